@@ -1,0 +1,32 @@
+# Decides whether the CUDA backend is built: sets JFPX_HAS_CUDA. The runtime is linked statically,
+# so that a program with the backend starts on a machine without a driver and can say so.
+set(JFPX_HAS_CUDA OFF)
+if(JFPX_CUDA STREQUAL "OFF")
+  jfpx_summary(cuda off "JFPX_CUDA=OFF")
+  return()
+endif()
+
+if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
+  set(CMAKE_CUDA_ARCHITECTURES "75-real;90" CACHE STRING "CUDA architectures")
+endif()
+include(CheckLanguage)
+check_language(CUDA)
+if(NOT CMAKE_CUDA_COMPILER)
+  if(JFPX_CUDA STREQUAL "ON")
+    message(FATAL_ERROR "JFPX_CUDA=ON, but no CUDA compiler was found. "
+      "Put nvcc on PATH, set CUDACXX, or configure with -DJFPX_CUDA=OFF.")
+  endif()
+  jfpx_summary(cuda off "nvcc not found")
+  return()
+endif()
+
+enable_language(CUDA)
+find_package(CUDAToolkit REQUIRED)
+set(JFPX_HAS_CUDA ON)
+# CMake 3.25 does not know CUDA20: the flag is given by hand (CUDA_STANDARD would decay to 17).
+# --fmad=false: nvcc must round each operation once, as the host compilers do.
+target_compile_options(jfpx_build_flags INTERFACE
+  "$<$<COMPILE_LANGUAGE:CUDA>:-std=c++20;--fmad=false;--Wreorder;-Xcompiler=-Wall;-Xcompiler=-Wextra;-Xcompiler=-Wconversion;-Xcompiler=-Wshadow;-Xcompiler=-ffp-contract=off>"
+  "$<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<BOOL:${JFPX_WERROR}>>:-Werror=all-warnings;-Xcompiler=-Werror>")
+string(REPLACE ";" ", " architectures "${CMAKE_CUDA_ARCHITECTURES}")
+jfpx_summary(cuda on "nvcc ${CMAKE_CUDA_COMPILER_VERSION}, architectures ${architectures}")

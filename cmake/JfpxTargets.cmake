@@ -1,0 +1,67 @@
+# Helpers that make each target twice: NAME computes in float, NAME_f64 in double.
+find_package(Threads REQUIRED)
+include(GNUInstallDirs)
+
+configure_file(${PROJECT_SOURCE_DIR}/include/jfpx/config.hpp.in
+               ${PROJECT_BINARY_DIR}/include/jfpx/config.hpp @ONLY)
+
+# Flags of our own files only; nothing here reaches a user's target.
+add_library(jfpx_build_flags INTERFACE)
+target_compile_features(jfpx_build_flags INTERFACE cxx_std_20)
+target_compile_options(jfpx_build_flags INTERFACE
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wconversion;-Wshadow>
+  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${JFPX_WERROR}>>:-Werror>)
+target_include_directories(jfpx_build_flags INTERFACE ${PROJECT_SOURCE_DIR})
+
+# The promise of equal bits rests on each operation being rounded once. g++ and clang contract
+# a*b+c to FMA when the target has it; users inline our headers (and Bullet's), so the flag is
+# part of the usage requirements.
+set(JFPX_EXACT_FLAGS $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-ffp-contract=off>)
+
+# jfpx_add_library(NAME [SOURCES ...] [LINK ...]): NAME and NAME_f64. A name in LINK that has a
+# _f64 sibling is linked as that sibling into NAME_f64.
+function(jfpx_add_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  foreach(suffix IN ITEMS "" "_f64")
+    set(target ${name}${suffix})
+    add_library(${target} ${arg_SOURCES})
+    _jfpx_configure(${target} "${suffix}" "${arg_PUBLIC}" "${arg_PRIVATE}")
+    target_compile_options(${target} PUBLIC ${JFPX_EXACT_FLAGS})
+    target_include_directories(${target} PUBLIC
+      $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+      $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
+      $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+    if(suffix)
+      target_compile_definitions(${target} PUBLIC JFPX_DOUBLE_PRECISION=1)
+    endif()
+  endforeach()
+endfunction()
+
+# jfpx_add_executable(NAME SOURCES ... [LINK ...] [F64_NAME n]): NAME and NAME_f64.
+function(jfpx_add_executable name)
+  cmake_parse_arguments(arg "" "F64_NAME" "SOURCES;LINK" ${ARGN})
+  foreach(suffix IN ITEMS "" "_f64")
+    set(target ${name}${suffix})
+    add_executable(${target} ${arg_SOURCES})
+    _jfpx_configure(${target} "${suffix}" "" "${arg_LINK}")
+  endforeach()
+  if(arg_F64_NAME)
+    set_target_properties(${name}_f64 PROPERTIES OUTPUT_NAME ${arg_F64_NAME})
+  endif()
+endfunction()
+
+function(_jfpx_configure target suffix public private)
+  foreach(scope IN ITEMS PUBLIC PRIVATE)
+    string(TOLOWER ${scope} list)
+    foreach(dependency IN LISTS ${list})
+      if(suffix AND TARGET ${dependency}${suffix})
+        set(dependency ${dependency}${suffix})
+      endif()
+      target_link_libraries(${target} ${scope} ${dependency})
+    endforeach()
+  endforeach()
+  target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:jfpx_build_flags>)
+  set_target_properties(${target} PROPERTIES
+    CXX_EXTENSIONS OFF CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON
+    CUDA_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
+endfunction()

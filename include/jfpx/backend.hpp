@@ -1,0 +1,35 @@
+/// Which parts of the machine can compute, and which cannot and why.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI {
+
+/// Who computes. All give the same bits, so `automatic` is free to choose.
+enum class Backend : std::uint8_t { automatic, x86, cuda };
+
+/// One row of the backend table.
+struct BackendStatus {
+  Backend backend = Backend::x86;
+  bool compiled = false;  ///< this build contains it
+  bool usable = false;    ///< it can run here and now
+  std::string device;     ///< the processor or GPU; empty where unknown
+  std::string reason;     ///< why it is not usable; empty where it is
+};
+
+/// All backends that jfpx knows, in a fixed order, probed now. Never throws for a missing device
+/// and leaves no CUDA error behind. Thread-safe.
+JFPX_API std::vector<BackendStatus> available_backends();
+
+/// "auto", "x86" or "cuda".
+JFPX_API std::string_view to_string(Backend backend) noexcept;
+/// The inverse of to_string(); empty for any other text.
+JFPX_API std::optional<Backend> parse_backend(std::string_view text) noexcept;
+
+}  // namespace jfpx::inline JFPX_ABI

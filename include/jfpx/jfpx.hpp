@@ -1,0 +1,10 @@
+/// Everything of jfpx that needs neither CUDA nor Bullet.
+#pragma once
+
+#include <jfpx/backend.hpp>
+#include <jfpx/error.hpp>
+#include <jfpx/random.hpp>
+#include <jfpx/recording.hpp>
+#include <jfpx/scene.hpp>
+#include <jfpx/sphere_collider.hpp>
+#include <jfpx/world.hpp>

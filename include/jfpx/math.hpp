@@ -1,0 +1,308 @@
+/// Vectors, quaternions, matrices, transforms and boxes: values, inline, the same bits on host and
+/// device. Every expression is a fixed sequence of single IEEE operations (thesis 4.2).
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <cmath>
+#include <limits>
+
+namespace jfpx::inline JFPX_ABI {
+
+/// Machine epsilon of Real; the project's threshold for "no direction" (DESIGN: contact).
+inline constexpr Real kEpsilon = std::numeric_limits<Real>::epsilon();
+inline constexpr Real kPi = static_cast<Real>(3.14159265358979323846);
+
+/// Correctly rounded square root; nvcc and the host compilers agree bit for bit.
+JFPX_HD inline Real square_root(Real x) {
+#if defined(__CUDA_ARCH__)
+  return ::sqrt(x);
+#else
+  return std::sqrt(x);
+#endif
+}
+JFPX_HD inline Real absolute(Real x) {
+#if defined(__CUDA_ARCH__)
+  return ::fabs(x);
+#else
+  return std::fabs(x);
+#endif
+}
+
+/// A vector or point in three dimensions.
+struct Vec3 {
+  Real x = 0, y = 0, z = 0;
+
+  JFPX_HD constexpr Real& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
+  JFPX_HD constexpr const Real& operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
+  JFPX_HD constexpr Vec3& operator+=(const Vec3& v) {
+    x += v.x, y += v.y, z += v.z;
+    return *this;
+  }
+  JFPX_HD constexpr Vec3& operator-=(const Vec3& v) {
+    x -= v.x, y -= v.y, z -= v.z;
+    return *this;
+  }
+  JFPX_HD constexpr Vec3& operator*=(Real s) {
+    x *= s, y *= s, z *= s;
+    return *this;
+  }
+  friend bool operator==(const Vec3&, const Vec3&) = default;
+};
+
+JFPX_HD constexpr Vec3 operator+(Vec3 a, const Vec3& b) { return a += b; }
+JFPX_HD constexpr Vec3 operator-(Vec3 a, const Vec3& b) { return a -= b; }
+JFPX_HD constexpr Vec3 operator-(const Vec3& v) { return {-v.x, -v.y, -v.z}; }
+JFPX_HD constexpr Vec3 operator*(Vec3 v, Real s) { return v *= s; }
+JFPX_HD constexpr Vec3 operator*(Real s, Vec3 v) { return v *= s; }
+
+/// a.x*b.x + a.y*b.y + a.z*b.z, summed from the left.
+JFPX_HD constexpr Real dot(const Vec3& a, const Vec3& b) {
+  return (a.x * b.x + a.y * b.y) + a.z * b.z;
+}
+JFPX_HD constexpr Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+JFPX_HD constexpr Vec3 component_product(const Vec3& a, const Vec3& b) {
+  return {a.x * b.x, a.y * b.y, a.z * b.z};
+}
+JFPX_HD constexpr Vec3 add_scaled(const Vec3& v, const Vec3& direction, Real scale) {
+  return v + direction * scale;
+}
+JFPX_HD constexpr Real length_squared(const Vec3& v) { return dot(v, v); }
+JFPX_HD inline Real length(const Vec3& v) { return square_root(length_squared(v)); }
+/// v scaled to length 1; a vector no longer than kEpsilon has no direction and is returned as it
+/// is.
+JFPX_HD inline Vec3 normalized(const Vec3& v) {
+  const Real n = length(v);
+  return n > kEpsilon ? v * (Real(1) / n) : v;
+}
+JFPX_HD inline bool is_finite(Real x) { return absolute(x) <= std::numeric_limits<Real>::max(); }
+JFPX_HD inline bool is_finite(const Vec3& v) {
+  return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
+}
+
+/// A rotation as w + xi + yj + zk. The default is the identity (erratum E24).
+struct Quat {
+  Real w = 1, x = 0, y = 0, z = 0;
+  friend bool operator==(const Quat&, const Quat&) = default;
+};
+
+/// Hamilton product: first b, then a.
+JFPX_HD constexpr Quat operator*(const Quat& a, const Quat& b) {
+  return {
+      a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+      a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
+}
+JFPX_HD constexpr Quat conjugate(const Quat& q) { return {q.w, -q.x, -q.y, -q.z}; }
+JFPX_HD constexpr Real length_squared(const Quat& q) {
+  return q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
+}
+/// q scaled to length 1; the identity when q is too short to have a direction (erratum E24).
+JFPX_HD inline Quat normalized(const Quat& q) {
+  const Real n2 = length_squared(q);
+  if (!(n2 > kEpsilon * kEpsilon)) return {};
+  const Real k = Real(1) / square_root(n2);
+  return {q.w * k, q.x * k, q.y * k, q.z * k};
+}
+/// q turned by the rotation vector `scale * omega` (world frame, [rad]) to first order, not
+/// normalised: q + (scale/2) * omega * q (thesis 4.2.2).
+JFPX_HD constexpr Quat add_scaled(const Quat& q, const Vec3& omega, Real scale) {
+  const Quat t = Quat{0, omega.x * scale, omega.y * scale, omega.z * scale} * q;
+  const Real half = Real(0.5);
+  return {q.w + t.w * half, q.x + t.x * half, q.y + t.y * half, q.z + t.z * half};
+}
+/// q turned by the small rotation vector `r` [rad], normalised (erratum E25).
+JFPX_HD inline Quat rotated_by(const Quat& q, const Vec3& r) {
+  return normalized(add_scaled(q, r, 1));
+}
+JFPX_HD inline bool is_finite(const Quat& q) {
+  return is_finite(q.w) && is_finite(q.x) && is_finite(q.y) && is_finite(q.z);
+}
+
+/// A 3x3 matrix, stored by rows. The default is the identity.
+struct Mat3 {
+  Vec3 row[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+  JFPX_HD constexpr Real operator()(int r, int c) const { return row[r][c]; }
+  JFPX_HD constexpr Real& operator()(int r, int c) { return row[r][c]; }
+  JFPX_HD constexpr Vec3 column(int c) const { return {row[0][c], row[1][c], row[2][c]}; }
+  friend bool operator==(const Mat3&, const Mat3&) = default;
+};
+
+JFPX_HD constexpr Mat3 diagonal(const Vec3& d) { return {{{d.x, 0, 0}, {0, d.y, 0}, {0, 0, d.z}}}; }
+JFPX_HD constexpr Mat3 from_columns(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return {{{a.x, b.x, c.x}, {a.y, b.y, c.y}, {a.z, b.z, c.z}}};
+}
+/// The matrix S with S*v = cross(u, v).
+JFPX_HD constexpr Mat3 skew_symmetric(const Vec3& u) {
+  return {{{0, -u.z, u.y}, {u.z, 0, -u.x}, {-u.y, u.x, 0}}};
+}
+JFPX_HD constexpr Mat3 transposed(const Mat3& m) {
+  return {{m.column(0), m.column(1), m.column(2)}};
+}
+JFPX_HD constexpr Vec3 operator*(const Mat3& m, const Vec3& v) {
+  return {dot(m.row[0], v), dot(m.row[1], v), dot(m.row[2], v)};
+}
+/// transposed(m) * v
+JFPX_HD constexpr Vec3 transform_transpose(const Mat3& m, const Vec3& v) {
+  return {dot(m.column(0), v), dot(m.column(1), v), dot(m.column(2), v)};
+}
+JFPX_HD constexpr Mat3 operator*(const Mat3& a, const Mat3& b) {
+  return from_columns(a * b.column(0), a * b.column(1), a * b.column(2));
+}
+JFPX_HD constexpr Mat3 operator*(const Mat3& m, Real s) {
+  return {{m.row[0] * s, m.row[1] * s, m.row[2] * s}};
+}
+JFPX_HD constexpr Mat3 operator+(const Mat3& a, const Mat3& b) {
+  return {{a.row[0] + b.row[0], a.row[1] + b.row[1], a.row[2] + b.row[2]}};
+}
+JFPX_HD constexpr Mat3 interpolate(const Mat3& a, const Mat3& b, Real t) {
+  return a * (Real(1) - t) + b * t;
+}
+JFPX_HD constexpr Real determinant(const Mat3& m) {
+  return dot(m.row[0], cross(m.row[1], m.row[2]));
+}
+/// Writes the inverse of m to *out. False, and *out untouched, when m is singular (erratum E26).
+JFPX_HD inline bool invert(const Mat3& m, Mat3* out) {
+  const Vec3 c0 = cross(m.row[1], m.row[2]);
+  const Vec3 c1 = cross(m.row[2], m.row[0]);
+  const Vec3 c2 = cross(m.row[0], m.row[1]);
+  const Real det = dot(m.row[0], c0);
+  if (!(absolute(det) > 0) || !is_finite(Real(1) / det)) return false;
+  *out = from_columns(c0, c1, c2) * (Real(1) / det);
+  return true;
+}
+/// Rotation matrix of a unit quaternion: R*v = q v q* (erratum E14 had the transpose).
+JFPX_HD constexpr Mat3 to_matrix(const Quat& q) {
+  const Real x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
+  const Real xx = q.x * x2, yy = q.y * y2, zz = q.z * z2;
+  const Real xy = q.x * y2, xz = q.x * z2, yz = q.y * z2;
+  const Real wx = q.w * x2, wy = q.w * y2, wz = q.w * z2;
+  return {{{1 - (yy + zz), xy - wz, xz + wy},
+           {xy + wz, 1 - (xx + zz), yz - wx},
+           {xz - wy, yz + wx, 1 - (xx + yy)}}};
+}
+JFPX_HD constexpr Vec3 rotate(const Quat& q, const Vec3& v) { return to_matrix(q) * v; }
+
+/// A rigid motion: p -> basis * p + origin, with an orthonormal basis.
+struct Transform {
+  Mat3 basis;
+  Vec3 origin;
+  friend bool operator==(const Transform&, const Transform&) = default;
+};
+JFPX_HD constexpr Transform make_transform(const Quat& q, const Vec3& origin) {
+  return {to_matrix(q), origin};
+}
+JFPX_HD constexpr Vec3 transform_point(const Transform& t, const Vec3& p) {
+  return t.basis * p + t.origin;
+}
+JFPX_HD constexpr Vec3 inverse_transform_point(const Transform& t, const Vec3& p) {
+  return transform_transpose(t.basis, p - t.origin);
+}
+JFPX_HD constexpr Vec3 transform_direction(const Transform& t, const Vec3& d) {
+  return t.basis * d;
+}
+JFPX_HD constexpr Vec3 inverse_transform_direction(const Transform& t, const Vec3& d) {
+  return transform_transpose(t.basis, d);
+}
+/// First b, then a.
+JFPX_HD constexpr Transform operator*(const Transform& a, const Transform& b) {
+  return {a.basis * b.basis, transform_point(a, b.origin)};
+}
+JFPX_HD constexpr Transform inverse(const Transform& t) {
+  return {transposed(t.basis), -transform_transpose(t.basis, t.origin)};
+}
+
+/// A general 4x4 matrix, stored by rows. The default is the identity.
+struct Mat4 {
+  Real m[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
+  friend bool operator==(const Mat4&, const Mat4&) = default;
+};
+JFPX_HD constexpr Mat4 to_mat4(const Transform& t) {
+  Mat4 r;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) r.m[i][j] = t.basis(i, j);
+    r.m[i][3] = t.origin[i];
+  }
+  return r;
+}
+JFPX_HD constexpr Mat4 operator*(const Mat4& a, const Mat4& b) {
+  Mat4 r;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      r.m[i][j] = a.m[i][0] * b.m[0][j] + a.m[i][1] * b.m[1][j] + a.m[i][2] * b.m[2][j] +
+                  a.m[i][3] * b.m[3][j];
+    }
+  }
+  return r;
+}
+/// The point p, with w = 1 and no perspective division.
+JFPX_HD constexpr Vec3 transform_point(const Mat4& a, const Vec3& p) {
+  return {a.m[0][0] * p.x + a.m[0][1] * p.y + a.m[0][2] * p.z + a.m[0][3],
+          a.m[1][0] * p.x + a.m[1][1] * p.y + a.m[1][2] * p.z + a.m[1][3],
+          a.m[2][0] * p.x + a.m[2][1] * p.y + a.m[2][2] * p.z + a.m[2][3]};
+}
+/// Column c without its last element: the axes (0-2) and the origin (3) of an affine matrix.
+JFPX_HD constexpr Vec3 axis(const Mat4& a, int c) { return {a.m[0][c], a.m[1][c], a.m[2][c]}; }
+/// Determinant of the 3x3 matrix that is left without row r and column c.
+JFPX_HD constexpr Real minor(const Mat4& a, int r, int c) {
+  Mat3 s;
+  for (int i = 0, k = 0; i < 4; ++i) {
+    if (i == r) continue;
+    for (int j = 0, l = 0; j < 4; ++j) {
+      if (j != c) s(k, l++) = a.m[i][j];
+    }
+    ++k;
+  }
+  return determinant(s);
+}
+JFPX_HD constexpr Real determinant(const Mat4& a) {
+  return a.m[0][0] * minor(a, 0, 0) - a.m[0][1] * minor(a, 0, 1) + a.m[0][2] * minor(a, 0, 2) -
+         a.m[0][3] * minor(a, 0, 3);
+}
+/// Writes the inverse to *out. False, and *out untouched, when a is singular (erratum E26).
+JFPX_HD inline bool invert(const Mat4& a, Mat4* out) {
+  const Real det = determinant(a);
+  if (!(absolute(det) > 0) || !is_finite(Real(1) / det)) return false;
+  const Real k = Real(1) / det;
+  Mat4 r;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      const Real sign = ((i + j) & 1) != 0 ? Real(-1) : Real(1);
+      r.m[j][i] = sign * minor(a, i, j) * k;
+    }
+  }
+  *out = r;
+  return true;
+}
+/// OpenGL's order: out[4*column + row].
+JFPX_HD constexpr void fill_column_major(const Mat4& a, Real out[16]) {
+  for (int j = 0; j < 4; ++j) {
+    for (int i = 0; i < 4; ++i) out[4 * j + i] = a.m[i][j];
+  }
+}
+
+/// An axis-aligned box. The default is empty.
+struct Aabb {
+  Vec3 lower{std::numeric_limits<Real>::max(), std::numeric_limits<Real>::max(),
+             std::numeric_limits<Real>::max()};
+  Vec3 upper{std::numeric_limits<Real>::lowest(), std::numeric_limits<Real>::lowest(),
+             std::numeric_limits<Real>::lowest()};
+  friend bool operator==(const Aabb&, const Aabb&) = default;
+};
+/// True also when the boxes only touch.
+JFPX_HD constexpr bool overlap(const Aabb& a, const Aabb& b) {
+  return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y &&
+         b.lower.y <= a.upper.y && a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
+}
+JFPX_HD constexpr Aabb merged(const Aabb& a, const Aabb& b) {
+  Aabb r;
+  for (int i = 0; i < 3; ++i) {
+    r.lower[i] = a.lower[i] < b.lower[i] ? a.lower[i] : b.lower[i];
+    r.upper[i] = a.upper[i] > b.upper[i] ? a.upper[i] : b.upper[i];
+  }
+  return r;
+}
+
+}  // namespace jfpx::inline JFPX_ABI

@@ -1,0 +1,64 @@
+/// Finds touching spheres: the narrowphase that the thesis moved to the GPU (thesis 4.5).
+#pragma once
+
+#include <jfpx/backend.hpp>
+#include <jfpx/contact.hpp>
+
+#include <memory>
+#include <span>
+
+namespace jfpx::inline JFPX_ABI {
+
+/// How pairs are found. All give the same contacts, bit for bit.
+enum class SphereAlgorithm : std::uint8_t {
+  automatic,
+  all_pairs,     ///< every pair is looked at: best for some hundreds of spheres
+  sorted_tiles,  ///< spheres sorted along a space-filling curve, tiles culled by their boxes
+};
+
+/// Widest vector instructions that may be used. A level that the processor lacks is lowered.
+enum class SimdLevel : std::uint8_t { automatic, scalar, sse2, avx2, avx512 };
+
+struct SphereColliderOptions {
+  Backend backend = Backend::automatic;
+  SphereAlgorithm algorithm = SphereAlgorithm::automatic;
+  unsigned threads = 1;                   ///< x86: worker threads, 0 = one per core, at most 256
+  SimdLevel simd = SimdLevel::automatic;  ///< x86
+  int device = 0;                         ///< cuda: ordinal of the GPU
+};
+
+/// Finds contacts among spheres. Owns its buffers, which only grow; calls are not thread-safe, but
+/// several colliders can be used by several threads. Results do not depend on backend, algorithm,
+/// number of threads or vector width, and stay valid until the next call on the same object.
+class JFPX_API SphereCollider {
+ public:
+  virtual ~SphereCollider();
+  SphereCollider(const SphereCollider&) = delete;
+  SphereCollider& operator=(const SphereCollider&) = delete;
+
+  /// All touching pairs among `spheres`, sorted by (a, b). No pair is lost, whatever their number.
+  /// @throws InvalidArgument if a value is not finite or a radius is not > 0: names the first such
+  ///   sphere and field. OutOfMemory with the bytes needed, DeviceError: the collider stays usable.
+  virtual ContactSpan find_contacts(std::span<const SphereInstance> spheres) = 0;
+
+  /// Tests only the given pairs, in their order; result i belongs to pairs[i]. Follows Bullet's
+  /// btSphereSphereCollisionAlgorithm for any values: a NaN makes a contact, nothing is rejected.
+  /// @throws InvalidArgument if a pair names a sphere that is not there; OutOfMemory, DeviceError.
+  virtual std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
+                                                 std::span<const SpherePair> pairs) = 0;
+
+  /// Who computed the last call (for a fixed backend: that backend).
+  virtual Backend backend() const noexcept = 0;
+  /// How pairs were found in the last find_contacts(); `automatic` before the first.
+  virtual SphereAlgorithm algorithm() const noexcept = 0;
+
+ protected:
+  SphereCollider() = default;
+};
+
+/// @throws BackendUnavailable if `options.backend` is asked for by name and can't be had;
+///   InvalidArgument for a bad option.
+JFPX_API std::unique_ptr<SphereCollider> make_sphere_collider(
+    const SphereColliderOptions& options = {});
+
+}  // namespace jfpx::inline JFPX_ABI

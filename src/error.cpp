@@ -1,0 +1,14 @@
+/// Home of the exceptions' vtables, so that they have one type across shared libraries.
+#include <jfpx/error.hpp>
+
+namespace jfpx::inline JFPX_ABI {
+
+Error::~Error() = default;
+InvalidScene::~InvalidScene() = default;
+InvalidArgument::~InvalidArgument() = default;
+BackendUnavailable::~BackendUnavailable() = default;
+OutOfMemory::~OutOfMemory() = default;
+DeviceError::~DeviceError() = default;
+FileError::~FileError() = default;
+
+}  // namespace jfpx::inline JFPX_ABI

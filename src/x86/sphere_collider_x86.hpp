@@ -1,0 +1,11 @@
+/// The x86 row of the backend table.
+#pragma once
+
+#include <jfpx/sphere_collider.hpp>
+
+namespace jfpx::inline JFPX_ABI::x86 {
+
+BackendStatus probe();
+std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options);
+
+}  // namespace jfpx::inline JFPX_ABI::x86
