@@ -2,14 +2,16 @@
 #pragma once
 
 #include <jfpx/scene.hpp>
+
 #include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace jfpx::inline JFPX_ABI::scenes {
 
 struct Options {
-  std::optional<std::uint32_t> spheres;  ///< number of spheres; the scene's default if absent
+  std::optional<std::uint32_t> spheres;  ///< the scene's default if absent
   std::uint64_t seed = 1;
 };
 
@@ -24,11 +26,16 @@ struct Entry {
 std::span<const Entry> all();
 
 /// The scene called `name`. `lattice` rounds the number of spheres down to a cube.
-/// @throws InvalidArgument for an unknown name (lists the names) or a number of spheres that a
-///   SphereIndex can't count.
+/// @throws InvalidArgument for an unknown name (lists the names); OutOfMemory that says how much is
+///   needed, before anything is touched, when the bodies would not fit into the machine's memory.
 Scene make(std::string_view name, const Options& options = {});
 
 /// The spheres of a scene, in body order: input for a SphereCollider.
 std::vector<SphereInstance> spheres_of(const Scene& scene);
+
+/// Uniformly random unit-diameter spheres, as many per volume as give `contacts_per_sphere`
+/// touching pairs per sphere on average (4 times the volume fraction). Spheres overlap freely.
+std::vector<SphereInstance> random_spheres(std::uint32_t count, Real contacts_per_sphere,
+                                           std::uint64_t seed);
 
 }  // namespace jfpx::inline JFPX_ABI::scenes

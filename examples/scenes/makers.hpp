@@ -1,0 +1,29 @@
+/// The makers behind the table of named scenes, and the parts that they share.
+#pragma once
+
+#include <jfpx/random.hpp>
+#include <jfpx/scene.hpp>
+
+namespace jfpx::inline JFPX_ABI::scenes {
+
+Scene make_boxes_and_balls(std::uint32_t spheres, std::uint64_t seed);
+Scene make_pile(std::uint32_t spheres, std::uint64_t seed);
+Scene make_gas(std::uint32_t spheres, std::uint64_t seed);
+Scene make_columns(std::uint32_t spheres, std::uint64_t seed);
+Scene make_overlap(std::uint32_t spheres, std::uint64_t seed);
+Scene make_lattice(std::uint32_t spheres, std::uint64_t seed);
+Scene make_polydisperse(std::uint32_t spheres, std::uint64_t seed);
+
+/// Smallest integer whose cube is at least n.
+std::uint32_t cube_side(std::uint32_t n);
+/// Site i of a cubic lattice with `side` sites along x and z and as many layers in y as needed.
+Vec3 lattice_site(std::uint32_t i, std::uint32_t side);
+
+/// A solid sphere of density 1 would weigh little; scenes give the mass instead.
+BodyDef sphere_at(const Vec3& position, Real radius, Real mass);
+/// Adds static box walls, 1 m thick or more, around the inner box [lower, upper]: floor and four
+/// sides, and a lid if `closed`.
+void add_container(Scene& scene, const Vec3& lower, const Vec3& upper, bool closed,
+                   const BodyDef& material);
+
+}  // namespace jfpx::inline JFPX_ABI::scenes
