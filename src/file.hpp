@@ -1,0 +1,20 @@
+/// Whole files, with errors that say which file and why.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <string>
+#include <string_view>
+
+namespace jfpx::inline JFPX_ABI {
+
+/// `PATH: what: reason from errno`, for FileError.
+std::string file_message(const std::string& path, std::string_view what, int error_number);
+
+/// @throws FileError
+std::string read_file(const std::string& path);
+/// Writes beside the path and renames, so that the file is there whole or not at all.
+/// @throws FileError
+void write_file(const std::string& path, std::string_view content);
+
+}  // namespace jfpx::inline JFPX_ABI

@@ -1,0 +1,12 @@
+/// JSON text of what recordings carry besides the scene.
+#pragma once
+
+#include <jfpx/recording.hpp>
+
+namespace jfpx::inline JFPX_ABI {
+
+std::string recording_header_to_json(const RecordingHeader& header);
+/// @throws InvalidScene
+RecordingHeader recording_header_from_json(std::string_view text);
+
+}  // namespace jfpx::inline JFPX_ABI
