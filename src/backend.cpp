@@ -14,7 +14,7 @@ namespace {
 #if JFPX_HAS_CUDA
 BackendStatus probe_cuda() { return cuda::probe(); }
 #else
-BackendStatus probe_cuda() { return {.backend = Backend::cuda, .reason = "built without CUDA"}; }
+BackendStatus probe_cuda() { return {Backend::cuda, false, false, {}, "built without CUDA"}; }
 #endif
 
 std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOptions&) {

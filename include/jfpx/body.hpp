@@ -21,8 +21,8 @@ struct BodyDef {
   Real mass = 1;  ///< [kg], >= 0; 0 means immovable
   Vec3 position;  ///< [m], centre of mass
   Quat orientation;
-  Vec3 velocity;                         ///< [m/s]
-  Vec3 angular_velocity;                 ///< [rad/s], world frame
+  Vec3 velocity;                         ///< [m/s]; an immovable body stays at rest
+  Vec3 angular_velocity;                 ///< [rad/s], world frame; likewise
   Vec3 acceleration{0, Real(-9.81), 0};  ///< [m/s^2], constant; ignored by an immovable body
   Real linear_damping = 1;               ///< [-], share of velocity kept per second, in (0, 1]
   Real angular_damping = 1;              ///< [-], likewise for angular velocity

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <jfpx/backend.hpp>
+#include <jfpx/collide.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/recording.hpp>

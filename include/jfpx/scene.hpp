@@ -14,9 +14,9 @@ struct ResolverSettings {
   /// Most contacts corrected per step in each loop; 0 means 8 per movable body, as the thesis did.
   std::uint32_t max_iterations = 0;
   Real velocity_epsilon = Real(0.01);      ///< [m/s], > 0: smaller closing changes are left alone
-  Real position_epsilon = Real(0.01);      ///< [m], > 0: smaller penetrations are left alone
+  Real position_epsilon = Real(0.01);      ///< [m], > 0: deeper penetrations are brought below it
   Real restitution_velocity = Real(0.25);  ///< [m/s], >= 0: slower contacts do not bounce
-  Real angular_limit = Real(0.2);  ///< [-], in (0, 1]: share of a projection that may rotate
+  Real angular_limit = Real(0.2);  ///< [rad], in (0, 1]: how far one projection may turn a body
   friend bool operator==(const ResolverSettings&, const ResolverSettings&) = default;
 };
 
@@ -41,8 +41,13 @@ struct Scene {
 inline constexpr int kSceneSchemaVersion = 1;
 /// Largest distance from the origin, per axis, that a position may have: [m].
 inline constexpr Real kMaxCoordinate = Real(1e9);
+/// How far from 1 the square of the length of a unit vector or quaternion may be: enough for
+/// numbers typed with four digits. Engines normalise what they are given.
+inline constexpr Real kUnitTolerance = Real(1e-3);
 
-/// Checks everything that could reach a step. Returns normally if the scene is sound.
+/// Checks everything that could reach a step. Returns normally if the scene is sound. Besides the
+/// ranges given with the fields: sizes, positions and offsets are at most kMaxCoordinate, masses
+/// and moments of inertia have finite inverses, dt is not denormal, 2^32 - 1 bodies at most.
 /// @throws InvalidScene naming the first bad body, field, its value and the allowed range.
 JFPX_API void validate(const Scene& scene);
 

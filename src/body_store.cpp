@@ -1,0 +1,173 @@
+/// Bodies come, move freely, sleep, wake and go.
+#include "src/body_store.hpp"
+
+#include "src/shared/inertia.hpp"
+#include "src/shared/integrate.hpp"
+#include "src/shared/power.hpp"
+
+#include <algorithm>
+
+namespace jfpx::inline JFPX_ABI {
+namespace {
+
+Real kept_per_step(Real kept_per_second, Real dt) {
+  return static_cast<Real>(shared::power(kept_per_second, dt));
+}
+
+Mat3 inverse_inertia_of(const Shape& shape, Real mass) {
+  Vec3 moments;
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) {
+    moments = shared::moments_of_inertia(*sphere, mass);
+  } else if (const auto* box = std::get_if<Box>(&shape)) {
+    moments = shared::moments_of_inertia(*box, mass);
+  }
+  // An immovable body has no inverse inertia, on purpose (erratum E26).
+  const auto inverse = [](Real moment) { return moment > 0 ? Real(1) / moment : Real(0); };
+  return diagonal({inverse(moments.x), inverse(moments.y), inverse(moments.z)});
+}
+
+bool before(BodyId a, BodyId b) { return a.index < b.index; }
+
+}  // namespace
+
+BodyStore::BodyStore(Real dt, const SleepSettings& sleep)
+    : dt_(dt), sleep_(sleep), motion_kept_(kept_per_step(sleep.bias, dt)) {}
+
+void BodyStore::resize(std::size_t slots) {
+  const auto all = [slots](auto&... arrays) { (arrays.resize(slots), ...); };
+  all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
+      moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion, moving.awake);
+  all(shape_, radius_, inverse_mass_, friction_, restitution_, body_inverse_inertia_, acceleration_,
+      velocity_kept_, angular_velocity_kept_, can_sleep_, generation_);
+}
+
+BodyId BodyStore::add(const BodyDef& def) {
+  if (free_.empty()) {
+    resize(capacity() + 1);
+    free_.push_back(static_cast<std::uint32_t>(capacity() - 1));
+  }
+  const std::uint32_t i = free_.back();
+  const BodyId id{i, generation_[i]};
+  ids_.insert(std::upper_bound(ids_.begin(), ids_.end(), id, before), id);
+  free_.pop_back();
+
+  shape_[i] = def.shape;
+  if (auto* half_space = std::get_if<HalfSpace>(&shape_[i])) {
+    const Real scale = Real(1) / length(half_space->normal);
+    half_space->normal *= scale;
+    half_space->offset *= scale;
+  }
+  const auto* sphere = std::get_if<Sphere>(&def.shape);
+  radius_[i] = sphere != nullptr ? sphere->radius : Real(0);
+  friction_[i] = def.friction;
+  restitution_[i] = def.restitution;
+  inverse_mass_[i] = def.mass > 0 ? Real(1) / def.mass : Real(0);
+  body_inverse_inertia_[i] = inverse_inertia_of(def.shape, def.mass);
+  acceleration_[i] = def.acceleration;
+  velocity_kept_[i] = kept_per_step(def.linear_damping, dt_);
+  angular_velocity_kept_[i] = kept_per_step(def.angular_damping, dt_);
+  can_sleep_[i] = sleep_.enabled && def.can_sleep ? 1 : 0;
+  moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
+  moving.motion[i] = 0;
+  moving.awake[i] = 0;
+  if (movable(i)) ++movable_count_;
+  set_state(i, {def.position, def.orientation, def.velocity, def.angular_velocity});
+  return id;
+}
+
+void BodyStore::remove(BodyId id) {
+  // A slot whose generations are used up is given up: an id never comes back.
+  if (generation_[id.index] + 1 != 0) free_.push_back(id.index);
+  ++generation_[id.index];
+  ids_.erase(std::lower_bound(ids_.begin(), ids_.end(), id, before));
+  if (movable(id.index)) --movable_count_;
+  moving.awake[id.index] = 0;
+}
+
+bool BodyStore::contains(BodyId id) const noexcept {
+  const auto place = std::lower_bound(ids_.begin(), ids_.end(), id, before);
+  return place != ids_.end() && *place == id;
+}
+
+BodyState BodyStore::state(std::uint32_t i) const {
+  return {moving.position[i], moving.orientation[i], moving.velocity[i],
+          moving.angular_velocity[i]};
+}
+
+void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
+  moving.position[i] = state.position;
+  moving.orientation[i] = normalized(state.orientation);
+  moving.velocity[i] = movable(i) ? state.velocity : Vec3{};
+  moving.angular_velocity[i] = movable(i) ? state.angular_velocity : Vec3{};
+  refresh_inertia(i);
+  wake(i);
+}
+
+void BodyStore::displace(std::uint32_t i, const Vec3& shift, const Vec3& turn) {
+  moving.position[i] += shift;
+  if (turn == Vec3{}) return;
+  moving.orientation[i] = rotated_by(moving.orientation[i], turn);
+  refresh_inertia(i);
+}
+
+void BodyStore::apply_force(std::uint32_t i, const Vec3& force) {
+  if (!movable(i)) return;
+  moving.force[i] += force;
+  wake(i);
+}
+
+void BodyStore::apply_torque(std::uint32_t i, const Vec3& torque) {
+  if (!movable(i)) return;
+  moving.torque[i] += torque;
+  wake(i);
+}
+
+void BodyStore::wake(std::uint32_t i) {
+  if (!movable(i)) return;
+  moving.awake[i] = 1;
+  moving.motion[i] = 2 * sleep_.epsilon;
+}
+
+void BodyStore::wake_by_touch(std::uint32_t sleeper, std::uint32_t toucher) {
+  // Passing the motion on, instead of topping it up, lets bodies that touch fall asleep together:
+  // topped up, they would wake each other in turn for ever.
+  moving.awake[sleeper] = 1;
+  moving.motion[sleeper] = moving.motion[toucher];
+}
+
+void BodyStore::integrate() {
+  for (const BodyId id : ids_) {
+    if (moving.awake[id.index] != 0) integrate(id.index);
+    moving.force[id.index] = moving.torque[id.index] = {};
+  }
+}
+
+void BodyStore::integrate(std::uint32_t i) {
+  moving.last_acceleration[i] = add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]);
+  const Vec3 angular_acceleration = moving.inverse_inertia[i] * moving.torque[i];
+  moving.velocity[i] = shared::integrated_velocity(moving.velocity[i], moving.last_acceleration[i],
+                                                   dt_, velocity_kept_[i]);
+  moving.angular_velocity[i] = shared::integrated_velocity(
+      moving.angular_velocity[i], angular_acceleration, dt_, angular_velocity_kept_[i]);
+  moving.position[i] = shared::integrated_position(moving.position[i], moving.velocity[i], dt_);
+  moving.orientation[i] =
+      shared::integrated_orientation(moving.orientation[i], moving.angular_velocity[i], dt_);
+  refresh_inertia(i);
+  if (can_sleep_[i] != 0) update_sleep(i);
+}
+
+void BodyStore::update_sleep(std::uint32_t i) {
+  moving.motion[i] =
+      shared::mean_motion(moving.motion[i], moving.velocity[i], moving.angular_velocity[i],
+                          motion_kept_, 10 * sleep_.epsilon);
+  if (!(moving.motion[i] < sleep_.epsilon)) return;
+  moving.awake[i] = 0;
+  moving.velocity[i] = moving.angular_velocity[i] = {};
+}
+
+void BodyStore::refresh_inertia(std::uint32_t i) {
+  moving.inverse_inertia[i] =
+      shared::in_world_axes(body_inverse_inertia_[i], to_matrix(moving.orientation[i]));
+}
+
+}  // namespace jfpx::inline JFPX_ABI

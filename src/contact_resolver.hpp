@@ -1,0 +1,264 @@
+/// Resolves contacts one at a time, worst first: penetrations, then velocities (thesis 4.4.6).
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include "src/body_store.hpp"
+#include "src/indexed_heap.hpp"
+#include "src/shared/contact_response.hpp"
+
+#include <numeric>
+
+namespace jfpx::inline JFPX_ABI {
+
+/// What resolving took.
+struct ResolverReport {
+  std::uint64_t position_iterations = 0;
+  std::uint64_t velocity_iterations = 0;
+  bool exhausted = false;  ///< a loop stopped at its limit with work left
+};
+
+/// Both loops take the worst contact, resolve it alone, and refresh every contact of the bodies
+/// that it moved (errata E6, E10, E11). `Queue` says which is worst; all queues that prefer the
+/// largest key and then the lowest index give the same bits. Buffers only grow.
+template <class Queue>
+class BasicContactResolver {
+ public:
+  /// @param contacts a and b are indices of `bodies`; of two movable bodies in contact both or none
+  ///   are awake. Contacts without an awake body are left alone.
+  ResolverReport resolve(BodyStore& bodies, std::span<const Contact> contacts,
+                         const ResolverSettings& settings);
+
+ private:
+  struct Row {
+    std::uint32_t a, b;
+    Vec3 normal, arm_a, arm_b;  ///< arms: from the centre of mass to the contact
+    Real from_acceleration;     ///< [m/s], of the separating velocity
+    Real friction, restitution;
+  };
+  using RowIndex = std::uint32_t;
+
+  void prepare(std::span<const Contact> contacts);
+  void index_rows_by_body();
+  std::span<const RowIndex> rows_of(std::uint32_t body) const;
+  Vec3 lever_arm(std::uint32_t body, const Contact& contact, Real side) const;
+
+  void resolve_positions(ResolverReport* report);
+  void project(const Row& row, Real depth);
+  void displace(std::uint32_t body, const shared::Displacement& displacement);
+
+  void resolve_velocities(ResolverReport* report);
+  void strike(const Row& row, Real wanted);
+  void push(std::uint32_t body, const Vec3& arm, const Vec3& impulse);
+  Vec3 relative_velocity(const Row& row) const;
+  Real wanted_change(const Row& row) const;
+  std::uint64_t limit() const;
+
+  BodyStore* bodies_ = nullptr;  ///< of the call in progress
+  ResolverSettings settings_;
+  std::vector<Row> rows_;
+  std::vector<Real> keys_;
+  Queue queue_;
+  std::vector<std::uint32_t> first_row_;  ///< by body: where its part of body_rows_ starts
+  std::vector<RowIndex> body_rows_;
+};
+
+extern template class BasicContactResolver<IndexedHeap>;
+using ContactResolver = BasicContactResolver<IndexedHeap>;
+
+template <class Queue>
+ResolverReport BasicContactResolver<Queue>::resolve(BodyStore& bodies,
+                                                    std::span<const Contact> contacts,
+                                                    const ResolverSettings& settings) {
+  bodies_ = &bodies;
+  settings_ = settings;
+  prepare(contacts);
+  ResolverReport report;
+  if (rows_.empty()) return report;
+  index_rows_by_body();
+  resolve_positions(&report);
+  resolve_velocities(&report);
+  return report;
+}
+
+/// keys_ becomes the penetrations.
+template <class Queue>
+void BasicContactResolver<Queue>::prepare(std::span<const Contact> contacts) {
+  const MotionArrays& moving = bodies_->moving;
+  rows_.clear();
+  keys_.clear();
+  for (const Contact& c : contacts) {
+    if (moving.awake[c.a] == 0 && moving.awake[c.b] == 0) continue;
+    Vec3 acceleration;
+    if (moving.awake[c.a] != 0) acceleration += moving.last_acceleration[c.a];
+    if (moving.awake[c.b] != 0) acceleration -= moving.last_acceleration[c.b];
+    rows_.push_back({c.a, c.b, c.normal, lever_arm(c.a, c, -1), lever_arm(c.b, c, 1),
+                     dot(acceleration, c.normal) * bodies_->dt(),
+                     square_root(bodies_->friction(c.a) * bodies_->friction(c.b)),
+                     square_root(bodies_->restitution(c.a) * bodies_->restitution(c.b))});
+    keys_.push_back(-c.distance);
+  }
+}
+
+/// A sphere's arm is taken along the normal: the difference of two points far from the origin
+/// would have lost its digits. `side` is -1 for body a, 1 for body b (erratum E2).
+template <class Queue>
+Vec3 BasicContactResolver<Queue>::lever_arm(std::uint32_t body, const Contact& contact,
+                                            Real side) const {
+  const Real radius = bodies_->radius(body);
+  if (radius > 0) return contact.normal * (side * (radius + contact.distance * Real(0.5)));
+  return contact.point - bodies_->moving.position[body];
+}
+
+/// Counting sort of the rows by movable body; each body's rows stay in order.
+template <class Queue>
+void BasicContactResolver<Queue>::index_rows_by_body() {
+  first_row_.assign(bodies_->capacity() + 1, 0);
+  for (const Row& row : rows_) {
+    for (const std::uint32_t body : {row.a, row.b}) {
+      if (bodies_->movable(body)) ++first_row_[body];
+    }
+  }
+  std::partial_sum(first_row_.begin(), first_row_.end(), first_row_.begin());
+  body_rows_.resize(first_row_.back());
+  // Each entry is now the end of its body's part; filling from the back makes it the start.
+  for (auto i = static_cast<RowIndex>(rows_.size()); i-- > 0;) {
+    for (const std::uint32_t body : {rows_[i].a, rows_[i].b}) {
+      if (bodies_->movable(body)) body_rows_[--first_row_[body]] = i;
+    }
+  }
+}
+
+template <class Queue>
+std::span<const std::uint32_t> BasicContactResolver<Queue>::rows_of(std::uint32_t body) const {
+  return std::span(body_rows_).subspan(first_row_[body], first_row_[body + 1] - first_row_[body]);
+}
+
+template <class Queue>
+std::uint64_t BasicContactResolver<Queue>::limit() const {
+  return settings_.max_iterations != 0 ? settings_.max_iterations
+                                       : std::uint64_t{8} * bodies_->movable_count();
+}
+
+template <class Queue>
+void BasicContactResolver<Queue>::resolve_positions(ResolverReport* report) {
+  // A little of the allowed depth is left as slack: resolved to nothing, a body at rest would sink
+  // and jump by the whole depth for ever; resolved to the limit itself, rounding and neighbours
+  // would bring the contact back at once.
+  const Real kept_depth = settings_.position_epsilon * Real(15.0 / 16.0);
+  queue_.assign(keys_);
+  for (std::uint64_t left = limit();; --left) {
+    const RowIndex worst = queue_.top();
+    const Real depth = queue_.key(worst);
+    if (!(depth > settings_.position_epsilon)) return;
+    if (left == 0) break;
+    project(rows_[worst], depth - kept_depth);
+    ++report->position_iterations;
+  }
+  report->exhausted = true;
+}
+
+/// Moves both bodies of the row apart by `depth`, shared by how easily each yields (erratum E6a).
+template <class Queue>
+void BasicContactResolver<Queue>::project(const Row& row, Real depth) {
+  const MotionArrays& moving = bodies_->moving;
+  const Real yield_a = bodies_->inverse_mass(row.a) +
+                       shared::angular_yield(row.normal, row.arm_a, moving.inverse_inertia[row.a]);
+  const Real yield_b = bodies_->inverse_mass(row.b) +
+                       shared::angular_yield(row.normal, row.arm_b, moving.inverse_inertia[row.b]);
+  const auto share = [&](std::uint32_t body, const Vec3& arm, Real signed_depth) {
+    return shared::projection(row.normal, arm, bodies_->inverse_mass(body),
+                              moving.inverse_inertia[body], signed_depth, yield_a + yield_b,
+                              settings_.angular_limit);
+  };
+  const shared::Displacement of_a = share(row.a, row.arm_a, depth);
+  const shared::Displacement of_b = share(row.b, row.arm_b, -depth);
+  displace(row.a, of_a);
+  displace(row.b, of_b);
+}
+
+/// Moves a body and re-estimates the depth of its contacts without new detection (Millington 2007,
+/// 14.4): moving a by +n makes the contact shallower, moving b deeper (erratum E10).
+template <class Queue>
+void BasicContactResolver<Queue>::displace(std::uint32_t body,
+                                           const shared::Displacement& displacement) {
+  if (!bodies_->movable(body)) return;
+  bodies_->displace(body, displacement.shift, displacement.turn);
+  for (const RowIndex i : rows_of(body)) {
+    const Row& row = rows_[i];
+    const bool is_a = row.a == body;
+    const Vec3 moved =
+        shared::point_velocity(displacement.shift, displacement.turn, is_a ? row.arm_a : row.arm_b);
+    const Real opened = dot(moved, row.normal);
+    queue_.update(i, queue_.key(i) + (is_a ? -opened : opened));
+  }
+}
+
+template <class Queue>
+void BasicContactResolver<Queue>::resolve_velocities(ResolverReport* report) {
+  for (RowIndex i = 0; i < rows_.size(); ++i) keys_[i] = wanted_change(rows_[i]);
+  queue_.assign(keys_);
+  for (std::uint64_t left = limit();; --left) {
+    const RowIndex worst = queue_.top();
+    const Real wanted = queue_.key(worst);
+    if (!(wanted > settings_.velocity_epsilon)) return;
+    if (left == 0) break;
+    const Row& row = rows_[worst];
+    strike(row, wanted);
+    for (const std::uint32_t body : {row.a, row.b}) {
+      if (!bodies_->movable(body)) continue;
+      for (const RowIndex i : rows_of(body)) queue_.update(i, wanted_change(rows_[i]));
+    }
+    ++report->velocity_iterations;
+  }
+  report->exhausted = true;
+}
+
+template <class Queue>
+Vec3 BasicContactResolver<Queue>::relative_velocity(const Row& row) const {
+  const MotionArrays& moving = bodies_->moving;
+  return shared::point_velocity(moving.velocity[row.a], moving.angular_velocity[row.a], row.arm_a) -
+         shared::point_velocity(moving.velocity[row.b], moving.angular_velocity[row.b], row.arm_b);
+}
+
+template <class Queue>
+Real BasicContactResolver<Queue>::wanted_change(const Row& row) const {
+  return shared::wanted_velocity_change(dot(row.normal, relative_velocity(row)),
+                                        row.from_acceleration, row.restitution,
+                                        settings_.restitution_velocity);
+}
+
+/// Gives both bodies equal and opposite impulses at one common point, so that momentum and angular
+/// momentum stay (errata E2, E3, E5).
+template <class Queue>
+void BasicContactResolver<Queue>::strike(const Row& row, Real wanted) {
+  const MotionArrays& moving = bodies_->moving;
+  const shared::ContactBasis basis = shared::contact_basis(row.normal);
+  Mat3 response = diagonal({0, 0, 0});
+  Vec3 velocity = relative_velocity(row);
+  for (const bool is_a : {true, false}) {
+    const std::uint32_t body = is_a ? row.a : row.b;
+    if (!bodies_->movable(body)) continue;
+    shared::add_response(basis, is_a ? row.arm_a : row.arm_b, bodies_->inverse_mass(body),
+                         moving.inverse_inertia[body], &response);
+    // What the next step's acceleration will add along the surface is stopped now as well: a body
+    // held by friction would creep downhill otherwise (Millington 2007, 15.2).
+    const Vec3 coming = moving.last_acceleration[body] * (is_a ? bodies_->dt() : -bodies_->dt());
+    velocity += coming;
+  }
+  const Vec3 impulse = shared::to_world(
+      basis,
+      shared::contact_impulse(response, shared::to_contact(basis, velocity), wanted, row.friction));
+  push(row.a, row.arm_a, impulse);
+  push(row.b, row.arm_b, -impulse);
+}
+
+template <class Queue>
+void BasicContactResolver<Queue>::push(std::uint32_t body, const Vec3& arm, const Vec3& impulse) {
+  if (!bodies_->movable(body)) return;
+  MotionArrays& moving = bodies_->moving;
+  moving.velocity[body] += impulse * bodies_->inverse_mass(body);
+  moving.angular_velocity[body] += moving.inverse_inertia[body] * cross(arm, impulse);
+}
+
+}  // namespace jfpx::inline JFPX_ABI

@@ -1,0 +1,167 @@
+/// Refuses scenes that could not be simulated, and says why.
+#include "src/scene_validate.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/shared/inertia.hpp"
+
+#include <array>
+#include <charconv>
+#include <initializer_list>
+#include <limits>
+
+namespace jfpx::inline JFPX_ABI {
+namespace {
+
+std::string list_text(std::initializer_list<Real> values) {
+  std::string text = "(";
+  for (const Real value : values) {
+    if (text.size() > 1) text += ", ";
+    text += to_text(value);
+  }
+  return text += ")";
+}
+
+template <class Value>
+std::string fault(std::string_view field, const Value& value, std::string_view range) {
+  return std::string(field) + " is " + to_text(value) + "; it must be " + std::string(range);
+}
+
+bool in_world(Real x) { return absolute(x) <= kMaxCoordinate; }
+bool in_world(const Vec3& v) { return in_world(v.x) && in_world(v.y) && in_world(v.z); }
+bool is_size(Real x) { return x > 0 && in_world(x); }
+bool is_unit(Real length_squared) { return absolute(length_squared - 1) <= kUnitTolerance; }
+
+std::string find_fault(const Sphere& sphere, Real mass) {
+  if (!is_size(sphere.radius)) return fault("radius", sphere.radius, "> 0 and at most 1e9");
+  const Real inertia = shared::moments_of_inertia(sphere, mass).x;
+  if (mass > 0 && !(inertia > 0 && is_finite(Real(1) / inertia) && is_finite(inertia))) {
+    return fault("moment of inertia", inertia, "such that it and its inverse are finite");
+  }
+  return {};
+}
+
+std::string find_fault(const Box& box, Real mass) {
+  const Vec3& h = box.half_extents;
+  if (!(is_size(h.x) && is_size(h.y) && is_size(h.z))) {
+    return fault("half_extents", h, "> 0 and at most 1e9 each");
+  }
+  const Vec3 inertia = shared::moments_of_inertia(box, mass);
+  for (int i = 0; i < 3 && mass > 0; ++i) {
+    if (!(inertia[i] > 0 && is_finite(Real(1) / inertia[i]) && is_finite(inertia[i]))) {
+      return fault("moments of inertia", inertia, "such that they and their inverses are finite");
+    }
+  }
+  return {};
+}
+
+std::string find_fault(const HalfSpace& half_space, Real) {
+  if (!is_unit(length_squared(half_space.normal))) {
+    return fault("normal", half_space.normal, "a unit vector, to a thousandth");
+  }
+  if (!in_world(half_space.offset)) {
+    return fault("offset", half_space.offset, "between -1e9 and 1e9");
+  }
+  return {};
+}
+
+std::string find_fault(const BodyDef& def) {
+  if (!(def.mass >= 0 && is_finite(def.mass))) {
+    return fault("mass", def.mass, "finite and >= 0");
+  }
+  if (def.mass > 0 && !is_finite(Real(1) / def.mass)) {
+    return fault("mass", def.mass, "0 or such that its inverse is finite");
+  }
+  std::string found =
+      std::visit([&def](const auto& shape) { return find_fault(shape, def.mass); }, def.shape);
+  if (!found.empty()) return found;
+  found = find_fault(BodyState{def.position, def.orientation, def.velocity, def.angular_velocity});
+  if (!found.empty()) return found;
+  if (!is_finite(def.acceleration)) return fault("acceleration", def.acceleration, "finite");
+  if (!(def.linear_damping > 0 && def.linear_damping <= 1)) {
+    return fault("linear_damping", def.linear_damping, "in (0, 1]");
+  }
+  if (!(def.angular_damping > 0 && def.angular_damping <= 1)) {
+    return fault("angular_damping", def.angular_damping, "in (0, 1]");
+  }
+  if (!(def.friction >= 0 && is_finite(def.friction))) {
+    return fault("friction", def.friction, "finite and >= 0");
+  }
+  if (!(def.restitution >= 0 && def.restitution <= 1)) {
+    return fault("restitution", def.restitution, "in [0, 1]");
+  }
+  return {};
+}
+
+std::string find_fault(const ResolverSettings& resolver) {
+  if (!(resolver.velocity_epsilon > 0 && is_finite(resolver.velocity_epsilon))) {
+    return fault("resolver.velocity_epsilon", resolver.velocity_epsilon, "finite and > 0");
+  }
+  if (!(resolver.position_epsilon > 0 && is_finite(resolver.position_epsilon))) {
+    return fault("resolver.position_epsilon", resolver.position_epsilon, "finite and > 0");
+  }
+  if (!(resolver.restitution_velocity >= 0 && is_finite(resolver.restitution_velocity))) {
+    return fault("resolver.restitution_velocity", resolver.restitution_velocity, "finite and >= 0");
+  }
+  if (!(resolver.angular_limit > 0 && resolver.angular_limit <= 1)) {
+    return fault("resolver.angular_limit", resolver.angular_limit, "in (0, 1]");
+  }
+  return {};
+}
+
+std::string find_fault(const SleepSettings& sleep) {
+  if (!(sleep.epsilon > 0 && is_finite(sleep.epsilon))) {
+    return fault("sleep.epsilon", sleep.epsilon, "finite and > 0");
+  }
+  if (!(sleep.bias > 0 && sleep.bias <= 1)) return fault("sleep.bias", sleep.bias, "in (0, 1]");
+  return {};
+}
+
+}  // namespace
+
+std::string to_text(Real value) {
+  std::array<char, 32> text;
+  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), end};
+}
+
+std::string to_text(const Vec3& v) { return list_text({v.x, v.y, v.z}); }
+std::string to_text(const Quat& q) { return list_text({q.w, q.x, q.y, q.z}); }
+
+std::string find_fault(const BodyState& state) {
+  if (!in_world(state.position)) return fault("position", state.position, "between -1e9 and 1e9");
+  if (!is_unit(length_squared(state.orientation))) {
+    return fault("orientation", state.orientation, "a unit quaternion, to a thousandth");
+  }
+  if (!is_finite(state.velocity)) return fault("velocity", state.velocity, "finite");
+  if (!is_finite(state.angular_velocity)) {
+    return fault("angular_velocity", state.angular_velocity, "finite");
+  }
+  return {};
+}
+
+void validate_body(const BodyDef& def, std::uint64_t body) {
+  const std::string found = find_fault(def);
+  if (!found.empty()) throw InvalidScene("body " + std::to_string(body) + ": " + found);
+}
+
+void validate_body_count(std::uint64_t bodies) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+  if (bodies <= kMost) return;
+  throw InvalidScene("the scene has " + std::to_string(bodies) + " bodies; it must have at most " +
+                     std::to_string(kMost));
+}
+
+void validate(const Scene& scene) {
+  // The smallest normal number: below it, dt and what is computed from it lose their digits.
+  if (!(scene.dt >= std::numeric_limits<Real>::min() && is_finite(scene.dt))) {
+    throw InvalidScene("scene: " + fault("dt", scene.dt, "finite, > 0 and no denormal number"));
+  }
+  for (const std::string& found : {find_fault(scene.resolver), find_fault(scene.sleep)}) {
+    if (!found.empty()) throw InvalidScene("scene: " + found);
+  }
+  validate_body_count(scene.bodies.size());
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) validate_body(scene.bodies[i], i);
+}
+
+}  // namespace jfpx::inline JFPX_ABI
