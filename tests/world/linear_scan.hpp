@@ -1,0 +1,31 @@
+/// The queue that the thesis used, a scan over all contacts: the oracle of the heap.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::test {
+
+/// Same interface and same choices as IndexedHeap, in O(n).
+class LinearScan {
+ public:
+  void assign(std::span<const Real> keys) { keys_.assign(keys.begin(), keys.end()); }
+  bool empty() const noexcept { return keys_.empty(); }
+  std::uint32_t top() const {
+    std::uint32_t best = 0;
+    for (std::uint32_t i = 1; i < keys_.size(); ++i) {
+      if (keys_[i] > keys_[best]) best = i;
+    }
+    return best;
+  }
+  Real key(std::uint32_t number) const { return keys_[number]; }
+  void update(std::uint32_t number, Real key) { keys_[number] = key; }
+
+ private:
+  std::vector<Real> keys_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::test

@@ -1,0 +1,75 @@
+/// Small scenes and sums that the tests of the world share.
+#pragma once
+
+#include <jfpx/random.hpp>
+#include <jfpx/world.hpp>
+
+#include "src/body_store.hpp"
+#include "src/shared/inertia.hpp"
+
+#include <cstdlib>
+#include <random>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::test {
+
+/// A Real that is written as a decimal number.
+constexpr Real operator""_r(long double value) { return static_cast<Real>(value); }
+
+/// A seed that differs from run to run; JFPX_TEST_SEED fixes it. Show it with SCOPED_TRACE.
+inline std::uint64_t fresh_seed() {
+  if (const char* fixed = std::getenv("JFPX_TEST_SEED")) return std::strtoull(fixed, nullptr, 0);
+  std::random_device device;
+  return (std::uint64_t{device()} << 32) | device();
+}
+inline std::string trace(std::uint64_t seed) { return "JFPX_TEST_SEED=" + std::to_string(seed); }
+
+/// A ball that nothing pulls, damps or lets sleep.
+inline BodyDef ball(const Vec3& position, Real radius = 1, Real mass = 1) {
+  BodyDef def;
+  def.shape = Sphere{radius};
+  def.mass = mass;
+  def.position = position;
+  def.acceleration = {};
+  def.friction = 0;
+  def.can_sleep = false;
+  return def;
+}
+inline BodyDef half_space(const Vec3& normal, Real offset) {
+  BodyDef def;
+  def.shape = HalfSpace{normal, offset};
+  def.mass = 0;
+  return def;
+}
+inline BodyDef ground() { return half_space({0, 1, 0}, 0); }
+
+/// Sums over the movable bodies of a world, in double.
+struct Sums {
+  double energy = 0;  ///< kinetic
+  double momentum[3] = {}, angular_momentum[3] = {};
+  double scale = 0;  ///< of the momenta, for tolerances
+};
+inline Sums sums(std::span<const BodyDef> bodies, std::span<const BodyState> states) {
+  Sums total;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const double m = static_cast<double>(bodies[i].mass);
+    if (!(m > 0)) continue;
+    const BodyState& s = states[i];
+    const double inertia = static_cast<double>(
+        shared::moments_of_inertia(std::get<Sphere>(bodies[i].shape), bodies[i].mass).x);
+    const double x[3] = {s.position.x, s.position.y, s.position.z};
+    const double v[3] = {s.velocity.x, s.velocity.y, s.velocity.z};
+    const double w[3] = {s.angular_velocity.x, s.angular_velocity.y, s.angular_velocity.z};
+    for (int k = 0; k < 3; ++k) {
+      const int j = (k + 1) % 3, l = (k + 2) % 3;
+      total.energy += 0.5 * (m * v[k] * v[k] + inertia * w[k] * w[k]);
+      total.momentum[k] += m * v[k];
+      total.angular_momentum[k] += m * (x[j] * v[l] - x[l] * v[j]) + inertia * w[k];
+      total.scale += m * std::abs(v[k]) * (1 + std::abs(x[j]) + std::abs(x[l]));
+    }
+  }
+  return total;
+}
+inline Sums sums(const World& world) { return sums(world.scene().bodies, world.states()); }
+
+}  // namespace jfpx::inline JFPX_ABI::test
