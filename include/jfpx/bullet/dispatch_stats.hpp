@@ -1,0 +1,47 @@
+/// What a jfpx::bullet::CollisionDispatcher did so far.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+/// Why a dispatch was left to Bullet's own code as a whole. The bits are the same either way.
+enum class Fallback : std::uint8_t {
+  none,
+  small_batch,      ///< fewer pairs than minimum_batch
+  no_spheres,       ///< no two spheres among the bodies of the pairs
+  near_callback,    ///< the user set a near callback
+  create_function,  ///< the user registered another SPHERE/SPHERE create function
+  continuous,       ///< dispatchFunc is not DISPATCH_DISCRETE
+  nested,           ///< called from a callback inside another dispatch of this dispatcher
+  collider_failed,  ///< the collider threw; see DispatchStats::failure
+};
+inline constexpr std::size_t kFallbackCount = 8;
+
+/// A short text for a table, for example "small batch".
+JFPX_API std::string_view to_string(Fallback fallback) noexcept;
+
+/// Counters since construction or reset_stats(). Pairs are counted in batches only.
+struct DispatchStats {
+  std::uint64_t dispatches = 0;    ///< calls of dispatchAllCollisionPairs
+  std::uint64_t batches = 0;       ///< of these, computed by the collider
+  std::uint64_t pairs = 0;         ///< overlapping pairs
+  std::uint64_t sphere_pairs = 0;  ///< of these, between two spheres
+  std::uint64_t touching = 0;      ///< of these, found touching by the collider
+  std::uint64_t written = 0;       ///< manifolds brought up to date without Bullet's algorithm
+  std::uint64_t verified = 0;      ///< sphere pairs recomputed by set_verify(true)
+  std::uint64_t mismatches = 0;    ///< of these, different in any field
+  std::string first_mismatch;      ///< field and both values; empty where there was none
+  std::array<std::uint64_t, kFallbackCount> fallbacks{};  ///< dispatches by Fallback
+  Fallback last_fallback = Fallback::none;                ///< none where the last was a batch
+  std::string failure;    ///< why the collider was given up for good; empty while it works
+  double prepare_ms = 0;  ///< wall clock of batches: gathering, collider, reading manifolds
+  double commit_ms = 0;   ///< wall clock of batches: the ordered walk
+};
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,66 @@
+/// The dispatcher that puts jfpx into a Bullet program: one line changes, every bit stays.
+#pragma once
+
+#include <jfpx/bullet/dispatch_stats.hpp>
+#include <jfpx/sphere_collider.hpp>
+
+#include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
+
+#include <memory>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+struct DispatcherOptions {
+  SphereColliderOptions collider;  ///< who tests the sphere pairs
+  std::size_t minimum_batch = 96;  ///< pairs below which a dispatch is left to Bullet
+  bool verify = false;             ///< as set_verify()
+};
+
+/// A btCollisionDispatcher that tests all sphere-sphere pairs at once. Manifolds, their order,
+/// every field of every point, callbacks and so trajectories are those of btCollisionDispatcher,
+/// bit for bit. No create function is registered: the pairs keep Bullet's own algorithms.
+///
+/// Not noticed, in contrast to Bullet: a callback that moves bodies, changes radii, writes into
+/// manifolds of other pairs or changes the pair cache while a dispatch is running.
+///
+/// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
+/// As in Bullet, one thread at a time; different dispatchers are independent.
+class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
+ public:
+  /// @throws BackendUnavailable if options.collider asks for a backend by name that can't be had;
+  ///   InvalidArgument for a bad option.
+  explicit CollisionDispatcher(btCollisionConfiguration* configuration,
+                               const DispatcherOptions& options = {});
+  /// Uses the given collider; options.collider is ignored.
+  /// @throws InvalidArgument if `collider` is null.
+  CollisionDispatcher(btCollisionConfiguration* configuration,
+                      std::unique_ptr<SphereCollider> collider,
+                      const DispatcherOptions& options = {});
+  ~CollisionDispatcher() override;
+  CollisionDispatcher(const CollisionDispatcher&) = delete;
+  CollisionDispatcher& operator=(const CollisionDispatcher&) = delete;
+
+  /// As in Bullet, for any pair cache. If the collider throws, this call and all later ones are
+  /// Bullet's own, and stats().failure says why.
+  void dispatchAllCollisionPairs(btOverlappingPairCache* pair_cache,
+                                 const btDispatcherInfo& dispatch_info,
+                                 btDispatcher* dispatcher) override;
+
+  std::size_t minimum_batch() const noexcept;
+  void set_minimum_batch(std::size_t pairs) noexcept;
+
+  /// Recompute every sphere pair of a batch with btSphereSphereCollisionAlgorithm on a scratch
+  /// manifold, compare all fields, count in stats(). Slow. Global contact callbacks are taken off
+  /// meanwhile: no other thread may use Bullet then. User-set combine callbacks are called twice.
+  void set_verify(bool on) noexcept;
+  bool verify() const noexcept;
+
+  const DispatchStats& stats() const noexcept;
+  void reset_stats();  ///< a failed collider stays given up, and `failure` is kept
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,76 @@
+/// The flat form of btManifoldResult::addContactPoint for two spheres (btManifoldResult.cpp of
+/// Bullet 3.24). Bullet's inline functions do the vector arithmetic, so the operations are
+/// Bullet's.
+#include "src/bullet/contact_point.hpp"
+
+#include <BulletCollision/CollisionDispatch/btCollisionObject.h>
+#include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+bool callbacks_are_default() {
+  return gContactStartedCallback == nullptr && gContactEndedCallback == nullptr &&
+         gContactDestroyedCallback == nullptr &&
+         gCalculateCombinedFrictionCallback == &btManifoldResult::calculateCombinedFriction &&
+         gCalculateCombinedRestitutionCallback == &btManifoldResult::calculateCombinedRestitution &&
+         gCalculateCombinedRollingFrictionCallback ==
+             &btManifoldResult::calculateCombinedRollingFriction &&
+         gCalculateCombinedSpinningFrictionCallback ==
+             &btManifoldResult::calculateCombinedSpinningFriction;
+}
+
+/// Bullet's limit on combined friction, with its order of comparisons: NaN passes.
+btScalar clamp_friction(btScalar friction) {
+  constexpr btScalar kMaxFriction = 10;
+  if (friction < -kMaxFriction) return -kMaxFriction;
+  if (friction > kMaxFriction) return kMaxFriction;
+  return friction;
+}
+
+void combine_materials(const btCollisionObject& a, const btCollisionObject& b,
+                       btManifoldPoint* point) {
+  point->m_combinedFriction = clamp_friction(a.getFriction() * b.getFriction());
+  point->m_combinedRestitution = a.getRestitution() * b.getRestitution();
+  point->m_combinedRollingFriction = clamp_friction(a.getRollingFriction() * b.getFriction() +
+                                                    b.getRollingFriction() * a.getFriction());
+  point->m_combinedSpinningFriction = clamp_friction(a.getSpinningFriction() * b.getFriction() +
+                                                     b.getSpinningFriction() * a.getFriction());
+}
+
+}  // namespace
+
+bool can_write_flat(const btPersistentManifold& manifold, const btCollisionObject& body_a,
+                    const btCollisionObject& body_b) {
+  int special = btCollisionObject::CF_HAS_CONTACT_STIFFNESS_DAMPING |
+                btCollisionObject::CF_HAS_FRICTION_ANCHOR;
+  if (gContactAddedCallback != nullptr) special |= btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK;
+  const int flags = body_a.getCollisionFlags() | body_b.getCollisionFlags();
+  return (flags & special) == 0 && manifold.getBody0() == &body_a && callbacks_are_default();
+}
+
+void write_contact(btPersistentManifold* manifold, const PairResult& result,
+                   const btCollisionObject& body_a, const btCollisionObject& body_b,
+                   Real radius_b) {
+  // btPersistentManifold::clearManifold, given that no callback is set.
+  manifold->setNumContacts(0);
+  if (result.touching == 0 || result.distance > manifold->getContactBreakingThreshold()) return;
+
+  const btTransform& pose_a = body_a.getWorldTransform();
+  const btTransform& pose_b = body_b.getWorldTransform();
+  const btVector3 normal(result.normal.x, result.normal.y, result.normal.z);
+  const btVector3 on_b = pose_b.getOrigin() + radius_b * normal;
+  const btVector3 on_a = on_b + normal * result.distance;
+  btManifoldPoint point(pose_a.invXform(on_a), pose_b.invXform(on_b), normal, result.distance);
+  point.m_positionWorldOnA = on_a;
+  point.m_positionWorldOnB = on_b;
+  combine_materials(body_a, body_b, &point);
+  btPlaneSpace1(point.m_normalWorldOnB, point.m_lateralFrictionDir1, point.m_lateralFrictionDir2);
+
+  // btPersistentManifold::addManifoldPoint on an empty manifold.
+  manifold->setNumContacts(1);
+  manifold->getContactPoint(0) = point;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,83 @@
+/// Recomputes a sphere pair with Bullet's own algorithm and compares.
+#include "src/bullet/pair_check.hpp"
+
+#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+#include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
+
+#include <cstdio>
+#include <utility>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+/// While it lives, nobody hears of the scratch manifold.
+class CallbacksOff {
+ public:
+  CallbacksOff() = default;
+  ~CallbacksOff() {
+    gContactAddedCallback = added_;
+    gContactStartedCallback = started_;
+    gContactEndedCallback = ended_;
+    gContactDestroyedCallback = destroyed_;
+  }
+  CallbacksOff(const CallbacksOff&) = delete;
+  CallbacksOff& operator=(const CallbacksOff&) = delete;
+
+ private:
+  ContactAddedCallback added_ = std::exchange(gContactAddedCallback, nullptr);
+  ContactStartedCallback started_ = std::exchange(gContactStartedCallback, nullptr);
+  ContactEndedCallback ended_ = std::exchange(gContactEndedCallback, nullptr);
+  ContactDestroyedCallback destroyed_ = std::exchange(gContactDestroyedCallback, nullptr);
+};
+
+}  // namespace
+
+std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDispatcherInfo& info,
+                                          const btCollisionObject& body_a,
+                                          const btCollisionObject& body_b, const PairResult& result,
+                                          const btPersistentManifold& thresholds,
+                                          const btPersistentManifold* manifold) {
+  const CallbacksOff callbacks_off;
+  btPersistentManifold scratch(&body_a, &body_b, 0, thresholds.getContactBreakingThreshold(),
+                               thresholds.getContactProcessingThreshold());
+  const btCollisionObjectWrapper a(nullptr, body_a.getCollisionShape(), &body_a,
+                                   body_a.getWorldTransform(), -1, -1);
+  const btCollisionObjectWrapper b(nullptr, body_b.getCollisionShape(), &body_b,
+                                   body_b.getWorldTransform(), -1, -1);
+  btManifoldResult out(&a, &b);
+  const btCollisionAlgorithmConstructionInfo construction(dispatcher, 1);
+  btSphereSphereCollisionAlgorithm algorithm(&scratch, construction, &a, &b);
+  algorithm.processCollision(&a, &b, info, &out);
+
+  FieldComparison compare;
+  const bool expected = scratch.getNumContacts() != 0;
+  // Bullet refuses a touching point if a user has set a negative breaking threshold.
+  const bool accepted =
+      result.touching != 0 && !(result.distance > thresholds.getContactBreakingThreshold());
+  compare("touching", expected ? 1 : 0, accepted ? 1 : 0);
+  if (expected && accepted) {
+    const btManifoldPoint& point = scratch.getContactPoint(0);
+    compare("distance", point.m_distance1, result.distance);
+    compare("normal.x", point.m_normalWorldOnB.x(), result.normal.x);
+    compare("normal.y", point.m_normalWorldOnB.y(), result.normal.y);
+    compare("normal.z", point.m_normalWorldOnB.z(), result.normal.z);
+  }
+  if (manifold != nullptr) {
+    compare("number of points", scratch.getNumContacts(), manifold->getNumContacts());
+    if (expected && manifold->getNumContacts() == 1) {
+      compare_points(scratch.getContactPoint(0), manifold->getContactPoint(0), &compare);
+    }
+  }
+  return compare.first();
+}
+
+std::string to_text(const FieldDifference& difference) {
+  char text[160];
+  std::snprintf(text, sizeof text, ": expected %.17g (0x%llx), actual %.17g (0x%llx)",
+                difference.expected, static_cast<unsigned long long>(difference.expected_bits),
+                difference.actual, static_cast<unsigned long long>(difference.actual_bits));
+  return difference.field + text;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

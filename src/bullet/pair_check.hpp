@@ -1,0 +1,24 @@
+/// Recomputes a sphere pair with Bullet's own algorithm and compares.
+#pragma once
+
+#include <jfpx/contact.hpp>
+
+#include "src/bullet/point_fields.hpp"
+
+class btCollisionObject;
+class btDispatcher;
+struct btDispatcherInfo;
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+/// Runs btSphereSphereCollisionAlgorithm on a scratch manifold and compares the outcome with the
+/// collider's result and, unless `manifold` is null, with the manifold as it is now. Global contact
+/// callbacks are taken off meanwhile.
+/// @return the first field that differs.
+std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDispatcherInfo& info,
+                                          const btCollisionObject& body_a,
+                                          const btCollisionObject& body_b, const PairResult& result,
+                                          const btPersistentManifold& thresholds,
+                                          const btPersistentManifold* manifold);
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,122 @@
+/// Gathers bodies and pairs. Memory latency is all there is to it: piles of 16k spheres have tens
+/// of megabytes of bodies, algorithms and manifolds, so everything is prefetched.
+#include "src/bullet/sphere_batch.hpp"
+
+#include <BulletCollision/CollisionDispatch/btGhostObject.h>
+#include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <algorithm>
+#include <typeinfo>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+constexpr std::size_t kCacheLine = 64;
+/// Pairs handled per pass of plan(): enough to overlap their cache misses, few enough to stay in
+/// the first-level cache between the passes.
+constexpr std::size_t kBlock = 64;
+
+void prefetch(const void* address) { __builtin_prefetch(address); }
+void prefetch_bytes(const void* address, std::size_t bytes) {
+  for (std::size_t i = 0; i < bytes; i += kCacheLine) {
+    __builtin_prefetch(static_cast<const char*>(address) + i);
+  }
+}
+
+/// True for exactly the classes whose checkCollideWithOverride is known to be free of side effects.
+/// typeid compares addresses here: a copy of the class in another library counts as foreign, which
+/// costs time and no bits.
+bool is_bullets_own_class(const btCollisionObject& body) {
+  const std::type_info* type = &typeid(body);
+  return type == &typeid(btRigidBody) || type == &typeid(btCollisionObject) ||
+         type == &typeid(btGhostObject) || type == &typeid(btPairCachingGhostObject);
+}
+
+}  // namespace
+
+bool SphereBatch::gather(std::span<const btBroadphasePair> pairs) {
+  table_.reset(std::min(2 * pairs.size(), bodies_.size()));
+  pairs_.resize(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const std::uint32_t a = table_.number(pairs[i].m_pProxy0);
+    const std::uint32_t b = table_.number(pairs[i].m_pProxy1);
+    pairs_[i] = {a, b};
+  }
+  read_bodies();
+  return std::count_if(traits_.begin(), traits_.end(),
+                       [](std::uint8_t traits) { return (traits & kSphere) != 0; }) >= 2;
+}
+
+void SphereBatch::read_bodies() {
+  const std::vector<btBroadphaseProxy*>& proxies = table_.proxies();
+  const std::size_t n = proxies.size();
+  bodies_.resize(n);
+  spheres_.assign(n, {});
+  traits_.assign(n, 0);
+  constexpr std::size_t kAhead = 16;
+  for (std::size_t i = 0; i < n + 2 * kAhead; ++i) {
+    if (i < n) prefetch(&proxies[i]->m_clientObject);
+    if (i >= kAhead && i - kAhead < n) {
+      const auto* body = static_cast<const btCollisionObject*>(proxies[i - kAhead]->m_clientObject);
+      bodies_[i - kAhead] = body;
+      prefetch_bytes(body, sizeof(btTransform) + sizeof(void*));
+      prefetch(static_cast<const void*>(&body->getWorldTransform()));
+    }
+    if (i < 2 * kAhead) continue;
+    const std::size_t k = i - 2 * kAhead;
+    const btCollisionObject& body = *bodies_[k];
+    if (!is_bullets_own_class(body)) traits_[k] |= kForeign;
+    const btCollisionShape* shape = body.getCollisionShape();
+    if (shape->getShapeType() != SPHERE_SHAPE_PROXYTYPE) continue;
+    traits_[k] |= kSphere;
+    const btVector3& centre = body.getWorldTransform().getOrigin();
+    spheres_[k] = {{centre.x(), centre.y(), centre.z()},
+                   static_cast<const btSphereShape*>(shape)->getRadius()};
+  }
+}
+
+btPersistentManifold* SphereBatch::find_manifold(btCollisionAlgorithm* algorithm) {
+  if (algorithm == nullptr || &typeid(*algorithm) != &typeid(btSphereSphereCollisionAlgorithm)) {
+    return nullptr;
+  }
+  found_.resizeNoInitialize(0);
+  // Qualified: known not to be overridden, so it inlines.
+  auto* spheres = static_cast<btSphereSphereCollisionAlgorithm*>(algorithm);
+  spheres->btSphereSphereCollisionAlgorithm::getAllContactManifolds(found_);
+  return found_.size() == 1 ? found_[0] : nullptr;
+}
+
+void SphereBatch::plan(std::span<const btBroadphasePair> pairs, std::span<const PairResult> results,
+                       bool ask_all) {
+  const std::size_t n = pairs.size();
+  actions_.resize(n);
+  manifolds_.resize(n);
+  for (std::size_t begin = 0; begin < n; begin += kBlock) {
+    const std::size_t end = std::min(n, begin + kBlock);
+    for (std::size_t i = end; i < std::min(n, end + kBlock); ++i) prefetch(pairs[i].m_algorithm);
+    for (std::size_t i = begin; i < end; ++i) {
+      manifolds_[i] = is_sphere_pair(i) ? find_manifold(pairs[i].m_algorithm) : nullptr;
+      if (manifolds_[i] != nullptr) prefetch(&manifolds_[i]->m_companionIdA);
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      if (manifolds_[i] == nullptr) {
+        actions_[i] = Action::stock;
+      } else if (results[i].touching != 0 || manifolds_[i]->getNumContacts() != 0) {
+        actions_[i] = Action::commit;
+      } else {
+        const bool foreign = ((traits_[pairs_[i].a] | traits_[pairs_[i].b]) & kForeign) != 0;
+        actions_[i] = ask_all || foreign ? Action::ask : Action::skip;
+      }
+    }
+  }
+}
+
+void SphereBatch::prefetch_commit(std::size_t i) const {
+  prefetch_bytes(manifolds_[i], sizeof(btManifoldPoint) + sizeof(btTypedObject));
+  prefetch_bytes(body_a(i), sizeof(btCollisionObject));
+  prefetch_bytes(body_b(i), sizeof(btCollisionObject));
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
