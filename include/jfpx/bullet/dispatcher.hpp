@@ -11,9 +11,9 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 
 struct DispatcherOptions {
-  SphereColliderOptions collider;  ///< who tests the sphere pairs
-  std::size_t minimum_batch = 96;  ///< pairs below which a dispatch is left to Bullet
-  bool verify = false;             ///< as set_verify()
+  SphereColliderOptions collider = {};  ///< who tests the sphere pairs
+  std::size_t minimum_batch = 96;       ///< pairs below which a dispatch is left to Bullet
+  bool verify = false;                  ///< as set_verify()
 };
 
 /// A btCollisionDispatcher that tests all sphere-sphere pairs at once. Manifolds, their order,

@@ -1,0 +1,187 @@
+/// Builds a Bullet world from a scene.
+#include <jfpx/bullet/scene_world.hpp>
+#include <jfpx/error.hpp>
+
+#include "src/bullet/timed_world.hpp"
+
+#include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
+#include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
+#include <BulletCollision/CollisionShapes/btBoxShape.h>
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <array>
+#include <map>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+btVector3 to_bullet(const Vec3& v) { return {v.x, v.y, v.z}; }
+btQuaternion to_bullet(const Quat& q) { return {q.x, q.y, q.z, q.w}; }
+Vec3 from_bullet(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
+Quat from_bullet(const btQuaternion& q) { return {q.w(), q.x(), q.y(), q.z()}; }
+
+bool is_half_space(const BodyDef& def) { return std::holds_alternative<HalfSpace>(def.shape); }
+
+/// Makes shapes and keeps them; equal shapes once if they are shared.
+class ShapeStore {
+ public:
+  explicit ShapeStore(bool share) : share_(share) {}
+
+  btCollisionShape* get(const Shape& shape) {
+    return std::visit([this](const auto& s) { return make(s); }, shape);
+  }
+
+ private:
+  using Key = std::array<Real, 3>;
+
+  btCollisionShape* make(const Sphere& sphere) {
+    return get(Key{sphere.radius, 0, 0}, [&] { return new btSphereShape(sphere.radius); });
+  }
+  btCollisionShape* make(const Box& box) {
+    const Vec3& h = box.half_extents;
+    return get(Key{h.x, h.y, h.z}, [&] { return new btBoxShape(to_bullet(h)); });
+  }
+  btCollisionShape* make(const HalfSpace& plane) {
+    shapes_.emplace_back(new btStaticPlaneShape(to_bullet(plane.normal), plane.offset));
+    return shapes_.back().get();
+  }
+
+  template <class Make>
+  btCollisionShape* get(const Key& key, Make make) {
+    if (share_) {
+      const auto found = shared_.find(key);
+      if (found != shared_.end()) return found->second;
+    }
+    shapes_.emplace_back(make());
+    if (share_) shared_.emplace(key, shapes_.back().get());
+    return shapes_.back().get();
+  }
+
+  bool share_;
+  std::vector<std::unique_ptr<btCollisionShape>> shapes_;
+  std::map<Key, btCollisionShape*> shared_;
+};
+
+std::unique_ptr<btRigidBody> make_body(const BodyDef& def, btCollisionShape* shape,
+                                       bool can_sleep) {
+  const Real mass = is_half_space(def) ? 0 : def.mass;
+  btVector3 inertia(0, 0, 0);
+  if (mass > 0) shape->calculateLocalInertia(mass, inertia);
+  btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, shape, inertia);
+  if (!is_half_space(def)) {
+    info.m_startWorldTransform = btTransform(to_bullet(def.orientation), to_bullet(def.position));
+  }
+  info.m_linearDamping = 1 - def.linear_damping;
+  info.m_angularDamping = 1 - def.angular_damping;
+  info.m_friction = square_root(def.friction);
+  info.m_restitution = square_root(def.restitution);
+  auto body = std::make_unique<btRigidBody>(info);
+  body->setFlags(body->getFlags() | BT_DISABLE_WORLD_GRAVITY);
+  if (mass > 0) {
+    body->setGravity(to_bullet(def.acceleration));
+    body->setLinearVelocity(to_bullet(def.velocity));
+    body->setAngularVelocity(to_bullet(def.angular_velocity));
+    if (!can_sleep) body->setActivationState(DISABLE_DEACTIVATION);
+  }
+  return body;
+}
+
+std::unique_ptr<btCollisionDispatcher> make_dispatcher(btCollisionConfiguration* configuration,
+                                                       const SceneWorldOptions& options) {
+  if (options.dispatcher == DispatcherKind::stock) {
+    return std::make_unique<btCollisionDispatcher>(configuration);
+  }
+  return std::make_unique<CollisionDispatcher>(configuration, options.dispatch);
+}
+
+}  // namespace
+
+/// Members in the order in which Bullet needs them to be made, and so destroyed in reverse.
+struct SceneWorld::Impl {
+  Scene scene;
+  ShapeStore shapes;
+  btDefaultCollisionConfiguration configuration;
+  std::unique_ptr<btCollisionDispatcher> dispatcher;
+  btDbvtBroadphase broadphase;
+  btSequentialImpulseConstraintSolver solver;
+  std::vector<std::unique_ptr<btRigidBody>> owned;
+  std::vector<btRigidBody*> bodies;
+  TimedWorld world;
+
+  Impl(const Scene& source, const SceneWorldOptions& options)
+      : scene(source),
+        shapes(options.share_shapes),
+        dispatcher(make_dispatcher(&configuration, options)),
+        world(dispatcher.get(), &broadphase, &solver, &configuration) {
+    world.setGravity({0, 0, 0});
+    world.getDispatchInfo().m_deterministicOverlappingPairs = options.deterministic_pairs;
+    for (const BodyDef& def : scene.bodies) {
+      const bool can_sleep = scene.sleep.enabled && def.can_sleep;
+      owned.push_back(make_body(def, shapes.get(def.shape), can_sleep));
+      bodies.push_back(owned.back().get());
+      world.addRigidBody(bodies.back());
+    }
+  }
+  ~Impl() {
+    // Bullet scans all pairs once for every body that leaves a world; without pairs it need not.
+    btOverlappingPairCache* cache = broadphase.getOverlappingPairCache();
+    while (cache->getNumOverlappingPairs() > 0) {
+      const btBroadphasePair& last =
+          cache->getOverlappingPairArrayPtr()[cache->getNumOverlappingPairs() - 1];
+      cache->removeOverlappingPair(last.m_pProxy0, last.m_pProxy1, dispatcher.get());
+    }
+  }
+};
+
+SceneWorld::SceneWorld(const Scene& scene, const SceneWorldOptions& options) {
+  validate(scene);
+  impl_ = std::make_unique<Impl>(scene, options);
+}
+SceneWorld::~SceneWorld() = default;
+SceneWorld::SceneWorld(SceneWorld&&) noexcept = default;
+SceneWorld& SceneWorld::operator=(SceneWorld&&) noexcept = default;
+
+void SceneWorld::step(Real dt) {
+  if (!(dt > kEpsilon) || !is_finite(dt)) {
+    throw InvalidArgument("dt is " + std::to_string(dt) +
+                          " s; it must be finite and larger than the machine epsilon");
+  }
+  // No sub-steps: Bullet then makes one step of the full length and keeps no remainder.
+  impl_->world.stepSimulation(dt, 0, dt);
+}
+void SceneWorld::step() { step(impl_->scene.dt); }
+
+std::vector<BodyState> SceneWorld::states() const {
+  std::vector<BodyState> states;
+  states.reserve(impl_->bodies.size());
+  for (std::size_t i = 0; i < impl_->bodies.size(); ++i) {
+    const btRigidBody& body = *impl_->bodies[i];
+    const BodyDef& def = impl_->scene.bodies[i];
+    if (is_half_space(def)) {
+      states.push_back({def.position, def.orientation, {}, {}});
+      continue;
+    }
+    const btTransform& pose = body.getWorldTransform();
+    states.push_back({from_bullet(pose.getOrigin()), from_bullet(pose.getRotation()),
+                      from_bullet(body.getLinearVelocity()),
+                      from_bullet(body.getAngularVelocity())});
+  }
+  return states;
+}
+std::uint64_t SceneWorld::state_hash() const { return jfpx::state_hash(states()); }
+const StageTimes& SceneWorld::last_step() const noexcept { return impl_->world.times(); }
+
+const Scene& SceneWorld::scene() const noexcept { return impl_->scene; }
+btDiscreteDynamicsWorld& SceneWorld::world() noexcept { return impl_->world; }
+const btDiscreteDynamicsWorld& SceneWorld::world() const noexcept { return impl_->world; }
+btCollisionDispatcher& SceneWorld::dispatcher() noexcept { return *impl_->dispatcher; }
+CollisionDispatcher* SceneWorld::jfpx_dispatcher() noexcept {
+  return dynamic_cast<CollisionDispatcher*>(impl_->dispatcher.get());
+}
+std::span<btRigidBody* const> SceneWorld::bodies() const noexcept { return impl_->bodies; }
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,66 @@
+/// A btDiscreteDynamicsWorld that knows how long its stages take.
+#pragma once
+
+#include <jfpx/bullet/scene_world.hpp>
+
+#include <chrono>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+/// Times the stages by overriding the virtual function of each. Bullet's profiler callbacks would
+/// do too, but they are global and belong to the user.
+class TimedWorld final : public btDiscreteDynamicsWorld {
+ public:
+  using btDiscreteDynamicsWorld::btDiscreteDynamicsWorld;
+
+  int stepSimulation(btScalar dt, int max_sub_steps, btScalar fixed_dt) override {
+    times_ = {};
+    int sub_steps = 0;
+    time(&times_.total,
+         [&] { sub_steps = btDiscreteDynamicsWorld::stepSimulation(dt, max_sub_steps, fixed_dt); });
+    return sub_steps;
+  }
+  void updateAabbs() override {
+    time(&times_.broadphase, [&] { btDiscreteDynamicsWorld::updateAabbs(); });
+  }
+  void computeOverlappingPairs() override {
+    time(&times_.broadphase, [&] { btDiscreteDynamicsWorld::computeOverlappingPairs(); });
+  }
+  void performDiscreteCollisionDetection() override {
+    const double broadphase = times_.broadphase;
+    time(&times_.dispatch, [&] { btDiscreteDynamicsWorld::performDiscreteCollisionDetection(); });
+    times_.dispatch -= times_.broadphase - broadphase;
+  }
+  void solveConstraints(btContactSolverInfo& info) override {
+    time(&times_.solve, [&] { btDiscreteDynamicsWorld::solveConstraints(info); });
+  }
+  const StageTimes& times() const { return times_; }
+
+ protected:
+  void predictUnconstraintMotion(btScalar dt) override {
+    time(&times_.integrate, [&] { btDiscreteDynamicsWorld::predictUnconstraintMotion(dt); });
+  }
+  void integrateTransforms(btScalar dt) override {
+    time(&times_.integrate, [&] { btDiscreteDynamicsWorld::integrateTransforms(dt); });
+  }
+  void updateActivationState(btScalar dt) override {
+    time(&times_.integrate, [&] { btDiscreteDynamicsWorld::updateActivationState(dt); });
+  }
+  void calculateSimulationIslands() override {
+    time(&times_.islands, [&] { btDiscreteDynamicsWorld::calculateSimulationIslands(); });
+  }
+
+ private:
+  template <class Stage>
+  static void time(double* milliseconds, Stage stage) {
+    const auto start = std::chrono::steady_clock::now();
+    stage();
+    const std::chrono::duration<double, std::milli> taken =
+        std::chrono::steady_clock::now() - start;
+    *milliseconds += taken.count();
+  }
+
+  StageTimes times_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,1 @@
+jfpx_add_test(bullet_trajectory_test SOURCES bullet/trajectory_test.cpp LINK jfpx_bullet)

@@ -1,0 +1,162 @@
+/// Two Bullet worlds made by the same recipe, one with Bullet's dispatcher and one with ours, that
+/// are stepped side by side and compared after every step.
+#pragma once
+
+#include <jfpx/bullet/dispatcher.hpp>
+#include <jfpx/bullet/verify.hpp>
+#include <jfpx/random.hpp>
+
+#include <BulletCollision/CollisionDispatch/btGhostObject.h>
+#include <btBulletDynamicsCommon.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+/// A fresh seed for a random test, or the one in the environment.
+inline std::uint64_t test_seed() {
+  const char* fixed = std::getenv("JFPX_TEST_SEED");
+  return fixed != nullptr ? std::strtoull(fixed, nullptr, 0) : std::random_device{}();
+}
+
+/// A Bullet world that owns everything. Made in two phases, because a dispatcher needs the
+/// configuration.
+struct BulletWorld {
+  using MakeDispatcher =
+      std::function<std::unique_ptr<btCollisionDispatcher>(btCollisionConfiguration*)>;
+  using MakeBroadphase = std::function<std::unique_ptr<btBroadphaseInterface>()>;
+
+  BulletWorld(std::unique_ptr<btCollisionConfiguration> c, const MakeDispatcher& make_dispatcher,
+              std::unique_ptr<btBroadphaseInterface> b)
+      : configuration(std::move(c)),
+        dispatcher(make_dispatcher(configuration.get())),
+        broadphase(std::move(b)),
+        world(dispatcher.get(), broadphase.get(), &solver, configuration.get()) {}
+  ~BulletWorld() {
+    for (int i = world.getNumCollisionObjects() - 1; i >= 0; --i) {
+      world.removeCollisionObject(world.getCollisionObjectArray()[i]);
+    }
+  }
+
+  btCollisionShape* keep(btCollisionShape* shape) {
+    shapes.emplace_back(shape);
+    return shape;
+  }
+  /// Adds a body; mass 0 is static.
+  btRigidBody* add(btCollisionShape* shape, const btVector3& position, btScalar mass = 1) {
+    btVector3 inertia(0, 0, 0);
+    if (mass > 0) shape->calculateLocalInertia(mass, inertia);
+    bodies.push_back(std::make_unique<btRigidBody>(mass, nullptr, shape, inertia));
+    btRigidBody* body = bodies.back().get();
+    btTransform pose;
+    pose.setIdentity();
+    pose.setOrigin(position);
+    body->setWorldTransform(pose);
+    body->setInterpolationWorldTransform(pose);
+    body->setUserIndex(static_cast<int>(bodies.size()) - 1);
+    world.addRigidBody(body);
+    return body;
+  }
+  btRigidBody* add_sphere(btScalar radius, const btVector3& position, btScalar mass = 1) {
+    return add(keep(new btSphereShape(radius)), position, mass);
+  }
+  CollisionDispatcher* ours() { return dynamic_cast<CollisionDispatcher*>(dispatcher.get()); }
+
+  std::unique_ptr<btCollisionConfiguration> configuration;
+  std::unique_ptr<btCollisionDispatcher> dispatcher;
+  std::unique_ptr<btBroadphaseInterface> broadphase;
+  btSequentialImpulseConstraintSolver solver;
+  std::vector<std::unique_ptr<btCollisionShape>> shapes;
+  std::vector<std::unique_ptr<btCollisionObject>> objects;
+  std::vector<std::unique_ptr<btRigidBody>> bodies;
+  btDiscreteDynamicsWorld world;
+  std::vector<std::string> log;  ///< what callbacks heard of this world
+};
+
+/// The world whose step is running: global callbacks write into its log.
+inline BulletWorld* g_current = nullptr;
+
+inline void log_event(std::string text) {
+  if (g_current != nullptr) g_current->log.push_back(std::move(text));
+}
+inline std::string name_of(const btCollisionObject* body) {
+  return std::to_string(body->getUserIndex());
+}
+
+struct TwinOptions {
+  BulletWorld::MakeDispatcher stock = [](btCollisionConfiguration* c) {
+    return std::make_unique<btCollisionDispatcher>(c);
+  };
+  BulletWorld::MakeDispatcher ours = [](btCollisionConfiguration* c) {
+    return std::make_unique<CollisionDispatcher>(c, DispatcherOptions{.minimum_batch = 0});
+  };
+  BulletWorld::MakeBroadphase broadphase = [] { return std::make_unique<btDbvtBroadphase>(); };
+  btDefaultCollisionConstructionInfo configuration;
+};
+
+class Twins {
+ public:
+  explicit Twins(const TwinOptions& options = {})
+      : stock_(std::make_unique<btDefaultCollisionConfiguration>(options.configuration),
+               options.stock, options.broadphase()),
+        ours_(std::make_unique<btDefaultCollisionConfiguration>(options.configuration),
+              options.ours, options.broadphase()) {}
+  ~Twins() { g_current = nullptr; }
+
+  BulletWorld& stock() { return stock_; }
+  BulletWorld& ours() { return ours_; }
+  const DispatchStats& stats() { return ours_.ours()->stats(); }
+
+  /// Does the same to both worlds.
+  template <class Action>
+  void both(Action action) {
+    for (BulletWorld* world : {&stock_, &ours_}) {
+      g_current = world;
+      action(*world);
+    }
+    g_current = nullptr;
+  }
+
+  /// Steps both and compares worlds and logs. False after a failure.
+  bool step(int steps = 1) {
+    for (int i = 0; i < steps; ++i) {
+      both([](BulletWorld& w) { w.world.stepSimulation(btScalar(1) / 60, 0); });
+      ++step_;
+      if (!compare()) return false;
+    }
+    return true;
+  }
+  bool compare() {
+    const auto difference = first_difference(stock_.world, ours_.world, step_);
+    if (difference) {
+      ADD_FAILURE() << to_text(*difference);
+      return false;
+    }
+    EXPECT_EQ(stock_.log, ours_.log) << "in step " << step_;
+    return stock_.log == ours_.log;
+  }
+  std::uint64_t steps() const { return step_; }
+
+ private:
+  BulletWorld stock_, ours_;
+  std::uint64_t step_ = 0;
+};
+
+/// A heap of spheres of several radii above a static box, close enough to touch all the time.
+inline void add_heap(BulletWorld& w, int count, std::uint64_t seed, btScalar edge = 3) {
+  Random random(seed);
+  w.add(w.keep(new btBoxShape(btVector3(50, 1, 50))), btVector3(0, -1, 0), 0);
+  for (int i = 0; i < count; ++i) {
+    const Vec3 p = random.uniform_in_box({0, 0, 0}, {edge, edge, edge});
+    const Real radius = random.uniform(Real(0.2), Real(0.6));
+    w.add_sphere(radius, btVector3(p.x, p.y + Real(0.6), p.z));
+  }
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
