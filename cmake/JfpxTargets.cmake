@@ -18,8 +18,8 @@ target_include_directories(jfpx_build_flags INTERFACE ${PROJECT_SOURCE_DIR})
 # part of the usage requirements.
 set(JFPX_EXACT_FLAGS $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-ffp-contract=off>)
 
-# jfpx_add_library(NAME [SOURCES ...] [LINK ...]): NAME and NAME_f64. A name in LINK that has a
-# _f64 sibling is linked as that sibling into NAME_f64.
+# jfpx_add_library(NAME SOURCES ... [PUBLIC ...] [PRIVATE ...]): NAME and NAME_f64. A linked target
+# that has a _f64 sibling is linked as that sibling into NAME_f64.
 function(jfpx_add_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   foreach(suffix IN ITEMS "" "_f64")
@@ -37,17 +37,14 @@ function(jfpx_add_library name)
   endforeach()
 endfunction()
 
-# jfpx_add_executable(NAME SOURCES ... [LINK ...] [F64_NAME n]): NAME and NAME_f64.
+# jfpx_add_executable(NAME SOURCES ... [LINK ...]): NAME and NAME_f64.
 function(jfpx_add_executable name)
-  cmake_parse_arguments(arg "" "F64_NAME" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
   foreach(suffix IN ITEMS "" "_f64")
     set(target ${name}${suffix})
     add_executable(${target} ${arg_SOURCES})
     _jfpx_configure(${target} "${suffix}" "" "${arg_LINK}")
   endforeach()
-  if(arg_F64_NAME)
-    set_target_properties(${name}_f64 PROPERTIES OUTPUT_NAME ${arg_F64_NAME})
-  endif()
 endfunction()
 
 function(_jfpx_configure target suffix public private)

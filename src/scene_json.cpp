@@ -183,8 +183,9 @@ Scene scene_from(const Json& json) {
   if (!bodies.is_array())
     fail("scene.bodies", std::string("is ") + kind_of(bodies) + "; it must be an array");
   scene.bodies.reserve(bodies.size());
-  for (const Json& body : bodies) {
-    read(body, "body " + std::to_string(scene.bodies.size()), scene.bodies.emplace_back());
+  for (const Json& json_body : bodies) {
+    const std::string where = "body " + std::to_string(scene.bodies.size());
+    read(json_body, where, scene.bodies.emplace_back());
   }
   object.reject_unknown();
   validate(scene);

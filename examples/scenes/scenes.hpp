@@ -11,7 +11,7 @@
 namespace jfpx::inline JFPX_ABI::scenes {
 
 struct Options {
-  std::optional<std::uint32_t> spheres;  ///< the scene's default if absent
+  std::optional<std::uint32_t> spheres = {};  ///< the scene's default if absent
   std::uint64_t seed = 1;
 };
 

@@ -250,6 +250,7 @@ void CollisionDispatcher::set_minimum_batch(std::size_t pairs) noexcept {
 }
 bool CollisionDispatcher::verify() const noexcept { return impl_->verify; }
 void CollisionDispatcher::set_verify(bool on) noexcept { impl_->verify = on; }
+Backend CollisionDispatcher::backend() const noexcept { return impl_->collider->backend(); }
 const DispatchStats& CollisionDispatcher::stats() const noexcept { return impl_->stats; }
 void CollisionDispatcher::reset_stats() {
   std::string failure = std::move(impl_->stats.failure);

@@ -182,6 +182,9 @@ btCollisionDispatcher& SceneWorld::dispatcher() noexcept { return *impl_->dispat
 CollisionDispatcher* SceneWorld::jfpx_dispatcher() noexcept {
   return dynamic_cast<CollisionDispatcher*>(impl_->dispatcher.get());
 }
+const CollisionDispatcher* SceneWorld::jfpx_dispatcher() const noexcept {
+  return dynamic_cast<const CollisionDispatcher*>(impl_->dispatcher.get());
+}
 std::span<btRigidBody* const> SceneWorld::bodies() const noexcept { return impl_->bodies; }
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -55,6 +55,9 @@ class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
   void set_verify(bool on) noexcept;
   bool verify() const noexcept;
 
+  /// Who tested the last batch of sphere pairs.
+  Backend backend() const noexcept;
+
   const DispatchStats& stats() const noexcept;
   void reset_stats();  ///< a failed collider stays given up, and `failure` is kept
 

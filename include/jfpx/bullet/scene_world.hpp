@@ -64,6 +64,7 @@ class JFPX_API SceneWorld {
   btCollisionDispatcher& dispatcher() noexcept;
   /// Null for DispatcherKind::stock.
   CollisionDispatcher* jfpx_dispatcher() noexcept;
+  const CollisionDispatcher* jfpx_dispatcher() const noexcept;
   /// The Bullet bodies, in the order of the scene's.
   std::span<btRigidBody* const> bodies() const noexcept;
 

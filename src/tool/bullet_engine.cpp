@@ -1,0 +1,44 @@
+/// Bullet, stock or with jfpx's dispatcher, behind the tool's interface.
+#include "src/tool/bullet_engine.hpp"
+
+#include "src/tool/bullet_world.hpp"
+
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+class BulletEngine final : public Engine {
+ public:
+  BulletEngine(EngineKind kind, const Scene& scene, const RunOptions& options)
+      : world_(make_bullet_world(kind, scene, options)) {}
+
+  void step() override {
+    world_.step();
+    contacts_ = count_contacts(world_);
+  }
+  std::vector<BodyState> states() const override { return world_.states(); }
+  std::uint64_t contacts() const override { return contacts_; }
+  std::uint32_t awake() const override {
+    std::uint32_t awake = 0;
+    for (const btRigidBody* body : world_.bodies()) {
+      awake += !body->isStaticObject() && body->isActive() ? 1 : 0;
+    }
+    return awake;
+  }
+  StageTimes times() const override { return last_step_times(world_); }
+  std::string backend() const override { return sphere_backend(world_); }
+
+ private:
+  bullet::SceneWorld world_;
+  std::uint64_t contacts_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_bullet_engine(EngineKind kind, const Scene& scene,
+                                           const RunOptions& options) {
+  return std::make_unique<BulletEngine>(kind, scene, options);
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

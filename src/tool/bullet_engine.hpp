@@ -1,0 +1,12 @@
+/// Bullet behind the tool's interface. In a build without Bullet everything here throws.
+#pragma once
+
+#include "src/tool/engine.hpp"
+
+namespace jfpx::inline JFPX_ABI::tool {
+
+/// `kind` is bullet or bullet_stock. @throws BackendUnavailable in a build without Bullet.
+std::unique_ptr<Engine> make_bullet_engine(EngineKind kind, const Scene& scene,
+                                           const RunOptions& options);
+
+}  // namespace jfpx::inline JFPX_ABI::tool

@@ -1,0 +1,40 @@
+/// What the tool does with Bullet worlds in more than one place.
+#include "src/tool/bullet_world.hpp"
+
+namespace jfpx::inline JFPX_ABI::tool {
+
+bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
+                                     const RunOptions& options) {
+  bullet::SceneWorldOptions world;
+  world.dispatcher =
+      kind == EngineKind::bullet ? bullet::DispatcherKind::jfpx : bullet::DispatcherKind::stock;
+  world.dispatch.collider = collider_options(options);
+  return bullet::SceneWorld(scene, world);
+}
+
+StageTimes last_step_times(const bullet::SceneWorld& world) {
+  const bullet::StageTimes& t = world.last_step();
+  return {.integrate = t.integrate,
+          .broad = t.broadphase,
+          .detect = t.dispatch,
+          .solve = t.islands + t.solve,
+          .total = t.total};
+}
+
+std::uint64_t count_contacts(bullet::SceneWorld& world) {
+  btCollisionDispatcher& dispatcher = world.dispatcher();
+  std::uint64_t contacts = 0;
+  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
+    contacts +=
+        static_cast<std::uint64_t>(dispatcher.getManifoldByIndexInternal(i)->getNumContacts());
+  }
+  return contacts;
+}
+
+std::string sphere_backend(const bullet::SceneWorld& world) {
+  const bullet::CollisionDispatcher* dispatcher = world.jfpx_dispatcher();
+  if (dispatcher == nullptr || dispatcher->stats().batches == 0) return "Bullet";
+  return std::string(to_string(dispatcher->backend()));
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

@@ -1,0 +1,29 @@
+/// The main job: a scene in native jfpx, stock Bullet and Bullet with jfpx, everything compared.
+#pragma once
+
+#include "src/tool/engine.hpp"
+
+namespace jfpx::inline JFPX_ABI::tool {
+
+/// What a comparison found. `stock` and `jfpx` are two Bullet worlds that differ in the dispatcher.
+struct Comparison {
+  /// Contacts of find_contacts() held against the sphere-sphere manifolds of stock Bullet.
+  std::uint64_t contacts_compared = 0;
+  std::uint64_t contact_mismatches = 0;
+  std::string first_contact_mismatch;  ///< a sentence; empty if there is none
+  /// The first difference between the two Bullet worlds in anything that was compared after each
+  /// step: manifolds in order, every field of every point, transforms, velocities.
+  std::string first_difference;
+  std::uint64_t hash_native = 0, hash_stock = 0, hash_jfpx = 0;
+  std::uint64_t contacts_native = 0, contacts_stock = 0, contacts_jfpx = 0;  ///< summed over steps
+  StageTimes ms_native, ms_stock, ms_jfpx;                                   ///< summed over steps
+  std::string backend;  ///< who computed the last batch of sphere pairs in `jfpx`
+
+  bool trajectory_identical() const { return first_difference.empty() && hash_stock == hash_jfpx; }
+  bool passed() const { return contact_mismatches == 0 && trajectory_identical(); }
+};
+
+/// Steps the three side by side. @throws BackendUnavailable in a build without Bullet.
+Comparison compare(const Scene& scene, const RunOptions& options);
+
+}  // namespace jfpx::inline JFPX_ABI::tool

@@ -1,0 +1,23 @@
+/// jfpx devices: which backends are compiled in, which can be used, and why not.
+#include <jfpx/backend.hpp>
+
+#include "src/tool/commands.hpp"
+#include "src/tool/output.hpp"
+
+#include <fmt/format.h>
+
+namespace jfpx::inline JFPX_ABI::tool {
+
+void add_devices_command(CLI::App& app, int&) {
+  CLI::App* command = app.add_subcommand("devices", "Show which backends can be used, and why not");
+  command->callback([] {
+    for (const BackendStatus& status : available_backends()) {
+      fmt::print("{:<5} {:<12} {:<10} {}\n", to_string(status.backend),
+                 status.compiled ? "compiled" : "not compiled",
+                 status.usable ? "usable" : "not usable",
+                 status.usable ? status.device : status.reason);
+    }
+  });
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

@@ -1,0 +1,45 @@
+/// The native engine behind the tool's interface.
+#include "src/tool/native_engine.hpp"
+
+#include <jfpx/world.hpp>
+
+#include <fmt/format.h>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+class NativeEngine final : public Engine {
+ public:
+  NativeEngine(const Scene& scene, const RunOptions& options)
+      : world_(scene, {.collider = collider_options(options)}) {}
+
+  void step() override { report_ = world_.step(); }
+  std::vector<BodyState> states() const override { return world_.states(); }
+  std::uint64_t contacts() const override { return report_.contacts; }
+  std::uint32_t awake() const override { return report_.awake; }
+  StageTimes times() const override {
+    return {.integrate = report_.integrate_ms,
+            .broad = 0,
+            .detect = report_.detect_ms,
+            .solve = report_.resolve_ms,
+            .total = report_.total_ms};
+  }
+  std::string backend() const override { return std::string(to_string(report_.backend)); }
+  std::string trouble() const override {
+    if (!report_.non_finite) return {};
+    return fmt::format("step {}: body {} left the finite numbers; the state is frozen",
+                       report_.step, report_.non_finite_body.index);
+  }
+
+ private:
+  World world_;
+  StepReport report_;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_native_engine(const Scene& scene, const RunOptions& options) {
+  return std::make_unique<NativeEngine>(scene, options);
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

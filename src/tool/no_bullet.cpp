@@ -1,0 +1,17 @@
+/// What stands in for Bullet in a build without it: an answer that says so.
+#include <jfpx/error.hpp>
+
+#include "src/tool/bullet_engine.hpp"
+#include "src/tool/comparison.hpp"
+
+namespace jfpx::inline JFPX_ABI::tool {
+
+std::unique_ptr<Engine> make_bullet_engine(EngineKind kind, const Scene&, const RunOptions&) {
+  throw BackendUnavailable(std::string(to_string(kind)) + ": built without Bullet");
+}
+
+Comparison compare(const Scene&, const RunOptions&) {
+  throw BackendUnavailable("compare: built without Bullet");
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

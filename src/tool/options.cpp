@@ -1,0 +1,82 @@
+/// What the commands that run scenes have in common on their command lines.
+#include "src/tool/options.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "examples/scenes/scenes.hpp"
+
+#include <filesystem>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+bool is_named(const std::string& name) {
+  for (const scenes::Entry& entry : scenes::all()) {
+    if (entry.name == name) return true;
+  }
+  return false;
+}
+
+bool looks_like_file(const std::string& name) {
+  return name.find('/') != std::string::npos || name.ends_with(".json") ||
+         std::filesystem::exists(name);
+}
+
+}  // namespace
+
+CLI::Validator whole_number() {
+  return CLI::Validator(
+      [](std::string& text) {
+        const bool whole = !text.empty() && text.find_first_not_of("0123456789") == text.npos;
+        return whole ? std::string() : "is " + text + "; it must be a whole number, 0 or more";
+      },
+      "");
+}
+
+void add_scene_options(CLI::App& app, RunOptions& options) {
+  app.add_option("SCENE", options.scene, "Name of a scene (see: jfpx scenes) or a JSON file")
+      ->required();
+  app.add_option("--spheres", options.spheres, "Number of spheres of a named scene")
+      ->check(whole_number());
+  app.add_option("--seed", options.seed, "Seed of a named scene")
+      ->check(whole_number())
+      ->capture_default_str();
+  app.add_option("--dt", options.dt, "Length of a step in seconds [the scene's]");
+  app.add_flag("--no-sleep", options.no_sleep, "Keep all bodies awake");
+}
+
+void add_run_options(CLI::App& app, RunOptions& options) {
+  app.add_option("--steps", options.steps, "Number of steps")
+      ->check(whole_number())
+      ->capture_default_str();
+  app.add_option_function<std::string>(
+         "--backend",
+         [&options](const std::string& text) { options.backend = *parse_backend(text); },
+         "Who finds sphere contacts: auto, x86 or cuda [auto]")
+      ->check(CLI::IsMember({"auto", "x86", "cuda"}));
+  app.add_option("--threads", options.threads, "Threads on x86, 0 = one per core")
+      ->check(whole_number())
+      ->capture_default_str();
+  app.add_option("--json", options.json, "Write the results as JSON to this file, - for stdout");
+  app.add_flag("--hash", options.hash,
+               "Print the hash of the final state, 16 hex digits, as the last line");
+  app.add_flag("--quiet", options.quiet, "Print nothing but what --hash and --json - ask for");
+}
+
+Scene load(const RunOptions& options) {
+  Scene scene;
+  if (!is_named(options.scene) && looks_like_file(options.scene)) {
+    if (options.spheres) {
+      throw InvalidArgument("--spheres goes with a named scene; " + options.scene + " is a file");
+    }
+    scene = load_scene(options.scene);
+  } else {
+    scene = scenes::make(options.scene, {.spheres = options.spheres, .seed = options.seed});
+  }
+  if (options.dt) scene.dt = *options.dt;
+  if (options.no_sleep) scene.sleep.enabled = false;
+  validate(scene);
+  return scene;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

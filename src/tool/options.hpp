@@ -1,0 +1,43 @@
+/// What the commands that run scenes have in common on their command lines.
+#pragma once
+
+#include <jfpx/backend.hpp>
+#include <jfpx/scene.hpp>
+
+#include <CLI/CLI.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::tool {
+
+/// Exit statuses; part of the command's contract.
+enum ExitStatus : int { kSuccess = 0, kCheckFailed = 1, kBadUsage = 2, kBackendUnavailable = 3 };
+
+/// Which scene, and how to run it.
+struct RunOptions {
+  std::string scene;  ///< name or path of a JSON file
+  std::optional<std::uint32_t> spheres;
+  std::optional<Real> dt;
+  std::uint64_t seed = 1;
+  std::uint64_t steps = 120;
+  bool no_sleep = false;
+  Backend backend = Backend::automatic;
+  unsigned threads = 1;
+  std::string json, csv, record;
+  bool hash = false, quiet = false;
+};
+
+/// Accepts decimal digits only. CLI11 by itself reads -1 as the largest unsigned number.
+CLI::Validator whole_number();
+/// Adds SCENE and the options that choose and change a scene.
+void add_scene_options(CLI::App& app, RunOptions& options);
+/// Adds --steps, --backend, --threads, --json, --hash, --quiet.
+void add_run_options(CLI::App& app, RunOptions& options);
+
+/// The scene that the options name, changed as they say.
+/// @throws InvalidArgument, InvalidScene, FileError, OutOfMemory
+Scene load(const RunOptions& options);
+
+}  // namespace jfpx::inline JFPX_ABI::tool

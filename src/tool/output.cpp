@@ -1,0 +1,92 @@
+/// What the commands print and write: tables, progress, files.
+#include "src/tool/output.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstdio>
+#include <type_traits>
+#include <unistd.h>
+
+namespace jfpx::inline JFPX_ABI::tool {
+
+OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
+  if (path_.empty() || path_ == "-") return;
+  part_ = path_ + ".part";
+  file_.open(part_, std::ios::binary | std::ios::trunc);
+  if (!file_) throw FileError(file_message(path_, "can't be written", errno));
+}
+
+OutputFile::~OutputFile() {
+  if (part_.empty() || finished_) return;
+  file_.close();
+  std::remove(part_.c_str());
+}
+
+void OutputFile::write(const std::string& content) {
+  if (path_ == "-") {
+    std::fputs(content.c_str(), stdout);
+  } else if (!path_.empty()) {
+    file_ << content;
+  }
+}
+
+void OutputFile::finish() {
+  if (part_.empty()) return;
+  file_.close();
+  if (!file_ || std::rename(part_.c_str(), path_.c_str()) != 0) {
+    throw FileError(file_message(path_, "can't be written", errno));
+  }
+  finished_ = true;
+}
+
+std::string Table::text() const {
+  std::vector<std::size_t> widths(rows_.front().size());
+  for (const auto& row : rows_) {
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  std::string result;
+  for (std::size_t r = 0; r < rows_.size(); ++r) {
+    std::string line;
+    for (std::size_t i = 0; i < rows_[r].size(); ++i) {
+      line += i == 0 ? fmt::format("{:<{}}", rows_[r][i], widths[i])
+                     : fmt::format("  {:>{}}", rows_[r][i], widths[i]);
+    }
+    result += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
+    if (r == 0) result += std::string(line.size(), '-') + "\n";
+  }
+  return result;
+}
+
+Progress::Progress(std::string label, std::uint64_t total, bool quiet)
+    : label_(std::move(label)), total_(total), shown_(!quiet && isatty(STDERR_FILENO) != 0) {}
+
+Progress::~Progress() {
+  if (shown_ && percent_ >= 0) fmt::print(stderr, "\r{:79}\r", "");
+}
+
+void Progress::advance_to(std::uint64_t done) {
+  if (!shown_ || total_ == 0) return;
+  const int percent = static_cast<int>(done * 100 / total_);
+  if (percent == percent_) return;
+  percent_ = percent;
+  const auto filled = static_cast<std::size_t>(percent) * 40 / 100;
+  fmt::print(stderr, "\r{} [{}{}] {:3}% {}/{}", label_, std::string(filled, '#'),
+             std::string(40 - filled, '.'), percent, done, total_);
+}
+
+std::string hex(std::uint64_t value) { return fmt::format("{:016x}", value); }
+std::string hex_bits(Real value) {
+  using Bits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
+  return fmt::format("0x{:0{}x}", std::bit_cast<Bits>(value), 2 * sizeof(Real));
+}
+std::string text(Real value) { return fmt::format("{}", value); }
+std::string ms(double value) { return fmt::format("{:.3f}", value); }
+
+}  // namespace jfpx::inline JFPX_ABI::tool

@@ -1,0 +1,69 @@
+/// What the commands print and write: tables, progress, files.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::tool {
+
+/// A file that appears under its name only when it is complete. "-" is stdout, "" is nothing.
+class OutputFile {
+ public:
+  /// Opens at once, so that a bad path fails before a long run. @throws FileError
+  explicit OutputFile(std::string path);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  explicit operator bool() const { return !path_.empty(); }
+  void write(const std::string& text);
+  /// @throws FileError
+  void finish();
+
+ private:
+  std::string path_, part_;
+  std::ofstream file_;
+  bool finished_ = false;
+};
+
+/// Rows of cells; the first row is the head, the first column is left-aligned, others right.
+class Table {
+ public:
+  explicit Table(std::vector<std::string> head) { rows_.push_back(std::move(head)); }
+  void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
+  std::string text() const;
+
+ private:
+  std::vector<std::vector<std::string>> rows_;
+};
+
+/// A bar on stderr while a long run lasts; silent unless stderr is a terminal.
+class Progress {
+ public:
+  Progress(std::string label, std::uint64_t total, bool quiet);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  void advance_to(std::uint64_t done);
+
+ private:
+  std::string label_;
+  std::uint64_t total_;
+  int percent_ = -1;
+  bool shown_;
+};
+
+/// The hash as 16 lower-case hex digits.
+std::string hex(std::uint64_t value);
+/// The bits of a Real as lower-case hex digits.
+std::string hex_bits(Real value);
+/// The shortest text that reads back to the same Real.
+std::string text(Real value);
+/// Milliseconds with three decimals.
+std::string ms(double value);
+
+}  // namespace jfpx::inline JFPX_ABI::tool

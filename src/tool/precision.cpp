@@ -1,0 +1,50 @@
+/// Switching between the float and the double build of the command.
+#include "src/tool/precision.hpp"
+
+#include <jfpx/error.hpp>
+#include <jfpx/recording.hpp>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <unistd.h>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+constexpr std::string_view kOwn = sizeof(Real) == 4 ? "float" : "double";
+constexpr const char* kOther = sizeof(Real) == 4 ? "jfpx-f64" : "jfpx";
+
+std::string asked_precision(int argc, char** argv) {
+  constexpr std::string_view kOption = "--precision";
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view argument = argv[i];
+    if (argument == kOption && i + 1 < argc) return argv[i + 1];
+    if (argument.starts_with(kOption) && argument.substr(kOption.size()).starts_with("=")) {
+      return std::string(argument.substr(kOption.size() + 1));
+    }
+  }
+  if (argc < 3 || std::string_view(argv[1]) != "replay") return {};
+  for (int i = 2; i < argc; ++i) {
+    if (argv[i][0] != '-' && std::filesystem::is_regular_file(argv[i])) {
+      return recording_precision(argv[i]);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+void switch_precision_if_asked(int argc, char** argv) {
+  const std::string asked = asked_precision(argc, argv);
+  if (asked == kOwn || (asked != "float" && asked != "double")) return;
+  const std::string sibling =
+      std::filesystem::read_symlink("/proc/self/exe").replace_filename(kOther).string();
+  execv(sibling.c_str(), argv);
+  throw Error(sibling + ", which computes in " + asked +
+              " precision, can't be started: " + std::strerror(errno));
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

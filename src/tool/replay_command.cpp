@@ -1,0 +1,70 @@
+/// jfpx replay: runs a recording again and stops at the first step that differs.
+#include <jfpx/recording.hpp>
+
+#include "src/tool/commands.hpp"
+#include "src/tool/engine.hpp"
+#include "src/tool/output.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+struct Options {
+  std::string path;
+  std::string engine;
+  RunOptions run;
+};
+
+int replay(Options options) {
+  RecordingReader recording(options.path);
+  const RecordingHeader& header = recording.header();
+  if (options.engine.empty()) options.engine = header.engine;
+  const auto engine = make_engine(parse_engine(options.engine), header.scene, options.run);
+  Progress progress(header.scene.name, recording.steps(), options.run.quiet);
+  for (std::uint64_t step = 1; step <= recording.steps(); ++step) {
+    engine->step();
+    const auto difference = first_difference(recording.states(step), engine->states());
+    if (difference) {
+      fmt::print("step {}, body {}, {}: recorded {} ({}), now {} ({})\n", step, difference->body,
+                 difference->field, text(difference->expected), hex_bits(difference->expected),
+                 text(difference->actual), hex_bits(difference->actual));
+      return kCheckFailed;
+    }
+    progress.advance_to(step);
+  }
+  if (!options.run.quiet) {
+    fmt::print("{}: {} steps, engine {}: all states equal the recording bit for bit\n",
+               options.path, recording.steps(), options.engine);
+  }
+  if (options.run.hash) fmt::print("{}\n", hex(state_hash(engine->states())));
+  return kSuccess;
+}
+
+}  // namespace
+
+void add_replay_command(CLI::App& app, int& status) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("replay", "Run a recording again; stop at the first step that differs");
+  command->add_option("FILE", options->path, "Recording made by: jfpx run --record FILE")
+      ->required();
+  command->add_option("--engine", options->engine, "native, bullet or bullet-stock [the recorded]")
+      ->check(CLI::IsMember({"native", "bullet", "bullet-stock"}));
+  command
+      ->add_option_function<std::string>(
+          "--backend",
+          [options](const std::string& text) { options->run.backend = *parse_backend(text); },
+          "auto, x86 or cuda [auto]")
+      ->check(CLI::IsMember({"auto", "x86", "cuda"}));
+  command->add_option("--threads", options->run.threads, "Threads on x86, 0 = one per core")
+      ->check(whole_number())
+      ->capture_default_str();
+  command->add_flag("--hash", options->run.hash, "Print the hash of the final state");
+  command->add_flag("--quiet", options->run.quiet, "Print only a difference");
+  command->callback([options, &status] { status = replay(*options); });
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

@@ -1,0 +1,120 @@
+/// jfpx run: one scene, one engine.
+#include <jfpx/error.hpp>
+#include <jfpx/recording.hpp>
+
+#include "src/tool/commands.hpp"
+#include "src/tool/engine.hpp"
+#include "src/tool/output.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <memory>
+#include <optional>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+struct Options {
+  RunOptions run;
+  std::string engine = "native";
+};
+
+struct Totals {
+  std::uint64_t contacts = 0;
+  StageTimes times;
+};
+
+std::string csv_row(std::uint64_t step, const Engine& engine) {
+  const StageTimes t = engine.times();
+  return fmt::format("{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", step, engine.contacts(),
+                     engine.awake(), t.integrate, t.broad, t.detect, t.solve, t.total);
+}
+
+std::string summary(const Options& options, const Scene& scene, const Engine& engine,
+                    const Totals& totals) {
+  const double steps = std::max(1.0, static_cast<double>(options.run.steps));
+  const StageTimes& t = totals.times;
+  Table table({"ms per step", "integrate", "broad", "detect", "solve", "total"});
+  table.add({options.engine, ms(t.integrate / steps), ms(t.broad / steps), ms(t.detect / steps),
+             ms(t.solve / steps), ms(t.total / steps)});
+  return fmt::format(
+      "{}: {} bodies, {} steps of {} s, engine {}, backend {}\n"
+      "contacts at the end {}, awake {}\n\n{}",
+      scene.name, scene.bodies.size(), options.run.steps, text(scene.dt), options.engine,
+      engine.backend(), engine.contacts(), engine.awake(), table.text());
+}
+
+nlohmann::ordered_json to_json_value(const Options& options, const Scene& scene,
+                                     const Engine& engine, const Totals& totals) {
+  const StageTimes& t = totals.times;
+  return {{"scene", scene.name},
+          {"bodies", scene.bodies.size()},
+          {"steps", options.run.steps},
+          {"engine", options.engine},
+          {"backend", engine.backend()},
+          {"precision", sizeof(Real) == 4 ? "float" : "double"},
+          {"contacts", engine.contacts()},
+          {"contacts_total", totals.contacts},
+          {"awake", engine.awake()},
+          {"hash", hex(state_hash(engine.states()))},
+          {"ms",
+           {{"integrate", t.integrate},
+            {"broad", t.broad},
+            {"detect", t.detect},
+            {"solve", t.solve},
+            {"total", t.total}}}};
+}
+
+int run(const Options& options) {
+  const Scene scene = load(options.run);
+  const auto engine = make_engine(parse_engine(options.engine), scene, options.run);
+  OutputFile csv(options.run.csv), json(options.run.json);
+  std::optional<RecordingWriter> recording;
+  if (!options.run.record.empty()) {
+    recording.emplace(options.run.record,
+                      RecordingHeader{.engine = options.engine,
+                                      .backend = std::string(to_string(options.run.backend)),
+                                      .scene = scene});
+  }
+  csv.write("step,contacts,awake,integrate_ms,broad_ms,detect_ms,solve_ms,total_ms\n");
+  Totals totals;
+  {
+    Progress progress(scene.name, options.run.steps, options.run.quiet);
+    for (std::uint64_t step = 1; step <= options.run.steps; ++step) {
+      engine->step();
+      totals.times += engine->times();
+      totals.contacts += engine->contacts();
+      if (csv) csv.write(csv_row(step, *engine));
+      if (recording) recording->append(engine->states());
+      progress.advance_to(step);
+    }
+  }
+  if (recording) recording->finish();
+  csv.finish();
+  json.write(to_json_value(options, scene, *engine, totals).dump(2) + "\n");
+  json.finish();
+  if (!options.run.quiet) fmt::print("{}", summary(options, scene, *engine, totals));
+  if (options.run.hash) fmt::print("{}\n", hex(state_hash(engine->states())));
+  if (engine->trouble().empty()) return kSuccess;
+  fmt::print(stderr, "jfpx: {}\n", engine->trouble());
+  return kCheckFailed;
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& app, int& status) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("run", "Run a scene with one engine");
+  add_scene_options(*command, options->run);
+  add_run_options(*command, options->run);
+  command->add_option("--engine", options->engine, "native, bullet (with jfpx) or bullet-stock")
+      ->check(CLI::IsMember({"native", "bullet", "bullet-stock"}))
+      ->capture_default_str();
+  command->add_option("--csv", options->run.csv, "Write one line a step to this file");
+  command->add_option("--record", options->run.record,
+                      "Write the state after every step to this file (see: jfpx replay)");
+  command->callback([options, &status] { status = run(*options); });
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

@@ -1,0 +1,58 @@
+/// jfpx scenes: what can be run, and any of it as JSON.
+#include "examples/scenes/scenes.hpp"
+#include "src/tool/commands.hpp"
+#include "src/tool/options.hpp"
+#include "src/tool/output.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+struct ScenesOptions {
+  RunOptions run;
+  bool do_export = false;
+};
+
+std::string list_text() {
+  Table table({"scene", "spheres", "what happens"});
+  std::string text;
+  std::size_t width = 0;
+  for (const scenes::Entry& entry : scenes::all()) width = std::max(width, entry.name.size());
+  for (const scenes::Entry& entry : scenes::all()) {
+    text += fmt::format("{:<{}}  {:>5} spheres  {}\n", entry.name, width, entry.default_spheres,
+                        entry.summary);
+  }
+  return text;
+}
+
+std::string describe(const Scene& scene) {
+  std::size_t movable = 0;
+  for (const BodyDef& body : scene.bodies) movable += body.mass > 0 ? 1 : 0;
+  return fmt::format("{}: {} bodies, {} of them movable, {} spheres, dt {} s\n", scene.name,
+                     scene.bodies.size(), movable, scenes::spheres_of(scene).size(),
+                     text(scene.dt));
+}
+
+}  // namespace
+
+void add_scenes_command(CLI::App& app, int&) {
+  auto options = std::make_shared<ScenesOptions>();
+  CLI::App* command = app.add_subcommand("scenes", "List the named scenes; describe or export one");
+  add_scene_options(*command, options->run);
+  command->get_option("SCENE")->required(false);
+  command->add_flag("--export", options->do_export, "Print the scene as JSON");
+  command->callback([options] {
+    if (options->run.scene.empty()) {
+      if (options->do_export) throw CLI::RequiredError("SCENE, to export,");
+      fmt::print("{}", list_text());
+      return;
+    }
+    const Scene scene = load(options->run);
+    fmt::print("{}", options->do_export ? to_json(scene) : describe(scene));
+  });
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

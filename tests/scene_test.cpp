@@ -1,0 +1,178 @@
+/// Named scenes, and scenes as JSON: round trips, and every way to be wrong.
+#include <jfpx/error.hpp>
+#include <jfpx/scene.hpp>
+
+#include "examples/scenes/scenes.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+namespace jfpx {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kMinimal =
+    R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "sphere", "radius": 1}}]})";
+
+/// What from_json() complains about; empty if it does not.
+std::string complaint(std::string_view text) {
+  try {
+    from_json(text);
+  } catch (const InvalidScene& error) {
+    return error.what();
+  }
+  return {};
+}
+
+std::string with_body(const std::string& fields) {
+  return R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "sphere", "radius": 1}, )" + fields +
+         "}]}";
+}
+
+TEST(NamedScenes, AreValidAndSurviveJson) {
+  for (const scenes::Entry& entry : scenes::all()) {
+    for (const std::uint32_t spheres : {0u, 1u, 2u, 33u}) {
+      const Scene scene = scenes::make(entry.name, {.spheres = spheres, .seed = 7});
+      EXPECT_EQ(scene.name, entry.name);
+      EXPECT_NO_THROW(validate(scene)) << entry.name;
+      EXPECT_EQ(from_json(to_json(scene)), scene) << entry.name;
+    }
+    EXPECT_EQ(scenes::spheres_of(scenes::make(entry.name)).size(), entry.default_spheres);
+  }
+}
+
+TEST(NamedScenes, SeedDecidesAndRepeats) {
+  EXPECT_EQ(scenes::make("pile", {.seed = 3}), scenes::make("pile", {.seed = 3}));
+  EXPECT_NE(scenes::make("pile", {.seed = 3}), scenes::make("pile", {.seed = 4}));
+}
+
+TEST(NamedScenes, TowerHasTheNumbersOfTheThesis) {
+  const Scene scene = scenes::make("boxes-and-balls");
+  ASSERT_EQ(scene.bodies.size(), 449u);
+  const BodyDef& top = scene.bodies[447];
+  EXPECT_NEAR(top.position.x, 134.2, 1e-4);
+  EXPECT_EQ(top.position.y, 1342);
+  EXPECT_EQ(top.mass, 20);
+  EXPECT_EQ(top.acceleration, (Vec3{0, Real(-9.8), 0}));
+  EXPECT_EQ(scene.dt, Real(0.01));
+}
+
+TEST(NamedScenes, LatticeRoundsDownToACube) {
+  EXPECT_EQ(scenes::make("lattice", {.spheres = 27}).bodies.size(), 27u);
+  EXPECT_EQ(scenes::make("lattice", {.spheres = 63}).bodies.size(), 27u);
+  EXPECT_EQ(scenes::make("lattice", {.spheres = 64}).bodies.size(), 64u);
+}
+
+TEST(NamedScenes, UnknownNameListsTheNames) {
+  try {
+    scenes::make("plie");
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("\"plie\""));
+    EXPECT_THAT(error.what(), HasSubstr("pile"));
+  }
+}
+
+TEST(NamedScenes, TooManySpheresAreRefusedBeforeMemoryIsTouched) {
+  try {
+    scenes::make("pile", {.spheres = 0xffffffffu});
+    FAIL();
+  } catch (const OutOfMemory& error) {
+    EXPECT_THAT(error.what(), HasSubstr("4294967295 spheres needs about"));
+  }
+}
+
+TEST(SceneJson, KeepsEveryBitOfEveryField) {
+  Scene scene;
+  scene.name = "a \"quoted\" name";
+  scene.dt = Real(1) / Real(3);
+  scene.resolver.max_iterations = 17;
+  scene.sleep.enabled = false;
+  BodyDef body;
+  body.shape = Box{{Real(0.1), Real(1e-30), Real(1e8)}};
+  body.mass = 0;
+  body.position = {Real(0.1), std::numeric_limits<Real>::denorm_min(), Real(-1e9)};
+  body.orientation = normalized(Quat{1, 2, 3, 4});
+  body.velocity = {Real(-0.0), 1, 2};
+  scene.bodies = {body, body};
+  scene.bodies[1].shape = HalfSpace{{0, 0, 1}, Real(-2.5)};
+  const Scene read = from_json(to_json(scene));
+  EXPECT_EQ(read, scene);
+  EXPECT_TRUE(std::signbit(read.bodies[0].velocity.x));
+}
+
+TEST(SceneJson, AbsentFieldsHaveDefaults) {
+  const Scene scene = from_json(kMinimal);
+  ASSERT_EQ(scene.bodies.size(), 1u);
+  BodyDef expected;
+  expected.shape = Sphere{1};
+  EXPECT_EQ(scene.bodies[0], expected);
+}
+
+TEST(SceneJson, BrokenTextGivesTheLineAndColumn) {
+  EXPECT_THAT(complaint("{\n\"jfpx_scene\": 1,\n oops}"), HasSubstr("line 3, column 2"));
+  EXPECT_THAT(complaint(""), HasSubstr("broken JSON"));
+  EXPECT_THAT(complaint(with_body("\"mass\": 1e999")), HasSubstr("broken JSON"));
+}
+
+TEST(SceneJson, EveryTruncationIsAnError) {
+  const std::string text = kMinimal;
+  for (std::size_t size = 0; size < text.size(); ++size) {
+    EXPECT_NE(complaint(text.substr(0, size)), "") << size;
+  }
+}
+
+TEST(SceneJson, WrongVersionIsNamed) {
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 2, "bodies": []})"), HasSubstr("is 2; this build reads"));
+  EXPECT_THAT(complaint(R"({"bodies": []})"), HasSubstr("has no field \"jfpx_scene\""));
+}
+
+TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
+  EXPECT_THAT(complaint(with_body("\"mass\": \"heavy\"")),
+              HasSubstr("body 0.mass: is a string; it must be a number"));
+  EXPECT_THAT(complaint(with_body("\"weight\": 1")),
+              HasSubstr("body 0: has an unknown field \"weight\"; known fields are"));
+  EXPECT_THAT(complaint(with_body("\"position\": [1, 2]")),
+              HasSubstr("body 0.position: must be an array of 3 numbers"));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"mass": 1}]})"),
+              HasSubstr("body 0: has no field \"shape\""));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "cone"}}]})"),
+              HasSubstr("\"cone\"; it must be sphere, box or half_space"));
+  EXPECT_THAT(complaint(with_body("\"can_sleep\": 1")), HasSubstr("must be a boolean"));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": 3})"), HasSubstr("must be an array"));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [], "resolver": {"max_iterations": -1}})"),
+              HasSubstr("must be a whole number"));
+}
+
+TEST(SceneJson, ValuesOutOfRangeAreInvalid) {
+  EXPECT_THAT(complaint(with_body("\"mass\": -1")), HasSubstr("mass"));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "dt": 0, "bodies": []})"), HasSubstr("dt"));
+}
+
+TEST(SceneFile, RoundTrips) {
+  const test::TemporaryFolder folder;
+  const Scene scene = scenes::make("columns", {.spheres = 40});
+  save_scene(scene, folder.file("scene.json"));
+  EXPECT_EQ(load_scene(folder.file("scene.json")), scene);
+  EXPECT_EQ(folder.entries(), 1u) << "nothing is left beside the file";
+}
+
+TEST(SceneFile, UnreadableAndUnwritablePathsAreNamed) {
+  const test::TemporaryFolder folder;
+  EXPECT_THROW(load_scene(folder.file("missing.json")), FileError);
+  EXPECT_THROW(save_scene(Scene{}, folder.file("no/such/folder.json")), FileError);
+  std::ofstream(folder.file("bad.json")) << "{";
+  try {
+    load_scene(folder.file("bad.json"));
+    FAIL();
+  } catch (const InvalidScene& error) {
+    EXPECT_THAT(error.what(), HasSubstr("bad.json: broken JSON"));
+  }
+}
+
+}  // namespace
+}  // namespace jfpx

@@ -1,0 +1,8 @@
+find_package(nlohmann_json 3.11 REQUIRED)
+jfpx_add_test(tool_test SOURCES tool/tool_test.cpp LINK nlohmann_json::nlohmann_json)
+foreach(suffix IN ITEMS "" "_f64")
+  add_dependencies(tool_test${suffix} jfpx_tool jfpx_tool_f64)
+  target_compile_definitions(tool_test${suffix} PRIVATE
+    JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
+    JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
+endforeach()

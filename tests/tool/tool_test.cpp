@@ -1,0 +1,256 @@
+/// The jfpx command as a user meets it: output, exit statuses, errors, files.
+#include <jfpx/backend.hpp>
+#include <jfpx/recording.hpp>
+#include <jfpx/scene.hpp>
+
+#include "examples/scenes/scenes.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <fstream>
+
+namespace jfpx {
+namespace {
+
+using test::ProcessResult;
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+using ::testing::Not;
+
+constexpr const char* kOtherPrecision = sizeof(Real) == 4 ? "double" : "float";
+
+/// The command with these arguments; stderr is part of the output.
+ProcessResult jfpx_command(const std::string& arguments) {
+  return test::run_process(std::string(JFPX_TOOL_PATH) + " " + arguments + " 2>&1");
+}
+/// As jfpx_command(), stdout only.
+ProcessResult jfpx_stdout(const std::string& arguments) {
+  return test::run_process(std::string(JFPX_TOOL_PATH) + " " + arguments + " 2>/dev/null");
+}
+
+bool cuda_usable() {
+  for (const BackendStatus& status : available_backends()) {
+    if (status.backend == Backend::cuda) return status.usable;
+  }
+  return false;
+}
+
+void expect_fails(const std::string& arguments, int status, const std::string& message) {
+  const ProcessResult result = jfpx_command(arguments);
+  EXPECT_EQ(result.status, status) << arguments << "\n" << result.output;
+  EXPECT_THAT(result.output, HasSubstr(message)) << arguments;
+}
+
+TEST(Tool, HelpNamesTheCommandsAndExitStatuses) {
+  const ProcessResult result = jfpx_command("--help");
+  EXPECT_EQ(result.status, 0);
+  for (const char* word : {"compare", "run", "replay", "scenes", "devices", "Exit status"}) {
+    EXPECT_THAT(result.output, HasSubstr(word));
+  }
+  EXPECT_EQ(jfpx_command("run --help").status, 0);
+  EXPECT_EQ(jfpx_command("--version").output, "jfpx " JFPX_VERSION "\n");
+}
+
+TEST(Tool, BadUsageIsStatusTwo) {
+  expect_fails("", 2, "subcommand");
+  expect_fails("fly", 2, "fly");
+  expect_fails("run", 2, "SCENE");
+  expect_fails("run pile --speres 3", 2, "--speres");
+  expect_fails("run pile --steps many", 2, "--steps");
+  expect_fails("run pile --steps -1", 2, "--steps");
+  expect_fails("run pile --engine havok", 2, "havok");
+  expect_fails("run pile --backend vulkan", 2, "vulkan");
+  expect_fails("run pile --precision half", 2, "half");
+  expect_fails("scenes --export", 2, "SCENE");
+}
+
+TEST(Tool, BadInputIsStatusTwoAndNamed) {
+  expect_fails("run plie", 2, "there is no scene called \"plie\"");
+  expect_fails("run pile --dt 0", 2, "dt");
+  expect_fails("run pile --dt nan", 2, "dt");
+  expect_fails("run pile --dt -0.1", 2, "dt");
+  expect_fails("run pile --spheres 4294967295", 2, "MiB");
+  expect_fails("run missing.json", 2, "missing.json: can't be opened");
+  expect_fails("run pile --threads 100000", 2, "threads");
+}
+
+TEST(Tool, SceneFilesAreChecked) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("scene.json");
+  std::ofstream(path) << "{\"jfpx_scene\": 1, \"bodies\": [}";
+  expect_fails("run " + path, 2, "scene.json: broken JSON");
+  save_scene(scenes::make("pile", {.spheres = 5}), path);
+  expect_fails("run " + path + " --spheres 3", 2, "--spheres goes with a named scene");
+  EXPECT_EQ(jfpx_command("run " + path + " --steps 2").status, 0);
+}
+
+TEST(Tool, ScenesAreListedDescribedAndExported) {
+  const ProcessResult list = jfpx_stdout("scenes");
+  EXPECT_EQ(list.status, 0);
+  for (const scenes::Entry& entry : scenes::all()) {
+    EXPECT_THAT(list.output, HasSubstr(std::string(entry.name)));
+  }
+  EXPECT_THAT(jfpx_stdout("scenes pile --spheres 30").output, HasSubstr("pile: 35 bodies, 30"));
+  const ProcessResult text = jfpx_stdout("scenes gas --spheres 10 --seed 5 --export");
+  EXPECT_EQ(from_json(text.output), scenes::make("gas", {.spheres = 10, .seed = 5}));
+}
+
+TEST(Tool, DevicesTellsTheTruth) {
+  const ProcessResult result = jfpx_stdout("devices");
+  EXPECT_EQ(result.status, 0);
+  for (const BackendStatus& status : available_backends()) {
+    EXPECT_THAT(result.output, HasSubstr(std::string(to_string(status.backend))));
+    EXPECT_THAT(result.output, HasSubstr(status.usable ? status.device : status.reason));
+  }
+}
+
+TEST(Tool, CudaThatCannotBeHadIsStatusThreeWithTheReason) {
+  if (cuda_usable()) GTEST_SKIP() << "CUDA is usable here";
+  std::string reason;
+  for (const BackendStatus& status : available_backends()) {
+    if (status.backend == Backend::cuda) reason = status.reason;
+  }
+  expect_fails("run pile --steps 1 --backend cuda", 3, "cuda: " + reason);
+  expect_fails("compare pile --steps 1 --backend cuda", 3, "cuda: " + reason);
+}
+
+TEST(Tool, HashIsTheLastLineAndRepeats) {
+  const std::string arguments = "run pile --spheres 50 --steps 20 --hash";
+  const ProcessResult loud = jfpx_stdout(arguments);
+  const ProcessResult quiet = jfpx_stdout(arguments + " --quiet");
+  EXPECT_THAT(quiet.output, MatchesRegex("[0-9a-f]{16}\n"));
+  EXPECT_THAT(loud.output, ::testing::EndsWith("\n" + quiet.output));
+  EXPECT_EQ(jfpx_stdout(arguments + " --quiet --threads 3").output, quiet.output);
+  EXPECT_NE(jfpx_stdout(arguments + " --quiet --seed 2").output, quiet.output);
+}
+
+TEST(Tool, PrecisionSwitchesTheBuild) {
+  const std::string arguments = "run gas --spheres 20 --steps 3 --json - --quiet --precision ";
+  for (const std::string precision : {"float", "double"}) {
+    const auto json = nlohmann::json::parse(jfpx_stdout(arguments + precision).output);
+    EXPECT_EQ(json["precision"], precision);
+  }
+  EXPECT_EQ(
+      jfpx_stdout("run gas --steps 1 --quiet --hash --precision=" + std::string(kOtherPrecision))
+          .status,
+      0);
+}
+
+TEST(Tool, RunWritesCsvAndJson) {
+  const test::TemporaryFolder folder;
+  const ProcessResult result =
+      jfpx_command("run pile --spheres 20 --steps 7 --csv " + folder.file("a.csv") + " --json " +
+                   folder.file("a.json"));
+  ASSERT_EQ(result.status, 0) << result.output;
+  std::ifstream csv(folder.file("a.csv"));
+  std::string line;
+  int lines = 0;
+  while (std::getline(csv, line)) ++lines;
+  EXPECT_EQ(lines, 8);
+  const auto json = nlohmann::json::parse(std::ifstream(folder.file("a.json")));
+  EXPECT_EQ(json["scene"], "pile");
+  EXPECT_EQ(json["steps"], 7);
+  EXPECT_EQ(folder.entries(), 2u);
+}
+
+TEST(Tool, UnwritableOutputFailsBeforeTheRunAndLeavesNothing) {
+  const test::TemporaryFolder folder;
+  expect_fails("run pile --steps 1 --json " + folder.file("no/x.json"), 2, "can't be written");
+  expect_fails("run pile --steps 1 --csv " + folder.file("no/x.csv"), 2, "can't be written");
+  expect_fails("run pile --steps 1 --record " + folder.file("no/x.rec"), 2, "can't be written");
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
+TEST(Tool, ReplayFindsARecordingEqual) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  for (const std::string precision : {"float", "double"}) {
+    ASSERT_EQ(jfpx_command("run pile --spheres 60 --steps 40 --quiet --record " + path +
+                           " --precision " + precision)
+                  .status,
+              0);
+    const ProcessResult result = jfpx_command("replay " + path);
+    EXPECT_EQ(result.status, 0) << result.output;
+    EXPECT_THAT(result.output, HasSubstr("40 steps"));
+    EXPECT_THAT(result.output, HasSubstr("bit for bit"));
+  }
+}
+
+TEST(Tool, ReplayStopsAtTheFirstStepThatDiffers) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  ASSERT_EQ(jfpx_command("run pile --spheres 10 --steps 8 --quiet --record " + path).status, 0);
+  const std::string changed = folder.file("changed.rec");
+  {
+    RecordingReader reader(path);
+    RecordingWriter writer(changed, reader.header());
+    for (std::uint64_t step = 1; step <= reader.steps(); ++step) {
+      auto states = reader.states(step);
+      if (step == 5) states[3].velocity.y = Real(42);
+      writer.append(states);
+    }
+    writer.finish();
+  }
+  expect_fails("replay " + changed, 1, "step 5, body 3, velocity.y: recorded 42");
+}
+
+TEST(Tool, ReplayRefusesDamagedFiles) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder.file("x.rec")) << "no recording at all, only text of some length";
+  expect_fails("replay " + folder.file("x.rec"), 2, "is not a jfpx recording");
+  expect_fails("replay " + folder.file("missing.rec"), 2, "missing.rec");
+}
+
+#if JFPX_HAS_BULLET
+TEST(Tool, CompareFindsEveryNamedSceneIdentical) {
+  for (const scenes::Entry& entry : scenes::all()) {
+    for (const char* sleep : {"", " --no-sleep"}) {
+      const ProcessResult result =
+          jfpx_stdout("compare " + std::string(entry.name) +
+                      " --spheres 125 --steps 30 --quiet --json -" + sleep);
+      EXPECT_EQ(result.status, 0) << entry.name << "\n" << result.output;
+      const auto json = nlohmann::json::parse(result.output);
+      EXPECT_EQ(json["contact_mismatches"], 0) << entry.name;
+      EXPECT_EQ(json["trajectory_identical"], true) << entry.name;
+      EXPECT_TRUE(json["first_difference"].is_null());
+      EXPECT_EQ(json["hash_stock"], json["hash_jfpx"]);
+      EXPECT_EQ(json["spheres"], 125);
+      EXPECT_TRUE(json["ms"].contains("native"));
+    }
+  }
+}
+
+TEST(Tool, CompareReallyComparesContacts) {
+  const auto json = nlohmann::json::parse(
+      jfpx_stdout("compare overlap --spheres 100 --steps 1 --quiet --json -").output);
+  EXPECT_EQ(json["contacts_compared"], 100 * 99 / 2);
+}
+
+TEST(Tool, BulletEnginesRunAndAgree) {
+  const std::string arguments = "run pile --spheres 80 --steps 60 --quiet --hash --engine ";
+  const ProcessResult jfpx = jfpx_stdout(arguments + "bullet");
+  const ProcessResult stock = jfpx_stdout(arguments + "bullet-stock");
+  EXPECT_EQ(jfpx.status, 0);
+  EXPECT_EQ(jfpx.output, stock.output);
+  EXPECT_NE(jfpx.output, jfpx_stdout(arguments + "native").output);
+}
+
+TEST(Tool, ScenesOfNoneAndOneBodyWork) {
+  for (const char* spheres : {"0", "1"}) {
+    EXPECT_EQ(jfpx_command(std::string("compare pile --steps 3 --spheres ") + spheres).status, 0);
+    EXPECT_EQ(jfpx_command(std::string("run overlap --steps 3 --spheres ") + spheres).status, 0);
+  }
+}
+#else
+TEST(Tool, BulletThatIsNotBuiltInIsStatusThree) {
+  expect_fails("compare pile", 3, "built without Bullet");
+  expect_fails("run pile --engine bullet", 3, "built without Bullet");
+}
+#endif
+
+}  // namespace
+}  // namespace jfpx
