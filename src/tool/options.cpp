@@ -5,7 +5,9 @@
 
 #include "examples/scenes/scenes.hpp"
 
+#include <charconv>
 #include <filesystem>
+#include <system_error>
 
 namespace jfpx::inline JFPX_ABI::tool {
 namespace {
@@ -27,8 +29,10 @@ bool looks_like_file(const std::string& name) {
 CLI::Validator whole_number() {
   return CLI::Validator(
       [](std::string& text) {
-        const bool whole = !text.empty() && text.find_first_not_of("0123456789") == text.npos;
-        return whole ? std::string() : "is " + text + "; it must be a whole number, 0 or more";
+        std::uint64_t value = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool whole = error == std::errc() && end == text.data() + text.size();
+        return whole ? "" : "is " + text + "; it must be a whole number from 0 to 2^64 - 1";
       },
       "");
 }

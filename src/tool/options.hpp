@@ -29,7 +29,8 @@ struct RunOptions {
   bool hash = false, quiet = false;
 };
 
-/// Accepts decimal digits only. CLI11 by itself reads -1 as the largest unsigned number.
+/// Accepts whole numbers of 64 bits. CLI11 by itself reads -1, and what is too large, as the
+/// largest one.
 CLI::Validator whole_number();
 /// Adds SCENE and the options that choose and change a scene.
 void add_scene_options(CLI::App& app, RunOptions& options);

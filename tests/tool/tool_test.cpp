@@ -62,6 +62,7 @@ TEST(Tool, BadUsageIsStatusTwo) {
   expect_fails("run pile --speres 3", 2, "--speres");
   expect_fails("run pile --steps many", 2, "--steps");
   expect_fails("run pile --steps -1", 2, "--steps");
+  expect_fails("run pile --seed 18446744073709551616", 2, "--seed");
   expect_fails("run pile --engine havok", 2, "havok");
   expect_fails("run pile --backend vulkan", 2, "vulkan");
   expect_fails("run pile --precision half", 2, "half");
