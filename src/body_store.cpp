@@ -149,20 +149,22 @@ void BodyStore::integrate(std::uint32_t i) {
                                                    dt_, velocity_kept_[i]);
   moving.angular_velocity[i] = shared::integrated_velocity(
       moving.angular_velocity[i], angular_acceleration, dt_, angular_velocity_kept_[i]);
+  if (can_sleep_[i] != 0 && falls_asleep(i)) return;
   moving.position[i] = shared::integrated_position(moving.position[i], moving.velocity[i], dt_);
   moving.orientation[i] =
       shared::integrated_orientation(moving.orientation[i], moving.angular_velocity[i], dt_);
   refresh_inertia(i);
-  if (can_sleep_[i] != 0) update_sleep(i);
 }
 
-void BodyStore::update_sleep(std::uint32_t i) {
+/// Asked before the body is moved: a body at rest would fall asleep a step's weight too deep.
+bool BodyStore::falls_asleep(std::uint32_t i) {
   moving.motion[i] =
       shared::mean_motion(moving.motion[i], moving.velocity[i], moving.angular_velocity[i],
                           motion_kept_, 10 * sleep_.epsilon);
-  if (!(moving.motion[i] < sleep_.epsilon)) return;
+  if (!(moving.motion[i] < sleep_.epsilon)) return false;
   moving.awake[i] = 0;
   moving.velocity[i] = moving.angular_velocity[i] = {};
+  return true;
 }
 
 void BodyStore::refresh_inertia(std::uint32_t i) {

@@ -72,7 +72,7 @@ class BodyStore {
  private:
   void resize(std::size_t slots);
   void integrate(std::uint32_t body);
-  void update_sleep(std::uint32_t body);
+  bool falls_asleep(std::uint32_t body);
   void refresh_inertia(std::uint32_t body);
 
   Real dt_;

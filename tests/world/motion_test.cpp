@@ -1,0 +1,262 @@
+/// Worlds against mechanics: falling, flying, bouncing, rolling, sliding, hitting.
+#include "tests/world/support.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+
+constexpr double kG = 9.81;
+
+BodyDef falling(const Vec3& position) {
+  BodyDef def = test::ball(position);
+  def.acceleration = {0, -9.81_r, 0};
+  return def;
+}
+
+TEST(Motion, FreeFallIsTheDiscreteSumAndNearlyTheParabola) {
+  Scene scene;
+  scene.dt = Real(1) / 64;
+  scene.bodies = {falling({0, 100, 0})};
+  World world(scene);
+  const double dt = 1.0 / 64;
+  for (int n = 1; n <= 256; ++n) {
+    world.step();
+    const BodyState s = world.states()[0];
+    // v_n = -g n dt, y_n = y_0 - g dt^2 (1 + 2 + ... + n).
+    ASSERT_NEAR(s.velocity.y, -kG * n * dt, 100 * static_cast<double>(kEpsilon) * n);
+    ASSERT_NEAR(s.position.y, 100 - kG * dt * dt * n * (n + 1) / 2,
+                100 * static_cast<double>(kEpsilon) * n);
+    const double t = n * dt;
+    ASSERT_NEAR(s.position.y, 100 - kG * t * t / 2, kG * t * dt);
+  }
+}
+
+TEST(Motion, ProjectileWithDragFollowsTheGeometricSums) {
+  Scene scene;
+  scene.dt = 0.01_r;
+  BodyDef def = falling({0, 0, 0});
+  def.velocity = {30, 40, 0};
+  def.linear_damping = 0.5_r;
+  scene.bodies = {def};
+  World world(scene);
+  for (int n = 0; n < 300; ++n) world.step();
+  const double q = std::pow(0.5, 0.01), dt = 0.01, n = 300;
+  const double qn = std::pow(q, n);
+  // v_n = v_0 q^n + a dt q (1 - q^n)/(1 - q); x_n = dt * (v_1 + ... + v_n).
+  const double fall = -kG * dt * q / (1 - q);
+  const double kept = dt * q * (1 - qn) / (1 - q);
+  const BodyState s = world.states()[0];
+  EXPECT_NEAR(s.velocity.x, 30 * qn, 1e-3);
+  EXPECT_NEAR(s.velocity.y, 40 * qn + fall * (1 - qn), 1e-3);
+  EXPECT_NEAR(s.position.x, 30 * kept, 1e-3);
+  EXPECT_NEAR(s.position.y, 40 * kept + fall * (n * dt - kept), 2e-3);
+}
+
+TEST(Motion, BounceReachesTheSquareOfTheRestitutionOfTheHeight) {
+  for (const Real e : {Real(0), 0.3_r, 0.5_r, 0.8_r, Real(1)}) {
+    Scene scene;
+    scene.dt = 0.001_r;
+    BodyDef def = falling({0, 1 + 5, 0});
+    def.restitution = e;
+    BodyDef floor = test::ground();
+    floor.restitution = e;
+    scene.bodies = {def, floor};
+    World world(scene);
+    bool hit = false;
+    double top = 0;
+    for (int n = 0; n < 4000; ++n) {
+      world.step();
+      const BodyState s = world.states()[0];
+      hit = hit || !world.contacts().empty();
+      if (hit && s.velocity.y < -0.5_r) break;
+      if (hit) top = std::max(top, static_cast<double>(s.position.y) - 1);
+    }
+    // A step at the speed of the hit, 9.9 m/s, is 9.9 mm long.
+    EXPECT_NEAR(top, static_cast<double>(e * e) * 5, 0.02) << "e " << e;
+  }
+}
+
+TEST(Motion, ABallRollsDownASlopeWithFiveSeventhsOfThePull) {
+  const double angle = 0.3;
+  Scene scene;
+  scene.dt = 0.01_r;
+  BodyDef def = falling({0, 0, 0});
+  def.friction = 1;
+  BodyDef slope = test::half_space(
+      {static_cast<Real>(std::sin(angle)), static_cast<Real>(std::cos(angle)), 0}, -1);
+  slope.friction = 1;
+  scene.bodies = {def, slope};
+  World world(scene);
+  for (int n = 0; n < 300; ++n) world.step();
+  const BodyState s = world.states()[0];
+  const double expected = 5.0 / 7.0 * kG * std::sin(angle) * 3;
+  EXPECT_NEAR(length(s.velocity), expected, 0.01 * expected);
+  EXPECT_NEAR(-s.angular_velocity.z, expected, 0.02 * expected);  // rolling: omega r = v
+  EXPECT_GT(s.velocity.x, 0);
+}
+
+TEST(Motion, ASlidingBallLosesTwoSeventhsOfItsSpeedAndThenRolls) {
+  Scene scene;
+  scene.dt = 0.005_r;
+  BodyDef def = falling({0, 1, 0});
+  def.velocity = {7, 0, 0};
+  def.friction = 0.25_r;
+  BodyDef floor = test::ground();
+  floor.friction = 0.25_r;
+  scene.bodies = {def, floor};
+  World world(scene);
+  // Sliding ends after t = 2 v / (7 mu g); until then the speed falls with mu g.
+  const double end = 2 * 7 / (7 * 0.25 * kG);
+  double t = 0;
+  for (; t < end / 2; t += 0.005) world.step();
+  EXPECT_NEAR(world.states()[0].velocity.x, 7 - 0.25 * kG * t, 0.1);
+  for (; t < 2 * end; t += 0.005) world.step();
+  const BodyState s = world.states()[0];
+  EXPECT_NEAR(s.velocity.x, 5, 0.05);
+  EXPECT_NEAR(-s.angular_velocity.z, 5, 0.05);
+  // Way: 12 v^2 / (49 mu g) sliding, then 5 m/s.
+  EXPECT_NEAR(s.position.x, 12 * 49 / (49 * 0.25 * kG) + 5 * (t - end), 0.1);
+}
+
+TEST(Motion, ABallThatMayNotTurnSlidesToAStopAfterVSquaredOverTwoMuG) {
+  Scene scene;
+  scene.dt = 0.001_r;
+  BodyDef def = falling({0, 1, 0});
+  def.velocity = {3, 0, 0};
+  def.friction = 0.5_r;
+  BodyDef floor = test::ground();
+  floor.friction = 0.5_r;
+  scene.bodies = {def, floor};
+  World world(scene);
+  const BodyId id = world.bodies()[0];
+  for (int n = 0; n < 1000; ++n) {
+    world.step();
+    BodyState s = world.state(id);
+    s.angular_velocity = {};  // held by hand
+    world.set_state(id, s);
+  }
+  EXPECT_NEAR(world.state(id).position.x, 9 / (2 * 0.5 * kG), 0.02);
+  EXPECT_NEAR(world.state(id).velocity.x, 0, 0.01);
+}
+
+TEST(Motion, FrictionTurnsBothBallsTheSameWayInAGlancingHit) {
+  Scene scene;
+  BodyDef a = test::ball({0, 0, 0}), b = test::ball({2.05_r, 0.5_r, 0});
+  a.velocity = {6, 0, 0};
+  a.friction = b.friction = 0.5_r;
+  scene.bodies = {a, b};
+  World world(scene);
+  for (int n = 0; n < 10; ++n) world.step();
+  const auto states = world.states();
+  // a passes below b and drags b's underside along +x: both turn about +z.
+  EXPECT_GT(states[0].angular_velocity.z, 0.1_r);
+  EXPECT_GT(states[1].angular_velocity.z, 0.1_r);
+  EXPECT_NEAR(states[0].angular_velocity.z, states[1].angular_velocity.z, 1e-5);
+}
+
+TEST(Motion, FirstHitOfTheTowerIsWhenTheSecondBallHasFallenOntoTheFirst) {
+  Scene scene;
+  scene.dt = 0.01_r;
+  for (int i = 0; i < 8; ++i) {
+    const Real y = 1 + 3 * static_cast<Real>(i);
+    BodyDef def = test::ball({0.1_r * y, y, 0}, 1, 20);
+    def.acceleration = {0, -9.8_r, 0};
+    def.linear_damping = 0.99_r;
+    def.can_sleep = true;
+    scene.bodies.push_back(def);
+  }
+  scene.bodies.push_back(test::ground());
+  World world(scene);
+  int first = 0;
+  for (int n = 1; n <= 100 && first == 0; ++n) {
+    if (world.step().sphere_contacts > 0) first = n;
+  }
+  // The centres are 0.3 apart along x, so they touch at a height of sqrt(4 - 0.09). Ball 0 lies on
+  // the ground, at most epsilon = 0.01 deep: both ends of that range.
+  const auto touching_step = [](double lowest) {
+    const double kept = std::pow(0.99, 0.01);
+    double y = 4, v = 0;
+    for (int n = 1;; ++n) {
+      v = (v - 9.8 * 0.01) * kept;
+      y += v * 0.01;
+      if (y - lowest <= std::sqrt(4 - 0.09)) return n;
+    }
+  };
+  EXPECT_EQ(touching_step(1), 46);
+  EXPECT_EQ(touching_step(0.99), 46);
+  EXPECT_EQ(first, 46);
+}
+
+TEST(Motion, MomentumIsConservedInACloud) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  Scene scene;
+  scene.resolver.position_epsilon = 100;  // projections move bodies without momentum
+  for (int i = 0; i < 60; ++i) {
+    BodyDef def =
+        test::ball(random.uniform_in_box({-4, -4, -4}, {4, 4, 4}), 1, random.uniform(1, 5));
+    def.velocity = def.position * Real(-2);
+    def.friction = random.uniform();
+    def.restitution = random.uniform();
+    scene.bodies.push_back(def);
+  }
+  World world(scene);
+  const test::Sums before = test::sums(world);
+  std::uint64_t impulses = 0;
+  for (int n = 0; n < 60; ++n) impulses += world.step().velocity_iterations;
+  EXPECT_GT(impulses, 50u);
+  const test::Sums after = test::sums(world);
+  const double tolerance = 20 * static_cast<double>(kEpsilon) * before.scale;
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(after.momentum[k], before.momentum[k], tolerance);
+    EXPECT_NEAR(after.angular_momentum[k], before.angular_momentum[k], tolerance);
+  }
+}
+
+TEST(Motion, EnergyNeverGrowsInAClosedBox) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  for (std::uint64_t run = 0; run < 6; ++run) {
+    Random random(seed + run);
+    Scene scene;
+    for (int i = 0; i < 60; ++i) {
+      BodyDef def =
+          test::ball(random.uniform_in_box({-4, -4, -4}, {4, 4, 4}), 1, random.uniform(1, 5));
+      def.velocity = random.uniform_in_box({-9, -9, -9}, {9, 9, 9});
+      def.angular_velocity = random.uniform_in_box({-9, -9, -9}, {9, 9, 9});
+      def.friction = run < 3 ? random.uniform() : 0;
+      def.restitution = run % 3 == 0 ? 1 : random.uniform();
+      scene.bodies.push_back(def);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const Real side : {Real(-1), Real(1)}) {
+        Vec3 normal;
+        normal[axis] = side;
+        BodyDef wall = test::half_space(normal, -5);
+        wall.restitution = 1;
+        scene.bodies.push_back(wall);
+      }
+    }
+    World world(scene);
+    double energy = test::sums(world).energy;
+    const double first = energy;
+    for (int n = 0; n < 200; ++n) {
+      world.step();
+      const double now = test::sums(world).energy;
+      ASSERT_LE(now, energy * (1 + 200 * static_cast<double>(kEpsilon))) << n;
+      energy = now;
+    }
+    if (run == 3) {  // elastic and smooth: all of it is kept, but for hits slower than 0.25 m/s
+      EXPECT_GT(energy, 0.97 * first);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace jfpx

@@ -1,0 +1,193 @@
+/// Worlds that come to rest: nothing sinks, nothing trembles, sleepers sleep and wake.
+#include "tests/world/support.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+
+BodyDef heavy(const Vec3& position, bool can_sleep, Real radius = 1) {
+  BodyDef def = test::ball(position, radius);
+  def.acceleration = {0, -9.81_r, 0};
+  def.friction = 0.4_r;
+  def.can_sleep = can_sleep;
+  return def;
+}
+
+Scene on_the_ground(std::vector<BodyDef> bodies) {
+  Scene scene;
+  scene.bodies = std::move(bodies);
+  scene.bodies.push_back(test::ground());
+  return scene;
+}
+
+TEST(Rest, ABallOnTheGroundNeitherSinksNorTrembles) {
+  const Scene scene = on_the_ground({heavy({0, 1, 0}, false)});
+  World world(scene);
+  for (int n = 0; n < 60; ++n) world.step();
+  const Real level = world.states()[0].position.y;
+  EXPECT_GE(level, 1 - scene.resolver.position_epsilon);
+  for (int n = 0; n < 600; ++n) {
+    world.step();
+    ASSERT_NEAR(world.states()[0].position.y, level, 1e-6);
+    ASSERT_NEAR(world.states()[0].velocity.y, 0, 1e-6);
+  }
+}
+
+TEST(Rest, ABallOnABoxRestsAsOnTheGround) {
+  BodyDef table = test::ground();
+  table.shape = Box{{5, 1, 5}};
+  table.position = {0, -1, 0};
+  Scene scene;
+  scene.bodies = {heavy({0.3_r, 1, 0.2_r}, false), table};
+  World world(scene);
+  for (int n = 0; n < 300; ++n) world.step();
+  EXPECT_GE(world.states()[0].position.y, 1 - scene.resolver.position_epsilon);
+  EXPECT_NEAR(world.states()[0].position.x, 0.3, 1e-4);
+}
+
+TEST(Rest, AStackOfTenMovesLessThanAMillimetreInTenSeconds) {
+  std::vector<BodyDef> balls;
+  for (int i = 0; i < 10; ++i) {
+    // A hundredth of a millimetre into each other, so that all touch though the sums round.
+    balls.push_back(heavy({0, 1 + 1.99999_r * static_cast<Real>(i), 0}, false));
+  }
+  Scene scene = on_the_ground(balls);
+  scene.resolver.position_epsilon = 5e-5_r;  // ten of them are half a millimetre
+  scene.resolver.velocity_epsilon = 1e-3_r;
+  scene.resolver.max_iterations = 100000;
+  World world(scene);
+  bool exhausted = false;
+  for (int n = 0; n < 600; ++n) {
+    exhausted |= world.step().iterations_exhausted;
+    const auto states = world.states();
+    for (std::size_t i = 0; i < 10; ++i) {
+      ASSERT_LT(length(states[i].position - balls[i].position), 1e-3_r) << n << ", ball " << i;
+    }
+  }
+  EXPECT_FALSE(exhausted);
+}
+
+TEST(Rest, AStackOfTenKeepsEachContactWithinTheEpsilonAndFallsAsleep) {
+  std::vector<BodyDef> balls;
+  for (int i = 0; i < 10; ++i) {
+    balls.push_back(heavy({0, 1 + 2 * static_cast<Real>(i), 0}, true));
+  }
+  Scene scene = on_the_ground(balls);
+  scene.resolver.max_iterations = 2000;
+  World world(scene);
+  StepReport report;
+  for (int n = 0; n < 600; ++n) report = world.step();
+  EXPECT_EQ(report.awake, 0u);
+  Real below = 0, top = 0;
+  for (std::size_t i = 0; i < 10; ++i, below = top) {
+    top = world.states()[i].position.y;
+    ASSERT_GE(top - below, (i == 0 ? 1 : 2) - scene.resolver.position_epsilon - 1e-6_r);
+  }
+}
+
+TEST(Rest, AHeapOfBallsComesToRestAboveTheGround) {
+  // The tower of the thesis, short: it leans, falls over and lies side by side.
+  std::vector<BodyDef> balls;
+  for (int i = 0; i < 6; ++i) {
+    const Real y = 1 + 3 * static_cast<Real>(i);
+    balls.push_back(heavy({0.1_r * y, y, 0}, true));
+    balls.back().linear_damping = 0.9_r;
+    balls.back().angular_damping = 0.1_r;
+  }
+  Scene scene = on_the_ground(balls);
+  World world(scene);
+  StepReport report;
+  for (int n = 0; n < 6000; ++n) report = world.step();
+  EXPECT_EQ(report.awake, 0u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_NEAR(world.states()[i].position.y, 1, scene.resolver.position_epsilon + 1e-5_r);
+  }
+}
+
+TEST(Erratum, E07_coincident_centres_part_along_x_and_stay_finite) {
+  Scene scene;
+  scene.bodies = {test::ball({5, 5, 5}), test::ball({5, 5, 5})};
+  World world(scene);
+  const StepReport report = world.step();
+  EXPECT_EQ(report.sphere_contacts, 1u);
+  EXPECT_FALSE(report.non_finite);
+  const auto states = world.states();
+  EXPECT_NEAR(states[0].position.x - states[1].position.x, 2, 0.0101);
+  EXPECT_EQ(states[0].position.y, 5);
+}
+
+TEST(Erratum, E06_a_ball_on_the_ground_does_not_sink) {
+  World world(on_the_ground({heavy({0, 1, 0}, false)}));
+  for (int n = 0; n < 600; ++n) world.step();
+  EXPECT_GT(world.states()[0].position.y, 0.98_r);  // the original: 0.02 after 600 steps
+}
+
+/// Four balls in a row on the ground, touching, asleep.
+World sleeping_row() {
+  std::vector<BodyDef> balls;
+  for (int i = 0; i < 4; ++i) balls.push_back(heavy({2 * static_cast<Real>(i), 0.995_r, 0}, true));
+  World world(on_the_ground(balls));
+  for (int n = 0; n < 120; ++n) world.step();
+  return world;
+}
+
+TEST(Sleep, TouchingBallsFallAsleepTogetherAndKeepTheirContacts) {
+  World world = sleeping_row();
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_FALSE(world.awake(world.bodies()[i]));
+  const auto before = world.states();
+  const StepReport report = world.step();
+  EXPECT_EQ(report.awake, 0u);
+  EXPECT_EQ(report.contacts, 7u);  // three pairs and four on the ground
+  EXPECT_EQ(report.position_iterations + report.velocity_iterations, 0u);
+  EXPECT_EQ(world.states(), before);
+}
+
+TEST(Sleep, AHitWakesAllThatTouch) {
+  World world = sleeping_row();
+  BodyDef shot = heavy({-2.2_r, 1, 0}, true);
+  shot.velocity = {10, 0, 0};
+  world.add(shot);
+  world.step();
+  world.step();
+  for (const BodyId id : world.bodies().first(4)) EXPECT_TRUE(world.awake(id));
+  for (int n = 0; n < 5; ++n) world.step();
+  EXPECT_GT(world.states()[3].velocity.x, 0.5_r);
+}
+
+TEST(Sleep, TheSurroundingsWakeNobody) {
+  World world = sleeping_row();
+  const auto before = world.states();
+  for (int n = 0; n < 60; ++n) EXPECT_EQ(world.step().awake, 0u);
+  EXPECT_EQ(world.states(), before);
+}
+
+TEST(Sleep, WhoLosesTheSupportWakesAndFalls) {
+  for (const bool remove : {true, false}) {
+    World world(on_the_ground({heavy({0, 0.995_r, 0}, true), heavy({0, 2.99_r, 0}, true)}));
+    for (int n = 0; n < 120; ++n) world.step();
+    const BodyId below = world.bodies()[0], above = world.bodies()[1];
+    ASSERT_FALSE(world.awake(above));
+    if (remove) {
+      world.remove(below);
+    } else {
+      world.set_state(below, {{50, 1, 0}, {}, {}, {}});
+    }
+    for (int n = 0; n < 240; ++n) world.step();
+    EXPECT_NEAR(world.state(above).position.y, 1, 0.0101);
+  }
+}
+
+TEST(Sleep, OneThatMayNotSleepKeepsItsNeighboursAwake) {
+  World world(on_the_ground({heavy({0, 0.995_r, 0}, false), heavy({1.995_r, 0.995_r, 0}, true)}));
+  StepReport report;
+  for (int n = 0; n < 300; ++n) report = world.step();
+  EXPECT_EQ(report.awake, 2u);
+}
+
+}  // namespace
+}  // namespace jfpx

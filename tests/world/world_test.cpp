@@ -1,0 +1,280 @@
+/// The world as its users see it: bodies come and go, reports, failures, contacts, determinism.
+#include <jfpx/error.hpp>
+
+#include "examples/scenes/scenes.hpp"
+#include "tests/world/support.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <new>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+
+Scene two_balls() {
+  Scene scene;
+  scene.bodies = {test::ball({0, 0, 0}), test::ball({1.5_r, 0, 0})};
+  return scene;
+}
+
+TEST(World, OfNothingSteps) {
+  World world{Scene{}};
+  const StepReport report = world.step();
+  EXPECT_EQ(report.step, 1u);
+  EXPECT_EQ(report.contacts, 0u);
+  EXPECT_TRUE(world.bodies().empty());
+  EXPECT_EQ(world.state_hash(), state_hash({}));
+}
+
+TEST(World, StartsInTheStateOfTheScene) {
+  Scene scene = two_balls();
+  scene.bodies[0].velocity = {1, 2, 3};
+  scene.bodies[1].angular_velocity = {4, 5, 6};
+  World world(scene);
+  EXPECT_EQ(world.scene(), scene);
+  const auto states = world.states();
+  ASSERT_EQ(states.size(), 2u);
+  EXPECT_EQ(states[0], (BodyState{{0, 0, 0}, {}, {1, 2, 3}, {}}));
+  EXPECT_EQ(states[1], (BodyState{{1.5_r, 0, 0}, {}, {}, {4, 5, 6}}));
+  EXPECT_EQ(world.state(world.bodies()[1]), states[1]);
+}
+
+TEST(World, ReportsWhatAStepDid) {
+  Scene scene = two_balls();
+  scene.bodies.push_back(test::half_space({0, 1, 0}, -0.5_r));
+  World world(scene);
+  world.step();
+  const StepReport report = world.step();
+  EXPECT_EQ(report.step, 2u);
+  EXPECT_EQ(report.awake, 2u);
+  EXPECT_EQ(report.backend, Backend::x86);
+  EXPECT_EQ(report.contacts, world.contacts().size());
+  EXPECT_LE(report.integrate_ms + report.detect_ms + report.resolve_ms,
+            report.total_ms * 1.001 + 1e-6);
+  EXPECT_FALSE(report.iterations_exhausted);
+  EXPECT_FALSE(report.non_finite);
+}
+
+TEST(World, ContactsAreSpherePairsFirstEachByBody) {
+  Scene scene;
+  scene.bodies = {test::half_space({0, 1, 0}, 0), test::ball({0, 0.9_r, 0}),
+                  test::ball({1.5_r, 0.9_r, 0}), test::half_space({0, 0, 1}, -0.9_r),
+                  test::ball({0, 0.9_r, 0}, 1, 0)};
+  World world(scene);
+  const StepReport report = world.step();
+  EXPECT_EQ(report.sphere_contacts, 3u);
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+  for (const Contact& c : world.contacts()) pairs.push_back({c.a, c.b});
+  // The immovable ball 4 touches half-spaces too, which is nobody's contact.
+  EXPECT_EQ(pairs, (std::vector<std::pair<std::uint32_t, std::uint32_t>>{
+                       {1, 2}, {1, 4}, {2, 4}, {1, 0}, {1, 3}, {2, 0}, {2, 3}}));
+  EXPECT_EQ(world.contacts()[3].normal, (Vec3{0, 1, 0}));
+  EXPECT_EQ(world.contacts()[3].distance, 0.9_r - 1);
+}
+
+TEST(World, BodiesComeAndGoAtAnyTime) {
+  World world(two_balls());
+  world.step();
+  const BodyId first = world.bodies()[0], second = world.bodies()[1];
+  world.remove(first);
+  EXPECT_TRUE(world.contacts().empty());
+  world.step();
+  const BodyId third = world.add(test::ball({9, 9, 9}));
+  EXPECT_EQ(std::vector<BodyId>(world.bodies().begin(), world.bodies().end()),
+            (std::vector<BodyId>{third, second}));
+  EXPECT_EQ(world.step().contacts, 0u);
+  EXPECT_EQ(world.states()[0].position, (Vec3{9, 9, 9}));
+  world.remove(second);
+  world.remove(third);
+  EXPECT_TRUE(world.states().empty());
+  world.step();
+}
+
+TEST(World, AStrangeIdIsAnError) {
+  World world(two_balls());
+  const BodyId gone = world.bodies()[0];
+  world.remove(gone);
+  EXPECT_THROW(world.remove(gone), InvalidArgument);
+  EXPECT_THROW(world.state(gone), InvalidArgument);
+  EXPECT_THROW(world.awake(BodyId{}), InvalidArgument);
+  EXPECT_THROW(world.set_state({7, 0}, {}), InvalidArgument);
+}
+
+TEST(World, SetStateRefusesWhatAnySceneWould) {
+  World world(two_balls());
+  const BodyId id = world.bodies()[0];
+  const auto before = world.states();
+  BodyState bad;
+  bad.velocity.y = std::numeric_limits<Real>::infinity();
+  EXPECT_THROW(world.set_state(id, bad), InvalidArgument);
+  bad = {};
+  bad.orientation = {0, 0, 0, 0};
+  EXPECT_THROW(world.set_state(id, bad), InvalidArgument);
+  EXPECT_EQ(world.states(), before);
+}
+
+TEST(World, AnObstacleCanBeMoved) {
+  Scene scene;
+  BodyDef box = test::ground();
+  box.shape = Box{{1, 1, 1}};
+  box.position = {50, 0, 0};
+  scene.bodies = {test::ball({0, 0, 0}), box};
+  World world(scene);
+  EXPECT_EQ(world.step().contacts, 0u);
+  world.set_state(world.bodies()[1], {{1.9_r, 0, 0}, {}, {9, 9, 9}, {}});
+  EXPECT_EQ(world.state(world.bodies()[1]).velocity, Vec3{});
+  EXPECT_EQ(world.step().contacts, 1u);
+}
+
+TEST(World, AMovableBoxOrHalfSpaceIsRefusedByName) {
+  for (const Shape& shape : {Shape{Box{}}, Shape{HalfSpace{}}}) {
+    Scene scene = two_balls();
+    BodyDef def;
+    def.shape = shape;
+    scene.bodies.push_back(def);
+    try {
+      World world(scene);
+      ADD_FAILURE() << "no error";
+    } catch (const InvalidScene& error) {
+      EXPECT_STREQ(error.what(),
+                   "body 2: mass is 1; it must be 0 for a box or half-space: the native engine "
+                   "moves spheres only in this version");
+    }
+    World world(two_balls());
+    EXPECT_THROW(world.add(def), InvalidScene);
+    EXPECT_EQ(world.bodies().size(), 2u);
+  }
+}
+
+TEST(World, ARunawayBodyIsNamedAndTheStateKept) {
+  Scene scene = two_balls();
+  BodyDef runaway = test::ball({0, 50, 0});
+  runaway.velocity = {0, std::numeric_limits<Real>::max() / 2, 0};
+  scene.bodies.push_back(runaway);
+  World world(scene);
+  const auto before = world.states();
+  const BodyId id = world.bodies()[2];
+  for (int n = 0; n < 3; ++n) {
+    const StepReport report = world.step();
+    ASSERT_TRUE(report.non_finite);
+    ASSERT_EQ(report.non_finite_body, id);
+    ASSERT_EQ(report.step, 0u);
+    ASSERT_EQ(world.states(), before);
+    ASSERT_TRUE(world.contacts().empty());
+  }
+  world.remove(id);
+  EXPECT_FALSE(world.step().non_finite);
+  EXPECT_NE(world.states()[0], before[0]);
+}
+
+TEST(World, LeavingTheWorldCountsAsRunningAway) {
+  Scene scene;
+  scene.dt = 1;
+  scene.bodies = {test::ball({0.999e9_r, 0, 0})};
+  scene.bodies[0].velocity = {1e7_r, 0, 0};
+  World world(scene);
+  EXPECT_TRUE(world.step().non_finite);
+  EXPECT_EQ(world.states()[0].position.x, 0.999e9_r);
+}
+
+/// Finds nothing, and fails in the ways that a collider may.
+class FailingCollider final : public SphereCollider {
+ public:
+  explicit FailingCollider(const int* fails) : fails_(fails) {}
+  ContactSpan find_contacts(std::span<const SphereInstance>) override {
+    if (*fails_ == 1) throw DeviceError("the device is gone");
+    if (*fails_ == 2) throw std::bad_alloc();
+    return {};
+  }
+  std::span<const PairResult> test_pairs(std::span<const SphereInstance>,
+                                         std::span<const SpherePair>) override {
+    return {};
+  }
+  Backend backend() const noexcept override { return Backend::x86; }
+  SphereAlgorithm algorithm() const noexcept override { return SphereAlgorithm::all_pairs; }
+
+ private:
+  const int* fails_;
+};
+
+TEST(World, AStepThatThrowsLeavesNoTrace) {
+  Scene scene = two_balls();
+  for (BodyDef& def : scene.bodies) def.acceleration = {0, -9.81_r, 0};
+  int fails = 0;
+  World world(scene, std::make_unique<FailingCollider>(&fails));
+  World twin(scene, std::make_unique<FailingCollider>(&fails));
+  world.step();
+  twin.step();
+  const auto before = world.states();
+  fails = 1;
+  EXPECT_THROW(world.step(), DeviceError);
+  EXPECT_EQ(world.states(), before);
+  fails = 2;
+  EXPECT_THROW(world.step(), OutOfMemory);
+  EXPECT_EQ(world.states(), before);
+  fails = 0;
+  EXPECT_EQ(world.step().step, 2u);
+  twin.step();
+  EXPECT_EQ(world.state_hash(), twin.state_hash());
+}
+
+TEST(World, NeedsACollider) { EXPECT_THROW(World(two_balls(), nullptr), InvalidArgument); }
+
+TEST(World, CanBeMoved) {
+  World a(two_balls());
+  a.step();
+  const std::uint64_t hash = a.state_hash();
+  World b(std::move(a));
+  EXPECT_EQ(b.state_hash(), hash);
+  a = std::move(b);
+  EXPECT_EQ(a.state_hash(), hash);
+}
+
+TEST(Determinism, ThreadsAlgorithmsAndRepeatsGiveTheSameBits) {
+  for (const std::string_view name : {"pile", "gas", "polydisperse"}) {
+    const Scene scene = scenes::make(name, {.spheres = 200, .seed = 3});
+    std::optional<std::uint64_t> expected;
+    for (const SphereAlgorithm algorithm :
+         {SphereAlgorithm::automatic, SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+      for (const unsigned threads : {1u, 2u, 3u, 8u}) {
+        WorldSettings settings;
+        settings.collider.algorithm = algorithm;
+        settings.collider.threads = threads;
+        World world(scene, settings);
+        for (int n = 0; n < 40; ++n) world.step();
+        if (!expected) expected = world.state_hash();
+        ASSERT_EQ(world.state_hash(), *expected) << name << ", threads " << threads;
+      }
+    }
+  }
+}
+
+TEST(StateHash, SeesEveryBitOfEveryField) {
+  const BodyState state{{1, 2, 3}, {1, 0, 0, 0}, {4, 5, 6}, {7, 8, 9}};
+  std::vector<BodyState> states(3, state);
+  const std::uint64_t hash = state_hash(states);
+  Real* values = &states[1].position.x;
+  for (int i = 0; i < 13; ++i) {
+    const Real old = values[i];
+    values[i] = std::nextafter(old, Real(100));
+    EXPECT_NE(state_hash(states), hash) << i;
+    values[i] = old;
+  }
+  EXPECT_EQ(state_hash(states), hash);
+  states.pop_back();
+  EXPECT_NE(state_hash(states), hash);
+}
+
+TEST(StateHash, TellsMinusZeroFromZeroAndOneOrderFromAnother) {
+  BodyState plus, minus;
+  minus.velocity.x = -Real(0);
+  const BodyState one[] = {plus, minus}, other[] = {minus, plus}, same[] = {plus, plus};
+  EXPECT_NE(state_hash(one), state_hash(same));
+  EXPECT_NE(state_hash(one), state_hash(other));
+}
+
+}  // namespace
+}  // namespace jfpx
