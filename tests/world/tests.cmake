@@ -3,8 +3,19 @@ jfpx_add_test(world_parts_test SOURCES
   world/collide_test.cpp
   world/contact_resolver_test.cpp
   world/indexed_heap_test.cpp
-  world/power_test.cpp)
+  world/power_test.cpp
+  world/scene_validate_test.cpp)
 jfpx_add_test(world_test SOURCES
   world/motion_test.cpp
   world/rest_test.cpp
   world/world_test.cpp)
+jfpx_add_test(allocation_test SOURCES world/allocation_test.cpp)
+
+jfpx_add_executable(pinned_hashes SOURCES world/pinned_hashes.cpp LINK jfpx jfpx_scenes)
+add_test(NAME PinnedHashes COMMAND pinned_hashes)
+add_test(NAME PinnedHashes_f64 COMMAND pinned_hashes_f64)
+add_test(NAME PinnedHashes.WithEveryCompiler
+  COMMAND ${CMAKE_COMMAND} -DBINARY_DIR=${PROJECT_BINARY_DIR}/flavours
+    -DCONFIG_DIR=${PROJECT_BINARY_DIR}/include -DLAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
+    -P ${CMAKE_CURRENT_LIST_DIR}/flavours/run.cmake)
+set_tests_properties(PinnedHashes.WithEveryCompiler PROPERTIES TIMEOUT 600 PROCESSORS 2)

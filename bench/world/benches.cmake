@@ -1,0 +1,1 @@
+jfpx_add_bench(world_bench SOURCES world/world_bench.cpp)

@@ -1,0 +1,87 @@
+/// Steps of the native world, and the resolver with a heap against a scan of all contacts.
+#include <jfpx/random.hpp>
+
+#include "examples/scenes/scenes.hpp"
+#include "src/contact_resolver.hpp"
+#include "tests/world/linear_scan.hpp"
+
+#include <benchmark/benchmark.h>
+
+namespace jfpx {
+namespace {
+
+/// One step of a scene that has settled for `warm_up` steps; per stage in the counters.
+void step(benchmark::State& state, const char* name, std::uint32_t spheres, int warm_up) {
+  World world(scenes::make(name, {.spheres = spheres, .seed = 1}));
+  for (int n = 0; n < warm_up; ++n) world.step();
+  StepReport sum;
+  for (auto _ : state) {
+    const StepReport report = world.step();
+    sum.contacts += report.contacts;
+    sum.position_iterations += report.position_iterations;
+    sum.velocity_iterations += report.velocity_iterations;
+    sum.integrate_ms += report.integrate_ms;
+    sum.detect_ms += report.detect_ms;
+    sum.resolve_ms += report.resolve_ms;
+  }
+  const auto mean = [&](auto total) {
+    return benchmark::Counter(static_cast<double>(total), benchmark::Counter::kAvgIterations);
+  };
+  state.counters["contacts"] = mean(sum.contacts);
+  state.counters["position_iterations"] = mean(sum.position_iterations);
+  state.counters["velocity_iterations"] = mean(sum.velocity_iterations);
+  state.counters["integrate_ms"] = mean(sum.integrate_ms);
+  state.counters["detect_ms"] = mean(sum.detect_ms);
+  state.counters["resolve_ms"] = mean(sum.resolve_ms);
+}
+
+void step_pile_2048(benchmark::State& state) { step(state, "pile", 2048, 120); }
+void step_tower_448(benchmark::State& state) { step(state, "boxes-and-balls", 448, 400); }
+
+/// A lattice with 19494 contacts whose spheres fly in all directions.
+struct Crowd {
+  Crowd() : bodies(Real(0.01), SleepSettings{}) {
+    Scene scene = scenes::make("lattice", {.spheres = 19 * 19 * 19, .seed = 1});
+    World still(scene);
+    still.step();
+    contacts.assign(still.contacts().begin(), still.contacts().end());
+    Random random(1);
+    for (BodyDef& def : scene.bodies) {
+      def.velocity = random.uniform_in_box({-5, -5, -5}, {5, 5, 5});
+      bodies.add(def);
+    }
+  }
+  BodyStore bodies;
+  std::vector<Contact> contacts;
+};
+
+template <class Queue>
+void resolve_20000(benchmark::State& state) {
+  const Crowd crowd;
+  BasicContactResolver<Queue> resolver;
+  // As many iterations as the slow one can do in reasonable time.
+  const ResolverSettings settings{.max_iterations = static_cast<std::uint32_t>(state.range(0))};
+  std::uint64_t iterations = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    BodyStore bodies = crowd.bodies;
+    state.ResumeTiming();
+    const ResolverReport report = resolver.resolve(bodies, crowd.contacts, settings);
+    iterations += report.position_iterations + report.velocity_iterations;
+  }
+  state.counters["contacts"] = static_cast<double>(crowd.contacts.size());
+  state.counters["iterations"] =
+      benchmark::Counter(static_cast<double>(iterations), benchmark::Counter::kAvgIterations);
+  state.counters["time_per_iteration"] = benchmark::Counter(
+      static_cast<double>(iterations), benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
+BENCHMARK(step_pile_2048)->Unit(benchmark::kMillisecond);
+BENCHMARK(step_tower_448)->Unit(benchmark::kMillisecond);
+BENCHMARK(resolve_20000<IndexedHeap>)->Arg(20000)->Unit(benchmark::kMillisecond);
+BENCHMARK(resolve_20000<test::LinearScan>)->Arg(20000)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace jfpx
+
+BENCHMARK_MAIN();

@@ -1,0 +1,59 @@
+/// Hashes of native runs, equal for every compiler and optimisation level. A changed hash is a
+/// change of what every user computes: pin the new one only with a line in CHANGELOG.md.
+/// A plain program, so that flavours/ can build it quickly in many ways.
+#include <jfpx/world.hpp>
+
+#include "examples/scenes/scenes.hpp"
+
+#include <cinttypes>
+#include <cstdio>
+
+namespace jfpx {
+namespace {
+
+struct Pin {
+  const char* scene;
+  std::uint32_t spheres;
+  int steps;
+  std::uint64_t float_hash, double_hash;
+};
+
+constexpr Pin kPins[] = {
+    {"boxes-and-balls", 16, 300, 0xe05d748f56476ecau, 0xe6d10396327e15fau},
+    {"pile", 100, 100, 0x8f7cb142a91b08deu, 0x5082c8d7fa98388cu},
+    {"gas", 200, 100, 0xa10f790439c09a40u, 0x0d5838aaa644c8b3u},
+    {"columns", 64, 60, 0x47c461faaac49dd3u, 0x260268dbd8e72d72u},
+    {"overlap", 32, 60, 0xf2230bd18b8b5575u, 0x7b88a66b3fc8384bu},
+    {"lattice", 125, 30, 0x954b8ff8f9bf4aa0u, 0xffd382557645e418u},
+    {"polydisperse", 100, 60, 0x53a5b2155ebb9b95u, 0xdda07c7f25f8daa8u},
+};
+
+/// False, with a line that says why, if the run goes wrong, resolves nothing, or ends elsewhere.
+bool check(const Pin& pin) {
+  World world(scenes::make(pin.scene, {.spheres = pin.spheres, .seed = 1}));
+  std::uint64_t resolved = 0;
+  bool finite = true;
+  for (int n = 0; n < pin.steps; ++n) {
+    const StepReport report = world.step();
+    resolved += report.position_iterations + report.velocity_iterations;
+    finite = finite && !report.non_finite;
+  }
+  const std::uint64_t expected = sizeof(Real) == 4 ? pin.float_hash : pin.double_hash;
+  const bool same = world.state_hash() == expected;
+  std::printf("%-16s %5" PRIu32 " spheres %5d steps  %016" PRIx64 "  %s\n", pin.scene, pin.spheres,
+              pin.steps, world.state_hash(),
+              !finite         ? "WRONG: a body ran away"
+              : resolved == 0 ? "WRONG: no contact was resolved"
+              : !same         ? "WRONG: another hash is pinned"
+                              : "as pinned");
+  return finite && resolved > 0 && same;
+}
+
+}  // namespace
+}  // namespace jfpx
+
+int main() {
+  bool all = true;
+  for (const jfpx::Pin& pin : jfpx::kPins) all = jfpx::check(pin) && all;
+  return all ? 0 : 1;
+}

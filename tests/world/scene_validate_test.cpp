@@ -1,0 +1,189 @@
+/// Every way in which a scene can be wrong, one at a time.
+#include "src/scene_validate.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "tests/world/support.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+
+constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
+constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
+constexpr Real kDenormal = std::numeric_limits<Real>::denorm_min();
+
+Scene sound() {
+  Scene scene;
+  scene.bodies.resize(4);
+  scene.bodies[1].shape = Box{};
+  scene.bodies[2].shape = HalfSpace{};
+  scene.bodies[2].mass = 0;
+  return scene;
+}
+
+/// The message of the error, or "" if there is none.
+std::string message(const Scene& scene) {
+  try {
+    validate(scene);
+  } catch (const InvalidScene& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Validate, ASoundSceneAndAnEmptyOnePass) {
+  EXPECT_EQ(message(sound()), "");
+  EXPECT_EQ(message(Scene{}), "");
+}
+
+TEST(Validate, TheEndsOfTheRangesPass) {
+  Scene scene = sound();
+  scene.dt = std::numeric_limits<Real>::min();
+  scene.resolver = {.max_iterations = 0xffffffffu,
+                    .velocity_epsilon = kDenormal,
+                    .position_epsilon = kDenormal,
+                    .restitution_velocity = 0,
+                    .angular_limit = 1};
+  scene.sleep = {.enabled = false, .epsilon = kDenormal, .bias = 1};
+  BodyDef& def = scene.bodies[3];
+  def.shape = Sphere{kMaxCoordinate};
+  def.position = {kMaxCoordinate, -kMaxCoordinate, 0};
+  def.velocity.x = std::numeric_limits<Real>::max();
+  def.linear_damping = def.angular_damping = kDenormal;
+  def.friction = std::numeric_limits<Real>::max();
+  def.restitution = 1;
+  def.orientation = {0.707_r, 0.707_r, 0, 0};
+  EXPECT_EQ(message(scene), "");
+}
+
+TEST(Validate, MessagesNameBodyFieldValueAndRange) {
+  Scene scene = sound();
+  scene.bodies[3].mass = -1;
+  EXPECT_EQ(message(scene), "body 3: mass is -1; it must be finite and >= 0");
+  scene = sound();
+  scene.bodies[1].velocity = {0.5_r, kNan, -2};
+  EXPECT_EQ(message(scene), "body 1: velocity is (0.5, nan, -2); it must be finite");
+  scene = sound();
+  scene.dt = 0;
+  EXPECT_EQ(message(scene), "scene: dt is 0; it must be finite, > 0 and no denormal number");
+  scene = sound();
+  scene.bodies[0].shape = Sphere{0};
+  scene.bodies[1].mass = kInfinity;
+  EXPECT_EQ(message(scene), "body 0: radius is 0; it must be > 0 and at most 1e9");
+}
+
+struct Fault {
+  const char* field;
+  std::function<void(Scene&, Real)> put;
+  std::vector<Real> values;
+};
+
+TEST(Validate, EveryFieldIsChecked) {
+  const auto body = [](auto member) {
+    return [member](Scene& scene, Real value) { scene.bodies[0].*member = value; };
+  };
+  const std::vector<Real> not_finite = {kNan, kInfinity, -kInfinity};
+  const auto and_also = [&](std::vector<Real> values) {
+    values.insert(values.end(), not_finite.begin(), not_finite.end());
+    return values;
+  };
+  const std::vector<Fault> faults = {
+      {"dt", [](Scene& s, Real v) { s.dt = v; }, and_also({0, -1, kDenormal})},
+      {"resolver.velocity_epsilon", [](Scene& s, Real v) { s.resolver.velocity_epsilon = v; },
+       and_also({0, -1})},
+      {"resolver.position_epsilon", [](Scene& s, Real v) { s.resolver.position_epsilon = v; },
+       and_also({0, -1})},
+      {"resolver.restitution_velocity",
+       [](Scene& s, Real v) { s.resolver.restitution_velocity = v; }, and_also({-1})},
+      {"resolver.angular_limit", [](Scene& s, Real v) { s.resolver.angular_limit = v; },
+       and_also({0, -1, 1.01_r})},
+      {"sleep.epsilon", [](Scene& s, Real v) { s.sleep.epsilon = v; }, and_also({0, -1})},
+      {"sleep.bias", [](Scene& s, Real v) { s.sleep.bias = v; }, and_also({0, -1, 1.01_r})},
+      {"mass", body(&BodyDef::mass), and_also({-1, kDenormal})},
+      {"linear_damping", body(&BodyDef::linear_damping), and_also({0, -1, 1.01_r})},
+      {"angular_damping", body(&BodyDef::angular_damping), and_also({0, -1, 1.01_r})},
+      {"friction", body(&BodyDef::friction), and_also({-1})},
+      {"restitution", body(&BodyDef::restitution), and_also({-1, 1.01_r})},
+      {"radius", [](Scene& s, Real v) { s.bodies[0].shape = Sphere{v}; },
+       and_also({0, -1, 1.01e9_r})},
+      {"half_extents",
+       [](Scene& s, Real v) {
+         s.bodies[0].shape = Box{{1, v, 1}};
+       },
+       and_also({0, -1, 1.01e9_r})},
+      {"normal",
+       [](Scene& s, Real v) {
+         s.bodies[2].shape = HalfSpace{{0, v, 0}, 0};
+       },
+       and_also({0, 0.99_r, 1.01_r})},
+      {"offset",
+       [](Scene& s, Real v) {
+         s.bodies[2].shape = HalfSpace{{0, 1, 0}, v};
+       },
+       and_also({1.01e9_r, -1.01e9_r})},
+      {"position", [](Scene& s, Real v) { s.bodies[0].position.z = v; },
+       and_also({1.01e9_r, -1.01e9_r})},
+      {"orientation",
+       [](Scene& s, Real v) {
+         s.bodies[0].orientation = {v, 0, 0, 0};
+       },
+       and_also({0, 0.99_r, 1.01_r})},
+      {"velocity", [](Scene& s, Real v) { s.bodies[0].velocity.x = v; }, not_finite},
+      {"angular_velocity", [](Scene& s, Real v) { s.bodies[0].angular_velocity.y = v; },
+       not_finite},
+      {"acceleration", [](Scene& s, Real v) { s.bodies[0].acceleration.z = v; }, not_finite},
+  };
+  for (const Fault& fault : faults) {
+    for (const Real value : fault.values) {
+      Scene scene = sound();
+      fault.put(scene, value);
+      const std::string text = message(scene);
+      EXPECT_NE(text.find(std::string(": ") + fault.field + " is "), std::string::npos)
+          << fault.field << " = " << value << ": \"" << text << '"';
+    }
+  }
+}
+
+TEST(Validate, MassesThatMakeNoFiniteInertiaAreRefused) {
+  const Real tiny = square_root(std::numeric_limits<Real>::min());
+  Scene scene = sound();
+  scene.bodies[0].mass = std::numeric_limits<Real>::min();
+  scene.bodies[0].shape = Sphere{tiny};
+  EXPECT_NE(message(scene).find("body 0: moment of inertia is "), std::string::npos);
+  scene.bodies[0].shape = Box{{tiny, tiny, tiny}};
+  EXPECT_NE(message(scene).find("body 0: moments of inertia is "), std::string::npos);
+  scene.bodies[0].mass = 0;
+  EXPECT_EQ(message(scene), "");
+}
+
+TEST(Validate, MoreBodiesThanIndicesAreRefused) {
+  EXPECT_NO_THROW(validate_body_count(0xffffffffu));
+  EXPECT_THROW(validate_body_count(0x100000000u), InvalidScene);
+}
+
+TEST(Validate, AWorldRefusesABadSceneAndABadBody) {
+  Scene scene;
+  scene.bodies = {test::ball({kNan, 0, 0})};
+  EXPECT_THROW(World{scene}, InvalidScene);
+  World world{Scene{}};
+  EXPECT_THROW(world.add(scene.bodies[0]), InvalidScene);
+  EXPECT_TRUE(world.bodies().empty());
+}
+
+TEST(ToText, IsShortAndReadsBack) {
+  EXPECT_EQ(to_text(0.1_r), "0.1");
+  EXPECT_EQ(to_text(Real(-2)), "-2");
+  EXPECT_EQ(to_text(kInfinity), "inf");
+  EXPECT_EQ(to_text(Vec3{1, 2, 3}), "(1, 2, 3)");
+  EXPECT_EQ(to_text(Quat{}), "(1, 0, 0, 0)");
+}
+
+}  // namespace
+}  // namespace jfpx
