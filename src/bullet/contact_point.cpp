@@ -7,6 +7,8 @@
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
 
+#include <new>
+
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
@@ -62,15 +64,16 @@ void write_contact(btPersistentManifold* manifold, const PairResult& result,
   const btVector3 normal(result.normal.x, result.normal.y, result.normal.z);
   const btVector3 on_b = pose_b.getOrigin() + radius_b * normal;
   const btVector3 on_a = on_b + normal * result.distance;
-  btManifoldPoint point(pose_a.invXform(on_a), pose_b.invXform(on_b), normal, result.distance);
-  point.m_positionWorldOnA = on_a;
-  point.m_positionWorldOnB = on_b;
-  combine_materials(body_a, body_b, &point);
-  btPlaneSpace1(point.m_normalWorldOnB, point.m_lateralFrictionDir1, point.m_lateralFrictionDir2);
 
-  // btPersistentManifold::addManifoldPoint on an empty manifold.
+  // btPersistentManifold::addManifoldPoint on an empty manifold. The point is made in its place: a
+  // copy right behind the writes would wait for them to leave the store buffer.
   manifold->setNumContacts(1);
-  manifold->getContactPoint(0) = point;
+  auto* point = new (&manifold->getContactPoint(0))
+      btManifoldPoint(pose_a.invXform(on_a), pose_b.invXform(on_b), normal, result.distance);
+  point->m_positionWorldOnA = on_a;
+  point->m_positionWorldOnB = on_b;
+  combine_materials(body_a, body_b, point);
+  btPlaneSpace1(normal, point->m_lateralFrictionDir1, point->m_lateralFrictionDir2);
 }
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -24,6 +24,10 @@ class ProxyTable {
     clear_entries();
   }
 
+  /// Brings the proxy's place into the cache. Lookups are as random as the pairs, and a table of
+  /// some thousand proxies is larger than the first-level cache.
+  void prefetch(const btBroadphaseProxy* proxy) const { __builtin_prefetch(&entries_[home(proxy)]); }
+
   /// The number of the proxy; a new one gets the next number.
   std::uint32_t number(btBroadphaseProxy* proxy) {
     Entry* entry = find(proxy);
@@ -45,12 +49,19 @@ class ProxyTable {
     std::uint32_t number;
   };
 
+  /// Two rounds of multiplying and folding. One round (Fibonacci hashing) is not enough: proxies
+  /// lie at nearly equal distances, which it maps to runs of 17 to 25 occupied entries.
+  std::size_t home(const btBroadphaseProxy* proxy) const {
+    constexpr std::uint64_t kMultiplier = 0x9e3779b97f4a7c15u;
+    std::uint64_t hash = reinterpret_cast<std::uintptr_t>(proxy) * kMultiplier;
+    hash = (hash ^ (hash >> 32)) * kMultiplier;
+    return hash >> shift_;
+  }
   Entry* find(const btBroadphaseProxy* proxy) {
-    // Fibonacci hashing (Knuth, TAOCP 6.4): the high bits of the product are well mixed.
-    const std::uint64_t hash = reinterpret_cast<std::uintptr_t>(proxy) * 0x9e3779b97f4a7c15u;
-    std::size_t i = static_cast<std::size_t>(hash >> shift_);
-    while (entries_[i].proxy != nullptr && entries_[i].proxy != proxy)
+    std::size_t i = home(proxy);
+    while (entries_[i].proxy != nullptr && entries_[i].proxy != proxy) {
       i = (i + 1) & (capacity_ - 1);
+    }
     return &entries_[i];
   }
 

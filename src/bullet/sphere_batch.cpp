@@ -25,6 +25,18 @@ void prefetch_bytes(const void* address, std::size_t bytes) {
   }
 }
 
+/// For an object no larger than a cache line, which may lie across two.
+void prefetch_ends(const void* address, std::size_t bytes) {
+  prefetch(address);
+  prefetch(static_cast<const char*>(address) + bytes - 1);
+}
+
+/// Prefetches what getNumContacts() reads. The count is private; two thresholds lie between it and
+/// the first public member behind it.
+void prefetch_count(const btPersistentManifold* manifold) {
+  prefetch(reinterpret_cast<const char*>(&manifold->m_companionIdA) - 3 * sizeof(btScalar));
+}
+
 /// True for exactly the classes whose checkCollideWithOverride is known to be free of side effects.
 /// typeid compares addresses here: a copy of the class in another library counts as foreign, which
 /// costs time and no bits.
@@ -39,7 +51,12 @@ bool is_bullets_own_class(const btCollisionObject& body) {
 bool SphereBatch::gather(std::span<const btBroadphasePair> pairs) {
   table_.reset(std::min(2 * pairs.size(), bodies_.size()));
   pairs_.resize(pairs.size());
+  constexpr std::size_t kAhead = 16;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (i + kAhead < pairs.size()) {
+      table_.prefetch(pairs[i + kAhead].m_pProxy0);
+      table_.prefetch(pairs[i + kAhead].m_pProxy1);
+    }
     const std::uint32_t a = table_.number(pairs[i].m_pProxy0);
     const std::uint32_t b = table_.number(pairs[i].m_pProxy1);
     pairs_[i] = {a, b};
@@ -95,10 +112,12 @@ void SphereBatch::plan(std::span<const btBroadphasePair> pairs, std::span<const 
   manifolds_.resize(n);
   for (std::size_t begin = 0; begin < n; begin += kBlock) {
     const std::size_t end = std::min(n, begin + kBlock);
-    for (std::size_t i = end; i < std::min(n, end + kBlock); ++i) prefetch(pairs[i].m_algorithm);
+    for (std::size_t i = end; i < std::min(n, end + kBlock); ++i) {
+      prefetch_ends(pairs[i].m_algorithm, sizeof(btSphereSphereCollisionAlgorithm));
+    }
     for (std::size_t i = begin; i < end; ++i) {
       manifolds_[i] = is_sphere_pair(i) ? find_manifold(pairs[i].m_algorithm) : nullptr;
-      if (manifolds_[i] != nullptr) prefetch(&manifolds_[i]->m_companionIdA);
+      if (manifolds_[i] != nullptr && results[i].touching == 0) prefetch_count(manifolds_[i]);
     }
     for (std::size_t i = begin; i < end; ++i) {
       if (manifolds_[i] == nullptr) {

@@ -1,0 +1,1 @@
+jfpx_add_bench(bullet_dispatch_bench SOURCES bullet/dispatch_bench.cpp LINK jfpx_bullet)

@@ -1,0 +1,168 @@
+/// dispatchAllCollisionPairs and whole steps: Bullet's dispatcher against ours, on the same state.
+///
+/// Each benchmark owns two worlds that move identically. A sample steps both, one after the other
+/// and in alternating order, and takes the wall clock of the dispatch inside the step ("cold": the
+/// other stages have emptied the caches), then repeats the dispatch alone ("hot"). Counters are
+/// medians; a ratio is stock / jfpx, so larger than 1 means that jfpx is faster.
+#include <jfpx/bullet/scene_world.hpp>
+
+#include "examples/scenes/scenes.hpp"
+
+#include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Medians of the ratios sample by sample: neighbours in time share the noise of the machine.
+struct Series {
+  std::vector<double> stock, jfpx, ratio;
+  void add(double stock_ms, double jfpx_ms) {
+    stock.push_back(stock_ms);
+    jfpx.push_back(jfpx_ms);
+    ratio.push_back(stock_ms / jfpx_ms);
+  }
+  void report(benchmark::State& state, const std::string& name) const {
+    state.counters[name + "_stock_ms"] = median(stock);
+    state.counters[name + "_jfpx_ms"] = median(jfpx);
+    state.counters[name + "_ratio"] = median(ratio);
+  }
+};
+
+double dispatch_ms(SceneWorld& w, int repeats) {
+  btDispatcher& dispatcher = w.dispatcher();
+  btOverlappingPairCache* pairs = w.world().getPairCache();
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < repeats; ++i) {
+    dispatcher.dispatchAllCollisionPairs(pairs, w.world().getDispatchInfo(), &dispatcher);
+  }
+  const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - start;
+  return taken.count() / repeats;
+}
+
+/// Two numbers in alternating order, so that neither is always the one after the other.
+template <class First, class Second>
+void alternate(bool swap, First first, Second second) {
+  if (swap) {
+    second();
+    first();
+  } else {
+    first();
+    second();
+  }
+}
+
+void compare_dispatch(benchmark::State& state, const char* name, std::uint32_t spheres, int settle,
+                      SceneWorldOptions options = {}) {
+  Scene scene = scenes::make(name, {.spheres = spheres, .seed = 1});
+  scene.sleep.enabled = false;
+  SceneWorld ours(scene, options);
+  options.dispatcher = DispatcherKind::stock;
+  SceneWorld stock(scene, options);
+  for (int i = 0; i < settle; ++i) {
+    stock.step();
+    ours.step();
+  }
+  const int repeats = static_cast<int>(std::max(1u, 4096u / spheres));
+  Series cold, hot, step;
+  bool swap = false;
+  for (auto _ : state) {
+    alternate(
+        swap, [&] { stock.step(); }, [&] { ours.step(); });
+    cold.add(stock.last_step().dispatch, ours.last_step().dispatch);
+    step.add(stock.last_step().total, ours.last_step().total);
+    double stock_ms = 0, ours_ms = 0;
+    alternate(
+        swap, [&] { stock_ms = dispatch_ms(stock, repeats); },
+        [&] { ours_ms = dispatch_ms(ours, repeats); });
+    hot.add(stock_ms, ours_ms);
+    state.SetIterationTime(ours.last_step().dispatch * 1e-3);
+    swap = !swap;
+  }
+  if (stock.state_hash() != ours.state_hash()) state.SkipWithError("the worlds differ");
+  cold.report(state, "dispatch");
+  hot.report(state, "hot");
+  step.report(state, "step");
+  const DispatchStats& stats = ours.jfpx_dispatcher()->stats();
+  state.counters["pairs"] = ours.world().getPairCache()->getNumOverlappingPairs();
+  state.counters["touching"] =
+      stats.batches == 0 ? 0
+                         : static_cast<double>(stats.touching) / static_cast<double>(stats.batches);
+}
+
+/// A gas of random spheres at rest in the same place, three contacts a sphere: what the collider
+/// benchmark runs on, here through Bullet's dispatch.
+void random_gas(benchmark::State& state, std::uint32_t spheres) {
+  Scene scene;
+  for (const SphereInstance& sphere : scenes::random_spheres(spheres, 3, 1)) {
+    BodyDef body;
+    body.shape = Sphere{sphere.radius};
+    body.position = sphere.centre;
+    body.acceleration = {};
+    scene.bodies.push_back(body);
+  }
+  SceneWorld ours(scene);
+  SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock});
+  for (SceneWorld* world : {&ours, &stock}) world->world().performDiscreteCollisionDetection();
+  Series series;
+  bool swap = false;
+  for (auto _ : state) {
+    double stock_ms = 0, ours_ms = 0;
+    alternate(
+        swap, [&] { stock_ms = dispatch_ms(stock, 1); }, [&] { ours_ms = dispatch_ms(ours, 1); });
+    series.add(stock_ms, ours_ms);
+    state.SetIterationTime(ours_ms * 1e-3);
+    swap = !swap;
+  }
+  series.report(state, "dispatch");
+  state.counters["pairs"] = ours.world().getPairCache()->getNumOverlappingPairs();
+}
+
+struct Size {
+  std::uint32_t spheres;
+  int settle, samples;
+};
+constexpr Size kSizes[] = {{16, 300, 400},  {64, 300, 300},   {256, 300, 200}, {1024, 200, 100},
+                           {4096, 120, 40}, {16384, 100, 15}, {65536, 60, 7}};
+
+void register_all() {
+  for (const char* scene : {"pile", "gas"}) {
+    for (const Size& size : kSizes) {
+      const std::string name =
+          std::string("dispatch/") + scene + "/" + std::to_string(size.spheres);
+      benchmark::RegisterBenchmark(name.c_str(),
+                                   [scene, size](benchmark::State& state) {
+                                     compare_dispatch(state, scene, size.spheres, size.settle);
+                                   })
+          ->UseManualTime()
+          ->Iterations(size.samples)
+          ->Unit(benchmark::kMillisecond);
+    }
+  }
+  benchmark::RegisterBenchmark("dispatch/random_gas/100000",
+                               [](benchmark::State& state) { random_gas(state, 100000); })
+      ->UseManualTime()
+      ->Iterations(9)
+      ->Unit(benchmark::kMillisecond);
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bullet
+
+int main(int argc, char** argv) {
+  jfpx::bullet::register_all();
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+}
