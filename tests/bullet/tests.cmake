@@ -1,1 +1,3 @@
 jfpx_add_test(bullet_trajectory_test SOURCES bullet/trajectory_test.cpp LINK jfpx_bullet)
+jfpx_add_test(bullet_contract_test SOURCES
+  bullet/contact_callbacks_test.cpp bullet/replaced_test.cpp LINK jfpx_bullet)

@@ -132,6 +132,14 @@ class Twins {
     }
     return true;
   }
+  /// Only the dispatch, of the bodies as they are.
+  bool dispatch() {
+    both([](BulletWorld& w) {
+      w.dispatcher->dispatchAllCollisionPairs(w.world.getPairCache(), w.world.getDispatchInfo(),
+                                              w.dispatcher.get());
+    });
+    return compare();
+  }
   bool compare() {
     const auto difference = first_difference(stock_.world, ours_.world, step_);
     if (difference) {

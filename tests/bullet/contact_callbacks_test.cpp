@@ -1,0 +1,168 @@
+/// The global contact callbacks: what they hear, and in which order, is compared entry by entry.
+#include "tests/bullet/twin_worlds.hpp"
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+/// Takes all callbacks off at the end of a test.
+class ContactCallbacks : public ::testing::Test {
+ protected:
+  ~ContactCallbacks() override {
+    gContactAddedCallback = nullptr;
+    gContactProcessedCallback = nullptr;
+    gContactDestroyedCallback = nullptr;
+    gContactStartedCallback = nullptr;
+    gContactEndedCallback = nullptr;
+  }
+};
+
+std::string numbers_of(const btManifoldPoint& point) {
+  return std::to_string(point.m_distance1) + " " + std::to_string(point.m_combinedFriction) + " " +
+         std::to_string(point.m_normalWorldOnB.y());
+}
+
+bool on_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, int part_a, int index_a,
+              const btCollisionObjectWrapper* b, int part_b, int index_b) {
+  log_event("added " + name_of(a->getCollisionObject()) + " " + name_of(b->getCollisionObject()) +
+            " " + numbers_of(point) + " " + std::to_string(part_a + index_a + part_b + index_b));
+  point.m_combinedFriction = btScalar(0.125);
+  point.m_userPersistentData = const_cast<btCollisionObject*>(a->getCollisionObject());
+  return true;
+}
+bool on_processed(btManifoldPoint& point, void* a, void* b) {
+  log_event("processed " + name_of(static_cast<btCollisionObject*>(a)) + " " +
+            name_of(static_cast<btCollisionObject*>(b)) + " " + numbers_of(point));
+  return true;
+}
+bool on_destroyed(void* data) {
+  log_event("destroyed " + name_of(static_cast<btCollisionObject*>(data)));
+  return true;
+}
+void on_started(btPersistentManifold* const& manifold) {
+  log_event("started " + name_of(manifold->getBody0()) + " " + name_of(manifold->getBody1()) + " " +
+            std::to_string(manifold->getNumContacts()));
+}
+void on_ended(btPersistentManifold* const& manifold) {
+  log_event("ended " + name_of(manifold->getBody0()) + " " + name_of(manifold->getBody1()) + " " +
+            std::to_string(manifold->getNumContacts()));
+}
+
+void flag_custom_material(BulletWorld& w, std::size_t stride) {
+  for (std::size_t i = 0; i < w.bodies.size(); i += stride) {
+    w.bodies[i]->setCollisionFlags(w.bodies[i]->getCollisionFlags() |
+                                   btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+  }
+}
+
+bool heard(const BulletWorld& w, const std::string& event) {
+  return std::any_of(w.log.begin(), w.log.end(),
+                     [&](const std::string& entry) { return entry.starts_with(event); });
+}
+
+TEST_F(ContactCallbacks, AllTogetherHearTheSame) {
+  gContactAddedCallback = on_added;
+  gContactProcessedCallback = on_processed;
+  gContactDestroyedCallback = on_destroyed;
+  gContactStartedCallback = on_started;
+  gContactEndedCallback = on_ended;
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 50, 21);
+    flag_custom_material(w, 3);
+  });
+  ASSERT_TRUE(twins.step(60));
+  for (const char* event : {"added", "processed", "destroyed", "started", "ended"}) {
+    EXPECT_TRUE(heard(twins.ours(), event)) << event;
+  }
+  EXPECT_EQ(twins.stats().batches, 60u);
+}
+
+TEST_F(ContactCallbacks, EachAloneHearsTheSame) {
+  for (int which = 0; which < 5; ++which) {
+    gContactAddedCallback = which == 0 ? on_added : nullptr;
+    gContactProcessedCallback = which == 1 ? on_processed : nullptr;
+    gContactDestroyedCallback = which == 2 ? on_destroyed : nullptr;
+    gContactStartedCallback = which == 3 ? on_started : nullptr;
+    gContactEndedCallback = which == 4 ? on_ended : nullptr;
+    Twins twins;
+    twins.both([](BulletWorld& w) {
+      add_heap(w, 40, 22);
+      flag_custom_material(w, 2);
+    });
+    ASSERT_TRUE(twins.step(30)) << which;
+    if (which != 2) {
+      EXPECT_FALSE(twins.ours().log.empty()) << which;
+    }
+  }
+}
+
+TEST_F(ContactCallbacks, AddedWithoutFlaggedBodiesHearsNothingAndBatchesWriteFlat) {
+  gContactAddedCallback = on_added;
+  Twins twins;
+  twins.both([](BulletWorld& w) { add_heap(w, 40, 23); });
+  ASSERT_TRUE(twins.step(20));
+  EXPECT_TRUE(twins.ours().log.empty());
+  EXPECT_GT(twins.stats().written, 0u);
+}
+
+TEST_F(ContactCallbacks, SetMidRunAreHeardFromTheNextStep) {
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 50, 24);
+    flag_custom_material(w, 2);
+  });
+  ASSERT_TRUE(twins.step(10));
+  gContactAddedCallback = on_added;
+  gContactDestroyedCallback = on_destroyed;
+  ASSERT_TRUE(twins.step(10));
+  gContactEndedCallback = on_ended;
+  gContactAddedCallback = nullptr;
+  ASSERT_TRUE(twins.step(10));
+  EXPECT_TRUE(heard(twins.ours(), "added"));
+  EXPECT_TRUE(heard(twins.ours(), "destroyed"));
+  EXPECT_TRUE(heard(twins.ours(), "ended"));
+}
+
+TEST_F(ContactCallbacks, VerifyIsNotHeard) {
+  gContactStartedCallback = on_started;
+  gContactEndedCallback = on_ended;
+  TwinOptions options;
+  options.ours = [](btCollisionConfiguration* c) {
+    return std::make_unique<CollisionDispatcher>(
+        c, DispatcherOptions{.minimum_batch = 0, .verify = true});
+  };
+  Twins twins(options);
+  twins.both([](BulletWorld& w) { add_heap(w, 40, 25); });
+  ASSERT_TRUE(twins.step(20));
+  EXPECT_GT(twins.stats().verified, 0u);
+  EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
+}
+
+/// Dispatches the world's own pairs again from inside a dispatch.
+void on_started_dispatch_again(btPersistentManifold* const& manifold) {
+  on_started(manifold);
+  if (g_current->log.size() > 400) return;  // the inner dispatch starts contacts too
+  static bool inside = false;
+  if (inside) return;
+  inside = true;
+  btHashedOverlappingPairCache cache;
+  cache.addOverlappingPair(g_current->bodies[1]->getBroadphaseHandle(),
+                           g_current->bodies[2]->getBroadphaseHandle());
+  g_current->dispatcher->dispatchAllCollisionPairs(&cache, g_current->world.getDispatchInfo(),
+                                                   g_current->dispatcher.get());
+  cache.removeOverlappingPair(g_current->bodies[1]->getBroadphaseHandle(),
+                              g_current->bodies[2]->getBroadphaseHandle(),
+                              g_current->dispatcher.get());
+  inside = false;
+}
+
+TEST_F(ContactCallbacks, MayDispatchAnotherCacheFromInside) {
+  gContactStartedCallback = on_started_dispatch_again;
+  Twins twins;
+  twins.both([](BulletWorld& w) { add_heap(w, 40, 26); });
+  ASSERT_TRUE(twins.step(5));
+  EXPECT_GT(twins.stats().fallbacks[static_cast<std::size_t>(Fallback::nested)], 0u);
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bullet
