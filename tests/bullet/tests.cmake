@@ -1,3 +1,13 @@
-jfpx_add_test(bullet_trajectory_test SOURCES bullet/trajectory_test.cpp LINK jfpx_bullet)
 jfpx_add_test(bullet_contract_test SOURCES
-  bullet/contact_callbacks_test.cpp bullet/replaced_test.cpp LINK jfpx_bullet)
+  bullet/contact_callbacks_test.cpp
+  bullet/replaced_test.cpp
+  bullet/situations_test.cpp
+  bullet/stats_test.cpp
+  LINK jfpx_bullet)
+jfpx_add_test(bullet_verify_test SOURCES
+  bullet/scene_world_test.cpp
+  bullet/verify_test.cpp
+  LINK jfpx_bullet)
+jfpx_add_test(bullet_trajectory_test SOURCES
+  bullet/trajectory_test.cpp
+  LINK jfpx_bullet)

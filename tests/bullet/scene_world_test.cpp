@@ -1,0 +1,192 @@
+/// What a scene becomes in Bullet.
+#include <jfpx/bullet/scene_world.hpp>
+#include <jfpx/error.hpp>
+
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+BodyDef ball(const Vec3& position, Real radius = Real(0.5)) {
+  BodyDef def;
+  def.shape = Sphere{radius};
+  def.position = position;
+  return def;
+}
+
+TEST(SceneWorld, OfAnEmptySceneSteps) {
+  SceneWorld world{Scene{}};
+  world.step();
+  EXPECT_TRUE(world.states().empty());
+}
+
+TEST(SceneWorld, KeepsOrderAndStartStates) {
+  Scene scene;
+  scene.bodies = {ball({1, 2, 3}), ball({4, 5, 6}), ball({7, 8, 9})};
+  scene.bodies[1].velocity = {1, 0, 0};
+  scene.bodies[1].angular_velocity = {0, 2, 0};
+  SceneWorld world(scene);
+  const std::vector<BodyState> states = world.states();
+  ASSERT_EQ(states.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(states[i].position, scene.bodies[i].position);
+  EXPECT_EQ(states[1].velocity, scene.bodies[1].velocity);
+  EXPECT_EQ(states[1].angular_velocity, scene.bodies[1].angular_velocity);
+  EXPECT_EQ(states[0].orientation, Quat{});
+}
+
+TEST(SceneWorld, FallsByItsOwnAcceleration) {
+  // Bullet integrates semi-implicitly: after n steps v = g n dt, y = g dt^2 n (n+1) / 2.
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0}), ball({10, 0, 0})};
+  scene.bodies[0].acceleration = {0, Real(-10), 0};
+  scene.bodies[1].acceleration = {Real(3), 0, 0};
+  scene.dt = Real(0.015625);
+  SceneWorld world(scene);
+  for (int i = 0; i < 32; ++i) world.step();
+  const std::vector<BodyState> states = world.states();
+  const double dt = 0.015625;
+  EXPECT_NEAR(states[0].velocity.y, -10 * 32 * dt, 1e-5);
+  EXPECT_NEAR(states[0].position.y, -10 * dt * dt * 32 * 33 / 2, 1e-5);
+  EXPECT_NEAR(states[1].velocity.x, 3 * 32 * dt, 1e-5);
+  EXPECT_EQ(states[1].velocity.y, 0);
+}
+
+TEST(SceneWorld, DampsByShareKeptPerSecond) {
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0})};
+  scene.bodies[0].acceleration = {};
+  scene.bodies[0].velocity = {8, 0, 0};
+  scene.bodies[0].angular_velocity = {0, 0, 4};
+  scene.bodies[0].linear_damping = Real(0.5);
+  scene.bodies[0].angular_damping = Real(0.25);
+  scene.dt = Real(1) / 64;
+  SceneWorld world(scene);
+  for (int i = 0; i < 64; ++i) world.step();
+  EXPECT_NEAR(world.states()[0].velocity.x, 4, 1e-4);
+  EXPECT_NEAR(world.states()[0].angular_velocity.z, 1, 1e-4);
+}
+
+TEST(SceneWorld, CombinesFrictionAndRestitutionAsTheSceneSays) {
+  // sqrt(0.81 * 0.25) = 0.45 and sqrt(0.36 * 0.64) = 0.48
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0}), ball({Real(0.9), 0, 0})};
+  scene.bodies[0].friction = Real(0.81);
+  scene.bodies[1].friction = Real(0.25);
+  scene.bodies[0].restitution = Real(0.36);
+  scene.bodies[1].restitution = Real(0.64);
+  SceneWorld world(scene);
+  world.step();
+  ASSERT_EQ(world.dispatcher().getNumManifolds(), 1);
+  const btPersistentManifold& manifold = *world.dispatcher().getManifoldByIndexInternal(0);
+  ASSERT_EQ(manifold.getNumContacts(), 1);
+  EXPECT_NEAR(manifold.getContactPoint(0).m_combinedFriction, 0.45, 1e-6);
+  EXPECT_NEAR(manifold.getContactPoint(0).m_combinedRestitution, 0.48, 1e-6);
+}
+
+TEST(SceneWorld, PlanesAndBoxesHoldABall) {
+  for (const bool plane : {true, false}) {
+    Scene scene;
+    scene.bodies = {ball({0, 1, 0})};
+    BodyDef ground;
+    ground.mass = 0;
+    if (plane) {
+      ground.shape = HalfSpace{{0, 1, 0}, Real(0.25)};
+      ground.position = {3, 3, 3};  // a half-space follows no pose
+    } else {
+      ground.shape = Box{{5, 1, 5}};
+      ground.position = {0, Real(-0.75), 0};
+    }
+    scene.bodies.push_back(ground);
+    SceneWorld world(scene);
+    for (int i = 0; i < 240; ++i) world.step();
+    EXPECT_NEAR(world.states()[0].position.y, 0.75, 0.01) << plane;
+    EXPECT_EQ(world.states()[1].position, ground.position);
+  }
+}
+
+TEST(SceneWorld, PutsToSleepWhatMaySleep) {
+  for (const bool enabled : {true, false}) {
+    Scene scene;
+    scene.sleep.enabled = enabled;
+    scene.bodies = {ball({0, 0, 0}), ball({10, 0, 0})};
+    for (BodyDef& body : scene.bodies) body.acceleration = {};
+    scene.bodies[1].can_sleep = false;
+    SceneWorld world(scene);
+    for (int i = 0; i < 300; ++i) world.step();
+    EXPECT_EQ(world.bodies()[0]->isActive(), !enabled);
+    EXPECT_TRUE(world.bodies()[1]->isActive());
+  }
+}
+
+TEST(SceneWorld, SharesShapesOnRequest) {
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0}), ball({5, 0, 0}), ball({9, 0, 0}, 1)};
+  SceneWorld shared(scene, {.share_shapes = true});
+  EXPECT_EQ(shared.bodies()[0]->getCollisionShape(), shared.bodies()[1]->getCollisionShape());
+  EXPECT_NE(shared.bodies()[0]->getCollisionShape(), shared.bodies()[2]->getCollisionShape());
+  SceneWorld single(scene, {.share_shapes = false});
+  EXPECT_NE(single.bodies()[0]->getCollisionShape(), single.bodies()[1]->getCollisionShape());
+}
+
+TEST(SceneWorld, StaticBodiesStay) {
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0})};
+  scene.bodies[0].mass = 0;
+  scene.bodies[0].velocity = {1, 1, 1};
+  SceneWorld world(scene);
+  for (int i = 0; i < 10; ++i) world.step();
+  EXPECT_EQ(world.states()[0].position, (Vec3{0, 0, 0}));
+}
+
+TEST(SceneWorld, TimesItsStages) {
+  Scene scene;
+  for (int i = 0; i < 50; ++i) scene.bodies.push_back(ball({Real(i) * Real(0.9), 0, 0}));
+  SceneWorld world(scene);
+  world.step();
+  const StageTimes& t = world.last_step();
+  const double sum = t.integrate + t.broadphase + t.dispatch + t.islands + t.solve;
+  for (const double stage : {t.integrate, t.broadphase, t.dispatch, t.islands, t.solve}) {
+    EXPECT_GT(stage, 0.0);
+  }
+  EXPECT_LE(sum, t.total);
+}
+
+TEST(SceneWorld, HashesItsStates) {
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0}), ball({Real(0.5), Real(0.8), 0})};
+  SceneWorld world(scene);
+  const std::uint64_t before = world.state_hash();
+  EXPECT_EQ(before, state_hash(world.states()));
+  world.step();
+  EXPECT_NE(world.state_hash(), before);
+}
+
+TEST(SceneWorld, RefusesABadStepAndABadScene) {
+  SceneWorld world{Scene{}};
+  for (const Real dt : {Real(0), Real(-1), kEpsilon, std::numeric_limits<Real>::quiet_NaN(),
+                        std::numeric_limits<Real>::infinity()}) {
+    EXPECT_THROW(world.step(dt), InvalidArgument) << dt;
+  }
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0}, -1)};
+  EXPECT_THROW(SceneWorld{scene}, InvalidScene);
+}
+
+TEST(SceneWorld, CanBeMovedAndHasTheDispatcherAskedFor) {
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0})};
+  SceneWorld first(scene, {.dispatcher = DispatcherKind::stock});
+  EXPECT_EQ(first.jfpx_dispatcher(), nullptr);
+  SceneWorld second = std::move(first);
+  second.step();
+  EXPECT_EQ(second.states().size(), 1u);
+  SceneWorld ours(scene);
+  EXPECT_EQ(ours.jfpx_dispatcher(), &ours.dispatcher());
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,398 @@
+/// Bullet worlds with more than spheres in them: stock and ours stay the same to the last bit.
+#include "tests/bullet/twin_worlds.hpp"
+
+#include <BulletCollision/BroadphaseCollision/btSimpleBroadphase.h>
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
+
+#include <limits>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+TEST(Situations, NoPairsAtAll) {
+  Twins twins;
+  ASSERT_TRUE(twins.step(3));
+  twins.both([](BulletWorld& w) { w.add_sphere(1, btVector3(0, 0, 0)); });
+  ASSERT_TRUE(twins.step(3));
+  EXPECT_EQ(twins.stats().batches, 0u);
+}
+
+TEST(Situations, BodiesComeAndGo) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Twins twins;
+  twins.both([&](BulletWorld& w) { add_heap(w, 80, seed); });
+  for (int round = 0; round < 40; ++round) {
+    twins.both([&](BulletWorld& w) {
+      Random random(seed + static_cast<std::uint64_t>(round));
+      const std::size_t victim = 1 + random.below(w.bodies.size() - 1);
+      btRigidBody* body = w.bodies[victim].get();
+      if (body->getBroadphaseHandle() != nullptr) {
+        w.world.removeRigidBody(body);
+      } else {
+        w.world.addRigidBody(body);
+      }
+      const Vec3 p = random.uniform_in_box({0, 2, 0}, {3, 4, 3});
+      w.add_sphere(random.uniform(Real(0.2), Real(0.6)), btVector3(p.x, p.y, p.z));
+    });
+    ASSERT_TRUE(twins.step(3));
+  }
+}
+
+TEST(Situations, SleepersKeepTheirPointsAndWake) {
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 30, 31);
+    for (auto& body : w.bodies) {
+      body->setSleepingThresholds(3, 3);
+      body->setDamping(btScalar(0.2), btScalar(0.6));
+    }
+  });
+  ASSERT_TRUE(twins.step(250));
+  int asleep = 0;
+  for (auto& body : twins.ours().bodies) asleep += body->isActive() ? 0 : 1;
+  EXPECT_GT(asleep, 10) << "the scene must put bodies to sleep to mean anything";
+  twins.both([](BulletWorld& w) { w.add_sphere(1, btVector3(1, 6, 1), 5); });
+  ASSERT_TRUE(twins.step(120));
+}
+
+TEST(Situations, KinematicPushersSensorsAndIgnoreLists) {
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 60, 32);
+    for (std::size_t i = 1; i < 6; ++i) {
+      w.bodies[i]->setCollisionFlags(w.bodies[i]->getCollisionFlags() |
+                                     btCollisionObject::CF_NO_CONTACT_RESPONSE);
+    }
+    for (std::size_t i = 10; i < 30; ++i) {
+      w.bodies[i]->setIgnoreCollisionCheck(w.bodies[i + 10].get(), true);
+    }
+    w.world.removeRigidBody(w.bodies[7].get());
+    w.bodies[7]->setCollisionFlags(btCollisionObject::CF_KINEMATIC_OBJECT);
+    w.bodies[7]->setActivationState(DISABLE_DEACTIVATION);
+    w.world.addRigidBody(w.bodies[7].get());
+    w.world.removeRigidBody(w.bodies[8].get());
+    w.world.addRigidBody(w.bodies[8].get(), 64, btBroadphaseProxy::StaticFilter);
+  });
+  for (int i = 0; i < 60; ++i) {
+    twins.both([&](BulletWorld& w) {
+      btTransform pose = w.bodies[7]->getWorldTransform();
+      pose.setOrigin(btVector3(btScalar(i) * btScalar(0.05), 1, btScalar(1.5)));
+      w.bodies[7]->setWorldTransform(pose);
+      if (i == 30) w.bodies[10]->setIgnoreCollisionCheck(w.bodies[20].get(), false);
+    });
+    ASSERT_TRUE(twins.step());
+  }
+  EXPECT_GT(twins.stats().written, 0u);
+}
+
+TEST(Situations, CompoundsOfSpheresAmongSpheres) {
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 40, 33);
+    for (int i = 0; i < 8; ++i) {
+      auto* compound = new btCompoundShape();
+      w.keep(compound);
+      btTransform at;
+      at.setIdentity();
+      for (int k = 0; k < 3; ++k) {
+        at.setOrigin(btVector3(btScalar(k - 1) * btScalar(0.5), 0, 0));
+        compound->addChildShape(at, w.keep(new btSphereShape(btScalar(0.3))));
+      }
+      w.add(compound, btVector3(btScalar(i % 3), btScalar(1 + i), btScalar(i % 2)));
+    }
+  });
+  ASSERT_TRUE(twins.step(100));
+}
+
+TEST(Situations, SpecialMaterialFlags) {
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 60, 34);
+    for (std::size_t i = 0; i < w.bodies.size(); ++i) {
+      btRigidBody& body = *w.bodies[i];
+      if (i % 3 == 0) body.setContactStiffnessAndDamping(2000, btScalar(0.2));
+      if (i % 4 == 0) {
+        body.setCollisionFlags(body.getCollisionFlags() |
+                               btCollisionObject::CF_HAS_FRICTION_ANCHOR);
+      }
+      body.setFriction(btScalar(i % 7));  // products beyond the limit of 10
+      body.setRollingFriction(btScalar(0.1) * btScalar(i % 5));
+      body.setSpinningFriction(btScalar(-0.3) * btScalar(i % 3));
+      body.setRestitution(btScalar(0.1) * btScalar(i % 11));
+      body.setAnisotropicFriction(btVector3(1, btScalar(0.5), btScalar(0.2)),
+                                  i % 2 == 0 ? btCollisionObject::CF_ANISOTROPIC_FRICTION : 0);
+    }
+  });
+  ASSERT_TRUE(twins.step(80));
+}
+
+TEST(Situations, RadiiChangeByScaleAndByHand) {
+  Twins twins;
+  twins.both([](BulletWorld& w) { add_heap(w, 50, 35); });
+  for (int round = 1; round <= 10; ++round) {
+    twins.both([&](BulletWorld& w) {
+      for (std::size_t i = 1; i < w.bodies.size(); i += 2) {
+        auto* sphere = static_cast<btSphereShape*>(w.bodies[i]->getCollisionShape());
+        if (i % 4 == 1) {
+          sphere->setUnscaledRadius(sphere->getRadius() * btScalar(1.01));
+        } else {
+          const btScalar s = 1 + btScalar(0.02) * btScalar(round);
+          sphere->setLocalScaling(btVector3(s, s, s));
+        }
+      }
+    });
+    ASSERT_TRUE(twins.step(5));
+  }
+}
+
+TEST(Situations, ShapesAreExchangedUnderLivingAlgorithms) {
+  Twins twins;
+  twins.both([](BulletWorld& w) { add_heap(w, 50, 36); });
+  ASSERT_TRUE(twins.step(10));
+  twins.both([](BulletWorld& w) {
+    auto* cache = w.world.getPairCache();
+    for (std::size_t i = 1; i < 20; ++i) {
+      // As Bullet wants it: the pairs are cleaned when the type of shape changes.
+      cache->cleanProxyFromPairs(w.bodies[i]->getBroadphaseHandle(), w.dispatcher.get());
+      w.bodies[i]->setCollisionShape(
+          w.keep(new btBoxShape(btVector3(btScalar(0.3), btScalar(0.3), btScalar(0.3)))));
+    }
+  });
+  ASSERT_TRUE(twins.step(30));
+}
+
+TEST(Situations, ManifoldPoolExhaustedWithoutDynamicAllocation) {
+  TwinOptions options;
+  options.configuration.m_defaultMaxPersistentManifoldPoolSize = 40;
+  options.configuration.m_defaultMaxCollisionAlgorithmPoolSize = 64;
+  Twins twins(options);
+  twins.both([](BulletWorld& w) {
+    // Spheres only: Bullet's other algorithms do not survive a null manifold.
+    Random random(37);
+    for (int i = 0; i < 40; ++i) {
+      const Vec3 p = random.uniform_in_box({0, 0, 0}, {2, 2, 2});
+      w.add_sphere(btScalar(0.5), btVector3(p.x, p.y, p.z));
+    }
+    w.world.setGravity(btVector3(0, 0, 0));
+    w.dispatcher->setDispatcherFlags(
+        w.dispatcher->getDispatcherFlags() |
+        btCollisionDispatcher::CD_DISABLE_CONTACTPOOL_DYNAMIC_ALLOCATION);
+  });
+  ASSERT_TRUE(twins.step(60));
+  EXPECT_GT(twins.ours().world.getPairCache()->getNumOverlappingPairs(), 40)
+      << "the pool must have run out to mean anything";
+}
+
+TEST(Situations, ContinuousCollisionOfBodies) {
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 40, 38);
+    for (std::size_t i = 1; i < w.bodies.size(); i += 3) {
+      w.bodies[i]->setCcdMotionThreshold(btScalar(0.01));
+      w.bodies[i]->setCcdSweptSphereRadius(btScalar(0.1));
+      w.bodies[i]->setLinearVelocity(btVector3(0, -40, 0));
+    }
+  });
+  ASSERT_TRUE(twins.step(60));
+}
+
+TEST(Situations, ContactTestsBetweenSteps) {
+  struct Report : btCollisionWorld::ContactResultCallback {
+    btScalar addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper* a, int, int,
+                             const btCollisionObjectWrapper* b, int, int) override {
+      log_event("contact " + name_of(a->getCollisionObject()) + " " +
+                name_of(b->getCollisionObject()) + " " + std::to_string(point.m_distance1));
+      return 0;
+    }
+  };
+  Twins twins;
+  twins.both([](BulletWorld& w) { add_heap(w, 50, 39); });
+  for (int i = 0; i < 30; ++i) {
+    twins.both([&](BulletWorld& w) {
+      Report report;
+      w.world.contactTest(w.bodies[static_cast<std::size_t>(1 + i)].get(), report);
+      w.world.contactPairTest(w.bodies[2].get(), w.bodies[3].get(), report);
+    });
+    ASSERT_TRUE(twins.step());
+  }
+  EXPECT_FALSE(twins.ours().log.empty());
+}
+
+TEST(Situations, GhostObjectsWithPrivatePairCaches) {
+  btGhostPairCallback callbacks[2];
+  Twins twins;
+  int world = 0;
+  twins.both([&](BulletWorld& w) {
+    w.world.getPairCache()->setInternalGhostPairCallback(&callbacks[world++]);
+    add_heap(w, 50, 40);
+    auto ghost = std::make_unique<btPairCachingGhostObject>();
+    ghost->setCollisionShape(w.keep(new btSphereShape(2)));
+    ghost->setCollisionFlags(btCollisionObject::CF_NO_CONTACT_RESPONSE);
+    btTransform pose;
+    pose.setIdentity();
+    pose.setOrigin(btVector3(1, 1, 1));
+    ghost->setWorldTransform(pose);
+    ghost->setUserIndex(1000);
+    w.world.addCollisionObject(ghost.get(), btBroadphaseProxy::SensorTrigger,
+                               btBroadphaseProxy::AllFilter);
+    w.objects.push_back(std::move(ghost));
+  });
+  for (int i = 0; i < 30; ++i) {
+    ASSERT_TRUE(twins.step());
+    // What btKinematicCharacterController does: dispatch the ghost's own pairs several times.
+    twins.both([&](BulletWorld& w) {
+      auto* ghost = static_cast<btPairCachingGhostObject*>(w.objects[0].get());
+      for (int k = 0; k < 3; ++k) {
+        btTransform pose = ghost->getWorldTransform();
+        pose.setOrigin(pose.getOrigin() + btVector3(btScalar(0.01), 0, 0));
+        ghost->setWorldTransform(pose);
+        w.dispatcher->dispatchAllCollisionPairs(ghost->getOverlappingPairCache(),
+                                                w.world.getDispatchInfo(), w.dispatcher.get());
+        btManifoldArray manifolds;
+        const auto& pairs = ghost->getOverlappingPairCache()->getOverlappingPairArray();
+        for (int p = 0; p < pairs.size(); ++p) {
+          manifolds.resize(0);
+          if (pairs[p].m_algorithm) pairs[p].m_algorithm->getAllContactManifolds(manifolds);
+          for (int m = 0; m < manifolds.size(); ++m) {
+            if (manifolds[m]->getNumContacts() == 0) continue;
+            log_event("ghost " + name_of(manifolds[m]->getBody0()) + " " +
+                      name_of(manifolds[m]->getBody1()) + " " +
+                      std::to_string(manifolds[m]->getContactPoint(0).m_distance1));
+          }
+        }
+      }
+    });
+  }
+  ASSERT_TRUE(twins.step());
+  EXPECT_FALSE(twins.ours().log.empty());
+}
+
+TEST(Situations, SortedPairCache) {
+  // It ignores m_deterministicOverlappingPairs; the hashed one does not.
+  std::vector<std::unique_ptr<btOverlappingPairCache>> caches;
+  for (const bool sorted : {false, true}) {
+    for (const bool deterministic : {false, true}) {
+      TwinOptions options;
+      options.broadphase = [&]() -> std::unique_ptr<btBroadphaseInterface> {
+        btOverlappingPairCache* cache = nullptr;
+        if (sorted) {
+          caches.push_back(std::make_unique<btSortedOverlappingPairCache>());
+          cache = caches.back().get();
+        }
+        return std::make_unique<btSimpleBroadphase>(1000, cache);
+      };
+      Twins twins(options);
+      twins.both([&](BulletWorld& w) {
+        add_heap(w, 40, 41);
+        w.world.getDispatchInfo().m_deterministicOverlappingPairs = deterministic;
+      });
+      ASSERT_TRUE(twins.step(40)) << sorted << deterministic;
+      EXPECT_EQ(twins.stats().batches, 40u);
+    }
+  }
+}
+
+TEST(Situations, PointsThatAUserPutIntoAManifoldAreCleared) {
+  // As Bullet's own loader does when it restores a saved world: the spheres are apart, and the next
+  // dispatch must take the points away again.
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    w.world.setGravity(btVector3(0, 0, 0));
+    w.add_sphere(btScalar(0.5), btVector3(0, 0, 0));
+    w.add_sphere(btScalar(0.5), btVector3(btScalar(1.01), 0, 0));
+  });
+  ASSERT_TRUE(twins.step(2));
+  twins.both([](BulletWorld& w) {
+    btPersistentManifold* manifold = w.dispatcher->getManifoldByIndexInternal(0);
+    ASSERT_EQ(manifold->getNumContacts(), 0);
+    for (int i = 0; i < 3; ++i) {
+      const btVector3 at(btScalar(i), 0, 0);
+      manifold->addManifoldPoint(btManifoldPoint(at, at, btVector3(0, 1, 0), btScalar(-0.1)));
+    }
+  });
+  ASSERT_TRUE(twins.dispatch());
+  EXPECT_EQ(twins.ours().dispatcher->getManifoldByIndexInternal(0)->getNumContacts(), 0);
+}
+
+TEST(Situations, ANegativeBreakingThresholdRefusesShallowPoints) {
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 40, 42);
+    w.world.stepSimulation(btScalar(1) / 60, 0);
+    for (int i = 0; i < w.dispatcher->getNumManifolds(); i += 2) {
+      w.dispatcher->getManifoldByIndexInternal(i)->setContactBreakingThreshold(btScalar(-0.05));
+    }
+  });
+  ASSERT_TRUE(twins.step(5));
+}
+
+TEST(Situations, TwoWorldsShareADispatcher) {
+  Twins twins;
+  twins.both([](BulletWorld& w) { add_heap(w, 40, 43); });
+  btDbvtBroadphase broadphases[2];
+  std::unique_ptr<btDiscreteDynamicsWorld> others[2];
+  btSequentialImpulseConstraintSolver solvers[2];
+  std::vector<std::unique_ptr<btRigidBody>> bodies;
+  btSphereShape shape(btScalar(0.5));
+  int world = 0;
+  twins.both([&](BulletWorld& w) {
+    others[world] = std::make_unique<btDiscreteDynamicsWorld>(
+        w.dispatcher.get(), &broadphases[world], &solvers[world], w.configuration.get());
+    Random random(44);
+    for (int i = 0; i < 40; ++i) {
+      const Vec3 p = random.uniform_in_box({0, 0, 0}, {3, 3, 3});
+      bodies.push_back(std::make_unique<btRigidBody>(1, nullptr, &shape, btVector3(1, 1, 1)));
+      btTransform pose;
+      pose.setIdentity();
+      pose.setOrigin(btVector3(p.x, p.y, p.z));
+      bodies.back()->setWorldTransform(pose);
+      others[world]->addRigidBody(bodies.back().get());
+    }
+    ++world;
+  });
+  for (int i = 0; i < 20; ++i) {
+    for (auto& other : others) other->stepSimulation(btScalar(1) / 60, 0);
+    ASSERT_TRUE(twins.step());
+    const auto difference = first_difference(*others[0], *others[1], twins.steps());
+    ASSERT_FALSE(difference) << to_text(*difference);
+  }
+  for (auto& other : others) {
+    for (int i = other->getNumCollisionObjects() - 1; i >= 0; --i) {
+      other->removeCollisionObject(other->getCollisionObjectArray()[i]);
+    }
+  }
+}
+
+TEST(Situations, CentresThatAreCoincidentDenormalInfiniteOrNotANumber) {
+  constexpr btScalar kInf = std::numeric_limits<btScalar>::infinity();
+  constexpr btScalar kNan = std::numeric_limits<btScalar>::quiet_NaN();
+  constexpr btScalar kTiny = std::numeric_limits<btScalar>::denorm_min();
+  constexpr btScalar kHuge = std::numeric_limits<btScalar>::max();
+  const std::vector<btScalar> values = {0,    -btScalar(0),   kTiny, SIMD_EPSILON, SIMD_EPSILON / 2,
+                                        kInf, -kInf,          kNan,  kHuge,        btScalar(0.999),
+                                        1,    btScalar(1e-23)};
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    w.world.setGravity(btVector3(0, 0, 0));
+    for (int i = 0; i < 12; ++i) w.add_sphere(btScalar(0.5), btVector3(0, 0, 0));
+  });
+  ASSERT_TRUE(twins.dispatch());
+  // The pairs exist; now the centres are moved without the broadphase hearing of it.
+  for (int axis = 0; axis < 3; ++axis) {
+    twins.both([&](BulletWorld& w) {
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        btVector3 at(0, 0, 0);
+        at[axis] = values[i];
+        at[(axis + 1) % 3] = values[(i * 5) % values.size()];
+        w.bodies[i]->getWorldTransform().setOrigin(at);
+        w.bodies[i]->setActivationState(ACTIVE_TAG);
+      }
+    });
+    ASSERT_TRUE(twins.dispatch());
+    EXPECT_GT(twins.stats().touching, 0u);
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bullet

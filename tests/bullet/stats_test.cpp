@@ -1,0 +1,205 @@
+/// The dispatcher's counters, its fallbacks with reasons, and that verify finds planted errors.
+#include <jfpx/error.hpp>
+
+#include "tests/bullet/twin_worlds.hpp"
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+/// Hands over to a real collider, then lets a test spoil the results or fail.
+class SpoiledCollider : public SphereCollider {
+ public:
+  using Spoil = std::function<void(std::span<PairResult>)>;
+  explicit SpoiledCollider(Spoil spoil) : spoil_(std::move(spoil)) {}
+
+  ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
+    return good_->find_contacts(spheres);
+  }
+  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
+                                         std::span<const SpherePair> pairs) override {
+    const auto results = good_->test_pairs(spheres, pairs);
+    results_.assign(results.begin(), results.end());
+    spoil_(results_);
+    return results_;
+  }
+  Backend backend() const noexcept override { return Backend::x86; }
+  SphereAlgorithm algorithm() const noexcept override { return SphereAlgorithm::automatic; }
+
+ private:
+  Spoil spoil_;
+  std::unique_ptr<SphereCollider> good_ = make_sphere_collider({.backend = Backend::x86});
+  std::vector<PairResult> results_;
+};
+
+TwinOptions with_collider(SpoiledCollider::Spoil spoil, bool verify = false) {
+  TwinOptions options;
+  options.ours = [=](btCollisionConfiguration* c) {
+    return std::make_unique<CollisionDispatcher>(
+        c, std::make_unique<SpoiledCollider>(spoil),
+        DispatcherOptions{.minimum_batch = 0, .verify = verify});
+  };
+  return options;
+}
+
+/// Four spheres in a row, each touching the next, and a far one above a box that touches the first.
+/// Pairs of the broadphase: 3 of spheres, 1 with the box.
+void add_row(BulletWorld& w) {
+  w.world.setGravity(btVector3(0, 0, 0));
+  for (int i = 0; i < 4; ++i) {
+    w.add_sphere(btScalar(0.5), btVector3(btScalar(i) * btScalar(0.99), 0, 0));
+  }
+  w.add_sphere(btScalar(0.5), btVector3(0, 10, 0));
+  w.add(w.keep(new btBoxShape(btVector3(btScalar(0.1), btScalar(0.1), btScalar(0.1)))),
+        btVector3(0, btScalar(0.55), 0), 0);
+}
+
+TEST(DispatchStats, CountPairsOfAKnownRow) {
+  Twins twins;
+  twins.both(add_row);
+  ASSERT_TRUE(twins.step());
+  EXPECT_EQ(twins.stats().dispatches, 1u);
+  EXPECT_EQ(twins.stats().batches, 1u);
+  EXPECT_EQ(twins.stats().pairs, 4u);
+  EXPECT_EQ(twins.stats().sphere_pairs, 3u);
+  EXPECT_EQ(twins.stats().touching, 3u);
+  EXPECT_EQ(twins.stats().written, 0u) << "the algorithms are new: Bullet makes and runs them";
+  ASSERT_TRUE(twins.dispatch());
+  EXPECT_EQ(twins.stats().batches, 2u);
+  EXPECT_EQ(twins.stats().written, 3u);
+  EXPECT_GT(twins.stats().prepare_ms, 0.0);
+  EXPECT_GT(twins.stats().commit_ms, 0.0);
+
+  twins.ours().ours()->reset_stats();
+  EXPECT_EQ(twins.stats().dispatches, 0u);
+  EXPECT_EQ(twins.stats().pairs, 0u);
+}
+
+TEST(DispatchStats, MinimumBatchIsTheSmallestBatch) {
+  for (const std::size_t minimum : {3u, 4u, 5u}) {
+    Twins twins;
+    twins.both(add_row);
+    twins.ours().ours()->set_minimum_batch(minimum);
+    ASSERT_EQ(twins.ours().ours()->minimum_batch(), minimum);
+    ASSERT_TRUE(twins.step());
+    EXPECT_EQ(twins.stats().batches, minimum <= 4 ? 1u : 0u);
+    EXPECT_EQ(twins.stats().last_fallback, minimum <= 4 ? Fallback::none : Fallback::small_batch);
+  }
+}
+
+TEST(DispatchStats, WorldsWithoutSpheresAreLeftToBullet) {
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    auto* box = w.keep(new btBoxShape(btVector3(1, 1, 1)));
+    for (int i = 0; i < 5; ++i) w.add(box, btVector3(0, btScalar(i), 0));
+    w.add_sphere(1, btVector3(0, 2, 0));
+  });
+  ASSERT_TRUE(twins.step(5));
+  EXPECT_EQ(twins.stats().last_fallback, Fallback::no_spheres);
+  EXPECT_EQ(twins.stats().fallbacks[static_cast<std::size_t>(Fallback::no_spheres)], 5u);
+}
+
+TEST(DispatchStats, EveryFallbackHasItsOwnText) {
+  std::vector<std::string> texts;
+  for (std::size_t i = 0; i < kFallbackCount; ++i) {
+    texts.emplace_back(to_string(static_cast<Fallback>(i)));
+  }
+  std::sort(texts.begin(), texts.end());
+  EXPECT_EQ(std::unique(texts.begin(), texts.end()), texts.end());
+  EXPECT_EQ(std::count(texts.begin(), texts.end(), "unknown"), 0);
+}
+
+TEST(FailingCollider, IsGivenUpAndTheBitsStay) {
+  int calls = 0;
+  Twins twins(with_collider([&](std::span<PairResult>) {
+    if (++calls == 10) throw DeviceError("the device is gone");
+  }));
+  twins.both([](BulletWorld& w) { add_heap(w, 50, 51); });
+  ASSERT_TRUE(twins.step(30));
+  EXPECT_EQ(calls, 10) << "it must not be asked again";
+  EXPECT_EQ(twins.stats().batches, 9u);
+  EXPECT_EQ(twins.stats().failure, "the device is gone");
+  EXPECT_EQ(twins.stats().last_fallback, Fallback::collider_failed);
+  EXPECT_EQ(twins.stats().fallbacks[static_cast<std::size_t>(Fallback::collider_failed)], 21u);
+  twins.ours().ours()->reset_stats();
+  EXPECT_EQ(twins.stats().failure, "the device is gone");
+}
+
+TEST(FailingCollider, NullIsAnError) {
+  btDefaultCollisionConfiguration configuration;
+  EXPECT_THROW(CollisionDispatcher(&configuration, std::unique_ptr<SphereCollider>()),
+               InvalidArgument);
+}
+
+/// The bits of one value of the first touching pair are changed by one.
+template <class Value>
+void flip_last_bit(Value* value) {
+  using Bits = std::conditional_t<sizeof(Value) == 8, std::uint64_t, std::uint32_t>;
+  *value = std::bit_cast<Value>(static_cast<Bits>(std::bit_cast<Bits>(*value) ^ 1u));
+}
+template <class Change>
+SpoiledCollider::Spoil in_first_touching(Change change) {
+  return [change](std::span<PairResult> results) {
+    for (PairResult& result : results) {
+      if (result.touching == 0) continue;
+      change(&result);
+      return;
+    }
+  };
+}
+
+struct PlantedError {
+  const char* name;
+  SpoiledCollider::Spoil spoil;
+};
+const PlantedError kPlantedErrors[] = {
+    {"normal.x", in_first_touching([](PairResult* r) { flip_last_bit(&r->normal.x); })},
+    {"normal.y", in_first_touching([](PairResult* r) { flip_last_bit(&r->normal.y); })},
+    {"normal.z", in_first_touching([](PairResult* r) { flip_last_bit(&r->normal.z); })},
+    {"distance", in_first_touching([](PairResult* r) { flip_last_bit(&r->distance); })},
+    {"touching", in_first_touching([](PairResult* r) { r->touching = 0; })},
+};
+
+TEST(Verify, FindsEveryPlantedError) {
+  for (const PlantedError& error : kPlantedErrors) {
+    SCOPED_TRACE(error.name);
+    Twins twins(with_collider(error.spoil, true));
+    twins.both(add_row);
+    // The first dispatch runs Bullet's new algorithms; the collider's results are checked anyway
+    // from the second on.
+    for (int i = 0; i < 2; ++i) {
+      twins.ours().dispatcher->dispatchAllCollisionPairs(twins.ours().world.getPairCache(),
+                                                         twins.ours().world.getDispatchInfo(),
+                                                         twins.ours().dispatcher.get());
+      if (i == 0) twins.ours().world.performDiscreteCollisionDetection();
+    }
+    EXPECT_GT(twins.stats().mismatches, 0u);
+    EXPECT_TRUE(twins.stats().first_mismatch.starts_with(error.name))
+        << twins.stats().first_mismatch;
+  }
+}
+
+TEST(Verify, FindsNothingWhereNothingIs) {
+  Twins twins(with_collider([](std::span<PairResult>) {}, true));
+  twins.both([](BulletWorld& w) { add_heap(w, 50, 52); });
+  ASSERT_TRUE(twins.step(30));
+  EXPECT_GT(twins.stats().verified, 1000u);
+  EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
+}
+
+TEST(FirstDifference, SeesAPlantedErrorOfTheColliderInTheManifold) {
+  for (const PlantedError& error : kPlantedErrors) {
+    SCOPED_TRACE(error.name);
+    Twins twins(with_collider(error.spoil));
+    twins.both(add_row);
+    for (BulletWorld* w : {&twins.stock(), &twins.ours()}) {
+      w->world.performDiscreteCollisionDetection();
+      w->world.performDiscreteCollisionDetection();
+    }
+    const auto difference = first_difference(twins.stock().world, twins.ours().world, 1);
+    ASSERT_TRUE(difference);
+    EXPECT_EQ(difference->what, "manifold");
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bullet
