@@ -5,6 +5,7 @@
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 
 #include <limits>
+#include <utility>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
@@ -118,7 +119,7 @@ TEST(Situations, SpecialMaterialFlags) {
       }
       body.setFriction(btScalar(i % 7));  // products beyond the limit of 10
       body.setRollingFriction(btScalar(0.1) * btScalar(i % 5));
-      body.setSpinningFriction(btScalar(-0.3) * btScalar(i % 3));
+      body.setSpinningFriction(btScalar(-3) * btScalar(i % 3));
       body.setRestitution(btScalar(0.1) * btScalar(i % 11));
       body.setAnisotropicFriction(btVector3(1, btScalar(0.5), btScalar(0.2)),
                                   i % 2 == 0 ? btCollisionObject::CF_ANISOTROPIC_FRICTION : 0);
@@ -325,6 +326,69 @@ TEST(Situations, ANegativeBreakingThresholdRefusesShallowPoints) {
     }
   });
   ASSERT_TRUE(twins.step(5));
+}
+
+TEST(Situations, ManifoldsWithBodiesExchangedByHand) {
+  Twins twins;
+  twins.both([](BulletWorld& w) { add_heap(w, 40, 45); });
+  ASSERT_TRUE(twins.step(2));
+  twins.both([](BulletWorld& w) {
+    for (int i = 0; i < w.dispatcher->getNumManifolds(); i += 3) {
+      btPersistentManifold* manifold = w.dispatcher->getManifoldByIndexInternal(i);
+      manifold->setBodies(manifold->getBody1(), manifold->getBody0());
+    }
+  });
+  ASSERT_TRUE(twins.dispatch());
+}
+
+/// Adds a pair to the cache when it is first asked about one.
+template <class Base>
+class PairAddingDispatcher : public Base {
+ public:
+  using Base::Base;
+  bool needsCollision(const btCollisionObject* a, const btCollisionObject* b) override {
+    if (cache != nullptr) std::exchange(cache, nullptr)->addOverlappingPair(first, second);
+    log_event("needs " + name_of(a) + " " + name_of(b));
+    return Base::needsCollision(a, b);
+  }
+  btOverlappingPairCache* cache = nullptr;
+  btBroadphaseProxy *first = nullptr, *second = nullptr;
+};
+
+TEST(Situations, APairAddedDuringTheDispatchIsVisited) {
+  TwinOptions options;
+  options.stock = [](btCollisionConfiguration* c) {
+    return std::make_unique<PairAddingDispatcher<btCollisionDispatcher>>(c);
+  };
+  options.ours = [](btCollisionConfiguration* c) {
+    return std::make_unique<PairAddingDispatcher<CollisionDispatcher>>(
+        c, DispatcherOptions{.minimum_batch = 0});
+  };
+  Twins twins(options);
+  const auto arm = [](auto& dispatcher, BulletWorld& w) {
+    dispatcher.cache = w.world.getPairCache();
+    dispatcher.first = w.bodies[1]->getBroadphaseHandle();
+    dispatcher.second = w.bodies[6]->getBroadphaseHandle();
+  };
+  twins.both([](BulletWorld& w) {
+    w.world.setGravity(btVector3(0, 0, 0));
+    // A ring of six that touch in pairs, and a far one: with 6 pairs, Bullet's array has room
+    // for 8.
+    for (int i = 0; i < 6; ++i) {
+      const btScalar angle = btScalar(i) * SIMD_2_PI / 6;
+      w.add_sphere(btScalar(0.51), btVector3(btCos(angle), btSin(angle), 0));
+    }
+    w.add_sphere(btScalar(0.5), btVector3(100, 0, 0));
+  });
+  ASSERT_TRUE(twins.step());
+  ASSERT_EQ(twins.ours().world.getPairCache()->getNumOverlappingPairs(), 6);
+  ASSERT_GT(twins.ours().world.getPairCache()->getOverlappingPairArray().capacity(), 6);
+  arm(dynamic_cast<PairAddingDispatcher<btCollisionDispatcher>&>(*twins.stock().dispatcher),
+      twins.stock());
+  arm(dynamic_cast<PairAddingDispatcher<CollisionDispatcher>&>(*twins.ours().dispatcher),
+      twins.ours());
+  ASSERT_TRUE(twins.dispatch());
+  EXPECT_EQ(twins.ours().log.back(), "needs 1 6");
 }
 
 TEST(Situations, TwoWorldsShareADispatcher) {

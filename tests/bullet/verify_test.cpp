@@ -219,6 +219,15 @@ TEST_F(Contacts, OfSleepersAreTheOldOnes) {
   EXPECT_EQ(check_.compare(a_.world, 1), 1u);
   EXPECT_EQ(check_.mismatches(), 0u);
 }
+TEST_F(Contacts, OfSleepersThatNeverMetAreLeftOut) {
+  for (int i = 0; i < 2; ++i) {
+    btRigidBody* body = a_.add_sphere(btScalar(0.5), btVector3(30, btScalar(i) / 2, 0));
+    body->forceActivationState(ISLAND_SLEEPING);
+  }
+  capture_and_detect();
+  EXPECT_EQ(check_.compare(a_.world, 1), 1u);
+  EXPECT_EQ(check_.mismatches(), 0u);
+}
 TEST_F(Contacts, OfASphereThatIsNotFiniteAreAnError) {
   a_.bodies[2]->getWorldTransform().setOrigin(
       btVector3(std::numeric_limits<btScalar>::quiet_NaN(), 0, 0));
