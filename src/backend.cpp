@@ -14,7 +14,9 @@ namespace {
 #if JFPX_HAS_CUDA
 BackendStatus probe_cuda() { return cuda::probe(); }
 #else
-BackendStatus probe_cuda() { return {Backend::cuda, false, false, {}, "built without CUDA"}; }
+BackendStatus probe_cuda() {
+  return {.backend = Backend::cuda, .device = {}, .reason = "built without CUDA"};
+}
 #endif
 
 std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOptions&) {

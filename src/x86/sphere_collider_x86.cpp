@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/shared/sphere_input.hpp"
 #include "src/shared/sphere_pair.hpp"
 
 #include <vector>
@@ -13,6 +14,7 @@ namespace {
 class SphereColliderX86 final : public SphereCollider {
  public:
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
+    shared::check_spheres(spheres);
     contacts_.clear();
     const auto n = static_cast<SphereIndex>(spheres.size());
     for (SphereIndex a = 0; a < n; ++a) {
@@ -28,6 +30,9 @@ class SphereColliderX86 final : public SphereCollider {
                                          std::span<const SpherePair> pairs) override {
     results_.resize(pairs.size());
     for (std::size_t i = 0; i < pairs.size(); ++i) {
+      if (pairs[i].a >= spheres.size() || pairs[i].b >= spheres.size()) {
+        shared::reject_pair(pairs, spheres.size());
+      }
       results_[i] = shared::test_sphere_pair(spheres[pairs[i].a], spheres[pairs[i].b]);
     }
     return results_;
