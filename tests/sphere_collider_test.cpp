@@ -39,7 +39,7 @@ TEST_P(SphereColliderContract, EqualsBruteForceForAllSmallNumbersOfSpheres) {
 TEST_P(SphereColliderContract, EqualsBruteForceForThousandsOfSpheres) {
   for (const SphereKind& kind : sphere_kinds()) {
     Random random(base_seed() ^ static_cast<std::uint64_t>(&kind - sphere_kinds().data()));
-    const std::size_t n = 1000 + random.below(2500);
+    const std::size_t n = 1000 + random.below(1500);
     const auto spheres = kind.make(n, random);
     ASSERT_TRUE(same_bits(collider().find_contacts(spheres), brute_force(spheres)))
         << kind.name << ", N = " << n << ", " << seed_note();

@@ -1,0 +1,1 @@
+jfpx_add_bench(sphere_collider_bench SOURCES x86/sphere_collider_bench.cpp)

@@ -1,0 +1,60 @@
+/// Pairs among very many spheres of any sizes: sorted cells, one grid for each class of radii.
+#pragma once
+
+#include "src/x86/cell_grid.hpp"
+#include "src/x86/pair_chunks.hpp"
+#include "src/x86/radix_sort.hpp"
+#include "src/x86/sphere_table.hpp"
+
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::x86 {
+
+/// A hierarchical grid (Krijgsman et al. 2014, doi 10.1007/s40571-014-0020-9) whose cells are never
+/// stored. Spheres are put into classes of similar radii. For each class, from the largest radii to
+/// the smallest, the spheres of the class (targets) are sorted by cell; they are tested against
+/// each other and against all smaller spheres (queries), sorted by the same cells. A query's
+/// neighbours lie in nine rows of three consecutive cells, so in nine runs of the sorted targets,
+/// and each run's begin only moves forward as the queries go on: no table of cells, so nothing
+/// depends on how large or how empty the world is. Spheres of one class in one cell can't all be
+/// apart, so the work is O(N log N + contacts) for each class that is there.
+class CellSweep {
+ public:
+  /// Adds every pair that touches to `pairs` in new chunks, and some that just do not.
+  void find_pairs(std::span<const SphereInstance> spheres, const Kernels& kernels, ThreadPool& pool,
+                  PairChunks* pairs);
+
+ private:
+  struct RadiusClass {
+    std::size_t end;  ///< in order_; begins where the class before ends
+    Real largest;
+  };
+  struct WideItem {
+    std::uint64_t cell;
+    std::uint32_t index;
+  };
+  template <class Item>
+  struct ItemBuffers {
+    Buffer<Item> items, spare;
+  };
+
+  void classify(std::span<const SphereInstance> spheres);
+  void place(const SphereSubset& subset, bool by_cell, ThreadPool& pool, SphereTable* table);
+  template <class Item, class Pack, class Key, class Index>
+  void place_by_cell(const SphereSubset& subset, unsigned cell_bits, unsigned low_bit,
+                     ThreadPool& pool, ItemBuffers<Item>* buffers, SphereTable* table,
+                     const Pack& pack, const Key& key, const Index& index);
+  /// `queries` against targets_; among themselves if they are targets_.
+  void search(const Kernels& kernels, const SphereTable& queries, bool by_cell, ThreadPool& pool,
+              PairChunks* pairs);
+
+  std::vector<RadiusClass> classes_;
+  Buffer<std::uint32_t> order_;  ///< spheres by class; unused if there is but one
+  CellGrid grid_;
+  RadixSorter sorter_;
+  ItemBuffers<std::uint64_t> items_;  ///< cell and index in one word, where they fit
+  ItemBuffers<WideItem> wide_items_;
+  SphereTable targets_, queries_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::x86

@@ -1,0 +1,70 @@
+/// Chunks are taken from a shared counter; see the header.
+#include "src/x86/thread_pool.hpp"
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+namespace jfpx::inline JFPX_ABI::x86 {
+
+ThreadPool::ThreadPool(unsigned threads) {
+  if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
+  workers_.reserve(threads - 1);
+  try {
+    while (workers_.size() + 1 < threads) {
+      workers_.emplace_back([this](std::stop_token stop) { work(stop); });
+    }
+  } catch (const std::system_error&) {
+    // Results do not depend on the number of threads: those that there are do all the work.
+  }
+}
+
+ThreadPool::~ThreadPool() {
+  for (std::jthread& worker : workers_) worker.request_stop();
+}
+
+void ThreadPool::run_shared(const Job& job) {
+  {
+    const std::lock_guard lock(mutex_);
+    job_ = job;
+    next_.store(0, std::memory_order_relaxed);
+    busy_ = static_cast<unsigned>(workers_.size());
+    ++generation_;
+  }
+  started_.notify_all();
+  take_chunks(job);
+  std::unique_lock lock(mutex_);
+  finished_.wait(lock, [&] { return busy_ == 0; });
+  if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
+}
+
+void ThreadPool::work(std::stop_token stop) {
+  unsigned seen = 0;
+  std::unique_lock lock(mutex_);
+  while (started_.wait(lock, stop, [&] { return generation_ != seen; })) {
+    seen = generation_;
+    const Job job = job_;
+    lock.unlock();
+    take_chunks(job);
+    lock.lock();
+    if (--busy_ == 0) finished_.notify_one();
+  }
+}
+
+void ThreadPool::take_chunks(const Job& job) {
+  for (;;) {
+    const std::size_t chunk = next_.fetch_add(1, std::memory_order_relaxed);
+    if (chunk >= job.chunks) return;
+    try {
+      job.call(job.body, chunk);
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      if (!error_ || chunk < error_chunk_) {
+        error_ = std::current_exception();
+        error_chunk_ = chunk;
+      }
+    }
+  }
+}
+
+}  // namespace jfpx::inline JFPX_ABI::x86
