@@ -5,12 +5,13 @@
 
 namespace jfpx::inline JFPX_ABI::x86 {
 
-void CellAxis::fit(Real low, Real high, Real reach) {
+void CellAxis::fit(Real low, Real high, Real distance) {
   constexpr double kMargin = 1 + 1.0 / 512;
   constexpr double kMostCells = 0x1p38;
   origin_ = static_cast<double>(low) * 0.25;
   const double extent = static_cast<double>(high) * 0.25 - origin_;
-  const double quarter = std::max(static_cast<double>(reach) * 0.5 * kMargin, extent / kMostCells);
+  const double quarter =
+      std::max(static_cast<double>(distance) * 0.25 * kMargin, extent / kMostCells);
   cells_per_quarter_ = 1 / quarter;
   count_ = static_cast<std::int64_t>(extent * cells_per_quarter_) + 2;
   end_ = static_cast<double>(count_ + 2);
@@ -58,13 +59,13 @@ bool CellGrid::multiply() noexcept {
   return true;
 }
 
-void CellGrid::fit(const SphereSubset& targets, Real reach) {
+void CellGrid::fit(const SphereSubset& targets, Real distance) {
   Aabb box;
   for (std::size_t i = 0; i < targets.count; ++i) {
     const Vec3& p = targets[i].centre;
     box = merged(box, {p, p});
   }
-  for (int i = 0; i < 3; ++i) axes_[i].fit(box.lower[i], box.upper[i], reach);
+  for (int i = 0; i < 3; ++i) axes_[i].fit(box.lower[i], box.upper[i], distance);
   if (multiply()) return;
   for (int i = 0; i < 3; ++i) axes_[i].skip_empty_cells(targets, i);
   while (!multiply()) {

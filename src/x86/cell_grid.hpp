@@ -23,19 +23,19 @@ struct SphereSubset {
   const SphereInstance& operator[](std::size_t i) const { return spheres[id(i)]; }
 };
 
-/// Cells along one axis, 0 to count()-1, as wide as the largest target.
+/// Cells along one axis, 0 to count()-1.
 ///
-/// Claim: spheres that touch are at most one cell apart. A cell is 2*reach*(1 + 2^-9) wide, where
-/// reach is the largest enlarged radius (kernels.inl) of the targets; queries are no larger. If two
-/// touch, |x_a - x_b| <= reach_a + reach_b but for a few epsilon: at most 1 - 2^-10 of a cell. A
+/// Claim: spheres that touch are at most one cell apart. A cell is distance*(1 + 2^-9) wide, where
+/// distance is the largest sum of two enlarged radii (kernels.inl) that can meet. If two spheres
+/// touch, |x_a - x_b| <= distance but for a few epsilon: at most 1 - 2^-10 of a cell. A
 /// position is computed in double, by four roundings of a number up to 2^38: off by 2^-13 at most.
 /// So positions differ by less than 1, and cells by at most 1.
 class CellAxis {
  public:
   static constexpr std::int64_t kNowhere = -2;
 
-  /// For targets from `low` to `high`; reach <= a quarter of the largest Real.
-  void fit(Real low, Real high, Real reach);
+  /// For targets from `low` to `high`; `distance` <= half the largest Real.
+  void fit(Real low, Real high, Real distance);
   /// Renumbers: a gap of any number of empty cells becomes one empty cell. For worlds so wide that
   /// the product of three counts would overflow.
   void skip_empty_cells(const SphereSubset& targets, int axis);
@@ -69,8 +69,8 @@ class CellAxis {
 
 class CellGrid {
  public:
-  /// @param reach the largest enlarged radius of the targets
-  void fit(const SphereSubset& targets, Real reach);
+  /// @param distance the largest sum of two enlarged radii, of a target and of what may meet it
+  void fit(const SphereSubset& targets, Real distance);
 
   /// Number of a cell; spheres that touch have numbers that differ by dx + dy*row() + dz*slab()
   /// with dx, dy, dz in -1..1. kNowhere: no target is near.

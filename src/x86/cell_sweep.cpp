@@ -54,23 +54,28 @@ void CellSweep::find_pairs(std::span<const SphereInstance> spheres, const Kernel
                            ThreadPool& pool, PairChunks* pairs) {
   classify(spheres);
   const std::uint32_t* order = classes_.size() > 1 ? order_.data() : nullptr;
+  const auto part = [&](std::size_t from, std::size_t to) {
+    return SphereSubset{spheres, order != nullptr ? order + from : nullptr, to - from};
+  };
   std::size_t begin = 0;
-  for (const RadiusClass& c : classes_) {
-    const auto part = [&](std::size_t from, std::size_t to) {
-      return SphereSubset{spheres, order != nullptr ? order + from : nullptr, to - from};
-    };
-    const SphereSubset targets = part(begin, c.end);
-    const SphereSubset smaller = part(c.end, spheres.size());
+  for (std::size_t k = 0; k < classes_.size(); ++k) {
+    const std::size_t end = classes_[k].end;
+    const SphereSubset targets = part(begin, end);
     // Where the sum of two radii can overflow, everything touches: the claim of CellAxis fails.
-    const bool by_cell = targets.count > kFewTargets && c.largest < kLargest / 8;
-    if (by_cell) grid_.fit(targets, enlarged_radius(c.largest));
+    const bool by_cell = targets.count > kFewTargets && classes_[k].largest < kLargest / 8;
+    const Real reach = enlarged_radius(classes_[k].largest);
+    if (by_cell) grid_.fit(targets, 2 * reach);
     place(targets, by_cell, pool, &targets_);
     search(kernels, targets_, by_cell, pool, pairs);
-    if (smaller.count > 0) {
-      place(smaller, by_cell, pool, &queries_);
+    if (k + 1 < classes_.size()) {
+      if (by_cell) {  // smaller spheres reach less far: sorted anew, fewer targets are near
+        grid_.fit(targets, reach + enlarged_radius(classes_[k + 1].largest));
+        place(targets, by_cell, pool, &targets_);
+      }
+      place(part(end, spheres.size()), by_cell, pool, &queries_);
       search(kernels, queries_, by_cell, pool, pairs);
     }
-    begin = c.end;
+    begin = end;
   }
 }
 

@@ -42,12 +42,14 @@ void sort_long_row(std::uint32_t* row, std::uint32_t* spare, std::size_t count) 
 
 void sort_row(std::uint32_t* row, std::uint32_t* spare, std::size_t count) {
   if (count > 512) return sort_long_row(row, spare, count);
-  if (count > 24) return std::sort(row, row + count);
+  if (count > 12) return std::sort(row, row + count);
+  // Insertion by exchange: the order of a row is random, so a comparison must not be a branch.
   for (std::size_t i = 1; i < count; ++i) {
-    const std::uint32_t v = row[i];
-    std::size_t j = i;
-    for (; j > 0 && row[j - 1] > v; --j) row[j] = row[j - 1];
-    row[j] = v;
+    for (std::size_t j = i; j > 0; --j) {
+      const std::uint32_t low = std::min(row[j - 1], row[j]);
+      row[j] = std::max(row[j - 1], row[j]);
+      row[j - 1] = low;
+    }
   }
 }
 
@@ -84,7 +86,7 @@ ContactSpan ContactWriter::write_unsorted(std::span<const SphereInstance> sphere
   higher_.reserve(total, "pairs in rows");
   contacts_.reserve(total, "contacts");
   pool.run(buckets_, [&](std::size_t bucket) {
-    sort_rows(bucket, spheres.size());
+    make_rows(bucket, spheres.size());
     sections_[bucket].touching = write_rows(spheres, bucket);
   });
   return close_gaps(buckets_);
@@ -114,7 +116,7 @@ void ContactWriter::divide(const PairChunks& pairs, ThreadPool& pool) {
   });
 }
 
-void ContactWriter::sort_rows(std::size_t bucket, std::size_t spheres) {
+void ContactWriter::make_rows(std::size_t bucket, std::size_t spheres) {
   const std::uint64_t begin = sections_[bucket].begin;
   const std::uint64_t end = sections_[bucket + 1].begin;
   const std::size_t first = bucket << bucket_bits_;
@@ -127,13 +129,6 @@ void ContactWriter::sort_rows(std::size_t bucket, std::size_t spheres) {
   for (std::uint64_t i = begin; i < end; ++i) {
     higher_[row_end_[lower(divided_[i])]++] = higher(divided_[i]);
   }
-  // The bucket's pairs are copied: their place serves as scratch.
-  auto* spare = reinterpret_cast<std::uint32_t*>(divided_.data() + begin);
-  std::uint64_t row = begin;
-  for (std::size_t a = first; a < last; ++a) {
-    sort_row(higher_.data() + row, spare, row_end_[a] - row);
-    row = row_end_[a];
-  }
 }
 
 std::uint64_t ContactWriter::write_rows(std::span<const SphereInstance> spheres,
@@ -141,12 +136,17 @@ std::uint64_t ContactWriter::write_rows(std::span<const SphereInstance> spheres,
   constexpr std::uint64_t kAhead = 24;  // spheres come from anywhere: ask for them in time
   const std::uint64_t begin = sections_[bucket].begin;
   const std::uint64_t end = sections_[bucket + 1].begin;
+  // The bucket's pairs are copied: their place serves as scratch.
+  auto* spare = reinterpret_cast<std::uint32_t*>(divided_.data() + begin);
   SphereContact* out = contacts_.data() + begin;
-  auto a = static_cast<std::uint32_t>(bucket << bucket_bits_);
-  for (std::uint64_t i = begin; i < end; ++i) {
-    if (i + kAhead < end) __builtin_prefetch(&spheres[higher_[i + kAhead]]);
-    while (row_end_[a] <= i) ++a;
-    out = append_contact(spheres, a, higher_[i], out);
+  std::uint64_t i = begin;
+  for (auto a = static_cast<std::uint32_t>(bucket << bucket_bits_); i < end; ++a) {
+    const std::uint64_t row_end = row_end_[a];
+    sort_row(higher_.data() + i, spare, row_end - i);
+    for (; i < row_end; ++i) {
+      if (i + kAhead < end) __builtin_prefetch(&spheres[higher_[i + kAhead]]);
+      out = append_contact(spheres, a, higher_[i], out);
+    }
   }
   return static_cast<std::uint64_t>(out - (contacts_.data() + begin));
 }

@@ -25,7 +25,7 @@ class ContactWriter {
   };
 
   void divide(const PairChunks& pairs, ThreadPool& pool);
-  void sort_rows(std::size_t bucket, std::size_t spheres);
+  void make_rows(std::size_t bucket, std::size_t spheres);
   std::uint64_t write_rows(std::span<const SphereInstance> spheres, std::size_t bucket);
   ContactSpan close_gaps(std::size_t sections);
 

@@ -1,5 +1,6 @@
 /// Bodies of the kernels, for any instruction set. Included, once each, by the kernels_*.cpp, which
-/// define `Simd` in an anonymous namespace before. See kernels.hpp for what may be used here.
+/// define `Simd`, and `RowSimd` for short runs of targets, in an anonymous namespace before. See
+/// kernels.hpp for what may be used here.
 
 // The filter. Let u = epsilon/2, R = r_a + r_b (exact), t = 2^-63 (float) or 2^-511 (double), the
 // square root of the smallest normal number; reach >= r*(1 + 6u) + t. A pair is dropped iff D > W,
@@ -14,24 +15,27 @@
 namespace jfpx::inline JFPX_ABI::x86 {
 namespace {
 
+template <class S>
 struct Query {
-  Simd::Vec x, y, z, reach;
+  typename S::Vec x, y, z, reach;
   std::uint32_t id;
 };
 
-inline Query load_query(const SphereColumns& q, std::uint32_t i) {
-  return {Simd::set(q.x[i]), Simd::set(q.y[i]), Simd::set(q.z[i]), Simd::set(q.reach[i]), q.id[i]};
+template <class S>
+inline Query<S> load_query(const SphereColumns& q, std::uint32_t i) {
+  return {S::set(q.x[i]), S::set(q.y[i]), S::set(q.z[i]), S::set(q.reach[i]), q.id[i]};
 }
 
 /// One bit per target from `at` on: set if the filter keeps it.
-inline std::uint32_t kept(const Query& q, const SphereColumns& t, std::uint32_t at) {
-  const Simd::Vec dx = Simd::sub(q.x, Simd::load(t.x + at));
-  const Simd::Vec dy = Simd::sub(q.y, Simd::load(t.y + at));
-  const Simd::Vec dz = Simd::sub(q.z, Simd::load(t.z + at));
-  const Simd::Vec w = Simd::add(q.reach, Simd::load(t.reach + at));
-  const Simd::Vec square =
-      Simd::add(Simd::add(Simd::mul(dx, dx), Simd::mul(dy, dy)), Simd::mul(dz, dz));
-  return Simd::not_greater(square, Simd::mul(w, w));
+template <class S>
+inline std::uint32_t kept(const Query<S>& q, const SphereColumns& t, std::uint32_t at) {
+  const typename S::Vec dx = S::sub(q.x, S::load(t.x + at));
+  const typename S::Vec dy = S::sub(q.y, S::load(t.y + at));
+  const typename S::Vec dz = S::sub(q.z, S::load(t.z + at));
+  const typename S::Vec w = S::add(q.reach, S::load(t.reach + at));
+  const typename S::Vec square =
+      S::add(S::add(S::mul(dx, dx), S::mul(dy, dy)), S::mul(dz, dz));
+  return S::not_greater(square, S::mul(w, w));
 }
 
 /// Appends pairs. A copy of the sink's pointers, so that they stay in registers.
@@ -42,14 +46,15 @@ class Appender {
   Appender(const Appender&) = delete;
   Appender& operator=(const Appender&) = delete;
 
+  template <class S>
   void append(std::uint32_t id, const std::uint32_t* others, std::uint32_t mask) {
-    if (end_ - next_ < kMaxLanes) {
+    if (end_ - next_ < kMaxLanes) [[unlikely]] {
       sink_->next = next_;
       sink_->grow(sink_);
       next_ = sink_->next;
       end_ = sink_->end;
     }
-    next_ = Simd::append(next_, id, others, mask);
+    next_ = S::append(next_, id, others, mask);
   }
 
  private:
@@ -74,40 +79,44 @@ class Appender {
 void search_all(const PairSearch& s) {
   constexpr std::uint32_t kLanes = Simd::kLanes;
   Appender pairs(s.sink);
-  const std::uint32_t count = s.targets.count;
-  for (std::uint32_t i = s.first; i < s.last; ++i) {
-    const Query q = load_query(s.queries, i);
-    std::uint32_t at = s.self ? i + 1 : 0;
+  const SphereColumns queries = s.queries;  // copies: vector stores may alias anything else
+  const SphereColumns targets = s.targets;
+  const bool self = s.self;
+  const std::uint32_t last = s.last;
+  const std::uint32_t count = targets.count;
+  for (std::uint32_t i = s.first; i < last; ++i) {
+    const Query<Simd> q = load_query<Simd>(queries, i);
+    std::uint32_t at = self ? i + 1 : 0;
     // Two vectors a turn halve the branches on what is mostly empty.
     for (; at + 2 * kLanes <= count; at += 2 * kLanes) {
-      const std::uint32_t first = kept(q, s.targets, at);
-      const std::uint32_t second = kept(q, s.targets, at + kLanes);
+      const std::uint32_t first = kept(q, targets, at);
+      const std::uint32_t second = kept(q, targets, at + kLanes);
       if ((first | second) == 0) continue;
-      pairs.append(q.id, s.targets.id + at, first);
-      pairs.append(q.id, s.targets.id + at + kLanes, second);
+      pairs.append<Simd>(q.id, targets.id + at, first);
+      pairs.append<Simd>(q.id, targets.id + at + kLanes, second);
     }
     for (; at < count; at += kLanes) {
       const std::uint32_t left = count - at;
       const std::uint32_t valid = left < kLanes ? (1u << left) - 1 : ~0u;
-      const std::uint32_t mask = kept(q, s.targets, at) & valid;
-      if (mask != 0) pairs.append(q.id, s.targets.id + at, mask);
+      const std::uint32_t mask = kept(q, targets, at) & valid;
+      if (mask != 0) pairs.append<Simd>(q.id, targets.id + at, mask);
     }
   }
 }
 
 /// Targets of cells [low, high), from row.cursor on. Cells ascend, so both bounds cut a prefix off
 /// each vector: no table of cells, no unpredictable branch.
-inline void search_row(const Query& q, const SphereColumns& t, std::int64_t low, std::int64_t high,
+inline void search_row(const Query<RowSimd>& q, const SphereColumns& t, std::int64_t low, std::int64_t high,
                        std::uint32_t* cursor, Appender* pairs) {
-  constexpr std::uint32_t kLanes = Simd::kLanes;
+  constexpr std::uint32_t kLanes = RowSimd::kLanes;
   std::uint32_t passed = 0;
   std::uint32_t at = *cursor;
   for (;;) {
-    const std::uint32_t below = Simd::cells_below(t.cell + at, low);
-    const std::uint32_t inside = Simd::cells_below(t.cell + at, high);
-    passed += Simd::count(below);
-    pairs->append(q.id, t.id + at, kept(q, t, at) & inside & ~below);
-    if (inside != Simd::kAll) break;
+    const std::uint32_t below = RowSimd::cells_below(t.cell + at, low);
+    const std::uint32_t inside = RowSimd::cells_below(t.cell + at, high);
+    passed += RowSimd::count(below);
+    pairs->append<RowSimd>(q.id, t.id + at, kept(q, t, at) & inside & ~below);
+    if (inside != RowSimd::kAll) [[likely]] break;
     at += kLanes;
   }
   *cursor += passed;
@@ -115,18 +124,22 @@ inline void search_row(const Query& q, const SphereColumns& t, std::int64_t low,
 
 void search_rows(const PairSearch& s, CellRow* rows, int row_count) {
   Appender pairs(s.sink);
-  for (std::uint32_t i = s.first; i < s.last; ++i) {
-    const Query q = load_query(s.queries, i);
-    const std::int64_t cell = s.queries.cell[i];
+  const SphereColumns queries = s.queries;  // copies: vector stores may alias anything else
+  const SphereColumns targets = s.targets;
+  const bool self = s.self;
+  const std::uint32_t last = s.last;
+  for (std::uint32_t i = s.first; i < last; ++i) {
+    const Query<RowSimd> q = load_query<RowSimd>(queries, i);
+    const std::int64_t cell = queries.cell[i];
     int row = 0;
-    if (s.self) {
+    if (self) {
       std::uint32_t behind = i + 1;
-      search_row(q, s.targets, cell, cell + 2, &behind, &pairs);
+      search_row(q, targets, cell, cell + 2, &behind, &pairs);
       row = 1;
     }
     for (; row < row_count; ++row) {
       const std::int64_t low = cell + rows[row].offset;
-      search_row(q, s.targets, low, low + 3, &rows[row].cursor, &pairs);
+      search_row(q, targets, low, low + 3, &rows[row].cursor, &pairs);
     }
   }
 }

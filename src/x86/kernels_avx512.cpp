@@ -18,6 +18,17 @@ inline void store_eight(std::uint64_t* out, __m256i id, __m256i others) {
   _mm512_storeu_si512(out, _mm512_or_si512(_mm512_slli_epi64(low, 32), high));
 }
 
+/// Appends the pairs of `id` with those of eight others that the mask names, without a branch on
+/// the mask, which nothing could predict: a whole vector is written, and the next pairs overwrite
+/// what was too much. (Compressing to memory instead is microcoded on Zen 4.)
+inline std::uint64_t* append_eight(std::uint64_t* out, std::uint32_t id,
+                                   const std::uint32_t* others, std::uint32_t mask) {
+  const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(others));
+  const __m256i chosen = _mm256_maskz_compress_epi32(static_cast<__mmask8>(mask), all);
+  store_eight(out, _mm256_set1_epi32(static_cast<int>(id)), chosen);
+  return out + __builtin_popcount(mask);
+}
+
 #if defined(JFPX_DOUBLE_PRECISION)
 struct Simd {
   static constexpr std::uint32_t kLanes = 8;
@@ -37,12 +48,10 @@ struct Simd {
   }
   static std::uint64_t* append(std::uint64_t* out, std::uint32_t id, const std::uint32_t* others,
                                std::uint32_t mask) {
-    const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(others));
-    const __m256i chosen = _mm256_maskz_compress_epi32(static_cast<__mmask8>(mask), all);
-    store_eight(out, _mm256_set1_epi32(static_cast<int>(id)), chosen);
-    return out + count(mask);
+    return append_eight(out, id, others, mask);
   }
 };
+using RowSimd = Simd;
 #else
 struct Simd {
   static constexpr std::uint32_t kLanes = 16;
@@ -60,8 +69,6 @@ struct Simd {
   static std::uint32_t count(std::uint32_t mask) {
     return static_cast<std::uint32_t>(__builtin_popcount(mask));
   }
-  // Without a branch on the mask, which nothing could predict: whole vectors are written, and the
-  // next pairs overwrite what was too many. Compressing to memory instead is microcoded on Zen 4.
   static std::uint64_t* append(std::uint64_t* out, std::uint32_t id, const std::uint32_t* others,
                                std::uint32_t mask) {
     const __m512i chosen =
@@ -71,6 +78,29 @@ struct Simd {
     store_eight(out, id8, _mm512_castsi512_si256(chosen));
     if (found > 8) store_eight(out + 8, id8, _mm512_extracti64x4_epi64(chosen, 1));
     return out + found;
+  }
+};
+
+/// Half as wide: the runs of a row rarely hold more than eight.
+struct RowSimd {
+  static constexpr std::uint32_t kLanes = 8;
+  static constexpr std::uint32_t kAll = (1u << kLanes) - 1;
+  using Vec = __m256;
+  static Vec load(const Real* p) { return _mm256_loadu_ps(p); }
+  static Vec set(Real v) { return _mm256_set1_ps(v); }
+  static Vec add(Vec a, Vec b) { return _mm256_add_ps(a, b); }
+  static Vec sub(Vec a, Vec b) { return _mm256_sub_ps(a, b); }
+  static Vec mul(Vec a, Vec b) { return _mm256_mul_ps(a, b); }
+  static std::uint32_t not_greater(Vec a, Vec b) { return _mm256_cmp_ps_mask(a, b, _CMP_NGT_UQ); }
+  static std::uint32_t cells_below(const std::int64_t* cell, std::int64_t bound) {
+    return eight_below(cell, bound);
+  }
+  static std::uint32_t count(std::uint32_t mask) {
+    return static_cast<std::uint32_t>(__builtin_popcount(mask));
+  }
+  static std::uint64_t* append(std::uint64_t* out, std::uint32_t id, const std::uint32_t* others,
+                               std::uint32_t mask) {
+    return append_eight(out, id, others, mask);
   }
 };
 #endif

@@ -26,6 +26,8 @@ struct Simd {
   }
 };
 
+using RowSimd = Simd;
+
 }  // namespace
 }  // namespace jfpx::inline JFPX_ABI::x86
 

@@ -61,6 +61,8 @@ struct Simd {
 };
 #endif
 
+using RowSimd = Simd;
+
 }  // namespace
 }  // namespace jfpx::inline JFPX_ABI::x86
 
