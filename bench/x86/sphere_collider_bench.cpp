@@ -71,6 +71,13 @@ Spheres giant_in_dust(std::size_t n) {
   return spheres;
 }
 
+/// One sphere of five times the radius in a gas: must not cost the others their small cells.
+Spheres larger_one(std::size_t n) {
+  Spheres spheres = gas(n);
+  spheres[n / 2].radius = 5;
+  return spheres;
+}
+
 /// A dense gas with a thousandth of its spheres up to 1e9 m away.
 Spheres outliers(std::size_t n) {
   Spheres spheres = gas(n);
@@ -156,8 +163,7 @@ void add(const std::string& name, Spheres (*make)(std::size_t), std::int64_t n,
                                               options);
                                })
       ->Arg(n)
-      ->Unit(benchmark::kMicrosecond)
-      ;
+      ->Unit(benchmark::kMicrosecond);
 }
 
 void add_all() {
@@ -187,6 +193,7 @@ void add_all() {
   for (const std::int64_t n : {100'000, 1'000'000}) {
     add("polydisperse/sorted", polydisperse, n, sorted_tiles, SimdLevel::automatic);
     add("giant_in_dust/sorted", giant_in_dust, n, sorted_tiles, SimdLevel::automatic);
+    add("larger_one/sorted", larger_one, n, sorted_tiles, SimdLevel::automatic);
     add("outliers/sorted", outliers, n, sorted_tiles, SimdLevel::automatic);
   }
   add("coincident/sorted", coincident, 2'000, sorted_tiles, SimdLevel::automatic);

@@ -10,14 +10,18 @@
 namespace jfpx::inline JFPX_ABI::x86 {
 namespace {
 
-/// Radii are binned by exponent and the two highest bits of the mantissa.
+/// Radii are binned by exponent and the two highest bits of the mantissa: four bins an octave.
 using RealBits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
 constexpr int kBinShift = std::numeric_limits<Real>::digits - 1 - 2;
 constexpr std::size_t kBins = std::size_t{1} << (sizeof(Real) * 8 - 1 - kBinShift);
-/// A class spans a factor of four, less up to a quarter octave: wider ones test more in vain,
-/// narrower ones sort more often.
-constexpr std::size_t kBinsPerClass = 8;
-constexpr Real kOneClass = 2;  ///< largest/smallest radius up to which no histogram is made
+
+/// Bins that a class spans. Wide classes are sorted less often, but a wide class of small spheres
+/// with a large one among them has many in a cell: those are narrowed.
+constexpr std::size_t kWidest = 16;
+constexpr std::size_t kNarrowest = 4;
+/// Other targets in a sphere's own cell, on average, from which on a class is narrowed.
+constexpr double kCrowded = 8;
+constexpr Real kOneBin = Real(1.5);  ///< largest/smallest radius up to which no bins are made
 
 constexpr Real kLargest = std::numeric_limits<Real>::max();
 
@@ -52,73 +56,83 @@ int make_rows(const CellGrid& grid, bool self, std::array<CellRow, 9>* rows) {
 
 void CellSweep::find_pairs(std::span<const SphereInstance> spheres, const Kernels& kernels,
                            ThreadPool& pool, PairChunks* pairs) {
-  classify(spheres);
-  const std::uint32_t* order = classes_.size() > 1 ? order_.data() : nullptr;
+  sort_by_radius(spheres);
+  const std::uint32_t* order = bins_.size() > 1 ? order_.data() : nullptr;
   const auto part = [&](std::size_t from, std::size_t to) {
     return SphereSubset{spheres, order != nullptr ? order + from : nullptr, to - from};
   };
   std::size_t begin = 0;
-  for (std::size_t k = 0; k < classes_.size(); ++k) {
-    const std::size_t end = classes_[k].end;
-    const SphereSubset targets = part(begin, end);
-    // Where the sum of two radii can overflow, everything touches: the claim of CellAxis fails.
-    const bool by_cell = targets.count > kFewTargets && classes_[k].largest < kLargest / 8;
-    const Real reach = enlarged_radius(classes_[k].largest);
-    if (by_cell) grid_.fit(targets, 2 * reach);
-    place(targets, by_cell, pool, &targets_);
+  for (std::size_t first = 0; first < bins_.size();) {
+    const Real largest = bins_[first].largest;
+    const Real reach = enlarged_radius(largest);
+    bool by_cell = false;
+    std::size_t next = first;
+    SphereSubset targets{};
+    for (std::size_t width = kWidest;; width /= 2) {
+      next = first;
+      while (next < bins_.size() && bins_[next].bin + width > bins_[first].bin) ++next;
+      targets = part(begin, bins_[next - 1].end);
+      // Where the sum of two radii can overflow, everything touches: the claim of CellAxis fails.
+      by_cell = targets.count > kFewTargets && largest < kLargest / 8;
+      if (by_cell) grid_.fit(targets, 2 * reach);
+      place(targets, by_cell, pool, &targets_);
+      if (!by_cell || width == kNarrowest || next == first + 1 || !is_crowded(targets_)) break;
+    }
     search(kernels, targets_, by_cell, pool, pairs);
-    if (k + 1 < classes_.size()) {
+    begin += targets.count;
+    if (next < bins_.size()) {
       if (by_cell) {  // smaller spheres reach less far: sorted anew, fewer targets are near
-        grid_.fit(targets, reach + enlarged_radius(classes_[k + 1].largest));
+        grid_.fit(targets, reach + enlarged_radius(bins_[next].largest));
         place(targets, by_cell, pool, &targets_);
       }
-      place(part(end, spheres.size()), by_cell, pool, &queries_);
+      place(part(begin, spheres.size()), by_cell, pool, &queries_);
       search(kernels, queries_, by_cell, pool, pairs);
     }
-    begin = end;
+    first = next;
   }
 }
 
-/// Fills classes_ from the largest radii to the smallest, and order_.
-void CellSweep::classify(std::span<const SphereInstance> spheres) {
+/// Fills bins_ from the largest radii to the smallest, and order_.
+void CellSweep::sort_by_radius(std::span<const SphereInstance> spheres) {
   Real smallest = kLargest;
   Real largest = 0;
   for (const SphereInstance& s : spheres) {
     smallest = std::min(smallest, s.radius);
     largest = std::max(largest, s.radius);
   }
-  classes_.clear();
-  if (largest <= smallest * kOneClass) {
-    classes_.push_back({spheres.size(), largest});
+  bins_.clear();
+  if (largest <= smallest * kOneBin) {
+    bins_.push_back({0, spheres.size(), largest});
     return;
   }
-  std::array<std::uint16_t, kBins> class_of_bin{};
-  std::array<std::uint32_t, kBins / kBinsPerClass + 1> counts{};
-  for (const SphereInstance& s : spheres) class_of_bin[bin_of(s.radius)] = 1;
-  // Greedy: a class begins at the largest bin that is left.
-  std::size_t lowest_bin = kBins;
-  for (std::size_t bin = kBins; bin-- > 0;) {
-    if (class_of_bin[bin] == 0) continue;
-    if (bin < lowest_bin) {
-      classes_.push_back({0, 0});
-      lowest_bin = bin >= kBinsPerClass - 1 ? bin - (kBinsPerClass - 1) : 0;
-    }
-    class_of_bin[bin] = static_cast<std::uint16_t>(classes_.size() - 1);
-  }
-  for (const SphereInstance& s : spheres) {
-    const std::size_t c = class_of_bin[bin_of(s.radius)];
-    ++counts[c];
-    classes_[c].largest = std::max(classes_[c].largest, s.radius);
-  }
+  std::uint32_t* next = bin_ends_.reserve(kBins, "bins of radii");
+  std::fill_n(next, kBins, 0u);
+  for (const SphereInstance& s : spheres) ++next[bin_of(s.radius)];
   std::uint32_t sum = 0;
-  for (std::size_t c = 0; c < classes_.size(); ++c) {
-    sum += std::exchange(counts[c], sum);
-    classes_[c].end = sum;
+  for (std::size_t bin = kBins; bin-- > 0;) {
+    const std::uint32_t count = std::exchange(next[bin], sum);
+    sum += count;
+    if (count > 0) bins_.push_back({bin, sum, 0});
   }
   order_.reserve(spheres.size(), "indices of spheres");
-  for (std::uint32_t i = 0; i < spheres.size(); ++i) {
-    order_[counts[class_of_bin[bin_of(spheres[i].radius)]]++] = i;
+  for (std::uint32_t i = 0; i < spheres.size(); ++i) order_[next[bin_of(spheres[i].radius)]++] = i;
+  std::size_t begin = 0;
+  for (RadiusBin& bin : bins_) {
+    for (; begin < bin.end; ++begin) {
+      bin.largest = std::max(bin.largest, spheres[order_[begin]].radius);
+    }
   }
+}
+
+bool CellSweep::is_crowded(const SphereTable& table) const {
+  const std::int64_t* cell = table.columns().cell;
+  double others = 0;  // twice over: every sphere counts those before it in its cell
+  std::uint32_t cell_begin = 0;
+  for (std::uint32_t i = 0; i < table.count(); ++i) {
+    if (cell[i] != cell[cell_begin]) cell_begin = i;
+    others += 2.0 * (i - cell_begin);
+  }
+  return others > kCrowded * table.count();
 }
 
 /// Fills a table with a subset; in order of cells, without the spheres that no target is near.

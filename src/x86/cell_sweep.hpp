@@ -25,8 +25,9 @@ class CellSweep {
                   PairChunks* pairs);
 
  private:
-  struct RadiusClass {
-    std::size_t end;  ///< in order_; begins where the class before ends
+  struct RadiusBin {
+    std::size_t bin;
+    std::size_t end;  ///< in order_; begins where the bin before ends
     Real largest;
   };
   struct WideItem {
@@ -38,7 +39,8 @@ class CellSweep {
     Buffer<Item> items, spare;
   };
 
-  void classify(std::span<const SphereInstance> spheres);
+  void sort_by_radius(std::span<const SphereInstance> spheres);
+  bool is_crowded(const SphereTable& table) const;
   void place(const SphereSubset& subset, bool by_cell, ThreadPool& pool, SphereTable* table);
   template <class Item, class Pack, class Key, class Index>
   void place_by_cell(const SphereSubset& subset, unsigned cell_bits, unsigned low_bit,
@@ -48,8 +50,9 @@ class CellSweep {
   void search(const Kernels& kernels, const SphereTable& queries, bool by_cell, ThreadPool& pool,
               PairChunks* pairs);
 
-  std::vector<RadiusClass> classes_;
-  Buffer<std::uint32_t> order_;  ///< spheres by class; unused if there is but one
+  std::vector<RadiusBin> bins_;  ///< those that are not empty, from the largest radii down
+  Buffer<std::uint32_t> bin_ends_;
+  Buffer<std::uint32_t> order_;  ///< spheres by bin; unused if there is but one
   CellGrid grid_;
   RadixSorter sorter_;
   ItemBuffers<std::uint64_t> items_;  ///< cell and index in one word, where they fit
