@@ -2,18 +2,32 @@
 #include "src/x86/cell_grid.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace jfpx::inline JFPX_ABI::x86 {
 
-void CellAxis::fit(Real low, Real high, Real distance) {
+namespace {
+
+/// The median of up to 64 targets: the middle of where most are, whatever a few outliers do.
+Real typical_coordinate(const SphereSubset& targets, int axis) {
+  std::array<Real, 64> sample{};
+  const std::size_t count = std::min(sample.size(), targets.count);
+  for (std::size_t i = 0; i < count; ++i) {
+    sample[i] = targets[i * targets.count / count].centre[axis];
+  }
+  const auto median = sample.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(sample.begin(), median, sample.begin() + static_cast<std::ptrdiff_t>(count));
+  return *median;
+}
+
+}  // namespace
+
+void CellAxis::fit(Real low, Real middle, Real high, Real distance) {
   constexpr double kMargin = 1 + 1.0 / 512;
-  constexpr double kMostCells = 0x1p38;
-  origin_ = static_cast<double>(low) * 0.25;
-  const double extent = static_cast<double>(high) * 0.25 - origin_;
-  const double quarter =
-      std::max(static_cast<double>(distance) * 0.25 * kMargin, extent / kMostCells);
-  cells_per_quarter_ = 1 / quarter;
-  count_ = static_cast<std::int64_t>(extent * cells_per_quarter_) + 2;
+  middle_ = static_cast<double>(middle) * 0.25;
+  cells_per_quarter_ = 1 / (static_cast<double>(distance) * 0.25 * kMargin);
+  begin_ = std::floor(position(low)) - 1;
+  count_ = static_cast<std::int64_t>(position(high) - begin_);
   end_ = static_cast<double>(count_ + 2);
   occupied_ = 0;
   halvings_ = 0;
@@ -65,7 +79,9 @@ void CellGrid::fit(const SphereSubset& targets, Real distance) {
     const Vec3& p = targets[i].centre;
     box = merged(box, {p, p});
   }
-  for (int i = 0; i < 3; ++i) axes_[i].fit(box.lower[i], box.upper[i], distance);
+  for (int i = 0; i < 3; ++i) {
+    axes_[i].fit(box.lower[i], typical_coordinate(targets, i), box.upper[i], distance);
+  }
   if (multiply()) return;
   for (int i = 0; i < 3; ++i) axes_[i].skip_empty_cells(targets, i);
   while (!multiply()) {

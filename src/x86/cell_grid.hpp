@@ -5,6 +5,7 @@
 
 #include "src/x86/buffer.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -28,14 +29,16 @@ struct SphereSubset {
 /// Claim: spheres that touch are at most one cell apart. A cell is distance*(1 + 2^-9) wide, where
 /// distance is the largest sum of two enlarged radii (kernels.inl) that can meet. If two spheres
 /// touch, |x_a - x_b| <= distance but for a few epsilon: at most 1 - 2^-10 of a cell. A
-/// position is computed in double, by four roundings of a number up to 2^38: off by 2^-13 at most.
-/// So positions differ by less than 1, and cells by at most 1.
+/// position is computed in double, by five roundings of a number up to 2^38: off by 2^-12 at most.
+/// So positions differ by less than 1, and cells by at most 1. Positions further than 2^37 cells
+/// from the middle are moved there, which brings none apart.
 class CellAxis {
  public:
   static constexpr std::int64_t kNowhere = -2;
 
-  /// For targets from `low` to `high`; `distance` <= half the largest Real.
-  void fit(Real low, Real high, Real distance);
+  /// For targets from `low` to `high`, most of them around `middle`; `distance` <= half the largest
+  /// Real.
+  void fit(Real low, Real middle, Real high, Real distance);
   /// Renumbers: a gap of any number of empty cells becomes one empty cell. For worlds so wide that
   /// the product of three counts would overflow.
   void skip_empty_cells(const SphereSubset& targets, int axis);
@@ -50,16 +53,22 @@ class CellAxis {
   }
 
  private:
+  double position(Real x) const noexcept {
+    const double p = (static_cast<double>(x) * 0.25 - middle_) * cells_per_quarter_;
+    return std::min(std::max(p, -kFarthest), kFarthest);
+  }
   std::int64_t straight_cell(Real x) const noexcept {
-    const double position = (static_cast<double>(x) * 0.25 - origin_) * cells_per_quarter_ + 1;
-    if (!(position >= 0 && position < end_)) return kNowhere;
-    return static_cast<std::int64_t>(position) - 1;
+    const double p = position(x) - begin_;
+    return p >= 0 && p < end_ ? static_cast<std::int64_t>(p) - 1 : kNowhere;
   }
   std::int64_t renumbered(std::int64_t cell) const noexcept;
 
-  double origin_ = 0;  ///< a quarter of the lowest coordinate, so that no difference overflows
+  static constexpr double kFarthest = 0x1p37;
+
+  double middle_ = 0;  ///< a quarter of the coordinate, so that no difference overflows
   double cells_per_quarter_ = 0;
-  double end_ = 0;  ///< straight cells + 2
+  double begin_ = 0;  ///< position of the cell before the first
+  double end_ = 0;    ///< straight cells + 2
   std::int64_t count_ = 0;
   std::size_t occupied_ = 0;  ///< 0: cells are not renumbered
   int halvings_ = 0;

@@ -65,7 +65,7 @@ TEST(SphereColliderX86, ClustersAtTheCornersOfAnEnormousWorldAreFound) {
   Random random(base_seed());
   std::vector<SphereInstance> spheres;
   const Real far = Real(1e12);
-  const Real radius = std::max(Real(0.01), far * kEpsilon * 8);
+  const Real radius = std::max(Real(0.01), far * kEpsilon * 2);
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 middle{(corner & 1) != 0 ? far : -far, (corner & 2) != 0 ? far : -far,
                       (corner & 4) != 0 ? far : -far};
@@ -79,6 +79,19 @@ TEST(SphereColliderX86, ClustersAtTheCornersOfAnEnormousWorldAreFound) {
   EXPECT_TRUE(
       same_bits(make(SphereAlgorithm::sorted_tiles)->find_contacts(spheres), brute_force(spheres)))
       << seed_note();
+}
+
+// A body that fell out of the world must not make everyone else's cells coarse: this takes a
+// fraction of a second, or minutes.
+TEST(SphereColliderX86, OneSphereAtTheEndOfTheWorldChangesNothingForTheOthers) {
+  Random random(base_seed());
+  auto spheres = make_gas(200000, 1, 3, random);
+  const auto collider = make(SphereAlgorithm::sorted_tiles, 2);
+  const ContactSpan before = collider->find_contacts(spheres);
+  const std::vector<SphereContact> expected(before.begin(), before.end());
+  spheres.push_back({{Real(-1e30), Real(1e25), Real(1e12)}, 1});
+  spheres.push_back({{Real(1e20), Real(-1e30), 3}, 1});
+  EXPECT_TRUE(same_bits(collider->find_contacts(spheres), expected)) << seed_note();
 }
 
 TEST(SphereColliderX86, AutomaticChoosesBySizeAndSaysWhat) {
