@@ -15,7 +15,6 @@ class IndexedHeap {
  public:
   /// Replaces all keys, in O(n).
   void assign(std::span<const Real> keys);
-  bool empty() const noexcept { return heap_.empty(); }
   /// The number with the largest key. The heap is not empty.
   std::uint32_t top() const { return heap_.front(); }
   Real key(std::uint32_t number) const { return keys_[number]; }

@@ -9,6 +9,7 @@
 
 #include <chrono>
 #include <new>
+#include <optional>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI {
@@ -19,6 +20,9 @@ using Clock = std::chrono::steady_clock;
 double elapsed_ms(Clock::time_point since, Clock::time_point until) {
   return std::chrono::duration<double, std::milli>(until - since).count();
 }
+
+/// Rounded up: the body in the scene, in the store, in the copy that a step can go back to.
+constexpr std::size_t kBytesPerBody = 1024;
 
 /// What this engine asks of a body beyond what every scene must be.
 void require_native(const BodyDef& def, std::uint64_t body) {
@@ -181,7 +185,7 @@ World::World(const Scene& scene, std::unique_ptr<SphereCollider> collider) {
     impl_ = std::make_unique<Impl>(scene, std::move(collider));
   } catch (const std::bad_alloc&) {
     throw OutOfMemory("no memory for a world of " + std::to_string(scene.bodies.size()) +
-                      " bodies: about " + std::to_string(scene.bodies.size() * 1024) +
+                      " bodies: about " + std::to_string(scene.bodies.size() * kBytesPerBody) +
                       " bytes are needed");
   }
 }

@@ -42,11 +42,5 @@ TEST(IndexedHeap, GivesTiesToTheLowestNumber) {
   EXPECT_EQ(heap.top(), 0u);
 }
 
-TEST(IndexedHeap, MayBeEmpty) {
-  IndexedHeap heap;
-  heap.assign({});
-  EXPECT_TRUE(heap.empty());
-}
-
 }  // namespace
 }  // namespace jfpx

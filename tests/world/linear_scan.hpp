@@ -13,7 +13,6 @@ namespace jfpx::inline JFPX_ABI::test {
 class LinearScan {
  public:
   void assign(std::span<const Real> keys) { keys_.assign(keys.begin(), keys.end()); }
-  bool empty() const noexcept { return keys_.empty(); }
   std::uint32_t top() const {
     std::uint32_t best = 0;
     for (std::uint32_t i = 1; i < keys_.size(); ++i) {
