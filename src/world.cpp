@@ -118,7 +118,6 @@ bool World::Impl::advance(StepReport* report) {
     return !runaway;
   };
   const Clock::time_point start = Clock::now();
-  // Force generators will write their forces here.
   bodies.integrate();
   if (!all_finite()) return false;
 
