@@ -24,14 +24,16 @@ SphereContact* append_contact(std::span<const SphereInstance> spheres, std::uint
   return out + 1;
 }
 
-/// LSD radix sort for rows that are too long to be compared.
-void sort_long_row(std::uint32_t* row, std::uint32_t* spare, std::size_t count) {
+/// LSD radix sort by the higher sphere, for rows that are too long to be compared.
+void sort_long_row(std::uint64_t* row, std::uint64_t* spare, std::size_t count) {
   constexpr unsigned kBits = 11;
-  std::uint32_t* const home = row;
-  const auto bits = static_cast<unsigned>(std::bit_width(*std::max_element(row, row + count)));
+  std::uint64_t* const home = row;
+  std::uint32_t largest = 0;
+  for (std::size_t i = 0; i < count; ++i) largest = std::max(largest, higher(row[i]));
+  const auto bits = static_cast<unsigned>(std::bit_width(largest));
   for (unsigned shift = 0; shift < bits; shift += kBits) {
     std::size_t next[1u << kBits] = {};
-    const auto digit = [&](std::uint32_t v) { return (v >> shift) & ((1u << kBits) - 1); };
+    const auto digit = [&](std::uint64_t p) { return (p >> shift) & ((1u << kBits) - 1); };
     for (std::size_t i = 0; i < count; ++i) ++next[digit(row[i])];
     std::exclusive_scan(std::begin(next), std::end(next), std::begin(next), std::size_t{0});
     for (std::size_t i = 0; i < count; ++i) spare[next[digit(row[i])]++] = row[i];
@@ -40,16 +42,43 @@ void sort_long_row(std::uint32_t* row, std::uint32_t* spare, std::size_t count) 
   if (row != home) std::copy_n(row, count, home);
 }
 
-void sort_row(std::uint32_t* row, std::uint32_t* spare, std::size_t count) {
-  if (count > 512) return sort_long_row(row, spare, count);
-  if (count > 12) return std::sort(row, row + count);
-  // Insertion by exchange: the order of a row is random, so a comparison must not be a branch.
-  for (std::size_t i = 1; i < count; ++i) {
+/// Sorts in registers, by exchange: the order of a row is random, so a comparison must not be a
+/// branch. (Values, not std::min's references: g++ 12 loses the exchange of two at -O2.)
+template <std::size_t Count>
+void sort_short_row(std::uint64_t* row) {
+  std::uint64_t v[Count];
+  std::copy_n(row, Count, v);
+#pragma GCC unroll 8
+  for (std::size_t i = 1; i < Count; ++i) {
+#pragma GCC unroll 8
     for (std::size_t j = i; j > 0; --j) {
-      const std::uint32_t low = std::min(row[j - 1], row[j]);
-      row[j] = std::max(row[j - 1], row[j]);
-      row[j - 1] = low;
+      const std::uint64_t left = v[j - 1];
+      const std::uint64_t right = v[j];
+      v[j - 1] = right < left ? right : left;
+      v[j] = right < left ? left : right;
     }
+  }
+  std::copy_n(v, Count, row);
+}
+
+/// A row's pairs have the same lower sphere.
+void sort_row(std::uint64_t* row, std::uint64_t* spare, std::size_t count) {
+  switch (count) {
+    case 0:
+    case 1:
+      return;
+    case 2:
+      return sort_short_row<2>(row);
+    case 3:
+      return sort_short_row<3>(row);
+    case 4:
+      return sort_short_row<4>(row);
+    case 5:
+      return sort_short_row<5>(row);
+    case 6:
+      return sort_short_row<6>(row);
+    default:
+      return count > 512 ? sort_long_row(row, spare, count) : std::sort(row, row + count);
   }
 }
 
@@ -83,7 +112,7 @@ ContactSpan ContactWriter::write_unsorted(std::span<const SphereInstance> sphere
   row_end_.reserve(buckets_ << bucket_bits_, "rows of pairs");
   divide(pairs, pool);
   const std::uint64_t total = sections_[buckets_].begin;
-  higher_.reserve(total, "pairs in rows");
+  rows_.reserve(total, "pairs in rows");
   contacts_.reserve(total, "contacts");
   pool.run(buckets_, [&](std::size_t bucket) {
     make_rows(bucket, spheres.size());
@@ -127,26 +156,25 @@ void ContactWriter::make_rows(std::size_t bucket, std::size_t spheres) {
   std::exclusive_scan(row_end_.data() + first, row_end_.data() + last, row_end_.data() + first,
                       begin);
   for (std::uint64_t i = begin; i < end; ++i) {
-    higher_[row_end_[lower(divided_[i])]++] = higher(divided_[i]);
+    rows_[row_end_[lower(divided_[i])]++] = divided_[i];
+  }
+  // The bucket's pairs are copied: their place serves as scratch.
+  std::uint64_t row = begin;
+  for (std::size_t a = first; a < last; ++a) {
+    sort_row(rows_.data() + row, divided_.data() + begin, row_end_[a] - row);
+    row = row_end_[a];
   }
 }
 
 std::uint64_t ContactWriter::write_rows(std::span<const SphereInstance> spheres,
                                         std::size_t bucket) {
-  constexpr std::uint64_t kAhead = 24;  // spheres come from anywhere: ask for them in time
+  constexpr std::uint64_t kAhead = 16;  // spheres come from anywhere: ask for them in time
   const std::uint64_t begin = sections_[bucket].begin;
   const std::uint64_t end = sections_[bucket + 1].begin;
-  // The bucket's pairs are copied: their place serves as scratch.
-  auto* spare = reinterpret_cast<std::uint32_t*>(divided_.data() + begin);
   SphereContact* out = contacts_.data() + begin;
-  std::uint64_t i = begin;
-  for (auto a = static_cast<std::uint32_t>(bucket << bucket_bits_); i < end; ++a) {
-    const std::uint64_t row_end = row_end_[a];
-    sort_row(higher_.data() + i, spare, row_end - i);
-    for (; i < row_end; ++i) {
-      if (i + kAhead < end) __builtin_prefetch(&spheres[higher_[i + kAhead]]);
-      out = append_contact(spheres, a, higher_[i], out);
-    }
+  for (std::uint64_t i = begin; i < end; ++i) {
+    if (i + kAhead < end) __builtin_prefetch(&spheres[higher(rows_[i + kAhead])]);
+    out = append_contact(spheres, lower(rows_[i]), higher(rows_[i]), out);
   }
   return static_cast<std::uint64_t>(out - (contacts_.data() + begin));
 }

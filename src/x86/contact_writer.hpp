@@ -35,8 +35,8 @@ class ContactWriter {
   std::size_t buckets_ = 0;
   Buffer<std::uint64_t> offsets_;  ///< per chunk and bucket
   Buffer<std::uint64_t> divided_;  ///< pairs by bucket
-  Buffer<std::uint32_t> higher_;   ///< higher spheres, by row; a row has one lower sphere
-  Buffer<std::uint64_t> row_end_;  ///< per sphere: end of its row in higher_
+  Buffer<std::uint64_t> rows_;     ///< pairs by lower sphere: its row
+  Buffer<std::uint64_t> row_end_;  ///< per sphere: end of its row
 };
 
 }  // namespace jfpx::inline JFPX_ABI::x86
