@@ -14,8 +14,8 @@
 namespace jfpx::inline JFPX_ABI::x86 {
 namespace {
 
-/// Below so many spheres all pairs are faster than sorting (bench/results).
-constexpr std::size_t kAllPairsBelow = 1024;
+/// Below so many spheres all pairs are faster than sorting, with vectors (bench/results).
+constexpr std::size_t kAllPairsBelow = 512;
 
 class SphereColliderX86 final : public SphereCollider {
  public:
@@ -50,9 +50,13 @@ class SphereColliderX86 final : public SphereCollider {
       SphereIndex largest = 0;
       for (const SpherePair& p : part) largest = std::max({largest, p.a, p.b});
       if (largest >= spheres.size()) shared::reject_pair(pairs, spheres.size());
+      constexpr std::size_t kAhead = 12;  // spheres come from anywhere: ask for them in time
       PairResult* out = results_.data() + chunk * kChunk;
-      for (const SpherePair& p : part) {
-        *out++ = shared::test_sphere_pair(spheres[p.a], spheres[p.b]);
+      for (std::size_t i = 0; i < part.size(); ++i) {
+        const SpherePair& later = part[std::min(i + kAhead, part.size() - 1)];
+        __builtin_prefetch(&spheres[later.a]);
+        __builtin_prefetch(&spheres[later.b]);
+        out[i] = shared::test_sphere_pair(spheres[part[i].a], spheres[part[i].b]);
       }
     });
     return {results_.data(), pairs.size()};
