@@ -57,7 +57,7 @@ TEST_P(SphereColliderContract, CoincidentSpheresAllTouch) {
 // Each of the three directions has n^2 rows with n-1 touching neighbours; diagonals are
 // 1.99*sqrt(2) > 2 apart.
 TEST_P(SphereColliderContract, LatticeHasThreeNSquaredTimesNMinusOneContacts) {
-  for (const std::size_t n : {1, 2, 3, 10, 31}) {
+  for (const std::size_t n : std::initializer_list<std::size_t>{1, 2, 3, 10, 31}) {
     const auto spheres = make_lattice(n, Real(1.99));
     EXPECT_EQ(collider().find_contacts(spheres).size(), 3 * n * n * (n - 1)) << "n = " << n;
   }
@@ -133,7 +133,7 @@ TEST_P(SphereColliderContract, AgreesWithALongDoubleOracle) {
 TEST_P(SphereColliderContract, TestPairsFollowsTheSharedArithmeticInTheGivenOrder) {
   for (const SphereKind& kind : sphere_kinds()) {
     Random random(base_seed());
-    for (const std::size_t n : {1, 2, 37, 400}) {
+    for (const std::size_t n : std::initializer_list<std::size_t>{1, 2, 37, 400}) {
       const auto spheres = kind.make(n, random);
       std::vector<SpherePair> pairs(n * 7 % 1009);
       for (SpherePair& p : pairs) {
@@ -258,7 +258,7 @@ TEST_P(SphereColliderContract, StaysUsableAfterAnError) {
 
 TEST_P(SphereColliderContract, AColliderServesSetsOfAnySizeInAnyOrder) {
   Random random(base_seed());
-  for (const std::size_t n : {2000, 3, 0, 700, 1, 2500, 64}) {
+  for (const std::size_t n : std::initializer_list<std::size_t>{2000, 3, 0, 700, 1, 2500, 64}) {
     const auto spheres = sphere_kind("uniform").make(n, random);
     ASSERT_TRUE(same_bits(collider().find_contacts(spheres), brute_force(spheres)))
         << "N = " << n << ", " << seed_note();

@@ -2,7 +2,7 @@
 #include <jfpx/random.hpp>
 #include <jfpx/sphere_collider.hpp>
 
-#include "src/shared/sphere_pair.hpp"
+#include "bench/x86/plain_loop.hpp"
 
 #include <benchmark/benchmark.h>
 
@@ -89,19 +89,6 @@ Spheres outliers(std::size_t n) {
 }
 
 Spheres coincident(std::size_t n) { return Spheres(n, {{1, 2, 3}, 1}); }
-
-/// The yardstick: what a compiler makes of the formula at -O2, without vectors.
-[[gnu::optimize("O2", "no-tree-vectorize")]] void plain_loop(const Spheres& spheres,
-                                                             std::vector<SphereContact>* contacts) {
-  contacts->clear();
-  const auto n = static_cast<SphereIndex>(spheres.size());
-  for (SphereIndex a = 0; a < n; ++a) {
-    for (SphereIndex b = a + 1; b < n; ++b) {
-      const PairResult r = shared::test_sphere_pair(spheres[a], spheres[b]);
-      if (r.touching != 0) contacts->push_back({a, b, r.normal, r.distance});
-    }
-  }
-}
 
 void count(benchmark::State& state, std::size_t spheres, std::size_t contacts) {
   using benchmark::Counter;

@@ -80,10 +80,10 @@ void CellGrid::fit(const SphereSubset& targets, Real distance) {
     box = merged(box, {p, p});
   }
   for (int i = 0; i < 3; ++i) {
-    axes_[i].fit(box.lower[i], typical_coordinate(targets, i), box.upper[i], distance);
+    axis(i).fit(box.lower[i], typical_coordinate(targets, i), box.upper[i], distance);
   }
   if (multiply()) return;
-  for (int i = 0; i < 3; ++i) axes_[i].skip_empty_cells(targets, i);
+  for (int i = 0; i < 3; ++i) axis(i).skip_empty_cells(targets, i);
   while (!multiply()) {
     std::max_element(axes_.begin(), axes_.end(), [](const CellAxis& a, const CellAxis& b) {
       return a.count() < b.count();

@@ -103,6 +103,8 @@ class CellGrid {
   /// Sets row_, slab_, cells_; false if the product is too large.
   bool multiply() noexcept;
 
+  CellAxis& axis(int i) noexcept { return axes_[static_cast<std::size_t>(i)]; }
+
   std::array<CellAxis, 3> axes_;
   std::int64_t row_ = 0;
   std::int64_t slab_ = 0;

@@ -11,7 +11,7 @@ namespace {
 /// The brand string (AMD64 manual vol. 3, E.4.3: leaves 0x80000002 to 0x80000004).
 std::string brand() {
   unsigned words[12] = {};
-  if (__get_cpuid_max(0x80000000u, nullptr) < 0x80000004u) return "x86-64";
+  if (static_cast<unsigned>(__get_cpuid_max(0x80000000u, nullptr)) < 0x80000004u) return "x86-64";
   for (unsigned i = 0; i < 3; ++i) {
     __get_cpuid(0x80000002u + i, &words[4 * i], &words[4 * i + 1], &words[4 * i + 2],
                 &words[4 * i + 3]);

@@ -55,7 +55,6 @@ using RowSimd = Simd;
 #else
 struct Simd {
   static constexpr std::uint32_t kLanes = 16;
-  static constexpr std::uint32_t kAll = (1u << kLanes) - 1;
   using Vec = __m512;
   static Vec load(const Real* p) { return _mm512_loadu_ps(p); }
   static Vec set(Real v) { return _mm512_set1_ps(v); }

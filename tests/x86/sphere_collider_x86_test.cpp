@@ -13,7 +13,7 @@ std::unique_ptr<SphereCollider> make(SphereAlgorithm algorithm, unsigned threads
 
 TEST(SphereColliderX86, AMillionSpheresOnALatticeHaveThreeNSquaredTimesNMinusOneContacts) {
   const auto collider = make(SphereAlgorithm::sorted_tiles, 2);
-  for (const std::size_t n : {55, 100}) {
+  for (const std::size_t n : std::initializer_list<std::size_t>{55, 100}) {
     const auto spheres = make_lattice(n, Real(1.99));
     EXPECT_EQ(collider->find_contacts(spheres).size(), 3 * n * n * (n - 1)) << "n = " << n;
   }

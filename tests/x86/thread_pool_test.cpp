@@ -14,7 +14,7 @@ TEST(ThreadPool, RunsEveryChunkOnce) {
   for (const unsigned threads : {1u, 2u, 5u}) {
     ThreadPool pool(threads);
     EXPECT_EQ(pool.threads(), threads);
-    for (const std::size_t chunks : {0, 1, 2, 7, 1000}) {
+    for (const std::size_t chunks : std::initializer_list<std::size_t>{0, 1, 2, 7, 1000}) {
       std::vector<int> runs(chunks);
       pool.run(chunks, [&](std::size_t i) { ++runs[i]; });
       EXPECT_EQ(runs, std::vector<int>(chunks, 1));
