@@ -6,9 +6,16 @@
 namespace jfpx::inline JFPX_ABI::x86 {
 namespace {
 
+/// A mask as a number. The empty statement keeps the number in a general register from here on:
+/// g++ 12 may spill a widened mask as one byte and read four back (seen under -fsanitize=thread).
+inline std::uint32_t widened(std::uint32_t mask) {
+  __asm__("" : "+r"(mask));
+  return mask;
+}
+
 /// One bit per cell for eight cells.
 inline std::uint32_t eight_below(const std::int64_t* cell, std::int64_t bound) {
-  return _mm512_cmplt_epi64_mask(_mm512_loadu_si512(cell), _mm512_set1_epi64(bound));
+  return widened(_mm512_cmplt_epi64_mask(_mm512_loadu_si512(cell), _mm512_set1_epi64(bound)));
 }
 
 /// Writes eight pairs of `id`, in the order of `others`.
@@ -39,7 +46,9 @@ struct Simd {
   static Vec add(Vec a, Vec b) { return _mm512_add_pd(a, b); }
   static Vec sub(Vec a, Vec b) { return _mm512_sub_pd(a, b); }
   static Vec mul(Vec a, Vec b) { return _mm512_mul_pd(a, b); }
-  static std::uint32_t not_greater(Vec a, Vec b) { return _mm512_cmp_pd_mask(a, b, _CMP_NGT_UQ); }
+  static std::uint32_t not_greater(Vec a, Vec b) {
+    return widened(_mm512_cmp_pd_mask(a, b, _CMP_NGT_UQ));
+  }
   static std::uint32_t cells_below(const std::int64_t* cell, std::int64_t bound) {
     return eight_below(cell, bound);
   }
@@ -61,7 +70,9 @@ struct Simd {
   static Vec add(Vec a, Vec b) { return _mm512_add_ps(a, b); }
   static Vec sub(Vec a, Vec b) { return _mm512_sub_ps(a, b); }
   static Vec mul(Vec a, Vec b) { return _mm512_mul_ps(a, b); }
-  static std::uint32_t not_greater(Vec a, Vec b) { return _mm512_cmp_ps_mask(a, b, _CMP_NGT_UQ); }
+  static std::uint32_t not_greater(Vec a, Vec b) {
+    return widened(_mm512_cmp_ps_mask(a, b, _CMP_NGT_UQ));
+  }
   static std::uint32_t cells_below(const std::int64_t* cell, std::int64_t bound) {
     return eight_below(cell, bound) | (eight_below(cell + 8, bound) << 8);
   }
@@ -90,7 +101,9 @@ struct RowSimd {
   static Vec add(Vec a, Vec b) { return _mm256_add_ps(a, b); }
   static Vec sub(Vec a, Vec b) { return _mm256_sub_ps(a, b); }
   static Vec mul(Vec a, Vec b) { return _mm256_mul_ps(a, b); }
-  static std::uint32_t not_greater(Vec a, Vec b) { return _mm256_cmp_ps_mask(a, b, _CMP_NGT_UQ); }
+  static std::uint32_t not_greater(Vec a, Vec b) {
+    return widened(_mm256_cmp_ps_mask(a, b, _CMP_NGT_UQ));
+  }
   static std::uint32_t cells_below(const std::int64_t* cell, std::int64_t bound) {
     return eight_below(cell, bound);
   }
