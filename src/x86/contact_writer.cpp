@@ -43,7 +43,7 @@ void sort_long_row(std::uint64_t* row, std::uint64_t* spare, std::size_t count) 
 }
 
 /// Sorts in registers, by exchange: the order of a row is random, so a comparison must not be a
-/// branch. (Values, not std::min's references: g++ 12 loses the exchange of two at -O2.)
+/// branch. (By value: what std::min refers to is overwritten by the first half of the exchange.)
 template <std::size_t Count>
 void sort_short_row(std::uint64_t* row) {
   std::uint64_t v[Count];
