@@ -132,8 +132,8 @@ struct Size {
   std::uint32_t spheres;
   int settle, samples;
 };
-constexpr Size kSizes[] = {{16, 300, 400},  {64, 300, 300},   {256, 300, 200}, {1024, 200, 100},
-                           {4096, 120, 40}, {16384, 100, 15}, {65536, 60, 7}};
+constexpr Size kSizes[] = {{16, 300, 400},  {64, 300, 300},  {256, 300, 200}, {1024, 200, 100},
+                           {4096, 120, 40}, {16384, 60, 11}, {65536, 30, 5}};
 
 void register_all() {
   for (const char* scene : {"pile", "gas"}) {

@@ -164,16 +164,6 @@ struct CollisionDispatcher::Impl {
       return {};
     }
   }
-
-  void count(std::span<const btBroadphasePair> pairs, std::span<const PairResult> results) {
-    ++stats.batches;
-    stats.pairs += pairs.size();
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      const bool spheres = batch.is_sphere_pair(i);
-      stats.sphere_pairs += spheres ? 1 : 0;
-      stats.touching += spheres && results[i].touching != 0 ? 1 : 0;
-    }
-  }
 };
 
 CollisionDispatcher::CollisionDispatcher(btCollisionConfiguration* configuration,
@@ -232,7 +222,10 @@ void CollisionDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pair
     return;
   }
 
-  impl.count(pairs, results);
+  ++impl.stats.batches;
+  impl.stats.pairs += pairs.size();
+  impl.stats.sphere_pairs += impl.batch.sphere_pair_count();
+  impl.stats.touching += impl.batch.touching_count();
   const auto prepared = Clock::now();
   {
     const Running running(&impl.running);

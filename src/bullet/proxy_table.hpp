@@ -24,9 +24,12 @@ class ProxyTable {
     clear_entries();
   }
 
+  bool fits_first_level_cache() const { return capacity_ * sizeof(Entry) <= 16384; }
   /// Brings the proxy's place into the cache. Lookups are as random as the pairs, and a table of
   /// some thousand proxies is larger than the first-level cache.
-  void prefetch(const btBroadphaseProxy* proxy) const { __builtin_prefetch(&entries_[home(proxy)]); }
+  void prefetch(const btBroadphaseProxy* proxy) const {
+    __builtin_prefetch(&entries_[home(proxy)]);
+  }
 
   /// The number of the proxy; a new one gets the next number.
   std::uint32_t number(btBroadphaseProxy* proxy) {

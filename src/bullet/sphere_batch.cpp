@@ -52,8 +52,9 @@ bool SphereBatch::gather(std::span<const btBroadphasePair> pairs) {
   table_.reset(std::min(2 * pairs.size(), bodies_.size()));
   pairs_.resize(pairs.size());
   constexpr std::size_t kAhead = 16;
+  const std::size_t prefetched = table_.fits_first_level_cache() ? 0 : pairs.size();
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (i + kAhead < pairs.size()) {
+    if (i + kAhead < prefetched) {
       table_.prefetch(pairs[i + kAhead].m_pProxy0);
       table_.prefetch(pairs[i + kAhead].m_pProxy1);
     }
@@ -105,20 +106,31 @@ btPersistentManifold* SphereBatch::find_manifold(btCollisionAlgorithm* algorithm
   return found_.size() == 1 ? found_[0] : nullptr;
 }
 
+void SphereBatch::find_manifolds(std::span<const btBroadphasePair> pairs,
+                                 std::span<const PairResult> results, std::size_t begin,
+                                 std::size_t end) {
+  for (std::size_t i = begin; i < end; ++i) {
+    manifolds_[i] = nullptr;
+    if ((traits_[pairs_[i].a] & traits_[pairs_[i].b] & kSphere) == 0) continue;
+    ++sphere_pair_count_;
+    touching_count_ += results[i].touching;
+    manifolds_[i] = find_manifold(pairs[i].m_algorithm);
+    if (manifolds_[i] != nullptr && results[i].touching == 0) prefetch_count(manifolds_[i]);
+  }
+}
+
 void SphereBatch::plan(std::span<const btBroadphasePair> pairs, std::span<const PairResult> results,
                        bool ask_all) {
   const std::size_t n = pairs.size();
   actions_.resize(n);
   manifolds_.resize(n);
+  sphere_pair_count_ = touching_count_ = 0;
   for (std::size_t begin = 0; begin < n; begin += kBlock) {
     const std::size_t end = std::min(n, begin + kBlock);
     for (std::size_t i = end; i < std::min(n, end + kBlock); ++i) {
       prefetch_ends(pairs[i].m_algorithm, sizeof(btSphereSphereCollisionAlgorithm));
     }
-    for (std::size_t i = begin; i < end; ++i) {
-      manifolds_[i] = is_sphere_pair(i) ? find_manifold(pairs[i].m_algorithm) : nullptr;
-      if (manifolds_[i] != nullptr && results[i].touching == 0) prefetch_count(manifolds_[i]);
-    }
+    find_manifolds(pairs, results, begin, end);
     for (std::size_t i = begin; i < end; ++i) {
       if (manifolds_[i] == nullptr) {
         actions_[i] = Action::stock;

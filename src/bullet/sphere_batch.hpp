@@ -38,12 +38,12 @@ class SphereBatch {
   std::span<const SphereInstance> spheres() const { return spheres_; }
   std::span<const SpherePair> sphere_pairs() const { return pairs_; }
 
-  bool is_sphere_pair(std::size_t i) const {
-    return (traits_[pairs_[i].a] & traits_[pairs_[i].b] & kSphere) != 0;
-  }
   const btCollisionObject* body_a(std::size_t i) const { return bodies_[pairs_[i].a]; }
   const btCollisionObject* body_b(std::size_t i) const { return bodies_[pairs_[i].b]; }
   Action action(std::size_t i) const { return actions_[i]; }
+  /// What plan() counted.
+  std::uint64_t sphere_pair_count() const { return sphere_pair_count_; }
+  std::uint64_t touching_count() const { return touching_count_; }
   /// The manifold of pair i if Bullet's own sphere-sphere algorithm has one, else null.
   btPersistentManifold* manifold(std::size_t i) const { return manifolds_[i]; }
   /// Brings the memory that committing pair i will use into the cache.
@@ -56,6 +56,8 @@ class SphereBatch {
   };
 
   void read_bodies();
+  void find_manifolds(std::span<const btBroadphasePair> pairs, std::span<const PairResult> results,
+                      std::size_t begin, std::size_t end);
   btPersistentManifold* find_manifold(btCollisionAlgorithm* algorithm);
 
   ProxyTable table_;
@@ -66,6 +68,7 @@ class SphereBatch {
   std::vector<Action> actions_;
   std::vector<btPersistentManifold*> manifolds_;
   btManifoldArray found_;
+  std::uint64_t sphere_pair_count_ = 0, touching_count_ = 0;
 };
 
 }  // namespace jfpx::inline JFPX_ABI::bullet
