@@ -79,8 +79,7 @@ void SphereBatch::read_bodies() {
     if (i >= kAhead && i - kAhead < n) {
       const auto* body = static_cast<const btCollisionObject*>(proxies[i - kAhead]->m_clientObject);
       bodies_[i - kAhead] = body;
-      prefetch_bytes(body, sizeof(btTransform) + sizeof(void*));
-      prefetch(static_cast<const void*>(&body->getWorldTransform()));
+      prefetch_bytes(body, 4 * sizeof(btTransform));  // pose and shape
     }
     if (i < 2 * kAhead) continue;
     const std::size_t k = i - 2 * kAhead;
