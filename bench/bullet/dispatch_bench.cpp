@@ -101,10 +101,13 @@ void compare_dispatch(benchmark::State& state, const char* name, std::uint32_t s
 }
 
 /// A gas of random spheres at rest in the same place, three contacts a sphere: what the collider
-/// benchmark runs on, here through Bullet's dispatch.
+/// benchmark runs on, here through Bullet's dispatch, and beside it the collider alone, which finds
+/// the pairs too.
 void random_gas(benchmark::State& state, std::uint32_t spheres) {
+  const std::vector<SphereInstance> instances = scenes::random_spheres(spheres, 3, 1);
+  const std::unique_ptr<SphereCollider> collider = make_sphere_collider();
   Scene scene;
-  for (const SphereInstance& sphere : scenes::random_spheres(spheres, 3, 1)) {
+  for (const SphereInstance& sphere : instances) {
     BodyDef body;
     body.shape = Sphere{sphere.radius};
     body.position = sphere.centre;
@@ -114,17 +117,23 @@ void random_gas(benchmark::State& state, std::uint32_t spheres) {
   SceneWorld ours(scene);
   SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock});
   for (SceneWorld* world : {&ours, &stock}) world->world().performDiscreteCollisionDetection();
-  Series series;
+  Series series, search;
   bool swap = false;
   for (auto _ : state) {
     double stock_ms = 0, ours_ms = 0;
     alternate(
         swap, [&] { stock_ms = dispatch_ms(stock, 1); }, [&] { ours_ms = dispatch_ms(ours, 1); });
     series.add(stock_ms, ours_ms);
+    const auto start = std::chrono::steady_clock::now();
+    benchmark::DoNotOptimize(collider->find_contacts(instances).data());
+    const std::chrono::duration<double, std::milli> found =
+        std::chrono::steady_clock::now() - start;
+    search.add(stock_ms, found.count());
     state.SetIterationTime(ours_ms * 1e-3);
     swap = !swap;
   }
   series.report(state, "dispatch");
+  search.report(state, "find_contacts");
   state.counters["pairs"] = ours.world().getPairCache()->getNumOverlappingPairs();
 }
 

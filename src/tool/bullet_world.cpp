@@ -9,6 +9,9 @@ bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
   world.dispatcher =
       kind == EngineKind::bullet ? bullet::DispatcherKind::jfpx : bullet::DispatcherKind::stock;
   world.dispatch.collider = collider_options(options);
+  if (options.minimum_batch) {
+    world.dispatch.minimum_batch = static_cast<std::size_t>(*options.minimum_batch);
+  }
   return bullet::SceneWorld(scene, world);
 }
 

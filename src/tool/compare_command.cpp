@@ -37,11 +37,13 @@ std::string report(const Scene& scene, const RunOptions& options, const Comparis
   return fmt::format(
       "{}: {} spheres, {} steps of {} s, {} precision, backend {}\n\n{}\n"
       "contacts and times are summed over all steps\n\n"
+      "dispatches by jfpx     {} of {}\n"
       "contacts compared      {}\n"
       "contact mismatches     {}{}\n"
       "Bullet's trajectories  {}\n",
       scene.name, count_spheres(scene), options.steps, text(scene.dt), kPrecision, result.backend,
-      engines.text(), result.contacts_compared, result.contact_mismatches,
+      engines.text(), result.batches, options.steps, result.contacts_compared,
+      result.contact_mismatches,
       result.contact_mismatches == 0 ? "" : "; first: " + result.first_contact_mismatch,
       yes_or_first(result.first_difference));
 }
@@ -63,6 +65,7 @@ nlohmann::ordered_json to_json_value(const Scene& scene, const RunOptions& optio
           {"steps", options.steps},
           {"backend", result.backend},
           {"precision", kPrecision},
+          {"batches", result.batches},
           {"contacts_compared", result.contacts_compared},
           {"contact_mismatches", result.contact_mismatches},
           {"trajectory_identical", result.trajectory_identical()},

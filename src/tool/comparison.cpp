@@ -10,7 +10,10 @@
 
 namespace jfpx::inline JFPX_ABI::tool {
 
-Comparison compare(const Scene& scene, const RunOptions& options) {
+Comparison compare(const Scene& scene, const RunOptions& given) {
+  RunOptions options = given;
+  // Otherwise small scenes would compare Bullet's own code with itself.
+  if (!options.minimum_batch) options.minimum_batch = 0;
   const auto native = make_native_engine(scene, options);
   bullet::SceneWorld stock = make_bullet_world(EngineKind::bullet_stock, scene, options);
   bullet::SceneWorld jfpx = make_bullet_world(EngineKind::bullet, scene, options);
@@ -45,6 +48,7 @@ Comparison compare(const Scene& scene, const RunOptions& options) {
   result.hash_stock = stock.state_hash();
   result.hash_jfpx = jfpx.state_hash();
   result.backend = sphere_backend(jfpx);
+  result.batches = jfpx.jfpx_dispatcher()->stats().batches;
   return result;
 }
 

@@ -61,6 +61,10 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_option("--threads", options.threads, "Threads on x86, 0 = one per core")
       ->check(whole_number())
       ->capture_default_str();
+  app.add_option("--minimum-batch", options.minimum_batch,
+                 "Bullet: pairs below which a dispatch is left to Bullet's own code "
+                 "[compare: 0, so that jfpx computes; else what pays]")
+      ->check(whole_number());
   app.add_option("--json", options.json, "Write the results as JSON to this file, - for stdout");
   app.add_flag("--hash", options.hash,
                "Print the hash of the final state, 16 hex digits, as the last line");

@@ -229,6 +229,7 @@ TEST(Tool, CompareReallyComparesContacts) {
   const auto json = nlohmann::json::parse(
       jfpx_stdout("compare overlap --spheres 100 --steps 1 --quiet --json -").output);
   EXPECT_EQ(json["contacts_compared"], 100 * 99 / 2);
+  EXPECT_EQ(json["batches"], 1) << "by default every dispatch is computed by jfpx";
 }
 
 TEST(Tool, BulletEnginesRunAndAgree) {
