@@ -7,7 +7,8 @@ if(JFPX_CUDA STREQUAL "OFF")
 endif()
 
 if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
-  set(CMAKE_CUDA_ARCHITECTURES "75-real;90" CACHE STRING "CUDA architectures")
+  # Machine code for Hopper, and code that the driver compiles for anything from Turing on.
+  set(CMAKE_CUDA_ARCHITECTURES "75-virtual;90" CACHE STRING "CUDA architectures")
 endif()
 include(CheckLanguage)
 check_language(CUDA)
@@ -25,8 +26,9 @@ find_package(CUDAToolkit REQUIRED)
 set(JFPX_HAS_CUDA ON)
 # CMake 3.25 does not know CUDA20: the flag is given by hand (CUDA_STANDARD would decay to 17).
 # --fmad=false: nvcc must round each operation once, as the host compilers do.
+# --expt-relaxed-constexpr: device code may call std::numeric_limits and our constexpr functions.
 target_compile_options(jfpx_build_flags INTERFACE
-  "$<$<COMPILE_LANGUAGE:CUDA>:-std=c++20;--fmad=false;--Wreorder;-Xcompiler=-Wall;-Xcompiler=-Wextra;-Xcompiler=-Wconversion;-Xcompiler=-Wshadow;-Xcompiler=-ffp-contract=off>"
+  "$<$<COMPILE_LANGUAGE:CUDA>:-std=c++20;--fmad=false;--expt-relaxed-constexpr;--Wreorder;-Xcompiler=-Wall;-Xcompiler=-Wextra;-Xcompiler=-Wconversion;-Xcompiler=-Wshadow;-Xcompiler=-ffp-contract=off>"
   "$<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<BOOL:${JFPX_WERROR}>>:-Werror=all-warnings;-Xcompiler=-Werror>")
 string(REPLACE ";" ", " architectures "${CMAKE_CUDA_ARCHITECTURES}")
 jfpx_summary(cuda on "nvcc ${CMAKE_CUDA_COMPILER_VERSION}, architectures ${architectures}")

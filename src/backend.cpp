@@ -6,6 +6,7 @@
 #include "src/x86/sphere_collider_x86.hpp"
 #if JFPX_HAS_CUDA
 #include "src/cuda/probe_cuda.hpp"
+#include "src/cuda/sphere_collider_cuda.hpp"
 #endif
 
 namespace jfpx::inline JFPX_ABI {
@@ -13,15 +14,17 @@ namespace {
 
 #if JFPX_HAS_CUDA
 BackendStatus probe_cuda() { return cuda::probe(); }
+std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOptions& options) {
+  return cuda::make_sphere_collider(options);
+}
 #else
 BackendStatus probe_cuda() {
   return {.backend = Backend::cuda, .device = {}, .reason = "built without CUDA"};
 }
-#endif
-
 std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOptions&) {
-  throw BackendUnavailable("cuda: this version has no CUDA sphere collider");
+  throw BackendUnavailable("cuda: built without CUDA");
 }
+#endif
 
 constexpr BackendRow kRows[] = {
     {Backend::x86, x86::probe, x86::make_sphere_collider},

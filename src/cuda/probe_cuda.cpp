@@ -1,6 +1,8 @@
 /// Asks the CUDA runtime whether a device can be used, and turns its answer into a sentence.
 #include "src/cuda/probe_cuda.hpp"
 
+#include "src/cuda/kernels.hpp"
+
 #include <cuda_runtime_api.h>
 
 #include <string>
@@ -26,24 +28,48 @@ std::string why_unusable(cudaError_t error) {
   return std::string(cudaGetErrorName(error)) + ": " + cudaGetErrorString(error);
 }
 
+/// Compute capability "9.0".
+std::string capability(const cudaDeviceProp& properties) {
+  return std::to_string(properties.major) + "." + std::to_string(properties.minor);
+}
+
+/// Whether the current build has code for the device. Leaves the caller's device current.
+cudaError_t code_for(int device) {
+  int previous = 0;
+  cudaError_t error = cudaGetDevice(&previous);
+  if (error == cudaSuccess) error = cudaSetDevice(device);
+  if (error == cudaSuccess) error = kernels_loadable();
+  static_cast<void>(cudaSetDevice(previous));
+  return error;
+}
+
 }  // namespace
 
-BackendStatus probe() {
+BackendStatus probe(int device) {
   BackendStatus status{
       .backend = Backend::cuda, .compiled = true, .usable = false, .device = {}, .reason = {}};
   int count = 0;
   cudaError_t error = cudaGetDeviceCount(&count);
-  cudaDeviceProp properties{};
-  if (error == cudaSuccess) error = cudaGetDeviceProperties(&properties, 0);
-  static_cast<void>(cudaGetLastError());
-  if (error != cudaSuccess) {
-    status.reason = why_unusable(error);
+  if (error == cudaSuccess && (device < 0 || device >= count)) {
+    status.reason = "there is no device " + std::to_string(device) + ", the driver sees " +
+                    std::to_string(count);
     return status;
   }
-  status.usable = true;
-  status.device = std::string(properties.name) + " (compute capability " +
-                  std::to_string(properties.major) + "." + std::to_string(properties.minor) + ", " +
-                  std::to_string(properties.totalGlobalMem >> 20) + " MiB)";
+  cudaDeviceProp properties{};
+  if (error == cudaSuccess) error = cudaGetDeviceProperties(&properties, device);
+  if (error == cudaSuccess) {
+    status.device = std::string(properties.name) + " (compute capability " +
+                    capability(properties) + ", " +
+                    std::to_string(properties.totalGlobalMem >> 20) + " MiB)";
+    error = code_for(device);
+  }
+  static_cast<void>(cudaGetLastError());
+  if (error == cudaErrorNoKernelImageForDevice || error == cudaErrorInvalidDeviceFunction) {
+    status.reason = "this build has no code for compute capability " + capability(properties);
+  } else if (error != cudaSuccess) {
+    status.reason = why_unusable(error);
+  }
+  status.usable = error == cudaSuccess;
   return status;
 }
 

@@ -50,13 +50,18 @@ inline bool all_valid(std::span<const SphereInstance> spheres) {
   return (good[0] & good[1] & good[2] & good[3]) != 0;
 }
 
-/// @throws InvalidArgument naming the first sphere and field that find_contacts() can't take.
-inline void check_spheres(std::span<const SphereInstance> spheres) {
+/// @throws InvalidArgument if a SphereIndex can't count the spheres.
+inline void check_count(std::span<const SphereInstance> spheres) {
   constexpr std::size_t kMost = std::numeric_limits<SphereIndex>::max();
   if (spheres.size() > kMost) {
     throw InvalidArgument("number of spheres is " + std::to_string(spheres.size()) +
                           "; it must be at most " + std::to_string(kMost));
   }
+}
+
+/// @throws InvalidArgument naming the first sphere and field that find_contacts() can't take.
+inline void check_spheres(std::span<const SphereInstance> spheres) {
+  check_count(spheres);
   if (!all_valid(spheres)) reject_sphere(spheres);
 }
 

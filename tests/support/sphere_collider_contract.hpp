@@ -7,6 +7,7 @@
 
 #include "tests/support/sphere_fixtures.hpp"
 
+#include <cstdlib>
 #include <memory>
 #include <string>
 
@@ -25,13 +26,14 @@ inline std::string case_name(const testing::TestParamInfo<ColliderCase>& info) {
 /// Instantiate with
 ///   INSTANTIATE_TEST_SUITE_P(Cuda, SphereColliderContract, testing::Values(...), case_name);
 /// in a source of the same program. Where the backend is not usable the tests are skipped, with
-/// its reason.
+/// its reason; they fail if the environment has JFPX_REQUIRE_CUDA=1.
 class SphereColliderContract : public testing::TestWithParam<ColliderCase> {
  protected:
   void SetUp() override {
     try {
       collider_ = make_sphere_collider(GetParam().options);
     } catch (const BackendUnavailable& e) {
+      if (std::getenv("JFPX_REQUIRE_CUDA") != nullptr) FAIL() << e.what();
       GTEST_SKIP() << e.what();
     }
   }

@@ -1,0 +1,143 @@
+/// Sphere contacts on a GPU, from host memory to host memory.
+#include "src/cuda/sphere_collider_cuda.hpp"
+
+#include <jfpx/cuda/sphere_collider.hpp>
+#include <jfpx/error.hpp>
+
+#include "src/cuda/device_buffer.hpp"
+#include "src/cuda/probe_cuda.hpp"
+#include "src/shared/sphere_input.hpp"
+
+#include <algorithm>
+#include <nvtx3/nvtx3.hpp>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::cuda {
+namespace {
+
+/// Up to here kernels write contacts straight into host memory: no copy, no second wait.
+constexpr std::size_t kMostMappedSpheres = 2048;
+
+/// More than `count`, so that a collider whose input grows slowly does not grow each time.
+std::size_t with_slack(std::size_t count) { return count + count / 4 + 64; }
+
+class SphereColliderCuda final : public SphereCollider {
+ public:
+  explicit SphereColliderCuda(const SphereColliderOptions& options)
+      : device_(options.device),
+        stream_(device_),
+        pool_(device_),
+        searcher_(stream_.get(), device_, options.algorithm) {
+    const DeviceGuard guard(device_);
+    count_.grow(1, "contact count");
+  }
+  ~SphereColliderCuda() override { static_cast<void>(cudaStreamSynchronize(stream_.get())); }
+
+  ContactSpan find_contacts(std::span<const SphereInstance> spheres) override;
+  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
+                                         std::span<const SpherePair> pairs) override;
+
+  Backend backend() const noexcept override { return Backend::cuda; }
+  SphereAlgorithm algorithm() const noexcept override { return algorithm_; }
+
+ private:
+  void upload(std::span<const SphereInstance> spheres);
+  /// Leaves the contacts in contacts_on_host_ if `mapped`, else on the device. Returns their
+  /// number.
+  std::size_t search(std::span<const SphereInstance> spheres, bool mapped);
+  void wait() { JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get())); }
+
+  int device_;
+  OwnedStream stream_;
+  MemoryPool pool_;
+  DeviceSphereCollider searcher_;
+  DeviceBuffer<SphereInstance> spheres_;
+  DeviceBuffer<SphereContact> contacts_;
+  DeviceBuffer<SpherePair> pairs_;
+  DeviceBuffer<PairResult> results_;
+  PinnedBuffer<ContactCount> count_;
+  PinnedBuffer<SphereContact> contacts_on_host_;
+  PinnedBuffer<PairResult> results_on_host_;
+  SphereAlgorithm algorithm_ = SphereAlgorithm::automatic;
+};
+
+void SphereColliderCuda::upload(std::span<const SphereInstance> spheres) {
+  spheres_.grow(pool_, stream_.get(), with_slack(spheres.size()), "spheres");
+  JFPX_CUDA_TRY(cudaMemcpyAsync(spheres_.data(), spheres.data(), spheres.size_bytes(),
+                                cudaMemcpyHostToDevice, stream_.get()));
+}
+
+std::size_t SphereColliderCuda::search(std::span<const SphereInstance> spheres, bool mapped) {
+  const auto make_room = [&](std::size_t contacts) {
+    searcher_.reserve(std::max(spheres.size(), spheres_.size()), contacts);
+    if (mapped) {
+      contacts_on_host_.grow(contacts, "contacts on the host");
+    } else {
+      contacts_.grow(pool_, stream_.get(), contacts, "contacts");
+    }
+  };
+  make_room(with_slack(4 * spheres.size()));
+  while (true) {
+    searcher_.find_contacts(spheres_.data(), spheres.size(),
+                            mapped ? contacts_on_host_.data() : contacts_.data(),
+                            mapped ? contacts_on_host_.size() : contacts_.size(), count_.data());
+    wait();
+    const ContactCount& count = *count_.data();
+    if (count.first_invalid != kNoSphere) shared::reject_sphere(spheres);
+    if (count.complete != 0) return count.contacts;
+    make_room(with_slack(count.contacts));
+  }
+}
+
+ContactSpan SphereColliderCuda::find_contacts(std::span<const SphereInstance> spheres) {
+  const nvtx3::scoped_range range("jfpx find_contacts");
+  shared::check_count(spheres);
+  algorithm_ = searcher_.algorithm_for(spheres.size());
+  if (spheres.empty()) return {};
+  const DeviceGuard guard(device_);
+  upload(spheres);
+  const bool mapped = spheres.size() <= kMostMappedSpheres;
+  const std::size_t found = search(spheres, mapped);
+  if (!mapped && found > 0) {
+    contacts_on_host_.grow(with_slack(found), "contacts on the host");
+    JFPX_CUDA_TRY(cudaMemcpyAsync(contacts_on_host_.data(), contacts_.data(),
+                                  found * sizeof(SphereContact), cudaMemcpyDeviceToHost,
+                                  stream_.get()));
+    wait();
+  }
+  return {contacts_on_host_.data(), found};
+}
+
+std::span<const PairResult> SphereColliderCuda::test_pairs(std::span<const SphereInstance> spheres,
+                                                           std::span<const SpherePair> pairs) {
+  const nvtx3::scoped_range range("jfpx test_pairs");
+  const std::size_t n = spheres.size();
+  if (std::any_of(pairs.begin(), pairs.end(), [n](SpherePair p) { return p.a >= n || p.b >= n; })) {
+    shared::reject_pair(pairs, n);
+  }
+  if (pairs.empty()) return {};
+  const DeviceGuard guard(device_);
+  upload(spheres);
+  const std::size_t room = with_slack(pairs.size());
+  pairs_.grow(pool_, stream_.get(), room, "pairs");
+  results_.grow(pool_, stream_.get(), room, "pair results");
+  results_on_host_.grow(room, "pair results on the host");
+  JFPX_CUDA_TRY(cudaMemcpyAsync(pairs_.data(), pairs.data(), pairs.size_bytes(),
+                                cudaMemcpyHostToDevice, stream_.get()));
+  searcher_.test_pairs(spheres_.data(), pairs_.data(), pairs.size(), results_.data());
+  JFPX_CUDA_TRY(cudaMemcpyAsync(results_on_host_.data(), results_.data(),
+                                pairs.size() * sizeof(PairResult), cudaMemcpyDeviceToHost,
+                                stream_.get()));
+  wait();
+  return {results_on_host_.data(), pairs.size()};
+}
+
+}  // namespace
+
+std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
+  const BackendStatus status = probe(options.device);
+  if (!status.usable) throw BackendUnavailable("cuda: " + status.reason);
+  return std::make_unique<SphereColliderCuda>(options);
+}
+
+}  // namespace jfpx::inline JFPX_ABI::cuda

@@ -1,0 +1,180 @@
+/// Hunts for pairs that touch and that the culling of the CUDA backend would lose. The same
+/// functions run in the kernels; here g++ compiles them, so no GPU is needed.
+#include "src/cuda/grid_cells.hpp"
+#include "src/cuda/sphere_filter.hpp"
+#include "src/shared/sphere_pair.hpp"
+#include "tests/support/sphere_fixtures.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace jfpx::inline JFPX_ABI::test {
+namespace {
+
+using Limits = std::numeric_limits<Real>;
+
+/// A number of any magnitude, with mantissas that round badly more often than chance has it.
+Real any_magnitude(Random& random) {
+  const int range = Limits::max_exponent - Limits::min_exponent + Limits::digits;
+  const int exponent = Limits::min_exponent - Limits::digits +
+                       static_cast<int>(random.below(static_cast<std::uint64_t>(range)));
+  const Real mantissa = random.below(4) == 0 ? 1 : random.uniform(1, 2);
+  const Real value = std::ldexp(mantissa, exponent - 1);
+  return value > 0 && is_finite(value) ? value : Limits::denorm_min();
+}
+
+/// Two spheres whose distance is the sum of their radii but for a few roundings, at any scale.
+struct Pair {
+  SphereInstance a, b;
+};
+Pair nearly_touching(Random& random) {
+  Pair p;
+  const Real scale = any_magnitude(random);
+  p.a.radius = scale;
+  p.b.radius = random.below(3) == 0 ? any_magnitude(random) : scale * random.uniform(Real(0.1), 3);
+  if (!(p.b.radius > 0) || !is_finite(p.b.radius)) p.b.radius = scale;
+  const Real offset = random.below(2) == 0 ? 0 : any_magnitude(random);
+  p.b.centre = Vec3{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)} * offset;
+  if (!is_finite(p.b.centre)) p.b.centre = {};
+  Vec3 direction{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
+  if (random.below(3) == 0) direction = {1, 0, 0};
+  direction = normalized(direction);
+  p.a.centre = p.b.centre + direction * (p.a.radius + p.b.radius);
+  for (int i = 0; i < 3; ++i) {
+    for (std::uint64_t k = random.below(4); k > 0; --k) {
+      const Real towards = random.below(2) == 0 ? Limits::max() : Limits::lowest();
+      p.a.centre[i] = std::nextafter(p.a.centre[i], towards);
+    }
+  }
+  if (!is_finite(p.a.centre)) p.a.centre = p.b.centre;
+  return p;
+}
+
+/// Whether the search looks from the smaller sphere (or, at equal levels, from either) into the
+/// cell of the other one.
+bool is_in_reach(const SphereInstance& from, const SphereInstance& to, Real half_0) {
+  const cuda::GridCell cell = cuda::grid_cell_of(to, half_0);
+  const Real half = cuda::half_cell_of(half_0, cell.level);
+  const Real inverse = cuda::inverse_width(half);
+  const Real reach = cuda::reach_of(from.radius, half);
+  const std::int32_t cells[3] = {cell.x, cell.y, cell.z};
+  for (int i = 0; i < 3; ++i) {
+    const Real x = from.centre[i];
+    if (cells[i] < cuda::cell_of(cuda::moved(x, -reach), inverse)) return false;
+    if (cells[i] > cuda::cell_of(cuda::moved(x, reach), inverse)) return false;
+  }
+  return true;
+}
+
+TEST(CudaFilter, LetsEveryTouchingPairThrough) {
+  Random random(base_seed());
+  int touching = 0;
+  for (int i = 0; i < 1'000'000; ++i) {
+    const Pair p = nearly_touching(random);
+    if (shared::test_sphere_pair(p.a, p.b).touching == 0) continue;
+    ++touching;
+    ASSERT_TRUE(cuda::may_touch(p.a, p.b)) << "pair " << i << ", " << seed_note();
+  }
+  EXPECT_GT(touching, 200'000) << "the hunt must meet touching pairs";
+}
+
+// A filter that lets everything through would pass the test above.
+TEST(CudaFilter, StopsPairsThatAreApartByMoreThanRoundings) {
+  Random random(base_seed());
+  for (int i = 0; i < 100'000; ++i) {
+    SphereInstance a{random.uniform_in_box({-9, -9, -9}, {9, 9, 9}), random.uniform(Real(0.1), 2)};
+    SphereInstance b{random.uniform_in_box({-9, -9, -9}, {9, 9, 9}), random.uniform(Real(0.1), 2)};
+    const Real gap = length(a.centre - b.centre) - (a.radius + b.radius);
+    if (gap > 64 * kEpsilon * 32) {
+      ASSERT_FALSE(cuda::may_touch(a, b)) << seed_note();
+    }
+  }
+}
+
+TEST(CudaGrid, TouchingSpheresAreInReachOfEachOther) {
+  Random random(base_seed());
+  int touching = 0;
+  for (int i = 0; i < 1'000'000; ++i) {
+    const Pair p = nearly_touching(random);
+    if (shared::test_sphere_pair(p.a, p.b).touching == 0) continue;
+    ++touching;
+    // A third, larger sphere may have set the scale.
+    Real half_0 = cuda::half_cell_for_radius(std::max(p.a.radius, p.b.radius));
+    if (random.below(2) == 0) half_0 = std::max(half_0, half_0 * random.uniform(1, 1000));
+    if (!is_finite(half_0)) continue;
+    const int level_a = cuda::level_of(p.a, half_0), level_b = cuda::level_of(p.b, half_0);
+    const auto note = [&] { return "pair " + std::to_string(i) + ", " + seed_note(); };
+    if (level_a >= level_b) {
+      ASSERT_TRUE(is_in_reach(p.a, p.b, half_0)) << note();
+    }
+    if (level_b >= level_a) {
+      ASSERT_TRUE(is_in_reach(p.b, p.a, half_0)) << note();
+    }
+    const bool a_is_wide = level_a < level_b;
+    const SphereInstance& wide = a_is_wide ? p.a : p.b;
+    const SphereInstance& fine = a_is_wide ? p.b : p.a;
+    if (level_a != level_b && cuda::is_far(wide)) {
+      ASSERT_GE(std::min(level_a, level_b), cuda::widest_far_level(fine, half_0)) << note();
+    }
+  }
+  EXPECT_GT(touching, 200'000) << "the hunt must meet touching pairs";
+}
+
+TEST(CudaGrid, ASphereLooksAtFewCells) {
+  Random random(base_seed());
+  for (int i = 0; i < 200'000; ++i) {
+    const Pair p = nearly_touching(random);
+    const Real half_0 = cuda::half_cell_for_radius(std::max(p.a.radius, p.b.radius));
+    const cuda::GridCell cell = cuda::grid_cell_of(p.a, half_0);
+    const Real half = cuda::half_cell_of(half_0, cell.level);
+    const Real reach = cuda::reach_of(p.a.radius, half), inverse = cuda::inverse_width(half);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Real x = p.a.centre[axis];
+      const std::int64_t cells = std::int64_t{cuda::cell_of(cuda::moved(x, reach), inverse)} -
+                                 cuda::cell_of(cuda::moved(x, -reach), inverse) + 1;
+      ASSERT_LE(cells, cuda::kRowsApart) << "pair " << i << ", " << seed_note();
+    }
+  }
+}
+
+TEST(CudaGrid, LevelsHalveFromTheLargestSphereOn) {
+  const Real half_0 = Real(0.75);
+  EXPECT_EQ(cuda::level_for(Real(0.75), half_0), 0);
+  EXPECT_EQ(cuda::level_for(Real(0.5), half_0), 0);
+  EXPECT_EQ(cuda::level_for(Real(0.375), half_0), 1);
+  EXPECT_EQ(cuda::level_for(std::nextafter(Real(0.375), Real(1)), half_0), 0);
+  EXPECT_EQ(cuda::level_for(Real(0.75) / 1024, half_0), 10);
+  EXPECT_EQ(cuda::level_for(Real(1e-30), half_0), cuda::kLastLevel);
+  EXPECT_EQ(cuda::level_for(Real(3), half_0), -2);
+  EXPECT_EQ(cuda::half_cell_of(half_0, 3), Real(0.09375));
+}
+
+// Lines along every axis and diagonal, a plane and a cube: with as many cells as buckets, no bucket
+// may hold many of them. A hash that ignored one coordinate would put 32 to 65 536 into one.
+TEST(CudaGrid, CellsFillTheTableEvenly) {
+  constexpr std::uint32_t kTable = 1 << 16;
+  const auto most_in_a_bucket = [&](auto&& cell) {
+    std::vector<int> load(kTable);
+    for (int i = 0; i < static_cast<int>(kTable); ++i) {
+      const Vec3 c = cell(i);
+      ++load[(cuda::row_of(static_cast<int>(c.y), static_cast<int>(c.z), 3) +
+              static_cast<std::uint32_t>(static_cast<int>(c.x))) %
+             kTable];
+    }
+    return *std::max_element(load.begin(), load.end());
+  };
+  const auto real = [](int i) { return static_cast<Real>(i); };
+  EXPECT_LT(most_in_a_bucket([&](int i) { return Vec3{real(i), 7, -3}; }), 24);
+  EXPECT_LT(most_in_a_bucket([&](int i) { return Vec3{5, real(i), 0}; }), 24);
+  EXPECT_LT(most_in_a_bucket([&](int i) { return Vec3{5, 0, real(-i)}; }), 24);
+  EXPECT_LT(most_in_a_bucket([&](int i) { return Vec3{real(i), real(i), real(i)}; }), 24);
+  EXPECT_LT(most_in_a_bucket([&](int i) { return Vec3{real(i % 256), 9, real(i / 256)}; }), 24);
+  EXPECT_LT(most_in_a_bucket([&](int i) {
+              return Vec3{real(i % 32 - 16), real(i / 32 % 32 - 16), real(i / 1024 - 32)};
+            }),
+            24);
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::test

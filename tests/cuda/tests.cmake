@@ -1,0 +1,14 @@
+jfpx_add_test(sphere_collider_cuda_test
+  SOURCES
+    sphere_collider_test.cpp
+    support/sphere_fixtures.cpp
+    cuda/sphere_collider_cases.cpp)
+jfpx_add_test(cuda_filter_test
+  SOURCES
+    cuda/filter_test.cpp
+    support/sphere_fixtures.cpp)
+jfpx_add_test(cuda_test
+  SOURCES
+    cuda/cuda_test.cpp
+    support/sphere_fixtures.cpp
+  LINK jfpx_cuda CUDA::cudart_static)
