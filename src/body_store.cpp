@@ -1,11 +1,14 @@
 /// Bodies come, move freely, sleep, wake and go.
 #include "src/body_store.hpp"
 
+#include <jfpx/error.hpp>
+
 #include "src/shared/inertia.hpp"
 #include "src/shared/integrate.hpp"
 #include "src/shared/power.hpp"
 
 #include <algorithm>
+#include <string>
 
 namespace jfpx::inline JFPX_ABI {
 namespace {
@@ -37,8 +40,8 @@ void BodyStore::resize(std::size_t slots) {
   const auto all = [slots](auto&... arrays) { (arrays.resize(slots), ...); };
   all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
       moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion, moving.awake);
-  all(shape_, radius_, inverse_mass_, friction_, restitution_, body_inverse_inertia_, acceleration_,
-      velocity_kept_, angular_velocity_kept_, can_sleep_, generation_);
+  all(shape_, radius_, mass_, inverse_mass_, friction_, restitution_, body_inverse_inertia_,
+      acceleration_, velocity_kept_, angular_velocity_kept_, can_sleep_, generation_);
 }
 
 BodyId BodyStore::add(const BodyDef& def) {
@@ -61,6 +64,7 @@ BodyId BodyStore::add(const BodyDef& def) {
   radius_[i] = sphere != nullptr ? sphere->radius : Real(0);
   friction_[i] = def.friction;
   restitution_[i] = def.restitution;
+  mass_[i] = def.mass;
   inverse_mass_[i] = def.mass > 0 ? Real(1) / def.mass : Real(0);
   body_inverse_inertia_[i] = inverse_inertia_of(def.shape, def.mass);
   acceleration_[i] = def.acceleration;
@@ -87,6 +91,13 @@ void BodyStore::remove(BodyId id) {
 bool BodyStore::contains(BodyId id) const noexcept {
   const auto place = std::lower_bound(ids_.begin(), ids_.end(), id, before);
   return place != ids_.end() && *place == id;
+}
+
+std::uint32_t BodyStore::require(BodyId id) const {
+  if (contains(id)) return id.index;
+  throw InvalidArgument("body id (index " + std::to_string(id.index) + ", generation " +
+                        std::to_string(id.generation) +
+                        ") is unknown; it must be of a living body of this world");
 }
 
 BodyState BodyStore::state(std::uint32_t i) const {

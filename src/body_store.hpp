@@ -34,6 +34,8 @@ class BodyStore {
   /// @param id must be contained
   void remove(BodyId id);
   bool contains(BodyId id) const noexcept;
+  /// The index of a contained body. @throws InvalidArgument for any other
+  std::uint32_t require(BodyId id) const;
   std::span<const BodyId> ids() const noexcept { return ids_; }
   /// Slots ever used; indices are below it.
   std::size_t capacity() const noexcept { return shape_.size(); }
@@ -60,6 +62,7 @@ class BodyStore {
 
   bool movable(std::uint32_t body) const { return inverse_mass_[body] > 0; }
   const Shape& shape(std::uint32_t body) const { return shape_[body]; }
+  Real mass(std::uint32_t body) const { return mass_[body]; }
   Real inverse_mass(std::uint32_t body) const { return inverse_mass_[body]; }
   Real friction(std::uint32_t body) const { return friction_[body]; }
   Real restitution(std::uint32_t body) const { return restitution_[body]; }
@@ -80,7 +83,7 @@ class BodyStore {
   Real motion_kept_;  ///< bias^dt
 
   std::vector<Shape> shape_;
-  std::vector<Real> radius_, inverse_mass_, friction_, restitution_;
+  std::vector<Real> radius_, mass_, inverse_mass_, friction_, restitution_;
   std::vector<Mat3> body_inverse_inertia_;  ///< body axes
   std::vector<Vec3> acceleration_;
   std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^dt

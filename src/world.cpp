@@ -1,9 +1,10 @@
-/// The step: integrate, detect, wake, resolve (thesis 4.3). Read this file first.
+/// The step: forces, integrate, detect, wake, resolve (thesis 4.3). Read this file first.
 #include <jfpx/error.hpp>
 #include <jfpx/world.hpp>
 
 #include "src/body_store.hpp"
 #include "src/contact_resolver.hpp"
+#include "src/force_registry.hpp"
 #include "src/narrow_phase.hpp"
 #include "src/scene_validate.hpp"
 
@@ -31,6 +32,11 @@ void require_native(const BodyDef& def, std::uint64_t body) {
                        "; it must be 0 for a box or half-space: the native engine moves spheres "
                        "only in this version");
   }
+}
+
+void require_finite(const char* name, const Vec3& value) {
+  if (is_finite(value)) return;
+  throw InvalidArgument(std::string(name) + " is " + to_text(value) + "; it must be finite");
 }
 
 /// What touches an awake body wakes, and so on along the contacts; the surroundings, never awake,
@@ -78,13 +84,6 @@ struct World::Impl {
     }
   }
 
-  std::uint32_t require(BodyId id) const {
-    if (bodies.contains(id)) return id.index;
-    throw InvalidArgument("body id (index " + std::to_string(id.index) + ", generation " +
-                          std::to_string(id.generation) +
-                          ") is unknown; it must be of a living body of this world");
-  }
-
   /// Who rested on a body that goes away or is put elsewhere must notice.
   void wake_neighbours(std::uint32_t body) {
     for (const Contact& c : contacts) {
@@ -92,6 +91,13 @@ struct World::Impl {
       if (c.b == body) bodies.wake(c.a);
     }
   }
+
+  /// A force that comes or goes is news to all bodies, whichever it may act on.
+  void wake_all() {
+    for (const BodyId id : bodies.ids()) bodies.wake(id.index);
+  }
+
+  double time() const { return static_cast<double>(steps) * static_cast<double>(scene.dt); }
 
   bool advance(StepReport* report);
   void undo() noexcept {
@@ -103,6 +109,7 @@ struct World::Impl {
   BodyStore bodies;
   NarrowPhase narrow_phase;
   ContactResolver resolver;
+  ForceRegistry forces;
   bool bodies_changed = true;     ///< since the narrow phase last heard of them
   std::vector<Contact> contacts;  ///< of the last step
   MotionArrays before;            ///< the state that a failed step goes back to
@@ -118,6 +125,8 @@ bool World::Impl::advance(StepReport* report) {
     return !runaway;
   };
   const Clock::time_point start = Clock::now();
+  ForceContext context(bodies, time());
+  forces.apply(context);
   bodies.integrate();
   if (!all_finite()) return false;
 
@@ -204,7 +213,7 @@ BodyId World::add(const BodyDef& body) {
 }
 
 void World::remove(BodyId id) {
-  impl_->wake_neighbours(impl_->require(id));
+  impl_->wake_neighbours(impl_->bodies.require(id));
   impl_->bodies.remove(id);
   impl_->contacts.clear();
   impl_->bodies_changed = true;
@@ -219,10 +228,10 @@ std::vector<BodyState> World::states() const {
   return states;
 }
 
-BodyState World::state(BodyId id) const { return impl_->bodies.state(impl_->require(id)); }
+BodyState World::state(BodyId id) const { return impl_->bodies.state(impl_->bodies.require(id)); }
 
 void World::set_state(BodyId id, const BodyState& state) {
-  const std::uint32_t body = impl_->require(id);
+  const std::uint32_t body = impl_->bodies.require(id);
   const std::string found = find_fault(state);
   if (!found.empty()) throw InvalidArgument("state: " + found);
   impl_->wake_neighbours(body);
@@ -230,7 +239,52 @@ void World::set_state(BodyId id, const BodyState& state) {
   impl_->bodies_changed = true;
 }
 
-bool World::awake(BodyId id) const { return impl_->bodies.moving.awake[impl_->require(id)] != 0; }
+bool World::awake(BodyId id) const {
+  return impl_->bodies.moving.awake[impl_->bodies.require(id)] != 0;
+}
+
+void World::apply_force(BodyId id, const Vec3& force) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  require_finite("force", force);
+  impl_->bodies.apply_force(body, force);
+}
+
+void World::apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  require_finite("force", force);
+  require_finite("point", point);
+  impl_->bodies.apply_force(body, force);
+  impl_->bodies.apply_torque(body, cross(point - impl_->bodies.moving.position[body], force));
+}
+
+void World::apply_torque(BodyId id, const Vec3& torque) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  require_finite("torque", torque);
+  impl_->bodies.apply_torque(body, torque);
+}
+
+Vec3 World::last_acceleration(BodyId id) const {
+  return impl_->bodies.moving.last_acceleration[impl_->bodies.require(id)];
+}
+
+ForceContext World::force_context() { return {impl_->bodies, impl_->time()}; }
+
+ForceId World::add_any(std::function<void(ForceContext&)> force) {
+  const ForceId id = impl_->forces.add(std::move(force));
+  impl_->wake_all();
+  return id;
+}
+
+std::function<void(ForceContext&)>& World::any_force(ForceId id) { return impl_->forces.at(id); }
+
+void World::remove_force(ForceId id) {
+  impl_->forces.remove(id);
+  impl_->wake_all();
+}
+
+std::span<const ForceId> World::forces() const { return impl_->forces.ids(); }
+
+double World::time() const { return impl_->time(); }
 
 std::span<const Contact> World::contacts() const { return impl_->contacts; }
 

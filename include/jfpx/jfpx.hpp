@@ -4,6 +4,7 @@
 #include <jfpx/backend.hpp>
 #include <jfpx/collide.hpp>
 #include <jfpx/error.hpp>
+#include <jfpx/force.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>

@@ -1,11 +1,16 @@
 /// The native engine: a world of rigid bodies that steps by itself (thesis 4.3).
 #pragma once
 
+#include <jfpx/error.hpp>
+#include <jfpx/force.hpp>
 #include <jfpx/scene.hpp>
 #include <jfpx/sphere_collider.hpp>
 
+#include <functional>
 #include <memory>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace jfpx::inline JFPX_ABI {
@@ -59,10 +64,10 @@ class JFPX_API World {
   /// @throws InvalidArgument if the id is not of a living body of this world.
   void remove(BodyId id);
 
-  /// One step of the scene's dt: integrate, detect, resolve. Throws nothing for physics. When a
-  /// value stops being finite, or a coordinate passes kMaxCoordinate, the step is undone and
+  /// One step of the scene's dt: forces, integrate, detect, resolve. Throws nothing for physics.
+  /// When a value stops being finite, or a coordinate passes kMaxCoordinate, the step is undone and
   /// reported; so are further steps, until the cause is removed or given another state.
-  /// @throws OutOfMemory, DeviceError; the state is then as before the step.
+  /// @throws OutOfMemory, DeviceError, what a force throws; the state is then as before the step.
   StepReport step();
 
   /// Living bodies in the order of their indices.
@@ -76,6 +81,38 @@ class JFPX_API World {
   /// @throws InvalidArgument for an unknown id or a value out of the range of validate().
   void set_state(BodyId id, const BodyState& state);
   bool awake(BodyId id) const;
+  /// Acceleration of the centre of mass that the last step used [m/s^2]: constant part and forces,
+  /// without contacts and damping. @throws InvalidArgument for an unknown id.
+  Vec3 last_acceleration(BodyId id) const;
+
+  /// Adds to the force [N] at the centre of mass, or at a point of the world [m], and to the torque
+  /// [N m], of the coming step; in world axes. Wakes the body (erratum E29); an immovable one stays
+  /// as it is (erratum E19). @throws InvalidArgument for an unknown id or a value not finite.
+  void apply_force(BodyId id, const Vec3& force);
+  void apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point);
+  void apply_torque(BodyId id, const Vec3& torque);
+
+  /// Adds a force that acts in every step, from force.hpp or of one's own; wakes all bodies.
+  /// Forces act in the order in which they were added. A force of force.hpp whose body is removed
+  /// does nothing from then on. A force must not call back into its World.
+  /// @throws InvalidArgument if a force of force.hpp has a bad field or an unknown body.
+  template <Force F>
+  ForceId add_force(F force) {
+    if constexpr (CheckedForce<F>) force.validate(force_context());
+    return add_any(std::move(force));
+  }
+  /// The force, to steer it: world.force<AeroControl>(id).control = 1.
+  /// @throws InvalidArgument if the id is unknown or of a force of another type.
+  template <Force F>
+  F& force(ForceId id) {
+    if (F* found = any_force(id).template target<F>()) return *found;
+    throw InvalidArgument("force " + std::to_string(id.number) + " is of another type");
+  }
+  /// Wakes all bodies. @throws InvalidArgument for an unknown id.
+  void remove_force(ForceId id);
+  std::span<const ForceId> forces() const;  ///< in the order in which they act
+
+  double time() const;  ///< [s], completed steps times dt
   /// Contacts of the last step, in order: sphere pairs by (a, b), then others by (a, b). None after
   /// a failed step, or when bodies were added or removed since.
   std::span<const Contact> contacts() const;
@@ -84,6 +121,10 @@ class JFPX_API World {
   const Scene& scene() const;  ///< settings as given; its bodies are those of construction
 
  private:
+  ForceContext force_context();
+  ForceId add_any(std::function<void(ForceContext&)> force);
+  std::function<void(ForceContext&)>& any_force(ForceId id);
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

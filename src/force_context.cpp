@@ -1,0 +1,44 @@
+/// What forces may see of the bodies, and do to them.
+#include <jfpx/force.hpp>
+
+#include "src/body_store.hpp"
+
+namespace jfpx::inline JFPX_ABI {
+
+Real ForceContext::dt() const { return bodies_->dt(); }
+std::span<const BodyId> ForceContext::bodies() const { return bodies_->ids(); }
+bool ForceContext::contains(BodyId id) const noexcept { return bodies_->contains(id); }
+
+std::uint32_t ForceContext::require(BodyId id) const { return bodies_->require(id); }
+
+BodyState ForceContext::state(BodyId id) const { return bodies_->state(require(id)); }
+const Shape& ForceContext::shape(BodyId id) const { return bodies_->shape(require(id)); }
+Real ForceContext::mass(BodyId id) const { return bodies_->mass(require(id)); }
+bool ForceContext::awake(BodyId id) const { return bodies_->moving.awake[require(id)] != 0; }
+
+void ForceContext::apply_force(BodyId id, const Vec3& force) {
+  const std::uint32_t body = require(id);
+  if (bodies_->moving.awake[body] != 0) bodies_->moving.force[body] += force;
+}
+
+void ForceContext::apply_torque(BodyId id, const Vec3& torque) {
+  const std::uint32_t body = require(id);
+  if (bodies_->moving.awake[body] != 0) bodies_->moving.torque[body] += torque;
+}
+
+void ForceContext::apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point) {
+  apply_force(id, force);
+  apply_torque(id, cross(point - bodies_->moving.position[id.index], force));
+}
+
+void ForceContext::wake(BodyId id) { bodies_->wake(require(id)); }
+
+void ForceContext::link(BodyId a, BodyId b) {
+  const std::uint32_t first = require(a), second = require(b);
+  const bool a_awake = bodies_->moving.awake[first] != 0;
+  if (a_awake == (bodies_->moving.awake[second] != 0)) return;
+  if (!bodies_->movable(first) || !bodies_->movable(second)) return;
+  bodies_->wake_by_touch(a_awake ? second : first, a_awake ? first : second);
+}
+
+}  // namespace jfpx::inline JFPX_ABI

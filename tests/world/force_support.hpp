@@ -1,0 +1,29 @@
+/// Worlds of a few balls for the tests of forces.
+#pragma once
+
+#include "tests/world/support.hpp"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::test {
+
+/// Balls of mass 2 and radius 1 that nothing else pulls, far enough apart not to touch.
+inline World world_of(std::vector<BodyDef> bodies, Real dt = Real(0.01)) {
+  Scene scene;
+  scene.dt = dt;
+  scene.bodies = std::move(bodies);
+  return World(scene);
+}
+inline BodyDef ball_at(const Vec3& position, const Vec3& velocity = {}) {
+  BodyDef def = ball(position, 1, 2);
+  def.velocity = velocity;
+  return def;
+}
+inline void expect_near(const Vec3& actual, const Vec3& expected, double tolerance) {
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(actual[i], expected[i], tolerance) << "xyz"[i];
+}
+
+}  // namespace jfpx::inline JFPX_ABI::test
