@@ -11,6 +11,8 @@ namespace jfpx::inline JFPX_ABI {
 
 /// Machine epsilon of Real; the project's threshold for "no direction" (DESIGN: contact).
 inline constexpr Real kEpsilon = std::numeric_limits<Real>::epsilon();
+/// The largest finite Real. A constant, for device code can't call numeric_limits.
+inline constexpr Real kMaxReal = std::numeric_limits<Real>::max();
 inline constexpr Real kPi = static_cast<Real>(3.14159265358979323846);
 
 /// Correctly rounded square root; nvcc and the host compilers agree bit for bit.
@@ -77,7 +79,7 @@ JFPX_HD inline Vec3 normalized(const Vec3& v) {
   const Real n = length(v);
   return n > kEpsilon ? v * (Real(1) / n) : v;
 }
-JFPX_HD inline bool is_finite(Real x) { return absolute(x) <= std::numeric_limits<Real>::max(); }
+JFPX_HD inline bool is_finite(Real x) { return absolute(x) <= kMaxReal; }
 JFPX_HD inline bool is_finite(const Vec3& v) {
   return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
 }

@@ -25,6 +25,13 @@ struct HalfSpace {
   friend bool operator==(const HalfSpace&, const HalfSpace&) = default;
 };
 
+/// All points p with dot(normal, p) = offset: a wall without thickness. Not yet a shape of bodies.
+struct Plane {
+  Vec3 normal{0, 1, 0};  ///< [-], unit
+  Real offset = 0;       ///< [m]
+  friend bool operator==(const Plane&, const Plane&) = default;
+};
+
 using Shape = std::variant<Sphere, Box, HalfSpace>;
 
 /// A sphere placed in the world: what the collider works on. Laid out as four Reals.

@@ -1,5 +1,6 @@
 jfpx_add_test(world_parts_test SOURCES
   world/body_store_test.cpp
+  world/box_pair_test.cpp
   world/collide_test.cpp
   world/contact_resolver_test.cpp
   world/indexed_heap_test.cpp
