@@ -17,13 +17,15 @@ Real kept_per_step(Real kept_per_second, Real dt) {
   return static_cast<Real>(shared::power(kept_per_second, dt));
 }
 
-Mat3 inverse_inertia_of(const Shape& shape, Real mass) {
-  Vec3 moments;
+Vec3 moments_of(const Shape& shape, Real mass) {
   if (const auto* sphere = std::get_if<Sphere>(&shape)) {
-    moments = shared::moments_of_inertia(*sphere, mass);
-  } else if (const auto* box = std::get_if<Box>(&shape)) {
-    moments = shared::moments_of_inertia(*box, mass);
+    return shared::moments_of_inertia(*sphere, mass);
   }
+  const auto* box = std::get_if<Box>(&shape);
+  return box != nullptr ? shared::moments_of_inertia(*box, mass) : Vec3{};
+}
+
+Mat3 inverse_inertia_of(const Vec3& moments) {
   // An immovable body has no inverse inertia, on purpose (erratum E26).
   const auto inverse = [](Real moment) { return moment > 0 ? Real(1) / moment : Real(0); };
   return diagonal({inverse(moments.x), inverse(moments.y), inverse(moments.z)});
@@ -41,7 +43,7 @@ void BodyStore::resize(std::size_t slots) {
   all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
       moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion, moving.awake);
   all(shape_, radius_, mass_, inverse_mass_, friction_, restitution_, body_inverse_inertia_,
-      acceleration_, velocity_kept_, angular_velocity_kept_, can_sleep_, generation_);
+      moments_, acceleration_, velocity_kept_, angular_velocity_kept_, can_sleep_, generation_);
 }
 
 BodyId BodyStore::add(const BodyDef& def) {
@@ -66,7 +68,11 @@ BodyId BodyStore::add(const BodyDef& def) {
   restitution_[i] = def.restitution;
   mass_[i] = def.mass;
   inverse_mass_[i] = def.mass > 0 ? Real(1) / def.mass : Real(0);
-  body_inverse_inertia_[i] = inverse_inertia_of(def.shape, def.mass);
+  const Vec3 moments = moments_of(def.shape, def.mass);
+  body_inverse_inertia_[i] = inverse_inertia_of(moments);
+  const bool all_equal = moments.x == moments.y && moments.y == moments.z;
+  moments_[i] =
+      all_equal ? Vec3{} : moments * (Real(1) / std::max({moments.x, moments.y, moments.z}));
   acceleration_[i] = def.acceleration;
   velocity_kept_[i] = kept_per_step(def.linear_damping, dt_);
   angular_velocity_kept_[i] = kept_per_step(def.angular_damping, dt_);
@@ -160,6 +166,10 @@ void BodyStore::integrate(std::uint32_t i) {
                                                    dt_, velocity_kept_[i]);
   moving.angular_velocity[i] = shared::integrated_velocity(
       moving.angular_velocity[i], angular_acceleration, dt_, angular_velocity_kept_[i]);
+  if (moments_[i].x > 0) {
+    moving.angular_velocity[i] = shared::precessed(moving.angular_velocity[i], moments_[i],
+                                                   to_matrix(moving.orientation[i]), dt_);
+  }
   if (can_sleep_[i] != 0 && falls_asleep(i)) return;
   moving.position[i] = shared::integrated_position(moving.position[i], moving.velocity[i], dt_);
   moving.orientation[i] =

@@ -85,6 +85,7 @@ class BodyStore {
   std::vector<Shape> shape_;
   std::vector<Real> radius_, mass_, inverse_mass_, friction_, restitution_;
   std::vector<Mat3> body_inverse_inertia_;  ///< body axes
+  std::vector<Vec3> moments_;  ///< principal, relative to the largest; 0 where all are equal
   std::vector<Vec3> acceleration_;
   std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^dt
   std::vector<std::uint8_t> can_sleep_;

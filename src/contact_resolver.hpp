@@ -35,10 +35,22 @@ class BasicContactResolver {
     Vec3 normal, arm_a, arm_b;  ///< arms: from the centre of mass to the contact
     Real from_acceleration;     ///< [m/s], of the separating velocity
     Real friction, restitution;
+    std::uint32_t first, last;  ///< rows of the same two bodies with the same normal: [first, last)
+  };
+  /// What is done at once for rows of the same two bodies.
+  struct Patch {
+    Row row;
+    Real amount;
+    Real reach;  ///< [m], mean distance of the points from their centre; 0 for one point
+  };
+  /// Shares of a patch's friction, whose squares add up to 1.
+  struct Grip {
+    Real sliding, turning;
   };
   using RowIndex = std::uint32_t;
 
   void prepare(std::span<const Contact> contacts);
+  Patch patch_of(RowIndex worst, Real kept) const;
   void index_rows_by_body();
   std::span<const RowIndex> rows_of(std::uint32_t body) const;
   Vec3 lever_arm(std::uint32_t body, const Contact& contact, Real side) const;
@@ -48,7 +60,10 @@ class BasicContactResolver {
   void displace(std::uint32_t body, const shared::Displacement& displacement);
 
   void resolve_velocities(ResolverReport* report);
-  void strike(const Row& row, Real wanted);
+  void strike(const Patch& patch);
+  Grip share_friction(const Patch& patch, const Vec3& velocity) const;
+  Real spin(const Row& row) const;
+  void twist(const Row& row, Real most);
   void push(std::uint32_t body, const Vec3& arm, const Vec3& impulse);
   Vec3 relative_velocity(const Row& row) const;
   Real wanted_change(const Row& row) const;
@@ -95,9 +110,48 @@ void BasicContactResolver<Queue>::prepare(std::span<const Contact> contacts) {
     rows_.push_back({c.a, c.b, c.normal, lever_arm(c.a, c, -1), lever_arm(c.b, c, 1),
                      dot(acceleration, c.normal) * bodies_->dt(),
                      square_root(bodies_->friction(c.a) * bodies_->friction(c.b)),
-                     square_root(bodies_->restitution(c.a) * bodies_->restitution(c.b))});
+                     square_root(bodies_->restitution(c.a) * bodies_->restitution(c.b)), 0, 0});
     keys_.push_back(-c.distance);
   }
+  for (RowIndex first = 0, last = 0; first < rows_.size(); first = last) {
+    const Row& head = rows_[first];
+    while (last < rows_.size() && rows_[last].a == head.a && rows_[last].b == head.b &&
+           rows_[last].normal == head.normal) {
+      ++last;
+    }
+    for (RowIndex i = first; i < last; ++i) rows_[i].first = first, rows_[i].last = last;
+  }
+}
+
+/// Where boxes touch along a face, all corners that want something are served at once, by the mean
+/// of what they want at the centre of it: corner after corner, each push would turn the box onto
+/// the next corner, and a box at rest would wander. Velocities are linear in the arm, so the mean
+/// is what the centre itself wants. A corner that wants more than the mean stays the worst, and
+/// weighs more the next time.
+template <class Queue>
+typename BasicContactResolver<Queue>::Patch BasicContactResolver<Queue>::patch_of(RowIndex worst,
+                                                                                  Real kept) const {
+  Patch patch{rows_[worst], queue_.key(worst) - kept, 0};
+  if (patch.row.last - patch.row.first == 1) return patch;
+  Real sum = 0;
+  Vec3 arm_a, arm_b;
+  for (RowIndex i = patch.row.first; i < patch.row.last; ++i) {
+    const Real wanted = queue_.key(i) - kept;
+    if (!(wanted > 0)) continue;
+    sum += wanted;
+    arm_a += rows_[i].arm_a * wanted;
+    arm_b += rows_[i].arm_b * wanted;
+  }
+  patch.row.arm_a = arm_a * (Real(1) / sum);
+  patch.row.arm_b = arm_b * (Real(1) / sum);
+  patch.amount = 0;
+  for (RowIndex i = patch.row.first; i < patch.row.last; ++i) {
+    const Real wanted = queue_.key(i) - kept;
+    if (!(wanted > 0)) continue;
+    patch.amount += wanted / sum * wanted;
+    patch.reach += wanted / sum * length(rows_[i].arm_a - patch.row.arm_a);
+  }
+  return patch;
 }
 
 /// A sphere's arm is taken along the normal: the difference of two points far from the origin
@@ -152,7 +206,8 @@ void BasicContactResolver<Queue>::resolve_positions(ResolverReport* report) {
     const Real depth = queue_.key(worst);
     if (!(depth > settings_.position_epsilon)) return;
     if (left == 0) break;
-    project(rows_[worst], depth - kept_depth);
+    const Patch patch = patch_of(worst, kept_depth);
+    project(patch.row, patch.amount);
     ++report->position_iterations;
   }
   report->exhausted = true;
@@ -203,9 +258,9 @@ void BasicContactResolver<Queue>::resolve_velocities(ResolverReport* report) {
     const Real wanted = queue_.key(worst);
     if (!(wanted > settings_.velocity_epsilon)) return;
     if (left == 0) break;
-    const Row& row = rows_[worst];
-    strike(row, wanted);
-    for (const std::uint32_t body : {row.a, row.b}) {
+    const Patch patch = patch_of(worst, 0);
+    strike(patch);
+    for (const std::uint32_t body : {patch.row.a, patch.row.b}) {
       if (!bodies_->movable(body)) continue;
       for (const RowIndex i : rows_of(body)) queue_.update(i, wanted_change(rows_[i]));
     }
@@ -231,7 +286,8 @@ Real BasicContactResolver<Queue>::wanted_change(const Row& row) const {
 /// Gives both bodies equal and opposite impulses at one common point, so that momentum and angular
 /// momentum stay (errata E2, E3, E5).
 template <class Queue>
-void BasicContactResolver<Queue>::strike(const Row& row, Real wanted) {
+void BasicContactResolver<Queue>::strike(const Patch& patch) {
+  const Row& row = patch.row;
   const MotionArrays& moving = bodies_->moving;
   const shared::ContactBasis basis = shared::contact_basis(row.normal);
   Mat3 response = diagonal({0, 0, 0});
@@ -246,11 +302,47 @@ void BasicContactResolver<Queue>::strike(const Row& row, Real wanted) {
     const Vec3 coming = moving.last_acceleration[body] * (is_a ? bodies_->dt() : -bodies_->dt());
     velocity += coming;
   }
-  const Vec3 impulse = shared::to_world(
-      basis,
-      shared::contact_impulse(response, shared::to_contact(basis, velocity), wanted, row.friction));
+  const Vec3 local_velocity = shared::to_contact(basis, velocity);
+  const Grip grip = share_friction(patch, local_velocity);
+  const Vec3 local =
+      shared::contact_impulse(response, local_velocity, patch.amount, row.friction * grip.sliding);
+  const Vec3 impulse = shared::to_world(basis, local);
   push(row.a, row.arm_a, impulse);
   push(row.b, row.arm_b, -impulse);
+  if (patch.reach > 0) twist(row, row.friction * grip.turning * local.x * patch.reach);
+}
+
+/// A patch that slides and turns has one friction for both: it acts against the velocity of its
+/// points, of which sliding and turning are parts at right angles in the mean.
+template <class Queue>
+typename BasicContactResolver<Queue>::Grip BasicContactResolver<Queue>::share_friction(
+    const Patch& patch, const Vec3& velocity) const {
+  if (!(patch.reach > 0)) return {1, 0};
+  const Real slide = square_root(velocity.y * velocity.y + velocity.z * velocity.z);
+  const Real turn = absolute(spin(patch.row)) * patch.reach;
+  const Real both = square_root(slide * slide + turn * turn);
+  return both > 0 ? Grip{slide / both, turn / both} : Grip{1, 0};
+}
+
+template <class Queue>
+Real BasicContactResolver<Queue>::spin(const Row& row) const {
+  const MotionArrays& moving = bodies_->moving;
+  return dot(row.normal, moving.angular_velocity[row.a] - moving.angular_velocity[row.b]);
+}
+
+/// Friction against turning about the normal, which a push at the centre of a patch does not feel.
+/// @param most largest angular impulse that friction has
+template <class Queue>
+void BasicContactResolver<Queue>::twist(const Row& row, Real most) {
+  MotionArrays& moving = bodies_->moving;
+  const Vec3 turned_a = moving.inverse_inertia[row.a] * row.normal;
+  const Vec3 turned_b = moving.inverse_inertia[row.b] * row.normal;
+  const Real yield = dot(row.normal, turned_a + turned_b);
+  if (!(yield > 0)) return;
+  const Real stop = -spin(row) / yield;
+  const Real impulse = stop > most ? most : stop < -most ? -most : stop;
+  moving.angular_velocity[row.a] += turned_a * impulse;
+  moving.angular_velocity[row.b] -= turned_b * impulse;
 }
 
 template <class Queue>

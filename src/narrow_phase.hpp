@@ -1,14 +1,16 @@
-/// Finds the contacts of a world: spheres among themselves, and spheres against what stands still.
+/// Finds the contacts of a world: spheres and boxes among themselves and against what stands still.
 #pragma once
 
+#include <jfpx/collide.hpp>
 #include <jfpx/world.hpp>
 
 #include "src/body_store.hpp"
 
 namespace jfpx::inline JFPX_ABI {
 
-/// Sphere pairs are the collider's; every immovable box and half-space is tested against every
-/// movable sphere. Contacts between immovable bodies are dropped.
+/// Sphere pairs are the collider's, and so are the candidates among movable boxes: it gets their
+/// bounding spheres too. Every immovable box and half-space is tested against every movable body.
+/// Contacts between immovable bodies are dropped.
 class NarrowPhase {
  public:
   explicit NarrowPhase(std::unique_ptr<SphereCollider> collider);
@@ -27,15 +29,24 @@ class NarrowPhase {
   /// An immovable box or half-space.
   struct Obstacle {
     std::uint32_t body = 0;
-    Shape shape;
-    Transform pose;
-    Real reach = 0;  ///< [m], from the origin of the pose to the farthest point; half-space: none
+    SphereInstance bounds;  ///< of a half-space: none, its radius is 0
+  };
+  /// Two bodies of which one is no sphere, in the order of their contact.
+  struct Candidate {
+    std::uint32_t a = 0, b = 0;
+    friend auto operator<=>(const Candidate&, const Candidate&) = default;
   };
 
+  void find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts);
+  void find_obstacles(const BodyStore& bodies);
+
   std::unique_ptr<SphereCollider> collider_;
-  std::vector<std::uint32_t> sphere_body_;  ///< by index in spheres_
-  std::vector<SphereInstance> spheres_;
+  std::size_t sphere_count_ = 0;        ///< of shapes_: spheres come first, then movable boxes
+  std::vector<std::uint32_t> body_;     ///< by index in bounds_
+  std::vector<SphereInstance> bounds_;  ///< spheres as they are, boxes as bounding spheres
   std::vector<Obstacle> obstacles_;
+  std::vector<Transform> pose_;  ///< by body; of boxes only
+  std::vector<Candidate> candidates_;
 };
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -27,10 +27,9 @@ constexpr std::size_t kBytesPerBody = 1024;
 
 /// What this engine asks of a body beyond what every scene must be.
 void require_native(const BodyDef& def, std::uint64_t body) {
-  if (def.mass > 0 && !std::holds_alternative<Sphere>(def.shape)) {
+  if (def.mass > 0 && std::holds_alternative<HalfSpace>(def.shape)) {
     throw InvalidScene("body " + std::to_string(body) + ": mass is " + to_text(def.mass) +
-                       "; it must be 0 for a box or half-space: the native engine moves spheres "
-                       "only in this version");
+                       "; it must be 0 for a half-space, which fills half of the world");
   }
 }
 

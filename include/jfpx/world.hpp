@@ -19,8 +19,8 @@ struct WorldSettings {
   SphereColliderOptions collider;  ///< who finds sphere contacts, and how
 };
 
-/// One contact of the native engine. `b` is the immovable one where a sphere meets a box or a
-/// half-space.
+/// One contact of the native engine; boxes that touch along a face have several. `a` is the sphere
+/// where a sphere meets a box, else the movable one where the other is not, else the lower index.
 struct Contact {
   std::uint32_t a = 0, b = 0;  ///< BodyId::index; the place in the scene until a body is removed
   Vec3 normal;                 ///< [-], unit, from b to a
@@ -48,7 +48,7 @@ struct StepReport {
 /// everything else excludes all other calls. Steps are deterministic to the last bit.
 class JFPX_API World {
  public:
-  /// Validates the scene. This version moves spheres only: boxes and half-spaces must be immovable.
+  /// Validates the scene. Half-spaces must be immovable.
   /// @throws InvalidScene, BackendUnavailable, OutOfMemory
   explicit World(const Scene& scene, const WorldSettings& settings = {});
   /// The same with sphere contacts from the given collider, which may be the caller's own.
@@ -113,8 +113,9 @@ class JFPX_API World {
   std::span<const ForceId> forces() const;  ///< in the order in which they act
 
   double time() const;  ///< [s], completed steps times dt
-  /// Contacts of the last step, in order: sphere pairs by (a, b), then others by (a, b). None after
-  /// a failed step, or when bodies were added or removed since.
+  /// Contacts of the last step, in order: sphere pairs by (a, b), then others by (a, b), the points
+  /// of one pair in the order of its test. None after a failed step, or when bodies were added or
+  /// removed since.
   std::span<const Contact> contacts() const;
   /// state_hash() of states().
   std::uint64_t state_hash() const;

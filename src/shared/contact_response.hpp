@@ -81,7 +81,17 @@ JFPX_HD inline Vec3 contact_impulse(const Mat3& response, const Vec3& velocity, 
   const Real planar = square_root(stop.y * stop.y + stop.z * stop.z);
   if (!(planar > stop.x * friction)) return stop;
 
-  const Real y = stop.y / planar, z = stop.z / planar;
+  Real y = stop.y / planar, z = stop.z / planar;
+  // Friction acts against the sliding that the push along the normal alone would leave. For spheres
+  // that is where `stop` points; a corner's turning pulls `stop` aside, and friction would be lost.
+  const Real push = wanted / along_normal;
+  const Real slip_y = velocity.y + response(1, 0) * push;
+  const Real slip_z = velocity.z + response(2, 0) * push;
+  const Real slip = square_root(slip_y * slip_y + slip_z * slip_z);
+  if (-(y * slip_y + z * slip_z) < Real(0.999) * slip) {
+    y = -slip_y / slip;
+    z = -slip_z / slip;
+  }
   const Real sliding = along_normal + (response(0, 1) * y + response(0, 2) * z) * friction;
   if (!(sliding > 0)) return frictionless;  // wedged: no impulse on the cone opens the contact
   const Real x = wanted / sliding;

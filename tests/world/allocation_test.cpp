@@ -40,6 +40,25 @@ TEST(Allocation, StepsOverTheSameContactsAllocateNothing) {
   EXPECT_EQ(allocations, before);
 }
 
+TEST(Allocation, NeitherBoxesNorForcesAllocateInWarmSteps) {
+  Scene scene;
+  for (int i = 0; i < 5; ++i) {
+    BodyDef def;
+    def.shape = Box{};
+    def.position = {0, Real(0.5) + static_cast<Real>(i), 0};
+    def.can_sleep = false;
+    scene.bodies.push_back(def);
+  }
+  scene.bodies.push_back(test::ground());
+  World world(scene);
+  world.add_force(Drag{.linear = Real(0.1)});
+  world.add_force(Spring{.a = {world.bodies()[0]}, .b = {world.bodies()[1]}, .rest_length = 1});
+  for (int n = 0; n < 100; ++n) world.step();
+  const long before = allocations;
+  for (int n = 0; n < 50; ++n) ASSERT_EQ(world.step().contacts, 20u);
+  EXPECT_EQ(allocations, before);
+}
+
 TEST(Allocation, TheCounterCounts) {
   const long before = allocations;
   const auto memory = std::make_unique<int>(1);

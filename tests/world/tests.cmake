@@ -7,6 +7,7 @@ jfpx_add_test(world_parts_test SOURCES
   world/power_test.cpp
   world/scene_validate_test.cpp)
 jfpx_add_test(world_test SOURCES
+  world/box_test.cpp
   world/force_registry_test.cpp
   world/force_test.cpp
   world/motion_test.cpp
