@@ -11,3 +11,8 @@ jfpx_add_test(bullet_verify_test SOURCES
 jfpx_add_test(bullet_trajectory_test SOURCES
   bullet/trajectory_test.cpp
   LINK jfpx_bullet)
+jfpx_add_test(bullet_random_worlds_test SOURCES
+  bullet/random_world.cpp
+  bullet/random_world_run.cpp
+  bullet/random_worlds_test.cpp
+  LINK jfpx_bullet)

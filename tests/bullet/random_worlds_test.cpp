@@ -1,0 +1,102 @@
+/// Random Bullet worlds never show which dispatcher they have.
+#include "tests/bullet/random_world.hpp"
+
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+/// Steps of worlds to run; JFPX_TEST_WORLD_STEPS asks for more, or for less.
+std::uint64_t wanted_steps() {
+  const char* asked = std::getenv("JFPX_TEST_WORLD_STEPS");
+  if (asked != nullptr) return std::strtoull(asked, nullptr, 0);
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
+  return 10'000;
+#else
+  return 100'000;
+#endif
+}
+
+std::string report(const RandomWorld& world, const Failure& failure) {
+  const RandomWorld least = shrink(world);
+  const auto again = run(least, nullptr);
+  std::ostringstream out;
+  out << failure.what << "\nshrunk: " << (again ? again->what : "no longer fails") << '\n' << least;
+  return out.str();
+}
+
+TEST(RandomWorlds, MoveAsStockWorldsDo) {
+  const std::uint64_t seed = test_seed();
+  RunTotals totals;
+  for (std::uint64_t i = 0; totals.steps < wanted_steps(); ++i) {
+    const RandomWorld world = make_random_world(seed + i);
+    const auto failure = run(world, &totals);
+    ASSERT_FALSE(failure) << "JFPX_TEST_SEED=" << seed + i << '\n' << report(world, *failure);
+  }
+  EXPECT_GT(totals.batches, totals.steps / 4) << "worlds without batches show nothing";
+  EXPECT_GT(totals.touching, totals.steps / 2);
+  EXPECT_GT(totals.written, totals.steps / 4);
+  EXPECT_GT(totals.verified, 0u);
+  RecordProperty("steps", std::to_string(totals.steps));
+}
+
+/// Finds what the real one finds, but for the distance of small overlaps.
+class SlightlyWrongCollider final : public SphereCollider {
+ public:
+  ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
+    return right_->find_contacts(spheres);
+  }
+  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
+                                         std::span<const SpherePair> pairs) override {
+    const auto results = right_->test_pairs(spheres, pairs);
+    results_.assign(results.begin(), results.end());
+    for (PairResult& result : results_) {
+      result.distance = std::nextafter(result.distance, -std::numeric_limits<Real>::infinity());
+    }
+    return results_;
+  }
+  Backend backend() const noexcept override { return right_->backend(); }
+  SphereAlgorithm algorithm() const noexcept override { return right_->algorithm(); }
+
+ private:
+  std::unique_ptr<SphereCollider> right_ = make_sphere_collider();
+  std::vector<PairResult> results_;
+};
+
+std::unique_ptr<btCollisionDispatcher> make_slightly_wrong(btCollisionConfiguration* configuration,
+                                                           const RandomWorld&) {
+  return std::make_unique<CollisionDispatcher>(configuration,
+                                               std::make_unique<SlightlyWrongCollider>(),
+                                               DispatcherOptions{.minimum_batch = 0});
+}
+
+TEST(RandomWorlds, ShowAnErrorOfOneBitAndShrinkToTwoBodies) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  int failed = 0;
+  for (std::uint64_t i = 0; i < 30; ++i) {
+    const RandomWorld world = make_random_world(seed + i);
+    if (!run(world, nullptr, make_slightly_wrong)) continue;
+    ++failed;
+    if (failed > 3) continue;  // shrinking takes hundreds of runs
+    const RandomWorld least = shrink(world, make_slightly_wrong);
+    EXPECT_TRUE(run(least, nullptr, make_slightly_wrong)) << least;
+    EXPECT_EQ(least.used_bodies(), 2u) << least;
+    EXPECT_LE(least.events.size(), 2u) << least;
+  }
+  EXPECT_GT(failed, 3) << "most worlds with touching spheres must fail";
+}
+
+TEST(RandomWorlds, AreTheSameForTheSameSeed) {
+  std::ostringstream first, second, other;
+  first << make_random_world(7);
+  second << make_random_world(7);
+  other << make_random_world(8);
+  EXPECT_EQ(first.str(), second.str());
+  EXPECT_NE(first.str(), other.str());
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bullet
