@@ -1,0 +1,48 @@
+/// A random world come to life: one of the two that are compared.
+#pragma once
+
+#include "tests/bullet/random_world.hpp"
+
+#include <set>
+#include <utility>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+/// Sets g_current while it is made; happen() and step() want it set by the caller.
+class LiveWorld {
+ public:
+  LiveWorld(const RandomWorld& world, MakeDispatcher make_dispatcher);
+  ~LiveWorld();
+  LiveWorld(const LiveWorld&) = delete;
+  LiveWorld& operator=(const LiveWorld&) = delete;
+
+  BulletWorld& live() { return live_; }
+  void happen(const RandomEvent& event);
+  void set_near_callback(bool on);
+  void step();  ///< one stepSimulation(); kinematic bodies are moved before
+
+ private:
+  std::unique_ptr<btCollisionConfiguration> make_configuration() const;
+  std::unique_ptr<btBroadphaseInterface> make_broadphase();
+  btCollisionShape* make_shape(const RandomBody& body);
+  void add_body(std::size_t i);
+  static void apply_traits(btRigidBody* made, const RandomBody& body);
+  static void place(btRigidBody* body, const btVector3& position);
+  /// Puts the body into the world, at its first place if it has left the finite numbers.
+  void enter(std::size_t i);
+  void add_joint(const RandomJoint& joint);
+  void remove_joint(btTypedConstraint* joint);
+  void leave(btRigidBody* body);  ///< takes it out of the world, with its joints
+  void reshape(std::size_t i);    ///< changes between its own shape and a box
+
+  const RandomWorld& random_;
+  btSortedOverlappingPairCache sorted_pairs_;
+  BulletWorld live_;
+  std::vector<btRigidBody*> bodies_;  ///< null where a body is not used
+  std::vector<btCollisionShape*> other_shapes_;
+  std::vector<std::pair<btScalar, btCollisionShape*>> shared_spheres_;
+  std::vector<std::unique_ptr<btTypedConstraint>> joints_;
+  std::set<std::pair<std::size_t, std::size_t>> ignored_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,85 @@
+/// Callbacks that log what they hear.
+#include "tests/bullet/random_world_globals.hpp"
+
+#include <cstdio>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+std::string bits_of(btScalar value) {
+  char text[32];
+  std::snprintf(text, sizeof text, " %a", static_cast<double>(value));
+  return text;
+}
+
+bool on_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, int part_a, int index_a,
+              const btCollisionObjectWrapper* b, int part_b, int index_b) {
+  log_event("added " + name_of(a->getCollisionObject()) + " " + name_of(b->getCollisionObject()) +
+            bits_of(point.m_distance1) + bits_of(point.m_combinedFriction) + " " +
+            std::to_string(part_a + part_b) + " " + std::to_string(index_a) + " " +
+            std::to_string(index_b));
+  point.m_combinedFriction *= btScalar(0.5);
+  point.m_userPersistentData = const_cast<btCollisionObject*>(a->getCollisionObject());
+  return true;
+}
+bool on_processed(btManifoldPoint& point, void* a, void* b) {
+  log_event("processed " + name_of(static_cast<btCollisionObject*>(a)) + " " +
+            name_of(static_cast<btCollisionObject*>(b)) + bits_of(point.m_distance1));
+  return true;
+}
+bool on_destroyed(void* data) {
+  log_event("destroyed " + name_of(static_cast<btCollisionObject*>(data)));
+  return true;
+}
+void on_started(btPersistentManifold* const& manifold) {
+  log_event("started " + name_of(manifold->getBody0()) + " " + name_of(manifold->getBody1()) + " " +
+            std::to_string(manifold->getNumContacts()));
+}
+void on_ended(btPersistentManifold* const& manifold) {
+  log_event("ended " + name_of(manifold->getBody0()) + " " + name_of(manifold->getBody1()) + " " +
+            std::to_string(manifold->getNumContacts()));
+}
+btScalar sum_of_frictions(const btCollisionObject* a, const btCollisionObject* b) {
+  log_event("combine " + name_of(a) + " " + name_of(b));
+  return a->getFriction() + b->getFriction();
+}
+}  // namespace
+
+void logging_near_callback(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
+                           const btDispatcherInfo& info) {
+  log_event("near " + name_of(static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject)) +
+            " " + name_of(static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject)));
+  btCollisionDispatcher::defaultNearCallback(pair, dispatcher, info);
+}
+
+btScalar LoggingReport::addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper* a,
+                                        int, int i, const btCollisionObjectWrapper* b, int, int j) {
+  log_event("tested " + name_of(a->getCollisionObject()) + " " + name_of(b->getCollisionObject()) +
+            bits_of(point.m_distance1) + " " + std::to_string(i) + " " + std::to_string(j));
+  return 0;
+}
+
+// set_verify() says that it calls combine callbacks twice.
+Globals::Globals(const RandomWorld& world) : allowed_(world.verify ? ~unsigned{kCombine} : ~0u) {
+  gContactBreakingThreshold = world.breaking_threshold;
+  gDeactivationTime = btScalar(0.15);  // runs are too short for two seconds
+  set_callbacks(world.callbacks);
+}
+
+Globals::~Globals() {
+  set_callbacks(0);
+  gContactBreakingThreshold = breaking_threshold_;
+  gDeactivationTime = deactivation_time_;
+}
+
+void Globals::set_callbacks(unsigned bits) {
+  bits &= allowed_;
+  gContactAddedCallback = (bits & kAdded) != 0 ? on_added : nullptr;
+  gContactProcessedCallback = (bits & kProcessed) != 0 ? on_processed : nullptr;
+  gContactDestroyedCallback = (bits & kDestroyed) != 0 ? on_destroyed : nullptr;
+  gContactStartedCallback = (bits & kStarted) != 0 ? on_started : nullptr;
+  gContactEndedCallback = (bits & kEnded) != 0 ? on_ended : nullptr;
+  gCalculateCombinedFrictionCallback = (bits & kCombine) != 0 ? sum_of_frictions : friction_;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
