@@ -12,5 +12,6 @@ void add_devices_command(CLI::App& app, int& status);
 void add_run_command(CLI::App& app, int& status);
 void add_compare_command(CLI::App& app, int& status);
 void add_replay_command(CLI::App& app, int& status);
+void add_preload_command(CLI::App& app, int& status);
 
 }  // namespace jfpx::inline JFPX_ABI::tool

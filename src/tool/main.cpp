@@ -45,6 +45,7 @@ int run(int argc, char** argv) {
   tool::add_compare_command(app, status);
   tool::add_run_command(app, status);
   tool::add_replay_command(app, status);
+  tool::add_preload_command(app, status);
   tool::add_scenes_command(app, status);
   tool::add_devices_command(app, status);
   try {

@@ -2,6 +2,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/tool/bullet_engine.hpp"
+#include "src/tool/commands.hpp"
 #include "src/tool/comparison.hpp"
 
 namespace jfpx::inline JFPX_ABI::tool {
@@ -12,6 +13,12 @@ std::unique_ptr<Engine> make_bullet_engine(EngineKind kind, const Scene&, const 
 
 Comparison compare(const Scene&, const RunOptions&) {
   throw BackendUnavailable("compare: built without Bullet");
+}
+
+void add_preload_command(CLI::App& app, int&) {
+  CLI::App* command = app.add_subcommand("preload", "Not available: built without Bullet");
+  command->prefix_command();
+  command->callback([] { throw BackendUnavailable("preload: built without Bullet"); });
 }
 
 }  // namespace jfpx::inline JFPX_ABI::tool

@@ -21,6 +21,7 @@ std::string asked_precision(int argc, char** argv) {
   constexpr std::string_view kOption = "--precision";
   for (int i = 1; i < argc; ++i) {
     const std::string_view argument = argv[i];
+    if (argument == "--") break;  // what follows belongs to another program
     if (argument == kOption && i + 1 < argc) return argv[i + 1];
     if (argument.starts_with(kOption) && argument.substr(kOption.size()).starts_with("=")) {
       return std::string(argument.substr(kOption.size() + 1));

@@ -24,3 +24,26 @@ jfpx_add_test(bullet_algorithm_test SOURCES
   ${random_worlds}
   bullet/algorithm_test.cpp
   LINK jfpx_bullet)
+
+if(JFPX_TOOL)
+  jfpx_add_executable(bullet_stock_program SOURCES bullet/stock_program.cpp
+    LINK jfpx_bullet3rd Threads::Threads)
+  jfpx_add_test(bullet_preload_test SOURCES bullet/preload_test.cpp)
+  foreach(suffix IN ITEMS "" "_f64")
+    set(other _f64)
+    set(precision F32)
+    if(suffix)
+      set(other "")
+      set(precision F64)
+    endif()
+    set(collision ${JFPX_BULLET_${precision}_LINK_LIBRARIES})
+    list(FILTER collision INCLUDE REGEX "BulletCollision")
+    add_dependencies(bullet_preload_test${suffix}
+      jfpx_tool jfpx_tool_f64 bullet_stock_program bullet_stock_program_f64)
+    target_compile_definitions(bullet_preload_test${suffix} PRIVATE
+      JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
+      JFPX_STOCK_PROGRAM="$<TARGET_FILE:bullet_stock_program${suffix}>"
+      JFPX_OTHER_STOCK_PROGRAM="$<TARGET_FILE:bullet_stock_program${other}>"
+      JFPX_BULLET_COLLISION="${collision}")
+  endforeach()
+endif()

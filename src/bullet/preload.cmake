@@ -1,0 +1,36 @@
+# libjfpx-bullet-preload.so for LD_PRELOAD, and beside it the engines that it loads: one a precision.
+
+# The engines know the layout of Bullet's classes, so they serve the Bullet that they are compiled
+# against and no other: recognised by the name that the run-time linker knows it by.
+foreach(precision IN ITEMS F32 F64)
+  set(libraries ${JFPX_BULLET_${precision}_LINK_LIBRARIES})
+  list(FILTER libraries INCLUDE REGEX "BulletCollision")
+  file(READ_SYMLINK "${libraries}" library)
+  get_filename_component(JFPX_BULLET_SONAME_${precision} "${library}" NAME)
+endforeach()
+
+foreach(suffix IN ITEMS "" "_f64")
+  set(engine jfpx_bullet_engine${suffix})
+  add_library(${engine} MODULE preload_engine.cpp)
+  _jfpx_configure(${engine} "${suffix}" "" "jfpx_bullet")
+  target_link_options(${engine} PRIVATE LINKER:--exclude-libs,ALL)
+endforeach()
+set_target_properties(jfpx_bullet_engine PROPERTIES OUTPUT_NAME jfpx-bullet-engine)
+set_target_properties(jfpx_bullet_engine_f64 PROPERTIES OUTPUT_NAME jfpx-bullet-engine-f64)
+
+add_library(jfpx_bullet_preload MODULE preload.cpp)
+target_link_libraries(jfpx_bullet_preload PRIVATE jfpx_build_flags ${CMAKE_DL_LIBS} Threads::Threads)
+target_compile_definitions(jfpx_bullet_preload PRIVATE
+  JFPX_ENGINE="$<TARGET_FILE_NAME:jfpx_bullet_engine>"
+  JFPX_ENGINE_F64="$<TARGET_FILE_NAME:jfpx_bullet_engine_f64>"
+  JFPX_BULLET_SONAME="${JFPX_BULLET_SONAME_F32}"
+  JFPX_BULLET_SONAME_F64="${JFPX_BULLET_SONAME_F64}")
+# It must not bring a C++ library into programs that have none.
+target_link_options(jfpx_bullet_preload PRIVATE LINKER:--as-needed)
+set_target_properties(jfpx_bullet_preload PROPERTIES
+  OUTPUT_NAME jfpx-bullet-preload CXX_EXTENSIONS OFF CXX_VISIBILITY_PRESET hidden)
+add_dependencies(jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64)
+
+# As installed: libraries in ../lib (or what it is called here) of the command.
+set_target_properties(jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64 PROPERTIES
+  LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/${CMAKE_INSTALL_LIBDIR})

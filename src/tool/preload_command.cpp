@@ -1,0 +1,92 @@
+/// jfpx preload -- PROGRAM [ARGS]: runs an unmodified Bullet program with the jfpx dispatcher.
+#include <jfpx/error.hpp>
+#include <jfpx/sphere_collider.hpp>
+
+#include "src/tool/commands.hpp"
+#include "src/tool/options.hpp"
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+struct PreloadOptions {
+  std::vector<std::string> command;
+  std::string backend = "auto";
+  std::string minimum_batch;
+  bool summary = false, verify = false;
+};
+
+/// The library beside this command, in the build tree as where it is installed.
+std::string find_library() {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
+  const std::string path =
+      (folder / JFPX_PRELOAD_FOLDER / "libjfpx-bullet-preload.so").lexically_normal().string();
+  if (!fs::exists(path)) throw Error(path + " is missing");
+  // LD_PRELOAD has no way to quote.
+  if (path.find_first_of(" :") != std::string::npos) {
+    throw Error("\"" + path + "\" can't be preloaded: its name has a space or a colon in it");
+  }
+  return path;
+}
+
+void set_environment(const PreloadOptions& options) {
+  std::string preload = find_library();
+  if (const char* others = std::getenv("LD_PRELOAD"); others != nullptr && *others != '\0') {
+    preload += std::string(":") + others;
+  }
+  setenv("LD_PRELOAD", preload.c_str(), 1);
+  if (options.summary) setenv("JFPX_PRELOAD_SUMMARY", "1", 1);
+  if (options.verify) setenv("JFPX_PRELOAD_VERIFY", "1", 1);
+  if (options.backend != "auto") setenv("JFPX_PRELOAD_BACKEND", options.backend.c_str(), 1);
+  if (!options.minimum_batch.empty()) {
+    setenv("JFPX_PRELOAD_MINIMUM_BATCH", options.minimum_batch.c_str(), 1);
+  }
+}
+
+[[noreturn]] void start(const PreloadOptions& options) {
+  // Asked here, where it can still be an error: inside the program it could only be a remark.
+  if (options.backend == "cuda") (void)make_sphere_collider({.backend = Backend::cuda});
+  set_environment(options);
+  std::vector<std::string> command = options.command;
+  std::vector<char*> arguments;
+  for (std::string& argument : command) arguments.push_back(argument.data());
+  arguments.push_back(nullptr);
+  execvp(arguments[0], arguments.data());
+  throw Error("\"" + command[0] + "\" can't be started: " + std::strerror(errno));
+}
+
+}  // namespace
+
+void add_preload_command(CLI::App& app, int&) {
+  CLI::App* command = app.add_subcommand(
+      "preload", "Run an unmodified, dynamically linked Bullet program with the jfpx dispatcher");
+  auto options = std::make_shared<PreloadOptions>();
+  command->add_option("command", options->command, "The program and its arguments")
+      ->required()
+      ->type_name("PROGRAM [ARGS]");
+  command->add_flag("--summary", options->summary, "Say on stderr at exit what was done");
+  command->add_flag("--verify", options->verify,
+                    "Recompute every sphere pair with Bullet's algorithm and compare (slow)");
+  command->add_option("--backend", options->backend, "auto, x86 or cuda")
+      ->check(CLI::IsMember({"auto", "x86", "cuda"}))
+      ->capture_default_str();
+  command
+      ->add_option("--minimum-batch", options->minimum_batch,
+                   "Overlapping pairs below which a dispatch is left to Bullet")
+      ->check(whole_number());
+  command->footer(
+      "The program's own exit status is returned; 2 if it can't be started. Programs that link\n"
+      "Bullet statically, and programs that are linked statically, run as without jfpx.");
+  command->callback([options] { start(*options); });
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

@@ -1,0 +1,122 @@
+/// Programs that were never changed, with and without the preloaded library.
+#include <jfpx/config.hpp>
+
+#include "tests/support/process.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+namespace jfpx {
+namespace {
+
+using test::ProcessResult;
+using test::run_process;
+using ::testing::ContainsRegex;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class Preload : public ::testing::Test {
+ protected:
+  // Only matters to builds with a sanitizer, which want to be the first library of a program.
+  Preload() { setenv("ASAN_OPTIONS", "verify_asan_link_order=0:detect_leaks=0", 1); }
+
+  static ProcessResult jfpx_command(const std::string& arguments) {
+    return run_process(JFPX_TOOL_PATH " " + arguments);
+  }
+  static ProcessResult alone(const std::string& arguments) {
+    return run_process(JFPX_STOCK_PROGRAM " " + arguments);
+  }
+};
+
+constexpr const char* kPrecision = sizeof(Real) == 4 ? "Bullet in float" : "Bullet in double";
+
+TEST_F(Preload, KeepsTheHashAndRunsBatches) {
+  const ProcessResult stock = alone("300");
+  ASSERT_EQ(stock.status, 0);
+  ASSERT_EQ(stock.output.size(), 17u);
+  const ProcessResult ours = jfpx_command(
+      "preload --summary --verify --minimum-batch 0 -- " JFPX_STOCK_PROGRAM " 300 2>&1");
+  EXPECT_EQ(ours.status, 0);
+  EXPECT_THAT(ours.output, HasSubstr(stock.output));
+  EXPECT_THAT(ours.output, ContainsRegex(std::string(kPrecision) + ": 60 dispatches, 60 batches"));
+  EXPECT_THAT(ours.output, ContainsRegex("[1-9][0-9]* touching, [1-9][0-9]* written"));
+  EXPECT_THAT(ours.output, ContainsRegex("verified: [1-9][0-9]* sphere pairs, 0 mismatches"));
+}
+
+TEST_F(Preload, FindsThePrecisionOfTheProgramByItself) {
+  const ProcessResult result =
+      jfpx_command("preload --summary --minimum-batch 0 -- " JFPX_OTHER_STOCK_PROGRAM " 50 2>&1");
+  EXPECT_THAT(result.output, HasSubstr(run_process(JFPX_OTHER_STOCK_PROGRAM " 50").output));
+  EXPECT_THAT(result.output, HasSubstr("60 batches (x86)"));
+  EXPECT_THAT(result.output, Not(HasSubstr(kPrecision)));
+}
+
+TEST_F(Preload, ServesWorldsInSeveralThreads) {
+  const std::string sizes = "200 100 0 1 150 200";
+  const ProcessResult ours = jfpx_command(
+      "preload --summary --minimum-batch 0 -- " JFPX_STOCK_PROGRAM " " + sizes + " 2>&1");
+  EXPECT_THAT(ours.output, HasSubstr(alone(sizes).output));
+  EXPECT_THAT(ours.output, HasSubstr("360 dispatches, "));
+}
+
+TEST_F(Preload, LeavesSmallWorldsToBulletByDefault) {
+  const ProcessResult ours = jfpx_command("preload --summary -- " JFPX_STOCK_PROGRAM " 20 2>&1");
+  EXPECT_THAT(ours.output, HasSubstr(alone("20").output));
+  EXPECT_THAT(ours.output, HasSubstr("60 dispatches, 0 batches"));
+  EXPECT_THAT(ours.output, HasSubstr("left to Bullet: 60 (small batch)"));
+}
+
+TEST_F(Preload, IsSilentAndKeepsTheExitStatusOfTheProgram) {
+  const ProcessResult silent = jfpx_command("preload -- " JFPX_STOCK_PROGRAM " 30 2>&1");
+  EXPECT_EQ(silent.output, alone("30").output);
+  EXPECT_EQ(jfpx_command("preload -- " JFPX_STOCK_PROGRAM).status, 7);
+}
+
+TEST_F(Preload, LeavesProgramsWithoutBulletUntouched) {
+  const ProcessResult result = jfpx_command(
+      "preload --summary -- sh -c 'echo \"$@\"; exit 5' -- --precision double -- x 2>&1");
+  EXPECT_EQ(result.status, 5);
+  EXPECT_EQ(result.output, "--precision double -- x\n");
+}
+
+TEST_F(Preload, SaysThatBulletWasNotUsed) {
+  const ProcessResult result = jfpx_command("preload --summary -- " JFPX_STOCK_PROGRAM " 2>&1");
+  EXPECT_THAT(result.output, HasSubstr(": Bullet's dispatcher was not used\n"));
+}
+
+TEST_F(Preload, KeepsWhatWasPreloadedBefore) {
+  const ProcessResult result = run_process("LD_PRELOAD=libm.so.6 " JFPX_TOOL_PATH
+                                           " preload -- sh -c 'echo $LD_PRELOAD' 2>&1");
+  EXPECT_THAT(result.output, HasSubstr("libjfpx-bullet-preload.so:libm.so.6"));
+}
+
+TEST_F(Preload, SaysWhyAProgramDoesNotStart) {
+  const ProcessResult missing = jfpx_command("preload -- /nowhere/at-all --x 2>&1");
+  EXPECT_EQ(missing.status, 2);
+  EXPECT_EQ(missing.output,
+            "jfpx: \"/nowhere/at-all\" can't be started: No such file or directory\n");
+  EXPECT_EQ(jfpx_command("preload -- / 2>&1").status, 2);
+  EXPECT_EQ(jfpx_command("preload 2>&1").status, 2);
+  EXPECT_EQ(jfpx_command("preload --minimum-batch -1 -- echo 2>&1").status, 2);
+  EXPECT_EQ(jfpx_command("preload --backend abacus -- echo 2>&1").status, 2);
+}
+
+TEST_F(Preload, LeavesABulletThatItDoesNotKnowAlone) {
+  // The same library under the name of another version, as a distribution would ship it.
+  const test::TemporaryFolder folder;
+  const std::string library = folder.file("libBulletCollision-9.so");
+  const ProcessResult copied = run_process("cp -L " JFPX_BULLET_COLLISION " " + library + " 2>&1");
+  ASSERT_EQ(copied.status, 0) << copied.output;
+  // Listed before the program's own, it is the Bullet that everybody finds.
+  const ProcessResult result =
+      run_process("LD_PRELOAD=" + library +
+                  " " JFPX_TOOL_PATH " preload --summary -- " JFPX_STOCK_PROGRAM " 30 2>&1");
+  EXPECT_THAT(result.output, HasSubstr(alone("30").output));
+  EXPECT_THAT(result.output, HasSubstr("left to Bullet: " + library + " is neither"));
+}
+
+}  // namespace
+}  // namespace jfpx
