@@ -47,3 +47,15 @@ if(JFPX_TOOL)
       JFPX_BULLET_COLLISION="${collision}")
   endforeach()
 endif()
+
+# The examples run, and say what they should.
+if(JFPX_EXAMPLES)
+  foreach(suffix IN ITEMS "" "_f64")
+    add_test(NAME bullet_app${suffix} COMMAND bullet_app${suffix})
+    set_tests_properties(bullet_app${suffix} PROPERTIES
+      PASS_REGULAR_EXPRESSION "[1-9][0-9]* of 120 dispatches in batches; [1-9][0-9]* contacts")
+    set(callbacks "$<TARGET_FILE:bullet_callbacks${suffix}>")
+    add_test(NAME bullet_callbacks${suffix} COMMAND sh -c
+      "\"${callbacks}\" && [ \"$(\"${callbacks}\")\" = \"$(\"${callbacks}\" stock)\" ]")
+  endforeach()
+endif()
