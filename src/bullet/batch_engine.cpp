@@ -141,7 +141,8 @@ bool has_bullets_sphere_function(const btCollisionDispatcher& dispatcher) {
   };
   const btCollisionAlgorithmCreateFunc* function =
       (dispatcher.*Access::table())[SPHERE_SHAPE_PROXYTYPE][SPHERE_SHAPE_PROXYTYPE];
-  return typeid(*function) == typeid(btSphereSphereCollisionAlgorithm::CreateFunc);
+  return function != nullptr &&
+         typeid(*function) == typeid(btSphereSphereCollisionAlgorithm::CreateFunc);
 }
 
 }  // namespace

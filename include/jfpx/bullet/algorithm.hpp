@@ -14,8 +14,8 @@ namespace jfpx::inline JFPX_ABI::bullet {
 /// own, and for checking one against the other. Register it before bodies overlap:
 ///
 ///     jfpx::bullet::SphereSphereAlgorithm::CreateFunc create;  // must outlive the dispatcher
-///     dispatcher.registerCollisionCreateFunc(SPHERE_SHAPE_PROXYTYPE, SPHERE_SHAPE_PROXYTYPE,
-///     &create);
+///     constexpr int kSphere = SPHERE_SHAPE_PROXYTYPE;
+///     dispatcher.registerCollisionCreateFunc(kSphere, kSphere, &create);
 ///
 /// and, for contactTest() and contactPairTest(), registerClosestPointsCreateFunc() likewise. It
 /// serves children of compounds too. A jfpx::bullet::CollisionDispatcher needs none of this, and
