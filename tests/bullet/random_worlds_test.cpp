@@ -19,6 +19,34 @@ std::uint64_t wanted_steps() {
 #endif
 }
 
+/// Bullet's dispatcher, called with other leftovers on the stack.
+template <int kFill>
+struct StockElsewhere final : btCollisionDispatcher {
+  using btCollisionDispatcher::btCollisionDispatcher;
+  void dispatchAllCollisionPairs(btOverlappingPairCache* cache, const btDispatcherInfo& info,
+                                 btDispatcher* dispatcher) override {
+    fill_stack();
+    btCollisionDispatcher::dispatchAllCollisionPairs(cache, info, dispatcher);
+  }
+  [[gnu::noinline]] static void fill_stack() {
+    volatile char leftovers[16384];
+    for (volatile char& c : leftovers) c = static_cast<char>(kFill);
+  }
+  static std::unique_ptr<btCollisionDispatcher> make(btCollisionConfiguration* configuration,
+                                                     const RandomWorld&) {
+    return std::make_unique<StockElsewhere>(configuration);
+  }
+};
+
+/// In rare worlds Bullet 3.24 itself reads uninitialised memory of its stack, for example in
+/// btPersistentManifold::refreshContactPoints (world 50183557 in float, seen by valgrind in a stock
+/// world), and two stock worlds part ways.
+bool stock_differs_from_itself(const RandomWorld& world) {
+  return run(world, nullptr, StockElsewhere<0>::make) ||
+         run(world, nullptr, StockElsewhere<0x3f>::make) ||
+         run(world, nullptr, StockElsewhere<0xff>::make);
+}
+
 std::string report(const RandomWorld& world, const Failure& failure) {
   const RandomWorld least = shrink(world);
   const auto again = run(least, nullptr);
@@ -30,11 +58,17 @@ std::string report(const RandomWorld& world, const Failure& failure) {
 TEST(RandomWorlds, MoveAsStockWorldsDo) {
   const std::uint64_t seed = test_seed();
   RunTotals totals;
+  std::uint64_t unreproducible = 0;
   for (std::uint64_t i = 0; totals.steps < wanted_steps(); ++i) {
     const RandomWorld world = make_random_world(seed + i);
     const auto failure = run(world, &totals);
+    if (failure && stock_differs_from_itself(world)) {
+      ++unreproducible;
+      continue;
+    }
     ASSERT_FALSE(failure) << "JFPX_TEST_SEED=" << seed + i << '\n' << report(world, *failure);
   }
+  EXPECT_LE(unreproducible, 1 + totals.steps / 1'000'000) << "too many to be Bullet's";
   EXPECT_GT(totals.batches, totals.steps / 4) << "worlds without batches show nothing";
   EXPECT_GT(totals.touching, totals.steps / 2);
   EXPECT_GT(totals.written, totals.steps / 4);
