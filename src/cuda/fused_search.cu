@@ -13,8 +13,10 @@ namespace cg = cooperative_groups;
 constexpr unsigned kBlocks = 16;  // the largest cluster that Hopper can have
 constexpr unsigned kThreads = 512;
 constexpr unsigned kWarps = kBlocks * kThreads / 32;
-constexpr unsigned kRowsPerWarp = kFusedSpheres / kWarps;
+[[maybe_unused]] constexpr unsigned kRowsPerWarp = kFusedSpheres / kWarps;
 
+// [[maybe_unused]]: clusters exist from Hopper on, so the code for older devices has an empty
+// kernel.
 struct FusedStorage {
   SphereInstance spheres[kFusedSpheres];
   std::uint32_t counts[kFusedSpheres];   // contacts of each row, gathered from all blocks
@@ -24,7 +26,7 @@ struct FusedStorage {
 };
 
 /// offsets becomes the exclusive scan of counts; returns the total. All threads of the block.
-__device__ std::uint32_t scan_rows(FusedStorage& s) {
+[[maybe_unused]] __device__ std::uint32_t scan_rows(FusedStorage& s) {
   constexpr unsigned kPerThread = kFusedSpheres / kThreads;
   std::uint32_t sum = 0;
   for (unsigned k = 0; k < kPerThread; ++k) sum += s.counts[kPerThread * threadIdx.x + k];
@@ -49,8 +51,8 @@ __device__ std::uint32_t scan_rows(FusedStorage& s) {
 }
 
 /// The 32 partners 32*word to +31 of row a that touch it and come after it.
-__device__ unsigned touching_word(const FusedStorage& s, std::uint32_t a, std::uint32_t word,
-                                  std::uint32_t n) {
+[[maybe_unused]] __device__ unsigned touching_word(const FusedStorage& s, std::uint32_t a,
+                                                   std::uint32_t word, std::uint32_t n) {
   const std::uint32_t b = 32 * word + lane_id();
   const bool touching = b > a && b < n && may_touch(s.spheres[a], s.spheres[b]) &&
                         shared::test_sphere_pair(s.spheres[a], s.spheres[b]).touching != 0;
