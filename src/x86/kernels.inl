@@ -33,8 +33,7 @@ inline std::uint32_t kept(const Query<S>& q, const SphereColumns& t, std::uint32
   const typename S::Vec dy = S::sub(q.y, S::load(t.y + at));
   const typename S::Vec dz = S::sub(q.z, S::load(t.z + at));
   const typename S::Vec w = S::add(q.reach, S::load(t.reach + at));
-  const typename S::Vec square =
-      S::add(S::add(S::mul(dx, dx), S::mul(dy, dy)), S::mul(dz, dz));
+  const typename S::Vec square = S::add(S::add(S::mul(dx, dx), S::mul(dy, dy)), S::mul(dz, dz));
   return S::not_greater(square, S::mul(w, w));
 }
 
@@ -106,8 +105,8 @@ void search_all(const PairSearch& s) {
 
 /// Targets of cells [low, high), from row.cursor on. Cells ascend, so both bounds cut a prefix off
 /// each vector: no table of cells, no unpredictable branch.
-inline void search_row(const Query<RowSimd>& q, const SphereColumns& t, std::int64_t low, std::int64_t high,
-                       std::uint32_t* cursor, Appender* pairs) {
+inline void search_row(const Query<RowSimd>& q, const SphereColumns& t, std::int64_t low,
+                       std::int64_t high, std::uint32_t* cursor, Appender* pairs) {
   constexpr std::uint32_t kLanes = RowSimd::kLanes;
   std::uint32_t passed = 0;
   std::uint32_t at = *cursor;
@@ -116,7 +115,8 @@ inline void search_row(const Query<RowSimd>& q, const SphereColumns& t, std::int
     const std::uint32_t inside = RowSimd::cells_below(t.cell + at, high);
     passed += RowSimd::count(below);
     pairs->append<RowSimd>(q.id, t.id + at, kept(q, t, at) & inside & ~below);
-    if (inside != RowSimd::kAll) [[likely]] break;
+    if (inside != RowSimd::kAll) [[likely]]
+      break;
     at += kLanes;
   }
   *cursor += passed;
