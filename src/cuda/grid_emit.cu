@@ -23,7 +23,7 @@ __device__ bool is_complete(const GridArgs& args, const SearchOutput& output) {
 struct EmitStorage {
   std::uint32_t partners[kSlots][kThreads];  // sorted
   std::uint32_t starts[kThreads + 1];        // contacts of the block before those of a sphere
-  std::uint32_t warp_sums[kThreads / 32];
+  alignas(16) std::uint32_t warp_sums[kThreads / 32];  // no load of it may reach into starts
 };
 
 /// A thread sorts the partners of its sphere: few, so by insertion. Returns their number, or 0 if

@@ -120,7 +120,11 @@ std::span<const PairResult> SphereColliderCuda::test_pairs(std::span<const Spher
   upload(spheres);
   const std::size_t room = with_slack(pairs.size());
   pairs_.grow(pool_, stream_.get(), room, "pairs");
-  results_.grow(pool_, stream_.get(), room, "pair results");
+  if (room > results_.size()) {
+    results_.grow(pool_, stream_.get(), room, "pair results");
+    // In double a result has padding, which no kernel writes but the copy reads.
+    JFPX_CUDA_TRY(cudaMemsetAsync(results_.data(), 0, room * sizeof(PairResult), stream_.get()));
+  }
   results_on_host_.grow(room, "pair results on the host");
   JFPX_CUDA_TRY(cudaMemcpyAsync(pairs_.data(), pairs.data(), pairs.size_bytes(),
                                 cudaMemcpyHostToDevice, stream_.get()));
