@@ -13,7 +13,7 @@ namespace jfpx::inline JFPX_ABI {
 enum class SphereAlgorithm : std::uint8_t {
   automatic,
   all_pairs,     ///< every pair is looked at: best for some hundreds of spheres
-  sorted_tiles,  ///< spheres sorted along a space-filling curve, tiles culled by their boxes
+  sorted_tiles,  ///< spheres sorted by place, only neighbours are looked at: best beyond
 };
 
 /// Widest vector instructions that may be used. A level that the processor lacks is lowered.
