@@ -109,28 +109,48 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
 #endif
 }
 
-}  // namespace
-
-bool fused_search_supported(int compute_capability_major) { return compute_capability_major >= 9; }
-
-void launch_fused_search(const FusedArgs& args, cudaStream_t stream) {
+/// Shared memory and cluster size beyond what every device grants.
+void allow_resources() {
   JFPX_CUDA_TRY(cudaFuncSetAttribute(fused_search, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                      static_cast<int>(sizeof(FusedStorage))));
   JFPX_CUDA_TRY(
       cudaFuncSetAttribute(fused_search, cudaFuncAttributeNonPortableClusterSizeAllowed, 1));
+}
+
+struct Launch {
+  Launch() {
+    cluster.id = cudaLaunchAttributeClusterDimension;
+    cluster.val.clusterDim.x = kBlocks;
+    cluster.val.clusterDim.y = 1;
+    cluster.val.clusterDim.z = 1;
+    config.gridDim = kBlocks;
+    config.blockDim = kThreads;
+    config.dynamicSmemBytes = sizeof(FusedStorage);
+    config.attrs = &cluster;
+    config.numAttrs = 1;
+  }
+  Launch(const Launch&) = delete;
+  Launch& operator=(const Launch&) = delete;
   cudaLaunchAttribute cluster{};
-  cluster.id = cudaLaunchAttributeClusterDimension;
-  cluster.val.clusterDim.x = kBlocks;
-  cluster.val.clusterDim.y = 1;
-  cluster.val.clusterDim.z = 1;
   cudaLaunchConfig_t config{};
-  config.gridDim = kBlocks;
-  config.blockDim = kThreads;
-  config.dynamicSmemBytes = sizeof(FusedStorage);
-  config.stream = stream;
-  config.attrs = &cluster;
-  config.numAttrs = 1;
-  JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, fused_search, args));
+};
+
+}  // namespace
+
+bool fused_search_supported(int compute_capability_major) {
+  if (compute_capability_major < 9) return false;
+  allow_resources();
+  const Launch launch;
+  int most_blocks = 0;
+  JFPX_CUDA_TRY(cudaOccupancyMaxPotentialClusterSize(&most_blocks, fused_search, &launch.config));
+  return most_blocks >= static_cast<int>(kBlocks);
+}
+
+void launch_fused_search(const FusedArgs& args, cudaStream_t stream) {
+  allow_resources();
+  Launch launch;
+  launch.config.stream = stream;
+  JFPX_CUDA_TRY(cudaLaunchKernelEx(&launch.config, fused_search, args));
 }
 
 }  // namespace jfpx::inline JFPX_ABI::cuda

@@ -53,7 +53,7 @@ struct FusedArgs {
   std::uint32_t n;  ///< at most kFusedSpheres
   SearchOutput output;
 };
-/// Whether the device can run it: it needs thread-block clusters (compute capability 9.0).
+/// Whether the current device can run it: it needs clusters of 16 thread blocks, as Hopper has.
 bool fused_search_supported(int compute_capability_major);
 void launch_fused_search(const FusedArgs& args, cudaStream_t stream);
 
