@@ -17,7 +17,6 @@ struct ScenesOptions {
 };
 
 std::string list_text() {
-  Table table({"scene", "spheres", "what happens"});
   std::string text;
   std::size_t width = 0;
   for (const scenes::Entry& entry : scenes::all()) width = std::max(width, entry.name.size());
