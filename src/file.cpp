@@ -3,6 +3,8 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/atomic_file.hpp"
+
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -35,17 +37,9 @@ std::string read_file(const std::string& path) {
 }
 
 void write_file(const std::string& path, std::string_view content) {
-  const std::string part = path + ".part";
-  File file(std::fopen(part.c_str(), "wb"));
-  if (!file) throw FileError(file_message(path, "can't be written", errno));
-  const bool written = std::fwrite(content.data(), 1, content.size(), file.get()) == content.size();
-  const int write_error = errno;
-  const bool closed = std::fclose(file.release()) == 0;
-  if (!written || !closed || std::rename(part.c_str(), path.c_str()) != 0) {
-    const int error = written ? errno : write_error;
-    std::remove(part.c_str());
-    throw FileError(file_message(path, "can't be written", error));
-  }
+  AtomicFile file(path);
+  file.write(content);
+  file.finish();
 }
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -9,12 +9,11 @@
 namespace jfpx::inline JFPX_ABI {
 
 /// `PATH: what: reason from errno`, for FileError.
-std::string file_message(const std::string& path, std::string_view what, int error_number);
+JFPX_API std::string file_message(const std::string& path, std::string_view what, int error_number);
 
 /// @throws FileError
 std::string read_file(const std::string& path);
-/// Writes beside the path and renames, so that the file is there whole or not at all.
-/// @throws FileError
+/// Through an AtomicFile: the file is there whole or not at all. @throws FileError
 void write_file(const std::string& path, std::string_view content);
 
 }  // namespace jfpx::inline JFPX_ABI

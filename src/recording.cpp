@@ -6,6 +6,7 @@
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
+#include "src/atomic_file.hpp"
 #include "src/file.hpp"
 #include "src/hash64.hpp"
 #include "src/scene_json.hpp"
@@ -13,7 +14,6 @@
 #include <array>
 #include <bit>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <fstream>
 
@@ -75,36 +75,22 @@ const char* precision_name(std::uint32_t real_size) { return real_size == 4 ? "f
 }  // namespace
 
 struct RecordingWriter::Impl {
-  std::string path, part;
-  std::ofstream file;
-  Hash64 hash;
-  std::size_t bodies = 0;
-  std::uint64_t frames = 0;
-  bool finished = false;
+  Impl(const std::string& path, std::size_t body_count) : file(path), bodies(body_count) {}
 
   void write(const void* data, std::size_t size) {
     hash.add_bytes(data, size);
-    file.write(static_cast<const char*>(data), static_cast<std::streamsize>(size));
-    if (!file) throw FileError(file_message(path, "can't be written", errno));
+    file.write({static_cast<const char*>(data), size});
   }
-  ~Impl() {
-    if (finished) return;
-    file.close();
-    std::remove(part.c_str());
-  }
+
+  AtomicFile file;
+  Hash64 hash;
+  std::size_t bodies;
+  std::uint64_t frames = 0;
 };
 
 RecordingWriter::RecordingWriter(const std::string& path, const RecordingHeader& header)
-    : impl_(std::make_unique<Impl>()) {
-  impl_->path = path;
-  impl_->part = path + ".part";
-  impl_->bodies = header.scene.bodies.size();
+    : impl_(std::make_unique<Impl>(path, header.scene.bodies.size())) {
   const std::string text = recording_header_to_json(header);
-  impl_->file.open(impl_->part, std::ios::binary | std::ios::trunc);
-  if (!impl_->file) {
-    impl_->finished = true;  // nothing of ours to remove
-    throw FileError(file_message(path, "can't be written", errno));
-  }
   Prefix prefix;
   prefix.header_size = text.size();
   impl_->write(&prefix, sizeof prefix);
@@ -128,12 +114,8 @@ void RecordingWriter::finish() {
   Impl& impl = *impl_;
   impl.hash.add_word(impl.frames);
   const Trailer trailer{.frames = impl.frames, .checksum = impl.hash.value()};
-  impl.file.write(reinterpret_cast<const char*>(&trailer), sizeof trailer);
-  impl.file.close();
-  if (!impl.file || std::rename(impl.part.c_str(), impl.path.c_str()) != 0) {
-    throw FileError(file_message(impl.path, "can't be written", errno));
-  }
-  impl.finished = true;
+  impl.file.write({reinterpret_cast<const char*>(&trailer), sizeof trailer});
+  impl.file.finish();
 }
 
 struct RecordingReader::Impl {

@@ -1,15 +1,10 @@
 /// What the commands print and write: tables, progress, files.
 #include "src/tool/output.hpp"
 
-#include <jfpx/error.hpp>
-
-#include "src/file.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cstdio>
 #include <type_traits>
 #include <unistd.h>
@@ -17,33 +12,19 @@
 namespace jfpx::inline JFPX_ABI::tool {
 
 OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
-  if (path_.empty() || path_ == "-") return;
-  part_ = path_ + ".part";
-  file_.open(part_, std::ios::binary | std::ios::trunc);
-  if (!file_) throw FileError(file_message(path_, "can't be written", errno));
-}
-
-OutputFile::~OutputFile() {
-  if (part_.empty() || finished_) return;
-  file_.close();
-  std::remove(part_.c_str());
+  if (*this && path_ != "-") file_.emplace(path_);
 }
 
 void OutputFile::write(const std::string& content) {
-  if (path_ == "-") {
+  if (file_) {
+    file_->write(content);
+  } else if (path_ == "-") {
     std::fputs(content.c_str(), stdout);
-  } else if (!path_.empty()) {
-    file_ << content;
   }
 }
 
 void OutputFile::finish() {
-  if (part_.empty()) return;
-  file_.close();
-  if (!file_ || std::rename(part_.c_str(), path_.c_str()) != 0) {
-    throw FileError(file_message(path_, "can't be written", errno));
-  }
-  finished_ = true;
+  if (file_) file_->finish();
 }
 
 std::string Table::text() const {

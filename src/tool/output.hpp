@@ -3,21 +3,20 @@
 
 #include <jfpx/config.hpp>
 
+#include "src/atomic_file.hpp"
+
 #include <cstdint>
-#include <fstream>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace jfpx::inline JFPX_ABI::tool {
 
-/// A file that appears under its name only when it is complete. "-" is stdout, "" is nothing.
+/// Where results go: a file that appears only when it is complete; "-" is stdout, "" is nothing.
 class OutputFile {
  public:
   /// Opens at once, so that a bad path fails before a long run. @throws FileError
   explicit OutputFile(std::string path);
-  ~OutputFile();
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
 
   explicit operator bool() const { return !path_.empty(); }
   void write(const std::string& text);
@@ -25,9 +24,8 @@ class OutputFile {
   void finish();
 
  private:
-  std::string path_, part_;
-  std::ofstream file_;
-  bool finished_ = false;
+  std::string path_;
+  std::optional<AtomicFile> file_;
 };
 
 /// Rows of cells; the first row is the head, the first column is left-aligned, others right.

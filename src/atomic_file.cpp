@@ -1,0 +1,35 @@
+/// A file that appears under its path only when it is complete.
+#include "src/atomic_file.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/file.hpp"
+
+#include <cerrno>
+#include <utility>
+
+namespace jfpx::inline JFPX_ABI {
+
+AtomicFile::AtomicFile(std::string path)
+    : path_(std::move(path)), part_(path_ + ".part"), file_(std::fopen(part_.c_str(), "wb")) {
+  if (file_ == nullptr) fail();
+}
+
+AtomicFile::~AtomicFile() {
+  if (file_ != nullptr) std::fclose(file_);
+  if (!finished_) std::remove(part_.c_str());
+}
+
+void AtomicFile::write(std::string_view bytes) {
+  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail();
+}
+
+void AtomicFile::finish() {
+  if (std::fclose(std::exchange(file_, nullptr)) != 0) fail();
+  if (std::rename(part_.c_str(), path_.c_str()) != 0) fail();
+  finished_ = true;
+}
+
+void AtomicFile::fail() const { throw FileError(file_message(path_, "can't be written", errno)); }
+
+}  // namespace jfpx::inline JFPX_ABI

@@ -1,0 +1,35 @@
+/// A file that appears under its path only when it is complete.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <cstdio>
+#include <string>
+#include <string_view>
+
+namespace jfpx::inline JFPX_ABI {
+
+/// Written beside its path and renamed at the end, so that the file is there whole or not at all.
+/// What was not finished is removed.
+class JFPX_API AtomicFile {
+ public:
+  /// Opens at once, so that a bad path fails before a long run. @throws FileError
+  explicit AtomicFile(std::string path);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+
+  /// @throws FileError
+  void write(std::string_view bytes);
+  /// Nothing may be written afterwards. @throws FileError
+  void finish();
+
+ private:
+  [[noreturn]] void fail() const;
+
+  std::string path_, part_;
+  std::FILE* file_;
+  bool finished_ = false;
+};
+
+}  // namespace jfpx::inline JFPX_ABI
