@@ -37,6 +37,8 @@ class BodyStore {
   /// The index of a contained body. @throws InvalidArgument for any other
   std::uint32_t require(BodyId id) const;
   std::span<const BodyId> ids() const noexcept { return ids_; }
+  /// The id of the body that has an index now.
+  BodyId id(std::uint32_t body) const { return {body, generation_[body]}; }
   /// Slots ever used; indices are below it.
   std::size_t capacity() const noexcept { return shape_.size(); }
   std::uint32_t movable_count() const noexcept { return movable_count_; }

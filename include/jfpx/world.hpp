@@ -29,6 +29,23 @@ struct Contact {
   friend bool operator==(const Contact&, const Contact&) = default;
 };
 
+enum class ContactPhase : std::uint8_t {
+  begin,  ///< the bodies touch and did not after the step before
+  stay,   ///< they touch and did
+  end     ///< they don't touch and did
+};
+
+/// What a step found out about two bodies; an immovable one may be among them, two never.
+struct ContactEvent {
+  ContactPhase phase = ContactPhase::begin;
+  BodyId a, b;                 ///< a.index < b.index; at an end, they may have been removed
+  std::uint32_t contacts = 0;  ///< how many contacts the bodies have, > 0
+  Vec3 normal;                 ///< [-], unit, from b to a: of the first of the deepest contacts
+  Vec3 point;                  ///< [m], world: of the same contact
+  Real distance = 0;           ///< [m], <= 0: of the same contact
+  friend bool operator==(const ContactEvent&, const ContactEvent&) = default;
+};
+
 /// What one step did. Times are wall clock.
 struct StepReport {
   std::uint64_t step = 0;             ///< number of the last step that was completed, from 1
@@ -117,6 +134,13 @@ class JFPX_API World {
   /// of one pair in the order of its test. None after a failed step, or when bodies were added or
   /// removed since.
   std::span<const Contact> contacts() const;
+  /// Who touched whom in the last step, who began to and who ended, sorted by (a.index, b.index);
+  /// where an index has got a new body, the end of the old pair comes first. A contact is as the
+  /// step found it, before it was resolved; at an end, as it was last found. Sleepers stay in
+  /// contact. A body that is removed, or put elsewhere, ends its contacts in the next step. None
+  /// after a failed step; the next one that succeeds compares with the last that did. The list
+  /// stays as it is until the next step, so that bodies may come and go while it is read.
+  std::span<const ContactEvent> contact_events() const;
   /// state_hash() of states().
   std::uint64_t state_hash() const;
   const Scene& scene() const;  ///< settings as given; its bodies are those of construction

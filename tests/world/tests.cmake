@@ -8,6 +8,7 @@ jfpx_add_test(world_parts_test SOURCES
   world/scene_validate_test.cpp)
 jfpx_add_test(world_test SOURCES
   world/box_test.cpp
+  world/contact_events_test.cpp
   world/force_registry_test.cpp
   world/force_test.cpp
   world/motion_test.cpp

@@ -1,0 +1,60 @@
+/// What a World is made of.
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include "src/body_store.hpp"
+#include "src/contact_events.hpp"
+#include "src/contact_resolver.hpp"
+#include "src/force_registry.hpp"
+#include "src/narrow_phase.hpp"
+
+namespace jfpx::inline JFPX_ABI {
+
+struct World::Impl {
+  /// What this engine asks of a body beyond what every scene must be. @throws InvalidScene
+  static void require_native(const BodyDef& def, std::uint64_t body);
+
+  Impl(const Scene& given, std::unique_ptr<SphereCollider> collider)
+      : scene(given), bodies(given.dt, given.sleep), narrow_phase(std::move(collider)) {
+    for (std::size_t i = 0; i < given.bodies.size(); ++i) {
+      require_native(given.bodies[i], i);
+      bodies.add(given.bodies[i]);
+    }
+  }
+
+  /// Who rested on a body that goes away or is put elsewhere must notice.
+  void wake_neighbours(std::uint32_t body) {
+    for (const Contact& c : contacts) {
+      if (c.a == body) bodies.wake(c.b);
+      if (c.b == body) bodies.wake(c.a);
+    }
+  }
+
+  /// A force that comes or goes is news to all bodies, whichever it may act on.
+  void wake_all() {
+    for (const BodyId id : bodies.ids()) bodies.wake(id.index);
+  }
+
+  double time() const { return static_cast<double>(steps) * static_cast<double>(scene.dt); }
+
+  bool advance(StepReport* report);
+  void undo() noexcept {
+    std::swap(bodies.moving, before);
+    contacts.clear();
+    events.clear();
+  }
+
+  Scene scene;
+  BodyStore bodies;
+  NarrowPhase narrow_phase;
+  ContactResolver resolver;
+  ForceRegistry forces;
+  bool bodies_changed = true;     ///< since the narrow phase last heard of them
+  std::vector<Contact> contacts;  ///< of the last step
+  ContactEvents events;
+  MotionArrays before;  ///< the state that a failed step goes back to
+  std::uint64_t steps = 0;
+};
+
+}  // namespace jfpx::inline JFPX_ABI

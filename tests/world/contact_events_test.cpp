@@ -1,0 +1,200 @@
+/// Contact events: across beginnings, rests, sleep, removal, moves by hand and failed steps.
+#include <jfpx/error.hpp>
+
+#include "tests/world/support.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <string>
+#include <utility>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+
+/// Phases and indices of a step's events, as "+0-1 =0-2 -1-2".
+std::string told(const World& world) {
+  std::string text;
+  for (const ContactEvent& e : world.contact_events()) {
+    if (!text.empty()) text += ' ';
+    text += e.phase == ContactPhase::begin ? '+' : e.phase == ContactPhase::stay ? '=' : '-';
+    text += std::to_string(e.a.index) + '-' + std::to_string(e.b.index);
+  }
+  return text;
+}
+std::string step(World* world) {
+  world->step();
+  return told(*world);
+}
+
+BodyDef heavy(const Vec3& position) {
+  BodyDef def = test::ball(position);
+  def.acceleration = {0, -9.81_r, 0};
+  def.can_sleep = true;
+  return def;
+}
+
+World two_resting_balls() {
+  Scene scene;
+  scene.bodies = {heavy({0, 0.995_r, 0}), heavy({0, 2.99_r, 0}), test::ground()};
+  return World(scene);
+}
+
+TEST(ContactEvents, OfNothingAreNone) {
+  World world{Scene{}};
+  EXPECT_TRUE(world.contact_events().empty());
+  EXPECT_EQ(step(&world), "");
+}
+
+TEST(ContactEvents, BeginStayAndEndWithABounce) {
+  Scene scene;
+  BodyDef ball = heavy({0, 1.5_r, 0});
+  ball.restitution = 1;
+  BodyDef ground = test::ground();
+  ground.restitution = 1;
+  scene.bodies = {ball, ground};
+  World world(scene);
+  std::string story;
+  for (int n = 0; n < 40; ++n) {
+    const std::string now = step(&world);
+    const std::string touching = world.contacts().empty() ? "" : now;
+    if (!touching.empty()) {
+      EXPECT_EQ(world.contact_events()[0].distance, world.contacts()[0].distance);
+    }
+    story += now.empty() ? "." : now.substr(0, 1);
+  }
+  // Falls for 0.32 s = 19 steps, touches, flies up and falls for 38.
+  EXPECT_EQ(story.find_first_not_of('.'), story.find('+'));
+  EXPECT_NE(story.find("+-."), std::string::npos) << story;
+  EXPECT_EQ(story.find("++"), std::string::npos) << story;
+}
+
+TEST(ContactEvents, TellTheDeepestContactOfAPairWhoeverIsFirstInIt) {
+  Scene scene;
+  BodyDef box = test::ball({0, 0.4_r, 0});
+  box.shape = Box{{1, 0.5_r, 1}};
+  box.orientation = normalized(Quat{1, 0, 0, 0.01_r});  // the corners at -x are the deeper ones
+  scene.bodies = {test::ground(), box};
+  World world(scene);
+  ASSERT_EQ(step(&world), "+0-1");
+  const ContactEvent& event = world.contact_events()[0];
+  EXPECT_EQ(event.a, world.bodies()[0]);
+  EXPECT_EQ(event.b, world.bodies()[1]);
+  EXPECT_EQ(event.contacts, 4u);
+  EXPECT_EQ(event.normal, (Vec3{0, -1, 0}));  // from the box to the ground
+  Real deepest = 0;
+  for (const Contact& c : world.contacts()) deepest = std::min(deepest, c.distance);
+  EXPECT_EQ(event.distance, deepest);
+  EXPECT_LT(event.point.x, 0);
+}
+
+TEST(ContactEvents, StayThroughSleep) {
+  World world = two_resting_balls();
+  EXPECT_EQ(step(&world), "+0-1 +0-2");
+  for (int n = 0; n < 120; ++n) ASSERT_EQ(step(&world), "=0-1 =0-2");
+  EXPECT_FALSE(world.awake(world.bodies()[0]));
+}
+
+TEST(ContactEvents, OfARemovedBodyEndInTheNextStep) {
+  World world = two_resting_balls();
+  step(&world);
+  const BodyId gone = world.bodies()[0];
+  // As a game does: remove while reading. The list stays as it is.
+  const auto events = world.contact_events();
+  world.remove(events[0].a);
+  EXPECT_EQ(told(world), "+0-1 +0-2");
+  EXPECT_EQ(step(&world), "-0-1 -0-2");
+  EXPECT_EQ(world.contact_events()[0].a, gone);
+  EXPECT_EQ(step(&world), "");
+}
+
+TEST(ContactEvents, TellTheNewBodyOfAnIndexFromTheOld) {
+  World world = two_resting_balls();
+  step(&world);
+  const BodyId old = world.bodies()[0];
+  world.remove(old);
+  const BodyId fresh = world.add(heavy({0, 0.995_r, 0}));
+  ASSERT_EQ(fresh.index, old.index);
+  EXPECT_EQ(step(&world), "-0-1 +0-1 -0-2 +0-2");
+  EXPECT_EQ(world.contact_events()[0].a, old);
+  EXPECT_EQ(world.contact_events()[1].a, fresh);
+}
+
+TEST(ContactEvents, FollowABodyThatIsPutElsewhere) {
+  World world = two_resting_balls();
+  step(&world);
+  world.set_state(world.bodies()[1], {{50, 0.995_r, 0}, {}, {}, {}});
+  EXPECT_EQ(step(&world), "-0-1 =0-2 +1-2");
+  world.set_state(world.bodies()[1], {{50, 9, 0}, {}, {}, {}});
+  EXPECT_EQ(step(&world), "=0-2 -1-2");
+}
+
+TEST(ContactEvents, OfAFailedStepAreNoneAndTheNextComparesWithTheLastThatSucceeded) {
+  World world = two_resting_balls();
+  step(&world);
+  bool fail = true;
+  const ForceId force = world.add_force([&fail](ForceContext&) {
+    if (fail) throw InvalidArgument("on purpose");
+  });
+  EXPECT_THROW(world.step(), InvalidArgument);
+  EXPECT_EQ(told(world), "");
+  EXPECT_THROW(world.step(), InvalidArgument);
+  fail = false;
+  EXPECT_EQ(step(&world), "=0-1 =0-2");
+
+  // A runaway body fails a step after contacts were found.
+  BodyDef runaway = test::ball({50, 0, 0});
+  runaway.velocity.y = std::numeric_limits<Real>::max() / 2;
+  const BodyId id = world.add(runaway);
+  ASSERT_TRUE(world.step().non_finite);
+  EXPECT_EQ(told(world), "");
+  world.remove(id);
+  world.remove_force(force);
+  EXPECT_EQ(step(&world), "=0-1 =0-2");
+}
+
+TEST(ContactEvents, AreTheDifferencesOfTheContactListsInARandomWorld) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  Scene scene;
+  for (int i = 0; i < 40; ++i) {
+    BodyDef def = test::ball(random.uniform_in_box({-3, 1, -3}, {3, 9, 3}));
+    if (i % 2 != 0) def.shape = Box{{0.5_r, 0.7_r, 0.9_r}};
+    if (i % 9 == 0) def.mass = 0;
+    def.acceleration = {0, -9.81_r, 0};
+    scene.bodies.push_back(def);
+  }
+  scene.bodies.insert(scene.bodies.begin() + 20, test::ground());
+  World world(scene);
+  using Pairs = std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t>;
+  Pairs before;
+  std::uint64_t begun = 0, ended = 0;
+  for (int n = 0; n < 200; ++n) {
+    world.step();
+    Pairs now;
+    for (const Contact& c : world.contacts()) ++now[std::minmax(c.a, c.b)];
+    std::pair<std::uint32_t, std::uint32_t> last{0, 0};
+    std::size_t touching = 0;
+    for (const ContactEvent& e : world.contact_events()) {
+      const std::pair pair{e.a.index, e.b.index};
+      ASSERT_LT(last, pair);
+      last = pair;
+      ASSERT_EQ(e.phase != ContactPhase::begin, before.contains(pair));
+      ASSERT_EQ(e.phase != ContactPhase::end, now.contains(pair));
+      ASSERT_EQ(e.contacts, (e.phase == ContactPhase::end ? before : now)[pair]);
+      begun += e.phase == ContactPhase::begin;
+      ended += e.phase == ContactPhase::end;
+      touching += e.phase != ContactPhase::end;
+    }
+    ASSERT_EQ(touching, now.size());
+    before = now;
+  }
+  EXPECT_GT(begun, 40u);
+  EXPECT_GT(ended, 10u);
+}
+
+}  // namespace
+}  // namespace jfpx
