@@ -38,6 +38,20 @@ void step(benchmark::State& state, const char* name, std::uint32_t spheres, int 
 void step_pile_2048(benchmark::State& state) { step(state, "pile", 2048, 120); }
 void step_tower_448(benchmark::State& state) { step(state, "boxes-and-balls", 448, 400); }
 
+/// One ray across a pile, by the number of spheres.
+void cast_ray(benchmark::State& state) {
+  const World world(
+      scenes::make("pile", {.spheres = static_cast<std::uint32_t>(state.range(0)), .seed = 1}));
+  Random random(1);
+  for (auto _ : state) {
+    const Ray ray{{0, 1000, 0}, random.uniform_in_box({-1, -50, -1}, {1, -50, 1})};
+    benchmark::DoNotOptimize(world.cast_ray(ray));
+  }
+  state.counters["time_per_body"] = benchmark::Counter(
+      static_cast<double>(state.range(0)),
+      benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+
 /// A lattice with 19494 contacts whose spheres fly in all directions.
 struct Crowd {
   Crowd() : bodies(Real(0.01), SleepSettings{}) {
@@ -78,6 +92,7 @@ void resolve_20000(benchmark::State& state) {
 
 BENCHMARK(step_pile_2048)->Unit(benchmark::kMillisecond);
 BENCHMARK(step_tower_448)->Unit(benchmark::kMillisecond);
+BENCHMARK(cast_ray)->Arg(1000)->Arg(10000)->Arg(100000);
 BENCHMARK(resolve_20000<IndexedHeap>)->Arg(20000)->Unit(benchmark::kMillisecond);
 BENCHMARK(resolve_20000<test::LinearScan>)->Arg(20000)->Unit(benchmark::kMillisecond);
 

@@ -3,11 +3,13 @@
 
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
+#include <jfpx/query.hpp>
 #include <jfpx/scene.hpp>
 #include <jfpx/sphere_collider.hpp>
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -128,6 +130,19 @@ class JFPX_API World {
   /// Wakes all bodies. @throws InvalidArgument for an unknown id.
   void remove_force(ForceId id);
   std::span<const ForceId> forces() const;  ///< in the order in which they act
+
+  /// What a ray hits first; of bodies at the same distance, the one with the lowest index. Each
+  /// query looks at every body, asleep or not, immovable or not: O(bodies), a few nanoseconds each.
+  /// @throws InvalidArgument for a field of the ray that is out of its range
+  std::optional<RayHit> cast_ray(const Ray& ray, const BodyFilter& filter = {}) const;
+  /// All that it hits, by distance, then index: one hit a body.
+  std::vector<RayHit> cast_ray_through(const Ray& ray, const BodyFilter& filter = {}) const;
+  /// Bodies that a sphere or a box touches, in the order of bodies(). An exact touch counts, as it
+  /// does for contacts, and with the same arithmetic.
+  /// @throws InvalidArgument for a size, place or orientation that no body could have
+  std::vector<BodyId> overlapping(const Sphere& sphere, const Vec3& centre) const;
+  std::vector<BodyId> overlapping(const Box& box, const Vec3& centre,
+                                  const Quat& orientation = {}) const;
 
   double time() const;  ///< [s], completed steps times dt
   /// Contacts of the last step, in order: sphere pairs by (a, b), then others by (a, b), the points

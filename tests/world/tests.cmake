@@ -12,6 +12,7 @@ jfpx_add_test(world_test SOURCES
   world/force_registry_test.cpp
   world/force_test.cpp
   world/motion_test.cpp
+  world/query_test.cpp
   world/rest_test.cpp
   world/world_test.cpp)
 jfpx_add_test(allocation_test SOURCES world/allocation_test.cpp)

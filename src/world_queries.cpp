@@ -1,0 +1,156 @@
+/// Rays and overlaps, against all bodies one by one: O(bodies), no structure to keep up to date.
+#include <jfpx/collide.hpp>
+#include <jfpx/error.hpp>
+
+#include "src/scene_validate.hpp"
+#include "src/shared/ray.hpp"
+#include "src/world_impl.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace jfpx::inline JFPX_ABI {
+namespace {
+
+[[noreturn]] void refuse(const char* name, const std::string& value, const char* range) {
+  throw InvalidArgument(std::string(name) + " is " + value + "; it must be " + range);
+}
+
+void require_place(const char* name, const Vec3& place) {
+  for (int i = 0; i < 3; ++i) {
+    if (!(absolute(place[i]) <= kMaxCoordinate))
+      refuse(name, to_text(place), "between -1e9 and 1e9");
+  }
+}
+
+/// Scaled first, for the square of a short or long vector's length may not be a number of Reals.
+Vec3 unit_direction(const Vec3& v) {
+  const Real most = std::max({absolute(v.x), absolute(v.y), absolute(v.z)});
+  if (!is_finite(v) || !(most > 0)) refuse("ray direction", to_text(v), "finite and not zero");
+  int exponent = 0;
+  std::frexp(most, &exponent);
+  const auto scaled = [exponent](Real x) { return std::ldexp(x, -exponent); };
+  return normalized(Vec3{scaled(v.x), scaled(v.y), scaled(v.z)});
+}
+
+/// A valid ray with a direction of length 1.
+Ray checked(const Ray& ray) {
+  require_place("ray origin", ray.origin);
+  if (!(ray.max_distance >= 0)) {
+    refuse("ray max_distance", to_text(ray.max_distance), ">= 0; infinity is allowed");
+  }
+  return {ray.origin, unit_direction(ray.direction), ray.max_distance};
+}
+
+Transform pose_of(const BodyStore& bodies, std::uint32_t body) {
+  return make_transform(bodies.moving.orientation[body], bodies.moving.position[body]);
+}
+
+shared::RayEntry enter(const Ray& ray, const BodyStore& bodies, std::uint32_t body) {
+  const auto visit = [&](const auto& shape) {
+    using S = std::decay_t<decltype(shape)>;
+    if constexpr (std::is_same_v<S, Sphere>) {
+      return shared::enter(ray.origin, ray.direction,
+                           SphereInstance{bodies.moving.position[body], shape.radius});
+    } else if constexpr (std::is_same_v<S, Box>) {
+      return shared::enter(ray.origin, ray.direction, shape, pose_of(bodies, body));
+    } else {
+      return shared::enter(ray.origin, ray.direction, shape);
+    }
+  };
+  return std::visit(visit, bodies.shape(body));
+}
+
+/// Calls `found` with each hit, in the order of bodies.
+template <class Found>
+void for_each_hit(const Ray& given, const BodyStore& bodies, const BodyFilter& filter,
+                  const Found& found) {
+  const Ray ray = checked(given);
+  for (const BodyId id : bodies.ids()) {
+    const shared::RayEntry entry = enter(ray, bodies, id.index);
+    if (!entry.hit || entry.distance > ray.max_distance || (filter && !filter(id))) continue;
+    found(RayHit{id, entry.distance, add_scaled(ray.origin, ray.direction, entry.distance),
+                 entry.normal});
+  }
+}
+
+bool touch(const SphereInstance& sphere, const Shape& shape, const Transform& pose) {
+  const auto visit = [&](const auto& s) {
+    using S = std::decay_t<decltype(s)>;
+    if constexpr (std::is_same_v<S, Sphere>) {
+      return !(length(sphere.centre - pose.origin) > sphere.radius + s.radius);
+    } else if constexpr (std::is_same_v<S, Box>) {
+      return collide(sphere, s, pose).touching;
+    } else {
+      return collide(sphere, s).touching;
+    }
+  };
+  return std::visit(visit, shape);
+}
+
+bool touch(const Box& box, const Transform& box_pose, const Shape& shape, const Transform& pose) {
+  const auto visit = [&](const auto& s) {
+    using S = std::decay_t<decltype(s)>;
+    if constexpr (std::is_same_v<S, Sphere>) {
+      return collide(SphereInstance{pose.origin, s.radius}, box, box_pose).touching;
+    } else if constexpr (std::is_same_v<S, Box>) {
+      return collide(box, box_pose, s, pose).count > 0;
+    } else {
+      return collide(box, box_pose, s).count > 0;
+    }
+  };
+  return std::visit(visit, shape);
+}
+
+}  // namespace
+
+std::optional<RayHit> World::cast_ray(const Ray& ray, const BodyFilter& filter) const {
+  std::optional<RayHit> closest;
+  for_each_hit(ray, impl_->bodies, filter, [&closest](const RayHit& hit) {
+    if (!closest || hit.distance < closest->distance) closest = hit;
+  });
+  return closest;
+}
+
+std::vector<RayHit> World::cast_ray_through(const Ray& ray, const BodyFilter& filter) const {
+  std::vector<RayHit> hits;
+  for_each_hit(ray, impl_->bodies, filter, [&hits](const RayHit& hit) { hits.push_back(hit); });
+  std::ranges::sort(hits, {},
+                    [](const RayHit& hit) { return std::tuple(hit.distance, hit.body.index); });
+  return hits;
+}
+
+std::vector<BodyId> World::overlapping(const Sphere& sphere, const Vec3& centre) const {
+  require_place("sphere centre", centre);
+  if (!(sphere.radius > 0 && sphere.radius <= kMaxCoordinate)) {
+    refuse("sphere radius", to_text(sphere.radius), "> 0 and at most 1e9");
+  }
+  std::vector<BodyId> found;
+  for (const BodyId id : bodies()) {
+    const Transform pose = pose_of(impl_->bodies, id.index);
+    if (touch({centre, sphere.radius}, impl_->bodies.shape(id.index), pose)) found.push_back(id);
+  }
+  return found;
+}
+
+std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
+                                       const Quat& orientation) const {
+  const Vec3& h = box.half_extents;
+  for (int i = 0; i < 3; ++i) {
+    if (!(h[i] > 0 && h[i] <= kMaxCoordinate)) {
+      refuse("box half_extents", to_text(h), "> 0 and at most 1e9 each");
+    }
+  }
+  const std::string fault = find_fault(BodyState{centre, orientation, {}, {}});
+  if (!fault.empty()) throw InvalidArgument("box " + fault);
+  const Transform box_pose = make_transform(normalized(orientation), centre);
+  std::vector<BodyId> found;
+  for (const BodyId id : bodies()) {
+    const Transform pose = pose_of(impl_->bodies, id.index);
+    if (touch(box, box_pose, impl_->bodies.shape(id.index), pose)) found.push_back(id);
+  }
+  return found;
+}
+
+}  // namespace jfpx::inline JFPX_ABI

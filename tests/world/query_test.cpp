@@ -1,0 +1,405 @@
+/// Rays and overlaps: by hand, against distance functions in double, and with bad input.
+#include <jfpx/error.hpp>
+
+#include "tests/world/support.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <set>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+using ::testing::ElementsAre;
+
+constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
+constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
+
+using Point = std::array<double, 3>;
+Point to_double(const Vec3& v) {
+  return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
+}
+double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Point along(const Point& from, const Point& direction, double t) {
+  return {from[0] + direction[0] * t, from[1] + direction[1] * t, from[2] + direction[2] * t};
+}
+
+/// A body in double, with the distance of a point from its surface: negative inside.
+struct Solid {
+  Shape shape;
+  Point centre;
+  std::array<Point, 3> axes;  ///< of the body, as unit vectors
+
+  explicit Solid(const BodyDef& def) : shape(def.shape), centre(to_double(def.position)) {
+    const Quat& q = def.orientation;
+    const double w = q.w, x = q.x, y = q.y, z = q.z, n = w * w + x * x + y * y + z * z;
+    axes[0] = {1 - 2 * (y * y + z * z) / n, 2 * (x * y + w * z) / n, 2 * (x * z - w * y) / n};
+    axes[1] = {2 * (x * y - w * z) / n, 1 - 2 * (x * x + z * z) / n, 2 * (y * z + w * x) / n};
+    axes[2] = {2 * (x * z + w * y) / n, 2 * (y * z - w * x) / n, 1 - 2 * (x * x + y * y) / n};
+  }
+  Point to_local(const Point& p) const {
+    const Point d{p[0] - centre[0], p[1] - centre[1], p[2] - centre[2]};
+    return {dot(axes[0], d), dot(axes[1], d), dot(axes[2], d)};
+  }
+  Point to_world(const Point& p) const {
+    return along(along(along(centre, axes[0], p[0]), axes[1], p[1]), axes[2], p[2]);
+  }
+  double distance(const Point& p) const {
+    if (const auto* sphere = std::get_if<Sphere>(&shape)) {
+      const Point local = to_local(p);
+      return std::sqrt(dot(local, local)) - static_cast<double>(sphere->radius);
+    }
+    if (const auto* plane = std::get_if<HalfSpace>(&shape)) {
+      const Point n = to_double(plane->normal);
+      const double len = std::sqrt(dot(n, n));
+      return (dot(n, p) - static_cast<double>(plane->offset)) / len;
+    }
+    const Point local = to_local(p), h = to_double(std::get<Box>(shape).half_extents);
+    double outside = 0, inside = -1e300;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double d = std::abs(local[i]) - h[i];
+      inside = std::max(inside, d);
+      outside += d > 0 ? d * d : 0;
+    }
+    return outside > 0 ? std::sqrt(outside) : inside;
+  }
+  /// The point of a box next to p.
+  Point nearest(const Point& p, double shrunk_by) const {
+    Point local = to_local(p);
+    const Point h = to_double(std::get<Box>(shape).half_extents);
+    for (std::size_t i = 0; i < 3; ++i) {
+      local[i] = std::clamp(local[i], shrunk_by - h[i], h[i] - shrunk_by);
+    }
+    return to_world(local);
+  }
+};
+
+/// Where a ray is deeper in a solid than `margin`, by steps that can't jump over such a place (Hart
+/// 1996, sphere tracing); infinity if nowhere before `end`.
+double march(const Solid& solid, const Point& origin, const Point& direction, double end,
+             double margin) {
+  for (double t = 0; t < end;) {
+    const double d = solid.distance(along(origin, direction, t));
+    if (d < -margin) return t;
+    t += d + 2 * margin;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+/// Balls, boxes and a half-space, some in each other.
+Scene random_scene(Random* random, int bodies) {
+  Scene scene;
+  for (int i = 0; i < bodies; ++i) {
+    BodyDef def = test::ball(random->uniform_in_box({-5, -5, -5}, {5, 5, 5}),
+                             random->uniform(0.1_r, 1.5_r), static_cast<Real>(i % 3));
+    if (i % 2 != 0) {
+      def.shape = Box{random->uniform_in_box({0.05_r, 0.05_r, 0.05_r}, {2, 2, 2})};
+      const Vec3 v = random->uniform_in_box({-1, -1, -1}, {1, 1, 1});
+      def.orientation = normalized(Quat{random->uniform(-1, 1), v.x, v.y, v.z});
+    }
+    scene.bodies.push_back(def);
+  }
+  BodyDef floor = test::half_space(
+      normalized(random->uniform_in_box({-0.3_r, 1, -0.3_r}, {0.3_r, 1, 0.3_r})), -4);
+  scene.bodies.push_back(floor);
+  return scene;
+}
+
+Vec3 random_direction(Random* random) {
+  const Vec3 v = random->uniform_in_box({-1, -1, -1}, {1, 1, 1});
+  Vec3 axis{};
+  axis[static_cast<int>(random->below(3))] = random->below(2) != 0 ? Real(1) : Real(-1);
+  return random->below(4) == 0 ? axis : v;  // parallel to faces now and then
+}
+
+TEST(RayCast, HitsWhatTheDistanceFunctionsSayAndNothingElse) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  const double margin = 4e-5;  // 20 m in float: a step of 2e-6, some ten of which add up
+  std::uint64_t hits = 0, inside = 0;
+  for (int run = 0; run < 300; ++run) {
+    const Scene scene = random_scene(&random, 12);
+    const World world(scene);
+    for (int i = 0; i < 100; ++i) {
+      const Ray ray{random.uniform_in_box({-8, -3, -8}, {8, 8, 8}), random_direction(&random),
+                    i % 3 == 0 ? random.uniform(0, 10) : 20};
+      const Point origin = to_double(ray.origin);
+      Point direction = to_double(ray.direction);
+      const double len = std::sqrt(dot(direction, direction));
+      for (double& d : direction) d /= len;
+      const std::vector<RayHit> found = world.cast_ray_through(ray);
+      std::set<std::uint32_t> met;
+      for (const RayHit& hit : found) {
+        ASSERT_TRUE(met.insert(hit.body.index).second);
+        const Solid solid(scene.bodies[hit.body.index]);
+        const double t = hit.distance, start = solid.distance(origin);
+        ASSERT_LE(hit.distance, ray.max_distance);
+        ASSERT_GE(hit.distance, 0);
+        ASSERT_NEAR(length(hit.normal), 1, 1e-6);
+        if (t == 0) {
+          ASSERT_LE(start, margin);
+          ++inside;
+          continue;
+        }
+        // On the surface, not in the solid before, and against the normal of this very face.
+        const Point there = along(origin, direction, t);
+        ASSERT_NEAR(solid.distance(there), 0, margin) << "body " << hit.body.index;
+        ASSERT_GE(march(solid, origin, direction, t - 1e-3, margin), t - 1e-3);
+        for (int k = 0; k < 3; ++k) {
+          ASSERT_NEAR(hit.point[k], there[static_cast<std::size_t>(k)], margin);
+        }
+        ASSERT_LE(dot(to_double(hit.normal), direction), margin);
+        const Point above = along(there, to_double(hit.normal), 0.01);
+        ASSERT_NEAR(solid.distance(above), 0.01, 3 * margin);
+      }
+      for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+        if (met.contains(body)) continue;
+        const Solid solid(scene.bodies[body]);
+        ASSERT_GE(march(solid, origin, direction, ray.max_distance - margin, margin), 1e9) << body;
+      }
+      hits += found.size();
+      // The closest is the first of all, which are sorted.
+      for (std::size_t k = 1; k < found.size(); ++k) {
+        ASSERT_LE(std::pair(found[k - 1].distance, found[k - 1].body.index),
+                  std::pair(found[k].distance, found[k].body.index));
+      }
+      const std::optional<RayHit> closest = world.cast_ray(ray);
+      ASSERT_EQ(closest.has_value(), !found.empty());
+      if (closest) {
+        ASSERT_EQ(*closest, found[0]);
+      }
+    }
+  }
+  EXPECT_GT(hits, 5000u);
+  EXPECT_GT(inside, 500u);
+}
+
+/// A ball at x = 5, a box around x = 10 and a wall at x = 20.
+World three_in_a_row() {
+  Scene scene;
+  BodyDef box = test::ball({10, 0, 0});
+  box.shape = Box{{1, 2, 3}};
+  scene.bodies = {test::half_space({-1, 0, 0}, -20), box, test::ball({5, 0, 0})};
+  return World(scene);
+}
+
+TEST(RayCast, GivesDistancePointAndNormal) {
+  const World world = three_in_a_row();
+  const auto hits = world.cast_ray_through({{0, 0.5_r, 0}, {1000, 0, 0}});
+  ASSERT_EQ(hits.size(), 3u);
+  const Real x = square_root(0.75_r);
+  EXPECT_EQ(hits[0].body, world.bodies()[2]);
+  EXPECT_NEAR(hits[0].distance, 5 - x, 1e-6);
+  EXPECT_NEAR(hits[0].normal.x, -x, 1e-6);
+  EXPECT_NEAR(hits[0].normal.y, 0.5, 1e-6);
+  EXPECT_EQ(hits[1], (RayHit{world.bodies()[1], 9, {9, 0.5_r, 0}, {-1, 0, 0}}));
+  EXPECT_EQ(hits[2], (RayHit{world.bodies()[0], 20, {20, 0.5_r, 0}, {-1, 0, 0}}));
+}
+
+TEST(RayCast, EndsAtItsMaximumDistanceInclusive) {
+  const World world = three_in_a_row();
+  EXPECT_FALSE(world.cast_ray({{0, 0, 0}, {1, 0, 0}, 3.99_r}));
+  EXPECT_EQ(world.cast_ray({{0, 0, 0}, {1, 0, 0}, 4})->distance, 4);
+  EXPECT_FALSE(world.cast_ray({{0, 0, 0}, {1, 0, 0}, 0}));
+  EXPECT_FALSE(world.cast_ray({{0, 0, 0}, {-1, 0, 0}}));
+  EXPECT_FALSE(World{Scene{}}.cast_ray({}));
+}
+
+TEST(RayCast, FromInsideHitsAtOnceAgainstTheRay) {
+  const World world = three_in_a_row();
+  for (const Vec3& from : {Vec3{5, 0.5_r, 0}, Vec3{10, 0, 0}, Vec3{30, 0, 0}}) {
+    const auto hit = world.cast_ray({from, {0, 2, 0}});
+    ASSERT_TRUE(hit);
+    EXPECT_EQ(hit->distance, 0);
+    EXPECT_EQ(hit->point, from);
+    EXPECT_EQ(hit->normal, (Vec3{0, -1, 0}));
+  }
+}
+
+TEST(RayCast, HearsOnlyOfBodiesThatTheFilterWants) {
+  const World world = three_in_a_row();
+  const BodyId ball = world.bodies()[2];
+  const auto not_the_ball = [ball](BodyId id) { return id != ball; };
+  EXPECT_EQ(world.cast_ray({{0, 0, 0}, {1, 0, 0}}, not_the_ball)->body, world.bodies()[1]);
+  EXPECT_EQ(world.cast_ray_through({{0, 0, 0}, {1, 0, 0}}, not_the_ball).size(), 2u);
+}
+
+TEST(RayCast, TiesGoToTheLowestIndex) {
+  Scene scene;
+  for (int i = 0; i < 5; ++i) scene.bodies.push_back(test::ball({5, 0, 0}));
+  const World world(scene);
+  const auto hits = world.cast_ray_through({{0, 0, 0}, {1, 0, 0}});
+  ASSERT_EQ(hits.size(), 5u);
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(hits[i].body, world.bodies()[i]);
+  EXPECT_EQ(world.cast_ray({{0, 0, 0}, {1, 0, 0}})->body, world.bodies()[0]);
+}
+
+TEST(RayCast, TheLengthOfTheDirectionDoesNotMatter) {
+  const World world = three_in_a_row();
+  const auto expected = world.cast_ray({{0, 0, 0}, {1, 0.01_r, 0}});
+  for (const int power : {-118, -60, 60, 126}) {
+    const Real scale = std::ldexp(Real(1), power);
+    EXPECT_EQ(world.cast_ray({{0, 0, 0}, {scale, 0.01_r * scale, 0}}), expected) << power;
+  }
+}
+
+TEST(RayCast, SeesBodiesWhereTheyAreNow) {
+  World world = three_in_a_row();
+  world.set_state(world.bodies()[2], {{7, 0, 0}, {}, {}, {}});
+  EXPECT_EQ(world.cast_ray({{0, 0, 0}, {1, 0, 0}})->distance, 6);
+  world.remove(world.bodies()[2]);
+  EXPECT_EQ(world.cast_ray({{0, 0, 0}, {1, 0, 0}})->distance, 9);
+}
+
+template <class Call>
+std::string complaint(const Call& call) {
+  try {
+    call();
+  } catch (const InvalidArgument& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(RayCast, RefusesWhatIsNoRay) {
+  const World world = three_in_a_row();
+  const auto said = [&world](const Ray& ray) { return complaint([&] { world.cast_ray(ray); }); };
+  EXPECT_EQ(said({{0, 0, 0}, {0, 0, 0}}),
+            "ray direction is (0, 0, 0); it must be finite and not zero");
+  EXPECT_EQ(said({{0, 0, 0}, {1, 0, 0}, -1}),
+            "ray max_distance is -1; it must be >= 0; infinity is allowed");
+  EXPECT_EQ(said({{2e9_r, 0, 0}, {1, 0, 0}}),
+            "ray origin is (2e+09, 0, 0); it must be between -1e9 and 1e9");
+  for (const Real bad : {kNan, kInfinity, -kInfinity}) {
+    EXPECT_NE(said({{0, bad, 0}, {1, 0, 0}}), "");
+    EXPECT_NE(said({{0, 0, 0}, {1, 0, bad}}), "");
+  }
+  EXPECT_NE(said({{0, 0, 0}, {1, 0, 0}, kNan}), "");
+  EXPECT_NE(complaint([&] { world.cast_ray_through({{0, 0, 0}, {0, 0, 0}}); }), "");
+}
+
+TEST(Overlap, OfASphereIsWhatTheDistanceFunctionsSay) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  std::uint64_t touching = 0;
+  for (int run = 0; run < 100; ++run) {
+    const Scene scene = random_scene(&random, 12);
+    const World world(scene);
+    for (int i = 0; i < 20; ++i) {
+      const Vec3 centre = random.uniform_in_box({-6, -6, -6}, {6, 6, 6});
+      const Real radius = random.uniform(0.01_r, 2);
+      std::set<std::uint32_t> found;
+      for (const BodyId id : world.overlapping(Sphere{radius}, centre)) found.insert(id.index);
+      for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+        const double gap =
+            Solid(scene.bodies[body]).distance(to_double(centre)) - static_cast<double>(radius);
+        if (std::abs(gap) > 1e-5) {
+          ASSERT_EQ(found.contains(body), gap < 0) << body;
+        }
+      }
+      touching += found.size();
+    }
+  }
+  EXPECT_GT(touching, 1000u);
+}
+
+/// Distance of two boxes, from above: by going to and fro between the points nearest to each other
+/// (Cheney and Goldstein 1959).
+double gap(const Solid& a, const Solid& b, double shrunk_by) {
+  Point p = a.centre, q = b.centre;
+  for (int i = 0; i < 3000; ++i) {
+    q = b.nearest(p, shrunk_by);
+    p = a.nearest(q, shrunk_by);
+  }
+  const Point d = along(p, q, -1);
+  return std::sqrt(dot(d, d));
+}
+
+TEST(Overlap, OfABoxIsWhatTheDistanceFunctionsSay) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  std::uint64_t touching = 0;
+  for (int run = 0; run < 120; ++run) {
+    const Scene scene = random_scene(&random, 12);
+    const World world(scene);
+    for (int i = 0; i < 10; ++i) {
+      BodyDef def;
+      def.position = random.uniform_in_box({-6, -6, -6}, {6, 6, 6});
+      def.shape = Box{random.uniform_in_box({0.05_r, 0.05_r, 0.05_r}, {1, 1, 1})};
+      const Vec3 v = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
+      def.orientation = normalized(Quat{random.uniform(-1, 1), v.x, v.y, v.z});
+      const Solid box(def);
+      std::set<std::uint32_t> found;
+      for (const BodyId id :
+           world.overlapping(std::get<Box>(def.shape), def.position, def.orientation)) {
+        found.insert(id.index);
+      }
+      for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+        const Solid solid(scene.bodies[body]);
+        double distance = 0;
+        if (const auto* sphere = std::get_if<Sphere>(&solid.shape)) {
+          distance = box.distance(solid.centre) - static_cast<double>(sphere->radius);
+        } else if (std::holds_alternative<HalfSpace>(solid.shape)) {
+          distance = 1e300;
+          for (int corner = 0; corner < 8; ++corner) {
+            Point local = to_double(std::get<Box>(def.shape).half_extents);
+            for (std::size_t k = 0; k < 3; ++k) local[k] *= (corner >> k & 1) != 0 ? 1 : -1;
+            distance = std::min(distance, solid.distance(box.to_world(local)));
+          }
+        } else if (found.contains(body)) {
+          distance = gap(box, solid, 0) < 1e-3 ? -1 : 1;
+        } else {
+          distance = gap(box, solid, 1e-3) > 1e-9 ? 1 : -1;
+        }
+        if (std::abs(distance) > 1e-5) {
+          ASSERT_EQ(found.contains(body), distance < 0) << body;
+        }
+      }
+      touching += found.size();
+    }
+  }
+  EXPECT_GT(touching, 200u);
+}
+
+TEST(Overlap, ComesInTheOrderOfBodiesAndCountsAnExactTouch) {
+  const World world = three_in_a_row();
+  const auto ids = world.bodies();
+  EXPECT_THAT(world.overlapping(Sphere{3}, {7.5_r, 0, 0}), ElementsAre(ids[1], ids[2]));
+  EXPECT_THAT(world.overlapping(Sphere{4}, {0, 0, 0}), ElementsAre(ids[2]));
+  EXPECT_THAT(world.overlapping(Sphere{3.99_r}, {0, 0, 0}), ElementsAre());
+  EXPECT_THAT(world.overlapping(Box{{4, 1, 1}}, {0, 0, 0}), ElementsAre(ids[2]));
+  EXPECT_THAT(world.overlapping(Box{{8, 1, 1}}, {12, 0, 0}), ElementsAre(ids[0], ids[1], ids[2]));
+  EXPECT_THAT(World{Scene{}}.overlapping(Sphere{}, {}), ElementsAre());
+}
+
+TEST(Overlap, RefusesWhatCouldBeNoBody) {
+  const World world = three_in_a_row();
+  const auto sphere = [&world](Real radius, const Vec3& centre) {
+    return complaint([&] { world.overlapping(Sphere{radius}, centre); });
+  };
+  const auto box = [&world](const Vec3& half, const Vec3& centre, const Quat& q) {
+    return complaint([&] { world.overlapping(Box{half}, centre, q); });
+  };
+  EXPECT_EQ(sphere(0, {}), "sphere radius is 0; it must be > 0 and at most 1e9");
+  EXPECT_EQ(box({1, -1, 1}, {}, {}),
+            "box half_extents is (1, -1, 1); it must be > 0 and at most 1e9 each");
+  EXPECT_EQ(box({1, 1, 1}, {}, {2, 0, 0, 0}),
+            "box orientation is (2, 0, 0, 0); it must be a unit quaternion, to a thousandth");
+  for (const Real bad : {kNan, kInfinity}) {
+    EXPECT_NE(sphere(bad, {}), "");
+    EXPECT_NE(sphere(1, {0, bad, 0}), "");
+    EXPECT_NE(box({bad, 1, 1}, {}, {}), "");
+    EXPECT_NE(box({1, 1, 1}, {bad, 0, 0}, {}), "");
+    EXPECT_NE(box({1, 1, 1}, {}, {bad, 0, 0, 0}), "");
+  }
+}
+
+}  // namespace
+}  // namespace jfpx
