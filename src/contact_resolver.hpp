@@ -108,9 +108,7 @@ void BasicContactResolver<Queue>::prepare(std::span<const Contact> contacts) {
     if (moving.awake[c.a] != 0) acceleration += moving.last_acceleration[c.a];
     if (moving.awake[c.b] != 0) acceleration -= moving.last_acceleration[c.b];
     rows_.push_back({c.a, c.b, c.normal, lever_arm(c.a, c, -1), lever_arm(c.b, c, 1),
-                     dot(acceleration, c.normal) * bodies_->dt(),
-                     square_root(bodies_->friction(c.a) * bodies_->friction(c.b)),
-                     square_root(bodies_->restitution(c.a) * bodies_->restitution(c.b)), 0, 0});
+                     dot(acceleration, c.normal) * bodies_->dt(), c.friction, c.restitution, 0, 0});
     keys_.push_back(-c.distance);
   }
   for (RowIndex first = 0, last = 0; first < rows_.size(); first = last) {

@@ -47,6 +47,17 @@ void read(const Json& json, const std::string& where, std::uint32_t& out) {
   }
   out = json.get<std::uint32_t>();
 }
+void read(const Json& json, const std::string& where, CombineRule& out) {
+  std::string name, names;
+  read(json, where, name);
+  // Past the last rule there are no names.
+  for (std::uint8_t i = 0; to_string(CombineRule{i}) != nullptr; ++i) {
+    out = CombineRule{i};
+    if (name == to_string(out)) return;
+    names += (i == 0 ? "" : ", ") + std::string(to_string(out));
+  }
+  fail(where, "is " + json.dump() + "; it must be one of " + names);
+}
 void read_array(const Json& json, const std::string& where, std::span<Real* const> out) {
   if (!json.is_array() || json.size() != out.size()) {
     fail(where, "must be an array of " + std::to_string(out.size()) + " numbers");
@@ -67,6 +78,7 @@ void read(const Json& json, const std::string& where, Quat& q) {
 void read(const Json& json, const std::string& where, Shape& shape);
 void read(const Json& json, const std::string& where, ResolverSettings& settings);
 void read(const Json& json, const std::string& where, SleepSettings& settings);
+void read(const Json& json, const std::string& where, MaterialSettings& settings);
 
 /// Reads the fields of one object and complains about those that nobody asked for.
 class ObjectReader {
@@ -167,6 +179,13 @@ void read(const Json& json, const std::string& where, SleepSettings& settings) {
   object.reject_unknown();
 }
 
+void read(const Json& json, const std::string& where, MaterialSettings& settings) {
+  ObjectReader object(json, where);
+  object.optional("friction", settings.friction);
+  object.optional("restitution", settings.restitution);
+  object.reject_unknown();
+}
+
 Scene scene_from(const Json& json) {
   ObjectReader object(json, "scene");
   const Json& version = object.at("jfpx_scene");
@@ -179,6 +198,7 @@ Scene scene_from(const Json& json) {
   object.optional("dt", scene.dt);
   object.optional("resolver", scene.resolver);
   object.optional("sleep", scene.sleep);
+  object.optional("materials", scene.materials);
   const Json& bodies = object.at("bodies");
   if (!bodies.is_array())
     fail("scene.bodies", std::string("is ") + kind_of(bodies) + "; it must be an array");
@@ -245,12 +265,14 @@ std::string to_json(const Scene& scene) {
   const Json sleep = {{"enabled", scene.sleep.enabled},
                       {"epsilon", scene.sleep.epsilon},
                       {"bias", scene.sleep.bias}};
+  const Json materials = {{"friction", to_string(scene.materials.friction)},
+                          {"restitution", to_string(scene.materials.restitution)}};
   // By hand around the values, so that a file has one line a body.
   std::string text = "{\"jfpx_scene\": " + std::to_string(kSceneSchemaVersion) +
                      ",\n \"name\": " + Json(scene.name).dump() +
                      ",\n \"dt\": " + Json(scene.dt).dump() +
                      ",\n \"resolver\": " + resolver.dump() + ",\n \"sleep\": " + sleep.dump() +
-                     ",\n \"bodies\": [";
+                     ",\n \"materials\": " + materials.dump() + ",\n \"bodies\": [";
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     text += (i == 0 ? "\n  " : ",\n  ") + to_value(scene.bodies[i]).dump();
   }

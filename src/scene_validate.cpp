@@ -9,6 +9,7 @@
 #include <charconv>
 #include <initializer_list>
 #include <limits>
+#include <utility>
 
 namespace jfpx::inline JFPX_ABI {
 namespace {
@@ -109,6 +110,16 @@ std::string find_fault(const ResolverSettings& resolver) {
   return {};
 }
 
+std::string find_fault(const MaterialSettings& materials) {
+  for (const auto& [field, rule] : {std::pair("materials.friction", materials.friction),
+                                    std::pair("materials.restitution", materials.restitution)}) {
+    if (to_string(rule) == nullptr) {
+      return fault(field, static_cast<Real>(rule), "one of the rules of CombineRule");
+    }
+  }
+  return {};
+}
+
 std::string find_fault(const SleepSettings& sleep) {
   if (!(sleep.epsilon > 0 && is_finite(sleep.epsilon))) {
     return fault("sleep.epsilon", sleep.epsilon, "finite and > 0");
@@ -157,7 +168,8 @@ void validate(const Scene& scene) {
   if (!(scene.dt >= std::numeric_limits<Real>::min() && is_finite(scene.dt))) {
     throw InvalidScene("scene: " + fault("dt", scene.dt, "finite, > 0 and no denormal number"));
   }
-  for (const std::string& found : {find_fault(scene.resolver), find_fault(scene.sleep)}) {
+  for (const std::string& found :
+       {find_fault(scene.resolver), find_fault(scene.sleep), find_fault(scene.materials)}) {
     if (!found.empty()) throw InvalidScene("scene: " + found);
   }
   validate_body_count(scene.bodies.size());

@@ -20,6 +20,14 @@ double elapsed_ms(Clock::time_point since, Clock::time_point until) {
 /// Rounded up: the body in the scene, in the store, in the copy that a step can go back to.
 constexpr std::size_t kBytesPerBody = 1024;
 
+void combine_materials(const BodyStore& bodies, const MaterialSettings& rules,
+                       std::vector<Contact>* contacts) {
+  for (Contact& c : *contacts) {
+    c.friction = combined(rules.friction, bodies.friction(c.a), bodies.friction(c.b));
+    c.restitution = combined(rules.restitution, bodies.restitution(c.a), bodies.restitution(c.b));
+  }
+}
+
 /// What touches an awake body wakes, and so on along the contacts; the surroundings, never awake,
 /// wake nobody (thesis 4.4.6, matchAwakeState). A sweep each way by turns: the contacts are sorted,
 /// so one sweep carries the news along all rising chains.
@@ -76,6 +84,7 @@ bool World::Impl::advance(StepReport* report) {
   contacts.clear();
   report->sphere_contacts = narrow_phase.find_contacts(bodies, &contacts);
   report->contacts = contacts.size();
+  combine_materials(bodies, scene.materials, &contacts);
 
   const Clock::time_point detected = Clock::now();
   wake_along(contacts, &bodies);

@@ -92,6 +92,7 @@ TEST(SceneJson, KeepsEveryBitOfEveryField) {
   scene.dt = Real(1) / Real(3);
   scene.resolver.max_iterations = 17;
   scene.sleep.enabled = false;
+  scene.materials = {CombineRule::maximum, CombineRule::average};
   BodyDef body;
   body.shape = Box{{Real(0.1), Real(1e-30), Real(1e8)}};
   body.mass = 0;
@@ -146,6 +147,21 @@ TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": 3})"), HasSubstr("must be an array"));
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [], "resolver": {"max_iterations": -1}})"),
               HasSubstr("must be a whole number"));
+}
+
+TEST(SceneJson, MaterialRulesAreNamed) {
+  for (const CombineRule rule :
+       {CombineRule::geometric_mean, CombineRule::product, CombineRule::minimum,
+        CombineRule::maximum, CombineRule::average}) {
+    const std::string text = R"({"jfpx_scene": 1, "bodies": [], "materials": {"friction": ")" +
+                             std::string(to_string(rule)) + R"("}})";
+    EXPECT_EQ(from_json(text).materials, (MaterialSettings{rule, CombineRule::geometric_mean}));
+  }
+  EXPECT_EQ(complaint(R"({"jfpx_scene": 1, "bodies": [], "materials": {"restitution": "sum"}})"),
+            "scene.materials.restitution: is \"sum\"; it must be one of geometric_mean, product, "
+            "minimum, maximum, average");
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [], "materials": {"friction": 1}})"),
+              HasSubstr("is a number; it must be a string"));
 }
 
 TEST(SceneJson, ValuesOutOfRangeAreInvalid) {

@@ -26,8 +26,8 @@ struct BodyDef {
   Vec3 acceleration{0, Real(-9.81), 0};  ///< [m/s^2], constant; ignored by an immovable body
   Real linear_damping = 1;               ///< [-], share of velocity kept per second, in (0, 1]
   Real angular_damping = 1;              ///< [-], likewise for angular velocity
-  Real friction = Real(0.5);             ///< [-], >= 0; two bodies combine as sqrt(f0 * f1)
-  Real restitution = 0;                  ///< [-], in [0, 1]; two bodies combine as sqrt(e0 * e1)
+  Real friction = Real(0.5);             ///< [-], >= 0; combined as Scene::materials says
+  Real restitution = 0;                  ///< [-], in [0, 1]; likewise
   bool can_sleep = true;
   friend bool operator==(const BodyDef&, const BodyDef&) = default;
 };

@@ -5,6 +5,7 @@
 #include <jfpx/collide.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
+#include <jfpx/material.hpp>
 #include <jfpx/query.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/recording.hpp>

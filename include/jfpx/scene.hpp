@@ -2,6 +2,7 @@
 #pragma once
 
 #include <jfpx/body.hpp>
+#include <jfpx/material.hpp>
 
 #include <string>
 #include <string_view>
@@ -34,6 +35,7 @@ struct Scene {
   std::vector<BodyDef> bodies;
   ResolverSettings resolver;
   SleepSettings sleep;
+  MaterialSettings materials;
   friend bool operator==(const Scene&, const Scene&) = default;
 };
 

@@ -28,6 +28,8 @@ struct Contact {
   Vec3 normal;                 ///< [-], unit, from b to a
   Vec3 point;                  ///< [m], world, the middle of the overlap
   Real distance = 0;           ///< [m], <= 0: minus the penetration
+  Real friction = 0;           ///< [-], >= 0, of the pair
+  Real restitution = 0;        ///< [-], in [0, 1], of the pair
   friend bool operator==(const Contact&, const Contact&) = default;
 };
 

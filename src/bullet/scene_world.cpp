@@ -15,6 +15,7 @@
 #include <array>
 #include <map>
 #include <string>
+#include <utility>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
@@ -66,8 +67,23 @@ class ShapeStore {
   std::map<Key, btCollisionShape*> shared_;
 };
 
-std::unique_ptr<btRigidBody> make_body(const BodyDef& def, btCollisionShape* shape,
-                                       bool can_sleep) {
+/// Bullet multiplies the coefficients of two bodies; of square roots that is the geometric mean.
+void require_bullet(const MaterialSettings& materials) {
+  for (const auto& [field, rule] : {std::pair("friction", materials.friction),
+                                    std::pair("restitution", materials.restitution)}) {
+    if (rule == CombineRule::geometric_mean || rule == CombineRule::product) continue;
+    throw InvalidScene(std::string("scene: materials.") + field + " is " + to_string(rule) +
+                       "; Bullet multiplies what two bodies have, so there it must be "
+                       "geometric_mean or product");
+  }
+}
+
+Real factor(CombineRule rule, Real coefficient) {
+  return rule == CombineRule::product ? coefficient : square_root(coefficient);
+}
+
+std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const MaterialSettings& materials,
+                                       btCollisionShape* shape, bool can_sleep) {
   const Real mass = is_half_space(def) ? 0 : def.mass;
   btVector3 inertia(0, 0, 0);
   if (mass > 0) shape->calculateLocalInertia(mass, inertia);
@@ -77,8 +93,8 @@ std::unique_ptr<btRigidBody> make_body(const BodyDef& def, btCollisionShape* sha
   }
   info.m_linearDamping = 1 - def.linear_damping;
   info.m_angularDamping = 1 - def.angular_damping;
-  info.m_friction = square_root(def.friction);
-  info.m_restitution = square_root(def.restitution);
+  info.m_friction = factor(materials.friction, def.friction);
+  info.m_restitution = factor(materials.restitution, def.restitution);
   auto body = std::make_unique<btRigidBody>(info);
   body->setFlags(body->getFlags() | BT_DISABLE_WORLD_GRAVITY);
   if (mass > 0) {
@@ -121,7 +137,7 @@ struct SceneWorld::Impl {
     world.getDispatchInfo().m_deterministicOverlappingPairs = options.deterministic_pairs;
     for (const BodyDef& def : scene.bodies) {
       const bool can_sleep = scene.sleep.enabled && def.can_sleep;
-      owned.push_back(make_body(def, shapes.get(def.shape), can_sleep));
+      owned.push_back(make_body(def, scene.materials, shapes.get(def.shape), can_sleep));
       bodies.push_back(owned.back().get());
       world.addRigidBody(bodies.back());
     }
@@ -139,6 +155,7 @@ struct SceneWorld::Impl {
 
 SceneWorld::SceneWorld(const Scene& scene, const SceneWorldOptions& options) {
   validate(scene);
+  require_bullet(scene.materials);
   impl_ = std::make_unique<Impl>(scene, options);
 }
 SceneWorld::~SceneWorld() = default;

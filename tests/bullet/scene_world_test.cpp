@@ -87,6 +87,34 @@ TEST(SceneWorld, CombinesFrictionAndRestitutionAsTheSceneSays) {
   EXPECT_NEAR(manifold.getContactPoint(0).m_combinedRestitution, 0.48, 1e-6);
 }
 
+TEST(SceneWorld, MultipliesWhereTheSceneDoesAndRefusesWhatBulletCannotDo) {
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0}), ball({Real(0.9), 0, 0})};
+  scene.bodies[0].friction = scene.bodies[0].restitution = Real(0.5);
+  scene.bodies[1].friction = scene.bodies[1].restitution = Real(0.25);
+  scene.materials = {CombineRule::product, CombineRule::product};
+  SceneWorld world(scene);
+  world.step();
+  const btPersistentManifold& manifold = *world.dispatcher().getManifoldByIndexInternal(0);
+  EXPECT_EQ(manifold.getContactPoint(0).m_combinedFriction, Real(0.125));
+  EXPECT_EQ(manifold.getContactPoint(0).m_combinedRestitution, Real(0.125));
+
+  for (const CombineRule rule :
+       {CombineRule::minimum, CombineRule::maximum, CombineRule::average}) {
+    scene.materials = {CombineRule::product, rule};
+    try {
+      SceneWorld refused(scene);
+      ADD_FAILURE() << to_string(rule);
+    } catch (const InvalidScene& error) {
+      EXPECT_EQ(error.what(), std::string("scene: materials.restitution is ") + to_string(rule) +
+                                  "; Bullet multiplies what two bodies have, so there it must be "
+                                  "geometric_mean or product");
+    }
+    scene.materials = {rule, CombineRule::product};
+    EXPECT_THROW(SceneWorld{scene}, InvalidScene);
+  }
+}
+
 TEST(SceneWorld, PlanesAndBoxesHoldABall) {
   for (const bool plane : {true, false}) {
     Scene scene;

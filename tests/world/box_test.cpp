@@ -366,6 +366,7 @@ TEST(Boxes, AllTouchingPairsAreFoundInOrder) {
   }
   std::vector<Contact> found(world.contacts().begin(), world.contacts().end());
   std::erase_if(found, [&](const Contact& c) { return sphere(c.a) && sphere(c.b); });
+  for (Contact& c : found) c.friction = c.restitution = 0;  // not of the pair tests
   EXPECT_GT(found.size(), 50u);
   EXPECT_EQ(found, expected);
 }

@@ -27,7 +27,10 @@ struct Scenario {
     const Vec3 normal = len > kEpsilon ? d * (1 / len) : Vec3{1, 0, 0};
     const Real distance = len - (bodies.radius(a) + bodies.radius(b));
     const SphereInstance sphere_b{bodies.moving.position[b], bodies.radius(b)};
-    contacts.push_back({a, b, normal, middle_point(normal, distance, sphere_b), distance});
+    contacts.push_back(
+        {a, b, normal, middle_point(normal, distance, sphere_b), distance,
+         combined(CombineRule::geometric_mean, bodies.friction(a), bodies.friction(b)),
+         combined(CombineRule::geometric_mean, bodies.restitution(a), bodies.restitution(b))});
   }
   ResolverReport resolve(const ResolverSettings& settings = {}) {
     return resolver.resolve(bodies, contacts, settings);

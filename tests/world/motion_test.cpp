@@ -81,6 +81,43 @@ TEST(Motion, BounceReachesTheSquareOfTheRestitutionOfTheHeight) {
   }
 }
 
+TEST(Motion, CoefficientsOfTwoBodiesCombineAsTheSceneSays) {
+  const struct {
+    CombineRule rule;
+    double of_half_and_eighth;
+  } cases[] = {{CombineRule::geometric_mean, 0.25},
+               {CombineRule::product, 0.0625},
+               {CombineRule::minimum, 0.125},
+               {CombineRule::maximum, 0.5},
+               {CombineRule::average, 0.3125}};
+  for (const auto& [rule, expected] : cases) {
+    // Bounces: a hit at speed 4 that no acceleration caused leaves with e times 4.
+    Scene scene;
+    BodyDef def = test::ball({0, 1, 0});
+    def.velocity = {0, -4, 0};
+    def.restitution = 0.5_r;
+    BodyDef floor = test::ground();
+    floor.restitution = 0.125_r;
+    scene.bodies = {def, floor};
+    scene.materials.restitution = rule;
+    World bouncing(scene);
+    bouncing.step();
+    EXPECT_NEAR(bouncing.states()[0].velocity.y, 4 * expected, 1e-5) << to_string(rule);
+    EXPECT_NEAR(bouncing.contacts()[0].restitution, expected, 1e-7) << to_string(rule);
+
+    // Slides: the first hit takes mu times 4 from the speed along the ground.
+    def.velocity = {30, -4, 0};
+    def.restitution = floor.restitution = 0;
+    def.friction = 0.125_r;
+    floor.friction = 0.5_r;
+    scene.bodies = {def, floor};
+    scene.materials = {rule, CombineRule::geometric_mean};
+    World sliding(scene);
+    sliding.step();
+    EXPECT_NEAR(sliding.states()[0].velocity.x, 30 - 4 * expected, 1e-5) << to_string(rule);
+  }
+}
+
 TEST(Motion, ABallRollsDownASlopeWithFiveSeventhsOfThePull) {
   const double angle = 0.3;
   Scene scene;

@@ -151,6 +151,13 @@ TEST(Validate, EveryFieldIsChecked) {
   }
 }
 
+TEST(Validate, ARuleThatIsNoneIsRefused) {
+  Scene scene = sound();
+  scene.materials.restitution = static_cast<CombineRule>(5);
+  EXPECT_EQ(message(scene),
+            "scene: materials.restitution is 5; it must be one of the rules of CombineRule");
+}
+
 TEST(Validate, MassesThatMakeNoFiniteInertiaAreRefused) {
   const Real tiny = square_root(std::numeric_limits<Real>::min());
   Scene scene = sound();

@@ -35,14 +35,16 @@ struct StageTimes {
 /// and dynamic tree broadphase. What a body of the scene becomes:
 /// - mass 0 is a static body; a half-space is a static plane and follows no pose;
 /// - damping: Bullet's is the share of velocity *lost* per second, with the same law of decay;
-/// - friction and restitution: square roots, because Bullet multiplies the values of two bodies;
+/// - friction and restitution: Bullet multiplies the values of two bodies, so they stay as they are
+///   where the scene's rule is the product and become square roots where it is the geometric mean;
 /// - acceleration: the body's own gravity; the world has none;
 /// - a body that may not sleep, and every body of a scene without sleep: DISABLE_DEACTIVATION.
 ///   Bullet's sleep thresholds stay at its defaults: it measures motion in its own way.
 /// Not thread-safe; several worlds in several threads are.
 class JFPX_API SceneWorld {
  public:
-  /// @throws InvalidScene; what the constructor of CollisionDispatcher throws.
+  /// @throws InvalidScene, also for friction and restitution that combine by another rule than
+  ///   geometric mean or product, which Bullet can't follow; what the constructor of CollisionDispatcher throws.
   explicit SceneWorld(const Scene& scene, const SceneWorldOptions& options = {});
   ~SceneWorld();
   SceneWorld(SceneWorld&&) noexcept;

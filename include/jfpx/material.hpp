@@ -1,0 +1,59 @@
+/// How the coefficients of two bodies become the one of their contact.
+#pragma once
+
+#include <jfpx/math.hpp>
+
+#include <cstdint>
+
+namespace jfpx::inline JFPX_ABI {
+
+enum class CombineRule : std::uint8_t {
+  geometric_mean,  ///< sqrt(a * b): equal coefficients stay what they are, 0 stays 0
+  product,         ///< a * b, as in Bullet
+  minimum,
+  maximum,
+  average  ///< a/2 + b/2
+};
+
+/// As it is written in a scene's JSON; null for a value that is no rule.
+constexpr const char* to_string(CombineRule rule) {
+  switch (rule) {
+    case CombineRule::geometric_mean:
+      return "geometric_mean";
+    case CombineRule::product:
+      return "product";
+    case CombineRule::minimum:
+      return "minimum";
+    case CombineRule::maximum:
+      return "maximum";
+    case CombineRule::average:
+      return "average";
+  }
+  return nullptr;
+}
+
+/// @param a,b >= 0
+JFPX_HD inline Real combined(CombineRule rule, Real a, Real b) {
+  switch (rule) {
+    case CombineRule::geometric_mean:
+      break;
+    case CombineRule::product:
+      return a * b;
+    case CombineRule::minimum:
+      return a < b ? a : b;
+    case CombineRule::maximum:
+      return a > b ? a : b;
+    case CombineRule::average:
+      return a * Real(0.5) + b * Real(0.5);
+  }
+  return square_root(a * b);
+}
+
+/// Which rule is for what.
+struct MaterialSettings {
+  CombineRule friction = CombineRule::geometric_mean;
+  CombineRule restitution = CombineRule::geometric_mean;
+  friend bool operator==(const MaterialSettings&, const MaterialSettings&) = default;
+};
+
+}  // namespace jfpx::inline JFPX_ABI
