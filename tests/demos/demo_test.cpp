@@ -1,0 +1,130 @@
+/// Demos as such: the table, and how inputs become actions.
+#include "examples/demos/demo.hpp"
+
+#include <jfpx/error.hpp>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+namespace jfpx {
+namespace {
+
+using demos::Demo;
+using demos::Input;
+using ::testing::HasSubstr;
+
+TEST(Demos, RunDrawAndRepeatToTheBit) {
+  for (const demos::Entry& entry : demos::all()) {
+    SCOPED_TRACE(entry.name);
+    const auto once = demos::make(entry.name), again = demos::make(entry.name);
+    EXPECT_EQ(once->name(), entry.name);
+    demos::View view;
+    for (std::size_t n = 0; n < 40; ++n) {
+      // Every control is pressed in turn, and held for two steps.
+      std::vector<Input> inputs;
+      const std::size_t count = once->controls().size();
+      inputs.push_back({n % count, true});
+      if (n >= 2) inputs.push_back({(n - 2) % count, false});
+      EXPECT_FALSE(once->step(inputs).non_finite);
+      again->step(inputs);
+      once->draw(&view);
+    }
+    EXPECT_EQ(once->state_hash(), again->state_hash());
+    EXPECT_NE(view.camera.eye, view.camera.target);
+  }
+}
+
+TEST(Demos, ControlsHaveNamesThatScriptsCanHold) {
+  for (const demos::Entry& entry : demos::all()) {
+    SCOPED_TRACE(entry.name);
+    const auto demo = demos::make(entry.name);
+    std::set<std::string_view> names;
+    for (const demos::Control& control : demo->controls()) {
+      EXPECT_FALSE(control.name.empty());
+      EXPECT_EQ(control.name.find_first_of(" \t\n#"), std::string_view::npos) << control.name;
+      EXPECT_FALSE(control.summary.empty()) << control.name;
+      EXPECT_FALSE(control.key.empty()) << control.name;
+      EXPECT_TRUE(names.insert(control.name).second) << control.name;
+    }
+  }
+}
+
+TEST(Demos, EveryNamedSceneIsOneAndMovesAsItsWorld) {
+  for (const scenes::Entry& entry : scenes::all()) {
+    const demos::Options options{.scene = {.spheres = 30, .seed = 2}};
+    const auto demo = demos::make(entry.name, options);
+    World world(scenes::make(entry.name, options.scene));
+    for (int n = 0; n < 5; ++n) {
+      demo->step();
+      world.step();
+    }
+    EXPECT_EQ(demo->state_hash(), world.state_hash()) << entry.name;
+    EXPECT_EQ(demo->world()->time(), world.time());
+    demo->step(std::vector<Input>{{0, true}});  // reset, then one step
+    World fresh(scenes::make(entry.name, options.scene));
+    fresh.step();
+    EXPECT_EQ(demo->state_hash(), fresh.state_hash()) << entry.name;
+  }
+}
+
+TEST(Demos, BadNamesAndStepsAreRefused) {
+  EXPECT_THROW(demos::make("filght"), InvalidArgument);
+  EXPECT_THROW(demos::make("flight", {.dt = Real(0)}), Error);
+  EXPECT_THROW(demos::make("boxes-and-balls", {.dt = Real(-1)}), Error);
+}
+
+/// Counts what its controls do: 0 once a press, 1 in every step.
+class Counter final : public Demo {
+ public:
+  static constexpr demos::Control kControls[] = {{"once", "acts once", "o"},
+                                                 {"held", "acts while down", "h", true}};
+  Counter() : Demo(kControls) {}
+  std::string_view name() const override { return "counter"; }
+  std::vector<BodyState> states() const override { return {}; }
+  void draw(demos::View*) const override {}
+
+  std::string acted;
+
+ private:
+  void act(std::size_t control) override { acted += static_cast<char>('0' + control); }
+  StepReport advance() override {
+    acted += ' ';
+    return {};
+  }
+};
+
+void step(Counter* demo, std::vector<Input> inputs) { demo->step(inputs); }
+
+TEST(Erratum, E42_press_and_release_in_one_step_act_once_and_leave_nothing_stuck) {
+  Counter demo;
+  step(&demo, {{1, true}, {1, false}, {0, true}, {0, false}});
+  step(&demo, {});
+  EXPECT_EQ(demo.acted, "10  ");  // last in, first out would leave both keys down
+}
+
+TEST(Erratum, E42_an_input_of_no_control_is_refused_and_changes_nothing) {
+  Counter demo;
+  try {
+    step(&demo, {{1, true}, {2, true}});
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("input of control 2"));
+  }
+  step(&demo, {});
+  EXPECT_EQ(demo.acted, " ");
+}
+
+TEST(Demos, HeldControlsActInEveryStepAndOthersOnceAPress) {
+  Counter demo;
+  step(&demo, {{0, true}, {1, true}});
+  step(&demo, {{0, true}});  // a keyboard that repeats
+  step(&demo, {{1, false}, {0, false}});
+  step(&demo, {{0, true}});
+  EXPECT_EQ(demo.acted, "01 1  0 ");
+}
+
+}  // namespace
+}  // namespace jfpx
