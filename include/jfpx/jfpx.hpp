@@ -7,6 +7,7 @@
 #include <jfpx/force.hpp>
 #include <jfpx/material.hpp>
 #include <jfpx/query.hpp>
+#include <jfpx/particle.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>

@@ -1,4 +1,6 @@
 /// Warm steps allocate nothing. A program of its own, because it replaces operator new.
+#include <jfpx/particle.hpp>
+
 #include "examples/scenes/scenes.hpp"
 #include "tests/world/support.hpp"
 
@@ -56,6 +58,20 @@ TEST(Allocation, NeitherBoxesNorForcesAllocateInWarmSteps) {
   for (int n = 0; n < 100; ++n) world.step();
   const long before = allocations;
   for (int n = 0; n < 50; ++n) ASSERT_EQ(world.step().contacts, 20u);
+  EXPECT_EQ(allocations, before);
+}
+
+TEST(Allocation, ParticlesAtRestAllocateNothing) {
+  ParticleWorld world({.grounds = {HalfSpace{}}});
+  for (int i = 0; i < 50; ++i) {
+    ParticleDef def;
+    def.radius = Real(0.5);
+    def.position = {static_cast<Real>(i % 10), Real(0.5) + static_cast<Real>(i / 10), 0};
+    world.add(def);
+  }
+  for (int n = 0; n < 100; ++n) world.step();
+  const long before = allocations;
+  for (int n = 0; n < 50; ++n) ASSERT_GT(world.step().contacts, 0u);
   EXPECT_EQ(allocations, before);
 }
 

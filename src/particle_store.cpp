@@ -1,0 +1,73 @@
+/// Particles come, fly and go.
+#include "src/particle_store.hpp"
+
+#include "src/shared/integrate.hpp"
+#include "src/shared/power.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace jfpx::inline JFPX_ABI {
+namespace {
+
+bool before(ParticleId a, ParticleId b) { return a.index < b.index; }
+
+}  // namespace
+
+void ParticleStore::resize(std::size_t slots) {
+  const auto all = [slots](auto&... arrays) { (arrays.resize(slots), ...); };
+  all(moving.position, moving.velocity, moving.force, acceleration_, gained_, inverse_mass_,
+      radius_, restitution_, kept_, generation_);
+}
+
+ParticleId ParticleStore::add(const ParticleDef& def) {
+  if (free_.empty()) {
+    resize(capacity() + 1);
+    free_.push_back(static_cast<std::uint32_t>(capacity() - 1));
+  }
+  const std::uint32_t i = free_.back();
+  const ParticleId id{i, generation_[i]};
+  ids_.insert(std::upper_bound(ids_.begin(), ids_.end(), id, before), id);
+  free_.pop_back();
+
+  inverse_mass_[i] = def.mass > 0 ? Real(1) / def.mass : Real(0);
+  radius_[i] = def.radius;
+  restitution_[i] = def.restitution;
+  kept_[i] = static_cast<Real>(shared::power(def.damping, dt_));
+  acceleration_[i] = def.acceleration;
+  gained_[i] = moving.force[i] = {};
+  set_state(i, {def.position, def.velocity});
+  return id;
+}
+
+void ParticleStore::remove(ParticleId id) {
+  // A slot whose generations are used up is given up: an id never comes back.
+  if (generation_[id.index] + 1 != 0) free_.push_back(id.index);
+  ++generation_[id.index];
+  ids_.erase(std::lower_bound(ids_.begin(), ids_.end(), id, before));
+}
+
+bool ParticleStore::contains(ParticleId id) const noexcept {
+  const auto place = std::lower_bound(ids_.begin(), ids_.end(), id, before);
+  return place != ids_.end() && *place == id;
+}
+
+void ParticleStore::set_state(std::uint32_t i, const ParticleState& state) {
+  moving.position[i] = state.position;
+  moving.velocity[i] = movable(i) ? state.velocity : Vec3{};
+}
+
+void ParticleStore::integrate() {
+  for (const ParticleId id : ids_) {
+    const std::uint32_t i = id.index;
+    const Vec3 force = std::exchange(moving.force[i], {});
+    if (!movable(i)) continue;
+    const Vec3 acceleration = add_scaled(acceleration_[i], force, inverse_mass_[i]);
+    gained_[i] = shared::integrated_velocity({}, acceleration, dt_, kept_[i]);
+    moving.velocity[i] =
+        shared::integrated_velocity(moving.velocity[i], acceleration, dt_, kept_[i]);
+    moving.position[i] = shared::integrated_position(moving.position[i], moving.velocity[i], dt_);
+  }
+}
+
+}  // namespace jfpx::inline JFPX_ABI
