@@ -6,8 +6,8 @@
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 #include <jfpx/material.hpp>
-#include <jfpx/query.hpp>
 #include <jfpx/particle.hpp>
+#include <jfpx/query.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
