@@ -44,7 +44,8 @@ struct StageTimes {
 class JFPX_API SceneWorld {
  public:
   /// @throws InvalidScene, also for friction and restitution that combine by another rule than
-  ///   geometric mean or product, which Bullet can't follow; what the constructor of CollisionDispatcher throws.
+  ///   geometric mean or product, which Bullet can't follow; what the constructor of
+  ///   CollisionDispatcher throws.
   explicit SceneWorld(const Scene& scene, const SceneWorldOptions& options = {});
   ~SceneWorld();
   SceneWorld(SceneWorld&&) noexcept;
