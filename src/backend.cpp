@@ -27,21 +27,15 @@ std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOp
 #endif
 
 constexpr BackendRow kRows[] = {
-    {Backend::x86, x86::probe, x86::make_sphere_collider},
-    {Backend::cuda, probe_cuda, make_cuda_sphere_collider},
+    {Backend::x86, true, x86::probe, x86::make_sphere_collider},
+    {Backend::cuda, JFPX_HAS_CUDA != 0, probe_cuda, make_cuda_sphere_collider},
 };
 
 }  // namespace
 
 const BackendRow& backend_row(Backend backend) {
-  if (backend == Backend::automatic) return kRows[0];
   for (const BackendRow& row : kRows) {
-    if (row.backend != backend) continue;
-    const BackendStatus status = row.probe();
-    if (!status.usable) {
-      throw BackendUnavailable(std::string(to_string(backend)) + ": " + status.reason);
-    }
-    return row;
+    if (row.backend == backend) return row;
   }
   throw InvalidArgument("backend is " + std::to_string(static_cast<int>(backend)) +
                         "; it must be automatic, x86 or cuda");

@@ -8,12 +8,12 @@ namespace jfpx::inline JFPX_ABI {
 
 struct BackendRow {
   Backend backend;
+  bool compiled;
   BackendStatus (*probe)();  ///< never throws for a missing device
   std::unique_ptr<SphereCollider> (*make_sphere_collider)(const SphereColliderOptions&);
 };
 
-/// The row that serves `backend`; `automatic` is resolved here.
-/// @throws BackendUnavailable with the reason if that backend can't be used.
+/// The row of a backend, which is not `automatic`. @throws InvalidArgument
 const BackendRow& backend_row(Backend backend);
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -23,7 +23,7 @@ class NarrowPhase {
   /// @throws what SphereCollider::find_contacts() throws
   std::uint64_t find_contacts(const BodyStore& bodies, std::vector<Contact>* contacts);
 
-  Backend backend() const noexcept { return collider_->backend(); }
+  const SphereCollider& collider() const noexcept { return *collider_; }
 
  private:
   /// An immovable box or half-space.

@@ -1,10 +1,24 @@
-/// Makes sphere colliders: resolves the backend and checks the options.
+/// Makes sphere colliders: checks the options and resolves the backend.
 #include <jfpx/error.hpp>
 #include <jfpx/sphere_collider.hpp>
 
+#include "src/automatic_sphere_collider.hpp"
 #include "src/backend_table.hpp"
+#include "src/cost_model.hpp"
 
 namespace jfpx::inline JFPX_ABI {
+namespace {
+
+std::unique_ptr<SphereCollider> make_named(const SphereColliderOptions& options) {
+  const BackendRow& row = backend_row(options.backend);
+  const BackendStatus status = row.probe();
+  if (!status.usable) {
+    throw BackendUnavailable(std::string(to_string(options.backend)) + ": " + status.reason);
+  }
+  return row.make_sphere_collider(options);
+}
+
+}  // namespace
 
 SphereCollider::~SphereCollider() = default;
 
@@ -13,7 +27,41 @@ std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions
     throw InvalidArgument("threads is " + std::to_string(options.threads) +
                           "; it must be 0 (one per core) to 256");
   }
-  return backend_row(options.backend).make_sphere_collider(options);
+  const std::string fault = find_fault(options.costs);
+  if (!fault.empty()) throw InvalidArgument("costs: " + fault);
+  if (options.backend != Backend::automatic) return make_named(options);
+  return std::make_unique<AutomaticSphereCollider>(options, make_named,
+                                                   backend_row(Backend::cuda).compiled);
+}
+
+std::string_view to_string(SphereAlgorithm algorithm) noexcept {
+  switch (algorithm) {
+    case SphereAlgorithm::automatic:
+      return "automatic";
+    case SphereAlgorithm::all_pairs:
+      return "all pairs";
+    case SphereAlgorithm::sorted_tiles:
+      return "sorted tiles";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(ChoiceReason reason) noexcept {
+  switch (reason) {
+    case ChoiceReason::fixed:
+      return "fixed";
+    case ChoiceReason::predicted:
+      return "predicted";
+    case ChoiceReason::measured:
+      return "measured";
+    case ChoiceReason::kept:
+      return "kept";
+    case ChoiceReason::trial:
+      return "trial";
+    case ChoiceReason::device_failed:
+      return "device failed";
+  }
+  return "unknown";
 }
 
 }  // namespace jfpx::inline JFPX_ABI

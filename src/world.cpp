@@ -129,7 +129,11 @@ StepReport World::step() {
     throw;
   }
   report.step = w.steps;
-  report.backend = w.narrow_phase.backend();
+  const SphereCollider& collider = w.narrow_phase.collider();
+  report.backend = collider.backend();
+  report.algorithm = collider.algorithm();
+  report.choice = collider.reason();
+  report.device_failure = collider.device_failure();
   for (const BodyId id : w.bodies.ids()) report.awake += w.bodies.moving.awake[id.index];
   report.total_ms = elapsed_ms(start, Clock::now());
   return report;

@@ -3,9 +3,11 @@
 
 #include <jfpx/backend.hpp>
 #include <jfpx/contact.hpp>
+#include <jfpx/cost_model.hpp>
 
 #include <memory>
 #include <span>
+#include <string_view>
 
 namespace jfpx::inline JFPX_ABI {
 
@@ -16,15 +18,34 @@ enum class SphereAlgorithm : std::uint8_t {
   sorted_tiles,  ///< spheres sorted by place, only neighbours are looked at: best beyond
 };
 
+/// "automatic", "all pairs" or "sorted tiles".
+JFPX_API std::string_view to_string(SphereAlgorithm algorithm) noexcept;
+
+/// Why a call was computed by whom it was. The bits do not depend on it.
+enum class ChoiceReason : std::uint8_t {
+  fixed,          ///< there was no choice: asked for by name, or nothing else is usable
+  predicted,      ///< the cost model expects it to be the fastest
+  measured,       ///< so do the times of the last calls
+  kept,           ///< another may be faster, but by too little to switch
+  trial,          ///< tried for a few calls, to learn how long it takes here
+  device_failed,  ///< the device failed, in this call or an earlier one
+};
+/// A short text for a table, for example "device failed".
+JFPX_API std::string_view to_string(ChoiceReason reason) noexcept;
+
 /// Widest vector instructions that may be used. A level that the processor lacks is lowered.
 enum class SimdLevel : std::uint8_t { automatic, scalar, sse2, avx2, avx512 };
 
+/// With `Backend::automatic` backend and algorithm are chosen call by call, from `costs` and from
+/// the times of the last calls. Where CUDA can't be had, x86 computes; when the device fails or its
+/// memory does not suffice, x86 takes over for good, with the same bits.
 struct SphereColliderOptions {
   Backend backend = Backend::automatic;
   SphereAlgorithm algorithm = SphereAlgorithm::automatic;
   unsigned threads = 1;                   ///< x86: worker threads, 0 = one per core, at most 256
   SimdLevel simd = SimdLevel::automatic;  ///< x86
   int device = 0;                         ///< cuda: ordinal of the GPU
+  CostModel costs = {};                   ///< automatic: what is expected to be fast
 };
 
 /// Finds contacts among spheres. Owns its buffers, which only grow; calls are not thread-safe, but
@@ -51,6 +72,10 @@ class JFPX_API SphereCollider {
   virtual Backend backend() const noexcept = 0;
   /// How pairs were found in the last find_contacts(); `automatic` before the first.
   virtual SphereAlgorithm algorithm() const noexcept = 0;
+  /// Why the last call was computed so.
+  virtual ChoiceReason reason() const noexcept { return ChoiceReason::fixed; }
+  /// Why x86 has taken over from a device in the last call; empty after all other calls.
+  virtual std::string_view device_failure() const noexcept { return {}; }
 
  protected:
   SphereCollider() = default;

@@ -62,6 +62,9 @@ struct StepReport {
   BodyId non_finite_body;             ///< the first such body
   std::uint32_t awake = 0;            ///< movable bodies awake after the step
   Backend backend = Backend::x86;     ///< who found sphere contacts
+  SphereAlgorithm algorithm = SphereAlgorithm::automatic;  ///< and how
+  ChoiceReason choice = ChoiceReason::fixed;               ///< and why they did
+  std::string device_failure;  ///< why x86 took over from a device in this step; else empty
   double integrate_ms = 0, detect_ms = 0, resolve_ms = 0, total_ms = 0;
 };
 

@@ -178,6 +178,7 @@ std::span<const PairResult> BatchEngine::prepare(std::span<const btBroadphasePai
     }
     const std::span<const PairResult> results =
         collider_->test_pairs(batch_.spheres(), batch_.sphere_pairs());
+    if (const auto why = collider_->device_failure(); !why.empty()) stats_.device_failure = why;
     batch_.plan(pairs, results, ask_all);
     return results;
   } catch (const std::exception& error) {
@@ -221,8 +222,10 @@ bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, bool ask_all,
 
 void BatchEngine::reset_stats() {
   std::string failure = std::move(stats_.failure);
+  std::string device_failure = std::move(stats_.device_failure);
   stats_ = {};
   stats_.failure = std::move(failure);
+  stats_.device_failure = std::move(device_failure);
 }
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

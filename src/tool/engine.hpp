@@ -34,6 +34,10 @@ class Engine {
   virtual std::uint32_t awake() const = 0;     ///< movable bodies awake
   virtual StageTimes times() const = 0;        ///< of the last step
   virtual std::string backend() const = 0;     ///< who computed the last step's sphere contacts
+  /// Who did, how and why, for a table.
+  virtual std::string choice() const { return backend(); }
+  /// Why x86 took over from a device at some step; empty unless it did.
+  virtual std::string device_failure() const { return {}; }
   /// Why the run can't go on meaningfully; empty while all is well.
   virtual std::string trouble() const { return {}; }
 };

@@ -13,7 +13,10 @@ class NativeEngine final : public Engine {
   NativeEngine(const Scene& scene, const RunOptions& options)
       : world_(scene, {.collider = collider_options(options)}) {}
 
-  void step() override { report_ = world_.step(); }
+  void step() override {
+    report_ = world_.step();
+    if (!report_.device_failure.empty()) device_failure_ = report_.device_failure;
+  }
   std::vector<BodyState> states() const override { return world_.states(); }
   std::uint64_t contacts() const override { return report_.contacts; }
   std::uint32_t awake() const override { return report_.awake; }
@@ -25,6 +28,11 @@ class NativeEngine final : public Engine {
             .total = report_.total_ms};
   }
   std::string backend() const override { return std::string(to_string(report_.backend)); }
+  std::string choice() const override {
+    return fmt::format("{}, {}, {}", to_string(report_.backend), to_string(report_.algorithm),
+                       to_string(report_.choice));
+  }
+  std::string device_failure() const override { return device_failure_; }
   std::string trouble() const override {
     if (!report_.non_finite) return {};
     return fmt::format("step {}: body {} left the finite numbers; the state is frozen",
@@ -34,6 +42,7 @@ class NativeEngine final : public Engine {
  private:
   World world_;
   StepReport report_;
+  std::string device_failure_;
 };
 
 }  // namespace

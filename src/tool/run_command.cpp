@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <map>
 #include <memory>
 #include <optional>
 
@@ -23,6 +24,7 @@ struct Options {
 struct Totals {
   std::uint64_t contacts = 0;
   StageTimes times;
+  std::map<std::string, std::uint64_t> choices;  ///< steps by who found sphere contacts, and why
 };
 
 std::string csv_row(std::uint64_t step, const Engine& engine) {
@@ -38,11 +40,13 @@ std::string summary(const Options& options, const Scene& scene, const Engine& en
   Table table({"ms per step", "integrate", "broad", "detect", "solve", "total"});
   table.add({options.engine, ms(t.integrate / steps), ms(t.broad / steps), ms(t.detect / steps),
              ms(t.solve / steps), ms(t.total / steps)});
+  Table choices({"sphere contacts by", "steps"});
+  for (const auto& [choice, count] : totals.choices) choices.add({choice, std::to_string(count)});
   return fmt::format(
       "{}: {} bodies, {} steps of {} s, engine {}, backend {}\n"
-      "contacts at the end {}, awake {}\n\n{}",
+      "contacts at the end {}, awake {}\n\n{}\n{}",
       scene.name, scene.bodies.size(), options.run.steps, text(scene.dt), options.engine,
-      engine.backend(), engine.contacts(), engine.awake(), table.text());
+      engine.backend(), engine.contacts(), engine.awake(), table.text(), choices.text());
 }
 
 nlohmann::ordered_json to_json_value(const Options& options, const Scene& scene,
@@ -57,6 +61,8 @@ nlohmann::ordered_json to_json_value(const Options& options, const Scene& scene,
           {"contacts", engine.contacts()},
           {"contacts_total", totals.contacts},
           {"awake", engine.awake()},
+          {"choices", totals.choices},
+          {"device_failure", engine.device_failure()},
           {"hash", hex(state_hash(engine.states()))},
           {"ms",
            {{"integrate", t.integrate},
@@ -85,6 +91,7 @@ int run(const Options& options) {
       engine->step();
       totals.times += engine->times();
       totals.contacts += engine->contacts();
+      ++totals.choices[engine->choice()];
       if (csv) csv.write(csv_row(step, *engine));
       if (recording) recording->append(engine->states());
       progress.advance_to(step);
@@ -96,6 +103,9 @@ int run(const Options& options) {
   json.finish();
   if (!options.run.quiet) fmt::print("{}", summary(options, scene, *engine, totals));
   if (options.run.hash) fmt::print("{}\n", hex(state_hash(engine->states())));
+  if (!engine->device_failure().empty()) {
+    fmt::print(stderr, "jfpx: x86 has taken over: {}\n", engine->device_failure());
+  }
   if (engine->trouble().empty()) return kSuccess;
   fmt::print(stderr, "jfpx: {}\n", engine->trouble());
   return kCheckFailed;

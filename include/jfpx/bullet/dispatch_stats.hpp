@@ -39,9 +39,10 @@ struct DispatchStats {
   std::string first_mismatch;      ///< field and both values; empty where there was none
   std::array<std::uint64_t, kFallbackCount> fallbacks{};  ///< dispatches by Fallback
   Fallback last_fallback = Fallback::none;                ///< none where the last was a batch
-  std::string failure;    ///< why the collider was given up for good; empty while it works
-  double prepare_ms = 0;  ///< wall clock of batches: gathering, collider, reading manifolds
-  double commit_ms = 0;   ///< wall clock of batches: the ordered walk
+  std::string failure;         ///< why the collider was given up for good; empty while it works
+  std::string device_failure;  ///< Backend::automatic: why x86 took over from the device, if it did
+  double prepare_ms = 0;       ///< wall clock of batches: gathering, collider, reading manifolds
+  double commit_ms = 0;        ///< wall clock of batches: the ordered walk
 };
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -61,7 +61,7 @@ class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
   Backend backend() const noexcept;
 
   const DispatchStats& stats() const noexcept;
-  void reset_stats();  ///< a failed collider stays given up, and `failure` is kept
+  void reset_stats();  ///< keeps `failure` and `device_failure`: what failed stays given up
 
  private:
   struct Impl;

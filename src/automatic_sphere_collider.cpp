@@ -1,0 +1,147 @@
+/// Backend::automatic: who computes is chosen call by call (thesis 5.4).
+#include "src/automatic_sphere_collider.hpp"
+
+#include <jfpx/error.hpp>
+
+#include <chrono>
+#include <utility>
+
+namespace jfpx::inline JFPX_ABI {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::vector<CostChooser::Way> ways_to_search(const SphereColliderOptions& options, bool with_cuda) {
+  using enum SphereAlgorithm;
+  const CostModel& costs = options.costs;
+  std::vector<CostChooser::Way> ways = {
+      {Backend::x86, all_pairs, costs.x86_all_pairs},
+      {Backend::x86, sorted_tiles, costs.x86_sorted_tiles},
+      {Backend::cuda, all_pairs, costs.cuda_all_pairs, true},
+      {Backend::cuda, sorted_tiles, costs.cuda_sorted_tiles, true},
+  };
+  std::erase_if(ways, [&](const CostChooser::Way& way) {
+    return (way.backend == Backend::cuda && !with_cuda) ||
+           (options.algorithm != automatic && options.algorithm != way.algorithm);
+  });
+  return ways;
+}
+
+std::vector<CostChooser::Way> ways_to_test(const SphereColliderOptions& options, bool with_cuda) {
+  std::vector<CostChooser::Way> ways = {
+      {Backend::x86, options.algorithm, options.costs.x86_given_pairs}};
+  if (with_cuda) {
+    ways.push_back({Backend::cuda, options.algorithm, options.costs.cuda_given_pairs, true});
+  }
+  return ways;
+}
+
+}  // namespace
+
+AutomaticSphereCollider::AutomaticSphereCollider(const SphereColliderOptions& options,
+                                                 SphereColliderMaker make, bool with_cuda)
+    : options_(options),
+      make_(std::move(make)),
+      search_(ways_to_search(options, with_cuda)),
+      given_(ways_to_test(options, with_cuda)),
+      device_asleep_(with_cuda) {}
+
+/// Calls `call` with the collider that `chooser` chooses, and with x86 if the device fails.
+template <class Call, class Measure>
+auto AutomaticSphereCollider::compute(CostChooser& chooser, const ColliderWork& expected,
+                                      const Call& call, const Measure& measure) {
+  device_failure_.clear();
+  start_device_if_it_pays();
+  while (true) {
+    const CostChooser::Decision decision = chooser.choose(expected);
+    const CostChooser::Way way = chooser.way(decision.way);
+    try {
+      SphereCollider& chosen = collider(way.backend, way.algorithm);
+      const Clock::time_point start = decision.timed ? Clock::now() : Clock::time_point{};
+      const auto result = call(chosen);
+      if (decision.timed) {
+        const std::chrono::duration<double, std::micro> us = Clock::now() - start;
+        chooser.record(measure(result), us.count());
+      }
+      backend_ = way.backend;
+      algorithm_ = chosen.algorithm();
+      reason_ = device_lost_ ? ChoiceReason::device_failed : chooser.reason();
+      return result;
+    } catch (const BackendUnavailable&) {
+      if (way.backend == Backend::x86) throw;
+      give_up_device({});
+    } catch (const DeviceError& error) {
+      if (way.backend == Backend::x86) throw;
+      give_up_device(error.what());
+    } catch (const OutOfMemory& error) {
+      if (way.backend == Backend::x86) throw;
+      give_up_device(error.what());
+    }
+  }
+}
+
+ContactSpan AutomaticSphereCollider::find_contacts(std::span<const SphereInstance> spheres) {
+  const auto n = static_cast<double>(spheres.size());
+  const auto work = [&](double contacts) {
+    return ColliderWork{.spheres = n,
+                        .pairs = n * (n - 1) / 2,
+                        .contacts = contacts,
+                        .bytes = n * sizeof(SphereInstance) + contacts * sizeof(SphereContact)};
+  };
+  const ContactSpan contacts = compute(
+      search_, work(n * contacts_per_sphere_),
+      [&](SphereCollider& collider) { return collider.find_contacts(spheres); },
+      [&](ContactSpan found) { return work(static_cast<double>(found.size())); });
+  if (n > 0) contacts_per_sphere_ = static_cast<double>(contacts.size()) / n;
+  return contacts;
+}
+
+std::span<const PairResult> AutomaticSphereCollider::test_pairs(
+    std::span<const SphereInstance> spheres, std::span<const SpherePair> pairs) {
+  const auto n = static_cast<double>(spheres.size()), m = static_cast<double>(pairs.size());
+  const ColliderWork work{
+      .spheres = n,
+      .pairs = m,
+      .bytes = n * sizeof(SphereInstance) + m * (sizeof(SpherePair) + sizeof(PairResult))};
+  return compute(
+      given_, work, [&](SphereCollider& collider) { return collider.test_pairs(spheres, pairs); },
+      [&](std::span<const PairResult>) { return work; });
+}
+
+/// For given pairs any algorithm will do: the one that is there, so that no second pool of threads
+/// and no second context is made for nothing.
+SphereCollider& AutomaticSphereCollider::collider(Backend backend, SphereAlgorithm algorithm) {
+  auto& of_backend = colliders_[backend == Backend::cuda ? 1 : 0];
+  if (algorithm == SphereAlgorithm::automatic) {
+    algorithm = of_backend[0] ? SphereAlgorithm::all_pairs : SphereAlgorithm::sorted_tiles;
+  }
+  std::unique_ptr<SphereCollider>& slot =
+      of_backend[algorithm == SphereAlgorithm::all_pairs ? 0 : 1];
+  if (slot == nullptr) {
+    SphereColliderOptions options = options_;
+    options.backend = backend;
+    options.algorithm = algorithm;
+    slot = make_(options);
+  }
+  return *slot;
+}
+
+/// The rule of who rents skis until the rent would have bought them: at most twice the cost of
+/// having known.
+void AutomaticSphereCollider::start_device_if_it_pays() {
+  if (!device_asleep_) return;
+  if (search_.missed_us() + given_.missed_us() < 1e3 * options_.costs.cuda_start_ms) return;
+  device_asleep_ = false;
+  search_.wake();
+  given_.wake();
+}
+
+void AutomaticSphereCollider::give_up_device(std::string_view failure) {
+  device_failure_ = failure;
+  device_lost_ = !failure.empty();
+  for (auto& collider : colliders_[1]) collider.reset();
+  search_.remove(Backend::cuda);
+  given_.remove(Backend::cuda);
+}
+
+}  // namespace jfpx::inline JFPX_ABI

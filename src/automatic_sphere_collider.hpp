@@ -1,0 +1,57 @@
+/// Backend::automatic: who computes is chosen call by call (thesis 5.4).
+#pragma once
+
+#include <jfpx/sphere_collider.hpp>
+
+#include "src/cost_chooser.hpp"
+
+#include <functional>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI {
+
+/// Makes the collider of a backend and algorithm that options name.
+using SphereColliderMaker =
+    std::function<std::unique_ptr<SphereCollider>(const SphereColliderOptions&)>;
+
+/// Hands each call to one of up to four colliders, x86 and CUDA with either algorithm, which are
+/// made when they are first needed. The device is first touched when what it would have saved so
+/// far is what touching it costs; where it can't be had, x86 stays, and nobody is told. When it
+/// fails, x86 computes that call and all others: device_failure() tells once.
+class AutomaticSphereCollider final : public SphereCollider {
+ public:
+  /// `options.backend` is `automatic`; `with_cuda` is whether `make` knows that backend.
+  AutomaticSphereCollider(const SphereColliderOptions& options, SphereColliderMaker make,
+                          bool with_cuda);
+
+  ContactSpan find_contacts(std::span<const SphereInstance> spheres) override;
+  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
+                                         std::span<const SpherePair> pairs) override;
+  Backend backend() const noexcept override { return backend_; }
+  SphereAlgorithm algorithm() const noexcept override { return algorithm_; }
+  ChoiceReason reason() const noexcept override { return reason_; }
+  std::string_view device_failure() const noexcept override { return device_failure_; }
+
+ private:
+  template <class Call, class Measure>
+  auto compute(CostChooser& chooser, const ColliderWork& expected, const Call& call,
+               const Measure& measure);
+  SphereCollider& collider(Backend backend, SphereAlgorithm algorithm);
+  void start_device_if_it_pays();
+  /// `failure` is empty where there never was one.
+  void give_up_device(std::string_view failure);
+
+  SphereColliderOptions options_;
+  SphereColliderMaker make_;
+  CostChooser search_, given_;
+  std::unique_ptr<SphereCollider> colliders_[2][2];  ///< by backend and algorithm
+  double contacts_per_sphere_ = 1;                   ///< in the last search
+  bool device_asleep_;
+  bool device_lost_ = false;
+  std::string device_failure_;
+  Backend backend_ = Backend::x86;
+  SphereAlgorithm algorithm_ = SphereAlgorithm::automatic;
+  ChoiceReason reason_ = ChoiceReason::fixed;
+};
+
+}  // namespace jfpx::inline JFPX_ABI

@@ -1,0 +1,147 @@
+/// Chooses among ways to do a call, by a cost model and by what the last calls took.
+#include "src/cost_chooser.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace jfpx::inline JFPX_ABI {
+namespace {
+
+/// Who is not faster by this much is not switched to: hysteresis.
+constexpr double kClearly = 0.93;
+/// Calls after a switch before the next: one that grows buffers, three that count.
+constexpr int kCallsToSettle = 4;
+constexpr int kCallsOnTrial = 3;
+constexpr double kTrialRatio = 2;
+/// A trial of three calls that take up to twice as long costs at most 3 in so many.
+constexpr double kCallsBetweenTrials = 100;
+constexpr double kMostPatience = 64;
+/// Deciding and timing takes about 0.1 us: calls that take little are decided together.
+constexpr double kDecisionEveryUs = 20;
+constexpr double kMostHeldCalls = 63;
+/// Where the pairs change by this, what was measured before is forgotten.
+constexpr double kOtherSize = 4;
+/// Buffers grow by some more than is needed.
+constexpr double kSlack = 1.5;
+
+}  // namespace
+
+CostChooser::CostChooser(std::vector<Way> ways) {
+  for (const Way& way : ways) ways_.push_back({.way = way});
+}
+
+double CostChooser::cost(const Candidate& c, const ColliderWork& work) const {
+  constexpr double kLeast = 1e-3;  // so that ratios are finite
+  return std::max(kLeast, microseconds(c.way.terms, work)) * c.correction;
+}
+
+std::size_t CostChooser::cheapest(const ColliderWork& work, bool dormant) const {
+  std::size_t best = kNone;
+  for (std::size_t i = 0; i < ways_.size(); ++i) {
+    if (ways_[i].way.dormant != dormant) continue;
+    if (best == kNone || cost(ways_[i], work) < cost(ways_[best], work)) best = i;
+  }
+  return best;
+}
+
+CostChooser::Decision CostChooser::choose(const ColliderWork& expected) {
+  if (held_calls_ > 0 && expected.spheres == held_.spheres && expected.pairs == held_.pairs) {
+    --held_calls_;
+    return {current_, false};
+  }
+  forget_if_size_changed(expected);
+  decide(expected);
+  const double us = cost(ways_[current_], expected);
+  held_ = expected;
+  held_calls_ = stay_ > 0 ? 0 : static_cast<int>(std::min(kMostHeldCalls, kDecisionEveryUs / us));
+  const double spent = us * (1 + held_calls_);
+  for (Candidate& c : ways_) c.waited_us += spent;
+  const std::size_t dormant = cheapest(expected, true);
+  if (dormant != kNone) {
+    missed_us_ += std::max(0.0, spent * (1 - cost(ways_[dormant], expected) / us));
+  }
+  return {current_, true};
+}
+
+void CostChooser::decide(const ColliderWork& work) {
+  if (stay_ > 0 && --stay_ > 0) return;
+  const std::size_t best = cheapest(work, false);
+  const bool after_trial = current_ != incumbent_;
+  const std::size_t tried = current_;
+  current_ = incumbent_;
+  if (incumbent_ == kNone ||
+      (best != incumbent_ && cost(ways_[best], work) < kClearly * cost(ways_[incumbent_], work))) {
+    take(best);
+  } else if (after_trial) {
+    ways_[tried].patience = std::min(kMostPatience, 2 * ways_[tried].patience);
+  } else if (const std::size_t rival = due_for_trial(work); rival != kNone) {
+    current_ = rival;
+    stay_ = kCallsOnTrial;
+    ways_[rival].waited_us = 0;
+    reason_ = ChoiceReason::trial;
+    return;
+  }
+  const auto ready = std::ranges::count_if(ways_, [](auto& c) { return !c.way.dormant; });
+  reason_ = ready == 1                             ? ChoiceReason::fixed
+            : best != incumbent_                   ? ChoiceReason::kept
+            : ways_[incumbent_].samples < kSamples ? ChoiceReason::predicted
+                                                   : ChoiceReason::measured;
+}
+
+void CostChooser::take(std::size_t way) {
+  incumbent_ = current_ = way;
+  stay_ = ways_[way].samples == 0 ? kCallsToSettle : 0;
+}
+
+std::size_t CostChooser::due_for_trial(const ColliderWork& work) const {
+  const double now = cost(ways_[incumbent_], work);
+  for (std::size_t i = 0; i < ways_.size(); ++i) {
+    if (i == incumbent_ || ways_[i].way.dormant) continue;
+    const double us = cost(ways_[i], work);
+    if (std::min(1.0, 1 / ways_[i].correction) * us >= kTrialRatio * now) continue;
+    if (ways_[i].waited_us >= kCallsBetweenTrials * ways_[i].patience * us) return i;
+  }
+  return kNone;
+}
+
+void CostChooser::forget_if_size_changed(const ColliderWork& work) {
+  const double pairs = std::max(1.0, work.pairs);
+  if (pairs <= kOtherSize * regime_pairs_ && regime_pairs_ <= kOtherSize * pairs) return;
+  regime_pairs_ = pairs;
+  for (Candidate& c : ways_) {
+    c.samples = 0;
+    c.correction = 1;
+    c.waited_us = 0;
+    c.patience = 1;
+  }
+  incumbent_ = current_ = kNone;
+  stay_ = 0;
+}
+
+void CostChooser::record(const ColliderWork& done, double us) {
+  Candidate& c = ways_[current_];
+  if (done.pairs > c.warm_pairs) {
+    c.warm_pairs = kSlack * done.pairs;
+    return;
+  }
+  c.correction = 1;
+  c.ratios[c.samples++ % kSamples] = us / cost(c, done);
+  std::array<double, kSamples> sorted = c.ratios;
+  const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(std::min(c.samples, kSamples));
+  const auto quartile = sorted.begin() + (end - sorted.begin() - 1) / 4;
+  std::nth_element(sorted.begin(), quartile, end);
+  c.correction = *quartile;
+}
+
+void CostChooser::wake() noexcept {
+  for (Candidate& c : ways_) c.way.dormant = false;
+  stay_ = held_calls_ = 0;
+}
+
+void CostChooser::remove(Backend backend) {
+  std::erase_if(ways_, [&](const Candidate& c) { return c.way.backend == backend; });
+  incumbent_ = current_ = kNone;
+  stay_ = held_calls_ = 0;
+}
+
+}  // namespace jfpx::inline JFPX_ABI

@@ -1,0 +1,185 @@
+/// Backend::automatic: the device is used when it pays, and its failures cost nothing but time.
+#include <jfpx/world.hpp>
+
+#include "examples/scenes/scenes.hpp"
+#include "tests/automatic/device_double.hpp"
+#include "tests/support/sphere_fixtures.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::test {
+namespace {
+
+std::vector<SpherePair> some_pairs(std::size_t spheres, std::size_t count, Random& random) {
+  std::vector<SpherePair> pairs(count);
+  for (SpherePair& p : pairs) {
+    p = {static_cast<SphereIndex>(random.below(spheres)),
+         static_cast<SphereIndex>(random.below(spheres))};
+  }
+  return pairs;
+}
+
+class AutomaticSphereColliderTest : public testing::Test {
+ protected:
+  std::unique_ptr<SphereCollider> make(const SphereColliderOptions& options) {
+    return std::make_unique<AutomaticSphereCollider>(options, maker_with(&device_), true);
+  }
+
+  Device device_;
+  Random random_{base_seed()};
+};
+using AutomaticCollider = AutomaticSphereColliderTest;
+
+TEST_F(AutomaticCollider, UsesTheDeviceWhereTheModelExpectsIt) {
+  const auto collider = make(device_wins());
+  const auto spheres = make_gas(300, 1, 3, random_);
+  EXPECT_TRUE(same_bits(collider->find_contacts(spheres), brute_force(spheres))) << seed_note();
+  EXPECT_EQ(collider->backend(), Backend::cuda);
+  EXPECT_EQ(collider->reason(), ChoiceReason::predicted);
+  EXPECT_EQ(collider->device_failure(), "");
+}
+
+TEST_F(AutomaticCollider, LeavesTheDeviceAloneUntilItWouldHavePaid) {
+  SphereColliderOptions options = device_wins();
+  options.costs.cuda_start_ms = 10;
+  // All pairs of 1001 spheres, 500500, take 20 ns each: 10.01 ms, whatever they really take.
+  options.algorithm = SphereAlgorithm::all_pairs;
+  options.costs.x86_all_pairs = {.pair_ns = 20};
+  const auto collider = make(options);
+  const auto spheres = make_gas(1001, 1, 3, random_);
+  collider->find_contacts(spheres);
+  EXPECT_EQ(device_.made, 0);
+  EXPECT_EQ(collider->backend(), Backend::x86);
+  EXPECT_EQ(collider->reason(), ChoiceReason::fixed);
+  collider->find_contacts(spheres);
+  EXPECT_EQ(device_.made, 1);
+  EXPECT_EQ(collider->backend(), Backend::cuda);
+}
+
+TEST_F(AutomaticCollider, ADeviceThatIsNotThereIsAskedForOnceAndNotMentioned) {
+  device_.when_made = [] { throw BackendUnavailable("cuda: no CUDA driver is installed"); };
+  const auto collider = make(device_wins());
+  const auto spheres = make_gas(300, 1, 3, random_);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_TRUE(same_bits(collider->find_contacts(spheres), brute_force(spheres))) << seed_note();
+    EXPECT_EQ(collider->backend(), Backend::x86);
+    EXPECT_EQ(collider->device_failure(), "");
+    EXPECT_NE(collider->reason(), ChoiceReason::device_failed);
+  }
+  EXPECT_EQ(device_.made, 1);
+}
+
+TEST_F(AutomaticCollider, AFailingDeviceIsReplacedInTheSameCallAndReportedOnce) {
+  const std::function<void()> failures[] = {
+      [] { throw DeviceError("the device is gone"); },
+      [] { throw OutOfMemory("the device is gone"); },
+  };
+  for (const auto& fail : failures) {
+    for (const bool when_made : {false, true}) {
+      for (const bool given : {false, true}) {
+        device_ = {};
+        const auto collider = make(device_wins());
+        const auto x86 = make_sphere_collider({.backend = Backend::x86});
+        const auto spheres = make_gas(300, 1, 3, random_);
+        const auto pairs = some_pairs(300, 1000, random_);
+        (when_made ? device_.when_made : device_.before_call) = [&] {
+          if (when_made || device_.calls == 4) fail();
+        };
+        std::string failures_told;
+        for (int i = 0; i < 10; ++i) {
+          if (given) {
+            ASSERT_TRUE(
+                same_bits(collider->test_pairs(spheres, pairs), x86->test_pairs(spheres, pairs)))
+                << seed_note();
+          } else {
+            ASSERT_TRUE(same_bits(collider->find_contacts(spheres), brute_force(spheres)))
+                << seed_note();
+          }
+          failures_told += collider->device_failure();
+          const bool failed = !failures_told.empty();
+          EXPECT_EQ(collider->backend(), failed ? Backend::x86 : Backend::cuda);
+          EXPECT_EQ(collider->reason() == ChoiceReason::device_failed, failed);
+        }
+        EXPECT_EQ(failures_told, "the device is gone");
+        EXPECT_EQ(device_.alive, 0) << "what failed must be let go";
+        EXPECT_EQ(device_.calls, when_made ? 0 : 4) << "it must not be asked again";
+      }
+    }
+  }
+}
+
+TEST_F(AutomaticCollider, BadInputIsNoFailureOfTheDevice) {
+  const auto collider = make(device_wins());
+  auto spheres = make_gas(300, 1, 3, random_);
+  spheres[7].radius = -1;
+  EXPECT_THROW(collider->find_contacts(spheres), InvalidArgument);
+  spheres[7].radius = 1;
+  EXPECT_TRUE(same_bits(collider->find_contacts(spheres), brute_force(spheres))) << seed_note();
+  EXPECT_EQ(collider->backend(), Backend::cuda);
+}
+
+TEST_F(AutomaticCollider, WhenX86FailsThereIsNobodyLeft) {
+  SphereColliderOptions options;
+  for (const bool memory : {false, true}) {
+    AutomaticSphereCollider collider(
+        options,
+        [&](const SphereColliderOptions&) -> std::unique_ptr<SphereCollider> {
+          device_.before_call = [memory] {
+            if (memory) throw OutOfMemory("no memory");
+            throw DeviceError("no device");
+          };
+          return std::make_unique<DeviceDouble>(&device_, SphereAlgorithm::automatic);
+        },
+        true);
+    const auto spheres = make_gas(30, 1, 3, random_);
+    EXPECT_THROW(collider.find_contacts(spheres), Error);
+  }
+}
+
+TEST_F(AutomaticCollider, KeepsToTheAlgorithmThatWasAskedFor) {
+  for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+    const auto collider = make_sphere_collider({.algorithm = algorithm});
+    for (const std::size_t n : {2u, 200u, 3000u}) {
+      collider->find_contacts(make_gas(n, 1, 3, random_));
+      EXPECT_EQ(collider->algorithm(), algorithm);
+    }
+  }
+}
+
+TEST_F(AutomaticCollider, RefusesCostsThatAreNone) {
+  for (const double bad :
+       {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    SphereColliderOptions options;
+    options.costs.x86_given_pairs.pair_ns = bad;
+    try {
+      make_sphere_collider(options);
+      FAIL();
+    } catch (const InvalidArgument& error) {
+      EXPECT_NE(std::string(error.what()).find("x86_given_pairs.pair_ns"), std::string::npos)
+          << error.what();
+    }
+  }
+}
+
+TEST_F(AutomaticCollider, StepReportsNameWhoComputedAndTheFailureOnce) {
+  const Scene scene = scenes::make("gas", {.spheres = 400, .seed = 1});
+  World world(scene, make(device_wins()));
+  World on_x86(scene, {.collider = {.backend = Backend::x86}});
+  device_.before_call = [&] {
+    if (device_.calls == 4) throw DeviceError("the device is gone");
+  };
+  for (int step = 1; step <= 20; ++step) {
+    const StepReport report = world.step();
+    on_x86.step();
+    ASSERT_EQ(world.state_hash(), on_x86.state_hash());
+    EXPECT_EQ(report.backend, step < 4 ? Backend::cuda : Backend::x86);
+    EXPECT_EQ(report.choice == ChoiceReason::device_failed, step >= 4);
+    EXPECT_EQ(report.device_failure, step == 4 ? "the device is gone" : "");
+    EXPECT_NE(report.algorithm, SphereAlgorithm::automatic);
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::test

@@ -1,0 +1,34 @@
+/// A device that fails inside Bullet: batches go on, the bits stay, the stats say why.
+#include "tests/automatic/device_double.hpp"
+#include "tests/bullet/twin_worlds.hpp"
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+TEST(DeviceTakeover, KeepsBatchesGoingAndBulletsBits) {
+  test::Device device;  // the first calls are its own, however long they take
+  device.before_call = [&] {
+    if (device.calls == 4) throw DeviceError("the device is gone");
+  };
+  TwinOptions options;
+  options.ours = [&](btCollisionConfiguration* configuration) {
+    return std::make_unique<CollisionDispatcher>(
+        configuration,
+        std::make_unique<AutomaticSphereCollider>(test::device_wins(), test::maker_with(&device),
+                                                  true),
+        DispatcherOptions{.minimum_batch = 0});
+  };
+  Twins twins(options);
+  twins.both([](BulletWorld& w) { add_heap(w, 50, 51); });
+  ASSERT_TRUE(twins.step(30));
+  EXPECT_EQ(device.calls, 4);
+  EXPECT_EQ(twins.stats().batches, 30u);
+  EXPECT_EQ(twins.stats().failure, "");
+  EXPECT_EQ(twins.stats().device_failure, "the device is gone");
+  EXPECT_EQ(twins.ours().ours()->backend(), Backend::x86);
+  twins.ours().ours()->reset_stats();
+  EXPECT_EQ(twins.stats().device_failure, "the device is gone");
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bullet
