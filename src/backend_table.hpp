@@ -14,6 +14,6 @@ struct BackendRow {
 };
 
 /// The row of a backend, which is not `automatic`. @throws InvalidArgument
-const BackendRow& backend_row(Backend backend);
+JFPX_API const BackendRow& backend_row(Backend backend);
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -78,9 +78,9 @@ std::string fault_of(const std::string& name, double value) {
 // as wide data cost.
 CostModel::CostModel() {
   constexpr double kWide = sizeof(Real) / 4;
-  x86_all_pairs = {.call_us = 0.1, .sphere_ns = 3, .pair_ns = 0.17 * kWide, .contact_ns = 7};
-  x86_sorted_tiles = {.call_us = 1, .sphere_ns = 50 * kWide, .contact_ns = 9};
-  x86_given_pairs = {.call_us = 0.1, .pair_ns = 6 * kWide};
+  x86_all_pairs = {.call_us = 0.05, .sphere_ns = 6, .pair_ns = 0.175 * kWide, .contact_ns = 5};
+  x86_sorted_tiles = {.call_us = 0.2, .sphere_ns = 52 * kWide, .contact_ns = 11};
+  x86_given_pairs = {.call_us = 0.05, .pair_ns = 5};
   cuda_all_pairs = {.call_us = 22, .byte_ns = 0.1, .pair_ns = 0.001 * kWide};
   cuda_sorted_tiles = {.call_us = 70, .byte_ns = 0.1, .sphere_ns = 0.3 * kWide};
   cuda_given_pairs = {.call_us = 25, .byte_ns = 0.1};

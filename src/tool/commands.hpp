@@ -9,6 +9,7 @@ namespace jfpx::inline JFPX_ABI::tool {
 
 void add_scenes_command(CLI::App& app, int& status);
 void add_devices_command(CLI::App& app, int& status);
+void add_calibrate_command(CLI::App& app, int& status);
 void add_run_command(CLI::App& app, int& status);
 void add_compare_command(CLI::App& app, int& status);
 void add_replay_command(CLI::App& app, int& status);

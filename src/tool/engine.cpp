@@ -4,9 +4,28 @@
 #include <jfpx/error.hpp>
 
 #include "src/tool/bullet_engine.hpp"
+#include "src/tool/cost_cache.hpp"
 #include "src/tool/native_engine.hpp"
 
+#include <fmt/format.h>
+
 namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+/// Read once: a command may make several engines, and why the file is not used is told once.
+const CostModel& costs_of_this_machine(bool quiet) {
+  static const CostModel costs = [quiet] {
+    const CachedCosts cached = load_cached_costs();
+    if (!quiet && !cached.problem.empty()) {
+      fmt::print(stderr, "jfpx: default costs are used (see: jfpx calibrate): {}\n",
+                 cached.problem);
+    }
+    return cached.costs;
+  }();
+  return costs;
+}
+
+}  // namespace
 
 std::string_view to_string(EngineKind kind) {
   switch (kind) {
@@ -41,6 +60,7 @@ SphereColliderOptions collider_options(const RunOptions& options) {
   SphereColliderOptions collider;
   collider.backend = options.backend;
   collider.threads = options.threads;
+  if (options.backend == Backend::automatic) collider.costs = costs_of_this_machine(options.quiet);
   return collider;
 }
 

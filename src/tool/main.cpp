@@ -48,6 +48,7 @@ int run(int argc, char** argv) {
   tool::add_preload_command(app, status);
   tool::add_scenes_command(app, status);
   tool::add_devices_command(app, status);
+  tool::add_calibrate_command(app, status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

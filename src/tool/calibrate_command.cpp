@@ -1,0 +1,100 @@
+/// jfpx calibrate: measures this machine for the automatic choice of backend and algorithm.
+#include "src/cost_model.hpp"
+#include "src/tool/calibration.hpp"
+#include "src/tool/commands.hpp"
+#include "src/tool/cost_cache.hpp"
+#include "src/tool/cost_fit.hpp"
+#include "src/tool/options.hpp"
+#include "src/tool/output.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+struct Options {
+  std::string json;
+  bool show = false, quiet = false;
+};
+
+std::string from_how_many(const CostTerms& a, const CostTerms& b) {
+  const double n = crossover(a, b);
+  return n == 0 ? "never" : fmt::format("{:.0f}", n);
+}
+
+std::string report(const CostModel& costs) {
+  Table terms({"way", "call us", "byte ns", "sphere ns", "pair ns", "contact ns"});
+  const auto add = [&](const char* name, const CostTerms& t) {
+    const auto number = [](double value) { return fmt::format("{:.4g}", value); };
+    terms.add({name, number(t.call_us), number(t.byte_ns), number(t.sphere_ns), number(t.pair_ns),
+               number(t.contact_ns)});
+  };
+  add("x86, all pairs", costs.x86_all_pairs);
+  add("x86, sorted tiles", costs.x86_sorted_tiles);
+  add("x86, given pairs", costs.x86_given_pairs);
+  add("cuda, all pairs", costs.cuda_all_pairs);
+  add("cuda, sorted tiles", costs.cuda_sorted_tiles);
+  add("cuda, given pairs", costs.cuda_given_pairs);
+  Table crossovers({"with 3 contacts a sphere", "pays from spheres"});
+  crossovers.add({"x86: sorted tiles instead of all pairs",
+                  from_how_many(costs.x86_all_pairs, costs.x86_sorted_tiles)});
+  crossovers.add({"cuda: sorted tiles instead of all pairs",
+                  from_how_many(costs.cuda_all_pairs, costs.cuda_sorted_tiles)});
+  crossovers.add(
+      {"all pairs: cuda instead of x86", from_how_many(costs.x86_all_pairs, costs.cuda_all_pairs)});
+  return fmt::format("{}\nstart of cuda: {:.0f} ms\n\n{}", terms.text(), costs.cuda_start_ms,
+                     crossovers.text());
+}
+
+CostModel measure(const Options& options) {
+  std::unique_ptr<Progress> progress;
+  const Calibration result = calibrate([&](std::uint64_t done, std::uint64_t total) {
+    if (!progress) progress = std::make_unique<Progress>("measuring", total, options.quiet);
+    progress->advance_to(done);
+  });
+  progress.reset();
+  if (!result.no_cuda.empty() && !options.quiet) {
+    fmt::print(stderr, "jfpx: cuda keeps its default costs: {}\n", result.no_cuda);
+  }
+  store_costs(result.costs);
+  return result.costs;
+}
+
+CostModel show(const Options& options) {
+  const CachedCosts cached = load_cached_costs();
+  if (!cached.problem.empty() && !options.quiet) {
+    fmt::print(stderr, "jfpx: {}: these are the default costs\n", cached.problem);
+  }
+  return cached.costs;
+}
+
+int run(const Options& options) {
+  OutputFile json(options.json);
+  const CostModel costs = options.show ? show(options) : measure(options);
+  json.write(to_json({costs, this_machine()}));
+  json.finish();
+  if (!options.quiet && options.json != "-") {
+    fmt::print("{}\n{}\n", report(costs), cost_model_path());
+  }
+  return kSuccess;
+}
+
+}  // namespace
+
+void add_calibrate_command(CLI::App& app, int& status) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "calibrate", "Measure this machine for the automatic choice of backend and algorithm");
+  command->add_flag("--show", options->show, "Measure nothing: show what is used now");
+  command->add_option("--json", options->json,
+                      "Write the costs as JSON to this file, - for stdout");
+  command->add_flag("--quiet", options->quiet, "Print nothing but what --json - asks for");
+  command->footer(
+      "Takes seconds. The costs are stored in the cache folder (XDG_CACHE_HOME) with machine,\n"
+      "driver and version; the other commands use them while all three are as they were.");
+  command->callback([options, &status] { status = run(*options); });
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

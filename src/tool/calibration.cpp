@@ -1,0 +1,177 @@
+/// Measures what sphere collision costs on this machine.
+#include "src/tool/calibration.hpp"
+
+#include <jfpx/error.hpp>
+#include <jfpx/random.hpp>
+#include <jfpx/sphere_collider.hpp>
+
+#include "examples/scenes/scenes.hpp"
+#include "src/tool/cost_fit.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <memory>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Us = std::chrono::duration<double, std::micro>;
+
+/// Contacts of a sphere: none, a heap, a crush.
+constexpr Real kDensities[] = {0, 3, 12};
+constexpr std::uint32_t kFew[] = {32, 128, 512, 2048};
+constexpr std::uint32_t kMany[] = {128, 512, 2048, 8192, 32768};
+constexpr std::uint32_t kFewForDevice[] = {128, 512, 2048, 8192};
+constexpr std::uint32_t kManyForDevice[] = {512, 2048, 8192, 32768, 131072};
+constexpr std::uint32_t kPairs[] = {256, 2048, 16384, 131072};
+constexpr std::uint32_t kCopied[] = {16384, 131072, 524288};
+
+std::vector<SphereInstance> make_spheres(std::uint32_t count, Real density) {
+  if (density > 0) return scenes::random_spheres(count, density, 1);
+  std::vector<SphereInstance> spheres = scenes::random_spheres(count, 3, 1);
+  for (SphereInstance& s : spheres) s.radius *= Real(1e-3);
+  return spheres;
+}
+
+/// The least time of a call: other work on the machine only adds to it.
+template <class Call>
+double least_us(const Call& call) {
+  constexpr Us kBudget{8e3};
+  constexpr int kLeast = 3;
+  call();  // grows buffers
+  double least = std::numeric_limits<double>::infinity();
+  const Clock::time_point begin = Clock::now();
+  for (int n = 0; n < kLeast || Clock::now() - begin < kBudget; ++n) {
+    const Clock::time_point start = Clock::now();
+    call();
+    least = std::min(least, Us(Clock::now() - start).count());
+  }
+  return std::max(least, 1e-3);
+}
+
+class Bench {
+ public:
+  explicit Bench(std::function<void(std::uint64_t, std::uint64_t)> progress)
+      : progress_(std::move(progress)) {}
+
+  void expect(std::size_t measurements) { total_ += measurements; }
+
+  /// Samples of one way to search, for all densities.
+  std::vector<CostSample> search(Backend backend, SphereAlgorithm algorithm,
+                                 std::span<const std::uint32_t> sizes) {
+    const auto collider = make_sphere_collider({.backend = backend, .algorithm = algorithm});
+    std::vector<CostSample> samples;
+    for (const std::uint32_t n : sizes) {
+      for (const Real density : kDensities) {
+        const auto spheres = make_spheres(n, density);
+        std::size_t contacts = 0;
+        const double us = least_us([&] { contacts = collider->find_contacts(spheres).size(); });
+        samples.push_back({search_work(n, static_cast<double>(contacts)), us});
+        progress_(++done_, total_);
+      }
+    }
+    return samples;
+  }
+
+  /// Samples of given pairs, half of them touching; `copied` spheres with one pair tell what
+  /// moving bytes costs.
+  std::vector<CostSample> given(Backend backend, std::span<const std::uint32_t> copied) {
+    const auto collider = make_sphere_collider({.backend = backend});
+    std::vector<CostSample> samples;
+    const auto measure = [&](std::span<const SphereInstance> spheres,
+                             std::span<const SpherePair> pairs) {
+      const double us = least_us([&] { collider->test_pairs(spheres, pairs); });
+      samples.push_back(
+          {test_work(static_cast<double>(spheres.size()), static_cast<double>(pairs.size())), us});
+      progress_(++done_, total_);
+    };
+    for (const std::uint32_t m : kPairs) {
+      const auto spheres = make_spheres(m / 4, 3);
+      measure(spheres, some_pairs(spheres, m));
+    }
+    for (const std::uint32_t n : copied) {
+      const auto spheres = make_spheres(n, 0);
+      measure(spheres, some_pairs(spheres, 1));
+    }
+    return samples;
+  }
+
+ private:
+  static std::vector<SpherePair> some_pairs(std::span<const SphereInstance> spheres,
+                                            std::uint32_t count) {
+    const auto collider = make_sphere_collider({.backend = Backend::x86});
+    const ContactSpan contacts = collider->find_contacts(spheres);
+    Random random(1);
+    std::vector<SpherePair> pairs(count);
+    for (SpherePair& p : pairs) {
+      const auto any = static_cast<SphereIndex>(random.below(spheres.size()));
+      if (contacts.empty() || random.below(2) == 0) {
+        p = {any, static_cast<SphereIndex>(random.below(spheres.size()))};
+      } else {
+        const SphereContact& c = contacts[random.below(contacts.size())];
+        p = {c.a, c.b};
+      }
+    }
+    return pairs;
+  }
+
+  std::function<void(std::uint64_t, std::uint64_t)> progress_;
+  std::uint64_t done_ = 0, total_ = 0;
+};
+
+using Term = double CostTerms::*;
+constexpr Term kAllPairsTerms[] = {&CostTerms::call_us, &CostTerms::sphere_ns, &CostTerms::pair_ns,
+                                   &CostTerms::contact_ns};
+constexpr Term kSortedTerms[] = {&CostTerms::call_us, &CostTerms::sphere_ns,
+                                 &CostTerms::contact_ns};
+constexpr Term kGivenTerms[] = {&CostTerms::call_us, &CostTerms::pair_ns};
+constexpr Term kCopiedTerms[] = {&CostTerms::call_us, &CostTerms::byte_ns, &CostTerms::pair_ns};
+
+void measure_x86(Bench& bench, CostModel* costs) {
+  using enum SphereAlgorithm;
+  costs->x86_all_pairs = fit_costs(bench.search(Backend::x86, all_pairs, kFew), kAllPairsTerms);
+  costs->x86_sorted_tiles =
+      fit_costs(bench.search(Backend::x86, sorted_tiles, kMany), kSortedTerms);
+  costs->x86_given_pairs = fit_costs(bench.given(Backend::x86, {}), kGivenTerms);
+}
+
+/// @throws BackendUnavailable
+double measure_start() {
+  const Clock::time_point start = Clock::now();
+  const auto spheres = make_spheres(512, 3);
+  make_sphere_collider({.backend = Backend::cuda})->find_contacts(spheres);
+  return 1e-3 * Us(Clock::now() - start).count();
+}
+
+void measure_cuda(Bench& bench, CostModel* costs) {
+  using enum SphereAlgorithm;
+  costs->cuda_given_pairs = fit_costs(bench.given(Backend::cuda, kCopied), kCopiedTerms);
+  const CostTerms copies{.byte_ns = costs->cuda_given_pairs.byte_ns};
+  costs->cuda_all_pairs =
+      fit_costs(bench.search(Backend::cuda, all_pairs, kFewForDevice), kAllPairsTerms, copies);
+  costs->cuda_sorted_tiles =
+      fit_costs(bench.search(Backend::cuda, sorted_tiles, kManyForDevice), kSortedTerms, copies);
+}
+
+}  // namespace
+
+Calibration calibrate(const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+  Calibration result;
+  Bench bench(progress);
+  constexpr std::size_t kD = std::size(kDensities);
+  bench.expect(kD * (std::size(kFew) + std::size(kMany)) + std::size(kPairs));
+  try {
+    result.costs.cuda_start_ms = measure_start();
+    bench.expect(kD * (std::size(kFewForDevice) + std::size(kManyForDevice)) + std::size(kPairs) +
+                 std::size(kCopied));
+  } catch (const BackendUnavailable& error) {
+    result.no_cuda = error.what();
+  }
+  measure_x86(bench, &result.costs);
+  if (result.no_cuda.empty()) measure_cuda(bench, &result.costs);
+  return result;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

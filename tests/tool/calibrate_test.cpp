@@ -1,0 +1,117 @@
+/// jfpx calibrate, and what the other commands make of its file.
+#include <jfpx/cost_model.hpp>
+
+#include "tests/support/process.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <fstream>
+
+namespace jfpx {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// The command with a cache folder of its own.
+class Calibrate : public testing::Test {
+ protected:
+  test::ProcessResult jfpx(const std::string& arguments, const char* redirect = "2>&1") {
+    return test::run_process("XDG_CACHE_HOME=" + folder_.file("") + " " + JFPX_TOOL_PATH + " " +
+                             arguments + " " + redirect);
+  }
+  std::string path() const {
+    return folder_.file(sizeof(Real) == 4 ? "jfpx/cost-model-float.json"
+                                          : "jfpx/cost-model-double.json");
+  }
+  void write(const std::string& content) {
+    std::filesystem::create_directories(folder_.file("jfpx"));
+    std::ofstream(path()) << content;
+  }
+  static constexpr const char* kRun = "run gas --spheres 10 --steps 1 --hash";
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(Calibrate, StoresCostsThatTheOtherCommandsUse) {
+  const auto result = jfpx("calibrate");
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("x86, sorted tiles"));
+  EXPECT_THAT(result.output, HasSubstr(path()));
+  EXPECT_THAT(result.output, Not(HasSubstr("measuring"))) << "progress is for terminals";
+  const MeasuredCostModel model = load_cost_model(path());
+  EXPECT_GT(model.costs.x86_all_pairs.pair_ns, 0.0);
+  EXPECT_GT(model.costs.x86_sorted_tiles.sphere_ns, 0.0);
+  EXPECT_GT(model.costs.x86_given_pairs.pair_ns, 0.0);
+  EXPECT_FALSE(model.origin.machine.empty());
+  EXPECT_EQ(model.origin.version, JFPX_VERSION);
+  EXPECT_EQ(folder_.entries(), 1u);
+
+  EXPECT_THAT(jfpx(kRun).output, Not(HasSubstr("default costs")));
+  const auto shown = jfpx("calibrate --show --json -", "2>/dev/null");
+  EXPECT_EQ(nlohmann::json::parse(shown.output)["x86_all_pairs"]["pair_ns"],
+            model.costs.x86_all_pairs.pair_ns);
+}
+
+TEST_F(Calibrate, WithoutAFileTheDefaultsAreUsedAndOneLineSaysSo) {
+  const auto run = jfpx(kRun);
+  EXPECT_EQ(run.status, 0);
+  EXPECT_THAT(run.output, HasSubstr("default costs are used"));
+  EXPECT_THAT(run.output, HasSubstr("this machine was not measured yet"));
+  EXPECT_THAT(jfpx(std::string(kRun) + " --quiet").output, Not(HasSubstr("costs")));
+  EXPECT_THAT(jfpx(std::string(kRun) + " --backend x86").output, Not(HasSubstr("costs")));
+  const auto shown = jfpx("calibrate --show");
+  EXPECT_EQ(shown.status, 0);
+  EXPECT_THAT(shown.output, HasSubstr("these are the default costs"));
+  EXPECT_EQ(folder_.entries(), 0u) << "only calibrate writes";
+}
+
+TEST_F(Calibrate, ABrokenFileIsIgnoredWithOneLineAndTheSameBits) {
+  const std::string hash = jfpx(std::string(kRun) + " --quiet").output;
+  for (const char* content : {"", "{", "null", "{\"jfpx_cost_model\": 1}", "\xff\xfe"}) {
+    write(content);
+    const auto run = jfpx(kRun);
+    EXPECT_EQ(run.status, 0) << content;
+    EXPECT_THAT(run.output, HasSubstr("default costs are used")) << content;
+    EXPECT_THAT(run.output, HasSubstr(path())) << content;
+    EXPECT_THAT(run.output, HasSubstr(hash)) << content;
+  }
+  std::filesystem::remove(path());
+  std::filesystem::create_directory(path());
+  EXPECT_EQ(jfpx(kRun).status, 0) << "a folder in its place";
+}
+
+TEST_F(Calibrate, AFileOfAnotherMachineDriverOrVersionIsIgnored) {
+  const auto here = jfpx("calibrate --show --json -", "2>/dev/null");
+  const auto good = nlohmann::ordered_json::parse(here.output);
+  write(good.dump());
+  EXPECT_THAT(jfpx(kRun).output, Not(HasSubstr("default costs")));
+  for (const char* part : {"machine", "driver", "version"}) {
+    auto stale = good;
+    stale[part] = "another";
+    write(stale.dump());
+    EXPECT_THAT(jfpx(kRun).output, HasSubstr("default costs are used")) << part;
+  }
+}
+
+TEST_F(Calibrate, AFolderThatCanNotBeMadeIsAnErrorOfCalibrateOnly) {
+  std::ofstream(folder_.file("jfpx")) << "a file where the folder should be";
+  EXPECT_EQ(jfpx(kRun).status, 0);
+  const auto result = jfpx("calibrate --quiet");
+  EXPECT_EQ(result.status, 2);
+  EXPECT_THAT(result.output, HasSubstr(path()));
+}
+
+TEST_F(Calibrate, WithoutAHomeNothingIsStored) {
+  const std::string command = "env -u HOME -u XDG_CACHE_HOME " + std::string(JFPX_TOOL_PATH) + " ";
+  const auto run = test::run_process(command + kRun + " 2>&1");
+  EXPECT_EQ(run.status, 0);
+  EXPECT_THAT(run.output, HasSubstr("HOME is not set"));
+}
+
+}  // namespace
+}  // namespace jfpx
