@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/inertia_tensor.hpp"
 #include "src/shared/inertia.hpp"
 #include "src/shared/integrate.hpp"
 #include "src/shared/power.hpp"
@@ -25,12 +26,6 @@ Vec3 moments_of(const Shape& shape, Real mass) {
   return box != nullptr ? shared::moments_of_inertia(*box, mass) : Vec3{};
 }
 
-Mat3 inverse_inertia_of(const Vec3& moments) {
-  // An immovable body has no inverse inertia, on purpose (erratum E26).
-  const auto inverse = [](Real moment) { return moment > 0 ? Real(1) / moment : Real(0); };
-  return diagonal({inverse(moments.x), inverse(moments.y), inverse(moments.z)});
-}
-
 bool before(BodyId a, BodyId b) { return a.index < b.index; }
 
 }  // namespace
@@ -43,7 +38,8 @@ void BodyStore::resize(std::size_t slots) {
   all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
       moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion, moving.awake);
   all(shape_, radius_, mass_, inverse_mass_, friction_, restitution_, body_inverse_inertia_,
-      moments_, acceleration_, velocity_kept_, angular_velocity_kept_, can_sleep_, generation_);
+      tensor_, acceleration_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_,
+      generation_);
 }
 
 BodyId BodyStore::add(const BodyDef& def) {
@@ -68,21 +64,35 @@ BodyId BodyStore::add(const BodyDef& def) {
   restitution_[i] = def.restitution;
   mass_[i] = def.mass;
   inverse_mass_[i] = def.mass > 0 ? Real(1) / def.mass : Real(0);
-  const Vec3 moments = moments_of(def.shape, def.mass);
-  body_inverse_inertia_[i] = inverse_inertia_of(moments);
-  const bool all_equal = moments.x == moments.y && moments.y == moments.z;
-  moments_[i] =
-      all_equal ? Vec3{} : moments * (Real(1) / std::max({moments.x, moments.y, moments.z}));
+  set_inertia(i, def);
   acceleration_[i] = def.acceleration;
   velocity_kept_[i] = kept_per_step(def.linear_damping, dt_);
   angular_velocity_kept_[i] = kept_per_step(def.angular_damping, dt_);
+  kinematic_[i] = def.kinematic ? 1 : 0;
   can_sleep_[i] = sleep_.enabled && def.can_sleep ? 1 : 0;
   moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
   moving.motion[i] = 0;
   moving.awake[i] = 0;
   if (movable(i)) ++movable_count_;
+  if (kinematic(i)) ++kinematic_count_;
   set_state(i, {def.position, def.orientation, def.velocity, def.angular_velocity});
   return id;
+}
+
+void BodyStore::set_inertia(std::uint32_t i, const BodyDef& def) {
+  if (!movable(i)) {  // no inverse inertia, on purpose (erratum E26)
+    body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
+    return;
+  }
+  const Mat3 tensor =
+      def.inertia ? symmetric_part(*def.inertia) : diagonal(moments_of(def.shape, def.mass));
+  body_inverse_inertia_[i] = inverse_inertia(tensor);
+  // The largest entry of such a matrix is on its diagonal.
+  const Vec3 moments{tensor(0, 0), tensor(1, 1), tensor(2, 2)};
+  const bool like_a_sphere =
+      moments.x == moments.y && moments.y == moments.z && is_diagonal(tensor);
+  tensor_[i] = like_a_sphere ? diagonal({0, 0, 0})
+                             : tensor * (Real(1) / std::max({moments.x, moments.y, moments.z}));
 }
 
 void BodyStore::remove(BodyId id) {
@@ -91,6 +101,7 @@ void BodyStore::remove(BodyId id) {
   ++generation_[id.index];
   ids_.erase(std::lower_bound(ids_.begin(), ids_.end(), id, before));
   if (movable(id.index)) --movable_count_;
+  if (kinematic(id.index)) --kinematic_count_;
   moving.awake[id.index] = 0;
 }
 
@@ -114,10 +125,14 @@ BodyState BodyStore::state(std::uint32_t i) const {
 void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
   moving.position[i] = state.position;
   moving.orientation[i] = normalized(state.orientation);
-  moving.velocity[i] = movable(i) ? state.velocity : Vec3{};
-  moving.angular_velocity[i] = movable(i) ? state.angular_velocity : Vec3{};
+  const bool moves = movable(i) || kinematic(i);
+  moving.velocity[i] = moves ? state.velocity : Vec3{};
+  moving.angular_velocity[i] = moves ? state.angular_velocity : Vec3{};
   refresh_inertia(i);
   wake(i);
+  if (!kinematic(i)) return;
+  moving.awake[i] = moving.velocity[i] == Vec3{} && moving.angular_velocity[i] == Vec3{} ? 0 : 1;
+  moving.motion[i] = 2 * sleep_.epsilon;
 }
 
 void BodyStore::displace(std::uint32_t i, const Vec3& shift, const Vec3& turn) {
@@ -152,9 +167,21 @@ void BodyStore::wake_by_touch(std::uint32_t sleeper, std::uint32_t toucher) {
   moving.motion[sleeper] = moving.motion[toucher];
 }
 
+void BodyStore::keep_awake(std::uint32_t i) {
+  moving.motion[i] = std::max(moving.motion[i], 2 * sleep_.epsilon);
+}
+
+bool BodyStore::carries() const {
+  return kinematic_count_ > 0 && std::ranges::any_of(ids_, [this](BodyId id) {
+           return kinematic(id.index) && moving.awake[id.index] != 0;
+         });
+}
+
 void BodyStore::integrate() {
   for (const BodyId id : ids_) {
-    if (moving.awake[id.index] != 0) integrate(id.index);
+    if (moving.awake[id.index] != 0) {
+      kinematic(id.index) ? move(id.index) : integrate(id.index);
+    }
     moving.force[id.index] = moving.torque[id.index] = {};
   }
 }
@@ -166,11 +193,15 @@ void BodyStore::integrate(std::uint32_t i) {
                                                    dt_, velocity_kept_[i]);
   moving.angular_velocity[i] = shared::integrated_velocity(
       moving.angular_velocity[i], angular_acceleration, dt_, angular_velocity_kept_[i]);
-  if (moments_[i].x > 0) {
-    moving.angular_velocity[i] = shared::precessed(moving.angular_velocity[i], moments_[i],
+  if (tensor_[i](0, 0) > 0) {
+    moving.angular_velocity[i] = shared::precessed(moving.angular_velocity[i], tensor_[i],
                                                    to_matrix(moving.orientation[i]), dt_);
   }
   if (can_sleep_[i] != 0 && falls_asleep(i)) return;
+  move(i);
+}
+
+void BodyStore::move(std::uint32_t i) {
   moving.position[i] = shared::integrated_position(moving.position[i], moving.velocity[i], dt_);
   moving.orientation[i] =
       shared::integrated_orientation(moving.orientation[i], moving.angular_velocity[i], dt_);

@@ -20,7 +20,7 @@ struct MotionArrays {
   std::vector<Vec3> last_acceleration;  ///< [m/s^2], of the last step
   std::vector<Mat3> inverse_inertia;    ///< [1/(kg m^2)], world axes
   std::vector<Real> motion;             ///< [m^2/s^2], recency-weighted mean (thesis 4.4.2)
-  std::vector<std::uint8_t> awake;      ///< 1 or 0; an immovable body is never awake
+  std::vector<std::uint8_t> awake;      ///< 1 or 0; of mass 0: only what is kinematic and moves
 };
 
 /// Owns the bodies, their ids and their free motion. Slots of removed bodies are reused under a
@@ -55,6 +55,8 @@ class BodyStore {
   void wake(std::uint32_t body);
   /// Awake with at least the motion of the body that touched it.
   void wake_by_touch(std::uint32_t sleeper, std::uint32_t toucher);
+  /// An awake body gets at least twice the sleep epsilon of motion.
+  void keep_awake(std::uint32_t body);
 
   /// Moves a body without giving it velocity.
   void displace(std::uint32_t body, const Vec3& shift, const Vec3& turn);
@@ -63,6 +65,9 @@ class BodyStore {
   void integrate();
 
   bool movable(std::uint32_t body) const { return inverse_mass_[body] > 0; }
+  bool kinematic(std::uint32_t body) const { return kinematic_[body] != 0; }
+  /// Whether a kinematic body moves.
+  bool carries() const;
   const Shape& shape(std::uint32_t body) const { return shape_[body]; }
   Real mass(std::uint32_t body) const { return mass_[body]; }
   Real inverse_mass(std::uint32_t body) const { return inverse_mass_[body]; }
@@ -76,7 +81,9 @@ class BodyStore {
 
  private:
   void resize(std::size_t slots);
+  void set_inertia(std::uint32_t body, const BodyDef& def);
   void integrate(std::uint32_t body);
+  void move(std::uint32_t body);
   bool falls_asleep(std::uint32_t body);
   void refresh_inertia(std::uint32_t body);
 
@@ -87,15 +94,15 @@ class BodyStore {
   std::vector<Shape> shape_;
   std::vector<Real> radius_, mass_, inverse_mass_, friction_, restitution_;
   std::vector<Mat3> body_inverse_inertia_;  ///< body axes
-  std::vector<Vec3> moments_;  ///< principal, relative to the largest; 0 where all are equal
+  std::vector<Mat3> tensor_;  ///< body axes, relative to the largest; 0: like a sphere's
   std::vector<Vec3> acceleration_;
   std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^dt
-  std::vector<std::uint8_t> can_sleep_;
+  std::vector<std::uint8_t> can_sleep_, kinematic_;
   std::vector<std::uint32_t> generation_;
 
   std::vector<BodyId> ids_;
   std::vector<std::uint32_t> free_;
-  std::uint32_t movable_count_ = 0;
+  std::uint32_t movable_count_ = 0, kinematic_count_ = 0;
 };
 
 }  // namespace jfpx::inline JFPX_ABI

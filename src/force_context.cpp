@@ -37,8 +37,8 @@ void ForceContext::link(BodyId a, BodyId b) {
   const std::uint32_t first = require(a), second = require(b);
   const bool a_awake = bodies_->moving.awake[first] != 0;
   if (a_awake == (bodies_->moving.awake[second] != 0)) return;
-  if (!bodies_->movable(first) || !bodies_->movable(second)) return;
-  bodies_->wake_by_touch(a_awake ? second : first, a_awake ? first : second);
+  const std::uint32_t sleeper = a_awake ? second : first;
+  if (bodies_->movable(sleeper)) bodies_->wake_by_touch(sleeper, a_awake ? first : second);
 }
 
 }  // namespace jfpx::inline JFPX_ABI

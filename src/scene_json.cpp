@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <optional>
 #include <set>
 
 namespace jfpx::inline JFPX_ABI {
@@ -69,6 +70,13 @@ void read_array(const Json& json, const std::string& where, std::span<Real* cons
 void read(const Json& json, const std::string& where, Vec3& v) {
   Real* const parts[] = {&v.x, &v.y, &v.z};
   read_array(json, where, parts);
+}
+void read(const Json& json, const std::string& where, std::optional<Mat3>& m) {
+  if (!json.is_array() || json.size() != 3) fail(where, "must be an array of 3 rows");
+  m.emplace();
+  for (std::size_t i = 0; i < 3; ++i) {
+    read(json[i], where + "[" + std::to_string(i) + "]", m->row[i]);
+  }
 }
 void read(const Json& json, const std::string& where, Quat& q) {
   Real* const parts[] = {&q.w, &q.x, &q.y, &q.z};
@@ -148,6 +156,8 @@ void read(const Json& json, const std::string& where, BodyDef& body) {
   ObjectReader object(json, where);
   object.required("shape", body.shape);
   object.optional("mass", body.mass);
+  object.optional("kinematic", body.kinematic);
+  object.optional("inertia", body.inertia);
   object.optional("position", body.position);
   object.optional("orientation", body.orientation);
   object.optional("velocity", body.velocity);
@@ -237,19 +247,25 @@ Json to_value(const Shape& shape) {
   return std::visit(Visitor{}, shape);
 }
 Json to_value(const BodyDef& b) {
-  return {{"shape", to_value(b.shape)},
-          {"mass", b.mass},
-          {"position", to_value(b.position)},
-          {"orientation",
-           Json::array({b.orientation.w, b.orientation.x, b.orientation.y, b.orientation.z})},
-          {"velocity", to_value(b.velocity)},
-          {"angular_velocity", to_value(b.angular_velocity)},
-          {"acceleration", to_value(b.acceleration)},
-          {"linear_damping", b.linear_damping},
-          {"angular_damping", b.angular_damping},
-          {"friction", b.friction},
-          {"restitution", b.restitution},
-          {"can_sleep", b.can_sleep}};
+  Json json = {{"shape", to_value(b.shape)},
+               {"mass", b.mass},
+               {"kinematic", b.kinematic},
+               {"position", to_value(b.position)},
+               {"orientation",
+                Json::array({b.orientation.w, b.orientation.x, b.orientation.y, b.orientation.z})},
+               {"velocity", to_value(b.velocity)},
+               {"angular_velocity", to_value(b.angular_velocity)},
+               {"acceleration", to_value(b.acceleration)},
+               {"linear_damping", b.linear_damping},
+               {"angular_damping", b.angular_damping},
+               {"friction", b.friction},
+               {"restitution", b.restitution},
+               {"can_sleep", b.can_sleep}};
+  if (b.inertia) {
+    const auto& row = b.inertia->row;
+    json["inertia"] = Json::array({to_value(row[0]), to_value(row[1]), to_value(row[2])});
+  }
+  return json;
 }
 
 }  // namespace

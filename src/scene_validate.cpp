@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/inertia_tensor.hpp"
 #include "src/shared/inertia.hpp"
 
 #include <array>
@@ -73,8 +74,19 @@ std::string find_fault(const BodyDef& def) {
   if (def.mass > 0 && !is_finite(Real(1) / def.mass)) {
     return fault("mass", def.mass, "0 or such that its inverse is finite");
   }
-  std::string found =
-      std::visit([&def](const auto& shape) { return find_fault(shape, def.mass); }, def.shape);
+  if (def.kinematic && def.mass > 0) {
+    return fault("mass", def.mass, "0 for a kinematic body");
+  }
+  if (def.kinematic && std::holds_alternative<HalfSpace>(def.shape)) {
+    return "kinematic is true; it must be false for a half-space, which follows no pose";
+  }
+  if (def.inertia) {
+    const char* range = inertia_must_be(*def.inertia);
+    if (range != nullptr) return fault("inertia", *def.inertia, range);
+  }
+  const Real solid_mass = def.inertia ? 0 : def.mass;  // 0: its inertia does not matter
+  std::string found = std::visit(
+      [solid_mass](const auto& shape) { return find_fault(shape, solid_mass); }, def.shape);
   if (!found.empty()) return found;
   found = find_fault(BodyState{def.position, def.orientation, def.velocity, def.angular_velocity});
   if (!found.empty()) return found;
@@ -137,6 +149,11 @@ std::string to_text(Real value) {
 }
 
 std::string to_text(const Vec3& v) { return list_text({v.x, v.y, v.z}); }
+std::string to_text(const Mat3& m) {
+  std::string text;
+  for (const Vec3& row : m.row) text += (text.empty() ? "(" : ", ") + to_text(row);
+  return text += ")";
+}
 std::string to_text(const Quat& q) { return list_text({q.w, q.x, q.y, q.z}); }
 
 std::string find_fault(const BodyState& state) {

@@ -19,5 +19,6 @@ std::string find_fault(const BodyState& state);
 std::string to_text(Real value);
 std::string to_text(const Vec3& v);
 std::string to_text(const Quat& q);
+std::string to_text(const Mat3& m);
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -28,25 +28,6 @@ void combine_materials(const BodyStore& bodies, const MaterialSettings& rules,
   }
 }
 
-/// What touches an awake body wakes, and so on along the contacts; the surroundings, never awake,
-/// wake nobody (thesis 4.4.6, matchAwakeState). A sweep each way by turns: the contacts are sorted,
-/// so one sweep carries the news along all rising chains.
-void wake_along(std::span<const Contact> contacts, BodyStore* bodies) {
-  const std::vector<std::uint8_t>& awake = bodies->moving.awake;
-  const auto pass_on = [&](const Contact& c) {
-    if (awake[c.a] == awake[c.b] || !bodies->movable(c.a) || !bodies->movable(c.b)) return false;
-    const bool a_awake = awake[c.a] != 0;
-    bodies->wake_by_touch(a_awake ? c.b : c.a, a_awake ? c.a : c.b);
-    return true;
-  };
-  for (bool changed = true; changed;) {
-    changed = false;
-    for (std::size_t i = 0; i < contacts.size(); ++i) changed |= pass_on(contacts[i]);
-    if (!changed) return;
-    for (std::size_t i = contacts.size(); i-- > 0;) changed |= pass_on(contacts[i]);
-  }
-}
-
 /// The first body whose state is not finite or has left the world.
 std::optional<BodyId> find_runaway(const BodyStore& bodies) {
   const MotionArrays& moving = bodies.moving;
@@ -79,7 +60,7 @@ bool World::Impl::advance(StepReport* report) {
   if (!all_finite()) return false;
 
   const Clock::time_point integrated = Clock::now();
-  if (bodies_changed) narrow_phase.set_bodies(bodies);
+  if (bodies_changed || bodies.carries()) narrow_phase.set_bodies(bodies);
   bodies_changed = false;
   contacts.clear();
   report->sphere_contacts = narrow_phase.find_contacts(bodies, &contacts);
@@ -87,7 +68,7 @@ bool World::Impl::advance(StepReport* report) {
   combine_materials(bodies, scene.materials, &contacts);
 
   const Clock::time_point detected = Clock::now();
-  wake_along(contacts, &bodies);
+  waking(contacts, &bodies);
   const ResolverReport resolved = resolver.resolve(bodies, contacts, scene.resolver);
   report->position_iterations = resolved.position_iterations;
   report->velocity_iterations = resolved.velocity_iterations;
@@ -134,7 +115,9 @@ StepReport World::step() {
   report.algorithm = collider.algorithm();
   report.choice = collider.reason();
   report.device_failure = collider.device_failure();
-  for (const BodyId id : w.bodies.ids()) report.awake += w.bodies.moving.awake[id.index];
+  for (const BodyId id : w.bodies.ids()) {
+    if (w.bodies.movable(id.index)) report.awake += w.bodies.moving.awake[id.index];
+  }
   report.total_ms = elapsed_ms(start, Clock::now());
   return report;
 }

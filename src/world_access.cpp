@@ -64,6 +64,12 @@ bool World::awake(BodyId id) const {
   return impl_->bodies.moving.awake[impl_->bodies.require(id)] != 0;
 }
 
+Real World::mass(BodyId id) const { return impl_->bodies.mass(impl_->bodies.require(id)); }
+
+Mat3 World::inverse_inertia(BodyId id) const {
+  return impl_->bodies.moving.inverse_inertia[impl_->bodies.require(id)];
+}
+
 void World::apply_force(BodyId id, const Vec3& force) {
   const std::uint32_t body = impl_->bodies.require(id);
   require_finite("force", force);

@@ -8,6 +8,7 @@
 #include "src/contact_resolver.hpp"
 #include "src/force_registry.hpp"
 #include "src/narrow_phase.hpp"
+#include "src/waking.hpp"
 
 namespace jfpx::inline JFPX_ABI {
 
@@ -48,6 +49,7 @@ struct World::Impl {
   Scene scene;
   BodyStore bodies;
   NarrowPhase narrow_phase;
+  Waking waking;
   ContactResolver resolver;
   ForceRegistry forces;
   bool bodies_changed = true;     ///< since the narrow phase last heard of them

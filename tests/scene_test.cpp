@@ -100,6 +100,10 @@ TEST(SceneJson, KeepsEveryBitOfEveryField) {
   body.orientation = normalized(Quat{1, 2, 3, 4});
   body.velocity = {Real(-0.0), 1, 2};
   scene.bodies = {body, body};
+  scene.bodies.push_back(body);
+  scene.bodies[2].kinematic = true;
+  scene.bodies[2].inertia =
+      Mat3{{{1, Real(0.1), Real(-0.2)}, {Real(0.1), 1, 0}, {Real(-0.2), 0, 1}}};
   scene.bodies[1].shape = HalfSpace{{0, 0, 1}, Real(-2.5)};
   const Scene read = from_json(to_json(scene));
   EXPECT_EQ(read, scene);
@@ -144,6 +148,10 @@ TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "cone"}}]})"),
               HasSubstr("\"cone\"; it must be sphere, box or half_space"));
   EXPECT_THAT(complaint(with_body("\"can_sleep\": 1")), HasSubstr("must be a boolean"));
+  EXPECT_THAT(complaint(with_body("\"inertia\": [1, 1, 1]")),
+              HasSubstr("body 0.inertia[0]: must be an array of 3 numbers"));
+  EXPECT_THAT(complaint(with_body("\"inertia\": [[1, 0, 0]]")),
+              HasSubstr("body 0.inertia: must be an array of 3 rows"));
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": 3})"), HasSubstr("must be an array"));
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [], "resolver": {"max_iterations": -1}})"),
               HasSubstr("must be a whole number"));

@@ -4,6 +4,7 @@
 #include <jfpx/shape.hpp>
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 namespace jfpx::inline JFPX_ABI {
@@ -19,10 +20,17 @@ struct BodyId {
 struct BodyDef {
   Shape shape = Sphere{};
   Real mass = 1;  ///< [kg], >= 0; 0 means immovable
+  /// Only with mass 0, and not of half-spaces: moves with its velocities, which nothing changes but
+  /// World::set_state(). Pushes others and is never pushed, however heavy they are.
+  bool kinematic = false;
+  /// [kg m^2], about the centre of mass, in body axes; that of the solid shape if absent.
+  /// Symmetric, positive definite, no principal moment larger than the sum of the others. Mass 0
+  /// has none.
+  std::optional<Mat3> inertia;
   Vec3 position;  ///< [m], centre of mass
   Quat orientation;
-  Vec3 velocity;                         ///< [m/s]; an immovable body stays at rest
-  Vec3 angular_velocity;                 ///< [rad/s], world frame; likewise
+  Vec3 velocity;          ///< [m/s]; a body that is immovable and not kinematic stays at rest
+  Vec3 angular_velocity;  ///< [rad/s], world frame; likewise
   Vec3 acceleration{0, Real(-9.81), 0};  ///< [m/s^2], constant; ignored by an immovable body
   Real linear_damping = 1;               ///< [-], share of velocity kept per second, in (0, 1]
   Real angular_damping = 1;              ///< [-], likewise for angular velocity
@@ -40,6 +48,28 @@ struct BodyState {
   Vec3 angular_velocity;  ///< [rad/s], world frame
   friend bool operator==(const BodyState&, const BodyState&) = default;
 };
+
+/// Places and directions in the axes of the body and of the world (thesis 4.4.2). A body's own
+/// origin is its centre of mass.
+JFPX_HD constexpr Transform pose(const BodyState& body) {
+  return make_transform(body.orientation, body.position);
+}
+JFPX_HD constexpr Vec3 to_world_point(const BodyState& body, const Vec3& local) {
+  return transform_point(pose(body), local);
+}
+JFPX_HD constexpr Vec3 to_local_point(const BodyState& body, const Vec3& world) {
+  return inverse_transform_point(pose(body), world);
+}
+JFPX_HD constexpr Vec3 to_world_direction(const BodyState& body, const Vec3& local) {
+  return transform_direction(pose(body), local);
+}
+JFPX_HD constexpr Vec3 to_local_direction(const BodyState& body, const Vec3& world) {
+  return inverse_transform_direction(pose(body), world);
+}
+/// Velocity of the material point of the body that is at `point` in the world [m/s].
+JFPX_HD constexpr Vec3 velocity_at(const BodyState& body, const Vec3& point) {
+  return body.velocity + cross(body.angular_velocity, point - body.position);
+}
 
 /// Hash over the bits of all states, in order: equal hashes mean the same world to the last bit.
 /// (-0 and 0 differ.) Float and double worlds have different hashes.

@@ -34,7 +34,7 @@ class JFPX_API ForceContext {
   BodyState state(BodyId id) const;
   const Shape& shape(BodyId id) const;
   Real mass(BodyId id) const;   ///< [kg]; 0: immovable
-  bool awake(BodyId id) const;  ///< never true of an immovable body
+  bool awake(BodyId id) const;  ///< of mass 0: only what is kinematic and moves
 
   /// Adds to the force [N] at the centre of mass, and to the torque [N m], in world axes. Nothing
   /// happens to sleeping and immovable bodies.
@@ -45,7 +45,7 @@ class JFPX_API ForceContext {
 
   /// Wakes a movable body.
   void wake(BodyId id);
-  /// If one of two movable bodies is awake, so is the other: they fall asleep together.
+  /// If one of two bodies is awake, so is the other, if movable: they fall asleep together.
   void link(BodyId a, BodyId b);
 
  private:

@@ -101,10 +101,14 @@ class JFPX_API World {
   /// @throws InvalidArgument for an unknown id.
   BodyState state(BodyId id) const;
   /// Replaces the moving state, wakes the body and what touched it. An immovable body is put to
-  /// its new place and stays at rest.
+  /// its new place and stays at rest; a kinematic one goes on with the new velocities.
   /// @throws InvalidArgument for an unknown id or a value out of the range of validate().
   void set_state(BodyId id, const BodyState& state);
+  /// Of mass 0, only kinematic bodies are awake, while they move.
   bool awake(BodyId id) const;
+  Real mass(BodyId id) const;  ///< [kg]; 0: immovable or kinematic
+  /// [1/(kg m^2)], world axes, about the centre of mass; zero for mass 0.
+  Mat3 inverse_inertia(BodyId id) const;
   /// Acceleration of the centre of mass that the last step used [m/s^2]: constant part and forces,
   /// without contacts and damping. @throws InvalidArgument for an unknown id.
   Vec3 last_acceleration(BodyId id) const;

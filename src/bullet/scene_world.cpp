@@ -3,6 +3,8 @@
 #include <jfpx/error.hpp>
 
 #include "src/bullet/timed_world.hpp"
+#include "src/inertia_tensor.hpp"
+#include "src/shared/integrate.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
@@ -78,6 +80,13 @@ void require_bullet(const MaterialSettings& materials) {
   }
 }
 
+/// Bullet's bodies have their moments of inertia about the axes of their shape.
+void require_bullet(const BodyDef& def, std::size_t body) {
+  if (!(def.mass > 0) || !def.inertia || is_diagonal(*def.inertia)) return;
+  throw InvalidScene("body " + std::to_string(body) +
+                     ": inertia has products of inertia; for Bullet it must be diagonal");
+}
+
 Real factor(CombineRule rule, Real coefficient) {
   return rule == CombineRule::product ? coefficient : square_root(coefficient);
 }
@@ -87,6 +96,9 @@ std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const MaterialSetting
   const Real mass = is_half_space(def) ? 0 : def.mass;
   btVector3 inertia(0, 0, 0);
   if (mass > 0) shape->calculateLocalInertia(mass, inertia);
+  if (mass > 0 && def.inertia) {
+    inertia = {(*def.inertia)(0, 0), (*def.inertia)(1, 1), (*def.inertia)(2, 2)};
+  }
   btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, shape, inertia);
   if (!is_half_space(def)) {
     info.m_startWorldTransform = btTransform(to_bullet(def.orientation), to_bullet(def.position));
@@ -97,11 +109,17 @@ std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const MaterialSetting
   info.m_restitution = factor(materials.restitution, def.restitution);
   auto body = std::make_unique<btRigidBody>(info);
   body->setFlags(body->getFlags() | BT_DISABLE_WORLD_GRAVITY);
-  if (mass > 0) {
-    body->setGravity(to_bullet(def.acceleration));
+  if (def.kinematic) {
+    body->setCollisionFlags(body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    body->setActivationState(DISABLE_DEACTIVATION);
+  }
+  if (mass > 0) body->setGravity(to_bullet(def.acceleration));
+  if (mass > 0 || def.kinematic) {
     body->setLinearVelocity(to_bullet(def.velocity));
     body->setAngularVelocity(to_bullet(def.angular_velocity));
-    if (!can_sleep) body->setActivationState(DISABLE_DEACTIVATION);
+  }
+  if (mass > 0 && !can_sleep) {
+    body->setActivationState(DISABLE_DEACTIVATION);
   }
   return body;
 }
@@ -136,10 +154,23 @@ struct SceneWorld::Impl {
     world.setGravity({0, 0, 0});
     world.getDispatchInfo().m_deterministicOverlappingPairs = options.deterministic_pairs;
     for (const BodyDef& def : scene.bodies) {
+      require_bullet(def, bodies.size());
       const bool can_sleep = scene.sleep.enabled && def.can_sleep;
       owned.push_back(make_body(def, scene.materials, shapes.get(def.shape), can_sleep));
       bodies.push_back(owned.back().get());
       world.addRigidBody(bodies.back());
+    }
+  }
+  /// As the native engine moves them; Bullet finds their velocities from the way.
+  void move_kinematic_bodies(Real dt) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const BodyDef& def = scene.bodies[i];
+      if (!def.kinematic) continue;
+      const btTransform& pose = bodies[i]->getWorldTransform();
+      bodies[i]->setWorldTransform(
+          btTransform(to_bullet(shared::integrated_orientation(from_bullet(pose.getRotation()),
+                                                               def.angular_velocity, dt)),
+                      pose.getOrigin() + to_bullet(def.velocity * dt)));
     }
   }
   ~Impl() {
@@ -167,6 +198,7 @@ void SceneWorld::step(Real dt) {
     throw InvalidArgument("dt is " + std::to_string(dt) +
                           " s; it must be finite and larger than the machine epsilon");
   }
+  impl_->move_kinematic_bodies(dt);
   // No sub-steps: Bullet then makes one step of the full length and keeps no remainder.
   impl_->world.stepSimulation(dt, 0, dt);
 }

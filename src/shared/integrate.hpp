@@ -24,15 +24,15 @@ JFPX_HD inline Quat integrated_orientation(const Quat& orientation, const Vec3& 
 /// Angular velocity after the gyroscopic part of a step: it turns about the axis of the angular
 /// momentum when the moments differ. One Newton step of the implicit equation in body axes (Catto,
 /// Numerical Methods, GDC 2015): never gains energy, where the explicit term explodes.
-/// @param moments principal moments of inertia, up to a common factor
+/// @param inertia in body axes, up to a common factor
 /// @param axes    of the body, as columns
-JFPX_HD inline Vec3 precessed(const Vec3& angular_velocity, const Vec3& moments, const Mat3& axes,
+JFPX_HD inline Vec3 precessed(const Vec3& angular_velocity, const Mat3& inertia, const Mat3& axes,
                               Real dt) {
   const Vec3 w = transform_transpose(axes, angular_velocity);
-  const Vec3 momentum = component_product(moments, w);
-  const Mat3 slope = skew_symmetric(w) * diagonal(moments) + skew_symmetric(momentum) * Real(-1);
+  const Vec3 momentum = inertia * w;
+  const Mat3 slope = skew_symmetric(w) * inertia + skew_symmetric(momentum) * Real(-1);
   Mat3 inverse;
-  if (!invert(diagonal(moments) + slope * dt, &inverse)) return angular_velocity;
+  if (!invert(inertia + slope * dt, &inverse)) return angular_velocity;
   return axes * (w - inverse * (cross(w, momentum) * dt));
 }
 

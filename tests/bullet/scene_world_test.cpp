@@ -6,7 +6,9 @@
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <string>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
@@ -112,6 +114,45 @@ TEST(SceneWorld, MultipliesWhereTheSceneDoesAndRefusesWhatBulletCannotDo) {
     }
     scene.materials = {rule, CombineRule::product};
     EXPECT_THROW(SceneWorld{scene}, InvalidScene);
+  }
+}
+
+TEST(SceneWorld, AKinematicBodyMovesByItsVelocitiesAndPushes) {
+  Scene scene;
+  scene.bodies = {ball({Real(0.9), 0, 0}), ball({0, 0, 0})};
+  scene.bodies[0].acceleration = {};
+  scene.bodies[1].mass = 0;
+  scene.bodies[1].kinematic = true;
+  scene.bodies[1].velocity = {2, 0, 0};
+  scene.bodies[1].angular_velocity = {0, 0, 1};
+  scene.dt = Real(1) / 64;
+  SceneWorld world(scene);
+  for (int i = 0; i < 64; ++i) world.step();
+  const BodyState pusher = world.states()[1];
+  EXPECT_NEAR(pusher.position.x, 2, 1e-5);
+  EXPECT_NEAR(pusher.velocity.x, 2, 1e-3);
+  EXPECT_NEAR(pusher.angular_velocity.z, 1, 1e-3);
+  EXPECT_NEAR(pusher.orientation.z, std::sin(0.5), 1e-4);
+  EXPECT_GT(world.states()[0].position.x, pusher.position.x + Real(0.9));
+  EXPECT_GT(world.states()[0].velocity.x, Real(1.9));
+}
+
+TEST(SceneWorld, TakesADiagonalInertiaAndRefusesAnyOther) {
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0}), ball({9, 0, 0})};
+  scene.bodies[1].inertia = diagonal({1, 2, Real(2.5)});
+  SceneWorld world(scene);
+  const btVector3 inverse = world.bodies()[1]->getInvInertiaDiagLocal();
+  EXPECT_NEAR(inverse.x(), 1, 1e-6);
+  EXPECT_NEAR(inverse.y(), 0.5, 1e-6);
+  EXPECT_NEAR(inverse.z(), 0.4, 1e-6);
+  scene.bodies[1].inertia = Mat3{{{1, Real(0.1), 0}, {Real(0.1), 1, 0}, {0, 0, 1}}};
+  try {
+    SceneWorld refused(scene);
+    ADD_FAILURE();
+  } catch (const InvalidScene& error) {
+    EXPECT_STREQ(error.what(),
+                 "body 1: inertia has products of inertia; for Bullet it must be diagonal");
   }
 }
 

@@ -158,6 +158,40 @@ TEST(Validate, ARuleThatIsNoneIsRefused) {
             "scene: materials.restitution is 5; it must be one of the rules of CombineRule");
 }
 
+TEST(Validate, AKinematicBodyHasNoMassAndAPose) {
+  Scene scene = sound();
+  scene.bodies[0].kinematic = true;
+  EXPECT_EQ(message(scene), "body 0: mass is 1; it must be 0 for a kinematic body");
+  scene.bodies[0].mass = 0;
+  EXPECT_EQ(message(scene), "");
+  scene.bodies[2].kinematic = true;
+  EXPECT_EQ(message(scene),
+            "body 2: kinematic is true; it must be false for a half-space, which follows no pose");
+}
+
+TEST(Validate, AnInertiaMustBeOneOfABody) {
+  const auto complaint = [](const Mat3& inertia) {
+    Scene scene = sound();
+    scene.bodies[1].inertia = inertia;
+    return message(scene);
+  };
+  EXPECT_EQ(complaint(diagonal({1, 2, 3})), "");
+  EXPECT_EQ(complaint(diagonal({1, -2, 3})),
+            "body 1: inertia is ((1, 0, 0), (0, -2, 0), (0, 0, 3)); it must be positive definite");
+  EXPECT_NE(complaint(diagonal({1, 0, 1})), "");
+  EXPECT_NE(complaint(diagonal({0, 0, 0})), "");
+  EXPECT_NE(complaint(diagonal({1, kNan, 1})), "");
+  EXPECT_NE(complaint(diagonal({1, 1, kInfinity})), "");
+  EXPECT_NE(complaint(diagonal({1, 1, 2.1_r})), "");
+  EXPECT_NE(complaint(Mat3{{{1, 0.1_r, 0}, {0, 1, 0}, {0, 0, 1}}}), "");
+  // A body whose shape alone would have no finite inertia may have one by word.
+  Scene scene = sound();
+  scene.bodies[0].mass = std::numeric_limits<Real>::min();
+  scene.bodies[0].shape = Sphere{square_root(std::numeric_limits<Real>::min())};
+  scene.bodies[0].inertia = Mat3{};
+  EXPECT_EQ(message(scene), "");
+}
+
 TEST(Validate, MassesThatMakeNoFiniteInertiaAreRefused) {
   const Real tiny = square_root(std::numeric_limits<Real>::min());
   Scene scene = sound();

@@ -4,6 +4,7 @@ jfpx_add_test(world_parts_test SOURCES
   world/collide_test.cpp
   world/contact_resolver_test.cpp
   world/indexed_heap_test.cpp
+  world/inertia_tensor_test.cpp
   world/power_test.cpp
   world/scene_validate_test.cpp)
 jfpx_add_test(world_test SOURCES
@@ -11,6 +12,8 @@ jfpx_add_test(world_test SOURCES
   world/contact_events_test.cpp
   world/force_registry_test.cpp
   world/force_test.cpp
+  world/inertia_test.cpp
+  world/kinematic_test.cpp
   world/motion_test.cpp
   world/query_test.cpp
   world/rest_test.cpp

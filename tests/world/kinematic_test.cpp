@@ -1,0 +1,196 @@
+/// Kinematic bodies: they move as told, push, carry, and are never pushed.
+#include "tests/world/support.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+
+BodyDef kinematic(const Shape& shape, const Vec3& position, const Vec3& velocity) {
+  BodyDef def = test::ball(position);
+  def.shape = shape;
+  def.mass = 0;
+  def.kinematic = true;
+  def.velocity = velocity;
+  def.friction = 0.5_r;
+  return def;
+}
+/// A platform whose upper side is at y = 0.
+BodyDef platform(const Vec3& velocity) { return kinematic(Box{{5, 1, 5}}, {0, -1, 0}, velocity); }
+BodyDef cube(const Vec3& position) {
+  BodyDef def;
+  def.shape = Box{{0.5_r, 0.5_r, 0.5_r}};
+  def.position = position;
+  def.can_sleep = false;
+  return def;
+}
+World world_of(std::vector<BodyDef> bodies) {
+  Scene scene;
+  scene.bodies = std::move(bodies);
+  return World(scene);
+}
+
+TEST(Kinematic, MovesByItsVelocitiesAlone) {
+  BodyDef def = kinematic(Sphere{1}, {1, 2, 3}, {0.5_r, 0, -1});
+  def.angular_velocity = {0, 0, 1};
+  def.acceleration = {9, 9, 9};
+  def.linear_damping = def.angular_damping = 0.1_r;
+  World world = world_of({def});
+  const BodyId id = world.bodies()[0];
+  world.apply_force(id, {9, 9, 9});
+  world.apply_torque(id, {9, 9, 9});
+  world.add_force(Gravity{});
+  for (int n = 0; n < 120; ++n) EXPECT_EQ(world.step().awake, 0u);
+  const BodyState s = world.state(id);
+  EXPECT_EQ(s.velocity, def.velocity);
+  EXPECT_EQ(s.angular_velocity, def.angular_velocity);
+  EXPECT_NEAR(s.position.x, 2, 1e-4);
+  EXPECT_NEAR(s.position.z, 1, 1e-4);
+  EXPECT_NEAR(s.orientation.w, std::cos(1.0), 1e-4);
+  EXPECT_NEAR(s.orientation.z, std::sin(1.0), 1e-4);
+  EXPECT_TRUE(world.awake(id));
+}
+
+TEST(Kinematic, IsNeverPushedHoweverHeavyTheOther) {
+  const BodyDef pusher = kinematic(Sphere{1}, {0, 0, 0}, {1, 0, 0});
+  BodyDef truck = test::ball({3, 0, 0}, 1, 1e6_r);
+  truck.velocity = {-5, 0, 0};
+  World alone = world_of({pusher}), hit = world_of({pusher, truck});
+  bool touched = false;
+  for (int n = 0; n < 60; ++n) {
+    alone.step();
+    touched |= hit.step().contacts > 0;
+    ASSERT_EQ(hit.states()[0], alone.states()[0]) << n;
+  }
+  EXPECT_TRUE(touched);
+  EXPECT_GT(hit.states()[1].velocity.x, 0.989_r);
+}
+
+TEST(Kinematic, PushesToItsOwnSpeedAndThrowsWithRestitution) {
+  // Hit at speed 2 by what does not give way: off with (1 + e) times 2.
+  for (const Real e : {Real(0), 0.5_r, Real(1)}) {
+    for (const Shape& shape : {Shape(Sphere{1}), Shape(Box{{1, 1, 1}})}) {
+      BodyDef pusher = kinematic(shape, {0, 0, 0}, {2, 0, 0});
+      BodyDef ball = test::ball({2.01_r, 0, 0});
+      pusher.restitution = ball.restitution = e;
+      World world = world_of({pusher, ball});
+      for (int n = 0; n < 30; ++n) world.step();
+      EXPECT_NEAR(world.states()[1].velocity.x, 2 * (1 + e), 0.011) << e;
+    }
+  }
+}
+
+TEST(Kinematic, AnElevatorLiftsWhatStandsOnIt) {
+  World world = world_of({platform({0, 0.5_r, 0}), cube({0, 0.5_r, 0}), cube({0, 1.5_r, 0})});
+  for (int n = 0; n < 240; ++n) world.step();
+  const auto states = world.states();
+  EXPECT_NEAR(states[0].position.y, -1 + 2, 1e-3);
+  EXPECT_NEAR(states[1].position.y, 0.5 + 2, 0.02);
+  EXPECT_NEAR(states[2].position.y, 1.5 + 2, 0.04);
+  EXPECT_NEAR(states[1].velocity.y, 0.5, 0.02);
+}
+
+TEST(Kinematic, AConveyorDragsByFriction) {
+  World world = world_of({platform({2, 0, 0}), cube({0, 0.5_r, 0})});
+  // Friction 0.5 accelerates with g/2: at speed 2 after 0.41 s.
+  for (int n = 0; n < 12; ++n) world.step();
+  EXPECT_NEAR(world.states()[1].velocity.x, 0.5 * 9.81 * 0.2, 0.1);
+  for (int n = 0; n < 48; ++n) world.step();
+  EXPECT_NEAR(world.states()[1].velocity.x, 2, 0.02);
+}
+
+TEST(Kinematic, ATurntableTakesABoxRound) {
+  BodyDef table = platform({});
+  table.angular_velocity = {0, 1, 0};
+  BodyDef passenger = cube({1, 0.5_r, 0});
+  passenger.velocity = {0, 0, -1};
+  passenger.angular_velocity = {0, 1, 0};
+  World world = world_of({table, passenger});
+  for (int n = 0; n < 60; ++n) world.step();  // 1 rad from x towards -z
+  const Vec3 at = world.states()[1].position;
+  EXPECT_NEAR(std::atan2(-at.z, at.x), 1, 0.05);
+  EXPECT_NEAR(std::hypot(at.x, at.z), 1, 0.05);
+}
+
+TEST(Kinematic, WhatItCarriesSlowlyStaysAwakeUntilItStops) {
+  // 0.1 m/s is far below the sleep epsilon; a sleeper would lose its speed.
+  std::vector<BodyDef> bodies = {platform({0.1_r, 0, 0})};
+  for (int i = 0; i < 3; ++i) {
+    bodies.push_back(cube({0, 0.5_r + static_cast<Real>(i), 0}));
+    bodies.back().can_sleep = true;
+  }
+  World world = world_of(bodies);
+  for (int n = 0; n < 60; ++n) world.step();
+  for (int n = 0; n < 240; ++n) {
+    ASSERT_EQ(world.step().awake, 3u) << n;
+    for (std::size_t i = 1; i < 4; ++i) {
+      ASSERT_NEAR(world.states()[i].velocity.x, 0.1, 0.03) << n;
+    }
+  }
+  const BodyId id = world.bodies()[0];
+  BodyState s = world.state(id);
+  s.velocity = {};
+  world.set_state(id, s);
+  EXPECT_FALSE(world.awake(id));
+  StepReport report;
+  for (int n = 0; n < 240; ++n) report = world.step();
+  EXPECT_EQ(report.awake, 0u);
+
+  // And wakes when it starts again.
+  s = world.state(id);
+  s.velocity = {1, 0, 0};
+  world.set_state(id, s);
+  EXPECT_EQ(world.step().awake, 3u);
+}
+
+TEST(Kinematic, WakesTheSleeperThatItReaches) {
+  BodyDef sleeper = test::ball({5, 0, 0});
+  sleeper.can_sleep = true;
+  World world = world_of({kinematic(Box{{1, 1, 1}}, {0, 0, 0}, {2, 0, 0}), sleeper});
+  const BodyId id = world.bodies()[1];
+  for (int n = 0; n < 85; ++n) world.step();
+  ASSERT_FALSE(world.awake(id));
+  for (int n = 0; n < 10; ++n) world.step();
+  EXPECT_TRUE(world.awake(id));
+  EXPECT_NEAR(world.state(id).velocity.x, 2, 0.011);
+}
+
+TEST(Kinematic, ASpringFromItWakesTheBodyAtItsOtherEnd) {
+  BodyDef sleeper = test::ball({5, 0, 0});
+  sleeper.can_sleep = true;
+  World world = world_of({kinematic(Sphere{1}, {0, 0, 0}, {}), sleeper});
+  const BodyId puller = world.bodies()[0], pulled = world.bodies()[1];
+  world.add_force(Spring{.a = {puller}, .b = {pulled}, .stiffness = 5, .rest_length = 5});
+  for (int n = 0; n < 120; ++n) world.step();
+  ASSERT_FALSE(world.awake(pulled));
+  world.set_state(puller, {{0, 0, 0}, {}, {-1, 0, 0}, {}});
+  for (int n = 0; n < 60; ++n) world.step();
+  EXPECT_LT(world.state(pulled).velocity.x, -0.1_r);
+}
+
+TEST(Kinematic, PassesThroughWhatIsAsImmovable) {
+  World world = world_of({kinematic(Sphere{1}, {0, 3, 0}, {0, -2, 0}),
+                          kinematic(Box{{1, 1, 1}}, {0, -3, 0}, {0, 2, 0}), test::ground()});
+  for (int n = 0; n < 120; ++n) EXPECT_EQ(world.step().contacts, 0u);
+  EXPECT_NEAR(world.states()[0].position.y, -1, 1e-3);
+}
+
+TEST(Kinematic, AStepThatFailsTakesItBack) {
+  World world = world_of({kinematic(Sphere{1}, {0.99e9_r, 0, 0}, {9e7_r, 0, 0})});
+  const auto before = world.states();
+  StepReport report;
+  for (int n = 0; n < 60 && !report.non_finite; ++n) report = world.step();
+  EXPECT_TRUE(report.non_finite);
+  EXPECT_EQ(report.non_finite_body, world.bodies()[0]);
+  const auto stopped = world.states();
+  EXPECT_NE(stopped, before);
+  world.step();
+  EXPECT_EQ(world.states(), stopped);
+}
+
+}  // namespace
+}  // namespace jfpx
