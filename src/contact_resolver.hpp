@@ -26,8 +26,10 @@ class BasicContactResolver {
  public:
   /// @param contacts a and b are indices of `bodies`; of two movable bodies in contact both or none
   ///   are awake. Contacts without an awake body are left alone.
+  /// @param generated how many of the last contacts were made and not found: they are no spheres'
+  ///   and form no patches
   ResolverReport resolve(BodyStore& bodies, std::span<const Contact> contacts,
-                         const ResolverSettings& settings);
+                         const ResolverSettings& settings, std::size_t generated = 0);
 
  private:
   struct Row {
@@ -49,7 +51,9 @@ class BasicContactResolver {
   };
   using RowIndex = std::uint32_t;
 
-  void prepare(std::span<const Contact> contacts);
+  void prepare(std::span<const Contact> contacts, std::size_t generated);
+  void add_row(const Contact& contact, const Vec3& arm_a, const Vec3& arm_b);
+  void group_patches();
   Patch patch_of(RowIndex worst, Real kept) const;
   void index_rows_by_body();
   std::span<const RowIndex> rows_of(std::uint32_t body) const;
@@ -84,10 +88,11 @@ using ContactResolver = BasicContactResolver<IndexedHeap>;
 template <class Queue>
 ResolverReport BasicContactResolver<Queue>::resolve(BodyStore& bodies,
                                                     std::span<const Contact> contacts,
-                                                    const ResolverSettings& settings) {
+                                                    const ResolverSettings& settings,
+                                                    std::size_t generated) {
   bodies_ = &bodies;
   settings_ = settings;
-  prepare(contacts);
+  prepare(contacts, generated);
   ResolverReport report;
   if (rows_.empty()) return report;
   index_rows_by_body();
@@ -98,19 +103,39 @@ ResolverReport BasicContactResolver<Queue>::resolve(BodyStore& bodies,
 
 /// keys_ becomes the penetrations.
 template <class Queue>
-void BasicContactResolver<Queue>::prepare(std::span<const Contact> contacts) {
+void BasicContactResolver<Queue>::prepare(std::span<const Contact> contacts,
+                                          std::size_t generated) {
   const MotionArrays& moving = bodies_->moving;
+  const auto asleep = [&moving](const Contact& c) {
+    return moving.awake[c.a] == 0 && moving.awake[c.b] == 0;
+  };
   rows_.clear();
   keys_.clear();
-  for (const Contact& c : contacts) {
-    if (moving.awake[c.a] == 0 && moving.awake[c.b] == 0) continue;
-    Vec3 acceleration;
-    if (moving.awake[c.a] != 0) acceleration += moving.last_acceleration[c.a];
-    if (moving.awake[c.b] != 0) acceleration -= moving.last_acceleration[c.b];
-    rows_.push_back({c.a, c.b, c.normal, lever_arm(c.a, c, -1), lever_arm(c.b, c, 1),
-                     dot(acceleration, c.normal) * bodies_->dt(), c.friction, c.restitution, 0, 0});
-    keys_.push_back(-c.distance);
+  for (const Contact& c : contacts.first(contacts.size() - generated)) {
+    if (!asleep(c)) add_row(c, lever_arm(c.a, c, -1), lever_arm(c.b, c, 1));
   }
+  group_patches();
+  for (const Contact& c : contacts.last(generated)) {
+    if (asleep(c)) continue;
+    add_row(c, c.point - moving.position[c.a], c.point - moving.position[c.b]);
+  }
+}
+
+/// As a patch of its own.
+template <class Queue>
+void BasicContactResolver<Queue>::add_row(const Contact& c, const Vec3& arm_a, const Vec3& arm_b) {
+  const MotionArrays& moving = bodies_->moving;
+  Vec3 acceleration;
+  if (moving.awake[c.a] != 0) acceleration += moving.last_acceleration[c.a];
+  if (moving.awake[c.b] != 0) acceleration -= moving.last_acceleration[c.b];
+  const auto row = static_cast<RowIndex>(rows_.size());
+  rows_.push_back({c.a, c.b, c.normal, arm_a, arm_b, dot(acceleration, c.normal) * bodies_->dt(),
+                   c.friction, c.restitution, row, row + 1});
+  keys_.push_back(-c.distance);
+}
+
+template <class Queue>
+void BasicContactResolver<Queue>::group_patches() {
   for (RowIndex first = 0, last = 0; first < rows_.size(); first = last) {
     const Row& head = rows_[first];
     while (last < rows_.size() && rows_[last].a == head.a && rows_[last].b == head.b &&

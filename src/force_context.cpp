@@ -1,20 +1,9 @@
-/// What forces may see of the bodies, and do to them.
+/// What forces may do to bodies.
 #include <jfpx/force.hpp>
 
 #include "src/body_store.hpp"
 
 namespace jfpx::inline JFPX_ABI {
-
-Real ForceContext::dt() const { return bodies_->dt(); }
-std::span<const BodyId> ForceContext::bodies() const { return bodies_->ids(); }
-bool ForceContext::contains(BodyId id) const noexcept { return bodies_->contains(id); }
-
-std::uint32_t ForceContext::require(BodyId id) const { return bodies_->require(id); }
-
-BodyState ForceContext::state(BodyId id) const { return bodies_->state(require(id)); }
-const Shape& ForceContext::shape(BodyId id) const { return bodies_->shape(require(id)); }
-Real ForceContext::mass(BodyId id) const { return bodies_->mass(require(id)); }
-bool ForceContext::awake(BodyId id) const { return bodies_->moving.awake[require(id)] != 0; }
 
 void ForceContext::apply_force(BodyId id, const Vec3& force) {
   const std::uint32_t body = require(id);

@@ -55,7 +55,7 @@ bool World::Impl::advance(StepReport* report) {
   };
   const Clock::time_point start = Clock::now();
   ForceContext context(bodies, time());
-  forces.apply(context);
+  forces.call(context);
   bodies.integrate();
   if (!all_finite()) return false;
 
@@ -66,16 +66,20 @@ bool World::Impl::advance(StepReport* report) {
   report->sphere_contacts = narrow_phase.find_contacts(bodies, &contacts);
   report->contacts = contacts.size();
   combine_materials(bodies, scene.materials, &contacts);
+  ContactContext contact_context(bodies, time(), &contacts);
+  generators.call(contact_context);
+  report->generated_contacts = contacts.size() - report->contacts;
 
   const Clock::time_point detected = Clock::now();
   waking(contacts, &bodies);
-  const ResolverReport resolved = resolver.resolve(bodies, contacts, scene.resolver);
+  const ResolverReport resolved =
+      resolver.resolve(bodies, contacts, scene.resolver, report->generated_contacts);
   report->position_iterations = resolved.position_iterations;
   report->velocity_iterations = resolved.velocity_iterations;
   report->iterations_exhausted = resolved.exhausted;
 
   if (!all_finite()) return false;
-  events.update(bodies, contacts);
+  events.update(bodies, std::span(contacts).first(report->contacts));
 
   const Clock::time_point end = Clock::now();
   report->integrate_ms = elapsed_ms(start, integrated);

@@ -111,6 +111,25 @@ void World::remove_force(ForceId id) {
 
 std::span<const ForceId> World::forces() const { return impl_->forces.ids(); }
 
+ContactGeneratorId World::add_any_generator(std::function<void(ContactContext&)> generator) {
+  const ContactGeneratorId id = impl_->generators.add(std::move(generator));
+  impl_->wake_all();
+  return id;
+}
+
+std::function<void(ContactContext&)>& World::any_generator(ContactGeneratorId id) {
+  return impl_->generators.at(id);
+}
+
+void World::remove_contact_generator(ContactGeneratorId id) {
+  impl_->generators.remove(id);
+  impl_->wake_all();
+}
+
+std::span<const ContactGeneratorId> World::contact_generators() const {
+  return impl_->generators.ids();
+}
+
 double World::time() const { return impl_->time(); }
 
 std::span<const Contact> World::contacts() const { return impl_->contacts; }

@@ -6,8 +6,8 @@
 #include "src/body_store.hpp"
 #include "src/contact_events.hpp"
 #include "src/contact_resolver.hpp"
-#include "src/force_registry.hpp"
 #include "src/narrow_phase.hpp"
+#include "src/registry.hpp"
 #include "src/waking.hpp"
 
 namespace jfpx::inline JFPX_ABI {
@@ -32,7 +32,7 @@ struct World::Impl {
     }
   }
 
-  /// A force that comes or goes is news to all bodies, whichever it may act on.
+  /// What comes or goes and acts in every step is news to all bodies, whichever it may act on.
   void wake_all() {
     for (const BodyId id : bodies.ids()) bodies.wake(id.index);
   }
@@ -51,7 +51,8 @@ struct World::Impl {
   NarrowPhase narrow_phase;
   Waking waking;
   ContactResolver resolver;
-  ForceRegistry forces;
+  Registry<ForceContext, ForceId> forces{"force"};
+  Registry<ContactContext, ContactGeneratorId> generators{"contact generator"};
   bool bodies_changed = true;     ///< since the narrow phase last heard of them
   std::vector<Contact> contacts;  ///< of the last step
   ContactEvents events;

@@ -2,15 +2,12 @@
 /// way to write one's own.
 #pragma once
 
-#include <jfpx/body.hpp>
+#include <jfpx/step_view.hpp>
 
 #include <concepts>
 #include <optional>
-#include <span>
 
 namespace jfpx::inline JFPX_ABI {
-
-class BodyStore;
 
 /// Names a force of one World. Never used twice.
 struct ForceId {
@@ -18,23 +15,13 @@ struct ForceId {
   friend bool operator==(const ForceId&, const ForceId&) = default;
 };
 
-/// What a force sees of a world at the start of a step, and where it leaves its push. Valid during
-/// the call only. What a force adds reaches awake bodies only: a body that came to rest under its
-/// forces sleeps on, and gravity wakes nobody. Forces that are news call wake() or link().
-class JFPX_API ForceContext {
+/// What a force sees of a world at the start of a step, and where it leaves its push. What a force
+/// adds reaches awake bodies only: a body that came to rest under its forces sleeps on, and gravity
+/// wakes nobody. Forces that are news call wake() or link(). An id that is not of a living body is
+/// an InvalidArgument, and the step is undone.
+class JFPX_API ForceContext : public StepView {
  public:
-  ForceContext(BodyStore& bodies, double time) : bodies_(&bodies), time_(time) {}
-
-  Real dt() const;                         ///< [s], length of the step
-  double time() const { return time_; }    ///< [s], start of the step; 0 in the first
-  std::span<const BodyId> bodies() const;  ///< living bodies in the order of their indices
-  bool contains(BodyId id) const noexcept;
-
-  /// These throw InvalidArgument for a body that does not live; the step is then undone.
-  BodyState state(BodyId id) const;
-  const Shape& shape(BodyId id) const;
-  Real mass(BodyId id) const;   ///< [kg]; 0: immovable
-  bool awake(BodyId id) const;  ///< of mass 0: only what is kinematic and moves
+  ForceContext(BodyStore& bodies, double time) : StepView(bodies, time), bodies_(&bodies) {}
 
   /// Adds to the force [N] at the centre of mass, and to the torque [N m], in world axes. Nothing
   /// happens to sleeping and immovable bodies.
@@ -49,9 +36,7 @@ class JFPX_API ForceContext {
   void link(BodyId a, BodyId b);
 
  private:
-  std::uint32_t require(BodyId id) const;
   BodyStore* bodies_;
-  double time_;
 };
 
 /// Anything that can be called with a ForceContext, a lambda for example. It must do the same when

@@ -4,6 +4,7 @@
 #include <jfpx/backend.hpp>
 #include <jfpx/collide.hpp>
 #include <jfpx/cost_model.hpp>
+#include <jfpx/contact_generator.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 #include <jfpx/material.hpp>

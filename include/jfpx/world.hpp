@@ -1,6 +1,7 @@
 /// The native engine: a world of rigid bodies that steps by itself (thesis 4.3).
 #pragma once
 
+#include <jfpx/contact_generator.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 #include <jfpx/query.hpp>
@@ -52,9 +53,10 @@ struct ContactEvent {
 
 /// What one step did. Times are wall clock.
 struct StepReport {
-  std::uint64_t step = 0;             ///< number of the last step that was completed, from 1
-  std::uint64_t contacts = 0;         ///< contacts found
-  std::uint64_t sphere_contacts = 0;  ///< of these, between two spheres
+  std::uint64_t step = 0;                ///< number of the last step that was completed, from 1
+  std::uint64_t contacts = 0;            ///< contacts found
+  std::uint64_t sphere_contacts = 0;     ///< of these, between two spheres
+  std::uint64_t generated_contacts = 0;  ///< made by contact generators, besides those found
   std::uint64_t position_iterations = 0;
   std::uint64_t velocity_iterations = 0;
   bool iterations_exhausted = false;  ///< a loop stopped at its limit with work left
@@ -140,6 +142,22 @@ class JFPX_API World {
   void remove_force(ForceId id);
   std::span<const ForceId> forces() const;  ///< in the order in which they act
 
+  /// Adds a contact generator, which is called in every step; wakes all bodies. Generators act in
+  /// the order in which they were added. One must not call back into its World.
+  template <ContactGenerator G>
+  ContactGeneratorId add_contact_generator(G generator) {
+    return add_any_generator(std::move(generator));
+  }
+  /// The generator, to change it. @throws InvalidArgument if the id is unknown or of another type.
+  template <ContactGenerator G>
+  G& contact_generator(ContactGeneratorId id) {
+    if (G* found = any_generator(id).template target<G>()) return *found;
+    throw InvalidArgument("contact generator " + std::to_string(id.number) + " is of another type");
+  }
+  /// Wakes all bodies. @throws InvalidArgument for an unknown id.
+  void remove_contact_generator(ContactGeneratorId id);
+  std::span<const ContactGeneratorId> contact_generators() const;  ///< in the order of acting
+
   /// What a ray hits first; of bodies at the same distance, the one with the lowest index. Each
   /// query looks at every body, asleep or not, immovable or not: O(bodies), a few nanoseconds each.
   /// @throws InvalidArgument for a field of the ray that is out of its range
@@ -155,10 +173,11 @@ class JFPX_API World {
 
   double time() const;  ///< [s], completed steps times dt
   /// Contacts of the last step, in order: sphere pairs by (a, b), then others by (a, b), the points
-  /// of one pair in the order of its test. None after a failed step, or when bodies were added or
-  /// removed since.
+  /// of one pair in the order of its test; then those of contact generators in their order. None
+  /// after a failed step, or when bodies were added or removed since.
   std::span<const Contact> contacts() const;
-  /// Who touched whom in the last step, who began to and who ended, sorted by (a.index, b.index);
+  /// Who touched whom in the last step, who began to and who ended, of contacts that were found and
+  /// not generated; sorted by (a.index, b.index);
   /// where an index has got a new body, the end of the old pair comes first. A contact is as the
   /// step found it, before it was resolved; at an end, as it was last found. Sleepers stay in
   /// contact. A body that is removed, or put elsewhere, ends its contacts in the next step. None
@@ -173,6 +192,8 @@ class JFPX_API World {
   ForceContext force_context();
   ForceId add_any(std::function<void(ForceContext&)> force);
   std::function<void(ForceContext&)>& any_force(ForceId id);
+  ContactGeneratorId add_any_generator(std::function<void(ContactContext&)> generator);
+  std::function<void(ContactContext&)>& any_generator(ContactGeneratorId id);
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

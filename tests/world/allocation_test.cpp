@@ -45,7 +45,7 @@ TEST(Allocation, StepsOverTheSameContactsAllocateNothing) {
   EXPECT_EQ(allocations, before);
 }
 
-TEST(Allocation, NeitherBoxesNorForcesAllocateInWarmSteps) {
+TEST(Allocation, NeitherBoxesNorForcesNorGeneratorsAllocateInWarmSteps) {
   Scene scene;
   for (int i = 0; i < 5; ++i) {
     BodyDef def;
@@ -58,9 +58,16 @@ TEST(Allocation, NeitherBoxesNorForcesAllocateInWarmSteps) {
   World world(scene, kFixed);
   world.add_force(Drag{.linear = Real(0.1)});
   world.add_force(Spring{.a = {world.bodies()[0]}, .b = {world.bodies()[1]}, .rest_length = 1});
+  world.add_contact_generator([](ContactContext& context) {
+    context.add({.a = context.bodies()[4], .b = context.bodies()[5], .normal = {0, 1, 0}});
+  });
   for (int n = 0; n < 100; ++n) world.step();
   const long before = allocations;
-  for (int n = 0; n < 50; ++n) ASSERT_EQ(world.step().contacts, 20u);
+  for (int n = 0; n < 50; ++n) {
+    const StepReport report = world.step();
+    ASSERT_EQ(report.contacts, 20u);
+    ASSERT_EQ(report.generated_contacts, 1u);
+  }
   EXPECT_EQ(allocations, before);
 }
 
@@ -76,6 +83,33 @@ TEST(Allocation, ParticlesAtRestAllocateNothing) {
   const long before = allocations;
   for (int n = 0; n < 50; ++n) ASSERT_GT(world.step().contacts, 0u);
   EXPECT_EQ(allocations, before);
+}
+
+TEST(Allocation, NeitherCarryingNorEventsAllocateInWarmSteps) {
+  Scene scene;
+  BodyDef platform = test::ball({0, -1, 0});
+  platform.shape = Box{{50, 1, 50}};
+  platform.mass = 0;
+  platform.kinematic = true;
+  platform.velocity = {Real(0.2), 0, 0};
+  platform.restitution = 1;
+  scene.bodies = {platform};
+  for (int i = 0; i < 9; ++i) {
+    BodyDef def = test::ball({static_cast<Real>(i % 3), 1, static_cast<Real>(i / 3)}, Real(0.4));
+    def.acceleration = {0, Real(-9.81), 0};
+    def.restitution = 1;  // bounces: contacts begin and end
+    scene.bodies.push_back(def);
+  }
+  World world(scene);
+  for (int n = 0; n < 80; ++n) world.step();
+  const long before = allocations;
+  std::size_t begun = 0;
+  for (int n = 0; n < 100; ++n) {
+    world.step();
+    for (const ContactEvent& e : world.contact_events()) begun += e.phase == ContactPhase::begin;
+  }
+  EXPECT_EQ(allocations, before);
+  EXPECT_GT(begun, 0u);
 }
 
 TEST(Allocation, TheCounterCounts) {

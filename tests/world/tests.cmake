@@ -10,6 +10,7 @@ jfpx_add_test(world_parts_test SOURCES
 jfpx_add_test(world_test SOURCES
   world/box_test.cpp
   world/contact_events_test.cpp
+  world/contact_generator_test.cpp
   world/force_registry_test.cpp
   world/force_test.cpp
   world/inertia_test.cpp

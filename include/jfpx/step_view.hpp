@@ -1,0 +1,36 @@
+/// What forces and contact generators see of a world in the middle of a step.
+#pragma once
+
+#include <jfpx/body.hpp>
+
+#include <span>
+
+namespace jfpx::inline JFPX_ABI {
+
+class BodyStore;
+
+/// Valid during the call that it is given to.
+class JFPX_API StepView {
+ public:
+  StepView(const BodyStore& bodies, double time) : bodies_(&bodies), time_(time) {}
+
+  Real dt() const;                         ///< [s], length of the step
+  double time() const { return time_; }    ///< [s], start of the step; 0 in the first
+  std::span<const BodyId> bodies() const;  ///< living bodies in the order of their indices
+  bool contains(BodyId id) const noexcept;
+
+  /// These throw InvalidArgument for a body that does not live; the step is then undone.
+  BodyState state(BodyId id) const;
+  const Shape& shape(BodyId id) const;
+  Real mass(BodyId id) const;   ///< [kg]; 0: immovable or kinematic
+  bool awake(BodyId id) const;  ///< of mass 0: only what is kinematic and moves
+
+ protected:
+  std::uint32_t require(BodyId id) const;
+
+ private:
+  const BodyStore* bodies_;
+  double time_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI
