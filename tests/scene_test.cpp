@@ -1,6 +1,7 @@
 /// Named scenes, and scenes as JSON: round trips, and every way to be wrong.
 #include <jfpx/error.hpp>
 #include <jfpx/scene.hpp>
+#include <jfpx/world.hpp>
 
 #include "examples/scenes/scenes.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -8,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 
 namespace jfpx {
@@ -61,6 +63,53 @@ TEST(NamedScenes, TowerHasTheNumbersOfTheThesis) {
   EXPECT_EQ(scene.dt, Real(0.01));
 }
 
+TEST(NamedScenes, TowerHasBoxesBesideItOnRequest) {
+  const Scene without = scenes::make("boxes-and-balls", {.spheres = 5});
+  const Scene scene = scenes::make("boxes-and-balls", {.spheres = 5, .boxes = 3});
+  ASSERT_EQ(scene.bodies.size(), 9u);
+  EXPECT_TRUE(std::equal(without.bodies.begin(), without.bodies.end(), scene.bodies.begin()));
+  const BodyDef& top = scene.bodies.back();
+  EXPECT_EQ(top.shape, Shape(Box{{1, 1, 1}}));
+  EXPECT_EQ(top.position, (Vec3{0, 16, 3}));
+  EXPECT_EQ(top.mass, 1);
+  EXPECT_EQ(top.acceleration, (Vec3{0, Real(-9.81), 0}));
+}
+
+TEST(NamedScenes, MixedCountsItsBallsAndBoxes) {
+  const auto boxes = [](const Scene& scene) {
+    return std::ranges::count_if(scene.bodies, [](const BodyDef& body) {
+      return std::holds_alternative<Box>(body.shape) && body.mass > 0;
+    });
+  };
+  const Scene even = scenes::make("mixed", {.spheres = 40});
+  EXPECT_EQ(even.bodies.size(), 40u + 40u + 5u);
+  EXPECT_EQ(boxes(even), 40);
+  const Scene odd = scenes::make("mixed", {.spheres = 3, .boxes = 10});
+  EXPECT_EQ(scenes::spheres_of(odd).size(), 3u);
+  EXPECT_EQ(boxes(odd), 10);
+  EXPECT_EQ(boxes(scenes::make("mixed", {.spheres = 7, .boxes = 0})), 0);
+  World world(even);  // in a way that nothing touches
+  EXPECT_EQ(world.step().contacts, 0u);
+}
+
+TEST(NamedScenes, BoxesAreRefusedWhereThereAreNone) {
+  EXPECT_THROW(scenes::make("pile", {.boxes = 3}), InvalidArgument);
+  EXPECT_THROW(scenes::make("big-ballistic", {.boxes = 0}), InvalidArgument);
+}
+
+TEST(NamedScenes, CratesStandFaceToFaceAndTheVolleyTouchesNothing) {
+  World world(scenes::make("big-ballistic", {.spheres = 9}));
+  std::uint64_t crate_contacts = 0;
+  world.step();
+  for (const Contact& c : world.contacts()) {
+    EXPECT_LT(c.a, 3u);  // crates are bodies 0 and 1, the ground is 2
+    EXPECT_LT(c.b, 3u);
+    EXPECT_NEAR(c.distance, 0, 0.003);  // one step of gravity
+    ++crate_contacts;
+  }
+  EXPECT_EQ(crate_contacts, 4u + 4u + 4u);
+}
+
 TEST(NamedScenes, LatticeRoundsDownToACube) {
   EXPECT_EQ(scenes::make("lattice", {.spheres = 27}).bodies.size(), 27u);
   EXPECT_EQ(scenes::make("lattice", {.spheres = 63}).bodies.size(), 27u);
@@ -82,7 +131,7 @@ TEST(NamedScenes, TooManySpheresAreRefusedBeforeMemoryIsTouched) {
     scenes::make("pile", {.spheres = 0xffffffffu});
     FAIL();
   } catch (const OutOfMemory& error) {
-    EXPECT_THAT(error.what(), HasSubstr("4294967295 spheres needs about"));
+    EXPECT_THAT(error.what(), HasSubstr("4294967295 bodies needs about"));
   }
 }
 

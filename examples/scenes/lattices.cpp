@@ -13,13 +13,13 @@ Vec3 jitter(Random& random, Real amount) {
 
 }  // namespace
 
-Scene make_pile(std::uint32_t spheres, std::uint64_t seed) {
+Scene make_pile(const Counts& counts) {
   constexpr Real kSpacing = Real(1.1);
   Scene scene;
   scene.name = "pile";
-  Random random(seed);
-  const std::uint32_t side = cube_side(spheres);
-  for (std::uint32_t i = 0; i < spheres; ++i) {
+  Random random(counts.seed);
+  const std::uint32_t side = cube_side(counts.spheres);
+  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
     const Vec3 site = lattice_site(i, side) * kSpacing + Vec3{0, Real(0.6), 0};
     scene.bodies.push_back(sphere_at(site + jitter(random, Real(0.04)), kRadius, 1));
   }
@@ -29,14 +29,14 @@ Scene make_pile(std::uint32_t spheres, std::uint64_t seed) {
   return scene;
 }
 
-Scene make_gas(std::uint32_t spheres, std::uint64_t seed) {
+Scene make_gas(const Counts& counts) {
   // Volume fraction 0.30: a sphere of radius 1/2 in a cell of edge cbrt(pi / 6 / 0.30).
   constexpr Real kSpacing = Real(1.2040);
   Scene scene;
   scene.name = "gas";
-  Random random(seed);
-  const std::uint32_t side = cube_side(spheres);
-  for (std::uint32_t i = 0; i < spheres; ++i) {
+  Random random(counts.seed);
+  const std::uint32_t side = cube_side(counts.spheres);
+  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
     const Vec3 site = lattice_site(i, side) * kSpacing;
     BodyDef body = sphere_at(site + jitter(random, Real(0.09)), kRadius, 1);
     body.velocity = random.uniform_in_box({-3, -3, -3}, {3, 3, 3});
@@ -55,15 +55,15 @@ Scene make_gas(std::uint32_t spheres, std::uint64_t seed) {
   return scene;
 }
 
-Scene make_columns(std::uint32_t spheres, std::uint64_t) {
+Scene make_columns(const Counts& counts) {
   constexpr std::uint32_t kHeight = 32;
   constexpr Real kOverlap = Real(0.75);  // neighbours start a quarter of a diameter into each other
   Scene scene;
   scene.name = "columns";
-  const std::uint32_t columns = (spheres + kHeight - 1) / kHeight;
+  const std::uint32_t columns = (counts.spheres + kHeight - 1) / kHeight;
   std::uint32_t side = 1;
   while (std::uint64_t{side} * side < columns) ++side;
-  for (std::uint32_t i = 0; i < spheres; ++i) {
+  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
     const std::uint32_t column = i / kHeight;
     const Vec3 position{static_cast<Real>(column % side) * 4,
                         kRadius + static_cast<Real>(i % kHeight) * kOverlap,
@@ -79,22 +79,22 @@ Scene make_columns(std::uint32_t spheres, std::uint64_t) {
   return scene;
 }
 
-Scene make_overlap(std::uint32_t spheres, std::uint64_t seed) {
+Scene make_overlap(const Counts& counts) {
   Scene scene;
   scene.name = "overlap";
-  Random random(seed);
-  for (std::uint32_t i = 0; i < spheres; ++i) {
+  Random random(counts.seed);
+  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
     scene.bodies.push_back(sphere_at(Vec3{0, 10, 0} + jitter(random, Real(0.05)), kRadius, 1));
   }
   return scene;
 }
 
-Scene make_lattice(std::uint32_t spheres, std::uint64_t) {
+Scene make_lattice(const Counts& counts) {
   constexpr Real kSpacing = Real(0.97);  // axis neighbours overlap by 3 %, diagonal ones are apart
   Scene scene;
   scene.name = "lattice";
-  std::uint32_t side = cube_side(spheres);
-  if (std::uint64_t{side} * side * side > spheres) --side;
+  std::uint32_t side = cube_side(counts.spheres);
+  if (std::uint64_t{side} * side * side > counts.spheres) --side;
   const std::uint32_t count = side * side * side;
   for (std::uint32_t i = 0; i < count; ++i) {
     BodyDef body = sphere_at(lattice_site(i, side) * kSpacing, kRadius, 1);
@@ -104,15 +104,15 @@ Scene make_lattice(std::uint32_t spheres, std::uint64_t) {
   return scene;
 }
 
-Scene make_polydisperse(std::uint32_t spheres, std::uint64_t seed) {
+Scene make_polydisperse(const Counts& counts) {
   Scene scene;
   scene.name = "polydisperse";
-  Random random(seed);
+  Random random(counts.seed);
   // Radii over four decades, each decade as many spheres as the next: 10^-u by four exact factors
   // and a linear spread inside the decade, so that no library function decides the bits.
   constexpr Real kDecades[] = {Real(5), Real(0.5), Real(0.05), Real(0.005)};
-  const Real width = Real(8) * static_cast<Real>(cube_side(spheres));
-  for (std::uint32_t i = 0; i < spheres; ++i) {
+  const Real width = Real(8) * static_cast<Real>(cube_side(counts.spheres));
+  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
     const Real radius = kDecades[random.below(4)] * random.uniform(Real(0.1), 1);
     const Vec3 position =
         random.uniform_in_box({0, radius, 0}, {width, width * Real(0.25) + radius, width});

@@ -4,15 +4,19 @@
 #include <jfpx/random.hpp>
 #include <jfpx/scene.hpp>
 
+#include "examples/scenes/scenes.hpp"
+
 namespace jfpx::inline JFPX_ABI::scenes {
 
-Scene make_boxes_and_balls(std::uint32_t spheres, std::uint64_t seed);
-Scene make_pile(std::uint32_t spheres, std::uint64_t seed);
-Scene make_gas(std::uint32_t spheres, std::uint64_t seed);
-Scene make_columns(std::uint32_t spheres, std::uint64_t seed);
-Scene make_overlap(std::uint32_t spheres, std::uint64_t seed);
-Scene make_lattice(std::uint32_t spheres, std::uint64_t seed);
-Scene make_polydisperse(std::uint32_t spheres, std::uint64_t seed);
+Scene make_boxes_and_balls(const Counts& counts);
+Scene make_big_ballistic(const Counts& counts);
+Scene make_mixed(const Counts& counts);
+Scene make_pile(const Counts& counts);
+Scene make_gas(const Counts& counts);
+Scene make_columns(const Counts& counts);
+Scene make_overlap(const Counts& counts);
+Scene make_lattice(const Counts& counts);
+Scene make_polydisperse(const Counts& counts);
 
 /// Smallest integer whose cube is at least n.
 std::uint32_t cube_side(std::uint32_t n);

@@ -13,16 +13,33 @@ namespace {
 
 constexpr Entry kScenes[] = {
     {"boxes-and-balls", "the thesis' benchmark: a leaning tower of balls falls on a ground", 448,
-     make_boxes_and_balls},
+     Boxes::on_request, make_boxes_and_balls},
+    {"big-ballistic", "two crates on a ground, and a volley of as many rounds as asked for", 0,
+     Boxes::none, make_big_ballistic},
+    {"mixed", "balls and boxes of many sizes fall into a pit of half-spaces", 1000,
+     Boxes::as_many_as_spheres, make_mixed},
     {"pile", "a jittered lattice of spheres falls into an open box and comes to rest", 2048,
-     make_pile},
-    {"gas", "fast spheres without gravity in a closed box, volume fraction 0.30", 4096, make_gas},
-    {"columns", "stacks of 32 spheres that start a quarter into each other", 1024, make_columns},
-    {"overlap", "all spheres at one point, within 5 cm: every pair touches", 256, make_overlap},
-    {"lattice", "a cubic lattice of n^3 spheres with exactly 3n^2(n-1) contacts", 1000,
+     Boxes::none, make_pile},
+    {"gas", "fast spheres without gravity in a closed box, volume fraction 0.30", 4096, Boxes::none,
+     make_gas},
+    {"columns", "stacks of 32 spheres that start a quarter into each other", 1024, Boxes::none,
+     make_columns},
+    {"overlap", "all spheres at one point, within 5 cm: every pair touches", 256, Boxes::none,
+     make_overlap},
+    {"lattice", "a cubic lattice of n^3 spheres with exactly 3n^2(n-1) contacts", 1000, Boxes::none,
      make_lattice},
-    {"polydisperse", "radii over four decades, from 0.5 mm to 5 m", 2000, make_polydisperse},
+    {"polydisperse", "radii over four decades, from 0.5 mm to 5 m", 2000, Boxes::none,
+     make_polydisperse},
 };
+
+std::uint32_t boxes_of(const Entry& entry, std::uint32_t spheres,
+                       const std::optional<std::uint32_t>& asked) {
+  if (asked && entry.boxes == Boxes::none) {
+    throw InvalidArgument("boxes is " + std::to_string(*asked) + "; \"" + std::string(entry.name) +
+                          "\" has no boxes to count");
+  }
+  return asked.value_or(entry.boxes == Boxes::as_many_as_spheres ? spheres : 0);
+}
 
 void require_memory(std::uint64_t bodies) {
   // Twice the bodies, because a world copies them.
@@ -31,7 +48,7 @@ void require_memory(std::uint64_t bodies) {
       static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
   if (needed <= present) return;
   constexpr double kMiB = 1024.0 * 1024.0;
-  throw OutOfMemory("a scene of " + std::to_string(bodies) + " spheres needs about " +
+  throw OutOfMemory("a scene of " + std::to_string(bodies) + " bodies needs about " +
                     std::to_string(static_cast<std::uint64_t>(needed / kMiB)) +
                     " MiB; this machine has " +
                     std::to_string(static_cast<std::uint64_t>(present / kMiB)) + " MiB");
@@ -45,9 +62,12 @@ Scene make(std::string_view name, const Options& options) {
   std::string names;
   for (const Entry& entry : kScenes) {
     if (entry.name == name) {
-      const std::uint32_t spheres = options.spheres.value_or(entry.default_spheres);
-      require_memory(spheres);
-      return entry.make(spheres, options.seed);
+      Counts counts{.spheres = options.spheres.value_or(entry.default_spheres),
+                    .boxes = 0,
+                    .seed = options.seed};
+      counts.boxes = boxes_of(entry, counts.spheres, options.boxes);
+      require_memory(std::uint64_t{counts.spheres} + counts.boxes);
+      return entry.make(counts);
     }
     names += names.empty() ? "" : ", ";
     names += entry.name;

@@ -12,22 +12,39 @@ namespace jfpx::inline JFPX_ABI::scenes {
 
 struct Options {
   std::optional<std::uint32_t> spheres = {};  ///< the scene's default if absent
+  std::optional<std::uint32_t> boxes = {};    ///< likewise; only for scenes with boxes
   std::uint64_t seed = 1;
+};
+
+/// How much of what a scene has.
+struct Counts {
+  std::uint32_t spheres = 0, boxes = 0;  ///< movable ones
+  std::uint64_t seed = 1;
+};
+
+/// How many movable boxes a scene has.
+enum class Boxes : std::uint8_t {
+  none,                ///< none, or always the same
+  on_request,          ///< none by default, else as many as asked for
+  as_many_as_spheres,  ///< by default
 };
 
 struct Entry {
   std::string_view name;
   std::string_view summary;  ///< one line for a user
   std::uint32_t default_spheres;
-  Scene (*make)(std::uint32_t spheres, std::uint64_t seed);
+  Boxes boxes;
+  Scene (*make)(const Counts& counts);
 };
 
 /// All named scenes, in a fixed order.
 std::span<const Entry> all();
 
 /// The scene called `name`. `lattice` rounds the number of spheres down to a cube.
-/// @throws InvalidArgument for an unknown name (lists the names); OutOfMemory that says how much is
-///   needed, before anything is touched, when the bodies would not fit into the machine's memory.
+/// @throws InvalidArgument for an unknown name (lists the names), or boxes asked of a scene that
+/// has
+///   none; OutOfMemory that says how much is needed, before anything is touched, when the bodies
+///   would not fit into the machine's memory.
 Scene make(std::string_view name, const Options& options = {});
 
 /// The spheres of a scene, in body order: input for a SphereCollider.
