@@ -13,6 +13,8 @@ namespace {
 constexpr Entry kDemos[] = {
     {"boxes-and-balls", "the thesis' benchmark: a leaning tower of balls falls on a ground",
      make_boxes_and_balls},
+    {"ballistic", "four weapons fire particles down a range", make_ballistic},
+    {"big-ballistic", "the same weapons fire rigid balls at two crates", make_big_ballistic},
     {"flight", "an aircraft with wings, rudder and tail takes off", make_flight},
 };
 
@@ -48,6 +50,16 @@ StepReport Demo::step(std::span<const Input> inputs) {
     if (controls_[i].repeats && down_[i] && !acted[i]) act(i);
   }
   return advance();
+}
+
+std::size_t find_control(const Demo& demo, std::string_view name) {
+  std::string names;
+  for (std::size_t i = 0; i < demo.controls().size(); ++i) {
+    if (demo.controls()[i].name == name) return i;
+    names += (names.empty() ? "" : ", ") + std::string(demo.controls()[i].name);
+  }
+  throw InvalidArgument("\"" + std::string(demo.name()) + "\" has no control \"" +
+                        std::string(name) + "\"; controls are " + names);
 }
 
 Item shadow_of(const Item& item, Real thickness) {

@@ -64,6 +64,9 @@ class Demo {
   std::vector<bool> down_;
 };
 
+/// The place of a control in controls(). @throws InvalidArgument listing the names.
+std::size_t find_control(const Demo& demo, std::string_view name);
+
 struct Options {
   scenes::Options scene = {};   ///< for demos that are a named scene
   std::optional<Real> dt = {};  ///< [s]; the demo's own if absent

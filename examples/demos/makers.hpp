@@ -5,6 +5,8 @@
 
 namespace jfpx::inline JFPX_ABI::demos {
 
+std::unique_ptr<Demo> make_ballistic(const Options& options);
+std::unique_ptr<Demo> make_big_ballistic(const Options& options);
 std::unique_ptr<Demo> make_boxes_and_balls(const Options& options);
 std::unique_ptr<Demo> make_flight(const Options& options);
 

@@ -1,7 +1,8 @@
-/// Demos as such: the table, and how inputs become actions.
-#include "examples/demos/demo.hpp"
-
+/// Demos as such: the table, how inputs become actions, and runs that repeat.
 #include <jfpx/error.hpp>
+
+#include "examples/demos/input_script.hpp"
+#include "tests/world/support.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -63,7 +64,7 @@ TEST(Demos, EveryNamedSceneIsOneAndMovesAsItsWorld) {
     }
     EXPECT_EQ(demo->state_hash(), world.state_hash()) << entry.name;
     EXPECT_EQ(demo->world()->time(), world.time());
-    demo->step(std::vector<Input>{{0, true}});  // reset, then one step
+    demo->step(std::vector<Input>{{find_control(*demo, "reset"), true}});
     World fresh(scenes::make(entry.name, options.scene));
     fresh.step();
     EXPECT_EQ(demo->state_hash(), fresh.state_hash()) << entry.name;
@@ -72,8 +73,39 @@ TEST(Demos, EveryNamedSceneIsOneAndMovesAsItsWorld) {
 
 TEST(Demos, BadNamesAndStepsAreRefused) {
   EXPECT_THROW(demos::make("filght"), InvalidArgument);
+  try {
+    find_control(*demos::make("ballistic"), "jump");
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("\"jump\"; controls are pistol, artillery"));
+  }
   EXPECT_THROW(demos::make("flight", {.dt = Real(0)}), Error);
   EXPECT_THROW(demos::make("boxes-and-balls", {.dt = Real(-1)}), Error);
+}
+
+TEST(ScriptRecorder, ARecordedRunRepeatsToTheBit) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  for (const demos::Entry& entry : demos::all()) {
+    SCOPED_TRACE(entry.name);
+    Random random(seed);
+    const demos::Options options{.scene = {.spheres = 5}};
+    const auto played = demos::make(entry.name, options);
+    const auto controls = played->controls().size();
+    demos::ScriptRecorder recorder(*played);
+    for (int n = 0; n < 200; ++n) {
+      std::vector<Input> inputs;
+      for (std::uint64_t k = random.below(3); k-- > 0;) {
+        inputs.push_back({random.below(controls), random.below(2) == 0});
+      }
+      recorder.add_step(inputs);
+      played->step(inputs);
+    }
+    const auto repeated = demos::make(entry.name, options);
+    demos::ScriptPlayer player(demos::parse_input_script(to_text(recorder.script())), *repeated);
+    for (int n = 0; n < 200; ++n) repeated->step(player.next());
+    EXPECT_EQ(repeated->state_hash(), played->state_hash());
+  }
 }
 
 /// Counts what its controls do: 0 once a press, 1 in every step.

@@ -1,0 +1,36 @@
+/// What the two ballistic demos share: weapons, controls, and how long rounds live.
+#pragma once
+
+#include "examples/demos/makers.hpp"
+#include "examples/scenes/weapons.hpp"
+
+#include <array>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::demos {
+
+using scenes::Weapon;
+
+/// Controls of both demos. The weapons have the numbers of Weapon.
+enum GunControl : std::size_t { kFire = 4, kResetGun = 5 };
+inline constexpr std::array<Control, 6> kGunControls{{{"pistol", "choose the pistol", "1"},
+                                                      {"artillery", "choose the artillery", "2"},
+                                                      {"fireball", "choose the fireball", "3"},
+                                                      {"laser", "choose the laser", "4"},
+                                                      {"fire", "fire one round", "mouse"},
+                                                      {"reset", "start again", "r"}}};
+
+inline constexpr std::size_t kMostRounds = 160;  ///< in flight; beyond, nothing is fired
+inline constexpr Real kLongestShot = 200;        ///< [m], along z
+inline constexpr double kOldestRound = 5;        ///< [s]; the original's never ended (E44, E45)
+
+/// Who has flown far, long, or into the ground is taken away.
+inline bool spent(const Vec3& position, double age) {
+  return position.y < 0 || position.z > kLongestShot || age > kOldestRound;
+}
+
+/// The gun's place, its shadow, and lines across the range.
+void draw_range(View* view, const Vec3& gun);
+std::string gun_text(Weapon weapon, std::size_t rounds);
+
+}  // namespace jfpx::inline JFPX_ABI::demos
