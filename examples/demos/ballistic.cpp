@@ -50,6 +50,7 @@ class Ballistic final : public Demo {
   }
 
   std::string_view name() const override { return "ballistic"; }
+  Real dt() const override { return settings_.dt; }
   std::vector<BodyState> states() const override;
   void draw(View* view) const override;
 
@@ -96,6 +97,8 @@ StepReport Ballistic::advance() {
   report.step = particles.step;
   report.contacts = particles.contacts;
   report.non_finite = particles.non_finite;
+  report.non_finite_body = {particles.non_finite_particle.index,
+                            particles.non_finite_particle.generation};
   report.awake = static_cast<std::uint32_t>(rounds_.size());
   return report;
 }

@@ -15,6 +15,7 @@ class BigBallistic final : public Demo {
       : Demo(kGunControls), options_(options), world_(start()) {}
 
   std::string_view name() const override { return "big-ballistic"; }
+  Real dt() const override { return world_.scene().dt; }
   std::vector<BodyState> states() const override { return world_.states(); }
   const World* world() const override { return &world_; }
   void draw(View* view) const override;

@@ -37,6 +37,7 @@ class Demo {
   Demo& operator=(const Demo&) = delete;
 
   virtual std::string_view name() const = 0;
+  virtual Real dt() const = 0;  ///< [s], length of a step
   std::span<const Control> controls() const { return controls_; }
   /// One step, with what happened since the last. Inputs act in the order given (erratum E42); a
   /// control that is pressed and released within one step still acts once.

@@ -102,6 +102,7 @@ class Flight final : public Demo {
   }
 
   std::string_view name() const override { return "flight"; }
+  Real dt() const override { return world_.scene().dt; }
   std::vector<BodyState> states() const override { return world_.states(); }
   const World* world() const override { return &world_; }
   void draw(View* view) const override;
@@ -111,12 +112,14 @@ class Flight final : public Demo {
   void add_forces();
   void reset();
   void turn(Surface surface, Real by);
+  void level();
   void act(std::size_t control) override;
   StepReport advance() override;
   void keep_above_ground();
 
   World world_;
   std::array<ForceId, kSurfaces> surfaces_;
+  std::array<Real, kSurfaces> control_{};  ///< [-], in [-1, 1]
 };
 
 void Flight::add_forces() {
@@ -134,12 +137,18 @@ void Flight::add_forces() {
 
 void Flight::reset() {
   world_.set_state(aircraft(), {});
-  for (const ForceId surface : surfaces_) world_.force<AeroControl>(surface).control = 0;
+  level();
 }
 
 void Flight::turn(Surface surface, Real by) {
-  Real& control = world_.force<AeroControl>(surfaces_[surface]).control;
-  control = std::clamp(control + by, Real(-1), Real(1));
+  control_[surface] = std::clamp(control_[surface] + by, Real(-1), Real(1));
+  world_.force<AeroControl>(surfaces_[surface]).control = control_[surface];
+}
+
+void Flight::level() {
+  for (const Surface surface : {kWingMinusZ, kWingPlusZ, kRudder}) {
+    turn(surface, -control_[surface]);
+  }
 }
 
 void Flight::act(std::size_t control) {
@@ -164,7 +173,7 @@ void Flight::act(std::size_t control) {
       break;
     }
     case kLevel:
-      for (const ForceId surface : surfaces_) world_.force<AeroControl>(surface).control = 0;
+      level();
       break;
     case kReset:
       reset();
@@ -216,10 +225,13 @@ void Flight::draw(View* view) const {
     view->items.push_back(shadow_of(item, Real(0.001)));
     view->items.push_back(item);
   }
-  char line[80];
-  std::snprintf(line, sizeof line, "altitude %.1f m, speed %.1f m/s",
+  const auto control = [this](Surface surface) { return static_cast<double>(control_[surface]); };
+  char state_line[80], control_line[80];
+  std::snprintf(state_line, sizeof state_line, "altitude %.1f m, speed %.1f m/s",
                 static_cast<double>(state.position.y), static_cast<double>(speed));
-  view->text = {line};
+  std::snprintf(control_line, sizeof control_line, "wings: left %+.1f, right %+.1f; rudder %+.1f",
+                control(kWingPlusZ), control(kWingMinusZ), control(kRudder));
+  view->text = {state_line, control_line};
 }
 
 }  // namespace

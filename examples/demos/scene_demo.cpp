@@ -37,6 +37,7 @@ class SceneDemo final : public Demo {
         world_(scene_, settings_) {}
 
   std::string_view name() const override { return scene_.name; }
+  Real dt() const override { return scene_.dt; }
   std::vector<BodyState> states() const override { return world_.states(); }
   const World* world() const override { return &world_; }
 

@@ -1,8 +1,6 @@
 /// The native engine behind the tool's interface.
 #include "src/tool/native_engine.hpp"
 
-#include <jfpx/world.hpp>
-
 #include <fmt/format.h>
 
 namespace jfpx::inline JFPX_ABI::tool {
@@ -20,24 +18,14 @@ class NativeEngine final : public Engine {
   std::vector<BodyState> states() const override { return world_.states(); }
   std::uint64_t contacts() const override { return report_.contacts; }
   std::uint32_t awake() const override { return report_.awake; }
-  StageTimes times() const override {
-    return {.integrate = report_.integrate_ms,
-            .broad = 0,
-            .detect = report_.detect_ms,
-            .solve = report_.resolve_ms,
-            .total = report_.total_ms};
-  }
+  StageTimes times() const override { return stage_times(report_); }
   std::string backend() const override { return std::string(to_string(report_.backend)); }
   std::string choice() const override {
     return fmt::format("{}, {}, {}", to_string(report_.backend), to_string(report_.algorithm),
                        to_string(report_.choice));
   }
   std::string device_failure() const override { return device_failure_; }
-  std::string trouble() const override {
-    if (!report_.non_finite) return {};
-    return fmt::format("step {}: body {} left the finite numbers; the state is frozen",
-                       report_.step, report_.non_finite_body.index);
-  }
+  std::string trouble() const override { return trouble_of(report_); }
 
  private:
   World world_;
@@ -46,6 +34,20 @@ class NativeEngine final : public Engine {
 };
 
 }  // namespace
+
+StageTimes stage_times(const StepReport& report) {
+  return {.integrate = report.integrate_ms,
+          .broad = 0,
+          .detect = report.detect_ms,
+          .solve = report.resolve_ms,
+          .total = report.total_ms};
+}
+
+std::string trouble_of(const StepReport& report) {
+  if (!report.non_finite) return {};
+  return fmt::format("step {}: body {} left the finite numbers; the state is frozen", report.step,
+                     report.non_finite_body.index);
+}
 
 std::unique_ptr<Engine> make_native_engine(const Scene& scene, const RunOptions& options) {
   return std::make_unique<NativeEngine>(scene, options);

@@ -1,10 +1,16 @@
 /// The native engine behind the tool's interface.
 #pragma once
 
+#include <jfpx/world.hpp>
+
 #include "src/tool/engine.hpp"
 
 namespace jfpx::inline JFPX_ABI::tool {
 
 std::unique_ptr<Engine> make_native_engine(const Scene& scene, const RunOptions& options);
+
+/// What a report says, in the tool's words.
+StageTimes stage_times(const StepReport& report);
+std::string trouble_of(const StepReport& report);
 
 }  // namespace jfpx::inline JFPX_ABI::tool

@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "examples/scenes/scenes.hpp"
+#include "src/tool/demo_engine.hpp"
 
 #include <charconv>
 #include <filesystem>
@@ -42,6 +43,9 @@ void add_scene_options(CLI::App& app, RunOptions& options) {
       ->required();
   app.add_option("--spheres", options.spheres, "Number of spheres of a named scene")
       ->check(whole_number());
+  app.add_option("--boxes", options.boxes,
+                 "Number of boxes, of named scenes that have some [see: jfpx scenes]")
+      ->check(whole_number());
   app.add_option("--seed", options.seed, "Seed of a named scene")
       ->check(whole_number())
       ->capture_default_str();
@@ -71,15 +75,26 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_flag("--quiet", options.quiet, "Print nothing but what --hash and --json - ask for");
 }
 
+scenes::Options scene_options(const RunOptions& options) {
+  return {.spheres = options.spheres, .boxes = options.boxes, .seed = options.seed};
+}
+
 Scene load(const RunOptions& options) {
   Scene scene;
   if (!is_named(options.scene) && looks_like_file(options.scene)) {
-    if (options.spheres) {
-      throw InvalidArgument("--spheres goes with a named scene; " + options.scene + " is a file");
+    if (options.spheres || options.boxes) {
+      throw InvalidArgument(std::string(options.spheres ? "--spheres" : "--boxes") +
+                            " goes with a named scene; " + options.scene + " is a file");
     }
     scene = load_scene(options.scene);
   } else {
-    scene = scenes::make(options.scene, {.spheres = options.spheres, .seed = options.seed});
+    if (is_only_a_demo(options.scene)) {
+      throw InvalidArgument("\"" + options.scene +
+                            "\" is a demo: more than rigid bodies belongs to it, so that only the "
+                            "native engine has it; try: jfpx run " +
+                            options.scene);
+    }
+    scene = scenes::make(options.scene, scene_options(options));
   }
   if (options.dt) scene.dt = *options.dt;
   if (options.no_sleep) scene.sleep.enabled = false;

@@ -4,6 +4,8 @@
 #include <jfpx/backend.hpp>
 #include <jfpx/scene.hpp>
 
+#include "examples/scenes/scenes.hpp"
+
 #include <CLI/CLI.hpp>
 
 #include <cstdint>
@@ -18,7 +20,7 @@ enum ExitStatus : int { kSuccess = 0, kCheckFailed = 1, kBadUsage = 2, kBackendU
 /// Which scene, and how to run it.
 struct RunOptions {
   std::string scene;  ///< name or path of a JSON file
-  std::optional<std::uint32_t> spheres;
+  std::optional<std::uint32_t> spheres, boxes;
   std::optional<Real> dt;
   std::uint64_t seed = 1;
   std::uint64_t steps = 120;
@@ -38,6 +40,8 @@ void add_scene_options(CLI::App& app, RunOptions& options);
 /// Adds --steps, --backend, --threads, --minimum-batch, --json, --hash, --quiet.
 void add_run_options(CLI::App& app, RunOptions& options);
 
+/// What the options say about a named scene.
+scenes::Options scene_options(const RunOptions& options);
 /// The scene that the options name, changed as they say.
 /// @throws InvalidArgument, InvalidScene, FileError, OutOfMemory
 Scene load(const RunOptions& options);

@@ -3,6 +3,7 @@
 #include <jfpx/recording.hpp>
 
 #include "src/tool/commands.hpp"
+#include "src/tool/demo_engine.hpp"
 #include "src/tool/engine.hpp"
 #include "src/tool/output.hpp"
 
@@ -19,6 +20,7 @@ namespace {
 struct Options {
   RunOptions run;
   std::string engine = "native";
+  std::string input;  ///< path of an input script
 };
 
 struct Totals {
@@ -72,9 +74,25 @@ nlohmann::ordered_json to_json_value(const Options& options, const Scene& scene,
             {"total", t.total}}}};
 }
 
+/// The engine, and the scene that it starts with.
+std::unique_ptr<Engine> start(const Options& options, Scene* scene) {
+  const EngineKind kind = parse_engine(options.engine);
+  if (options.input.empty() && !(kind == EngineKind::native && is_only_a_demo(options.run.scene))) {
+    *scene = load(options.run);
+    return make_engine(kind, *scene, options.run);
+  }
+  if (kind != EngineKind::native) {
+    throw InvalidArgument("--input goes with the native engine; engine is " + options.engine);
+  }
+  if (!options.run.record.empty()) {
+    throw InvalidArgument("--record goes with scenes; a demo is repeated by its --input");
+  }
+  return make_demo_engine(options.run, options.input, scene);
+}
+
 int run(const Options& options) {
-  const Scene scene = load(options.run);
-  const auto engine = make_engine(parse_engine(options.engine), scene, options.run);
+  Scene scene;
+  const auto engine = start(options, &scene);
   OutputFile csv(options.run.csv), json(options.run.json);
   std::optional<RecordingWriter> recording;
   if (!options.run.record.empty()) {
@@ -121,6 +139,8 @@ void add_run_command(CLI::App& app, int& status) {
   command->add_option("--engine", options->engine, "native, bullet (with jfpx) or bullet-stock")
       ->check(CLI::IsMember({"native", "bullet", "bullet-stock"}))
       ->capture_default_str();
+  command->add_option("--input", options->input,
+                      "Run as a demo with the inputs of this file (see: jfpx scenes DEMO)");
   command->add_option("--csv", options->run.csv, "Write one line a step to this file");
   command->add_option("--record", options->run.record,
                       "Write the state after every step to this file (see: jfpx replay)");

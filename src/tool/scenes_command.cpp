@@ -1,6 +1,8 @@
 /// jfpx scenes: what can be run, and any of it as JSON.
+#include "examples/demos/demo.hpp"
 #include "examples/scenes/scenes.hpp"
 #include "src/tool/commands.hpp"
+#include "src/tool/demo_engine.hpp"
 #include "src/tool/options.hpp"
 #include "src/tool/output.hpp"
 
@@ -20,9 +22,14 @@ std::string list_text() {
   std::string text;
   std::size_t width = 0;
   for (const scenes::Entry& entry : scenes::all()) width = std::max(width, entry.name.size());
+  for (const demos::Entry& entry : demos::all()) width = std::max(width, entry.name.size());
   for (const scenes::Entry& entry : scenes::all()) {
     text += fmt::format("{:<{}}  {:>5} spheres  {}\n", entry.name, width, entry.default_spheres,
                         entry.summary);
+  }
+  text += "\nDemos, which have controls too (jfpx scenes DEMO lists them):\n\n";
+  for (const demos::Entry& entry : demos::all()) {
+    text += fmt::format("{:<{}}  {}\n", entry.name, width, entry.summary);
   }
   return text;
 }
@@ -39,7 +46,8 @@ std::string describe(const Scene& scene) {
 
 void add_scenes_command(CLI::App& app, int&) {
   auto options = std::make_shared<ScenesOptions>();
-  CLI::App* command = app.add_subcommand("scenes", "List the named scenes; describe or export one");
+  CLI::App* command =
+      app.add_subcommand("scenes", "List the named scenes and demos; describe or export one");
   add_scene_options(*command, options->run);
   command->get_option("SCENE")->required(false);
   command->add_flag("--export", options->do_export, "Print the scene as JSON");
@@ -49,6 +57,9 @@ void add_scenes_command(CLI::App& app, int&) {
       fmt::print("{}", list_text());
       return;
     }
+    const bool demo = is_demo(options->run.scene);
+    if (demo && !options->do_export) fmt::print("{}\n", describe_demo(options->run.scene));
+    if (is_only_a_demo(options->run.scene) && !options->do_export) return;
     const Scene scene = load(options->run);
     fmt::print("{}", options->do_export ? to_json(scene) : describe(scene));
   });

@@ -3,6 +3,7 @@
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
 
+#include "examples/demos/demo.hpp"
 #include "examples/scenes/scenes.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -98,6 +99,58 @@ TEST(Tool, ScenesAreListedDescribedAndExported) {
   EXPECT_THAT(jfpx_stdout("scenes pile --spheres 30").output, HasSubstr("pile: 35 bodies, 30"));
   const ProcessResult text = jfpx_stdout("scenes gas --spheres 10 --seed 5 --export");
   EXPECT_EQ(from_json(text.output), scenes::make("gas", {.spheres = 10, .seed = 5}));
+}
+
+TEST(Tool, DemosAreListedWithTheirControls) {
+  const std::string list = jfpx_stdout("scenes").output;
+  for (const demos::Entry& entry : demos::all()) {
+    EXPECT_THAT(list, HasSubstr(std::string(entry.name)));
+    const ProcessResult result = jfpx_stdout("scenes " + std::string(entry.name));
+    EXPECT_EQ(result.status, 0);
+    for (const demos::Control& control : demos::make(entry.name)->controls()) {
+      EXPECT_THAT(result.output, HasSubstr(std::string(control.name)));
+    }
+  }
+}
+
+TEST(Tool, DemosRunWithTheirInputsAndRepeat) {
+  const test::TemporaryFolder folder;
+  const std::string script = folder.file("shots.input");
+  std::ofstream(script) << "jfpx-input 1 ballistic\n2 fire press\n2 fire release\n5 fire press\n";
+  const std::string arguments = "run ballistic --steps 30 --quiet --hash";
+  const ProcessResult shots = jfpx_stdout(arguments + " --input " + script);
+  EXPECT_EQ(shots.status, 0);
+  EXPECT_THAT(shots.output, MatchesRegex("[0-9a-f]{16}\n"));
+  EXPECT_EQ(jfpx_stdout(arguments + " --input " + script).output, shots.output);
+  EXPECT_NE(jfpx_stdout(arguments).output, shots.output);
+  const auto json = nlohmann::json::parse(
+      jfpx_stdout("run ballistic --steps 30 --quiet --json - --input " + script).output);
+  EXPECT_EQ(json["scene"], "ballistic");
+  EXPECT_EQ(json["awake"], 2);
+}
+
+TEST(Tool, ASceneWithoutInputsIsTheSameAsADemo) {
+  const test::TemporaryFolder folder;
+  const std::string script = folder.file("none.input");
+  std::ofstream(script) << "jfpx-input 1 mixed\n";
+  const std::string arguments = "run mixed --spheres 20 --boxes 7 --steps 40 --quiet --hash";
+  EXPECT_EQ(jfpx_stdout(arguments + " --input " + script).output, jfpx_stdout(arguments).output);
+}
+
+TEST(Tool, DemosRefuseWhatTheyCannotDo) {
+  const test::TemporaryFolder folder;
+  const std::string script = folder.file("x.input");
+  std::ofstream(script) << "jfpx-input 1 flight\n1 fire press\n";
+  expect_fails("run flight --input " + script, 2, "\"flight\" has no control \"fire\"");
+  expect_fails("run ballistic --input " + script, 2, "are of \"flight\", not of \"ballistic\"");
+  expect_fails("run flight --input " + folder.file("none.input"), 2, "none.input");
+  expect_fails("run flight --engine bullet", 2, "only the native engine");
+  expect_fails("compare ballistic", 2, "only the native engine");
+  expect_fails("scenes flight --export", 2, "only the native engine");
+  expect_fails("run flight --record " + folder.file("a.rec"), 2, "--record goes with scenes");
+  expect_fails("run flight --no-sleep", 2, "--no-sleep goes with a scene");
+  expect_fails("run pile --boxes 3", 2, "boxes");
+  expect_fails("run flight --dt 0", 2, "dt");
 }
 
 TEST(Tool, DevicesTellsTheTruth) {

@@ -1,0 +1,88 @@
+/// Demos behind the tool's interface.
+#include "src/tool/demo_engine.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "examples/demos/input_script.hpp"
+#include "src/tool/native_engine.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+std::unique_ptr<demos::Demo> make_demo(const RunOptions& options) {
+  const WorldSettings world{.collider = collider_options(options)};
+  if (!is_demo(options.scene)) return demos::make(load(options), world);
+  if (options.no_sleep) {
+    throw InvalidArgument("--no-sleep goes with a scene; " + options.scene + " is a demo");
+  }
+  return demos::make(options.scene,
+                     {.scene = scene_options(options), .dt = options.dt, .world = world});
+}
+
+class DemoEngine final : public Engine {
+ public:
+  DemoEngine(std::unique_ptr<demos::Demo> demo, const demos::InputScript& script)
+      : demo_(std::move(demo)), player_(script, *demo_) {}
+
+  void step() override {
+    const auto start = std::chrono::steady_clock::now();
+    report_ = demo_->step(player_.next());
+    const std::chrono::duration<double, std::milli> passed =
+        std::chrono::steady_clock::now() - start;
+    report_.total_ms = passed.count();  // controls included
+  }
+  std::vector<BodyState> states() const override { return demo_->states(); }
+  std::uint64_t contacts() const override { return report_.contacts; }
+  std::uint32_t awake() const override { return report_.awake; }
+  StageTimes times() const override { return stage_times(report_); }
+  std::string backend() const override { return std::string(to_string(report_.backend)); }
+  std::string trouble() const override { return trouble_of(report_); }
+
+ private:
+  std::unique_ptr<demos::Demo> demo_;
+  demos::ScriptPlayer player_;
+  StepReport report_;
+};
+
+}  // namespace
+
+bool is_demo(const std::string& name) {
+  return std::ranges::any_of(demos::all(), [&](const auto& entry) { return entry.name == name; });
+}
+
+bool is_only_a_demo(const std::string& name) {
+  return is_demo(name) &&
+         std::ranges::none_of(scenes::all(), [&](const auto& entry) { return entry.name == name; });
+}
+
+std::unique_ptr<Engine> make_demo_engine(const RunOptions& options, const std::string& script,
+                                         Scene* start) {
+  std::unique_ptr<demos::Demo> demo = make_demo(options);
+  *start = demo->world() != nullptr ? demo->world()->scene() : Scene{};
+  start->name = demo->name();
+  start->dt = demo->dt();
+  const demos::InputScript inputs = script.empty()
+                                        ? demos::InputScript{.demo = start->name, .lines = {}}
+                                        : demos::load_input_script(script);
+  return std::make_unique<DemoEngine>(std::move(demo), inputs);
+}
+
+std::string describe_demo(const std::string& name) {
+  const auto demo = demos::make(name);
+  std::string text;
+  for (const demos::Entry& entry : demos::all()) {
+    if (entry.name == name) text = fmt::format("{}: {}\n\n", entry.name, entry.summary);
+  }
+  for (const demos::Control& control : demo->controls()) {
+    text += fmt::format("  {:<12} {:<6} {}{}\n", control.name, control.key, control.summary,
+                        control.repeats ? ", in every step while it is down" : "");
+  }
+  return text;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

@@ -1,0 +1,23 @@
+/// Demos behind the tool's interface: which names are demos, and how one runs with its inputs.
+#pragma once
+
+#include "src/tool/engine.hpp"
+
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::tool {
+
+bool is_demo(const std::string& name);
+/// True for a demo that is no scene, because more than bodies belongs to it.
+bool is_only_a_demo(const std::string& name);
+
+/// The demo or scene that the options name, as a demo, with the inputs of a script; "" is no input.
+/// @param start receives the scene that the demo starts with; without bodies, if it has none
+/// @throws InvalidArgument, also for options that a demo does not have; FileError; as load()
+std::unique_ptr<Engine> make_demo_engine(const RunOptions& options, const std::string& script,
+                                         Scene* start);
+
+/// Name, summary and controls of a demo, for a user.
+std::string describe_demo(const std::string& name);
+
+}  // namespace jfpx::inline JFPX_ABI::tool
