@@ -15,6 +15,7 @@ jfpx_add_test(world_test SOURCES
   world/force_test.cpp
   world/inertia_test.cpp
   world/kinematic_test.cpp
+  world/mixed_test.cpp
   world/motion_test.cpp
   world/query_test.cpp
   world/rest_test.cpp
