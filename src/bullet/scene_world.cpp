@@ -132,6 +132,13 @@ std::unique_ptr<btCollisionDispatcher> make_dispatcher(btCollisionConfiguration*
   return std::make_unique<CollisionDispatcher>(configuration, options.dispatch);
 }
 
+std::unique_ptr<btSequentialImpulseConstraintSolver> make_solver(const SceneWorldOptions& options) {
+  if (options.solver == SolverKind::stock) {
+    return std::make_unique<btSequentialImpulseConstraintSolver>();
+  }
+  return std::make_unique<ConstraintSolver>(options.solve);
+}
+
 }  // namespace
 
 /// Members in the order in which Bullet needs them to be made, and so destroyed in reverse.
@@ -141,7 +148,7 @@ struct SceneWorld::Impl {
   btDefaultCollisionConfiguration configuration;
   std::unique_ptr<btCollisionDispatcher> dispatcher;
   btDbvtBroadphase broadphase;
-  btSequentialImpulseConstraintSolver solver;
+  std::unique_ptr<btSequentialImpulseConstraintSolver> solver;
   std::vector<std::unique_ptr<btRigidBody>> owned;
   std::vector<btRigidBody*> bodies;
   TimedWorld world;
@@ -150,7 +157,8 @@ struct SceneWorld::Impl {
       : scene(source),
         shapes(options.share_shapes),
         dispatcher(make_dispatcher(&configuration, options)),
-        world(dispatcher.get(), &broadphase, &solver, &configuration) {
+        solver(make_solver(options)),
+        world(dispatcher.get(), &broadphase, solver.get(), &configuration) {
     world.setGravity({0, 0, 0});
     world.getDispatchInfo().m_deterministicOverlappingPairs = options.deterministic_pairs;
     for (const BodyDef& def : scene.bodies) {
@@ -233,6 +241,9 @@ CollisionDispatcher* SceneWorld::jfpx_dispatcher() noexcept {
 }
 const CollisionDispatcher* SceneWorld::jfpx_dispatcher() const noexcept {
   return dynamic_cast<const CollisionDispatcher*>(impl_->dispatcher.get());
+}
+const ConstraintSolver* SceneWorld::jfpx_solver() const noexcept {
+  return dynamic_cast<const ConstraintSolver*>(impl_->solver.get());
 }
 std::span<btRigidBody* const> SceneWorld::bodies() const noexcept { return impl_->bodies; }
 

@@ -17,12 +17,13 @@ btVector3 to_bullet(const Vec3& v) { return {v.x, v.y, v.z}; }
 
 }  // namespace
 
-LiveWorld::LiveWorld(const RandomWorld& world, MakeDispatcher make_dispatcher)
+LiveWorld::LiveWorld(const RandomWorld& world, MakeDispatcher make_dispatcher,
+                     const WorldParts& parts)
     : random_(world),
       live_(
           make_configuration(),
           [&](btCollisionConfiguration* c) { return make_dispatcher(c, random_); },
-          make_broadphase()) {
+          make_broadphase(), parts) {
   g_current = &live_;
   live_.world.setGravity(to_bullet(random_.gravity));
   live_.world.getDispatchInfo().m_deterministicOverlappingPairs = random_.deterministic;

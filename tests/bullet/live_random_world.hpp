@@ -11,7 +11,7 @@ namespace jfpx::inline JFPX_ABI::bullet {
 /// Sets g_current while it is made; happen() and step() want it set by the caller.
 class LiveWorld {
  public:
-  LiveWorld(const RandomWorld& world, MakeDispatcher make_dispatcher);
+  LiveWorld(const RandomWorld& world, MakeDispatcher make_dispatcher, const WorldParts& parts = {});
   ~LiveWorld();
   LiveWorld(const LiveWorld&) = delete;
   LiveWorld& operator=(const LiveWorld&) = delete;

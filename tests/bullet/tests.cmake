@@ -20,6 +20,12 @@ jfpx_add_test(bullet_random_worlds_test SOURCES
   ${random_worlds}
   bullet/random_worlds_test.cpp
   LINK jfpx_bullet)
+jfpx_add_test(bullet_solver_test SOURCES
+  ${random_worlds}
+  bullet/solver_test.cpp
+  bullet/solver_world.cpp
+  bullet/solver_world_run.cpp
+  LINK jfpx_bullet)
 jfpx_add_test(bullet_algorithm_test SOURCES
   ${random_worlds}
   bullet/algorithm_test.cpp

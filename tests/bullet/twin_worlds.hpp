@@ -25,6 +25,20 @@ inline std::uint64_t test_seed() {
   return fixed != nullptr ? std::strtoull(fixed, nullptr, 0) : std::random_device{}();
 }
 
+/// Who makes the parts of a world that a test may replace.
+struct WorldParts {
+  std::function<std::unique_ptr<btSequentialImpulseConstraintSolver>()> solver = [] {
+    return std::make_unique<btSequentialImpulseConstraintSolver>();
+  };
+  std::function<std::unique_ptr<btDiscreteDynamicsWorld>(
+      btDispatcher*, btBroadphaseInterface*, btConstraintSolver*, btCollisionConfiguration*)>
+      world = [](btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+                 btConstraintSolver* constraint_solver, btCollisionConfiguration* configuration) {
+        return std::make_unique<btDiscreteDynamicsWorld>(dispatcher, broadphase, constraint_solver,
+                                                         configuration);
+      };
+};
+
 /// A Bullet world that owns everything. Made in two phases, because a dispatcher needs the
 /// configuration.
 struct BulletWorld {
@@ -33,11 +47,13 @@ struct BulletWorld {
   using MakeBroadphase = std::function<std::unique_ptr<btBroadphaseInterface>()>;
 
   BulletWorld(std::unique_ptr<btCollisionConfiguration> c, const MakeDispatcher& make_dispatcher,
-              std::unique_ptr<btBroadphaseInterface> b)
+              std::unique_ptr<btBroadphaseInterface> b, const WorldParts& parts = {})
       : configuration(std::move(c)),
         dispatcher(make_dispatcher(configuration.get())),
         broadphase(std::move(b)),
-        world(dispatcher.get(), broadphase.get(), &solver, configuration.get()) {}
+        solver(parts.solver()),
+        made_world(
+            parts.world(dispatcher.get(), broadphase.get(), solver.get(), configuration.get())) {}
   ~BulletWorld() {
     for (int i = world.getNumCollisionObjects() - 1; i >= 0; --i) {
       world.removeCollisionObject(world.getCollisionObjectArray()[i]);
@@ -71,11 +87,12 @@ struct BulletWorld {
   std::unique_ptr<btCollisionConfiguration> configuration;
   std::unique_ptr<btCollisionDispatcher> dispatcher;
   std::unique_ptr<btBroadphaseInterface> broadphase;
-  btSequentialImpulseConstraintSolver solver;
+  std::unique_ptr<btSequentialImpulseConstraintSolver> solver;
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
   std::vector<std::unique_ptr<btCollisionObject>> objects;
   std::vector<std::unique_ptr<btRigidBody>> bodies;
-  btDiscreteDynamicsWorld world;
+  std::unique_ptr<btDiscreteDynamicsWorld> made_world;
+  btDiscreteDynamicsWorld& world = *made_world;
   std::vector<std::string> log;  ///< what callbacks heard of this world
 };
 

@@ -1,6 +1,7 @@
 /// A jfpx::Scene as a complete Bullet world that steps by itself.
 #pragma once
 
+#include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dispatcher.hpp>
 #include <jfpx/scene.hpp>
 
@@ -13,10 +14,13 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 
 enum class DispatcherKind : std::uint8_t { stock, jfpx };
+enum class SolverKind : std::uint8_t { stock, jfpx };
 
 struct SceneWorldOptions {
   DispatcherKind dispatcher = DispatcherKind::jfpx;
   DispatcherOptions dispatch = {};   ///< for DispatcherKind::jfpx
+  SolverKind solver = SolverKind::jfpx;
+  ConstraintSolverOptions solve = {};  ///< for SolverKind::jfpx
   bool share_shapes = true;          ///< one btSphereShape a radius, one btBoxShape a size
   bool deterministic_pairs = false;  ///< btDispatcherInfo::m_deterministicOverlappingPairs
 };
@@ -31,8 +35,8 @@ struct StageTimes {
   double total = 0;
 };
 
-/// Owns a btDiscreteDynamicsWorld made from a scene, with Bullet's default configuration, solver
-/// and dynamic tree broadphase. What a body of the scene becomes:
+/// Owns a btDiscreteDynamicsWorld made from a scene, with Bullet's default configuration and
+/// dynamic tree broadphase. What a body of the scene becomes:
 /// - mass 0 is a static body; a half-space is a static plane and follows no pose;
 /// - a kinematic body is one of Bullet's, moved by its velocities before each step;
 /// - a given inertia must be diagonal, for Bullet keeps moments about the axes of the shape;
@@ -70,6 +74,8 @@ class JFPX_API SceneWorld {
   /// Null for DispatcherKind::stock.
   CollisionDispatcher* jfpx_dispatcher() noexcept;
   const CollisionDispatcher* jfpx_dispatcher() const noexcept;
+  /// Null for SolverKind::stock.
+  const ConstraintSolver* jfpx_solver() const noexcept;
   /// The Bullet bodies, in the order of the scene's.
   std::span<btRigidBody* const> bodies() const noexcept;
 

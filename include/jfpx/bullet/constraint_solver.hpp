@@ -1,0 +1,74 @@
+/// The constraint solver that puts jfpx into a Bullet program: one line changes, every bit stays.
+#pragma once
+
+#include <jfpx/sphere_collider.hpp>
+
+#include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+struct ConstraintSolverOptions {
+  unsigned threads = 1;                   ///< 0: one per core, at most 256
+  SimdLevel simd = SimdLevel::automatic;  ///< vectors of rows: AVX2 or none
+  /// Manifolds below which a group is left to Bullet's own code.
+  std::size_t minimum_batch = 24;
+};
+
+/// Why a group was left to Bullet's own code.
+enum class SolverFallback : std::uint8_t {
+  small,        ///< fewer manifolds than the minimum
+  mode,         ///< random order, two directions of friction or cached ones; no iterations
+  row_solver,   ///< the user has set a row solver
+  constraints,  ///< a constraint of a type that is not Bullet's
+  rolling,      ///< a contact with rolling friction
+  not_finite,   ///< something left the finite numbers: done again by Bullet, for its NaNs
+};
+inline constexpr std::size_t kSolverFallbacks = 6;
+
+struct ConstraintSolverStats {
+  std::uint64_t groups = 0;                                 ///< solved by jfpx
+  std::uint64_t contacts = 0;                               ///< in these
+  std::uint64_t joints = 0;                                 ///< constraints in these
+  std::uint64_t sweeps = 0;                                 ///< over their rows
+  std::array<std::uint64_t, kSolverFallbacks> fallbacks{};  ///< groups, by SolverFallback
+};
+
+/// A btSequentialImpulseConstraintSolver that solves independent rows side by side, in vectors and
+/// threads. Velocities, transforms, impulses, directions of friction and analytics are those of
+/// btSequentialImpulseConstraintSolver, bit for bit: rows depend on each other only through bodies
+/// that move, and each body meets its rows in Bullet's order.
+///
+/// Groups that it does not cover are solved by the base class; stats() says how often and why.
+/// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
+/// As in Bullet, one thread at a time; different solvers are independent.
+class JFPX_API ConstraintSolver : public btSequentialImpulseConstraintSolver {
+ public:
+  BT_DECLARE_ALIGNED_ALLOCATOR();
+
+  /// @throws InvalidArgument for more than 256 threads.
+  explicit ConstraintSolver(const ConstraintSolverOptions& options = {});
+  ~ConstraintSolver() override;
+  ConstraintSolver(const ConstraintSolver&) = delete;
+  ConstraintSolver& operator=(const ConstraintSolver&) = delete;
+
+  btScalar solveGroup(btCollisionObject** bodies, int body_count, btPersistentManifold** manifolds,
+                      int manifold_count, btTypedConstraint** constraints, int constraint_count,
+                      const btContactSolverInfo& info, btIDebugDraw* debug_drawer,
+                      btDispatcher* dispatcher) override;
+
+  std::size_t minimum_batch() const noexcept;
+  void set_minimum_batch(std::size_t manifolds) noexcept;
+
+  const ConstraintSolverStats& stats() const noexcept;
+  void reset_stats() noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

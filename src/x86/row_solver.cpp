@@ -1,0 +1,291 @@
+/// Scheduling and running the sweeps; see the header.
+#include "src/x86/row_solver.hpp"
+
+#include "src/x86/cpu.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace jfpx::inline JFPX_ABI::x86 {
+namespace {
+
+/// Blocks that a thread takes at a time: about a microsecond's work, ten times what taking costs.
+constexpr std::uint32_t kTicketBlocks = 12;
+/// With fewer blocks than this waking a second thread costs more than it helps.
+constexpr std::uint32_t kBlocksPerThread = 64;
+
+const RowKernels& row_kernels(SimdLevel simd) {
+  return usable_simd_level(simd) >= SimdLevel::avx2 ? kAvx2RowKernels : kScalarRowKernels;
+}
+
+bool all_finite(const Real* values, std::size_t count) {
+  bool finite = true;
+  for (std::size_t i = 0; i < count; ++i) {
+    finite &= std::abs(values[i]) <= std::numeric_limits<Real>::max();
+  }
+  return finite;
+}
+
+/// Waits for other threads, which may have to wait for a processor themselves.
+template <class Condition>
+void wait_until(Condition condition) {
+  for (int spins = 0; !condition(); ++spins) {
+    if (spins < 1000) {
+      __builtin_ia32_pause();
+    } else {
+      std::this_thread::yield();
+    }
+  }
+}
+
+}  // namespace
+
+/// Passes over the blocks, repeated until the residual is small. Tickets are numbered through all
+/// passes and iterations and taken in order, so that whoever holds one only ever waits for lower
+/// ones, which are held by running threads or done.
+struct RowSolver::Program {
+  RowArrays arrays;
+  RowSweep passes[2] = {};
+  std::uint64_t pass_count = 0;
+  const Ticket* tickets = nullptr;
+  std::uint64_t ticket_count = 0;
+  std::uint64_t iterations = 0;
+  Real threshold = -1;
+  std::atomic<Real>* residuals = nullptr;  ///< one an iteration
+  std::atomic<std::uint64_t> next{0}, done{0};
+  std::atomic<bool> broken{false};
+
+  std::uint64_t tickets_an_iteration() const { return pass_count * ticket_count; }
+
+  void join() {
+    const std::uint64_t per_iteration = tickets_an_iteration();
+    for (;;) {
+      const std::uint64_t number = next.fetch_add(1, std::memory_order_relaxed);
+      const std::uint64_t iteration = per_iteration == 0 ? iterations : number / per_iteration;
+      if (iteration >= iterations) return;
+      const std::uint64_t start = iteration * per_iteration;
+      wait_until([&] { return done.load(std::memory_order_acquire) >= start; });
+      if (iteration > 0 && is_last(iteration - 1)) return;
+      const std::uint64_t pass = (number - start) / ticket_count;
+      const Ticket& ticket = tickets[(number - start) % ticket_count];
+      const std::uint64_t after = start + pass * ticket_count + ticket.after;
+      wait_until([&] { return done.load(std::memory_order_acquire) >= after; });
+      RowResidual residual;
+      passes[pass](arrays, ticket.first, ticket.last, &residual);
+      if (residual.broken) broken.store(true, std::memory_order_relaxed);
+      raise(residuals + iteration, residual.largest);
+      done.fetch_add(1, std::memory_order_release);
+    }
+  }
+  bool is_last(std::uint64_t iteration) const {
+    return iteration + 1 == iterations ||
+           residuals[iteration].load(std::memory_order_relaxed) <= threshold;
+  }
+  int iterations_done() const {
+    if (iterations == 0) return 0;
+    std::uint64_t i = 0;
+    while (!is_last(i)) ++i;
+    return static_cast<int>(i) + 1;
+  }
+  static void raise(std::atomic<Real>* value, Real to) {
+    Real now = value->load(std::memory_order_relaxed);
+    while (to > now && !value->compare_exchange_weak(now, to, std::memory_order_relaxed)) {
+    }
+  }
+};
+
+RowSolver::RowSolver(unsigned threads, SimdLevel simd)
+    : kernels_(row_kernels(simd)), pool_(threads) {}
+
+void RowSolver::resize_bodies(std::size_t count) {
+  bodies_.reserve(count * rows::kBodyFields, "bodies of a solver", body_count_ * rows::kBodyFields);
+  velocities_.reserve(count * rows::kVelocityFields, "velocities of a solver",
+                      body_count_ * rows::kVelocityFields);
+  pushes_.reserve(count * rows::kVelocityFields, "velocities of a solver",
+                  body_count_ * rows::kVelocityFields);
+  factors_.reserve(count * rows::kFactorFields, "factors of a solver",
+                   body_count_ * rows::kFactorFields);
+  body_count_ = count;
+  std::fill_n(body(0), rows::kBodyFields, Real(0));
+  std::fill_n(velocity(0), rows::kVelocityFields, Real(0));
+  std::fill_n(push(0), rows::kVelocityFields, Real(0));
+  std::fill_n(factors(0), rows::kFactorFields, Real(0));
+}
+
+// A contact's level is one more than the highest of those before it that move one of its bodies.
+// Rows of a level are independent, and level by level is an order that keeps each body's.
+void RowSolver::schedule(std::span<const RowPair> pairs) {
+  const auto slot = [](std::int32_t id) { return static_cast<std::size_t>(id); };
+  const std::uint32_t lanes = kernels_.lanes;
+  contact_level_.reserve(pairs.size(), "contacts of a solver");
+  level_count_.reserve(pairs.size(), "contacts of a solver");
+  level_end_.reserve(pairs.size(), "contacts of a solver");
+  body_level_.reserve(body_count_, "bodies of a solver");
+  std::fill_n(body_level_.data(), body_count_, 0u);
+  levels_ = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto [a, b] = pairs[i];
+    std::uint32_t level = 0;
+    if (a >= 0) level = body_level_[slot(a)];
+    if (b >= 0) level = std::max(level, body_level_[slot(b)]);
+    if (a >= 0) body_level_[slot(a)] = level + 1;
+    if (b >= 0) body_level_[slot(b)] = level + 1;
+    contact_level_[i] = level;
+    if (level == levels_) level_count_[levels_++] = 0;
+    ++level_count_[level];
+  }
+  blocks_ = 0;
+  for (std::uint32_t level = 0; level < levels_; ++level) {
+    const std::uint32_t first = blocks_;
+    blocks_ += (level_count_[level] + lanes - 1) / lanes;
+    level_end_[level] = blocks_;
+    level_count_[level] = first * lanes;  // from here on: the level's next free lane
+  }
+  const std::size_t places = std::size_t{blocks_} * lanes;
+  order_.reserve(places, "contacts of a solver");
+  ids_.reserve(2 * places, "contacts of a solver");
+  contacts_.reserve(places * rows::kContactFields, "rows of a solver");
+  frictions_.reserve(places * rows::kFrictionFields, "rows of a solver");
+  std::fill_n(order_.data(), places, kNoContact);
+  std::fill_n(ids_.data(), 2 * places, rows::kFixedBody);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const std::uint32_t place = level_count_[contact_level_[i]]++;
+    order_[place] = static_cast<std::uint32_t>(i);
+    std::int32_t* ids = ids_.data() + std::size_t{place / lanes} * 2 * lanes + place % lanes;
+    ids[0] = pairs[i].a;
+    ids[lanes] = pairs[i].b;
+  }
+  make_tickets({level_end_.data(), levels_}, &tickets_, &ticket_count_);
+}
+
+// Long levels are cut, so that threads share them; a run of short levels becomes one ticket,
+// because one thread alone is done with them sooner than several that wait for each other.
+void RowSolver::make_tickets(std::span<const std::uint32_t> level_ends, Buffer<Ticket>* tickets,
+                             std::uint32_t* count) {
+  const std::uint32_t total = level_ends.empty() ? 0 : level_ends.back();
+  tickets->reserve(total, "tickets of a solver");
+  *count = 0;
+  const auto add = [&](std::uint32_t first, std::uint32_t last, std::uint32_t after) {
+    (*tickets)[(*count)++] = {first, last, after};
+  };
+  std::uint32_t first = 0, begin = 0;  // of the run of short levels; of the level
+  const auto flush = [&](std::uint32_t end) {
+    if (first < end) add(first, end, *count);
+  };
+  for (const std::uint32_t end : level_ends) {
+    if (end - begin > kTicketBlocks) {
+      flush(begin);
+      const std::uint32_t after = *count;
+      for (std::uint32_t i = begin; i < end; i += kTicketBlocks) {
+        add(i, std::min(end, i + kTicketBlocks), after);
+      }
+      first = end;
+    } else if (end - first >= kTicketBlocks) {
+      flush(end);
+      first = end;
+    }
+    begin = end;
+  }
+  flush(total);
+}
+
+unsigned RowSolver::set_up_contacts(const rows::RowSettings& settings, std::uint32_t block,
+                                    const Real* inputs, Real* second) {
+  return kernels_.set_up_contacts(settings, inputs, bodies_.data(),
+                                  ids_.data() + std::size_t{block} * 2 * kernels_.lanes,
+                                  contact_rows(block), friction_rows(block), second);
+}
+void RowSolver::set_up_frictions(const rows::RowSettings& settings, std::uint32_t block,
+                                 const Real* inputs) {
+  kernels_.set_up_frictions(settings, inputs, bodies_.data(),
+                            ids_.data() + std::size_t{block} * 2 * kernels_.lanes,
+                            friction_rows(block));
+}
+
+/// Most contacts are not deep enough to be pushed apart: only blocks with one that is are swept.
+std::uint64_t RowSolver::find_pushes() {
+  push_blocks_.reserve(blocks_, "rows of a solver");
+  push_level_end_.reserve(levels_, "rows of a solver");
+  push_blocks_count_ = 0;
+  std::uint64_t pushing = 0;
+  std::uint32_t block = 0, levels = 0;
+  for (std::uint32_t level = 0; level < levels_; ++level) {
+    const std::uint32_t before = push_blocks_count_;
+    for (; block < level_end_[level]; ++block) {
+      const Real* rhs = contact_rows(block) + std::size_t{rows::kRowPushRhs} * kernels_.lanes;
+      const auto here = std::count_if(rhs, rhs + kernels_.lanes, [](Real r) { return r != 0; });
+      if (here > 0) push_blocks_[push_blocks_count_++] = block;
+      pushing += static_cast<std::uint64_t>(here);
+    }
+    if (push_blocks_count_ > before) push_level_end_[levels++] = push_blocks_count_;
+  }
+  make_tickets({push_level_end_.data(), levels}, &push_tickets_, &push_ticket_count_);
+  return pushing;
+}
+
+RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_factors) {
+  const std::size_t factors = with_factors ? 1 : 0;
+  const std::uint64_t pushing = settings.push ? find_pushes() : 0;
+  const auto iterations = static_cast<std::size_t>(std::max(settings.iterations, 0));
+  if (2 * iterations + 1 > residual_capacity_) {
+    residual_capacity_ = 2 * iterations + 1;
+    residuals_ = std::make_unique<std::atomic<Real>[]>(residual_capacity_);
+  }
+  for (std::size_t i = 0; i < 2 * iterations + 1; ++i) residuals_[i] = 0;
+
+  RowArrays arrays{.ids = ids_.data(),
+                   .velocities = velocities_.data(),
+                   .pushes = pushes_.data(),
+                   .factors = with_factors ? factors_.data() : nullptr,
+                   .contacts = contacts_.data(),
+                   .frictions = frictions_.data(),
+                   .push_blocks = push_blocks_.data()};
+  Program warm, push, main;
+  for (Program* program : {&warm, &push, &main}) {
+    program->arrays = arrays;
+    program->pass_count = 1;
+    program->tickets = tickets_.data();
+    program->ticket_count = ticket_count_;
+    program->iterations = iterations;
+    program->threshold = settings.threshold;
+  }
+  warm.passes[0] = kernels_.warm_starts[factors];
+  warm.iterations = settings.warm_start ? 1 : 0;
+  warm.residuals = residuals_.get() + 2 * iterations;
+  push.passes[0] = kernels_.pushes[factors];
+  push.tickets = push_tickets_.data();
+  push.ticket_count = push_ticket_count_;
+  push.iterations = pushing > 0 ? iterations : 0;
+  push.residuals = residuals_.get() + iterations;
+  main.residuals = residuals_.get();
+  if (settings.interleave) {
+    main.passes[0] = kernels_.both[factors];
+  } else {
+    main.passes[0] = kernels_.contacts[factors];
+    main.passes[1] = kernels_.frictions[factors];
+    main.pass_count = 2;
+  }
+  pool_.run(std::clamp(blocks_ / kBlocksPerThread, 1u, pool_.threads()), [&](std::size_t) {
+    warm.join();
+    push.join();
+    wait_until([&] {
+      return warm.done.load(std::memory_order_acquire) >=
+             warm.iterations * warm.tickets_an_iteration();
+    });
+    main.join();
+  });
+
+  RowSweepReport report;
+  report.iterations = main.iterations_done();
+  if (report.iterations > 0) {
+    report.residual = residuals_[static_cast<std::size_t>(report.iterations) - 1];
+  }
+  report.pushed = pushing * static_cast<std::uint64_t>(push.iterations_done());
+  const std::size_t numbers = body_count_ * rows::kVelocityFields;
+  report.broken = main.broken || push.broken || !all_finite(velocities_.data(), numbers) ||
+                  !all_finite(pushes_.data(), numbers);
+  return report;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::x86

@@ -1,0 +1,103 @@
+/// Sweeps of sequential impulses over contact rows, in an order that gives the bits of the serial
+/// one: rows that share no moving body run side by side, in vectors and in threads.
+#pragma once
+
+#include <jfpx/sphere_collider.hpp>
+
+#include "src/x86/buffer.hpp"
+#include "src/x86/row_kernels.hpp"
+#include "src/x86/thread_pool.hpp"
+
+#include <atomic>
+#include <memory>
+#include <span>
+
+namespace jfpx::inline JFPX_ABI::x86 {
+
+/// The bodies of a contact: ids, complemented for bodies that no row moves.
+struct RowPair {
+  std::int32_t a, b;
+};
+
+struct RowSweepSettings {
+  int iterations = 10;
+  Real threshold = 0;       ///< sweeps end when the largest squared residual is no larger
+  bool interleave = false;  ///< each contact's friction right after it
+  bool warm_start = false;  ///< begin with the impulses in the rows
+  bool push = true;         ///< the sweeps against penetration too
+};
+
+struct RowSweepReport {
+  int iterations = 0;        ///< sweeps done
+  Real residual = 0;         ///< the largest squared one of the last sweep
+  std::uint64_t pushed = 0;  ///< rows solved against penetration, over all sweeps
+  bool broken = false;       ///< something left the finite numbers: the result is worth nothing
+};
+
+/// Owns its buffers, which only grow. To be used in the order of its functions; one thread at a
+/// time.
+class JFPX_API RowSolver {
+ public:
+  /// @param threads 0: one per core
+  explicit RowSolver(unsigned threads = 1, SimdLevel simd = SimdLevel::automatic);
+
+  ThreadPool& pool() noexcept { return pool_; }
+  unsigned lanes() const noexcept { return kernels_.lanes; }
+
+  /// Room for bodies [0, count); body 0 is set to Bullet's fixed one, the others must be filled.
+  void resize_bodies(std::size_t count);
+  Real* body(std::size_t i) { return bodies_.data() + i * rows::kBodyFields; }
+  Real* velocity(std::size_t i) { return velocities_.data() + i * rows::kVelocityFields; }
+  Real* push(std::size_t i) { return pushes_.data() + i * rows::kVelocityFields; }
+  Real* factors(std::size_t i) { return factors_.data() + i * rows::kFactorFields; }
+
+  /// Arranges the contacts, given in their serial order, in blocks.
+  void schedule(std::span<const RowPair> pairs);
+  std::uint32_t blocks() const noexcept { return blocks_; }
+  /// Which contact is in a lane; kNoContact in lanes that are left over.
+  static constexpr std::uint32_t kNoContact = UINT32_MAX;
+  const std::uint32_t* contacts_of(std::uint32_t block) const {
+    return order_.data() + std::size_t{block} * kernels_.lanes;
+  }
+  Real* contact_rows(std::uint32_t block) {
+    return contacts_.data() + std::size_t{block} * kernels_.lanes * rows::kContactFields;
+  }
+  Real* friction_rows(std::uint32_t block) {
+    return frictions_.data() + std::size_t{block} * kernels_.lanes * rows::kFrictionFields;
+  }
+
+  /// Sets up the contact rows of a block from its inputs. Safe for different blocks at once.
+  unsigned set_up_contacts(const rows::RowSettings& settings, std::uint32_t block,
+                           const Real* inputs, Real* second);
+  void set_up_frictions(const rows::RowSettings& settings, std::uint32_t block, const Real* inputs);
+
+  /// @param factors whether some body has a linear or angular factor other than 1
+  RowSweepReport solve(const RowSweepSettings& settings, bool factors);
+
+ private:
+  /// A range of blocks that one thread runs in one go, once all tickets before `after` are done.
+  struct Ticket {
+    std::uint32_t first, last, after;
+  };
+  struct Program;
+
+  void make_tickets(std::span<const std::uint32_t> level_ends, Buffer<Ticket>* tickets,
+                    std::uint32_t* count);
+  std::uint64_t find_pushes();
+
+  const RowKernels& kernels_;
+  ThreadPool pool_;
+  std::uint32_t blocks_ = 0, push_blocks_count_ = 0;
+  std::uint32_t ticket_count_ = 0, push_ticket_count_ = 0;
+  std::size_t body_count_ = 0;
+  std::uint32_t levels_ = 0;
+  Buffer<Real> bodies_, velocities_, pushes_, factors_, contacts_, frictions_;
+  Buffer<std::int32_t> ids_;
+  Buffer<std::uint32_t> order_, body_level_, contact_level_, level_count_, level_end_;
+  Buffer<std::uint32_t> push_blocks_, push_level_end_;
+  Buffer<Ticket> tickets_, push_tickets_;
+  std::unique_ptr<std::atomic<Real>[]> residuals_;
+  std::size_t residual_capacity_ = 0;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::x86

@@ -1,0 +1,61 @@
+/// Random worlds with all that a constraint solver meets: joints of every type, solver settings
+/// that change, factors, gyroscopic forces, heaps. Run with Bullet's parts and with others.
+#pragma once
+
+#include "tests/bullet/random_world.hpp"
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+inline constexpr std::uint64_t kJointKinds = 11;
+
+struct SolverJoint {
+  std::uint64_t kind = 0;  ///< below kJointKinds
+  std::size_t a = 0, b = 0;
+  bool alone = false;  ///< of body a and the world, where the type can be
+  bool collide = true;
+  bool limits = false, motor = false, feedback = false;
+  int iterations = -1;  ///< override
+  Real breaking = Real(1e30);
+  Real low = 0, high = 0, speed = 0, strength = 0;
+};
+
+/// Bullet's solver settings from a step on.
+struct SolverChange {
+  int step = 0;
+  btContactSolverInfo info;
+};
+
+/// What a body has beyond a RandomBody.
+struct SolverBody {
+  Vec3 linear_factor = {1, 1, 1}, angular_factor = {1, 1, 1};
+  int gyroscopic = 0;  ///< flags; 0: Bullet's default
+  Real linear_damping = 0;
+  bool massive = false;  ///< kinematic with a mass
+};
+
+struct SolverWorld {
+  RandomWorld base;
+  std::vector<SolverBody> bodies;
+  std::vector<SolverJoint> joints;
+  std::vector<SolverChange> changes;
+  unsigned threads = 1;
+  bool vectors = true;  ///< else the plain kernels
+};
+
+SolverWorld make_solver_world(std::uint64_t seed);
+std::ostream& operator<<(std::ostream& out, const SolverWorld& world);
+
+struct SolverTotals {
+  std::uint64_t steps = 0, groups = 0, contacts = 0, joints = 0, fallbacks[8] = {};
+};
+
+/// The parts under test. The dispatcher is Bullet's in both worlds if `ours` is false.
+using MakeParts = WorldParts (*)(const SolverWorld&);
+WorldParts our_solver(const SolverWorld& world);
+
+std::optional<Failure> run(const SolverWorld& world, SolverTotals* totals,
+                           MakeParts parts = our_solver, MakeDispatcher dispatcher = make_stock);
+/// Takes away steps, bodies, joints, events and changes for as long as the world fails.
+SolverWorld shrink(SolverWorld world, MakeParts parts, MakeDispatcher dispatcher = make_stock);
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
