@@ -5,6 +5,7 @@
 #include "src/bullet/contact_scan.hpp"
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <LinearMath/btQuickprof.h>
 
 #include <algorithm>
 #include <atomic>
@@ -137,20 +138,9 @@ struct ConstraintSolver::Impl {
 
   /// @return why it could not be; all that Bullet's solver reads is then as it was
   std::optional<SolverFallback> solve(std::span<btPersistentManifold* const> manifolds) {
-    settings = row_settings(*info);
-    set_up_bodies();
-    if (!scan.run(solver.pool(), manifolds, marks)) return SolverFallback::rolling;
-    set_up_late_bodies(manifolds);
-    solver.schedule(scan.pairs());
-    set_up_contacts();
-    const x86::RowSweepReport report = solver.solve(
-        {.iterations = info->m_numIterations,
-         .threshold = info->m_leastSquaresResidualThreshold,
-         .interleave =
-             (info->m_solverMode & SOLVER_INTERLEAVE_CONTACT_AND_FRICTION_CONSTRAINTS) != 0,
-         .warm_start = warm,
-         .push = settings.split},
-        factors);
+    BT_PROFILE("solveGroup");  // here and below: Bullet's own names, for those who profile
+    if (!set_up(manifolds)) return SolverFallback::rolling;
+    const x86::RowSweepReport report = sweep();
     if (report.broken) {
       for (const LateBody& late : scan.late()) late.object->setCompanionId(late.companion);
       return SolverFallback::not_finite;
@@ -164,7 +154,36 @@ struct ConstraintSolver::Impl {
     return std::nullopt;
   }
 
+  bool set_up(std::span<btPersistentManifold* const> manifolds) {
+    BT_PROFILE("solveGroupCacheFriendlySetup");
+    settings = row_settings(*info);
+    set_up_bodies();
+    {
+      BT_PROFILE("find contacts");
+      if (!scan.run(solver.pool(), manifolds, marks)) return false;
+      set_up_late_bodies(manifolds);
+    }
+    {
+      BT_PROFILE("schedule contacts");
+      solver.schedule(scan.pairs());
+    }
+    set_up_contacts();
+    return true;
+  }
+
+  x86::RowSweepReport sweep() {
+    BT_PROFILE("solveGroupCacheFriendlyIterations");
+    return solver.solve({.iterations = info->m_numIterations,
+                         .threshold = info->m_leastSquaresResidualThreshold,
+                         .interleave = (info->m_solverMode &
+                                        SOLVER_INTERLEAVE_CONTACT_AND_FRICTION_CONSTRAINTS) != 0,
+                         .warm_start = warm,
+                         .push = settings.split},
+                        factors);
+  }
+
   void set_up_bodies() {
+    BT_PROFILE("convertBodies");
     const std::size_t count = bodies.size();
     self.m_tmpSolverBodyPool.resizeNoInitialize(0);
     self.m_tmpSolverBodyPool.reserve(static_cast<int>(count) + 1);
@@ -251,6 +270,7 @@ struct ConstraintSolver::Impl {
   }
 
   void set_up_contacts() {
+    BT_PROFILE("set up contacts");
     const std::size_t chunks = (solver.blocks() + kBlocksAChunk - 1) / kBlocksAChunk;
     solver.pool().run(chunks, [&](std::size_t chunk) {
       const auto last = static_cast<std::uint32_t>(
@@ -323,6 +343,7 @@ struct ConstraintSolver::Impl {
   }
 
   void write_back() {
+    BT_PROFILE("solveGroupCacheFriendlyFinish");
     if (settings.warm_start) {
       const std::size_t chunks = (solver.blocks() + kBlocksAChunk - 1) / kBlocksAChunk;
       solver.pool().run(chunks, [&](std::size_t chunk) {

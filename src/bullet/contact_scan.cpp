@@ -1,6 +1,7 @@
 /// Walks manifolds in chunks; see the header.
 #include "src/bullet/contact_scan.hpp"
 
+#include "src/bullet/prefetch.hpp"
 
 #include <algorithm>
 
@@ -9,22 +10,6 @@ namespace {
 
 constexpr std::size_t kChunk = 512;        ///< manifolds
 constexpr std::int32_t kLate = INT32_MIN;  ///< in place of an id: a late body
-constexpr std::ptrdiff_t kFarAhead = 16, kAhead = 6;
-
-/// Manifolds and bodies lie scattered: what is needed next is asked for early. Where the companion
-/// id of a body lies is private, so this is a guess, which costs nothing if it is wrong.
-constexpr std::ptrdiff_t kCompanionGuess = sizeof(btScalar) == 4 ? 232 : 416;
-
-void prefetch_manifold(const btPersistentManifold* manifold) {
-  const char* end = reinterpret_cast<const char*>(manifold + 1);
-  __builtin_prefetch(end - 48);
-  __builtin_prefetch(end - 1);
-  __builtin_prefetch(&manifold->getContactPoint(0).m_distance1);
-}
-void prefetch_bodies(const btPersistentManifold* manifold) {
-  __builtin_prefetch(reinterpret_cast<const char*>(manifold->getBody0()) + kCompanionGuess);
-  __builtin_prefetch(reinterpret_cast<const char*>(manifold->getBody1()) + kCompanionGuess);
-}
 
 bool is_light(const btRigidBody& body) {
   const btScalar inverse = body.getInvMass();
@@ -110,8 +95,14 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
   std::uint32_t count = 0;
   bool rolling = false, late = false;
   for (std::size_t i = first; i < last; ++i) {
-    if (i + kFarAhead < last) prefetch_manifold(manifolds[i + kFarAhead]);
-    if (i + kAhead < last) prefetch_bodies(manifolds[i + kAhead]);
+    if (i + kManifoldsAhead < last) {
+      prefetch_header(manifolds[i + kManifoldsAhead]);
+      __builtin_prefetch(&manifolds[i + kManifoldsAhead]->getContactPoint(0).m_distance1);
+    }
+    if (i + kObjectsAhead < last) {
+      prefetch_state(manifolds[i + kObjectsAhead]->getBody0());
+      prefetch_state(manifolds[i + kObjectsAhead]->getBody1());
+    }
     btPersistentManifold* manifold = manifolds[i];
     const int points = manifold->getNumContacts();
     const Side a = side_of(object_of(manifold->getBody0()), marks);

@@ -1,4 +1,5 @@
 /// Builds a Bullet world from a scene.
+#include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/bullet/scene_world.hpp>
 #include <jfpx/error.hpp>
 
@@ -139,6 +140,20 @@ std::unique_ptr<btSequentialImpulseConstraintSolver> make_solver(const SceneWorl
   return std::make_unique<ConstraintSolver>(options.solve);
 }
 
+std::unique_ptr<btDiscreteDynamicsWorld> make_world(btCollisionDispatcher* dispatcher,
+                                                    btBroadphaseInterface* broadphase,
+                                                    btConstraintSolver* solver,
+                                                    btCollisionConfiguration* configuration,
+                                                    const SceneWorldOptions& options,
+                                                    StageTimes* times) {
+  if (options.world == WorldKind::stock) {
+    return std::make_unique<TimedWorld<btDiscreteDynamicsWorld>>(times, dispatcher, broadphase,
+                                                                 solver, configuration);
+  }
+  return std::make_unique<TimedWorld<DynamicsWorld>>(times, dispatcher, broadphase, solver,
+                                                     configuration, options.step);
+}
+
 }  // namespace
 
 /// Members in the order in which Bullet needs them to be made, and so destroyed in reverse.
@@ -151,22 +166,24 @@ struct SceneWorld::Impl {
   std::unique_ptr<btSequentialImpulseConstraintSolver> solver;
   std::vector<std::unique_ptr<btRigidBody>> owned;
   std::vector<btRigidBody*> bodies;
-  TimedWorld world;
+  StageTimes times;
+  std::unique_ptr<btDiscreteDynamicsWorld> world;
 
   Impl(const Scene& source, const SceneWorldOptions& options)
       : scene(source),
         shapes(options.share_shapes),
         dispatcher(make_dispatcher(&configuration, options)),
         solver(make_solver(options)),
-        world(dispatcher.get(), &broadphase, solver.get(), &configuration) {
-    world.setGravity({0, 0, 0});
-    world.getDispatchInfo().m_deterministicOverlappingPairs = options.deterministic_pairs;
+        world(make_world(dispatcher.get(), &broadphase, solver.get(), &configuration, options,
+                         &times)) {
+    world->setGravity({0, 0, 0});
+    world->getDispatchInfo().m_deterministicOverlappingPairs = options.deterministic_pairs;
     for (const BodyDef& def : scene.bodies) {
       require_bullet(def, bodies.size());
       const bool can_sleep = scene.sleep.enabled && def.can_sleep;
       owned.push_back(make_body(def, scene.materials, shapes.get(def.shape), can_sleep));
       bodies.push_back(owned.back().get());
-      world.addRigidBody(bodies.back());
+      world->addRigidBody(bodies.back());
     }
   }
   /// As the native engine moves them; Bullet finds their velocities from the way.
@@ -208,7 +225,7 @@ void SceneWorld::step(Real dt) {
   }
   impl_->move_kinematic_bodies(dt);
   // No sub-steps: Bullet then makes one step of the full length and keeps no remainder.
-  impl_->world.stepSimulation(dt, 0, dt);
+  impl_->world->stepSimulation(dt, 0, dt);
 }
 void SceneWorld::step() { step(impl_->scene.dt); }
 
@@ -230,11 +247,11 @@ std::vector<BodyState> SceneWorld::states() const {
   return states;
 }
 std::uint64_t SceneWorld::state_hash() const { return jfpx::state_hash(states()); }
-const StageTimes& SceneWorld::last_step() const noexcept { return impl_->world.times(); }
+const StageTimes& SceneWorld::last_step() const noexcept { return impl_->times; }
 
 const Scene& SceneWorld::scene() const noexcept { return impl_->scene; }
-btDiscreteDynamicsWorld& SceneWorld::world() noexcept { return impl_->world; }
-const btDiscreteDynamicsWorld& SceneWorld::world() const noexcept { return impl_->world; }
+btDiscreteDynamicsWorld& SceneWorld::world() noexcept { return *impl_->world; }
+const btDiscreteDynamicsWorld& SceneWorld::world() const noexcept { return *impl_->world; }
 btCollisionDispatcher& SceneWorld::dispatcher() noexcept { return *impl_->dispatcher; }
 CollisionDispatcher* SceneWorld::jfpx_dispatcher() noexcept {
   return dynamic_cast<CollisionDispatcher*>(impl_->dispatcher.get());

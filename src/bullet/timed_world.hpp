@@ -1,4 +1,4 @@
-/// A btDiscreteDynamicsWorld that knows how long its stages take.
+/// A dynamics world that knows how long its stages take.
 #pragma once
 
 #include <jfpx/bullet/scene_world.hpp>
@@ -9,45 +9,47 @@ namespace jfpx::inline JFPX_ABI::bullet {
 
 /// Times the stages by overriding the virtual function of each. Bullet's profiler callbacks would
 /// do too, but they are global and belong to the user.
-class TimedWorld final : public btDiscreteDynamicsWorld {
+template <class World>
+class TimedWorld final : public World {
  public:
-  using btDiscreteDynamicsWorld::btDiscreteDynamicsWorld;
+  /// @param times outlives the world
+  template <class... Arguments>
+  explicit TimedWorld(StageTimes* times, const Arguments&... arguments)
+      : World(arguments...), times_(*times) {}
 
   int stepSimulation(btScalar dt, int max_sub_steps, btScalar fixed_dt) override {
     times_ = {};
     int sub_steps = 0;
-    time(&times_.total,
-         [&] { sub_steps = btDiscreteDynamicsWorld::stepSimulation(dt, max_sub_steps, fixed_dt); });
+    time(&times_.total, [&] { sub_steps = World::stepSimulation(dt, max_sub_steps, fixed_dt); });
     return sub_steps;
   }
   void updateAabbs() override {
-    time(&times_.broadphase, [&] { btDiscreteDynamicsWorld::updateAabbs(); });
+    time(&times_.broadphase, [&] { World::updateAabbs(); });
   }
   void computeOverlappingPairs() override {
-    time(&times_.broadphase, [&] { btDiscreteDynamicsWorld::computeOverlappingPairs(); });
+    time(&times_.broadphase, [&] { World::computeOverlappingPairs(); });
   }
   void performDiscreteCollisionDetection() override {
     const double broadphase = times_.broadphase;
-    time(&times_.dispatch, [&] { btDiscreteDynamicsWorld::performDiscreteCollisionDetection(); });
+    time(&times_.dispatch, [&] { World::performDiscreteCollisionDetection(); });
     times_.dispatch -= times_.broadphase - broadphase;
   }
   void solveConstraints(btContactSolverInfo& info) override {
-    time(&times_.solve, [&] { btDiscreteDynamicsWorld::solveConstraints(info); });
+    time(&times_.solve, [&] { World::solveConstraints(info); });
   }
-  const StageTimes& times() const { return times_; }
 
  protected:
   void predictUnconstraintMotion(btScalar dt) override {
-    time(&times_.integrate, [&] { btDiscreteDynamicsWorld::predictUnconstraintMotion(dt); });
+    time(&times_.integrate, [&] { World::predictUnconstraintMotion(dt); });
   }
   void integrateTransforms(btScalar dt) override {
-    time(&times_.integrate, [&] { btDiscreteDynamicsWorld::integrateTransforms(dt); });
+    time(&times_.integrate, [&] { World::integrateTransforms(dt); });
   }
   void updateActivationState(btScalar dt) override {
-    time(&times_.integrate, [&] { btDiscreteDynamicsWorld::updateActivationState(dt); });
+    time(&times_.integrate, [&] { World::updateActivationState(dt); });
   }
   void calculateSimulationIslands() override {
-    time(&times_.islands, [&] { btDiscreteDynamicsWorld::calculateSimulationIslands(); });
+    time(&times_.islands, [&] { World::calculateSimulationIslands(); });
   }
 
  private:
@@ -60,7 +62,7 @@ class TimedWorld final : public btDiscreteDynamicsWorld {
     *milliseconds += taken.count();
   }
 
-  StageTimes times_;
+  StageTimes& times_;
 };
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -16,50 +16,53 @@ namespace jfpx::inline JFPX_ABI::rows {
 //
 // `S` says what a number is: S::Vec holds S::kLanes of them, S::Mask one truth each.
 
+// Vectors passed through memory would cost more than the arithmetic.
+#define JFPX_ROW [[gnu::always_inline]] inline
+
 template <class S>
 struct Vec3Of {
   using V = typename S::Vec;
   V x, y, z;
 
-  friend Vec3Of operator+(const Vec3Of& a, const Vec3Of& b) {
+  JFPX_ROW friend Vec3Of operator+(const Vec3Of& a, const Vec3Of& b) {
     return {a.x + b.x, a.y + b.y, a.z + b.z};
   }
-  friend Vec3Of operator-(const Vec3Of& a, const Vec3Of& b) {
+  JFPX_ROW friend Vec3Of operator-(const Vec3Of& a, const Vec3Of& b) {
     return {a.x - b.x, a.y - b.y, a.z - b.z};
   }
-  friend Vec3Of operator*(const Vec3Of& a, V s) { return {a.x * s, a.y * s, a.z * s}; }
-  friend Vec3Of operator*(const Vec3Of& a, const Vec3Of& b) {
+  JFPX_ROW friend Vec3Of operator*(const Vec3Of& a, V s) { return {a.x * s, a.y * s, a.z * s}; }
+  JFPX_ROW friend Vec3Of operator*(const Vec3Of& a, const Vec3Of& b) {
     return {a.x * b.x, a.y * b.y, a.z * b.z};
   }
-  friend Vec3Of operator-(const Vec3Of& a) {
+  JFPX_ROW friend Vec3Of operator-(const Vec3Of& a) {
     return {S::negate(a.x), S::negate(a.y), S::negate(a.z)};
   }
 };
 
 template <class S>
-typename S::Vec dot(const Vec3Of<S>& a, const Vec3Of<S>& b) {
+JFPX_ROW typename S::Vec dot(const Vec3Of<S>& a, const Vec3Of<S>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <class S>
-Vec3Of<S> cross(const Vec3Of<S>& a, const Vec3Of<S>& b) {
+JFPX_ROW Vec3Of<S> cross(const Vec3Of<S>& a, const Vec3Of<S>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 /// `v` where the mask holds, else +0.
 template <class S>
-Vec3Of<S> keep(typename S::Mask mask, const Vec3Of<S>& v) {
+JFPX_ROW Vec3Of<S> keep(typename S::Mask mask, const Vec3Of<S>& v) {
   return {S::keep(mask, v.x), S::keep(mask, v.y), S::keep(mask, v.z)};
 }
 template <class S>
-Vec3Of<S> select(typename S::Mask mask, const Vec3Of<S>& a, const Vec3Of<S>& b) {
+JFPX_ROW Vec3Of<S> select(typename S::Mask mask, const Vec3Of<S>& a, const Vec3Of<S>& b) {
   return {S::select(mask, a.x, b.x), S::select(mask, a.y, b.y), S::select(mask, a.z, b.z)};
 }
 template <class S>
-Vec3Of<S> load3(const Real* fields) {
+JFPX_ROW Vec3Of<S> load3(const Real* fields) {
   constexpr int kLanes = S::kLanes;
   return {S::load(fields), S::load(fields + kLanes), S::load(fields + 2 * kLanes)};
 }
 template <class S>
-void store3(Real* fields, const Vec3Of<S>& v) {
+JFPX_ROW void store3(Real* fields, const Vec3Of<S>& v) {
   constexpr int kLanes = S::kLanes;
   S::store(fields, v.x);
   S::store(fields + kLanes, v.y);
@@ -75,18 +78,20 @@ struct BodyOf {
   V3 inertia[3];  ///< rows of the inverse inertia tensor
   typename S::Vec inverse_mass;
 
-  V3 angular_response(const V3& torque) const {
+  JFPX_ROW V3 angular_response(const V3& torque) const {
     const V3 turned = {dot(inertia[0], torque), dot(inertia[1], torque), dot(inertia[2], torque)};
     return keep<S>(real, turned * angular_factor);
   }
-  V3 velocity_at(const V3& arm) const { return keep<S>(real, linear + cross(angular, arm)); }
-  V3 forced_velocity_at(const V3& arm) const {
+  JFPX_ROW V3 velocity_at(const V3& arm) const {
+    return keep<S>(real, linear + cross(angular, arm));
+  }
+  JFPX_ROW V3 forced_velocity_at(const V3& arm) const {
     return keep<S>(real, forced_linear + cross(forced_angular, arm));
   }
 };
 
 template <class S>
-BodyOf<S> gather_body(const Real* bodies, const std::int32_t* ids) {
+JFPX_ROW BodyOf<S> gather_body(const Real* bodies, const std::int32_t* ids) {
   typename S::Vec f[kBodyFields];
   for (int k = 0; k < kBodyFields; k += 4) S::gather4(bodies + k, ids, kBodyFields, f + k);
   BodyOf<S> b;
@@ -106,7 +111,7 @@ BodyOf<S> gather_body(const Real* bodies, const std::int32_t* ids) {
 
 /// btPlaneSpace1: two directions orthogonal to n and to each other.
 template <class S>
-void plane_space(const Vec3Of<S>& n, Vec3Of<S>* p, Vec3Of<S>* q) {
+JFPX_ROW void plane_space(const Vec3Of<S>& n, Vec3Of<S>* p, Vec3Of<S>* q) {
   const auto zero = S::set(0);
   const auto steep = S::less(S::set(Real(0.7071067811865475244008443621048490)), S::absolute(n.z));
   const auto a = S::select(steep, n.y * n.y + n.z * n.z, n.x * n.x + n.y * n.y);
@@ -123,8 +128,9 @@ void plane_space(const Vec3Of<S>& n, Vec3Of<S>* p, Vec3Of<S>* q) {
 /// goes into the axis of the friction row. The other direction goes into `second` where Bullet
 /// writes one, which the returned mask tells.
 template <class S>
-typename S::Mask set_up_contact(const RowSettings& settings, const Real* in, const Real* bodies,
-                                const std::int32_t* ids, Real* row, Real* friction, Real* second) {
+JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real* in,
+                                         const Real* bodies, const std::int32_t* ids, Real* row,
+                                         Real* friction, Real* second) {
   constexpr int kLanes = S::kLanes;
   using V3 = Vec3Of<S>;
   const auto field = [&](int i) { return S::load(in + i * kLanes); };
@@ -193,8 +199,8 @@ typename S::Mask set_up_contact(const RowSettings& settings, const Real* in, con
 
 /// The second half: the friction row along the axis that is in it.
 template <class S>
-void set_up_friction(const RowSettings& settings, const Real* in, const Real* bodies,
-                     const std::int32_t* ids, Real* row) {
+JFPX_ROW void set_up_friction(const RowSettings& settings, const Real* in, const Real* bodies,
+                              const std::int32_t* ids, Real* row) {
   constexpr int kLanes = S::kLanes;
   using V3 = Vec3Of<S>;
   const auto field = [&](int i) { return S::load(in + i * kLanes); };
@@ -239,7 +245,8 @@ struct Movers {
   V3 linear_a, angular_a, linear_b, angular_b;
   typename S::Vec mass_a, mass_b, pad_a, pad_b;
 
-  Movers(const std::int32_t* i, Real* v, const Real* f) : ids(i), velocities(v), factors(f) {
+  JFPX_ROW Movers(const std::int32_t* i, Real* v, const Real* f)
+      : ids(i), velocities(v), factors(f) {
     typename S::Vec u[4];
     S::gather4(v, ids, kVelocityFields, u);
     linear_a = {u[0], u[1], u[2]}, mass_a = u[3];
@@ -251,15 +258,16 @@ struct Movers {
     angular_b = {u[0], u[1], u[2]}, pad_b = u[3];
   }
   /// The velocity along the row, times -inverse, in Bullet's order.
-  typename S::Vec resist(typename S::Vec impulse, typename S::Vec inverse, const V3& axis_a,
-                         const V3& axis_b, const V3& turn_a, const V3& turn_b) const {
+  JFPX_ROW typename S::Vec resist(typename S::Vec impulse, typename S::Vec inverse,
+                                  const V3& axis_a, const V3& axis_b, const V3& turn_a,
+                                  const V3& turn_b) const {
     const auto velocity_a = dot(axis_a, linear_a) + dot(turn_a, angular_a);
     const auto velocity_b = dot(axis_b, linear_b) + dot(turn_b, angular_b);
     impulse = impulse - velocity_a * inverse;
     return impulse - velocity_b * inverse;
   }
-  void push(typename S::Vec impulse, const V3& axis_a, const V3& axis_b, const Real* row,
-            typename S::Mask active) {
+  JFPX_ROW void push(typename S::Vec impulse, const V3& axis_a, const V3& axis_b, const Real* row,
+                     typename S::Mask active) {
     const V3 response_a = load3<S>(row + kRowAngularA * kLanes);
     const V3 response_b = load3<S>(row + kRowAngularB * kLanes);
     V3 new_linear_a, new_angular_a, new_linear_b, new_angular_b;
@@ -280,8 +288,9 @@ struct Movers {
   }
 
  private:
-  void move(const std::int32_t* who, const V3& axis, const V3& response, typename S::Vec impulse,
-            const V3& linear, const V3& angular, V3* new_linear, V3* new_angular) const {
+  JFPX_ROW void move(const std::int32_t* who, const V3& axis, const V3& response,
+                     typename S::Vec impulse, const V3& linear, const V3& angular, V3* new_linear,
+                     V3* new_angular) const {
     typename S::Vec m[4], l[4], t[4];
     S::gather4(factors, who, kFactorFields, m);
     S::gather4(factors + 4, who, kFactorFields, l);
@@ -291,8 +300,8 @@ struct Movers {
     *new_linear = linear + axis * masses * impulse * linear_factor;
     *new_angular = angular + response * (angular_factor * impulse);
   }
-  void put(const std::int32_t* who, const V3& linear, typename S::Vec mass, const V3& angular,
-           typename S::Vec pad) const {
+  JFPX_ROW void put(const std::int32_t* who, const V3& linear, typename S::Vec mass,
+                    const V3& angular, typename S::Vec pad) const {
     const typename S::Vec u[4] = {linear.x, linear.y, linear.z, mass};
     const typename S::Vec w[4] = {angular.x, angular.y, angular.z, pad};
     S::scatter8(velocities, who, kVelocityFields, u, w);
@@ -305,7 +314,7 @@ struct Residual {
   typename S::Vec largest = S::set(0);
   typename S::Mask broken = S::never();
 
-  void add(typename S::Vec impulse, typename S::Vec inverse, typename S::Mask active) {
+  JFPX_ROW void add(typename S::Vec impulse, typename S::Vec inverse, typename S::Mask active) {
     const auto residual = S::residual(impulse, inverse);
     const auto squared = S::keep(active, residual * residual);
     largest = S::select(S::less(largest, squared), squared, largest);
@@ -316,8 +325,8 @@ struct Residual {
 /// One contact row, or its push against penetration (the split impulse), which differ in the fields
 /// that they use and in the velocities.
 template <class S, bool kFactors, bool kPush>
-void solve_contact(const std::int32_t* ids, Real* velocities, const Real* factors, Real* row,
-                   Residual<S>* residual) {
+JFPX_ROW void solve_contact(const std::int32_t* ids, Real* velocities, const Real* factors,
+                            Real* row, Residual<S>* residual) {
   constexpr int kLanes = S::kLanes;
   const auto zero = S::set(0);
   Movers<S, kFactors> movers(ids, velocities, factors);
@@ -341,8 +350,8 @@ void solve_contact(const std::int32_t* ids, Real* velocities, const Real* factor
 
 /// One friction row, limited by the impulse of its contact.
 template <class S, bool kFactors>
-void solve_friction(const std::int32_t* ids, Real* velocities, const Real* factors,
-                    const Real* contact, Real* row, Residual<S>* residual) {
+JFPX_ROW void solve_friction(const std::int32_t* ids, Real* velocities, const Real* factors,
+                             const Real* contact, Real* row, Residual<S>* residual) {
   constexpr int kLanes = S::kLanes;
   const auto zero = S::set(0);
   const auto pressure = S::load(contact + kRowImpulse * kLanes);
@@ -370,12 +379,15 @@ void solve_friction(const std::int32_t* ids, Real* velocities, const Real* facto
 
 /// Gives the bodies the impulses that the rows start with.
 template <class S, bool kFactors>
-void warm_start(const std::int32_t* ids, Real* velocities, const Real* factors, const Real* row) {
+JFPX_ROW void warm_start(const std::int32_t* ids, Real* velocities, const Real* factors,
+                         const Real* row) {
   constexpr int kLanes = S::kLanes;
   Movers<S, kFactors> movers(ids, velocities, factors);
   const auto n = load3<S>(row + kRowAxis * kLanes);
   movers.push(S::load(row + kRowImpulse * kLanes), keep<S>(S::is_real(ids), n),
               keep<S>(S::is_real(ids + kLanes), -n), row, S::always());
 }
+
+#undef JFPX_ROW
 
 }  // namespace jfpx::inline JFPX_ABI::rows

@@ -54,7 +54,7 @@ struct RowSolver::Program {
   Real threshold = -1;
   std::atomic<Real>* residuals = nullptr;  ///< one an iteration
   std::atomic<std::uint64_t> next{0}, done{0};
-  std::atomic<bool> broken{false};
+  std::atomic<bool> broken{false}, ended{false};
 
   std::uint64_t tickets_an_iteration() const { return pass_count * ticket_count; }
 
@@ -65,8 +65,15 @@ struct RowSolver::Program {
       const std::uint64_t iteration = per_iteration == 0 ? iterations : number / per_iteration;
       if (iteration >= iterations) return;
       const std::uint64_t start = iteration * per_iteration;
-      wait_until([&] { return done.load(std::memory_order_acquire) >= start; });
-      if (iteration > 0 && is_last(iteration - 1)) return;
+      // With few tickets an iteration, the number may lie more than one behind the last.
+      wait_until([&] {
+        return done.load(std::memory_order_acquire) >= start ||
+               ended.load(std::memory_order_relaxed);
+      });
+      if (ended.load(std::memory_order_relaxed) || (iteration > 0 && is_last(iteration - 1))) {
+        ended.store(true, std::memory_order_relaxed);
+        return;
+      }
       const std::uint64_t pass = (number - start) / ticket_count;
       const Ticket& ticket = tickets[(number - start) % ticket_count];
       const std::uint64_t after = start + pass * ticket_count + ticket.after;

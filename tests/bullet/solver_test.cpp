@@ -52,36 +52,52 @@ bool stock_differs_from_itself(const SolverWorld& world) {
          run(world, nullptr, StockElsewhere<0xff>::parts);
 }
 
-std::string report(const SolverWorld& world, const Failure& failure, MakeParts parts) {
-  const SolverWorld least = shrink(world, parts);
-  const auto again = run(least, nullptr, parts);
+std::string report(const SolverWorld& world, const Failure& failure, MakeParts parts,
+                   MakeDispatcher dispatcher) {
+  const SolverWorld least = shrink(world, parts, dispatcher);
+  const auto again = run(least, nullptr, parts, dispatcher);
   std::ostringstream out;
   out << failure.what << "\nshrunk: " << (again ? again->what : "no longer fails") << '\n' << least;
   return out.str();
 }
 
-TEST(ConstraintSolver, MovesRandomWorldsAsStock) {
+/// Runs random worlds with these parts beside stock ones.
+SolverTotals expect_stocks_bits(std::uint64_t steps, MakeParts parts, MakeDispatcher dispatcher) {
   const std::uint64_t seed = test_seed();
   SolverTotals totals;
   std::uint64_t unreproducible = 0;
-  for (std::uint64_t i = 0; totals.steps < wanted_steps(); ++i) {
+  for (std::uint64_t i = 0; totals.steps < steps; ++i) {
     const SolverWorld world = make_solver_world(seed + i);
-    const auto failure = run(world, &totals);
+    const auto failure = run(world, &totals, parts, dispatcher);
     if (failure && stock_differs_from_itself(world)) {
       ++unreproducible;
       continue;
     }
-    ASSERT_FALSE(failure) << "JFPX_TEST_SEED=" << seed + i << '\n'
-                          << report(world, *failure, our_solver);
+    if (failure) {
+      ADD_FAILURE() << "JFPX_TEST_SEED=" << seed + i << '\n'
+                    << report(world, *failure, parts, dispatcher);
+      return totals;
+    }
   }
-  EXPECT_LE(unreproducible, 1 + totals.steps / 100'000) << "too many to be Bullet's";
+  EXPECT_LE(unreproducible, 1 + steps / 100'000) << "too many to be Bullet's";
+  return totals;
+}
+
+TEST(ConstraintSolver, MovesRandomWorldsAsStock) {
+  const SolverTotals totals = expect_stocks_bits(wanted_steps(), our_solver, make_stock);
   EXPECT_GT(totals.groups, totals.steps / 4) << "worlds that Bullet solves show nothing";
   EXPECT_GT(totals.contacts, totals.steps);
   for (std::size_t i = 0; i < kSolverFallbacks; ++i) {
     RecordProperty("fallbacks_" + std::to_string(i), std::to_string(totals.fallbacks[i]));
   }
-  RecordProperty("groups", std::to_string(totals.groups));
-  RecordProperty("unreproducible", std::to_string(unreproducible));
+}
+
+TEST(DynamicsWorld, MovesRandomWorldsAsStock) {
+  expect_stocks_bits(wanted_steps() / 4, our_world, make_stock);
+}
+
+TEST(DynamicsWorld, MovesRandomWorldsAsStockWithOurDispatcherAndSolver) {
+  expect_stocks_bits(wanted_steps() / 4, our_solver_and_world, make_ours);
 }
 
 }  // namespace

@@ -49,9 +49,11 @@ struct SolverTotals {
   std::uint64_t steps = 0, groups = 0, contacts = 0, joints = 0, fallbacks[8] = {};
 };
 
-/// The parts under test. The dispatcher is Bullet's in both worlds if `ours` is false.
+/// The parts under test, beside the dispatcher.
 using MakeParts = WorldParts (*)(const SolverWorld&);
 WorldParts our_solver(const SolverWorld& world);
+WorldParts our_world(const SolverWorld& world);
+WorldParts our_solver_and_world(const SolverWorld& world);
 
 std::optional<Failure> run(const SolverWorld& world, SolverTotals* totals,
                            MakeParts parts = our_solver, MakeDispatcher dispatcher = make_stock);

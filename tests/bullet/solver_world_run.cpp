@@ -1,5 +1,6 @@
 /// Running a world for solvers twice at once, with Bullet's parts and with others.
 #include <jfpx/bullet/constraint_solver.hpp>
+#include <jfpx/bullet/dynamics_world.hpp>
 
 #include "src/bullet/point_fields.hpp"
 #include "tests/bullet/live_random_world.hpp"
@@ -195,6 +196,21 @@ WorldParts our_solver(const SolverWorld& world) {
         ConstraintSolverOptions{.threads = threads, .simd = simd, .minimum_batch = 1});
   };
   return parts;
+}
+
+WorldParts our_world(const SolverWorld& world) {
+  WorldParts parts;
+  parts.world = [threads = world.threads](
+                    btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+                    btConstraintSolver* solver, btCollisionConfiguration* configuration) {
+    return std::make_unique<DynamicsWorld>(dispatcher, broadphase, solver, configuration,
+                                           DynamicsWorldOptions{.threads = threads});
+  };
+  return parts;
+}
+
+WorldParts our_solver_and_world(const SolverWorld& world) {
+  return {.solver = our_solver(world).solver, .world = our_world(world).world};
 }
 
 std::optional<Failure> run(const SolverWorld& world, SolverTotals* totals, MakeParts parts,

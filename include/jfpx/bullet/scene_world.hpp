@@ -3,9 +3,8 @@
 
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dispatcher.hpp>
+#include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/scene.hpp>
-
-#include <BulletDynamics/Dynamics/btDiscreteDynamicsWorld.h>
 
 #include <memory>
 #include <span>
@@ -15,12 +14,15 @@ namespace jfpx::inline JFPX_ABI::bullet {
 
 enum class DispatcherKind : std::uint8_t { stock, jfpx };
 enum class SolverKind : std::uint8_t { stock, jfpx };
+enum class WorldKind : std::uint8_t { stock, jfpx };
 
 struct SceneWorldOptions {
   DispatcherKind dispatcher = DispatcherKind::jfpx;
-  DispatcherOptions dispatch = {};   ///< for DispatcherKind::jfpx
+  DispatcherOptions dispatch = {};  ///< for DispatcherKind::jfpx
   SolverKind solver = SolverKind::jfpx;
   ConstraintSolverOptions solve = {};  ///< for SolverKind::jfpx
+  WorldKind world = WorldKind::jfpx;
+  DynamicsWorldOptions step = {};    ///< for WorldKind::jfpx
   bool share_shapes = true;          ///< one btSphereShape a radius, one btBoxShape a size
   bool deterministic_pairs = false;  ///< btDispatcherInfo::m_deterministicOverlappingPairs
 };

@@ -1,0 +1,52 @@
+/// The dynamics world that puts jfpx into a Bullet program: one line changes, every bit stays.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <BulletDynamics/Dynamics/btDiscreteDynamicsWorld.h>
+
+#include <memory>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+struct DynamicsWorldOptions {
+  unsigned threads = 1;  ///< 0: one per core, at most 256
+};
+
+/// A btDiscreteDynamicsWorld whose islands are sorted by compact keys instead of through pointers,
+/// and whose bodies are predicted and integrated in parallel. Groups, their order, sleeping,
+/// velocities and transforms are those of btDiscreteDynamicsWorld, bit for bit.
+///
+/// In steps with continuous collision of some body, bodies are integrated one by one, because each
+/// sees those before it at their new places. What users may override or call is as in Bullet; the
+/// island manager's own buildAndProcessIslands() is not used while islands are split.
+///
+/// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
+/// As in Bullet, one thread at a time; different worlds are independent.
+class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
+ public:
+  BT_DECLARE_ALIGNED_ALLOCATOR();
+
+  /// As Bullet's: the parts are the caller's, but a null solver becomes one that the world owns.
+  /// @throws InvalidArgument for more than 256 threads.
+  DynamicsWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+                btConstraintSolver* solver, btCollisionConfiguration* configuration,
+                const DynamicsWorldOptions& options = {});
+  ~DynamicsWorld() override;
+  DynamicsWorld(const DynamicsWorld&) = delete;
+  DynamicsWorld& operator=(const DynamicsWorld&) = delete;
+
+  void solveConstraints(btContactSolverInfo& info) override;
+
+ protected:
+  void predictUnconstraintMotion(btScalar dt) override;
+  void createPredictiveContacts(btScalar dt) override;
+  void calculateSimulationIslands() override;
+  void integrateTransforms(btScalar dt) override;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

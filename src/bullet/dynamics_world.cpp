@@ -1,0 +1,141 @@
+/// Steps of a world; see the header.
+#include <jfpx/bullet/dynamics_world.hpp>
+#include <jfpx/error.hpp>
+
+#include "src/bullet/islands.hpp"
+#include "src/x86/thread_pool.hpp"
+
+#include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
+#include <LinearMath/btQuickprof.h>
+
+#include <algorithm>
+#include <atomic>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+constexpr int kBodiesAChunk = 256;
+
+int island_of(const btTypedConstraint* constraint) {
+  const int tag = constraint->getRigidBodyA().getIslandTag();
+  return tag >= 0 ? tag : constraint->getRigidBodyB().getIslandTag();
+}
+bool is_movable(const btCollisionObject& object) { return !object.isStaticOrKinematicObject(); }
+
+}  // namespace
+
+struct DynamicsWorld::Impl {
+  x86::ThreadPool pool;
+  IslandSolver islands;
+
+  explicit Impl(unsigned threads) : pool(threads) {}
+
+  /// Calls run(bodies, count) for all parts of the array, at once.
+  template <class Run>
+  void in_parts(btAlignedObjectArray<btRigidBody*>& bodies, const Run& run) {
+    const int count = bodies.size();
+    const int chunks = (count + kBodiesAChunk - 1) / kBodiesAChunk;
+    pool.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
+      const int first = static_cast<int>(chunk) * kBodiesAChunk;
+      run(&bodies[first], std::min(kBodiesAChunk, count - first));
+    });
+  }
+  /// Whether the path of some body may be cut short by continuous collision.
+  bool has_swept_bodies(btAlignedObjectArray<btRigidBody*>& bodies, const btDispatcherInfo& info) {
+    if (!info.m_useContinuous) return false;
+    std::atomic<bool> found{false};
+    in_parts(bodies, [&](btRigidBody** part, int count) {
+      if (std::any_of(part, part + count, [](const btRigidBody* body) {
+            return body->getCcdSquareMotionThreshold() != 0;
+          })) {
+        found.store(true, std::memory_order_relaxed);
+      }
+    });
+    return found;
+  }
+};
+
+DynamicsWorld::DynamicsWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+                             btConstraintSolver* solver, btCollisionConfiguration* configuration,
+                             const DynamicsWorldOptions& options)
+    : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration) {
+  if (options.threads > 256) {
+    throw InvalidArgument("threads is " + std::to_string(options.threads) +
+                          "; it must be at most 256");
+  }
+  impl_ = std::make_unique<Impl>(options.threads);
+}
+DynamicsWorld::~DynamicsWorld() = default;
+
+void DynamicsWorld::predictUnconstraintMotion(btScalar dt) {
+  BT_PROFILE("predictUnconstraintMotion");
+  impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+    for (int i = 0; i < count; ++i) {
+      if (!is_movable(*bodies[i])) continue;
+      bodies[i]->applyDamping(dt);
+      bodies[i]->predictIntegratedTransform(dt, bodies[i]->getInterpolationWorldTransform());
+    }
+  });
+}
+
+void DynamicsWorld::createPredictiveContacts(btScalar dt) {
+  if (impl_->has_swept_bodies(m_nonStaticRigidBodies, getDispatchInfo())) {
+    btDiscreteDynamicsWorld::createPredictiveContacts(dt);
+    return;
+  }
+  BT_PROFILE("createPredictiveContacts");
+  releasePredictiveContacts();
+  impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+    for (int i = 0; i < count; ++i) bodies[i]->setHitFraction(1);
+  });
+}
+
+void DynamicsWorld::integrateTransforms(btScalar dt) {
+  if (m_applySpeculativeContactRestitution ||
+      impl_->has_swept_bodies(m_nonStaticRigidBodies, getDispatchInfo())) {
+    btDiscreteDynamicsWorld::integrateTransforms(dt);
+    return;
+  }
+  BT_PROFILE("integrateTransforms");
+  impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+    integrateTransformsInternal(bodies, count, dt);
+  });
+}
+
+void DynamicsWorld::calculateSimulationIslands() {
+  BT_PROFILE("calculateSimulationIslands");
+  btUnionFind& unions = getSimulationIslandManager()->getUnionFind();
+  const auto unite = [&](const btCollisionObject& a, const btCollisionObject& b) {
+    if (is_movable(a) && is_movable(b)) unions.unite(a.getIslandTag(), b.getIslandTag());
+  };
+  number_and_unite(*this, &unions);
+  for (int i = 0; i < m_predictiveManifolds.size(); ++i) {
+    unite(*m_predictiveManifolds[i]->getBody0(), *m_predictiveManifolds[i]->getBody1());
+  }
+  for (int i = 0; i < m_constraints.size(); ++i) {
+    if (!m_constraints[i]->isEnabled()) continue;
+    unite(m_constraints[i]->getRigidBodyA(), m_constraints[i]->getRigidBodyB());
+  }
+  store_islands(*this, &unions);
+}
+
+void DynamicsWorld::solveConstraints(btContactSolverInfo& info) {
+  btSimulationIslandManager& manager = *getSimulationIslandManager();
+  if (!manager.getSplitIslands()) {
+    btDiscreteDynamicsWorld::solveConstraints(info);
+    return;
+  }
+  BT_PROFILE("solveConstraints");
+  m_sortedConstraints.copyFromArray(m_constraints);
+  m_sortedConstraints.quickSort([](const btTypedConstraint* l, const btTypedConstraint* r) {
+    return island_of(l) < island_of(r);
+  });
+  m_constraintSolver->prepareSolve(getNumCollisionObjects(), getDispatcher()->getNumManifolds());
+  impl_->islands.solve(*this, manager.getUnionFind(), *m_constraintSolver, info,
+                       m_sortedConstraints.size() > 0 ? &m_sortedConstraints[0] : nullptr,
+                       m_sortedConstraints.size());
+  m_constraintSolver->allSolved(info, getDebugDrawer());
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,212 @@
+/// Follows btSimulationIslandManager.cpp and the island callback of btDiscreteDynamicsWorld.cpp of
+/// Bullet 3.24 step by step; see the header.
+#include "src/bullet/islands.hpp"
+
+#include "src/bullet/prefetch.hpp"
+
+#include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>
+#include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <LinearMath/btQuickprof.h>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+void prefetch_state_of(const btCollisionObjectArray& objects, int i) {
+  if (i < objects.size()) prefetch_state(objects[i]);
+}
+const btCollisionObject* object_of(const btBroadphaseProxy* proxy) {
+  return static_cast<const btCollisionObject*>(proxy->m_clientObject);
+}
+bool merges(const btCollisionObject* object) {
+  return object != nullptr && object->mergesSimulationIslands();
+}
+int island_of(const btCollisionObject& a, const btCollisionObject& b) {
+  return a.getIslandTag() >= 0 ? a.getIslandTag() : b.getIslandTag();
+}
+int island_of(const btTypedConstraint& constraint) {
+  return island_of(constraint.getRigidBodyA(), constraint.getRigidBodyB());
+}
+
+/// Kinematic objects that move wake whatever they overlap.
+void wake(const btCollisionObject& kinematic, const btCollisionObject& other) {
+  if (kinematic.isKinematicObject() && kinematic.getActivationState() != ISLAND_SLEEPING &&
+      kinematic.hasContactResponse()) {
+    other.activate();
+  }
+}
+
+}  // namespace
+
+void number_and_unite(btCollisionWorld& world, btUnionFind* unions) {
+  btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  int count = 0;
+  for (int i = 0; i < objects.size(); ++i) {
+    prefetch_state_of(objects, i + kObjectsAhead);
+    btCollisionObject* object = objects[i];
+    if (!object->isStaticOrKinematicObject()) object->setIslandTag(count++);
+    object->setCompanionId(-1);
+    object->setHitFraction(1);
+  }
+  unions->reset(count);
+  btOverlappingPairCache* cache = world.getPairCache();
+  const int pairs = cache->getNumOverlappingPairs();
+  if (pairs == 0) return;
+  const btBroadphasePair* pair = cache->getOverlappingPairArrayPtr();
+  for (int i = 0; i < pairs; ++i) {
+    if (i + 2 * kObjectsAhead < pairs) {
+      __builtin_prefetch(pair[i + 2 * kObjectsAhead].m_pProxy0);
+      __builtin_prefetch(pair[i + 2 * kObjectsAhead].m_pProxy1);
+    }
+    if (i + kObjectsAhead < pairs) {
+      prefetch_state(object_of(pair[i + kObjectsAhead].m_pProxy0));
+      prefetch_state(object_of(pair[i + kObjectsAhead].m_pProxy1));
+    }
+    const btCollisionObject* a = object_of(pair[i].m_pProxy0);
+    const btCollisionObject* b = object_of(pair[i].m_pProxy1);
+    if (merges(a) && merges(b)) unions->unite(a->getIslandTag(), b->getIslandTag());
+  }
+}
+
+void store_islands(btCollisionWorld& world, btUnionFind* unions) {
+  btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  int index = 0;
+  for (int i = 0; i < objects.size(); ++i) {
+    prefetch_state_of(objects, i + kObjectsAhead);
+    btCollisionObject* object = objects[i];
+    if (object->isStaticOrKinematicObject()) {
+      object->setIslandTag(-1);
+      object->setCompanionId(-2);
+    } else {
+      object->setIslandTag(unions->find(index));
+      unions->getElement(index).m_sz = i;
+      object->setCompanionId(-1);
+      ++index;
+    }
+  }
+}
+
+void IslandSolver::solve(btCollisionWorld& world, btUnionFind& unions, btConstraintSolver& solver,
+                         const btContactSolverInfo& info, btTypedConstraint** constraints,
+                         int constraint_count) {
+  {
+    BT_PROFILE("islandUnionFindAndQuickSort");
+    unions.sortIslands();
+    update_sleep(world.getCollisionObjectArray(), unions);
+    collect_manifolds(world);
+  }
+  BT_PROFILE("processIslands");
+  solve_awake(world, unions, solver, info, constraints, constraint_count);
+}
+
+/// An island sleeps if none of its objects is awake; one that doesn't has no sleepers.
+void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& unions) {
+  const int count = unions.getNumElements();
+  const auto object = [&](int k) { return objects[unions.getElement(k).m_sz]; };
+  for (int first = 0, last = 0; first < count; first = last) {
+    const int island = unions.getElement(first).m_id;
+    bool asleep = true;
+    for (last = first; last < count && unions.getElement(last).m_id == island; ++last) {
+      if (last + kObjectsAhead < count) prefetch_state(object(last + kObjectsAhead));
+      const btCollisionObject& o = *object(last);
+      const int state = o.getActivationState();
+      if (o.getIslandTag() == island && (state == ACTIVE_TAG || state == DISABLE_DEACTIVATION)) {
+        asleep = false;
+      }
+    }
+    for (int k = first; k < last; ++k) {
+      btCollisionObject& o = *object(k);
+      if (o.getIslandTag() != island) continue;
+      if (asleep) {
+        o.setActivationState(ISLAND_SLEEPING);
+      } else if (o.getActivationState() == ISLAND_SLEEPING) {
+        o.setActivationState(WANTS_DEACTIVATION);
+        o.setDeactivationTime(0);
+      }
+    }
+  }
+}
+
+/// Lists the manifolds that islands are solved with, and what they are sorted by.
+void IslandSolver::collect_manifolds(btCollisionWorld& world) {
+  btDispatcher& dispatcher = *world.getDispatcher();
+  const bool only_touching = world.getDispatchInfo().m_deterministicOverlappingPairs;
+  const int count = dispatcher.getNumManifolds();
+  btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();
+  keys_.resizeNoInitialize(0);
+  keys_.reserve(count);
+  for (int i = 0; i < count; ++i) {
+    if (i + 2 * kManifoldsAhead < count) prefetch_header(manifolds[i + 2 * kManifoldsAhead]);
+    if (i + kManifoldsAhead < count) {
+      prefetch_state(manifolds[i + kManifoldsAhead]->getBody0());
+      prefetch_state(manifolds[i + kManifoldsAhead]->getBody1());
+    }
+    btPersistentManifold* manifold = manifolds[i];
+    if (only_touching && manifold->getNumContacts() == 0) continue;
+    const btCollisionObject &a = *manifold->getBody0(), &b = *manifold->getBody1();
+    if (a.getActivationState() == ISLAND_SLEEPING && b.getActivationState() == ISLAND_SLEEPING) {
+      continue;
+    }
+    wake(a, b);
+    wake(b, a);
+    if (!dispatcher.needsResponse(&a, &b)) continue;
+    Key& key = keys_.expandNonInitializing();
+    key = {island_of(a, b), 0, 0, manifold};
+    if (only_touching) {
+      key.uid0 = a.getBroadphaseHandle()->m_uniqueId;
+      key.uid1 = b.getBroadphaseHandle()->m_uniqueId;
+    }
+  }
+}
+
+void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
+                               btConstraintSolver& solver, const btContactSolverInfo& info,
+                               btTypedConstraint** constraints, int constraint_count) {
+  // Bullet's sort is not stable: the order is that of this very sort, on keys that compare alike.
+  if (world.getDispatchInfo().m_deterministicOverlappingPairs) {
+    keys_.quickSort([](const Key& l, const Key& r) {
+      if (l.island != r.island) return l.island < r.island;
+      return l.uid0 != r.uid0 ? l.uid0 < r.uid0 : l.uid1 < r.uid1;
+    });
+  } else {
+    keys_.quickSort([](const Key& l, const Key& r) { return l.island < r.island; });
+  }
+  const btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  const auto solve_group = [&] {
+    solver.solveGroup(bodies_.data(), static_cast<int>(bodies_.size()), manifolds_.data(),
+                      static_cast<int>(manifolds_.size()), constraints_.data(),
+                      static_cast<int>(constraints_.size()), info, world.getDebugDrawer(),
+                      world.getDispatcher());
+    bodies_.clear();
+    manifolds_.clear();
+    constraints_.clear();
+  };
+  int key = 0, joint = 0;
+  for (int first = 0, last = 0; first < unions.getNumElements(); first = last) {
+    const int island = unions.getElement(first).m_id;
+    const std::size_t bodies_before = bodies_.size();
+    bool awake = false;
+    for (last = first; last < unions.getNumElements() && unions.getElement(last).m_id == island;
+         ++last) {
+      bodies_.push_back(objects[unions.getElement(last).m_sz]);
+      awake |= bodies_.back()->isActive();
+    }
+    const int first_key = key;
+    while (key < keys_.size() && keys_[key].island == island) ++key;
+    if (!awake) {
+      bodies_.resize(bodies_before);
+      continue;
+    }
+    for (int k = first_key; k < key; ++k) manifolds_.push_back(keys_[k].manifold);
+    while (joint < constraint_count && island_of(*constraints[joint]) < island) ++joint;
+    for (; joint < constraint_count && island_of(*constraints[joint]) == island; ++joint) {
+      constraints_.push_back(constraints[joint]);
+    }
+    // Small islands are gathered into one group.
+    const int size = static_cast<int>(constraints_.size() + manifolds_.size());
+    if (info.m_minimumSolverBatchSize <= 1 || size > info.m_minimumSolverBatchSize) solve_group();
+  }
+  solve_group();  // as Bullet does, also where nothing is left
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
