@@ -3,6 +3,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/bullet/contact_scan.hpp"
+#include "src/bullet/joint_rows.hpp"
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <LinearMath/btQuickprof.h>
@@ -114,6 +115,9 @@ struct ConstraintSolver::Impl {
 
   // One group: valid while it is solved.
   std::span<btCollisionObject*> bodies;
+  std::span<btTypedConstraint*> joints;
+  std::vector<std::int32_t> joint_ids;  ///< by solver body: see JointRows
+  std::vector<LateBody> joint_late;     ///< bodies that only a joint has brought in
   const btContactSolverInfo* info = nullptr;
   rows::RowSettings settings{};
 
@@ -122,7 +126,7 @@ struct ConstraintSolver::Impl {
         solver(checked_threads(options.threads), options.simd),
         minimum_batch(options.minimum_batch) {}
 
-  std::optional<SolverFallback> obstacle(int manifold_count, int constraint_count) const {
+  std::optional<SolverFallback> obstacle(int manifold_count) const {
     if (static_cast<std::size_t>(manifold_count) < minimum_batch) return SolverFallback::small;
     if ((info->m_solverMode & kUnsupportedModes) != 0 || info->m_numIterations <= 0) {
       return SolverFallback::mode;
@@ -132,17 +136,23 @@ struct ConstraintSolver::Impl {
             self.getScalarConstraintRowSolverLowerLimit()) {
       return SolverFallback::row_solver;
     }
-    if (constraint_count > 0) return SolverFallback::constraints;
+    if (!std::all_of(joints.begin(), joints.end(),
+                     [](const btTypedConstraint* joint) { return is_known_joint(*joint); })) {
+      return SolverFallback::constraints;
+    }
     return std::nullopt;
   }
 
   /// @return why it could not be; all that Bullet's solver reads is then as it was
   std::optional<SolverFallback> solve(std::span<btPersistentManifold* const> manifolds) {
     BT_PROFILE("solveGroup");  // here and below: Bullet's own names, for those who profile
-    if (!set_up(manifolds)) return SolverFallback::rolling;
+    if (!set_up(manifolds)) {
+      forget_late_bodies();
+      return SolverFallback::rolling;
+    }
     const x86::RowSweepReport report = sweep();
     if (report.broken) {
-      for (const LateBody& late : scan.late()) late.object->setCompanionId(late.companion);
+      forget_late_bodies();
       return SolverFallback::not_finite;
     }
     gNumSplitImpulseRecoveries += static_cast<int>(report.pushed);
@@ -150,6 +160,7 @@ struct ConstraintSolver::Impl {
     write_back();
     ++stats.groups;
     stats.contacts += scan.contacts().size();
+    stats.joints += joints.size();
     stats.sweeps += static_cast<std::uint64_t>(report.iterations);
     return std::nullopt;
   }
@@ -158,6 +169,7 @@ struct ConstraintSolver::Impl {
     BT_PROFILE("solveGroupCacheFriendlySetup");
     settings = row_settings(*info);
     set_up_bodies();
+    if (!joints.empty()) set_up_joints();
     {
       BT_PROFILE("find contacts");
       if (!scan.run(solver.pool(), manifolds, marks)) return false;
@@ -173,13 +185,21 @@ struct ConstraintSolver::Impl {
 
   x86::RowSweepReport sweep() {
     BT_PROFILE("solveGroupCacheFriendlyIterations");
-    return solver.solve({.iterations = info->m_numIterations,
-                         .threshold = info->m_leastSquaresResidualThreshold,
-                         .interleave = (info->m_solverMode &
-                                        SOLVER_INTERLEAVE_CONTACT_AND_FRICTION_CONSTRAINTS) != 0,
-                         .warm_start = warm,
-                         .push = settings.split},
-                        factors);
+    btConstraintArray& rows = self.m_tmpSolverNonContactConstraintPool;
+    const auto row_count = static_cast<std::size_t>(joints.empty() ? 0 : rows.size());
+    JointRows joint_rows(solver, {row_count > 0 ? &rows[0] : nullptr, row_count}, joint_ids);
+    x86::RowSweepSettings sweeps{
+        .iterations = info->m_numIterations,
+        .threshold = info->m_leastSquaresResidualThreshold,
+        .interleave =
+            (info->m_solverMode & SOLVER_INTERLEAVE_CONTACT_AND_FRICTION_CONSTRAINTS) != 0,
+        .warm_start = warm,
+        .push = settings.split};
+    if (!joints.empty()) {
+      sweeps.serial = &joint_rows;
+      sweeps.serial_iterations = self.m_maxOverrideNumSolverIterations;
+    }
+    return solver.solve(sweeps, factors);
   }
 
   void set_up_bodies() {
@@ -215,8 +235,7 @@ struct ConstraintSolver::Impl {
     btSolverBody& body = self.m_tmpSolverBodyPool[static_cast<int>(i)];
     btRigidBody* original = moving_body(object);
     self.initSolverBody(&body, original, settings.dt);
-    std::fill_n(solver.velocity(i + 1), rows::kVelocityFields, Real(0));
-    std::fill_n(solver.push(i + 1), rows::kVelocityFields, Real(0));
+    clear_velocities(i + 1);
     if (original == nullptr) return;
     object->setCompanionId(static_cast<int>(i));
     if (original->getInvMass() != 0) add_gyroscopic_forces(*original, &body);
@@ -255,16 +274,64 @@ struct ConstraintSolver::Impl {
     }
   }
 
+  /// Bullet makes the rows; bodies that it adds for them get ids here.
+  void set_up_joints() {
+    btAlignedObjectArray<btSolverBody>& pool = self.m_tmpSolverBodyPool;
+    self.m_fixedBodyId = -1;
+    self.m_maxOverrideNumSolverIterations = 0;
+    joint_late.clear();
+    for (btTypedConstraint* joint : joints) {
+      for (btRigidBody* body : {&joint->getRigidBodyA(), &joint->getRigidBodyB()}) {
+        if (body->getCompanionId() < 0) joint_late.push_back({body, body->getCompanionId()});
+      }
+    }
+    self.convertJoints(joints.data(), static_cast<int>(joints.size()), *info);
+    // Also for joints without rows: Bullet brings their bodies in when it comes to solve them.
+    for (btTypedConstraint* joint : joints) {
+      if (!joint->isEnabled()) continue;
+      self.getOrInitSolverBody(joint->getRigidBodyA(), settings.dt);
+      self.getOrInitSolverBody(joint->getRigidBodyB(), settings.dt);
+    }
+    const auto count = static_cast<std::size_t>(pool.size());
+    solver.resize_bodies(count + 1);
+    marks.resize(count + 1, kLight | kUnmoved);
+    joint_ids.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const btSolverBody& body = pool[static_cast<int>(i)];
+      if (i >= bodies.size()) {
+        clear_velocities(i + 1);
+        if (body.m_originalBody != nullptr) {
+          pack(body, i + 1);
+          marks[i + 1] = marks_of(*body.m_originalBody);
+        }
+      }
+      const auto id = static_cast<std::int32_t>(i) + 1;
+      const bool moved = (marks[i + 1] & kUnmoved) == 0;
+      joint_ids[i] = body.m_originalBody == nullptr ? rows::kFixedBody : (moved ? id : ~id);
+    }
+  }
+  void clear_velocities(std::size_t id) {
+    std::fill_n(solver.velocity(id), rows::kVelocityFields, Real(0));
+    std::fill_n(solver.push(id), rows::kVelocityFields, Real(0));
+  }
+
+  /// Leaves the companion ids as they were.
+  void forget_late_bodies() {
+    for (const LateBody& late : scan.late()) late.object->setCompanionId(late.companion);
+    if (joints.empty()) return;
+    for (const LateBody& late : joint_late) late.object->setCompanionId(late.companion);
+  }
+
   /// As Bullet does when it meets them in a manifold.
   void set_up_late_bodies(std::span<btPersistentManifold* const> manifolds) {
-    scan.find_late(manifolds, bodies.size() + 1);
-    solver.resize_bodies(bodies.size() + 1 + scan.late().size());
+    const auto next_id = static_cast<std::size_t>(self.m_tmpSolverBodyPool.size()) + 1;
+    scan.find_late(manifolds, next_id);
+    solver.resize_bodies(next_id + scan.late().size());
     for (const LateBody& late : scan.late()) {
       const auto id = static_cast<std::size_t>(late.object->getCompanionId()) + 1;
       btSolverBody& body = self.m_tmpSolverBodyPool.expandNonInitializing();
       self.initSolverBody(&body, late.object, settings.dt);
-      std::fill_n(solver.velocity(id), rows::kVelocityFields, Real(0));
-      std::fill_n(solver.push(id), rows::kVelocityFields, Real(0));
+      clear_velocities(id);
       pack(body, id);
     }
   }
@@ -354,6 +421,10 @@ struct ConstraintSolver::Impl {
         }
       });
     }
+    if (!joints.empty()) {
+      self.writeBackJoints(0, self.m_tmpSolverNonContactConstraintPool.size(), *info);
+      self.m_tmpSolverNonContactConstraintPool.resizeNoInitialize(0);
+    }
     const auto count = static_cast<std::size_t>(self.m_tmpSolverBodyPool.size());
     const std::size_t chunks = (count + kBodiesAChunk - 1) / kBodiesAChunk;
     solver.pool().run(chunks, [&](std::size_t chunk) {
@@ -401,7 +472,8 @@ btScalar ConstraintSolver::solveGroup(btCollisionObject** bodies, int body_count
   }
   impl_->info = &info;
   impl_->bodies = {bodies, static_cast<std::size_t>(body_count)};
-  std::optional<SolverFallback> obstacle = impl_->obstacle(manifold_count, constraint_count);
+  impl_->joints = {constraints, static_cast<std::size_t>(constraint_count)};
+  std::optional<SolverFallback> obstacle = impl_->obstacle(manifold_count);
   if (!obstacle) obstacle = impl_->solve({manifolds, static_cast<std::size_t>(manifold_count)});
   if (!obstacle) return 0;
   ++impl_->stats.fallbacks[static_cast<std::size_t>(*obstacle)];

@@ -66,6 +66,7 @@ bool ContactScan::run(x86::ThreadPool& pool, std::span<btPersistentManifold* con
   constexpr std::size_t kMost = MANIFOLD_CACHE_SIZE;
   found_.reserve(kMost * manifolds.size(), "contacts of a solver");
   found_pairs_.reserve(kMost * manifolds.size(), "contacts of a solver");
+  late_.clear();
   const std::size_t chunks = (manifolds.size() + kChunk - 1) / kChunk;
   chunks_.reserve(chunks, "contacts of a solver");
   pool.run(chunks, [&](std::size_t chunk) { scan(manifolds, chunk, marks); });
@@ -122,7 +123,6 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
 
 void ContactScan::find_late(std::span<btPersistentManifold* const> manifolds,
                             std::size_t first_id) {
-  late_.clear();
   if (!any_late_) return;
   // Also where a manifold has no contact: Bullet writes these bodies back too.
   for (btPersistentManifold* manifold : manifolds) {

@@ -50,13 +50,19 @@ struct RowSolver::Program {
   std::uint64_t pass_count = 0;
   const Ticket* tickets = nullptr;
   std::uint64_t ticket_count = 0;
-  std::uint64_t iterations = 0;
+  std::uint64_t iterations = 0;        ///< with the serial rows
+  std::uint64_t block_iterations = 0;  ///< with the blocks
+  SerialRows* serial = nullptr;
   Real threshold = -1;
   std::atomic<Real>* residuals = nullptr;  ///< one an iteration
   std::atomic<std::uint64_t> next{0}, done{0};
   std::atomic<bool> broken{false}, ended{false};
 
-  std::uint64_t tickets_an_iteration() const { return pass_count * ticket_count; }
+  /// The serial rows are one ticket, the first.
+  std::uint64_t serial_tickets() const { return serial == nullptr ? 0 : 1; }
+  std::uint64_t tickets_an_iteration() const {
+    return serial_tickets() + pass_count * ticket_count;
+  }
 
   void join() {
     const std::uint64_t per_iteration = tickets_an_iteration();
@@ -74,16 +80,23 @@ struct RowSolver::Program {
         ended.store(true, std::memory_order_relaxed);
         return;
       }
-      const std::uint64_t pass = (number - start) / ticket_count;
-      const Ticket& ticket = tickets[(number - start) % ticket_count];
-      const std::uint64_t after = start + pass * ticket_count + ticket.after;
-      wait_until([&] { return done.load(std::memory_order_acquire) >= after; });
       RowResidual residual;
-      passes[pass](arrays, ticket.first, ticket.last, &residual);
+      if (number - start < serial_tickets()) {
+        serial->sweep(static_cast<int>(iteration), &residual);
+      } else if (iteration < block_iterations) {
+        run_blocks(start + serial_tickets(), number, &residual);
+      }
       if (residual.broken) broken.store(true, std::memory_order_relaxed);
       raise(residuals + iteration, residual.largest);
       done.fetch_add(1, std::memory_order_release);
     }
+  }
+  void run_blocks(std::uint64_t start, std::uint64_t number, RowResidual* residual) {
+    const std::uint64_t pass = (number - start) / ticket_count;
+    const Ticket& ticket = tickets[(number - start) % ticket_count];
+    const std::uint64_t after = start + pass * ticket_count + ticket.after;
+    wait_until([&] { return done.load(std::memory_order_acquire) >= after; });
+    passes[pass](arrays, ticket.first, ticket.last, residual);
   }
   bool is_last(std::uint64_t iteration) const {
     return iteration + 1 == iterations ||
@@ -234,7 +247,9 @@ std::uint64_t RowSolver::find_pushes() {
 RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_factors) {
   const std::size_t factors = with_factors ? 1 : 0;
   const std::uint64_t pushing = settings.push ? find_pushes() : 0;
-  const auto iterations = static_cast<std::size_t>(std::max(settings.iterations, 0));
+  const auto iterations =
+      static_cast<std::size_t>(std::max({settings.iterations, settings.serial_iterations, 0}));
+  const auto block_iterations = static_cast<std::size_t>(std::max(settings.iterations, 0));
   if (2 * iterations + 1 > residual_capacity_) {
     residual_capacity_ = 2 * iterations + 1;
     residuals_ = std::make_unique<std::atomic<Real>[]>(residual_capacity_);
@@ -254,7 +269,7 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
     program->pass_count = 1;
     program->tickets = tickets_.data();
     program->ticket_count = ticket_count_;
-    program->iterations = iterations;
+    program->iterations = program->block_iterations = block_iterations;
     program->threshold = settings.threshold;
   }
   warm.passes[0] = kernels_.warm_starts[factors];
@@ -263,9 +278,11 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
   push.passes[0] = kernels_.pushes[factors];
   push.tickets = push_tickets_.data();
   push.ticket_count = push_ticket_count_;
-  push.iterations = pushing > 0 ? iterations : 0;
+  push.iterations = pushing > 0 ? block_iterations : 0;
   push.residuals = residuals_.get() + iterations;
   main.residuals = residuals_.get();
+  main.iterations = iterations;
+  main.serial = settings.serial;
   if (settings.interleave) {
     main.passes[0] = kernels_.both[factors];
   } else {

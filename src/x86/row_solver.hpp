@@ -19,12 +19,23 @@ struct RowPair {
   std::int32_t a, b;
 };
 
+/// Other rows, which are solved one after the other at the start of each sweep.
+class SerialRows {
+ public:
+  virtual void sweep(int iteration, RowResidual* residual) = 0;
+
+ protected:
+  ~SerialRows() = default;
+};
+
 struct RowSweepSettings {
   int iterations = 10;
-  Real threshold = 0;       ///< sweeps end when the largest squared residual is no larger
-  bool interleave = false;  ///< each contact's friction right after it
-  bool warm_start = false;  ///< begin with the impulses in the rows
-  bool push = true;         ///< the sweeps against penetration too
+  SerialRows* serial = nullptr;
+  int serial_iterations = 0;  ///< of the serial rows, where they are more
+  Real threshold = 0;         ///< sweeps end when the largest squared residual is no larger
+  bool interleave = false;    ///< each contact's friction right after it
+  bool warm_start = false;    ///< begin with the impulses in the rows
+  bool push = true;           ///< the sweeps against penetration too
 };
 
 struct RowSweepReport {

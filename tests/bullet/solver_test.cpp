@@ -87,6 +87,7 @@ TEST(ConstraintSolver, MovesRandomWorldsAsStock) {
   const SolverTotals totals = expect_stocks_bits(wanted_steps(), our_solver, make_stock);
   EXPECT_GT(totals.groups, totals.steps / 4) << "worlds that Bullet solves show nothing";
   EXPECT_GT(totals.contacts, totals.steps);
+  EXPECT_GT(totals.joints, totals.steps / 20);
   for (std::size_t i = 0; i < kSolverFallbacks; ++i) {
     RecordProperty("fallbacks_" + std::to_string(i), std::to_string(totals.fallbacks[i]));
   }

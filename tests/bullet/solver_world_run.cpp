@@ -193,7 +193,7 @@ WorldParts our_solver(const SolverWorld& world) {
   parts.solver = [threads = world.threads,
                   simd = world.vectors ? SimdLevel::automatic : SimdLevel::scalar] {
     return std::make_unique<ConstraintSolver>(
-        ConstraintSolverOptions{.threads = threads, .simd = simd, .minimum_batch = 1});
+        ConstraintSolverOptions{.threads = threads, .simd = simd, .minimum_batch = 0});
   };
   return parts;
 }

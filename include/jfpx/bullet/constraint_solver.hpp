@@ -23,7 +23,7 @@ enum class SolverFallback : std::uint8_t {
   small,        ///< fewer manifolds than the minimum
   mode,         ///< random order, two directions of friction or cached ones; no iterations
   row_solver,   ///< the user has set a row solver
-  constraints,  ///< a constraint of a type that is not Bullet's
+  constraints,  ///< a constraint of a class that is not Bullet's
   rolling,      ///< a contact with rolling friction
   not_finite,   ///< something left the finite numbers: done again by Bullet, for its NaNs
 };

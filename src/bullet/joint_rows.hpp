@@ -1,0 +1,35 @@
+/// Rows of joints, solved one after the other on the velocities of the row solver.
+#pragma once
+
+#include "src/x86/row_solver.hpp"
+
+#include <BulletDynamics/ConstraintSolver/btSolverConstraint.h>
+#include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
+
+#include <span>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+/// Whether the constraint is of a class of Bullet's, of which we know that it does all in its rows.
+bool is_known_joint(const btTypedConstraint& constraint);
+
+/// The rows are Bullet's own, as btSequentialImpulseConstraintSolver::convertJoints() makes them;
+/// impulses are left in them.
+class JointRows final : public x86::SerialRows {
+ public:
+  /// @param ids by solver body: the id, with the complement for bodies that rows do not move
+  JointRows(x86::RowSolver& solver, std::span<btSolverConstraint> joint_rows,
+            std::span<const std::int32_t> ids)
+      : solver_(solver), rows_(joint_rows), ids_(ids) {}
+
+  void sweep(int iteration, x86::RowResidual* residual) override;
+
+ private:
+  btScalar solve(btSolverConstraint& row);
+
+  x86::RowSolver& solver_;
+  std::span<btSolverConstraint> rows_;
+  std::span<const std::int32_t> ids_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
