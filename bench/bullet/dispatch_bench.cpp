@@ -66,6 +66,8 @@ void compare_dispatch(benchmark::State& state, const char* name, std::uint32_t s
                       SceneWorldOptions options = {}) {
   Scene scene = scenes::make(name, {.spheres = spheres, .seed = 1});
   scene.sleep.enabled = false;
+  options.solver = SolverKind::stock;  // see solver_bench.cpp
+  options.world = WorldKind::stock;
   SceneWorld ours(scene, options);
   options.dispatcher = DispatcherKind::stock;
   SceneWorld stock(scene, options);

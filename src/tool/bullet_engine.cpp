@@ -1,4 +1,4 @@
-/// Bullet, stock or with jfpx's dispatcher, behind the tool's interface.
+/// Bullet, stock or with jfpx's parts, behind the tool's interface.
 #include "src/tool/bullet_engine.hpp"
 
 #include "src/tool/bullet_world.hpp"

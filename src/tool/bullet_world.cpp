@@ -6,11 +6,17 @@ namespace jfpx::inline JFPX_ABI::tool {
 bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
                                      const RunOptions& options) {
   bullet::SceneWorldOptions world;
-  world.dispatcher =
-      kind == EngineKind::bullet ? bullet::DispatcherKind::jfpx : bullet::DispatcherKind::stock;
+  const bool ours = kind == EngineKind::bullet;
+  world.dispatcher = ours ? bullet::DispatcherKind::jfpx : bullet::DispatcherKind::stock;
+  world.solver =
+      ours && options.solver == "jfpx" ? bullet::SolverKind::jfpx : bullet::SolverKind::stock;
+  world.world =
+      ours && options.world == "jfpx" ? bullet::WorldKind::jfpx : bullet::WorldKind::stock;
   world.dispatch.collider = collider_options(options);
+  world.solve.threads = world.step.threads = options.threads;
   if (options.minimum_batch) {
     world.dispatch.minimum_batch = static_cast<std::size_t>(*options.minimum_batch);
+    world.solve.minimum_batch = static_cast<std::size_t>(*options.minimum_batch);
   }
   return bullet::SceneWorld(scene, world);
 }

@@ -38,11 +38,12 @@ std::string report(const Scene& scene, const RunOptions& options, const Comparis
       "{}: {} spheres, {} steps of {} s, {} precision, backend {}\n\n{}\n"
       "contacts and times are summed over all steps\n\n"
       "dispatches by jfpx     {} of {}\n"
+      "groups solved by jfpx  {}\n"
       "contacts compared      {}\n"
       "contact mismatches     {}{}\n"
       "Bullet's trajectories  {}\n",
       scene.name, count_spheres(scene), options.steps, text(scene.dt), kPrecision, result.backend,
-      engines.text(), result.batches, options.steps, result.contacts_compared,
+      engines.text(), result.batches, options.steps, result.groups, result.contacts_compared,
       result.contact_mismatches,
       result.contact_mismatches == 0 ? "" : "; first: " + result.first_contact_mismatch,
       yes_or_first(result.first_difference));
@@ -66,6 +67,7 @@ nlohmann::ordered_json to_json_value(const Scene& scene, const RunOptions& optio
           {"backend", result.backend},
           {"precision", kPrecision},
           {"batches", result.batches},
+          {"groups", result.groups},
           {"contacts_compared", result.contacts_compared},
           {"contact_mismatches", result.contact_mismatches},
           {"trajectory_identical", result.trajectory_identical()},

@@ -49,6 +49,7 @@ Comparison compare(const Scene& scene, const RunOptions& given) {
   result.hash_jfpx = jfpx.state_hash();
   result.backend = sphere_backend(jfpx);
   result.batches = jfpx.jfpx_dispatcher()->stats().batches;
+  if (jfpx.jfpx_solver() != nullptr) result.groups = jfpx.jfpx_solver()->stats().groups;
   return result;
 }
 

@@ -5,7 +5,7 @@
 
 namespace jfpx::inline JFPX_ABI::tool {
 
-/// What a comparison found. `stock` and `jfpx` are two Bullet worlds that differ in the dispatcher.
+/// What a comparison found. `stock` and `jfpx` are two Bullet worlds that differ in their parts.
 struct Comparison {
   /// Contacts of find_contacts() held against the sphere-sphere manifolds of stock Bullet.
   std::uint64_t contacts_compared = 0;
@@ -18,6 +18,7 @@ struct Comparison {
   std::uint64_t contacts_native = 0, contacts_stock = 0, contacts_jfpx = 0;  ///< summed over steps
   StageTimes ms_native, ms_stock, ms_jfpx;                                   ///< summed over steps
   std::uint64_t batches = 0;  ///< dispatches of `jfpx` that its collider computed
+  std::uint64_t groups = 0;   ///< groups of bodies that the solver of `jfpx` solved
   std::string backend;        ///< who computed the last batch of sphere pairs in `jfpx`
 
   bool trajectory_identical() const { return first_difference.empty() && hash_stock == hash_jfpx; }

@@ -1,4 +1,4 @@
-/// One way to run a scene: native, stock Bullet, or Bullet with jfpx's dispatcher.
+/// One way to run a scene: native, stock Bullet, or Bullet with jfpx's parts.
 #pragma once
 
 #include <jfpx/body.hpp>

@@ -66,9 +66,17 @@ void add_run_options(CLI::App& app, RunOptions& options) {
       ->check(whole_number())
       ->capture_default_str();
   app.add_option("--minimum-batch", options.minimum_batch,
-                 "Bullet: pairs below which a dispatch is left to Bullet's own code "
-                 "[compare: 0, so that jfpx computes; else what pays]")
+                 "Bullet: pairs below which a dispatch, and manifolds below which a group of the "
+                 "solver, is left to Bullet's own code [compare: 0, so that jfpx computes; else "
+                 "what pays]")
       ->check(whole_number());
+  const CLI::IsMember whose({"stock", "jfpx"});
+  app.add_option("--solver", options.solver, "Bullet: whose constraint solver")
+      ->check(whose)
+      ->capture_default_str();
+  app.add_option("--world", options.world, "Bullet: whose dynamics world")
+      ->check(whose)
+      ->capture_default_str();
   app.add_option("--json", options.json, "Write the results as JSON to this file, - for stdout");
   app.add_flag("--hash", options.hash,
                "Print the hash of the final state, 16 hex digits, as the last line");

@@ -27,7 +27,8 @@ struct RunOptions {
   bool no_sleep = false;
   Backend backend = Backend::automatic;
   unsigned threads = 1;
-  std::optional<std::uint64_t> minimum_batch;  ///< pairs; absent: the command's default
+  std::optional<std::uint64_t> minimum_batch;   ///< pairs; absent: the command's default
+  std::string solver = "jfpx", world = "jfpx";  ///< Bullet's parts: "jfpx" or "stock"
   std::string json, csv, record;
   bool hash = false, quiet = false;
 };
@@ -37,7 +38,7 @@ struct RunOptions {
 CLI::Validator whole_number();
 /// Adds SCENE and the options that choose and change a scene.
 void add_scene_options(CLI::App& app, RunOptions& options);
-/// Adds --steps, --backend, --threads, --minimum-batch, --json, --hash, --quiet.
+/// Adds --steps, --backend, --threads, --minimum-batch, --solver, --world, --json, --hash, --quiet.
 void add_run_options(CLI::App& app, RunOptions& options);
 
 /// What the options say about a named scene.

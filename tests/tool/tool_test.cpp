@@ -66,6 +66,8 @@ TEST(Tool, BadUsageIsStatusTwo) {
   expect_fails("run pile --seed 18446744073709551616", 2, "--seed");
   expect_fails("run pile --engine havok", 2, "havok");
   expect_fails("run pile --backend vulkan", 2, "vulkan");
+  expect_fails("run pile --solver ode", 2, "ode");
+  expect_fails("run pile --world ode", 2, "ode");
   expect_fails("run pile --precision half", 2, "half");
   expect_fails("scenes --export", 2, "SCENE");
 }
@@ -285,10 +287,20 @@ TEST(Tool, CompareReallyComparesContacts) {
   EXPECT_EQ(json["batches"], 1) << "by default every dispatch is computed by jfpx";
 }
 
+TEST(Tool, CompareUsesOurSolverUnlessToldOtherwise) {
+  const std::string arguments = "compare pile --spheres 60 --steps 40 --quiet --json - ";
+  const auto ours = nlohmann::json::parse(jfpx_stdout(arguments).output);
+  const auto stock = nlohmann::json::parse(jfpx_stdout(arguments + "--solver stock").output);
+  EXPECT_GE(ours["groups"], 20);
+  EXPECT_EQ(stock["groups"], 0);
+  EXPECT_EQ(ours["hash_jfpx"], stock["hash_jfpx"]);
+}
+
 TEST(Tool, BulletEnginesRunAndAgree) {
   const std::string arguments = "run pile --spheres 80 --steps 60 --quiet --hash --engine ";
   const ProcessResult jfpx = jfpx_stdout(arguments + "bullet");
   const ProcessResult stock = jfpx_stdout(arguments + "bullet-stock");
+  EXPECT_EQ(jfpx.output, jfpx_stdout(arguments + "bullet --world stock --solver stock").output);
   EXPECT_EQ(jfpx.status, 0);
   EXPECT_EQ(jfpx.output, stock.output);
   EXPECT_NE(jfpx.output, jfpx_stdout(arguments + "native").output);
