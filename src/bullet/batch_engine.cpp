@@ -1,10 +1,10 @@
-/// One dispatch: a read-only pre-pass over all pairs, the collider, then one walk in the order of
-/// the pair cache that does for each pair what Bullet would have done.
+/// One dispatch: a read-only pre-pass over all pairs, the collider, then a commit that does for
+/// each pair what Bullet would have done: in any order where that can't be observed, in Bullet's
+/// elsewhere.
 #include "src/bullet/batch_engine.hpp"
 
 #include <jfpx/error.hpp>
 
-#include "src/bullet/contact_point.hpp"
 #include "src/bullet/pair_check.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
@@ -48,92 +48,6 @@ class Running {
   bool* flag_;
 };
 
-/// The ordered walk. The pair cache itself drives it, so the order is Bullet's for every kind of
-/// cache, with and without m_deterministicOverlappingPairs.
-class CommitWalk final : public btOverlapCallback {
- public:
-  CommitWalk(btCollisionDispatcher* dispatcher, const btDispatcherInfo& info,
-             std::span<const btBroadphasePair> pairs, std::span<const PairResult> results,
-             const SphereBatch& batch, DispatchStats* stats, bool verify)
-      : dispatcher_(dispatcher),
-        info_(info),
-        pairs_(pairs),
-        results_(results),
-        batch_(batch),
-        stats_(stats),
-        verify_(verify) {}
-
-  bool processOverlap(btBroadphasePair& pair) override {
-    const std::size_t i = (reinterpret_cast<std::uintptr_t>(&pair) -
-                           reinterpret_cast<std::uintptr_t>(pairs_.data())) /
-                          sizeof(btBroadphasePair);
-    if (i >= pairs_.size()) {  // added by a callback during this walk
-      visit_stock(pair);
-      return false;
-    }
-    prefetch(i + kAhead);
-    const bool current = visit(i, pair);
-    if (verify_ && batch_.manifold(i) != nullptr) check(i, current);
-    return false;
-  }
-
- private:
-  /// Commits in flight: enough to hide memory, few enough to stay in the cache.
-  static constexpr std::size_t kAhead = 12;
-
-  void prefetch(std::size_t i) const {
-    if (i < pairs_.size() && batch_.action(i) == Action::commit) batch_.prefetch_commit(i);
-  }
-
-  void visit_stock(btBroadphasePair& pair) const {
-    (*dispatcher_->getNearCallback())(pair, *dispatcher_, info_);
-  }
-
-  /// True if the manifold is now what the result says; false if the filter kept it as it was.
-  bool visit(std::size_t i, btBroadphasePair& pair) const {
-    switch (batch_.action(i)) {
-      case Action::stock:
-        visit_stock(pair);
-        return true;
-      case Action::skip:
-        return true;
-      case Action::ask:
-        dispatcher_->needsCollision(batch_.body_a(i), batch_.body_b(i));
-        return true;
-      case Action::commit:
-        break;
-    }
-    const btCollisionObject* a = batch_.body_a(i);
-    const btCollisionObject* b = batch_.body_b(i);
-    if (!can_write_flat(*batch_.manifold(i), *a, *b)) {
-      visit_stock(pair);
-      return false;  // the near callback asks the filter itself, and does not say what it heard
-    }
-    if (!dispatcher_->needsCollision(a, b)) return false;
-    ++stats_->written;
-    write_contact(batch_.manifold(i), results_[i], *a, *b,
-                  batch_.spheres()[batch_.sphere_pairs()[i].b].radius);
-    return true;
-  }
-
-  void check(std::size_t i, bool current) const {
-    ++stats_->verified;
-    const btPersistentManifold* manifold = batch_.manifold(i);
-    const auto difference = check_pair(dispatcher_, info_, *batch_.body_a(i), *batch_.body_b(i),
-                                       results_[i], *manifold, current ? manifold : nullptr);
-    if (!difference) return;
-    if (stats_->mismatches++ == 0) stats_->first_mismatch = to_text(*difference);
-  }
-
-  btCollisionDispatcher* dispatcher_;
-  const btDispatcherInfo& info_;
-  std::span<const btBroadphasePair> pairs_;
-  std::span<const PairResult> results_;
-  const SphereBatch& batch_;
-  DispatchStats* stats_;
-  bool verify_;
-};
-
 /// Whether pairs of spheres get Bullet's own algorithm. The table of create functions is protected.
 bool has_bullets_sphere_function(const btCollisionDispatcher& dispatcher) {
   struct Access : btCollisionDispatcher {
@@ -150,7 +64,8 @@ bool has_bullets_sphere_function(const btCollisionDispatcher& dispatcher) {
 BatchEngine::BatchEngine(std::unique_ptr<SphereCollider> collider, const DispatcherOptions& options)
     : collider_(std::move(collider)),
       minimum_batch_(options.minimum_batch),
-      verify_(options.verify) {
+      verify_(options.verify),
+      pool_(options.collider.threads) {
   if (collider_ == nullptr) throw InvalidArgument("collider is null; it must be a SphereCollider");
 }
 
@@ -167,57 +82,108 @@ Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatche
   return Fallback::none;
 }
 
-/// Everything before the walk; empty results and `*fallback` set if there is nothing to do or
-/// the collider failed.
-std::span<const PairResult> BatchEngine::prepare(std::span<const btBroadphasePair> pairs,
-                                                 bool ask_all, Fallback* fallback) {
+/// Everything before the commit, and all that may throw. False and `*fallback` set if there is
+/// nothing to do or the collider failed.
+bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
+                          btOverlappingPairCache& cache, Fallback* fallback) {
   try {
-    if (!batch_.gather(pairs)) {
+    if (!batch_.gather(pairs_, {&dispatcher, traits.tells_releases}, pool_)) {
       *fallback = Fallback::no_spheres;
-      return {};
+      return false;
     }
-    const std::span<const PairResult> results =
-        collider_->test_pairs(batch_.spheres(), batch_.sphere_pairs());
+    results_ = collider_->test_pairs(batch_.spheres(), batch_.pairs());
     if (const auto why = collider_->device_failure(); !why.empty()) stats_.device_failure = why;
-    batch_.plan(pairs, results, ask_all);
-    return results;
+    // A cache of another class may show its user more of the walk than the pairs.
+    quiet_ = typeid(cache) == typeid(btHashedOverlappingPairCache) &&
+             is_quiet(batch_, traits.may_override_filter);
+    if (quiet_) {
+      quiet_commit_.reserve(pairs_.size());
+    } else {
+      add(ordered_commit_.plan(batch_, results_, traits.may_override_filter));
+    }
+    return true;
   } catch (const std::exception& error) {
     stats_.failure = error.what();
     if (stats_.failure.empty()) stats_.failure = "unknown";
     *fallback = Fallback::collider_failed;
-    return {};
+    return false;
   }
 }
 
-bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, bool ask_all,
+bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                            btOverlappingPairCache& cache, const btDispatcherInfo& info,
                            btDispatcher* argument) {
   ++stats_.dispatches;
   const std::span<const btBroadphasePair> pairs = pairs_of(cache);
   Fallback fallback = reason_to_fall_back(dispatcher, pairs.size(), info);
   const auto start = fallback == Fallback::none ? Clock::now() : Clock::time_point{};
-  std::span<const PairResult> results;
-  if (fallback == Fallback::none) results = prepare(pairs, ask_all, &fallback);
+  if (fallback == Fallback::none) {
+    pairs_ = pairs;
+    prepare(dispatcher, traits, cache, &fallback);
+  }
   stats_.last_fallback = fallback;
   if (fallback != Fallback::none) {
     ++stats_.fallbacks[static_cast<std::size_t>(fallback)];
     return false;
   }
-
   ++stats_.batches;
   stats_.pairs += pairs.size();
-  stats_.sphere_pairs += batch_.sphere_pair_count();
-  stats_.touching += batch_.touching_count();
   const auto prepared = Clock::now();
-  {
-    const Running running(&running_);
-    CommitWalk walk(&dispatcher, info, pairs, results, batch_, &stats_, verify_);
-    BT_PROFILE("processAllOverlappingPairs");
-    cache.processAllOverlappingPairs(&walk, argument, info);
-  }
+  commit(dispatcher, cache, info, argument);
   stats_.prepare_ms += milliseconds(start, prepared);
   stats_.commit_ms += milliseconds(prepared, Clock::now());
   return true;
+}
+
+void BatchEngine::commit(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                         const btDispatcherInfo& info, btDispatcher* argument) {
+  const Running running(&running_);
+  BT_PROFILE("processAllOverlappingPairs");
+  if (quiet_) {
+    commit_quietly(dispatcher, cache, info);
+    return;
+  }
+  OrderedCommit::Visited visited;
+  if (verify_) {
+    visited = [&](std::size_t i, bool current) { check(dispatcher, info, i, current); };
+  }
+  stats_.written +=
+      ordered_commit_.run(dispatcher, cache, info, argument, batch_, pairs_, results_, visited);
+}
+
+void BatchEngine::commit_quietly(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                                 const btDispatcherInfo& info) {
+  const std::size_t n = pairs_.size();
+  add(quiet_commit_.run(dispatcher, batch_, results_, pool_));
+  quiet_commit_.sort_left(pairs_, info.m_deterministicOverlappingPairs);
+  // The array may grow, and move, while Bullet's algorithms run.
+  const auto visit = [&](std::size_t i) {
+    if (i >= pairs_of(cache).size()) return;
+    (*dispatcher.getNearCallback())(cache.getOverlappingPairArrayPtr()[i], dispatcher, info);
+  };
+  for (const std::uint32_t i : quiet_commit_.left()) visit(i);
+  for (std::size_t i = n; i < pairs_of(cache).size(); ++i) visit(i);
+  if (!verify_) return;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (batch_.kind(i) != PairKind::spheres || !batch_.both_are_spheres(i)) continue;
+    check(dispatcher, info, i, dispatcher.needsCollision(batch_.body_a(i), batch_.body_b(i)));
+  }
+}
+
+void BatchEngine::add(const CommitCounts& counts) {
+  stats_.sphere_pairs += counts.sphere_pairs;
+  stats_.touching += counts.touching;
+  stats_.written += counts.written;
+}
+
+void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info,
+                        std::size_t i, bool current) {
+  ++stats_.verified;
+  const btPersistentManifold* manifold = batch_.manifold(i);
+  const auto difference = check_pair(&dispatcher, info, *batch_.body_a(i), *batch_.body_b(i),
+                                     results_[i], *manifold, current ? manifold : nullptr);
+  if (!difference) return;
+  if (stats_.mismatches++ == 0) stats_.first_mismatch = to_text(*difference);
 }
 
 void BatchEngine::reset_stats() {

@@ -3,26 +3,35 @@
 
 #include <jfpx/bullet/dispatcher.hpp>
 
-#include "src/bullet/sphere_batch.hpp"
+#include "src/bullet/ordered_commit.hpp"
+#include "src/bullet/quiet_commit.hpp"
 
 #include <memory>
 #include <span>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
-/// Keeps nothing of a dispatcher between two dispatches, so that any engine can serve any. One
-/// dispatch at a time.
+/// What the engine must know of the class of a dispatcher.
+struct DispatcherTraits {
+  bool may_override_filter;  ///< needsCollision must be asked about every pair
+  bool tells_releases;       ///< forget() is called for every manifold that it releases
+};
+
+/// Any engine can serve any dispatcher: what it keeps from one dispatch to the next is checked
+/// before it is used. One dispatch at a time.
 class JFPX_API BatchEngine {
  public:
   /// @throws InvalidArgument if `collider` is null.
   BatchEngine(std::unique_ptr<SphereCollider> collider, const DispatcherOptions& options);
 
-  /// Does what dispatcher.btCollisionDispatcher::dispatchAllCollisionPairs would do. `ask_all` when
-  /// the dispatcher's class may override needsCollision: it must be asked about every pair then.
+  /// Does what dispatcher.btCollisionDispatcher::dispatchAllCollisionPairs would do.
   /// @return false if this dispatch must be left to Bullet: nothing was done, and stats().
   ///   last_fallback says why.
-  bool dispatch(btCollisionDispatcher& dispatcher, bool ask_all, btOverlappingPairCache& cache,
-                const btDispatcherInfo& info, btDispatcher* argument);
+  bool dispatch(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
+                btOverlappingPairCache& cache, const btDispatcherInfo& info,
+                btDispatcher* argument);
+  /// The dispatcher is about to release a manifold.
+  void forget(const btPersistentManifold* manifold) noexcept { batch_.forget(manifold); }
 
   std::size_t minimum_batch() const noexcept { return minimum_batch_; }
   void set_minimum_batch(std::size_t pairs) noexcept { minimum_batch_ = pairs; }
@@ -35,15 +44,29 @@ class JFPX_API BatchEngine {
  private:
   Fallback reason_to_fall_back(const btCollisionDispatcher& dispatcher, std::size_t pairs,
                                const btDispatcherInfo& info) const;
-  std::span<const PairResult> prepare(std::span<const btBroadphasePair> pairs, bool ask_all,
-                                      Fallback* fallback);
+  bool prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
+               btOverlappingPairCache& cache, Fallback* fallback);
+  void commit(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+              const btDispatcherInfo& info, btDispatcher* argument);
+  void commit_quietly(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                      const btDispatcherInfo& info);
+  void add(const CommitCounts& counts);
+  void check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info, std::size_t i,
+             bool current);
 
   std::unique_ptr<SphereCollider> collider_;
   std::size_t minimum_batch_;
   bool verify_;
   bool running_ = false;
+  x86::ThreadPool pool_;
   SphereBatch batch_;
+  QuietCommit quiet_commit_;
+  OrderedCommit ordered_commit_;
   DispatchStats stats_;
+  // Of the dispatch that is running:
+  std::span<const btBroadphasePair> pairs_;
+  std::span<const PairResult> results_;
+  bool quiet_ = false;
 };
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -12,17 +12,6 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
-bool callbacks_are_default() {
-  return gContactStartedCallback == nullptr && gContactEndedCallback == nullptr &&
-         gContactDestroyedCallback == nullptr &&
-         gCalculateCombinedFrictionCallback == &btManifoldResult::calculateCombinedFriction &&
-         gCalculateCombinedRestitutionCallback == &btManifoldResult::calculateCombinedRestitution &&
-         gCalculateCombinedRollingFrictionCallback ==
-             &btManifoldResult::calculateCombinedRollingFriction &&
-         gCalculateCombinedSpinningFrictionCallback ==
-             &btManifoldResult::calculateCombinedSpinningFriction;
-}
-
 /// Bullet's limit on combined friction, with its order of comparisons: NaN passes.
 btScalar clamp_friction(btScalar friction) {
   constexpr btScalar kMaxFriction = 10;
@@ -43,13 +32,24 @@ void combine_materials(const btCollisionObject& a, const btCollisionObject& b,
 
 }  // namespace
 
-bool can_write_flat(const btPersistentManifold& manifold, const btCollisionObject& body_a,
-                    const btCollisionObject& body_b) {
+bool contacts_are_heard() {
+  return gContactStartedCallback != nullptr || gContactEndedCallback != nullptr ||
+         gContactDestroyedCallback != nullptr ||
+         gCalculateCombinedFrictionCallback != &btManifoldResult::calculateCombinedFriction ||
+         gCalculateCombinedRestitutionCallback != &btManifoldResult::calculateCombinedRestitution ||
+         gCalculateCombinedRollingFrictionCallback !=
+             &btManifoldResult::calculateCombinedRollingFriction ||
+         gCalculateCombinedSpinningFrictionCallback !=
+             &btManifoldResult::calculateCombinedSpinningFriction;
+}
+
+bool is_plain(const btPersistentManifold& manifold, const btCollisionObject& body_a,
+              const btCollisionObject& body_b) {
   int special = btCollisionObject::CF_HAS_CONTACT_STIFFNESS_DAMPING |
                 btCollisionObject::CF_HAS_FRICTION_ANCHOR;
   if (gContactAddedCallback != nullptr) special |= btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK;
   const int flags = body_a.getCollisionFlags() | body_b.getCollisionFlags();
-  return (flags & special) == 0 && manifold.getBody0() == &body_a && callbacks_are_default();
+  return (flags & special) == 0 && manifold.getBody0() == &body_a;
 }
 
 void write_contact(btPersistentManifold* manifold, const PairResult& result,

@@ -8,11 +8,14 @@ class btPersistentManifold;
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
-/// False where something other than the manifold's fields depends on who writes the contact: a
-/// global callback that would be called, a material that needs more than the defaults, or bodies
-/// in the other order. To be asked for every contact, because a callback may change the answer.
-bool can_write_flat(const btPersistentManifold& manifold, const btCollisionObject& body_a,
-                    const btCollisionObject& body_b);
+/// Whether a global callback would be called for a contact of two spheres, gContactAddedCallback
+/// aside, or a user's function would combine their materials.
+bool contacts_are_heard();
+
+/// Whether write_contact() does all that Bullet would do, given that nobody hears it: the materials
+/// need no more than the defaults, and the manifold has the bodies in this order.
+bool is_plain(const btPersistentManifold& manifold, const btCollisionObject& body_a,
+              const btCollisionObject& body_b);
 
 /// Clears the manifold and, if the pair touches, adds its point: every field of the point gets the
 /// bits that Bullet would give it. `radius_b` is the radius of body b's sphere.

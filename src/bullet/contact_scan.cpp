@@ -101,8 +101,8 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
       __builtin_prefetch(&manifolds[i + kManifoldsAhead]->getContactPoint(0).m_distance1);
     }
     if (i + kObjectsAhead < last) {
-      prefetch_state(manifolds[i + kObjectsAhead]->getBody0());
-      prefetch_state(manifolds[i + kObjectsAhead]->getBody1());
+      prefetch_island_state(manifolds[i + kObjectsAhead]->getBody0());
+      prefetch_island_state(manifolds[i + kObjectsAhead]->getBody1());
     }
     btPersistentManifold* manifold = manifolds[i];
     const int points = manifold->getNumContacts();

@@ -28,9 +28,15 @@ void CollisionDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pair
                                                     const btDispatcherInfo& dispatch_info,
                                                     btDispatcher* dispatcher) {
   const bool subclass = typeid(*this) != typeid(CollisionDispatcher);
-  if (!impl_->engine.dispatch(*this, subclass, *pair_cache, dispatch_info, dispatcher)) {
+  const DispatcherTraits traits{.may_override_filter = subclass, .tells_releases = !subclass};
+  if (!impl_->engine.dispatch(*this, traits, *pair_cache, dispatch_info, dispatcher)) {
     btCollisionDispatcher::dispatchAllCollisionPairs(pair_cache, dispatch_info, dispatcher);
   }
+}
+
+void CollisionDispatcher::releaseManifold(btPersistentManifold* manifold) {
+  impl_->engine.forget(manifold);
+  btCollisionDispatcher::releaseManifold(manifold);
 }
 
 std::size_t CollisionDispatcher::minimum_batch() const noexcept {

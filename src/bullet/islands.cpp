@@ -12,8 +12,8 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
-void prefetch_state_of(const btCollisionObjectArray& objects, int i) {
-  if (i < objects.size()) prefetch_state(objects[i]);
+void prefetch_island_state_of(const btCollisionObjectArray& objects, int i) {
+  if (i < objects.size()) prefetch_island_state(objects[i]);
 }
 const btCollisionObject* object_of(const btBroadphaseProxy* proxy) {
   return static_cast<const btCollisionObject*>(proxy->m_clientObject);
@@ -42,7 +42,7 @@ void number_and_unite(btCollisionWorld& world, btUnionFind* unions) {
   btCollisionObjectArray& objects = world.getCollisionObjectArray();
   int count = 0;
   for (int i = 0; i < objects.size(); ++i) {
-    prefetch_state_of(objects, i + kObjectsAhead);
+    prefetch_island_state_of(objects, i + kObjectsAhead);
     btCollisionObject* object = objects[i];
     if (!object->isStaticOrKinematicObject()) object->setIslandTag(count++);
     object->setCompanionId(-1);
@@ -59,8 +59,8 @@ void number_and_unite(btCollisionWorld& world, btUnionFind* unions) {
       __builtin_prefetch(pair[i + 2 * kObjectsAhead].m_pProxy1);
     }
     if (i + kObjectsAhead < pairs) {
-      prefetch_state(object_of(pair[i + kObjectsAhead].m_pProxy0));
-      prefetch_state(object_of(pair[i + kObjectsAhead].m_pProxy1));
+      prefetch_island_state(object_of(pair[i + kObjectsAhead].m_pProxy0));
+      prefetch_island_state(object_of(pair[i + kObjectsAhead].m_pProxy1));
     }
     const btCollisionObject* a = object_of(pair[i].m_pProxy0);
     const btCollisionObject* b = object_of(pair[i].m_pProxy1);
@@ -72,7 +72,7 @@ void store_islands(btCollisionWorld& world, btUnionFind* unions) {
   btCollisionObjectArray& objects = world.getCollisionObjectArray();
   int index = 0;
   for (int i = 0; i < objects.size(); ++i) {
-    prefetch_state_of(objects, i + kObjectsAhead);
+    prefetch_island_state_of(objects, i + kObjectsAhead);
     btCollisionObject* object = objects[i];
     if (object->isStaticOrKinematicObject()) {
       object->setIslandTag(-1);
@@ -107,7 +107,7 @@ void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& un
     const int island = unions.getElement(first).m_id;
     bool asleep = true;
     for (last = first; last < count && unions.getElement(last).m_id == island; ++last) {
-      if (last + kObjectsAhead < count) prefetch_state(object(last + kObjectsAhead));
+      if (last + kObjectsAhead < count) prefetch_island_state(object(last + kObjectsAhead));
       const btCollisionObject& o = *object(last);
       const int state = o.getActivationState();
       if (o.getIslandTag() == island && (state == ACTIVE_TAG || state == DISABLE_DEACTIVATION)) {
@@ -138,8 +138,8 @@ void IslandSolver::collect_manifolds(btCollisionWorld& world) {
   for (int i = 0; i < count; ++i) {
     if (i + 2 * kManifoldsAhead < count) prefetch_header(manifolds[i + 2 * kManifoldsAhead]);
     if (i + kManifoldsAhead < count) {
-      prefetch_state(manifolds[i + kManifoldsAhead]->getBody0());
-      prefetch_state(manifolds[i + kManifoldsAhead]->getBody1());
+      prefetch_island_state(manifolds[i + kManifoldsAhead]->getBody0());
+      prefetch_island_state(manifolds[i + kManifoldsAhead]->getBody1());
     }
     btPersistentManifold* manifold = manifolds[i];
     if (only_touching && manifold->getNumContacts() == 0) continue;

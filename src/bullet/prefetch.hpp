@@ -1,4 +1,4 @@
-/// Asks early for what lies scattered in Bullet's heaps.
+/// Asking for memory in time: bodies, algorithms and manifolds lie anywhere.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -6,14 +6,64 @@
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
 
+#include <cstddef>
+
 namespace jfpx::inline JFPX_ABI::bullet {
+
+inline void prefetch(const void* address) { __builtin_prefetch(address); }
+
+inline void prefetch_bytes(const void* address, std::size_t bytes) {
+  constexpr std::size_t kCacheLine = 64;
+  for (std::size_t i = 0; i < bytes; i += kCacheLine) {
+    __builtin_prefetch(static_cast<const char*>(address) + i);
+  }
+}
+
+/// For an object no larger than a cache line, which may lie across two.
+inline void prefetch_ends(const void* address, std::size_t bytes) {
+  prefetch(address);
+  prefetch(static_cast<const char*>(address) + bytes - 1);
+}
+
+/// Where the protected fields of a body lie.
+struct BodyFields : btCollisionObject {
+  static constexpr auto shape = &BodyFields::m_collisionShape;
+  static constexpr auto friction = &BodyFields::m_friction;
+  static constexpr auto spinning_friction = &BodyFields::m_spinningFriction;
+  static constexpr auto check_collide_with = &BodyFields::m_checkCollideWith;
+};
+
+/// Class, position, and the fields from the shape to the friction.
+inline void prefetch_state(const btCollisionObject& body) {
+  prefetch(&body);
+  prefetch(&body.getWorldTransform().getOrigin());
+  prefetch(&(body.*BodyFields::shape));
+  prefetch(&(body.*BodyFields::friction));
+}
+
+/// All that a contact of the body needs.
+inline void prefetch_for_contact(const btCollisionObject& body) {
+  prefetch_state(body);
+  prefetch(&(body.*BodyFields::spinning_friction));
+  prefetch(&(body.*BodyFields::check_collide_with));
+}
+
+/// Bodies, count and thresholds. They are private; two thresholds lie between them and the first
+/// public member behind.
+inline void prefetch_count(const btPersistentManifold* manifold) {
+  prefetch(reinterpret_cast<const char*>(&manifold->m_companionIdA) - 3 * sizeof(btScalar));
+}
+
+inline void prefetch_first_point(const btPersistentManifold* manifold) {
+  prefetch_bytes(manifold, sizeof(btTypedObject) + sizeof(btManifoldPoint));
+}
 
 /// How far ahead of its use: manifolds come from memory, their bodies seldom.
 inline constexpr int kManifoldsAhead = 16, kObjectsAhead = 8;
 
 /// The flags, island tag, companion id and activation state of an object. Where they lie is
 /// private, so this is a guess, which costs nothing if it is wrong.
-inline void prefetch_state(const btCollisionObject* object) {
+inline void prefetch_island_state(const btCollisionObject* object) {
   constexpr int kGuess = sizeof(btScalar) == 4 ? 224 : 400;
   __builtin_prefetch(reinterpret_cast<const char*>(object) + kGuess);
   __builtin_prefetch(reinterpret_cast<const char*>(object) + kGuess + 24);

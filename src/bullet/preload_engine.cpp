@@ -128,7 +128,8 @@ JFPX_API bool jfpx_preload_try_dispatch(void* dispatcher, void* pair_cache, cons
   if (engine.get() == nullptr) return false;
   btCollisionDispatcher& own = *static_cast<btCollisionDispatcher*>(dispatcher);
   const bool subclass = typeid(own) != typeid(btCollisionDispatcher);
-  return engine.get()->dispatch(own, subclass, *static_cast<btOverlappingPairCache*>(pair_cache),
+  const DispatcherTraits traits{.may_override_filter = subclass, .tells_releases = false};
+  return engine.get()->dispatch(own, traits, *static_cast<btOverlappingPairCache*>(pair_cache),
                                 *static_cast<const btDispatcherInfo*>(info),
                                 static_cast<btDispatcher*>(argument));
 }

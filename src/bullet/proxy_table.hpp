@@ -1,4 +1,4 @@
-/// Numbers the distinct broadphase proxies of a pair list, in order of first appearance.
+/// Numbers the broadphase proxies that a list of pairs names, and keeps the numbers while it does.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -16,35 +16,38 @@ namespace jfpx::inline JFPX_ABI::bullet {
 /// array indices belong to one world.
 class ProxyTable {
  public:
-  /// Forgets all proxies. `expected` is a guess of how many will come.
-  void reset(std::size_t expected) {
+  void clear() {
     proxies_.clear();
-    capacity_ = std::bit_ceil(2 * expected + 64);
-    if (entries_.size() < capacity_) entries_.resize(capacity_);
-    clear_entries();
+    users_.clear();
+    in_use_ = 0;
+    if (capacity_ == 0) {
+      grow();
+    } else {
+      clear_entries();
+    }
   }
 
-  bool fits_first_level_cache() const { return capacity_ * sizeof(Entry) <= 16384; }
+  /// Numbers run from 0 to here. Those without a user belong to proxies that may be gone.
+  std::size_t size() const { return proxies_.size(); }
+  bool in_use(std::size_t number) const { return users_[number] != 0; }
+  btBroadphaseProxy* proxy(std::size_t number) const { return proxies_[number]; }
+  /// True when it is time to number anew, because most numbers have no user.
+  bool wasteful() const { return proxies_.size() > 2 * in_use_ + 1024; }
+
   /// Brings the proxy's place into the cache. Lookups are as random as the pairs, and a table of
   /// some thousand proxies is larger than the first-level cache.
   void prefetch(const btBroadphaseProxy* proxy) const {
     __builtin_prefetch(&entries_[home(proxy)]);
   }
 
-  /// The number of the proxy; a new one gets the next number.
-  std::uint32_t number(btBroadphaseProxy* proxy) {
+  /// The number of the proxy, which has one user more; a new one gets the next number.
+  std::uint32_t acquire(btBroadphaseProxy* proxy) {
     Entry* entry = find(proxy);
-    if (entry->proxy == proxy) return entry->number;
-    if (2 * (proxies_.size() + 1) > capacity_) {
-      grow();
-      entry = find(proxy);
-    }
-    *entry = {proxy, static_cast<std::uint32_t>(proxies_.size())};
-    proxies_.push_back(proxy);
+    if (entry->proxy == nullptr) entry = add(proxy, entry);
+    in_use_ += users_[entry->number]++ == 0 ? 1 : 0;
     return entry->number;
   }
-
-  const std::vector<btBroadphaseProxy*>& proxies() const { return proxies_; }
+  void release(std::uint32_t number) { in_use_ -= --users_[number] == 0 ? 1 : 0; }
 
  private:
   struct Entry {
@@ -68,14 +71,25 @@ class ProxyTable {
     return &entries_[i];
   }
 
+  Entry* add(btBroadphaseProxy* proxy, Entry* entry) {
+    if (2 * (proxies_.size() + 1) > capacity_) {
+      grow();
+      entry = find(proxy);
+    }
+    *entry = {proxy, static_cast<std::uint32_t>(proxies_.size())};
+    proxies_.push_back(proxy);
+    users_.push_back(0);
+    return entry;
+  }
+
   void clear_entries() {
-    shift_ = 64 - std::countr_zero(capacity_);
     for (std::size_t i = 0; i < capacity_; ++i) entries_[i] = {};
   }
 
   void grow() {
-    capacity_ *= 4;
-    if (entries_.size() < capacity_) entries_.resize(capacity_);
+    capacity_ = capacity_ == 0 ? 64 : 4 * capacity_;
+    shift_ = 64 - std::countr_zero(capacity_);
+    entries_.resize(capacity_);
     clear_entries();
     for (std::size_t i = 0; i < proxies_.size(); ++i) {
       *find(proxies_[i]) = {proxies_[i], static_cast<std::uint32_t>(i)};
@@ -84,6 +98,8 @@ class ProxyTable {
 
   std::vector<Entry> entries_;
   std::vector<btBroadphaseProxy*> proxies_;
+  std::vector<std::uint32_t> users_;
+  std::size_t in_use_ = 0;
   std::size_t capacity_ = 0;
   int shift_ = 0;
 };

@@ -1,74 +1,70 @@
-/// The read-only pre-pass of a dispatch: what the collider needs to know, and what the walk over
-/// the pairs will have to do.
+/// The read-only pre-pass of a dispatch: the bodies and pairs of one pair cache, as they are now.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>
 
-#include "src/bullet/proxy_table.hpp"
+#include "src/bullet/pair_mirror.hpp"
 
-#include <BulletCollision/BroadphaseCollision/btBroadphaseProxy.h>
-#include <BulletCollision/BroadphaseCollision/btCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
 
 #include <vector>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
-/// What the walk does at a pair.
-enum class Action : std::uint8_t {
-  stock,   ///< not two spheres, or not (yet) a pair with Bullet's own sphere-sphere algorithm
-  skip,    ///< does not touch and has no points: nothing could change
-  ask,     ///< as skip, but a user's override of the collision filter must be asked
-  commit,  ///< touches or has points
+/// What the dispatch needs to know of a body beside its sphere.
+enum BodyTrait : std::uint8_t {
+  kSphere = 1,
+  kActive = 2,
+  /// Its class may override btCollisionObject::checkCollideWithOverride, and it would be called.
+  kForeign = 4,
 };
 
-/// The bodies and pairs of one pair cache, as they are now. Keeps nothing between dispatches except
-/// memory: bodies, algorithms and manifolds may change and move between any two calls.
 class SphereBatch {
  public:
   /// Reads the bodies of `pairs`. False if there are no two spheres among them.
-  bool gather(std::span<const btBroadphasePair> pairs);
-  /// Decides for every pair. `results[i]` belongs to pair i; `ask_all` when the dispatcher's class
-  /// may override needsCollision.
-  void plan(std::span<const btBroadphasePair> pairs, std::span<const PairResult> results,
-            bool ask_all);
+  bool gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner,
+              x86::ThreadPool& pool);
+  void forget(const btPersistentManifold* manifold) noexcept { mirror_.forget(manifold); }
 
-  /// One entry a body. Bodies that are not spheres have a point at the origin, and nobody looks at
-  /// the results of their pairs: sorting them out costs more than testing them.
+  /// One entry a body. Bodies that are not spheres have a radius of NaN, so that any pair with one
+  /// "touches" and is sorted out where touching pairs are handled: looking at every pair before
+  /// costs more.
   std::span<const SphereInstance> spheres() const { return spheres_; }
-  std::span<const SpherePair> sphere_pairs() const { return pairs_; }
+  std::span<const SpherePair> pairs() const { return mirror_.pairs(); }
 
-  const btCollisionObject* body_a(std::size_t i) const { return bodies_[pairs_[i].a]; }
-  const btCollisionObject* body_b(std::size_t i) const { return bodies_[pairs_[i].b]; }
-  Action action(std::size_t i) const { return actions_[i]; }
-  /// What plan() counted.
-  std::uint64_t sphere_pair_count() const { return sphere_pair_count_; }
-  std::uint64_t touching_count() const { return touching_count_; }
-  /// The manifold of pair i if Bullet's own sphere-sphere algorithm has one, else null.
-  btPersistentManifold* manifold(std::size_t i) const { return manifolds_[i]; }
-  /// Brings the memory that committing pair i will use into the cache.
-  void prefetch_commit(std::size_t i) const;
+  PairKind kind(std::size_t i) const { return mirror_.kind(i); }
+  /// The manifold of pair i; null for PairKind::other.
+  btPersistentManifold* manifold(std::size_t i) const { return mirror_.manifold(i); }
+  const btCollisionObject* body_a(std::size_t i) const { return bodies_[pairs()[i].a]; }
+  const btCollisionObject* body_b(std::size_t i) const { return bodies_[pairs()[i].b]; }
+  bool both_are_spheres(std::size_t i) const {
+    return (traits_[pairs()[i].a] & traits_[pairs()[i].b] & kSphere) != 0;
+  }
+  /// The traits that either body of pair i has.
+  unsigned either_trait(std::size_t i) const {
+    return static_cast<unsigned>(traits_[pairs()[i].a] | traits_[pairs()[i].b]);
+  }
+  /// The traits, and the collision flags, that any body has.
+  unsigned any_trait() const { return any_trait_; }
+  int any_collision_flag() const { return any_collision_flag_; }
 
  private:
-  enum Trait : std::uint8_t {
-    kSphere = 1,
-    kForeign = 2,  ///< a class that may override btCollisionObject::checkCollideWithOverride
+  struct Summary {
+    unsigned traits = 0;
+    int collision_flags = 0;
+    std::size_t spheres = 0;
   };
 
-  void read_bodies();
-  void find_manifolds(std::span<const btBroadphasePair> pairs, std::span<const PairResult> results,
-                      std::size_t begin, std::size_t end);
-  btPersistentManifold* find_manifold(btCollisionAlgorithm* algorithm);
+  Summary read_bodies(std::size_t begin, std::size_t end);
+  std::uint8_t read_body(std::size_t number);
 
-  ProxyTable table_;
-  std::vector<SpherePair> pairs_;
+  PairMirror mirror_;
   std::vector<SphereInstance> spheres_;
   std::vector<const btCollisionObject*> bodies_;
   std::vector<std::uint8_t> traits_;
-  std::vector<Action> actions_;
-  std::vector<btPersistentManifold*> manifolds_;
-  btManifoldArray found_;
-  std::uint64_t sphere_pair_count_ = 0, touching_count_ = 0;
+  std::vector<Summary> summaries_;  ///< by chunk
+  unsigned any_trait_ = 0;
+  int any_collision_flag_ = 0;
 };
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -47,6 +47,8 @@ class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
   void dispatchAllCollisionPairs(btOverlappingPairCache* pair_cache,
                                  const btDispatcherInfo& dispatch_info,
                                  btDispatcher* dispatcher) override;
+  /// As in Bullet; also forgets what was remembered of the manifold.
+  void releaseManifold(btPersistentManifold* manifold) override;
 
   std::size_t minimum_batch() const noexcept;
   void set_minimum_batch(std::size_t pairs) noexcept;

@@ -1,0 +1,127 @@
+/// The walk in Bullet's order.
+#include "src/bullet/ordered_commit.hpp"
+
+#include "src/bullet/contact_point.hpp"
+#include "src/bullet/prefetch.hpp"
+
+#include <algorithm>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+class OrderedCommit::Walk final : public btOverlapCallback {
+ public:
+  Walk(const OrderedCommit& commit, btCollisionDispatcher& dispatcher, const btDispatcherInfo& info,
+       const SphereBatch& batch, std::span<const btBroadphasePair> pairs,
+       std::span<const PairResult> results, const Visited& visited)
+      : actions_(commit.actions_),
+        dispatcher_(dispatcher),
+        info_(info),
+        batch_(batch),
+        pairs_(pairs),
+        results_(results),
+        visited_(visited) {}
+
+  bool processOverlap(btBroadphasePair& pair) override {
+    const std::size_t i = (reinterpret_cast<std::uintptr_t>(&pair) -
+                           reinterpret_cast<std::uintptr_t>(pairs_.data())) /
+                          sizeof(btBroadphasePair);
+    if (i >= pairs_.size()) {  // added by a callback during this walk
+      visit_stock(pair);
+      return false;
+    }
+    ask_for(i + kAhead);
+    const bool current = visit(i, pair);
+    if (visited_ && batch_.kind(i) == PairKind::spheres && batch_.both_are_spheres(i)) {
+      visited_(i, current);
+    }
+    return false;
+  }
+  std::uint64_t written() const { return written_; }
+
+ private:
+  /// Commits in flight: enough to hide memory, few enough to stay in the cache.
+  static constexpr std::size_t kAhead = 12;
+
+  void ask_for(std::size_t i) const {
+    if (i >= pairs_.size() || actions_[i] != Action::commit) return;
+    prefetch_count(batch_.manifold(i));
+    prefetch_first_point(batch_.manifold(i));
+    prefetch_for_contact(*batch_.body_a(i));
+    prefetch_for_contact(*batch_.body_b(i));
+  }
+
+  void visit_stock(btBroadphasePair& pair) const {
+    (*dispatcher_.getNearCallback())(pair, dispatcher_, info_);
+  }
+
+  bool visit(std::size_t i, btBroadphasePair& pair) {
+    const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
+    switch (actions_[i]) {
+      case Action::stock:
+        visit_stock(pair);
+        return true;
+      case Action::skip:
+        return true;
+      case Action::ask:
+        dispatcher_.needsCollision(a, b);
+        return true;
+      case Action::commit:
+        break;
+    }
+    // Asked for every contact, because a callback may set another one.
+    if (contacts_are_heard() || !is_plain(*batch_.manifold(i), *a, *b)) {
+      visit_stock(pair);
+      return false;  // the near callback asks the filter itself, and does not say what it heard
+    }
+    if (!dispatcher_.needsCollision(a, b)) return false;
+    ++written_;
+    write_contact(batch_.manifold(i), results_[i], *a, *b,
+                  batch_.spheres()[batch_.pairs()[i].b].radius);
+    return true;
+  }
+
+  std::span<const Action> actions_;
+  btCollisionDispatcher& dispatcher_;
+  const btDispatcherInfo& info_;
+  const SphereBatch& batch_;
+  std::span<const btBroadphasePair> pairs_;
+  std::span<const PairResult> results_;
+  const Visited& visited_;
+  std::uint64_t written_ = 0;
+};
+
+CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairResult> results,
+                                 bool ask_all) {
+  constexpr std::size_t kAhead = 16;
+  const std::size_t n = results.size();
+  actions_.resize(n);
+  CommitCounts counts;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (i + kAhead < n && batch.kind(i + kAhead) == PairKind::spheres) {
+      prefetch_count(batch.manifold(i + kAhead));
+    }
+    actions_[i] = Action::stock;
+    if (!batch.both_are_spheres(i)) continue;
+    ++counts.sphere_pairs;
+    counts.touching += results[i].touching;
+    if (batch.kind(i) != PairKind::spheres) continue;
+    if (results[i].touching != 0 || batch.manifold(i)->getNumContacts() != 0) {
+      actions_[i] = Action::commit;
+    } else {
+      const bool ask = ask_all || (batch.either_trait(i) & kForeign) != 0;
+      actions_[i] = ask ? Action::ask : Action::skip;
+    }
+  }
+  return counts;
+}
+
+std::uint64_t OrderedCommit::run(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                                 const btDispatcherInfo& info, btDispatcher* argument,
+                                 const SphereBatch& batch, std::span<const btBroadphasePair> pairs,
+                                 std::span<const PairResult> results, const Visited& visited) {
+  Walk walk(*this, dispatcher, info, batch, pairs, results, visited);
+  cache.processAllOverlappingPairs(&walk, argument, info);
+  return walk.written();
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,128 @@
+/// One pass over the pairs: most need no more than a look at the number of points.
+#include "src/bullet/quiet_commit.hpp"
+
+#include "src/bullet/contact_point.hpp"
+#include "src/bullet/prefetch.hpp"
+
+#include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+class Committer {
+ public:
+  Committer(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
+            std::span<const PairResult> results, std::size_t begin, std::size_t end)
+      : dispatcher_(dispatcher), batch_(batch), results_(results), begin_(begin), end_(end) {}
+
+  /// Writes the pairs that are left to Bullet to `left` and returns their number.
+  std::size_t run(std::uint32_t* left) {
+    std::size_t count = 0;
+    for (std::size_t i = begin_; i < std::min(end_, begin_ + kAhead); ++i) ask_for(i);
+    for (std::size_t i = begin_; i < end_; ++i) {
+      if (i + kAhead < end_) ask_for(i + kAhead);
+      if (!commit(i)) left[count++] = static_cast<std::uint32_t>(i);
+    }
+    return count;
+  }
+  const CommitCounts& counts() const { return counts_; }
+
+ private:
+  /// Pairs in flight: enough to hide memory, few enough to stay in the first-level cache.
+  static constexpr std::size_t kAhead = 16;
+
+  void ask_for(std::size_t i) const {
+    if (batch_.kind(i) != PairKind::spheres) return;
+    prefetch_count(batch_.manifold(i));
+    if (results_[i].touching == 0) return;
+    prefetch_first_point(batch_.manifold(i));
+    prefetch_for_contact(*batch_.body_a(i));
+    prefetch_for_contact(*batch_.body_b(i));
+  }
+
+  /// False if the pair is left to Bullet.
+  bool commit(std::size_t i) {
+    if (batch_.kind(i) != PairKind::spheres) {
+      if (batch_.both_are_spheres(i)) count_pair(i);
+      return false;
+    }
+    btPersistentManifold* manifold = batch_.manifold(i);
+    if (results_[i].touching == 0 && manifold->getNumContacts() == 0) {
+      ++counts_.sphere_pairs;
+      return true;
+    }
+    if (!batch_.both_are_spheres(i)) return false;  // the shape was exchanged under the algorithm
+    count_pair(i);
+    if ((batch_.either_trait(i) & kActive) == 0) return true;
+    const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
+    if (!is_plain(*manifold, *a, *b)) return false;
+    // Qualified: nobody has overridden it.
+    if (!dispatcher_.btCollisionDispatcher::needsCollision(a, b)) return true;
+    ++counts_.written;
+    write_contact(manifold, results_[i], *a, *b, batch_.spheres()[batch_.pairs()[i].b].radius);
+    return true;
+  }
+
+  void count_pair(std::size_t i) {
+    ++counts_.sphere_pairs;
+    counts_.touching += results_[i].touching;
+  }
+
+  btCollisionDispatcher& dispatcher_;
+  const SphereBatch& batch_;
+  std::span<const PairResult> results_;
+  std::size_t begin_, end_;
+  CommitCounts counts_;
+};
+
+}  // namespace
+
+bool is_quiet(const SphereBatch& batch, bool ask_all) {
+  if (ask_all || (batch.any_trait() & kForeign) != 0) return false;
+  if (contacts_are_heard() || gContactProcessedCallback != nullptr) return false;
+  return gContactAddedCallback == nullptr ||
+         (batch.any_collision_flag() & btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK) == 0;
+}
+
+void QuietCommit::reserve(std::size_t pairs) {
+  left_.resize(pairs);
+  chunks_.resize((pairs + kPairChunk - 1) / kPairChunk);
+}
+
+CommitCounts QuietCommit::run(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
+                              std::span<const PairResult> results, x86::ThreadPool& pool) {
+  const std::size_t n = results.size();
+  pool.run(chunks_.size(), [&](std::size_t chunk) {
+    const std::size_t begin = chunk * kPairChunk;
+    Committer committer(dispatcher, batch, results, begin, std::min(n, begin + kPairChunk));
+    chunks_[chunk].left = committer.run(&left_[begin]);
+    chunks_[chunk].counts = committer.counts();
+  });
+  CommitCounts sum;
+  left_count_ = 0;
+  for (std::size_t chunk = 0; chunk < chunks_.size(); ++chunk) {
+    const Chunk& part = chunks_[chunk];
+    std::memmove(&left_[left_count_], &left_[chunk * kPairChunk],
+                 part.left * sizeof(std::uint32_t));
+    left_count_ += part.left;
+    sum.sphere_pairs += part.counts.sphere_pairs;
+    sum.touching += part.counts.touching;
+    sum.written += part.counts.written;
+  }
+  return sum;
+}
+
+void QuietCommit::sort_left(std::span<const btBroadphasePair> pairs, bool deterministic) {
+  if (!deterministic) return;  // ascending already: the order of the array
+  const auto ids = [&](std::uint32_t i) {
+    return std::pair(pairs[i].m_pProxy0->m_uniqueId, pairs[i].m_pProxy1->m_uniqueId);
+  };
+  std::sort(left_.begin(), left_.begin() + static_cast<std::ptrdiff_t>(left_count_),
+            [&](std::uint32_t p, std::uint32_t q) { return ids(p) > ids(q); });
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
