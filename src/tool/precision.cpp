@@ -15,7 +15,13 @@ namespace jfpx::inline JFPX_ABI::tool {
 namespace {
 
 constexpr std::string_view kOwn = sizeof(Real) == 4 ? "float" : "double";
-constexpr const char* kOther = sizeof(Real) == 4 ? "jfpx-f64" : "jfpx";
+
+/// The same program in the other precision: NAME and NAME-f64 lie side by side.
+std::string sibling_of(const std::string& name) {
+  constexpr std::string_view kSuffix = "-f64";
+  return name.ends_with(kSuffix) ? name.substr(0, name.size() - kSuffix.size())
+                                 : name + std::string(kSuffix);
+}
 
 std::string asked_precision(int argc, char** argv) {
   constexpr std::string_view kOption = "--precision";
@@ -41,8 +47,9 @@ std::string asked_precision(int argc, char** argv) {
 void switch_precision_if_asked(int argc, char** argv) {
   const std::string asked = asked_precision(argc, argv);
   if (asked == kOwn || (asked != "float" && asked != "double")) return;
+  const std::filesystem::path own = std::filesystem::read_symlink("/proc/self/exe");
   const std::string sibling =
-      std::filesystem::read_symlink("/proc/self/exe").replace_filename(kOther).string();
+      std::filesystem::path(own).replace_filename(sibling_of(own.filename())).string();
   execv(sibling.c_str(), argv);
   throw Error(sibling + ", which computes in " + asked +
               " precision, can't be started: " + std::strerror(errno));
