@@ -1,0 +1,25 @@
+# Finds what the viewer needs: sets JFPX_HAS_VIEWER and the target jfpx_viewer3rd. Through
+# pkg-config, because Debian's imgui, epoxy and stb come without CMake files.
+set(JFPX_HAS_VIEWER OFF)
+if(JFPX_VIEWER STREQUAL "OFF")
+  jfpx_summary(viewer off "JFPX_VIEWER=OFF")
+  return()
+endif()
+
+find_package(PkgConfig)
+if(PKG_CONFIG_FOUND)
+  pkg_check_modules(JFPX_VIEWER3RD IMPORTED_TARGET sdl2>=2.0.22 epoxy imgui>=1.80 stb)
+endif()
+if(NOT JFPX_VIEWER3RD_FOUND)
+  set(reason "pkg-config does not find sdl2, epoxy, imgui and stb: run scripts/setup")
+  if(JFPX_VIEWER STREQUAL "ON")
+    message(FATAL_ERROR "JFPX_VIEWER=ON, but ${reason}.")
+  endif()
+  jfpx_summary(viewer off "${reason}")
+  return()
+endif()
+
+set(JFPX_HAS_VIEWER ON)
+add_library(jfpx_viewer3rd INTERFACE)
+target_link_libraries(jfpx_viewer3rd INTERFACE PkgConfig::JFPX_VIEWER3RD)
+jfpx_summary(viewer on "SDL ${JFPX_VIEWER3RD_sdl2_VERSION}, Dear ImGui ${JFPX_VIEWER3RD_imgui_VERSION}")

@@ -1,0 +1,51 @@
+/// Colours of bodies: by number, and by a value between 0 and 1.
+#include "examples/viewer/colours.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace jfpx::inline JFPX_ABI::view {
+
+Paint ball_paint(std::uint32_t index) {
+  static constexpr std::array<Paint, 8> kPool = {{{232, 178, 36},
+                                                  {30, 84, 168},
+                                                  {204, 44, 40},
+                                                  {98, 52, 138},
+                                                  {228, 106, 34},
+                                                  {22, 118, 78},
+                                                  {134, 30, 42},
+                                                  {34, 34, 38}}};
+  // Scattered, so that neighbours differ in colour and kind.
+  const std::uint32_t scattered = (index * 2654435761u) >> 8;
+  Paint paint = kPool[scattered % kPool.size()];
+  paint.pattern = (scattered >> 5) % 5 < 2 ? Pattern::striped_ball : Pattern::solid_ball;
+  return paint;
+}
+
+Paint crate_paint(std::uint32_t index) {
+  const std::uint32_t tone = ((index * 2654435761u) >> 12) % 5;
+  const auto shade = [tone](unsigned base) { return static_cast<std::uint8_t>(base - 7 * tone); };
+  return {shade(196), shade(150), shade(96), Pattern::crate};
+}
+
+Paint scale_paint(Real value) {
+  // Five points of the colour map viridis (van der Walt and Smith).
+  static constexpr std::array<Paint, 5> kPoints = {
+      {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}}};
+  const Real at = std::clamp(value, Real(0), Real(1)) * 4;
+  const auto i = static_cast<std::size_t>(std::min(at, Real(3)));
+  const Real share = at - static_cast<Real>(i);
+  const auto mix = [share](std::uint8_t a, std::uint8_t b) {
+    return static_cast<std::uint8_t>(static_cast<Real>(a) * (1 - share) +
+                                     static_cast<Real>(b) * share + Real(0.5));
+  };
+  const Paint &a = kPoints[i], &b = kPoints[i + 1];
+  return {mix(a.r, b.r), mix(a.g, b.g), mix(a.b, b.b), Pattern::plain};
+}
+
+Paint dimmed(Paint paint) {
+  const auto dim = [](std::uint8_t c) { return static_cast<std::uint8_t>(c * 9 / 16 + 12); };
+  return {dim(paint.r), dim(paint.g), dim(paint.b), paint.pattern};
+}
+
+}  // namespace jfpx::inline JFPX_ABI::view

@@ -1,0 +1,17 @@
+/// Colours of bodies: by number, and by a value between 0 and 1.
+#pragma once
+
+#include "examples/viewer/drawing.hpp"
+
+namespace jfpx::inline JFPX_ABI::view {
+
+/// The colours of a set of pool balls, solid and striped in turn.
+Paint ball_paint(std::uint32_t index);
+/// Wood in slightly different tones.
+Paint crate_paint(std::uint32_t index);
+/// Dark blue over green to yellow, equally bright steps; values are clamped to [0, 1].
+Paint scale_paint(Real value);
+/// The paint in the dark: for bodies that sleep.
+Paint dimmed(Paint paint);
+
+}  // namespace jfpx::inline JFPX_ABI::view

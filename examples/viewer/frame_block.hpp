@@ -1,0 +1,23 @@
+/// The uniform block that all shaders share: shaders/frame.glsl.
+#pragma once
+
+#include "examples/viewer/renderer.hpp"
+
+namespace jfpx::inline JFPX_ABI::view {
+
+/// Laid out as std140 wants it.
+struct FrameBlock {
+  float view_projection[16];
+  float light[16];
+  float ray_x[4], ray_y[4], ray_z[4];
+  float sun[4];
+  float viewport[4];
+  float shadow[4];
+  float occlusion[4];
+};
+
+/// @param width, height of the target in samples
+FrameBlock make_frame_block(const Drawing& drawing, const View& view, const Quality& quality,
+                            int width, int height);
+
+}  // namespace jfpx::inline JFPX_ABI::view

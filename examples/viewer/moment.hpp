@@ -1,0 +1,28 @@
+/// One instant of a run: all that a picture or the panel shows of it.
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::view {
+
+/// Milliseconds of one step.
+struct StageTimes {
+  double integrate = 0, broad = 0, detect = 0, solve = 0, total = 0;
+};
+
+struct Moment {
+  std::uint64_t step = 0;
+  std::vector<BodyState> states;    ///< in the order of the scene's bodies
+  std::vector<std::uint8_t> awake;  ///< likewise, 1 or 0
+  std::vector<Contact> contacts;    ///< a and b are places in the scene
+  StageTimes times;
+  std::uint64_t iterations = 0;  ///< of the native resolver, both loops
+  std::string computed_by;       ///< who found the sphere contacts
+  std::string trouble;           ///< why the run can't go on meaningfully
+};
+
+}  // namespace jfpx::inline JFPX_ABI::view

@@ -1,0 +1,118 @@
+/// The command line of jfpx-view.
+#include "examples/viewer/options.hpp"
+
+#include <jfpx/error.hpp>
+
+#include <algorithm>
+#include <charconv>
+
+namespace jfpx::inline JFPX_ABI::view {
+namespace {
+
+constexpr int kLargestSize = 8192;
+
+Size parse_size(const std::string& text) {
+  Size size;
+  const char* end = text.data() + text.size();
+  const auto [x, bad_width] = std::from_chars(text.data(), end, size.width);
+  if (bad_width == std::errc() && x != end && *x == 'x') {
+    const auto [rest, bad_height] = std::from_chars(x + 1, end, size.height);
+    const int smallest = std::min(size.width, size.height);
+    const int largest = std::max(size.width, size.height);
+    if (bad_height == std::errc() && rest == end && smallest >= 16 && largest <= kLargestSize) {
+      return size;
+    }
+  }
+  throw CLI::ValidationError("--size", "is " + text +
+                                           "; it must be WIDTHxHEIGHT, each from 16 to " +
+                                           std::to_string(kLargestSize) + ", as in 1280x720");
+}
+
+Vec3 parse_point(const std::string& option, const std::string& text) {
+  Vec3 point;
+  const char *from = text.data(), *end = text.data() + text.size();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [rest, bad] = std::from_chars(from, end, point[axis]);
+    const bool last = axis == 2;
+    if (bad != std::errc() || !(absolute(point[axis]) <= Real(1e9)) ||
+        (last ? rest != end : rest == end || *rest != ',')) {
+      throw CLI::ValidationError(option, "is " + text + "; it must be X,Y,Z in metres");
+    }
+    from = rest + 1;
+  }
+  return point;
+}
+
+}  // namespace
+
+void add_view_options(CLI::App& app, ViewOptions& options) {
+  tool::add_scene_options(app, options.run);
+  app.add_flag("--side-by-side", options.side_by_side,
+               "Native, stock Bullet and Bullet with jfpx, in step");
+  app.add_option_function<std::string>(
+         "--engine",
+         [&options](const std::string& name) { options.choice.engine = parse_engine(name); },
+         "native, bullet (with jfpx) or bullet-stock [native]")
+      ->check(CLI::IsMember({"native", "bullet", "bullet-stock"}));
+  app.add_option_function<std::string>(
+         "--backend",
+         [&options](const std::string& name) { options.choice.backend = *parse_backend(name); },
+         "Who finds sphere contacts: auto, x86 or cuda [auto]")
+      ->check(CLI::IsMember({"auto", "x86", "cuda"}));
+  app.add_option("--threads", options.choice.threads, "Threads on x86, 0 = one per core")
+      ->check(tool::whole_number())
+      ->capture_default_str();
+  app.add_flag("--headless", options.headless, "No window, no display");
+  app.add_option("--frames", options.frames, "Steps to run [headless: 120; window: until closed]")
+      ->check(tool::whole_number());
+  app.add_option("--screenshot", options.screenshot, "Write the last frame to this PNG file");
+  app.add_option("--record", options.record,
+                 "Write every frame to this folder as frame-000001.png and so on");
+  app.add_option_function<std::string>(
+      "--size", [&options](const std::string& text) { options.size = parse_size(text); },
+      "Size of the picture or window [1280x720]");
+  app.add_option_function<std::string>(
+         "--quality",
+         [&options](const std::string& name) {
+           options.quality = name == "low"    ? kLowQuality
+                             : name == "high" ? kHighQuality
+                                              : kMediumQuality;
+         },
+         "low, medium or high [medium]")
+      ->check(CLI::IsMember({"low", "medium", "high"}));
+  app.add_option_function<std::string>(
+         "--colours",
+         [&options](const std::string& name) {
+           const auto* found =
+               std::find(std::begin(kColouringNames), std::end(kColouringNames), name);
+           options.colouring = static_cast<Colouring>(found - std::begin(kColouringNames));
+         },
+         "What colours tell: bodies, speed, sleep, penetration or contacts [bodies]")
+      ->check(CLI::IsMember({"bodies", "speed", "sleep", "penetration", "contacts"}));
+  app.add_flag("--contacts", options.contacts, "Draw contact points and normals");
+  app.add_flag("--panel", options.panel, "Show the panel in headless pictures too");
+  app.add_option_function<std::string>(
+      "--eye", [&options](const std::string& text) { options.eye = parse_point("--eye", text); },
+      "Where the camera is: X,Y,Z [m]");
+  app.add_option_function<std::string>(
+      "--target",
+      [&options](const std::string& text) { options.target = parse_point("--target", text); },
+      "What it looks at: X,Y,Z [m]");
+  app.add_flag("--no-render{false}", options.render,
+               "Open no window and draw nothing: for timing the engine alone");
+  app.add_flag("--fullscreen", options.fullscreen, "Start in full screen");
+}
+
+void check(const ViewOptions& options) {
+  if (options.eye.has_value() != options.target.has_value()) {
+    throw InvalidArgument("--eye and --target go together");
+  }
+  if (options.eye && length(*options.target - *options.eye) <= kEpsilon) {
+    throw InvalidArgument("--eye and --target are the same point");
+  }
+  if (!options.render && (!options.screenshot.empty() || !options.record.empty())) {
+    throw InvalidArgument("--no-render draws nothing that --screenshot or --record could write");
+  }
+}
+
+}  // namespace jfpx::inline JFPX_ABI::view

@@ -1,0 +1,77 @@
+/// Plays a run.
+#include "examples/viewer/player.hpp"
+
+#include <cmath>
+
+namespace jfpx::inline JFPX_ABI::view {
+namespace {
+
+std::size_t bytes_of(const Moment& moment) {
+  return sizeof moment + moment.states.size() * (sizeof(BodyState) + 1) +
+         moment.contacts.size() * sizeof(Contact);
+}
+
+}  // namespace
+
+unsigned StepClock::advance(double seconds, double dt) {
+  if (seconds > 0 && std::isfinite(seconds)) rest_ += seconds;
+  const double due = std::floor(rest_ / dt);
+  const unsigned steps = due > kMostSteps ? kMostSteps : static_cast<unsigned>(due);
+  rest_ = due > kMostSteps ? 0 : rest_ - due * dt;
+  share_ = rest_ / dt;
+  return steps;
+}
+
+Player::Player(std::unique_ptr<Run> run, const Scene& scene) : scene_(scene), run_(std::move(run)) {
+  keep(run_->moment());
+}
+
+void Player::keep(Moment moment) {
+  bytes_ += bytes_of(moment);
+  history_.push_back(std::move(moment));
+  while (history_.size() > 2 && (bytes_ > kHistoryBytes || history_.size() > kHistoryLength)) {
+    bytes_ -= bytes_of(history_.front());
+    history_.pop_front();
+  }
+  shown_ = history_.size() - 1;
+}
+
+void Player::advance(double seconds) {
+  if (paused) return;
+  const unsigned steps = clock_.advance(seconds * speed, static_cast<double>(scene_.dt));
+  for (unsigned i = 0; i < steps; ++i) step();
+}
+
+void Player::step() {
+  if (in_the_past()) {
+    ++shown_;
+    return;
+  }
+  run_->step();
+  keep(run_->moment());
+}
+
+bool Player::step_back() {
+  clock_.settle();
+  if (shown_ == 0) return false;
+  --shown_;
+  return true;
+}
+
+bool Player::switch_to(const EngineChoice& choice) {
+  if (choice == run_->choice()) return true;
+  if (run_->switch_to(choice)) return true;
+  run_ = continue_run(scene_, history_.back(), choice);
+  shown_ = history_.size() - 1;
+  return false;
+}
+
+void Player::set_settings(const Scene& settings) {
+  scene_.dt = settings.dt;
+  scene_.resolver = settings.resolver;
+  scene_.sleep = settings.sleep;
+  run_ = continue_run(scene_, history_.back(), run_->choice());
+  shown_ = history_.size() - 1;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::view

@@ -1,0 +1,24 @@
+/// Numbered pictures in a folder, to be made into a film.
+#pragma once
+
+#include "examples/viewer/image.hpp"
+
+namespace jfpx::inline JFPX_ABI::view {
+
+class Recorder {
+ public:
+  /// Makes the folder; an empty name records nothing. @throws FileError
+  explicit Recorder(std::string folder);
+  bool on() const { return !folder_.empty(); }
+  /// Writes frame-000001.png and so on. @throws FileError
+  void add(const Image& image);
+
+ private:
+  std::string folder_;
+  unsigned frames_ = 0;
+};
+
+/// The first of STEM-1, STEM-2, ... that does not exist yet, with the ending.
+std::string free_name(const std::string& stem, const std::string& ending);
+
+}  // namespace jfpx::inline JFPX_ABI::view

@@ -1,0 +1,70 @@
+/// Draws pictures with OpenGL 3.3: ray-cast spheres, boxes, grounds, soft shadows.
+#pragma once
+
+#include "examples/viewer/camera.hpp"
+#include "examples/viewer/drawing.hpp"
+#include "examples/viewer/gl.hpp"
+#include "examples/viewer/image.hpp"
+
+#include <memory>
+
+namespace jfpx::inline JFPX_ABI::view {
+
+/// What beauty may cost.
+struct Quality {
+  int supersample = 1;         ///< samples along an edge of a pixel, all shaded
+  int samples = 4;             ///< multisampling of edges
+  int shadow_size = 2048;      ///< texels along an edge of the shadow map; 0 for none
+  int shadow_taps = 16;        ///< for each of the two loops of a soft shadow
+  int occlusion_samples = 12;  ///< 0 for no ambient occlusion
+  friend bool operator==(const Quality&, const Quality&) = default;
+};
+inline constexpr Quality kLowQuality{1, 4, 1024, 4, 0};
+inline constexpr Quality kMediumQuality{};
+inline constexpr Quality kHighQuality{2, 4, 4096, 24, 24};
+
+/// A rectangle of the output, in pixels from its lower left corner.
+struct Viewport {
+  int x = 0, y = 0, width = 0, height = 0;
+};
+
+/// Needs a current context for its whole life. A picture takes one draw call a kind of item and
+/// pass, whatever the number of bodies.
+class Renderer {
+ public:
+  explicit Renderer(const Quality& quality = {});
+  ~Renderer();
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+
+  void set_quality(const Quality& quality);
+  const Quality& quality() const;
+
+  /// Draws into the viewport of a framebuffer; 0 is the window.
+  void draw(const Drawing& drawing, const View& view, const Viewport& viewport,
+            GLuint framebuffer = 0);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A framebuffer without a window, whose pixels can be read.
+class Canvas {
+ public:
+  Canvas(int width, int height);
+  int width() const { return width_; }
+  int height() const { return height_; }
+  GLuint framebuffer() const { return framebuffer_.name(); }
+  Image read() const { return read_pixels(framebuffer(), width_, height_); }
+
+  /// The lower left part of a framebuffer.
+  static Image read_pixels(GLuint framebuffer, int width, int height);
+
+ private:
+  int width_, height_;
+  GlTexture colour_;
+  GlFramebuffer framebuffer_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::view

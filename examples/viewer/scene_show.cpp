@@ -1,0 +1,89 @@
+/// One run in the window.
+#include "examples/viewer/scene_show.hpp"
+
+#include "examples/viewer/framing.hpp"
+
+#include <fmt/format.h>
+
+namespace jfpx::inline JFPX_ABI::view {
+namespace {
+
+Player make_player(const ViewOptions& options) {
+  const Scene scene = tool::load(options.run);
+  return {make_run(scene, options.choice), scene};
+}
+
+}  // namespace
+
+SceneShow::SceneShow(const ViewOptions& options)
+    : options_(options), player_(make_player(options)), stage_(player_.scene()) {
+  colouring = options.colouring;
+  contacts = options.contacts;
+  wanted_spheres_ = static_cast<int>(options.run.spheres.value_or(0));
+  wanted_seed_ = static_cast<int>(options.run.seed);
+  home();
+}
+
+void SceneShow::load(const ViewOptions& options) {
+  Player fresh = make_player(options);  // may throw; the old one runs on then
+  fresh.paused = player_.paused;
+  fresh.speed = player_.speed;
+  player_ = std::move(fresh);
+  stage_ = Stage(player_.scene());
+  options_ = options;
+  picked_.reset();
+}
+
+void SceneShow::advance(double seconds) {
+  player_.paused = paused;
+  player_.speed = speed;
+  player_.advance(seconds);
+}
+void SceneShow::step() { player_.step(); }
+void SceneShow::step_back() { player_.step_back(); }
+void SceneShow::restart() {
+  ViewOptions same = options_;
+  same.choice = player_.choice();
+  load(same);
+}
+void SceneShow::home() { camera = camera_for(options_, player_.scene(), player_.shown()); }
+
+View SceneShow::view() const {
+  const Bounds bounds = bounds_of(player_.scene(), player_.shown().states);
+  return camera.view(bounds.centre, bounds.radius);
+}
+
+void SceneShow::draw(Renderer& renderer, const Target& target) {
+  const View now = view();
+  Drawing drawing(now.eye);
+  stage_.draw(player_.before(), player_.shown(), player_.share(), colouring, &drawing);
+  if (contacts) stage_.draw_contacts(player_.shown().contacts, false, &drawing);
+  if (picked_) stage_.draw_mark(player_.shown(), *picked_, &drawing);
+  renderer.draw(drawing, now, {0, 0, target.width, target.height}, target.framebuffer);
+}
+
+void SceneShow::pick(int x, int y, int width, int height) {
+  const View now = view();
+  const Vec3 direction =
+      ray_through(now, static_cast<Real>(x), static_cast<Real>(y), width, height);
+  picked_ = stage_.pick(player_.shown(), now.eye, direction);
+}
+
+int SceneShow::status() const {
+  return player_.shown().trouble.empty() ? tool::kSuccess : tool::kCheckFailed;
+}
+
+std::string SceneShow::summary() const {
+  const Moment& now = player_.shown();
+  const EngineChoice choice = player_.choice();
+  return fmt::format("{}: {} bodies, step {}, {} contacts, engine {}, spheres by {}{}{}",
+                     player_.scene().name, player_.scene().bodies.size(), now.step,
+                     now.contacts.size(), kEngineNames[static_cast<std::size_t>(choice.engine)],
+                     now.computed_by, now.trouble.empty() ? "" : "; ", now.trouble);
+}
+
+std::unique_ptr<Show> make_scene_show(const ViewOptions& options) {
+  return std::make_unique<SceneShow>(options);
+}
+
+}  // namespace jfpx::inline JFPX_ABI::view

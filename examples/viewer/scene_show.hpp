@@ -1,0 +1,49 @@
+/// One run in the window, with its panel.
+#pragma once
+
+#include "examples/viewer/player.hpp"
+#include "examples/viewer/show.hpp"
+
+#include <optional>
+
+namespace jfpx::inline JFPX_ABI::view {
+
+class SceneShow final : public Show {
+ public:
+  explicit SceneShow(const ViewOptions& options);
+
+  void advance(double seconds) override;
+  void step() override;
+  void step_back() override;
+  void restart() override;
+  void home() override;
+  void draw(Renderer& renderer, const Target& target) override;
+  void panel() override;
+  void pick(int x, int y, int width, int height) override;
+  std::uint64_t steps() const override { return player_.shown().step; }
+  double engine_ms() const override { return player_.shown().times.total; }
+  Real body_size() const override { return stage_.body_size(); }
+  int status() const override;
+  std::string summary() const override;
+
+  Player& player() { return player_; }
+
+ private:
+  void load(const ViewOptions& options);
+  View view() const;
+  void show_controls();
+  void show_scene_choice();
+  void show_engine_choice();
+  void show_settings();
+  void show_counters();
+  void show_picked();
+
+  ViewOptions options_;
+  Player player_;
+  Stage stage_;
+  std::optional<std::uint32_t> picked_;
+  std::string message_;  ///< why the last wish was not granted
+  int wanted_spheres_ = 0, wanted_seed_ = 1;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::view

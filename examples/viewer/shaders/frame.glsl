@@ -1,0 +1,23 @@
+// What every shader knows of a frame. Positions are relative to the eye, in world axes, so that
+// large coordinates keep their digits.
+layout(std140) uniform Frame {
+  mat4 view_projection;
+  mat4 light;      // position -> shadow map: xy and depth in [0, 1]
+  vec4 ray_x;      // half a viewport to the right at distance 1; w: vertical extent of a pixel at 1
+  vec4 ray_y;      // half a viewport up
+  vec4 ray_z;      // forward; w: near plane
+  vec4 sun;        // direction towards the sun; w: tangent of its blur
+  vec4 viewport;   // width, height; z: far plane; w: height of the eye over the horizon's ground
+  vec4 shadow;     // metres a texel, metres across, metres deep; w: taps, 0 for no shadows
+  vec4 occlusion;  // radius in metres; y: samples, 0 for none; z: distance where fog takes over
+};
+
+float pixel_size(float at_distance) { return ray_x.w * at_distance; }
+
+vec3 rotate(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
+vec3 rotate_back(vec4 q, vec3 v) { return rotate(vec4(-q.xyz, q.w), v); }
+
+float depth_of(vec3 p) {
+  vec4 clip = view_projection * vec4(p, 1.0);
+  return clamp(0.5 + 0.5 * clip.z / clip.w, 0.0, 0.9999999);
+}

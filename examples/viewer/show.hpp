@@ -1,0 +1,53 @@
+/// What fills the window: one run, or several side by side.
+#pragma once
+
+#include "examples/viewer/camera.hpp"
+#include "examples/viewer/controls.hpp"
+#include "examples/viewer/options.hpp"
+#include "examples/viewer/renderer.hpp"
+
+#include <memory>
+
+namespace jfpx::inline JFPX_ABI::view {
+
+/// Where a picture goes.
+struct Target {
+  GLuint framebuffer = 0;
+  int width = 0, height = 0;
+};
+
+class Show {
+ public:
+  virtual ~Show() = default;
+
+  virtual void advance(double seconds) = 0;  ///< lets wall time pass
+  virtual void step() = 0;                   ///< exactly one step
+  virtual void step_back() {}
+  virtual void restart() = 0;
+  virtual void home() = 0;  ///< the camera shows everything again
+  /// Draws bodies, and text that belongs to the picture; between Ui::begin() and Ui::end().
+  virtual void draw(Renderer& renderer, const Target& target) = 0;
+  virtual void panel() {}  ///< likewise
+  virtual void pick(int /*x*/, int /*y*/, int /*width*/, int /*height*/) {}
+  /// Keys of a demo, by SDL's names in lower case.
+  virtual std::vector<std::string> demo_keys() const { return {}; }
+  virtual void demo_key(const DemoKey& /*key*/) {}
+
+  virtual std::uint64_t steps() const = 0;            ///< made so far
+  virtual double engine_ms() const = 0;               ///< of the last step
+  virtual Real body_size() const = 0;                 ///< [m]
+  virtual int status() const = 0;                     ///< the exit status so far
+  virtual std::string summary() const { return {}; }  ///< printed at the end
+
+  Camera camera;
+  Colouring colouring = Colouring::bodies;
+  bool contacts = false;
+  bool paused = false;
+  double speed = 1;
+};
+
+std::unique_ptr<Show> make_scene_show(const ViewOptions& options);
+/// @throws BackendUnavailable in a build without Bullet.
+std::unique_ptr<Show> make_side_by_side(const ViewOptions& options);
+
+}  // namespace jfpx::inline JFPX_ABI::view

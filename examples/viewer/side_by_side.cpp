@@ -1,0 +1,271 @@
+/// Native jfpx, stock Bullet and Bullet with jfpx in step, one camera, every difference marked.
+#include <jfpx/bullet/scene_world.hpp>
+#include <jfpx/bullet/verify.hpp>
+
+#include "examples/viewer/bullet_moment.hpp"
+#include "examples/viewer/comparison.hpp"
+#include "examples/viewer/framing.hpp"
+#include "examples/viewer/player.hpp"
+#include "examples/viewer/show.hpp"
+#include "examples/viewer/timing.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <deque>
+#include <imgui.h>
+
+namespace jfpx::inline JFPX_ABI::view {
+namespace {
+
+enum Column : std::size_t { kNative, kStock, kJfpx, kColumns };
+constexpr std::array<const char*, kColumns> kTitles = {"native jfpx", "stock Bullet",
+                                                       "Bullet with jfpx"};
+constexpr std::array<Paint, kColumns> kTrails = {{{255, 170, 40}, {90, 190, 255}, {90, 190, 255}}};
+constexpr std::size_t kTraced = 6;     // bodies whose paths are drawn
+constexpr std::size_t kTrail = 240;    // steps of a path
+constexpr std::size_t kPlotted = 600;  // steps of a plot
+constexpr std::size_t kTimed = 60;     // steps whose median time is shown
+constexpr float kStrip = 0.26f;        // share of the height below the pictures
+
+bullet::SceneWorld make_world(const Scene& scene, const ViewOptions& options,
+                              bullet::DispatcherKind dispatcher) {
+  bullet::SceneWorldOptions world;
+  world.dispatcher = dispatcher;
+  world.dispatch.collider.backend = options.choice.backend;
+  world.dispatch.collider.threads = options.choice.threads;
+  world.dispatch.minimum_batch = 0;  // or small scenes would compare Bullet's code with itself
+  return bullet::SceneWorld(scene, world);
+}
+
+/// The three engines, in step, and what was found about them.
+struct Trio {
+  std::unique_ptr<Run> native;
+  bullet::SceneWorld stock, jfpx;
+  bullet::ContactCheck check;
+  std::array<Moment, kColumns> before, now;
+  std::vector<Contact> different;  ///< contacts of the last step that only one Bullet world has
+  std::uint64_t differences = 0;   ///< of all steps
+  std::string first_difference;
+  std::array<std::vector<float>, kColumns> energies;
+  std::array<std::deque<double>, kColumns> times;  ///< of the last steps [ms]
+  std::vector<float> drifts;
+
+  Trio(const Scene& scene, const ViewOptions& options)
+      : native(
+            make_run(scene, {EngineKind::native, options.choice.backend, options.choice.threads})),
+        stock(make_world(scene, options, bullet::DispatcherKind::stock)),
+        jfpx(make_world(scene, options, bullet::DispatcherKind::jfpx)) {
+    look(0);
+    before = now;
+  }
+
+  void step() {
+    const std::uint64_t step = now[kNative].step + 1;
+    before = std::move(now);
+    native->step();
+    check.capture(stock.world());
+    stock.step();
+    check.compare(stock.world(), step);
+    jfpx.step();
+    look(step);
+    different = different_contacts(now[kStock].contacts, now[kJfpx].contacts);
+    differences += different.size();
+    if (!first_difference.empty()) return;  // all later ones follow from the first
+    const auto difference = bullet::first_difference(stock.world(), jfpx.world(), step);
+    if (difference) first_difference = to_text(*difference);
+  }
+
+ private:
+  void look(std::uint64_t step) {
+    now = {native->moment(), moment_of(stock, step), moment_of(jfpx, step)};
+    const Scene& scene = stock.scene();
+    for (std::size_t i = 0; i < kColumns; ++i) {
+      energies[i].push_back(static_cast<float>(energy(scene, now[i].states)));
+      times[i].push_back(now[i].times.total);
+      if (times[i].size() > kTimed) times[i].pop_front();
+    }
+    drifts.push_back(static_cast<float>(drift(scene, now[kNative].states, now[kStock].states)));
+  }
+};
+
+class SideBySide final : public Show {
+ public:
+  explicit SideBySide(const ViewOptions& options)
+      : options_(options),
+        scene_(tool::load(options.run)),
+        stage_(scene_),
+        trio_(std::make_unique<Trio>(scene_, options)) {
+    colouring = options.colouring;
+    contacts = options.contacts;
+    home();
+  }
+
+  void advance(double seconds) override {
+    if (paused) return;
+    const unsigned due = clock_.advance(seconds * speed, static_cast<double>(scene_.dt));
+    for (unsigned i = 0; i < due; ++i) step();
+  }
+  void step() override {
+    trio_->step();
+    trace();
+  }
+  void restart() override {
+    trio_ = std::make_unique<Trio>(scene_, options_);
+    for (auto& trail : trails_) trail.clear();
+  }
+  void home() override {
+    ViewOptions column = options_;
+    column.size.width = std::max(options_.size.width / 3, 1);
+    column.size.height =
+        std::max(static_cast<int>(static_cast<float>(options_.size.height) * (1 - kStrip)), 1);
+    camera = camera_for(column, scene_, trio_->now[kNative]);
+  }
+  void draw(Renderer& renderer, const Target& target) override;
+
+  std::uint64_t steps() const override { return trio_->now[kNative].step; }
+  double engine_ms() const override {
+    double sum = 0;
+    for (const Moment& moment : trio_->now) sum += moment.times.total;
+    return sum;
+  }
+  Real body_size() const override { return stage_.body_size(); }
+  int status() const override { return same() ? tool::kSuccess : tool::kCheckFailed; }
+  std::string summary() const override;
+
+ private:
+  bool same() const {
+    return trio_->differences == 0 && trio_->first_difference.empty() &&
+           trio_->check.mismatches() == 0;
+  }
+  void trace();
+  void draw_trails(Drawing* drawing) const;
+  void draw_texts(const Target& target, int top_height) const;
+  void draw_plots(const Target& target, int top_height) const;
+
+  ViewOptions options_;
+  Scene scene_;
+  Stage stage_;
+  std::unique_ptr<Trio> trio_;
+  StepClock clock_;
+  std::array<std::deque<std::vector<Vec3>>, kColumns> trails_;
+};
+
+void SideBySide::trace() {
+  for (std::size_t column = 0; column < kColumns; ++column) {
+    std::vector<Vec3> places;
+    const std::size_t stride = std::max<std::size_t>(scene_.bodies.size() / kTraced, 1);
+    for (std::size_t i = 0; i < scene_.bodies.size(); i += stride) {
+      if (scene_.bodies[i].mass > 0) places.push_back(trio_->now[column].states[i].position);
+    }
+    trails_[column].push_back(std::move(places));
+    if (trails_[column].size() > kTrail) trails_[column].pop_front();
+  }
+}
+
+void SideBySide::draw_trails(Drawing* drawing) const {
+  for (const std::size_t column : {kNative, kStock}) {
+    const auto& trail = trails_[column];
+    for (std::size_t i = 1; i < trail.size(); ++i) {
+      const auto alpha = static_cast<std::uint8_t>(60 + 195 * i / trail.size());
+      for (std::size_t k = 0; k < trail[i].size(); ++k) {
+        drawing->add_line(trail[i - 1][k], trail[i][k], kTrails[column], 2.0f, alpha);
+      }
+    }
+  }
+}
+
+void SideBySide::draw(Renderer& renderer, const Target& target) {
+  const int strip = static_cast<int>(static_cast<float>(target.height) * kStrip);
+  const int top_height = target.height - strip;
+  const Bounds bounds = bounds_of(scene_, trio_->now[kNative].states);
+  const View view = camera.view(bounds.centre, bounds.radius);
+  const Real share = paused ? 1 : static_cast<Real>(clock_.share());
+  for (std::size_t column = 0; column < kColumns; ++column) {
+    Drawing drawing(view.eye);
+    const Moment& now = trio_->now[column];
+    stage_.draw(trio_->before[column], now, share, colouring, &drawing);
+    if (contacts) stage_.draw_contacts(now.contacts, false, &drawing);
+    if (column != kNative) stage_.draw_contacts(trio_->different, true, &drawing);
+    draw_trails(&drawing);
+    const int left = target.width * static_cast<int>(column) / 3;
+    const int right = target.width * (static_cast<int>(column) + 1) / 3;
+    renderer.draw(drawing, view, {left, strip, right - left, top_height}, target.framebuffer);
+  }
+  draw_texts(target, top_height);
+  draw_plots(target, top_height);
+}
+
+void SideBySide::draw_texts(const Target& target, int top_height) const {
+  ImDrawList* list = ImGui::GetBackgroundDrawList();
+  const float scale = ImGui::GetIO().DisplaySize.x / static_cast<float>(target.width);
+  const float width = static_cast<float>(target.width) * scale / 3;
+  const float height = static_cast<float>(top_height) * scale;
+  for (std::size_t column = 0; column < kColumns; ++column) {
+    const float left = width * static_cast<float>(column);
+    const Moment& now = trio_->now[column];
+    list->AddRectFilled({left, 0}, {left + width, 26}, IM_COL32(12, 16, 22, 190));
+    list->AddText({left + 10, 6}, IM_COL32_WHITE, kTitles[column]);
+    const std::string count =
+        fmt::format("{} contacts, {:.2f} ms a step", now.contacts.size(),
+                    median({trio_->times[column].begin(), trio_->times[column].end()}));
+    const float room = ImGui::CalcTextSize(count.c_str()).x;
+    list->AddText({left + width - room - 10, 6}, IM_COL32(200, 212, 226, 255), count.c_str());
+    if (column > 0) list->AddLine({left, 0}, {left, height}, IM_COL32(12, 16, 22, 255), 3);
+  }
+}
+
+void SideBySide::draw_plots(const Target& target, int top_height) const {
+  const float scale = ImGui::GetIO().DisplaySize.x / static_cast<float>(target.width);
+  const float top = static_cast<float>(top_height) * scale;
+  ImGui::SetNextWindowPos({0, top});
+  ImGui::SetNextWindowSize({ImGui::GetIO().DisplaySize.x, ImGui::GetIO().DisplaySize.y - top});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
+  ImGui::Begin("differences", nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+                   ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav);
+  const ImVec4 verdict = same() ? ImVec4{0.45f, 0.95f, 0.55f, 1} : ImVec4{1, 0.2f, 0.15f, 1};
+  ImGui::TextColored(
+      verdict, "%s",
+      fmt::format("stock Bullet and Bullet with jfpx: {} different contacts, worlds {}; "
+                  "{} contacts checked against jfpx' own, {} mismatches",
+                  trio_->differences,
+                  trio_->first_difference.empty() ? "identical" : trio_->first_difference,
+                  trio_->check.compared(), trio_->check.mismatches())
+          .c_str());
+  const float height = ImGui::GetContentRegionAvail().y;
+  const float width = (ImGui::GetContentRegionAvail().x - 16) / 3;
+  const auto plot = [&](const char* id, const std::vector<float>& values, const std::string& text) {
+    const std::size_t first = values.size() > kPlotted ? values.size() - kPlotted : 0;
+    ImGui::PlotLines(id, values.data() + first, static_cast<int>(values.size() - first), 0,
+                     text.c_str(), FLT_MAX, FLT_MAX, {width, height});
+  };
+  const auto& e = trio_->energies;
+  plot("##native", e[kNative], fmt::format("energy, native: {:.4g} J", e[kNative].back()));
+  ImGui::SameLine();
+  plot("##bullet", e[kJfpx], fmt::format("energy, Bullet: {:.4g} J", e[kJfpx].back()));
+  ImGui::SameLine();
+  plot("##drift", trio_->drifts,
+       fmt::format("mean distance native to Bullet: {:.4g} m", trio_->drifts.back()));
+  ImGui::End();
+  ImGui::PopStyleVar();
+}
+
+std::string SideBySide::summary() const {
+  return fmt::format(
+      "{}: step {}, {} different contacts between stock Bullet and Bullet with jfpx, worlds {}; {} "
+      "contacts checked, {} mismatches; native is {:.4g} m away on average",
+      scene_.name, steps(), trio_->differences,
+      trio_->first_difference.empty() ? "identical" : trio_->first_difference,
+      trio_->check.compared(), trio_->check.mismatches(), trio_->drifts.back());
+}
+
+}  // namespace
+
+std::unique_ptr<Show> make_side_by_side(const ViewOptions& options) {
+  return std::make_unique<SideBySide>(options);
+}
+
+}  // namespace jfpx::inline JFPX_ABI::view

@@ -1,0 +1,239 @@
+/// How the bodies of a scene look, and where they stand.
+#include "examples/viewer/stage.hpp"
+
+#include "examples/viewer/colours.hpp"
+#include "examples/viewer/values.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace jfpx::inline JFPX_ABI::view {
+namespace {
+
+constexpr Paint kConcrete{168, 168, 166, Pattern::wall};
+constexpr Paint kFloor{124, 130, 138};
+constexpr Paint kGlass{255, 255, 255, Pattern::glass};
+constexpr Real kPlate = Real(0.25);  // thickness of a room's floor, in bodies
+constexpr Real kEndless = kMaxReal / 4;
+
+bool movable(const BodyDef& body) { return body.mass > 0; }
+
+Real size_of(const BodyDef& body) {
+  if (const Sphere* sphere = std::get_if<Sphere>(&body.shape)) return sphere->radius;
+  if (const Box* box = std::get_if<Box>(&body.shape)) return length(box->half_extents);
+  return 0;
+}
+
+/// The middle one, and the ones `left_out` from both ends.
+struct Spread {
+  Real low, high;
+};
+Spread spread(std::vector<Real>& values) {
+  const std::size_t left_out = values.size() / 50;
+  const auto low = values.begin() + static_cast<std::ptrdiff_t>(left_out);
+  const auto high = values.end() - 1 - static_cast<std::ptrdiff_t>(left_out);
+  std::nth_element(values.begin(), low, values.end());
+  const Real lowest = *low;
+  std::nth_element(values.begin(), high, values.end());
+  return {lowest, *high};
+}
+
+int thin_axis(const Vec3& h) {
+  int axis = 0;
+  for (int i = 1; i < 3; ++i) axis = h[i] < h[axis] ? i : axis;
+  return axis;
+}
+
+Vec3 between(const Vec3& a, const Vec3& b, Real share) { return a + (b - a) * share; }
+Quat between(const Quat& a, const Quat& b, Real share) {
+  const Real way = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -share : share;
+  const Real rest = 1 - share;
+  return normalized(Quat{a.w * rest + b.w * way, a.x * rest + b.x * way, a.y * rest + b.y * way,
+                         a.z * rest + b.z * way});
+}
+
+/// A round number of metres near ten bodies: edge of the ground's cells.
+Real cell_for(Real body_size) {
+  return std::pow(Real(10), std::round(std::log10(std::max(body_size, Real(1e-6)) * 2)));
+}
+
+}  // namespace
+
+Bounds bounds_of(const Scene& scene, const std::vector<BodyState>& states) {
+  std::vector<Real> along[3];
+  Real largest = 0;
+  for (const bool wanted : {true, false}) {  // what moves; in a scene where nothing does, the rest
+    for (std::size_t i = 0; i < scene.bodies.size() && i < states.size(); ++i) {
+      const BodyDef& body = scene.bodies[i];
+      if (movable(body) != wanted || std::holds_alternative<HalfSpace>(body.shape)) continue;
+      for (int axis = 0; axis < 3; ++axis) along[axis].push_back(states[i].position[axis]);
+      largest = std::max(largest, size_of(body));
+    }
+    if (!along[0].empty()) break;
+  }
+  if (along[0].empty()) return {{0, 1, 0}, 4};
+  Vec3 low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Spread s = spread(along[axis]);
+    low[axis] = s.low;
+    high[axis] = s.high;
+  }
+  return {(low + high) * Real(0.5), length(high - low) * Real(0.5) + largest};
+}
+
+Stage::Stage(const Scene& scene) : scene_(scene) {
+  std::vector<Real> sizes;
+  for (const BodyDef& body : scene_.bodies) {
+    if (!movable(body)) continue;
+    sizes.push_back(size_of(body));
+    falls_ = falls_ || body.acceleration.y < 0;
+  }
+  if (!sizes.empty()) {
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    body_size_ = *middle;
+  }
+  find_room();
+}
+
+// Large upright boxes around what moves are the walls of a room. They are drawn as glass, cut to
+// the inside, so that one can look in.
+void Stage::find_room() {
+  std::vector<BodyState> states;
+  for (const BodyDef& body : scene_.bodies) states.push_back({body.position, {}, {}, {}});
+  const Bounds bounds = bounds_of(scene_, states);
+  room_ = {{-kEndless, -kEndless, -kEndless}, {kEndless, kEndless, kEndless}};
+  for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
+    const BodyDef& body = scene_.bodies[i];
+    if (movable(body)) continue;
+    const Box* box = std::get_if<Box>(&body.shape);
+    const bool level = body.orientation == Quat{};
+    if (box == nullptr || !level || length(box->half_extents) < bounds.radius) {
+      obstacles_.push_back(i);
+      continue;
+    }
+    const int axis = thin_axis(box->half_extents);
+    const Real away = bounds.centre[axis] - body.position[axis];
+    if (std::fabs(away) < box->half_extents[axis]) {
+      obstacles_.push_back(i);
+      continue;
+    }
+    walls_.push_back(i);
+    const Real half = box->half_extents[axis];
+    if (away > 0) room_.lower[axis] = std::max(room_.lower[axis], body.position[axis] + half);
+    if (away < 0) room_.upper[axis] = std::min(room_.upper[axis], body.position[axis] - half);
+  }
+}
+
+Paint Stage::paint(std::uint32_t body) const {
+  const BodyDef& def = scene_.bodies[body];
+  if (!movable(def)) return kConcrete;
+  return std::holds_alternative<Box>(def.shape) ? crate_paint(body) : ball_paint(body);
+}
+
+void Stage::draw_still(const Bounds& bounds, Drawing* drawing) const {
+  const Real cell = cell_for(body_size_);
+  for (const std::uint32_t i : obstacles_) {
+    const BodyDef& body = scene_.bodies[i];
+    if (const HalfSpace* plane = std::get_if<HalfSpace>(&body.shape)) {
+      drawing->add_ground(plane->normal, plane->offset, cell, kFloor);
+    }
+  }
+  for (const std::uint32_t i : walls_) {
+    const BodyDef& body = scene_.bodies[i];
+    const Vec3 h = std::get<Box>(body.shape).half_extents;
+    const int axis = thin_axis(h);
+    Vec3 low, high;
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::max(body.position[k] - h[k], room_.lower[k]);
+      high[k] = std::min(body.position[k] + h[k], room_.upper[k]);
+    }
+    const bool floor = axis == 1 && bounds.centre.y > body.position.y;
+    const Real thickness = floor ? body_size_ * kPlate : 0;
+    const bool lower_side = bounds.centre[axis] > body.position[axis];
+    high[axis] = lower_side ? room_.lower[axis] : room_.upper[axis] + thickness;
+    low[axis] = lower_side ? room_.lower[axis] - thickness : room_.upper[axis];
+    drawing->add_box((low + high) * Real(0.5), (high - low) * Real(0.5), {},
+                     floor ? kConcrete : kGlass);
+  }
+  // A floor to stand on, where nothing can fall through it.
+  const bool has_floor = room_.lower.y > -kEndless;
+  if (!drawing->grounds().empty() || (falls_ && !has_floor)) return;
+  const Real level = has_floor ? room_.lower.y - body_size_ * kPlate
+                               : bounds.centre.y - bounds.radius - body_size_;
+  drawing->add_ground({0, 1, 0}, level, cell, kFloor);
+}
+
+void Stage::draw(const Moment& from, const Moment& to, Real share, Colouring colouring,
+                 Drawing* drawing) const {
+  const Bounds bounds = bounds_of(scene_, to.states);
+  drawing->set_bounds(bounds.centre, bounds.radius * Real(1.25));
+  drawing->set_detail(body_size_ * Real(1.6));
+  draw_still(bounds, drawing);
+  const std::vector<Real> values = colour_values(scene_, to, colouring);
+  for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
+    const BodyDef& def = scene_.bodies[i];
+    const bool still = !movable(def);
+    if (still && std::find(walls_.begin(), walls_.end(), i) != walls_.end()) continue;
+    const Vec3 position = between(from.states[i].position, to.states[i].position, share);
+    const Quat turn = between(from.states[i].orientation, to.states[i].orientation, share);
+    Paint paint = this->paint(i);
+    if (!still && !values.empty()) paint = scale_paint(values[i]);
+    if (!still && to.awake[i] == 0) paint = dimmed(paint);
+    if (const Sphere* sphere = std::get_if<Sphere>(&def.shape)) {
+      if (still) paint.pattern = Pattern::plain;
+      drawing->add_sphere(position, sphere->radius, turn, paint);
+    } else if (const Box* box = std::get_if<Box>(&def.shape)) {
+      drawing->add_box(position, box->half_extents, turn, paint);
+    }
+  }
+}
+
+void Stage::draw_contacts(const std::vector<Contact>& contacts, bool red, Drawing* drawing) const {
+  for (const Contact& contact : contacts) {
+    const bool still = scene_.bodies[contact.b].mass == 0;
+    const Paint paint = red ? Paint{255, 30, 20} : still ? Paint{255, 170, 40} : Paint{60, 255, 90};
+    const Vec3 end = contact.point + contact.normal * (body_size_ * Real(0.7));
+    drawing->add_line(contact.point, end, paint, red ? 4.0f : 2.0f);
+    drawing->add_line(contact.point, contact.point, paint, red ? 10.0f : 6.0f);
+  }
+}
+
+void Stage::draw_mark(const Moment& moment, std::uint32_t body, Drawing* drawing) const {
+  const Shape& shape = scene_.bodies[body].shape;
+  const Box* box = std::get_if<Box>(&shape);
+  const Real size = size_of(scene_.bodies[body]);
+  const Vec3 half = (box != nullptr ? box->half_extents : Vec3{size, size, size}) * Real(1.06);
+  const Transform pose =
+      make_transform(moment.states[body].orientation, moment.states[body].position);
+  const auto corner = [&](int bits) {
+    const auto side = [bits](int axis) { return (bits >> axis & 1) != 0 ? Real(1) : Real(-1); };
+    return transform_point(pose, component_product(half, {side(0), side(1), side(2)}));
+  };
+  for (int from = 0; from < 8; ++from) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const int to = from | 1 << axis;
+      if (to != from) drawing->add_line(corner(from), corner(to), {255, 240, 120}, 2.0f);
+    }
+  }
+}
+
+std::optional<std::uint32_t> Stage::pick(const Moment& moment, const Vec3& eye,
+                                         const Vec3& direction) const {
+  std::optional<std::uint32_t> found;
+  Real nearest = kMaxReal;
+  for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
+    const BodyDef& def = scene_.bodies[i];
+    if (!movable(def)) continue;
+    const BodyState& state = moment.states[i];
+    const Real distance = std::visit(
+        [&](const auto& shape) { return ray_distance(shape, state, eye, direction); }, def.shape);
+    if (distance < nearest) {
+      nearest = distance;
+      found = i;
+    }
+  }
+  return found;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::view

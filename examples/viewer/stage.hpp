@@ -1,0 +1,62 @@
+/// How the bodies of a scene look, and where they stand: what does not change while it runs.
+#pragma once
+
+#include <jfpx/scene.hpp>
+
+#include "examples/viewer/drawing.hpp"
+#include "examples/viewer/moment.hpp"
+
+#include <optional>
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::view {
+
+/// What the colour of a body says.
+enum class Colouring : std::uint8_t { bodies, speed, sleep, penetration, contacts };
+inline constexpr const char* kColouringNames[] = {"bodies", "speed", "sleep", "penetration",
+                                                  "contacts"};
+
+/// A ball that holds what is worth seeing.
+struct Bounds {
+  Vec3 centre;
+  Real radius = 1;
+};
+/// The ball around the movable bodies, leaving out the one in fifty that went astray on each side.
+Bounds bounds_of(const Scene& scene, const std::vector<BodyState>& states);
+
+class Stage {
+ public:
+  explicit Stage(const Scene& scene);
+
+  /// Adds bodies, grounds and walls. `from` and `to` are two moments of the run, and `share` says
+  /// how far the picture is between them: 0 to 1.
+  void draw(const Moment& from, const Moment& to, Real share, Colouring colouring,
+            Drawing* drawing) const;
+  /// Adds normals and points of contacts as lines; `red` draws them as faults.
+  void draw_contacts(const std::vector<Contact>& contacts, bool red, Drawing* drawing) const;
+
+  /// Adds a frame around one body.
+  void draw_mark(const Moment& moment, std::uint32_t body, Drawing* drawing) const;
+
+  /// The movable body that a ray meets first; the direction is unit.
+  std::optional<std::uint32_t> pick(const Moment& moment, const Vec3& eye,
+                                    const Vec3& direction) const;
+  /// The colour of a body where bodies are told apart.
+  Paint paint(std::uint32_t body) const;
+  /// Radius of a typical movable body [m].
+  Real body_size() const { return body_size_; }
+  const Scene& scene() const { return scene_; }
+
+ private:
+  void find_room();
+  void draw_still(const Bounds& bounds, Drawing* drawing) const;
+
+  Scene scene_;
+  Real body_size_ = Real(0.5);
+  std::vector<std::uint32_t> obstacles_;  ///< immovable bodies that are drawn as they are
+  std::vector<std::uint32_t> walls_;      ///< immovable boxes around the room
+  Aabb room_;                             ///< inside of the walls; endless where there is none
+  bool falls_ = false;                    ///< something has a weight
+};
+
+}  // namespace jfpx::inline JFPX_ABI::view

@@ -1,0 +1,31 @@
+/// Text and panels over the picture: Dear ImGui on a window or on a canvas.
+#pragma once
+
+#include "examples/viewer/renderer.hpp"
+#include "examples/viewer/window.hpp"
+
+namespace jfpx::inline JFPX_ABI::view {
+
+/// One at a time, in the thread of its OpenGL context.
+class Ui {
+ public:
+  explicit Ui(Window& window);  ///< takes events from the window
+  explicit Ui(const Canvas& canvas);
+  ~Ui();
+  Ui(const Ui&) = delete;
+  Ui& operator=(const Ui&) = delete;
+
+  void handle(const SDL_Event& event);
+  bool wants_keyboard() const;
+  bool wants_mouse() const;
+  void begin(double seconds);
+  /// Draws all that was asked for since begin().
+  void end(GLuint framebuffer, int width, int height);
+
+ private:
+  void set_up();
+  bool on_window_;
+  int width_ = 0, height_ = 0;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::view

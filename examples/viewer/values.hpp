@@ -1,0 +1,20 @@
+/// Numbers about bodies: for colouring, and for picking with the mouse.
+#pragma once
+
+#include "examples/viewer/stage.hpp"
+
+namespace jfpx::inline JFPX_ABI::view {
+
+/// A value in [0, 1] for each body, scaled to the largest of the moment where there is no natural
+/// scale; empty for Colouring::bodies.
+std::vector<Real> colour_values(const Scene& scene, const Moment& moment, Colouring colouring);
+
+/// Where a ray enters a shape, as a distance along its unit direction; kMaxReal if it misses or
+/// the shape lies behind.
+Real ray_distance(const Sphere& sphere, const BodyState& state, const Vec3& from,
+                  const Vec3& direction);
+Real ray_distance(const Box& box, const BodyState& state, const Vec3& from, const Vec3& direction);
+Real ray_distance(const HalfSpace& plane, const BodyState& state, const Vec3& from,
+                  const Vec3& direction);
+
+}  // namespace jfpx::inline JFPX_ABI::view

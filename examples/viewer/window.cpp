@@ -1,0 +1,86 @@
+/// A window with OpenGL 3.3, or only the context where no window shall be seen.
+#include "examples/viewer/window.hpp"
+
+#include <jfpx/error.hpp>
+
+#include <epoxy/gl.h>
+
+namespace jfpx::inline JFPX_ABI::view {
+namespace {
+
+[[noreturn]] void refuse(const char* what) {
+  throw BackendUnavailable(std::string(what) + ": " + SDL_GetError());
+}
+
+}  // namespace
+
+int Window::started_ = 0;
+
+void Window::Quit::operator()(int*) const { SDL_Quit(); }
+
+Window::Window(const std::string& title, int width, int height, bool visible) {
+  SDL_SetMainReady();
+  if (SDL_Init(SDL_INIT_VIDEO) != 0) refuse("the viewer finds no display");
+  library_.reset(&started_);
+  SDL_GL_SetAttribute(SDL_GL_CONTEXT_MAJOR_VERSION, 3);
+  SDL_GL_SetAttribute(SDL_GL_CONTEXT_MINOR_VERSION, 3);
+  SDL_GL_SetAttribute(SDL_GL_CONTEXT_PROFILE_MASK, SDL_GL_CONTEXT_PROFILE_CORE);
+  SDL_GL_SetAttribute(SDL_GL_DOUBLEBUFFER, 1);
+  const Uint32 flags =
+      SDL_WINDOW_OPENGL | (visible ? Uint32{SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI}
+                                   : Uint32{SDL_WINDOW_HIDDEN});
+  window_.reset(SDL_CreateWindow(title.c_str(), SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
+                                 width, height, flags));
+  if (window_ == nullptr) refuse("the viewer can't open a window with OpenGL");
+  context_.reset(SDL_GL_CreateContext(window_.get()));
+  if (context_ == nullptr) refuse("the viewer needs OpenGL 3.3");
+  if (epoxy_gl_version() < 33) {
+    throw BackendUnavailable("the viewer needs OpenGL 3.3; this driver has " +
+                             std::to_string(epoxy_gl_version() / 10) + "." +
+                             std::to_string(epoxy_gl_version() % 10));
+  }
+  SDL_GL_SetSwapInterval(1);
+}
+
+Window Window::open(const std::string& title, int width, int height) {
+  return {title, width, height, true};
+}
+
+Window Window::hidden() {
+  // Needs no X server; the user's SDL_VIDEODRIVER goes first.
+  SDL_SetHintWithPriority(SDL_HINT_VIDEODRIVER, "offscreen", SDL_HINT_DEFAULT);
+  return {"jfpx", 16, 16, false};
+}
+
+void Window::swap() { SDL_GL_SwapWindow(window_.get()); }
+void Window::set_title(const std::string& title) {
+  SDL_SetWindowTitle(window_.get(), title.c_str());
+}
+void Window::set_fullscreen(bool on) {
+  if (SDL_SetWindowFullscreen(window_.get(), on ? SDL_WINDOW_FULLSCREEN_DESKTOP : 0) == 0) {
+    fullscreen_ = on;
+  }
+}
+void Window::capture_mouse(bool on) { SDL_SetRelativeMouseMode(on ? SDL_TRUE : SDL_FALSE); }
+
+int Window::pixel_width() const {
+  int width = 0;
+  SDL_GL_GetDrawableSize(window_.get(), &width, nullptr);
+  return width;
+}
+int Window::pixel_height() const {
+  int height = 0;
+  SDL_GL_GetDrawableSize(window_.get(), nullptr, &height);
+  return height;
+}
+float Window::pixel_ratio() const {
+  int points = 0;
+  SDL_GetWindowSize(window_.get(), &points, nullptr);
+  return points > 0 ? static_cast<float>(pixel_width()) / static_cast<float>(points) : 1.0f;
+}
+std::string Window::driver() const {
+  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  return name != nullptr ? name : "unknown";
+}
+
+}  // namespace jfpx::inline JFPX_ABI::view

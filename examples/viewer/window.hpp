@@ -1,0 +1,56 @@
+/// A window with OpenGL 3.3, or only the context where no window shall be seen.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <SDL.h>
+
+#include <memory>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::view {
+
+/// One at a time, because SDL is one.
+class Window {
+ public:
+  /// A visible window that can be resized.
+  /// @throws BackendUnavailable if there is no display or no OpenGL 3.3.
+  static Window open(const std::string& title, int width, int height);
+  /// A context without a window, which needs no display.
+  /// @throws BackendUnavailable if there is no OpenGL 3.3.
+  static Window hidden();
+
+  void swap();
+  void set_title(const std::string& title);
+  void set_fullscreen(bool on);
+  bool fullscreen() const { return fullscreen_; }
+  /// While captured, the mouse is hidden and reports movement without end.
+  void capture_mouse(bool on);
+  int pixel_width() const;
+  int pixel_height() const;
+  /// Pixels a unit of mouse coordinates: 2 on many high-density screens.
+  float pixel_ratio() const;
+  SDL_Window* sdl() const { return window_.get(); }
+  SDL_GLContext context() const { return context_.get(); }
+  std::string driver() const;  ///< OpenGL's name of the renderer
+
+ private:
+  struct Quit {
+    void operator()(int* started) const;
+  };
+  struct CloseWindow {
+    void operator()(SDL_Window* window) const { SDL_DestroyWindow(window); }
+  };
+  struct CloseContext {
+    void operator()(void* context) const { SDL_GL_DeleteContext(context); }
+  };
+  Window(const std::string& title, int width, int height, bool visible);
+
+  static int started_;
+  std::unique_ptr<int, Quit> library_;
+  std::unique_ptr<SDL_Window, CloseWindow> window_;
+  std::unique_ptr<void, CloseContext> context_;
+  bool fullscreen_ = false;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::view

@@ -1,0 +1,359 @@
+/// Camera, keys and mouse, clock and player: all of the viewer that needs no picture.
+#include "examples/viewer/controls.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "examples/scenes/scenes.hpp"
+#include "examples/viewer/comparison.hpp"
+#include "examples/viewer/player.hpp"
+#include "examples/viewer/timing.hpp"
+#include "examples/viewer/values.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace jfpx {
+namespace {
+
+using namespace view;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+SDL_Event key(SDL_Keycode code, bool down = true) {
+  SDL_Event event{};
+  event.type = down ? SDL_KEYDOWN : SDL_KEYUP;
+  event.key.keysym.sym = code;
+  return event;
+}
+SDL_Event mouse_button(Uint32 type, Uint8 button = SDL_BUTTON_LEFT) {
+  SDL_Event event{};
+  event.type = type;
+  event.button.button = button;
+  event.button.x = 40;
+  event.button.y = 30;
+  return event;
+}
+SDL_Event mouse_move(int x, int y) {
+  SDL_Event event{};
+  event.type = SDL_MOUSEMOTION;
+  event.motion.xrel = x;
+  event.motion.yrel = y;
+  return event;
+}
+
+TEST(Controls, CommandsComeInTheOrderOfTheirKeys) {  // erratum E42: last in, first out
+  Controls controls;
+  for (const SDL_Keycode code : {SDLK_SPACE, SDLK_c, SDLK_F1, SDLK_PERIOD}) {
+    controls.handle(key(code));
+    controls.handle(key(code, false));
+  }
+  EXPECT_THAT(controls.take_commands(),
+              ElementsAre(Command::pause, Command::contacts, Command::help, Command::step));
+  EXPECT_THAT(controls.take_commands(), IsEmpty());
+}
+
+TEST(Controls, AKeyPressedAndReleasedWithinAFrameMovesOnceAndDoesNotStick) {  // erratum E42
+  Controls controls;
+  controls.orbit = false;
+  Camera camera;
+  const Vec3 start = camera.eye();
+  controls.handle(key(SDLK_w));
+  controls.handle(key(SDLK_w, false));
+  controls.move(&camera, 0.1, 1);
+  const Vec3 moved = camera.eye();
+  EXPECT_LT(moved.z, start.z);
+  controls.move(&camera, 0.1, 1);
+  EXPECT_EQ(camera.eye(), moved);
+}
+
+TEST(Controls, EveryPossibleKeyCodeIsHarmless) {  // erratum E42: wrote past an array
+  Controls controls;
+  Camera camera;
+  constexpr SDL_Keycode kStrange[] = {SDLK_UNKNOWN, -1,         0x7fffffff,
+                                      -2147483647,  SDLK_SLEEP, 0x40000fff};
+  for (const SDL_Keycode code : kStrange) {
+    controls.handle(key(code));
+    controls.handle(key(code, false));
+  }
+  controls.move(&camera, 0.1, 1);
+  EXPECT_EQ(camera.eye(), Camera().eye());
+  EXPECT_THAT(controls.take_commands(), IsEmpty());
+}
+
+TEST(Controls, LosingTheFocusReleasesAllKeys) {
+  Controls controls;
+  Camera camera;
+  controls.handle(key(SDLK_d));
+  controls.move(&camera, 0.01, 1);
+  SDL_Event lost{};
+  lost.type = SDL_WINDOWEVENT;
+  lost.window.event = SDL_WINDOWEVENT_FOCUS_LOST;
+  controls.handle(lost);
+  const Vec3 there = camera.eye();
+  controls.move(&camera, 1, 1);
+  EXPECT_EQ(camera.eye(), there);
+}
+
+TEST(Controls, WalkingDoesNotDependOnTheFrameRate) {
+  const auto walked = [](int frames) {
+    Controls controls;
+    controls.orbit = false;
+    Camera camera;
+    controls.handle(key(SDLK_w));
+    for (int i = 0; i < frames; ++i) controls.move(&camera, 1.0 / frames, 1);
+    return length(camera.eye() - Camera().eye());
+  };
+  EXPECT_GT(walked(10), 1);
+  EXPECT_NEAR(walked(10), walked(1000), 1e-3);
+}
+
+TEST(Controls, TheMouseTurnsBothAnglesAndAClickWithoutADragPicks) {  // erratum E41: pitch was lost
+  Controls controls;
+  controls.orbit = false;
+  Camera camera;
+  controls.handle(mouse_button(SDL_MOUSEBUTTONDOWN));
+  controls.handle(mouse_move(-100, -60));
+  controls.handle(mouse_button(SDL_MOUSEBUTTONUP));
+  controls.move(&camera, 0.01, 1);
+  EXPECT_GT(camera.yaw(), 0.1);
+  EXPECT_GT(camera.pitch(), 0.1);
+  EXPECT_THAT(controls.take_clicks(), IsEmpty());
+  controls.handle(mouse_button(SDL_MOUSEBUTTONDOWN));
+  controls.handle(mouse_button(SDL_MOUSEBUTTONUP));
+  const auto clicks = controls.take_clicks();
+  ASSERT_EQ(clicks.size(), 1u);
+  EXPECT_EQ(clicks[0].x, 40);
+  // Moves of a mouse that is not held turn nothing.
+  const Real yaw = camera.yaw();
+  controls.handle(mouse_move(50, 50));
+  controls.move(&camera, 0.01, 1);
+  EXPECT_EQ(camera.yaw(), yaw);
+}
+
+TEST(Camera, PitchStopsBeforeTheZenith) {
+  Camera camera;
+  camera.turn(0, 10);
+  EXPECT_EQ(camera.pitch(), Camera::kMaxPitch);
+  camera.turn(0, -20);
+  EXPECT_EQ(camera.pitch(), -Camera::kMaxPitch);
+  camera.look_at({0, 5, 0}, {0, 0, 0});  // straight down
+  const View view = camera.view({}, 1);
+  EXPECT_NEAR(length(view.up), 1, 1e-5);
+  EXPECT_NEAR(dot(view.up, view.forward), 0, 1e-5);
+}
+
+TEST(Camera, OrbitKeepsTheFocusAndZoomTheDirection) {
+  Camera camera;
+  camera.look_at({3, 4, 12}, {0, 1, 0});
+  camera.orbit(Real(0.7), Real(0.2));
+  EXPECT_NEAR(length(camera.focus() - Vec3{0, 1, 0}), 0, 1e-4);
+  const Vec3 forward = camera.forward();
+  camera.zoom(Real(0.5));
+  EXPECT_NEAR(length(camera.focus() - Vec3{0, 1, 0}), 0, 1e-4);
+  EXPECT_NEAR(dot(camera.forward(), forward), 1, 1e-5);
+  camera.zoom(0);  // never reaches the focus
+  EXPECT_GT(camera.distance(), 0);
+}
+
+TEST(Camera, ProjectionAndRayAreInverses) {
+  Camera camera;
+  camera.look_at({3, 4, 12}, {0, 1, 0});
+  const View view = camera.view({}, 5);
+  for (const Vec3 point : {Vec3{0, 1, 0}, Vec3{2, -1, 3}, Vec3{-4, 3, -6}}) {
+    const auto pixel = project(view, point, 640, 480);
+    ASSERT_TRUE(pixel);
+    const Vec3 ray = ray_through(view, pixel->x, pixel->y, 640, 480);
+    EXPECT_NEAR(dot(ray, normalized(point - view.eye)), 1, 1e-5);
+  }
+  EXPECT_FALSE(project(view, {6, 8, 24}, 640, 480));  // behind
+}
+
+TEST(StepClock, StepsAreFixedWhateverTheFrameRate) {
+  for (const int frames : {10, 60, 144, 1000}) {
+    StepClock clock;
+    unsigned steps = 0;
+    for (int i = 0; i < frames; ++i) steps += clock.advance(0.5 / frames, 1.0 / 64);
+    EXPECT_NEAR(steps, 32, 1) << frames;
+    EXPECT_GE(clock.share(), 0);
+    EXPECT_LT(clock.share(), 1.0001);
+  }
+  StepClock clock;
+  EXPECT_EQ(clock.advance(1e9, 0.01), StepClock::kMostSteps);  // no endless catching up
+  for (const double bad : {-1.0, 0.0, std::nan(""), HUGE_VAL}) {
+    EXPECT_EQ(clock.advance(bad, 0.01), 0u);
+  }
+}
+
+Player player_of(const Scene& scene, const EngineChoice& choice = {}) {
+  return {make_run(scene, choice), scene};
+}
+
+TEST(Player, SteppingBackAndAheadShowsTheSameBits) {
+  const Scene scene = scenes::make("pile", {.spheres = 40});
+  Player player = player_of(scene), straight = player_of(scene);
+  for (int i = 0; i < 30; ++i) player.step();
+  const std::uint64_t end = state_hash(player.shown().states);
+  for (int i = 0; i < 12; ++i) EXPECT_TRUE(player.step_back());
+  EXPECT_EQ(player.shown().step, 18u);
+  EXPECT_NE(state_hash(player.shown().states), end);
+  for (int i = 0; i < 12; ++i) player.step();
+  EXPECT_EQ(state_hash(player.shown().states), end);
+  for (int i = 0; i < 10; ++i) player.step();
+  for (int i = 0; i < 40; ++i) straight.step();
+  EXPECT_EQ(state_hash(player.shown().states), state_hash(straight.shown().states));
+  while (player.step_back()) {
+  }
+  EXPECT_EQ(player.shown().step, 0u);
+  EXPECT_FALSE(player.step_back());
+}
+
+TEST(Player, SwitchingTheBackendKeepsTheBits) {
+  const Scene scene = scenes::make("pile", {.spheres = 60});
+  Player straight = player_of(scene), switched = player_of(scene);
+  for (int i = 0; i < 60; ++i) {
+    if (i == 10) {
+      EXPECT_TRUE(switched.switch_to({.backend = Backend::x86}));
+    }
+    if (i == 25) {
+      EXPECT_TRUE(switched.switch_to({.backend = Backend::x86, .threads = 3}));
+    }
+    if (i == 40) {
+      EXPECT_TRUE(switched.switch_to({}));
+    }
+    straight.step();
+    switched.step();
+    ASSERT_EQ(state_hash(straight.shown().states), state_hash(switched.shown().states)) << i;
+  }
+}
+
+TEST(Player, ABackendThatCannotBeHadLeavesTheRunAsItWas) {
+  for (const BackendStatus& row : available_backends()) {
+    if (row.usable) continue;
+    Player player = player_of(scenes::make("pile", {.spheres = 10}));
+    player.step();
+    EXPECT_THROW(player.switch_to({.backend = row.backend}), BackendUnavailable);
+    EXPECT_EQ(player.choice(), EngineChoice{});
+    player.step();
+    EXPECT_EQ(player.shown().step, 2u);
+  }
+}
+
+TEST(Player, SwitchingBulletsDispatcherKeepsTheBits) {
+  if (!has_engine(EngineKind::bullet)) GTEST_SKIP() << "built without Bullet";
+  const Scene scene = scenes::make("pile", {.spheres = 60});
+  Player stock = player_of(scene, {.engine = EngineKind::bullet_stock});
+  Player switched = player_of(scene, {.engine = EngineKind::bullet_stock});
+  for (int i = 0; i < 80; ++i) {
+    if (i % 20 == 10) {
+      EXPECT_TRUE(switched.switch_to({.engine = EngineKind::bullet}));
+    }
+    if (i % 20 == 0) {
+      EXPECT_TRUE(switched.switch_to({.engine = EngineKind::bullet_stock}));
+    }
+    stock.step();
+    switched.step();
+    ASSERT_EQ(state_hash(stock.shown().states), state_hash(switched.shown().states)) << i;
+    EXPECT_EQ(switched.shown().computed_by, i % 20 >= 10 ? "x86" : "Bullet") << i;
+  }
+}
+
+TEST(Player, AnotherEngineGoesOnFromTheSameState) {
+  if (!has_engine(EngineKind::bullet)) GTEST_SKIP() << "built without Bullet";
+  const Scene scene = scenes::make("gas", {.spheres = 27});
+  Player player = player_of(scene);
+  for (int i = 0; i < 20; ++i) player.step();
+  const Moment before = player.shown();
+  EXPECT_FALSE(player.switch_to({.engine = EngineKind::bullet}));
+  player.step();
+  EXPECT_EQ(player.shown().step, 21u);
+  EXPECT_LT(drift(scene, before.states, player.shown().states),
+            6 * 1.8 / 60);  // speeds <= 3 sqrt 3
+}
+
+TEST(Player, HistoryIsBounded) {
+  Player player = player_of(scenes::make("gas", {.spheres = 1}));
+  for (std::size_t i = 0; i < Player::kHistoryLength + 100; ++i) player.step();
+  EXPECT_LE(player.history().size(), Player::kHistoryLength);
+}
+
+TEST(Comparison, FindsEveryPlantedDifference) {
+  std::vector<Contact> contacts;
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    contacts.push_back({i, i + 1, {1, 0, 0}, {Real(i), 0, 0}, Real(-0.01)});
+  }
+  contacts.push_back(contacts.back());  // twice the same is not the same as once
+  EXPECT_THAT(different_contacts(contacts, contacts), IsEmpty());
+  std::vector<Contact> reversed(contacts.rbegin(), contacts.rend());
+  EXPECT_THAT(different_contacts(contacts, reversed), IsEmpty());
+  std::vector<Contact> planted = contacts;
+  planted[7].distance = std::nextafter(planted[7].distance, Real(0));
+  EXPECT_EQ(different_contacts(contacts, planted).size(), 2u);  // one gone, one new
+  planted = contacts;
+  planted.pop_back();
+  EXPECT_EQ(different_contacts(contacts, planted).size(), 1u);
+  planted = contacts;
+  planted[3].normal.y = -Real(0);  // another bit
+  EXPECT_EQ(different_contacts(contacts, planted).size(), 2u);
+  EXPECT_EQ(different_contacts({}, contacts).size(), 21u);
+}
+
+TEST(Comparison, EnergyIsKineticPlusPotential) {
+  Scene scene;
+  BodyDef ball;
+  ball.shape = Sphere{2};
+  ball.mass = 3;
+  ball.acceleration = {0, -10, 0};
+  scene.bodies = {ball};
+  const BodyState state{{0, 7, 0}, {}, {4, 0, 0}, {0, 0, 5}};
+  // 3 16/2 + (0.4 3 4) 25/2 + 3 10 7
+  EXPECT_NEAR(energy(scene, std::vector{state}), 24 + 60 + 210, 1e-3);
+  scene.bodies[0].shape = Box{{1, 2, 3}};
+  // Half a turn about x swaps nothing for a spin about z: 3/3 (1 + 4) 25/2
+  const BodyState turned{{0, 7, 0}, {0, 1, 0, 0}, {4, 0, 0}, {0, 0, 5}};
+  EXPECT_NEAR(energy(scene, std::vector{turned}), 24 + 62.5 + 210, 1e-3);
+}
+
+TEST(Stage, PickFindsTheNearestMovableBody) {
+  Scene scene;
+  const auto add = [&scene](Shape shape, const Vec3& at, Real mass) {
+    BodyDef body;
+    body.shape = shape;
+    body.position = at;
+    body.mass = mass;
+    scene.bodies.push_back(body);
+  };
+  add(Sphere{1}, {0, 0, 4}, 0);  // immovable, in front
+  add(Sphere{1}, {0, 0, -3}, 1);
+  add(Box{{1, 1, 1}}, {0, 0, 0}, 1);
+  add(Sphere{1}, {5, 0, 0}, 1);
+  Moment moment;
+  for (const BodyDef& body : scene.bodies) moment.states.push_back({body.position, {}, {}, {}});
+  moment.awake.assign(4, 1);
+  const Stage stage(scene);
+  EXPECT_EQ(stage.pick(moment, {0, 0, 10}, {0, 0, -1}), 2u);
+  EXPECT_EQ(stage.pick(moment, {0, 0, -10}, {0, 0, 1}), 1u);
+  EXPECT_EQ(stage.pick(moment, {5, Real(0.99), 10}, {0, 0, -1}), 3u);
+  EXPECT_EQ(stage.pick(moment, {5, Real(1.01), 10}, {0, 0, -1}), std::nullopt);
+  EXPECT_EQ(stage.pick(moment, {0, 0, 10}, {0, 0, 1}), std::nullopt);  // all behind
+}
+
+TEST(Stage, BoundsLeaveOutTheOneThatFlewAway) {
+  Scene scene = scenes::make("lattice", {.spheres = 1000});
+  std::vector<BodyState> states;
+  for (const BodyDef& body : scene.bodies) states.push_back({body.position, {}, {}, {}});
+  const Real usual = bounds_of(scene, states).radius;
+  states[17].position = {1e6, 0, 0};
+  EXPECT_LT(bounds_of(scene, states).radius, usual * Real(1.1));
+  EXPECT_GT(bounds_of(Scene{}, {}).radius, 0);
+}
+
+TEST(Timing, MedianOfNoneOddAndEven) {
+  EXPECT_EQ(median({}), 0);
+  EXPECT_EQ(median({3, 1, 2}), 2);
+  EXPECT_EQ(median({4, 1, 2, 3}), 2.5);
+}
+
+}  // namespace
+}  // namespace jfpx

@@ -1,0 +1,239 @@
+/// Pictures: what is drawn is where it must be, in its colour, hidden by what is before it.
+#include "examples/viewer/stage.hpp"
+#include "tests/viewer/gl_fixture.hpp"
+
+#include <gmock/gmock.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <random>
+
+namespace jfpx {
+namespace {
+
+using namespace view;
+using RendererTest = test::GlTest;
+
+constexpr int kWidth = 320, kHeight = 200;
+constexpr std::array<Paint, 6> kHues = {
+    {{220, 20, 20}, {20, 200, 20}, {20, 20, 220}, {210, 200, 10}, {200, 10, 200}, {10, 190, 200}}};
+
+unsigned fresh_seed() {
+  const char* given = std::getenv("JFPX_TEST_SEED");
+  return given ? static_cast<unsigned>(std::strtoul(given, nullptr, 10)) : std::random_device{}();
+}
+
+View view_of(const Vec3& eye, const Vec3& target, Real reach) {
+  Camera camera;
+  camera.look_at(eye, target);
+  return camera.view(target, reach);
+}
+
+/// The hue of kHues whose direction in colour space is nearest to the pixel's.
+std::size_t nearest_hue(const std::uint8_t* pixel) {
+  std::size_t best = 0;
+  double best_cosine = -1;
+  for (std::size_t i = 0; i < kHues.size(); ++i) {
+    const double p[] = {double(pixel[0]), double(pixel[1]), double(pixel[2])};
+    const double h[] = {double(kHues[i].r), double(kHues[i].g), double(kHues[i].b)};
+    // Without the grey part, which sky and sun add.
+    const double grey_p = std::min({p[0], p[1], p[2]}), grey_h = std::min({h[0], h[1], h[2]});
+    double pp = 0, hh = 0, ph = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double a = p[k] - grey_p, b = h[k] - grey_h;
+      pp += a * a, hh += b * b, ph += a * b;
+    }
+    const double cosine = ph / std::sqrt(pp * hh + 1e-9);
+    if (cosine > best_cosine) best_cosine = cosine, best = i;
+  }
+  return best;
+}
+
+std::size_t hue_at(const Image& image, const View& view, const Vec3& point) {
+  const auto pixel = project(view, point, image.width, image.height);
+  return nearest_hue(image.at(static_cast<int>(pixel->x), static_cast<int>(pixel->y)));
+}
+
+double mean_difference(const Image& a, const Image& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) sum += std::abs(int{a.rgb[i]} - int{b.rgb[i]});
+  return sum / static_cast<double>(a.rgb.size());
+}
+
+TEST_F(RendererTest, EveryBodysProjectedCentreHasItsColour) {
+  const unsigned seed = fresh_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> jitter(-0.35f, 0.35f), angle(-1, 1);
+  const Vec3 eye{-6, Real(2.5), 15};  // the sun stands behind it, at the left
+  const View view = view_of(eye, {}, 12);
+  Drawing drawing(eye);
+  drawing.set_bounds({}, 12);
+  std::vector<std::pair<Vec3, std::size_t>> bodies;
+  for (int x = -3; x <= 3; ++x) {
+    for (int y = -2; y <= 2; ++y) {
+      const Vec3 at{Real(x) * 2 + jitter(random), Real(y) * 2 + jitter(random), jitter(random)};
+      const std::size_t hue = random() % kHues.size();
+      const Quat turn =
+          normalized(Quat{angle(random), angle(random), angle(random), angle(random)});
+      if (random() % 2 == 0) {
+        drawing.add_sphere(at, Real(0.6), turn, kHues[hue]);
+      } else {
+        drawing.add_box(at, {Real(0.5), Real(0.4), Real(0.6)}, turn, kHues[hue]);
+      }
+      bodies.emplace_back(at, hue);
+    }
+  }
+  const Image image = picture(drawing, view, kWidth, kHeight);
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    EXPECT_EQ(hue_at(image, view, bodies[k].first), bodies[k].second) << "body " << k;
+  }
+}
+
+TEST_F(RendererTest, SpheresAndBoxesHideWhatIsBehindThem) {
+  const Vec3 eye{0, 0, 10};
+  const View view = view_of(eye, {}, 5);
+  for (const bool sphere_first : {true, false}) {
+    Drawing drawing(eye);
+    drawing.set_bounds({}, 5);
+    // A sphere half sunk into a box: the box' face at z = 0, the sphere's front at z = +-0.5.
+    drawing.add_box({0, 0, -1}, {3, 3, 1}, {}, kHues[0]);
+    drawing.add_sphere({0, 0, sphere_first ? Real(-0.5) : Real(-1.5)}, 1, {}, kHues[1]);
+    const Image image = picture(drawing, view, kWidth, kHeight);
+    EXPECT_EQ(hue_at(image, view, {0, 0, 0}), sphere_first ? 1u : 0u);
+    EXPECT_EQ(hue_at(image, view, {Real(-1.5), 1, 0}), 0u);
+  }
+}
+
+TEST_F(RendererTest, DepthOfSpheresIsExactOffTheAxis) {
+  // A thin needle through the edge of a sphere that is far from the middle of the picture: visible
+  // where it sticks out towards the eye, hidden behind the front.
+  const Vec3 eye{0, 0, 10};
+  const View view = view_of(eye, {}, 8);
+  const Vec3 centre{Real(-3.6), 2, 0};
+  const Vec3 to_eye = normalized(eye - centre);
+  for (const Real depth : {Real(0.96), Real(1.04)}) {
+    Drawing drawing(eye);
+    drawing.set_bounds({}, 8);
+    drawing.add_sphere(centre, 1, {}, kHues[2]);
+    drawing.add_sphere(centre + to_eye * depth - to_eye * Real(0.01), Real(0.01) + Real(0.02), {},
+                       kHues[3]);
+    const Image image = picture(drawing, view, 640, 400);
+    EXPECT_EQ(hue_at(image, view, centre), depth > 1 ? 3u : 2u) << depth;
+  }
+}
+
+TEST_F(RendererTest, WorldsFarFromTheOriginLookTheSame) {
+  const auto at_offset = [](const Vec3& offset) {
+    const Vec3 eye = offset + Vec3{2, 1, 8};
+    Drawing drawing(eye);
+    drawing.set_bounds(offset, 4);
+    drawing.add_sphere(offset, 1, {}, {230, 180, 40, Pattern::solid_ball});
+    drawing.add_box(offset + Vec3{2, 0, 0}, {Real(0.5), 1, Real(0.5)}, {},
+                    {200, 150, 90, Pattern::crate});
+    return picture(drawing, view_of(eye, offset, 4), kWidth, kHeight);
+  };
+  // Offsets and positions are exact in both precisions.
+  EXPECT_LT(mean_difference(at_offset({}), at_offset({65536, 0, -32768})), 0.2);
+}
+
+TEST_F(RendererTest, ShadowsFallOnTheGroundAndOnlyThere) {
+  const Vec3 eye{0, 6, 12};
+  const View view = view_of(eye, {}, 8);
+  const auto brightness = [&](bool with_ball, const Vec3& point) {
+    Drawing drawing(eye);
+    drawing.set_bounds({}, 6);
+    drawing.add_ground({0, 1, 0}, 0, 1, {150, 150, 150});
+    if (with_ball) drawing.add_sphere({0, 2, 0}, 1, {}, kHues[0]);
+    const Image image = picture(drawing, view, kWidth, kHeight, kMediumQuality);
+    const auto pixel = project(view, point, kWidth, kHeight);
+    const std::uint8_t* p = image.at(static_cast<int>(pixel->x), static_cast<int>(pixel->y));
+    return p[0] + p[1] + p[2];
+  };
+  // The sun stands at (-0.52, 0.80, 0.34): the ball's centre throws its shadow to (1.3, 0, -0.85).
+  const Vec3 shaded{Real(1.3), 0, Real(-0.85)}, lit{Real(-3), 0, 2};
+  EXPECT_LT(brightness(true, shaded), brightness(false, shaded) * 3 / 4);
+  EXPECT_NEAR(brightness(true, lit), brightness(false, lit), 6);
+}
+
+TEST_F(RendererTest, SpinShowsOnBallsButNotOnPlainSpheres) {
+  const Vec3 eye{0, 0, 5};
+  const View view = view_of(eye, {}, 2);
+  const auto turned = [&](Pattern pattern, const Quat& turn) {
+    Drawing drawing(eye);
+    drawing.set_bounds({}, 2);
+    drawing.add_sphere({}, 1, turn, {200, 40, 40, pattern});
+    return picture(drawing, view, kWidth, kHeight);
+  };
+  const Quat quarter{Real(0.70710678), Real(0.70710678), 0, 0};
+  for (const Pattern pattern : {Pattern::solid_ball, Pattern::striped_ball}) {
+    EXPECT_GT(mean_difference(turned(pattern, {}), turned(pattern, quarter)), 1.0);
+  }
+  EXPECT_EQ(turned(Pattern::plain, {}).rgb, turned(Pattern::plain, quarter).rgb);
+}
+
+TEST_F(RendererTest, NothingIsDrawnTwiceAndEmptyPicturesAreSky) {
+  const Vec3 eye{0, 2, 8};
+  const View view = view_of(eye, {0, 2, 0}, 4);
+  Drawing empty(eye);
+  const Image first = picture(empty, view, kWidth, kHeight);
+  EXPECT_EQ(first.rgb, picture(empty, view, kWidth, kHeight).rgb);
+  // Blue, and bluer at the top.
+  const std::uint8_t *top = first.at(10, 0), *bottom = first.at(10, kHeight - 1);
+  EXPECT_GT(top[2], top[0]);
+  EXPECT_GT(top[2] - top[0], bottom[2] - bottom[0]);
+}
+
+TEST_F(RendererTest, AHundredThousandSpheresTakeOneDraw) {
+  const Vec3 eye{0, 0, 60};
+  Drawing drawing(eye);
+  drawing.set_bounds({}, 40);
+  for (int i = 0; i < 100000; ++i) {
+    drawing.add_sphere({Real(i % 47) - 23, Real(i / 47 % 47) - 23, Real(i / 2209) - 23}, Real(0.4),
+                       {}, kHues[static_cast<std::size_t>(i) % kHues.size()]);
+  }
+  const Image image = picture(drawing, view_of(eye, {}, 45), 160, 100);
+  std::vector<bool> seen(kHues.size());
+  for (int x = 40; x < 120; ++x) seen[nearest_hue(image.at(x, 50))] = true;
+  EXPECT_THAT(seen, ::testing::Each(true));
+}
+
+TEST_F(RendererTest, EqualsItsReference) {
+  Scene scene;
+  const auto add = [&scene](Shape shape, const Vec3& at, Real mass) {
+    BodyDef body;
+    body.shape = shape;
+    body.position = at;
+    body.mass = mass;
+    body.orientation = normalized(Quat{1, Real(0.2) * at.x, Real(0.3), Real(0.1) * at.z});
+    scene.bodies.push_back(body);
+  };
+  for (int i = 0; i < 9; ++i) {
+    const Vec3 at{Real(i % 3) * 2 - 2, 1 + Real(i % 2), Real(i / 3) * 2 - 2};
+    if (i % 3 == 1) {
+      add(Box{{Real(0.7), Real(0.6), Real(0.8)}}, at, 1);
+    } else {
+      add(Sphere{Real(0.9)}, at, 1);
+    }
+  }
+  add(HalfSpace{}, {}, 0);
+  Moment moment;
+  for (const BodyDef& body : scene.bodies) {
+    moment.states.push_back({body.position, body.orientation, {}, {}});
+  }
+  moment.awake.assign(scene.bodies.size(), 1);
+  moment.awake[2] = 0;
+  const Vec3 eye{5, 4, 9};
+  Drawing drawing(eye);
+  Stage(scene).draw(moment, moment, 1, Colouring::bodies, &drawing);
+  const Image image = picture(drawing, view_of(eye, {0, 1, 0}, 5), 240, 150, kHighQuality);
+  const std::string path = JFPX_REFERENCE_FOLDER "/stage.png";
+  if (std::getenv("JFPX_WRITE_REFERENCES") != nullptr) write_png(image, path);
+  const Image reference = read_png(path);
+  ASSERT_EQ(reference.rgb.size(), image.rgb.size());
+  EXPECT_LT(mean_difference(image, reference), 1.5) << "JFPX_WRITE_REFERENCES=1 writes it anew";
+}
+
+}  // namespace
+}  // namespace jfpx

@@ -1,0 +1,194 @@
+/// The program jfpx-view as a user meets it: pictures, exit statuses, errors.
+#include "examples/viewer/image.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+namespace jfpx {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+
+constexpr const char* kOtherPrecision = sizeof(Real) == 4 ? "double" : "float";
+
+/// The program with these arguments; stderr is part of the output.
+test::ProcessResult jfpx_view(const std::string& arguments, const std::string& environment = "") {
+  return test::run_process(environment + " " JFPX_VIEW_PATH " " + arguments + " 2>&1");
+}
+
+/// One sentence, and nothing else, tells what is wrong.
+void expect_fails(const test::ProcessResult& result, int status, const std::string& message) {
+  EXPECT_EQ(result.status, status) << result.output;
+  EXPECT_THAT(result.output, HasSubstr(message));
+  EXPECT_THAT(result.output, ::testing::StartsWith("jfpx-view: "));
+}
+
+/// Brightest minus darkest green.
+int contrast(const view::Image& image) {
+  int low = 255, high = 0;
+  for (std::size_t i = 1; i < image.rgb.size(); i += 3) {
+    low = std::min<int>(low, image.rgb[i]);
+    high = std::max<int>(high, image.rgb[i]);
+  }
+  return high - low;
+}
+
+class Pictures : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto probe = jfpx_view("pile --spheres 0 --headless --frames 0 --size 16x16");
+    if (probe.status == 3) GTEST_SKIP() << probe.output;
+    ASSERT_EQ(probe.status, 0) << probe.output;
+  }
+  test::TemporaryFolder folder;
+
+  view::Image take(const std::string& arguments) {
+    const std::string path = folder.file("picture.png");
+    const auto result =
+        jfpx_view(arguments + " --headless --size 160x120 --quality low --screenshot " + path);
+    EXPECT_EQ(result.status, 0) << result.output;
+    return view::read_png(path);
+  }
+};
+
+TEST_F(Pictures, OfEveryNamedSceneAreNotBlank) {
+  for (const char* scene :
+       {"boxes-and-balls", "pile", "gas", "columns", "overlap", "lattice", "polydisperse"}) {
+    const view::Image image = take(std::string(scene) + " --spheres 27 --frames 5");
+    EXPECT_EQ(image.width, 160);
+    EXPECT_EQ(image.height, 120);
+    EXPECT_GT(contrast(image), 80) << scene;
+  }
+}
+
+TEST_F(Pictures, AreTheSameEveryTimeAndChangeWithTime) {
+  const auto first = take("pile --spheres 60 --frames 30");
+  EXPECT_EQ(first.rgb, take("pile --spheres 60 --frames 30").rgb);
+  EXPECT_NE(first.rgb, take("pile --spheres 60 --frames 10").rgb);
+}
+
+TEST_F(Pictures, ComeInBothPrecisions) {
+  const auto image =
+      take(std::string("pile --spheres 30 --frames 5 --precision ") + kOtherPrecision);
+  EXPECT_GT(contrast(image), 80);
+}
+
+TEST_F(Pictures, ThePanelHasAPlaceInThem) {
+  const auto without = take("pile --spheres 30 --frames 5");
+  const auto with = take("pile --spheres 30 --frames 5 --panel");
+  EXPECT_NE(with.rgb, without.rgb);
+  EXPECT_LT(with.at(20, 60)[0], 90) << "the panel is dark";
+}
+
+TEST_F(Pictures, SideBySideFindsNoDifference) {
+  if (!JFPX_HAS_BULLET) GTEST_SKIP() << "built without Bullet";
+  const auto result = jfpx_view(
+      "--side-by-side pile --spheres 60 --frames 60 --headless --size 300x150 --quality low "
+      "--screenshot " +
+      folder.file("three.png"));
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("0 different contacts"));
+  EXPECT_THAT(result.output, HasSubstr("worlds identical"));
+  EXPECT_THAT(result.output, HasSubstr(" 0 mismatches"));
+  // Bullet's two pictures are the same, and the native one is another.
+  const auto image = view::read_png(folder.file("three.png"));
+  int same = 0, other = 0;
+  for (int y = 30; y < 100; ++y) {
+    for (int x = 2; x < 98; ++x) {
+      same += std::equal(image.at(100 + x, y), image.at(100 + x, y) + 3, image.at(200 + x, y));
+      other += std::equal(image.at(x, y), image.at(x, y) + 3, image.at(100 + x, y));
+    }
+  }
+  EXPECT_EQ(same, 70 * 96);
+  EXPECT_LT(other, 70 * 96);
+}
+
+TEST_F(Pictures, AreRecordedWithNumbers) {
+  const auto result =
+      jfpx_view("gas --spheres 8 --frames 3 --headless --size 64x48 --quality low --record " +
+                folder.file("film"));
+  EXPECT_EQ(result.status, 0) << result.output;
+  for (const char* name :
+       {"film/frame-000001.png", "film/frame-000002.png", "film/frame-000003.png"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder.file(name))) << name;
+  }
+}
+
+TEST_F(Pictures, AWindowRunsAndClosesAtItsLastFrame) {
+  const auto result =
+      jfpx_view("pile --spheres 20 --frames 10 --size 160x120 --quality low --screenshot " +
+                    folder.file("last.png"),
+                "SDL_VIDEODRIVER=offscreen");
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("rendering on"));
+  EXPECT_GT(contrast(view::read_png(folder.file("last.png"))), 80);
+}
+
+TEST(View, RunsWithoutRenderingForTiming) {
+  const auto result = jfpx_view("pile --spheres 20 --frames 10 --no-render", "env -u DISPLAY");
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("10 steps"));
+  EXPECT_THAT(result.output, HasSubstr("rendering off"));
+}
+
+TEST(View, BadUsageIsStatusTwo) {
+  expect_fails(jfpx_view("plie --headless"), 2, "there is no scene called \"plie\"");
+  expect_fails(jfpx_view("missing.json --headless"), 2, "missing.json: can't be opened");
+  expect_fails(jfpx_view("pile --headless --spheres 4 --eye 1,2,3"), 2, "--target");
+  expect_fails(jfpx_view("pile --headless --eye 1,2,3 --target 1,2,3"), 2, "same point");
+  expect_fails(jfpx_view("pile --no-render --screenshot a.png"), 2, "--no-render");
+  for (const char* size : {"0x0", "15x100", "100x9000", "100", "x", "1e3x100", "-5x100"}) {
+    EXPECT_EQ(jfpx_view(std::string("pile --headless --size ") + size).status, 2) << size;
+  }
+  EXPECT_EQ(jfpx_view("pile --headless --eye 1,2 --target 0,0,0").status, 2);
+  EXPECT_EQ(jfpx_view("pile --headless --eye nan,2,3 --target 0,0,0").status, 2);
+  EXPECT_EQ(jfpx_view("pile --headless --colours mood").status, 2);
+  EXPECT_EQ(jfpx_view("pile --headless --frames -1").status, 2);
+}
+
+TEST(View, ABrokenSceneFileIsNamed) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("broken.json");
+  std::ofstream(path) << "{\"jfpx_scene\": 1, \"bodies\": [";
+  expect_fails(jfpx_view(path + " --headless"), 2, path);
+}
+
+TEST(View, NoDisplayIsStatusThree) {
+  expect_fails(
+      jfpx_view("pile --spheres 2", "env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=x11"), 3,
+      "display");
+  // A driver without OpenGL.
+  expect_fails(jfpx_view("pile --spheres 2 --headless", "SDL_VIDEODRIVER=dummy"), 3, "OpenGL");
+}
+
+TEST_F(Pictures, AnOldOpenGlIsStatusThree) {
+  expect_fails(jfpx_view("pile --spheres 2 --headless", "MESA_GL_VERSION_OVERRIDE=3.2"), 3,
+               "OpenGL 3.3");
+}
+
+TEST_F(Pictures, AFileThatCannotBeWrittenIsNamedAndNothingIsLeft) {
+  expect_fails(jfpx_view("pile --spheres 2 --headless --frames 1 --size 32x32 --screenshot " +
+                         folder.file("no/such/folder.png")),
+               2, "no/such/folder.png");
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
+TEST(View, HelpNamesTheOptionsAndExitStatuses) {
+  const auto help = jfpx_view("--help");
+  EXPECT_EQ(help.status, 0);
+  for (const char* word :
+       {"--headless", "--screenshot", "--side-by-side", "--engine", "Exit status"}) {
+    EXPECT_THAT(help.output, HasSubstr(word));
+  }
+  EXPECT_EQ(jfpx_view("--version").output, "jfpx-view " JFPX_VERSION "\n");
+}
+
+}  // namespace
+}  // namespace jfpx
