@@ -4,7 +4,7 @@ set(JFPX_CUDA AUTO CACHE STRING "CUDA backend: AUTO (if nvcc is found), ON (requ
 set_property(CACHE JFPX_CUDA PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_BULLET AUTO CACHE STRING "Bullet adapter: AUTO (if Bullet is found), ON (required) or OFF")
 set_property(CACHE JFPX_BULLET PROPERTY STRINGS AUTO ON OFF)
-set(JFPX_VIEWER AUTO CACHE STRING "Viewer: AUTO (if SDL2, epoxy, imgui, stb are found), ON (required) or OFF")
+set(JFPX_VIEWER AUTO CACHE STRING "Viewer: AUTO (if SDL2, epoxy, imgui and libpng are found), ON (required) or OFF")
 set_property(CACHE JFPX_VIEWER PROPERTY STRINGS AUTO ON OFF)
 option(JFPX_TOOL "Build the jfpx command" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_EXAMPLES "Build the examples" ${PROJECT_IS_TOP_LEVEL})

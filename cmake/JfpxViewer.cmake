@@ -1,5 +1,5 @@
 # Finds what the viewer needs: sets JFPX_HAS_VIEWER and the target jfpx_viewer3rd. Through
-# pkg-config, because Debian's imgui, epoxy and stb come without CMake files.
+# pkg-config, because Debian's imgui and epoxy come without CMake files.
 set(JFPX_HAS_VIEWER OFF)
 if(JFPX_VIEWER STREQUAL "OFF")
   jfpx_summary(viewer off "JFPX_VIEWER=OFF")
@@ -8,10 +8,10 @@ endif()
 
 find_package(PkgConfig)
 if(PKG_CONFIG_FOUND)
-  pkg_check_modules(JFPX_VIEWER3RD IMPORTED_TARGET sdl2>=2.0.22 epoxy imgui>=1.80 stb)
+  pkg_check_modules(JFPX_VIEWER3RD IMPORTED_TARGET sdl2>=2.0.22 epoxy imgui>=1.80 stb libpng)
 endif()
 if(NOT JFPX_VIEWER3RD_FOUND)
-  set(reason "pkg-config does not find sdl2, epoxy, imgui and stb: run scripts/setup")
+  set(reason "pkg-config does not find sdl2, epoxy, imgui, stb and libpng: run scripts/setup")
   if(JFPX_VIEWER STREQUAL "ON")
     message(FATAL_ERROR "JFPX_VIEWER=ON, but ${reason}.")
   endif()

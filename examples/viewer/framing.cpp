@@ -39,7 +39,7 @@ Camera camera_for(const ViewOptions& options, const Scene& scene, const Moment& 
     return camera;
   }
   Bounds bounds = bounds_of(scene, moment.states);
-  const Real largest = Stage(scene).body_size() * 60;
+  const Real largest = Stage(scene).large_size() * 60;
   if (bounds.radius > largest) {
     bounds.centre.y -= (bounds.radius - largest) * Real(0.9);
     bounds.radius = largest;

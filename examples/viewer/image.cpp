@@ -3,37 +3,46 @@
 
 #include <jfpx/error.hpp>
 
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <memory>
-#include <stb_image.h>
-#include <stb_image_write.h>
+#include <png.h>
 
 namespace jfpx::inline JFPX_ABI::view {
+namespace {
+
+png_image new_image() {
+  png_image png;
+  std::memset(&png, 0, sizeof png);
+  png.version = PNG_IMAGE_VERSION;
+  return png;
+}
+
+}  // namespace
 
 void write_png(const Image& image, const std::string& path) {
+  png_image png = new_image();
+  png.width = static_cast<png_uint_32>(image.width);
+  png.height = static_cast<png_uint_32>(image.height);
+  png.format = PNG_FORMAT_RGB;
   const std::string part = path + ".part";
-  errno = 0;
-  stbi_write_png_compression_level = 9;
-  const int written =
-      stbi_write_png(part.c_str(), image.width, image.height, 3, image.rgb.data(), image.width * 3);
-  if (written == 0 || std::rename(part.c_str(), path.c_str()) != 0) {
-    const std::string reason = errno != 0 ? std::strerror(errno) : "the file can't be written";
-    std::remove(part.c_str());
-    throw FileError(path + ": " + reason);
+  if (png_image_write_to_file(&png, part.c_str(), 0, image.rgb.data(), 0, nullptr) != 0 &&
+      std::rename(part.c_str(), path.c_str()) == 0) {
+    return;
   }
+  std::remove(part.c_str());
+  throw FileError(path + ": can't be written: " + png.message);
 }
 
 Image read_png(const std::string& path) {
-  Image image;
-  int channels = 0;
-  const std::unique_ptr<std::uint8_t, decltype(&stbi_image_free)> data(
-      stbi_load(path.c_str(), &image.width, &image.height, &channels, 3), stbi_image_free);
-  if (data == nullptr) throw FileError(path + ": " + stbi_failure_reason());
-  image.rgb.assign(data.get(), data.get() + static_cast<std::size_t>(image.width) *
-                                                static_cast<std::size_t>(image.height) * 3);
-  return image;
+  png_image png = new_image();
+  if (png_image_begin_read_from_file(&png, path.c_str()) != 0) {
+    png.format = PNG_FORMAT_RGB;
+    Image image{static_cast<int>(png.width), static_cast<int>(png.height), {}};
+    image.rgb.resize(PNG_IMAGE_SIZE(png));
+    if (png_image_finish_read(&png, nullptr, image.rgb.data(), 0, nullptr) != 0) return image;
+  }
+  png_image_free(&png);
+  throw FileError(path + ": " + png.message);
 }
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -89,9 +89,9 @@ Stage::Stage(const Scene& scene) : scene_(scene) {
     falls_ = falls_ || body.acceleration.y < 0;
   }
   if (!sizes.empty()) {
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
-    body_size_ = *middle;
+    std::sort(sizes.begin(), sizes.end());
+    body_size_ = sizes[sizes.size() / 2];
+    large_size_ = sizes[sizes.size() * 9 / 10];
   }
   find_room();
 }

@@ -45,6 +45,8 @@ class Stage {
   Paint paint(std::uint32_t body) const;
   /// Radius of a typical movable body [m].
   Real body_size() const { return body_size_; }
+  /// Radius that nine in ten movable bodies do not exceed [m].
+  Real large_size() const { return large_size_; }
   const Scene& scene() const { return scene_; }
 
  private:
@@ -53,6 +55,7 @@ class Stage {
 
   Scene scene_;
   Real body_size_ = Real(0.5);
+  Real large_size_ = Real(0.5);
   std::vector<std::uint32_t> obstacles_;  ///< immovable bodies that are drawn as they are
   std::vector<std::uint32_t> walls_;      ///< immovable boxes around the room
   Aabb room_;                             ///< inside of the walls; endless where there is none
