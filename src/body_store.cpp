@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/assembly.hpp"
 #include "src/inertia_tensor.hpp"
 #include "src/shared/inertia.hpp"
 #include "src/shared/integrate.hpp"
@@ -10,6 +11,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 namespace jfpx::inline JFPX_ABI {
 namespace {
@@ -18,12 +20,30 @@ Real kept_per_step(Real kept_per_second, Real dt) {
   return static_cast<Real>(shared::power(kept_per_second, dt));
 }
 
-Vec3 moments_of(const Shape& shape, Real mass) {
+/// Of a solid body of a shape that can move.
+Mat3 tensor_of(const Shape& shape, Real mass) {
   if (const auto* sphere = std::get_if<Sphere>(&shape)) {
-    return shared::moments_of_inertia(*sphere, mass);
+    return diagonal(shared::moments_of_inertia(*sphere, mass));
   }
-  const auto* box = std::get_if<Box>(&shape);
-  return box != nullptr ? shared::moments_of_inertia(*box, mass) : Vec3{};
+  if (const auto* box = std::get_if<Box>(&shape)) {
+    return diagonal(shared::moments_of_inertia(*box, mass));
+  }
+  return mass_properties(std::get<Assembly>(shape), mass).inertia;
+}
+
+/// The shape with unit vectors and quaternions made so to rounding.
+Shape normalized(Shape shape) {
+  const auto scale = [](auto* wall) {
+    const Real k = Real(1) / length(wall->normal);
+    wall->normal *= k;
+    wall->offset *= k;
+  };
+  if (auto* half_space = std::get_if<HalfSpace>(&shape)) scale(half_space);
+  if (auto* plane = std::get_if<Plane>(&shape)) scale(plane);
+  if (auto* assembly = std::get_if<Assembly>(&shape)) {
+    for (AssemblyPart& part : assembly->parts) part.orientation = normalized(part.orientation);
+  }
+  return shape;
 }
 
 bool before(BodyId a, BodyId b) { return a.index < b.index; }
@@ -43,6 +63,7 @@ void BodyStore::resize(std::size_t slots) {
 }
 
 BodyId BodyStore::add(const BodyDef& def) {
+  Shape shape = normalized(def.shape);  // may throw, so before anything changes
   if (free_.empty()) {
     resize(capacity() + 1);
     free_.push_back(static_cast<std::uint32_t>(capacity() - 1));
@@ -52,12 +73,7 @@ BodyId BodyStore::add(const BodyDef& def) {
   ids_.insert(std::upper_bound(ids_.begin(), ids_.end(), id, before), id);
   free_.pop_back();
 
-  shape_[i] = def.shape;
-  if (auto* half_space = std::get_if<HalfSpace>(&shape_[i])) {
-    const Real scale = Real(1) / length(half_space->normal);
-    half_space->normal *= scale;
-    half_space->offset *= scale;
-  }
+  shape_[i] = std::move(shape);
   const auto* sphere = std::get_if<Sphere>(&def.shape);
   radius_[i] = sphere != nullptr ? sphere->radius : Real(0);
   friction_[i] = def.friction;
@@ -84,8 +100,7 @@ void BodyStore::set_inertia(std::uint32_t i, const BodyDef& def) {
     body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
     return;
   }
-  const Mat3 tensor =
-      def.inertia ? symmetric_part(*def.inertia) : diagonal(moments_of(def.shape, def.mass));
+  const Mat3 tensor = def.inertia ? symmetric_part(*def.inertia) : tensor_of(shape_[i], def.mass);
   body_inverse_inertia_[i] = inverse_inertia(tensor);
   // The largest entry of such a matrix is on its diagonal.
   const Vec3 moments{tensor(0, 0), tensor(1, 1), tensor(2, 2)};

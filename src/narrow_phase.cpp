@@ -7,46 +7,56 @@
 namespace jfpx::inline JFPX_ABI {
 namespace {
 
-/// Larger than what the pair tests may find wrongly by rounding, so that a bound never hides a
-/// touch.
-constexpr Real kMargin = 1 + 64 * kEpsilon;
-
 bool near(const SphereInstance& a, const SphereInstance& b) {
   const Real most = a.radius + b.radius;
-  return length_squared(a.centre - b.centre) <= most * most * kMargin;
+  return length_squared(a.centre - b.centre) <= most * most * (1 + 64 * kEpsilon);
 }
 
-Real bounding_radius(const Box& box) { return length(box.half_extents) * kMargin; }
+template <class T>
+void sort_if_needed(std::vector<T>* items) {
+  if (!std::ranges::is_sorted(*items)) std::ranges::sort(*items);
+}
 
-/// Appends the contacts of two bodies of which one is no sphere.
+/// Appends the contacts of two pieces of which one is no sphere.
 class PairTest {
  public:
-  PairTest(const BodyStore& bodies, std::span<const Transform> poses,
-           std::vector<Contact>* contacts)
-      : bodies_(bodies), poses_(poses), contacts_(contacts) {}
+  using Piece = PieceTable::Piece;
 
-  void operator()(std::uint32_t a, std::uint32_t b) const {
-    const Shape& solid = bodies_.shape(b);
-    if (const auto* sphere = std::get_if<Sphere>(&bodies_.shape(a))) {
-      const SphereInstance instance{bodies_.moving.position[a], sphere->radius};
-      if (const auto* half_space = std::get_if<HalfSpace>(&solid)) {
-        add(a, b, collide(instance, *half_space));
+  PairTest(const BodyStore& bodies, const PieceTable& pieces, std::vector<Contact>* contacts)
+      : bodies_(bodies), pieces_(pieces), contacts_(contacts) {}
+
+  /// Body a owns piece p, body b piece q; only q may be a wall.
+  void operator()(std::uint32_t a, std::uint32_t b, Piece p, Piece q) const {
+    if (pieces_.is_wall(q)) {
+      const HalfSpace solid = facing(pieces_.wall(q), bodies_.moving.position[a]);
+      if (pieces_.is_sphere(p)) {
+        add(a, b, collide(pieces_.bounds(p), solid), 1);
       } else {
-        add(a, b, collide(instance, std::get<Box>(solid), poses_[b]));
+        add(a, b, collide(pieces_.box(p).box, pieces_.box(p).pose, solid));
       }
-      return;
-    }
-    const Box& box = std::get<Box>(bodies_.shape(a));
-    if (const auto* half_space = std::get_if<HalfSpace>(&solid)) {
-      add(a, b, collide(box, poses_[a], *half_space));
+    } else if (pieces_.is_sphere(p)) {
+      add(a, b, collide(pieces_.bounds(p), pieces_.box(q).box, pieces_.box(q).pose), 1);
+    } else if (pieces_.is_sphere(q)) {
+      add(a, b, collide(pieces_.bounds(q), pieces_.box(p).box, pieces_.box(p).pose), -1);
     } else {
-      add(a, b, collide(box, poses_[a], std::get<Box>(solid), poses_[b]));
+      const PieceTable::PosedBox &first = pieces_.box(p), &second = pieces_.box(q);
+      add(a, b, collide(first.box, first.pose, second.box, second.pose));
     }
   }
 
  private:
-  void add(std::uint32_t a, std::uint32_t b, const Touch& touch) const {
-    if (touch.touching) contacts_->push_back({a, b, touch.normal, touch.point, touch.distance});
+  /// What is solid for a body whose centre of mass is at `centre`.
+  static HalfSpace facing(const PieceTable::Wall& wall, const Vec3& centre) {
+    const HalfSpace& solid = wall.solid;
+    if (!wall.two_sided || !(dot(solid.normal, centre) < solid.offset)) return solid;
+    return {-solid.normal, -solid.offset};
+  }
+
+  /// @param side 1 if the sphere of the touch is a's, -1 if it is b's
+  void add(std::uint32_t a, std::uint32_t b, const Touch& touch, Real side) const {
+    if (!touch.touching) return;
+    const Vec3 normal = side < 0 ? -touch.normal : touch.normal;
+    contacts_->push_back({a, b, normal, touch.point, touch.distance});
   }
   void add(std::uint32_t a, std::uint32_t b, const Manifold& manifold) const {
     for (int i = 0; i < manifold.count; ++i) {
@@ -56,7 +66,7 @@ class PairTest {
   }
 
   const BodyStore& bodies_;
-  std::span<const Transform> poses_;
+  const PieceTable& pieces_;
   std::vector<Contact>* contacts_;
 };
 
@@ -65,73 +75,66 @@ class PairTest {
 NarrowPhase::NarrowPhase(std::unique_ptr<SphereCollider> collider)
     : collider_(std::move(collider)) {}
 
-void NarrowPhase::set_bodies(const BodyStore& bodies) {
-  body_.clear();
-  bounds_.clear();
-  obstacles_.clear();
-  pose_.resize(bodies.capacity());
-  for (const BodyId id : bodies.ids()) {
-    const auto* sphere = std::get_if<Sphere>(&bodies.shape(id.index));
-    if (sphere == nullptr) continue;
-    body_.push_back(id.index);
-    bounds_.push_back({bodies.moving.position[id.index], sphere->radius});
-  }
-  sphere_count_ = body_.size();
-  for (const BodyId id : bodies.ids()) {
-    const Shape& shape = bodies.shape(id.index);
-    if (std::holds_alternative<Sphere>(shape)) continue;
-    const auto* box = std::get_if<Box>(&shape);
-    const SphereInstance bounds{bodies.moving.position[id.index],
-                                box != nullptr ? bounding_radius(*box) : Real(0)};
-    pose_[id.index] = make_transform(bodies.moving.orientation[id.index], bounds.centre);
-    if (bodies.movable(id.index)) {
-      body_.push_back(id.index);
-      bounds_.push_back(bounds);
-    } else {
-      obstacles_.push_back({id.index, bounds});
-    }
-  }
-}
+void NarrowPhase::set_bodies(const BodyStore& bodies) { pieces_.set_bodies(bodies); }
 
 std::uint64_t NarrowPhase::find_contacts(const BodyStore& bodies, std::vector<Contact>* contacts) {
-  for (std::size_t i = 0; i < bounds_.size(); ++i) {
-    const std::uint32_t body = body_[i];
-    bounds_[i].centre = bodies.moving.position[body];
-    if (i < sphere_count_) continue;
-    pose_[body] = make_transform(bodies.moving.orientation[body], bounds_[i].centre);
-  }
+  pieces_.place(bodies);
   candidates_.clear();
   find_sphere_pairs(bodies, contacts);
   const std::uint64_t sphere_contacts = contacts->size();
   find_obstacles(bodies);
-  // Without movable boxes they come in order.
-  if (!std::ranges::is_sorted(candidates_)) std::ranges::sort(candidates_);
-  const PairTest test(bodies, pose_, contacts);
-  for (const Candidate& c : candidates_) test(c.a, c.b);
+  sort_if_needed(&candidates_);
+  const PairTest test(bodies, pieces_, contacts);
+  for (const Candidate& c : candidates_) test(c.a, c.b, c.piece_a, c.piece_b);
   return sphere_contacts;
 }
 
-/// Pairs in which a box takes part become candidates; a sphere is their a.
+/// Whether x is body a of its contacts with y.
+bool NarrowPhase::comes_first(const BodyStore& bodies, std::uint32_t x, std::uint32_t y) const {
+  const bool x_is_sphere = bodies.radius(x) > 0, y_is_sphere = bodies.radius(y) > 0;
+  const bool assembly = std::holds_alternative<Assembly>(bodies.shape(x)) ||
+                        std::holds_alternative<Assembly>(bodies.shape(y));
+  if (!assembly && x_is_sphere && y_is_sphere) return x < y;
+  if (!assembly && x_is_sphere != y_is_sphere) return x_is_sphere;
+  if (bodies.movable(x) != bodies.movable(y)) return bodies.movable(x);
+  return x < y;
+}
+
+NarrowPhase::Candidate NarrowPhase::ordered(const BodyStore& bodies, Piece x, Piece y) const {
+  const std::uint32_t of_x = pieces_.body(x), of_y = pieces_.body(y);
+  if (comes_first(bodies, of_x, of_y)) return {of_x, of_y, x, y};
+  return {of_y, of_x, y, x};
+}
+
+/// Pairs in which a box takes part become candidates.
 void NarrowPhase::find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts) {
-  for (const SphereContact& c : collider_->find_contacts(bounds_)) {
-    const std::uint32_t a = body_[c.a], b = body_[c.b];
-    if (!bodies.movable(a) && !bodies.movable(b)) continue;
-    if (c.b >= sphere_count_) {
-      candidates_.push_back({a, b});
-      continue;
+  const ContactSpan found = collider_->find_contacts(pieces_.bounds());
+  hits_.clear();
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const std::uint32_t a = pieces_.body(found[i].a), b = pieces_.body(found[i].b);
+    if (a == b || (!bodies.movable(a) && !bodies.movable(b))) continue;
+    const Candidate pair = ordered(bodies, found[i].a, found[i].b);
+    if (pieces_.is_sphere(found[i].b)) {
+      hits_.push_back({pair, i});
+    } else {
+      candidates_.push_back(pair);
     }
-    const Vec3 point = middle_point(c.normal, c.distance, bounds_[c.b]);
-    contacts->push_back({a, b, c.normal, point, c.distance});
+  }
+  sort_if_needed(&hits_);
+  for (const SphereHit& hit : hits_) {
+    const SphereContact& c = found[hit.index];
+    const Vec3 point = middle_point(c.normal, c.distance, pieces_.bounds(c.b));
+    const Vec3 normal = hit.pair.piece_a == c.a ? c.normal : -c.normal;
+    contacts->push_back({hit.pair.a, hit.pair.b, normal, point, c.distance});
   }
 }
 
 void NarrowPhase::find_obstacles(const BodyStore& bodies) {
-  for (std::size_t i = 0; i < bounds_.size(); ++i) {
-    if (!bodies.movable(body_[i])) continue;
-    for (const Obstacle& obstacle : obstacles_) {
-      const bool unbounded = !(obstacle.bounds.radius > 0);
-      if (unbounded || near(bounds_[i], obstacle.bounds)) {
-        candidates_.push_back({body_[i], obstacle.body});
+  for (Piece piece = 0; piece < pieces_.fixed_begin(); ++piece) {
+    if (!bodies.movable(pieces_.body(piece))) continue;
+    for (Piece fixed = pieces_.fixed_begin(); fixed < pieces_.size(); ++fixed) {
+      if (pieces_.is_wall(fixed) || near(pieces_.bounds(piece), pieces_.bounds(fixed))) {
+        candidates_.push_back(ordered(bodies, piece, fixed));
       }
     }
   }

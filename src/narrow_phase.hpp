@@ -5,12 +5,13 @@
 #include <jfpx/world.hpp>
 
 #include "src/body_store.hpp"
+#include "src/piece_table.hpp"
 
 namespace jfpx::inline JFPX_ABI {
 
 /// Sphere pairs are the collider's, and so are the candidates among movable boxes: it gets their
-/// bounding spheres too. Every immovable box and half-space is tested against every movable body.
-/// Contacts between immovable bodies are dropped.
+/// bounding spheres too. Every immovable box, half-space and plane is tested against every movable
+/// body. Contacts between immovable bodies, and within one body, are dropped.
 class NarrowPhase {
  public:
   explicit NarrowPhase(std::unique_ptr<SphereCollider> collider);
@@ -18,7 +19,8 @@ class NarrowPhase {
   /// Must be called when bodies came, went, or an immovable one was moved.
   void set_bodies(const BodyStore& bodies);
 
-  /// Appends sphere pairs by (a, b), then the others by (a, b); a and b are body indices.
+  /// Appends sphere pairs, then the others, each by (a, b), then by the pieces of a and of b; a and
+  /// b are body indices, chosen as Contact says.
   /// @returns the number of sphere pairs
   /// @throws what SphereCollider::find_contacts() throws
   std::uint64_t find_contacts(const BodyStore& bodies, std::vector<Contact>* contacts);
@@ -26,26 +28,28 @@ class NarrowPhase {
   const SphereCollider& collider() const noexcept { return *collider_; }
 
  private:
-  /// An immovable box or half-space.
-  struct Obstacle {
-    std::uint32_t body = 0;
-    SphereInstance bounds;  ///< of a half-space: none, its radius is 0
-  };
-  /// Two bodies of which one is no sphere, in the order of their contact.
+  using Piece = PieceTable::Piece;
+  /// Two pieces that may touch, in the order of their contact.
   struct Candidate {
     std::uint32_t a = 0, b = 0;
+    Piece piece_a = 0, piece_b = 0;
     friend auto operator<=>(const Candidate&, const Candidate&) = default;
   };
+  /// Two spheres that touch.
+  struct SphereHit {
+    Candidate pair;
+    std::uint64_t index = 0;  ///< in what the collider found
+    friend auto operator<=>(const SphereHit&, const SphereHit&) = default;
+  };
 
+  bool comes_first(const BodyStore& bodies, std::uint32_t x, std::uint32_t y) const;
+  Candidate ordered(const BodyStore& bodies, Piece x, Piece y) const;
   void find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts);
   void find_obstacles(const BodyStore& bodies);
 
   std::unique_ptr<SphereCollider> collider_;
-  std::size_t sphere_count_ = 0;        ///< of shapes_: spheres come first, then movable boxes
-  std::vector<std::uint32_t> body_;     ///< by index in bounds_
-  std::vector<SphereInstance> bounds_;  ///< spheres as they are, boxes as bounding spheres
-  std::vector<Obstacle> obstacles_;
-  std::vector<Transform> pose_;  ///< by body; of boxes only
+  PieceTable pieces_;
+  std::vector<SphereHit> hits_;
   std::vector<Candidate> candidates_;
 };
 

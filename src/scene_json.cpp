@@ -9,6 +9,7 @@
 
 #include <optional>
 #include <set>
+#include <variant>
 
 namespace jfpx::inline JFPX_ABI {
 namespace {
@@ -84,6 +85,8 @@ void read(const Json& json, const std::string& where, Quat& q) {
 }
 
 void read(const Json& json, const std::string& where, Shape& shape);
+void read(const Json& json, const std::string& where, std::variant<Sphere, Box>& shape);
+void read(const Json& json, const std::string& where, std::vector<AssemblyPart>& parts);
 void read(const Json& json, const std::string& where, ResolverSettings& settings);
 void read(const Json& json, const std::string& where, SleepSettings& settings);
 void read(const Json& json, const std::string& where, MaterialSettings& settings);
@@ -129,27 +132,84 @@ class ObjectReader {
   std::set<std::string> known_;
 };
 
-void read(const Json& json, const std::string& where, Shape& shape) {
+void read_fields(ObjectReader* object, Sphere* sphere) {
+  object->required("radius", sphere->radius);
+}
+void read_fields(ObjectReader* object, Box* box) {
+  object->required("half_extents", box->half_extents);
+}
+void read_fields(ObjectReader* object, HalfSpace* half_space) {
+  object->required("normal", half_space->normal);
+  object->required("offset", half_space->offset);
+}
+void read_fields(ObjectReader* object, Plane* plane) {
+  object->required("normal", plane->normal);
+  object->required("offset", plane->offset);
+}
+void read_fields(ObjectReader* object, Assembly* assembly) {
+  object->required("parts", assembly->parts);
+}
+
+template <class T>
+constexpr const char* kTypeName = nullptr;
+template <>
+constexpr const char* kTypeName<Sphere> = "sphere";
+template <>
+constexpr const char* kTypeName<Box> = "box";
+template <>
+constexpr const char* kTypeName<HalfSpace> = "half_space";
+template <>
+constexpr const char* kTypeName<Plane> = "plane";
+template <>
+constexpr const char* kTypeName<Assembly> = "assembly";
+
+/// Reads the one of the shapes that the field "type" names.
+template <class... Shapes>
+void read_shape(const Json& json, const std::string& where, std::variant<Shapes...>* shape) {
   ObjectReader object(json, where);
   std::string type;
   object.required("type", type);
-  if (type == "sphere") {
-    Sphere sphere;
-    object.required("radius", sphere.radius);
-    shape = sphere;
-  } else if (type == "box") {
-    Box box;
-    object.required("half_extents", box.half_extents);
-    shape = box;
-  } else if (type == "half_space") {
-    HalfSpace half_space;
-    object.required("normal", half_space.normal);
-    object.required("offset", half_space.offset);
-    shape = half_space;
-  } else {
-    fail(object.path("type"), "is \"" + type + "\"; it must be sphere, box or half_space");
+  const auto read_if = [&]<class T>(T value) {
+    if (type != kTypeName<T>) return false;
+    read_fields(&object, &value);
+    *shape = std::move(value);
+    return true;
+  };
+  if (!(read_if(Shapes{}) || ...)) {
+    std::string names;
+    std::size_t left = sizeof...(Shapes);
+    const auto list = [&](const char* name) {
+      names += names.empty() ? "" : left == 1 ? " or " : ", ";
+      names += name;
+      --left;
+    };
+    (list(kTypeName<Shapes>), ...);
+    fail(object.path("type"), "is \"" + type + "\"; it must be " + names);
   }
   object.reject_unknown();
+}
+void read(const Json& json, const std::string& where, Shape& shape) {
+  read_shape(json, where, &shape);
+}
+void read(const Json& json, const std::string& where, std::variant<Sphere, Box>& shape) {
+  read_shape(json, where, &shape);
+}
+
+void read(const Json& json, const std::string& where, AssemblyPart& part) {
+  ObjectReader object(json, where);
+  object.required("shape", part.shape);
+  object.optional("position", part.position);
+  object.optional("orientation", part.orientation);
+  object.optional("density", part.density);
+  object.reject_unknown();
+}
+void read(const Json& json, const std::string& where, std::vector<AssemblyPart>& parts) {
+  if (!json.is_array()) fail(where, std::string("is ") + kind_of(json) + "; it must be an array");
+  parts.clear();
+  for (const Json& json_part : json) {
+    const std::string place = where + "[" + std::to_string(parts.size()) + "]";
+    read(json_part, place, parts.emplace_back());
+  }
 }
 
 void read(const Json& json, const std::string& where, BodyDef& body) {
@@ -234,25 +294,45 @@ Json parse(std::string_view text) {
 }
 
 Json to_value(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
-Json to_value(const Shape& shape) {
-  struct Visitor {
-    Json operator()(const Sphere& s) const { return {{"type", "sphere"}, {"radius", s.radius}}; }
-    Json operator()(const Box& b) const {
-      return {{"type", "box"}, {"half_extents", to_value(b.half_extents)}};
-    }
-    Json operator()(const HalfSpace& h) const {
-      return {{"type", "half_space"}, {"normal", to_value(h.normal)}, {"offset", h.offset}};
-    }
-  };
-  return std::visit(Visitor{}, shape);
+Json to_value(const Quat& q) { return Json::array({q.w, q.x, q.y, q.z}); }
+
+template <class... Shapes>
+Json to_value(const std::variant<Shapes...>& shape);
+
+Json fields_of(const Sphere& s) { return {{"radius", s.radius}}; }
+Json fields_of(const Box& b) { return {{"half_extents", to_value(b.half_extents)}}; }
+Json fields_of(const HalfSpace& h) {
+  return {{"normal", to_value(h.normal)}, {"offset", h.offset}};
 }
+Json fields_of(const Plane& p) { return {{"normal", to_value(p.normal)}, {"offset", p.offset}}; }
+Json fields_of(const Assembly& assembly) {
+  Json parts = Json::array();
+  for (const AssemblyPart& part : assembly.parts) {
+    parts.push_back({{"shape", to_value(part.shape)},
+                     {"position", to_value(part.position)},
+                     {"orientation", to_value(part.orientation)},
+                     {"density", part.density}});
+  }
+  return {{"parts", parts}};
+}
+
+template <class... Shapes>
+Json to_value(const std::variant<Shapes...>& shape) {
+  return std::visit(
+      []<class T>(const T& value) {
+        Json json = {{"type", kTypeName<T>}};
+        json.update(fields_of(value));
+        return json;
+      },
+      shape);
+}
+
 Json to_value(const BodyDef& b) {
   Json json = {{"shape", to_value(b.shape)},
                {"mass", b.mass},
                {"kinematic", b.kinematic},
                {"position", to_value(b.position)},
-               {"orientation",
-                Json::array({b.orientation.w, b.orientation.x, b.orientation.y, b.orientation.z})},
+               {"orientation", to_value(b.orientation)},
                {"velocity", to_value(b.velocity)},
                {"angular_velocity", to_value(b.angular_velocity)},
                {"acceleration", to_value(b.acceleration)},

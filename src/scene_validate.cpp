@@ -3,9 +3,12 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/assembly.hpp"
 #include "src/inertia_tensor.hpp"
+#include "src/principal_inertia.hpp"
 #include "src/shared/inertia.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <initializer_list>
@@ -34,37 +37,79 @@ bool in_world(const Vec3& v) { return in_world(v.x) && in_world(v.y) && in_world
 bool is_size(Real x) { return x > 0 && in_world(x); }
 bool is_unit(Real length_squared) { return absolute(length_squared - 1) <= kUnitTolerance; }
 
-std::string find_fault(const Sphere& sphere, Real mass) {
-  if (!is_size(sphere.radius)) return fault("radius", sphere.radius, "> 0 and at most 1e9");
-  const Real inertia = shared::moments_of_inertia(sphere, mass).x;
-  if (mass > 0 && !(inertia > 0 && is_finite(Real(1) / inertia) && is_finite(inertia))) {
-    return fault("moment of inertia", inertia, "such that it and its inverse are finite");
+bool has_inverse(Real moment) {
+  return moment > 0 && is_finite(moment) && is_finite(Real(1) / moment);
+}
+
+std::string find_fault(const Sphere& sphere) {
+  if (is_size(sphere.radius)) return {};
+  return fault("radius", sphere.radius, "> 0 and at most 1e9");
+}
+
+std::string find_fault(const Box& box) {
+  const Vec3& h = box.half_extents;
+  if (is_size(h.x) && is_size(h.y) && is_size(h.z)) return {};
+  return fault("half_extents", h, "> 0 and at most 1e9 each");
+}
+
+std::string find_fault(const Vec3& normal, Real offset) {
+  if (!is_unit(length_squared(normal))) {
+    return fault("normal", normal, "a unit vector, to a thousandth");
   }
-  return {};
+  return in_world(offset) ? std::string() : fault("offset", offset, "between -1e9 and 1e9");
+}
+
+std::string find_fault(const AssemblyPart& part) {
+  std::string found = std::visit([](const auto& shape) { return find_fault(shape); }, part.shape);
+  if (!found.empty()) return found;
+  if (!in_world(part.position)) return fault("position", part.position, "between -1e9 and 1e9");
+  if (!is_unit(length_squared(part.orientation))) {
+    return fault("orientation", part.orientation, "a unit quaternion, to a thousandth");
+  }
+  if (part.density > 0 && part.density <= Real(1e9)) return {};
+  return fault("density", part.density, "> 0 and at most 1e9");
+}
+
+std::string find_moments_fault(const Vec3& moments) {
+  if (has_inverse(moments.x) && has_inverse(moments.y) && has_inverse(moments.z)) return {};
+  return fault("moments of inertia", moments, "such that they and their inverses are finite");
+}
+
+std::string find_fault(const Sphere& sphere, Real mass) {
+  const std::string found = find_fault(sphere);
+  if (!found.empty() || mass == 0) return found;
+  const Real inertia = shared::moments_of_inertia(sphere, mass).x;
+  if (has_inverse(inertia)) return {};
+  return fault("moment of inertia", inertia, "such that it and its inverse are finite");
 }
 
 std::string find_fault(const Box& box, Real mass) {
-  const Vec3& h = box.half_extents;
-  if (!(is_size(h.x) && is_size(h.y) && is_size(h.z))) {
-    return fault("half_extents", h, "> 0 and at most 1e9 each");
-  }
-  const Vec3 inertia = shared::moments_of_inertia(box, mass);
-  for (int i = 0; i < 3 && mass > 0; ++i) {
-    if (!(inertia[i] > 0 && is_finite(Real(1) / inertia[i]) && is_finite(inertia[i]))) {
-      return fault("moments of inertia", inertia, "such that they and their inverses are finite");
-    }
-  }
-  return {};
+  const std::string found = find_fault(box);
+  if (!found.empty() || mass == 0) return found;
+  return find_moments_fault(shared::moments_of_inertia(box, mass));
 }
 
 std::string find_fault(const HalfSpace& half_space, Real) {
-  if (!is_unit(length_squared(half_space.normal))) {
-    return fault("normal", half_space.normal, "a unit vector, to a thousandth");
+  return find_fault(half_space.normal, half_space.offset);
+}
+
+std::string find_fault(const Plane& plane, Real) { return find_fault(plane.normal, plane.offset); }
+
+std::string find_fault(const Assembly& assembly, Real mass) {
+  if (assembly.parts.empty()) return "parts is empty; it must have at least one sphere or box";
+  Real reach = 0;
+  for (std::size_t i = 0; i < assembly.parts.size(); ++i) {
+    const AssemblyPart& part = assembly.parts[i];
+    const std::string found = find_fault(part);
+    if (!found.empty()) return "parts[" + std::to_string(i) + "]." + found;
+    reach = std::max(reach, length(part.position) + bounding_radius(part));
   }
-  if (!in_world(half_space.offset)) {
-    return fault("offset", half_space.offset, "between -1e9 and 1e9");
-  }
-  return {};
+  if (mass == 0) return {};
+  const MassProperties whole = mass_properties(assembly, mass);
+  const std::string found = find_moments_fault(principal_inertia(whole.inertia).moments);
+  if (!found.empty() || length(whole.centre) <= reach * kUnitTolerance) return found;
+  return fault("centre of mass of parts", whole.centre,
+               "the origin, to a thousandth of the body's reach; centred() moves it there");
 }
 
 std::string find_fault(const BodyDef& def) {
@@ -79,6 +124,9 @@ std::string find_fault(const BodyDef& def) {
   }
   if (def.kinematic && std::holds_alternative<HalfSpace>(def.shape)) {
     return "kinematic is true; it must be false for a half-space, which follows no pose";
+  }
+  if (def.kinematic && std::holds_alternative<Plane>(def.shape)) {
+    return "kinematic is true; it must be false for a plane, which follows no pose";
   }
   if (def.inertia) {
     const char* range = inertia_must_be(*def.inertia);

@@ -17,9 +17,12 @@ void require_finite(const char* name, const Vec3& value) {
 }  // namespace
 
 void World::Impl::require_native(const BodyDef& def, std::uint64_t body) {
-  if (def.mass > 0 && std::holds_alternative<HalfSpace>(def.shape)) {
+  const bool half_space = std::holds_alternative<HalfSpace>(def.shape);
+  if (def.mass > 0 && (half_space || std::holds_alternative<Plane>(def.shape))) {
     throw InvalidScene("body " + std::to_string(body) + ": mass is " + to_text(def.mass) +
-                       "; it must be 0 for a half-space, which fills half of the world");
+                       "; it must be 0 for a " +
+                       (half_space ? "half-space, which fills half of the world"
+                                   : "plane, which divides the whole world"));
   }
 }
 

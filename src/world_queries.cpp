@@ -47,19 +47,45 @@ Transform pose_of(const BodyStore& bodies, std::uint32_t body) {
   return make_transform(bodies.moving.orientation[body], bodies.moving.position[body]);
 }
 
-shared::RayEntry enter(const Ray& ray, const BodyStore& bodies, std::uint32_t body) {
-  const auto visit = [&](const auto& shape) {
+/// Calls visit(shape, pose) for what the body is, or for each part of an assembly.
+template <class Visit>
+void for_each_piece(const BodyStore& bodies, std::uint32_t body, const Visit& visit) {
+  const Transform pose = pose_of(bodies, body);
+  const auto take_apart = [&](const auto& shape) {
     using S = std::decay_t<decltype(shape)>;
-    if constexpr (std::is_same_v<S, Sphere>) {
-      return shared::enter(ray.origin, ray.direction,
-                           SphereInstance{bodies.moving.position[body], shape.radius});
-    } else if constexpr (std::is_same_v<S, Box>) {
-      return shared::enter(ray.origin, ray.direction, shape, pose_of(bodies, body));
+    if constexpr (std::is_same_v<S, Assembly>) {
+      for (const AssemblyPart& part : shape.parts) {
+        const Transform local = make_transform(part.orientation, part.position);
+        std::visit([&](const auto& s) { visit(s, pose * local); }, part.shape);
+      }
+    } else if constexpr (std::is_same_v<S, Sphere> || std::is_same_v<S, Box>) {
+      visit(shape, pose);
     } else {
-      return shared::enter(ray.origin, ray.direction, shape);
+      visit(shape, Transform{});
     }
   };
-  return std::visit(visit, bodies.shape(body));
+  std::visit(take_apart, bodies.shape(body));
+}
+
+shared::RayEntry enter(const Ray& ray, const Sphere& sphere, const Transform& pose) {
+  return shared::enter(ray.origin, ray.direction, SphereInstance{pose.origin, sphere.radius});
+}
+shared::RayEntry enter(const Ray& ray, const Box& box, const Transform& pose) {
+  return shared::enter(ray.origin, ray.direction, box, pose);
+}
+template <class Wall>
+shared::RayEntry enter(const Ray& ray, const Wall& wall, const Transform&) {
+  return shared::enter(ray.origin, ray.direction, wall);
+}
+
+/// The first entry; of parts at the same distance, the first part's.
+shared::RayEntry enter(const Ray& ray, const BodyStore& bodies, std::uint32_t body) {
+  shared::RayEntry first;
+  for_each_piece(bodies, body, [&](const auto& shape, const Transform& pose) {
+    const shared::RayEntry entry = enter(ray, shape, pose);
+    if (entry.hit && (!first.hit || entry.distance < first.distance)) first = entry;
+  });
+  return first;
 }
 
 /// Calls `found` with each hit, in the order of bodies.
@@ -75,32 +101,44 @@ void for_each_hit(const Ray& given, const BodyStore& bodies, const BodyFilter& f
   }
 }
 
-bool touch(const SphereInstance& sphere, const Shape& shape, const Transform& pose) {
-  const auto visit = [&](const auto& s) {
-    using S = std::decay_t<decltype(s)>;
-    if constexpr (std::is_same_v<S, Sphere>) {
-      return !(length(sphere.centre - pose.origin) > sphere.radius + s.radius);
-    } else if constexpr (std::is_same_v<S, Box>) {
-      return collide(sphere, s, pose).touching;
-    } else {
-      return collide(sphere, s).touching;
-    }
-  };
-  return std::visit(visit, shape);
+bool touch(const SphereInstance& sphere, const Sphere& other, const Transform& pose) {
+  return !(length(sphere.centre - pose.origin) > sphere.radius + other.radius);
+}
+bool touch(const SphereInstance& sphere, const Box& box, const Transform& pose) {
+  return collide(sphere, box, pose).touching;
+}
+template <class Wall>
+bool touch(const SphereInstance& sphere, const Wall& wall, const Transform&) {
+  return collide(sphere, wall).touching;
 }
 
-bool touch(const Box& box, const Transform& box_pose, const Shape& shape, const Transform& pose) {
-  const auto visit = [&](const auto& s) {
-    using S = std::decay_t<decltype(s)>;
-    if constexpr (std::is_same_v<S, Sphere>) {
-      return collide(SphereInstance{pose.origin, s.radius}, box, box_pose).touching;
-    } else if constexpr (std::is_same_v<S, Box>) {
-      return collide(box, box_pose, s, pose).count > 0;
-    } else {
-      return collide(box, box_pose, s).count > 0;
-    }
-  };
-  return std::visit(visit, shape);
+struct PosedBox {
+  Box box;
+  Transform pose;
+};
+bool touch(const PosedBox& box, const Sphere& sphere, const Transform& pose) {
+  return collide(SphereInstance{pose.origin, sphere.radius}, box.box, box.pose).touching;
+}
+bool touch(const PosedBox& box, const Box& other, const Transform& pose) {
+  return collide(box.box, box.pose, other, pose).count > 0;
+}
+template <class Wall>
+bool touch(const PosedBox& box, const Wall& wall, const Transform&) {
+  return collide(box.box, box.pose, wall).count > 0;
+}
+
+/// @param solid a SphereInstance or a PosedBox
+template <class Solid>
+std::vector<BodyId> bodies_touching(const Solid& solid, const BodyStore& bodies) {
+  std::vector<BodyId> found;
+  for (const BodyId id : bodies.ids()) {
+    bool touches = false;
+    for_each_piece(bodies, id.index, [&](const auto& shape, const Transform& pose) {
+      touches = touches || touch(solid, shape, pose);
+    });
+    if (touches) found.push_back(id);
+  }
+  return found;
 }
 
 }  // namespace
@@ -126,12 +164,7 @@ std::vector<BodyId> World::overlapping(const Sphere& sphere, const Vec3& centre)
   if (!(sphere.radius > 0 && sphere.radius <= kMaxCoordinate)) {
     refuse("sphere radius", to_text(sphere.radius), "> 0 and at most 1e9");
   }
-  std::vector<BodyId> found;
-  for (const BodyId id : bodies()) {
-    const Transform pose = pose_of(impl_->bodies, id.index);
-    if (touch({centre, sphere.radius}, impl_->bodies.shape(id.index), pose)) found.push_back(id);
-  }
-  return found;
+  return bodies_touching(SphereInstance{centre, sphere.radius}, impl_->bodies);
 }
 
 std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
@@ -144,13 +177,8 @@ std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
   }
   const std::string fault = find_fault(BodyState{centre, orientation, {}, {}});
   if (!fault.empty()) throw InvalidArgument("box " + fault);
-  const Transform box_pose = make_transform(normalized(orientation), centre);
-  std::vector<BodyId> found;
-  for (const BodyId id : bodies()) {
-    const Transform pose = pose_of(impl_->bodies, id.index);
-    if (touch(box, box_pose, impl_->bodies.shape(id.index), pose)) found.push_back(id);
-  }
-  return found;
+  const Transform pose = make_transform(normalized(orientation), centre);
+  return bodies_touching(PosedBox{box, pose}, impl_->bodies);
 }
 
 }  // namespace jfpx::inline JFPX_ABI

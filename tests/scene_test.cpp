@@ -148,12 +148,15 @@ TEST(SceneJson, KeepsEveryBitOfEveryField) {
   body.position = {Real(0.1), std::numeric_limits<Real>::denorm_min(), Real(-1e9)};
   body.orientation = normalized(Quat{1, 2, 3, 4});
   body.velocity = {Real(-0.0), 1, 2};
-  scene.bodies = {body, body};
-  scene.bodies.push_back(body);
-  scene.bodies[2].kinematic = true;
-  scene.bodies[2].inertia =
+  scene.bodies = {body, body, body, body, body};
+  scene.bodies[4].kinematic = true;
+  scene.bodies[4].inertia =
       Mat3{{{1, Real(0.1), Real(-0.2)}, {Real(0.1), 1, 0}, {Real(-0.2), 0, 1}}};
   scene.bodies[1].shape = HalfSpace{{0, 0, 1}, Real(-2.5)};
+  scene.bodies[2].shape = Plane{{0, 1, 0}, Real(0.1)};
+  scene.bodies[3].shape =
+      Assembly{{{.shape = Sphere{Real(0.3)}, .position = {Real(0.1), 0, 7}, .density = Real(0.7)},
+                {.shape = Box{}, .orientation = normalized(Quat{4, 3, 2, 1})}}};
   const Scene read = from_json(to_json(scene));
   EXPECT_EQ(read, scene);
   EXPECT_TRUE(std::signbit(read.bodies[0].velocity.x));
@@ -195,7 +198,18 @@ TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"mass": 1}]})"),
               HasSubstr("body 0: has no field \"shape\""));
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "cone"}}]})"),
-              HasSubstr("\"cone\"; it must be sphere, box or half_space"));
+              HasSubstr("\"cone\"; it must be sphere, box, half_space, plane or assembly"));
+  const auto with_parts = [](const std::string& parts) {
+    return R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "assembly", "parts": )" + parts +
+           "}}]}";
+  };
+  EXPECT_THAT(complaint(with_parts("{}")), HasSubstr("body 0.shape.parts: is an object; it must"));
+  EXPECT_THAT(complaint(with_parts("[]")), HasSubstr("body 0: parts is empty"));
+  EXPECT_THAT(
+      complaint(with_parts(R"([{"shape": {"type": "plane"}}])")),
+      HasSubstr("body 0.shape.parts[0].shape.type: is \"plane\"; it must be sphere or box"));
+  EXPECT_THAT(complaint(with_parts(R"([{"shape": {"type": "sphere", "radius": -1}}])")),
+              HasSubstr("body 0: parts[0].radius is -1; it must be > 0"));
   EXPECT_THAT(complaint(with_body("\"can_sleep\": 1")), HasSubstr("must be a boolean"));
   EXPECT_THAT(complaint(with_body("\"inertia\": [1, 1, 1]")),
               HasSubstr("body 0.inertia[0]: must be an array of 3 numbers"));

@@ -4,6 +4,7 @@
 #include <jfpx/math.hpp>
 
 #include <variant>
+#include <vector>
 
 namespace jfpx::inline JFPX_ABI {
 
@@ -25,14 +26,38 @@ struct HalfSpace {
   friend bool operator==(const HalfSpace&, const HalfSpace&) = default;
 };
 
-/// All points p with dot(normal, p) = offset: a wall without thickness. Not yet a shape of bodies.
+/// All points p with dot(normal, p) = offset: a wall without thickness. A body is pushed to the
+/// side where its centre of mass is, all parts of it, however far they reach through; to the front
+/// if it is on the plane. In world coordinates, as a half-space.
 struct Plane {
-  Vec3 normal{0, 1, 0};  ///< [-], unit
+  Vec3 normal{0, 1, 0};  ///< [-], unit, to the front
   Real offset = 0;       ///< [m]
   friend bool operator==(const Plane&, const Plane&) = default;
 };
 
-using Shape = std::variant<Sphere, Box, HalfSpace>;
+/// A sphere or a box that belongs to an assembly, placed in the axes of the body.
+struct AssemblyPart {
+  std::variant<Sphere, Box> shape = Sphere{};
+  Vec3 position = {};  ///< [m], body axes, of the part's centre
+  Quat orientation = {};
+  Real density = 1;  ///< [-], in (0, 1e9], relative to the other parts
+  friend bool operator==(const AssemblyPart&, const AssemblyPart&) = default;
+};
+
+/// Spheres and boxes that move as one body (thesis 4.4.5) and never touch each other. The body's
+/// mass is shared out by density times volume; where parts overlap it counts for both. The centre
+/// of mass of a movable body must be the origin of its axes, to a thousandth of its reach; engines
+/// take the origin for it. See centred().
+struct Assembly {
+  std::vector<AssemblyPart> parts;  ///< at least one
+  friend bool operator==(const Assembly&, const Assembly&) = default;
+};
+
+/// The assembly moved in its axes so that the centre of mass is the origin.
+/// @param assembly each part in the ranges that validate() asks for
+JFPX_API Assembly centred(Assembly assembly);
+
+using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Assembly>;
 
 /// A sphere placed in the world: what the collider works on. Laid out as four Reals.
 struct alignas(4 * sizeof(Real)) SphereInstance {

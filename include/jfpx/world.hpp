@@ -22,8 +22,9 @@ struct WorldSettings {
   SphereColliderOptions collider;  ///< who finds sphere contacts, and how
 };
 
-/// One contact of the native engine; boxes that touch along a face have several. `a` is the sphere
-/// where a sphere meets a box, else the movable one where the other is not, else the lower index.
+/// One contact of the native engine; boxes that touch along a face have several, and so have
+/// assemblies. Of two spheres `a` has the lower index; `a` is the sphere where a sphere meets a box,
+/// half-space or plane, else the movable one where the other is not, else the lower index.
 struct Contact {
   std::uint32_t a = 0, b = 0;  ///< BodyId::index; the place in the scene until a body is removed
   Vec3 normal;                 ///< [-], unit, from b to a
@@ -74,7 +75,7 @@ struct StepReport {
 /// everything else excludes all other calls. Steps are deterministic to the last bit.
 class JFPX_API World {
  public:
-  /// Validates the scene. Half-spaces must be immovable.
+  /// Validates the scene. Half-spaces and planes must be immovable.
   /// @throws InvalidScene, BackendUnavailable, OutOfMemory
   explicit World(const Scene& scene, const WorldSettings& settings = {});
   /// The same with sphere contacts from the given collider, which may be the caller's own.
@@ -172,9 +173,11 @@ class JFPX_API World {
                                   const Quat& orientation = {}) const;
 
   double time() const;  ///< [s], completed steps times dt
-  /// Contacts of the last step, in order: sphere pairs by (a, b), then others by (a, b), the points
-  /// of one pair in the order of its test; then those of contact generators in their order. None
-  /// after a failed step, or when bodies were added or removed since.
+  /// Contacts of the last step, in order: where spheres, or spheres of assemblies, touch each other,
+  /// by (a, b); then all others by (a, b); then those of contact generators in their order. Those of
+  /// the same a and b come by a's part, then b's part, spheres before boxes; the points of two parts
+  /// in the order of their test. None after a failed step, or when bodies were added or removed
+  /// since.
   std::span<const Contact> contacts() const;
   /// Who touched whom in the last step, who began to and who ended, of contacts that were found and
   /// not generated; sorted by (a.index, b.index);

@@ -3,13 +3,16 @@
 #include <jfpx/bullet/scene_world.hpp>
 #include <jfpx/error.hpp>
 
+#include "src/assembly.hpp"
 #include "src/bullet/timed_world.hpp"
 #include "src/inertia_tensor.hpp"
+#include "src/principal_inertia.hpp"
 #include "src/shared/integrate.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
@@ -30,13 +33,24 @@ Quat from_bullet(const btQuaternion& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
 bool is_half_space(const BodyDef& def) { return std::holds_alternative<HalfSpace>(def.shape); }
 
+/// The axes of Bullet's body, in those of ours: Bullet wants principal ones.
+btTransform principal_axes(const PrincipalInertia& inertia) {
+  const Mat3& m = inertia.axes;
+  return btTransform(
+      btMatrix3x3(m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2)));
+}
+
 /// Makes shapes and keeps them; equal shapes once if they are shared.
 class ShapeStore {
  public:
   explicit ShapeStore(bool share) : share_(share) {}
 
-  btCollisionShape* get(const Shape& shape) {
-    return std::visit([this](const auto& s) { return make(s); }, shape);
+  /// @param axes of Bullet's body in those of ours; other than the identity for assemblies only
+  btCollisionShape* get(const Shape& shape, const btTransform& axes) {
+    if (const auto* assembly = std::get_if<Assembly>(&shape)) return make(*assembly, axes);
+    if (const auto* plane = std::get_if<HalfSpace>(&shape)) return make(*plane);
+    if (const auto* box = std::get_if<Box>(&shape)) return make(*box);
+    return make(std::get<Sphere>(shape));
   }
 
  private:
@@ -51,6 +65,17 @@ class ShapeStore {
   }
   btCollisionShape* make(const HalfSpace& plane) {
     shapes_.emplace_back(new btStaticPlaneShape(to_bullet(plane.normal), plane.offset));
+    return shapes_.back().get();
+  }
+
+  btCollisionShape* make(const Assembly& assembly, const btTransform& axes) {
+    auto compound = std::make_unique<btCompoundShape>();
+    for (const AssemblyPart& part : assembly.parts) {
+      const btTransform place(to_bullet(normalized(part.orientation)), to_bullet(part.position));
+      btCollisionShape* child = std::visit([this](const auto& s) { return make(s); }, part.shape);
+      compound->addChildShape(axes.inverse() * place, child);
+    }
+    shapes_.push_back(std::move(compound));
     return shapes_.back().get();
   }
 
@@ -81,29 +106,51 @@ void require_bullet(const MaterialSettings& materials) {
   }
 }
 
-/// Bullet's bodies have their moments of inertia about the axes of their shape.
+/// Bullet's bodies have their moments of inertia about the axes of their shape, which an assembly
+/// can be turned to; and Bullet has no two-sided plane.
 void require_bullet(const BodyDef& def, std::size_t body) {
-  if (!(def.mass > 0) || !def.inertia || is_diagonal(*def.inertia)) return;
-  throw InvalidScene("body " + std::to_string(body) +
-                     ": inertia has products of inertia; for Bullet it must be diagonal");
+  const auto refuse = [body](const char* what) {
+    throw InvalidScene("body " + std::to_string(body) + ": " + what);
+  };
+  if (std::holds_alternative<Plane>(def.shape)) {
+    refuse(
+        "shape is a two-sided plane, which Bullet does not have; it must be a half-space or a "
+        "box to run in Bullet");
+  }
+  if (std::holds_alternative<Assembly>(def.shape)) return;
+  if (def.mass > 0 && def.inertia && !is_diagonal(*def.inertia)) {
+    refuse("inertia has products of inertia; for Bullet it must be diagonal");
+  }
+}
+
+/// Of an assembly that can move; of all others nothing.
+PrincipalInertia inertia_of(const BodyDef& def) {
+  const auto* assembly = std::get_if<Assembly>(&def.shape);
+  if (assembly == nullptr || !(def.mass > 0)) return {};
+  return principal_inertia(def.inertia ? symmetric_part(*def.inertia)
+                                       : mass_properties(*assembly, def.mass).inertia);
 }
 
 Real factor(CombineRule rule, Real coefficient) {
   return rule == CombineRule::product ? coefficient : square_root(coefficient);
 }
 
-std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const MaterialSettings& materials,
-                                       btCollisionShape* shape, bool can_sleep) {
+std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const PrincipalInertia& own,
+                                       const MaterialSettings& materials, btCollisionShape* shape,
+                                       bool can_sleep) {
   const Real mass = is_half_space(def) ? 0 : def.mass;
+  const bool assembly = std::holds_alternative<Assembly>(def.shape);
   btVector3 inertia(0, 0, 0);
-  if (mass > 0) shape->calculateLocalInertia(mass, inertia);
-  if (mass > 0 && def.inertia) {
+  if (assembly) inertia = to_bullet(own.moments);
+  if (mass > 0 && !assembly) shape->calculateLocalInertia(mass, inertia);
+  if (mass > 0 && !assembly && def.inertia) {
     inertia = {(*def.inertia)(0, 0), (*def.inertia)(1, 1), (*def.inertia)(2, 2)};
   }
   btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, shape, inertia);
   if (!is_half_space(def)) {
     info.m_startWorldTransform = btTransform(to_bullet(def.orientation), to_bullet(def.position));
   }
+  if (assembly) info.m_startWorldTransform *= principal_axes(own);
   info.m_linearDamping = 1 - def.linear_damping;
   info.m_angularDamping = 1 - def.angular_damping;
   info.m_friction = factor(materials.friction, def.friction);
@@ -166,6 +213,7 @@ struct SceneWorld::Impl {
   std::unique_ptr<btSequentialImpulseConstraintSolver> solver;
   std::vector<std::unique_ptr<btRigidBody>> owned;
   std::vector<btRigidBody*> bodies;
+  std::vector<PrincipalInertia> inertia;  ///< by body; the default for all but movable assemblies
   StageTimes times;
   std::unique_ptr<btDiscreteDynamicsWorld> world;
 
@@ -180,8 +228,10 @@ struct SceneWorld::Impl {
     world->getDispatchInfo().m_deterministicOverlappingPairs = options.deterministic_pairs;
     for (const BodyDef& def : scene.bodies) {
       require_bullet(def, bodies.size());
+      inertia.push_back(inertia_of(def));
       const bool can_sleep = scene.sleep.enabled && def.can_sleep;
-      owned.push_back(make_body(def, scene.materials, shapes.get(def.shape), can_sleep));
+      btCollisionShape* shape = shapes.get(def.shape, principal_axes(inertia.back()));
+      owned.push_back(make_body(def, inertia.back(), scene.materials, shape, can_sleep));
       bodies.push_back(owned.back().get());
       world->addRigidBody(bodies.back());
     }
@@ -239,7 +289,8 @@ std::vector<BodyState> SceneWorld::states() const {
       states.push_back({def.position, def.orientation, {}, {}});
       continue;
     }
-    const btTransform& pose = body.getWorldTransform();
+    btTransform pose = body.getWorldTransform();
+    if (impl_->inertia[i].axes != Mat3{}) pose *= principal_axes(impl_->inertia[i]).inverse();
     states.push_back({from_bullet(pose.getOrigin()), from_bullet(pose.getRotation()),
                       from_bullet(body.getLinearVelocity()),
                       from_bullet(body.getAngularVelocity())});

@@ -17,6 +17,12 @@ JFPX_HD constexpr Vec3 moments_of_inertia(const Box& box, Real mass) {
   return Vec3{h2.y + h2.z, h2.z + h2.x, h2.x + h2.y} * (mass / 3);
 }
 
+/// What a mass at `place` adds to the tensor about the origin (parallel axis theorem).
+JFPX_HD constexpr Mat3 parallel_axis(const Vec3& place, Real mass) {
+  const Mat3 cross_twice = skew_symmetric(place) * skew_symmetric(place);
+  return cross_twice * -mass;
+}
+
 /// R * tensor * R^T: a tensor of body axes in world axes.
 JFPX_HD constexpr Mat3 in_world_axes(const Mat3& tensor, const Mat3& rotation) {
   return rotation * tensor * transposed(rotation);

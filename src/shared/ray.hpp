@@ -1,5 +1,5 @@
-/// Where a ray enters a sphere, a box, a half-space. `direction` is a unit vector throughout, and
-/// solids contain their surface.
+/// Where a ray enters a sphere, a box, a half-space, or crosses a plane. `direction` is a unit
+/// vector throughout, and solids contain their surface.
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -63,6 +63,13 @@ JFPX_HD constexpr RayEntry enter(const Vec3& origin, const Vec3& direction,
   const Real sinking = -dot(half_space.normal, direction);
   if (!(sinking > 0)) return {};
   return {true, height / sinking, half_space.normal};
+}
+
+/// From the side where it starts.
+JFPX_HD constexpr RayEntry enter(const Vec3& origin, const Vec3& direction, const Plane& plane) {
+  const bool behind = dot(plane.normal, origin) < plane.offset;
+  return behind ? enter(origin, direction, HalfSpace{-plane.normal, -plane.offset})
+                : enter(origin, direction, HalfSpace{plane.normal, plane.offset});
 }
 
 }  // namespace jfpx::inline JFPX_ABI::shared

@@ -1,6 +1,7 @@
 /// What a scene becomes in Bullet.
 #include <jfpx/bullet/scene_world.hpp>
 #include <jfpx/error.hpp>
+#include <jfpx/world.hpp>
 
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
@@ -174,6 +175,72 @@ TEST(SceneWorld, PlanesAndBoxesHoldABall) {
     for (int i = 0; i < 240; ++i) world.step();
     EXPECT_NEAR(world.states()[0].position.y, 0.75, 0.01) << plane;
     EXPECT_EQ(world.states()[1].position, ground.position);
+  }
+}
+
+/// An angle of two bars: its tensor is not diagonal.
+BodyDef angle_iron(const Vec3& position) {
+  BodyDef def = ball(position);
+  def.shape = centred({{{.shape = Box{{Real(1.5), Real(0.5), Real(0.5)}}},
+                        {.shape = Box{{Real(0.5), 1, Real(0.5)}},
+                         .position = {-1, Real(1.5), 0},
+                         .orientation = normalized(Quat{1, Real(0.2), 0, 0})}}});
+  return def;
+}
+
+TEST(SceneWorld, AssembliesStartAsTheSceneSaysAndHaveTheInertiaOfTheNativeWorld) {
+  Scene scene;
+  scene.dt = Real(1) / 1024;
+  scene.bodies = {angle_iron({1, 2, 3})};
+  BodyDef& def = scene.bodies[0];
+  def.acceleration = {};
+  def.orientation = normalized(Quat{1, Real(0.5), Real(-0.25), 0});
+  def.angular_velocity = {Real(0.3), Real(0.2), Real(0.1)};
+  SceneWorld bullet(scene);
+  const BodyState s = bullet.states()[0];
+  EXPECT_EQ(s.position, def.position);
+  EXPECT_NEAR(s.orientation.w, def.orientation.w, 1e-6);
+  EXPECT_NEAR(s.orientation.x, def.orientation.x, 1e-6);
+  EXPECT_NEAR(s.orientation.y, def.orientation.y, 1e-6);
+  EXPECT_NEAR(s.orientation.z, def.orientation.z, 1e-6);
+
+  // The same torque on both turns them the same way.
+  World native(scene);
+  const Vec3 torque{2, Real(-1), 3};
+  native.apply_torque(native.bodies()[0], torque);
+  bullet.bodies()[0]->applyTorque({torque.x, torque.y, torque.z});
+  native.step();
+  bullet.step();
+  const Vec3 difference = native.states()[0].angular_velocity - bullet.states()[0].angular_velocity;
+  EXPECT_NEAR(length(difference), 0, 2e-3);
+}
+
+TEST(SceneWorld, AnAssemblyComesToRestOnTheGround) {
+  Scene scene;
+  scene.bodies = {angle_iron({0, 2, 0})};
+  BodyDef ground;
+  ground.shape = HalfSpace{};
+  ground.mass = 0;
+  scene.bodies.push_back(ground);
+  SceneWorld world(scene);
+  for (int i = 0; i < 600; ++i) world.step();
+  EXPECT_LT(length(world.states()[0].velocity), Real(0.01));
+  EXPECT_GT(world.states()[0].position.y, Real(0.4));
+  EXPECT_LT(world.states()[0].position.y, Real(1.5));
+}
+
+TEST(SceneWorld, ATwoSidedPlaneIsRefusedByName) {
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0}), ball({0, 0, 0})};
+  scene.bodies[1].shape = Plane{};
+  scene.bodies[1].mass = 0;
+  try {
+    SceneWorld world(scene);
+    FAIL();
+  } catch (const InvalidScene& error) {
+    EXPECT_STREQ(error.what(),
+                 "body 1: shape is a two-sided plane, which Bullet does not have; it must be a "
+                 "half-space or a box to run in Bullet");
   }
 }
 

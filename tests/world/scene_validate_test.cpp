@@ -25,6 +25,12 @@ Scene sound() {
   scene.bodies[1].shape = Box{};
   scene.bodies[2].shape = HalfSpace{};
   scene.bodies[2].mass = 0;
+  scene.bodies.resize(6);
+  scene.bodies[4].shape = Plane{};
+  scene.bodies[4].mass = 0;
+  scene.bodies[5].shape = Assembly{{{.shape = Sphere{}, .position = {-1, 0, 0}},
+                                    {.shape = Sphere{}, .position = {1, 0, 0}},
+                                    {.shape = Box{}}}};
   return scene;
 }
 
@@ -89,6 +95,9 @@ TEST(Validate, EveryFieldIsChecked) {
   const auto body = [](auto member) {
     return [member](Scene& scene, Real value) { scene.bodies[0].*member = value; };
   };
+  const auto part = [](Scene& scene, std::size_t i) -> AssemblyPart& {
+    return std::get<Assembly>(scene.bodies[5].shape).parts[i];
+  };
   const std::vector<Real> not_finite = {kNan, kInfinity, -kInfinity};
   const auto and_also = [&](std::vector<Real> values) {
     values.insert(values.end(), not_finite.begin(), not_finite.end());
@@ -128,6 +137,32 @@ TEST(Validate, EveryFieldIsChecked) {
          s.bodies[2].shape = HalfSpace{{0, 1, 0}, v};
        },
        and_also({1.01e9_r, -1.01e9_r})},
+      {"normal",
+       [](Scene& s, Real v) {
+         s.bodies[4].shape = Plane{{0, v, 0}, 0};
+       },
+       and_also({0, 0.99_r, 1.01_r})},
+      {"offset",
+       [](Scene& s, Real v) {
+         s.bodies[4].shape = Plane{{0, 1, 0}, v};
+       },
+       and_also({1.01e9_r, -1.01e9_r})},
+      {"parts[1].radius", [part](Scene& s, Real v) { part(s, 1).shape = Sphere{v}; },
+       and_also({0, -1, 1.01e9_r})},
+      {"parts[2].half_extents",
+       [part](Scene& s, Real v) {
+         part(s, 2).shape = Box{{1, 1, v}};
+       },
+       and_also({0, -1, 1.01e9_r})},
+      {"parts[0].position", [part](Scene& s, Real v) { part(s, 0).position.y = v; },
+       and_also({1.01e9_r, -1.01e9_r})},
+      {"parts[0].orientation",
+       [part](Scene& s, Real v) {
+         part(s, 0).orientation = {0, v, 0, 0};
+       },
+       and_also({0, 0.99_r, 1.01_r})},
+      {"parts[2].density", [part](Scene& s, Real v) { part(s, 2).density = v; },
+       and_also({0, -1, 1.01e9_r})},
       {"position", [](Scene& s, Real v) { s.bodies[0].position.z = v; },
        and_also({1.01e9_r, -1.01e9_r})},
       {"orientation",
@@ -202,6 +237,31 @@ TEST(Validate, MassesThatMakeNoFiniteInertiaAreRefused) {
   EXPECT_NE(message(scene).find("body 0: moments of inertia is "), std::string::npos);
   scene.bodies[0].mass = 0;
   EXPECT_EQ(message(scene), "");
+}
+
+TEST(Validate, AnAssemblyNeedsPartsAroundItsCentreOfMass) {
+  Scene scene = sound();
+  scene.bodies[5].shape = Assembly{};
+  EXPECT_EQ(message(scene), "body 5: parts is empty; it must have at least one sphere or box");
+  scene = sound();
+  auto& assembly = std::get<Assembly>(scene.bodies[5].shape);
+  for (AssemblyPart& part : assembly.parts) part.position.y += 0.5_r;
+  EXPECT_EQ(message(scene),
+            "body 5: centre of mass of parts is (0, 0.5, 0); it must be the origin, to a "
+            "thousandth of the body's reach; centred() moves it there");
+  scene.bodies[5].mass = 0;  // has none
+  EXPECT_EQ(message(scene), "");
+  scene.bodies[5].mass = 1;
+  scene.bodies[5].shape = centred(assembly);
+  EXPECT_EQ(message(scene), "");
+}
+
+TEST(Validate, AnAssemblyWithoutFiniteInertiaIsRefused) {
+  const Real tiny = square_root(std::numeric_limits<Real>::min());
+  Scene scene = sound();
+  scene.bodies[5].mass = std::numeric_limits<Real>::min();
+  scene.bodies[5].shape = Assembly{{{.shape = Sphere{tiny}}}};
+  EXPECT_NE(message(scene).find("body 5: moments of inertia is "), std::string::npos);
 }
 
 TEST(Validate, MoreBodiesThanIndicesAreRefused) {

@@ -39,9 +39,12 @@ struct StageTimes {
 
 /// Owns a btDiscreteDynamicsWorld made from a scene, with Bullet's default configuration and
 /// dynamic tree broadphase. What a body of the scene becomes:
-/// - mass 0 is a static body; a half-space is a static plane and follows no pose;
+/// - mass 0 is a static body; a half-space is a static plane and follows no pose; Bullet has no
+///   two-sided plane;
+/// - an assembly is a btCompoundShape in its principal axes, with the inertia of the native engine;
 /// - a kinematic body is one of Bullet's, moved by its velocities before each step;
-/// - a given inertia must be diagonal, for Bullet keeps moments about the axes of the shape;
+/// - a given inertia, but for an assembly, must be diagonal, for Bullet keeps moments about the
+///   axes of the shape;
 /// - damping: Bullet's is the share of velocity *lost* per second, with the same law of decay;
 /// - friction and restitution: Bullet multiplies the values of two bodies, so they stay as they are
 ///   where the scene's rule is the product and become square roots where it is the geometric mean;
@@ -51,9 +54,9 @@ struct StageTimes {
 /// Not thread-safe; several worlds in several threads are.
 class JFPX_API SceneWorld {
  public:
-  /// @throws InvalidScene, also for what Bullet can't follow: an inertia that is not diagonal,
-  ///   friction and restitution that combine by another rule than geometric mean or product; what
-  ///   the constructor of CollisionDispatcher throws.
+  /// @throws InvalidScene, also for what Bullet can't follow: a two-sided plane, an inertia that is
+  ///   not diagonal, friction and restitution that combine by another rule than geometric mean or
+  ///   product; what the constructor of CollisionDispatcher throws.
   explicit SceneWorld(const Scene& scene, const SceneWorldOptions& options = {});
   ~SceneWorld();
   SceneWorld(SceneWorld&&) noexcept;
