@@ -72,10 +72,14 @@ class PairTest {
 
 }  // namespace
 
-NarrowPhase::NarrowPhase(std::unique_ptr<SphereCollider> collider)
-    : collider_(std::move(collider)) {}
+NarrowPhase::NarrowPhase(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
+    : touches_(std::move(collider), broad_phase) {}
 
-void NarrowPhase::set_bodies(const BodyStore& bodies) { pieces_.set_bodies(bodies); }
+void NarrowPhase::set_bodies(const BodyStore& bodies) {
+  pieces_.set_bodies(bodies);
+  pieces_.place(bodies);
+  touches_.set_spheres(pieces_.bounds());
+}
 
 std::uint64_t NarrowPhase::find_contacts(const BodyStore& bodies, std::vector<Contact>* contacts) {
   pieces_.place(bodies);
@@ -108,7 +112,7 @@ NarrowPhase::Candidate NarrowPhase::ordered(const BodyStore& bodies, Piece x, Pi
 
 /// Pairs in which a box takes part become candidates.
 void NarrowPhase::find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts) {
-  const ContactSpan found = collider_->find_contacts(pieces_.bounds());
+  const ContactSpan found = touches_.find(pieces_.bounds());
   hits_.clear();
   for (std::size_t i = 0; i < found.size(); ++i) {
     const std::uint32_t a = pieces_.body(found[i].a), b = pieces_.body(found[i].b);

@@ -6,15 +6,17 @@
 
 #include "src/body_store.hpp"
 #include "src/piece_table.hpp"
+#include "src/touch_finder.hpp"
 
 namespace jfpx::inline JFPX_ABI {
 
 /// Sphere pairs are the collider's, and so are the candidates among movable boxes: it gets their
-/// bounding spheres too. Every immovable box, half-space and plane is tested against every movable
-/// body. Contacts between immovable bodies, and within one body, are dropped.
+/// bounding spheres too, or the broad phase finds for it which may touch. Every immovable box,
+/// half-space and plane is tested against every movable body. Contacts between immovable bodies,
+/// and within one body, are dropped.
 class NarrowPhase {
  public:
-  explicit NarrowPhase(std::unique_ptr<SphereCollider> collider);
+  NarrowPhase(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase);
 
   /// Must be called when bodies came, went, or an immovable one was moved.
   void set_bodies(const BodyStore& bodies);
@@ -25,7 +27,7 @@ class NarrowPhase {
   /// @throws what SphereCollider::find_contacts() throws
   std::uint64_t find_contacts(const BodyStore& bodies, std::vector<Contact>* contacts);
 
-  const SphereCollider& collider() const noexcept { return *collider_; }
+  const SphereCollider& collider() const noexcept { return touches_.collider(); }
 
  private:
   using Piece = PieceTable::Piece;
@@ -47,7 +49,7 @@ class NarrowPhase {
   void find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts);
   void find_obstacles(const BodyStore& bodies);
 
-  std::unique_ptr<SphereCollider> collider_;
+  TouchFinder touches_;
   PieceTable pieces_;
   std::vector<SphereHit> hits_;
   std::vector<Candidate> candidates_;

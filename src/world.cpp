@@ -127,13 +127,13 @@ StepReport World::step() {
 }
 
 World::World(const Scene& scene, const WorldSettings& settings)
-    : World(scene, make_sphere_collider(settings.collider)) {}
+    : World(scene, make_sphere_collider(settings.collider), settings.broad_phase) {}
 
-World::World(const Scene& scene, std::unique_ptr<SphereCollider> collider) {
+World::World(const Scene& scene, std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase) {
   if (collider == nullptr) throw InvalidArgument("collider is null; it must be a sphere collider");
   validate(scene);
   try {
-    impl_ = std::make_unique<Impl>(scene, std::move(collider));
+    impl_ = std::make_unique<Impl>(scene, std::move(collider), broad_phase);
   } catch (const std::bad_alloc&) {
     throw OutOfMemory("no memory for a world of " + std::to_string(scene.bodies.size()) +
                       " bodies: about " + std::to_string(scene.bodies.size() * kBytesPerBody) +

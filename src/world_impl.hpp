@@ -16,8 +16,10 @@ struct World::Impl {
   /// What this engine asks of a body beyond what every scene must be. @throws InvalidScene
   static void require_native(const BodyDef& def, std::uint64_t body);
 
-  Impl(const Scene& given, std::unique_ptr<SphereCollider> collider)
-      : scene(given), bodies(given.dt, given.sleep), narrow_phase(std::move(collider)) {
+  Impl(const Scene& given, std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
+      : scene(given),
+        bodies(given.dt, given.sleep),
+        narrow_phase(std::move(collider), broad_phase) {
     for (std::size_t i = 0; i < given.bodies.size(); ++i) {
       require_native(given.bodies[i], i);
       bodies.add(given.bodies[i]);

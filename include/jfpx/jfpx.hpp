@@ -2,6 +2,7 @@
 #pragma once
 
 #include <jfpx/backend.hpp>
+#include <jfpx/broad_phase.hpp>
 #include <jfpx/collide.hpp>
 #include <jfpx/cost_model.hpp>
 #include <jfpx/contact_generator.hpp>

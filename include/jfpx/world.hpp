@@ -1,6 +1,7 @@
 /// The native engine: a world of rigid bodies that steps by itself (thesis 4.3).
 #pragma once
 
+#include <jfpx/broad_phase.hpp>
 #include <jfpx/contact_generator.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
@@ -19,12 +20,13 @@
 namespace jfpx::inline JFPX_ABI {
 
 struct WorldSettings {
-  SphereColliderOptions collider;  ///< who finds sphere contacts, and how
+  SphereColliderOptions collider;              ///< who finds sphere contacts, and how
+  BroadPhase broad_phase = BroadPhase::cells;  ///< who finds which bounds touch
 };
 
 /// One contact of the native engine; boxes that touch along a face have several, and so have
-/// assemblies. Of two spheres `a` has the lower index; `a` is the sphere where a sphere meets a box,
-/// half-space or plane, else the movable one where the other is not, else the lower index.
+/// assemblies. Of two spheres `a` has the lower index; `a` is the sphere where a sphere meets a
+/// box, half-space or plane, else the movable one where the other is not, else the lower index.
 struct Contact {
   std::uint32_t a = 0, b = 0;  ///< BodyId::index; the place in the scene until a body is removed
   Vec3 normal;                 ///< [-], unit, from b to a
@@ -80,7 +82,8 @@ class JFPX_API World {
   explicit World(const Scene& scene, const WorldSettings& settings = {});
   /// The same with sphere contacts from the given collider, which may be the caller's own.
   /// @throws InvalidArgument if it is null, InvalidScene, OutOfMemory
-  World(const Scene& scene, std::unique_ptr<SphereCollider> collider);
+  World(const Scene& scene, std::unique_ptr<SphereCollider> collider,
+        BroadPhase broad_phase = BroadPhase::cells);
   ~World();
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
@@ -173,11 +176,11 @@ class JFPX_API World {
                                   const Quat& orientation = {}) const;
 
   double time() const;  ///< [s], completed steps times dt
-  /// Contacts of the last step, in order: where spheres, or spheres of assemblies, touch each other,
-  /// by (a, b); then all others by (a, b); then those of contact generators in their order. Those of
-  /// the same a and b come by a's part, then b's part, spheres before boxes; the points of two parts
-  /// in the order of their test. None after a failed step, or when bodies were added or removed
-  /// since.
+  /// Contacts of the last step, in order: where spheres, or spheres of assemblies, touch each
+  /// other, by (a, b); then all others by (a, b); then those of contact generators in their order.
+  /// Those of the same a and b come by a's part, then b's part, spheres before boxes; the points of
+  /// two parts in the order of their test. None after a failed step, or when bodies were added or
+  /// removed since.
   std::span<const Contact> contacts() const;
   /// Who touched whom in the last step, who began to and who ended, of contacts that were found and
   /// not generated; sorted by (a.index, b.index);

@@ -43,7 +43,7 @@ Assembly angle_iron() {
 }
 
 std::vector<Contact> find_contacts(const BodyStore& bodies, std::uint64_t* sphere_contacts) {
-  NarrowPhase narrow_phase(make_sphere_collider());
+  NarrowPhase narrow_phase(make_sphere_collider(), BroadPhase::cells);
   narrow_phase.set_bodies(bodies);
   std::vector<Contact> contacts;
   *sphere_contacts = narrow_phase.find_contacts(bodies, &contacts);

@@ -22,6 +22,7 @@ jfpx_add_test(world_test SOURCES
   world/world_test.cpp)
 jfpx_add_test(particle_test SOURCES world/particle_test.cpp)
 jfpx_add_test(assembly_test SOURCES world/assembly_test.cpp)
+jfpx_add_test(broad_phase_test SOURCES world/broad_phase_test.cpp)
 jfpx_add_test(allocation_test SOURCES world/allocation_test.cpp)
 
 jfpx_add_executable(pinned_hashes SOURCES world/pinned_hashes.cpp LINK jfpx jfpx_scenes)
