@@ -1,6 +1,8 @@
 /// Gathers bounds, asks the collider, and tests what is no pair of spheres.
 #include "src/narrow_phase.hpp"
 
+#include <jfpx/intersect.hpp>
+
 #include <algorithm>
 #include <utility>
 
@@ -28,7 +30,7 @@ class PairTest {
   /// Body a owns piece p, body b piece q; only q may be a wall.
   void operator()(std::uint32_t a, std::uint32_t b, Piece p, Piece q) const {
     if (pieces_.is_wall(q)) {
-      const HalfSpace solid = facing(pieces_.wall(q), bodies_.moving.position[a]);
+      const HalfSpace solid = pieces_.wall(q).solid_for(bodies_.moving.position[a]);
       if (pieces_.is_sphere(p)) {
         add(a, b, collide(pieces_.bounds(p), solid), 1);
       } else {
@@ -40,18 +42,12 @@ class PairTest {
       add(a, b, collide(pieces_.bounds(q), pieces_.box(p).box, pieces_.box(p).pose), -1);
     } else {
       const PieceTable::PosedBox &first = pieces_.box(p), &second = pieces_.box(q);
+      if (!may_touch(first.box, first.pose, second.box, second.pose)) return;
       add(a, b, collide(first.box, first.pose, second.box, second.pose));
     }
   }
 
  private:
-  /// What is solid for a body whose centre of mass is at `centre`.
-  static HalfSpace facing(const PieceTable::Wall& wall, const Vec3& centre) {
-    const HalfSpace& solid = wall.solid;
-    if (!wall.two_sided || !(dot(solid.normal, centre) < solid.offset)) return solid;
-    return {-solid.normal, -solid.offset};
-  }
-
   /// @param side 1 if the sphere of the touch is a's, -1 if it is b's
   void add(std::uint32_t a, std::uint32_t b, const Touch& touch, Real side) const {
     if (!touch.touching) return;
@@ -135,13 +131,22 @@ void NarrowPhase::find_sphere_pairs(const BodyStore& bodies, std::vector<Contact
 
 void NarrowPhase::find_obstacles(const BodyStore& bodies) {
   for (Piece piece = 0; piece < pieces_.fixed_begin(); ++piece) {
-    if (!bodies.movable(pieces_.body(piece))) continue;
+    const std::uint32_t body = pieces_.body(piece);
+    if (!bodies.movable(body)) continue;
     for (Piece fixed = pieces_.fixed_begin(); fixed < pieces_.size(); ++fixed) {
-      if (pieces_.is_wall(fixed) || near(pieces_.bounds(piece), pieces_.bounds(fixed))) {
+      if (may_touch(piece, fixed, bodies.moving.position[body])) {
         candidates_.push_back(ordered(bodies, piece, fixed));
       }
     }
   }
+}
+
+/// @param centre of mass of the body that the piece belongs to
+bool NarrowPhase::may_touch(Piece piece, Piece fixed, const Vec3& centre) const {
+  if (!pieces_.is_wall(fixed)) return near(pieces_.bounds(piece), pieces_.bounds(fixed));
+  const HalfSpace solid = pieces_.wall(fixed).solid_for(centre);
+  if (pieces_.is_sphere(piece)) return jfpx::may_touch(pieces_.bounds(piece), solid);
+  return jfpx::may_touch(pieces_.box(piece).box, pieces_.box(piece).pose, solid);
 }
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -48,6 +48,7 @@ class NarrowPhase {
   Candidate ordered(const BodyStore& bodies, Piece x, Piece y) const;
   void find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts);
   void find_obstacles(const BodyStore& bodies);
+  bool may_touch(Piece piece, Piece fixed, const Vec3& centre) const;
 
   TouchFinder touches_;
   PieceTable pieces_;

@@ -19,10 +19,15 @@ class PieceTable {
     Box box;
     Transform pose;
   };
-  /// A half-space, or the one behind a plane as seen from its front.
   struct Wall {
-    HalfSpace solid;
+    HalfSpace solid;  ///< of a plane: what is behind it
     bool two_sided = false;
+
+    /// What is solid for a body whose centre of mass is at `centre`.
+    HalfSpace solid_for(const Vec3& centre) const {
+      if (!two_sided || !(dot(solid.normal, centre) < solid.offset)) return solid;
+      return {-solid.normal, -solid.offset};
+    }
   };
 
   /// Must be called when bodies came, went, or an immovable one was moved.

@@ -8,6 +8,7 @@
 #include <jfpx/contact_generator.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
+#include <jfpx/intersect.hpp>
 #include <jfpx/material.hpp>
 #include <jfpx/particle.hpp>
 #include <jfpx/query.hpp>

@@ -14,6 +14,11 @@ inline Quat random_turn(Random* random) {
   return normalized(q);
 }
 
+/// A unit vector.
+inline Vec3 random_direction(Random* random) {
+  return normalized(rotate(random_turn(random), {1, 0, 0}));
+}
+
 inline std::variant<Sphere, Box> random_piece(Random* random) {
   if (random->below(2) == 0) return Sphere{random->uniform(0.1_r, 0.6_r)};
   return Box{random->uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {0.5_r, 0.7_r, 0.9_r})};
