@@ -44,6 +44,12 @@ class Hunt {
   Real scale_ = 1;
 };
 
+/// The rotation that takes one unit vector to another.
+Quat turn_from(const Vec3& from, const Vec3& to) {
+  const Vec3 axis = cross(from, to);
+  return normalized(Quat{1 + dot(from, to), axis.x, axis.y, axis.z});
+}
+
 /// How often a test ruled out, how often there was a touch.
 struct Score {
   int clear = 0, touches = 0;
@@ -134,10 +140,14 @@ TEST(MayTouch, NeverDeniesATouchOfBoxAndBox) {
     const Transform pose_a = hunt.pose(home);
     Transform pose_b = hunt.pose({});
     if (hunt.random.below(3) == 0) pose_b.basis = pose_a.basis;
-    // Face to corner, where the test is tight, or anywhere.
+    // Corner to face, where the test is tight, or anywhere.
     const int face = static_cast<int>(hunt.random.below(3));
     const bool tight = hunt.random.below(2) == 0;
     const Vec3 way = tight ? pose_a.basis.column(face) : hunt.direction();
+    if (tight) {
+      pose_b.basis =
+          to_matrix(turn_from(b.half_extents * (Real(1) / length(b.half_extents)), -way));
+    }
     const Real reach =
         (tight ? a.half_extents[face] : length(a.half_extents)) + length(b.half_extents);
     pose_b.origin = home + way * (reach * hunt.near_one());
