@@ -31,6 +31,7 @@ void PieceTable::set_bodies(const BodyStore& bodies) {
   walls_.clear();
   part_.clear();
   local_.clear();
+  kinematic_.clear();
   const auto add = [&](std::uint32_t body, Real radius, const AssemblyPart* part) {
     body_.push_back(body);
     bounds_.push_back({{}, radius});
@@ -55,7 +56,10 @@ void PieceTable::set_bodies(const BodyStore& bodies) {
     }
     if (movable) fixed_begin_ = size();
   }
-  for (Piece piece = fixed_begin_; piece < size(); ++piece) place(bodies, piece);
+  for (Piece piece = fixed_begin_; piece < size(); ++piece) {
+    place(bodies, piece);
+    if (bodies.kinematic(body_[piece])) kinematic_.push_back(piece);
+  }
   for (const BodyId id : bodies.ids()) {
     const Shape& shape = bodies.shape(id.index);
     if (const auto* half_space = std::get_if<HalfSpace>(&shape)) {
@@ -71,6 +75,7 @@ void PieceTable::set_bodies(const BodyStore& bodies) {
 
 void PieceTable::place(const BodyStore& bodies) {
   for (Piece piece = 0; piece < fixed_begin_; ++piece) place(bodies, piece);
+  for (const Piece piece : kinematic_) place(bodies, piece);
 }
 
 void PieceTable::place(const BodyStore& bodies, Piece piece) {

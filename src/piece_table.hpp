@@ -9,8 +9,8 @@
 namespace jfpx::inline JFPX_ABI {
 
 /// A piece is a body of one shape, or one part of an assembly. Pieces are numbered: spheres, then
-/// boxes that can move, then those that can't, then half-spaces and planes; each kind by body, then
-/// by part.
+/// boxes that can be moved, then those that can't (kinematic ones among them), then half-spaces and
+/// planes; each kind by body, then by part.
 class PieceTable {
  public:
   using Piece = std::uint32_t;
@@ -46,7 +46,7 @@ class PieceTable {
   /// Of all spheres and movable boxes.
   std::span<const SphereInstance> bounds() const { return {bounds_.data(), fixed_begin_}; }
   Piece size() const { return static_cast<Piece>(body_.size()); }
-  Piece fixed_begin() const { return fixed_begin_; }  ///< the first box or wall that can't move
+  Piece fixed_begin() const { return fixed_begin_; }  ///< the first box or wall of mass 0
 
  private:
   void add_body(const BodyStore& bodies, std::uint32_t body);
@@ -59,6 +59,7 @@ class PieceTable {
   std::vector<Wall> walls_;
   std::vector<std::uint32_t> part_;  ///< by sphere or box: 0, or 1 + its index in local_
   std::vector<Transform> local_;     ///< of parts, in body axes
+  std::vector<Piece> kinematic_;     ///< boxes of mass 0 that move all the same
 };
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -60,7 +60,7 @@ bool World::Impl::advance(StepReport* report) {
   if (!all_finite()) return false;
 
   const Clock::time_point integrated = Clock::now();
-  if (bodies_changed || bodies.carries()) narrow_phase.set_bodies(bodies);
+  if (bodies_changed) narrow_phase.set_bodies(bodies);
   bodies_changed = false;
   contacts.clear();
   report->sphere_contacts = narrow_phase.find_contacts(bodies, &contacts);
