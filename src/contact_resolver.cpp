@@ -1,8 +1,8 @@
-/// The resolver of the engine: the heap picks.
+/// The resolver of the engine: a tournament picks.
 #include "src/contact_resolver.hpp"
 
 namespace jfpx::inline JFPX_ABI {
 
-template class BasicContactResolver<IndexedHeap>;
+template class BasicContactResolver<Tournament>;
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -4,8 +4,8 @@
 #include <jfpx/world.hpp>
 
 #include "src/body_store.hpp"
-#include "src/indexed_heap.hpp"
 #include "src/shared/contact_response.hpp"
+#include "src/tournament.hpp"
 
 #include <numeric>
 
@@ -32,7 +32,7 @@ class BasicContactResolver {
                          const ResolverSettings& settings, std::size_t generated = 0);
 
  private:
-  struct Row {
+  struct alignas(64) Row {  // a cache line in float, two in double
     std::uint32_t a, b;
     Vec3 normal, arm_a, arm_b;  ///< arms: from the centre of mass to the contact
     Real from_acceleration;     ///< [m/s], of the separating velocity
@@ -41,9 +41,10 @@ class BasicContactResolver {
   };
   /// What is done at once for rows of the same two bodies.
   struct Patch {
-    Row row;
+    const Row& row;     ///< the worst of them
+    Vec3 arm_a, arm_b;  ///< to where it is done
     Real amount;
-    Real reach;  ///< [m], mean distance of the points from their centre; 0 for one point
+    Real reach = 0;  ///< [m], mean distance of the points from their centre; 0 for one point
   };
   /// Shares of a patch's friction, whose squares add up to 1.
   struct Grip {
@@ -57,10 +58,11 @@ class BasicContactResolver {
   Patch patch_of(RowIndex worst, Real kept) const;
   void index_rows_by_body();
   std::span<const RowIndex> rows_of(std::uint32_t body) const;
+  void fetch_neighbours(const Row& row) const;
   Vec3 lever_arm(std::uint32_t body, const Contact& contact, Real side) const;
 
   void resolve_positions(ResolverReport* report);
-  void project(const Row& row, Real depth);
+  void project(const Patch& patch);
   void displace(std::uint32_t body, const shared::Displacement& displacement);
 
   void resolve_velocities(ResolverReport* report);
@@ -69,7 +71,7 @@ class BasicContactResolver {
   Real spin(const Row& row) const;
   void twist(const Row& row, Real most);
   void push(std::uint32_t body, const Vec3& arm, const Vec3& impulse);
-  Vec3 relative_velocity(const Row& row) const;
+  Vec3 relative_velocity(const Row& row, const Vec3& arm_a, const Vec3& arm_b) const;
   Real wanted_change(const Row& row) const;
   std::uint64_t limit() const;
 
@@ -82,8 +84,8 @@ class BasicContactResolver {
   std::vector<RowIndex> body_rows_;
 };
 
-extern template class BasicContactResolver<IndexedHeap>;
-using ContactResolver = BasicContactResolver<IndexedHeap>;
+extern template class BasicContactResolver<Tournament>;
+using ContactResolver = BasicContactResolver<Tournament>;
 
 template <class Queue>
 ResolverReport BasicContactResolver<Queue>::resolve(BodyStore& bodies,
@@ -154,25 +156,26 @@ void BasicContactResolver<Queue>::group_patches() {
 template <class Queue>
 typename BasicContactResolver<Queue>::Patch BasicContactResolver<Queue>::patch_of(RowIndex worst,
                                                                                   Real kept) const {
-  Patch patch{rows_[worst], queue_.key(worst) - kept, 0};
-  if (patch.row.last - patch.row.first == 1) return patch;
+  const Row& row = rows_[worst];
+  Patch patch{row, row.arm_a, row.arm_b, queue_.key(worst) - kept};
+  if (row.last - row.first == 1) return patch;
   Real sum = 0;
   Vec3 arm_a, arm_b;
-  for (RowIndex i = patch.row.first; i < patch.row.last; ++i) {
+  for (RowIndex i = row.first; i < row.last; ++i) {
     const Real wanted = queue_.key(i) - kept;
     if (!(wanted > 0)) continue;
     sum += wanted;
     arm_a += rows_[i].arm_a * wanted;
     arm_b += rows_[i].arm_b * wanted;
   }
-  patch.row.arm_a = arm_a * (Real(1) / sum);
-  patch.row.arm_b = arm_b * (Real(1) / sum);
+  patch.arm_a = arm_a * (Real(1) / sum);
+  patch.arm_b = arm_b * (Real(1) / sum);
   patch.amount = 0;
-  for (RowIndex i = patch.row.first; i < patch.row.last; ++i) {
+  for (RowIndex i = row.first; i < row.last; ++i) {
     const Real wanted = queue_.key(i) - kept;
     if (!(wanted > 0)) continue;
     patch.amount += wanted / sum * wanted;
-    patch.reach += wanted / sum * length(rows_[i].arm_a - patch.row.arm_a);
+    patch.reach += wanted / sum * length(rows_[i].arm_a - patch.arm_a);
   }
   return patch;
 }
@@ -211,6 +214,17 @@ std::span<const std::uint32_t> BasicContactResolver<Queue>::rows_of(std::uint32_
   return std::span(body_rows_).subspan(first_row_[body], first_row_[body + 1] - first_row_[body]);
 }
 
+/// Asks for the rows that will have to be refreshed, while there is still something to compute:
+/// they are scattered over more memory than the inner caches hold.
+template <class Queue>
+void BasicContactResolver<Queue>::fetch_neighbours(const Row& row) const {
+  for (const std::uint32_t body : {row.a, row.b}) {
+    __builtin_prefetch(&bodies_->moving.inverse_inertia[body]);
+    if (!bodies_->movable(body)) continue;
+    for (const RowIndex i : rows_of(body)) __builtin_prefetch(&rows_[i]);
+  }
+}
+
 template <class Queue>
 std::uint64_t BasicContactResolver<Queue>::limit() const {
   return settings_.max_iterations != 0 ? settings_.max_iterations
@@ -229,28 +243,30 @@ void BasicContactResolver<Queue>::resolve_positions(ResolverReport* report) {
     const Real depth = queue_.key(worst);
     if (!(depth > settings_.position_epsilon)) return;
     if (left == 0) break;
-    const Patch patch = patch_of(worst, kept_depth);
-    project(patch.row, patch.amount);
+    fetch_neighbours(rows_[worst]);
+    project(patch_of(worst, kept_depth));
     ++report->position_iterations;
   }
   report->exhausted = true;
 }
 
-/// Moves both bodies of the row apart by `depth`, shared by how easily each yields (erratum E6a).
+/// Moves both bodies apart by the patch's amount, shared by how easily each yields (erratum E6a).
 template <class Queue>
-void BasicContactResolver<Queue>::project(const Row& row, Real depth) {
+void BasicContactResolver<Queue>::project(const Patch& patch) {
   const MotionArrays& moving = bodies_->moving;
-  const Real yield_a = bodies_->inverse_mass(row.a) +
-                       shared::angular_yield(row.normal, row.arm_a, moving.inverse_inertia[row.a]);
-  const Real yield_b = bodies_->inverse_mass(row.b) +
-                       shared::angular_yield(row.normal, row.arm_b, moving.inverse_inertia[row.b]);
+  const Row& row = patch.row;
+  const auto yield = [&](std::uint32_t body, const Vec3& arm) {
+    return bodies_->inverse_mass(body) +
+           shared::angular_yield(row.normal, arm, moving.inverse_inertia[body]);
+  };
+  const Real total_yield = yield(row.a, patch.arm_a) + yield(row.b, patch.arm_b);
   const auto share = [&](std::uint32_t body, const Vec3& arm, Real signed_depth) {
     return shared::projection(row.normal, arm, bodies_->inverse_mass(body),
-                              moving.inverse_inertia[body], signed_depth, yield_a + yield_b,
+                              moving.inverse_inertia[body], signed_depth, total_yield,
                               settings_.angular_limit);
   };
-  const shared::Displacement of_a = share(row.a, row.arm_a, depth);
-  const shared::Displacement of_b = share(row.b, row.arm_b, -depth);
+  const shared::Displacement of_a = share(row.a, patch.arm_a, patch.amount);
+  const shared::Displacement of_b = share(row.b, patch.arm_b, -patch.amount);
   displace(row.a, of_a);
   displace(row.b, of_b);
 }
@@ -268,7 +284,7 @@ void BasicContactResolver<Queue>::displace(std::uint32_t body,
     const Vec3 moved =
         shared::point_velocity(displacement.shift, displacement.turn, is_a ? row.arm_a : row.arm_b);
     const Real opened = dot(moved, row.normal);
-    queue_.update(i, queue_.key(i) + (is_a ? -opened : opened));
+    queue_.update(i, queue_.key(i) + opened * (is_a ? Real(-1) : Real(1)));
   }
 }
 
@@ -281,6 +297,7 @@ void BasicContactResolver<Queue>::resolve_velocities(ResolverReport* report) {
     const Real wanted = queue_.key(worst);
     if (!(wanted > settings_.velocity_epsilon)) return;
     if (left == 0) break;
+    fetch_neighbours(rows_[worst]);
     const Patch patch = patch_of(worst, 0);
     strike(patch);
     for (const std::uint32_t body : {patch.row.a, patch.row.b}) {
@@ -293,17 +310,18 @@ void BasicContactResolver<Queue>::resolve_velocities(ResolverReport* report) {
 }
 
 template <class Queue>
-Vec3 BasicContactResolver<Queue>::relative_velocity(const Row& row) const {
+inline Vec3 BasicContactResolver<Queue>::relative_velocity(const Row& row, const Vec3& arm_a,
+                                                           const Vec3& arm_b) const {
   const MotionArrays& moving = bodies_->moving;
-  return shared::point_velocity(moving.velocity[row.a], moving.angular_velocity[row.a], row.arm_a) -
-         shared::point_velocity(moving.velocity[row.b], moving.angular_velocity[row.b], row.arm_b);
+  return shared::point_velocity(moving.velocity[row.a], moving.angular_velocity[row.a], arm_a) -
+         shared::point_velocity(moving.velocity[row.b], moving.angular_velocity[row.b], arm_b);
 }
 
 template <class Queue>
 Real BasicContactResolver<Queue>::wanted_change(const Row& row) const {
-  return shared::wanted_velocity_change(dot(row.normal, relative_velocity(row)),
-                                        row.from_acceleration, row.restitution,
-                                        settings_.restitution_velocity);
+  return shared::wanted_velocity_change(
+      dot(row.normal, relative_velocity(row, row.arm_a, row.arm_b)), row.from_acceleration,
+      row.restitution, settings_.restitution_velocity);
 }
 
 /// Gives both bodies equal and opposite impulses at one common point, so that momentum and angular
@@ -314,11 +332,11 @@ void BasicContactResolver<Queue>::strike(const Patch& patch) {
   const MotionArrays& moving = bodies_->moving;
   const shared::ContactBasis basis = shared::contact_basis(row.normal);
   Mat3 response = diagonal({0, 0, 0});
-  Vec3 velocity = relative_velocity(row);
+  Vec3 velocity = relative_velocity(row, patch.arm_a, patch.arm_b);
   for (const bool is_a : {true, false}) {
     const std::uint32_t body = is_a ? row.a : row.b;
     if (!bodies_->movable(body)) continue;
-    shared::add_response(basis, is_a ? row.arm_a : row.arm_b, bodies_->inverse_mass(body),
+    shared::add_response(basis, is_a ? patch.arm_a : patch.arm_b, bodies_->inverse_mass(body),
                          moving.inverse_inertia[body], &response);
     // What the next step's acceleration will add along the surface is stopped now as well: a body
     // held by friction would creep downhill otherwise (Millington 2007, 15.2).
@@ -330,8 +348,8 @@ void BasicContactResolver<Queue>::strike(const Patch& patch) {
   const Vec3 local =
       shared::contact_impulse(response, local_velocity, patch.amount, row.friction * grip.sliding);
   const Vec3 impulse = shared::to_world(basis, local);
-  push(row.a, row.arm_a, impulse);
-  push(row.b, row.arm_b, -impulse);
+  push(row.a, patch.arm_a, impulse);
+  push(row.b, patch.arm_b, -impulse);
   if (patch.reach > 0) twist(row, row.friction * grip.turning * local.x * patch.reach);
 }
 

@@ -54,16 +54,16 @@ std::uint64_t ParticleResolver::relax(std::span<const ParticleContact> contacts,
                                       Correct correct) {
   keys_.resize(contacts.size());
   for (std::uint32_t i = 0; i < contacts.size(); ++i) keys_[i] = key(i);
-  heap_.assign(keys_);
+  queue_.assign(keys_);
   for (std::uint64_t done = 0; done < limit; ++done) {
-    const std::uint32_t worst = heap_.top();
-    if (!(heap_.key(worst) > epsilon)) return done;
+    const std::uint32_t worst = queue_.top();
+    if (!(queue_.key(worst) > epsilon)) return done;
     correct(worst);
     for_both(contacts[worst], [&](std::uint32_t p, Real) {
-      for (std::uint32_t k = first_[p]; k < first_[p + 1]; ++k) heap_.update(of_[k], key(of_[k]));
+      for (std::uint32_t k = first_[p]; k < first_[p + 1]; ++k) queue_.update(of_[k], key(of_[k]));
     });
   }
-  *exhausted |= heap_.key(heap_.top()) > epsilon;
+  *exhausted |= queue_.key(queue_.top()) > epsilon;
   return limit;
 }
 

@@ -1,8 +1,8 @@
 /// Parts particles that overlap and lets them bounce: the thesis' two loops (4.4.6) without arms.
 #pragma once
 
-#include "src/indexed_heap.hpp"
 #include "src/particle_store.hpp"
+#include "src/tournament.hpp"
 
 namespace jfpx::inline JFPX_ABI {
 
@@ -19,7 +19,7 @@ class ParticleResolver {
   std::uint64_t relax(std::span<const ParticleContact> contacts, std::uint64_t limit, Real epsilon,
                       bool* exhausted, Key key, Correct correct);
 
-  IndexedHeap heap_;
+  Tournament queue_;
   std::vector<Real> keys_, distance_;
   /// Contacts of particle p: entries first_[p] to first_[p + 1] of of_.
   std::vector<std::uint32_t> first_, of_, next_;

@@ -45,12 +45,11 @@ JFPX_HD constexpr Vec3 point_velocity(const Vec3& velocity, const Vec3& angular_
 /// @param slowest          closing slower than this does not bounce
 JFPX_HD constexpr Real wanted_velocity_change(Real separating, Real from_acceleration,
                                               Real restitution, Real slowest) {
-  Real bounce = 0;
-  if (separating < -slowest) {
-    const Real hit = from_acceleration < 0 ? separating - from_acceleration : separating;
-    if (hit < 0) bounce = -restitution * hit;
-  }
-  return bounce - separating;
+  const Real hit = from_acceleration < 0 ? separating - from_acceleration : separating;
+  // By a factor of 0 or 1: a branch could not be foretold, and this is the resolver's inner loop.
+  const Real back = -restitution * hit;
+  const bool bounces = (separating < -slowest) & (hit < 0);
+  return static_cast<Real>(bounces) * back - separating;
 }
 
 /// Adds what one body contributes to the change of relative velocity per unit impulse, in contact

@@ -328,18 +328,18 @@ Scenario crowd(std::uint64_t seed, std::uint32_t count) {
   return s;
 }
 
-TEST(ContactResolver, TheHeapChoosesAsTheLinearScanDoesBitForBit) {
+TEST(ContactResolver, TheTournamentChoosesAsTheLinearScanDoesBitForBit) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   for (std::uint64_t k = 0; k < 10; ++k) {
     Scenario s = crowd(seed + k, 100);
     BodyStore copy = s.bodies;
-    const ResolverReport with_heap = s.resolve();
+    const ResolverReport with_tournament = s.resolve();
     BasicContactResolver<test::LinearScan> scanner;
     const ResolverReport with_scan = scanner.resolve(copy, s.contacts, {});
-    ASSERT_GT(with_heap.position_iterations, 100u);
-    ASSERT_EQ(with_heap.position_iterations, with_scan.position_iterations);
-    ASSERT_EQ(with_heap.velocity_iterations, with_scan.velocity_iterations);
+    ASSERT_GT(with_tournament.position_iterations, 100u);
+    ASSERT_EQ(with_tournament.position_iterations, with_scan.position_iterations);
+    ASSERT_EQ(with_tournament.velocity_iterations, with_scan.velocity_iterations);
     for (std::uint32_t i = 0; i < 100; ++i) ASSERT_EQ(s.bodies.state(i), copy.state(i)) << i;
   }
 }

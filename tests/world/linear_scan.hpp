@@ -1,4 +1,4 @@
-/// The queue that the thesis used, a scan over all contacts: the oracle of the heap.
+/// The queue that the thesis used, a scan over all contacts: the oracle of the tournament.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -9,7 +9,7 @@
 
 namespace jfpx::inline JFPX_ABI::test {
 
-/// Same interface and same choices as IndexedHeap, in O(n).
+/// Same interface and same choices as Tournament, in O(n).
 class LinearScan {
  public:
   void assign(std::span<const Real> keys) { keys_.assign(keys.begin(), keys.end()); }

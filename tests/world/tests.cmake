@@ -3,11 +3,11 @@ jfpx_add_test(world_parts_test SOURCES
   world/box_pair_test.cpp
   world/collide_test.cpp
   world/contact_resolver_test.cpp
-  world/indexed_heap_test.cpp
   world/inertia_tensor_test.cpp
   world/intersect_test.cpp
   world/power_test.cpp
-  world/scene_validate_test.cpp)
+  world/scene_validate_test.cpp
+  world/tournament_test.cpp)
 jfpx_add_test(world_test SOURCES
   world/box_test.cpp
   world/contact_events_test.cpp
