@@ -12,3 +12,8 @@ jfpx_add_test(cuda_test
     cuda/cuda_test.cpp
     support/sphere_fixtures.cpp
   LINK jfpx_cuda CUDA::cudart_static)
+jfpx_add_test(cuda_pair_tests_test
+  SOURCES
+    cuda/pair_tests.cu
+    cuda/pair_tests_test.cpp
+  LINK CUDA::cudart_static)

@@ -5,6 +5,7 @@ jfpx_add_test(world_parts_test SOURCES
   world/contact_resolver_test.cpp
   world/inertia_tensor_test.cpp
   world/intersect_test.cpp
+  world/pair_oracle_test.cpp
   world/power_test.cpp
   world/scene_validate_test.cpp
   world/tournament_test.cpp)
