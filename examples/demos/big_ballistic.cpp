@@ -67,7 +67,8 @@ bool BigBallistic::is_crate(std::uint32_t body) const {
 }
 
 bool BigBallistic::hit_a_crate(BodyId round) const {
-  return std::ranges::any_of(world_.contacts(), [&](const Contact& c) {
+  const std::span<const Contact> contacts = world_.contacts();
+  return std::any_of(contacts.begin(), contacts.end(), [&](const Contact& c) {
     return (c.a == round.index && is_crate(c.b)) || (c.b == round.index && is_crate(c.a));
   });
 }
@@ -76,12 +77,17 @@ bool BigBallistic::hit_a_crate(BodyId round) const {
 /// as any body does; in the original it passed through both.
 StepReport BigBallistic::advance() {
   const StepReport report = world_.step();
-  const auto kept = std::ranges::stable_partition(rounds_, [this](const Round& round) {
-    return !hit_a_crate(round.id) &&
-           !spent(world_.state(round.id).position, world_.time() - round.fired);
-  });
-  for (const Round& round : kept) world_.remove(round.id);
-  rounds_.erase(kept.begin(), kept.end());
+  std::vector<BodyId> gone;  // all are asked before any is removed, which ends all contacts
+  for (const Round& round : rounds_) {
+    const double age = world_.time() - round.fired;
+    if (hit_a_crate(round.id) || spent(world_.state(round.id).position, age)) {
+      gone.push_back(round.id);
+    }
+  }
+  for (const BodyId id : gone) {
+    world_.remove(id);
+    std::erase_if(rounds_, [id](const Round& round) { return round.id == id; });
+  }
   return report;
 }
 

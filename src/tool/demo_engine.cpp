@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
 
 namespace jfpx::inline JFPX_ABI::tool {
@@ -52,12 +51,17 @@ class DemoEngine final : public Engine {
 }  // namespace
 
 bool is_demo(const std::string& name) {
-  return std::ranges::any_of(demos::all(), [&](const auto& entry) { return entry.name == name; });
+  for (const demos::Entry& entry : demos::all()) {
+    if (entry.name == name) return true;
+  }
+  return false;
 }
 
 bool is_only_a_demo(const std::string& name) {
-  return is_demo(name) &&
-         std::ranges::none_of(scenes::all(), [&](const auto& entry) { return entry.name == name; });
+  for (const scenes::Entry& entry : scenes::all()) {
+    if (entry.name == name) return false;
+  }
+  return is_demo(name);
 }
 
 std::unique_ptr<Engine> make_demo_engine(const RunOptions& options, const std::string& script,

@@ -1,12 +1,16 @@
 /// Hashes of native runs, equal for every compiler and optimisation level. A changed hash is a
 /// change of what every user computes: pin the new one only with a line in CHANGELOG.md.
 /// A plain program, so that flavours/ can build it quickly in many ways.
+#include <jfpx/random.hpp>
 #include <jfpx/world.hpp>
 
+#include "examples/demos/demo.hpp"
 #include "examples/scenes/scenes.hpp"
+#include "src/hash64.hpp"
 
 #include <cinttypes>
 #include <cstdio>
+#include <vector>
 
 namespace jfpx {
 namespace {
@@ -26,6 +30,20 @@ constexpr Pin kPins[] = {
     {"overlap", 32, 60, 0xf2230bd18b8b5575u, 0x7b88a66b3fc8384bu},
     {"lattice", 125, 30, 0x954b8ff8f9bf4aa0u, 0xffd382557645e418u},
     {"polydisperse", 100, 60, 0x53a5b2155ebb9b95u, 0xdda07c7f25f8daa8u},
+    {"mixed", 40, 150, 0xedcd6493fe8d2e86u, 0x50dbfac0b4f12d61u},
+    {"big-ballistic", 12, 200, 0x9afc83700278eeeau, 0x91aef0ced8d642f8u},
+};
+
+struct DemoPin {
+  const char* demo;
+  int steps;
+  std::uint64_t float_hash, double_hash;
+};
+
+constexpr DemoPin kDemoPins[] = {
+    {"ballistic", 400, 0xec60440246cf9935u, 0x92cb3b64182c2893u},
+    {"big-ballistic", 400, 0x96fc4cc922d2b100u, 0xae8136d06ad154d1u},
+    {"flight", 900, 0xc255fca24d5f635eu, 0xa3eabd790ad788b7u},
 };
 
 /// False, with a line that says why, if the run goes wrong, resolves nothing, or ends elsewhere.
@@ -49,11 +67,41 @@ bool check(const Pin& pin) {
   return finite && resolved > 0 && same;
 }
 
+/// A demo under random hands that leave its reset alone. The hash is over the states of all steps,
+/// because rounds come and go.
+bool check(const DemoPin& pin) {
+  const auto demo = demos::make(pin.demo);
+  const std::size_t reset = find_control(*demo, "reset");
+  Random random(1);
+  Hash64 hash;
+  bool finite = true;
+  std::size_t control = reset;
+  for (int n = 0; n < pin.steps; ++n) {
+    std::vector<demos::Input> inputs;
+    if (n % 5 == 0) {
+      if (control != reset) inputs.push_back({control, false});
+      control = random.below(demo->controls().size());
+      if (control != reset) inputs.push_back({control, true});
+    }
+    finite = !demo->step(inputs).non_finite && finite;
+    hash.add_word(demo->state_hash());
+  }
+  const std::uint64_t expected = sizeof(Real) == 4 ? pin.float_hash : pin.double_hash;
+  const bool same = hash.value() == expected;
+  std::printf("%-16s  as a demo  %5d steps  %016" PRIx64 "  %s\n", pin.demo, pin.steps,
+              hash.value(),
+              !finite ? "WRONG: a body ran away"
+              : !same ? "WRONG: another hash is pinned"
+                      : "as pinned");
+  return finite && same;
+}
+
 }  // namespace
 }  // namespace jfpx
 
 int main() {
   bool all = true;
   for (const jfpx::Pin& pin : jfpx::kPins) all = jfpx::check(pin) && all;
+  for (const jfpx::DemoPin& pin : jfpx::kDemoPins) all = jfpx::check(pin) && all;
   return all ? 0 : 1;
 }

@@ -27,7 +27,7 @@ jfpx_add_test(assembly_test SOURCES world/assembly_test.cpp)
 jfpx_add_test(broad_phase_test SOURCES world/broad_phase_test.cpp)
 jfpx_add_test(allocation_test SOURCES world/allocation_test.cpp)
 
-jfpx_add_executable(pinned_hashes SOURCES world/pinned_hashes.cpp LINK jfpx jfpx_scenes)
+jfpx_add_executable(pinned_hashes SOURCES world/pinned_hashes.cpp LINK jfpx jfpx_demos)
 add_test(NAME PinnedHashes COMMAND pinned_hashes)
 add_test(NAME PinnedHashes_f64 COMMAND pinned_hashes_f64)
 add_test(NAME PinnedHashes.WithEveryCompiler
