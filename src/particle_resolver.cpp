@@ -7,7 +7,7 @@
 namespace jfpx::inline JFPX_ABI {
 namespace {
 
-/// Calls act(particle, sign) for the movable particles of a contact; moving `sign` times the normal
+/// Calls act(particle, sign) for the particles of a contact; moving along `sign` times the normal
 /// parts them.
 template <class Act>
 void for_both(const ParticleContact& c, Act act) {

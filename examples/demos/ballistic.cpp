@@ -41,12 +41,12 @@ ParticleDef round_of(Weapon weapon) {
   return round;
 }
 
-class Ballistic final : public Demo {
+class Ballistic final : public GunDemo {
  public:
-  explicit Ballistic(const Options& options) : Demo(kGunControls) {
+  explicit Ballistic(const Options& options) {
     settings_.dt = options.dt.value_or(settings_.dt);
     settings_.collider = options.world.collider;
-    reset();
+    world_ = ParticleWorld(settings_);
   }
 
   std::string_view name() const override { return "ballistic"; }
@@ -60,30 +60,19 @@ class Ballistic final : public Demo {
     double fired;  ///< [s]
   };
 
-  void reset() {
+  std::size_t rounds() const override { return rounds_.size(); }
+  void restart() override {
     world_ = ParticleWorld(settings_);
     rounds_.clear();
-    weapon_ = Weapon::laser;
   }
-  void fire() {
-    if (rounds_.size() == kMostRounds) return;
-    rounds_.push_back({world_.add(round_of(weapon_)), world_.time()});
-  }
-  void act(std::size_t control) override {
-    if (control == kFire) {
-      fire();
-    } else if (control == kResetGun) {
-      reset();
-    } else {
-      weapon_ = static_cast<Weapon>(control);
-    }
+  void fire(Weapon weapon) override {
+    rounds_.push_back({world_.add(round_of(weapon)), world_.time()});
   }
   StepReport advance() override;
 
   ParticleSettings settings_;
   ParticleWorld world_;
   std::vector<Round> rounds_;  ///< in flight, in the order in which they were fired
-  Weapon weapon_ = Weapon::laser;
 };
 
 StepReport Ballistic::advance() {
@@ -126,7 +115,7 @@ void Ballistic::draw(View* view) const {
     view->items.push_back(shadow_of(shadow, Real(0.1)));
     view->items.push_back({.shape = Sphere{Real(1.3)}, .position = position, .colour = kBlack});
   }
-  view->text = {gun_text(weapon_, rounds_.size())};
+  view->text = {gun_text()};
 }
 
 }  // namespace

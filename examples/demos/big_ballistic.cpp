@@ -9,10 +9,9 @@
 namespace jfpx::inline JFPX_ABI::demos {
 namespace {
 
-class BigBallistic final : public Demo {
+class BigBallistic final : public GunDemo {
  public:
-  explicit BigBallistic(const Options& options)
-      : Demo(kGunControls), options_(options), world_(start()) {}
+  explicit BigBallistic(const Options& options) : options_(options), world_(start()) {}
 
   std::string_view name() const override { return "big-ballistic"; }
   Real dt() const override { return world_.scene().dt; }
@@ -32,23 +31,13 @@ class BigBallistic final : public Demo {
     scene.dt = options_.dt.value_or(scene.dt);
     return World(scene, options_.world);
   }
-  void reset() {
+  std::size_t rounds() const override { return rounds_.size(); }
+  void restart() override {
     world_ = start();
     rounds_.clear();
-    weapon_ = Weapon::laser;
   }
-  void fire() {
-    if (rounds_.size() == kMostRounds) return;
-    rounds_.push_back({world_.add(scenes::big_round(weapon_)), weapon_, world_.time()});
-  }
-  void act(std::size_t control) override {
-    if (control == kFire) {
-      fire();
-    } else if (control == kResetGun) {
-      reset();
-    } else {
-      weapon_ = static_cast<Weapon>(control);
-    }
+  void fire(Weapon weapon) override {
+    rounds_.push_back({world_.add(scenes::big_round(weapon)), weapon, world_.time()});
   }
   StepReport advance() override;
   bool is_crate(std::uint32_t body) const;
@@ -57,7 +46,6 @@ class BigBallistic final : public Demo {
   Options options_;
   World world_;
   std::vector<Round> rounds_;  ///< in flight, in the order in which they were fired
-  Weapon weapon_ = Weapon::laser;
 };
 
 /// Bodies of the scene keep their indices: only rounds come and go.
@@ -112,7 +100,7 @@ void BigBallistic::draw(View* view) const {
     }
   }
   for (const Round& round : rounds_) add(scenes::big_round(round.weapon).shape, round.id, kBlack);
-  view->text = {gun_text(weapon_, rounds_.size())};
+  view->text = {gun_text()};
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 /// flight: an aircraft that a propeller pulls along the ground until its wings carry it (thesis
 /// 4.4.3), after Millington's demo of the same name.
-#include <jfpx/error.hpp>
-
 #include "examples/demos/makers.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-/// The drawing that the two ballistic demos share.
+/// What the two ballistic demos share.
 #include "examples/demos/gunnery.hpp"
 
 namespace jfpx::inline JFPX_ABI::demos {
@@ -10,9 +10,20 @@ void draw_range(View* view, const Vec3& gun) {
   view->items.push_back(marker);
 }
 
-std::string gun_text(Weapon weapon, std::size_t rounds) {
-  return std::string(scenes::kWeaponNames[static_cast<std::size_t>(weapon)]) + ", " +
-         std::to_string(rounds) + " of " + std::to_string(kMostRounds) + " rounds in flight";
+void GunDemo::act(std::size_t control) {
+  if (control == kFire) {
+    if (rounds() < kMostRounds) fire(weapon_);
+  } else if (control == kResetGun) {
+    weapon_ = Weapon::laser;
+    restart();
+  } else {
+    weapon_ = static_cast<Weapon>(control);
+  }
+}
+
+std::string GunDemo::gun_text() const {
+  return std::string(scenes::kWeaponNames[static_cast<std::size_t>(weapon_)]) + ", " +
+         std::to_string(rounds()) + " of " + std::to_string(kMostRounds) + " rounds in flight";
 }
 
 }  // namespace jfpx::inline JFPX_ABI::demos

@@ -29,8 +29,23 @@ inline bool spent(const Vec3& position, double age) {
   return position.y < 0 || position.z > kLongestShot || age > kOldestRound;
 }
 
+/// A demo with a gun: which weapon is chosen, and when it fires.
+class GunDemo : public Demo {
+ protected:
+  GunDemo() : Demo(kGunControls) {}
+  /// "laser, 3 of 160 rounds in flight"
+  std::string gun_text() const;
+
+ private:
+  void act(std::size_t control) final;
+  virtual std::size_t rounds() const = 0;  ///< in flight
+  virtual void fire(Weapon weapon) = 0;
+  virtual void restart() = 0;
+
+  Weapon weapon_ = Weapon::laser;
+};
+
 /// The gun's place, its shadow, and lines across the range.
 void draw_range(View* view, const Vec3& gun);
-std::string gun_text(Weapon weapon, std::size_t rounds);
 
 }  // namespace jfpx::inline JFPX_ABI::demos

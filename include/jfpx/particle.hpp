@@ -36,7 +36,7 @@ struct ParticleState {
   friend bool operator==(const ParticleState&, const ParticleState&) = default;
 };
 
-/// One contact of particles. Grounds are numbered as in the settings.
+/// One contact between two particles, or of one with a ground.
 struct ParticleContact {
   static constexpr std::uint32_t kNoParticle = 0xffffffffu;
   std::uint32_t a = 0;            ///< ParticleId::index
@@ -101,7 +101,8 @@ class JFPX_API ParticleWorld {
   ParticleReport step();
 
   double time() const;  ///< [s], completed steps times dt
-  /// Contacts of the last step: between particles by (a, b), then with grounds by (a, ground).
+  /// Contacts of the last step: between particles by (a, b), then with grounds by (a, place
+  /// in the settings). None after a failed step, or when particles were removed since.
   std::span<const ParticleContact> contacts() const;
   const ParticleSettings& settings() const;
 
