@@ -5,6 +5,7 @@
 #include "src/scene_validate.hpp"
 #include "src/shared/force_laws.hpp"
 #include "src/shared/integrate.hpp"
+#include "src/shared/submerged.hpp"
 
 #include <algorithm>
 
@@ -112,6 +113,22 @@ void blow(ForceContext& context, BodyId body, const Mat3& tensor, const Vec3& po
   context.apply_force_at_point(body, axes * (tensor * through_air), surface.position);
 }
 
+Real submerged_volume(const Sphere& sphere, const Vec3& centre, const HalfSpace& liquid) {
+  return shared::submerged_volume(sphere.radius, liquid.offset - dot(liquid.normal, centre));
+}
+
+/// The push of the displaced liquid acts in the middle of what it would fill.
+void float_box(ForceContext& context, BodyId body, const Box& box, const Transform& pose,
+               const HalfSpace& liquid, const Vec3& weight) {
+  // Around the origin, so that the middle does not lose digits to the distance from it.
+  const HalfSpace below{liquid.normal, liquid.offset - dot(liquid.normal, pose.origin)};
+  shared::Submerged part;
+  shared::add_submerged(box, {pose.basis, {}}, below, &part);
+  if (!(part.volume > 0)) return;
+  context.apply_force_at_point(body, weight * part.volume,
+                               pose.origin + part.moment * (1 / part.volume));
+}
+
 }  // namespace
 
 void Gravity::validate(const ForceContext& context) const {
@@ -185,13 +202,25 @@ void Buoyancy::validate(const ForceContext& context) const {
   check.alive("body", body);
 }
 void Buoyancy::operator()(ForceContext& context) const {
-  const Vec3 up = normalized(liquid.normal);
+  const Vec3 weight = normalized(liquid.normal) * (density * gravity);  // of a cubic metre
   for_awake(context, body, [&](BodyId id) {
-    const auto* sphere = std::get_if<Sphere>(&context.shape(id));
-    if (sphere == nullptr) return;
-    const Real height = liquid.offset - dot(liquid.normal, context.state(id).position);
-    const Real displaced = density * shared::submerged_volume(sphere->radius, height);
-    context.apply_force(id, up * (displaced * gravity));
+    const BodyState state = context.state(id);
+    const Transform pose = make_transform(state.orientation, state.position);
+    if (const auto* sphere = std::get_if<Sphere>(&context.shape(id))) {
+      context.apply_force(id, weight * submerged_volume(*sphere, state.position, liquid));
+    } else if (const auto* box = std::get_if<Box>(&context.shape(id))) {
+      float_box(context, id, *box, pose, liquid, weight);
+    } else if (const auto* assembly = std::get_if<Assembly>(&context.shape(id))) {
+      for (const AssemblyPart& part : assembly->parts) {
+        const Transform place = pose * make_transform(part.orientation, part.position);
+        if (const auto* ball = std::get_if<Sphere>(&part.shape)) {
+          const Vec3 push = weight * submerged_volume(*ball, place.origin, liquid);
+          context.apply_force_at_point(id, push, place.origin);
+        } else {
+          float_box(context, id, std::get<Box>(part.shape), place, liquid, weight);
+        }
+      }
+    }
   });
 }
 

@@ -122,8 +122,8 @@ struct JFPX_API AeroControl {
   Mat3 tensor() const;
 };
 
-/// The weight of the liquid that a sphere displaces, exactly, against gravity. Boxes and
-/// half-spaces feel nothing.
+/// The weight of the liquid that a sphere, a box or an assembly displaces, exactly, against
+/// gravity, in the middle of the displaced liquid. What assemblies displace twice counts twice.
 struct JFPX_API Buoyancy {
   HalfSpace liquid = {};      ///< the solid side is liquid; the normal points up
   Real density = 1000;        ///< [kg/m^3], >= 0

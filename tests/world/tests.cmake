@@ -11,6 +11,7 @@ jfpx_add_test(world_parts_test SOURCES
   world/tournament_test.cpp)
 jfpx_add_test(world_test SOURCES
   world/box_test.cpp
+  world/buoyancy_test.cpp
   world/contact_events_test.cpp
   world/contact_generator_test.cpp
   world/force_registry_test.cpp
