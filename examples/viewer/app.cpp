@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "examples/viewer/demo_show.hpp"
 #include "examples/viewer/recorder.hpp"
 #include "examples/viewer/show.hpp"
 #include "examples/viewer/timing.hpp"
@@ -21,7 +22,8 @@ constexpr double kLongestFrame = 0.25;         // [s]; after a stall the clock d
 constexpr double kRecordedFrame = 1.0 / 60.0;  // [s]
 
 std::unique_ptr<Show> make_show(const ViewOptions& options) {
-  return options.side_by_side ? make_side_by_side(options) : make_scene_show(options);
+  if (options.side_by_side) return make_side_by_side(options);
+  return is_playable(options.run.scene) ? make_demo_show(options) : make_scene_show(options);
 }
 
 int finish(const Show& show, const Timing& timing, const ViewOptions& options) {

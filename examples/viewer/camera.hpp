@@ -50,6 +50,8 @@ class Camera {
   /// The clip planes enclose a ball around `centre`, and the ground some way beyond it.
   View view(const Vec3& centre, Real radius) const;
 
+  friend bool operator==(const Camera&, const Camera&) = default;
+
   Real fov_y = Real(0.72);
 
  private:

@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "examples/viewer/between.hpp"
 #include "examples/viewer/timing.hpp"
 
 #include <fmt/format.h>
@@ -48,8 +49,6 @@ bool same_items(const demos::View& a, const demos::View& b) {
                     [](const demos::Item& x, const demos::Item& y) { return x.shape == y.shape; });
 }
 
-Vec3 between(const Vec3& a, const Vec3& b, Real share) { return a + (b - a) * share; }
-
 }  // namespace
 
 bool is_playable(std::string_view name) {
@@ -67,7 +66,7 @@ void draw_demo(const demos::View& from, const demos::View& to, Real share, Drawi
     if (is_shadow(item)) continue;
     const demos::Item& old = mixes ? from.items[i] : item;
     const Vec3 place = between(old.position, item.position, share);
-    const Quat turn = item.orientation;
+    const Quat turn = between(old.orientation, item.orientation, share);
     if (const Sphere* sphere = std::get_if<Sphere>(&item.shape)) {
       drawing->add_sphere(place, sphere->radius, turn, paint_of(item.colour, true));
     } else if (const Box* box = std::get_if<Box>(&item.shape)) {

@@ -3,6 +3,8 @@
 
 #include <jfpx/error.hpp>
 
+#include "examples/viewer/demo_show.hpp"
+
 #include <algorithm>
 #include <charconv>
 
@@ -91,6 +93,7 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
       ->check(CLI::IsMember({"bodies", "speed", "sleep", "penetration", "contacts"}));
   app.add_flag("--contacts", options.contacts, "Draw contact points and normals");
   app.add_flag("--panel", options.panel, "Show the panel in headless pictures too");
+  app.add_option("--input", options.input, "Inputs of a demo, from this file");
   app.add_option_function<std::string>(
       "--eye", [&options](const std::string& text) { options.eye = parse_point("--eye", text); },
       "Where the camera is: X,Y,Z [m]");
@@ -104,6 +107,10 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
 }
 
 void check(const ViewOptions& options) {
+  if (!options.input.empty() && (options.side_by_side || !is_playable(options.run.scene))) {
+    throw InvalidArgument("--input goes with a demo that has controls; " + options.run.scene +
+                          " is a scene");
+  }
   if (options.eye.has_value() != options.target.has_value()) {
     throw InvalidArgument("--eye and --target go together");
   }

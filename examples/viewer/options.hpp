@@ -29,6 +29,7 @@ struct ViewOptions {
   bool panel = false;     ///< show it in headless pictures
   bool render = true;     ///< the thesis' switch "rendering on / off"
   bool fullscreen = false;
+  std::string input;  ///< file with an input script, for a demo
   std::optional<Vec3> eye, target;
 };
 

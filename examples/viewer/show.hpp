@@ -47,6 +47,7 @@ class Show {
 };
 
 std::unique_ptr<Show> make_scene_show(const ViewOptions& options);
+std::unique_ptr<Show> make_demo_show(const ViewOptions& options);
 /// @throws BackendUnavailable in a build without Bullet.
 std::unique_ptr<Show> make_side_by_side(const ViewOptions& options);
 

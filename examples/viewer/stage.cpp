@@ -1,6 +1,7 @@
 /// How the bodies of a scene look, and where they stand.
 #include "examples/viewer/stage.hpp"
 
+#include "examples/viewer/between.hpp"
 #include "examples/viewer/colours.hpp"
 #include "examples/viewer/values.hpp"
 
@@ -42,14 +43,6 @@ int thin_axis(const Vec3& h) {
   int axis = 0;
   for (int i = 1; i < 3; ++i) axis = h[i] < h[axis] ? i : axis;
   return axis;
-}
-
-Vec3 between(const Vec3& a, const Vec3& b, Real share) { return a + (b - a) * share; }
-Quat between(const Quat& a, const Quat& b, Real share) {
-  const Real way = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -share : share;
-  const Real rest = 1 - share;
-  return normalized(Quat{a.w * rest + b.w * way, a.x * rest + b.x * way, a.y * rest + b.y * way,
-                         a.z * rest + b.z * way});
 }
 
 /// A round number of metres near ten bodies: edge of the ground's cells.

@@ -50,20 +50,6 @@ class DemoEngine final : public Engine {
 
 }  // namespace
 
-bool is_demo(const std::string& name) {
-  for (const demos::Entry& entry : demos::all()) {
-    if (entry.name == name) return true;
-  }
-  return false;
-}
-
-bool is_only_a_demo(const std::string& name) {
-  for (const scenes::Entry& entry : scenes::all()) {
-    if (entry.name == name) return false;
-  }
-  return is_demo(name);
-}
-
 std::unique_ptr<Engine> make_demo_engine(const RunOptions& options, const std::string& script,
                                          Scene* start) {
   std::unique_ptr<demos::Demo> demo = make_demo(options);

@@ -1,15 +1,12 @@
-/// Demos behind the tool's interface: which names are demos, and how one runs with its inputs.
+/// Demos behind the tool's interface: how one runs with its inputs.
 #pragma once
 
+#include "src/tool/demo_names.hpp"
 #include "src/tool/engine.hpp"
 
 #include <string>
 
 namespace jfpx::inline JFPX_ABI::tool {
-
-bool is_demo(const std::string& name);
-/// True for a demo that is no scene, because more than bodies belongs to it.
-bool is_only_a_demo(const std::string& name);
 
 /// The demo or scene that the options name, as a demo, with the inputs of a script; "" is no input.
 /// @param start receives the scene that the demo starts with; without bodies, if it has none

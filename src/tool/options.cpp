@@ -4,7 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "examples/scenes/scenes.hpp"
-#include "src/tool/demo_engine.hpp"
+#include "src/tool/demo_names.hpp"
 
 #include <charconv>
 #include <filesystem>

@@ -1,7 +1,10 @@
 jfpx_add_test(controls_test SOURCES viewer/controls_test.cpp LINK jfpx_viewer)
+jfpx_add_test(demo_show_test SOURCES viewer/demo_show_test.cpp LINK jfpx_viewer)
 jfpx_add_test(renderer_test SOURCES viewer/renderer_test.cpp LINK jfpx_viewer)
 jfpx_add_test(view_test SOURCES viewer/view_test.cpp LINK jfpx_viewer)
 foreach(suffix IN ITEMS "" "_f64")
+  target_compile_definitions(demo_show_test${suffix} PRIVATE
+    JFPX_INPUT_FOLDER="${PROJECT_SOURCE_DIR}/examples/demos/inputs")
   target_compile_definitions(renderer_test${suffix} PRIVATE
     JFPX_REFERENCE_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/viewer/reference")
   add_dependencies(view_test${suffix} jfpx_view jfpx_view_f64)

@@ -1,0 +1,14 @@
+/// Which names are demos.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::tool {
+
+bool is_demo(const std::string& name);
+/// True for a demo that is no scene, because more than bodies belongs to it.
+bool is_only_a_demo(const std::string& name);
+
+}  // namespace jfpx::inline JFPX_ABI::tool
