@@ -140,6 +140,7 @@ class SideBySide final : public Show {
     return trio_->differences == 0 && trio_->first_difference.empty() &&
            trio_->check.mismatches() == 0;
   }
+  std::string findings() const;
   void trace();
   void draw_trails(Drawing* drawing) const;
   void draw_texts(const Target& target, int top_height) const;
@@ -199,21 +200,23 @@ void SideBySide::draw(Renderer& renderer, const Target& target) {
 }
 
 void SideBySide::draw_texts(const Target& target, int top_height) const {
+  constexpr float kMargin = 10;
+  const ImU32 dark = IM_COL32(12, 16, 22, 200);
   ImDrawList* list = ImGui::GetBackgroundDrawList();
   const float scale = ImGui::GetIO().DisplaySize.x / static_cast<float>(target.width);
   const float width = static_cast<float>(target.width) * scale / 3;
-  const float height = static_cast<float>(top_height) * scale;
+  const float line = ImGui::GetTextLineHeightWithSpacing();
   for (std::size_t column = 0; column < kColumns; ++column) {
     const float left = width * static_cast<float>(column);
-    const Moment& now = trio_->now[column];
-    list->AddRectFilled({left, 0}, {left + width, 26}, IM_COL32(12, 16, 22, 190));
-    list->AddText({left + 10, 6}, IM_COL32_WHITE, kTitles[column]);
+    const auto& times = trio_->times[column];
     const std::string count =
-        fmt::format("{} contacts, {:.2f} ms a step", now.contacts.size(),
-                    median({trio_->times[column].begin(), trio_->times[column].end()}));
-    const float room = ImGui::CalcTextSize(count.c_str()).x;
-    list->AddText({left + width - room - 10, 6}, IM_COL32(200, 212, 226, 255), count.c_str());
-    if (column > 0) list->AddLine({left, 0}, {left, height}, IM_COL32(12, 16, 22, 255), 3);
+        fmt::format("{} contacts, {:.2f} ms a step", trio_->now[column].contacts.size(),
+                    median({times.begin(), times.end()}));
+    list->AddRectFilled({left, 0}, {left + width, 2 * line + 8}, dark);
+    list->AddText({left + kMargin, 6}, IM_COL32_WHITE, kTitles[column]);
+    list->AddText({left + kMargin, 6 + line}, IM_COL32(200, 212, 226, 255), count.c_str());
+    if (column == 0) continue;
+    list->AddLine({left, 0}, {left, static_cast<float>(top_height) * scale}, dark, 3);
   }
 }
 
@@ -227,14 +230,7 @@ void SideBySide::draw_plots(const Target& target, int top_height) const {
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav);
   const ImVec4 verdict = same() ? ImVec4{0.45f, 0.95f, 0.55f, 1} : ImVec4{1, 0.2f, 0.15f, 1};
-  ImGui::TextColored(
-      verdict, "%s",
-      fmt::format("stock Bullet and Bullet with jfpx: {} different contacts, worlds {}; "
-                  "{} contacts checked against jfpx' own, {} mismatches",
-                  trio_->differences,
-                  trio_->first_difference.empty() ? "identical" : trio_->first_difference,
-                  trio_->check.compared(), trio_->check.mismatches())
-          .c_str());
+  ImGui::TextColored(verdict, "%s", findings().c_str());
   const float height = ImGui::GetContentRegionAvail().y;
   const float width = (ImGui::GetContentRegionAvail().x - 16) / 3;
   const auto plot = [&](const char* id, const std::vector<float>& values, const std::string& text) {
@@ -253,13 +249,18 @@ void SideBySide::draw_plots(const Target& target, int top_height) const {
   ImGui::PopStyleVar();
 }
 
-std::string SideBySide::summary() const {
+std::string SideBySide::findings() const {
+  const std::string& first = trio_->first_difference;
   return fmt::format(
-      "{}: step {}, {} different contacts between stock Bullet and Bullet with jfpx, worlds {}; {} "
-      "contacts checked, {} mismatches; native is {:.4g} m away on average",
-      scene_.name, steps(), trio_->differences,
-      trio_->first_difference.empty() ? "identical" : trio_->first_difference,
-      trio_->check.compared(), trio_->check.mismatches(), trio_->drifts.back());
+      "{} different contacts between stock Bullet and Bullet with jfpx, worlds {}; "
+      "{} contacts checked, {} mismatches",
+      trio_->differences, first.empty() ? "identical" : first, trio_->check.compared(),
+      trio_->check.mismatches());
+}
+
+std::string SideBySide::summary() const {
+  return fmt::format("{}: step {}, {}; native is {:.4g} m away on average", scene_.name, steps(),
+                     findings(), trio_->drifts.back());
 }
 
 }  // namespace

@@ -144,6 +144,19 @@ TEST(Camera, PitchStopsBeforeTheZenith) {
   EXPECT_NEAR(dot(view.up, view.forward), 0, 1e-5);
 }
 
+TEST(Camera, ClipPlanesFitScenesOfAnySize) {  // erratum E43: 1000 to 5000 m, then 1 to 100 m
+  for (const Real radius : {Real(0.01), Real(1), Real(1342)}) {  // the tower is 1342 m tall
+    Camera camera;
+    camera.look_at({0, 0, 3 * radius}, {});
+    const View view = camera.view({}, radius);
+    EXPECT_LT(view.near_plane, 2 * radius);
+    EXPECT_GT(view.near_plane, 0);
+    EXPECT_GT(view.far_plane, 4 * radius);
+    camera.look_at({0, 0, radius / 2}, {});  // inside
+    EXPECT_LT(camera.view({}, radius).near_plane, radius / 100 + Real(1e-3));
+  }
+}
+
 TEST(Camera, OrbitKeepsTheFocusAndZoomTheDirection) {
   Camera camera;
   camera.look_at({3, 4, 12}, {0, 1, 0});
