@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -28,11 +29,9 @@ std::vector<CostChooser::Way> ways_to_search(const SphereColliderOptions& option
 }
 
 std::vector<CostChooser::Way> ways_to_test(const SphereColliderOptions& options, bool with_cuda) {
-  std::vector<CostChooser::Way> ways = {
-      {Backend::x86, options.algorithm, options.costs.x86_given_pairs}};
-  if (with_cuda) {
-    ways.push_back({Backend::cuda, options.algorithm, options.costs.cuda_given_pairs, true});
-  }
+  using enum SphereAlgorithm;
+  std::vector<CostChooser::Way> ways = {{Backend::x86, automatic, options.costs.x86_given_pairs}};
+  if (with_cuda) ways.push_back({Backend::cuda, automatic, options.costs.cuda_given_pairs, true});
   return ways;
 }
 
@@ -50,31 +49,32 @@ AutomaticSphereCollider::AutomaticSphereCollider(const SphereColliderOptions& op
 template <class Call, class Measure>
 auto AutomaticSphereCollider::compute(CostChooser& chooser, const ColliderWork& expected,
                                       const Call& call, const Measure& measure) {
-  device_failure_.clear();
+  if (!device_failure_.empty()) device_failure_.clear();
   start_device_if_it_pays();
   while (true) {
     const CostChooser::Decision decision = chooser.choose(expected);
-    const CostChooser::Way way = chooser.way(decision.way);
+    const Backend backend = chooser.way(decision.way).backend;
+    const SphereAlgorithm algorithm = chooser.way(decision.way).algorithm;
     try {
-      SphereCollider& chosen = collider(way.backend, way.algorithm);
+      SphereCollider& chosen = collider(backend, algorithm);
       const Clock::time_point start = decision.timed ? Clock::now() : Clock::time_point{};
       const auto result = call(chosen);
       if (decision.timed) {
         const std::chrono::duration<double, std::micro> us = Clock::now() - start;
         chooser.record(measure(result), us.count());
       }
-      backend_ = way.backend;
-      algorithm_ = chosen.algorithm();
+      backend_ = backend;
+      if (algorithm != SphereAlgorithm::automatic) algorithm_ = algorithm;
       reason_ = device_lost_ ? ChoiceReason::device_failed : chooser.reason();
       return result;
     } catch (const BackendUnavailable&) {
-      if (way.backend == Backend::x86) throw;
+      if (backend == Backend::x86) throw;
       give_up_device({});
     } catch (const DeviceError& error) {
-      if (way.backend == Backend::x86) throw;
+      if (backend == Backend::x86) throw;
       give_up_device(error.what());
     } catch (const OutOfMemory& error) {
-      if (way.backend == Backend::x86) throw;
+      if (backend == Backend::x86) throw;
       give_up_device(error.what());
     }
   }
@@ -88,12 +88,14 @@ ContactSpan AutomaticSphereCollider::find_contacts(std::span<const SphereInstanc
                         .contacts = contacts,
                         .bytes = n * sizeof(SphereInstance) + contacts * sizeof(SphereContact)};
   };
-  const ContactSpan contacts = compute(
+  return compute(
       search_, work(n * contacts_per_sphere_),
       [&](SphereCollider& collider) { return collider.find_contacts(spheres); },
-      [&](ContactSpan found) { return work(static_cast<double>(found.size())); });
-  if (n > 0) contacts_per_sphere_ = static_cast<double>(contacts.size()) / n;
-  return contacts;
+      [&](ContactSpan found) {
+        const auto contacts = static_cast<double>(found.size());
+        contacts_per_sphere_ = contacts / std::max(n, 1.0);
+        return work(contacts);
+      });
 }
 
 std::span<const PairResult> AutomaticSphereCollider::test_pairs(

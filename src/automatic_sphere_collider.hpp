@@ -45,7 +45,7 @@ class AutomaticSphereCollider final : public SphereCollider {
   SphereColliderMaker make_;
   CostChooser search_, given_;
   std::unique_ptr<SphereCollider> colliders_[2][2];  ///< by backend and algorithm
-  double contacts_per_sphere_ = 1;                   ///< in the last search
+  double contacts_per_sphere_ = 1;                   ///< in the last search that was timed
   bool device_asleep_;
   bool device_lost_ = false;
   std::string device_failure_;

@@ -16,9 +16,10 @@ constexpr double kTrialRatio = 2;
 /// A trial of three calls that take up to twice as long costs at most 3 in so many.
 constexpr double kCallsBetweenTrials = 100;
 constexpr double kMostPatience = 64;
-/// Deciding and timing takes about 0.1 us: calls that take little are decided together.
-constexpr double kDecisionEveryUs = 20;
-constexpr double kMostHeldCalls = 63;
+/// Deciding and timing takes 0.1 us, and some us where reading the clock is a call of the system:
+/// calls that take little are decided together.
+constexpr double kDecisionEveryUs = 200;
+constexpr double kMostHeldCalls = 4095;
 /// Where the pairs change by this, what was measured before is forgotten.
 constexpr double kOtherSize = 4;
 /// Buffers grow by some more than is needed.

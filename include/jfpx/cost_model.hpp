@@ -32,12 +32,12 @@ constexpr double microseconds(const CostTerms& t, const ColliderWork& work) {
 }
 
 /// Costs of all ways, for this precision. The defaults are of an AMD EPYC of 2022 with AVX-512, one
-/// thread, and of an NVIDIA H200 (bench/results). Elsewhere, and where they are wrong, the times of
+/// thread, and of an NVIDIA H200. Elsewhere, and where they are wrong, the times of
 /// the last calls correct them.
 struct CostModel {
   CostTerms x86_all_pairs, x86_sorted_tiles, x86_given_pairs;
   CostTerms cuda_all_pairs, cuda_sorted_tiles, cuda_given_pairs;
-  double cuda_start_ms = 300;  ///< [ms] the first use of the device, >= 0
+  double cuda_start_ms = 200;  ///< [ms] the first use of the device, >= 0
 
   JFPX_API CostModel();
   friend bool operator==(const CostModel&, const CostModel&) = default;
