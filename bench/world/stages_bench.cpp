@@ -1,0 +1,89 @@
+/// Stages of a native step: how they grow with the number of spheres, and what they allocate.
+#include <jfpx/world.hpp>
+
+#include "bench/world/samples.hpp"
+#include "examples/scenes/scenes.hpp"
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace jfpx::inline JFPX_ABI::bench {
+namespace {
+
+struct Run {
+  const char* scene;
+  std::uint32_t spheres;
+  int settle, steps;
+};
+constexpr Run kRuns[] = {
+    {"gas", 64, 20, 200},           {"gas", 512, 20, 200},         {"gas", 4096, 20, 60},
+    {"gas", 32768, 10, 15},         {"gas", 262144, 3, 5},         {"polydisperse", 512, 20, 100},
+    {"polydisperse", 4096, 20, 40}, {"polydisperse", 32768, 5, 8}, {"pile", 64, 120, 100},
+    {"pile", 512, 60, 40},          {"pile", 4096, 20, 8}};
+
+void stages(benchmark::State& state, Backend backend, const Run& run) {
+  Scene scene = scenes::make(run.scene, {.spheres = run.spheres, .seed = 1});
+  scene.sleep.enabled = false;
+  World world(scene, {.collider = {.backend = backend}});
+  for (int n = 0; n < run.settle; ++n) world.step();
+  std::vector<double> integrate, detect, resolve, contacts, allocated;
+  StepReport report;
+  for (auto _ : state) {
+    const long before = allocations;
+    report = world.step();
+    allocated.push_back(static_cast<double>(allocations - before));
+    integrate.push_back(report.integrate_ms);
+    detect.push_back(report.detect_ms);
+    resolve.push_back(report.resolve_ms);
+    contacts.push_back(static_cast<double>(report.sphere_contacts));
+    state.SetIterationTime(report.total_ms * 1e-3);
+  }
+  state.counters["spheres"] = run.spheres;
+  state.counters["contacts"] = mean(contacts);
+  state.counters["integrate_ms"] = median(integrate);
+  state.counters["detect_ms"] = median(detect);
+  state.counters["resolve_ms"] = median(resolve);
+  state.counters["allocations"] = median(allocated);
+  // What detection has to read and write at least, once each.
+  state.counters["detect_bytes"] =
+      run.spheres * sizeof(SphereInstance) + mean(contacts) * sizeof(SphereContact);
+  state.SetLabel(std::string(to_string(report.backend)) + ", " +
+                 std::string(to_string(report.algorithm)));
+}
+
+void register_all() {
+  for (const Backend backend : {Backend::x86, Backend::cuda, Backend::automatic}) {
+    if (backend == Backend::cuda && !cuda_is_usable()) continue;
+    for (const Run& run : kRuns) {
+      benchmark::RegisterBenchmark(
+          ("stages/" + std::string(run.scene) + "/" + std::string(to_string(backend)) + "/" +
+           std::to_string(run.spheres))
+              .c_str(),
+          [=](benchmark::State& state) { stages(state, backend, run); })
+          ->UseManualTime()
+          ->Iterations(run.steps)
+          ->Unit(benchmark::kMillisecond);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bench
+
+int main(int argc, char** argv) {
+  jfpx::bench::register_all();
+  return jfpx::bench::run_benchmarks(argc, argv);
+}
