@@ -1,0 +1,201 @@
+"""docs/benchmarks.md: everything in it is computed from the files in bench/results."""
+import math
+
+BULLET_STAGES = ("integrate", "broadphase", "dispatch", "islands", "solve", "step")
+NATIVE_STAGES = ("integrate", "detect", "resolve")
+
+
+def number(value):
+    """Three digits."""
+    if value == 0:
+        return "0"
+    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:.{digits}f}"
+
+
+def table(head, rows):
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return "\n".join(lines + ["| " + " | ".join(str(c) for c in row) + " |" for row in rows]) + "\n"
+
+
+def parts(benchmarks):
+    """(parts of the name, values), without the name of the bench."""
+    return [(name.split("/")[1:], b) for name, b in benchmarks.items()]
+
+
+def crossover(rows):
+    """Where the ratio of two curves passes 1: (n, first, second) rows, straight in both logarithms.
+    None if the first is always the faster or always the slower one."""
+    rows = sorted(rows)
+    for (n0, a0, b0), (n1, a1, b1) in zip(rows, rows[1:]):
+        low, high = math.log(a0 / b0), math.log(a1 / b1)
+        if low < 0 <= high:
+            return math.exp(math.log(n0) + (math.log(n1) - math.log(n0)) * -low / (high - low))
+    return None
+
+
+def exponent(points):
+    """Slope of a straight line through (log n, log time): least squares."""
+    logs = [(math.log(n), math.log(t)) for n, t in points if n > 0 and t > 0]
+    if len(logs) < 2:
+        return None
+    mean_n = sum(n for n, _ in logs) / len(logs)
+    mean_t = sum(t for _, t in logs) / len(logs)
+    spread = sum((n - mean_n) ** 2 for n, _ in logs)
+    return sum((n - mean_n) * (t - mean_t) for n, t in logs) / spread if spread else None
+
+
+def origin(machine, bench, precision="float"):
+    context = machine.context(bench, precision)
+    load = context.get("load_avg") or []
+    busy = f", load {load[0]:.1f}" if load else ""
+    return (f"`{context['command']}`, {context['date'][:10]}{busy}; data: "
+            f"[{bench}_{precision}.json](../bench/results/{machine.name}/{bench}_{precision}.json)\n")
+
+
+def automatic(machine):
+    rows, worst = [], 0
+    benchmarks = machine.get("automatic")
+    if not benchmarks:
+        return ""
+    for (scene, n), b in parts(benchmarks):
+        fixed = {key.removesuffix("_us"): value for key, value in b.items()
+                 if key.endswith("_us") and key != "automatic_us"}
+        best = min(fixed, key=fixed.get)
+        worst = max(worst, b["ratio"])
+        rows.append([scene, n, number(b["contacts"]) if b["contacts"] < 100 else int(b["contacts"]),
+                     *[number(fixed[k] / fixed[best]) if k in fixed else "" for k in columns(benchmarks)],
+                     best.replace("_", " "), b.get("label", ""), f"{b['ratio']:.2f}"])
+    over = sum(b["ratio"] > 1.1 for b in benchmarks.values())
+    head = ["scene", "N", "contacts", *[k.replace("_", " ") for k in columns(benchmarks)], "best fixed",
+            "automatic chose last", "automatic / best"]
+    return ("### The automatic choice\n\n" + origin(machine, "automatic") +
+            f"\nColumns of fixed choices are times divided by the best of the row. Worst ratio of "
+            f"`automatic` {worst:.2f}; {over} of {len(rows)} rows are over 1.10.\n\n" + table(head, rows) +
+            "\n")
+
+
+def columns(benchmarks):
+    names = []
+    for b in benchmarks.values():
+        names += [k.removesuffix("_us") for k in b
+                  if k.endswith("_us") and k != "automatic_us" and k.removesuffix("_us") not in names]
+    return names
+
+
+def thesis(machine, published):
+    ours = {}
+    for (backend, n), b in parts(machine.get("thesis")):
+        ours.setdefault(int(n), {})[backend] = b
+    if not ours:
+        return ""
+    old = {row["spheres"]: row for row in published["rendering_off"]}
+    rows = []
+    for n in sorted(ours):
+        x86, cuda = ours[n].get("x86"), ours[n].get("cuda")
+        o = old.get(n)
+        mark = " (1)" if o and "x86_note" in o else ""
+        rows.append([n, int(x86["iterations"]), number(x86["real_time"]), number(x86["median_ms"]),
+                     number(x86["first_ms"]), number(x86["contacts"]),
+                     *([number(cuda[k]) for k in ("real_time", "median_ms", "first_ms")] +
+                       [number(x86["real_time"] / cuda["real_time"])] if cuda else [""] * 4),
+                     *([number(o["x86_mean_ms"]) + mark, number(o["cuda_mean_ms"]),
+                        number(o["x86_mean_ms"] / o["cuda_mean_ms"]) + mark] if o else [""] * 3)])
+    text = ("### The thesis again: detection in `boxes-and-balls` (figures 5.1 and 5.2)\n\n" +
+            origin(machine, "thesis") + "\nMilliseconds of contact generation a frame, as the thesis timed "
+            "it, without rendering: mean over the frames, median, and the first frame apart. \"2010\" are "
+            "the published means.\n\n" +
+            table(["N", "frames", "x86 mean", "median", "first", "contacts", "cuda mean", "median", "first",
+                   "x86 / cuda", "2010 x86", "2010 cuda", "2010 x86 / cuda"], rows) +
+            "\n(1) The published x86 file for 32 spheres is that of 16, byte for byte.\n\n")
+    with_cuda = [(n, b["x86"]["real_time"], b["cuda"]["real_time"]) for n, b in ours.items() if "cuda" in b]
+    here = crossover(with_cuda) if with_cuda else None
+    there = crossover([(n, r["x86_mean_ms"], r["cuda_mean_ms"]) for n, r in old.items()
+                       if "x86_note" not in r])
+    text += f"CUDA pays from N = {there:.0f} in the published data (without the doubtful point)"
+    text += (f", from N = {here:.0f} here.\n\n" if here else ".\n\n")
+    last = max(n for n in old if n in ours)
+    return text + (f"At N = {last} this x86 code takes 1 / "
+                   f"{number(old[last]['x86_mean_ms'] / ours[last]['x86']['real_time'])} of the published "
+                   "time: another processor and an optimised build are in that figure, too.\n\n")
+
+
+def stages(machine):
+    benchmarks = parts(machine.get("stages"))
+    if not benchmarks:
+        return ""
+    rows, series = [], {}
+    for (scene, backend, n), b in benchmarks:
+        for stage in NATIVE_STAGES:
+            series.setdefault((scene, backend, stage), []).append((int(n), b[f"{stage}_ms"]))
+        rows.append([scene, backend, n, number(b["contacts"]),
+                     *[number(b[f"{s}_ms"]) for s in NATIVE_STAGES], number(b["real_time"]),
+                     number(1e6 * b["detect_ms"] / int(n)), number(b["detect_bytes"] / 1e6 / b["detect_ms"]),
+                     int(b["allocations"]), b.get("label", "")])
+    fits = []
+    for scene, backend in dict.fromkeys((s, b) for s, b, _ in series):
+        slopes = [exponent(series[scene, backend, stage]) for stage in NATIVE_STAGES]
+        fits.append([scene, backend, *[f"{x:.2f}" if x is not None else "" for x in slopes]])
+    return ("### Stages of a native step\n\n" + origin(machine, "stages") +
+            "\nMedians, ms. \"GB/s\": the bytes that detection has to read and write at least, by its time.\n\n" +
+            table(["scene", "backend", "N", "contacts", *NATIVE_STAGES, "step", "detect ns a sphere", "GB/s",
+                   "allocations", "computed last by"], rows) +
+            "\nTime grows as N to the power of:\n\n" + table(["scene", "backend", *NATIVE_STAGES], fits) + "\n")
+
+
+def bullet(machine):
+    benchmarks = parts(machine.get("bullet_step"))
+    if not benchmarks:
+        return ""
+    shares, ratios = [], []
+    for (scene, n), b in benchmarks:
+        shares.append([scene, n, number(b["step_stock_ms"]),
+                       *[f"{100 * b[f'{s}_stock_ms'] / b['step_stock_ms']:.0f} %" for s in BULLET_STAGES[:-1]]])
+        gain = b["step_ratio"]
+        ratios.append([scene, n, *[f"{b[f'{s}_ratio']:.2f}" for s in BULLET_STAGES],
+                       "yes" if gain > 1.03 else "no" if gain > 0.97 else "slower"])
+    return ("### Bullet's step in its parts\n\n" + origin(machine, "bullet_step") +
+            "\nStock Bullet: ms a step, and where they go.\n\n" +
+            table(["scene", "N", "step", *BULLET_STAGES[:-1]], shares) +
+            "\nStock / jfpx, medians of the ratios step by step: above 1 jfpx is faster. Only dispatch is "
+            "jfpx's; what differs from 1 elsewhere is noise, or caches. Both worlds end with equal hashes.\n\n" +
+            table(["scene", "N", *BULLET_STAGES, "gain"], ratios) + "\n")
+
+
+def precisions(machine):
+    rows = []
+    for bench, key in (("thesis", "real_time"), ("stages", "detect_ms"), ("stages", "integrate_ms"),
+                       ("stages", "resolve_ms")):
+        single, double = machine.get(bench), machine.get(bench, "double")
+        for name in single:
+            if name not in double or "automatic" in name or not single[name][key]:
+                continue
+            *what, n = name.split("/")
+            if bench == "thesis" and int(n) not in (16, 448, 16384, 1000000):
+                continue
+            stage = "detect" if key == "real_time" else key.removesuffix("_ms")
+            rows.append(["/".join(what[1:]) if bench == "stages" else "tower/" + what[1], stage, n,
+                         f"{double[name][key] / single[name][key]:.2f}"])
+    if not rows:
+        return ""
+    ratios = sorted(float(r[-1]) for r in rows if r[1] == "detect")
+    return ("### Double against float\n\n" + origin(machine, "stages", "double") +
+            f"\nTime in double divided by time in float. The median for detection is "
+            f"{ratios[len(ratios) // 2]:.2f}: vectors hold half as many spheres, and twice the bytes move. The "
+            "thesis stayed with float because GPUs of its time had little or no double arithmetic (5.1, 6.2).\n\n" +
+            table(["scene", "stage", "N", "double / float"], rows) + "\n")
+
+
+def document(found):
+    machines, published = found
+    text = ("# Benchmarks\n\nGenerated by `bench/report.py tables` from the files in `bench/results`; do not edit. "
+            "`scripts/bench` measures this machine and writes this page again.\n\nProcessors are shared with other "
+            "work while they measure: compare figures within a table, not across machines or days. Times of a GPU "
+            "are absolute.\n\n")
+    for machine in machines:
+        first = next(iter(machine.files.values()))["context"]
+        text += f"## {first['machine']}\n\n"
+        for section in (automatic(machine), thesis(machine, published), stages(machine), bullet(machine),
+                        precisions(machine)):
+            text += section
+    return text.rstrip("\n") + "\n"

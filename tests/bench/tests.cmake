@@ -1,0 +1,11 @@
+# bench/report.py, and that every figure in the documents rests on a file that is there.
+find_program(JFPX_PYTHON3 python3)
+if(JFPX_PYTHON3)
+  add_test(NAME bench_report COMMAND ${JFPX_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/bench/report_test.py)
+  add_test(NAME bench_claims COMMAND ${JFPX_PYTHON3} -B ${PROJECT_SOURCE_DIR}/bench/report.py check)
+else()
+  foreach(name IN ITEMS bench_report bench_claims)
+    add_test(NAME ${name} COMMAND ${CMAKE_COMMAND} -E echo "skipped: python3 was not found")
+    set_tests_properties(${name} PROPERTIES SKIP_REGULAR_EXPRESSION "skipped:")
+  endforeach()
+endif()
