@@ -41,31 +41,44 @@ AutomaticSphereCollider::AutomaticSphereCollider(const SphereColliderOptions& op
                                                  SphereColliderMaker make, bool with_cuda)
     : options_(options),
       make_(std::move(make)),
-      search_(ways_to_search(options, with_cuda)),
-      given_(ways_to_test(options, with_cuda)),
+      search_{CostChooser(ways_to_search(options, with_cuda))},
+      given_{CostChooser(ways_to_test(options, with_cuda))},
       device_asleep_(with_cuda) {}
 
-/// Calls `call` with the collider that `chooser` chooses, and with x86 if the device fails.
+/// Whether the last decision holds for this call too: then calls.by does it.
+bool AutomaticSphereCollider::goes_on(Calls& calls, std::size_t spheres, std::size_t pairs) {
+  if (calls.following > 0 && spheres == calls.spheres && pairs == calls.pairs) {
+    --calls.following;
+    backend_ = Backend::x86;
+    reason_ = calls.reason;
+    return true;
+  }
+  calls.spheres = spheres;
+  calls.pairs = pairs;
+  return false;
+}
+
+/// Calls `call` with the collider that is chosen, and with x86 if the device fails.
 template <class Call, class Measure>
-auto AutomaticSphereCollider::compute(CostChooser& chooser, const ColliderWork& expected,
-                                      const Call& call, const Measure& measure) {
-  if (!device_failure_.empty()) device_failure_.clear();
+auto AutomaticSphereCollider::compute(Calls& calls, const ColliderWork& expected, const Call& call,
+                                      const Measure& measure) {
+  device_failure_.clear();
+  calls.following = 0;
   start_device_if_it_pays();
   while (true) {
-    const CostChooser::Decision decision = chooser.choose(expected);
-    const Backend backend = chooser.way(decision.way).backend;
-    const SphereAlgorithm algorithm = chooser.way(decision.way).algorithm;
+    const CostChooser::Decision decision = calls.chooser.choose(expected);
+    const auto [backend, algorithm, terms, dormant] = calls.chooser.way(decision.way);
     try {
-      SphereCollider& chosen = collider(backend, algorithm);
-      const Clock::time_point start = decision.timed ? Clock::now() : Clock::time_point{};
-      const auto result = call(chosen);
-      if (decision.timed) {
-        const std::chrono::duration<double, std::micro> us = Clock::now() - start;
-        chooser.record(measure(result), us.count());
-      }
+      calls.by = &collider(backend, algorithm);
+      const Clock::time_point start = Clock::now();
+      const auto result = call(*calls.by);
+      const std::chrono::duration<double, std::micro> us = Clock::now() - start;
+      calls.chooser.record(measure(result), us.count());
+      if (device_failure_.empty()) calls.following = decision.following;
+      calls.reason = device_lost_ ? ChoiceReason::device_failed : calls.chooser.reason();
       backend_ = backend;
+      reason_ = calls.reason;
       if (algorithm != SphereAlgorithm::automatic) algorithm_ = algorithm;
-      reason_ = device_lost_ ? ChoiceReason::device_failed : chooser.reason();
       return result;
     } catch (const BackendUnavailable&) {
       if (backend == Backend::x86) throw;
@@ -81,6 +94,7 @@ auto AutomaticSphereCollider::compute(CostChooser& chooser, const ColliderWork& 
 }
 
 ContactSpan AutomaticSphereCollider::find_contacts(std::span<const SphereInstance> spheres) {
+  if (goes_on(search_, spheres.size(), 0)) return search_.by->find_contacts(spheres);
   const auto n = static_cast<double>(spheres.size());
   const auto work = [&](double contacts) {
     return ColliderWork{.spheres = n,
@@ -100,6 +114,7 @@ ContactSpan AutomaticSphereCollider::find_contacts(std::span<const SphereInstanc
 
 std::span<const PairResult> AutomaticSphereCollider::test_pairs(
     std::span<const SphereInstance> spheres, std::span<const SpherePair> pairs) {
+  if (goes_on(given_, spheres.size(), pairs.size())) return given_.by->test_pairs(spheres, pairs);
   const auto n = static_cast<double>(spheres.size()), m = static_cast<double>(pairs.size());
   const ColliderWork work{
       .spheres = n,
@@ -132,18 +147,20 @@ SphereCollider& AutomaticSphereCollider::collider(Backend backend, SphereAlgorit
 /// having known.
 void AutomaticSphereCollider::start_device_if_it_pays() {
   if (!device_asleep_) return;
-  if (search_.missed_us() + given_.missed_us() < 1e3 * options_.costs.cuda_start_ms) return;
+  if (search_.chooser.missed_us() + given_.chooser.missed_us() < 1e3 * options_.costs.cuda_start_ms)
+    return;
   device_asleep_ = false;
-  search_.wake();
-  given_.wake();
+  for (Calls* calls : {&search_, &given_}) calls->chooser.wake();
 }
 
 void AutomaticSphereCollider::give_up_device(std::string_view failure) {
   device_failure_ = failure;
   device_lost_ = !failure.empty();
   for (auto& collider : colliders_[1]) collider.reset();
-  search_.remove(Backend::cuda);
-  given_.remove(Backend::cuda);
+  for (Calls* calls : {&search_, &given_}) {
+    calls->chooser.remove(Backend::cuda);
+    calls->following = 0;  // so that the next call tells that it did not fail
+  }
 }
 
 }  // namespace jfpx::inline JFPX_ABI

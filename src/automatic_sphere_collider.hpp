@@ -33,9 +33,20 @@ class AutomaticSphereCollider final : public SphereCollider {
   std::string_view device_failure() const noexcept override { return device_failure_; }
 
  private:
+  /// Calls of one kind: who is to do them.
+  struct Calls {
+    CostChooser chooser;
+    // While these last, x86 does calls with the same counts without a further thought.
+    int following = 0;
+    std::size_t spheres = 0, pairs = 0;
+    SphereCollider* by = nullptr;
+    ChoiceReason reason = ChoiceReason::fixed;
+  };
+
   template <class Call, class Measure>
-  auto compute(CostChooser& chooser, const ColliderWork& expected, const Call& call,
+  auto compute(Calls& calls, const ColliderWork& expected, const Call& call,
                const Measure& measure);
+  bool goes_on(Calls& calls, std::size_t spheres, std::size_t pairs);
   SphereCollider& collider(Backend backend, SphereAlgorithm algorithm);
   void start_device_if_it_pays();
   /// `failure` is empty where there never was one.
@@ -43,9 +54,9 @@ class AutomaticSphereCollider final : public SphereCollider {
 
   SphereColliderOptions options_;
   SphereColliderMaker make_;
-  CostChooser search_, given_;
+  Calls search_, given_;
   std::unique_ptr<SphereCollider> colliders_[2][2];  ///< by backend and algorithm
-  double contacts_per_sphere_ = 1;                   ///< in the last search that was timed
+  double contacts_per_sphere_ = 1;                   ///< in the last search that was decided alone
   bool device_asleep_;
   bool device_lost_ = false;
   std::string device_failure_;

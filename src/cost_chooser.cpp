@@ -19,7 +19,7 @@ constexpr double kMostPatience = 64;
 /// Deciding and timing takes 0.1 us, and some us where reading the clock is a call of the system:
 /// calls that take little are decided together.
 constexpr double kDecisionEveryUs = 200;
-constexpr double kMostHeldCalls = 4095;
+constexpr double kMostFollowing = 4095;
 /// Where the pairs change by this, what was measured before is forgotten.
 constexpr double kOtherSize = 4;
 /// Buffers grow by some more than is needed.
@@ -46,22 +46,20 @@ std::size_t CostChooser::cheapest(const ColliderWork& work, bool dormant) const 
 }
 
 CostChooser::Decision CostChooser::choose(const ColliderWork& expected) {
-  if (held_calls_ > 0 && expected.spheres == held_.spheres && expected.pairs == held_.pairs) {
-    --held_calls_;
-    return {current_, false};
-  }
   forget_if_size_changed(expected);
   decide(expected);
   const double us = cost(ways_[current_], expected);
-  held_ = expected;
-  held_calls_ = stay_ > 0 ? 0 : static_cast<int>(std::min(kMostHeldCalls, kDecisionEveryUs / us));
-  const double spent = us * (1 + held_calls_);
+  // No call to a device takes so little.
+  const bool alone = stay_ > 0 || ways_[current_].way.backend != Backend::x86;
+  const int following =
+      alone ? 0 : static_cast<int>(std::min(kMostFollowing, kDecisionEveryUs / us));
+  const double spent = us * (1 + following);
   for (Candidate& c : ways_) c.waited_us += spent;
   const std::size_t dormant = cheapest(expected, true);
   if (dormant != kNone) {
     missed_us_ += std::max(0.0, spent * (1 - cost(ways_[dormant], expected) / us));
   }
-  return {current_, true};
+  return {current_, following};
 }
 
 void CostChooser::decide(const ColliderWork& work) {
@@ -136,13 +134,13 @@ void CostChooser::record(const ColliderWork& done, double us) {
 
 void CostChooser::wake() noexcept {
   for (Candidate& c : ways_) c.way.dormant = false;
-  stay_ = held_calls_ = 0;
+  stay_ = 0;
 }
 
 void CostChooser::remove(Backend backend) {
   std::erase_if(ways_, [&](const Candidate& c) { return c.way.backend == backend; });
   incumbent_ = current_ = kNone;
-  stay_ = held_calls_ = 0;
+  stay_ = 0;
 }
 
 }  // namespace jfpx::inline JFPX_ABI

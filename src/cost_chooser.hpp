@@ -24,14 +24,14 @@ class CostChooser {
   };
   struct Decision {
     std::size_t way;
-    bool timed;  ///< record() is wanted
+    int following;  ///< calls with the same counts that need not ask, nor record()
   };
 
   /// At least one of `ways` is not dormant.
   explicit CostChooser(std::vector<Way> ways);
 
   Decision choose(const ColliderWork& expected);
-  /// What the call that choose() decided last had to do, and how long it took.
+  /// What the call for which choose() was asked last had to do, and how long it took.
   void record(const ColliderWork& done, double us);
 
   const Way& way(std::size_t index) const { return ways_[index].way; }
@@ -72,8 +72,6 @@ class CostChooser {
   int stay_ = 0;              ///< decisions for which nothing changes
   double regime_pairs_ = -1;  ///< size for which the ratios were measured
   double missed_us_ = 0;
-  ColliderWork held_;  ///< for which the last decision still holds
-  int held_calls_ = 0;
 };
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -5,7 +5,7 @@ import pathlib
 THESIS = "thesis_2010.json"
 # Of the context that Google Benchmark writes; names of hosts, people and folders stay out.
 KEPT_CONTEXT = ("date", "machine", "x86", "cuda", "num_cpus", "load_avg", "precision", "version",
-                "command", "costs", "library_build_type")
+                "command", "costs")
 DROPPED_FIELDS = ("family_index", "per_family_instance_index", "run_name", "run_type", "repetitions",
                   "repetition_index", "threads")
 
@@ -38,6 +38,8 @@ def store(raw, dest):
         raise ResultError(f"{raw}: has no benchmarks")
     context = {key: data["context"][key] for key in KEPT_CONTEXT if key in data["context"]}
     context.setdefault("machine", machine_of(context))
+    if "load_avg" in context:
+        context["load_avg"] = context["load_avg"][0]
     benchmarks = [{key: value for key, value in b.items() if key not in DROPPED_FIELDS}
                   for b in data["benchmarks"]]
     dest = pathlib.Path(dest)

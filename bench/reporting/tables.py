@@ -47,8 +47,7 @@ def exponent(points):
 
 def origin(machine, bench, precision="float"):
     context = machine.context(bench, precision)
-    load = context.get("load_avg") or []
-    busy = f", load {load[0]:.1f}" if load else ""
+    busy = f", load {context['load_avg']:.1f}" if "load_avg" in context else ""
     return (f"`{context['command']}`, {context['date'][:10]}{busy}; data: "
             f"[{bench}_{precision}.json](../bench/results/{machine.name}/{bench}_{precision}.json)\n")
 
@@ -98,17 +97,17 @@ def thesis(machine, published):
         rows.append([n, int(x86["iterations"]), number(x86["real_time"]), number(x86["median_ms"]),
                      number(x86["first_ms"]), number(x86["contacts"]),
                      *([number(cuda[k]) for k in ("real_time", "median_ms", "first_ms")] +
-                       [number(x86["real_time"] / cuda["real_time"])] if cuda else [""] * 4),
+                       [number(x86["median_ms"] / cuda["median_ms"])] if cuda else [""] * 4),
                      *([number(o["x86_mean_ms"]) + mark, number(o["cuda_mean_ms"]),
                         number(o["x86_mean_ms"] / o["cuda_mean_ms"]) + mark] if o else [""] * 3)])
     text = ("### The thesis again: detection in `boxes-and-balls` (figures 5.1 and 5.2)\n\n" +
             origin(machine, "thesis") + "\nMilliseconds of contact generation a frame, as the thesis timed "
-            "it, without rendering: mean over the frames, median, and the first frame apart. \"2010\" are "
-            "the published means.\n\n" +
+            "it, without rendering: mean over the frames, median, and the first frame apart. Ratios are of "
+            "medians. \"2010\" are the published means.\n\n" +
             table(["N", "frames", "x86 mean", "median", "first", "contacts", "cuda mean", "median", "first",
                    "x86 / cuda", "2010 x86", "2010 cuda", "2010 x86 / cuda"], rows) +
             "\n(1) The published x86 file for 32 spheres is that of 16, byte for byte.\n\n")
-    with_cuda = [(n, b["x86"]["real_time"], b["cuda"]["real_time"]) for n, b in ours.items() if "cuda" in b]
+    with_cuda = [(n, b["x86"]["median_ms"], b["cuda"]["median_ms"]) for n, b in ours.items() if "cuda" in b]
     here = crossover(with_cuda) if with_cuda else None
     there = crossover([(n, r["x86_mean_ms"], r["cuda_mean_ms"]) for n, r in old.items()
                        if "x86_note" not in r])
@@ -116,7 +115,7 @@ def thesis(machine, published):
     text += (f", from N = {here:.0f} here.\n\n" if here else ".\n\n")
     last = max(n for n in old if n in ours)
     return text + (f"At N = {last} this x86 code takes 1 / "
-                   f"{number(old[last]['x86_mean_ms'] / ours[last]['x86']['real_time'])} of the published "
+                   f"{number(old[last]['x86_mean_ms'] / ours[last]['x86']['median_ms'])} of the published "
                    "time: another processor and an optimised build are in that figure, too.\n\n")
 
 
@@ -164,7 +163,7 @@ def bullet(machine):
 
 def precisions(machine):
     rows = []
-    for bench, key in (("thesis", "real_time"), ("stages", "detect_ms"), ("stages", "integrate_ms"),
+    for bench, key in (("thesis", "median_ms"), ("stages", "detect_ms"), ("stages", "integrate_ms"),
                        ("stages", "resolve_ms")):
         single, double = machine.get(bench), machine.get(bench, "double")
         for name in single:
@@ -173,7 +172,7 @@ def precisions(machine):
             *what, n = name.split("/")
             if bench == "thesis" and int(n) not in (16, 448, 16384, 1000000):
                 continue
-            stage = "detect" if key == "real_time" else key.removesuffix("_ms")
+            stage = "detect" if key == "median_ms" else key.removesuffix("_ms")
             rows.append(["/".join(what[1:]) if bench == "stages" else "tower/" + what[1], stage, n,
                          f"{double[name][key] / single[name][key]:.2f}"])
     if not rows:

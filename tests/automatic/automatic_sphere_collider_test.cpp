@@ -148,6 +148,31 @@ TEST_F(AutomaticCollider, KeepsToTheAlgorithmThatWasAskedFor) {
   }
 }
 
+TEST_F(AutomaticCollider, NoticesANewSizeAtOnce) {
+  const auto collider = make_sphere_collider();
+  const auto few = make_gas(2, 1, 3, random_), many = make_gas(20000, 1, 3, random_);
+  for (int i = 0; i < 50; ++i) collider->find_contacts(few);  // decided together
+  collider->find_contacts(many);
+  EXPECT_EQ(collider->algorithm(), SphereAlgorithm::sorted_tiles);
+  collider->find_contacts(few);
+  EXPECT_EQ(collider->algorithm(), SphereAlgorithm::all_pairs);
+}
+
+TEST_F(AutomaticCollider, AFailureInOneKindOfCallIsNotToldByTheNextOfTheOther) {
+  SphereColliderOptions options = device_wins();
+  options.costs.x86_all_pairs = {};  // searches are for x86, a microsecond each: decided together
+  const auto collider = make(options);
+  const auto spheres = make_gas(20, 1, 3, random_);
+  const auto pairs = some_pairs(20, 50, random_);
+  for (int i = 0; i < 20; ++i) collider->find_contacts(spheres);
+  device_.before_call = [] { throw DeviceError("the device is gone"); };
+  collider->test_pairs(spheres, pairs);
+  EXPECT_EQ(collider->device_failure(), "the device is gone");
+  collider->find_contacts(spheres);
+  EXPECT_EQ(collider->device_failure(), "");
+  EXPECT_EQ(collider->reason(), ChoiceReason::device_failed);
+}
+
 TEST_F(AutomaticCollider, RefusesCostsThatAreNone) {
   for (const double bad :
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
