@@ -9,12 +9,17 @@ namespace {
 
 /// Who is not faster by this much is not switched to: hysteresis.
 constexpr double kClearly = 0.93;
-/// Calls after a switch before the next: one that grows buffers, three that count.
-constexpr int kCallsToSettle = 4;
-constexpr int kCallsOnTrial = 3;
+/// Calls that do not count when a way is new to a size: they grow buffers.
+constexpr int kColdCalls = 2;
+/// Calls after a switch before the next: those, and three that count.
+constexpr int kCallsToSettle = kColdCalls + 3;
+/// A trial lasts so long, since a processor that waited for a GPU is slow at first, but at least
+/// as many calls as it takes to settle.
+constexpr double kTrialUs = 300;
 constexpr double kTrialRatio = 2;
-/// A trial of three calls that take up to twice as long costs at most 3 in so many.
-constexpr double kCallsBetweenTrials = 100;
+/// Time between trials, in trials: as they take up to twice as long, one costs at most 1 in so
+/// many.
+constexpr double kTrialsBetween = 25;
 constexpr double kMostPatience = 64;
 /// Deciding and timing takes 0.1 us, and some us where reading the clock is a call of the system:
 /// calls that take little are decided together.
@@ -75,7 +80,7 @@ void CostChooser::decide(const ColliderWork& work) {
     ways_[tried].patience = std::min(kMostPatience, 2 * ways_[tried].patience);
   } else if (const std::size_t rival = due_for_trial(work); rival != kNone) {
     current_ = rival;
-    stay_ = kCallsOnTrial;
+    stay_ = trial_calls(ways_[rival], work);
     ways_[rival].waited_us = 0;
     reason_ = ChoiceReason::trial;
     return;
@@ -92,13 +97,18 @@ void CostChooser::take(std::size_t way) {
   stay_ = ways_[way].samples == 0 ? kCallsToSettle : 0;
 }
 
+int CostChooser::trial_calls(const Candidate& c, const ColliderWork& work) const {
+  return std::max(kCallsToSettle, static_cast<int>(kTrialUs / std::max(1.0, cost(c, work))));
+}
+
 std::size_t CostChooser::due_for_trial(const ColliderWork& work) const {
   const double now = cost(ways_[incumbent_], work);
   for (std::size_t i = 0; i < ways_.size(); ++i) {
     if (i == incumbent_ || ways_[i].way.dormant) continue;
     const double us = cost(ways_[i], work);
     if (std::min(1.0, 1 / ways_[i].correction) * us >= kTrialRatio * now) continue;
-    if (ways_[i].waited_us >= kCallsBetweenTrials * ways_[i].patience * us) return i;
+    const double trial_us = us * trial_calls(ways_[i], work);
+    if (ways_[i].waited_us >= kTrialsBetween * ways_[i].patience * trial_us) return i;
   }
   return kNone;
 }
@@ -121,6 +131,10 @@ void CostChooser::record(const ColliderWork& done, double us) {
   Candidate& c = ways_[current_];
   if (done.pairs > c.warm_pairs) {
     c.warm_pairs = kSlack * done.pairs;
+    c.cold_calls = kColdCalls;
+  }
+  if (c.cold_calls > 0) {
+    --c.cold_calls;
     return;
   }
   c.correction = 1;

@@ -54,12 +54,14 @@ class CostChooser {
     std::size_t samples = 0;                ///< taken since the size changed
     double correction = 1;                  ///< their lower quartile: a clock errs upwards
     double warm_pairs = -1;                 ///< up to here its buffers have grown
+    int cold_calls = 0;                     ///< that do not count
     double waited_us = 0;                   ///< time spent since its last trial
     double patience = 1;                    ///< grows with each trial that was in vain
   };
 
   double cost(const Candidate& c, const ColliderWork& work) const;
   std::size_t cheapest(const ColliderWork& work, bool dormant) const;
+  int trial_calls(const Candidate& c, const ColliderWork& work) const;
   std::size_t due_for_trial(const ColliderWork& work) const;
   void forget_if_size_changed(const ColliderWork& work);
   void decide(const ColliderWork& work);
