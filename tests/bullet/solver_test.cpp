@@ -1,9 +1,12 @@
 /// The constraint solver moves worlds as Bullet's does.
 #include <jfpx/bullet/constraint_solver.hpp>
+#include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/error.hpp>
 
 #include "tests/bullet/solver_world.hpp"
 
+#include <cmath>
+#include <limits>
 #include <sstream>
 
 namespace jfpx::inline JFPX_ABI::bullet {
@@ -99,6 +102,199 @@ TEST(DynamicsWorld, MovesRandomWorldsAsStock) {
 
 TEST(DynamicsWorld, MovesRandomWorldsAsStockWithOurDispatcherAndSolver) {
   expect_stocks_bits(wanted_steps() / 4, our_solver_and_world, make_ours);
+}
+
+/// Right but for the last bit of one velocity.
+class SlightlyWrongSolver final : public ConstraintSolver {
+ public:
+  using ConstraintSolver::ConstraintSolver;
+  btScalar solveGroup(btCollisionObject** bodies, int body_count, btPersistentManifold** manifolds,
+                      int manifold_count, btTypedConstraint** constraints, int constraint_count,
+                      const btContactSolverInfo& info, btIDebugDraw* debug_drawer,
+                      btDispatcher* dispatcher) override {
+    const std::uint64_t before = stats().contacts;
+    const btScalar result =
+        ConstraintSolver::solveGroup(bodies, body_count, manifolds, manifold_count, constraints,
+                                     constraint_count, info, debug_drawer, dispatcher);
+    if (stats().contacts > before) {
+      if (btRigidBody* body = btRigidBody::upcast(bodies[body_count - 1])) {
+        btVector3 velocity = body->getLinearVelocity();
+        velocity.setX(std::nextafter(velocity.x(), btScalar(1e30)));
+        body->setLinearVelocity(velocity);
+      }
+    }
+    return result;
+  }
+  static WorldParts parts(const SolverWorld&) {
+    WorldParts made;
+    made.solver = [] {
+      return std::make_unique<SlightlyWrongSolver>(ConstraintSolverOptions{.minimum_batch = 0});
+    };
+    return made;
+  }
+};
+
+TEST(ConstraintSolver, ShowsAnErrorOfOneBitInRandomWorldsAndShrinksThem) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  int failed = 0;
+  for (std::uint64_t i = 0; i < 40; ++i) {
+    const SolverWorld world = make_solver_world(seed + i);
+    if (!run(world, nullptr, SlightlyWrongSolver::parts)) continue;
+    if (++failed > 2) continue;  // shrinking takes hundreds of runs
+    const SolverWorld least = shrink(world, SlightlyWrongSolver::parts);
+    EXPECT_TRUE(run(least, nullptr, SlightlyWrongSolver::parts)) << least;
+    EXPECT_LE(least.base.used_bodies(), 3u) << least;
+  }
+  EXPECT_GT(failed, 10) << "most worlds with contacts must fail";
+}
+
+/// A heap with more rows than threads and vectors can share badly.
+SolverWorld large_heap(std::uint64_t seed) {
+  SolverWorld world;
+  world.base.seed = seed;
+  world.base.steps = 12;
+  world.base.gravity = {0, -10, 0};
+  Random random(seed);
+  for (int i = 0; i < 700; ++i) {
+    RandomBody body;
+    body.size = random.uniform(Real(0.3), Real(0.6));
+    body.position = random.uniform_in_box({0, 0, 0}, {7, 7, 7});
+    body.mass = i == 0 ? Real(0) : random.uniform(Real(0.5), 2);
+    body.restitution = random.uniform(0, Real(0.5));
+    world.base.bodies.push_back(body);
+  }
+  world.bodies.resize(world.base.bodies.size());
+  return world;
+}
+
+TEST(ConstraintSolver, HasStocksBitsForAnyThreadsVectorsAndModes) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  for (const unsigned threads : {1u, 2u, 3u, 8u}) {
+    for (const bool vectors : {true, false}) {
+      SolverWorld world = large_heap(seed);
+      world.threads = threads;
+      world.vectors = vectors;
+      btContactSolverInfo info;
+      info.m_solverMode ^= SOLVER_INTERLEAVE_CONTACT_AND_FRICTION_CONSTRAINTS;
+      info.m_splitImpulsePenetrationThreshold = 0;
+      world.changes.push_back({6, info});
+      SolverTotals totals;
+      const auto failure = run(world, &totals, our_solver_and_world, make_ours);
+      EXPECT_FALSE(failure) << threads << " threads, vectors " << vectors << ": " << failure->what;
+      EXPECT_GT(totals.contacts, 12u * 1000u) << "too few to be shared";
+    }
+  }
+}
+
+WorldParts plain_parts() {
+  WorldParts parts;
+  parts.solver = [] {
+    return std::make_unique<ConstraintSolver>(ConstraintSolverOptions{.minimum_batch = 0});
+  };
+  return parts;
+}
+const ConstraintSolver& solver_of(BulletWorld& world) {
+  return dynamic_cast<const ConstraintSolver&>(*world.solver);
+}
+std::uint64_t fallbacks(BulletWorld& world, SolverFallback why) {
+  return solver_of(world).stats().fallbacks[static_cast<std::size_t>(why)];
+}
+
+TEST(ConstraintSolver, LeavesGroupsThatExplodeToBullet) {
+  Twins twins({.parts = plain_parts()});
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 40, 7);
+    // Not a velocity: Bullet takes bodies with infinite boxes out of the simulation.
+    constexpr btScalar kHuge = std::numeric_limits<btScalar>::max();
+    for (std::size_t i = 1; i < 4; ++i) {
+      w.bodies[i]->setMassProps(btScalar(0.01), btVector3(1, 1, 1));
+      w.bodies[i]->applyCentralForce(btVector3(kHuge, -kHuge, kHuge));
+    }
+  });
+  twins.step();
+  EXPECT_GT(fallbacks(twins.ours(), SolverFallback::not_finite), 0u);
+}
+
+int g_rows_solved = 0;
+btScalar counting_row_solver(btSolverBody&, btSolverBody&, const btSolverConstraint&) {
+  ++g_rows_solved;
+  return 0;
+}
+
+TEST(ConstraintSolver, UsesRowSolversOfTheUser) {
+  Twins twins({.parts = plain_parts()});
+  twins.both([](BulletWorld& w) { add_heap(w, 30, 3); });
+  ASSERT_TRUE(twins.step());
+  EXPECT_GT(solver_of(twins.ours()).stats().groups, 0u);
+  twins.both(
+      [](BulletWorld& w) { w.solver->setConstraintRowSolverLowerLimit(counting_row_solver); });
+  g_rows_solved = 0;
+  ASSERT_TRUE(twins.step());
+  EXPECT_GT(g_rows_solved, 0);
+  EXPECT_GT(fallbacks(twins.ours(), SolverFallback::row_solver), 0u);
+}
+
+/// A joint that does something of its own in every sweep.
+struct OwnJoint final : btPoint2PointConstraint {
+  using btPoint2PointConstraint::btPoint2PointConstraint;
+  int calls = 0;
+  void solveConstraintObsolete(btSolverBody& a, btSolverBody&, btScalar) override {
+    ++calls;
+    a.internalGetDeltaLinearVelocity() += btVector3(0, btScalar(0.01), 0);
+  }
+};
+
+TEST(ConstraintSolver, LeavesJointsOfTheUsersClassesToBullet) {
+  std::vector<std::unique_ptr<OwnJoint>> joints;
+  Twins twins({.parts = plain_parts()});
+  twins.both([&](BulletWorld& w) {
+    add_heap(w, 30, 5);
+    joints.push_back(std::make_unique<OwnJoint>(*w.bodies[3], *w.bodies[4], btVector3(0, 1, 0),
+                                                btVector3(0, -1, 0)));
+    w.world.addConstraint(joints.back().get());
+  });
+  twins.step(3);
+  EXPECT_GT(joints[0]->calls, 0);
+  EXPECT_EQ(joints[0]->calls, joints[1]->calls);
+  EXPECT_GT(fallbacks(twins.ours(), SolverFallback::constraints), 0u);
+  twins.both([&](BulletWorld& w) { w.world.removeConstraint(w.world.getConstraint(0)); });
+}
+
+TEST(ConstraintSolver, LeavesSmallGroupsToBullet) {
+  Twins twins({.parts = plain_parts()});
+  twins.both([](BulletWorld& w) { add_heap(w, 10, 11); });
+  auto& solver = dynamic_cast<ConstraintSolver&>(*twins.ours().solver);
+  solver.set_minimum_batch(1000);
+  EXPECT_EQ(solver.minimum_batch(), 1000u);
+  ASSERT_TRUE(twins.step(3));
+  EXPECT_EQ(solver.stats().groups, 0u);
+  EXPECT_GT(fallbacks(twins.ours(), SolverFallback::small), 0u);
+  solver.set_minimum_batch(0);
+  ASSERT_TRUE(twins.step(3));
+  EXPECT_GT(solver.stats().groups, 0u);
+  EXPECT_GT(solver.stats().sweeps, solver.stats().groups);
+  solver.reset_stats();
+  EXPECT_EQ(solver.stats().groups, 0u);
+}
+
+TEST(ConstraintSolver, AndWorldRefuseTooManyThreads) {
+  EXPECT_THROW(ConstraintSolver({.threads = 257}), InvalidArgument);
+  btDefaultCollisionConfiguration configuration;
+  btCollisionDispatcher dispatcher(&configuration);
+  btDbvtBroadphase broadphase;
+  EXPECT_THROW(DynamicsWorld(&dispatcher, &broadphase, nullptr, &configuration, {.threads = 257}),
+               InvalidArgument);
+}
+
+TEST(DynamicsWorld, OwnsTheSolverThatItIsNotGiven) {
+  btDefaultCollisionConfiguration configuration;
+  btCollisionDispatcher dispatcher(&configuration);
+  btDbvtBroadphase broadphase;
+  DynamicsWorld world(&dispatcher, &broadphase, nullptr, &configuration);
+  world.stepSimulation(btScalar(1) / 60, 0);
+  EXPECT_NE(world.getConstraintSolver(), nullptr);
 }
 
 }  // namespace

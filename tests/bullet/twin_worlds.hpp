@@ -114,7 +114,8 @@ struct TwinOptions {
     return std::make_unique<CollisionDispatcher>(c, DispatcherOptions{.minimum_batch = 0});
   };
   BulletWorld::MakeBroadphase broadphase = [] { return std::make_unique<btDbvtBroadphase>(); };
-  btDefaultCollisionConstructionInfo configuration;
+  btDefaultCollisionConstructionInfo configuration = {};
+  WorldParts parts;  ///< of our world
 };
 
 class Twins {
@@ -123,7 +124,7 @@ class Twins {
       : stock_(std::make_unique<btDefaultCollisionConfiguration>(options.configuration),
                options.stock, options.broadphase()),
         ours_(std::make_unique<btDefaultCollisionConfiguration>(options.configuration),
-              options.ours, options.broadphase()) {}
+              options.ours, options.broadphase(), options.parts) {}
   ~Twins() { g_current = nullptr; }
 
   BulletWorld& stock() { return stock_; }
