@@ -4,6 +4,7 @@
 
 #include "src/bullet/contact_scan.hpp"
 #include "src/bullet/joint_rows.hpp"
+#include "src/bullet/row_inputs.hpp"
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <LinearMath/btQuickprof.h>
@@ -23,83 +24,13 @@ namespace {
 constexpr std::size_t kBodiesAChunk = 256;
 constexpr std::size_t kBlocksAChunk = 16;
 /// SOLVER_SIMD means nothing on Linux; SOLVER_FRICTION_SEPARATE and SOLVER_CACHE_FRIENDLY nowhere.
-constexpr int kUnsupportedModes = SOLVER_RANDMIZE_ORDER | SOLVER_USE_2_FRICTION_DIRECTIONS |
-                                  SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
+constexpr int kUnsupportedModes = SOLVER_RANDMIZE_ORDER | SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
 
 unsigned checked_threads(unsigned threads) {
   if (threads > 256) {
     throw InvalidArgument("threads is " + std::to_string(threads) + "; it must be at most 256");
   }
   return threads;
-}
-
-rows::RowSettings row_settings(const btContactSolverInfo& info) {
-  return {.dt = info.m_timeStep,
-          .inverse_dt = btScalar(1) / info.m_timeStep,
-          .relaxation = info.m_sor,
-          .restitution_threshold = info.m_restitutionVelocityThreshold,
-          .slop = info.m_linearSlop,
-          .split_threshold = info.m_splitImpulsePenetrationThreshold,
-          .friction_erp = info.m_frictionERP,
-          .warm_factor = info.m_warmstartingFactor,
-          .epsilon = SIMD_EPSILON,
-          .split = info.m_splitImpulse != 0,
-          .warm_start = (info.m_solverMode & SOLVER_USE_WARMSTARTING) != 0,
-          .friction_follows_velocity =
-              (info.m_solverMode & SOLVER_DISABLE_VELOCITY_DEPENDENT_FRICTION_DIRECTION) == 0};
-}
-
-void put(Real* to, const btVector3& v) { std::copy_n(v.m_floats, 3, to); }
-
-/// Fills the body as gather_body() reads it.
-void pack_body(const btSolverBody& body, Real* to) {
-  const btRigidBody& original = *body.m_originalBody;
-  const btVector3 factor = original.getAngularFactor();
-  const btVector3 columns[] = {original.getWorldTransform().getOrigin(), body.m_linearVelocity,
-                               body.m_angularVelocity,
-                               body.m_linearVelocity + body.m_externalForceImpulse,
-                               body.m_angularVelocity + body.m_externalTorqueImpulse};
-  for (int i = 0; i < 5; ++i) put(to + 4 * i, columns[i]);
-  for (int i = 0; i < 3; ++i) put(to + 20 + 4 * i, original.getInvInertiaTensorWorld()[i]);
-  to[3] = original.getInvMass();
-  for (int i = 0; i < 3; ++i) to[7 + 4 * i] = factor[i];
-  to[19] = to[23] = to[27] = to[31] = 0;
-}
-
-/// Softness and error reduction of a contact.
-void contact_softness(const btManifoldPoint& point, const btContactSolverInfo& info, Real* cfm,
-                      Real* erp) {
-  const int flags = point.m_contactPointFlags;
-  *cfm = info.m_globalCfm;
-  *erp = info.m_erp2;
-  if ((flags & (BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP)) != 0) {
-    if ((flags & BT_CONTACT_FLAG_HAS_CONTACT_CFM) != 0) *cfm = point.m_contactCFM;
-    if ((flags & BT_CONTACT_FLAG_HAS_CONTACT_ERP) != 0) *erp = point.m_contactERP;
-  } else if ((flags & BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING) != 0) {
-    btScalar denominator =
-        info.m_timeStep * point.m_combinedContactStiffness1 + point.m_combinedContactDamping1;
-    if (denominator < SIMD_EPSILON) denominator = SIMD_EPSILON;
-    *cfm = btScalar(1) / denominator;
-    *erp = (info.m_timeStep * point.m_combinedContactStiffness1) / denominator;
-  }
-}
-
-/// Writes the contact into its lane.
-void pack_contact(const btManifoldPoint& point, const btContactSolverInfo& info, std::size_t lanes,
-                  Real* to) {
-  const auto put3 = [&](std::size_t field, const btVector3& v) {
-    for (std::size_t i = 0; i < 3; ++i) to[(field + i) * lanes] = v.m_floats[i];
-  };
-  put3(rows::kInNormal, point.m_normalWorldOnB);
-  put3(rows::kInPointA, point.m_positionWorldOnA);
-  put3(rows::kInPointB, point.m_positionWorldOnB);
-  to[rows::kInDistance * lanes] = point.m_distance1;
-  to[rows::kInFriction * lanes] = point.m_combinedFriction;
-  to[rows::kInRestitution * lanes] = point.m_combinedRestitution;
-  to[rows::kInImpulse * lanes] = point.m_appliedImpulse;
-  contact_softness(point, info, to + rows::kInCfm * lanes, to + rows::kInErp * lanes);
-  to[rows::kInAnchor * lanes] =
-      (point.m_contactPointFlags & BT_CONTACT_FLAG_FRICTION_ANCHOR) != 0 ? Real(1) : Real(0);
 }
 
 }  // namespace
@@ -146,10 +77,7 @@ struct ConstraintSolver::Impl {
   /// @return why it could not be; all that Bullet's solver reads is then as it was
   std::optional<SolverFallback> solve(std::span<btPersistentManifold* const> manifolds) {
     BT_PROFILE("solveGroup");  // here and below: Bullet's own names, for those who profile
-    if (!set_up(manifolds)) {
-      forget_late_bodies();
-      return SolverFallback::rolling;
-    }
+    set_up(manifolds);
     const x86::RowSweepReport report = sweep();
     if (report.broken) {
       forget_late_bodies();
@@ -165,22 +93,26 @@ struct ConstraintSolver::Impl {
     return std::nullopt;
   }
 
-  bool set_up(std::span<btPersistentManifold* const> manifolds) {
+  void set_up(std::span<btPersistentManifold* const> manifolds) {
     BT_PROFILE("solveGroupCacheFriendlySetup");
     settings = row_settings(*info);
     set_up_bodies();
     if (!joints.empty()) set_up_joints();
     {
       BT_PROFILE("find contacts");
-      if (!scan.run(solver.pool(), manifolds, marks)) return false;
+      scan.run(solver.pool(), manifolds, marks);
       set_up_late_bodies(manifolds);
     }
     {
       BT_PROFILE("schedule contacts");
-      solver.schedule(scan.pairs());
+      solver.schedule(scan.pairs(), directions());
     }
     set_up_contacts();
-    return true;
+    if (scan.any_rolling()) set_up_torsions();
+  }
+
+  std::uint32_t directions() const {
+    return (info->m_solverMode & SOLVER_USE_2_FRICTION_DIRECTIONS) != 0 ? 2 : 1;
   }
 
   x86::RowSweepReport sweep() {
@@ -238,36 +170,15 @@ struct ConstraintSolver::Impl {
     clear_velocities(i + 1);
     if (original == nullptr) return;
     object->setCompanionId(static_cast<int>(i));
-    if (original->getInvMass() != 0) add_gyroscopic_forces(*original, &body);
+    if (original->getInvMass() != 0) add_gyroscopic_impulses(*info, &body);
     pack(body, i + 1);
     marks[i + 1] = marks_of(*original);
-  }
-
-  void add_gyroscopic_forces(const btRigidBody& original, btSolverBody* body) const {
-    const int flags = original.getFlags();
-    if ((flags & BT_ENABLE_GYROSCOPIC_FORCE_EXPLICIT) != 0) {
-      body->m_externalTorqueImpulse -=
-          original.computeGyroscopicForceExplicit(info->m_maxGyroscopicForce) *
-          original.getInvInertiaTensorWorld() * info->m_timeStep;
-    }
-    if ((flags & BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_WORLD) != 0) {
-      body->m_externalTorqueImpulse +=
-          original.computeGyroscopicImpulseImplicit_World(info->m_timeStep);
-    }
-    if ((flags & BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY) != 0) {
-      body->m_externalTorqueImpulse +=
-          original.computeGyroscopicImpulseImplicit_Body(info->m_timeStep);
-    }
   }
 
   void pack(const btSolverBody& body, std::size_t id) {
     pack_body(body, solver.body(id));
     solver.velocity(id)[3] = solver.push(id)[3] = body.m_invMass[0];
-    Real* f = solver.factors(id);
-    std::fill_n(f, rows::kFactorFields, Real(0));
-    put(f, body.m_invMass);
-    put(f + 4, body.m_linearFactor);
-    put(f + 8, body.m_angularFactor);
+    pack_factors(body, solver.factors(id));
     const btVector3 ones(1, 1, 1);
     if (body.m_linearFactor != ones || body.m_angularFactor != ones) {
       factors.store(true, std::memory_order_relaxed);
@@ -372,30 +283,120 @@ struct ConstraintSolver::Impl {
       if (point.m_appliedImpulse != 0) warm.store(settings.warm_start, std::memory_order_relaxed);
     }
     const unsigned has_second = solver.set_up_contacts(settings, block, inputs, second);
-    Real* const axes = solver.friction_rows(block);
     for (std::size_t lane = 0; lane < used; ++lane) {
-      const ContactRef& contact = scan.contacts()[contacts[lane]];
-      btManifoldPoint& point = contact.get();
-      point.m_lateralFrictionDir1.setValue(axes[lane], axes[lanes + lane], axes[2 * lanes + lane]);
-      if ((has_second >> lane & 1) != 0) {
-        for (std::size_t i = 0; i < 3; ++i) {
-          point.m_lateralFrictionDir2.m_floats[i] = second[i * lanes + lane];
-        }
-      }
-      if (contact.anisotropic) turn_friction(contact, lanes, axes + lane);
+      set_directions(scan.contacts()[contacts[lane]], block, lane,
+                     (has_second >> lane & 1) != 0 ? second + lane : nullptr);
     }
-    solver.set_up_frictions(settings, block, inputs);
+    for (std::uint32_t k = 0; k < directions(); ++k) {
+      solver.set_up_frictions(settings, block, k, inputs);
+    }
   }
 
-  /// Friction that depends on the direction, which is a matter for Bullet.
-  static void turn_friction(const ContactRef& contact, std::size_t lanes, Real* axis) {
+  /// Leaves the directions of friction in the contact, as Bullet does, and in the rows.
+  /// @param second the other direction in the plane of the contact, if it does not slide
+  void set_directions(const ContactRef& contact, std::uint32_t block, std::size_t lane,
+                      const Real* second) {
+    const std::size_t lanes = solver.lanes();
     btManifoldPoint& point = contact.get();
+    Real* const axis = solver.friction_rows(block) + lane;
+    point.m_lateralFrictionDir1.setValue(axis[0], axis[lanes], axis[2 * lanes]);
+    if (second != nullptr) {
+      // Not setValue(): Bullet leaves the fourth component as it was.
+      for (std::size_t i = 0; i < 3; ++i) {
+        point.m_lateralFrictionDir2.m_floats[i] = second[i * lanes];
+      }
+    }
+    if (contact.anisotropic) {
+      turn(contact, &point.m_lateralFrictionDir1, btCollisionObject::CF_ANISOTROPIC_FRICTION);
+      put_lane(axis, lanes, point.m_lateralFrictionDir1);
+    }
+    if (directions() == 1) return;
+    if (second == nullptr) {
+      point.m_lateralFrictionDir2 = point.m_lateralFrictionDir1.cross(point.m_normalWorldOnB);
+      point.m_lateralFrictionDir2.normalize();
+    }
+    if (contact.anisotropic) {
+      turn(contact, &point.m_lateralFrictionDir2, btCollisionObject::CF_ANISOTROPIC_FRICTION);
+    }
+    put_lane(solver.friction_rows(block, 1) + lane, lanes, point.m_lateralFrictionDir2);
+    if (second != nullptr && !settings.friction_follows_velocity) {
+      point.m_contactPointFlags |= BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED;
+    }
+  }
+  static void put_lane(Real* to, std::size_t lanes, const btVector3& v) {
+    for (std::size_t i = 0; i < 3; ++i) to[i * lanes] = v.m_floats[i];
+  }
+  /// Friction that depends on the direction, which is a matter for Bullet.
+  static void turn(const ContactRef& contact, btVector3* axis, int mode) {
     for (const btCollisionObject* object :
          {contact.manifold->getBody0(), contact.manifold->getBody1()}) {
-      applyAnisotropicFriction(const_cast<btCollisionObject*>(object), point.m_lateralFrictionDir1,
-                               btCollisionObject::CF_ANISOTROPIC_FRICTION);
+      applyAnisotropicFriction(const_cast<btCollisionObject*>(object), *axis, mode);
     }
-    for (std::size_t i = 0; i < 3; ++i) axis[i * lanes] = point.m_lateralFrictionDir1.m_floats[i];
+  }
+
+  /// Rows against rolling and spinning: seldom many, so that Bullet's own function sets them up.
+  void set_up_torsions() {
+    BT_PROFILE("set up torsions");
+    const auto contact_in = [&](std::uint32_t block, std::size_t lane) -> const ContactRef* {
+      const std::uint32_t contact = solver.contacts_of(block)[lane];
+      return contact == x86::RowSolver::kNoContact ? nullptr : &scan.contacts()[contact];
+    };
+    solver.choose_torsions([&](std::uint32_t block) {
+      for (std::size_t lane = 0; lane < solver.lanes(); ++lane) {
+        const ContactRef* contact = contact_in(block, lane);
+        if (contact != nullptr && contact->rolling) return true;
+      }
+      return false;
+    });
+    // Bullet's function wants a solver body for the fixed body too.
+    btSolverBody& fixed = self.m_tmpSolverBodyPool.expandNonInitializing();
+    self.initSolverBody(&fixed, nullptr, settings.dt);
+    solver.pool().run(solver.torsion_blocks().size(), [&](std::size_t k) {
+      const std::uint32_t block = solver.torsion_blocks()[k];
+      for (std::uint32_t t = 0; t < x86::kTorsions; ++t) {
+        std::fill_n(solver.torsion_rows(k, t), solver.lanes() * rows::kFrictionFields, Real(0));
+      }
+      for (std::size_t lane = 0; lane < solver.lanes(); ++lane) {
+        const ContactRef* contact = contact_in(block, lane);
+        if (contact != nullptr && contact->rolling) set_up_torsion(*contact, k, lane);
+      }
+    });
+  }
+  void set_up_torsion(const ContactRef& contact, std::size_t k, std::size_t lane) {
+    const btManifoldPoint& point = contact.get();
+    const btVector3& normal = point.m_normalWorldOnB;
+    put_torsion(contact, normal, point.m_combinedSpinningFriction, solver.torsion_rows(k, 0), lane);
+    btVector3 axes[2];
+    btPlaneSpace1(normal, axes[0], axes[1]);
+    for (std::uint32_t i = 0; i < 2; ++i) {
+      axes[i].normalize();
+      turn(contact, &axes[i], btCollisionObject::CF_ANISOTROPIC_ROLLING_FRICTION);
+      if (axes[i].length() > 0.001) {
+        put_torsion(contact, axes[i], point.m_combinedRollingFriction,
+                    solver.torsion_rows(k, i + 1), lane);
+      }
+    }
+  }
+  void put_torsion(const ContactRef& contact, const btVector3& axis, btScalar strength, Real* to,
+                   std::size_t lane) {
+    const std::size_t lanes = solver.lanes();
+    const int fixed = self.m_tmpSolverBodyPool.size() - 1;
+    const auto body_of = [&](const btCollisionObject* object) {
+      return object->getCompanionId() >= 0 ? object->getCompanionId() : fixed;
+    };
+    btSolverConstraint row;
+    self.setupTorsionalFrictionConstraint(row, axis, body_of(contact.manifold->getBody0()),
+                                          body_of(contact.manifold->getBody1()), contact.get(),
+                                          strength, {}, {}, nullptr, nullptr, settings.relaxation);
+    const auto at = [&](int field) { return to + static_cast<std::size_t>(field) * lanes + lane; };
+    *at(rows::kRowPresent) = 1;
+    put_lane(at(rows::kRowTurnA), lanes, row.m_relpos1CrossNormal);
+    put_lane(at(rows::kRowTurnB), lanes, row.m_relpos2CrossNormal);
+    put_lane(at(rows::kRowAngularA), lanes, row.m_angularComponentA);
+    put_lane(at(rows::kRowAngularB), lanes, row.m_angularComponentB);
+    *at(rows::kRowInverse) = row.m_jacDiagABInv;
+    *at(rows::kRowRhs) = row.m_rhs;
+    *at(rows::kRowFriction) = row.m_friction;
   }
 
   void analyse(const x86::RowSweepReport& report, int manifold_count) {
@@ -425,6 +426,7 @@ struct ConstraintSolver::Impl {
       self.writeBackJoints(0, self.m_tmpSolverNonContactConstraintPool.size(), *info);
       self.m_tmpSolverNonContactConstraintPool.resizeNoInitialize(0);
     }
+    if (scan.any_rolling()) self.m_tmpSolverBodyPool.pop_back();  // see set_up_torsions()
     const auto count = static_cast<std::size_t>(self.m_tmpSolverBodyPool.size());
     const std::size_t chunks = (count + kBodiesAChunk - 1) / kBodiesAChunk;
     solver.pool().run(chunks, [&](std::size_t chunk) {
@@ -446,12 +448,14 @@ struct ConstraintSolver::Impl {
     const std::size_t lanes = solver.lanes();
     const Real* contact = solver.contact_rows(block) + rows::kRowImpulse * lanes;
     const Real* friction = solver.friction_rows(block) + rows::kRowImpulse * lanes;
+    const Real* other = solver.friction_rows(block, directions() - 1) + rows::kRowImpulse * lanes;
     const std::uint32_t* contacts = solver.contacts_of(block);
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       if (contacts[lane] == x86::RowSolver::kNoContact) return;
       btManifoldPoint& point = scan.contacts()[contacts[lane]].get();
       point.m_appliedImpulse = contact[lane];
       point.m_appliedImpulseLateral1 = friction[lane];
+      if (directions() == 2) point.m_appliedImpulseLateral2 = other[lane];
     }
   }
 };

@@ -61,7 +61,7 @@ std::uint8_t marks_of(const btRigidBody& body) {
   return static_cast<std::uint8_t>(marks);
 }
 
-bool ContactScan::run(x86::ThreadPool& pool, std::span<btPersistentManifold* const> manifolds,
+void ContactScan::run(x86::ThreadPool& pool, std::span<btPersistentManifold* const> manifolds,
                       std::span<const std::uint8_t> marks) {
   constexpr std::size_t kMost = MANIFOLD_CACHE_SIZE;
   found_.reserve(kMost * manifolds.size(), "contacts of a solver");
@@ -71,9 +71,9 @@ bool ContactScan::run(x86::ThreadPool& pool, std::span<btPersistentManifold* con
   chunks_.reserve(chunks, "contacts of a solver");
   pool.run(chunks, [&](std::size_t chunk) { scan(manifolds, chunk, marks); });
   count_ = 0;
-  any_late_ = false;
+  any_late_ = any_rolling_ = false;
   for (std::size_t i = 0; i < chunks; ++i) {
-    if (chunks_[i].rolling) return false;
+    any_rolling_ |= chunks_[i].rolling;
     any_late_ |= chunks_[i].late;
     count_ += chunks_[i].count;
   }
@@ -85,7 +85,6 @@ bool ContactScan::run(x86::ThreadPool& pool, std::span<btPersistentManifold* con
     std::copy_n(found_pairs_.data() + kMost * kChunk * i, chunks_[i].count, pairs_.data() + next);
     next += chunks_[i].count;
   }
-  return true;
 }
 
 void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::size_t chunk,
@@ -113,8 +112,9 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
     for (int k = 0; k < points; ++k) {
       const btManifoldPoint& point = manifold->getContactPoint(k);
       if (!(point.getDistance() <= manifold->getContactProcessingThreshold())) continue;
-      if (point.m_combinedRollingFriction > 0) rolling = true;
-      refs[count] = {manifold, k, a.anisotropic || b.anisotropic};
+      const bool rolls = point.m_combinedRollingFriction > 0;
+      rolling |= rolls;
+      refs[count] = {manifold, k, a.anisotropic || b.anisotropic, rolls};
       pairs[count++] = {a.id, b.id};
     }
   }

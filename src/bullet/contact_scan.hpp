@@ -23,6 +23,7 @@ struct ContactRef {
   btPersistentManifold* manifold;
   int point;
   bool anisotropic;  ///< one of the bodies has anisotropic friction
+  bool rolling;      ///< has rolling friction
 
   btManifoldPoint& get() const { return manifold->getContactPoint(point); }
 };
@@ -37,8 +38,7 @@ class ContactScan {
  public:
   /// Lists the contacts in Bullet's order. Ids are companion ids plus one; bodies without one are
   /// fixed, or late.
-  /// @return false if a contact has rolling friction
-  bool run(x86::ThreadPool& pool, std::span<btPersistentManifold* const> manifolds,
+  void run(x86::ThreadPool& pool, std::span<btPersistentManifold* const> manifolds,
            std::span<const std::uint8_t> marks);
   /// Gives late bodies ids from `first_id` on, and the companion ids that belong to them.
   void find_late(std::span<btPersistentManifold* const> manifolds, std::size_t first_id);
@@ -46,6 +46,7 @@ class ContactScan {
   std::span<const ContactRef> contacts() const { return {refs_.data(), count_}; }
   std::span<const x86::RowPair> pairs() const { return {pairs_.data(), count_}; }
   std::span<const LateBody> late() const { return late_; }
+  bool any_rolling() const { return any_rolling_; }
 
  private:
   struct Chunk {
@@ -60,7 +61,7 @@ class ContactScan {
   x86::Buffer<Chunk> chunks_;
   std::vector<LateBody> late_;
   std::size_t count_ = 0;
-  bool any_late_ = false;
+  bool any_late_ = false, any_rolling_ = false;
 };
 
 /// The object as a body if Bullet's solver takes notice of its motion: it has a finite mass or is

@@ -377,6 +377,37 @@ JFPX_ROW void solve_friction(const std::int32_t* ids, Real* velocities, const Re
   residual->add(impulse, inverse, active);
 }
 
+/// One row against rolling or spinning: an impulse that only turns, limited by that of its contact.
+template <class S, bool kFactors>
+JFPX_ROW void solve_torsion(const std::int32_t* ids, Real* velocities, const Real* factors,
+                            const Real* contact, Real* row, Residual<S>* residual) {
+  constexpr int kLanes = S::kLanes;
+  const auto zero = S::set(0);
+  const auto pressure = S::load(contact + kRowImpulse * kLanes);
+  const auto active =
+      S::both(S::less(zero, pressure), S::less(zero, S::load(row + kRowPresent * kLanes)));
+  if (!S::any(active)) return;
+  Movers<S, kFactors> movers(ids, velocities, factors);
+  const auto strength = S::load(row + kRowFriction * kLanes);
+  auto upper = strength * pressure;
+  upper = S::select(S::less(strength, upper), strength, upper);
+  const auto lower = S::negate(upper);
+  const auto before = S::load(row + kRowImpulse * kLanes);
+  const auto inverse = S::load(row + kRowInverse * kLanes);
+  const Vec3Of<S> axis_a = {zero, zero, zero};
+  const Vec3Of<S> axis_b = -axis_a;  // as Bullet has it, and multiplies with it
+  auto impulse = S::load(row + kRowRhs * kLanes) - before * zero;
+  impulse = movers.resist(impulse, inverse, axis_a, axis_b, load3<S>(row + kRowTurnA * kLanes),
+                          load3<S>(row + kRowTurnB * kLanes));
+  const auto sum = before + impulse;
+  const auto below = S::less(sum, lower), above = S::less(upper, sum);
+  impulse = S::select(below, lower - before, S::select(above, upper - before, impulse));
+  const auto after = S::select(below, lower, S::select(above, upper, sum));
+  S::store(row + kRowImpulse * kLanes, S::select(active, after, before));
+  movers.push(impulse, axis_a, axis_b, row, active);
+  residual->add(impulse, inverse, active);
+}
+
 /// Gives the bodies the impulses that the rows start with.
 template <class S, bool kFactors>
 JFPX_ROW void warm_start(const std::int32_t* ids, Real* velocities, const Real* factors,

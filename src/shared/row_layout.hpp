@@ -20,6 +20,8 @@ enum RowField : int {
   kRowImpulse = 17,   ///< impulse given so far
   kRowFriction = 18,  ///< of a friction row: the coefficient
   kFrictionFields = 19,
+  // A row against rolling or spinning is laid out like a friction row, but for its axis:
+  kRowPresent = 0,  ///< 1 where the contact has such a row, else 0
   kRowCfm = 18,  ///< of a contact row: softness
   kRowPushRhs = 19,
   kRowPush = 20,  ///< impulse of the push against penetration so far

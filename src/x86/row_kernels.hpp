@@ -14,8 +14,15 @@ struct RowArrays {
   const Real* factors;  ///< null where all factors are 1
   Real* contacts;
   Real* frictions;
-  const std::uint32_t* push_blocks;  ///< blocks with a row that pushes
+  std::uint32_t directions;             ///< of friction: rows a contact, one after the other
+  const std::uint32_t* push_blocks;     ///< blocks with a row that pushes
+  const std::uint32_t* torsion_blocks;  ///< blocks with a row against rolling or spinning
+  Real* torsions;                       ///< kTorsions of them for each of those
 };
+
+/// Rows against rolling and spinning of a contact: around the normal, and around two axes across
+/// it.
+inline constexpr std::uint32_t kTorsions = 3;
 
 struct RowResidual {
   Real largest = 0;     ///< squared
@@ -39,8 +46,9 @@ struct RowKernels {
   RowSweep warm_starts[2];
   RowSweep contacts[2];
   RowSweep frictions[2];
-  RowSweep both[2];    ///< contact and friction of a block by turns
-  RowSweep pushes[2];  ///< blocks are indices into push_blocks
+  RowSweep both[2];      ///< contact and friction of a block by turns
+  RowSweep pushes[2];    ///< blocks are indices into push_blocks
+  RowSweep torsions[2];  ///< blocks are indices into torsion_blocks
 };
 
 extern const RowKernels kScalarRowKernels;

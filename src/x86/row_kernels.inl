@@ -15,7 +15,7 @@ Real* contact_of(const RowArrays& arrays, std::uint32_t block) {
   return arrays.contacts + std::size_t{rows::kContactFields} * kLanes * block;
 }
 Real* friction_of(const RowArrays& arrays, std::uint32_t block) {
-  return arrays.frictions + std::size_t{rows::kFrictionFields} * kLanes * block;
+  return arrays.frictions + std::size_t{rows::kFrictionFields} * kLanes * arrays.directions * block;
 }
 void report(const BlockResidual& found, RowResidual* residual) {
   Real lanes[kLanes];
@@ -34,6 +34,16 @@ unsigned set_up_contacts(const rows::RowSettings& settings, const Real* inputs, 
 void set_up_frictions(const rows::RowSettings& settings, const Real* inputs, const Real* bodies,
                       const std::int32_t* ids, Real* frictions) {
   rows::set_up_friction<Simd>(settings, inputs, bodies, ids, frictions);
+}
+
+template <bool kFactors>
+void solve_frictions(const RowArrays& arrays, std::uint32_t block, BlockResidual* found) {
+  Real* row = friction_of(arrays, block);
+  for (std::uint32_t k = 0; k < arrays.directions; ++k) {
+    rows::solve_friction<Simd, kFactors>(ids_of(arrays, block), arrays.velocities, arrays.factors,
+                                         contact_of(arrays, block), row, found);
+    row += rows::kFrictionFields * kLanes;
+  }
 }
 
 template <bool kFactors>
@@ -59,8 +69,7 @@ void sweep_frictions(const RowArrays& arrays, std::uint32_t first, std::uint32_t
                      RowResidual* residual) {
   BlockResidual found;
   for (std::uint32_t i = first; i < last; ++i) {
-    rows::solve_friction<Simd, kFactors>(ids_of(arrays, i), arrays.velocities, arrays.factors,
-                                         contact_of(arrays, i), friction_of(arrays, i), &found);
+    solve_frictions<kFactors>(arrays, i, &found);
   }
   report(found, residual);
 }
@@ -71,8 +80,7 @@ void sweep_both(const RowArrays& arrays, std::uint32_t first, std::uint32_t last
   for (std::uint32_t i = first; i < last; ++i) {
     rows::solve_contact<Simd, kFactors, false>(ids_of(arrays, i), arrays.velocities, arrays.factors,
                                                contact_of(arrays, i), &found);
-    rows::solve_friction<Simd, kFactors>(ids_of(arrays, i), arrays.velocities, arrays.factors,
-                                         contact_of(arrays, i), friction_of(arrays, i), &found);
+    solve_frictions<kFactors>(arrays, i, &found);
   }
   report(found, residual);
 }
@@ -88,6 +96,22 @@ void sweep_pushes(const RowArrays& arrays, std::uint32_t first, std::uint32_t la
   report(found, residual);
 }
 
+template <bool kFactors>
+void sweep_torsions(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
+                    RowResidual* residual) {
+  BlockResidual found;
+  for (std::uint32_t k = first; k < last; ++k) {
+    const std::uint32_t i = arrays.torsion_blocks[k];
+    Real* row = arrays.torsions + std::size_t{rows::kFrictionFields} * kLanes * kTorsions * k;
+    for (std::uint32_t t = 0; t < kTorsions; ++t) {
+      rows::solve_torsion<Simd, kFactors>(ids_of(arrays, i), arrays.velocities, arrays.factors,
+                                          contact_of(arrays, i), row, &found);
+      row += rows::kFrictionFields * kLanes;
+    }
+  }
+  report(found, residual);
+}
+
 constexpr RowKernels kKernels = {
     kLanes,
     set_up_contacts,
@@ -97,6 +121,7 @@ constexpr RowKernels kKernels = {
     {sweep_frictions<false>, sweep_frictions<true>},
     {sweep_both<false>, sweep_both<true>},
     {sweep_pushes<false>, sweep_pushes<true>},
+    {sweep_torsions<false>, sweep_torsions<true>},
 };
 
 }  // namespace

@@ -29,6 +29,7 @@ struct Simd {
   static Mask less_equal(Vec a, Vec b) { return _mm256_cmp_pd(a, b, _CMP_LE_OQ); }
   static Mask differs(Vec a, Vec b) { return _mm256_cmp_pd(a, b, _CMP_NEQ_UQ); }
   static Mask unordered(Vec v) { return _mm256_cmp_pd(v, v, _CMP_UNORD_Q); }
+  static Mask both(Mask a, Mask b) { return _mm256_and_pd(a, b); }
   static Mask either(Mask a, Mask b) { return _mm256_or_pd(a, b); }
   static Mask negate_mask(Mask m) { return _mm256_xor_pd(m, always()); }
   static Mask always() { return _mm256_castsi256_pd(_mm256_set1_epi32(-1)); }
@@ -86,6 +87,7 @@ struct Simd {
   static Mask less_equal(Vec a, Vec b) { return _mm256_cmp_ps(a, b, _CMP_LE_OQ); }
   static Mask differs(Vec a, Vec b) { return _mm256_cmp_ps(a, b, _CMP_NEQ_UQ); }
   static Mask unordered(Vec v) { return _mm256_cmp_ps(v, v, _CMP_UNORD_Q); }
+  static Mask both(Mask a, Mask b) { return _mm256_and_ps(a, b); }
   static Mask either(Mask a, Mask b) { return _mm256_or_ps(a, b); }
   static Mask negate_mask(Mask m) { return _mm256_xor_ps(m, always()); }
   static Mask always() { return _mm256_castsi256_ps(_mm256_set1_epi32(-1)); }

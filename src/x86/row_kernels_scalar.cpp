@@ -23,6 +23,7 @@ struct Simd {
   static Mask less_equal(Vec a, Vec b) { return a <= b; }
   static Mask differs(Vec a, Vec b) { return a != b; }
   static Mask unordered(Vec v) { return v != v; }
+  static Mask both(Mask a, Mask b) { return a && b; }
   static Mask either(Mask a, Mask b) { return a || b; }
   static Mask negate_mask(Mask m) { return !m; }
   static Mask always() { return true; }

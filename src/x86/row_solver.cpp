@@ -45,11 +45,15 @@ void wait_until(Condition condition) {
 /// passes and iterations and taken in order, so that whoever holds one only ever waits for lower
 /// ones, which are held by running threads or done.
 struct RowSolver::Program {
+  struct Pass {
+    RowSweep sweep;
+    const Ticket* tickets;
+    std::uint64_t ticket_count;
+  };
+
   RowArrays arrays;
-  RowSweep passes[2] = {};
-  std::uint64_t pass_count = 0;
-  const Ticket* tickets = nullptr;
-  std::uint64_t ticket_count = 0;
+  Pass passes[3];
+  std::size_t pass_count = 0;
   std::uint64_t iterations = 0;        ///< with the serial rows
   std::uint64_t block_iterations = 0;  ///< with the blocks
   SerialRows* serial = nullptr;
@@ -61,7 +65,12 @@ struct RowSolver::Program {
   /// The serial rows are one ticket, the first.
   std::uint64_t serial_tickets() const { return serial == nullptr ? 0 : 1; }
   std::uint64_t tickets_an_iteration() const {
-    return serial_tickets() + pass_count * ticket_count;
+    std::uint64_t count = serial_tickets();
+    for (std::size_t i = 0; i < pass_count; ++i) count += passes[i].ticket_count;
+    return count;
+  }
+  void add(RowSweep sweep, const Ticket* list, std::uint64_t count) {
+    passes[pass_count++] = {sweep, list, count};
   }
 
   void join() {
@@ -92,11 +101,11 @@ struct RowSolver::Program {
     }
   }
   void run_blocks(std::uint64_t start, std::uint64_t number, RowResidual* residual) {
-    const std::uint64_t pass = (number - start) / ticket_count;
-    const Ticket& ticket = tickets[(number - start) % ticket_count];
-    const std::uint64_t after = start + pass * ticket_count + ticket.after;
-    wait_until([&] { return done.load(std::memory_order_acquire) >= after; });
-    passes[pass](arrays, ticket.first, ticket.last, residual);
+    const Pass* pass = passes;
+    for (; number - start >= pass->ticket_count; ++pass) start += pass->ticket_count;
+    const Ticket& ticket = pass->tickets[number - start];
+    wait_until([&] { return done.load(std::memory_order_acquire) >= start + ticket.after; });
+    pass->sweep(arrays, ticket.first, ticket.last, residual);
   }
   bool is_last(std::uint64_t iteration) const {
     return iteration + 1 == iterations ||
@@ -135,7 +144,9 @@ void RowSolver::resize_bodies(std::size_t count) {
 
 // A contact's level is one more than the highest of those before it that move one of its bodies.
 // Rows of a level are independent, and level by level is an order that keeps each body's.
-void RowSolver::schedule(std::span<const RowPair> pairs) {
+void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t directions) {
+  directions_ = directions;
+  torsion_choice_.count = torsion_choice_.ticket_count = 0;
   const auto slot = [](std::int32_t id) { return static_cast<std::size_t>(id); };
   const std::uint32_t lanes = kernels_.lanes;
   contact_level_.reserve(pairs.size(), "contacts of a solver");
@@ -166,7 +177,7 @@ void RowSolver::schedule(std::span<const RowPair> pairs) {
   order_.reserve(places, "contacts of a solver");
   ids_.reserve(2 * places, "contacts of a solver");
   contacts_.reserve(places * rows::kContactFields, "rows of a solver");
-  frictions_.reserve(places * rows::kFrictionFields, "rows of a solver");
+  frictions_.reserve(places * directions * rows::kFrictionFields, "rows of a solver");
   std::fill_n(order_.data(), places, kNoContact);
   std::fill_n(ids_.data(), 2 * places, rows::kFixedBody);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -217,36 +228,26 @@ unsigned RowSolver::set_up_contacts(const rows::RowSettings& settings, std::uint
                                   contact_rows(block), friction_rows(block), second);
 }
 void RowSolver::set_up_frictions(const rows::RowSettings& settings, std::uint32_t block,
-                                 const Real* inputs) {
+                                 std::uint32_t direction, const Real* inputs) {
   kernels_.set_up_frictions(settings, inputs, bodies_.data(),
                             ids_.data() + std::size_t{block} * 2 * kernels_.lanes,
-                            friction_rows(block));
-}
-
-/// Most contacts are not deep enough to be pushed apart: only blocks with one that is are swept.
-std::uint64_t RowSolver::find_pushes() {
-  push_blocks_.reserve(blocks_, "rows of a solver");
-  push_level_end_.reserve(levels_, "rows of a solver");
-  push_blocks_count_ = 0;
-  std::uint64_t pushing = 0;
-  std::uint32_t block = 0, levels = 0;
-  for (std::uint32_t level = 0; level < levels_; ++level) {
-    const std::uint32_t before = push_blocks_count_;
-    for (; block < level_end_[level]; ++block) {
-      const Real* rhs = contact_rows(block) + std::size_t{rows::kRowPushRhs} * kernels_.lanes;
-      const auto here = std::count_if(rhs, rhs + kernels_.lanes, [](Real r) { return r != 0; });
-      if (here > 0) push_blocks_[push_blocks_count_++] = block;
-      pushing += static_cast<std::uint64_t>(here);
-    }
-    if (push_blocks_count_ > before) push_level_end_[levels++] = push_blocks_count_;
-  }
-  make_tickets({push_level_end_.data(), levels}, &push_tickets_, &push_ticket_count_);
-  return pushing;
+                            friction_rows(block, direction));
 }
 
 RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_factors) {
   const std::size_t factors = with_factors ? 1 : 0;
-  const std::uint64_t pushing = settings.push ? find_pushes() : 0;
+  std::uint64_t pushing = 0;
+  if (settings.push) {
+    // Most contacts are not deep enough to be pushed apart: only blocks with one that is are swept.
+    choose(
+        [&](std::uint32_t block) {
+          const Real* rhs = contact_rows(block) + std::size_t{rows::kRowPushRhs} * kernels_.lanes;
+          const auto here = std::count_if(rhs, rhs + kernels_.lanes, [](Real r) { return r != 0; });
+          pushing += static_cast<std::uint64_t>(here);
+          return here > 0;
+        },
+        &push_choice_);
+  }
   const auto iterations =
       static_cast<std::size_t>(std::max({settings.iterations, settings.serial_iterations, 0}));
   const auto block_iterations = static_cast<std::size_t>(std::max(settings.iterations, 0));
@@ -262,34 +263,33 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
                    .factors = with_factors ? factors_.data() : nullptr,
                    .contacts = contacts_.data(),
                    .frictions = frictions_.data(),
-                   .push_blocks = push_blocks_.data()};
+                   .directions = directions_,
+                   .push_blocks = push_choice_.blocks.data(),
+                   .torsion_blocks = torsion_choice_.blocks.data(),
+                   .torsions = torsions_.data()};
   Program warm, push, main;
   for (Program* program : {&warm, &push, &main}) {
     program->arrays = arrays;
-    program->pass_count = 1;
-    program->tickets = tickets_.data();
-    program->ticket_count = ticket_count_;
     program->iterations = program->block_iterations = block_iterations;
     program->threshold = settings.threshold;
   }
-  warm.passes[0] = kernels_.warm_starts[factors];
+  warm.add(kernels_.warm_starts[factors], tickets_.data(), ticket_count_);
   warm.iterations = settings.warm_start ? 1 : 0;
   warm.residuals = residuals_.get() + 2 * iterations;
-  push.passes[0] = kernels_.pushes[factors];
-  push.tickets = push_tickets_.data();
-  push.ticket_count = push_ticket_count_;
+  push.add(kernels_.pushes[factors], push_choice_.tickets.data(), push_choice_.ticket_count);
   push.iterations = pushing > 0 ? block_iterations : 0;
   push.residuals = residuals_.get() + iterations;
   main.residuals = residuals_.get();
   main.iterations = iterations;
   main.serial = settings.serial;
   if (settings.interleave) {
-    main.passes[0] = kernels_.both[factors];
+    main.add(kernels_.both[factors], tickets_.data(), ticket_count_);
   } else {
-    main.passes[0] = kernels_.contacts[factors];
-    main.passes[1] = kernels_.frictions[factors];
-    main.pass_count = 2;
+    main.add(kernels_.contacts[factors], tickets_.data(), ticket_count_);
+    main.add(kernels_.frictions[factors], tickets_.data(), ticket_count_);
   }
+  main.add(kernels_.torsions[factors], torsion_choice_.tickets.data(),
+           torsion_choice_.ticket_count);
   pool_.run(std::clamp(blocks_ / kBlocksPerThread, 1u, pool_.threads()), [&](std::size_t) {
     warm.join();
     push.join();

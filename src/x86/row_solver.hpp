@@ -62,8 +62,9 @@ class JFPX_API RowSolver {
   Real* push(std::size_t i) { return pushes_.data() + i * rows::kVelocityFields; }
   Real* factors(std::size_t i) { return factors_.data() + i * rows::kFactorFields; }
 
-  /// Arranges the contacts, given in their serial order, in blocks.
-  void schedule(std::span<const RowPair> pairs);
+  /// Arranges the contacts, given in their serial order, in blocks. No block has torsions then.
+  /// @param directions of friction: 1 or 2
+  void schedule(std::span<const RowPair> pairs, std::uint32_t directions);
   std::uint32_t blocks() const noexcept { return blocks_; }
   /// Which contact is in a lane; kNoContact in lanes that are left over.
   static constexpr std::uint32_t kNoContact = UINT32_MAX;
@@ -73,14 +74,34 @@ class JFPX_API RowSolver {
   Real* contact_rows(std::uint32_t block) {
     return contacts_.data() + std::size_t{block} * kernels_.lanes * rows::kContactFields;
   }
-  Real* friction_rows(std::uint32_t block) {
-    return frictions_.data() + std::size_t{block} * kernels_.lanes * rows::kFrictionFields;
+  /// The rows of one of the directions of friction.
+  Real* friction_rows(std::uint32_t block, std::uint32_t direction = 0) {
+    return frictions_.data() +
+           (std::size_t{block} * directions_ + direction) * kernels_.lanes * rows::kFrictionFields;
+  }
+
+  /// Chooses the blocks that have rows against rolling or spinning, for which has(block); no other
+  /// is looked at later.
+  template <class Has>
+  void choose_torsions(const Has& has) {
+    choose(has, &torsion_choice_);
+    torsions_.reserve(
+        std::size_t{torsion_choice_.count} * kTorsions * kernels_.lanes * rows::kFrictionFields,
+        "rows of a solver");
+  }
+  std::span<const std::uint32_t> torsion_blocks() const {
+    return {torsion_choice_.blocks.data(), torsion_choice_.count};
+  }
+  /// Rows of the k-th of those blocks; t is below kTorsions.
+  Real* torsion_rows(std::size_t k, std::uint32_t t) {
+    return torsions_.data() + (k * kTorsions + t) * kernels_.lanes * rows::kFrictionFields;
   }
 
   /// Sets up the contact rows of a block from its inputs. Safe for different blocks at once.
   unsigned set_up_contacts(const rows::RowSettings& settings, std::uint32_t block,
                            const Real* inputs, Real* second);
-  void set_up_frictions(const rows::RowSettings& settings, std::uint32_t block, const Real* inputs);
+  void set_up_frictions(const rows::RowSettings& settings, std::uint32_t block,
+                        std::uint32_t direction, const Real* inputs);
 
   /// @param factors whether some body has a linear or angular factor other than 1
   RowSweepReport solve(const RowSweepSettings& settings, bool factors);
@@ -91,22 +112,41 @@ class JFPX_API RowSolver {
     std::uint32_t first, last, after;
   };
   struct Program;
+  /// Some of the blocks, in order.
+  struct Choice {
+    Buffer<std::uint32_t> blocks, level_ends;
+    Buffer<Ticket> tickets;
+    std::uint32_t count = 0, ticket_count = 0;
+  };
 
+  template <class Has>
+  void choose(const Has& has, Choice* choice) {
+    choice->blocks.reserve(blocks_, "rows of a solver");
+    choice->level_ends.reserve(levels_, "rows of a solver");
+    choice->count = 0;
+    std::uint32_t block = 0, levels = 0;
+    for (std::uint32_t level = 0; level < levels_; ++level) {
+      const std::uint32_t before = choice->count;
+      for (; block < level_end_[level]; ++block) {
+        if (has(block)) choice->blocks[choice->count++] = block;
+      }
+      if (choice->count > before) choice->level_ends[levels++] = choice->count;
+    }
+    make_tickets({choice->level_ends.data(), levels}, &choice->tickets, &choice->ticket_count);
+  }
   void make_tickets(std::span<const std::uint32_t> level_ends, Buffer<Ticket>* tickets,
                     std::uint32_t* count);
-  std::uint64_t find_pushes();
 
   const RowKernels& kernels_;
   ThreadPool pool_;
-  std::uint32_t blocks_ = 0, push_blocks_count_ = 0;
-  std::uint32_t ticket_count_ = 0, push_ticket_count_ = 0;
+  std::uint32_t blocks_ = 0, directions_ = 1, ticket_count_ = 0;
   std::size_t body_count_ = 0;
   std::uint32_t levels_ = 0;
-  Buffer<Real> bodies_, velocities_, pushes_, factors_, contacts_, frictions_;
+  Buffer<Real> bodies_, velocities_, pushes_, factors_, contacts_, frictions_, torsions_;
   Buffer<std::int32_t> ids_;
   Buffer<std::uint32_t> order_, body_level_, contact_level_, level_count_, level_end_;
-  Buffer<std::uint32_t> push_blocks_, push_level_end_;
-  Buffer<Ticket> tickets_, push_tickets_;
+  Buffer<Ticket> tickets_;
+  Choice push_choice_, torsion_choice_;
   std::unique_ptr<std::atomic<Real>[]> residuals_;
   std::size_t residual_capacity_ = 0;
 };

@@ -103,8 +103,7 @@ SolverWorld make_solver_world(std::uint64_t seed) {
   SolverWorld world;
   world.base = make_random_world(seed);
   Random random(seed ^ 0x5eed'501e'0000'0001ull);
-  // Rolling friction has its own rows, and is left to Bullet: seldom interesting.
-  if (chance(random, Real(0.85))) {
+  if (chance(random, Real(0.5))) {
     for (RandomBody& body : world.base.bodies) body.rolling = 0;
   }
   if (chance(random, Real(0.25))) add_heap(random, &world.base);

@@ -21,13 +21,12 @@ struct ConstraintSolverOptions {
 /// Why a group was left to Bullet's own code.
 enum class SolverFallback : std::uint8_t {
   small,        ///< fewer manifolds than the minimum
-  mode,         ///< random order, two directions of friction or cached ones; no iterations
+  mode,         ///< random order or cached directions of friction; no iterations
   row_solver,   ///< the user has set a row solver
   constraints,  ///< a constraint of a class that is not Bullet's
-  rolling,      ///< a contact with rolling friction
   not_finite,   ///< something left the finite numbers: done again by Bullet, for its NaNs
 };
-inline constexpr std::size_t kSolverFallbacks = 6;
+inline constexpr std::size_t kSolverFallbacks = 5;
 
 struct ConstraintSolverStats {
   std::uint64_t groups = 0;                                 ///< solved by jfpx
