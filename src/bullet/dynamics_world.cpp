@@ -29,7 +29,7 @@ struct DynamicsWorld::Impl {
   x86::ThreadPool pool;
   IslandSolver islands;
 
-  explicit Impl(unsigned threads) : pool(threads) {}
+  explicit Impl(unsigned threads) : pool(threads), islands(pool) {}
 
   /// Calls run(bodies, count) for all parts of the array, at once.
   template <class Run>

@@ -2,12 +2,18 @@
 /// Bullet 3.24 step by step; see the header.
 #include "src/bullet/islands.hpp"
 
+#include <jfpx/bullet/dispatcher.hpp>
+
 #include "src/bullet/prefetch.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <LinearMath/btQuickprof.h>
+
+#include <algorithm>
+#include <atomic>
+#include <typeinfo>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
@@ -33,6 +39,27 @@ void wake(const btCollisionObject& kinematic, const btCollisionObject& other) {
   if (kinematic.isKinematicObject() && kinematic.getActivationState() != ISLAND_SLEEPING &&
       kinematic.hasContactResponse()) {
     other.activate();
+  }
+}
+
+/// Whether the manifold is one that islands are solved with. `kinematic` becomes true if that may
+/// depend on whom kinematic objects have woken.
+bool is_wanted(btDispatcher& dispatcher, const btPersistentManifold& manifold, bool only_touching,
+               bool* kinematic) {
+  if (only_touching && manifold.getNumContacts() == 0) return false;
+  const btCollisionObject &a = *manifold.getBody0(), &b = *manifold.getBody1();
+  if (a.isKinematicObject() || b.isKinematicObject()) *kinematic = true;
+  if (a.getActivationState() == ISLAND_SLEEPING && b.getActivationState() == ISLAND_SLEEPING) {
+    return false;
+  }
+  return dispatcher.needsResponse(&a, &b);
+}
+
+void prefetch_manifold(btPersistentManifold* const* manifolds, int i, int count) {
+  if (i + 2 * kManifoldsAhead < count) prefetch_header(manifolds[i + 2 * kManifoldsAhead]);
+  if (i + kManifoldsAhead < count) {
+    prefetch_island_state(manifolds[i + kManifoldsAhead]->getBody0());
+    prefetch_island_state(manifolds[i + kManifoldsAhead]->getBody1());
   }
 }
 
@@ -127,20 +154,18 @@ void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& un
   }
 }
 
-/// Lists the manifolds that islands are solved with, and what they are sorted by.
+/// Lists the manifolds that islands are solved with, and their islands.
 void IslandSolver::collect_manifolds(btCollisionWorld& world) {
   btDispatcher& dispatcher = *world.getDispatcher();
   const bool only_touching = world.getDispatchInfo().m_deterministicOverlappingPairs;
   const int count = dispatcher.getNumManifolds();
+  found_.reserve(static_cast<std::size_t>(count), "manifolds of islands");
+  found_island_.reserve(static_cast<std::size_t>(count), "manifolds of islands");
+  if (collect_at_once(dispatcher, only_touching)) return;
   btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();
-  keys_.resizeNoInitialize(0);
-  keys_.reserve(count);
+  count_ = 0;
   for (int i = 0; i < count; ++i) {
-    if (i + 2 * kManifoldsAhead < count) prefetch_header(manifolds[i + 2 * kManifoldsAhead]);
-    if (i + kManifoldsAhead < count) {
-      prefetch_island_state(manifolds[i + kManifoldsAhead]->getBody0());
-      prefetch_island_state(manifolds[i + kManifoldsAhead]->getBody1());
-    }
+    prefetch_manifold(manifolds, i, count);
     btPersistentManifold* manifold = manifolds[i];
     if (only_touching && manifold->getNumContacts() == 0) continue;
     const btCollisionObject &a = *manifold->getBody0(), &b = *manifold->getBody1();
@@ -150,27 +175,75 @@ void IslandSolver::collect_manifolds(btCollisionWorld& world) {
     wake(a, b);
     wake(b, a);
     if (!dispatcher.needsResponse(&a, &b)) continue;
-    Key& key = keys_.expandNonInitializing();
-    key = {island_of(a, b), 0, 0, manifold};
-    if (only_touching) {
-      key.uid0 = a.getBroadphaseHandle()->m_uniqueId;
-      key.uid1 = b.getBroadphaseHandle()->m_uniqueId;
-    }
+    const auto at = static_cast<std::size_t>(count_++);
+    found_[at] = manifold;
+    found_island_[at] = island_of(a, b);
   }
+}
+
+/// The same on all threads, in chunks. Not where kinematic objects wake others, nor with a
+/// dispatcher of the user's, who may not expect to be asked from several threads.
+bool IslandSolver::collect_at_once(btDispatcher& dispatcher, bool only_touching) {
+  const std::type_info& type = typeid(dispatcher);
+  if (type != typeid(btCollisionDispatcher) && type != typeid(CollisionDispatcher)) return false;
+  constexpr int kChunk = 4096;
+  const int count = dispatcher.getNumManifolds();
+  const int chunks = (count + kChunk - 1) / kChunk;
+  btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();
+  chunk_counts_.assign(static_cast<std::size_t>(chunks), 0);
+  std::atomic<bool> kinematic{false};
+  pool_.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
+    const int first = static_cast<int>(chunk) * kChunk, last = std::min(count, first + kChunk);
+    bool seen = false;
+    int next = first;
+    for (int i = first; i < last; ++i) {
+      prefetch_manifold(manifolds, i, last);
+      if (!is_wanted(dispatcher, *manifolds[i], only_touching, &seen)) continue;
+      const auto at = static_cast<std::size_t>(next++);
+      found_[at] = manifolds[i];
+      found_island_[at] = island_of(*manifolds[i]->getBody0(), *manifolds[i]->getBody1());
+    }
+    chunk_counts_[chunk] = next - first;
+    if (seen) kinematic.store(true, std::memory_order_relaxed);
+  });
+  if (kinematic) return false;
+  count_ = 0;
+  for (int chunk = 0; chunk < chunks; ++chunk) {
+    const int size = chunk_counts_[static_cast<std::size_t>(chunk)];
+    std::copy_n(found_.data() + chunk * kChunk, size, found_.data() + count_);
+    std::copy_n(found_island_.data() + chunk * kChunk, size, found_island_.data() + count_);
+    count_ += size;
+  }
+  return true;
+}
+
+/// Bullet's sort is not stable: the order is that of this very sort, on keys that compare alike.
+void IslandSolver::sort_manifolds(bool by_pair) {
+  keys_.resizeNoInitialize(count_);
+  if (!by_pair) {
+    for (int i = 0; i < count_; ++i) {
+      keys_[i] = {found_island_[static_cast<std::size_t>(i)], i};
+    }
+    keys_.quickSort([](const IslandKey& l, const IslandKey& r) { return l.island < r.island; });
+    return;
+  }
+  pair_keys_.resizeNoInitialize(count_);
+  for (int i = 0; i < count_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    pair_keys_[i] = {found_island_[at], found_[at]->getBody0()->getBroadphaseHandle()->m_uniqueId,
+                     found_[at]->getBody1()->getBroadphaseHandle()->m_uniqueId, i};
+  }
+  pair_keys_.quickSort([](const PairKey& l, const PairKey& r) {
+    if (l.island != r.island) return l.island < r.island;
+    return l.uid0 != r.uid0 ? l.uid0 < r.uid0 : l.uid1 < r.uid1;
+  });
+  for (int i = 0; i < count_; ++i) keys_[i] = {pair_keys_[i].island, pair_keys_[i].index};
 }
 
 void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
                                btConstraintSolver& solver, const btContactSolverInfo& info,
                                btTypedConstraint** constraints, int constraint_count) {
-  // Bullet's sort is not stable: the order is that of this very sort, on keys that compare alike.
-  if (world.getDispatchInfo().m_deterministicOverlappingPairs) {
-    keys_.quickSort([](const Key& l, const Key& r) {
-      if (l.island != r.island) return l.island < r.island;
-      return l.uid0 != r.uid0 ? l.uid0 < r.uid0 : l.uid1 < r.uid1;
-    });
-  } else {
-    keys_.quickSort([](const Key& l, const Key& r) { return l.island < r.island; });
-  }
+  sort_manifolds(world.getDispatchInfo().m_deterministicOverlappingPairs);
   const btCollisionObjectArray& objects = world.getCollisionObjectArray();
   const auto solve_group = [&] {
     solver.solveGroup(bodies_.data(), static_cast<int>(bodies_.size()), manifolds_.data(),
@@ -197,7 +270,9 @@ void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
       bodies_.resize(bodies_before);
       continue;
     }
-    for (int k = first_key; k < key; ++k) manifolds_.push_back(keys_[k].manifold);
+    for (int k = first_key; k < key; ++k) {
+      manifolds_.push_back(found_[static_cast<std::size_t>(keys_[k].index)]);
+    }
     while (joint < constraint_count && island_of(*constraints[joint]) < island) ++joint;
     for (; joint < constraint_count && island_of(*constraints[joint]) == island; ++joint) {
       constraints_.push_back(constraints[joint]);
