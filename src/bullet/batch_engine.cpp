@@ -6,6 +6,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/bullet/pair_check.hpp"
+#include "src/bullet/prefetch.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 #include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
@@ -34,6 +35,11 @@ std::span<const btBroadphasePair> pairs_of(btOverlappingPairCache& cache) {
   // Bullet asserts when an empty cache is asked for its array.
   if (n <= 0) return {};
   return {cache.getOverlappingPairArrayPtr(), static_cast<std::size_t>(n)};
+}
+
+std::string text_of(const std::exception& error) {
+  const std::string text = error.what();
+  return text.empty() ? "unknown" : text;
 }
 
 /// Sets a flag for the time of a dispatch, also when a callback throws.
@@ -72,7 +78,7 @@ BatchEngine::BatchEngine(std::unique_ptr<SphereCollider> collider, const Dispatc
 Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatcher,
                                           std::size_t pairs, const btDispatcherInfo& info) const {
   if (running_) return Fallback::nested;
-  if (!stats_.failure.empty()) return Fallback::collider_failed;
+  if (given_up_) return Fallback::collider_failed;
   if (pairs == 0 || pairs < minimum_batch_) return Fallback::small_batch;
   if (dispatcher.getNearCallback() != btNearCallback(btCollisionDispatcher::defaultNearCallback)) {
     return Fallback::near_callback;
@@ -83,7 +89,7 @@ Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatche
 }
 
 /// Everything before the commit, and all that may throw. False and `*fallback` set if there is
-/// nothing to do or the collider failed.
+/// nothing to do or something failed that x86 needs too.
 bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                           btOverlappingPairCache& cache, Fallback* fallback) {
   try {
@@ -91,8 +97,7 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
       *fallback = Fallback::no_spheres;
       return false;
     }
-    results_ = collider_->test_pairs(batch_.spheres(), batch_.pairs());
-    if (const auto why = collider_->device_failure(); !why.empty()) stats_.device_failure = why;
+    test_pairs();
     // A cache of another class may show its user more of the walk than the pairs.
     quiet_ = typeid(cache) == typeid(btHashedOverlappingPairCache) &&
              is_quiet(batch_, traits.may_override_filter);
@@ -103,10 +108,23 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
     }
     return true;
   } catch (const std::exception& error) {
-    stats_.failure = error.what();
-    if (stats_.failure.empty()) stats_.failure = "unknown";
+    stats_.failure = text_of(error);
+    given_up_ = true;
     *fallback = Fallback::collider_failed;
     return false;
+  }
+}
+
+/// If the collider fails, for example because its device is lost, x86 takes over for good.
+void BatchEngine::test_pairs() {
+  try {
+    results_ = collider_->test_pairs(batch_.spheres(), batch_.pairs());
+    if (const auto why = collider_->device_failure(); !why.empty()) stats_.device_failure = why;
+  } catch (const std::exception& error) {
+    if (!stats_.device_failure.empty()) throw;
+    stats_.device_failure = text_of(error);
+    collider_ = make_sphere_collider({.backend = Backend::x86, .threads = pool_.threads()});
+    results_ = collider_->test_pairs(batch_.spheres(), batch_.pairs());
   }
 }
 
@@ -156,13 +174,7 @@ void BatchEngine::commit_quietly(btCollisionDispatcher& dispatcher, btOverlappin
   const std::size_t n = pairs_.size();
   add(quiet_commit_.run(dispatcher, batch_, results_, pool_));
   quiet_commit_.sort_left(pairs_, info.m_deterministicOverlappingPairs);
-  // The array may grow, and move, while Bullet's algorithms run.
-  const auto visit = [&](std::size_t i) {
-    if (i >= pairs_of(cache).size()) return;
-    (*dispatcher.getNearCallback())(cache.getOverlappingPairArrayPtr()[i], dispatcher, info);
-  };
-  for (const std::uint32_t i : quiet_commit_.left()) visit(i);
-  for (std::size_t i = n; i < pairs_of(cache).size(); ++i) visit(i);
+  visit_left(dispatcher, cache, info);
   if (!verify_) return;
   for (std::size_t i = 0; i < n; ++i) {
     if (batch_.kind(i) != PairKind::spheres || !batch_.both_are_spheres(i)) continue;
@@ -170,10 +182,36 @@ void BatchEngine::commit_quietly(btCollisionDispatcher& dispatcher, btOverlappin
   }
 }
 
+void BatchEngine::visit_left(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                             const btDispatcherInfo& info) {
+  constexpr std::size_t kAhead = 4;
+  const std::span<const std::uint32_t> left = quiet_commit_.left();
+  const std::size_t n = pairs_.size();
+  // The array may grow, and move, while Bullet's algorithms run.
+  const auto visit = [&](std::size_t i) {
+    if (i >= pairs_of(cache).size()) return;
+    (*dispatcher.getNearCallback())(cache.getOverlappingPairArrayPtr()[i], dispatcher, info);
+  };
+  for (std::size_t k = 0; k < left.size(); ++k) {
+    if (k + kAhead < left.size()) {
+      const std::size_t i = left[k + kAhead];
+      prefetch_for_contact(*batch_.body_a(i));
+      prefetch_for_contact(*batch_.body_b(i));
+      if (batch_.manifold(i) != nullptr) {
+        prefetch_count(batch_.manifold(i));
+        prefetch_first_point(batch_.manifold(i));
+      }
+    }
+    visit(left[k]);
+  }
+  for (std::size_t i = n; i < pairs_of(cache).size(); ++i) visit(i);
+}
+
 void BatchEngine::add(const CommitCounts& counts) {
   stats_.sphere_pairs += counts.sphere_pairs;
   stats_.touching += counts.touching;
   stats_.written += counts.written;
+  stats_.sphere_boxes += counts.sphere_boxes;
 }
 
 void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info,

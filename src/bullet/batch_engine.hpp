@@ -46,10 +46,13 @@ class JFPX_API BatchEngine {
                                const btDispatcherInfo& info) const;
   bool prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                btOverlappingPairCache& cache, Fallback* fallback);
+  void test_pairs();
   void commit(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
               const btDispatcherInfo& info, btDispatcher* argument);
   void commit_quietly(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
                       const btDispatcherInfo& info);
+  void visit_left(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                  const btDispatcherInfo& info);
   void add(const CommitCounts& counts);
   void check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info, std::size_t i,
              bool current);
@@ -58,6 +61,7 @@ class JFPX_API BatchEngine {
   std::size_t minimum_batch_;
   bool verify_;
   bool running_ = false;
+  bool given_up_ = false;
   x86::ThreadPool pool_;
   SphereBatch batch_;
   QuietCommit quiet_commit_;

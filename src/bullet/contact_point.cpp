@@ -1,10 +1,14 @@
 /// The flat form of btManifoldResult::addContactPoint for two spheres (btManifoldResult.cpp of
-/// Bullet 3.24). Bullet's inline functions do the vector arithmetic, so the operations are
-/// Bullet's.
+/// Bullet 3.24), and of btConvexConvexAlgorithm for a sphere and a box. Bullet's inline functions
+/// do the vector arithmetic, so the operations are Bullet's.
 #include "src/bullet/contact_point.hpp"
 
+#include "src/bullet/sphere_box.hpp"
+
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
+#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionShapes/btConvexInternalShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
 
 #include <new>
@@ -40,7 +44,11 @@ bool contacts_are_heard() {
          gCalculateCombinedRollingFrictionCallback !=
              &btManifoldResult::calculateCombinedRollingFriction ||
          gCalculateCombinedSpinningFrictionCallback !=
-             &btManifoldResult::calculateCombinedSpinningFriction;
+             &btManifoldResult::calculateCombinedSpinningFriction ||
+         gCalculateCombinedContactDampingCallback !=
+             &btManifoldResult::calculateCombinedContactDamping ||
+         gCalculateCombinedContactStiffnessCallback !=
+             &btManifoldResult::calculateCombinedContactStiffness;
 }
 
 bool is_plain(const btPersistentManifold& manifold, const btCollisionObject& body_a,
@@ -74,6 +82,35 @@ void write_contact(btPersistentManifold* manifold, const PairResult& result,
   point->m_positionWorldOnB = on_b;
   combine_materials(body_a, body_b, point);
   btPlaneSpace1(normal, point->m_lateralFrictionDir1, point->m_lateralFrictionDir2);
+}
+
+bool update_sphere_box(btPersistentManifold* manifold, const btCollisionObject& body_a,
+                       const btCollisionObject& body_b, bool sphere_first) {
+  const auto* shape_a = static_cast<const btConvexInternalShape*>(body_a.getCollisionShape());
+  const auto* shape_b = static_cast<const btConvexInternalShape*>(body_b.getCollisionShape());
+  const btConvexInternalShape* box = sphere_first ? shape_b : shape_a;
+  SphereBoxInput input = {.pose_a = body_a.getWorldTransform(),
+                          .pose_b = body_b.getWorldTransform(),
+                          .margin_a = shape_a->getMargin(),
+                          .margin_b = shape_b->getMargin(),
+                          .core = box->getImplicitShapeDimensions(),
+                          .sphere_first = sphere_first,
+                          .maximum_distance_squared = 0};
+  const btScalar reach = input.margin_a + input.margin_b + manifold->getContactBreakingThreshold();
+  input.maximum_distance_squared = reach * reach;
+  SphereBoxContact contact;
+  const SphereBoxAnswer answer = find_closest_points(input, &contact);
+  if (answer == SphereBoxAnswer::unknown) return false;
+  if (answer == SphereBoxAnswer::apart && manifold->getNumContacts() == 0) return true;
+  const btCollisionObjectWrapper a(nullptr, shape_a, &body_a, input.pose_a, -1, -1);
+  const btCollisionObjectWrapper b(nullptr, shape_b, &body_b, input.pose_b, -1, -1);
+  btManifoldResult result(&a, &b);
+  result.setPersistentManifold(manifold);
+  if (answer == SphereBoxAnswer::contact) {
+    result.addContactPoint(contact.normal_on_b, contact.point_on_b, contact.distance);
+  }
+  result.refreshContactPoints();
+  return true;
 }
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

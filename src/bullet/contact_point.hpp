@@ -1,4 +1,4 @@
-/// Writes the manifold of two spheres as btSphereSphereCollisionAlgorithm would, without it.
+/// Brings manifolds up to date as Bullet's algorithms would, without them.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -9,7 +9,7 @@ class btPersistentManifold;
 namespace jfpx::inline JFPX_ABI::bullet {
 
 /// Whether a global callback would be called for a contact of two spheres, gContactAddedCallback
-/// aside, or a user's function would combine their materials.
+/// aside, or a user's function may combine the materials of any contact.
 bool contacts_are_heard();
 
 /// Whether write_contact() does all that Bullet would do, given that nobody hears it: the materials
@@ -21,5 +21,12 @@ bool is_plain(const btPersistentManifold& manifold, const btCollisionObject& bod
 /// bits that Bullet would give it. `radius_b` is the radius of body b's sphere.
 void write_contact(btPersistentManifold* manifold, const PairResult& result,
                    const btCollisionObject& body_a, const btCollisionObject& body_b, Real radius_b);
+
+/// Brings the manifold of a sphere and a box up to date, in this order or the other, as
+/// btConvexConvexAlgorithm without perturbation would. The shapes are exactly btSphereShape and
+/// btBoxShape.
+/// @return false if that takes Bullet's penetration depth solver: nothing was done.
+bool update_sphere_box(btPersistentManifold* manifold, const btCollisionObject& body_a,
+                       const btCollisionObject& body_b, bool sphere_first);
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

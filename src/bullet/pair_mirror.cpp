@@ -3,6 +3,7 @@
 
 #include "src/bullet/prefetch.hpp"
 
+#include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
 
 #include <algorithm>
@@ -18,6 +19,28 @@ constexpr std::size_t kAhead = 16;
 struct AlgorithmFields : btCollisionAlgorithm {
   static constexpr auto dispatcher = &AlgorithmFields::m_dispatcher;
 };
+
+/// A private member, reached in the one way that the language has: an explicit instantiation may
+/// name it. The algorithm keeps the number that its configuration had when it was made.
+struct PerturbationTag {
+  friend int btConvexConvexAlgorithm::*member_of(PerturbationTag);
+};
+template <class Tag, int btConvexConvexAlgorithm::*Member>
+struct Reveal {
+  friend int btConvexConvexAlgorithm::*member_of(Tag) { return Member; }
+};
+template struct Reveal<PerturbationTag, &btConvexConvexAlgorithm::m_numPerturbationIterations>;
+
+/// The manifold of an algorithm of exactly this class, which is known not to override the function,
+/// so that it inlines; null if it has none of its own.
+template <class Algorithm>
+btPersistentManifold* manifold_of(btCollisionAlgorithm* algorithm) {
+  btPersistentManifold* room[1];
+  btManifoldArray found;
+  found.initializeFromBuffer(room, 0, 1);
+  static_cast<Algorithm*>(algorithm)->Algorithm::getAllContactManifolds(found);
+  return found.size() == 1 ? found[0] : nullptr;
+}
 
 std::uint64_t hash_of(const btPersistentManifold* manifold) {
   return reinterpret_cast<std::uintptr_t>(manifold) * 0x9e3779b97f4a7c15u;
@@ -91,18 +114,21 @@ std::size_t PairMirror::find_changed(std::span<const btBroadphasePair> pairs, st
 }
 
 PairMirror::Link PairMirror::read_link(btCollisionAlgorithm* algorithm, const PairOwner& owner) {
-  if (algorithm == nullptr || &typeid(*algorithm) != &typeid(btSphereSphereCollisionAlgorithm)) {
-    return {};
+  if (algorithm == nullptr) return {};
+  const std::type_info* type = &typeid(*algorithm);
+  Link link;
+  if (type == &typeid(btSphereSphereCollisionAlgorithm)) {
+    link.manifold = manifold_of<btSphereSphereCollisionAlgorithm>(algorithm);
+    link.kind = PairKind::spheres;
+  } else if (type == &typeid(btConvexConvexAlgorithm)) {
+    auto* convex = static_cast<btConvexConvexAlgorithm*>(algorithm);
+    if (convex->*member_of(PerturbationTag()) != 0) return {};
+    link.manifold = manifold_of<btConvexConvexAlgorithm>(algorithm);
+    link.kind = PairKind::convex;
   }
-  btPersistentManifold* room[1];
-  btManifoldArray found;
-  found.initializeFromBuffer(room, 0, 1);
-  // Qualified: known not to be overridden, so it inlines.
-  auto* spheres = static_cast<btSphereSphereCollisionAlgorithm*>(algorithm);
-  spheres->btSphereSphereCollisionAlgorithm::getAllContactManifolds(found);
-  if (found.size() != 1) return {};
-  const bool lasting = algorithm->*AlgorithmFields::dispatcher == owner.dispatcher;
-  return {found[0], PairKind::spheres, lasting};
+  if (link.manifold == nullptr) return {};
+  link.lasting = algorithm->*AlgorithmFields::dispatcher == owner.dispatcher;
+  return link;
 }
 
 void PairMirror::update(std::span<const btBroadphasePair> pairs,

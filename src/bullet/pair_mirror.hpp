@@ -24,6 +24,7 @@ inline constexpr std::size_t kPairChunk = 4096;
 enum class PairKind : std::uint8_t {
   other,    ///< none yet, or one that only Bullet can run
   spheres,  ///< btSphereSphereCollisionAlgorithm with a manifold
+  convex,   ///< btConvexConvexAlgorithm with a manifold, without perturbation
 };
 
 /// Who made the algorithms of the pairs.
@@ -53,17 +54,18 @@ class PairMirror {
   const ProxyTable& proxies() const { return proxies_; }
 
  private:
-  struct Key {
-    const btBroadphaseProxy* proxy0 = nullptr;
-    const btBroadphaseProxy* proxy1 = nullptr;
-    const btCollisionAlgorithm* algorithm = nullptr;
-  };
   struct Link {
     btPersistentManifold* manifold = nullptr;
     PairKind kind = PairKind::other;
     bool lasting = true;  ///< whether the link may be kept; else it is read again every time
   };
+  static Link read_link(btCollisionAlgorithm* algorithm, const PairOwner& owner);
 
+  struct Key {
+    const btBroadphaseProxy* proxy0 = nullptr;
+    const btBroadphaseProxy* proxy1 = nullptr;
+    const btCollisionAlgorithm* algorithm = nullptr;
+  };
   void resize(std::size_t pairs);
   void clear();
   void sort_releases();
@@ -73,7 +75,6 @@ class PairMirror {
   void update(std::span<const btBroadphasePair> pairs, std::span<const std::uint32_t> changed,
               const PairOwner& owner);
   void read_links(std::span<const btBroadphasePair> pairs, std::size_t begin, std::size_t end);
-  static Link read_link(btCollisionAlgorithm* algorithm, const PairOwner& owner);
 
   ProxyTable proxies_;
   std::vector<Key> keys_;

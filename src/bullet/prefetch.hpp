@@ -36,7 +36,7 @@ struct BodyFields : btCollisionObject {
 /// Class, position, and the fields from the shape to the friction.
 inline void prefetch_state(const btCollisionObject& body) {
   prefetch(&body);
-  prefetch(&body.getWorldTransform().getOrigin());
+  prefetch(&body.getWorldTransform() + 1);  // its end: the position is last
   prefetch(&(body.*BodyFields::shape));
   prefetch(&(body.*BodyFields::friction));
 }
@@ -48,14 +48,19 @@ inline void prefetch_for_contact(const btCollisionObject& body) {
   prefetch(&(body.*BodyFields::check_collide_with));
 }
 
-/// Bodies, count and thresholds. They are private; two thresholds lie between them and the first
-/// public member behind.
+/// The bodies, the count and the thresholds, which are private: two thresholds lie between the
+/// count and the first public member behind.
 inline void prefetch_count(const btPersistentManifold* manifold) {
-  prefetch(reinterpret_cast<const char*>(&manifold->m_companionIdA) - 3 * sizeof(btScalar));
+  const char* count =
+      reinterpret_cast<const char*>(&manifold->m_companionIdA) - 2 * sizeof(btScalar) - sizeof(int);
+  prefetch(count);
+  prefetch(count - 2 * sizeof(void*));
 }
 
 inline void prefetch_first_point(const btPersistentManifold* manifold) {
-  prefetch_bytes(manifold, sizeof(btTypedObject) + sizeof(btManifoldPoint));
+  constexpr std::size_t kBytes = sizeof(btTypedObject) + sizeof(btManifoldPoint);
+  prefetch_bytes(manifold, kBytes);
+  prefetch(reinterpret_cast<const char*>(manifold) + kBytes);
 }
 
 /// How far ahead of its use: manifolds come from memory, their bodies seldom.

@@ -71,6 +71,7 @@ class EnginePool {
       sum.sphere_pairs += stats.sphere_pairs;
       sum.touching += stats.touching;
       sum.written += stats.written;
+      sum.sphere_boxes += stats.sphere_boxes;
       sum.verified += stats.verified;
       if (sum.mismatches == 0) sum.first_mismatch = stats.first_mismatch;
       sum.mismatches += stats.mismatches;
@@ -157,7 +158,7 @@ JFPX_API void jfpx_preload_print_summary(const char* prefix) {
                  Count{stats.verified}, Count{stats.mismatches}, stats.first_mismatch.c_str());
   }
   if (!stats.failure.empty()) {
-    std::fprintf(stderr, "%sleft to Bullet for good: %s\n", prefix, stats.failure.c_str());
+    std::fprintf(stderr, "%sthe collider failed: %s\n", prefix, stats.failure.c_str());
   }
 }
 

@@ -4,6 +4,7 @@
 #include "src/bullet/prefetch.hpp"
 
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
+#include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
@@ -39,6 +40,7 @@ std::uint8_t SphereBatch::read_body(std::size_t number) {
     spheres_[number] = {{centre.x(), centre.y(), centre.z()},
                         static_cast<const btSphereShape*>(shape)->getRadius()};
   } else {
+    if (&typeid(*shape) == &typeid(btBoxShape)) traits |= kBox;
     spheres_[number] = {{}, kNaN};
   }
   return static_cast<std::uint8_t>(traits);

@@ -17,6 +17,7 @@ enum BodyTrait : std::uint8_t {
   kActive = 2,
   /// Its class may override btCollisionObject::checkCollideWithOverride, and it would be called.
   kForeign = 4,
+  kBox = 8,  ///< exactly a btBoxShape
 };
 
 class SphereBatch {
@@ -37,12 +38,12 @@ class SphereBatch {
   btPersistentManifold* manifold(std::size_t i) const { return mirror_.manifold(i); }
   const btCollisionObject* body_a(std::size_t i) const { return bodies_[pairs()[i].a]; }
   const btCollisionObject* body_b(std::size_t i) const { return bodies_[pairs()[i].b]; }
-  bool both_are_spheres(std::size_t i) const {
-    return (traits_[pairs()[i].a] & traits_[pairs()[i].b] & kSphere) != 0;
-  }
+  bool both_are_spheres(std::size_t i) const { return (trait_a(i) & trait_b(i) & kSphere) != 0; }
+  std::uint8_t trait_a(std::size_t i) const { return traits_[pairs()[i].a]; }
+  std::uint8_t trait_b(std::size_t i) const { return traits_[pairs()[i].b]; }
   /// The traits that either body of pair i has.
   unsigned either_trait(std::size_t i) const {
-    return static_cast<unsigned>(traits_[pairs()[i].a] | traits_[pairs()[i].b]);
+    return static_cast<unsigned>(trait_a(i) | trait_b(i));
   }
   /// The traits, and the collision flags, that any body has.
   unsigned any_trait() const { return any_trait_; }

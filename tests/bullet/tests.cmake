@@ -1,9 +1,12 @@
 jfpx_add_test(bullet_contract_test SOURCES
   bullet/contact_callbacks_test.cpp
   bullet/replaced_test.cpp
+  bullet/mirror_test.cpp
+  bullet/more_situations_test.cpp
   bullet/situations_test.cpp
+  bullet/sphere_box_test.cpp
   bullet/stats_test.cpp
-  LINK jfpx_bullet)
+  LINK jfpx_bullet jfpx_scenes)
 jfpx_add_test(bullet_verify_test SOURCES
   bullet/scene_world_test.cpp
   bullet/verify_test.cpp

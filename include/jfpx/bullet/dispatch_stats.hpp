@@ -19,7 +19,7 @@ enum class Fallback : std::uint8_t {
   create_function,  ///< the user registered another SPHERE/SPHERE create function
   continuous,       ///< dispatchFunc is not DISPATCH_DISCRETE
   nested,           ///< called from a callback inside another dispatch of this dispatcher
-  collider_failed,  ///< the collider threw; see DispatchStats::failure
+  collider_failed,  ///< x86 failed too, for want of memory; see DispatchStats::failure
 };
 inline constexpr std::size_t kFallbackCount = 8;
 
@@ -33,14 +33,15 @@ struct DispatchStats {
   std::uint64_t pairs = 0;         ///< overlapping pairs
   std::uint64_t sphere_pairs = 0;  ///< of these, between two spheres
   std::uint64_t touching = 0;      ///< of these, found touching by the collider
-  std::uint64_t written = 0;       ///< manifolds brought up to date without Bullet's algorithm
+  std::uint64_t written = 0;       ///< of these, brought up to date without Bullet's algorithm
+  std::uint64_t sphere_boxes = 0;  ///< pairs of a sphere and a box, likewise
   std::uint64_t verified = 0;      ///< sphere pairs recomputed by set_verify(true)
   std::uint64_t mismatches = 0;    ///< of these, different in any field
   std::string first_mismatch;      ///< field and both values; empty where there was none
   std::array<std::uint64_t, kFallbackCount> fallbacks{};  ///< dispatches by Fallback
   Fallback last_fallback = Fallback::none;                ///< none where the last was a batch
-  std::string failure;         ///< why the collider was given up for good; empty while it works
-  std::string device_failure;  ///< Backend::automatic: why x86 took over from the device, if it did
+  std::string failure;         ///< why batches were given up for good; empty while all is well
+  std::string device_failure;  ///< why x86 took over from the device, if it did
   double prepare_ms = 0;       ///< wall clock of batches: gathering, collider, reading manifolds
   double commit_ms = 0;        ///< wall clock of batches: the ordered walk
 };

@@ -42,8 +42,8 @@ class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
   CollisionDispatcher(const CollisionDispatcher&) = delete;
   CollisionDispatcher& operator=(const CollisionDispatcher&) = delete;
 
-  /// As in Bullet, for any pair cache. If the collider throws, this call and all later ones are
-  /// Bullet's own, and stats().failure says why.
+  /// As in Bullet, for any pair cache. If the collider throws, x86 tests the pairs of this call and
+  /// of all later ones, with the same bits, and stats().device_failure says why.
   void dispatchAllCollisionPairs(btOverlappingPairCache* pair_cache,
                                  const btDispatcherInfo& dispatch_info,
                                  btDispatcher* dispatcher) override;

@@ -1,0 +1,142 @@
+/// What the dispatcher remembers of pairs is never believed longer than it is true.
+#include "tests/bullet/twin_worlds.hpp"
+
+#include <algorithm>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+TwinOptions with_threads(unsigned threads) {
+  TwinOptions options;
+  options.ours = [threads](btCollisionConfiguration* c) {
+    return std::make_unique<CollisionDispatcher>(
+        c, DispatcherOptions{.collider = {.backend = Backend::x86, .threads = threads},
+                             .minimum_batch = 0});
+  };
+  return options;
+}
+
+/// Destroys the algorithms of some pairs, whose memory and manifolds go back to Bullet's pools, and
+/// lets Bullet make new ones in another order: the same pairs then have the same algorithms by
+/// address, with other manifolds.
+void remake_algorithms(BulletWorld& w, Random& random) {
+  btOverlappingPairCache& cache = *w.world.getPairCache();
+  std::vector<std::size_t> chosen;
+  const auto n = static_cast<std::size_t>(cache.getNumOverlappingPairs());
+  for (std::size_t i = 0; i < n; ++i) {
+    if (random.below(3) == 0) chosen.push_back(i);
+  }
+  btBroadphasePair* pairs = cache.getOverlappingPairArrayPtr();
+  for (const std::size_t i : chosen) cache.cleanOverlappingPair(pairs[i], w.dispatcher.get());
+  for (std::size_t k = chosen.size(); k > 1; --k) std::swap(chosen[k - 1], chosen[random.below(k)]);
+  for (const std::size_t i : chosen) {
+    (*w.dispatcher->getNearCallback())(pairs[i], *w.dispatcher, w.world.getDispatchInfo());
+  }
+}
+
+TEST(PairMirror, NoticesAlgorithmsMadeAnewInTheSamePlace) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Twins twins;
+  twins.both([&](BulletWorld& w) { add_heap(w, 80, seed); });
+  for (std::uint64_t round = 0; round < 30; ++round) {
+    ASSERT_TRUE(twins.step(2));
+    twins.both([&](BulletWorld& w) {
+      Random random(seed + round);
+      remake_algorithms(w, random);
+    });
+  }
+  EXPECT_GT(twins.stats().written, 1000u);
+}
+
+TEST(PairMirror, ForgetsAllWhenMostManifoldsGoAtOnce) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Twins twins;
+  twins.both([&](BulletWorld& w) { add_heap(w, 500, seed); });
+  for (int round = 0; round < 4; ++round) {
+    ASSERT_TRUE(twins.step(3));
+    ASSERT_GT(twins.ours().dispatcher->getNumManifolds(), 3000)
+        << "there must be more than the mirror remembers one by one";
+    twins.both([](BulletWorld& w) {
+      for (auto& body : w.bodies) w.world.removeRigidBody(body.get());
+      std::reverse(w.bodies.begin() + 1, w.bodies.end());
+      for (auto& body : w.bodies) w.world.addRigidBody(body.get());
+    });
+  }
+}
+
+TEST(PairMirror, NumbersBodiesAnewWhenMostHaveGone) {
+  Twins twins;
+  Random random(7);
+  for (int round = 0; round < 8; ++round) {
+    // Some hundred new bodies a round take the numbers past what the living ones need.
+    twins.both([&](BulletWorld& w) {
+      while (w.world.getNumCollisionObjects() > 1) {
+        w.world.removeCollisionObject(w.world.getCollisionObjectArray()[1]);
+      }
+      add_heap(w, 250, static_cast<std::uint64_t>(round), 5);
+    });
+    ASSERT_TRUE(twins.step(3));
+  }
+}
+
+TEST(PairMirror, ServesADispatcherThatReleasesInASubclass) {
+  /// Its author has forgotten to call the class in between.
+  class Careless : public CollisionDispatcher {
+   public:
+    using CollisionDispatcher::CollisionDispatcher;
+    void releaseManifold(btPersistentManifold* manifold) override {
+      btCollisionDispatcher::releaseManifold(manifold);
+    }
+  };
+  TwinOptions options;
+  options.ours = [](btCollisionConfiguration* c) {
+    return std::make_unique<Careless>(c, DispatcherOptions{.minimum_batch = 0});
+  };
+  Twins twins(options);
+  twins.both([](BulletWorld& w) { add_heap(w, 60, 8); });
+  for (std::uint64_t round = 0; round < 10; ++round) {
+    ASSERT_TRUE(twins.step(2));
+    twins.both([&](BulletWorld& w) {
+      Random random(round);
+      remake_algorithms(w, random);
+    });
+  }
+}
+
+TEST(QuietCommit, HasTheSameBitsForAnyNumberOfThreads) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  for (const unsigned threads : {1u, 2u, 5u}) {
+    Twins twins(with_threads(threads));
+    twins.both([&](BulletWorld& w) { add_heap(w, 700, seed, 6); });
+    ASSERT_TRUE(twins.step(10)) << threads;
+    EXPECT_GT(twins.ours().world.getPairCache()->getNumOverlappingPairs(), 4096)
+        << "more than one thread must have something to do";
+    EXPECT_GT(twins.stats().written, 1000u);
+  }
+}
+
+TEST(QuietCommit, ServesSpheresOnBoxesThatTurn) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Twins twins;
+  twins.both([&](BulletWorld& w) {
+    Random random(seed);
+    add_heap(w, 60, seed, 4);
+    for (int i = 0; i < 40; ++i) {
+      const Vec3 p = random.uniform_in_box({0, 1, 0}, {4, 6, 4});
+      const auto edge = [&] { return random.uniform(Real(0.1), Real(0.8)); };
+      btRigidBody* box = w.add(w.keep(new btBoxShape(btVector3(edge(), edge(), edge()))),
+                               btVector3(p.x, p.y, p.z), i % 4 == 0 ? btScalar(0) : btScalar(1));
+      box->setAngularVelocity(btVector3(edge(), edge(), edge()));
+      box->setContactStiffnessAndDamping(i % 3 == 0 ? 1000 : BT_LARGE_FLOAT, btScalar(0.1));
+    }
+  });
+  ASSERT_TRUE(twins.step(150));
+  EXPECT_GT(twins.stats().sphere_boxes, 1000u);
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bullet
