@@ -34,3 +34,5 @@ add_dependencies(jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64)
 # As installed: libraries in ../lib (or what it is called here) of the command.
 set_target_properties(jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64 PROPERTIES
   LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/${CMAKE_INSTALL_LIBDIR})
+install(TARGETS jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
