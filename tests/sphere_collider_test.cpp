@@ -28,7 +28,7 @@ std::string message_of(Call&& call) {
 TEST_P(SphereColliderContract, EqualsBruteForceForAllSmallNumbersOfSpheres) {
   for (const SphereKind& kind : sphere_kinds()) {
     Random random(base_seed() + static_cast<std::uint64_t>(&kind - sphere_kinds().data()));
-    for (std::size_t n = 0; n <= 300; n += n < 70 ? 1 : 23) {
+    for (std::size_t n = 0; n <= scaled(300); n += n < scaled(70) ? 1 : 23) {
       const auto spheres = kind.make(n, random);
       ASSERT_TRUE(same_bits(collider().find_contacts(spheres), brute_force(spheres)))
           << kind.name << ", N = " << n << ", " << seed_note();
@@ -39,7 +39,7 @@ TEST_P(SphereColliderContract, EqualsBruteForceForAllSmallNumbersOfSpheres) {
 TEST_P(SphereColliderContract, EqualsBruteForceForThousandsOfSpheres) {
   for (const SphereKind& kind : sphere_kinds()) {
     Random random(base_seed() ^ static_cast<std::uint64_t>(&kind - sphere_kinds().data()));
-    const std::size_t n = 1000 + random.below(1500);
+    const std::size_t n = scaled(1000 + random.below(1500));
     const auto spheres = kind.make(n, random);
     ASSERT_TRUE(same_bits(collider().find_contacts(spheres), brute_force(spheres)))
         << kind.name << ", N = " << n << ", " << seed_note();
@@ -47,10 +47,10 @@ TEST_P(SphereColliderContract, EqualsBruteForceForThousandsOfSpheres) {
 }
 
 TEST_P(SphereColliderContract, CoincidentSpheresAllTouch) {
-  constexpr std::size_t kN = 1500;
-  const std::vector<SphereInstance> spheres(kN, {{3, -4, 5}, Real(0.25)});
+  const std::size_t n = scaled(1500);
+  const std::vector<SphereInstance> spheres(n, {{3, -4, 5}, Real(0.25)});
   const ContactSpan contacts = collider().find_contacts(spheres);
-  ASSERT_EQ(contacts.size(), kN * (kN - 1) / 2);
+  ASSERT_EQ(contacts.size(), n * (n - 1) / 2);
   EXPECT_TRUE(same_bits(contacts, brute_force(spheres)));
 }
 
@@ -65,7 +65,7 @@ TEST_P(SphereColliderContract, LatticeHasThreeNSquaredTimesNMinusOneContacts) {
 
 TEST_P(SphereColliderContract, PermutedInputGivesTheSameContacts) {
   Random random(base_seed());
-  const auto spheres = sphere_kind("polydisperse").make(2000, random);
+  const auto spheres = sphere_kind("polydisperse").make(scaled(2000), random);
   std::vector<SphereIndex> order(spheres.size());
   for (SphereIndex i = 0; i < order.size(); ++i) order[i] = i;
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);

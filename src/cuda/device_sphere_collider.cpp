@@ -14,13 +14,13 @@ namespace jfpx::inline JFPX_ABI::cuda {
 namespace {
 
 /// Up to here all pairs beat the grid (measured on an H200: bench/results).
-constexpr std::size_t kMostForAllPairs = 8000;
+constexpr std::size_t kMostForAllPairs = 4500;
 /// Most memory for the bit matrix of all pairs; larger searches are done in bands of rows, twice.
 constexpr std::size_t kMaskBytes = std::size_t{256} << 20;
 
 constexpr std::size_t kMaskWords = kMaskBytes / sizeof(std::uint32_t);
 constexpr std::size_t kStateWords = sizeof(SearchState) / sizeof(std::uint32_t);
-static_assert(sizeof(SearchState) % sizeof(std::uint64_t) == 0);
+static_assert(sizeof(SearchState) % 16 == 0);
 
 /// Words for the bit matrix of a search among up to `n` spheres: all of it or a band of it.
 std::size_t mask_words(std::size_t n) {
@@ -52,6 +52,7 @@ struct DeviceSphereCollider::Impl {
     int major = 0;
     JFPX_CUDA_TRY(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device));
     has_fused = fused_search_supported(major);
+    grid_blocks = most_grid_blocks(device);
     reserve(0, 0);
   }
 
@@ -78,6 +79,7 @@ struct DeviceSphereCollider::Impl {
   SphereAlgorithm algorithm;
   MemoryPool pool;
   bool has_fused = false;
+  unsigned grid_blocks = 0;
   std::size_t spheres_reserved = 0, contacts_reserved = 0;
 
   DeviceBuffer<std::uint32_t> counters;  // SearchState, then contacts of each sphere
@@ -86,7 +88,9 @@ struct DeviceSphereCollider::Impl {
   DeviceBuffer<std::uint32_t> masks;
 
   DeviceBuffer<std::uint32_t> table;
-  DeviceBuffer<uint2> places;
+  DeviceBuffer<unsigned long long> block_sums;
+  DeviceBuffer<std::uint32_t> places, ranks;
+  DeviceBuffer<unsigned char> plan;
   DeviceBuffer<SphereInstance> sorted;
   DeviceBuffer<std::uint32_t> ids;
   DeviceBuffer<std::uint32_t> partners;
@@ -112,15 +116,19 @@ void DeviceSphereCollider::Impl::reserve(std::size_t n, std::size_t contacts) {
 
 void DeviceSphereCollider::Impl::reserve_spheres(std::size_t n) {
   const std::size_t table_size = uses_grid(n) ? table_size_for(n) : 0;
-  counters.grow(pool, stream, kStateWords + n + 1, "contact counts");
+  counters.grow(pool, stream, kStateWords + n + 4, "contact counts");
   offsets.grow(pool, stream, n + 1, "contact offsets");
-  scan_scratch.grow(pool, stream, scan_scratch_bytes(std::max(table_size, n) + 1), "scan scratch");
   if (algorithm != SphereAlgorithm::sorted_tiles) {
     const bool all = algorithm == SphereAlgorithm::all_pairs;
-    masks.grow(pool, stream, mask_words(all ? n : std::min(n, kMostForAllPairs)), "pair masks");
+    const std::size_t most = all ? n : std::min(n, kMostForAllPairs);
+    masks.grow(pool, stream, mask_words(most), "pair masks");
+    scan_scratch.grow(pool, stream, scan_scratch_bytes(most + 1), "scan scratch");
   }
   if (uses_grid(n)) {
-    table.grow(pool, stream, table_size + 1, "cell table");
+    table.grow(pool, stream, table_size + 4, "cell table");
+    block_sums.grow(pool, stream, 2 * std::size_t{kMostGridBlocks}, "sums of blocks");
+    plan.grow(pool, stream, grid_plan_bytes(), "the plan of the cells");
+    ranks.grow(pool, stream, n, "ranks in the cell table");
     places.grow(pool, stream, n, "places in the cell table");
     sorted.grow(pool, stream, n, "sorted spheres");
     ids.grow(pool, stream, n, "sorted indices");
@@ -178,13 +186,17 @@ void DeviceSphereCollider::Impl::find_among_all_pairs(const SphereInstance* d_sp
 void DeviceSphereCollider::Impl::find_in_grid(const SphereInstance* d_spheres, std::uint32_t n,
                                               const SearchOutput& output) {
   JFPX_CUDA_TRY(cudaMemsetAsync(counters.data(), 0, sizeof(SearchState), stream));
+  const std::uint32_t table_size = table_size_for(n);
   const GridArgs grid{.spheres = d_spheres,
                       .n = n,
-                      .table_size = table_size_for(n),
+                      .table_size = table_size,
                       .table = table.data(),
                       .places = places.data(),
+                      .ranks = ranks.data(),
                       .sorted = sorted.data(),
                       .ids = ids.data(),
+                      .table_sums = block_sums.data(),
+                      .count_sums = block_sums.data() + kMostGridBlocks,
                       .counts = counts(),
                       .partners = partners.data(),
                       .overflow = overflow.data(),
@@ -193,15 +205,9 @@ void DeviceSphereCollider::Impl::find_in_grid(const SphereInstance* d_spheres, s
                       .crowded = crowded.data(),
                       .giants = giants.data(),
                       .crowded_b = crowded_b.data(),
-                      .state = state()};
-  launch_grid_measure(grid, stream);
-  launch_grid_assign(grid, stream);
-  exclusive_scan(table.data(), std::size_t{grid.table_size} + 1, scan_scratch.data(),
-                 scan_scratch.size(), stream);
-  launch_grid_scatter(grid, stream);
-  launch_grid_search(grid, stream);
-  scan_counts(n);
-  launch_grid_emit(grid, output, stream);
+                      .state = state(),
+                      .plan = reinterpret_cast<GridPlan*>(plan.data())};
+  launch_grid_search(grid, output, grid_blocks, stream);
 }
 
 DeviceSphereCollider::DeviceSphereCollider(Stream stream, int device, SphereAlgorithm algorithm)

@@ -48,17 +48,25 @@ JFPX_HD inline Real half_cell_of(Real half_0, int level) {
                              (static_cast<RealBits>(level) << kMantissaBits));
 }
 
-/// The finest level with half cells no smaller than `half`: floor(log2(half_0 / half)).
-JFPX_HD inline int level_for(Real half, Real half_0) {
-  const int level = exponent_of(half_0) - exponent_of(half);
-  if (level > kLastLevel) return kLastLevel;
-  return half_cell_of(half_0, level) < half ? level - 1 : level;
+/// What the cells of all levels follow from.
+struct GridScale {
+  Real half_0;                  ///< half cell width of level 0: what the largest radius asks for
+  int last_level = kLastLevel;  ///< finer levels would hold hardly a sphere a cell
+  Real x_cells = 1;             ///< cells are this many times narrower in x: 1 or 2
+};
+
+/// The finest level with half cells no smaller than `half`: floor(log2(half_0 / half)), if there is
+/// such a level.
+JFPX_HD inline int level_for(Real half, const GridScale& scale) {
+  const int level = exponent_of(scale.half_0) - exponent_of(half);
+  if (level > scale.last_level) return scale.last_level;
+  return half_cell_of(scale.half_0, level) < half ? level - 1 : level;
 }
 
-/// The level of a sphere, if the largest radius of all asks for `half_0`.
-JFPX_HD inline int level_of(const SphereInstance& s, Real half_0) {
+/// The level of a sphere.
+JFPX_HD inline int level_of(const SphereInstance& s, const GridScale& scale) {
   const Real radius = half_cell_for_radius(s.radius), place = half_cell_for_place(s.centre);
-  return level_for(radius > place ? radius : place, half_0);
+  return level_for(radius > place ? radius : place, scale);
 }
 JFPX_HD inline bool is_far(const SphereInstance& s) {
   return half_cell_for_place(s.centre) > half_cell_for_radius(s.radius);
@@ -67,10 +75,11 @@ JFPX_HD inline bool is_far(const SphereInstance& s) {
 /// The widest level on which `s` can touch a far sphere: a far sphere on a level wider than that
 /// of `s` has its largest coordinate m beyond kMostCells of its half cells, and touches `s` only if
 /// m differs by less than three of them. So half_cell_for_place differs by a factor less than
-/// 1 + 2^-20, and the level by less than two.
-JFPX_HD inline int widest_far_level(const SphereInstance& s, Real half_0) {
+/// 1 + 2^-20, and the level by less than two. (A level that is wider than that of `s` is not the
+/// last one: the far sphere's place alone decided about it.)
+JFPX_HD inline int widest_far_level(const SphereInstance& s, const GridScale& scale) {
   const Real place = half_cell_for_place(s.centre);
-  return place > 0 ? level_for(place, half_0) - 1 : kLastLevel;
+  return place > 0 ? level_for(place, {scale.half_0}) - 1 : kLastLevel;
 }
 
 /// Inverse cell width of a level.
@@ -140,11 +149,11 @@ struct GridCell {
   std::int32_t x, y, z;
   int level;
 };
-JFPX_HD inline GridCell grid_cell_of(const SphereInstance& s, Real half_0) {
-  const int level = level_of(s, half_0);
-  const Real inverse = inverse_width(half_cell_of(half_0, level));
-  return {cell_of(s.centre.x, inverse), cell_of(s.centre.y, inverse), cell_of(s.centre.z, inverse),
-          level};
+JFPX_HD inline GridCell grid_cell_of(const SphereInstance& s, const GridScale& scale) {
+  const int level = level_of(s, scale);
+  const Real inverse = inverse_width(half_cell_of(scale.half_0, level));
+  return {cell_of(s.centre.x, inverse * scale.x_cells), cell_of(s.centre.y, inverse),
+          cell_of(s.centre.z, inverse), level};
 }
 
 }  // namespace jfpx::inline JFPX_ABI::cuda

@@ -13,13 +13,19 @@
 namespace jfpx::inline JFPX_ABI::cuda {
 
 /// Counters that kernels of one search share. Zero bytes at the start of a search.
-struct SearchState {
-  unsigned long long overflow;      ///< entries of GridArgs::overflow, also those that did not fit
-  unsigned long long largest_half;  ///< bits of the largest half cell that a radius asks for
-  std::uint32_t valid_before;       ///< ~(lowest index of an invalid sphere), 0 if there is none
-  std::uint32_t levels;             ///< bit l: there are spheres on grid level l
-  std::uint32_t crowded;            ///< entries of GridArgs::crowded
-  std::uint32_t giants;             ///< entries of GridArgs::giants
+struct alignas(16) SearchState {
+  unsigned long long contacts;       ///< that the grid has found
+  unsigned long long overflow;       ///< entries of GridArgs::overflow, also those without room
+  unsigned long long largest_half;   ///< bits of the largest half cell that a radius asks for
+  unsigned long long smallest_half;  ///< ~bits of the smallest one
+  unsigned long long farthest[6];    ///< ordered bits of the largest x, -x, y, -y, z, -z
+  std::uint32_t valid_before;        ///< ~(lowest index of an invalid sphere), 0 if there is none
+  std::uint32_t levels;              ///< bit l: there are spheres on grid level l
+  std::uint32_t crowded;             ///< entries of GridArgs::crowded
+  std::uint32_t giants;              ///< entries of GridArgs::giants
+  std::uint32_t has_far;             ///< 1: there are spheres far from the origin (grid_cells.hpp)
+  std::uint32_t next_chunk;          ///< spheres given to warps
+  std::uint32_t same_cell[32];       ///< pairs of a sample in the same cell, by level
 };
 
 /// Where a search puts its result. `contacts` or `pairs` is null.
@@ -33,13 +39,10 @@ struct SearchOutput {
 /// cudaSuccess if this build has machine code, or code to be compiled, for the current device.
 cudaError_t kernels_loadable();
 
-// --- scans -------------------------------------------------------------------------------------
+// --- scan --------------------------------------------------------------------------------------
 
-/// Bytes of scratch memory that the scans of up to `n` values need.
+/// Bytes of scratch memory that the scan of up to `n` values needs.
 std::size_t scan_scratch_bytes(std::size_t n);
-/// values[i] becomes the sum of the values before i.
-void exclusive_scan(std::uint32_t* values, std::size_t n, void* scratch, std::size_t scratch_bytes,
-                    cudaStream_t stream);
 /// sums[i] becomes the sum of the values before i, in 64 bits.
 void exclusive_scan(const std::uint32_t* values, unsigned long long* sums, std::size_t n,
                     void* scratch, std::size_t scratch_bytes, cudaStream_t stream);
@@ -102,34 +105,42 @@ struct OverflowPair {
   std::uint32_t a, b, rank;
 };
 
+/// Blocks that share out the table and the spheres, at most.
+inline constexpr unsigned kMostGridBlocks = 132 * 16;
+struct GridPlan;
+/// Its size.
+std::size_t grid_plan_bytes();
+
+/// Arrays are 16-byte aligned, with room for 15 bytes more than said.
 struct GridArgs {
   const SphereInstance* spheres;
-  std::uint32_t n;
-  std::uint32_t table_size;     ///< a power of two
-  std::uint32_t* table;         ///< [table_size + 1] histogram, then starts, of the buckets
-  uint2* places;                ///< [n] bucket of a sphere, its rank in there
-  SphereInstance* sorted;       ///< [n] spheres in the order of the table
-  std::uint32_t* ids;           ///< [n] their indices
-  std::uint32_t* counts;        ///< [n + 1] pairs of which sphere a is the first
-  std::uint32_t* partners;      ///< [kSlots][n] the first b's of a
-  OverflowPair* overflow;       ///< [capacity] the other pairs
-  unsigned long long capacity;  ///< most pairs that there is room for
-  unsigned long long* offsets;  ///< [n + 1] exclusive scan of the counts
-  std::uint32_t* crowded;       ///< [capacity / kSlots + 1] a's with more than kSlots pairs
-  std::uint32_t* giants;        ///< [capacity / kLongList + 1] a's with more than kLongList pairs
-  std::uint32_t* crowded_b;     ///< [capacity] b's of both, by place in the output
+  std::uint32_t n;                 ///< at least 1
+  std::uint32_t table_size;        ///< a power of two
+  std::uint32_t* table;            ///< [table_size + 1] histogram, then starts, of the buckets
+  std::uint32_t* places;           ///< [n] bucket, then position in their order, of a sphere
+  std::uint32_t* ranks;            ///< [n] rank in the bucket, then pairs, of a sphere
+  SphereInstance* sorted;          ///< [n] spheres by position
+  std::uint32_t* ids;              ///< [n] their indices
+  unsigned long long* table_sums;  ///< [blocks] spheres in the buckets of each block
+  unsigned long long* count_sums;  ///< [blocks] pairs of the spheres of each block
+  std::uint32_t* counts;           ///< [n] pairs of which a sphere is the first, by position
+  std::uint32_t* partners;         ///< [n][kSlots] the first b's found of a sphere, by position
+  OverflowPair* overflow;          ///< [capacity] the other pairs
+  unsigned long long capacity;     ///< most pairs that there is room for
+  unsigned long long* offsets;     ///< [n] contacts before those of a, if a has more than kSlots
+  std::uint32_t* crowded;          ///< [capacity / kSlots + 1] a's with more than kSlots pairs
+  std::uint32_t* giants;           ///< [capacity / kLongList + 1] a's with more than kLongList
+  std::uint32_t* crowded_b;        ///< [capacity] b's of both, by place in the output
   SearchState* state;
+  GridPlan* plan;           ///< for searches of several launches
+  std::uint32_t lanes = 1;  ///< threads that share a sphere in the search: a power of two
 };
-/// Validates, finds the widest cell, clears table and counts.
-void launch_grid_measure(const GridArgs& args, cudaStream_t stream);
-/// Puts spheres into buckets: fills places and the histogram.
-void launch_grid_assign(const GridArgs& args, cudaStream_t stream);
-/// Sorts spheres by bucket, once the table has been scanned.
-void launch_grid_scatter(const GridArgs& args, cudaStream_t stream);
-/// Finds all touching pairs: fills counts, partners and overflow.
-void launch_grid_search(const GridArgs& args, cudaStream_t stream);
-/// Writes contacts or pairs in order, once the counts have been scanned, and the count.
-void launch_grid_emit(const GridArgs& args, const SearchOutput& output, cudaStream_t stream);
+
+/// Blocks of the search that `device` holds at a time. It must be the current device.
+unsigned most_grid_blocks(int device);
+/// The whole search. `most_blocks` is the answer of most_grid_blocks().
+void launch_grid_search(const GridArgs& args, const SearchOutput& output, unsigned most_blocks,
+                        cudaStream_t stream);
 
 // --- given pairs -------------------------------------------------------------------------------
 

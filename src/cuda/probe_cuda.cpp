@@ -15,19 +15,6 @@ std::string version_text(int version) {
   return std::to_string(version / 1000) + "." + std::to_string(version % 1000 / 10);
 }
 
-std::string why_unusable(cudaError_t error) {
-  if (error == cudaErrorNoDevice) return "the CUDA driver sees no GPU";
-  if (error == cudaErrorInsufficientDriver) {
-    int driver = 0, runtime = 0;
-    static_cast<void>(cudaDriverGetVersion(&driver));
-    static_cast<void>(cudaRuntimeGetVersion(&runtime));
-    if (driver == 0) return "no CUDA driver is installed";
-    return "the CUDA driver is too old: it supports CUDA " + version_text(driver) +
-           ", this build needs " + version_text(runtime);
-  }
-  return std::string(cudaGetErrorName(error)) + ": " + cudaGetErrorString(error);
-}
-
 /// Compute capability "9.0".
 std::string capability(const cudaDeviceProp& properties) {
   return std::to_string(properties.major) + "." + std::to_string(properties.minor);
@@ -44,6 +31,16 @@ cudaError_t code_for(int device) {
 }
 
 }  // namespace
+
+std::string why_unusable(cudaError_t error, int driver, int runtime) {
+  if (error == cudaErrorNoDevice) return "the CUDA driver sees no GPU";
+  if (error == cudaErrorInsufficientDriver) {
+    if (driver == 0) return "no CUDA driver is installed";
+    return "the CUDA driver is too old: it supports CUDA " + version_text(driver) +
+           ", this build needs " + version_text(runtime);
+  }
+  return std::string(cudaGetErrorName(error)) + ": " + cudaGetErrorString(error);
+}
 
 BackendStatus probe(int device) {
   BackendStatus status{
@@ -67,7 +64,10 @@ BackendStatus probe(int device) {
   if (error == cudaErrorNoKernelImageForDevice || error == cudaErrorInvalidDeviceFunction) {
     status.reason = "this build has no code for compute capability " + capability(properties);
   } else if (error != cudaSuccess) {
-    status.reason = why_unusable(error);
+    int driver = 0, runtime = 0;
+    static_cast<void>(cudaDriverGetVersion(&driver));
+    static_cast<void>(cudaRuntimeGetVersion(&runtime));
+    status.reason = why_unusable(error, driver, runtime);
   }
   status.usable = error == cudaSuccess;
   return status;

@@ -16,7 +16,7 @@ namespace jfpx::inline JFPX_ABI::cuda {
 namespace {
 
 /// Up to here kernels write contacts straight into host memory: no copy, no second wait.
-constexpr std::size_t kMostMappedSpheres = 2048;
+constexpr std::size_t kMostMappedSpheres = 20'000;
 
 /// More than `count`, so that a collider whose input grows slowly does not grow each time.
 std::size_t with_slack(std::size_t count) { return count + count / 4 + 64; }
@@ -45,12 +45,15 @@ class SphereColliderCuda final : public SphereCollider {
   /// Leaves the contacts in contacts_on_host_ if `mapped`, else on the device. Returns their
   /// number.
   std::size_t search(std::span<const SphereInstance> spheres, bool mapped);
+  /// What it reserves stays with what it had if there is no memory for more.
+  void make_room(std::size_t spheres, std::size_t contacts, bool mapped);
   void wait() { JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get())); }
 
   int device_;
   OwnedStream stream_;
   MemoryPool pool_;
   DeviceSphereCollider searcher_;
+  std::size_t spheres_reserved_ = 0, contacts_reserved_ = 0;
   DeviceBuffer<SphereInstance> spheres_;
   DeviceBuffer<SphereContact> contacts_;
   DeviceBuffer<SpherePair> pairs_;
@@ -62,21 +65,15 @@ class SphereColliderCuda final : public SphereCollider {
 };
 
 void SphereColliderCuda::upload(std::span<const SphereInstance> spheres) {
-  spheres_.grow(pool_, stream_.get(), with_slack(spheres.size()), "spheres");
+  if (spheres.size() > spheres_.size()) {
+    spheres_.grow(pool_, stream_.get(), with_slack(spheres.size()), "spheres");
+  }
   JFPX_CUDA_TRY(cudaMemcpyAsync(spheres_.data(), spheres.data(), spheres.size_bytes(),
                                 cudaMemcpyHostToDevice, stream_.get()));
 }
 
 std::size_t SphereColliderCuda::search(std::span<const SphereInstance> spheres, bool mapped) {
-  const auto make_room = [&](std::size_t contacts) {
-    searcher_.reserve(std::max(spheres.size(), spheres_.size()), contacts);
-    if (mapped) {
-      contacts_on_host_.grow(contacts, "contacts on the host");
-    } else {
-      contacts_.grow(pool_, stream_.get(), contacts, "contacts");
-    }
-  };
-  make_room(with_slack(4 * spheres.size()));
+  make_room(spheres.size(), 4 * spheres.size(), mapped);
   while (true) {
     searcher_.find_contacts(spheres_.data(), spheres.size(),
                             mapped ? contacts_on_host_.data() : contacts_.data(),
@@ -85,7 +82,24 @@ std::size_t SphereColliderCuda::search(std::span<const SphereInstance> spheres, 
     const ContactCount& count = *count_.data();
     if (count.first_invalid != kNoSphere) shared::reject_sphere(spheres);
     if (count.complete != 0) return count.contacts;
-    make_room(with_slack(count.contacts));
+    make_room(spheres.size(), count.contacts, mapped);
+  }
+}
+
+void SphereColliderCuda::make_room(std::size_t spheres, std::size_t contacts, bool mapped) {
+  if (spheres > spheres_reserved_ || contacts > contacts_reserved_) {
+    const std::size_t more_spheres =
+        spheres > spheres_reserved_ ? with_slack(spheres) : spheres_reserved_;
+    const std::size_t more_contacts =
+        contacts > contacts_reserved_ ? with_slack(contacts) : contacts_reserved_;
+    searcher_.reserve(more_spheres, more_contacts);
+    spheres_reserved_ = more_spheres;
+    contacts_reserved_ = more_contacts;
+  }
+  if (mapped && contacts > contacts_on_host_.size()) {
+    contacts_on_host_.grow(with_slack(contacts), "contacts on the host");
+  } else if (!mapped && contacts > contacts_.size()) {
+    contacts_.grow(pool_, stream_.get(), with_slack(contacts), "contacts");
   }
 }
 

@@ -1,107 +1,13 @@
-/// What only the CUDA collider promises: streams, graphs, faults, memory, threads.
-#include <jfpx/cuda/sphere_collider.hpp>
+/// What only the CUDA collider promises: streams, graphs, threads, any size.
 #include <jfpx/error.hpp>
 
-#include "src/cuda/device_buffer.hpp"
-#include "src/cuda/probe_cuda.hpp"
 #include "src/shared/sphere_pair.hpp"
-#include "tests/support/sphere_fixtures.hpp"
+#include "tests/cuda/cuda_fixture.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cstdlib>
 #include <thread>
 
 namespace jfpx::inline JFPX_ABI::test {
 namespace {
-
-using namespace cuda;
-using Spheres = std::vector<SphereInstance>;
-
-TEST(CudaBackend, WithoutADeviceItIsUnavailableAndSaysWhy) {
-  const BackendStatus status = probe();
-  if (status.usable) GTEST_SKIP() << "there is a device: " << status.device;
-  EXPECT_FALSE(status.reason.empty());
-  EXPECT_TRUE(status.compiled);
-  try {
-    make_sphere_collider({.backend = Backend::cuda});
-    ADD_FAILURE() << "BackendUnavailable was not thrown";
-  } catch (const BackendUnavailable& e) {
-    EXPECT_EQ(std::string(e.what()), "cuda: " + status.reason);
-  }
-  EXPECT_THROW(DeviceSphereCollider(nullptr), BackendUnavailable);
-  EXPECT_EQ(make_sphere_collider({})->backend(), Backend::x86);
-}
-
-TEST(CudaBackend, ADeviceThatIsNotThereIsUnavailable) {
-  EXPECT_FALSE(probe(1000).usable);
-  EXPECT_FALSE(probe(-1).usable);
-  EXPECT_THROW(make_sphere_collider({.backend = Backend::cuda, .device = 1000}),
-               BackendUnavailable);
-}
-
-/// Tests that need a device: skipped without one, failed if the environment insists.
-class Cuda : public testing::Test {
- protected:
-  void SetUp() override {
-    const BackendStatus status = probe();
-    usable_ = status.usable;
-    if (usable_) return;
-    if (std::getenv("JFPX_REQUIRE_CUDA") != nullptr) FAIL() << status.reason;
-    GTEST_SKIP() << status.reason;
-  }
-  void TearDown() override {
-    inject_fault(-1, cudaSuccess);
-    if (usable_) {
-      EXPECT_EQ(cudaGetLastError(), cudaSuccess) << "an error was left behind";
-    }
-  }
-
-  static std::unique_ptr<SphereCollider> make(
-      SphereAlgorithm algorithm = SphereAlgorithm::automatic) {
-    return make_sphere_collider({.backend = Backend::cuda, .algorithm = algorithm});
-  }
-  static std::size_t free_bytes() {
-    std::size_t free = 0, total = 0;
-    JFPX_CUDA_TRY(cudaDeviceSynchronize());
-    JFPX_CUDA_TRY(cudaMemGetInfo(&free, &total));
-    return free;
-  }
-
- private:
-  bool usable_ = false;
-};
-
-/// Input and output of a search on a stream.
-struct DeviceData {
-  explicit DeviceData(const Spheres& input, std::size_t capacity) : stream(0), pool(0) {
-    spheres.grow(pool, stream.get(), input.size() + 1, "spheres");
-    contacts.grow(pool, stream.get(), capacity + 1, "contacts");
-    count.grow(1, "count");
-    upload(input);
-  }
-  ~DeviceData() { static_cast<void>(cudaStreamSynchronize(stream.get())); }
-  void upload(const Spheres& input) {
-    JFPX_CUDA_TRY(cudaMemcpyAsync(spheres.data(), input.data(),
-                                  input.size() * sizeof(SphereInstance), cudaMemcpyHostToDevice,
-                                  stream.get()));
-  }
-  void wait() const { JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get())); }
-  template <typename T>
-  std::vector<T> download(const T* from, std::size_t n) const {
-    std::vector<T> to(n);
-    JFPX_CUDA_TRY(
-        cudaMemcpyAsync(to.data(), from, n * sizeof(T), cudaMemcpyDeviceToHost, stream.get()));
-    wait();
-    return to;
-  }
-
-  OwnedStream stream;
-  MemoryPool pool;
-  DeviceBuffer<SphereInstance> spheres;
-  DeviceBuffer<SphereContact> contacts;
-  PinnedBuffer<ContactCount> count;
-};
 
 constexpr SphereAlgorithm kAlgorithms[] = {SphereAlgorithm::all_pairs,
                                            SphereAlgorithm::sorted_tiles};
@@ -142,6 +48,46 @@ TEST_F(Cuda, AllPairsInBandsAgreesWithTheGrid) {
   const auto grid = make(SphereAlgorithm::sorted_tiles);
   EXPECT_TRUE(same_bits(grid->find_contacts(spheres), all_pairs->find_contacts(spheres)))
       << seed_note();
+}
+
+// Beyond 2^18 spheres each phase of the grid is a launch of its own. The oracle is x86.
+TEST_F(Cuda, SearchesOfManyLaunchesEqualX86) {
+  constexpr std::size_t kEdge = 1 << 18;
+  const auto x86 = make_sphere_collider({.backend = Backend::x86, .threads = 0});
+  const auto collider = make();
+  for (const std::string_view name :
+       {"uniform", "lattice", "line", "plane", "polydisperse", "far", "outliers", "touching"}) {
+    Random random(base_seed());
+    const std::size_t n = kEdge - 1 + random.below(3) + random.below(2) * random.below(50'000);
+    const auto spheres = sphere_kind(name).make(n, random);
+    ASSERT_TRUE(same_bits(collider->find_contacts(spheres), x86->find_contacts(spheres)))
+        << name << ", N = " << n << ", " << seed_note();
+  }
+}
+
+TEST_F(Cuda, SearchesOfManyLaunchesNameBadSpheresAndGrowTheirBuffers) {
+  constexpr std::size_t kN = 300'000;
+  const auto collider = make();
+  // 500 spheres in one place, between eight of a lattice whose spheres are apart; then groups of
+  // 200 as well: far more contacts than were reserved.
+  Spheres spheres = make_lattice(67, 3);
+  spheres.resize(kN);
+  const Vec3 between = spheres[0].centre + Vec3{1.5, 1.5, 1.5};
+  for (std::size_t i = 0; i < 500; ++i) spheres[599 * i].centre = between;
+  EXPECT_EQ(collider->find_contacts(spheres).size(), 500u * 499 / 2);
+  for (std::size_t i = 0; i < kN; ++i) spheres[i].centre = spheres[i / 200 * 200].centre;
+  const auto x86 = make_sphere_collider({.backend = Backend::x86, .threads = 0});
+  const ContactSpan contacts = collider->find_contacts(spheres);
+  EXPECT_GT(contacts.size(), 20'000'000u);
+  EXPECT_TRUE(same_bits(contacts, x86->find_contacts(spheres)));
+  spheres[123'456].radius = -1;
+  spheres[200'000].centre.x = std::numeric_limits<Real>::infinity();
+  try {
+    collider->find_contacts(spheres);
+    ADD_FAILURE() << "InvalidArgument was not thrown";
+  } catch (const InvalidArgument& e) {
+    EXPECT_EQ(std::string(e.what()).find("sphere 123456: radius is -1"), 0u) << e.what();
+  }
 }
 
 // One sphere over 100 000 others: its list is as long as there are spheres. With index 0 it is a in
@@ -334,74 +280,6 @@ TEST_F(Cuda, CollidersInSeveralThreadsAreIndependent) {
       }
     });
   }
-}
-
-/// Fails every CUDA call of `work` in turn, until it makes fewer calls than that.
-template <typename Work>
-void with_every_call_failing(cudaError_t error, Work&& work) {
-  for (long call = 0; call < 500; ++call) {
-    inject_fault(call, error);
-    bool threw = false;
-    try {
-      work();
-    } catch (const DeviceError& e) {
-      threw = true;
-      EXPECT_NE(std::string(e.what()).find(cudaGetErrorName(error)), std::string::npos) << e.what();
-      EXPECT_NE(std::string(e.what()).find("src/cuda/"), std::string::npos) << e.what();
-    } catch (const OutOfMemory& e) {
-      threw = true;
-      EXPECT_NE(std::string(e.what()).find(" bytes of "), std::string::npos) << e.what();
-    }
-    const bool reached = take_injected_fault() == cudaSuccess && threw;
-    inject_fault(-1, cudaSuccess);
-    if (!reached) return;
-  }
-  ADD_FAILURE() << "more than 500 CUDA calls";
-}
-
-TEST_F(Cuda, AnyFailingCallIsAnErrorAndTheColliderGoesOn) {
-  Random random(base_seed());
-  const auto spheres = sphere_kind("uniform").make(3000, random);
-  const auto expected = brute_force(spheres);
-  const std::vector<SpherePair> pairs(100, {1, 2});
-  for (const cudaError_t error : {cudaErrorMemoryAllocation, cudaErrorLaunchOutOfResources}) {
-    for (const SphereAlgorithm algorithm :
-         {SphereAlgorithm::automatic, SphereAlgorithm::sorted_tiles}) {
-      std::unique_ptr<SphereCollider> collider;
-      with_every_call_failing(error, [&] {
-        collider = make(algorithm);  // anew each time: what grows, grows under the fault
-        collider->find_contacts(spheres);
-        collider->test_pairs(spheres, pairs);
-      });
-      const auto survivor = make(algorithm);
-      with_every_call_failing(error, [&] { survivor->find_contacts(spheres); });
-      EXPECT_TRUE(same_bits(survivor->find_contacts(spheres), expected)) << seed_note();
-      EXPECT_EQ(survivor->test_pairs(spheres, pairs).size(), pairs.size());
-    }
-  }
-}
-
-TEST_F(Cuda, NothingLeaksWhetherItFailsOrNot) {
-  Random random(base_seed());
-  const auto spheres = sphere_kind("uniform").make(30'000, random);
-  const auto use = [&] { make()->find_contacts(spheres); };
-  use();
-  const std::size_t before = free_bytes();
-  for (int i = 0; i < 10; ++i) use();
-  with_every_call_failing(cudaErrorMemoryAllocation, use);
-  EXPECT_EQ(free_bytes(), before);
-}
-
-TEST_F(Cuda, WarmCallsTakeNoMemory) {
-  Random random(base_seed());
-  const auto collider = make();
-  const auto spheres = sphere_kind("uniform").make(30'000, random);
-  for (int i = 0; i < 3; ++i) collider->find_contacts(spheres);
-  const std::size_t before = free_bytes();
-  for (int i = 0; i < 5; ++i) {
-    collider->find_contacts(sphere_kind("uniform").make(29'000 + random.below(1000), random));
-  }
-  EXPECT_EQ(free_bytes(), before);
 }
 
 }  // namespace

@@ -53,16 +53,18 @@ Pair nearly_touching(Random& random) {
 
 /// Whether the search looks from the smaller sphere (or, at equal levels, from either) into the
 /// cell of the other one.
-bool is_in_reach(const SphereInstance& from, const SphereInstance& to, Real half_0) {
-  const cuda::GridCell cell = cuda::grid_cell_of(to, half_0);
-  const Real half = cuda::half_cell_of(half_0, cell.level);
+bool is_in_reach(const SphereInstance& from, const SphereInstance& to,
+                 const cuda::GridScale& scale) {
+  const cuda::GridCell cell = cuda::grid_cell_of(to, scale);
+  const Real half = cuda::half_cell_of(scale.half_0, cell.level);
   const Real inverse = cuda::inverse_width(half);
   const Real reach = cuda::reach_of(from.radius, half);
   const std::int32_t cells[3] = {cell.x, cell.y, cell.z};
   for (int i = 0; i < 3; ++i) {
     const Real x = from.centre[i];
-    if (cells[i] < cuda::cell_of(cuda::moved(x, -reach), inverse)) return false;
-    if (cells[i] > cuda::cell_of(cuda::moved(x, reach), inverse)) return false;
+    const Real cells_a_metre = i == 0 ? inverse * scale.x_cells : inverse;
+    if (cells[i] < cuda::cell_of(cuda::moved(x, -reach), cells_a_metre)) return false;
+    if (cells[i] > cuda::cell_of(cuda::moved(x, reach), cells_a_metre)) return false;
   }
   return true;
 }
@@ -103,19 +105,21 @@ TEST(CudaGrid, TouchingSpheresAreInReachOfEachOther) {
     Real half_0 = cuda::half_cell_for_radius(std::max(p.a.radius, p.b.radius));
     if (random.below(2) == 0) half_0 = std::max(half_0, half_0 * random.uniform(1, 1000));
     if (!is_finite(half_0)) continue;
-    const int level_a = cuda::level_of(p.a, half_0), level_b = cuda::level_of(p.b, half_0);
+    const cuda::GridScale scale{half_0, static_cast<int>(random.below(cuda::kLastLevel + 1)),
+                                random.below(2) == 0 ? Real(1) : Real(2)};
+    const int level_a = cuda::level_of(p.a, scale), level_b = cuda::level_of(p.b, scale);
     const auto note = [&] { return "pair " + std::to_string(i) + ", " + seed_note(); };
     if (level_a >= level_b) {
-      ASSERT_TRUE(is_in_reach(p.a, p.b, half_0)) << note();
+      ASSERT_TRUE(is_in_reach(p.a, p.b, scale)) << note();
     }
     if (level_b >= level_a) {
-      ASSERT_TRUE(is_in_reach(p.b, p.a, half_0)) << note();
+      ASSERT_TRUE(is_in_reach(p.b, p.a, scale)) << note();
     }
     const bool a_is_wide = level_a < level_b;
     const SphereInstance& wide = a_is_wide ? p.a : p.b;
     const SphereInstance& fine = a_is_wide ? p.b : p.a;
     if (level_a != level_b && cuda::is_far(wide)) {
-      ASSERT_GE(std::min(level_a, level_b), cuda::widest_far_level(fine, half_0)) << note();
+      ASSERT_GE(std::min(level_a, level_b), cuda::widest_far_level(fine, scale)) << note();
     }
   }
   EXPECT_GT(touching, 200'000) << "the hunt must meet touching pairs";
@@ -126,7 +130,7 @@ TEST(CudaGrid, ASphereLooksAtFewCells) {
   for (int i = 0; i < 200'000; ++i) {
     const Pair p = nearly_touching(random);
     const Real half_0 = cuda::half_cell_for_radius(std::max(p.a.radius, p.b.radius));
-    const cuda::GridCell cell = cuda::grid_cell_of(p.a, half_0);
+    const cuda::GridCell cell = cuda::grid_cell_of(p.a, {half_0});
     const Real half = cuda::half_cell_of(half_0, cell.level);
     const Real reach = cuda::reach_of(p.a.radius, half), inverse = cuda::inverse_width(half);
     for (int axis = 0; axis < 3; ++axis) {
@@ -140,14 +144,16 @@ TEST(CudaGrid, ASphereLooksAtFewCells) {
 
 TEST(CudaGrid, LevelsHalveFromTheLargestSphereOn) {
   const Real half_0 = Real(0.75);
-  EXPECT_EQ(cuda::level_for(Real(0.75), half_0), 0);
-  EXPECT_EQ(cuda::level_for(Real(0.5), half_0), 0);
-  EXPECT_EQ(cuda::level_for(Real(0.375), half_0), 1);
-  EXPECT_EQ(cuda::level_for(std::nextafter(Real(0.375), Real(1)), half_0), 0);
-  EXPECT_EQ(cuda::level_for(Real(0.75) / 1024, half_0), 10);
-  EXPECT_EQ(cuda::level_for(Real(1e-30), half_0), cuda::kLastLevel);
-  EXPECT_EQ(cuda::level_for(Real(3), half_0), -2);
+  EXPECT_EQ(cuda::level_for(Real(0.75), {half_0}), 0);
+  EXPECT_EQ(cuda::level_for(Real(0.5), {half_0}), 0);
+  EXPECT_EQ(cuda::level_for(Real(0.375), {half_0}), 1);
+  EXPECT_EQ(cuda::level_for(std::nextafter(Real(0.375), Real(1)), {half_0}), 0);
+  EXPECT_EQ(cuda::level_for(Real(0.75) / 1024, {half_0}), 10);
+  EXPECT_EQ(cuda::level_for(Real(1e-30), {half_0}), cuda::kLastLevel);
+  EXPECT_EQ(cuda::level_for(Real(3), {half_0}), -2);
   EXPECT_EQ(cuda::half_cell_of(half_0, 3), Real(0.09375));
+  EXPECT_EQ(cuda::level_for(Real(0.75) / 1024, {half_0, 6}), 6);
+  EXPECT_EQ(cuda::level_for(Real(0.375), {half_0, 6}), 1);
 }
 
 // Lines along every axis and diagonal, a plane and a cube: with as many cells as buckets, no bucket

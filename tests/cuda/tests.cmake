@@ -10,6 +10,8 @@ jfpx_add_test(cuda_filter_test
 jfpx_add_test(cuda_test
   SOURCES
     cuda/cuda_test.cpp
+    cuda/cuda_fault_test.cpp
+    cuda/cuda_huge_test.cpp
     support/sphere_fixtures.cpp
   LINK jfpx_cuda CUDA::cudart_static)
 jfpx_add_test(cuda_pair_tests_test

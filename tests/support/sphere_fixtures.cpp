@@ -298,6 +298,11 @@ std::uint64_t base_seed() {
   return seed;
 }
 
+std::size_t scaled(std::size_t n) {
+  const char* const divisor = std::getenv("JFPX_TEST_DIVISOR");
+  return divisor == nullptr ? n : n / std::max(1ul, std::strtoul(divisor, nullptr, 10));
+}
+
 std::string seed_note() { return "repeat with JFPX_TEST_SEED=" + std::to_string(base_seed()); }
 
 }  // namespace jfpx::inline JFPX_ABI::test

@@ -42,6 +42,8 @@ testing::AssertionResult same_bits(std::span<const PairResult> actual,
 
 /// Base of all seeds of this run: JFPX_TEST_SEED if set, else fresh from the system.
 std::uint64_t base_seed();
+/// n, or n / JFPX_TEST_DIVISOR if that is set: smaller tests for slow machines and checking tools.
+std::size_t scaled(std::size_t n);
 /// To be streamed into a failing assertion or SCOPED_TRACE: how to repeat this run.
 std::string seed_note();
 
