@@ -15,7 +15,7 @@ namespace jfpx::inline JFPX_ABI {
 enum class SphereAlgorithm : std::uint8_t {
   automatic,
   all_pairs,     ///< every pair is looked at: best for some hundreds of spheres
-  sorted_tiles,  ///< spheres sorted by place, only neighbours are looked at: best beyond
+  sorted_tiles,  ///< sorted into tiles of space, the cells of grids; only neighbours are looked at
 };
 
 /// "automatic", "all pairs" or "sorted tiles".
