@@ -131,7 +131,8 @@ class Searcher {
   }
 
   /// Looks up the next rows of the level. A row that goes on at the start of the table has
-  /// candidates from n on: those from 0 on.
+  /// candidates from n on: those from 0 on. (2 n fits into 32 bits: for more spheres than 2^31 no
+  /// device has the memory.)
   __device__ void collect_ranges() {
     uint2 ranges[kRowsAtOnce];
     std::uint32_t keys[kRowsAtOnce];
