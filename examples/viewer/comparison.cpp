@@ -30,15 +30,45 @@ std::vector<Bits> sorted(std::span<const Contact> contacts) {
   return bits;
 }
 
-Vec3 moments_of_inertia(const BodyDef& body) {
-  if (const Box* box = std::get_if<Box>(&body.shape)) {
-    const Vec3 squares = component_product(box->half_extents, box->half_extents);
-    const Real k = body.mass / 3;
-    return {k * (squares.y + squares.z), k * (squares.x + squares.z), k * (squares.x + squares.y)};
+Real volume_of(const Sphere& sphere) {
+  return Real(4) / 3 * kPi * sphere.radius * sphere.radius * sphere.radius;
+}
+Real volume_of(const Box& box) {
+  return 8 * box.half_extents.x * box.half_extents.y * box.half_extents.z;
+}
+
+Mat3 inertia_of(const Sphere& sphere, Real mass) {
+  const Real i = Real(0.4) * mass * sphere.radius * sphere.radius;
+  return diagonal({i, i, i});
+}
+Mat3 inertia_of(const Box& box, Real mass) {
+  const Vec3 squares = component_product(box.half_extents, box.half_extents);
+  const Real k = mass / 3;
+  return diagonal(
+      {k * (squares.y + squares.z), k * (squares.x + squares.z), k * (squares.x + squares.y)});
+}
+Mat3 inertia_of(const Assembly& assembly, Real mass) {
+  const auto weight = [](const AssemblyPart& part) {
+    return part.density * std::visit([](const auto& s) { return volume_of(s); }, part.shape);
+  };
+  Real whole = 0;
+  for (const AssemblyPart& part : assembly.parts) whole += weight(part);
+  Mat3 sum = diagonal({});
+  for (const AssemblyPart& part : assembly.parts) {
+    const Real m = mass * weight(part) / whole;
+    const Mat3 own = std::visit([m](const auto& s) { return inertia_of(s, m); }, part.shape);
+    const Mat3 turn = to_matrix(part.orientation), arm = skew_symmetric(part.position);
+    sum = sum + turn * own * transposed(turn) + arm * transposed(arm) * m;  // parallel axes
   }
-  const Sphere* sphere = std::get_if<Sphere>(&body.shape);
-  const Real i = sphere != nullptr ? Real(0.4) * body.mass * sphere->radius * sphere->radius : 0;
-  return {i, i, i};
+  return sum;
+}
+Mat3 inertia_of(const HalfSpace&, Real) { return diagonal({}); }
+Mat3 inertia_of(const Plane&, Real) { return diagonal({}); }
+
+Mat3 inertia_of(const BodyDef& body) {
+  if (body.inertia) return *body.inertia;
+  return std::visit([&body](const auto& shape) { return inertia_of(shape, body.mass); },
+                    body.shape);
 }
 
 }  // namespace
@@ -71,7 +101,7 @@ double energy(const Scene& scene, std::span<const BodyState> states) {
     const BodyDef& body = scene.bodies[i];
     const BodyState& s = states[i];
     const Vec3 spin = transform_transpose(to_matrix(s.orientation), s.angular_velocity);
-    const Vec3 momentum = component_product(moments_of_inertia(body), spin);
+    const Vec3 momentum = inertia_of(body) * spin;
     sum +=
         static_cast<double>(body.mass * length_squared(s.velocity) / 2 + dot(momentum, spin) / 2 -
                             body.mass * dot(body.acceleration, s.position));

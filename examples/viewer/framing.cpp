@@ -1,6 +1,8 @@
 /// Where the camera stands at first.
 #include "examples/viewer/framing.hpp"
 
+#include "examples/viewer/values.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -19,9 +21,7 @@ Real distance_for(const Camera& camera, const Bounds& bounds, const Scene& scene
     const BodyDef& body = scene.bodies[i];
     const Vec3 p = moment.states[i].position - bounds.centre;
     if (body.mass == 0 || length(p) > bounds.radius) continue;
-    const Sphere* sphere = std::get_if<Sphere>(&body.shape);
-    const Box* box = std::get_if<Box>(&body.shape);
-    const Real size = sphere ? sphere->radius : box ? length(box->half_extents) : Real(0);
+    const Real size = size_of(body.shape);
     needed.push_back(std::max((std::fabs(dot(p, view.right)) + size) / wide,
                               (std::fabs(dot(p, view.up)) + size) / tall) -
                      dot(p, view.forward));

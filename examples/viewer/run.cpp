@@ -39,7 +39,7 @@ Scene with_states(const Scene& scene, const std::vector<BodyState>& states) {
   Scene moved = scene;
   for (std::size_t i = 0; i < moved.bodies.size(); ++i) {
     BodyDef& body = moved.bodies[i];
-    if (body.mass == 0) continue;
+    if (body.mass == 0 && !body.kinematic) continue;
     body.position = states[i].position;
     body.orientation = states[i].orientation;
     body.velocity = states[i].velocity;

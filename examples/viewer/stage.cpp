@@ -19,12 +19,6 @@ constexpr Real kEndless = kMaxReal / 4;
 
 bool movable(const BodyDef& body) { return body.mass > 0; }
 
-Real size_of(const BodyDef& body) {
-  if (const Sphere* sphere = std::get_if<Sphere>(&body.shape)) return sphere->radius;
-  if (const Box* box = std::get_if<Box>(&body.shape)) return length(box->half_extents);
-  return 0;
-}
-
 /// The middle one, and the ones `left_out` from both ends.
 struct Spread {
   Real low, high;
@@ -58,9 +52,9 @@ Bounds bounds_of(const Scene& scene, const std::vector<BodyState>& states) {
   for (const bool wanted : {true, false}) {  // what moves; in a scene where nothing does, the rest
     for (std::size_t i = 0; i < scene.bodies.size() && i < states.size(); ++i) {
       const BodyDef& body = scene.bodies[i];
-      if (movable(body) != wanted || std::holds_alternative<HalfSpace>(body.shape)) continue;
+      if (movable(body) != wanted || is_endless(body.shape)) continue;
       for (int axis = 0; axis < 3; ++axis) along[axis].push_back(states[i].position[axis]);
-      largest = std::max(largest, size_of(body));
+      largest = std::max(largest, size_of(body.shape));
     }
     if (!along[0].empty()) break;
   }
@@ -78,7 +72,7 @@ Stage::Stage(const Scene& scene) : scene_(scene) {
   std::vector<Real> sizes;
   for (const BodyDef& body : scene_.bodies) {
     if (!movable(body)) continue;
-    sizes.push_back(size_of(body));
+    sizes.push_back(size_of(body.shape));
     falls_ = falls_ || body.acceleration.y < 0;
   }
   if (!sizes.empty()) {
@@ -101,7 +95,7 @@ void Stage::find_room() {
     if (movable(body)) continue;
     const Box* box = std::get_if<Box>(&body.shape);
     const bool level = body.orientation == Quat{};
-    if (box == nullptr || !level || length(box->half_extents) < bounds.radius) {
+    if (box == nullptr || !level || body.kinematic || length(box->half_extents) < bounds.radius) {
       obstacles_.push_back(i);
       continue;
     }
@@ -121,7 +115,10 @@ void Stage::find_room() {
 Paint Stage::paint(std::uint32_t body) const {
   const BodyDef& def = scene_.bodies[body];
   if (!movable(def)) return kConcrete;
-  return std::holds_alternative<Box>(def.shape) ? crate_paint(body) : ball_paint(body);
+  if (std::holds_alternative<Box>(def.shape)) return crate_paint(body);
+  Paint paint = ball_paint(body);
+  if (std::holds_alternative<Assembly>(def.shape)) paint.pattern = Pattern::plain;
+  return paint;
 }
 
 void Stage::draw_still(const Bounds& bounds, Drawing* drawing) const {
@@ -130,6 +127,12 @@ void Stage::draw_still(const Bounds& bounds, Drawing* drawing) const {
     const BodyDef& body = scene_.bodies[i];
     if (const HalfSpace* plane = std::get_if<HalfSpace>(&body.shape)) {
       drawing->add_ground(plane->normal, plane->offset, cell, kFloor);
+    }
+    if (const Plane* plane = std::get_if<Plane>(&body.shape)) {
+      // Seen from the side where the bodies are, so that it does not hide them.
+      const bool front = dot(plane->normal, bounds.centre) >= plane->offset;
+      const Vec3 normal = front ? plane->normal : -plane->normal;
+      drawing->add_ground(normal, front ? plane->offset : -plane->offset, cell, kFloor);
     }
   }
   for (const std::uint32_t i : walls_) {
@@ -173,11 +176,22 @@ void Stage::draw(const Moment& from, const Moment& to, Real share, Colouring col
     Paint paint = this->paint(i);
     if (!still && !values.empty()) paint = scale_paint(values[i]);
     if (!still && to.awake[i] == 0) paint = dimmed(paint);
-    if (const Sphere* sphere = std::get_if<Sphere>(&def.shape)) {
-      if (still) paint.pattern = Pattern::plain;
-      drawing->add_sphere(position, sphere->radius, turn, paint);
-    } else if (const Box* box = std::get_if<Box>(&def.shape)) {
-      drawing->add_box(position, box->half_extents, turn, paint);
+    if (still && !def.kinematic) paint.pattern = Pattern::plain;
+    if (still && std::holds_alternative<Box>(def.shape)) paint.pattern = Pattern::wall;
+    draw_shape(def.shape, {position, turn, {}, {}}, paint, drawing);
+  }
+}
+
+void Stage::draw_shape(const Shape& shape, const BodyState& at, Paint paint,
+                       Drawing* drawing) const {
+  if (const Sphere* sphere = std::get_if<Sphere>(&shape)) {
+    drawing->add_sphere(at.position, sphere->radius, at.orientation, paint);
+  } else if (const Box* box = std::get_if<Box>(&shape)) {
+    drawing->add_box(at.position, box->half_extents, at.orientation, paint);
+  } else if (const Assembly* assembly = std::get_if<Assembly>(&shape)) {
+    for (const AssemblyPart& part : assembly->parts) {
+      draw_shape(std::visit([](const auto& s) { return Shape(s); }, part.shape), placed(part, at),
+                 paint, drawing);
     }
   }
 }
@@ -195,7 +209,7 @@ void Stage::draw_contacts(const std::vector<Contact>& contacts, bool red, Drawin
 void Stage::draw_mark(const Moment& moment, std::uint32_t body, Drawing* drawing) const {
   const Shape& shape = scene_.bodies[body].shape;
   const Box* box = std::get_if<Box>(&shape);
-  const Real size = size_of(scene_.bodies[body]);
+  const Real size = size_of(shape);
   const Vec3 half = (box != nullptr ? box->half_extents : Vec3{size, size, size}) * Real(1.06);
   const Transform pose =
       make_transform(moment.states[body].orientation, moment.states[body].position);

@@ -51,6 +51,7 @@ class Stage {
 
  private:
   void find_room();
+  void draw_shape(const Shape& shape, const BodyState& at, Paint paint, Drawing* drawing) const;
   void draw_still(const Bounds& bounds, Drawing* drawing) const;
 
   Scene scene_;

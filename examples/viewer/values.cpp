@@ -60,6 +60,40 @@ Real ray_distance(const Box& box, const BodyState& state, const Vec3& from, cons
   return enter <= leave ? enter : kMaxReal;
 }
 
+// Planes are never picked: they do not move.
 Real ray_distance(const HalfSpace&, const BodyState&, const Vec3&, const Vec3&) { return kMaxReal; }
+Real ray_distance(const Plane&, const BodyState&, const Vec3&, const Vec3&) { return kMaxReal; }
+
+Real ray_distance(const Assembly& assembly, const BodyState& state, const Vec3& from,
+                  const Vec3& direction) {
+  Real nearest = kMaxReal;
+  for (const AssemblyPart& part : assembly.parts) {
+    const BodyState place = placed(part, state);
+    const auto distance = [&](const auto& s) { return ray_distance(s, place, from, direction); };
+    nearest = std::min(nearest, std::visit(distance, part.shape));
+  }
+  return nearest;
+}
+
+Real size_of(const Shape& shape) {
+  if (const Sphere* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
+  if (const Box* box = std::get_if<Box>(&shape)) return length(box->half_extents);
+  Real size = 0;
+  if (const Assembly* assembly = std::get_if<Assembly>(&shape)) {
+    for (const AssemblyPart& part : assembly->parts) {
+      const Real own = std::visit([](const auto& s) { return size_of(Shape(s)); }, part.shape);
+      size = std::max(size, length(part.position) + own);
+    }
+  }
+  return size;
+}
+
+BodyState placed(const AssemblyPart& part, const BodyState& body) {
+  return {to_world_point(body, part.position), body.orientation * part.orientation, {}, {}};
+}
+
+bool is_endless(const Shape& shape) {
+  return std::holds_alternative<HalfSpace>(shape) || std::holds_alternative<Plane>(shape);
+}
 
 }  // namespace jfpx::inline JFPX_ABI::view

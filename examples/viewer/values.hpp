@@ -16,5 +16,16 @@ Real ray_distance(const Sphere& sphere, const BodyState& state, const Vec3& from
 Real ray_distance(const Box& box, const BodyState& state, const Vec3& from, const Vec3& direction);
 Real ray_distance(const HalfSpace& plane, const BodyState& state, const Vec3& from,
                   const Vec3& direction);
+Real ray_distance(const Plane& plane, const BodyState& state, const Vec3& from,
+                  const Vec3& direction);
+Real ray_distance(const Assembly& assembly, const BodyState& state, const Vec3& from,
+                  const Vec3& direction);
+
+/// Radius of a ball around the body's position that holds the shape [m]; 0 for planes.
+Real size_of(const Shape& shape);
+/// Where a part of an assembly is.
+BodyState placed(const AssemblyPart& part, const BodyState& body);
+/// True for shapes without end.
+bool is_endless(const Shape& shape);
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -328,6 +328,52 @@ TEST(Comparison, EnergyIsKineticPlusPotential) {
   EXPECT_NEAR(energy(scene, std::vector{turned}), 24 + 62.5 + 210, 1e-3);
 }
 
+TEST(Comparison, EnergyOfAnAssemblyHasItsArms) {
+  Scene scene;
+  BodyDef dumbbell;
+  dumbbell.shape = Assembly{
+      {{.shape = Sphere{1}, .position = {-3, 0, 0}}, {.shape = Sphere{1}, .position = {3, 0, 0}}}};
+  dumbbell.mass = 2;
+  dumbbell.acceleration = {};
+  scene.bodies = {dumbbell};
+  const BodyState state{{}, {}, {}, {0, 0, 1}};
+  // Two balls of 1 kg: (0.4 + 9) 1/2 each
+  EXPECT_NEAR(energy(scene, std::vector{state}), 9.4, 1e-4);
+  scene.bodies[0].inertia = diagonal({1, 1, 7});
+  EXPECT_NEAR(energy(scene, std::vector{state}), 3.5, 1e-4);
+}
+
+TEST(Stage, PartsOfAnAssemblyAreDrawnAndPickedWhereTheyAre) {
+  Scene scene;
+  BodyDef body;
+  body.shape = Assembly{{{.shape = Sphere{1}, .position = {-3, 0, 0}},
+                         {.shape = Box{{1, 1, 1}}, .position = {3, 0, 0}}}};
+  body.position = {0, 5, 0};
+  body.orientation = {Real(0.70710678), 0, 0, Real(0.70710678)};  // x points up
+  BodyDef wall;
+  wall.shape = Plane{{1, 0, 0}, -8};
+  wall.mass = 0;
+  scene.bodies = {body, wall};
+  Moment moment;
+  for (const BodyDef& def : scene.bodies) {
+    moment.states.push_back({def.position, def.orientation, {}, {}});
+  }
+  moment.awake = {1, 1};
+  const Stage stage(scene);
+  EXPECT_EQ(stage.pick(moment, {0, 8, 20}, {0, 0, -1}), 0u);  // the box
+  EXPECT_EQ(stage.pick(moment, {0, 2, 20}, {0, 0, -1}), 0u);  // the ball
+  EXPECT_EQ(stage.pick(moment, {0, 5, 20}, {0, 0, -1}), std::nullopt);
+  EXPECT_EQ(stage.pick(moment, {3, 5, 20}, {0, 0, -1}), std::nullopt);
+  Drawing drawing({0, 0, 20});
+  stage.draw(moment, moment, 1, Colouring::bodies, &drawing);
+  ASSERT_EQ(drawing.spheres().size(), 1u);
+  ASSERT_EQ(drawing.boxes().size(), 1u);
+  EXPECT_NEAR(drawing.spheres()[0].centre[1], 2, 1e-4);
+  EXPECT_NEAR(drawing.boxes()[0].centre[1], 8, 1e-4);
+  ASSERT_GE(drawing.grounds().size(), 1u);
+  EXPECT_NEAR(drawing.grounds()[0].height, 8, 1e-4);
+}
+
 TEST(Stage, PickFindsTheNearestMovableBody) {
   Scene scene;
   const auto add = [&scene](Shape shape, const Vec3& at, Real mass) {
