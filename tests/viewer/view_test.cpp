@@ -97,17 +97,17 @@ TEST_F(Pictures, SideBySideFindsNoDifference) {
   EXPECT_THAT(result.output, HasSubstr("0 different contacts"));
   EXPECT_THAT(result.output, HasSubstr("worlds identical"));
   EXPECT_THAT(result.output, HasSubstr(" 0 mismatches"));
-  // Bullet's two pictures are the same, and the native one is another.
+  // Below the titles Bullet's two pictures are the same, and the native one is another.
   const auto image = view::read_png(folder.file("three.png"));
   int same = 0, other = 0;
-  for (int y = 30; y < 100; ++y) {
+  for (int y = 50; y < 100; ++y) {
     for (int x = 2; x < 98; ++x) {
       same += std::equal(image.at(100 + x, y), image.at(100 + x, y) + 3, image.at(200 + x, y));
       other += std::equal(image.at(x, y), image.at(x, y) + 3, image.at(100 + x, y));
     }
   }
-  EXPECT_EQ(same, 70 * 96);
-  EXPECT_LT(other, 70 * 96);
+  EXPECT_EQ(same, 50 * 96);
+  EXPECT_LT(other, 50 * 96);
 }
 
 TEST_F(Pictures, AreRecordedWithNumbers) {
