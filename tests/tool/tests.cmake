@@ -5,8 +5,6 @@ jfpx_add_test(cost_fit_test SOURCES
   tool/cost_fit_test.cpp
   ${PROJECT_SOURCE_DIR}/src/tool/cost_fit.cpp
   support/sphere_fixtures.cpp)
-jfpx_add_test(tool_test SOURCES tool/calibrate_test.cpp tool/tool_test.cpp
-  LINK jfpx_demos nlohmann_json::nlohmann_json)
 foreach(suffix IN ITEMS "" "_f64")
   add_dependencies(tool_test${suffix} jfpx_tool jfpx_tool_f64)
   target_compile_definitions(tool_test${suffix} PRIVATE
