@@ -4,8 +4,8 @@
 #include <jfpx/backend.hpp>
 #include <jfpx/broad_phase.hpp>
 #include <jfpx/collide.hpp>
-#include <jfpx/cost_model.hpp>
 #include <jfpx/contact_generator.hpp>
+#include <jfpx/cost_model.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 #include <jfpx/intersect.hpp>
