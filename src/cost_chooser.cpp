@@ -17,8 +17,8 @@ constexpr int kCallsToSettle = kColdCalls + 3;
 /// as many calls as it takes to settle.
 constexpr double kTrialUs = 300;
 constexpr double kTrialRatio = 2;
-/// Time between trials, in trials: as they take up to twice as long, one costs at most 1 in so
-/// many.
+/// Time between trials, in trials: of one that takes twice as long half is lost, two hundredths of
+/// all.
 constexpr double kTrialsBetween = 25;
 constexpr double kMostPatience = 64;
 /// Deciding and timing takes 0.1 us, and some us where reading the clock is a call of the system:

@@ -15,7 +15,8 @@ def curves(machine):
     """{backend: [(n, ms)]} of the thesis bench."""
     found = {}
     for (backend, n), b in parts(machine.get("thesis")):
-        found.setdefault(backend, []).append((int(n), b["median_ms"]))
+        if backend != "auto":
+            found.setdefault(backend, []).append((int(n), b["median_ms"]))
     return {backend: sorted(points) for backend, points in found.items()}
 
 
