@@ -49,7 +49,9 @@ TEST(Submerged, PartsOfBoxesHaveTheVolumeOfTheFormula) {
       total *= size[k];
     }
     const double expected = cut_volume(size, n, static_cast<double>(offset + reach));
-    ASSERT_NEAR(below.volume, expected, 50 * static_cast<double>(kEpsilon) * total);
+    // The formula divides small differences by the product of the normal's components.
+    const double noise = 50 * static_cast<double>(kEpsilon) + 1e-11;
+    ASSERT_NEAR(below.volume, expected, noise * total);
   }
 }
 
