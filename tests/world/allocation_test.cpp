@@ -13,25 +13,22 @@
 namespace {
 std::atomic<long> allocations{0}, alive{0};
 
+void* counted(void* memory) {
+  if (memory == nullptr) throw std::bad_alloc();
+  ++allocations;
+  ++alive;
+  return memory;
+}
 void release(void* memory) noexcept {
   if (memory != nullptr) --alive;
   std::free(memory);
 }
 }  // namespace
 
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) {
-    ++alive;
-    return memory;
-  }
-  throw std::bad_alloc();
-}
+void* operator new(std::size_t size) { return counted(std::malloc(size)); }
 void* operator new(std::size_t size, std::align_val_t alignment) {
-  ++allocations;
   const auto line = static_cast<std::size_t>(alignment);
-  if (void* memory = std::aligned_alloc(line, (size + line - 1) / line * line)) return memory;
-  throw std::bad_alloc();
+  return counted(std::aligned_alloc(line, (size + line - 1) / line * line));
 }
 void operator delete(void* memory, std::align_val_t) noexcept { release(memory); }
 void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { release(memory); }
