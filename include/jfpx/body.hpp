@@ -10,6 +10,7 @@
 namespace jfpx::inline JFPX_ABI {
 
 /// Names a body of one World for the body's whole life. The id of a removed body never comes back.
+/// In another World it names whatever body has the same place there, or none.
 struct BodyId {
   std::uint32_t index = 0xffffffffu;
   std::uint32_t generation = 0;

@@ -118,6 +118,32 @@ TEST(Motion, CoefficientsOfTwoBodiesCombineAsTheSceneSays) {
   }
 }
 
+TEST(Motion, NewtonsCradleLetsAsManyBallsGoAsCame) {
+  for (const std::size_t coming : {1u, 2u, 3u}) {
+    Scene scene;
+    scene.dt = 0.001_r;
+    for (std::size_t i = 0; i < 5; ++i) {
+      BodyDef def = test::ball({2 * static_cast<Real>(i), 0, 0});
+      def.restitution = 1;
+      if (i < coming) {
+        def.position.x -= 0.0025_r;
+        def.velocity = {2, 0, 0};
+      }
+      scene.bodies.push_back(def);
+    }
+    World world(scene);
+    const test::Sums before = test::sums(world);
+    for (int n = 0; n < 20; ++n) ASSERT_FALSE(world.step().iterations_exhausted);
+    const auto states = world.states();
+    for (std::size_t i = 0; i < 5; ++i) {
+      EXPECT_NEAR(states[i].velocity.x, i + coming >= 5 ? 2 : 0, 0.011) << i << " of " << coming;
+    }
+    const test::Sums after = test::sums(world);
+    EXPECT_NEAR(after.momentum[0], before.momentum[0], 1e-5 * before.scale);
+    EXPECT_NEAR(after.energy, before.energy, 0.02 * before.energy);
+  }
+}
+
 TEST(Motion, ABallRollsDownASlopeWithFiveSeventhsOfThePull) {
   const double angle = 0.3;
   Scene scene;

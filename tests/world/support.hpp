@@ -7,6 +7,8 @@
 #include "src/body_store.hpp"
 #include "src/shared/inertia.hpp"
 
+#include <gtest/gtest.h>
+
 #include <cstdlib>
 #include <random>
 #include <string>
@@ -42,6 +44,31 @@ inline BodyDef half_space(const Vec3& normal, Real offset) {
   return def;
 }
 inline BodyDef ground() { return half_space({0, 1, 0}, 0); }
+
+/// Ten bodies like the lowest, stacked, stay where they are to a millimetre for ten seconds.
+inline void expect_that_ten_stand(const BodyDef& lowest, Real height) {
+  Scene scene;
+  for (int i = 0; i < 10; ++i) {
+    scene.bodies.push_back(lowest);
+    // A hundredth of a millimetre into each other, so that all touch though the sums round.
+    scene.bodies.back().position.y += (height - Real(1e-5)) * static_cast<Real>(i);
+  }
+  scene.bodies.push_back(ground());
+  scene.resolver.position_epsilon = Real(5e-5);  // ten of them are half a millimetre
+  scene.resolver.velocity_epsilon = Real(1e-3);
+  scene.resolver.max_iterations = 100000;
+  World world(scene);
+  bool exhausted = false;
+  for (int n = 0; n < 600; ++n) {
+    exhausted |= world.step().iterations_exhausted;
+    const auto states = world.states();
+    for (std::size_t i = 0; i < 10; ++i) {
+      ASSERT_LT(length(states[i].position - scene.bodies[i].position), Real(1e-3))
+          << n << ", body " << i;
+    }
+  }
+  EXPECT_FALSE(exhausted);
+}
 
 /// Sums over the movable bodies of a world, in double.
 struct Sums {

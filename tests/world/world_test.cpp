@@ -103,6 +103,34 @@ TEST(World, AStrangeIdIsAnError) {
   EXPECT_THROW(world.set_state({7, 0}, {}), InvalidArgument);
 }
 
+TEST(World, AnIdOfAnotherWorldNamesTheBodyInItsPlaceOrNone) {
+  Scene more = two_balls();
+  more.bodies.push_back(test::ball({9, 0, 0}));
+  World here(two_balls());
+  const World other(more);
+  EXPECT_EQ(here.state(other.bodies()[1]), here.states()[1]);
+  EXPECT_THROW(here.state(other.bodies()[2]), InvalidArgument);
+  here.remove(here.bodies()[1]);
+  here.add(test::ball({5, 0, 0}));  // in the same place, but another body
+  EXPECT_THROW(here.state(other.bodies()[1]), InvalidArgument);
+}
+
+TEST(World, AHugeStepIsUndoneWhereItLeadsOutOfTheWorld) {
+  Scene scene;
+  scene.dt = std::numeric_limits<Real>::max();
+  scene.bodies = {test::ball({0, 0, 0}), test::half_space({0, 1, 0}, -1)};
+  World resting(scene);
+  EXPECT_FALSE(resting.step().non_finite);
+  EXPECT_EQ(resting.states()[0].position, Vec3{});
+  scene.bodies[0].velocity = {1, 0, 0};
+  World flying(scene);
+  const auto before = flying.states();
+  const StepReport report = flying.step();
+  EXPECT_TRUE(report.non_finite);
+  EXPECT_EQ(report.non_finite_body, flying.bodies()[0]);
+  EXPECT_EQ(flying.states(), before);
+}
+
 TEST(World, SetStateRefusesWhatAnySceneWould) {
   World world(two_balls());
   const BodyId id = world.bodies()[0];
