@@ -140,6 +140,33 @@ TEST(Erratum, E31_contacts_keep_no_memory) {
   EXPECT_EQ(alive, before);
 }
 
+TEST(Allocation, WarmStepsOfAssembliesAllocateNothingWithAnyBroadPhase) {
+  for (const BroadPhase way : {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {
+    Scene scene;
+    for (int i = 0; i < 10; ++i) {
+      BodyDef def;
+      def.shape = Assembly{{{.shape = Sphere{}, .position = {0, 0, -1}},
+                            {.shape = Sphere{}, .position = {0, 0, 1}},
+                            {.shape = Box{{Real(0.2), Real(0.2), 1}}}}};
+      def.position = {static_cast<Real>(i) * Real(0.9), Real(0.5), 0};
+      def.can_sleep = false;
+      def.restitution = 0;
+      scene.bodies.push_back(def);
+    }
+    scene.bodies.push_back(test::ground());
+    scene.bodies.push_back(test::half_space({1, 0, 0}, -1));
+    WorldSettings settings;
+    settings.broad_phase = way;
+    World world(scene, settings);
+    for (int n = 0; n < 300; ++n) world.step();
+    const long before = allocations;
+    std::uint64_t contacts = 0;
+    for (int n = 0; n < 50; ++n) contacts += world.step().contacts;
+    EXPECT_GT(contacts, 50u * 20u);
+    EXPECT_EQ(allocations, before) << static_cast<int>(way);
+  }
+}
+
 TEST(Allocation, TheCounterCounts) {
   const long before = allocations;
   const auto memory = std::make_unique<int>(1);

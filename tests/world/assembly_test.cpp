@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 
 namespace jfpx {
 namespace {
@@ -292,6 +293,48 @@ TEST(Assembly, RunsTheSameWithAnyNumberOfThreadsAndAlgorithm) {
       if (expected == 0) expected = world.state_hash();
       EXPECT_EQ(world.state_hash(), expected) << threads;
     }
+  }
+}
+
+/// Kinetic and potential, in double.
+double energy(const World& world) {
+  double sum = 0;
+  const auto states = world.states();
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const BodyDef& def = world.scene().bodies[i];
+    if (!(def.mass > 0)) continue;
+    const BodyState& s = states[i];
+    const Mat3 tensor = shared::in_world_axes(
+        mass_properties(std::get<Assembly>(def.shape), def.mass).inertia, to_matrix(s.orientation));
+    sum += static_cast<double>(def.mass * length_squared(s.velocity) / 2);
+    sum += static_cast<double>(dot(s.angular_velocity, tensor * s.angular_velocity) / 2);
+    sum -= static_cast<double>(def.mass * dot(def.acceleration, s.position));
+  }
+  return sum;
+}
+
+/// JFPX_LONG_STEPS makes it longer.
+TEST(Assembly, ALongRunStaysFiniteGainsNoEnergyAndStaysAboveTheGround) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  Scene scene;
+  for (int i = 0; i < 12; ++i) {
+    const Vec3 place = random.uniform_in_box({-3, 4, -3}, {3, 12, 3});
+    BodyDef def = body_of(test::random_assembly(&random), place, random.uniform(1, 5));
+    def.orientation = test::random_turn(&random);
+    def.can_sleep = i % 2 == 0;
+    scene.bodies.push_back(def);
+  }
+  scene.bodies.push_back(test::ground());
+  World world(scene);
+  const double at_first = energy(world);
+  const char* more = std::getenv("JFPX_LONG_STEPS");
+  const int steps = more != nullptr ? std::atoi(more) : 2000;
+  for (int n = 0; n < steps; ++n) {
+    ASSERT_FALSE(world.step().non_finite) << n;
+    for (const BodyState& s : world.states()) ASSERT_GT(s.position.y, -0.05) << n;
+    ASSERT_LE(energy(world), at_first * 1.01) << n;
   }
 }
 
