@@ -221,6 +221,16 @@ void RowSolver::make_tickets(std::span<const std::uint32_t> level_ends, Buffer<T
   flush(total);
 }
 
+/// Threads that find something to do at the same time: no more than a level has tickets on average.
+unsigned RowSolver::useful_threads() const {
+  std::uint32_t stages = 0;
+  for (std::uint32_t i = 0; i < ticket_count_; ++i) {
+    if (i == 0 || tickets_[i].after != tickets_[i - 1].after) ++stages;
+  }
+  const std::uint32_t at_once = ticket_count_ / std::max(stages, 1u);
+  return std::clamp(std::min(at_once, blocks_ / kBlocksPerThread), 1u, pool_.threads());
+}
+
 unsigned RowSolver::set_up_contacts(const rows::RowSettings& settings, std::uint32_t block,
                                     const Real* inputs, Real* second) {
   return kernels_.set_up_contacts(settings, inputs, bodies_.data(),
@@ -290,7 +300,7 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
   }
   main.add(kernels_.torsions[factors], torsion_choice_.tickets.data(),
            torsion_choice_.ticket_count);
-  pool_.run(std::clamp(blocks_ / kBlocksPerThread, 1u, pool_.threads()), [&](std::size_t) {
+  pool_.run(useful_threads(), [&](std::size_t) {
     warm.join();
     push.join();
     wait_until([&] {

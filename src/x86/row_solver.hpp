@@ -134,6 +134,7 @@ class JFPX_API RowSolver {
     }
     make_tickets({choice->level_ends.data(), levels}, &choice->tickets, &choice->ticket_count);
   }
+  unsigned useful_threads() const;
   void make_tickets(std::span<const std::uint32_t> level_ends, Buffer<Ticket>* tickets,
                     std::uint32_t* count);
 

@@ -28,12 +28,15 @@ void ThreadPool::run_shared(const Job& job) {
     const std::lock_guard lock(mutex_);
     job_ = job;
     next_.store(0, std::memory_order_relaxed);
-    busy_ = static_cast<unsigned>(workers_.size());
+    open_ = true;
     ++generation_;
   }
   started_.notify_all();
   take_chunks(job);
+  // All chunks are taken: workers that the system has not let run yet have nothing to come for, and
+  // on a busy machine waiting for them would cost more than the loop.
   std::unique_lock lock(mutex_);
+  open_ = false;
   finished_.wait(lock, [&] { return busy_ == 0; });
   if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
@@ -43,6 +46,8 @@ void ThreadPool::work(std::stop_token stop) {
   std::unique_lock lock(mutex_);
   while (started_.wait(lock, stop, [&] { return generation_ != seen; })) {
     seen = generation_;
+    if (!open_) continue;
+    ++busy_;
     const Job job = job_;
     lock.unlock();
     take_chunks(job);

@@ -15,7 +15,7 @@
 namespace jfpx::inline JFPX_ABI::x86 {
 
 /// The caller is one of the threads; the others sleep between loops. One loop at a time.
-class ThreadPool {
+class JFPX_API ThreadPool {
  public:
   /// @param threads 0: one per core. Fewer are started where the system refuses more.
   explicit ThreadPool(unsigned threads);
@@ -53,7 +53,8 @@ class ThreadPool {
   std::condition_variable finished_;
   Job job_;
   unsigned generation_ = 0;  ///< counts loops, so that a worker joins each once
-  unsigned busy_ = 0;        ///< workers that have not finished the loop
+  bool open_ = false;        ///< whether workers may still join the loop
+  unsigned busy_ = 0;        ///< workers that have joined and not finished it
   std::atomic<std::size_t> next_{0};
   std::exception_ptr error_;
   std::size_t error_chunk_ = 0;
