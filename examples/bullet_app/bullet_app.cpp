@@ -1,5 +1,7 @@
-/// A Bullet program as everybody writes it, with one line changed: the dispatcher.
+/// A Bullet program as everybody writes it, with three lines changed, each of which could be alone.
+#include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dispatcher.hpp>
+#include <jfpx/bullet/dynamics_world.hpp>
 
 #include <btBulletDynamicsCommon.h>
 
@@ -11,8 +13,9 @@ int main() {
   btDefaultCollisionConfiguration configuration;
   jfpx::bullet::CollisionDispatcher dispatcher(&configuration);  // was: btCollisionDispatcher
   btDbvtBroadphase broadphase;
-  btSequentialImpulseConstraintSolver solver;
-  btDiscreteDynamicsWorld world(&dispatcher, &broadphase, &solver, &configuration);
+  jfpx::bullet::ConstraintSolver solver;  // was: btSequentialImpulseConstraintSolver
+  jfpx::bullet::DynamicsWorld world(&dispatcher, &broadphase, &solver,
+                                    &configuration);  // was: btDiscreteDynamicsWorld
   world.setGravity(btVector3(0, -10, 0));
 
   btBoxShape ground_shape(btVector3(50, 50, 50));
@@ -41,5 +44,7 @@ int main() {
               static_cast<unsigned long long>(stats.batches),
               static_cast<unsigned long long>(stats.dispatches),
               static_cast<unsigned long long>(stats.touching));
+  std::printf("%llu contacts solved side by side\n",
+              static_cast<unsigned long long>(solver.stats().contacts));
   for (const auto& body : bodies) world.removeRigidBody(body.get());
 }
