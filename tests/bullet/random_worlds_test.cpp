@@ -19,14 +19,14 @@ std::uint64_t wanted_steps() {
 #endif
 }
 
-/// Bullet's dispatcher, called with other leftovers on the stack.
+/// Bullet's dispatcher, with other leftovers on the stack before each pair. Once a dispatch is not
+/// enough: what a pair finds there is left by the pair before.
 template <int kFill>
 struct StockElsewhere final : btCollisionDispatcher {
   using btCollisionDispatcher::btCollisionDispatcher;
-  void dispatchAllCollisionPairs(btOverlappingPairCache* cache, const btDispatcherInfo& info,
-                                 btDispatcher* dispatcher) override {
+  bool needsCollision(const btCollisionObject* a, const btCollisionObject* b) override {
     fill_stack();
-    btCollisionDispatcher::dispatchAllCollisionPairs(cache, info, dispatcher);
+    return btCollisionDispatcher::needsCollision(a, b);
   }
   [[gnu::noinline]] static void fill_stack() {
     volatile char leftovers[16384];
