@@ -22,7 +22,7 @@ enum RowField : int {
   kFrictionFields = 19,
   // A row against rolling or spinning is laid out like a friction row, but for its axis:
   kRowPresent = 0,  ///< 1 where the contact has such a row, else 0
-  kRowCfm = 18,  ///< of a contact row: softness
+  kRowCfm = 18,     ///< of a contact row: softness
   kRowPushRhs = 19,
   kRowPush = 20,  ///< impulse of the push against penetration so far
   kContactFields = 21,
