@@ -384,10 +384,11 @@ struct ConstraintSolver::Impl {
     const auto body_of = [&](const btCollisionObject* object) {
       return object->getCompanionId() >= 0 ? object->getCompanionId() : fixed;
     };
+    const btVector3 unused_arm(0, 0, 0);
     btSolverConstraint row;
-    self.setupTorsionalFrictionConstraint(row, axis, body_of(contact.manifold->getBody0()),
-                                          body_of(contact.manifold->getBody1()), contact.get(),
-                                          strength, {}, {}, nullptr, nullptr, settings.relaxation);
+    self.setupTorsionalFrictionConstraint(
+        row, axis, body_of(contact.manifold->getBody0()), body_of(contact.manifold->getBody1()),
+        contact.get(), strength, unused_arm, unused_arm, nullptr, nullptr, settings.relaxation);
     const auto at = [&](int field) { return to + static_cast<std::size_t>(field) * lanes + lane; };
     *at(rows::kRowPresent) = 1;
     put_lane(at(rows::kRowTurnA), lanes, row.m_relpos1CrossNormal);
