@@ -8,12 +8,13 @@
 namespace jfpx::inline JFPX_ABI::tool {
 
 bool is_demo(const std::string& name) {
-  return std::ranges::any_of(demos::all(), [&](const auto& entry) { return entry.name == name; });
+  return std::any_of(demos::all().begin(), demos::all().end(),
+                     [&](const auto& entry) { return entry.name == name; });
 }
 
 bool is_only_a_demo(const std::string& name) {
-  return is_demo(name) &&
-         std::ranges::none_of(scenes::all(), [&](const auto& entry) { return entry.name == name; });
+  return is_demo(name) && std::none_of(scenes::all().begin(), scenes::all().end(),
+                                       [&](const auto& entry) { return entry.name == name; });
 }
 
 }  // namespace jfpx::inline JFPX_ABI::tool
