@@ -8,16 +8,7 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
-/// Steps of worlds to run; JFPX_TEST_WORLD_STEPS asks for more, or for less.
-std::uint64_t wanted_steps() {
-  const char* asked = std::getenv("JFPX_TEST_WORLD_STEPS");
-  if (asked != nullptr) return std::strtoull(asked, nullptr, 0);
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
-  return 10'000;
-#else
-  return 100'000;
-#endif
-}
+std::uint64_t wanted_steps() { return wanted_world_steps(10'000, 100'000); }
 
 /// Bullet's dispatcher, with other leftovers on the stack before each pair. Once a dispatch is not
 /// enough: what a pair finds there is left by the pair before.
@@ -25,12 +16,8 @@ template <int kFill>
 struct StockElsewhere final : btCollisionDispatcher {
   using btCollisionDispatcher::btCollisionDispatcher;
   bool needsCollision(const btCollisionObject* a, const btCollisionObject* b) override {
-    fill_stack();
+    fill_stack<kFill>();
     return btCollisionDispatcher::needsCollision(a, b);
-  }
-  [[gnu::noinline]] static void fill_stack() {
-    volatile char leftovers[16384];
-    for (volatile char& c : leftovers) c = static_cast<char>(kFill);
   }
   static std::unique_ptr<btCollisionDispatcher> make(btCollisionConfiguration* configuration,
                                                      const RandomWorld&) {

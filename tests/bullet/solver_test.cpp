@@ -12,16 +12,7 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
-/// Steps of worlds to run; JFPX_TEST_WORLD_STEPS asks for more, or for less.
-std::uint64_t wanted_steps() {
-  const char* asked = std::getenv("JFPX_TEST_WORLD_STEPS");
-  if (asked != nullptr) return std::strtoull(asked, nullptr, 0);
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
-  return 5'000;
-#else
-  return 100'000;
-#endif
-}
+std::uint64_t wanted_steps() { return wanted_world_steps(5'000, 100'000); }
 
 /// Bullet's solver, called with other leftovers on the stack: Bullet 3.24 itself reads
 /// uninitialised memory in rare worlds (see random_worlds_test.cpp).
@@ -31,16 +22,12 @@ struct StockElsewhere final : btSequentialImpulseConstraintSolver {
                       int manifold_count, btTypedConstraint** constraints, int constraint_count,
                       const btContactSolverInfo& info, btIDebugDraw* debug_drawer,
                       btDispatcher* dispatcher) override {
-    fill_stack();
+    fill_stack<kFill>();
     const btScalar result = btSequentialImpulseConstraintSolver::solveGroup(
         bodies, body_count, manifolds, manifold_count, constraints, constraint_count, info,
         debug_drawer, dispatcher);
-    fill_stack();
+    fill_stack<kFill>();
     return result;
-  }
-  [[gnu::noinline]] static void fill_stack() {
-    volatile char leftovers[16384];
-    for (volatile char& c : leftovers) c = static_cast<char>(kFill);
   }
   static WorldParts parts(const SolverWorld&) {
     WorldParts made;

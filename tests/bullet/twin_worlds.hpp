@@ -25,6 +25,25 @@ inline std::uint64_t test_seed() {
   return fixed != nullptr ? std::strtoull(fixed, nullptr, 0) : std::random_device{}();
 }
 
+/// Steps of random worlds to run; JFPX_TEST_WORLD_STEPS asks for more, or for less.
+inline std::uint64_t wanted_world_steps(std::uint64_t in_slow_builds, std::uint64_t otherwise) {
+  const char* asked = std::getenv("JFPX_TEST_WORLD_STEPS");
+  if (asked != nullptr) return std::strtoull(asked, nullptr, 0);
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
+  constexpr bool kSlow = true;
+#else
+  constexpr bool kSlow = false;
+#endif
+  return kSlow ? in_slow_builds : otherwise;
+}
+
+/// Leaves bytes on the stack for those who read it uninitialised.
+template <int kFill>
+[[gnu::noinline]] void fill_stack() {
+  volatile char leftovers[16384];
+  for (volatile char& c : leftovers) c = static_cast<char>(kFill);
+}
+
 /// Who makes the parts of a world that a test may replace.
 struct WorldParts {
   std::function<std::unique_ptr<btSequentialImpulseConstraintSolver>()> solver = [] {
