@@ -348,24 +348,17 @@ JFPX_ROW void solve_contact(const std::int32_t* ids, Real* velocities, const Rea
   residual->add(impulse, inverse, active);
 }
 
-/// One friction row, limited by the impulse of its contact.
+/// A row whose impulse stays within `upper` either way, in the lanes that are active.
 template <class S, bool kFactors>
-JFPX_ROW void solve_friction(const std::int32_t* ids, Real* velocities, const Real* factors,
-                             const Real* contact, Real* row, Residual<S>* residual) {
+JFPX_ROW void solve_limited(const std::int32_t* ids, Real* velocities, const Real* factors,
+                            Real* row, const Vec3Of<S>& axis_a, const Vec3Of<S>& axis_b,
+                            typename S::Vec upper, typename S::Mask active, Residual<S>* residual) {
   constexpr int kLanes = S::kLanes;
-  const auto zero = S::set(0);
-  const auto pressure = S::load(contact + kRowImpulse * kLanes);
-  const auto active = S::less(zero, pressure);
-  if (!S::any(active)) return;
   Movers<S, kFactors> movers(ids, velocities, factors);
-  const auto upper = S::load(row + kRowFriction * kLanes) * pressure;
   const auto lower = S::negate(upper);
   const auto before = S::load(row + kRowImpulse * kLanes);
   const auto inverse = S::load(row + kRowInverse * kLanes);
-  const auto axis = load3<S>(row + kRowAxis * kLanes);
-  const auto axis_a = keep<S>(S::is_real(ids), axis);
-  const auto axis_b = keep<S>(S::is_real(ids + kLanes), -axis);
-  auto impulse = S::load(row + kRowRhs * kLanes) - before * zero;
+  auto impulse = S::load(row + kRowRhs * kLanes) - before * S::set(0);
   impulse = movers.resist(impulse, inverse, axis_a, axis_b, load3<S>(row + kRowTurnA * kLanes),
                           load3<S>(row + kRowTurnB * kLanes));
   const auto sum = before + impulse;
@@ -375,6 +368,20 @@ JFPX_ROW void solve_friction(const std::int32_t* ids, Real* velocities, const Re
   S::store(row + kRowImpulse * kLanes, S::select(active, after, before));
   movers.push(impulse, axis_a, axis_b, row, active);
   residual->add(impulse, inverse, active);
+}
+
+/// One friction row, limited by the impulse of its contact.
+template <class S, bool kFactors>
+JFPX_ROW void solve_friction(const std::int32_t* ids, Real* velocities, const Real* factors,
+                             const Real* contact, Real* row, Residual<S>* residual) {
+  constexpr int kLanes = S::kLanes;
+  const auto pressure = S::load(contact + kRowImpulse * kLanes);
+  const auto active = S::less(S::set(0), pressure);
+  if (!S::any(active)) return;
+  const auto axis = load3<S>(row + kRowAxis * kLanes);
+  solve_limited<S, kFactors>(ids, velocities, factors, row, keep<S>(S::is_real(ids), axis),
+                             keep<S>(S::is_real(ids + kLanes), -axis),
+                             S::load(row + kRowFriction * kLanes) * pressure, active, residual);
 }
 
 /// One row against rolling or spinning: an impulse that only turns, limited by that of its contact.
@@ -387,25 +394,13 @@ JFPX_ROW void solve_torsion(const std::int32_t* ids, Real* velocities, const Rea
   const auto active =
       S::both(S::less(zero, pressure), S::less(zero, S::load(row + kRowPresent * kLanes)));
   if (!S::any(active)) return;
-  Movers<S, kFactors> movers(ids, velocities, factors);
   const auto strength = S::load(row + kRowFriction * kLanes);
-  auto upper = strength * pressure;
-  upper = S::select(S::less(strength, upper), strength, upper);
-  const auto lower = S::negate(upper);
-  const auto before = S::load(row + kRowImpulse * kLanes);
-  const auto inverse = S::load(row + kRowInverse * kLanes);
+  const auto limit = strength * pressure;
+  const auto upper = S::select(S::less(strength, limit), strength, limit);
   const Vec3Of<S> axis_a = {zero, zero, zero};
   const Vec3Of<S> axis_b = -axis_a;  // as Bullet has it, and multiplies with it
-  auto impulse = S::load(row + kRowRhs * kLanes) - before * zero;
-  impulse = movers.resist(impulse, inverse, axis_a, axis_b, load3<S>(row + kRowTurnA * kLanes),
-                          load3<S>(row + kRowTurnB * kLanes));
-  const auto sum = before + impulse;
-  const auto below = S::less(sum, lower), above = S::less(upper, sum);
-  impulse = S::select(below, lower - before, S::select(above, upper - before, impulse));
-  const auto after = S::select(below, lower, S::select(above, upper, sum));
-  S::store(row + kRowImpulse * kLanes, S::select(active, after, before));
-  movers.push(impulse, axis_a, axis_b, row, active);
-  residual->add(impulse, inverse, active);
+  solve_limited<S, kFactors>(ids, velocities, factors, row, axis_a, axis_b, upper, active,
+                             residual);
 }
 
 /// Gives the bodies the impulses that the rows start with.
