@@ -212,6 +212,7 @@ void BatchEngine::add(const CommitCounts& counts) {
   stats_.touching += counts.touching;
   stats_.written += counts.written;
   stats_.sphere_boxes += counts.sphere_boxes;
+  stats_.sphere_planes += counts.sphere_planes;
 }
 
 void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info,

@@ -3,12 +3,17 @@
 /// do the vector arithmetic, so the operations are Bullet's.
 #include "src/bullet/contact_point.hpp"
 
+#include <jfpx/math.hpp>
+
 #include "src/bullet/sphere_box.hpp"
+#include "src/bullet/sphere_plane.hpp"
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/CollisionShapes/btConvexInternalShape.h>
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
 
 #include <new>
@@ -82,6 +87,32 @@ void write_contact(btPersistentManifold* manifold, const PairResult& result,
   point->m_positionWorldOnB = on_b;
   combine_materials(body_a, body_b, point);
   btPlaneSpace1(normal, point->m_lateralFrictionDir1, point->m_lateralFrictionDir2);
+}
+
+bool update_sphere_plane(btPersistentManifold* manifold, const btCollisionObject& body_a,
+                         const btCollisionObject& body_b, bool sphere_first) {
+  const btCollisionObject& sphere = sphere_first ? body_a : body_b;
+  const btCollisionObject& plane = sphere_first ? body_b : body_a;
+  const SpherePlaneContact contact = find_closest_points(
+      sphere.getWorldTransform(), static_cast<const btSphereShape&>(*sphere.getCollisionShape()),
+      plane.getWorldTransform(),
+      static_cast<const btStaticPlaneShape&>(*plane.getCollisionShape()));
+  // Which of two NaN an operation returns is up to the compiler.
+  const btVector3 sum = contact.normal_on_plane + contact.point_on_plane;
+  if (!is_finite(sum.x() + sum.y() + sum.z() + contact.distance)) return false;
+  const bool touching = contact.distance < manifold->getContactBreakingThreshold();
+  if (!touching && manifold->getNumContacts() == 0) return true;
+  const btCollisionObjectWrapper a(nullptr, body_a.getCollisionShape(), &body_a,
+                                   body_a.getWorldTransform(), -1, -1);
+  const btCollisionObjectWrapper b(nullptr, body_b.getCollisionShape(), &body_b,
+                                   body_b.getWorldTransform(), -1, -1);
+  btManifoldResult result(&a, &b);
+  result.setPersistentManifold(manifold);
+  if (touching) {
+    result.addContactPoint(contact.normal_on_plane, contact.point_on_plane, contact.distance);
+  }
+  if (manifold->getNumContacts() != 0) result.refreshContactPoints();
+  return true;
 }
 
 bool update_sphere_box(btPersistentManifold* manifold, const btCollisionObject& body_a,

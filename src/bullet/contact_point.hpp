@@ -29,4 +29,10 @@ void write_contact(btPersistentManifold* manifold, const PairResult& result,
 bool update_sphere_box(btPersistentManifold* manifold, const btCollisionObject& body_a,
                        const btCollisionObject& body_b, bool sphere_first);
 
+/// The same for a sphere and a plane, exactly a btStaticPlaneShape, and
+/// btConvexPlaneCollisionAlgorithm.
+/// @return false if numbers are not finite: nothing was done.
+bool update_sphere_plane(btPersistentManifold* manifold, const btCollisionObject& body_a,
+                         const btCollisionObject& body_b, bool sphere_first);
+
 }  // namespace jfpx::inline JFPX_ABI::bullet

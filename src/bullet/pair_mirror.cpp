@@ -4,6 +4,7 @@
 #include "src/bullet/prefetch.hpp"
 
 #include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
+#include <BulletCollision/CollisionDispatch/btConvexPlaneCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
 
 #include <algorithm>
@@ -20,16 +21,21 @@ struct AlgorithmFields : btCollisionAlgorithm {
   static constexpr auto dispatcher = &AlgorithmFields::m_dispatcher;
 };
 
-/// A private member, reached in the one way that the language has: an explicit instantiation may
-/// name it. The algorithm keeps the number that its configuration had when it was made.
+/// Private members, reached in the one way that the language has: an explicit instantiation may
+/// name them. An algorithm keeps the number of perturbations that its configuration had when it
+/// was made, and which of its bodies was the plane.
 struct PerturbationTag {
   friend int btConvexConvexAlgorithm::*member_of(PerturbationTag);
 };
-template <class Tag, int btConvexConvexAlgorithm::*Member>
+struct PlaneFirstTag {
+  friend bool btConvexPlaneCollisionAlgorithm::*member_of(PlaneFirstTag);
+};
+template <class Tag, auto Member>
 struct Reveal {
-  friend int btConvexConvexAlgorithm::*member_of(Tag) { return Member; }
+  friend auto member_of(Tag) -> decltype(Member) { return Member; }
 };
 template struct Reveal<PerturbationTag, &btConvexConvexAlgorithm::m_numPerturbationIterations>;
+template struct Reveal<PlaneFirstTag, &btConvexPlaneCollisionAlgorithm::m_isSwapped>;
 
 /// The manifold of an algorithm of exactly this class, which is known not to override the function,
 /// so that it inlines; null if it has none of its own.
@@ -125,6 +131,12 @@ PairMirror::Link PairMirror::read_link(btCollisionAlgorithm* algorithm, const Pa
     if (convex->*member_of(PerturbationTag()) != 0) return {};
     link.manifold = manifold_of<btConvexConvexAlgorithm>(algorithm);
     link.kind = PairKind::convex;
+  } else if (type == &typeid(btConvexPlaneCollisionAlgorithm)) {
+    // Its perturbation is for polyhedra.
+    auto* plane = static_cast<btConvexPlaneCollisionAlgorithm*>(algorithm);
+    link.manifold = manifold_of<btConvexPlaneCollisionAlgorithm>(algorithm);
+    link.kind =
+        plane->*member_of(PlaneFirstTag()) ? PairKind::plane_convex : PairKind::convex_plane;
   }
   if (link.manifold == nullptr) return {};
   link.lasting = algorithm->*AlgorithmFields::dispatcher == owner.dispatcher;

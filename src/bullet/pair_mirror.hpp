@@ -22,9 +22,11 @@ inline constexpr std::size_t kPairChunk = 4096;
 
 /// What Bullet's algorithm of a pair is.
 enum class PairKind : std::uint8_t {
-  other,    ///< none yet, or one that only Bullet can run
-  spheres,  ///< btSphereSphereCollisionAlgorithm with a manifold
-  convex,   ///< btConvexConvexAlgorithm with a manifold, without perturbation
+  other,         ///< none yet, or one that only Bullet can run
+  spheres,       ///< btSphereSphereCollisionAlgorithm with a manifold
+  convex,        ///< btConvexConvexAlgorithm with a manifold, without perturbation
+  convex_plane,  ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane second
+  plane_convex,  ///< the same, the plane first
 };
 
 /// Who made the algorithms of the pairs.

@@ -72,6 +72,7 @@ class EnginePool {
       sum.touching += stats.touching;
       sum.written += stats.written;
       sum.sphere_boxes += stats.sphere_boxes;
+      sum.sphere_planes += stats.sphere_planes;
       sum.verified += stats.verified;
       if (sum.mismatches == 0) sum.first_mismatch = stats.first_mismatch;
       sum.mismatches += stats.mismatches;

@@ -53,11 +53,24 @@ class Committer {
 
   /// False if the pair is left to Bullet.
   bool commit(std::size_t i) {
-    if (batch_.kind(i) == PairKind::convex) return commit_convex(i);
-    if (batch_.kind(i) == PairKind::other) {
-      if (batch_.both_are_spheres(i)) count_pair(i);
-      return false;
+    switch (batch_.kind(i)) {
+      case PairKind::other:
+        if (batch_.both_are_spheres(i)) count_pair(i);
+        return false;
+      case PairKind::spheres:
+        return commit_spheres(i);
+      case PairKind::convex:
+        return commit_with(kBox, (batch_.trait_a(i) & kSphere) != 0, i, update_sphere_box,
+                           &counts_.sphere_boxes);
+      case PairKind::convex_plane:
+        return commit_with(kPlane, true, i, update_sphere_plane, &counts_.sphere_planes);
+      case PairKind::plane_convex:
+        return commit_with(kPlane, false, i, update_sphere_plane, &counts_.sphere_planes);
     }
+    return false;
+  }
+
+  bool commit_spheres(std::size_t i) {
     btPersistentManifold* manifold = batch_.manifold(i);
     if (results_[i].touching == 0 && manifold->getNumContacts() == 0) {
       ++counts_.sphere_pairs;
@@ -75,18 +88,21 @@ class Committer {
     return true;
   }
 
-  bool commit_convex(std::size_t i) {
+  /// A sphere and a body that has the trait `other`.
+  template <class Update>
+  bool commit_with(BodyTrait other, bool sphere_first, std::size_t i, Update update,
+                   std::uint64_t* count) {
     const unsigned a_is = batch_.trait_a(i), b_is = batch_.trait_b(i);
-    const bool sphere_first = (a_is & kSphere) != 0 && (b_is & kBox) != 0;
-    const bool box_first = (a_is & kBox) != 0 && (b_is & kSphere) != 0;
-    if (!sphere_first && !box_first) return false;
+    // The shapes may have been exchanged under the algorithm.
+    if (((sphere_first ? a_is : b_is) & kSphere) == 0) return false;
+    if (((sphere_first ? b_is : a_is) & other) == 0) return false;
     if ((batch_.either_trait(i) & kActive) == 0) return true;
     const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
     const btCollisionShape* sphere = (sphere_first ? a : b)->getCollisionShape();
     if (&typeid(*sphere) != &typeid(btSphereShape)) return false;
     if (!dispatcher_.btCollisionDispatcher::needsCollision(a, b)) return true;
-    if (!update_sphere_box(batch_.manifold(i), *a, *b, sphere_first)) return false;
-    ++counts_.sphere_boxes;
+    if (!update(batch_.manifold(i), *a, *b, sphere_first)) return false;
+    ++*count;
     return true;
   }
 
@@ -136,6 +152,7 @@ CommitCounts QuietCommit::run(btCollisionDispatcher& dispatcher, const SphereBat
     sum.touching += part.counts.touching;
     sum.written += part.counts.written;
     sum.sphere_boxes += part.counts.sphere_boxes;
+    sum.sphere_planes += part.counts.sphere_planes;
   }
   return sum;
 }

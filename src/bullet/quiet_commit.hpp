@@ -11,10 +11,11 @@ namespace jfpx::inline JFPX_ABI::bullet {
 
 /// What a commit adds to the statistics.
 struct CommitCounts {
-  std::uint64_t sphere_pairs = 0;  ///< pairs of two spheres
-  std::uint64_t touching = 0;      ///< of these, found touching by the collider
-  std::uint64_t written = 0;       ///< of these, brought up to date without Bullet's algorithm
-  std::uint64_t sphere_boxes = 0;  ///< pairs of a sphere and a box, likewise
+  std::uint64_t sphere_pairs = 0;   ///< pairs of two spheres
+  std::uint64_t touching = 0;       ///< of these, found touching by the collider
+  std::uint64_t written = 0;        ///< of these, brought up to date without Bullet's algorithm
+  std::uint64_t sphere_boxes = 0;   ///< pairs of a sphere and a box, likewise
+  std::uint64_t sphere_planes = 0;  ///< pairs of a sphere and a plane, likewise
 };
 
 /// True if the order in which manifolds are brought up to date can't be observed: no global

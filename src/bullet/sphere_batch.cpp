@@ -6,6 +6,7 @@
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
 #include <algorithm>
@@ -41,6 +42,7 @@ std::uint8_t SphereBatch::read_body(std::size_t number) {
                         static_cast<const btSphereShape*>(shape)->getRadius()};
   } else {
     if (&typeid(*shape) == &typeid(btBoxShape)) traits |= kBox;
+    if (&typeid(*shape) == &typeid(btStaticPlaneShape)) traits |= kPlane;
     spheres_[number] = {{}, kNaN};
   }
   return static_cast<std::uint8_t>(traits);

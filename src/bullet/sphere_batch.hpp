@@ -17,7 +17,8 @@ enum BodyTrait : std::uint8_t {
   kActive = 2,
   /// Its class may override btCollisionObject::checkCollideWithOverride, and it would be called.
   kForeign = 4,
-  kBox = 8,  ///< exactly a btBoxShape
+  kBox = 8,     ///< exactly a btBoxShape
+  kPlane = 16,  ///< exactly a btStaticPlaneShape
 };
 
 class SphereBatch {

@@ -88,7 +88,8 @@ btCollisionShape* LiveWorld::make_shape(const RandomBody& body) {
     case ShapeKind::box:
       return live_.keep(new btBoxShape(btVector3(s, s, s)));
     case ShapeKind::plane:
-      return live_.keep(new btStaticPlaneShape(btVector3(0, 1, 0), 0));
+      return live_.keep(new btStaticPlaneShape(
+          btVector3(body.normal.x, body.normal.y, body.normal.z), body.offset));
     case ShapeKind::capsule:
       return live_.keep(new btCapsuleShape(s / 2, s));
     case ShapeKind::compound: {

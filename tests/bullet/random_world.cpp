@@ -23,6 +23,17 @@ ShapeKind random_shape(Random& random, bool only_spheres) {
   return static_cast<ShapeKind>(1 + random.below(4));
 }
 
+/// A plane through the origin, level or not, or near it.
+void make_plane(Random& random, const RandomWorld& world, RandomBody* body) {
+  body->shape = ShapeKind::plane;
+  body->mass = 0;
+  body->position = {0, 0, 0};
+  if (chance(random, Real(0.6))) return;
+  body->normal = normalized(random.uniform_in_box({-1, Real(0.2), -1}, {1, 1, 1}));
+  body->offset = world.scale * random.uniform(-1, 1);
+  body->position = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
+}
+
 RandomBody random_body(Random& random, const RandomWorld& world, Real edge, bool only_spheres,
                        bool mixed_sizes) {
   RandomBody body;
@@ -40,10 +51,7 @@ RandomBody random_body(Random& random, const RandomWorld& world, Real edge, bool
   body.velocity = random.uniform_in_box({-speed, -speed, -speed}, {speed, speed, speed});
   body.spin = random.uniform_in_box({-5, -5, -5}, {5, 5, 5});
   body.mass = chance(random, Real(0.12)) ? Real(0) : random.uniform(Real(0.1), Real(5));
-  if (body.shape == ShapeKind::plane) {
-    body.mass = 0;
-    body.position = {0, 0, 0};
-  }
+  if (body.shape == ShapeKind::plane) make_plane(random, world, &body);
   if (chance(random, Real(0.6))) {
     body.traits = static_cast<unsigned>(random.next() & random.next()) & ((1u << kTraitCount) - 1);
   }
@@ -209,10 +217,11 @@ RandomWorld make_random_world(std::uint64_t seed) {
   const bool only_spheres = chance(random, Real(0.4)), mixed = chance(random, Real(0.2));
   if (chance(random, Real(0.5))) {
     RandomBody ground;
-    ground.shape = chance(random, Real(0.5)) ? ShapeKind::plane : ShapeKind::box;
+    ground.shape = ShapeKind::box;
     ground.size = 20 * world.scale;
-    ground.position = {0, ground.shape == ShapeKind::plane ? Real(0) : -ground.size, 0};
+    ground.position = {0, -ground.size, 0};
     ground.mass = 0;
+    if (chance(random, Real(0.5))) make_plane(random, world, &ground);
     world.bodies.push_back(ground);
   }
   for (std::size_t i = 0; i < count; ++i) {

@@ -35,7 +35,9 @@ struct RandomBody {
   ShapeKind shape = ShapeKind::sphere;
   Real size = 1;  ///< radius, half side, half height: [m]
   Vec3 position, velocity, spin;
-  Real mass = 1;  ///< 0 is static
+  Vec3 normal = {0, 1, 0};  ///< of a plane, before its body turns
+  Real offset = 0;          ///< of a plane, along its normal: [m]
+  Real mass = 1;            ///< 0 is static
   unsigned traits = 0;
   int group = 0, mask = 0;  ///< Bullet's defaults where group is 0
   Real friction = Real(0.5), restitution = 0, rolling = 0;

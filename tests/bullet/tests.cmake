@@ -5,6 +5,7 @@ jfpx_add_test(bullet_contract_test SOURCES
   bullet/more_situations_test.cpp
   bullet/situations_test.cpp
   bullet/sphere_box_test.cpp
+  bullet/sphere_plane_test.cpp
   bullet/stats_test.cpp
   LINK jfpx_bullet jfpx_scenes)
 jfpx_add_test(bullet_verify_test SOURCES

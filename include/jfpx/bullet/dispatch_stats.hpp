@@ -28,16 +28,17 @@ JFPX_API std::string_view to_string(Fallback fallback) noexcept;
 
 /// Counters since construction or reset_stats(). Pairs are counted in batches only.
 struct DispatchStats {
-  std::uint64_t dispatches = 0;    ///< calls of dispatchAllCollisionPairs
-  std::uint64_t batches = 0;       ///< of these, computed by the collider
-  std::uint64_t pairs = 0;         ///< overlapping pairs
-  std::uint64_t sphere_pairs = 0;  ///< of these, between two spheres
-  std::uint64_t touching = 0;      ///< of these, found touching by the collider
-  std::uint64_t written = 0;       ///< of these, brought up to date without Bullet's algorithm
-  std::uint64_t sphere_boxes = 0;  ///< pairs of a sphere and a box, likewise
-  std::uint64_t verified = 0;      ///< sphere pairs recomputed by set_verify(true)
-  std::uint64_t mismatches = 0;    ///< of these, different in any field
-  std::string first_mismatch;      ///< field and both values; empty where there was none
+  std::uint64_t dispatches = 0;     ///< calls of dispatchAllCollisionPairs
+  std::uint64_t batches = 0;        ///< of these, computed by the collider
+  std::uint64_t pairs = 0;          ///< overlapping pairs
+  std::uint64_t sphere_pairs = 0;   ///< of these, between two spheres
+  std::uint64_t touching = 0;       ///< of these, found touching by the collider
+  std::uint64_t written = 0;        ///< of these, brought up to date without Bullet's algorithm
+  std::uint64_t sphere_boxes = 0;   ///< pairs of a sphere and a box, likewise
+  std::uint64_t sphere_planes = 0;  ///< pairs of a sphere and a plane, likewise
+  std::uint64_t verified = 0;       ///< sphere pairs recomputed by set_verify(true)
+  std::uint64_t mismatches = 0;     ///< of these, different in any field
+  std::string first_mismatch;       ///< field and both values; empty where there was none
   std::array<std::uint64_t, kFallbackCount> fallbacks{};  ///< dispatches by Fallback
   Fallback last_fallback = Fallback::none;                ///< none where the last was a batch
   std::string failure;         ///< why batches were given up for good; empty while all is well
