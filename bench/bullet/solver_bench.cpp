@@ -134,28 +134,31 @@ void compare_steps(benchmark::State& state, const char* name, std::uint32_t sphe
                                static_cast<double>(std::max<std::uint64_t>(stats.groups, 1));
 }
 
-struct Size {
+struct Case {
+  const char* scene;
   std::uint32_t spheres;
   int settle, samples;
 };
-constexpr Size kSizes[] = {{16, 300, 400},  {64, 300, 300},  {256, 300, 200}, {1024, 200, 60},
-                           {4096, 120, 30}, {16384, 60, 11}, {65536, 30, 5}};
+constexpr Case kCases[] = {
+    {"pile", 16, 300, 400},  {"pile", 64, 300, 300},  {"pile", 256, 300, 200},
+    {"pile", 1024, 200, 60}, {"pile", 4096, 120, 30}, {"pile", 16384, 60, 11},
+    {"pile", 65536, 30, 5},  {"gas", 16, 300, 400},   {"gas", 64, 300, 300},
+    {"gas", 256, 300, 200},  {"gas", 1024, 200, 60},  {"gas", 4096, 120, 30},
+    {"gas", 16384, 60, 11},  {"gas", 65536, 30, 5},   {"columns", 16384, 60, 11},
+};
 
 void register_all() {
-  for (const char* scene : {"pile", "gas"}) {
-    for (const Size& size : kSizes) {
-      for (const unsigned threads : {1u, 2u}) {
-        const std::string name = std::string("step/") + scene + "/" + std::to_string(size.spheres) +
-                                 "/threads:" + std::to_string(threads);
-        benchmark::RegisterBenchmark(name.c_str(),
-                                     [scene, size, threads](benchmark::State& state) {
-                                       compare_steps(state, scene, size.spheres, size.settle,
-                                                     threads);
-                                     })
-            ->UseManualTime()
-            ->Iterations(size.samples)
-            ->Unit(benchmark::kMillisecond);
-      }
+  for (const Case& c : kCases) {
+    for (const unsigned threads : {1u, 2u, 8u}) {
+      const std::string name = std::string("step/") + c.scene + "/" + std::to_string(c.spheres) +
+                               "/threads:" + std::to_string(threads);
+      benchmark::RegisterBenchmark(name.c_str(),
+                                   [c, threads](benchmark::State& state) {
+                                     compare_steps(state, c.scene, c.spheres, c.settle, threads);
+                                   })
+          ->UseManualTime()
+          ->Iterations(c.samples)
+          ->Unit(benchmark::kMillisecond);
     }
   }
 }

@@ -27,23 +27,37 @@ bool all_finite(const Real* values, std::size_t count) {
   return finite;
 }
 
-/// Waits for other threads, which may have to wait for a processor themselves.
-template <class Condition>
-void wait_until(Condition condition) {
-  for (int spins = 0; !condition(); ++spins) {
-    if (spins < 1000) {
+/// How long to wait for other threads, which may have to wait for a processor themselves.
+class Patience {
+ public:
+  /// @param endless else it ends after some tens of microseconds on processors that are free, and
+  /// after some time slices of others on those that are not
+  explicit Patience(bool endless) : endless_(endless) {}
+
+  /// Waits a moment; false once it has ended.
+  bool wait() {
+    if (waits_ < kSpins) {
       __builtin_ia32_pause();
     } else {
+      if (!endless_ && waits_ >= kSpins + kYields) return false;
       std::this_thread::yield();
     }
+    ++waits_;
+    return true;
   }
-}
+  void renew() { waits_ = 0; }
+
+ private:
+  static constexpr std::uint64_t kSpins = 1000, kYields = 50;
+  bool endless_;
+  std::uint64_t waits_ = 0;
+};
 
 }  // namespace
 
 /// Passes over the blocks, repeated until the residual is small. Tickets are numbered through all
-/// passes and iterations and taken in order, so that whoever holds one only ever waits for lower
-/// ones, which are held by running threads or done.
+/// passes and iterations, and taken in order. A ticket is taken when it can be run at once: so
+/// those who wait hold up nobody, and may leave.
 struct RowSolver::Program {
   struct Pass {
     RowSweep sweep;
@@ -73,39 +87,59 @@ struct RowSolver::Program {
     passes[pass_count++] = {sweep, list, count};
   }
 
-  void join() {
+  /// Takes tickets until there are none; false if patience has ended before.
+  bool join(Patience patience) {
     const std::uint64_t per_iteration = tickets_an_iteration();
+    std::uint64_t number = next.load(std::memory_order_relaxed);
     for (;;) {
-      const std::uint64_t number = next.fetch_add(1, std::memory_order_relaxed);
       const std::uint64_t iteration = per_iteration == 0 ? iterations : number / per_iteration;
-      if (iteration >= iterations) return;
+      if (iteration >= iterations) return true;
       const std::uint64_t start = iteration * per_iteration;
-      // With few tickets an iteration, the number may lie more than one behind the last.
-      wait_until([&] {
-        return done.load(std::memory_order_acquire) >= start ||
-               ended.load(std::memory_order_relaxed);
-      });
-      if (ended.load(std::memory_order_relaxed) || (iteration > 0 && is_last(iteration - 1))) {
-        ended.store(true, std::memory_order_relaxed);
-        return;
+      const Work work = work_of(number - start, iteration);
+      if (done.load(std::memory_order_acquire) < start + work.after) {
+        if (ended.load(std::memory_order_relaxed)) return true;
+        if (!patience.wait()) return false;
+        number = next.load(std::memory_order_relaxed);
+        continue;
       }
+      if (iteration > 0 && is_last(iteration - 1)) ended.store(true, std::memory_order_relaxed);
+      if (ended.load(std::memory_order_relaxed)) return true;
+      if (!next.compare_exchange_weak(number, number + 1, std::memory_order_relaxed)) continue;
+      patience.renew();
       RowResidual residual;
-      if (number - start < serial_tickets()) {
+      if (work.sweep != nullptr) {
+        work.sweep(arrays, work.first, work.last, &residual);
+      } else if (work.is_serial) {
         serial->sweep(static_cast<int>(iteration), &residual);
-      } else if (iteration < block_iterations) {
-        run_blocks(start + serial_tickets(), number, &residual);
       }
       if (residual.broken) broken.store(true, std::memory_order_relaxed);
       raise(residuals + iteration, residual.largest);
       done.fetch_add(1, std::memory_order_release);
+      ++number;
     }
   }
-  void run_blocks(std::uint64_t start, std::uint64_t number, RowResidual* residual) {
+  bool is_done() const {
+    return done.load(std::memory_order_acquire) >= iterations * tickets_an_iteration();
+  }
+
+  /// What a ticket asks for. It may begin when the `after` tickets of its iteration before it, and
+  /// all of earlier iterations, are done.
+  struct Work {
+    RowSweep sweep = nullptr;
+    bool is_serial = false;
+    std::uint32_t first = 0, last = 0;
+    std::uint64_t after = 0;
+  };
+  Work work_of(std::uint64_t number, std::uint64_t iteration) const {
+    if (number < serial_tickets()) return {.is_serial = true};
+    std::uint64_t start = serial_tickets();
     const Pass* pass = passes;
     for (; number - start >= pass->ticket_count; ++pass) start += pass->ticket_count;
     const Ticket& ticket = pass->tickets[number - start];
-    wait_until([&] { return done.load(std::memory_order_acquire) >= start + ticket.after; });
-    pass->sweep(arrays, ticket.first, ticket.last, residual);
+    return {.sweep = iteration < block_iterations ? pass->sweep : nullptr,
+            .first = ticket.first,
+            .last = ticket.last,
+            .after = start + ticket.after};
   }
   bool is_last(std::uint64_t iteration) const {
     return iteration + 1 == iterations ||
@@ -300,14 +334,15 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
   }
   main.add(kernels_.torsions[factors], torsion_choice_.tickets.data(),
            torsion_choice_.ticket_count);
-  pool_.run(useful_threads(), [&](std::size_t) {
-    warm.join();
-    push.join();
-    wait_until([&] {
-      return warm.done.load(std::memory_order_acquire) >=
-             warm.iterations * warm.tickets_an_iteration();
-    });
-    main.join();
+  // The first stays whatever happens, so that somebody ends the work. Others leave when they are
+  // kept waiting: then there are more threads than processors for them, and they are in the way.
+  pool_.run(useful_threads(), [&](std::size_t participant) {
+    Patience patience(participant == 0);
+    if (!warm.join(patience) || !push.join(patience)) return;
+    while (!warm.is_done()) {
+      if (!patience.wait()) return;
+    }
+    main.join(patience);
   });
 
   RowSweepReport report;
