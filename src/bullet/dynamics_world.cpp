@@ -2,6 +2,7 @@
 #include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/error.hpp>
 
+#include "src/bullet/box_update.hpp"
 #include "src/bullet/islands.hpp"
 #include "src/x86/thread_pool.hpp"
 
@@ -28,6 +29,7 @@ bool is_movable(const btCollisionObject& object) { return !object.isStaticOrKine
 struct DynamicsWorld::Impl {
   x86::ThreadPool pool;
   IslandSolver islands;
+  BoxUpdate boxes;
 
   explicit Impl(unsigned threads) : pool(threads), islands(pool) {}
 
@@ -101,6 +103,11 @@ void DynamicsWorld::integrateTransforms(btScalar dt) {
   impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
     integrateTransformsInternal(bodies, count, dt);
   });
+}
+
+void DynamicsWorld::updateAabbs() {
+  BT_PROFILE("updateAabbs");
+  if (!impl_->boxes.run(*this)) btDiscreteDynamicsWorld::updateAabbs();
 }
 
 void DynamicsWorld::calculateSimulationIslands() {

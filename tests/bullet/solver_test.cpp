@@ -280,6 +280,57 @@ TEST(ConstraintSolver, AndWorldRefuseTooManyThreads) {
                InvalidArgument);
 }
 
+std::vector<std::pair<int, int>> pairs_of(BulletWorld& world) {
+  std::vector<std::pair<int, int>> pairs;
+  const btBroadphasePairArray& array = world.world.getPairCache()->getOverlappingPairArray();
+  for (int i = 0; i < array.size(); ++i) {
+    pairs.emplace_back(array[i].m_pProxy0->getUid(), array[i].m_pProxy1->getUid());
+  }
+  return pairs;
+}
+
+/// Hears of every overlap that is found, and lets odd neighbours be.
+struct LoggingFilter final : btOverlapFilterCallback {
+  bool needBroadphaseCollision(btBroadphaseProxy* a, btBroadphaseProxy* b) const override {
+    log_event("filter " + std::to_string(a->getUid()) + " " + std::to_string(b->getUid()));
+    return (a->getUid() + b->getUid()) % 2 == 0;
+  }
+};
+
+TEST(DynamicsWorld, HasStocksPairsInStocksOrder) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  LoggingFilter filter;
+  btGhostPairCallback ghosts;
+  TwinOptions options;
+  options.parts.world = our_world({}).world;
+  Twins twins(options);
+  twins.both([&](BulletWorld& w) { add_heap(w, 400, seed, 8); });
+  std::size_t most = 0;
+  const auto expect_same_pairs = [&] {
+    ASSERT_TRUE(twins.step());
+    const auto pairs = pairs_of(twins.stock());
+    most = std::max(most, pairs.size());
+    ASSERT_EQ(pairs, pairs_of(twins.ours()));
+  };
+  for (int step = 0; step < 80; ++step) {
+    SCOPED_TRACE(step);
+    twins.both([&](BulletWorld& w) {
+      if (step == 20) w.world.setForceUpdateAllAabbs(false);
+      if (step == 30) w.world.getPairCache()->setInternalGhostPairCallback(&ghosts);
+      if (step == 40) w.world.getPairCache()->setOverlapFilterCallback(&filter);
+      if (step == 44) w.world.getPairCache()->setOverlapFilterCallback(nullptr);
+      // Far away and back: leaves of the tree are taken out and put in elsewhere.
+      btRigidBody& body = *w.bodies[static_cast<std::size_t>(1 + step * 5)];
+      body.translate(btVector3(step % 2 == 0 ? btScalar(100) : btScalar(0.3), 0, 0));
+      if (step % 8 == 7) w.world.removeRigidBody(&body);
+    });
+    expect_same_pairs();
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(most, 1000u) << "too few for tables to grow";
+}
+
 TEST(DynamicsWorld, OwnsTheSolverThatItIsNotGiven) {
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher(&configuration);

@@ -14,7 +14,8 @@ struct DynamicsWorldOptions {
 };
 
 /// A btDiscreteDynamicsWorld whose islands are sorted by compact keys instead of through pointers,
-/// and whose bodies are predicted and integrated in parallel. Groups, their order, sleeping,
+/// whose bodies are predicted and integrated in parallel, and which finds the overlapping pairs of
+/// a btDbvtBroadphase again without waiting for each. Pairs, groups, their order, sleeping,
 /// velocities and transforms are those of btDiscreteDynamicsWorld, bit for bit.
 ///
 /// In steps with continuous collision of some body, bodies are integrated one by one, because each
@@ -36,6 +37,7 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
   DynamicsWorld(const DynamicsWorld&) = delete;
   DynamicsWorld& operator=(const DynamicsWorld&) = delete;
 
+  void updateAabbs() override;
   void solveConstraints(btContactSolverInfo& info) override;
 
  protected:

@@ -1,0 +1,37 @@
+/// What a step does to the boxes of bodies in Bullet's dynamic tree, with the same results in the
+/// same order, asking for memory ahead of its use.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
+#include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
+
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+/// In large worlds more than half of Bullet's update goes into finding again, one after the other,
+/// pairs that the hash table has since long: each takes several reads from memory.
+class BoxUpdate {
+ public:
+  /// btCollisionWorld::updateAabbs(). False, and nothing is done, if the broadphase is not Bullet's
+  /// own tree over Bullet's own hash table, as it is by default, or if the user filters pairs.
+  bool run(btCollisionWorld& world);
+
+ private:
+  struct Pair {
+    btDbvtProxy *a, *b;  ///< by ascending id
+    bool swapped;        ///< `a` is the body that has moved
+    int* slot;           ///< where a search in the hash table begins
+    int index;           ///< into the pairs, of the first to compare with
+  };
+
+  void find_overlaps(const btDbvtNode* root, const btDbvtNode* leaf);
+  void add_pairs(btHashedOverlappingPairCache& cache);
+
+  std::vector<const btDbvtNode*> stack_;
+  std::vector<Pair> pairs_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
