@@ -49,8 +49,7 @@ AutomaticSphereCollider::AutomaticSphereCollider(const SphereColliderOptions& op
 bool AutomaticSphereCollider::goes_on(Calls& calls, std::size_t spheres, std::size_t pairs) {
   if (calls.following > 0 && spheres == calls.spheres && pairs == calls.pairs) {
     --calls.following;
-    backend_ = Backend::x86;
-    reason_ = calls.reason;
+    last_ = &calls;
     return true;
   }
   calls.spheres = spheres;
@@ -76,8 +75,8 @@ auto AutomaticSphereCollider::compute(Calls& calls, const ColliderWork& expected
       calls.chooser.record(measure(result), us.count());
       if (device_failure_.empty()) calls.following = decision.following;
       calls.reason = device_lost_ ? ChoiceReason::device_failed : calls.chooser.reason();
-      backend_ = backend;
-      reason_ = calls.reason;
+      calls.backend = backend;
+      last_ = &calls;
       if (algorithm != SphereAlgorithm::automatic) algorithm_ = algorithm;
       return result;
     } catch (const BackendUnavailable&) {

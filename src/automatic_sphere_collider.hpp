@@ -27,9 +27,9 @@ class AutomaticSphereCollider final : public SphereCollider {
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override;
   std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
                                          std::span<const SpherePair> pairs) override;
-  Backend backend() const noexcept override { return backend_; }
+  Backend backend() const noexcept override { return last_->backend; }
   SphereAlgorithm algorithm() const noexcept override { return algorithm_; }
-  ChoiceReason reason() const noexcept override { return reason_; }
+  ChoiceReason reason() const noexcept override { return last_->reason; }
   std::string_view device_failure() const noexcept override { return device_failure_; }
 
  private:
@@ -40,6 +40,7 @@ class AutomaticSphereCollider final : public SphereCollider {
     int following = 0;
     std::size_t spheres = 0, pairs = 0;
     SphereCollider* by = nullptr;
+    Backend backend = Backend::x86;
     ChoiceReason reason = ChoiceReason::fixed;
   };
 
@@ -55,14 +56,13 @@ class AutomaticSphereCollider final : public SphereCollider {
   SphereColliderOptions options_;
   SphereColliderMaker make_;
   Calls search_, given_;
+  const Calls* last_ = &search_;
   std::unique_ptr<SphereCollider> colliders_[2][2];  ///< by backend and algorithm
   double contacts_per_sphere_ = 1;                   ///< in the last search that was decided alone
   bool device_asleep_;
   bool device_lost_ = false;
   std::string device_failure_;
-  Backend backend_ = Backend::x86;
   SphereAlgorithm algorithm_ = SphereAlgorithm::automatic;
-  ChoiceReason reason_ = ChoiceReason::fixed;
 };
 
 }  // namespace jfpx::inline JFPX_ABI

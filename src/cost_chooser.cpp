@@ -17,6 +17,10 @@ constexpr int kCallsToSettle = kColdCalls + 3;
 /// as many calls as it takes to settle.
 constexpr double kTrialUs = 300;
 constexpr double kTrialRatio = 2;
+/// One whose outcome is closer than this goes on so many times as long, which costs little because
+/// it is close: a processor that waited for a GPU takes a millisecond to be as fast as it can.
+constexpr double kClose = 1.2;
+constexpr int kLonger = 4;
 /// Time between trials, in trials: of one that takes twice as long half is lost, two hundredths of
 /// all.
 constexpr double kTrialsBetween = 25;
@@ -76,13 +80,16 @@ void CostChooser::decide(const ColliderWork& work) {
   if (incumbent_ == kNone ||
       (best != incumbent_ && cost(ways_[best], work) < kClearly * cost(ways_[incumbent_], work))) {
     take(best);
+  } else if (after_trial && !prolonged_ &&
+             cost(ways_[tried], work) < kClose * cost(ways_[incumbent_], work)) {
+    prolonged_ = true;
+    start_trial(tried, kLonger * trial_calls(ways_[tried], work));
+    return;
   } else if (after_trial) {
     ways_[tried].patience = std::min(kMostPatience, 2 * ways_[tried].patience);
   } else if (const std::size_t rival = due_for_trial(work); rival != kNone) {
-    current_ = rival;
-    stay_ = trial_calls(ways_[rival], work);
-    ways_[rival].waited_us = 0;
-    reason_ = ChoiceReason::trial;
+    prolonged_ = false;
+    start_trial(rival, trial_calls(ways_[rival], work));
     return;
   }
   const auto ready = std::ranges::count_if(ways_, [](auto& c) { return !c.way.dormant; });
@@ -95,6 +102,13 @@ void CostChooser::decide(const ColliderWork& work) {
 void CostChooser::take(std::size_t way) {
   incumbent_ = current_ = way;
   stay_ = ways_[way].samples == 0 ? kCallsToSettle : 0;
+}
+
+void CostChooser::start_trial(std::size_t way, int calls) {
+  current_ = way;
+  stay_ = calls;
+  ways_[way].waited_us = 0;
+  reason_ = ChoiceReason::trial;
 }
 
 int CostChooser::trial_calls(const Candidate& c, const ColliderWork& work) const {

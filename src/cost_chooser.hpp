@@ -66,12 +66,14 @@ class CostChooser {
   void forget_if_size_changed(const ColliderWork& work);
   void decide(const ColliderWork& work);
   void take(std::size_t way);
+  void start_trial(std::size_t way, int calls);
 
   std::vector<Candidate> ways_;
   std::size_t incumbent_ = kNone;  ///< who computes
   std::size_t current_ = kNone;    ///< the incumbent, or who is on trial
   ChoiceReason reason_ = ChoiceReason::fixed;
   int stay_ = 0;              ///< decisions for which nothing changes
+  bool prolonged_ = false;    ///< the last trial
   double regime_pairs_ = -1;  ///< size for which the ratios were measured
   double missed_us_ = 0;
 };

@@ -132,6 +132,24 @@ TEST(CostChooser, DoesNotSwitchForALittle) {
   EXPECT_LE(machine.calls[1], 10000 / 25) << "trials only";
 }
 
+// As a processor that waited for a GPU: for a millisecond it takes 1.15 times as long.
+TEST(CostChooser, TriesLongerWhereTheOutcomeIsClose) {
+  CostChooser chooser(ways_with({20, 20}));
+  double on_other = 0;  // [us] since the first way had a turn
+  Machine machine{{19, 16}};
+  const auto run = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      machine.clock = [&](double us) {
+        on_other = machine.last == 1 ? on_other + us : 0;
+        return machine.last == 1 && on_other < 1000 ? 1.15 * us : us;
+      };
+      machine.run(chooser, 1);
+    }
+  };
+  run(3000);
+  EXPECT_GT(machine.calls[1], 2 * machine.calls[0]);
+}
+
 TEST(CostChooser, SaysWhenAnotherIsBetterByTooLittle) {
   CostChooser chooser(ways_with({50, 55}));
   Machine machine{{54, 51}};  // measured against predicted: 54 against 55, then 54 against 51
