@@ -30,8 +30,10 @@ struct DynamicsWorld::Impl {
   x86::ThreadPool pool;
   IslandSolver islands;
   BoxUpdate boxes;
+  std::size_t minimum_batch;
 
-  explicit Impl(unsigned threads) : pool(threads), islands(pool) {}
+  explicit Impl(const DynamicsWorldOptions& options)
+      : pool(options.threads), islands(pool), minimum_batch(options.minimum_batch) {}
 
   /// Calls run(bodies, count) for all parts of the array, at once.
   template <class Run>
@@ -66,11 +68,23 @@ DynamicsWorld::DynamicsWorld(btDispatcher* dispatcher, btBroadphaseInterface* br
     throw InvalidArgument("threads is " + std::to_string(options.threads) +
                           "; it must be at most 256");
   }
-  impl_ = std::make_unique<Impl>(options.threads);
+  impl_ = std::make_unique<Impl>(options);
 }
 DynamicsWorld::~DynamicsWorld() = default;
 
+std::size_t DynamicsWorld::minimum_batch() const noexcept { return impl_->minimum_batch; }
+void DynamicsWorld::set_minimum_batch(std::size_t bodies) noexcept {
+  impl_->minimum_batch = bodies;
+}
+bool DynamicsWorld::is_small() const noexcept {
+  return static_cast<std::size_t>(m_nonStaticRigidBodies.size()) < impl_->minimum_batch;
+}
+
 void DynamicsWorld::predictUnconstraintMotion(btScalar dt) {
+  if (is_small()) {
+    btDiscreteDynamicsWorld::predictUnconstraintMotion(dt);
+    return;
+  }
   BT_PROFILE("predictUnconstraintMotion");
   impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
     for (int i = 0; i < count; ++i) {
@@ -82,7 +96,7 @@ void DynamicsWorld::predictUnconstraintMotion(btScalar dt) {
 }
 
 void DynamicsWorld::createPredictiveContacts(btScalar dt) {
-  if (impl_->has_swept_bodies(m_nonStaticRigidBodies, getDispatchInfo())) {
+  if (is_small() || impl_->has_swept_bodies(m_nonStaticRigidBodies, getDispatchInfo())) {
     btDiscreteDynamicsWorld::createPredictiveContacts(dt);
     return;
   }
@@ -94,7 +108,7 @@ void DynamicsWorld::createPredictiveContacts(btScalar dt) {
 }
 
 void DynamicsWorld::integrateTransforms(btScalar dt) {
-  if (m_applySpeculativeContactRestitution ||
+  if (is_small() || m_applySpeculativeContactRestitution ||
       impl_->has_swept_bodies(m_nonStaticRigidBodies, getDispatchInfo())) {
     btDiscreteDynamicsWorld::integrateTransforms(dt);
     return;
@@ -107,10 +121,14 @@ void DynamicsWorld::integrateTransforms(btScalar dt) {
 
 void DynamicsWorld::updateAabbs() {
   BT_PROFILE("updateAabbs");
-  if (!impl_->boxes.run(*this)) btDiscreteDynamicsWorld::updateAabbs();
+  if (is_small() || !impl_->boxes.run(*this)) btDiscreteDynamicsWorld::updateAabbs();
 }
 
 void DynamicsWorld::calculateSimulationIslands() {
+  if (is_small()) {
+    btDiscreteDynamicsWorld::calculateSimulationIslands();
+    return;
+  }
   BT_PROFILE("calculateSimulationIslands");
   btUnionFind& unions = getSimulationIslandManager()->getUnionFind();
   const auto unite = [&](const btCollisionObject& a, const btCollisionObject& b) {
@@ -129,7 +147,7 @@ void DynamicsWorld::calculateSimulationIslands() {
 
 void DynamicsWorld::solveConstraints(btContactSolverInfo& info) {
   btSimulationIslandManager& manager = *getSimulationIslandManager();
-  if (!manager.getSplitIslands()) {
+  if (is_small() || !manager.getSplitIslands()) {
     btDiscreteDynamicsWorld::solveConstraints(info);
     return;
   }

@@ -177,6 +177,10 @@ std::unique_ptr<btCollisionDispatcher> make_dispatcher(btCollisionConfiguration*
   if (options.dispatcher == DispatcherKind::stock) {
     return std::make_unique<btCollisionDispatcher>(configuration);
   }
+  if (options.make_collider) {
+    return std::make_unique<CollisionDispatcher>(configuration, options.make_collider(),
+                                                 options.dispatch);
+  }
   return std::make_unique<CollisionDispatcher>(configuration, options.dispatch);
 }
 

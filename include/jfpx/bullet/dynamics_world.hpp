@@ -5,12 +5,14 @@
 
 #include <BulletDynamics/Dynamics/btDiscreteDynamicsWorld.h>
 
+#include <cstddef>
 #include <memory>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
 struct DynamicsWorldOptions {
-  unsigned threads = 1;  ///< 0: one per core, at most 256
+  unsigned threads = 1;           ///< 0: one per core, at most 256
+  std::size_t minimum_batch = 0;  ///< bodies below which a step is left to Bullet's own code
 };
 
 /// A btDiscreteDynamicsWorld whose islands are sorted by compact keys instead of through pointers,
@@ -40,6 +42,10 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
   void updateAabbs() override;
   void solveConstraints(btContactSolverInfo& info) override;
 
+  std::size_t minimum_batch() const noexcept;
+  /// Not within a step.
+  void set_minimum_batch(std::size_t bodies) noexcept;
+
  protected:
   void predictUnconstraintMotion(btScalar dt) override;
   void createPredictiveContacts(btScalar dt) override;
@@ -47,6 +53,8 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
   void integrateTransforms(btScalar dt) override;
 
  private:
+  bool is_small() const noexcept;
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

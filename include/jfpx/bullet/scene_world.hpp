@@ -6,6 +6,7 @@
 #include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/scene.hpp>
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -19,6 +20,8 @@ enum class WorldKind : std::uint8_t { stock, jfpx };
 struct SceneWorldOptions {
   DispatcherKind dispatcher = DispatcherKind::jfpx;
   DispatcherOptions dispatch = {};  ///< for DispatcherKind::jfpx
+  /// Makes the dispatcher's collider, if set: dispatch.collider is ignored then.
+  std::function<std::unique_ptr<SphereCollider>()> make_collider = {};
   SolverKind solver = SolverKind::jfpx;
   ConstraintSolverOptions solve = {};  ///< for SolverKind::jfpx
   WorldKind world = WorldKind::jfpx;
