@@ -1,11 +1,15 @@
-/// A Bullet world as a moment. Only for builds with Bullet.
+/// Bullet worlds from choices, and as moments. Only for builds with Bullet.
 #pragma once
 
 #include <jfpx/bullet/scene_world.hpp>
 
 #include "examples/viewer/moment.hpp"
+#include "examples/viewer/run.hpp"
 
 namespace jfpx::inline JFPX_ABI::view {
+
+/// Backend and threads of a choice, with jfpx's parts throughout.
+bullet::SceneWorldOptions world_options(const EngineChoice& choice);
 
 Moment moment_of(bullet::SceneWorld& world, std::uint64_t step);
 

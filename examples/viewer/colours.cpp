@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace jfpx::inline JFPX_ABI::view {
 
@@ -41,6 +42,16 @@ Paint scale_paint(Real value) {
   };
   const Paint &a = kPoints[i], &b = kPoints[i + 1];
   return {mix(a.r, b.r), mix(a.g, b.g), mix(a.b, b.b), Pattern::plain};
+}
+
+Paint hue_paint(std::uint32_t number) {
+  // Multiples of the golden ratio, of a turn, stay apart (Knuth 1998, 6.4).
+  const float turn = static_cast<float>(number * 2654435769u) * 0x1p-32f * 6;
+  const auto channel = [turn](float at) {
+    const float from_peak = std::fabs(std::fmod(turn + at, 6.0f) - 3);
+    return static_cast<std::uint8_t>(62 + 178 * std::clamp(from_peak - 1, 0.0f, 1.0f));
+  };
+  return {channel(0), channel(4), channel(2), Pattern::plain};
 }
 
 Paint dimmed(Paint paint) {

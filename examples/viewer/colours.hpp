@@ -11,6 +11,8 @@ Paint ball_paint(std::uint32_t index);
 Paint crate_paint(std::uint32_t index);
 /// Dark blue over green to yellow, equally bright steps; values are clamped to [0, 1].
 Paint scale_paint(Real value);
+/// One of many hues, far from those of the numbers beside it.
+Paint hue_paint(std::uint32_t number);
 /// The paint in the dark: for bodies that sleep.
 Paint dimmed(Paint paint);
 

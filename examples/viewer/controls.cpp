@@ -56,6 +56,7 @@ std::optional<Command> command_of(SDL_Keycode key, Uint16 modifiers) {
     case SDLK_UP:
       return Command::faster;
     case SDLK_F5:
+    case SDLK_r:  // the thesis' key
       return Command::restart;
     case SDLK_o:
       return Command::orbit;
@@ -64,8 +65,12 @@ std::optional<Command> command_of(SDL_Keycode key, Uint16 modifiers) {
       return Command::home;
     case SDLK_c:
       return Command::contacts;
+    case SDLK_f:
+      return Command::forces;
     case SDLK_v:
       return Command::colouring;
+    case SDLK_F9:
+      return Command::save;
     case SDLK_F10:
       return Command::record;
     case SDLK_F12:
@@ -96,9 +101,11 @@ std::span<const KeyHelp> key_help() {
       {". or Right", "one step"},
       {", or Left", "one step back"},
       {"- and +", "slow motion, faster"},
-      {"F5", "start again"},
+      {"F5 or R", "start again"},
       {"C", "contact points and normals"},
+      {"F", "forces, weight aside"},
       {"V", "what colours tell"},
+      {"F9", "save all steps for jfpx replay"},
       {"F10", "record numbered pictures"},
       {"F12", "screenshot"},
       {"F11", "full screen"},

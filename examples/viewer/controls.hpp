@@ -27,9 +27,11 @@ enum class Command : std::uint8_t {
   orbit,
   home,
   contacts,
+  forces,
   colouring,
   screenshot,
   record,
+  save,
   fullscreen,
 };
 

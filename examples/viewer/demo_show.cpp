@@ -4,6 +4,8 @@
 #include <jfpx/error.hpp>
 
 #include "examples/viewer/between.hpp"
+#include "examples/viewer/forces.hpp"
+#include "examples/viewer/scene_choice.hpp"
 #include "examples/viewer/timing.hpp"
 
 #include <fmt/format.h>
@@ -24,6 +26,17 @@ std::unique_ptr<demos::Demo> make_demo(const ViewOptions& options) {
   return demos::make(
       options.run.scene,
       {.scene = tool::scene_options(options.run), .dt = options.run.dt, .world = world});
+}
+
+/// What forces, weight among them, did in the last step: the weight of a body is as long as this.
+void draw_forces(const World& world, Drawing* drawing) {
+  constexpr Real kWeight = 3, kGravity = Real(9.81), kLongest = 20;
+  for (const BodyId id : world.bodies()) {
+    const Vec3 way = world.last_acceleration(id) * (kWeight / kGravity);
+    const Real reach = length(way);
+    if (!(world.mass(id) > 0) || !(reach > kEpsilon)) continue;
+    draw_arrow(world.state(id).position, way * (std::min(reach, kLongest) / reach), drawing);
+  }
 }
 
 bool is_shadow(const demos::Item& item) {
@@ -50,13 +63,6 @@ bool same_items(const demos::View& a, const demos::View& b) {
 }
 
 }  // namespace
-
-bool is_playable(std::string_view name) {
-  const auto entries = demos::all();
-  return std::any_of(entries.begin(), entries.end(),
-                     [name](const demos::Entry& entry) { return entry.name == name; }) &&
-         demos::make(name, {.scene = {.spheres = 0}})->controls().size() > 1;
-}
 
 void draw_demo(const demos::View& from, const demos::View& to, Real share, Drawing* drawing) {
   drawing->add_ground({0, 1, 0}, 0, 1, kGround);
@@ -86,6 +92,8 @@ Bounds bounds_of(const demos::View& view) {
 }
 
 DemoShow::DemoShow(const ViewOptions& options) : options_(options) {
+  contacts = options.contacts;
+  forces = options.forces;
   if (options.choice.engine != EngineKind::native) {
     throw InvalidArgument(options.run.scene +
                           " is a demo of the native engine: it takes no --engine");
@@ -138,6 +146,14 @@ void DemoShow::demo_key(const DemoKey& key) {
   }
 }
 
+std::vector<KeyHelp> DemoShow::demo_help() const {
+  std::vector<KeyHelp> help;
+  for (const demos::Control& control : demo_->controls()) {
+    help.push_back({control.key, control.summary});
+  }
+  return help;
+}
+
 void DemoShow::home() {
   followed_ = camera;
   follow();
@@ -173,6 +189,7 @@ void DemoShow::draw(Renderer& renderer, const Target& target) {
       drawing.add_line(contact.point, contact.point + contact.normal, {60, 255, 90}, 2);
     }
   }
+  if (forces && world != nullptr) draw_forces(*world, &drawing);
   renderer.draw(drawing, view, {0, 0, target.width, target.height}, target.framebuffer);
   float y = ImGui::GetIO().DisplaySize.y - 12;
   for (auto line = now_.text.rbegin(); line != now_.text.rend(); ++line) {
@@ -192,9 +209,13 @@ void DemoShow::panel() {
     if (ImGui::Button("Step")) paused = true, step();
     ImGui::SameLine();
     if (ImGui::Button("Restart")) restart();
-    for (const demos::Control& control : demo_->controls()) {
-      ImGui::Text("%-6s %s", std::string(control.key).c_str(),
-                  std::string(control.summary).c_str());
+    if (const auto chosen = choose_scene(options_.run.scene)) {
+      next = options_;
+      next->run.scene = *chosen;
+      next->input.clear();
+    }
+    for (const KeyHelp& line : demo_help()) {
+      ImGui::Text("%-6s %s", std::string(line.keys).c_str(), std::string(line.what).c_str());
     }
     ImGui::Separator();
     ImGui::TextUnformatted(fmt::format("step {}, {} contacts, {:.3f} ms", report_.step,

@@ -9,9 +9,6 @@
 
 namespace jfpx::inline JFPX_ABI::view {
 
-/// True for demos that are more than a scene: those with controls beyond a new start.
-bool is_playable(std::string_view name);
-
 /// Adds what a demo shows, between two of its pictures. Flattened shapes, which stood for shadows
 /// in the thesis, are left out: the renderer throws real ones.
 void draw_demo(const demos::View& from, const demos::View& to, Real share, Drawing* drawing);
@@ -30,6 +27,7 @@ class DemoShow final : public Show {
   void panel() override;
   std::vector<std::string> demo_keys() const override;
   void demo_key(const DemoKey& key) override;
+  std::vector<KeyHelp> demo_help() const override;
   std::uint64_t steps() const override { return report_.step; }
   double engine_ms() const override { return report_.total_ms; }
   Real body_size() const override { return 1; }

@@ -1,45 +1,17 @@
 /// The native engine as a run.
 #include <jfpx/error.hpp>
 
-#include "examples/viewer/run.hpp"
+#include "examples/viewer/exchangeable_collider.hpp"
 
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
-SphereColliderOptions options_of(const EngineChoice& choice) {
-  SphereColliderOptions options;
-  options.backend = choice.backend;
-  options.threads = choice.threads;
-  return options;
-}
-
-/// A collider that can be exchanged while its World lives. All give the same bits, so a run can't
-/// tell.
-class ExchangeableCollider final : public SphereCollider {
- public:
-  explicit ExchangeableCollider(std::unique_ptr<SphereCollider> first) : now_(std::move(first)) {}
-  void exchange(std::unique_ptr<SphereCollider> next) { now_ = std::move(next); }
-
-  ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
-    return now_->find_contacts(spheres);
-  }
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                         std::span<const SpherePair> pairs) override {
-    return now_->test_pairs(spheres, pairs);
-  }
-  Backend backend() const noexcept override { return now_->backend(); }
-  SphereAlgorithm algorithm() const noexcept override { return now_->algorithm(); }
-
- private:
-  std::unique_ptr<SphereCollider> now_;
-};
-
 class NativeRun final : public Run {
  public:
   NativeRun(const Scene& scene, const EngineChoice& choice, std::uint64_t first_step)
-      : NativeRun(
-            scene, choice, first_step,
-            std::make_unique<ExchangeableCollider>(make_sphere_collider(options_of(choice)))) {}
+      : NativeRun(scene, choice, first_step,
+                  std::make_unique<ExchangeableCollider>(
+                      make_sphere_collider(collider_options(choice)))) {}
 
   void step() override { report_ = world_.step(); }
 
@@ -63,7 +35,7 @@ class NativeRun final : public Run {
   EngineChoice choice() const override { return choice_; }
   bool switch_to(const EngineChoice& choice) override {
     if (choice.engine != EngineKind::native) return false;
-    collider_->exchange(make_sphere_collider(options_of(choice)));
+    collider_->exchange(make_sphere_collider(collider_options(choice)));
     choice_ = choice;
     return true;
   }

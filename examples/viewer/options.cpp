@@ -3,7 +3,7 @@
 
 #include <jfpx/error.hpp>
 
-#include "examples/viewer/demo_show.hpp"
+#include "src/tool/demo_names.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -64,12 +64,23 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
   app.add_option("--threads", options.choice.threads, "Threads on x86, 0 = one per core")
       ->check(tool::whole_number())
       ->capture_default_str();
+  const auto add_part = [&](const char* name, bool* jfpx, const char* what) {
+    app.add_option_function<std::string>(
+           name, [jfpx](const std::string& whose) { *jfpx = whose == "jfpx"; }, what)
+        ->check(CLI::IsMember({"stock", "jfpx"}));
+  };
+  add_part("--solver", &options.choice.jfpx_solver,
+           "Engine bullet: whose solver, stock or jfpx [jfpx]");
+  add_part("--world", &options.choice.jfpx_world,
+           "Engine bullet: whose world, stock or jfpx [jfpx]");
   app.add_flag("--headless", options.headless, "No window, no display");
   app.add_option("--frames", options.frames, "Steps to run [headless: 120; window: until closed]")
       ->check(tool::whole_number());
   app.add_option("--screenshot", options.screenshot, "Write the last frame to this PNG file");
   app.add_option("--record", options.record,
                  "Write every frame to this folder as frame-000001.png and so on");
+  app.add_option("--recording", options.recording,
+                 "Write the states of all steps to this file at the end, for: jfpx replay");
   app.add_option_function<std::string>(
       "--size", [&options](const std::string& text) { options.size = parse_size(text); },
       "Size of the picture or window [1280x720]");
@@ -89,9 +100,11 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
                std::find(std::begin(kColouringNames), std::end(kColouringNames), name);
            options.colouring = static_cast<Colouring>(found - std::begin(kColouringNames));
          },
-         "What colours tell: bodies, speed, sleep, penetration or contacts [bodies]")
-      ->check(CLI::IsMember({"bodies", "speed", "sleep", "penetration", "contacts"}));
+         "What colours tell: bodies, speed, sleep, penetration, contacts or islands [bodies]")
+      ->check(CLI::IsMember(
+          std::vector<std::string>(std::begin(kColouringNames), std::end(kColouringNames))));
   app.add_flag("--contacts", options.contacts, "Draw contact points and normals");
+  app.add_flag("--forces", options.forces, "Draw what pushes each body, its weight aside");
   app.add_flag("--panel", options.panel, "Show the panel in headless pictures too");
   app.add_option("--input", options.input, "Inputs of a demo, from this file");
   app.add_option_function<std::string>(
@@ -107,9 +120,8 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
 }
 
 void check(const ViewOptions& options) {
-  if (!options.input.empty() && (options.side_by_side || !is_playable(options.run.scene))) {
-    throw InvalidArgument("--input goes with a demo that has controls; " + options.run.scene +
-                          " is a scene");
+  if (!options.input.empty() && (options.side_by_side || !tool::is_demo(options.run.scene))) {
+    throw InvalidArgument("--input goes with a demo; " + options.run.scene + " is a scene");
   }
   if (options.eye.has_value() != options.target.has_value()) {
     throw InvalidArgument("--eye and --target go together");

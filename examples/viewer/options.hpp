@@ -22,10 +22,12 @@ struct ViewOptions {
   std::optional<std::uint64_t> frames;  ///< steps before the last picture
   std::string screenshot;               ///< PNG of the last frame
   std::string record;                   ///< folder for numbered PNGs
+  std::string recording;                ///< file for the states of all steps
   Size size;
   Quality quality = kMediumQuality;
   Colouring colouring = Colouring::bodies;
   bool contacts = false;  ///< draw them
+  bool forces = false;    ///< likewise
   bool panel = false;     ///< show it in headless pictures
   bool render = true;     ///< the thesis' switch "rendering on / off"
   bool fullscreen = false;

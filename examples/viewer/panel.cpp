@@ -1,7 +1,7 @@
 /// The panel of a run: what runs, on what, how fast, and what is known about a body.
 #include <jfpx/error.hpp>
 
-#include "examples/scenes/scenes.hpp"
+#include "examples/viewer/scene_choice.hpp"
 #include "examples/viewer/scene_show.hpp"
 
 #include <fmt/format.h>
@@ -16,6 +16,12 @@ namespace {
 const ImVec4 kWarning{1.0f, 0.55f, 0.35f, 1.0f};
 
 void say(const std::string& text) { ImGui::TextUnformatted(text.c_str()); }
+
+std::ptrdiff_t count_spheres(const Scene& scene) {
+  return std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const BodyDef& body) {
+    return std::holds_alternative<Sphere>(body.shape);
+  });
+}
 
 /// A slider over a Real. @return whether the user has let go of a new value.
 bool slide(const char* label, Real* value, float low, float high, const char* format = "%.3f") {
@@ -61,6 +67,12 @@ void SceneShow::show_controls() {
   if (ImGui::Button("Step")) paused = true, step();
   ImGui::SameLine();
   if (ImGui::Button("Restart")) restart();
+  for (const auto& [label, command] :
+       {std::pair("Picture", Command::screenshot), std::pair("Film", Command::record),
+        std::pair("Save steps", Command::save)}) {
+    if (command != Command::screenshot) ImGui::SameLine();
+    if (ImGui::Button(label)) commands.push_back(command);
+  }
   auto rate = static_cast<float>(speed);
   if (ImGui::SliderFloat("speed", &rate, 0.01f, 4, "%.2f x", ImGuiSliderFlags_Logarithmic)) {
     speed = static_cast<double>(rate);
@@ -74,16 +86,11 @@ void SceneShow::show_scene_choice() {
   ViewOptions wish = options_;
   wish.choice = player_.choice();
   bool changed = false;
-  if (ImGui::BeginCombo("scene", player_.scene().name.c_str())) {
-    for (const scenes::Entry& entry : scenes::all()) {
-      if (ImGui::Selectable(entry.name.data(), entry.name == options_.run.scene)) {
-        wish.run.scene = entry.name;
-        wish.run.spheres.reset();
-        wanted_spheres_ = static_cast<int>(entry.default_spheres);
-        changed = true;
-      }
-    }
-    ImGui::EndCombo();
+  if (const auto chosen = choose_scene(player_.scene().name)) {
+    wish.run.scene = *chosen;
+    wish.run.spheres.reset();
+    wish.run.boxes.reset();
+    changed = true;
   }
   ImGui::InputInt("spheres", &wanted_spheres_, 0);
   if (ImGui::IsItemDeactivatedAfterEdit()) {
@@ -99,7 +106,13 @@ void SceneShow::show_scene_choice() {
   }
   if (!changed) return;
   message_.clear();
+  if (is_playable(wish.run.scene)) {
+    wish.choice.engine = EngineKind::native;
+    next = wish;
+    return;
+  }
   load(wish);
+  wanted_spheres_ = static_cast<int>(count_spheres(player_.scene()));
   home();
 }
 
@@ -119,6 +132,11 @@ void SceneShow::show_engine_choice() {
     ImGui::RadioButton(to_string(static_cast<Backend>(i)).data(), &backend, i);
   }
   wish.backend = static_cast<Backend>(backend);
+  if (wish.engine == EngineKind::bullet) {
+    ImGui::Checkbox("jfpx' solver", &wish.jfpx_solver);
+    ImGui::SameLine();
+    ImGui::Checkbox("jfpx' world", &wish.jfpx_world);
+  }
   if (wish == player_.choice()) return;
   message_ = player_.switch_to(wish) ? "Switched: the bits stay the same."
                                      : "Another engine goes on from the same state.";
@@ -171,10 +189,13 @@ void SceneShow::show_counters() {
                      fmt::format("{:.3f} ms", now.times.*field).c_str(), 0, FLT_MAX, {170, 26});
   }
   int telling = static_cast<int>(colouring);
-  if (ImGui::Combo("colours", &telling, kColouringNames, 5)) {
+  if (ImGui::Combo("colours", &telling, kColouringNames,
+                   static_cast<int>(std::size(kColouringNames)))) {
     colouring = static_cast<Colouring>(telling);
   }
-  ImGui::Checkbox("contact points and normals", &contacts);
+  ImGui::Checkbox("contacts", &contacts);
+  ImGui::SameLine();
+  ImGui::Checkbox("forces", &forces);
 }
 
 void SceneShow::show_picked() {

@@ -1,6 +1,9 @@
 /// Plays a run.
 #include "examples/viewer/player.hpp"
 
+#include <jfpx/error.hpp>
+#include <jfpx/recording.hpp>
+
 #include <cmath>
 
 namespace jfpx::inline JFPX_ABI::view {
@@ -61,8 +64,7 @@ bool Player::step_back() {
 bool Player::switch_to(const EngineChoice& choice) {
   if (choice == run_->choice()) return true;
   if (run_->switch_to(choice)) return true;
-  run_ = continue_run(scene_, history_.back(), choice);
-  shown_ = history_.size() - 1;
+  go_on_with(choice);
   return false;
 }
 
@@ -70,8 +72,25 @@ void Player::set_settings(const Scene& settings) {
   scene_.dt = settings.dt;
   scene_.resolver = settings.resolver;
   scene_.sleep = settings.sleep;
-  run_ = continue_run(scene_, history_.back(), run_->choice());
+  go_on_with(run_->choice());
+}
+
+void Player::go_on_with(const EngineChoice& choice) {
+  run_ = continue_run(scene_, history_.back(), choice);
   shown_ = history_.size() - 1;
+  changed_ = true;
+}
+
+void Player::save_recording(const std::string& path) const {
+  const auto refuse = [&](const char* why) { throw InvalidArgument(path + ": " + why); };
+  if (changed_) refuse("another engine or other settings went on with the run: no replay could");
+  if (history_.front().step != 0) refuse("the first steps are no longer kept");
+  RecordingWriter recording(
+      path, {.engine = std::string(kEngineNames[static_cast<std::size_t>(run_->choice().engine)]),
+             .backend = std::string(to_string(run_->choice().backend)),
+             .scene = scene_});
+  for (std::size_t i = 1; i < history_.size(); ++i) recording.append(history_[i].states);
+  recording.finish();
 }
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -45,6 +45,10 @@ class Player {
   /// @throws BackendUnavailable; nothing has changed then.
   bool switch_to(const EngineChoice& choice);
   EngineChoice choice() const { return run_->choice(); }
+  /// Writes the states of all steps, for `jfpx replay`.
+  /// @throws InvalidArgument if they are not one run from the first step, or the first is no longer
+  ///   kept; FileError
+  void save_recording(const std::string& path) const;
   /// Replaces resolver and sleep settings and dt, from the newest moment on.
   void set_settings(const Scene& settings);
 
@@ -62,12 +66,14 @@ class Player {
 
  private:
   void keep(Moment moment);
+  void go_on_with(const EngineChoice& choice);
 
   Scene scene_;
   std::unique_ptr<Run> run_;
   std::deque<Moment> history_;
   std::size_t shown_ = 0;
   std::size_t bytes_ = 0;
+  bool changed_ = false;  ///< the run is no longer the one that began
   StepClock clock_;
 };
 

@@ -6,6 +6,7 @@
 #include "examples/viewer/moment.hpp"
 
 #include <memory>
+#include <string>
 #include <string_view>
 
 namespace jfpx::inline JFPX_ABI::view {
@@ -19,7 +20,8 @@ EngineKind parse_engine(std::string_view name);
 struct EngineChoice {
   EngineKind engine = EngineKind::native;
   Backend backend = Backend::automatic;
-  unsigned threads = 1;  ///< x86, 0 = one per core
+  unsigned threads = 1;                        ///< x86, 0 = one per core
+  bool jfpx_solver = true, jfpx_world = true;  ///< of EngineKind::bullet; else Bullet's own
   friend bool operator==(const EngineChoice&, const EngineChoice&) = default;
 };
 
@@ -37,6 +39,14 @@ class Run {
 
 /// @throws InvalidScene, BackendUnavailable, OutOfMemory
 std::unique_ptr<Run> make_run(const Scene& scene, const EngineChoice& choice);
+/// A run whose states are in a file. It has no contacts; another engine or backend goes on live.
+struct Recorded {
+  Scene scene;
+  std::unique_ptr<Run> run;
+};
+/// @throws FileError
+Recorded open_recording(const std::string& path);
+
 /// Engines that this build has, in the order of EngineKind.
 bool has_engine(EngineKind engine);
 

@@ -2,13 +2,20 @@
 #include "examples/viewer/scene_show.hpp"
 
 #include "examples/viewer/framing.hpp"
+#include "src/tool/demo_names.hpp"
 
 #include <fmt/format.h>
 
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
+constexpr std::string_view kRecordingEnding = ".rec";
+
 Player make_player(const ViewOptions& options) {
+  if (options.run.scene.ends_with(kRecordingEnding)) {
+    Recorded recorded = open_recording(options.run.scene);
+    return {std::move(recorded.run), recorded.scene};
+  }
   const Scene scene = tool::load(options.run);
   return {make_run(scene, options.choice), scene};
 }
@@ -19,6 +26,7 @@ SceneShow::SceneShow(const ViewOptions& options)
     : options_(options), player_(make_player(options)), stage_(player_.scene()) {
   colouring = options.colouring;
   contacts = options.contacts;
+  forces = options.forces;
   wanted_spheres_ = static_cast<int>(options.run.spheres.value_or(0));
   wanted_seed_ = static_cast<int>(options.run.seed);
   home();
@@ -58,6 +66,7 @@ void SceneShow::draw(Renderer& renderer, const Target& target) {
   Drawing drawing(now.eye);
   stage_.draw(player_.before(), player_.shown(), player_.share(), colouring, &drawing);
   if (contacts) stage_.draw_contacts(player_.shown().contacts, false, &drawing);
+  if (forces) stage_.draw_forces(player_.before(), player_.shown(), &drawing);
   if (picked_) stage_.draw_mark(player_.shown(), *picked_, &drawing);
   renderer.draw(drawing, now, {0, 0, target.width, target.height}, target.framebuffer);
 }
@@ -68,6 +77,9 @@ void SceneShow::pick(int x, int y, int width, int height) {
       ray_through(now, static_cast<Real>(x), static_cast<Real>(y), width, height);
   picked_ = stage_.pick(player_.shown(), now.eye, direction);
 }
+
+// As in the thesis.
+bool SceneShow::walks() const { return tool::is_demo(options_.run.scene); }
 
 int SceneShow::status() const {
   return player_.shown().trouble.empty() ? tool::kSuccess : tool::kCheckFailed;

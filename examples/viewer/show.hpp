@@ -7,6 +7,7 @@
 #include "examples/viewer/renderer.hpp"
 
 #include <memory>
+#include <optional>
 
 namespace jfpx::inline JFPX_ABI::view {
 
@@ -32,6 +33,12 @@ class Show {
   /// Keys of a demo, by SDL's names in lower case.
   virtual std::vector<std::string> demo_keys() const { return {}; }
   virtual void demo_key(const DemoKey& /*key*/) {}
+  /// What they do, for the help.
+  virtual std::vector<KeyHelp> demo_help() const { return {}; }
+  /// Walking instead of circling at first.
+  virtual bool walks() const { return false; }
+  /// Writes the states of all steps. @throws InvalidArgument where that can't be, FileError
+  virtual void save_recording(const std::string& path) const;
 
   virtual std::uint64_t steps() const = 0;            ///< made so far
   virtual double engine_ms() const = 0;               ///< of the last step
@@ -41,11 +48,16 @@ class Show {
 
   Camera camera;
   Colouring colouring = Colouring::bodies;
-  bool contacts = false;
+  bool contacts = false, forces = false;
   bool paused = false;
   double speed = 1;
+
+  std::vector<Command> commands;    ///< that the panel asks for
+  std::optional<ViewOptions> next;  ///< another show, likewise
 };
 
+/// The show that the options ask for.
+std::unique_ptr<Show> make_show(const ViewOptions& options);
 std::unique_ptr<Show> make_scene_show(const ViewOptions& options);
 std::unique_ptr<Show> make_demo_show(const ViewOptions& options);
 /// @throws BackendUnavailable in a build without Bullet.

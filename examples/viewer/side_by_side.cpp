@@ -30,13 +30,18 @@ constexpr std::size_t kPlotted = 600;  // steps of a plot
 constexpr std::size_t kTimed = 60;     // steps whose median time is shown
 constexpr float kStrip = 0.26f;        // share of the height below the pictures
 
-bullet::SceneWorld make_world(const Scene& scene, const ViewOptions& options,
-                              bullet::DispatcherKind dispatcher) {
-  bullet::SceneWorldOptions world;
-  world.dispatcher = dispatcher;
-  world.dispatch.collider.backend = options.choice.backend;
-  world.dispatch.collider.threads = options.choice.threads;
-  world.dispatch.minimum_batch = 0;  // or small scenes would compare Bullet's code with itself
+bullet::SceneWorld make_stock_world(const Scene& scene) {
+  return bullet::SceneWorld(scene, {.dispatcher = bullet::DispatcherKind::stock,
+                                    .solver = bullet::SolverKind::stock,
+                                    .world = bullet::WorldKind::stock});
+}
+
+bullet::SceneWorld make_jfpx_world(const Scene& scene, const EngineChoice& choice) {
+  bullet::SceneWorldOptions world = world_options(choice);
+  if (!choice.jfpx_solver) world.solver = bullet::SolverKind::stock;
+  if (!choice.jfpx_world) world.world = bullet::WorldKind::stock;
+  // Small scenes would compare Bullet's code with itself.
+  world.dispatch.minimum_batch = world.solve.minimum_batch = 0;
   return bullet::SceneWorld(scene, world);
 }
 
@@ -56,8 +61,8 @@ struct Trio {
   Trio(const Scene& scene, const ViewOptions& options)
       : native(
             make_run(scene, {EngineKind::native, options.choice.backend, options.choice.threads})),
-        stock(make_world(scene, options, bullet::DispatcherKind::stock)),
-        jfpx(make_world(scene, options, bullet::DispatcherKind::jfpx)) {
+        stock(make_stock_world(scene)),
+        jfpx(make_jfpx_world(scene, options.choice)) {
     look(0);
     before = now;
   }
@@ -100,6 +105,7 @@ class SideBySide final : public Show {
         trio_(std::make_unique<Trio>(scene_, options)) {
     colouring = options.colouring;
     contacts = options.contacts;
+    forces = options.forces;
     home();
   }
 
@@ -189,6 +195,7 @@ void SideBySide::draw(Renderer& renderer, const Target& target) {
     const Moment& now = trio_->now[column];
     stage_.draw(trio_->before[column], now, share, colouring, &drawing);
     if (contacts) stage_.draw_contacts(now.contacts, false, &drawing);
+    if (forces) stage_.draw_forces(trio_->before[column], now, &drawing);
     if (column != kNative) stage_.draw_contacts(trio_->different, true, &drawing);
     draw_trails(&drawing);
     const int left = target.width * static_cast<int>(column) / 3;

@@ -3,6 +3,8 @@
 
 #include "examples/viewer/between.hpp"
 #include "examples/viewer/colours.hpp"
+#include "examples/viewer/forces.hpp"
+#include "examples/viewer/islands.hpp"
 #include "examples/viewer/values.hpp"
 
 #include <algorithm>
@@ -18,6 +20,16 @@ constexpr Real kPlate = Real(0.25);  // thickness of a room's floor, in bodies
 constexpr Real kEndless = kMaxReal / 4;
 
 bool movable(const BodyDef& body) { return body.mass > 0; }
+
+/// What colours tell of each body; empty where they only tell bodies apart.
+std::vector<Paint> told_paints(const Scene& scene, const Moment& moment, Colouring colouring) {
+  if (colouring == Colouring::islands) return island_paints(scene, moment.contacts);
+  std::vector<Paint> paints;
+  for (const Real value : colour_values(scene, moment, colouring)) {
+    paints.push_back(scale_paint(value));
+  }
+  return paints;
+}
 
 /// The middle one, and the ones `left_out` from both ends.
 struct Spread {
@@ -166,7 +178,7 @@ void Stage::draw(const Moment& from, const Moment& to, Real share, Colouring col
   drawing->set_bounds(bounds.centre, bounds.radius * Real(1.25));
   drawing->set_detail(body_size_ * Real(1.6));
   draw_still(bounds, drawing);
-  const std::vector<Real> values = colour_values(scene_, to, colouring);
+  const std::vector<Paint> told = told_paints(scene_, to, colouring);
   for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
     const BodyDef& def = scene_.bodies[i];
     const bool still = !movable(def);
@@ -174,7 +186,7 @@ void Stage::draw(const Moment& from, const Moment& to, Real share, Colouring col
     const Vec3 position = between(from.states[i].position, to.states[i].position, share);
     const Quat turn = between(from.states[i].orientation, to.states[i].orientation, share);
     Paint paint = this->paint(i);
-    if (!still && !values.empty()) paint = scale_paint(values[i]);
+    if (!still && !told.empty()) paint = told[i];
     if (!still && to.awake[i] == 0) paint = dimmed(paint);
     if (still && !def.kinematic) paint.pattern = Pattern::plain;
     if (still && std::holds_alternative<Box>(def.shape)) paint.pattern = Pattern::wall;
@@ -204,6 +216,10 @@ void Stage::draw_contacts(const std::vector<Contact>& contacts, bool red, Drawin
     drawing->add_line(contact.point, end, paint, red ? 4.0f : 2.0f);
     drawing->add_line(contact.point, contact.point, paint, red ? 10.0f : 6.0f);
   }
+}
+
+void Stage::draw_forces(const Moment& before, const Moment& now, Drawing* drawing) const {
+  view::draw_forces(scene_, before, now, body_size_ * Real(2.2), drawing);
 }
 
 void Stage::draw_mark(const Moment& moment, std::uint32_t body, Drawing* drawing) const {

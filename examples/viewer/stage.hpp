@@ -12,9 +12,9 @@
 namespace jfpx::inline JFPX_ABI::view {
 
 /// What the colour of a body says.
-enum class Colouring : std::uint8_t { bodies, speed, sleep, penetration, contacts };
-inline constexpr const char* kColouringNames[] = {"bodies", "speed", "sleep", "penetration",
-                                                  "contacts"};
+enum class Colouring : std::uint8_t { bodies, speed, sleep, penetration, contacts, islands };
+inline constexpr const char* kColouringNames[] = {"bodies",      "speed",    "sleep",
+                                                  "penetration", "contacts", "islands"};
 
 /// A ball that holds what is worth seeing.
 struct Bounds {
@@ -34,6 +34,9 @@ class Stage {
             Drawing* drawing) const;
   /// Adds normals and points of contacts as lines; `red` draws them as faults.
   void draw_contacts(const std::vector<Contact>& contacts, bool red, Drawing* drawing) const;
+
+  /// Adds arrows for what pushed the bodies in the step between two moments.
+  void draw_forces(const Moment& before, const Moment& now, Drawing* drawing) const;
 
   /// Adds a frame around one body.
   void draw_mark(const Moment& moment, std::uint32_t body, Drawing* drawing) const;

@@ -4,9 +4,25 @@
 #include <algorithm>
 
 namespace jfpx::inline JFPX_ABI::view {
+namespace {
+
+Real size_of(const Sphere& sphere) { return sphere.radius; }
+Real size_of(const Box& box) { return length(box.half_extents); }
+Real size_of(const HalfSpace&) { return 0; }
+Real size_of(const Plane&) { return 0; }
+Real size_of(const Assembly& assembly) {
+  Real size = 0;
+  for (const AssemblyPart& part : assembly.parts) {
+    const Real own = std::visit([](const auto& s) { return size_of(s); }, part.shape);
+    size = std::max(size, length(part.position) + own);
+  }
+  return size;
+}
+
+}  // namespace
 
 std::vector<Real> colour_values(const Scene& scene, const Moment& moment, Colouring colouring) {
-  if (colouring == Colouring::bodies) return {};
+  if (colouring == Colouring::bodies || colouring == Colouring::islands) return {};
   std::vector<Real> values(scene.bodies.size());
   if (colouring == Colouring::speed) {
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = length(moment.states[i].velocity);
@@ -76,16 +92,7 @@ Real ray_distance(const Assembly& assembly, const BodyState& state, const Vec3& 
 }
 
 Real size_of(const Shape& shape) {
-  if (const Sphere* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
-  if (const Box* box = std::get_if<Box>(&shape)) return length(box->half_extents);
-  Real size = 0;
-  if (const Assembly* assembly = std::get_if<Assembly>(&shape)) {
-    for (const AssemblyPart& part : assembly->parts) {
-      const Real own = std::visit([](const auto& s) { return size_of(Shape(s)); }, part.shape);
-      size = std::max(size, length(part.position) + own);
-    }
-  }
-  return size;
+  return std::visit([](const auto& s) { return size_of(s); }, shape);
 }
 
 BodyState placed(const AssemblyPart& part, const BodyState& body) {

@@ -6,7 +6,7 @@
 namespace jfpx::inline JFPX_ABI::view {
 
 /// A value in [0, 1] for each body, scaled to the largest of the moment where there is no natural
-/// scale; empty for Colouring::bodies.
+/// scale; empty for Colouring::bodies and islands.
 std::vector<Real> colour_values(const Scene& scene, const Moment& moment, Colouring colouring);
 
 /// Where a ray enters a shape, as a distance along its unit direction; kMaxReal if it misses or

@@ -52,7 +52,12 @@ Window::Window(const std::string& title, int width, int height, bool visible) {
   window_.reset(SDL_CreateWindow(title.c_str(), SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
                                  width, height, flags));
   if (window_ == nullptr) refuse("the viewer can't open a window with OpenGL");
+  SDL_GL_SetAttribute(SDL_GL_CONTEXT_RESET_NOTIFICATION, SDL_GL_CONTEXT_RESET_LOSE_CONTEXT);
   context_.reset(SDL_GL_CreateContext(window_.get()));
+  if (context_ == nullptr) {  // some drivers can't tell of resets
+    SDL_GL_SetAttribute(SDL_GL_CONTEXT_RESET_NOTIFICATION, SDL_GL_CONTEXT_RESET_NO_NOTIFICATION);
+    context_.reset(SDL_GL_CreateContext(window_.get()));
+  }
   if (context_ == nullptr) refuse("the viewer needs OpenGL 3.3");
   if (epoxy_gl_version() < 33) {
     throw BackendUnavailable("the viewer needs OpenGL 3.3; this driver has " +
@@ -73,7 +78,16 @@ Window Window::hidden() {
   return {"jfpx", 16, 16, false};
 }
 
-void Window::swap() { SDL_GL_SwapWindow(window_.get()); }
+void Window::check_context() const {
+  const bool tells = epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_KHR_robustness");
+  if (!tells || glGetGraphicsResetStatus() == GL_NO_ERROR) return;
+  throw BackendUnavailable("OpenGL lost its context: the graphics device was reset");
+}
+
+void Window::swap() {
+  check_context();
+  SDL_GL_SwapWindow(window_.get());
+}
 void Window::set_title(const std::string& title) {
   SDL_SetWindowTitle(window_.get(), title.c_str());
 }

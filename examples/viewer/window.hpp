@@ -20,6 +20,9 @@ class Window {
   /// @throws BackendUnavailable if there is no OpenGL 3.3.
   static Window hidden();
 
+  /// @throws BackendUnavailable if the device was reset and all that it knew is gone.
+  void check_context() const;
+  /// Shows what was drawn. @throws as check_context()
   void swap();
   void set_title(const std::string& title);
   void set_fullscreen(bool on);

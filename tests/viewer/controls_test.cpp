@@ -5,14 +5,20 @@
 
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/comparison.hpp"
+#include "examples/viewer/forces.hpp"
+#include "examples/viewer/islands.hpp"
 #include "examples/viewer/player.hpp"
 #include "examples/viewer/timing.hpp"
 #include "examples/viewer/values.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <random>
 
 namespace jfpx {
 namespace {
@@ -20,6 +26,11 @@ namespace {
 using namespace view;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+
+unsigned fresh_seed() {
+  const char* given = std::getenv("JFPX_TEST_SEED");
+  return given ? static_cast<unsigned>(std::strtoul(given, nullptr, 10)) : std::random_device{}();
+}
 
 SDL_Event key(SDL_Keycode code, bool down = true) {
   SDL_Event event{};
@@ -272,6 +283,64 @@ TEST(Player, SwitchingBulletsDispatcherKeepsTheBits) {
   }
 }
 
+TEST(Player, SwitchingBulletsPartsAndBackendsAtRandomKeepsTheBits) {
+  if (!has_engine(EngineKind::bullet)) GTEST_SKIP() << "built without Bullet";
+  const unsigned seed = fresh_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  std::mt19937 random(seed);
+  const Scene scene = scenes::make("mixed", {.spheres = 30, .boxes = 30, .seed = seed});
+  Player stock = player_of(scene, {.engine = EngineKind::bullet_stock});
+  Player switched = player_of(scene, {.engine = EngineKind::bullet});
+  for (int i = 0; i < 120; ++i) {
+    if (random() % 3 == 0) {
+      const EngineChoice choice{
+          .engine = random() % 4 == 0 ? EngineKind::bullet_stock : EngineKind::bullet,
+          .backend = random() % 2 == 0 ? Backend::x86 : Backend::automatic,
+          .jfpx_solver = random() % 2 == 0,
+          .jfpx_world = random() % 2 == 0};
+      EXPECT_TRUE(switched.switch_to(choice));
+    }
+    stock.step();
+    switched.step();
+    ASSERT_EQ(state_hash(stock.shown().states), state_hash(switched.shown().states)) << i;
+  }
+}
+
+TEST(Player, ARecordingIsPlayedAndGoesOnLiveAndReplays) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  const Scene scene = scenes::make("gas", {.spheres = 20});
+  Player live = player_of(scene);
+  for (int i = 0; i < 15; ++i) live.step();
+  live.save_recording(path);
+  Recorded recorded = open_recording(path);
+  EXPECT_EQ(recorded.scene, scene);
+  Player played(std::move(recorded.run), recorded.scene);
+  for (const Moment& moment : live.history()) {
+    EXPECT_EQ(state_hash(played.shown().states), state_hash(moment.states)) << moment.step;
+    played.step();
+  }
+  EXPECT_EQ(played.shown().step, 15u);  // the end stays
+  EXPECT_TRUE(played.step_back());
+  EXPECT_FALSE(played.switch_to({.backend = Backend::x86}));
+  played.step();
+  EXPECT_EQ(played.shown().step, 16u);
+  EXPECT_EQ(played.shown().computed_by, "x86");
+}
+
+TEST(Player, OnlyAWholeRunIsRecorded) {
+  const test::TemporaryFolder folder;
+  Player changed = player_of(scenes::make("gas", {.spheres = 1}));
+  Scene settings = changed.scene();
+  settings.resolver.max_iterations = 5;
+  changed.set_settings(settings);
+  EXPECT_THROW(changed.save_recording(folder.file("a.rec")), InvalidArgument);
+  Player late = player_of(scenes::make("gas", {.spheres = 1}));
+  for (std::size_t i = 0; i < Player::kHistoryLength + 1; ++i) late.step();
+  EXPECT_THROW(late.save_recording(folder.file("a.rec")), InvalidArgument);
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
 TEST(Player, AnotherEngineGoesOnFromTheSameState) {
   if (!has_engine(EngineKind::bullet)) GTEST_SKIP() << "built without Bullet";
   const Scene scene = scenes::make("gas", {.spheres = 27});
@@ -289,6 +358,108 @@ TEST(Player, HistoryIsBounded) {
   Player player = player_of(scenes::make("gas", {.spheres = 1}));
   for (std::size_t i = 0; i < Player::kHistoryLength + 100; ++i) player.step();
   EXPECT_LE(player.history().size(), Player::kHistoryLength);
+}
+
+/// Balls of 2 kg in a row, the last one immovable.
+Scene row_of_balls(std::size_t count) {
+  Scene scene;
+  BodyDef ball;
+  ball.mass = 2;
+  ball.acceleration = {0, -10, 0};
+  scene.bodies.assign(count, ball);
+  scene.bodies.back().mass = 0;
+  scene.dt = Real(0.125);
+  return scene;
+}
+
+TEST(Islands, HangTogetherByMovableBodiesOnly) {
+  const Scene scene = row_of_balls(8);
+  const auto touch = [](std::uint32_t a, std::uint32_t b) { return Contact{a, b, {}, {}}; };
+  // 5-6-3 and 1-2; 0 and 4 lie on the immovable 7, which joins nothing.
+  const std::vector<Contact> contacts = {touch(5, 6), touch(1, 2), touch(3, 6),
+                                         touch(0, 7), touch(4, 7), touch(1, 7)};
+  EXPECT_THAT(islands_of(scene, contacts), ElementsAre(0, 1, 1, 3, 4, 3, 3, 7));
+  EXPECT_THAT(islands_of(scene, {}), ElementsAre(0, 1, 2, 3, 4, 5, 6, 7));
+  EXPECT_THAT(islands_of({}, {}), IsEmpty());
+  const auto paints = island_paints(scene, contacts);
+  EXPECT_EQ(paints[3], paints[5]);
+  EXPECT_EQ(paints[0], paints[4]);  // alone: grey
+  EXPECT_EQ(paints[0].r + 10, paints[0].b);
+  EXPECT_NE(paints[1], paints[3]);
+  EXPECT_NE(paints[1], paints[0]);
+}
+
+TEST(Islands, AreThoseOfAFloodFill) {
+  const unsigned seed = fresh_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  std::mt19937 random(seed);
+  const Scene scene = row_of_balls(60);
+  std::vector<Contact> contacts(random() % 80);
+  std::uniform_int_distribution<std::uint32_t> any(0, 59);
+  for (Contact& contact : contacts) contact.a = any(random), contact.b = any(random);
+  std::vector<std::uint32_t> expected(60);
+  for (std::uint32_t i = 0; i < 60; ++i) expected[i] = i;
+  for (bool changed = true; changed;) {  // labels sink to the lowest neighbour's
+    changed = false;
+    for (const Contact& c : contacts) {
+      if (c.a == 59 || c.b == 59 || expected[c.a] == expected[c.b]) continue;
+      expected[c.a] = expected[c.b] = std::min(expected[c.a], expected[c.b]);
+      changed = true;
+    }
+  }
+  EXPECT_EQ(islands_of(scene, contacts), expected);
+}
+
+TEST(Forces, AreWhatGravityDoesNotExplain) {
+  const Scene scene = row_of_balls(4);
+  Moment before, now;
+  before.states.resize(4);
+  now.states = before.states;
+  now.step = 1;
+  now.states[1].velocity = {0, Real(-1.25), 0};  // falls freely: 10 / 8
+  now.states[2].velocity = {3, 0, 0};            // struck while it lies
+  const auto forces = forces_between(scene, before, now);
+  EXPECT_THAT(forces, ElementsAre(Vec3{0, 20, 0}, Vec3{}, Vec3{48, 20, 0}, Vec3{}));
+  now.step = 0;
+  EXPECT_THAT(forces_between(scene, before, now), ::testing::Each(Vec3{}));
+}
+
+TEST(Forces, OfABallAtRestAreItsWeightOnEveryEngine) {
+  for (const EngineKind engine : {EngineKind::native, EngineKind::bullet}) {
+    if (!has_engine(engine)) continue;
+    Scene scene;
+    BodyDef ball, ground;
+    ball.shape = Sphere{1};
+    ball.position = {0, 1, 0};
+    ball.mass = 3;
+    ball.acceleration = {0, -10, 0};
+    ground.shape = HalfSpace{{0, 1, 0}, 0};
+    ground.mass = 0;
+    scene.bodies = {ball, ground};
+    Player player = player_of(scene, {.engine = engine});
+    Vec3 sum;
+    constexpr int kSteps = 60;
+    for (int i = 0; i < 2 * kSteps; ++i) {
+      player.step();
+      if (i >= kSteps) sum += forces_between(scene, player.before(), player.shown())[0];
+    }
+    EXPECT_NEAR(sum.y / kSteps, 30, 0.5) << kEngineNames[static_cast<std::size_t>(engine)];
+  }
+}
+
+TEST(Forces, AreDrawnAsArrowsOfBoundedLength) {
+  const Scene scene = row_of_balls(4);
+  Moment before, now;
+  before.states.resize(4);
+  now.states = before.states;
+  now.step = 1;
+  now.states[1].velocity = {0, Real(-1.25), 0};
+  now.states[2].velocity = {1e6, 0, 0};
+  Drawing drawing({0, 0, 10});
+  draw_forces(scene, before, now, 2, &drawing);
+  ASSERT_EQ(drawing.lines().size(), 6u);         // two arrows: a shaft and a head of two lines each
+  EXPECT_FLOAT_EQ(drawing.lines()[0].to[1], 2);  // one weight, one unit
+  EXPECT_FLOAT_EQ(drawing.lines()[3].to[0], 10);  // five units at the most
 }
 
 TEST(Comparison, FindsEveryPlantedDifference) {

@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "examples/viewer/scene_choice.hpp"
 #include "tests/viewer/gl_fixture.hpp"
 
 #include <gmock/gmock.h>

@@ -28,6 +28,8 @@ class GlTest : public ::testing::Test {
     if (window_ == nullptr) GTEST_SKIP() << reason_;
   }
 
+  static view::Window& window() { return *window_; }
+
   static view::Image picture(const view::Drawing& drawing, const view::View& view, int width,
                              int height, const view::Quality& quality = view::kLowQuality) {
     view::Renderer renderer(quality);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <random>
+#include <utility>
 
 namespace jfpx {
 namespace {
@@ -197,6 +198,18 @@ TEST_F(RendererTest, AHundredThousandSpheresTakeOneDraw) {
   std::vector<bool> seen(kHues.size());
   for (int x = 40; x < 120; ++x) seen[nearest_hue(image.at(x, 50))] = true;
   EXPECT_THAT(seen, ::testing::Each(true));
+}
+
+GLenum guilty() { return GL_GUILTY_CONTEXT_RESET; }
+
+TEST_F(RendererTest, ALostContextIsOneSentence) {
+  window().check_context();
+  if (epoxy_gl_version() < 45) GTEST_SKIP() << "this driver can't tell";
+  const auto driver = std::exchange(epoxy_glGetGraphicsResetStatus, guilty);
+  EXPECT_THROW(window().check_context(), BackendUnavailable);
+  EXPECT_THROW(window().swap(), BackendUnavailable);
+  epoxy_glGetGraphicsResetStatus = driver;
+  window().check_context();
 }
 
 TEST_F(RendererTest, EqualsItsReference) {

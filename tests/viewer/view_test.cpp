@@ -121,6 +121,23 @@ TEST_F(Pictures, AreRecordedWithNumbers) {
   }
 }
 
+TEST_F(Pictures, ColoursAndArrowsShow) {
+  const auto plain = take("pile --spheres 60 --frames 60");
+  for (const char* what : {"--colours islands", "--colours speed", "--forces", "--contacts"}) {
+    EXPECT_NE(take(std::string("pile --spheres 60 --frames 60 ") + what).rgb, plain.rgb) << what;
+  }
+}
+
+TEST_F(Pictures, AWindowThatIsClosedInTheMiddleEndsWell) {
+  const auto result =
+      test::run_process("SDL_VIDEODRIVER=offscreen timeout -s TERM 2 " JFPX_VIEW_PATH
+                        " pile --spheres 400 --size 160x120 --quality low 2>&1; echo status $?");
+  // timeout itself says 124 when it had to send the signal.
+  EXPECT_THAT(result.output, HasSubstr("status 124"));
+  EXPECT_THAT(result.output, HasSubstr("rendering on"));
+  EXPECT_THAT(result.output, HasSubstr("engine native"));
+}
+
 TEST_F(Pictures, AWindowRunsAndClosesAtItsLastFrame) {
   const auto result =
       jfpx_view("pile --spheres 20 --frames 10 --size 160x120 --quality low --screenshot " +
@@ -136,6 +153,30 @@ TEST(View, RunsWithoutRenderingForTiming) {
   EXPECT_EQ(result.status, 0) << result.output;
   EXPECT_THAT(result.output, HasSubstr("10 steps"));
   EXPECT_THAT(result.output, HasSubstr("rendering off"));
+}
+
+TEST(View, StatesAreRecordedAndPlayedBack) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("gas.rec");
+  const auto recorded = jfpx_view("gas --spheres 9 --frames 7 --no-render --recording " + path);
+  EXPECT_EQ(recorded.status, 0) << recorded.output;
+  const auto played = jfpx_view(path + " --frames 7 --no-render");
+  EXPECT_EQ(played.status, 0) << played.output;
+  EXPECT_THAT(played.output, HasSubstr("step 7"));
+  std::ofstream(path, std::ios::app) << "more";
+  expect_fails(jfpx_view(path + " --no-render"), 2, path);
+  expect_fails(jfpx_view("flight --frames 2 --no-render --recording " + path), 2,
+               "can be recorded");
+}
+
+TEST(View, BulletsPartsAreChosenByName) {
+  if (!JFPX_HAS_BULLET) GTEST_SKIP() << "built without Bullet";
+  for (const char* parts : {"--solver stock", "--world stock", "--solver stock --world stock"}) {
+    const auto result =
+        jfpx_view(std::string("pile --engine bullet --spheres 30 --frames 9 --no-render ") + parts);
+    EXPECT_EQ(result.status, 0) << result.output;
+  }
+  EXPECT_EQ(jfpx_view("pile --no-render --solver mine").status, 2);
 }
 
 TEST(View, BadUsageIsStatusTwo) {

@@ -1,0 +1,40 @@
+/// A collider that can be exchanged while its owner lives.
+#pragma once
+
+#include <jfpx/sphere_collider.hpp>
+
+#include "examples/viewer/run.hpp"
+
+#include <memory>
+#include <utility>
+
+namespace jfpx::inline JFPX_ABI::view {
+
+inline SphereColliderOptions collider_options(const EngineChoice& choice) {
+  SphereColliderOptions options;
+  options.backend = choice.backend;
+  options.threads = choice.threads;
+  return options;
+}
+
+/// All colliders give the same bits, so a run can't tell.
+class ExchangeableCollider final : public SphereCollider {
+ public:
+  explicit ExchangeableCollider(std::unique_ptr<SphereCollider> first) : now_(std::move(first)) {}
+  void exchange(std::unique_ptr<SphereCollider> next) { now_ = std::move(next); }
+
+  ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
+    return now_->find_contacts(spheres);
+  }
+  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
+                                         std::span<const SpherePair> pairs) override {
+    return now_->test_pairs(spheres, pairs);
+  }
+  Backend backend() const noexcept override { return now_->backend(); }
+  SphereAlgorithm algorithm() const noexcept override { return now_->algorithm(); }
+
+ private:
+  std::unique_ptr<SphereCollider> now_;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::view

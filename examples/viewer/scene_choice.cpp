@@ -1,0 +1,31 @@
+/// Choosing what runs, in a panel.
+#include "examples/viewer/scene_choice.hpp"
+
+#include "examples/demos/demo.hpp"
+#include "src/tool/demo_names.hpp"
+
+#include <imgui.h>
+
+namespace jfpx::inline JFPX_ABI::view {
+
+std::optional<std::string> choose_scene(const std::string& current) {
+  std::optional<std::string> chosen;
+  if (!ImGui::BeginCombo("scene", current.c_str())) return chosen;
+  const auto offer = [&](std::string_view name) {
+    const std::string text(name);
+    if (ImGui::Selectable(text.c_str(), text == current)) chosen = text;
+  };
+  for (const scenes::Entry& entry : scenes::all()) offer(entry.name);
+  for (const demos::Entry& entry : demos::all()) {
+    if (tool::is_only_a_demo(std::string(entry.name))) offer(entry.name);
+  }
+  ImGui::EndCombo();
+  return chosen;
+}
+
+bool is_playable(std::string_view name) {
+  return tool::is_demo(std::string(name)) &&
+         demos::make(name, {.scene = {.spheres = 0}})->controls().size() > 1;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::view
