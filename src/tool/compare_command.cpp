@@ -66,6 +66,7 @@ nlohmann::ordered_json to_json_value(const Scene& scene, const RunOptions& optio
           {"steps", options.steps},
           {"backend", result.backend},
           {"precision", kPrecision},
+          {"threads", options.threads},
           {"batches", result.batches},
           {"groups", result.groups},
           {"contacts_compared", result.contacts_compared},

@@ -11,3 +11,10 @@ foreach(suffix IN ITEMS "" "_f64")
     JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
     JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
 endforeach()
+
+# The matrix of scripts/identity, small.
+if(JFPX_HAS_BULLET)
+  add_test(NAME identity COMMAND ${PROJECT_SOURCE_DIR}/scripts/identity
+    --jfpx $<TARGET_FILE:jfpx_tool> --spheres 6 --steps 10 --threads "1 3")
+  set_tests_properties(identity PROPERTIES PASS_REGULAR_EXPRESSION "all 36 comparisons are identical")
+endif()
