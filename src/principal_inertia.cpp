@@ -1,13 +1,15 @@
 /// Cyclic Jacobi rotations (Golub and Van Loan, Matrix Computations, 8.5), in double.
 #include "src/principal_inertia.hpp"
 
-#include <array>
 #include <cmath>
 
 namespace jfpx::inline JFPX_ABI {
 namespace {
 
-using Matrix = std::array<std::array<double, 3>, 3>;
+struct Matrix {
+  double row[3][3] = {};
+  double* operator[](int i) { return row[i]; }
+};
 
 /// Makes m[p][q] zero by a rotation in that plane, and turns the columns of `axes` with it.
 void rotate(Matrix* tensor, Matrix* axes, int p, int q) {
@@ -30,7 +32,7 @@ void rotate(Matrix* tensor, Matrix* axes, int p, int q) {
 }  // namespace
 
 PrincipalInertia principal_inertia(const Mat3& tensor) {
-  Matrix m{}, axes{};
+  Matrix m, axes;
   double size = 0;
   for (int i = 0; i < 3; ++i) {
     axes[i][i] = 1;

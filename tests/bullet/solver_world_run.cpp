@@ -18,7 +18,7 @@ btVector3 to_bullet(const Vec3& v) { return {v.x, v.y, v.z}; }
 class LiveSolverWorld {
  public:
   LiveSolverWorld(const SolverWorld& world, MakeDispatcher dispatcher, const WorldParts& parts)
-      : world_(world), live_(world.base, dispatcher, parts) {
+      : live_(world.base, dispatcher, parts) {
     for (const auto& body : live_.live().bodies) {
       dress(body.get(), world.bodies[static_cast<std::size_t>(body->getUserIndex())]);
     }
@@ -144,7 +144,6 @@ class LiveSolverWorld {
     return std::make_unique<btPoint2PointConstraint>(a, b, in_a.getOrigin(), in_b.getOrigin());
   }
 
-  const SolverWorld& world_;
   std::vector<std::unique_ptr<btJointFeedback>> feedbacks_;
   std::vector<std::unique_ptr<btTypedConstraint>> joints_;
   LiveWorld live_;
