@@ -67,10 +67,16 @@ Prefix read_prefix(std::ifstream& file, const std::string& path) {
     throw FileError(path + ": is a recording of version " + std::to_string(prefix.version) +
                     "; this build reads version " + std::to_string(kVersion));
   }
+  if (prefix.real_size != sizeof(float) && prefix.real_size != sizeof(double)) {
+    throw FileError(path + ": is corrupt: its numbers have " + std::to_string(prefix.real_size) +
+                    " bytes; it must be 4 or 8");
+  }
   return prefix;
 }
 
-const char* precision_name(std::uint32_t real_size) { return real_size == 4 ? "float" : "double"; }
+const char* precision_name(std::uint32_t real_size) {
+  return real_size == sizeof(float) ? "float" : "double";
+}
 
 }  // namespace
 
@@ -179,7 +185,11 @@ RecordingReader::RecordingReader(const std::string& path) : impl_(std::make_uniq
   }
   hash.add_word(trailer.frames);
   if (hash.value() != trailer.checksum) impl.fail(kCorrupt);
-  impl.header = recording_header_from_json(text);
+  try {
+    impl.header = recording_header_from_json(text);
+  } catch (const InvalidScene& error) {
+    impl.fail(std::string("is corrupt: ") + error.what());
+  }
   if (impl.frames > 0 && impl.frame_size != impl.header.scene.bodies.size() * sizeof(BodyState)) {
     impl.fail("is corrupt: its frames do not fit its scene");
   }

@@ -299,6 +299,11 @@ Json to_value(const Quat& q) { return Json::array({q.w, q.x, q.y, q.z}); }
 template <class... Shapes>
 Json to_value(const std::variant<Shapes...>& shape);
 
+/// JSON is UTF-8; a name may be any bytes.
+std::string quoted(const std::string& text) {
+  return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 Json fields_of(const Sphere& s) { return {{"radius", s.radius}}; }
 Json fields_of(const Box& b) { return {{"half_extents", to_value(b.half_extents)}}; }
 Json fields_of(const HalfSpace& h) {
@@ -365,7 +370,7 @@ std::string to_json(const Scene& scene) {
                           {"restitution", to_string(scene.materials.restitution)}};
   // By hand around the values, so that a file has one line a body.
   std::string text = "{\"jfpx_scene\": " + std::to_string(kSceneSchemaVersion) +
-                     ",\n \"name\": " + Json(scene.name).dump() +
+                     ",\n \"name\": " + quoted(scene.name) +
                      ",\n \"dt\": " + Json(scene.dt).dump() +
                      ",\n \"resolver\": " + resolver.dump() + ",\n \"sleep\": " + sleep.dump() +
                      ",\n \"materials\": " + materials.dump() + ",\n \"bodies\": [";
@@ -389,9 +394,8 @@ Scene load_scene(const std::string& path) {
 void save_scene(const Scene& scene, const std::string& path) { write_file(path, to_json(scene)); }
 
 std::string recording_header_to_json(const RecordingHeader& header) {
-  return "{\"engine\": " + Json(header.engine).dump() +
-         ", \"backend\": " + Json(header.backend).dump() + ", \"scene\": " + to_json(header.scene) +
-         "}";
+  return "{\"engine\": " + quoted(header.engine) + ", \"backend\": " + quoted(header.backend) +
+         ", \"scene\": " + to_json(header.scene) + "}";
 }
 
 RecordingHeader recording_header_from_json(std::string_view text) {

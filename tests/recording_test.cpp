@@ -4,11 +4,13 @@
 #include <jfpx/recording.hpp>
 
 #include "examples/scenes/scenes.hpp"
+#include "src/hash64.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <fstream>
 #include <sstream>
 
@@ -132,6 +134,48 @@ TEST(Recording, ErrorsSayWhatIsWrong) {
   bad[good.size() - 40] ^= 1;
   overwrite(path, bad);
   EXPECT_THAT(complaint(), HasSubstr("checksum"));
+}
+
+TEST(Recording, OfABadSceneIsCorruptThoughItsChecksumIsRight) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  write_recording(path, 2, 0);
+  constexpr std::size_t kPrefix = 24, kTrailer = 24, kChecksum = 16;
+  std::string bad = content_of(path);
+  bad.replace(bad.find("\"mass\""), 6, "\"moss\"");
+  Hash64 hash;
+  hash.add_bytes(bad.data(), kPrefix);
+  hash.add_bytes(bad.data() + kPrefix, bad.size() - kPrefix - kTrailer);
+  hash.add_word(0);
+  const std::uint64_t checksum = hash.value();
+  std::memcpy(bad.data() + bad.size() - kChecksum, &checksum, sizeof checksum);
+  overwrite(path, bad);
+  try {
+    RecordingReader reader(path);
+    ADD_FAILURE() << "a header that is no header was read";
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("run.rec: is corrupt: body 0: has an unknown field"));
+  }
+}
+
+TEST(Recording, OfNumbersThatAreNeitherFloatNorDoubleHasNoPrecision) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  write_recording(path, 1, 1);
+  std::string bad = content_of(path);
+  bad[12] = 77;
+  overwrite(path, bad);
+  EXPECT_THROW(recording_precision(path), FileError);
+  EXPECT_THROW(RecordingReader{path}, FileError);
+}
+
+TEST(Recording, OfANameThatIsNoUtf8IsReadBackWithAReplacement) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  RecordingHeader header = header_of(1);
+  header.scene.name = "caf\xe9";
+  RecordingWriter(path, header).finish();
+  EXPECT_EQ(RecordingReader(path).header().scene.name, "caf\xef\xbf\xbd");
 }
 
 TEST(Recording, UnwritablePathIsNamed) {

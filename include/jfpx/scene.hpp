@@ -53,7 +53,8 @@ inline constexpr Real kUnitTolerance = Real(1e-3);
 /// @throws InvalidScene naming the first bad body, field, its value and the allowed range.
 JFPX_API void validate(const Scene& scene);
 
-/// The scene as JSON text. Numbers are written so that from_json() gives back the same bits.
+/// The scene as JSON text. Numbers are written so that from_json() gives back the same bits. What
+/// is no UTF-8 in the name becomes U+FFFD.
 JFPX_API std::string to_json(const Scene& scene);
 /// Parses and validates.
 /// @throws InvalidScene: broken JSON (with line and column), unknown or missing field, wrong type,
