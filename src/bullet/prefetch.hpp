@@ -7,22 +7,27 @@
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
 
 #include <cstddef>
+#include <cstdint>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
 inline void prefetch(const void* address) { __builtin_prefetch(address); }
 
+/// Some bytes behind an address that may be null or of something that has gone: there, arithmetic
+/// with pointers is undefined.
+inline void prefetch_at(const void* address, std::size_t bytes) {
+  prefetch(reinterpret_cast<const void*>(reinterpret_cast<std::uintptr_t>(address) + bytes));
+}
+
 inline void prefetch_bytes(const void* address, std::size_t bytes) {
   constexpr std::size_t kCacheLine = 64;
-  for (std::size_t i = 0; i < bytes; i += kCacheLine) {
-    __builtin_prefetch(static_cast<const char*>(address) + i);
-  }
+  for (std::size_t i = 0; i < bytes; i += kCacheLine) prefetch_at(address, i);
 }
 
 /// For an object no larger than a cache line, which may lie across two.
 inline void prefetch_ends(const void* address, std::size_t bytes) {
   prefetch(address);
-  prefetch(static_cast<const char*>(address) + bytes - 1);
+  prefetch_at(address, bytes - 1);
 }
 
 /// Where the protected fields of a body lie.
@@ -60,7 +65,7 @@ inline void prefetch_count(const btPersistentManifold* manifold) {
 inline void prefetch_first_point(const btPersistentManifold* manifold) {
   constexpr std::size_t kBytes = sizeof(btTypedObject) + sizeof(btManifoldPoint);
   prefetch_bytes(manifold, kBytes);
-  prefetch(reinterpret_cast<const char*>(manifold) + kBytes);
+  prefetch_at(manifold, kBytes);
 }
 
 /// How far ahead of its use: manifolds come from memory, their bodies seldom.
@@ -69,16 +74,15 @@ inline constexpr int kManifoldsAhead = 16, kObjectsAhead = 8;
 /// The flags, island tag, companion id and activation state of an object. Where they lie is
 /// private, so this is a guess, which costs nothing if it is wrong.
 inline void prefetch_island_state(const btCollisionObject* object) {
-  constexpr int kGuess = sizeof(btScalar) == 4 ? 224 : 400;
-  __builtin_prefetch(reinterpret_cast<const char*>(object) + kGuess);
-  __builtin_prefetch(reinterpret_cast<const char*>(object) + kGuess + 24);
+  constexpr std::size_t kGuess = sizeof(btScalar) == 4 ? 224 : 400;
+  prefetch_at(object, kGuess);
+  prefetch_at(object, kGuess + 24);
 }
 
 /// The bodies and the number of points of a manifold, which are its last fields.
 inline void prefetch_header(const btPersistentManifold* manifold) {
-  const char* end = reinterpret_cast<const char*>(manifold + 1);
-  __builtin_prefetch(end - 48);
-  __builtin_prefetch(end - 1);
+  prefetch_at(manifold, sizeof(btPersistentManifold) - 48);
+  prefetch_at(manifold, sizeof(btPersistentManifold) - 1);
 }
 
 }  // namespace jfpx::inline JFPX_ABI::bullet
