@@ -10,6 +10,7 @@ option(JFPX_TOOL "Build the jfpx command" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_EXAMPLES "Build the examples" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_BENCH "Build the benchmarks" OFF)
+option(JFPX_FUZZ "Drive the fuzz targets by libFuzzer; needs clang and -fsanitize=fuzzer-no-link, as preset fuzz has" OFF)
 option(JFPX_WERROR "Treat warnings as errors" ${PROJECT_IS_TOP_LEVEL})
 
 foreach(option IN ITEMS JFPX_CUDA JFPX_BULLET JFPX_VIEWER)
@@ -17,6 +18,11 @@ foreach(option IN ITEMS JFPX_CUDA JFPX_BULLET JFPX_VIEWER)
     message(FATAL_ERROR "${option} is \"${${option}}\"; it takes AUTO, ON or OFF.")
   endif()
 endforeach()
+
+if(JFPX_FUZZ AND NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+  message(FATAL_ERROR "JFPX_FUZZ=ON, but the compiler is ${CMAKE_CXX_COMPILER_ID}, which has no "
+    "libFuzzer. Use scripts/fuzz or cmake --preset fuzz; both take clang++.")
+endif()
 
 if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)

@@ -8,9 +8,10 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
-bool chance(Random& random, Real share) { return random.uniform() < share; }
+// `random` is a Random, or test::Bytes.
+bool chance(auto& random, Real share) { return random.uniform() < share; }
 
-Real power_of_ten(Random& random, int low, int high) {
+Real power_of_ten(auto& random, int low, int high) {
   Real value = 1;
   const int exponent =
       low + static_cast<int>(random.below(static_cast<std::uint64_t>(high - low) + 1));
@@ -18,13 +19,13 @@ Real power_of_ten(Random& random, int low, int high) {
   return value;
 }
 
-ShapeKind random_shape(Random& random, bool only_spheres) {
+ShapeKind random_shape(auto& random, bool only_spheres) {
   if (only_spheres || chance(random, Real(0.7))) return ShapeKind::sphere;
   return static_cast<ShapeKind>(1 + random.below(4));
 }
 
 /// A plane through the origin, level or not, or near it.
-void make_plane(Random& random, const RandomWorld& world, RandomBody* body) {
+void make_plane(auto& random, const RandomWorld& world, RandomBody* body) {
   body->shape = ShapeKind::plane;
   body->mass = 0;
   body->position = {0, 0, 0};
@@ -34,7 +35,7 @@ void make_plane(Random& random, const RandomWorld& world, RandomBody* body) {
   body->position = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
 }
 
-RandomBody random_body(Random& random, const RandomWorld& world, Real edge, bool only_spheres,
+RandomBody random_body(auto& random, const RandomWorld& world, Real edge, bool only_spheres,
                        bool mixed_sizes) {
   RandomBody body;
   body.shape = random_shape(random, only_spheres);
@@ -67,7 +68,7 @@ RandomBody random_body(Random& random, const RandomWorld& world, Real edge, bool
   return body;
 }
 
-RandomEvent random_event(Random& random, const RandomWorld& world, Real edge) {
+RandomEvent random_event(auto& random, const RandomWorld& world, Real edge) {
   RandomEvent event;
   event.step = static_cast<int>(random.below(static_cast<std::uint64_t>(world.steps)));
   event.kind = static_cast<EventKind>(random.below(kEventKinds));
@@ -82,6 +83,57 @@ RandomEvent random_event(Random& random, const RandomWorld& world, Real edge) {
   event.x = random.uniform(Real(0.5), Real(1.5));
   event.bits = static_cast<unsigned>(random.next() & random.next());
   return event;
+}
+
+RandomWorld draw_world(auto& random) {
+  RandomWorld world;
+  world.steps = 10 + static_cast<int>(random.below(70));
+  world.scale = power_of_ten(random, -2, 2);
+  if (chance(random, Real(0.2))) world.dt = Real(1) / 30;
+  world.sub_steps = chance(random, Real(0.1)) ? 3 : 0;
+  if (chance(random, Real(0.75))) world.gravity = {0, -10 * world.scale, 0};
+  world.broadphase = chance(random, Real(0.6)) ? BroadphaseKind::tree
+                                               : static_cast<BroadphaseKind>(random.below(4));
+  world.deterministic = chance(random, Real(0.25));
+  world.split_islands = !chance(random, Real(0.1));
+  world.verify = chance(random, Real(0.1));
+  world.minimum_batch = chance(random, Real(0.1)) ? 12 : 0;
+  world.pool = chance(random, Real(0.2)) ? 4 : 64;
+  if (chance(random, Real(0.2)))
+    world.breaking_threshold = Real(0.02) * power_of_ten(random, -2, 1);
+  if (chance(random, Real(0.3)))
+    world.callbacks = static_cast<unsigned>(random.next()) & kAllCallbacks;
+  // Replaced near callbacks mean no batch at all: seldom interesting.
+  if (chance(random, Real(0.8))) world.callbacks &= ~unsigned{kNear};
+
+  const std::size_t count = 2 + random.below(chance(random, Real(0.1)) ? 40 : 12);
+  const Real edge =
+      world.scale * random.uniform(Real(0.5), 2) * std::sqrt(static_cast<Real>(count));
+  const bool only_spheres = chance(random, Real(0.4)), mixed = chance(random, Real(0.2));
+  if (chance(random, Real(0.5))) {
+    RandomBody ground;
+    ground.shape = ShapeKind::box;
+    ground.size = 20 * world.scale;
+    ground.position = {0, -ground.size, 0};
+    ground.mass = 0;
+    if (chance(random, Real(0.5))) make_plane(random, world, &ground);
+    world.bodies.push_back(ground);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    world.bodies.push_back(random_body(random, world, edge, only_spheres, mixed));
+  }
+  for (std::uint64_t n = chance(random, Real(0.3)) ? random.below(5) : 0; n > 0; --n) {
+    RandomJoint joint{random.below(world.bodies.size()), random.below(world.bodies.size()),
+                      chance(random, Real(0.5)), Real(1e30)};
+    if (chance(random, Real(0.3))) joint.breaking = random.uniform(0, 10);
+    if (joint.a != joint.b) world.joints.push_back(joint);
+  }
+  for (std::uint64_t n = chance(random, Real(0.8)) ? random.below(25) : 0; n > 0; --n) {
+    world.events.push_back(random_event(random, world, edge));
+  }
+  std::stable_sort(world.events.begin(), world.events.end(),
+                   [](const RandomEvent& p, const RandomEvent& q) { return p.step < q.step; });
+  return world;
 }
 
 const char* name_of(ShapeKind kind) {
@@ -190,56 +242,12 @@ std::size_t RandomWorld::used_bodies() const {
 
 RandomWorld make_random_world(std::uint64_t seed) {
   Random random(seed);
-  RandomWorld world;
+  RandomWorld world = draw_world(random);
   world.seed = seed;
-  world.steps = 10 + static_cast<int>(random.below(70));
-  world.scale = power_of_ten(random, -2, 2);
-  if (chance(random, Real(0.2))) world.dt = Real(1) / 30;
-  world.sub_steps = chance(random, Real(0.1)) ? 3 : 0;
-  if (chance(random, Real(0.75))) world.gravity = {0, -10 * world.scale, 0};
-  world.broadphase = chance(random, Real(0.6)) ? BroadphaseKind::tree
-                                               : static_cast<BroadphaseKind>(random.below(4));
-  world.deterministic = chance(random, Real(0.25));
-  world.split_islands = !chance(random, Real(0.1));
-  world.verify = chance(random, Real(0.1));
-  world.minimum_batch = chance(random, Real(0.1)) ? 12 : 0;
-  world.pool = chance(random, Real(0.2)) ? 4 : 64;
-  if (chance(random, Real(0.2)))
-    world.breaking_threshold = Real(0.02) * power_of_ten(random, -2, 1);
-  if (chance(random, Real(0.3)))
-    world.callbacks = static_cast<unsigned>(random.next()) & kAllCallbacks;
-  // Replaced near callbacks mean no batch at all: seldom interesting.
-  if (chance(random, Real(0.8))) world.callbacks &= ~unsigned{kNear};
-
-  const std::size_t count = 2 + random.below(chance(random, Real(0.1)) ? 40 : 12);
-  const Real edge =
-      world.scale * random.uniform(Real(0.5), 2) * std::sqrt(static_cast<Real>(count));
-  const bool only_spheres = chance(random, Real(0.4)), mixed = chance(random, Real(0.2));
-  if (chance(random, Real(0.5))) {
-    RandomBody ground;
-    ground.shape = ShapeKind::box;
-    ground.size = 20 * world.scale;
-    ground.position = {0, -ground.size, 0};
-    ground.mass = 0;
-    if (chance(random, Real(0.5))) make_plane(random, world, &ground);
-    world.bodies.push_back(ground);
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    world.bodies.push_back(random_body(random, world, edge, only_spheres, mixed));
-  }
-  for (std::uint64_t n = chance(random, Real(0.3)) ? random.below(5) : 0; n > 0; --n) {
-    RandomJoint joint{random.below(world.bodies.size()), random.below(world.bodies.size()),
-                      chance(random, Real(0.5)), Real(1e30)};
-    if (chance(random, Real(0.3))) joint.breaking = random.uniform(0, 10);
-    if (joint.a != joint.b) world.joints.push_back(joint);
-  }
-  for (std::uint64_t n = chance(random, Real(0.8)) ? random.below(25) : 0; n > 0; --n) {
-    world.events.push_back(random_event(random, world, edge));
-  }
-  std::stable_sort(world.events.begin(), world.events.end(),
-                   [](const RandomEvent& p, const RandomEvent& q) { return p.step < q.step; });
   return world;
 }
+
+RandomWorld make_random_world(test::Bytes& bytes) { return draw_world(bytes); }
 
 RandomWorld shrink(RandomWorld world, MakeDispatcher ours) {
   return Shrinker(std::move(world), ours).shrink();

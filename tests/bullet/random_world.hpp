@@ -3,6 +3,7 @@
 #pragma once
 
 #include "tests/bullet/twin_worlds.hpp"
+#include "tests/support/bytes.hpp"
 
 #include <cstdint>
 #include <iosfwd>
@@ -115,6 +116,7 @@ struct RandomWorld {
 
 /// The same world for the same seed, in both precisions as far as numbers allow.
 RandomWorld make_random_world(std::uint64_t seed);
+RandomWorld make_random_world(test::Bytes& bytes);  ///< with what a fuzzer wants
 /// The whole world in a form that a person can rebuild.
 std::ostream& operator<<(std::ostream& out, const RandomWorld& world);
 

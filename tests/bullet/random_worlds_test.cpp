@@ -1,5 +1,5 @@
 /// Random Bullet worlds never show which dispatcher they have.
-#include "tests/bullet/random_world.hpp"
+#include "tests/bullet/stock_elsewhere.hpp"
 
 #include <cmath>
 #include <limits>
@@ -9,30 +9,6 @@ namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
 std::uint64_t wanted_steps() { return wanted_world_steps(10'000, 100'000); }
-
-/// Bullet's dispatcher, with other leftovers on the stack before each pair. Once a dispatch is not
-/// enough: what a pair finds there is left by the pair before.
-template <int kFill>
-struct StockElsewhere final : btCollisionDispatcher {
-  using btCollisionDispatcher::btCollisionDispatcher;
-  bool needsCollision(const btCollisionObject* a, const btCollisionObject* b) override {
-    fill_stack<kFill>();
-    return btCollisionDispatcher::needsCollision(a, b);
-  }
-  static std::unique_ptr<btCollisionDispatcher> make(btCollisionConfiguration* configuration,
-                                                     const RandomWorld&) {
-    return std::make_unique<StockElsewhere>(configuration);
-  }
-};
-
-/// In rare worlds Bullet 3.24 itself reads uninitialised memory of its stack, for example in
-/// btPersistentManifold::refreshContactPoints (world 50183557 in float, seen by valgrind in a stock
-/// world), and two stock worlds part ways.
-bool stock_differs_from_itself(const RandomWorld& world) {
-  return run(world, nullptr, StockElsewhere<0>::make) ||
-         run(world, nullptr, StockElsewhere<0x3f>::make) ||
-         run(world, nullptr, StockElsewhere<0xff>::make);
-}
 
 std::string report(const RandomWorld& world, const Failure& failure) {
   const RandomWorld least = shrink(world);

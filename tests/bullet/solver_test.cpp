@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "tests/bullet/solver_world.hpp"
+#include "tests/bullet/stock_elsewhere.hpp"
 
 #include <cmath>
 #include <limits>
@@ -13,34 +14,6 @@ namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
 std::uint64_t wanted_steps() { return wanted_world_steps(5'000, 100'000); }
-
-/// Bullet's solver, called with other leftovers on the stack: Bullet 3.24 itself reads
-/// uninitialised memory in rare worlds (see random_worlds_test.cpp).
-template <int kFill>
-struct StockElsewhere final : btSequentialImpulseConstraintSolver {
-  btScalar solveGroup(btCollisionObject** bodies, int body_count, btPersistentManifold** manifolds,
-                      int manifold_count, btTypedConstraint** constraints, int constraint_count,
-                      const btContactSolverInfo& info, btIDebugDraw* debug_drawer,
-                      btDispatcher* dispatcher) override {
-    fill_stack<kFill>();
-    const btScalar result = btSequentialImpulseConstraintSolver::solveGroup(
-        bodies, body_count, manifolds, manifold_count, constraints, constraint_count, info,
-        debug_drawer, dispatcher);
-    fill_stack<kFill>();
-    return result;
-  }
-  static WorldParts parts(const SolverWorld&) {
-    WorldParts made;
-    made.solver = [] { return std::make_unique<StockElsewhere>(); };
-    return made;
-  }
-};
-
-bool stock_differs_from_itself(const SolverWorld& world) {
-  return run(world, nullptr, StockElsewhere<0>::parts) ||
-         run(world, nullptr, StockElsewhere<0x3f>::parts) ||
-         run(world, nullptr, StockElsewhere<0xff>::parts);
-}
 
 std::string report(const SolverWorld& world, const Failure& failure, MakeParts parts,
                    MakeDispatcher dispatcher) {

@@ -3,16 +3,18 @@
 
 #include <cmath>
 #include <ostream>
+#include <utility>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
-bool chance(Random& random, Real share) { return random.uniform() < share; }
-Real one_of(Random& random, std::initializer_list<Real> values) {
+// `random` is a Random, or test::Bytes.
+bool chance(auto& random, Real share) { return random.uniform() < share; }
+Real one_of(auto& random, std::initializer_list<Real> values) {
   return values.begin()[random.below(values.size())];
 }
 
-btContactSolverInfo random_info(Random& random) {
+btContactSolverInfo random_info(auto& random) {
   btContactSolverInfo info;
   const auto maybe = [&](btScalar* value, std::initializer_list<Real> values) {
     if (chance(random, Real(0.25))) *value = one_of(random, values);
@@ -46,7 +48,7 @@ btContactSolverInfo random_info(Random& random) {
   return info;
 }
 
-SolverBody random_body(Random& random) {
+SolverBody random_body(auto& random) {
   SolverBody body;
   if (chance(random, Real(0.05))) body.linear_factor = {1, 0, 1};
   if (chance(random, Real(0.05))) body.angular_factor = {0, 0, 0};
@@ -62,7 +64,7 @@ SolverBody random_body(Random& random) {
   return body;
 }
 
-SolverJoint random_joint(Random& random, std::size_t bodies) {
+SolverJoint random_joint(auto& random, std::size_t bodies) {
   SolverJoint joint;
   joint.kind = random.below(kJointKinds);
   joint.a = random.below(bodies);
@@ -82,7 +84,7 @@ SolverJoint random_joint(Random& random, std::size_t bodies) {
 }
 
 /// More spheres than vectors have lanes, so deep in each other that they all touch.
-void add_heap(Random& random, RandomWorld* world) {
+void add_heap(auto& random, RandomWorld* world) {
   const std::uint64_t count = 20 + random.below(150);
   const Real edge = world->scale * std::cbrt(static_cast<Real>(count)) * random.uniform(1, 2);
   for (std::uint64_t i = 0; i < count; ++i) {
@@ -97,12 +99,9 @@ void add_heap(Random& random, RandomWorld* world) {
   world->steps = std::min(world->steps, 20);
 }
 
-}  // namespace
-
-SolverWorld make_solver_world(std::uint64_t seed) {
+SolverWorld draw_world(auto& random, RandomWorld base) {
   SolverWorld world;
-  world.base = make_random_world(seed);
-  Random random(seed ^ 0x5eed'501e'0000'0001ull);
+  world.base = std::move(base);
   if (chance(random, Real(0.5))) {
     for (RandomBody& body : world.base.bodies) body.rolling = 0;
   }
@@ -132,6 +131,18 @@ SolverWorld make_solver_world(std::uint64_t seed) {
   if (chance(random, Real(0.2))) world.threads = 2 + static_cast<unsigned>(random.below(2));
   world.vectors = !chance(random, Real(0.2));
   return world;
+}
+
+}  // namespace
+
+SolverWorld make_solver_world(std::uint64_t seed) {
+  Random random(seed ^ 0x5eed'501e'0000'0001ull);
+  return draw_world(random, make_random_world(seed));
+}
+
+SolverWorld make_solver_world(test::Bytes& bytes) {
+  RandomWorld base = make_random_world(bytes);
+  return draw_world(bytes, std::move(base));
 }
 
 std::ostream& operator<<(std::ostream& out, const SolverWorld& world) {

@@ -43,6 +43,7 @@ struct SolverWorld {
 };
 
 SolverWorld make_solver_world(std::uint64_t seed);
+SolverWorld make_solver_world(test::Bytes& bytes);  ///< with what a fuzzer wants
 std::ostream& operator<<(std::ostream& out, const SolverWorld& world);
 
 struct SolverTotals {

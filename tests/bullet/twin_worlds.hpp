@@ -77,6 +77,10 @@ struct BulletWorld {
     for (int i = world.getNumCollisionObjects() - 1; i >= 0; --i) {
       world.removeCollisionObject(world.getCollisionObjectArray()[i]);
     }
+    // Of the last step's predictive contacts, which Bullet's world forgets.
+    while (dispatcher->getNumManifolds() > 0) {
+      dispatcher->releaseManifold(dispatcher->getManifoldByIndexInternal(0));
+    }
   }
 
   btCollisionShape* keep(btCollisionShape* shape) {

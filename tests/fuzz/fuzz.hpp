@@ -1,0 +1,27 @@
+/// What all fuzz targets share: how a finding is reported.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+/// Each target defines it: tries one input, and returns 0 whatever the input is.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+namespace jfpx::inline JFPX_ABI::fuzz {
+
+/// Ends the program, so that the fuzzer keeps the input.
+[[noreturn]] inline void report_finding(const std::string& what) {
+  std::fprintf(stderr, "finding: %s\n", what.c_str());
+  std::abort();
+}
+
+inline void require(bool holds, const char* what) {
+  if (!holds) report_finding(std::string("not so: ") + what);
+}
+
+}  // namespace jfpx::inline JFPX_ABI::fuzz

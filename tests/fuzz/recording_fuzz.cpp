@@ -1,0 +1,123 @@
+/// Recordings: any file is one that can be read and written again, or a FileError.
+#include <jfpx/error.hpp>
+#include <jfpx/recording.hpp>
+
+#include "src/hash64.hpp"
+#include "tests/fuzz/fuzz.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <span>
+#include <string_view>
+
+namespace jfpx::inline JFPX_ABI {
+namespace {
+
+using fuzz::require;
+using Input = std::span<const std::uint8_t>;
+
+/// Bytes of a file, with the checksum that the reader will compute.
+class File {
+ public:
+  void add(const void* data, std::size_t size) {
+    bytes_.append(static_cast<const char*>(data), size);
+    hash_.add_bytes(data, size);
+  }
+  std::string sealed(std::uint64_t frames) {
+    hash_.add_word(frames);
+    const std::uint64_t numbers[] = {frames, hash_.value()};
+    bytes_.append(reinterpret_cast<const char*>(numbers), sizeof numbers);
+    return bytes_ + "JFPXEND\n";
+  }
+
+ private:
+  std::string bytes_;
+  Hash64 hash_;
+};
+
+std::uint8_t take_byte(Input* input) {
+  if (input->empty()) return 0;
+  const std::uint8_t byte = input->front();
+  *input = input->subspan(1);
+  return byte;
+}
+
+/// A file that is right but for its text and frames. The input has the length of the text (2
+/// bytes), the number of frames (1 byte), the text and the frames.
+std::string file_around(Input input, std::size_t frame_size) {
+  const std::size_t low = take_byte(&input);
+  const std::size_t wanted = low | static_cast<std::size_t>(take_byte(&input)) << 8;
+  const std::uint64_t frames = take_byte(&input) % 16;
+  const Input text = input.first(std::min(wanted, input.size()));
+  input = input.subspan(text.size());
+  if (frame_size == 0 && frames > 0) frame_size = input.size() / frames;
+
+  File file;
+  char prefix[24] = {'J', 'F', 'P', 'X', 'R', 'E', 'C', '\n', 1, 0, 0, 0, sizeof(Real)};
+  const std::uint64_t text_size = text.size();
+  std::memcpy(prefix + 16, &text_size, sizeof text_size);
+  file.add(prefix, sizeof prefix);
+  file.add(text.data(), text.size());
+  for (std::uint64_t k = 0; k < frames; ++k) {
+    const Input given = input.first(std::min(frame_size, input.size()));
+    input = input.subspan(given.size());
+    std::string frame(given.begin(), given.end());
+    frame.resize(frame_size);
+    file.add(frame.data(), frame.size());
+  }
+  return file.sealed(frames);
+}
+
+/// The first byte says how much of the rest is taken as it is.
+std::string file_of(Input input) {
+  const std::uint8_t mode = take_byte(&input);
+  if (mode % 4 == 0) return {input.begin(), input.end()};
+  if (mode % 4 == 1) return file_around(input, 0);
+  return file_around(input, (mode / 4 % 8) * sizeof(BodyState));
+}
+
+void expect_the_same_again(RecordingReader& reader, const std::string& path) {
+  RecordingWriter writer(path, reader.header());
+  for (std::uint64_t k = 1; k <= reader.steps(); ++k) writer.append(reader.states(k));
+  writer.finish();
+  RecordingReader again(path);
+  require(again.header() == reader.header(), "a header survives");
+  require(again.steps() == reader.steps(), "all frames survive");
+  for (std::uint64_t k = 1; k <= reader.steps(); ++k) {
+    require(!first_difference(reader.states(k), again.states(k)), "frames survive");
+  }
+}
+
+void read(const std::string& path, const std::string& copy) {
+  try {
+    RecordingReader reader(path);
+    require(recording_precision(path) == (sizeof(Real) == 4 ? "float" : "double"), "precision");
+    if (reader.steps() <= 16) expect_the_same_again(reader, copy);
+  } catch (const FileError&) {
+  }
+}
+
+void read_precision(const std::string& path, std::string_view bytes) {
+  try {
+    const std::string precision = recording_precision(path);
+    std::uint32_t size = 0;
+    std::memcpy(&size, bytes.data() + 12, sizeof size);
+    require(size == (precision == "float" ? 4u : 8u), "the precision is that of the file");
+  } catch (const FileError&) {
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace jfpx;
+  static const test::TemporaryFolder folder;
+  const std::string path = folder.file("in.rec"), bytes = file_of({data, size});
+  std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
+  read_precision(path, bytes);
+  read(path, folder.file("out.rec"));
+  return 0;
+}

@@ -1,0 +1,82 @@
+/// Scene files: any text is a scene that survives JSON to the last bit, or an InvalidScene; and any
+/// scene can be stepped, with the same bits for every broad phase.
+#include <jfpx/error.hpp>
+#include <jfpx/world.hpp>
+
+#include "tests/fuzz/fuzz.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <string_view>
+
+namespace jfpx::inline JFPX_ABI {
+namespace {
+
+using fuzz::require;
+
+/// Larger ones say nothing more and take long.
+constexpr std::size_t kMostBodies = 24, kMostParts = 48;
+constexpr int kSteps = 3;
+
+std::optional<Scene> parsed(std::string_view text) {
+  try {
+    return from_json(text);
+  } catch (const InvalidScene&) {
+    return std::nullopt;
+  }
+}
+
+bool is_small(const Scene& scene) {
+  std::size_t parts = 0;
+  for (const BodyDef& body : scene.bodies) {
+    const auto* assembly = std::get_if<Assembly>(&body.shape);
+    if (assembly != nullptr) parts += assembly->parts.size();
+  }
+  return scene.bodies.size() <= kMostBodies && parts <= kMostParts;
+}
+
+std::optional<World> made(const Scene& scene, BroadPhase broad_phase) {
+  try {
+    return World(scene, {.collider = {.backend = Backend::x86}, .broad_phase = broad_phase});
+  } catch (const InvalidScene&) {
+    return std::nullopt;  // half-spaces and planes that move
+  }
+}
+
+void step(const Scene& scene) {
+  std::optional<World> world = made(scene, BroadPhase::cells);
+  std::optional<World> other = made(scene, BroadPhase::hierarchy);
+  require(world.has_value() == other.has_value(), "both worlds refuse the scene");
+  if (!world) return;
+  for (int n = 0; n < kSteps; ++n) {
+    const std::uint64_t before = world->state_hash();
+    const StepReport report = world->step(), other_report = other->step();
+    require(report.non_finite == other_report.non_finite, "both worlds say if a body ran away");
+    require(!report.non_finite || world->state_hash() == before, "a failed step is undone");
+    require(world->state_hash() == other->state_hash(), "broad phases give the same bits");
+    require(std::ranges::equal(world->contacts(), other->contacts()), "and the same contacts");
+    for (const BodyState& state : world->states()) {
+      require(is_finite(state.position) && is_finite(state.orientation) &&
+                  is_finite(state.velocity) && is_finite(state.angular_velocity),
+              "states are finite");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace jfpx;
+  std::optional<Scene> scene = parsed({reinterpret_cast<const char*>(data), size});
+  if (!scene) return 0;
+  const std::string text = to_json(*scene);
+  const std::optional<Scene> again = parsed(text);
+  fuzz::require(again && *again == *scene, "a scene survives JSON");
+  fuzz::require(to_json(*again) == text, "and has one JSON form");
+  if (!is_small(*scene)) return 0;
+  // As many iterations as a user asks for is right, but nothing to wait for here.
+  scene->resolver.max_iterations = std::min(scene->resolver.max_iterations, 500u);
+  step(*scene);
+  return 0;
+}

@@ -1,0 +1,17 @@
+/// Bullet worlds made of a fuzzer's bytes, with joints and changing settings: our solver, our world
+/// or all three parts beside Bullet's, all bits compared after each step.
+#include "tests/fuzz/bullet_fuzz.hpp"
+
+#include <algorithm>
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace jfpx::bullet;
+  constexpr MakeParts kParts[] = {our_solver, our_world, our_solver_and_world};
+  jfpx::test::Bytes bytes({data, size});
+  const std::uint64_t parts = bytes.below(4);
+  const MakeDispatcher dispatcher = parts == 3 ? make_ours : make_stock;
+  const SolverWorld world = make_solver_world(bytes);
+  const auto failure = run(world, nullptr, kParts[std::min<std::uint64_t>(parts, 2)], dispatcher);
+  if (failure && !stock_differs_from_itself(world)) report_difference(*failure, world);
+  return 0;
+}

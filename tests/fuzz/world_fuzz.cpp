@@ -1,0 +1,222 @@
+/// Random calls of World's interface, of two worlds beside each other that find contacts in
+/// different ways: equal results, equal errors, equal bits. Refused calls change nothing.
+#include <jfpx/error.hpp>
+
+#include "tests/fuzz/fuzz.hpp"
+#include "tests/fuzz/world_input.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <variant>
+
+namespace jfpx::inline JFPX_ABI {
+namespace {
+
+using fuzz::add_drawn_force;
+using fuzz::draw_body;
+using fuzz::draw_contact;
+using fuzz::draw_id;
+using fuzz::draw_state;
+using fuzz::require;
+using test::Bytes;
+
+constexpr std::size_t kMostBodies = 20, kMostForces = 8;
+constexpr int kMostCalls = 48;
+
+/// What a call returned, or the text of the error that refused it.
+template <class Result>
+struct Outcome {
+  std::optional<Result> result;
+  std::string error;
+  friend bool operator==(const Outcome&, const Outcome&) = default;
+};
+
+template <class Call>
+auto outcome(Call call) {
+  using Result =
+      std::conditional_t<std::is_void_v<decltype(call())>, std::monostate, decltype(call())>;
+  Outcome<Result> outcome;
+  try {
+    if constexpr (std::is_void_v<decltype(call())>) {
+      call();
+      outcome.result.emplace();
+    } else {
+      outcome.result = call();
+    }
+  } catch (const InvalidArgument& error) {
+    outcome.error = error.what();
+  } catch (const InvalidScene& error) {
+    outcome.error = error.what();
+  }
+  return outcome;
+}
+
+class Twins {
+ public:
+  Twins(const Scene& scene, const WorldSettings& settings)
+      : first_(scene, WorldSettings{.collider = {.backend = Backend::x86}}),
+        second_(scene, settings) {}
+
+  const World& world() const { return first_; }
+
+  /// The same call for both. Void, or something with an ==.
+  template <class Call>
+  auto both(Call call) {
+    const std::uint64_t before = first_.state_hash();
+    const std::size_t bodies = first_.bodies().size();
+    const auto first = outcome([&] { return call(first_); });
+    const auto second = outcome([&] { return call(second_); });
+    require(first == second, "both worlds say the same");
+    require(first.result || (first_.state_hash() == before && first_.bodies().size() == bodies),
+            "a refused call changes nothing");
+    compare();
+    return first.result;
+  }
+
+  void step() {
+    const std::uint64_t before = first_.state_hash();
+    const double time = first_.time();
+    const auto done = both([](World& w) {
+      const StepReport report = w.step();
+      return std::tuple(report.step, report.contacts, report.generated_contacts,
+                        report.position_iterations, report.velocity_iterations, report.non_finite,
+                        report.non_finite_body, report.awake);
+    });
+    const bool failed = !done || std::get<5>(*done);
+    require(!failed || (first_.state_hash() == before && first_.time() == time &&
+                        first_.contacts().empty() && first_.contact_events().empty()),
+            "a failed step leaves no trace");
+  }
+
+  void move() {
+    World elsewhere = std::move(first_);
+    first_ = std::move(second_);
+    second_ = std::move(elsewhere);
+  }
+
+ private:
+  void compare() const {
+    require(std::ranges::equal(first_.bodies(), second_.bodies()), "equal bodies");
+    require(first_.state_hash() == second_.state_hash(), "equal bits");
+    require(std::ranges::equal(first_.contacts(), second_.contacts()), "equal contacts");
+    require(std::ranges::equal(first_.contact_events(), second_.contact_events()), "equal events");
+    for (const BodyId id : first_.bodies()) {
+      const BodyState state = first_.state(id);
+      require(is_finite(state.position) && is_finite(state.orientation) &&
+                  is_finite(state.velocity) && is_finite(state.angular_velocity),
+              "states are finite");
+      require(first_.awake(id) == second_.awake(id), "the same bodies are awake");
+    }
+  }
+
+  World first_, second_;
+};
+
+void query(Bytes& bytes, Twins& twins) {
+  if (bytes.chance(Real(0.5))) {
+    Ray ray{.origin = bytes.vector(-5, 5), .direction = bytes.vector(-1, 1)};
+    if (bytes.chance(Real(0.5))) ray.max_distance = bytes.number(0, 10);
+    const auto nearest = twins.both([&](World& w) { return w.cast_ray(ray); });
+    const auto all = twins.both([&](World& w) { return w.cast_ray_through(ray); });
+    require(nearest.has_value() == all.has_value(), "both refuse a ray");
+    if (!all) return;
+    require(nearest->has_value() == !all->empty(), "a ray that hits has a first hit");
+    if (!all->empty()) require(**nearest == all->front(), "which is the first of all hits");
+    return;
+  }
+  const Vec3 centre = bytes.vector(-5, 5);
+  const Real size = bytes.number(Real(0.1), 3);
+  twins.both([&](World& w) { return w.overlapping(Sphere{size}, centre); });
+  const Vec3 half = bytes.vector(Real(0.1), 3);
+  twins.both([&](World& w) { return w.overlapping(Box{half}, centre, {0, 1, 0, 0}); });
+}
+
+void push(Bytes& bytes, Twins& twins) {
+  const BodyId id = draw_id(bytes, twins.world().bodies());
+  const Vec3 force = bytes.vector(-100, 100), point = bytes.vector(-3, 3);
+  const bool finite = is_finite(force);
+  const auto pushed = twins.both([&](World& w) { w.apply_force(id, force); });
+  require(finite || !pushed, "a force that is not finite is refused");
+  twins.both([&](World& w) { w.apply_force_at_point(id, force, point); });
+  twins.both([&](World& w) { w.apply_torque(id, force); });
+}
+
+void change_forces(Bytes& bytes, Twins& twins) {
+  const auto forces = twins.world().forces();
+  if (forces.size() < kMostForces && bytes.chance(Real(0.7))) {
+    twins.both([&](World& w) { return add_drawn_force(bytes, w); });
+  } else {
+    const ForceId id =
+        forces.empty() ? ForceId{bytes.below(9)} : forces[bytes.below(forces.size())];
+    twins.both([&](World& w) { w.remove_force(id); });
+  }
+}
+
+void change_generators(Bytes& bytes, Twins& twins) {
+  const auto generators = twins.world().contact_generators();
+  if (generators.size() < kMostForces && bytes.chance(Real(0.6))) {
+    const GeneratedContact contact = draw_contact(bytes, twins.world().bodies());
+    twins.both([&](World& w) {
+      return w.add_contact_generator([contact](ContactContext& context) { context.add(contact); });
+    });
+  } else {
+    const ContactGeneratorId id =
+        generators.empty() ? ContactGeneratorId{7} : generators[bytes.below(generators.size())];
+    twins.both([&](World& w) { w.remove_contact_generator(id); });
+  }
+}
+
+void call_anything(Bytes& bytes, Twins& twins) {
+  switch (bytes.below(10)) {
+    case 0:
+      if (twins.world().bodies().size() >= kMostBodies) break;
+      twins.both([def = draw_body(bytes)](World& w) { return w.add(def); });
+      break;
+    case 1:
+      twins.both([id = draw_id(bytes, twins.world().bodies())](World& w) { w.remove(id); });
+      break;
+    case 2: {
+      const BodyId id = draw_id(bytes, twins.world().bodies());
+      twins.both([id, state = draw_state(bytes)](World& w) { w.set_state(id, state); });
+      break;
+    }
+    case 3:
+      push(bytes, twins);
+      break;
+    case 4:
+      change_forces(bytes, twins);
+      break;
+    case 5:
+      change_generators(bytes, twins);
+      break;
+    case 6:
+      query(bytes, twins);
+      break;
+    case 7:
+      twins.move();
+      break;
+    default:
+      for (std::uint64_t n = 1 + bytes.below(6); n > 0; --n) twins.step();
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace jfpx;
+  test::Bytes bytes({data, size});
+  const WorldSettings settings = fuzz::draw_settings(bytes);
+  const Scene scene = fuzz::draw_scene(bytes);
+  std::optional<Twins> twins;
+  try {
+    twins.emplace(scene, settings);
+  } catch (const InvalidScene&) {
+    return 0;
+  }
+  for (int calls = 0; calls < kMostCalls && !bytes.used_up(); ++calls) {
+    call_anything(bytes, *twins);
+  }
+  return 0;
+}

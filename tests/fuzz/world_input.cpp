@@ -1,0 +1,229 @@
+/// Drawing bodies, forces and settings; see the header.
+#include "tests/fuzz/world_input.hpp"
+
+#include <optional>
+#include <utility>
+
+namespace jfpx::inline JFPX_ABI::fuzz {
+namespace {
+
+using test::Bytes;
+
+Quat draw_orientation(Bytes& bytes) {
+  if (bytes.chance(Real(0.4))) return {};
+  const Real w = bytes.number(-1, 1);
+  const Vec3 v = bytes.vector(-1, 1);
+  const Quat q{w, v.x, v.y, v.z};
+  return bytes.chance(Real(0.9)) ? normalized(q) : q;
+}
+
+Vec3 draw_direction(Bytes& bytes) {
+  constexpr Vec3 kAxes[] = {{0, 1, 0}, {1, 0, 0}, {0, 0, -1}, {0, -1, 0}};
+  if (bytes.chance(Real(0.5))) return kAxes[bytes.below(4)];
+  const Vec3 v = bytes.vector(-1, 1);
+  return bytes.chance(Real(0.9)) ? v * (Real(1) / length(v)) : v;
+}
+
+Sphere draw_sphere(Bytes& bytes) { return {bytes.number(Real(0.1), Real(1.5))}; }
+Box draw_box(Bytes& bytes) { return {bytes.vector(Real(0.1), Real(1.5))}; }
+
+Assembly draw_assembly(Bytes& bytes) {
+  Assembly assembly;
+  for (std::uint64_t n = bytes.below(4); n > 0; --n) {
+    AssemblyPart part;
+    if (bytes.chance(Real(0.5))) {
+      part.shape = draw_sphere(bytes);
+    } else {
+      part.shape = draw_box(bytes);
+    }
+    part.position = bytes.vector(-2, 2);
+    part.orientation = draw_orientation(bytes);
+    part.density = bytes.number(Real(0.1), 3);
+    assembly.parts.push_back(part);
+  }
+  return bytes.chance(Real(0.9)) ? centred(std::move(assembly)) : assembly;
+}
+
+Shape draw_shape(Bytes& bytes) {
+  switch (bytes.below(8)) {
+    case 0:
+    case 1:
+      return draw_box(bytes);
+    case 2:
+      return HalfSpace{draw_direction(bytes), bytes.number(-2, 2)};
+    case 3:
+      return Plane{draw_direction(bytes), bytes.number(-2, 2)};
+    case 4:
+      return draw_assembly(bytes);
+    default:
+      return draw_sphere(bytes);
+  }
+}
+
+Attachment draw_attachment(Bytes& bytes, std::span<const BodyId> bodies) {
+  Attachment attachment;
+  if (bytes.chance(Real(0.7))) attachment.body = draw_id(bytes, bodies);
+  attachment.point = bytes.vector(-1, 1);
+  return attachment;
+}
+
+Mat3 draw_matrix(Bytes& bytes) {
+  Mat3 m;
+  for (Vec3& row : m.row) row = bytes.vector(-2, 2);
+  return m;
+}
+
+}  // namespace
+
+BodyId draw_id(Bytes& bytes, std::span<const BodyId> bodies) {
+  if (bodies.empty() || bytes.chance(Real(0.06))) {
+    const auto index = static_cast<std::uint32_t>(bytes.below(32));
+    return {index, static_cast<std::uint32_t>(bytes.below(4))};
+  }
+  return bodies[bytes.below(bodies.size())];
+}
+
+BodyDef draw_body(Bytes& bytes) {
+  BodyDef def;
+  def.shape = draw_shape(bytes);
+  const bool wall =
+      std::holds_alternative<HalfSpace>(def.shape) || std::holds_alternative<Plane>(def.shape);
+  def.mass = bytes.chance(wall ? Real(0.95) : Real(0.15)) ? Real(0) : bytes.number(Real(0.1), 5);
+  def.kinematic = def.mass == 0 && bytes.chance(Real(0.3));
+  if (bytes.chance(Real(0.1))) def.inertia = draw_matrix(bytes);
+  if (bytes.chance(Real(0.1))) def.inertia = diagonal(bytes.vector(1, 2));
+  def.position = bytes.vector(-3, 3);
+  def.orientation = draw_orientation(bytes);
+  if (bytes.chance(Real(0.5))) {
+    def.velocity = bytes.vector(-5, 5);
+    def.angular_velocity = bytes.vector(-5, 5);
+  }
+  if (bytes.chance(Real(0.3))) {
+    def.acceleration = bytes.vector(-10, 10);
+    def.linear_damping = bytes.number(Real(0.5), 1);
+    def.angular_damping = bytes.number(Real(0.5), 1);
+    def.friction = bytes.number(0, 2);
+    def.restitution = bytes.number(0, 1);
+  }
+  def.can_sleep = bytes.chance(Real(0.8));
+  return def;
+}
+
+BodyState draw_state(Bytes& bytes) {
+  BodyState state;
+  state.position = bytes.vector(-3, 3);
+  state.orientation = draw_orientation(bytes);
+  state.velocity = bytes.vector(-5, 5);
+  state.angular_velocity = bytes.vector(-5, 5);
+  return state;
+}
+
+Scene draw_scene(Bytes& bytes) {
+  Scene scene;
+  if (bytes.chance(Real(0.3))) {
+    scene.dt = bytes.number(Real(0.001), Real(0.1));
+    scene.resolver.velocity_epsilon = bytes.number(Real(1e-5), Real(0.1));
+    scene.resolver.position_epsilon = bytes.number(Real(1e-5), Real(0.1));
+    scene.resolver.restitution_velocity = bytes.number(0, 1);
+    scene.resolver.angular_limit = bytes.number(Real(0.01), 1);
+    scene.sleep.epsilon = bytes.number(Real(0.001), 1);
+    scene.sleep.bias = bytes.number(Real(0.01), 1);
+    scene.sleep.enabled = bytes.chance(Real(0.8));
+    scene.materials.friction = CombineRule{static_cast<std::uint8_t>(bytes.below(6))};
+    scene.materials.restitution = CombineRule{static_cast<std::uint8_t>(bytes.below(6))};
+  }
+  scene.resolver.max_iterations = static_cast<std::uint32_t>(bytes.below(200));
+  for (std::uint64_t n = bytes.below(8); n > 0; --n) scene.bodies.push_back(draw_body(bytes));
+  return scene;
+}
+
+WorldSettings draw_settings(Bytes& bytes) {
+  WorldSettings settings;
+  settings.collider.backend = Backend::x86;
+  settings.collider.algorithm = SphereAlgorithm{static_cast<std::uint8_t>(bytes.below(3))};
+  settings.collider.simd = SimdLevel{static_cast<std::uint8_t>(bytes.below(5))};
+  settings.collider.threads = bytes.chance(Real(0.05)) ? 2 : 1;
+  settings.broad_phase = BroadPhase{static_cast<std::uint8_t>(bytes.below(3))};
+  return settings;
+}
+
+GeneratedContact draw_contact(Bytes& bytes, std::span<const BodyId> bodies) {
+  GeneratedContact contact;
+  contact.a = draw_id(bytes, bodies);
+  contact.b = draw_id(bytes, bodies);
+  contact.normal = draw_direction(bytes);
+  contact.point = bytes.vector(-3, 3);
+  contact.distance = bytes.number(Real(-0.5), 0);
+  contact.friction = bytes.number(0, 1);
+  contact.restitution = bytes.number(0, 1);
+  return contact;
+}
+
+ForceId add_drawn_force(Bytes bytes, World& world) {
+  const std::span<const BodyId> bodies = world.bodies();
+  std::optional<BodyId> body;
+  if (bytes.chance(Real(0.6))) body = draw_id(bytes, bodies);
+  switch (bytes.below(9)) {
+    case 0:
+      return world.add_force(Gravity{bytes.vector(-10, 10), body});
+    case 1: {
+      Drag drag{.linear = bytes.number(0, 2), .quadratic = bytes.number(0, 2), .body = body};
+      drag.wind = bytes.vector(-5, 5);
+      return world.add_force(drag);
+    }
+    case 2: {
+      Spring spring{.a = draw_attachment(bytes, bodies), .b = draw_attachment(bytes, bodies)};
+      spring.stiffness = bytes.number(0, 100);
+      spring.damping = bytes.number(0, 5);
+      spring.rest_length = bytes.number(0, 3);
+      return world.add_force(spring);
+    }
+    case 3: {
+      Bungee bungee{.a = draw_attachment(bytes, bodies), .b = draw_attachment(bytes, bodies)};
+      bungee.stiffness = bytes.number(0, 100);
+      bungee.damping = bytes.number(0, 5);
+      bungee.rest_length = bytes.number(0, 3);
+      return world.add_force(bungee);
+    }
+    case 4: {
+      Aero aero{.body = draw_id(bytes, bodies), .tensor = draw_matrix(bytes)};
+      aero.point = bytes.vector(-1, 1);
+      aero.wind = bytes.vector(-5, 5);
+      return world.add_force(aero);
+    }
+    case 5: {
+      AeroControl aero{.body = draw_id(bytes, bodies), .lowest = draw_matrix(bytes)};
+      aero.highest = draw_matrix(bytes);
+      aero.point = bytes.vector(-1, 1);
+      aero.control = bytes.number(-2, 2);
+      return world.add_force(aero);
+    }
+    case 6: {
+      Buoyancy buoyancy{.liquid = {draw_direction(bytes), bytes.number(-2, 2)}, .body = body};
+      buoyancy.density = bytes.number(0, 2000);
+      buoyancy.gravity = bytes.number(0, 20);
+      return world.add_force(buoyancy);
+    }
+    case 7: {
+      Explosion explosion{.centre = bytes.vector(-3, 3), .start = bytes.number(0, 1)};
+      explosion.peak_force = bytes.number(0, 1000);
+      explosion.speed = bytes.number(1, 340);
+      explosion.thickness = bytes.number(Real(0.1), 10);
+      explosion.duration = bytes.number(Real(0.1), 2);
+      return world.add_force(explosion);
+    }
+    default: {
+      // One of a user's own, that checks nothing.
+      const BodyId id = draw_id(bytes, bodies);
+      const Vec3 force = bytes.vector(-50, 50), point = bytes.vector(-3, 3);
+      return world.add_force([id, force, point](ForceContext& context) {
+        if (!context.contains(id)) return;
+        context.wake(id);
+        context.apply_force_at_point(id, force, point);
+        context.link(id, context.bodies().front());
+      });
+    }
+  }
+}
+
+}  // namespace jfpx::inline JFPX_ABI::fuzz
