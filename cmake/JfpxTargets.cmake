@@ -6,26 +6,36 @@ configure_file(${PROJECT_SOURCE_DIR}/include/jfpx/config.hpp.in
                ${PROJECT_BINARY_DIR}/include/jfpx/config.hpp @ONLY)
 
 # Flags of our own files only; nothing here reaches a user's target.
-add_library(jfpx_build_flags INTERFACE)
-target_compile_features(jfpx_build_flags INTERFACE cxx_std_20)
-target_compile_options(jfpx_build_flags INTERFACE
+add_library(jfpx_warnings INTERFACE)
+target_compile_options(jfpx_warnings INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wconversion;-Wshadow>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${JFPX_WERROR}>>:-Werror>)
+add_library(jfpx_build_flags INTERFACE)
+target_compile_features(jfpx_build_flags INTERFACE cxx_std_20)
 target_include_directories(jfpx_build_flags INTERFACE ${PROJECT_SOURCE_DIR})
+target_link_libraries(jfpx_build_flags INTERFACE jfpx_warnings)
 
 # The promise of equal bits rests on each operation being rounded once. g++ and clang contract
 # a*b+c to FMA when the target has it; users inline our headers (and Bullet's), so the flag is
 # part of the usage requirements.
 set(JFPX_EXACT_FLAGS $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-ffp-contract=off>)
 
-# jfpx_add_library(NAME SOURCES ... [PUBLIC ...] [PRIVATE ...]): NAME and NAME_f64. A linked target
-# that has a _f64 sibling is linked as that sibling into NAME_f64.
+# jfpx_add_library(NAME [STATIC|OBJECT] SOURCES ... [PUBLIC ...] [PRIVATE ...]): NAME and NAME_f64. A
+# linked target that has a _f64 sibling is linked as that sibling into NAME_f64. Without a kind,
+# BUILD_SHARED_LIBS decides: so for what is installed, and nothing else.
 function(jfpx_add_library name)
-  cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "STATIC;OBJECT" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  set(kind "")
+  if(arg_STATIC)
+    set(kind STATIC)
+  elseif(arg_OBJECT)
+    set(kind OBJECT)
+  endif()
   foreach(suffix IN ITEMS "" "_f64")
     set(target ${name}${suffix})
-    add_library(${target} ${arg_SOURCES})
+    add_library(${target} ${kind} ${arg_SOURCES})
     _jfpx_configure(${target} "${suffix}" "${arg_PUBLIC}" "${arg_PRIVATE}")
+    target_compile_features(${target} PUBLIC cxx_std_20)
     target_compile_options(${target} PUBLIC ${JFPX_EXACT_FLAGS})
     target_include_directories(${target} PUBLIC
       $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>

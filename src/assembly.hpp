@@ -12,7 +12,7 @@ struct MassProperties {
   Mat3 inertia;  ///< [kg m^2], body axes, about their origin
 };
 /// @param mass [kg], of the whole
-MassProperties mass_properties(const Assembly& assembly, Real mass);
+JFPX_API MassProperties mass_properties(const Assembly& assembly, Real mass);
 
 /// Radius of the smallest sphere around a part's centre that holds it [m].
 Real bounding_radius(const AssemblyPart& part);

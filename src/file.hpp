@@ -12,8 +12,8 @@ namespace jfpx::inline JFPX_ABI {
 JFPX_API std::string file_message(const std::string& path, std::string_view what, int error_number);
 
 /// @throws FileError
-std::string read_file(const std::string& path);
+JFPX_API std::string read_file(const std::string& path);
 /// Through an AtomicFile: the file is there whole or not at all. @throws FileError
-void write_file(const std::string& path, std::string_view content);
+JFPX_API void write_file(const std::string& path, std::string_view content);
 
 }  // namespace jfpx::inline JFPX_ABI

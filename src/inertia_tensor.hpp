@@ -12,8 +12,8 @@ const char* inertia_must_be(const Mat3& tensor);
 /// @param tensor one about which inertia_must_be() has nothing to say
 Mat3 inverse_inertia(const Mat3& tensor);
 
-bool is_diagonal(const Mat3& tensor);
+JFPX_API bool is_diagonal(const Mat3& tensor);
 /// The mean of a tensor and its transpose: what is meant where the last digits differ.
-Mat3 symmetric_part(const Mat3& tensor);
+JFPX_API Mat3 symmetric_part(const Mat3& tensor);
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -11,6 +11,6 @@ struct PrincipalInertia {
 };
 
 /// @param tensor finite and symmetric; its upper half is read
-PrincipalInertia principal_inertia(const Mat3& tensor);
+JFPX_API PrincipalInertia principal_inertia(const Mat3& tensor);
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -1,4 +1,5 @@
-# Every public header compiles alone, without CUDA, and all but bullet/ without Bullet.
+# Every public header, and so every installed one, compiles alone: without our other folders, without
+# CUDA, and all but bullet/ without Bullet.
 file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR}/include CONFIGURE_DEPENDS
      ${PROJECT_SOURCE_DIR}/include/jfpx/*.hpp)
 set(plain "")
@@ -14,8 +15,8 @@ foreach(header IN LISTS headers)
   endif()
 endforeach()
 add_library(headers_alone OBJECT ${plain})
-target_link_libraries(headers_alone PRIVATE jfpx jfpx_build_flags)
+target_link_libraries(headers_alone PRIVATE jfpx jfpx_warnings)
 if(JFPX_HAS_BULLET AND with_bullet)
   add_library(bullet_headers_alone OBJECT ${with_bullet})
-  target_link_libraries(bullet_headers_alone PRIVATE jfpx_bullet jfpx_build_flags)
+  target_link_libraries(bullet_headers_alone PRIVATE jfpx_bullet jfpx_warnings)
 endif()

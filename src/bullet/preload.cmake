@@ -32,7 +32,9 @@ set_target_properties(jfpx_bullet_preload PROPERTIES
 add_dependencies(jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64)
 
 # As installed: libraries in ../lib (or what it is called here) of the command.
-set_target_properties(jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64 PROPERTIES
-  LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/${CMAKE_INSTALL_LIBDIR})
-install(TARGETS jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64
-  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+set(modules jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64)
+set_target_properties(${modules} PROPERTIES
+  LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/${CMAKE_INSTALL_LIBDIR} INSTALL_RPATH "$ORIGIN")
+if(JFPX_INSTALL)
+  install(TARGETS ${modules} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT tools)
+endif()

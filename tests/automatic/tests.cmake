@@ -4,7 +4,7 @@ if(JFPX_HAS_BULLET)
   set(bullet_takeover automatic/bullet_takeover_test.cpp)
   set(bullet_library jfpx_bullet)
 endif()
-jfpx_add_test(automatic_test
+jfpx_add_test(automatic_test INTERNAL
   SOURCES
     automatic/automatic_sphere_collider_test.cpp
     automatic/cost_chooser_test.cpp

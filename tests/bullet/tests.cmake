@@ -1,4 +1,4 @@
-jfpx_add_test(bullet_contract_test SOURCES
+jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   bullet/contact_callbacks_test.cpp
   bullet/replaced_test.cpp
   bullet/mirror_test.cpp
@@ -8,7 +8,7 @@ jfpx_add_test(bullet_contract_test SOURCES
   bullet/sphere_plane_test.cpp
   bullet/stats_test.cpp
   LINK jfpx_bullet jfpx_scenes)
-jfpx_add_test(bullet_verify_test SOURCES
+jfpx_add_test(bullet_verify_test INTERNAL SOURCES
   bullet/scene_world_test.cpp
   bullet/verify_test.cpp
   LINK jfpx_bullet)

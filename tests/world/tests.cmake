@@ -1,4 +1,4 @@
-jfpx_add_test(world_parts_test SOURCES
+jfpx_add_test(world_parts_test INTERNAL SOURCES
   world/body_store_test.cpp
   world/box_pair_test.cpp
   world/collide_test.cpp
@@ -24,8 +24,8 @@ jfpx_add_test(world_test SOURCES
   world/rest_test.cpp
   world/world_test.cpp)
 jfpx_add_test(particle_test SOURCES world/particle_test.cpp)
-jfpx_add_test(assembly_test SOURCES world/assembly_test.cpp)
-jfpx_add_test(broad_phase_test SOURCES world/broad_phase_test.cpp)
+jfpx_add_test(assembly_test INTERNAL SOURCES world/assembly_test.cpp)
+jfpx_add_test(broad_phase_test INTERNAL SOURCES world/broad_phase_test.cpp)
 jfpx_add_test(allocation_test SOURCES world/allocation_test.cpp)
 
 jfpx_add_executable(pinned_hashes SOURCES world/pinned_hashes.cpp LINK jfpx jfpx_demos)

@@ -1,0 +1,104 @@
+# What `cmake --install` puts where: libraries with their CMake and pkg-config files, headers, programs.
+# All of it can be moved afterwards: no file names the prefix. Components as Debian splits them:
+# runtime, runtime_bullet, dev, tools.
+set(JFPX_CMAKE_FOLDER ${CMAKE_INSTALL_LIBDIR}/cmake/jfpx)
+file(RELATIVE_PATH JFPX_LIBRARIES_FROM_PROGRAMS /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR})
+
+# jfpx_export(NAME [AS NAME] COMPONENT ...): NAME and NAME_f64 as jfpx::NAME and jfpx::NAME_f64 of the
+# installed package, as files libNAME and libNAME-f64, and with pkg-config files called likewise.
+function(jfpx_export name)
+  cmake_parse_arguments(arg "" "AS;COMPONENT" "" ${ARGN})
+  if(NOT arg_AS)
+    set(arg_AS ${name})
+  endif()
+  foreach(suffix IN ITEMS "" "_f64")
+    set(target ${name}${suffix})
+    string(REPLACE "_" "-" file ${target})
+    # While the version is 0.x, each minor version may change what callers are compiled against.
+    set_target_properties(${target} PROPERTIES
+      EXPORT_NAME ${arg_AS}${suffix} OUTPUT_NAME ${file}
+      VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+      INSTALL_RPATH "$ORIGIN")
+    get_target_property(kind ${target} TYPE)
+    if(kind STREQUAL "SHARED_LIBRARY")
+      set(exports ${PROJECT_SOURCE_DIR}/cmake/exports.map)
+      target_link_options(${target} PRIVATE LINKER:--version-script=${exports} LINKER:--no-undefined)
+      set_property(TARGET ${target} APPEND PROPERTY LINK_DEPENDS ${exports})
+    endif()
+    if(JFPX_INSTALL)
+      install(TARGETS ${target} EXPORT ${name}-targets
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${arg_COMPONENT} NAMELINK_COMPONENT dev
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
+      _jfpx_install_pkg_config(${file} "${suffix}")
+    endif()
+  endforeach()
+  if(JFPX_INSTALL)
+    install(EXPORT ${name}-targets NAMESPACE jfpx:: DESTINATION ${JFPX_CMAKE_FOLDER} COMPONENT dev)
+  endif()
+endfunction()
+
+# jfpx_install_programs(TARGET...): commands that find our libraries from where they are.
+function(jfpx_install_programs)
+  if(JFPX_INSTALL)
+    set_target_properties(${ARGN} PROPERTIES INSTALL_RPATH "$ORIGIN/${JFPX_LIBRARIES_FROM_PROGRAMS}")
+    install(TARGETS ${ARGN} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
+  endif()
+endfunction()
+
+function(_jfpx_install_pkg_config file suffix)
+  set(folder ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+  file(RELATIVE_PATH up /${folder} /)
+  string(REGEX REPLACE "/$" "" up "${up}")
+  set(cflags "-I\${includedir} -ffp-contract=off")
+  set(description "${PROJECT_DESCRIPTION}")
+  set(precision "single precision")
+  if(suffix)
+    string(APPEND cflags " -DJFPX_DOUBLE_PRECISION=1")
+    set(precision "double precision")
+  endif()
+  set(requires "")
+  set(libraries "-L\${libdir} -l${file}")
+  if(file MATCHES "bullet")
+    set(description "${description}: the adapter for Bullet")
+    set(bullet bullet)
+    string(REPLACE "-bullet" "" core ${file})
+    if(suffix)
+      set(bullet bullet-float64)
+    endif()
+    set(requires "${core} = ${PROJECT_VERSION}, ${bullet} = ${JFPX_BULLET_F32_VERSION}")
+  elseif(NOT BUILD_SHARED_LIBS)
+    string(APPEND libraries " -pthread")
+    if(JFPX_HAS_CUDA)
+      string(APPEND libraries " -L${CUDAToolkit_LIBRARY_DIR} -lcudart_static -ldl -lrt")
+    endif()
+  endif()
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/jfpx.pc.in ${PROJECT_BINARY_DIR}/${file}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/${file}.pc DESTINATION ${folder} COMPONENT dev)
+endfunction()
+
+if(NOT JFPX_INSTALL)
+  return()
+endif()
+
+set(left_out "")
+if(NOT JFPX_HAS_BULLET)
+  list(APPEND left_out PATTERN bullet EXCLUDE)
+endif()
+if(NOT JFPX_HAS_CUDA)
+  list(APPEND left_out PATTERN cuda EXCLUDE)
+endif()
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/jfpx DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev
+  FILES_MATCHING PATTERN *.hpp ${left_out})
+install(FILES ${PROJECT_BINARY_DIR}/include/jfpx/config.hpp
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/jfpx COMPONENT dev)
+
+include(CMakePackageConfigHelpers)
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/jfpx-config.cmake.in
+  ${PROJECT_BINARY_DIR}/jfpx-config.cmake INSTALL_DESTINATION ${JFPX_CMAKE_FOLDER})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/jfpx-config-version.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES
+  ${PROJECT_BINARY_DIR}/jfpx-config.cmake ${PROJECT_BINARY_DIR}/jfpx-config-version.cmake
+  cmake/JfpxFindBullet.cmake
+  DESTINATION ${JFPX_CMAKE_FOLDER} COMPONENT dev)
+install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev)

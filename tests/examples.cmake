@@ -1,0 +1,10 @@
+# The examples run, and say what they should.
+foreach(suffix IN ITEMS "" "_f64")
+  add_test(NAME collider${suffix} COMMAND collider${suffix})
+  set_tests_properties(collider${suffix} PROPERTIES
+    PASS_REGULAR_EXPRESSION "spheres 0 and 1 overlap by 0.5\n$")
+  # Four quarters of a circle end where they began.
+  add_test(NAME own_force${suffix} COMMAND own_force${suffix})
+  set_tests_properties(own_force${suffix} PROPERTIES
+    PASS_REGULAR_EXPRESSION "3.14 s  \\([-+]0.0., \\+1.00\\).*12.56 s  \\(\\+1.00, [-+]0.0.\\)")
+endforeach()

@@ -1,0 +1,143 @@
+#!/usr/bin/env bash
+# Uses jfpx as those do who install it. Usage: check.sh STEP BUILD WORK; the environment says what the
+# build has: KIND (static, shared), HAS_CUDA, HAS_BULLET (ON, OFF), CXX, LAUNCHER (of the compiler).
+set -euo pipefail
+step=$1 build=$2 work=$3
+here=$(cd "$(dirname "$0")" && pwd)
+root=$(cd "$here/../.." && pwd)
+prefix=$work/moved # where it was not installed
+
+fail() {
+  echo "$*" >&2
+  exit 1
+}
+configure() { # SOURCE FOLDER [ARGS]
+  local source=$1 folder=$2
+  shift 2
+  rm -rf "$folder"
+  cmake -S "$source" -B "$folder" -G Ninja -DCMAKE_CXX_COMPILER="$CXX" \
+    -DCMAKE_CXX_COMPILER_LAUNCHER="${LAUNCHER:-}" -DCMAKE_PREFIX_PATH="$prefix" \
+    -DEXAMPLES="$root/examples" -DJFPX="$root" "$@"
+}
+# The programs of a stranger say what they should: FOLDER SUFFIX_OF_DOUBLE
+run_programs() {
+  local suffix
+  for suffix in "" "$2"; do
+    [ "$("$1/collider$suffix")" = "spheres 0 and 1 overlap by 0.5" ] || fail "collider$suffix"
+    [ "$HAS_BULLET" = OFF ] || "$1/bullet_app$suffix" | grep -E '[1-9][0-9]* contacts of spheres' || fail "bullet_app$suffix"
+  done
+}
+components() {
+  [ "$HAS_BULLET" = OFF ] || echo -n "bullet;"
+  [ "$HAS_CUDA" = OFF ] || echo -n "cuda;"
+}
+libraries() { # of the installed tree that match
+  find "$prefix" -name "libjfpx$1" -type f
+}
+
+case $step in
+  # Installs, moves, and looks for traces of where it was built and installed.
+  prefix)
+    rm -rf "$work"
+    mkdir -p "$work"
+    cmake --install "$build" --prefix "$work/first" >/dev/null
+    mv "$work/first" "$prefix"
+    traces=$(grep -rlF -e "$work/first" -e "$build" "$prefix" || true)
+    [ -z "$traces" ] || fail "these can't be moved: $traces"
+    for header in $(cd "$prefix/include" && find . -name '*.hpp'); do
+      [ "$header" = ./jfpx/config.hpp ] || cmp "$root/include/$header" "$prefix/include/$header"
+    done
+    ;;
+  cmake)
+    configure "$here/cmake" "$work/cmake" -DCOMPONENTS="$(components)" >/dev/null
+    cmake --build "$work/cmake" >/dev/null
+    run_programs "$work/cmake" _f64
+    compiled="not compiled"
+    [ "$HAS_CUDA" = OFF ] || compiled=compiled
+    [ "$("$work/cmake/both")" = "contacts 1 1
+x86 compiled
+cuda $compiled
+refused" ] || fail "$("$work/cmake/both")"
+    ;;
+  pkg_config)
+    folder=$(dirname "$(find "$prefix" -name jfpx.pc)")
+    mkdir -p "$work/makefile"
+    programs="collider collider-f64"
+    [ "$HAS_BULLET" = OFF ] || programs+=" bullet_app bullet_app-f64"
+    export LD_LIBRARY_PATH=${folder%/pkgconfig}
+    PKG_CONFIG_PATH=$folder make -B -s -C "$work/makefile" -f "$here/makefile/Makefile" \
+      EXAMPLES="$root/examples" PROGRAMS="$programs" CXX="${LAUNCHER:-} $CXX"
+    run_programs "$work/makefile" -f64
+    ;;
+  # A component that is not there, a version that is not this one: the user is told what to do.
+  messages)
+    expect() { # TEXT ARGS
+      local text=$1
+      shift
+      if configure "$here/cmake" "$work/messages" "$@" >"$work/messages.txt" 2>&1; then fail "accepted: $*"; fi
+      tr '\n' ' ' <"$work/messages.txt" | tr -s ' ' | grep -qF "$text" || fail "no \"$text\" in: $(cat "$work/messages.txt")"
+    }
+    expect 'jfpx has no component "rockets"; it has bullet and cuda.' -DCOMPONENTS=rockets
+    [ "$HAS_CUDA" = ON ] || expect "This jfpx was built without CUDA" -DCOMPONENTS=cuda
+    if [ "$HAS_BULLET" = OFF ]; then
+      expect "This jfpx was built without Bullet" -DCOMPONENTS=bullet
+    else
+      PKG_CONFIG_LIBDIR=$work expect "install pkg-config and libbullet-dev" -DCOMPONENTS=bullet
+    fi
+    version=$(find "$prefix" -name jfpx-config-version.cmake)
+    for other in 0.2 1.0; do
+      echo "set(PACKAGE_FIND_VERSION $other) set(PACKAGE_FIND_VERSION_MAJOR ${other%.*}) set(PACKAGE_FIND_VERSION_MINOR ${other#*.})
+        include($version) if(PACKAGE_VERSION_COMPATIBLE) message(FATAL_ERROR compatible) endif()" | tr ' ' '\n' >"$work/version.cmake"
+      cmake -P "$work/version.cmake" || fail "version $other is accepted"
+    done
+    ;;
+  # Shared libraries export what is jfpx's, and need nothing of CUDA.
+  symbols)
+    [ "$KIND" = shared ] || { echo "skipped: static libraries"; exit 0; }
+    for library in $(libraries '*.so.*'); do
+      symbols=$(nm -DC --defined-only "$library" | cut -d' ' -f3-)
+      [ -n "$symbols" ] || fail "$library exports nothing"
+      foreign=$(grep -vE '^((vtable|typeinfo|typeinfo name) for |(non-virtual|virtual) thunk to )?jfpx::f(32|64)::' <<<"$symbols" || true)
+      [ -z "$foreign" ] || fail "$library exports: $foreign"
+      objdump -p "$library" | grep -E 'NEEDED.*(cuda|cudart)' && fail "$library needs CUDA"
+    done
+    for module in $(libraries '-bullet-preload.so') $(libraries '-bullet-engine*.so'); do
+      symbols=$(nm -DC --defined-only "$module" | cut -d' ' -f3-)
+      ! grep -E '^(cuda|__cuda|nvtx|std::|jfpx::)' <<<"$symbols" || fail "$module exports more than it should"
+    done
+    ;;
+  # jfpx inside another project, by FetchContent.
+  subproject)
+    configure "$here/subproject" "$work/subproject" -DJFPX_CUDA=OFF >/dev/null
+    cmake --build "$work/subproject" --target careless >/dev/null 2>&1
+    "$work/subproject/careless" || fail "careless"
+    rm -rf "$work/nothing"
+    cmake --install "$work/subproject" --prefix "$work/nothing" >/dev/null
+    [ ! -e "$work/nothing" ] || fail "installs: $(find "$work/nothing")"
+    ;;
+  # The Debian packages, unpacked where nothing else is.
+  debian)
+    command -v dpkg-deb >/dev/null && command -v dpkg-shlibdeps >/dev/null || { echo "skipped: no dpkg-dev"; exit 0; }
+    [ "$KIND" = shared ] || { echo "skipped: packages are made of shared builds"; exit 0; }
+    rm -rf "$work/packages" "$work/root"
+    cpack --config "$build/CPackConfig.cmake" -B "$work/packages" >"$work/cpack.txt" 2>&1 || fail "$(cat "$work/cpack.txt")"
+    for package in "$work"/packages/*.deb; do dpkg -x "$package" "$work/root"; done
+    depends() { dpkg-deb -f "$work"/packages/"$1"_*.deb Depends; }
+    depends libjfpx0.1 | grep -q 'libstdc++6' || fail "libjfpx0.1 depends on: $(depends libjfpx0.1)"
+    depends libjfpx-dev | grep -q 'libjfpx0.1 (= ' || fail "libjfpx-dev depends on: $(depends libjfpx-dev)"
+    depends jfpx-tools | grep -q 'libjfpx0.1 (= .*libsdl2' || depends jfpx-tools | grep -q 'libsdl2.*libjfpx0.1 (= ' ||
+      fail "jfpx-tools depends on: $(depends jfpx-tools)"
+    if [ "$HAS_BULLET" = ON ]; then
+      depends libjfpx-bullet0.1 | grep -q 'libbullet3' || fail "libjfpx-bullet0.1 depends on: $(depends libjfpx-bullet0.1)"
+      ! depends libjfpx0.1 | grep -q bullet || fail "libjfpx0.1 depends on Bullet"
+    fi
+    [ -s "$work/root/usr/share/doc/libjfpx0.1/copyright" ] || fail "no copyright"
+    prefix=$work/root/usr
+    "$prefix/bin/jfpx" run pile --spheres 64 --steps 10 --precision double --hash | grep -E '^[0-9a-f]{16}$' || fail "jfpx run"
+    [ "$HAS_BULLET" = OFF ] || "$prefix/bin/jfpx" preload --summary -- "$prefix/bin/jfpx" compare pile --spheres 64 --steps 10
+    configure "$here/cmake" "$work/debian" >/dev/null
+    cmake --build "$work/debian" --target collider >/dev/null
+    "$work/debian/collider"
+    ;;
+  *) fail "unknown step $step" ;;
+esac
