@@ -5,7 +5,7 @@ import pathlib
 THESIS = "thesis_2010.json"
 # Of the context that Google Benchmark writes; names of hosts, people and folders stay out.
 KEPT_CONTEXT = ("date", "machine", "x86", "cuda", "num_cpus", "load_avg", "precision", "version",
-                "command", "costs")
+                "command", "costs", "pictures", "copied_gb_a_second", "giga_operations_a_second")
 DROPPED_FIELDS = ("family_index", "per_family_instance_index", "run_name", "run_type", "repetitions",
                   "repetition_index", "threads")
 

@@ -129,17 +129,71 @@ def stages(machine):
             series.setdefault((scene, backend, stage), []).append((int(n), b[f"{stage}_ms"]))
         rows.append([scene, backend, n, number(b["contacts"]),
                      *[number(b[f"{s}_ms"]) for s in NATIVE_STAGES], number(b["real_time"]),
-                     number(1e6 * b["detect_ms"] / int(n)), number(b["detect_bytes"] / 1e6 / b["detect_ms"]),
-                     int(b["allocations"]), b.get("label", "")])
+                     number(1e6 * b["detect_ms"] / int(n)), int(b["allocations"]), b.get("label", "")])
     fits = []
     for scene, backend in dict.fromkeys((s, b) for s, b, _ in series):
         slopes = [exponent(series[scene, backend, stage]) for stage in NATIVE_STAGES]
         fits.append([scene, backend, *[f"{x:.2f}" if x is not None else "" for x in slopes]])
     return ("### Stages of a native step\n\n" + origin(machine, "stages") +
-            "\nMedians, ms. \"GB/s\": the bytes that detection has to read and write at least, by its time.\n\n" +
-            table(["scene", "backend", "N", "contacts", *NATIVE_STAGES, "step", "detect ns a sphere", "GB/s",
+            "\nMedians, ms. Allocations: of the median step.\n\n" +
+            table(["scene", "backend", "N", "contacts", *NATIVE_STAGES, "step", "detect ns a sphere",
                    "allocations", "computed last by"], rows) +
-            "\nTime grows as N to the power of:\n\n" + table(["scene", "backend", *NATIVE_STAGES], fits) + "\n")
+            "\nTime grows as N to the power of:\n\n" + table(["scene", "backend", *NATIVE_STAGES], fits) + "\n" +
+            floors(machine, benchmarks))
+
+
+def floors(machine, benchmarks):
+    """What the stages must read, write and compute at least, and how near they come to it."""
+    context = machine.context("stages")
+    if "copied_gb_a_second" not in context:
+        return ""
+    gb, giga = float(context["copied_gb_a_second"]), float(context["giga_operations_a_second"])
+    rows = []
+    for (scene, backend, n), b in benchmarks:
+        if backend == "auto":
+            continue
+        row = [scene, backend, n]
+        for stage in NATIVE_STAGES:
+            size, operations = b[f"{stage}_bytes"], b[f"{stage}_operations"]
+            floor = 1e-6 * max(size / gb, operations / giga)
+            row += [number(size / 1e3), number(operations / 1e3), number(b[f"{stage}_ms"] / floor)]
+        rows.append(row)
+    head = [f"{stage} {what}" for stage in NATIVE_STAGES for what in ("kB", "kop", "x floor")]
+    return ("What a stage must read and write once (kB) and compute (kop, thousands of operations), and how many "
+            "times as long as that it takes, at the rates that one core showed in the same run: "
+            f"{number(gb)} GB/s in copies, {number(giga)} billion operations/s in vectors of 128 bits. Operations "
+            "are counted in `bench/world/floor.hpp`: of the formula for each contact, of an update for each body, "
+            "of each iteration that the resolver made. Below 1 a stage works in caches, in wider vectors, or on a "
+            "GPU.\n\n" +
+            table(["scene", "backend", "N", *head], rows) + "\n")
+
+
+def rendering(machine, published):
+    ours = {}
+    for (mode, backend, n), b in parts(machine.get("rendering")):
+        ours.setdefault((backend, int(n)), {})[mode] = b
+    ours = {key: modes for key, modes in ours.items() if "on" in modes}
+    if not ours:
+        return ""
+    off, on = ({row["spheres"]: row for row in published[f"rendering_{mode}"]} for mode in ("off", "on"))
+    rows = []
+    for (backend, n), modes in sorted(ours.items(), key=lambda item: (item[0][0] != "x86", item[0][1])):
+        mark = " (1)" if f"{backend}_note" in off[n] else ""
+        before, after = off[n][f"{backend}_mean_ms"], on[n][f"{backend}_mean_ms"]
+        rows.append([backend, n, *[number(modes[m][k]) for m in ("off", "on")
+                                   for k in ("real_time", "median_ms", "first_ms")],
+                     f"{modes['on']['median_ms'] / modes['off']['median_ms']:.2f}",
+                     number(modes["on"]["picture_ms"]), number(before) + mark, number(after),
+                     f"{after / before:.2f}{mark}"])
+    frames = int(next(iter(ours.values()))["on"]["iterations"])
+    return ("### With rendering (figure 5.3)\n\n" + origin(machine, "rendering") +
+            f"\nMilliseconds of contact generation a frame, over {frames} frames, while none is drawn and while "
+            f"each is: {machine.context('rendering')['pictures']}, without a screen. \"Picture\": drawing one, "
+            "median. The ratio is of medians; \"2010\" are the published means.\n\n" +
+            table(["backend", "N", "off mean", "median", "first", "on mean", "median", "first", "on / off", "picture",
+                   "2010 off", "2010 on", "2010 on / off"], rows) +
+            "\n(1) The published x86 file for 32 spheres without rendering is that of 16, byte for byte.\n\n" +
+            "Drawing comes between two detections, so what it costs them is the caches that it has filled.\n\n")
 
 
 def bullet(machine):
@@ -156,8 +210,9 @@ def bullet(machine):
     return ("### Bullet's step in its parts\n\n" + origin(machine, "bullet_step") +
             "\nStock Bullet: ms a step, and where they go.\n\n" +
             table(["scene", "N", "step", *BULLET_STAGES[:-1]], shares) +
-            "\nStock / jfpx, medians of the ratios step by step: above 1 jfpx is faster. Only dispatch is "
-            "jfpx's; what differs from 1 elsewhere is noise, or caches. Both worlds end with equal hashes.\n\n" +
+            "\nStock / jfpx, medians of the ratios step by step: above 1 jfpx is faster. Integration, "
+            "dispatch, islands and solver are jfpx's, the broadphase is Bullet's in both: what differs from 1 there is "
+            "noise, or caches. Both worlds end with equal hashes.\n\n" +
             table(["scene", "N", *BULLET_STAGES, "gain"], ratios) + "\n")
 
 
@@ -194,7 +249,8 @@ def document(found):
     for machine in machines:
         first = next(iter(machine.files.values()))["context"]
         text += f"## {first['machine']}\n\n"
-        for section in (automatic(machine), thesis(machine, published), stages(machine), bullet(machine),
+        for section in (automatic(machine), thesis(machine, published), rendering(machine, published),
+                        stages(machine), bullet(machine),
                         precisions(machine)):
             text += section
     return text.rstrip("\n") + "\n"

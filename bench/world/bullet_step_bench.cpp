@@ -1,4 +1,5 @@
-/// A step of Bullet in its parts: stock dispatcher against jfpx's, worlds that move identically.
+/// A step of Bullet in its parts: stock against jfpx's dispatcher, solver and world, which move
+/// identically.
 #include <jfpx/bullet/scene_world.hpp>
 
 #include "bench/world/samples.hpp"
@@ -9,7 +10,9 @@ namespace {
 
 using bullet::DispatcherKind;
 using bullet::SceneWorld;
+using bullet::SolverKind;
 using bullet::StageTimes;
+using bullet::WorldKind;
 
 struct Stage {
   const char* name;
@@ -38,7 +41,9 @@ constexpr Run kRuns[] = {
 void steps(benchmark::State& state, const Run& run) {
   Scene scene = scenes::make(run.scene, {.spheres = run.spheres, .seed = 1});
   scene.sleep.enabled = false;
-  SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock});
+  SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock,
+                           .solver = SolverKind::stock,
+                           .world = WorldKind::stock});
   SceneWorld ours(scene);
   for (int i = 0; i < run.settle; ++i) {
     stock.step();

@@ -1,6 +1,7 @@
 /// Stages of a native step: how they grow with the number of spheres, and what they allocate.
 #include <jfpx/world.hpp>
 
+#include "bench/world/floor.hpp"
 #include "bench/world/samples.hpp"
 #include "examples/scenes/scenes.hpp"
 
@@ -40,6 +41,11 @@ void stages(benchmark::State& state, Backend backend, const Run& run) {
   World world(scene, {.collider = {.backend = backend}});
   for (int n = 0; n < run.settle; ++n) world.step();
   std::vector<double> integrate, detect, resolve, contacts, allocated;
+  Work integrating, detecting, resolving;
+  const auto add = [](Work* sum, const Work& more) {
+    sum->bytes += more.bytes;
+    sum->operations += more.operations;
+  };
   StepReport report;
   for (auto _ : state) {
     const long before = allocations;
@@ -49,6 +55,9 @@ void stages(benchmark::State& state, Backend backend, const Run& run) {
     detect.push_back(report.detect_ms);
     resolve.push_back(report.resolve_ms);
     contacts.push_back(static_cast<double>(report.sphere_contacts));
+    add(&integrating, integrate_work(report.awake));
+    add(&detecting, detect_work(run.spheres, contacts.back()));
+    add(&resolving, resolve_work(report, report.awake));
     state.SetIterationTime(report.total_ms * 1e-3);
   }
   state.counters["spheres"] = run.spheres;
@@ -57,9 +66,13 @@ void stages(benchmark::State& state, Backend backend, const Run& run) {
   state.counters["detect_ms"] = median(detect);
   state.counters["resolve_ms"] = median(resolve);
   state.counters["allocations"] = median(allocated);
-  // What detection has to read and write at least, once each.
-  state.counters["detect_bytes"] =
-      run.spheres * sizeof(SphereInstance) + mean(contacts) * sizeof(SphereContact);
+  const auto count = [&](const std::string& stage, const Work& sum) {
+    state.counters[stage + "_bytes"] = sum.bytes / static_cast<double>(contacts.size());
+    state.counters[stage + "_operations"] = sum.operations / static_cast<double>(contacts.size());
+  };
+  count("integrate", integrating);
+  count("detect", detecting);
+  count("resolve", resolving);
   state.SetLabel(std::string(to_string(report.backend)) + ", " +
                  std::string(to_string(report.algorithm)));
 }
@@ -84,6 +97,10 @@ void register_all() {
 }  // namespace jfpx::inline JFPX_ABI::bench
 
 int main(int argc, char** argv) {
+  benchmark::AddCustomContext("copied_gb_a_second",
+                              std::to_string(jfpx::bench::copied_gb_a_second()));
+  benchmark::AddCustomContext("giga_operations_a_second",
+                              std::to_string(jfpx::bench::giga_operations_a_second()));
   jfpx::bench::register_all();
   return jfpx::bench::run_benchmarks(argc, argv);
 }

@@ -140,6 +140,22 @@ class Page(Folder):
              "iterations": 1000, "first_ms": 1, "median_ms": t, "contacts": 5}
             for backend, n, t in (("x86", 32, 0.5), ("x86", 448, 4), ("cuda", 32, 1), ("cuda", 448, 2))]
         self.write("results/box/thesis_float.json", thesis)
+        rendering = result()
+        rendering["context"]["pictures"] = "800 x 600 by a card"
+        rendering["benchmarks"] = [
+            {"name": f"rendering/{mode}/x86/32/iterations:1000/manual_time", "real_time": t, "time_unit": "ms",
+             "iterations": 1000, "first_ms": 2, "median_ms": t, "picture_ms": 7}
+            for mode, t in (("off", 0.5), ("on", 0.6))]
+        self.write("results/box/rendering_float.json", rendering)
+        stages = result()
+        stages["context"].update(copied_gb_a_second="2.0", giga_operations_a_second="4.0")
+        stages["benchmarks"] = [
+            {"name": f"stages/gas/x86/{n}/iterations:9/manual_time", "real_time": 1, "time_unit": "ms",
+             "contacts": 5, "allocations": 0, "label": "x86",
+             **{f"{stage}_{what}": value for stage in ("integrate", "detect", "resolve")
+                for what, value in (("ms", n / 1e3), ("bytes", 2000), ("operations", 40000))}}
+            for n in (100, 1000)]
+        self.write("results/box/stages_float.json", stages)
         self.write(f"results/{results.THESIS}", (ROOT / "bench/results" / results.THESIS).read_text())
         return self.folder / "results"
 
@@ -153,6 +169,13 @@ class Page(Folder):
         self.assertIn("`x_bench`, 2026-01-02", page)
         # 0.5 against 1 at 32, 4 against 2 at 448: ratios 1/2 and 2, so the geometric mean, 120.
         self.assertIn("from N = 120 here", page)
+        self.assertIn("800 x 600 by a card", page)
+        # Published at 32: 0.2199 (the file of 16) and 0.4747.
+        self.assertIn("| x86 | 32 | 0.500 | 0.500 | 2.00 | 0.600 | 0.600 | 2.00 | 1.20 | 7.00 | 0.220 (1) | 0.475 "
+                      "| 2.16 (1) |", page)
+        self.assertIn("| gas | x86 | 1.00 | 1.00 | 1.00 |", page, "time grows as N")
+        # 2 kB at 2 GB/s is 1 us, 40 thousand operations at 4 billion a second 10 us; 100 us were taken.
+        self.assertIn("| gas | x86 | 100 |" + " 2.00 | 40.0 | 10.0 |" * 3, page)
 
     def test_plots_are_drawn_and_repeat_to_the_byte(self):
         try:

@@ -1,0 +1,113 @@
+/// The thesis' figure 5.3: contact detection of a frame of boxes-and-balls while every frame is
+/// drawn, and while none is.
+#include <jfpx/error.hpp>
+
+#include "bench/world/samples.hpp"
+#include "examples/scenes/scenes.hpp"
+#include "examples/viewer/renderer.hpp"
+#include "examples/viewer/run.hpp"
+#include "examples/viewer/stage.hpp"
+#include "examples/viewer/timing.hpp"
+#include "examples/viewer/window.hpp"
+
+#include <memory>
+#include <optional>
+
+namespace jfpx::inline JFPX_ABI::bench {
+namespace {
+
+constexpr std::uint32_t kSizes[] = {2, 4, 8, 16, 32, 64, 128, 256, 448};
+constexpr int kFrames = 1000;
+
+/// A picture as large as the thesis' window, or a stamp where a processor has to draw it.
+class Screen {
+ public:
+  Screen() : canvas_(software() ? 160 : 800, software() ? 120 : 600) {
+    camera_.look_at({0, 10, 50}, {0, 10, 0});
+    camera_.fov_y = kPi / 4;
+  }
+
+  void draw(const view::Stage& stage, const view::Moment& before, const view::Moment& now) {
+    const view::Bounds bounds = view::bounds_of(stage.scene(), now.states);
+    const view::View view = camera_.view(bounds.centre, bounds.radius);
+    view::Drawing drawing(view.eye);
+    stage.draw(before, now, 1, view::Colouring::bodies, &drawing);
+    renderer_.draw(drawing, view, {0, 0, canvas_.width(), canvas_.height()}, canvas_.framebuffer());
+    glFinish();
+  }
+  std::string description() const {
+    return std::to_string(canvas_.width()) + " x " + std::to_string(canvas_.height()) + " by " +
+           window_.driver();
+  }
+
+ private:
+  bool software() const { return window_.driver().find("llvmpipe") != std::string::npos; }
+
+  view::Window window_ = view::Window::hidden();
+  view::Renderer renderer_{view::kLowQuality};
+  view::Canvas canvas_;
+  view::Camera camera_;
+};
+
+/// The first frame is reported apart: it makes buffers and, on a GPU, starts the device.
+void frames(benchmark::State& state, Backend backend, std::uint32_t spheres, Screen* screen) {
+  const Scene scene = scenes::make("boxes-and-balls", {.spheres = spheres, .seed = 1});
+  const auto run = view::make_run(scene, {.backend = backend});
+  const view::Stage stage(scene);
+  std::vector<double> detect_ms, picture_ms;
+  view::Moment before = run->moment();
+  const auto frame = [&] {
+    run->step();
+    view::Moment now = run->moment();
+    const double ms = now.times.detect;
+    if (screen != nullptr) {
+      view::Stopwatch watch;
+      screen->draw(stage, before, now);
+      picture_ms.push_back(watch.lap() * 1e3);
+    }
+    before = std::move(now);
+    return ms;
+  };
+  const double first_ms = frame();
+  for (auto _ : state) {
+    detect_ms.push_back(frame());
+    state.SetIterationTime(detect_ms.back() * 1e-3);
+  }
+  state.counters["spheres"] = spheres;
+  state.counters["first_ms"] = first_ms;
+  state.counters["median_ms"] = median(detect_ms);
+  if (screen != nullptr) state.counters["picture_ms"] = median(picture_ms);
+}
+
+void register_all(Screen* screen) {
+  for (const Backend backend : {Backend::x86, Backend::cuda}) {
+    if (backend == Backend::cuda && !cuda_is_usable()) continue;
+    for (const std::uint32_t spheres : kSizes) {
+      for (Screen* on : {static_cast<Screen*>(nullptr), screen}) {
+        const std::string name = std::string("rendering/") + (on != nullptr ? "on/" : "off/") +
+                                 std::string(to_string(backend)) + "/" + std::to_string(spheres);
+        benchmark::RegisterBenchmark(
+            name.c_str(), [=](benchmark::State& state) { frames(state, backend, spheres, on); })
+            ->UseManualTime()
+            ->Iterations(kFrames)
+            ->Unit(benchmark::kMillisecond);
+        if (screen == nullptr) break;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bench
+
+int main(int argc, char** argv) {
+  std::unique_ptr<jfpx::bench::Screen> screen;
+  try {
+    screen = std::make_unique<jfpx::bench::Screen>();
+    benchmark::AddCustomContext("pictures", screen->description());
+  } catch (const jfpx::BackendUnavailable& error) {
+    benchmark::AddCustomContext("pictures", std::string("none: ") + error.what());
+  }
+  jfpx::bench::register_all(screen.get());
+  return jfpx::bench::run_benchmarks(argc, argv);
+}
