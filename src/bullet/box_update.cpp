@@ -3,6 +3,8 @@
 
 #include "src/bullet/prefetch.hpp"
 
+#include <LinearMath/btQuickprof.h>
+
 #include <typeinfo>
 
 namespace jfpx::inline JFPX_ABI::bullet {
@@ -79,6 +81,7 @@ bool BoxUpdate::run(btCollisionWorld& world) {
   auto& cache = static_cast<btHashedOverlappingPairCache&>(pair_cache);
   if (tree.m_deferedcollide || cache.getOverlapFilterCallback() != nullptr) return false;
 
+  BT_PROFILE("updateAabbs");  // Bullet's own name, for those who profile
   OwnSearch search(tree);
   btCollisionObjectArray& objects = world.getCollisionObjectArray();
   for (int i = 0; i < objects.size(); ++i) {

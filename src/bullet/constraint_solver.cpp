@@ -494,4 +494,11 @@ void ConstraintSolver::set_minimum_batch(std::size_t manifolds) noexcept {
 const ConstraintSolverStats& ConstraintSolver::stats() const noexcept { return impl_->stats; }
 void ConstraintSolver::reset_stats() noexcept { impl_->stats = {}; }
 
+std::string_view to_string(SolverFallback fallback) noexcept {
+  constexpr std::string_view kTexts[kSolverFallbacks] = {
+      "small group", "solver mode", "row solver replaced", "class of a constraint", "not finite"};
+  const auto i = static_cast<std::size_t>(fallback);
+  return i < kSolverFallbacks ? kTexts[i] : "unknown";
+}
+
 }  // namespace jfpx::inline JFPX_ABI::bullet

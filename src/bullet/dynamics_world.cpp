@@ -120,7 +120,6 @@ void DynamicsWorld::integrateTransforms(btScalar dt) {
 }
 
 void DynamicsWorld::updateAabbs() {
-  BT_PROFILE("updateAabbs");
   if (is_small() || !impl_->boxes.run(*this)) btDiscreteDynamicsWorld::updateAabbs();
 }
 

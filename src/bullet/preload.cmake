@@ -2,16 +2,21 @@
 
 # The engines know the layout of Bullet's classes, so they serve the Bullet that they are compiled
 # against and no other: recognised by the name that the run-time linker knows it by.
+set(names "")
 foreach(precision IN ITEMS F32 F64)
-  set(libraries ${JFPX_BULLET_${precision}_LINK_LIBRARIES})
-  list(FILTER libraries INCLUDE REGEX "BulletCollision")
-  file(READ_SYMLINK "${libraries}" library)
-  get_filename_component(JFPX_BULLET_SONAME_${precision} "${library}" NAME)
+  foreach(part IN ITEMS Collision Dynamics)
+    set(libraries ${JFPX_BULLET_${precision}_LINK_LIBRARIES})
+    list(FILTER libraries INCLUDE REGEX "Bullet${part}")
+    file(READ_SYMLINK "${libraries}" library)
+    get_filename_component(library "${library}" NAME)
+    string(TOUPPER "${part}" part)
+    list(APPEND names JFPX_BULLET_${part}_${precision}="${library}")
+  endforeach()
 endforeach()
 
 foreach(suffix IN ITEMS "" "_f64")
   set(engine jfpx_bullet_engine${suffix})
-  add_library(${engine} MODULE preload_engine.cpp)
+  add_library(${engine} MODULE preload_engine.cpp preload_options.cpp preload_solver.cpp)
   _jfpx_configure(${engine} "${suffix}" "" "jfpx_bullet")
   target_link_options(${engine} PRIVATE LINKER:--exclude-libs,ALL)
 endforeach()
@@ -23,8 +28,7 @@ target_link_libraries(jfpx_bullet_preload PRIVATE jfpx_build_flags ${CMAKE_DL_LI
 target_compile_definitions(jfpx_bullet_preload PRIVATE
   JFPX_ENGINE="$<TARGET_FILE_NAME:jfpx_bullet_engine>"
   JFPX_ENGINE_F64="$<TARGET_FILE_NAME:jfpx_bullet_engine_f64>"
-  JFPX_BULLET_SONAME="${JFPX_BULLET_SONAME_F32}"
-  JFPX_BULLET_SONAME_F64="${JFPX_BULLET_SONAME_F64}")
+  ${names})
 # It must not bring a C++ library into programs that have none.
 target_link_options(jfpx_bullet_preload PRIVATE LINKER:--as-needed)
 set_target_properties(jfpx_bullet_preload PROPERTIES

@@ -2,11 +2,12 @@
 #include "src/bullet/preload_engine.hpp"
 
 #include "src/bullet/batch_engine.hpp"
+#include "src/bullet/preload_options.hpp"
+#include "src/bullet/preload_solver.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 
 #include <cstdio>
-#include <cstdlib>
 #include <mutex>
 #include <string>
 #include <string_view>
@@ -16,23 +17,16 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
-std::string_view setting(const char* name) {
-  const char* value = std::getenv(name);
-  return value == nullptr ? std::string_view{} : value;
-}
-
-/// From JFPX_PRELOAD_BACKEND, JFPX_PRELOAD_MINIMUM_BATCH and JFPX_PRELOAD_VERIFY. Values that mean
-/// nothing are as good as none: there is nobody to tell.
+/// From JFPX_PRELOAD_BACKEND, _MINIMUM_BATCH, _THREADS and _VERIFY.
 DispatcherOptions options_from_environment() {
   DispatcherOptions options;
-  const std::string_view backend = setting("JFPX_PRELOAD_BACKEND");
+  const std::string_view backend = preload_setting("JFPX_PRELOAD_BACKEND");
   if (backend == "x86") options.collider.backend = Backend::x86;
   if (backend == "cuda") options.collider.backend = Backend::cuda;
-  const std::string minimum(setting("JFPX_PRELOAD_MINIMUM_BATCH"));
-  char* end = nullptr;
-  const unsigned long long pairs = std::strtoull(minimum.c_str(), &end, 10);
-  if (!minimum.empty() && *end == '\0') options.minimum_batch = pairs;
-  const std::string_view verify = setting("JFPX_PRELOAD_VERIFY");
+  if (const auto pairs = preload_number("JFPX_PRELOAD_MINIMUM_BATCH"))
+    options.minimum_batch = *pairs;
+  options.collider.threads = preload_threads();
+  const std::string_view verify = preload_setting("JFPX_PRELOAD_VERIFY");
   options.verify = !verify.empty() && verify != "0";
   return options;
 }
@@ -161,6 +155,7 @@ JFPX_API void jfpx_preload_print_summary(const char* prefix) {
   if (!stats.failure.empty()) {
     std::fprintf(stderr, "%sthe collider failed: %s\n", prefix, stats.failure.c_str());
   }
+  print_solver_summary(prefix);
 }
 
 }  // extern "C"

@@ -1,4 +1,4 @@
-/// jfpx preload -- PROGRAM [ARGS]: runs an unmodified Bullet program with the jfpx dispatcher.
+/// jfpx preload -- PROGRAM [ARGS]: runs an unmodified Bullet program with parts of jfpx.
 #include <jfpx/error.hpp>
 #include <jfpx/sphere_collider.hpp>
 
@@ -20,7 +20,8 @@ namespace {
 struct PreloadOptions {
   std::vector<std::string> command;
   std::string backend = "auto";
-  std::string minimum_batch;
+  std::string minimum_batch, threads;
+  std::vector<std::string> parts;
   bool summary = false, verify = false;
 };
 
@@ -47,6 +48,12 @@ void set_environment(const PreloadOptions& options) {
   if (options.summary) setenv("JFPX_PRELOAD_SUMMARY", "1", 1);
   if (options.verify) setenv("JFPX_PRELOAD_VERIFY", "1", 1);
   if (options.backend != "auto") setenv("JFPX_PRELOAD_BACKEND", options.backend.c_str(), 1);
+  if (!options.threads.empty()) setenv("JFPX_PRELOAD_THREADS", options.threads.c_str(), 1);
+  if (!options.parts.empty()) {
+    std::string list;
+    for (const std::string& part : options.parts) list += (list.empty() ? "" : ",") + part;
+    setenv("JFPX_PRELOAD_PARTS", list.c_str(), 1);
+  }
   if (!options.minimum_batch.empty()) {
     setenv("JFPX_PRELOAD_MINIMUM_BATCH", options.minimum_batch.c_str(), 1);
   }
@@ -68,7 +75,9 @@ void set_environment(const PreloadOptions& options) {
 
 void add_preload_command(CLI::App& app, int&) {
   CLI::App* command = app.add_subcommand(
-      "preload", "Run an unmodified, dynamically linked Bullet program with the jfpx dispatcher");
+      "preload",
+      "Run an unmodified, dynamically linked Bullet program with jfpx's dispatcher, solver and "
+      "update of boxes");
   auto options = std::make_shared<PreloadOptions>();
   command->add_option("command", options->command, "The program and its arguments")
       ->required()
@@ -80,8 +89,16 @@ void add_preload_command(CLI::App& app, int&) {
       ->check(CLI::IsMember({"auto", "x86", "cuda"}))
       ->capture_default_str();
   command
+      ->add_option("--parts", options->parts,
+                   "Which of dispatcher, solver and world (its update of boxes) [all]")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"dispatcher", "solver", "world"}));
+  command->add_option("--threads", options->threads, "Threads on x86, 0 = one per core [1]")
+      ->check(CLI::Range(0u, 256u));
+  command
       ->add_option("--minimum-batch", options->minimum_batch,
-                   "Overlapping pairs below which a dispatch is left to Bullet")
+                   "Overlapping pairs below which a dispatch, and manifolds below which a group of "
+                   "the solver, is left to Bullet")
       ->check(whole_number());
   command->footer(
       "The program's own exit status is returned; 2 if it can't be started. Programs that link\n"

@@ -44,6 +44,31 @@ TEST_F(Preload, KeepsTheHashAndRunsBatches) {
   EXPECT_THAT(ours.output, ContainsRegex(std::string(kPrecision) + ": 60 dispatches, 60 batches"));
   EXPECT_THAT(ours.output, ContainsRegex("[1-9][0-9]* touching, [1-9][0-9]* written"));
   EXPECT_THAT(ours.output, ContainsRegex("verified: [1-9][0-9]* sphere pairs, 0 mismatches"));
+  EXPECT_THAT(ours.output, HasSubstr(": world: 60 updates of all boxes\n"));
+  // In three of the sixty steps rows are in random order, which is left to Bullet.
+  EXPECT_THAT(ours.output,
+              ContainsRegex(": solver: 114 groups, [1-9][0-9]* contacts, 57 joints\n"));
+  EXPECT_THAT(ours.output, HasSubstr(": groups left to Bullet: 6 (solver mode)\n"));
+}
+
+TEST_F(Preload, GivesThePartsThatAreAskedFor) {
+  const std::string stock = alone("300").output;
+  const auto with = [&](const std::string& options) {
+    const ProcessResult ours =
+        jfpx_command("preload --summary " + options + " -- " JFPX_STOCK_PROGRAM " 300 2>&1");
+    EXPECT_THAT(ours.output, HasSubstr(stock)) << options;
+    return ours.output;
+  };
+  const std::string solver = with("--parts solver --threads 3 --minimum-batch 0");
+  EXPECT_THAT(solver, HasSubstr(": solver: 114 groups"));
+  EXPECT_THAT(solver, Not(HasSubstr("updates of all boxes")));
+  EXPECT_THAT(solver, HasSubstr(": 0 dispatches"));
+  const std::string others = with("--parts world,dispatcher --threads 0 --minimum-batch 0");
+  EXPECT_THAT(others, Not(HasSubstr(": solver: ")));
+  EXPECT_THAT(others, HasSubstr(": world: 60 updates of all boxes"));
+  EXPECT_THAT(others, HasSubstr(": 60 dispatches, 60 batches"));
+  EXPECT_EQ(jfpx_command("preload --parts islands -- echo 2>&1").status, 2);
+  EXPECT_EQ(jfpx_command("preload --threads 257 -- echo 2>&1").status, 2);
 }
 
 TEST_F(Preload, FindsThePrecisionOfTheProgramByItself) {
@@ -84,7 +109,7 @@ TEST_F(Preload, LeavesProgramsWithoutBulletUntouched) {
 
 TEST_F(Preload, SaysThatBulletWasNotUsed) {
   const ProcessResult result = jfpx_command("preload --summary -- " JFPX_STOCK_PROGRAM " 2>&1");
-  EXPECT_THAT(result.output, HasSubstr(": Bullet's dispatcher was not used\n"));
+  EXPECT_THAT(result.output, HasSubstr(": Bullet was not used\n"));
 }
 
 TEST_F(Preload, KeepsWhatWasPreloadedBefore) {

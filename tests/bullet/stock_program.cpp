@@ -6,16 +6,28 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <memory>
 #include <thread>
 #include <vector>
 
 namespace {
 
-std::uint64_t hash_of(const btRigidBody& body, std::uint64_t hash) {
-  unsigned char bytes[3 * sizeof(btScalar)];
-  std::memcpy(bytes, body.getWorldTransform().getOrigin().m_floats, sizeof bytes);
+template <class Value>
+std::uint64_t hash_of(const Value& value, std::uint64_t hash) {
+  unsigned char bytes[sizeof(Value)];
+  std::memcpy(bytes, &value, sizeof bytes);
   for (const unsigned char byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;  // FNV-1a
   return hash;
+}
+std::uint64_t hash_of(const btRigidBody& body, std::uint64_t hash) {
+  for (int i = 0; i < 3; ++i) hash = hash_of(body.getWorldTransform().getOrigin()[i], hash);
+  return hash;
+}
+/// What a solver says of itself and remembers.
+std::uint64_t hash_of(const btSequentialImpulseConstraintSolver& solver, std::uint64_t hash) {
+  const btSolverAnalyticsData& data = solver.m_analyticsData;
+  hash = hash_of(data.m_numSolverCalls, hash_of(data.m_numIterationsUsed, hash));
+  return hash_of(solver.getRandSeed(), hash_of(data.m_remainingLeastSquaresResidual, hash));
 }
 
 std::uint64_t drop(int spheres) {
@@ -38,8 +50,21 @@ std::uint64_t drop(int spheres) {
     bodies.back()->setWorldTransform(pose);
   }
   for (btRigidBody* body : bodies) world.addRigidBody(body);
-  for (int step = 0; step < 60; ++step) world.stepSimulation(btScalar(1) / 60, 0);
+  std::unique_ptr<btPoint2PointConstraint> joint;
+  if (spheres > 1) {
+    joint = std::make_unique<btPoint2PointConstraint>(
+        *bodies[1], *bodies[2], btVector3(btScalar(0.5), 0, 0), btVector3(btScalar(-0.5), 0, 0));
+    world.addConstraint(joint.get());
+  }
   std::uint64_t hash = 0xcbf29ce484222325u;
+  for (int step = 0; step < 60; ++step) {
+    // In some steps rows are solved in a random order.
+    const int mode = world.getSolverInfo().m_solverMode & ~SOLVER_RANDMIZE_ORDER;
+    world.getSolverInfo().m_solverMode = step % 20 == 7 ? mode | SOLVER_RANDMIZE_ORDER : mode;
+    world.stepSimulation(btScalar(1) / 60, 0);
+    hash = hash_of(solver, hash);
+  }
+  if (joint != nullptr) world.removeConstraint(joint.get());
   for (btRigidBody* body : bodies) {
     hash = hash_of(*body, hash);
     world.removeRigidBody(body);

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <string_view>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
@@ -27,6 +28,9 @@ enum class SolverFallback : std::uint8_t {
   not_finite,   ///< something left the finite numbers: done again by Bullet, for its NaNs
 };
 inline constexpr std::size_t kSolverFallbacks = 5;
+
+/// A short text for a table, for example "small group".
+JFPX_API std::string_view to_string(SolverFallback fallback) noexcept;
 
 struct ConstraintSolverStats {
   std::uint64_t groups = 0;                                 ///< solved by jfpx
