@@ -14,10 +14,15 @@ namespace jfpx::inline JFPX_ABI::rows {
 // (btSequentialImpulseConstraintSolver.cpp), each rounded once, because bits are compared. Also
 // where it looks redundant: 0 + x turns -0 into 0, and x - 0 * y is not always x.
 //
-// `S` says what a number is: S::Vec holds S::kLanes of them, S::Mask one truth each.
+// `S` says what a number is: S::Vec holds S::kLanes of them, S::Mask one truth each. It also finds
+// the bodies that S::Id names.
 
-// Vectors passed through memory would cost more than the arithmetic.
+// For functions of rows: vectors passed through memory would cost more than the arithmetic.
+#if defined(__CUDACC__)
+#define JFPX_ROW __host__ __device__ __forceinline__
+#else
 #define JFPX_ROW [[gnu::always_inline]] inline
+#endif
 
 template <class S>
 struct Vec3Of {
@@ -91,7 +96,7 @@ struct BodyOf {
 };
 
 template <class S>
-JFPX_ROW BodyOf<S> gather_body(const Real* bodies, const std::int32_t* ids) {
+JFPX_ROW BodyOf<S> gather_body(const Real* bodies, const typename S::Id* ids) {
   typename S::Vec f[kBodyFields];
   for (int k = 0; k < kBodyFields; k += 4) S::gather4(bodies + k, ids, kBodyFields, f + k);
   BodyOf<S> b;
@@ -129,7 +134,7 @@ JFPX_ROW void plane_space(const Vec3Of<S>& n, Vec3Of<S>* p, Vec3Of<S>* q) {
 /// writes one, which the returned mask tells.
 template <class S>
 JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real* in,
-                                         const Real* bodies, const std::int32_t* ids, Real* row,
+                                         const Real* bodies, const typename S::Id* ids, Real* row,
                                          Real* friction, Real* second) {
   constexpr int kLanes = S::kLanes;
   using V3 = Vec3Of<S>;
@@ -197,10 +202,17 @@ JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real
   return S::negate_mask(slides);
 }
 
+/// The other direction of friction, where Bullet has none yet.
+template <class S>
+JFPX_ROW Vec3Of<S> across(const Vec3Of<S>& direction, const Vec3Of<S>& normal) {
+  const Vec3Of<S> v = cross(direction, normal);
+  return v * (S::set(1) / S::square_root(dot(v, v)));
+}
+
 /// The second half: the friction row along the axis that is in it.
 template <class S>
 JFPX_ROW void set_up_friction(const RowSettings& settings, const Real* in, const Real* bodies,
-                              const std::int32_t* ids, Real* row) {
+                              const typename S::Id* ids, Real* row) {
   constexpr int kLanes = S::kLanes;
   using V3 = Vec3Of<S>;
   const auto field = [&](int i) { return S::load(in + i * kLanes); };
@@ -239,13 +251,13 @@ template <class S, bool kFactors>
 struct Movers {
   using V3 = Vec3Of<S>;
   static constexpr int kLanes = S::kLanes;
-  const std::int32_t* ids;
+  const typename S::Id* ids;
   Real* velocities;
   const Real* factors;
   V3 linear_a, angular_a, linear_b, angular_b;
   typename S::Vec mass_a, mass_b, pad_a, pad_b;
 
-  JFPX_ROW Movers(const std::int32_t* i, Real* v, const Real* f)
+  JFPX_ROW Movers(const typename S::Id* i, Real* v, const Real* f)
       : ids(i), velocities(v), factors(f) {
     typename S::Vec u[4];
     S::gather4(v, ids, kVelocityFields, u);
@@ -288,7 +300,7 @@ struct Movers {
   }
 
  private:
-  JFPX_ROW void move(const std::int32_t* who, const V3& axis, const V3& response,
+  JFPX_ROW void move(const typename S::Id* who, const V3& axis, const V3& response,
                      typename S::Vec impulse, const V3& linear, const V3& angular, V3* new_linear,
                      V3* new_angular) const {
     typename S::Vec m[4], l[4], t[4];
@@ -300,7 +312,7 @@ struct Movers {
     *new_linear = linear + axis * masses * impulse * linear_factor;
     *new_angular = angular + response * (angular_factor * impulse);
   }
-  JFPX_ROW void put(const std::int32_t* who, const V3& linear, typename S::Vec mass,
+  JFPX_ROW void put(const typename S::Id* who, const V3& linear, typename S::Vec mass,
                     const V3& angular, typename S::Vec pad) const {
     const typename S::Vec u[4] = {linear.x, linear.y, linear.z, mass};
     const typename S::Vec w[4] = {angular.x, angular.y, angular.z, pad};
@@ -322,11 +334,13 @@ struct Residual {
   }
 };
 
+// `Found` below is a Residual<S>, or hands on to one later.
+
 /// One contact row, or its push against penetration (the split impulse), which differ in the fields
 /// that they use and in the velocities.
-template <class S, bool kFactors, bool kPush>
-JFPX_ROW void solve_contact(const std::int32_t* ids, Real* velocities, const Real* factors,
-                            Real* row, Residual<S>* residual) {
+template <class S, bool kFactors, bool kPush, class Found>
+JFPX_ROW void solve_contact(const typename S::Id* ids, Real* velocities, const Real* factors,
+                            Real* row, Found* residual) {
   constexpr int kLanes = S::kLanes;
   const auto zero = S::set(0);
   Movers<S, kFactors> movers(ids, velocities, factors);
@@ -349,10 +363,10 @@ JFPX_ROW void solve_contact(const std::int32_t* ids, Real* velocities, const Rea
 }
 
 /// A row whose impulse stays within `upper` either way, in the lanes that are active.
-template <class S, bool kFactors>
-JFPX_ROW void solve_limited(const std::int32_t* ids, Real* velocities, const Real* factors,
+template <class S, bool kFactors, class Found>
+JFPX_ROW void solve_limited(const typename S::Id* ids, Real* velocities, const Real* factors,
                             Real* row, const Vec3Of<S>& axis_a, const Vec3Of<S>& axis_b,
-                            typename S::Vec upper, typename S::Mask active, Residual<S>* residual) {
+                            typename S::Vec upper, typename S::Mask active, Found* residual) {
   constexpr int kLanes = S::kLanes;
   Movers<S, kFactors> movers(ids, velocities, factors);
   const auto lower = S::negate(upper);
@@ -371,9 +385,9 @@ JFPX_ROW void solve_limited(const std::int32_t* ids, Real* velocities, const Rea
 }
 
 /// One friction row, limited by the impulse of its contact.
-template <class S, bool kFactors>
-JFPX_ROW void solve_friction(const std::int32_t* ids, Real* velocities, const Real* factors,
-                             const Real* contact, Real* row, Residual<S>* residual) {
+template <class S, bool kFactors, class Found>
+JFPX_ROW void solve_friction(const typename S::Id* ids, Real* velocities, const Real* factors,
+                             const Real* contact, Real* row, Found* residual) {
   constexpr int kLanes = S::kLanes;
   const auto pressure = S::load(contact + kRowImpulse * kLanes);
   const auto active = S::less(S::set(0), pressure);
@@ -385,9 +399,9 @@ JFPX_ROW void solve_friction(const std::int32_t* ids, Real* velocities, const Re
 }
 
 /// One row against rolling or spinning: an impulse that only turns, limited by that of its contact.
-template <class S, bool kFactors>
-JFPX_ROW void solve_torsion(const std::int32_t* ids, Real* velocities, const Real* factors,
-                            const Real* contact, Real* row, Residual<S>* residual) {
+template <class S, bool kFactors, class Found>
+JFPX_ROW void solve_torsion(const typename S::Id* ids, Real* velocities, const Real* factors,
+                            const Real* contact, Real* row, Found* residual) {
   constexpr int kLanes = S::kLanes;
   const auto zero = S::set(0);
   const auto pressure = S::load(contact + kRowImpulse * kLanes);
@@ -405,7 +419,7 @@ JFPX_ROW void solve_torsion(const std::int32_t* ids, Real* velocities, const Rea
 
 /// Gives the bodies the impulses that the rows start with.
 template <class S, bool kFactors>
-JFPX_ROW void warm_start(const std::int32_t* ids, Real* velocities, const Real* factors,
+JFPX_ROW void warm_start(const typename S::Id* ids, Real* velocities, const Real* factors,
                          const Real* row) {
   constexpr int kLanes = S::kLanes;
   Movers<S, kFactors> movers(ids, velocities, factors);
@@ -413,7 +427,5 @@ JFPX_ROW void warm_start(const std::int32_t* ids, Real* velocities, const Real* 
   movers.push(S::load(row + kRowImpulse * kLanes), keep<S>(S::is_real(ids), n),
               keep<S>(S::is_real(ids + kLanes), -n), row, S::always());
 }
-
-#undef JFPX_ROW
 
 }  // namespace jfpx::inline JFPX_ABI::rows

@@ -50,6 +50,11 @@ inline constexpr int kBodyFields = 32;     ///< see gather_body()
 inline constexpr int kVelocityFields = 8;  ///< linear gained, inverse mass; angular gained, unused
 inline constexpr int kFactorFields = 12;   ///< inverse masses; linear; angular factors; each padded
 
+/// The bodies of a contact.
+struct RowPair {
+  std::int32_t a, b;
+};
+
 /// What a step says about all of its rows.
 struct RowSettings {
   Real dt, inverse_dt;
@@ -63,6 +68,18 @@ struct RowSettings {
   bool split;
   bool warm_start;
   bool friction_follows_velocity;
+};
+
+/// Rows against rolling and spinning of a contact: around the normal, and around two axes across
+/// it.
+inline constexpr std::uint32_t kTorsions = 3;
+
+/// What became of a group of rows.
+struct RowSweepReport {
+  int iterations = 0;        ///< sweeps done
+  Real residual = 0;         ///< the largest squared one of the last sweep
+  std::uint64_t pushed = 0;  ///< rows solved against penetration, over all sweeps
+  bool broken = false;       ///< something left the finite numbers: the result is worth nothing
 };
 
 }  // namespace jfpx::inline JFPX_ABI::rows

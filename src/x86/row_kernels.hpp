@@ -20,9 +20,7 @@ struct RowArrays {
   Real* torsions;                       ///< kTorsions of them for each of those
 };
 
-/// Rows against rolling and spinning of a contact: around the normal, and around two axes across
-/// it.
-inline constexpr std::uint32_t kTorsions = 3;
+using rows::kTorsions;
 
 struct RowResidual {
   Real largest = 0;     ///< squared

@@ -17,6 +17,7 @@ struct Simd {
   static constexpr int kLanes = 4;
   using Vec = __m256d;
   using Mask = __m256d;
+  using Id = std::int32_t;
   static Vec set(Real v) { return _mm256_set1_pd(v); }
   static Vec load(const Real* p) { return _mm256_loadu_pd(p); }
   static void store(Real* p, Vec v) { _mm256_storeu_pd(p, v); }
@@ -75,6 +76,7 @@ struct Simd {
   static constexpr int kLanes = 8;
   using Vec = __m256;
   using Mask = __m256;
+  using Id = std::int32_t;
   static Vec set(Real v) { return _mm256_set1_ps(v); }
   static Vec load(const Real* p) { return _mm256_loadu_ps(p); }
   static void store(Real* p, Vec v) { _mm256_storeu_ps(p, v); }

@@ -14,10 +14,8 @@
 
 namespace jfpx::inline JFPX_ABI::x86 {
 
-/// The bodies of a contact: ids, complemented for bodies that no row moves.
-struct RowPair {
-  std::int32_t a, b;
-};
+using rows::RowPair;
+using rows::RowSweepReport;
 
 /// Other rows, which are solved one after the other at the start of each sweep.
 class SerialRows {
@@ -38,13 +36,6 @@ struct RowSweepSettings {
   bool push = true;           ///< the sweeps against penetration too
 };
 
-struct RowSweepReport {
-  int iterations = 0;        ///< sweeps done
-  Real residual = 0;         ///< the largest squared one of the last sweep
-  std::uint64_t pushed = 0;  ///< rows solved against penetration, over all sweeps
-  bool broken = false;       ///< something left the finite numbers: the result is worth nothing
-};
-
 /// Owns its buffers, which only grow. To be used in the order of its functions; one thread at a
 /// time.
 class JFPX_API RowSolver {
@@ -57,6 +48,7 @@ class JFPX_API RowSolver {
 
   /// Room for bodies [0, count); body 0 is set to Bullet's fixed one, the others must be filled.
   void resize_bodies(std::size_t count);
+  std::size_t bodies() const noexcept { return body_count_; }
   Real* body(std::size_t i) { return bodies_.data() + i * rows::kBodyFields; }
   Real* velocity(std::size_t i) { return velocities_.data() + i * rows::kVelocityFields; }
   Real* push(std::size_t i) { return pushes_.data() + i * rows::kVelocityFields; }
@@ -66,6 +58,7 @@ class JFPX_API RowSolver {
   /// @param directions of friction: 1 or 2
   void schedule(std::span<const RowPair> pairs, std::uint32_t directions);
   std::uint32_t blocks() const noexcept { return blocks_; }
+  std::uint32_t levels() const noexcept { return levels_; }
   /// Which contact is in a lane; kNoContact in lanes that are left over.
   static constexpr std::uint32_t kNoContact = UINT32_MAX;
   const std::uint32_t* contacts_of(std::uint32_t block) const {
