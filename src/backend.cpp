@@ -5,6 +5,7 @@
 #include "src/backend_table.hpp"
 #include "src/x86/sphere_collider_x86.hpp"
 #if JFPX_HAS_CUDA
+#include "src/cuda/group_solver_cuda.hpp"
 #include "src/cuda/probe_cuda.hpp"
 #include "src/cuda/sphere_collider_cuda.hpp"
 #endif
@@ -17,6 +18,9 @@ BackendStatus probe_cuda() { return cuda::probe(); }
 std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOptions& options) {
   return cuda::make_sphere_collider(options);
 }
+std::unique_ptr<GroupSolver> make_cuda_group_solver(int device) {
+  return cuda::make_group_solver(device);
+}
 #else
 BackendStatus probe_cuda() {
   return {.backend = Backend::cuda, .device = {}, .reason = "built without CUDA"};
@@ -24,11 +28,15 @@ BackendStatus probe_cuda() {
 std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOptions&) {
   throw BackendUnavailable("cuda: built without CUDA");
 }
+std::unique_ptr<GroupSolver> make_cuda_group_solver(int) {
+  throw BackendUnavailable("cuda: built without CUDA");
+}
 #endif
 
 constexpr BackendRow kRows[] = {
-    {Backend::x86, true, x86::probe, x86::make_sphere_collider},
-    {Backend::cuda, JFPX_HAS_CUDA != 0, probe_cuda, make_cuda_sphere_collider},
+    {Backend::x86, true, x86::probe, x86::make_sphere_collider, nullptr},
+    {Backend::cuda, JFPX_HAS_CUDA != 0, probe_cuda, make_cuda_sphere_collider,
+     make_cuda_group_solver},
 };
 
 }  // namespace

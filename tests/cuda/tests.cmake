@@ -12,6 +12,7 @@ jfpx_add_test(cuda_test
     cuda/cuda_test.cpp
     cuda/cuda_fault_test.cpp
     cuda/cuda_huge_test.cpp
+    cuda/group_solver_test.cpp
     support/sphere_fixtures.cpp
   LINK jfpx_cuda CUDA::cudart_static)
 jfpx_add_test(cuda_pair_tests_test
