@@ -14,7 +14,7 @@ namespace jfpx::inline JFPX_ABI {
 /// model's word, so that one which disappoints is left for one that may be better. What the model
 /// or the last measurements hold to be at most twice as slow is tried from time to time, for at
 /// most some hundredths of the time.
-class CostChooser {
+class JFPX_API CostChooser {
  public:
   struct Way {
     Backend backend;

@@ -2,9 +2,13 @@
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/error.hpp>
 
+#include "src/backend_table.hpp"
 #include "src/bullet/contact_scan.hpp"
+#include "src/bullet/device_groups.hpp"
 #include "src/bullet/joint_rows.hpp"
+#include "src/bullet/prefetch.hpp"
 #include "src/bullet/row_inputs.hpp"
+#include "src/bullet/torsion_rows.hpp"
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <LinearMath/btQuickprof.h>
@@ -33,11 +37,18 @@ unsigned checked_threads(unsigned threads) {
   return threads;
 }
 
+GroupSolverMaker maker_of_devices(int device) {
+  const BackendRow& row = backend_row(Backend::cuda);
+  if (!row.compiled) return nullptr;
+  return [make = row.make_group_solver, device] { return make(device); };
+}
+
 }  // namespace
 
 struct ConstraintSolver::Impl {
   ConstraintSolver& self;
   x86::RowSolver solver;
+  DeviceGroups device;
   std::size_t minimum_batch;
   ConstraintSolverStats stats;
   ContactScan scan;
@@ -51,10 +62,12 @@ struct ConstraintSolver::Impl {
   std::vector<LateBody> joint_late;     ///< bodies that only a joint has brought in
   const btContactSolverInfo* info = nullptr;
   rows::RowSettings settings{};
+  bool on_device = false;
 
-  Impl(ConstraintSolver& owner, const ConstraintSolverOptions& options)
+  Impl(ConstraintSolver& owner, const ConstraintSolverOptions& options, GroupSolverMaker make)
       : self(owner),
         solver(checked_threads(options.threads), options.simd),
+        device(options.backend, std::move(make), solver.pool().threads()),
         minimum_batch(options.minimum_batch) {}
 
   std::optional<SolverFallback> obstacle(int manifold_count) const {
@@ -67,10 +80,7 @@ struct ConstraintSolver::Impl {
             self.getScalarConstraintRowSolverLowerLimit()) {
       return SolverFallback::row_solver;
     }
-    if (!std::all_of(joints.begin(), joints.end(),
-                     [](const btTypedConstraint* joint) { return is_known_joint(*joint); })) {
-      return SolverFallback::constraints;
-    }
+    if (!are_known_joints(joints)) return SolverFallback::constraints;
     return std::nullopt;
   }
 
@@ -78,7 +88,7 @@ struct ConstraintSolver::Impl {
   std::optional<SolverFallback> solve(std::span<btPersistentManifold* const> manifolds) {
     BT_PROFILE("solveGroup");  // here and below: Bullet's own names, for those who profile
     set_up(manifolds);
-    const x86::RowSweepReport report = sweep();
+    const rows::RowSweepReport report = solve_rows();
     if (report.broken) {
       forget_late_bodies();
       return SolverFallback::not_finite;
@@ -86,7 +96,9 @@ struct ConstraintSolver::Impl {
     gNumSplitImpulseRecoveries += static_cast<int>(report.pushed);
     analyse(report, static_cast<int>(manifolds.size()));
     write_back();
+    device.finished(on_device ? 0 : solver.levels());
     ++stats.groups;
+    if (on_device) ++stats.on_device;
     stats.contacts += scan.contacts().size();
     stats.joints += joints.size();
     stats.sweeps += static_cast<std::uint64_t>(report.iterations);
@@ -103,6 +115,37 @@ struct ConstraintSolver::Impl {
       scan.run(solver.pool(), manifolds, marks);
       set_up_late_bodies(manifolds);
     }
+    if (!scan.any_rolling()) return;
+    // Bullet's function for rows against rolling wants a solver body for the fixed body too.
+    btSolverBody& fixed = self.m_tmpSolverBodyPool.expandNonInitializing();
+    self.initSolverBody(&fixed, nullptr, settings.dt);
+  }
+
+  rows::RowSweepReport solve_rows() {
+    on_device = false;
+    if (joints.empty() && device.choose(scan, *info)) {
+      const auto report = device.solve(device_group());
+      stats.device_failure = device.failure();
+      on_device = report.has_value();
+      if (on_device) return *report;
+    }
+    set_up_rows();
+    return sweep();
+  }
+  DeviceGroup device_group() {
+    return {.host = solver,
+            .scan = scan,
+            .info = *info,
+            .settings = settings,
+            .bodies = solver.bodies(),
+            .directions = directions(),
+            .factors = factors,
+            .make_torsions = [this](const ContactRef& contact, Real* to) {
+              set_up_torsion(contact, to, 1);
+            }};
+  }
+  void set_up_rows() {
+    BT_PROFILE("solveGroupCacheFriendlySetup");
     {
       BT_PROFILE("schedule contacts");
       solver.schedule(scan.pairs(), directions());
@@ -115,7 +158,7 @@ struct ConstraintSolver::Impl {
     return (info->m_solverMode & SOLVER_USE_2_FRICTION_DIRECTIONS) != 0 ? 2 : 1;
   }
 
-  x86::RowSweepReport sweep() {
+  rows::RowSweepReport sweep() {
     BT_PROFILE("solveGroupCacheFriendlyIterations");
     btConstraintArray& rows = self.m_tmpSolverNonContactConstraintPool;
     const auto row_count = static_cast<std::size_t>(joints.empty() ? 0 : rows.size());
@@ -148,16 +191,10 @@ struct ConstraintSolver::Impl {
     solver.pool().run(chunks, [&](std::size_t chunk) {
       const std::size_t last = std::min(count, (chunk + 1) * kBodiesAChunk);
       for (std::size_t i = chunk * kBodiesAChunk; i < last; ++i) {
-        if (i + 8 < last) prefetch(bodies[i + 8]);
+        if (i + 8 < last) prefetch_bytes(bodies[i + 8], sizeof(btRigidBody));
         set_up_body(i, bodies[i]);
       }
     });
-  }
-  static void prefetch(const btCollisionObject* object) {
-    const char* at = reinterpret_cast<const char*>(object);
-    for (std::size_t line = 0; line < sizeof(btRigidBody); line += 64) {
-      __builtin_prefetch(at + line);
-    }
   }
 
   /// As Bullet's convertBodies(). A body that it would not give a solver body keeps its place, as
@@ -263,10 +300,7 @@ struct ConstraintSolver::Impl {
     for (std::size_t lane = 0; lane < solver.lanes(); ++lane) {
       const std::uint32_t contact = solver.contacts_of(block)[lane];
       if (contact == x86::RowSolver::kNoContact) return;
-      const char* at = reinterpret_cast<const char*>(&scan.contacts()[contact].get());
-      for (std::size_t line = 0; line < sizeof(btManifoldPoint); line += 64) {
-        __builtin_prefetch(at + line);
-      }
+      prefetch_bytes(&scan.contacts()[contact].get(), sizeof(btManifoldPoint));
     }
   }
 
@@ -307,7 +341,8 @@ struct ConstraintSolver::Impl {
       }
     }
     if (contact.anisotropic) {
-      turn(contact, &point.m_lateralFrictionDir1, btCollisionObject::CF_ANISOTROPIC_FRICTION);
+      turn_by_anisotropy(contact, &point.m_lateralFrictionDir1,
+                         btCollisionObject::CF_ANISOTROPIC_FRICTION);
       put_lane(axis, lanes, point.m_lateralFrictionDir1);
     }
     if (directions() == 1) return;
@@ -316,7 +351,8 @@ struct ConstraintSolver::Impl {
       point.m_lateralFrictionDir2.normalize();
     }
     if (contact.anisotropic) {
-      turn(contact, &point.m_lateralFrictionDir2, btCollisionObject::CF_ANISOTROPIC_FRICTION);
+      turn_by_anisotropy(contact, &point.m_lateralFrictionDir2,
+                         btCollisionObject::CF_ANISOTROPIC_FRICTION);
     }
     put_lane(solver.friction_rows(block, 1) + lane, lanes, point.m_lateralFrictionDir2);
     if (second != nullptr && !settings.friction_follows_velocity) {
@@ -326,15 +362,6 @@ struct ConstraintSolver::Impl {
   static void put_lane(Real* to, std::size_t lanes, const btVector3& v) {
     for (std::size_t i = 0; i < 3; ++i) to[i * lanes] = v.m_floats[i];
   }
-  /// Friction that depends on the direction, which is a matter for Bullet.
-  static void turn(const ContactRef& contact, btVector3* axis, int mode) {
-    for (const btCollisionObject* object :
-         {contact.manifold->getBody0(), contact.manifold->getBody1()}) {
-      applyAnisotropicFriction(const_cast<btCollisionObject*>(object), *axis, mode);
-    }
-  }
-
-  /// Rows against rolling and spinning: seldom many, so that Bullet's own function sets them up.
   void set_up_torsions() {
     BT_PROFILE("set up torsions");
     const auto contact_in = [&](std::uint32_t block, std::size_t lane) -> const ContactRef* {
@@ -348,9 +375,6 @@ struct ConstraintSolver::Impl {
       }
       return false;
     });
-    // Bullet's function wants a solver body for the fixed body too.
-    btSolverBody& fixed = self.m_tmpSolverBodyPool.expandNonInitializing();
-    self.initSolverBody(&fixed, nullptr, settings.dt);
     solver.pool().run(solver.torsion_blocks().size(), [&](std::size_t k) {
       const std::uint32_t block = solver.torsion_blocks()[k];
       for (std::uint32_t t = 0; t < x86::kTorsions; ++t) {
@@ -358,49 +382,18 @@ struct ConstraintSolver::Impl {
       }
       for (std::size_t lane = 0; lane < solver.lanes(); ++lane) {
         const ContactRef* contact = contact_in(block, lane);
-        if (contact != nullptr && contact->rolling) set_up_torsion(*contact, k, lane);
+        if (contact != nullptr && contact->rolling) {
+          set_up_torsion(*contact, solver.torsion_rows(k, 0) + lane, solver.lanes());
+        }
       }
     });
   }
-  void set_up_torsion(const ContactRef& contact, std::size_t k, std::size_t lane) {
-    const btManifoldPoint& point = contact.get();
-    const btVector3& normal = point.m_normalWorldOnB;
-    put_torsion(contact, normal, point.m_combinedSpinningFriction, solver.torsion_rows(k, 0), lane);
-    btVector3 axes[2];
-    btPlaneSpace1(normal, axes[0], axes[1]);
-    for (std::uint32_t i = 0; i < 2; ++i) {
-      axes[i].normalize();
-      turn(contact, &axes[i], btCollisionObject::CF_ANISOTROPIC_ROLLING_FRICTION);
-      if (axes[i].length() > 0.001) {
-        put_torsion(contact, axes[i], point.m_combinedRollingFriction,
-                    solver.torsion_rows(k, i + 1), lane);
-      }
-    }
-  }
-  void put_torsion(const ContactRef& contact, const btVector3& axis, btScalar strength, Real* to,
-                   std::size_t lane) {
-    const std::size_t lanes = solver.lanes();
-    const int fixed = self.m_tmpSolverBodyPool.size() - 1;
-    const auto body_of = [&](const btCollisionObject* object) {
-      return object->getCompanionId() >= 0 ? object->getCompanionId() : fixed;
-    };
-    const btVector3 unused_arm(0, 0, 0);
-    btSolverConstraint row;
-    self.setupTorsionalFrictionConstraint(
-        row, axis, body_of(contact.manifold->getBody0()), body_of(contact.manifold->getBody1()),
-        contact.get(), strength, unused_arm, unused_arm, nullptr, nullptr, settings.relaxation);
-    const auto at = [&](int field) { return to + static_cast<std::size_t>(field) * lanes + lane; };
-    *at(rows::kRowPresent) = 1;
-    put_lane(at(rows::kRowTurnA), lanes, row.m_relpos1CrossNormal);
-    put_lane(at(rows::kRowTurnB), lanes, row.m_relpos2CrossNormal);
-    put_lane(at(rows::kRowAngularA), lanes, row.m_angularComponentA);
-    put_lane(at(rows::kRowAngularB), lanes, row.m_angularComponentB);
-    *at(rows::kRowInverse) = row.m_jacDiagABInv;
-    *at(rows::kRowRhs) = row.m_rhs;
-    *at(rows::kRowFriction) = row.m_friction;
+  void set_up_torsion(const ContactRef& contact, Real* to, std::size_t lanes) {
+    const int fixed = self.m_tmpSolverBodyPool.size() - 1;  // see set_up()
+    bullet::set_up_torsions(self, fixed, settings.relaxation, contact, to, lanes);
   }
 
-  void analyse(const x86::RowSweepReport& report, int manifold_count) {
+  void analyse(const rows::RowSweepReport& report, int manifold_count) {
     self.m_leastSquaresResidual = report.residual;
     btSolverAnalyticsData& data = self.m_analyticsData;
     ++data.m_numSolverCalls;
@@ -413,7 +406,9 @@ struct ConstraintSolver::Impl {
 
   void write_back() {
     BT_PROFILE("solveGroupCacheFriendlyFinish");
-    if (settings.warm_start) {
+    if (on_device) {
+      device.write_back(device_group());
+    } else if (settings.warm_start) {
       const std::size_t chunks = (solver.blocks() + kBlocksAChunk - 1) / kBlocksAChunk;
       solver.pool().run(chunks, [&](std::size_t chunk) {
         const auto last = static_cast<std::uint32_t>(
@@ -427,7 +422,7 @@ struct ConstraintSolver::Impl {
       self.writeBackJoints(0, self.m_tmpSolverNonContactConstraintPool.size(), *info);
       self.m_tmpSolverNonContactConstraintPool.resizeNoInitialize(0);
     }
-    if (scan.any_rolling()) self.m_tmpSolverBodyPool.pop_back();  // see set_up_torsions()
+    if (scan.any_rolling()) self.m_tmpSolverBodyPool.pop_back();  // see set_up()
     const auto count = static_cast<std::size_t>(self.m_tmpSolverBodyPool.size());
     const std::size_t chunks = (count + kBodiesAChunk - 1) / kBodiesAChunk;
     solver.pool().run(chunks, [&](std::size_t chunk) {
@@ -462,7 +457,12 @@ struct ConstraintSolver::Impl {
 };
 
 ConstraintSolver::ConstraintSolver(const ConstraintSolverOptions& options)
-    : impl_(std::make_unique<Impl>(*this, options)) {}
+    : impl_(std::make_unique<Impl>(*this, options, maker_of_devices(options.device))) {}
+ConstraintSolver::ConstraintSolver(std::unique_ptr<GroupSolver> device,
+                                   const ConstraintSolverOptions& options)
+    : impl_(std::make_unique<Impl>(*this, options,
+                                   [made = std::make_shared<std::unique_ptr<GroupSolver>>(
+                                        std::move(device))] { return std::move(*made); })) {}
 ConstraintSolver::~ConstraintSolver() = default;
 
 btScalar ConstraintSolver::solveGroup(btCollisionObject** bodies, int body_count,
@@ -492,7 +492,9 @@ void ConstraintSolver::set_minimum_batch(std::size_t manifolds) noexcept {
   impl_->minimum_batch = manifolds;
 }
 const ConstraintSolverStats& ConstraintSolver::stats() const noexcept { return impl_->stats; }
-void ConstraintSolver::reset_stats() noexcept { impl_->stats = {}; }
+void ConstraintSolver::reset_stats() {
+  impl_->stats = {.device_failure = std::move(impl_->stats.device_failure)};
+}
 
 std::string_view to_string(SolverFallback fallback) noexcept {
   constexpr std::string_view kTexts[kSolverFallbacks] = {

@@ -71,10 +71,11 @@ void ContactScan::run(x86::ThreadPool& pool, std::span<btPersistentManifold* con
   chunks_.reserve(chunks, "contacts of a solver");
   pool.run(chunks, [&](std::size_t chunk) { scan(manifolds, chunk, marks); });
   count_ = 0;
-  any_late_ = any_rolling_ = false;
+  any_late_ = any_rolling_ = any_anisotropic_ = false;
   for (std::size_t i = 0; i < chunks; ++i) {
     any_rolling_ |= chunks_[i].rolling;
     any_late_ |= chunks_[i].late;
+    any_anisotropic_ |= chunks_[i].anisotropic;
     count_ += chunks_[i].count;
   }
   refs_.reserve(count_, "contacts of a solver");
@@ -93,7 +94,7 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
   ContactRef* const refs = found_.data() + MANIFOLD_CACHE_SIZE * first;
   x86::RowPair* const pairs = found_pairs_.data() + MANIFOLD_CACHE_SIZE * first;
   std::uint32_t count = 0;
-  bool rolling = false, late = false;
+  bool rolling = false, late = false, anisotropic = false;
   for (std::size_t i = first; i < last; ++i) {
     if (i + kManifoldsAhead < last) {
       prefetch_header(manifolds[i + kManifoldsAhead]);
@@ -114,11 +115,12 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
       if (!(point.getDistance() <= manifold->getContactProcessingThreshold())) continue;
       const bool rolls = point.m_combinedRollingFriction > 0;
       rolling |= rolls;
+      anisotropic |= a.anisotropic || b.anisotropic;
       refs[count] = {manifold, k, a.anisotropic || b.anisotropic, rolls};
       pairs[count++] = {a.id, b.id};
     }
   }
-  chunks_[chunk] = {count, rolling, late};
+  chunks_[chunk] = {count, rolling, late, anisotropic};
 }
 
 void ContactScan::find_late(std::span<btPersistentManifold* const> manifolds,

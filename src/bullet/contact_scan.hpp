@@ -47,11 +47,12 @@ class ContactScan {
   std::span<const x86::RowPair> pairs() const { return {pairs_.data(), count_}; }
   std::span<const LateBody> late() const { return late_; }
   bool any_rolling() const { return any_rolling_; }
+  bool any_anisotropic() const { return any_anisotropic_; }
 
  private:
   struct Chunk {
     std::uint32_t count;
-    bool rolling, late;
+    bool rolling, late, anisotropic;
   };
   void scan(std::span<btPersistentManifold* const> manifolds, std::size_t chunk,
             std::span<const std::uint8_t> marks);
@@ -61,7 +62,7 @@ class ContactScan {
   x86::Buffer<Chunk> chunks_;
   std::vector<LateBody> late_;
   std::size_t count_ = 0;
-  bool any_late_ = false, any_rolling_ = false;
+  bool any_late_ = false, any_rolling_ = false, any_anisotropic_ = false;
 };
 
 /// The object as a body if Bullet's solver takes notice of its motion: it has a finite mass or is

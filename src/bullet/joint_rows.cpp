@@ -25,8 +25,6 @@ void apply(x86::RowSolver& solver, std::int32_t id, const btVector3& axis,
   store(velocity + 4, load(velocity + 4) + response * (impulse * load(factors + 8)));
 }
 
-}  // namespace
-
 bool is_known_joint(const btTypedConstraint& constraint) {
   static const std::type_info* const kKnown[] = {&typeid(btPoint2PointConstraint),
                                                  &typeid(btHingeConstraint),
@@ -42,6 +40,13 @@ bool is_known_joint(const btTypedConstraint& constraint) {
                                                  &typeid(btGearConstraint)};
   return std::any_of(std::begin(kKnown), std::end(kKnown),
                      [&](const std::type_info* known) { return *known == typeid(constraint); });
+}
+
+}  // namespace
+
+bool are_known_joints(std::span<btTypedConstraint* const> joints) {
+  return std::all_of(joints.begin(), joints.end(),
+                     [](const btTypedConstraint* joint) { return is_known_joint(*joint); });
 }
 
 void JointRows::sweep(int iteration, x86::RowResidual* residual) {

@@ -10,8 +10,8 @@
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
-/// Whether the constraint is of a class of Bullet's, of which we know that it does all in its rows.
-bool is_known_joint(const btTypedConstraint& constraint);
+/// Whether all are of classes of Bullet's, of which we know that they do all in their rows.
+bool are_known_joints(std::span<btTypedConstraint* const> joints);
 
 /// The rows are Bullet's own, as btSequentialImpulseConstraintSolver::convertJoints() makes them;
 /// impulses are left in them.

@@ -3,8 +3,7 @@
 #include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/error.hpp>
 
-#include "tests/bullet/solver_world.hpp"
-#include "tests/bullet/stock_elsewhere.hpp"
+#include "tests/bullet/stock_bits.hpp"
 
 #include <cmath>
 #include <limits>
@@ -13,41 +12,8 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
-std::uint64_t wanted_steps() { return wanted_world_steps(5'000, 100'000); }
-
-std::string report(const SolverWorld& world, const Failure& failure, MakeParts parts,
-                   MakeDispatcher dispatcher) {
-  const SolverWorld least = shrink(world, parts, dispatcher);
-  const auto again = run(least, nullptr, parts, dispatcher);
-  std::ostringstream out;
-  out << failure.what << "\nshrunk: " << (again ? again->what : "no longer fails") << '\n' << least;
-  return out.str();
-}
-
-/// Runs random worlds with these parts beside stock ones.
-SolverTotals expect_stocks_bits(std::uint64_t steps, MakeParts parts, MakeDispatcher dispatcher) {
-  const std::uint64_t seed = test_seed();
-  SolverTotals totals;
-  std::uint64_t unreproducible = 0;
-  for (std::uint64_t i = 0; totals.steps < steps; ++i) {
-    const SolverWorld world = make_solver_world(seed + i);
-    const auto failure = run(world, &totals, parts, dispatcher);
-    if (failure && stock_differs_from_itself(world)) {
-      ++unreproducible;
-      continue;
-    }
-    if (failure) {
-      ADD_FAILURE() << "JFPX_TEST_SEED=" << seed + i << '\n'
-                    << report(world, *failure, parts, dispatcher);
-      return totals;
-    }
-  }
-  EXPECT_LE(unreproducible, 1 + steps / 100'000) << "too many to be Bullet's";
-  return totals;
-}
-
 TEST(ConstraintSolver, MovesRandomWorldsAsStock) {
-  const SolverTotals totals = expect_stocks_bits(wanted_steps(), our_solver, make_stock);
+  const SolverTotals totals = expect_stocks_bits(wanted_solver_steps(), our_solver, make_stock);
   EXPECT_GT(totals.groups, totals.steps / 4) << "worlds that Bullet solves show nothing";
   EXPECT_GT(totals.contacts, totals.steps);
   EXPECT_GT(totals.joints, totals.steps / 20);
@@ -57,11 +23,11 @@ TEST(ConstraintSolver, MovesRandomWorldsAsStock) {
 }
 
 TEST(DynamicsWorld, MovesRandomWorldsAsStock) {
-  expect_stocks_bits(wanted_steps() / 4, our_world, make_stock);
+  expect_stocks_bits(wanted_solver_steps() / 4, our_world, make_stock);
 }
 
 TEST(DynamicsWorld, MovesRandomWorldsAsStockWithOurDispatcherAndSolver) {
-  expect_stocks_bits(wanted_steps() / 4, our_solver_and_world, make_ours);
+  expect_stocks_bits(wanted_solver_steps() / 4, our_solver_and_world, make_ours);
 }
 
 /// Right but for the last bit of one velocity.
@@ -114,37 +80,14 @@ TEST(ConstraintSolver, ShowsAnErrorOfOneBitInRandomWorldsAndShrinksThem) {
   EXPECT_GT(failed, 10) << "most worlds with contacts must fail";
 }
 
-/// A heap with more rows than threads and vectors can share badly.
-SolverWorld large_heap(std::uint64_t seed) {
-  SolverWorld world;
-  world.base.seed = seed;
-  world.base.steps = 12;
-  world.base.gravity = {0, -10, 0};
-  Random random(seed);
-  for (int i = 0; i < 700; ++i) {
-    RandomBody body;
-    body.size = random.uniform(Real(0.3), Real(0.6));
-    body.position = random.uniform_in_box({0, 0, 0}, {7, 7, 7});
-    body.mass = i == 0 ? Real(0) : random.uniform(Real(0.5), 2);
-    body.restitution = random.uniform(0, Real(0.5));
-    world.base.bodies.push_back(body);
-  }
-  world.bodies.resize(world.base.bodies.size());
-  return world;
-}
-
 TEST(ConstraintSolver, HasStocksBitsForAnyThreadsVectorsAndModes) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   for (const unsigned threads : {1u, 2u, 3u, 8u}) {
     for (const bool vectors : {true, false}) {
-      SolverWorld world = large_heap(seed);
+      SolverWorld world = make_large_heap(seed);
       world.threads = threads;
       world.vectors = vectors;
-      btContactSolverInfo info;
-      info.m_solverMode ^= SOLVER_INTERLEAVE_CONTACT_AND_FRICTION_CONSTRAINTS;
-      info.m_splitImpulsePenetrationThreshold = 0;
-      world.changes.push_back({6, info});
       SolverTotals totals;
       const auto failure = run(world, &totals, our_solver_and_world, make_ours);
       EXPECT_FALSE(failure) << threads << " threads, vectors " << vectors << ": " << failure->what;

@@ -47,7 +47,8 @@ SolverWorld make_solver_world(test::Bytes& bytes);  ///< with what a fuzzer want
 std::ostream& operator<<(std::ostream& out, const SolverWorld& world);
 
 struct SolverTotals {
-  std::uint64_t steps = 0, groups = 0, contacts = 0, joints = 0, fallbacks[8] = {};
+  std::uint64_t steps = 0, groups = 0, on_device = 0, contacts = 0, joints = 0;
+  std::uint64_t fallbacks[8] = {};
 };
 
 /// The parts under test, beside the dispatcher.

@@ -249,6 +249,7 @@ std::optional<Failure> run(const SolverWorld& world, SolverTotals* totals, MakeP
     if (const auto* solver =
             dynamic_cast<const ConstraintSolver*>(ours.live().live().solver.get())) {
       totals->groups += solver->stats().groups;
+      totals->on_device += solver->stats().on_device;
       totals->contacts += solver->stats().contacts;
       totals->joints += solver->stats().joints;
       for (std::size_t i = 0; i < kSolverFallbacks; ++i) {

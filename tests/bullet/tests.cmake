@@ -20,6 +20,10 @@ set(random_worlds
   bullet/random_world.cpp
   bullet/random_world_globals.cpp
   bullet/random_world_run.cpp)
+set(solver_worlds
+  bullet/solver_world.cpp
+  bullet/solver_world_run.cpp
+  bullet/stock_bits.cpp)
 jfpx_add_test(bullet_random_worlds_test SOURCES
   ${random_worlds}
   bullet/random_worlds_test.cpp
@@ -27,9 +31,21 @@ jfpx_add_test(bullet_random_worlds_test SOURCES
 jfpx_add_test(bullet_solver_test SOURCES
   ${random_worlds}
   bullet/solver_test.cpp
-  bullet/solver_world.cpp
-  bullet/solver_world_run.cpp
+  ${solver_worlds}
   LINK jfpx_bullet)
+jfpx_add_test(bullet_device_groups_test SOURCES
+  ${random_worlds}
+  ${solver_worlds}
+  bullet/device_groups_test.cpp
+  LINK jfpx_bullet)
+if(JFPX_HAS_CUDA)
+  jfpx_add_test(bullet_solver_cuda_test SOURCES
+    ${random_worlds}
+    ${solver_worlds}
+    bullet/solver_cuda_test.cpp
+    support/sphere_fixtures.cpp
+    LINK jfpx_bullet jfpx_cuda CUDA::cudart_static)
+endif()
 jfpx_add_test(bullet_algorithm_test SOURCES
   ${random_worlds}
   bullet/algorithm_test.cpp

@@ -8,11 +8,20 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <string_view>
+
+namespace jfpx::inline JFPX_ABI {
+class GroupSolver;
+}
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
 struct ConstraintSolverOptions {
+  /// Who sweeps over the rows. `automatic`: x86, or a GPU where that has been faster. `cuda`: a GPU
+  /// whenever it can (not groups with joints or with friction that depends on the direction).
+  Backend backend = Backend::automatic;
+  int device = 0;                         ///< cuda: ordinal of the GPU
   unsigned threads = 1;                   ///< 0: one per core, at most 256
   SimdLevel simd = SimdLevel::automatic;  ///< vectors of rows: AVX2 or none
   /// Manifolds below which a group is left to Bullet's own code.
@@ -34,10 +43,12 @@ JFPX_API std::string_view to_string(SolverFallback fallback) noexcept;
 
 struct ConstraintSolverStats {
   std::uint64_t groups = 0;                                 ///< solved by jfpx
+  std::uint64_t on_device = 0;                              ///< of these: on the GPU
   std::uint64_t contacts = 0;                               ///< in these
   std::uint64_t joints = 0;                                 ///< constraints in these
   std::uint64_t sweeps = 0;                                 ///< over their rows
   std::array<std::uint64_t, kSolverFallbacks> fallbacks{};  ///< groups, by SolverFallback
+  std::string device_failure;  ///< why the GPU was given up and x86 took over; empty: it was not
 };
 
 /// A btSequentialImpulseConstraintSolver that solves independent rows side by side, in vectors and
@@ -52,8 +63,11 @@ class JFPX_API ConstraintSolver : public btSequentialImpulseConstraintSolver {
  public:
   BT_DECLARE_ALIGNED_ALLOCATOR();
 
-  /// @throws InvalidArgument for more than 256 threads.
+  /// @throws InvalidArgument for more than 256 threads; BackendUnavailable if the backend is asked
+  ///   for by name and can't be had.
   explicit ConstraintSolver(const ConstraintSolverOptions& options = {});
+  /// Uses the given device; options.backend says when.
+  ConstraintSolver(std::unique_ptr<GroupSolver> device, const ConstraintSolverOptions& options);
   ~ConstraintSolver() override;
   ConstraintSolver(const ConstraintSolver&) = delete;
   ConstraintSolver& operator=(const ConstraintSolver&) = delete;
@@ -67,7 +81,7 @@ class JFPX_API ConstraintSolver : public btSequentialImpulseConstraintSolver {
   void set_minimum_batch(std::size_t manifolds) noexcept;
 
   const ConstraintSolverStats& stats() const noexcept;
-  void reset_stats() noexcept;
+  void reset_stats();  ///< keeps `device_failure`: what failed stays given up
 
  private:
   struct Impl;

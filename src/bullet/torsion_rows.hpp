@@ -1,0 +1,22 @@
+/// Rows against rolling and spinning of a contact, which Bullet's own function sets up: they are
+/// seldom many.
+#pragma once
+
+#include "src/bullet/contact_scan.hpp"
+
+#include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+/// Friction that depends on the direction, which is a matter for Bullet.
+/// @param mode one of btCollisionObject::AnisotropicFrictionFlags
+void turn_by_anisotropy(const ContactRef& contact, btVector3* axis, int mode);
+
+/// Fills the kTorsions rows of a contact, where they are not to stay 0. Safe for different contacts
+/// at once.
+/// @param fixed Bullet's solver body that stands for all bodies without one
+/// @param to    the contact's lane of the rows, all 0
+void set_up_torsions(btSequentialImpulseConstraintSolver& solver, int fixed, btScalar relaxation,
+                     const ContactRef& contact, Real* to, std::size_t lanes);
+
+}  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,0 +1,161 @@
+/// Groups that are handed to a device: a double of one, whose walkers are those of the kernels.
+#include <jfpx/bullet/constraint_solver.hpp>
+#include <jfpx/error.hpp>
+
+#include "src/row_order.hpp"
+#include "tests/bullet/stock_bits.hpp"
+#include "tests/support/group_double.hpp"
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+using test::GroupDouble;
+
+WorldParts with_double(const SolverWorld& world) {
+  WorldParts parts;
+  parts.solver = [seed = world.base.seed, threads = world.threads] {
+    return std::make_unique<ConstraintSolver>(
+        std::make_unique<GroupDouble>(seed),
+        ConstraintSolverOptions{.backend = Backend::cuda, .threads = threads, .minimum_batch = 0});
+  };
+  return parts;
+}
+
+TEST(DeviceGroups, MoveRandomWorldsAsStock) {
+  const SolverTotals totals =
+      expect_stocks_bits(wanted_solver_steps() / 2, with_double, make_stock);
+  EXPECT_GT(totals.on_device, totals.steps / 8) << "groups that x86 solves show nothing";
+}
+
+TEST(DeviceGroups, MoveAHeapAsStockWithContactAndFrictionInEitherOrder) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  const SolverWorld world = make_large_heap(seed);
+  SolverTotals totals;
+  const auto failure = run(world, &totals, with_double, make_stock);
+  EXPECT_FALSE(failure) << failure->what;
+  EXPECT_GT(totals.on_device, 0u);
+  EXPECT_GT(totals.contacts, 12u * 1000u);
+}
+
+WorldParts with_slightly_wrong_double(const SolverWorld& world) {
+  WorldParts parts;
+  parts.solver = [seed = world.base.seed] {
+    auto device = std::make_unique<GroupDouble>(seed);
+    device->slightly_wrong = true;
+    return std::make_unique<ConstraintSolver>(
+        std::move(device), ConstraintSolverOptions{.backend = Backend::cuda, .minimum_batch = 0});
+  };
+  return parts;
+}
+
+TEST(DeviceGroups, ShowAnErrorOfOneBit) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  int failed = 0;
+  for (std::uint64_t i = 0; i < 40; ++i) {
+    failed += run(make_solver_world(seed + i), nullptr, with_slightly_wrong_double) ? 1 : 0;
+  }
+  EXPECT_GT(failed, 5) << "most worlds with contacts must fail";
+}
+
+/// The device fails in its third group, before or after it has filled its results.
+TEST(DeviceGroups, ADeviceThatFailsIsReplacedInTheSameGroupAndReportedOnce) {
+  int groups = 0;
+  WorldParts parts;
+  parts.solver = [&] {
+    auto device = std::make_unique<GroupDouble>(7);
+    device->before_solve = [&] {
+      if (++groups == 3) throw DeviceError("the device is gone");
+    };
+    return std::make_unique<ConstraintSolver>(
+        std::move(device), ConstraintSolverOptions{.backend = Backend::cuda, .minimum_batch = 0});
+  };
+  Twins twins({.parts = parts});
+  twins.both([](BulletWorld& w) { add_heap(w, 60, 17); });
+  auto& solver = dynamic_cast<ConstraintSolver&>(*twins.ours().solver);
+  ASSERT_TRUE(twins.step());
+  EXPECT_EQ(solver.stats().device_failure, "");
+  ASSERT_TRUE(twins.step(30));
+  EXPECT_EQ(groups, 3);
+  EXPECT_EQ(solver.stats().on_device, 2u);
+  EXPECT_GT(solver.stats().groups, 20u);
+  EXPECT_EQ(solver.stats().device_failure, "the device is gone");
+  solver.reset_stats();
+  EXPECT_EQ(solver.stats().groups, 0u);
+  EXPECT_EQ(solver.stats().device_failure, "the device is gone");
+}
+
+TEST(DeviceGroups, AreNotAskedForOnX86) {
+  int groups = 0;
+  WorldParts parts;
+  parts.solver = [&] {
+    auto device = std::make_unique<GroupDouble>(7);
+    device->before_solve = [&] { ++groups; };
+    return std::make_unique<ConstraintSolver>(
+        std::move(device), ConstraintSolverOptions{.backend = Backend::x86, .minimum_batch = 0});
+  };
+  Twins twins({.parts = parts});
+  twins.both([](BulletWorld& w) { add_heap(w, 60, 17); });
+  ASSERT_TRUE(twins.step(3));
+  EXPECT_EQ(groups, 0);
+}
+
+/// Each body meets its contacts in the given order, and a place never needs a later one.
+TEST(RowOrder, KeepsTheOrderOfEveryBody) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Random random(seed);
+  RowOrder order;
+  for (int round = 0; round < 200; ++round) {
+    const std::size_t bodies = 1 + random.below(40), count = random.below(200);
+    std::vector<rows::RowPair> pairs(count);
+    for (rows::RowPair& pair : pairs) {
+      const auto id = [&] {
+        const auto body = static_cast<std::int32_t>(random.below(bodies));
+        return body == 0 || random.below(8) == 0 ? ~body : body;
+      };
+      pair = {id(), id()};
+      if (pair.a == pair.b) pair.b = rows::kFixedBody;
+    }
+    std::vector<rows::Place> places(count), chosen(count + 1);
+    std::vector<std::uint32_t> contacts(count), moves(bodies), chosen_moves(bodies);
+    order.build(pairs, bodies, places.data(), contacts.data(), moves.data());
+    std::vector<std::uint8_t> marks(count);
+    for (std::uint8_t& mark : marks) mark = random.below(3) == 0 ? 1 : 0;
+    const std::uint32_t some = RowOrder::choose(places, contacts.data(), marks, bodies,
+                                                chosen.data(), chosen_moves.data());
+
+    std::vector<std::uint32_t> met(bodies), met_of_chosen(bodies);
+    std::vector<std::int64_t> last(bodies, -1);
+    std::uint32_t next_chosen = 0;
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const rows::Place& place = places[k];
+      ASSERT_EQ(place.row, k);
+      ASSERT_EQ(place.a, pairs[contacts[k]].a);
+      ASSERT_EQ(place.b, pairs[contacts[k]].b);
+      const bool is_chosen = marks[contacts[k]] != 0;
+      const auto expect_turn = [&](std::int32_t id, std::uint32_t rank, std::uint32_t chosen_rank) {
+        if (id < 0) return;
+        const auto body = static_cast<std::size_t>(id);
+        EXPECT_EQ(rank, met[body]++);
+        EXPECT_LT(last[body], contacts[k]);
+        last[body] = contacts[k];
+        if (!is_chosen) return;
+        EXPECT_EQ(chosen_rank, met_of_chosen[body]++);
+      };
+      const rows::Place& in_chosen = chosen[std::min(next_chosen, some)];
+      expect_turn(place.a, place.rank_a, in_chosen.rank_a);
+      expect_turn(place.b, place.rank_b, in_chosen.rank_b);
+      if (!is_chosen) continue;
+      EXPECT_EQ(in_chosen.row, k);
+      ++next_chosen;
+    }
+    EXPECT_EQ(next_chosen, some);
+    EXPECT_EQ(met, moves);
+    EXPECT_EQ(met_of_chosen, chosen_moves);
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bullet
