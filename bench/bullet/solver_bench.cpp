@@ -5,92 +5,11 @@
 /// are Bullet's profile zones. With one thread the clock is the CPU time of that thread, which
 /// other work on the machine disturbs little; with more it is the wall clock. Counters are medians;
 /// a ratio is the median of stock / jfpx, so larger than 1 means that jfpx is faster.
-#include <jfpx/bullet/scene_world.hpp>
-
+#include "bench/bullet/step_parts.hpp"
 #include "examples/scenes/scenes.hpp"
-
-#include <LinearMath/btQuickprof.h>
-#include <benchmark/benchmark.h>
-
-#include <algorithm>
-#include <array>
-#include <cstring>
-#include <ctime>
-#include <string>
-#include <vector>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
-
-clockid_t g_clock = CLOCK_MONOTONIC;
-
-double now_ms() {
-  timespec t{};
-  clock_gettime(g_clock, &t);
-  return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_nsec) * 1e-6;
-}
-
-/// Zones that are timed, and the part that each is counted for, or taken away from.
-enum Part : std::size_t { kMotion, kBoxes, kDispatch, kIslands, kSetUp, kSweeps, kFinish, kParts };
-constexpr const char* kPartNames[kParts] = {"motion", "boxes",  "dispatch", "islands",
-                                            "set_up", "sweeps", "finish"};
-struct Zone {
-  const char* name;
-  Part part;
-  double sign;
-};
-constexpr Zone kZones[] = {{"predictUnconstraintMotion", kMotion, 1},
-                           {"createPredictiveContacts", kMotion, 1},
-                           {"integrateTransforms", kMotion, 1},
-                           {"updateActivationState", kMotion, 1},
-                           {"updateAabbs", kBoxes, 1},
-                           {"calculateOverlappingPairs", kBoxes, 1},
-                           {"dispatchAllCollisionPairs", kDispatch, 1},
-                           {"calculateSimulationIslands", kIslands, 1},
-                           {"solveConstraints", kIslands, 1},
-                           {"solveGroup", kIslands, -1},
-                           {"solveGroupCacheFriendlySetup", kSetUp, 1},
-                           {"solveGroupCacheFriendlyIterations", kSweeps, 1},
-                           {"solveGroupCacheFriendlyFinish", kFinish, 1}};
-
-std::array<double, kParts> g_parts;
-std::vector<std::pair<const Zone*, double>> g_open;
-
-void enter_zone(const char* name) {
-  const Zone* zone = std::find_if(std::begin(kZones), std::end(kZones),
-                                  [&](const Zone& z) { return std::strcmp(z.name, name) == 0; });
-  g_open.emplace_back(zone == std::end(kZones) ? nullptr : zone, now_ms());
-}
-void leave_zone() {
-  const auto [zone, since] = g_open.back();
-  g_open.pop_back();
-  if (zone != nullptr) g_parts[zone->part] += zone->sign * (now_ms() - since);
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-struct Samples {
-  std::vector<double> total;
-  std::array<std::vector<double>, kParts> parts;
-
-  void step(SceneWorld& world) {
-    g_parts = {};
-    const double start = now_ms();
-    world.step();
-    total.push_back(now_ms() - start);
-    for (std::size_t i = 0; i < kParts; ++i) parts[i].push_back(g_parts[i]);
-  }
-  void report(benchmark::State& state, const std::string& who) const {
-    state.counters["step_" + who + "_ms"] = median(total);
-    for (std::size_t i = 0; i < kParts; ++i) {
-      state.counters[std::string(kPartNames[i]) + "_" + who + "_ms"] = median(parts[i]);
-    }
-  }
-};
 
 void compare_steps(benchmark::State& state, const char* name, std::uint32_t spheres, int settle,
                    unsigned threads) {
@@ -107,8 +26,7 @@ void compare_steps(benchmark::State& state, const char* name, std::uint32_t sphe
     ours.step();
   }
   g_clock = threads == 1 ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC;
-  btSetCustomEnterProfileZoneFunc(enter_zone);
-  btSetCustomLeaveProfileZoneFunc(leave_zone);
+  const TimedZones timed;
   Samples stock_samples, our_samples;
   bool swap = false;
   for (auto _ : state) {
@@ -118,8 +36,6 @@ void compare_steps(benchmark::State& state, const char* name, std::uint32_t sphe
     swap = !swap;
     state.SetIterationTime(our_samples.total.back() * 1e-3);
   }
-  btSetCustomEnterProfileZoneFunc([](const char*) {});
-  btSetCustomLeaveProfileZoneFunc([] {});
   if (stock.state_hash() != ours.state_hash()) state.SkipWithError("the worlds differ");
   stock_samples.report(state, "stock");
   our_samples.report(state, "jfpx");

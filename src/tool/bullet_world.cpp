@@ -13,6 +13,7 @@ bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
   world.world =
       ours && options.world == "jfpx" ? bullet::WorldKind::jfpx : bullet::WorldKind::stock;
   world.dispatch.collider = collider_options(options);
+  world.solve.backend = options.backend;
   world.solve.threads = world.step.threads = options.threads;
   if (options.minimum_batch) {
     world.dispatch.minimum_batch = static_cast<std::size_t>(*options.minimum_batch);

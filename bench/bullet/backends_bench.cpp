@@ -1,0 +1,169 @@
+/// Whole steps of a settled scene: a stock Bullet world against worlds of jfpx on one thread, on
+/// all of them, and with a GPU.
+///
+/// All worlds of a benchmark begin with the same bodies, which a world of jfpx has moved until they
+/// have settled (or has been read from --settled=FOLDER), step in turn, and end with the same state
+/// hash. Wall clock; a ratio is the median of stock / jfpx.
+#include "bench/bullet/step_parts.hpp"
+#include "examples/scenes/scenes.hpp"
+
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <thread>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
+
+std::string g_folder;  ///< settled states are kept here; empty: nowhere
+bool g_only_settle = false;
+
+struct Case {
+  const char* scene;
+  std::uint32_t spheres;
+  int settle, samples;
+};
+constexpr Case kCases[] = {
+    {"pile", 16, 300, 200},  {"pile", 64, 300, 200},    {"pile", 255, 300, 100},
+    {"pile", 1024, 300, 60}, {"pile", 4096, 300, 31},   {"pile", 16384, 300, 21},
+    {"pile", 65536, 300, 9}, {"gas", 255, 60, 100},     {"gas", 16384, 60, 11},
+    {"gas", 65536, 60, 9},   {"columns", 16384, 60, 11}};
+
+struct Rival {
+  const char* name;
+  Backend backend;
+  bool all_threads;
+};
+constexpr Rival kRivals[] = {{"x86_1", Backend::x86, false},
+                             {"x86", Backend::x86, true},
+                             {"cuda", Backend::cuda, true},
+                             {"auto", Backend::automatic, true}};
+
+unsigned all_threads() { return std::max(1u, std::thread::hardware_concurrency()); }
+
+SceneWorldOptions options_of(const Rival& rival) {
+  SceneWorldOptions options;
+  options.dispatch.collider.backend = options.solve.backend = rival.backend;
+  const unsigned threads = rival.all_threads ? all_threads() : 1;
+  options.dispatch.collider.threads = options.solve.threads = options.step.threads = threads;
+  return options;
+}
+
+Scene settled(const Case& c) {
+  Scene scene = scenes::make(c.scene, {.spheres = c.spheres, .seed = 1});
+  scene.sleep.enabled = false;
+  const std::string file = g_folder + "/" + c.scene + "_" + std::to_string(c.spheres) + ".states";
+  std::vector<BodyState> states(scene.bodies.size());
+  const auto bytes = static_cast<std::streamsize>(states.size() * sizeof(BodyState));
+  std::ifstream in(file, std::ios::binary);
+  if (g_folder.empty() || !in.read(reinterpret_cast<char*>(states.data()), bytes)) {
+    SceneWorld world(scene, options_of(kRivals[1]));
+    for (int i = 0; i < c.settle; ++i) world.step();
+    states = world.states();
+    if (!g_folder.empty()) {
+      std::ofstream(file, std::ios::binary)
+          .write(reinterpret_cast<const char*>(states.data()), bytes);
+    }
+  }
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    scene.bodies[i].position = states[i].position;
+    scene.bodies[i].orientation = states[i].orientation;
+    scene.bodies[i].velocity = states[i].velocity;
+    scene.bodies[i].angular_velocity = states[i].angular_velocity;
+  }
+  return scene;
+}
+
+bool has_cuda() {
+  for (const BackendStatus& status : available_backends()) {
+    if (status.backend == Backend::cuda) return status.usable;
+  }
+  return false;
+}
+
+void compare(benchmark::State& state, const Case& c) {
+  const Scene scene = settled(c);
+  if (g_only_settle) {
+    for (auto _ : state) state.SetIterationTime(1e-9);
+    return;
+  }
+  std::vector<Rival> rivals;
+  for (const Rival& rival : kRivals) {
+    if (rival.backend != Backend::cuda || has_cuda()) rivals.push_back(rival);
+  }
+  SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock,
+                           .solver = SolverKind::stock,
+                           .world = WorldKind::stock});
+  std::vector<std::unique_ptr<SceneWorld>> worlds;
+  for (const Rival& rival : rivals) {
+    worlds.push_back(std::make_unique<SceneWorld>(scene, options_of(rival)));
+  }
+  const int warm_up = 12;  // buffers grow, `auto` makes up its mind
+  Samples stock_samples;
+  std::vector<Samples> samples(worlds.size());
+  const TimedZones timed;
+  int steps = 0;
+  const auto step_all = [&] {
+    stock_samples.step(stock);
+    for (std::size_t i = 0; i < worlds.size(); ++i) {
+      const std::size_t k = (i + static_cast<std::size_t>(steps)) % worlds.size();
+      samples[k].step(*worlds[k]);
+    }
+    ++steps;
+  };
+  for (int i = 0; i < warm_up; ++i) step_all();
+  stock_samples = {};
+  for (Samples& s : samples) s = {};
+  for (auto _ : state) {
+    step_all();
+    state.SetIterationTime(stock_samples.total.back() * 1e-3);
+  }
+  stock_samples.report(state, "stock");
+  for (std::size_t i = 0; i < worlds.size(); ++i) {
+    if (worlds[i]->state_hash() != stock.state_hash()) state.SkipWithError("the worlds differ");
+    samples[i].report(state, rivals[i].name);
+    std::vector<double> ratios;
+    for (std::size_t k = 0; k < stock_samples.total.size(); ++k) {
+      ratios.push_back(stock_samples.total[k] / samples[i].total[k]);
+    }
+    const std::string name = rivals[i].name;
+    state.counters["ratio_" + name] = median(ratios);
+    const ConstraintSolverStats& stats = worlds[i]->jfpx_solver()->stats();
+    state.counters["on_device_" + name] = static_cast<double>(stats.on_device);
+    state.counters["groups_" + name] = static_cast<double>(stats.groups);
+    state.counters["contacts"] = static_cast<double>(stats.contacts) / steps;
+  }
+}
+
+void register_all() {
+  for (const Case& c : kCases) {
+    const std::string name = std::string("step/") + c.scene + "/" + std::to_string(c.spheres);
+    benchmark::RegisterBenchmark(name.c_str(), [&c](benchmark::State& state) { compare(state, c); })
+        ->UseManualTime()
+        ->Iterations(g_only_settle ? 1 : c.samples)
+        ->Unit(benchmark::kMillisecond);
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bullet
+
+/// --settled=FOLDER: keep settled states there; --only-settle: do no more than that.
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const std::string folder = "--settled=";
+    if (argument == "--only-settle") {
+      jfpx::bullet::g_only_settle = true;
+    } else if (argument.starts_with(folder)) {
+      jfpx::bullet::g_folder = argument.substr(folder.size());
+    } else {
+      std::fprintf(stderr, "unknown argument %s\n", argv[i]);
+      return 2;
+    }
+  }
+  jfpx::bullet::register_all();
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+}

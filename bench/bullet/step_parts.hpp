@@ -1,0 +1,117 @@
+/// Times the parts of a Bullet step, by Bullet's profile zones.
+#pragma once
+
+#include <jfpx/bullet/scene_world.hpp>
+
+#include <LinearMath/btQuickprof.h>
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <ctime>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+inline clockid_t g_clock = CLOCK_MONOTONIC;
+
+inline double now_ms() {
+  timespec t{};
+  clock_gettime(g_clock, &t);
+  return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_nsec) * 1e-6;
+}
+
+/// Zones that are timed, and the part that each is counted for, or taken away from.
+enum Part : std::size_t {
+  kMotion,
+  kBoxes,
+  kDispatch,
+  kIslands,
+  kSetUp,
+  kSweeps,
+  kFinish,
+  kBodies,  // this and the next are shares of kSetUp
+  kScan,
+  kParts
+};
+inline constexpr const char* kPartNames[kParts] = {
+    "motion", "boxes", "dispatch", "islands", "set_up", "sweeps", "finish", "bodies", "scan"};
+struct Zone {
+  const char* name;
+  Part part;
+  double sign;
+};
+inline constexpr Zone kZones[] = {{"predictUnconstraintMotion", kMotion, 1},
+                                  {"createPredictiveContacts", kMotion, 1},
+                                  {"integrateTransforms", kMotion, 1},
+                                  {"updateActivationState", kMotion, 1},
+                                  {"updateAabbs", kBoxes, 1},
+                                  {"calculateOverlappingPairs", kBoxes, 1},
+                                  {"dispatchAllCollisionPairs", kDispatch, 1},
+                                  {"calculateSimulationIslands", kIslands, 1},
+                                  {"convertBodies", kBodies, 1},
+                                  {"find contacts", kScan, 1},
+                                  {"solveConstraints", kIslands, 1},
+                                  {"solveGroup", kIslands, -1},
+                                  {"solveGroupCacheFriendlySetup", kSetUp, 1},
+                                  {"solveGroupCacheFriendlyIterations", kSweeps, 1},
+                                  {"solveGroupCacheFriendlyFinish", kFinish, 1}};
+
+inline std::array<double, kParts> g_parts;
+inline std::vector<std::pair<const Zone*, double>> g_open;
+
+inline void enter_zone(const char* name) {
+  const Zone* zone = std::find_if(std::begin(kZones), std::end(kZones),
+                                  [&](const Zone& z) { return std::strcmp(z.name, name) == 0; });
+  g_open.emplace_back(zone == std::end(kZones) ? nullptr : zone, now_ms());
+}
+inline void leave_zone() {
+  const auto [zone, since] = g_open.back();
+  g_open.pop_back();
+  if (zone != nullptr) g_parts[zone->part] += zone->sign * (now_ms() - since);
+}
+
+inline double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+struct Samples {
+  std::vector<double> total;
+  std::array<std::vector<double>, kParts> parts;
+
+  void step(SceneWorld& world) {
+    g_parts = {};
+    const double start = now_ms();
+    world.step();
+    total.push_back(now_ms() - start);
+    for (std::size_t i = 0; i < kParts; ++i) parts[i].push_back(g_parts[i]);
+  }
+  void report(benchmark::State& state, const std::string& who) const {
+    state.counters["step_" + who + "_ms"] = median(total);
+    for (std::size_t i = 0; i < kParts; ++i) {
+      state.counters[std::string(kPartNames[i]) + "_" + who + "_ms"] = median(parts[i]);
+    }
+  }
+};
+
+/// Zones are timed as long as it lives.
+class TimedZones {
+ public:
+  TimedZones() {
+    btSetCustomEnterProfileZoneFunc(enter_zone);
+    btSetCustomLeaveProfileZoneFunc(leave_zone);
+  }
+  ~TimedZones() {
+    btSetCustomEnterProfileZoneFunc([](const char*) {});
+    btSetCustomLeaveProfileZoneFunc([] {});
+  }
+  TimedZones(const TimedZones&) = delete;
+  TimedZones& operator=(const TimedZones&) = delete;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
