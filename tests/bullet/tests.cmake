@@ -77,6 +77,9 @@ endif()
 # The examples run, and say what they should.
 if(JFPX_EXAMPLES)
   foreach(suffix IN ITEMS "" "_f64")
+    add_test(NAME bullet_algorithm${suffix} COMMAND bullet_algorithm${suffix})
+    set_tests_properties(bullet_algorithm${suffix} PROPERTIES
+      PASS_REGULAR_EXPRESSION "1 contact at a distance of -0.5\n$")
     add_test(NAME bullet_app${suffix} COMMAND bullet_app${suffix})
     set_tests_properties(bullet_app${suffix} PROPERTIES
       PASS_REGULAR_EXPRESSION "[1-9][0-9]* of 120 dispatches in batches; [1-9][0-9]* contacts")
