@@ -9,6 +9,7 @@ InvalidArgument::~InvalidArgument() = default;
 BackendUnavailable::~BackendUnavailable() = default;
 OutOfMemory::~OutOfMemory() = default;
 DeviceError::~DeviceError() = default;
+BuildMismatch::~BuildMismatch() = default;
 FileError::~FileError() = default;
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -23,6 +23,7 @@ std::unique_ptr<SphereCollider> make_named(const SphereColliderOptions& options)
 SphereCollider::~SphereCollider() = default;
 
 std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
+  verify_build(options.headers);
   if (options.threads > 256) {
     throw InvalidArgument("threads is " + std::to_string(options.threads) +
                           "; it must be 0 (one per core) to 256");

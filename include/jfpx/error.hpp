@@ -49,6 +49,13 @@ class JFPX_API DeviceError : public Error {
   ~DeviceError() override;
 };
 
+/// The program was compiled with the headers of another jfpx than the library: see verify_build().
+class JFPX_API BuildMismatch : public Error {
+ public:
+  using Error::Error;
+  ~BuildMismatch() override;
+};
+
 /// A file could not be read or written, is truncated, or is corrupt.
 class JFPX_API FileError : public Error {
  public:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <jfpx/backend.hpp>
+#include <jfpx/build.hpp>
 #include <jfpx/contact.hpp>
 #include <jfpx/cost_model.hpp>
 
@@ -40,6 +41,8 @@ enum class SimdLevel : std::uint8_t { automatic, scalar, sse2, avx2, avx512 };
 /// the times of the last calls. Where CUDA can't be had, x86 computes; when the device fails or its
 /// memory does not suffice, x86 takes over for good, with the same bits.
 struct SphereColliderOptions {
+  Build headers =
+      Build::of_these_headers;  ///< leave it: tells the library what the caller includes
   Backend backend = Backend::automatic;
   SphereAlgorithm algorithm = SphereAlgorithm::automatic;
   unsigned threads = 1;                   ///< x86: worker threads, 0 = one per core, at most 256
@@ -82,7 +85,7 @@ class JFPX_API SphereCollider {
 };
 
 /// @throws BackendUnavailable if `options.backend` is asked for by name and can't be had;
-///   InvalidArgument for a bad option.
+///   InvalidArgument for a bad option; BuildMismatch, see verify_build().
 JFPX_API std::unique_ptr<SphereCollider> make_sphere_collider(
     const SphereColliderOptions& options = {});
 

@@ -91,20 +91,49 @@ refused" ] || fail "$("$work/cmake/both")"
       cmake -P "$work/version.cmake" || fail "version $other is accepted"
     done
     ;;
-  # Shared libraries export what is jfpx's, and need nothing of CUDA.
+  # A program of other headers, or of other switches, is told so when it starts.
+  mismatch)
+    folder=$(dirname "$(find "$prefix" -name jfpx.pc)")
+    export PKG_CONFIG_PATH=$folder LD_LIBRARY_PATH=${folder%/pkgconfig}
+    refused() { # TEXT FLAGS
+      local program=$work/mismatch text=$1
+      shift
+      # shellcheck disable=SC2046  # words are what is wanted
+      $CXX -std=c++20 "$@" $(pkg-config --cflags jfpx) "$root/examples/collider/collider.cpp" -o "$program" $(pkg-config --libs jfpx)
+      if "$program" >"$work/mismatch.txt" 2>&1; then fail "runs: $*"; fi
+      grep -qF "$text" "$work/mismatch.txt" || fail "$*: $(cat "$work/mismatch.txt")"
+    }
+    mkdir -p "$work/newer/jfpx"
+    sed 's/^#define JFPX_VERSION_MINOR .*/#define JFPX_VERSION_MINOR 99/' "$prefix/include/jfpx/config.hpp" >"$work/newer/jfpx/config.hpp"
+    refused "compiled with the headers of jfpx 0.99 in float" -I"$work/newer"
+    refused "compiled with the headers of jfpx 0.1 in float, layout" -D_GLIBCXX_DEBUG
+    ;;
+  # Shared libraries export what is jfpx's, and need nothing of CUDA. Static ones become shared to see.
   symbols)
-    [ "$KIND" = shared ] || { echo "skipped: static libraries"; exit 0; }
+    if [ "$KIND" = static ]; then
+      folder=$(dirname "$(find "$prefix" -name jfpx.pc)")
+      for name in jfpx jfpx-f64; do
+        # shellcheck disable=SC2046  # words are what is wanted
+        $CXX -shared -o "$prefix/lib$name.so.probe" -Wl,--no-undefined "-Wl,--version-script=$root/cmake/exports.map" \
+          -Wl,--whole-archive "${folder%/pkgconfig}/lib$name.a" -Wl,--no-whole-archive \
+          $(PKG_CONFIG_PATH=$folder pkg-config --libs "$name")
+      done
+    fi
+    checked=0
     for library in $(libraries '*.so.*'); do
       symbols=$(nm -DC --defined-only "$library" | cut -d' ' -f3-)
-      [ -n "$symbols" ] || fail "$library exports nothing"
+      grep -qE '::(World::step|bullet::CollisionDispatcher::dispatchAllCollisionPairs)\(' <<<"$symbols" || fail "$library exports: $symbols"
       foreign=$(grep -vE '^((vtable|typeinfo|typeinfo name) for |(non-virtual|virtual) thunk to )?jfpx::f(32|64)::' <<<"$symbols" || true)
       [ -z "$foreign" ] || fail "$library exports: $foreign"
-      objdump -p "$library" | grep -E 'NEEDED.*(cuda|cudart)' && fail "$library needs CUDA"
+      ! objdump -p "$library" | grep -E 'NEEDED.*(cuda|cudart)' || fail "$library needs CUDA"
+      checked=$((checked + 1))
     done
+    [ "$checked" -ge 2 ] || fail "only $checked libraries were found"
     for module in $(libraries '-bullet-preload.so') $(libraries '-bullet-engine*.so'); do
       symbols=$(nm -DC --defined-only "$module" | cut -d' ' -f3-)
       ! grep -E '^(cuda|__cuda|nvtx|std::|jfpx::)' <<<"$symbols" || fail "$module exports more than it should"
     done
+    rm -f "$prefix"/*.probe
     ;;
   # jfpx inside another project, by FetchContent.
   subproject)
