@@ -14,13 +14,10 @@
 
 #include <chrono>
 #include <exception>
-#include <type_traits>
 #include <typeinfo>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI::bullet {
-
-static_assert(std::is_same_v<btScalar, Real>, "jfpx and Bullet must have the same precision");
 
 namespace {
 

@@ -93,7 +93,9 @@ struct ConstraintSolver::Impl {
       forget_late_bodies();
       return SolverFallback::not_finite;
     }
-    gNumSplitImpulseRecoveries += static_cast<int>(report.pushed);
+    // Worlds of several threads share it, in Bullet as here.
+    std::atomic_ref(gNumSplitImpulseRecoveries)
+        .fetch_add(static_cast<int>(report.pushed), std::memory_order_relaxed);
     analyse(report, static_cast<int>(manifolds.size()));
     write_back();
     device.finished(on_device ? 0 : solver.levels());

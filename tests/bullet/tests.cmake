@@ -51,6 +51,22 @@ jfpx_add_test(bullet_algorithm_test SOURCES
   bullet/algorithm_test.cpp
   LINK jfpx_bullet)
 
+# Bullet as it must not be compiled is refused with a text that helps.
+function(jfpx_add_guard_test name text)
+  set(source ${CMAKE_CURRENT_BINARY_DIR}/bullet_guard.cpp)
+  file(WRITE ${source} "#include <jfpx/bullet/constraint_solver.hpp>\n")
+  set(includes ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include ${JFPX_BULLET_F32_INCLUDE_DIRS})
+  list(TRANSFORM includes PREPEND -I)
+  add_test(NAME bullet_guard_${name} COMMAND sh -c
+    "${CMAKE_CXX_COMPILER} -std=c++20 -fsyntax-only ${ARGN} \"$@\" 2>&1 && echo compiles" guard ${includes} ${source})
+  set_tests_properties(bullet_guard_${name} PROPERTIES PASS_REGULAR_EXPRESSION "${text}")
+endfunction()
+jfpx_add_guard_test(threads "keeps the bits of Bullet without BT_THREADSAFE" -DBT_THREADSAFE=1)
+jfpx_add_guard_test(vectors "keeps the bits of Bullet's scalar code" -DBT_USE_SSE)
+jfpx_add_guard_test(double "the two are mixed here" -DBT_USE_DOUBLE_PRECISION)
+jfpx_add_guard_test(float "the two are mixed here" -DJFPX_DOUBLE_PRECISION)
+jfpx_add_guard_test(none "^compiles" -DBT_THREADSAFE=0)
+
 if(JFPX_TOOL)
   jfpx_add_executable(bullet_stock_program SOURCES bullet/stock_program.cpp
     LINK jfpx_bullet3rd Threads::Threads)

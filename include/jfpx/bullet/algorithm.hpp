@@ -1,7 +1,7 @@
 /// The sphere-sphere algorithm alone, for programs that keep their own dispatcher.
 #pragma once
 
-#include <jfpx/config.hpp>
+#include <jfpx/bullet/abi.hpp>
 
 #include <BulletCollision/BroadphaseCollision/btDispatcher.h>
 #include <BulletCollision/CollisionDispatch/btActivatingCollisionAlgorithm.h>

@@ -1,6 +1,7 @@
 /// The constraint solver that puts jfpx into a Bullet program: one line changes, every bit stays.
 #pragma once
 
+#include <jfpx/bullet/abi.hpp>
 #include <jfpx/sphere_collider.hpp>
 
 #include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>

@@ -1,6 +1,7 @@
 /// The dispatcher that puts jfpx into a Bullet program: one line changes, every bit stays.
 #pragma once
 
+#include <jfpx/bullet/abi.hpp>
 #include <jfpx/bullet/dispatch_stats.hpp>
 #include <jfpx/sphere_collider.hpp>
 

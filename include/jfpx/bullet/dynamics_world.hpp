@@ -1,7 +1,7 @@
 /// The dynamics world that puts jfpx into a Bullet program: one line changes, every bit stays.
 #pragma once
 
-#include <jfpx/config.hpp>
+#include <jfpx/bullet/abi.hpp>
 
 #include <BulletDynamics/Dynamics/btDiscreteDynamicsWorld.h>
 

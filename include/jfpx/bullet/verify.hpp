@@ -1,6 +1,7 @@
 /// Cross-checks: two Bullet worlds against each other, and Bullet's contacts against jfpx's own.
 #pragma once
 
+#include <jfpx/bullet/abi.hpp>
 #include <jfpx/sphere_collider.hpp>
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>

@@ -1,0 +1,24 @@
+/// Refuses, when a program is compiled, a Bullet that is built in another way than the one whose
+/// bits jfpx keeps.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <LinearMath/btScalar.h>
+
+#include <type_traits>
+
+#if defined(BT_THREADSAFE) && BT_THREADSAFE
+#error "jfpx keeps the bits of Bullet without BT_THREADSAFE, as distributions ship it: undefine it"
+#endif
+#if defined(BT_USE_SSE) || defined(BT_USE_NEON)
+#error "jfpx keeps the bits of Bullet's scalar code: undefine BT_USE_SSE and BT_USE_NEON"
+#endif
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+static_assert(std::is_same_v<btScalar, Real>,
+              "jfpx::bullet goes with Bullet in float, jfpx::bullet_f64 with Bullet in double "
+              "(BT_USE_DOUBLE_PRECISION): the two are mixed here");
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
