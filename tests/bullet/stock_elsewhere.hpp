@@ -44,16 +44,33 @@ struct SolverElsewhere final : btSequentialImpulseConstraintSolver {
   }
 };
 
-inline bool stock_differs_from_itself(const RandomWorld& world) {
-  return run(world, nullptr, DispatcherElsewhere<0>::make) ||
-         run(world, nullptr, DispatcherElsewhere<0x3f>::make) ||
-         run(world, nullptr, DispatcherElsewhere<0xff>::make);
+/// The first step in which stock differs from stock with some other leftovers.
+template <class RunElsewhere>
+std::optional<int> first_accident_of_stock(const RunElsewhere& run_elsewhere) {
+  std::optional<int> first;
+  const auto look = [&](const std::optional<Failure>& failure) {
+    if (failure && (!first || failure->step < *first)) first = failure->step;
+  };
+  look(run_elsewhere.template operator()<0>());
+  look(run_elsewhere.template operator()<0x3f>());  // 0.75 in float
+  look(run_elsewhere.template operator()<0x7f>());  // huge
+  look(run_elsewhere.template operator()<0xbf>());  // 0.75 below zero
+  look(run_elsewhere.template operator()<0xff>());  // not a number
+  return first;
 }
 
-inline bool stock_differs_from_itself(const SolverWorld& world) {
-  return run(world, nullptr, SolverElsewhere<0>::parts, DispatcherElsewhere<0>::make) ||
-         run(world, nullptr, SolverElsewhere<0x3f>::parts, DispatcherElsewhere<0x3f>::make) ||
-         run(world, nullptr, SolverElsewhere<0xff>::parts, DispatcherElsewhere<0xff>::make);
+/// Whether the failure is Bullet's own: stock has parted ways with stock no later, and from then on
+/// nothing can be said of a third.
+inline bool is_accident_of_stock(const RandomWorld& world, const Failure& failure) {
+  const auto accident = first_accident_of_stock(
+      [&]<int kFill>() { return run(world, nullptr, DispatcherElsewhere<kFill>::make); });
+  return accident && *accident <= failure.step;
+}
+inline bool is_accident_of_stock(const SolverWorld& world, const Failure& failure) {
+  const auto accident = first_accident_of_stock([&]<int kFill>() {
+    return run(world, nullptr, SolverElsewhere<kFill>::parts, DispatcherElsewhere<kFill>::make);
+  });
+  return accident && *accident <= failure.step;
 }
 
 }  // namespace jfpx::inline JFPX_ABI::bullet
