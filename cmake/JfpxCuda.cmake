@@ -7,8 +7,12 @@ if(JFPX_CUDA STREQUAL "OFF")
 endif()
 
 if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
-  # Machine code for Hopper, and code that the driver compiles for anything from Turing on.
-  set(CMAKE_CUDA_ARCHITECTURES "75-virtual;90" CACHE STRING "CUDA architectures")
+  # Machine code for Hopper, and code that the driver compiles for anything from Turing on. In another
+  # project for our own targets only.
+  set(CMAKE_CUDA_ARCHITECTURES "75-virtual;90")
+  if(PROJECT_IS_TOP_LEVEL)
+    set(CMAKE_CUDA_ARCHITECTURES "75-virtual;90" CACHE STRING "CUDA architectures")
+  endif()
 endif()
 include(CheckLanguage)
 check_language(CUDA)

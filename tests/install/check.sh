@@ -15,7 +15,7 @@ configure() { # SOURCE FOLDER [ARGS]
   local source=$1 folder=$2
   shift 2
   rm -rf "$folder"
-  cmake -S "$source" -B "$folder" -G Ninja -DCMAKE_CXX_COMPILER="$CXX" \
+  cmake -S "$source" -B "$folder" -G Ninja --no-warn-unused-cli -DCMAKE_CXX_COMPILER="$CXX" \
     -DCMAKE_CXX_COMPILER_LAUNCHER="${LAUNCHER:-}" -DCMAKE_PREFIX_PATH="$prefix" \
     -DEXAMPLES="$root/examples" -DJFPX="$root" "$@"
 }
@@ -68,6 +68,15 @@ refused" ] || fail "$("$work/cmake/both")"
     PKG_CONFIG_PATH=$folder make -B -s -C "$work/makefile" -f "$here/makefile/Makefile" \
       EXAMPLES="$root/examples" PROGRAMS="$programs" CXX="${LAUNCHER:-} $CXX"
     run_programs "$work/makefile" -f64
+    ;;
+  # A CUDA program; where no device is, it says so.
+  cuda)
+    [ "$HAS_CUDA" = ON ] || { echo "skipped: built without CUDA"; exit 0; }
+    configure "$here/cuda" "$work/cuda" -DCMAKE_CUDA_COMPILER_LAUNCHER="${LAUNCHER:-}" -DCMAKE_CUDA_ARCHITECTURES=90-real >/dev/null
+    cmake --build "$work/cuda" >/dev/null
+    for program in cuda_stream cuda_stream_f64; do
+      "$work/cuda/$program" >"$work/cuda.txt" 2>&1 || grep -q '^cuda_stream: ' "$work/cuda.txt" || fail "$(cat "$work/cuda.txt")"
+    done
     ;;
   # A component that is not there, a version that is not this one: the user is told what to do.
   messages)
