@@ -127,13 +127,12 @@ RowSweepArgs GroupSolverCuda::make_args(const GroupSweeps& sweeps) {
   std::size_t least = 0;
   Carver inputs(input_.data());
   const GroupInputs in = carve_inputs(size_, &inputs, &least);
-  const std::size_t blocks = (size_.contacts + rows::kPlaceLanes - 1) / rows::kPlaceLanes;
-  const std::size_t places = blocks * rows::kPlaceLanes;
   rows::RowGroupArrays group{};
   const auto carve_rows = [&](std::byte* memory) {
     Carver carver(memory);
-    group.contact_rows = carver.take<Real>(places * rows::kContactFields);
-    group.friction_rows = carver.take<Real>(places * sweeps.directions * rows::kFrictionFields);
+    group.contact_rows = carver.take<Real>(size_.contacts * rows::kContactFields);
+    group.friction_rows =
+        carver.take<Real>(size_.contacts * sweeps.directions * rows::kFrictionFields);
     group.main.cells = carver.take<rows::Cell>(size_.bodies * rows::kBodyCells);
     group.push.cells = carver.take<rows::Cell>(size_.bodies * rows::kBodyCells);
     return carver.used();

@@ -22,8 +22,6 @@ struct alignas(16) Cell {
 };
 static_assert(sizeof(Cell) == 16);
 
-/// Rows are kept in blocks of so many, as a warp has lanes.
-inline constexpr std::uint32_t kPlaceLanes = 32;
 inline constexpr std::uint32_t kNoTorsion = UINT32_MAX;
 
 /// A contact in the order of the sweeps.
@@ -69,20 +67,18 @@ struct RowGroupArrays {
   const Real* inputs;             ///< by contact, kInputFields each
   const std::uint32_t* contacts;  ///< by place of `main`: the contact
   const std::uint32_t* torsions;  ///< by contact: which kTorsions rows; null if there are none
-  Real* contact_rows;             ///< by place, in blocks
-  Real* friction_rows;            ///< by place, in blocks, direction after direction
+  Real* contact_rows;             ///< by place
+  Real* friction_rows;            ///< by place, direction after direction
   Real* torsion_rows;             ///< kTorsions * kFrictionFields each
   ContactOutcome* outcomes;       ///< by contact
   Real* velocities;  ///< by body: linear, angular, and those of the push; kOutcomeVelocities each
   std::uint32_t bodies_count, directions;
 
   JFPX_HD Real* contact_at(std::uint32_t place) const {
-    return contact_rows + std::size_t{place / kPlaceLanes} * kPlaceLanes * kContactFields +
-           place % kPlaceLanes;
+    return contact_rows + std::size_t{place} * kContactFields;
   }
   JFPX_HD Real* friction_at(std::uint32_t place, std::uint32_t direction) const {
-    const std::size_t block = std::size_t{place / kPlaceLanes} * directions + direction;
-    return friction_rows + block * kPlaceLanes * kFrictionFields + place % kPlaceLanes;
+    return friction_rows + (std::size_t{place} * directions + direction) * kFrictionFields;
   }
 };
 inline constexpr int kOutcomeVelocities = 12;
@@ -124,18 +120,11 @@ struct LateResidual {
 };
 
 template <int kFields>
-JFPX_ROW void load_row(const Real* at, Real* row) {
+JFPX_ROW void copy_row(const Real* from, Real* to) {
 #if defined(__CUDA_ARCH__)
 #pragma unroll
 #endif
-  for (int i = 0; i < kFields; ++i) row[i] = at[i * static_cast<int>(kPlaceLanes)];
-}
-template <int kFields>
-JFPX_ROW void store_row(const Real* row, Real* at) {
-#if defined(__CUDA_ARCH__)
-#pragma unroll
-#endif
-  for (int i = 0; i < kFields; ++i) at[i * static_cast<int>(kPlaceLanes)] = row[i];
+  for (int i = 0; i < kFields; ++i) to[i] = from[i];
 }
 
 /// Makes the rows of the contact at a place, and sets its impulses against rolling to 0.
@@ -151,8 +140,8 @@ JFPX_ROW bool set_up_place(const RowGroupArrays& group, std::uint32_t index) {
   const bool has_second =
       set_up_contact<OneLane>(group.settings, in, group.bodies, ids, row, friction, second);
   set_up_friction<OneLane>(group.settings, in, group.bodies, ids, friction);
-  store_row<kContactFields>(row, group.contact_at(index));
-  store_row<kFrictionFields>(friction, group.friction_at(index, 0));
+  copy_row<kContactFields>(row, group.contact_at(index));
+  copy_row<kFrictionFields>(friction, group.friction_at(index, 0));
   ContactOutcome& outcome = group.outcomes[contact];
   store3<OneLane>(outcome.direction, load3<OneLane>(friction));
   if (group.directions == 2) {
@@ -162,7 +151,7 @@ JFPX_ROW bool set_up_place(const RowGroupArrays& group, std::uint32_t index) {
     }
     store3<OneLane>(friction, load3<OneLane>(second));
     set_up_friction<OneLane>(group.settings, in, group.bodies, ids, friction);
-    store_row<kFrictionFields>(friction, group.friction_at(index, 1));
+    copy_row<kFrictionFields>(friction, group.friction_at(index, 1));
   }
   store3<OneLane>(outcome.second, load3<OneLane>(second));
   outcome.has_second = has_second ? 1 : 0;
@@ -177,9 +166,9 @@ JFPX_ROW bool set_up_place(const RowGroupArrays& group, std::uint32_t index) {
 /// Hands out the impulses of the contact at a place.
 JFPX_ROW void finish_place(const RowGroupArrays& group, std::uint32_t index) {
   ContactOutcome& outcome = group.outcomes[group.contacts[index]];
-  outcome.impulse = group.contact_at(index)[kRowImpulse * kPlaceLanes];
+  outcome.impulse = group.contact_at(index)[kRowImpulse];
   for (std::uint32_t k = 0; k < group.directions; ++k) {
-    outcome.lateral[k] = group.friction_at(index, k)[kRowImpulse * kPlaceLanes];
+    outcome.lateral[k] = group.friction_at(index, k)[kRowImpulse];
   }
   if (group.directions == 1) outcome.lateral[1] = 0;
 }
@@ -273,17 +262,17 @@ class RowWalker {
     has_a_ = has_b_ = false;
     const Real* const contact = group_.contact_at(place_.row);
     if (kPush || step_ <= RowStep::both) {
-      load_row<kContactFields>(contact, row_);
+      copy_row<kContactFields>(contact, row_);
     } else {
-      pressure_ = contact[kRowImpulse * static_cast<int>(kPlaceLanes)];
+      pressure_ = contact[kRowImpulse];
       if (step_ == RowStep::frictions) {
-        load_row<kFrictionFields>(group_.friction_at(place_.row, 0), row_);
+        copy_row<kFrictionFields>(group_.friction_at(place_.row, 0), row_);
       }
     }
   }
   JFPX_ROW void keep_impulse() const {
     if (kPush || step_ == RowStep::contacts || step_ == RowStep::both) {
-      group_.contact_at(place_.row)[kImpulse * static_cast<int>(kPlaceLanes)] =
+      group_.contact_at(place_.row)[kImpulse] =
           kPush || step_ == RowStep::contacts ? row_[kImpulse] : pressure_;
     }
   }
@@ -329,7 +318,7 @@ class RowWalker {
         solve_friction_rows(factors, late);
       } else if (step_ == RowStep::both) {
         pressure_ = row_[kRowImpulse];
-        load_row<kFrictionFields>(group_.friction_at(place_.row, 0), row_);
+        copy_row<kFrictionFields>(group_.friction_at(place_.row, 0), row_);
         solve_friction_rows(factors, late);
       } else if (step_ == RowStep::torsions) {
         solve_torsion_rows(factors, late);
@@ -345,9 +334,9 @@ class RowWalker {
     if (!(0 < pressure_)) return;
     for (std::uint32_t k = 0; k < program_.directions; ++k) {
       Real* const at = group_.friction_at(place_.row, k);
-      if (k > 0) load_row<kFrictionFields>(at, row_);
+      if (k > 0) copy_row<kFrictionFields>(at, row_);
       solve_friction<WalkLane, kFactors>(bodies_, velocities_, factors, contact, row_, late);
-      at[kRowImpulse * static_cast<int>(kPlaceLanes)] = row_[kRowImpulse];
+      at[kRowImpulse] = row_[kRowImpulse];
     }
   }
   JFPX_ROW void solve_torsion_rows(const Real* factors, LateResidual* late) {

@@ -99,11 +99,9 @@ class GroupDouble final : public GroupSolver {
   }
 
   rows::RowGroupArrays arrays(const GroupSweeps& sweeps) {
-    const std::size_t places = (size_.contacts + rows::kPlaceLanes - 1) / rows::kPlaceLanes *
-                               std::size_t{rows::kPlaceLanes};
     // Poisoned, so that what nobody writes shows.
-    contact_rows_.assign(places * rows::kContactFields, kPoison);
-    friction_rows_.assign(places * sweeps.directions * rows::kFrictionFields, kPoison);
+    contact_rows_.assign(size_.contacts * rows::kContactFields, kPoison);
+    friction_rows_.assign(size_.contacts * sweeps.directions * rows::kFrictionFields, kPoison);
     outcomes_.resize(size_.contacts);
     velocities_.assign(size_.bodies * rows::kOutcomeVelocities, kPoison);
     cells_.assign(2 * size_.bodies * rows::kBodyCells, {});
