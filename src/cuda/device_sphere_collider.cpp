@@ -93,7 +93,9 @@ struct DeviceSphereCollider::Impl {
   DeviceBuffer<unsigned char> plan;
   DeviceBuffer<SphereInstance> sorted;
   DeviceBuffer<std::uint32_t> ids;
-  DeviceBuffer<std::uint32_t> partners;
+  DeviceBuffer<TurningStates> states;
+  DeviceBuffer<CoarseBuckets> coarse;
+  DeviceBuffer<unsigned char> scratch;
 
   DeviceBuffer<OverflowPair> overflow;
   DeviceBuffer<std::uint32_t> crowded, giants, crowded_b;
@@ -101,6 +103,11 @@ struct DeviceSphereCollider::Impl {
 
 void DeviceSphereCollider::Impl::reserve(std::size_t n, std::size_t contacts) {
   const DeviceGuard guard(device);
+  const std::size_t most = std::max(n, spheres_reserved);
+  if (uses_grid(most)) {
+    const std::size_t bytes = grid_scratch_bytes(most, std::max(contacts, contacts_reserved));
+    scratch.grow(pool, stream, bytes, "scratch memory");
+  }
   if (n > spheres_reserved || counters.size() == 0) {
     reserve_spheres(n);
     spheres_reserved = n;
@@ -130,9 +137,11 @@ void DeviceSphereCollider::Impl::reserve_spheres(std::size_t n) {
     plan.grow(pool, stream, grid_plan_bytes(), "the plan of the cells");
     ranks.grow(pool, stream, n, "ranks in the cell table");
     places.grow(pool, stream, n, "places in the cell table");
-    sorted.grow(pool, stream, n, "sorted spheres");
+    sorted.grow(pool, stream, n + 2, "sorted spheres");
     ids.grow(pool, stream, n, "sorted indices");
-    partners.grow(pool, stream, n * kSlots, "partners");
+    coarse.grow(pool, stream, 1, "coarse buckets");
+    states.grow(pool, stream, 1, "states of searches");
+    JFPX_CUDA_TRY(cudaMemsetAsync(states.data(), 0, sizeof(TurningStates), stream));
   }
 }
 
@@ -185,28 +194,30 @@ void DeviceSphereCollider::Impl::find_among_all_pairs(const SphereInstance* d_sp
 
 void DeviceSphereCollider::Impl::find_in_grid(const SphereInstance* d_spheres, std::uint32_t n,
                                               const SearchOutput& output) {
-  JFPX_CUDA_TRY(cudaMemsetAsync(counters.data(), 0, sizeof(SearchState), stream));
   const std::uint32_t table_size = table_size_for(n);
-  const GridArgs grid{.spheres = d_spheres,
-                      .n = n,
-                      .table_size = table_size,
-                      .table = table.data(),
-                      .places = places.data(),
-                      .ranks = ranks.data(),
-                      .sorted = sorted.data(),
-                      .ids = ids.data(),
-                      .table_sums = block_sums.data(),
-                      .count_sums = block_sums.data() + kMostGridBlocks,
-                      .counts = counts(),
-                      .partners = partners.data(),
-                      .overflow = overflow.data(),
-                      .capacity = contacts_reserved,
-                      .offsets = offsets.data(),
-                      .crowded = crowded.data(),
-                      .giants = giants.data(),
-                      .crowded_b = crowded_b.data(),
-                      .state = state(),
-                      .plan = reinterpret_cast<GridPlan*>(plan.data())};
+  GridArgs grid{.spheres = d_spheres,
+                .n = n,
+                .table_size = table_size,
+                .table = table.data(),
+                .places = places.data(),
+                .ranks = ranks.data(),
+                .sorted = sorted.data(),
+                .ids = ids.data(),
+                .table_sums = block_sums.data(),
+                .count_sums = block_sums.data() + kMostGridBlocks,
+                .counts = counts(),
+                .coarse = coarse.data(),
+
+                .overflow = overflow.data(),
+                .capacity = contacts_reserved,
+                .offsets = offsets.data(),
+                .crowded = crowded.data(),
+                .giants = giants.data(),
+                .crowded_b = crowded_b.data(),
+                .state = state(),
+                .states = states.data(),
+                .plan = reinterpret_cast<GridPlan*>(plan.data())};
+  use_grid_scratch(grid, scratch.data());
   launch_grid_search(grid, output, grid_blocks, stream);
 }
 

@@ -1,175 +1,142 @@
-/// Large N: spheres in the cells of a hierarchy of grids, by counting sort; only neighbouring cells
-/// are looked at. No world bounds, no cell size to choose, any mix of radii.
+/// Large N: spheres in the cells of a hierarchy of grids, sorted by counting; only neighbouring
+/// cells are looked at. No world bounds, no cell size to choose, any mix of radii. A launch a
+/// phase, each with as many threads as it can have.
 #include "src/cuda/grid_build.cuh"
 #include "src/cuda/grid_emit.cuh"
+#include "src/cuda/grid_launch.hpp"
+#include "src/cuda/grid_neighbours.cuh"
 #include "src/cuda/grid_search.cuh"
+#include "src/cuda/grid_sort.cuh"
 
 #include <algorithm>
-#include <cooperative_groups.h>
 
 namespace jfpx::inline JFPX_ABI::cuda {
 namespace {
 
-namespace cg = cooperative_groups;
-
-// --- all phases in one launch: up to some 10^5 spheres, where launches would take most of the time
-
-constexpr unsigned kBlocksPerMultiprocessor = sizeof(Real) == 4 ? 4 : 3;
-
-union PhaseStorage {
-  BuildStorage build;
-  SearchStorage<true> dense_search;
-  SearchStorage<false> search;
-  EmitStorage emit;
-  CrowdedStorage crowded;
-};
-
-__global__ void __launch_bounds__(kGridThreads, kBlocksPerMultiprocessor)
-    grid_search(const __grid_constant__ GridArgs args,
-                const __grid_constant__ SearchOutput output) {
-  __shared__ PhaseStorage storage;
-  __shared__ GridPlan plan;
-  const cg::grid_group grid = cg::this_grid();
-  const bool one = blockIdx.x == 0 && threadIdx.x == 0;
-
-  measure(args, storage.build);
-  grid.sync();
-  if (args.state->valid_before != 0) {
-    if (one) write_count(output, 0, first_invalid(args.state), false);
-    return;
-  }
-  if (needs_sample(*args.state)) {
-    sample_cells(args, storage.build);
-    grid.sync();
-  }
-  make_plan(args, plan);
-  assign(args, plan);
-  grid.sync();
-  sum_table(args, plan, storage.build);
-  grid.sync();
-  scan_table(args, plan, storage.build);
-  grid.sync();
-  scatter(args, true);
-  grid.sync();
-  if (plan.dense) {
-    Searcher<true>(args, plan, storage.dense_search).run();
-  } else {
-    Searcher<false>(args, plan, storage.search).run();
-  }
-  grid.sync();
-  const bool complete = is_complete(args, output);
-  if (one) write_count(output, args.state->contacts, kNoSphere, complete);
-  if (!complete) return;
-  sum_counts(args, storage.emit);
-  grid.sync();
-  emit(args, output, storage.emit);
-  if (args.state->overflow == 0) return;
-  grid.sync();
-  place_overflow(args);
-  grid.sync();
-  emit_crowded(args, output, storage.crowded);
-}
-
-void launch_cooperative(const GridArgs& args, const SearchOutput& output, unsigned most_blocks,
-                        cudaStream_t stream) {
-  GridArgs shared_out = args;
-  // While there are threads to spare, several share a sphere: half the device is enough.
-  const std::uint64_t threads = std::uint64_t{most_blocks} * kGridThreads / 2;
-  while (shared_out.lanes < 8 && 2 * shared_out.lanes * std::uint64_t{args.n} <= threads) {
-    shared_out.lanes *= 2;
-  }
-  const std::uint64_t wanted = (shared_out.lanes * std::uint64_t{args.n} - 1) / kGridThreads + 1;
-  cudaLaunchAttribute cooperative{};
-  cooperative.id = cudaLaunchAttributeCooperative;
-  cooperative.val.cooperative = 1;
-  cudaLaunchConfig_t config{};
-  config.gridDim = static_cast<unsigned>(std::min<std::uint64_t>(wanted, most_blocks));
-  config.blockDim = kGridThreads;
-  config.stream = stream;
-  config.attrs = &cooperative;
-  config.numAttrs = 1;
-  JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, grid_search, shared_out, output));
-}
-
-// --- a launch a phase: more spheres, each phase with as many threads as it can have
-
-template <auto kPhase>
-__global__ void __launch_bounds__(kGridThreads) build_phase(GridArgs args) {
-  wait_for_previous_kernel();
-  __shared__ BuildStorage storage;
-  kPhase(args, storage);
-}
+/// Dynamic shared memory of a block.
+extern __shared__ __align__(32) unsigned char dynamic_storage[];
 
 __device__ bool is_valid_input(const GridArgs& args) { return args.state->valid_before == 0; }
 
-__device__ void sample_phase(const GridArgs& args, BuildStorage& s) {
-  if (is_valid_input(args) && needs_sample(*args.state)) sample_cells(args, s);
+__global__ void __launch_bounds__(kGridThreads) measure_phase(GridArgs args) {
+  wait_for_previous_kernel();
+  __shared__ BuildStorage storage;
+  clear(args.coarse->counts, sizeof(args.coarse->counts));
+  measure(args, storage);
 }
 
-/// By one block.
+/// The last block makes the plan.
 __global__ void __launch_bounds__(kGridThreads) plan_phase(GridArgs args) {
   wait_for_previous_kernel();
+  __shared__ BuildStorage storage;
   __shared__ GridPlan plan;
   if (!is_valid_input(args)) return;
+  if (needs_sample(*args.state)) sample_cells(args, storage);
+  if (!is_last_block(args.state->blocks_sampled)) return;
   make_plan(args, plan);
   if (threadIdx.x == 0) *args.plan = plan;
 }
 
-template <auto kPhase>
-__global__ void __launch_bounds__(kGridThreads) planned_phase(GridArgs args) {
+__global__ void __launch_bounds__(kCountThreads) coarse_phase(GridArgs args) {
   wait_for_previous_kernel();
   __shared__ GridPlan plan;
-  __shared__ BuildStorage storage;
+  __shared__ std::uint32_t counts[kCoarseBuckets];
+  __shared__ unsigned long long warp_sums[kCountThreads / 32];
   if (!is_valid_input(args)) return;
   copy_plan(args, plan);
-  kPhase(args, plan, storage);
+  if (!plan.single) clear_counts(args);
+  count_coarse(args, plan, counts, warp_sums);
 }
 
-__device__ void assign_phase(const GridArgs& args, const GridPlan& plan, BuildStorage&) {
-  assign(args, plan);
-}
-
-template <auto kPhase>
-__global__ void __launch_bounds__(kGridThreads) sort_phase(GridArgs args) {
+template <bool kLarge>
+__global__ void __launch_bounds__(TileStorage<kLarge>::kThreads, 1) part_phase(GridArgs args) {
   wait_for_previous_kernel();
-  if (is_valid_input(args)) kPhase(args);
+  __shared__ GridPlan plan;
+  __shared__ unsigned long long warp_sums[TileStorage<kLarge>::kThreads / 32];
+  if (!is_valid_input(args)) return;
+  copy_plan(args, plan);
+  part(args, plan, *reinterpret_cast<TileStorage<kLarge>*>(dynamic_storage), warp_sums);
 }
-__device__ void scatter_ids(const GridArgs& args) { scatter(args, false); }
 
-constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 5 : 3;  // of a multiprocessor
+__global__ void __launch_bounds__(kMostSortThreads, 1) sort_phase(GridArgs args, SortRoom room) {
+  wait_for_previous_kernel();
+  __shared__ GridPlan plan;
+  __shared__ unsigned long long warp_sums[kMostSortThreads / 32];
+  if (!is_valid_input(args)) return;
+  copy_plan(args, plan);
+  SortStorage storage = sort_storage(dynamic_storage, room, warp_sums);
+  sort_coarse(args, plan, room, storage);
+}
+
+constexpr unsigned kNeighbourBlocks = sizeof(Real) == 4 ? 5 : 3;  // of a multiprocessor
+constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 5 : 3;
+
+__global__ void __launch_bounds__(kGridThreads, kNeighbourBlocks)
+    neighbour_phase(GridArgs args, SearchOutput output) {
+  wait_for_previous_kernel();
+  __shared__ NeighbourStorage storage;
+  __shared__ GridPlan plan;
+  if (!is_valid_input(args) || !args.plan->single) return;
+  copy_plan(args, plan);
+  NeighbourSearcher(args, plan, output, storage).run(blockIdx.x * kGridThreads + threadIdx.x);
+}
 
 template <bool kDense>
 __global__ void __launch_bounds__(kGridThreads, kSearchBlocks) search_phase(GridArgs args) {
   wait_for_previous_kernel();
   __shared__ SearchStorage<kDense> storage;
   __shared__ GridPlan plan;
-  if (!is_valid_input(args) || args.plan->dense != kDense) return;
+  if (!is_valid_input(args) || args.plan->single || args.plan->dense != kDense) return;
   copy_plan(args, plan);
   Searcher<kDense>(args, plan, storage).run();
 }
 
+union SumStorage {
+  CopyStorage copy;
+  EmitStorage emit;
+};
 __global__ void __launch_bounds__(kGridThreads) sum_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
-  __shared__ EmitStorage storage;
+  __shared__ SumStorage storage;
   const bool complete = is_valid_input(args) && is_complete(args, output);
   if (blockIdx.x == 0 && threadIdx.x == 0) {
     write_count(output, args.state->contacts, first_invalid(args.state), complete);
   }
-  if (complete) sum_counts(args, storage);
+  if (!complete) return;
+  if (args.plan->single) {
+    sum_lists(args, storage.copy);
+  } else {
+    sum_counts(args, storage.emit);
+  }
+}
+
+__global__ void __launch_bounds__(kGridThreads) copy_phase(GridArgs args, SearchOutput output) {
+  wait_for_previous_kernel();
+  __shared__ CopyStorage storage;
+  if (!is_valid_input(args) || !args.plan->single || !is_complete(args, output)) return;
+  copy_lists(args, output, storage);
 }
 
 __global__ void __launch_bounds__(kGridThreads) emit_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ EmitStorage storage;
-  if (is_valid_input(args) && is_complete(args, output)) emit(args, output, storage);
+  if (!is_valid_input(args) || args.plan->single || !is_complete(args, output)) return;
+  emit(args, output, storage);
 }
 
 __device__ bool has_crowded(const GridArgs& args, const SearchOutput& output) {
   return args.state->overflow != 0 && is_valid_input(args) && is_complete(args, output);
 }
-__global__ void __launch_bounds__(kGridThreads) overflow_phase(GridArgs args, SearchOutput output) {
+__global__ void __launch_bounds__(kGridThreads) list_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
-  if (has_crowded(args, output)) place_overflow(args);
+  __shared__ GridPlan plan;
+  if (!has_crowded(args, output)) return;
+  copy_plan(args, plan);
+  if (plan.single) {
+    list_crowded(args, plan);
+  } else {
+    place_overflow(args);
+  }
 }
 __global__ void __launch_bounds__(kGridThreads) crowded_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
@@ -177,47 +144,109 @@ __global__ void __launch_bounds__(kGridThreads) crowded_phase(GridArgs args, Sea
   if (has_crowded(args, output)) emit_crowded(args, output, storage);
 }
 
+/// Launches a kernel with `bytes` of dynamic shared memory.
+template <typename... Parameters, typename... Arguments>
+void launch_with(std::size_t bytes, void (*kernel)(Parameters...), unsigned blocks,
+                 unsigned threads, cudaStream_t stream, const Arguments&... arguments) {
+  JFPX_CUDA_TRY(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                     static_cast<int>(bytes)));
+  launch(kernel, blocks, 1, threads, bytes, stream, arguments...);
+}
+
+constexpr unsigned kFewBlocks = 132 * 4, kManyBlocks = kMostGridBlocks;
+
+template <bool kLarge>
+void launch_part(const GridArgs& args, cudaStream_t stream) {
+  using Tile = TileStorage<kLarge>;
+  launch_with(sizeof(Tile), part_phase<kLarge>, (args.n - 1) / Tile::kSpheres + 1, Tile::kThreads,
+              stream, args);
+}
+
+/// `shared_bytes` is what a block can have.
+void launch_sort(const GridArgs& args, std::size_t shared_bytes, cudaStream_t stream) {
+  constexpr unsigned kCountBlocks = 132;
+  constexpr std::size_t kOthers = 2048;  // bytes of shared memory that are taken otherwise
+  const std::size_t most = shared_bytes - kOthers;
+  launch(coarse_phase, kCountBlocks, 1, kCountThreads, 0, stream, args);
+  if (sizeof(TileStorage<true>) <= most) {
+    launch_part<true>(args, stream);
+  } else {
+    launch_part<false>(args, stream);
+  }
+  // Evenly spread, a coarse bucket has between n / kCoarseBuckets spheres and twice as many. If
+  // they don't fit, they are not brought into shared memory, and there is more of it for buckets.
+  constexpr std::uint32_t kMostBuckets = 8192, kMostSpheres = (1 << 16) - 4;
+  const std::uint32_t buckets = args.table_size / kCoarseBuckets, spheres = args.n / kCoarseBuckets;
+  SortRoom room{std::clamp(buckets, 4u, kMostBuckets), 0};
+  const auto fitting = static_cast<std::uint32_t>((most - room.bytes()) / SortRoom{0, 1}.bytes());
+  if (spheres <= fitting) {
+    room.spheres = std::min({fitting, 4 * spheres, kMostSpheres}) / 4 * 4;
+  } else {
+    room.buckets = std::min(buckets, static_cast<std::uint32_t>(most / sizeof(std::uint32_t)));
+    room.buckets = room.buckets / 4 * 4;
+  }
+  const bool is_large = spheres > 2048;
+  launch_with(room.bytes(), sort_phase, kCoarseBuckets, is_large ? kMostSortThreads : 512, stream,
+              args, room);
+}
+
 void launch_phases(const GridArgs& args, const SearchOutput& output, cudaStream_t stream) {
-  constexpr unsigned kFew = 132 * 4, kMany = kMostGridBlocks;
   const auto run = [&](auto kernel, unsigned blocks, const auto&... arguments) {
-    launch(kernel, blocks, 1, kGridThreads, stream, arguments...);
+    launch(kernel, blocks, 1, kGridThreads, 0, stream, arguments...);
   };
+  int device = 0, shared_bytes = 0;
+  JFPX_CUDA_TRY(cudaGetDevice(&device));
+  JFPX_CUDA_TRY(
+      cudaDeviceGetAttribute(&shared_bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));
   const auto chunks = static_cast<unsigned>((std::uint64_t{args.n} - 1) / kGridThreads + 1);
-  run(build_phase<measure>, kFew, args);
-  run(build_phase<sample_phase>, kLastLevel + 1, args);
-  run(plan_phase, 1, args);
-  run(planned_phase<assign_phase>, kFew, args);
-  run(planned_phase<sum_table>, kFew, args);
-  run(planned_phase<scan_table>, kFew, args);
-  run(sort_phase<scatter_ids>, kMany, args);
-  run(sort_phase<gather>, kMany, args);
-  run(search_phase<true>, chunks, args);
-  run(search_phase<false>, chunks, args);
-  run(sum_phase, kMany, args, output);
-  run(emit_phase, kMany, args, output);
-  run(overflow_phase, kFew, args, output);
-  run(crowded_phase, kFew, args, output);
+  JFPX_CUDA_TRY(cudaMemsetAsync(args.state, 0, sizeof(SearchState), stream));
+  run(measure_phase, kFewBlocks, args);
+  run(plan_phase, kLastLevel + 1, args);
+  launch_sort(args, static_cast<std::size_t>(shared_bytes), stream);
+  run(neighbour_phase, chunks, args, output);
+  run(search_phase<true>, std::min(chunks, 132 * kSearchBlocks), args);
+  run(search_phase<false>, std::min(chunks, 132 * kSearchBlocks), args);
+  run(sum_phase, kManyBlocks, args, output);
+  run(copy_phase, kCopyBlocks, args, output);
+  run(emit_phase, kManyBlocks, args, output);
+  run(list_phase, kFewBlocks, args, output);
+  run(crowded_phase, kFewBlocks, args, output);
 }
 
 /// Up to here all phases are one launch (measured on an H200: bench/results).
-constexpr std::uint32_t kMostCooperative = 1 << 18;
+constexpr std::uint32_t kMostInOneLaunch = 1 << 18;
+
+constexpr std::size_t rounded(std::size_t bytes) { return (bytes + 255) / 256 * 256; }
 
 }  // namespace
 
-unsigned most_grid_blocks(int device) {
-  int per_multiprocessor = 0, multiprocessors = 0;
-  JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&per_multiprocessor, grid_search,
-                                                              kGridThreads, 0));
-  JFPX_CUDA_TRY(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
-  return std::min(static_cast<unsigned>(per_multiprocessor * multiprocessors), kMostGridBlocks);
+std::size_t grid_plan_bytes() { return sizeof(GridPlan); }
+
+std::size_t grid_scratch_bytes(std::size_t n, std::size_t capacity) {
+  const std::size_t slots = kDirectSlots * std::min<std::size_t>(n, kMostDirect);
+  const std::size_t cells = rounded(slots * sizeof(SphereInstance)) + slots * sizeof(std::uint32_t);
+  const std::size_t parted = rounded(n * sizeof(SphereInstance)) + n * sizeof(std::uint32_t);
+  const std::size_t found =
+      std::max(n * kSlots * sizeof(std::uint32_t), capacity * sizeof(SphereContact));
+  return std::max({cells, parted, found}) + 256;
 }
 
-std::size_t grid_plan_bytes() { return sizeof(GridPlan); }
+void use_grid_scratch(GridArgs& args, unsigned char* scratch) {
+  args.partners = reinterpret_cast<std::uint32_t*>(scratch);
+  args.stage = reinterpret_cast<SphereContact*>(scratch);
+  args.parted = reinterpret_cast<SphereInstance*>(scratch);
+  args.parted_ids =
+      reinterpret_cast<std::uint32_t*>(scratch + rounded(args.n * sizeof(SphereInstance)));
+  if (args.n > kMostDirect) return;
+  args.slots = args.parted;
+  args.slot_ids = reinterpret_cast<std::uint32_t*>(
+      scratch + rounded(std::size_t{kDirectSlots} * args.n * sizeof(SphereInstance)));
+}
 
 void launch_grid_search(const GridArgs& args, const SearchOutput& output, unsigned most_blocks,
                         cudaStream_t stream) {
-  if (args.n <= kMostCooperative) {
-    launch_cooperative(args, output, most_blocks, stream);
+  if (args.n <= kMostInOneLaunch) {
+    launch_in_one(args, output, most_blocks, stream);
   } else {
     launch_phases(args, output, stream);
   }

@@ -32,6 +32,21 @@ __device__ inline Real from_ordered(unsigned long long key) {
   return std::bit_cast<Real>(static_cast<RealBits>(bits >> kShift));
 }
 
+/// Spheres as other phases of the same launch wrote them: not through the read-only cache.
+__device__ inline SphereInstance load_sorted(const SphereInstance* p) {
+  SphereInstance s;
+  if constexpr (sizeof(Real) == 4) {
+    const float4 v = *reinterpret_cast<const float4*>(p);
+    s = {{v.x, v.y, v.z}, v.w};
+  } else {
+    const double2 lo = reinterpret_cast<const double2*>(p)[0];
+    const double2 hi = reinterpret_cast<const double2*>(p)[1];
+    s = {{static_cast<Real>(lo.x), static_cast<Real>(lo.y), static_cast<Real>(hi.x)},
+         static_cast<Real>(hi.y)};
+  }
+  return s;
+}
+
 /// The box of cells of one level that spheres can be in, and its first bucket.
 struct LevelBox {
   std::int32_t x0, y0, z0;
@@ -46,7 +61,10 @@ struct LevelBox {
 struct GridPlan {
   GridScale scale;
   bool dense;
+  bool single;                 ///< dense, and all spheres are on level 0
+  Real inverse_x, inverse_yz;  ///< inverse cell widths of level 0
   std::uint32_t buckets;
+  std::uint32_t coarse_shift;  ///< 2^coarse_shift consecutive buckets are a coarse bucket
   LevelBox boxes[kLastLevel + 1];
 
   /// Cell x of the row has the bucket row + x, modulo `mask() + 1`.
@@ -66,7 +84,15 @@ struct GridPlan {
     return (row<kDense>(cell.y, cell.z, cell.level) + static_cast<std::uint32_t>(cell.x)) &
            mask<kDense>();
   }
-  __device__ std::uint32_t bucket(const GridCell& cell) const {
+  __device__ std::uint32_t bucket_of(const SphereInstance& s) const {
+    if (single) {
+      const LevelBox& box = boxes[0];
+      const std::int32_t y = cell_of(s.centre.y, inverse_yz) - box.y0;
+      const std::int32_t z = cell_of(s.centre.z, inverse_yz) - box.z0;
+      const std::int32_t x = cell_of(s.centre.x, inverse_x) - box.x0;
+      return static_cast<std::uint32_t>((z * box.ny + y) * box.nx + x);
+    }
+    const GridCell cell = grid_cell_of(s, scale);
     return dense ? bucket<true>(cell) : bucket<false>(cell);
   }
 };
@@ -134,7 +160,12 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
       if (!dense) scale.x_cells = 1;
       plan.scale = scale;
       plan.dense = dense;
+      plan.single = dense && scale.last_level == 0;
+      plan.inverse_yz = inverse_width(half_cell_of(scale.half_0, 0));
+      plan.inverse_x = plan.inverse_yz * scale.x_cells;
       plan.buckets = dense ? static_cast<std::uint32_t>(all_cells) : args.table_size;
+      plan.coarse_shift = 0;
+      while ((plan.buckets - 1) >> plan.coarse_shift >= kCoarseBuckets) ++plan.coarse_shift;
     }
   }
   __syncthreads();
@@ -151,21 +182,27 @@ __device__ inline void copy_plan(const GridArgs& args, GridPlan& plan) {
   __syncthreads();
 }
 
-/// The part of `count` items that this block takes: consecutive ones, from a multiple of `unit` on.
+/// The part of `count` items that this block of `blocks` takes: consecutive ones, from a multiple
+/// of `unit` on; none, if it is beyond them.
 struct Span {
   std::uint64_t first, past;
 };
-__device__ inline Span span_of_block(std::uint64_t count, unsigned unit) {
+__device__ inline Span span_of_block(std::uint64_t count, unsigned unit, unsigned blocks) {
+  if (blockIdx.x >= blocks) return {0, 0};
   const std::uint64_t units = (count + unit - 1) / unit;
-  const std::uint64_t first = units * blockIdx.x / gridDim.x * unit;
-  const std::uint64_t past = units * (blockIdx.x + 1) / gridDim.x * unit;
+  const std::uint64_t first = units * blockIdx.x / blocks * unit;
+  const std::uint64_t past = units * (blockIdx.x + 1) / blocks * unit;
   return {first, past < count ? past : count};
+}
+__device__ inline Span span_of_block(std::uint64_t count, unsigned unit) {
+  return span_of_block(count, unit, gridDim.x);
 }
 
 /// Sum of `value` over the threads of the block before this one; `total` becomes that of all.
 __device__ inline unsigned long long block_exclusive_sum(unsigned long long value,
                                                          unsigned long long* warp_sums,
-                                                         unsigned long long& total) {
+                                                         unsigned long long& total,
+                                                         unsigned warps) {
   unsigned long long inclusive = value;
   for (unsigned d = 1; d < 32; d *= 2) {
     const unsigned long long below = __shfl_up_sync(kFullWarp, inclusive, d);
@@ -175,11 +212,17 @@ __device__ inline unsigned long long block_exclusive_sum(unsigned long long valu
   __syncthreads();
   unsigned long long before = inclusive - value;
   total = 0;
-  for (unsigned w = 0; w < kGridWarps; ++w) {
+  for (unsigned w = 0; w < warps; ++w) {
     if (w < threadIdx.x / 32) before += warp_sums[w];
     total += warp_sums[w];
   }
   return before;
+}
+template <unsigned kWarps = kGridWarps>
+__device__ inline unsigned long long block_exclusive_sum(unsigned long long value,
+                                                         unsigned long long* warp_sums,
+                                                         unsigned long long& total) {
+  return block_exclusive_sum(value, warp_sums, total, kWarps);
 }
 
 /// Sum over the block, for all its threads.

@@ -20,6 +20,18 @@ __device__ inline std::uint64_t grid_thread() {
 }
 __device__ inline std::uint64_t all_threads() { return std::uint64_t{gridDim.x} * kGridThreads; }
 
+/// Whether all other blocks have passed here; then what they wrote before can be read. All threads
+/// of a block.
+__device__ inline bool is_last_block(std::uint32_t& blocks_passed) {
+  __shared__ bool last;
+  __threadfence();
+  __syncthreads();
+  if (threadIdx.x == 0) last = atomicAdd(&blocks_passed, 1u) == gridDim.x - 1;
+  __syncthreads();
+  __threadfence();
+  return last;
+}
+
 /// Clears `bytes` bytes and up to 15 more.
 __device__ inline void clear(void* data, std::size_t bytes) {
   uint4* const to = static_cast<uint4*>(data);
@@ -27,11 +39,16 @@ __device__ inline void clear(void* data, std::size_t bytes) {
   for (std::size_t i = grid_thread(); i < count; i += all_threads()) to[i] = {0, 0, 0, 0};
 }
 
-/// Validates; finds the widest and the narrowest cell that a radius asks for, and the box of all
-/// centres; clears what the other phases count in.
-__device__ inline void measure(const GridArgs& args, BuildStorage& s) {
+__device__ inline void clear_table(const GridArgs& args) {
   clear(args.table, (std::size_t{args.table_size} + 1) * sizeof(*args.table));
+}
+__device__ inline void clear_counts(const GridArgs& args) {
   clear(args.counts, args.n * sizeof(*args.counts));
+}
+
+/// Validates; finds the widest and the narrowest cell that a radius asks for, and the box of all
+/// centres.
+__device__ inline void measure(const GridArgs& args, BuildStorage& s) {
   constexpr Real kNone = -std::numeric_limits<Real>::max();
   // Largest of: half cell, minus half cell, x, -x, y, -y, z, -z.
   Real most[8] = {kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};
@@ -146,9 +163,8 @@ __device__ inline void assign(const GridArgs& args, const GridPlan& plan) {
     for (unsigned k = 0; k < kBatch; ++k) {
       const std::uint64_t i = first + k * all_threads();
       const SphereInstance sphere = load_sphere(args.spheres + (i < args.n ? i : first));
-      const GridCell cell = grid_cell_of(sphere, plan.scale);
-      buckets[k] = plan.bucket(cell);
-      if (!is_far(sphere)) level_bits |= 1u << cell.level;
+      buckets[k] = plan.bucket_of(sphere);
+      if (!plan.single && !is_far(sphere)) level_bits |= 1u << level_of(sphere, plan.scale);
     }
 #pragma unroll
     for (unsigned k = 0; k < kBatch; ++k) {
@@ -201,8 +217,8 @@ __device__ inline void scan_table(const GridArgs& args, const GridPlan& plan, Bu
   }
 }
 
-/// Sorts spheres by bucket: their indices and, if `all_of_it`, themselves. Places become positions.
-__device__ inline void scatter(const GridArgs& args, bool all_of_it) {
+/// Sorts spheres by bucket. Places become positions.
+__device__ inline void scatter(const GridArgs& args) {
   for (std::uint64_t first = grid_thread(); first < args.n; first += kBatch * all_threads()) {
     std::uint32_t to[kBatch];
 #pragma unroll
@@ -217,25 +233,7 @@ __device__ inline void scatter(const GridArgs& args, bool all_of_it) {
       if (i >= args.n) break;
       args.places[i] = to[k];
       args.ids[to[k]] = static_cast<std::uint32_t>(i);
-      if (all_of_it) args.sorted[to[k]] = load_sphere(args.spheres + i);
-    }
-  }
-}
-
-/// Brings the spheres into the order of their indices. Random reads are cheaper than random writes
-/// of half a sector, which memory has to merge.
-__device__ inline void gather(const GridArgs& args) {
-  for (std::uint64_t first = grid_thread(); first < args.n; first += kBatch * all_threads()) {
-    SphereInstance spheres[kBatch];
-#pragma unroll
-    for (unsigned k = 0; k < kBatch; ++k) {
-      const std::uint64_t i = first + k * all_threads();
-      spheres[k] = load_sphere(args.spheres + args.ids[i < args.n ? i : first]);
-    }
-#pragma unroll
-    for (unsigned k = 0; k < kBatch; ++k) {
-      const std::uint64_t i = first + k * all_threads();
-      if (i < args.n) args.sorted[i] = spheres[k];
+      args.sorted[to[k]] = load_sphere(args.spheres + i);
     }
   }
 }

@@ -38,6 +38,11 @@ __device__ inline void put_off(const GridArgs& args, std::uint32_t a, std::uint3
     args.crowded[atomicAdd(&args.state->crowded, 1u)] = a;
   }
   args.offsets[a] = offset;
+}
+/// The same where the first partners are in slots.
+__device__ inline void put_off_slots(const GridArgs& args, std::uint32_t a, std::uint32_t count,
+                                     unsigned long long offset) {
+  put_off(args, a, count, offset);
   for (std::uint32_t k = 0; k < kSlots; ++k) {
     args.crowded_b[offset + k] = args.partners[std::size_t{args.places[a]} * kSlots + k];
   }
@@ -73,6 +78,18 @@ __device__ inline void sort_partners(const std::uint32_t* partners, std::uint32_
     sorted[to] = b;
     owners[k] = static_cast<std::uint8_t>(threadIdx.x);
   }
+}
+
+/// A lane puts a contact on its warp's stage, for write_staged(); a pair goes to its place at once.
+__device__ inline void write_or_stage(const SearchOutput& output, unsigned long long at,
+                                      std::uint32_t a, std::uint32_t b, const SphereInstance& sa,
+                                      const SphereInstance& sb, unsigned char* staged) {
+  if (output.contacts == nullptr) {
+    output.pairs[at] = {a, b};
+    return;
+  }
+  const PairResult r = shared::test_sphere_pair(sa, sb);
+  reinterpret_cast<SphereContact*>(staged)[lane_id()] = {a, b, r.normal, r.distance};
 }
 
 /// A warp writes the contacts that its lanes hold to consecutive places, in whole sectors.
@@ -126,7 +143,7 @@ __device__ inline unsigned long long emit_tile(const GridArgs& args, const Searc
   const unsigned long long offset = before + (sums >> kFewBits);
   sort_partners(partners, few, s.partners + start, s.owners + start);
   s.shift[threadIdx.x] = offset - start;
-  if (count > kSlots) put_off(args, a, count, offset);
+  if (count > kSlots) put_off_slots(args, a, count, offset);
   __syncthreads();
   const bool stages = fews == total >> kFewBits && output.contacts != nullptr;
   for (std::uint32_t first = threadIdx.x & ~31u; first < fews; first += kGridThreads) {
@@ -167,16 +184,11 @@ __device__ inline void place_overflow(const GridArgs& args) {
   }
 }
 
-/// A warp sorts up to kLongList partners (Batcher's bitonic network) and writes their contacts.
-__device__ inline void emit_crowded_sphere(const GridArgs& args, const SearchOutput& output,
-                                           std::uint32_t a, std::uint32_t* ids) {
-  const unsigned long long offset = args.offsets[a];
-  const std::uint32_t length = args.ranks[a];
+/// A warp sorts `length` ids by Batcher's bitonic network; there is room up to a power of two.
+__device__ inline void sort_ids(std::uint32_t* ids, std::uint32_t length) {
   std::uint32_t padded = 32;
   while (padded < length) padded *= 2;
-  for (unsigned i = lane_id(); i < padded; i += 32) {
-    ids[i] = i < length ? args.crowded_b[offset + i] : ~0u;
-  }
+  for (unsigned i = length + lane_id(); i < padded; i += 32) ids[i] = ~0u;
   for (unsigned run = 2; run <= padded; run *= 2) {
     for (unsigned distance = run / 2; distance != 0; distance /= 2) {
       __syncwarp();
@@ -190,9 +202,28 @@ __device__ inline void emit_crowded_sphere(const GridArgs& args, const SearchOut
     }
   }
   __syncwarp();
+}
+
+/// A warp writes the contacts of up to kLongList partners in order. Few of them are not sorted:
+/// each goes where as many are smaller.
+__device__ inline void emit_crowded_sphere(const GridArgs& args, const SearchOutput& output,
+                                           std::uint32_t a, std::uint32_t* ids) {
+  constexpr std::uint32_t kFew = 64;
+  const unsigned long long offset = args.offsets[a];
+  const std::uint32_t length = args.ranks[a];
+  for (unsigned i = lane_id(); i < length; i += 32) ids[i] = args.crowded_b[offset + i];
+  const bool few = length <= kFew;
+  if (!few) sort_ids(ids, length);
+  __syncwarp();
   const SphereInstance sphere = load_sphere(args.spheres + a);
   for (unsigned i = lane_id(); i < length; i += 32) {
-    write_contact(output, offset + i, a, ids[i], sphere, load_sphere(args.spheres + ids[i]));
+    const std::uint32_t b = ids[i];
+    std::uint32_t rank = i;
+    if (few) {
+      rank = 0;
+      for (unsigned k = 0; k < length; ++k) rank += ids[k] < b ? 1 : 0;
+    }
+    write_contact(output, offset + rank, a, b, sphere, load_sphere(args.spheres + b));
   }
   __syncwarp();
 }

@@ -7,7 +7,7 @@
 namespace jfpx::inline JFPX_ABI::cuda {
 
 inline constexpr unsigned kRowsAtOnce = 5;  // rows that a thread looks up before it tests
-inline constexpr unsigned kHeld = 8;        // candidates past the filter that a thread keeps
+inline constexpr unsigned kHeld = 8;        // touching candidates that a thread keeps
 
 /// Also the row that was looked at, where a candidate may be of another one.
 struct HeldRows {
@@ -19,24 +19,9 @@ struct NoRows {};
 template <bool kDense>
 struct SearchStorage {
   uint2 ranges[kRowsAtOnce][kGridThreads];  // candidates of a row
-  std::uint32_t held[kHeld][kGridThreads];  // positions of candidates past the filter
+  std::uint32_t held[kHeld][kGridThreads];  // positions of touching candidates
   std::conditional_t<kDense, NoRows, HeldRows> rows;
 };
-
-/// Spheres as other phases of the same launch wrote them: not through the read-only cache.
-__device__ inline SphereInstance load_sorted(const SphereInstance* p) {
-  SphereInstance s;
-  if constexpr (sizeof(Real) == 4) {
-    const float4 v = *reinterpret_cast<const float4*>(p);
-    s = {{v.x, v.y, v.z}, v.w};
-  } else {
-    const double2 lo = reinterpret_cast<const double2*>(p)[0];
-    const double2 hi = reinterpret_cast<const double2*>(p)[1];
-    s = {{static_cast<Real>(lo.x), static_cast<Real>(lo.y), static_cast<Real>(hi.x)},
-         static_cast<Real>(hi.y)};
-  }
-  return s;
-}
 
 /// A warp takes spheres in the order of the table; `lanes` threads share a sphere, each takes every
 /// so many-th row. A sphere looks at its own level (each pair from the sphere whose cell comes
@@ -182,8 +167,12 @@ class Searcher {
         const std::uint32_t first = position_of(at), second = position_of(min(at + 1, end - 1));
         const SphereInstance one = load_sorted(args_.sorted + first);
         const SphereInstance other = load_sorted(args_.sorted + second);
-        const bool first_hits = may_touch(self_, one);
-        const bool second_hits = may_touch(self_, other) && second != first;
+        const Closeness to_one = closeness(self_, one), to_other = closeness(self_, other);
+        bool first_hits = to_one.near, second_hits = second != first && to_other.near;
+        if ((first_hits && !to_one.sure) || (second_hits && !to_other.sure)) {
+          first_hits = first_hits && touch(self_, one);
+          second_hits = second_hits && touch(self_, other);
+        }
         if (first_hits) hold(first, key);
         if (second_hits) hold(second, key);
         at += 2;
@@ -201,7 +190,7 @@ class Searcher {
     ++held_;
   }
 
-  /// Takes those of the held candidates that touch and are in the row that was looked at. All lanes
+  /// Takes those of the held candidates that are in the row that was looked at. All lanes
   /// together, so that each has something to do: candidate i of the warp belongs to the lane with
   /// the first sum beyond i. Where places are hashed, others are in the same buckets by chance;
   /// they have their own turn, or none. A touching sphere of that row is in one of the cells looked
@@ -216,10 +205,7 @@ class Searcher {
     __syncwarp();
     for (unsigned first = 0; first < all; first += 32) {
       const unsigned i = first + lane_id();
-      unsigned owner = 0;
-      for (unsigned step = 16; step != 0; step /= 2) {
-        if (__shfl_sync(kFullWarp, sum, owner + step - 1) <= i) owner += step;
-      }
+      const unsigned owner = owner_of(i, sum);
       const unsigned owners_sum = __shfl_sync(kFullWarp, sum, owner);
       const unsigned owners_held = __shfl_sync(kFullWarp, held_, owner);
       const std::uint32_t position = __shfl_sync(kFullWarp, position_, owner);
@@ -234,15 +220,13 @@ class Searcher {
 
   __device__ void accept(std::uint32_t position, std::uint32_t other_position, unsigned slot,
                          unsigned thread) {
-    const SphereInstance self = load_sorted(args_.sorted + position);
-    const SphereInstance other = load_sorted(args_.sorted + other_position);
     const std::uint32_t id = args_.ids[position], other_id = args_.ids[other_position];
     if constexpr (!kDense) {
+      const SphereInstance other = load_sorted(args_.sorted + other_position);
       const std::uint32_t key = storage_.rows.keys[slot][thread];
       if (!is_in_row(other, key, storage_.rows.levels[slot][thread])) return;
     }
     const bool first = id < other_id;
-    if (shared::test_sphere_pair(first ? self : other, first ? other : self).touching == 0) return;
     ++found_;
     add_pair(first ? position : other_position, min(id, other_id), max(id, other_id));
   }
@@ -295,7 +279,7 @@ class Searcher {
   std::int32_t x0_ = 0, x1_ = 0, y0_ = 0, y1_ = 0, z1_ = 0, y_ = 0, z_ = 0;
   bool own_row_is_next_ = false;
   unsigned ranges_ = 0;  // rows that were looked up
-  unsigned held_ = 0;    // candidates that wait for the exact test
+  unsigned held_ = 0;    // touching candidates that wait to be taken
 };
 
 }  // namespace jfpx::inline JFPX_ABI::cuda

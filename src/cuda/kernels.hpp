@@ -25,6 +25,11 @@ struct alignas(16) SearchState {
   std::uint32_t giants;              ///< entries of GridArgs::giants
   std::uint32_t has_far;             ///< 1: there are spheres far from the origin (grid_cells.hpp)
   std::uint32_t next_chunk;          ///< spheres given to warps
+  std::uint32_t blocks_sampled;      ///< blocks that have done their part of the sample
+  std::uint32_t blocks_counted;      ///< blocks that have counted coarse buckets
+  std::uint32_t cell_is_full;        ///< 1: a cell of the direct search has no room
+  std::uint32_t block_is_full;       ///< 1: a block of the direct search found too many pairs
+  unsigned long long staged;         ///< contacts that the search put on the stage
   std::uint32_t same_cell[32];       ///< pairs of a sample in the same cell, by level
 };
 
@@ -105,6 +110,30 @@ struct OverflowPair {
   std::uint32_t a, b, rank;
 };
 
+/// A search in one launch leaves the state of the next one clear.
+struct TurningStates {
+  SearchState states[2];
+  std::uint32_t turn;  ///< whose number is even or odd: the state of the next search
+  std::uint32_t padding[3];
+};
+
+/// Spheres that are not sorted but put into cells: for so many, at most, ...
+inline constexpr std::uint32_t kMostDirect = 24'000;
+/// ... cells have this much room for each of them.
+inline constexpr std::uint32_t kDirectSlots = 12;
+
+/// Coarse buckets of a search of many launches.
+inline constexpr unsigned kCoarseBuckets = 2048;
+struct CoarseBuckets {
+  /// In a sector of its own: atomics on numbers that share one wait for each other.
+  struct alignas(32) Counter {
+    std::uint32_t value;
+  };
+  Counter counts[kCoarseBuckets];
+  Counter next[kCoarseBuckets];  ///< place of the next sphere
+  std::uint32_t starts[kCoarseBuckets + 4];
+};
+
 /// Blocks that share out the table and the spheres, at most.
 inline constexpr unsigned kMostGridBlocks = 132 * 16;
 struct GridPlan;
@@ -114,27 +143,40 @@ std::size_t grid_plan_bytes();
 /// Arrays are 16-byte aligned, with room for 15 bytes more than said.
 struct GridArgs {
   const SphereInstance* spheres;
-  std::uint32_t n;                 ///< at least 1
-  std::uint32_t table_size;        ///< a power of two
-  std::uint32_t* table;            ///< [table_size + 1] histogram, then starts, of the buckets
-  std::uint32_t* places;           ///< [n] bucket, then position in their order, of a sphere
-  std::uint32_t* ranks;            ///< [n] rank in the bucket, then pairs, of a sphere
-  SphereInstance* sorted;          ///< [n] spheres by position
-  std::uint32_t* ids;              ///< [n] their indices
-  unsigned long long* table_sums;  ///< [blocks] spheres in the buckets of each block
-  unsigned long long* count_sums;  ///< [blocks] pairs of the spheres of each block
-  std::uint32_t* counts;           ///< [n] pairs of which a sphere is the first, by position
-  std::uint32_t* partners;         ///< [n][kSlots] the first b's found of a sphere, by position
-  OverflowPair* overflow;          ///< [capacity] the other pairs
-  unsigned long long capacity;     ///< most pairs that there is room for
-  unsigned long long* offsets;     ///< [n] contacts before those of a, if a has more than kSlots
-  std::uint32_t* crowded;          ///< [capacity / kSlots + 1] a's with more than kSlots pairs
-  std::uint32_t* giants;           ///< [capacity / kLongList + 1] a's with more than kLongList
-  std::uint32_t* crowded_b;        ///< [capacity] b's of both, by place in the output
+  std::uint32_t n;                    ///< at least 1
+  std::uint32_t table_size;           ///< a power of two
+  std::uint32_t* table;               ///< [table_size + 1] histogram, then starts, of the buckets
+  std::uint32_t* places;              ///< [n] bucket, then position in their order, of a sphere
+  std::uint32_t* ranks;               ///< [n] rank in the bucket, then pairs, of a sphere
+  SphereInstance* sorted;             ///< [n] spheres by position
+  std::uint32_t* ids;                 ///< [n] their indices
+  unsigned long long* table_sums;     ///< [blocks] spheres in the buckets of each block
+  unsigned long long* count_sums;     ///< [blocks] pairs of the spheres of each block
+  std::uint32_t* counts;              ///< [n] pairs of which a sphere is the first, by position
+  std::uint32_t* partners = nullptr;  ///< [n][kSlots] the first b's found of a sphere, by position
+  SphereContact* stage = nullptr;     ///< [capacity] contacts (or pairs) by the position of their a
+  SphereInstance* slots = nullptr;    ///< [kDirectSlots * n] room in cells, null if n > kMostDirect
+  std::uint32_t* slot_ids = nullptr;  ///< [kDirectSlots * n]
+  SphereInstance* parted = nullptr;   ///< [n] spheres by coarse bucket
+  std::uint32_t* parted_ids = nullptr;  ///< [n]
+  CoarseBuckets* coarse;
+  OverflowPair* overflow;       ///< [capacity] the other pairs
+  unsigned long long capacity;  ///< most pairs that there is room for
+  unsigned long long* offsets;  ///< [n] contacts before those of a, if a has more than kSlots;
+                                ///< before, where the stage has those of a: StagedList
+  std::uint32_t* crowded;       ///< [capacity / kSlots + 1] a's with more than kSlots pairs
+  std::uint32_t* giants;        ///< [capacity / kLongList + 1] a's with more than kLongList
+  std::uint32_t* crowded_b;     ///< [capacity] b's of both, by place in the output
   SearchState* state;
+  TurningStates* states;    ///< for searches of one launch, instead of `state`
   GridPlan* plan;           ///< for searches of several launches
   std::uint32_t lanes = 1;  ///< threads that share a sphere in the search: a power of two
 };
+
+/// Bytes of memory in which arrays of one search follow those that it no longer needs.
+std::size_t grid_scratch_bytes(std::size_t n, std::size_t capacity);
+/// Sets the pointers into it.
+void use_grid_scratch(GridArgs& args, unsigned char* scratch);
 
 /// Blocks of the search that `device` holds at a time. It must be the current device.
 unsigned most_grid_blocks(int device);

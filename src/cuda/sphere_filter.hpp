@@ -1,7 +1,8 @@
-/// A cheap test that no touching pair fails: what passes goes through the exact formula.
+/// Cheap tests that are right wherever they decide: what they leave in doubt goes through the exact
+/// formula.
 #pragma once
 
-#include <jfpx/contact.hpp>
+#include "src/shared/sphere_pair.hpp"
 
 #include <limits>
 
@@ -16,8 +17,13 @@ JFPX_HD inline Real fused(Real a, Real b, Real c) {
 #endif
 }
 
-/// False only if shared::test_sphere_pair(a, b) says that a and b do not touch. Spheres must be
-/// valid (finite, radius > 0).
+/// What can be said of two spheres without a square root.
+struct Closeness {
+  bool near;  ///< false only if shared::test_sphere_pair() says that they do not touch
+  bool sure;  ///< true only if it says that they touch
+};
+
+/// Spheres must be valid (finite, radius > 0).
 ///
 /// Proof. u = epsilon/2 is the unit roundoff, t = 2^-150 (float) half the smallest subnormal. Both
 /// tests start from the same differences dx, dy, dz; D is their true sum of squares, s the sum of
@@ -25,19 +31,38 @@ JFPX_HD inline Real fused(Real a, Real b, Real c) {
 ///  1. The exact test computes q >= D(1-u)^3 - 3t and touches iff fl(sqrt(q)) <= s, so that
 ///     q <= s^2 / (1-u)^2 and D <= (s^2 / (1-u)^2 + 3t) / (1-u)^3.
 ///  2. This test computes d2 <= D(1+u)^3 + 3t <= s^2 (1 + 9u) + 8t for any u <= 2^-24.
-///  3. It passes iff d2 <= bound, and bound >= (s^2 (1-u) - t)(1+16u)(1-u) + min(1-u)
+///  3. They are near iff d2 <= bound, and bound >= (s^2 (1-u) - t)(1+16u)(1-u) + min(1-u)
 ///     >= s^2 (1 + 9u) + 8t, because min, the smallest normal number, is 2^24 t or more.
 ///  4. Overflow: if d2 overflows to infinity then s^2 (1+9u) + 8t exceeds the largest finite
 ///  number,
 ///     and the bound, which is larger by 4u s^2, overflows as well; infinity <= infinity passes.
-JFPX_HD inline bool may_touch(const SphereInstance& a, const SphereInstance& b) {
+///  5. It is sure iff fl(d2 (1+16u) + min) < fl(s^2), where d2 >= D(1-u)^3 - 3t. Let both sides be
+///     finite. Then d2 (1+15u) + min/2 < s^2 (1+u) + t, and the exact test computes
+///     q <= D(1+u)^3 + 3t <= d2 (1+7u) + 8t < (s^2 (1+u) + t)(1-7u) - min/4 + 8t < s^2 (1-5u), as
+///     min/4 exceeds 9t. So fl(sqrt(q)) <= s (1-2u)(1+u) < s: they touch.
+///  6. If fl(s^2) overflows in 5, the left side is finite, hence d2 (1+7u) + 8t, hence q; s^2
+///  exceeds
+///     all finite numbers, hence sqrt(q) < s and, as rounding is monotone, fl(sqrt(q)) <= s.
+JFPX_HD inline Closeness closeness(const SphereInstance& a, const SphereInstance& b) {
   constexpr Real kSlack = 1 + 8 * std::numeric_limits<Real>::epsilon();
+  constexpr Real kLeast = std::numeric_limits<Real>::min();
   const Real dx = a.centre.x - b.centre.x;
   const Real dy = a.centre.y - b.centre.y;
   const Real dz = a.centre.z - b.centre.z;
   const Real s = a.radius + b.radius;
-  const Real d2 = fused(dx, dx, fused(dy, dy, dz * dz));
-  return !(d2 > fused(s * s, kSlack, std::numeric_limits<Real>::min()));
+  const Real d2 = fused(dx, dx, fused(dy, dy, dz * dz)), s2 = s * s;
+  return {!(d2 > fused(s2, kSlack, kLeast)), fused(d2, kSlack, kLeast) < s2};
+}
+
+JFPX_HD inline bool may_touch(const SphereInstance& a, const SphereInstance& b) {
+  return closeness(a, b).near;
+}
+
+/// What shared::test_sphere_pair(a, b) says about valid spheres, nearly always without its square
+/// root.
+JFPX_HD inline bool touch(const SphereInstance& a, const SphereInstance& b) {
+  const Closeness c = closeness(a, b);
+  return c.near && (c.sure || shared::test_sphere_pair(a, b).touching != 0);
 }
 
 }  // namespace jfpx::inline JFPX_ABI::cuda

@@ -11,13 +11,14 @@ namespace jfpx::inline JFPX_ABI::cuda {
 /// kernel must begin with wait_for_previous_kernel(). Saves about a microsecond a kernel.
 template <typename... Parameters, typename... Arguments>
 void launch(void (*kernel)(Parameters...), unsigned blocks_x, unsigned blocks_y, unsigned threads,
-            cudaStream_t stream, const Arguments&... arguments) {
+            std::size_t shared_bytes, cudaStream_t stream, const Arguments&... arguments) {
   cudaLaunchAttribute overlap{};
   overlap.id = cudaLaunchAttributeProgrammaticStreamSerialization;
   overlap.val.programmaticStreamSerializationAllowed = 1;
   cudaLaunchConfig_t config{};
   config.gridDim = dim3(blocks_x, blocks_y);
   config.blockDim = threads;
+  config.dynamicSmemBytes = shared_bytes;
   config.stream = stream;
   config.attrs = &overlap;
   config.numAttrs = 1;
@@ -43,6 +44,23 @@ __device__ inline unsigned warp_reduce(unsigned value, Combine combine) {
     value = combine(value, __shfl_xor_sync(kFullWarp, value, static_cast<int>(d)));
   }
   return value;
+}
+
+__device__ inline unsigned warp_max(unsigned value) {
+#if __CUDA_ARCH__ >= 800
+  return __reduce_max_sync(kFullWarp, value);
+#else
+  return warp_reduce(value, [](unsigned p, unsigned q) { return p > q ? p : q; });
+#endif
+}
+
+/// Of sums that grow from lane to lane: the lane with the first one beyond i, or the last lane.
+__device__ inline unsigned owner_of(std::uint32_t i, std::uint32_t sum) {
+  unsigned owner = 0;
+  for (unsigned step = 16; step != 0; step /= 2) {
+    if (__shfl_sync(kFullWarp, sum, owner + step - 1) <= i) owner += step;
+  }
+  return owner;
 }
 
 /// Loads of data that no thread writes during the kernel.

@@ -1,6 +1,7 @@
 /// What only the CUDA collider promises: streams, graphs, threads, any size.
 #include <jfpx/error.hpp>
 
+#include "src/cuda/kernels.hpp"
 #include "src/shared/sphere_pair.hpp"
 #include "tests/cuda/cuda_fixture.hpp"
 
@@ -50,6 +51,35 @@ TEST_F(Cuda, AllPairsInBandsAgreesWithTheGrid) {
       << seed_note();
 }
 
+// Up to kMostDirect spheres of about one size are not sorted, unless a cell has no room for its
+// spheres or a block none for its pairs: both are found out half-way. The oracle is x86.
+TEST_F(Cuda, SearchesWithoutSortingEqualX86) {
+  const auto x86 = make_sphere_collider({.backend = Backend::x86, .threads = 0});
+  const auto collider = make(SphereAlgorithm::sorted_tiles);
+  Random random(base_seed());
+  const auto check = [&](const Spheres& spheres, const char* what) {
+    for (int repeat = 0; repeat < 2; ++repeat) {
+      ASSERT_TRUE(same_bits(collider->find_contacts(spheres), x86->find_contacts(spheres)))
+          << what << ", N = " << spheres.size() << ", " << seed_note();
+    }
+  };
+  for (const std::size_t n : {10'000u, kMostDirect - 1, kMostDirect, kMostDirect + 1, 100'000u}) {
+    check(make_gas(n, Real(0.5), 3, random), "gas");
+  }
+  auto crowded = make_gas(20'000, Real(0.5), 3, random);
+  for (std::size_t i = 0; i < 40; ++i) crowded[500 * i].centre = crowded[7].centre;
+  check(crowded, "a cell without room");
+  // Eight spheres a cell, each in contact with 32: the first 45 have nearly all of these as b.
+  auto dense = make_lattice(28, Real(0.5));
+  for (SphereInstance& s : dense) s.radius = Real(0.5);
+  for (std::size_t i = dense.size(); i > 1; --i) std::swap(dense[i - 1], dense[random.below(i)]);
+  check(dense, "a block without room");
+  check(make_gas(10'000, Real(0.5), 3, random), "gas again");
+  auto wide = make_gas(20'000, Real(0.5), 3, random);
+  for (SphereInstance& s : wide) s.radius *= random.uniform(Real(0.4), 1);
+  check(wide, "radii that differ by more than two");
+}
+
 // Beyond 2^18 spheres each phase of the grid is a launch of its own. The oracle is x86.
 TEST_F(Cuda, SearchesOfManyLaunchesEqualX86) {
   constexpr std::size_t kEdge = 1 << 18;
@@ -62,6 +92,20 @@ TEST_F(Cuda, SearchesOfManyLaunchesEqualX86) {
     const auto spheres = sphere_kind(name).make(n, random);
     ASSERT_TRUE(same_bits(collider->find_contacts(spheres), x86->find_contacts(spheres)))
         << name << ", N = " << n << ", " << seed_note();
+  }
+}
+
+// A crowd in a corner of a gas: more spheres than one block sorts in shared memory, and lists of
+// all lengths for spheres of one level.
+TEST_F(Cuda, SearchesOfManyLaunchesStandACrowd) {
+  const auto x86 = make_sphere_collider({.backend = Backend::x86, .threads = 0});
+  const auto collider = make();
+  Random random(base_seed());
+  for (const std::size_t crowd : {1'000, 5'000}) {
+    auto spheres = make_gas(280'000, Real(0.5), 3, random);
+    for (std::size_t i = 0; i < crowd; ++i) spheres[53 * i].centre *= Real(0.03);
+    ASSERT_TRUE(same_bits(collider->find_contacts(spheres), x86->find_contacts(spheres)))
+        << crowd << ", " << seed_note();
   }
 }
 

@@ -81,7 +81,40 @@ TEST(CudaFilter, LetsEveryTouchingPairThrough) {
   EXPECT_GT(touching, 200'000) << "the hunt must meet touching pairs";
 }
 
-// A filter that lets everything through would pass the test above.
+TEST(CudaFilter, DecidesAsTheExactTestDoes) {
+  Random random(base_seed());
+  int sure = 0, apart = 0;
+  for (int i = 0; i < 1'000'000; ++i) {
+    Pair p = nearly_touching(random);
+    p.a.radius *= 1 + static_cast<Real>(random.below(32)) * Limits::epsilon();
+    if (!is_finite(p.a.radius)) continue;
+    const bool touching = shared::test_sphere_pair(p.a, p.b).touching != 0;
+    apart += touching ? 0 : 1;
+    if (cuda::closeness(p.a, p.b).sure) {
+      ++sure;
+      ASSERT_TRUE(touching) << "pair " << i << ", " << seed_note();
+    }
+    ASSERT_EQ(cuda::touch(p.a, p.b), touching) << "pair " << i << ", " << seed_note();
+  }
+  EXPECT_GT(sure, 50'000) << "the hunt must meet pairs without doubt";
+  EXPECT_GT(apart, 50'000) << "the hunt must meet pairs that are just apart";
+}
+
+// Where the square of the sum overflows, nothing is sure but what is true.
+TEST(CudaFilter, IsRightWhereSquaresOverflow) {
+  const Real huge = std::sqrt(Limits::max());
+  for (const Real scale : {Real(0.25), Real(0.5), Real(0.70710678), Real(1), Real(1.5), Real(2)}) {
+    for (const Real distance : {Real(0), Real(0.5), Real(0.9999999), Real(1), Real(1.9999999),
+                                Real(2), Real(2.0000002), Real(2.5)}) {
+      const SphereInstance a{{0, 0, 0}, huge * scale},
+          b{{huge * scale * distance, 0, 0}, huge * scale};
+      const bool touching = shared::test_sphere_pair(a, b).touching != 0;
+      EXPECT_EQ(cuda::touch(a, b), touching) << scale << " " << distance;
+    }
+  }
+}
+
+// A filter that lets everything through would pass the first test.
 TEST(CudaFilter, StopsPairsThatAreApartByMoreThanRoundings) {
   Random random(base_seed());
   for (int i = 0; i < 100'000; ++i) {

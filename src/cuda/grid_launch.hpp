@@ -1,0 +1,12 @@
+/// How the search among many spheres is launched.
+#pragma once
+
+#include "src/cuda/kernels.hpp"
+
+namespace jfpx::inline JFPX_ABI::cuda {
+
+/// All phases in one launch of `most_blocks` blocks at most, with barriers between them.
+void launch_in_one(const GridArgs& args, const SearchOutput& output, unsigned most_blocks,
+                   cudaStream_t stream);
+
+}  // namespace jfpx::inline JFPX_ABI::cuda
