@@ -130,13 +130,12 @@ __global__ void __launch_bounds__(kEmitThreads) mask_emit(MaskEmitArgs args) {
 
 void launch_all_pairs(const AllPairsArgs& args, cudaStream_t stream) {
   const TileGrid grid = tile_grid(args);
-  launch(all_pairs, grid.width(), grid.height(), kThreads, 0, stream, args);
+  launch(all_pairs, grid.width(), grid.height(), kThreads, stream, args);
 }
 
 void launch_mask_emit(const MaskEmitArgs& args, cudaStream_t stream) {
   constexpr unsigned kRowsPerBlock = kEmitThreads / 32;
-  launch(mask_emit, (args.rows + kRowsPerBlock - 1) / kRowsPerBlock, 1, kEmitThreads, 0, stream,
-         args);
+  launch(mask_emit, (args.rows + kRowsPerBlock - 1) / kRowsPerBlock, 1, kEmitThreads, stream, args);
 }
 
 }  // namespace jfpx::inline JFPX_ABI::cuda

@@ -25,8 +25,10 @@ __global__ void __launch_bounds__(kGridThreads) measure_phase(GridArgs args) {
   measure(args, storage);
 }
 
+constexpr unsigned kPlanThreads = 1024;
+
 /// The last block makes the plan.
-__global__ void __launch_bounds__(kGridThreads) plan_phase(GridArgs args) {
+__global__ void __launch_bounds__(kPlanThreads) plan_phase(GridArgs args) {
   wait_for_previous_kernel();
   __shared__ BuildStorage storage;
   __shared__ GridPlan plan;
@@ -144,22 +146,22 @@ __global__ void __launch_bounds__(kGridThreads) crowded_phase(GridArgs args, Sea
   if (has_crowded(args, output)) emit_crowded(args, output, storage);
 }
 
-/// Launches a kernel with `bytes` of dynamic shared memory.
+/// Launches a kernel with more shared memory than a block may have by default.
 template <typename... Parameters, typename... Arguments>
-void launch_with(std::size_t bytes, void (*kernel)(Parameters...), unsigned blocks,
-                 unsigned threads, cudaStream_t stream, const Arguments&... arguments) {
+void launch_large(std::size_t bytes, void (*kernel)(Parameters...), unsigned blocks,
+                  unsigned threads, cudaStream_t stream, const Arguments&... arguments) {
   JFPX_CUDA_TRY(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                      static_cast<int>(bytes)));
-  launch(kernel, blocks, 1, threads, bytes, stream, arguments...);
+  launch_sharing(bytes, kernel, blocks, 1, threads, stream, arguments...);
 }
 
-constexpr unsigned kFewBlocks = 132 * 4, kManyBlocks = kMostGridBlocks;
+constexpr unsigned kFewBlocks = 132 * 4, kCrowdedBlocks = 132 * 6, kManyBlocks = kMostGridBlocks;
 
 template <bool kLarge>
 void launch_part(const GridArgs& args, cudaStream_t stream) {
   using Tile = TileStorage<kLarge>;
-  launch_with(sizeof(Tile), part_phase<kLarge>, (args.n - 1) / Tile::kSpheres + 1, Tile::kThreads,
-              stream, args);
+  launch_large(sizeof(Tile), part_phase<kLarge>, (args.n - 1) / Tile::kSpheres + 1, Tile::kThreads,
+               stream, args);
 }
 
 /// `shared_bytes` is what a block can have.
@@ -167,7 +169,7 @@ void launch_sort(const GridArgs& args, std::size_t shared_bytes, cudaStream_t st
   constexpr unsigned kCountBlocks = 132;
   constexpr std::size_t kOthers = 2048;  // bytes of shared memory that are taken otherwise
   const std::size_t most = shared_bytes - kOthers;
-  launch(coarse_phase, kCountBlocks, 1, kCountThreads, 0, stream, args);
+  launch(coarse_phase, kCountBlocks, 1, kCountThreads, stream, args);
   if (sizeof(TileStorage<true>) <= most) {
     launch_part<true>(args, stream);
   } else {
@@ -186,13 +188,13 @@ void launch_sort(const GridArgs& args, std::size_t shared_bytes, cudaStream_t st
     room.buckets = room.buckets / 4 * 4;
   }
   const bool is_large = spheres > 2048;
-  launch_with(room.bytes(), sort_phase, kCoarseBuckets, is_large ? kMostSortThreads : 512, stream,
-              args, room);
+  launch_large(room.bytes(), sort_phase, kCoarseBuckets, is_large ? kMostSortThreads : 512, stream,
+               args, room);
 }
 
 void launch_phases(const GridArgs& args, const SearchOutput& output, cudaStream_t stream) {
   const auto run = [&](auto kernel, unsigned blocks, const auto&... arguments) {
-    launch(kernel, blocks, 1, kGridThreads, 0, stream, arguments...);
+    launch(kernel, blocks, 1, kGridThreads, stream, arguments...);
   };
   int device = 0, shared_bytes = 0;
   JFPX_CUDA_TRY(cudaGetDevice(&device));
@@ -201,7 +203,7 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, cudaStream_
   const auto chunks = static_cast<unsigned>((std::uint64_t{args.n} - 1) / kGridThreads + 1);
   JFPX_CUDA_TRY(cudaMemsetAsync(args.state, 0, sizeof(SearchState), stream));
   run(measure_phase, kFewBlocks, args);
-  run(plan_phase, kLastLevel + 1, args);
+  launch(plan_phase, kLastLevel + 1, 1, kPlanThreads, stream, args);
   launch_sort(args, static_cast<std::size_t>(shared_bytes), stream);
   run(neighbour_phase, chunks, args, output);
   run(search_phase<true>, std::min(chunks, 132 * kSearchBlocks), args);
@@ -210,7 +212,7 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, cudaStream_
   run(copy_phase, kCopyBlocks, args, output);
   run(emit_phase, kManyBlocks, args, output);
   run(list_phase, kFewBlocks, args, output);
-  run(crowded_phase, kFewBlocks, args, output);
+  run(crowded_phase, kCrowdedBlocks, args, output);
 }
 
 /// Up to here all phases are one launch (measured on an H200: bench/results).

@@ -127,11 +127,11 @@ __device__ inline void sample_cells(const GridArgs& args, BuildStorage& s) {
   for (int level = static_cast<int>(blockIdx.x); level < finest;
        level += static_cast<int>(gridDim.x)) {
     __syncthreads();
-    for (unsigned i = threadIdx.x; i < 2 * kSamples; i += kGridThreads) s.samples[i] = 0;
+    for (unsigned i = threadIdx.x; i < 2 * kSamples; i += blockDim.x) s.samples[i] = 0;
     __syncthreads();
     const Real inverse = inverse_width(half_cell_of(all_levels.half_0, level));
     std::uint32_t pairs = 0;
-    for (std::uint32_t k = threadIdx.x; k < samples; k += kGridThreads) {
+    for (std::uint32_t k = threadIdx.x; k < samples; k += blockDim.x) {
       // Multiples of the golden ratio, modulo 1: evenly spread over any order of the spheres.
       const std::uint32_t place = k * 0x9e3779b9u;
       const std::uint32_t i = args.n > samples ? __umulhi(place, args.n) : k;

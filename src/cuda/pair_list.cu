@@ -27,7 +27,7 @@ cudaError_t kernels_loadable() {
 void launch_test_pairs(const SphereInstance* spheres, const SpherePair* pairs, std::size_t m,
                        PairResult* results, cudaStream_t stream) {
   if (m == 0) return;
-  launch(test_pairs, static_cast<unsigned>((m + kThreads - 1) / kThreads), 1, kThreads, 0, stream,
+  launch(test_pairs, static_cast<unsigned>((m + kThreads - 1) / kThreads), 1, kThreads, stream,
          spheres, pairs, m, results);
 }
 
