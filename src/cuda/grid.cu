@@ -70,10 +70,14 @@ __global__ void __launch_bounds__(kMostSortThreads, 1) sort_phase(GridArgs args,
   sort_coarse(args, plan, room, storage);
 }
 
-constexpr unsigned kNeighbourBlocks = sizeof(Real) == 4 ? 5 : 3;  // of a multiprocessor
+/// Blocks of a search that a multiprocessor is to hold. Turing's have 1024 threads.
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 4 : 3;
+#else
 constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 5 : 3;
+#endif
 
-__global__ void __launch_bounds__(kGridThreads, kNeighbourBlocks)
+__global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
     neighbour_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ NeighbourStorage storage;
@@ -228,9 +232,9 @@ std::size_t grid_scratch_bytes(std::size_t n, std::size_t capacity) {
   const std::size_t slots = kDirectSlots * std::min<std::size_t>(n, kMostDirect);
   const std::size_t cells = rounded(slots * sizeof(SphereInstance)) + slots * sizeof(std::uint32_t);
   const std::size_t parted = rounded(n * sizeof(SphereInstance)) + n * sizeof(std::uint32_t);
-  const std::size_t found =
-      std::max(n * kSlots * sizeof(std::uint32_t), capacity * sizeof(SphereContact));
-  return std::max({cells, parted, found}) + 256;
+  const std::size_t partners = n * kSlots * sizeof(std::uint32_t);
+  const std::size_t staged = std::min(n * kSlots, capacity) * sizeof(SphereContact);
+  return std::max({cells, parted, partners, staged}) + 256;
 }
 
 void use_grid_scratch(GridArgs& args, unsigned char* scratch) {

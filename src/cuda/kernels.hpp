@@ -154,7 +154,8 @@ struct GridArgs {
   unsigned long long* count_sums;     ///< [blocks] pairs of the spheres of each block
   std::uint32_t* counts;              ///< [n] pairs of which a sphere is the first, by position
   std::uint32_t* partners = nullptr;  ///< [n][kSlots] the first b's found of a sphere, by position
-  SphereContact* stage = nullptr;     ///< [capacity] contacts (or pairs) by the position of their a
+  SphereContact* stage =
+      nullptr;  ///< contacts (or pairs) of non-crowded a's by the position of their a
   SphereInstance* slots = nullptr;    ///< [kDirectSlots * n] room in cells, null if n > kMostDirect
   std::uint32_t* slot_ids = nullptr;  ///< [kDirectSlots * n]
   SphereInstance* parted = nullptr;   ///< [n] spheres by coarse bucket
