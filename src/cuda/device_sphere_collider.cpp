@@ -207,7 +207,6 @@ void DeviceSphereCollider::Impl::find_in_grid(const SphereInstance* d_spheres, s
                 .count_sums = block_sums.data() + kMostGridBlocks,
                 .counts = counts(),
                 .coarse = coarse.data(),
-
                 .overflow = overflow.data(),
                 .capacity = contacts_reserved,
                 .offsets = offsets.data(),

@@ -143,23 +143,25 @@ std::size_t grid_plan_bytes();
 /// Arrays are 16-byte aligned, with room for 15 bytes more than said.
 struct GridArgs {
   const SphereInstance* spheres;
-  std::uint32_t n;                    ///< at least 1
-  std::uint32_t table_size;           ///< a power of two
-  std::uint32_t* table;               ///< [table_size + 1] histogram, then starts, of the buckets
-  std::uint32_t* places;              ///< [n] bucket, then position in their order, of a sphere
-  std::uint32_t* ranks;               ///< [n] rank in the bucket, then pairs, of a sphere
-  SphereInstance* sorted;             ///< [n] spheres by position
-  std::uint32_t* ids;                 ///< [n] their indices
-  unsigned long long* table_sums;     ///< [blocks] spheres in the buckets of each block
-  unsigned long long* count_sums;     ///< [blocks] pairs of the spheres of each block
-  std::uint32_t* counts;              ///< [n] pairs of which a sphere is the first, by position
+  std::uint32_t n;                 ///< at least 1
+  std::uint32_t table_size;        ///< a power of two
+  std::uint32_t* table;            ///< [table_size + 1] histogram, then starts, of the buckets
+  std::uint32_t* places;           ///< [n] bucket, then position in their order, of a sphere
+  std::uint32_t* ranks;            ///< [n] rank in the bucket, then pairs, of a sphere
+  SphereInstance* sorted;          ///< [n + 2] spheres by position
+  std::uint32_t* ids;              ///< [n] their indices
+  unsigned long long* table_sums;  ///< [blocks] spheres in the buckets of each block
+  unsigned long long* count_sums;  ///< [blocks] pairs of the spheres of each block
+  std::uint32_t* counts;           ///< [n] pairs of which a sphere is the first, by position
+  // In scratch memory, one after the other; null until use_grid_scratch().
+  SphereInstance* slots = nullptr;    ///< [kDirectSlots * n] room in cells; null if n > kMostDirect
+  std::uint32_t* slot_ids = nullptr;  ///< [kDirectSlots * n] indices of the spheres there
+  SphereInstance* parted = nullptr;   ///< [n] spheres by coarse bucket
+  std::uint32_t* parted_ids = nullptr;  ///< [n] their indices
   std::uint32_t* partners = nullptr;  ///< [n][kSlots] the first b's found of a sphere, by position
   SphereContact* stage =
-      nullptr;  ///< contacts (or pairs) of non-crowded a's by the position of their a
-  SphereInstance* slots = nullptr;    ///< [kDirectSlots * n] room in cells, null if n > kMostDirect
-  std::uint32_t* slot_ids = nullptr;  ///< [kDirectSlots * n]
-  SphereInstance* parted = nullptr;   ///< [n] spheres by coarse bucket
-  std::uint32_t* parted_ids = nullptr;  ///< [n]
+      nullptr;  ///< contacts, or pairs, of spheres with up to kSlots, by position
+
   CoarseBuckets* coarse;
   OverflowPair* overflow;       ///< [capacity] the other pairs
   unsigned long long capacity;  ///< most pairs that there is room for
