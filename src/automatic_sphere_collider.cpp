@@ -35,6 +35,15 @@ std::vector<CostChooser::Way> ways_to_test(const SphereColliderOptions& options,
   return ways;
 }
 
+/// What given pairs take, the same for all results and for those that touch: what a pair costs
+/// hardly depends on it.
+ColliderWork work_of(std::span<const SphereInstance> spheres, std::span<const SpherePair> pairs) {
+  const auto n = static_cast<double>(spheres.size()), m = static_cast<double>(pairs.size());
+  return {.spheres = n,
+          .pairs = m,
+          .bytes = n * sizeof(SphereInstance) + m * (sizeof(SpherePair) + sizeof(PairResult))};
+}
+
 }  // namespace
 
 AutomaticSphereCollider::AutomaticSphereCollider(const SphereColliderOptions& options,
@@ -114,14 +123,25 @@ ContactSpan AutomaticSphereCollider::find_contacts(std::span<const SphereInstanc
 std::span<const PairResult> AutomaticSphereCollider::test_pairs(
     std::span<const SphereInstance> spheres, std::span<const SpherePair> pairs) {
   if (goes_on(given_, spheres.size(), pairs.size())) return given_.by->test_pairs(spheres, pairs);
-  const auto n = static_cast<double>(spheres.size()), m = static_cast<double>(pairs.size());
-  const ColliderWork work{
-      .spheres = n,
-      .pairs = m,
-      .bytes = n * sizeof(SphereInstance) + m * (sizeof(SpherePair) + sizeof(PairResult))};
+  const ColliderWork work = work_of(spheres, pairs);
   return compute(
       given_, work, [&](SphereCollider& collider) { return collider.test_pairs(spheres, pairs); },
       [&](std::span<const PairResult>) { return work; });
+}
+
+std::span<const PairContact> AutomaticSphereCollider::find_touching(
+    std::span<const SphereInstance> spheres, std::span<const SpherePair> pairs) {
+  transferred_ = {};
+  if (goes_on(given_, spheres.size(), pairs.size())) {
+    return given_.by->find_touching(spheres, pairs);
+  }
+  const ColliderWork work = work_of(spheres, pairs);
+  const auto found = compute(
+      given_, work,
+      [&](SphereCollider& collider) { return collider.find_touching(spheres, pairs); },
+      [&](std::span<const PairContact>) { return work; });
+  transferred_ = given_.by->transferred();
+  return found;
 }
 
 /// For given pairs any algorithm will do: the one that is there, so that no second pool of threads

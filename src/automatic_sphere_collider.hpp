@@ -27,6 +27,9 @@ class AutomaticSphereCollider final : public SphereCollider {
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override;
   std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
                                          std::span<const SpherePair> pairs) override;
+  std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                             std::span<const SpherePair> pairs) override;
+  TransferredBytes transferred() const noexcept override { return transferred_; }
   Backend backend() const noexcept override { return last_->backend; }
   SphereAlgorithm algorithm() const noexcept override { return algorithm_; }
   ChoiceReason reason() const noexcept override { return last_->reason; }
@@ -62,6 +65,7 @@ class AutomaticSphereCollider final : public SphereCollider {
   bool device_asleep_;
   bool device_lost_ = false;
   std::string device_failure_;
+  TransferredBytes transferred_;
   SphereAlgorithm algorithm_ = SphereAlgorithm::automatic;
 };
 

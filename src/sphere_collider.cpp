@@ -5,6 +5,7 @@
 #include "src/automatic_sphere_collider.hpp"
 #include "src/backend_table.hpp"
 #include "src/cost_model.hpp"
+#include "src/shared/sphere_input.hpp"
 
 namespace jfpx::inline JFPX_ABI {
 namespace {
@@ -21,6 +22,18 @@ std::unique_ptr<SphereCollider> make_named(const SphereColliderOptions& options)
 }  // namespace
 
 SphereCollider::~SphereCollider() = default;
+
+std::span<const PairContact> SphereCollider::find_touching(std::span<const SphereInstance> spheres,
+                                                           std::span<const SpherePair> pairs) {
+  shared::check_count(pairs);
+  touching_.clear();
+  std::uint32_t pair = 0;
+  for (const PairResult& result : test_pairs(spheres, pairs)) {
+    if (result.touching != 0) touching_.push_back({result.normal, result.distance, pair});
+    ++pair;
+  }
+  return touching_;
+}
 
 std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
   verify_build(options.headers);

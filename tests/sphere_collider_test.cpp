@@ -145,6 +145,8 @@ TEST_P(SphereColliderContract, TestPairsFollowsTheSharedArithmeticInTheGivenOrde
       }
       ASSERT_TRUE(same_bits(collider().test_pairs(spheres, pairs), expected))
           << kind.name << ", N = " << n << ", " << seed_note();
+      ASSERT_TRUE(same_bits(collider().find_touching(spheres, pairs), touching_of(expected)))
+          << kind.name << ", N = " << n << ", " << seed_note();
     }
   }
 }
@@ -166,6 +168,7 @@ TEST_P(SphereColliderContract, TestPairsTreatsOddValuesAsBulletDoes) {
       expected.push_back(shared::test_sphere_pair(spheres[a], spheres[b]));
     }
   }
+  ASSERT_TRUE(same_bits(collider().find_touching(spheres, pairs), touching_of(expected)));
   const auto results = collider().test_pairs(spheres, pairs);
   ASSERT_TRUE(same_bits(results, expected));
   const auto touching = [&](std::size_t a, std::size_t b) {
@@ -185,6 +188,7 @@ TEST_P(SphereColliderContract, TestPairsTreatsOddValuesAsBulletDoes) {
 TEST_P(SphereColliderContract, NoSpheresAndNoPairsAreFine) {
   EXPECT_TRUE(collider().find_contacts({}).empty());
   EXPECT_TRUE(collider().test_pairs({}, {}).empty());
+  EXPECT_TRUE(collider().find_touching({}, {}).empty());
   const std::vector<SphereInstance> one = {{{1, 2, 3}, 4}};
   EXPECT_TRUE(collider().find_contacts(one).empty());
 }
@@ -229,6 +233,35 @@ TEST_P(SphereColliderContract, MoreSpheresThanAnIndexCountsAreRejected) {
             "number of spheres is 4294967296; it must be at most 4294967295");
 }
 
+TEST_P(SphereColliderContract, MorePairsThanAContactCanNumberAreRejected) {
+  const SphereInstance one{{0, 0, 0}, 1};
+  const SpherePair pair{0, 0};
+  const std::span<const SpherePair> pairs(&pair, std::size_t{1} << 32);  // never read
+  EXPECT_EQ(message_of([&] {
+              collider().find_touching({&one, 1}, pairs);
+            }),
+            "number of pairs is 4294967296; it must be at most 4294967295");
+}
+
+TEST_P(SphereColliderContract, FindsNoneSomeAndAllOfManyPairsTouching) {
+  Random random(base_seed());
+  for (const Real reach : {Real(0), Real(1), Real(1e3)}) {
+    std::vector<SphereInstance> spheres(3000);
+    for (SphereInstance& s : spheres) s = {random.uniform_in_box({1, 1, 1}, {9, 9, 9}), reach};
+    std::vector<SpherePair> pairs(20000);  // several chunks, the last one not full
+    for (SpherePair& p : pairs) {
+      p.a = static_cast<SphereIndex>(random.below(spheres.size()));
+      p.b = (p.a + 1) % static_cast<SphereIndex>(spheres.size());
+    }
+    const auto results = collider().test_pairs(spheres, pairs);
+    const auto expected = touching_of(results);
+    ASSERT_TRUE(same_bits(collider().find_touching(spheres, pairs), expected)) << seed_note();
+    const std::size_t most = pairs.size();
+    EXPECT_EQ(expected.size() == 0, reach == 0);
+    EXPECT_EQ(expected.size() == most, reach == 1e3);
+  }
+}
+
 TEST_P(SphereColliderContract, TestPairsNamesThePairWithAnIndexOutOfRange) {
   const auto spheres = make_lattice(2, 2);
   std::vector<SpherePair> pairs(50, {1, 2});
@@ -238,6 +271,8 @@ TEST_P(SphereColliderContract, TestPairsNamesThePairWithAnIndexOutOfRange) {
             "pair 31: b is 8; it must be less than the number of spheres, 8");
   pairs[31] = {4294967295u, 8};
   EXPECT_EQ(message_of([&] { collider().test_pairs(spheres, pairs); }),
+            "pair 31: a is 4294967295; it must be less than the number of spheres, 8");
+  EXPECT_EQ(message_of([&] { collider().find_touching(spheres, pairs); }),
             "pair 31: a is 4294967295; it must be less than the number of spheres, 8");
   EXPECT_EQ(message_of([&] { collider().test_pairs({}, pairs); }),
             "pair 0: a is 1; it must be less than the number of spheres, 0");

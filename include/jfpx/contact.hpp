@@ -33,6 +33,14 @@ struct PairResult {
   friend bool operator==(const PairResult&, const PairResult&) = default;
 };
 
+/// A touching pair of a list of pairs.
+struct PairContact {
+  Vec3 normal;             ///< [-], unit, from b to a
+  Real distance = 0;       ///< [m], <= 0; NaN where an input was NaN
+  std::uint32_t pair = 0;  ///< its number in the list
+  friend bool operator==(const PairContact&, const PairContact&) = default;
+};
+
 /// The deepest point of a on the surface of b, as Bullet computes it. `sphere_b` is sphere b.
 JFPX_HD constexpr Vec3 point_on_b(const Vec3& normal, const SphereInstance& sphere_b) {
   return sphere_b.centre + normal * sphere_b.radius;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace jfpx::inline JFPX_ABI {
 
@@ -51,6 +52,11 @@ struct SphereColliderOptions {
   CostModel costs = {};                   ///< automatic: what is expected to be fast
 };
 
+/// Bytes that a call moved between the memories of host and device.
+struct TransferredBytes {
+  std::uint64_t to_device = 0, from_device = 0;
+};
+
 /// Finds contacts among spheres. Owns its buffers, which only grow; calls are not thread-safe, but
 /// several colliders can be used by several threads. Results do not depend on backend, algorithm,
 /// number of threads or vector width, and stay valid until the next call on the same object.
@@ -71,6 +77,16 @@ class JFPX_API SphereCollider {
   virtual std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
                                                  std::span<const SpherePair> pairs) = 0;
 
+  /// As test_pairs(), but only the pairs that touch, in their order. What most callers want: few
+  /// of the pairs that a broad phase hands over do touch.
+  /// @throws as test_pairs(); InvalidArgument for 2^32 pairs or more.
+  virtual std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                                     std::span<const SpherePair> pairs);
+
+  /// What the last find_touching() moved; of a list that it knows from the call before, a device is
+  /// told only what differs. Nothing on x86.
+  virtual TransferredBytes transferred() const noexcept { return {}; }
+
   /// Who computed the last call (for a fixed backend: that backend).
   virtual Backend backend() const noexcept = 0;
   /// How pairs were found in the last find_contacts(); `automatic` before the first.
@@ -82,6 +98,9 @@ class JFPX_API SphereCollider {
 
  protected:
   SphereCollider() = default;
+
+ private:
+  std::vector<PairContact> touching_;  ///< of find_touching(), where a class does not override it
 };
 
 /// @throws BackendUnavailable if `options.backend` is asked for by name and can't be had;

@@ -65,6 +65,15 @@ inline void check_spheres(std::span<const SphereInstance> spheres) {
   if (!all_valid(spheres)) reject_sphere(spheres);
 }
 
+/// @throws InvalidArgument if PairContact::pair can't count the pairs.
+inline void check_count(std::span<const SpherePair> pairs) {
+  constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
+  if (pairs.size() > kMost) {
+    throw InvalidArgument("number of pairs is " + std::to_string(pairs.size()) +
+                          "; it must be at most " + std::to_string(kMost));
+  }
+}
+
 /// @throws InvalidArgument naming the first pair that has an index >= `spheres`.
 [[noreturn]] inline void reject_pair(std::span<const SpherePair> pairs, std::size_t spheres) {
   const auto bad = std::find_if(pairs.begin(), pairs.end(), [&](const SpherePair& p) {

@@ -30,6 +30,19 @@ JFPX_HD inline PairResult test_sphere_pair(const SphereInstance& a, const Sphere
   return sphere_pair_contact(d, len, sum);
 }
 
+/// The same without a branch, for lists in which touching and not touching are mixed: `*contact`
+/// is written in any case.
+JFPX_HD inline bool find_sphere_contact(const SphereInstance& a, const SphereInstance& b,
+                                        PairContact* contact) {
+  const Vec3 d = a.centre - b.centre;
+  const Real len = square_root((d.x * d.x + d.y * d.y) + d.z * d.z);
+  const Real sum = a.radius + b.radius;
+  const PairResult r = sphere_pair_contact(d, len, sum);
+  contact->normal = r.normal;
+  contact->distance = r.distance;
+  return !(len > sum);
+}
+
 /// The same for spheres that count as touching up to a distance of `threshold`.
 JFPX_HD inline PairResult test_sphere_pair(const SphereInstance& a, const SphereInstance& b,
                                            Real threshold) {

@@ -43,29 +43,71 @@ class SphereColliderX86 final : public SphereCollider {
   std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
                                          std::span<const SpherePair> pairs) override {
     results_.reserve(pairs.size(), "pair results");
-    constexpr std::size_t kChunk = 4096;
-    pool_.run((pairs.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-      const auto part =
-          pairs.subspan(chunk * kChunk, std::min(kChunk, pairs.size() - chunk * kChunk));
-      SphereIndex largest = 0;
-      for (const SpherePair& p : part) largest = std::max({largest, p.a, p.b});
-      if (largest >= spheres.size()) shared::reject_pair(pairs, spheres.size());
-      constexpr std::size_t kAhead = 12;  // spheres come from anywhere: ask for them in time
-      PairResult* out = results_.data() + chunk * kChunk;
-      for (std::size_t i = 0; i < part.size(); ++i) {
-        const SpherePair& later = part[std::min(i + kAhead, part.size() - 1)];
-        __builtin_prefetch(&spheres[later.a]);
-        __builtin_prefetch(&spheres[later.b]);
-        out[i] = shared::test_sphere_pair(spheres[part[i].a], spheres[part[i].b]);
-      }
+    pool_.run(chunks_of(pairs), [&](std::size_t chunk) {
+      PairResult* out = results_.data() + chunk * kPairChunk;
+      for_each_pair(spheres, pairs, chunk,
+                    [&](const SphereInstance& a, const SphereInstance& b, std::size_t) {
+                      *out++ = shared::test_sphere_pair(a, b);
+                    });
     });
     return {results_.data(), pairs.size()};
+  }
+
+  std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                             std::span<const SpherePair> pairs) override {
+    shared::check_count(pairs);
+    touching_.reserve(pairs.size(), "touching pairs");
+    // One thread writes without gaps; several each into the place of their chunk.
+    const bool gaps = pool_.threads() > 1;
+    std::size_t total = 0;
+    touching_counts_.resize(chunks_of(pairs));
+    pool_.run(touching_counts_.size(), [&](std::size_t chunk) {
+      PairContact* const begin = touching_.data() + (gaps ? chunk * kPairChunk : total);
+      PairContact* out = begin;
+      for_each_pair(spheres, pairs, chunk,
+                    [&](const SphereInstance& a, const SphereInstance& b, std::size_t i) {
+                      const bool touch = shared::find_sphere_contact(a, b, out);
+                      out->pair = static_cast<std::uint32_t>(i);
+                      out += touch ? 1 : 0;
+                    });
+      touching_counts_[chunk] = static_cast<std::size_t>(out - begin);
+      if (!gaps) total += touching_counts_[chunk];
+    });
+    for (std::size_t chunk = 0; gaps && chunk < touching_counts_.size(); ++chunk) {
+      const PairContact* from = touching_.data() + chunk * kPairChunk;
+      total = static_cast<std::size_t>(
+          std::copy(from, from + touching_counts_[chunk], touching_.data() + total) -
+          touching_.data());
+    }
+    return {touching_.data(), total};
   }
 
   Backend backend() const noexcept override { return Backend::x86; }
   SphereAlgorithm algorithm() const noexcept override { return used_; }
 
  private:
+  static constexpr std::size_t kPairChunk = 4096;
+  static std::size_t chunks_of(std::span<const SpherePair> pairs) {
+    return (pairs.size() + kPairChunk - 1) / kPairChunk;
+  }
+  /// Calls test(sphere a, sphere b, i) for the pairs of a chunk.
+  template <class Test>
+  static void for_each_pair(std::span<const SphereInstance> spheres,
+                            std::span<const SpherePair> pairs, std::size_t chunk,
+                            const Test& test) {
+    const std::size_t begin = chunk * kPairChunk, end = std::min(pairs.size(), begin + kPairChunk);
+    SphereIndex largest = 0;
+    for (std::size_t i = begin; i < end; ++i) largest = std::max({largest, pairs[i].a, pairs[i].b});
+    if (largest >= spheres.size()) shared::reject_pair(pairs, spheres.size());
+    constexpr std::size_t kAhead = 12;  // spheres come from anywhere: ask for them in time
+    for (std::size_t i = begin; i < end; ++i) {
+      const SpherePair& later = pairs[std::min(i + kAhead, end - 1)];
+      __builtin_prefetch(&spheres[later.a]);
+      __builtin_prefetch(&spheres[later.b]);
+      test(spheres[pairs[i].a], spheres[pairs[i].b], i);
+    }
+  }
+
   void find_all_pairs(std::span<const SphereInstance> spheres) {
     table_.fill(
         pool_, spheres, spheres.size(), [](std::size_t i) { return static_cast<SphereIndex>(i); },
@@ -92,6 +134,8 @@ class SphereColliderX86 final : public SphereCollider {
   PairChunks pairs_;
   ContactWriter writer_;
   Buffer<PairResult> results_;
+  Buffer<PairContact> touching_;
+  std::vector<std::size_t> touching_counts_;  ///< by chunk
 };
 
 }  // namespace

@@ -196,6 +196,9 @@ bool same(const SphereContact& a, const SphereContact& b) {
 bool same(const PairResult& a, const PairResult& b) {
   return a.touching == b.touching && same(a.normal, b.normal) && same(a.distance, b.distance);
 }
+bool same(const PairContact& a, const PairContact& b) {
+  return a.pair == b.pair && same(a.normal, b.normal) && same(a.distance, b.distance);
+}
 
 std::string describe(const Vec3& normal, Real distance) {
   char text[128];
@@ -210,6 +213,9 @@ std::string describe(const SphereContact& c) {
 }
 std::string describe(const PairResult& r) {
   return (r.touching != 0 ? "touching, " : "apart, ") + describe(r.normal, r.distance);
+}
+std::string describe(const PairContact& c) {
+  return "pair " + std::to_string(c.pair) + ", " + describe(c.normal, c.distance);
 }
 
 template <class T>
@@ -285,6 +291,19 @@ testing::AssertionResult same_bits(ContactSpan actual, ContactSpan expected) {
 testing::AssertionResult same_bits(std::span<const PairResult> actual,
                                    std::span<const PairResult> expected) {
   return compare(actual, expected);
+}
+testing::AssertionResult same_bits(std::span<const PairContact> actual,
+                                   std::span<const PairContact> expected) {
+  return compare(actual, expected);
+}
+
+std::vector<PairContact> touching_of(std::span<const PairResult> results) {
+  std::vector<PairContact> touching;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (results[i].touching == 0) continue;
+    touching.push_back({results[i].normal, results[i].distance, static_cast<std::uint32_t>(i)});
+  }
+  return touching;
 }
 
 std::uint64_t base_seed() {

@@ -39,6 +39,11 @@ std::vector<SphereContact> brute_force(std::span<const SphereInstance> spheres);
 testing::AssertionResult same_bits(ContactSpan actual, ContactSpan expected);
 testing::AssertionResult same_bits(std::span<const PairResult> actual,
                                    std::span<const PairResult> expected);
+testing::AssertionResult same_bits(std::span<const PairContact> actual,
+                                   std::span<const PairContact> expected);
+
+/// What find_touching() must make of these results.
+std::vector<PairContact> touching_of(std::span<const PairResult> results);
 
 /// Base of all seeds of this run: JFPX_TEST_SEED if set, else fresh from the system.
 std::uint64_t base_seed();

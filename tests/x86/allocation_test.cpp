@@ -59,9 +59,11 @@ TEST_P(Allocation, WarmCallsAllocateNothing) {
     }
     collider->find_contacts(spheres);
     collider->test_pairs(spheres, pairs);
+    collider->find_touching(spheres, pairs);
     const std::size_t before = allocations;
     collider->find_contacts(spheres);
     collider->test_pairs(spheres, pairs);
+    collider->find_touching(spheres, pairs);
     EXPECT_EQ(allocations - before, 0u) << name << ", " << seed_note();
   }
 }
