@@ -192,4 +192,22 @@ void launch_grid_search(const GridArgs& args, const SearchOutput& output, unsign
 void launch_test_pairs(const SphereInstance* spheres, const SpherePair* pairs, std::size_t m,
                        PairResult* results, cudaStream_t stream);
 
+/// Pairs that a block counts, and then writes.
+inline constexpr std::size_t kTouchingPerBlock = 2048;
+constexpr std::size_t touching_blocks(std::size_t m) {
+  return (m + kTouchingPerBlock - 1) / kTouchingPerBlock;
+}
+
+struct TouchingArgs {
+  const SphereInstance* spheres;
+  const SpherePair* pairs;
+  std::size_t m;
+  std::uint32_t* counts;     ///< [touching_blocks(m) + 1]; the last one becomes 0
+  unsigned long long* sums;  ///< their exclusive scan
+  PairContact* touching;     ///< [m], may be memory of the host
+  unsigned long long* total;
+};
+void launch_count_touching(const TouchingArgs& args, cudaStream_t stream);
+void launch_emit_touching(const TouchingArgs& args, cudaStream_t stream);
+
 }  // namespace jfpx::inline JFPX_ABI::cuda

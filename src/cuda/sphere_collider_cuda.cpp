@@ -5,6 +5,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/cuda/device_buffer.hpp"
+#include "src/cuda/pair_list_search.hpp"
 #include "src/cuda/probe_cuda.hpp"
 #include "src/shared/sphere_input.hpp"
 
@@ -17,6 +18,12 @@ namespace {
 
 /// Up to here kernels write contacts straight into host memory: no copy, no second wait.
 constexpr std::size_t kMostMappedSpheres = 20'000;
+
+void check_pairs(std::span<const SpherePair> pairs, std::size_t n) {
+  if (std::any_of(pairs.begin(), pairs.end(), [n](SpherePair p) { return p.a >= n || p.b >= n; })) {
+    shared::reject_pair(pairs, n);
+  }
+}
 
 /// More than `count`, so that a collider whose input grows slowly does not grow each time.
 std::size_t with_slack(std::size_t count) { return count + count / 4 + 64; }
@@ -36,6 +43,10 @@ class SphereColliderCuda final : public SphereCollider {
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override;
   std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
                                          std::span<const SpherePair> pairs) override;
+
+  std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                             std::span<const SpherePair> pairs) override;
+  TransferredBytes transferred() const noexcept override { return pair_list_.transferred(); }
 
   Backend backend() const noexcept override { return Backend::cuda; }
   SphereAlgorithm algorithm() const noexcept override { return algorithm_; }
@@ -61,6 +72,7 @@ class SphereColliderCuda final : public SphereCollider {
   PinnedBuffer<ContactCount> count_;
   PinnedBuffer<SphereContact> contacts_on_host_;
   PinnedBuffer<PairResult> results_on_host_;
+  PairListSearch pair_list_;
   SphereAlgorithm algorithm_ = SphereAlgorithm::automatic;
 };
 
@@ -125,10 +137,7 @@ ContactSpan SphereColliderCuda::find_contacts(std::span<const SphereInstance> sp
 std::span<const PairResult> SphereColliderCuda::test_pairs(std::span<const SphereInstance> spheres,
                                                            std::span<const SpherePair> pairs) {
   const nvtx3::scoped_range range("jfpx test_pairs");
-  const std::size_t n = spheres.size();
-  if (std::any_of(pairs.begin(), pairs.end(), [n](SpherePair p) { return p.a >= n || p.b >= n; })) {
-    shared::reject_pair(pairs, n);
-  }
+  check_pairs(pairs, spheres.size());
   if (pairs.empty()) return {};
   const DeviceGuard guard(device_);
   upload(spheres);
@@ -148,6 +157,15 @@ std::span<const PairResult> SphereColliderCuda::test_pairs(std::span<const Spher
                                 stream_.get()));
   wait();
   return {results_on_host_.data(), pairs.size()};
+}
+
+std::span<const PairContact> SphereColliderCuda::find_touching(
+    std::span<const SphereInstance> spheres, std::span<const SpherePair> pairs) {
+  const nvtx3::scoped_range range("jfpx find_touching");
+  shared::check_count(pairs);
+  check_pairs(pairs, spheres.size());
+  const DeviceGuard guard(device_);
+  return pair_list_.find(pool_, stream_.get(), spheres, pairs);
 }
 
 }  // namespace

@@ -75,9 +75,13 @@ TEST_F(Cuda, AnyFailingCallIsAnErrorAndTheColliderGoesOn) {
         collider = make(algorithm);  // anew each time: what grows, grows under the fault
         collider->find_contacts(spheres);
         collider->test_pairs(spheres, pairs);
+        collider->find_touching(spheres, pairs);
       });
       const auto survivor = make(algorithm);
       with_every_call_failing(error, [&] { survivor->find_contacts(spheres); });
+      const auto touching = survivor->find_touching(spheres, pairs).size();
+      with_every_call_failing(error, [&] { survivor->find_touching(spheres, pairs); });
+      EXPECT_EQ(survivor->find_touching(spheres, pairs).size(), touching);
       EXPECT_TRUE(same_bits(survivor->find_contacts(spheres), expected)) << seed_note();
       EXPECT_EQ(survivor->test_pairs(spheres, pairs).size(), pairs.size());
     }

@@ -196,6 +196,52 @@ TEST_F(Cuda, AThousandMillionPairsHaveTheBitsOfX86) {
   EXPECT_GT(touching, kPairs / 10) << "the test must meet touching pairs";
 }
 
+// The device is told what differs from the list before, in blocks of 4 KiB, and sends back what
+// touches: nothing moves for a list that rests.
+TEST_F(Cuda, OnlyWhatChangedInAListOfPairsIsSent) {
+  Random random(base_seed());
+  const auto collider = make();
+  const auto x86 = make_sphere_collider({.backend = Backend::x86});
+  auto spheres = sphere_kind("uniform").make(60'000, random);
+  std::vector<SpherePair> pairs(300'000);
+  for (SpherePair& p : pairs) {
+    p = {static_cast<SphereIndex>(random.below(60'000)),
+         static_cast<SphereIndex>(random.below(60'000))};
+  }
+  for (SphereIndex i = 0; i < 1000; ++i) pairs[300 * i] = {i, i};
+  const auto find = [&] {
+    const auto expected = x86->find_touching(spheres, pairs);
+    EXPECT_TRUE(same_bits(collider->find_touching(spheres, pairs), expected)) << seed_note();
+    EXPECT_EQ(collider->transferred().from_device, expected.size() * sizeof(PairContact) + 8);
+    return collider->transferred().to_device;
+  };
+  const std::size_t all =
+      spheres.size() * sizeof(SphereInstance) + pairs.size() * sizeof(SpherePair);
+  EXPECT_EQ(find(), all);
+  EXPECT_EQ(find(), 0u);
+  spheres[17].centre.x += 1;
+  EXPECT_EQ(find(), 4096u);
+  std::swap(pairs[100'000], pairs[200'000]);
+  EXPECT_EQ(find(), 2 * 4096u);
+  collider->find_contacts(spheres);
+  collider->test_pairs(spheres, pairs);
+  EXPECT_EQ(find(), 0u) << "other calls have memory of their own";
+  pairs.resize(299'000);
+  EXPECT_EQ(find(), 0u);
+  pairs.resize(300'500, {5, 5});
+  EXPECT_LE(find(), 1500 * sizeof(SpherePair) + 2 * 4096);
+  spheres.resize(200'000, {{0, 0, 0}, 1});
+  pairs.resize(900'000, {199'999, 199'998});
+  EXPECT_EQ(find(), spheres.size() * sizeof(SphereInstance) + pairs.size() * sizeof(SpherePair));
+  for (int round = 0; round < 20; ++round) {
+    for (int k = 0; k < 50; ++k) {
+      spheres[random.below(spheres.size())].centre.y += 1;
+      pairs[random.below(pairs.size())].a = static_cast<SphereIndex>(random.below(spheres.size()));
+    }
+    find();
+  }
+}
+
 TEST_F(Cuda, ASearchOnAStreamLeavesContactsOnTheDevice) {
   for (const SphereAlgorithm algorithm : kAlgorithms) {
     for (const std::size_t n : {0, 1, 500, 3000}) {
