@@ -119,8 +119,10 @@ __global__ void __launch_bounds__(kSetUpThreads)
     finish_rows(const __grid_constant__ RowSweepArgs args) {
   wait_for_previous_kernel();
   const unsigned i = blockIdx.x * kSetUpThreads + threadIdx.x;
-  if (i < args.group.main.count) rows::finish_place(args.group, i);
-  if (i < args.group.bodies_count && !rows::finish_body(args.group, i)) args.findings->broken = 1;
+  bool fine = true;
+  if (i < args.group.main.count) fine &= rows::finish_place(args.group, i);
+  if (i < args.group.bodies_count) fine &= rows::finish_body(args.group, i);
+  if (!fine) args.findings->broken = 1;
 }
 
 unsigned blocks_for(std::size_t count, unsigned threads) {

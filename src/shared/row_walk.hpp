@@ -163,14 +163,20 @@ JFPX_ROW bool set_up_place(const RowGroupArrays& group, std::uint32_t index) {
   return row[kRowPushRhs] != 0;
 }
 
-/// Hands out the impulses of the contact at a place.
-JFPX_ROW void finish_place(const RowGroupArrays& group, std::uint32_t index) {
+/// Hands out the impulses of the contact at a place. @return whether all it hands out are numbers:
+/// which NaN it is differs between processors
+JFPX_ROW bool finish_place(const RowGroupArrays& group, std::uint32_t index) {
   ContactOutcome& outcome = group.outcomes[group.contacts[index]];
   outcome.impulse = group.contact_at(index)[kRowImpulse];
   for (std::uint32_t k = 0; k < group.directions; ++k) {
     outcome.lateral[k] = group.friction_at(index, k)[kRowImpulse];
   }
   if (group.directions == 1) outcome.lateral[1] = 0;
+  bool numbers = outcome.impulse == outcome.impulse;
+  for (const Real v : outcome.direction) numbers &= v == v;
+  for (const Real v : outcome.second) numbers &= v == v;
+  for (const Real v : outcome.lateral) numbers &= v == v;
+  return numbers;
 }
 
 /// Hands out the velocities of a body. @return whether they are all finite

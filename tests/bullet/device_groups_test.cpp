@@ -101,6 +101,26 @@ TEST(DeviceGroups, AreNotAskedForOnX86) {
   EXPECT_EQ(groups, 0);
 }
 
+/// Such as that of a contact without a normal, which pushes nobody: it would be another NaN on a
+/// GPU than on x86, so that Bullet has to solve the group.
+TEST(DeviceGroups, ADirectionThatIsNoNumberBreaksTheGroup) {
+  GroupDouble device(1);
+  for (const Real normal : {Real(1), Real(0)}) {
+    const GroupInputs in = device.inputs({.bodies = 2, .contacts = 1});
+    std::fill_n(in.bodies, 2 * rows::kBodyFields, Real(0));
+    in.bodies[rows::kBodyFields + 3] = 1;
+    std::fill_n(in.contacts, rows::kInputFields, Real(0));
+    in.contacts[rows::kInNormal] = normal;
+    in.contacts[rows::kInDistance] = 1;
+    const std::vector<rows::RowPair> pairs = {{1, rows::kFixedBody}};
+    RowOrder().build(pairs, 2, in.places, in.place_contacts, in.moves);
+    GroupSweeps sweeps{};
+    sweeps.settings.dt = sweeps.settings.inverse_dt = sweeps.settings.relaxation = 1;
+    EXPECT_EQ(device.solve(sweeps).broken, normal == 0);
+    EXPECT_EQ(device.outcomes()[0].impulse, 0);
+  }
+}
+
 /// Each body meets its contacts in the given order, and a place never needs a later one.
 TEST(RowOrder, KeepsTheOrderOfEveryBody) {
   const std::uint64_t seed = test_seed();

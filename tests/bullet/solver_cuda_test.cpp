@@ -18,29 +18,23 @@ WorldParts on_cuda(const SolverWorld& world) {
   };
   return parts;
 }
-WorldParts all_on_cuda(const SolverWorld& world) {
+WorldParts with_our_world(const SolverWorld& world) {
   return {.solver = on_cuda(world).solver, .world = our_world(world).world};
 }
-std::unique_ptr<btCollisionDispatcher> make_cuda_dispatcher(btCollisionConfiguration* configuration,
-                                                            const RandomWorld&) {
-  return std::make_unique<CollisionDispatcher>(
-      configuration, DispatcherOptions{.collider = {.backend = Backend::cuda}, .minimum_batch = 0});
-}
-
 TEST_F(CudaSolver, MovesRandomWorldsAsStock) {
   const SolverTotals totals = expect_stocks_bits(wanted_solver_steps(), on_cuda, make_stock);
   EXPECT_GT(totals.on_device, totals.steps / 8) << "groups that x86 solves show nothing";
 }
 
-TEST_F(CudaSolver, MovesRandomWorldsAsStockWithAllPartsOnTheDevice) {
-  expect_stocks_bits(wanted_solver_steps() / 4, all_on_cuda, make_cuda_dispatcher);
+TEST_F(CudaSolver, MovesRandomWorldsAsStockWithOurDispatcherAndWorld) {
+  expect_stocks_bits(wanted_solver_steps() / 4, with_our_world, make_ours);
 }
 
 TEST_F(CudaSolver, MovesAHeapAsStockWithContactAndFrictionInEitherOrder) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   SolverTotals totals;
-  const auto failure = run(make_large_heap(seed), &totals, all_on_cuda, make_cuda_dispatcher);
+  const auto failure = run(make_large_heap(seed), &totals, with_our_world, make_ours);
   EXPECT_FALSE(failure) << failure->what;
   EXPECT_GT(totals.on_device, 0u);
 }

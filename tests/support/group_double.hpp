@@ -85,7 +85,9 @@ class GroupDouble final : public GroupSolver {
       walk<false, true>(group, push_program(push), &push_found);
     }
     findings.broken = found.is_broken || push_found.is_broken;
-    for (std::uint32_t i = 0; i < size_.contacts; ++i) rows::finish_place(group, i);
+    for (std::uint32_t i = 0; i < size_.contacts; ++i) {
+      if (!rows::finish_place(group, i)) findings.broken = true;
+    }
     for (std::uint32_t i = 0; i < size_.bodies; ++i) {
       if (!rows::finish_body(group, i)) findings.broken = true;
     }
