@@ -193,7 +193,8 @@ def rendering(machine, published):
             table(["backend", "N", "off mean", "median", "first", "on mean", "median", "first", "on / off", "picture",
                    "2010 off", "2010 on", "2010 on / off"], rows) +
             "\n(1) The published x86 file for 32 spheres without rendering is that of 16, byte for byte.\n\n" +
-            "Drawing comes between two detections, so what it costs them is the caches that it has filled.\n\n")
+            "Drawing comes between two detections: it fills the processor's caches, and a GPU that has drawn takes a "
+            "while before it computes.\n\n")
 
 
 def bullet(machine):
