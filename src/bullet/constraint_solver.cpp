@@ -2,7 +2,6 @@
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/error.hpp>
 
-#include "src/backend_table.hpp"
 #include "src/bullet/contact_scan.hpp"
 #include "src/bullet/device_groups.hpp"
 #include "src/bullet/joint_rows.hpp"
@@ -35,12 +34,6 @@ unsigned checked_threads(unsigned threads) {
     throw InvalidArgument("threads is " + std::to_string(threads) + "; it must be at most 256");
   }
   return threads;
-}
-
-GroupSolverMaker maker_of_devices(int device) {
-  const BackendRow& row = backend_row(Backend::cuda);
-  if (!row.compiled) return nullptr;
-  return [make = row.make_group_solver, device] { return make(device); };
 }
 
 }  // namespace
@@ -384,9 +377,8 @@ struct ConstraintSolver::Impl {
       }
       for (std::size_t lane = 0; lane < solver.lanes(); ++lane) {
         const ContactRef* contact = contact_in(block, lane);
-        if (contact != nullptr && contact->rolling) {
-          set_up_torsion(*contact, solver.torsion_rows(k, 0) + lane, solver.lanes());
-        }
+        if (contact == nullptr || !contact->rolling) continue;
+        set_up_torsion(*contact, solver.torsion_rows(k, 0) + lane, solver.lanes());
       }
     });
   }

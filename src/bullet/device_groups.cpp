@@ -1,6 +1,9 @@
 /// Packs groups for a device and brings the results back; see the header.
 #include "src/bullet/device_groups.hpp"
 
+#include <jfpx/error.hpp>
+
+#include "src/backend_table.hpp"
 #include "src/bullet/prefetch.hpp"
 #include "src/bullet/row_inputs.hpp"
 
@@ -48,12 +51,21 @@ bool may_be_pushed(const btManifoldPoint& point, const rows::RowSettings& settin
 
 }  // namespace
 
+GroupSolverMaker maker_of_devices(int device) {
+  const BackendRow& row = backend_row(Backend::cuda);
+  if (!row.compiled) return nullptr;
+  return [make = row.make_group_solver, device] { return make(device); };
+}
+
 DeviceGroups::DeviceGroups(Backend backend, GroupSolverMaker make, unsigned threads)
     : backend_(backend),
       make_(std::move(make)),
       x86_(x86_costs(threads)),
       cuda_(cuda_costs(threads)) {
-  if (backend_ == Backend::cuda) solver_ = make_();
+  if (backend_ == Backend::cuda) {
+    if (make_ == nullptr) throw BackendUnavailable("cuda: built without CUDA");
+    solver_ = make_();
+  }
   if (backend_ == Backend::automatic && make_ != nullptr) {
     asleep_ = true;
     chooser_.emplace(

@@ -23,6 +23,8 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 
 using GroupSolverMaker = std::function<std::unique_ptr<GroupSolver>()>;
+/// Of the GPU with this ordinal; null in a build without CUDA.
+GroupSolverMaker maker_of_devices(int device);
 
 /// A group whose bodies are packed and whose contacts are found.
 struct DeviceGroup {

@@ -86,6 +86,12 @@ TEST(DeviceGroups, ADeviceThatFailsIsReplacedInTheSameGroupAndReportedOnce) {
   EXPECT_EQ(solver.stats().device_failure, "the device is gone");
 }
 
+TEST(DeviceGroups, ABackendThatCantBeHadIsUnavailableAndAutomaticDoesWithout) {
+  EXPECT_THROW(ConstraintSolver({.backend = Backend::cuda, .device = 1000}), BackendUnavailable);
+  const ConstraintSolver solver({.backend = Backend::automatic, .device = 1000});
+  EXPECT_EQ(solver.stats().device_failure, "");
+}
+
 TEST(DeviceGroups, AreNotAskedForOnX86) {
   int groups = 0;
   WorldParts parts;

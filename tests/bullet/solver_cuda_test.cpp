@@ -1,6 +1,5 @@
 /// Bullet's solver on the GPU: random worlds move as stock ones, and x86 takes over when it fails.
 #include <jfpx/bullet/constraint_solver.hpp>
-#include <jfpx/error.hpp>
 
 #include "tests/bullet/stock_bits.hpp"
 #include "tests/cuda/cuda_fixture.hpp"
@@ -60,12 +59,6 @@ TEST_F(CudaSolver, IsReplacedByX86InTheGroupInWhichItFailsAndSaysSoOnce) {
         << solver.stats().device_failure;
   }
   ADD_FAILURE() << "more than 100 CUDA calls";
-}
-
-TEST(CudaSolverBackend, ThatIsNotThereIsUnavailableAndAutomaticDoesWithout) {
-  EXPECT_THROW(ConstraintSolver({.backend = Backend::cuda, .device = 1000}), BackendUnavailable);
-  const ConstraintSolver solver({.backend = Backend::automatic, .device = 1000});
-  EXPECT_EQ(solver.stats().device_failure, "");
 }
 
 }  // namespace
