@@ -33,6 +33,8 @@ struct SolverState : btSequentialImpulseConstraintSolver {
 
 ConstraintSolverOptions options_from_environment() {
   ConstraintSolverOptions options;
+  // Else whoever is faster, which is never an error: there is nobody to tell.
+  if (preload_setting("JFPX_PRELOAD_BACKEND") == "x86") options.backend = Backend::x86;
   options.threads = preload_threads();
   if (const auto least = preload_number("JFPX_PRELOAD_MINIMUM_BATCH")) {
     options.minimum_batch = *least;
