@@ -48,7 +48,7 @@ _jfpx_describe_package(runtime_bullet libjfpx-bullet${version} libs "libjfpx${ve
   "jfpx inside Bullet: dispatcher, solver and world" "${text}")
 set(for_dev ${libraries})
 if(JFPX_HAS_BULLET)
-  list(APPEND for_dev libbullet-dev)
+  list(APPEND for_dev libbullet-dev pkg-config) # jfpx-config.cmake finds the one by the other
 endif()
 _jfpx_describe_package(dev libjfpx-dev libdevel "${for_dev}" "rigid-body collision with the same bits everywhere: headers" "${text}")
 _jfpx_describe_package(tools jfpx-tools science "${libraries}" "commands of jfpx: run, compare, replay, view scenes"

@@ -167,6 +167,7 @@ refused" ] || fail "$("$work/cmake/both")"
       fail "jfpx-tools depends on: $(depends jfpx-tools)"
     if [ "$HAS_BULLET" = ON ]; then
       depends libjfpx-bullet0.1 | grep -q 'libbullet3' || fail "libjfpx-bullet0.1 depends on: $(depends libjfpx-bullet0.1)"
+      depends libjfpx-dev | grep -q 'libbullet-dev, pkg-config' || fail "libjfpx-dev depends on: $(depends libjfpx-dev)"
       ! depends libjfpx0.1 | grep -q bullet || fail "libjfpx0.1 depends on Bullet"
     fi
     [ -s "$work/root/usr/share/doc/libjfpx0.1/copyright" ] || fail "no copyright"
