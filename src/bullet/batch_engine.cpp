@@ -70,6 +70,12 @@ BatchEngine::BatchEngine(std::unique_ptr<SphereCollider> collider, const Dispatc
       verify_(options.verify),
       pool_(options.collider.threads) {
   if (collider_ == nullptr) throw InvalidArgument("collider is null; it must be a SphereCollider");
+  if (options.fuses_products) {
+    stats_.warning =
+        "the program is compiled with fused multiply-add, also in Bullet's headers: its bits are "
+        "not "
+        "those of other builds; compile it with -ffp-contract=off";
+  }
 }
 
 Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatcher,
@@ -94,14 +100,14 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
       *fallback = Fallback::no_spheres;
       return false;
     }
-    test_pairs();
+    find_touching();
     // A cache of another class may show its user more of the walk than the pairs.
     quiet_ = typeid(cache) == typeid(btHashedOverlappingPairCache) &&
              is_quiet(batch_, traits.may_override_filter);
     if (quiet_) {
       quiet_commit_.reserve(pairs_.size());
     } else {
-      add(ordered_commit_.plan(batch_, results_, traits.may_override_filter));
+      add(ordered_commit_.plan(batch_, touching_, traits.may_override_filter));
     }
     return true;
   } catch (const std::exception& error) {
@@ -113,15 +119,19 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
 }
 
 /// If the collider fails, for example because its device is lost, x86 takes over for good.
-void BatchEngine::test_pairs() {
+void BatchEngine::find_touching() {
   try {
-    results_ = collider_->test_pairs(batch_.spheres(), batch_.pairs());
+    touching_ = collider_->find_touching(batch_.spheres(), batch_.pairs());
+    batch_.expect_contacts(touching_.size());
+    const TransferredBytes bytes = collider_->transferred();
+    stats_.to_device += bytes.to_device;
+    stats_.from_device += bytes.from_device;
     if (const auto why = collider_->device_failure(); !why.empty()) stats_.device_failure = why;
   } catch (const std::exception& error) {
     if (!stats_.device_failure.empty()) throw;
     stats_.device_failure = text_of(error);
     collider_ = make_sphere_collider({.backend = Backend::x86, .threads = pool_.threads()});
-    results_ = collider_->test_pairs(batch_.spheres(), batch_.pairs());
+    touching_ = collider_->find_touching(batch_.spheres(), batch_.pairs());
   }
 }
 
@@ -163,13 +173,15 @@ void BatchEngine::commit(btCollisionDispatcher& dispatcher, btOverlappingPairCac
     visited = [&](std::size_t i, bool current) { check(dispatcher, info, i, current); };
   }
   stats_.written +=
-      ordered_commit_.run(dispatcher, cache, info, argument, batch_, pairs_, results_, visited);
+      ordered_commit_.run(dispatcher, cache, info, argument, batch_, pairs_, touching_, visited);
 }
 
 void BatchEngine::commit_quietly(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
                                  const btDispatcherInfo& info) {
   const std::size_t n = pairs_.size();
-  add(quiet_commit_.run(dispatcher, batch_, results_, pool_));
+  if (verify_) convex_check_.remember(batch_);
+  add(quiet_commit_.run(dispatcher, batch_, touching_, pool_));
+  if (verify_) check_convex(dispatcher, info);
   quiet_commit_.sort_left(pairs_, info.m_deterministicOverlappingPairs);
   visit_left(dispatcher, cache, info);
   if (!verify_) return;
@@ -195,7 +207,7 @@ void BatchEngine::visit_left(btCollisionDispatcher& dispatcher, btOverlappingPai
       prefetch_for_contact(*batch_.body_a(i));
       prefetch_for_contact(*batch_.body_b(i));
       if (batch_.manifold(i) != nullptr) {
-        prefetch_count(batch_.manifold(i));
+        prefetch_header(batch_.manifold(i));
         prefetch_first_point(batch_.manifold(i));
       }
     }
@@ -216,8 +228,26 @@ void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInf
                         std::size_t i, bool current) {
   ++stats_.verified;
   const btPersistentManifold* manifold = batch_.manifold(i);
-  const auto difference = check_pair(&dispatcher, info, *batch_.body_a(i), *batch_.body_b(i),
-                                     results_[i], *manifold, current ? manifold : nullptr);
+  const PairContact* contact = first_contact(touching_, i);
+  const bool touch = contact != touching_.data() + touching_.size() && contact->pair == i;
+  const auto difference =
+      check_pair(&dispatcher, info, *batch_.body_a(i), *batch_.body_b(i), touch ? contact : nullptr,
+                 *manifold, current ? manifold : nullptr);
+  note(difference);
+}
+
+/// Pairs of a sphere and something else. Nobody listens: that is what quiet means.
+void BatchEngine::check_convex(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info) {
+  convex_check_.for_each(
+      quiet_commit_.left(), [&](std::size_t i, const btPersistentManifold& before) {
+        const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
+        if (!dispatcher.needsCollision(a, b)) return;
+        ++stats_.verified;
+        note(check_update(*pairs_[i].m_algorithm, info, *a, *b, before, batch_.manifold(i)));
+      });
+}
+
+void BatchEngine::note(const std::optional<FieldDifference>& difference) {
   if (!difference) return;
   if (stats_.mismatches++ == 0) stats_.first_mismatch = to_text(*difference);
 }
@@ -225,7 +255,9 @@ void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInf
 void BatchEngine::reset_stats() {
   std::string failure = std::move(stats_.failure);
   std::string device_failure = std::move(stats_.device_failure);
+  std::string warning = std::move(stats_.warning);
   stats_ = {};
+  stats_.warning = std::move(warning);
   stats_.failure = std::move(failure);
   stats_.device_failure = std::move(device_failure);
 }

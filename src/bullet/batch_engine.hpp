@@ -3,6 +3,7 @@
 
 #include <jfpx/bullet/dispatcher.hpp>
 
+#include "src/bullet/convex_check.hpp"
 #include "src/bullet/ordered_commit.hpp"
 #include "src/bullet/quiet_commit.hpp"
 
@@ -46,7 +47,7 @@ class JFPX_API BatchEngine {
                                const btDispatcherInfo& info) const;
   bool prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                btOverlappingPairCache& cache, Fallback* fallback);
-  void test_pairs();
+  void find_touching();
   void commit(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
               const btDispatcherInfo& info, btDispatcher* argument);
   void commit_quietly(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
@@ -56,6 +57,8 @@ class JFPX_API BatchEngine {
   void add(const CommitCounts& counts);
   void check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info, std::size_t i,
              bool current);
+  void check_convex(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info);
+  void note(const std::optional<FieldDifference>& difference);
 
   std::unique_ptr<SphereCollider> collider_;
   std::size_t minimum_batch_;
@@ -66,10 +69,11 @@ class JFPX_API BatchEngine {
   SphereBatch batch_;
   QuietCommit quiet_commit_;
   OrderedCommit ordered_commit_;
+  ConvexCheck convex_check_;  ///< of set_verify()
   DispatchStats stats_;
   // Of the dispatch that is running:
   std::span<const btBroadphasePair> pairs_;
-  std::span<const PairResult> results_;
+  std::span<const PairContact> touching_;
   bool quiet_ = false;
 };
 

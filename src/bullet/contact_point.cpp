@@ -29,14 +29,13 @@ btScalar clamp_friction(btScalar friction) {
   return friction;
 }
 
-void combine_materials(const btCollisionObject& a, const btCollisionObject& b,
-                       btManifoldPoint* point) {
-  point->m_combinedFriction = clamp_friction(a.getFriction() * b.getFriction());
-  point->m_combinedRestitution = a.getRestitution() * b.getRestitution();
-  point->m_combinedRollingFriction = clamp_friction(a.getRollingFriction() * b.getFriction() +
-                                                    b.getRollingFriction() * a.getFriction());
-  point->m_combinedSpinningFriction = clamp_friction(a.getSpinningFriction() * b.getFriction() +
-                                                     b.getSpinningFriction() * a.getFriction());
+void combine_materials(const BodyState& a, const BodyState& b, btManifoldPoint* point) {
+  point->m_combinedFriction = clamp_friction(a.friction * b.friction);
+  point->m_combinedRestitution = a.restitution * b.restitution;
+  point->m_combinedRollingFriction =
+      clamp_friction(a.rolling_friction * b.friction + b.rolling_friction * a.friction);
+  point->m_combinedSpinningFriction =
+      clamp_friction(a.spinning_friction * b.friction + b.spinning_friction * a.friction);
 }
 
 }  // namespace
@@ -56,36 +55,28 @@ bool contacts_are_heard() {
              &btManifoldResult::calculateCombinedContactStiffness;
 }
 
-bool is_plain(const btPersistentManifold& manifold, const btCollisionObject& body_a,
-              const btCollisionObject& body_b) {
+int special_collision_flags() {
   int special = btCollisionObject::CF_HAS_CONTACT_STIFFNESS_DAMPING |
                 btCollisionObject::CF_HAS_FRICTION_ANCHOR;
   if (gContactAddedCallback != nullptr) special |= btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK;
-  const int flags = body_a.getCollisionFlags() | body_b.getCollisionFlags();
-  return (flags & special) == 0 && manifold.getBody0() == &body_a;
+  return special;
 }
 
-void write_contact(btPersistentManifold* manifold, const PairResult& result,
-                   const btCollisionObject& body_a, const btCollisionObject& body_b,
-                   Real radius_b) {
-  // btPersistentManifold::clearManifold, given that no callback is set.
-  manifold->setNumContacts(0);
-  if (result.touching == 0 || result.distance > manifold->getContactBreakingThreshold()) return;
-
-  const btTransform& pose_a = body_a.getWorldTransform();
-  const btTransform& pose_b = body_b.getWorldTransform();
-  const btVector3 normal(result.normal.x, result.normal.y, result.normal.z);
-  const btVector3 on_b = pose_b.getOrigin() + radius_b * normal;
-  const btVector3 on_a = on_b + normal * result.distance;
+void write_contact(btPersistentManifold* manifold, const PairContact& contact, const BodyState& a,
+                   const BodyState& b, Real radius_b) {
+  if (contact.distance > manifold->getContactBreakingThreshold()) return;
+  const btVector3 normal(contact.normal.x, contact.normal.y, contact.normal.z);
+  const btVector3 on_b = b.pose.getOrigin() + radius_b * normal;
+  const btVector3 on_a = on_b + normal * contact.distance;
 
   // btPersistentManifold::addManifoldPoint on an empty manifold. The point is made in its place: a
   // copy right behind the writes would wait for them to leave the store buffer.
   manifold->setNumContacts(1);
   auto* point = new (&manifold->getContactPoint(0))
-      btManifoldPoint(pose_a.invXform(on_a), pose_b.invXform(on_b), normal, result.distance);
+      btManifoldPoint(a.pose.invXform(on_a), b.pose.invXform(on_b), normal, contact.distance);
   point->m_positionWorldOnA = on_a;
   point->m_positionWorldOnB = on_b;
-  combine_materials(body_a, body_b, point);
+  combine_materials(a, b, point);
   btPlaneSpace1(normal, point->m_lateralFrictionDir1, point->m_lateralFrictionDir2);
 }
 

@@ -3,6 +3,8 @@
 
 #include <jfpx/contact.hpp>
 
+#include "src/bullet/body_state.hpp"
+
 class btCollisionObject;
 class btPersistentManifold;
 
@@ -12,15 +14,15 @@ namespace jfpx::inline JFPX_ABI::bullet {
 /// aside, or a user's function may combine the materials of any contact.
 bool contacts_are_heard();
 
-/// Whether write_contact() does all that Bullet would do, given that nobody hears it: the materials
-/// need no more than the defaults, and the manifold has the bodies in this order.
-bool is_plain(const btPersistentManifold& manifold, const btCollisionObject& body_a,
-              const btCollisionObject& body_b);
+/// The collision flags of bodies whose contacts need more than write_contact() does, given that
+/// nobody hears it.
+int special_collision_flags();
 
-/// Clears the manifold and, if the pair touches, adds its point: every field of the point gets the
-/// bits that Bullet would give it. `radius_b` is the radius of body b's sphere.
-void write_contact(btPersistentManifold* manifold, const PairResult& result,
-                   const btCollisionObject& body_a, const btCollisionObject& body_b, Real radius_b);
+/// Adds the point of a touching pair to an empty manifold that has the bodies in this order: every
+/// field of the point gets the bits that Bullet would give it. `radius_b` is that of body b's
+/// sphere.
+void write_contact(btPersistentManifold* manifold, const PairContact& contact, const BodyState& a,
+                   const BodyState& b, Real radius_b);
 
 /// Brings the manifold of a sphere and a box up to date, in this order or the other, as
 /// btConvexConvexAlgorithm without perturbation would. The shapes are exactly btSphereShape and

@@ -12,13 +12,14 @@ class OrderedCommit::Walk final : public btOverlapCallback {
  public:
   Walk(const OrderedCommit& commit, btCollisionDispatcher& dispatcher, const btDispatcherInfo& info,
        const SphereBatch& batch, std::span<const btBroadphasePair> pairs,
-       std::span<const PairResult> results, const Visited& visited)
+       std::span<const PairContact> touching, const Visited& visited)
       : actions_(commit.actions_),
+        contacts_(commit.contacts_),
         dispatcher_(dispatcher),
         info_(info),
         batch_(batch),
         pairs_(pairs),
-        results_(results),
+        touching_(touching),
         visited_(visited) {}
 
   bool processOverlap(btBroadphasePair& pair) override {
@@ -44,10 +45,16 @@ class OrderedCommit::Walk final : public btOverlapCallback {
 
   void ask_for(std::size_t i) const {
     if (i >= pairs_.size() || actions_[i] != Action::commit) return;
-    prefetch_count(batch_.manifold(i));
+    prefetch_header(batch_.manifold(i));
     prefetch_first_point(batch_.manifold(i));
     prefetch_for_contact(*batch_.body_a(i));
     prefetch_for_contact(*batch_.body_b(i));
+  }
+
+  static bool is_plain(const btPersistentManifold& manifold, const btCollisionObject& a,
+                       const btCollisionObject& b) {
+    const int flags = a.getCollisionFlags() | b.getCollisionFlags();
+    return (flags & special_collision_flags()) == 0 && manifold.getBody0() == &a;
   }
 
   void visit_stock(btBroadphasePair& pair) const {
@@ -68,44 +75,53 @@ class OrderedCommit::Walk final : public btOverlapCallback {
       case Action::commit:
         break;
     }
+    btPersistentManifold* manifold = batch_.manifold(i);
     // Asked for every contact, because a callback may set another one.
-    if (contacts_are_heard() || !is_plain(*batch_.manifold(i), *a, *b)) {
+    if (contacts_are_heard() || !is_plain(*manifold, *a, *b)) {
       visit_stock(pair);
       return false;  // the near callback asks the filter itself, and does not say what it heard
     }
     if (!dispatcher_.needsCollision(a, b)) return false;
     ++written_;
-    write_contact(batch_.manifold(i), results_[i], *a, *b,
-                  batch_.spheres()[batch_.pairs()[i].b].radius);
+    manifold->setNumContacts(0);
+    // Materials as they are now: callbacks may change those of their bodies.
+    if (contacts_[i] != kNone) {
+      write_contact(manifold, touching_[contacts_[i]], state_of(*a), state_of(*b),
+                    batch_.radius_b(i));
+    }
     return true;
   }
 
   std::span<const Action> actions_;
+  std::span<const std::uint32_t> contacts_;
   btCollisionDispatcher& dispatcher_;
   const btDispatcherInfo& info_;
   const SphereBatch& batch_;
   std::span<const btBroadphasePair> pairs_;
-  std::span<const PairResult> results_;
+  std::span<const PairContact> touching_;
   const Visited& visited_;
   std::uint64_t written_ = 0;
 };
 
-CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairResult> results,
+CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairContact> touching,
                                  bool ask_all) {
   constexpr std::size_t kAhead = 16;
-  const std::size_t n = results.size();
-  actions_.resize(n);
+  const std::size_t n = batch.pairs().size();
+  actions_.assign(n, Action::stock);
+  contacts_.assign(n, kNone);
+  for (std::size_t k = 0; k < touching.size(); ++k) {
+    contacts_[touching[k].pair] = static_cast<std::uint32_t>(k);
+  }
   CommitCounts counts;
   for (std::size_t i = 0; i < n; ++i) {
     if (i + kAhead < n && batch.kind(i + kAhead) == PairKind::spheres) {
       prefetch_count(batch.manifold(i + kAhead));
     }
-    actions_[i] = Action::stock;
     if (!batch.both_are_spheres(i)) continue;
     ++counts.sphere_pairs;
-    counts.touching += results[i].touching;
+    counts.touching += contacts_[i] != kNone ? 1 : 0;
     if (batch.kind(i) != PairKind::spheres) continue;
-    if (results[i].touching != 0 || batch.manifold(i)->getNumContacts() != 0) {
+    if (contacts_[i] != kNone || batch.manifold(i)->getNumContacts() != 0) {
       actions_[i] = Action::commit;
     } else {
       const bool ask = ask_all || (batch.either_trait(i) & kForeign) != 0;
@@ -118,8 +134,8 @@ CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairR
 std::uint64_t OrderedCommit::run(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
                                  const btDispatcherInfo& info, btDispatcher* argument,
                                  const SphereBatch& batch, std::span<const btBroadphasePair> pairs,
-                                 std::span<const PairResult> results, const Visited& visited) {
-  Walk walk(*this, dispatcher, info, batch, pairs, results, visited);
+                                 std::span<const PairContact> touching, const Visited& visited) {
+  Walk walk(*this, dispatcher, info, batch, pairs, touching, visited);
   cache.processAllOverlappingPairs(&walk, argument, info);
   return walk.written();
 }

@@ -16,16 +16,16 @@ namespace jfpx::inline JFPX_ABI::bullet {
 class OrderedCommit {
  public:
   /// Called with each sphere pair behind its visit, and whether its manifold is now what the
-  /// results say; false if a filter may have kept it as it was.
+  /// contacts say; false if a filter may have kept it as it was.
   using Visited = std::function<void(std::size_t i, bool current)>;
 
   /// Decides what the walk does at each pair, as the manifolds are now. `ask_all` when the
   /// dispatcher's class may override needsCollision. The only part that can throw by itself.
-  CommitCounts plan(const SphereBatch& batch, std::span<const PairResult> results, bool ask_all);
+  CommitCounts plan(const SphereBatch& batch, std::span<const PairContact> touching, bool ask_all);
   /// @return manifolds written.
   std::uint64_t run(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
                     const btDispatcherInfo& info, btDispatcher* argument, const SphereBatch& batch,
-                    std::span<const btBroadphasePair> pairs, std::span<const PairResult> results,
+                    std::span<const btBroadphasePair> pairs, std::span<const PairContact> touching,
                     const Visited& visited);
 
  private:
@@ -37,7 +37,10 @@ class OrderedCommit {
   };
   class Walk;
 
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+
   std::vector<Action> actions_;
+  std::vector<std::uint32_t> contacts_;  ///< by pair: the number of its contact, or kNone
 };
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -35,7 +35,8 @@ class CallbacksOff {
 
 std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDispatcherInfo& info,
                                           const btCollisionObject& body_a,
-                                          const btCollisionObject& body_b, const PairResult& result,
+                                          const btCollisionObject& body_b,
+                                          const PairContact* contact,
                                           const btPersistentManifold& thresholds,
                                           const btPersistentManifold* manifold) {
   const CallbacksOff callbacks_off;
@@ -54,14 +55,14 @@ std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDisp
   const bool expected = scratch.getNumContacts() != 0;
   // Bullet refuses a touching point if a user has set a negative breaking threshold.
   const bool accepted =
-      result.touching != 0 && !(result.distance > thresholds.getContactBreakingThreshold());
+      contact != nullptr && !(contact->distance > thresholds.getContactBreakingThreshold());
   compare("touching", expected ? 1 : 0, accepted ? 1 : 0);
   if (expected && accepted) {
     const btManifoldPoint& point = scratch.getContactPoint(0);
-    compare("distance", point.m_distance1, result.distance);
-    compare("normal.x", point.m_normalWorldOnB.x(), result.normal.x);
-    compare("normal.y", point.m_normalWorldOnB.y(), result.normal.y);
-    compare("normal.z", point.m_normalWorldOnB.z(), result.normal.z);
+    compare("distance", point.m_distance1, contact->distance);
+    compare("normal.x", point.m_normalWorldOnB.x(), contact->normal.x);
+    compare("normal.y", point.m_normalWorldOnB.y(), contact->normal.y);
+    compare("normal.z", point.m_normalWorldOnB.z(), contact->normal.z);
   }
   if (manifold != nullptr) {
     compare("number of points", scratch.getNumContacts(), manifold->getNumContacts());

@@ -12,12 +12,13 @@ struct btDispatcherInfo;
 namespace jfpx::inline JFPX_ABI::bullet {
 
 /// Runs btSphereSphereCollisionAlgorithm on a scratch manifold and compares the outcome with the
-/// collider's result and, unless `manifold` is null, with the manifold as it is now. Global contact
-/// callbacks are taken off meanwhile.
+/// collider's contact, null if it found none, and, unless `manifold` is null, with the manifold as
+/// it is now. Global contact callbacks are taken off meanwhile.
 /// @return the first field that differs.
 std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDispatcherInfo& info,
                                           const btCollisionObject& body_a,
-                                          const btCollisionObject& body_b, const PairResult& result,
+                                          const btCollisionObject& body_b,
+                                          const PairContact* contact,
                                           const btPersistentManifold& thresholds,
                                           const btPersistentManifold* manifold);
 

@@ -112,8 +112,8 @@ std::size_t PairMirror::find_changed(std::span<const btBroadphasePair> pairs, st
     const btBroadphasePair& pair = pairs[i];
     const Key& key = keys_[i];
     const bool same = key.proxy0 == pair.m_pProxy0 && key.proxy1 == pair.m_pProxy1 &&
-                      key.algorithm == pair.m_algorithm && links_[i].lasting;
-    if (same && !(check_releases && was_released(links_[i].manifold))) continue;
+                      key.algorithm == pair.m_algorithm && links_[i].lasting();
+    if (same && !(check_releases && was_released(links_[i].manifold()))) continue;
     changed[count++] = static_cast<std::uint32_t>(i);
   }
   return count;
@@ -122,25 +122,24 @@ std::size_t PairMirror::find_changed(std::span<const btBroadphasePair> pairs, st
 PairMirror::Link PairMirror::read_link(btCollisionAlgorithm* algorithm, const PairOwner& owner) {
   if (algorithm == nullptr) return {};
   const std::type_info* type = &typeid(*algorithm);
-  Link link;
+  btPersistentManifold* manifold = nullptr;
+  PairKind kind = PairKind::other;
   if (type == &typeid(btSphereSphereCollisionAlgorithm)) {
-    link.manifold = manifold_of<btSphereSphereCollisionAlgorithm>(algorithm);
-    link.kind = PairKind::spheres;
+    manifold = manifold_of<btSphereSphereCollisionAlgorithm>(algorithm);
+    kind = PairKind::spheres;
   } else if (type == &typeid(btConvexConvexAlgorithm)) {
     auto* convex = static_cast<btConvexConvexAlgorithm*>(algorithm);
     if (convex->*member_of(PerturbationTag()) != 0) return {};
-    link.manifold = manifold_of<btConvexConvexAlgorithm>(algorithm);
-    link.kind = PairKind::convex;
+    manifold = manifold_of<btConvexConvexAlgorithm>(algorithm);
+    kind = PairKind::convex;
   } else if (type == &typeid(btConvexPlaneCollisionAlgorithm)) {
     // Its perturbation is for polyhedra.
     auto* plane = static_cast<btConvexPlaneCollisionAlgorithm*>(algorithm);
-    link.manifold = manifold_of<btConvexPlaneCollisionAlgorithm>(algorithm);
-    link.kind =
-        plane->*member_of(PlaneFirstTag()) ? PairKind::plane_convex : PairKind::convex_plane;
+    manifold = manifold_of<btConvexPlaneCollisionAlgorithm>(algorithm);
+    kind = plane->*member_of(PlaneFirstTag()) ? PairKind::plane_convex : PairKind::convex_plane;
   }
-  if (link.manifold == nullptr) return {};
-  link.lasting = algorithm->*AlgorithmFields::dispatcher == owner.dispatcher;
-  return link;
+  if (!Link::can_hold(manifold)) return {};
+  return {manifold, kind, algorithm->*AlgorithmFields::dispatcher == owner.dispatcher};
 }
 
 void PairMirror::update(std::span<const btBroadphasePair> pairs,

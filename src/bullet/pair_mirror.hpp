@@ -50,16 +50,34 @@ class PairMirror {
 
   /// The numbers of the two proxies of every pair.
   std::span<const SpherePair> pairs() const { return pairs_; }
-  PairKind kind(std::size_t i) const { return links_[i].kind; }
+  PairKind kind(std::size_t i) const { return links_[i].kind(); }
   /// Null for PairKind::other.
-  btPersistentManifold* manifold(std::size_t i) const { return links_[i].manifold; }
+  btPersistentManifold* manifold(std::size_t i) const { return links_[i].manifold(); }
   const ProxyTable& proxies() const { return proxies_; }
 
  private:
-  struct Link {
-    btPersistentManifold* manifold = nullptr;
-    PairKind kind = PairKind::other;
-    bool lasting = true;  ///< whether the link may be kept; else it is read again every time
+  /// The manifold, the kind, and whether the link may be kept, else it is read again every time: in
+  /// one word, because all links are streamed through twice a dispatch.
+  class Link {
+   public:
+    Link() = default;
+    Link(btPersistentManifold* manifold, PairKind kind, bool lasting)
+        : bits_(reinterpret_cast<std::uintptr_t>(manifold) | static_cast<std::uintptr_t>(kind) |
+                (lasting ? 0 : kFleeting)) {}
+    /// False for null, and for a pool of the user's that is not aligned as Bullet's are.
+    static bool can_hold(const btPersistentManifold* manifold) {
+      return manifold != nullptr &&
+             (reinterpret_cast<std::uintptr_t>(manifold) & (kKind | kFleeting)) == 0;
+    }
+    btPersistentManifold* manifold() const {
+      return reinterpret_cast<btPersistentManifold*>(bits_ & ~(kKind | kFleeting));
+    }
+    PairKind kind() const { return static_cast<PairKind>(bits_ & kKind); }
+    bool lasting() const { return (bits_ & kFleeting) == 0; }
+
+   private:
+    static constexpr std::uintptr_t kKind = 7, kFleeting = 8;
+    std::uintptr_t bits_ = 0;
   };
   static Link read_link(btCollisionAlgorithm* algorithm, const PairOwner& owner);
 

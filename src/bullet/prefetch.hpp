@@ -38,28 +38,37 @@ struct BodyFields : btCollisionObject {
   static constexpr auto check_collide_with = &BodyFields::m_checkCollideWith;
 };
 
-/// Class, position, and the fields from the shape to the friction.
-inline void prefetch_state(const btCollisionObject& body) {
-  prefetch(&body);
+/// Position, the fields from the shape to the activation, and whether there is a filter.
+inline void prefetch_place(const btCollisionObject& body) {
   prefetch(&body.getWorldTransform() + 1);  // its end: the position is last
   prefetch(&(body.*BodyFields::shape));
-  prefetch(&(body.*BodyFields::friction));
+  prefetch(&(body.*BodyFields::friction));  // right behind the activation
+  prefetch(&(body.*BodyFields::check_collide_with));
+}
+
+/// The same, and its class.
+inline void prefetch_state(const btCollisionObject& body) {
+  prefetch(&body);
+  prefetch_place(body);
 }
 
 /// All that a contact of the body needs.
 inline void prefetch_for_contact(const btCollisionObject& body) {
   prefetch_state(body);
   prefetch(&(body.*BodyFields::spinning_friction));
-  prefetch(&(body.*BodyFields::check_collide_with));
 }
 
-/// The bodies, the count and the thresholds, which are private: two thresholds lie between the
-/// count and the first public member behind.
+/// The number of points of a manifold. It is private: two thresholds lie between it and the first
+/// public member behind.
 inline void prefetch_count(const btPersistentManifold* manifold) {
-  const char* count =
-      reinterpret_cast<const char*>(&manifold->m_companionIdA) - 2 * sizeof(btScalar) - sizeof(int);
-  prefetch(count);
-  prefetch(count - 2 * sizeof(void*));
+  prefetch(reinterpret_cast<const char*>(&manifold->m_companionIdA) - 2 * sizeof(btScalar) -
+           sizeof(int));
+}
+
+/// The bodies, the number of points and the thresholds of a manifold, which are its last fields.
+inline void prefetch_header(const btPersistentManifold* manifold) {
+  prefetch_at(manifold, sizeof(btPersistentManifold) - 48);
+  prefetch_at(manifold, sizeof(btPersistentManifold) - 1);
 }
 
 inline void prefetch_first_point(const btPersistentManifold* manifold) {
@@ -77,12 +86,6 @@ inline void prefetch_island_state(const btCollisionObject* object) {
   constexpr std::size_t kGuess = sizeof(btScalar) == 4 ? 224 : 400;
   prefetch_at(object, kGuess);
   prefetch_at(object, kGuess + 24);
-}
-
-/// The bodies and the number of points of a manifold, which are its last fields.
-inline void prefetch_header(const btPersistentManifold* manifold) {
-  prefetch_at(manifold, sizeof(btPersistentManifold) - 48);
-  prefetch_at(manifold, sizeof(btPersistentManifold) - 1);
 }
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -17,19 +17,29 @@ namespace {
 
 class Committer {
  public:
+  /// `touching` are the contacts of all pairs.
   Committer(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
-            std::span<const PairResult> results, std::size_t begin, std::size_t end)
-      : dispatcher_(dispatcher), batch_(batch), results_(results), begin_(begin), end_(end) {}
+            std::span<const PairContact> touching, std::size_t begin, std::size_t end)
+      : dispatcher_(dispatcher),
+        batch_(batch),
+        next_(first_contact(touching, begin)),
+        last_(touching.data() + touching.size()),
+        begin_(begin),
+        end_(end) {}
 
   /// Writes the pairs that are left to Bullet to `left` and returns their number.
   std::size_t run(std::uint32_t* left) {
     std::size_t count = 0;
     for (std::size_t i = begin_; i < std::min(end_, begin_ + kCountAhead); ++i) ask_for_count(i);
-    for (std::size_t i = begin_; i < std::min(end_, begin_ + kWriteAhead); ++i) ask_for_rest(i);
+    for (std::ptrdiff_t k = 0; k < kContactsAhead; ++k) ask_for_contact(k);
     for (std::size_t i = begin_; i < end_; ++i) {
       if (i + kCountAhead < end_) ask_for_count(i + kCountAhead);
-      if (i + kWriteAhead < end_) ask_for_rest(i + kWriteAhead);
-      if (!commit(i)) left[count++] = static_cast<std::uint32_t>(i);
+      const PairContact* contact = nullptr;
+      if (next_ != last_ && next_->pair == i) {
+        ask_for_contact(kContactsAhead);
+        contact = next_++;
+      }
+      if (!commit(i, contact)) left[count++] = static_cast<std::uint32_t>(i);
     }
     return count;
   }
@@ -38,27 +48,29 @@ class Committer {
  private:
   /// Most pairs take a nanosecond or two, and memory some hundred.
   static constexpr std::size_t kCountAhead = 64;
-  /// Pairs that touch take longer, and need a dozen cache lines.
-  static constexpr std::size_t kWriteAhead = 16;
+  /// Contacts take longer, and need half a dozen cache lines of their manifold.
+  static constexpr std::ptrdiff_t kContactsAhead = 10;
 
   void ask_for_count(std::size_t i) const {
     if (batch_.kind(i) != PairKind::other) prefetch_count(batch_.manifold(i));
   }
-  void ask_for_rest(std::size_t i) const {
-    if (results_[i].touching == 0 || batch_.kind(i) == PairKind::other) return;
+  /// For the contact `k` behind the next one.
+  void ask_for_contact(std::ptrdiff_t k) const {
+    if (last_ - next_ <= k || batch_.kind(next_[k].pair) != PairKind::spheres) return;
+    const std::size_t i = next_[k].pair;
+    prefetch_header(batch_.manifold(i));
     prefetch_first_point(batch_.manifold(i));
-    prefetch_for_contact(*batch_.body_a(i));
-    prefetch_for_contact(*batch_.body_b(i));
+    batch_.prefetch_states(i);
   }
 
-  /// False if the pair is left to Bullet.
-  bool commit(std::size_t i) {
+  /// `contact` is null if the spheres do not touch. False if the pair is left to Bullet.
+  bool commit(std::size_t i, const PairContact* contact) {
     switch (batch_.kind(i)) {
       case PairKind::other:
-        if (batch_.both_are_spheres(i)) count_pair(i);
+        if (batch_.both_are_spheres(i)) count_pair(contact);
         return false;
       case PairKind::spheres:
-        return commit_spheres(i);
+        return commit_spheres(i, contact);
       case PairKind::convex:
         return commit_with(kBox, (batch_.trait_a(i) & kSphere) != 0, i, update_sphere_box,
                            &counts_.sphere_boxes);
@@ -70,22 +82,28 @@ class Committer {
     return false;
   }
 
-  bool commit_spheres(std::size_t i) {
+  bool commit_spheres(std::size_t i, const PairContact* contact) {
     btPersistentManifold* manifold = batch_.manifold(i);
-    if (results_[i].touching == 0 && manifold->getNumContacts() == 0) {
+    if (contact == nullptr && manifold->getNumContacts() == 0) {
       ++counts_.sphere_pairs;
       return true;
     }
     if (!batch_.both_are_spheres(i)) return false;  // the shape was exchanged under the algorithm
-    count_pair(i);
-    if ((batch_.either_trait(i) & kActive) == 0) return true;
-    const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
-    if (!is_plain(*manifold, *a, *b)) return false;
-    // Qualified: nobody has overridden it.
-    if (!dispatcher_.btCollisionDispatcher::needsCollision(a, b)) return true;
+    count_pair(contact);
+    const unsigned traits = batch_.either_trait(i);
+    if ((traits & kActive) == 0) return true;
+    if ((traits & kSpecial) != 0 || manifold->getBody0() != batch_.body_a(i)) return false;
+    if ((traits & kPicky) != 0 && !needs_collision(i)) return true;
     ++counts_.written;
-    write_contact(manifold, results_[i], *a, *b, batch_.spheres()[batch_.pairs()[i].b].radius);
+    manifold->setNumContacts(0);  // btPersistentManifold::clearManifold without callbacks
+    if (contact == nullptr) return true;
+    write_contact(manifold, *contact, batch_.state_a(i), batch_.state_b(i), batch_.radius_b(i));
     return true;
+  }
+
+  /// Qualified: nobody has overridden it.
+  bool needs_collision(std::size_t i) const {
+    return dispatcher_.btCollisionDispatcher::needsCollision(batch_.body_a(i), batch_.body_b(i));
   }
 
   /// A sphere and a body that has the trait `other`.
@@ -100,20 +118,20 @@ class Committer {
     const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
     const btCollisionShape* sphere = (sphere_first ? a : b)->getCollisionShape();
     if (&typeid(*sphere) != &typeid(btSphereShape)) return false;
-    if (!dispatcher_.btCollisionDispatcher::needsCollision(a, b)) return true;
+    if ((batch_.either_trait(i) & kPicky) != 0 && !needs_collision(i)) return true;
     if (!update(batch_.manifold(i), *a, *b, sphere_first)) return false;
     ++*count;
     return true;
   }
 
-  void count_pair(std::size_t i) {
+  void count_pair(const PairContact* contact) {
     ++counts_.sphere_pairs;
-    counts_.touching += results_[i].touching;
+    counts_.touching += contact != nullptr ? 1 : 0;
   }
 
   btCollisionDispatcher& dispatcher_;
   const SphereBatch& batch_;
-  std::span<const PairResult> results_;
+  const PairContact *next_, *last_;
   std::size_t begin_, end_;
   CommitCounts counts_;
 };
@@ -133,11 +151,11 @@ void QuietCommit::reserve(std::size_t pairs) {
 }
 
 CommitCounts QuietCommit::run(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
-                              std::span<const PairResult> results, x86::ThreadPool& pool) {
-  const std::size_t n = results.size();
+                              std::span<const PairContact> touching, x86::ThreadPool& pool) {
+  const std::size_t n = batch.pairs().size();
   pool.run(chunks_.size(), [&](std::size_t chunk) {
     const std::size_t begin = chunk * kPairChunk;
-    Committer committer(dispatcher, batch, results, begin, std::min(n, begin + kPairChunk));
+    Committer committer(dispatcher, batch, touching, begin, std::min(n, begin + kPairChunk));
     chunks_[chunk].left = committer.run(&left_[begin]);
     chunks_[chunk].counts = committer.counts();
   });

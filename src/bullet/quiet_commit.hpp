@@ -29,9 +29,9 @@ class QuietCommit {
  public:
   /// Makes room; the only part that can throw.
   void reserve(std::size_t pairs);
-  /// Does what needs no order. `results[i]` belongs to pair i of the batch.
+  /// Does what needs no order.
   CommitCounts run(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
-                   std::span<const PairResult> results, x86::ThreadPool& pool);
+                   std::span<const PairContact> touching, x86::ThreadPool& pool);
   /// Puts the pairs that are left to Bullet into the order in which btHashedOverlappingPairCache
   /// visits them, with and without m_deterministicOverlappingPairs.
   void sort_left(std::span<const btBroadphasePair> pairs, bool deterministic);

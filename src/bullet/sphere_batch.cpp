@@ -1,6 +1,7 @@
 /// Reads bodies. Memory latency is all there is to it: everything is prefetched.
 #include "src/bullet/sphere_batch.hpp"
 
+#include "src/bullet/contact_point.hpp"
 #include "src/bullet/prefetch.hpp"
 
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
@@ -33,7 +34,11 @@ std::uint8_t SphereBatch::read_body(std::size_t number) {
   constexpr Real kNaN = std::numeric_limits<Real>::quiet_NaN();
   const btCollisionObject& body = *bodies_[number];
   unsigned traits = body.isActive() ? kActive : 0;
-  if (!is_bullets_own_class(body) && body.*BodyFields::check_collide_with != 0) traits |= kForeign;
+  if (body.*BodyFields::check_collide_with != 0) {
+    traits |= is_bullets_own_class(body) ? kPicky : kPicky | kForeign;
+  }
+  if ((body.getCollisionFlags() & special_flags_) != 0) traits |= kSpecial;
+  if (copies_states_) states_[number] = state_of(body);
   const btCollisionShape* shape = body.getCollisionShape();
   if (shape->getShapeType() == SPHERE_SHAPE_PROXYTYPE) {
     traits |= kSphere;
@@ -48,6 +53,16 @@ std::uint8_t SphereBatch::read_body(std::size_t number) {
   return static_cast<std::uint8_t>(traits);
 }
 
+void SphereBatch::prefetch_states(std::size_t i) const {
+  for (const SphereIndex number : {pairs()[i].a, pairs()[i].b}) {
+    if (copies_states_) {
+      prefetch_ends(&states_[number], sizeof(BodyState));
+    } else {
+      prefetch_for_contact(*bodies_[number]);
+    }
+  }
+}
+
 SphereBatch::Summary SphereBatch::read_bodies(std::size_t begin, std::size_t end) {
   const ProxyTable& proxies = mirror_.proxies();
   constexpr std::size_t kAhead = 12;
@@ -59,7 +74,9 @@ SphereBatch::Summary SphereBatch::read_bodies(std::size_t begin, std::size_t end
       bodies_[k] = proxies.in_use(k)
                        ? static_cast<const btCollisionObject*>(proxies.proxy(k)->m_clientObject)
                        : nullptr;
-      if (bodies_[k] != nullptr) prefetch_state(*bodies_[k]);
+      if (bodies_[k] != nullptr) {
+        copies_states_ ? prefetch_for_contact(*bodies_[k]) : prefetch_place(*bodies_[k]);
+      }
     }
     if (const std::size_t k = i - 2 * kAhead; i >= begin + 2 * kAhead && k < end) {
       if (bodies_[k] != nullptr) {
@@ -84,6 +101,9 @@ bool SphereBatch::gather(std::span<const btBroadphasePair> pairs, const PairOwne
   bodies_.resize(n);
   spheres_.resize(n);
   traits_.resize(n);
+  copies_states_ = expected_contacts_ > n;
+  if (copies_states_) states_.resize(n);
+  special_flags_ = special_collision_flags();
   summaries_.resize((n + kBodyChunk - 1) / kBodyChunk);
   pool.run(summaries_.size(), [&](std::size_t chunk) {
     const std::size_t begin = chunk * kBodyChunk;

@@ -3,10 +3,12 @@
 
 #include <jfpx/sphere_collider.hpp>
 
+#include "src/bullet/body_state.hpp"
 #include "src/bullet/pair_mirror.hpp"
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
 
+#include <algorithm>
 #include <vector>
 
 namespace jfpx::inline JFPX_ABI::bullet {
@@ -17,12 +19,24 @@ enum BodyTrait : std::uint8_t {
   kActive = 2,
   /// Its class may override btCollisionObject::checkCollideWithOverride, and it would be called.
   kForeign = 4,
-  kBox = 8,     ///< exactly a btBoxShape
-  kPlane = 16,  ///< exactly a btStaticPlaneShape
+  kBox = 8,       ///< exactly a btBoxShape
+  kPlane = 16,    ///< exactly a btStaticPlaneShape
+  kPicky = 32,    ///< it has a list of bodies to ignore, or a filter: it must be asked
+  kSpecial = 64,  ///< its contacts need more than write_contact()
 };
+
+/// The first of the contacts that belong to pair `pair` or a later one.
+inline const PairContact* first_contact(std::span<const PairContact> touching, std::size_t pair) {
+  return std::lower_bound(
+      touching.data(), touching.data() + touching.size(), pair,
+      [](const PairContact& contact, std::size_t i) { return contact.pair < i; });
+}
 
 class SphereBatch {
  public:
+  /// Contacts to be expected. Where bodies have several, what contacts need of them is copied, once
+  /// for all; where few have any, it is read when it is needed.
+  void expect_contacts(std::size_t contacts) { expected_contacts_ = contacts; }
   /// Reads the bodies of `pairs`. False if there are no two spheres among them.
   bool gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner,
               x86::ThreadPool& pool);
@@ -39,6 +53,11 @@ class SphereBatch {
   btPersistentManifold* manifold(std::size_t i) const { return mirror_.manifold(i); }
   const btCollisionObject* body_a(std::size_t i) const { return bodies_[pairs()[i].a]; }
   const btCollisionObject* body_b(std::size_t i) const { return bodies_[pairs()[i].b]; }
+  BodyState state_a(std::size_t i) const { return state(pairs()[i].a); }
+  BodyState state_b(std::size_t i) const { return state(pairs()[i].b); }
+  /// Asks for what the contact of pair i needs of its bodies.
+  void prefetch_states(std::size_t i) const;
+  Real radius_b(std::size_t i) const { return spheres_[pairs()[i].b].radius; }
   bool both_are_spheres(std::size_t i) const { return (trait_a(i) & trait_b(i) & kSphere) != 0; }
   std::uint8_t trait_a(std::size_t i) const { return traits_[pairs()[i].a]; }
   std::uint8_t trait_b(std::size_t i) const { return traits_[pairs()[i].b]; }
@@ -57,6 +76,10 @@ class SphereBatch {
     std::size_t spheres = 0;
   };
 
+  BodyState state(SphereIndex number) const {
+    return copies_states_ ? states_[number] : state_of(*bodies_[number]);
+  }
+
   Summary read_bodies(std::size_t begin, std::size_t end);
   std::uint8_t read_body(std::size_t number);
 
@@ -64,9 +87,13 @@ class SphereBatch {
   std::vector<SphereInstance> spheres_;
   std::vector<const btCollisionObject*> bodies_;
   std::vector<std::uint8_t> traits_;
+  std::vector<BodyState> states_;  ///< if copies_states_
+  bool copies_states_ = false;
   std::vector<Summary> summaries_;  ///< by chunk
   unsigned any_trait_ = 0;
   int any_collision_flag_ = 0;
+  int special_flags_ = 0;
+  std::size_t expected_contacts_ = 0;
 };
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

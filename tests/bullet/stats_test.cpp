@@ -1,6 +1,7 @@
 /// The dispatcher's counters, its fallbacks with reasons, and that verify finds planted errors.
 #include <jfpx/error.hpp>
 
+#include "src/bullet/convex_check.hpp"
 #include "tests/bullet/twin_worlds.hpp"
 
 namespace jfpx::inline JFPX_ABI::bullet {
@@ -186,6 +187,60 @@ TEST(Verify, FindsEveryPlantedError) {
     EXPECT_TRUE(twins.stats().first_mismatch.starts_with(error.name))
         << twins.stats().first_mismatch;
   }
+}
+
+/// A sphere that rests on a box and on a plane, and lies there with points of several steps.
+TEST(Verify, RecomputesSpheresOnBoxesAndPlanes) {
+  Twins twins(with_collider([](std::span<PairResult>) {}, true));
+  twins.both([](BulletWorld& w) {
+    w.add(w.keep(new btBoxShape(btVector3(5, 1, 5))), btVector3(0, -1, 0), 0);
+    w.add(w.keep(new btStaticPlaneShape(btVector3(1, 3, 0).normalized(), btScalar(-0.5))),
+          btVector3(0, 0, 0), 0);
+    for (int i = 0; i < 5; ++i) {
+      w.add_sphere(btScalar(0.5), btVector3(btScalar(i) * btScalar(1.1), btScalar(0.6), 0));
+    }
+  });
+  ASSERT_TRUE(twins.step(60));
+  EXPECT_GE(twins.stats().sphere_boxes, 5u * 50u);
+  EXPECT_GE(twins.stats().sphere_planes, 5u * 50u);
+  EXPECT_GE(twins.stats().verified, twins.stats().sphere_boxes + twins.stats().sphere_planes);
+  EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
+}
+
+TEST(Verify, FindsEveryPlantedErrorOfAPointThatPersists) {
+  BulletWorld w(std::make_unique<btDefaultCollisionConfiguration>(), TwinOptions().stock,
+                TwinOptions().broadphase());
+  w.add(w.keep(new btBoxShape(btVector3(5, 1, 5))), btVector3(0, -1, 0), 0);
+  w.add_sphere(btScalar(0.5), btVector3(0, btScalar(0.49), 0));
+  for (int i = 0; i < 5; ++i) w.world.stepSimulation(btScalar(1) / 60, 0);
+  ASSERT_EQ(w.dispatcher->getNumManifolds(), 1);
+  btPersistentManifold* manifold = w.dispatcher->getManifoldByIndexInternal(0);
+  const btPersistentManifold before = *manifold;
+  const btBroadphasePair& pair = *w.world.getPairCache()->getOverlappingPairArrayPtr();
+  const auto process = [&] {
+    w.dispatcher->dispatchAllCollisionPairs(w.world.getPairCache(), w.world.getDispatchInfo(),
+                                            w.dispatcher.get());
+  };
+  const auto difference = [&] {
+    const auto found = check_update(*pair.m_algorithm, w.world.getDispatchInfo(), *w.bodies[0],
+                                    *w.bodies[1], before, manifold);
+    return found ? found->field : "";
+  };
+  process();
+  ASSERT_GT(manifold->getNumContacts(), 0);
+  EXPECT_EQ(difference(), "");
+  EXPECT_EQ(difference(), "") << "the manifold must keep what it had";
+  btManifoldPoint& point = manifold->getContactPoint(0);
+  flip_last_bit(&point.m_distance1);
+  EXPECT_EQ(difference(), "m_distance1");
+  flip_last_bit(&point.m_distance1);
+  flip_last_bit(&point.m_localPointB.m_floats[1]);
+  EXPECT_EQ(difference(), "m_localPointB.y");
+  flip_last_bit(&point.m_localPointB.m_floats[1]);
+  ++point.m_lifeTime;
+  EXPECT_EQ(difference(), "m_lifeTime");
+  manifold->setNumContacts(0);
+  EXPECT_EQ(difference(), "number of points");
 }
 
 TEST(Verify, FindsNothingWhereNothingIs) {

@@ -9,9 +9,14 @@ jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   bullet/stats_test.cpp
   LINK jfpx_bullet jfpx_scenes)
 jfpx_add_test(bullet_verify_test INTERNAL SOURCES
+  bullet/fused_test.cpp
+  bullet/fused_unit.cpp
   bullet/scene_world_test.cpp
   bullet/verify_test.cpp
   LINK jfpx_bullet)
+# Behind the options that linking jfpx::bullet brings.
+set_source_files_properties(bullet/fused_unit.cpp PROPERTIES
+  COMPILE_OPTIONS "-O3;-march=native;-ffp-contract=fast")
 jfpx_add_test(bullet_trajectory_test SOURCES
   bullet/trajectory_test.cpp
   LINK jfpx_bullet)

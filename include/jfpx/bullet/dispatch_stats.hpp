@@ -36,15 +36,18 @@ struct DispatchStats {
   std::uint64_t written = 0;        ///< of these, brought up to date without Bullet's algorithm
   std::uint64_t sphere_boxes = 0;   ///< pairs of a sphere and a box, likewise
   std::uint64_t sphere_planes = 0;  ///< pairs of a sphere and a plane, likewise
-  std::uint64_t verified = 0;       ///< sphere pairs recomputed by set_verify(true)
+  std::uint64_t verified = 0;       ///< pairs recomputed by set_verify(true)
   std::uint64_t mismatches = 0;     ///< of these, different in any field
   std::string first_mismatch;       ///< field and both values; empty where there was none
   std::array<std::uint64_t, kFallbackCount> fallbacks{};  ///< dispatches by Fallback
   Fallback last_fallback = Fallback::none;                ///< none where the last was a batch
-  std::string failure;         ///< why batches were given up for good; empty while all is well
-  std::string device_failure;  ///< why x86 took over from the device, if it did
-  double prepare_ms = 0;       ///< wall clock of batches: gathering, collider, reading manifolds
-  double commit_ms = 0;        ///< wall clock of batches: the ordered walk
+  std::uint64_t to_device = 0;    ///< bytes that the collider sent to a device
+  std::uint64_t from_device = 0;  ///< bytes that it got back
+  std::string failure;            ///< why batches were given up for good; empty while all is well
+  std::string device_failure;     ///< why x86 took over from the device, if it did
+  std::string warning;            ///< that this program does not have Bullet's bits; see fused.hpp
+  double prepare_ms = 0;          ///< wall clock of batches: gathering, collider, reading manifolds
+  double commit_ms = 0;           ///< wall clock of batches: the ordered walk
 };
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

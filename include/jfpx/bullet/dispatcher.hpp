@@ -3,6 +3,7 @@
 
 #include <jfpx/bullet/abi.hpp>
 #include <jfpx/bullet/dispatch_stats.hpp>
+#include <jfpx/bullet/fused.hpp>
 #include <jfpx/sphere_collider.hpp>
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
@@ -13,10 +14,12 @@ namespace jfpx::inline JFPX_ABI::bullet {
 
 struct DispatcherOptions {
   SphereColliderOptions collider = {};  ///< who tests the sphere pairs
-  /// Pairs below which a dispatch is left to Bullet. The default is where a gas, the worst case,
-  /// breaks even: nothing touches, and Bullet is quick to say so while all fits into the cache.
-  std::size_t minimum_batch = 3072;
+  /// Pairs below which a dispatch is left to Bullet. A gas, the worst case, since nothing touches and
+  /// Bullet is quick to say so, breaks even below 100 pairs; there is little to win before 256.
+  std::size_t minimum_batch = 256;
   bool verify = false;  ///< as set_verify()
+  /// Leave it as it is: tells how the program is compiled. If so, stats().warning says it.
+  bool fuses_products = bullet::fuses_products();
 };
 
 /// A btCollisionDispatcher that tests all sphere-sphere pairs at once. Manifolds, their order,
@@ -54,9 +57,9 @@ class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
   std::size_t minimum_batch() const noexcept;
   void set_minimum_batch(std::size_t pairs) noexcept;
 
-  /// Recompute every sphere pair of a batch with btSphereSphereCollisionAlgorithm on a scratch
-  /// manifold, compare all fields, count in stats(). Slow. Global contact callbacks are taken off
-  /// meanwhile: no other thread may use Bullet then. User-set combine callbacks are called twice.
+  /// Recompute every pair of a batch that was not left to Bullet with Bullet's own algorithm,
+  /// compare all fields, count in stats(). Slow. Global contact callbacks are taken off meanwhile:
+  /// no other thread may use Bullet then. User-set combine callbacks are called twice.
   void set_verify(bool on) noexcept;
   bool verify() const noexcept;
 
