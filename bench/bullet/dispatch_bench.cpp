@@ -6,6 +6,7 @@
 /// medians; a ratio is stock / jfpx, so larger than 1 means that jfpx is faster.
 #include <jfpx/bullet/scene_world.hpp>
 
+#include "bench/bullet/series.hpp"
 #include "examples/scenes/scenes.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
@@ -18,27 +19,6 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-/// Medians of the ratios sample by sample: neighbours in time share the noise of the machine.
-struct Series {
-  std::vector<double> stock, jfpx, ratio;
-  void add(double stock_ms, double jfpx_ms) {
-    stock.push_back(stock_ms);
-    jfpx.push_back(jfpx_ms);
-    ratio.push_back(stock_ms / jfpx_ms);
-  }
-  void report(benchmark::State& state, const std::string& name) const {
-    state.counters[name + "_stock_ms"] = median(stock);
-    state.counters[name + "_jfpx_ms"] = median(jfpx);
-    state.counters[name + "_ratio"] = median(ratio);
-  }
-};
-
 double dispatch_ms(SceneWorld& w, int repeats) {
   btDispatcher& dispatcher = w.dispatcher();
   btOverlappingPairCache* pairs = w.world().getPairCache();
@@ -48,18 +28,6 @@ double dispatch_ms(SceneWorld& w, int repeats) {
   }
   const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - start;
   return taken.count() / repeats;
-}
-
-/// Two numbers in alternating order, so that neither is always the one after the other.
-template <class First, class Second>
-void alternate(bool swap, First first, Second second) {
-  if (swap) {
-    second();
-    first();
-  } else {
-    first();
-    second();
-  }
 }
 
 void compare_dispatch(benchmark::State& state, const char* name, std::uint32_t spheres, int settle,
@@ -97,9 +65,12 @@ void compare_dispatch(benchmark::State& state, const char* name, std::uint32_t s
   step.report(state, "step");
   const DispatchStats& stats = ours.jfpx_dispatcher()->stats();
   state.counters["pairs"] = ours.world().getPairCache()->getNumOverlappingPairs();
-  state.counters["touching"] =
-      stats.batches == 0 ? 0
-                         : static_cast<double>(stats.touching) / static_cast<double>(stats.batches);
+  const auto per_batch = [&](std::uint64_t count) {
+    return stats.batches == 0 ? 0 : static_cast<double>(count) / static_cast<double>(stats.batches);
+  };
+  state.counters["touching"] = per_batch(stats.touching);
+  state.counters["to_device"] = per_batch(stats.to_device);
+  state.counters["from_device"] = per_batch(stats.from_device);
 }
 
 /// A gas of random spheres at rest in the same place, three contacts a sphere: what the collider
@@ -146,18 +117,34 @@ struct Size {
 constexpr Size kSizes[] = {{16, 300, 400},  {64, 300, 300},  {256, 300, 200}, {1024, 200, 100},
                            {4096, 120, 40}, {16384, 60, 11}, {65536, 30, 5}};
 
+void register_dispatch(const std::string& name, const char* scene, const Size& size,
+                       Backend backend) {
+  SceneWorldOptions options;
+  options.dispatch.collider.backend = backend;
+  benchmark::RegisterBenchmark((name + "/" + scene + "/" + std::to_string(size.spheres)).c_str(),
+                               [=](benchmark::State& state) {
+                                 compare_dispatch(state, scene, size.spheres, size.settle, options);
+                               })
+      ->UseManualTime()
+      ->Iterations(size.samples)
+      ->Unit(benchmark::kMillisecond);
+}
+
+bool cuda_is_usable() {
+  const auto backends = available_backends();
+  return std::any_of(backends.begin(), backends.end(), [](const BackendStatus& status) {
+    return status.backend == Backend::cuda && status.usable;
+  });
+}
+
 void register_all() {
+  const bool with_cuda = cuda_is_usable();
   for (const char* scene : {"pile", "gas"}) {
     for (const Size& size : kSizes) {
-      const std::string name =
-          std::string("dispatch/") + scene + "/" + std::to_string(size.spheres);
-      benchmark::RegisterBenchmark(name.c_str(),
-                                   [scene, size](benchmark::State& state) {
-                                     compare_dispatch(state, scene, size.spheres, size.settle);
-                                   })
-          ->UseManualTime()
-          ->Iterations(size.samples)
-          ->Unit(benchmark::kMillisecond);
+      register_dispatch("dispatch", scene, size, Backend::x86);
+      if (with_cuda && size.spheres >= 1024) {
+        register_dispatch("dispatch_cuda", scene, size, Backend::cuda);
+      }
     }
   }
   benchmark::RegisterBenchmark("dispatch/random_gas/100000",
@@ -171,9 +158,5 @@ void register_all() {
 }  // namespace jfpx::inline JFPX_ABI::bullet
 
 int main(int argc, char** argv) {
-  jfpx::bullet::register_all();
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
-  benchmark::RunSpecifiedBenchmarks();
-  benchmark::Shutdown();
+  return jfpx::bullet::run_benchmarks(argc, argv, jfpx::bullet::register_all);
 }
