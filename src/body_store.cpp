@@ -5,6 +5,7 @@
 
 #include "src/assembly.hpp"
 #include "src/inertia_tensor.hpp"
+#include "src/make_room.hpp"
 #include "src/shared/inertia.hpp"
 #include "src/shared/integrate.hpp"
 #include "src/shared/power.hpp"
@@ -53,21 +54,23 @@ bool before(BodyId a, BodyId b) { return a.index < b.index; }
 BodyStore::BodyStore(Real dt, const SleepSettings& sleep)
     : dt_(dt), sleep_(sleep), motion_kept_(kept_per_step(sleep.bias, dt)) {}
 
-void BodyStore::resize(std::size_t slots) {
+/// All or nothing: a slot is there once it has a generation. remove() never needs memory.
+void BodyStore::add_slot() {
+  const std::size_t slots = capacity() + 1;
+  make_room(&free_, slots);
+  make_room(&ids_, slots);
   const auto all = [slots](auto&... arrays) { (arrays.resize(slots), ...); };
   all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
       moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion, moving.awake);
   all(shape_, radius_, mass_, inverse_mass_, friction_, restitution_, body_inverse_inertia_,
       tensor_, acceleration_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_,
       generation_);
+  free_.push_back(static_cast<std::uint32_t>(slots - 1));
 }
 
 BodyId BodyStore::add(const BodyDef& def) {
   Shape shape = normalized(def.shape);  // may throw, so before anything changes
-  if (free_.empty()) {
-    resize(capacity() + 1);
-    free_.push_back(static_cast<std::uint32_t>(capacity() - 1));
-  }
+  if (free_.empty()) add_slot();
   const std::uint32_t i = free_.back();
   const BodyId id{i, generation_[i]};
   ids_.insert(std::upper_bound(ids_.begin(), ids_.end(), id, before), id);
@@ -110,7 +113,7 @@ void BodyStore::set_inertia(std::uint32_t i, const BodyDef& def) {
                              : tensor * (Real(1) / std::max({moments.x, moments.y, moments.z}));
 }
 
-void BodyStore::remove(BodyId id) {
+void BodyStore::remove(BodyId id) noexcept {
   // A slot whose generations are used up is given up: an id never comes back.
   if (generation_[id.index] + 1 != 0) free_.push_back(id.index);
   ++generation_[id.index];

@@ -29,10 +29,10 @@ class BodyStore {
  public:
   BodyStore(Real dt, const SleepSettings& sleep);
 
-  /// @param def must have passed validation
+  /// @param def must have passed validation @throws std::bad_alloc; nothing has changed then
   BodyId add(const BodyDef& def);
   /// @param id must be contained
-  void remove(BodyId id);
+  void remove(BodyId id) noexcept;
   bool contains(BodyId id) const noexcept;
   /// The index of a contained body. @throws InvalidArgument for any other
   std::uint32_t require(BodyId id) const;
@@ -40,7 +40,7 @@ class BodyStore {
   /// The id of the body that has an index now.
   BodyId id(std::uint32_t body) const { return {body, generation_[body]}; }
   /// Slots ever used; indices are below it.
-  std::size_t capacity() const noexcept { return shape_.size(); }
+  std::size_t capacity() const noexcept { return generation_.size(); }
   std::uint32_t movable_count() const noexcept { return movable_count_; }
 
   BodyState state(std::uint32_t body) const;
@@ -80,7 +80,7 @@ class BodyStore {
   MotionArrays moving;
 
  private:
-  void resize(std::size_t slots);
+  void add_slot();
   void set_inertia(std::uint32_t body, const BodyDef& def);
   void integrate(std::uint32_t body);
   void move(std::uint32_t body);

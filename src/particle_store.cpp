@@ -1,6 +1,7 @@
 /// Particles come, fly and go.
 #include "src/particle_store.hpp"
 
+#include "src/make_room.hpp"
 #include "src/shared/integrate.hpp"
 #include "src/shared/power.hpp"
 
@@ -14,17 +15,19 @@ bool before(ParticleId a, ParticleId b) { return a.index < b.index; }
 
 }  // namespace
 
-void ParticleStore::resize(std::size_t slots) {
+/// All or nothing: a slot is there once it has a generation. remove() never needs memory.
+void ParticleStore::add_slot() {
+  const std::size_t slots = capacity() + 1;
+  make_room(&free_, slots);
+  make_room(&ids_, slots);
   const auto all = [slots](auto&... arrays) { (arrays.resize(slots), ...); };
   all(moving.position, moving.velocity, moving.force, acceleration_, gained_, inverse_mass_,
       radius_, restitution_, kept_, generation_);
+  free_.push_back(static_cast<std::uint32_t>(slots - 1));
 }
 
 ParticleId ParticleStore::add(const ParticleDef& def) {
-  if (free_.empty()) {
-    resize(capacity() + 1);
-    free_.push_back(static_cast<std::uint32_t>(capacity() - 1));
-  }
+  if (free_.empty()) add_slot();
   const std::uint32_t i = free_.back();
   const ParticleId id{i, generation_[i]};
   ids_.insert(std::upper_bound(ids_.begin(), ids_.end(), id, before), id);
@@ -40,7 +43,7 @@ ParticleId ParticleStore::add(const ParticleDef& def) {
   return id;
 }
 
-void ParticleStore::remove(ParticleId id) {
+void ParticleStore::remove(ParticleId id) noexcept {
   // A slot whose generations are used up is given up: an id never comes back.
   if (generation_[id.index] + 1 != 0) free_.push_back(id.index);
   ++generation_[id.index];

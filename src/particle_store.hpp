@@ -21,14 +21,14 @@ class ParticleStore {
  public:
   explicit ParticleStore(Real dt) : dt_(dt) {}
 
-  /// @param def must have passed validation
+  /// @param def must have passed validation @throws std::bad_alloc; nothing has changed then
   ParticleId add(const ParticleDef& def);
   /// @param id must be contained
-  void remove(ParticleId id);
+  void remove(ParticleId id) noexcept;
   bool contains(ParticleId id) const noexcept;
   std::span<const ParticleId> ids() const noexcept { return ids_; }
   /// Slots ever used; indices are below it.
-  std::size_t capacity() const noexcept { return radius_.size(); }
+  std::size_t capacity() const noexcept { return generation_.size(); }
 
   /// Puts a particle somewhere; an immovable one stays at rest.
   void set_state(std::uint32_t particle, const ParticleState& state);
@@ -45,7 +45,7 @@ class ParticleStore {
   ParticleMotion moving;
 
  private:
-  void resize(std::size_t slots);
+  void add_slot();
 
   Real dt_;
   std::vector<Vec3> acceleration_, gained_;

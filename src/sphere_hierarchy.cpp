@@ -2,6 +2,7 @@
 #include <jfpx/broad_phase.hpp>
 #include <jfpx/error.hpp>
 
+#include "src/make_room.hpp"
 #include "src/scene_validate.hpp"
 #include "src/shared/bounding_sphere.hpp"
 #include "src/shared/sphere_pair.hpp"
@@ -104,12 +105,14 @@ const SphereInstance& SphereHierarchy::sphere(Leaf leaf) const {
 
 /// Memory may run out: here, before the tree changes, and nowhere else.
 void SphereHierarchy::make_room(std::size_t free_nodes) {
-  while (free_.size() < free_nodes) {
+  const std::size_t nodes = nodes_.size() + free_nodes - std::min(free_nodes, free_.size());
+  jfpx::make_room(&nodes_, nodes);
+  free_.reserve(nodes_.capacity());
+  scratch_.reserve(nodes_.capacity());
+  while (nodes_.size() < nodes) {
     nodes_.emplace_back();
     free_.push_back(static_cast<Index>(nodes_.size() - 1));
   }
-  free_.reserve(nodes_.capacity());
-  scratch_.reserve(nodes_.capacity());
 }
 
 SphereHierarchy::Index SphereHierarchy::make_node() {

@@ -64,6 +64,8 @@ bool World::Impl::advance(StepReport* report) {
   bodies_changed = false;
   contacts.clear();
   report->sphere_contacts = narrow_phase.find_contacts(bodies, &contacts);
+  // Text, which may find no memory: while the step can be undone.
+  report->device_failure = narrow_phase.collider().device_failure();
   report->contacts = contacts.size();
   combine_materials(bodies, scene.materials, &contacts);
   ContactContext contact_context(bodies, time(), &contacts);
@@ -118,7 +120,6 @@ StepReport World::step() {
   report.backend = collider.backend();
   report.algorithm = collider.algorithm();
   report.choice = collider.reason();
-  report.device_failure = collider.device_failure();
   for (const BodyId id : w.bodies.ids()) {
     if (w.bodies.movable(id.index)) report.awake += w.bodies.moving.awake[id.index];
   }

@@ -31,9 +31,10 @@ BodyId World::add(const BodyDef& body) {
   validate_body_count(number + 1);
   validate_body(body, number);
   Impl::require_native(body, number);
+  const BodyId id = impl_->bodies.add(body);
   impl_->bodies_changed = true;
   impl_->contacts.clear();
-  return impl_->bodies.add(body);
+  return id;
 }
 
 void World::remove(BodyId id) {

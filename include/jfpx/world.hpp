@@ -88,7 +88,8 @@ class JFPX_API World {
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
 
-  /// Adds a body. @throws InvalidScene if the definition is bad.
+  /// Adds a body. @throws InvalidScene if the definition is bad; std::bad_alloc, here and wherever
+  ///   something is added: nothing has changed then. To remove needs no memory.
   BodyId add(const BodyDef& body);
   /// Takes a body out and wakes what touched it.
   /// @throws InvalidArgument if the id is not of a living body of this world.

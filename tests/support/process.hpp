@@ -1,12 +1,14 @@
 /// Runs a command and keeps what it said.
 #pragma once
 
+#include <jfpx/config.hpp>
+
 #include <cstdio>
 #include <stdexcept>
 #include <string>
 #include <sys/wait.h>
 
-namespace jfpx::test {
+namespace jfpx::inline JFPX_ABI::test {
 
 struct ProcessResult {
   int status = -1;     ///< exit status; 128 + signal if it was killed
@@ -27,4 +29,4 @@ inline ProcessResult run_process(const std::string& command) {
   return result;
 }
 
-}  // namespace jfpx::test
+}  // namespace jfpx::inline JFPX_ABI::test

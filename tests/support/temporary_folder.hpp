@@ -1,12 +1,14 @@
 /// A folder that lives as long as a test.
 #pragma once
 
+#include <jfpx/config.hpp>
+
 #include <filesystem>
 #include <stdexcept>
 #include <stdlib.h>
 #include <string>
 
-namespace jfpx::test {
+namespace jfpx::inline JFPX_ABI::test {
 
 class TemporaryFolder {
  public:
@@ -32,4 +34,4 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-}  // namespace jfpx::test
+}  // namespace jfpx::inline JFPX_ABI::test

@@ -11,7 +11,7 @@
 #include <memory>
 #include <string>
 
-namespace jfpx::test {
+namespace jfpx::inline JFPX_ABI::test {
 
 /// Tests that draw derive from this; they are skipped, with the reason, where OpenGL is missing.
 class GlTest : public ::testing::Test {
@@ -43,4 +43,4 @@ class GlTest : public ::testing::Test {
   inline static std::string reason_;
 };
 
-}  // namespace jfpx::test
+}  // namespace jfpx::inline JFPX_ABI::test

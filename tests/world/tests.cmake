@@ -26,7 +26,11 @@ jfpx_add_test(world_test SOURCES
 jfpx_add_test(particle_test SOURCES world/particle_test.cpp)
 jfpx_add_test(assembly_test INTERNAL SOURCES world/assembly_test.cpp)
 jfpx_add_test(broad_phase_test INTERNAL SOURCES world/broad_phase_test.cpp)
+# These replace operator new: programs of their own.
 jfpx_add_test(allocation_test SOURCES world/allocation_test.cpp)
+jfpx_add_test(out_of_memory_test SOURCES
+  support/failing_new.cpp
+  world/out_of_memory_test.cpp)
 
 jfpx_add_executable(pinned_hashes SOURCES world/pinned_hashes.cpp LINK jfpx jfpx_demos)
 add_test(NAME PinnedHashes COMMAND pinned_hashes)

@@ -1,0 +1,65 @@
+/// Replaces operator new of a test program.
+#include "tests/support/failing_new.hpp"
+
+#include <atomic>
+#include <cstdlib>
+#include <limits>
+
+namespace {
+
+constexpr std::size_t kNever = std::numeric_limits<std::size_t>::max();
+
+std::atomic<std::size_t> calls{0}, alive{0};
+std::atomic<std::size_t> first_failure{kNever}, last_failure{kNever};
+std::atomic<bool> has_failed{false};
+
+void* allocate(std::size_t bytes, std::size_t alignment) {
+  const std::size_t call = calls++;
+  if (call >= first_failure && call <= last_failure) {
+    has_failed = true;
+    throw std::bad_alloc();
+  }
+  void* memory = nullptr;
+  if (posix_memalign(&memory, alignment, bytes) != 0) throw std::bad_alloc();
+  ++alive;
+  return memory;
+}
+void release(void* memory) noexcept {
+  if (memory != nullptr) --alive;
+  std::free(memory);
+}
+
+}  // namespace
+
+void* operator new(std::size_t n) { return allocate(n, __STDCPP_DEFAULT_NEW_ALIGNMENT__); }
+void* operator new(std::size_t n, std::align_val_t a) {
+  return allocate(n, static_cast<std::size_t>(a));
+}
+void operator delete(void* p) noexcept { release(p); }
+void operator delete(void* p, std::size_t) noexcept { release(p); }
+void operator delete(void* p, std::align_val_t) noexcept { release(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { release(p); }
+
+namespace jfpx::inline JFPX_ABI::test {
+
+FailingNew::FailingNew(std::size_t k, Shortage shortage) {
+  has_failed = false;
+  const std::size_t failing = calls + k;
+  last_failure = shortage == Shortage::once ? failing : kNever;
+  first_failure = failing;
+}
+FailingNew::~FailingNew() { first_failure = kNever; }
+bool FailingNew::failed() { return has_failed; }
+
+std::size_t living_allocations() { return alive; }
+
+std::size_t with_every_failure(
+    const std::function<bool(std::size_t k, Shortage shortage)>& attempt) {
+  std::size_t failures = 0;
+  for (const Shortage shortage : {Shortage::once, Shortage::for_good}) {
+    for (std::size_t k = 0; attempt(k, shortage); ++k) ++failures;
+  }
+  return failures;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::test

@@ -1,0 +1,276 @@
+/// Whichever allocation fails, in a step, when something comes, or in reading and writing: it is an
+/// error, nothing has happened, nothing leaks, and what follows has the same bits as ever.
+#include <jfpx/error.hpp>
+#include <jfpx/particle.hpp>
+#include <jfpx/recording.hpp>
+
+#include "tests/support/failing_new.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/world/shape_zoo.hpp"
+
+#include <array>
+
+namespace jfpx::inline JFPX_ABI::test {
+namespace {
+
+const std::array<WorldSettings, 5> kSettings{{
+    {.collider = {.backend = Backend::x86, .algorithm = SphereAlgorithm::all_pairs}},
+    {.collider = {.backend = Backend::x86,
+                  .algorithm = SphereAlgorithm::sorted_tiles,
+                  .threads = 3}},
+    {.collider = {}},
+    {.collider = {.backend = Backend::x86}, .broad_phase = BroadPhase::hierarchy},
+    {.collider = {.backend = Backend::x86}, .broad_phase = BroadPhase::brute_force},
+}};
+
+/// All shapes, in contact.
+Scene crowd(std::uint64_t seed) {
+  Random random(seed);
+  Scene scene;
+  for (int i = 0; i < 40; ++i) scene.bodies.push_back(random_body(&random, 2));
+  BodyDef platform;
+  platform.shape = Box{{3, Real(0.2), 3}};
+  platform.mass = 0;
+  platform.kinematic = true;
+  platform.position = {0, -2, 0};
+  platform.velocity = {1, 0, 0};
+  scene.bodies.push_back(platform);
+  scene.bodies.push_back(ground());
+  scene.resolver.max_iterations = 100;
+  return scene;
+}
+
+/// The same world each time.
+World make_world(const Scene& scene, const WorldSettings& settings, int steps) {
+  World world(scene, settings);
+  const BodyId first = world.bodies()[0], second = world.bodies()[1];
+  world.add_force(Spring{.a = {first}, .b = {second}, .stiffness = 5, .rest_length = 1});
+  world.add_contact_generator([first, second](ContactContext& context) {
+    context.add({.a = first, .b = second, .normal = {0, 1, 0}});
+  });
+  for (int n = 0; n < steps; ++n) world.step();
+  return world;
+}
+
+/// All that a user can see of the next steps.
+struct Moment {
+  std::uint64_t hash = 0;
+  std::vector<Contact> contacts;
+  std::vector<ContactEvent> events;
+  friend bool operator==(const Moment&, const Moment&) = default;
+};
+std::vector<Moment> follow(World& world, int steps) {
+  std::vector<Moment> moments;
+  for (int n = 0; n < steps; ++n) {
+    world.step();
+    moments.push_back({world.state_hash(),
+                       {world.contacts().begin(), world.contacts().end()},
+                       {world.contact_events().begin(), world.contact_events().end()}});
+  }
+  return moments;
+}
+
+TEST(OutOfMemoryInAWorld, AStepHasNotHappenedWhicheverAllocationFails) {
+  const std::uint64_t seed = fresh_seed();
+  SCOPED_TRACE(trace(seed));
+  const Scene scene = crowd(seed);
+  for (std::size_t i = 0; i < kSettings.size(); ++i) {
+    for (const int warm : {0, 1, 4}) {
+      SCOPED_TRACE("settings " + std::to_string(i) + " after " + std::to_string(warm) + " steps");
+      World untroubled = make_world(scene, kSettings[i], warm);
+      const std::vector<Moment> expected = follow(untroubled, 3);
+      const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
+        const std::size_t alive = living_allocations();
+        {
+          World world = make_world(scene, kSettings[i], warm);
+          const std::uint64_t before = world.state_hash();
+          const double time = world.time();
+          const bool failed = runs_out(k, shortage, [&] { world.step(); });
+          if (failed) {
+            EXPECT_TRUE(world.state_hash() == before && world.time() == time) << k;
+            EXPECT_TRUE(world.contacts().empty() && world.contact_events().empty()) << k;
+            EXPECT_TRUE(follow(world, 3) == expected) << k;
+          } else {
+            const std::vector<Moment> rest(expected.begin() + 1, expected.end());
+            EXPECT_EQ(world.state_hash(), expected[0].hash) << k;
+            EXPECT_TRUE(follow(world, 2) == rest) << k;
+          }
+        }
+        EXPECT_EQ(living_allocations(), alive) << k;
+        return FailingNew::failed() && !testing::Test::HasFailure();
+      });
+      if (warm == 0) {
+        EXPECT_GT(failures, 20u);
+      }
+    }
+  }
+}
+
+TEST(OutOfMemoryInAWorld, WhatFailedToComeHasLeftNoTrace) {
+  const std::uint64_t seed = fresh_seed();
+  SCOPED_TRACE(trace(seed));
+  const Scene scene = crowd(seed);
+  BodyDef def;
+  def.shape = Assembly{
+      {{.shape = Sphere{}, .position = {0, 0, -1}}, {.shape = Box{}, .position = {0, 0, 1}}}};
+  def.shape = centred(std::get<Assembly>(def.shape));
+  const auto body = [&](World& world) { world.add(def); };
+  const auto force = [](World& world) { world.add_force(Drag{.linear = 1}); };
+  const auto generator = [](World& world) {
+    const std::array<BodyId, 4> far{world.bodies()[2], world.bodies()[3], {}, {}};
+    world.add_contact_generator([far](ContactContext& context) {
+      context.add({.a = far[0], .b = far[1], .normal = {1, 0, 0}});
+    });
+  };
+  const auto comes = [&](const auto& come, bool into_a_gap) {
+    const auto make = [&] {
+      World world = make_world(scene, kSettings[0], 3);
+      if (into_a_gap) world.remove(world.bodies()[5]);
+      if (into_a_gap) world.step();
+      return world;
+    };
+    World untroubled = make();
+    come(untroubled);
+    const std::vector<Moment> expected = follow(untroubled, 3);
+    const std::vector<BodyId> bodies(untroubled.bodies().begin(), untroubled.bodies().end());
+    return with_every_failure([&](std::size_t k, Shortage shortage) {
+      World world = make();
+      const std::size_t contacts = world.contacts().size(), count = world.bodies().size();
+      if (runs_out(k, shortage, [&] { come(world); })) {
+        EXPECT_EQ(world.bodies().size(), count) << k;
+        EXPECT_EQ(world.contacts().size(), contacts) << k;
+        come(world);
+      }
+      EXPECT_TRUE(std::ranges::equal(world.bodies(), bodies)) << k;
+      EXPECT_TRUE(follow(world, 3) == expected) << k;
+      return FailingNew::failed() && !testing::Test::HasFailure();
+    });
+  };
+  for (const bool into_a_gap : {false, true}) {
+    SCOPED_TRACE(into_a_gap ? "into a gap" : "at the end");
+    EXPECT_GT(comes(body, into_a_gap), 0u);
+    EXPECT_GT(comes(force, into_a_gap), 0u);
+    EXPECT_GT(comes(generator, into_a_gap), 0u);
+  }
+}
+
+TEST(OutOfMemoryInAWorld, BodiesLeaveAndMoveWithoutMemory) {
+  World world = make_world(crowd(1), kSettings[0], 2);
+  BodyState state = world.state(world.bodies()[1]);
+  state.position.y += 1;
+  const BodyId gone = world.bodies()[0], moved = world.bodies()[1], pushed = world.bodies()[2];
+  const ForceId force = world.forces()[0];
+  {
+    const FailingNew failing(0, Shortage::for_good);
+    world.remove(gone);
+    world.set_state(moved, state);
+    world.apply_force(pushed, {1, 2, 3});
+    world.remove_force(force);
+  }
+  EXPECT_FALSE(FailingNew::failed());
+  EXPECT_EQ(world.state(moved).position, state.position);
+}
+
+TEST(OutOfMemoryInAWorld, AWorldThatCannotBeMadeLeavesNothingBehind) {
+  const Scene scene = crowd(2);
+  for (const WorldSettings& settings : kSettings) {
+    { const World first(scene, settings); }  // what is made once and kept
+    const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
+      const std::size_t alive = living_allocations();
+      runs_out(k, shortage, [&] { const World world(scene, settings); });
+      EXPECT_EQ(living_allocations(), alive) << k;
+      return FailingNew::failed() && !testing::Test::HasFailure();
+    });
+    EXPECT_GT(failures, 20u);
+  }
+}
+
+TEST(OutOfMemoryAmongParticles, NothingHasHappenedWhicheverAllocationFails) {
+  const auto make = [] {
+    ParticleWorld world({.grounds = {HalfSpace{}}});
+    for (int i = 0; i < 16; ++i) {
+      ParticleDef def;
+      def.radius = Real(0.3);
+      def.position = {static_cast<Real>(i % 4) * Real(0.5), static_cast<Real>(i / 4) * Real(0.5),
+                      0};
+      world.add(def);
+    }
+    return world;
+  };
+  const auto end = [](ParticleWorld& world) {
+    for (int n = 0; n < 3; ++n) world.step();
+    std::vector<ParticleState> states;
+    for (const ParticleId id : world.particles()) states.push_back(world.state(id));
+    return states;
+  };
+  const auto step = [](ParticleWorld& world) { world.step(); };
+  const auto add = [](ParticleWorld& world) { world.add({.position = {0, 3, 0}, .radius = 1}); };
+  const auto happens = [&](const auto& happen) {
+    ParticleWorld untroubled = make();
+    happen(untroubled);
+    const std::vector<ParticleState> expected = end(untroubled);
+    return with_every_failure([&](std::size_t k, Shortage shortage) {
+      ParticleWorld world = make();
+      if (runs_out(k, shortage, [&] { happen(world); })) {
+        EXPECT_EQ(world.particles().size(), 16u);
+        happen(world);
+      }
+      EXPECT_EQ(end(world), expected) << k;
+      return FailingNew::failed() && !testing::Test::HasFailure();
+    });
+  };
+  EXPECT_GT(happens(step), 5u);
+  EXPECT_GT(happens(add), 0u);
+}
+
+TEST(OutOfMemoryInACollider, TheNextCallFindsEverything) {
+  Random random(3);
+  std::vector<SphereInstance> spheres(700);
+  for (SphereInstance& sphere : spheres) {
+    sphere = {random.uniform_in_box({0, 0, 0}, {9, 9, 9}), random.uniform(Real(0.2), Real(0.7))};
+  }
+  const std::vector<SpherePair> pairs{{0, 1}, {5, 3}, {699, 0}};
+  for (const WorldSettings& settings : kSettings) {
+    const auto untroubled = make_sphere_collider(settings.collider);
+    const ContactSpan found = untroubled->find_contacts(spheres);
+    const std::vector<SphereContact> expected(found.begin(), found.end());
+    const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
+      const auto collider = make_sphere_collider(settings.collider);
+      runs_out(k, shortage, [&] { collider->find_contacts(spheres); });
+      const bool failed = FailingNew::failed();
+      EXPECT_TRUE(std::ranges::equal(collider->find_contacts(spheres), expected)) << k;
+      runs_out(k, shortage, [&] { collider->test_pairs(spheres, pairs); });
+      EXPECT_EQ(collider->test_pairs(spheres, pairs).size(), pairs.size());
+      return (failed || FailingNew::failed()) && !testing::Test::HasFailure();
+    });
+    EXPECT_GT(failures, 3u);
+  }
+}
+
+// Not so the JSON in a recording's head, and in scene files: the library that reads and writes it
+// ends the program when a small allocation fails.
+TEST(OutOfMemoryInRecordings, FramesAreWrittenWithoutMemoryAndReadTheNextTime) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  const RecordingHeader header{.engine = "native", .backend = "x86", .scene = crowd(4)};
+  const std::vector<BodyState> states(header.scene.bodies.size());
+  RecordingWriter writer(path, header);
+  {
+    const FailingNew failing(0, Shortage::for_good);
+    writer.append(states);
+    writer.append(states);
+    writer.finish();
+  }
+  EXPECT_FALSE(FailingNew::failed());
+  RecordingReader reader(path);
+  const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
+    runs_out(k, shortage, [&] { reader.states(2); });
+    const bool failed = FailingNew::failed();
+    EXPECT_EQ(reader.states(2), states) << k;
+    return failed && !testing::Test::HasFailure();
+  });
+  EXPECT_GT(failures, 0u);
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::test
