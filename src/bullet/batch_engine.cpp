@@ -14,6 +14,8 @@
 
 #include <chrono>
 #include <exception>
+#include <functional>
+#include <new>
 #include <typeinfo>
 #include <utility>
 
@@ -34,9 +36,13 @@ std::span<const btBroadphasePair> pairs_of(btOverlappingPairCache& cache) {
   return {cache.getOverlappingPairArrayPtr(), static_cast<std::size_t>(n)};
 }
 
-std::string text_of(const std::exception& error) {
-  const std::string text = error.what();
-  return text.empty() ? "unknown" : text;
+std::string text_of(const std::exception& error) noexcept {
+  try {
+    const std::string text = error.what();
+    return text.empty() ? "unknown" : text;
+  } catch (const std::bad_alloc&) {
+    return "out of memory";  // short enough to need none
+  }
 }
 
 /// Sets a flag for the time of a dispatch, also when a callback throws.
@@ -168,10 +174,9 @@ void BatchEngine::commit(btCollisionDispatcher& dispatcher, btOverlappingPairCac
     commit_quietly(dispatcher, cache, info);
     return;
   }
+  const auto verify = [&](std::size_t i, bool current) { check(dispatcher, info, i, current); };
   OrderedCommit::Visited visited;
-  if (verify_) {
-    visited = [&](std::size_t i, bool current) { check(dispatcher, info, i, current); };
-  }
+  if (verify_) visited = std::ref(verify);  // which needs no memory
   stats_.written +=
       ordered_commit_.run(dispatcher, cache, info, argument, batch_, pairs_, touching_, visited);
 }

@@ -2,9 +2,11 @@
 #include "src/bullet/box_update.hpp"
 
 #include "src/bullet/prefetch.hpp"
+#include "src/make_room.hpp"
 
 #include <LinearMath/btQuickprof.h>
 
+#include <new>
 #include <typeinfo>
 
 namespace jfpx::inline JFPX_ABI::bullet {
@@ -80,6 +82,8 @@ bool BoxUpdate::run(btCollisionWorld& world) {
   if (typeid(pair_cache) != typeid(btHashedOverlappingPairCache)) return false;
   auto& cache = static_cast<btHashedOverlappingPairCache&>(pair_cache);
   if (tree.m_deferedcollide || cache.getOverlapFilterCallback() != nullptr) return false;
+  const int leaves = tree.m_sets[0].m_leaves + tree.m_sets[1].m_leaves;
+  if (!make_room(static_cast<std::size_t>(leaves))) return false;
 
   BT_PROFILE("updateAabbs");  // Bullet's own name, for those who profile
   OwnSearch search(tree);
@@ -97,6 +101,17 @@ bool BoxUpdate::run(btCollisionWorld& world) {
     add_pairs(cache);
   }
   return true;
+}
+
+/// No leaf is found twice, and the stack holds no node above another.
+bool BoxUpdate::make_room(std::size_t leaves) noexcept {
+  try {
+    jfpx::make_room(&stack_, leaves);
+    jfpx::make_room(&pairs_, leaves);
+    return true;
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
 }
 
 // btDbvt::collideTTpersistentStack() for a leaf: the leaves that overlap it, in its order. Both

@@ -16,7 +16,8 @@ namespace jfpx::inline JFPX_ABI::bullet {
 class BoxUpdate {
  public:
   /// btCollisionWorld::updateAabbs(). False, and nothing is done, if the broadphase is not Bullet's
-  /// own tree over Bullet's own hash table, as it is by default, or if the user filters pairs.
+  /// own tree over Bullet's own hash table, as it is by default, if the user filters pairs, or if
+  /// there is no memory.
   bool run(btCollisionWorld& world);
 
  private:
@@ -27,6 +28,7 @@ class BoxUpdate {
     int index;           ///< into the pairs, of the first to compare with
   };
 
+  bool make_room(std::size_t leaves) noexcept;
   void find_overlaps(const btDbvtNode* root, const btDbvtNode* leaf);
   void add_pairs(btHashedOverlappingPairCache& cache);
 

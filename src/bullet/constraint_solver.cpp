@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <new>
 #include <optional>
 #include <span>
 #include <string>
@@ -80,12 +81,18 @@ struct ConstraintSolver::Impl {
   /// @return why it could not be; all that Bullet's solver reads is then as it was
   std::optional<SolverFallback> solve(std::span<btPersistentManifold* const> manifolds) {
     BT_PROFILE("solveGroup");  // here and below: Bullet's own names, for those who profile
-    set_up(manifolds);
-    const rows::RowSweepReport report = solve_rows();
-    if (report.broken) {
-      forget_late_bodies();
-      return SolverFallback::not_finite;
+    joint_late.clear();
+    scan.forget_late();
+    rows::RowSweepReport report;
+    try {
+      set_up(manifolds);
+      report = solve_rows();
+    } catch (const OutOfMemory&) {
+      return give_back(SolverFallback::out_of_memory);
+    } catch (const std::bad_alloc&) {
+      return give_back(SolverFallback::out_of_memory);
     }
+    if (report.broken) return give_back(SolverFallback::not_finite);
     // Worlds of several threads share it, in Bullet as here.
     std::atomic_ref(gNumSplitImpulseRecoveries)
         .fetch_add(static_cast<int>(report.pushed), std::memory_order_relaxed);
@@ -222,7 +229,6 @@ struct ConstraintSolver::Impl {
     btAlignedObjectArray<btSolverBody>& pool = self.m_tmpSolverBodyPool;
     self.m_fixedBodyId = -1;
     self.m_maxOverrideNumSolverIterations = 0;
-    joint_late.clear();
     for (btTypedConstraint* joint : joints) {
       for (btRigidBody* body : {&joint->getRigidBodyA(), &joint->getRigidBodyB()}) {
         if (body->getCompanionId() < 0) joint_late.push_back({body, body->getCompanionId()});
@@ -259,10 +265,10 @@ struct ConstraintSolver::Impl {
   }
 
   /// Leaves the companion ids as they were.
-  void forget_late_bodies() {
+  SolverFallback give_back(SolverFallback why) {
     for (const LateBody& late : scan.late()) late.object->setCompanionId(late.companion);
-    if (joints.empty()) return;
     for (const LateBody& late : joint_late) late.object->setCompanionId(late.companion);
+    return why;
   }
 
   /// As Bullet does when it meets them in a manifold.
@@ -492,7 +498,8 @@ void ConstraintSolver::reset_stats() {
 
 std::string_view to_string(SolverFallback fallback) noexcept {
   constexpr std::string_view kTexts[kSolverFallbacks] = {
-      "small group", "solver mode", "row solver replaced", "class of a constraint", "not finite"};
+      "small group",           "solver mode", "row solver replaced",
+      "class of a constraint", "not finite",  "out of memory"};
   const auto i = static_cast<std::size_t>(fallback);
   return i < kSolverFallbacks ? kTexts[i] : "unknown";
 }

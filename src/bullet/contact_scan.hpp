@@ -46,6 +46,7 @@ class ContactScan {
   std::span<const ContactRef> contacts() const { return {refs_.data(), count_}; }
   std::span<const x86::RowPair> pairs() const { return {pairs_.data(), count_}; }
   std::span<const LateBody> late() const { return late_; }
+  void forget_late() noexcept { late_.clear(); }
   bool any_rolling() const { return any_rolling_; }
   bool any_anisotropic() const { return any_anisotropic_; }
 

@@ -146,7 +146,8 @@ void DynamicsWorld::calculateSimulationIslands() {
 
 void DynamicsWorld::solveConstraints(btContactSolverInfo& info) {
   btSimulationIslandManager& manager = *getSimulationIslandManager();
-  if (is_small() || !manager.getSplitIslands()) {
+  if (is_small() || !manager.getSplitIslands() ||
+      !impl_->islands.make_room(*this, m_constraints.size())) {
     btDiscreteDynamicsWorld::solveConstraints(info);
     return;
   }

@@ -3,8 +3,10 @@
 #include "src/bullet/islands.hpp"
 
 #include <jfpx/bullet/dispatcher.hpp>
+#include <jfpx/error.hpp>
 
 #include "src/bullet/prefetch.hpp"
+#include "src/make_room.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
@@ -13,10 +15,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <new>
 #include <typeinfo>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
+
+constexpr int kManifoldsAChunk = 4096;
 
 void prefetch_island_state_of(const btCollisionObjectArray& objects, int i) {
   if (i < objects.size()) prefetch_island_state(objects[i]);
@@ -113,6 +118,23 @@ void store_islands(btCollisionWorld& world, btUnionFind* unions) {
   }
 }
 
+bool IslandSolver::make_room(btCollisionWorld& world, int constraint_count) noexcept {
+  const auto manifolds = static_cast<std::size_t>(world.getDispatcher()->getNumManifolds());
+  try {
+    found_.reserve(manifolds, "manifolds of islands");
+    found_island_.reserve(manifolds, "manifolds of islands");
+    jfpx::make_room(&chunk_counts_, manifolds / std::size_t{kManifoldsAChunk} + 1);
+    jfpx::make_room(&manifolds_, manifolds);
+    jfpx::make_room(&bodies_, static_cast<std::size_t>(world.getNumCollisionObjects()));
+    jfpx::make_room(&constraints_, static_cast<std::size_t>(constraint_count));
+  } catch (const OutOfMemory&) {
+    return false;
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+  return true;
+}
+
 void IslandSolver::solve(btCollisionWorld& world, btUnionFind& unions, btConstraintSolver& solver,
                          const btContactSolverInfo& info, btTypedConstraint** constraints,
                          int constraint_count) {
@@ -159,8 +181,6 @@ void IslandSolver::collect_manifolds(btCollisionWorld& world) {
   btDispatcher& dispatcher = *world.getDispatcher();
   const bool only_touching = world.getDispatchInfo().m_deterministicOverlappingPairs;
   const int count = dispatcher.getNumManifolds();
-  found_.reserve(static_cast<std::size_t>(count), "manifolds of islands");
-  found_island_.reserve(static_cast<std::size_t>(count), "manifolds of islands");
   if (collect_at_once(dispatcher, only_touching)) return;
   btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();
   count_ = 0;
@@ -186,7 +206,7 @@ void IslandSolver::collect_manifolds(btCollisionWorld& world) {
 bool IslandSolver::collect_at_once(btDispatcher& dispatcher, bool only_touching) {
   const std::type_info& type = typeid(dispatcher);
   if (type != typeid(btCollisionDispatcher) && type != typeid(CollisionDispatcher)) return false;
-  constexpr int kChunk = 4096;
+  constexpr int kChunk = kManifoldsAChunk;
   const int count = dispatcher.getNumManifolds();
   const int chunks = (count + kChunk - 1) / kChunk;
   btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();

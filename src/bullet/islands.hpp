@@ -28,6 +28,8 @@ class IslandSolver {
  public:
   explicit IslandSolver(x86::ThreadPool& pool) : pool_(pool) {}
 
+  /// Takes all memory that solve() will need. @returns false if it can't be had
+  bool make_room(btCollisionWorld& world, int constraint_count) noexcept;
   /// @param constraints sorted by island
   void solve(btCollisionWorld& world, btUnionFind& unions, btConstraintSolver& solver,
              const btContactSolverInfo& info, btTypedConstraint** constraints,

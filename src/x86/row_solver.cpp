@@ -296,8 +296,8 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
       static_cast<std::size_t>(std::max({settings.iterations, settings.serial_iterations, 0}));
   const auto block_iterations = static_cast<std::size_t>(std::max(settings.iterations, 0));
   if (2 * iterations + 1 > residual_capacity_) {
+    residuals_ = std::make_unique<std::atomic<Real>[]>(2 * iterations + 1);
     residual_capacity_ = 2 * iterations + 1;
-    residuals_ = std::make_unique<std::atomic<Real>[]>(residual_capacity_);
   }
   for (std::size_t i = 0; i < 2 * iterations + 1; ++i) residuals_[i] = 0;
 

@@ -55,6 +55,11 @@ jfpx_add_test(bullet_algorithm_test SOURCES
   ${random_worlds}
   bullet/algorithm_test.cpp
   LINK jfpx_bullet)
+# Replaces operator new: a program of its own.
+jfpx_add_test(bullet_out_of_memory_test SOURCES
+  bullet/out_of_memory_test.cpp
+  support/failing_new.cpp
+  LINK jfpx_bullet)
 
 # Bullet as it must not be compiled is refused with a text that helps.
 function(jfpx_add_guard_test name text)

@@ -36,8 +36,9 @@ enum class SolverFallback : std::uint8_t {
   row_solver,   ///< the user has set a row solver
   constraints,  ///< a constraint of a class that is not Bullet's
   not_finite,   ///< something left the finite numbers: done again by Bullet, for its NaNs
+  out_of_memory,
 };
-inline constexpr std::size_t kSolverFallbacks = 5;
+inline constexpr std::size_t kSolverFallbacks = 6;
 
 /// A short text for a table, for example "small group".
 JFPX_API std::string_view to_string(SolverFallback fallback) noexcept;
