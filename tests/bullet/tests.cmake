@@ -55,6 +55,7 @@ jfpx_add_test(bullet_algorithm_test SOURCES
   ${random_worlds}
   bullet/algorithm_test.cpp
   LINK jfpx_bullet)
+jfpx_add_test(bullet_soak_test SOURCES bullet/soak_test.cpp LINK jfpx_bullet)
 # Replaces operator new: a program of its own.
 jfpx_add_test(bullet_out_of_memory_test SOURCES
   bullet/out_of_memory_test.cpp

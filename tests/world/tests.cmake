@@ -26,6 +26,7 @@ jfpx_add_test(world_test SOURCES
 jfpx_add_test(particle_test SOURCES world/particle_test.cpp)
 jfpx_add_test(assembly_test INTERNAL SOURCES world/assembly_test.cpp)
 jfpx_add_test(broad_phase_test INTERNAL SOURCES world/broad_phase_test.cpp)
+jfpx_add_test(soak_test SOURCES world/soak_test.cpp)
 # These replace operator new: programs of their own.
 jfpx_add_test(allocation_test SOURCES world/allocation_test.cpp)
 jfpx_add_test(out_of_memory_test SOURCES

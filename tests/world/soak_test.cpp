@@ -1,0 +1,90 @@
+/// Worlds that never come to rest, with bodies and forces that come and go: memory stays flat.
+#include "tests/support/soak.hpp"
+
+#include <jfpx/particle.hpp>
+
+#include "tests/world/shape_zoo.hpp"
+
+#include <deque>
+
+namespace jfpx::inline JFPX_ABI::test {
+namespace {
+
+/// A box of half-spaces.
+std::vector<BodyDef> walls(Real room) {
+  std::vector<BodyDef> bodies;
+  for (const Real side : {Real(1), Real(-1)}) {
+    for (const Vec3& axis : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}) {
+      bodies.push_back(half_space(axis * side, -room));
+    }
+  }
+  return bodies;
+}
+
+/// One that bounces for ever.
+BodyDef bouncing_body(Random* random, Real room) {
+  BodyDef def;
+  do {
+    def = random_body(random, room);
+  } while (def.mass == 0);
+  def.restitution = 1;
+  def.friction = Real(0.1);
+  def.velocity = random->uniform_in_box({-3, -3, -3}, {3, 3, 3});
+  return def;
+}
+
+TEST(Soak, AWorldWhereBodiesComeAndGoKeepsItsMemoryFlat) {
+  const std::uint64_t seed = fresh_seed();
+  SCOPED_TRACE(trace(seed));
+  Random random(seed);
+  constexpr Real kRoom = 3;
+  Scene scene;
+  scene.bodies = walls(kRoom);
+  World world(scene);
+  std::deque<BodyId> bodies;
+  for (int i = 0; i < 12; ++i) bodies.push_back(world.add(bouncing_body(&random, kRoom - 2)));
+  std::uint64_t contacts = 0, failed = 0;
+  expect_flat_memory(soak_steps(), [&](std::uint64_t n) {
+    if (n % 50 == 0) {
+      world.remove(bodies.front());
+      bodies.pop_front();
+      bodies.push_back(world.add(bouncing_body(&random, kRoom - 2)));
+    }
+    if (n % 70 == 0) world.add_force(Drag{.linear = Real(0.1), .body = bodies.back()});
+    if (n % 70 == 35) world.remove_force(world.forces().front());
+    const StepReport report = world.step();
+    contacts += report.contacts;
+    failed += report.non_finite ? 1 : 0;
+  });
+  EXPECT_GT(contacts, soak_steps() / 10);
+  EXPECT_EQ(failed, 0u);
+}
+
+TEST(Soak, ParticlesThatComeAndGoKeepTheirMemoryFlat) {
+  const std::uint64_t seed = fresh_seed();
+  SCOPED_TRACE(trace(seed));
+  Random random(seed);
+  ParticleWorld world({.grounds = {HalfSpace{}}});
+  std::deque<ParticleId> particles;
+  const auto add = [&] {
+    ParticleDef def;
+    def.radius = Real(0.2);
+    def.restitution = 1;
+    def.position = random.uniform_in_box({-1, 1, -1}, {1, 4, 1});
+    particles.push_back(world.add(def));
+  };
+  for (int i = 0; i < 20; ++i) add();
+  std::uint64_t contacts = 0;
+  expect_flat_memory(soak_steps(), [&](std::uint64_t n) {
+    if (n % 20 == 0) {
+      world.remove(particles.front());
+      particles.pop_front();
+      add();
+    }
+    contacts += world.step().contacts;
+  });
+  EXPECT_GT(contacts, soak_steps() / 10);
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::test
