@@ -46,6 +46,11 @@ void Instances::upload_bytes(const void* data, std::size_t items) {
   count_ = static_cast<GLsizei>(items);
 }
 
+GLuint Instances::reserve(std::size_t items) {
+  upload_bytes(nullptr, items);
+  return buffer_.name();
+}
+
 void Instances::draw() const {
   if (count_ == 0) return;
   glBindVertexArray(array_.name());

@@ -19,6 +19,8 @@ class Instances {
   };
   Instances(std::span<const Field> fields, std::size_t stride, GLenum mode, int vertices);
   void upload_bytes(const void* data, std::size_t items);
+  /// Room for so many items, which somebody else fills. @return the buffer
+  GLuint reserve(std::size_t items);
   void draw() const;
 
  private:

@@ -97,7 +97,7 @@ struct Renderer::Impl {
   GlProgram line{shaders::line_vert, shaders::line_frag};
   GlBuffer frame = make_buffer();
   GlVertexArray empty = make_vertex_array();
-  SphereInstances spheres;
+  SphereInstances spheres, resident_spheres;
   BoxInstances boxes, glass;
   LineInstances lines;
   std::optional<Targets> targets;
@@ -140,6 +140,7 @@ struct Renderer::Impl {
     const bool smooth = pass == kColourPass && quality.samples > 1;
     if (smooth) glEnable(GL_SAMPLE_ALPHA_TO_COVERAGE);
     spheres.draw();
+    resident_spheres.draw();
     glDisable(GL_SAMPLE_ALPHA_TO_COVERAGE);
   }
 
@@ -248,6 +249,10 @@ void Renderer::set_quality(const Quality& quality) {
   if (quality == impl_->quality) return;
   impl_->quality = quality;
   impl_->targets.reset();
+}
+
+GLuint Renderer::resident_spheres(std::size_t count) {
+  return impl_->resident_spheres.reserve(count);
 }
 
 void Renderer::draw(const Drawing& drawing, const View& view, const Viewport& viewport,

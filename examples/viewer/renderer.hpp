@@ -40,6 +40,10 @@ class Renderer {
   void set_quality(const Quality& quality);
   const Quality& quality() const;
 
+  /// Room for spheres that somebody else writes, CUDA for example: they are in every picture,
+  /// besides those of the drawing. @return a buffer of that many SphereItems, of the renderer
+  GLuint resident_spheres(std::size_t count);
+
   /// Draws into the viewport of a framebuffer; 0 is the window.
   void draw(const Drawing& drawing, const View& view, const Viewport& viewport,
             GLuint framebuffer = 0);

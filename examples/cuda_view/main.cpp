@@ -1,0 +1,125 @@
+/// Shows balls that never leave the GPU: CUDA moves and collides them and writes the buffer that
+/// OpenGL draws from.
+#include <jfpx/error.hpp>
+
+#include "examples/cuda_view/crowd.hpp"
+#include "examples/cuda_view/shared_buffer.hpp"
+#include "examples/viewer/controls.hpp"
+#include "examples/viewer/renderer.hpp"
+#include "examples/viewer/timing.hpp"
+#include "examples/viewer/window.hpp"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <vector>
+
+namespace {
+
+using namespace jfpx;
+using cuda_view::Crowd;
+
+struct Options {
+  std::uint32_t balls = 100000;
+  int frames = 0;  // until closed
+  std::string screenshot;
+  bool headless = false, by_host = false;
+};
+
+constexpr int kWidth = 1280, kHeight = 720, kStepsAFrame = 2;
+
+class Show {
+ public:
+  explicit Show(const Options& options)
+      : options_(options),
+        window_(options.headless ? view::Window::hidden()
+                                 : view::Window::open("cuda_view", kWidth, kHeight)),
+        canvas_(kWidth, kHeight),
+        crowd_(options.balls),
+        buffer_(renderer_.resident_spheres(crowd_.size()), crowd_.size() * sizeof(view::SphereItem),
+                options.by_host) {
+    const Real side = crowd_.side();
+    camera_.look_at({side * Real(0.9), side * Real(0.75), side * Real(1.35)}, {0, side / 5, 0});
+  }
+
+  void run() {
+    const int frames = options_.frames > 0 || !options_.headless ? options_.frames : 240;
+    view::Stopwatch clock;
+    for (int n = 0; !quit_ && (frames == 0 || n < frames); ++n) {
+      read_events(clock.lap());
+      view::Stopwatch watch;
+      for (int i = 0; i < kStepsAFrame; ++i) crowd_.step();
+      step_ms_.push_back(watch.lap() * 1e3 / kStepsAFrame);
+      draw();
+      glFinish();
+      picture_ms_.push_back(watch.lap() * 1e3);
+      if (!options_.headless) window_.swap();
+    }
+    if (!options_.screenshot.empty()) write_png(canvas_.read(), options_.screenshot);
+    const std::string& detour = buffer_.detour();
+    fmt::print("{} balls, {} contacts; {:.3f} ms a step, {:.3f} ms a picture (medians), {}\n",
+               crowd_.size(), crowd_.contacts(), view::median(step_ms_), view::median(picture_ms_),
+               detour.empty() ? "without the host" : "by way of the host: " + detour);
+  }
+
+ private:
+  void read_events(double seconds) {
+    SDL_Event event;
+    while (SDL_PollEvent(&event) != 0) controls_.handle(event);
+    for (const view::Command command : controls_.take_commands()) {
+      quit_ = quit_ || command == view::Command::quit;
+    }
+    controls_.move(&camera_, seconds, Crowd::kRadius);
+  }
+
+  void draw() {
+    const Real side = crowd_.side();
+    const view::View view = camera_.view({0, side / 3, 0}, side);
+    crowd_.write_items(static_cast<view::SphereItem*>(buffer_.map(crowd_.stream())), view.eye);
+    buffer_.unmap(crowd_.stream());
+    view::Drawing drawing(view.eye);
+    drawing.set_bounds({0, side / 3, 0}, side);
+    drawing.set_detail(2 * Crowd::kRadius);
+    drawing.add_ground({0, 1, 0}, 0, 10 * Crowd::kRadius, {124, 130, 138});
+    const bool shown = !options_.headless;
+    renderer_.draw(
+        drawing, view,
+        {0, 0, shown ? window_.pixel_width() : kWidth, shown ? window_.pixel_height() : kHeight},
+        shown ? 0 : canvas_.framebuffer());
+  }
+
+  Options options_;
+  view::Window window_;
+  view::Renderer renderer_;
+  view::Canvas canvas_;
+  view::Camera camera_;
+  view::Controls controls_;
+  Crowd crowd_;
+  cuda_view::SharedBuffer buffer_;
+  std::vector<double> step_ms_, picture_ms_;
+  bool quit_ = false;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("cuda_view: balls that never leave the GPU.", "cuda_view");
+  Options options;
+  app.add_option("--balls", options.balls, "How many")->check(CLI::Range(1, 50'000'000));
+  app.add_option("--frames", options.frames, "Pictures [headless: 240; window: until closed]")
+      ->check(CLI::Range(1, 1'000'000));
+  app.add_option("--screenshot", options.screenshot, "Headless: the last picture, as PNG");
+  app.add_flag("--headless", options.headless, "No window, no display");
+  app.add_flag("--by-host", options.by_host, "Copy by way of the host, to compare");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    Show(options).run();
+    return 0;
+  } catch (const BackendUnavailable& error) {
+    fmt::print(stderr, "cuda_view: {}\n", error.what());
+    return 3;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "cuda_view: {}\n", error.what());
+    return 1;
+  }
+}
