@@ -84,12 +84,14 @@ struct Propulsion {
 
 struct Part {
   Vec3 size, position;  ///< [m], body axes
+  Colour colour;
 };
-constexpr Part kParts[] = {{{2, Real(0.8), 1}, {Real(-0.5), 0, 0}},
-                           {{Real(2.75), Real(0.5), Real(0.5)}, {1, Real(0.15), 0}},
-                           {{Real(0.8), Real(0.1), 6}, {0, Real(0.3), 0}},
-                           {{Real(0.75), Real(1.15), Real(0.1)}, {2, Real(0.775), 0}},
-                           {{Real(0.85), Real(0.1), 2}, {Real(1.9), 0, 0}}};
+constexpr Colour kBlue{0.12F, 0.30F, 0.62F}, kIvory{0.90F, 0.88F, 0.82F};
+constexpr Part kParts[] = {{{2, Real(0.8), 1}, {Real(-0.5), 0, 0}, kBlue},
+                           {{Real(2.75), Real(0.5), Real(0.5)}, {1, Real(0.15), 0}, kBlue},
+                           {{Real(0.8), Real(0.1), 6}, {0, Real(0.3), 0}, kIvory},
+                           {{Real(0.75), Real(1.15), Real(0.1)}, {2, Real(0.775), 0}, kBlue},
+                           {{Real(0.85), Real(0.1), 2}, {Real(1.9), 0, 0}, kIvory}};
 
 class Flight final : public Demo {
  public:
@@ -219,7 +221,7 @@ void Flight::draw(View* view) const {
     const Item item{.shape = Box{part.size * Real(0.5)},
                     .position = state.position + rotate(state.orientation, part.position),
                     .orientation = state.orientation,
-                    .colour = {0.85F, 0.85F, 0.9F}};
+                    .colour = part.colour};
     view->items.push_back(shadow_of(item, Real(0.001)));
     view->items.push_back(item);
   }

@@ -40,7 +40,9 @@ Camera camera_for(const ViewOptions& options, const Scene& scene, const Moment& 
   }
   Bounds bounds = bounds_of(scene, moment.states);
   const Real largest = Stage(scene).large_size() * 60;
-  if (bounds.radius > largest) {
+  const Vec3& half = bounds.half_extents;
+  const bool tall = half.y > 4 * std::max(half.x, half.z);
+  if (tall && bounds.radius > largest) {
     bounds.centre.y -= (bounds.radius - largest) * Real(0.9);
     bounds.radius = largest;
   }

@@ -6,7 +6,7 @@
 
 namespace jfpx::inline JFPX_ABI::view {
 
-/// Sees all that moves, from the front, the right and above; a scene too large for its bodies to be
+/// Sees all that moves, from the front, the right and above; a tower too tall for its bodies to be
 /// seen is shown from its foot. --eye and --target go first.
 Camera camera_for(const ViewOptions& options, const Scene& scene, const Moment& moment);
 

@@ -77,7 +77,8 @@ Bounds bounds_of(const Scene& scene, const std::vector<BodyState>& states) {
     low[axis] = s.low;
     high[axis] = s.high;
   }
-  return {(low + high) * Real(0.5), length(high - low) * Real(0.5) + largest};
+  const Vec3 half = (high - low) * Real(0.5);
+  return {(low + high) * Real(0.5), length(half) + largest, half};
 }
 
 Stage::Stage(const Scene& scene) : scene_(scene) {
@@ -107,7 +108,9 @@ void Stage::find_room() {
     if (movable(body)) continue;
     const Box* box = std::get_if<Box>(&body.shape);
     const bool level = body.orientation == Quat{};
-    if (box == nullptr || !level || body.kinematic || length(box->half_extents) < bounds.radius) {
+    // A wall of a cube is 0.8 times as long as what the cube holds.
+    const bool large = box != nullptr && length(box->half_extents) > Real(0.7) * bounds.radius;
+    if (!large || !level || body.kinematic) {
       obstacles_.push_back(i);
       continue;
     }

@@ -20,6 +20,7 @@ inline constexpr const char* kColouringNames[] = {"bodies",      "speed",    "sl
 struct Bounds {
   Vec3 centre;
   Real radius = 1;
+  Vec3 half_extents{};  ///< of the upright box around it
 };
 /// The ball around the movable bodies, leaving out the one in fifty that went astray on each side.
 Bounds bounds_of(const Scene& scene, const std::vector<BodyState>& states);

@@ -52,6 +52,7 @@ Window::Window(const std::string& title, int width, int height, bool visible) {
   window_.reset(SDL_CreateWindow(title.c_str(), SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
                                  width, height, flags));
   if (window_ == nullptr) refuse("the viewer can't open a window with OpenGL");
+  keep_driver_for_leak_sanitizer();
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_RESET_NOTIFICATION, SDL_GL_CONTEXT_RESET_LOSE_CONTEXT);
   context_.reset(SDL_GL_CreateContext(window_.get()));
   if (context_ == nullptr) {  // some drivers can't tell of resets
@@ -64,7 +65,6 @@ Window::Window(const std::string& title, int width, int height, bool visible) {
                              std::to_string(epoxy_gl_version() / 10) + "." +
                              std::to_string(epoxy_gl_version() % 10));
   }
-  keep_driver_for_leak_sanitizer();
   SDL_GL_SetSwapInterval(1);
 }
 

@@ -579,6 +579,17 @@ TEST(Stage, BoundsLeaveOutTheOneThatFlewAway) {
   EXPECT_GT(bounds_of(Scene{}, {}).radius, 0);
 }
 
+TEST(Stage, WallsOfLargeRoomsAreGlassAndTheRoomIsSeenWhole) {
+  const Scene scene = scenes::make("gas", {.spheres = 30000});
+  Moment moment;
+  for (const BodyDef& body : scene.bodies) moment.states.push_back({body.position, {}, {}, {}});
+  moment.awake.assign(scene.bodies.size(), 1);
+  Drawing drawing({0, 0, 1000});
+  Stage(scene).draw(moment, moment, 1, Colouring::bodies, &drawing);
+  EXPECT_EQ(drawing.glass().size(), 5u);
+  EXPECT_EQ(drawing.boxes().size(), 1u);  // the floor
+}
+
 TEST(Timing, MedianOfNoneOddAndEven) {
   EXPECT_EQ(median({}), 0);
   EXPECT_EQ(median({3, 1, 2}), 2);
