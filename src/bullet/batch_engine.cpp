@@ -79,8 +79,7 @@ BatchEngine::BatchEngine(std::unique_ptr<SphereCollider> collider, const Dispatc
   if (options.fuses_products) {
     stats_.warning =
         "the program is compiled with fused multiply-add, also in Bullet's headers: its bits are "
-        "not "
-        "those of other builds; compile it with -ffp-contract=off";
+        "not those of other builds; compile it with -ffp-contract=off";
   }
 }
 

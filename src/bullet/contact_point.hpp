@@ -2,6 +2,7 @@
 #pragma once
 
 #include <jfpx/contact.hpp>
+#include <jfpx/math.hpp>
 
 #include "src/bullet/body_state.hpp"
 
@@ -17,6 +18,13 @@ bool contacts_are_heard();
 /// The collision flags of bodies whose contacts need more than write_contact() does, given that
 /// nobody hears it.
 int special_collision_flags();
+
+/// False for a contact that is left to Bullet: which NaN an operation returns is up to processor
+/// and compiler.
+inline bool has_stocks_bits(const PairContact& contact) {
+  const Vec3& normal = contact.normal;
+  return is_finite(normal.x + normal.y + normal.z + contact.distance);
+}
 
 /// Adds the point of a touching pair to an empty manifold that has the bodies in this order: every
 /// field of the point gets the bits that Bullet would give it. `radius_b` is that of body b's

@@ -77,7 +77,9 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     }
     btPersistentManifold* manifold = batch_.manifold(i);
     // Asked for every contact, because a callback may set another one.
-    if (contacts_are_heard() || !is_plain(*manifold, *a, *b)) {
+    const PairContact* contact = contacts_[i] != kNone ? &touching_[contacts_[i]] : nullptr;
+    const bool is_odd = contact != nullptr && !has_stocks_bits(*contact);
+    if (contacts_are_heard() || is_odd || !is_plain(*manifold, *a, *b)) {
       visit_stock(pair);
       return false;  // the near callback asks the filter itself, and does not say what it heard
     }
@@ -85,9 +87,8 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     ++written_;
     manifold->setNumContacts(0);
     // Materials as they are now: callbacks may change those of their bodies.
-    if (contacts_[i] != kNone) {
-      write_contact(manifold, touching_[contacts_[i]], state_of(*a), state_of(*b),
-                    batch_.radius_b(i));
+    if (contact != nullptr) {
+      write_contact(manifold, *contact, state_of(*a), state_of(*b), batch_.radius_b(i));
     }
     return true;
   }

@@ -93,6 +93,7 @@ class Committer {
     const unsigned traits = batch_.either_trait(i);
     if ((traits & kActive) == 0) return true;
     if ((traits & kSpecial) != 0 || manifold->getBody0() != batch_.body_a(i)) return false;
+    if (contact != nullptr && !has_stocks_bits(*contact)) return false;
     if ((traits & kPicky) != 0 && !needs_collision(i)) return true;
     ++counts_.written;
     manifold->setNumContacts(0);  // btPersistentManifold::clearManifold without callbacks

@@ -134,6 +134,48 @@ TEST(FailingCollider, OfTheFirstDispatchLeavesNoTrace) {
   EXPECT_EQ(twins.stats().failure, "");
 }
 
+bool hear_nothing(btManifoldPoint&, const btCollisionObjectWrapper*, int, int,
+                  const btCollisionObjectWrapper*, int, int) {
+  return false;
+}
+
+/// A GPU answers an invalid operation with another NaN than x86 does.
+TEST(OddCollider, MayHaveNaNsOfItsOwn) {
+  constexpr btScalar kInf = std::numeric_limits<btScalar>::infinity();
+  constexpr btScalar kNan = std::numeric_limits<btScalar>::quiet_NaN();
+  const std::vector<btScalar> values = {0, kInf, -kInf, kNan, btScalar(0.5)};
+  int nans = 0;
+  for (const bool heard : {false, true}) {  // both ways to write contacts
+    gContactAddedCallback = heard ? hear_nothing : nullptr;
+    Twins twins(with_collider([&](std::span<PairResult> results) {
+      for (PairResult& r : results) {
+        for (Real* x : {&r.normal.x, &r.normal.y, &r.normal.z, &r.distance}) {
+          if (*x == *x) continue;
+          ++nans;
+          *x = -*x;
+        }
+      }
+    }));
+    twins.both([&](BulletWorld& w) {
+      w.world.setGravity(btVector3(0, 0, 0));
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        w.add_sphere(btScalar(0.5), btVector3(0, 0, 0));
+      }
+      if (heard) w.bodies[0]->setCollisionFlags(btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+    });
+    ASSERT_TRUE(twins.dispatch());
+    twins.both([&](BulletWorld& w) {
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        w.bodies[i]->getWorldTransform().setOrigin(btVector3(values[i], 0, values[(i * 2) % 5]));
+      }
+    });
+    const bool same = twins.dispatch();
+    gContactAddedCallback = nullptr;
+    ASSERT_TRUE(same) << "heard: " << heard;
+  }
+  EXPECT_GT(nans, 0);
+}
+
 TEST(FailingCollider, NullIsAnError) {
   btDefaultCollisionConfiguration configuration;
   EXPECT_THROW(CollisionDispatcher(&configuration, std::unique_ptr<SphereCollider>()),
