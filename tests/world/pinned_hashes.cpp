@@ -1,6 +1,7 @@
 /// Hashes of native runs, equal for every compiler and optimisation level. A changed hash is a
 /// change of what every user computes: pin the new one only with a line in CHANGELOG.md.
-/// A plain program, so that flavours/ can build it quickly in many ways.
+/// A plain program, so that flavours/ can build it quickly in many ways. Arguments are numbers of
+/// threads to compute with, in turn; without any, it is 1.
 #include <jfpx/random.hpp>
 #include <jfpx/world.hpp>
 
@@ -10,6 +11,7 @@
 
 #include <cinttypes>
 #include <cstdio>
+#include <cstdlib>
 #include <vector>
 
 namespace jfpx {
@@ -47,8 +49,12 @@ constexpr DemoPin kDemoPins[] = {
 };
 
 /// False, with a line that says why, if the run goes wrong, resolves nothing, or ends elsewhere.
-bool check(const Pin& pin) {
-  World world(scenes::make(pin.scene, {.spheres = pin.spheres, .seed = 1}));
+bool check(const Pin& pin, unsigned threads) {
+  WorldSettings settings;
+  settings.collider = {.backend = Backend::x86, .threads = threads};
+  // Small sets would be searched by one thread.
+  if (threads > 1) settings.collider.algorithm = SphereAlgorithm::sorted_tiles;
+  World world(scenes::make(pin.scene, {.spheres = pin.spheres, .seed = 1}), settings);
   std::uint64_t resolved = 0;
   bool finite = true;
   for (int n = 0; n < pin.steps; ++n) {
@@ -99,9 +105,15 @@ bool check(const DemoPin& pin) {
 }  // namespace
 }  // namespace jfpx
 
-int main() {
+int main(int count, char** arguments) {
   bool all = true;
-  for (const jfpx::Pin& pin : jfpx::kPins) all = jfpx::check(pin) && all;
+  for (int i = 1; i < count || i == 1; ++i) {
+    const unsigned long threads = i < count ? std::strtoul(arguments[i], nullptr, 10) : 1;
+    std::printf("with %lu threads:\n", threads);
+    for (const jfpx::Pin& pin : jfpx::kPins) {
+      all = jfpx::check(pin, static_cast<unsigned>(threads)) && all;
+    }
+  }
   for (const jfpx::DemoPin& pin : jfpx::kDemoPins) all = jfpx::check(pin) && all;
   return all ? 0 : 1;
 }

@@ -26,6 +26,7 @@ jfpx_add_test(world_test SOURCES
 jfpx_add_test(particle_test SOURCES world/particle_test.cpp)
 jfpx_add_test(assembly_test INTERNAL SOURCES world/assembly_test.cpp)
 jfpx_add_test(broad_phase_test INTERNAL SOURCES world/broad_phase_test.cpp)
+jfpx_add_test(concurrency_test SOURCES world/concurrency_test.cpp)
 jfpx_add_test(soak_test SOURCES world/soak_test.cpp)
 # These replace operator new: programs of their own.
 jfpx_add_test(allocation_test SOURCES world/allocation_test.cpp)
@@ -34,8 +35,10 @@ jfpx_add_test(out_of_memory_test SOURCES
   world/out_of_memory_test.cpp)
 
 jfpx_add_executable(pinned_hashes SOURCES world/pinned_hashes.cpp LINK jfpx jfpx_demos)
-add_test(NAME PinnedHashes COMMAND pinned_hashes)
-add_test(NAME PinnedHashes_f64 COMMAND pinned_hashes_f64)
+foreach(suffix IN ITEMS "" "_f64")
+  add_test(NAME PinnedHashes${suffix} COMMAND pinned_hashes${suffix})
+  add_test(NAME PinnedHashes.WithAnyNumberOfThreads${suffix} COMMAND pinned_hashes${suffix} 2 3 4 5 6 7 8)
+endforeach()
 add_test(NAME PinnedHashes.WithEveryCompiler
   COMMAND ${CMAKE_COMMAND} -DBINARY_DIR=${PROJECT_BINARY_DIR}/flavours
     -DCONFIG_DIR=${PROJECT_BINARY_DIR}/include -DLAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
