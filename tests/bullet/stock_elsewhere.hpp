@@ -59,18 +59,24 @@ std::optional<int> first_accident_of_stock(const RunElsewhere& run_elsewhere) {
   return first;
 }
 
+/// Of a sphere and a capsule about the same centre, Bullet's own algorithm leaves the fourth number
+/// of the normal unset (seen by valgrind): two runs of one stock world differ there.
+inline bool is_left_unset_by_stock(const Failure& failure) {
+  return failure.what.find("m_normalWorldOnB.w") != std::string::npos;
+}
+
 /// Whether the failure is Bullet's own: stock has parted ways with stock no later, and from then on
 /// nothing can be said of a third.
 inline bool is_accident_of_stock(const RandomWorld& world, const Failure& failure) {
   const auto accident = first_accident_of_stock(
       [&]<int kFill>() { return run(world, nullptr, DispatcherElsewhere<kFill>::make); });
-  return accident && *accident <= failure.step;
+  return (accident && *accident <= failure.step) || is_left_unset_by_stock(failure);
 }
 inline bool is_accident_of_stock(const SolverWorld& world, const Failure& failure) {
   const auto accident = first_accident_of_stock([&]<int kFill>() {
     return run(world, nullptr, SolverElsewhere<kFill>::parts, DispatcherElsewhere<kFill>::make);
   });
-  return accident && *accident <= failure.step;
+  return (accident && *accident <= failure.step) || is_left_unset_by_stock(failure);
 }
 
 }  // namespace jfpx::inline JFPX_ABI::bullet
