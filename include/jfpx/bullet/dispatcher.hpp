@@ -14,8 +14,8 @@ namespace jfpx::inline JFPX_ABI::bullet {
 
 struct DispatcherOptions {
   SphereColliderOptions collider = {};  ///< who tests the sphere pairs
-  /// Pairs below which a dispatch is left to Bullet. A gas, the worst case, since nothing touches and
-  /// Bullet is quick to say so, breaks even below 100 pairs; there is little to win before 256.
+  /// Pairs below which a dispatch is left to Bullet. A gas, the worst case, since nothing touches
+  /// and Bullet is quick to say so, breaks even below 100 pairs; there is little to win before 256.
   std::size_t minimum_batch = 256;
   bool verify = false;  ///< as set_verify()
   /// Leave it as it is: tells how the program is compiled. If so, stats().warning says it.
