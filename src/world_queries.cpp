@@ -95,9 +95,11 @@ void for_each_hit(const Ray& given, const BodyStore& bodies, const BodyFilter& f
   const Ray ray = checked(given);
   for (const BodyId id : bodies.ids()) {
     const shared::RayEntry entry = enter(ray, bodies, id.index);
-    if (!entry.hit || entry.distance > ray.max_distance || (filter && !filter(id))) continue;
-    found(RayHit{id, entry.distance, add_scaled(ray.origin, ray.direction, entry.distance),
-                 entry.normal});
+    if (!entry.hit || entry.distance > ray.max_distance) continue;
+    const Vec3 point = add_scaled(ray.origin, ray.direction, entry.distance);
+    // Nearly parallel to a wall, which it then meets farther away than any Real.
+    if (!is_finite(point) || (filter && !filter(id))) continue;
+    found(RayHit{id, entry.distance, point, entry.normal});
   }
 }
 

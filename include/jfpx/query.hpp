@@ -16,7 +16,8 @@ struct Ray {
 };
 
 /// Where a ray enters a body. A ray that starts in a body, or on its surface, hits it at a distance
-/// of 0 with a normal against the ray.
+/// of 0 with a normal against the ray. All numbers are finite: a wall that a ray would meet farther
+/// away than any Real is not hit.
 struct RayHit {
   BodyId body;
   Real distance = 0;  ///< [m], from the origin

@@ -248,6 +248,31 @@ TEST(RayCast, TheLengthOfTheDirectionDoesNotMatter) {
   }
 }
 
+/// The ray meets the half-space at 2 m / sinking; of the plane it is the normal that leans.
+TEST(RayCast, WallsFartherAwayThanNumbersReachAreNotHit) {
+  constexpr Real kDenormal = std::numeric_limits<Real>::denorm_min();
+  BodyDef plane = test::half_space({1, 0, kDenormal}, 0);
+  plane.shape = Plane{{1, 0, kDenormal}, 0};
+  Scene scene;
+  scene.bodies = {test::half_space({0, 0, -1}, 0), test::ball({5, 0, -2}), plane};
+  const World world(scene);
+  const auto ids = world.bodies();
+  for (const Real sinking : {kDenormal, 4 * kDenormal, std::numeric_limits<Real>::min() / 4}) {
+    const Ray along_floor{{2, 0, -2}, {1, 0, sinking}};
+    const auto hits = world.cast_ray_through(along_floor);
+    ASSERT_EQ(hits.size(), 1u) << sinking;
+    EXPECT_EQ(hits[0].body, ids[1]) << sinking;
+    EXPECT_EQ(hits[0].point, (Vec3{4, 0, -2})) << sinking;
+    EXPECT_EQ(world.cast_ray(along_floor), hits[0]) << sinking;
+    EXPECT_FALSE(world.cast_ray({{9, 0, -2}, {1, 0, sinking}})) << sinking;
+  }
+  EXPECT_FALSE(world.cast_ray({{2, 3, -2}, {0, 0, -1}}));
+  const Real sinking = 16 * std::numeric_limits<Real>::min();
+  const auto far = world.cast_ray({{9, 0, -2}, {1, 0, sinking}});
+  ASSERT_TRUE(far);
+  EXPECT_EQ(*far, (RayHit{ids[0], 2 / sinking, {2 / sinking, 0, 0}, {0, 0, -1}}));
+}
+
 TEST(RayCast, SeesBodiesWhereTheyAreNow) {
   World world = three_in_a_row();
   world.set_state(world.bodies()[2], {{7, 0, 0}, {}, {}, {}});
