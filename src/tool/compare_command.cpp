@@ -38,13 +38,15 @@ std::string report(const Scene& scene, const RunOptions& options, const Comparis
       "{}: {} spheres, {} steps of {} s, {} precision, backend {}\n\n{}\n"
       "contacts and times are summed over all steps\n\n"
       "dispatches by jfpx     {} of {}\n"
-      "groups solved by jfpx  {}\n"
+      "groups solved by jfpx  {}{}{}\n"
       "contacts compared      {}\n"
       "contact mismatches     {}{}\n"
       "Bullet's trajectories  {}\n",
       scene.name, count_spheres(scene), options.steps, text(scene.dt), kPrecision, result.backend,
-      engines.text(), result.batches, options.steps, result.groups, result.contacts_compared,
-      result.contact_mismatches,
+      engines.text(), result.batches, options.steps, result.groups,
+      result.groups_on_device == 0 ? "" : fmt::format(", {} on the GPU", result.groups_on_device),
+      result.device_failure.empty() ? "" : "; given up: " + result.device_failure,
+      result.contacts_compared, result.contact_mismatches,
       result.contact_mismatches == 0 ? "" : "; first: " + result.first_contact_mismatch,
       yes_or_first(result.first_difference));
 }
@@ -69,6 +71,7 @@ nlohmann::ordered_json to_json_value(const Scene& scene, const RunOptions& optio
           {"threads", options.threads},
           {"batches", result.batches},
           {"groups", result.groups},
+          {"groups_on_device", result.groups_on_device},
           {"contacts_compared", result.contacts_compared},
           {"contact_mismatches", result.contact_mismatches},
           {"trajectory_identical", result.trajectory_identical()},

@@ -49,7 +49,11 @@ Comparison compare(const Scene& scene, const RunOptions& given) {
   result.hash_jfpx = jfpx.state_hash();
   result.backend = sphere_backend(jfpx);
   result.batches = jfpx.jfpx_dispatcher()->stats().batches;
-  if (jfpx.jfpx_solver() != nullptr) result.groups = jfpx.jfpx_solver()->stats().groups;
+  if (const bullet::ConstraintSolver* solver = jfpx.jfpx_solver()) {
+    result.groups = solver->stats().groups;
+    result.groups_on_device = solver->stats().on_device;
+    result.device_failure = solver->stats().device_failure;
+  }
   return result;
 }
 

@@ -17,9 +17,11 @@ struct Comparison {
   std::uint64_t hash_native = 0, hash_stock = 0, hash_jfpx = 0;
   std::uint64_t contacts_native = 0, contacts_stock = 0, contacts_jfpx = 0;  ///< summed over steps
   StageTimes ms_native, ms_stock, ms_jfpx;                                   ///< summed over steps
-  std::uint64_t batches = 0;  ///< dispatches of `jfpx` that its collider computed
-  std::uint64_t groups = 0;   ///< groups of bodies that the solver of `jfpx` solved
-  std::string backend;        ///< who computed the last batch of sphere pairs in `jfpx`
+  std::uint64_t batches = 0;           ///< dispatches of `jfpx` that its collider computed
+  std::uint64_t groups = 0;            ///< groups of bodies that the solver of `jfpx` solved
+  std::uint64_t groups_on_device = 0;  ///< of these: on the GPU
+  std::string device_failure;          ///< why its solver gave the GPU up; empty: it did not
+  std::string backend;                 ///< who computed the last batch of sphere pairs in `jfpx`
 
   bool trajectory_identical() const { return first_difference.empty() && hash_stock == hash_jfpx; }
   bool passed() const { return contact_mismatches == 0 && trajectory_identical(); }

@@ -294,6 +294,8 @@ TEST(Tool, CompareUsesOurSolverUnlessToldOtherwise) {
   const auto stock = nlohmann::json::parse(jfpx_stdout(arguments + "--solver stock").output);
   EXPECT_GE(ours["groups"], 20);
   EXPECT_EQ(stock["groups"], 0);
+  EXPECT_LE(ours["groups_on_device"], ours["groups"]);
+  EXPECT_EQ(stock["groups_on_device"], 0);
   EXPECT_EQ(ours["hash_jfpx"], stock["hash_jfpx"]);
 }
 
