@@ -211,9 +211,9 @@ def bullet(machine):
     return ("### Bullet's step in its parts\n\n" + origin(machine, "bullet_step") +
             "\nStock Bullet: ms a step, and where they go.\n\n" +
             table(["scene", "N", "step", *BULLET_STAGES[:-1]], shares) +
-            "\nStock / jfpx, medians of the ratios step by step: above 1 jfpx is faster. Integration, "
-            "dispatch, islands and solver are jfpx's, the broadphase is Bullet's in both: what differs from 1 there is "
-            "noise, or caches. Both worlds end with equal hashes.\n\n" +
+            "\nStock / jfpx, medians of the ratios step by step: above 1 jfpx is faster, on one thread. All parts are "
+            "jfpx's but Bullet's tree of boxes itself, in which the broadphase of jfpx finds pairs side by side. "
+            "Both worlds end with equal hashes.\n\n" +
             table(["scene", "N", *BULLET_STAGES, "gain"], ratios) + "\n")
 
 

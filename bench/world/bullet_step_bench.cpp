@@ -29,12 +29,12 @@ struct Run {
   int settle, steps;
 };
 constexpr Run kRuns[] = {
-    {"pile", 64, 120, 200},    {"pile", 1024, 120, 60},   {"pile", 4096, 60, 21},
-    {"pile", 16384, 30, 7},    {"pile", 65536, 10, 3},    {"gas", 64, 30, 200},
-    {"gas", 1024, 30, 60},     {"gas", 4096, 30, 21},     {"gas", 16384, 15, 9},
-    {"gas", 65536, 5, 3},      {"columns", 64, 30, 200},  {"columns", 1024, 30, 60},
-    {"columns", 4096, 30, 21}, {"columns", 16384, 15, 9}, {"columns", 65536, 5, 3},
-    {"overlap", 64, 0, 20},    {"overlap", 256, 0, 5},    {"overlap", 1024, 0, 2}};
+    {"pile", 64, 120, 200},    {"pile", 1024, 120, 60},    {"pile", 4096, 120, 31},
+    {"pile", 16384, 90, 15},   {"pile", 65536, 60, 7},     {"gas", 64, 30, 200},
+    {"gas", 1024, 30, 60},     {"gas", 4096, 30, 31},      {"gas", 16384, 15, 15},
+    {"gas", 65536, 10, 7},     {"columns", 64, 30, 200},   {"columns", 1024, 30, 60},
+    {"columns", 4096, 30, 31}, {"columns", 16384, 15, 15}, {"columns", 65536, 10, 7},
+    {"overlap", 64, 0, 40},    {"overlap", 256, 0, 15},    {"overlap", 1024, 0, 5}};
 
 /// Both worlds step in turn, each first every other time. The ratio is the median of the ratios
 /// step by step: neighbours in time share the noise of the machine.
