@@ -53,7 +53,7 @@ def origin(machine, bench, precision="float"):
 
 
 def automatic(machine):
-    rows, worst = [], 0
+    rows = []
     benchmarks = machine.get("automatic")
     if not benchmarks:
         return ""
@@ -61,17 +61,22 @@ def automatic(machine):
         fixed = {key.removesuffix("_us"): value for key, value in b.items()
                  if key.endswith("_us") and key != "automatic_us"}
         best = min(fixed, key=fixed.get)
-        worst = max(worst, b["ratio"])
         rows.append([scene, n, number(b["contacts"]) if b["contacts"] < 100 else int(b["contacts"]),
                      *[number(fixed[k] / fixed[best]) if k in fixed else "" for k in columns(benchmarks)],
                      best.replace("_", " "), b.get("label", ""), f"{b['ratio']:.2f}"])
-    over = sum(b["ratio"] > 1.1 for b in benchmarks.values())
+    double = machine.get("automatic", "double")
+    in_double = f" In double: {verdict(double)}." if double else ""
     head = ["scene", "N", "contacts", *[k.replace("_", " ") for k in columns(benchmarks)], "best fixed",
             "automatic chose last", "automatic / best"]
     return ("### The automatic choice\n\n" + origin(machine, "automatic") +
-            f"\nColumns of fixed choices are times divided by the best of the row. Worst ratio of "
-            f"`automatic` {worst:.2f}; {over} of {len(rows)} rows are over 1.10.\n\n" + table(head, rows) +
-            "\n")
+            f"\nColumns of fixed choices are times divided by the best of the row. `automatic`: "
+            f"{verdict(benchmarks)}.{in_double}\n\n" + table(head, rows) + "\n")
+
+
+def verdict(benchmarks):
+    ratios = [b["ratio"] for b in benchmarks.values()]
+    over = sum(ratio > 1.1 for ratio in ratios)
+    return f"worst ratio {max(ratios):.2f}, {over} of {len(ratios)} rows are over 1.10"
 
 
 def columns(benchmarks):
