@@ -9,18 +9,34 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 
 /// Leftovers before each pair. Once a dispatch is not enough: what a pair finds there is left by
-/// the pair before.
+/// the pair before. Twice a pair: before the near callback, whose frame the algorithm's will be
+/// in, and behind what that callback itself has left.
 template <int kFill>
-struct DispatcherElsewhere final : btCollisionDispatcher {
+class DispatcherElsewhere final : public btCollisionDispatcher {
+ public:
   using btCollisionDispatcher::btCollisionDispatcher;
   bool needsCollision(const btCollisionObject* a, const btCollisionObject* b) override {
     fill_stack<kFill>();
     return btCollisionDispatcher::needsCollision(a, b);
   }
+  void dispatchAllCollisionPairs(btOverlappingPairCache* pairs, const btDispatcherInfo& info,
+                                 btDispatcher* dispatcher) override {
+    near_ = getNearCallback();
+    setNearCallback(
+        [](btBroadphasePair& pair, btCollisionDispatcher& self, const btDispatcherInfo& its_info) {
+          fill_stack<kFill>();
+          static_cast<DispatcherElsewhere&>(self).near_(pair, self, its_info);
+        });
+    btCollisionDispatcher::dispatchAllCollisionPairs(pairs, info, dispatcher);
+    setNearCallback(near_);
+  }
   static std::unique_ptr<btCollisionDispatcher> make(btCollisionConfiguration* configuration,
                                                      const RandomWorld&) {
     return std::make_unique<DispatcherElsewhere>(configuration);
   }
+
+ private:
+  btNearCallback near_ = nullptr;
 };
 
 /// Leftovers before and after each group.

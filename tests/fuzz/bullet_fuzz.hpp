@@ -8,10 +8,11 @@
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
+/// @param least the world, shrunk
 template <class World>
-[[noreturn]] void report_difference(const Failure& failure, const World& world) {
+[[noreturn]] void report_difference(const Failure& failure, const World& least) {
   std::ostringstream text;
-  text << "after step " << failure.step << ": " << failure.what << '\n' << world;
+  text << "after step " << failure.step << ": " << failure.what << "\nshrunk to:\n" << least;
   fuzz::report_finding(text.str());
 }
 

@@ -7,6 +7,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   test::Bytes bytes({data, size});
   const bullet::RandomWorld world = bullet::make_random_world(bytes);
   const auto failure = run(world, nullptr);
-  if (failure && !is_accident_of_stock(world, *failure)) report_difference(*failure, world);
+  if (failure && !is_accident_of_stock(world, *failure)) report_difference(*failure, shrink(world));
   return 0;
 }

@@ -11,7 +11,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::uint64_t parts = bytes.below(4);
   const MakeDispatcher dispatcher = parts == 3 ? make_ours : make_stock;
   const SolverWorld world = make_solver_world(bytes);
-  const auto failure = run(world, nullptr, kParts[std::min<std::uint64_t>(parts, 2)], dispatcher);
-  if (failure && !is_accident_of_stock(world, *failure)) report_difference(*failure, world);
+  const MakeParts ours = kParts[std::min<std::uint64_t>(parts, 2)];
+  const auto failure = run(world, nullptr, ours, dispatcher);
+  if (failure && !is_accident_of_stock(world, *failure)) {
+    report_difference(*failure, shrink(world, ours, dispatcher));
+  }
   return 0;
 }
