@@ -10,6 +10,7 @@
 #include "examples/viewer/player.hpp"
 #include "examples/viewer/timing.hpp"
 #include "examples/viewer/values.hpp"
+#include "tests/support/seed.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
@@ -17,7 +18,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <random>
 
 namespace jfpx {
@@ -26,11 +26,6 @@ namespace {
 using namespace view;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-
-unsigned fresh_seed() {
-  const char* given = std::getenv("JFPX_TEST_SEED");
-  return given ? static_cast<unsigned>(std::strtoul(given, nullptr, 10)) : std::random_device{}();
-}
 
 SDL_Event key(SDL_Keycode code, bool down = true) {
   SDL_Event event{};
@@ -285,8 +280,7 @@ TEST(Player, SwitchingBulletsDispatcherKeepsTheBits) {
 
 TEST(Player, SwitchingBulletsPartsAndBackendsAtRandomKeepsTheBits) {
   if (!has_engine(EngineKind::bullet)) GTEST_SKIP() << "built without Bullet";
-  const unsigned seed = fresh_seed();
-  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  const test::Seed seed;
   std::mt19937 random(seed);
   const Scene scene = scenes::make("mixed", {.spheres = 30, .boxes = 30, .seed = seed});
   Player stock = player_of(scene, {.engine = EngineKind::bullet_stock});
@@ -390,8 +384,7 @@ TEST(Islands, HangTogetherByMovableBodiesOnly) {
 }
 
 TEST(Islands, AreThoseOfAFloodFill) {
-  const unsigned seed = fresh_seed();
-  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  const test::Seed seed;
   std::mt19937 random(seed);
   const Scene scene = row_of_balls(60);
   std::vector<Contact> contacts(random() % 80);

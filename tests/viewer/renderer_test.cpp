@@ -1,5 +1,6 @@
 /// Pictures: what is drawn is where it must be, in its colour, hidden by what is before it.
 #include "examples/viewer/stage.hpp"
+#include "tests/support/seed.hpp"
 #include "tests/viewer/gl_fixture.hpp"
 
 #include <gmock/gmock.h>
@@ -19,11 +20,6 @@ using RendererTest = test::GlTest;
 constexpr int kWidth = 320, kHeight = 200;
 constexpr std::array<Paint, 6> kHues = {
     {{220, 20, 20}, {20, 200, 20}, {20, 20, 220}, {210, 200, 10}, {200, 10, 200}, {10, 190, 200}}};
-
-unsigned fresh_seed() {
-  const char* given = std::getenv("JFPX_TEST_SEED");
-  return given ? static_cast<unsigned>(std::strtoul(given, nullptr, 10)) : std::random_device{}();
-}
 
 View view_of(const Vec3& eye, const Vec3& target, Real reach) {
   Camera camera;
@@ -63,32 +59,51 @@ double mean_difference(const Image& a, const Image& b) {
 }
 
 TEST_F(RendererTest, EveryBodysProjectedCentreHasItsColour) {
-  const unsigned seed = fresh_seed();
-  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  const test::Seed seed;
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> jitter(-0.35f, 0.35f), angle(-1, 1);
   const Vec3 eye{-6, Real(2.5), 15};  // the sun stands behind it, at the left
   const View view = view_of(eye, {}, 12);
   Drawing drawing(eye);
   drawing.set_bounds({}, 12);
-  std::vector<std::pair<Vec3, std::size_t>> bodies;
+  struct Body {
+    Vec3 at;
+    std::size_t hue;
+    std::string text;
+  };
+  std::vector<Body> bodies;
+  // A smooth face that mirrors the sun into the eye has the sun's colour, not its own.
+  const Vec3 sun = normalized(Vec3{Real(-0.52), Real(0.80), Real(0.34)});
+  const auto mirrors_sun = [&](const Quat& turn, const Vec3& at) {
+    const Vec3 half_way = normalized(sun + normalized(eye - at));
+    const Vec3 local = transform_transpose(to_matrix(turn), half_way);
+    return std::max({absolute(local.x), absolute(local.y), absolute(local.z)}) > Real(0.97);
+  };
+  // Rows and columns of the picture, not of the world: none hides the centre of another. Two are
+  // 2 - 2 * 0.35 m apart across the picture; perspective takes 0.7 m in depth * 6.35 / 16 of it,
+  // and the slant of the ray divides by sqrt(1 + (6.35 / 16)^2), which leaves 0.95 m. A box reaches
+  // sqrt(0.5^2 + 0.4^2 + 0.6^2) = 0.88 m.
   for (int x = -3; x <= 3; ++x) {
     for (int y = -2; y <= 2; ++y) {
-      const Vec3 at{Real(x) * 2 + jitter(random), Real(y) * 2 + jitter(random), jitter(random)};
+      const Vec3 at = view.right * (Real(x) * 2 + jitter(random)) +
+                      view.up * (Real(y) * 2 + jitter(random)) + view.forward * jitter(random);
       const std::size_t hue = random() % kHues.size();
-      const Quat turn =
-          normalized(Quat{angle(random), angle(random), angle(random), angle(random)});
-      if (random() % 2 == 0) {
+      const bool sphere = random() % 2 == 0;
+      Quat turn;
+      do {
+        turn = normalized(Quat{angle(random), angle(random), angle(random), angle(random)});
+      } while (!sphere && mirrors_sun(turn, at));
+      if (sphere) {
         drawing.add_sphere(at, Real(0.6), turn, kHues[hue]);
       } else {
         drawing.add_box(at, {Real(0.5), Real(0.4), Real(0.6)}, turn, kHues[hue]);
       }
-      bodies.emplace_back(at, hue);
+      bodies.push_back({at, hue, (sphere ? "sphere " : "box ") + std::to_string(bodies.size())});
     }
   }
   const Image image = picture(drawing, view, kWidth, kHeight);
-  for (std::size_t k = 0; k < bodies.size(); ++k) {
-    EXPECT_EQ(hue_at(image, view, bodies[k].first), bodies[k].second) << "body " << k;
+  for (const Body& body : bodies) {
+    EXPECT_EQ(hue_at(image, view, body.at), body.hue) << body.text;
   }
 }
 
