@@ -48,6 +48,15 @@ Moment moment_of(bullet::SceneWorld& world, std::uint64_t step) {
     }
     moment.trouble = stats.failure;
   }
+  moment.solved_by = "Bullet";
+  const auto* solver =
+      dynamic_cast<const bullet::ConstraintSolver*>(world.world().getConstraintSolver());
+  if (solver != nullptr) {
+    const bullet::ConstraintSolverStats& stats = solver->stats();
+    if (stats.groups > 0) moment.solved_by = to_string(Backend::x86);
+    if (stats.on_device > 0) moment.solved_by = to_string(Backend::cuda);
+    if (moment.trouble.empty()) moment.trouble = stats.device_failure;
+  }
   return moment;
 }
 

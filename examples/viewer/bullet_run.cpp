@@ -3,6 +3,7 @@
 #include "examples/viewer/exchangeable_collider.hpp"
 
 #include <limits>
+#include <utility>
 
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
@@ -10,11 +11,15 @@ namespace {
 class BulletRun final : public Run {
  public:
   BulletRun(const Scene& scene, const EngineChoice& choice, std::uint64_t first_step)
-      : choice_(choice), step_(first_step), world_(make_world(scene)) {
+      : choice_(choice),
+        step_(first_step),
+        solver_(make_solver(choice)),
+        world_(make_world(scene)) {
     apply_choice();
   }
 
   void step() override {
+    solver_->reset_stats();  // so that they tell who solved this step
     world_.step();
     ++step_;
   }
@@ -25,7 +30,9 @@ class BulletRun final : public Run {
   bool switch_to(const EngineChoice& choice) override {
     if (choice.engine == EngineKind::native || choice.threads != choice_.threads) return false;
     if (choice.backend != choice_.backend) {
+      auto solver = make_solver(choice);
       collider_->exchange(make_sphere_collider(collider_options(choice)));
+      solver_ = std::move(solver);  // impulses to start from are in the manifolds
     }
     choice_ = choice;
     apply_choice();
@@ -33,8 +40,13 @@ class BulletRun final : public Run {
   }
 
  private:
+  static std::unique_ptr<bullet::ConstraintSolver> make_solver(const EngineChoice& choice) {
+    return std::make_unique<bullet::ConstraintSolver>(world_options(choice).solve);
+  }
+
   bullet::SceneWorld make_world(const Scene& scene) {
     bullet::SceneWorldOptions options = world_options(choice_);
+    options.solver = bullet::SolverKind::stock;  // solver_ takes its place
     options.make_collider = [this] {
       auto collider =
           std::make_unique<ExchangeableCollider>(make_sphere_collider(collider_options(choice_)));
@@ -48,12 +60,12 @@ class BulletRun final : public Run {
   // choices differ in three numbers and share all that Bullet remembers.
   void apply_choice() {
     const auto least = [this](bool jfpx) {
-      return jfpx && choice_.engine == EngineKind::bullet ? std::size_t{0}
+      return jfpx && choice_.engine == EngineKind::bullet ? choice_.minimum_batch
                                                           : std::numeric_limits<std::size_t>::max();
     };
     world_.jfpx_dispatcher()->set_minimum_batch(least(true));
-    dynamic_cast<bullet::ConstraintSolver&>(*world_.world().getConstraintSolver())
-        .set_minimum_batch(least(choice_.jfpx_solver));
+    solver_->set_minimum_batch(least(choice_.jfpx_solver));
+    world_.world().setConstraintSolver(solver_.get());
     dynamic_cast<bullet::DynamicsWorld&>(world_.world())
         .set_minimum_batch(least(choice_.jfpx_world));
   }
@@ -61,6 +73,7 @@ class BulletRun final : public Run {
   EngineChoice choice_;
   std::uint64_t step_;
   ExchangeableCollider* collider_ = nullptr;  // owned by the world
+  std::unique_ptr<bullet::ConstraintSolver> solver_;
   bullet::SceneWorld world_;
 };
 
@@ -69,6 +82,7 @@ class BulletRun final : public Run {
 bullet::SceneWorldOptions world_options(const EngineChoice& choice) {
   bullet::SceneWorldOptions options;
   options.dispatch.collider = collider_options(choice);
+  options.solve.backend = choice.backend;
   options.solve.threads = options.step.threads = choice.threads;
   return options;
 }

@@ -22,6 +22,7 @@ struct Moment {
   StageTimes times;
   std::uint64_t iterations = 0;  ///< of the native resolver, both loops
   std::string computed_by;       ///< who found the sphere contacts
+  std::string solved_by;         ///< Bullet: who swept over the rows; of a native run empty
   std::string trouble;           ///< why the run can't go on meaningfully
 };
 

@@ -59,7 +59,7 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
   app.add_option_function<std::string>(
          "--backend",
          [&options](const std::string& name) { options.choice.backend = *parse_backend(name); },
-         "Who finds sphere contacts: auto, x86 or cuda [auto]")
+         "Who finds sphere contacts, and solves in Bullet: auto, x86 or cuda [auto]")
       ->check(CLI::IsMember({"auto", "x86", "cuda"}));
   app.add_option("--threads", options.choice.threads, "Threads on x86, 0 = one per core")
       ->check(tool::whole_number())
@@ -73,6 +73,11 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
            "Engine bullet: whose solver, stock or jfpx [jfpx]");
   add_part("--world", &options.choice.jfpx_world,
            "Engine bullet: whose world, stock or jfpx [jfpx]");
+  app.add_option("--minimum-batch", options.choice.minimum_batch,
+                 "Engine bullet: pairs, bodies or manifolds below which a part is left to Bullet's "
+                 "own code")
+      ->check(tool::whole_number())
+      ->capture_default_str();
   app.add_flag("--headless", options.headless, "No window, no display");
   app.add_option("--frames", options.frames, "Steps to run [headless: 120; window: until closed]")
       ->check(tool::whole_number());

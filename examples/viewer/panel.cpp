@@ -169,7 +169,9 @@ void SceneShow::show_counters() {
   const auto awake = std::count(now.awake.begin(), now.awake.end(), std::uint8_t{1});
   say(fmt::format("{} bodies, {} awake, {} contacts", now.states.size(), awake,
                   now.contacts.size()));
-  say(fmt::format("spheres by {}, {} corrections", now.computed_by, now.iterations));
+  say(now.solved_by.empty()
+          ? fmt::format("spheres by {}, {} corrections", now.computed_by, now.iterations)
+          : fmt::format("spheres by {}, solved by {}", now.computed_by, now.solved_by));
   if (!now.trouble.empty()) ImGui::TextColored(kWarning, "%s", now.trouble.c_str());
   const std::array<std::pair<const char*, double StageTimes::*>, 5> stages = {
       {{"integrate", &StageTimes::integrate},

@@ -19,9 +19,10 @@ EngineKind parse_engine(std::string_view name);
 
 struct EngineChoice {
   EngineKind engine = EngineKind::native;
-  Backend backend = Backend::automatic;
-  unsigned threads = 1;                        ///< x86, 0 = one per core
+  Backend backend = Backend::automatic;  ///< of sphere contacts, and of rows of Bullet's solver
+  unsigned threads = 1;                  ///< x86, 0 = one per core
   bool jfpx_solver = true, jfpx_world = true;  ///< of EngineKind::bullet; else Bullet's own
+  std::size_t minimum_batch = 0;               ///< likewise: less is left to Bullet's own code
   friend bool operator==(const EngineChoice&, const EngineChoice&) = default;
 };
 

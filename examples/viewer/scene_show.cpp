@@ -88,10 +88,12 @@ int SceneShow::status() const {
 std::string SceneShow::summary() const {
   const Moment& now = player_.shown();
   const EngineChoice choice = player_.choice();
-  return fmt::format("{}: {} bodies, step {}, {} contacts, engine {}, spheres by {}{}{}",
-                     player_.scene().name, player_.scene().bodies.size(), now.step,
-                     now.contacts.size(), kEngineNames[static_cast<std::size_t>(choice.engine)],
-                     now.computed_by, now.trouble.empty() ? "" : "; ", now.trouble);
+  return fmt::format(
+      "{}: {} bodies, step {}, {} contacts, engine {}, spheres by {}{}{}, hash {:016x}{}{}",
+      player_.scene().name, player_.scene().bodies.size(), now.step, now.contacts.size(),
+      kEngineNames[static_cast<std::size_t>(choice.engine)], now.computed_by,
+      now.solved_by.empty() ? "" : ", solved by ", now.solved_by, state_hash(now.states),
+      now.trouble.empty() ? "" : "; ", now.trouble);
 }
 
 std::unique_ptr<Show> make_scene_show(const ViewOptions& options) {

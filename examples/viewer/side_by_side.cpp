@@ -40,8 +40,8 @@ bullet::SceneWorld make_jfpx_world(const Scene& scene, const EngineChoice& choic
   bullet::SceneWorldOptions world = world_options(choice);
   if (!choice.jfpx_solver) world.solver = bullet::SolverKind::stock;
   if (!choice.jfpx_world) world.world = bullet::WorldKind::stock;
-  // Small scenes would compare Bullet's code with itself.
-  world.dispatch.minimum_batch = world.solve.minimum_batch = 0;
+  // By default 0: small scenes would compare Bullet's code with itself.
+  world.dispatch.minimum_batch = world.solve.minimum_batch = choice.minimum_batch;
   return bullet::SceneWorld(scene, world);
 }
 

@@ -249,13 +249,36 @@ TEST(Player, SwitchingTheBackendKeepsTheBits) {
 
 TEST(Player, ABackendThatCannotBeHadLeavesTheRunAsItWas) {
   for (const BackendStatus& row : available_backends()) {
-    if (row.usable) continue;
-    Player player = player_of(scenes::make("pile", {.spheres = 10}));
-    player.step();
-    EXPECT_THROW(player.switch_to({.backend = row.backend}), BackendUnavailable);
-    EXPECT_EQ(player.choice(), EngineChoice{});
-    player.step();
-    EXPECT_EQ(player.shown().step, 2u);
+    for (const EngineKind engine : {EngineKind::native, EngineKind::bullet}) {
+      if (row.usable || !has_engine(engine)) continue;
+      const EngineChoice choice{.engine = engine};
+      Player player = player_of(scenes::make("pile", {.spheres = 10}), choice);
+      player.step();
+      EXPECT_THROW(player.switch_to({.engine = engine, .backend = row.backend}),
+                   BackendUnavailable);
+      EXPECT_EQ(player.choice(), choice);
+      player.step();
+      EXPECT_EQ(player.shown().step, 2u);
+    }
+  }
+}
+
+TEST(Player, TellsWhoSolvedTheStep) {
+  if (!has_engine(EngineKind::bullet)) GTEST_SKIP() << "built without Bullet";
+  const auto solved_by = [](const EngineChoice& choice) {
+    Player player = player_of(scenes::make("pile", {.spheres = 60}), choice);
+    for (int i = 0; i < 50; ++i) player.step();
+    EXPECT_FALSE(player.shown().contacts.empty());
+    return player.shown().solved_by;
+  };
+  EXPECT_EQ(solved_by({}), "");
+  EXPECT_EQ(solved_by({.engine = EngineKind::bullet_stock}), "Bullet");
+  EXPECT_EQ(solved_by({.engine = EngineKind::bullet, .jfpx_solver = false}), "Bullet");
+  EXPECT_EQ(solved_by({.engine = EngineKind::bullet, .minimum_batch = 100000}), "Bullet");
+  for (const BackendStatus& row : available_backends()) {
+    if (!row.usable) continue;
+    EXPECT_EQ(solved_by({.engine = EngineKind::bullet, .backend = row.backend}),
+              to_string(row.backend));
   }
 }
 
@@ -283,15 +306,20 @@ TEST(Player, SwitchingBulletsPartsAndBackendsAtRandomKeepsTheBits) {
   const test::Seed seed;
   std::mt19937 random(seed);
   const Scene scene = scenes::make("mixed", {.spheres = 30, .boxes = 30, .seed = seed});
+  std::vector<Backend> backends = {Backend::automatic};
+  for (const BackendStatus& row : available_backends()) {
+    if (row.usable) backends.push_back(row.backend);
+  }
   Player stock = player_of(scene, {.engine = EngineKind::bullet_stock});
   Player switched = player_of(scene, {.engine = EngineKind::bullet});
   for (int i = 0; i < 120; ++i) {
     if (random() % 3 == 0) {
       const EngineChoice choice{
           .engine = random() % 4 == 0 ? EngineKind::bullet_stock : EngineKind::bullet,
-          .backend = random() % 2 == 0 ? Backend::x86 : Backend::automatic,
+          .backend = backends[random() % backends.size()],
           .jfpx_solver = random() % 2 == 0,
-          .jfpx_world = random() % 2 == 0};
+          .jfpx_world = random() % 2 == 0,
+          .minimum_batch = random() % 3 == 0 ? random() % 40 : 0};
       EXPECT_TRUE(switched.switch_to(choice));
     }
     stock.step();

@@ -7,8 +7,9 @@ foreach(suffix IN ITEMS "" "_f64")
     JFPX_INPUT_FOLDER="${PROJECT_SOURCE_DIR}/examples/demos/inputs")
   target_compile_definitions(renderer_test${suffix} PRIVATE
     JFPX_REFERENCE_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/viewer/reference")
-  add_dependencies(view_test${suffix} jfpx_view jfpx_view_f64)
+  add_dependencies(view_test${suffix} jfpx_view jfpx_view_f64 jfpx_tool${suffix})
   target_compile_definitions(view_test${suffix} PRIVATE
     JFPX_VIEW_PATH="$<TARGET_FILE:jfpx_view${suffix}>"
+    JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
     JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
 endforeach()

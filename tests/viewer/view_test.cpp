@@ -169,6 +169,17 @@ TEST(View, StatesAreRecordedAndPlayedBack) {
                "can be recorded");
 }
 
+TEST(View, TellsTheHashThatTheToolTells) {
+  for (const std::string engine : {"native", "bullet"}) {
+    if (!JFPX_HAS_BULLET && engine == "bullet") continue;
+    const std::string run = " pile --spheres 40 --engine " + engine;
+    const auto ran = test::run_process(JFPX_TOOL_PATH " run" + run + " --steps 30 --hash --quiet");
+    ASSERT_EQ(ran.status, 0) << ran.output;
+    EXPECT_THAT(jfpx_view(run + " --frames 30 --no-render").output,
+                HasSubstr("hash " + ran.output.substr(0, 16)));
+  }
+}
+
 TEST(View, BulletsPartsAreChosenByName) {
   if (!JFPX_HAS_BULLET) GTEST_SKIP() << "built without Bullet";
   for (const char* parts : {"--solver stock", "--world stock", "--solver stock --world stock"}) {
