@@ -9,6 +9,7 @@ namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
 constexpr Vec3 kTowardsSun{Real(-0.52), Real(0.80), Real(0.34)};
+constexpr Real kGoldenAngle = Real(2.39996323);
 constexpr Real kSunBlur = Real(0.045);  // tangent: a sun some times as wide as the real one
 
 void put(float (&out)[4], const Vec3& v, Real w) {
@@ -69,13 +70,19 @@ FrameBlock make_frame_block(const Drawing& drawing, const View& view, const Qual
   const Real half = Real(0.5);
   put(block.light, rows(side * k, half - dot(side, towards) * k, up * k,
                         half - dot(up, towards) * k, sun * -k, half + dot(sun, towards) * k));
+  for (int i = 0; i < kMostTaps; ++i) {
+    const Real angle = static_cast<Real>(i) * kGoldenAngle;
+    put(block.taps[i], {std::cos(angle), std::sin(angle), std::sqrt(static_cast<Real>(i) + half)},
+        0);
+  }
   const Real across = 2 * radius;
   if (quality.shadow_size > 0) {
     put(block.shadow, {across / static_cast<Real>(quality.shadow_size), across, across},
-        static_cast<Real>(quality.shadow_taps));
+        static_cast<Real>(std::min(quality.shadow_taps, kMostTaps)));
   }
   put(block.occlusion,
-      {static_cast<Real>(drawing.detail()), static_cast<Real>(quality.occlusion_samples),
+      {static_cast<Real>(drawing.detail()),
+       static_cast<Real>(std::min(quality.occlusion_samples, kMostTaps)),
        view.far_plane * Real(0.6)},
       0);
   return block;

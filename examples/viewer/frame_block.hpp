@@ -5,6 +5,8 @@
 
 namespace jfpx::inline JFPX_ABI::view {
 
+inline constexpr int kMostTaps = 32;
+
 /// Laid out as std140 wants it.
 struct FrameBlock {
   float view_projection[16];
@@ -14,6 +16,7 @@ struct FrameBlock {
   float viewport[4];
   float shadow[4];
   float occlusion[4];
+  float taps[kMostTaps][4];
 };
 
 /// @param width, height of the target in samples

@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "examples/viewer/frame_block.hpp"
 #include "examples/viewer/shaders.hpp"
 
 #include <array>
@@ -18,7 +19,7 @@ std::string log_of(GLuint shader) {
 }
 
 void attach(GLuint program, GLenum stage, std::string_view defines, std::string_view source) {
-  std::string head = "#version 330 core\n";
+  std::string head = "#version 330 core\n#define MOST_TAPS " + std::to_string(kMostTaps) + "\n";
   if (epoxy_has_gl_extension("GL_ARB_conservative_depth")) {
     head += "#extension GL_ARB_conservative_depth : enable\n";
   }

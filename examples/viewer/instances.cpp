@@ -51,10 +51,10 @@ GLuint Instances::reserve(std::size_t items) {
   return buffer_.name();
 }
 
-void Instances::draw() const {
-  if (count_ == 0) return;
+void Instances::draw(std::size_t items) const {
+  if (items == 0) return;
   glBindVertexArray(array_.name());
-  glDrawArraysInstanced(mode_, 0, vertices_, count_);
+  glDrawArraysInstanced(mode_, 0, vertices_, static_cast<GLsizei>(items));
 }
 
 SphereInstances::SphereInstances()

@@ -21,7 +21,9 @@ class Instances {
   void upload_bytes(const void* data, std::size_t items);
   /// Room for so many items, which somebody else fills. @return the buffer
   GLuint reserve(std::size_t items);
-  void draw() const;
+  void draw() const { draw(static_cast<std::size_t>(count_)); }
+  /// Only the first ones.
+  void draw(std::size_t items) const;
 
  private:
   GlBuffer buffer_;

@@ -4,6 +4,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "examples/viewer/draw_order.hpp"
 #include "examples/viewer/frame_block.hpp"
 #include "examples/viewer/instances.hpp"
 #include "examples/viewer/shaders.hpp"
@@ -97,6 +98,7 @@ struct Renderer::Impl {
   GlProgram line{shaders::line_vert, shaders::line_frag};
   GlBuffer frame = make_buffer();
   GlVertexArray empty = make_vertex_array();
+  DrawOrder order;
   SphereInstances spheres, resident_spheres;
   BoxInstances boxes, glass;
   LineInstances lines;
@@ -123,11 +125,12 @@ struct Renderer::Impl {
     if (!shadow_map || shadow_map->size != size) shadow_map.emplace(size);
   }
 
-  void upload(const Drawing& drawing, const FrameBlock& block) {
+  void upload(const Drawing& drawing, const View& view, const FrameBlock& block) {
     glBindBuffer(GL_UNIFORM_BUFFER, frame.name());
     glBufferData(GL_UNIFORM_BUFFER, sizeof block, &block, GL_STREAM_DRAW);
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame.name());
-    spheres.upload(drawing.spheres());
+    const Real aspect = static_cast<Real>(targets->width) / static_cast<Real>(targets->height);
+    spheres.upload(order.sort(drawing.spheres(), view, aspect));
     boxes.upload(drawing.boxes());
     glass.upload(drawing.glass());
     lines.upload(drawing.lines());
@@ -139,7 +142,7 @@ struct Renderer::Impl {
     sphere[pass].use();
     const bool smooth = pass == kColourPass && quality.samples > 1;
     if (smooth) glEnable(GL_SAMPLE_ALPHA_TO_COVERAGE);
-    spheres.draw();
+    spheres.draw(pass == kShadowPass ? order.all() : order.visible());
     resident_spheres.draw();
     glDisable(GL_SAMPLE_ALPHA_TO_COVERAGE);
   }
@@ -260,7 +263,7 @@ void Renderer::draw(const Drawing& drawing, const View& view, const Viewport& vi
   if (viewport.width <= 0 || viewport.height <= 0) return;  // a minimised window
   Impl& r = *impl_;
   r.resize(viewport.width * r.quality.supersample, viewport.height * r.quality.supersample);
-  r.upload(drawing,
+  r.upload(drawing, view,
            make_frame_block(drawing, view, r.quality, r.targets->width, r.targets->height));
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);

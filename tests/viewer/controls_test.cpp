@@ -5,6 +5,7 @@
 
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/comparison.hpp"
+#include "examples/viewer/draw_order.hpp"
 #include "examples/viewer/forces.hpp"
 #include "examples/viewer/islands.hpp"
 #include "examples/viewer/player.hpp"
@@ -19,6 +20,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <tuple>
 
 namespace jfpx {
 namespace {
@@ -564,6 +566,52 @@ TEST(Stage, PartsOfAnAssemblyAreDrawnAndPickedWhereTheyAre) {
   EXPECT_NEAR(drawing.boxes()[0].centre[1], 8, 1e-4);
   ASSERT_GE(drawing.grounds().size(), 1u);
   EXPECT_NEAR(drawing.grounds()[0].height, 8, 1e-4);
+}
+
+TEST(DrawOrder, HasWhatIsSeenFirstFrontToBackAndLosesNothing) {
+  const test::Seed seed;
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> anywhere(-20, 20), size(0.05f, 3);
+  const auto point = [&] { return Vec3{anywhere(random), anywhere(random), anywhere(random)}; };
+  const auto vec = [](const float(&c)[3]) { return Vec3{c[0], c[1], c[2]}; };
+  Camera camera;
+  camera.look_at(point(), point());
+  const View view = camera.view({}, 20);
+  constexpr int kWidth = 320, kHeight = 180;
+  DrawOrder order;
+  EXPECT_TRUE(order.sort({}, view, Real(1.5)).empty());
+  EXPECT_EQ(order.visible(), 0u);
+  for (const std::size_t count : {1u, 2u, 700u}) {
+    Drawing drawing(view.eye);
+    for (std::size_t i = 0; i < count; ++i) drawing.add_sphere(point(), size(random), {}, {});
+    const auto key = [](const SphereItem& s) { return std::tuple(s.centre[0], s.radius); };
+    const auto by_key = [&](const auto& a, const auto& b) { return key(a) < key(b); };
+    const auto same = [&](const auto& a, const auto& b) { return key(a) == key(b); };
+    std::vector<SphereItem> given = drawing.spheres();
+    std::vector<SphereItem> ordered = order.sort(given, view, Real(kWidth) / kHeight);
+    float last = 0;
+    for (std::size_t i = 0; i < order.visible(); ++i) {
+      const auto distance = static_cast<float>(length(vec(ordered[i].centre)));
+      const float front = std::max(distance - ordered[i].radius, 0.0f);  // the eye may be inside
+      EXPECT_GE(front, last - 70.0f / 2000) << i;  // 2048 shells in the diagonal of 40 m cubed
+      last = std::max(last, front);
+    }
+    // Of what comes after no point is in the picture.
+    for (std::size_t i = order.visible(); i < count; ++i) {
+      for (int k = 0; k < 50; ++k) {
+        const Vec3 on_it = normalized(point()) * Real(ordered[i].radius) + vec(ordered[i].centre);
+        const auto pixel = project(view, view.eye + on_it, kWidth, kHeight);
+        const bool seen =
+            pixel && pixel->x > 0 && pixel->x < kWidth && pixel->y > 0 && pixel->y < kHeight;
+        EXPECT_FALSE(seen) << i;
+      }
+    }
+    std::sort(given.begin(), given.end(), by_key);
+    std::sort(ordered.begin(), ordered.end(), by_key);
+    EXPECT_TRUE(std::equal(given.begin(), given.end(), ordered.begin(), ordered.end(), same));
+    // A picture of 41 by 23 degrees shows a small part of what is all around.
+    EXPECT_LE(order.visible(), std::max<std::size_t>(count * 3 / 4, 2));
+  }
 }
 
 TEST(Stage, PickFindsTheNearestMovableBody) {

@@ -76,7 +76,7 @@ void main() {
   }
   if (pattern == 3) base = crate(uv / face, base, seed);
   if (pattern == 4) base = wall(uv, base);
-  result = vec4(shaded(base, normal, at, pattern == 0 ? 0.5 : 0.12), 1.0);
+  result = vec4(shaded(base, normal, at, pattern == 0 ? 0.5 : 0.12, shadow.w), 1.0);
 #elif !defined(SHADOW_PASS)
   result = vec4(normal, 1.0);
 #endif

@@ -10,6 +10,7 @@ layout(std140) uniform Frame {
   vec4 viewport;   // width, height; z: far plane; w: height of the eye over the horizon's ground
   vec4 shadow;     // metres a texel, metres across, metres deep; w: taps, 0 for no shadows
   vec4 occlusion;  // radius in metres; y: samples, 0 for none; z: distance where fog takes over
+  vec4 taps[MOST_TAPS];  // direction by the golden angle; z: where it lies on a disk of radius sqrt(taps)
 };
 
 float pixel_size(float at_distance) { return ray_x.w * at_distance; }

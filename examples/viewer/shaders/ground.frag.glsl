@@ -33,7 +33,7 @@ void main() {
   base *= 1.0 - 0.045 * (checker - 0.5) * clamp(0.2 / width.x, 0.0, 1.0);
   base *= 1.0 - 0.20 * lines(cells, width, 0.006);
   base *= 1.0 - 0.30 * lines(cells / 10.0, width / 10.0, 0.002);
-  result = vec4(shaded(base, plane.xyz, p, 0.22), 1.0);
+  result = vec4(shaded(base, plane.xyz, p, 0.22, shadow.w), 1.0);
 #else
   result = vec4(plane.xyz, 1.0);
 #endif

@@ -19,15 +19,10 @@ vec3 sky(vec3 direction) {
 float noise_of_pixel() {
   return fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
 }
-vec2 on_disk(int i, float count, float turn) {
-  float r = sqrt((float(i) + 0.5) / count);
-  float a = float(i) * 2.3999632 + turn;
-  return r * vec2(cos(a), sin(a));
-}
 
 // Percentage-closer soft shadows (Fernando 2005): the blur grows with the distance to the blocker,
 // so that shadows are sharp where things touch.
-float sunlight(vec3 p, vec3 n) {
+float sunlight(vec3 p, vec3 n, float most_taps) {
   if (shadow.w < 1.0) return 1.0;
   float facing = max(dot(n, sun.xyz), 0.05);
   vec3 at = (light * vec4(p + n * shadow.x * 1.5, 1.0)).xyz;
@@ -38,11 +33,12 @@ float sunlight(vec3 p, vec3 n) {
   vec2 slope = clamp(n_light.xy / facing, -6.0, 6.0) * (shadow.y / shadow.z);
   float bias = 1.2 * shadow.x / shadow.z;
   float turn = 6.2831853 * noise_of_pixel();
-  int taps = int(shadow.w);
+  int count = int(min(shadow.w, most_taps));
+  mat2 on_disk = inversesqrt(float(count)) * mat2(cos(turn), sin(turn), -sin(turn), cos(turn));
   float search = clamp(0.5 * sun.w * at.z * shadow.z, shadow.x * 2.0, shadow.x * 60.0) / shadow.y;
   float blocker = 0.0, blockers = 0.0;
-  for (int i = 0; i < taps; ++i) {
-    vec2 offset = on_disk(i, shadow.w, turn) * search;
+  for (int i = 0; i < count; ++i) {
+    vec2 offset = on_disk * (taps[i].xy * (taps[i].z * search));
     float depth = texture(shadow_map, at.xy + offset).r;
     if (depth < min(at.z + dot(slope, offset) - bias, 0.99999)) {
       blocker += depth;
@@ -50,15 +46,16 @@ float sunlight(vec3 p, vec3 n) {
     }
   }
   if (blockers < 0.5) return 1.0;
+  if (blockers > float(count) - 0.5) return 0.0;
   float gap = (at.z - blocker / blockers) * shadow.z;
   float blur = clamp(gap * sun.w, shadow.x * 1.2, shadow.x * 60.0) / shadow.y;
   float lit = 0.0;
-  for (int i = 0; i < taps; ++i) {
-    vec2 offset = on_disk(i, shadow.w, turn) * blur;
+  for (int i = 0; i < count; ++i) {
+    vec2 offset = on_disk * (taps[i].xy * (taps[i].z * blur));
     float depth = texture(shadow_map, at.xy + offset).r;
     lit += depth < min(at.z + dot(slope, offset) - bias, 0.99999) ? 0.0 : 1.0;
   }
-  return lit / shadow.w;
+  return lit / float(count);
 }
 
 float ambient_light() {
@@ -74,11 +71,11 @@ vec3 fogged(vec3 colour, vec3 p) {
 }
 
 // A surface of the given colour; gloss 1 is a clear coat that mirrors the sky.
-vec3 shaded(vec3 albedo, vec3 n, vec3 p, float gloss) {
+vec3 shaded(vec3 albedo, vec3 n, vec3 p, float gloss, float most_taps) {
   vec3 to_eye = -normalize(p);
   float open = ambient_light();
   float facing = dot(n, sun.xyz);
-  float lit = facing > 0.0 ? sunlight(p, n) : 0.0;
+  float lit = facing > 0.0 ? sunlight(p, n, most_taps) : 0.0;
   vec3 ambient = mix(kBounce, kSkyLight, 0.5 + 0.5 * n.y) * open;
   vec3 colour = albedo * (ambient + kSun * max(facing, 0.0) * lit);
   float grazing = 1.0 - max(dot(n, to_eye), 0.0);

@@ -25,12 +25,12 @@ void main() {
   float radius = occlusion.x;
   float reach = clamp(radius / pixel_size(length(p)), 1.0, viewport.y * 0.25);
   float turn = 6.2831853 * fract(52.9829189 * fract(dot(vec2(pixel & 3), vec2(0.7548777, 0.5698403))));
+  mat2 turned = mat2(cos(turn), sin(turn), -sin(turn), cos(turn));
   float samples = occlusion.y;
   float sum = 0.0;
   for (int i = 0; i < int(samples); ++i) {
     float r = (float(i) + 0.5) / samples;
-    float a = float(i) * 2.3999632 + turn;
-    ivec2 other = pixel + ivec2(r * reach * vec2(cos(a), sin(a)));
+    ivec2 other = pixel + ivec2(r * reach * (turned * taps[i].xy));
     if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, ivec2(viewport.xy)))) continue;
     vec3 v = position(other) - p;
     float vv = dot(v, v), vn = dot(v, n);

@@ -59,7 +59,9 @@ void main() {
     float facing = max(dot(n, -direction), 0.15);
     base = pool_ball(rotate_back(orientation, n), base, pattern == 2, width / (ball.w * facing));
   }
-  result = vec4(shaded(base, n, p, 1.0), coverage);
+  // A ball of a few pixels has no room for the fine parts of its shade.
+  float taps_wanted = 4.0 + ball.w / width;
+  result = vec4(shaded(base, n, p, 1.0, taps_wanted), coverage);
 #else
   result = vec4(n, 1.0);
 #endif

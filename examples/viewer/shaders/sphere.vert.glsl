@@ -3,6 +3,12 @@ layout(location = 0) in vec4 place;  // centre, radius
 layout(location = 1) in vec4 turn;
 layout(location = 2) in vec4 paint;  // colour; w: pattern
 
+#ifdef SMOOTH_EDGES
+const float kMargin = 0.6;  // pixels, for the half of an edge that lies outside
+#else
+const float kMargin = 0.0;
+#endif
+
 flat out vec4 ball;
 flat out vec4 orientation;
 flat out vec4 colour;
@@ -30,7 +36,7 @@ void main() {
   // Before the front of the sphere, so that no fragment lies behind the quad.
   vec3 axis = place.xyz / d;
   float distance = max(d - radius, ray_z.w * 1.05);
-  float half_size = distance * radius / sqrt((d - radius) * (d + radius)) + 1.5 * pixel_size(distance);
+  float half_size = distance * radius / sqrt((d - radius) * (d + radius)) + kMargin * pixel_size(distance);
   vec3 side = normalize(abs(axis.y) < 0.9 ? cross(axis, vec3(0, 1, 0)) : cross(axis, vec3(1, 0, 0)));
   vec3 up = cross(side, axis);
   at = axis * distance + (side * corner.x + up * corner.y) * half_size;

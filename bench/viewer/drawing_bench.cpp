@@ -1,0 +1,183 @@
+/// What a picture of many balls costs, and which part of it: items made on the host, shadows,
+/// ambient occlusion, edges; from afar and near.
+#include <jfpx/error.hpp>
+
+#include "bench/world/samples.hpp"
+#include "examples/scenes/scenes.hpp"
+#include "examples/viewer/colours.hpp"
+#include "examples/viewer/renderer.hpp"
+#include "examples/viewer/stage.hpp"
+#include "examples/viewer/window.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <random>
+#include <string>
+#include <time.h>
+#include <vector>
+
+namespace jfpx::inline JFPX_ABI::bench {
+namespace {
+
+using namespace view;
+
+constexpr int kWidth = 1280, kHeight = 720;
+constexpr Real kRadius = Real(0.5);
+
+struct Variant {
+  const char* name;
+  Quality quality;
+};
+
+Quality medium_but(void (*change)(Quality&)) {
+  Quality quality = kMediumQuality;
+  change(quality);
+  return quality;
+}
+
+std::vector<Variant> variants() {
+  return {{"medium", kMediumQuality},
+          {"medium_without_shadows", medium_but([](Quality& q) { q.shadow_size = 0; })},
+          {"medium_without_occlusion", medium_but([](Quality& q) { q.occlusion_samples = 0; })},
+          {"medium_without_both",
+           medium_but([](Quality& q) { q.shadow_size = q.occlusion_samples = 0; })},
+          {"medium_with_one_sample", medium_but([](Quality& q) { q.samples = 1; })},
+          {"low", kLowQuality},
+          {"high", kHighQuality}};
+}
+
+/// Balls that lie in a wide box, some twelve deep, in an order that says nothing of their places.
+std::vector<Vec3> pile(std::size_t count, Real side) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> jitter(-0.2f, 0.2f);
+  const Real spacing = 2 * kRadius;
+  const auto row = static_cast<std::size_t>(side / spacing);
+  std::vector<Vec3> places;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto along = [&](std::size_t k) {
+      return (static_cast<Real>(k % row) + Real(0.5)) * spacing - side / 2 + jitter(random);
+    };
+    places.push_back({along(i), kRadius + static_cast<Real>(i / (row * row)) * spacing * Real(0.9),
+                      along(i / row)});
+  }
+  std::shuffle(places.begin(), places.end(), random);
+  return places;
+}
+
+class Gallery {
+ public:
+  /// Times pictures of a pile; `closeness` 1 has all of it in the picture.
+  void pictures(benchmark::State& state, const Quality& quality, std::size_t balls, Real closeness,
+                int width, int height) {
+    const Real side = 2 * std::cbrt(static_cast<Real>(balls));
+    Camera camera;
+    camera.look_at(Vec3{side * Real(0.9), side * Real(0.75), side * Real(1.35)} * (1 / closeness),
+                   {0, side / 10, 0});
+    const View view = camera.view({0, side / 10, 0}, side);
+    Drawing drawing(view.eye);
+    drawing.set_bounds({0, side / 10, 0}, side);
+    drawing.set_detail(2 * kRadius);
+    drawing.add_ground({0, 1, 0}, 0, 10 * kRadius, {124, 130, 138});
+    std::uint32_t number = 0;
+    for (const Vec3& place : pile(balls, side)) {
+      drawing.add_sphere(place, kRadius, {}, ball_paint(number++));
+    }
+    renderer_.set_quality(quality);
+    std::vector<double> ms;
+    const auto draw = [&] {
+      return milliseconds_of([&] {
+        renderer_.draw(drawing, view, {0, 0, width, height}, canvas_.framebuffer());
+        glFinish();
+      });
+    };
+    draw();  // makes buffers
+    for (auto _ : state) {
+      ms.push_back(draw());
+      state.SetIterationTime(ms.back() * 1e-3);
+    }
+    state.counters["median_ms"] = median(ms);
+  }
+  std::string driver() const { return window_.driver(); }
+
+ private:
+  /// Wall clock; where processors draw, their time, which other work on the machine lengthens less.
+  template <class Call>
+  double milliseconds_of(const Call& call) const {
+    const auto now = [this] {
+      timespec time{};
+      clock_gettime(software_ ? CLOCK_PROCESS_CPUTIME_ID : CLOCK_MONOTONIC, &time);
+      return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+    };
+    const double start = now();
+    call();
+    return now() - start;
+  }
+
+  Window window_ = Window::hidden();
+  bool software_ = window_.driver().find("llvmpipe") != std::string::npos;
+  Renderer renderer_;
+  Canvas canvas_{kWidth, kHeight};
+};
+
+/// The host's part of a picture of a run.
+void items(benchmark::State& state, std::uint32_t balls) {
+  const Scene scene = scenes::make("gas", {.spheres = balls, .seed = 1});
+  const Stage stage(scene);
+  Moment moment;
+  for (const BodyDef& body : scene.bodies) {
+    moment.states.push_back({body.position, body.orientation, {}, {}});
+  }
+  moment.awake.assign(scene.bodies.size(), 1);
+  for (auto _ : state) {
+    Drawing drawing({0, 0, 100});
+    stage.draw(moment, moment, Real(0.5), Colouring::bodies, &drawing);
+    benchmark::DoNotOptimize(drawing.spheres().data());
+  }
+}
+
+void register_all(Gallery* gallery) {
+  for (const std::uint32_t balls : {10000u, 100000u}) {
+    benchmark::RegisterBenchmark(("drawing/items/" + std::to_string(balls)).c_str(),
+                                 [=](benchmark::State& state) { items(state, balls); })
+        ->Unit(benchmark::kMillisecond);
+    if (gallery == nullptr) continue;
+    // A stamp: hardly any pixels, so what remains is the cost of the spheres themselves.
+    benchmark::RegisterBenchmark(("drawing/stamp/" + std::to_string(balls)).c_str(),
+                                 [=](benchmark::State& state) {
+                                   gallery->pictures(
+                                       state, medium_but([](Quality& q) { q.shadow_size = 0; }),
+                                       balls, 1, 32, 18);
+                                 })
+        ->UseManualTime()
+        ->Unit(benchmark::kMillisecond);
+    for (const Variant& variant : variants()) {
+      for (const auto& [from, closeness] : {std::pair("afar", Real(1)), {"near", Real(4)}}) {
+        const std::string name =
+            std::string("drawing/") + from + "/" + std::to_string(balls) + "/" + variant.name;
+        benchmark::RegisterBenchmark(name.c_str(),
+                                     [=](benchmark::State& state) {
+                                       gallery->pictures(state, variant.quality, balls, closeness,
+                                                         kWidth, kHeight);
+                                     })
+            ->UseManualTime()
+            ->Unit(benchmark::kMillisecond);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace jfpx::inline JFPX_ABI::bench
+
+int main(int argc, char** argv) {
+  std::unique_ptr<jfpx::bench::Gallery> gallery;
+  try {
+    gallery = std::make_unique<jfpx::bench::Gallery>();
+    benchmark::AddCustomContext("pictures", "1280 x 720 by " + gallery->driver());
+  } catch (const jfpx::BackendUnavailable& error) {
+    benchmark::AddCustomContext("pictures", std::string("none: ") + error.what());
+  }
+  jfpx::bench::register_all(gallery.get());
+  return jfpx::bench::run_benchmarks(argc, argv);
+}
