@@ -54,6 +54,8 @@ class Drawing {
  public:
   explicit Drawing(const Vec3& eye) : eye_(eye) {}
 
+  /// Room for so many spheres in all, so that adding them is cheap.
+  void reserve_spheres(std::size_t count) { spheres_.reserve(count); }
   void add_sphere(const Vec3& centre, Real radius, const Quat& turn, Paint paint);
   void add_box(const Vec3& centre, const Vec3& half_extents, const Quat& turn, Paint paint);
   void add_line(const Vec3& from, const Vec3& to, Paint paint, float width,

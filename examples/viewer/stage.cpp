@@ -186,6 +186,7 @@ void Stage::draw(const Moment& from, const Moment& to, Real share, Colouring col
   drawing->set_detail(body_size_ * Real(1.6));
   draw_still(bounds, drawing);
   const std::vector<Paint> told = told_paints(scene_, to, colouring);
+  drawing->reserve_spheres(scene_.bodies.size());
   for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
     const BodyDef& def = scene_.bodies[i];
     const bool still = !movable(def);
