@@ -14,21 +14,23 @@ struct RayEntry {
 };
 
 /// The chord is found from the centre's distance to the line, not from the difference of two large
-/// squares, so that small spheres far away are hit where they are.
+/// squares, so that small spheres far away are hit where they are; and in radii, for the square of
+/// a small one may not be a number of Reals.
 JFPX_HD inline RayEntry enter(const Vec3& origin, const Vec3& direction,
                               const SphereInstance& sphere) {
+  const Real r = sphere.radius;
   const Vec3 from_centre = origin - sphere.centre;
-  const Real r2 = sphere.radius * sphere.radius;
-  if (!(length_squared(from_centre) > r2)) return {true, 0, -direction};
+  if (!(length_squared(from_centre) > r * r)) return {true, 0, -direction};
   const Real ahead = -dot(from_centre, direction);
   if (!(ahead > 0)) return {};
   const Vec3 beside = add_scaled(from_centre, direction, ahead);
-  const Real half_chord2 = r2 - length_squared(beside);
+  const Vec3 in_radii{beside.x / r, beside.y / r, beside.z / r};
+  const Real half_chord2 = 1 - length_squared(in_radii);
   if (!(half_chord2 >= 0)) return {};
   const Real half_chord = square_root(half_chord2);
-  const Real distance = ahead - half_chord;
+  const Real distance = ahead - half_chord * r;
   return {true, distance > 0 ? distance : Real(0),
-          normalized(add_scaled(beside, direction, -half_chord))};
+          normalized(add_scaled(in_radii, direction, -half_chord))};
 }
 
 /// The part of the ray between each pair of faces (Kay and Kajiya 1986). Through an edge, the face

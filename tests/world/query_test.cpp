@@ -201,6 +201,25 @@ TEST(RayCast, GivesDistancePointAndNormal) {
   EXPECT_EQ(hits[2], (RayHit{world.bodies()[0], 20, {20, 0.5_r, 0}, {-1, 0, 0}}));
 }
 
+/// Half a radius beside the centre the normal is (-sqrt(3)/2, 1/2, 0), however small the radius and
+/// its square are.
+TEST(RayCast, SmallSpheresHaveUnitNormalsAndAreHitWhereTheyAre) {
+  const Real least = std::numeric_limits<Real>::denorm_min();
+  for (const Real radius : {kEpsilon, kEpsilon / 2, 1e-9_r, 1e-20_r, 4096 * least, 4 * least}) {
+    Scene scene;
+    scene.bodies = {test::ball({0, 0, 0}, radius, 0)};
+    const World world(scene);
+    const auto hit = world.cast_ray({{-1, radius / 2, 0}, {1, 0, 0}});
+    ASSERT_TRUE(hit) << radius;
+    EXPECT_NEAR(hit->normal.x, -square_root(0.75_r), 1e-6) << radius;
+    EXPECT_NEAR(hit->normal.y, 0.5, 1e-6) << radius;
+    EXPECT_EQ(hit->normal.z, 0) << radius;
+    EXPECT_NEAR(hit->distance, 1, 1e-6) << radius;
+    EXPECT_EQ(world.cast_ray({{-1, 0, 0}, {1, 0, 0}})->normal, (Vec3{-1, 0, 0})) << radius;
+    EXPECT_FALSE(world.cast_ray({{-1, radius * 1.25_r, 0}, {1, 0, 0}})) << radius;
+  }
+}
+
 TEST(RayCast, EndsAtItsMaximumDistanceInclusive) {
   const World world = three_in_a_row();
   EXPECT_FALSE(world.cast_ray({{0, 0, 0}, {1, 0, 0}, 3.99_r}));
