@@ -1,25 +1,35 @@
-"""jfpx for Conan 2: conan create packaging/conan"""
+"""jfpx for Conan 2: conan create packaging/conan -s compiler.cppstd=20"""
 import os
+import re
 
 from conan import ConanFile
+from conan.errors import ConanInvalidConfiguration
 from conan.tools.build import check_min_cppstd
 from conan.tools.cmake import CMake, CMakeDeps, CMakeToolchain, cmake_layout
-from conan.tools.files import copy
+from conan.tools.files import copy, load
 
 
 class Jfpx(ConanFile):
     name = "jfpx"
-    version = "0.1.0"
     license = "Zlib"
     description = "Rigid-body collision with the same bits on x86, on CUDA and inside Bullet"
+    topics = ("physics", "collision-detection", "deterministic", "cuda")
+    package_type = "library"
     settings = "os", "arch", "compiler", "build_type"
     options = {"shared": [True, False], "cuda": [True, False]}
     default_options = {"shared": False, "cuda": False}
 
+    @property
+    def _root(self):  # the recipe lies inside the sources that it builds
+        return os.path.join(self.recipe_folder, "..", "..")
+
+    def set_version(self):
+        text = load(self, os.path.join(self._root, "CMakeLists.txt"))
+        self.version = re.search(r"project\(jfpx VERSION ([0-9.]+)", text).group(1)
+
     def export_sources(self):
-        root = os.path.join(self.recipe_folder, "..", "..")
         for pattern in ("CMakeLists.txt", "LICENSE", "README.md", "CHANGELOG.md", "cmake/*", "include/*", "src/*"):
-            copy(self, pattern, root, self.export_sources_folder)
+            copy(self, pattern, self._root, self.export_sources_folder)
 
     def layout(self):
         cmake_layout(self)
@@ -29,14 +39,18 @@ class Jfpx(ConanFile):
 
     def validate(self):
         check_min_cppstd(self, 20)
+        if self.settings.os != "Linux" or self.settings.arch != "x86_64":
+            raise ConanInvalidConfiguration("jfpx has been tried on x86-64 Linux only")
 
     def generate(self):
         CMakeDeps(self).generate()
         toolchain = CMakeToolchain(self)
         toolchain.cache_variables["JFPX_CUDA"] = "ON" if self.options.cuda else "OFF"
         toolchain.cache_variables["JFPX_BULLET"] = "OFF"
-        for part in ("VIEWER", "TOOL", "EXAMPLES", "TESTS"):
-            toolchain.cache_variables[f"JFPX_{part}"] = "OFF"
+        toolchain.cache_variables["JFPX_VIEWER"] = "OFF"
+        toolchain.cache_variables["JFPX_TOOL"] = "OFF"
+        toolchain.cache_variables["JFPX_EXAMPLES"] = "OFF"
+        toolchain.cache_variables["JFPX_TESTS"] = "OFF"
         toolchain.generate()
 
     def build(self):
@@ -46,6 +60,7 @@ class Jfpx(ConanFile):
 
     def package(self):
         CMake(self).install()
+        copy(self, "LICENSE", self.source_folder, os.path.join(self.package_folder, "licenses"))
 
     def package_info(self):
         # The package's own CMake files say more than Conan could: exact flags, both precisions.

@@ -21,3 +21,7 @@ jfpx_add_install_test(mismatch Install.RefusesProgramsOfOtherHeaders)
 jfpx_add_install_test(symbols Install.ExportsOwnSymbolsOnly)
 jfpx_add_install_test(subproject Install.LeavesOtherProjectsAlone)
 jfpx_add_install_test(debian Install.DebianPackagesServeToo)
+
+# What package managers build from.
+add_test(NAME Install.RecipesFitTheProject COMMAND ${CMAKE_COMMAND}
+  -DSOURCE_DIR=${PROJECT_SOURCE_DIR} -DWORK_DIR=${PROJECT_BINARY_DIR}/recipes-test -P ${CMAKE_CURRENT_SOURCE_DIR}/install/recipes.cmake)
