@@ -71,4 +71,8 @@ function(_jfpx_configure target suffix public private)
   set_target_properties(${target} PROPERTIES
     CXX_EXTENSIONS OFF CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON
     CUDA_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
+  # Tools that read sources (clangd, clang-tidy) shall read each once.
+  if(suffix)
+    set_target_properties(${target} PROPERTIES EXPORT_COMPILE_COMMANDS OFF)
+  endif()
 endfunction()

@@ -169,8 +169,8 @@ void read_shape(const Json& json, const std::string& where, std::variant<Shapes.
   ObjectReader object(json, where);
   std::string type;
   object.required("type", type);
-  const auto read_if = [&]<class T>(T value) {
-    if (type != kTypeName<T>) return false;
+  const auto read_if = [&](auto value) {
+    if (type != kTypeName<decltype(value)>) return false;
     read_fields(&object, &value);
     *shape = std::move(value);
     return true;

@@ -21,8 +21,9 @@ constexpr int kMaxIterations = 1000;
 class Cores {
  public:
   explicit Cores(const SphereBoxInput& input)
-      : half_(input.core), sphere_first_(input.sphere_first) {
-    offset_ = (input.pose_a.getOrigin() + input.pose_b.getOrigin()) * btScalar(0.5);
+      : half_(input.core),
+        offset_((input.pose_a.getOrigin() + input.pose_b.getOrigin()) * btScalar(0.5)),
+        sphere_first_(input.sphere_first) {
     btTransform a = input.pose_a, b = input.pose_b;
     a.getOrigin() -= offset_;
     b.getOrigin() -= offset_;
