@@ -98,7 +98,7 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
   for (std::size_t i = first; i < last; ++i) {
     if (i + kManifoldsAhead < last) {
       prefetch_header(manifolds[i + kManifoldsAhead]);
-      __builtin_prefetch(&manifolds[i + kManifoldsAhead]->getContactPoint(0).m_distance1);
+      prefetch(&manifolds[i + kManifoldsAhead]->getContactPoint(0).m_distance1);
     }
     if (i + kObjectsAhead < last) {
       prefetch_island_state(manifolds[i + kObjectsAhead]->getBody0());

@@ -87,8 +87,8 @@ void number_and_unite(btCollisionWorld& world, btUnionFind* unions) {
   const btBroadphasePair* pair = cache->getOverlappingPairArrayPtr();
   for (int i = 0; i < pairs; ++i) {
     if (i + 2 * kObjectsAhead < pairs) {
-      __builtin_prefetch(pair[i + 2 * kObjectsAhead].m_pProxy0);
-      __builtin_prefetch(pair[i + 2 * kObjectsAhead].m_pProxy1);
+      prefetch(pair[i + 2 * kObjectsAhead].m_pProxy0);
+      prefetch(pair[i + 2 * kObjectsAhead].m_pProxy1);
     }
     if (i + kObjectsAhead < pairs) {
       prefetch_island_state(object_of(pair[i + kObjectsAhead].m_pProxy0));

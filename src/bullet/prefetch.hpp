@@ -1,7 +1,7 @@
-/// Asking for memory in time: bodies, algorithms and manifolds lie anywhere.
+/// What to ask for in time: bodies, algorithms and manifolds lie anywhere.
 #pragma once
 
-#include <jfpx/config.hpp>
+#include "src/prefetch.hpp"
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
@@ -10,8 +10,6 @@
 #include <cstdint>
 
 namespace jfpx::inline JFPX_ABI::bullet {
-
-inline void prefetch(const void* address) { __builtin_prefetch(address); }
 
 /// Some bytes behind an address that may be null or of something that has gone: there, arithmetic
 /// with pointers is undefined.

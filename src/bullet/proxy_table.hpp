@@ -1,7 +1,7 @@
 /// Numbers the broadphase proxies that a list of pairs names, and keeps the numbers while it does.
 #pragma once
 
-#include <jfpx/config.hpp>
+#include "src/prefetch.hpp"
 
 #include <bit>
 #include <cstdint>
@@ -36,9 +36,7 @@ class ProxyTable {
 
   /// Brings the proxy's place into the cache. Lookups are as random as the pairs, and a table of
   /// some thousand proxies is larger than the first-level cache.
-  void prefetch(const btBroadphaseProxy* proxy) const {
-    __builtin_prefetch(&entries_[home(proxy)]);
-  }
+  void prefetch(const btBroadphaseProxy* proxy) const { jfpx::prefetch(&entries_[home(proxy)]); }
 
   /// The number of the proxy, which has one user more; a new one gets the next number.
   std::uint32_t acquire(btBroadphaseProxy* proxy) {
