@@ -1,4 +1,4 @@
-/// One pass over the pairs: most need no more than a look at the number of points.
+/// Most pairs need no more than a look at the number of points; the others are visited.
 #include "src/bullet/quiet_commit.hpp"
 
 #include "src/bullet/contact_point.hpp"
@@ -8,7 +8,9 @@
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
+#include <ranges>
 #include <typeinfo>
 #include <utility>
 
@@ -29,38 +31,59 @@ class Committer {
 
   /// Writes the pairs that are left to Bullet to `left` and returns their number.
   std::size_t run(std::uint32_t* left) {
+    const std::span<const std::uint32_t> visits = find_visits();
+    counts_.sphere_pairs += end_ - begin_ - visits.size();
     std::size_t count = 0;
-    for (std::size_t i = begin_; i < std::min(end_, begin_ + kCountAhead); ++i) ask_for_count(i);
-    for (std::ptrdiff_t k = 0; k < kContactsAhead; ++k) ask_for_contact(k);
-    for (std::size_t i = begin_; i < end_; ++i) {
-      if (i + kCountAhead < end_) ask_for_count(i + kCountAhead);
-      const PairContact* contact = nullptr;
-      if (next_ != last_ && next_->pair == i) {
-        ask_for_contact(kContactsAhead);
-        contact = next_++;
-      }
-      if (!commit(i, contact)) left[count++] = static_cast<std::uint32_t>(i);
+    for (std::size_t k = 0; k < std::min(visits.size(), kVisitsAhead); ++k) ask_for(visits[k]);
+    for (std::size_t k = 0; k < visits.size(); ++k) {
+      if (k + kVisitsAhead < visits.size()) ask_for(visits[k + kVisitsAhead]);
+      const std::uint32_t i = visits[k];
+      const bool touch = next_ != last_ && next_->pair == i;
+      if (!commit(i, touch ? next_++ : nullptr)) left[count++] = i;
     }
     return count;
   }
   const CommitCounts& counts() const { return counts_; }
 
  private:
-  /// Most pairs take a nanosecond or two, and memory some hundred.
-  static constexpr std::size_t kCountAhead = 64;
-  /// Contacts take longer, and need half a dozen cache lines of their manifold.
-  static constexpr std::ptrdiff_t kContactsAhead = 10;
+  /// A look takes a nanosecond, memory some hundred.
+  static constexpr std::size_t kCountsAhead = 128;
+  /// Visits take longer, and need a dozen cache lines each.
+  static constexpr std::size_t kVisitsAhead = 10;
 
-  void ask_for_count(std::size_t i) const {
-    if (batch_.kind(i) != PairKind::other) prefetch_count(batch_.manifold(i));
+  /// The pairs that need more than a look at the number of their manifold's points: those that
+  /// touch or have touched, and all that are not of two spheres. None can do with less, for Bullet
+  /// would also clear points that a user has put there. The loop does nothing else, so that memory
+  /// alone limits it.
+  std::span<const std::uint32_t> find_visits() {
+    std::size_t count = 0;
+    for (std::size_t i = begin_; i < std::min(end_, begin_ + kCountsAhead); ++i) ask_for_count(i);
+    for (std::size_t i = begin_; i < end_; ++i) {
+      if (i + kCountsAhead < end_) ask_for_count(i + kCountsAhead);
+      found_[count] = static_cast<std::uint32_t>(i);
+      const bool enough =
+          batch_.kind(i) == PairKind::spheres && batch_.manifold(i)->getNumContacts() == 0;
+      count += enough ? 0 : 1;
+    }
+    const std::span touching(next_, first_contact({next_, last_}, end_));
+    const auto merged = std::ranges::set_union(std::span(found_).first(count),
+                                               touching | std::views::transform(&PairContact::pair),
+                                               visits_.begin());
+    return {visits_.begin(), merged.out};
   }
-  /// For the contact `k` behind the next one.
-  void ask_for_contact(std::ptrdiff_t k) const {
-    if (last_ - next_ <= k || batch_.kind(next_[k].pair) != PairKind::spheres) return;
-    const std::size_t i = next_[k].pair;
+  void ask_for_count(std::size_t i) const {
+    if (batch_.kind(i) == PairKind::spheres) prefetch_count(batch_.manifold(i));
+  }
+  void ask_for(std::size_t i) const {
+    if (batch_.kind(i) == PairKind::other) return;
     prefetch_header(batch_.manifold(i));
     prefetch_first_point(batch_.manifold(i));
-    batch_.prefetch_states(i);
+    if (batch_.kind(i) == PairKind::spheres) {
+      batch_.prefetch_states(i);
+    } else {
+      prefetch_for_contact(*batch_.body_a(i));
+      prefetch_for_contact(*batch_.body_b(i));
+    }
   }
 
   /// `contact` is null if the spheres do not touch. False if the pair is left to Bullet.
@@ -84,10 +107,6 @@ class Committer {
 
   bool commit_spheres(std::size_t i, const PairContact* contact) {
     btPersistentManifold* manifold = batch_.manifold(i);
-    if (contact == nullptr && manifold->getNumContacts() == 0) {
-      ++counts_.sphere_pairs;
-      return true;
-    }
     if (!batch_.both_are_spheres(i)) return false;  // the shape was exchanged under the algorithm
     count_pair(contact);
     const unsigned traits = batch_.either_trait(i);
@@ -134,6 +153,7 @@ class Committer {
   const SphereBatch& batch_;
   const PairContact *next_, *last_;
   std::size_t begin_, end_;
+  std::array<std::uint32_t, kPairChunk> found_, visits_;
   CommitCounts counts_;
 };
 
