@@ -48,10 +48,6 @@ btPersistentManifold* manifold_of(btCollisionAlgorithm* algorithm) {
   return found.size() == 1 ? found[0] : nullptr;
 }
 
-std::uint64_t hash_of(const btPersistentManifold* manifold) {
-  return reinterpret_cast<std::uintptr_t>(manifold) * 0x9e3779b97f4a7c15u;
-}
-
 }  // namespace
 
 void PairMirror::forget(const btPersistentManifold* manifold) noexcept {
@@ -87,21 +83,34 @@ void PairMirror::resize(std::size_t pairs) {
   changed_counts_.resize((pairs + kPairChunk - 1) / kPairChunk);
 }
 
-/// Makes was_released() fast: 16 bits or more a manifold, one of them set.
+/// Makes was_released() fast: a Bloom filter of 32 bits or more a manifold, two of them set. One in
+/// some hundred other manifolds has both set too; with one bit it would be one in some ten, and to
+/// read their links again cost more than everything else about releases.
 void PairMirror::sort_releases() {
   if (released_.empty()) return;
-  const std::size_t bits = std::bit_ceil(std::max<std::size_t>(1024, 16 * released_.size()));
+  const std::size_t bits = std::bit_ceil(std::max<std::size_t>(1024, 32 * released_.size()));
   release_shift_ = 64 - std::countr_zero(bits);
   release_bits_.assign(bits / 64, 0);
   for (const btPersistentManifold* manifold : released_) {
-    const std::uint64_t bit = hash_of(manifold) >> release_shift_;
-    release_bits_[bit / 64] |= std::uint64_t{1} << (bit % 64);
+    for (const std::uint64_t bit : release_bits_of(manifold)) {
+      release_bits_[bit / 64] |= std::uint64_t{1} << (bit % 64);
+    }
   }
 }
 
+/// The highest bits of a hash, and those that follow.
+std::array<std::uint64_t, 2> PairMirror::release_bits_of(
+    const btPersistentManifold* manifold) const {
+  const std::uint64_t hash = reinterpret_cast<std::uintptr_t>(manifold) * 0x9e3779b97f4a7c15u;
+  return {hash >> release_shift_, hash << (64 - release_shift_) >> release_shift_};
+}
+
 bool PairMirror::was_released(const btPersistentManifold* manifold) const {
-  const std::uint64_t bit = hash_of(manifold) >> release_shift_;
-  return (release_bits_[bit / 64] >> (bit % 64) & 1) != 0;
+  const auto is_set = [&](std::uint64_t bit) {
+    return (release_bits_[bit / 64] >> (bit % 64) & 1) != 0;
+  };
+  const auto [first, second] = release_bits_of(manifold);
+  return is_set(first) && is_set(second);
 }
 
 std::size_t PairMirror::find_changed(std::span<const btBroadphasePair> pairs, std::size_t begin,

@@ -10,6 +10,7 @@
 #include <BulletCollision/BroadphaseCollision/btCollisionAlgorithm.h>
 #include <BulletCollision/BroadphaseCollision/btDispatcher.h>
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -89,6 +90,7 @@ class PairMirror {
   void resize(std::size_t pairs);
   void clear();
   void sort_releases();
+  std::array<std::uint64_t, 2> release_bits_of(const btPersistentManifold* manifold) const;
   bool was_released(const btPersistentManifold* manifold) const;
   std::size_t find_changed(std::span<const btBroadphasePair> pairs, std::size_t begin,
                            std::size_t end, std::uint32_t* changed) const;
