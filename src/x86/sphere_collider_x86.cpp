@@ -8,8 +8,10 @@
 #include "src/x86/cell_sweep.hpp"
 #include "src/x86/contact_writer.hpp"
 #include "src/x86/cpu.hpp"
+#include "src/x86/pair_filter.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace jfpx::inline JFPX_ABI::x86 {
 namespace {
@@ -45,10 +47,14 @@ class SphereColliderX86 final : public SphereCollider {
     results_.reserve(pairs.size(), "pair results");
     pool_.run(chunks_of(pairs), [&](std::size_t chunk) {
       PairResult* out = results_.data() + chunk * kPairChunk;
-      for_each_pair(spheres, pairs, chunk,
-                    [&](const SphereInstance& a, const SphereInstance& b, std::size_t) {
-                      *out++ = shared::test_sphere_pair(a, b);
-                    });
+      constexpr std::size_t kAhead = 12;  // spheres come from anywhere: ask for them in time
+      const std::span<const SpherePair> part = chunk_of(spheres, pairs, chunk);
+      for (std::size_t i = 0; i < part.size(); ++i) {
+        const SpherePair later = part[std::min(i + kAhead, part.size() - 1)];
+        __builtin_prefetch(&spheres[later.a]);
+        __builtin_prefetch(&spheres[later.b]);
+        *out++ = shared::test_sphere_pair(spheres[part[i].a], spheres[part[i].b]);
+      }
     });
     return {results_.data(), pairs.size()};
   }
@@ -64,12 +70,16 @@ class SphereColliderX86 final : public SphereCollider {
     pool_.run(touching_counts_.size(), [&](std::size_t chunk) {
       PairContact* const begin = touching_.data() + (gaps ? chunk * kPairChunk : total);
       PairContact* out = begin;
-      for_each_pair(spheres, pairs, chunk,
-                    [&](const SphereInstance& a, const SphereInstance& b, std::size_t i) {
-                      const bool touch = shared::find_sphere_contact(a, b, out);
-                      out->pair = static_cast<std::uint32_t>(i);
-                      out += touch ? 1 : 0;
-                    });
+      const std::span<const SpherePair> part = chunk_of(spheres, pairs, chunk);
+      std::array<std::uint32_t, kPairChunk> candidates;
+      const std::size_t count =
+          find_candidates(spheres.data(), part.data(), part.size(), candidates.data());
+      for (std::size_t k = 0; k < count; ++k) {
+        const SpherePair pair = part[candidates[k]];
+        const bool touch = shared::find_sphere_contact(spheres[pair.a], spheres[pair.b], out);
+        out->pair = static_cast<std::uint32_t>(chunk * kPairChunk + candidates[k]);
+        out += touch ? 1 : 0;
+      }
       touching_counts_[chunk] = static_cast<std::size_t>(out - begin);
       if (!gaps) total += touching_counts_[chunk];
     });
@@ -90,22 +100,15 @@ class SphereColliderX86 final : public SphereCollider {
   static std::size_t chunks_of(std::span<const SpherePair> pairs) {
     return (pairs.size() + kPairChunk - 1) / kPairChunk;
   }
-  /// Calls test(sphere a, sphere b, i) for the pairs of a chunk.
-  template <class Test>
-  static void for_each_pair(std::span<const SphereInstance> spheres,
-                            std::span<const SpherePair> pairs, std::size_t chunk,
-                            const Test& test) {
+  /// The pairs of a chunk, checked.
+  static std::span<const SpherePair> chunk_of(std::span<const SphereInstance> spheres,
+                                              std::span<const SpherePair> pairs,
+                                              std::size_t chunk) {
     const std::size_t begin = chunk * kPairChunk, end = std::min(pairs.size(), begin + kPairChunk);
     SphereIndex largest = 0;
     for (std::size_t i = begin; i < end; ++i) largest = std::max({largest, pairs[i].a, pairs[i].b});
     if (largest >= spheres.size()) shared::reject_pair(pairs, spheres.size());
-    constexpr std::size_t kAhead = 12;  // spheres come from anywhere: ask for them in time
-    for (std::size_t i = begin; i < end; ++i) {
-      const SpherePair& later = pairs[std::min(i + kAhead, end - 1)];
-      __builtin_prefetch(&spheres[later.a]);
-      __builtin_prefetch(&spheres[later.b]);
-      test(spheres[pairs[i].a], spheres[pairs[i].b], i);
-    }
+    return pairs.subspan(begin, end - begin);
   }
 
   void find_all_pairs(std::span<const SphereInstance> spheres) {
