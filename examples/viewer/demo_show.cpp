@@ -80,6 +80,7 @@ void draw_demo(const demos::View& from, const demos::View& to, Real share, Drawi
     }
   }
   for (const demos::Line& line : to.lines) {
+    if (line.from.y == 0 && line.to.y == 0) continue;  // the ground has a grid of its own
     drawing->add_line(line.from, line.to, paint_of(line.colour, false), 1.5f, 160);
   }
 }

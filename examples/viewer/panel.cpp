@@ -187,8 +187,10 @@ void SceneShow::show_counters() {
     for (std::size_t i = first; i < history.size(); ++i) {
       values[i - first] = static_cast<float>(history[i].times.*field);
     }
-    ImGui::PlotLines(name, values.data(), static_cast<int>(values.size()), 0,
-                     fmt::format("{:.3f} ms", now.times.*field).c_str(), 0, FLT_MAX, {170, 26});
+    // What stands behind ### keeps the plot the same one while its label changes.
+    const std::string label = fmt::format("{:.3f} ms {}###{}", now.times.*field, name, name);
+    ImGui::PlotLines(label.c_str(), values.data(), static_cast<int>(values.size()), 0, nullptr, 0,
+                     FLT_MAX, {170, 26});
   }
   int telling = static_cast<int>(colouring);
   if (ImGui::Combo("colours", &telling, kColouringNames,

@@ -28,6 +28,7 @@ constexpr std::size_t kTraced = 6;     // bodies whose paths are drawn
 constexpr std::size_t kTrail = 240;    // steps of a path
 constexpr std::size_t kPlotted = 600;  // steps of a plot
 constexpr std::size_t kTimed = 60;     // steps whose median time is shown
+constexpr float kWideColumn = 260;     // pixels that have room for large titles
 constexpr float kStrip = 0.26f;        // share of the height below the pictures
 
 bullet::SceneWorld make_stock_world(const Scene& scene) {
@@ -213,15 +214,16 @@ void SideBySide::draw_texts(const Target& target, int top_height) const {
   const float scale = ImGui::GetIO().DisplaySize.x / static_cast<float>(target.width);
   const float width = static_cast<float>(target.width) * scale / 3;
   const float line = ImGui::GetTextLineHeightWithSpacing();
+  const float title = ImGui::GetFontSize() * (width > kWideColumn ? 2 : 1);
   for (std::size_t column = 0; column < kColumns; ++column) {
     const float left = width * static_cast<float>(column);
     const auto& times = trio_->times[column];
     const std::string count =
         fmt::format("{} contacts, {:.2f} ms a step", trio_->now[column].contacts.size(),
                     median({times.begin(), times.end()}));
-    list->AddRectFilled({left, 0}, {left + width, 2 * line + 8}, dark);
-    list->AddText({left + kMargin, 6}, IM_COL32_WHITE, kTitles[column]);
-    list->AddText({left + kMargin, 6 + line}, IM_COL32(200, 212, 226, 255), count.c_str());
+    list->AddRectFilled({left, 0}, {left + width, title + line + 13}, dark);
+    list->AddText(ImGui::GetFont(), title, {left + kMargin, 6}, IM_COL32_WHITE, kTitles[column]);
+    list->AddText({left + kMargin, 11 + title}, IM_COL32(200, 212, 226, 255), count.c_str());
     if (column == 0) continue;
     list->AddLine({left, 0}, {left, static_cast<float>(top_height) * scale}, dark, 3);
   }
@@ -238,12 +240,17 @@ void SideBySide::draw_plots(const Target& target, int top_height) const {
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav);
   const ImVec4 verdict = same() ? ImVec4{0.45f, 0.95f, 0.55f, 1} : ImVec4{1, 0.2f, 0.15f, 1};
   ImGui::TextColored(verdict, "%s", findings().c_str());
-  const float height = ImGui::GetContentRegionAvail().y;
+  const float height =
+      std::max(ImGui::GetContentRegionAvail().y - ImGui::GetFrameHeightWithSpacing(), 1.0f);
   const float width = (ImGui::GetContentRegionAvail().x - 16) / 3;
   const auto plot = [&](const char* id, const std::vector<float>& values, const std::string& text) {
     const std::size_t first = values.size() > kPlotted ? values.size() - kPlotted : 0;
-    ImGui::PlotLines(id, values.data() + first, static_cast<int>(values.size() - first), 0,
-                     text.c_str(), FLT_MAX, FLT_MAX, {width, height});
+    ImGui::BeginGroup();
+    ImGui::AlignTextToFramePadding();  // or the first stands higher than those on its line
+    ImGui::TextUnformatted(text.c_str());
+    ImGui::PlotLines(id, values.data() + first, static_cast<int>(values.size() - first), 0, nullptr,
+                     FLT_MAX, FLT_MAX, {width, height});
+    ImGui::EndGroup();
   };
   const auto& e = trio_->energies;
   plot("##native", e[kNative], fmt::format("energy, native: {:.4g} J", e[kNative].back()));
