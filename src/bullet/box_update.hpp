@@ -13,7 +13,7 @@ namespace jfpx::inline JFPX_ABI::bullet {
 
 /// In large worlds more than half of Bullet's update goes into finding again, one after the other,
 /// pairs that the hash table has since long: each takes several reads from memory.
-class BoxUpdate {
+class JFPX_API BoxUpdate {
  public:
   /// btCollisionWorld::updateAabbs(). False, and nothing is done, if the broadphase is not Bullet's
   /// own tree over Bullet's own hash table, as it is by default, if the user filters pairs, or if
