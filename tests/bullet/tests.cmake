@@ -1,5 +1,6 @@
 jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   bullet/contact_callbacks_test.cpp
+  bullet/device_traffic_test.cpp
   bullet/replaced_test.cpp
   bullet/mirror_test.cpp
   bullet/more_situations_test.cpp
