@@ -176,6 +176,26 @@ class App {
     tell("wrote " + name);
   }
 
+  /// What the command line asked for must be written, or the program ends; a key's wish is told to
+  /// have failed.
+  void write_pictures() {
+    const bool by_key = wanted_picture_ != options_.screenshot;
+    try {
+      if (!wanted_picture_.empty()) save_picture();
+    } catch (const FileError& error) {
+      if (!by_key) throw;
+      tell(error.what());
+    }
+    if (!recorder_.on()) return;
+    try {
+      recorder_.add(picture());
+    } catch (const FileError& error) {
+      recorder_ = Recorder("");
+      if (!options_.record.empty()) throw;
+      tell(error.what());
+    }
+  }
+
   void save_picture() {
     const std::string name = std::exchange(wanted_picture_, {});
     write_png(picture(), name);
@@ -201,8 +221,7 @@ class App {
     show_notice(seconds);
     ui_.end(0, width, height);
     timing_.add_picture(watch.lap() * 1e3);
-    if (recorder_.on()) recorder_.add(picture());
-    if (!wanted_picture_.empty()) save_picture();
+    write_pictures();
     window_.swap();
     grant_wishes();
   }

@@ -140,6 +140,74 @@ TEST(Controls, TheMouseTurnsBothAnglesAndAClickWithoutADragPicks) {  // erratum 
   EXPECT_EQ(camera.yaw(), yaw);
 }
 
+TEST(Controls, WheelAndShiftChangeTheWalkingSpeed) {
+  const auto walked = [](int wheel, bool shift) {
+    Controls controls;
+    controls.orbit = false;
+    Camera camera;
+    SDL_Event event{};
+    event.type = SDL_MOUSEWHEEL;
+    event.wheel.y = wheel;
+    controls.handle(event);
+    controls.move(&camera, 0.1, 1);
+    if (shift) controls.handle(key(SDLK_LSHIFT));
+    controls.handle(key(SDLK_w));
+    controls.move(&camera, 0.1, 1);
+    return length(camera.eye() - Camera().eye());
+  };
+  EXPECT_GT(walked(3, false), walked(0, false) * Real(1.9));  // 1.25^3
+  EXPECT_LT(walked(-3, false), walked(0, false) * Real(0.6));
+  EXPECT_NEAR(walked(0, true) / walked(0, false), 5, 1e-3);
+}
+
+TEST(Controls, DragAndWheelCircleTheFocusUnlessOneWalks) {
+  Controls controls;
+  Camera camera;
+  camera.look_at({0, 0, 10}, {});
+  controls.handle(mouse_button(SDL_MOUSEBUTTONDOWN));
+  controls.handle(mouse_move(80, 30));
+  controls.handle(mouse_button(SDL_MOUSEBUTTONUP));
+  controls.move(&camera, 0.1, 1);
+  EXPECT_GT(length(camera.eye() - Vec3{0, 0, 10}), 1);
+  EXPECT_NEAR(length(camera.focus()), 0, 1e-4);
+  SDL_Event event{};
+  event.type = SDL_MOUSEWHEEL;
+  event.wheel.y = 4;
+  controls.handle(event);
+  controls.move(&camera, 0.1, 1);
+  EXPECT_LT(length(camera.eye()), 7);  // 0.88^4
+  EXPECT_NEAR(length(camera.focus()), 0, 1e-4);
+}
+
+TEST(Controls, TheHelpNamesEveryKeyThatDoesSomething) {
+  std::string help = " ";
+  for (const KeyHelp& line : key_help()) {
+    help += std::string(line.keys) + " " + std::string(line.what) + " ";
+  }
+  std::replace_if(
+      help.begin(), help.end(), [](char c) { return c == ':' || c == ';'; }, ' ');
+  std::vector<SDL_Keycode> codes;
+  for (SDL_Keycode code = 1; code < 128; ++code) codes.push_back(code);
+  for (int code = 0; code < SDL_NUM_SCANCODES; ++code) {
+    codes.push_back(SDL_SCANCODE_TO_KEYCODE(code));
+  }
+  int meanings = 0;
+  for (const SDL_Keycode code : codes) {
+    if (code == SDLK_EQUALS) continue;  // the same key as +
+    Controls controls;
+    controls.orbit = false;
+    Camera camera;
+    controls.handle(key(code));
+    controls.move(&camera, 1, 1);
+    if (controls.take_commands().empty() && camera == Camera()) continue;
+    ++meanings;
+    std::string name = SDL_GetKeyName(code);
+    if (name == "Escape") name = "Esc";
+    EXPECT_NE(help.find(" " + name + " "), std::string::npos) << name;
+  }
+  EXPECT_GE(meanings, 27);
+}
+
 TEST(Camera, PitchStopsBeforeTheZenith) {
   Camera camera;
   camera.turn(0, 10);
@@ -636,6 +704,30 @@ TEST(Stage, PickFindsTheNearestMovableBody) {
   EXPECT_EQ(stage.pick(moment, {5, Real(0.99), 10}, {0, 0, -1}), 3u);
   EXPECT_EQ(stage.pick(moment, {5, Real(1.01), 10}, {0, 0, -1}), std::nullopt);
   EXPECT_EQ(stage.pick(moment, {0, 0, 10}, {0, 0, 1}), std::nullopt);  // all behind
+}
+
+TEST(Stage, DrawsBodiesBetweenTwoStepsAndSleepersDarker) {
+  const Scene scene = row_of_balls(3);
+  Moment from, to;
+  from.states.resize(3);
+  from.awake.assign(3, 1);
+  to = from;
+  from.states[0].position = {1, 2, 3};
+  to.states[0].position = {2, 4, 3};
+  to.states[0].orientation = {0, 0, 1, 0};  // half a turn about y
+  to.awake[1] = 0;
+  Drawing drawing({});
+  Stage(scene).draw(from, to, Real(0.25), Colouring::bodies, &drawing);
+  ASSERT_EQ(drawing.spheres().size(), 3u);
+  const SphereItem& moving = drawing.spheres()[0];
+  EXPECT_THAT(moving.centre, ElementsAre(1.25f, 2.5f, 3.0f));
+  // (3/4, 0, 1/4, 0), made a unit quaternion
+  EXPECT_NEAR(moving.turn[1], 1 / std::sqrt(10.0), 1e-6);
+  EXPECT_NEAR(moving.turn[3], 3 / std::sqrt(10.0), 1e-6);
+  Drawing awake({});
+  Stage(scene).draw(from, from, 1, Colouring::bodies, &awake);
+  EXPECT_LT(drawing.spheres()[1].paint.r, awake.spheres()[1].paint.r);
+  EXPECT_EQ(drawing.spheres()[0].paint, awake.spheres()[0].paint);
 }
 
 TEST(Stage, BoundsLeaveOutTheOneThatFlewAway) {

@@ -201,6 +201,21 @@ TEST_F(RendererTest, NothingIsDrawnTwiceAndEmptyPicturesAreSky) {
   EXPECT_GT(top[2] - top[0], bottom[2] - bottom[0]);
 }
 
+TEST_F(RendererTest, AnotherSizeLooksAsWithANewRenderer) {
+  const Vec3 eye{0, 1, 6};
+  const View view = view_of(eye, {}, 2);
+  Drawing drawing(eye);
+  drawing.set_bounds({}, 2);
+  drawing.add_sphere({}, 1, {}, {200, 40, 40, Pattern::striped_ball});
+  Renderer renderer(kMediumQuality);
+  for (const auto& [width, height] : {std::pair(120, 80), {48, 90}, {0, 0}, {0, 10}, {120, 80}}) {
+    const Canvas canvas(std::max(width, 1), std::max(height, 1));
+    renderer.draw(drawing, view, {0, 0, width, height}, canvas.framebuffer());
+    if (width == 0) continue;  // a minimised window
+    EXPECT_EQ(canvas.read().rgb, picture(drawing, view, width, height, kMediumQuality).rgb);
+  }
+}
+
 TEST_F(RendererTest, AHundredThousandSpheresTakeOneDraw) {
   const Vec3 eye{0, 0, 60};
   Drawing drawing(eye);

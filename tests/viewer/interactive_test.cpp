@@ -1,0 +1,144 @@
+/// The window as a user has it: keys, another size, the end; events come from SDL's queue.
+#include <jfpx/error.hpp>
+
+#include "examples/viewer/app.hpp"
+#include "examples/viewer/image.hpp"
+#include "examples/viewer/window.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <SDL.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <initializer_list>
+#include <utility>
+
+namespace jfpx {
+namespace {
+
+using namespace view;
+namespace fs = std::filesystem;
+
+constexpr Size kSize{160, 120};
+
+class Interactive : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    setenv("SDL_VIDEODRIVER", "offscreen", 1);
+    try {
+      (void)Window::hidden();
+    } catch (const BackendUnavailable& error) {
+      GTEST_SKIP() << error.what();
+    }
+    fs::current_path(folder.file(""));  // where pictures go
+    SDL_SetMainReady();
+    ASSERT_EQ(SDL_Init(SDL_INIT_EVENTS), 0) << SDL_GetError();
+  }
+  void TearDown() override { fs::current_path(before_); }
+
+  static ViewOptions options(std::uint64_t frames) {
+    ViewOptions options;
+    options.run.scene = "pile";
+    options.run.spheres = 20;
+    options.frames = frames;
+    options.size = kSize;
+    options.quality = kLowQuality;
+    return options;
+  }
+  /// Keys that are down and up again before the first picture.
+  static void press(std::initializer_list<SDL_Keycode> keys) {
+    for (const SDL_Keycode code : keys) {
+      for (const SDL_EventType type : {SDL_KEYDOWN, SDL_KEYUP}) {
+        SDL_Event event{};
+        event.type = type;
+        event.key.keysym.sym = code;
+        SDL_PushEvent(&event);
+      }
+    }
+  }
+
+  const test::TemporaryFolder folder;
+
+ private:
+  fs::path before_ = fs::current_path();
+};
+
+TEST_F(Interactive, KeysTakePicturesFilmsAndRecordings) {
+  press({SDLK_F1, SDLK_F2, SDLK_c, SDLK_f, SDLK_v, SDLK_o, SDLK_h, SDLK_MINUS, SDLK_PLUS, SDLK_F10,
+         SDLK_F12, SDLK_F9});
+  EXPECT_EQ(run_interactive(options(4)), 0);
+  EXPECT_TRUE(fs::exists("jfpx-view-frames-1/frame-000001.png"));
+  EXPECT_TRUE(fs::exists("jfpx-view-frames-1/frame-000004.png"));
+  const Image image = read_png("jfpx-view-1.png");
+  EXPECT_EQ(image.width, kSize.width);
+  EXPECT_EQ(image.height, kSize.height);
+  EXPECT_EQ(open_recording("jfpx-view-1.rec").scene.name, "pile");
+  EXPECT_EQ(folder.entries(), 3u);
+}
+
+TEST_F(Interactive, F1ShowsTheHelp) {
+  const auto brightness_of_the_middle = [](std::initializer_list<SDL_Keycode> keys) {
+    SDL_SetMainReady();
+    SDL_Init(SDL_INIT_EVENTS);
+    press(keys);
+    ViewOptions wish = options(30);
+    wish.screenshot = "picture.png";
+    EXPECT_EQ(run_interactive(wish), 0);
+    const Image image = read_png("picture.png");
+    int sum = 0;
+    for (int x = 40; x < 120; ++x) sum += image.at(x, 60)[1];
+    return sum;
+  };
+  const int panel_away = brightness_of_the_middle({SDLK_F2});
+  EXPECT_LT(brightness_of_the_middle({SDLK_F2, SDLK_F1}), panel_away * 2 / 3);
+}
+
+TEST_F(Interactive, AWindowThatIsClosedStillWritesItsLastPicture) {
+  SDL_Event quit{};
+  quit.type = SDL_QUIT;
+  SDL_PushEvent(&quit);
+  ViewOptions wish = options(1'000'000);
+  wish.screenshot = "last.png";
+  EXPECT_EQ(run_interactive(wish), 0);
+  EXPECT_EQ(read_png("last.png").width, kSize.width);
+}
+
+TEST_F(Interactive, AWindowOfAnotherSizeHasPicturesOfThatSize) {
+  const auto resize = [](void* done, SDL_Event* event) {
+    if (event->type == SDL_WINDOWEVENT && !std::exchange(*static_cast<bool*>(done), true)) {
+      SDL_SetWindowSize(SDL_GetWindowFromID(event->window.windowID), 200, 90);
+    }
+    return 0;
+  };
+  bool done = false;
+  SDL_AddEventWatch(resize, &done);
+  ViewOptions wish = options(3);
+  wish.screenshot = "resized.png";
+  EXPECT_EQ(run_interactive(wish), 0);
+  ASSERT_TRUE(done);
+  EXPECT_EQ(read_png("resized.png").width, 200);
+  EXPECT_EQ(read_png("resized.png").height, 90);
+}
+
+TEST_F(Interactive, FullScreenFillsTheScreen) {
+  ViewOptions wish = options(2);
+  wish.fullscreen = true;
+  wish.screenshot = "full.png";
+  EXPECT_EQ(run_interactive(wish), 0);
+  EXPECT_GT(read_png("full.png").width, kSize.width);
+}
+
+TEST_F(Interactive, WhatCannotBeWrittenIsToldAndTheWindowStays) {
+  fs::remove_all(fs::current_path());
+  press({SDLK_F12, SDLK_F10, SDLK_F9});
+  EXPECT_EQ(run_interactive(options(3)), 0);
+  SDL_SetMainReady();
+  ASSERT_EQ(SDL_Init(SDL_INIT_EVENTS), 0);
+  ViewOptions wish = options(3);
+  wish.screenshot = "last.png";  // asked for on the command line: an error
+  EXPECT_THROW(run_interactive(wish), FileError);
+}
+
+}  // namespace
+}  // namespace jfpx
