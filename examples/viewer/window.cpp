@@ -23,7 +23,8 @@ namespace {
 void keep_driver_for_leak_sanitizer() {
 #if defined(__SANITIZE_ADDRESS__)
   const auto keep = [](dl_phdr_info* library, std::size_t, void*) {
-    if (std::strstr(library->dlpi_name, "_dri.so") != nullptr) {
+    for (const char* driver : {"_dri.so", "libEGL_mesa.so"}) {
+      if (std::strstr(library->dlpi_name, driver) == nullptr) continue;
       dlopen(library->dlpi_name, RTLD_LAZY | RTLD_NOLOAD | RTLD_NODELETE);
     }
     return 0;

@@ -730,6 +730,22 @@ TEST(Stage, DrawsBodiesBetweenTwoStepsAndSleepersDarker) {
   EXPECT_EQ(drawing.spheres()[0].paint, awake.spheres()[0].paint);
 }
 
+TEST(Stage, DifferentContactsAreRedAndWiderThanOthers) {
+  const Scene scene = row_of_balls(3);
+  const std::vector<Contact> contacts = {{0, 1, {1, 0, 0}, {1, 2, 3}, Real(-0.1)},
+                                         {0, 2, {1, 0, 0}, {4, 5, 6}, Real(-0.1)}};
+  Drawing usual({}), faults({});
+  Stage(scene).draw_contacts(contacts, false, &usual);
+  Stage(scene).draw_contacts(contacts, true, &faults);
+  ASSERT_EQ(usual.lines().size(), 4u);  // of each contact its normal and its point
+  ASSERT_EQ(faults.lines().size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_GT(faults.lines()[i].width, usual.lines()[i].width);
+    EXPECT_GT(faults.lines()[i].rgba[0], 4 * faults.lines()[i].rgba[1]);
+    EXPECT_GT(usual.lines()[i].rgba[1], 100);  // green, or orange against what stands still
+  }
+}
+
 TEST(Stage, BoundsLeaveOutTheOneThatFlewAway) {
   Scene scene = scenes::make("lattice", {.spheres = 1000});
   std::vector<BodyState> states;
