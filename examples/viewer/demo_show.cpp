@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "examples/viewer/between.hpp"
+#include "examples/viewer/exchangeable_collider.hpp"
 #include "examples/viewer/forces.hpp"
 #include "examples/viewer/scene_choice.hpp"
 #include "examples/viewer/timing.hpp"
@@ -21,8 +22,7 @@ constexpr Paint kGround{124, 130, 138};
 
 std::unique_ptr<demos::Demo> make_demo(const ViewOptions& options) {
   WorldSettings world;
-  world.collider.backend = options.choice.backend;
-  world.collider.threads = options.choice.threads;
+  world.collider = collider_options(options.choice);
   return demos::make(
       options.run.scene,
       {.scene = tool::scene_options(options.run), .dt = options.run.dt, .world = world});

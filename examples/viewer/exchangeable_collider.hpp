@@ -4,16 +4,19 @@
 #include <jfpx/sphere_collider.hpp>
 
 #include "examples/viewer/run.hpp"
+#include "src/tool/cost_cache.hpp"
 
 #include <memory>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI::view {
 
+/// With the costs that `jfpx calibrate` has measured on this machine, if it has.
 inline SphereColliderOptions collider_options(const EngineChoice& choice) {
   SphereColliderOptions options;
   options.backend = choice.backend;
   options.threads = choice.threads;
+  if (choice.backend == Backend::automatic) options.costs = tool::load_cached_costs().costs;
   return options;
 }
 

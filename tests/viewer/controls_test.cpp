@@ -6,6 +6,7 @@
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/comparison.hpp"
 #include "examples/viewer/draw_order.hpp"
+#include "examples/viewer/exchangeable_collider.hpp"
 #include "examples/viewer/forces.hpp"
 #include "examples/viewer/islands.hpp"
 #include "examples/viewer/player.hpp"
@@ -19,6 +20,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <random>
 #include <tuple>
 
@@ -315,6 +317,19 @@ TEST(Player, SwitchingTheBackendKeepsTheBits) {
     switched.step();
     ASSERT_EQ(state_hash(straight.shown().states), state_hash(switched.shown().states)) << i;
   }
+}
+
+TEST(Player, UsesTheCostsThatWereMeasuredOnThisMachine) {
+  const test::TemporaryFolder folder;
+  const char* before = std::getenv("XDG_CACHE_HOME");
+  const std::string kept = before != nullptr ? before : "";
+  setenv("XDG_CACHE_HOME", folder.file("").c_str(), 1);
+  EXPECT_EQ(collider_options({}).costs, CostModel());  // not measured yet
+  CostModel costs;
+  costs.x86_all_pairs.call_us = 123;
+  tool::store_costs(costs);
+  EXPECT_EQ(collider_options({}).costs, costs);
+  before != nullptr ? setenv("XDG_CACHE_HOME", kept.c_str(), 1) : unsetenv("XDG_CACHE_HOME");
 }
 
 TEST(Player, ABackendThatCannotBeHadLeavesTheRunAsItWas) {
