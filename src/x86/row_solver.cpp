@@ -4,11 +4,15 @@
 #include "src/x86/cpu.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
 namespace jfpx::inline JFPX_ABI::x86 {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 /// Blocks that a thread takes at a time: about a microsecond's work, ten times what taking costs.
 constexpr std::uint32_t kTicketBlocks = 12;
@@ -336,7 +340,10 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
            torsion_choice_.ticket_count);
   // The first stays whatever happens, so that somebody ends the work. Others leave when they are
   // kept waiting: then there are more threads than processors for them, and they are in the way.
-  pool_.run(useful_threads(), [&](std::size_t participant) {
+  const unsigned most = useful_threads();
+  ThreadChoice& choice = thread_choices_[std::bit_width(blocks_)];
+  const auto start = most > 1 ? Clock::now() : Clock::time_point{};
+  pool_.run(choice.several() ? most : 1, [&](std::size_t participant) {
     Patience patience(participant == 0);
     if (!warm.join(patience) || !push.join(patience)) return;
     while (!warm.is_done()) {
@@ -347,6 +354,10 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
 
   RowSweepReport report;
   report.iterations = main.iterations_done();
+  if (most > 1) {
+    const std::chrono::duration<double> taken = Clock::now() - start;
+    choice.record(taken.count() / (static_cast<double>(blocks_) * (report.iterations + 1)));
+  }
   if (report.iterations > 0) {
     report.residual = residuals_[static_cast<std::size_t>(report.iterations) - 1];
   }

@@ -6,8 +6,10 @@
 
 #include "src/x86/buffer.hpp"
 #include "src/x86/row_kernels.hpp"
+#include "src/x86/thread_choice.hpp"
 #include "src/x86/thread_pool.hpp"
 
+#include <array>
 #include <atomic>
 #include <memory>
 #include <span>
@@ -40,7 +42,7 @@ struct RowSweepSettings {
 /// time.
 class JFPX_API RowSolver {
  public:
-  /// @param threads 0: one per core
+  /// @param threads at most; 0: one per core. Sweeps take one where that has been faster.
   explicit RowSolver(unsigned threads = 1, SimdLevel simd = SimdLevel::automatic);
 
   ThreadPool& pool() noexcept { return pool_; }
@@ -143,6 +145,7 @@ class JFPX_API RowSolver {
   Choice push_choice_, torsion_choice_;
   std::unique_ptr<std::atomic<Real>[]> residuals_;
   std::size_t residual_capacity_ = 0;
+  std::array<ThreadChoice, 33> thread_choices_;  ///< by the bits of the number of blocks
 };
 
 }  // namespace jfpx::inline JFPX_ABI::x86
