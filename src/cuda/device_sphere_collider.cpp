@@ -133,11 +133,11 @@ void DeviceSphereCollider::Impl::reserve_spheres(std::size_t n) {
   }
   if (uses_grid(n)) {
     table.grow(pool, stream, table_size + 4, "cell table");
-    block_sums.grow(pool, stream, 2 * std::size_t{kMostGridBlocks}, "sums of blocks");
+    block_sums.grow(pool, stream, kMostGridBlocks + grid_sums(n) + n / kBin + 3, "sums of blocks");
     plan.grow(pool, stream, grid_plan_bytes(), "the plan of the cells");
     ranks.grow(pool, stream, n, "ranks in the cell table");
     places.grow(pool, stream, n, "places in the cell table");
-    sorted.grow(pool, stream, n + 2, "sorted spheres");
+    sorted.grow(pool, stream, n + kReadBeyond, "sorted spheres");
     ids.grow(pool, stream, n, "sorted indices");
     coarse.grow(pool, stream, 1, "coarse buckets");
     states.grow(pool, stream, 1, "states of searches");
@@ -205,6 +205,7 @@ void DeviceSphereCollider::Impl::find_in_grid(const SphereInstance* d_spheres, s
                 .ids = ids.data(),
                 .table_sums = block_sums.data(),
                 .count_sums = block_sums.data() + kMostGridBlocks,
+                .bin_sums = block_sums.data() + kMostGridBlocks + grid_sums(n),
                 .counts = counts(),
                 .coarse = coarse.data(),
                 .overflow = overflow.data(),

@@ -9,6 +9,7 @@
 #include "src/cuda/grid_sort.cuh"
 
 #include <algorithm>
+#include <bit>
 
 namespace jfpx::inline JFPX_ABI::cuda {
 namespace {
@@ -22,6 +23,7 @@ __global__ void __launch_bounds__(kGridThreads) measure_phase(GridArgs args) {
   wait_for_previous_kernel();
   __shared__ BuildStorage storage;
   clear(args.coarse->counts, sizeof(args.coarse->counts));
+  clear(args.bin_sums, bins_of(args.n) * sizeof(*args.bin_sums));
   measure(args, storage);
 }
 
@@ -60,10 +62,19 @@ __global__ void __launch_bounds__(TileStorage<kLarge>::kThreads, 1) part_phase(G
   part(args, plan, *reinterpret_cast<TileStorage<kLarge>*>(dynamic_storage), warp_sums);
 }
 
-__global__ void __launch_bounds__(kMostSortThreads, 1) sort_phase(GridArgs args, SortRoom room) {
+/// Blocks of 512 threads on a multiprocessor: as its shared memory has it. Turing has less.
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+constexpr unsigned kSortBlocks = 2;
+#else
+constexpr unsigned kSortBlocks = sizeof(Real) == 4 ? 3 : 2;
+#endif
+
+template <unsigned kThreads>
+__global__ void __launch_bounds__(kThreads, kThreads == 512 ? kSortBlocks : 1)
+    sort_phase(GridArgs args, SortRoom room) {
   wait_for_previous_kernel();
   __shared__ GridPlan plan;
-  __shared__ unsigned long long warp_sums[kMostSortThreads / 32];
+  __shared__ unsigned long long warp_sums[kThreads / 32];
   if (!is_valid_input(args)) return;
   copy_plan(args, plan);
   SortStorage storage = sort_storage(dynamic_storage, room, warp_sums);
@@ -80,11 +91,10 @@ constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 5 : 3;
 __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
     neighbour_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
-  __shared__ NeighbourStorage storage;
-  __shared__ GridPlan plan;
+  __shared__ NeighbourStorage storage[kGridWarps];
   if (!is_valid_input(args) || !args.plan->single) return;
-  copy_plan(args, plan);
-  NeighbourSearcher(args, plan, output, storage).run(blockIdx.x * kGridThreads + threadIdx.x);
+  NeighbourSearcher(args, output, storage[threadIdx.x / 32])
+      .run(blockIdx.x * kGridThreads + threadIdx.x);
 }
 
 template <bool kDense>
@@ -97,30 +107,34 @@ __global__ void __launch_bounds__(kGridThreads, kSearchBlocks) search_phase(Grid
   Searcher<kDense>(args, plan, storage).run();
 }
 
-union SumStorage {
-  CopyStorage copy;
-  EmitStorage emit;
-};
 __global__ void __launch_bounds__(kGridThreads) sum_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
-  __shared__ SumStorage storage;
+  __shared__ EmitStorage storage;
   const bool complete = is_valid_input(args) && is_complete(args, output);
   if (blockIdx.x == 0 && threadIdx.x == 0) {
-    write_count(output, args.state->contacts, first_invalid(args.state), complete);
+    write_count(output, contacts_found(*args.state), first_invalid(args.state), complete);
   }
   if (!complete) return;
   if (args.plan->single) {
-    sum_lists(args, storage.copy);
+    sum_bins(args);
   } else {
-    sum_counts(args, storage.emit);
+    sum_counts(args, storage);
   }
 }
 
-__global__ void __launch_bounds__(kGridThreads) copy_phase(GridArgs args, SearchOutput output) {
+/// All the threads of a multiprocessor, which on Turing are half as many.
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+constexpr unsigned kCopyBlocks = 4;
+#else
+constexpr unsigned kCopyBlocks = 8;
+#endif
+
+__global__ void __launch_bounds__(kGridThreads, kCopyBlocks)
+    copy_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ CopyStorage storage;
   if (!is_valid_input(args) || !args.plan->single || !is_complete(args, output)) return;
-  copy_lists(args, output, storage);
+  copy_bin(args, output, storage);
 }
 
 __global__ void __launch_bounds__(kGridThreads) emit_phase(GridArgs args, SearchOutput output) {
@@ -135,11 +149,9 @@ __device__ bool has_crowded(const GridArgs& args, const SearchOutput& output) {
 }
 __global__ void __launch_bounds__(kGridThreads) list_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
-  __shared__ GridPlan plan;
   if (!has_crowded(args, output)) return;
-  copy_plan(args, plan);
-  if (plan.single) {
-    list_crowded(args, plan);
+  if (args.plan->single) {
+    list_crowded(args);
   } else {
     place_overflow(args);
   }
@@ -182,7 +194,8 @@ void launch_sort(const GridArgs& args, std::size_t shared_bytes, cudaStream_t st
   // Evenly spread, a coarse bucket has between n / kCoarseBuckets spheres and twice as many. If
   // they don't fit, they are not brought into shared memory, and there is more of it for buckets.
   constexpr std::uint32_t kMostBuckets = 8192, kMostSpheres = (1 << 16) - 4;
-  const std::uint32_t buckets = args.table_size / kCoarseBuckets, spheres = args.n / kCoarseBuckets;
+  const std::uint32_t buckets = args.table_size / args.coarse_buckets,
+                      spheres = args.n / args.coarse_buckets;
   SortRoom room{std::clamp(buckets, 4u, kMostBuckets), 0};
   const auto fitting = static_cast<std::uint32_t>((most - room.bytes()) / SortRoom{0, 1}.bytes());
   if (spheres <= fitting) {
@@ -191,9 +204,11 @@ void launch_sort(const GridArgs& args, std::size_t shared_bytes, cudaStream_t st
     room.buckets = std::min(buckets, static_cast<std::uint32_t>(most / sizeof(std::uint32_t)));
     room.buckets = room.buckets / 4 * 4;
   }
-  const bool is_large = spheres > 2048;
-  launch_large(room.bytes(), sort_phase, kCoarseBuckets, is_large ? kMostSortThreads : 512, stream,
-               args, room);
+  if (spheres > 2048) {
+    launch_large(room.bytes(), sort_phase<1024>, args.coarse_buckets, 1024, stream, args, room);
+  } else {
+    launch_large(room.bytes(), sort_phase<512>, args.coarse_buckets, 512, stream, args, room);
+  }
 }
 
 void launch_phases(const GridArgs& args, const SearchOutput& output, cudaStream_t stream) {
@@ -213,7 +228,7 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, cudaStream_
   run(search_phase<true>, std::min(chunks, 132 * kSearchBlocks), args);
   run(search_phase<false>, std::min(chunks, 132 * kSearchBlocks), args);
   run(sum_phase, kManyBlocks, args, output);
-  run(copy_phase, kCopyBlocks, args, output);
+  run(copy_phase, chunks, args, output);
   run(emit_phase, kManyBlocks, args, output);
   run(list_phase, kFewBlocks, args, output);
   run(crowded_phase, kCrowdedBlocks, args, output);
@@ -221,6 +236,10 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, cudaStream_
 
 /// Up to here all phases are one launch (measured on an H200: bench/results).
 constexpr std::uint32_t kMostInOneLaunch = 1 << 18;
+
+/// Coarse buckets are made for about so many spheres each: fewer buckets take fewer atomics, and
+/// smaller ones more blocks to sort them.
+constexpr std::uint32_t kSpheresOfCoarse = 1024, kFewestCoarse = 256;
 
 constexpr std::size_t rounded(std::size_t bytes) { return (bytes + 255) / 256 * 256; }
 
@@ -233,7 +252,7 @@ std::size_t grid_scratch_bytes(std::size_t n, std::size_t capacity) {
   const std::size_t cells = rounded(slots * sizeof(SphereInstance)) + slots * sizeof(std::uint32_t);
   const std::size_t parted = rounded(n * sizeof(SphereInstance)) + n * sizeof(std::uint32_t);
   const std::size_t partners = n * kSlots * sizeof(std::uint32_t);
-  const std::size_t staged = std::min(n * kSlots, capacity) * sizeof(SphereContact);
+  const std::size_t staged = std::min(n * kStaged, capacity) * sizeof(SphereContact);
   return std::max({cells, parted, partners, staged}) + 256;
 }
 
@@ -254,7 +273,10 @@ void launch_grid_search(const GridArgs& args, const SearchOutput& output, unsign
   if (args.n <= kMostInOneLaunch) {
     launch_in_one(args, output, most_blocks, stream);
   } else {
-    launch_phases(args, output, stream);
+    GridArgs phased = args;
+    phased.coarse_buckets =
+        std::clamp(std::bit_ceil(args.n / kSpheresOfCoarse), kFewestCoarse, kCoarseBuckets);
+    launch_phases(phased, output, stream);
   }
 }
 

@@ -54,6 +54,12 @@ struct LevelBox {
   std::uint32_t base;
 };
 
+/// Where the row (y, z) of the level begins, less the first x: cell x is x buckets on.
+__device__ inline std::uint32_t row_of_box(const LevelBox& box, std::int32_t y, std::int32_t z) {
+  const auto yz = static_cast<std::uint32_t>((z - box.z0) * box.ny + (y - box.y0));
+  return box.base + yz * static_cast<std::uint32_t>(box.nx) - static_cast<std::uint32_t>(box.x0);
+}
+
 /// Where cells are in the table. If the cells of all levels, from the lowest to the highest
 /// coordinates there are, fit into the table, each has a bucket of its own ("dense"): rows follow
 /// rows, and what is near in y and z is not far in memory. Else rows start at hashed places, and a
@@ -61,8 +67,8 @@ struct LevelBox {
 struct GridPlan {
   GridScale scale;
   bool dense;
-  bool single;                 ///< dense, and all spheres are on level 0
-  Real inverse_x, inverse_yz;  ///< inverse cell widths of level 0
+  bool single;      ///< dense, and all spheres are on level 0
+  Real inverse_yz;  ///< inverse cell width of level 0, in y and z
   std::uint32_t buckets;
   std::uint32_t coarse_shift;  ///< 2^coarse_shift consecutive buckets are a coarse bucket
   LevelBox boxes[kLastLevel + 1];
@@ -71,9 +77,7 @@ struct GridPlan {
   template <bool kDense>
   __device__ std::uint32_t row(std::int32_t y, std::int32_t z, int level) const {
     if constexpr (!kDense) return row_of(y, z, level);
-    const LevelBox& box = boxes[level];
-    const auto yz = static_cast<std::uint32_t>((z - box.z0) * box.ny + (y - box.y0));
-    return box.base + yz * static_cast<std::uint32_t>(box.nx) - static_cast<std::uint32_t>(box.x0);
+    return row_of_box(boxes[level], y, z);
   }
   template <bool kDense>
   __device__ std::uint32_t mask() const {
@@ -89,7 +93,7 @@ struct GridPlan {
       const LevelBox& box = boxes[0];
       const std::int32_t y = cell_of(s.centre.y, inverse_yz) - box.y0;
       const std::int32_t z = cell_of(s.centre.z, inverse_yz) - box.z0;
-      const std::int32_t x = cell_of(s.centre.x, inverse_x) - box.x0;
+      const std::int32_t x = cell_of(s.centre.x, scale.inverse_x) - box.x0;
       return static_cast<std::uint32_t>((z * box.ny + y) * box.nx + x);
     }
     const GridCell cell = grid_cell_of(s, scale);
@@ -118,7 +122,8 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
   if (threadIdx.x < 32) {
     const SearchState& state = *args.state;
     const int level = static_cast<int>(lane_id());
-    GridScale scale{half_0_of(args.state), last_level(state, args.n), 2};
+    GridScale scale{half_0_of(args.state), last_level(state, args.n)};
+    Real x_cells = 2;  // of a cell of the last level
     const Vec3 high{from_ordered(state.farthest[0]), from_ordered(state.farthest[2]),
                     from_ordered(state.farthest[4])};
     const Vec3 low{-from_ordered(state.farthest[1]), -from_ordered(state.farthest[3]),
@@ -127,13 +132,14 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
     LevelBox box{};
     unsigned long long cells = 0, cells_to_here = 0, all_cells = 0;
     while (true) {
+      scale.inverse_x = x_cells * inverse_width(half_cell_of(scale.half_0, scale.last_level));
       if (level <= scale.last_level) {
         const Real inverse = inverse_width(half_cell_of(scale.half_0, level));
         const auto extent = [&](Real from, Real to, Real inverse_cell, std::int32_t& first) {
           first = cell_of(from, inverse_cell);
           return std::int64_t{cell_of(to, inverse_cell)} - first + 1;
         };
-        const std::int64_t nx = extent(low.x, high.x, inverse * scale.x_cells, box.x0);
+        const std::int64_t nx = extent(low.x, high.x, scale.inverse_x, box.x0);
         const std::int64_t ny = extent(low.y, high.y, inverse, box.y0);
         const std::int64_t nz = extent(low.z, high.z, inverse, box.z0);
         box.nx = static_cast<std::int32_t>(nx);
@@ -149,23 +155,22 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
         if (lane_id() >= d) cells_to_here += below;
       }
       all_cells = __shfl_sync(kFullWarp, cells_to_here, 31);
-      if (all_cells <= args.table_size || scale.x_cells == 1) break;
-      scale.x_cells = 1;
+      if (all_cells <= args.table_size || x_cells == 1) break;
+      x_cells = 1;
       cells = 0;
     }
     box.base = static_cast<std::uint32_t>(cells_to_here - cells);
     plan.boxes[level] = box;
     if (level == 0) {
       const bool dense = all_cells <= args.table_size && state.has_far == 0;
-      if (!dense) scale.x_cells = 1;
+      if (!dense) scale.inverse_x = 0;
       plan.scale = scale;
       plan.dense = dense;
       plan.single = dense && scale.last_level == 0;
       plan.inverse_yz = inverse_width(half_cell_of(scale.half_0, 0));
-      plan.inverse_x = plan.inverse_yz * scale.x_cells;
       plan.buckets = dense ? static_cast<std::uint32_t>(all_cells) : args.table_size;
       plan.coarse_shift = 0;
-      while ((plan.buckets - 1) >> plan.coarse_shift >= kCoarseBuckets) ++plan.coarse_shift;
+      while ((plan.buckets - 1) >> plan.coarse_shift >= args.coarse_buckets) ++plan.coarse_shift;
     }
   }
   __syncthreads();
@@ -182,20 +187,15 @@ __device__ inline void copy_plan(const GridArgs& args, GridPlan& plan) {
   __syncthreads();
 }
 
-/// The part of `count` items that this block of `blocks` takes: consecutive ones, from a multiple
-/// of `unit` on; none, if it is beyond them.
+/// The part of `count` items that this block takes: consecutive ones, from a multiple of `unit` on.
 struct Span {
   std::uint64_t first, past;
 };
-__device__ inline Span span_of_block(std::uint64_t count, unsigned unit, unsigned blocks) {
-  if (blockIdx.x >= blocks) return {0, 0};
-  const std::uint64_t units = (count + unit - 1) / unit;
-  const std::uint64_t first = units * blockIdx.x / blocks * unit;
-  const std::uint64_t past = units * (blockIdx.x + 1) / blocks * unit;
-  return {first, past < count ? past : count};
-}
 __device__ inline Span span_of_block(std::uint64_t count, unsigned unit) {
-  return span_of_block(count, unit, gridDim.x);
+  const std::uint64_t units = (count + unit - 1) / unit;
+  const std::uint64_t first = units * blockIdx.x / gridDim.x * unit;
+  const std::uint64_t past = units * (blockIdx.x + 1) / gridDim.x * unit;
+  return {first, past < count ? past : count};
 }
 
 /// Sum of `value` over the threads of the block before this one; `total` becomes that of all.

@@ -52,7 +52,7 @@ JFPX_HD inline Real half_cell_of(Real half_0, int level) {
 struct GridScale {
   Real half_0;                  ///< half cell width of level 0: what the largest radius asks for
   int last_level = kLastLevel;  ///< finer levels would hold hardly a sphere a cell
-  Real x_cells = 1;             ///< cells are this many times narrower in x: 1 or 2
+  Real inverse_x = 0;           ///< inverse width in x of the cells of all levels; 0: cubes
 };
 
 /// The finest level with half cells no smaller than `half`: floor(log2(half_0 / half)), if there is
@@ -144,6 +144,11 @@ constexpr bool rows_have_different_keys() {
 }
 static_assert(rows_have_different_keys());
 
+/// Inverse width in x of the cells of a level, if it is `inverse` in y and z.
+JFPX_HD inline Real inverse_x_of(Real inverse, const GridScale& scale) {
+  return scale.inverse_x > 0 ? scale.inverse_x : inverse;
+}
+
 /// The cell of a sphere at its own level.
 struct GridCell {
   std::int32_t x, y, z;
@@ -152,7 +157,7 @@ struct GridCell {
 JFPX_HD inline GridCell grid_cell_of(const SphereInstance& s, const GridScale& scale) {
   const int level = level_of(s, scale);
   const Real inverse = inverse_width(half_cell_of(scale.half_0, level));
-  return {cell_of(s.centre.x, inverse * scale.x_cells), cell_of(s.centre.y, inverse),
+  return {cell_of(s.centre.x, inverse_x_of(inverse, scale)), cell_of(s.centre.y, inverse),
           cell_of(s.centre.z, inverse), level};
 }
 

@@ -24,8 +24,11 @@ struct CrowdedStorage {
 };
 static_assert(kGridWarps * kLongList >= kWindowWords);
 
+__device__ inline unsigned long long contacts_found(const SearchState& state) {
+  return state.contacts + state.crowded_contacts;
+}
 __device__ inline bool is_complete(const GridArgs& args, const SearchOutput& output) {
-  const unsigned long long total = args.state->contacts;
+  const unsigned long long total = contacts_found(*args.state);
   return total <= args.capacity && total <= output.capacity;
 }
 

@@ -7,7 +7,7 @@
 namespace jfpx::inline JFPX_ABI::cuda {
 
 inline constexpr unsigned kRowsAtOnce = 5;  // rows that a thread looks up before it tests
-inline constexpr unsigned kHeld = 8;        // touching candidates that a thread keeps
+inline constexpr unsigned kHeld = 8;        // candidates that a thread keeps
 
 /// Also the row that was looked at, where a candidate may be of another one.
 struct HeldRows {
@@ -19,7 +19,7 @@ struct NoRows {};
 template <bool kDense>
 struct SearchStorage {
   uint2 ranges[kRowsAtOnce][kGridThreads];  // candidates of a row
-  std::uint32_t held[kHeld][kGridThreads];  // positions of touching candidates
+  std::uint32_t held[kHeld][kGridThreads];  // positions of candidates that may touch
   std::conditional_t<kDense, NoRows, HeldRows> rows;
 };
 
@@ -78,8 +78,9 @@ class Searcher {
     const auto low = [&](Real x, Real scale) { return cell_of(moved(x, -reach), scale); };
     const auto high = [&](Real x, Real scale) { return cell_of(moved(x, reach), scale); };
     level_ = level;
-    x0_ = low(self_.centre.x, inverse * plan_.scale.x_cells);
-    x1_ = high(self_.centre.x, inverse * plan_.scale.x_cells);
+    doubt_ = doubt_of(self_.radius + half);
+    const Real inverse_x = inverse_x_of(inverse, plan_.scale);
+    x0_ = low(self_.centre.x, inverse_x), x1_ = high(self_.centre.x, inverse_x);
     y0_ = low(self_.centre.y, inverse), y1_ = high(self_.centre.y, inverse);
     z_ = low(self_.centre.z, inverse), z1_ = high(self_.centre.z, inverse);
     if (kDense) {
@@ -91,6 +92,12 @@ class Searcher {
     const bool own = level == cell_.level;
     y_ = own ? cell_.y : y0_;
     z_ = own ? cell_.z : z_;
+    if constexpr (kDense) {
+      const LevelBox& box = plan_.boxes[level];
+      row_ = row_of_box(box, y_, z_);
+      next_row_ = static_cast<std::uint32_t>(box.nx);
+      next_slice_ = next_row_ * static_cast<std::uint32_t>(box.ny - (y1_ - y0_));
+    }
     own_row_is_next_ = own && lane == 0;
     skip_rows(lane);
   }
@@ -98,6 +105,7 @@ class Searcher {
   __device__ void skip_rows(unsigned count) {
     for (unsigned k = 0; k < count; ++k) {
       const bool last = y_ == y1_;
+      if constexpr (kDense) row_ += last ? next_slice_ : next_row_;
       z_ += last ? 1 : 0;
       y_ = last ? y0_ : y_ + 1;
     }
@@ -125,7 +133,7 @@ class Searcher {
     for (unsigned k = 0; k < kRowsAtOnce; ++k) {
       ranges[k] = {0, 0};
       if (z_ > z1_) continue;
-      const std::uint32_t key = plan_.row<kDense>(y_, z_, level_);
+      const std::uint32_t key = kDense ? row_ : row_of(y_, z_, level_);
       const std::int32_t x0 = own_row_is_next_ ? cell_.x : x0_;
       const std::uint32_t first = (key + static_cast<std::uint32_t>(x0)) & plan_.mask<kDense>();
       std::uint32_t past = first + static_cast<std::uint32_t>(x1_ - x0) + 1;
@@ -151,7 +159,7 @@ class Searcher {
     return kDense || at < args_.n ? at : at - args_.n;
   }
 
-  /// Filters the candidates in the lanes' lists, two of each lane at a time.
+  /// Holds the candidates in the lanes' lists that may touch, two of each lane at a time.
   __device__ void filter_candidates() {
     std::uint32_t at = 0, end = 0, key = 0;
     unsigned next = 0;
@@ -165,23 +173,18 @@ class Searcher {
       if (!__any_sync(kFullWarp, at < end)) return;
       if (at < end) {
         const std::uint32_t first = position_of(at), second = position_of(min(at + 1, end - 1));
-        const SphereInstance one = load_sorted(args_.sorted + first);
-        const SphereInstance other = load_sorted(args_.sorted + second);
-        const Closeness to_one = closeness(self_, one), to_other = closeness(self_, other);
-        bool first_hits = to_one.near, second_hits = second != first && to_other.near;
-        if ((first_hits && !to_one.sure) || (second_hits && !to_other.sure)) {
-          first_hits = first_hits && touch(self_, one);
-          second_hits = second_hits && touch(self_, other);
-        }
-        if (first_hits) hold(first, key);
-        if (second_hits) hold(second, key);
+        const Real to_first = excess(self_, load_sorted(args_.sorted + first));
+        const Real to_second = excess(self_, load_sorted(args_.sorted + second));
+        if (!(to_first > doubt_)) hold(first, key, to_first);
+        if (second != first && !(to_second > doubt_)) hold(second, key, to_second);
         at += 2;
       }
       if (__any_sync(kFullWarp, held_ > kHeld - 2)) accept_held();
     }
   }
 
-  __device__ void hold(std::uint32_t other, std::uint32_t key) {
+  __device__ void hold(std::uint32_t other, std::uint32_t key, Real its_excess) {
+    in_doubt_ = in_doubt_ || !(its_excess < -doubt_);
     storage_.held[held_][threadIdx.x] = other;
     if constexpr (!kDense) {
       storage_.rows.keys[held_][threadIdx.x] = key;
@@ -196,12 +199,9 @@ class Searcher {
   /// they have their own turn, or none. A touching sphere of that row is in one of the cells looked
   /// at, and all of these are different buckets: it is met once.
   __device__ void accept_held() {
-    unsigned sum = held_;
-    for (unsigned d = 1; d < 32; d *= 2) {
-      const unsigned below = __shfl_up_sync(kFullWarp, sum, d);
-      if (lane_id() >= d) sum += below;
-    }
+    const unsigned sum = warp_inclusive_sum(held_);
     const unsigned all = __shfl_sync(kFullWarp, sum, 31);
+    const bool in_doubt = __any_sync(kFullWarp, in_doubt_);
     __syncwarp();
     for (unsigned first = 0; first < all; first += 32) {
       const unsigned i = first + lane_id();
@@ -212,10 +212,16 @@ class Searcher {
       if (i >= all) continue;
       const unsigned slot = i - (owners_sum - owners_held);
       const unsigned thread = threadIdx.x - lane_id() + owner;
-      accept(position, storage_.held[slot][thread], slot, thread);
+      const std::uint32_t other = storage_.held[slot][thread];
+      if (in_doubt &&
+          !touch(load_sorted(args_.sorted + position), load_sorted(args_.sorted + other))) {
+        continue;
+      }
+      accept(position, other, slot, thread);
     }
     __syncwarp();
     held_ = 0;
+    in_doubt_ = false;
   }
 
   __device__ void accept(std::uint32_t position, std::uint32_t other_position, unsigned slot,
@@ -276,10 +282,13 @@ class Searcher {
   int widest_far_ = 0;
   // The level that is looked at, its cells in reach, and its next row.
   int level_ = 0;
+  Real doubt_ = 0;  // of excess(), there
   std::int32_t x0_ = 0, x1_ = 0, y0_ = 0, y1_ = 0, z1_ = 0, y_ = 0, z_ = 0;
+  std::uint32_t row_ = 0, next_row_ = 0, next_slice_ = 0;  // where it is in a dense table
   bool own_row_is_next_ = false;
-  unsigned ranges_ = 0;  // rows that were looked up
-  unsigned held_ = 0;    // touching candidates that wait to be taken
+  unsigned ranges_ = 0;    // rows that were looked up
+  unsigned held_ = 0;      // candidates that wait to be taken
+  bool in_doubt_ = false;  // whether one of them may not touch
 };
 
 }  // namespace jfpx::inline JFPX_ABI::cuda

@@ -8,7 +8,6 @@
 namespace jfpx::inline JFPX_ABI::cuda {
 
 inline constexpr unsigned kCountThreads = 1024;
-inline constexpr unsigned kMostSortThreads = 1024;
 
 /// A tile of spheres: the more there are, the longer the runs that are written and the fewer the
 /// atomics. A large one takes most of the shared memory of Hopper, a small one less than 64 KiB,
@@ -228,7 +227,7 @@ __device__ inline void sort_coarse(const GridArgs& args, const GridPlan& plan, c
   const std::uint32_t past = args.coarse->starts[blockIdx.x + 1];
   if (past_bucket == plan.buckets) {
     if (threadIdx.x == 0) args.table[plan.buckets] = args.n;
-    if (threadIdx.x < 2) args.sorted[args.n + threadIdx.x] = {};  // to be read, not used
+    if (threadIdx.x < kReadBeyond) args.sorted[args.n + threadIdx.x] = {};
   }
   const bool fits = past_bucket - first_bucket <= room.buckets && past - first <= room.spheres;
   unsigned long long before = first;

@@ -19,7 +19,7 @@ struct StagedList {
     return static_cast<std::uint32_t>(is_crowded() ? place() : bits & kCrowded);
   }
 };
-static_assert(kSlots < StagedList::kCrowded);
+static_assert(kStaged < StagedList::kCrowded);
 __device__ inline StagedList staged_list(unsigned long long place, unsigned count) {
   return {place << StagedList::kCountBits | count};
 }
@@ -30,14 +30,13 @@ __device__ inline SearchOutput stage_of(const GridArgs& args, const SearchOutput
   return {nullptr, reinterpret_cast<SpherePair*>(args.stage), args.capacity, nullptr};
 }
 
-/// Blocks that share out the lists of contacts.
-inline constexpr unsigned kCopyBlocks = 132 * 8;
-static_assert(kCopyBlocks <= kMostGridBlocks);
+static_assert(kBin == kGridThreads);
+__device__ inline std::uint32_t bins_of(std::uint32_t n) { return (n - 1) / kBin + 1; }
 
 struct CopyStorage {
   unsigned long long from[kGridThreads], to[kGridThreads];  // minus a contact's number in the tile
   unsigned long long warp_sums[kGridWarps];
-  std::uint8_t owners[kSlots * kGridThreads];
+  std::uint8_t owners[kStaged * kGridThreads];
 };
 
 /// A block copies `count` records of kWords words each.
@@ -64,14 +63,36 @@ __device__ inline void copy_words(const void* stage, void* output, std::uint32_t
   }
 }
 
-/// A block copies the contacts of kGridThreads consecutive a's, one a thread, from the stage to
-/// their places. Returns their number.
-__device__ inline unsigned long long copy_tile(const GridArgs& args, const SearchOutput& output,
-                                               std::uint64_t a, StagedList list,
-                                               unsigned long long before, CopyStorage& s) {
-  __syncthreads();
+/// Leaves the sums of kBinsOfSum bins each.
+__device__ inline void sum_bins(const GridArgs& args) {
+  const std::uint32_t bins = bins_of(args.n);
+  const unsigned warps = gridDim.x * kGridWarps;
+  for (std::uint32_t sum = blockIdx.x * kGridWarps + threadIdx.x / 32; sum * kBinsOfSum < bins;
+       sum += warps) {
+    unsigned long long mine = 0;
+    for (std::uint32_t k = lane_id(); k < kBinsOfSum; k += 32) {
+      if (sum * kBinsOfSum + k < bins) mine += args.bin_sums[sum * kBinsOfSum + k];
+    }
+    for (unsigned d = 16; d != 0; d /= 2) {
+      mine += __shfl_xor_sync(kFullWarp, mine, static_cast<int>(d));
+    }
+    if (lane_id() == 0) args.count_sums[sum] = mine;
+  }
+}
+
+/// A block copies the contacts of a bin, a thread an a, from the stage to their places.
+__device__ inline void copy_bin(const GridArgs& args, const SearchOutput& output, CopyStorage& s) {
+  const std::uint32_t bin = blockIdx.x, first_bin = bin / kBinsOfSum * kBinsOfSum;
+  const std::uint32_t a = bin * kBin + threadIdx.x;
+  const StagedList list{a < args.n ? args.offsets[a] : 0};
+  unsigned long long mine =
+      threadIdx.x < bin - first_bin ? args.bin_sums[first_bin + threadIdx.x] : 0;
+  for (std::uint32_t k = threadIdx.x; k < bin / kBinsOfSum; k += kGridThreads) {
+    mine += args.count_sums[k];
+  }
+  const unsigned long long before = block_sum(mine, s.warp_sums);
   const std::uint32_t count = list.count(), staged = list.staged();
-  // Both sums at once: of what is staged, at most kSlots * kGridThreads, and of all contacts.
+  // Both sums at once: of what is staged, at most kStaged * kGridThreads, and of all contacts.
   constexpr unsigned kStagedBits = 16;
   unsigned long long total = 0;
   const unsigned long long sums = block_exclusive_sum(
@@ -84,9 +105,8 @@ __device__ inline unsigned long long copy_tile(const GridArgs& args, const Searc
     s.owners[start + k] = static_cast<std::uint8_t>(threadIdx.x);
   }
   if (list.is_crowded()) {
-    const auto sphere = static_cast<std::uint32_t>(a);
-    args.ranks[sphere] = count;
-    put_off(args, sphere, count, before + (sums >> kStagedBits));
+    args.ranks[a] = count;
+    put_off(args, a, count, before + (sums >> kStagedBits));
   }
   __syncthreads();
   static_assert(sizeof(SpherePair) == 8 && sizeof(SphereContact) % 8 == 0);
@@ -94,35 +114,6 @@ __device__ inline unsigned long long copy_tile(const GridArgs& args, const Searc
     copy_words<sizeof(SphereContact) / 8>(args.stage, output.contacts, all, s);
   } else {
     copy_words<1>(args.stage, output.pairs, all, s);
-  }
-  return total >> kStagedBits;
-}
-
-/// Leaves the number of contacts of each block's a's.
-__device__ inline void sum_lists(const GridArgs& args, CopyStorage& s) {
-  const Span span = span_of_block(args.n, kGridThreads, kCopyBlocks);
-  unsigned long long sum = 0;
-  for (std::uint64_t a = span.first + threadIdx.x; a < span.past; a += kGridThreads) {
-    sum += StagedList{args.offsets[a]}.count();
-  }
-  sum = block_sum(sum, s.warp_sums);
-  if (threadIdx.x == 0) args.count_sums[blockIdx.x] = sum;
-}
-
-__device__ inline void copy_lists(const GridArgs& args, const SearchOutput& output,
-                                  CopyStorage& s) {
-  const Span span = span_of_block(args.n, kGridThreads, kCopyBlocks);
-  unsigned long long before = sum_of_blocks_before(args.count_sums, s.warp_sums);
-  const auto list_of = [&](std::uint64_t a) {
-    return StagedList{a < span.past ? args.offsets[a] : 0};
-  };
-  std::uint64_t a = span.first + threadIdx.x;
-  StagedList list = list_of(a);
-  for (std::uint64_t first = span.first; first < span.past; first += kGridThreads) {
-    const StagedList next = list_of(a + kGridThreads);
-    before += copy_tile(args, output, a, list, before, s);
-    list = next;
-    a += kGridThreads;
   }
 }
 

@@ -14,7 +14,7 @@ namespace jfpx::inline JFPX_ABI::cuda {
 
 /// Counters that kernels of one search share. Zero bytes at the start of a search.
 struct alignas(16) SearchState {
-  unsigned long long contacts;       ///< that the grid has found
+  unsigned long long contacts;       ///< that the grid has found, crowded_contacts not included
   unsigned long long overflow;       ///< entries of GridArgs::overflow, also those without room
   unsigned long long largest_half;   ///< bits of the largest half cell that a radius asks for
   unsigned long long smallest_half;  ///< ~bits of the smallest one
@@ -29,8 +29,8 @@ struct alignas(16) SearchState {
   std::uint32_t blocks_counted;      ///< blocks that have counted coarse buckets
   std::uint32_t cell_is_full;        ///< 1: a cell of the direct search has no room
   std::uint32_t block_is_full;       ///< 1: a block of the direct search found too many pairs
-  unsigned long long staged;         ///< contacts that the search put on the stage
-  std::uint32_t same_cell[32];       ///< pairs of a sample in the same cell, by level
+  unsigned long long crowded_contacts;  ///< that have no place on the stage
+  std::uint32_t same_cell[32];          ///< pairs of a sample in the same cell, by level
 };
 
 /// Where a search puts its result. `contacts` or `pairs` is null.
@@ -102,6 +102,10 @@ void launch_mask_emit(const MaskEmitArgs& args, cudaStream_t stream);
 
 /// Partners that a sphere keeps in its own slots; further ones go to a list for all spheres.
 inline constexpr std::uint32_t kSlots = 16;
+/// Contacts of a sphere that have a place on the stage; if there are more, none has.
+inline constexpr std::uint32_t kStaged = 18;
+/// Spheres that a search reads, and does not use, after the last one.
+inline constexpr std::uint32_t kReadBeyond = 2;
 /// Lists longer than this are sorted by many blocks.
 inline constexpr std::uint32_t kLongList = 1024;
 
@@ -136,6 +140,15 @@ struct CoarseBuckets {
 
 /// Blocks that share out the table and the spheres, at most.
 inline constexpr unsigned kMostGridBlocks = 132 * 16;
+/// Contacts of one level are counted by so many consecutive a's, which a block copies, ...
+inline constexpr std::uint32_t kBin = 256;
+/// ... and summed by so many of these bins.
+inline constexpr std::uint32_t kBinsOfSum = 64;
+/// Sums that a search among n spheres has beside those of its bins.
+constexpr std::size_t grid_sums(std::size_t n) {
+  return kMostGridBlocks + n / (kBin * kBinsOfSum) / 2 * 2 + 2;
+}
+
 struct GridPlan;
 /// Its size.
 std::size_t grid_plan_bytes();
@@ -148,10 +161,11 @@ struct GridArgs {
   std::uint32_t* table;            ///< [table_size + 1] histogram, then starts, of the buckets
   std::uint32_t* places;           ///< [n] bucket, then position in their order, of a sphere
   std::uint32_t* ranks;            ///< [n] rank in the bucket, then pairs, of a sphere
-  SphereInstance* sorted;          ///< [n + 2] spheres by position
+  SphereInstance* sorted;          ///< [n + kReadBeyond] spheres by position
   std::uint32_t* ids;              ///< [n] their indices
   unsigned long long* table_sums;  ///< [blocks] spheres in the buckets of each block
-  unsigned long long* count_sums;  ///< [blocks] pairs of the spheres of each block
+  unsigned long long* count_sums;  ///< [grid_sums(n)] pairs of each block, or kBinsOfSum bins
+  unsigned long long* bin_sums;    ///< [n / kBin + 1] pairs of the spheres of a bin
   std::uint32_t* counts;           ///< [n] pairs of which a sphere is the first, by position
   // In scratch memory, one after the other; null until use_grid_scratch().
   SphereInstance* slots = nullptr;    ///< [kDirectSlots * n] room in cells; null if n > kMostDirect
@@ -160,7 +174,7 @@ struct GridArgs {
   std::uint32_t* parted_ids = nullptr;  ///< [n] their indices
   std::uint32_t* partners = nullptr;  ///< [n][kSlots] the first b's found of a sphere, by position
   SphereContact* stage =
-      nullptr;  ///< contacts, or pairs, of spheres with up to kSlots, by position
+      nullptr;  ///< contacts, or pairs, of spheres with up to kStaged, by position
 
   CoarseBuckets* coarse;
   OverflowPair* overflow;       ///< [capacity] the other pairs
@@ -171,8 +185,9 @@ struct GridArgs {
   std::uint32_t* giants;        ///< [capacity / kLongList + 1] a's with more than kLongList
   std::uint32_t* crowded_b;     ///< [capacity] b's of both, by place in the output
   SearchState* state;
-  TurningStates* states;    ///< for searches of one launch, instead of `state`
-  GridPlan* plan;           ///< for searches of several launches
+  TurningStates* states;  ///< for searches of one launch, instead of `state`
+  GridPlan* plan;         ///< for searches of several launches
+  std::uint32_t coarse_buckets = kCoarseBuckets;  ///< of these, how many there may be
   std::uint32_t lanes = 1;  ///< threads that share a sphere in the search: a power of two
 };
 

@@ -65,4 +65,33 @@ JFPX_HD inline bool touch(const SphereInstance& a, const SphereInstance& b) {
   return c.near && (c.sure || shared::test_sphere_pair(a, b).touching != 0);
 }
 
+/// The square of the distance of the centres less that of the sum of the radii, nearly: half the
+/// instructions of closeness(). With e = excess(a, b) and d = doubt_of(S), where S is at least the
+/// computed sum of the radii: spheres that touch have !(e > d), and spheres with e < -d touch.
+/// Spheres must be valid.
+///
+/// Proof, with u, t, D and s as above and p = fl(s^2), so that |p - s^2| <= u s^2 + t.
+///  1. If they touch, D <= s^2 (1+9u) + 8t. Each of the three sums is rounded from a number between
+///     -p and D (1+3u) + 3t, whose magnitude is at most s^2 (1+13u) + 12t. So all errors together
+///     are at most 4.1u s^2 + 5t, and e <= 13.1u s^2 + 13t.
+///  2. If e < 0, so are the sums before it, as a square was added to each. As rounding is monotone
+///     none is less than -p, and all errors together are at most 4.1u s^2 + 5t. If e < -d then
+///     D < s^2 - d + 4.1u s^2 + 5t. But spheres that do not touch have fl(sqrt(q)) > s, hence
+///     q >= s^2 (1-2u), with q <= D (1+u)^3 + 3t: D >= s^2 (1-6u) - 4t.
+///  3. d >= 18u S^2 (1-u)^3 - 18u t + min (1-u) >= 16u s^2 + 2^23 t: more than 1 and 2 ask for.
+///  4. Overflow: if S^2 overflows, d is infinite, and nothing is excluded and nothing sure, NaN
+///     included. Else p is finite; where a sum overflows, D exceeds p by far more than touching
+///     spheres can have it, and e is infinite.
+JFPX_HD inline Real excess(const SphereInstance& a, const SphereInstance& b) {
+  const Real dx = a.centre.x - b.centre.x;
+  const Real dy = a.centre.y - b.centre.y;
+  const Real dz = a.centre.z - b.centre.z;
+  const Real s = a.radius + b.radius;
+  return fused(dx, dx, fused(dy, dy, fused(dz, dz, -(s * s))));
+}
+JFPX_HD inline Real doubt_of(Real largest_sum) {
+  constexpr Real kSlack = 9 * std::numeric_limits<Real>::epsilon();
+  return fused(largest_sum * largest_sum, kSlack, std::numeric_limits<Real>::min());
+}
+
 }  // namespace jfpx::inline JFPX_ABI::cuda

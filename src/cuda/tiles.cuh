@@ -61,6 +61,15 @@ __device__ inline unsigned warp_max(unsigned value) {
 #endif
 }
 
+/// Sum of the values of this lane and those below.
+__device__ inline unsigned warp_inclusive_sum(unsigned value) {
+  for (unsigned d = 1; d < 32; d *= 2) {
+    const unsigned below = __shfl_up_sync(kFullWarp, value, d);
+    if (lane_id() >= d) value += below;
+  }
+  return value;
+}
+
 /// Of sums that grow from lane to lane: the lane with the first one beyond i, or the last lane.
 __device__ inline unsigned owner_of(std::uint32_t i, std::uint32_t sum) {
   unsigned owner = 0;

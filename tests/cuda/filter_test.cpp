@@ -62,7 +62,7 @@ bool is_in_reach(const SphereInstance& from, const SphereInstance& to,
   const std::int32_t cells[3] = {cell.x, cell.y, cell.z};
   for (int i = 0; i < 3; ++i) {
     const Real x = from.centre[i];
-    const Real cells_a_metre = i == 0 ? inverse * scale.x_cells : inverse;
+    const Real cells_a_metre = i == 0 ? cuda::inverse_x_of(inverse, scale) : inverse;
     if (cells[i] < cuda::cell_of(cuda::moved(x, -reach), cells_a_metre)) return false;
     if (cells[i] > cuda::cell_of(cuda::moved(x, reach), cells_a_metre)) return false;
   }
@@ -100,6 +100,33 @@ TEST(CudaFilter, DecidesAsTheExactTestDoes) {
   EXPECT_GT(apart, 50'000) << "the hunt must meet pairs that are just apart";
 }
 
+TEST(CudaFilter, ExcessLosesNoTouchingPairAndIsSureOfNoOther) {
+  Random random(base_seed());
+  int touching = 0, apart = 0, sure = 0, excluded = 0;
+  for (int i = 0; i < 2'000'000; ++i) {
+    Pair p = nearly_touching(random);
+    p.a.radius *= 1 + static_cast<Real>(random.below(64)) * (Limits::epsilon() / 2);
+    if (!is_finite(p.a.radius)) continue;
+    const Real sum = p.a.radius + p.b.radius;
+    const Real doubt = cuda::doubt_of(random.below(2) == 0 ? sum : sum * random.uniform(1, 4));
+    const Real excess = cuda::excess(p.a, p.b);
+    const bool is_touching = shared::test_sphere_pair(p.a, p.b).touching != 0;
+    (is_touching ? touching : apart) += 1;
+    if (excess > doubt) {
+      ++excluded;
+      ASSERT_FALSE(is_touching) << "pair " << i << ", " << seed_note();
+    }
+    if (excess < -doubt) {
+      ++sure;
+      ASSERT_TRUE(is_touching) << "pair " << i << ", " << seed_note();
+    }
+  }
+  EXPECT_GT(touching, 400'000) << "the hunt must meet touching pairs";
+  EXPECT_GT(apart, 100'000) << "the hunt must meet pairs that are just apart";
+  EXPECT_GT(sure, 10'000) << "what is never sure would pass";
+  EXPECT_GT(excluded, 1'000) << "what excludes nothing would pass";
+}
+
 // Where the square of the sum overflows, nothing is sure but what is true.
 TEST(CudaFilter, IsRightWhereSquaresOverflow) {
   const Real huge = std::sqrt(Limits::max());
@@ -110,6 +137,9 @@ TEST(CudaFilter, IsRightWhereSquaresOverflow) {
           b{{huge * scale * distance, 0, 0}, huge * scale};
       const bool touching = shared::test_sphere_pair(a, b).touching != 0;
       EXPECT_EQ(cuda::touch(a, b), touching) << scale << " " << distance;
+      const Real doubt = cuda::doubt_of(a.radius + b.radius), excess = cuda::excess(a, b);
+      EXPECT_FALSE(touching && excess > doubt) << scale << " " << distance;
+      EXPECT_FALSE(!touching && excess < -doubt) << scale << " " << distance;
     }
   }
 }
@@ -138,9 +168,12 @@ TEST(CudaGrid, TouchingSpheresAreInReachOfEachOther) {
     Real half_0 = cuda::half_cell_for_radius(std::max(p.a.radius, p.b.radius));
     if (random.below(2) == 0) half_0 = std::max(half_0, half_0 * random.uniform(1, 1000));
     if (!is_finite(half_0)) continue;
-    const cuda::GridScale scale{half_0, static_cast<int>(random.below(cuda::kLastLevel + 1)),
-                                random.below(2) == 0 ? Real(1) : Real(2)};
+    cuda::GridScale scale{half_0, static_cast<int>(random.below(cuda::kLastLevel + 1))};
     const int level_a = cuda::level_of(p.a, scale), level_b = cuda::level_of(p.b, scale);
+    if (random.below(2) == 0) {  // as narrow in x as half the cells of the finer level
+      const Real half = cuda::half_cell_of(half_0, std::max(level_a, level_b));
+      scale.inverse_x = 2 * cuda::inverse_width(half);
+    }
     const auto note = [&] { return "pair " + std::to_string(i) + ", " + seed_note(); };
     if (level_a >= level_b) {
       ASSERT_TRUE(is_in_reach(p.a, p.b, scale)) << note();
