@@ -133,6 +133,14 @@ TEST_F(Cuda, GroupsOfAnySizeHaveTheBitsOfTheHost) {
   }
 }
 
+// For scripts/sanitize-cuda.
+TEST_F(Cuda, FewContactsOfAGroup) {
+  SCOPED_TRACE(seed_note());
+  Random random(base_seed());
+  RandomGroup group(20, 100, random);
+  expect_same(*make_group_solver(0), group, base_seed());
+}
+
 // More contacts than an H200 has threads: each takes several.
 TEST_F(Cuda, MoreContactsThanThreadsHaveTheBitsOfTheHost) {
   Random random(base_seed());

@@ -11,6 +11,7 @@ jfpx_add_test(cuda_test
   SOURCES
     cuda/cuda_test.cpp
     cuda/cuda_fault_test.cpp
+    cuda/cuda_few_test.cpp
     cuda/cuda_huge_test.cpp
     cuda/group_solver_test.cpp
     support/sphere_fixtures.cpp
