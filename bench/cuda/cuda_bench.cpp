@@ -156,8 +156,8 @@ void add_on_device(const std::string& kind, const Input& input, std::size_t n,
 
 void register_all() {
   const Input& gas = input("gas");
-  for (const std::size_t n :
-       {448, 1000, 2000, 4096, 10000, 20000, 32000, 100000, 260000, 270000, 1000000, 10000000}) {
+  for (const std::size_t n : {448, 1000, 2000, 4096, 10000, 20000, 32000, 100000, 260000, 270000,
+                              400000, 1000000, 10000000}) {
     add_on_device("automatic", gas, n, SphereAlgorithm::automatic);
     if (n > 1000 && n <= 32000) add_on_device("all_pairs", gas, n, SphereAlgorithm::all_pairs);
     if (n <= 32000) add_on_device("sorted_tiles", gas, n, SphereAlgorithm::sorted_tiles);
