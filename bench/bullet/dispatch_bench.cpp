@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <chrono>
 #include <string>
+#include <thread>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
@@ -118,9 +119,9 @@ constexpr Size kSizes[] = {{16, 300, 400},  {64, 300, 300},  {256, 300, 200}, {1
                            {4096, 120, 40}, {16384, 60, 11}, {65536, 30, 5}};
 
 void register_dispatch(const std::string& name, const char* scene, const Size& size,
-                       Backend backend) {
+                       const SphereColliderOptions& collider) {
   SceneWorldOptions options;
-  options.dispatch.collider.backend = backend;
+  options.dispatch.collider = collider;
   benchmark::RegisterBenchmark((name + "/" + scene + "/" + std::to_string(size.spheres)).c_str(),
                                [=](benchmark::State& state) {
                                  compare_dispatch(state, scene, size.spheres, size.settle, options);
@@ -141,9 +142,14 @@ void register_all() {
   const bool with_cuda = cuda_is_usable();
   for (const char* scene : {"pile", "gas"}) {
     for (const Size& size : kSizes) {
-      register_dispatch("dispatch", scene, size, Backend::x86);
+      register_dispatch("dispatch", scene, size, {.backend = Backend::x86});
+      for (const unsigned threads : {2u, 4u}) {
+        if (size.spheres < 4096 || threads > std::thread::hardware_concurrency()) continue;
+        register_dispatch("dispatch_threads_" + std::to_string(threads), scene, size,
+                          {.backend = Backend::x86, .threads = threads});
+      }
       if (with_cuda && size.spheres >= 1024) {
-        register_dispatch("dispatch_cuda", scene, size, Backend::cuda);
+        register_dispatch("dispatch_cuda", scene, size, {.backend = Backend::cuda});
       }
     }
   }
