@@ -58,7 +58,6 @@ class BasicContactResolver {
   Patch patch_of(RowIndex worst, Real kept) const;
   void index_rows_by_body();
   std::span<const RowIndex> rows_of(std::uint32_t body) const;
-  void fetch_neighbours(const Row& row) const;
   Vec3 lever_arm(std::uint32_t body, const Contact& contact, Real side) const;
 
   void resolve_positions(ResolverReport* report);
@@ -214,17 +213,6 @@ std::span<const std::uint32_t> BasicContactResolver<Queue>::rows_of(std::uint32_
   return std::span(body_rows_).subspan(first_row_[body], first_row_[body + 1] - first_row_[body]);
 }
 
-/// Asks for the rows that will have to be refreshed, while there is still something to compute:
-/// they are scattered over more memory than the inner caches hold.
-template <class Queue>
-void BasicContactResolver<Queue>::fetch_neighbours(const Row& row) const {
-  for (const std::uint32_t body : {row.a, row.b}) {
-    __builtin_prefetch(&bodies_->moving.inverse_inertia[body]);
-    if (!bodies_->movable(body)) continue;
-    for (const RowIndex i : rows_of(body)) __builtin_prefetch(&rows_[i]);
-  }
-}
-
 template <class Queue>
 std::uint64_t BasicContactResolver<Queue>::limit() const {
   return settings_.max_iterations != 0 ? settings_.max_iterations
@@ -243,7 +231,6 @@ void BasicContactResolver<Queue>::resolve_positions(ResolverReport* report) {
     const Real depth = queue_.key(worst);
     if (!(depth > settings_.position_epsilon)) return;
     if (left == 0) break;
-    fetch_neighbours(rows_[worst]);
     project(patch_of(worst, kept_depth));
     ++report->position_iterations;
   }
@@ -297,7 +284,6 @@ void BasicContactResolver<Queue>::resolve_velocities(ResolverReport* report) {
     const Real wanted = queue_.key(worst);
     if (!(wanted > settings_.velocity_epsilon)) return;
     if (left == 0) break;
-    fetch_neighbours(rows_[worst]);
     const Patch patch = patch_of(worst, 0);
     strike(patch);
     for (const std::uint32_t body : {patch.row.a, patch.row.b}) {
