@@ -4,6 +4,7 @@
 
 #include "src/bullet/contact_scan.hpp"
 #include "src/bullet/device_groups.hpp"
+#include "src/bullet/friction_directions.hpp"
 #include "src/bullet/joint_rows.hpp"
 #include "src/bullet/prefetch.hpp"
 #include "src/bullet/row_inputs.hpp"
@@ -318,51 +319,18 @@ struct ConstraintSolver::Impl {
       if (point.m_appliedImpulse != 0) warm.store(settings.warm_start, std::memory_order_relaxed);
     }
     const unsigned has_second = solver.set_up_contacts(settings, block, inputs, second);
+    Real* const one = solver.friction_rows(block);
+    Real* const two = directions() == 2 ? solver.friction_rows(block, 1) : nullptr;
     for (std::size_t lane = 0; lane < used; ++lane) {
-      set_directions(scan.contacts()[contacts[lane]], block, lane,
-                     (has_second >> lane & 1) != 0 ? second + lane : nullptr);
+      const Real* other = (has_second >> lane & 1) != 0 ? second + lane : nullptr;
+      set_friction_directions(scan.contacts()[contacts[lane]], settings, lanes, other, one + lane,
+                              two != nullptr ? two + lane : nullptr);
     }
     for (std::uint32_t k = 0; k < directions(); ++k) {
       solver.set_up_frictions(settings, block, k, inputs);
     }
   }
 
-  /// Leaves the directions of friction in the contact, as Bullet does, and in the rows.
-  /// @param second the other direction in the plane of the contact, if it does not slide
-  void set_directions(const ContactRef& contact, std::uint32_t block, std::size_t lane,
-                      const Real* second) {
-    const std::size_t lanes = solver.lanes();
-    btManifoldPoint& point = contact.get();
-    Real* const axis = solver.friction_rows(block) + lane;
-    point.m_lateralFrictionDir1.setValue(axis[0], axis[lanes], axis[2 * lanes]);
-    if (second != nullptr) {
-      // Not setValue(): Bullet leaves the fourth component as it was.
-      for (std::size_t i = 0; i < 3; ++i) {
-        point.m_lateralFrictionDir2.m_floats[i] = second[i * lanes];
-      }
-    }
-    if (contact.anisotropic) {
-      turn_by_anisotropy(contact, &point.m_lateralFrictionDir1,
-                         btCollisionObject::CF_ANISOTROPIC_FRICTION);
-      put_lane(axis, lanes, point.m_lateralFrictionDir1);
-    }
-    if (directions() == 1) return;
-    if (second == nullptr) {
-      point.m_lateralFrictionDir2 = point.m_lateralFrictionDir1.cross(point.m_normalWorldOnB);
-      point.m_lateralFrictionDir2.normalize();
-    }
-    if (contact.anisotropic) {
-      turn_by_anisotropy(contact, &point.m_lateralFrictionDir2,
-                         btCollisionObject::CF_ANISOTROPIC_FRICTION);
-    }
-    put_lane(solver.friction_rows(block, 1) + lane, lanes, point.m_lateralFrictionDir2);
-    if (second != nullptr && !settings.friction_follows_velocity) {
-      point.m_contactPointFlags |= BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED;
-    }
-  }
-  static void put_lane(Real* to, std::size_t lanes, const btVector3& v) {
-    for (std::size_t i = 0; i < 3; ++i) to[i * lanes] = v.m_floats[i];
-  }
   void set_up_torsions() {
     BT_PROFILE("set up torsions");
     const auto contact_in = [&](std::uint32_t block, std::size_t lane) -> const ContactRef* {
