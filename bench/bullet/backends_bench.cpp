@@ -96,28 +96,9 @@ void compare(benchmark::State& state, const Case& c, const Rival& rival) {
     stock.step();
     ours.step();
   }
-  Samples stock_samples, our_samples;
-  {
-    const TimedZones timed;
-    bool swap = false;
-    for (auto _ : state) {
-      if (swap) our_samples.step(ours);
-      stock_samples.step(stock);
-      if (!swap) our_samples.step(ours);
-      swap = !swap;
-      state.SetIterationTime(our_samples.total.back() * 1e-3);
-    }
-  }
-  if (ours.state_hash() != stock.state_hash()) state.SkipWithError("the worlds differ");
-  stock_samples.report(state, "stock");
-  our_samples.report(state, "jfpx");
-  std::vector<double> ratios;
-  for (std::size_t k = 0; k < stock_samples.total.size(); ++k) {
-    ratios.push_back(stock_samples.total[k] / our_samples.total[k]);
-  }
-  state.counters["ratio"] = median(ratios);
+  step_in_turn(state, stock, ours);
   const ConstraintSolverStats& stats = ours.jfpx_solver()->stats();
-  const auto steps = static_cast<double>(warm_up) + static_cast<double>(ratios.size());
+  const auto steps = static_cast<double>(warm_up) + static_cast<double>(state.iterations());
   state.counters["groups"] = static_cast<double>(stats.groups) / steps;
   state.counters["on_device"] = static_cast<double>(stats.on_device) / steps;
   state.counters["contacts"] = static_cast<double>(stats.contacts) / steps;

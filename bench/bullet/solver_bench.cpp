@@ -26,24 +26,7 @@ void compare_steps(benchmark::State& state, const char* name, std::uint32_t sphe
     ours.step();
   }
   g_clock = threads == 1 ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC;
-  const TimedZones timed;
-  Samples stock_samples, our_samples;
-  bool swap = false;
-  for (auto _ : state) {
-    if (swap) our_samples.step(ours);
-    stock_samples.step(stock);
-    if (!swap) our_samples.step(ours);
-    swap = !swap;
-    state.SetIterationTime(our_samples.total.back() * 1e-3);
-  }
-  if (stock.state_hash() != ours.state_hash()) state.SkipWithError("the worlds differ");
-  stock_samples.report(state, "stock");
-  our_samples.report(state, "jfpx");
-  std::vector<double> ratios;
-  for (std::size_t i = 0; i < stock_samples.total.size(); ++i) {
-    ratios.push_back(stock_samples.total[i] / our_samples.total[i]);
-  }
-  state.counters["ratio"] = median(ratios);
+  step_in_turn(state, stock, ours);
   const ConstraintSolverStats& stats = ours.jfpx_solver()->stats();
   state.counters["groups"] = static_cast<double>(stats.groups);
   state.counters["contacts"] = static_cast<double>(stats.contacts) /
@@ -83,9 +66,5 @@ void register_all() {
 }  // namespace jfpx::inline JFPX_ABI::bullet
 
 int main(int argc, char** argv) {
-  jfpx::bullet::register_all();
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
-  benchmark::RunSpecifiedBenchmarks();
-  benchmark::Shutdown();
+  return jfpx::bullet::run_benchmarks(argc, argv, jfpx::bullet::register_all);
 }

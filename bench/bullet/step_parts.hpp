@@ -3,6 +3,8 @@
 
 #include <jfpx/bullet/scene_world.hpp>
 
+#include "bench/bullet/series.hpp"
+
 #include <LinearMath/btQuickprof.h>
 #include <benchmark/benchmark.h>
 
@@ -74,12 +76,6 @@ inline void leave_zone() {
   if (zone != nullptr) g_parts[zone->part] += zone->sign * (now_ms() - since);
 }
 
-inline double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 struct Samples {
   std::vector<double> total;
   std::array<std::vector<double>, kParts> parts;
@@ -113,5 +109,29 @@ class TimedZones {
   TimedZones(const TimedZones&) = delete;
   TimedZones& operator=(const TimedZones&) = delete;
 };
+
+/// Steps both worlds, in alternating order, once for each iteration of the benchmark, and reports
+/// medians of their parts and of the ratio of whole steps.
+inline void step_in_turn(benchmark::State& state, SceneWorld& stock, SceneWorld& ours) {
+  Samples stock_samples, our_samples;
+  {
+    const TimedZones timed;
+    bool swap = false;
+    for (auto _ : state) {
+      alternate(
+          swap, [&] { stock_samples.step(stock); }, [&] { our_samples.step(ours); });
+      swap = !swap;
+      state.SetIterationTime(our_samples.total.back() * 1e-3);
+    }
+  }
+  if (stock.state_hash() != ours.state_hash()) state.SkipWithError("the worlds differ");
+  stock_samples.report(state, "stock");
+  our_samples.report(state, "jfpx");
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < stock_samples.total.size(); ++i) {
+    ratios.push_back(stock_samples.total[i] / our_samples.total[i]);
+  }
+  state.counters["ratio"] = median(ratios);
+}
 
 }  // namespace jfpx::inline JFPX_ABI::bullet
