@@ -36,11 +36,11 @@ constexpr double kSlack = 1.5;
 
 }  // namespace
 
-CostChooser::CostChooser(std::vector<Way> ways) {
+CostChooser::CostChooser(const std::vector<Way>& ways) {
   for (const Way& way : ways) ways_.push_back({.way = way});
 }
 
-double CostChooser::cost(const Candidate& c, const ColliderWork& work) const {
+double CostChooser::cost(const Candidate& c, const ColliderWork& work) {
   constexpr double kLeast = 1e-3;  // so that ratios are finite
   return std::max(kLeast, microseconds(c.way.terms, work)) * c.correction;
 }
@@ -111,7 +111,7 @@ void CostChooser::start_trial(std::size_t way, int calls) {
   reason_ = ChoiceReason::trial;
 }
 
-int CostChooser::trial_calls(const Candidate& c, const ColliderWork& work) const {
+int CostChooser::trial_calls(const Candidate& c, const ColliderWork& work) {
   return std::max(kCallsToSettle, static_cast<int>(kTrialUs / std::max(1.0, cost(c, work))));
 }
 

@@ -28,7 +28,7 @@ class JFPX_API CostChooser {
   };
 
   /// At least one of `ways` is not dormant.
-  explicit CostChooser(std::vector<Way> ways);
+  explicit CostChooser(const std::vector<Way>& ways);
 
   Decision choose(const ColliderWork& expected);
   /// What the call for which choose() was asked last had to do, and how long it took.
@@ -59,9 +59,9 @@ class JFPX_API CostChooser {
     double patience = 1;                    ///< grows with each trial that was in vain
   };
 
-  double cost(const Candidate& c, const ColliderWork& work) const;
+  static double cost(const Candidate& c, const ColliderWork& work);
   std::size_t cheapest(const ColliderWork& work, bool dormant) const;
-  int trial_calls(const Candidate& c, const ColliderWork& work) const;
+  static int trial_calls(const Candidate& c, const ColliderWork& work);
   std::size_t due_for_trial(const ColliderWork& work) const;
   void forget_if_size_changed(const ColliderWork& work);
   void decide(const ColliderWork& work);

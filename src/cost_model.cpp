@@ -77,7 +77,7 @@ std::string fault_of(const std::string& name, double value) {
 // From jfpx calibrate on those two machines. Double costs what twice
 // as wide data cost.
 CostModel::CostModel() {
-  constexpr double kWide = sizeof(Real) / 4;
+  constexpr double kWide = sizeof(Real) / 4.0;
   x86_all_pairs = {.call_us = 0.05, .sphere_ns = 6, .pair_ns = 0.175 * kWide, .contact_ns = 5};
   x86_sorted_tiles = {.call_us = 0.2, .sphere_ns = 52 * kWide, .contact_ns = 11};
   x86_given_pairs = {.call_us = 0.05, .pair_ns = 5};

@@ -222,11 +222,13 @@ std::optional<StateDifference> first_difference(std::span<const BodyState> expec
                                                 std::span<const BodyState> actual) {
   const std::size_t common = std::min(expected.size(), actual.size());
   for (std::size_t body = 0; body < common; ++body) {
+    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits are what is compared
     if (std::memcmp(&expected[body], &actual[body], sizeof(BodyState)) == 0) continue;
     Real e[kRealsPerBody], a[kRealsPerBody];
     std::memcpy(e, &expected[body], sizeof e);
     std::memcpy(a, &actual[body], sizeof a);
     for (const Field& field : kFields) {
+      // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits are what is compared
       if (std::memcmp(&e[field.index], &a[field.index], sizeof(Real)) != 0) {
         return StateDifference{static_cast<std::uint32_t>(body), field.name, e[field.index],
                                a[field.index]};

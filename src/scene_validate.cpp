@@ -76,7 +76,7 @@ std::string find_moments_fault(const Vec3& moments) {
 }
 
 std::string find_fault(const Sphere& sphere, Real mass) {
-  const std::string found = find_fault(sphere);
+  std::string found = find_fault(sphere);
   if (!found.empty() || mass == 0) return found;
   const Real inertia = shared::moments_of_inertia(sphere, mass).x;
   if (has_inverse(inertia)) return {};
@@ -84,7 +84,7 @@ std::string find_fault(const Sphere& sphere, Real mass) {
 }
 
 std::string find_fault(const Box& box, Real mass) {
-  const std::string found = find_fault(box);
+  std::string found = find_fault(box);
   if (!found.empty() || mass == 0) return found;
   return find_moments_fault(shared::moments_of_inertia(box, mass));
 }
@@ -106,7 +106,7 @@ std::string find_fault(const Assembly& assembly, Real mass) {
   }
   if (mass == 0) return {};
   const MassProperties whole = mass_properties(assembly, mass);
-  const std::string found = find_moments_fault(principal_inertia(whole.inertia).moments);
+  std::string found = find_moments_fault(principal_inertia(whole.inertia).moments);
   if (!found.empty() || length(whole.centre) <= reach * kUnitTolerance) return found;
   return fault("centre of mass of parts", whole.centre,
                "the origin, to a thousandth of the body's reach; centred() moves it there");

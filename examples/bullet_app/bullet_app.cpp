@@ -28,7 +28,8 @@ int main() {
   for (int i = 0; i < 1000; ++i) {
     bodies.push_back(std::make_unique<btRigidBody>(1, nullptr, &sphere_shape, inertia));
     // Ten layers of ten by ten, leaning a little so that they tumble.
-    const btVector3 cell(btScalar(i % 10), btScalar(i / 100), btScalar(i / 10 % 10));
+    const int column = i % 10, row = i / 10 % 10, layer = i / 100;
+    const btVector3 cell{btScalar(column), btScalar(layer), btScalar(row)};
     bodies.back()->getWorldTransform().setOrigin(
         cell * btScalar(0.95) + btVector3(cell.y() * btScalar(0.1), btScalar(0.5), 0));
   }

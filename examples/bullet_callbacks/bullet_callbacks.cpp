@@ -53,9 +53,10 @@ void fill(btDiscreteDynamicsWorld* world, btCollisionShape* shape,
     bodies->push_back(std::make_unique<btRigidBody>(1, nullptr, shape, inertia));
     btRigidBody& body = *bodies->back();
     body.setUserIndex(i);
-    body.getWorldTransform().setOrigin(btVector3(
-        btScalar(i % 4) * btScalar(0.9) + btScalar(0.01) * btScalar(i),
-        btScalar(0.5) + btScalar(i / 16) * btScalar(0.9), btScalar(i / 4 % 4) * btScalar(0.9)));
+    const int column = i % 4, row = i / 4 % 4, layer = i / 16;
+    body.getWorldTransform().setOrigin(
+        btVector3(btScalar(column) * btScalar(0.9) + btScalar(0.01) * btScalar(i),
+                  btScalar(0.5) + btScalar(layer) * btScalar(0.9), btScalar(row) * btScalar(0.9)));
     int flags = body.getCollisionFlags();
     if (i % 3 == 0) flags |= btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK;
     if (i == kSensor) flags |= btCollisionObject::CF_NO_CONTACT_RESPONSE;

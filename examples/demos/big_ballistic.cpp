@@ -64,7 +64,7 @@ bool BigBallistic::hit_a_crate(BodyId round) const {
 /// A round that hits a crate has pushed it when it is taken away. Grounds and other rounds it meets
 /// as any body does; in the original it passed through both.
 StepReport BigBallistic::advance() {
-  const StepReport report = world_.step();
+  StepReport report = world_.step();
   std::vector<BodyId> gone;  // all are asked before any is removed, which ends all contacts
   for (const Round& round : rounds_) {
     const double age = world_.time() - round.fired;

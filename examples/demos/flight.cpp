@@ -182,7 +182,7 @@ void Flight::act(std::size_t control) {
 }
 
 StepReport Flight::advance() {
-  const StepReport report = world_.step();
+  StepReport report = world_.step();
   keep_above_ground();
   return report;
 }

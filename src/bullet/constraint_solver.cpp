@@ -298,7 +298,7 @@ struct ConstraintSolver::Impl {
       }
     });
   }
-  void prefetch_block(std::uint32_t block) {
+  void prefetch_block(std::uint32_t block) const {
     for (std::size_t lane = 0; lane < solver.lanes(); ++lane) {
       const std::uint32_t contact = solver.contacts_of(block)[lane];
       if (contact == x86::RowSolver::kNoContact) return;

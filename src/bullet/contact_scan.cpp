@@ -37,7 +37,8 @@ Side side_of(btCollisionObject* object, std::span<const std::uint8_t> marks) {
 }
 
 btCollisionObject* object_of(const btCollisionObject* object) {
-  return const_cast<btCollisionObject*>(object);  // as Bullet's own solver does
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): as Bullet's own solver does
+  return const_cast<btCollisionObject*>(object);
 }
 
 }  // namespace

@@ -254,7 +254,7 @@ void DeviceGroups::write_back(const DeviceGroup& group) const {
 
 /// As Bullet leaves a point: see ConstraintSolver's set_directions().
 void DeviceGroups::write_back(const DeviceGroup& group, const rows::ContactOutcome& from,
-                              btManifoldPoint& point) const {
+                              btManifoldPoint& point) {
   point.m_lateralFrictionDir1.setValue(from.direction[0], from.direction[1], from.direction[2]);
   if (from.has_second != 0) {
     // Not setValue(): Bullet leaves the fourth component as it was.

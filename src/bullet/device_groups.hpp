@@ -69,8 +69,8 @@ class DeviceGroups {
                      std::size_t last);
   std::size_t number_torsions(const ContactScan& scan);
   rows::RowSweepReport solve_packed(const DeviceGroup& group);
-  void write_back(const DeviceGroup& group, const rows::ContactOutcome& from,
-                  btManifoldPoint& point) const;
+  static void write_back(const DeviceGroup& group, const rows::ContactOutcome& from,
+                         btManifoldPoint& point);
   void start();
   void give_up(const std::string& why);
 

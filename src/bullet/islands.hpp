@@ -44,7 +44,7 @@ class IslandSolver {
     int island, uid0, uid1, index;
   };
 
-  void update_sleep(btCollisionObjectArray& objects, btUnionFind& unions);
+  static void update_sleep(btCollisionObjectArray& objects, btUnionFind& unions);
   void collect_manifolds(btCollisionWorld& world);
   bool collect_at_once(btDispatcher& dispatcher, bool only_touching);
   void sort_manifolds(bool by_pair);

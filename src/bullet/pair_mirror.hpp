@@ -71,6 +71,7 @@ class PairMirror {
              (reinterpret_cast<std::uintptr_t>(manifold) & (kKind | kFleeting)) == 0;
     }
     btPersistentManifold* manifold() const {
+      // NOLINTNEXTLINE(performance-no-int-to-ptr): the word also holds the kind
       return reinterpret_cast<btPersistentManifold*>(bits_ & ~(kKind | kFleeting));
     }
     PairKind kind() const { return static_cast<PairKind>(bits_ & kKind); }

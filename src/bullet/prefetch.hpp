@@ -14,6 +14,7 @@ namespace jfpx::inline JFPX_ABI::bullet {
 /// Some bytes behind an address that may be null or of something that has gone: there, arithmetic
 /// with pointers is undefined.
 inline void prefetch_at(const void* address, std::size_t bytes) {
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): nothing is read through it
   prefetch(reinterpret_cast<const void*>(reinterpret_cast<std::uintptr_t>(address) + bytes));
 }
 

@@ -221,8 +221,8 @@ struct SceneWorld::Impl {
   StageTimes times;
   std::unique_ptr<btDiscreteDynamicsWorld> world;
 
-  Impl(const Scene& source, const SceneWorldOptions& options)
-      : scene(source),
+  Impl(Scene source, const SceneWorldOptions& options)
+      : scene(std::move(source)),
         shapes(options.share_shapes),
         dispatcher(make_dispatcher(&configuration, options)),
         solver(make_solver(options)),

@@ -57,6 +57,7 @@ class Torsions {
 void turn_by_anisotropy(const ContactRef& contact, btVector3* axis, int mode) {
   for (const btCollisionObject* object :
        {contact.manifold->getBody0(), contact.manifold->getBody1()}) {
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): it only reads
     Access::applyAnisotropicFriction(const_cast<btCollisionObject*>(object), *axis, mode);
   }
 }

@@ -288,6 +288,7 @@ class RowWalker {
     Cell read[kBodyCells];
     for (int c = 0; c < kBodyCells; ++c) read[c] = Cells::load(cells + c);
     std::uint32_t missing = 0;
+    // NOLINTNEXTLINE(modernize-loop-convert): as above, so that devices keep `read` in registers
     for (int c = 0; c < kBodyCells; ++c) {
       if (turn - read[c].turn > missing) missing = turn - read[c].turn;
     }

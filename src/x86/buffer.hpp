@@ -50,16 +50,18 @@ class Buffer {
 
  private:
   static constexpr std::size_t kHugePage = std::size_t{1} << 21;
+  // NOLINTNEXTLINE(bugprone-sizeof-expression): T may well be a pointer
+  static constexpr std::size_t kElement = sizeof(T);
 
   static std::align_val_t alignment(std::size_t bytes) {
     return std::align_val_t{bytes >= 2 * kHugePage ? kHugePage : 64};
   }
 
   static T* allocate(std::size_t count, const char* purpose) {
-    if (count > std::numeric_limits<std::ptrdiff_t>::max() / sizeof(T)) {
+    if (count > std::numeric_limits<std::ptrdiff_t>::max() / kElement) {
       throw OutOfMemory(std::to_string(count) + " " + purpose + " are more than can be addressed");
     }
-    const std::size_t bytes = count * sizeof(T);
+    const std::size_t bytes = count * kElement;
     void* memory = nullptr;
     try {
       memory = ::operator new(bytes, alignment(bytes));
@@ -73,7 +75,7 @@ class Buffer {
     return static_cast<T*>(memory);
   }
   static void release(T* data, std::size_t capacity) noexcept {
-    if (data != nullptr) ::operator delete(data, alignment(capacity * sizeof(T)));
+    if (data != nullptr) ::operator delete(data, alignment(capacity * kElement));
   }
 
   T* data_ = nullptr;

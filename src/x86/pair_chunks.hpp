@@ -53,9 +53,8 @@ class PairChunks {
   };
 
   struct Filler : PairSink {
-    explicit Filler(Chunk* c) : PairSink{c->pairs.data(), nullptr, grow_chunk}, chunk(c) {
-      end = next + c->pairs.capacity();
-    }
+    explicit Filler(Chunk* c)
+        : PairSink{c->pairs.data(), c->pairs.data() + c->pairs.capacity(), grow_chunk}, chunk(c) {}
     void close() { chunk->count = static_cast<std::size_t>(next - chunk->pairs.data()); }
 
     static void grow_chunk(PairSink* sink) {

@@ -40,11 +40,11 @@ inline constexpr std::size_t kPairLanes = 4;
 
 struct SphereLanes {
   SphereLanes(const SphereInstance& s, const SphereInstance& t, const SphereInstance& u,
-              const SphereInstance& v) {
-    x = _mm_loadu_ps(&s.centre.x);
-    y = _mm_loadu_ps(&t.centre.x);
-    z = _mm_loadu_ps(&u.centre.x);
-    radius = _mm_loadu_ps(&v.centre.x);
+              const SphereInstance& v)
+      : x(_mm_loadu_ps(&s.centre.x)),
+        y(_mm_loadu_ps(&t.centre.x)),
+        z(_mm_loadu_ps(&u.centre.x)),
+        radius(_mm_loadu_ps(&v.centre.x)) {
     _MM_TRANSPOSE4_PS(x, y, z, radius);
   }
   __m128 x, y, z, radius;
