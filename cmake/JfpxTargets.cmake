@@ -71,6 +71,12 @@ function(_jfpx_configure target suffix public private)
   set_target_properties(${target} PROPERTIES
     CXX_EXTENSIONS OFF CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON
     CUDA_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
+  # Tests stay as they are: they are most of what there is to compile. Less optimised, intrinsics' own
+  # headers look uninitialised to g++.
+  if(JFPX_COVERAGE AND NOT suffix AND CMAKE_CURRENT_SOURCE_DIR MATCHES "^${PROJECT_SOURCE_DIR}/src")
+    target_compile_options(${target} PRIVATE -O1 --coverage -fprofile-update=atomic -Wno-uninitialized)
+    target_link_options(${target} PUBLIC --coverage)
+  endif()
   # Tools that read sources (clangd, clang-tidy) shall read each once.
   if(suffix)
     set_target_properties(${target} PROPERTIES EXPORT_COMPILE_COMMANDS OFF)
