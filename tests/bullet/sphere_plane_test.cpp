@@ -5,9 +5,7 @@
 
 #include <BulletCollision/CollisionDispatch/btConvexPlaneCollisionAlgorithm.h>
 
-#include <array>
 #include <cmath>
-#include <limits>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
@@ -119,16 +117,12 @@ TEST(SpherePlane, HasEveryBitOfExtremeNumbersOrLeavesThem) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   Random random(seed);
-  using Limits = std::numeric_limits<Real>;
-  const std::array extremes = {
-      Real(0),        -Real(0),           Limits::denorm_min(), Limits::min(), Limits::max(),
-      -Limits::max(), Limits::infinity(), Limits::quiet_NaN(),  Real(1e6),     Real(1e-6)};
   Tally tally;
   for (int i = 0; i < 3000; ++i) {
     Meeting meeting(random);
     for (int k = 0; k < 3; ++k) {
       meeting.place(random);
-      const Real extreme = extremes[random.below(extremes.size())];
+      const Real extreme = random_extreme(random);
       const int axis = static_cast<int>(random.below(3));
       switch (k == 0 ? 0 : random.below(4)) {
         case 0:

@@ -12,6 +12,8 @@
 
 #include <cstdlib>
 #include <functional>
+#include <iterator>
+#include <limits>
 #include <memory>
 #include <random>
 #include <string>
@@ -23,6 +25,15 @@ namespace jfpx::inline JFPX_ABI::bullet {
 inline std::uint64_t test_seed() {
   const char* fixed = std::getenv("JFPX_TEST_SEED");
   return fixed != nullptr ? std::strtoull(fixed, nullptr, 0) : std::random_device{}();
+}
+
+/// A number that arithmetic stumbles over.
+inline Real random_extreme(Random& random) {
+  using Limits = std::numeric_limits<Real>;
+  constexpr Real kExtremes[] = {
+      Real(0),        -Real(0),           Limits::denorm_min(), Limits::min(), Limits::max(),
+      -Limits::max(), Limits::infinity(), Limits::quiet_NaN(),  Real(1e6),     Real(1e-6)};
+  return kExtremes[random.below(std::size(kExtremes))];
 }
 
 /// Steps of random worlds to run; JFPX_TEST_WORLD_STEPS asks for more, or for less.
