@@ -5,11 +5,11 @@
 
 #include <jfpx/math.hpp>
 
+#include "src/bullet/body_wrapper.hpp"
 #include "src/bullet/sphere_box.hpp"
 #include "src/bullet/sphere_plane.hpp"
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
-#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/CollisionShapes/btConvexInternalShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
@@ -93,10 +93,8 @@ bool update_sphere_plane(btPersistentManifold* manifold, const btCollisionObject
   if (!is_finite(sum.x() + sum.y() + sum.z() + contact.distance)) return false;
   const bool touching = contact.distance < manifold->getContactBreakingThreshold();
   if (!touching && manifold->getNumContacts() == 0) return true;
-  const btCollisionObjectWrapper a(nullptr, body_a.getCollisionShape(), &body_a,
-                                   body_a.getWorldTransform(), -1, -1);
-  const btCollisionObjectWrapper b(nullptr, body_b.getCollisionShape(), &body_b,
-                                   body_b.getWorldTransform(), -1, -1);
+  const btCollisionObjectWrapper a = wrapper_of(body_a);
+  const btCollisionObjectWrapper b = wrapper_of(body_b);
   btManifoldResult result(&a, &b);
   result.setPersistentManifold(manifold);
   if (touching) {
@@ -124,8 +122,8 @@ bool update_sphere_box(btPersistentManifold* manifold, const btCollisionObject& 
   const SphereBoxAnswer answer = find_closest_points(input, &contact);
   if (answer == SphereBoxAnswer::unknown) return false;
   if (answer == SphereBoxAnswer::apart && manifold->getNumContacts() == 0) return true;
-  const btCollisionObjectWrapper a(nullptr, shape_a, &body_a, input.pose_a, -1, -1);
-  const btCollisionObjectWrapper b(nullptr, shape_b, &body_b, input.pose_b, -1, -1);
+  const btCollisionObjectWrapper a = wrapper_of(body_a);
+  const btCollisionObjectWrapper b = wrapper_of(body_b);
   btManifoldResult result(&a, &b);
   result.setPersistentManifold(manifold);
   if (answer == SphereBoxAnswer::contact) {

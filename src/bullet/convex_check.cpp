@@ -1,7 +1,8 @@
 /// Recomputes pairs of a sphere and a box or a plane with Bullet's own algorithm and compares.
 #include "src/bullet/convex_check.hpp"
 
-#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+#include "src/bullet/body_wrapper.hpp"
+
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 
 #include <algorithm>
@@ -16,10 +17,8 @@ std::optional<FieldDifference> check_update(btCollisionAlgorithm& algorithm,
                                             const btPersistentManifold& before,
                                             btPersistentManifold* manifold) {
   const btPersistentManifold ours = std::exchange(*manifold, before);
-  const btCollisionObjectWrapper a(nullptr, body_a.getCollisionShape(), &body_a,
-                                   body_a.getWorldTransform(), -1, -1);
-  const btCollisionObjectWrapper b(nullptr, body_b.getCollisionShape(), &body_b,
-                                   body_b.getWorldTransform(), -1, -1);
+  const btCollisionObjectWrapper a = wrapper_of(body_a);
+  const btCollisionObjectWrapper b = wrapper_of(body_b);
   btManifoldResult result(&a, &b);
   algorithm.processCollision(&a, &b, info, &result);
   const btPersistentManifold expected = std::exchange(*manifold, ours);

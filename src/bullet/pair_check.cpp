@@ -1,7 +1,8 @@
 /// Recomputes a sphere pair with Bullet's own algorithm and compares.
 #include "src/bullet/pair_check.hpp"
 
-#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+#include "src/bullet/body_wrapper.hpp"
+
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
 
@@ -42,10 +43,8 @@ std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDisp
   const CallbacksOff callbacks_off;
   btPersistentManifold scratch(&body_a, &body_b, 0, thresholds.getContactBreakingThreshold(),
                                thresholds.getContactProcessingThreshold());
-  const btCollisionObjectWrapper a(nullptr, body_a.getCollisionShape(), &body_a,
-                                   body_a.getWorldTransform(), -1, -1);
-  const btCollisionObjectWrapper b(nullptr, body_b.getCollisionShape(), &body_b,
-                                   body_b.getWorldTransform(), -1, -1);
+  const btCollisionObjectWrapper a = wrapper_of(body_a);
+  const btCollisionObjectWrapper b = wrapper_of(body_b);
   btManifoldResult out(&a, &b);
   const btCollisionAlgorithmConstructionInfo construction(dispatcher, 1);
   btSphereSphereCollisionAlgorithm algorithm(&scratch, construction, &a, &b);

@@ -1,0 +1,16 @@
+/// A body as Bullet's algorithms want to be handed it.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <BulletCollision/CollisionDispatch/btCollisionObject.h>
+#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+
+namespace jfpx::inline JFPX_ABI::bullet {
+
+/// As the dispatcher makes it: no child of another shape.
+inline btCollisionObjectWrapper wrapper_of(const btCollisionObject& body) {
+  return {nullptr, body.getCollisionShape(), &body, body.getWorldTransform(), -1, -1};
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bullet
