@@ -27,6 +27,7 @@ if(ALL)
   endforeach()
 endif()
 
+cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
 foreach(compiler IN ITEMS g++ clang++)
   find_program(path_of_${compiler} ${compiler})
   if(NOT path_of_${compiler})
@@ -41,7 +42,7 @@ foreach(compiler IN ITEMS g++ clang++)
         -DCMAKE_CXX_COMPILER=${path_of_${compiler}} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
         -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS=${flavour} -DCONFIG_DIR=${CONFIG_DIR}
       OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
-    execute_process(COMMAND ${CMAKE_COMMAND} --build ${build} --parallel 2
+    execute_process(COMMAND ${CMAKE_COMMAND} --build ${build} --parallel ${processors}
       OUTPUT_VARIABLE output RESULT_VARIABLE result)
     if(NOT result EQUAL 0)
       message(FATAL_ERROR "${compiler} ${flavour} does not build:\n${output}")
