@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <ranges>
 #include <typeinfo>
 #include <utility>
 
@@ -65,11 +64,20 @@ class Committer {
           batch_.kind(i) == PairKind::spheres && batch_.manifold(i)->getNumContacts() == 0;
       count += enough ? 0 : 1;
     }
-    const std::span touching(next_, first_contact({next_, last_}, end_));
-    const auto merged = std::ranges::set_union(std::span(found_).first(count),
-                                               touching | std::views::transform(&PairContact::pair),
-                                               visits_.begin());
-    return {visits_.begin(), merged.out};
+    return with_touching({found_.data(), count});
+  }
+  /// The union of two ascending lists: `found`, and the pairs of this part that touch.
+  std::span<const std::uint32_t> with_touching(std::span<const std::uint32_t> found) {
+    auto out = visits_.begin();
+    const PairContact* touching = next_;
+    const PairContact* const end = first_contact({next_, last_}, end_);
+    for (const std::uint32_t i : found) {
+      while (touching != end && touching->pair < i) *out++ = touching++->pair;
+      if (touching != end && touching->pair == i) ++touching;
+      *out++ = i;
+    }
+    while (touching != end) *out++ = touching++->pair;
+    return {visits_.begin(), out};
   }
   void ask_for_count(std::size_t i) const {
     if (batch_.kind(i) == PairKind::spheres) prefetch_count(batch_.manifold(i));
