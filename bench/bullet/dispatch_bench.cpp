@@ -115,8 +115,8 @@ struct Size {
   std::uint32_t spheres;
   int settle, samples;
 };
-constexpr Size kSizes[] = {{16, 300, 400},  {64, 300, 300},  {256, 300, 200}, {1024, 200, 100},
-                           {4096, 120, 40}, {16384, 60, 11}, {65536, 30, 5}};
+constexpr Size kSizes[] = {{16, 300, 400},  {64, 300, 300},   {256, 300, 200}, {1024, 200, 100},
+                           {4096, 120, 40}, {16384, 120, 11}, {65536, 120, 7}};
 
 void register_dispatch(const std::string& name, const char* scene, const Size& size,
                        const SphereColliderOptions& collider) {
