@@ -11,58 +11,48 @@
 namespace jfpx::inline JFPX_ABI::x86 {
 
 #if defined(JFPX_DOUBLE_PRECISION)
-inline constexpr std::size_t kPairLanes = 2;
+using RealLanes = __m128d;
+inline RealLanes square_root(RealLanes x) { return _mm_sqrt_pd(x); }
+/// One bit a lane: set unless x is greater than y.
+inline int not_greater(RealLanes x, RealLanes y) { return _mm_movemask_pd(_mm_cmpngt_pd(x, y)); }
+#else
+using RealLanes = __m128;
+inline RealLanes square_root(RealLanes x) { return _mm_sqrt_ps(x); }
+/// One bit a lane: set unless x is greater than y.
+inline int not_greater(RealLanes x, RealLanes y) { return _mm_movemask_ps(_mm_cmpngt_ps(x, y)); }
+#endif
+inline constexpr std::size_t kPairLanes = sizeof(RealLanes) / sizeof(Real);
 
+/// The same sphere, first or second, of as many pairs.
 struct SphereLanes {
-  SphereLanes(const SphereInstance& s, const SphereInstance& t) {
-    const __m128d xy0 = _mm_loadu_pd(&s.centre.x), zr0 = _mm_loadu_pd(&s.centre.z);
-    const __m128d xy1 = _mm_loadu_pd(&t.centre.x), zr1 = _mm_loadu_pd(&t.centre.z);
+  SphereLanes(const SphereInstance* spheres, const SpherePair* pairs,
+              SphereIndex SpherePair::*which) {
+    const auto real = [&](std::size_t i) { return &spheres[pairs[i].*which].centre.x; };
+#if defined(JFPX_DOUBLE_PRECISION)
+    const RealLanes xy0 = _mm_loadu_pd(real(0)), zr0 = _mm_loadu_pd(real(0) + 2);
+    const RealLanes xy1 = _mm_loadu_pd(real(1)), zr1 = _mm_loadu_pd(real(1) + 2);
     x = _mm_unpacklo_pd(xy0, xy1);
     y = _mm_unpackhi_pd(xy0, xy1);
     z = _mm_unpacklo_pd(zr0, zr1);
     radius = _mm_unpackhi_pd(zr0, zr1);
-  }
-  __m128d x, y, z, radius;
-};
-
-/// One bit a pair: set unless the distance of the centres is greater than the sum of the radii.
-inline unsigned touching_lanes(const SphereInstance* spheres, const SpherePair* pairs) {
-  const SphereLanes a(spheres[pairs[0].a], spheres[pairs[1].a]);
-  const SphereLanes b(spheres[pairs[0].b], spheres[pairs[1].b]);
-  const __m128d x = _mm_sub_pd(a.x, b.x), y = _mm_sub_pd(a.y, b.y), z = _mm_sub_pd(a.z, b.z);
-  const __m128d square =
-      _mm_add_pd(_mm_add_pd(_mm_mul_pd(x, x), _mm_mul_pd(y, y)), _mm_mul_pd(z, z));
-  const __m128d sum = _mm_add_pd(a.radius, b.radius);
-  return static_cast<unsigned>(_mm_movemask_pd(_mm_cmpngt_pd(_mm_sqrt_pd(square), sum)));
-}
 #else
-inline constexpr std::size_t kPairLanes = 4;
-
-struct SphereLanes {
-  SphereLanes(const SphereInstance& s, const SphereInstance& t, const SphereInstance& u,
-              const SphereInstance& v)
-      : x(_mm_loadu_ps(&s.centre.x)),
-        y(_mm_loadu_ps(&t.centre.x)),
-        z(_mm_loadu_ps(&u.centre.x)),
-        radius(_mm_loadu_ps(&v.centre.x)) {
+    x = _mm_loadu_ps(real(0));
+    y = _mm_loadu_ps(real(1));
+    z = _mm_loadu_ps(real(2));
+    radius = _mm_loadu_ps(real(3));
     _MM_TRANSPOSE4_PS(x, y, z, radius);
+#endif
   }
-  __m128 x, y, z, radius;
+  RealLanes x, y, z, radius;
 };
 
 /// One bit a pair: set unless the distance of the centres is greater than the sum of the radii.
 inline unsigned touching_lanes(const SphereInstance* spheres, const SpherePair* pairs) {
-  const SphereLanes a(spheres[pairs[0].a], spheres[pairs[1].a], spheres[pairs[2].a],
-                      spheres[pairs[3].a]);
-  const SphereLanes b(spheres[pairs[0].b], spheres[pairs[1].b], spheres[pairs[2].b],
-                      spheres[pairs[3].b]);
-  const __m128 x = _mm_sub_ps(a.x, b.x), y = _mm_sub_ps(a.y, b.y), z = _mm_sub_ps(a.z, b.z);
-  const __m128 square =
-      _mm_add_ps(_mm_add_ps(_mm_mul_ps(x, x), _mm_mul_ps(y, y)), _mm_mul_ps(z, z));
-  const __m128 sum = _mm_add_ps(a.radius, b.radius);
-  return static_cast<unsigned>(_mm_movemask_ps(_mm_cmpngt_ps(_mm_sqrt_ps(square), sum)));
+  const SphereLanes a(spheres, pairs, &SpherePair::a), b(spheres, pairs, &SpherePair::b);
+  const RealLanes x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
+  return static_cast<unsigned>(
+      not_greater(square_root(x * x + y * y + z * z), a.radius + b.radius));
 }
-#endif
 static_assert(sizeof(SphereInstance) == 4 * sizeof(Real));
 
 /// Writes the positions in the list, ascending, of all pairs that touch, and of a few more at its
