@@ -1,13 +1,13 @@
-/// All pairs by tiles (thesis 4.5.2): spheres of a tile's columns in shared memory, those of its
-/// rows in registers. The outcome is a bit matrix, from which contacts come out in canonical order.
-#include "src/cuda/sphere_filter.hpp"
+/// All pairs by tiles (thesis 4.5.2): the spheres of a tile's rows and columns in shared memory, on
+/// a lattice around them all. The outcome is a bit matrix, from which contacts come out in
+/// canonical order.
+#include "src/cuda/lattice.cuh"
 #include "src/cuda/tiles.cuh"
 
 namespace jfpx::inline JFPX_ABI::cuda {
 namespace {
 
-constexpr unsigned kThreads = 128;
-constexpr unsigned kRows = kTile / kThreads;  // rows of a thread
+constexpr unsigned kThreads = kTile;  // one a row
 constexpr unsigned kEmitThreads = 256;
 
 /// Row r of tiles has tiles - r tiles on and right of the diagonal. A band's first row of tiles is
@@ -22,27 +22,27 @@ __host__ __device__ TileGrid tile_grid(const AllPairsArgs& args) {
   return {(args.n + kTile - 1) / kTile, args.first_row / kTile, (args.rows + kTile - 1) / kTile};
 }
 
-/// Clears the bits of `word` whose spheres do not touch `a`.
-__device__ std::uint32_t exactly_touching(std::uint32_t word, const SphereInstance& a,
-                                          const SphereInstance* b) {
-  for (std::uint32_t left = word; left != 0; left &= left - 1) {
-    const int k = __ffs(static_cast<int>(left)) - 1;
-    if (shared::test_sphere_pair(a, b[k]).touching == 0) word &= ~(1u << k);
-  }
-  return word;
-}
+struct TileStorage {
+  SphereInstance columns[kTile];
+  LatticeRecord row_records[kTile], column_records[kTile];
+  std::uint32_t words[kTile][kWordsPerTile + 1];
+  LatticeStorage lattice;
+};
 
-/// The bits of word `first_b / 32` of row `a` that stand for pairs: a < b < n.
-__device__ std::uint32_t pair_bits(std::uint32_t a, std::uint32_t first_b, std::uint32_t n) {
-  std::uint32_t bits = n <= first_b ? 0 : n - first_b >= 32 ? ~0u : (1u << (n - first_b)) - 1;
-  if (a >= first_b) bits &= a - first_b >= 31 ? 0 : ~0u << (a - first_b + 1);
-  return bits;
+/// Fills the words of the 32 rows of a warp: which columns of the tile they may touch.
+__device__ void fill_words(TileStorage& s) {
+  const unsigned first_row = threadIdx.x - lane_id();
+  const LatticeFragment rows = load_fragment(s.row_records + first_row);
+  for (unsigned w = 0; w < kWordsPerTile; ++w) {
+    const LatticeFragment columns = load_fragment(s.column_records + 32 * w);
+    put_bytes(lattice_bytes(rows, columns), &s.words[first_row][w], kWordsPerTile + 1);
+  }
+  __syncwarp();
 }
 
 __global__ void __launch_bounds__(kThreads) all_pairs(AllPairsArgs args) {
   wait_for_previous_kernel();
-  __shared__ SphereInstance columns[kTile];
-  __shared__ std::uint32_t words[kTile][kWordsPerTile + 1];
+  __shared__ TileStorage s;
   const TileGrid grid = tile_grid(args);
   std::uint32_t tile_row = grid.first + blockIdx.y;
   std::uint32_t tile_column = tile_row + blockIdx.x;
@@ -52,45 +52,28 @@ __global__ void __launch_bounds__(kThreads) all_pairs(AllPairsArgs args) {
     tile_row = grid.first + mirrored;
     tile_column = tile_column - grid.tiles + tile_row;
   }
-  const std::uint32_t first_b = tile_column * kTile;
   const std::uint32_t last = args.n - 1;
+  const std::uint32_t a = tile_row * kTile + threadIdx.x, first_b = tile_column * kTile;
 
-  SphereInstance row[kRows];
-  std::uint32_t count[kRows] = {};
-  for (unsigned r = 0; r < kRows; ++r) {
-    const std::uint32_t a = tile_row * kTile + r * kThreads + threadIdx.x;
-    const std::uint32_t b = first_b + r * kThreads + threadIdx.x;
-    row[r] = load_sphere(args.spheres + min(a, last));
-    columns[r * kThreads + threadIdx.x] = load_sphere(args.spheres + min(b, last));
-    if (tile_row == tile_column && a <= last && !is_valid(row[r])) report_invalid(args.state, a);
-  }
+  const SphereInstance row = load_sphere(args.spheres + min(a, last));
+  const SphereInstance column = load_sphere(args.spheres + min(first_b + threadIdx.x, last));
+  if (tile_row == tile_column && a <= last && !is_valid(row)) report_invalid(args.state, a);
+  s.columns[threadIdx.x] = column;
+  const Lattice lattice = lattice_of_block(row, column, s.lattice);
+  s.row_records[threadIdx.x] = record_of(row_terms(on_lattice(lattice, row)));
+  s.column_records[place_of_column(threadIdx.x)] =
+      record_of(column_terms(on_lattice(lattice, column)));
   __syncthreads();
+  fill_words(s);
 
+  std::uint32_t count = 0;
   for (unsigned w = 0; w < kWordsPerTile; ++w) {
-    std::uint32_t word[kRows] = {};
-#pragma unroll
-    for (unsigned k = 0; k < 32; ++k) {
-      const SphereInstance b = columns[32 * w + k];
-#pragma unroll
-      for (unsigned r = 0; r < kRows; ++r) {
-        if (may_touch(row[r], b)) word[r] |= 1u << k;
-      }
-    }
-#pragma unroll
-    for (unsigned r = 0; r < kRows; ++r) {
-      const unsigned local = r * kThreads + threadIdx.x;
-      word[r] &= pair_bits(tile_row * kTile + local, first_b + 32 * w, args.n);
-      if (word[r] != 0) word[r] = exactly_touching(word[r], row[r], columns + 32 * w);
-      words[local][w] = word[r];
-      count[r] += static_cast<unsigned>(__popc(word[r]));
-    }
+    std::uint32_t word = s.words[threadIdx.x][w] & pair_bits(a, first_b + 32 * w, args.n);
+    if (word != 0) word = exactly_touching(word, row, s.columns + 32 * w);
+    s.words[threadIdx.x][w] = word;
+    count += static_cast<unsigned>(__popc(word));
   }
-  if (args.count) {
-    for (unsigned r = 0; r < kRows; ++r) {
-      const std::uint32_t a = tile_row * kTile + r * kThreads + threadIdx.x;
-      if (count[r] != 0 && a <= last) atomicAdd(&args.counts[a], count[r]);
-    }
-  }
+  if (args.count && count != 0 && a <= last) atomicAdd(&args.counts[a], count);
   __syncthreads();
 
   // A row's words of this tile are one 32-byte sector of the matrix.
@@ -98,7 +81,7 @@ __global__ void __launch_bounds__(kThreads) all_pairs(AllPairsArgs args) {
   for (unsigned i = threadIdx.x; i < kTile * kWordsPerTile; i += kThreads) {
     const unsigned local = i / kWordsPerTile, w = i % kWordsPerTile;
     const std::size_t band_row = std::size_t{tile_row - grid.first} * kTile + local;
-    args.masks[band_row * stride + tile_column * kWordsPerTile + w] = words[local][w];
+    args.masks[band_row * stride + tile_column * kWordsPerTile + w] = s.words[local][w];
   }
 }
 

@@ -97,8 +97,12 @@ __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
       .run(blockIdx.x * kGridThreads + threadIdx.x);
 }
 
+/// Where cells are hashed, a block needs more of the cache.
 template <bool kDense>
-__global__ void __launch_bounds__(kGridThreads, kSearchBlocks) search_phase(GridArgs args) {
+constexpr unsigned kLevelBlocks = kDense ? kSearchBlocks : std::min(kSearchBlocks, 4u);
+
+template <bool kDense>
+__global__ void __launch_bounds__(kGridThreads, kLevelBlocks<kDense>) search_phase(GridArgs args) {
   wait_for_previous_kernel();
   __shared__ SearchStorage<kDense> storage;
   __shared__ GridPlan plan;
@@ -225,8 +229,8 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, cudaStream_
   launch(plan_phase, kLastLevel + 1, 1, kPlanThreads, stream, args);
   launch_sort(args, static_cast<std::size_t>(shared_bytes), stream);
   run(neighbour_phase, chunks, args, output);
-  run(search_phase<true>, std::min(chunks, 132 * kSearchBlocks), args);
-  run(search_phase<false>, std::min(chunks, 132 * kSearchBlocks), args);
+  run(search_phase<true>, std::min(chunks, 132 * kLevelBlocks<true>), args);
+  run(search_phase<false>, std::min(chunks, 132 * kLevelBlocks<false>), args);
   run(sum_phase, kManyBlocks, args, output);
   run(copy_phase, chunks, args, output);
   run(emit_phase, kManyBlocks, args, output);

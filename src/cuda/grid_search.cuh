@@ -20,6 +20,7 @@ template <bool kDense>
 struct SearchStorage {
   uint2 ranges[kRowsAtOnce][kGridThreads];  // candidates of a row
   std::uint32_t held[kHeld][kGridThreads];  // positions of candidates that may touch
+  std::uint32_t next_turn;                  // of a warp of the block
   std::conditional_t<kDense, NoRows, HeldRows> rows;
 };
 
@@ -35,13 +36,17 @@ class Searcher {
   __device__ void run() {
     const std::uint32_t spheres_of_warp = 32 / args_.lanes;
     const std::uint32_t chunks = (args_.n - 1) / spheres_of_warp + 1;
-    const std::uint32_t warps = gridDim.x * kGridWarps;
-    std::uint32_t chunk = blockIdx.x * kGridWarps + threadIdx.x / 32;
-    while (chunk < chunks) {
+    // The warps of a block are always at chunks that are near each other, and share what they read.
+    if (threadIdx.x == 0) storage_.next_turn = kGridWarps;
+    __syncthreads();
+    std::uint32_t turn = threadIdx.x / 32;
+    while (true) {
+      const std::uint32_t chunk =
+          (turn / kGridWarps * gridDim.x + blockIdx.x) * kGridWarps + turn % kGridWarps;
+      if (chunk >= chunks) break;
       search(chunk * spheres_of_warp + lane_id() / args_.lanes, lane_id() % args_.lanes);
-      if (chunks <= warps) break;
-      if (lane_id() == 0) chunk = warps + atomicAdd(&args_.state->next_chunk, 1u);
-      chunk = __shfl_sync(kFullWarp, chunk, 0);
+      if (lane_id() == 0) turn = atomicAdd(&storage_.next_turn, 1u);
+      turn = __shfl_sync(kFullWarp, turn, 0);
     }
     unsigned long long found = found_;
     for (unsigned d = 16; d != 0; d /= 2) {

@@ -24,7 +24,6 @@ struct alignas(16) SearchState {
   std::uint32_t crowded;             ///< entries of GridArgs::crowded
   std::uint32_t giants;              ///< entries of GridArgs::giants
   std::uint32_t has_far;             ///< 1: there are spheres far from the origin (grid_cells.hpp)
-  std::uint32_t next_chunk;          ///< spheres given to warps
   std::uint32_t blocks_sampled;      ///< blocks that have done their part of the sample
   std::uint32_t blocks_counted;      ///< blocks that have counted coarse buckets
   std::uint32_t cell_is_full;        ///< 1: a cell of the direct search has no room

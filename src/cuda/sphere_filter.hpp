@@ -9,7 +9,8 @@
 namespace jfpx::inline JFPX_ABI::cuda {
 
 /// Fused multiply-add on host and device, whatever the contraction flags say.
-JFPX_HD inline Real fused(Real a, Real b, Real c) {
+template <typename T>
+JFPX_HD inline T fused(T a, T b, T c) {
 #if defined(__CUDA_ARCH__)
   return ::fma(a, b, c);
 #else

@@ -1,6 +1,7 @@
 /// Hunts for pairs that touch and that the culling of the CUDA backend would lose. The same
 /// functions run in the kernels; here g++ compiles them, so no GPU is needed.
 #include "src/cuda/grid_cells.hpp"
+#include "src/cuda/lattice.hpp"
 #include "src/cuda/sphere_filter.hpp"
 #include "src/shared/sphere_pair.hpp"
 #include "tests/support/sphere_fixtures.hpp"
@@ -220,6 +221,65 @@ TEST(CudaGrid, LevelsHalveFromTheLargestSphereOn) {
   EXPECT_EQ(cuda::half_cell_of(half_0, 3), Real(0.09375));
   EXPECT_EQ(cuda::level_for(Real(0.75) / 1024, {half_0, 6}), 6);
   EXPECT_EQ(cuda::level_for(Real(0.375), {half_0, 6}), 1);
+}
+
+/// The sum of products of a row and a column, which must be exact in any order.
+float lattice_sum(const cuda::LatticeTerms& row, const cuda::LatticeTerms& column, Random& random) {
+  double exact = 0;
+  std::vector<float> products;
+  for (unsigned k = 0; k < cuda::kTerms; ++k) {
+    for (const float term : {row.values[k], column.values[k]}) {
+      EXPECT_LE(std::abs(term), 2048) << "half precision holds no more";
+      EXPECT_EQ(term, std::round(term));
+    }
+    products.push_back(row.values[k] * column.values[k]);
+    exact += static_cast<double>(row.values[k]) * static_cast<double>(column.values[k]);
+  }
+  float sum = 0;
+  while (!products.empty()) {
+    const std::size_t k = random.below(products.size());
+    sum += products[k];
+    products.erase(products.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  EXPECT_EQ(static_cast<double>(sum), exact);
+  return sum;
+}
+
+TEST(CudaLattice, LetsEveryTouchingPairThrough) {
+  Random random(base_seed());
+  int touching = 0;
+  for (int i = 0; i < 300'000 && !::testing::Test::HasFailure(); ++i) {
+    const Pair p = nearly_touching(random);
+    if (shared::test_sphere_pair(p.a, p.b).touching == 0) continue;
+    ++touching;
+    // What else is in the tile: nothing, or others up to anywhere.
+    Vec3 low, high;
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(p.a.centre[axis], p.b.centre[axis]);
+      high[axis] = std::max(p.a.centre[axis], p.b.centre[axis]);
+      if (random.below(3) == 0) low[axis] = std::min(low[axis], -any_magnitude(random));
+      if (random.below(3) == 0) high[axis] = std::max(high[axis], any_magnitude(random));
+    }
+    Real largest = std::max(p.a.radius, p.b.radius);
+    if (random.below(3) == 0) largest = std::max(largest, any_magnitude(random));
+    const cuda::Lattice lattice = cuda::lattice_around(low, high, largest);
+    const auto a = on_lattice(lattice, p.a), b = on_lattice(lattice, p.b);
+    ASSERT_LT(lattice_sum(row_terms(a), column_terms(b), random), 0)
+        << "pair " << i << ", " << seed_note();
+  }
+  EXPECT_GT(touching, 50'000) << "the hunt must meet touching pairs; " << seed_note();
+}
+
+TEST(CudaLattice, HoldsBackSpheresThatAreApart) {
+  Random random(base_seed());
+  for (int i = 0; i < 10'000; ++i) {
+    SphereInstance a{{0, 0, 0}, random.uniform(Real(0.5), 1)}, b{{}, random.uniform(Real(0.5), 1)};
+    const Vec3 direction = normalized(random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    b.centre = direction * ((a.radius + b.radius) * Real(1.1));
+    const cuda::Lattice lattice = cuda::lattice_around({-8, -8, -8}, {8, 8, 8}, 1);
+    const auto row = on_lattice(lattice, a), column = on_lattice(lattice, b);
+    ASSERT_GE(lattice_sum(row_terms(row), column_terms(column), random), 0) << seed_note();
+  }
 }
 
 // Lines along every axis and diagonal, a plane and a cube: with as many cells as buckets, no bucket
