@@ -1,6 +1,6 @@
 /// Small N: the whole search in one launch, by one cluster of thread blocks.
 #include "src/cuda/cuda_try.hpp"
-#include "src/cuda/sphere_filter.hpp"
+#include "src/cuda/lattice.cuh"
 #include "src/cuda/tiles.cuh"
 
 #include <cooperative_groups.h>
@@ -12,17 +12,30 @@ namespace cg = cooperative_groups;
 
 constexpr unsigned kBlocks = 16;  // the largest cluster that Hopper can have
 constexpr unsigned kThreads = 512;
-constexpr unsigned kWarps = kBlocks * kThreads / 32;
-[[maybe_unused]] constexpr unsigned kRowsPerWarp = kFusedSpheres / kWarps;
+constexpr unsigned kWarps = kThreads / 32;
+constexpr unsigned kMostTiles = kFusedSpheres / 32;  // of 32 rows each
+static_assert(kMostTiles == 2 * kBlocks && kFusedSpheres == 2 * kThreads);
+[[maybe_unused]] constexpr unsigned kRowsOfWarp = 64 / kWarps;
 
 // [[maybe_unused]]: clusters exist from Hopper on, so the code for older devices has an empty
 // kernel.
 struct FusedStorage {
   SphereInstance spheres[kFusedSpheres];
-  std::uint32_t counts[kFusedSpheres];   // contacts of each row, gathered from all blocks
-  std::uint32_t offsets[kFusedSpheres];  // contacts before each row
-  std::uint32_t warp_sums[kThreads / 32];
-  std::uint32_t first_invalid;
+  LatticeRecord rows[kFusedSpheres], columns[kFusedSpheres];
+  LatticeStorage lattice;
+  std::uint32_t words[64][kMostTiles + 1];  // of the two rows of tiles of this block
+  std::uint32_t counts[kFusedSpheres];      // contacts of each row, gathered from all blocks
+  std::uint32_t offsets[kFusedSpheres];     // contacts before each row
+  std::uint32_t warp_sums[kWarps];
+  std::uint32_t valid_before[kWarps];  // ~(lowest index of an invalid sphere), 0 if there is none
+};
+
+/// The two rows of tiles of a block: the first ones are long, the last ones short.
+struct TilesOfBlock {
+  unsigned tiles, rows[2];
+  __device__ TilesOfBlock(std::uint32_t n, unsigned block)
+      : tiles((n + 31) / 32), rows{block, kMostTiles - 1 - block} {}
+  __device__ unsigned of_row(unsigned k) const { return rows[k] < tiles ? tiles - rows[k] : 0; }
 };
 
 /// offsets becomes the exclusive scan of counts; returns the total. All threads of the block.
@@ -50,42 +63,74 @@ struct FusedStorage {
   return total;
 }
 
-/// The 32 partners 32*word to +31 of row a that touch it and come after it.
-[[maybe_unused]] __device__ unsigned touching_word(const FusedStorage& s, std::uint32_t a,
-                                                   std::uint32_t word, std::uint32_t n) {
-  const std::uint32_t b = 32 * word + lane_id();
-  const bool touching = b > a && b < n && may_touch(s.spheres[a], s.spheres[b]) &&
-                        shared::test_sphere_pair(s.spheres[a], s.spheres[b]).touching != 0;
-  return __ballot_sync(kFullWarp, touching);
+/// Loads all spheres, and brings them onto a lattice. All threads of the block.
+[[maybe_unused]] __device__ void load_spheres(const FusedArgs& args, unsigned tiles,
+                                              FusedStorage& s) {
+  SphereInstance mine[2];
+  unsigned valid_before = 0;
+  for (unsigned k = 0; k < 2; ++k) {
+    const std::uint32_t i = min(k * kThreads + threadIdx.x, args.n - 1);
+    mine[k] = load_sphere(args.spheres + i);
+    if (!is_valid(mine[k])) valid_before = max(valid_before, ~i);
+  }
+  valid_before = warp_max(valid_before);
+  if (lane_id() == 0) s.valid_before[threadIdx.x / 32] = valid_before;
+  const Lattice lattice = lattice_of_block(mine[0], mine[1], s.lattice);
+  for (unsigned k = 0; k < 2; ++k) {
+    const unsigned i = k * kThreads + threadIdx.x;
+    s.counts[i] = 0;
+    if (i >= 32 * tiles) continue;
+    s.spheres[i] = mine[k];
+    const LatticeSphere on = on_lattice(lattice, mine[k]);
+    s.rows[i] = record_of(row_terms(on));
+    s.columns[place_of_column(i)] = record_of(column_terms(on));
+  }
+}
+
+/// Fills the words of the block's rows: which columns they may touch.
+[[maybe_unused]] __device__ void fill_words(const TilesOfBlock& mine, FusedStorage& s) {
+  const unsigned first = mine.of_row(0), all = first + mine.of_row(1);
+  for (unsigned t = threadIdx.x / 32; t < all; t += kWarps) {
+    const unsigned k = t < first ? 0 : 1, row = mine.rows[k];
+    const unsigned column = row + (k == 0 ? t : t - first);
+    put_bytes(
+        lattice_bytes(load_fragment(s.rows + 32 * row), load_fragment(s.columns + 32 * column)),
+        &s.words[32 * k][column], kMostTiles + 1);
+  }
 }
 
 __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
 #if __CUDA_ARCH__ >= 900
-  extern __shared__ __align__(alignof(SphereInstance)) unsigned char raw[];
+  extern __shared__ __align__(alignof(FusedStorage)) unsigned char raw[];
   FusedStorage& s = *reinterpret_cast<FusedStorage*>(raw);
   const cg::cluster_group cluster = cg::this_cluster();
   const std::uint32_t n = args.n;
-
-  if (threadIdx.x == 0) s.first_invalid = kNoSphere;
-  for (unsigned i = threadIdx.x; i < kFusedSpheres; i += kThreads) s.counts[i] = 0;
-  __syncthreads();
-  for (unsigned i = threadIdx.x; i < n; i += kThreads) {
-    s.spheres[i] = load_sphere(args.spheres + i);
-    if (!is_valid(s.spheres[i])) atomicMin(&s.first_invalid, i);
+  const unsigned warp = threadIdx.x / 32;
+  const bool one = cluster.block_rank() == 0 && threadIdx.x == 0;
+  if (n == 0) {
+    if (one) write_count(args.output, 0, kNoSphere, true);
+    return;
   }
-  cluster.sync();  // nobody writes into a block that has not started
 
-  // Rows are dealt to warps in turn: early rows are longer. Lane w keeps word w of a row.
-  const unsigned warp = threadIdx.x / 32 * kBlocks + cluster.block_rank();
-  unsigned words[kRowsPerWarp] = {};
+  const TilesOfBlock tiles(n, cluster.block_rank());
+  load_spheres(args, tiles.tiles, s);
+  cluster.sync();  // nobody writes into a block that has not started
+  fill_words(tiles, s);
+  __syncthreads();
+
+  // A warp has rows of both rows of tiles. Lane w keeps word w of a row.
+  const auto row = [&](unsigned k) {
+    const unsigned local = k * kWarps + warp;
+    return 32 * tiles.rows[local / 32] + local % 32;
+  };
+  unsigned words[kRowsOfWarp] = {};
 #pragma unroll
-  for (unsigned k = 0; k < kRowsPerWarp; ++k) {
-    const std::uint32_t a = warp + k * kWarps;
+  for (unsigned k = 0; k < kRowsOfWarp; ++k) {
+    const std::uint32_t a = row(k);
     if (a >= n) continue;
-#pragma unroll 4
-    for (std::uint32_t w = a / 32; w < (n + 31) / 32; ++w) {
-      const unsigned word = touching_word(s, a, w, n);
-      if (lane_id() == w) words[k] = word;
+    if (lane_id() >= a / 32 && lane_id() < tiles.tiles) {
+      words[k] = s.words[k * kWarps + warp][lane_id()] & pair_bits(a, 32 * lane_id(), n);
+      words[k] = exactly_touching(words[k], s.spheres[a], s.spheres + 32 * lane_id());
     }
     const unsigned count = warp_reduce(static_cast<unsigned>(__popc(words[k])),
                                        [](unsigned p, unsigned q) { return p + q; });
@@ -95,11 +140,13 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
 
   const std::uint32_t total = scan_rows(s);
   const bool complete = total <= args.output.capacity;
-  if (warp == 0 && lane_id() == 0) write_count(args.output, total, s.first_invalid, complete);
-  if (!complete || s.first_invalid != kNoSphere) return;
+  const unsigned valid_before = warp_max(s.valid_before[lane_id() % kWarps]);
+  const std::uint32_t invalid = valid_before == 0 ? kNoSphere : ~valid_before;
+  if (one) write_count(args.output, total, invalid, complete);
+  if (!complete || invalid != kNoSphere) return;
 #pragma unroll
-  for (unsigned k = 0; k < kRowsPerWarp; ++k) {
-    const std::uint32_t a = warp + k * kWarps;
+  for (unsigned k = 0; k < kRowsOfWarp; ++k) {
+    const std::uint32_t a = row(k);
     if (a >= n) continue;
     emit_row(args.output, s.offsets[a], a, s.spheres[a], 0, words[k],
              [&](std::uint32_t b) { return s.spheres[b]; });

@@ -1,7 +1,6 @@
 /// What the phases of the large-N search share: where its cells are in the table.
 #pragma once
 
-#include "src/cuda/extremes.cuh"
 #include "src/cuda/grid_cells.hpp"
 #include "src/cuda/tiles.cuh"
 
@@ -16,6 +15,21 @@ __device__ inline Real half_0_of(const SearchState* state) {
 }
 __device__ inline unsigned long long bits_of(Real x) {
   return static_cast<unsigned long long>(std::bit_cast<RealBits>(x));
+}
+
+/// A number from 1 on that grows with x; ordered(-x) falls with it.
+__device__ inline unsigned long long ordered(Real x) {
+  constexpr unsigned kShift = sizeof(Real) == 4 ? 32 : 0;
+  const unsigned long long bits = static_cast<unsigned long long>(std::bit_cast<RealBits>(x))
+                                  << kShift;
+  constexpr unsigned long long kSign = 1ull << 63;
+  return (bits & kSign) != 0 ? ~bits : bits | kSign;
+}
+__device__ inline Real from_ordered(unsigned long long key) {
+  constexpr unsigned kShift = sizeof(Real) == 4 ? 32 : 0;
+  constexpr unsigned long long kSign = 1ull << 63;
+  const unsigned long long bits = (key & kSign) != 0 ? key & ~kSign : ~key;
+  return std::bit_cast<Real>(static_cast<RealBits>(bits >> kShift));
 }
 
 /// Spheres as other phases of the same launch wrote them: not through the read-only cache.

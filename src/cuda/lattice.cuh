@@ -2,7 +2,6 @@
 /// exactly.
 #pragma once
 
-#include "src/cuda/extremes.cuh"
 #include "src/cuda/lattice.hpp"
 #include "src/cuda/tiles.cuh"
 #include "src/shared/sphere_pair.hpp"
@@ -11,18 +10,16 @@
 
 namespace jfpx::inline JFPX_ABI::cuda {
 
-/// Largest x, -x, y, -y, z, -z and radius, as ordered() has them.
+/// Largest x, -x, y, -y, z, -z and radius of each warp.
 struct LatticeStorage {
-  unsigned long long extremes[7];
+  Real extremes[7][32];
 };
 /// A lattice for the spheres of a block, two a thread. All threads of the block.
 __device__ inline Lattice lattice_of_block(const SphereInstance& p, const SphereInstance& q,
                                            LatticeStorage& s) {
-  if (threadIdx.x < 7) s.extremes[threadIdx.x] = 0;
-  __syncthreads();
   const auto enter = [&](int which, Real x, Real y) {
     const Real most = warp_max(x > y ? x : y);
-    if (lane_id() == 0) atomicMax(&s.extremes[which], ordered(most));
+    if (lane_id() == 0) s.extremes[which][threadIdx.x / 32] = most;
   };
 #pragma unroll
   for (int axis = 0; axis < 3; ++axis) {
@@ -31,7 +28,8 @@ __device__ inline Lattice lattice_of_block(const SphereInstance& p, const Sphere
   }
   enter(6, p.radius, q.radius);
   __syncthreads();
-  const auto most = [&](int which) { return from_ordered(s.extremes[which]); };
+  const unsigned warp = min(lane_id(), blockDim.x / 32 - 1);
+  const auto most = [&](int which) { return warp_max(s.extremes[which][warp]); };
   return lattice_around({-most(1), -most(3), -most(5)}, {most(0), most(2), most(4)}, most(6));
 }
 

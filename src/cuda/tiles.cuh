@@ -61,6 +61,21 @@ __device__ inline unsigned warp_max(unsigned value) {
 #endif
 }
 
+/// Largest number of a warp; every lane gets it. Not for NaN.
+__device__ inline Real warp_max(Real x) {
+#if __CUDA_ARCH__ >= 800 && !defined(JFPX_DOUBLE_PRECISION)
+  const auto in_order = [](int bits) { return bits ^ (bits >> 31 & 0x7fffffff); };
+  return std::bit_cast<Real>(
+      in_order(__reduce_max_sync(kFullWarp, in_order(std::bit_cast<int>(x)))));
+#else
+  for (unsigned d = 16; d != 0; d /= 2) {
+    const Real other = __shfl_xor_sync(kFullWarp, x, static_cast<int>(d));
+    x = other > x ? other : x;
+  }
+  return x;
+#endif
+}
+
 /// Sum of the values of this lane and those below.
 __device__ inline unsigned warp_inclusive_sum(unsigned value) {
   for (unsigned d = 1; d < 32; d *= 2) {
