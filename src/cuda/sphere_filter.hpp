@@ -55,10 +55,6 @@ JFPX_HD inline Closeness closeness(const SphereInstance& a, const SphereInstance
   return {!(d2 > fused(s2, kSlack, kLeast)), fused(d2, kSlack, kLeast) < s2};
 }
 
-JFPX_HD inline bool may_touch(const SphereInstance& a, const SphereInstance& b) {
-  return closeness(a, b).near;
-}
-
 /// What shared::test_sphere_pair(a, b) says about valid spheres, nearly always without its square
 /// root.
 JFPX_HD inline bool touch(const SphereInstance& a, const SphereInstance& b) {

@@ -77,7 +77,7 @@ TEST(CudaFilter, LetsEveryTouchingPairThrough) {
     const Pair p = nearly_touching(random);
     if (shared::test_sphere_pair(p.a, p.b).touching == 0) continue;
     ++touching;
-    ASSERT_TRUE(cuda::may_touch(p.a, p.b)) << "pair " << i << ", " << seed_note();
+    ASSERT_TRUE(cuda::closeness(p.a, p.b).near) << "pair " << i << ", " << seed_note();
   }
   EXPECT_GT(touching, 200'000) << "the hunt must meet touching pairs";
 }
@@ -153,7 +153,7 @@ TEST(CudaFilter, StopsPairsThatAreApartByMoreThanRoundings) {
     SphereInstance b{random.uniform_in_box({-9, -9, -9}, {9, 9, 9}), random.uniform(Real(0.1), 2)};
     const Real gap = length(a.centre - b.centre) - (a.radius + b.radius);
     if (gap > 64 * kEpsilon * 32) {
-      ASSERT_FALSE(cuda::may_touch(a, b)) << seed_note();
+      ASSERT_FALSE(cuda::closeness(a, b).near) << seed_note();
     }
   }
 }
