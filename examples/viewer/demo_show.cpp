@@ -8,6 +8,7 @@
 #include "examples/viewer/forces.hpp"
 #include "examples/viewer/scene_choice.hpp"
 #include "examples/viewer/timing.hpp"
+#include "examples/viewer/widgets.hpp"
 
 #include <fmt/format.h>
 
@@ -205,23 +206,22 @@ void DemoShow::panel() {
   ImGui::SetNextWindowPos({12, 12}, ImGuiCond_FirstUseEver);
   const std::string title(demo_->name());
   if (ImGui::Begin(title.c_str(), nullptr, ImGuiWindowFlags_AlwaysAutoResize)) {
-    if (ImGui::Button(paused ? "Run" : "Pause")) paused = !paused;
+    if (widget::button(paused ? "Run" : "Pause")) paused = !paused;
     ImGui::SameLine();
-    if (ImGui::Button("Step")) paused = true, step();
+    if (widget::button("Step")) paused = true, step();
     ImGui::SameLine();
-    if (ImGui::Button("Restart")) restart();
+    if (widget::button("Restart")) restart();
     if (const auto chosen = choose_scene(options_.run.scene)) {
       next = options_;
       next->run.scene = *chosen;
       next->input.clear();
     }
     for (const KeyHelp& line : demo_help()) {
-      ImGui::Text("%-6s %s", std::string(line.keys).c_str(), std::string(line.what).c_str());
+      widget::text(fmt::format("{:6} {}", line.keys, line.what));
     }
     ImGui::Separator();
-    ImGui::TextUnformatted(fmt::format("step {}, {} contacts, {:.3f} ms", report_.step,
-                                       report_.contacts, report_.total_ms)
-                               .c_str());
+    widget::text(fmt::format("step {}, {} contacts, {:.3f} ms", report_.step, report_.contacts,
+                             report_.total_ms));
   }
   ImGui::End();
 }

@@ -1,11 +1,7 @@
-/// The window and what happens in it.
-#include <jfpx/error.hpp>
+/// The program in a window.
+#include "examples/viewer/interactive.hpp"
 
-#include "examples/viewer/app.hpp"
-#include "examples/viewer/recorder.hpp"
-#include "examples/viewer/show.hpp"
-#include "examples/viewer/timing.hpp"
-#include "examples/viewer/ui.hpp"
+#include <jfpx/error.hpp>
 
 #include <algorithm>
 #include <imgui.h>
@@ -18,266 +14,251 @@ namespace {
 constexpr double kLongestFrame = 0.25;  // [s]; after a stall the clock does not catch up
 constexpr double kNoticeTime = 4;       // [s]
 
-class App {
- public:
-  explicit App(const ViewOptions& options)
-      : options_(options),
-        show_(make_show(options)),
-        window_(Window::open("jfpx-view: " + options.run.scene, options.size.width,
-                             options.size.height)),
-        renderer_(options.quality),
-        ui_(window_),
-        recorder_(options.record) {
-    if (options.fullscreen) window_.set_fullscreen(true);
-    meet_show();
+void add_help(const KeyHelp& line) {
+  for (const std::string_view text : {line.keys, line.what}) {
+    ImGui::TableNextColumn();
+    ImGui::TextUnformatted(text.data(), text.data() + text.size());
   }
-
-  int run() {
-    Stopwatch clock;
-    while (!quit_) {
-      read_events();
-      const double seconds = std::min(clock.lap(), kLongestFrame);
-      controls_.move(&show_->camera, seconds, show_->body_size());
-      const std::uint64_t before = show_->steps();
-      show_->advance(recorder_.on() ? kRecordedFrame : seconds);
-      if (show_->steps() > before) {
-        timing_.add_step(show_->engine_ms(), show_->steps() - before);
-      }
-      quit_ = quit_ || (options_.frames && show_->steps() >= *options_.frames);
-      if (quit_) wanted_picture_ = options_.screenshot;
-      draw(seconds);
-    }
-    return finish(*show_, timing_, options_);
-  }
-
- private:
-  void read_events() {
-    SDL_Event event;
-    while (SDL_PollEvent(&event) != 0) {
-      ui_.handle(event);
-      controls_.handle(event, !ui_.wants_keyboard(), !ui_.wants_mouse());
-    }
-    window_.capture_mouse(controls_.looking());
-    for (const DemoKey& key : controls_.take_demo_keys()) show_->demo_key(key);
-    for (const Command command : controls_.take_commands()) try_to_obey(command);
-    const float ratio = window_.pixel_ratio();
-    for (const Click& click : controls_.take_clicks()) {
-      show_->pick(static_cast<int>(static_cast<float>(click.x) * ratio),
-                  static_cast<int>(static_cast<float>(click.y) * ratio), window_.pixel_width(),
-                  window_.pixel_height());
-    }
-  }
-
-  /// Tells the controls what the show that is new wants of them.
-  void meet_show() {
-    controls_.set_demo_keys(show_->demo_keys());
-    controls_.orbit = !show_->walks();
-  }
-
-  /// What the panel asked for while it was drawn.
-  void grant_wishes() {
-    for (const Command command : std::exchange(show_->commands, {})) try_to_obey(command);
-    if (!show_->next) return;
-    const ViewOptions next = *std::exchange(show_->next, std::nullopt);
-    try {
-      show_ = make_show(next);
-      meet_show();
-      window_.set_title("jfpx-view: " + next.run.scene);
-    } catch (const Error& error) {
-      tell(error.what());
-    }
-  }
-
-  /// What can't be done now is told and changes nothing.
-  void try_to_obey(Command command) {
-    try {
-      obey(command);
-    } catch (const Error& error) {
-      tell(error.what());
-    }
-  }
-
-  void obey(Command command) {
-    switch (command) {
-      case Command::quit:
-        quit_ = true;
-        break;
-      case Command::help:
-        help_ = !help_;
-        break;
-      case Command::panel:
-        panel_ = !panel_;
-        break;
-      case Command::pause:
-        show_->paused = !show_->paused;
-        break;
-      case Command::step:
-        show_->paused = true;
-        show_->step();
-        break;
-      case Command::step_back:
-        show_->paused = true;
-        show_->step_back();
-        break;
-      case Command::slower:
-        show_->speed = std::max(show_->speed / 2, 1.0 / 64);
-        break;
-      case Command::faster:
-        show_->speed = std::min(show_->speed * 2, 16.0);
-        break;
-      case Command::restart:
-        show_->restart();
-        break;
-      case Command::orbit:
-        controls_.orbit = !controls_.orbit;
-        break;
-      case Command::home:
-        show_->home();
-        break;
-      case Command::contacts:
-        show_->contacts = !show_->contacts;
-        break;
-      case Command::forces:
-        show_->forces = !show_->forces;
-        break;
-      case Command::colouring:
-        show_->colouring = static_cast<Colouring>((static_cast<std::size_t>(show_->colouring) + 1) %
-                                                  std::size(kColouringNames));
-        break;
-      case Command::screenshot:
-        wanted_picture_ = free_name("jfpx-view", ".png");
-        break;
-      case Command::record:
-        toggle_recorder();
-        break;
-      case Command::save:
-        save_recording();
-        break;
-      case Command::fullscreen:
-        window_.set_fullscreen(!window_.fullscreen());
-        break;
-    }
-  }
-
-  void toggle_recorder() {
-    if (recorder_.on()) {
-      recorder_ = Recorder("");
-      tell("no more pictures are recorded");
-      return;
-    }
-    const std::string folder = free_name("jfpx-view-frames", "");
-    recorder_ = Recorder(folder);
-    tell("pictures go to " + folder);
-  }
-
-  void save_recording() {
-    const std::string name = free_name("jfpx-view", ".rec");
-    show_->save_recording(name);
-    tell("wrote " + name);
-  }
-
-  /// What the command line asked for must be written, or the program ends; a key's wish is told to
-  /// have failed.
-  void write_pictures() {
-    const bool by_key = wanted_picture_ != options_.screenshot;
-    try {
-      if (!wanted_picture_.empty()) save_picture();
-    } catch (const FileError& error) {
-      if (!by_key) throw;
-      tell(error.what());
-    }
-    if (!recorder_.on()) return;
-    try {
-      recorder_.add(picture());
-    } catch (const FileError& error) {
-      recorder_ = Recorder("");
-      if (!options_.record.empty()) throw;
-      tell(error.what());
-    }
-  }
-
-  void save_picture() {
-    const std::string name = std::exchange(wanted_picture_, {});
-    write_png(picture(), name);
-    tell("wrote " + name);
-  }
-
-  void tell(const std::string& what) {
-    notice_ = what;
-    notice_left_ = kNoticeTime;
-  }
-
-  void draw(double seconds) {
-    const int width = window_.pixel_width(), height = window_.pixel_height();
-    if (width == 0 || height == 0) {  // minimised
-      SDL_Delay(20);
-      return;
-    }
-    Stopwatch watch;
-    ui_.begin(seconds);
-    show_->draw(renderer_, {0, width, height});
-    if (panel_) show_->panel();
-    if (help_) show_help();
-    show_notice(seconds);
-    ui_.end(0, width, height);
-    timing_.add_picture(watch.lap() * 1e3);
-    write_pictures();
-    window_.swap();
-    grant_wishes();
-  }
-
-  /// What was drawn last. Taken before the swap, which may leave the back buffer undefined.
-  Image picture() const {
-    return Canvas::read_pixels(0, window_.pixel_width(), window_.pixel_height());
-  }
-
-  void show_help() {
-    ImGui::SetNextWindowPos({ImGui::GetIO().DisplaySize.x / 2, ImGui::GetIO().DisplaySize.y / 2},
-                            ImGuiCond_Always, {0.5f, 0.5f});
-    ImGui::Begin("Keys", &help_, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
-    if (ImGui::BeginTable("keys", 2)) {
-      for (const KeyHelp& line : show_->demo_help()) add_help(line);
-      for (const KeyHelp& line : key_help()) add_help(line);
-      ImGui::EndTable();
-    }
-    ImGui::End();
-  }
-
-  static void add_help(const KeyHelp& line) {
-    for (const std::string_view text : {line.keys, line.what}) {
-      ImGui::TableNextColumn();
-      ImGui::TextUnformatted(text.data(), text.data() + text.size());
-    }
-  }
-
-  void show_notice(double seconds) {
-    if (notice_left_ <= 0) return;
-    notice_left_ -= seconds;
-    const ImVec2 size = ImGui::CalcTextSize(notice_.c_str());
-    const ImVec2 screen = ImGui::GetIO().DisplaySize;
-    const ImVec2 at{(screen.x - size.x) / 2, screen.y - size.y - 24};
-    ImDrawList* list = ImGui::GetForegroundDrawList();
-    list->AddRectFilled({at.x - 12, at.y - 8}, {at.x + size.x + 12, at.y + size.y + 8},
-                        IM_COL32(12, 16, 22, 210), 6);
-    list->AddText(at, IM_COL32_WHITE, notice_.c_str());
-  }
-
-  ViewOptions options_;
-  std::unique_ptr<Show> show_;
-  Window window_;
-  Renderer renderer_;
-  Ui ui_;
-  Controls controls_;
-  Recorder recorder_;
-  Timing timing_;
-  std::string wanted_picture_;  ///< file for the next one
-  std::string notice_;          ///< shown for a while
-  double notice_left_ = 0;      ///< [s]
-  bool quit_ = false, help_ = false, panel_ = true;
-};
+}
 
 }  // namespace
 
-int run_interactive(const ViewOptions& options) { return App(options).run(); }
+App::App(const ViewOptions& options)
+    : options_(options),
+      show_(make_show(options)),
+      window_(
+          Window::open("jfpx-view: " + options.run.scene, options.size.width, options.size.height)),
+      renderer_(options.quality),
+      ui_(window_),
+      recorder_(options.record) {
+  if (options.fullscreen) window_.set_fullscreen(true);
+  meet_show();
+}
+
+bool App::frame(double seconds) {
+  read_events();
+  controls_.move(&show_->camera, seconds, show_->body_size());
+  const std::uint64_t before = show_->steps();
+  show_->advance(recorder_.on() ? kRecordedFrame : seconds);
+  if (show_->steps() > before) {
+    timing_.add_step(show_->engine_ms(), show_->steps() - before);
+  }
+  quit_ = quit_ || (options_.frames && show_->steps() >= *options_.frames);
+  if (quit_) wanted_picture_ = options_.screenshot;
+  draw(seconds);
+  return !quit_;
+}
+
+void App::read_events() {
+  SDL_Event event;
+  while (SDL_PollEvent(&event) != 0) {
+    ui_.handle(event);
+    controls_.handle(event, !ui_.wants_keyboard(), !ui_.wants_mouse());
+  }
+  window_.capture_mouse(controls_.looking());
+  for (const DemoKey& key : controls_.take_demo_keys()) show_->demo_key(key);
+  for (const Command command : controls_.take_commands()) try_to_obey(command);
+  const float ratio = window_.pixel_ratio();
+  for (const Click& click : controls_.take_clicks()) {
+    show_->pick(static_cast<int>(static_cast<float>(click.x) * ratio),
+                static_cast<int>(static_cast<float>(click.y) * ratio), window_.pixel_width(),
+                window_.pixel_height());
+  }
+}
+
+/// Tells the controls what the show that is new wants of them.
+void App::meet_show() {
+  controls_.set_demo_keys(show_->demo_keys());
+  controls_.orbit = !show_->walks();
+}
+
+/// What the panel asked for while it was drawn.
+void App::grant_wishes() {
+  for (const Command command : std::exchange(show_->commands, {})) try_to_obey(command);
+  if (!show_->next) return;
+  const ViewOptions next = *std::exchange(show_->next, std::nullopt);
+  try {
+    show_ = make_show(next);
+    meet_show();
+    window_.set_title("jfpx-view: " + next.run.scene);
+  } catch (const Error& error) {
+    tell(error.what());
+  }
+}
+
+/// What can't be done now is told and changes nothing.
+void App::try_to_obey(Command command) {
+  try {
+    obey(command);
+  } catch (const Error& error) {
+    tell(error.what());
+  }
+}
+
+void App::obey(Command command) {
+  switch (command) {
+    case Command::quit:
+      quit_ = true;
+      break;
+    case Command::help:
+      help_ = !help_;
+      break;
+    case Command::panel:
+      panel_ = !panel_;
+      break;
+    case Command::pause:
+      show_->paused = !show_->paused;
+      break;
+    case Command::step:
+      show_->paused = true;
+      show_->step();
+      break;
+    case Command::step_back:
+      show_->paused = true;
+      show_->step_back();
+      break;
+    case Command::slower:
+      show_->speed = std::max(show_->speed / 2, 1.0 / 64);
+      break;
+    case Command::faster:
+      show_->speed = std::min(show_->speed * 2, 16.0);
+      break;
+    case Command::restart:
+      show_->restart();
+      break;
+    case Command::orbit:
+      controls_.orbit = !controls_.orbit;
+      break;
+    case Command::home:
+      show_->home();
+      break;
+    case Command::contacts:
+      show_->contacts = !show_->contacts;
+      break;
+    case Command::forces:
+      show_->forces = !show_->forces;
+      break;
+    case Command::colouring:
+      show_->colouring = static_cast<Colouring>((static_cast<std::size_t>(show_->colouring) + 1) %
+                                                std::size(kColouringNames));
+      break;
+    case Command::screenshot:
+      wanted_picture_ = free_name("jfpx-view", ".png");
+      break;
+    case Command::record:
+      toggle_recorder();
+      break;
+    case Command::save:
+      save_recording();
+      break;
+    case Command::fullscreen:
+      window_.set_fullscreen(!window_.fullscreen());
+      break;
+  }
+}
+
+void App::toggle_recorder() {
+  if (recorder_.on()) {
+    recorder_ = Recorder("");
+    tell("no more pictures are recorded");
+    return;
+  }
+  const std::string folder = free_name("jfpx-view-frames", "");
+  recorder_ = Recorder(folder);
+  tell("pictures go to " + folder);
+}
+
+void App::save_recording() {
+  const std::string name = free_name("jfpx-view", ".rec");
+  show_->save_recording(name);
+  tell("wrote " + name);
+}
+
+/// What the command line asked for must be written, or the program ends; a key's wish is told to
+/// have failed.
+void App::write_pictures() {
+  const bool by_key = wanted_picture_ != options_.screenshot;
+  try {
+    if (!wanted_picture_.empty()) save_picture();
+  } catch (const FileError& error) {
+    if (!by_key) throw;
+    tell(error.what());
+  }
+  if (!recorder_.on()) return;
+  try {
+    recorder_.add(picture());
+  } catch (const FileError& error) {
+    recorder_ = Recorder("");
+    if (!options_.record.empty()) throw;
+    tell(error.what());
+  }
+}
+
+void App::save_picture() {
+  const std::string name = std::exchange(wanted_picture_, {});
+  write_png(picture(), name);
+  tell("wrote " + name);
+}
+
+void App::tell(const std::string& what) {
+  notice_ = what;
+  notice_left_ = kNoticeTime;
+}
+
+void App::draw(double seconds) {
+  const int width = window_.pixel_width(), height = window_.pixel_height();
+  if (width == 0 || height == 0) {  // minimised
+    SDL_Delay(20);
+    return;
+  }
+  Stopwatch watch;
+  ui_.begin(seconds);
+  show_->draw(renderer_, {0, width, height});
+  if (panel_) show_->panel();
+  if (help_) show_help();
+  show_notice(seconds);
+  ui_.end(0, width, height);
+  timing_.add_picture(watch.lap() * 1e3);
+  write_pictures();
+  window_.swap();
+  grant_wishes();
+}
+
+/// What was drawn last. Taken before the swap, which may leave the back buffer undefined.
+Image App::picture() const {
+  return Canvas::read_pixels(0, window_.pixel_width(), window_.pixel_height());
+}
+
+void App::show_help() {
+  ImGui::SetNextWindowPos({ImGui::GetIO().DisplaySize.x / 2, ImGui::GetIO().DisplaySize.y / 2},
+                          ImGuiCond_Always, {0.5f, 0.5f});
+  ImGui::Begin("Keys", &help_, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
+  if (ImGui::BeginTable("keys", 2)) {
+    for (const KeyHelp& line : show_->demo_help()) add_help(line);
+    for (const KeyHelp& line : key_help()) add_help(line);
+    ImGui::EndTable();
+  }
+  ImGui::End();
+}
+
+void App::show_notice(double seconds) {
+  if (notice_left_ <= 0) return;
+  notice_left_ -= seconds;
+  const ImVec2 size = ImGui::CalcTextSize(notice_.c_str());
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  const ImVec2 at{(screen.x - size.x) / 2, screen.y - size.y - 24};
+  ImDrawList* list = ImGui::GetForegroundDrawList();
+  list->AddRectFilled({at.x - 12, at.y - 8}, {at.x + size.x + 12, at.y + size.y + 8},
+                      IM_COL32(12, 16, 22, 210), 6);
+  list->AddText(at, IM_COL32_WHITE, notice_.c_str());
+}
+
+int run_interactive(const ViewOptions& options) {
+  App app(options);
+  Stopwatch clock;
+  while (app.frame(std::min(clock.lap(), kLongestFrame))) {
+  }
+  return app.finish();
+}
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -3,30 +3,29 @@
 
 #include "examples/viewer/scene_choice.hpp"
 #include "examples/viewer/scene_show.hpp"
+#include "examples/viewer/widgets.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <imgui.h>
+#include <limits>
 
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
-const ImVec4 kWarning{1.0f, 0.55f, 0.35f, 1.0f};
-
-void say(const std::string& text) { ImGui::TextUnformatted(text.c_str()); }
-
-std::ptrdiff_t count_spheres(const Scene& scene) {
-  return std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const BodyDef& body) {
-    return std::holds_alternative<Sphere>(body.shape);
-  });
-}
+constexpr float kWidth = 330;      // [units]
+constexpr float kItemWidth = 170;  // of a slider or a field, its label not counted
+constexpr float kTextWidth = 320;
+constexpr float kTableWidth = 300;
+constexpr float kMargin = 12;  // between a panel and the window's edge
+constexpr std::uint64_t kMostSpheres = 2'000'000;
 
 /// A slider over a Real. @return whether the user has let go of a new value.
 bool slide(const char* label, Real* value, float low, float high, const char* format = "%.3f") {
   auto number = static_cast<float>(*value);
-  if (ImGui::SliderFloat(label, &number, low, high, format, ImGuiSliderFlags_Logarithmic)) {
+  if (widget::slider(label, &number, low, high, format)) {
     *value = static_cast<Real>(std::clamp(number, low, high));
   }
   return ImGui::IsItemDeactivatedAfterEdit();
@@ -35,10 +34,10 @@ bool slide(const char* label, Real* value, float low, float high, const char* fo
 }  // namespace
 
 void SceneShow::panel() {
-  ImGui::SetNextWindowPos({12, 12}, ImGuiCond_FirstUseEver);
-  ImGui::SetNextWindowSize({330, 0}, ImGuiCond_FirstUseEver);
+  ImGui::SetNextWindowPos({kMargin, kMargin}, ImGuiCond_FirstUseEver);
+  ImGui::SetNextWindowSize({kWidth, 0}, ImGuiCond_FirstUseEver);
   if (ImGui::Begin("jfpx", nullptr, ImGuiWindowFlags_AlwaysAutoResize)) {
-    ImGui::PushItemWidth(170);
+    ImGui::PushItemWidth(kItemWidth);
     try {
       show_controls();
       show_scene_choice();
@@ -46,43 +45,49 @@ void SceneShow::panel() {
       show_settings();
     } catch (const Error& error) {
       message_ = error.what();  // what was asked for can't be had; the run goes on as before
+      fill_fields();
     }
-    if (!message_.empty()) {
-      ImGui::PushTextWrapPos(320);
-      ImGui::TextColored(kWarning, "%s", message_.c_str());
-      ImGui::PopTextWrapPos();
-    }
+    if (!message_.empty()) widget::warning(message_, kTextWidth);
     show_counters();
-    show_picked();
     ImGui::PopItemWidth();
   }
   ImGui::End();
+  show_picked();
+}
+
+void SceneShow::fill_fields() {
+  const auto& bodies = player_.scene().bodies;
+  wanted_spheres_ = static_cast<std::uint64_t>(std::count_if(
+      bodies.begin(), bodies.end(),
+      [](const BodyDef& body) { return std::holds_alternative<Sphere>(body.shape); }));
+  wanted_seed_ = options_.run.seed;
+  wanted_settings_ = player_.settings();
 }
 
 void SceneShow::show_controls() {
-  if (ImGui::Button(paused ? "Run" : "Pause")) paused = !paused;
+  if (widget::button(paused ? "Run" : "Pause")) paused = !paused;
   ImGui::SameLine();
-  if (ImGui::Button("Back")) paused = true, step_back();
+  if (widget::button("Back")) paused = true, step_back();
   ImGui::SameLine();
-  if (ImGui::Button("Step")) paused = true, step();
+  if (widget::button("Step")) paused = true, step();
   ImGui::SameLine();
-  if (ImGui::Button("Restart")) restart();
+  if (widget::button("Restart")) restart();
   for (const auto& [label, command] :
        {std::pair("Picture", Command::screenshot), std::pair("Film", Command::record),
         std::pair("Save steps", Command::save)}) {
     if (command != Command::screenshot) ImGui::SameLine();
-    if (ImGui::Button(label)) commands.push_back(command);
+    if (widget::button(label)) commands.push_back(command);
   }
   auto rate = static_cast<float>(speed);
-  if (ImGui::SliderFloat("speed", &rate, 0.01f, 4, "%.2f x", ImGuiSliderFlags_Logarithmic)) {
+  if (widget::slider("speed", &rate, 0.01f, 4, "%.2f x")) {
     speed = static_cast<double>(rate);
   }
-  say(fmt::format("step {}, {:.2f} s{}", player_.shown().step, player_.time(),
-                  player_.in_the_past() ? "  (looking back)" : ""));
+  widget::text(fmt::format("step {}, {:.2f} s{}", player_.shown().step, player_.time(),
+                           player_.in_the_past() ? "  (looking back)" : ""));
 }
 
 void SceneShow::show_scene_choice() {
-  if (!ImGui::CollapsingHeader("Scene", ImGuiTreeNodeFlags_DefaultOpen)) return;
+  if (!widget::heading("Scene", true)) return;
   ViewOptions wish = options_;
   wish.choice = player_.choice();
   bool changed = false;
@@ -92,16 +97,12 @@ void SceneShow::show_scene_choice() {
     wish.run.boxes.reset();
     changed = true;
   }
-  ImGui::InputInt("spheres", &wanted_spheres_, 0);
-  if (ImGui::IsItemDeactivatedAfterEdit()) {
-    wanted_spheres_ = std::clamp(wanted_spheres_, 0, 2'000'000);
-    wish.run.spheres = static_cast<std::uint32_t>(wanted_spheres_);
+  if (widget::number("spheres", &wanted_spheres_)) {
+    wish.run.spheres = static_cast<std::uint32_t>(std::min(wanted_spheres_, kMostSpheres));
     changed = true;
   }
-  ImGui::InputInt("seed", &wanted_seed_, 0);
-  if (ImGui::IsItemDeactivatedAfterEdit()) {
-    wanted_seed_ = std::max(wanted_seed_, 0);
-    wish.run.seed = static_cast<std::uint64_t>(wanted_seed_);
+  if (widget::number("seed", &wanted_seed_)) {
+    wish.run.seed = wanted_seed_;
     changed = true;
   }
   if (!changed) return;
@@ -112,30 +113,29 @@ void SceneShow::show_scene_choice() {
     return;
   }
   load(wish);
-  wanted_spheres_ = static_cast<int>(count_spheres(player_.scene()));
   home();
 }
 
 void SceneShow::show_engine_choice() {
-  if (!ImGui::CollapsingHeader("Engine", ImGuiTreeNodeFlags_DefaultOpen)) return;
+  if (!widget::heading("Engine", true)) return;
   EngineChoice wish = player_.choice();
   int engine = static_cast<int>(wish.engine);
   for (int i = 0; i < 3; ++i) {
     if (!has_engine(static_cast<EngineKind>(i))) continue;
     if (i > 0) ImGui::SameLine();
-    ImGui::RadioButton(kEngineNames[static_cast<std::size_t>(i)].data(), &engine, i);
+    widget::radio(kEngineNames[static_cast<std::size_t>(i)].data(), &engine, i);
   }
   wish.engine = static_cast<EngineKind>(engine);
   int backend = static_cast<int>(wish.backend);
   for (int i = 0; i < 3; ++i) {
     if (i > 0) ImGui::SameLine();
-    ImGui::RadioButton(to_string(static_cast<Backend>(i)).data(), &backend, i);
+    widget::radio(to_string(static_cast<Backend>(i)).data(), &backend, i);
   }
   wish.backend = static_cast<Backend>(backend);
   if (wish.engine == EngineKind::bullet) {
-    ImGui::Checkbox("jfpx' solver", &wish.jfpx_solver);
+    widget::check("jfpx' solver", &wish.jfpx_solver);
     ImGui::SameLine();
-    ImGui::Checkbox("jfpx' world", &wish.jfpx_world);
+    widget::check("jfpx' world", &wish.jfpx_world);
   }
   if (wish == player_.choice()) return;
   message_ = player_.switch_to(wish) ? "Switched: the bits stay the same."
@@ -143,23 +143,23 @@ void SceneShow::show_engine_choice() {
 }
 
 void SceneShow::show_settings() {
-  if (!ImGui::CollapsingHeader("Settings")) return;
-  Scene wish = player_.scene();
-  bool changed = slide("dt [s]", &wish.dt, 1e-4f, 0.05f, "%.4f");
-  int iterations = static_cast<int>(wish.resolver.max_iterations);
-  ImGui::InputInt("iterations, 0 = 8N", &iterations, 0);
-  if (ImGui::IsItemDeactivatedAfterEdit()) {
-    wish.resolver.max_iterations = static_cast<std::uint32_t>(std::max(iterations, 0));
-    changed = true;
-  }
-  changed |= slide("velocity eps [m/s]", &wish.resolver.velocity_epsilon, 1e-5f, 1);
-  changed |= slide("position eps [m]", &wish.resolver.position_epsilon, 1e-5f, 1);
-  changed |= slide("restitution from [m/s]", &wish.resolver.restitution_velocity, 1e-3f, 5);
-  changed |= slide("sleep eps [m2/s2]", &wish.sleep.epsilon, 1e-4f, 5);
-  changed |= ImGui::Checkbox("sleep", &wish.sleep.enabled);
+  if (!widget::heading("Settings", false)) return;
+  // While a widget is held its value is the user's, and is taken over when he lets go.
+  if (!ImGui::IsAnyItemActive()) wanted_settings_ = player_.settings();
+  bool changed = slide("dt [s]", &wanted_settings_.dt, 1e-4f, 0.05f, "%.4f");
+  std::uint64_t iterations = wanted_settings_.resolver.max_iterations;
+  changed |= widget::number("iterations, 0 = 8N", &iterations);
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+  wanted_settings_.resolver.max_iterations =
+      static_cast<std::uint32_t>(std::min(iterations, kMost));
+  changed |= slide("velocity eps [m/s]", &wanted_settings_.resolver.velocity_epsilon, 1e-5f, 1);
+  changed |= slide("position eps [m]", &wanted_settings_.resolver.position_epsilon, 1e-5f, 1);
+  changed |=
+      slide("restitution from [m/s]", &wanted_settings_.resolver.restitution_velocity, 1e-3f, 5);
+  changed |= slide("sleep eps [m2/s2]", &wanted_settings_.sleep.epsilon, 1e-4f, 5);
+  changed |= widget::check("sleep", &wanted_settings_.sleep.enabled);
   if (!changed) return;
-  validate(wish);
-  player_.set_settings(wish);
+  player_.set_settings(wanted_settings_);
   message_.clear();
 }
 
@@ -167,12 +167,12 @@ void SceneShow::show_counters() {
   const Moment& now = player_.shown();
   ImGui::Separator();
   const auto awake = std::count(now.awake.begin(), now.awake.end(), std::uint8_t{1});
-  say(fmt::format("{} bodies, {} awake, {} contacts", now.states.size(), awake,
-                  now.contacts.size()));
-  say(now.solved_by.empty()
-          ? fmt::format("spheres by {}, {} corrections", now.computed_by, now.iterations)
-          : fmt::format("spheres by {}, solved by {}", now.computed_by, now.solved_by));
-  if (!now.trouble.empty()) ImGui::TextColored(kWarning, "%s", now.trouble.c_str());
+  widget::text(fmt::format("{} bodies, {} awake, {} contacts", now.states.size(), awake,
+                           now.contacts.size()));
+  widget::text(now.solved_by.empty()
+                   ? fmt::format("spheres by {}, {} corrections", now.computed_by, now.iterations)
+                   : fmt::format("spheres by {}, solved by {}", now.computed_by, now.solved_by));
+  if (!now.trouble.empty()) widget::warning(now.trouble, kTextWidth);
   const std::array<std::pair<const char*, double StageTimes::*>, 5> stages = {
       {{"integrate", &StageTimes::integrate},
        {"broad", &StageTimes::broad},
@@ -190,43 +190,55 @@ void SceneShow::show_counters() {
     // What stands behind ### keeps the plot the same one while its label changes.
     const std::string label = fmt::format("{:.3f} ms {}###{}", now.times.*field, name, name);
     ImGui::PlotLines(label.c_str(), values.data(), static_cast<int>(values.size()), 0, nullptr, 0,
-                     FLT_MAX, {170, 26});
+                     FLT_MAX, {kItemWidth, 26});
   }
-  int telling = static_cast<int>(colouring);
-  if (ImGui::Combo("colours", &telling, kColouringNames,
-                   static_cast<int>(std::size(kColouringNames)))) {
-    colouring = static_cast<Colouring>(telling);
+  if (widget::open_list("colours", kColouringNames[static_cast<std::size_t>(colouring)])) {
+    for (std::size_t i = 0; i < std::size(kColouringNames); ++i) {
+      const auto offered = static_cast<Colouring>(i);
+      if (widget::entry(kColouringNames[i], offered == colouring)) colouring = offered;
+    }
+    widget::close_list();
   }
-  ImGui::Checkbox("contacts", &contacts);
+  widget::check("contacts", &contacts);
   ImGui::SameLine();
-  ImGui::Checkbox("forces", &forces);
+  widget::check("forces", &forces);
 }
 
 void SceneShow::show_picked() {
   if (!picked_) return;
+  // What stands behind ### keeps the window the same one for all bodies.
+  const std::string title = fmt::format("body {}###body", *picked_);
+  ImGui::SetNextWindowPos({ImGui::GetIO().DisplaySize.x - kMargin, kMargin}, ImGuiCond_Always,
+                          {1, 0});
+  if (ImGui::Begin(title.c_str(), nullptr,
+                   ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing)) {
+    show_body(*picked_);
+  }
+  ImGui::End();
+}
+
+void SceneShow::show_body(std::uint32_t body) {
   const Moment& now = player_.shown();
-  const BodyState& state = now.states[*picked_];
-  ImGui::Separator();
-  say(fmt::format("body {}{}", *picked_, now.awake[*picked_] != 0 ? "" : ", asleep"));
-  say(fmt::format("at ({:.3f}, {:.3f}, {:.3f})", state.position.x, state.position.y,
-                  state.position.z));
-  say(fmt::format("{:.3f} m/s, {:.3f} rad/s", length(state.velocity),
-                  length(state.angular_velocity)));
+  const BodyState& state = now.states[body];
+  widget::text(fmt::format("at ({:.3f}, {:.3f}, {:.3f})", state.position.x, state.position.y,
+                           state.position.z));
+  widget::text(fmt::format("{:.3f} m/s, {:.3f} rad/s{}", length(state.velocity),
+                           length(state.angular_velocity), now.awake[body] != 0 ? "" : ", asleep"));
   if (!ImGui::BeginTable("contacts", 3, ImGuiTableFlags_RowBg | ImGuiTableFlags_ScrollY,
-                         {0, 120})) {
+                         {kTableWidth, 120})) {
     return;
   }
   for (const char* head : {"with", "depth [mm]", "normal"}) ImGui::TableSetupColumn(head);
   ImGui::TableHeadersRow();
   for (const Contact& contact : now.contacts) {
-    if (contact.a != *picked_ && contact.b != *picked_) continue;
-    const Vec3 n = contact.a == *picked_ ? contact.normal : -contact.normal;
+    if (contact.a != body && contact.b != body) continue;
+    const Vec3 n = contact.a == body ? contact.normal : -contact.normal;
     ImGui::TableNextColumn();
-    say(fmt::format("{}", contact.a == *picked_ ? contact.b : contact.a));
+    widget::text(fmt::format("{}", contact.a == body ? contact.b : contact.a));
     ImGui::TableNextColumn();
-    say(fmt::format("{:.3f}", -contact.distance * 1000));
+    widget::text(fmt::format("{:.3f}", -contact.distance * 1000));
     ImGui::TableNextColumn();
-    say(fmt::format("{:.2f} {:.2f} {:.2f}", n.x, n.y, n.z));
+    widget::text(fmt::format("{:.2f} {:.2f} {:.2f}", n.x, n.y, n.z));
   }
   ImGui::EndTable();
 }

@@ -68,10 +68,13 @@ bool Player::switch_to(const EngineChoice& choice) {
   return false;
 }
 
-void Player::set_settings(const Scene& settings) {
-  scene_.dt = settings.dt;
-  scene_.resolver = settings.resolver;
-  scene_.sleep = settings.sleep;
+void Player::set_settings(const RunSettings& settings) {
+  Scene changed = scene_;
+  changed.dt = settings.dt;
+  changed.resolver = settings.resolver;
+  changed.sleep = settings.sleep;
+  validate(changed);
+  scene_ = std::move(changed);
   go_on_with(run_->choice());
 }
 

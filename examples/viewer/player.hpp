@@ -25,6 +25,13 @@ class StepClock {
   double rest_ = 0, share_ = 1;
 };
 
+/// What can be changed while a scene runs.
+struct RunSettings {
+  Real dt = 0;  ///< [s]
+  ResolverSettings resolver;
+  SleepSettings sleep;
+};
+
 class Player {
  public:
   /// Moments that are kept for stepping back take no more memory than this, about.
@@ -49,8 +56,9 @@ class Player {
   /// @throws InvalidArgument if they are not one run from the first step, or the first is no longer
   ///   kept; FileError
   void save_recording(const std::string& path) const;
-  /// Replaces resolver and sleep settings and dt, from the newest moment on.
-  void set_settings(const Scene& settings);
+  RunSettings settings() const { return {scene_.dt, scene_.resolver, scene_.sleep}; }
+  /// Replaces them from the newest moment on. @throws InvalidScene; nothing has changed then.
+  void set_settings(const RunSettings& settings);
 
   const Moment& shown() const { return history_[shown_]; }
   /// The moment before the one that is shown, or that one itself.

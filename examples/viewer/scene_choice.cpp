@@ -2,24 +2,23 @@
 #include "examples/viewer/scene_choice.hpp"
 
 #include "examples/demos/demo.hpp"
+#include "examples/viewer/widgets.hpp"
 #include "src/tool/demo_names.hpp"
-
-#include <imgui.h>
 
 namespace jfpx::inline JFPX_ABI::view {
 
 std::optional<std::string> choose_scene(const std::string& current) {
   std::optional<std::string> chosen;
-  if (!ImGui::BeginCombo("scene", current.c_str())) return chosen;
+  if (!widget::open_list("scene", current)) return chosen;
   const auto offer = [&](std::string_view name) {
     const std::string text(name);
-    if (ImGui::Selectable(text.c_str(), text == current)) chosen = text;
+    if (widget::entry(text, text == current)) chosen = text;
   };
   for (const scenes::Entry& entry : scenes::all()) offer(entry.name);
   for (const demos::Entry& entry : demos::all()) {
     if (tool::is_only_a_demo(std::string(entry.name))) offer(entry.name);
   }
-  ImGui::EndCombo();
+  widget::close_list();
   return chosen;
 }
 

@@ -27,8 +27,7 @@ SceneShow::SceneShow(const ViewOptions& options)
   colouring = options.colouring;
   contacts = options.contacts;
   forces = options.forces;
-  wanted_spheres_ = static_cast<int>(options.run.spheres.value_or(0));
-  wanted_seed_ = static_cast<int>(options.run.seed);
+  fill_fields();
   home();
 }
 
@@ -40,6 +39,7 @@ void SceneShow::load(const ViewOptions& options) {
   stage_ = Stage(player_.scene());
   options_ = options;
   picked_.reset();
+  fill_fields();
 }
 
 void SceneShow::advance(double seconds) {

@@ -28,24 +28,29 @@ class SceneShow final : public Show {
   int status() const override;
   std::string summary() const override;
 
-  Player& player() { return player_; }
+  const Player& player() const { return player_; }
+  View view() const;  ///< what the camera sees
+  const std::optional<std::uint32_t>& picked() const { return picked_; }
 
  private:
   void load(const ViewOptions& options);
-  View view() const;
+  void fill_fields();
   void show_controls();
   void show_scene_choice();
   void show_engine_choice();
   void show_settings();
   void show_counters();
   void show_picked();
+  void show_body(std::uint32_t body);
 
   ViewOptions options_;
   Player player_;
   Stage stage_;
   std::optional<std::uint32_t> picked_;
   std::string message_;  ///< why the last wish was not granted
-  int wanted_spheres_ = 0, wanted_seed_ = 1;
+  // What the panel's fields hold, which the user may be changing.
+  std::uint64_t wanted_spheres_ = 0, wanted_seed_ = 0;
+  RunSettings wanted_settings_;
 };
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -438,7 +438,7 @@ TEST(Player, ARecordingIsPlayedAndGoesOnLiveAndReplays) {
 TEST(Player, OnlyAWholeRunIsRecorded) {
   const test::TemporaryFolder folder;
   Player changed = player_of(scenes::make("gas", {.spheres = 1}));
-  Scene settings = changed.scene();
+  RunSettings settings = changed.settings();
   settings.resolver.max_iterations = 5;
   changed.set_settings(settings);
   EXPECT_THROW(changed.save_recording(folder.file("a.rec")), InvalidArgument);

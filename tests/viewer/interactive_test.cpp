@@ -1,16 +1,6 @@
 /// The window as a user has it: keys, another size, the end; events come from SDL's queue.
-#include <jfpx/error.hpp>
+#include "tests/viewer/window_fixture.hpp"
 
-#include "examples/viewer/app.hpp"
-#include "examples/viewer/image.hpp"
-#include "examples/viewer/window.hpp"
-#include "tests/support/temporary_folder.hpp"
-
-#include <SDL.h>
-#include <gtest/gtest.h>
-
-#include <cstdlib>
-#include <filesystem>
 #include <initializer_list>
 #include <utility>
 
@@ -22,21 +12,8 @@ namespace fs = std::filesystem;
 
 constexpr Size kSize{160, 120};
 
-class Interactive : public ::testing::Test {
+class Interactive : public test::WindowTest {
  protected:
-  void SetUp() override {
-    setenv("SDL_VIDEODRIVER", "offscreen", 1);
-    try {
-      (void)Window::hidden();
-    } catch (const BackendUnavailable& error) {
-      GTEST_SKIP() << error.what();
-    }
-    fs::current_path(folder.file(""));  // where pictures go
-    SDL_SetMainReady();
-    ASSERT_EQ(SDL_Init(SDL_INIT_EVENTS), 0) << SDL_GetError();
-  }
-  void TearDown() override { fs::current_path(before_); }
-
   static ViewOptions options(std::uint64_t frames) {
     ViewOptions options;
     options.run.scene = "pile";
@@ -49,19 +26,9 @@ class Interactive : public ::testing::Test {
   /// Keys that are down and up again before the first picture.
   static void press(std::initializer_list<SDL_Keycode> keys) {
     for (const SDL_Keycode code : keys) {
-      for (const SDL_EventType type : {SDL_KEYDOWN, SDL_KEYUP}) {
-        SDL_Event event{};
-        event.type = type;
-        event.key.keysym.sym = code;
-        SDL_PushEvent(&event);
-      }
+      for (const bool down : {true, false}) test::push_key(code, down);
     }
   }
-
-  const test::TemporaryFolder folder;
-
- private:
-  fs::path before_ = fs::current_path();
 };
 
 TEST_F(Interactive, KeysTakePicturesFilmsAndRecordings) {
@@ -79,8 +46,7 @@ TEST_F(Interactive, KeysTakePicturesFilmsAndRecordings) {
 
 TEST_F(Interactive, F1ShowsTheHelp) {
   const auto brightness_of_the_middle = [](std::initializer_list<SDL_Keycode> keys) {
-    SDL_SetMainReady();
-    SDL_Init(SDL_INIT_EVENTS);
+    start_events();
     press(keys);
     ViewOptions wish = options(30);
     wish.screenshot = "picture.png";
@@ -133,8 +99,7 @@ TEST_F(Interactive, WhatCannotBeWrittenIsToldAndTheWindowStays) {
   fs::remove_all(fs::current_path());
   press({SDLK_F12, SDLK_F10, SDLK_F9});
   EXPECT_EQ(run_interactive(options(3)), 0);
-  SDL_SetMainReady();
-  ASSERT_EQ(SDL_Init(SDL_INIT_EVENTS), 0);
+  start_events();
   ViewOptions wish = options(3);
   wish.screenshot = "last.png";  // asked for on the command line: an error
   EXPECT_THROW(run_interactive(wish), FileError);

@@ -1,0 +1,62 @@
+/// The program in a window: events, steps that are due, a picture, and so on until it is closed.
+#pragma once
+
+#include "examples/viewer/app.hpp"
+#include "examples/viewer/recorder.hpp"
+#include "examples/viewer/show.hpp"
+#include "examples/viewer/timing.hpp"
+#include "examples/viewer/ui.hpp"
+
+#include <memory>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::view {
+
+/// One at a time, because SDL is one.
+class App {
+ public:
+  /// Opens the window. @throws what loading, engines and OpenGL throw.
+  explicit App(const ViewOptions& options);
+
+  /// Obeys the events that have come, lets `seconds` pass, and draws.
+  /// @return false after the last picture
+  /// @throws FileError if a picture can't be written that the command line asked for;
+  ///   BackendUnavailable if OpenGL lost its context
+  bool frame(double seconds);
+  /// What is written and printed at the end. @return the exit status
+  int finish() const { return view::finish(*show_, timing_, options_); }
+
+  Show& show() { return *show_; }
+  Window& window() { return window_; }
+
+ private:
+  void read_events();
+  void meet_show();
+  void grant_wishes();
+  void try_to_obey(Command command);
+  void obey(Command command);
+  void toggle_recorder();
+  void save_recording();
+  void write_pictures();
+  void save_picture();
+  Image picture() const;
+  void tell(const std::string& what);
+  void draw(double seconds);
+  void show_help();
+  void show_notice(double seconds);
+
+  ViewOptions options_;
+  std::unique_ptr<Show> show_;
+  Window window_;
+  Renderer renderer_;
+  Ui ui_;
+  Controls controls_;
+  Recorder recorder_;
+  Timing timing_;
+  std::string wanted_picture_;  ///< file for the next one
+  std::string notice_;          ///< shown for a while
+  double notice_left_ = 0;      ///< [s]
+  bool quit_ = false, help_ = false, panel_ = true;
+};
+
+}  // namespace jfpx::inline JFPX_ABI::view

@@ -1,0 +1,137 @@
+/// A user of the window.
+#include "tests/viewer/user.hpp"
+
+#include "tests/viewer/window_fixture.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace {
+
+struct Mouse {
+  SDL_Window* window = nullptr;
+  int x = 0, y = 0;
+  Uint32 buttons = 0;
+};
+Mouse mouse;
+
+}  // namespace
+
+// SDL's offscreen driver has no mouse: these are linked instead of SDL's own.
+extern "C" SDL_Window* SDL_GetMouseFocus() { return mouse.window; }
+extern "C" Uint32 SDL_GetMouseState(int* x, int* y) {
+  if (x != nullptr) *x = mouse.x;
+  if (y != nullptr) *y = mouse.y;
+  return mouse.buttons;
+}
+
+namespace jfpx::inline JFPX_ABI::test {
+
+User::User(const view::ViewOptions& options) : app_(options) {
+  mouse = {app_.window().sdl()};
+  view::widget::tell(&log_);
+  for (int i = 0; i < 3; ++i) frame();  // panels learn their size from the first ones
+}
+
+User::~User() { mouse = {}; }
+
+bool User::frame(double seconds) {
+  log_ = {};
+  return app_.frame(seconds);
+}
+
+std::string User::value(const std::string& label) const {
+  return sees(label) ? find(label).value : "";
+}
+
+bool User::reads(std::string_view part) const {
+  const auto has_part = [part](const std::string& text) {
+    return text.find(part) != std::string::npos;
+  };
+  return std::any_of(texts().begin(), texts().end(), has_part);
+}
+
+const view::PanelLog::Widget& User::find(const std::string& label) const {
+  const auto found = log_.widgets.find(label);
+  if (found == log_.widgets.end()) throw std::runtime_error("the panel does not show " + label);
+  return found->second;
+}
+
+void User::drag_in(const std::string& label, double from, double to) {
+  const view::PanelLog::Widget place = find(label);
+  const auto x = [&place](double share) {
+    return place.left + 1 + (place.right - place.left - 2) * static_cast<float>(share);
+  };
+  const float y = (place.top + place.bottom) / 2;
+  move_to(x(from), y);
+  press(true);
+  if (from != to) move_to(x(to), y);
+  press(false);
+}
+
+void User::choose(const std::string& list, const std::string& entry) {
+  const auto before = log_.widgets;
+  click(list);
+  frame();  // the list learns its size from its first one
+  const auto is_new = [&before](const auto& widget) { return !before.contains(widget.first); };
+  for (int i = 0; i < 20 && !sees(entry); ++i) {
+    const auto seen = std::find_if(log_.widgets.begin(), log_.widgets.end(), is_new);
+    if (seen == log_.widgets.end()) break;
+    move_to(seen->second.left + 4, seen->second.top + 4);
+    SDL_Event event{};
+    event.type = SDL_MOUSEWHEEL;
+    event.wheel.y = -1;
+    SDL_PushEvent(&event);
+    frame();
+    frame();
+  }
+  click(entry);
+}
+
+void User::type(const std::string& field, const std::string& text) {
+  click(field);
+  SDL_Event event{};
+  event.type = SDL_TEXTINPUT;
+  text.copy(event.text.text, sizeof event.text.text - 1);
+  SDL_PushEvent(&event);
+  frame();
+  for (const bool down : {true, false}) {
+    push_key(SDLK_RETURN, down);
+    frame();
+  }
+}
+
+void User::click_at(Real x, Real y) {
+  move_to(static_cast<float>(x), static_cast<float>(y));
+  press(true);
+  press(false);
+}
+
+void User::move_to(float x, float y) {
+  SDL_Event event{};
+  event.type = SDL_MOUSEMOTION;
+  event.motion.state = mouse.buttons;
+  event.motion.x = static_cast<int>(x);
+  event.motion.y = static_cast<int>(y);
+  event.motion.xrel = event.motion.x - mouse.x;
+  event.motion.yrel = event.motion.y - mouse.y;
+  mouse.x = event.motion.x;
+  mouse.y = event.motion.y;
+  SDL_PushEvent(&event);
+  frame();
+}
+
+void User::press(bool down) {
+  mouse.buttons = down ? SDL_BUTTON_LMASK : 0;
+  SDL_Event event{};
+  event.type = down ? SDL_MOUSEBUTTONDOWN : SDL_MOUSEBUTTONUP;
+  event.button.button = SDL_BUTTON_LEFT;
+  event.button.state = down ? SDL_PRESSED : SDL_RELEASED;
+  event.button.x = mouse.x;
+  event.button.y = mouse.y;
+  SDL_PushEvent(&event);
+  frame();
+  if (!down) frame();  // what the panel asked for shows in the next picture
+}
+
+}  // namespace jfpx::inline JFPX_ABI::test

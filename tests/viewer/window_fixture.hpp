@@ -1,0 +1,53 @@
+/// Windows without a display, in a folder of their own.
+#pragma once
+
+#include <jfpx/error.hpp>
+
+#include "examples/viewer/interactive.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <SDL.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+namespace jfpx::inline JFPX_ABI::test {
+
+/// Tests that open windows derive from this; they are skipped, with the reason, where OpenGL is
+/// missing. What the viewer writes goes to the folder.
+class WindowTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    setenv("SDL_VIDEODRIVER", "offscreen", 1);
+    try {
+      (void)view::Window::hidden();
+    } catch (const BackendUnavailable& error) {
+      GTEST_SKIP() << error.what();
+    }
+    std::filesystem::current_path(folder.file(""));
+    start_events();
+  }
+  void TearDown() override { std::filesystem::current_path(before_); }
+
+  /// Lets events be pushed before there is a window.
+  static void start_events() {
+    SDL_SetMainReady();
+    ASSERT_EQ(SDL_Init(SDL_INIT_EVENTS), 0) << SDL_GetError();
+  }
+
+  const TemporaryFolder folder;
+
+ private:
+  std::filesystem::path before_ = std::filesystem::current_path();
+};
+
+inline void push_key(SDL_Keycode code, bool down) {
+  SDL_Event event{};
+  event.type = down ? SDL_KEYDOWN : SDL_KEYUP;
+  event.key.keysym.sym = code;
+  event.key.keysym.scancode = SDL_GetScancodeFromKey(code);
+  SDL_PushEvent(&event);
+}
+
+}  // namespace jfpx::inline JFPX_ABI::test
