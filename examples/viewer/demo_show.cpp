@@ -192,7 +192,8 @@ void DemoShow::draw(Renderer& renderer, const Target& target) {
     }
   }
   if (forces && world != nullptr) draw_forces(*world, &drawing);
-  renderer.draw(drawing, view, {0, 0, target.width, target.height}, target.framebuffer);
+  renderer.draw(drawing, view, {0, 0, target.width, target.height, target.unit},
+                target.framebuffer);
   float y = ImGui::GetIO().DisplaySize.y - 12;
   for (auto line = now_.text.rbegin(); line != now_.text.rend(); ++line) {
     y -= ImGui::GetTextLineHeightWithSpacing();

@@ -38,7 +38,7 @@ struct BoxItem {
 struct LineItem {
   float from[3], to[3];
   std::uint8_t rgba[4];
-  float width;  ///< pixels
+  float width;  ///< in units: Viewport::unit
 };
 struct GroundItem {
   float normal[3], height;  ///< height of the eye over the plane

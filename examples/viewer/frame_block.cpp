@@ -45,20 +45,23 @@ Mat4 projection(const View& view, Real aspect) {
 }  // namespace
 
 FrameBlock make_frame_block(const Drawing& drawing, const View& view, const Quality& quality,
-                            int width, int height) {
+                            const Viewport& viewport) {
   FrameBlock block;
   std::memset(&block, 0, sizeof block);
-  const Real aspect = static_cast<Real>(width) / static_cast<Real>(height);
+  const Real width = static_cast<Real>(viewport.width * quality.supersample);
+  const Real height = static_cast<Real>(viewport.height * quality.supersample);
+  const Real aspect = width / height;
   const Mat4 turned = rows(view.right, 0, view.up, 0, -view.forward, 0);
   put(block.view_projection, projection(view, aspect) * turned);
   const Real tangent = std::tan(view.fov_y / 2);
-  put(block.ray_x, view.right * (tangent * aspect), 2 * tangent / static_cast<Real>(height));
+  put(block.ray_x, view.right * (tangent * aspect), 2 * tangent / height);
   put(block.ray_y, view.up * tangent, 0);
   put(block.ray_z, view.forward, view.near_plane);
 
   const Vec3 sun = normalized(kTowardsSun);
   put(block.sun, sun, kSunBlur);
-  put(block.viewport, {static_cast<Real>(width), static_cast<Real>(height), view.far_plane}, 0);
+  put(block.viewport, {width, height, view.far_plane},
+      static_cast<Real>(viewport.unit) * static_cast<Real>(quality.supersample));
 
   // The shadow map covers what throws shadows, or what is near when that is far too much.
   const Vec3 towards = drawing.bounds_centre() - view.eye;

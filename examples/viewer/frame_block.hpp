@@ -19,8 +19,7 @@ struct FrameBlock {
   float taps[kMostTaps][4];
 };
 
-/// @param width, height of the target in samples
 FrameBlock make_frame_block(const Drawing& drawing, const View& view, const Quality& quality,
-                            int width, int height);
+                            const Viewport& viewport);
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -58,11 +58,9 @@ void App::read_events() {
   window_.capture_mouse(controls_.looking());
   for (const DemoKey& key : controls_.take_demo_keys()) show_->demo_key(key);
   for (const Command command : controls_.take_commands()) try_to_obey(command);
-  const float ratio = window_.pixel_ratio();
-  for (const Click& click : controls_.take_clicks()) {
-    show_->pick(static_cast<int>(static_cast<float>(click.x) * ratio),
-                static_cast<int>(static_cast<float>(click.y) * ratio), window_.pixel_width(),
-                window_.pixel_height());
+  for (const Click& click : controls_.take_clicks()) {  // in the middle of its unit
+    show_->pick(static_cast<Real>(click.x) + Real(0.5), static_cast<Real>(click.y) + Real(0.5),
+                window_.width(), window_.height());
   }
 }
 
@@ -213,7 +211,7 @@ void App::draw(double seconds) {
   }
   Stopwatch watch;
   ui_.begin(seconds);
-  show_->draw(renderer_, {0, width, height});
+  show_->draw(renderer_, {0, width, height, window_.pixel_ratio()});
   if (panel_) show_->panel();
   if (help_) show_help();
   show_notice(seconds);

@@ -263,8 +263,7 @@ void Renderer::draw(const Drawing& drawing, const View& view, const Viewport& vi
   if (viewport.width <= 0 || viewport.height <= 0) return;  // a minimised window
   Impl& r = *impl_;
   r.resize(viewport.width * r.quality.supersample, viewport.height * r.quality.supersample);
-  r.upload(drawing, view,
-           make_frame_block(drawing, view, r.quality, r.targets->width, r.targets->height));
+  r.upload(drawing, view, make_frame_block(drawing, view, r.quality, viewport));
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);
   glDisable(GL_CULL_FACE);

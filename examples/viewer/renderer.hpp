@@ -26,6 +26,7 @@ inline constexpr Quality kHighQuality{2, 4, 4096, 24, 24};
 /// A rectangle of the output, in pixels from its lower left corner.
 struct Viewport {
   int x = 0, y = 0, width = 0, height = 0;
+  float unit = 1;  ///< pixels that widths of lines are counted in
 };
 
 /// Needs a current context for its whole life. A picture takes one draw call a kind of item and

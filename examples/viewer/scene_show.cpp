@@ -68,13 +68,12 @@ void SceneShow::draw(Renderer& renderer, const Target& target) {
   if (contacts) stage_.draw_contacts(player_.shown().contacts, false, &drawing);
   if (forces) stage_.draw_forces(player_.before(), player_.shown(), &drawing);
   if (picked_) stage_.draw_mark(player_.shown(), *picked_, &drawing);
-  renderer.draw(drawing, now, {0, 0, target.width, target.height}, target.framebuffer);
+  renderer.draw(drawing, now, {0, 0, target.width, target.height, target.unit}, target.framebuffer);
 }
 
-void SceneShow::pick(int x, int y, int width, int height) {
+void SceneShow::pick(Real x, Real y, int width, int height) {
   const View now = view();
-  const Vec3 direction =
-      ray_through(now, static_cast<Real>(x), static_cast<Real>(y), width, height);
+  const Vec3 direction = ray_through(now, x, y, width, height);
   picked_ = stage_.pick(player_.shown(), now.eye, direction);
 }
 

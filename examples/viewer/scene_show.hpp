@@ -19,7 +19,7 @@ class SceneShow final : public Show {
   void home() override;
   void draw(Renderer& renderer, const Target& target) override;
   void panel() override;
-  void pick(int x, int y, int width, int height) override;
+  void pick(Real x, Real y, int width, int height) override;
   std::uint64_t steps() const override { return player_.shown().step; }
   double engine_ms() const override { return player_.shown().times.total; }
   Real body_size() const override { return stage_.body_size(); }

@@ -14,7 +14,8 @@ namespace jfpx::inline JFPX_ABI::view {
 /// Where a picture goes.
 struct Target {
   GLuint framebuffer = 0;
-  int width = 0, height = 0;
+  int width = 0, height = 0;  ///< pixels
+  float unit = 1;             ///< pixels of one unit of the window
 };
 
 class Show {
@@ -29,7 +30,8 @@ class Show {
   /// Draws bodies, and text that belongs to the picture; between Ui::begin() and Ui::end().
   virtual void draw(Renderer& renderer, const Target& target) = 0;
   virtual void panel() {}  ///< likewise
-  virtual void pick(int /*x*/, int /*y*/, int /*width*/, int /*height*/) {}
+  /// Looks for a body at a point of a picture that is as large as said, in any unit.
+  virtual void pick(Real /*x*/, Real /*y*/, int /*width*/, int /*height*/) {}
   /// Keys of a demo, by SDL's names in lower case.
   virtual std::vector<std::string> demo_keys() const { return {}; }
   virtual void demo_key(const DemoKey& /*key*/) {}

@@ -28,7 +28,7 @@ constexpr std::size_t kTraced = 6;     // bodies whose paths are drawn
 constexpr std::size_t kTrail = 240;    // steps of a path
 constexpr std::size_t kPlotted = 600;  // steps of a plot
 constexpr std::size_t kTimed = 60;     // steps whose median time is shown
-constexpr float kWideColumn = 260;     // pixels that have room for large titles
+constexpr float kWideColumn = 260;     // [units] that have room for large titles
 constexpr float kStrip = 0.26f;        // share of the height below the pictures
 
 bullet::SceneWorld make_stock_world(const Scene& scene) {
@@ -201,7 +201,8 @@ void SideBySide::draw(Renderer& renderer, const Target& target) {
     draw_trails(&drawing);
     const int left = target.width * static_cast<int>(column) / 3;
     const int right = target.width * (static_cast<int>(column) + 1) / 3;
-    renderer.draw(drawing, view, {left, strip, right - left, top_height}, target.framebuffer);
+    renderer.draw(drawing, view, {left, strip, right - left, top_height, target.unit},
+                  target.framebuffer);
   }
   draw_texts(target, top_height);
   draw_plots(target, top_height);
@@ -211,8 +212,7 @@ void SideBySide::draw_texts(const Target& target, int top_height) const {
   constexpr float kMargin = 10;
   const ImU32 dark = IM_COL32(12, 16, 22, 200);
   ImDrawList* list = ImGui::GetBackgroundDrawList();
-  const float scale = ImGui::GetIO().DisplaySize.x / static_cast<float>(target.width);
-  const float width = static_cast<float>(target.width) * scale / 3;
+  const float width = ImGui::GetIO().DisplaySize.x / 3;
   const float line = ImGui::GetTextLineHeightWithSpacing();
   const float title = ImGui::GetFontSize() * (width > kWideColumn ? 2 : 1);
   for (std::size_t column = 0; column < kColumns; ++column) {
@@ -225,13 +225,12 @@ void SideBySide::draw_texts(const Target& target, int top_height) const {
     list->AddText(ImGui::GetFont(), title, {left + kMargin, 6}, IM_COL32_WHITE, kTitles[column]);
     list->AddText({left + kMargin, 11 + title}, IM_COL32(200, 212, 226, 255), count.c_str());
     if (column == 0) continue;
-    list->AddLine({left, 0}, {left, static_cast<float>(top_height) * scale}, dark, 3);
+    list->AddLine({left, 0}, {left, static_cast<float>(top_height) / target.unit}, dark, 3);
   }
 }
 
 void SideBySide::draw_plots(const Target& target, int top_height) const {
-  const float scale = ImGui::GetIO().DisplaySize.x / static_cast<float>(target.width);
-  const float top = static_cast<float>(top_height) * scale;
+  const float top = static_cast<float>(top_height) / target.unit;
   ImGui::SetNextWindowPos({0, top});
   ImGui::SetNextWindowSize({ImGui::GetIO().DisplaySize.x, ImGui::GetIO().DisplaySize.y - top});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);

@@ -11,16 +11,18 @@
 #include <backends/imgui_impl_opengl3.h>
 
 namespace jfpx::inline JFPX_ABI::view {
+namespace {
 
-Ui::Ui(Window& window) : on_window_(true) {
+constexpr float kTextSize = 13;  // [units], that of the default font
+
+}  // namespace
+
+Ui::Ui(Window& window) : window_(&window) {
   set_up();
   ImGui_ImplSDL2_InitForOpenGL(window.sdl(), window.context());
-  ImGui::GetIO().FontGlobalScale = std::max(1.0f, std::min(window.pixel_ratio(), 2.0f));
 }
 
-Ui::Ui(const Canvas& canvas) : on_window_(false), width_(canvas.width()), height_(canvas.height()) {
-  set_up();
-}
+Ui::Ui(const Canvas& canvas) : width_(canvas.width()), height_(canvas.height()) { set_up(); }
 
 void Ui::set_up() {
   IMGUI_CHECKVERSION();
@@ -42,7 +44,7 @@ void Ui::set_up() {
 
 Ui::~Ui() {
   ImGui_ImplOpenGL3_Shutdown();
-  if (on_window_) ImGui_ImplSDL2_Shutdown();
+  if (window_ != nullptr) ImGui_ImplSDL2_Shutdown();
   ImGui::DestroyContext();
 }
 
@@ -50,9 +52,24 @@ void Ui::handle(const SDL_Event& event) { ImGui_ImplSDL2_ProcessEvent(&event); }
 bool Ui::wants_keyboard() const { return ImGui::GetIO().WantTextInput; }
 bool Ui::wants_mouse() const { return ImGui::GetIO().WantCaptureMouse; }
 
+/// Letters have as many pixels as the screen gives them, and keep their size in units. A window may
+/// be moved to another screen.
+void Ui::fit_text(float pixel_ratio) {
+  if (pixel_ratio == pixel_ratio_) return;
+  pixel_ratio_ = pixel_ratio;
+  ImGuiIO& io = ImGui::GetIO();
+  ImFontConfig font;
+  font.SizePixels = kTextSize * pixel_ratio;
+  io.Fonts->Clear();
+  io.Fonts->AddFontDefault(&font);
+  io.FontGlobalScale = 1 / pixel_ratio;
+  ImGui_ImplOpenGL3_DestroyDeviceObjects();  // the next frame makes them anew
+}
+
 void Ui::begin(double seconds) {
+  fit_text(window_ != nullptr ? window_->pixel_ratio() : 1);
   ImGui_ImplOpenGL3_NewFrame();
-  if (on_window_) {
+  if (window_ != nullptr) {
     ImGui_ImplSDL2_NewFrame();
   } else {
     ImGui::GetIO().DisplaySize = {static_cast<float>(width_), static_cast<float>(height_)};

@@ -24,8 +24,10 @@ class Ui {
 
  private:
   void set_up();
-  bool on_window_;
-  int width_ = 0, height_ = 0;
+  void fit_text(float pixel_ratio);
+  Window* window_ = nullptr;
+  int width_ = 0, height_ = 0;  ///< of the canvas, where there is no window
+  float pixel_ratio_ = 0;       ///< that the text was made for
 };
 
 }  // namespace jfpx::inline JFPX_ABI::view

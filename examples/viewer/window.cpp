@@ -99,6 +99,16 @@ void Window::set_fullscreen(bool on) {
 }
 void Window::capture_mouse(bool on) { SDL_SetRelativeMouseMode(on ? SDL_TRUE : SDL_FALSE); }
 
+int Window::width() const {
+  int width = 0;
+  SDL_GetWindowSize(window_.get(), &width, nullptr);
+  return width;
+}
+int Window::height() const {
+  int height = 0;
+  SDL_GetWindowSize(window_.get(), nullptr, &height);
+  return height;
+}
 int Window::pixel_width() const {
   int width = 0;
   SDL_GL_GetDrawableSize(window_.get(), &width, nullptr);
@@ -110,9 +120,7 @@ int Window::pixel_height() const {
   return height;
 }
 float Window::pixel_ratio() const {
-  int points = 0;
-  SDL_GetWindowSize(window_.get(), &points, nullptr);
-  return points > 0 ? static_cast<float>(pixel_width()) / static_cast<float>(points) : 1.0f;
+  return width() > 0 ? static_cast<float>(pixel_width()) / static_cast<float>(width()) : 1.0f;
 }
 std::string Window::driver() const {
   const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));

@@ -29,9 +29,11 @@ class Window {
   bool fullscreen() const { return fullscreen_; }
   /// While captured, the mouse is hidden and reports movement without end.
   void capture_mouse(bool on);
+  int width() const;   ///< in units, those of mouse coordinates
+  int height() const;  ///< likewise
   int pixel_width() const;
   int pixel_height() const;
-  /// Pixels a unit of mouse coordinates: 2 on many high-density screens.
+  /// Pixels of a unit: 2 on many high-density screens.
   float pixel_ratio() const;
   SDL_Window* sdl() const { return window_.get(); }
   SDL_GLContext context() const { return context_.get(); }

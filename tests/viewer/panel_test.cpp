@@ -3,6 +3,7 @@
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/demo_show.hpp"
 #include "examples/viewer/scene_show.hpp"
+#include "tests/viewer/row_of_balls.hpp"
 #include "tests/viewer/user.hpp"
 #include "tests/viewer/window_fixture.hpp"
 
@@ -13,13 +14,11 @@ namespace jfpx {
 namespace {
 
 using namespace view;
+using test::kRowSize;
 using ::testing::ElementsAre;
 using ::testing::StartsWith;
 namespace fs = std::filesystem;
 
-/// Fast: what counts here is on the panel.
-constexpr Quality kSketch{.samples = 1, .shadow_size = 0, .occlusion_samples = 0};
-constexpr Size kWide{800, 640};
 constexpr double kStep = 1.0 / 60;  // [s], the dt of all scenes here
 
 ViewOptions options_for(const std::string& scene) {
@@ -27,26 +26,7 @@ ViewOptions options_for(const std::string& scene) {
   options.run.scene = scene;
   options.run.spheres = 30;
   options.size = {360, 760};  // hardly more than the panel
-  options.quality = kSketch;
-  return options;
-}
-
-/// Four balls in a row, each touching its neighbours, beside the panel.
-ViewOptions row_of_balls(const std::string& path) {
-  Scene scene;
-  for (int i = 0; i < 4; ++i) {
-    BodyDef ball;
-    ball.shape = Sphere{Real(0.5)};
-    ball.position = {Real(i) * Real(0.999), 0, 0};
-    ball.mass = 1;
-    scene.bodies.push_back(ball);
-  }
-  save_scene(scene, path);
-  ViewOptions options = options_for(path);
-  options.run.spheres.reset();
-  options.size = kWide;
-  options.eye = {-1, 0, 12};
-  options.target = {-1, 0, 0};
+  options.quality = test::kSketch;
   return options;
 }
 
@@ -237,7 +217,7 @@ TEST_F(Panel, NumbersAndSeedsMakeOtherScenes) {
 }
 
 TEST_F(Panel, WhatASceneCannotHaveIsToldAndTheFieldsShowWhatIs) {
-  test::User user(row_of_balls(folder.file("row.json")));
+  test::User user(test::row_of_balls(folder.file("row.json")));
   user.show().paused = true;
   user.click("Step");
   user.type("spheres", "9");
@@ -305,12 +285,12 @@ TEST_F(Panel, ColoursContactsAndForcesAreSwitched) {
 }
 
 TEST_F(Panel, ABodyThatIsClickedTellsItsContacts) {
-  test::User user(row_of_balls(folder.file("row.json")));
+  test::User user(test::row_of_balls(folder.file("row.json")));
   user.show().paused = true;
   user.click("Step");
   for (std::uint32_t k = 0; k < 4; ++k) {
     const Vec3 place = scene(user).player().shown().states[k].position;
-    const auto at = project(scene(user).view(), place, kWide.width, kWide.height);
+    const auto at = project(scene(user).view(), place, kRowSize.width, kRowSize.height);
     user.click_at(at->x, at->y);
     ASSERT_EQ(scene(user).picked(), k);
     const auto& texts = user.texts();
@@ -335,7 +315,7 @@ TEST_F(Panel, ABodyThatIsClickedTellsItsContacts) {
       EXPECT_THAT(pushes, ElementsAre(StartsWith("1.00"), StartsWith("-1.00")));
     }
   }
-  user.click_at(kWide.width - 10, kWide.height - 10);  // the sky
+  user.click_at(kRowSize.width - 10, kRowSize.height - 10);  // the sky
   EXPECT_EQ(scene(user).picked(), std::nullopt);
   EXPECT_FALSE(user.reads("at ("));
 }

@@ -189,6 +189,35 @@ TEST_F(RendererTest, SpinShowsOnBallsButNotOnPlainSpheres) {
   EXPECT_EQ(turned(Pattern::plain, {}).rgb, turned(Pattern::plain, quarter).rgb);
 }
 
+TEST_F(RendererTest, LinesAreAsWideAsSaidInUnitsWhateverTheSamples) {
+  const Vec3 eye{0, 0, 5};
+  const View view = view_of(eye, {}, 2);
+  constexpr int kUnits = 60;
+  const auto rows = [&](float width, int unit, int supersample) {
+    Drawing drawing(eye);
+    drawing.set_bounds({}, 2);
+    if (width > 0) drawing.add_line({-3, 0, 0}, {3, 0, 0}, {255, 0, 0}, width);
+    Renderer renderer({.supersample = supersample, .samples = 1});
+    const Canvas canvas(kUnits * unit, kUnits * unit);
+    renderer.draw(drawing, view, {0, 0, canvas.width(), canvas.height(), float(unit)},
+                  canvas.framebuffer());
+    const Image image = canvas.read();
+    int red = 0;
+    for (int y = 0; y < image.height; ++y) {
+      const std::uint8_t* pixel = image.at(image.width / 2, y);
+      red += pixel[0] > 2 * pixel[2];
+    }
+    return red;
+  };
+  for (const int supersample : {1, 2}) {
+    for (const int unit : {1, 2, 3}) {
+      EXPECT_EQ(rows(8, unit, supersample), 8 * unit) << supersample;
+      EXPECT_EQ(rows(2, unit, supersample), 2 * unit) << supersample;
+      EXPECT_EQ(rows(0, unit, supersample), 0) << supersample;
+    }
+  }
+}
+
 TEST_F(RendererTest, NothingIsDrawnTwiceAndEmptyPicturesAreSky) {
   const Vec3 eye{0, 2, 8};
   const View view = view_of(eye, {0, 2, 0}, 4);

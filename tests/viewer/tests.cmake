@@ -1,7 +1,7 @@
 jfpx_add_test(controls_test SOURCES viewer/controls_test.cpp LINK jfpx_viewer)
 jfpx_add_test(demo_show_test SOURCES viewer/demo_show_test.cpp LINK jfpx_viewer)
 jfpx_add_test(interactive_test SOURCES viewer/interactive_test.cpp LINK jfpx_viewer)
-jfpx_add_test(panel_test SOURCES viewer/panel_test.cpp viewer/user.cpp LINK jfpx_viewer)
+jfpx_add_test(panel_test SOURCES viewer/panel_test.cpp viewer/dense_screen_test.cpp viewer/user.cpp LINK jfpx_viewer)
 jfpx_add_test(renderer_test SOURCES viewer/renderer_test.cpp LINK jfpx_viewer)
 jfpx_add_test(view_test SOURCES viewer/view_test.cpp LINK jfpx_viewer)
 foreach(suffix IN ITEMS "" "_f64")

@@ -4,7 +4,9 @@
 #include "tests/viewer/window_fixture.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace {
 
@@ -14,26 +16,46 @@ struct Mouse {
   Uint32 buttons = 0;
 };
 Mouse mouse;
+double screen_density = 1;
 
 }  // namespace
 
-// SDL's offscreen driver has no mouse: these are linked instead of SDL's own.
+// SDL's offscreen driver has no mouse, and its units are pixels: these are linked instead of SDL's
+// own. On a dense screen a window has more pixels than units.
 extern "C" SDL_Window* SDL_GetMouseFocus() { return mouse.window; }
 extern "C" Uint32 SDL_GetMouseState(int* x, int* y) {
   if (x != nullptr) *x = mouse.x;
   if (y != nullptr) *y = mouse.y;
   return mouse.buttons;
 }
+extern "C" void SDL_GetWindowSize(SDL_Window* window, int* width, int* height) {
+  SDL_GL_GetDrawableSize(window, width, height);
+  for (int* size : {width, height}) {
+    if (size != nullptr) *size = static_cast<int>(std::lround(*size / screen_density));
+  }
+}
 
 namespace jfpx::inline JFPX_ABI::test {
 
-User::User(const view::ViewOptions& options) : app_(options) {
+User::User(view::ViewOptions options, double density)
+    : app_(on_screen(std::move(options), density)) {
   mouse = {app_.window().sdl()};
   view::widget::tell(&log_);
   for (int i = 0; i < 3; ++i) frame();  // panels learn their size from the first ones
 }
 
-User::~User() { mouse = {}; }
+User::~User() {
+  mouse = {};
+  screen_density = 1;
+}
+
+view::ViewOptions User::on_screen(view::ViewOptions options, double density) {
+  screen_density = density;
+  for (int* size : {&options.size.width, &options.size.height}) {
+    *size = static_cast<int>(std::lround(*size * density));
+  }
+  return options;
+}
 
 bool User::frame(double seconds) {
   log_ = {};
@@ -63,10 +85,7 @@ void User::drag_in(const std::string& label, double from, double to) {
     return place.left + 1 + (place.right - place.left - 2) * static_cast<float>(share);
   };
   const float y = (place.top + place.bottom) / 2;
-  move_to(x(from), y);
-  press(true);
-  if (from != to) move_to(x(to), y);
-  press(false);
+  drag(x(from), y, x(to), y);
 }
 
 void User::choose(const std::string& list, const std::string& entry) {
@@ -101,9 +120,14 @@ void User::type(const std::string& field, const std::string& text) {
   }
 }
 
-void User::click_at(Real x, Real y) {
-  move_to(static_cast<float>(x), static_cast<float>(y));
+void User::click_at(Real x, Real y) { drag(x, y, x, y); }
+
+void User::drag(Real from_x, Real from_y, Real to_x, Real to_y) {
+  move_to(static_cast<float>(from_x), static_cast<float>(from_y));
   press(true);
+  if (from_x != to_x || from_y != to_y) {
+    move_to(static_cast<float>(to_x), static_cast<float>(to_y));
+  }
   press(false);
 }
 

@@ -14,16 +14,19 @@ namespace jfpx::inline JFPX_ABI::test {
 /// events.
 class User {
  public:
+  /// @param density pixels of a unit of the window; the options' size is in units
   /// @throws as view::App
-  explicit User(const view::ViewOptions& options);
+  explicit User(view::ViewOptions options, double density = 1);
   ~User();
   User(const User&) = delete;
   User& operator=(const User&) = delete;
 
   view::Show& show() { return app_.show(); }
+  view::Window& window() { return app_.window(); }
 
   /// One picture, `seconds` after the last. @return false if it was the last one
   bool frame(double seconds = 0);
+  const view::PanelLog& panel() const { return log_; }
   bool sees(const std::string& label) const { return log_.widgets.contains(label); }
   /// What a widget shows, or "" if there is no such widget.
   std::string value(const std::string& label) const;
@@ -39,13 +42,17 @@ class User {
   void choose(const std::string& list, const std::string& entry);
   /// Replaces the text of a field.
   void type(const std::string& field, const std::string& text);
-  /// In the window's units.
+  // In the window's units:
   void click_at(Real x, Real y);
+  void drag(Real from_x, Real from_y, Real to_x, Real to_y);
 
  private:
   const view::PanelLog::Widget& find(const std::string& label) const;
   void move_to(float x, float y);
   void press(bool down);
+
+  /// Makes the screen as dense as that, and the size one in pixels.
+  static view::ViewOptions on_screen(view::ViewOptions options, double density);
 
   view::PanelLog log_;
   view::App app_;

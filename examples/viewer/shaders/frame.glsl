@@ -7,7 +7,7 @@ layout(std140) uniform Frame {
   vec4 ray_y;      // half a viewport up
   vec4 ray_z;      // forward; w: near plane
   vec4 sun;        // direction towards the sun; w: tangent of its blur
-  vec4 viewport;   // width, height; z: far plane; w: height of the eye over the horizon's ground
+  vec4 viewport;   // width, height in samples; z: far plane; w: samples of a unit of line widths
   vec4 shadow;     // metres a texel, metres across, metres deep; w: taps, 0 for no shadows
   vec4 occlusion;  // radius in metres; y: samples, 0 for none; z: distance where fog takes over
   vec4 taps[MOST_TAPS];  // direction by the golden angle; z: where it lies on a disk of radius sqrt(taps)

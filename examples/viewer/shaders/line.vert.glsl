@@ -2,7 +2,7 @@
 layout(location = 0) in vec3 from;
 layout(location = 1) in vec3 to;
 layout(location = 2) in vec4 paint;
-layout(location = 3) in float width;  // pixels
+layout(location = 3) in float width;  // units
 
 out vec4 colour;
 
@@ -20,7 +20,7 @@ void main() {
   vec4 p = (gl_VertexID & 1) == 0 ? a : b;
   float across = (gl_VertexID >> 1) == 0 ? -1.0 : 1.0;
   float along = (gl_VertexID & 1) == 0 ? -0.5 : 0.5;
-  p.xy += (side * across + direction * along) * width / viewport.xy * p.w;
+  p.xy += (side * across + direction * along) * width * viewport.w / viewport.xy * p.w;
   if (a.w <= 0.0 || b.w <= 0.0) p = vec4(0.0, 0.0, -2.0, 1.0);
   colour = paint;
   gl_Position = p;

@@ -1,0 +1,35 @@
+/// A scene whose contacts and places in the picture are plain to see.
+#pragma once
+
+#include "examples/viewer/options.hpp"
+
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::test {
+
+inline constexpr view::Size kRowSize{800, 640};
+/// Fast: what counts is where things are.
+inline constexpr view::Quality kSketch{.samples = 1, .shadow_size = 0, .occlusion_samples = 0};
+
+/// Four balls in a row, each touching its neighbours, to the right of the panel. @param path of the
+/// scene file that is written
+inline view::ViewOptions row_of_balls(const std::string& path) {
+  Scene scene;
+  for (int i = 0; i < 4; ++i) {
+    BodyDef ball;
+    ball.shape = Sphere{Real(0.5)};
+    ball.position = {Real(i) * Real(0.999), 0, 0};
+    ball.mass = 1;
+    scene.bodies.push_back(ball);
+  }
+  save_scene(scene, path);
+  view::ViewOptions options;
+  options.run.scene = path;
+  options.size = kRowSize;
+  options.quality = kSketch;
+  options.eye = {-1, 0, 12};
+  options.target = {-1, 0, 0};
+  return options;
+}
+
+}  // namespace jfpx::inline JFPX_ABI::test
