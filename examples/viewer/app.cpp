@@ -43,12 +43,17 @@ int run_headless(const ViewOptions& options) {
     window.check_context();
     timing.add_picture(watch.lap() * 1e3);
   };
+  const auto picture = [&] {
+    Image image = canvas.read();
+    window.check_context();  // what a lost context leaves is no picture
+    return image;
+  };
   for (std::uint64_t i = 0; i < options.frames.value_or(kHeadlessFrames); ++i) {
     show->step();
     timing.add_step(show->engine_ms());
     if (!recorder.on()) continue;
     draw();
-    recorder.add(canvas.read());
+    recorder.add(picture());
   }
   show->home();
   if (options.panel) {  // windows learn their size from a first, invisible frame
@@ -57,7 +62,7 @@ int run_headless(const ViewOptions& options) {
     ui.end(canvas.framebuffer(), canvas.width(), canvas.height());
   }
   draw();
-  if (!options.screenshot.empty()) write_png(canvas.read(), options.screenshot);
+  if (!options.screenshot.empty()) write_png(picture(), options.screenshot);
   return finish(*show, timing, options);
 }
 

@@ -222,9 +222,12 @@ void App::draw(double seconds) {
   grant_wishes();
 }
 
-/// What was drawn last. Taken before the swap, which may leave the back buffer undefined.
+/// What was drawn last. Taken before the swap, which may leave the back buffer undefined. What a
+/// lost context leaves is no picture.
 Image App::picture() const {
-  return Canvas::read_pixels(0, window_.pixel_width(), window_.pixel_height());
+  Image image = Canvas::read_pixels(0, window_.pixel_width(), window_.pixel_height());
+  window_.check_context();
+  return image;
 }
 
 void App::show_help() {

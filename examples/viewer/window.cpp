@@ -79,9 +79,12 @@ Window Window::hidden() {
   return {"jfpx", 16, 16, false};
 }
 
+bool Window::tells_of_resets() const {
+  return epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_KHR_robustness");
+}
+
 void Window::check_context() const {
-  const bool tells = epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_KHR_robustness");
-  if (!tells || glGetGraphicsResetStatus() == GL_NO_ERROR) return;
+  if (!tells_of_resets() || glGetGraphicsResetStatus() == GL_NO_ERROR) return;
   throw BackendUnavailable("OpenGL lost its context: the graphics device was reset");
 }
 

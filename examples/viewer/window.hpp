@@ -20,6 +20,8 @@ class Window {
   /// @throws BackendUnavailable if there is no OpenGL 3.3.
   static Window hidden();
 
+  /// Whether the driver says when the device was reset.
+  bool tells_of_resets() const;
   /// @throws BackendUnavailable if the device was reset and all that it knew is gone.
   void check_context() const;
   /// Shows what was drawn. @throws as check_context()

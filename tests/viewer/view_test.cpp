@@ -1,5 +1,6 @@
 /// The program jfpx-view as a user meets it: pictures, exit statuses, errors.
 #include "examples/viewer/image.hpp"
+#include "examples/viewer/window.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -224,6 +225,36 @@ TEST(View, NoDisplayIsStatusThree) {
 TEST_F(Pictures, AnOldOpenGlIsStatusThree) {
   expect_fails(jfpx_view("pile --spheres 2 --headless", "MESA_GL_VERSION_OVERRIDE=3.2"), 3,
                "OpenGL 3.3");
+}
+
+TEST_F(Pictures, ALostContextIsOneSentenceStatusThreeAndWhatWasWrittenIsWhole) {
+  {
+    const auto window = view::Window::hidden();
+    if (!window.tells_of_resets()) GTEST_SKIP() << window.driver() << " can't tell";
+  }
+  // The device is asked after a picture was drawn, and again after it was read; in a window, where
+  // drawing needs not be over before, after it was read and after it was shown.
+  for (const std::string kind : {"--headless", ""}) {
+    for (const int healthy : {0, 1, 2, 3, 5}) {
+      const std::string folder_name = folder.file("film" + kind + std::to_string(healthy));
+      const auto result =
+          jfpx_view("pile --spheres 5 --size 64x48 --quality low --frames 100 --screenshot " +
+                        folder.file("last.png") + " --record " + folder_name + " " + kind,
+                    "SDL_VIDEODRIVER=offscreen JFPX_TEST_HEALTHY=" + std::to_string(healthy) +
+                        " LD_PRELOAD=" JFPX_LOST_CONTEXT_PATH);
+      EXPECT_EQ(result.status, 3);
+      EXPECT_EQ(result.output,
+                "jfpx-view: OpenGL lost its context: the graphics device was reset\n");
+      const int pictures = kind.empty() ? (healthy + 1) / 2 : healthy / 2;
+      for (int i = 1; i <= pictures + 1; ++i) {
+        const std::string name = folder_name + "/frame-00000" + std::to_string(i) + ".png";
+        ASSERT_EQ(std::filesystem::exists(name), i <= pictures) << name;
+        if (i > pictures) break;
+        EXPECT_GT(contrast(view::read_png(name)), 40);
+      }
+    }
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder.file("last.png")));
 }
 
 TEST_F(Pictures, AFileThatCannotBeWrittenIsNamedAndNothingIsLeft) {
