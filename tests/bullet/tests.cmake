@@ -57,6 +57,9 @@ jfpx_add_test(bullet_algorithm_test SOURCES
   bullet/algorithm_test.cpp
   LINK jfpx_bullet)
 jfpx_add_test(bullet_soak_test SOURCES bullet/soak_test.cpp LINK jfpx_bullet)
+# Too few worlds would fail by chance.
+add_test(NAME soak_refuses_few_steps COMMAND ${PROJECT_SOURCE_DIR}/scripts/soak --steps 19999)
+set_tests_properties(soak_refuses_few_steps PROPERTIES PASS_REGULAR_EXPRESSION "it takes 20000 or more")
 # Replaces operator new: a program of its own.
 jfpx_add_test(bullet_out_of_memory_test SOURCES
   bullet/out_of_memory_test.cpp
