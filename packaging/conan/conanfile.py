@@ -46,11 +46,9 @@ class Jfpx(ConanFile):
         CMakeDeps(self).generate()
         toolchain = CMakeToolchain(self)
         toolchain.cache_variables["JFPX_CUDA"] = "ON" if self.options.cuda else "OFF"
-        toolchain.cache_variables["JFPX_BULLET"] = "OFF"
-        toolchain.cache_variables["JFPX_VIEWER"] = "OFF"
-        toolchain.cache_variables["JFPX_TOOL"] = "OFF"
-        toolchain.cache_variables["JFPX_EXAMPLES"] = "OFF"
-        toolchain.cache_variables["JFPX_TESTS"] = "OFF"
+        # No warning of a compiler to come may stop a build: JFPX_WERROR.
+        for switch in ("JFPX_BULLET", "JFPX_VIEWER", "JFPX_TOOL", "JFPX_EXAMPLES", "JFPX_TESTS", "JFPX_WERROR"):
+            toolchain.cache_variables[switch] = "OFF"
         toolchain.generate()
 
     def build(self):
@@ -63,6 +61,8 @@ class Jfpx(ConanFile):
         copy(self, "LICENSE", self.source_folder, os.path.join(self.package_folder, "licenses"))
 
     def package_info(self):
-        # The package's own CMake files say more than Conan could: exact flags, both precisions.
+        # The package's own files for CMake and pkg-config say more than Conan could: exact flags, both precisions.
         self.cpp_info.set_property("cmake_find_mode", "none")
+        self.cpp_info.set_property("pkg_config_name", "none")
         self.cpp_info.builddirs.append(os.path.join("lib", "cmake", "jfpx"))
+        self.buildenv_info.prepend_path("PKG_CONFIG_PATH", os.path.join(self.package_folder, "lib", "pkgconfig"))

@@ -1,20 +1,25 @@
-"""A program of someone else, built against the package and run, in both precisions."""
+"""A program of someone else, built against the package and run: in both precisions, by CMake's files and pkg-config's."""
 import os
 
 from conan import ConanFile
 from conan.tools.build import can_run
-from conan.tools.cmake import CMake, cmake_layout
+from conan.tools.cmake import CMake, CMakeToolchain, cmake_layout
 
 
 class JfpxTest(ConanFile):
     settings = "os", "arch", "compiler", "build_type"
-    generators = "CMakeToolchain", "CMakeDeps", "VirtualRunEnv"
+    generators = "CMakeDeps", "PkgConfigDeps", "VirtualBuildEnv", "VirtualRunEnv"
 
     def requirements(self):
         self.requires(self.tested_reference_str)
 
     def layout(self):
         cmake_layout(self)
+
+    def generate(self):
+        toolchain = CMakeToolchain(self)
+        toolchain.user_presets_path = False  # nothing beside these files
+        toolchain.generate()
 
     def build(self):
         cmake = CMake(self)
@@ -23,5 +28,5 @@ class JfpxTest(ConanFile):
 
     def test(self):
         if can_run(self):
-            for program in ("collider", "collider_f64"):
+            for program in ("collider", "collider_f64", "collider_pc", "collider_pc_f64"):
                 self.run(os.path.join(self.cpp.build.bindir, program), env="conanrun")

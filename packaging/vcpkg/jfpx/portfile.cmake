@@ -1,13 +1,16 @@
 # The port lies inside the sources that it builds.
 get_filename_component(SOURCE_PATH "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
 
-set(cuda OFF)
+set(cuda -DJFPX_CUDA=OFF)
 if("cuda" IN_LIST FEATURES)
-  set(cuda ON)
+  vcpkg_find_cuda(OUT_CUDA_TOOLKIT_ROOT cuda_root) # comes with vcpkg's port cuda, and sets NVCC
+  set(cuda -DJFPX_CUDA=ON "-DCMAKE_CUDA_COMPILER=${NVCC}" "-DCUDAToolkit_ROOT=${cuda_root}")
 endif()
+# No warning of a compiler to come may stop a build.
 vcpkg_cmake_configure(
   SOURCE_PATH "${SOURCE_PATH}"
-  OPTIONS -DJFPX_CUDA=${cuda} -DJFPX_BULLET=OFF -DJFPX_VIEWER=OFF -DJFPX_TOOL=OFF -DJFPX_EXAMPLES=OFF -DJFPX_TESTS=OFF)
+  OPTIONS ${cuda} -DJFPX_BULLET=OFF -DJFPX_VIEWER=OFF -DJFPX_TOOL=OFF -DJFPX_EXAMPLES=OFF -DJFPX_TESTS=OFF
+    -DJFPX_WERROR=OFF)
 vcpkg_cmake_install()
 vcpkg_cmake_config_fixup(CONFIG_PATH lib/cmake/jfpx)
 vcpkg_fixup_pkgconfig()
