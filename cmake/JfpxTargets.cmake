@@ -1,6 +1,7 @@
 # Helpers that make each target twice: NAME computes in float, NAME_f64 in double.
 find_package(Threads REQUIRED)
 include(GNUInstallDirs)
+include(JfpxExact)
 
 configure_file(${PROJECT_SOURCE_DIR}/include/jfpx/config.hpp.in
                ${PROJECT_BINARY_DIR}/include/jfpx/config.hpp @ONLY)
@@ -13,12 +14,8 @@ target_compile_options(jfpx_warnings INTERFACE
 add_library(jfpx_build_flags INTERFACE)
 target_compile_features(jfpx_build_flags INTERFACE cxx_std_20)
 target_include_directories(jfpx_build_flags INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(jfpx_build_flags INTERFACE ${JFPX_OWN_EXACT_FLAGS})
 target_link_libraries(jfpx_build_flags INTERFACE jfpx_warnings)
-
-# The promise of equal bits rests on each operation being rounded once. g++ and clang contract
-# a*b+c to FMA when the target has it; users inline our headers (and Bullet's), so the flag is
-# part of the usage requirements.
-set(JFPX_EXACT_FLAGS $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-ffp-contract=off>)
 
 # jfpx_add_library(NAME [STATIC|OBJECT] SOURCES ... [PUBLIC ...] [PRIVATE ...]): NAME and NAME_f64. A
 # linked target that has a _f64 sibling is linked as that sibling into NAME_f64. Without a kind,

@@ -14,7 +14,7 @@ TEST(FusedProducts, OfAProgramForAnyProcessorAreNotThere) {
 }
 
 TEST(FusedProducts, AreFoundAndSaid) {
-  if (!fused_unit_can_fuse()) GTEST_SKIP() << "this processor does not fuse";
+  if (!__builtin_cpu_supports("fma")) GTEST_SKIP() << "this processor does not fuse";
   btDefaultCollisionConfiguration configuration;
   CollisionDispatcher dispatcher(&configuration, options_of_fused_unit());
   EXPECT_NE(dispatcher.stats().warning.find("-ffp-contract=off"), std::string::npos);

@@ -1,11 +1,11 @@
-/// A part of a program that is compiled for this processor, with products and sums fused if it can.
+/// A part of a program that is compiled for a processor with FMA, with products and sums fused.
 #pragma once
 
 #include <jfpx/bullet/dispatcher.hpp>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
-bool fused_unit_can_fuse();
+/// Only where the processor has FMA.
 DispatcherOptions options_of_fused_unit();
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -17,7 +17,7 @@ jfpx_add_test(bullet_verify_test INTERNAL SOURCES
   LINK jfpx_bullet)
 # Behind the options that linking jfpx::bullet brings.
 set_source_files_properties(bullet/fused_unit.cpp PROPERTIES
-  COMPILE_OPTIONS "-O3;-march=native;-ffp-contract=fast")
+  COMPILE_OPTIONS "-O3;-mfma;-ffp-contract=fast")
 jfpx_add_test(bullet_trajectory_test SOURCES
   bullet/trajectory_test.cpp
   LINK jfpx_bullet)
