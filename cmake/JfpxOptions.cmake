@@ -13,7 +13,7 @@ option(JFPX_BENCH "Build the benchmarks" OFF)
 option(JFPX_FUZZ "Drive the fuzz targets by libFuzzer; needs clang and -fsanitize=fuzzer-no-link, as preset fuzz has" OFF)
 option(JFPX_COVERAGE "Count which lines of src are run, in float; see scripts/coverage" OFF)
 option(JFPX_INSTALL "Install libraries, headers and programs" ${PROJECT_IS_TOP_LEVEL})
-option(JFPX_WERROR "Treat warnings as errors" ${PROJECT_IS_TOP_LEVEL})
+option(JFPX_WERROR "Treat warnings as errors, as the presets of developers do" OFF)
 
 foreach(option IN ITEMS JFPX_CUDA JFPX_BULLET JFPX_VIEWER)
   if(NOT "${${option}}" MATCHES "^(AUTO|ON|OFF)$")

@@ -46,8 +46,7 @@ class Jfpx(ConanFile):
         CMakeDeps(self).generate()
         toolchain = CMakeToolchain(self)
         toolchain.cache_variables["JFPX_CUDA"] = "ON" if self.options.cuda else "OFF"
-        # No warning of a compiler to come may stop a build: JFPX_WERROR.
-        for switch in ("JFPX_BULLET", "JFPX_VIEWER", "JFPX_TOOL", "JFPX_EXAMPLES", "JFPX_TESTS", "JFPX_WERROR"):
+        for switch in ("JFPX_BULLET", "JFPX_VIEWER", "JFPX_TOOL", "JFPX_EXAMPLES", "JFPX_TESTS"):
             toolchain.cache_variables[switch] = "OFF"
         toolchain.generate()
 

@@ -6,11 +6,9 @@ if("cuda" IN_LIST FEATURES)
   vcpkg_find_cuda(OUT_CUDA_TOOLKIT_ROOT cuda_root) # comes with vcpkg's port cuda, and sets NVCC
   set(cuda -DJFPX_CUDA=ON "-DCMAKE_CUDA_COMPILER=${NVCC}" "-DCUDAToolkit_ROOT=${cuda_root}")
 endif()
-# No warning of a compiler to come may stop a build.
 vcpkg_cmake_configure(
   SOURCE_PATH "${SOURCE_PATH}"
-  OPTIONS ${cuda} -DJFPX_BULLET=OFF -DJFPX_VIEWER=OFF -DJFPX_TOOL=OFF -DJFPX_EXAMPLES=OFF -DJFPX_TESTS=OFF
-    -DJFPX_WERROR=OFF)
+  OPTIONS ${cuda} -DJFPX_BULLET=OFF -DJFPX_VIEWER=OFF -DJFPX_TOOL=OFF -DJFPX_EXAMPLES=OFF -DJFPX_TESTS=OFF)
 vcpkg_cmake_install()
 vcpkg_cmake_config_fixup(CONFIG_PATH lib/cmake/jfpx)
 vcpkg_fixup_pkgconfig()
