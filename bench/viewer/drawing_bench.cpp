@@ -6,6 +6,7 @@
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/colours.hpp"
 #include "examples/viewer/renderer.hpp"
+#include "examples/viewer/show.hpp"
 #include "examples/viewer/stage.hpp"
 #include "examples/viewer/window.hpp"
 
@@ -84,23 +85,40 @@ class Gallery {
       drawing.add_sphere(place, kRadius, {}, ball_paint(number++));
     }
     renderer_.set_quality(quality);
-    std::vector<double> ms;
-    const auto draw = [&] {
-      return milliseconds_of([&] {
-        renderer_.draw(drawing, view, {0, 0, width, height}, canvas_.framebuffer());
-        glFinish();
-      });
-    };
-    draw();  // makes buffers
-    for (auto _ : state) {
-      ms.push_back(draw());
-      state.SetIterationTime(ms.back() * 1e-3);
-    }
-    state.counters["median_ms"] = median(ms);
+    time(state, [&] {
+      renderer_.draw(drawing, view, {0, 0, width, height}, canvas_.framebuffer());
+    });
+  }
+
+  /// Times pictures of a scene as jfpx-view draws them: items are made anew for each.
+  void views(benchmark::State& state, const Quality& quality, std::uint32_t balls) {
+    ViewOptions options;
+    options.run.scene = "gas";
+    options.run.spheres = balls;
+    const std::unique_ptr<Show> show = make_show(options);
+    renderer_.set_quality(quality);
+    time(state, [&] {
+      show->draw(renderer_, {canvas_.framebuffer(), canvas_.width(), canvas_.height()});
+    });
   }
   std::string driver() const { return window_.driver(); }
 
  private:
+  template <class Call>
+  void time(benchmark::State& state, const Call& draw) {
+    const auto picture = [&] {
+      draw();
+      glFinish();
+    };
+    picture();  // makes buffers
+    std::vector<double> ms;
+    for (auto _ : state) {
+      ms.push_back(milliseconds_of(picture));
+      state.SetIterationTime(ms.back() * 1e-3);
+    }
+    state.counters["median_ms"] = median(ms);
+  }
+
   /// Wall clock; where processors draw, their time, which other work on the machine lengthens less.
   template <class Call>
   double milliseconds_of(const Call& call) const {
@@ -152,6 +170,11 @@ void register_all(Gallery* gallery) {
         ->UseManualTime()
         ->Unit(benchmark::kMillisecond);
     for (const Variant& variant : variants()) {
+      benchmark::RegisterBenchmark(
+          ("drawing/view/" + std::to_string(balls) + "/" + variant.name).c_str(),
+          [=](benchmark::State& state) { gallery->views(state, variant.quality, balls); })
+          ->UseManualTime()
+          ->Unit(benchmark::kMillisecond);
       for (const auto& [from, closeness] : {std::pair("afar", Real(1)), {"near", Real(4)}}) {
         const std::string name =
             std::string("drawing/") + from + "/" + std::to_string(balls) + "/" + variant.name;

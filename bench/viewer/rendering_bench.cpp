@@ -28,7 +28,7 @@ class Screen {
   }
 
   void draw(const view::Stage& stage, const view::Moment& before, const view::Moment& now) {
-    const view::Bounds bounds = view::bounds_of(stage.scene(), now.states);
+    const view::Bounds bounds = stage.bounds(now.states);
     const view::View view = camera_.view(bounds.centre, bounds.radius);
     view::Drawing drawing(view.eye);
     stage.draw(before, now, 1, view::Colouring::bodies, &drawing);

@@ -57,7 +57,7 @@ void SceneShow::restart() {
 void SceneShow::home() { camera = camera_for(options_, player_.scene(), player_.shown()); }
 
 View SceneShow::view() const {
-  const Bounds bounds = bounds_of(player_.scene(), player_.shown().states);
+  const Bounds bounds = stage_.bounds(player_.shown().states);
   return camera.view(bounds.centre, bounds.radius);
 }
 

@@ -188,7 +188,7 @@ void SideBySide::draw_trails(Drawing* drawing) const {
 void SideBySide::draw(Renderer& renderer, const Target& target) {
   const int strip = static_cast<int>(static_cast<float>(target.height) * kStrip);
   const int top_height = target.height - strip;
-  const Bounds bounds = bounds_of(scene_, trio_->now[kNative].states);
+  const Bounds bounds = stage_.bounds(trio_->now[kNative].states);
   const View view = camera.view(bounds.centre, bounds.radius);
   const Real share = paused ? 1 : static_cast<Real>(clock_.share());
   for (std::size_t column = 0; column < kColumns; ++column) {

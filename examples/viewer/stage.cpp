@@ -16,8 +16,7 @@ namespace {
 constexpr Paint kConcrete{168, 168, 166, Pattern::wall};
 constexpr Paint kFloor{124, 130, 138};
 constexpr Paint kGlass{255, 255, 255, Pattern::glass};
-constexpr Real kPlate = Real(0.25);      // thickness of a room's floor, in bodies
-constexpr std::size_t kSurveyed = 4000;  // bodies of a crowd that tell where it is
+constexpr Real kPlate = Real(0.25);  // thickness of a room's floor, in bodies
 constexpr Real kEndless = kMaxReal / 4;
 
 bool movable(const BodyDef& body) { return body.mass > 0; }
@@ -30,20 +29,6 @@ std::vector<Paint> told_paints(const Scene& scene, const Moment& moment, Colouri
     paints.push_back(scale_paint(value));
   }
   return paints;
-}
-
-/// The middle one, and the ones `left_out` from both ends.
-struct Spread {
-  Real low, high;
-};
-Spread spread(std::vector<Real>& values) {
-  const std::size_t left_out = values.size() / 50;
-  const auto low = values.begin() + static_cast<std::ptrdiff_t>(left_out);
-  const auto high = values.end() - 1 - static_cast<std::ptrdiff_t>(left_out);
-  std::nth_element(values.begin(), low, values.end());
-  const Real lowest = *low;
-  std::nth_element(values.begin(), high, values.end());
-  return {lowest, *high};
 }
 
 int thin_axis(const Vec3& h) {
@@ -59,33 +44,7 @@ Real cell_for(Real body_size) {
 
 }  // namespace
 
-Bounds bounds_of(const Scene& scene, const std::vector<BodyState>& states) {
-  const std::size_t count = std::min(scene.bodies.size(), states.size());
-  const std::size_t stride = std::max(count / kSurveyed, std::size_t{1});
-  std::vector<Real> along[3];
-  Real largest = 0;
-  for (const bool wanted : {true, false}) {  // what moves; in a scene where nothing does, the rest
-    for (std::size_t i = 0; i < count; ++i) {
-      const BodyDef& body = scene.bodies[i];
-      if (movable(body) != wanted || is_endless(body.shape)) continue;
-      largest = std::max(largest, size_of(body.shape));
-      if (i % stride != 0) continue;
-      for (int axis = 0; axis < 3; ++axis) along[axis].push_back(states[i].position[axis]);
-    }
-    if (!along[0].empty()) break;
-  }
-  if (along[0].empty()) return {{0, 1, 0}, 4};
-  Vec3 low, high;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Spread s = spread(along[axis]);
-    low[axis] = s.low;
-    high[axis] = s.high;
-  }
-  const Vec3 half = (high - low) * Real(0.5);
-  return {(low + high) * Real(0.5), length(half) + largest, half};
-}
-
-Stage::Stage(const Scene& scene) : scene_(scene) {
+Stage::Stage(const Scene& scene) : scene_(scene), survey_(scene) {
   std::vector<Real> sizes;
   for (const BodyDef& body : scene_.bodies) {
     if (!movable(body)) continue;
@@ -98,6 +57,8 @@ Stage::Stage(const Scene& scene) : scene_(scene) {
     large_size_ = sizes[sizes.size() * 9 / 10];
   }
   find_room();
+  for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) looks_.push_back(look_of(i));
+  for (const std::uint32_t wall : walls_) looks_[wall].kind = Look::Kind::hidden;
 }
 
 // Large upright boxes around what moves are the walls of a room. They are drawn as glass, cut to
@@ -105,7 +66,7 @@ Stage::Stage(const Scene& scene) : scene_(scene) {
 void Stage::find_room() {
   std::vector<BodyState> states;
   for (const BodyDef& body : scene_.bodies) states.push_back({body.position, {}, {}, {}});
-  const Bounds bounds = bounds_of(scene_, states);
+  const Bounds bounds = survey_.bounds(states);
   room_ = {{-kEndless, -kEndless, -kEndless}, {kEndless, kEndless, kEndless}};
   for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
     const BodyDef& body = scene_.bodies[i];
@@ -138,6 +99,19 @@ Paint Stage::paint(std::uint32_t body) const {
   Paint paint = ball_paint(body);
   if (std::holds_alternative<Assembly>(def.shape)) paint.pattern = Pattern::plain;
   return paint;
+}
+
+Stage::Look Stage::look_of(std::uint32_t body) const {
+  const BodyDef& def = scene_.bodies[body];
+  if (movable(def)) {
+    const Sphere* sphere = std::get_if<Sphere>(&def.shape);
+    if (sphere == nullptr) return {Look::Kind::moving, paint(body)};
+    return {Look::Kind::moving_ball, paint(body), sphere->radius};
+  }
+  Look look{Look::Kind::still, paint(body)};
+  if (!def.kinematic) look.paint.pattern = Pattern::plain;
+  if (std::holds_alternative<Box>(def.shape)) look.paint.pattern = Pattern::wall;
+  return look;
 }
 
 void Stage::draw_still(const Bounds& bounds, Drawing* drawing) const {
@@ -181,24 +155,27 @@ void Stage::draw_still(const Bounds& bounds, Drawing* drawing) const {
 
 void Stage::draw(const Moment& from, const Moment& to, Real share, Colouring colouring,
                  Drawing* drawing) const {
-  const Bounds bounds = bounds_of(scene_, to.states);
+  const Bounds bounds = survey_.bounds(to.states);
   drawing->set_bounds(bounds.centre, bounds.radius * Real(1.25));
   drawing->set_detail(body_size_ * Real(1.6));
   draw_still(bounds, drawing);
   const std::vector<Paint> told = told_paints(scene_, to, colouring);
   drawing->reserve_spheres(scene_.bodies.size());
-  for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
-    const BodyDef& def = scene_.bodies[i];
-    const bool still = !movable(def);
-    if (still && std::find(walls_.begin(), walls_.end(), i) != walls_.end()) continue;
+  for (std::uint32_t i = 0; i < looks_.size(); ++i) {
+    const Look& look = looks_[i];
+    if (look.kind == Look::Kind::hidden) continue;
     const Vec3 position = between(from.states[i].position, to.states[i].position, share);
     const Quat turn = between(from.states[i].orientation, to.states[i].orientation, share);
-    Paint paint = this->paint(i);
-    if (!still && !told.empty()) paint = told[i];
-    if (!still && to.awake[i] == 0) paint = dimmed(paint);
-    if (still && !def.kinematic) paint.pattern = Pattern::plain;
-    if (still && std::holds_alternative<Box>(def.shape)) paint.pattern = Pattern::wall;
-    draw_shape(def.shape, {position, turn, {}, {}}, paint, drawing);
+    Paint paint = look.paint;
+    if (look.kind != Look::Kind::still) {
+      if (!told.empty()) paint = told[i];
+      if (to.awake[i] == 0) paint = dimmed(paint);
+    }
+    if (look.kind == Look::Kind::moving_ball) {
+      drawing->add_sphere(position, look.radius, turn, paint);
+    } else {
+      draw_shape(scene_.bodies[i].shape, {position, turn, {}, {}}, paint, drawing);
+    }
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <jfpx/scene.hpp>
 
+#include "examples/viewer/bounds.hpp"
 #include "examples/viewer/drawing.hpp"
 #include "examples/viewer/moment.hpp"
 
@@ -15,15 +16,6 @@ namespace jfpx::inline JFPX_ABI::view {
 enum class Colouring : std::uint8_t { bodies, speed, sleep, penetration, contacts, islands };
 inline constexpr const char* kColouringNames[] = {"bodies",      "speed",    "sleep",
                                                   "penetration", "contacts", "islands"};
-
-/// A ball that holds what is worth seeing.
-struct Bounds {
-  Vec3 centre;
-  Real radius = 1;
-  Vec3 half_extents{};  ///< of the upright box around it
-};
-/// The ball around the movable bodies, leaving out the one in fifty that went astray on each side.
-Bounds bounds_of(const Scene& scene, const std::vector<BodyState>& states);
 
 class Stage {
  public:
@@ -52,13 +44,26 @@ class Stage {
   /// Radius that nine in ten movable bodies do not exceed [m].
   Real large_size() const { return large_size_; }
   const Scene& scene() const { return scene_; }
+  /// Where the movable bodies are.
+  Bounds bounds(const std::vector<BodyState>& states) const { return survey_.bounds(states); }
 
  private:
+  /// What a picture needs to know of a body: far less than its definition, which of a hundred
+  /// thousand bodies fills no cache.
+  struct Look {
+    enum class Kind : std::uint8_t { hidden, still, moving, moving_ball } kind;
+    Paint paint;
+    Real radius = 0;  ///< of a moving ball
+  };
+
   void find_room();
+  Look look_of(std::uint32_t body) const;
   void draw_shape(const Shape& shape, const BodyState& at, Paint paint, Drawing* drawing) const;
   void draw_still(const Bounds& bounds, Drawing* drawing) const;
 
   Scene scene_;
+  Survey survey_;
+  std::vector<Look> looks_;  ///< of each body
   Real body_size_ = Real(0.5);
   Real large_size_ = Real(0.5);
   std::vector<std::uint32_t> obstacles_;  ///< immovable bodies that are drawn as they are
