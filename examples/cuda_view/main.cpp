@@ -24,6 +24,8 @@ struct Options {
   int frames = 0;  // until closed
   std::string screenshot;
   bool headless = false, by_host = false;
+  view::Quality quality;
+  std::vector<Real> eye, target;  // empty: from above a corner
 };
 
 constexpr int kWidth = 1280, kHeight = 720, kStepsAFrame = 2;
@@ -39,7 +41,13 @@ class Show {
         buffer_(renderer_.resident_spheres(crowd_.size()), crowd_.size() * sizeof(view::SphereItem),
                 options.by_host) {
     const Real side = crowd_.side();
-    camera_.look_at({side * Real(0.9), side * Real(0.75), side * Real(1.35)}, {0, side / 5, 0});
+    Vec3 eye{side * Real(0.9), side * Real(0.75), side * Real(1.35)}, target{0, side / 5, 0};
+    if (!options.eye.empty()) eye = {options.eye[0], options.eye[1], options.eye[2]};
+    if (!options.target.empty()) target = {options.target[0], options.target[1], options.target[2]};
+    if (length(target - eye) <= kEpsilon) {
+      throw InvalidArgument("--eye and --target are the same point");
+    }
+    camera_.look_at(eye, target);
   }
 
   void run() {
@@ -90,7 +98,7 @@ class Show {
 
   Options options_;
   view::Window window_;
-  view::Renderer renderer_;
+  view::Renderer renderer_{options_.quality};
   view::Canvas canvas_;
   view::Camera camera_;
   view::Controls controls_;
@@ -109,6 +117,14 @@ int main(int argc, char** argv) {
   app.add_option("--frames", options.frames, "Pictures [headless: 240; window: until closed]")
       ->check(CLI::Range(1, 1'000'000));
   app.add_option("--screenshot", options.screenshot, "Headless: the last picture, as PNG");
+  app.add_flag_callback(
+      "--high", [&] { options.quality = view::kHighQuality; }, "High quality instead of medium");
+  app.add_option("--eye", options.eye, "Where the camera is: X,Y,Z [m]")
+      ->expected(3)
+      ->delimiter(',');
+  app.add_option("--target", options.target, "What it looks at: X,Y,Z [m]")
+      ->expected(3)
+      ->delimiter(',');
   app.add_flag("--headless", options.headless, "No window, no display");
   app.add_flag("--by-host", options.by_host, "Copy by way of the host, to compare");
   CLI11_PARSE(app, argc, argv);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <utility>
 
@@ -125,7 +126,10 @@ TEST(DeviceTraffic, ADeviceIsSentNothingOfARestingWorld) {
   const bool usable = std::any_of(
       backends.begin(), backends.end(),
       [](const BackendStatus& status) { return status.backend == Backend::cuda && status.usable; });
-  if (!usable) GTEST_SKIP() << "no CUDA device";
+  if (!usable) {
+    if (std::getenv("JFPX_REQUIRE_CUDA") != nullptr) FAIL() << "no CUDA device";
+    GTEST_SKIP() << "no CUDA device";
+  }
   SceneWorldOptions options;
   options.dispatch.minimum_batch = 0;
   options.dispatch.collider.backend = Backend::cuda;
