@@ -14,11 +14,14 @@ struct Contender {
   std::string name;
   SphereColliderOptions options;
   std::unique_ptr<SphereCollider> collider = {};
+  int calls = 1;                ///< in each round: about a millisecond of them
   std::vector<double> us = {};  ///< a call, on average of each round
 };
 
 /// Larger searches among all pairs lose by far and would take long.
-constexpr std::size_t kMostForAllPairs = 16384;
+constexpr std::size_t most_for_all_pairs(Backend backend) {
+  return backend == Backend::x86 ? 4096 : 16384;
+}
 /// Where its memory happens to lie makes a search among 32 spheres up to 1.6 times as long:
 /// colliders that choose the same then differ by chance. So each is made anew, elsewhere, this many
 /// times.
@@ -33,7 +36,7 @@ std::vector<Contender> contenders_for(std::size_t n, const CostModel& costs) {
   for (const Backend backend : {Backend::x86, Backend::cuda}) {
     if (backend == Backend::cuda && !cuda_is_usable()) continue;
     for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
-      if (algorithm == SphereAlgorithm::all_pairs && n > kMostForAllPairs) continue;
+      if (algorithm == SphereAlgorithm::all_pairs && n > most_for_all_pairs(backend)) continue;
       add(std::string(to_string(backend)) + "_" +
               (algorithm == SphereAlgorithm::all_pairs ? "all_pairs" : "sorted_tiles"),
           {.backend = backend, .algorithm = algorithm});
@@ -61,29 +64,27 @@ void place(std::vector<Contender>& contenders, std::span<const SphereInstance> s
 /// slow.
 void measure(std::vector<Contender>& contenders, std::span<const SphereInstance> spheres,
              Random& random) {
-  double least = 1e9;
   for (Contender& c : contenders) {
     const auto call = [&] { c.collider->find_contacts(spheres); };
     call();
     const double us = microseconds_of(call);
-    least = std::min(least, us);
-    const int warm_up = static_cast<int>(std::clamp(2e5 / us, 12.0, 2000.0));
-    if (c.name == "automatic") {
-      for (int i = 0; i < warm_up; ++i) call();
-    }
+    c.calls = static_cast<int>(std::clamp(1e3 / us, 1.0, 2000.0));
+    if (c.name != "automatic") continue;
+    // Until it has tried what it wants to try: that takes time, and some calls.
+    const double warm_up = std::max(2e4 / us, std::clamp(2e5 / us, 12.0, 2000.0));
+    for (int i = 0; i < warm_up; ++i) call();
   }
-  const int calls = static_cast<int>(std::clamp(1e3 / least, 1.0, 2000.0));
   std::vector<Contender*> order;
   for (Contender& c : contenders) order.push_back(&c);
   for (int round = 0; round < kRounds; ++round) {
     for (std::size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[random.below(k)]);
     for (Contender* turn : order) {
       Contender& c = *turn;
-      for (int i = 0; i < calls / 2; ++i) c.collider->find_contacts(spheres);
+      for (int i = 0; i < c.calls / 2; ++i) c.collider->find_contacts(spheres);
       c.us.push_back(microseconds_of([&] {
-                       for (int i = 0; i < calls; ++i) c.collider->find_contacts(spheres);
+                       for (int i = 0; i < c.calls; ++i) c.collider->find_contacts(spheres);
                      }) /
-                     calls);
+                     c.calls);
     }
   }
 }

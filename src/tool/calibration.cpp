@@ -21,8 +21,8 @@ using Us = std::chrono::duration<double, std::micro>;
 
 /// Contacts of a sphere: none, a heap, a crush.
 constexpr Real kDensities[] = {0, 3, 12};
-constexpr std::uint32_t kFew[] = {32, 128, 512, 2048};
-constexpr std::uint32_t kMany[] = {128, 512, 2048, 8192, 32768};
+constexpr std::uint32_t kFew[] = {4, 32, 128, 512, 2048};
+constexpr std::uint32_t kMany[] = {4, 128, 512, 2048, 8192, 32768};
 constexpr std::uint32_t kFewForDevice[] = {128, 512, 2048, 8192};
 constexpr std::uint32_t kManyForDevice[] = {512, 2048, 8192, 32768, 131072};
 constexpr std::uint32_t kPairs[] = {256, 2048, 16384, 131072};
