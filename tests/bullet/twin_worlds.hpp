@@ -10,6 +10,7 @@
 #include <btBulletDynamicsCommon.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <cstdlib>
 #include <functional>
 #include <iterator>
@@ -52,8 +53,9 @@ inline std::uint64_t wanted_world_steps(std::uint64_t in_slow_builds, std::uint6
 /// (EPA) alone has frames of 40 KB in double. AddressSanitizer would leave gaps around the array.
 template <int kFill>
 [[gnu::noinline, gnu::no_sanitize_address]] void fill_stack() {
-  volatile char leftovers[65536];
-  for (volatile char& c : leftovers) c = static_cast<char>(kFill);
+  constexpr std::uint64_t kEightTimes = std::uint64_t{kFill} * 0x0101010101010101;
+  volatile std::uint64_t leftovers[8192];
+  for (volatile std::uint64_t& eight : leftovers) eight = kEightTimes;
 }
 
 /// Who makes the parts of a world that a test may replace.
