@@ -1,18 +1,17 @@
 /// What a picture of many balls costs, and which part of it: items made on the host, shadows,
 /// ambient occlusion, edges; from afar and near.
-#include <jfpx/error.hpp>
-
+#include "bench/viewer/screen.hpp"
 #include "bench/world/samples.hpp"
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/colours.hpp"
 #include "examples/viewer/renderer.hpp"
 #include "examples/viewer/show.hpp"
 #include "examples/viewer/stage.hpp"
-#include "examples/viewer/window.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <random>
 #include <string>
 #include <time.h>
@@ -101,7 +100,9 @@ class Gallery {
       show->draw(renderer_, {canvas_.framebuffer(), canvas_.width(), canvas_.height()});
     });
   }
-  std::string driver() const { return window_.driver(); }
+  std::string description() const {
+    return fmt::format("{} x {} by {}", kWidth, kHeight, window_.driver());
+  }
 
  private:
   template <class Call>
@@ -133,7 +134,7 @@ class Gallery {
   }
 
   Window window_ = Window::hidden();
-  bool software_ = window_.driver().find("llvmpipe") != std::string::npos;
+  bool software_ = draws_in_software(window_);
   Renderer renderer_;
   Canvas canvas_{kWidth, kHeight};
 };
@@ -194,13 +195,5 @@ void register_all(Gallery* gallery) {
 }  // namespace jfpx::inline JFPX_ABI::bench
 
 int main(int argc, char** argv) {
-  std::unique_ptr<jfpx::bench::Gallery> gallery;
-  try {
-    gallery = std::make_unique<jfpx::bench::Gallery>();
-    benchmark::AddCustomContext("pictures", "1280 x 720 by " + gallery->driver());
-  } catch (const jfpx::BackendUnavailable& error) {
-    benchmark::AddCustomContext("pictures", std::string("none: ") + error.what());
-  }
-  jfpx::bench::register_all(gallery.get());
-  return jfpx::bench::run_benchmarks(argc, argv);
+  return jfpx::bench::run_with_screen(argc, argv, jfpx::bench::register_all);
 }

@@ -1,17 +1,14 @@
 /// The thesis' figure 5.3: contact detection of a frame of boxes-and-balls while every frame is
 /// drawn, and while none is.
-#include <jfpx/error.hpp>
-
+#include "bench/viewer/screen.hpp"
 #include "bench/world/samples.hpp"
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/renderer.hpp"
 #include "examples/viewer/run.hpp"
 #include "examples/viewer/stage.hpp"
 #include "examples/viewer/timing.hpp"
-#include "examples/viewer/window.hpp"
 
-#include <memory>
-#include <optional>
+#include <fmt/format.h>
 
 namespace jfpx::inline JFPX_ABI::bench {
 namespace {
@@ -22,7 +19,8 @@ constexpr int kFrames = 1000;
 /// A picture as large as the thesis' window, or a stamp where a processor has to draw it.
 class Screen {
  public:
-  Screen() : canvas_(software() ? 160 : 800, software() ? 120 : 600) {
+  Screen()
+      : canvas_(draws_in_software(window_) ? 160 : 800, draws_in_software(window_) ? 120 : 600) {
     camera_.look_at({0, 10, 50}, {0, 10, 0});
     camera_.fov_y = kPi / 4;
   }
@@ -36,13 +34,10 @@ class Screen {
     glFinish();
   }
   std::string description() const {
-    return std::to_string(canvas_.width()) + " x " + std::to_string(canvas_.height()) + " by " +
-           window_.driver();
+    return fmt::format("{} x {} by {}", canvas_.width(), canvas_.height(), window_.driver());
   }
 
  private:
-  bool software() const { return window_.driver().find("llvmpipe") != std::string::npos; }
-
   view::Window window_ = view::Window::hidden();
   view::Renderer renderer_{view::kLowQuality};
   view::Canvas canvas_;
@@ -101,13 +96,5 @@ void register_all(Screen* screen) {
 }  // namespace jfpx::inline JFPX_ABI::bench
 
 int main(int argc, char** argv) {
-  std::unique_ptr<jfpx::bench::Screen> screen;
-  try {
-    screen = std::make_unique<jfpx::bench::Screen>();
-    benchmark::AddCustomContext("pictures", screen->description());
-  } catch (const jfpx::BackendUnavailable& error) {
-    benchmark::AddCustomContext("pictures", std::string("none: ") + error.what());
-  }
-  jfpx::bench::register_all(screen.get());
-  return jfpx::bench::run_benchmarks(argc, argv);
+  return jfpx::bench::run_with_screen(argc, argv, jfpx::bench::register_all);
 }

@@ -1,0 +1,34 @@
+/// What benchmarks that draw have in common: a context without a window, and doing without it.
+#pragma once
+
+#include <jfpx/error.hpp>
+
+#include "bench/world/samples.hpp"
+#include "examples/viewer/window.hpp"
+
+#include <memory>
+#include <string>
+
+namespace jfpx::inline JFPX_ABI::bench {
+
+/// True where a processor draws.
+inline bool draws_in_software(const view::Window& window) {
+  return window.driver().find("llvmpipe") != std::string::npos;
+}
+
+/// The main() of benchmarks that `register_all` registers; it gets nullptr where there is no
+/// OpenGL. Screen::description() says in the results how large pictures are and who draws them.
+template <class Screen>
+int run_with_screen(int argc, char** argv, void (*register_all)(Screen*)) {
+  std::unique_ptr<Screen> screen;
+  try {
+    screen = std::make_unique<Screen>();
+    benchmark::AddCustomContext("pictures", screen->description());
+  } catch (const BackendUnavailable& error) {
+    benchmark::AddCustomContext("pictures", std::string("none: ") + error.what());
+  }
+  register_all(screen.get());
+  return run_benchmarks(argc, argv);
+}
+
+}  // namespace jfpx::inline JFPX_ABI::bench
