@@ -159,6 +159,16 @@ GeneratedContact draw_contact(Bytes& bytes, std::span<const BodyId> bodies) {
   return contact;
 }
 
+/// A spring or a bungee.
+template <class Elastic>
+Elastic draw_elastic(Bytes& bytes, std::span<const BodyId> bodies) {
+  Elastic elastic{.a = draw_attachment(bytes, bodies), .b = draw_attachment(bytes, bodies)};
+  elastic.stiffness = bytes.number(0, 100);
+  elastic.damping = bytes.number(0, 5);
+  elastic.rest_length = bytes.number(0, 3);
+  return elastic;
+}
+
 ForceId add_drawn_force(Bytes bytes, World& world) {
   const std::span<const BodyId> bodies = world.bodies();
   std::optional<BodyId> body;
@@ -171,20 +181,10 @@ ForceId add_drawn_force(Bytes bytes, World& world) {
       drag.wind = bytes.vector(-5, 5);
       return world.add_force(drag);
     }
-    case 2: {
-      Spring spring{.a = draw_attachment(bytes, bodies), .b = draw_attachment(bytes, bodies)};
-      spring.stiffness = bytes.number(0, 100);
-      spring.damping = bytes.number(0, 5);
-      spring.rest_length = bytes.number(0, 3);
-      return world.add_force(spring);
-    }
-    case 3: {
-      Bungee bungee{.a = draw_attachment(bytes, bodies), .b = draw_attachment(bytes, bodies)};
-      bungee.stiffness = bytes.number(0, 100);
-      bungee.damping = bytes.number(0, 5);
-      bungee.rest_length = bytes.number(0, 3);
-      return world.add_force(bungee);
-    }
+    case 2:
+      return world.add_force(draw_elastic<Spring>(bytes, bodies));
+    case 3:
+      return world.add_force(draw_elastic<Bungee>(bytes, bodies));
     case 4: {
       Aero aero{.body = draw_id(bytes, bodies), .tensor = draw_matrix(bytes)};
       aero.point = bytes.vector(-1, 1);
