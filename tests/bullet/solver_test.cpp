@@ -5,6 +5,7 @@
 
 #include "tests/bullet/stock_bits.hpp"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -185,6 +186,27 @@ TEST(ConstraintSolver, LeavesSmallGroupsToBullet) {
   EXPECT_GT(solver.stats().sweeps, solver.stats().groups);
   solver.reset_stats();
   EXPECT_EQ(solver.stats().groups, 0u);
+}
+
+TEST(DynamicsWorld, LeavesSmallWorldsToBulletFromAnyStepOn) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Random random(seed);
+  WorldParts parts;
+  parts.world = [](btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+                   btConstraintSolver* solver, btCollisionConfiguration* configuration) {
+    return std::make_unique<DynamicsWorld>(dispatcher, broadphase, solver, configuration);
+  };
+  Twins twins({.parts = parts});
+  twins.both([&](BulletWorld& w) { add_heap(w, 30, seed); });
+  auto& world = dynamic_cast<DynamicsWorld&>(*twins.ours().made_world);
+  for (int n = 0; n < 60; ++n) {
+    // 30 bodies move: all of the step is ours, ours at the limit, Bullet's.
+    const std::size_t minimum = std::array<std::size_t, 3>{0, 30, 31}[random.below(3)];
+    world.set_minimum_batch(minimum);
+    ASSERT_EQ(world.minimum_batch(), minimum);
+    ASSERT_TRUE(twins.step());
+  }
 }
 
 TEST(ConstraintSolver, AndWorldRefuseTooManyThreads) {

@@ -92,6 +92,28 @@ TEST(Tool, SceneFilesAreChecked) {
   EXPECT_EQ(jfpx_command("run " + path + " --steps 2").status, 0);
 }
 
+TEST(Tool, ABodyThatRunsAwayIsNamedAndStatusOne) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("scene.json");
+  Scene scene;
+  scene.dt = 1;
+  scene.bodies.resize(2);
+  for (BodyDef& body : scene.bodies) body.shape = Sphere{1};
+  scene.bodies[1].position = {Real(0.999e9), 0, 0};
+  scene.bodies[1].velocity = {Real(1e7), 0, 0};  // past kMaxCoordinate in one step
+  save_scene(scene, path);
+  expect_fails("run " + path + " --steps 3", 1, "step 0: body 1 left the finite numbers");
+}
+
+TEST(Tool, ProgressIsDrawnOnTerminalsOnly) {
+  const std::string run = std::string(JFPX_TOOL_PATH) + " run pile --spheres 8 --steps 30";
+  EXPECT_THAT(test::run_process("script -qec '" + run + "' /dev/null").output,
+              HasSubstr("100% 30/30"));
+  EXPECT_THAT(test::run_process("script -qec '" + run + " --quiet' /dev/null").output,
+              Not(HasSubstr("%")));
+  EXPECT_THAT(jfpx_command("run pile --spheres 8 --steps 30").output, Not(HasSubstr("%")));
+}
+
 TEST(Tool, ScenesAreListedDescribedAndExported) {
   const ProcessResult list = jfpx_stdout("scenes");
   EXPECT_EQ(list.status, 0);

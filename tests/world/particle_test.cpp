@@ -336,6 +336,22 @@ TEST(Particle, BadFieldsAreNamedWithValueAndRange) {
   EXPECT_THROW(world.set_state(id, {{kInf, 0, 0}, {}}), InvalidArgument);
 }
 
+TEST(Particle, FliesOnFromTheStateItIsGiven) {
+  ParticleWorld moved, made;
+  const ParticleId id = moved.add({});
+  moved.step();
+  moved.set_state(id, {{1, 2, 3}, {4, 5, 6}});
+  ParticleDef def;
+  def.position = {1, 2, 3};
+  def.velocity = {4, 5, 6};
+  const ParticleId twin = made.add(def);
+  for (int n = 0; n < 3; ++n) {
+    EXPECT_EQ(moved.state(id), made.state(twin));
+    moved.step();
+    made.step();
+  }
+}
+
 TEST(Particle, BadSettingsAreRefused) {
   const auto refused = [](const ParticleSettings& settings) {
     EXPECT_THROW(ParticleWorld{settings}, InvalidArgument);

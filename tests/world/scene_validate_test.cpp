@@ -202,6 +202,9 @@ TEST(Validate, AKinematicBodyHasNoMassAndAPose) {
   scene.bodies[2].kinematic = true;
   EXPECT_EQ(message(scene),
             "body 2: kinematic is true; it must be false for a half-space, which follows no pose");
+  scene.bodies[2].shape = Plane{{0, 1, 0}, 0};
+  EXPECT_EQ(message(scene),
+            "body 2: kinematic is true; it must be false for a plane, which follows no pose");
 }
 
 TEST(Validate, AnInertiaMustBeOneOfABody) {

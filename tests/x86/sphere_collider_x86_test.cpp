@@ -81,6 +81,30 @@ TEST(SphereColliderX86, ClustersAtTheCornersOfAnEnormousWorldAreFound) {
       << seed_note();
 }
 
+// Empty cells are skipped, and still there are more than 64 bits can count: about two a sphere on
+// each axis, (2 * 10^6)^3 > 2^62. So cells are halved in number. Who touches is known: who lies at
+// the same place.
+TEST(SphereColliderX86, AMillionSpheresStrewnAcrossAnEnormousWorldAreFound) {
+  Random random(base_seed());
+  constexpr std::size_t kCount = 1'000'000, kTouching = 1000;
+  constexpr Real kFar = Real(1e9);
+  std::vector<SphereInstance> spheres;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    spheres.push_back(
+        {random.uniform_in_box({-kFar, -kFar, -kFar}, {kFar, kFar, kFar}), Real(0.5)});
+  }
+  std::vector<std::pair<SphereIndex, SphereIndex>> expected, found;
+  for (std::size_t i = 0; i < kTouching; ++i) {
+    expected.emplace_back(static_cast<SphereIndex>(i * (kCount / kTouching)),
+                          static_cast<SphereIndex>(kCount + i));
+    spheres.push_back(spheres[expected.back().first]);
+  }
+  for (const SphereContact& c : make(SphereAlgorithm::sorted_tiles)->find_contacts(spheres)) {
+    found.emplace_back(c.a, c.b);
+  }
+  EXPECT_EQ(found, expected) << seed_note();
+}
+
 // A body that fell out of the world must not make everyone else's cells coarse: this takes a
 // fraction of a second, or minutes.
 TEST(SphereColliderX86, OneSphereAtTheEndOfTheWorldChangesNothingForTheOthers) {
