@@ -59,9 +59,10 @@ Scene make_big_ballistic(const Counts& counts) {
   set_material(&ground);
   scene.bodies.push_back(ground);
   for (std::uint32_t i = 0; i < counts.spheres; ++i) {
-    BodyDef round = big_round(static_cast<Weapon>(i % 4));
-    round.position += Vec3{static_cast<Real>(i % 4) * Real(1.3) - Real(1.95),
-                           static_cast<Real>(i / 4) * Real(1.3), 0};
+    const std::uint32_t column = i % 4, storey = i / 4;
+    BodyDef round = big_round(static_cast<Weapon>(column));
+    round.position += Vec3{static_cast<Real>(column) * Real(1.3) - Real(1.95),
+                           static_cast<Real>(storey) * Real(1.3), 0};
     scene.bodies.push_back(round);
   }
   return scene;

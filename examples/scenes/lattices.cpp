@@ -64,10 +64,10 @@ Scene make_columns(const Counts& counts) {
   std::uint32_t side = 1;
   while (std::uint64_t{side} * side < columns) ++side;
   for (std::uint32_t i = 0; i < counts.spheres; ++i) {
-    const std::uint32_t column = i / kHeight;
+    const std::uint32_t column = i / kHeight, row = column / side;
     const Vec3 position{static_cast<Real>(column % side) * 4,
                         kRadius + static_cast<Real>(i % kHeight) * kOverlap,
-                        static_cast<Real>(column / side) * 4};
+                        static_cast<Real>(row) * 4};
     scene.bodies.push_back(sphere_at(position, kRadius, 1));
   }
   BodyDef ground;

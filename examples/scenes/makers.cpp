@@ -11,9 +11,8 @@ std::uint32_t cube_side(std::uint32_t n) {
 
 Vec3 lattice_site(std::uint32_t i, std::uint32_t side) {
   const std::uint64_t layer = std::uint64_t{side} * side;
-  const std::uint64_t in_layer = i % layer;
-  return {static_cast<Real>(in_layer % side), static_cast<Real>(i / layer),
-          static_cast<Real>(in_layer / side)};
+  const std::uint64_t in_layer = i % layer, storey = i / layer, row = in_layer / side;
+  return {static_cast<Real>(in_layer % side), static_cast<Real>(storey), static_cast<Real>(row)};
 }
 
 BodyDef sphere_at(const Vec3& position, Real radius, Real mass) {

@@ -19,7 +19,9 @@ struct Bits {
         contact(c) {}
   int compare(const Bits& other) const {
     const int ids = std::memcmp(bodies, other.bodies, sizeof bodies);
-    return ids != 0 ? ids : std::memcmp(numbers, other.numbers, sizeof numbers);
+    if (ids != 0) return ids;
+    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits are what is compared here
+    return std::memcmp(numbers, other.numbers, sizeof numbers);
   }
   bool operator<(const Bits& other) const { return compare(other) < 0; }
 };
@@ -80,6 +82,7 @@ std::vector<Contact> different_contacts(std::span<const Contact> expected,
   std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(),
                                 std::back_inserter(different));
   std::vector<Contact> contacts;
+  contacts.reserve(different.size());
   for (const Bits& bits : different) contacts.push_back(bits.contact);
   return contacts;
 }

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <imgui.h>
 
 namespace jfpx::inline JFPX_ABI::view {
@@ -46,7 +47,7 @@ bool is_shadow(const demos::Item& item) {
 
 Paint paint_of(const demos::Colour& colour, bool ball) {
   const auto byte = [](float x) {
-    return static_cast<std::uint8_t>(std::clamp(x, 0.0f, 1.0f) * 255 + 0.5f);
+    return static_cast<std::uint8_t>(std::lround(std::clamp(x, 0.0f, 1.0f) * 255));
   };
   Paint paint{byte(colour.red), byte(colour.green), byte(colour.blue)};
   const bool brown = colour.red > colour.blue + 0.3f;
@@ -195,12 +196,12 @@ void DemoShow::draw(Renderer& renderer, const Target& target) {
   renderer.draw(drawing, view, {0, 0, target.width, target.height, target.unit},
                 target.framebuffer);
   float y = ImGui::GetIO().DisplaySize.y - 12;
-  for (auto line = now_.text.rbegin(); line != now_.text.rend(); ++line) {
+  std::for_each(now_.text.rbegin(), now_.text.rend(), [&](const std::string& line) {
     y -= ImGui::GetTextLineHeightWithSpacing();
     ImDrawList* list = ImGui::GetBackgroundDrawList();
-    list->AddText({15, y + 1}, IM_COL32(0, 0, 0, 190), line->c_str());
-    list->AddText({14, y}, IM_COL32_WHITE, line->c_str());
-  }
+    list->AddText({15, y + 1}, IM_COL32(0, 0, 0, 190), line.c_str());
+    list->AddText({14, y}, IM_COL32_WHITE, line.c_str());
+  });
 }
 
 void DemoShow::panel() {

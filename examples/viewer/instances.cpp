@@ -32,9 +32,11 @@ Instances::Instances(std::span<const Field> fields, std::size_t stride, GLenum m
   GLuint location = 0;
   for (const Field& field : fields) {
     glEnableVertexAttribArray(location);
-    glVertexAttribPointer(
-        location, field.components, field.type, field.type == GL_UNSIGNED_BYTE ? GL_TRUE : GL_FALSE,
-        static_cast<GLsizei>(stride), reinterpret_cast<const void*>(field.offset));
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): OpenGL takes offsets as pointers
+    const auto* offset = reinterpret_cast<const void*>(field.offset);
+    glVertexAttribPointer(location, field.components, field.type,
+                          field.type == GL_UNSIGNED_BYTE ? GL_TRUE : GL_FALSE,
+                          static_cast<GLsizei>(stride), offset);
     glVertexAttribDivisor(location, 1);
     ++location;
   }

@@ -38,6 +38,7 @@ std::vector<Paint> island_paints(const Scene& scene, std::span<const Contact> co
   std::vector<std::uint32_t> sizes(islands.size());
   for (const std::uint32_t island : islands) ++sizes[island];
   std::vector<Paint> paints;
+  paints.reserve(islands.size());
   for (const std::uint32_t island : islands) {
     paints.push_back(sizes[island] > 1 ? hue_paint(island) : kAlone);
   }

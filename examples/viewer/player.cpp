@@ -25,7 +25,8 @@ unsigned StepClock::advance(double seconds, double dt) {
   return steps;
 }
 
-Player::Player(std::unique_ptr<Run> run, const Scene& scene) : scene_(scene), run_(std::move(run)) {
+Player::Player(std::unique_ptr<Run> run, Scene scene)
+    : scene_(std::move(scene)), run_(std::move(run)) {
   keep(run_->moment());
 }
 

@@ -38,7 +38,7 @@ class Player {
   static constexpr std::size_t kHistoryBytes = std::size_t{192} << 20;
   static constexpr std::size_t kHistoryLength = 3000;
 
-  Player(std::unique_ptr<Run> run, const Scene& scene);
+  Player(std::unique_ptr<Run> run, Scene scene);
 
   /// Lets wall time pass.
   void advance(double seconds);

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
@@ -44,7 +45,7 @@ Real cell_for(Real body_size) {
 
 }  // namespace
 
-Stage::Stage(const Scene& scene) : scene_(scene), survey_(scene) {
+Stage::Stage(Scene scene) : scene_(std::move(scene)), survey_(scene_) {
   std::vector<Real> sizes;
   for (const BodyDef& body : scene_.bodies) {
     if (!movable(body)) continue;

@@ -19,7 +19,7 @@ inline constexpr const char* kColouringNames[] = {"bodies",      "speed",    "sl
 
 class Stage {
  public:
-  explicit Stage(const Scene& scene);
+  explicit Stage(Scene scene);
 
   /// Adds bodies, grounds and walls. `from` and `to` are two moments of the run, and `share` says
   /// how far the picture is between them: 0 to 1.

@@ -88,7 +88,7 @@ void Window::check_context() const {
   throw BackendUnavailable("OpenGL lost its context: the graphics device was reset");
 }
 
-void Window::swap() {
+void Window::swap() {  // NOLINT(bugprone-exception-escape): buffers, not windows
   check_context();
   SDL_GL_SwapWindow(window_.get());
 }

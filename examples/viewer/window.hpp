@@ -25,7 +25,7 @@ class Window {
   /// @throws BackendUnavailable if the device was reset and all that it knew is gone.
   void check_context() const;
   /// Shows what was drawn. @throws as check_context()
-  void swap();
+  void swap();  // NOLINT(bugprone-exception-escape): buffers, not windows
   void set_title(const std::string& title);
   void set_fullscreen(bool on);
   bool fullscreen() const { return fullscreen_; }
