@@ -28,14 +28,14 @@ bool looks_like_file(const std::string& name) {
 }  // namespace
 
 CLI::Validator whole_number() {
-  return CLI::Validator(
-      [](std::string& text) {
-        std::uint64_t value = 0;
-        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-        const bool whole = error == std::errc() && end == text.data() + text.size();
-        return whole ? "" : "is " + text + "; it must be a whole number from 0 to 2^64 - 1";
-      },
-      "");
+  return {[](std::string& text) {
+            std::uint64_t value = 0;
+            const auto [end, error] =
+                std::from_chars(text.data(), text.data() + text.size(), value);
+            const bool whole = error == std::errc() && end == text.data() + text.size();
+            return whole ? "" : "is " + text + "; it must be a whole number from 0 to 2^64 - 1";
+          },
+          ""};
 }
 
 void add_scene_options(CLI::App& app, RunOptions& options) {
