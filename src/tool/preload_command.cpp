@@ -29,7 +29,7 @@ struct PreloadOptions {
 std::string find_library() {
   namespace fs = std::filesystem;
   const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
-  const std::string path =
+  std::string path =
       (folder / JFPX_PRELOAD_FOLDER / "libjfpx-bullet-preload.so").lexically_normal().string();
   if (!fs::exists(path)) throw Error(path + " is missing");
   // LD_PRELOAD has no way to quote.
@@ -65,6 +65,7 @@ void set_environment(const PreloadOptions& options) {
   set_environment(options);
   std::vector<std::string> command = options.command;
   std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
   for (std::string& argument : command) arguments.push_back(argument.data());
   arguments.push_back(nullptr);
   execvp(arguments[0], arguments.data());
