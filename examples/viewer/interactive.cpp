@@ -30,7 +30,8 @@ App::App(const ViewOptions& options)
           Window::open("jfpx-view: " + options.run.scene, options.size.width, options.size.height)),
       renderer_(options.quality),
       ui_(window_),
-      recorder_(options.record) {
+      recorder_(options.record),
+      seen_{0, options.size.width, options.size.height, 1} {
   if (options.fullscreen) window_.set_fullscreen(true);
   meet_show();
 }
@@ -174,17 +175,17 @@ void App::save_recording() {
 
 /// What the command line asked for must be written, or the program ends; a key's wish is told to
 /// have failed.
-void App::write_pictures() {
+void App::write_pictures(const Target& target) {
   const bool by_key = wanted_picture_ != options_.screenshot;
   try {
-    if (!wanted_picture_.empty()) save_picture();
+    if (!wanted_picture_.empty()) save_picture(target);
   } catch (const FileError& error) {
     if (!by_key) throw;
     tell(error.what());
   }
   if (!recorder_.on()) return;
   try {
-    recorder_.add(picture());
+    recorder_.add(picture(target));
   } catch (const FileError& error) {
     recorder_ = Recorder("");
     if (!options_.record.empty()) throw;
@@ -192,9 +193,9 @@ void App::write_pictures() {
   }
 }
 
-void App::save_picture() {
+void App::save_picture(const Target& target) {
   const std::string name = std::exchange(wanted_picture_, {});
-  write_png(picture(), name);
+  write_png(picture(target), name);
   tell("wrote " + name);
 }
 
@@ -204,28 +205,45 @@ void App::tell(const std::string& what) {
 }
 
 void App::draw(double seconds) {
-  const int width = window_.pixel_width(), height = window_.pixel_height();
-  if (width == 0 || height == 0) {  // minimised
+  if (window_.minimised()) {
+    draw_unseen(seconds);
+  } else {
+    seen_ = {0, window_.pixel_width(), window_.pixel_height(), window_.pixel_ratio()};
+    draw_to(seen_, seconds);
+    window_.swap();
+  }
+  grant_wishes();
+}
+
+/// A window that is minimised has no pixels to read. A picture that is wanted is drawn as large as
+/// the window was.
+void App::draw_unseen(double seconds) {
+  if (wanted_picture_.empty() && !recorder_.on()) {
     SDL_Delay(20);
     return;
   }
+  const Canvas canvas(seen_.width, seen_.height);
+  Target target = seen_;
+  target.framebuffer = canvas.framebuffer();
+  draw_to(target, seconds);
+}
+
+void App::draw_to(const Target& target, double seconds) {
   Stopwatch watch;
   ui_.begin(seconds);
-  show_->draw(renderer_, {0, width, height, window_.pixel_ratio()});
+  show_->draw(renderer_, target);
   if (panel_) show_->panel();
   if (help_) show_help();
   show_notice(seconds);
-  ui_.end(0, width, height);
+  ui_.end(target.framebuffer, target.width, target.height);
   timing_.add_picture(watch.lap() * 1e3);
-  write_pictures();
-  window_.swap();
-  grant_wishes();
+  write_pictures(target);
 }
 
 /// What was drawn last. Taken before the swap, which may leave the back buffer undefined. What a
 /// lost context leaves is no picture.
-Image App::picture() const {
-  Image image = Canvas::read_pixels(0, window_.pixel_width(), window_.pixel_height());
+Image App::picture(const Target& target) const {
+  Image image = Canvas::read_pixels(target.framebuffer, target.width, target.height);
   window_.check_context();
   return image;
 }

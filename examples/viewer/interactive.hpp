@@ -37,11 +37,13 @@ class App {
   void obey(Command command);
   void toggle_recorder();
   void save_recording();
-  void write_pictures();
-  void save_picture();
-  Image picture() const;
+  void write_pictures(const Target& target);
+  void save_picture(const Target& target);
+  Image picture(const Target& target) const;
   void tell(const std::string& what);
   void draw(double seconds);
+  void draw_unseen(double seconds);
+  void draw_to(const Target& target, double seconds);
   void show_help();
   void show_notice(double seconds);
 
@@ -53,6 +55,7 @@ class App {
   Controls controls_;
   Recorder recorder_;
   Timing timing_;
+  Target seen_;                 ///< the window as it was last seen
   std::string wanted_picture_;  ///< file for the next one
   std::string notice_;          ///< shown for a while
   double notice_left_ = 0;      ///< [s]

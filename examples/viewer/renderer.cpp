@@ -260,7 +260,7 @@ GLuint Renderer::resident_spheres(std::size_t count) {
 
 void Renderer::draw(const Drawing& drawing, const View& view, const Viewport& viewport,
                     GLuint framebuffer) {
-  if (viewport.width <= 0 || viewport.height <= 0) return;  // a minimised window
+  if (viewport.width <= 0 || viewport.height <= 0) return;  // no room left
   Impl& r = *impl_;
   r.resize(viewport.width * r.quality.supersample, viewport.height * r.quality.supersample);
   r.upload(drawing, view, make_frame_block(drawing, view, r.quality, viewport));

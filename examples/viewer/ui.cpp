@@ -17,7 +17,7 @@ constexpr float kTextSize = 13;  // [units], that of the default font
 
 }  // namespace
 
-Ui::Ui(Window& window) : window_(&window) {
+Ui::Ui(Window& window) : window_(&window), width_(window.width()), height_(window.height()) {
   set_up();
   ImGui_ImplSDL2_InitForOpenGL(window.sdl(), window.context());
 }
@@ -67,13 +67,22 @@ void Ui::fit_text(float pixel_ratio) {
 }
 
 void Ui::begin(double seconds) {
-  fit_text(window_ != nullptr ? window_->pixel_ratio() : 1);
+  const bool seen = window_ != nullptr && !window_->minimised();
+  if (seen) {
+    width_ = window_->width();
+    height_ = window_->height();
+    fit_text(window_->pixel_ratio());
+  } else if (window_ == nullptr) {
+    fit_text(1);
+  }
   ImGui_ImplOpenGL3_NewFrame();
   if (window_ != nullptr) {
     ImGui_ImplSDL2_NewFrame();
   } else {
-    ImGui::GetIO().DisplaySize = {static_cast<float>(width_), static_cast<float>(height_)};
     ImGui::GetIO().DeltaTime = std::max(static_cast<float>(seconds), 1e-4f);
+  }
+  if (!seen) {  // a window that is minimised would have no size
+    ImGui::GetIO().DisplaySize = {static_cast<float>(width_), static_cast<float>(height_)};
   }
   ImGui::NewFrame();
 }

@@ -26,7 +26,7 @@ class Ui {
   void set_up();
   void fit_text(float pixel_ratio);
   Window* window_ = nullptr;
-  int width_ = 0, height_ = 0;  ///< of the canvas, where there is no window
+  int width_ = 0, height_ = 0;  ///< [units] of the canvas, or of the window when it was last seen
   float pixel_ratio_ = 0;       ///< that the text was made for
 };
 

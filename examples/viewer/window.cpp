@@ -112,6 +112,10 @@ int Window::height() const {
   SDL_GetWindowSize(window_.get(), nullptr, &height);
   return height;
 }
+bool Window::minimised() const {
+  return (SDL_GetWindowFlags(window_.get()) & SDL_WINDOW_MINIMIZED) != 0 || pixel_width() == 0 ||
+         pixel_height() == 0;
+}
 int Window::pixel_width() const {
   int width = 0;
   SDL_GL_GetDrawableSize(window_.get(), &width, nullptr);

@@ -33,6 +33,8 @@ class Window {
   void capture_mouse(bool on);
   int width() const;   ///< in units, those of mouse coordinates
   int height() const;  ///< likewise
+  /// Nobody sees it: what is drawn into it may get lost.
+  bool minimised() const;
   int pixel_width() const;
   int pixel_height() const;
   /// Pixels of a unit: 2 on many high-density screens.

@@ -4,6 +4,17 @@
 #include <initializer_list>
 #include <utility>
 
+namespace {
+
+bool minimised = false;
+
+}  // namespace
+
+// SDL's offscreen driver minimises nothing: this is linked instead of SDL's own.
+extern "C" Uint32 SDL_GetWindowFlags(SDL_Window*) {
+  return minimised ? SDL_WINDOW_MINIMIZED : SDL_WINDOW_SHOWN;
+}
+
 namespace jfpx {
 namespace {
 
@@ -22,6 +33,10 @@ class Interactive : public test::WindowTest {
     options.size = kSize;
     options.quality = kLowQuality;
     return options;
+  }
+  void TearDown() override {
+    minimised = false;
+    WindowTest::TearDown();
   }
   /// Keys that are down and up again before the first picture.
   static void press(std::initializer_list<SDL_Keycode> keys) {
@@ -85,6 +100,39 @@ TEST_F(Interactive, AWindowOfAnotherSizeHasPicturesOfThatSize) {
   ASSERT_TRUE(done);
   EXPECT_EQ(read_png("resized.png").width, 200);
   EXPECT_EQ(read_png("resized.png").height, 90);
+}
+
+TEST_F(Interactive, AWindowThatIsMinimisedStillHasPictures) {
+  const auto take = [](const char* name, bool unseen) {
+    start_events();
+    ViewOptions wish = options(1'000'000);
+    wish.screenshot = std::string(name) + ".png";
+    App app(wish);
+    app.show().paused = true;
+    for (int i = 0; i < 2; ++i) EXPECT_TRUE(app.frame(0));  // panels learn their size
+    minimised = unseen;
+    press({SDLK_F10});
+    EXPECT_TRUE(app.frame(0));
+    press({SDLK_F10, SDLK_ESCAPE});
+    EXPECT_FALSE(app.frame(0));
+    EXPECT_EQ(app.finish(), 0);
+    minimised = false;
+  };
+  take("seen", false);
+  take("unseen", true);
+  EXPECT_EQ(read_png("unseen.png").rgb, read_png("seen.png").rgb);
+  EXPECT_EQ(read_png("jfpx-view-frames-2/frame-000001.png").width, kSize.width);
+}
+
+TEST_F(Interactive, AWindowThatIsMinimisedFromTheStartHasAPictureToo) {
+  minimised = true;
+  ViewOptions wish = options(2);
+  wish.screenshot = "unseen.png";
+  EXPECT_EQ(run_interactive(wish), 0);
+  EXPECT_EQ(read_png("unseen.png").width, kSize.width);
+  wish.screenshot = "missing/unseen.png";
+  start_events();
+  EXPECT_THROW(run_interactive(wish), FileError);
 }
 
 TEST_F(Interactive, FullScreenFillsTheScreen) {
