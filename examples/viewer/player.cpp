@@ -62,6 +62,15 @@ bool Player::step_back() {
   return true;
 }
 
+void Player::restart() {
+  if (!run_->rewind()) run_ = make_run(scene_, run_->choice());
+  history_.clear();
+  bytes_ = 0;
+  keep(run_->moment());
+  changed_ = false;
+  clock_ = {};
+}
+
 bool Player::switch_to(const EngineChoice& choice) {
   if (choice == run_->choice()) return true;
   if (run_->switch_to(choice)) return true;

@@ -47,6 +47,9 @@ class Player {
   /// Shows the step before, as far as kept. What was computed stays: stepping ahead again shows the
   /// same bits. @return false at the oldest one
   bool step_back();
+  /// Begins anew, on the engine and with the settings of now. @throws as make_run(); nothing has
+  /// changed then.
+  void restart();
 
   /// Goes on with another engine or backend. @return whether the bits stay those of one run.
   /// @throws BackendUnavailable; nothing has changed then.

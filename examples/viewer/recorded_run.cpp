@@ -12,9 +12,7 @@ class RecordedRun final : public Run {
   explicit RecordedRun(RecordingReader recording) : recording_(std::move(recording)) {
     choice_.engine = parse_engine(recording_.header().engine);
     if (const auto backend = parse_backend(recording_.header().backend)) choice_.backend = *backend;
-    for (const BodyDef& body : recording_.header().scene.bodies) {
-      states_.push_back({body.position, body.orientation, body.velocity, body.angular_velocity});
-    }
+    rewind();
   }
 
   void step() override {
@@ -29,6 +27,15 @@ class RecordedRun final : public Run {
     moment.awake.assign(states_.size(), 1);
     moment.computed_by = "the recording";
     return moment;
+  }
+
+  bool rewind() override {
+    step_ = 0;
+    states_.clear();
+    for (const BodyDef& body : recording_.header().scene.bodies) {
+      states_.push_back({body.position, body.orientation, body.velocity, body.angular_velocity});
+    }
+    return true;
   }
 
   EngineChoice choice() const override { return choice_; }

@@ -31,6 +31,8 @@ class Run {
   virtual ~Run() = default;
   virtual void step() = 0;
   virtual Moment moment() = 0;
+  /// Goes back to the first step. @return false if a run of the scene that is made anew does that.
+  virtual bool rewind() { return false; }
   virtual EngineChoice choice() const = 0;
   /// Goes on with another choice and the same bits: everything that the engine remembers stays.
   /// @return false if that takes another engine; the run is as before.

@@ -50,9 +50,8 @@ void SceneShow::advance(double seconds) {
 void SceneShow::step() { player_.step(); }
 void SceneShow::step_back() { player_.step_back(); }
 void SceneShow::restart() {
-  ViewOptions same = options_;
-  same.choice = player_.choice();
-  load(same);
+  player_.restart();
+  message_.clear();
 }
 void SceneShow::home() { camera = camera_for(options_, player_.scene(), player_.shown()); }
 

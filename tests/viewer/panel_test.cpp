@@ -253,6 +253,59 @@ TEST_F(Panel, SettingsOfTheSolverAreTakenOver) {
   EXPECT_TRUE(user.reads("step 1, 0.00 s"));
 }
 
+TEST_F(Panel, RestartKeepsWhatThePanelShows) {
+  test::User user(options_for("pile"));
+  user.show().paused = true;
+  user.click("Settings");
+  user.frame();
+  user.drag_in("dt [s]", 0.5, 0);
+  user.type("iterations, 0 = 8N", "17");
+  user.click("sleep");
+  user.click("x86");
+  user.drag_in("speed", 0.5, 1);
+  const Scene wanted = scene(user).player().scene();
+  for (int i = 0; i < 3; ++i) user.click("Step");
+  user.click("Restart");
+  EXPECT_EQ(user.show().steps(), 0u);
+  EXPECT_EQ(scene(user).player().scene(), wanted);
+  EXPECT_EQ(user.value("iterations, 0 = 8N"), "17");
+  EXPECT_EQ(user.value("sleep"), wanted.sleep.enabled ? "on" : "off");
+  EXPECT_EQ(user.value("x86"), "on");
+  EXPECT_EQ(user.show().speed, 4);
+  EXPECT_TRUE(user.show().paused);
+  // From the first step on it is one run with these settings, which a replay can make again.
+  Player expected(make_run(wanted, scene(user).player().choice()), wanted);
+  for (int i = 0; i < 3; ++i) user.click("Step"), expected.step();
+  EXPECT_EQ(hash(user), state_hash(expected.shown().states));
+  user.click("Save steps");
+  EXPECT_EQ(open_recording("jfpx-view-1.rec").scene, wanted);
+}
+
+TEST_F(Panel, ARecordingStartsAgainAsItIsShown) {
+  {
+    test::User user(options_for("pile"));
+    for (int i = 0; i < 3; ++i) user.click("Step");
+    user.click("Save steps");
+  }
+  start_events();
+  test::User user(options_for("jfpx-view-1.rec"));
+  user.click("Step");
+  const std::uint64_t recorded = hash(user);
+  user.click("Restart");
+  user.click("Step");
+  EXPECT_TRUE(user.reads("spheres by the recording"));
+  EXPECT_EQ(hash(user), recorded);
+  user.click("Settings");
+  user.frame();
+  user.drag_in("dt [s]", 0.5, 0);  // goes on live
+  user.click("Restart");
+  EXPECT_EQ(user.show().steps(), 0u);
+  EXPECT_NEAR(scene(user).player().scene().dt, 1e-4, 1e-7);
+  user.click("Step");
+  EXPECT_FALSE(user.reads("spheres by the recording"));
+  EXPECT_NE(hash(user), recorded);
+}
+
 TEST_F(Panel, PicturesFilmsAndRecordingsAreWritten) {
   test::User user(options_for("pile"));
   user.click("Picture");
