@@ -4,6 +4,7 @@
 #include "examples/viewer/values.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
@@ -40,12 +41,17 @@ Survey::Survey(const Scene& scene) {
 }
 
 Bounds Survey::bounds(const std::vector<BodyState>& states) const {
-  if (bodies_.empty()) return {{0, 1, 0}, 4};
+  constexpr Bounds kNothing{{0, 1, 0}, 4};
+  if (bodies_.empty()) return kNothing;
   Vec3 low, high;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<Real> along;
     along.reserve(bodies_.size());
-    for (const std::uint32_t body : bodies_) along.push_back(states[body].position[axis]);
+    for (const std::uint32_t body : bodies_) {
+      const Real place = states[body].position[axis];
+      if (std::isfinite(place)) along.push_back(place);  // what left the numbers has no order
+    }
+    if (along.empty()) return kNothing;
     const Spread s = spread(along);
     low[axis] = s.low;
     high[axis] = s.high;

@@ -33,7 +33,7 @@ Paint scale_paint(Real value) {
   // Five points of the colour map viridis (van der Walt and Smith).
   static constexpr std::array<Paint, 5> kPoints = {
       {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}}};
-  const Real at = std::clamp(value, Real(0), Real(1)) * 4;
+  const Real at = value > 0 ? std::min(value, Real(1)) * 4 : 0;  // also of what is no number
   const auto i = static_cast<std::size_t>(std::min(at, Real(3)));
   const Real share = at - static_cast<Real>(i);
   const auto mix = [share](std::uint8_t a, std::uint8_t b) {

@@ -50,6 +50,7 @@ const std::vector<SphereItem>& DrawOrder::sort(const std::vector<SphereItem>& it
     distances_[i] = kBeyond;
     if (!frustum.meets({Real(c[0]), Real(c[1]), Real(c[2])}, Real(items[i].radius))) continue;
     const float front = std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) - items[i].radius;
+    if (!std::isfinite(front)) continue;
     distances_[i] = std::max(front, 0.0f);
     nearest = std::min(nearest, distances_[i]);
     farthest = std::max(farthest, distances_[i]);

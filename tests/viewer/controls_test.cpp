@@ -21,6 +21,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <random>
 #include <tuple>
 
@@ -695,6 +696,40 @@ TEST(DrawOrder, HasWhatIsSeenFirstFrontToBackAndLosesNothing) {
     // A picture of 41 by 23 degrees shows a small part of what is all around.
     EXPECT_LE(order.visible(), std::max<std::size_t>(count * 3 / 4, 2));
   }
+}
+
+TEST(Stage, DrawsWhatLeftTheFiniteNumbersAmongTheRest) {
+  const Scene scene = scenes::make("lattice", {.spheres = 64});
+  Moment moment = make_run(scene, {})->moment();
+  const Stage stage(scene);
+  const Bounds before = stage.bounds(moment.states);
+  const auto lose = [&moment](std::size_t i, Real value) {
+    moment.states[i].position = moment.states[i].velocity = {value, value, value};
+  };
+  DrawOrder order;
+  const auto visible = [&](Colouring colouring) {
+    const Bounds bounds = stage.bounds(moment.states);
+    EXPECT_TRUE(std::isfinite(bounds.radius));
+    Camera camera;
+    camera.look_at(before.centre + Vec3{0, 0, before.radius * 4}, before.centre);
+    const View view = camera.view(bounds.centre, bounds.radius);
+    Drawing drawing(view.eye);
+    stage.draw(moment, moment, 1, colouring, &drawing);
+    EXPECT_EQ(order.sort(drawing.spheres(), view, 1).size(), 64u);
+    return order.visible();
+  };
+  ASSERT_EQ(visible(Colouring::speed), 64u);
+  std::size_t body = 0;
+  while (!(scene.bodies[body].mass > 0)) ++body;
+  lose(body, std::numeric_limits<Real>::quiet_NaN());
+  lose(body + 1, std::numeric_limits<Real>::infinity());
+  lose(body + 2, -std::numeric_limits<Real>::infinity());
+  EXPECT_EQ(visible(Colouring::speed), 61u);
+  EXPECT_EQ(visible(Colouring::islands), 61u);
+  for (std::size_t i = 0; i < moment.states.size(); ++i) {
+    lose(i, std::numeric_limits<Real>::quiet_NaN());
+  }
+  EXPECT_EQ(visible(Colouring::speed), 0u);
 }
 
 TEST(Stage, PickFindsTheNearestMovableBody) {
