@@ -3,9 +3,11 @@
 
 #include <jfpx/error.hpp>
 
+#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <png.h>
+#include <system_error>
 
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
@@ -25,12 +27,12 @@ void write_png(const Image& image, const std::string& path) {
   png.height = static_cast<png_uint_32>(image.height);
   png.format = PNG_FORMAT_RGB;
   const std::string part = path + ".part";
-  if (png_image_write_to_file(&png, part.c_str(), 0, image.rgb.data(), 0, nullptr) != 0 &&
-      std::rename(part.c_str(), path.c_str()) == 0) {
-    return;
-  }
+  const bool written =
+      png_image_write_to_file(&png, part.c_str(), 0, image.rgb.data(), 0, nullptr) != 0;
+  if (written && std::rename(part.c_str(), path.c_str()) == 0) return;
+  const std::string why = written ? std::generic_category().message(errno) : png.message;
   std::remove(part.c_str());
-  throw FileError(path + ": can't be written: " + png.message);
+  throw FileError(path + ": can't be written: " + why);
 }
 
 Image read_png(const std::string& path) {

@@ -8,6 +8,7 @@
 #include "examples/viewer/draw_order.hpp"
 #include "examples/viewer/exchangeable_collider.hpp"
 #include "examples/viewer/forces.hpp"
+#include "examples/viewer/image.hpp"
 #include "examples/viewer/islands.hpp"
 #include "examples/viewer/player.hpp"
 #include "examples/viewer/timing.hpp"
@@ -21,6 +22,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <limits>
 #include <random>
 #include <tuple>
@@ -696,6 +698,21 @@ TEST(DrawOrder, HasWhatIsSeenFirstFrontToBackAndLosesNothing) {
     // A picture of 41 by 23 degrees shows a small part of what is all around.
     EXPECT_LE(order.visible(), std::max<std::size_t>(count * 3 / 4, 2));
   }
+}
+
+TEST(Image, WhatCannotBeWrittenIsToldWithTheReasonAndLeavesNothing) {
+  const test::TemporaryFolder folder;
+  const Image image{1, 1, {1, 2, 3}};
+  std::filesystem::create_directory(folder.file("taken.png"));
+  for (const char* name : {"taken.png", "missing/a.png"}) {
+    try {
+      write_png(image, folder.file(name));
+      FAIL() << name;
+    } catch (const FileError& error) {
+      EXPECT_THAT(error.what(), ::testing::MatchesRegex(".*: can't be written: .*irectory.*"));
+    }
+  }
+  EXPECT_EQ(folder.entries(), 1u);
 }
 
 TEST(Stage, DrawsWhatLeftTheFiniteNumbersAmongTheRest) {
