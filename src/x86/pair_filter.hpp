@@ -25,30 +25,28 @@ inline constexpr std::size_t kPairLanes = sizeof(RealLanes) / sizeof(Real);
 
 /// The same sphere, first or second, of as many pairs.
 struct SphereLanes {
-  SphereLanes(const SphereInstance* spheres, const SpherePair* pairs,
-              SphereIndex SpherePair::*which) {
-    const auto real = [&](std::size_t i) { return &spheres[pairs[i].*which].centre.x; };
-#if defined(JFPX_DOUBLE_PRECISION)
-    const RealLanes xy0 = _mm_loadu_pd(real(0)), zr0 = _mm_loadu_pd(real(0) + 2);
-    const RealLanes xy1 = _mm_loadu_pd(real(1)), zr1 = _mm_loadu_pd(real(1) + 2);
-    x = _mm_unpacklo_pd(xy0, xy1);
-    y = _mm_unpackhi_pd(xy0, xy1);
-    z = _mm_unpacklo_pd(zr0, zr1);
-    radius = _mm_unpackhi_pd(zr0, zr1);
-#else
-    x = _mm_loadu_ps(real(0));
-    y = _mm_loadu_ps(real(1));
-    z = _mm_loadu_ps(real(2));
-    radius = _mm_loadu_ps(real(3));
-    _MM_TRANSPOSE4_PS(x, y, z, radius);
-#endif
-  }
   RealLanes x, y, z, radius;
 };
+inline SphereLanes load_lanes(const SphereInstance* spheres, const SpherePair* pairs,
+                              SphereIndex SpherePair::*which) {
+  const auto real = [&](std::size_t i) { return &spheres[pairs[i].*which].centre.x; };
+#if defined(JFPX_DOUBLE_PRECISION)
+  const RealLanes xy0 = _mm_loadu_pd(real(0)), zr0 = _mm_loadu_pd(real(0) + 2);
+  const RealLanes xy1 = _mm_loadu_pd(real(1)), zr1 = _mm_loadu_pd(real(1) + 2);
+  return {_mm_unpacklo_pd(xy0, xy1), _mm_unpackhi_pd(xy0, xy1), _mm_unpacklo_pd(zr0, zr1),
+          _mm_unpackhi_pd(zr0, zr1)};
+#else
+  SphereLanes s{_mm_loadu_ps(real(0)), _mm_loadu_ps(real(1)), _mm_loadu_ps(real(2)),
+                _mm_loadu_ps(real(3))};
+  _MM_TRANSPOSE4_PS(s.x, s.y, s.z, s.radius);
+  return s;
+#endif
+}
 
 /// One bit a pair: set unless the distance of the centres is greater than the sum of the radii.
 inline unsigned touching_lanes(const SphereInstance* spheres, const SpherePair* pairs) {
-  const SphereLanes a(spheres, pairs, &SpherePair::a), b(spheres, pairs, &SpherePair::b);
+  const SphereLanes a = load_lanes(spheres, pairs, &SpherePair::a);
+  const SphereLanes b = load_lanes(spheres, pairs, &SpherePair::b);
   const RealLanes x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
   return static_cast<unsigned>(
       not_greater(square_root(x * x + y * y + z * z), a.radius + b.radius));
