@@ -128,6 +128,12 @@ void check(const ViewOptions& options) {
   if (!options.input.empty() && (options.side_by_side || !tool::is_demo(options.run.scene))) {
     throw InvalidArgument("--input goes with a demo; " + options.run.scene + " is a scene");
   }
+  const tool::RunOptions& run = options.run;
+  if (is_recording(run.scene) &&
+      (run.spheres || run.boxes || run.dt || run.seed != tool::RunOptions{}.seed)) {
+    throw InvalidArgument(run.scene +
+                          " is a recording: --spheres, --boxes, --seed and --dt can't change it");
+  }
   if (options.eye.has_value() != options.target.has_value()) {
     throw InvalidArgument("--eye and --target go together");
   }

@@ -50,6 +50,8 @@ class RecordedRun final : public Run {
 
 }  // namespace
 
+bool is_recording(std::string_view scene) { return scene.ends_with(".rec"); }
+
 Recorded open_recording(const std::string& path) {
   RecordingReader recording(path);
   Scene scene = recording.header().scene;

@@ -49,6 +49,8 @@ struct Recorded {
 };
 /// @throws FileError
 Recorded open_recording(const std::string& path);
+/// Whether a scene's name is that of a recording: it ends with ".rec".
+bool is_recording(std::string_view scene);
 
 /// Engines that this build has, in the order of EngineKind.
 bool has_engine(EngineKind engine);

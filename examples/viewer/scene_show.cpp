@@ -9,10 +9,8 @@
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
-constexpr std::string_view kRecordingEnding = ".rec";
-
 Player make_player(const ViewOptions& options) {
-  if (options.run.scene.ends_with(kRecordingEnding)) {
+  if (is_recording(options.run.scene)) {
     Recorded recorded = open_recording(options.run.scene);
     return {std::move(recorded.run), recorded.scene};
   }

@@ -166,6 +166,9 @@ TEST(View, StatesAreRecordedAndPlayedBack) {
   const auto played = jfpx_view(path + " --frames 7 --no-render");
   EXPECT_EQ(played.status, 0) << played.output;
   EXPECT_THAT(played.output, HasSubstr("step 7"));
+  for (const char* change : {" --spheres 5", " --boxes 1", " --dt 0.01", " --seed 2"}) {
+    expect_fails(jfpx_view(path + change + " --no-render"), 2, "is a recording");
+  }
   std::ofstream(path, std::ios::app) << "more";
   expect_fails(jfpx_view(path + " --no-render"), 2, path);
   expect_fails(jfpx_view("flight --frames 2 --no-render --recording " + path), 2,
