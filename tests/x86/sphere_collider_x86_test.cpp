@@ -99,9 +99,8 @@ TEST(SphereColliderX86, AMillionSpheresStrewnAcrossAnEnormousWorldAreFound) {
                           static_cast<SphereIndex>(kCount + i));
     spheres.push_back(spheres[expected.back().first]);
   }
-  for (const SphereContact& c : make(SphereAlgorithm::sorted_tiles)->find_contacts(spheres)) {
-    found.emplace_back(c.a, c.b);
-  }
+  const auto collider = make(SphereAlgorithm::sorted_tiles);
+  for (const SphereContact& c : collider->find_contacts(spheres)) found.emplace_back(c.a, c.b);
   EXPECT_EQ(found, expected) << seed_note();
 }
 
