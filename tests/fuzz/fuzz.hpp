@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <sstream>
 #include <string>
 
 /// Each target defines it: tries one input, and returns 0 whatever the input is.
@@ -14,9 +15,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 namespace jfpx::inline JFPX_ABI::fuzz {
 
-/// Ends the program, so that the fuzzer keeps the input.
+/// Ends the program, so that the fuzzer keeps the input. Of what its processes write, libFuzzer
+/// passes on the lines with "ERROR:" alone.
 [[noreturn]] inline void report_finding(const std::string& what) {
-  std::fprintf(stderr, "finding: %s\n", what.c_str());
+  std::istringstream lines(what);
+  for (std::string line; std::getline(lines, line);) {
+    std::fprintf(stderr, "ERROR: finding: %s\n", line.c_str());
+  }
   std::abort();
 }
 
