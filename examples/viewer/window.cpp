@@ -18,6 +18,16 @@ namespace {
   throw BackendUnavailable(std::string(what) + ": " + SDL_GetError());
 }
 
+struct Extent {
+  int width = 0, height = 0;
+};
+/// In what `ask` counts: units or pixels.
+Extent size_by(void (*ask)(SDL_Window*, int*, int*), SDL_Window* window) {
+  Extent extent;
+  ask(window, &extent.width, &extent.height);
+  return extent;
+}
+
 /// Mesa frees its own memory when a driver is unloaded at the end, or never. With the driver kept
 /// where it is, the leak sanitizer sees that its memory is in use, and reports ours only.
 void keep_driver_for_leak_sanitizer() {
@@ -102,30 +112,14 @@ void Window::set_fullscreen(bool on) {
 }
 void Window::capture_mouse(bool on) { SDL_SetRelativeMouseMode(on ? SDL_TRUE : SDL_FALSE); }
 
-int Window::width() const {
-  int width = 0;
-  SDL_GetWindowSize(window_.get(), &width, nullptr);
-  return width;
-}
-int Window::height() const {
-  int height = 0;
-  SDL_GetWindowSize(window_.get(), nullptr, &height);
-  return height;
-}
+int Window::width() const { return size_by(SDL_GetWindowSize, window_.get()).width; }
+int Window::height() const { return size_by(SDL_GetWindowSize, window_.get()).height; }
 bool Window::minimised() const {
   return (SDL_GetWindowFlags(window_.get()) & SDL_WINDOW_MINIMIZED) != 0 || pixel_width() == 0 ||
          pixel_height() == 0;
 }
-int Window::pixel_width() const {
-  int width = 0;
-  SDL_GL_GetDrawableSize(window_.get(), &width, nullptr);
-  return width;
-}
-int Window::pixel_height() const {
-  int height = 0;
-  SDL_GL_GetDrawableSize(window_.get(), nullptr, &height);
-  return height;
-}
+int Window::pixel_width() const { return size_by(SDL_GL_GetDrawableSize, window_.get()).width; }
+int Window::pixel_height() const { return size_by(SDL_GL_GetDrawableSize, window_.get()).height; }
 float Window::pixel_ratio() const {
   return width() > 0 ? static_cast<float>(pixel_width()) / static_cast<float>(width()) : 1.0f;
 }

@@ -105,4 +105,5 @@ JFPX_HD inline LatticeTerms column_terms(const LatticeSphere& b) {
   const LatticeParts power = parts_of(power_of_origin(b));
   return {{b.x, b.y, b.z, b.radius, power.upper, power.lower, kUpperPart, 1}};
 }
+
 }  // namespace jfpx::inline JFPX_ABI::cuda
