@@ -140,8 +140,7 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
 
   const std::uint32_t total = scan_rows(s);
   const bool complete = total <= args.output.capacity;
-  const unsigned valid_before = warp_max(s.valid_before[lane_id() % kWarps]);
-  const std::uint32_t invalid = valid_before == 0 ? kNoSphere : ~valid_before;
+  const std::uint32_t invalid = first_invalid(warp_max(s.valid_before[lane_id() % kWarps]));
   if (one) write_count(args.output, total, invalid, complete);
   if (!complete || invalid != kNoSphere) return;
 #pragma unroll

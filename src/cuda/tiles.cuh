@@ -117,8 +117,11 @@ __device__ inline bool is_valid(const SphereInstance& s) {
 __device__ inline void report_invalid(SearchState* state, std::uint32_t i) {
   atomicMax(&state->valid_before, ~i);
 }
+__device__ inline std::uint32_t first_invalid(std::uint32_t valid_before) {
+  return valid_before == 0 ? kNoSphere : ~valid_before;
+}
 __device__ inline std::uint32_t first_invalid(const SearchState* state) {
-  return state->valid_before == 0 ? kNoSphere : ~state->valid_before;
+  return first_invalid(state->valid_before);
 }
 
 /// Writes the contact of the pair a < b, which is known to touch, to place `at` of the output.
