@@ -45,8 +45,8 @@ __device__ inline unsigned lane_id() { return threadIdx.x % 32; }
 __device__ inline unsigned lanes_below() { return (1u << lane_id()) - 1; }
 
 /// Sum, maximum and union over a warp; every lane gets it.
-template <typename Combine>
-__device__ inline unsigned warp_reduce(unsigned value, Combine combine) {
+template <typename T, typename Combine>
+__device__ inline T warp_reduce(T value, Combine combine) {
   for (unsigned d = 16; d != 0; d /= 2) {
     value = combine(value, __shfl_xor_sync(kFullWarp, value, static_cast<int>(d)));
   }
@@ -68,11 +68,7 @@ __device__ inline Real warp_max(Real x) {
   return std::bit_cast<Real>(
       in_order(__reduce_max_sync(kFullWarp, in_order(std::bit_cast<int>(x)))));
 #else
-  for (unsigned d = 16; d != 0; d /= 2) {
-    const Real other = __shfl_xor_sync(kFullWarp, x, static_cast<int>(d));
-    x = other > x ? other : x;
-  }
-  return x;
+  return warp_reduce(x, [](Real p, Real q) { return q > p ? q : p; });
 #endif
 }
 
