@@ -2,6 +2,7 @@
 #include "src/bullet/pair_check.hpp"
 
 #include "src/bullet/body_wrapper.hpp"
+#include "src/bullet/contact_point.hpp"
 
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
@@ -58,10 +59,15 @@ std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDisp
   compare("touching", expected ? 1 : 0, accepted ? 1 : 0);
   if (expected && accepted) {
     const btManifoldPoint& point = scratch.getContactPoint(0);
-    compare("distance", point.m_distance1, contact->distance);
-    compare("normal.x", point.m_normalWorldOnB.x(), contact->normal.x);
-    compare("normal.y", point.m_normalWorldOnB.y(), contact->normal.y);
-    compare("normal.z", point.m_normalWorldOnB.z(), contact->normal.z);
+    const btVector3& normal = point.m_normalWorldOnB;
+    const PairContact stock{{normal.x(), normal.y(), normal.z()}, point.m_distance1, contact->pair};
+    compare("contact is finite", has_stocks_bits(stock), has_stocks_bits(*contact));
+    if (has_stocks_bits(*contact)) {
+      compare("distance", stock.distance, contact->distance);
+      compare("normal.x", stock.normal.x, contact->normal.x);
+      compare("normal.y", stock.normal.y, contact->normal.y);
+      compare("normal.z", stock.normal.z, contact->normal.z);
+    }
   }
   if (manifold != nullptr) {
     compare("number of points", scratch.getNumContacts(), manifold->getNumContacts());

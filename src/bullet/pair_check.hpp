@@ -13,7 +13,8 @@ namespace jfpx::inline JFPX_ABI::bullet {
 
 /// Runs btSphereSphereCollisionAlgorithm on a scratch manifold and compares the outcome with the
 /// collider's contact, null if it found none, and, unless `manifold` is null, with the manifold as
-/// it is now. Global contact callbacks are taken off meanwhile.
+/// it is now. Of a contact that is left to Bullet (has_stocks_bits()) the collider's numbers may be
+/// others. Global contact callbacks are taken off meanwhile.
 /// @return the first field that differs.
 std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDispatcherInfo& info,
                                           const btCollisionObject& body_a,

@@ -68,7 +68,6 @@ TEST(PairMirror, ForgetsAllWhenMostManifoldsGoAtOnce) {
 
 TEST(PairMirror, NumbersBodiesAnewWhenMostHaveGone) {
   Twins twins;
-  Random random(7);
   for (int round = 0; round < 8; ++round) {
     // Some hundred new bodies a round take the numbers past what the living ones need.
     twins.both([&](BulletWorld& w) {

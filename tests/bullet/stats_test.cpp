@@ -145,17 +145,18 @@ TEST(OddCollider, MayHaveNaNsOfItsOwn) {
   constexpr btScalar kNan = std::numeric_limits<btScalar>::quiet_NaN();
   const std::vector<btScalar> values = {0, kInf, -kInf, kNan, btScalar(0.5)};
   int nans = 0;
+  const auto negate_nans = [&](std::span<PairResult> results) {
+    for (PairResult& r : results) {
+      for (Real* x : {&r.normal.x, &r.normal.y, &r.normal.z, &r.distance}) {
+        if (*x == *x) continue;
+        ++nans;
+        *x = -*x;
+      }
+    }
+  };
   for (const bool heard : {false, true}) {  // both ways to write contacts
     gContactAddedCallback = heard ? hear_nothing : nullptr;
-    Twins twins(with_collider([&](std::span<PairResult> results) {
-      for (PairResult& r : results) {
-        for (Real* x : {&r.normal.x, &r.normal.y, &r.normal.z, &r.distance}) {
-          if (*x == *x) continue;
-          ++nans;
-          *x = -*x;
-        }
-      }
-    }));
+    Twins twins(with_collider(negate_nans, true));
     twins.both([&](BulletWorld& w) {
       w.world.setGravity(btVector3(0, 0, 0));
       for (std::size_t i = 0; i < values.size(); ++i) {
@@ -172,8 +173,32 @@ TEST(OddCollider, MayHaveNaNsOfItsOwn) {
     const bool same = twins.dispatch();
     gContactAddedCallback = nullptr;
     ASSERT_TRUE(same) << "heard: " << heard;
+    EXPECT_GT(twins.stats().verified, 0u);
+    EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
   }
   EXPECT_GT(nans, 0);
+}
+
+/// Of two NaNs an operation returns the first, and compilers exchange operands.
+TEST(Verify, LeavesTheSignOfANaNToCompilers) {
+  constexpr btScalar kInf = std::numeric_limits<btScalar>::infinity();
+  constexpr btScalar kNan = std::numeric_limits<btScalar>::quiet_NaN();
+  const std::vector<btScalar> values = {kNan, -kNan, kInf, -kInf, btScalar(0.5)};
+  const std::size_t count = values.size() * values.size() * values.size();
+  Twins twins(with_collider([](std::span<PairResult>) {}, true));
+  twins.both([&](BulletWorld& w) {
+    for (std::size_t i = 0; i < count; ++i) w.add_sphere(btScalar(0.5), btVector3(0, 0, 0));
+  });
+  ASSERT_TRUE(twins.dispatch());
+  twins.both([&](BulletWorld& w) {
+    for (std::size_t i = 0; i < count; ++i) {
+      w.bodies[i]->getWorldTransform().setOrigin(
+          btVector3(values[i % 5], values[i / 5 % 5], values[i / 25]));
+    }
+  });
+  ASSERT_TRUE(twins.dispatch());
+  EXPECT_EQ(twins.stats().verified, count * (count - 1) / 2);
+  EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
 }
 
 TEST(FailingCollider, NullIsAnError) {
