@@ -1,7 +1,10 @@
 /// Random Bullet worlds never show which dispatcher they have.
 #include "tests/bullet/stock_elsewhere.hpp"
+#include "tests/support/bytes.hpp"
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <sstream>
 
@@ -91,6 +94,28 @@ TEST(RandomWorlds, ShowAnErrorOfOneBitAndShrinkToTwoBodies) {
   EXPECT_EQ(fewest_bodies, 2u) << shrunk.str();
   EXPECT_LE(fewest_events, 2u) << shrunk.str();
   EXPECT_GT(failed, 3) << "most worlds with touching spheres must fail";
+}
+
+RandomWorld fuzzed_world(const char* input) {
+  std::ifstream file(JFPX_DISPATCHER_CORPUS + std::string(input), std::ios::binary);
+  EXPECT_TRUE(file) << input;
+  const std::vector<char> text{std::istreambuf_iterator<char>(file), {}};
+  const std::vector<std::uint8_t> bytes(text.begin(), text.end());
+  test::Bytes draws(bytes);
+  return make_random_world(draws);
+}
+bool parts_from_itself(const RandomWorld& world) {
+  return stock_parts_from_stock(world.steps,
+                                [&] { return run(world, nullptr, DispatcherElsewhere::make); });
+}
+
+/// Leftovers that are the same everywhere make no difference in this world.
+TEST(AccidentsOfStock, AreFoundWhereOnlyDifferentLeftoversShowThem) {
+  EXPECT_TRUE(
+      parts_from_itself(fuzzed_world(sizeof(Real) == 4 ? "huge-leftovers" : "coincident-capsule")));
+}
+TEST(AccidentsOfStock, AreNotSeenWhereNoneAre) {
+  EXPECT_FALSE(parts_from_itself(fuzzed_world("seed-0")));
 }
 
 TEST(RandomWorlds, AreTheSameForTheSameSeed) {

@@ -34,6 +34,8 @@ jfpx_add_test(bullet_random_worlds_test SOURCES
   ${random_worlds}
   bullet/random_worlds_test.cpp
   LINK jfpx_bullet)
+set_source_files_properties(bullet/random_worlds_test.cpp PROPERTIES
+  COMPILE_DEFINITIONS "JFPX_DISPATCHER_CORPUS=\"${CMAKE_CURRENT_SOURCE_DIR}/fuzz/corpus/dispatcher/\"")
 jfpx_add_test(bullet_solver_test SOURCES
   ${random_worlds}
   bullet/solver_test.cpp

@@ -49,15 +49,6 @@ inline std::uint64_t wanted_world_steps(std::uint64_t in_slow_builds, std::uint6
   return kSlow ? in_slow_builds : otherwise;
 }
 
-/// Leaves bytes on the stack for those who read it uninitialised: Bullet's penetration depth solver
-/// (EPA) alone has frames of 40 KB in double. AddressSanitizer would leave gaps around the array.
-template <int kFill>
-[[gnu::noinline, gnu::no_sanitize_address]] void fill_stack() {
-  constexpr std::uint64_t kEightTimes = std::uint64_t{kFill} * 0x0101010101010101;
-  volatile std::uint64_t leftovers[8192];
-  for (volatile std::uint64_t& eight : leftovers) eight = kEightTimes;
-}
-
 /// Who makes the parts of a world that a test may replace.
 struct WorldParts {
   std::function<std::unique_ptr<btSequentialImpulseConstraintSolver>()> solver = [] {
