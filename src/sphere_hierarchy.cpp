@@ -176,11 +176,11 @@ void SphereHierarchy::unlink(Index leaf) {
   refit_up(above);
 }
 
-void SphereHierarchy::replace_child(Index parent, Index old, Index by) {
-  if (parent == kNone) {
+void SphereHierarchy::replace_child(Index above, Index old, Index by) {
+  if (above == kNone) {
     root_ = by;
   } else {
-    nodes_[parent].child[nodes_[parent].child[0] == old ? 0 : 1] = by;
+    nodes_[above].child[nodes_[above].child[0] == old ? 0 : 1] = by;
   }
 }
 

@@ -10,7 +10,7 @@ template <class PassOn>
 void spread(std::span<const Contact> contacts, const PassOn& pass_on) {
   for (bool changed = true; changed;) {
     changed = false;
-    for (std::size_t i = 0; i < contacts.size(); ++i) changed |= pass_on(contacts[i]);
+    for (const Contact& contact : contacts) changed |= pass_on(contact);
     if (!changed) return;
     for (std::size_t i = contacts.size(); i-- > 0;) changed |= pass_on(contacts[i]);
   }

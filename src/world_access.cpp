@@ -68,6 +68,8 @@ bool World::awake(BodyId id) const {
   return impl_->bodies.moving.awake[impl_->bodies.require(id)] != 0;
 }
 
+void World::wake(BodyId id) { impl_->bodies.wake(impl_->bodies.require(id)); }
+
 Real World::mass(BodyId id) const { return impl_->bodies.mass(impl_->bodies.require(id)); }
 
 Mat3 World::inverse_inertia(BodyId id) const {

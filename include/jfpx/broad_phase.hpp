@@ -74,7 +74,7 @@ class JFPX_API SphereHierarchy {
   void set_sphere(Index leaf, const SphereInstance& sphere);
   void link(Index leaf);
   void unlink(Index leaf);
-  void replace_child(Index parent, Index old, Index by);
+  void replace_child(Index above, Index old, Index by);
   void refit(Index node);
   void refit_up(Index node);
   void take_apart(Index node);

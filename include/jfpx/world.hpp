@@ -78,7 +78,8 @@ struct StepReport {
 class JFPX_API World {
  public:
   /// Validates the scene. Half-spaces and planes must be immovable.
-  /// @throws InvalidScene, BackendUnavailable, OutOfMemory
+  /// @throws InvalidScene, BackendUnavailable, OutOfMemory; InvalidArgument for a bad setting;
+  ///   BuildMismatch (build.hpp)
   explicit World(const Scene& scene, const WorldSettings& settings = {});
   /// The same with sphere contacts from the given collider, which may be the caller's own.
   /// @throws InvalidArgument if it is null, InvalidScene, OutOfMemory
@@ -112,7 +113,11 @@ class JFPX_API World {
   /// @throws InvalidArgument for an unknown id or a value out of the range of validate().
   void set_state(BodyId id, const BodyState& state);
   /// Of mass 0, only kinematic bodies are awake, while they move.
+  /// @throws InvalidArgument for an unknown id, as do mass() and inverse_inertia().
   bool awake(BodyId id) const;
+  /// Wakes the body, as a push does; one of mass 0 stays as it is. Whom it then touches wakes too.
+  /// @throws InvalidArgument for an unknown id.
+  void wake(BodyId id);
   Real mass(BodyId id) const;  ///< [kg]; 0: immovable or kinematic
   /// [1/(kg m^2)], world axes, about the centre of mass; zero for mass 0.
   Mat3 inverse_inertia(BodyId id) const;
@@ -136,7 +141,8 @@ class JFPX_API World {
     if constexpr (CheckedForce<F>) force.validate(force_context());
     return add_any(std::move(force));
   }
-  /// The force, to steer it: world.force<AeroControl>(id).control = 1.
+  /// The force, to steer it: world.force<AeroControl>(id).control = 1. A change is not validated
+  /// and wakes nobody: wake() does, where bodies that sleep shall feel it.
   /// @throws InvalidArgument if the id is unknown or of a force of another type.
   template <Force F>
   F& force(ForceId id) {
@@ -153,7 +159,8 @@ class JFPX_API World {
   ContactGeneratorId add_contact_generator(G generator) {
     return add_any_generator(std::move(generator));
   }
-  /// The generator, to change it. @throws InvalidArgument if the id is unknown or of another type.
+  /// The generator, to change it, which wakes nobody.
+  /// @throws InvalidArgument if the id is unknown or of another type.
   template <ContactGenerator G>
   G& contact_generator(ContactGeneratorId id) {
     if (G* found = any_generator(id).template target<G>()) return *found;

@@ -41,10 +41,10 @@ JFPX_HD inline void add_prism(const Vec3 (&a)[3], const Vec3 (&b)[3], Submerged*
 /// left when the tip is cut off, again a prism. Sorts the corners.
 JFPX_HD inline void add_clipped(Corner (&c)[4], Submerged* sum) {
   int below = 0;
-  for (int i = 0; i < 4; ++i) {
-    if (c[i].height > 0) continue;
-    const Corner corner = c[i];
-    c[i] = c[below];
+  for (Corner& place : c) {
+    if (place.height > 0) continue;
+    const Corner corner = place;
+    place = c[below];
     c[below++] = corner;
   }
   if (below == 0) return;

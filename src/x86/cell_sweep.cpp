@@ -68,8 +68,7 @@ void CellSweep::find_pairs(std::span<const SphereInstance> spheres, const Kernel
     bool by_cell = false;
     std::size_t next = first;
     SphereSubset targets{};
-    for (std::size_t width = kWidest;; width /= 2) {
-      next = first;
+    for (std::size_t width = kWidest;; width /= 2, next = first) {
       while (next < bins_.size() && bins_[next].bin + width > bins_[first].bin) ++next;
       targets = part(begin, bins_[next - 1].end);
       // Where the sum of two radii can overflow, everything touches: the claim of CellAxis fails.

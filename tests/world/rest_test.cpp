@@ -1,4 +1,7 @@
 /// Worlds that come to rest: nothing sinks, nothing trembles, sleepers sleep and wake.
+#include <jfpx/error.hpp>
+#include <jfpx/force.hpp>
+
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
@@ -146,6 +149,25 @@ TEST(Sleep, TheSurroundingsWakeNobody) {
   const auto before = world.states();
   for (int n = 0; n < 60; ++n) EXPECT_EQ(world.step().awake, 0u);
   EXPECT_EQ(world.states(), before);
+}
+
+TEST(Sleep, WhoIsWokenFeelsAForceThatHasChanged) {
+  World world = sleeping_row();
+  const ForceId lift = world.add_force(Gravity{{0, 0, 0}});
+  for (int n = 0; n < 120; ++n) world.step();
+  const BodyId first = world.bodies()[0];
+  world.force<Gravity>(lift).acceleration = {0, 50, 0};
+  EXPECT_EQ(world.step().awake, 0u) << "a change alone wakes nobody";
+  world.wake(first);
+  EXPECT_TRUE(world.awake(first));
+  for (int n = 0; n < 10; ++n) world.step();
+  EXPECT_GT(world.state(first).velocity.y, 1);
+  EXPECT_FALSE(world.awake(world.bodies()[1]));
+  const BodyId ground = world.bodies()[4];
+  world.wake(ground);
+  EXPECT_FALSE(world.awake(ground)) << "of mass 0";
+  world.remove(first);
+  EXPECT_THROW(world.wake(first), InvalidArgument);
 }
 
 TEST(Sleep, WhoLosesTheSupportWakesAndFalls) {
