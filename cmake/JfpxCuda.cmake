@@ -26,6 +26,14 @@ if(NOT CMAKE_CUDA_COMPILER)
 endif()
 
 enable_language(CUDA)
+if(CMAKE_CUDA_COMPILER_VERSION VERSION_LESS 12)
+  if(JFPX_CUDA STREQUAL "ON")
+    message(FATAL_ERROR "JFPX_CUDA=ON, but nvcc is ${CMAKE_CUDA_COMPILER_VERSION}, and C++20 takes 12 or newer. "
+      "Set CUDACXX to a newer one, or configure with -DJFPX_CUDA=OFF.")
+  endif()
+  jfpx_summary(cuda off "nvcc ${CMAKE_CUDA_COMPILER_VERSION} is too old, C++20 takes 12")
+  return()
+endif()
 find_package(CUDAToolkit REQUIRED)
 set(JFPX_HAS_CUDA ON)
 # CMake 3.25 does not know CUDA20: the flag is given by hand (CUDA_STANDARD would decay to 17).

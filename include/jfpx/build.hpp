@@ -37,7 +37,9 @@ enum class Build : std::uint64_t {
                                         sizeof(detail::LayoutProbe))
 };
 
-/// Called wherever a world or a collider is made; a program may call it earlier.
+/// Called by make_sphere_collider(), and so by worlds that make their collider, by
+/// DeviceSphereCollider and by what of jfpx::bullet replaces a part of Bullet. A program may call
+/// it earlier.
 /// @throws BuildMismatch that says how `headers` and the library differ. Thread-safe.
 JFPX_API void verify_build(Build headers = Build::of_these_headers);
 

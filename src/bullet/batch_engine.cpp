@@ -75,6 +75,7 @@ BatchEngine::BatchEngine(std::unique_ptr<SphereCollider> collider, const Dispatc
       minimum_batch_(options.minimum_batch),
       verify_(options.verify),
       pool_(options.collider.threads) {
+  verify_build(options.collider.headers);
   if (collider_ == nullptr) throw InvalidArgument("collider is null; it must be a SphereCollider");
   if (options.fuses_products) {
     stats_.warning =

@@ -39,6 +39,7 @@ class JFPX_API BatchEngine {
   bool verify() const noexcept { return verify_; }
   void set_verify(bool on) noexcept { verify_ = on; }
   Backend backend() const noexcept { return collider_->backend(); }
+  ChoiceReason reason() const noexcept { return collider_->reason(); }
   const DispatchStats& stats() const noexcept { return stats_; }
   void reset_stats();
 

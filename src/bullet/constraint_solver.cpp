@@ -31,11 +31,13 @@ constexpr std::size_t kBlocksAChunk = 16;
 /// SOLVER_SIMD means nothing on Linux; SOLVER_FRICTION_SEPARATE and SOLVER_CACHE_FRIENDLY nowhere.
 constexpr int kUnsupportedModes = SOLVER_RANDMIZE_ORDER | SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
 
-unsigned checked_threads(unsigned threads) {
-  if (threads > 256) {
-    throw InvalidArgument("threads is " + std::to_string(threads) + "; it must be at most 256");
+unsigned checked_threads(const ConstraintSolverOptions& options) {
+  verify_build(options.headers);
+  if (options.threads > 256) {
+    throw InvalidArgument("threads is " + std::to_string(options.threads) +
+                          "; it must be at most 256");
   }
-  return threads;
+  return options.threads;
 }
 
 }  // namespace
@@ -61,7 +63,7 @@ struct ConstraintSolver::Impl {
 
   Impl(ConstraintSolver& owner, const ConstraintSolverOptions& options, GroupSolverMaker make)
       : self(owner),
-        solver(checked_threads(options.threads), options.simd),
+        solver(checked_threads(options), options.simd),
         device(options.backend, std::move(make), solver.pool().threads()),
         minimum_batch(options.minimum_batch) {}
 

@@ -48,6 +48,7 @@ void CollisionDispatcher::set_minimum_batch(std::size_t pairs) noexcept {
 bool CollisionDispatcher::verify() const noexcept { return impl_->engine.verify(); }
 void CollisionDispatcher::set_verify(bool on) noexcept { impl_->engine.set_verify(on); }
 Backend CollisionDispatcher::backend() const noexcept { return impl_->engine.backend(); }
+ChoiceReason CollisionDispatcher::reason() const noexcept { return impl_->engine.reason(); }
 const DispatchStats& CollisionDispatcher::stats() const noexcept { return impl_->engine.stats(); }
 void CollisionDispatcher::reset_stats() { impl_->engine.reset_stats(); }
 

@@ -64,6 +64,7 @@ DynamicsWorld::DynamicsWorld(btDispatcher* dispatcher, btBroadphaseInterface* br
                              btConstraintSolver* solver, btCollisionConfiguration* configuration,
                              const DynamicsWorldOptions& options)
     : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration) {
+  verify_build(options.headers);
   if (options.threads > 256) {
     throw InvalidArgument("threads is " + std::to_string(options.threads) +
                           "; it must be at most 256");

@@ -221,8 +221,9 @@ void DeviceSphereCollider::Impl::find_in_grid(const SphereInstance* d_spheres, s
   launch_grid_search(grid, output, grid_blocks, stream);
 }
 
-DeviceSphereCollider::DeviceSphereCollider(Stream stream, int device, SphereAlgorithm algorithm)
-    : impl_(std::make_unique<Impl>(stream, device, algorithm)) {}
+DeviceSphereCollider::DeviceSphereCollider(Stream stream, int device, SphereAlgorithm algorithm,
+                                           Build headers)
+    : impl_((verify_build(headers), std::make_unique<Impl>(stream, device, algorithm))) {}
 DeviceSphereCollider::~DeviceSphereCollider() = default;
 DeviceSphereCollider::DeviceSphereCollider(DeviceSphereCollider&&) noexcept = default;
 DeviceSphereCollider& DeviceSphereCollider::operator=(DeviceSphereCollider&&) noexcept = default;

@@ -1,4 +1,6 @@
 /// The dispatcher's counters, its fallbacks with reasons, and that verify finds planted errors.
+#include <jfpx/bullet/constraint_solver.hpp>
+#include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/error.hpp>
 
 #include "src/bullet/convex_check.hpp"
@@ -25,6 +27,7 @@ class SpoiledCollider : public SphereCollider {
   }
   Backend backend() const noexcept override { return Backend::x86; }
   SphereAlgorithm algorithm() const noexcept override { return SphereAlgorithm::automatic; }
+  ChoiceReason reason() const noexcept override { return ChoiceReason::kept; }
 
  private:
   Spoil spoil_;
@@ -109,13 +112,34 @@ TEST(DispatchStats, EveryFallbackHasItsOwnText) {
   EXPECT_EQ(std::count(texts.begin(), texts.end(), "unknown"), 0);
 }
 
+/// A user may take any one of the three, and makes the collider for another library perhaps.
+TEST(BuildCheck, IsDoneByWhatReplacesAPartOfBullet) {
+  const Build other{detail::pack_build(JFPX_VERSION_MAJOR, JFPX_VERSION_MINOR + 1, sizeof(Real),
+                                       sizeof(detail::LayoutProbe))};
+  btDefaultCollisionConfiguration configuration;
+  EXPECT_THROW(CollisionDispatcher(&configuration, {.collider = {.headers = other}}),
+               BuildMismatch);
+  EXPECT_THROW(
+      CollisionDispatcher(&configuration, make_sphere_collider(), {.collider = {.headers = other}}),
+      BuildMismatch);
+  EXPECT_THROW(ConstraintSolver({.headers = other}), BuildMismatch);
+  CollisionDispatcher dispatcher(&configuration);
+  btDbvtBroadphase broadphase;
+  ConstraintSolver solver;
+  EXPECT_THROW(DynamicsWorld(&dispatcher, &broadphase, &solver, &configuration, {.headers = other}),
+               BuildMismatch);
+}
+
 TEST(FailingCollider, IsGivenUpAndTheBitsStay) {
   int calls = 0;
   Twins twins(with_collider([&](std::span<PairResult>) {
     if (++calls == 10) throw DeviceError("the device is gone");
   }));
   twins.both([](BulletWorld& w) { add_heap(w, 50, 51); });
-  ASSERT_TRUE(twins.step(30));
+  ASSERT_TRUE(twins.step(5));
+  EXPECT_EQ(twins.ours().ours()->reason(), ChoiceReason::kept) << "what the collider says";
+  ASSERT_TRUE(twins.step(25));
+  EXPECT_EQ(twins.ours().ours()->reason(), ChoiceReason::fixed);
   EXPECT_EQ(calls, 10) << "it must not be asked again";
   EXPECT_EQ(twins.stats().batches, 30u) << "x86 must take over in the same dispatch";
   EXPECT_EQ(twins.stats().device_failure, "the device is gone");

@@ -23,6 +23,12 @@ TEST(CudaBackend, WithoutADeviceItIsUnavailableAndSaysWhy) {
   EXPECT_EQ(make_sphere_collider({})->backend(), Backend::x86);
 }
 
+TEST(CudaBackend, HeadersOfAnotherBuildAreRefusedBeforeTheDeviceIsAsked) {
+  const Build other{detail::pack_build(JFPX_VERSION_MAJOR, JFPX_VERSION_MINOR + 1, sizeof(Real),
+                                       sizeof(detail::LayoutProbe))};
+  EXPECT_THROW(DeviceSphereCollider(nullptr, 0, SphereAlgorithm::automatic, other), BuildMismatch);
+}
+
 TEST(CudaBackend, ADeviceThatIsNotThereIsUnavailable) {
   EXPECT_FALSE(probe(1000).usable);
   EXPECT_FALSE(probe(-1).usable);

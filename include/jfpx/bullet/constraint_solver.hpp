@@ -19,6 +19,7 @@ class GroupSolver;
 namespace jfpx::inline JFPX_ABI::bullet {
 
 struct ConstraintSolverOptions {
+  Build headers = Build::of_these_headers;  ///< leave it: what the caller includes
   /// Who sweeps over the rows. `automatic`: x86, or a GPU where that has been faster. `cuda`: a GPU
   /// whenever it can (not groups with joints or with friction that depends on the direction).
   Backend backend = Backend::automatic;
@@ -66,9 +67,10 @@ class JFPX_API ConstraintSolver : public btSequentialImpulseConstraintSolver {
   BT_DECLARE_ALIGNED_ALLOCATOR();
 
   /// @throws InvalidArgument for more than 256 threads; BackendUnavailable if the backend is asked
-  ///   for by name and can't be had.
+  ///   for by name and can't be had; BuildMismatch (build.hpp).
   explicit ConstraintSolver(const ConstraintSolverOptions& options = {});
-  /// Uses the given device; options.backend says when.
+  /// For jfpx's own tests, which bring a device of their own: GroupSolver is not installed.
+  /// options.backend says when it is used.
   ConstraintSolver(std::unique_ptr<GroupSolver> device, const ConstraintSolverOptions& options);
   ~ConstraintSolver() override;
   ConstraintSolver(const ConstraintSolver&) = delete;

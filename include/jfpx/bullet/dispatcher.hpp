@@ -34,10 +34,10 @@ struct DispatcherOptions {
 class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
  public:
   /// @throws BackendUnavailable if options.collider asks for a backend by name that can't be had;
-  ///   InvalidArgument for a bad option.
+  ///   InvalidArgument for a bad option; BuildMismatch (build.hpp).
   explicit CollisionDispatcher(btCollisionConfiguration* configuration,
                                const DispatcherOptions& options = {});
-  /// Uses the given collider; options.collider is ignored.
+  /// Uses the given collider; of options.collider only `headers` is looked at.
   /// @throws InvalidArgument if `collider` is null.
   CollisionDispatcher(btCollisionConfiguration* configuration,
                       std::unique_ptr<SphereCollider> collider,
@@ -65,6 +65,8 @@ class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
 
   /// Who tested the last batch of sphere pairs.
   Backend backend() const noexcept;
+  /// Why that one did.
+  ChoiceReason reason() const noexcept;
 
   const DispatchStats& stats() const noexcept;
   void reset_stats();  ///< keeps `failure` and `device_failure`: what failed stays given up

@@ -1,6 +1,7 @@
 /// The dynamics world that puts jfpx into a Bullet program: one line changes, every bit stays.
 #pragma once
 
+#include <jfpx/build.hpp>
 #include <jfpx/bullet/abi.hpp>
 
 #include <BulletDynamics/Dynamics/btDiscreteDynamicsWorld.h>
@@ -11,7 +12,8 @@
 namespace jfpx::inline JFPX_ABI::bullet {
 
 struct DynamicsWorldOptions {
-  unsigned threads = 1;           ///< 0: one per core, at most 256
+  Build headers = Build::of_these_headers;  ///< leave it: what the caller includes
+  unsigned threads = 1;                     ///< 0: one per core, at most 256
   std::size_t minimum_batch = 0;  ///< bodies below which a step is left to Bullet's own code
 };
 
@@ -31,7 +33,7 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
   BT_DECLARE_ALIGNED_ALLOCATOR();
 
   /// As Bullet's: the parts are the caller's, but a null solver becomes one that the world owns.
-  /// @throws InvalidArgument for more than 256 threads.
+  /// @throws InvalidArgument for more than 256 threads; BuildMismatch (build.hpp).
   DynamicsWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
                 btConstraintSolver* solver, btCollisionConfiguration* configuration,
                 const DynamicsWorldOptions& options = {});

@@ -30,9 +30,11 @@ class JFPX_API DeviceSphereCollider {
  public:
   /// Works on `device`, enqueues on `stream`, which must belong to that device, outlive the object
   /// and not be capturing.
-  /// @throws BackendUnavailable with the reason if the device can't be used, DeviceError.
+  /// @throws BackendUnavailable with the reason if the device can't be used, DeviceError;
+  ///   BuildMismatch (build.hpp) by `headers`, which is to be left as it is.
   explicit DeviceSphereCollider(Stream stream, int device = 0,
-                                SphereAlgorithm algorithm = SphereAlgorithm::automatic);
+                                SphereAlgorithm algorithm = SphereAlgorithm::automatic,
+                                Build headers = Build::of_these_headers);
   ~DeviceSphereCollider();
   DeviceSphereCollider(DeviceSphereCollider&&) noexcept;
   DeviceSphereCollider& operator=(DeviceSphereCollider&&) noexcept;
