@@ -16,6 +16,7 @@ namespace {
 struct PairTables : btHashedOverlappingPairCache {
   static constexpr auto heads = &PairTables::m_hashTable;
   static constexpr auto next = &PairTables::m_next;
+  static constexpr auto ghosts = &PairTables::m_ghostPairCallback;
 };
 
 /// The cache's own hash, which is private. Were it another, each pair would be left to Bullet.
@@ -82,6 +83,8 @@ bool BoxUpdate::run(btCollisionWorld& world) {
   if (typeid(pair_cache) != typeid(btHashedOverlappingPairCache)) return false;
   auto& cache = static_cast<btHashedOverlappingPairCache&>(pair_cache);
   if (tree.m_deferedcollide || cache.getOverlapFilterCallback() != nullptr) return false;
+  // Both are called in the middle of the update, and may add and remove bodies.
+  if (cache.*PairTables::ghosts != nullptr || world.getDebugDrawer() != nullptr) return false;
   const int leaves = tree.m_sets[0].m_leaves + tree.m_sets[1].m_leaves;
   if (!make_room(static_cast<std::size_t>(leaves))) return false;
 

@@ -16,8 +16,8 @@ namespace jfpx::inline JFPX_ABI::bullet {
 class JFPX_API BoxUpdate {
  public:
   /// btCollisionWorld::updateAabbs(). False, and nothing is done, if the broadphase is not Bullet's
-  /// own tree over Bullet's own hash table, as it is by default, if the user filters pairs, or if
-  /// there is no memory.
+  /// own tree over Bullet's own hash table, as it is by default, if the user filters or hears of
+  /// pairs or draws, or if there is no memory.
   bool run(btCollisionWorld& world);
 
  private:

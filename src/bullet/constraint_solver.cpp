@@ -14,7 +14,10 @@
 #include <LinearMath/btQuickprof.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cstddef>
+#include <cstring>
 #include <new>
 #include <optional>
 #include <span>
@@ -31,19 +34,26 @@ constexpr std::size_t kBlocksAChunk = 16;
 /// SOLVER_SIMD means nothing on Linux; SOLVER_FRICTION_SEPARATE and SOLVER_CACHE_FRIENDLY nowhere.
 constexpr int kUnsupportedModes = SOLVER_RANDMIZE_ORDER | SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
 
-unsigned checked_threads(const ConstraintSolverOptions& options) {
-  verify_build(options.headers);
-  if (options.threads > 256) {
-    throw InvalidArgument("threads is " + std::to_string(options.threads) +
-                          "; it must be at most 256");
-  }
-  return options.threads;
+/// Where a call of a virtual function leads, by the Itanium C++ ABI that g++ and clang follow: the
+/// pointer to a virtual member is one more than its offset in the table.
+template <class Member>
+const void* target(const void* object, Member member) {
+  std::ptrdiff_t offset;
+  std::memcpy(&offset, &member, sizeof offset);
+  const char* table;
+  std::memcpy(&table, object, sizeof table);
+  const void* function;
+  std::memcpy(&function, table + (offset - 1), sizeof function);
+  return function;
 }
 
 }  // namespace
 
 struct ConstraintSolver::Impl {
+  using Steps = std::array<const void*, 7>;
+
   ConstraintSolver& self;
+  const Steps own_steps;  ///< of this very class
   x86::RowSolver solver;
   DeviceGroups device;
   std::size_t minimum_batch;
@@ -62,13 +72,26 @@ struct ConstraintSolver::Impl {
   bool on_device = false;
 
   Impl(ConstraintSolver& owner, const ConstraintSolverOptions& options, GroupSolverMaker make)
-      : self(owner),
-        solver(checked_threads(options), options.simd),
+      : self((verify_build(options.headers), owner)),
+        own_steps(steps()),
+        solver(options.threads, options.simd),
         device(options.backend, std::move(make), solver.pool().threads()),
         minimum_batch(options.minimum_batch) {}
 
+  /// The steps of Bullet's solver that are not gone here one by one, as the object has them now.
+  Steps steps() const {
+    return {target(&self, &ConstraintSolver::convertContacts),
+            target(&self, &ConstraintSolver::convertBodies),
+            target(&self, &ConstraintSolver::solveSingleIteration),
+            target(&self, &ConstraintSolver::solveGroupCacheFriendlySetup),
+            target(&self, &ConstraintSolver::solveGroupCacheFriendlyIterations),
+            target(&self, &ConstraintSolver::solveGroupCacheFriendlySplitImpulseIterations),
+            target(&self, &ConstraintSolver::solveGroupCacheFriendlyFinish)};
+  }
+
   std::optional<SolverFallback> obstacle(int manifold_count) const {
     if (static_cast<std::size_t>(manifold_count) < minimum_batch) return SolverFallback::small;
+    if (steps() != own_steps) return SolverFallback::overridden;
     if ((info->m_solverMode & kUnsupportedModes) != 0 || info->m_numIterations <= 0) {
       return SolverFallback::mode;
     }
@@ -468,8 +491,8 @@ void ConstraintSolver::reset_stats() {
 
 std::string_view to_string(SolverFallback fallback) noexcept {
   constexpr std::string_view kTexts[kSolverFallbacks] = {
-      "small group",           "solver mode", "row solver replaced",
-      "class of a constraint", "not finite",  "out of memory"};
+      "small group",           "step overridden", "solver mode",  "row solver replaced",
+      "class of a constraint", "not finite",      "out of memory"};
   const auto i = static_cast<std::size_t>(fallback);
   return i < kSolverFallbacks ? kTexts[i] : "unknown";
 }

@@ -32,6 +32,7 @@ struct ContactCheck::Impl {
   std::vector<btCollisionObject*> bodies;  ///< spheres, in the order of their proxies' ids
   std::vector<SphereInstance> spheres;
   std::vector<bool> active;
+  bool captured = false;
   std::uint64_t compared = 0, mismatches = 0;
   std::optional<Difference> first;
 
@@ -125,6 +126,7 @@ ContactCheck& ContactCheck::operator=(ContactCheck&&) noexcept = default;
 
 void ContactCheck::capture(const btDynamicsWorld& world) {
   Impl& impl = *impl_;
+  impl.captured = true;
   impl.bodies.clear();
   impl.spheres.clear();
   impl.active.clear();
@@ -149,6 +151,7 @@ void ContactCheck::capture(const btDynamicsWorld& world) {
 
 std::uint64_t ContactCheck::compare(btDynamicsWorld& world, std::uint64_t step) {
   Impl& impl = *impl_;
+  if (!impl.captured) throw InvalidArgument("nothing was captured; call capture() before the step");
   const ContactSpan contacts = impl.collider->find_contacts(impl.spheres);
   const std::vector<BulletPoint> points = impl.points_of(world);
   std::uint64_t compared = 0;

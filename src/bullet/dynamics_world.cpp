@@ -65,10 +65,6 @@ DynamicsWorld::DynamicsWorld(btDispatcher* dispatcher, btBroadphaseInterface* br
                              const DynamicsWorldOptions& options)
     : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration) {
   verify_build(options.headers);
-  if (options.threads > 256) {
-    throw InvalidArgument("threads is " + std::to_string(options.threads) +
-                          "; it must be at most 256");
-  }
   impl_ = std::make_unique<Impl>(options);
 }
 DynamicsWorld::~DynamicsWorld() = default;
@@ -124,8 +120,13 @@ void DynamicsWorld::updateAabbs() {
   if (is_small() || !impl_->boxes.run(*this)) btDiscreteDynamicsWorld::updateAabbs();
 }
 
+bool DynamicsWorld::has_bullets_islands() const noexcept {
+  return m_islandManager != nullptr &&
+         typeid(*m_islandManager) == typeid(btSimulationIslandManager);
+}
+
 void DynamicsWorld::calculateSimulationIslands() {
-  if (is_small()) {
+  if (is_small() || !has_bullets_islands()) {
     btDiscreteDynamicsWorld::calculateSimulationIslands();
     return;
   }
@@ -147,7 +148,7 @@ void DynamicsWorld::calculateSimulationIslands() {
 
 void DynamicsWorld::solveConstraints(btContactSolverInfo& info) {
   btSimulationIslandManager& manager = *getSimulationIslandManager();
-  if (is_small() || !manager.getSplitIslands() ||
+  if (is_small() || !has_bullets_islands() || !manager.getSplitIslands() ||
       !impl_->islands.make_room(*this, m_constraints.size())) {
     btDiscreteDynamicsWorld::solveConstraints(info);
     return;

@@ -176,17 +176,26 @@ void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& un
   }
 }
 
+/// False for a class of the user's, who may override how manifolds are asked for, and may not
+/// expect to be asked from several threads.
+bool is_plain(const btDispatcher& dispatcher) {
+  const std::type_info& type = typeid(dispatcher);
+  return type == typeid(btCollisionDispatcher) || type == typeid(CollisionDispatcher);
+}
+
 /// Lists the manifolds that islands are solved with, and their islands.
 void IslandSolver::collect_manifolds(btCollisionWorld& world) {
   btDispatcher& dispatcher = *world.getDispatcher();
   const bool only_touching = world.getDispatchInfo().m_deterministicOverlappingPairs;
   const int count = dispatcher.getNumManifolds();
-  if (collect_at_once(dispatcher, only_touching)) return;
-  btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();
+  const bool plain = is_plain(dispatcher);
+  if (plain && collect_at_once(dispatcher, only_touching)) return;
+  btPersistentManifold** manifolds = plain ? dispatcher.getInternalManifoldPointer() : nullptr;
   count_ = 0;
   for (int i = 0; i < count; ++i) {
-    prefetch_manifold(manifolds, i, count);
-    btPersistentManifold* manifold = manifolds[i];
+    if (plain) prefetch_manifold(manifolds, i, count);
+    btPersistentManifold* manifold =
+        plain ? manifolds[i] : dispatcher.getManifoldByIndexInternal(i);
     if (only_touching && manifold->getNumContacts() == 0) continue;
     const btCollisionObject &a = *manifold->getBody0(), &b = *manifold->getBody1();
     if (a.getActivationState() == ISLAND_SLEEPING && b.getActivationState() == ISLAND_SLEEPING) {
@@ -201,11 +210,9 @@ void IslandSolver::collect_manifolds(btCollisionWorld& world) {
   }
 }
 
-/// The same on all threads, in chunks. Not where kinematic objects wake others, nor with a
-/// dispatcher of the user's, who may not expect to be asked from several threads.
+/// The same on all threads, in chunks, of a plain dispatcher. Not where kinematic objects wake
+/// others.
 bool IslandSolver::collect_at_once(btDispatcher& dispatcher, bool only_touching) {
-  const std::type_info& type = typeid(dispatcher);
-  if (type != typeid(btCollisionDispatcher) && type != typeid(CollisionDispatcher)) return false;
   constexpr int kChunk = kManifoldsAChunk;
   const int count = dispatcher.getNumManifolds();
   const int chunks = (count + kChunk - 1) / kChunk;

@@ -62,6 +62,11 @@ class OrderedCommit::Walk final : public btOverlapCallback {
   }
 
   bool visit(std::size_t i, btBroadphasePair& pair) {
+    // A callback may set one of its own on the way.
+    if (dispatcher_.getNearCallback() != &btCollisionDispatcher::defaultNearCallback) {
+      visit_stock(pair);
+      return false;
+    }
     const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
     switch (actions_[i]) {
       case Action::stock:

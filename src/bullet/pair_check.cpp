@@ -42,7 +42,9 @@ std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDisp
                                           const btPersistentManifold& thresholds,
                                           const btPersistentManifold* manifold) {
   const CallbacksOff callbacks_off;
-  btPersistentManifold scratch(&body_a, &body_b, 0, thresholds.getContactBreakingThreshold(),
+  // Users may have exchanged the bodies of the manifold.
+  btPersistentManifold scratch(thresholds.getBody0(), thresholds.getBody1(), 0,
+                               thresholds.getContactBreakingThreshold(),
                                thresholds.getContactProcessingThreshold());
   const btCollisionObjectWrapper a = wrapper_of(body_a);
   const btCollisionObjectWrapper b = wrapper_of(body_b);

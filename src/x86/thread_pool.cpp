@@ -1,14 +1,21 @@
 /// Chunks are taken from a shared counter; see the header.
 #include "src/x86/thread_pool.hpp"
 
+#include <jfpx/error.hpp>
+
 #include <algorithm>
+#include <string>
 #include <system_error>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI::x86 {
 
 ThreadPool::ThreadPool(unsigned threads) {
-  if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
+  if (threads > kMost) {
+    throw InvalidArgument("threads is " + std::to_string(threads) + "; it must be at most " +
+                          std::to_string(kMost));
+  }
+  if (threads == 0) threads = std::clamp(std::thread::hardware_concurrency(), 1u, kMost);
   workers_.reserve(threads - 1);
   try {
     while (workers_.size() + 1 < threads) {

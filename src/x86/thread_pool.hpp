@@ -17,7 +17,10 @@ namespace jfpx::inline JFPX_ABI::x86 {
 /// The caller is one of the threads; the others sleep between loops. One loop at a time.
 class JFPX_API ThreadPool {
  public:
+  static constexpr unsigned kMost = 256;
+
   /// @param threads 0: one per core. Fewer are started where the system refuses more.
+  /// @throws InvalidArgument for more than kMost.
   explicit ThreadPool(unsigned threads);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;

@@ -66,7 +66,8 @@ WorldParts parts(unsigned threads, bool solver, bool world) {
                            btConstraintSolver* constraint_solver,
                            btCollisionConfiguration* configuration) {
       return std::make_unique<DynamicsWorld>(dispatcher, broadphase, constraint_solver,
-                                             configuration, DynamicsWorldOptions{threads});
+                                             configuration,
+                                             DynamicsWorldOptions{.threads = threads});
     };
   }
   return made;

@@ -42,6 +42,31 @@ TEST(ReplacedNearCallback, ComesAndGoesMidRun) {
   EXPECT_EQ(twins.stats().batches, 20u);
 }
 
+bool replace_near_callback(btManifoldPoint&, const btCollisionObjectWrapper*, int, int,
+                           const btCollisionObjectWrapper*, int, int) {
+  g_current->dispatcher->setNearCallback(logging_near_callback);
+  return false;
+}
+
+TEST(ReplacedNearCallback, InTheMiddleOfADispatchIsCalledForTheRest) {
+  Twins twins;
+  twins.both([](BulletWorld& w) { add_heap(w, 60, 13); });
+  ASSERT_TRUE(twins.step(10));
+  gContactAddedCallback = replace_near_callback;
+  twins.both([](BulletWorld& w) {
+    w.log.clear();
+    for (const auto& body : w.bodies) {
+      body->setCollisionFlags(body->getCollisionFlags() |
+                              btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+    }
+  });
+  const bool same = twins.dispatch();
+  gContactAddedCallback = nullptr;
+  EXPECT_TRUE(same);
+  EXPECT_GT(twins.stock().log.size(), 20u);
+  EXPECT_EQ(twins.stats().last_fallback, Fallback::none);
+}
+
 /// A user's algorithm for two spheres: Bullet's with a log.
 class LoggingAlgorithm : public btSphereSphereCollisionAlgorithm {
  public:

@@ -338,7 +338,10 @@ TEST(Situations, ManifoldsWithBodiesExchangedByHand) {
       manifold->setBodies(manifold->getBody1(), manifold->getBody0());
     }
   });
+  twins.ours().ours()->set_verify(true);
   ASSERT_TRUE(twins.dispatch());
+  EXPECT_GT(twins.stats().verified, 0u);
+  EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
 }
 
 /// Adds a pair to the cache when it is first asked about one.

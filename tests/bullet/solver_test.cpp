@@ -5,10 +5,13 @@
 
 #include "tests/bullet/stock_bits.hpp"
 
+#include <BulletCollision/CollisionDispatch/btSimulationIslandManager.h>
+
 #include <array>
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <utility>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
@@ -267,6 +270,192 @@ TEST(DynamicsWorld, HasStocksPairsInStocksOrder) {
     if (HasFatalFailure()) return;
   }
   EXPECT_GT(most, 1000u) << "too few for tables to grow";
+}
+
+/// Two worlds of 64 balls that slide on a box, stepped side by side.
+class Sliding {
+ public:
+  explicit Sliding(const WorldParts& stock, const WorldParts& ours)
+      : stock_(std::make_unique<btDefaultCollisionConfiguration>(), TwinOptions().stock,
+               TwinOptions().broadphase(), stock),
+        ours_(std::make_unique<btDefaultCollisionConfiguration>(), TwinOptions().stock,
+              TwinOptions().broadphase(), ours) {
+    for (BulletWorld* w : {&stock_, &ours_}) {
+      w->add(w->keep(new btBoxShape(btVector3(50, 1, 50))), btVector3(0, -1, 0), 0);
+      for (int i = 0; i < 64; ++i) {
+        const btVector3 place{btScalar(i % 8) - 4, btScalar(0.49), btScalar(i / 8) - 4};
+        w->add_sphere(btScalar(0.5), place)->setLinearVelocity(btVector3(1, 0, 0));
+      }
+    }
+  }
+  BulletWorld& stock() { return stock_; }
+  BulletWorld& ours() { return ours_; }
+  void expect_same(int steps) {
+    for (int i = 0; i < steps; ++i) {
+      for (BulletWorld* w : {&stock_, &ours_}) w->world.stepSimulation(btScalar(1) / 60, 0);
+      const auto difference =
+          first_difference(stock_.world, ours_.world, static_cast<std::uint64_t>(i));
+      ASSERT_FALSE(difference) << to_text(*difference);
+    }
+  }
+
+ private:
+  BulletWorld stock_, ours_;
+};
+
+/// A user's solver: takes friction away and counts the iterations.
+template <class Base>
+class Slippery final : public Base {
+ public:
+  int iterations = 0;
+
+ protected:
+  void convertContacts(btPersistentManifold** manifolds, int count,
+                       const btContactSolverInfo& info) override {
+    for (int i = 0; i < count; ++i) {
+      for (int k = 0; k < manifolds[i]->getNumContacts(); ++k) {
+        manifolds[i]->getContactPoint(k).m_combinedFriction = 0;
+      }
+    }
+    Base::convertContacts(manifolds, count, info);
+  }
+  btScalar solveSingleIteration(int iteration, btCollisionObject** bodies, int body_count,
+                                btPersistentManifold** manifolds, int manifold_count,
+                                btTypedConstraint** constraints, int constraint_count,
+                                const btContactSolverInfo& info, btIDebugDraw* drawer) override {
+    ++iterations;
+    return Base::solveSingleIteration(iteration, bodies, body_count, manifolds, manifold_count,
+                                      constraints, constraint_count, info, drawer);
+  }
+};
+
+TEST(ConstraintSolver, LeavesGroupsToASubclassThatOverridesAStep) {
+  WorldParts stock, ours;
+  stock.solver = [] { return std::make_unique<Slippery<btSequentialImpulseConstraintSolver>>(); };
+  ours.solver = [] { return std::make_unique<Slippery<ConstraintSolver>>(); };
+  Sliding worlds(stock, ours);
+  worlds.expect_same(60);
+  const auto& theirs =
+      dynamic_cast<Slippery<btSequentialImpulseConstraintSolver>&>(*worlds.stock().solver);
+  const auto& mine = dynamic_cast<Slippery<ConstraintSolver>&>(*worlds.ours().solver);
+  EXPECT_GT(theirs.iterations, 0);
+  EXPECT_EQ(mine.iterations, theirs.iterations);
+  EXPECT_EQ(mine.stats().groups, 0u);
+  EXPECT_GT(mine.stats().fallbacks[static_cast<std::size_t>(SolverFallback::overridden)], 0u);
+}
+
+struct CountingManager final : btSimulationIslandManager {
+  void storeIslandActivationState(btCollisionWorld* world) override {
+    ++stored;
+    btSimulationIslandManager::storeIslandActivationState(world);
+  }
+  int stored = 0;
+};
+/// As Bullet's own worlds of multi-bodies do, with a manager of its own.
+template <class Base>
+class WithManager final : public Base {
+ public:
+  template <class... Arguments>
+  explicit WithManager(Arguments... arguments)
+      : Base(arguments...), bullets_(this->m_islandManager) {
+    this->m_islandManager = &manager;
+  }
+  ~WithManager() override { this->m_islandManager = bullets_; }
+  CountingManager manager;
+
+ private:
+  btSimulationIslandManager* bullets_;
+};
+
+TEST(DynamicsWorld, LeavesIslandsToAManagerOfTheUsers) {
+  WorldParts stock, ours;
+  stock.world = [](auto*... parts) {
+    return std::make_unique<WithManager<btDiscreteDynamicsWorld>>(parts...);
+  };
+  ours.world = [](auto*... parts) {
+    return std::make_unique<WithManager<DynamicsWorld>>(parts...);
+  };
+  Sliding worlds(stock, ours);
+  worlds.expect_same(5);
+  EXPECT_EQ(dynamic_cast<WithManager<DynamicsWorld>&>(worlds.ours().world).manager.stored, 5);
+  EXPECT_EQ(
+      dynamic_cast<WithManager<btDiscreteDynamicsWorld>&>(worlds.stock().world).manager.stored, 5);
+}
+
+/// Adds a ball when the first pair is found after it was told to.
+struct Spawner final : btOverlappingPairCallback {
+  explicit Spawner(BulletWorld* w) : world(w) {}
+  btBroadphasePair* addOverlappingPair(btBroadphaseProxy*, btBroadphaseProxy*) override {
+    if (std::exchange(armed, false)) {
+      world->add_sphere(btScalar(0.5), btVector3(0, btScalar(1.2), 0));
+      ++spawned;
+    }
+    return nullptr;
+  }
+  void* removeOverlappingPair(btBroadphaseProxy*, btBroadphaseProxy*, btDispatcher*) override {
+    return nullptr;
+  }
+  void removeOverlappingPairsContainingProxy(btBroadphaseProxy*, btDispatcher*) override {}
+  BulletWorld* world;
+  bool armed = true;
+  int spawned = 0;
+};
+
+TEST(DynamicsWorld, HasStocksPairsWhenACallbackAddsBodies) {
+  WorldParts ours;
+  ours.world = our_world({}).world;
+  Sliding worlds({}, ours);
+  worlds.expect_same(1);
+  Spawner stock_spawner(&worlds.stock()), our_spawner(&worlds.ours());
+  worlds.stock().world.getPairCache()->setInternalGhostPairCallback(&stock_spawner);
+  worlds.ours().world.getPairCache()->setInternalGhostPairCallback(&our_spawner);
+  for (BulletWorld* w : {&worlds.stock(), &worlds.ours()}) {
+    w->bodies[20]->translate(btVector3(3, btScalar(0.6), 2));
+  }
+  worlds.expect_same(1);
+  EXPECT_EQ(stock_spawner.spawned, 1);
+  EXPECT_EQ(our_spawner.spawned, 1);
+  EXPECT_EQ(pairs_of(worlds.stock()), pairs_of(worlds.ours()));
+  worlds.expect_same(30);
+  worlds.stock().world.getPairCache()->setInternalGhostPairCallback(nullptr);
+  worlds.ours().world.getPairCache()->setInternalGhostPairCallback(nullptr);
+}
+
+/// Takes the body out that Bullet complains about: once in the life of a program.
+class Remover final : public btIDebugDraw {
+ public:
+  explicit Remover(BulletWorld* w) : world_(w) {}
+  void drawLine(const btVector3&, const btVector3&, const btVector3&) override {}
+  void drawContactPoint(const btVector3&, const btVector3&, btScalar, int,
+                        const btVector3&) override {}
+  void draw3dText(const btVector3&, const char*) override {}
+  void setDebugMode(int) override {}
+  int getDebugMode() const override { return 0; }
+  void reportErrorWarning(const char*) override {
+    for (const auto& body : world_->bodies) {
+      if (body->isInWorld() && body->getActivationState() == DISABLE_SIMULATION) {
+        world_->world.removeRigidBody(body.get());
+      }
+    }
+    ++reports;
+  }
+  int reports = 0;
+
+ private:
+  BulletWorld* world_;
+};
+
+TEST(DynamicsWorld, LetsADebugDrawerTakeBodiesOut) {
+  WorldParts ours;
+  ours.world = our_world({}).world;
+  Sliding worlds({}, ours);
+  Remover remover(&worlds.ours());
+  worlds.ours().world.setDebugDrawer(&remover);
+  worlds.ours().bodies[7]->setLinearVelocity(btVector3(0, btScalar(1e9), 0));
+  for (int i = 0; i < 5; ++i) worlds.ours().world.stepSimulation(btScalar(1) / 60, 0);
+  EXPECT_GT(remover.reports, 0) << "in a program that has had such a report before?";
+  EXPECT_FALSE(worlds.ours().bodies[7]->isInWorld());
+  worlds.ours().world.setDebugDrawer(nullptr);
 }
 
 TEST(DynamicsWorld, OwnsTheSolverThatItIsNotGiven) {

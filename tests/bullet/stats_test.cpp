@@ -225,8 +225,11 @@ TEST(Verify, LeavesTheSignOfANaNToCompilers) {
   EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
 }
 
-TEST(FailingCollider, NullIsAnError) {
+TEST(FailingCollider, NullIsAnErrorAndSoAreTooManyThreads) {
   btDefaultCollisionConfiguration configuration;
+  EXPECT_THROW(
+      CollisionDispatcher(&configuration, make_sphere_collider(), {.collider = {.threads = 257}}),
+      InvalidArgument);
   EXPECT_THROW(CollisionDispatcher(&configuration, std::unique_ptr<SphereCollider>()),
                InvalidArgument);
 }

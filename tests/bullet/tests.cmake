@@ -116,6 +116,9 @@ if(JFPX_EXAMPLES)
     add_test(NAME bullet_app${suffix} COMMAND bullet_app${suffix})
     set_tests_properties(bullet_app${suffix} PROPERTIES
       PASS_REGULAR_EXPRESSION "[1-9][0-9]* of 120 dispatches in batches; [1-9][0-9]* contacts")
+    add_test(NAME bullet_parallel${suffix} COMMAND bullet_parallel${suffix})
+    set_tests_properties(bullet_parallel${suffix} PROPERTIES
+      PASS_REGULAR_EXPRESSION "contacts by (x86|cuda) \\(.*\n.*: both times\n$")
     set(callbacks "$<TARGET_FILE:bullet_callbacks${suffix}>")
     add_test(NAME bullet_callbacks${suffix} COMMAND sh -c
       "\"${callbacks}\" && [ \"$(\"${callbacks}\")\" = \"$(\"${callbacks}\" stock)\" ]")

@@ -234,6 +234,10 @@ TEST_F(Contacts, OfASphereThatIsNotFiniteAreAnError) {
   check_.capture(a_.world);
   EXPECT_THROW(check_.compare(a_.world, 1), InvalidArgument);
 }
+TEST_F(Contacts, ThatWereNotCapturedAreAnError) {
+  ContactCheck forgotten(make_sphere_collider());
+  EXPECT_THROW(forgotten.compare(a_.world, 1), InvalidArgument);
+}
 TEST_F(Contacts, OfBodiesInAnotherOrderThanTheirProxies) {
   // Removal swaps the last body into the gap of the world's array.
   a_.add_sphere(btScalar(0.5), btVector3(0, btScalar(5.9), 0));

@@ -33,13 +33,14 @@ struct ConstraintSolverOptions {
 /// Why a group was left to Bullet's own code.
 enum class SolverFallback : std::uint8_t {
   small,        ///< fewer manifolds than the minimum
+  overridden,   ///< a subclass overrides a step of Bullet's, such as convertContacts()
   mode,         ///< random order or cached directions of friction; no iterations
   row_solver,   ///< the user has set a row solver
   constraints,  ///< a constraint of a class that is not Bullet's
   not_finite,   ///< something left the finite numbers: done again by Bullet, for its NaNs
   out_of_memory,
 };
-inline constexpr std::size_t kSolverFallbacks = 6;
+inline constexpr std::size_t kSolverFallbacks = 7;
 
 /// A short text for a table, for example "small group".
 JFPX_API std::string_view to_string(SolverFallback fallback) noexcept;

@@ -37,8 +37,8 @@ class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
   ///   InvalidArgument for a bad option; BuildMismatch (build.hpp).
   explicit CollisionDispatcher(btCollisionConfiguration* configuration,
                                const DispatcherOptions& options = {});
-  /// Uses the given collider; of options.collider only `headers` is looked at.
-  /// @throws InvalidArgument if `collider` is null.
+  /// Uses the given collider; of options.collider only `headers` and `threads` count.
+  /// @throws InvalidArgument if `collider` is null, or for more than 256 threads.
   CollisionDispatcher(btCollisionConfiguration* configuration,
                       std::unique_ptr<SphereCollider> collider,
                       const DispatcherOptions& options = {});

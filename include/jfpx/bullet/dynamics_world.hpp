@@ -23,8 +23,11 @@ struct DynamicsWorldOptions {
 /// velocities and transforms are those of btDiscreteDynamicsWorld, bit for bit.
 ///
 /// In steps with continuous collision of some body, bodies are integrated one by one, because each
-/// sees those before it at their new places. What users may override or call is as in Bullet; the
-/// island manager's own buildAndProcessIslands() is not used while islands are split.
+/// sees those before it at their new places. What users may override or call is as in Bullet; while
+/// islands are split, buildAndProcessIslands() of Bullet's own island manager and the world's
+/// protected m_solverIslandCallback are not used. Islands of another manager are left to it, and
+/// boxes to Bullet while there is a debug drawer or a ghost pair callback, which may change the
+/// world.
 ///
 /// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
 /// As in Bullet, one thread at a time; different worlds are independent.
@@ -56,6 +59,7 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
 
  private:
   bool is_small() const noexcept;
+  bool has_bullets_islands() const noexcept;
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -20,7 +20,7 @@ enum class WorldKind : std::uint8_t { stock, jfpx };
 struct SceneWorldOptions {
   DispatcherKind dispatcher = DispatcherKind::jfpx;
   DispatcherOptions dispatch = {};  ///< for DispatcherKind::jfpx
-  /// Makes the dispatcher's collider, if set: dispatch.collider is ignored then.
+  /// Makes the dispatcher's collider, if set: of dispatch.collider only `threads` counts then.
   std::function<std::unique_ptr<SphereCollider>()> make_collider = {};
   SolverKind solver = SolverKind::jfpx;
   ConstraintSolverOptions solve = {};  ///< for SolverKind::jfpx
