@@ -4,6 +4,8 @@
 #include "src/cuda/lattice.cuh"
 #include "src/cuda/tiles.cuh"
 
+#include <algorithm>
+
 namespace jfpx::inline JFPX_ABI::cuda {
 namespace {
 
@@ -118,7 +120,9 @@ void launch_all_pairs(const AllPairsArgs& args, cudaStream_t stream) {
 
 void launch_mask_emit(const MaskEmitArgs& args, cudaStream_t stream) {
   constexpr unsigned kRowsPerBlock = kEmitThreads / 32;
-  launch(mask_emit, (args.rows + kRowsPerBlock - 1) / kRowsPerBlock, 1, kEmitThreads, stream, args);
+  // Of no rows there is still the count to write.
+  const unsigned blocks = args.rows / kRowsPerBlock + (args.rows % kRowsPerBlock != 0 ? 1 : 0);
+  launch(mask_emit, std::max(blocks, 1u), 1, kEmitThreads, stream, args);
 }
 
 }  // namespace jfpx::inline JFPX_ABI::cuda

@@ -3,7 +3,9 @@
 
 #include "src/cuda/cuda_try.hpp"
 
+#include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI::cuda {
@@ -13,14 +15,19 @@ class DeviceGuard {
  public:
   explicit DeviceGuard(int device) {
     JFPX_CUDA_TRY(cudaGetDevice(&previous_));
-    if (device != previous_) JFPX_CUDA_TRY(cudaSetDevice(device));
+    if (device == previous_) return;
+    JFPX_CUDA_TRY(cudaSetDevice(device));
+    changed_ = true;
   }
-  ~DeviceGuard() { static_cast<void>(cudaSetDevice(previous_)); }
+  ~DeviceGuard() {
+    if (changed_) static_cast<void>(JFPX_CUDA_RESULT(cudaSetDevice(previous_)));
+  }
   DeviceGuard(const DeviceGuard&) = delete;
   DeviceGuard& operator=(const DeviceGuard&) = delete;
 
  private:
   int previous_ = 0;
+  bool changed_ = false;
 };
 
 /// A stream of its own, not ordered with the default stream.
@@ -86,10 +93,10 @@ template <typename T>
 class DeviceBuffer {
  public:
   void grow(const MemoryPool& pool, cudaStream_t stream, std::size_t count, const char* what) {
-    if (count > size_) {
-      memory_ = DeviceMemory(pool, stream, count * sizeof(T), what);
-      size_ = count;
-    }
+    if (count <= size_) return;
+    const std::size_t most = std::numeric_limits<std::size_t>::max() / sizeof(T);
+    memory_ = DeviceMemory(pool, stream, std::min(count, most) * sizeof(T), what);
+    size_ = count;
   }
   T* data() const noexcept { return static_cast<T*>(memory_.data()); }
   std::size_t size() const noexcept { return size_; }

@@ -8,7 +8,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdint>
 #include <string>
+#include <utility>
 
 namespace jfpx::inline JFPX_ABI::cuda {
 namespace {
@@ -17,6 +19,9 @@ namespace {
 constexpr std::size_t kMostForAllPairs = 4500;
 /// Most memory for the bit matrix of all pairs; larger searches are done in bands of rows, twice.
 constexpr std::size_t kMaskBytes = std::size_t{256} << 20;
+
+/// The grid counts twice as many in 32 bits.
+constexpr std::size_t kMostSpheres = std::size_t{1} << 31;
 
 constexpr std::size_t kMaskWords = kMaskBytes / sizeof(std::uint32_t);
 constexpr std::size_t kStateWords = sizeof(SearchState) / sizeof(std::uint32_t);
@@ -34,6 +39,12 @@ std::uint32_t table_size_for(std::size_t n) {
       std::min(std::bit_ceil(std::max<std::size_t>(2 * n, 1024)), std::size_t{1} << 31));
 }
 
+/// Kernels copy 8 bytes at a time.
+void require_words(const void* output, const char* name) {
+  if (std::bit_cast<std::uintptr_t>(output) % 8 == 0) return;
+  throw InvalidArgument(std::string("the address of the ") + name + " is not a multiple of 8");
+}
+
 int usable_device(int device) {
   const BackendStatus status = probe(device);
   if (!status.usable) throw BackendUnavailable("cuda: " + status.reason);
@@ -49,9 +60,7 @@ struct DeviceSphereCollider::Impl {
         algorithm(algorithm_to_use),
         pool(device) {
     const DeviceGuard guard(device);
-    int major = 0;
-    JFPX_CUDA_TRY(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device));
-    has_fused = fused_search_supported(major);
+    has_fused = fused_search_supported();
     grid_blocks = most_grid_blocks(device);
     reserve(0, 0);
   }
@@ -80,7 +89,7 @@ struct DeviceSphereCollider::Impl {
   MemoryPool pool;
   bool has_fused = false;
   unsigned grid_blocks = 0;
-  std::size_t spheres_reserved = 0, contacts_reserved = 0;
+  std::size_t spheres_reserved = 0, contacts_asked = 0, contacts_reserved = 0;
 
   DeviceBuffer<std::uint32_t> counters;  // SearchState, then contacts of each sphere
   DeviceBuffer<unsigned long long> offsets;
@@ -102,10 +111,16 @@ struct DeviceSphereCollider::Impl {
 };
 
 void DeviceSphereCollider::Impl::reserve(std::size_t n, std::size_t contacts) {
+  if (n > kMostSpheres) {
+    throw InvalidArgument("number of spheres is " + std::to_string(n) + "; it must be at most " +
+                          std::to_string(kMostSpheres));
+  }
   const DeviceGuard guard(device);
   const std::size_t most = std::max(n, spheres_reserved);
+  // Few spheres need no memory for contacts, but more may be asked for later.
+  contacts = std::max(contacts, contacts_asked);
   if (uses_grid(most)) {
-    const std::size_t bytes = grid_scratch_bytes(most, std::max(contacts, contacts_reserved));
+    const std::size_t bytes = grid_scratch_bytes(most, contacts);
     scratch.grow(pool, stream, bytes, "scratch memory");
   }
   if (n > spheres_reserved || counters.size() == 0) {
@@ -119,6 +134,7 @@ void DeviceSphereCollider::Impl::reserve(std::size_t n, std::size_t contacts) {
     crowded_b.grow(pool, stream, contacts, "partners of crowded spheres");
     contacts_reserved = contacts;
   }
+  contacts_asked = contacts;
 }
 
 void DeviceSphereCollider::Impl::reserve_spheres(std::size_t n) {
@@ -151,6 +167,8 @@ void DeviceSphereCollider::Impl::find(const SphereInstance* d_spheres, std::size
     throw InvalidArgument("number of spheres is " + std::to_string(n) + "; " +
                           std::to_string(spheres_reserved) + " were reserved");
   }
+  require_words(output.contacts, "contacts");
+  require_words(output.pairs, "pairs");
   const DeviceGuard guard(device);
   const auto n32 = static_cast<std::uint32_t>(n);
   if (uses_grid(n) && n > 0) {
@@ -180,7 +198,11 @@ void DeviceSphereCollider::Impl::find_among_all_pairs(const SphereInstance* d_sp
     }
   };
   for_each_band([&] { launch_all_pairs(search, stream); });
-  scan_counts(n);
+  if (n > 0) {
+    scan_counts(n);
+  } else {
+    JFPX_CUDA_TRY(cudaMemsetAsync(offsets.data(), 0, sizeof(unsigned long long), stream));
+  }
   if (band >= n) {
     launch_mask_emit(emit, stream);
     return;
@@ -224,9 +246,20 @@ void DeviceSphereCollider::Impl::find_in_grid(const SphereInstance* d_spheres, s
 DeviceSphereCollider::DeviceSphereCollider(Stream stream, int device, SphereAlgorithm algorithm,
                                            Build headers)
     : impl_((verify_build(headers), std::make_unique<Impl>(stream, device, algorithm))) {}
-DeviceSphereCollider::~DeviceSphereCollider() = default;
+DeviceSphereCollider::~DeviceSphereCollider() {
+  if (impl_ == nullptr) return;
+  try {
+    const DeviceGuard guard(impl_->device);  // whose default stream the memory may be freed on
+    impl_.reset();
+  } catch (const DeviceError&) {
+    impl_.reset();  // of a device that is lost
+  }
+}
 DeviceSphereCollider::DeviceSphereCollider(DeviceSphereCollider&&) noexcept = default;
-DeviceSphereCollider& DeviceSphereCollider::operator=(DeviceSphereCollider&&) noexcept = default;
+DeviceSphereCollider& DeviceSphereCollider::operator=(DeviceSphereCollider&& other) noexcept {
+  std::swap(impl_, other.impl_);
+  return *this;
+}
 
 void DeviceSphereCollider::reserve(std::size_t spheres, std::size_t contacts) {
   impl_->reserve(spheres, contacts);

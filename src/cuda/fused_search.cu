@@ -183,8 +183,8 @@ struct Launch {
 
 }  // namespace
 
-bool fused_search_supported(int compute_capability_major) {
-  if (compute_capability_major < 9) return false;
+bool fused_search_supported() {
+  if (!has_hopper_code()) return false;
   allow_resources();
   const Launch launch;
   int most_blocks = 0;

@@ -166,22 +166,25 @@ __global__ void __launch_bounds__(kGridThreads) crowded_phase(GridArgs args, Sea
   if (has_crowded(args, output)) emit_crowded(args, output, storage);
 }
 
-/// Launches a kernel with more shared memory than a block may have by default.
+/// Launches a kernel with more shared memory than a block may have by default. `most` is the same
+/// for all launches on a device: the limit is the kernel's, and another thread may be about to
+/// launch it.
 template <typename... Parameters, typename... Arguments>
-void launch_large(std::size_t bytes, void (*kernel)(Parameters...), unsigned blocks,
-                  unsigned threads, cudaStream_t stream, const Arguments&... arguments) {
+void launch_large(std::size_t most, std::size_t bytes, void (*kernel)(Parameters...),
+                  unsigned blocks, unsigned threads, cudaStream_t stream,
+                  const Arguments&... arguments) {
   JFPX_CUDA_TRY(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                                     static_cast<int>(bytes)));
+                                     static_cast<int>(most)));
   launch_sharing(bytes, kernel, blocks, 1, threads, stream, arguments...);
 }
 
 constexpr unsigned kFewBlocks = 132 * 4, kCrowdedBlocks = 132 * 6, kManyBlocks = kMostGridBlocks;
 
 template <bool kLarge>
-void launch_part(const GridArgs& args, cudaStream_t stream) {
+void launch_part(const GridArgs& args, std::size_t most, cudaStream_t stream) {
   using Tile = TileStorage<kLarge>;
-  launch_large(sizeof(Tile), part_phase<kLarge>, (args.n - 1) / Tile::kSpheres + 1, Tile::kThreads,
-               stream, args);
+  launch_large(most, sizeof(Tile), part_phase<kLarge>, (args.n - 1) / Tile::kSpheres + 1,
+               Tile::kThreads, stream, args);
 }
 
 /// `shared_bytes` is what a block can have.
@@ -191,9 +194,9 @@ void launch_sort(const GridArgs& args, std::size_t shared_bytes, cudaStream_t st
   const std::size_t most = shared_bytes - kOthers;
   launch(coarse_phase, kCountBlocks, 1, kCountThreads, stream, args);
   if (sizeof(TileStorage<true>) <= most) {
-    launch_part<true>(args, stream);
+    launch_part<true>(args, most, stream);
   } else {
-    launch_part<false>(args, stream);
+    launch_part<false>(args, most, stream);
   }
   // Evenly spread, a coarse bucket has between n / kCoarseBuckets spheres and twice as many. If
   // they don't fit, they are not brought into shared memory, and there is more of it for buckets.
@@ -209,9 +212,10 @@ void launch_sort(const GridArgs& args, std::size_t shared_bytes, cudaStream_t st
     room.buckets = room.buckets / 4 * 4;
   }
   if (spheres > 2048) {
-    launch_large(room.bytes(), sort_phase<1024>, args.coarse_buckets, 1024, stream, args, room);
+    launch_large(most, room.bytes(), sort_phase<1024>, args.coarse_buckets, 1024, stream, args,
+                 room);
   } else {
-    launch_large(room.bytes(), sort_phase<512>, args.coarse_buckets, 512, stream, args, room);
+    launch_large(most, room.bytes(), sort_phase<512>, args.coarse_buckets, 512, stream, args, room);
   }
 }
 

@@ -42,6 +42,10 @@ struct SearchOutput {
 
 /// cudaSuccess if this build has machine code, or code to be compiled, for the current device.
 cudaError_t kernels_loadable();
+/// Whether the code that the current device runs was compiled for Hopper or newer. Not the same as
+/// a Hopper: that one also runs what was compiled for any GPU before it, in which kernels neither
+/// wait for the one before them nor form clusters.
+bool has_hopper_code();
 
 // --- scan --------------------------------------------------------------------------------------
 
@@ -60,8 +64,9 @@ struct FusedArgs {
   std::uint32_t n;  ///< at most kFusedSpheres
   SearchOutput output;
 };
-/// Whether the current device can run it: it needs clusters of 16 thread blocks, as Hopper has.
-bool fused_search_supported(int compute_capability_major);
+/// Whether the current device can run it: it needs clusters of 16 thread blocks, as Hopper has, and
+/// code that was compiled for them.
+bool fused_search_supported();
 void launch_fused_search(const FusedArgs& args, cudaStream_t stream);
 
 // --- all pairs ---------------------------------------------------------------------------------

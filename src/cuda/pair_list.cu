@@ -1,6 +1,9 @@
 /// Tests given pairs: the batch that Bullet's pair cache asks for.
 #include "src/cuda/tiles.cuh"
 
+#include <array>
+#include <atomic>
+
 namespace jfpx::inline JFPX_ABI::cuda {
 namespace {
 
@@ -72,6 +75,21 @@ __global__ void __launch_bounds__(kThreads) emit_touching(TouchingArgs args) {
 cudaError_t kernels_loadable() {
   cudaFuncAttributes attributes{};
   return cudaFuncGetAttributes(&attributes, test_pairs);
+}
+
+bool has_hopper_code() {
+  constexpr int kDevices = 64;
+  enum : signed char { kUnknown, kNo, kYes };
+  static std::array<std::atomic<signed char>, kDevices> known{};
+  int device = 0;
+  JFPX_CUDA_TRY(cudaGetDevice(&device));
+  const bool remembers = device < kDevices;
+  if (remembers && known[device] != kUnknown) return known[device] == kYes;
+  cudaFuncAttributes attributes{};
+  JFPX_CUDA_TRY(cudaFuncGetAttributes(&attributes, test_pairs));
+  const bool yes = attributes.ptxVersion >= 90;
+  if (remembers) known[device] = yes ? kYes : kNo;
+  return yes;
 }
 
 void launch_test_pairs(const SphereInstance* spheres, const SpherePair* pairs, std::size_t m,

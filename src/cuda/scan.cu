@@ -9,6 +9,9 @@ namespace {
 
 cudaError_t scan(void* scratch, std::size_t& bytes, const std::uint32_t* in,
                  unsigned long long* out, std::size_t n, cudaStream_t stream) {
+  // CUB takes the last error of the thread for its own, also one that a call of the user's has
+  // left.
+  static_cast<void>(cudaGetLastError());
   return cub::DeviceScan::ExclusiveScan(scratch, bytes, in, out, ::cuda::std::plus<>{}, 0ull,
                                         static_cast<std::uint32_t>(n), stream);
 }

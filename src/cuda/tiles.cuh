@@ -23,7 +23,7 @@ void launch_sharing(std::size_t shared_bytes, void (*kernel)(Parameters...), uns
   config.dynamicSmemBytes = shared_bytes;
   config.stream = stream;
   config.attrs = &overlap;
-  config.numAttrs = 1;
+  config.numAttrs = has_hopper_code() ? 1 : 0;  // older code does not wait
   JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, kernel, Parameters(arguments)...));
 }
 template <typename... Parameters, typename... Arguments>

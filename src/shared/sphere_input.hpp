@@ -25,6 +25,7 @@ inline bool is_valid(const SphereInstance& s) {
 
 [[noreturn]] inline void reject_sphere(std::span<const SphereInstance> spheres) {
   const auto bad = std::find_if_not(spheres.begin(), spheres.end(), is_valid);
+  if (bad == spheres.end()) throw InvalidArgument("a sphere was not valid while it was read");
   const std::string sphere = "sphere " + std::to_string(bad - spheres.begin()) + ": ";
   for (int i = 0; i < 3; ++i) {
     if (is_finite(bad->centre[i])) continue;

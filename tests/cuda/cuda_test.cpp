@@ -5,6 +5,8 @@
 #include "src/shared/sphere_pair.hpp"
 #include "tests/cuda/cuda_fixture.hpp"
 
+#include <array>
+#include <limits>
 #include <thread>
 
 namespace jfpx::inline JFPX_ABI::test {
@@ -354,6 +356,93 @@ TEST_F(Cuda, AnInvalidSphereOnTheDeviceIsNamed) {
       EXPECT_EQ(data.count.data()->complete, 0u);
       EXPECT_EQ(data.count.data()->contacts, 0u);
     }
+  }
+}
+
+TEST_F(Cuda, OutputsThatAreNotAlignedAreRefused) {
+  Random random(base_seed());
+  const auto spheres = sphere_kind("uniform").make(3000, random);
+  DeviceData data(spheres, 100);
+  DeviceSphereCollider collider(data.stream.get());
+  collider.reserve(spheres.size(), 100);
+  auto* const odd = reinterpret_cast<unsigned char*>(data.contacts.data()) + 4;
+  EXPECT_THROW(collider.find_contacts(data.spheres.data(), spheres.size(),
+                                      reinterpret_cast<SphereContact*>(odd), 99, data.count.data()),
+               InvalidArgument);
+  EXPECT_THROW(collider.find_pairs(data.spheres.data(), spheres.size(),
+                                   reinterpret_cast<SpherePair*>(odd), 99, data.count.data()),
+               InvalidArgument);
+}
+
+TEST_F(Cuda, ContactsCanBeReservedBeforeSpheres) {
+  Random random(base_seed());
+  const auto spheres = sphere_kind("uniform").make(6000, random);
+  const auto expected = brute_force(spheres);
+  DeviceData data(spheres, expected.size());
+  DeviceSphereCollider collider(data.stream.get());
+  collider.reserve(1000, expected.size());
+  collider.reserve(spheres.size(), 0);
+  collider.find_contacts(data.spheres.data(), spheres.size(), data.contacts.data(), expected.size(),
+                         data.count.data());
+  data.wait();
+  EXPECT_EQ(data.count.data()->complete, 1u) << seed_note();
+  EXPECT_TRUE(same_bits(data.download(data.contacts.data(), expected.size()), expected));
+}
+
+TEST_F(Cuda, AbsurdSizesAreRefusedAndNothingIsLost) {
+  Random random(base_seed());
+  const auto spheres = sphere_kind("uniform").make(6000, random);
+  const auto expected = brute_force(spheres);
+  DeviceData data(spheres, expected.size());
+  DeviceSphereCollider collider(data.stream.get());
+  EXPECT_THROW(collider.reserve((std::size_t{1} << 31) + 1, 0), InvalidArgument);
+  collider.reserve(spheres.size(), expected.size());
+  EXPECT_THROW(collider.reserve(0, std::numeric_limits<std::size_t>::max() / 2), OutOfMemory);
+  collider.reserve(spheres.size(), expected.size());
+  collider.find_contacts(data.spheres.data(), spheres.size(), data.contacts.data(), expected.size(),
+                         data.count.data());
+  EXPECT_TRUE(same_bits(data.download(data.contacts.data(), expected.size()), expected));
+}
+
+TEST_F(Cuda, ErrorsThatAUserHasLeftAreNotTheCollidersOwn) {
+  Random random(base_seed());
+  const auto spheres = sphere_kind("uniform").make(2000, random);
+  const auto expected = brute_force(spheres);
+  for (const SphereAlgorithm algorithm : kAlgorithms) {
+    const auto collider = make(algorithm);
+    void* memory = nullptr;
+    ASSERT_NE(cudaMalloc(&memory, std::size_t{1} << 60), cudaSuccess);
+    EXPECT_TRUE(same_bits(collider->find_contacts(spheres), expected)) << seed_note();
+    static_cast<void>(cudaGetLastError());
+  }
+}
+
+/// How much shared memory a kernel may have is set before its launch, for all threads at once.
+TEST_F(Cuda, LargeCollidersInSeveralThreadsAreIndependent) {
+  Random random(base_seed());
+  const auto spheres = sphere_kind("uniform").make(600'000, random);
+  std::array<std::uint64_t, 2> expected{};
+  constexpr std::array<std::size_t, 2> kSizes = {262'145, 600'000};
+  const auto count_of = [&](DeviceData& data, DeviceSphereCollider& collider, std::size_t n) {
+    collider.find_pairs(data.spheres.data(), n, nullptr, 0, data.count.data());
+    data.wait();
+    return data.count.data()->contacts;
+  };
+  constexpr int kRounds = 500;  // before, one launch of 5,000 failed
+  {
+    DeviceData data(spheres, 0);
+    DeviceSphereCollider collider(data.stream.get());
+    collider.reserve(spheres.size(), 0);
+    for (std::size_t k = 0; k < 2; ++k) expected[k] = count_of(data, collider, kSizes[k]);
+  }
+  std::vector<std::jthread> workers;
+  for (std::size_t t = 0; t < 8; ++t) {
+    workers.emplace_back([&, n = kSizes[t % 2], contacts = expected[t % 2]] {
+      DeviceData data(spheres, 0);
+      DeviceSphereCollider collider(data.stream.get());
+      collider.reserve(n, 0);
+      for (int i = 0; i < kRounds; ++i) ASSERT_EQ(count_of(data, collider, n), contacts);
+    });
   }
 }
 

@@ -40,7 +40,8 @@ class JFPX_API DeviceSphereCollider {
   DeviceSphereCollider& operator=(DeviceSphereCollider&&) noexcept;
 
   /// Makes room for searches with up to `spheres` spheres and `contacts` contacts. Grows only.
-  /// @throws OutOfMemory with the bytes needed, DeviceError; what was reserved before stays.
+  /// @throws InvalidArgument for more than 2^31 spheres, OutOfMemory with the bytes needed,
+  /// DeviceError; what was reserved before stays.
   void reserve(std::size_t spheres, std::size_t contacts);
 
   /// Enqueues the search for all touching pairs among `n` spheres. On completion *d_count is set
@@ -48,7 +49,9 @@ class JFPX_API DeviceSphereCollider {
   /// there are no more than `capacity` and than were reserved, and every sphere is valid (all
   /// values finite, radius > 0). Otherwise read *d_count, reserve, and enqueue again.
   /// @param d_spheres device memory, 4*sizeof(Real)-aligned, unchanged until completion
-  /// @throws InvalidArgument if `n` is more than was reserved, DeviceError.
+  /// @param d_contacts device memory, 8-aligned (as d_pairs below); may be null if `capacity` is 0
+  /// @throws InvalidArgument if `n` is more than was reserved or an output is not aligned,
+  /// DeviceError.
   void find_contacts(const SphereInstance* d_spheres, std::size_t n, SphereContact* d_contacts,
                      std::size_t capacity, ContactCount* d_count);
   /// The same, but writes 8 bytes a contact: the indices alone.
