@@ -21,8 +21,8 @@ struct BodyId {
 struct BodyDef {
   Shape shape = Sphere{};
   Real mass = 1;  ///< [kg], >= 0; 0 means immovable
-  /// Only with mass 0, and not of half-spaces: moves with its velocities, which nothing changes but
-  /// World::set_state(). Pushes others and is never pushed, however heavy they are.
+  /// Only with mass 0, and not of half-spaces and planes: moves with its velocities, which nothing
+  /// changes but World::set_state(). Pushes others and is never pushed, however heavy they are.
   bool kinematic = false;
   /// [kg m^2], about the centre of mass, in body axes; that of the solid shape if absent.
   /// Symmetric, positive definite, no principal moment larger than the sum of the others. Mass 0

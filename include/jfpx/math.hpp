@@ -1,5 +1,6 @@
-/// Vectors, quaternions, matrices, transforms and boxes: values, inline, the same bits on host and
-/// device. Every expression is a fixed sequence of single IEEE operations (thesis 4.2).
+/// Vectors, quaternions, matrices, transforms and boxes: values, inline, the same bits on host and,
+/// with nvcc's --fmad=false, on the device. Every expression is a fixed sequence of single IEEE
+/// operations (thesis 4.2).
 #pragma once
 
 #include <jfpx/config.hpp>

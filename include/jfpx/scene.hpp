@@ -25,7 +25,7 @@ struct ResolverSettings {
 struct SleepSettings {
   bool enabled = true;
   Real epsilon = Real(0.3);  ///< [m^2/s^2], > 0: a body sleeps when its mean motion is below
-  Real bias = Real(0.05);    ///< [-], in (0, 1): weight that one second leaves to the old mean
+  Real bias = Real(0.05);    ///< [-], in (0, 1]: weight that one second leaves to the old mean
   friend bool operator==(const SleepSettings&, const SleepSettings&) = default;
 };
 

@@ -93,7 +93,9 @@ void add_calibrate_command(CLI::App& app, int& status) {
   command->add_flag("--quiet", options->quiet, "Print nothing but what --json - asks for");
   command->footer(
       "Takes seconds. The costs are stored in the cache folder (XDG_CACHE_HOME) with machine,\n"
-      "driver and version; the other commands use them while all three are as they were.");
+      "driver and version; run, compare, replay and jfpx-view use them while all three are as "
+      "they\n"
+      "were. Programs of your own have load_cost_model() and SphereColliderOptions::costs.");
   command->callback([options, &status] { status = run(*options); });
 }
 

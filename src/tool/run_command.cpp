@@ -141,7 +141,9 @@ void add_run_command(CLI::App& app, int& status) {
       ->capture_default_str();
   command->add_option("--input", options->input,
                       "Run as a demo with the inputs of this file (see: jfpx scenes DEMO)");
-  command->add_option("--csv", options->run.csv, "Write one line a step to this file");
+  command->add_option(
+      "--csv", options->run.csv,
+      "Write one line a step to this file: step, contacts, awake bodies, milliseconds");
   command->add_option("--record", options->run.record,
                       "Write the state after every step to this file (see: jfpx replay)");
   command->callback([options, &status] { status = run(*options); });
