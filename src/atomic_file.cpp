@@ -21,16 +21,27 @@ AtomicFile::~AtomicFile() {
 }
 
 void AtomicFile::write(std::string_view bytes) {
+  require_open();
   if (bytes.empty()) return;  // fwrite may not be given null
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail();
 }
 
 void AtomicFile::finish() {
+  require_open();
   if (std::fclose(std::exchange(file_, nullptr)) != 0) fail();
   if (std::rename(part_.c_str(), path_.c_str()) != 0) fail();
   finished_ = true;
 }
 
-void AtomicFile::fail() const { throw FileError(file_message(path_, "can't be written", errno)); }
+void AtomicFile::require_open() const {
+  if (file_ == nullptr || failed_) {
+    throw FileError(path_ + (finished_ ? " is finished" : " could not be written before"));
+  }
+}
+
+void AtomicFile::fail() {
+  failed_ = true;
+  throw FileError(file_message(path_, "can't be written", errno));
+}
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -19,17 +19,18 @@ class JFPX_API AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// @throws FileError
+  /// @throws FileError, and from then on always: a part of it may be missing
   void write(std::string_view bytes);
   /// Nothing may be written afterwards. @throws FileError
   void finish();
 
  private:
-  [[noreturn]] void fail() const;
+  void require_open() const;
+  [[noreturn]] void fail();
 
   std::string path_, part_;
   std::FILE* file_;
-  bool finished_ = false;
+  bool finished_ = false, failed_ = false;
 };
 
 }  // namespace jfpx::inline JFPX_ABI

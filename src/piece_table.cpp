@@ -1,6 +1,8 @@
 /// Takes bodies apart, and keeps their pieces where they belong.
 #include "src/piece_table.hpp"
 
+#include <algorithm>
+
 namespace jfpx::inline JFPX_ABI {
 namespace {
 
@@ -9,7 +11,12 @@ namespace {
 constexpr Real kMargin = 1 + 64 * kEpsilon;
 
 Real bounding_radius(const Sphere& sphere) { return sphere.radius; }
-Real bounding_radius(const Box& box) { return length(box.half_extents) * kMargin; }
+Real bounding_radius(const Box& box) {
+  constexpr Real kSquareIsLost = Real(1e-15);
+  const Vec3& h = box.half_extents;
+  const Real largest = std::max({h.x, h.y, h.z});
+  return largest < kSquareIsLost ? 2 * largest : length(h) * kMargin;
+}
 
 /// Calls visit(piece, part or null) for each piece of type T in the body.
 template <class T, class Visit>

@@ -28,6 +28,8 @@ constexpr std::uint32_t kVersion = 1;
 constexpr std::size_t kRealsPerBody = 13;
 constexpr std::size_t kPrefixSize = 24;
 constexpr std::size_t kTrailerSize = 24;
+/// Frames of no bodies take no bytes, so that any number of them could be claimed.
+constexpr std::uint64_t kMostEmptyFrames = 10'000'000;
 
 static_assert(sizeof(BodyState) == kRealsPerBody * sizeof(Real), "a state has no padding");
 
@@ -112,6 +114,10 @@ void RecordingWriter::append(std::span<const BodyState> states) {
     throw InvalidArgument("a frame has " + std::to_string(states.size()) +
                           " bodies; the recorded scene has " + std::to_string(impl_->bodies));
   }
+  if (states.empty() && impl_->frames == kMostEmptyFrames) {
+    throw InvalidArgument("a recording without bodies has at most " +
+                          std::to_string(kMostEmptyFrames) + " frames");
+  }
   impl_->write(states.data(), states.size_bytes());
   ++impl_->frames;
 }
@@ -180,7 +186,7 @@ RecordingReader::RecordingReader(const std::string& path) : impl_(std::make_uniq
   }
   if (impl.frame_size == 0) {
     // A scene without bodies: each frame added only its length.
-    if (impl.frames > size) impl.fail(kCorrupt);
+    if (impl.frames > kMostEmptyFrames) impl.fail(kCorrupt);
     for (std::uint64_t k = 0; k < impl.frames; ++k) hash.add_bytes(nullptr, 0);
   }
   hash.add_word(trailer.frames);

@@ -30,6 +30,9 @@ const char* kind_of(const Json& value) {
   return value.is_null() ? "null" : "a number";
 }
 
+/// Of what holds others only what it is: to write them takes a stack as deep as they are nested.
+std::string text_of(const Json& json) { return json.is_structured() ? kind_of(json) : json.dump(); }
+
 void read(const Json& json, const std::string& where, Real& out) {
   if (!json.is_number()) fail(where, std::string("is ") + kind_of(json) + "; it must be a number");
   out = json.get<Real>();
@@ -45,7 +48,7 @@ void read(const Json& json, const std::string& where, std::string& out) {
 }
 void read(const Json& json, const std::string& where, std::uint32_t& out) {
   if (!json.is_number_unsigned() || json.get<std::uint64_t>() > 0xffffffffu) {
-    fail(where, "is " + json.dump() + "; it must be a whole number from 0 to 4294967295");
+    fail(where, "is " + text_of(json) + "; it must be a whole number from 0 to 4294967295");
   }
   out = json.get<std::uint32_t>();
 }
@@ -58,7 +61,7 @@ void read(const Json& json, const std::string& where, CombineRule& out) {
     if (name == to_string(out)) return;
     names += (i == 0 ? "" : ", ") + std::string(to_string(out));
   }
-  fail(where, "is " + json.dump() + "; it must be one of " + names);
+  fail(where, "is " + text_of(json) + "; it must be one of " + names);
 }
 void read_array(const Json& json, const std::string& where, std::span<Real* const> out) {
   if (!json.is_array() || json.size() != out.size()) {
@@ -260,7 +263,7 @@ Scene scene_from(const Json& json) {
   ObjectReader object(json, "scene");
   const Json& version = object.at("jfpx_scene");
   if (version != kSceneSchemaVersion) {
-    fail("scene.jfpx_scene", "is " + version.dump() + "; this build reads schema version " +
+    fail("scene.jfpx_scene", "is " + text_of(version) + "; this build reads schema version " +
                                  std::to_string(kSceneSchemaVersion));
   }
   Scene scene;
@@ -282,7 +285,27 @@ Scene scene_from(const Json& json) {
   return scene;
 }
 
+/// The parser needs no stack, but whoever copies or writes what it made does.
+void require_shallow(std::string_view text) {
+  constexpr int kDeepest = 64;
+  int depth = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '"') in_string = !in_string;
+    if (in_string && c == '\\') ++i;  // what it escapes
+    if (in_string) continue;
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (depth > kDeepest) {
+      throw InvalidScene("arrays and objects are nested more than " + std::to_string(kDeepest) +
+                         " deep");
+    }
+  }
+}
+
 Json parse(std::string_view text) {
+  require_shallow(text);
   try {
     return Json::parse(text);
   } catch (const nlohmann::json::exception& error) {

@@ -41,6 +41,10 @@ std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions
     throw InvalidArgument("threads is " + std::to_string(options.threads) +
                           "; it must be 0 (one per core) to 256");
   }
+  if (options.algorithm > SphereAlgorithm::sorted_tiles) {
+    throw InvalidArgument("algorithm is none of SphereAlgorithm");
+  }
+  if (options.simd > SimdLevel::avx512) throw InvalidArgument("simd is none of SimdLevel");
   const std::string fault = find_fault(options.costs);
   if (!fault.empty()) throw InvalidArgument("costs: " + fault);
   if (options.backend != Backend::automatic) return make_named(options);

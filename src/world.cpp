@@ -35,7 +35,9 @@ std::optional<BodyId> find_runaway(const BodyStore& bodies) {
     const Vec3& x = moving.position[id.index];
     const bool in_world = absolute(x.x) <= kMaxCoordinate && absolute(x.y) <= kMaxCoordinate &&
                           absolute(x.z) <= kMaxCoordinate;
-    if (!in_world || !is_finite(moving.orientation[id.index]) ||
+    // A spin whose square overflows leaves no direction.
+    const bool is_turn = length_squared(moving.orientation[id.index]) > Real(0.5);
+    if (!in_world || !is_turn || !is_finite(moving.orientation[id.index]) ||
         !is_finite(moving.velocity[id.index]) || !is_finite(moving.angular_velocity[id.index])) {
       return id;
     }
@@ -62,6 +64,8 @@ bool World::Impl::advance(StepReport* report) {
   const Clock::time_point integrated = Clock::now();
   if (bodies_changed) narrow_phase.set_bodies(bodies);
   bodies_changed = false;
+  std::swap(contacts, contacts_before);
+  contacts_are_new = true;
   contacts.clear();
   report->sphere_contacts = narrow_phase.find_contacts(bodies, &contacts);
   // Text, which may find no memory: while the step can be undone.
@@ -100,9 +104,11 @@ StepReport World::step() {
     throw OutOfMemory("no memory to keep the state of " + std::to_string(w.bodies.ids().size()) +
                       " bodies during a step");
   }
+  w.contacts_are_new = false;
   try {
     if (w.advance(&report)) {
       ++w.steps;
+      w.shows_contacts = true;
     } else {
       w.undo();
     }

@@ -33,14 +33,17 @@ BodyId World::add(const BodyDef& body) {
   Impl::require_native(body, number);
   const BodyId id = impl_->bodies.add(body);
   impl_->bodies_changed = true;
-  impl_->contacts.clear();
+  impl_->shows_contacts = false;
   return id;
 }
 
 void World::remove(BodyId id) {
-  impl_->wake_neighbours(impl_->bodies.require(id));
+  const std::uint32_t body = impl_->bodies.require(id);
+  impl_->wake_neighbours(body);
   impl_->bodies.remove(id);
-  impl_->contacts.clear();
+  // The next body to be added may get its index.
+  std::erase_if(impl_->contacts, [body](const Contact& c) { return c.a == body || c.b == body; });
+  impl_->shows_contacts = false;
   impl_->bodies_changed = true;
 }
 
@@ -138,7 +141,10 @@ std::span<const ContactGeneratorId> World::contact_generators() const {
 
 double World::time() const { return impl_->time(); }
 
-std::span<const Contact> World::contacts() const { return impl_->contacts; }
+std::span<const Contact> World::contacts() const {
+  return impl_->shows_contacts ? std::span<const Contact>(impl_->contacts)
+                               : std::span<const Contact>();
+}
 
 std::span<const ContactEvent> World::contact_events() const { return impl_->events.list(); }
 

@@ -44,7 +44,8 @@ struct World::Impl {
   bool advance(StepReport* report);
   void undo() noexcept {
     std::swap(bodies.moving, before);
-    contacts.clear();
+    if (contacts_are_new) std::swap(contacts, contacts_before);
+    shows_contacts = false;
     events.clear();
   }
 
@@ -55,8 +56,12 @@ struct World::Impl {
   ContactResolver resolver;
   Registry<ForceContext, ForceId> forces{"force"};
   Registry<ContactContext, ContactGeneratorId> generators{"contact generator"};
-  bool bodies_changed = true;     ///< since the narrow phase last heard of them
-  std::vector<Contact> contacts;  ///< of the last step
+  bool bodies_changed = true;  ///< since the narrow phase last heard of them
+  /// Of the last step that was not undone, whatever has been added since: who rests on whom.
+  std::vector<Contact> contacts;
+  std::vector<Contact> contacts_before;  ///< of the step before it
+  bool contacts_are_new = false;         ///< in a step: they are already of this one
+  bool shows_contacts = false;           ///< users see none after a change or an undone step
   ContactEvents events;
   MotionArrays before;  ///< the state that a failed step goes back to
   std::uint64_t steps = 0;

@@ -10,9 +10,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <sys/resource.h>
 
 namespace jfpx {
 namespace {
@@ -68,6 +70,37 @@ TEST(Recording, ReadsBackWhatWasWritten) {
     }
   }
   EXPECT_EQ(recording_precision(path), sizeof(Real) == 4 ? "float" : "double");
+}
+
+TEST(Recording, OfNoBodiesMayHaveMoreFramesThanBytes) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("empty.rec");
+  write_recording(path, 0, 5000);
+  EXPECT_EQ(RecordingReader(path).steps(), 5000u);
+}
+
+TEST(Recording, IsFinishedOnceAndNotAfterAFailedWrite) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  RecordingWriter writer(path, header_of(17));
+  writer.append(random_states(17, 1));
+  writer.finish();
+  EXPECT_THROW(writer.finish(), FileError);
+  EXPECT_THROW(writer.append(random_states(17, 2)), FileError);
+  EXPECT_EQ(RecordingReader(path).steps(), 1u);
+
+  const std::string full = folder.file("full.rec");
+  RecordingWriter unlucky(full, header_of(1000));
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{.rlim_cur = 10'000, .rlim_max = before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  EXPECT_THROW(for (int i = 0; i < 100; ++i) unlucky.append(random_states(1000, 1)), FileError);
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, old_handler);
+  EXPECT_THROW(unlucky.finish(), FileError) << "there is room again, but a frame is cut off";
+  EXPECT_FALSE(std::ifstream(full));
 }
 
 TEST(Recording, UnfinishedFileDoesNotAppear) {

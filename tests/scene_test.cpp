@@ -176,6 +176,18 @@ TEST(SceneJson, BrokenTextGivesTheLineAndColumn) {
   EXPECT_THAT(complaint(with_body("\"mass\": 1e999")), HasSubstr("broken JSON"));
 }
 
+/// To copy or write such a value takes a stack as deep.
+TEST(SceneJson, NestedAHundredThousandTimesIsAnError) {
+  const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
+  EXPECT_THAT(complaint("{\"jfpx_scene\": " + deep + ", \"bodies\": []}"),
+              HasSubstr("nested more than 64 deep"));
+  EXPECT_THAT(complaint("{\"jfpx_scene\": [[1]], \"bodies\": []}"),
+              HasSubstr("scene.jfpx_scene: is an array; "));
+  EXPECT_EQ(complaint("{\"jfpx_scene\": 1, \"name\": \"" + std::string(200, '[') + "\\\"" +
+                      std::string(200, '{') + "\", \"bodies\": []}"),
+            "");
+}
+
 TEST(SceneJson, EveryTruncationIsAnError) {
   const std::string text = kMinimal;
   for (std::size_t size = 0; size < text.size(); ++size) {

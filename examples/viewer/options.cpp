@@ -119,8 +119,9 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
       "--target",
       [&options](const std::string& text) { options.target = parse_point("--target", text); },
       "What it looks at: X,Y,Z [m]");
-  app.add_flag("--no-render{false}", options.render,
-               "Open no window and draw nothing: for timing the engine alone");
+  app.add_flag_callback(
+      "--no-render", [&options] { options.render = false; },
+      "Open no window and draw nothing: for timing the engine alone");
   app.add_flag("--fullscreen", options.fullscreen, "Start in full screen");
 }
 

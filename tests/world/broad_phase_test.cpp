@@ -247,6 +247,23 @@ TEST(BroadPhase, AllWaysFindTheSameContactsThroughInsertionsAndRemovals) {
   EXPECT_GT(contacts, 10000u);
 }
 
+/// The squares of their edges are 0 in float.
+TEST(BroadPhase, BoxesMayBeAsSmallAsNumbersGo) {
+  for (const BroadPhase way : {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {
+    for (const Real half :
+         {Real(1e-15), Real(1e-22), Real(1e-30), std::numeric_limits<Real>::min()}) {
+      BodyDef body = test::ball({0, 1, 0});
+      body.shape = Assembly{{{.shape = Sphere{1}}, {.shape = Box{{half, half, half}}}}};
+      Scene scene;
+      scene.bodies = {body, test::ball({1, 1, 0}), test::ground()};
+      WorldSettings settings;
+      settings.broad_phase = way;
+      World world(scene, settings);
+      for (int n = 0; n < 3; ++n) EXPECT_GT(world.step().contacts, 0u) << half;
+    }
+  }
+}
+
 TEST(BroadPhase, WorldsRunTheSameWhicheverIsChosen) {
   Random random(5);
   Scene scene;

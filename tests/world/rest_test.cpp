@@ -186,6 +186,48 @@ TEST(Sleep, WhoLosesTheSupportWakesAndFalls) {
   }
 }
 
+/// What rests on a body is known until a step has found what it rests on now.
+TEST(Sleep, WhoLosesTheSupportAfterOtherChangesWakesToo) {
+  using Change = void (*)(World&);
+  const Change changes[] = {
+      [](World& w) { w.remove(w.bodies()[0]); },  // the other pedestal
+      [](World& w) {
+        w.add(test::ball({50, 50, 50}, 1));
+      },
+      [](World& w) {
+        w.remove(w.add(test::ball({50, 50, 50}, 1)));
+      },
+      [](World& w) {  // a step that is undone
+        BodyDef runaway = test::ball({50, 50, 50}, 1);
+        runaway.velocity = {1e9_r, 0, 0};
+        const BodyId id = w.add(runaway);
+        for (int n = 0; n < 200 && !w.step().non_finite; ++n) {
+        }
+        w.remove(id);
+      },
+  };
+  for (const Change& change : changes) {
+    SCOPED_TRACE(&change - changes);
+    std::vector<BodyDef> pedestals(2);
+    pedestals[0].shape = pedestals[1].shape = Box{{1, 0.5_r, 1}};
+    pedestals[0].mass = pedestals[1].mass = 0;
+    pedestals[0].position = {-5, -0.5_r, 0};
+    pedestals[1].position = {5, -0.5_r, 0};
+    Scene scene;
+    scene.bodies = {pedestals[0], pedestals[1], heavy({-5, 0.995_r, 0}, true),
+                    heavy({5, 0.995_r, 0}, true)};
+    World world(scene);
+    const BodyId support = world.bodies()[1], sleeper = world.bodies()[3];
+    for (int n = 0; n < 1000 && world.awake(sleeper); ++n) world.step();
+    ASSERT_FALSE(world.awake(sleeper));
+    change(world);
+    world.remove(support);
+    EXPECT_TRUE(world.contacts().empty());
+    for (int n = 0; n < 60; ++n) world.step();
+    EXPECT_LT(world.state(sleeper).position.y, 0);
+  }
+}
+
 TEST(Sleep, OneThatMayNotSleepKeepsItsNeighboursAwake) {
   World world(on_the_ground({heavy({0, 0.995_r, 0}, false), heavy({1.995_r, 0.995_r, 0}, true)}));
   StepReport report;

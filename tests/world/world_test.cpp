@@ -131,6 +131,17 @@ TEST(World, AHugeStepIsUndoneWhereItLeadsOutOfTheWorld) {
   EXPECT_EQ(flying.states(), before);
 }
 
+TEST(World, ASpinWithoutADirectionIsUndone) {
+  Scene scene;
+  scene.bodies = {test::ball({0, 0, 0})};
+  scene.bodies[0].angular_velocity = {0, std::sqrt(std::numeric_limits<Real>::max()) * 1000, 0};
+  World world(scene);
+  const auto before = world.states();
+  EXPECT_TRUE(world.step().non_finite);
+  EXPECT_EQ(world.states(), before);
+  EXPECT_NO_THROW(world.set_state(world.bodies()[0], before[0]));
+}
+
 TEST(World, SetStateRefusesWhatAnySceneWould) {
   World world(two_balls());
   const BodyId id = world.bodies()[0];

@@ -135,6 +135,16 @@ TEST(SphereColliderX86, TheBackendTableNamesTheProcessor) {
   EXPECT_NE(status.device.find(", "), std::string::npos) << status.device;
 }
 
+TEST(SphereColliderX86, OptionsThatAreNoneAreRejected) {
+  for (const Backend backend : {Backend::automatic, Backend::x86}) {
+    EXPECT_THROW(
+        make_sphere_collider({.backend = backend, .algorithm = static_cast<SphereAlgorithm>(3)}),
+        InvalidArgument);
+    EXPECT_THROW(make_sphere_collider({.backend = backend, .simd = static_cast<SimdLevel>(5)}),
+                 InvalidArgument);
+  }
+}
+
 TEST(SphereColliderX86, TooManyThreadsAreRejected) {
   EXPECT_THROW(make(SphereAlgorithm::automatic, 257), InvalidArgument);
   EXPECT_NO_THROW(make(SphereAlgorithm::automatic, 0));
