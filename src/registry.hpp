@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,7 +25,7 @@ class Registry {
 
   Id add(Function function) {
     ids_.reserve(ids_.size() + 1);
-    functions_.push_back(std::move(function));
+    functions_.push_back(std::make_unique<Function>(std::move(function)));
     ids_.push_back({next_});
     return {next_++};
   }
@@ -34,12 +35,13 @@ class Registry {
     ids_.erase(ids_.begin() + place);
     functions_.erase(functions_.begin() + place);
   }
-  Function& at(Id id) { return functions_[place_of(id)]; }
+  /// Stays where it is until it is removed.
+  Function& at(Id id) { return *functions_[place_of(id)]; }
   const std::vector<Id>& ids() const noexcept { return ids_; }
   bool empty() const noexcept { return ids_.empty(); }
 
   void call(Context& context) const {
-    for (const Function& function : functions_) function(context);
+    for (const auto& function : functions_) (*function)(context);
   }
 
  private:
@@ -53,7 +55,7 @@ class Registry {
   const char* kind_;
   std::uint64_t next_ = 0;
   std::vector<Id> ids_;  ///< rising
-  std::vector<Function> functions_;
+  std::vector<std::unique_ptr<Function>> functions_;
 };
 
 }  // namespace jfpx::inline JFPX_ABI

@@ -4,6 +4,7 @@
 #include "src/scene_validate.hpp"
 #include "src/world_impl.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI {
@@ -48,6 +49,20 @@ void World::remove(BodyId id) {
 }
 
 std::span<const BodyId> World::bodies() const { return impl_->bodies.ids(); }
+
+bool World::contains(BodyId id) const noexcept { return impl_->bodies.contains(id); }
+
+BodyId World::body_at(std::uint32_t index) const {
+  const std::span<const BodyId> ids = bodies();
+  const auto found = std::ranges::lower_bound(ids, index, {}, &BodyId::index);
+  if (found != ids.end() && found->index == index) return *found;
+  throw InvalidArgument("index is " + std::to_string(index) +
+                        "; it must be that of a living body of this world");
+}
+
+const Shape& World::shape(BodyId id) const {
+  return impl_->bodies.shape(impl_->bodies.require(id));
+}
 
 std::vector<BodyState> World::states() const {
   std::vector<BodyState> states;

@@ -24,7 +24,9 @@ struct BackendStatus {
 };
 
 /// All backends that jfpx knows, in a fixed order, probed now. Never throws for a missing device
-/// and leaves no CUDA error behind. Thread-safe.
+/// and leaves no CUDA error behind. Where there is a GPU, the first call starts CUDA, which takes
+/// some tenths of a second: `automatic` would do so in the call that first uses the GPU.
+/// Thread-safe.
 JFPX_API std::vector<BackendStatus> available_backends();
 
 /// "auto", "x86" or "cuda".

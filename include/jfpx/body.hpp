@@ -32,11 +32,12 @@ struct BodyDef {
   Quat orientation;
   Vec3 velocity;          ///< [m/s]; a body that is immovable and not kinematic stays at rest
   Vec3 angular_velocity;  ///< [rad/s], world frame; likewise
-  Vec3 acceleration{0, Real(-9.81), 0};  ///< [m/s^2], constant; ignored by an immovable body
-  Real linear_damping = 1;               ///< [-], share of velocity kept per second, in (0, 1]
-  Real angular_damping = 1;              ///< [-], likewise for angular velocity
-  Real friction = Real(0.5);             ///< [-], >= 0; combined as Scene::materials says
-  Real restitution = 0;                  ///< [-], in [0, 1]; likewise
+  /// [m/s^2], constant: gravity, unless set. Ignored by an immovable body.
+  Vec3 acceleration{0, Real(-9.81), 0};
+  Real linear_damping = 1;    ///< [-], share of velocity kept per second, in (0, 1]
+  Real angular_damping = 1;   ///< [-], likewise for angular velocity
+  Real friction = Real(0.5);  ///< [-], >= 0; combined as Scene::materials says
+  Real restitution = 0;       ///< [-], in [0, 1]; likewise
   bool can_sleep = true;
   friend bool operator==(const BodyDef&, const BodyDef&) = default;
 };

@@ -35,7 +35,8 @@ class JFPX_API BackendUnavailable : public Error {
   ~BackendUnavailable() override;
 };
 
-/// Memory ran out. The message says how many bytes were needed, and for what.
+/// Memory ran out. The message says how many bytes were needed, and for what. Where a small
+/// allocation fails it is std::bad_alloc, as anywhere in C++: who means to go on catches both.
 class JFPX_API OutOfMemory : public Error {
  public:
   using Error::Error;

@@ -17,8 +17,8 @@ struct ForceId {
 
 /// What a force sees of a world at the start of a step, and where it leaves its push. What a force
 /// adds reaches awake bodies only: a body that came to rest under its forces sleeps on, and gravity
-/// wakes nobody. Forces that are news call wake() or link(). An id that is not of a living body is
-/// an InvalidArgument, and the step is undone.
+/// wakes nobody. Forces that must affect sleeping bodies call wake() or link(). An id that is not
+/// of a living body is an InvalidArgument, and the step is undone.
 class JFPX_API ForceContext : public StepView {
  public:
   ForceContext(BodyStore& bodies, double time) : StepView(bodies, time), bodies_(&bodies) {}
@@ -51,8 +51,8 @@ concept CheckedForce = Force<F> && requires(const F& force, const ForceContext& 
   force.validate(context);
 };
 
-/// mass * acceleration on one body or on all. (BodyDef::acceleration does the same without a
-/// force.)
+/// mass * acceleration on one body or on all, on top of BodyDef::acceleration, which is gravity
+/// already unless a body says otherwise.
 struct JFPX_API Gravity {
   Vec3 acceleration{0, Real(-9.81), 0};  ///< [m/s^2], finite
   std::optional<BodyId> body = {};       ///< all bodies if absent

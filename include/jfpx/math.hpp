@@ -249,7 +249,7 @@ JFPX_HD constexpr Vec3 transform_point(const Mat4& a, const Vec3& p) {
 /// Column c without its last element: the axes (0-2) and the origin (3) of an affine matrix.
 JFPX_HD constexpr Vec3 axis(const Mat4& a, int c) { return {a.m[0][c], a.m[1][c], a.m[2][c]}; }
 /// Determinant of the 3x3 matrix that is left without row r and column c.
-JFPX_HD constexpr Real minor(const Mat4& a, int r, int c) {
+JFPX_HD constexpr Real minor_determinant(const Mat4& a, int r, int c) {
   Mat3 s;
   for (int i = 0, k = 0; i < 4; ++i) {
     if (i == r) continue;
@@ -261,8 +261,8 @@ JFPX_HD constexpr Real minor(const Mat4& a, int r, int c) {
   return determinant(s);
 }
 JFPX_HD constexpr Real determinant(const Mat4& a) {
-  return a.m[0][0] * minor(a, 0, 0) - a.m[0][1] * minor(a, 0, 1) + a.m[0][2] * minor(a, 0, 2) -
-         a.m[0][3] * minor(a, 0, 3);
+  return a.m[0][0] * minor_determinant(a, 0, 0) - a.m[0][1] * minor_determinant(a, 0, 1) +
+         a.m[0][2] * minor_determinant(a, 0, 2) - a.m[0][3] * minor_determinant(a, 0, 3);
 }
 /// Writes the inverse to *out. False, and *out untouched, when a is singular (erratum E26).
 JFPX_HD inline bool invert(const Mat4& a, Mat4* out) {
@@ -273,7 +273,7 @@ JFPX_HD inline bool invert(const Mat4& a, Mat4* out) {
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) {
       const Real sign = ((i + j) & 1) != 0 ? Real(-1) : Real(1);
-      r.m[j][i] = sign * minor(a, i, j) * k;
+      r.m[j][i] = sign * minor_determinant(a, i, j) * k;
     }
   }
   *out = r;

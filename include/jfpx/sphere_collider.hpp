@@ -40,7 +40,8 @@ enum class SimdLevel : std::uint8_t { automatic, scalar, sse2, avx2, avx512 };
 
 /// With `Backend::automatic` backend and algorithm are chosen call by call, from `costs` and from
 /// the times of the last calls. Where CUDA can't be had, x86 computes; when the device fails or its
-/// memory does not suffice, x86 takes over for good, with the same bits.
+/// memory does not suffice, x86 takes over for good, with the same bits. The call that first uses a
+/// GPU starts CUDA, some tenths of a second, unless available_backends() was called before.
 struct SphereColliderOptions {
   Build headers =
       Build::of_these_headers;  ///< leave it: tells the library what the caller includes
@@ -104,7 +105,7 @@ class JFPX_API SphereCollider {
 };
 
 /// @throws BackendUnavailable if `options.backend` is asked for by name and can't be had;
-///   InvalidArgument for a bad option; BuildMismatch, see verify_build().
+///   InvalidArgument for a bad option; BuildMismatch, see verify_build(). Thread-safe.
 JFPX_API std::unique_ptr<SphereCollider> make_sphere_collider(
     const SphereColliderOptions& options = {});
 

@@ -20,7 +20,8 @@
 namespace jfpx::inline JFPX_ABI {
 
 struct WorldSettings {
-  SphereColliderOptions collider;              ///< who finds sphere contacts, and how
+  SphereColliderOptions collider;              ///< who finds sphere contacts, and how; what else
+                                               ///< a step does takes one thread
   BroadPhase broad_phase = BroadPhase::cells;  ///< who finds which bounds touch
 };
 
@@ -28,12 +29,13 @@ struct WorldSettings {
 /// assemblies. Of two spheres `a` has the lower index; `a` is the sphere where a sphere meets a
 /// box, half-space or plane, else the movable one where the other is not, else the lower index.
 struct Contact {
-  std::uint32_t a = 0, b = 0;  ///< BodyId::index; the place in the scene until a body is removed
-  Vec3 normal;                 ///< [-], unit, from b to a
-  Vec3 point;                  ///< [m], world, the middle of the overlap
-  Real distance = 0;           ///< [m], <= 0: minus the penetration
-  Real friction = 0;           ///< [-], >= 0, of the pair
-  Real restitution = 0;        ///< [-], in [0, 1], of the pair
+  /// BodyId::index, for World::body_at(); the place in the scene until a body is removed
+  std::uint32_t a = 0, b = 0;
+  Vec3 normal;           ///< [-], unit, from b to a
+  Vec3 point;            ///< [m], world, the middle of the overlap
+  Real distance = 0;     ///< [m], <= 0: minus the penetration
+  Real friction = 0;     ///< [-], >= 0, of the pair
+  Real restitution = 0;  ///< [-], in [0, 1], of the pair
   friend bool operator==(const Contact&, const Contact&) = default;
 };
 
@@ -63,10 +65,12 @@ struct StepReport {
   std::uint64_t position_iterations = 0;
   std::uint64_t velocity_iterations = 0;
   bool iterations_exhausted = false;  ///< a loop stopped at its limit with work left
-  bool non_finite = false;            ///< a body left the world; the state is as before the step
-  BodyId non_finite_body;             ///< the first such body
-  std::uint32_t awake = 0;            ///< movable bodies awake after the step
-  Backend backend = Backend::x86;     ///< who found sphere contacts
+  /// A body left the finite numbers; the state is as before the step. Look at it: until that body
+  /// is removed or put elsewhere, no step happens any more.
+  bool non_finite = false;
+  BodyId non_finite_body;                                  ///< the first such body
+  std::uint32_t awake = 0;                                 ///< movable bodies awake after the step
+  Backend backend = Backend::x86;                          ///< who found sphere contacts
   SphereAlgorithm algorithm = SphereAlgorithm::automatic;  ///< and how
   ChoiceReason choice = ChoiceReason::fixed;               ///< and why they did
   std::string device_failure;  ///< why x86 took over from a device in this step; else empty
@@ -102,8 +106,15 @@ class JFPX_API World {
   /// @throws OutOfMemory, DeviceError, what a force throws; the state is then as before the step.
   StepReport step();
 
-  /// Living bodies in the order of their indices.
+  /// Living bodies in the order of their indices. Valid until a body is added or removed.
   std::span<const BodyId> bodies() const;
+  /// Whether the body lives in this world.
+  bool contains(BodyId id) const noexcept;
+  /// The living body of an index, as contacts name it.
+  /// @throws InvalidArgument if there is none, or no body ever had that index.
+  BodyId body_at(std::uint32_t index) const;
+  /// @throws InvalidArgument for an unknown id. Valid until a body is added or removed.
+  const Shape& shape(BodyId id) const;
   /// States in the order of bodies().
   std::vector<BodyState> states() const;
   /// @throws InvalidArgument for an unknown id.
@@ -141,8 +152,9 @@ class JFPX_API World {
     if constexpr (CheckedForce<F>) force.validate(force_context());
     return add_any(std::move(force));
   }
-  /// The force, to steer it: world.force<AeroControl>(id).control = 1. A change is not validated
-  /// and wakes nobody: wake() does, where bodies that sleep shall feel it.
+  /// The force, to steer it: world.force<AeroControl>(id).control = 1. Stays where it is until it
+  /// is removed. A change is not validated and wakes nobody: call wake() for sleeping bodies that
+  /// must feel it.
   /// @throws InvalidArgument if the id is unknown or of a force of another type.
   template <Force F>
   F& force(ForceId id) {
@@ -151,7 +163,8 @@ class JFPX_API World {
   }
   /// Wakes all bodies. @throws InvalidArgument for an unknown id.
   void remove_force(ForceId id);
-  std::span<const ForceId> forces() const;  ///< in the order in which they act
+  /// In the order in which they act. Valid until one is added or removed.
+  std::span<const ForceId> forces() const;
 
   /// Adds a contact generator, which is called in every step; wakes all bodies. Generators act in
   /// the order in which they were added. One must not call back into its World.
@@ -159,7 +172,7 @@ class JFPX_API World {
   ContactGeneratorId add_contact_generator(G generator) {
     return add_any_generator(std::move(generator));
   }
-  /// The generator, to change it, which wakes nobody.
+  /// The generator, to change it, which wakes nobody. Stays where it is until it is removed.
   /// @throws InvalidArgument if the id is unknown or of another type.
   template <ContactGenerator G>
   G& contact_generator(ContactGeneratorId id) {
@@ -168,7 +181,8 @@ class JFPX_API World {
   }
   /// Wakes all bodies. @throws InvalidArgument for an unknown id.
   void remove_contact_generator(ContactGeneratorId id);
-  std::span<const ContactGeneratorId> contact_generators() const;  ///< in the order of acting
+  /// In the order in which they act. Valid until one is added or removed.
+  std::span<const ContactGeneratorId> contact_generators() const;
 
   /// What a ray hits first; of bodies at the same distance, the one with the lowest index. Each
   /// query looks at every body, asleep or not, immovable or not: O(bodies), a few nanoseconds each.
@@ -188,7 +202,7 @@ class JFPX_API World {
   /// other, by (a, b); then all others by (a, b); then those of contact generators in their order.
   /// Those of the same a and b come by a's part, then b's part, spheres before boxes; the points of
   /// two parts in the order of their test. None after a failed step, or when bodies were added or
-  /// removed since.
+  /// removed since. Valid until then, or until the next step.
   std::span<const Contact> contacts() const;
   /// Who touched whom in the last step, who began to and who ended, of contacts that were found and
   /// not generated; sorted by (a.index, b.index);

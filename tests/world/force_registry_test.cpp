@@ -151,6 +151,27 @@ TEST(Forces, AreRemovedOnceAndNeverComeBack) {
   EXPECT_EQ(world.last_acceleration(world.bodies()[0]), (Vec3{0, 0, 1}));
 }
 
+/// As large as std::function keeps in itself.
+struct Wind {
+  Real strength = 0;
+  void operator()(ForceContext& context) const {
+    for (const BodyId id : context.bodies()) context.apply_force(id, {strength, 0, 0});
+  }
+};
+
+TEST(Forces, StayWhereTheyAreUntilTheyAreRemoved) {
+  World world = world_of({ball_at({0, 0, 0})});
+  const ForceId before = world.add_force(Drag{.linear = 0});
+  const ForceId id = world.add_force(Wind{1});
+  Wind& wind = world.force<Wind>(id);
+  for (int i = 0; i < 100; ++i) world.add_force(Wind{0});
+  world.remove_force(before);
+  EXPECT_EQ(&world.force<Wind>(id), &wind);
+  wind.strength = 6;
+  world.step();
+  EXPECT_GT(world.last_acceleration(world.bodies()[0]).x, 2);
+}
+
 TEST(Forces, OfARemovedBodyDoNothing) {
   World world = world_of({ball_at({0, 0, 0}), ball_at({9, 0, 0})});
   const BodyId gone = world.bodies()[0], left = world.bodies()[1];
