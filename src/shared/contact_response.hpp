@@ -126,11 +126,15 @@ JFPX_HD inline Displacement projection(const Vec3& normal, const Vec3& arm, Real
   Displacement d{normal * (inverse_mass * per_yield), {}};
   if (!(yield > 0)) return d;
 
-  const Real most = angular_limit * length(add_scaled(arm, normal, -dot(arm, normal)));
   Real turned = yield * per_yield;
-  if (absolute(turned) > most) turned = turned < 0 ? -most : most;
-  d.shift = normal * ((inverse_mass + yield) * per_yield - turned);
   d.turn = inverse_inertia * cross(arm, normal) * (turned / yield);
+  const Real angle = length(d.turn);
+  if (angle > angular_limit) {
+    const Real part = angular_limit / angle;
+    turned = turned * part;
+    d.turn = d.turn * part;
+  }
+  d.shift = normal * ((inverse_mass + yield) * per_yield - turned);
   return d;
 }
 

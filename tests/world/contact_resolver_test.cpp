@@ -277,6 +277,23 @@ TEST(ContactResolver, ProjectionTurnsABodyThatIsHitOffCentreButNotTooFar) {
   EXPECT_NEAR(2 * deep.bodies.moving.orientation[0].z, 0.2, 2e-3);
 }
 
+TEST(ContactResolver, ProjectionTurnsAThinRodNoFurtherEither) {
+  // Pushed near its own axis: easily turned about that, and not at all where the push would turn a
+  // body that is alike about all axes.
+  BodyDef rod = test::ball({0, 0, 0});
+  rod.shape = Box{{1, 0.01_r, 0.01_r}};
+  const BodyDef defs[] = {rod, test::ground()};
+  Scenario s(defs);
+  s.contacts.push_back({0, 1, {0, 1, 0}, {1, 0, 0.01_r}, -1});
+  s.resolve({.max_iterations = 1, .angular_limit = 0.2_r});
+  const Quat& turned = s.bodies.moving.orientation[0];
+  EXPECT_NEAR(2 * std::acos(std::min(1.0, std::fabs(double(turned.w)))), 0.2, 2e-3);
+  // The contact's point has come up by the whole depth all the same.
+  const Vec3 point = s.bodies.moving.position[0] +
+                     cross(Vec3{2 * turned.x, 2 * turned.y, 2 * turned.z}, Vec3{1, 0, 0.01_r});
+  EXPECT_NEAR(point.y, 1 - 0.01 * 15 / 16, 1e-2);
+}
+
 TEST(ContactResolver, SleepersAreLeftAlone) {
   const BodyDef defs[] = {test::ball({0, 0, 0}), test::ball({1, 0, 0})};
   Scenario s(defs);

@@ -243,12 +243,13 @@ TEST(Particle, AGasKeepsItsMomentumAndNeverGainsEnergy) {
 
 TEST(Particle, ColliderAndRepeatsDoNotShowInTheBits) {
   std::vector<ParticleState> first;
-  for (const SphereAlgorithm algorithm :
-       {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+  const SphereColliderOptions ways[] = {
+      {.algorithm = SphereAlgorithm::all_pairs},
+      {.algorithm = SphereAlgorithm::all_pairs},
+      {.algorithm = SphereAlgorithm::all_pairs, .threads = 3},  // rows are shared out by 64
+      {.algorithm = SphereAlgorithm::sorted_tiles, .threads = 3, .simd = SimdLevel::scalar}};
+  for (const SphereColliderOptions& collider : ways) {
     Random random(7);
-    SphereColliderOptions collider;
-    collider.algorithm = algorithm;
-    collider.threads = algorithm == SphereAlgorithm::all_pairs ? 1 : 3;
     ParticleWorld world({.grounds = {kGround}, .collider = collider});
     for (int i = 0; i < 300; ++i) {
       ParticleDef def;

@@ -12,6 +12,7 @@
 #include <cinttypes>
 #include <cstdio>
 #include <cstdlib>
+#include <iterator>
 #include <vector>
 
 namespace jfpx {
@@ -32,8 +33,10 @@ constexpr Pin kPins[] = {
     {"overlap", 32, 60, 0xf2230bd18b8b5575u, 0x7b88a66b3fc8384bu},
     {"lattice", 125, 30, 0x954b8ff8f9bf4aa0u, 0xffd382557645e418u},
     {"polydisperse", 100, 60, 0x53a5b2155ebb9b95u, 0xdda07c7f25f8daa8u},
-    {"mixed", 40, 150, 0xedcd6493fe8d2e86u, 0x50dbfac0b4f12d61u},
+    {"mixed", 40, 150, 0xe7754d5b191f68b6u, 0xacb6fb80d2166f68u},
     {"big-ballistic", 12, 200, 0x9afc83700278eeeau, 0x91aef0ced8d642f8u},
+    // Enough for several threads to sort and search cells.
+    {"polydisperse", 20000, 3, 0x83f37a5b83aeda08u, 0x505dd13569439f7bu},
 };
 
 struct DemoPin {
@@ -48,12 +51,21 @@ constexpr DemoPin kDemoPins[] = {
     {"flight", 900, 0xc255fca24d5f635eu, 0xa3eabd790ad788b7u},
 };
 
+/// Each vector width has its turn with some number of threads; the widest there is with one.
+SimdLevel simd_of(unsigned threads) {
+  constexpr SimdLevel kLevels[] = {SimdLevel::automatic, SimdLevel::scalar, SimdLevel::sse2,
+                                   SimdLevel::avx2, SimdLevel::avx512};
+  return kLevels[(threads - 1) % std::size(kLevels)];
+}
+
 /// False, with a line that says why, if the run goes wrong, resolves nothing, or ends elsewhere.
 bool check(const Pin& pin, unsigned threads) {
   WorldSettings settings;
-  settings.collider = {.backend = Backend::x86, .threads = threads};
-  // Small sets would be searched by one thread.
-  if (threads > 1) settings.collider.algorithm = SphereAlgorithm::sorted_tiles;
+  settings.collider = {.backend = Backend::x86, .threads = threads, .simd = simd_of(threads)};
+  // Of small sets, threads share the rows of all pairs alone.
+  if (threads > 1 && pin.spheres < 20000) {
+    settings.collider.algorithm = SphereAlgorithm::all_pairs;
+  }
   World world(scenes::make(pin.scene, {.spheres = pin.spheres, .seed = 1}), settings);
   std::uint64_t resolved = 0;
   bool finite = true;
