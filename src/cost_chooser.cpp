@@ -36,7 +36,8 @@ constexpr double kSlack = 1.5;
 
 }  // namespace
 
-CostChooser::CostChooser(const std::vector<Way>& ways) {
+CostChooser::CostChooser(const std::vector<Way>& ways, bool asked_always)
+    : asked_always_(asked_always) {
   for (const Way& way : ways) ways_.push_back({.way = way});
 }
 
@@ -59,7 +60,7 @@ CostChooser::Decision CostChooser::choose(const ColliderWork& expected) {
   decide(expected);
   const double us = cost(ways_[current_], expected);
   // No call to a device takes so little.
-  const bool alone = stay_ > 0 || ways_[current_].way.backend != Backend::x86;
+  const bool alone = asked_always_ || stay_ > 0 || ways_[current_].way.backend != Backend::x86;
   const int following =
       alone ? 0 : static_cast<int>(std::min(kMostFollowing, kDecisionEveryUs / us));
   const double spent = us * (1 + following);

@@ -27,8 +27,9 @@ class JFPX_API CostChooser {
     int following;  ///< calls with the same counts that need not ask, nor record()
   };
 
-  /// At least one of `ways` is not dormant.
-  explicit CostChooser(const std::vector<Way>& ways);
+  /// @param ways at least one is not dormant
+  /// @param asked_always choose() is called for each call: none follow
+  explicit CostChooser(const std::vector<Way>& ways, bool asked_always = false);
 
   Decision choose(const ColliderWork& expected);
   /// What the call for which choose() was asked last had to do, and how long it took.
@@ -69,6 +70,7 @@ class JFPX_API CostChooser {
   void start_trial(std::size_t way, int calls);
 
   std::vector<Candidate> ways_;
+  bool asked_always_;
   std::size_t incumbent_ = kNone;  ///< who computes
   std::size_t current_ = kNone;    ///< the incumbent, or who is on trial
   ChoiceReason reason_ = ChoiceReason::fixed;

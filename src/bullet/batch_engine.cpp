@@ -5,6 +5,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/bullet/failure.hpp"
 #include "src/bullet/pair_check.hpp"
 #include "src/bullet/prefetch.hpp"
 
@@ -34,15 +35,6 @@ std::span<const btBroadphasePair> pairs_of(btOverlappingPairCache& cache) {
   // Bullet asserts when an empty cache is asked for its array.
   if (n <= 0) return {};
   return {cache.getOverlappingPairArrayPtr(), static_cast<std::size_t>(n)};
-}
-
-std::string text_of(const std::exception& error) noexcept {
-  try {
-    const std::string text = error.what();
-    return text.empty() ? "unknown" : text;
-  } catch (const std::bad_alloc&) {
-    return "out of memory";  // short enough to need none
-  }
 }
 
 /// Sets a flag for the time of a dispatch, also when a callback throws.
@@ -87,7 +79,6 @@ BatchEngine::BatchEngine(std::unique_ptr<SphereCollider> collider, const Dispatc
 Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatcher,
                                           std::size_t pairs, const btDispatcherInfo& info) const {
   if (running_) return Fallback::nested;
-  if (given_up_) return Fallback::collider_failed;
   if (pairs == 0 || pairs < minimum_batch_) return Fallback::small_batch;
   if (dispatcher.getNearCallback() != btNearCallback(btCollisionDispatcher::defaultNearCallback)) {
     return Fallback::near_callback;
@@ -118,13 +109,14 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
     return true;
   } catch (const std::exception& error) {
     stats_.failure = text_of(error);
-    given_up_ = true;
-    *fallback = Fallback::collider_failed;
+    batch_.forget_all();
+    *fallback = Fallback::out_of_memory;
     return false;
   }
 }
 
-/// If the collider fails, for example because its device is lost, x86 takes over for good.
+/// If the collider fails, for example because its device is lost, x86 takes over for good. What x86
+/// itself can want is memory, which the next dispatch may find.
 void BatchEngine::find_touching() {
   try {
     touching_ = collider_->find_touching(batch_.spheres(), batch_.pairs());
@@ -134,7 +126,8 @@ void BatchEngine::find_touching() {
     stats_.from_device += bytes.from_device;
     if (const auto why = collider_->device_failure(); !why.empty()) stats_.device_failure = why;
   } catch (const std::exception& error) {
-    if (!stats_.device_failure.empty()) throw;
+    const bool on_x86 = !stats_.device_failure.empty() || collider_->backend() == Backend::x86;
+    if (on_x86 && is_shortage(error)) throw;
     stats_.device_failure = text_of(error);
     collider_ = make_sphere_collider({.backend = Backend::x86, .threads = pool_.threads()});
     touching_ = collider_->find_touching(batch_.spheres(), batch_.pairs());
@@ -258,12 +251,10 @@ void BatchEngine::note(const std::optional<FieldDifference>& difference) {
 }
 
 void BatchEngine::reset_stats() {
-  std::string failure = std::move(stats_.failure);
   std::string device_failure = std::move(stats_.device_failure);
   std::string warning = std::move(stats_.warning);
   stats_ = {};
   stats_.warning = std::move(warning);
-  stats_.failure = std::move(failure);
   stats_.device_failure = std::move(device_failure);
 }
 

@@ -65,7 +65,6 @@ class JFPX_API BatchEngine {
   std::size_t minimum_batch_;
   bool verify_;
   bool running_ = false;
-  bool given_up_ = false;
   x86::ThreadPool pool_;
   SphereBatch batch_;
   QuietCommit quiet_commit_;

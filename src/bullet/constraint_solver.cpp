@@ -31,6 +31,9 @@ namespace {
 
 constexpr std::size_t kBodiesAChunk = 256;
 constexpr std::size_t kBlocksAChunk = 16;
+/// A residual is kept for each, and set to 0 in each group. Who asks for more means "until it is
+/// solved", and takes Bullet's time.
+constexpr int kMostIterations = 1 << 16;
 /// SOLVER_SIMD means nothing on Linux; SOLVER_FRICTION_SEPARATE and SOLVER_CACHE_FRIENDLY nowhere.
 constexpr int kUnsupportedModes = SOLVER_RANDMIZE_ORDER | SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
 
@@ -50,10 +53,11 @@ const void* target(const void* object, Member member) {
 }  // namespace
 
 struct ConstraintSolver::Impl {
-  using Steps = std::array<const void*, 7>;
+  using Steps = std::array<const void*, 8>;
 
   ConstraintSolver& self;
-  const Steps own_steps;  ///< of this very class
+  const Steps own_steps;                        ///< of this very class
+  const btSingleConstraintRowSolver own_split;  ///< Bullet's own
   x86::RowSolver solver;
   DeviceGroups device;
   std::size_t minimum_batch;
@@ -74,6 +78,7 @@ struct ConstraintSolver::Impl {
   Impl(ConstraintSolver& owner, const ConstraintSolverOptions& options, GroupSolverMaker make)
       : self((verify_build(options.headers), owner)),
         own_steps(steps()),
+        own_split(owner.m_resolveSplitPenetrationImpulse),
         solver(options.threads, options.simd),
         device(options.backend, std::move(make), solver.pool().threads()),
         minimum_batch(options.minimum_batch) {}
@@ -82,6 +87,7 @@ struct ConstraintSolver::Impl {
   Steps steps() const {
     return {target(&self, &ConstraintSolver::convertContacts),
             target(&self, &ConstraintSolver::convertBodies),
+            target(&self, &ConstraintSolver::convertJoints),
             target(&self, &ConstraintSolver::solveSingleIteration),
             target(&self, &ConstraintSolver::solveGroupCacheFriendlySetup),
             target(&self, &ConstraintSolver::solveGroupCacheFriendlyIterations),
@@ -89,15 +95,26 @@ struct ConstraintSolver::Impl {
             target(&self, &ConstraintSolver::solveGroupCacheFriendlyFinish)};
   }
 
+  /// A joint may ask for more than the world does.
+  int most_iterations() const {
+    int most = info->m_numIterations;
+    for (const btTypedConstraint* joint : joints) {
+      most = std::max(most, joint->getOverrideNumSolverIterations());
+    }
+    return most;
+  }
+
   std::optional<SolverFallback> obstacle(int manifold_count) const {
     if (static_cast<std::size_t>(manifold_count) < minimum_batch) return SolverFallback::small;
     if (steps() != own_steps) return SolverFallback::overridden;
-    if ((info->m_solverMode & kUnsupportedModes) != 0 || info->m_numIterations <= 0) {
+    if ((info->m_solverMode & kUnsupportedModes) != 0 || info->m_numIterations <= 0 ||
+        most_iterations() > kMostIterations) {
       return SolverFallback::mode;
     }
     if (self.m_resolveSingleConstraintRowGeneric != self.getScalarConstraintRowSolverGeneric() ||
         self.m_resolveSingleConstraintRowLowerLimit !=
-            self.getScalarConstraintRowSolverLowerLimit()) {
+            self.getScalarConstraintRowSolverLowerLimit() ||
+        self.m_resolveSplitPenetrationImpulse != own_split) {
       return SolverFallback::row_solver;
     }
     if (!are_known_joints(joints)) return SolverFallback::constraints;
@@ -294,6 +311,7 @@ struct ConstraintSolver::Impl {
   SolverFallback give_back(SolverFallback why) {
     for (const LateBody& late : scan.late()) late.object->setCompanionId(late.companion);
     for (const LateBody& late : joint_late) late.object->setCompanionId(late.companion);
+    device.abandon();
     return why;
   }
 
@@ -332,10 +350,9 @@ struct ConstraintSolver::Impl {
   }
 
   void set_up_block(std::uint32_t block) {
-    constexpr std::size_t kMostLanes = 8;
     const std::size_t lanes = solver.lanes();
-    alignas(64) Real inputs[rows::kInputFields * kMostLanes] = {};
-    alignas(64) Real second[3 * kMostLanes];
+    alignas(64) Real inputs[rows::kInputFields * rows::kMostLanes] = {};
+    alignas(64) Real second[3 * rows::kMostLanes];
     const std::uint32_t* contacts = solver.contacts_of(block);
     std::size_t used = 0;
     for (; used < lanes && contacts[used] != x86::RowSolver::kNoContact; ++used) {

@@ -70,7 +70,8 @@ DeviceGroups::DeviceGroups(Backend backend, GroupSolverMaker make, unsigned thre
     asleep_ = true;
     chooser_.emplace(
         std::vector<CostChooser::Way>{{Backend::x86, SphereAlgorithm::automatic, x86_},
-                                      {Backend::cuda, SphereAlgorithm::automatic, cuda_, true}});
+                                      {Backend::cuda, SphereAlgorithm::automatic, cuda_, true}},
+        true);
   }
 }
 
@@ -115,8 +116,8 @@ void DeviceGroups::give_up(const std::string& why) {
 }
 
 void DeviceGroups::finished(std::uint32_t levels) {
-  if (levels > 0) levels_a_contact_ = levels / std::max(1.0, work_.pairs);
-  if (!timed_ || !chooser_) return;
+  if (!timed_ || !chooser_) return;  // levels of another group than that of work_
+  if (levels > 0) levels_a_contact_ = levels / work_.pairs;
   const std::chrono::duration<double, std::micro> us = Clock::now() - since_;
   chooser_->record(work_, us.count());
   timed_ = false;
@@ -135,6 +136,8 @@ std::optional<rows::RowSweepReport> DeviceGroups::solve(const DeviceGroup& group
       }
     }
     return solve_packed(group);
+  } catch (const std::bad_alloc&) {  // of the host, not of the device
+    throw;
   } catch (const std::exception& error) {
     give_up(error.what());
     return std::nullopt;
@@ -252,7 +255,7 @@ void DeviceGroups::write_back(const DeviceGroup& group) const {
             });
 }
 
-/// As Bullet leaves a point: see ConstraintSolver's set_directions().
+/// As Bullet leaves a point: see ConstraintSolver's set_friction_directions().
 void DeviceGroups::write_back(const DeviceGroup& group, const rows::ContactOutcome& from,
                               btManifoldPoint& point) {
   point.m_lateralFrictionDir1.setValue(from.direction[0], from.direction[1], from.direction[2]);

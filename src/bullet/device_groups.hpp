@@ -56,6 +56,8 @@ class DeviceGroups {
   void write_back(const DeviceGroup& group) const;
   /// @param levels of the group's order, as x86 has found it; 0: x86 has not
   void finished(std::uint32_t levels);
+  /// The group was not solved: its time tells nothing.
+  void abandon() noexcept { timed_ = false; }
 
   /// Why the device was given up; empty if it was not.
   const std::string& failure() const noexcept { return failure_; }

@@ -68,8 +68,8 @@ std::string_view to_string(Fallback fallback) noexcept {
       return "continuous dispatch";
     case Fallback::nested:
       return "nested dispatch";
-    case Fallback::collider_failed:
-      return "collider failed";
+    case Fallback::out_of_memory:
+      return "out of memory";
   }
   return "unknown";
 }

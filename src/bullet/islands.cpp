@@ -272,15 +272,19 @@ void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
                                btTypedConstraint** constraints, int constraint_count) {
   sort_manifolds(world.getDispatchInfo().m_deterministicOverlappingPairs);
   const btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  const auto begin_group = [&] {
+    bodies_.clear();
+    manifolds_.clear();
+    constraints_.clear();
+  };
   const auto solve_group = [&] {
     solver.solveGroup(bodies_.data(), static_cast<int>(bodies_.size()), manifolds_.data(),
                       static_cast<int>(manifolds_.size()), constraints_.data(),
                       static_cast<int>(constraints_.size()), info, world.getDebugDrawer(),
                       world.getDispatcher());
-    bodies_.clear();
-    manifolds_.clear();
-    constraints_.clear();
+    begin_group();
   };
+  begin_group();  // what a solver that threw left behind may be gone
   int key = 0, joint = 0;
   for (int first = 0, last = 0; first < unions.getNumElements(); first = last) {
     const int island = unions.getElement(first).m_id;

@@ -48,6 +48,8 @@ class PairMirror {
                x86::ThreadPool& pool);
   /// A manifold is about to be released.
   void forget(const btPersistentManifold* manifold) noexcept;
+  /// After refresh() has thrown: nothing that is remembered may be used.
+  void forget_all() noexcept { lost_ = true; }
 
   /// The numbers of the two proxies of every pair.
   std::span<const SpherePair> pairs() const { return pairs_; }
@@ -97,7 +99,6 @@ class PairMirror {
                            std::size_t end, std::uint32_t* changed) const;
   void update(std::span<const btBroadphasePair> pairs, std::span<const std::uint32_t> changed,
               const PairOwner& owner);
-  void read_links(std::span<const btBroadphasePair> pairs, std::size_t begin, std::size_t end);
 
   ProxyTable proxies_;
   std::vector<Key> keys_;
@@ -108,7 +109,7 @@ class PairMirror {
   std::vector<const btPersistentManifold*> released_;
   std::vector<std::uint64_t> release_bits_;  ///< a set with false positives, which cost a look
   int release_shift_ = 0;
-  bool lost_ = false;  ///< too much was released to remember
+  bool lost_ = false;  ///< what is remembered is of no use, or too much was released to remember
 };
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -2,117 +2,65 @@
 #include "src/bullet/preload_engine.hpp"
 
 #include "src/bullet/batch_engine.hpp"
+#include "src/bullet/lease_pool.hpp"
 #include "src/bullet/preload_options.hpp"
 #include "src/bullet/preload_solver.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 
 #include <cstdio>
-#include <mutex>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <typeinfo>
-#include <vector>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
 
-/// From JFPX_PRELOAD_BACKEND, _MINIMUM_BATCH, _THREADS and _VERIFY.
-DispatcherOptions options_from_environment() {
+std::unique_ptr<BatchEngine> make_engine() {
+  const PreloadOptions& from = preload_options();
   DispatcherOptions options;
-  const std::string_view backend = preload_setting("JFPX_PRELOAD_BACKEND");
-  if (backend == "x86") options.collider.backend = Backend::x86;
-  if (backend == "cuda") options.collider.backend = Backend::cuda;
-  if (const auto pairs = preload_number("JFPX_PRELOAD_MINIMUM_BATCH"))
-    options.minimum_batch = *pairs;
-  options.collider.threads = preload_threads();
-  const std::string_view verify = preload_setting("JFPX_PRELOAD_VERIFY");
-  options.verify = !verify.empty() && verify != "0";
-  return options;
+  options.collider.backend = from.backend;
+  options.collider.threads = from.threads;
+  if (from.minimum_batch) options.minimum_batch = *from.minimum_batch;
+  options.verify = from.verify;
+  return std::make_unique<BatchEngine>(make_sphere_collider(options.collider), options);
 }
 
-/// One engine for each dispatch that runs at the same time: dispatchers may live in several
-/// threads, and nothing says when one of them is gone.
-class EnginePool {
- public:
-  /// Never destroyed: threads may dispatch, and the summary is written, while the process ends.
-  static EnginePool& instance() {
-    static EnginePool& pool = *new EnginePool;
-    return pool;
-  }
+/// Never destroyed: threads may dispatch, and the summary is written, while the process ends.
+LeasePool<BatchEngine>& pool() {
+  static auto& made = *new LeasePool<BatchEngine>(make_engine);
+  return made;
+}
 
-  /// Null if no collider can be had.
-  BatchEngine* take() {
-    const std::lock_guard lock(mutex_);
-    if (idle_.empty()) return make();
-    BatchEngine* engine = idle_.back();
-    idle_.pop_back();
-    return engine;
-  }
-  void give_back(BatchEngine* engine) {
-    const std::lock_guard lock(mutex_);
-    idle_.push_back(engine);
-  }
-  /// Of the engines that are not at work.
-  DispatchStats stats(std::string_view* backend) {
-    const std::lock_guard lock(mutex_);
-    DispatchStats sum;
-    for (const BatchEngine* engine : idle_) {
-      const DispatchStats& stats = engine->stats();
-      sum.dispatches += stats.dispatches;
-      sum.batches += stats.batches;
-      sum.pairs += stats.pairs;
-      sum.sphere_pairs += stats.sphere_pairs;
-      sum.touching += stats.touching;
-      sum.written += stats.written;
-      sum.sphere_boxes += stats.sphere_boxes;
-      sum.sphere_planes += stats.sphere_planes;
-      sum.verified += stats.verified;
-      if (sum.mismatches == 0) sum.first_mismatch = stats.first_mismatch;
-      sum.mismatches += stats.mismatches;
-      for (std::size_t i = 0; i < kFallbackCount; ++i) sum.fallbacks[i] += stats.fallbacks[i];
-      if (!stats.failure.empty()) sum.failure = stats.failure;
-      sum.prepare_ms += stats.prepare_ms;
-      sum.commit_ms += stats.commit_ms;
-      if (stats.batches > 0) *backend = to_string(engine->backend());
-    }
-    if (!failure_.empty()) sum.failure = failure_;
-    return sum;
-  }
-
- private:
-  BatchEngine* make() {
-    if (!failure_.empty()) return nullptr;
-    try {
-      const DispatcherOptions options = options_from_environment();
-      idle_.reserve(++made_);
-      return new BatchEngine(make_sphere_collider(options.collider), options);
-    } catch (const std::exception& error) {
-      failure_ = error.what();
-      return nullptr;
-    }
-  }
-
-  std::mutex mutex_;
-  std::vector<BatchEngine*> idle_;
-  std::size_t made_ = 0;  ///< room for all in idle_, so that giving back can't fail
-  std::string failure_;
-};
-
-/// An engine for the time of a dispatch, also when a callback throws.
-class Lease {
- public:
-  Lease() : engine_(EnginePool::instance().take()) {}
-  ~Lease() {
-    if (engine_ != nullptr) EnginePool::instance().give_back(engine_);
-  }
-  Lease(const Lease&) = delete;
-  Lease& operator=(const Lease&) = delete;
-  BatchEngine* get() const { return engine_; }
-
- private:
-  BatchEngine* engine_;
-};
+/// @param backend who computed, if somebody did
+DispatchStats sum_of_stats(std::string_view* backend) {
+  DispatchStats sum;
+  pool().for_each_idle([&](const BatchEngine& engine) {
+    const DispatchStats& stats = engine.stats();
+    sum.dispatches += stats.dispatches;
+    sum.batches += stats.batches;
+    sum.pairs += stats.pairs;
+    sum.sphere_pairs += stats.sphere_pairs;
+    sum.touching += stats.touching;
+    sum.written += stats.written;
+    sum.sphere_boxes += stats.sphere_boxes;
+    sum.sphere_planes += stats.sphere_planes;
+    sum.verified += stats.verified;
+    if (sum.mismatches == 0) sum.first_mismatch = stats.first_mismatch;
+    sum.mismatches += stats.mismatches;
+    for (std::size_t i = 0; i < kFallbackCount; ++i) sum.fallbacks[i] += stats.fallbacks[i];
+    sum.to_device += stats.to_device;
+    sum.from_device += stats.from_device;
+    if (!stats.failure.empty()) sum.failure = stats.failure;
+    if (!stats.device_failure.empty()) sum.device_failure = stats.device_failure;
+    sum.prepare_ms += stats.prepare_ms;
+    sum.commit_ms += stats.commit_ms;
+    if (stats.batches > 0) *backend = to_string(engine.backend());
+  });
+  if (const std::string why = pool().why(); !why.empty()) sum.failure = why;
+  return sum;
+}
 
 }  // namespace
 
@@ -120,7 +68,7 @@ extern "C" {
 
 JFPX_API bool jfpx_preload_try_dispatch(void* dispatcher, void* pair_cache, const void* info,
                                         void* argument) {
-  const Lease engine;
+  const LeasePool<BatchEngine>::Lease engine(pool());
   if (engine.get() == nullptr) return false;
   btCollisionDispatcher& own = *static_cast<btCollisionDispatcher*>(dispatcher);
   const bool subclass = typeid(own) != typeid(btCollisionDispatcher);
@@ -133,7 +81,7 @@ JFPX_API bool jfpx_preload_try_dispatch(void* dispatcher, void* pair_cache, cons
 JFPX_API void jfpx_preload_print_summary(const char* prefix) {
   using Count = unsigned long long;
   std::string_view backend = "none";
-  const DispatchStats stats = EnginePool::instance().stats(&backend);
+  const DispatchStats stats = sum_of_stats(&backend);
   std::fprintf(stderr, "%sBullet in %s: %llu dispatches, %llu batches (%.*s)\n", prefix,
                sizeof(Real) == 4 ? "float" : "double", Count{stats.dispatches},
                Count{stats.batches}, static_cast<int>(backend.size()), backend.data());
@@ -152,8 +100,8 @@ JFPX_API void jfpx_preload_print_summary(const char* prefix) {
     std::fprintf(stderr, "%sverified: %llu sphere pairs, %llu mismatches %s\n", prefix,
                  Count{stats.verified}, Count{stats.mismatches}, stats.first_mismatch.c_str());
   }
-  if (!stats.failure.empty()) {
-    std::fprintf(stderr, "%sthe collider failed: %s\n", prefix, stats.failure.c_str());
+  for (const std::string& why : {stats.failure, stats.device_failure}) {
+    if (!why.empty()) std::fprintf(stderr, "%sfailed: %s\n", prefix, why.c_str());
   }
   print_solver_summary(prefix);
 }

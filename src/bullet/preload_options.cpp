@@ -1,27 +1,64 @@
 /// Reading the environment; see the header.
 #include "src/bullet/preload_options.hpp"
 
+#include "src/x86/thread_pool.hpp"
+
 #include <charconv>
+#include <cstdio>
 #include <cstdlib>
+#include <limits>
+#include <string_view>
 
 namespace jfpx::inline JFPX_ABI::bullet {
+namespace {
 
-std::string_view preload_setting(const char* name) {
+/// Empty if not set.
+std::string_view setting(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? std::string_view{} : value;
 }
 
-std::optional<unsigned long long> preload_number(const char* name) {
-  const std::string_view text = preload_setting(name);
-  unsigned long long value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
+void ignore(const char* name, std::string_view value, const char* allowed) {
+  std::fprintf(stderr, "jfpx preload: %s is \"%.*s\"; it must be %s. It is ignored\n", name,
+               static_cast<int>(value.size()), value.data(), allowed);
 }
 
-unsigned preload_threads() {
-  const auto threads = preload_number("JFPX_PRELOAD_THREADS");
-  return threads && *threads <= 256 ? static_cast<unsigned>(*threads) : 1;
+std::optional<std::size_t> number(const char* name, std::size_t most, const char* allowed) {
+  const std::string_view text = setting(name);
+  if (text.empty()) return std::nullopt;
+  std::size_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc() && end == text.data() + text.size() && value <= most) return value;
+  ignore(name, text, allowed);
+  return std::nullopt;
+}
+
+PreloadOptions read() {
+  PreloadOptions options;
+  constexpr const char* kBackend = "JFPX_PRELOAD_BACKEND";
+  if (const std::string_view text = setting(kBackend); !text.empty()) {
+    if (const auto backend = parse_backend(text)) {
+      options.backend = *backend;
+    } else {
+      ignore(kBackend, text, "auto, x86 or cuda");
+    }
+  }
+  static_assert(x86::ThreadPool::kMost == 256, "the text says so");
+  if (const auto threads = number("JFPX_PRELOAD_THREADS", x86::ThreadPool::kMost, "0 to 256")) {
+    options.threads = static_cast<unsigned>(*threads);
+  }
+  options.minimum_batch = number("JFPX_PRELOAD_MINIMUM_BATCH",
+                                 std::numeric_limits<std::size_t>::max(), "a whole number");
+  const std::string_view verify = setting("JFPX_PRELOAD_VERIFY");
+  options.verify = !verify.empty() && verify != "0";
+  return options;
+}
+
+}  // namespace
+
+const PreloadOptions& preload_options() {
+  static const PreloadOptions options = read();
+  return options;
 }
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -1,18 +1,21 @@
-/// What the environment tells the preloaded engines. Values that mean nothing are as good as none:
-/// there is nobody to tell.
+/// What the environment tells the preloaded parts.
 #pragma once
 
-#include <jfpx/config.hpp>
+#include <jfpx/backend.hpp>
 
+#include <cstddef>
 #include <optional>
-#include <string_view>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 
-/// Empty if not set.
-std::string_view preload_setting(const char* name);
-std::optional<unsigned long long> preload_number(const char* name);
-/// JFPX_PRELOAD_THREADS: 0 is one per core; 1 if not set.
-unsigned preload_threads();
+struct PreloadOptions {
+  Backend backend = Backend::automatic;      ///< JFPX_PRELOAD_BACKEND
+  unsigned threads = 1;                      ///< JFPX_PRELOAD_THREADS: 0 is one per core
+  std::optional<std::size_t> minimum_batch;  ///< JFPX_PRELOAD_MINIMUM_BATCH
+  bool verify = false;                       ///< JFPX_PRELOAD_VERIFY
+};
+
+/// Read once. A value that means nothing is told on stderr, and as good as none. Thread-safe.
+const PreloadOptions& preload_options();
 
 }  // namespace jfpx::inline JFPX_ABI::bullet

@@ -4,14 +4,15 @@
 #include <jfpx/bullet/constraint_solver.hpp>
 
 #include "src/bullet/box_update.hpp"
+#include "src/bullet/lease_pool.hpp"
 #include "src/bullet/preload_options.hpp"
 
 #include <atomic>
 #include <cstdio>
-#include <mutex>
+#include <memory>
+#include <string>
 #include <string_view>
 #include <typeinfo>
-#include <vector>
 
 namespace jfpx::inline JFPX_ABI::bullet {
 namespace {
@@ -31,80 +32,54 @@ struct SolverState : btSequentialImpulseConstraintSolver {
   }
 };
 
-ConstraintSolverOptions options_from_environment() {
+std::unique_ptr<ConstraintSolver> make_solver() {
+  const PreloadOptions& from = preload_options();
   ConstraintSolverOptions options;
-  // Else whoever is faster, which is never an error: there is nobody to tell.
-  if (preload_setting("JFPX_PRELOAD_BACKEND") == "x86") options.backend = Backend::x86;
-  options.threads = preload_threads();
-  if (const auto least = preload_number("JFPX_PRELOAD_MINIMUM_BATCH")) {
-    options.minimum_batch = *least;
-  }
-  return options;
+  options.backend = from.backend;
+  options.threads = from.threads;
+  if (from.minimum_batch) options.minimum_batch = *from.minimum_batch;
+  return std::make_unique<ConstraintSolver>(options);
 }
 
-/// One solver for each group that is solved at the same time: they take the place of the program's
-/// for a group, because nothing says when one of those is gone.
-class SolverPool {
+/// Never destroyed, as what follows: threads may solve, and the summary is written, while the
+/// process ends.
+LeasePool<ConstraintSolver>& pool() {
+  static auto& made = *new LeasePool<ConstraintSolver>(make_solver);
+  return made;
+}
+
+std::atomic<std::uint64_t> g_small{0}, g_boxes{0};
+
+std::size_t minimum_batch() {
+  return preload_options().minimum_batch.value_or(ConstraintSolverOptions{}.minimum_batch);
+}
+
+ConstraintSolverStats sum_of_stats() {
+  ConstraintSolverStats sum;
+  pool().for_each_idle([&](const ConstraintSolver& solver) {
+    const ConstraintSolverStats& stats = solver.stats();
+    sum.groups += stats.groups;
+    sum.on_device += stats.on_device;
+    sum.contacts += stats.contacts;
+    sum.joints += stats.joints;
+    sum.sweeps += stats.sweeps;
+    for (std::size_t i = 0; i < kSolverFallbacks; ++i) sum.fallbacks[i] += stats.fallbacks[i];
+    if (!stats.device_failure.empty()) sum.device_failure = stats.device_failure;
+  });
+  sum.fallbacks[static_cast<std::size_t>(SolverFallback::small)] += g_small;
+  return sum;
+}
+
+/// All that a solver remembers goes there and back, also when something in between throws.
+class TakenOver {
  public:
-  /// Never destroyed: threads may solve, and the summary is written, while the process ends.
-  static SolverPool& instance() {
-    static SolverPool& pool = *new SolverPool;
-    return pool;
-  }
-  ConstraintSolver* take() {
-    const std::lock_guard lock(mutex_);
-    if (idle_.empty()) {
-      idle_.reserve(++made_);
-      return new ConstraintSolver(options_);
-    }
-    ConstraintSolver* solver = idle_.back();
-    idle_.pop_back();
-    return solver;
-  }
-  void give_back(ConstraintSolver* solver) {
-    const std::lock_guard lock(mutex_);
-    idle_.push_back(solver);
-  }
-  std::size_t minimum_batch() const { return options_.minimum_batch; }
-
-  /// Of the solvers that are not at work.
-  ConstraintSolverStats stats() {
-    const std::lock_guard lock(mutex_);
-    ConstraintSolverStats sum;
-    for (const ConstraintSolver* solver : idle_) {
-      const ConstraintSolverStats& stats = solver->stats();
-      sum.groups += stats.groups;
-      sum.contacts += stats.contacts;
-      sum.joints += stats.joints;
-      for (std::size_t i = 0; i < kSolverFallbacks; ++i) sum.fallbacks[i] += stats.fallbacks[i];
-    }
-    sum.fallbacks[static_cast<std::size_t>(SolverFallback::small)] += small;
-    return sum;
-  }
-
-  std::atomic<std::uint64_t> small{0}, boxes{0};
-
- private:
-  const ConstraintSolverOptions options_ = options_from_environment();
-  std::mutex mutex_;
-  std::vector<ConstraintSolver*> idle_;
-  std::size_t made_ = 0;  ///< room for all in idle_, so that giving back can't fail
-};
-
-/// A solver for the time of a group, also when something in it throws.
-class StandIn {
- public:
-  explicit StandIn(btSequentialImpulseConstraintSolver* original)
-      : original_(original), solver_(SolverPool::instance().take()) {
+  TakenOver(btSequentialImpulseConstraintSolver* original, ConstraintSolver* solver)
+      : original_(original), solver_(solver) {
     SolverState::copy(*original_, solver_);
   }
-  ~StandIn() {
-    SolverState::copy(*solver_, original_);
-    SolverPool::instance().give_back(solver_);
-  }
-  StandIn(const StandIn&) = delete;
-  StandIn& operator=(const StandIn&) = delete;
-  ConstraintSolver* operator->() const { return solver_; }
+  ~TakenOver() { SolverState::copy(*solver_, original_); }
+  TakenOver(const TakenOver&) = delete;
+  TakenOver& operator=(const TakenOver&) = delete;
 
  private:
   btSequentialImpulseConstraintSolver* original_;
@@ -115,10 +90,9 @@ class StandIn {
 
 void print_solver_summary(const char* prefix) {
   using Count = unsigned long long;
-  SolverPool& pool = SolverPool::instance();
-  const ConstraintSolverStats stats = pool.stats();
-  if (pool.boxes > 0) {
-    std::fprintf(stderr, "%sworld: %llu updates of all boxes\n", prefix, Count{pool.boxes});
+  const ConstraintSolverStats stats = sum_of_stats();
+  if (g_boxes > 0) {
+    std::fprintf(stderr, "%sworld: %llu updates of all boxes\n", prefix, Count{g_boxes});
   }
   if (stats.groups > 0) {
     std::fprintf(stderr, "%ssolver: %llu groups, %llu contacts, %llu joints\n", prefix,
@@ -140,17 +114,19 @@ JFPX_API bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count
                                      const void* info, void* drawer, void* dispatcher) {
   auto* own = static_cast<btSequentialImpulseConstraintSolver*>(solver);
   if (typeid(*own) != typeid(btSequentialImpulseConstraintSolver)) return false;
-  SolverPool& pool = SolverPool::instance();
-  if (static_cast<std::size_t>(manifold_count) < pool.minimum_batch()) {
-    pool.small.fetch_add(1, std::memory_order_relaxed);
+  if (static_cast<std::size_t>(manifold_count) < minimum_batch()) {
+    g_small.fetch_add(1, std::memory_order_relaxed);
     return false;
   }
-  const StandIn stand_in(own);
-  stand_in->solveGroup(reinterpret_cast<btCollisionObject**>(bodies), body_count,
-                       reinterpret_cast<btPersistentManifold**>(manifolds), manifold_count,
-                       reinterpret_cast<btTypedConstraint**>(joints), joint_count,
-                       *static_cast<const btContactSolverInfo*>(info),
-                       static_cast<btIDebugDraw*>(drawer), static_cast<btDispatcher*>(dispatcher));
+  const LeasePool<ConstraintSolver>::Lease lease(pool());
+  if (lease.get() == nullptr) return false;
+  const TakenOver taken_over(own, lease.get());
+  lease.get()->solveGroup(reinterpret_cast<btCollisionObject**>(bodies), body_count,
+                          reinterpret_cast<btPersistentManifold**>(manifolds), manifold_count,
+                          reinterpret_cast<btTypedConstraint**>(joints), joint_count,
+                          *static_cast<const btContactSolverInfo*>(info),
+                          static_cast<btIDebugDraw*>(drawer),
+                          static_cast<btDispatcher*>(dispatcher));
   return true;
 }
 
@@ -158,7 +134,7 @@ JFPX_API bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count
 JFPX_API bool jfpx_preload_try_update_boxes(void* world) {
   thread_local BoxUpdate update;
   if (!update.run(*static_cast<btCollisionWorld*>(world))) return false;
-  SolverPool::instance().boxes.fetch_add(1, std::memory_order_relaxed);
+  g_boxes.fetch_add(1, std::memory_order_relaxed);
   return true;
 }
 

@@ -85,9 +85,10 @@ class ProxyTable {
   }
 
   void grow() {
-    capacity_ = capacity_ == 0 ? 64 : 4 * capacity_;
+    const std::size_t more = capacity_ == 0 ? 64 : 4 * capacity_;
+    entries_.resize(more);  // may throw
+    capacity_ = more;
     shift_ = 64 - std::countr_zero(capacity_);
-    entries_.resize(capacity_);
     clear_entries();
     for (std::size_t i = 0; i < proxies_.size(); ++i) {
       *find(proxies_[i]) = {proxies_[i], static_cast<std::uint32_t>(i)};

@@ -41,6 +41,8 @@ class SphereBatch {
   bool gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner,
               x86::ThreadPool& pool);
   void forget(const btPersistentManifold* manifold) noexcept { mirror_.forget(manifold); }
+  /// After gather() has thrown, or where it should read everything anew.
+  void forget_all() noexcept { mirror_.forget_all(); }
 
   /// One entry a body. Bodies that are not spheres have a radius of NaN, so that any pair with one
   /// "touches" and is sorted out where touching pairs are handled: looking at every pair before

@@ -151,7 +151,7 @@ JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real
   const V3 angular_a = a.angular_response(torque_a), angular_b = b.angular_response(-torque_b);
   const auto denominator_a = S::keep(a.real, a.inverse_mass + dot(n, cross(angular_a, arm_a)));
   const auto denominator_b = S::keep(b.real, b.inverse_mass + dot(n, cross(-angular_b, arm_b)));
-  // Lanes without a contact have no body, and must not divide by 0.
+  // Lanes without a contact have no body: 1 stands for 1/0.
   const auto used = S::either(a.real, b.real);
   const auto inverse = S::select(
       used, S::set(settings.relaxation) / (denominator_a + denominator_b + cfm), S::set(1));

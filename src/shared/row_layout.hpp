@@ -73,6 +73,8 @@ struct RowSettings {
 /// Rows against rolling and spinning of a contact: around the normal, and around two axes across
 /// it.
 inline constexpr std::uint32_t kTorsions = 3;
+/// Lanes of a block, whatever the instruction set.
+inline constexpr std::uint32_t kMostLanes = 8;
 
 /// What became of a group of rows.
 struct RowSweepReport {

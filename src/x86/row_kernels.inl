@@ -6,6 +6,7 @@ namespace jfpx::inline JFPX_ABI::x86 {
 namespace {
 
 constexpr std::uint32_t kLanes = Simd::kLanes;
+static_assert(kLanes <= rows::kMostLanes);
 using BlockResidual = rows::Residual<Simd>;
 
 const std::int32_t* ids_of(const RowArrays& arrays, std::uint32_t block) {

@@ -10,16 +10,19 @@
 
 namespace jfpx::inline JFPX_ABI::x86 {
 
+void ThreadPool::check(unsigned threads) {
+  if (threads <= kMost) return;
+  throw InvalidArgument("threads is " + std::to_string(threads) +
+                        "; it must be 0 (one per core) to " + std::to_string(kMost));
+}
+
 ThreadPool::ThreadPool(unsigned threads) {
-  if (threads > kMost) {
-    throw InvalidArgument("threads is " + std::to_string(threads) + "; it must be at most " +
-                          std::to_string(kMost));
-  }
+  check(threads);
   if (threads == 0) threads = std::clamp(std::thread::hardware_concurrency(), 1u, kMost);
   workers_.reserve(threads - 1);
   try {
     while (workers_.size() + 1 < threads) {
-      workers_.emplace_back([this](std::stop_token stop) { work(stop); });
+      workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
     }
   } catch (const std::system_error&) {
     // Results do not depend on the number of threads: those that there are do all the work.
@@ -48,7 +51,7 @@ void ThreadPool::run_shared(const Job& job) {
   if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 
-void ThreadPool::work(std::stop_token stop) {
+void ThreadPool::work(const std::stop_token& stop) {
   unsigned seen = 0;
   std::unique_lock lock(mutex_);
   while (started_.wait(lock, stop, [&] { return generation_ != seen; })) {

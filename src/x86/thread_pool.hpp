@@ -18,9 +18,11 @@ namespace jfpx::inline JFPX_ABI::x86 {
 class JFPX_API ThreadPool {
  public:
   static constexpr unsigned kMost = 256;
+  /// @throws InvalidArgument for more than kMost.
+  static void check(unsigned threads);
 
   /// @param threads 0: one per core. Fewer are started where the system refuses more.
-  /// @throws InvalidArgument for more than kMost.
+  /// @throws InvalidArgument as check() does.
   explicit ThreadPool(unsigned threads);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
@@ -48,7 +50,7 @@ class JFPX_API ThreadPool {
   };
 
   void run_shared(const Job& job);
-  void work(std::stop_token stop);
+  void work(const std::stop_token& stop);
   void take_chunks(const Job& job);
 
   std::mutex mutex_;

@@ -34,11 +34,13 @@ void empty(BulletWorld& w) {
   }
 }
 
-std::size_t expect_that_nothing_shows(const TwinOptions& options, int warm_steps = 0) {
-  return with_every_failure([&](std::size_t k, Shortage shortage) {
+/// @returns how many allocations failed
+std::size_t expect_that_nothing_shows(const TwinOptions& options) {
+  std::uint64_t left_to_bullet = 0;
+  bool ours = false;
+  const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
     Twins twins(options);
     twins.both(fill);
-    twins.step(warm_steps);
     const auto step = [](BulletWorld& w) { w.world.stepSimulation(btScalar(1) / 60, 0); };
     step(twins.stock());
     EXPECT_NO_THROW({
@@ -48,9 +50,18 @@ std::size_t expect_that_nothing_shows(const TwinOptions& options, int warm_steps
     const bool failed = FailingNew::failed();
     const bool same = twins.compare() && twins.step(kStepsAfter);
     EXPECT_TRUE(same) << "allocation " << k;
+    if (const CollisionDispatcher* dispatcher = twins.ours().ours()) {
+      ours = true;
+      const DispatchStats& stats = dispatcher->stats();
+      left_to_bullet += stats.fallbacks[static_cast<std::size_t>(Fallback::out_of_memory)];
+      EXPECT_EQ(stats.last_fallback, Fallback::none) << "allocation " << k << ": given up for good";
+      EXPECT_EQ(stats.device_failure, "") << "allocation " << k;
+    }
     twins.both(empty);
     return failed && !testing::Test::HasFailure();
   });
+  EXPECT_EQ(left_to_bullet > 0, ours);
+  return failures;
 }
 
 WorldParts parts(unsigned threads, bool solver, bool world) {

@@ -71,6 +71,23 @@ TEST_F(Preload, GivesThePartsThatAreAskedFor) {
   EXPECT_EQ(jfpx_command("preload --threads 257 -- echo 2>&1").status, 2);
 }
 
+TEST_F(Preload, SaysWhichSettingsMeanNothingAndRunsWithoutThem) {
+  const std::string stock = alone("300").output;
+  setenv("JFPX_PRELOAD_THREADS", "300", 1);
+  setenv("JFPX_PRELOAD_BACKEND", "gpu", 1);
+  setenv("JFPX_PRELOAD_MINIMUM_BATCH", "-1", 1);
+  const ProcessResult ours = jfpx_command("preload -- " JFPX_STOCK_PROGRAM " 300 2>&1");
+  for (const char* name :
+       {"JFPX_PRELOAD_THREADS", "JFPX_PRELOAD_BACKEND", "JFPX_PRELOAD_MINIMUM_BATCH"}) {
+    unsetenv(name);
+  }
+  EXPECT_EQ(ours.status, 0);
+  EXPECT_THAT(ours.output, HasSubstr(stock));
+  EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_THREADS is \"300\"; it must be 0 to 256."));
+  EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_BACKEND is \"gpu\"; it must be auto, x86 or "));
+  EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_MINIMUM_BATCH is \"-1\"; it must be a whole "));
+}
+
 TEST_F(Preload, FindsThePrecisionOfTheProgramByItself) {
   const ProcessResult result =
       jfpx_command("preload --summary --minimum-batch 0 -- " JFPX_OTHER_STOCK_PROGRAM " 50 2>&1");

@@ -31,7 +31,7 @@ std::optional<std::string> compare(LiveWorld& stock, LiveWorld& ours, int step) 
     return "verify: " + dispatcher->stats().first_mismatch;
   }
   if (dispatcher != nullptr && !dispatcher->stats().failure.empty()) {
-    return "the collider failed: " + dispatcher->stats().failure;
+    return "out of memory: " + dispatcher->stats().failure;
   }
   return std::nullopt;
 }

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <stdexcept>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI::bullet {
@@ -342,6 +343,124 @@ TEST(ConstraintSolver, LeavesGroupsToASubclassThatOverridesAStep) {
   EXPECT_EQ(mine.iterations, theirs.iterations);
   EXPECT_EQ(mine.stats().groups, 0u);
   EXPECT_GT(mine.stats().fallbacks[static_cast<std::size_t>(SolverFallback::overridden)], 0u);
+}
+
+/// Hears of the joints of every group, also where there are none.
+template <class Base>
+class JointListener final : public Base {
+ public:
+  int calls = 0;
+
+ protected:
+  void convertJoints(btTypedConstraint** joints, int count,
+                     const btContactSolverInfo& info) override {
+    ++calls;
+    Base::convertJoints(joints, count, info);
+  }
+};
+
+TEST(ConstraintSolver, LeavesGroupsToASubclassThatListensToJoints) {
+  WorldParts stock, ours;
+  stock.solver = [] {
+    return std::make_unique<JointListener<btSequentialImpulseConstraintSolver>>();
+  };
+  ours.solver = [] { return std::make_unique<JointListener<ConstraintSolver>>(); };
+  Sliding worlds(stock, ours);
+  worlds.expect_same(5);
+  const auto& theirs =
+      dynamic_cast<JointListener<btSequentialImpulseConstraintSolver>&>(*worlds.stock().solver);
+  const auto& mine = dynamic_cast<JointListener<ConstraintSolver>&>(*worlds.ours().solver);
+  EXPECT_GT(theirs.calls, 0);
+  EXPECT_EQ(mine.calls, theirs.calls);
+}
+
+/// Parts nothing by split impulses, once told so: a change of the mode, as in the first step, makes
+/// Bullet forget functions that were set.
+template <class Base>
+class Soft final : public Base {
+ public:
+  void soften() {
+    this->m_resolveSplitPenetrationImpulse = [](btSolverBody&, btSolverBody&,
+                                                const btSolverConstraint&) { return btScalar(0); };
+  }
+};
+
+TEST(ConstraintSolver, UsesTheSplitImpulsesOfASubclass) {
+  WorldParts stock, ours;
+  stock.solver = [] { return std::make_unique<Soft<btSequentialImpulseConstraintSolver>>(); };
+  ours.solver = [] { return std::make_unique<Soft<ConstraintSolver>>(); };
+  Sliding worlds(stock, ours);
+  for (BulletWorld* w : {&worlds.stock(), &worlds.ours()}) {
+    w->world.getSolverInfo().m_splitImpulsePenetrationThreshold = 0;  // all that overlaps
+  }
+  worlds.expect_same(1);
+  auto& theirs = dynamic_cast<Soft<btSequentialImpulseConstraintSolver>&>(*worlds.stock().solver);
+  auto& mine = dynamic_cast<Soft<ConstraintSolver>&>(*worlds.ours().solver);
+  theirs.soften();
+  mine.soften();
+  worlds.expect_same(10);
+  EXPECT_GT(mine.stats().fallbacks[static_cast<std::size_t>(SolverFallback::row_solver)], 0u);
+}
+
+TEST(ConstraintSolver, LeavesSweepsWithoutEndToBullet) {
+  constexpr int kForEver = 1'000'000'000;
+  WorldParts ours;
+  ours.solver = our_solver({}).solver;
+  for (const bool by_joint : {false, true}) {
+    Sliding worlds({}, ours);
+    for (BulletWorld* w : {&worlds.stock(), &worlds.ours()}) {
+      w->world.getSolverInfo().m_leastSquaresResidualThreshold = btScalar(1e30);
+      if (!by_joint) {
+        w->world.getSolverInfo().m_numIterations = kForEver;
+        continue;
+      }
+      auto* joint = new btPoint2PointConstraint(*w->bodies[1], btVector3(0, 0, 0));
+      joint->setOverrideNumSolverIterations(kForEver);
+      w->world.addConstraint(joint);
+    }
+    worlds.expect_same(3);
+    const auto& mine = dynamic_cast<ConstraintSolver&>(*worlds.ours().solver);
+    EXPECT_GT(mine.stats().fallbacks[static_cast<std::size_t>(SolverFallback::mode)], 0u);
+    for (BulletWorld* w : {&worlds.stock(), &worlds.ours()}) {
+      if (!by_joint) continue;
+      btTypedConstraint* joint = w->world.getConstraint(0);
+      w->world.removeConstraint(joint);
+      delete joint;
+    }
+  }
+}
+
+/// Throws once.
+struct Throwing final : btSequentialImpulseConstraintSolver {
+  btScalar solveGroup(btCollisionObject** bodies, int body_count, btPersistentManifold** manifolds,
+                      int manifold_count, btTypedConstraint** constraints, int constraint_count,
+                      const btContactSolverInfo& info, btIDebugDraw* drawer,
+                      btDispatcher* dispatcher) override {
+    if (std::exchange(armed, false)) throw std::runtime_error("enough");
+    return btSequentialImpulseConstraintSolver::solveGroup(
+        bodies, body_count, manifolds, manifold_count, constraints, constraint_count, info, drawer,
+        dispatcher);
+  }
+  bool armed = false;
+};
+
+TEST(DynamicsWorld, ForgetsTheGroupInWhichASolverThrew) {
+  WorldParts stock, ours;
+  stock.solver = ours.solver = [] { return std::make_unique<Throwing>(); };
+  ours.world = our_world({}).world;
+  Sliding worlds(stock, ours);
+  for (BulletWorld* w : {&worlds.stock(), &worlds.ours()}) {
+    // All in one group, solved at the end: else Bullet itself would keep bodies that are gone.
+    w->world.getSolverInfo().m_minimumSolverBatchSize = 1 << 20;
+  }
+  worlds.expect_same(5);
+  for (BulletWorld* w : {&worlds.stock(), &worlds.ours()}) {
+    dynamic_cast<Throwing&>(*w->solver).armed = true;
+    EXPECT_THROW(w->world.stepSimulation(btScalar(1) / 60, 0), std::runtime_error);
+    w->world.removeRigidBody(w->bodies.back().get());
+    w->bodies.pop_back();
+  }
+  worlds.expect_same(10);
 }
 
 struct CountingManager final : btSimulationIslandManager {

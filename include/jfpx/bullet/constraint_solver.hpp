@@ -34,8 +34,8 @@ struct ConstraintSolverOptions {
 enum class SolverFallback : std::uint8_t {
   small,        ///< fewer manifolds than the minimum
   overridden,   ///< a subclass overrides a step of Bullet's, such as convertContacts()
-  mode,         ///< random order or cached directions of friction; no iterations
-  row_solver,   ///< the user has set a row solver
+  mode,         ///< random order, cached directions of friction; no iterations, or over 65,536
+  row_solver,   ///< the user, or a subclass, has set a row solver
   constraints,  ///< a constraint of a class that is not Bullet's
   not_finite,   ///< something left the finite numbers: done again by Bullet, for its NaNs
   out_of_memory,

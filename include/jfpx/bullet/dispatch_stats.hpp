@@ -19,7 +19,7 @@ enum class Fallback : std::uint8_t {
   create_function,  ///< the user registered another SPHERE/SPHERE create function
   continuous,       ///< dispatchFunc is not DISPATCH_DISCRETE
   nested,           ///< called from a callback inside another dispatch of this dispatcher
-  collider_failed,  ///< x86 failed too, for want of memory; see DispatchStats::failure
+  out_of_memory,    ///< see DispatchStats::failure; the next dispatch tries again
 };
 inline constexpr std::size_t kFallbackCount = 8;
 
@@ -43,7 +43,7 @@ struct DispatchStats {
   Fallback last_fallback = Fallback::none;                ///< none where the last was a batch
   std::uint64_t to_device = 0;    ///< bytes that the collider sent to a device
   std::uint64_t from_device = 0;  ///< bytes that it got back
-  std::string failure;            ///< why batches were given up for good; empty while all is well
+  std::string failure;            ///< what the last dispatch wanted that ran out of memory
   std::string device_failure;     ///< why x86 took over from the device, if it did
   std::string warning;            ///< that this program does not have Bullet's bits; see fused.hpp
   double prepare_ms = 0;          ///< wall clock of batches: gathering, collider, reading manifolds
