@@ -6,6 +6,7 @@
 #include "src/backend_table.hpp"
 #include "src/cost_model.hpp"
 #include "src/shared/sphere_input.hpp"
+#include "src/x86/thread_pool.hpp"
 
 namespace jfpx::inline JFPX_ABI {
 namespace {
@@ -37,10 +38,7 @@ std::span<const PairContact> SphereCollider::find_touching(std::span<const Spher
 
 std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
   verify_build(options.headers);
-  if (options.threads > 256) {
-    throw InvalidArgument("threads is " + std::to_string(options.threads) +
-                          "; it must be 0 (one per core) to 256");
-  }
+  x86::ThreadPool::check(options.threads);
   if (options.algorithm > SphereAlgorithm::sorted_tiles) {
     throw InvalidArgument("algorithm is none of SphereAlgorithm");
   }

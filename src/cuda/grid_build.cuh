@@ -78,12 +78,7 @@ __device__ inline void measure(const GridArgs& args, BuildStorage& s) {
     }
   }
 #pragma unroll
-  for (unsigned v = 0; v < 8; ++v) {
-    for (unsigned d = 16; d != 0; d /= 2) {
-      const Real other = __shfl_xor_sync(kFullWarp, most[v], static_cast<int>(d));
-      most[v] = most[v] > other ? most[v] : other;
-    }
-  }
+  for (unsigned v = 0; v < 8; ++v) most[v] = warp_max(most[v]);
   const bool any_of_warp = __any_sync(kFullWarp, any);
   if (__any_sync(kFullWarp, far) && lane_id() == 0) args.state->has_far = 1;
   if (lane_id() == 0) {
