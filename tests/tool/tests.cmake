@@ -1,4 +1,3 @@
-find_package(nlohmann_json 3.11 REQUIRED)
 jfpx_add_test(tool_test SOURCES tool/calibrate_test.cpp tool/tool_test.cpp
   LINK jfpx_demos nlohmann_json::nlohmann_json)
 jfpx_add_test(cost_fit_test SOURCES
