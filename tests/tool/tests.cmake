@@ -17,3 +17,6 @@ if(JFPX_HAS_BULLET)
     --jfpx $<TARGET_FILE:jfpx_tool> --spheres 6 --steps 10 --threads "1 3")
   set_tests_properties(identity PROPERTIES PASS_REGULAR_EXPRESSION "all 36 comparisons are identical")
 endif()
+add_test(NAME identity_counts_what_dies COMMAND ${PROJECT_SOURCE_DIR}/scripts/identity
+  --jfpx ${CMAKE_CURRENT_SOURCE_DIR}/tool/killer.sh --only "overlap" --precision float --threads 1)
+set_tests_properties(identity_counts_what_dies PROPERTIES PASS_REGULAR_EXPRESSION "2 of 2 comparisons FAILED")
