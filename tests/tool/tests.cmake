@@ -6,8 +6,9 @@ jfpx_add_test(cost_fit_test SOURCES
   support/sphere_fixtures.cpp)
 foreach(suffix IN ITEMS "" "_f64")
   add_dependencies(tool_test${suffix} jfpx_tool jfpx_tool_f64)
+  # In quotes, as shells run it.
   target_compile_definitions(tool_test${suffix} PRIVATE
-    JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
+    "JFPX_TOOL_PATH=\"\\\"$<TARGET_FILE:jfpx_tool${suffix}>\\\"\""
     JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
 endforeach()
 
