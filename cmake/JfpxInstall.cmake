@@ -1,6 +1,14 @@
 # What `cmake --install` puts where: libraries with their CMake and pkg-config files, headers, programs.
 # All of it can be moved afterwards: no file names the prefix. Components as Debian splits them:
 # runtime, runtime_bullet, dev, tools.
+if(JFPX_INSTALL)
+  foreach(folder IN ITEMS BINDIR LIBDIR INCLUDEDIR)
+    if(IS_ABSOLUTE "${CMAKE_INSTALL_${folder}}")
+      message(FATAL_ERROR "CMAKE_INSTALL_${folder} is \"${CMAKE_INSTALL_${folder}}\"; it must be relative to "
+        "CMAKE_INSTALL_PREFIX, as programs and libraries find each other wherever they are moved together.")
+    endif()
+  endforeach()
+endif()
 set(JFPX_CMAKE_FOLDER ${CMAKE_INSTALL_LIBDIR}/cmake/jfpx)
 file(RELATIVE_PATH JFPX_LIBRARIES_FROM_PROGRAMS /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR})
 

@@ -51,6 +51,10 @@ if(JFPX_HAS_BULLET)
   list(APPEND for_dev libbullet-dev pkg-config) # jfpx-config.cmake finds the one by the other
 endif()
 _jfpx_describe_package(dev libjfpx-dev libdevel "${for_dev}" "rigid-body collision with the same bits everywhere: headers" "${text}")
+if(JFPX_HAS_VIEWER)
+  # SDL loads them when it opens a window or draws without one.
+  set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS "libegl1, libgl1-mesa-dri")
+endif()
 _jfpx_describe_package(tools jfpx-tools science "${libraries}" "commands of jfpx: run, compare, replay, view scenes"
   "${text} Also runs unmodified Bullet programs with it: jfpx preload.")
 include(CPack)

@@ -70,7 +70,9 @@ function(_jfpx_configure target suffix public private)
     CUDA_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
   # Tests stay as they are: they are most of what there is to compile. Less optimised, intrinsics' own
   # headers look uninitialised to g++.
-  if(JFPX_COVERAGE AND NOT suffix AND CMAKE_CURRENT_SOURCE_DIR MATCHES "^${PROJECT_SOURCE_DIR}/src")
+  set(sources ${PROJECT_SOURCE_DIR}/src)
+  cmake_path(IS_PREFIX sources "${CMAKE_CURRENT_SOURCE_DIR}" ours)
+  if(JFPX_COVERAGE AND NOT suffix AND ours)
     target_compile_options(${target} PRIVATE -O1 --coverage -fprofile-update=atomic -Wno-uninitialized)
     target_link_options(${target} PUBLIC --coverage)
   endif()

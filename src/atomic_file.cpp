@@ -6,18 +6,45 @@
 #include "src/file.hpp"
 
 #include <cerrno>
+#include <filesystem>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Something is there, and renaming a file over it would destroy it.
+bool is_special(const std::string& path) {
+  std::error_code ignored;
+  const fs::file_status status = fs::status(path, ignored);
+  return fs::exists(status) && !fs::is_regular_file(status);
+}
+
+/// Where the links end, also where nothing is there yet.
+std::string follow_links(const std::string& path) {
+  constexpr int kMostLinks = 40;  // as Linux: links may go round in circles
+  fs::path target = path;
+  std::error_code ignored;
+  for (int i = 0; i < kMostLinks && fs::is_symlink(target, ignored); ++i) {
+    target = target.parent_path() / fs::read_symlink(target, ignored);
+  }
+  return target.string();
+}
+
+}  // namespace
 
 AtomicFile::AtomicFile(std::string path)
-    : path_(std::move(path)), part_(path_ + ".part"), file_(std::fopen(part_.c_str(), "wb")) {
+    : path_(std::move(path)),
+      target_(is_special(path_) ? path_ : follow_links(path_)),
+      part_(is_special(target_) ? target_ : target_ + ".part"),
+      file_(std::fopen(part_.c_str(), "wb")) {
   if (file_ == nullptr) fail();
 }
 
 AtomicFile::~AtomicFile() {
   if (file_ != nullptr) std::fclose(file_);
-  if (!finished_) std::remove(part_.c_str());
+  if (!finished_ && part_ != target_) std::remove(part_.c_str());
 }
 
 void AtomicFile::write(std::string_view bytes) {
@@ -29,7 +56,7 @@ void AtomicFile::write(std::string_view bytes) {
 void AtomicFile::finish() {
   require_open();
   if (std::fclose(std::exchange(file_, nullptr)) != 0) fail();
-  if (std::rename(part_.c_str(), path_.c_str()) != 0) fail();
+  if (part_ != target_ && std::rename(part_.c_str(), target_.c_str()) != 0) fail();
   finished_ = true;
 }
 

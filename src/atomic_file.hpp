@@ -10,7 +10,8 @@
 namespace jfpx::inline JFPX_ABI {
 
 /// Written beside its path and renamed at the end, so that the file is there whole or not at all.
-/// What was not finished is removed.
+/// What was not finished is removed. A link stays one: the file that it leads to is written. A
+/// device or a pipe can't be replaced: what is written goes there at once.
 class JFPX_API AtomicFile {
  public:
   /// Opens at once, so that a bad path fails before a long run. @throws FileError
@@ -28,7 +29,9 @@ class JFPX_API AtomicFile {
   void require_open() const;
   [[noreturn]] void fail();
 
-  std::string path_, part_;
+  std::string path_;
+  std::string target_;  ///< where the links of path_ end
+  std::string part_;    ///< where it is written; target_ itself if that is no ordinary file
   std::FILE* file_;
   bool finished_ = false, failed_ = false;
 };

@@ -14,7 +14,7 @@ complain() {
 tests=$(
   find tests \( -name '*.cpp' -o -name '*.hpp' -o -name '*.cu' \) -exec cat {} + | tr '\n' ' ' |
     grep -oE 'TEST(_F|_P)?\( *\w+, *\w+ *\)' | sed -E 's/.*\( *(\w+), *(\w+).*/\1.\2/'
-  sed -nE 's/^jfpx_add_install_test\(\w+ (Install\.\w+)\)/\1/p' tests/install/tests.cmake
+  sed -nE 's/^jfpx_add_(install|configure)_test\(\w+ (\w+\.\w+)\)/\2/p' tests/{install,configure}/tests.cmake
   sed -nE 's/^ *jfpx_add_fuzzer\((\w+).*/Fuzz.\1/p' tests/fuzz/tests.cmake
   grep -rhoE 'NAME [A-Z]\w+(\.\w+)?' tests --include='*.cmake' --include=CMakeLists.txt | cut -d' ' -f2
 )

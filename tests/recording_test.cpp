@@ -12,9 +12,13 @@
 
 #include <csignal>
 #include <cstring>
+#include <fcntl.h>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace jfpx {
 namespace {
@@ -209,6 +213,37 @@ TEST(Recording, OfANameThatIsNoUtf8IsReadBackWithAReplacement) {
   header.scene.name = "caf\xe9";
   RecordingWriter(path, header).finish();
   EXPECT_EQ(RecordingReader(path).header().scene.name, "caf\xef\xbf\xbd");
+}
+
+TEST(Recording, GoesWhereALinkLeads) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec"), link = folder.file("link.rec");
+  std::filesystem::create_symlink("run.rec", link);
+  for (const std::uint64_t steps : {1u, 2u}) {  // nothing is there, then a file
+    write_recording(link, 3, steps);
+    EXPECT_TRUE(std::filesystem::is_symlink(link));
+    EXPECT_FALSE(std::filesystem::is_symlink(path));
+    EXPECT_EQ(RecordingReader(path).steps(), steps);
+    EXPECT_EQ(folder.entries(), 2u);
+  }
+}
+
+TEST(Recording, GoesIntoAPipeThatStaysOne) {
+  const test::TemporaryFolder folder;
+  const std::string pipe = folder.file("pipe"), path = folder.file("run.rec");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  write_recording(pipe, 2, 3);  // fits into the pipe
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+  std::string content(1 << 16, '\0');
+  const ssize_t size = read(reader, content.data(), content.size());
+  ASSERT_GT(size, 0);
+  write_recording(path, 2, 3);
+  EXPECT_EQ(content.substr(0, static_cast<std::size_t>(size)), content_of(path));
+  { RecordingWriter unfinished(pipe, header_of(2)); }
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+  close(reader);
 }
 
 TEST(Recording, UnwritablePathIsNamed) {

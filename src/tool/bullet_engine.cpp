@@ -28,10 +28,7 @@ class BulletEngine final : public Engine {
   }
   StageTimes times() const override { return last_step_times(world_); }
   std::string backend() const override { return sphere_backend(world_); }
-  std::string device_failure() const override {
-    const bullet::CollisionDispatcher* dispatcher = world_.jfpx_dispatcher();
-    return dispatcher == nullptr ? std::string() : dispatcher->stats().device_failure;
-  }
+  std::string device_failure() const override { return tool::device_failure(world_); }
 
  private:
   bullet::SceneWorld world_;

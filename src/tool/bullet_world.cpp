@@ -47,4 +47,13 @@ std::string sphere_backend(const bullet::SceneWorld& world) {
   return std::string(to_string(dispatcher->backend()));
 }
 
+std::string device_failure(const bullet::SceneWorld& world) {
+  const bullet::CollisionDispatcher* dispatcher = world.jfpx_dispatcher();
+  if (dispatcher != nullptr && !dispatcher->stats().device_failure.empty()) {
+    return dispatcher->stats().device_failure;
+  }
+  const bullet::ConstraintSolver* solver = world.jfpx_solver();
+  return solver == nullptr ? std::string() : solver->stats().device_failure;
+}
+
 }  // namespace jfpx::inline JFPX_ABI::tool

@@ -16,4 +16,7 @@ std::uint64_t count_contacts(bullet::SceneWorld& world);
 /// Bullet's own code.
 std::string sphere_backend(const bullet::SceneWorld& world);
 
+/// Why x86 took over from a device in dispatcher or solver; empty if in neither.
+std::string device_failure(const bullet::SceneWorld& world);
+
 }  // namespace jfpx::inline JFPX_ABI::tool

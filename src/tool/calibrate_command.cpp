@@ -48,7 +48,7 @@ std::string report(const CostModel& costs) {
                      crossovers.text());
 }
 
-CostModel measure(const Options& options) {
+MeasuredCostModel measure(const Options& options) {
   std::unique_ptr<Progress> progress;
   const Calibration result = calibrate([&](std::uint64_t done, std::uint64_t total) {
     if (!progress) progress = std::make_unique<Progress>("measuring", total, options.quiet);
@@ -59,24 +59,25 @@ CostModel measure(const Options& options) {
     fmt::print(stderr, "jfpx: cuda keeps its default costs: {}\n", result.no_cuda);
   }
   store_costs(result.costs);
-  return result.costs;
+  return {result.costs, this_machine()};
 }
 
-CostModel show(const Options& options) {
+MeasuredCostModel show(const Options& options) {
   const CachedCosts cached = load_cached_costs();
-  if (!cached.problem.empty() && !options.quiet) {
+  if (cached.problem.empty()) return {cached.costs, this_machine()};
+  if (!options.quiet) {
     fmt::print(stderr, "jfpx: {}: these are the default costs\n", cached.problem);
   }
-  return cached.costs;
+  return {cached.costs, {.machine = "none: default costs", .driver = ""}};
 }
 
 int run(const Options& options) {
   OutputFile json(options.json);
-  const CostModel costs = options.show ? show(options) : measure(options);
-  json.write(to_json({costs, this_machine()}));
+  const MeasuredCostModel model = options.show ? show(options) : measure(options);
+  json.write(to_json(model));
   json.finish();
   if (!options.quiet && options.json != "-") {
-    fmt::print("{}\n{}\n", report(costs), cost_model_path());
+    fmt::print("{}\n{}\n", report(model.costs), cost_model_path());
   }
   return kSuccess;
 }

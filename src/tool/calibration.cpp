@@ -137,7 +137,7 @@ void measure_x86(Bench& bench, CostModel* costs) {
   costs->x86_given_pairs = fit_costs(bench.given(Backend::x86, {}), kGivenTerms);
 }
 
-/// @throws BackendUnavailable
+/// @throws BackendUnavailable, DeviceError
 double measure_start() {
   const Clock::time_point start = Clock::now();
   const auto spheres = make_spheres(512, 3);
@@ -155,6 +155,18 @@ void measure_cuda(Bench& bench, CostModel* costs) {
       fit_costs(bench.search(Backend::cuda, sorted_tiles, kManyForDevice), kSortedTerms, copies);
 }
 
+/// A device may be missing, and may fail at any time; that is no reason to know nothing of x86.
+/// @return why it could not be measured; empty if it was
+template <class Measure>
+std::string try_device(const Measure& measure) {
+  try {
+    measure();
+    return {};
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
 }  // namespace
 
 Calibration calibrate(const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
@@ -162,15 +174,19 @@ Calibration calibrate(const std::function<void(std::uint64_t, std::uint64_t)>& p
   Bench bench(progress);
   constexpr std::size_t kD = std::size(kDensities);
   bench.expect(kD * (std::size(kFew) + std::size(kMany)) + std::size(kPairs));
-  try {
-    result.costs.cuda_start_ms = measure_start();
+  double start_ms = 0;
+  // First, while nothing has started the device.
+  result.no_cuda = try_device([&] { start_ms = measure_start(); });
+  if (result.no_cuda.empty()) {
     bench.expect(kD * (std::size(kFewForDevice) + std::size(kManyForDevice)) + std::size(kPairs) +
                  std::size(kCopied));
-  } catch (const BackendUnavailable& error) {
-    result.no_cuda = error.what();
   }
   measure_x86(bench, &result.costs);
-  if (result.no_cuda.empty()) measure_cuda(bench, &result.costs);
+  if (!result.no_cuda.empty()) return result;
+  CostModel with_cuda = result.costs;
+  with_cuda.cuda_start_ms = start_ms;
+  result.no_cuda = try_device([&] { measure_cuda(bench, &with_cuda); });
+  if (result.no_cuda.empty()) result.costs = with_cuda;
   return result;
 }
 

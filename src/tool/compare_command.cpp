@@ -2,6 +2,7 @@
 #include "src/tool/commands.hpp"
 #include "src/tool/comparison.hpp"
 #include "src/tool/output.hpp"
+#include "src/tool/precision.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -10,8 +11,6 @@
 
 namespace jfpx::inline JFPX_ABI::tool {
 namespace {
-
-constexpr const char* kPrecision = sizeof(Real) == 4 ? "float" : "double";
 
 std::size_t count_spheres(const Scene& scene) {
   std::size_t spheres = 0;
@@ -38,25 +37,16 @@ std::string report(const Scene& scene, const RunOptions& options, const Comparis
       "{}: {} spheres, {} steps of {} s, {} precision, backend {}\n\n{}\n"
       "contacts and times are summed over all steps\n\n"
       "dispatches by jfpx     {} of {}\n"
-      "groups solved by jfpx  {}{}{}\n"
+      "groups solved by jfpx  {}{}\n"
       "contacts compared      {}\n"
       "contact mismatches     {}{}\n"
       "Bullet's trajectories  {}\n",
       scene.name, count_spheres(scene), options.steps, text(scene.dt), kPrecision, result.backend,
       engines.text(), result.batches, options.steps, result.groups,
       result.groups_on_device == 0 ? "" : fmt::format(", {} on the GPU", result.groups_on_device),
-      result.device_failure.empty() ? "" : "; given up: " + result.device_failure,
       result.contacts_compared, result.contact_mismatches,
       result.contact_mismatches == 0 ? "" : "; first: " + result.first_contact_mismatch,
       yes_or_first(result.first_difference));
-}
-
-nlohmann::ordered_json stages(const StageTimes& t) {
-  return {{"integrate", t.integrate},
-          {"broad", t.broad},
-          {"detect", t.detect},
-          {"solve", t.solve},
-          {"total", t.total}};
 }
 
 nlohmann::ordered_json to_json_value(const Scene& scene, const RunOptions& options,
@@ -72,6 +62,8 @@ nlohmann::ordered_json to_json_value(const Scene& scene, const RunOptions& optio
           {"batches", result.batches},
           {"groups", result.groups},
           {"groups_on_device", result.groups_on_device},
+          {"device_failure", result.device_failure},
+          {"trouble", result.trouble},
           {"contacts_compared", result.contacts_compared},
           {"contact_mismatches", result.contact_mismatches},
           {"trajectory_identical", result.trajectory_identical()},
@@ -80,9 +72,9 @@ nlohmann::ordered_json to_json_value(const Scene& scene, const RunOptions& optio
           {"hash_stock", hex(result.hash_stock)},
           {"hash_jfpx", hex(result.hash_jfpx)},
           {"ms",
-           {{"native", stages(result.ms_native)},
-            {"stock", stages(result.ms_stock)},
-            {"jfpx", stages(result.ms_jfpx)}}}};
+           {{"native", to_json_value(result.ms_native)},
+            {"stock", to_json_value(result.ms_stock)},
+            {"jfpx", to_json_value(result.ms_jfpx)}}}};
 }
 
 int run(const RunOptions& options) {
@@ -91,9 +83,10 @@ int run(const RunOptions& options) {
   const Comparison result = compare(scene, options);
   json.write(to_json_value(scene, options, result).dump(2) + "\n");
   json.finish();
-  if (!options.quiet) fmt::print("{}", report(scene, options, result));
+  if (wants_table(options)) fmt::print("{}", report(scene, options, result));
   if (options.hash) fmt::print("{}\n", hex(result.hash_jfpx));
-  return result.passed() ? kSuccess : kCheckFailed;
+  const int status = report_trouble(result.device_failure, result.trouble);
+  return result.passed() ? status : kCheckFailed;
 }
 
 }  // namespace

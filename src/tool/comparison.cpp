@@ -52,8 +52,10 @@ Comparison compare(const Scene& scene, const RunOptions& given) {
   if (const bullet::ConstraintSolver* solver = jfpx.jfpx_solver()) {
     result.groups = solver->stats().groups;
     result.groups_on_device = solver->stats().on_device;
-    result.device_failure = solver->stats().device_failure;
   }
+  result.device_failure =
+      native->device_failure().empty() ? device_failure(jfpx) : native->device_failure();
+  result.trouble = native->trouble();
   return result;
 }
 

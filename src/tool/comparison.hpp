@@ -20,7 +20,8 @@ struct Comparison {
   std::uint64_t batches = 0;           ///< dispatches of `jfpx` that its collider computed
   std::uint64_t groups = 0;            ///< groups of bodies that the solver of `jfpx` solved
   std::uint64_t groups_on_device = 0;  ///< of these: on the GPU
-  std::string device_failure;          ///< why its solver gave the GPU up; empty: it did not
+  std::string device_failure;          ///< why x86 took over from the GPU; empty: it did not
+  std::string trouble;                 ///< why native could not go on meaningfully; empty: it could
   std::string backend;                 ///< who computed the last batch of sphere pairs in `jfpx`
 
   bool trajectory_identical() const { return first_difference.empty() && hash_stock == hash_jfpx; }

@@ -34,18 +34,21 @@ class DemoEngine final : public Engine {
     const std::chrono::duration<double, std::milli> passed =
         std::chrono::steady_clock::now() - start;
     report_.total_ms = passed.count();  // controls included
+    if (!report_.device_failure.empty()) device_failure_ = report_.device_failure;
   }
   std::vector<BodyState> states() const override { return demo_->states(); }
   std::uint64_t contacts() const override { return report_.contacts; }
   std::uint32_t awake() const override { return report_.awake; }
   StageTimes times() const override { return stage_times(report_); }
   std::string backend() const override { return std::string(to_string(report_.backend)); }
+  std::string device_failure() const override { return device_failure_; }
   std::string trouble() const override { return trouble_of(report_); }
 
  private:
   std::unique_ptr<demos::Demo> demo_;
   demos::ScriptPlayer player_;
   StepReport report_;
+  std::string device_failure_;
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-/// Which names are demos.
+/// Which names are scenes and demos.
 #include "src/tool/demo_names.hpp"
 
 #include "examples/demos/demo.hpp"
@@ -6,15 +6,17 @@
 #include <algorithm>
 
 namespace jfpx::inline JFPX_ABI::tool {
+namespace {
 
-bool is_demo(const std::string& name) {
-  return std::any_of(demos::all().begin(), demos::all().end(),
-                     [&](const auto& entry) { return entry.name == name; });
+template <class Entry>
+bool has(std::span<const Entry> entries, const std::string& name) {
+  return std::ranges::any_of(entries, [&](const Entry& entry) { return entry.name == name; });
 }
 
-bool is_only_a_demo(const std::string& name) {
-  return is_demo(name) && std::none_of(scenes::all().begin(), scenes::all().end(),
-                                       [&](const auto& entry) { return entry.name == name; });
-}
+}  // namespace
+
+bool is_scene(const std::string& name) { return has(scenes::all(), name); }
+bool is_demo(const std::string& name) { return has(demos::all(), name); }
+bool is_only_a_demo(const std::string& name) { return is_demo(name) && !is_scene(name); }
 
 }  // namespace jfpx::inline JFPX_ABI::tool

@@ -1,4 +1,4 @@
-/// Which names are demos.
+/// Which names are scenes and demos.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -7,6 +7,7 @@
 
 namespace jfpx::inline JFPX_ABI::tool {
 
+bool is_scene(const std::string& name);
 bool is_demo(const std::string& name);
 /// True for a demo that is no scene, because more than bodies belongs to it.
 bool is_only_a_demo(const std::string& name);

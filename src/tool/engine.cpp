@@ -8,6 +8,10 @@
 #include "src/tool/native_engine.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <iterator>
 
 namespace jfpx::inline JFPX_ABI::tool {
 namespace {
@@ -27,24 +31,19 @@ const CostModel& costs_of_this_machine(bool quiet) {
 
 }  // namespace
 
-std::string_view to_string(EngineKind kind) {
-  switch (kind) {
-    case EngineKind::native:
-      return "native";
-    case EngineKind::bullet:
-      return "bullet";
-    case EngineKind::bullet_stock:
-      return "bullet-stock";
-  }
-  return "unknown";
-}
+std::string_view to_string(EngineKind kind) { return kEngineNames[static_cast<int>(kind)]; }
 
 EngineKind parse_engine(std::string_view name) {
-  for (const EngineKind kind : {EngineKind::native, EngineKind::bullet, EngineKind::bullet_stock}) {
-    if (name == to_string(kind)) return kind;
+  const auto* found = std::ranges::find(kEngineNames, name);
+  if (found != std::end(kEngineNames)) {
+    return static_cast<EngineKind>(found - std::begin(kEngineNames));
   }
-  throw InvalidArgument("engine is \"" + std::string(name) +
-                        "\"; it must be native, bullet or bullet-stock");
+  throw InvalidArgument(
+      fmt::format("engine is \"{}\"; it must be one of {}", name, fmt::join(kEngineNames, ", ")));
+}
+
+CLI::Validator engine_name() {
+  return CLI::IsMember(std::vector<std::string>(std::begin(kEngineNames), std::end(kEngineNames)));
 }
 
 StageTimes& StageTimes::operator+=(const StageTimes& other) {
@@ -54,6 +53,23 @@ StageTimes& StageTimes::operator+=(const StageTimes& other) {
   solve += other.solve;
   total += other.total;
   return *this;
+}
+
+nlohmann::ordered_json to_json_value(const StageTimes& times) {
+  return {{"integrate", times.integrate},
+          {"broad", times.broad},
+          {"detect", times.detect},
+          {"solve", times.solve},
+          {"total", times.total}};
+}
+
+int report_trouble(const std::string& device_failure, const std::string& trouble) {
+  if (!device_failure.empty()) {
+    fmt::print(stderr, "jfpx: x86 has taken over: {}\n", device_failure);
+  }
+  if (trouble.empty()) return kSuccess;
+  fmt::print(stderr, "jfpx: {}\n", trouble);
+  return kCheckFailed;
 }
 
 SphereColliderOptions collider_options(const RunOptions& options) {

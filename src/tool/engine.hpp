@@ -6,6 +6,8 @@
 
 #include "src/tool/options.hpp"
 
+#include <nlohmann/json_fwd.hpp>
+
 #include <memory>
 #include <string>
 #include <string_view>
@@ -14,16 +16,21 @@
 namespace jfpx::inline JFPX_ABI::tool {
 
 enum class EngineKind : std::uint8_t { native, bullet, bullet_stock };
+/// Their names, in this order.
+inline constexpr const char* kEngineNames[] = {"native", "bullet", "bullet-stock"};
 
 std::string_view to_string(EngineKind kind);
 /// @throws InvalidArgument for a name that to_string() does not give.
 EngineKind parse_engine(std::string_view name);
+/// Accepts the names of engines.
+CLI::Validator engine_name();
 
 /// Milliseconds spent in each stage.
 struct StageTimes {
   double integrate = 0, broad = 0, detect = 0, solve = 0, total = 0;
   StageTimes& operator+=(const StageTimes& other);
 };
+nlohmann::ordered_json to_json_value(const StageTimes& times);
 
 class Engine {
  public:
@@ -44,6 +51,9 @@ class Engine {
 
 /// @throws BackendUnavailable, also where this build has no Bullet; InvalidScene.
 std::unique_ptr<Engine> make_engine(EngineKind kind, const Scene& scene, const RunOptions& options);
+
+/// Says on stderr what went wrong while the engine ran. @return the exit status
+int report_trouble(const std::string& device_failure, const std::string& trouble);
 
 /// What the run options say about the sphere collider.
 SphereColliderOptions collider_options(const RunOptions& options);

@@ -2,16 +2,36 @@
 #include <jfpx/error.hpp>
 
 #include "src/tool/commands.hpp"
+#include "src/tool/interrupts.hpp"
 #include "src/tool/options.hpp"
 #include "src/tool/precision.hpp"
 
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
 #include <new>
 
 namespace {
 
 using namespace jfpx;
+
+/// CLI11 only says that a command is missing where the first word is none of ours.
+std::string what_is_wrong(const CLI::App& app, const CLI::Error& error) {
+  const std::vector<std::string> unknown = app.remaining(true);
+  if (!app.get_subcommands().empty() || unknown.empty()) return error.what();
+  const std::string& word = unknown.front();
+  return fmt::format("there is no {} \"{}\"", word.starts_with('-') ? "option" : "command", word);
+}
+
+/// What was printed may still lie in a buffer, with no disk to go to.
+int finish_output(int status) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
+  fmt::print(stderr, "jfpx: stdout can't be written: {}\n", std::strerror(errno));
+  return status == tool::kSuccess ? tool::kBadUsage : status;
+}
 
 int run(int argc, char** argv) {
   tool::switch_precision_if_asked(argc, argv);
@@ -21,7 +41,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "jfpx " JFPX_VERSION);
   app.require_subcommand(1);
   app.fallthrough();
-  std::string precision = sizeof(Real) == 4 ? "float" : "double";
+  std::string precision(tool::kPrecision);
   app.add_option("--precision", precision, "float or double")
       ->check(CLI::IsMember({"float", "double"}))
       ->capture_default_str();
@@ -35,11 +55,7 @@ int run(int argc, char** argv) {
       "input;\n"
       "3 backend not usable. Results go to stdout, everything else to stderr.");
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
-    const std::vector<std::string> unknown = failed->remaining(true);
-    const std::string what = failed->get_subcommands().empty() && !unknown.empty()
-                                 ? "there is no command \"" + unknown.front() + "\""
-                                 : error.what();
-    return "jfpx: " + what + "\nRun with --help for more information.\n";
+    return "jfpx: " + what_is_wrong(*failed, error) + "\nRun with --help for more information.\n";
   });
   int status = tool::kSuccess;
   tool::add_compare_command(app, status);
@@ -61,7 +77,11 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return run(argc, argv);
+    return finish_output(run(argc, argv));
+  } catch (const tool::Interrupted& interrupted) {
+    // As if it had not been caught: the shell shall see why it ended.
+    std::signal(interrupted.signal, SIG_DFL);
+    std::raise(interrupted.signal);
   } catch (const BackendUnavailable& error) {
     fmt::print(stderr, "jfpx: {}\n", error.what());
     return tool::kBackendUnavailable;

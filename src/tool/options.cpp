@@ -13,16 +13,16 @@
 namespace jfpx::inline JFPX_ABI::tool {
 namespace {
 
-bool is_named(const std::string& name) {
-  for (const scenes::Entry& entry : scenes::all()) {
-    if (entry.name == name) return true;
-  }
-  return false;
-}
-
 bool looks_like_file(const std::string& name) {
   return name.find('/') != std::string::npos || name.ends_with(".json") ||
          std::filesystem::exists(name);
+}
+
+/// The option that a file can't follow, if one was given.
+const char* option_of_named_scenes(const RunOptions& options) {
+  if (options.spheres) return "--spheres";
+  if (options.boxes) return "--boxes";
+  return options.seed == RunOptions{}.seed ? nullptr : "--seed";
 }
 
 }  // namespace
@@ -77,7 +77,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_option("--world", options.world, "Bullet: whose dynamics world")
       ->check(whose)
       ->capture_default_str();
-  app.add_option("--json", options.json, "Write the results as JSON to this file, - for stdout");
+  app.add_option("--json", options.json,
+                 "Write the results as JSON to this file, - for stdout, instead of a table");
   app.add_flag("--hash", options.hash,
                "Print the hash of the final state, 16 hex digits, as the last line");
   app.add_flag("--quiet", options.quiet, "Print nothing but what --hash and --json - ask for");
@@ -89,10 +90,10 @@ scenes::Options scene_options(const RunOptions& options) {
 
 Scene load(const RunOptions& options) {
   Scene scene;
-  if (!is_named(options.scene) && looks_like_file(options.scene)) {
-    if (options.spheres || options.boxes) {
-      throw InvalidArgument(std::string(options.spheres ? "--spheres" : "--boxes") +
-                            " goes with a named scene; " + options.scene + " is a file");
+  if (!is_scene(options.scene) && looks_like_file(options.scene)) {
+    if (const char* option = option_of_named_scenes(options)) {
+      throw InvalidArgument(std::string(option) + " goes with a named scene; " + options.scene +
+                            " is a file");
     }
     scene = load_scene(options.scene);
   } else {

@@ -41,6 +41,9 @@ void add_scene_options(CLI::App& app, RunOptions& options);
 /// Adds --steps, --backend, --threads, --minimum-batch, --solver, --world, --json, --hash, --quiet.
 void add_run_options(CLI::App& app, RunOptions& options);
 
+/// False where only JSON, or nothing, shall be on stdout.
+inline bool wants_table(const RunOptions& options) { return !options.quiet && options.json != "-"; }
+
 /// What the options say about a named scene.
 scenes::Options scene_options(const RunOptions& options);
 /// The scene that the options name, changed as they say.

@@ -1,10 +1,15 @@
 /// What the commands print and write: tables, progress, files.
 #include "src/tool/output.hpp"
 
+#include <jfpx/error.hpp>
+
+#include "src/file.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <bit>
+#include <cerrno>
 #include <cstdio>
 #include <type_traits>
 #include <unistd.h>
@@ -18,8 +23,8 @@ OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
 void OutputFile::write(const std::string& content) {
   if (file_) {
     file_->write(content);
-  } else if (path_ == "-") {
-    std::fputs(content.c_str(), stdout);
+  } else if (path_ == "-" && std::fputs(content.c_str(), stdout) == EOF) {
+    throw FileError(file_message("stdout", "can't be written", errno));
   }
 }
 
@@ -53,6 +58,7 @@ Progress::~Progress() {
 }
 
 void Progress::advance_to(std::uint64_t done) {
+  Interrupts::check();
   if (!shown_ || total_ == 0) return;
   const int percent = static_cast<int>(done * 100 / total_);
   if (percent == percent_) return;

@@ -4,6 +4,7 @@
 #include <jfpx/config.hpp>
 
 #include "src/atomic_file.hpp"
+#include "src/tool/interrupts.hpp"
 
 #include <cstdint>
 #include <optional>
@@ -19,6 +20,7 @@ class OutputFile {
   explicit OutputFile(std::string path);
 
   explicit operator bool() const { return !path_.empty(); }
+  /// @throws FileError
   void write(const std::string& text);
   /// @throws FileError
   void finish();
@@ -39,16 +41,18 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-/// A bar on stderr while a long run lasts; silent unless stderr is a terminal.
+/// A bar on stderr while a long run lasts; silent unless stderr is a terminal. Ctrl-C ends the run.
 class Progress {
  public:
   Progress(std::string label, std::uint64_t total, bool quiet);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
+  /// @throws Interrupted
   void advance_to(std::uint64_t done);
 
  private:
+  Interrupts interrupts_;
   std::string label_;
   std::uint64_t total_;
   int percent_ = -1;

@@ -14,8 +14,6 @@
 namespace jfpx::inline JFPX_ABI::tool {
 namespace {
 
-constexpr std::string_view kOwn = sizeof(Real) == 4 ? "float" : "double";
-
 /// The same program in the other precision: NAME and NAME-f64 lie side by side.
 std::string sibling_of(const std::string& name) {
   constexpr std::string_view kSuffix = "-f64";
@@ -46,7 +44,7 @@ std::string asked_precision(int argc, char** argv) {
 
 void switch_precision_if_asked(int argc, char** argv) {
   const std::string asked = asked_precision(argc, argv);
-  if (asked == kOwn || (asked != "float" && asked != "double")) return;
+  if (asked == kPrecision || (asked != "float" && asked != "double")) return;
   const std::filesystem::path own = std::filesystem::read_symlink("/proc/self/exe");
   const std::string sibling =
       std::filesystem::path(own).replace_filename(sibling_of(own.filename())).string();

@@ -3,7 +3,12 @@
 
 #include <jfpx/config.hpp>
 
+#include <string_view>
+
 namespace jfpx::inline JFPX_ABI::tool {
+
+/// What this build computes in, as --precision calls it.
+inline constexpr std::string_view kPrecision = sizeof(Real) == 4 ? "float" : "double";
 
 /// Runs the other build in this process' place when the arguments ask for the other precision:
 /// by --precision, or by naming a recording of it. Returns if this build is the right one.

@@ -19,8 +19,7 @@ namespace {
 
 struct PreloadOptions {
   std::vector<std::string> command;
-  std::string backend = "auto";
-  std::string minimum_batch, threads;
+  std::string backend, minimum_batch, threads;  ///< empty: what the environment says
   std::vector<std::string> parts;
   bool summary = false, verify = false;
 };
@@ -47,7 +46,7 @@ void set_environment(const PreloadOptions& options) {
   setenv("LD_PRELOAD", preload.c_str(), 1);
   if (options.summary) setenv("JFPX_PRELOAD_SUMMARY", "1", 1);
   if (options.verify) setenv("JFPX_PRELOAD_VERIFY", "1", 1);
-  if (options.backend != "auto") setenv("JFPX_PRELOAD_BACKEND", options.backend.c_str(), 1);
+  if (!options.backend.empty()) setenv("JFPX_PRELOAD_BACKEND", options.backend.c_str(), 1);
   if (!options.threads.empty()) setenv("JFPX_PRELOAD_THREADS", options.threads.c_str(), 1);
   if (!options.parts.empty()) {
     std::string list;
@@ -86,9 +85,8 @@ void add_preload_command(CLI::App& app, int&) {
   command->add_flag("--summary", options->summary, "Say on stderr at exit what was done");
   command->add_flag("--verify", options->verify,
                     "Recompute every sphere pair with Bullet's algorithm and compare (slow)");
-  command->add_option("--backend", options->backend, "auto, x86 or cuda")
-      ->check(CLI::IsMember({"auto", "x86", "cuda"}))
-      ->capture_default_str();
+  command->add_option("--backend", options->backend, "auto, x86 or cuda [auto]")
+      ->check(CLI::IsMember({"auto", "x86", "cuda"}));
   command
       ->add_option("--parts", options->parts,
                    "Which of dispatcher, solver and world (its update of boxes) [all]")

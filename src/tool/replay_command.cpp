@@ -40,7 +40,7 @@ int replay(Options options) {
                options.path, recording.steps(), options.engine);
   }
   if (options.run.hash) fmt::print("{}\n", hex(state_hash(engine->states())));
-  return kSuccess;
+  return report_trouble(engine->device_failure(), engine->trouble());
 }
 
 }  // namespace
@@ -52,7 +52,7 @@ void add_replay_command(CLI::App& app, int& status) {
   command->add_option("FILE", options->path, "Recording made by: jfpx run --record FILE")
       ->required();
   command->add_option("--engine", options->engine, "native, bullet or bullet-stock [the recorded]")
-      ->check(CLI::IsMember({"native", "bullet", "bullet-stock"}));
+      ->check(engine_name());
   command
       ->add_option_function<std::string>(
           "--backend",

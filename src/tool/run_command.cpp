@@ -6,6 +6,7 @@
 #include "src/tool/demo_engine.hpp"
 #include "src/tool/engine.hpp"
 #include "src/tool/output.hpp"
+#include "src/tool/precision.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -53,25 +54,19 @@ std::string summary(const Options& options, const Scene& scene, const Engine& en
 
 nlohmann::ordered_json to_json_value(const Options& options, const Scene& scene,
                                      const Engine& engine, const Totals& totals) {
-  const StageTimes& t = totals.times;
   return {{"scene", scene.name},
           {"bodies", scene.bodies.size()},
           {"steps", options.run.steps},
           {"engine", options.engine},
           {"backend", engine.backend()},
-          {"precision", sizeof(Real) == 4 ? "float" : "double"},
+          {"precision", kPrecision},
           {"contacts", engine.contacts()},
           {"contacts_total", totals.contacts},
           {"awake", engine.awake()},
           {"choices", totals.choices},
           {"device_failure", engine.device_failure()},
           {"hash", hex(state_hash(engine.states()))},
-          {"ms",
-           {{"integrate", t.integrate},
-            {"broad", t.broad},
-            {"detect", t.detect},
-            {"solve", t.solve},
-            {"total", t.total}}}};
+          {"ms", to_json_value(totals.times)}};
 }
 
 /// The engine, and the scene that it starts with.
@@ -119,14 +114,19 @@ int run(const Options& options) {
   csv.finish();
   json.write(to_json_value(options, scene, *engine, totals).dump(2) + "\n");
   json.finish();
-  if (!options.run.quiet) fmt::print("{}", summary(options, scene, *engine, totals));
+  if (wants_table(options.run)) fmt::print("{}", summary(options, scene, *engine, totals));
   if (options.run.hash) fmt::print("{}\n", hex(state_hash(engine->states())));
-  if (!engine->device_failure().empty()) {
-    fmt::print(stderr, "jfpx: x86 has taken over: {}\n", engine->device_failure());
+  return report_trouble(engine->device_failure(), engine->trouble());
+}
+
+/// What only one engine knows goes with no other.
+void check_engine(const CLI::App& command, const Options& options) {
+  if (options.engine == to_string(EngineKind::bullet)) return;
+  for (const char* option : {"--solver", "--world", "--minimum-batch"}) {
+    if (command.count(option) == 0) continue;
+    throw InvalidArgument(std::string(option) + " goes with --engine bullet; engine is " +
+                          options.engine);
   }
-  if (engine->trouble().empty()) return kSuccess;
-  fmt::print(stderr, "jfpx: {}\n", engine->trouble());
-  return kCheckFailed;
 }
 
 }  // namespace
@@ -137,7 +137,7 @@ void add_run_command(CLI::App& app, int& status) {
   add_scene_options(*command, options->run);
   add_run_options(*command, options->run);
   command->add_option("--engine", options->engine, "native, bullet (with jfpx) or bullet-stock")
-      ->check(CLI::IsMember({"native", "bullet", "bullet-stock"}))
+      ->check(engine_name())
       ->capture_default_str();
   command->add_option("--input", options->input,
                       "Run as a demo with the inputs of this file (see: jfpx scenes DEMO)");
@@ -146,7 +146,10 @@ void add_run_command(CLI::App& app, int& status) {
       "Write one line a step to this file: step, contacts, awake bodies, milliseconds");
   command->add_option("--record", options->run.record,
                       "Write the state after every step to this file (see: jfpx replay)");
-  command->callback([options, &status] { status = run(*options); });
+  command->callback([command, options, &status] {
+    check_engine(*command, *options);
+    status = run(*options);
+  });
 }
 
 }  // namespace jfpx::inline JFPX_ABI::tool

@@ -51,9 +51,11 @@ void add_scenes_command(CLI::App& app, int&) {
   add_scene_options(*command, options->run);
   command->get_option("SCENE")->required(false);
   command->add_flag("--export", options->do_export, "Print the scene as JSON");
-  command->callback([options] {
+  command->callback([command, options] {
     if (options->run.scene.empty()) {
-      if (options->do_export) throw CLI::RequiredError("SCENE, to export,");
+      for (const CLI::Option* option : command->get_options()) {
+        if (option->count() > 0) throw CLI::RequiredError("SCENE, for " + option->get_name() + ",");
+      }
       fmt::print("{}", list_text());
       return;
     }

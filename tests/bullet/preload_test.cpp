@@ -51,6 +51,13 @@ TEST_F(Preload, KeepsTheHashAndRunsBatches) {
   EXPECT_THAT(ours.output, HasSubstr(": groups left to Bullet: 6 (solver mode)\n"));
 }
 
+TEST_F(Preload, OptionsComeBeforeTheEnvironment) {
+  const std::string asked = "JFPX_PRELOAD_BACKEND=x86 " JFPX_TOOL_PATH " preload ";
+  const std::string shows = "-- printenv JFPX_PRELOAD_BACKEND";
+  EXPECT_EQ(run_process(asked + "--backend auto " + shows).output, "auto\n");
+  EXPECT_EQ(run_process(asked + shows).output, "x86\n");
+}
+
 TEST_F(Preload, GivesThePartsThatAreAskedFor) {
   const std::string stock = alone("300").output;
   const auto with = [&](const std::string& options) {

@@ -75,7 +75,7 @@ function(jfpx_add_guard_test name text)
   set(includes ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include ${JFPX_BULLET_F32_INCLUDE_DIRS})
   list(TRANSFORM includes PREPEND -I)
   add_test(NAME bullet_guard_${name} COMMAND sh -c
-    "${CMAKE_CXX_COMPILER} -std=c++20 -fsyntax-only ${ARGN} \"$@\" 2>&1 && echo compiles" guard ${includes} ${source})
+    "\"${CMAKE_CXX_COMPILER}\" -std=c++20 -fsyntax-only ${ARGN} \"$@\" 2>&1 && echo compiles" guard ${includes} ${source})
   set_tests_properties(bullet_guard_${name} PROPERTIES PASS_REGULAR_EXPRESSION "${text}")
 endfunction()
 jfpx_add_guard_test(threads "keeps the bits of Bullet without BT_THREADSAFE" -DBT_THREADSAFE=1)

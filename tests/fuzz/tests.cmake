@@ -34,4 +34,6 @@ if(JFPX_HAS_BULLET)
   jfpx_add_fuzzer(Dispatcher SOURCES ${fuzzed_worlds} LINK jfpx_bullet GTest::gtest)
   jfpx_add_fuzzer(Solver SOURCES ${fuzzed_worlds} LINK jfpx_bullet GTest::gtest)
 endif()
+add_test(NAME fuzz_script COMMAND
+  ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/script.sh ${PROJECT_SOURCE_DIR}/scripts/fuzz)
 add_custom_target(fuzzers DEPENDS ${JFPX_FUZZERS})

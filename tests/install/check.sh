@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Uses jfpx as those do who install it. Usage: check.sh STEP BUILD WORK; the environment says what the
-# build has: KIND (static, shared), HAS_CUDA, HAS_BULLET (ON, OFF), CXX, LAUNCHER (of the compiler).
+# build has: KIND (static, shared), HAS_CUDA, HAS_BULLET, HAS_VIEWER (ON, OFF), CXX, LAUNCHER (of the
+# compiler).
 set -euo pipefail
 step=$1 build=$2 work=$3
 here=$(cd "$(dirname "$0")" && pwd)
@@ -62,11 +63,12 @@ refused" ] || fail "$("$work/cmake/both")"
   pkg_config)
     folder=$(dirname "$(find "$prefix" -name jfpx.pc)")
     mkdir -p "$work/makefile"
+    ln -sfn "$root/examples" "$work/makefile/examples" # make knows no path with a space in it
     programs="collider collider-f64"
     [ "$HAS_BULLET" = OFF ] || programs+=" bullet_app bullet_app-f64"
     export LD_LIBRARY_PATH=${folder%/pkgconfig}
     PKG_CONFIG_PATH=$folder make -B -s -C "$work/makefile" -f "$here/makefile/Makefile" \
-      EXAMPLES="$root/examples" PROGRAMS="$programs" CXX="${LAUNCHER:-} $CXX"
+      EXAMPLES=examples PROGRAMS="$programs" CXX="${LAUNCHER:-} $CXX"
     run_programs "$work/makefile" -f64
     ;;
   # A CUDA program; where no device is, it says so.
@@ -129,19 +131,19 @@ refused" ] || fail "$("$work/cmake/both")"
       done
     fi
     checked=0
-    for library in $(libraries '*.so.*'); do
+    while read -r library; do
       symbols=$(nm -DC --defined-only "$library" | cut -d' ' -f3-)
       grep -qE '::(World::step|bullet::CollisionDispatcher::dispatchAllCollisionPairs)\(' <<<"$symbols" || fail "$library exports: $symbols"
       foreign=$(grep -vE '^((vtable|typeinfo|typeinfo name) for |(non-virtual|virtual) thunk to )?jfpx::f(32|64)::' <<<"$symbols" || true)
       [ -z "$foreign" ] || fail "$library exports: $foreign"
       ! objdump -p "$library" | grep -E 'NEEDED.*(cuda|cudart)' || fail "$library needs CUDA"
       checked=$((checked + 1))
-    done
+    done < <(libraries '*.so.*')
     [ "$checked" -ge 2 ] || fail "only $checked libraries were found"
-    for module in $(libraries '-bullet-preload.so') $(libraries '-bullet-engine*.so'); do
+    while read -r module; do
       symbols=$(nm -DC --defined-only "$module" | cut -d' ' -f3-)
       ! grep -E '^(cuda|__cuda|nvtx|std::|jfpx::)' <<<"$symbols" || fail "$module exports more than it should"
-    done
+    done < <(libraries '-bullet-preload.so' && libraries '-bullet-engine*.so')
     rm -f "$prefix"/*.probe
     ;;
   # jfpx inside another project, by FetchContent.
@@ -154,6 +156,8 @@ refused" ] || fail "$("$work/cmake/both")"
     rm -rf "$work/nothing"
     cmake --install "$work/subproject" --prefix "$work/nothing" >/dev/null
     [ ! -e "$work/nothing" ] || fail "installs: $(find "$work/nothing")"
+    configure "$here/subproject" "$work/subproject" -DJFPX_CUDA=OFF -DJFPX_INSTALL=ON >/dev/null
+    [ ! -e "$work/subproject/CPackConfig.cmake" ] || fail "makes packages of its owner"
     ;;
   # The Debian packages, unpacked where nothing else is.
   debian)
@@ -162,11 +166,15 @@ refused" ] || fail "$("$work/cmake/both")"
     rm -rf "$work/packages" "$work/root"
     cpack --config "$build/CPackConfig.cmake" -B "$work/packages" >"$work/cpack.txt" 2>&1 || fail "$(cat "$work/cpack.txt")"
     for package in "$work"/packages/*.deb; do dpkg -x "$package" "$work/root"; done
-    depends() { dpkg-deb -f "$work"/packages/"$1"_*.deb Depends; }
+    depends() { dpkg-deb -f "$work"/packages/"$1"_*.deb "${2:-Depends}"; }
     depends libjfpx0.1 | grep -q 'libstdc++6' || fail "libjfpx0.1 depends on: $(depends libjfpx0.1)"
     depends libjfpx-dev | grep -q 'libjfpx0.1 (= ' || fail "libjfpx-dev depends on: $(depends libjfpx-dev)"
-    depends jfpx-tools | grep -q 'libjfpx0.1 (= .*libsdl2' || depends jfpx-tools | grep -q 'libsdl2.*libjfpx0.1 (= ' ||
-      fail "jfpx-tools depends on: $(depends jfpx-tools)"
+    depends jfpx-tools | grep -q 'libjfpx0.1 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
+    if [ "$HAS_VIEWER" = ON ]; then
+      depends jfpx-tools | grep -q libsdl2 || fail "jfpx-tools depends on: $(depends jfpx-tools)"
+      depends jfpx-tools Recommends | grep -q 'libegl1, libgl1-mesa-dri' ||
+        fail "jfpx-tools recommends: $(depends jfpx-tools Recommends)"
+    fi
     if [ "$HAS_BULLET" = ON ]; then
       depends libjfpx-bullet0.1 | grep -q 'libbullet3' || fail "libjfpx-bullet0.1 depends on: $(depends libjfpx-bullet0.1)"
       depends libjfpx-dev | grep -q 'libbullet-dev, pkg-config' || fail "libjfpx-dev depends on: $(depends libjfpx-dev)"

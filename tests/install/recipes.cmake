@@ -52,7 +52,7 @@ function(vcpkg_cmake_configure)
   file(REMOVE_RECURSE ${WORK_DIR}/build)
   execute_process(COMMAND ${CMAKE_COMMAND} -S ${arg_SOURCE_PATH} -B ${WORK_DIR}/build -G Ninja
       -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX=${CURRENT_PACKAGES_DIR} ${arg_OPTIONS}
-    OUTPUT_VARIABLE output COMMAND_ERROR_IS_FATAL ANY)
+    OUTPUT_VARIABLE output ERROR_VARIABLE output COMMAND_ERROR_IS_FATAL ANY)
   if(NOT EXISTS ${WORK_DIR}/build/cmake_install.cmake OR output MATCHES "Manually-specified")
     message(FATAL_ERROR "the port's options do not fit:\n${output}")
   endif()

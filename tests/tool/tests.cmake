@@ -1,4 +1,3 @@
-find_package(nlohmann_json 3.11 REQUIRED)
 jfpx_add_test(tool_test SOURCES tool/calibrate_test.cpp tool/tool_test.cpp
   LINK jfpx_demos nlohmann_json::nlohmann_json)
 jfpx_add_test(cost_fit_test SOURCES
@@ -7,8 +6,9 @@ jfpx_add_test(cost_fit_test SOURCES
   support/sphere_fixtures.cpp)
 foreach(suffix IN ITEMS "" "_f64")
   add_dependencies(tool_test${suffix} jfpx_tool jfpx_tool_f64)
+  # In quotes, as shells run it.
   target_compile_definitions(tool_test${suffix} PRIVATE
-    JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
+    "JFPX_TOOL_PATH=\"\\\"$<TARGET_FILE:jfpx_tool${suffix}>\\\"\""
     JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
 endforeach()
 
@@ -18,3 +18,6 @@ if(JFPX_HAS_BULLET)
     --jfpx $<TARGET_FILE:jfpx_tool> --spheres 6 --steps 10 --threads "1 3")
   set_tests_properties(identity PROPERTIES PASS_REGULAR_EXPRESSION "all 36 comparisons are identical")
 endif()
+add_test(NAME identity_counts_what_dies COMMAND ${PROJECT_SOURCE_DIR}/scripts/identity
+  --jfpx ${CMAKE_CURRENT_SOURCE_DIR}/tool/killer.sh --only "overlap" --precision float --threads 1)
+set_tests_properties(identity_counts_what_dies PROPERTIES PASS_REGULAR_EXPRESSION "2 of 2 comparisons FAILED")

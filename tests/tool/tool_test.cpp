@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <filesystem>
 #include <fstream>
 
 namespace jfpx {
@@ -46,6 +47,17 @@ void expect_fails(const std::string& arguments, int status, const std::string& m
   EXPECT_THAT(result.output, HasSubstr(message)) << arguments;
 }
 
+/// Two spheres, of which one is past kMaxCoordinate after a step.
+void save_runaway(const std::string& path) {
+  Scene scene;
+  scene.dt = 1;
+  scene.bodies.resize(2);
+  for (BodyDef& body : scene.bodies) body.shape = Sphere{1};
+  scene.bodies[1].position = {Real(0.999e9), 0, 0};
+  scene.bodies[1].velocity = {Real(1e7), 0, 0};
+  save_scene(scene, path);
+}
+
 TEST(Tool, HelpNamesTheCommandsAndExitStatuses) {
   const ProcessResult result = jfpx_command("--help");
   EXPECT_EQ(result.status, 0);
@@ -58,7 +70,8 @@ TEST(Tool, HelpNamesTheCommandsAndExitStatuses) {
 
 TEST(Tool, BadUsageIsStatusTwo) {
   expect_fails("", 2, "subcommand");
-  expect_fails("fly", 2, "fly");
+  expect_fails("fly", 2, "there is no command \"fly\"");
+  expect_fails("--bogus", 2, "there is no option \"--bogus\"");
   expect_fails("run", 2, "SCENE");
   expect_fails("run pile --speres 3", 2, "--speres");
   expect_fails("run pile --steps many", 2, "--steps");
@@ -70,6 +83,58 @@ TEST(Tool, BadUsageIsStatusTwo) {
   expect_fails("run pile --world ode", 2, "ode");
   expect_fails("run pile --precision half", 2, "half");
   expect_fails("scenes --export", 2, "SCENE");
+  expect_fails("scenes --spheres 5", 2, "SCENE");
+}
+
+TEST(Tool, OptionsThatWouldDoNothingAreRefused) {
+  for (const std::string engine : {"native", "bullet-stock"}) {
+    for (const std::string option : {"--solver stock", "--world jfpx", "--minimum-batch 3"}) {
+      expect_fails("run pile --engine " + engine + " " + option, 2,
+                   "goes with --engine bullet; engine is " + engine);
+    }
+  }
+}
+
+TEST(Tool, OutputThatIsLostIsAnError) {
+  for (const std::string arguments : {"--version", "scenes", "scenes pile --spheres 5 --export",
+                                      "run pile --steps 1 --quiet --json -"}) {
+    const ProcessResult result =
+        test::run_process(JFPX_TOOL_PATH " " + arguments + " 2>&1 >/dev/full");
+    EXPECT_EQ(result.status, 2) << arguments;
+    EXPECT_THAT(result.output, HasSubstr("No space left on device")) << arguments;
+  }
+  // By a link, which is what breaks if it goes wrong.
+  const test::TemporaryFolder folder;
+  std::filesystem::create_symlink("/dev/full", folder.file("full"));
+  expect_fails("run pile --steps 1 --csv " + folder.file("full"), 2, "can't be written: No space");
+}
+
+TEST(Tool, ResultsGoThroughLinksToDevices) {
+  const test::TemporaryFolder folder;
+  const std::string link = folder.file("link");
+  std::filesystem::create_symlink("/dev/stdout", link);
+  const ProcessResult piped = jfpx_stdout("run pile --steps 1 --quiet --json " + link);
+  EXPECT_EQ(piped.status, 0);
+  EXPECT_EQ(nlohmann::json::parse(piped.output)["steps"], 1);
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(folder.entries(), 1u);
+}
+
+TEST(Tool, JsonOnStdoutIsAllThatIsThere) {
+  for (const std::string command : {"run", JFPX_HAS_BULLET ? "compare" : "run"}) {
+    const ProcessResult result = jfpx_stdout(command + " pile --spheres 8 --steps 2 --json -");
+    EXPECT_EQ(nlohmann::json::parse(result.output)["steps"], 2) << command;
+  }
+}
+
+TEST(Tool, AnInterruptedRunLeavesNoFiles) {
+  const test::TemporaryFolder folder;
+  const ProcessResult result =
+      test::run_process("timeout --preserve-status -s INT 0.5 " JFPX_TOOL_PATH
+                        " run pile --spheres 50 --steps 100000000 --quiet --record " +
+                        folder.file("run.rec") + " --csv " + folder.file("run.csv"));
+  EXPECT_EQ(result.status, 130) << "as if it had not noticed";
+  EXPECT_EQ(folder.entries(), 0u);
 }
 
 TEST(Tool, BadInputIsStatusTwoAndNamed) {
@@ -88,21 +153,20 @@ TEST(Tool, SceneFilesAreChecked) {
   std::ofstream(path) << "{\"jfpx_scene\": 1, \"bodies\": [}";
   expect_fails("run " + path, 2, "scene.json: broken JSON");
   save_scene(scenes::make("pile", {.spheres = 5}), path);
-  expect_fails("run " + path + " --spheres 3", 2, "--spheres goes with a named scene");
+  for (const std::string option : {"--spheres", "--seed"}) {
+    expect_fails("run " + path + " " + option + " 3", 2, option + " goes with a named scene");
+  }
   EXPECT_EQ(jfpx_command("run " + path + " --steps 2").status, 0);
 }
 
 TEST(Tool, ABodyThatRunsAwayIsNamedAndStatusOne) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("scene.json");
-  Scene scene;
-  scene.dt = 1;
-  scene.bodies.resize(2);
-  for (BodyDef& body : scene.bodies) body.shape = Sphere{1};
-  scene.bodies[1].position = {Real(0.999e9), 0, 0};
-  scene.bodies[1].velocity = {Real(1e7), 0, 0};  // past kMaxCoordinate in one step
-  save_scene(scene, path);
-  expect_fails("run " + path + " --steps 3", 1, "step 0: body 1 left the finite numbers");
+  const std::string recording = folder.file("run.rec");
+  save_runaway(path);
+  const std::string message = "step 0: body 1 left the finite numbers";
+  expect_fails("run " + path + " --steps 3 --record " + recording, 1, message);
+  expect_fails("replay " + recording, 1, message);
 }
 
 TEST(Tool, ProgressIsDrawnOnTerminalsOnly) {
@@ -308,6 +372,19 @@ TEST(Tool, CompareReallyComparesContacts) {
       jfpx_stdout("compare overlap --spheres 100 --steps 1 --quiet --json -").output);
   EXPECT_EQ(json["contacts_compared"], 100 * 99 / 2);
   EXPECT_EQ(json["batches"], 1) << "by default every dispatch is computed by jfpx";
+}
+
+TEST(Tool, CompareSaysWhatWentWrongInTheNativeWorld) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("scene.json");
+  save_runaway(path);
+  expect_fails("compare " + path + " --steps 3", 1, "body 1 left the finite numbers");
+  const auto troubled =
+      nlohmann::json::parse(jfpx_stdout("compare " + path + " --steps 3 --json -").output);
+  EXPECT_NE(troubled["trouble"], "");
+  const auto fine = nlohmann::json::parse(jfpx_stdout("compare pile --steps 1 --json -").output);
+  EXPECT_EQ(fine["trouble"], "");
+  EXPECT_TRUE(fine["device_failure"].is_string());
 }
 
 TEST(Tool, CompareUsesOurSolverUnlessToldOtherwise) {

@@ -3,19 +3,25 @@ jfpx_add_test(demo_show_test SOURCES viewer/demo_show_test.cpp LINK jfpx_viewer)
 jfpx_add_test(interactive_test SOURCES viewer/interactive_test.cpp LINK jfpx_viewer)
 jfpx_add_test(panel_test SOURCES viewer/panel_test.cpp viewer/dense_screen_test.cpp viewer/user.cpp LINK jfpx_viewer)
 jfpx_add_test(renderer_test SOURCES viewer/renderer_test.cpp LINK jfpx_viewer)
-jfpx_add_test(view_test SOURCES viewer/view_test.cpp LINK jfpx_viewer)
-# Loaded into the program, whichever precision: a device that is reset.
-add_library(lost_context MODULE viewer/lost_context.cpp)
-target_link_libraries(lost_context PRIVATE jfpx_build_flags jfpx_viewer3rd)
 foreach(suffix IN ITEMS "" "_f64")
   target_compile_definitions(demo_show_test${suffix} PRIVATE
     JFPX_INPUT_FOLDER="${PROJECT_SOURCE_DIR}/examples/demos/inputs")
   target_compile_definitions(renderer_test${suffix} PRIVATE
     JFPX_REFERENCE_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/viewer/reference")
-  add_dependencies(view_test${suffix} jfpx_view jfpx_view_f64 jfpx_tool${suffix} lost_context)
-  target_compile_definitions(view_test${suffix} PRIVATE
-    JFPX_VIEW_PATH="$<TARGET_FILE:jfpx_view${suffix}>"
-    JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
-    JFPX_LOST_CONTEXT_PATH="$<TARGET_FILE:lost_context>"
-    JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
 endforeach()
+
+# What the viewer shows is what the tool says.
+if(JFPX_TOOL)
+  jfpx_add_test(view_test SOURCES viewer/view_test.cpp LINK jfpx_viewer)
+  # Loaded into the program, whichever precision: a device that is reset.
+  add_library(lost_context MODULE viewer/lost_context.cpp)
+  target_link_libraries(lost_context PRIVATE jfpx_build_flags jfpx_viewer3rd)
+  foreach(suffix IN ITEMS "" "_f64")
+    add_dependencies(view_test${suffix} jfpx_view jfpx_view_f64 jfpx_tool${suffix} lost_context)
+    target_compile_definitions(view_test${suffix} PRIVATE
+      JFPX_VIEW_PATH="$<TARGET_FILE:jfpx_view${suffix}>"
+      JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
+      JFPX_LOST_CONTEXT_PATH="$<TARGET_FILE:lost_context>"
+      JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
+  endforeach()
+endif()

@@ -40,6 +40,7 @@ else()
   set(flavours "-O0" "-O3${best}")
 endif()
 
+find_program(objdump objdump REQUIRED)
 cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
 set(others "")
 foreach(compiler IN ITEMS g++ clang++)
@@ -65,8 +66,11 @@ foreach(compiler IN ITEMS g++ clang++)
       set(program ${build}/pinned_hashes${suffix})
       execute_process(COMMAND ${program} ${threads} OUTPUT_VARIABLE output RESULT_VARIABLE result)
       # Also where no scene comes by.
-      execute_process(COMMAND objdump -d ${program} COMMAND grep -cE "vfn?m(add|sub)"
-        OUTPUT_VARIABLE fused OUTPUT_STRIP_TRAILING_WHITESPACE)
+      execute_process(COMMAND ${objdump} -d ${program} COMMAND grep -cE "vfn?m(add|sub)"
+        OUTPUT_VARIABLE fused OUTPUT_STRIP_TRAILING_WHITESPACE RESULTS_VARIABLE results)
+      if(NOT results MATCHES "^0;")
+        message(FATAL_ERROR "${objdump} can't read ${program}")
+      endif()
       if(NOT result EQUAL 0)
         message("${compiler} ${flavour}${suffix}: OTHER HASHES\n${output}")
         list(APPEND others "${compiler} ${flavour}${suffix}")

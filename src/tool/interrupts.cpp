@@ -1,0 +1,31 @@
+/// Ctrl-C as an exception; see the header.
+#include "src/tool/interrupts.hpp"
+
+namespace jfpx::inline JFPX_ABI::tool {
+namespace {
+
+volatile std::sig_atomic_t g_signal = 0;
+
+extern "C" void remember_signal(int signal) { g_signal = signal; }
+
+}  // namespace
+
+Interrupts::Interrupts() {
+  struct sigaction action {};
+  action.sa_handler = remember_signal;
+  action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    sigaction(kSignals[i], nullptr, &before_[i]);
+    if (before_[i].sa_handler == SIG_DFL) sigaction(kSignals[i], &action, nullptr);
+  }
+}
+
+Interrupts::~Interrupts() {
+  for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &before_[i], nullptr);
+}
+
+void Interrupts::check() {
+  if (g_signal != 0) throw Interrupted{g_signal};
+}
+
+}  // namespace jfpx::inline JFPX_ABI::tool

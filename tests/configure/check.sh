@@ -1,0 +1,69 @@
+#!/usr/bin/env bash
+# Configures jfpx as somebody may. Usage: check.sh STEP WORK; CXX is the compiler.
+set -euo pipefail
+step=$1 work=$2/$1
+root=$(cd "$(dirname "$0")/../.." && pwd)
+rm -rf "$work"
+mkdir -p "$work"
+
+fail() {
+  echo "$*" >&2
+  exit 1
+}
+configure() { # ARGS
+  cmake -B "$work/build" -G Ninja -DCMAKE_CXX_COMPILER="$CXX" -DJFPX_BULLET=OFF "$@" >"$work/log" 2>&1
+}
+# Line breaks of CMake's messages do not matter.
+said() { tr '\n' ' ' <"$work/log" | tr -s ' ' | grep -qF -- "$1"; }
+accepts() { configure "$@" || fail "refused: $*: $(cat "$work/log")"; }
+refuses() { # TEXT ARGS
+  if configure "${@:2}"; then fail "accepted: ${*:2}"; fi
+  said "$1" || fail "no \"$1\" in: $(cat "$work/log")"
+}
+
+case $step in
+  # A checkout whose path means something to regular expressions.
+  signs)
+    mkdir "$work/c++"
+    ln -s "$root" "$work/c++/jfpx"
+    accepts -S "$work/c++/jfpx" -DJFPX_CUDA=OFF -DJFPX_VIEWER=OFF -DJFPX_TESTS=OFF
+    ;;
+  no_tool) accepts -S "$root" -DJFPX_CUDA=OFF -DJFPX_TOOL=OFF -DJFPX_TESTS=ON ;;
+  no_examples)
+    accepts -S "$root" -DJFPX_CUDA=OFF -DJFPX_TESTS=OFF -DJFPX_EXAMPLES=OFF
+    said "viewer off (JFPX_EXAMPLES=OFF)" || fail "the summary says nothing of the viewer: $(cat "$work/log")"
+    refuses "the viewer is one of the examples" -S "$root" -DJFPX_VIEWER=ON -DJFPX_EXAMPLES=OFF
+    ;;
+  absolute)
+    for folder in BINDIR LIBDIR INCLUDEDIR; do
+      refuses "CMAKE_INSTALL_$folder is \"/usr/x\"; it must be relative" \
+        -S "$root" -DJFPX_CUDA=OFF -DCMAKE_INSTALL_$folder=/usr/x -DJFPX_VIEWER=OFF
+      rm -r "$work/build"
+    done
+    ;;
+  # An nvcc that does not know our architectures, or is none, is left out before CMake tries it.
+  cuda)
+    printf '#!/bin/sh\necho "Cuda compilation tools, release 11.5, V11.5.119"\n' >"$work/old"
+    printf '#!/bin/sh\nexit 1\n' >"$work/broken"
+    chmod +x "$work/old" "$work/broken"
+    accepts -S "$root" -DCMAKE_CUDA_COMPILER="$work/old" -DJFPX_VIEWER=OFF -DJFPX_TESTS=OFF
+    said "cuda off (nvcc is 11.5" || fail "the old nvcc is not named: $(cat "$work/log")"
+    refuses "broken is not nvcc" -S "$root" -DCMAKE_CUDA_COMPILER="$work/broken" -DJFPX_CUDA=ON
+    # What was not found is looked for again.
+    for once in first second; do
+      CUDACXX=$work/broken accepts -S "$root" -DJFPX_CUDA=AUTO
+      said "Looking for a CUDA compiler" || fail "not the $once time: $(cat "$work/log")"
+      said "cuda off (no CUDA compiler was found that works" || fail "$(cat "$work/log")"
+    done
+    ;;
+  # What a build folder was once configured with does not decide what a preset builds there.
+  presets)
+    presets=$(sed -n '/"name": "base", "hidden": true, "generator"/,/}},/p' "$root/CMakePresets.json")
+    switches=$(sed -nE 's/^(option\(|set\()(JFPX_[A-Z]+) ("|AUTO CACHE).*/\2/p' "$root/cmake/JfpxOptions.cmake" | grep -v SUMMARY)
+    [ "$(wc -w <<<"$switches")" -ge 11 ] || fail "only $switches were found"
+    for switch in $switches; do
+      grep -qF "\"$switch\": " <<<"$presets" || fail "the preset base does not set $switch"
+    done
+    ;;
+  *) fail "unknown step $step" ;;
+esac
