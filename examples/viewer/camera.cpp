@@ -45,19 +45,20 @@ void Camera::move(Real right, Real up, Real forward_distance) {
   eye_.y += up;
 }
 
+// The eye comes back from the focus rounded: a camera that nobody moves must keep its bits.
 void Camera::orbit(Real yaw, Real pitch) {
+  if (yaw == 0 && pitch == 0) return;
   const Vec3 centre = focus();
   turn(yaw, pitch);
   eye_ = centre - forward() * distance_;
 }
 
 void Camera::zoom(Real factor) {
+  if (factor == 1) return;
   const Vec3 centre = focus();
   distance_ = std::clamp(distance_ * factor, Real(1e-3), kMaxReal / 4);
   eye_ = centre - forward() * distance_;
 }
-
-void Camera::set_focus(const Vec3& centre) { eye_ = centre - forward() * distance_; }
 
 View Camera::view(const Vec3& centre, Real radius) const {
   View view;

@@ -34,12 +34,10 @@ class Camera {
   void turn(Real yaw, Real pitch);
   /// Moves along its own axes [m].
   void move(Real right, Real up, Real forward);
-  /// Circles the focus by the angles; the focus stays in the middle.
+  /// Circles the focus by the angles; the focus stays in the middle. None moves no bit.
   void orbit(Real yaw, Real pitch);
-  /// Multiplies the distance to the focus.
+  /// Multiplies the distance to the focus; 1 moves no bit.
   void zoom(Real factor);
-  /// Moves the focus, and the eye with it.
-  void set_focus(const Vec3& focus);
 
   const Vec3& eye() const { return eye_; }
   Vec3 focus() const { return eye_ + forward() * distance_; }

@@ -74,7 +74,6 @@ class Controls {
   enum Motion : std::size_t { kLeft, kRight, kBack, kAhead, kDown, kUp, kMotions };
 
   void key(const SDL_KeyboardEvent& event);
-  void command(SDL_Keycode key, Uint16 modifiers);
   bool demo_key(SDL_Keycode key, bool pressed);
   void press(std::size_t motion, bool down);
   void button(const SDL_MouseButtonEvent& event);

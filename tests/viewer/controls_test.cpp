@@ -251,6 +251,24 @@ TEST(Camera, OrbitKeepsTheFocusAndZoomTheDirection) {
   EXPECT_GT(camera.distance(), 0);
 }
 
+TEST(Camera, StaysBitForBitWhereNobodyMovesIt) {
+  const test::Seed seed;
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> anywhere(-50, 50);
+  const auto point = [&] { return Vec3{anywhere(random), anywhere(random), anywhere(random)}; };
+  for (const bool orbit : {true, false}) {
+    for (int i = 0; i < 200; ++i) {
+      Controls controls;
+      controls.orbit = orbit;
+      Camera camera;
+      camera.look_at(point(), point());
+      const Camera before = camera;
+      controls.move(&camera, 0.01, 1);
+      ASSERT_EQ(camera, before) << i;
+    }
+  }
+}
+
 TEST(Camera, ProjectionAndRayAreInverses) {
   Camera camera;
   camera.look_at({3, 4, 12}, {0, 1, 0});

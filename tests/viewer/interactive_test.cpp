@@ -1,4 +1,5 @@
 /// The window as a user has it: keys, another size, the end; events come from SDL's queue.
+#include "examples/viewer/demo_show.hpp"
 #include "tests/viewer/window_fixture.hpp"
 
 #include <initializer_list>
@@ -133,6 +134,20 @@ TEST_F(Interactive, AWindowThatIsMinimisedFromTheStartHasAPictureToo) {
   wish.screenshot = "missing/unseen.png";
   start_events();
   EXPECT_THROW(run_interactive(wish), FileError);
+}
+
+TEST_F(Interactive, TheCameraOfADemoFollowsWhileNobodyMovesIt) {
+  ViewOptions wish = options(1'000'000);
+  wish.run = {};
+  wish.run.scene = "flight";
+  App app(wish);
+  for (int i = 0; i < 200; ++i) app.frame(kRecordedFrame);
+  app.show().paused = true;
+  app.frame(0);
+  demos::View shown;
+  dynamic_cast<const DemoShow&>(app.show()).demo().draw(&shown);
+  EXPECT_GT(app.show().steps(), 100u);
+  EXPECT_LT(length(app.show().camera.eye() - shown.camera.eye), 1e-3);
 }
 
 TEST_F(Interactive, FullScreenFillsTheScreen) {
