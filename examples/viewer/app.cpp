@@ -48,15 +48,17 @@ int run_headless(const ViewOptions& options) {
     window.check_context();  // what a lost context leaves is no picture
     return image;
   };
-  for (std::uint64_t i = 0; i < options.frames.value_or(kHeadlessFrames); ++i) {
+  const std::uint64_t frames = options.frames.value_or(kHeadlessFrames);
+  // SDL makes an event of SIGINT and SIGTERM, which somebody must ask for.
+  for (std::uint64_t i = 0; i < frames && !SDL_QuitRequested(); ++i) {
     show->step();
     timing.add_step(show->engine_ms());
     if (!recorder.on()) continue;
     draw();
     recorder.add(picture());
   }
-  show->home();
-  if (options.panel) {  // windows learn their size from a first, invisible frame
+  if (!recorder.on()) show->home();  // else the last picture is that of the film
+  if (options.panel) {               // windows learn their size from a first, invisible frame
     ui.begin(kRecordedFrame);
     show->panel();
     ui.end(canvas.framebuffer(), canvas.width(), canvas.height());

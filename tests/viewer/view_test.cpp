@@ -115,12 +115,14 @@ TEST_F(Pictures, SideBySideFindsNoDifference) {
 TEST_F(Pictures, AreRecordedWithNumbers) {
   const auto result =
       jfpx_view("gas --spheres 8 --frames 3 --headless --size 64x48 --quality low --record " +
-                folder.file("film"));
+                folder.file("film") + " --screenshot " + folder.file("last.png"));
   EXPECT_EQ(result.status, 0) << result.output;
   for (const char* name :
        {"film/frame-000001.png", "film/frame-000002.png", "film/frame-000003.png"}) {
     EXPECT_TRUE(std::filesystem::exists(folder.file(name))) << name;
   }
+  EXPECT_EQ(view::read_png(folder.file("last.png")).rgb,
+            view::read_png(folder.file("film/frame-000003.png")).rgb);
 }
 
 TEST_F(Pictures, ColoursAndArrowsShow) {
@@ -139,6 +141,18 @@ TEST_F(Pictures, AWindowThatIsClosedInTheMiddleEndsWell) {
   EXPECT_THAT(result.output, HasSubstr("status 0"));  // the program's own
   EXPECT_THAT(result.output, HasSubstr("rendering on"));
   EXPECT_THAT(result.output, HasSubstr("engine native"));
+}
+
+TEST_F(Pictures, ARunWithoutAWindowEndsWellWhenItIsTerminated) {
+  const std::string path = folder.file("last.png");
+  const auto result = test::run_process(
+      "timeout --preserve-status -k 60 -s TERM 2 " JFPX_VIEW_PATH
+      " pile --spheres 400 --headless --frames 100000000 --size 160x120 --quality low "
+      "--screenshot " +
+      path + " 2>&1; echo status $?");
+  EXPECT_THAT(result.output, HasSubstr("status 0"));
+  EXPECT_THAT(result.output, HasSubstr("rendering on"));
+  EXPECT_GT(contrast(view::read_png(path)), 80);
 }
 
 TEST_F(Pictures, AWindowRunsAndClosesAtItsLastFrame) {
