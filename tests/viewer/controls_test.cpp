@@ -852,6 +852,80 @@ TEST(Stage, WallsOfLargeRoomsAreGlassAndTheRoomIsSeenWhole) {
   EXPECT_EQ(drawing.boxes().size(), 1u);  // the floor
 }
 
+/// A ball and immovable boxes, each where the list says and as large.
+Scene ball_among(const Vec3& ball, const std::vector<std::pair<Vec3, Vec3>>& boxes) {
+  Scene scene;
+  BodyDef body;
+  body.shape = Sphere{Real(0.5)};
+  body.position = ball;
+  body.mass = 1;
+  scene.bodies = {body};
+  for (const auto& [position, half] : boxes) {
+    body.shape = Box{half};
+    body.position = position;
+    body.mass = 0;
+    scene.bodies.push_back(body);
+  }
+  return scene;
+}
+
+Moment moment_of(const Scene& scene) {
+  Moment moment;
+  for (const BodyDef& body : scene.bodies) moment.states.push_back({body.position, {}, {}, {}});
+  moment.awake.assign(scene.bodies.size(), 1);
+  return moment;
+}
+
+/// Where boxes end above and below, in the order in which they are drawn.
+std::vector<float> heights(const std::vector<BoxItem>& boxes, float side) {
+  std::vector<float> heights;
+  for (const BoxItem& box : boxes) heights.push_back(box.centre[1] + side * box.half_extents[1]);
+  return heights;
+}
+
+TEST(Stage, EachStepOfAStairHasItsOwnHeight) {
+  const Vec3 half{1, Real(0.25), 1};
+  const Scene scene =
+      ball_among({0, 1, 0}, {{{0, 0, 0}, half}, {{2, Real(-0.5), 0}, half}, {{4, -1, 0}, half}});
+  const Moment moment = moment_of(scene);
+  Drawing drawing({});
+  Stage(scene).draw(moment, moment, 1, Colouring::bodies, &drawing);
+  EXPECT_THAT(heights(drawing.boxes(), 1), ::testing::UnorderedElementsAre(0.25f, -0.25f, -0.75f));
+  EXPECT_THAT(drawing.glass(), IsEmpty());
+  const std::vector<float> below = heights(drawing.boxes(), -1);
+  ASSERT_EQ(drawing.grounds().size(), 1u);  // seen from the origin
+  EXPECT_LE(-drawing.grounds()[0].height, *std::min_element(below.begin(), below.end()));
+}
+
+TEST(Stage, OfFloorsOneAboveAnotherTheLargestIsTheRooms) {
+  const Scene scene =
+      ball_among({0, 5, 0}, {{{0, 3, 0}, {1, Real(0.25), 1}}, {{0, 0, 0}, {9, Real(0.5), 9}}});
+  const Moment moment = moment_of(scene);
+  Drawing drawing({});
+  Stage(scene).draw(moment, moment, 1, Colouring::bodies, &drawing);
+  EXPECT_THAT(heights(drawing.boxes(), 1), ::testing::UnorderedElementsAre(3.25f, 0.5f));
+}
+
+TEST(Stage, AWallStaysWhereItIsWhenTheCrowdHasPassedIt) {
+  const Scene scene =
+      ball_among({0, 2, 0}, {{{0, 0, 0}, {4, Real(0.5), 4}}, {{4, 3, 0}, {Real(0.25), 3, 4}}});
+  const Stage stage(scene);
+  const auto drawn = [&](const Vec3& ball) {
+    Moment moment = moment_of(scene);
+    moment.states[0].position = ball;
+    Drawing drawing({});
+    stage.draw(moment, moment, 1, Colouring::bodies, &drawing);
+    EXPECT_EQ(drawing.boxes().size(), 1u);
+    EXPECT_EQ(drawing.glass().size(), 1u);
+    return std::pair(drawing.boxes().at(0).centre[1], drawing.glass().at(0).centre[0]);
+  };
+  const auto before = drawn({0, 2, 0});
+  EXPECT_EQ(before.first, 0.5f - 0.0625f);  // half of a plate of an eighth of a metre
+  EXPECT_EQ(before.second, 3.75f);
+  EXPECT_EQ(drawn({0, -20, 0}), before);
+  EXPECT_EQ(drawn({20, 2, 0}), before);
+}
+
 TEST(Timing, MedianOfNoneOddAndEven) {
   EXPECT_EQ(median({}), 0);
   EXPECT_EQ(median({3, 1, 2}), 2);
