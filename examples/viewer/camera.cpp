@@ -69,8 +69,8 @@ View Camera::view(const Vec3& centre, Real radius) const {
   view.fov_y = fov_y;
   const Real away = length(centre - eye_);
   view.far_plane = std::max((away + radius) * 8, Real(10));
-  // Depth has 24 bits: the near plane goes out as far as nothing is cut off.
-  view.near_plane = std::max((away - radius) * Real(0.5), view.far_plane * Real(2e-5));
+  // Half of depth's values lie within twice the near plane: it goes out as far as may be.
+  view.near_plane = std::max((away - radius) * Real(0.5), view.far_plane * kLeastNear);
   return view;
 }
 
