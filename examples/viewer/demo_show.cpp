@@ -110,15 +110,10 @@ void DemoShow::restart() {
   script_.reset();
   if (!options_.input.empty()) script_.emplace(demos::load_input_script(options_.input), *demo_);
   waiting_.clear();
+  clock_.settle();
   report_ = {};
   demo_->draw(&now_);
   before_ = now_;
-}
-
-void DemoShow::advance(double seconds) {
-  if (paused) return;
-  const unsigned due = clock_.advance(seconds * speed, static_cast<double>(demo_->dt()));
-  for (unsigned i = 0; i < due; ++i) step();
 }
 
 void DemoShow::step() {
@@ -171,10 +166,9 @@ void DemoShow::follow() {
   }
   if (followed_ && *followed_ != camera) followed_.reset();
   if (!followed_) return;
-  const Real share = paused ? 1 : static_cast<Real>(clock_.share());
   const demos::Camera &old = before_.camera, &now = now_.camera;
   camera.fov_y = now.field_of_view * kPi / 180;
-  camera.look_at(between(old.eye, now.eye, share), between(old.target, now.target, share));
+  camera.look_at(between(old.eye, now.eye, share()), between(old.target, now.target, share()));
   followed_ = camera;
 }
 
@@ -185,7 +179,7 @@ void DemoShow::draw(Renderer& renderer, const Target& target) {
   Drawing drawing(view.eye);
   drawing.set_bounds(bounds.centre, bounds.radius * Real(1.2));
   drawing.set_detail(1);
-  draw_demo(before_, now_, paused ? 1 : static_cast<Real>(clock_.share()), &drawing);
+  draw_demo(before_, now_, share(), &drawing);
   const World* world = demo_->world();
   if (contacts && world != nullptr) {
     for (const Contact& contact : world->contacts()) {
@@ -208,11 +202,7 @@ void DemoShow::panel() {
   ImGui::SetNextWindowPos({12, 12}, ImGuiCond_FirstUseEver);
   const std::string title(demo_->name());
   if (ImGui::Begin(title.c_str(), nullptr, ImGuiWindowFlags_AlwaysAutoResize)) {
-    if (widget::button(paused ? "Run" : "Pause")) paused = !paused;
-    ImGui::SameLine();
-    if (widget::button("Step")) paused = true, step();
-    ImGui::SameLine();
-    if (widget::button("Restart")) restart();
+    show_run_buttons(false);
     if (const auto chosen = choose_scene(options_.run.scene)) {
       next = options_;
       next->run.scene = *chosen;

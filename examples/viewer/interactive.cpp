@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <imgui.h>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI::view {
@@ -40,7 +41,8 @@ bool App::frame(double seconds) {
   read_events();
   controls_.move(&show_->camera, seconds, show_->body_size());
   const std::uint64_t before = show_->steps();
-  show_->advance(recorder_.on() ? kRecordedFrame : seconds);
+  const std::uint64_t last = options_.frames.value_or(std::numeric_limits<std::uint64_t>::max());
+  show_->advance(recorder_.on() ? kRecordedFrame : seconds, last > before ? last - before : 0);
   if (show_->steps() > before) {
     timing_.add_step(show_->engine_ms(), show_->steps() - before);
   }

@@ -19,7 +19,8 @@ constexpr float kWidth = 330;      // [units]
 constexpr float kItemWidth = 170;  // of a slider or a field, its label not counted
 constexpr float kTextWidth = 320;
 constexpr float kTableWidth = 300;
-constexpr float kMargin = 12;  // between a panel and the window's edge
+constexpr float kMargin = 12;        // between a panel and the window's edge
+constexpr double kUnnoticed = 0.95;  // share of the speed that was asked for
 constexpr std::uint64_t kMostSpheres = 2'000'000;
 
 /// A slider over a Real. @return whether the user has let go of a new value.
@@ -65,13 +66,7 @@ void SceneShow::fill_fields() {
 }
 
 void SceneShow::show_controls() {
-  if (widget::button(paused ? "Run" : "Pause")) paused = !paused;
-  ImGui::SameLine();
-  if (widget::button("Back")) paused = true, step_back();
-  ImGui::SameLine();
-  if (widget::button("Step")) paused = true, step();
-  ImGui::SameLine();
-  if (widget::button("Restart")) restart();
+  show_run_buttons(true);
   for (const auto& [label, command] :
        {std::pair("Picture", Command::screenshot), std::pair("Film", Command::record),
         std::pair("Save steps", Command::save)}) {
@@ -81,6 +76,9 @@ void SceneShow::show_controls() {
   auto rate = static_cast<float>(speed);
   if (widget::slider("speed", &rate, 0.01f, 4, "%.2f x")) {
     speed = static_cast<double>(rate);
+  }
+  if (clock_.kept() < kUnnoticed) {
+    widget::text(fmt::format("too slow for that: {:.2f} x", speed * clock_.kept()));
   }
   widget::text(fmt::format("step {}, {:.2f} s{}", player_.shown().step, player_.time(),
                            player_.in_the_past() ? "  (looking back)" : ""));

@@ -4,8 +4,6 @@
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
-#include <cmath>
-
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
@@ -15,15 +13,6 @@ std::size_t bytes_of(const Moment& moment) {
 }
 
 }  // namespace
-
-unsigned StepClock::advance(double seconds, double dt) {
-  if (seconds > 0 && std::isfinite(seconds)) rest_ += seconds;
-  const double due = std::floor(rest_ / dt);
-  const unsigned steps = due > kMostSteps ? kMostSteps : static_cast<unsigned>(due);
-  rest_ = due > kMostSteps ? 0 : rest_ - due * dt;
-  share_ = rest_ / dt;
-  return steps;
-}
 
 Player::Player(std::unique_ptr<Run> run, Scene scene)
     : scene_(std::move(scene)), run_(std::move(run)) {
@@ -40,12 +29,6 @@ void Player::keep(Moment moment) {
   shown_ = history_.size() - 1;
 }
 
-void Player::advance(double seconds) {
-  if (paused) return;
-  const unsigned steps = clock_.advance(seconds * speed, static_cast<double>(scene_.dt));
-  for (unsigned i = 0; i < steps; ++i) step();
-}
-
 void Player::step() {
   if (in_the_past()) {
     ++shown_;
@@ -56,7 +39,6 @@ void Player::step() {
 }
 
 bool Player::step_back() {
-  clock_.settle();
   if (shown_ == 0) return false;
   --shown_;
   return true;
@@ -68,7 +50,6 @@ void Player::restart() {
   bytes_ = 0;
   keep(run_->moment());
   changed_ = false;
-  clock_ = {};
 }
 
 bool Player::switch_to(const EngineChoice& choice) {

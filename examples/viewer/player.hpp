@@ -1,4 +1,4 @@
-/// Plays a run: a fixed step behind a clock of any rate, pause, slow motion, and steps back.
+/// Plays a run: steps ahead, and back through what is kept.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -8,22 +8,6 @@
 #include <deque>
 
 namespace jfpx::inline JFPX_ABI::view {
-
-/// Turns wall time into whole steps and the share of the next one.
-class StepClock {
- public:
-  /// Most steps for one frame: a machine that is too slow shows slow motion instead of freezing.
-  static constexpr unsigned kMostSteps = 8;
-
-  /// @return how many steps of `dt` are due after `seconds` more. Bad times count as none.
-  unsigned advance(double seconds, double dt);
-  /// How far into the step that is shown: 0 to 1.
-  double share() const { return share_; }
-  void settle() { rest_ = 0, share_ = 1; }
-
- private:
-  double rest_ = 0, share_ = 1;
-};
 
 /// What can be changed while a scene runs.
 struct RunSettings {
@@ -40,8 +24,6 @@ class Player {
 
   Player(std::unique_ptr<Run> run, Scene scene);
 
-  /// Lets wall time pass.
-  void advance(double seconds);
   /// One step: of what was kept, or a new one.
   void step();
   /// Shows the step before, as far as kept. What was computed stays: stepping ahead again shows the
@@ -66,14 +48,10 @@ class Player {
   const Moment& shown() const { return history_[shown_]; }
   /// The moment before the one that is shown, or that one itself.
   const Moment& before() const { return history_[shown_ == 0 ? 0 : shown_ - 1]; }
-  Real share() const { return paused ? 1 : static_cast<Real>(clock_.share()); }
   bool in_the_past() const { return shown_ + 1 < history_.size(); }
   const std::deque<Moment>& history() const { return history_; }
   const Scene& scene() const { return scene_; }
   double time() const { return static_cast<double>(shown().step) * static_cast<double>(scene_.dt); }
-
-  bool paused = false;
-  double speed = 1;
 
  private:
   void keep(Moment moment);
@@ -85,7 +63,6 @@ class Player {
   std::size_t shown_ = 0;
   std::size_t bytes_ = 0;
   bool changed_ = false;  ///< the run is no longer the one that began
-  StepClock clock_;
 };
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -31,8 +31,6 @@ SceneShow::SceneShow(const ViewOptions& options)
 
 void SceneShow::load(const ViewOptions& options) {
   Player fresh = make_player(options);  // may throw; the old one runs on then
-  fresh.paused = player_.paused;
-  fresh.speed = player_.speed;
   player_ = std::move(fresh);
   stage_ = Stage(player_.scene());
   options_ = options;
@@ -40,14 +38,13 @@ void SceneShow::load(const ViewOptions& options) {
   fill_fields();
 }
 
-void SceneShow::advance(double seconds) {
-  player_.paused = paused;
-  player_.speed = speed;
-  player_.advance(seconds);
-}
 void SceneShow::step() { player_.step(); }
-void SceneShow::step_back() { player_.step_back(); }
+void SceneShow::step_back() {
+  clock_.settle();
+  player_.step_back();
+}
 void SceneShow::restart() {
+  clock_.settle();
   player_.restart();
   message_.clear();
 }
@@ -61,7 +58,7 @@ View SceneShow::view() const {
 void SceneShow::draw(Renderer& renderer, const Target& target) {
   const View now = view();
   Drawing drawing(now.eye);
-  stage_.draw(player_.before(), player_.shown(), player_.share(), colouring, &drawing);
+  stage_.draw(player_.before(), player_.shown(), share(), colouring, &drawing);
   if (contacts) stage_.draw_contacts(player_.shown().contacts, false, &drawing);
   if (forces) stage_.draw_forces(player_.before(), player_.shown(), &drawing);
   if (picked_) stage_.draw_mark(player_.shown(), *picked_, &drawing);

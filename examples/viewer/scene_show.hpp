@@ -12,7 +12,6 @@ class SceneShow final : public Show {
  public:
   explicit SceneShow(const ViewOptions& options);
 
-  void advance(double seconds) override;
   void step() override;
   void step_back() override;
   void restart() override;
@@ -20,6 +19,7 @@ class SceneShow final : public Show {
   void draw(Renderer& renderer, const Target& target) override;
   void panel() override;
   void pick(Real x, Real y, int width, int height) override;
+  double dt() const override { return static_cast<double>(player_.scene().dt); }
   std::uint64_t steps() const override { return player_.shown().step; }
   double engine_ms() const override { return player_.shown().times.total; }
   Real body_size() const override { return stage_.body_size(); }

@@ -4,8 +4,27 @@
 #include <jfpx/error.hpp>
 
 #include "examples/viewer/scene_choice.hpp"
+#include "examples/viewer/widgets.hpp"
+
+#include <imgui.h>
 
 namespace jfpx::inline JFPX_ABI::view {
+
+void Show::advance(double seconds, std::uint64_t most) {
+  if (!paused) clock_.advance(seconds * speed, dt(), most, [this] { step(); });
+}
+
+void Show::show_run_buttons(bool with_back) {
+  if (widget::button(paused ? "Run" : "Pause")) paused = !paused;
+  ImGui::SameLine();
+  if (with_back) {
+    if (widget::button("Back")) paused = true, step_back();
+    ImGui::SameLine();
+  }
+  if (widget::button("Step")) paused = true, step();
+  ImGui::SameLine();
+  if (widget::button("Restart")) restart();
+}
 
 void Show::save_recording(const std::string& path) const {
   throw InvalidArgument(path + ": only a scene on one engine can be recorded");

@@ -5,7 +5,9 @@
 #include "examples/viewer/controls.hpp"
 #include "examples/viewer/options.hpp"
 #include "examples/viewer/renderer.hpp"
+#include "examples/viewer/step_clock.hpp"
 
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -22,8 +24,9 @@ class Show {
  public:
   virtual ~Show() = default;
 
-  virtual void advance(double seconds) = 0;  ///< lets wall time pass
-  virtual void step() = 0;                   ///< exactly one step
+  /// Lets wall time pass: makes the steps that are due, `most` of them at most.
+  void advance(double seconds, std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
+  virtual void step() = 0;  ///< exactly one step
   virtual void step_back() {}
   virtual void restart() = 0;
   virtual void home() = 0;  ///< the camera shows everything again
@@ -42,6 +45,7 @@ class Show {
   /// Writes the states of all steps. @throws InvalidArgument where that can't be, FileError
   virtual void save_recording(const std::string& path) const;
 
+  virtual double dt() const = 0;                      ///< [s], of the next step
   virtual std::uint64_t steps() const = 0;            ///< made so far
   virtual double engine_ms() const = 0;               ///< of the last step
   virtual Real body_size() const = 0;                 ///< [m]
@@ -56,6 +60,14 @@ class Show {
 
   std::vector<Command> commands;    ///< that the panel asks for
   std::optional<ViewOptions> next;  ///< another show, likewise
+
+ protected:
+  /// How far the picture is into the step that is shown: 0 to 1.
+  Real share() const { return paused ? 1 : static_cast<Real>(clock_.share()); }
+  /// Buttons to run, step and start again, in a row.
+  void show_run_buttons(bool with_back);
+
+  StepClock clock_;
 };
 
 /// The show that the options ask for.

@@ -5,7 +5,6 @@
 #include "examples/viewer/bullet_moment.hpp"
 #include "examples/viewer/comparison.hpp"
 #include "examples/viewer/framing.hpp"
-#include "examples/viewer/player.hpp"
 #include "examples/viewer/show.hpp"
 #include "examples/viewer/timing.hpp"
 
@@ -110,17 +109,13 @@ class SideBySide final : public Show {
     home();
   }
 
-  void advance(double seconds) override {
-    if (paused) return;
-    const unsigned due = clock_.advance(seconds * speed, static_cast<double>(scene_.dt));
-    for (unsigned i = 0; i < due; ++i) step();
-  }
   void step() override {
     trio_->step();
     trace();
   }
   void restart() override {
     trio_ = std::make_unique<Trio>(scene_, options_);
+    clock_.settle();
     for (auto& trail : trails_) trail.clear();
   }
   void home() override {
@@ -132,6 +127,7 @@ class SideBySide final : public Show {
   }
   void draw(Renderer& renderer, const Target& target) override;
 
+  double dt() const override { return static_cast<double>(scene_.dt); }
   std::uint64_t steps() const override { return trio_->now[kNative].step; }
   double engine_ms() const override {
     double sum = 0;
@@ -157,7 +153,6 @@ class SideBySide final : public Show {
   Scene scene_;
   Stage stage_;
   std::unique_ptr<Trio> trio_;
-  StepClock clock_;
   std::array<std::deque<std::vector<Vec3>>, kColumns> trails_;
 };
 
@@ -190,11 +185,10 @@ void SideBySide::draw(Renderer& renderer, const Target& target) {
   const int top_height = target.height - strip;
   const Bounds bounds = stage_.bounds(trio_->now[kNative].states);
   const View view = camera.view(bounds.centre, bounds.radius);
-  const Real share = paused ? 1 : static_cast<Real>(clock_.share());
   for (std::size_t column = 0; column < kColumns; ++column) {
     Drawing drawing(view.eye);
     const Moment& now = trio_->now[column];
-    stage_.draw(trio_->before[column], now, share, colouring, &drawing);
+    stage_.draw(trio_->before[column], now, share(), colouring, &drawing);
     if (contacts) stage_.draw_contacts(now.contacts, false, &drawing);
     if (forces) stage_.draw_forces(trio_->before[column], now, &drawing);
     if (column != kNative) stage_.draw_contacts(trio_->different, true, &drawing);

@@ -11,6 +11,7 @@
 #include "examples/viewer/image.hpp"
 #include "examples/viewer/islands.hpp"
 #include "examples/viewer/player.hpp"
+#include "examples/viewer/step_clock.hpp"
 #include "examples/viewer/timing.hpp"
 #include "examples/viewer/values.hpp"
 #include "tests/support/seed.hpp"
@@ -282,20 +283,52 @@ TEST(Camera, ProjectionAndRayAreInverses) {
   EXPECT_FALSE(project(view, {6, 8, 24}, 640, 480));  // behind
 }
 
+constexpr std::uint64_t kAnyNumber = std::numeric_limits<std::uint64_t>::max();
+
+std::uint64_t steps_after(StepClock* clock, double seconds, double dt,
+                          std::uint64_t most = kAnyNumber) {
+  std::uint64_t steps = 0;
+  clock->advance(seconds, dt, most, [&steps] { ++steps; });
+  return steps;
+}
+
 TEST(StepClock, StepsAreFixedWhateverTheFrameRate) {
   for (const int frames : {10, 60, 144, 1000}) {
     StepClock clock;
-    unsigned steps = 0;
-    for (int i = 0; i < frames; ++i) steps += clock.advance(0.5 / frames, 1.0 / 64);
-    EXPECT_NEAR(steps, 32, 1) << frames;
+    std::uint64_t steps = 0;
+    for (int i = 0; i < frames; ++i) steps += steps_after(&clock, 0.5 / frames, 1.0 / 64);
+    EXPECT_NEAR(static_cast<double>(steps), 32, 1) << frames;
     EXPECT_GE(clock.share(), 0);
     EXPECT_LT(clock.share(), 1.0001);
   }
   StepClock clock;
-  EXPECT_EQ(clock.advance(1e9, 0.01), StepClock::kMostSteps);  // no endless catching up
   for (const double bad : {-1.0, 0.0, std::nan(""), HUGE_VAL}) {
-    EXPECT_EQ(clock.advance(bad, 0.01), 0u);
+    EXPECT_EQ(steps_after(&clock, bad, 0.01), 0u);
   }
+}
+
+TEST(StepClock, AMachineThatIsFastEnoughMakesAllSteps) {
+  StepClock clock;
+  clock.patience = HUGE_VAL;
+  EXPECT_EQ(steps_after(&clock, 0.25, 1.0 / 4096), 1024u);  // far more than are sure
+  EXPECT_EQ(clock.kept(), 1);
+}
+
+TEST(StepClock, WhatPatienceDoesNotSufficeForIsGivenUpAndTold) {
+  StepClock clock;
+  clock.patience = -1;
+  EXPECT_EQ(steps_after(&clock, 1, 1.0 / 64), StepClock::kSureSteps);
+  EXPECT_EQ(clock.kept(), 1.0 / 8);
+  EXPECT_EQ(steps_after(&clock, 1.0 / 64, 1.0 / 64), 1u);  // no endless catching up
+  for (int i = 0; i < 1000; ++i) steps_after(&clock, 1.0 / 64, 1.0 / 64);
+  EXPECT_GT(clock.kept(), 0.999);
+}
+
+TEST(StepClock, MakesNoMoreStepsThanAreWanted) {
+  StepClock clock;
+  EXPECT_EQ(steps_after(&clock, 0.1, 1.0 / 64, 3), 3u);
+  EXPECT_EQ(steps_after(&clock, 0.1, 1.0 / 64, 0), 0u);
+  EXPECT_EQ(clock.share(), 1);
 }
 
 Player player_of(const Scene& scene, const EngineChoice& choice = {}) {

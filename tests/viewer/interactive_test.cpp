@@ -60,6 +60,13 @@ TEST_F(Interactive, KeysTakePicturesFilmsAndRecordings) {
   EXPECT_EQ(folder.entries(), 3u);
 }
 
+TEST_F(Interactive, AWindowClosesAfterAsManyStepsAsWereWanted) {
+  App app(options(5));
+  EXPECT_TRUE(app.frame(3.5 / 60));
+  EXPECT_FALSE(app.frame(7.5 / 60));
+  EXPECT_EQ(app.show().steps(), 5u);
+}
+
 TEST_F(Interactive, F1ShowsTheHelp) {
   const auto brightness_of_the_middle = [](std::initializer_list<SDL_Keycode> keys) {
     start_events();
