@@ -80,7 +80,7 @@ void SceneShow::show_controls() {
   if (clock_.kept() < kUnnoticed) {
     widget::text(fmt::format("too slow for that: {:.2f} x", speed * clock_.kept()));
   }
-  widget::text(fmt::format("step {}, {:.2f} s{}", player_.shown().step, player_.time(),
+  widget::text(fmt::format("step {}, {:.2f} s{}", player_.shown().step, player_.shown().time,
                            player_.in_the_past() ? "  (looking back)" : ""));
 }
 

@@ -35,7 +35,10 @@ void Player::step() {
     return;
   }
   run_->step();
-  keep(run_->moment());
+  Moment moment = run_->moment();
+  moment.dt = scene_.dt;
+  moment.time = history_.back().time + static_cast<double>(scene_.dt);
+  keep(std::move(moment));
 }
 
 bool Player::step_back() {

@@ -51,7 +51,6 @@ class Player {
   bool in_the_past() const { return shown_ + 1 < history_.size(); }
   const std::deque<Moment>& history() const { return history_; }
   const Scene& scene() const { return scene_; }
-  double time() const { return static_cast<double>(shown().step) * static_cast<double>(scene_.dt); }
 
  private:
   void keep(Moment moment);

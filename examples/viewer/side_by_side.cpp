@@ -88,6 +88,7 @@ struct Trio {
     now = {native->moment(), moment_of(stock, step), moment_of(jfpx, step)};
     const Scene& scene = stock.scene();
     for (std::size_t i = 0; i < kColumns; ++i) {
+      now[i].dt = scene.dt;
       energies[i].push_back(static_cast<float>(energy(scene, now[i].states)));
       times[i].push_back(now[i].times.total);
       if (times[i].size() > kTimed) times[i].pop_front();

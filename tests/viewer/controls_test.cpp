@@ -576,6 +576,7 @@ TEST(Forces, AreWhatGravityDoesNotExplain) {
   before.states.resize(4);
   now.states = before.states;
   now.step = 1;
+  now.dt = scene.dt;
   now.states[1].velocity = {0, Real(-1.25), 0};  // falls freely: 10 / 8
   now.states[2].velocity = {3, 0, 0};            // struck while it lies
   const auto forces = forces_between(scene, before, now);
@@ -607,12 +608,33 @@ TEST(Forces, OfABallAtRestAreItsWeightOnEveryEngine) {
   }
 }
 
+TEST(Forces, OfABallThatFallsAreNoneWhateverTheSettingsBecome) {
+  Scene scene;
+  BodyDef ball;
+  ball.mass = 3;
+  ball.acceleration = {0, -10, 0};
+  scene.bodies = {ball};
+  scene.dt = Real(1.0 / 64);
+  Player player = player_of(scene);
+  for (int i = 0; i < 2; ++i) player.step();
+  RunSettings settings = player.settings();
+  settings.dt = scene.dt / 4;
+  player.set_settings(settings);
+  EXPECT_EQ(player.shown().time, 2.0 / 64);
+  const Moment last = player.shown();
+  EXPECT_NEAR(length(forces_between(scene, player.before(), last)[0]), 0, 0.01);
+  player.step();
+  EXPECT_EQ(player.shown().time, 2.25 / 64);
+  EXPECT_NEAR(length(forces_between(scene, player.before(), player.shown())[0]), 0, 0.01);
+}
+
 TEST(Forces, AreDrawnAsArrowsOfBoundedLength) {
   const Scene scene = row_of_balls(4);
   Moment before, now;
   before.states.resize(4);
   now.states = before.states;
   now.step = 1;
+  now.dt = scene.dt;
   now.states[1].velocity = {0, Real(-1.25), 0};
   now.states[2].velocity = {1e6, 0, 0};
   Drawing drawing({0, 0, 10});
