@@ -18,7 +18,8 @@ constexpr std::uint64_t kHeadlessFrames = 120;
 int run_without_rendering(const ViewOptions& options) {
   const auto show = make_show(options);
   Timing timing;
-  for (std::uint64_t i = 0; i < options.frames.value_or(kHeadlessFrames); ++i) {
+  const std::uint64_t frames = options.frames.value_or(kHeadlessFrames);
+  for (std::uint64_t i = 0; i < frames && !show->at_end(); ++i) {
     show->step();
     timing.add_step(show->engine_ms());
   }
@@ -50,7 +51,7 @@ int run_headless(const ViewOptions& options) {
   };
   const std::uint64_t frames = options.frames.value_or(kHeadlessFrames);
   // SDL makes an event of SIGINT and SIGTERM, which somebody must ask for.
-  for (std::uint64_t i = 0; i < frames && !SDL_QuitRequested(); ++i) {
+  for (std::uint64_t i = 0; i < frames && !show->at_end() && !SDL_QuitRequested(); ++i) {
     show->step();
     timing.add_step(show->engine_ms());
     if (!recorder.on()) continue;

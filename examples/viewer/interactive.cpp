@@ -46,7 +46,7 @@ bool App::frame(double seconds) {
   if (show_->steps() > before) {
     timing_.add_step(show_->engine_ms(), show_->steps() - before);
   }
-  quit_ = quit_ || (options_.frames && show_->steps() >= *options_.frames);
+  quit_ = quit_ || (options_.frames && (show_->steps() >= last || show_->at_end()));
   if (quit_) wanted_picture_ = options_.screenshot;
   draw(seconds);
   return !quit_;

@@ -79,7 +79,9 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
       ->check(tool::whole_number())
       ->capture_default_str();
   app.add_flag("--headless", options.headless, "No window, no display");
-  app.add_option("--frames", options.frames, "Steps to run [headless: 120; window: until closed]")
+  app.add_option("--frames", options.frames,
+                 "Steps to run, of a recording as many as it has [headless: 120; window: until "
+                 "closed]")
       ->check(tool::whole_number());
   app.add_option("--screenshot", options.screenshot, "Write the last frame to this PNG file");
   app.add_option("--record", options.record,

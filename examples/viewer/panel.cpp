@@ -81,7 +81,9 @@ void SceneShow::show_controls() {
     widget::text(fmt::format("too slow for that: {:.2f} x", speed * clock_.kept()));
   }
   widget::text(fmt::format("step {}, {:.2f} s{}", player_.shown().step, player_.shown().time,
-                           player_.in_the_past() ? "  (looking back)" : ""));
+                           player_.in_the_past() ? "  (looking back)"
+                           : player_.at_end()    ? "  (end of recording)"
+                                                 : ""));
 }
 
 void SceneShow::show_scene_choice() {

@@ -30,6 +30,7 @@ void Player::keep(Moment moment) {
 }
 
 void Player::step() {
+  if (at_end()) return;
   if (in_the_past()) {
     ++shown_;
     return;

@@ -24,8 +24,10 @@ class Player {
 
   Player(std::unique_ptr<Run> run, Scene scene);
 
-  /// One step: of what was kept, or a new one.
+  /// One step: of what was kept, or a new one; at the end none.
   void step();
+  /// No step is left: the run is a recording, which is over.
+  bool at_end() const { return !in_the_past() && run_->at_end(); }
   /// Shows the step before, as far as kept. What was computed stays: stepping ahead again shows the
   /// same bits. @return false at the oldest one
   bool step_back();

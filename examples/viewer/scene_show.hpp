@@ -13,6 +13,7 @@ class SceneShow final : public Show {
   explicit SceneShow(const ViewOptions& options);
 
   void step() override;
+  bool at_end() const override { return player_.at_end(); }
   void step_back() override;
   void restart() override;
   void home() override;

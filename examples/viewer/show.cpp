@@ -12,6 +12,7 @@ namespace jfpx::inline JFPX_ABI::view {
 
 void Show::advance(double seconds, std::uint64_t most) {
   if (!paused) clock_.advance(seconds * speed, dt(), most, [this] { step(); });
+  paused = paused || at_end();
 }
 
 void Show::show_run_buttons(bool with_back) {

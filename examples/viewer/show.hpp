@@ -24,9 +24,11 @@ class Show {
  public:
   virtual ~Show() = default;
 
-  /// Lets wall time pass: makes the steps that are due, `most` of them at most.
+  /// Lets wall time pass: makes the steps that are due, `most` of them at most. At the end the show
+  /// pauses.
   void advance(double seconds, std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
-  virtual void step() = 0;  ///< exactly one step
+  virtual void step() = 0;                       ///< exactly one step; at the end none
+  virtual bool at_end() const { return false; }  ///< no step is left
   virtual void step_back() {}
   virtual void restart() = 0;
   virtual void home() = 0;  ///< the camera shows everything again

@@ -482,7 +482,11 @@ TEST(Player, ARecordingIsPlayedAndGoesOnLiveAndReplays) {
     played.step();
   }
   EXPECT_EQ(played.shown().step, 15u);  // the end stays
+  EXPECT_TRUE(played.at_end());
+  EXPECT_EQ(played.history().size(), 16u);
   EXPECT_TRUE(played.step_back());
+  EXPECT_EQ(played.shown().step, 14u);
+  EXPECT_FALSE(played.at_end());
   EXPECT_FALSE(played.switch_to({.backend = Backend::x86}));
   played.step();
   EXPECT_EQ(played.shown().step, 16u);

@@ -1,5 +1,7 @@
 /// The panel as a user has it: widgets are clicked where they are drawn, and what they promise
 /// comes.
+#include <jfpx/recording.hpp>
+
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/demo_show.hpp"
 #include "examples/viewer/scene_show.hpp"
@@ -304,6 +306,29 @@ TEST_F(Panel, ARecordingStartsAgainAsItIsShown) {
   user.click("Step");
   EXPECT_FALSE(user.reads("spheres by the recording"));
   EXPECT_NE(hash(user), recorded);
+}
+
+TEST_F(Panel, ARecordingPausesAtItsEndAndIsSavedAsItIs) {
+  {
+    test::User user(options_for("pile"));
+    for (int i = 0; i < 3; ++i) user.click("Step");
+    user.click("Save steps");
+  }
+  start_events();
+  ViewOptions options = options_for("jfpx-view-1.rec");
+  options.run.spheres.reset();
+  test::User user(options);
+  user.frame(10 * kStep);
+  user.frame();
+  EXPECT_EQ(user.show().steps(), 3u);
+  EXPECT_TRUE(user.show().paused);
+  EXPECT_TRUE(user.reads("(end of recording)"));
+  user.click("Step");
+  user.click("Run");
+  user.click("Save steps");
+  EXPECT_EQ(RecordingReader("jfpx-view-2.rec").steps(), 3u);
+  user.click("Back");
+  EXPECT_EQ(user.show().steps(), 2u);
 }
 
 TEST_F(Panel, PicturesFilmsAndRecordingsAreWritten) {

@@ -177,9 +177,14 @@ TEST(View, StatesAreRecordedAndPlayedBack) {
   const std::string path = folder.file("gas.rec");
   const auto recorded = jfpx_view("gas --spheres 9 --frames 7 --no-render --recording " + path);
   EXPECT_EQ(recorded.status, 0) << recorded.output;
-  const auto played = jfpx_view(path + " --frames 7 --no-render");
+  const auto played = jfpx_view(path + " --frames 70 --no-render");
   EXPECT_EQ(played.status, 0) << played.output;
-  EXPECT_THAT(played.output, HasSubstr("step 7"));
+  EXPECT_THAT(played.output, HasSubstr("step 7,"));
+  EXPECT_THAT(played.output, HasSubstr("7 steps,"));
+  const std::string again = folder.file("again.rec");
+  EXPECT_EQ(jfpx_view(path + " --frames 70 --no-render --recording " + again).status, 0);
+  const auto replayed = test::run_process(JFPX_TOOL_PATH " replay " + again + " 2>&1");
+  EXPECT_EQ(replayed.status, 0) << replayed.output;
   for (const char* change : {" --spheres 5", " --boxes 1", " --dt 0.01", " --seed 2"}) {
     expect_fails(jfpx_view(path + change + " --no-render"), 2, "is a recording");
   }
