@@ -23,7 +23,8 @@ int run_without_rendering(const ViewOptions& options) {
     show->step();
     timing.add_step(show->engine_ms());
   }
-  return finish(*show, timing, options);
+  finish(*show, timing, options);
+  return show->status();
 }
 
 int run_headless(const ViewOptions& options) {
@@ -66,15 +67,15 @@ int run_headless(const ViewOptions& options) {
   }
   draw();
   if (!options.screenshot.empty()) write_png(picture(), options.screenshot);
-  return finish(*show, timing, options);
+  finish(*show, timing, options);
+  return show->status();
 }
 
 }  // namespace
 
-int finish(const Show& show, const Timing& timing, const ViewOptions& options) {
+void finish(const Show& show, const Timing& timing, const ViewOptions& options) {
   if (!options.recording.empty()) show.save_recording(options.recording);
   fmt::print("{}\n{}\n", show.summary(), timing.text(options.render));
-  return show.status();
 }
 
 int run_app(const ViewOptions& options) {

@@ -16,7 +16,7 @@ int run_app(const ViewOptions& options);
 /// The same, in a window until it is closed.
 int run_interactive(const ViewOptions& options);
 
-/// What is written and printed at the end of a run. @return the exit status
-int finish(const Show& show, const Timing& timing, const ViewOptions& options);
+/// What is written and printed at the end of a run.
+void finish(const Show& show, const Timing& timing, const ViewOptions& options);
 
 }  // namespace jfpx::inline JFPX_ABI::view

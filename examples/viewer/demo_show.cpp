@@ -126,6 +126,7 @@ void DemoShow::step() {
   waiting_.clear();
   Stopwatch watch;
   report_ = demo_->step(inputs);
+  check(!report_.non_finite);
   report_.total_ms = watch.lap() * 1e3;  // controls included
   before_ = std::move(now_);
   demo_->draw(&now_);
@@ -217,8 +218,6 @@ void DemoShow::panel() {
   }
   ImGui::End();
 }
-
-int DemoShow::status() const { return report_.non_finite ? tool::kCheckFailed : tool::kSuccess; }
 
 std::string DemoShow::summary() const {
   return fmt::format("{}: step {}, hash {:016x}{}", demo_->name(), report_.step,

@@ -31,7 +31,6 @@ class DemoShow final : public Show {
   std::uint64_t steps() const override { return report_.step; }
   double engine_ms() const override { return report_.total_ms; }
   Real body_size() const override { return 1; }
-  int status() const override;
   std::string summary() const override;
 
   const demos::Demo& demo() const { return *demo_; }

@@ -52,6 +52,11 @@ bool App::frame(double seconds) {
   return !quit_;
 }
 
+int App::finish() const {
+  view::finish(*show_, timing_, options_);
+  return std::max(status_, show_->status());
+}
+
 void App::read_events() {
   SDL_Event event;
   while (SDL_PollEvent(&event) != 0) {
@@ -79,7 +84,9 @@ void App::grant_wishes() {
   if (!show_->next) return;
   const ViewOptions next = *std::exchange(show_->next, std::nullopt);
   try {
-    show_ = make_show(next);
+    std::unique_ptr<Show> fresh = make_show(next);
+    status_ = std::max(status_, show_->status());
+    show_ = std::move(fresh);
     meet_show();
     window_.set_title("jfpx-view: " + next.run.scene);
   } catch (const Error& error) {

@@ -24,7 +24,7 @@ class App {
   ///   BackendUnavailable if OpenGL lost its context
   bool frame(double seconds);
   /// What is written and printed at the end. @return the exit status
-  int finish() const { return view::finish(*show_, timing_, options_); }
+  int finish() const;
 
   Show& show() { return *show_; }
   Window& window() { return window_; }
@@ -59,6 +59,7 @@ class App {
   std::string wanted_picture_;  ///< file for the next one
   std::string notice_;          ///< shown for a while
   double notice_left_ = 0;      ///< [s]
+  int status_ = 0;              ///< of the shows before
   bool quit_ = false, help_ = false, panel_ = true;
 };
 

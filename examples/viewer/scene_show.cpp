@@ -38,7 +38,10 @@ void SceneShow::load(const ViewOptions& options) {
   fill_fields();
 }
 
-void SceneShow::step() { player_.step(); }
+void SceneShow::step() {
+  player_.step();
+  check(player_.shown().trouble.empty());
+}
 void SceneShow::step_back() {
   clock_.settle();
   player_.step_back();
@@ -73,10 +76,6 @@ void SceneShow::pick(Real x, Real y, int width, int height) {
 
 // As in the thesis.
 bool SceneShow::walks() const { return tool::is_demo(options_.run.scene); }
-
-int SceneShow::status() const {
-  return player_.shown().trouble.empty() ? tool::kSuccess : tool::kCheckFailed;
-}
 
 std::string SceneShow::summary() const {
   const Moment& now = player_.shown();

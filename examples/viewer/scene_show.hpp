@@ -26,7 +26,6 @@ class SceneShow final : public Show {
   Real body_size() const override { return stage_.body_size(); }
   bool walks() const override;
   void save_recording(const std::string& path) const override { player_.save_recording(path); }
-  int status() const override;
   std::string summary() const override;
 
   const Player& player() const { return player_; }

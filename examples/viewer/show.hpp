@@ -51,8 +51,10 @@ class Show {
   virtual std::uint64_t steps() const = 0;            ///< made so far
   virtual double engine_ms() const = 0;               ///< of the last step
   virtual Real body_size() const = 0;                 ///< [m]
-  virtual int status() const = 0;                     ///< the exit status so far
   virtual std::string summary() const { return {}; }  ///< printed at the end
+
+  /// The exit status so far: what failed once has failed, whatever starts again.
+  int status() const { return failed_ ? tool::kCheckFailed : tool::kSuccess; }
 
   Camera camera;
   Colouring colouring = Colouring::bodies;
@@ -69,7 +71,13 @@ class Show {
   /// Buttons to run, step and start again, in a row.
   void show_run_buttons(bool with_back);
 
+  /// After each step.
+  void check(bool well) { failed_ = failed_ || !well; }
+
   StepClock clock_;
+
+ private:
+  bool failed_ = false;
 };
 
 /// The show that the options ask for.

@@ -112,6 +112,7 @@ class SideBySide final : public Show {
 
   void step() override {
     trio_->step();
+    check(same());
     trace();
   }
   void restart() override {
@@ -136,7 +137,6 @@ class SideBySide final : public Show {
     return sum;
   }
   Real body_size() const override { return stage_.body_size(); }
-  int status() const override { return same() ? tool::kSuccess : tool::kCheckFailed; }
   std::string summary() const override;
 
  private:

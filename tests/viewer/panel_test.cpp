@@ -171,6 +171,30 @@ TEST_F(Panel, BulletsPartsAreExchangedWithoutMovingABit) {
   EXPECT_TRUE(user.reads("spheres by x86, solved by Bullet"));
 }
 
+TEST_F(Panel, WhatFailedOnceHasFailedWhateverStartsAgain) {
+  Scene scene;
+  BodyDef ball;
+  ball.mass = 1;
+  ball.velocity = {kMaxCoordinate, 0, 0};
+  scene.bodies = {ball};
+  scene.dt = Real(0.5);
+  save_scene(scene, folder.file("fast.json"));
+  ViewOptions options = options_for(folder.file("fast.json"));
+  options.run.spheres.reset();
+  test::User user(options);
+  user.show().paused = true;
+  ASSERT_EQ(user.show().status(), 0);
+  for (int i = 0; i < 4; ++i) user.show().step();
+  ASSERT_EQ(user.show().status(), 1);
+  user.frame();
+  user.click("Restart");
+  EXPECT_EQ(user.show().steps(), 0u);
+  EXPECT_EQ(user.show().status(), 1);
+  user.choose("scene", "flight");
+  EXPECT_EQ(user.show().status(), 0);
+  EXPECT_EQ(user.finish(), 1);
+}
+
 TEST_F(Panel, ScenesAndDemosAreChosen) {
   test::User user(options_for("pile"));
   user.show().paused = true;
