@@ -20,6 +20,7 @@ namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
 constexpr Real kFlat = Real(0.5);  // scales below this stand for shadows
+constexpr float kTextWidth = 320;  // [units]
 constexpr Paint kGround{124, 130, 138};
 
 std::unique_ptr<demos::Demo> make_demo(const ViewOptions& options) {
@@ -204,6 +205,7 @@ void DemoShow::panel() {
   const std::string title(demo_->name());
   if (ImGui::Begin(title.c_str(), nullptr, ImGuiWindowFlags_AlwaysAutoResize)) {
     show_run_buttons(false);
+    if (!message.empty()) widget::warning(message, kTextWidth);
     if (const auto chosen = choose_scene(options_.run.scene)) {
       next = options_;
       next->run.scene = *chosen;

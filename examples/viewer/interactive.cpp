@@ -82,16 +82,26 @@ void App::meet_show() {
 void App::grant_wishes() {
   for (const Command command : std::exchange(show_->commands, {})) try_to_obey(command);
   if (!show_->next) return;
-  const ViewOptions next = *std::exchange(show_->next, std::nullopt);
   try {
-    std::unique_ptr<Show> fresh = make_show(next);
-    status_ = std::max(status_, show_->status());
-    show_ = std::move(fresh);
-    meet_show();
-    window_.set_title("jfpx-view: " + next.run.scene);
+    open(*std::exchange(show_->next, std::nullopt));
   } catch (const Error& error) {
-    tell(error.what());
+    show_->message = error.what();
   }
+}
+
+/// Shows something else, as what is shown is. @throws what loading and engines throw; nothing has
+/// changed then.
+void App::open(const ViewOptions& next) {
+  std::unique_ptr<Show> fresh = make_show(next);
+  fresh->paused = show_->paused;
+  fresh->speed = show_->speed;
+  fresh->colouring = show_->colouring;
+  fresh->contacts = show_->contacts;
+  fresh->forces = show_->forces;
+  status_ = std::max(status_, show_->status());
+  show_ = std::move(fresh);
+  meet_show();
+  window_.set_title("jfpx-view: " + next.run.scene);
 }
 
 /// What can't be done now is told and changes nothing.

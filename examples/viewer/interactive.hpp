@@ -33,6 +33,7 @@ class App {
   void read_events();
   void meet_show();
   void grant_wishes();
+  void open(const ViewOptions& next);
   void try_to_obey(Command command);
   void obey(Command command);
   void toggle_recorder();

@@ -45,10 +45,10 @@ void SceneShow::panel() {
       show_engine_choice();
       show_settings();
     } catch (const Error& error) {
-      message_ = error.what();  // what was asked for can't be had; the run goes on as before
+      message = error.what();  // what was asked for can't be had; the run goes on as before
       fill_fields();
     }
-    if (!message_.empty()) widget::warning(message_, kTextWidth);
+    if (!message.empty()) widget::warning(message, kTextWidth);
     show_counters();
     ImGui::PopItemWidth();
   }
@@ -106,14 +106,10 @@ void SceneShow::show_scene_choice() {
     changed = true;
   }
   if (!changed) return;
-  message_.clear();
-  if (is_playable(wish.run.scene)) {
-    wish.choice.engine = EngineKind::native;
-    next = wish;
-    return;
-  }
-  load(wish);
-  home();
+  message.clear();
+  if (is_playable(wish.run.scene)) wish.choice.engine = EngineKind::native;
+  next = wish;
+  fill_fields();  // which stay if that can't be had
 }
 
 void SceneShow::show_engine_choice() {
@@ -138,8 +134,8 @@ void SceneShow::show_engine_choice() {
     widget::check("jfpx' world", &wish.jfpx_world);
   }
   if (wish == player_.choice()) return;
-  message_ = player_.switch_to(wish) ? "Switched: the bits stay the same."
-                                     : "Another engine goes on from the same state.";
+  message = player_.switch_to(wish) ? "Switched: the bits stay the same."
+                                    : "Another engine goes on from the same state.";
 }
 
 void SceneShow::show_settings() {
@@ -160,7 +156,7 @@ void SceneShow::show_settings() {
   changed |= widget::check("sleep", &wanted_settings_.sleep.enabled);
   if (!changed) return;
   player_.set_settings(wanted_settings_);
-  message_.clear();
+  message.clear();
 }
 
 void SceneShow::show_counters() {

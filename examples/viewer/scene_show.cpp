@@ -29,15 +29,6 @@ SceneShow::SceneShow(const ViewOptions& options)
   home();
 }
 
-void SceneShow::load(const ViewOptions& options) {
-  Player fresh = make_player(options);  // may throw; the old one runs on then
-  player_ = std::move(fresh);
-  stage_ = Stage(player_.scene());
-  options_ = options;
-  picked_.reset();
-  fill_fields();
-}
-
 void SceneShow::step() {
   player_.step();
   check(player_.shown().trouble.empty());
@@ -49,7 +40,7 @@ void SceneShow::step_back() {
 void SceneShow::restart() {
   clock_.settle();
   player_.restart();
-  message_.clear();
+  message.clear();
 }
 void SceneShow::home() { camera = camera_for(options_, player_.scene(), player_.shown()); }
 

@@ -33,7 +33,6 @@ class SceneShow final : public Show {
   const std::optional<std::uint32_t>& picked() const { return picked_; }
 
  private:
-  void load(const ViewOptions& options);
   void fill_fields();
   void show_controls();
   void show_scene_choice();
@@ -47,7 +46,6 @@ class SceneShow final : public Show {
   Player player_;
   Stage stage_;
   std::optional<std::uint32_t> picked_;
-  std::string message_;  ///< why the last wish was not granted
   // What the panel's fields hold, which the user may be changing.
   std::uint64_t wanted_spheres_ = 0, wanted_seed_ = 0;
   RunSettings wanted_settings_;

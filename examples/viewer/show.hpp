@@ -64,6 +64,7 @@ class Show {
 
   std::vector<Command> commands;    ///< that the panel asks for
   std::optional<ViewOptions> next;  ///< another show, likewise
+  std::string message;              ///< what became of that, for the panel
 
  protected:
   /// How far the picture is into the step that is shown: 0 to 1.

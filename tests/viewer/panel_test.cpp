@@ -204,6 +204,9 @@ TEST_F(Panel, ScenesAndDemosAreChosen) {
   user.choose("scene", "flight");
   ASSERT_NE(dynamic_cast<DemoShow*>(&user.show()), nullptr);
   for (int i = 0; i < 3; ++i) user.frame();
+  EXPECT_TRUE(user.show().paused);
+  user.click("Run");
+  EXPECT_FALSE(user.show().paused);
   user.click("Pause");
   EXPECT_TRUE(user.show().paused);
   const std::uint64_t steps = user.show().steps();
@@ -213,6 +216,27 @@ TEST_F(Panel, ScenesAndDemosAreChosen) {
   EXPECT_EQ(user.show().steps(), 0u);
   user.choose("scene", "lattice");
   EXPECT_EQ(scene(user).player().scene().name, "lattice");
+}
+
+TEST_F(Panel, WhatIsChosenComesAsIfItHadBeenStarted) {
+  ViewOptions options = options_for("pile");
+  options.size.width = 720;
+  test::User user(options);
+  user.show().paused = true;
+  user.show().forces = true;
+  const auto eye_moves = [&user] {
+    const Vec3 before = user.show().camera.eye();
+    user.drag(600, 500, 640, 480);
+    return user.show().camera.eye() != before;
+  };
+  EXPECT_TRUE(eye_moves());  // in a circle
+  user.choose("scene", "boxes-and-balls");
+  EXPECT_STREQ(SDL_GetWindowTitle(user.window().sdl()), "jfpx-view: boxes-and-balls");
+  EXPECT_TRUE(user.show().forces);
+  EXPECT_FALSE(eye_moves());  // one looks around, as in the thesis
+  user.choose("scene", "gas");
+  EXPECT_STREQ(SDL_GetWindowTitle(user.window().sdl()), "jfpx-view: gas");
+  EXPECT_TRUE(eye_moves());
 }
 
 TEST_F(Panel, NumbersAndSeedsMakeOtherScenes) {
