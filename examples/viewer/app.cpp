@@ -15,8 +15,14 @@ namespace {
 
 constexpr std::uint64_t kHeadlessFrames = 120;
 
+std::unique_ptr<Show> start(const ViewOptions& options) {
+  auto show = make_show(options);
+  if (!options.recording.empty()) show->record_to(options.recording);
+  return show;
+}
+
 int run_without_rendering(const ViewOptions& options) {
-  const auto show = make_show(options);
+  const auto show = start(options);
   Timing timing;
   const std::uint64_t frames = options.frames.value_or(kHeadlessFrames);
   for (std::uint64_t i = 0; i < frames && !show->at_end(); ++i) {
@@ -28,7 +34,7 @@ int run_without_rendering(const ViewOptions& options) {
 }
 
 int run_headless(const ViewOptions& options) {
-  const auto show = make_show(options);
+  const auto show = start(options);
   Window window = Window::hidden();
   Renderer renderer(options.quality);
   const Canvas canvas(options.size.width, options.size.height);
@@ -50,6 +56,15 @@ int run_headless(const ViewOptions& options) {
     window.check_context();  // what a lost context leaves is no picture
     return image;
   };
+  std::exception_ptr failure;
+  const auto write = [&failure](const auto& picture_file) {
+    try {
+      picture_file();
+    } catch (const FileError&) {
+      failure = std::current_exception();
+    }
+    return failure == nullptr;
+  };
   const std::uint64_t frames = options.frames.value_or(kHeadlessFrames);
   // SDL makes an event of SIGINT and SIGTERM, which somebody must ask for.
   for (std::uint64_t i = 0; i < frames && !show->at_end() && !SDL_QuitRequested(); ++i) {
@@ -57,7 +72,7 @@ int run_headless(const ViewOptions& options) {
     timing.add_step(show->engine_ms());
     if (!recorder.on()) continue;
     draw();
-    recorder.add(picture());
+    if (!write([&] { recorder.add(picture()); })) break;
   }
   if (!recorder.on()) show->home();  // else the last picture is that of the film
   if (options.panel) {               // windows learn their size from a first, invisible frame
@@ -66,19 +81,26 @@ int run_headless(const ViewOptions& options) {
     ui.end(canvas.framebuffer(), canvas.width(), canvas.height());
   }
   draw();
-  if (!options.screenshot.empty()) write_png(picture(), options.screenshot);
-  finish(*show, timing, options);
+  if (!options.screenshot.empty()) write([&] { write_png(picture(), options.screenshot); });
+  finish(*show, timing, options, failure);
   return show->status();
 }
 
 }  // namespace
 
-void finish(const Show& show, const Timing& timing, const ViewOptions& options) {
-  if (!options.recording.empty()) show.save_recording(options.recording);
+void finish(Show& show, const Timing& timing, const ViewOptions& options,
+            std::exception_ptr failure) {
+  try {
+    show.finish_recording();
+  } catch (const Error&) {
+    if (!failure) failure = std::current_exception();
+  }
   fmt::print("{}\n{}\n", show.summary(), timing.text(options.render));
+  if (failure) std::rethrow_exception(failure);
 }
 
 int run_app(const ViewOptions& options) {
+  if (!options.screenshot.empty()) require_writable(options.screenshot);
   if (!options.render) return run_without_rendering(options);
   if (options.headless) return run_headless(options);
   return run_interactive(options);

@@ -42,7 +42,11 @@ bool App::frame(double seconds) {
   controls_.move(&show_->camera, seconds, show_->body_size());
   const std::uint64_t before = show_->steps();
   const std::uint64_t last = options_.frames.value_or(std::numeric_limits<std::uint64_t>::max());
-  show_->advance(recorder_.on() ? kRecordedFrame : seconds, last > before ? last - before : 0);
+  try {
+    show_->advance(recorder_.on() ? kRecordedFrame : seconds, last > before ? last - before : 0);
+  } catch (const FileError& error) {
+    fail_or_tell(error, false);
+  }
   if (show_->steps() > before) {
     timing_.add_step(show_->engine_ms(), show_->steps() - before);
   }
@@ -52,8 +56,8 @@ bool App::frame(double seconds) {
   return !quit_;
 }
 
-int App::finish() const {
-  view::finish(*show_, timing_, options_);
+int App::finish() {
+  view::finish(*show_, timing_, options_, failure_);
   return std::max(status_, show_->status());
 }
 
@@ -72,10 +76,12 @@ void App::read_events() {
   }
 }
 
-/// Tells the controls what the show that is new wants of them.
+/// Tells the controls what the show that is new wants of them, and records it if that was asked
+/// for.
 void App::meet_show() {
   controls_.set_demo_keys(show_->demo_keys());
   controls_.orbit = !show_->walks();
+  if (!options_.recording.empty()) show_->record_to(options_.recording);
 }
 
 /// What the panel asked for while it was drawn.
@@ -92,6 +98,7 @@ void App::grant_wishes() {
 /// Shows something else, as what is shown is. @throws what loading and engines throw; nothing has
 /// changed then.
 void App::open(const ViewOptions& next) {
+  check(next);
   std::unique_ptr<Show> fresh = make_show(next);
   fresh->paused = show_->paused;
   fresh->speed = show_->speed;
@@ -192,24 +199,32 @@ void App::save_recording() {
   tell("wrote " + name);
 }
 
-/// What the command line asked for must be written, or the program ends; a key's wish is told to
-/// have failed.
 void App::write_pictures(const Target& target) {
-  const bool by_key = wanted_picture_ != options_.screenshot;
+  const bool picture_by_key = wanted_picture_ != options_.screenshot;
   try {
     if (!wanted_picture_.empty()) save_picture(target);
   } catch (const FileError& error) {
-    if (!by_key) throw;
-    tell(error.what());
+    fail_or_tell(error, picture_by_key);
   }
   if (!recorder_.on()) return;
+  const bool film_by_key = recorder_.folder() != options_.record;
   try {
     recorder_.add(picture(target));
   } catch (const FileError& error) {
     recorder_ = Recorder("");
-    if (!options_.record.empty()) throw;
-    tell(error.what());
+    fail_or_tell(error, film_by_key);
   }
+}
+
+/// What the command line asked for must be written, or the program ends; a key's wish is told to
+/// have failed. Called while the error is handled.
+void App::fail_or_tell(const Error& error, bool by_key) {
+  if (by_key) {
+    tell(error.what());
+    return;
+  }
+  if (!failure_) failure_ = std::current_exception();
+  quit_ = true;
 }
 
 void App::save_picture(const Target& target) {

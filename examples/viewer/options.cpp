@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "examples/viewer/show.hpp"
 #include "src/tool/demo_names.hpp"
 
 #include <algorithm>
@@ -87,7 +88,7 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
   app.add_option("--record", options.record,
                  "Write every frame to this folder as frame-000001.png and so on");
   app.add_option("--recording", options.recording,
-                 "Write the states of all steps to this file at the end, for: jfpx replay");
+                 "Write the states of all steps to this file, for: jfpx replay");
   app.add_option_function<std::string>(
       "--size", [&options](const std::string& text) { options.size = parse_size(text); },
       "Size of the picture or window [1280x720]");
@@ -136,6 +137,9 @@ void check(const ViewOptions& options) {
       (run.spheres || run.boxes || run.dt || run.seed != tool::RunOptions{}.seed)) {
     throw InvalidArgument(run.scene +
                           " is a recording: --spheres, --boxes, --seed and --dt can't change it");
+  }
+  if (!options.recording.empty() && (options.side_by_side || shows_demo(options))) {
+    throw InvalidArgument(options.recording + ": only a scene on one engine can be recorded");
   }
   if (options.eye.has_value() != options.target.has_value()) {
     throw InvalidArgument("--eye and --target go together");

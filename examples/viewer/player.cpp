@@ -2,7 +2,6 @@
 #include "examples/viewer/player.hpp"
 
 #include <jfpx/error.hpp>
-#include <jfpx/recording.hpp>
 
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
@@ -10,6 +9,13 @@ namespace {
 std::size_t bytes_of(const Moment& moment) {
   return sizeof moment + moment.states.size() * (sizeof(BodyState) + 1) +
          moment.contacts.size() * sizeof(Contact);
+}
+
+constexpr const char* kNotOneRun =
+    "another engine or other settings went on with the run: no replay could";
+
+[[noreturn]] void refuse_recording(const std::string& path, const char* why) {
+  throw InvalidArgument(path + ": " + why);
 }
 
 }  // namespace
@@ -39,6 +45,7 @@ void Player::step() {
   Moment moment = run_->moment();
   moment.dt = scene_.dt;
   moment.time = history_.back().time + static_cast<double>(scene_.dt);
+  if (recording_) recording_->append(moment.states);
   keep(std::move(moment));
 }
 
@@ -54,6 +61,7 @@ void Player::restart() {
   bytes_ = 0;
   keep(run_->moment());
   changed_ = false;
+  if (!recording_path_.empty()) record_to(recording_path_);
 }
 
 bool Player::switch_to(const EngineChoice& choice) {
@@ -77,18 +85,33 @@ void Player::go_on_with(const EngineChoice& choice) {
   run_ = continue_run(scene_, history_.back(), choice);
   shown_ = history_.size() - 1;
   changed_ = true;
+  recording_.reset();
+}
+
+RecordingHeader Player::header() const {
+  return {.engine = std::string(kEngineNames[static_cast<std::size_t>(run_->choice().engine)]),
+          .backend = std::string(to_string(run_->choice().backend)),
+          .scene = scene_};
 }
 
 void Player::save_recording(const std::string& path) const {
-  const auto refuse = [&](const char* why) { throw InvalidArgument(path + ": " + why); };
-  if (changed_) refuse("another engine or other settings went on with the run: no replay could");
-  if (history_.front().step != 0) refuse("the first steps are no longer kept");
-  RecordingWriter recording(
-      path, {.engine = std::string(kEngineNames[static_cast<std::size_t>(run_->choice().engine)]),
-             .backend = std::string(to_string(run_->choice().backend)),
-             .scene = scene_});
+  if (changed_) refuse_recording(path, kNotOneRun);
+  if (history_.front().step != 0) refuse_recording(path, "the first steps are no longer kept");
+  RecordingWriter recording(path, header());
   for (std::size_t i = 1; i < history_.size(); ++i) recording.append(history_[i].states);
   recording.finish();
+}
+
+void Player::record_to(const std::string& path) {
+  recording_path_ = path;
+  recording_.reset();  // removes its part, which lies where that of the next one will
+  recording_.emplace(path, header());
+}
+
+void Player::finish_recording() {
+  if (recording_path_.empty()) return;
+  if (!recording_) refuse_recording(recording_path_, kNotOneRun);
+  recording_->finish();
 }
 
 }  // namespace jfpx::inline JFPX_ABI::view

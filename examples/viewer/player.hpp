@@ -1,11 +1,12 @@
 /// Plays a run: steps ahead, and back through what is kept.
 #pragma once
 
-#include <jfpx/scene.hpp>
+#include <jfpx/recording.hpp>
 
 #include "examples/viewer/run.hpp"
 
 #include <deque>
+#include <optional>
 
 namespace jfpx::inline JFPX_ABI::view {
 
@@ -43,6 +44,12 @@ class Player {
   /// @throws InvalidArgument if they are not one run from the first step, or the first is no longer
   ///   kept; FileError
   void save_recording(const std::string& path) const;
+  /// Before the first step: from now on each step is written to a file, which beginning anew begins
+  /// anew. @throws FileError, and so do the steps
+  void record_to(const std::string& path);
+  /// Completes that file, if there is one; no step may follow.
+  /// @throws InvalidArgument if the steps are not those of one run; FileError
+  void finish_recording();
   RunSettings settings() const { return {scene_.dt, scene_.resolver, scene_.sleep}; }
   /// Replaces them from the newest moment on. @throws InvalidScene; nothing has changed then.
   void set_settings(const RunSettings& settings);
@@ -56,6 +63,7 @@ class Player {
 
  private:
   void keep(Moment moment);
+  RecordingHeader header() const;
   void go_on_with(const EngineChoice& choice);
 
   Scene scene_;
@@ -64,6 +72,8 @@ class Player {
   std::size_t shown_ = 0;
   std::size_t bytes_ = 0;
   bool changed_ = false;  ///< the run is no longer the one that began
+  std::string recording_path_;
+  std::optional<RecordingWriter> recording_;
 };
 
 }  // namespace jfpx::inline JFPX_ABI::view

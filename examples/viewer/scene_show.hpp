@@ -26,6 +26,8 @@ class SceneShow final : public Show {
   Real body_size() const override { return stage_.body_size(); }
   bool walks() const override;
   void save_recording(const std::string& path) const override { player_.save_recording(path); }
+  void record_to(const std::string& path) override { player_.record_to(path); }
+  void finish_recording() override { player_.finish_recording(); }
   std::string summary() const override;
 
   const Player& player() const { return player_; }

@@ -46,6 +46,10 @@ class Show {
   virtual bool walks() const { return false; }
   /// Writes the states of all steps. @throws InvalidArgument where that can't be, FileError
   virtual void save_recording(const std::string& path) const;
+  /// Before the first step: writes each step. @throws as save_recording(), and so do the steps
+  virtual void record_to(const std::string& path);
+  /// Completes what record_to() began, if that was called. @throws as save_recording()
+  virtual void finish_recording() {}
 
   virtual double dt() const = 0;                      ///< [s], of the next step
   virtual std::uint64_t steps() const = 0;            ///< made so far
@@ -81,6 +85,8 @@ class Show {
   bool failed_ = false;
 };
 
+/// Whether the options ask for a demo with its own keys.
+bool shows_demo(const ViewOptions& options);
 /// The show that the options ask for.
 std::unique_ptr<Show> make_show(const ViewOptions& options);
 std::unique_ptr<Show> make_scene_show(const ViewOptions& options);

@@ -2,6 +2,7 @@
 #include "examples/viewer/controls.hpp"
 
 #include <jfpx/error.hpp>
+#include <jfpx/recording.hpp>
 
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/comparison.hpp"
@@ -23,10 +24,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fcntl.h>
 #include <filesystem>
 #include <limits>
 #include <random>
+#include <sys/stat.h>
 #include <tuple>
+#include <unistd.h>
 
 namespace jfpx {
 namespace {
@@ -506,6 +510,41 @@ TEST(Player, OnlyAWholeRunIsRecorded) {
   EXPECT_EQ(folder.entries(), 0u);
 }
 
+TEST(Player, EachStepIsWrittenAsItIsMadeHoweverManyAreKept) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("a.rec");
+  Player player = player_of(scenes::make("gas", {.spheres = 1}));
+  player.record_to(path);
+  player.step();
+  player.restart();
+  std::vector<std::uint64_t> hashes;
+  for (std::size_t i = 0; i < Player::kHistoryLength + 1; ++i) {
+    player.step();
+    hashes.push_back(state_hash(player.shown().states));
+    if (i == 5) player.step_back(), player.step();
+  }
+  player.finish_recording();
+  RecordingReader recording(path);
+  ASSERT_EQ(recording.steps(), hashes.size());
+  for (std::size_t i = 0; i < hashes.size(); ++i) {
+    ASSERT_EQ(state_hash(recording.states(i + 1)), hashes[i]) << i;
+  }
+}
+
+TEST(Player, ARunWithOtherSettingsLeavesNoRecording) {
+  const test::TemporaryFolder folder;
+  Player player = player_of(scenes::make("gas", {.spheres = 1}));
+  player.record_to(folder.file("a.rec"));
+  player.step();
+  RunSettings settings = player.settings();
+  settings.resolver.max_iterations = 5;
+  player.set_settings(settings);
+  player.step();
+  EXPECT_THROW(player.finish_recording(), InvalidArgument);
+  EXPECT_EQ(folder.entries(), 0u);
+  EXPECT_THROW(player.record_to(folder.file("missing/a.rec")), FileError);
+}
+
 TEST(Player, AnotherEngineGoesOnFromTheSameState) {
   if (!has_engine(EngineKind::bullet)) GTEST_SKIP() << "built without Bullet";
   const Scene scene = scenes::make("gas", {.spheres = 27});
@@ -789,6 +828,21 @@ TEST(Image, WhatCannotBeWrittenIsToldWithTheReasonAndLeavesNothing) {
       EXPECT_THAT(error.what(), ::testing::MatchesRegex(".*: can't be written: .*irectory.*"));
     }
   }
+  EXPECT_EQ(folder.entries(), 1u);
+}
+
+TEST(Image, WhatIsNoFileIsWrittenToAndStays) {
+  const test::TemporaryFolder folder;
+  const std::string pipe = folder.file("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK);  // so that writers need not wait
+  require_writable(pipe);
+  write_png({1, 1, {1, 2, 3}}, pipe);
+  char magic[4] = {};
+  EXPECT_EQ(read(reader, magic, sizeof magic), 4);
+  EXPECT_EQ(std::string(magic + 1, 3), "PNG");
+  close(reader);
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
   EXPECT_EQ(folder.entries(), 1u);
 }
 

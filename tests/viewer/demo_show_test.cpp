@@ -121,6 +121,9 @@ TEST(DemoShow, BadOptionsAreNamed) {
   EXPECT_THROW(DemoShow{options}, InvalidArgument);
   EXPECT_THROW(DemoShow{options_for("flight", "missing.input")}, FileError);
   EXPECT_THROW(DemoShow{options_for("flight", "ballistic.input")}, InvalidArgument);
+  options = options_for("flight");
+  options.recording = "flight.rec";
+  EXPECT_THROW(check(options), InvalidArgument);
   ViewOptions scene = options_for("pile", "flight.input");
   EXPECT_THROW(check(scene), InvalidArgument);
 }

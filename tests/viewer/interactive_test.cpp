@@ -1,4 +1,6 @@
 /// The window as a user has it: keys, another size, the end; events come from SDL's queue.
+#include <jfpx/recording.hpp>
+
 #include "examples/viewer/demo_show.hpp"
 #include "tests/viewer/window_fixture.hpp"
 
@@ -173,6 +175,38 @@ TEST_F(Interactive, WhatCannotBeWrittenIsToldAndTheWindowStays) {
   ViewOptions wish = options(3);
   wish.screenshot = "last.png";  // asked for on the command line: an error
   EXPECT_THROW(run_interactive(wish), FileError);
+}
+
+TEST_F(Interactive, WhatCannotBeWrittenAtTheEndLeavesTheRestWhole) {
+  fs::create_directory("pictures");
+  ViewOptions wish = options(3);
+  wish.screenshot = "pictures/last.png";
+  wish.recording = "run.rec";
+  App app(wish);
+  fs::remove("pictures");
+  while (app.frame(kRecordedFrame)) {
+  }
+  EXPECT_THROW(app.finish(), FileError);
+  EXPECT_EQ(RecordingReader("run.rec").steps(), 3u);
+}
+
+TEST_F(Interactive, AFilmOfTheCommandLineMustBeWrittenAndOneOfAKeyIsTold) {
+  ViewOptions wish = options(1'000'000);
+  wish.record = "film";
+  {
+    App app(wish);
+    EXPECT_TRUE(app.frame(0));
+    press({SDLK_F10, SDLK_F10});  // no more, and another one
+    EXPECT_TRUE(app.frame(0));
+    fs::remove_all("jfpx-view-frames-1");
+    EXPECT_TRUE(app.frame(0));
+    EXPECT_EQ(app.finish(), 0);
+  }
+  start_events();
+  App app(wish);
+  fs::remove_all("film");
+  EXPECT_FALSE(app.frame(0));
+  EXPECT_THROW(app.finish(), FileError);
 }
 
 }  // namespace
