@@ -107,7 +107,11 @@ void SceneShow::show_scene_choice() {
   }
   if (!changed) return;
   message.clear();
-  if (is_playable(wish.run.scene)) wish.choice.engine = EngineKind::native;
+  if (is_playable(wish.run.scene)) {  // which takes less
+    wish.choice.engine = EngineKind::native;
+    wish.run.no_sleep = false;
+    wish.colouring = Colouring::bodies;
+  }
   next = wish;
   fill_fields();  // which stay if that can't be had
 }

@@ -185,13 +185,29 @@ TEST(View, StatesAreRecordedAndPlayedBack) {
   EXPECT_EQ(jfpx_view(path + " --frames 70 --no-render --recording " + again).status, 0);
   const auto replayed = test::run_process(JFPX_TOOL_PATH " replay " + again + " 2>&1");
   EXPECT_EQ(replayed.status, 0) << replayed.output;
-  for (const char* change : {" --spheres 5", " --boxes 1", " --dt 0.01", " --seed 2"}) {
+  for (const char* change :
+       {" --spheres 5", " --boxes 1", " --dt 0.01", " --seed 2", " --no-sleep", " --engine bullet",
+        " --backend x86", " --threads 3", " --side-by-side"}) {
     expect_fails(jfpx_view(path + change + " --no-render"), 2, "is a recording");
   }
   std::ofstream(path, std::ios::app) << "more";
   expect_fails(jfpx_view(path + " --no-render"), 2, path);
   expect_fails(jfpx_view("flight --frames 2 --no-render --recording " + path), 2,
                "can be recorded");
+}
+
+TEST(View, ARecordingIsPlayedInThePrecisionInWhichItWasMade) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("gas.rec");
+  const auto recorded =
+      jfpx_view(std::string("gas --spheres 9 --frames 7 --no-render --precision ") +
+                kOtherPrecision + " --recording " + path);
+  ASSERT_EQ(recorded.status, 0) << recorded.output;
+  const auto played = jfpx_view(path + " --no-render");
+  EXPECT_EQ(played.status, 0) << played.output;
+  EXPECT_THAT(played.output, HasSubstr("step 7,"));
+  const std::string own = sizeof(Real) == 4 ? "float" : "double";
+  expect_fails(jfpx_view(path + " --no-render --precision " + own), 2, kOtherPrecision);
 }
 
 TEST(View, TellsTheHashThatTheToolTells) {
@@ -221,6 +237,9 @@ TEST(View, BadUsageIsStatusTwo) {
   expect_fails(jfpx_view("pile --headless --spheres 4 --eye 1,2,3"), 2, "--target");
   expect_fails(jfpx_view("pile --headless --eye 1,2,3 --target 1,2,3"), 2, "same point");
   expect_fails(jfpx_view("pile --no-render --screenshot a.png"), 2, "--no-render");
+  expect_fails(jfpx_view("flight --no-render --no-sleep"), 2, "--no-sleep goes with a scene");
+  expect_fails(jfpx_view("flight --no-render --colours speed"), 2, "--colours goes with a scene");
+  expect_fails(jfpx_view("--side-by-side pile --no-render --engine bullet"), 2, "all engines");
   for (const char* size : {"0x0", "15x100", "100x9000", "100", "x", "1e3x100", "-5x100"}) {
     EXPECT_EQ(jfpx_view(std::string("pile --headless --size ") + size).status, 2) << size;
   }
@@ -295,8 +314,8 @@ TEST_F(Pictures, AFileThatCannotBeWrittenIsNamedAndNothingIsLeft) {
 TEST(View, HelpNamesTheOptionsAndExitStatuses) {
   const auto help = jfpx_view("--help");
   EXPECT_EQ(help.status, 0);
-  for (const char* word :
-       {"--headless", "--screenshot", "--side-by-side", "--engine", "Exit status"}) {
+  for (const char* word : {"recording (.rec)", "--headless", "--screenshot", "--side-by-side",
+                           "--engine", "Exit status"}) {
     EXPECT_THAT(help.output, HasSubstr(word));
   }
   EXPECT_EQ(jfpx_view("--version").output, "jfpx-view " JFPX_VERSION "\n");
