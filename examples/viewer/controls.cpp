@@ -12,6 +12,7 @@ namespace {
 constexpr Real kRadiansPerPixel = Real(0.0045);
 constexpr double kBodiesPerSecond = 12;  // walking speed
 constexpr double kFaster = 5;
+constexpr int kStill = 2;  // [units] by which a mouse may move in a click
 
 std::optional<std::size_t> motion_of(SDL_Keycode key) {
   switch (key) {
@@ -115,7 +116,12 @@ std::span<const KeyHelp> key_help() {
   return kHelp;
 }
 
-void Controls::set_demo_keys(std::vector<std::string> names) { demo_names_ = std::move(names); }
+void Controls::set_demo_keys(std::vector<std::string> names) {
+  demo_names_ = std::move(names);
+  // Keys that are down may be the demo's now, and so may be their release.
+  down_.reset();
+  touched_.reset();
+}
 
 void Controls::handle(const SDL_Event& event, bool keyboard, bool mouse) {
   switch (event.type) {
@@ -190,13 +196,16 @@ void Controls::button(const SDL_MouseButtonEvent& event) {
   }
   looking_ = down;
   dragged_ = false;
+  drag_x_ = drag_y_ = 0;
 }
 
 void Controls::motion(const SDL_MouseMotionEvent& event) {
   if (!looking_) return;
   turn_x_ += static_cast<float>(event.xrel);
   turn_y_ += static_cast<float>(event.yrel);
-  if (std::abs(turn_x_) + std::abs(turn_y_) > 2) dragged_ = true;
+  drag_x_ += event.xrel;
+  drag_y_ += event.yrel;
+  if (std::abs(drag_x_) + std::abs(drag_y_) > kStill) dragged_ = true;
 }
 
 void Controls::move(Camera* camera, double seconds, Real scale) {

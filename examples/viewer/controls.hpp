@@ -56,7 +56,8 @@ struct DemoKey {
 /// between two frames still acts once (erratum E42). Keys without a meaning do nothing.
 class Controls {
  public:
-  /// Keys that belong to a demo are kept from the camera: see take_demo_keys().
+  /// Keys that belong to a demo are kept from the camera: see take_demo_keys(). Keys that are down
+  /// walk no more.
   void set_demo_keys(std::vector<std::string> names);
   /// @param keyboard, mouse whether the panel leaves them to the scene
   void handle(const SDL_Event& event, bool keyboard = true, bool mouse = true);
@@ -86,6 +87,7 @@ class Controls {
   std::bitset<kMotions> down_, touched_;
   bool fast_ = false, looking_ = false, dragged_ = false;
   float turn_x_ = 0, turn_y_ = 0, wheel_ = 0;
+  int drag_x_ = 0, drag_y_ = 0;  ///< [units] since the button went down
   double speed_ = 1;
 };
 

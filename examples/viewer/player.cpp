@@ -67,7 +67,7 @@ void Player::restart() {
 bool Player::switch_to(const EngineChoice& choice) {
   if (choice == run_->choice()) return true;
   if (run_->switch_to(choice)) return true;
-  go_on_with(choice);
+  go_on_with(scene_, choice);
   return false;
 }
 
@@ -77,12 +77,12 @@ void Player::set_settings(const RunSettings& settings) {
   changed.resolver = settings.resolver;
   changed.sleep = settings.sleep;
   validate(changed);
-  scene_ = std::move(changed);
-  go_on_with(run_->choice());
+  go_on_with(std::move(changed), run_->choice());
 }
 
-void Player::go_on_with(const EngineChoice& choice) {
-  run_ = continue_run(scene_, history_.back(), choice);
+void Player::go_on_with(Scene scene, const EngineChoice& choice) {
+  run_ = continue_run(scene, history_.back(), choice);
+  scene_ = std::move(scene);
   shown_ = history_.size() - 1;
   changed_ = true;
   recording_.reset();

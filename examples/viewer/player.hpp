@@ -51,7 +51,8 @@ class Player {
   /// @throws InvalidArgument if the steps are not those of one run; FileError
   void finish_recording();
   RunSettings settings() const { return {scene_.dt, scene_.resolver, scene_.sleep}; }
-  /// Replaces them from the newest moment on. @throws InvalidScene; nothing has changed then.
+  /// Replaces them from the newest moment on. @throws InvalidScene, BackendUnavailable; nothing has
+  /// changed then.
   void set_settings(const RunSettings& settings);
 
   const Moment& shown() const { return history_[shown_]; }
@@ -64,7 +65,7 @@ class Player {
  private:
   void keep(Moment moment);
   RecordingHeader header() const;
-  void go_on_with(const EngineChoice& choice);
+  void go_on_with(Scene scene, const EngineChoice& choice);
 
   Scene scene_;
   std::unique_ptr<Run> run_;

@@ -50,8 +50,8 @@ struct Targets {
     glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
                               many_depths.name());
     if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
-      throw Error("OpenGL rejects a multisampled framebuffer of " + std::to_string(w) + " x " +
-                  std::to_string(h));
+      throw BackendUnavailable("OpenGL rejects a multisampled framebuffer of " + std::to_string(w) +
+                               " x " + std::to_string(h));
     }
   }
 };

@@ -150,6 +150,33 @@ TEST(Controls, TheMouseTurnsBothAnglesAndAClickWithoutADragPicks) {  // erratum 
   EXPECT_EQ(camera.yaw(), yaw);
 }
 
+TEST(Controls, ADragIsNoClickHoweverSlowItIs) {
+  for (const int units : {1, 10}) {
+    Controls controls;
+    Camera camera;
+    controls.handle(mouse_button(SDL_MOUSEBUTTONDOWN));
+    for (int i = 0; i < units; ++i) {
+      controls.handle(mouse_move(1, 0));
+      controls.move(&camera, 0.1, 1);
+    }
+    controls.handle(mouse_button(SDL_MOUSEBUTTONUP));
+    EXPECT_EQ(controls.take_clicks().size(), units == 1 ? 1u : 0u);
+  }
+}
+
+TEST(Controls, AKeyThatBecomesADemosDoesNotWalkOn) {
+  Controls controls;
+  controls.orbit = false;
+  Camera camera;
+  controls.handle(key(SDLK_w));
+  controls.move(&camera, 0.1, 1);
+  const Vec3 there = camera.eye();
+  controls.set_demo_keys({"w"});
+  controls.handle(key(SDLK_w, false));
+  controls.move(&camera, 0.1, 1);
+  EXPECT_EQ(camera.eye(), there);
+}
+
 TEST(Controls, WheelAndShiftChangeTheWalkingSpeed) {
   const auto walked = [](int wheel, bool shift) {
     Controls controls;
@@ -403,6 +430,25 @@ TEST(Player, ABackendThatCannotBeHadLeavesTheRunAsItWas) {
       player.step();
       EXPECT_EQ(player.shown().step, 2u);
     }
+  }
+}
+
+TEST(Player, SettingsThatCannotBeTakenOverLeaveAllAsItWas) {
+  for (const BackendStatus& row : available_backends()) {
+    if (row.usable) continue;
+    const test::TemporaryFolder folder;  // of a recording that another machine made
+    const Scene scene = scenes::make("gas", {.spheres = 2});
+    RecordingWriter(
+        folder.file("a.rec"),
+        {.engine = "native", .backend = std::string(to_string(row.backend)), .scene = scene})
+        .finish();
+    Recorded recorded = open_recording(folder.file("a.rec"));
+    Player player(std::move(recorded.run), recorded.scene);
+    RunSettings settings = player.settings();
+    settings.dt *= 2;
+    EXPECT_THROW(player.set_settings(settings), BackendUnavailable);
+    EXPECT_EQ(player.scene(), scene);
+    player.save_recording(folder.file("b.rec"));
   }
 }
 

@@ -292,6 +292,14 @@ TEST_F(RendererTest, AHundredThousandSpheresTakeOneDraw) {
   EXPECT_THAT(seen, ::testing::Each(true));
 }
 
+TEST_F(RendererTest, WhatTheDriverRejectsMakesOpenGlUnusable) {
+  constexpr std::string_view kVertex = "void main() { gl_Position = vec4(0.0); }";
+  EXPECT_THROW(GlProgram(kVertex, "this is no shader"), BackendUnavailable);
+  EXPECT_THROW(GlProgram(kVertex, "void main() { undefined_function(); }"), BackendUnavailable);
+  EXPECT_THROW(make_framebuffer(make_texture(GL_DEPTH_COMPONENT32F, 4, 4).name(), 0),
+               BackendUnavailable);
+}
+
 GLenum guilty() { return GL_GUILTY_CONTEXT_RESET; }
 
 TEST_F(RendererTest, ALostContextIsOneSentence) {
