@@ -88,7 +88,7 @@ class Show {
     view::Drawing drawing(view.eye);
     drawing.set_bounds({0, side / 3, 0}, side);
     drawing.set_detail(2 * Crowd::kRadius);
-    drawing.add_ground({0, 1, 0}, 0, 10 * Crowd::kRadius, {124, 130, 138});
+    drawing.add_ground({0, 1, 0}, 0, 10 * Crowd::kRadius, view::kGroundPaint);
     const bool shown = !options_.headless;
     renderer_.draw(
         drawing, view,

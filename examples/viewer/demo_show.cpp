@@ -21,7 +21,6 @@ namespace {
 
 constexpr Real kFlat = Real(0.5);  // scales below this stand for shadows
 constexpr float kTextWidth = 320;  // [units]
-constexpr Paint kGround{124, 130, 138};
 
 std::unique_ptr<demos::Demo> make_demo(const ViewOptions& options) {
   WorldSettings world;
@@ -68,7 +67,7 @@ bool same_items(const demos::View& a, const demos::View& b) {
 }  // namespace
 
 void draw_demo(const demos::View& from, const demos::View& to, Real share, Drawing* drawing) {
-  drawing->add_ground({0, 1, 0}, 0, 1, kGround);
+  drawing->add_ground({0, 1, 0}, 0, 1, kGroundPaint);
   const bool mixes = same_items(from, to);
   for (std::size_t i = 0; i < to.items.size(); ++i) {
     const demos::Item& item = to.items[i];

@@ -25,6 +25,8 @@ struct Paint {
   friend bool operator==(const Paint&, const Paint&) = default;
 };
 
+inline constexpr Paint kGroundPaint{124, 130, 138};
+
 struct SphereItem {
   float centre[3], radius;
   float turn[4];  ///< x, y, z, w

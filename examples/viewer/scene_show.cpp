@@ -50,19 +50,20 @@ View SceneShow::view() const {
 }
 
 void SceneShow::draw(Renderer& renderer, const Target& target) {
+  options_.size = {target.width, target.height};  // what home() is to fill
   const View now = view();
   Drawing drawing(now.eye);
   stage_.draw(player_.before(), player_.shown(), share(), colouring, &drawing);
   if (contacts) stage_.draw_contacts(player_.shown().contacts, false, &drawing);
   if (forces) stage_.draw_forces(player_.before(), player_.shown(), &drawing);
-  if (picked_) stage_.draw_mark(player_.shown(), *picked_, &drawing);
+  if (picked_) stage_.draw_mark(player_.before(), player_.shown(), share(), *picked_, &drawing);
   renderer.draw(drawing, now, {0, 0, target.width, target.height, target.unit}, target.framebuffer);
 }
 
 void SceneShow::pick(Real x, Real y, int width, int height) {
   const View now = view();
   const Vec3 direction = ray_through(now, x, y, width, height);
-  picked_ = stage_.pick(player_.shown(), now.eye, direction);
+  picked_ = stage_.pick(player_.before(), player_.shown(), share(), now.eye, direction);
 }
 
 // As in the thesis.

@@ -22,7 +22,8 @@ namespace {
 enum Column : std::size_t { kNative, kStock, kJfpx, kColumns };
 constexpr std::array<const char*, kColumns> kTitles = {"native jfpx", "stock Bullet",
                                                        "Bullet with jfpx"};
-constexpr std::array<Paint, kColumns> kTrails = {{{255, 170, 40}, {90, 190, 255}, {90, 190, 255}}};
+/// Of native and of Bullet, which both of its columns share.
+constexpr std::array<Paint, 2> kTrails = {{{255, 170, 40}, {90, 190, 255}}};
 constexpr std::size_t kTraced = 6;     // bodies whose paths are drawn
 constexpr std::size_t kTrail = 240;    // steps of a path
 constexpr std::size_t kPlotted = 600;  // steps of a plot
@@ -154,11 +155,11 @@ class SideBySide final : public Show {
   Scene scene_;
   Stage stage_;
   std::unique_ptr<Trio> trio_;
-  std::array<std::deque<std::vector<Vec3>>, kColumns> trails_;
+  std::array<std::deque<std::vector<Vec3>>, kTrails.size()> trails_;
 };
 
 void SideBySide::trace() {
-  for (std::size_t column = 0; column < kColumns; ++column) {
+  for (const std::size_t column : {kNative, kStock}) {
     std::vector<Vec3> places;
     const std::size_t stride = std::max<std::size_t>(scene_.bodies.size() / kTraced, 1);
     for (std::size_t i = 0; i < scene_.bodies.size(); i += stride) {
@@ -182,6 +183,7 @@ void SideBySide::draw_trails(Drawing* drawing) const {
 }
 
 void SideBySide::draw(Renderer& renderer, const Target& target) {
+  options_.size = {target.width, target.height};  // what home() is to fill
   const int strip = static_cast<int>(static_cast<float>(target.height) * kStrip);
   const int top_height = target.height - strip;
   const Bounds bounds = stage_.bounds(trio_->now[kNative].states);
@@ -194,10 +196,10 @@ void SideBySide::draw(Renderer& renderer, const Target& target) {
     if (forces) stage_.draw_forces(trio_->before[column], now, &drawing);
     if (column != kNative) stage_.draw_contacts(trio_->different, true, &drawing);
     draw_trails(&drawing);
-    const int left = target.width * static_cast<int>(column) / 3;
-    const int right = target.width * (static_cast<int>(column) + 1) / 3;
-    renderer.draw(drawing, view, {left, strip, right - left, top_height, target.unit},
-                  target.framebuffer);
+    // All as wide: the renderer makes new buffers for each other size. They may overlap by a pixel.
+    const int width = (target.width + 2) / 3;
+    const int left = (target.width - width) * static_cast<int>(column) / 2;
+    renderer.draw(drawing, view, {left, strip, width, top_height, target.unit}, target.framebuffer);
   }
   draw_texts(target, top_height);
   draw_plots(target, top_height);

@@ -15,7 +15,6 @@ namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
 constexpr Paint kConcrete{168, 168, 166, Pattern::wall};
-constexpr Paint kFloor{124, 130, 138};
 constexpr Paint kGlass{255, 255, 255, Pattern::glass};
 constexpr Real kPlate = Real(0.25);  // thickness of a room's floor, in bodies
 constexpr Real kEndless = kMaxReal / 4;
@@ -140,13 +139,13 @@ void Stage::draw_still(const Bounds& bounds, Drawing* drawing) const {
   for (const std::uint32_t i : obstacles_) {
     const BodyDef& body = scene_.bodies[i];
     if (const HalfSpace* plane = std::get_if<HalfSpace>(&body.shape)) {
-      drawing->add_ground(plane->normal, plane->offset, cell, kFloor);
+      drawing->add_ground(plane->normal, plane->offset, cell, kGroundPaint);
     }
     if (const Plane* plane = std::get_if<Plane>(&body.shape)) {
       // Seen from the side where the bodies are, so that it does not hide them.
       const bool front = dot(plane->normal, bounds.centre) >= plane->offset;
       const Vec3 normal = front ? plane->normal : -plane->normal;
-      drawing->add_ground(normal, front ? plane->offset : -plane->offset, cell, kFloor);
+      drawing->add_ground(normal, front ? plane->offset : -plane->offset, cell, kGroundPaint);
     }
   }
   for (const Wall& wall : walls_) draw_wall(wall, drawing);
@@ -154,7 +153,7 @@ void Stage::draw_still(const Bounds& bounds, Drawing* drawing) const {
   const bool has_floor = room_.lower.y > -kEndless;
   if (!drawing->grounds().empty() || (falls_ && !has_floor)) return;
   const Real level = has_floor ? lowest_ : bounds.centre.y - bounds.radius - body_size_;
-  drawing->add_ground({0, 1, 0}, level, cell, kFloor);
+  drawing->add_ground({0, 1, 0}, level, cell, kGroundPaint);
 }
 
 void Stage::draw_wall(const Wall& wall, Drawing* drawing) const {
@@ -182,17 +181,16 @@ void Stage::draw(const Moment& from, const Moment& to, Real share, Colouring col
   for (std::uint32_t i = 0; i < looks_.size(); ++i) {
     const Look& look = looks_[i];
     if (look.kind == Look::Kind::hidden) continue;
-    const Vec3 position = between(from.states[i].position, to.states[i].position, share);
-    const Quat turn = between(from.states[i].orientation, to.states[i].orientation, share);
+    const BodyState shown = between(from.states[i], to.states[i], share);
     Paint paint = look.paint;
     if (look.kind != Look::Kind::still) {
       if (!told.empty()) paint = told[i];
       if (to.awake[i] == 0) paint = dimmed(paint);
     }
     if (look.kind == Look::Kind::moving_ball) {
-      drawing->add_sphere(position, look.radius, turn, paint);
+      drawing->add_sphere(shown.position, look.radius, shown.orientation, paint);
     } else {
-      draw_shape(scene_.bodies[i].shape, {position, turn, {}, {}}, paint, drawing);
+      draw_shape(scene_.bodies[i].shape, shown, paint, drawing);
     }
   }
 }
@@ -225,33 +223,34 @@ void Stage::draw_forces(const Moment& before, const Moment& now, Drawing* drawin
   view::draw_forces(scene_, before, now, body_size_ * Real(2.2), drawing);
 }
 
-void Stage::draw_mark(const Moment& moment, std::uint32_t body, Drawing* drawing) const {
+void Stage::draw_mark(const Moment& from, const Moment& to, Real share, std::uint32_t body,
+                      Drawing* drawing) const {
   const Shape& shape = scene_.bodies[body].shape;
   const Box* box = std::get_if<Box>(&shape);
   const Real size = size_of(shape);
   const Vec3 half = (box != nullptr ? box->half_extents : Vec3{size, size, size}) * Real(1.06);
-  const Transform pose =
-      make_transform(moment.states[body].orientation, moment.states[body].position);
+  const BodyState shown = between(from.states[body], to.states[body], share);
+  const Transform pose = make_transform(shown.orientation, shown.position);
   const auto corner = [&](int bits) {
     const auto side = [bits](int axis) { return (bits >> axis & 1) != 0 ? Real(1) : Real(-1); };
     return transform_point(pose, component_product(half, {side(0), side(1), side(2)}));
   };
-  for (int from = 0; from < 8; ++from) {
+  for (int start = 0; start < 8; ++start) {
     for (int axis = 0; axis < 3; ++axis) {
-      const int to = from | 1 << axis;
-      if (to != from) drawing->add_line(corner(from), corner(to), {255, 240, 120}, 2.0f);
+      const int end = start | 1 << axis;
+      if (end != start) drawing->add_line(corner(start), corner(end), {255, 240, 120}, 2.0f);
     }
   }
 }
 
-std::optional<std::uint32_t> Stage::pick(const Moment& moment, const Vec3& eye,
-                                         const Vec3& direction) const {
+std::optional<std::uint32_t> Stage::pick(const Moment& from, const Moment& to, Real share,
+                                         const Vec3& eye, const Vec3& direction) const {
   std::optional<std::uint32_t> found;
   Real nearest = kMaxReal;
   for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
     const BodyDef& def = scene_.bodies[i];
     if (!movable(def)) continue;
-    const BodyState& state = moment.states[i];
+    const BodyState state = between(from.states[i], to.states[i], share);
     const Real distance = std::visit(
         [&](const auto& shape) { return ray_distance(shape, state, eye, direction); }, def.shape);
     if (distance < nearest) {

@@ -31,12 +31,13 @@ class Stage {
   /// Adds arrows for what pushed the bodies in the step between two moments.
   void draw_forces(const Moment& before, const Moment& now, Drawing* drawing) const;
 
-  /// Adds a frame around one body.
-  void draw_mark(const Moment& moment, std::uint32_t body, Drawing* drawing) const;
+  /// Adds a frame around one body where draw() shows it.
+  void draw_mark(const Moment& from, const Moment& to, Real share, std::uint32_t body,
+                 Drawing* drawing) const;
 
-  /// The movable body that a ray meets first; the direction is unit.
-  std::optional<std::uint32_t> pick(const Moment& moment, const Vec3& eye,
-                                    const Vec3& direction) const;
+  /// The movable body that a ray meets first where draw() shows them; the direction is unit.
+  std::optional<std::uint32_t> pick(const Moment& from, const Moment& to, Real share,
+                                    const Vec3& eye, const Vec3& direction) const;
   /// The colour of a body where bodies are told apart.
   Paint paint(std::uint32_t body) const;
   /// Radius of a typical movable body [m].

@@ -802,10 +802,10 @@ TEST(Stage, PartsOfAnAssemblyAreDrawnAndPickedWhereTheyAre) {
   }
   moment.awake = {1, 1};
   const Stage stage(scene);
-  EXPECT_EQ(stage.pick(moment, {0, 8, 20}, {0, 0, -1}), 0u);  // the box
-  EXPECT_EQ(stage.pick(moment, {0, 2, 20}, {0, 0, -1}), 0u);  // the ball
-  EXPECT_EQ(stage.pick(moment, {0, 5, 20}, {0, 0, -1}), std::nullopt);
-  EXPECT_EQ(stage.pick(moment, {3, 5, 20}, {0, 0, -1}), std::nullopt);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 8, 20}, {0, 0, -1}), 0u);  // the box
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 2, 20}, {0, 0, -1}), 0u);  // the ball
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 5, 20}, {0, 0, -1}), std::nullopt);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {3, 5, 20}, {0, 0, -1}), std::nullopt);
   Drawing drawing({0, 0, 20});
   stage.draw(moment, moment, 1, Colouring::bodies, &drawing);
   ASSERT_EQ(drawing.spheres().size(), 1u);
@@ -943,11 +943,11 @@ TEST(Stage, PickFindsTheNearestMovableBody) {
   for (const BodyDef& body : scene.bodies) moment.states.push_back({body.position, {}, {}, {}});
   moment.awake.assign(4, 1);
   const Stage stage(scene);
-  EXPECT_EQ(stage.pick(moment, {0, 0, 10}, {0, 0, -1}), 2u);
-  EXPECT_EQ(stage.pick(moment, {0, 0, -10}, {0, 0, 1}), 1u);
-  EXPECT_EQ(stage.pick(moment, {5, Real(0.99), 10}, {0, 0, -1}), 3u);
-  EXPECT_EQ(stage.pick(moment, {5, Real(1.01), 10}, {0, 0, -1}), std::nullopt);
-  EXPECT_EQ(stage.pick(moment, {0, 0, 10}, {0, 0, 1}), std::nullopt);  // all behind
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 0, 10}, {0, 0, -1}), 2u);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 0, -10}, {0, 0, 1}), 1u);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {5, Real(0.99), 10}, {0, 0, -1}), 3u);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {5, Real(1.01), 10}, {0, 0, -1}), std::nullopt);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 0, 10}, {0, 0, 1}), std::nullopt);  // all behind
 }
 
 TEST(Stage, DrawsBodiesBetweenTwoStepsAndSleepersDarker) {
@@ -972,6 +972,22 @@ TEST(Stage, DrawsBodiesBetweenTwoStepsAndSleepersDarker) {
   Stage(scene).draw(from, from, 1, Colouring::bodies, &awake);
   EXPECT_LT(drawing.spheres()[1].paint.r, awake.spheres()[1].paint.r);
   EXPECT_EQ(drawing.spheres()[0].paint, awake.spheres()[0].paint);
+}
+
+TEST(Stage, BodiesArePickedAndMarkedWhereTheyAreDrawn) {
+  const Scene scene = row_of_balls(2);
+  Moment from, to;
+  from.states.resize(2);
+  from.awake.assign(2, 1);
+  to = from;
+  to.states[0].position = {8, 0, 0};
+  const Stage stage(scene);
+  EXPECT_EQ(stage.pick(from, to, Real(0.25), {2, 0, 10}, {0, 0, -1}), 0u);
+  EXPECT_EQ(stage.pick(from, to, Real(0.25), {8, 0, 10}, {0, 0, -1}), std::nullopt);
+  Drawing drawing({});
+  stage.draw_mark(from, to, Real(0.25), 0, &drawing);
+  ASSERT_EQ(drawing.lines().size(), 12u);
+  for (const LineItem& line : drawing.lines()) EXPECT_NEAR(line.from[0], 2, 1);
 }
 
 TEST(Stage, DifferentContactsAreRedAndWiderThanOthers) {

@@ -10,6 +10,8 @@
 namespace {
 
 bool minimised = false;
+bool interval_is_refused = false;
+int pauses = 0;
 
 }  // namespace
 
@@ -17,6 +19,10 @@ bool minimised = false;
 extern "C" Uint32 SDL_GetWindowFlags(SDL_Window*) {
   return minimised ? SDL_WINDOW_MINIMIZED : SDL_WINDOW_SHOWN;
 }
+
+// Likewise, for a driver that can't wait for the screen, or can.
+extern "C" int SDL_GL_SetSwapInterval(int) { return interval_is_refused ? -1 : 0; }
+extern "C" void SDL_Delay(Uint32) { ++pauses; }
 
 namespace jfpx {
 namespace {
@@ -38,7 +44,7 @@ class Interactive : public test::WindowTest {
     return options;
   }
   void TearDown() override {
-    minimised = false;
+    minimised = interval_is_refused = false;
     WindowTest::TearDown();
   }
   /// Keys that are down and up again before the first picture.
@@ -110,6 +116,53 @@ TEST_F(Interactive, AWindowOfAnotherSizeHasPicturesOfThatSize) {
   ASSERT_TRUE(done);
   EXPECT_EQ(read_png("resized.png").width, 200);
   EXPECT_EQ(read_png("resized.png").height, 90);
+}
+
+TEST_F(Interactive, EverythingIsShownAgainInAWindowOfAnotherShape) {
+  ViewOptions wish = options(1'000'000);
+  wish.size = {160, 160};
+  App app(wish);
+  app.show().paused = true;
+  app.frame(0);
+  const Real before = app.show().camera.distance();
+  SDL_SetWindowSize(app.window().sdl(), 40, 160);
+  app.frame(0);
+  ASSERT_EQ(app.window().pixel_width(), 40);
+  press({SDLK_h});
+  app.frame(0);
+  EXPECT_GT(app.show().camera.distance(), before * 2);
+}
+
+int buffers_made = 0;
+decltype(epoxy_glRenderbufferStorageMultisample) make_storage;
+void counted_storage(GLenum target, GLsizei samples, GLenum format, GLsizei width, GLsizei height) {
+  ++buffers_made;
+  make_storage(target, samples, format, width, height);
+}
+
+TEST_F(Interactive, PicturesSideBySideShareTheirBuffers) {
+  if (!has_engine(EngineKind::bullet)) GTEST_SKIP() << "built without Bullet";
+  ViewOptions wish = options(1'000'000);
+  wish.side_by_side = true;
+  wish.size = {161, 120};  // no multiple of 3
+  App app(wish);
+  app.frame(0);
+  make_storage = std::exchange(epoxy_glRenderbufferStorageMultisample, counted_storage);
+  app.frame(0);
+  EXPECT_EQ(buffers_made, 0);
+  SDL_SetWindowSize(app.window().sdl(), 200, 120);
+  app.frame(0);
+  EXPECT_EQ(buffers_made, 2);  // colours and depths
+  epoxy_glRenderbufferStorageMultisample = make_storage;
+}
+
+TEST_F(Interactive, WithoutAScreenToWaitForPicturesPause) {
+  interval_is_refused = true;
+  App app(options(1'000'000));
+  app.frame(0);
+  const int before = pauses;
+  app.frame(0);
+  EXPECT_GT(pauses, before);
 }
 
 TEST_F(Interactive, AWindowThatIsMinimisedStillHasPictures) {
