@@ -141,7 +141,11 @@ std::vector<std::string> DemoShow::demo_keys() const {
 void DemoShow::demo_key(const DemoKey& key) {
   const auto controls = demo_->controls();
   for (std::size_t i = 0; i < controls.size(); ++i) {
-    if (controls[i].key == key.name) waiting_.push_back({i, key.pressed});
+    if (controls[i].key != key.name) continue;
+    if (paused) {  // nobody saw what it would have done: only how keys are in the end counts
+      std::erase_if(waiting_, [i](const demos::Input& input) { return input.control == i; });
+    }
+    waiting_.push_back({i, key.pressed});
   }
 }
 

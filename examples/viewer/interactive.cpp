@@ -3,6 +3,8 @@
 
 #include <jfpx/error.hpp>
 
+#include "examples/viewer/widgets.hpp"
+
 #include <algorithm>
 #include <imgui.h>
 #include <iterator>
@@ -18,7 +20,7 @@ constexpr double kNoticeTime = 4;       // [s]
 void add_help(const KeyHelp& line) {
   for (const std::string_view text : {line.keys, line.what}) {
     ImGui::TableNextColumn();
-    ImGui::TextUnformatted(text.data(), text.data() + text.size());
+    widget::text(std::string(text));
   }
 }
 
@@ -288,7 +290,9 @@ void App::show_help() {
   ImGui::Begin("Keys", &help_, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
   if (ImGui::BeginTable("keys", 2)) {
     for (const KeyHelp& line : show_->demo_help()) add_help(line);
-    for (const KeyHelp& line : key_help()) add_help(line);
+    for (const KeyHelp& line : key_help()) {
+      if (show_->has(line.of)) add_help(line);
+    }
     ImGui::EndTable();
   }
   ImGui::End();

@@ -24,6 +24,7 @@ class SceneShow final : public Show {
   std::uint64_t steps() const override { return player_.shown().step; }
   double engine_ms() const override { return player_.shown().times.total; }
   Real body_size() const override { return stage_.body_size(); }
+  bool has(Feature) const override { return true; }
   bool walks() const override;
   void save_recording(const std::string& path) const override { player_.save_recording(path); }
   void record_to(const std::string& path) override { player_.record_to(path); }

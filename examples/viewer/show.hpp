@@ -37,11 +37,12 @@ class Show {
   virtual void panel() {}  ///< likewise
   /// Looks for a body at a point of a picture that is as large as said, in any unit.
   virtual void pick(Real /*x*/, Real /*y*/, int /*width*/, int /*height*/) {}
-  /// Keys of a demo, by SDL's names in lower case.
+  /// Keys of a demo, as in DemoKey.
   virtual std::vector<std::string> demo_keys() const { return {}; }
   virtual void demo_key(const DemoKey& /*key*/) {}
   /// What they do, for the help.
   virtual std::vector<KeyHelp> demo_help() const { return {}; }
+  virtual bool has(Feature feature) const { return feature == Feature::none; }
   /// Walking instead of circling at first.
   virtual bool walks() const { return false; }
   /// Writes the states of all steps. @throws InvalidArgument where that can't be, FileError

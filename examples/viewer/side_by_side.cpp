@@ -130,6 +130,9 @@ class SideBySide final : public Show {
   }
   void draw(Renderer& renderer, const Target& target) override;
 
+  bool has(Feature feature) const override {
+    return feature == Feature::none || feature == Feature::colouring;
+  }
   double dt() const override { return static_cast<double>(scene_.dt); }
   std::uint64_t steps() const override { return trio_->now[kNative].step; }
   double engine_ms() const override {

@@ -398,6 +398,24 @@ TEST_F(Panel, PicturesFilmsAndRecordingsAreWritten) {
   EXPECT_EQ(pictures(), filmed);
 }
 
+TEST_F(Panel, TheHelpListsWhatTheShowHas) {
+  test::User user(options_for("pile"));
+  const auto keys = [&user](const std::string& scene) {
+    user.choose("scene", scene);
+    for (const bool down : {true, false}) test::push_key(SDLK_F1, down);
+    user.frame();
+    const auto listed = [&user](const char* what) { return user.reads(what) ? '1' : '0'; };
+    const std::string seen = {listed("pick a body"), listed("one step back"),
+                              listed("what colours tell"), listed("raise both wings"),
+                              listed("screenshot")};
+    for (const bool down : {true, false}) test::push_key(SDLK_F1, down);
+    user.frame();
+    return seen;
+  };
+  EXPECT_EQ(keys("gas"), "11101");
+  EXPECT_EQ(keys("flight"), "00011");
+}
+
 TEST_F(Panel, ColoursContactsAndForcesAreSwitched) {
   test::User user(options_for("pile"));
   user.choose("colours", "speed");
