@@ -36,6 +36,7 @@ App::App(const ViewOptions& options)
       recorder_(options.record),
       seen_{0, options.size.width, options.size.height, 1} {
   if (options.fullscreen) window_.set_fullscreen(true);
+  show_->paused = options.paused;
   meet_show();
 }
 
@@ -66,6 +67,7 @@ int App::finish() {
 void App::read_events() {
   SDL_Event event;
   while (SDL_PollEvent(&event) != 0) {
+    if (event.type == SDL_DROPFILE) open_file(event.drop.file);
     ui_.handle(event);
     controls_.handle(event, !ui_.wants_keyboard(), !ui_.wants_mouse());
   }
@@ -94,6 +96,25 @@ void App::grant_wishes() {
     open(*std::exchange(show_->next, std::nullopt));
   } catch (const Error& error) {
     show_->message = error.what();
+  }
+}
+
+/// A scene or a recording that was dropped on the window; the path is SDL's to be freed.
+void App::open_file(char* path) {
+  const std::unique_ptr<char, void (*)(void*)> owner(path, SDL_free);
+  ViewOptions next = options_;
+  next.run = {};
+  next.run.scene = path;
+  next.input.clear();
+  next.eye = next.target = std::nullopt;
+  if (is_recording(path)) {
+    next.choice = {};
+    next.side_by_side = false;
+  }
+  try {
+    open(next);
+  } catch (const Error& error) {
+    tell(error.what());
   }
 }
 

@@ -38,6 +38,7 @@ class App {
   void meet_show();
   void grant_wishes();
   void open(const ViewOptions& next);
+  void open_file(char* path);
   void try_to_obey(Command command);
   void obey(Command command);
   void toggle_recorder();

@@ -154,6 +154,7 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
       "--no-render", [&options] { options.render = false; },
       "Open no window and draw nothing: for timing the engine alone");
   app.add_flag("--fullscreen", options.fullscreen, "Start in full screen");
+  app.add_flag("--paused", options.paused, "Start paused");
 }
 
 void check(const ViewOptions& options) {
@@ -174,6 +175,9 @@ void check(const ViewOptions& options) {
   }
   if (options.eye && length(*options.target - *options.eye) <= kEpsilon) {
     throw InvalidArgument("--eye and --target are the same point");
+  }
+  if (options.paused && (options.headless || !options.render)) {
+    throw InvalidArgument("--paused goes with a window");
   }
   if (!options.render && (!options.screenshot.empty() || !options.record.empty())) {
     throw InvalidArgument("--no-render draws nothing that --screenshot or --record could write");

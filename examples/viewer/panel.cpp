@@ -24,9 +24,9 @@ constexpr double kUnnoticed = 0.95;  // share of the speed that was asked for
 constexpr std::uint64_t kMostSpheres = 2'000'000;
 
 /// A slider over a Real. @return whether the user has let go of a new value.
-bool slide(const char* label, Real* value, float low, float high, const char* format = "%.3f") {
+bool slide(const char* label, Real* value, float low, float high) {
   auto number = static_cast<float>(*value);
-  if (widget::slider(label, &number, low, high, format)) {
+  if (widget::slider(label, &number, low, high, "%.5f")) {  // to which it is rounded
     *value = static_cast<Real>(std::clamp(number, low, high));
   }
   return ImGui::IsItemDeactivatedAfterEdit();
@@ -146,7 +146,7 @@ void SceneShow::show_settings() {
   if (!widget::heading("Settings", false)) return;
   // While a widget is held its value is the user's, and is taken over when he lets go.
   if (!ImGui::IsAnyItemActive()) wanted_settings_ = player_.settings();
-  bool changed = slide("dt [s]", &wanted_settings_.dt, 1e-4f, 0.05f, "%.4f");
+  bool changed = slide("dt [s]", &wanted_settings_.dt, 1e-4f, 0.05f);
   std::uint64_t iterations = wanted_settings_.resolver.max_iterations;
   changed |= widget::number("iterations, 0 = 8N", &iterations);
   constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
@@ -158,6 +158,10 @@ void SceneShow::show_settings() {
       slide("restitution from [m/s]", &wanted_settings_.resolver.restitution_velocity, 1e-3f, 5);
   changed |= slide("sleep eps [m2/s2]", &wanted_settings_.sleep.epsilon, 1e-4f, 5);
   changed |= widget::check("sleep", &wanted_settings_.sleep.enabled);
+  if (widget::button("The scene's own")) {
+    wanted_settings_ = own_settings_;
+    changed = true;
+  }
   if (!changed) return;
   player_.set_settings(wanted_settings_);
   message.clear();

@@ -52,6 +52,7 @@ class SceneShow final : public Show {
   // What the panel's fields hold, which the user may be changing.
   std::uint64_t wanted_spheres_ = 0, wanted_seed_ = 0;
   RunSettings wanted_settings_;
+  const RunSettings own_settings_ = player_.settings();  ///< with which the scene came
 };
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -1,9 +1,12 @@
 /// The window as a user has it: keys, another size, the end; events come from SDL's queue.
 #include <jfpx/recording.hpp>
 
+#include "examples/scenes/scenes.hpp"
 #include "examples/viewer/demo_show.hpp"
+#include "examples/viewer/scene_show.hpp"
 #include "tests/viewer/window_fixture.hpp"
 
+#include <fstream>
 #include <initializer_list>
 #include <utility>
 
@@ -116,6 +119,51 @@ TEST_F(Interactive, AWindowOfAnotherSizeHasPicturesOfThatSize) {
   ASSERT_TRUE(done);
   EXPECT_EQ(read_png("resized.png").width, 200);
   EXPECT_EQ(read_png("resized.png").height, 90);
+}
+
+TEST_F(Interactive, AWindowThatStartsPausedMakesNoStep) {
+  ViewOptions wish = options(1'000'000);
+  wish.paused = true;
+  App app(wish);
+  app.frame(1);
+  EXPECT_EQ(app.show().steps(), 0u);
+  press({SDLK_SPACE});
+  app.frame(1);
+  EXPECT_GT(app.show().steps(), 0u);
+  wish.headless = true;
+  EXPECT_THROW(check(wish), InvalidArgument);
+}
+
+TEST_F(Interactive, AFileThatIsDroppedOnTheWindowIsShown) {
+  save_scene(scenes::make("gas", {.spheres = 3}), "three.json");
+  std::ofstream("broken.json") << "{";
+  const auto drop = [](const char* path) {
+    SDL_Event event{};
+    event.type = SDL_DROPFILE;
+    event.drop.file = SDL_strdup(path);
+    SDL_PushEvent(&event);
+  };
+  App app(options(1'000'000));
+  const auto bodies = [&app] {
+    return dynamic_cast<const SceneShow&>(app.show()).player().scene().bodies.size();
+  };
+  for (int i = 0; i < 3; ++i) app.frame(kRecordedFrame);
+  press({SDLK_F9});
+  app.frame(0);
+  const std::size_t own = bodies();
+  drop("three.json");
+  app.frame(0);
+  const std::size_t three = bodies();
+  EXPECT_EQ(three, scenes::make("gas", {.spheres = 3}).bodies.size());
+  for (const char* bad : {"broken.json", "missing.rec"}) {
+    drop(bad);
+    app.frame(0);
+    EXPECT_EQ(bodies(), three);
+  }
+  drop("jfpx-view-1.rec");
+  app.frame(0);
+  EXPECT_EQ(bodies(), own);
+  EXPECT_EQ(app.finish(), 0);
 }
 
 TEST_F(Interactive, EverythingIsShownAgainInAWindowOfAnotherShape) {

@@ -299,8 +299,13 @@ TEST_F(Panel, SettingsOfTheSolverAreTakenOver) {
   EXPECT_EQ(now().sleep.enabled, !before.sleep.enabled);
   EXPECT_EQ(user.value("sleep"), before.sleep.enabled ? "off" : "on");
   EXPECT_EQ(user.value("velocity eps [m/s]"), "1");
+  user.drag_in("velocity eps [m/s]", 0.5, 0.25);
+  EXPECT_GT(now().resolver.velocity_epsilon, 5e-5);
+  EXPECT_LT(now().resolver.velocity_epsilon, 5e-4);
   user.click("Step");
   EXPECT_TRUE(user.reads("step 1, 0.00 s"));
+  user.click("The scene's own");
+  EXPECT_EQ(now(), before);
 }
 
 TEST_F(Panel, RestartKeepsWhatThePanelShows) {
