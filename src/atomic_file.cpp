@@ -6,18 +6,21 @@
 #include "src/file.hpp"
 
 #include <cerrno>
+#include <filesystem>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI {
 
 AtomicFile::AtomicFile(std::string path)
-    : path_(std::move(path)), part_(path_ + ".part"), file_(std::fopen(part_.c_str(), "wb")) {
+    : path_(std::move(path)),
+      part_(std::filesystem::is_other(path_) ? path_ : path_ + ".part"),
+      file_(std::fopen(part_.c_str(), "wb")) {
   if (file_ == nullptr) fail();
 }
 
 AtomicFile::~AtomicFile() {
   if (file_ != nullptr) std::fclose(file_);
-  if (!finished_) std::remove(part_.c_str());
+  if (!finished_ && part_ != path_) std::remove(part_.c_str());
 }
 
 void AtomicFile::write(std::string_view bytes) {
@@ -29,7 +32,7 @@ void AtomicFile::write(std::string_view bytes) {
 void AtomicFile::finish() {
   require_open();
   if (std::fclose(std::exchange(file_, nullptr)) != 0) fail();
-  if (std::rename(part_.c_str(), path_.c_str()) != 0) fail();
+  if (part_ != path_ && std::rename(part_.c_str(), path_.c_str()) != 0) fail();
   finished_ = true;
 }
 

@@ -10,7 +10,7 @@
 namespace jfpx::inline JFPX_ABI {
 
 /// Written beside its path and renamed at the end, so that the file is there whole or not at all.
-/// What was not finished is removed.
+/// What was not finished is removed. What is no file, /dev/null for one, is written to and stays.
 class JFPX_API AtomicFile {
  public:
   /// Opens at once, so that a bad path fails before a long run. @throws FileError

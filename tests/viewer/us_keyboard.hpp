@@ -11,7 +11,8 @@ inline SDL_Scancode us_scancode(SDL_Keycode code) {
   if (code >= SDLK_a && code <= SDLK_z) {
     return static_cast<SDL_Scancode>(SDL_SCANCODE_A + (code - SDLK_a));
   }
-  if ((code & SDLK_SCANCODE_MASK) != 0) return static_cast<SDL_Scancode>(code & 0x1ff);
+  if ((code & SDLK_SCANCODE_MASK) != 0)
+    return static_cast<SDL_Scancode>(code & ~SDLK_SCANCODE_MASK);
   return SDL_GetScancodeFromKey(code);
 }
 
