@@ -32,7 +32,7 @@ struct ViewOptions {
   bool render = true;     ///< the thesis' switch "rendering on / off"
   bool fullscreen = false;
   bool paused = false;  ///< at first
-  std::string input;  ///< file with an input script, for a demo
+  std::string input;    ///< file with an input script, for a demo
   std::optional<Vec3> eye, target;
 };
 
