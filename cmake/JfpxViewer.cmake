@@ -16,7 +16,7 @@ endif()
 
 find_package(PkgConfig)
 if(PKG_CONFIG_FOUND)
-  pkg_check_modules(JFPX_VIEWER3RD IMPORTED_TARGET sdl2>=2.0.22 epoxy imgui>=1.80 stb libpng)
+  pkg_check_modules(JFPX_VIEWER3RD IMPORTED_TARGET sdl2>=2.0.22 epoxy imgui>=1.84 stb libpng)
 endif()
 if(NOT JFPX_VIEWER3RD_FOUND)
   set(reason "pkg-config does not find sdl2, epoxy, imgui, stb and libpng: run scripts/setup")

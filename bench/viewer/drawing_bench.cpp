@@ -78,7 +78,7 @@ class Gallery {
     Drawing drawing(view.eye);
     drawing.set_bounds({0, side / 10, 0}, side);
     drawing.set_detail(2 * kRadius);
-    drawing.add_ground({0, 1, 0}, 0, 10 * kRadius, {124, 130, 138});
+    drawing.add_ground({0, 1, 0}, 0, 10 * kRadius, kGroundPaint);
     std::uint32_t number = 0;
     for (const Vec3& place : pile(balls, side)) {
       drawing.add_sphere(place, kRadius, {}, ball_paint(number++));

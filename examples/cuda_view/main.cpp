@@ -6,12 +6,15 @@
 #include "examples/cuda_view/shared_buffer.hpp"
 #include "examples/viewer/controls.hpp"
 #include "examples/viewer/renderer.hpp"
+#include "examples/viewer/step_clock.hpp"
 #include "examples/viewer/timing.hpp"
 #include "examples/viewer/window.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <limits>
 #include <vector>
 
 namespace {
@@ -29,6 +32,8 @@ struct Options {
 };
 
 constexpr int kWidth = 1280, kHeight = 720, kStepsAFrame = 2;
+constexpr double kStep = static_cast<double>(Crowd::kStep);  // [s]
+constexpr double kLongestFrame = 0.25;  // [s]; after a stall the clock does not catch up
 
 class Show {
  public:
@@ -54,16 +59,18 @@ class Show {
     const int frames = options_.frames > 0 || !options_.headless ? options_.frames : 240;
     view::Stopwatch clock;
     for (int n = 0; !quit_ && (frames == 0 || n < frames); ++n) {
-      read_events(clock.lap());
+      const double seconds = std::min(clock.lap(), kLongestFrame);
+      read_events(seconds);
+      // Without a window a run has the same pictures every time.
+      advance(options_.headless ? kStepsAFrame * kStep : seconds);
       view::Stopwatch watch;
-      for (int i = 0; i < kStepsAFrame; ++i) crowd_.step();
-      step_ms_.push_back(watch.lap() * 1e3 / kStepsAFrame);
       draw();
       glFinish();
       picture_ms_.push_back(watch.lap() * 1e3);
+      window_.check_context();
+      if (quit_ || n + 1 == frames) write_screenshot();
       if (!options_.headless) window_.swap();
     }
-    if (!options_.screenshot.empty()) write_png(canvas_.read(), options_.screenshot);
     const std::string& detour = buffer_.detour();
     fmt::print("{} balls, {} contacts; {:.3f} ms a step, {:.3f} ms a picture (medians), {}\n",
                crowd_.size(), crowd_.contacts(), view::median(step_ms_), view::median(picture_ms_),
@@ -71,6 +78,27 @@ class Show {
   }
 
  private:
+  void advance(double seconds) {
+    view::Stopwatch watch;
+    std::uint64_t steps = 0;
+    steps_.advance(seconds, kStep, std::numeric_limits<std::uint64_t>::max(), [&] {
+      crowd_.step();
+      ++steps;
+    });
+    if (steps > 0) step_ms_.push_back(watch.lap() * 1e3 / static_cast<double>(steps));
+  }
+
+  /// Before the swap, which may leave the back buffer undefined.
+  void write_screenshot() const {
+    if (options_.screenshot.empty()) return;
+    const view::Image image =
+        options_.headless
+            ? canvas_.read()
+            : view::Canvas::read_pixels(0, window_.pixel_width(), window_.pixel_height());
+    window_.check_context();
+    view::write_png(image, options_.screenshot);
+  }
+
   void read_events(double seconds) {
     SDL_Event event;
     while (SDL_PollEvent(&event) != 0) controls_.handle(event);
@@ -88,7 +116,7 @@ class Show {
     view::Drawing drawing(view.eye);
     drawing.set_bounds({0, side / 3, 0}, side);
     drawing.set_detail(2 * Crowd::kRadius);
-    drawing.add_ground({0, 1, 0}, 0, 10 * Crowd::kRadius, {124, 130, 138});
+    drawing.add_ground({0, 1, 0}, 0, 10 * Crowd::kRadius, view::kGroundPaint);
     const bool shown = !options_.headless;
     renderer_.draw(
         drawing, view,
@@ -102,6 +130,7 @@ class Show {
   view::Canvas canvas_;
   view::Camera camera_;
   view::Controls controls_;
+  view::StepClock steps_;
   Crowd crowd_;
   cuda_view::SharedBuffer buffer_;
   std::vector<double> step_ms_, picture_ms_;
@@ -116,7 +145,7 @@ int main(int argc, char** argv) {
   app.add_option("--balls", options.balls, "How many")->check(CLI::Range(1, 50'000'000));
   app.add_option("--frames", options.frames, "Pictures [headless: 240; window: until closed]")
       ->check(CLI::Range(1, 1'000'000));
-  app.add_option("--screenshot", options.screenshot, "Headless: the last picture, as PNG");
+  app.add_option("--screenshot", options.screenshot, "The last picture, as PNG");
   app.add_flag_callback(
       "--high", [&] { options.quality = view::kHighQuality; }, "High quality instead of medium");
   app.add_option("--eye", options.eye, "Where the camera is: X,Y,Z [m]")
@@ -127,15 +156,22 @@ int main(int argc, char** argv) {
       ->delimiter(',');
   app.add_flag("--headless", options.headless, "No window, no display");
   app.add_flag("--by-host", options.by_host, "Copy by way of the host, to compare");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   try {
     Show(options).run();
     return 0;
   } catch (const BackendUnavailable& error) {
     fmt::print(stderr, "cuda_view: {}\n", error.what());
     return 3;
+  } catch (const DeviceError& error) {
+    fmt::print(stderr, "cuda_view: {}\n", error.what());
+    return 3;
   } catch (const std::exception& error) {
     fmt::print(stderr, "cuda_view: {}\n", error.what());
-    return 1;
+    return 2;
   }
 }

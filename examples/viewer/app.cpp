@@ -15,18 +15,26 @@ namespace {
 
 constexpr std::uint64_t kHeadlessFrames = 120;
 
+std::unique_ptr<Show> start(const ViewOptions& options) {
+  auto show = make_show(options);
+  if (!options.recording.empty()) show->record_to(options.recording);
+  return show;
+}
+
 int run_without_rendering(const ViewOptions& options) {
-  const auto show = make_show(options);
+  const auto show = start(options);
   Timing timing;
-  for (std::uint64_t i = 0; i < options.frames.value_or(kHeadlessFrames); ++i) {
+  const std::uint64_t frames = options.frames.value_or(kHeadlessFrames);
+  for (std::uint64_t i = 0; i < frames && !show->at_end(); ++i) {
     show->step();
     timing.add_step(show->engine_ms());
   }
-  return finish(*show, timing, options);
+  finish(*show, timing, options);
+  return show->status();
 }
 
 int run_headless(const ViewOptions& options) {
-  const auto show = make_show(options);
+  const auto show = start(options);
   Window window = Window::hidden();
   Renderer renderer(options.quality);
   const Canvas canvas(options.size.width, options.size.height);
@@ -48,33 +56,51 @@ int run_headless(const ViewOptions& options) {
     window.check_context();  // what a lost context leaves is no picture
     return image;
   };
-  for (std::uint64_t i = 0; i < options.frames.value_or(kHeadlessFrames); ++i) {
+  std::exception_ptr failure;
+  const auto write = [&failure](const auto& picture_file) {
+    try {
+      picture_file();
+    } catch (const FileError&) {
+      failure = std::current_exception();
+    }
+    return failure == nullptr;
+  };
+  const std::uint64_t frames = options.frames.value_or(kHeadlessFrames);
+  // SDL makes an event of SIGINT and SIGTERM, which somebody must ask for.
+  for (std::uint64_t i = 0; i < frames && !show->at_end() && !SDL_QuitRequested(); ++i) {
     show->step();
     timing.add_step(show->engine_ms());
     if (!recorder.on()) continue;
     draw();
-    recorder.add(picture());
+    if (!write([&] { recorder.add(picture()); })) break;
   }
-  show->home();
-  if (options.panel) {  // windows learn their size from a first, invisible frame
+  if (!recorder.on()) show->home();  // else the last picture is that of the film
+  if (options.panel) {               // windows learn their size from a first, invisible frame
     ui.begin(kRecordedFrame);
     show->panel();
     ui.end(canvas.framebuffer(), canvas.width(), canvas.height());
   }
   draw();
-  if (!options.screenshot.empty()) write_png(picture(), options.screenshot);
-  return finish(*show, timing, options);
+  if (!options.screenshot.empty()) write([&] { write_png(picture(), options.screenshot); });
+  finish(*show, timing, options, failure);
+  return show->status();
 }
 
 }  // namespace
 
-int finish(const Show& show, const Timing& timing, const ViewOptions& options) {
-  if (!options.recording.empty()) show.save_recording(options.recording);
+void finish(Show& show, const Timing& timing, const ViewOptions& options,
+            std::exception_ptr failure) {
+  try {
+    show.finish_recording();
+  } catch (const Error&) {
+    if (!failure) failure = std::current_exception();
+  }
   fmt::print("{}\n{}\n", show.summary(), timing.text(options.render));
-  return show.status();
+  if (failure) std::rethrow_exception(failure);
 }
 
 int run_app(const ViewOptions& options) {
+  if (!options.screenshot.empty()) require_writable(options.screenshot);
   if (!options.render) return run_without_rendering(options);
   if (options.headless) return run_headless(options);
   return run_interactive(options);

@@ -3,6 +3,8 @@
 
 #include "examples/viewer/options.hpp"
 
+#include <exception>
+
 namespace jfpx::inline JFPX_ABI::view {
 
 class Show;
@@ -16,7 +18,9 @@ int run_app(const ViewOptions& options);
 /// The same, in a window until it is closed.
 int run_interactive(const ViewOptions& options);
 
-/// What is written and printed at the end of a run. @return the exit status
-int finish(const Show& show, const Timing& timing, const ViewOptions& options);
+/// What is completed and printed at the end of a run, whatever could not be written before.
+/// @throws `failure`, or why the recording can't be written
+void finish(Show& show, const Timing& timing, const ViewOptions& options,
+            std::exception_ptr failure = nullptr);
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -2,7 +2,7 @@
 /// own.
 #pragma once
 
-#include <jfpx/math.hpp>
+#include <jfpx/body.hpp>
 
 namespace jfpx::inline JFPX_ABI::view {
 
@@ -14,6 +14,12 @@ inline Quat between(const Quat& a, const Quat& b, Real share) {
   const Real rest = 1 - share;
   return normalized(Quat{a.w * rest + b.w * way, a.x * rest + b.x * way, a.y * rest + b.y * way,
                          a.z * rest + b.z * way});
+}
+
+/// Place and turn; at rest.
+inline BodyState between(const BodyState& a, const BodyState& b, Real share) {
+  return {
+      between(a.position, b.position, share), between(a.orientation, b.orientation, share), {}, {}};
 }
 
 }  // namespace jfpx::inline JFPX_ABI::view

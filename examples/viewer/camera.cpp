@@ -45,19 +45,20 @@ void Camera::move(Real right, Real up, Real forward_distance) {
   eye_.y += up;
 }
 
+// The eye comes back from the focus rounded: a camera that nobody moves must keep its bits.
 void Camera::orbit(Real yaw, Real pitch) {
+  if (yaw == 0 && pitch == 0) return;
   const Vec3 centre = focus();
   turn(yaw, pitch);
   eye_ = centre - forward() * distance_;
 }
 
 void Camera::zoom(Real factor) {
+  if (factor == 1) return;
   const Vec3 centre = focus();
   distance_ = std::clamp(distance_ * factor, Real(1e-3), kMaxReal / 4);
   eye_ = centre - forward() * distance_;
 }
-
-void Camera::set_focus(const Vec3& centre) { eye_ = centre - forward() * distance_; }
 
 View Camera::view(const Vec3& centre, Real radius) const {
   View view;
@@ -68,8 +69,8 @@ View Camera::view(const Vec3& centre, Real radius) const {
   view.fov_y = fov_y;
   const Real away = length(centre - eye_);
   view.far_plane = std::max((away + radius) * 8, Real(10));
-  // Depth has 24 bits: the near plane goes out as far as nothing is cut off.
-  view.near_plane = std::max((away - radius) * Real(0.5), view.far_plane * Real(2e-5));
+  // Half of depth's values lie within twice the near plane: it goes out as far as may be.
+  view.near_plane = std::max((away - radius) * Real(0.5), view.far_plane * kLeastNear);
   return view;
 }
 

@@ -12,8 +12,12 @@ struct View {
   Vec3 eye;
   Vec3 right{1, 0, 0}, up{0, 1, 0}, forward{0, 0, -1};  ///< unit, orthogonal
   Real fov_y = Real(0.8);                               ///< [rad], whole vertical angle
-  Real near_plane = Real(0.1), far_plane = 1000;        ///< [m]
+  /// [m]; the renderer takes the near one back where what it draws is nearer.
+  Real near_plane = Real(0.1), far_plane = 1000;
 };
+
+/// The near plane stays as far out as this share of the far one: depth has so many digits.
+inline constexpr Real kLeastNear = Real(2e-5);
 
 /// Where a point appears, in pixels from the upper left corner; nothing if it is behind the eye.
 struct Pixel {
@@ -34,12 +38,10 @@ class Camera {
   void turn(Real yaw, Real pitch);
   /// Moves along its own axes [m].
   void move(Real right, Real up, Real forward);
-  /// Circles the focus by the angles; the focus stays in the middle.
+  /// Circles the focus by the angles; the focus stays in the middle. None moves no bit.
   void orbit(Real yaw, Real pitch);
-  /// Multiplies the distance to the focus.
+  /// Multiplies the distance to the focus; 1 moves no bit.
   void zoom(Real factor);
-  /// Moves the focus, and the eye with it.
-  void set_focus(const Vec3& focus);
 
   const Vec3& eye() const { return eye_; }
   Vec3 focus() const { return eye_ + forward() * distance_; }

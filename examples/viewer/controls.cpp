@@ -12,20 +12,21 @@ namespace {
 constexpr Real kRadiansPerPixel = Real(0.0045);
 constexpr double kBodiesPerSecond = 12;  // walking speed
 constexpr double kFaster = 5;
+constexpr int kStill = 2;  // [units] by which a mouse may move in a click
 
-std::optional<std::size_t> motion_of(SDL_Keycode key) {
+std::optional<std::size_t> motion_of(SDL_Scancode key) {
   switch (key) {
-    case SDLK_a:
+    case SDL_SCANCODE_A:
       return 0;
-    case SDLK_d:
+    case SDL_SCANCODE_D:
       return 1;
-    case SDLK_s:
+    case SDL_SCANCODE_S:
       return 2;
-    case SDLK_w:
+    case SDL_SCANCODE_W:
       return 3;
-    case SDLK_q:
+    case SDL_SCANCODE_Q:
       return 4;
-    case SDLK_e:
+    case SDL_SCANCODE_E:
       return 5;
     default:
       return std::nullopt;
@@ -49,10 +50,12 @@ std::optional<Command> command_of(SDL_Keycode key, Uint16 modifiers) {
     case SDLK_LEFT:
       return Command::step_back;
     case SDLK_MINUS:
+    case SDLK_KP_MINUS:
     case SDLK_DOWN:
       return Command::slower;
     case SDLK_PLUS:
     case SDLK_EQUALS:
+    case SDLK_KP_PLUS:
     case SDLK_UP:
       return Command::faster;
     case SDLK_F5:
@@ -91,22 +94,22 @@ std::span<const KeyHelp> key_help() {
   static constexpr KeyHelp kHelp[] = {
       {"F1", "this help"},
       {"F2", "panel"},
-      {"W A S D", "walk; Q and E: down and up; Shift: faster"},
+      {"W A S D", "walk; Q and E: down and up; Shift: faster (as a US keyboard has them)"},
       {"drag", "look around, or circle the focus"},
       {"wheel", "walking speed, or distance to the focus"},
       {"O", "circle or walk"},
       {"H or Home", "show everything again"},
-      {"click", "pick a body: its contacts are listed"},
+      {"click", "pick a body: its contacts are listed", Feature::picking},
       {"Space", "pause"},
       {". or Right", "one step"},
-      {", or Left", "one step back"},
+      {", or Left", "one step back", Feature::history},
       {"- or Down", "slow motion"},
       {"+ or Up", "faster"},
       {"F5 or R", "start again"},
       {"C", "contact points and normals"},
       {"F", "forces, weight aside"},
-      {"V", "what colours tell"},
-      {"F9", "save all steps for jfpx replay"},
+      {"V", "what colours tell", Feature::colouring},
+      {"F9", "save all steps for jfpx replay", Feature::saving},
       {"F10", "record numbered pictures"},
       {"F12", "screenshot"},
       {"F11 or Alt Return", "full screen"},
@@ -115,7 +118,12 @@ std::span<const KeyHelp> key_help() {
   return kHelp;
 }
 
-void Controls::set_demo_keys(std::vector<std::string> names) { demo_names_ = std::move(names); }
+void Controls::set_demo_keys(std::vector<std::string> names) {
+  demo_names_ = std::move(names);
+  // Keys that are down may be the demo's now, and so may be their release.
+  down_.reset();
+  touched_.reset();
+}
 
 void Controls::handle(const SDL_Event& event, bool keyboard, bool mouse) {
   switch (event.type) {
@@ -153,8 +161,8 @@ void Controls::key(const SDL_KeyboardEvent& event) {
   const bool down = event.type == SDL_KEYDOWN;
   const SDL_Keycode code = event.keysym.sym;
   if (code == SDLK_LSHIFT || code == SDLK_RSHIFT) fast_ = down;
-  if (demo_key(code, down)) return;
-  if (const auto motion = motion_of(code)) {
+  if (demo_key(event.keysym.scancode, down)) return;
+  if (const auto motion = motion_of(event.keysym.scancode)) {
     press(*motion, down);
   } else if (const auto command = command_of(code, event.keysym.mod); command && down) {
     const bool repeats = *command == Command::step || *command == Command::step_back;
@@ -162,8 +170,8 @@ void Controls::key(const SDL_KeyboardEvent& event) {
   }
 }
 
-bool Controls::demo_key(SDL_Keycode code, bool pressed) {
-  std::string name = SDL_GetKeyName(code);
+bool Controls::demo_key(SDL_Scancode code, bool pressed) {
+  std::string name = SDL_GetScancodeName(code);
   std::transform(name.begin(), name.end(), name.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (std::find(demo_names_.begin(), demo_names_.end(), name) == demo_names_.end()) return false;
@@ -190,13 +198,16 @@ void Controls::button(const SDL_MouseButtonEvent& event) {
   }
   looking_ = down;
   dragged_ = false;
+  drag_x_ = drag_y_ = 0;
 }
 
 void Controls::motion(const SDL_MouseMotionEvent& event) {
   if (!looking_) return;
   turn_x_ += static_cast<float>(event.xrel);
   turn_y_ += static_cast<float>(event.yrel);
-  if (std::abs(turn_x_) + std::abs(turn_y_) > 2) dragged_ = true;
+  drag_x_ += event.xrel;
+  drag_y_ += event.yrel;
+  if (std::abs(drag_x_) + std::abs(drag_y_) > kStill) dragged_ = true;
 }
 
 void Controls::move(Camera* camera, double seconds, Real scale) {

@@ -35,9 +35,13 @@ enum class Command : std::uint8_t {
   fullscreen,
 };
 
+/// What not every show has.
+enum class Feature : std::uint8_t { none, picking, history, colouring, saving };
+
 /// One line of the help.
 struct KeyHelp {
   std::string_view keys, what;
+  Feature of = Feature::none;  ///< that the keys belong to
 };
 std::span<const KeyHelp> key_help();
 
@@ -46,17 +50,21 @@ struct Click {
   int x, y;
 };
 
-/// A demo's key went down or up; the name is SDL's, in lower case.
+/// A demo's key went down or up: the one where a US keyboard has that name, in SDL's words and
+/// lower case.
 struct DemoKey {
   std::string name;
   bool pressed;
 };
 
 /// Events act in the order in which they came, and all of them: a key that is pressed and released
-/// between two frames still acts once (erratum E42). Keys without a meaning do nothing.
+/// between two frames still acts once (erratum E42). Keys without a meaning do nothing. Keys to
+/// walk and those of demos count by their place, so that they lie together on any keyboard; others
+/// by what is written on them.
 class Controls {
  public:
-  /// Keys that belong to a demo are kept from the camera: see take_demo_keys().
+  /// Keys that belong to a demo are kept from the camera: see take_demo_keys(). Keys that are down
+  /// walk no more.
   void set_demo_keys(std::vector<std::string> names);
   /// @param keyboard, mouse whether the panel leaves them to the scene
   void handle(const SDL_Event& event, bool keyboard = true, bool mouse = true);
@@ -74,8 +82,7 @@ class Controls {
   enum Motion : std::size_t { kLeft, kRight, kBack, kAhead, kDown, kUp, kMotions };
 
   void key(const SDL_KeyboardEvent& event);
-  void command(SDL_Keycode key, Uint16 modifiers);
-  bool demo_key(SDL_Keycode key, bool pressed);
+  bool demo_key(SDL_Scancode key, bool pressed);
   void press(std::size_t motion, bool down);
   void button(const SDL_MouseButtonEvent& event);
   void motion(const SDL_MouseMotionEvent& event);
@@ -87,6 +94,7 @@ class Controls {
   std::bitset<kMotions> down_, touched_;
   bool fast_ = false, looking_ = false, dragged_ = false;
   float turn_x_ = 0, turn_y_ = 0, wheel_ = 0;
+  int drag_x_ = 0, drag_y_ = 0;  ///< [units] since the button went down
   double speed_ = 1;
 };
 

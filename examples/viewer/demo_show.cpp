@@ -20,7 +20,7 @@ namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
 constexpr Real kFlat = Real(0.5);  // scales below this stand for shadows
-constexpr Paint kGround{124, 130, 138};
+constexpr float kTextWidth = 320;  // [units]
 
 std::unique_ptr<demos::Demo> make_demo(const ViewOptions& options) {
   WorldSettings world;
@@ -67,7 +67,7 @@ bool same_items(const demos::View& a, const demos::View& b) {
 }  // namespace
 
 void draw_demo(const demos::View& from, const demos::View& to, Real share, Drawing* drawing) {
-  drawing->add_ground({0, 1, 0}, 0, 1, kGround);
+  drawing->add_ground({0, 1, 0}, 0, 1, kGroundPaint);
   const bool mixes = same_items(from, to);
   for (std::size_t i = 0; i < to.items.size(); ++i) {
     const demos::Item& item = to.items[i];
@@ -110,15 +110,10 @@ void DemoShow::restart() {
   script_.reset();
   if (!options_.input.empty()) script_.emplace(demos::load_input_script(options_.input), *demo_);
   waiting_.clear();
+  clock_.settle();
   report_ = {};
   demo_->draw(&now_);
   before_ = now_;
-}
-
-void DemoShow::advance(double seconds) {
-  if (paused) return;
-  const unsigned due = clock_.advance(seconds * speed, static_cast<double>(demo_->dt()));
-  for (unsigned i = 0; i < due; ++i) step();
 }
 
 void DemoShow::step() {
@@ -131,6 +126,7 @@ void DemoShow::step() {
   waiting_.clear();
   Stopwatch watch;
   report_ = demo_->step(inputs);
+  check(!report_.non_finite);
   report_.total_ms = watch.lap() * 1e3;  // controls included
   before_ = std::move(now_);
   demo_->draw(&now_);
@@ -145,7 +141,11 @@ std::vector<std::string> DemoShow::demo_keys() const {
 void DemoShow::demo_key(const DemoKey& key) {
   const auto controls = demo_->controls();
   for (std::size_t i = 0; i < controls.size(); ++i) {
-    if (controls[i].key == key.name) waiting_.push_back({i, key.pressed});
+    if (controls[i].key != key.name) continue;
+    if (paused) {  // nobody saw what it would have done: only how keys are in the end counts
+      std::erase_if(waiting_, [i](const demos::Input& input) { return input.control == i; });
+    }
+    waiting_.push_back({i, key.pressed});
   }
 }
 
@@ -171,10 +171,9 @@ void DemoShow::follow() {
   }
   if (followed_ && *followed_ != camera) followed_.reset();
   if (!followed_) return;
-  const Real share = paused ? 1 : static_cast<Real>(clock_.share());
   const demos::Camera &old = before_.camera, &now = now_.camera;
   camera.fov_y = now.field_of_view * kPi / 180;
-  camera.look_at(between(old.eye, now.eye, share), between(old.target, now.target, share));
+  camera.look_at(between(old.eye, now.eye, share()), between(old.target, now.target, share()));
   followed_ = camera;
 }
 
@@ -185,7 +184,7 @@ void DemoShow::draw(Renderer& renderer, const Target& target) {
   Drawing drawing(view.eye);
   drawing.set_bounds(bounds.centre, bounds.radius * Real(1.2));
   drawing.set_detail(1);
-  draw_demo(before_, now_, paused ? 1 : static_cast<Real>(clock_.share()), &drawing);
+  draw_demo(before_, now_, share(), &drawing);
   const World* world = demo_->world();
   if (contacts && world != nullptr) {
     for (const Contact& contact : world->contacts()) {
@@ -208,11 +207,8 @@ void DemoShow::panel() {
   ImGui::SetNextWindowPos({12, 12}, ImGuiCond_FirstUseEver);
   const std::string title(demo_->name());
   if (ImGui::Begin(title.c_str(), nullptr, ImGuiWindowFlags_AlwaysAutoResize)) {
-    if (widget::button(paused ? "Run" : "Pause")) paused = !paused;
-    ImGui::SameLine();
-    if (widget::button("Step")) paused = true, step();
-    ImGui::SameLine();
-    if (widget::button("Restart")) restart();
+    show_run_buttons(false);
+    if (!message.empty()) widget::warning(message, kTextWidth);
     if (const auto chosen = choose_scene(options_.run.scene)) {
       next = options_;
       next->run.scene = *chosen;
@@ -227,8 +223,6 @@ void DemoShow::panel() {
   }
   ImGui::End();
 }
-
-int DemoShow::status() const { return report_.non_finite ? tool::kCheckFailed : tool::kSuccess; }
 
 std::string DemoShow::summary() const {
   return fmt::format("{}: step {}, hash {:016x}{}", demo_->name(), report_.step,

@@ -19,7 +19,6 @@ class DemoShow final : public Show {
  public:
   explicit DemoShow(const ViewOptions& options);
 
-  void advance(double seconds) override;
   void step() override;
   void restart() override;
   void home() override;
@@ -28,10 +27,10 @@ class DemoShow final : public Show {
   std::vector<std::string> demo_keys() const override;
   void demo_key(const DemoKey& key) override;
   std::vector<KeyHelp> demo_help() const override;
+  double dt() const override { return static_cast<double>(demo_->dt()); }
   std::uint64_t steps() const override { return report_.step; }
   double engine_ms() const override { return report_.total_ms; }
   Real body_size() const override { return 1; }
-  int status() const override;
   std::string summary() const override;
 
   const demos::Demo& demo() const { return *demo_; }
@@ -45,7 +44,6 @@ class DemoShow final : public Show {
   std::vector<demos::Input> waiting_;  ///< what the user did since the last step
   demos::View before_, now_;
   StepReport report_;
-  StepClock clock_;
   std::optional<Camera> followed_;  ///< the demo's own camera, while nobody moved it
 };
 

@@ -44,7 +44,8 @@ const std::vector<SphereItem>& DrawOrder::sort(const std::vector<SphereItem>& it
                                                const View& view, Real aspect) {
   const Frustum frustum(view, aspect);
   distances_.resize(items.size());
-  float nearest = HUGE_VALF, farthest = 0;
+  float farthest = 0;
+  nearest_ = HUGE_VALF;
   for (std::size_t i = 0; i < items.size(); ++i) {
     const float(&c)[3] = items[i].centre;
     distances_[i] = kBeyond;
@@ -52,12 +53,12 @@ const std::vector<SphereItem>& DrawOrder::sort(const std::vector<SphereItem>& it
     const float front = std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) - items[i].radius;
     if (!std::isfinite(front)) continue;
     distances_[i] = std::max(front, 0.0f);
-    nearest = std::min(nearest, distances_[i]);
+    nearest_ = std::min(nearest_, distances_[i]);
     farthest = std::max(farthest, distances_[i]);
   }
-  const float scale = farthest > nearest ? (kShells - 1) / (farthest - nearest) : 0;
+  const float scale = farthest > nearest_ ? (kShells - 1) / (farthest - nearest_) : 0;
   const auto shell_of = [&](float distance) {
-    return distance < 0 ? kShells : static_cast<std::uint32_t>((distance - nearest) * scale);
+    return distance < 0 ? kShells : static_cast<std::uint32_t>((distance - nearest_) * scale);
   };
   // Counts become places: the end of the shell before, which moves on as items are put there.
   ends_.assign(kShells + 2, 0);

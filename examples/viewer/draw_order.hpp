@@ -4,6 +4,7 @@
 #include "examples/viewer/camera.hpp"
 #include "examples/viewer/drawing.hpp"
 
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -20,12 +21,15 @@ class DrawOrder {
   std::size_t all() const { return ordered_.size(); }
   /// How many of them, the first ones, are in the picture.
   std::size_t visible() const { return visible_; }
+  /// How near the nearest of these comes to the eye [m]; infinite where there is none.
+  float nearest() const { return nearest_; }
 
  private:
   std::vector<SphereItem> ordered_;
   std::vector<float> distances_;
   std::vector<std::size_t> ends_;
   std::size_t visible_ = 0;
+  float nearest_ = HUGE_VALF;
 };
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -1,6 +1,7 @@
 /// What a picture shows: plain lists of instances, ready for the GPU.
 #include "examples/viewer/drawing.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace jfpx::inline JFPX_ABI::view {
@@ -16,7 +17,27 @@ void put(float (&out)[4], const Quat& q) {
   out[3] = static_cast<float>(q.w);
 }
 
+/// From the eye, which is at the origin, to a box.
+float distance_to(const BoxItem& item) {
+  const Vec3 centre{Real(item.centre[0]), Real(item.centre[1]), Real(item.centre[2])};
+  const Quat turn{Real(item.turn[3]), Real(item.turn[0]), Real(item.turn[1]), Real(item.turn[2])};
+  const Vec3 eye = transform_transpose(to_matrix(turn), -centre);
+  Vec3 outside;
+  for (int i = 0; i < 3; ++i) {
+    outside[i] = std::max(std::fabs(eye[i]) - Real(item.half_extents[i]), Real(0));
+  }
+  return static_cast<float>(length(outside));
+}
+
 }  // namespace
+
+float Drawing::nearest_box() const {
+  float nearest = HUGE_VALF;
+  for (const auto* items : {&boxes_, &glass_}) {
+    for (const BoxItem& item : *items) nearest = std::min(nearest, distance_to(item));
+  }
+  return nearest;
+}
 
 void Drawing::add_sphere(const Vec3& centre, Real radius, const Quat& turn, Paint paint) {
   SphereItem& item = spheres_.emplace_back();

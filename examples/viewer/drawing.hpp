@@ -25,6 +25,8 @@ struct Paint {
   friend bool operator==(const Paint&, const Paint&) = default;
 };
 
+inline constexpr Paint kGroundPaint{124, 130, 138};
+
 struct SphereItem {
   float centre[3], radius;
   float turn[4];  ///< x, y, z, w
@@ -71,6 +73,8 @@ class Drawing {
   const std::vector<SphereItem>& spheres() const { return spheres_; }
   const std::vector<BoxItem>& boxes() const { return boxes_; }
   const std::vector<BoxItem>& glass() const { return glass_; }
+  /// How near the nearest box, of glass or not, comes to the eye [m]; infinite without boxes.
+  float nearest_box() const;
   const std::vector<LineItem>& lines() const { return lines_; }
   const std::vector<GroundItem>& grounds() const { return grounds_; }
   const Vec3& bounds_centre() const { return bounds_centre_; }

@@ -44,7 +44,7 @@ std::vector<Vec3> forces_between(const Scene& scene, const Moment& before, const
     const BodyDef& body = scene.bodies[i];
     if (!(body.mass > 0)) continue;
     const Vec3 change = now.states[i].velocity - before.states[i].velocity;
-    forces[i] = (change * (1 / scene.dt) - body.acceleration) * body.mass;
+    forces[i] = (change * (1 / now.dt) - body.acceleration) * body.mass;
   }
   return forces;
 }

@@ -35,7 +35,7 @@ void attach(GLuint program, GLenum stage, std::string_view defines, std::string_
   glDeleteShader(shader);  // lives on in the program
   GLint compiled = 0;
   glGetShaderiv(shader, GL_COMPILE_STATUS, &compiled);
-  if (compiled == GL_FALSE) throw Error("OpenGL rejects a shader: " + log_of(shader));
+  if (compiled == GL_FALSE) throw BackendUnavailable("OpenGL rejects a shader: " + log_of(shader));
 }
 
 }  // namespace
@@ -92,7 +92,7 @@ GlFramebuffer make_framebuffer(GLuint colour, GLuint depth) {
     glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, depth, 0);
   }
   if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
-    throw Error("OpenGL rejects a framebuffer of the viewer");
+    throw BackendUnavailable("OpenGL rejects a framebuffer of the viewer");
   }
   return framebuffer;
 }
@@ -108,7 +108,7 @@ GlProgram::GlProgram(std::string_view vertex, std::string_view fragment, std::st
   if (linked == GL_FALSE) {
     std::array<char, 2048> text{};
     glGetProgramInfoLog(program_.name(), static_cast<GLsizei>(text.size()), nullptr, text.data());
-    throw Error(std::string("OpenGL rejects a program: ") + text.data());
+    throw BackendUnavailable(std::string("OpenGL rejects a program: ") + text.data());
   }
   const GLuint block = glGetUniformBlockIndex(program_.name(), "Frame");
   if (block != GL_INVALID_INDEX) glUniformBlockBinding(program_.name(), block, 0);

@@ -50,14 +50,15 @@ GlVertexArray make_vertex_array();
 GlTexture make_texture(GLenum format, int width, int height);
 /// @param samples per pixel; 0 or 1 for a plain one
 GlRenderbuffer make_renderbuffer(GLenum format, int width, int height, int samples);
-/// Two textures as a target: `colour` may be 0. @throws Error if the driver rejects it.
+/// Two textures as a target: `colour` may be 0. @throws BackendUnavailable if the driver
+/// rejects it.
 GlFramebuffer make_framebuffer(GLuint colour, GLuint depth);
 
 /// A linked program. Sources are joined behind `#version 330 core` and the frame's declarations.
 class GlProgram {
  public:
   /// @param defines lines that come first, for example "#define SHADOW_PASS\n"
-  /// @throws Error with the driver's message if it does not compile or link.
+  /// @throws BackendUnavailable with the driver's message if it does not compile or link.
   GlProgram(std::string_view vertex, std::string_view fragment, std::string_view defines = "");
   void use() const { glUseProgram(program_.name()); }
   /// Where a uniform is, or -1, which OpenGL ignores. The name must end with a zero.

@@ -23,6 +23,8 @@ struct Image {
 
 /// Writes a PNG, all or nothing. @throws FileError
 void write_png(const Image& image, const std::string& path);
+/// Leaves nothing behind. @throws FileError as write_png(), before there is a picture
+void require_writable(const std::string& path);
 /// @throws FileError
 Image read_png(const std::string& path);
 

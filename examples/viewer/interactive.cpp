@@ -3,9 +3,12 @@
 
 #include <jfpx/error.hpp>
 
+#include "examples/viewer/widgets.hpp"
+
 #include <algorithm>
 #include <imgui.h>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 namespace jfpx::inline JFPX_ABI::view {
@@ -17,7 +20,7 @@ constexpr double kNoticeTime = 4;       // [s]
 void add_help(const KeyHelp& line) {
   for (const std::string_view text : {line.keys, line.what}) {
     ImGui::TableNextColumn();
-    ImGui::TextUnformatted(text.data(), text.data() + text.size());
+    widget::text(std::string(text));
   }
 }
 
@@ -33,6 +36,7 @@ App::App(const ViewOptions& options)
       recorder_(options.record),
       seen_{0, options.size.width, options.size.height, 1} {
   if (options.fullscreen) window_.set_fullscreen(true);
+  show_->paused = options.paused;
   meet_show();
 }
 
@@ -40,19 +44,30 @@ bool App::frame(double seconds) {
   read_events();
   controls_.move(&show_->camera, seconds, show_->body_size());
   const std::uint64_t before = show_->steps();
-  show_->advance(recorder_.on() ? kRecordedFrame : seconds);
+  const std::uint64_t last = options_.frames.value_or(std::numeric_limits<std::uint64_t>::max());
+  try {
+    show_->advance(recorder_.on() ? kRecordedFrame : seconds, last > before ? last - before : 0);
+  } catch (const FileError& error) {
+    fail_or_tell(error, false);
+  }
   if (show_->steps() > before) {
     timing_.add_step(show_->engine_ms(), show_->steps() - before);
   }
-  quit_ = quit_ || (options_.frames && show_->steps() >= *options_.frames);
+  quit_ = quit_ || (options_.frames && (show_->steps() >= last || show_->at_end()));
   if (quit_) wanted_picture_ = options_.screenshot;
   draw(seconds);
   return !quit_;
 }
 
+int App::finish() {
+  view::finish(*show_, timing_, options_, failure_);
+  return std::max(status_, show_->status());
+}
+
 void App::read_events() {
   SDL_Event event;
   while (SDL_PollEvent(&event) != 0) {
+    if (event.type == SDL_DROPFILE) open_file(event.drop.file);
     ui_.handle(event);
     controls_.handle(event, !ui_.wants_keyboard(), !ui_.wants_mouse());
   }
@@ -65,24 +80,58 @@ void App::read_events() {
   }
 }
 
-/// Tells the controls what the show that is new wants of them.
+/// Tells the controls what the show that is new wants of them, and records it if that was asked
+/// for.
 void App::meet_show() {
   controls_.set_demo_keys(show_->demo_keys());
   controls_.orbit = !show_->walks();
+  if (!options_.recording.empty()) show_->record_to(options_.recording);
 }
 
 /// What the panel asked for while it was drawn.
 void App::grant_wishes() {
   for (const Command command : std::exchange(show_->commands, {})) try_to_obey(command);
   if (!show_->next) return;
-  const ViewOptions next = *std::exchange(show_->next, std::nullopt);
   try {
-    show_ = make_show(next);
-    meet_show();
-    window_.set_title("jfpx-view: " + next.run.scene);
+    open(*std::exchange(show_->next, std::nullopt));
+  } catch (const Error& error) {
+    show_->message = error.what();
+  }
+}
+
+/// A scene or a recording that was dropped on the window; the path is SDL's to be freed.
+void App::open_file(char* path) {
+  const std::unique_ptr<char, void (*)(void*)> owner(path, SDL_free);
+  ViewOptions next = options_;
+  next.run = {};
+  next.run.scene = path;
+  next.input.clear();
+  next.eye = next.target = std::nullopt;
+  if (is_recording(path)) {
+    next.choice = {};
+    next.side_by_side = false;
+  }
+  try {
+    open(next);
   } catch (const Error& error) {
     tell(error.what());
   }
+}
+
+/// Shows something else, as what is shown is. @throws what loading and engines throw; nothing has
+/// changed then.
+void App::open(const ViewOptions& next) {
+  check(next);
+  std::unique_ptr<Show> fresh = make_show(next);
+  fresh->paused = show_->paused;
+  fresh->speed = show_->speed;
+  fresh->colouring = show_->colouring;
+  fresh->contacts = show_->contacts;
+  fresh->forces = show_->forces;
+  status_ = std::max(status_, show_->status());
+  show_ = std::move(fresh);
+  meet_show();
+  window_.set_title("jfpx-view: " + next.run.scene);
 }
 
 /// What can't be done now is told and changes nothing.
@@ -173,24 +222,32 @@ void App::save_recording() {
   tell("wrote " + name);
 }
 
-/// What the command line asked for must be written, or the program ends; a key's wish is told to
-/// have failed.
 void App::write_pictures(const Target& target) {
-  const bool by_key = wanted_picture_ != options_.screenshot;
+  const bool picture_by_key = wanted_picture_ != options_.screenshot;
   try {
     if (!wanted_picture_.empty()) save_picture(target);
   } catch (const FileError& error) {
-    if (!by_key) throw;
-    tell(error.what());
+    fail_or_tell(error, picture_by_key);
   }
   if (!recorder_.on()) return;
+  const bool film_by_key = recorder_.folder() != options_.record;
   try {
     recorder_.add(picture(target));
   } catch (const FileError& error) {
     recorder_ = Recorder("");
-    if (!options_.record.empty()) throw;
-    tell(error.what());
+    fail_or_tell(error, film_by_key);
   }
+}
+
+/// What the command line asked for must be written, or the program ends; a key's wish is told to
+/// have failed. Called while the error is handled.
+void App::fail_or_tell(const Error& error, bool by_key) {
+  if (by_key) {
+    tell(error.what());
+    return;
+  }
+  if (!failure_) failure_ = std::current_exception();
+  quit_ = true;
 }
 
 void App::save_picture(const Target& target) {
@@ -254,7 +311,9 @@ void App::show_help() {
   ImGui::Begin("Keys", &help_, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
   if (ImGui::BeginTable("keys", 2)) {
     for (const KeyHelp& line : show_->demo_help()) add_help(line);
-    for (const KeyHelp& line : key_help()) add_help(line);
+    for (const KeyHelp& line : key_help()) {
+      if (show_->has(line.of)) add_help(line);
+    }
     ImGui::EndTable();
   }
   ImGui::End();

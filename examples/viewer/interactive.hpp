@@ -1,12 +1,15 @@
 /// The program in a window: events, steps that are due, a picture, and so on until it is closed.
 #pragma once
 
+#include <jfpx/error.hpp>
+
 #include "examples/viewer/app.hpp"
 #include "examples/viewer/recorder.hpp"
 #include "examples/viewer/show.hpp"
 #include "examples/viewer/timing.hpp"
 #include "examples/viewer/ui.hpp"
 
+#include <exception>
 #include <memory>
 #include <string>
 
@@ -19,12 +22,13 @@ class App {
   explicit App(const ViewOptions& options);
 
   /// Obeys the events that have come, lets `seconds` pass, and draws.
-  /// @return false after the last picture
-  /// @throws FileError if a picture can't be written that the command line asked for;
-  ///   BackendUnavailable if OpenGL lost its context
+  /// @return false after the last picture, which is that before one can't be written that the
+  ///   command line asked for
+  /// @throws BackendUnavailable if OpenGL lost its context
   bool frame(double seconds);
-  /// What is written and printed at the end. @return the exit status
-  int finish() const { return view::finish(*show_, timing_, options_); }
+  /// What is completed and printed at the end. @return the exit status
+  /// @throws Error for the first thing that the command line asked for and can't be written
+  int finish();
 
   Show& show() { return *show_; }
   Window& window() { return window_; }
@@ -33,12 +37,15 @@ class App {
   void read_events();
   void meet_show();
   void grant_wishes();
+  void open(const ViewOptions& next);
+  void open_file(char* path);
   void try_to_obey(Command command);
   void obey(Command command);
   void toggle_recorder();
   void save_recording();
   void write_pictures(const Target& target);
   void save_picture(const Target& target);
+  void fail_or_tell(const Error& error, bool by_key);
   Image picture(const Target& target) const;
   void tell(const std::string& what);
   void draw(double seconds);
@@ -59,6 +66,8 @@ class App {
   std::string wanted_picture_;  ///< file for the next one
   std::string notice_;          ///< shown for a while
   double notice_left_ = 0;      ///< [s]
+  std::exception_ptr failure_;  ///< to write what the command line asked for
+  int status_ = 0;              ///< of the shows before
   bool quit_ = false, help_ = false, panel_ = true;
 };
 

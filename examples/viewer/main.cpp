@@ -1,5 +1,6 @@
 /// The program jfpx-view.
 #include <jfpx/error.hpp>
+#include <jfpx/recording.hpp>
 
 #include "examples/viewer/app.hpp"
 #include "src/tool/precision.hpp"
@@ -17,9 +18,10 @@ int run(int argc, char** argv) {
   CLI::App app("jfpx-view: see scenes run, on the native engine and on Bullet.", "jfpx-view");
   app.set_version_flag("--version", "jfpx-view " JFPX_VERSION);
   std::string precision = sizeof(Real) == 4 ? "float" : "double";
-  app.add_option("--precision", precision, "float or double")
-      ->check(CLI::IsMember({"float", "double"}))
-      ->capture_default_str();
+  const CLI::Option* asked =
+      app.add_option("--precision", precision, "float or double, or what a recording was made in")
+          ->check(CLI::IsMember({"float", "double"}))
+          ->capture_default_str();
   app.footer(
       "Examples:\n"
       "  jfpx-view pile --spheres 2000\n"
@@ -35,6 +37,9 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? tool::kSuccess : tool::kBadUsage;
+  }
+  if (asked->empty() && view::is_recording(options.run.scene)) {
+    tool::switch_precision(recording_precision(options.run.scene), argv);
   }
   view::check(options);
   return view::run_app(options);

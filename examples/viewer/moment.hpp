@@ -16,6 +16,8 @@ struct StageTimes {
 
 struct Moment {
   std::uint64_t step = 0;
+  double time = 0;                  ///< [s] since the run began
+  Real dt = 0;                      ///< [s], of the step that led here
   std::vector<BodyState> states;    ///< in the order of the scene's bodies
   std::vector<std::uint8_t> awake;  ///< likewise, 1 or 0
   std::vector<Contact> contacts;    ///< a and b are places in the scene

@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "examples/viewer/show.hpp"
 #include "src/tool/demo_names.hpp"
 
 #include <algorithm>
@@ -45,10 +46,38 @@ Vec3 parse_point(const std::string& option, const std::string& text) {
   return point;
 }
 
+void check_recording(const ViewOptions& options) {
+  const tool::RunOptions& run = options.run;
+  if (options.side_by_side) {
+    throw InvalidArgument("--side-by-side takes its steps anew; " + run.scene + " is a recording");
+  }
+  if (run.spheres || run.boxes || run.dt || run.seed != tool::RunOptions{}.seed || run.no_sleep) {
+    throw InvalidArgument(
+        run.scene +
+        " is a recording: --spheres, --boxes, --seed, --dt and --no-sleep can't change it");
+  }
+  if (options.choice != EngineChoice{}) {
+    throw InvalidArgument(run.scene +
+                          " is a recording: it begins on its own engine and backend, and the panel "
+                          "lets it go on with others");
+  }
+}
+
+void check_demo(const ViewOptions& options) {
+  const char* unused = options.run.no_sleep                           ? "--no-sleep"
+                       : options.colouring != ViewOptions{}.colouring ? "--colours"
+                                                                      : nullptr;
+  if (unused == nullptr) return;
+  throw InvalidArgument(std::string(unused) + " goes with a scene; " + options.run.scene +
+                        " is a demo");
+}
+
 }  // namespace
 
 void add_view_options(CLI::App& app, ViewOptions& options) {
-  tool::add_scene_options(app, options.run);
+  tool::add_scene_options(app, options.run,
+                          "Name of a scene or demo (see: jfpx scenes), a JSON file, or a recording "
+                          "(.rec)");
   app.add_flag("--side-by-side", options.side_by_side,
                "Native, stock Bullet and Bullet with jfpx, in step");
   app.add_option_function<std::string>(
@@ -79,13 +108,15 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
       ->check(tool::whole_number())
       ->capture_default_str();
   app.add_flag("--headless", options.headless, "No window, no display");
-  app.add_option("--frames", options.frames, "Steps to run [headless: 120; window: until closed]")
+  app.add_option("--frames", options.frames,
+                 "Steps to run, of a recording as many as it has [headless: 120; window: until "
+                 "closed]")
       ->check(tool::whole_number());
   app.add_option("--screenshot", options.screenshot, "Write the last frame to this PNG file");
   app.add_option("--record", options.record,
                  "Write every frame to this folder as frame-000001.png and so on");
   app.add_option("--recording", options.recording,
-                 "Write the states of all steps to this file at the end, for: jfpx replay");
+                 "Write the states of all steps to this file, for: jfpx replay");
   app.add_option_function<std::string>(
       "--size", [&options](const std::string& text) { options.size = parse_size(text); },
       "Size of the picture or window [1280x720]");
@@ -123,23 +154,30 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
       "--no-render", [&options] { options.render = false; },
       "Open no window and draw nothing: for timing the engine alone");
   app.add_flag("--fullscreen", options.fullscreen, "Start in full screen");
+  app.add_flag("--paused", options.paused, "Start paused");
 }
 
 void check(const ViewOptions& options) {
-  if (!options.input.empty() && (options.side_by_side || !tool::is_demo(options.run.scene))) {
-    throw InvalidArgument("--input goes with a demo; " + options.run.scene + " is a scene");
+  const std::string& scene = options.run.scene;
+  if (!options.input.empty() && (options.side_by_side || !tool::is_demo(scene))) {
+    throw InvalidArgument("--input goes with a demo; " + scene + " is a scene");
   }
-  const tool::RunOptions& run = options.run;
-  if (is_recording(run.scene) &&
-      (run.spheres || run.boxes || run.dt || run.seed != tool::RunOptions{}.seed)) {
-    throw InvalidArgument(run.scene +
-                          " is a recording: --spheres, --boxes, --seed and --dt can't change it");
+  if (is_recording(scene)) check_recording(options);
+  if (options.side_by_side && options.choice.engine != EngineKind::native) {
+    throw InvalidArgument("--side-by-side shows all engines: --engine can't choose one");
+  }
+  if (shows_demo(options)) check_demo(options);
+  if (!options.recording.empty() && (options.side_by_side || shows_demo(options))) {
+    throw InvalidArgument(options.recording + ": only a scene on one engine can be recorded");
   }
   if (options.eye.has_value() != options.target.has_value()) {
     throw InvalidArgument("--eye and --target go together");
   }
   if (options.eye && length(*options.target - *options.eye) <= kEpsilon) {
     throw InvalidArgument("--eye and --target are the same point");
+  }
+  if (options.paused && (options.headless || !options.render)) {
+    throw InvalidArgument("--paused goes with a window");
   }
   if (!options.render && (!options.screenshot.empty() || !options.record.empty())) {
     throw InvalidArgument("--no-render draws nothing that --screenshot or --record could write");

@@ -31,7 +31,8 @@ struct ViewOptions {
   bool panel = false;     ///< show it in headless pictures
   bool render = true;     ///< the thesis' switch "rendering on / off"
   bool fullscreen = false;
-  std::string input;  ///< file with an input script, for a demo
+  bool paused = false;  ///< at first
+  std::string input;    ///< file with an input script, for a demo
   std::optional<Vec3> eye, target;
 };
 

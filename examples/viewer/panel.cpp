@@ -19,13 +19,14 @@ constexpr float kWidth = 330;      // [units]
 constexpr float kItemWidth = 170;  // of a slider or a field, its label not counted
 constexpr float kTextWidth = 320;
 constexpr float kTableWidth = 300;
-constexpr float kMargin = 12;  // between a panel and the window's edge
+constexpr float kMargin = 12;        // between a panel and the window's edge
+constexpr double kUnnoticed = 0.95;  // share of the speed that was asked for
 constexpr std::uint64_t kMostSpheres = 2'000'000;
 
 /// A slider over a Real. @return whether the user has let go of a new value.
-bool slide(const char* label, Real* value, float low, float high, const char* format = "%.3f") {
+bool slide(const char* label, Real* value, float low, float high) {
   auto number = static_cast<float>(*value);
-  if (widget::slider(label, &number, low, high, format)) {
+  if (widget::slider(label, &number, low, high, "%.5f")) {  // to which it is rounded
     *value = static_cast<Real>(std::clamp(number, low, high));
   }
   return ImGui::IsItemDeactivatedAfterEdit();
@@ -44,10 +45,10 @@ void SceneShow::panel() {
       show_engine_choice();
       show_settings();
     } catch (const Error& error) {
-      message_ = error.what();  // what was asked for can't be had; the run goes on as before
+      message = error.what();  // what was asked for can't be had; the run goes on as before
       fill_fields();
     }
-    if (!message_.empty()) widget::warning(message_, kTextWidth);
+    if (!message.empty()) widget::warning(message, kTextWidth);
     show_counters();
     ImGui::PopItemWidth();
   }
@@ -65,13 +66,7 @@ void SceneShow::fill_fields() {
 }
 
 void SceneShow::show_controls() {
-  if (widget::button(paused ? "Run" : "Pause")) paused = !paused;
-  ImGui::SameLine();
-  if (widget::button("Back")) paused = true, step_back();
-  ImGui::SameLine();
-  if (widget::button("Step")) paused = true, step();
-  ImGui::SameLine();
-  if (widget::button("Restart")) restart();
+  show_run_buttons(true);
   for (const auto& [label, command] :
        {std::pair("Picture", Command::screenshot), std::pair("Film", Command::record),
         std::pair("Save steps", Command::save)}) {
@@ -82,8 +77,13 @@ void SceneShow::show_controls() {
   if (widget::slider("speed", &rate, 0.01f, 4, "%.2f x")) {
     speed = static_cast<double>(rate);
   }
-  widget::text(fmt::format("step {}, {:.2f} s{}", player_.shown().step, player_.time(),
-                           player_.in_the_past() ? "  (looking back)" : ""));
+  if (clock_.kept() < kUnnoticed) {
+    widget::text(fmt::format("too slow for that: {:.2f} x", speed * clock_.kept()));
+  }
+  widget::text(fmt::format("step {}, {:.2f} s{}", player_.shown().step, player_.shown().time,
+                           player_.in_the_past() ? "  (looking back)"
+                           : player_.at_end()    ? "  (end of recording)"
+                                                 : ""));
 }
 
 void SceneShow::show_scene_choice() {
@@ -106,14 +106,14 @@ void SceneShow::show_scene_choice() {
     changed = true;
   }
   if (!changed) return;
-  message_.clear();
-  if (is_playable(wish.run.scene)) {
+  message.clear();
+  if (is_playable(wish.run.scene)) {  // which takes less
     wish.choice.engine = EngineKind::native;
-    next = wish;
-    return;
+    wish.run.no_sleep = false;
+    wish.colouring = Colouring::bodies;
   }
-  load(wish);
-  home();
+  next = wish;
+  fill_fields();  // which stay if that can't be had
 }
 
 void SceneShow::show_engine_choice() {
@@ -138,15 +138,15 @@ void SceneShow::show_engine_choice() {
     widget::check("jfpx' world", &wish.jfpx_world);
   }
   if (wish == player_.choice()) return;
-  message_ = player_.switch_to(wish) ? "Switched: the bits stay the same."
-                                     : "Another engine goes on from the same state.";
+  message = player_.switch_to(wish) ? "Switched: the bits stay the same."
+                                    : "Another engine goes on from the same state.";
 }
 
 void SceneShow::show_settings() {
   if (!widget::heading("Settings", false)) return;
   // While a widget is held its value is the user's, and is taken over when he lets go.
   if (!ImGui::IsAnyItemActive()) wanted_settings_ = player_.settings();
-  bool changed = slide("dt [s]", &wanted_settings_.dt, 1e-4f, 0.05f, "%.4f");
+  bool changed = slide("dt [s]", &wanted_settings_.dt, 1e-4f, 0.05f);
   std::uint64_t iterations = wanted_settings_.resolver.max_iterations;
   changed |= widget::number("iterations, 0 = 8N", &iterations);
   constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
@@ -158,9 +158,13 @@ void SceneShow::show_settings() {
       slide("restitution from [m/s]", &wanted_settings_.resolver.restitution_velocity, 1e-3f, 5);
   changed |= slide("sleep eps [m2/s2]", &wanted_settings_.sleep.epsilon, 1e-4f, 5);
   changed |= widget::check("sleep", &wanted_settings_.sleep.enabled);
+  if (widget::button("The scene's own")) {
+    wanted_settings_ = own_settings_;
+    changed = true;
+  }
   if (!changed) return;
   player_.set_settings(wanted_settings_);
-  message_.clear();
+  message.clear();
 }
 
 void SceneShow::show_counters() {

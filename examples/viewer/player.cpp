@@ -2,9 +2,6 @@
 #include "examples/viewer/player.hpp"
 
 #include <jfpx/error.hpp>
-#include <jfpx/recording.hpp>
-
-#include <cmath>
 
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
@@ -14,16 +11,14 @@ std::size_t bytes_of(const Moment& moment) {
          moment.contacts.size() * sizeof(Contact);
 }
 
-}  // namespace
+constexpr const char* kNotOneRun =
+    "another engine or other settings went on with the run: no replay could";
 
-unsigned StepClock::advance(double seconds, double dt) {
-  if (seconds > 0 && std::isfinite(seconds)) rest_ += seconds;
-  const double due = std::floor(rest_ / dt);
-  const unsigned steps = due > kMostSteps ? kMostSteps : static_cast<unsigned>(due);
-  rest_ = due > kMostSteps ? 0 : rest_ - due * dt;
-  share_ = rest_ / dt;
-  return steps;
+[[noreturn]] void refuse_recording(const std::string& path, const char* why) {
+  throw InvalidArgument(path + ": " + why);
 }
+
+}  // namespace
 
 Player::Player(std::unique_ptr<Run> run, Scene scene)
     : scene_(std::move(scene)), run_(std::move(run)) {
@@ -40,23 +35,21 @@ void Player::keep(Moment moment) {
   shown_ = history_.size() - 1;
 }
 
-void Player::advance(double seconds) {
-  if (paused) return;
-  const unsigned steps = clock_.advance(seconds * speed, static_cast<double>(scene_.dt));
-  for (unsigned i = 0; i < steps; ++i) step();
-}
-
 void Player::step() {
+  if (at_end()) return;
   if (in_the_past()) {
     ++shown_;
     return;
   }
   run_->step();
-  keep(run_->moment());
+  Moment moment = run_->moment();
+  moment.dt = scene_.dt;
+  moment.time = history_.back().time + static_cast<double>(scene_.dt);
+  if (recording_) recording_->append(moment.states);
+  keep(std::move(moment));
 }
 
 bool Player::step_back() {
-  clock_.settle();
   if (shown_ == 0) return false;
   --shown_;
   return true;
@@ -68,13 +61,13 @@ void Player::restart() {
   bytes_ = 0;
   keep(run_->moment());
   changed_ = false;
-  clock_ = {};
+  if (!recording_path_.empty()) record_to(recording_path_);
 }
 
 bool Player::switch_to(const EngineChoice& choice) {
   if (choice == run_->choice()) return true;
   if (run_->switch_to(choice)) return true;
-  go_on_with(choice);
+  go_on_with(scene_, choice);
   return false;
 }
 
@@ -84,26 +77,41 @@ void Player::set_settings(const RunSettings& settings) {
   changed.resolver = settings.resolver;
   changed.sleep = settings.sleep;
   validate(changed);
-  scene_ = std::move(changed);
-  go_on_with(run_->choice());
+  go_on_with(std::move(changed), run_->choice());
 }
 
-void Player::go_on_with(const EngineChoice& choice) {
-  run_ = continue_run(scene_, history_.back(), choice);
+void Player::go_on_with(Scene scene, const EngineChoice& choice) {
+  run_ = continue_run(scene, history_.back(), choice);
+  scene_ = std::move(scene);
   shown_ = history_.size() - 1;
   changed_ = true;
+  recording_.reset();
+}
+
+RecordingHeader Player::header() const {
+  return {.engine = std::string(kEngineNames[static_cast<std::size_t>(run_->choice().engine)]),
+          .backend = std::string(to_string(run_->choice().backend)),
+          .scene = scene_};
 }
 
 void Player::save_recording(const std::string& path) const {
-  const auto refuse = [&](const char* why) { throw InvalidArgument(path + ": " + why); };
-  if (changed_) refuse("another engine or other settings went on with the run: no replay could");
-  if (history_.front().step != 0) refuse("the first steps are no longer kept");
-  RecordingWriter recording(
-      path, {.engine = std::string(kEngineNames[static_cast<std::size_t>(run_->choice().engine)]),
-             .backend = std::string(to_string(run_->choice().backend)),
-             .scene = scene_});
+  if (changed_) refuse_recording(path, kNotOneRun);
+  if (history_.front().step != 0) refuse_recording(path, "the first steps are no longer kept");
+  RecordingWriter recording(path, header());
   for (std::size_t i = 1; i < history_.size(); ++i) recording.append(history_[i].states);
   recording.finish();
+}
+
+void Player::record_to(const std::string& path) {
+  recording_path_ = path;
+  recording_.reset();  // removes its part, which lies where that of the next one will
+  recording_.emplace(path, header());
+}
+
+void Player::finish_recording() {
+  if (recording_path_.empty()) return;
+  if (!recording_) refuse_recording(recording_path_, kNotOneRun);
+  recording_->finish();
 }
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -1,29 +1,14 @@
-/// Plays a run: a fixed step behind a clock of any rate, pause, slow motion, and steps back.
+/// Plays a run: steps ahead, and back through what is kept.
 #pragma once
 
-#include <jfpx/scene.hpp>
+#include <jfpx/recording.hpp>
 
 #include "examples/viewer/run.hpp"
 
 #include <deque>
+#include <optional>
 
 namespace jfpx::inline JFPX_ABI::view {
-
-/// Turns wall time into whole steps and the share of the next one.
-class StepClock {
- public:
-  /// Most steps for one frame: a machine that is too slow shows slow motion instead of freezing.
-  static constexpr unsigned kMostSteps = 8;
-
-  /// @return how many steps of `dt` are due after `seconds` more. Bad times count as none.
-  unsigned advance(double seconds, double dt);
-  /// How far into the step that is shown: 0 to 1.
-  double share() const { return share_; }
-  void settle() { rest_ = 0, share_ = 1; }
-
- private:
-  double rest_ = 0, share_ = 1;
-};
 
 /// What can be changed while a scene runs.
 struct RunSettings {
@@ -40,10 +25,10 @@ class Player {
 
   Player(std::unique_ptr<Run> run, Scene scene);
 
-  /// Lets wall time pass.
-  void advance(double seconds);
-  /// One step: of what was kept, or a new one.
+  /// One step: of what was kept, or a new one; at the end none.
   void step();
+  /// No step is left: the run is a recording, which is over.
+  bool at_end() const { return !in_the_past() && run_->at_end(); }
   /// Shows the step before, as far as kept. What was computed stays: stepping ahead again shows the
   /// same bits. @return false at the oldest one
   bool step_back();
@@ -59,25 +44,28 @@ class Player {
   /// @throws InvalidArgument if they are not one run from the first step, or the first is no longer
   ///   kept; FileError
   void save_recording(const std::string& path) const;
+  /// Before the first step: from now on each step is written to a file, which beginning anew begins
+  /// anew. @throws FileError, and so do the steps
+  void record_to(const std::string& path);
+  /// Completes that file, if there is one; no step may follow.
+  /// @throws InvalidArgument if the steps are not those of one run; FileError
+  void finish_recording();
   RunSettings settings() const { return {scene_.dt, scene_.resolver, scene_.sleep}; }
-  /// Replaces them from the newest moment on. @throws InvalidScene; nothing has changed then.
+  /// Replaces them from the newest moment on. @throws InvalidScene, BackendUnavailable; nothing has
+  /// changed then.
   void set_settings(const RunSettings& settings);
 
   const Moment& shown() const { return history_[shown_]; }
   /// The moment before the one that is shown, or that one itself.
   const Moment& before() const { return history_[shown_ == 0 ? 0 : shown_ - 1]; }
-  Real share() const { return paused ? 1 : static_cast<Real>(clock_.share()); }
   bool in_the_past() const { return shown_ + 1 < history_.size(); }
   const std::deque<Moment>& history() const { return history_; }
   const Scene& scene() const { return scene_; }
-  double time() const { return static_cast<double>(shown().step) * static_cast<double>(scene_.dt); }
-
-  bool paused = false;
-  double speed = 1;
 
  private:
   void keep(Moment moment);
-  void go_on_with(const EngineChoice& choice);
+  RecordingHeader header() const;
+  void go_on_with(Scene scene, const EngineChoice& choice);
 
   Scene scene_;
   std::unique_ptr<Run> run_;
@@ -85,7 +73,8 @@ class Player {
   std::size_t shown_ = 0;
   std::size_t bytes_ = 0;
   bool changed_ = false;  ///< the run is no longer the one that began
-  StepClock clock_;
+  std::string recording_path_;
+  std::optional<RecordingWriter> recording_;
 };
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -1,4 +1,4 @@
-/// A recording as a run: its states one after another, then the last one for ever.
+/// A recording as a run: its states one after another.
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
@@ -15,10 +15,8 @@ class RecordedRun final : public Run {
     rewind();
   }
 
-  void step() override {
-    if (step_ == recording_.steps()) return;
-    states_ = recording_.states(++step_);
-  }
+  void step() override { states_ = recording_.states(++step_); }
+  bool at_end() const override { return step_ == recording_.steps(); }
 
   Moment moment() override {
     Moment moment;

@@ -10,6 +10,7 @@ class Recorder {
   /// Makes the folder; an empty name records nothing. @throws FileError
   explicit Recorder(std::string folder);
   bool on() const { return !folder_.empty(); }
+  const std::string& folder() const { return folder_; }
   /// Writes frame-000001.png and so on. @throws FileError
   void add(const Image& image);
 

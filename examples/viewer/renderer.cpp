@@ -9,6 +9,8 @@
 #include "examples/viewer/instances.hpp"
 #include "examples/viewer/shaders.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 
 namespace jfpx::inline JFPX_ABI::view {
@@ -48,8 +50,8 @@ struct Targets {
     glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
                               many_depths.name());
     if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
-      throw Error("OpenGL rejects a multisampled framebuffer of " + std::to_string(w) + " x " +
-                  std::to_string(h));
+      throw BackendUnavailable("OpenGL rejects a multisampled framebuffer of " + std::to_string(w) +
+                               " x " + std::to_string(h));
     }
   }
 };
@@ -76,6 +78,16 @@ void bind_texture(GLenum unit, const GlTexture& texture) {
 }
 
 void draw_screen() { glDrawArrays(GL_TRIANGLES, 0, 3); }
+
+/// The view with a near plane that cuts off nothing as far away as that, in the corners too.
+View clear_of(float nearest, View view, Real aspect) {
+  const Real tangent = std::tan(view.fov_y / 2);
+  const Real to_corner = std::sqrt(1 + tangent * tangent * (1 + aspect * aspect));
+  view.near_plane =
+      std::clamp(static_cast<Real>(nearest) / (to_corner * Real(1.05)), view.far_plane * kLeastNear,
+                 std::max(view.near_plane, view.far_plane * kLeastNear));
+  return view;
+}
 
 }  // namespace
 
@@ -125,12 +137,14 @@ struct Renderer::Impl {
     if (!shadow_map || shadow_map->size != size) shadow_map.emplace(size);
   }
 
-  void upload(const Drawing& drawing, const View& view, const FrameBlock& block) {
+  void upload(const Drawing& drawing, const View& view, const Viewport& viewport) {
+    const Real aspect = static_cast<Real>(viewport.width) / static_cast<Real>(viewport.height);
+    spheres.upload(order.sort(drawing.spheres(), view, aspect));
+    const View clear = clear_of(std::min(order.nearest(), drawing.nearest_box()), view, aspect);
+    const FrameBlock block = make_frame_block(drawing, clear, quality, viewport);
     glBindBuffer(GL_UNIFORM_BUFFER, frame.name());
     glBufferData(GL_UNIFORM_BUFFER, sizeof block, &block, GL_STREAM_DRAW);
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame.name());
-    const Real aspect = static_cast<Real>(targets->width) / static_cast<Real>(targets->height);
-    spheres.upload(order.sort(drawing.spheres(), view, aspect));
     boxes.upload(drawing.boxes());
     glass.upload(drawing.glass());
     lines.upload(drawing.lines());
@@ -263,7 +277,7 @@ void Renderer::draw(const Drawing& drawing, const View& view, const Viewport& vi
   if (viewport.width <= 0 || viewport.height <= 0) return;  // no room left
   Impl& r = *impl_;
   r.resize(viewport.width * r.quality.supersample, viewport.height * r.quality.supersample);
-  r.upload(drawing, view, make_frame_block(drawing, view, r.quality, viewport));
+  r.upload(drawing, view, viewport);
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);
   glDisable(GL_CULL_FACE);

@@ -30,6 +30,8 @@ class Run {
  public:
   virtual ~Run() = default;
   virtual void step() = 0;
+  /// No step is left: a recording is over.
+  virtual bool at_end() const { return false; }
   virtual Moment moment() = 0;
   /// Goes back to the first step. @return false if a run of the scene that is made anew does that.
   virtual bool rewind() { return false; }

@@ -29,27 +29,18 @@ SceneShow::SceneShow(const ViewOptions& options)
   home();
 }
 
-void SceneShow::load(const ViewOptions& options) {
-  Player fresh = make_player(options);  // may throw; the old one runs on then
-  fresh.paused = player_.paused;
-  fresh.speed = player_.speed;
-  player_ = std::move(fresh);
-  stage_ = Stage(player_.scene());
-  options_ = options;
-  picked_.reset();
-  fill_fields();
+void SceneShow::step() {
+  player_.step();
+  check(player_.shown().trouble.empty());
 }
-
-void SceneShow::advance(double seconds) {
-  player_.paused = paused;
-  player_.speed = speed;
-  player_.advance(seconds);
+void SceneShow::step_back() {
+  clock_.settle();
+  player_.step_back();
 }
-void SceneShow::step() { player_.step(); }
-void SceneShow::step_back() { player_.step_back(); }
 void SceneShow::restart() {
+  clock_.settle();
   player_.restart();
-  message_.clear();
+  message.clear();
 }
 void SceneShow::home() { camera = camera_for(options_, player_.scene(), player_.shown()); }
 
@@ -59,27 +50,24 @@ View SceneShow::view() const {
 }
 
 void SceneShow::draw(Renderer& renderer, const Target& target) {
+  options_.size = {target.width, target.height};  // what home() is to fill
   const View now = view();
   Drawing drawing(now.eye);
-  stage_.draw(player_.before(), player_.shown(), player_.share(), colouring, &drawing);
+  stage_.draw(player_.before(), player_.shown(), share(), colouring, &drawing);
   if (contacts) stage_.draw_contacts(player_.shown().contacts, false, &drawing);
   if (forces) stage_.draw_forces(player_.before(), player_.shown(), &drawing);
-  if (picked_) stage_.draw_mark(player_.shown(), *picked_, &drawing);
+  if (picked_) stage_.draw_mark(player_.before(), player_.shown(), share(), *picked_, &drawing);
   renderer.draw(drawing, now, {0, 0, target.width, target.height, target.unit}, target.framebuffer);
 }
 
 void SceneShow::pick(Real x, Real y, int width, int height) {
   const View now = view();
   const Vec3 direction = ray_through(now, x, y, width, height);
-  picked_ = stage_.pick(player_.shown(), now.eye, direction);
+  picked_ = stage_.pick(player_.before(), player_.shown(), share(), now.eye, direction);
 }
 
 // As in the thesis.
 bool SceneShow::walks() const { return tool::is_demo(options_.run.scene); }
-
-int SceneShow::status() const {
-  return player_.shown().trouble.empty() ? tool::kSuccess : tool::kCheckFailed;
-}
 
 std::string SceneShow::summary() const {
   const Moment& now = player_.shown();

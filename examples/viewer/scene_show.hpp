@@ -12,20 +12,23 @@ class SceneShow final : public Show {
  public:
   explicit SceneShow(const ViewOptions& options);
 
-  void advance(double seconds) override;
   void step() override;
+  bool at_end() const override { return player_.at_end(); }
   void step_back() override;
   void restart() override;
   void home() override;
   void draw(Renderer& renderer, const Target& target) override;
   void panel() override;
   void pick(Real x, Real y, int width, int height) override;
+  double dt() const override { return static_cast<double>(player_.scene().dt); }
   std::uint64_t steps() const override { return player_.shown().step; }
   double engine_ms() const override { return player_.shown().times.total; }
   Real body_size() const override { return stage_.body_size(); }
+  bool has(Feature) const override { return true; }
   bool walks() const override;
   void save_recording(const std::string& path) const override { player_.save_recording(path); }
-  int status() const override;
+  void record_to(const std::string& path) override { player_.record_to(path); }
+  void finish_recording() override { player_.finish_recording(); }
   std::string summary() const override;
 
   const Player& player() const { return player_; }
@@ -33,7 +36,6 @@ class SceneShow final : public Show {
   const std::optional<std::uint32_t>& picked() const { return picked_; }
 
  private:
-  void load(const ViewOptions& options);
   void fill_fields();
   void show_controls();
   void show_scene_choice();
@@ -47,10 +49,10 @@ class SceneShow final : public Show {
   Player player_;
   Stage stage_;
   std::optional<std::uint32_t> picked_;
-  std::string message_;  ///< why the last wish was not granted
   // What the panel's fields hold, which the user may be changing.
   std::uint64_t wanted_spheres_ = 0, wanted_seed_ = 0;
   RunSettings wanted_settings_;
+  const RunSettings own_settings_ = player_.settings();  ///< with which the scene came
 };
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -5,7 +5,6 @@
 #include "examples/viewer/bullet_moment.hpp"
 #include "examples/viewer/comparison.hpp"
 #include "examples/viewer/framing.hpp"
-#include "examples/viewer/player.hpp"
 #include "examples/viewer/show.hpp"
 #include "examples/viewer/timing.hpp"
 
@@ -23,7 +22,8 @@ namespace {
 enum Column : std::size_t { kNative, kStock, kJfpx, kColumns };
 constexpr std::array<const char*, kColumns> kTitles = {"native jfpx", "stock Bullet",
                                                        "Bullet with jfpx"};
-constexpr std::array<Paint, kColumns> kTrails = {{{255, 170, 40}, {90, 190, 255}, {90, 190, 255}}};
+/// Of native and of Bullet, which both of its columns share.
+constexpr std::array<Paint, 2> kTrails = {{{255, 170, 40}, {90, 190, 255}}};
 constexpr std::size_t kTraced = 6;     // bodies whose paths are drawn
 constexpr std::size_t kTrail = 240;    // steps of a path
 constexpr std::size_t kPlotted = 600;  // steps of a plot
@@ -89,6 +89,7 @@ struct Trio {
     now = {native->moment(), moment_of(stock, step), moment_of(jfpx, step)};
     const Scene& scene = stock.scene();
     for (std::size_t i = 0; i < kColumns; ++i) {
+      now[i].dt = scene.dt;
       energies[i].push_back(static_cast<float>(energy(scene, now[i].states)));
       times[i].push_back(now[i].times.total);
       if (times[i].size() > kTimed) times[i].pop_front();
@@ -110,17 +111,14 @@ class SideBySide final : public Show {
     home();
   }
 
-  void advance(double seconds) override {
-    if (paused) return;
-    const unsigned due = clock_.advance(seconds * speed, static_cast<double>(scene_.dt));
-    for (unsigned i = 0; i < due; ++i) step();
-  }
   void step() override {
     trio_->step();
+    check(same());
     trace();
   }
   void restart() override {
     trio_ = std::make_unique<Trio>(scene_, options_);
+    clock_.settle();
     for (auto& trail : trails_) trail.clear();
   }
   void home() override {
@@ -132,6 +130,10 @@ class SideBySide final : public Show {
   }
   void draw(Renderer& renderer, const Target& target) override;
 
+  bool has(Feature feature) const override {
+    return feature == Feature::none || feature == Feature::colouring;
+  }
+  double dt() const override { return static_cast<double>(scene_.dt); }
   std::uint64_t steps() const override { return trio_->now[kNative].step; }
   double engine_ms() const override {
     double sum = 0;
@@ -139,7 +141,6 @@ class SideBySide final : public Show {
     return sum;
   }
   Real body_size() const override { return stage_.body_size(); }
-  int status() const override { return same() ? tool::kSuccess : tool::kCheckFailed; }
   std::string summary() const override;
 
  private:
@@ -157,12 +158,11 @@ class SideBySide final : public Show {
   Scene scene_;
   Stage stage_;
   std::unique_ptr<Trio> trio_;
-  StepClock clock_;
-  std::array<std::deque<std::vector<Vec3>>, kColumns> trails_;
+  std::array<std::deque<std::vector<Vec3>>, kTrails.size()> trails_;
 };
 
 void SideBySide::trace() {
-  for (std::size_t column = 0; column < kColumns; ++column) {
+  for (const std::size_t column : {kNative, kStock}) {
     std::vector<Vec3> places;
     const std::size_t stride = std::max<std::size_t>(scene_.bodies.size() / kTraced, 1);
     for (std::size_t i = 0; i < scene_.bodies.size(); i += stride) {
@@ -186,23 +186,23 @@ void SideBySide::draw_trails(Drawing* drawing) const {
 }
 
 void SideBySide::draw(Renderer& renderer, const Target& target) {
+  options_.size = {target.width, target.height};  // what home() is to fill
   const int strip = static_cast<int>(static_cast<float>(target.height) * kStrip);
   const int top_height = target.height - strip;
   const Bounds bounds = stage_.bounds(trio_->now[kNative].states);
   const View view = camera.view(bounds.centre, bounds.radius);
-  const Real share = paused ? 1 : static_cast<Real>(clock_.share());
   for (std::size_t column = 0; column < kColumns; ++column) {
     Drawing drawing(view.eye);
     const Moment& now = trio_->now[column];
-    stage_.draw(trio_->before[column], now, share, colouring, &drawing);
+    stage_.draw(trio_->before[column], now, share(), colouring, &drawing);
     if (contacts) stage_.draw_contacts(now.contacts, false, &drawing);
     if (forces) stage_.draw_forces(trio_->before[column], now, &drawing);
     if (column != kNative) stage_.draw_contacts(trio_->different, true, &drawing);
     draw_trails(&drawing);
-    const int left = target.width * static_cast<int>(column) / 3;
-    const int right = target.width * (static_cast<int>(column) + 1) / 3;
-    renderer.draw(drawing, view, {left, strip, right - left, top_height, target.unit},
-                  target.framebuffer);
+    // All as wide: the renderer makes new buffers for each other size. They may overlap by a pixel.
+    const int width = (target.width + 2) / 3;
+    const int left = (target.width - width) * static_cast<int>(column) / 2;
+    renderer.draw(drawing, view, {left, strip, width, top_height, target.unit}, target.framebuffer);
   }
   draw_texts(target, top_height);
   draw_plots(target, top_height);

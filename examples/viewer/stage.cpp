@@ -15,7 +15,6 @@ namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
 constexpr Paint kConcrete{168, 168, 166, Pattern::wall};
-constexpr Paint kFloor{124, 130, 138};
 constexpr Paint kGlass{255, 255, 255, Pattern::glass};
 constexpr Real kPlate = Real(0.25);  // thickness of a room's floor, in bodies
 constexpr Real kEndless = kMaxReal / 4;
@@ -57,39 +56,59 @@ Stage::Stage(Scene scene) : scene_(std::move(scene)), survey_(scene_) {
     body_size_ = sizes[sizes.size() / 2];
     large_size_ = sizes[sizes.size() * 9 / 10];
   }
-  find_room();
   for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) looks_.push_back(look_of(i));
-  for (const std::uint32_t wall : walls_) looks_[wall].kind = Look::Kind::hidden;
+  find_room();
+}
+
+std::optional<Stage::Wall> Stage::wall_of(std::uint32_t body, const Bounds& bounds) const {
+  const BodyDef& def = scene_.bodies[body];
+  const Box* box = std::get_if<Box>(&def.shape);
+  if (box == nullptr || movable(def) || def.kinematic || def.orientation != Quat{}) return {};
+  // A wall of a cube is 0.8 times as long as what the cube holds.
+  if (!(length(box->half_extents) > Real(0.7) * bounds.radius)) return {};
+  const int axis = thin_axis(box->half_extents);
+  const Vec3 away = bounds.centre - def.position;
+  for (int k = 0; k < 3; ++k) {
+    const bool beside = std::fabs(away[k]) >= box->half_extents[k];
+    if (beside != (k == axis)) return {};
+  }
+  const bool low = away[axis] > 0;
+  const Real half = box->half_extents[axis];
+  const bool floor = axis == 1 && low;
+  return Wall{body, axis, low, def.position[axis] + (low ? half : -half),
+              floor ? std::min(body_size_ * kPlate, 2 * half) : 0};
 }
 
 // Large upright boxes around what moves are the walls of a room. They are drawn as glass, cut to
-// the inside, so that one can look in.
+// the inside, so that one can look in. Of several on one side the largest is the wall.
 void Stage::find_room() {
   std::vector<BodyState> states;
   for (const BodyDef& body : scene_.bodies) states.push_back({body.position, {}, {}, {}});
   const Bounds bounds = survey_.bounds(states);
+  const auto size = [this](const Wall& wall) { return size_of(scene_.bodies[wall.body].shape); };
+  for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
+    const std::optional<Wall> wall = wall_of(i, bounds);
+    if (!wall) continue;
+    const auto rival = std::find_if(walls_.begin(), walls_.end(), [&](const Wall& other) {
+      return other.axis == wall->axis && other.low == wall->low;
+    });
+    if (rival == walls_.end()) {
+      walls_.push_back(*wall);
+    } else if (size(*wall) > size(*rival)) {
+      *rival = *wall;
+    }
+  }
   room_ = {{-kEndless, -kEndless, -kEndless}, {kEndless, kEndless, kEndless}};
+  for (const Wall& wall : walls_) {
+    (wall.low ? room_.lower : room_.upper)[wall.axis] = wall.face;
+    looks_[wall.body].kind = Look::Kind::hidden;
+  }
+  lowest_ = room_.lower.y - body_size_ * kPlate;
   for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
     const BodyDef& body = scene_.bodies[i];
-    if (movable(body)) continue;
-    const Box* box = std::get_if<Box>(&body.shape);
-    const bool level = body.orientation == Quat{};
-    // A wall of a cube is 0.8 times as long as what the cube holds.
-    const bool large = box != nullptr && length(box->half_extents) > Real(0.7) * bounds.radius;
-    if (!large || !level || body.kinematic) {
-      obstacles_.push_back(i);
-      continue;
-    }
-    const int axis = thin_axis(box->half_extents);
-    const Real away = bounds.centre[axis] - body.position[axis];
-    if (std::fabs(away) < box->half_extents[axis]) {
-      obstacles_.push_back(i);
-      continue;
-    }
-    walls_.push_back(i);
-    const Real half = box->half_extents[axis];
-    if (away > 0) room_.lower[axis] = std::max(room_.lower[axis], body.position[axis] + half);
-    if (away < 0) room_.upper[axis] = std::min(room_.upper[axis], body.position[axis] - half);
+    if (movable(body) || looks_[i].kind == Look::Kind::hidden) continue;
+    obstacles_.push_back(i);
+    if (!is_endless(body.shape)) lowest_ = std::min(lowest_, body.position.y - size_of(body.shape));
   }
 }
 
@@ -120,38 +139,35 @@ void Stage::draw_still(const Bounds& bounds, Drawing* drawing) const {
   for (const std::uint32_t i : obstacles_) {
     const BodyDef& body = scene_.bodies[i];
     if (const HalfSpace* plane = std::get_if<HalfSpace>(&body.shape)) {
-      drawing->add_ground(plane->normal, plane->offset, cell, kFloor);
+      drawing->add_ground(plane->normal, plane->offset, cell, kGroundPaint);
     }
     if (const Plane* plane = std::get_if<Plane>(&body.shape)) {
       // Seen from the side where the bodies are, so that it does not hide them.
       const bool front = dot(plane->normal, bounds.centre) >= plane->offset;
       const Vec3 normal = front ? plane->normal : -plane->normal;
-      drawing->add_ground(normal, front ? plane->offset : -plane->offset, cell, kFloor);
+      drawing->add_ground(normal, front ? plane->offset : -plane->offset, cell, kGroundPaint);
     }
   }
-  for (const std::uint32_t i : walls_) {
-    const BodyDef& body = scene_.bodies[i];
-    const Vec3 h = std::get<Box>(body.shape).half_extents;
-    const int axis = thin_axis(h);
-    Vec3 low, high;
-    for (int k = 0; k < 3; ++k) {
-      low[k] = std::max(body.position[k] - h[k], room_.lower[k]);
-      high[k] = std::min(body.position[k] + h[k], room_.upper[k]);
-    }
-    const bool floor = axis == 1 && bounds.centre.y > body.position.y;
-    const Real thickness = floor ? body_size_ * kPlate : 0;
-    const bool lower_side = bounds.centre[axis] > body.position[axis];
-    high[axis] = lower_side ? room_.lower[axis] : room_.upper[axis] + thickness;
-    low[axis] = lower_side ? room_.lower[axis] - thickness : room_.upper[axis];
-    drawing->add_box((low + high) * Real(0.5), (high - low) * Real(0.5), {},
-                     floor ? kConcrete : kGlass);
-  }
+  for (const Wall& wall : walls_) draw_wall(wall, drawing);
   // A floor to stand on, where nothing can fall through it.
   const bool has_floor = room_.lower.y > -kEndless;
   if (!drawing->grounds().empty() || (falls_ && !has_floor)) return;
-  const Real level = has_floor ? room_.lower.y - body_size_ * kPlate
-                               : bounds.centre.y - bounds.radius - body_size_;
-  drawing->add_ground({0, 1, 0}, level, cell, kFloor);
+  const Real level = has_floor ? lowest_ : bounds.centre.y - bounds.radius - body_size_;
+  drawing->add_ground({0, 1, 0}, level, cell, kGroundPaint);
+}
+
+void Stage::draw_wall(const Wall& wall, Drawing* drawing) const {
+  const BodyDef& body = scene_.bodies[wall.body];
+  const Vec3 h = std::get<Box>(body.shape).half_extents;
+  Vec3 low, high;
+  for (int k = 0; k < 3; ++k) {
+    low[k] = std::max(body.position[k] - h[k], room_.lower[k]);
+    high[k] = std::min(body.position[k] + h[k], room_.upper[k]);
+  }
+  low[wall.axis] = wall.face - wall.thickness;
+  high[wall.axis] = wall.face;
+  drawing->add_box((low + high) * Real(0.5), (high - low) * Real(0.5), {},
+                   wall.thickness > 0 ? kConcrete : kGlass);
 }
 
 void Stage::draw(const Moment& from, const Moment& to, Real share, Colouring colouring,
@@ -165,17 +181,16 @@ void Stage::draw(const Moment& from, const Moment& to, Real share, Colouring col
   for (std::uint32_t i = 0; i < looks_.size(); ++i) {
     const Look& look = looks_[i];
     if (look.kind == Look::Kind::hidden) continue;
-    const Vec3 position = between(from.states[i].position, to.states[i].position, share);
-    const Quat turn = between(from.states[i].orientation, to.states[i].orientation, share);
+    const BodyState shown = between(from.states[i], to.states[i], share);
     Paint paint = look.paint;
     if (look.kind != Look::Kind::still) {
       if (!told.empty()) paint = told[i];
       if (to.awake[i] == 0) paint = dimmed(paint);
     }
     if (look.kind == Look::Kind::moving_ball) {
-      drawing->add_sphere(position, look.radius, turn, paint);
+      drawing->add_sphere(shown.position, look.radius, shown.orientation, paint);
     } else {
-      draw_shape(scene_.bodies[i].shape, {position, turn, {}, {}}, paint, drawing);
+      draw_shape(scene_.bodies[i].shape, shown, paint, drawing);
     }
   }
 }
@@ -208,33 +223,34 @@ void Stage::draw_forces(const Moment& before, const Moment& now, Drawing* drawin
   view::draw_forces(scene_, before, now, body_size_ * Real(2.2), drawing);
 }
 
-void Stage::draw_mark(const Moment& moment, std::uint32_t body, Drawing* drawing) const {
+void Stage::draw_mark(const Moment& from, const Moment& to, Real share, std::uint32_t body,
+                      Drawing* drawing) const {
   const Shape& shape = scene_.bodies[body].shape;
   const Box* box = std::get_if<Box>(&shape);
   const Real size = size_of(shape);
   const Vec3 half = (box != nullptr ? box->half_extents : Vec3{size, size, size}) * Real(1.06);
-  const Transform pose =
-      make_transform(moment.states[body].orientation, moment.states[body].position);
+  const BodyState shown = between(from.states[body], to.states[body], share);
+  const Transform pose = make_transform(shown.orientation, shown.position);
   const auto corner = [&](int bits) {
     const auto side = [bits](int axis) { return (bits >> axis & 1) != 0 ? Real(1) : Real(-1); };
     return transform_point(pose, component_product(half, {side(0), side(1), side(2)}));
   };
-  for (int from = 0; from < 8; ++from) {
+  for (int start = 0; start < 8; ++start) {
     for (int axis = 0; axis < 3; ++axis) {
-      const int to = from | 1 << axis;
-      if (to != from) drawing->add_line(corner(from), corner(to), {255, 240, 120}, 2.0f);
+      const int end = start | 1 << axis;
+      if (end != start) drawing->add_line(corner(start), corner(end), {255, 240, 120}, 2.0f);
     }
   }
 }
 
-std::optional<std::uint32_t> Stage::pick(const Moment& moment, const Vec3& eye,
-                                         const Vec3& direction) const {
+std::optional<std::uint32_t> Stage::pick(const Moment& from, const Moment& to, Real share,
+                                         const Vec3& eye, const Vec3& direction) const {
   std::optional<std::uint32_t> found;
   Real nearest = kMaxReal;
   for (std::uint32_t i = 0; i < scene_.bodies.size(); ++i) {
     const BodyDef& def = scene_.bodies[i];
     if (!movable(def)) continue;
-    const BodyState& state = moment.states[i];
+    const BodyState state = between(from.states[i], to.states[i], share);
     const Real distance = std::visit(
         [&](const auto& shape) { return ray_distance(shape, state, eye, direction); }, def.shape);
     if (distance < nearest) {

@@ -31,12 +31,13 @@ class Stage {
   /// Adds arrows for what pushed the bodies in the step between two moments.
   void draw_forces(const Moment& before, const Moment& now, Drawing* drawing) const;
 
-  /// Adds a frame around one body.
-  void draw_mark(const Moment& moment, std::uint32_t body, Drawing* drawing) const;
+  /// Adds a frame around one body where draw() shows it.
+  void draw_mark(const Moment& from, const Moment& to, Real share, std::uint32_t body,
+                 Drawing* drawing) const;
 
-  /// The movable body that a ray meets first; the direction is unit.
-  std::optional<std::uint32_t> pick(const Moment& moment, const Vec3& eye,
-                                    const Vec3& direction) const;
+  /// The movable body that a ray meets first where draw() shows them; the direction is unit.
+  std::optional<std::uint32_t> pick(const Moment& from, const Moment& to, Real share,
+                                    const Vec3& eye, const Vec3& direction) const;
   /// The colour of a body where bodies are told apart.
   Paint paint(std::uint32_t body) const;
   /// Radius of a typical movable body [m].
@@ -56,7 +57,18 @@ class Stage {
     Real radius = 0;  ///< of a moving ball
   };
 
+  /// A large upright box that the crowd is before: the side of a room.
+  struct Wall {
+    std::uint32_t body;
+    int axis;        ///< across it
+    bool low;        ///< the room lies above it on the axis
+    Real face;       ///< where the room ends
+    Real thickness;  ///< that is drawn; of a pane 0
+  };
+
   void find_room();
+  std::optional<Wall> wall_of(std::uint32_t body, const Bounds& bounds) const;
+  void draw_wall(const Wall& wall, Drawing* drawing) const;
   Look look_of(std::uint32_t body) const;
   void draw_shape(const Shape& shape, const BodyState& at, Paint paint, Drawing* drawing) const;
   void draw_still(const Bounds& bounds, Drawing* drawing) const;
@@ -67,8 +79,9 @@ class Stage {
   Real body_size_ = Real(0.5);
   Real large_size_ = Real(0.5);
   std::vector<std::uint32_t> obstacles_;  ///< immovable bodies that are drawn as they are
-  std::vector<std::uint32_t> walls_;      ///< immovable boxes around the room
+  std::vector<Wall> walls_;               ///< at most one on each side of the room
   Aabb room_;                             ///< inside of the walls; endless where there is none
+  Real lowest_ = 0;                       ///< of what stands still: the ground lies below it
   bool falls_ = false;                    ///< something has a weight
 };
 

@@ -14,6 +14,8 @@
 namespace jfpx::inline JFPX_ABI::view {
 namespace {
 
+constexpr Uint32 kPause = 8;  // [ms] between pictures that do not wait for the screen
+
 [[noreturn]] void refuse(const char* what) {
   throw BackendUnavailable(std::string(what) + ": " + SDL_GetError());
 }
@@ -76,7 +78,7 @@ Window::Window(const std::string& title, int width, int height, bool visible) {
                              std::to_string(epoxy_gl_version() / 10) + "." +
                              std::to_string(epoxy_gl_version() % 10));
   }
-  SDL_GL_SetSwapInterval(1);
+  synchronised_ = SDL_GL_SetSwapInterval(1) == 0;
 }
 
 Window Window::open(const std::string& title, int width, int height) {
@@ -101,6 +103,7 @@ void Window::check_context() const {
 void Window::swap() {  // NOLINT(bugprone-exception-escape): buffers, not windows
   check_context();
   SDL_GL_SwapWindow(window_.get());
+  if (!synchronised_) SDL_Delay(kPause);
 }
 void Window::set_title(const std::string& title) {
   SDL_SetWindowTitle(window_.get(), title.c_str());

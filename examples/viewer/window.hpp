@@ -60,6 +60,7 @@ class Window {
   std::unique_ptr<SDL_Window, CloseWindow> window_;
   std::unique_ptr<void, CloseContext> context_;
   bool fullscreen_ = false;
+  bool synchronised_ = false;  ///< pictures wait for the screen
 };
 
 }  // namespace jfpx::inline JFPX_ABI::view

@@ -38,9 +38,8 @@ CLI::Validator whole_number() {
           ""};
 }
 
-void add_scene_options(CLI::App& app, RunOptions& options) {
-  app.add_option("SCENE", options.scene, "Name of a scene (see: jfpx scenes) or a JSON file")
-      ->required();
+void add_scene_options(CLI::App& app, RunOptions& options, const std::string& scene) {
+  app.add_option("SCENE", options.scene, scene)->required();
   app.add_option("--spheres", options.spheres, "Number of spheres of a named scene")
       ->check(whole_number());
   app.add_option("--boxes", options.boxes,

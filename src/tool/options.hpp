@@ -36,8 +36,10 @@ struct RunOptions {
 /// Accepts whole numbers of 64 bits. CLI11 by itself reads -1, and what is too large, as the
 /// largest one.
 CLI::Validator whole_number();
-/// Adds SCENE and the options that choose and change a scene.
-void add_scene_options(CLI::App& app, RunOptions& options);
+/// Adds SCENE, with that as its help, and the options that choose and change a scene.
+void add_scene_options(
+    CLI::App& app, RunOptions& options,
+    const std::string& scene = "Name of a scene (see: jfpx scenes) or a JSON file");
 /// Adds --steps, --backend, --threads, --minimum-batch, --solver, --world, --json, --hash, --quiet.
 void add_run_options(CLI::App& app, RunOptions& options);
 

@@ -42,15 +42,18 @@ std::string asked_precision(int argc, char** argv) {
 
 }  // namespace
 
-void switch_precision_if_asked(int argc, char** argv) {
-  const std::string asked = asked_precision(argc, argv);
-  if (asked == kPrecision || (asked != "float" && asked != "double")) return;
+void switch_precision(const std::string& precision, char** argv) {
+  if (precision == kPrecision || (precision != "float" && precision != "double")) return;
   const std::filesystem::path own = std::filesystem::read_symlink("/proc/self/exe");
   const std::string sibling =
       std::filesystem::path(own).replace_filename(sibling_of(own.filename())).string();
   execv(sibling.c_str(), argv);
-  throw Error(sibling + ", which computes in " + asked +
+  throw Error(sibling + ", which computes in " + precision +
               " precision, can't be started: " + std::strerror(errno));
+}
+
+void switch_precision_if_asked(int argc, char** argv) {
+  switch_precision(asked_precision(argc, argv), argv);
 }
 
 }  // namespace jfpx::inline JFPX_ABI::tool

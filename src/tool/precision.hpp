@@ -3,6 +3,7 @@
 
 #include <jfpx/config.hpp>
 
+#include <string>
 #include <string_view>
 
 namespace jfpx::inline JFPX_ABI::tool {
@@ -10,10 +11,13 @@ namespace jfpx::inline JFPX_ABI::tool {
 /// What this build computes in, as --precision calls it.
 inline constexpr std::string_view kPrecision = sizeof(Real) == 4 ? "float" : "double";
 
-/// Runs the other build in this process' place when the arguments ask for the other precision:
-/// by --precision, or by naming a recording of it. Returns if this build is the right one.
+/// Runs the build of that precision, "float" or "double", with the same arguments in this process'
+/// place. Returns if that is this one, or there is no such precision.
 /// Bullet's float and double libraries export the same symbols, so one process can't hold both.
-/// @throws Error if the other build is not beside this one; FileError for a broken recording.
+/// @throws Error if the other build is not beside this one.
+void switch_precision(const std::string& precision, char** argv);
+/// The same, when the arguments ask for the other precision: by --precision, or by `replay` of a
+/// recording of it. @throws FileError for a broken recording, too.
 void switch_precision_if_asked(int argc, char** argv);
 
 }  // namespace jfpx::inline JFPX_ABI::tool

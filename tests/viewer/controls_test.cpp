@@ -2,6 +2,7 @@
 #include "examples/viewer/controls.hpp"
 
 #include <jfpx/error.hpp>
+#include <jfpx/recording.hpp>
 
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/comparison.hpp"
@@ -11,10 +12,12 @@
 #include "examples/viewer/image.hpp"
 #include "examples/viewer/islands.hpp"
 #include "examples/viewer/player.hpp"
+#include "examples/viewer/step_clock.hpp"
 #include "examples/viewer/timing.hpp"
 #include "examples/viewer/values.hpp"
 #include "tests/support/seed.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/viewer/us_keyboard.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,10 +25,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fcntl.h>
 #include <filesystem>
 #include <limits>
 #include <random>
+#include <sys/stat.h>
 #include <tuple>
+#include <unistd.h>
 
 namespace jfpx {
 namespace {
@@ -34,10 +40,12 @@ using namespace view;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
+/// Of a US keyboard.
 SDL_Event key(SDL_Keycode code, bool down = true) {
   SDL_Event event{};
   event.type = down ? SDL_KEYDOWN : SDL_KEYUP;
   event.key.keysym.sym = code;
+  event.key.keysym.scancode = test::us_scancode(code);
   return event;
 }
 SDL_Event mouse_button(Uint32 type, Uint8 button = SDL_BUTTON_LEFT) {
@@ -145,6 +153,33 @@ TEST(Controls, TheMouseTurnsBothAnglesAndAClickWithoutADragPicks) {  // erratum 
   EXPECT_EQ(camera.yaw(), yaw);
 }
 
+TEST(Controls, ADragIsNoClickHoweverSlowItIs) {
+  for (const int units : {1, 10}) {
+    Controls controls;
+    Camera camera;
+    controls.handle(mouse_button(SDL_MOUSEBUTTONDOWN));
+    for (int i = 0; i < units; ++i) {
+      controls.handle(mouse_move(1, 0));
+      controls.move(&camera, 0.1, 1);
+    }
+    controls.handle(mouse_button(SDL_MOUSEBUTTONUP));
+    EXPECT_EQ(controls.take_clicks().size(), units == 1 ? 1u : 0u);
+  }
+}
+
+TEST(Controls, AKeyThatBecomesADemosDoesNotWalkOn) {
+  Controls controls;
+  controls.orbit = false;
+  Camera camera;
+  controls.handle(key(SDLK_w));
+  controls.move(&camera, 0.1, 1);
+  const Vec3 there = camera.eye();
+  controls.set_demo_keys({"w"});
+  controls.handle(key(SDLK_w, false));
+  controls.move(&camera, 0.1, 1);
+  EXPECT_EQ(camera.eye(), there);
+}
+
 TEST(Controls, WheelAndShiftChangeTheWalkingSpeed) {
   const auto walked = [](int wheel, bool shift) {
     Controls controls;
@@ -184,6 +219,22 @@ TEST(Controls, DragAndWheelCircleTheFocusUnlessOneWalks) {
   EXPECT_NEAR(length(camera.focus()), 0, 1e-4);
 }
 
+TEST(Controls, KeysToWalkAndOfDemosCountByTheirPlace) {
+  SDL_Event event = key(SDLK_z);  // on a French keyboard, where a US one has W
+  event.key.keysym.scancode = SDL_SCANCODE_W;
+  Controls walking, flying;
+  walking.orbit = false;
+  Camera camera;
+  walking.handle(event);
+  walking.move(&camera, 0.1, 1);
+  EXPECT_LT(camera.eye().z, Camera().eye().z);
+  flying.set_demo_keys({"w"});
+  flying.handle(event);
+  const auto keys = flying.take_demo_keys();
+  ASSERT_EQ(keys.size(), 1u);
+  EXPECT_EQ(keys[0].name, "w");
+}
+
 TEST(Controls, TheHelpNamesEveryKeyThatDoesSomething) {
   std::string help = " ";
   for (const KeyHelp& line : key_help()) {
@@ -208,9 +259,10 @@ TEST(Controls, TheHelpNamesEveryKeyThatDoesSomething) {
     ++meanings;
     std::string name = SDL_GetKeyName(code);
     if (name == "Escape") name = "Esc";
+    if (name.starts_with("Keypad ")) name = name.back();
     EXPECT_NE(help.find(" " + name + " "), std::string::npos) << name;
   }
-  EXPECT_GE(meanings, 27);
+  EXPECT_GE(meanings, 29);
 }
 
 TEST(Camera, PitchStopsBeforeTheZenith) {
@@ -251,6 +303,24 @@ TEST(Camera, OrbitKeepsTheFocusAndZoomTheDirection) {
   EXPECT_GT(camera.distance(), 0);
 }
 
+TEST(Camera, StaysBitForBitWhereNobodyMovesIt) {
+  const test::Seed seed;
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> anywhere(-50, 50);
+  const auto point = [&] { return Vec3{anywhere(random), anywhere(random), anywhere(random)}; };
+  for (const bool orbit : {true, false}) {
+    for (int i = 0; i < 200; ++i) {
+      Controls controls;
+      controls.orbit = orbit;
+      Camera camera;
+      camera.look_at(point(), point());
+      const Camera before = camera;
+      controls.move(&camera, 0.01, 1);
+      ASSERT_EQ(camera, before) << i;
+    }
+  }
+}
+
 TEST(Camera, ProjectionAndRayAreInverses) {
   Camera camera;
   camera.look_at({3, 4, 12}, {0, 1, 0});
@@ -264,20 +334,52 @@ TEST(Camera, ProjectionAndRayAreInverses) {
   EXPECT_FALSE(project(view, {6, 8, 24}, 640, 480));  // behind
 }
 
+constexpr std::uint64_t kAnyNumber = std::numeric_limits<std::uint64_t>::max();
+
+std::uint64_t steps_after(StepClock* clock, double seconds, double dt,
+                          std::uint64_t most = kAnyNumber) {
+  std::uint64_t steps = 0;
+  clock->advance(seconds, dt, most, [&steps] { ++steps; });
+  return steps;
+}
+
 TEST(StepClock, StepsAreFixedWhateverTheFrameRate) {
   for (const int frames : {10, 60, 144, 1000}) {
     StepClock clock;
-    unsigned steps = 0;
-    for (int i = 0; i < frames; ++i) steps += clock.advance(0.5 / frames, 1.0 / 64);
-    EXPECT_NEAR(steps, 32, 1) << frames;
+    std::uint64_t steps = 0;
+    for (int i = 0; i < frames; ++i) steps += steps_after(&clock, 0.5 / frames, 1.0 / 64);
+    EXPECT_NEAR(static_cast<double>(steps), 32, 1) << frames;
     EXPECT_GE(clock.share(), 0);
     EXPECT_LT(clock.share(), 1.0001);
   }
   StepClock clock;
-  EXPECT_EQ(clock.advance(1e9, 0.01), StepClock::kMostSteps);  // no endless catching up
   for (const double bad : {-1.0, 0.0, std::nan(""), HUGE_VAL}) {
-    EXPECT_EQ(clock.advance(bad, 0.01), 0u);
+    EXPECT_EQ(steps_after(&clock, bad, 0.01), 0u);
   }
+}
+
+TEST(StepClock, AMachineThatIsFastEnoughMakesAllSteps) {
+  StepClock clock;
+  clock.patience = HUGE_VAL;
+  EXPECT_EQ(steps_after(&clock, 0.25, 1.0 / 4096), 1024u);  // far more than are sure
+  EXPECT_EQ(clock.kept(), 1);
+}
+
+TEST(StepClock, WhatPatienceDoesNotSufficeForIsGivenUpAndTold) {
+  StepClock clock;
+  clock.patience = -1;
+  EXPECT_EQ(steps_after(&clock, 1, 1.0 / 64), StepClock::kSureSteps);
+  EXPECT_EQ(clock.kept(), 1.0 / 8);
+  EXPECT_EQ(steps_after(&clock, 1.0 / 64, 1.0 / 64), 1u);  // no endless catching up
+  for (int i = 0; i < 1000; ++i) steps_after(&clock, 1.0 / 64, 1.0 / 64);
+  EXPECT_GT(clock.kept(), 0.999);
+}
+
+TEST(StepClock, MakesNoMoreStepsThanAreWanted) {
+  StepClock clock;
+  EXPECT_EQ(steps_after(&clock, 0.1, 1.0 / 64, 3), 3u);
+  EXPECT_EQ(steps_after(&clock, 0.1, 1.0 / 64, 0), 0u);
+  EXPECT_EQ(clock.share(), 1);
 }
 
 Player player_of(const Scene& scene, const EngineChoice& choice = {}) {
@@ -348,6 +450,25 @@ TEST(Player, ABackendThatCannotBeHadLeavesTheRunAsItWas) {
       player.step();
       EXPECT_EQ(player.shown().step, 2u);
     }
+  }
+}
+
+TEST(Player, SettingsThatCannotBeTakenOverLeaveAllAsItWas) {
+  for (const BackendStatus& row : available_backends()) {
+    if (row.usable) continue;
+    const test::TemporaryFolder folder;  // of a recording that another machine made
+    const Scene scene = scenes::make("gas", {.spheres = 2});
+    RecordingWriter(
+        folder.file("a.rec"),
+        {.engine = "native", .backend = std::string(to_string(row.backend)), .scene = scene})
+        .finish();
+    Recorded recorded = open_recording(folder.file("a.rec"));
+    Player player(std::move(recorded.run), recorded.scene);
+    RunSettings settings = player.settings();
+    settings.dt *= 2;
+    EXPECT_THROW(player.set_settings(settings), BackendUnavailable);
+    EXPECT_EQ(player.scene(), scene);
+    player.save_recording(folder.file("b.rec"));
   }
 }
 
@@ -431,7 +552,11 @@ TEST(Player, ARecordingIsPlayedAndGoesOnLiveAndReplays) {
     played.step();
   }
   EXPECT_EQ(played.shown().step, 15u);  // the end stays
+  EXPECT_TRUE(played.at_end());
+  EXPECT_EQ(played.history().size(), 16u);
   EXPECT_TRUE(played.step_back());
+  EXPECT_EQ(played.shown().step, 14u);
+  EXPECT_FALSE(played.at_end());
   EXPECT_FALSE(played.switch_to({.backend = Backend::x86}));
   played.step();
   EXPECT_EQ(played.shown().step, 16u);
@@ -449,6 +574,41 @@ TEST(Player, OnlyAWholeRunIsRecorded) {
   for (std::size_t i = 0; i < Player::kHistoryLength + 1; ++i) late.step();
   EXPECT_THROW(late.save_recording(folder.file("a.rec")), InvalidArgument);
   EXPECT_EQ(folder.entries(), 0u);
+}
+
+TEST(Player, EachStepIsWrittenAsItIsMadeHoweverManyAreKept) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("a.rec");
+  Player player = player_of(scenes::make("gas", {.spheres = 1}));
+  player.record_to(path);
+  player.step();
+  player.restart();
+  std::vector<std::uint64_t> hashes;
+  for (std::size_t i = 0; i < Player::kHistoryLength + 1; ++i) {
+    player.step();
+    hashes.push_back(state_hash(player.shown().states));
+    if (i == 5) player.step_back(), player.step();
+  }
+  player.finish_recording();
+  RecordingReader recording(path);
+  ASSERT_EQ(recording.steps(), hashes.size());
+  for (std::size_t i = 0; i < hashes.size(); ++i) {
+    ASSERT_EQ(state_hash(recording.states(i + 1)), hashes[i]) << i;
+  }
+}
+
+TEST(Player, ARunWithOtherSettingsLeavesNoRecording) {
+  const test::TemporaryFolder folder;
+  Player player = player_of(scenes::make("gas", {.spheres = 1}));
+  player.record_to(folder.file("a.rec"));
+  player.step();
+  RunSettings settings = player.settings();
+  settings.resolver.max_iterations = 5;
+  player.set_settings(settings);
+  player.step();
+  EXPECT_THROW(player.finish_recording(), InvalidArgument);
+  EXPECT_EQ(folder.entries(), 0u);
+  EXPECT_THROW(player.record_to(folder.file("missing/a.rec")), FileError);
 }
 
 TEST(Player, AnotherEngineGoesOnFromTheSameState) {
@@ -525,6 +685,7 @@ TEST(Forces, AreWhatGravityDoesNotExplain) {
   before.states.resize(4);
   now.states = before.states;
   now.step = 1;
+  now.dt = scene.dt;
   now.states[1].velocity = {0, Real(-1.25), 0};  // falls freely: 10 / 8
   now.states[2].velocity = {3, 0, 0};            // struck while it lies
   const auto forces = forces_between(scene, before, now);
@@ -556,12 +717,33 @@ TEST(Forces, OfABallAtRestAreItsWeightOnEveryEngine) {
   }
 }
 
+TEST(Forces, OfABallThatFallsAreNoneWhateverTheSettingsBecome) {
+  Scene scene;
+  BodyDef ball;
+  ball.mass = 3;
+  ball.acceleration = {0, -10, 0};
+  scene.bodies = {ball};
+  scene.dt = Real(1.0 / 64);
+  Player player = player_of(scene);
+  for (int i = 0; i < 2; ++i) player.step();
+  RunSettings settings = player.settings();
+  settings.dt = scene.dt / 4;
+  player.set_settings(settings);
+  EXPECT_EQ(player.shown().time, 2.0 / 64);
+  const Moment last = player.shown();
+  EXPECT_NEAR(length(forces_between(scene, player.before(), last)[0]), 0, 0.01);
+  player.step();
+  EXPECT_EQ(player.shown().time, 2.25 / 64);
+  EXPECT_NEAR(length(forces_between(scene, player.before(), player.shown())[0]), 0, 0.01);
+}
+
 TEST(Forces, AreDrawnAsArrowsOfBoundedLength) {
   const Scene scene = row_of_balls(4);
   Moment before, now;
   before.states.resize(4);
   now.states = before.states;
   now.step = 1;
+  now.dt = scene.dt;
   now.states[1].velocity = {0, Real(-1.25), 0};
   now.states[2].velocity = {1e6, 0, 0};
   Drawing drawing({0, 0, 10});
@@ -640,10 +822,10 @@ TEST(Stage, PartsOfAnAssemblyAreDrawnAndPickedWhereTheyAre) {
   }
   moment.awake = {1, 1};
   const Stage stage(scene);
-  EXPECT_EQ(stage.pick(moment, {0, 8, 20}, {0, 0, -1}), 0u);  // the box
-  EXPECT_EQ(stage.pick(moment, {0, 2, 20}, {0, 0, -1}), 0u);  // the ball
-  EXPECT_EQ(stage.pick(moment, {0, 5, 20}, {0, 0, -1}), std::nullopt);
-  EXPECT_EQ(stage.pick(moment, {3, 5, 20}, {0, 0, -1}), std::nullopt);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 8, 20}, {0, 0, -1}), 0u);  // the box
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 2, 20}, {0, 0, -1}), 0u);  // the ball
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 5, 20}, {0, 0, -1}), std::nullopt);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {3, 5, 20}, {0, 0, -1}), std::nullopt);
   Drawing drawing({0, 0, 20});
   stage.draw(moment, moment, 1, Colouring::bodies, &drawing);
   ASSERT_EQ(drawing.spheres().size(), 1u);
@@ -715,6 +897,21 @@ TEST(Image, WhatCannotBeWrittenIsToldWithTheReasonAndLeavesNothing) {
   EXPECT_EQ(folder.entries(), 1u);
 }
 
+TEST(Image, WhatIsNoFileIsWrittenToAndStays) {
+  const test::TemporaryFolder folder;
+  const std::string pipe = folder.file("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK);  // so that writers need not wait
+  require_writable(pipe);
+  write_png({1, 1, {1, 2, 3}}, pipe);
+  char magic[4] = {};
+  EXPECT_EQ(read(reader, magic, sizeof magic), 4);
+  EXPECT_EQ(std::string(magic + 1, 3), "PNG");
+  close(reader);
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+  EXPECT_EQ(folder.entries(), 1u);
+}
+
 TEST(Stage, DrawsWhatLeftTheFiniteNumbersAmongTheRest) {
   const Scene scene = scenes::make("lattice", {.spheres = 64});
   Moment moment = make_run(scene, {})->moment();
@@ -766,11 +963,11 @@ TEST(Stage, PickFindsTheNearestMovableBody) {
   for (const BodyDef& body : scene.bodies) moment.states.push_back({body.position, {}, {}, {}});
   moment.awake.assign(4, 1);
   const Stage stage(scene);
-  EXPECT_EQ(stage.pick(moment, {0, 0, 10}, {0, 0, -1}), 2u);
-  EXPECT_EQ(stage.pick(moment, {0, 0, -10}, {0, 0, 1}), 1u);
-  EXPECT_EQ(stage.pick(moment, {5, Real(0.99), 10}, {0, 0, -1}), 3u);
-  EXPECT_EQ(stage.pick(moment, {5, Real(1.01), 10}, {0, 0, -1}), std::nullopt);
-  EXPECT_EQ(stage.pick(moment, {0, 0, 10}, {0, 0, 1}), std::nullopt);  // all behind
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 0, 10}, {0, 0, -1}), 2u);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 0, -10}, {0, 0, 1}), 1u);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {5, Real(0.99), 10}, {0, 0, -1}), 3u);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {5, Real(1.01), 10}, {0, 0, -1}), std::nullopt);
+  EXPECT_EQ(stage.pick(moment, moment, 1, {0, 0, 10}, {0, 0, 1}), std::nullopt);  // all behind
 }
 
 TEST(Stage, DrawsBodiesBetweenTwoStepsAndSleepersDarker) {
@@ -795,6 +992,22 @@ TEST(Stage, DrawsBodiesBetweenTwoStepsAndSleepersDarker) {
   Stage(scene).draw(from, from, 1, Colouring::bodies, &awake);
   EXPECT_LT(drawing.spheres()[1].paint.r, awake.spheres()[1].paint.r);
   EXPECT_EQ(drawing.spheres()[0].paint, awake.spheres()[0].paint);
+}
+
+TEST(Stage, BodiesArePickedAndMarkedWhereTheyAreDrawn) {
+  const Scene scene = row_of_balls(2);
+  Moment from, to;
+  from.states.resize(2);
+  from.awake.assign(2, 1);
+  to = from;
+  to.states[0].position = {8, 0, 0};
+  const Stage stage(scene);
+  EXPECT_EQ(stage.pick(from, to, Real(0.25), {2, 0, 10}, {0, 0, -1}), 0u);
+  EXPECT_EQ(stage.pick(from, to, Real(0.25), {8, 0, 10}, {0, 0, -1}), std::nullopt);
+  Drawing drawing({});
+  stage.draw_mark(from, to, Real(0.25), 0, &drawing);
+  ASSERT_EQ(drawing.lines().size(), 12u);
+  for (const LineItem& line : drawing.lines()) EXPECT_NEAR(line.from[0], 2, 1);
 }
 
 TEST(Stage, DifferentContactsAreRedAndWiderThanOthers) {
@@ -832,6 +1045,80 @@ TEST(Stage, WallsOfLargeRoomsAreGlassAndTheRoomIsSeenWhole) {
   Stage(scene).draw(moment, moment, 1, Colouring::bodies, &drawing);
   EXPECT_EQ(drawing.glass().size(), 5u);
   EXPECT_EQ(drawing.boxes().size(), 1u);  // the floor
+}
+
+/// A ball and immovable boxes, each where the list says and as large.
+Scene ball_among(const Vec3& ball, const std::vector<std::pair<Vec3, Vec3>>& boxes) {
+  Scene scene;
+  BodyDef body;
+  body.shape = Sphere{Real(0.5)};
+  body.position = ball;
+  body.mass = 1;
+  scene.bodies = {body};
+  for (const auto& [position, half] : boxes) {
+    body.shape = Box{half};
+    body.position = position;
+    body.mass = 0;
+    scene.bodies.push_back(body);
+  }
+  return scene;
+}
+
+Moment moment_of(const Scene& scene) {
+  Moment moment;
+  for (const BodyDef& body : scene.bodies) moment.states.push_back({body.position, {}, {}, {}});
+  moment.awake.assign(scene.bodies.size(), 1);
+  return moment;
+}
+
+/// Where boxes end above and below, in the order in which they are drawn.
+std::vector<float> heights(const std::vector<BoxItem>& boxes, float side) {
+  std::vector<float> heights;
+  for (const BoxItem& box : boxes) heights.push_back(box.centre[1] + side * box.half_extents[1]);
+  return heights;
+}
+
+TEST(Stage, EachStepOfAStairHasItsOwnHeight) {
+  const Vec3 half{1, Real(0.25), 1};
+  const Scene scene =
+      ball_among({0, 1, 0}, {{{0, 0, 0}, half}, {{2, Real(-0.5), 0}, half}, {{4, -1, 0}, half}});
+  const Moment moment = moment_of(scene);
+  Drawing drawing({});
+  Stage(scene).draw(moment, moment, 1, Colouring::bodies, &drawing);
+  EXPECT_THAT(heights(drawing.boxes(), 1), ::testing::UnorderedElementsAre(0.25f, -0.25f, -0.75f));
+  EXPECT_THAT(drawing.glass(), IsEmpty());
+  const std::vector<float> below = heights(drawing.boxes(), -1);
+  ASSERT_EQ(drawing.grounds().size(), 1u);  // seen from the origin
+  EXPECT_LE(-drawing.grounds()[0].height, *std::min_element(below.begin(), below.end()));
+}
+
+TEST(Stage, OfFloorsOneAboveAnotherTheLargestIsTheRooms) {
+  const Scene scene =
+      ball_among({0, 5, 0}, {{{0, 3, 0}, {1, Real(0.25), 1}}, {{0, 0, 0}, {9, Real(0.5), 9}}});
+  const Moment moment = moment_of(scene);
+  Drawing drawing({});
+  Stage(scene).draw(moment, moment, 1, Colouring::bodies, &drawing);
+  EXPECT_THAT(heights(drawing.boxes(), 1), ::testing::UnorderedElementsAre(3.25f, 0.5f));
+}
+
+TEST(Stage, AWallStaysWhereItIsWhenTheCrowdHasPassedIt) {
+  const Scene scene =
+      ball_among({0, 2, 0}, {{{0, 0, 0}, {4, Real(0.5), 4}}, {{4, 3, 0}, {Real(0.25), 3, 4}}});
+  const Stage stage(scene);
+  const auto drawn = [&](const Vec3& ball) {
+    Moment moment = moment_of(scene);
+    moment.states[0].position = ball;
+    Drawing drawing({});
+    stage.draw(moment, moment, 1, Colouring::bodies, &drawing);
+    EXPECT_EQ(drawing.boxes().size(), 1u);
+    EXPECT_EQ(drawing.glass().size(), 1u);
+    return std::pair(drawing.boxes().at(0).centre[1], drawing.glass().at(0).centre[0]);
+  };
+  const auto before = drawn({0, 2, 0});
+  EXPECT_EQ(before.first, 0.5f - 0.0625f);  // half of a plate of an eighth of a metre
+  EXPECT_EQ(before.second, 3.75f);
+  EXPECT_EQ(drawn({0, -20, 0}), before);
+  EXPECT_EQ(drawn({20, 2, 0}), before);
 }
 
 TEST(Timing, MedianOfNoneOddAndEven) {

@@ -62,6 +62,20 @@ TEST_F(DemoPictures, AScriptFliesTheAircraftAndThePictureShowsIt) {
   EXPECT_LT(difference_at(with, without, view, place + Vec3{5, Real(2.5), 0}), 12);
 }
 
+TEST(DemoShow, WhatWasPressedAndReleasedDuringAPauseDoesNotAct) {
+  DemoShow show(options_for("ballistic"));
+  show.paused = true;
+  for (int i = 0; i < 3; ++i) {
+    show.demo_key({"mouse", true});
+    show.demo_key({"mouse", false});
+  }
+  show.step();
+  EXPECT_EQ(show.demo().states().size(), 0u);
+  show.demo_key({"mouse", true});  // and held
+  show.step();
+  EXPECT_EQ(show.demo().states().size(), 1u);
+}
+
 TEST_F(DemoPictures, OfAllDemosShowWhatTheyHave) {
   for (const demos::Entry& entry : demos::all()) {
     if (!is_playable(entry.name)) continue;
@@ -83,7 +97,8 @@ TEST(DemoShow, KeysSteerInTheirOrder) {
   controls.set_demo_keys(steered.demo_keys());
   SDL_Event event{};
   event.type = SDL_KEYDOWN;
-  event.key.keysym.sym = SDLK_s;  // raises both wings; walks back where there is no demo
+  event.key.keysym.scancode =
+      SDL_SCANCODE_S;  // raises both wings; walks back where there is no demo
   controls.handle(event);
   for (const DemoKey& key : controls.take_demo_keys()) steered.demo_key(key);
   for (int i = 0; i < 390; ++i) steered.step(), left.step();
@@ -121,6 +136,9 @@ TEST(DemoShow, BadOptionsAreNamed) {
   EXPECT_THROW(DemoShow{options}, InvalidArgument);
   EXPECT_THROW(DemoShow{options_for("flight", "missing.input")}, FileError);
   EXPECT_THROW(DemoShow{options_for("flight", "ballistic.input")}, InvalidArgument);
+  options = options_for("flight");
+  options.recording = "flight.rec";
+  EXPECT_THROW(check(options), InvalidArgument);
   ViewOptions scene = options_for("pile", "flight.input");
   EXPECT_THROW(check(scene), InvalidArgument);
 }

@@ -1,12 +1,20 @@
 /// The window as a user has it: keys, another size, the end; events come from SDL's queue.
+#include <jfpx/recording.hpp>
+
+#include "examples/scenes/scenes.hpp"
+#include "examples/viewer/demo_show.hpp"
+#include "examples/viewer/scene_show.hpp"
 #include "tests/viewer/window_fixture.hpp"
 
+#include <fstream>
 #include <initializer_list>
 #include <utility>
 
 namespace {
 
 bool minimised = false;
+bool interval_is_refused = false;
+int pauses = 0;
 
 }  // namespace
 
@@ -14,6 +22,10 @@ bool minimised = false;
 extern "C" Uint32 SDL_GetWindowFlags(SDL_Window*) {
   return minimised ? SDL_WINDOW_MINIMIZED : SDL_WINDOW_SHOWN;
 }
+
+// Likewise, for a driver that can't wait for the screen, or can.
+extern "C" int SDL_GL_SetSwapInterval(int) { return interval_is_refused ? -1 : 0; }
+extern "C" void SDL_Delay(Uint32) { ++pauses; }
 
 namespace jfpx {
 namespace {
@@ -35,7 +47,7 @@ class Interactive : public test::WindowTest {
     return options;
   }
   void TearDown() override {
-    minimised = false;
+    minimised = interval_is_refused = false;
     WindowTest::TearDown();
   }
   /// Keys that are down and up again before the first picture.
@@ -57,6 +69,13 @@ TEST_F(Interactive, KeysTakePicturesFilmsAndRecordings) {
   EXPECT_EQ(image.height, kSize.height);
   EXPECT_EQ(open_recording("jfpx-view-1.rec").scene.name, "pile");
   EXPECT_EQ(folder.entries(), 3u);
+}
+
+TEST_F(Interactive, AWindowClosesAfterAsManyStepsAsWereWanted) {
+  App app(options(5));
+  EXPECT_TRUE(app.frame(3.5 / 60));
+  EXPECT_FALSE(app.frame(7.5 / 60));
+  EXPECT_EQ(app.show().steps(), 5u);
 }
 
 TEST_F(Interactive, F1ShowsTheHelp) {
@@ -102,6 +121,98 @@ TEST_F(Interactive, AWindowOfAnotherSizeHasPicturesOfThatSize) {
   EXPECT_EQ(read_png("resized.png").height, 90);
 }
 
+TEST_F(Interactive, AWindowThatStartsPausedMakesNoStep) {
+  ViewOptions wish = options(1'000'000);
+  wish.paused = true;
+  App app(wish);
+  app.frame(1);
+  EXPECT_EQ(app.show().steps(), 0u);
+  press({SDLK_SPACE});
+  app.frame(1);
+  EXPECT_GT(app.show().steps(), 0u);
+  wish.headless = true;
+  EXPECT_THROW(check(wish), InvalidArgument);
+}
+
+TEST_F(Interactive, AFileThatIsDroppedOnTheWindowIsShown) {
+  save_scene(scenes::make("gas", {.spheres = 3}), "three.json");
+  std::ofstream("broken.json") << "{";
+  const auto drop = [](const char* path) {
+    SDL_Event event{};
+    event.type = SDL_DROPFILE;
+    event.drop.file = SDL_strdup(path);
+    SDL_PushEvent(&event);
+  };
+  App app(options(1'000'000));
+  const auto bodies = [&app] {
+    return dynamic_cast<const SceneShow&>(app.show()).player().scene().bodies.size();
+  };
+  for (int i = 0; i < 3; ++i) app.frame(kRecordedFrame);
+  press({SDLK_F9});
+  app.frame(0);
+  const std::size_t own = bodies();
+  drop("three.json");
+  app.frame(0);
+  const std::size_t three = bodies();
+  EXPECT_EQ(three, scenes::make("gas", {.spheres = 3}).bodies.size());
+  for (const char* bad : {"broken.json", "missing.rec"}) {
+    drop(bad);
+    app.frame(0);
+    EXPECT_EQ(bodies(), three);
+  }
+  drop("jfpx-view-1.rec");
+  app.frame(0);
+  EXPECT_EQ(bodies(), own);
+  EXPECT_EQ(app.finish(), 0);
+}
+
+TEST_F(Interactive, EverythingIsShownAgainInAWindowOfAnotherShape) {
+  ViewOptions wish = options(1'000'000);
+  wish.size = {160, 160};
+  App app(wish);
+  app.show().paused = true;
+  app.frame(0);
+  const Real before = app.show().camera.distance();
+  SDL_SetWindowSize(app.window().sdl(), 40, 160);
+  app.frame(0);
+  ASSERT_EQ(app.window().pixel_width(), 40);
+  press({SDLK_h});
+  app.frame(0);
+  EXPECT_GT(app.show().camera.distance(), before * 2);
+}
+
+int buffers_made = 0;
+decltype(epoxy_glRenderbufferStorageMultisample) make_storage;
+void counted_storage(GLenum target, GLsizei samples, GLenum format, GLsizei width, GLsizei height) {
+  ++buffers_made;
+  make_storage(target, samples, format, width, height);
+}
+
+TEST_F(Interactive, PicturesSideBySideShareTheirBuffers) {
+  if (!has_engine(EngineKind::bullet)) GTEST_SKIP() << "built without Bullet";
+  ViewOptions wish = options(1'000'000);
+  wish.side_by_side = true;
+  wish.size = {161, 120};  // no multiple of 3
+  App app(wish);
+  app.frame(0);
+  make_storage = std::exchange(epoxy_glRenderbufferStorageMultisample, counted_storage);
+  app.frame(0);
+  EXPECT_EQ(buffers_made, 0);
+  SDL_SetWindowSize(app.window().sdl(), 200, 120);
+  app.frame(0);
+  EXPECT_EQ(buffers_made, 2);  // colours and depths
+  epoxy_glRenderbufferStorageMultisample = make_storage;
+}
+
+TEST_F(Interactive, WithoutAScreenToWaitForPicturesPause) {
+  interval_is_refused = true;
+  App app(options(1'000'000));
+  app.frame(0);
+  const int before = pauses;
+  app.frame(0);
+  EXPECT_GT(pauses, before);
+}
+
 TEST_F(Interactive, AWindowThatIsMinimisedStillHasPictures) {
   const auto take = [](const char* name, bool unseen) {
     start_events();
@@ -135,6 +246,20 @@ TEST_F(Interactive, AWindowThatIsMinimisedFromTheStartHasAPictureToo) {
   EXPECT_THROW(run_interactive(wish), FileError);
 }
 
+TEST_F(Interactive, TheCameraOfADemoFollowsWhileNobodyMovesIt) {
+  ViewOptions wish = options(1'000'000);
+  wish.run = {};
+  wish.run.scene = "flight";
+  App app(wish);
+  for (int i = 0; i < 200; ++i) app.frame(kRecordedFrame);
+  app.show().paused = true;
+  app.frame(0);
+  demos::View shown;
+  dynamic_cast<const DemoShow&>(app.show()).demo().draw(&shown);
+  EXPECT_GT(app.show().steps(), 100u);
+  EXPECT_LT(length(app.show().camera.eye() - shown.camera.eye), 1e-3);
+}
+
 TEST_F(Interactive, FullScreenFillsTheScreen) {
   ViewOptions wish = options(2);
   wish.fullscreen = true;
@@ -151,6 +276,38 @@ TEST_F(Interactive, WhatCannotBeWrittenIsToldAndTheWindowStays) {
   ViewOptions wish = options(3);
   wish.screenshot = "last.png";  // asked for on the command line: an error
   EXPECT_THROW(run_interactive(wish), FileError);
+}
+
+TEST_F(Interactive, WhatCannotBeWrittenAtTheEndLeavesTheRestWhole) {
+  fs::create_directory("pictures");
+  ViewOptions wish = options(3);
+  wish.screenshot = "pictures/last.png";
+  wish.recording = "run.rec";
+  App app(wish);
+  fs::remove("pictures");
+  while (app.frame(kRecordedFrame)) {
+  }
+  EXPECT_THROW(app.finish(), FileError);
+  EXPECT_EQ(RecordingReader("run.rec").steps(), 3u);
+}
+
+TEST_F(Interactive, AFilmOfTheCommandLineMustBeWrittenAndOneOfAKeyIsTold) {
+  ViewOptions wish = options(1'000'000);
+  wish.record = "film";
+  {
+    App app(wish);
+    EXPECT_TRUE(app.frame(0));
+    press({SDLK_F10, SDLK_F10});  // no more, and another one
+    EXPECT_TRUE(app.frame(0));
+    fs::remove_all("jfpx-view-frames-1");
+    EXPECT_TRUE(app.frame(0));
+    EXPECT_EQ(app.finish(), 0);
+  }
+  start_events();
+  App app(wish);
+  fs::remove_all("film");
+  EXPECT_FALSE(app.frame(0));
+  EXPECT_THROW(app.finish(), FileError);
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 /// The panel as a user has it: widgets are clicked where they are drawn, and what they promise
 /// comes.
+#include <jfpx/recording.hpp>
+
 #include "examples/scenes/scenes.hpp"
 #include "examples/viewer/demo_show.hpp"
 #include "examples/viewer/scene_show.hpp"
@@ -169,6 +171,30 @@ TEST_F(Panel, BulletsPartsAreExchangedWithoutMovingABit) {
   EXPECT_TRUE(user.reads("spheres by x86, solved by Bullet"));
 }
 
+TEST_F(Panel, WhatFailedOnceHasFailedWhateverStartsAgain) {
+  Scene scene;
+  BodyDef ball;
+  ball.mass = 1;
+  ball.velocity = {kMaxCoordinate, 0, 0};
+  scene.bodies = {ball};
+  scene.dt = Real(0.5);
+  save_scene(scene, folder.file("fast.json"));
+  ViewOptions options = options_for(folder.file("fast.json"));
+  options.run.spheres.reset();
+  test::User user(options);
+  user.show().paused = true;
+  ASSERT_EQ(user.show().status(), 0);
+  for (int i = 0; i < 4; ++i) user.show().step();
+  ASSERT_EQ(user.show().status(), 1);
+  user.frame();
+  user.click("Restart");
+  EXPECT_EQ(user.show().steps(), 0u);
+  EXPECT_EQ(user.show().status(), 1);
+  user.choose("scene", "flight");
+  EXPECT_EQ(user.show().status(), 0);
+  EXPECT_EQ(user.finish(), 1);
+}
+
 TEST_F(Panel, ScenesAndDemosAreChosen) {
   test::User user(options_for("pile"));
   user.show().paused = true;
@@ -178,6 +204,9 @@ TEST_F(Panel, ScenesAndDemosAreChosen) {
   user.choose("scene", "flight");
   ASSERT_NE(dynamic_cast<DemoShow*>(&user.show()), nullptr);
   for (int i = 0; i < 3; ++i) user.frame();
+  EXPECT_TRUE(user.show().paused);
+  user.click("Run");
+  EXPECT_FALSE(user.show().paused);
   user.click("Pause");
   EXPECT_TRUE(user.show().paused);
   const std::uint64_t steps = user.show().steps();
@@ -187,6 +216,27 @@ TEST_F(Panel, ScenesAndDemosAreChosen) {
   EXPECT_EQ(user.show().steps(), 0u);
   user.choose("scene", "lattice");
   EXPECT_EQ(scene(user).player().scene().name, "lattice");
+}
+
+TEST_F(Panel, WhatIsChosenComesAsIfItHadBeenStarted) {
+  ViewOptions options = options_for("pile");
+  options.size.width = 720;
+  test::User user(options);
+  user.show().paused = true;
+  user.show().forces = true;
+  const auto eye_moves = [&user] {
+    const Vec3 before = user.show().camera.eye();
+    user.drag(600, 500, 640, 480);
+    return user.show().camera.eye() != before;
+  };
+  EXPECT_TRUE(eye_moves());  // in a circle
+  user.choose("scene", "boxes-and-balls");
+  EXPECT_STREQ(SDL_GetWindowTitle(user.window().sdl()), "jfpx-view: boxes-and-balls");
+  EXPECT_TRUE(user.show().forces);
+  EXPECT_FALSE(eye_moves());  // one looks around, as in the thesis
+  user.choose("scene", "gas");
+  EXPECT_STREQ(SDL_GetWindowTitle(user.window().sdl()), "jfpx-view: gas");
+  EXPECT_TRUE(eye_moves());
 }
 
 TEST_F(Panel, NumbersAndSeedsMakeOtherScenes) {
@@ -249,8 +299,13 @@ TEST_F(Panel, SettingsOfTheSolverAreTakenOver) {
   EXPECT_EQ(now().sleep.enabled, !before.sleep.enabled);
   EXPECT_EQ(user.value("sleep"), before.sleep.enabled ? "off" : "on");
   EXPECT_EQ(user.value("velocity eps [m/s]"), "1");
+  user.drag_in("velocity eps [m/s]", 0.5, 0.25);
+  EXPECT_GT(now().resolver.velocity_epsilon, 5e-5);
+  EXPECT_LT(now().resolver.velocity_epsilon, 5e-4);
   user.click("Step");
   EXPECT_TRUE(user.reads("step 1, 0.00 s"));
+  user.click("The scene's own");
+  EXPECT_EQ(now(), before);
 }
 
 TEST_F(Panel, RestartKeepsWhatThePanelShows) {
@@ -306,6 +361,29 @@ TEST_F(Panel, ARecordingStartsAgainAsItIsShown) {
   EXPECT_NE(hash(user), recorded);
 }
 
+TEST_F(Panel, ARecordingPausesAtItsEndAndIsSavedAsItIs) {
+  {
+    test::User user(options_for("pile"));
+    for (int i = 0; i < 3; ++i) user.click("Step");
+    user.click("Save steps");
+  }
+  start_events();
+  ViewOptions options = options_for("jfpx-view-1.rec");
+  options.run.spheres.reset();
+  test::User user(options);
+  user.frame(10 * kStep);
+  user.frame();
+  EXPECT_EQ(user.show().steps(), 3u);
+  EXPECT_TRUE(user.show().paused);
+  EXPECT_TRUE(user.reads("(end of recording)"));
+  user.click("Step");
+  user.click("Run");
+  user.click("Save steps");
+  EXPECT_EQ(RecordingReader("jfpx-view-2.rec").steps(), 3u);
+  user.click("Back");
+  EXPECT_EQ(user.show().steps(), 2u);
+}
+
 TEST_F(Panel, PicturesFilmsAndRecordingsAreWritten) {
   test::User user(options_for("pile"));
   user.click("Picture");
@@ -323,6 +401,24 @@ TEST_F(Panel, PicturesFilmsAndRecordingsAreWritten) {
   EXPECT_GE(filmed, 3);
   user.frame();
   EXPECT_EQ(pictures(), filmed);
+}
+
+TEST_F(Panel, TheHelpListsWhatTheShowHas) {
+  test::User user(options_for("pile"));
+  const auto keys = [&user](const std::string& scene) {
+    user.choose("scene", scene);
+    for (const bool down : {true, false}) test::push_key(SDLK_F1, down);
+    user.frame();
+    const auto listed = [&user](const char* what) { return user.reads(what) ? '1' : '0'; };
+    const std::string seen = {listed("pick a body"), listed("one step back"),
+                              listed("what colours tell"), listed("raise both wings"),
+                              listed("screenshot")};
+    for (const bool down : {true, false}) test::push_key(SDLK_F1, down);
+    user.frame();
+    return seen;
+  };
+  EXPECT_EQ(keys("gas"), "11101");
+  EXPECT_EQ(keys("flight"), "00011");
 }
 
 TEST_F(Panel, ColoursContactsAndForcesAreSwitched) {

@@ -140,6 +140,39 @@ TEST_F(RendererTest, DepthOfSpheresIsExactOffTheAxis) {
   }
 }
 
+TEST_F(RendererTest, WhatIsNearerThanTheCrowdIsNotCutOff) {
+  // The crowd is at the far end of a ramp, and one ball came to the camera.
+  const Vec3 eye{0, 4, 24};
+  const View view = view_of(eye, {0, 4, -20}, 1);
+  const Vec3 stray = eye + view.forward * Real(1.7) + view.right * Real(0.85);  // 27 degrees aside
+  Drawing drawing(eye);
+  drawing.set_bounds({0, 0, 0}, 30);
+  drawing.add_box({0, 0, 0}, {3, 1, 22}, {}, kHues[0]);
+  drawing.add_sphere(stray, Real(0.3), {}, kHues[2]);
+  const Image image = picture(drawing, view, kWidth, kHeight);
+  for (const Real z : {Real(-15), Real(0), Real(10), Real(15)}) {
+    EXPECT_EQ(hue_at(image, view, {0, 1, z}), 0u) << z;
+  }
+  EXPECT_EQ(hue_at(image, view, stray), 2u);
+}
+
+TEST_F(RendererTest, ABallIsSeenHoweverNearTheEyeComes) {
+  // So near that depth has no digits left: 2e-5 of the far plane is 0.2 m.
+  const Vec3 eye{0, 0, 0};
+  View view = view_of(eye, {0, 0, -1000}, 200);
+  view.far_plane = 10000;
+  for (const Real aside : {Real(0), Real(0.5)}) {
+    Drawing drawing(eye);
+    drawing.set_bounds({0, 0, -5}, 6);
+    const Vec3 ball{aside * Real(0.12), 0, Real(-0.12)};
+    drawing.add_sphere(ball, Real(0.04), {}, kHues[1]);
+    drawing.add_box({0, 0, -5}, {4, 4, 1}, {}, kHues[0]);
+    const Image image = picture(drawing, view, kWidth, kHeight);
+    EXPECT_EQ(hue_at(image, view, ball), 1u) << aside;
+    EXPECT_EQ(hue_at(image, view, {Real(-1.6), Real(1.2), -4}), 0u);
+  }
+}
+
 TEST_F(RendererTest, WorldsFarFromTheOriginLookTheSame) {
   const auto at_offset = [](const Vec3& offset) {
     const Vec3 eye = offset + Vec3{2, 1, 8};
@@ -257,6 +290,14 @@ TEST_F(RendererTest, AHundredThousandSpheresTakeOneDraw) {
   std::vector<bool> seen(kHues.size());
   for (int x = 40; x < 120; ++x) seen[nearest_hue(image.at(x, 50))] = true;
   EXPECT_THAT(seen, ::testing::Each(true));
+}
+
+TEST_F(RendererTest, WhatTheDriverRejectsMakesOpenGlUnusable) {
+  constexpr std::string_view kVertex = "void main() { gl_Position = vec4(0.0); }";
+  EXPECT_THROW(GlProgram(kVertex, "this is no shader"), BackendUnavailable);
+  EXPECT_THROW(GlProgram(kVertex, "void main() { undefined_function(); }"), BackendUnavailable);
+  EXPECT_THROW(make_framebuffer(make_texture(GL_DEPTH_COMPONENT32F, 4, 4).name(), 0),
+               BackendUnavailable);
 }
 
 GLenum guilty() { return GL_GUILTY_CONTEXT_RESET; }

@@ -24,6 +24,8 @@ class User {
   view::Show& show() { return app_.show(); }
   view::Window& window() { return app_.window(); }
 
+  int finish() { return app_.finish(); }  ///< as view::App
+
   /// One picture, `seconds` after the last. @return false if it was the last one
   bool frame(double seconds = 0);
   const view::PanelLog& panel() const { return log_; }

@@ -115,12 +115,14 @@ TEST_F(Pictures, SideBySideFindsNoDifference) {
 TEST_F(Pictures, AreRecordedWithNumbers) {
   const auto result =
       jfpx_view("gas --spheres 8 --frames 3 --headless --size 64x48 --quality low --record " +
-                folder.file("film"));
+                folder.file("film") + " --screenshot " + folder.file("last.png"));
   EXPECT_EQ(result.status, 0) << result.output;
   for (const char* name :
        {"film/frame-000001.png", "film/frame-000002.png", "film/frame-000003.png"}) {
     EXPECT_TRUE(std::filesystem::exists(folder.file(name))) << name;
   }
+  EXPECT_EQ(view::read_png(folder.file("last.png")).rgb,
+            view::read_png(folder.file("film/frame-000003.png")).rgb);
 }
 
 TEST_F(Pictures, ColoursAndArrowsShow) {
@@ -139,6 +141,18 @@ TEST_F(Pictures, AWindowThatIsClosedInTheMiddleEndsWell) {
   EXPECT_THAT(result.output, HasSubstr("status 0"));  // the program's own
   EXPECT_THAT(result.output, HasSubstr("rendering on"));
   EXPECT_THAT(result.output, HasSubstr("engine native"));
+}
+
+TEST_F(Pictures, ARunWithoutAWindowEndsWellWhenItIsTerminated) {
+  const std::string path = folder.file("last.png");
+  const auto result = test::run_process(
+      "timeout --preserve-status -k 60 -s TERM 2 " JFPX_VIEW_PATH
+      " pile --spheres 400 --headless --frames 100000000 --size 160x120 --quality low "
+      "--screenshot " +
+      path + " 2>&1; echo status $?");
+  EXPECT_THAT(result.output, HasSubstr("status 0"));
+  EXPECT_THAT(result.output, HasSubstr("rendering on"));
+  EXPECT_GT(contrast(view::read_png(path)), 80);
 }
 
 TEST_F(Pictures, AWindowRunsAndClosesAtItsLastFrame) {
@@ -163,16 +177,37 @@ TEST(View, StatesAreRecordedAndPlayedBack) {
   const std::string path = folder.file("gas.rec");
   const auto recorded = jfpx_view("gas --spheres 9 --frames 7 --no-render --recording " + path);
   EXPECT_EQ(recorded.status, 0) << recorded.output;
-  const auto played = jfpx_view(path + " --frames 7 --no-render");
+  const auto played = jfpx_view(path + " --frames 70 --no-render");
   EXPECT_EQ(played.status, 0) << played.output;
-  EXPECT_THAT(played.output, HasSubstr("step 7"));
-  for (const char* change : {" --spheres 5", " --boxes 1", " --dt 0.01", " --seed 2"}) {
+  EXPECT_THAT(played.output, HasSubstr("step 7,"));
+  EXPECT_THAT(played.output, HasSubstr("7 steps,"));
+  const std::string again = folder.file("again.rec");
+  EXPECT_EQ(jfpx_view(path + " --frames 70 --no-render --recording " + again).status, 0);
+  const auto replayed = test::run_process(JFPX_TOOL_PATH " replay " + again + " 2>&1");
+  EXPECT_EQ(replayed.status, 0) << replayed.output;
+  for (const char* change :
+       {" --spheres 5", " --boxes 1", " --dt 0.01", " --seed 2", " --no-sleep", " --engine bullet",
+        " --backend x86", " --threads 3", " --side-by-side"}) {
     expect_fails(jfpx_view(path + change + " --no-render"), 2, "is a recording");
   }
   std::ofstream(path, std::ios::app) << "more";
   expect_fails(jfpx_view(path + " --no-render"), 2, path);
   expect_fails(jfpx_view("flight --frames 2 --no-render --recording " + path), 2,
                "can be recorded");
+}
+
+TEST(View, ARecordingIsPlayedInThePrecisionInWhichItWasMade) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("gas.rec");
+  const auto recorded =
+      jfpx_view(std::string("gas --spheres 9 --frames 7 --no-render --precision ") +
+                kOtherPrecision + " --recording " + path);
+  ASSERT_EQ(recorded.status, 0) << recorded.output;
+  const auto played = jfpx_view(path + " --no-render");
+  EXPECT_EQ(played.status, 0) << played.output;
+  EXPECT_THAT(played.output, HasSubstr("step 7,"));
+  const std::string own = sizeof(Real) == 4 ? "float" : "double";
+  expect_fails(jfpx_view(path + " --no-render --precision " + own), 2, kOtherPrecision);
 }
 
 TEST(View, TellsTheHashThatTheToolTells) {
@@ -202,6 +237,9 @@ TEST(View, BadUsageIsStatusTwo) {
   expect_fails(jfpx_view("pile --headless --spheres 4 --eye 1,2,3"), 2, "--target");
   expect_fails(jfpx_view("pile --headless --eye 1,2,3 --target 1,2,3"), 2, "same point");
   expect_fails(jfpx_view("pile --no-render --screenshot a.png"), 2, "--no-render");
+  expect_fails(jfpx_view("flight --no-render --no-sleep"), 2, "--no-sleep goes with a scene");
+  expect_fails(jfpx_view("flight --no-render --colours speed"), 2, "--colours goes with a scene");
+  expect_fails(jfpx_view("--side-by-side pile --no-render --engine bullet"), 2, "all engines");
   for (const char* size : {"0x0", "15x100", "100x9000", "100", "x", "1e3x100", "-5x100"}) {
     EXPECT_EQ(jfpx_view(std::string("pile --headless --size ") + size).status, 2) << size;
   }
@@ -276,8 +314,8 @@ TEST_F(Pictures, AFileThatCannotBeWrittenIsNamedAndNothingIsLeft) {
 TEST(View, HelpNamesTheOptionsAndExitStatuses) {
   const auto help = jfpx_view("--help");
   EXPECT_EQ(help.status, 0);
-  for (const char* word :
-       {"--headless", "--screenshot", "--side-by-side", "--engine", "Exit status"}) {
+  for (const char* word : {"recording (.rec)", "--headless", "--screenshot", "--side-by-side",
+                           "--engine", "Exit status"}) {
     EXPECT_THAT(help.output, HasSubstr(word));
   }
   EXPECT_EQ(jfpx_view("--version").output, "jfpx-view " JFPX_VERSION "\n");

@@ -5,6 +5,7 @@
 
 #include "examples/viewer/interactive.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/viewer/us_keyboard.hpp"
 
 #include <SDL.h>
 #include <gtest/gtest.h>
@@ -46,7 +47,7 @@ inline void push_key(SDL_Keycode code, bool down) {
   SDL_Event event{};
   event.type = down ? SDL_KEYDOWN : SDL_KEYUP;
   event.key.keysym.sym = code;
-  event.key.keysym.scancode = SDL_GetScancodeFromKey(code);
+  event.key.keysym.scancode = us_scancode(code);
   SDL_PushEvent(&event);
 }
 

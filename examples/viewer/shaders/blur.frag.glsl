@@ -2,7 +2,6 @@
 uniform sampler2D source;
 uniform sampler2D normal_map;
 in vec3 ray;
-in vec2 uv;
 layout(location = 0) out vec4 result;
 
 void main() {

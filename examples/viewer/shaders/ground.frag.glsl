@@ -4,7 +4,6 @@ uniform vec4 grid_u;   // direction in the plane; w: where the eye is along it, 
 uniform vec4 grid_v;
 uniform vec4 surface;  // colour; w: edge of a cell in metres
 in vec3 ray;
-in vec2 uv;
 layout(location = 0) out vec4 result;
 
 #ifdef COLOUR_PASS

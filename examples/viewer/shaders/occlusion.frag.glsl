@@ -2,7 +2,6 @@
 uniform sampler2D depth_map;
 uniform sampler2D normal_map;
 in vec3 ray;
-in vec2 uv;
 layout(location = 0) out vec4 result;
 
 vec3 position(ivec2 pixel) {

@@ -1,10 +1,8 @@
 // One triangle over the whole viewport, as far away as can be.
 out vec3 ray;
-out vec2 uv;
 
 void main() {
   vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0;
-  uv = corner * 0.5 + 0.5;
   ray = ray_z.xyz + corner.x * ray_x.xyz + corner.y * ray_y.xyz;
   gl_Position = vec4(corner, 0.9999999, 1.0);
 }

@@ -1,5 +1,4 @@
 in vec3 ray;
-in vec2 uv;
 layout(location = 0) out vec4 result;
 
 void main() { result = vec4(sky(normalize(ray)), 1.0); }

@@ -51,7 +51,8 @@ void main() {
   float inner = sqrt(max(ball.w * ball.w - miss * miss, 0.0));
   vec3 p = direction * (along - inner);
   vec3 n = normalize(p - ball.xyz);
-  gl_FragDepth = depth_of(p);
+  // What comes nearer than the near plane lies before its quad, against what was promised.
+  gl_FragDepth = max(depth_of(p), gl_FragCoord.z);
 #ifdef COLOUR_PASS
   int pattern = int(colour.w * 255.0 + 0.5);
   vec3 base = pow(colour.rgb, vec3(2.2));

@@ -33,9 +33,10 @@ void main() {
     gl_Position = vec4(0.0, 0.0, -2.0, 1.0);
     return;
   }
-  // Before the front of the sphere, so that no fragment lies behind the quad.
+  // Before the front of the sphere, so that no fragment lies before the quad, and behind the near
+  // plane in the corners of the picture, too.
   vec3 axis = place.xyz / d;
-  float distance = max(d - radius, ray_z.w * 1.05);
+  float distance = max(d - radius, ray_z.w * 1.01 * length(ray_x.xyz + ray_y.xyz + ray_z.xyz));
   float half_size = distance * radius / sqrt((d - radius) * (d + radius)) + kMargin * pixel_size(distance);
   vec3 side = normalize(abs(axis.y) < 0.9 ? cross(axis, vec3(0, 1, 0)) : cross(axis, vec3(1, 0, 0)));
   vec3 up = cross(side, axis);

@@ -3,7 +3,6 @@ uniform sampler2D source;
 uniform int scale;  // samples along an edge of a pixel
 uniform ivec2 origin;
 in vec3 ray;
-in vec2 uv;
 layout(location = 0) out vec4 result;
 
 // Fit of the ACES curve by Narkowicz (2015).

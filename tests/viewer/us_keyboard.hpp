@@ -1,0 +1,19 @@
+/// Where a US keyboard has its keys: the letters, and those without, before SDL has a video driver.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <SDL.h>
+
+namespace jfpx::inline JFPX_ABI::test {
+
+inline SDL_Scancode us_scancode(SDL_Keycode code) {
+  if (code >= SDLK_a && code <= SDLK_z) {
+    return static_cast<SDL_Scancode>(SDL_SCANCODE_A + (code - SDLK_a));
+  }
+  if ((code & SDLK_SCANCODE_MASK) != 0)
+    return static_cast<SDL_Scancode>(code & ~SDLK_SCANCODE_MASK);
+  return SDL_GetScancodeFromKey(code);
+}
+
+}  // namespace jfpx::inline JFPX_ABI::test
