@@ -107,23 +107,6 @@ TEST(Recording, IsFinishedOnceAndNotAfterAFailedWrite) {
   EXPECT_FALSE(std::ifstream(full));
 }
 
-TEST(Recording, IsWrittenToWhatIsNoFileWithoutReplacingIt) {
-  const test::TemporaryFolder folder;
-  const std::string pipe = folder.file("pipe");
-  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK);  // so that writers need not wait
-  { const RecordingWriter unfinished(pipe, header_of(1)); }
-  RecordingWriter writer(pipe, header_of(1));
-  writer.append(random_states(1, 1));
-  writer.finish();
-  char magic[7] = {};
-  EXPECT_EQ(read(reader, magic, sizeof magic), 7);
-  EXPECT_EQ(std::string(magic, 7), "JFPXREC");
-  close(reader);
-  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
-  EXPECT_EQ(folder.entries(), 1u);
-}
-
 TEST(Recording, UnfinishedFileDoesNotAppear) {
   const test::TemporaryFolder folder;
   {

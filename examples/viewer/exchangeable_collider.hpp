@@ -4,7 +4,6 @@
 #include <jfpx/sphere_collider.hpp>
 
 #include "examples/viewer/run.hpp"
-#include "src/tool/cost_cache.hpp"
 
 #include <memory>
 #include <utility>
@@ -16,7 +15,7 @@ inline SphereColliderOptions collider_options(const EngineChoice& choice) {
   SphereColliderOptions options;
   options.backend = choice.backend;
   options.threads = choice.threads;
-  if (choice.backend == Backend::automatic) options.costs = tool::load_cached_costs().costs;
+  if (choice.backend == Backend::automatic) options.costs = calibrated_costs().costs;
   return options;
 }
 

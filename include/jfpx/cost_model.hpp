@@ -62,4 +62,14 @@ JFPX_API void save_cost_model(const MeasuredCostModel& model, const std::string&
 ///   of another format, or holds a term that is not finite or < 0.
 JFPX_API MeasuredCostModel load_cost_model(const std::string& path);
 
+struct CalibratedCosts {
+  CostModel costs;      ///< the defaults unless `problem` is empty
+  std::string problem;  ///< why they are not those of this machine: one line
+};
+/// What `jfpx calibrate` has measured on this machine, for SphereColliderOptions::costs. Looks in
+/// the user's cache folder ($XDG_CACHE_HOME, $HOME/.cache); a file that is missing, broken, or of
+/// another machine, driver or version is not used. Does not start a GPU. Thread-safe.
+/// @throws std::bad_alloc
+JFPX_API CalibratedCosts calibrated_costs();
+
 }  // namespace jfpx::inline JFPX_ABI

@@ -22,6 +22,7 @@ std::unique_ptr<BatchEngine> make_engine() {
   DispatcherOptions options;
   options.collider.backend = from.backend;
   options.collider.threads = from.threads;
+  options.collider.costs = calibrated_costs().costs;
   if (from.minimum_batch) options.minimum_batch = *from.minimum_batch;
   options.verify = from.verify;
   return std::make_unique<BatchEngine>(make_sphere_collider(options.collider), options);

@@ -1,8 +1,8 @@
 /// jfpx calibrate: measures this machine for the automatic choice of backend and algorithm.
+#include "src/cost_cache.hpp"
 #include "src/cost_model.hpp"
 #include "src/tool/calibration.hpp"
 #include "src/tool/commands.hpp"
-#include "src/tool/cost_cache.hpp"
 #include "src/tool/cost_fit.hpp"
 #include "src/tool/options.hpp"
 #include "src/tool/output.hpp"
@@ -63,7 +63,7 @@ MeasuredCostModel measure(const Options& options) {
 }
 
 MeasuredCostModel show(const Options& options) {
-  const CachedCosts cached = load_cached_costs();
+  const CalibratedCosts cached = calibrated_costs();
   if (cached.problem.empty()) return {cached.costs, this_machine()};
   if (!options.quiet) {
     fmt::print(stderr, "jfpx: {}: these are the default costs\n", cached.problem);

@@ -4,7 +4,6 @@
 #include <jfpx/error.hpp>
 
 #include "src/tool/bullet_engine.hpp"
-#include "src/tool/cost_cache.hpp"
 #include "src/tool/native_engine.hpp"
 
 #include <fmt/format.h>
@@ -19,7 +18,7 @@ namespace {
 /// Read once: a command may make several engines, and why the file is not used is told once.
 const CostModel& costs_of_this_machine(bool quiet) {
   static const CostModel costs = [quiet] {
-    const CachedCosts cached = load_cached_costs();
+    const CalibratedCosts cached = calibrated_costs();
     if (!quiet && !cached.problem.empty()) {
       fmt::print(stderr, "jfpx: default costs are used (see: jfpx calibrate): {}\n",
                  cached.problem);

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -36,6 +37,22 @@ class Calibrate : public testing::Test {
 
   test::TemporaryFolder folder_;
 };
+
+TEST_F(Calibrate, StoresCostsThatProgramsCanAskFor) {
+  setenv("XDG_CACHE_HOME", folder_.file("").c_str(), 1);
+  const CalibratedCosts before = calibrated_costs();
+  EXPECT_EQ(before.problem, "this machine was not measured yet");
+  EXPECT_EQ(before.costs, CostModel());
+  ASSERT_EQ(jfpx("calibrate").status, 0);
+  const CalibratedCosts after = calibrated_costs();
+  EXPECT_EQ(after.problem, "");
+  EXPECT_EQ(after.costs, load_cost_model(path()).costs);
+  EXPECT_NE(after.costs, CostModel());
+  write("{");
+  EXPECT_THAT(calibrated_costs().problem, HasSubstr(path()));
+  EXPECT_EQ(calibrated_costs().costs, CostModel());
+  unsetenv("XDG_CACHE_HOME");
+}
 
 TEST_F(Calibrate, StoresCostsThatTheOtherCommandsUse) {
   const auto result = jfpx("calibrate");

@@ -1,11 +1,9 @@
 /// The cost model of this machine, in the user's cache folder.
-#include "src/tool/cost_cache.hpp"
+#include "src/cost_cache.hpp"
 
 #include <jfpx/error.hpp>
 
 #include "src/backend_table.hpp"
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -14,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx::inline JFPX_ABI {
 namespace {
 
 namespace fs = std::filesystem;
@@ -51,7 +49,9 @@ std::string describe_driver() {
     models.push_back(model.substr(std::min(model.size(), model.find_first_not_of(" \t"))));
   }
   std::ranges::sort(models);
-  return fmt::format("{}; {}", fmt::join(models, ", "), version);
+  std::string text;
+  for (const std::string& model : models) text += (text.empty() ? "" : ", ") + model;
+  return text + "; " + version;
 }
 
 std::string problem_with(const CostModelOrigin& origin) {
@@ -71,13 +71,13 @@ std::string cost_model_path() {
 
 CostModelOrigin this_machine() {
   CostModelOrigin origin;
-  origin.machine = fmt::format("{}, {} cores", backend_row(Backend::x86).probe().device,
-                               std::thread::hardware_concurrency());
+  origin.machine = backend_row(Backend::x86).probe().device + ", " +
+                   std::to_string(std::thread::hardware_concurrency()) + " cores";
   origin.driver = describe_driver();
   return origin;
 }
 
-CachedCosts load_cached_costs() {
+CalibratedCosts calibrated_costs() {
   const std::string path = cost_model_path();
   if (path.empty()) return {{}, "there is no cache folder: HOME is not set"};
   std::error_code ignored;
@@ -101,4 +101,4 @@ void store_costs(const CostModel& costs) {
   save_cost_model({costs, this_machine()}, path);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace jfpx::inline JFPX_ABI
