@@ -15,6 +15,7 @@
 #include "examples/viewer/step_clock.hpp"
 #include "examples/viewer/timing.hpp"
 #include "examples/viewer/values.hpp"
+#include "src/cost_cache.hpp"
 #include "tests/support/seed.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/viewer/us_keyboard.hpp"
@@ -432,7 +433,7 @@ TEST(Player, UsesTheCostsThatWereMeasuredOnThisMachine) {
   EXPECT_EQ(collider_options({}).costs, CostModel());  // not measured yet
   CostModel costs;
   costs.x86_all_pairs.call_us = 123;
-  tool::store_costs(costs);
+  store_costs(costs);
   EXPECT_EQ(collider_options({}).costs, costs);
   before != nullptr ? setenv("XDG_CACHE_HOME", kept.c_str(), 1) : unsetenv("XDG_CACHE_HOME");
 }
