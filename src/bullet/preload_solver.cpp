@@ -98,6 +98,12 @@ void print_solver_summary(const char* prefix) {
     std::fprintf(stderr, "%ssolver: %llu groups, %llu contacts, %llu joints\n", prefix,
                  Count{stats.groups}, Count{stats.contacts}, Count{stats.joints});
   }
+  if (stats.on_device > 0) {
+    std::fprintf(stderr, "%ssolver: %llu of the groups on a GPU\n", prefix, Count{stats.on_device});
+  }
+  for (const std::string& why : {pool().why(), stats.device_failure}) {
+    if (!why.empty()) std::fprintf(stderr, "%ssolver: failed: %s\n", prefix, why.c_str());
+  }
   for (std::size_t i = 0; i < kSolverFallbacks; ++i) {
     if (stats.fallbacks[i] == 0) continue;
     const std::string_view reason = to_string(static_cast<SolverFallback>(i));

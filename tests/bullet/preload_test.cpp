@@ -1,5 +1,5 @@
 /// Programs that were never changed, with and without the preloaded library.
-#include <jfpx/config.hpp>
+#include <jfpx/backend.hpp>
 
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -93,6 +93,19 @@ TEST_F(Preload, SaysWhichSettingsMeanNothingAndRunsWithoutThem) {
   EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_THREADS is \"300\"; it must be 0 to 256."));
   EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_BACKEND is \"gpu\"; it must be auto, x86 or "));
   EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_MINIMUM_BATCH is \"-1\"; it must be a whole "));
+}
+
+TEST_F(Preload, SaysWhyThereIsNoGpuAndLeavesAllToBullet) {
+  if (available_backends()[1].usable) GTEST_SKIP() << "there is one";
+  setenv("JFPX_PRELOAD_BACKEND", "cuda", 1);
+  const ProcessResult ours =
+      jfpx_command("preload --summary --minimum-batch 0 -- " JFPX_STOCK_PROGRAM " 300 2>&1");
+  unsetenv("JFPX_PRELOAD_BACKEND");
+  EXPECT_EQ(ours.status, 0);
+  EXPECT_THAT(ours.output, HasSubstr(alone("300").output));
+  EXPECT_THAT(ours.output, HasSubstr(": 0 dispatches, 0 batches (none)\n"));
+  EXPECT_THAT(ours.output, ContainsRegex(": failed: cuda: [^\n]+\n"));
+  EXPECT_THAT(ours.output, ContainsRegex(": solver: failed: cuda: [^\n]+\n"));
 }
 
 TEST_F(Preload, FindsThePrecisionOfTheProgramByItself) {
