@@ -129,8 +129,9 @@ TEST(Tool, JsonOnStdoutIsAllThatIsThere) {
 
 TEST(Tool, AnInterruptedRunLeavesNoFiles) {
   const test::TemporaryFolder folder;
+  // Else it would send a second signal, to the whole group, which ends the program at once.
   const ProcessResult result =
-      test::run_process("timeout --preserve-status -s INT 0.5 " JFPX_TOOL_PATH
+      test::run_process("timeout --foreground --preserve-status -s INT 0.5 " JFPX_TOOL_PATH
                         " run pile --spheres 50 --steps 100000000 --quiet --record " +
                         folder.file("run.rec") + " --csv " + folder.file("run.csv"));
   EXPECT_EQ(result.status, 130) << "as if it had not noticed";
