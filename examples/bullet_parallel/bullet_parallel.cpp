@@ -24,7 +24,8 @@ btVector3 let_fall(btDiscreteDynamicsWorld& world) {
   bodies.push_back(std::make_unique<btRigidBody>(0, nullptr, &ground_shape));
   for (int i = 0; i < 4000; ++i) {
     bodies.push_back(std::make_unique<btRigidBody>(1, nullptr, &sphere_shape, inertia));
-    const btVector3 cell{btScalar(i % 20), btScalar(i / 400), btScalar(i / 20 % 20)};
+    const int layer = i / 400, row = i / 20 % 20;
+    const btVector3 cell{btScalar(i % 20), btScalar(layer), btScalar(row)};
     bodies.back()->getWorldTransform().setOrigin(
         cell * btScalar(0.97) + btVector3(cell.y() * btScalar(0.1), btScalar(0.5), 0));
   }
