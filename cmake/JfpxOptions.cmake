@@ -6,7 +6,7 @@ set(JFPX_BULLET AUTO CACHE STRING "Bullet adapter: AUTO (if Bullet is found), ON
 set_property(CACHE JFPX_BULLET PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_VIEWER AUTO CACHE STRING "Viewer: AUTO (if SDL2, epoxy, imgui and libpng are found), ON (required) or OFF")
 set_property(CACHE JFPX_VIEWER PROPERTY STRINGS AUTO ON OFF)
-option(JFPX_TOOL "Build the jfpx command" ${PROJECT_IS_TOP_LEVEL})
+option(JFPX_TOOL "Build the programs: jfpx and, where its libraries are found, jfpx-view" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_EXAMPLES "Build the examples" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_BENCH "Build the benchmarks" OFF)

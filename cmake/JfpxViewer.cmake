@@ -5,12 +5,12 @@ if(JFPX_VIEWER STREQUAL "OFF")
   jfpx_summary(viewer off "JFPX_VIEWER=OFF")
   return()
 endif()
-if(NOT JFPX_EXAMPLES)
+if(NOT JFPX_TOOL)
   if(JFPX_VIEWER STREQUAL "ON")
-    message(FATAL_ERROR "JFPX_VIEWER=ON, but JFPX_EXAMPLES=OFF, and the viewer is one of the examples. "
-      "Configure with -DJFPX_EXAMPLES=ON or without the viewer.")
+    message(FATAL_ERROR "JFPX_VIEWER=ON, but JFPX_TOOL=OFF, which turns all programs off. "
+      "Configure with -DJFPX_TOOL=ON or without the viewer.")
   endif()
-  jfpx_summary(viewer off "JFPX_EXAMPLES=OFF")
+  jfpx_summary(viewer off "JFPX_TOOL=OFF")
   return()
 endif()
 

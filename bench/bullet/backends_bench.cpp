@@ -5,13 +5,15 @@
 /// (or which have been read from --settled=FOLDER), step in turn, and end with the same state hash.
 /// No third world is there to take their caches. Wall clock; a ratio is the median of stock / jfpx.
 #include "bench/bullet/step_parts.hpp"
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 
 #include <cstdio>
 #include <fstream>
 #include <thread>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 std::string g_folder;  ///< settled states are kept here; empty: nowhere
@@ -34,14 +36,14 @@ struct Rival {
   unsigned threads;  ///< at most; 0: one per core
 };
 /// Where a GPU is, the dispatcher may choose it too; the solver of "cuda" has to.
-constexpr Rival kRivals[] = {{"x86_1", Backend::x86, 1}, {"auto_1", Backend::automatic, 1},
-                             {"x86", Backend::x86, 0},   {"cuda_8", Backend::cuda, 8},
+constexpr Rival kRivals[] = {{"x86_1", Backend::cpu, 1}, {"auto_1", Backend::automatic, 1},
+                             {"x86", Backend::cpu, 0},   {"cuda_8", Backend::cuda, 8},
                              {"cuda", Backend::cuda, 0}, {"auto", Backend::automatic, 0}};
 
 SceneWorldOptions options_of(const Rival& rival) {
   SceneWorldOptions options;
   options.dispatch.collider.backend =
-      rival.backend == Backend::x86 ? Backend::x86 : Backend::automatic;
+      rival.backend == Backend::cpu ? Backend::cpu : Backend::automatic;
   options.solve.backend = rival.backend;
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
   const unsigned threads = rival.threads == 0 ? cores : std::min(cores, rival.threads);
@@ -120,7 +122,9 @@ void register_all() {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 /// --settled=FOLDER: keep settled states there; --only-settle: do no more than that.
 int main(int argc, char** argv) {

@@ -7,7 +7,7 @@
 #include <jfpx/bullet/scene_world.hpp>
 
 #include "bench/bullet/series.hpp"
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 #include <benchmark/benchmark.h>
@@ -17,7 +17,9 @@
 #include <string>
 #include <thread>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 double dispatch_ms(SceneWorld& w, int repeats) {
@@ -142,11 +144,11 @@ void register_all() {
   const bool with_cuda = cuda_is_usable();
   for (const char* scene : {"pile", "gas"}) {
     for (const Size& size : kSizes) {
-      register_dispatch("dispatch", scene, size, {.backend = Backend::x86});
+      register_dispatch("dispatch", scene, size, {.backend = Backend::cpu});
       for (const unsigned threads : {2u, 4u}) {
         if (size.spheres < 4096 || threads > std::thread::hardware_concurrency()) continue;
         register_dispatch("dispatch_threads_" + std::to_string(threads), scene, size,
-                          {.backend = Backend::x86, .threads = threads});
+                          {.backend = Backend::cpu, .threads = threads});
       }
       if (with_cuda && size.spheres >= 1024) {
         register_dispatch("dispatch_cuda", scene, size, {.backend = Backend::cuda});
@@ -161,7 +163,9 @@ void register_all() {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 int main(int argc, char** argv) {
   return jfpx::bullet::run_benchmarks(argc, argv, jfpx::bullet::register_all);

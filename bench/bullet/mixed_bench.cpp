@@ -3,7 +3,7 @@
 #include <jfpx/bullet/scene_world.hpp>
 #include <jfpx/world.hpp>
 
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 
 #include <benchmark/benchmark.h>
 

@@ -6,9 +6,11 @@
 /// other work on the machine disturbs little; with more it is the wall clock. Counters are medians;
 /// a ratio is the median of stock / jfpx, so larger than 1 means that jfpx is faster.
 #include "bench/bullet/step_parts.hpp"
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 void compare_steps(benchmark::State& state, const char* name, std::uint32_t spheres, int settle,
@@ -63,7 +65,9 @@ void register_all() {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 int main(int argc, char** argv) {
   return jfpx::bullet::run_benchmarks(argc, argv, jfpx::bullet::register_all);

@@ -16,7 +16,9 @@
 #include <utility>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 inline clockid_t g_clock = CLOCK_MONOTONIC;
 
@@ -134,4 +136,6 @@ inline void step_in_turn(benchmark::State& state, SceneWorld& stock, SceneWorld&
   state.counters["ratio"] = median(ratios);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

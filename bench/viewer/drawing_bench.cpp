@@ -2,11 +2,11 @@
 /// ambient occlusion, edges; from afar and near.
 #include "bench/viewer/screen.hpp"
 #include "bench/world/samples.hpp"
-#include "examples/scenes/scenes.hpp"
-#include "examples/viewer/colours.hpp"
-#include "examples/viewer/renderer.hpp"
-#include "examples/viewer/show.hpp"
-#include "examples/viewer/stage.hpp"
+#include "src/scenes/scenes.hpp"
+#include "src/viewer/colours.hpp"
+#include "src/viewer/renderer.hpp"
+#include "src/viewer/show.hpp"
+#include "src/viewer/stage.hpp"
 
 #include <fmt/format.h>
 
@@ -17,7 +17,9 @@
 #include <time.h>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::bench {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bench {
 namespace {
 
 using namespace view;
@@ -192,7 +194,9 @@ void register_all(Gallery* gallery) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bench
+}  // namespace bench
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 int main(int argc, char** argv) {
   return jfpx::bench::run_with_screen(argc, argv, jfpx::bench::register_all);

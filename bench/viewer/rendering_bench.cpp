@@ -2,15 +2,17 @@
 /// drawn, and while none is.
 #include "bench/viewer/screen.hpp"
 #include "bench/world/samples.hpp"
-#include "examples/scenes/scenes.hpp"
-#include "examples/viewer/renderer.hpp"
-#include "examples/viewer/run.hpp"
-#include "examples/viewer/stage.hpp"
-#include "examples/viewer/timing.hpp"
+#include "src/scenes/scenes.hpp"
+#include "src/viewer/renderer.hpp"
+#include "src/viewer/run.hpp"
+#include "src/viewer/stage.hpp"
+#include "src/viewer/timing.hpp"
 
 #include <fmt/format.h>
 
-namespace jfpx::inline JFPX_ABI::bench {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bench {
 namespace {
 
 constexpr std::uint32_t kSizes[] = {2, 4, 8, 16, 32, 64, 128, 256, 448};
@@ -75,7 +77,7 @@ void frames(benchmark::State& state, Backend backend, std::uint32_t spheres, Scr
 }
 
 void register_all(Screen* screen) {
-  for (const Backend backend : {Backend::x86, Backend::cuda}) {
+  for (const Backend backend : {Backend::cpu, Backend::cuda}) {
     if (backend == Backend::cuda && !cuda_is_usable()) continue;
     for (const std::uint32_t spheres : kSizes) {
       for (Screen* on : {static_cast<Screen*>(nullptr), screen}) {
@@ -93,7 +95,9 @@ void register_all(Screen* screen) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bench
+}  // namespace bench
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 int main(int argc, char** argv) {
   return jfpx::bench::run_with_screen(argc, argv, jfpx::bench::register_all);

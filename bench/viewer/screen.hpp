@@ -4,12 +4,14 @@
 #include <jfpx/error.hpp>
 
 #include "bench/world/samples.hpp"
-#include "examples/viewer/window.hpp"
+#include "src/viewer/window.hpp"
 
 #include <memory>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::bench {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bench {
 
 /// True where a processor draws.
 inline bool draws_in_software(const view::Window& window) {
@@ -31,4 +33,6 @@ int run_with_screen(int argc, char** argv, void (*register_all)(Screen*)) {
   return run_benchmarks(argc, argv);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bench
+}  // namespace bench
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -2,12 +2,14 @@
 #include <jfpx/random.hpp>
 #include <jfpx/sphere_collider.hpp>
 
-#include "bench/cuda/inputs.hpp"
+#include "bench/sphere_collider/inputs.hpp"
 #include "bench/world/samples.hpp"
 
 #include <memory>
 
-namespace jfpx::inline JFPX_ABI::bench {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bench {
 namespace {
 
 struct Contender {
@@ -20,7 +22,7 @@ struct Contender {
 
 /// Larger searches among all pairs lose by far and would take long.
 constexpr std::size_t most_for_all_pairs(Backend backend) {
-  return backend == Backend::x86 ? 4096 : 16384;
+  return backend == Backend::cpu ? 4096 : 16384;
 }
 /// Where its memory happens to lie makes a search among 32 spheres up to 1.6 times as long:
 /// colliders that choose the same then differ by chance. So each is made anew, elsewhere, this many
@@ -33,7 +35,7 @@ std::vector<Contender> contenders_for(std::size_t n, const CostModel& costs) {
   const auto add = [&](const std::string& name, const SphereColliderOptions& options) {
     contenders.push_back({name, options});
   };
-  for (const Backend backend : {Backend::x86, Backend::cuda}) {
+  for (const Backend backend : {Backend::cpu, Backend::cuda}) {
     if (backend == Backend::cuda && !cuda_is_usable()) continue;
     for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
       if (algorithm == SphereAlgorithm::all_pairs && n > most_for_all_pairs(backend)) continue;
@@ -146,7 +148,9 @@ void register_all(const CostModel& costs) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bench
+}  // namespace bench
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 /// An argument --costs=FILE names costs that `jfpx calibrate --json FILE` has measured.
 int main(int argc, char** argv) {

@@ -3,9 +3,11 @@
 #include <jfpx/bullet/scene_world.hpp>
 
 #include "bench/world/samples.hpp"
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 
-namespace jfpx::inline JFPX_ABI::bench {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bench {
 namespace {
 
 using bullet::DispatcherKind;
@@ -87,7 +89,9 @@ void register_all() {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bench
+}  // namespace bench
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 int main(int argc, char** argv) {
   jfpx::bench::register_all();

@@ -13,7 +13,9 @@
 #include <limits>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::bench {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bench {
 
 struct Work {
   double bytes = 0, operations = 0;
@@ -77,4 +79,6 @@ inline double giga_operations_a_second() {
   });
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bench
+}  // namespace bench
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -12,7 +12,9 @@
 #include <time.h>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::bench {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bench {
 
 inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -73,4 +75,6 @@ inline int run_benchmarks(int argc, char** argv) {
   return 0;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bench
+}  // namespace bench
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -3,7 +3,7 @@
 
 #include "bench/world/floor.hpp"
 #include "bench/world/samples.hpp"
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 
 #include <atomic>
 #include <cstdlib>
@@ -21,7 +21,9 @@ void* operator new(std::size_t size) {
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace jfpx::inline JFPX_ABI::bench {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bench {
 namespace {
 
 struct Run {
@@ -78,7 +80,7 @@ void stages(benchmark::State& state, Backend backend, const Run& run) {
 }
 
 void register_all() {
-  for (const Backend backend : {Backend::x86, Backend::cuda, Backend::automatic}) {
+  for (const Backend backend : {Backend::cpu, Backend::cuda, Backend::automatic}) {
     if (backend == Backend::cuda && !cuda_is_usable()) continue;
     for (const Run& run : kRuns) {
       benchmark::RegisterBenchmark(
@@ -94,7 +96,9 @@ void register_all() {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bench
+}  // namespace bench
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 int main(int argc, char** argv) {
   benchmark::AddCustomContext("copied_gb_a_second",

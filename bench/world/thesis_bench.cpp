@@ -2,9 +2,11 @@
 #include <jfpx/world.hpp>
 
 #include "bench/world/samples.hpp"
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 
-namespace jfpx::inline JFPX_ABI::bench {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bench {
 namespace {
 
 struct Size {
@@ -36,7 +38,7 @@ void frames(benchmark::State& state, Backend backend, const Size& size) {
 }
 
 void register_all() {
-  for (const Backend backend : {Backend::x86, Backend::cuda, Backend::automatic}) {
+  for (const Backend backend : {Backend::cpu, Backend::cuda, Backend::automatic}) {
     if (backend == Backend::cuda && !cuda_is_usable()) continue;
     for (const Size& size : kSizes) {
       benchmark::RegisterBenchmark(
@@ -51,7 +53,9 @@ void register_all() {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bench
+}  // namespace bench
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 int main(int argc, char** argv) {
   jfpx::bench::register_all();

@@ -1,8 +1,8 @@
 /// Steps of the native world, and the resolver with a tournament against a scan of all contacts.
 #include <jfpx/random.hpp>
 
-#include "examples/scenes/scenes.hpp"
-#include "src/contact_resolver.hpp"
+#include "src/scenes/scenes.hpp"
+#include "src/world/contact_resolver.hpp"
 #include "tests/world/linear_scan.hpp"
 
 #include <benchmark/benchmark.h>
@@ -93,7 +93,7 @@ void resolve_20000(benchmark::State& state) {
 BENCHMARK(step_pile_2048)->Unit(benchmark::kMillisecond);
 BENCHMARK(step_tower_448)->Unit(benchmark::kMillisecond);
 BENCHMARK(cast_ray)->Arg(1000)->Arg(10000)->Arg(100000);
-BENCHMARK(resolve_20000<Tournament>)->Arg(20000)->Unit(benchmark::kMillisecond);
+BENCHMARK(resolve_20000<IndexedPriorityQueue>)->Arg(20000)->Unit(benchmark::kMillisecond);
 BENCHMARK(resolve_20000<test::LinearScan>)->Arg(20000)->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 
 using jfpx::Real;
 
-constexpr std::uint32_t kSpheres = 20000, kMostContacts = 8 * kSpheres;
+constexpr std::uint32_t kSpheres = 20000, kMaxContacts = 8 * kSpheres;
 constexpr int kSteps = 200;
 
 void check(cudaError_t error) {
@@ -61,18 +61,18 @@ void run() {
   jfpx::SphereContact* contacts = nullptr;
   jfpx::cuda::ContactCount* count = nullptr;
   check(cudaMalloc(&spheres, kSpheres * sizeof *spheres));
-  check(cudaMalloc(&contacts, kMostContacts * sizeof *contacts));
+  check(cudaMalloc(&contacts, kMaxContacts * sizeof *contacts));
   check(cudaMalloc(&count, sizeof *count));
   make_spheres<<<(kSpheres + 255) / 256, 256, 0, stream>>>(spheres);
   check(cudaGetLastError());
 
   {
     jfpx::cuda::DeviceSphereCollider collider(stream);
-    collider.reserve(kSpheres, kMostContacts);
+    collider.reserve(kSpheres, kMaxContacts);
     cudaGraph_t graph = nullptr;
     cudaGraphExec_t step = nullptr;
     check(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
-    collider.find_contacts(spheres, kSpheres, contacts, kMostContacts, count);
+    collider.find_contacts(spheres, kSpheres, contacts, kMaxContacts, count);
     push_apart<<<(kSpheres + 255) / 256, 256, 0, stream>>>(spheres, contacts, count);
     check(cudaGetLastError());
     check(cudaStreamEndCapture(stream, &graph));

@@ -1,14 +1,16 @@
 /// Balls that fall into a box, on the GPU alone.
 #include "examples/cuda_view/crowd.hpp"
-#include "examples/viewer/colours.hpp"
-#include "src/cuda/cuda_try.hpp"
+#include "src/base/cuda/cuda_try.hpp"
+#include "src/viewer/colours.hpp"
 
 #include <cuda_runtime.h>
 
 #include <cmath>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::cuda_view {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda_view {
 namespace {
 
 constexpr Real kGravity = Real(9.81), kKept = Real(0.999), kEagerness = Real(0.3);
@@ -208,4 +210,6 @@ std::uint32_t Crowd::size() const { return impl_->n; }
 std::uint64_t Crowd::contacts() const { return impl_->queue.count->contacts; }
 Real Crowd::side() const { return impl_->side; }
 
-}  // namespace jfpx::inline JFPX_ABI::cuda_view
+}  // namespace cuda_view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -3,12 +3,14 @@
 
 #include <jfpx/cuda/sphere_collider.hpp>
 
-#include "examples/viewer/drawing.hpp"
+#include "src/viewer/drawing.hpp"
 
 #include <cstdint>
 #include <memory>
 
-namespace jfpx::inline JFPX_ABI::cuda_view {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda_view {
 
 /// Position-based (Mueller and others 2007): balls move, touching ones are pushed apart, and what
 /// came of it is the velocity. Pushes are added as whole numbers, so their order does not show and
@@ -39,4 +41,6 @@ class Crowd {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::cuda_view
+}  // namespace cuda_view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

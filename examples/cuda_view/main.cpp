@@ -4,11 +4,11 @@
 
 #include "examples/cuda_view/crowd.hpp"
 #include "examples/cuda_view/shared_buffer.hpp"
-#include "examples/viewer/controls.hpp"
-#include "examples/viewer/renderer.hpp"
-#include "examples/viewer/step_clock.hpp"
-#include "examples/viewer/timing.hpp"
-#include "examples/viewer/window.hpp"
+#include "src/viewer/controls.hpp"
+#include "src/viewer/renderer.hpp"
+#include "src/viewer/step_clock.hpp"
+#include "src/viewer/timing.hpp"
+#include "src/viewer/window.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>

@@ -1,13 +1,15 @@
 /// An OpenGL buffer that CUDA writes.
 #include "examples/cuda_view/shared_buffer.hpp"
 
-#include "src/cuda/cuda_try.hpp"
+#include "src/base/cuda/cuda_try.hpp"
 
 #include <epoxy/gl.h>
 // After epoxy, which stands in for the header that it would include.
 #include <cuda_gl_interop.h>
 
-namespace jfpx::inline JFPX_ABI::cuda_view {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda_view {
 namespace {
 
 /// Why CUDA can't reach what OpenGL draws with; empty if it can.
@@ -73,4 +75,6 @@ void SharedBuffer::unmap(cuda::Stream stream) {
   glBufferSubData(GL_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(impl_->bytes), impl_->host);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::cuda_view
+}  // namespace cuda_view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -7,7 +7,9 @@
 #include <memory>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::cuda_view {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda_view {
 
 /// Needs the OpenGL context of the buffer for its whole life.
 class SharedBuffer {
@@ -33,4 +35,6 @@ class SharedBuffer {
   std::string detour_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::cuda_view
+}  // namespace cuda_view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -9,14 +9,15 @@
 #include <string_view>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// Who computes. All give the same bits, so `automatic` is free to choose.
-enum class Backend : std::uint8_t { automatic, x86, cuda };
+enum class Backend : std::uint8_t { automatic, cpu, cuda };
 
 /// One row of the backend table.
 struct BackendStatus {
-  Backend backend = Backend::x86;
+  Backend backend = Backend::cpu;
   bool compiled = false;  ///< this build contains it
   bool usable = false;    ///< it can run here and now
   std::string device;     ///< the processor or GPU; empty where unknown
@@ -29,9 +30,11 @@ struct BackendStatus {
 /// Thread-safe.
 JFPX_API std::vector<BackendStatus> available_backends();
 
-/// "auto", "x86" or "cuda".
+/// "auto", "cpu" or "cuda".
 JFPX_API std::string_view to_string(Backend backend) noexcept;
-/// The inverse of to_string(); empty for any other text.
+/// The inverse of to_string(); empty for any other text. Also accepts "x86", the name of
+/// Backend::cpu in version 0.1.
 JFPX_API std::optional<Backend> parse_backend(std::string_view text) noexcept;
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

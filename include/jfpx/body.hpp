@@ -7,7 +7,8 @@
 #include <optional>
 #include <span>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// Names a body of one World for the body's whole life. The id of a removed body never comes back.
 /// In another World it names whatever body has the same place there, or none.
@@ -77,4 +78,5 @@ JFPX_HD constexpr Vec3 velocity_at(const BodyState& body, const Vec3& point) {
 /// (-0 and 0 differ.) Float and double worlds have different hashes.
 JFPX_API std::uint64_t state_hash(std::span<const BodyState> states) noexcept;
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -8,7 +8,8 @@
 #include <span>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// How a world finds the pairs whose bounds touch. All give the same contacts, bit for bit.
 enum class BroadPhase : std::uint8_t {
@@ -68,7 +69,7 @@ class JFPX_API SphereHierarchy {
     bool is_leaf() const { return child[0] == kNone; }
   };
 
-  void make_room(std::size_t free_nodes);
+  void reserve_geometric(std::size_t free_nodes);
   Index make_node();
   void require(Leaf leaf) const;
   void set_sphere(Index leaf, const SphereInstance& sphere);
@@ -91,4 +92,5 @@ class JFPX_API SphereHierarchy {
   std::vector<Index> scratch_;  ///< leaves of a part that is built anew
 };
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -9,7 +9,8 @@
 #include <string>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 namespace detail {
 
@@ -43,4 +44,5 @@ enum class Build : std::uint64_t {
 /// @throws BuildMismatch that says how `headers` and the library differ. Thread-safe.
 JFPX_API void verify_build(Build headers = Build::of_these_headers);
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -4,7 +4,8 @@
 
 #include <jfpx/shape.hpp>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// How a sphere touches a solid. Without a touch the other fields are 0.
 struct Touch {
@@ -112,4 +113,5 @@ JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose, const 
 JFPX_API Manifold collide(const Box& a, const Transform& pose_a, const Box& b,
                           const Transform& pose_b);
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

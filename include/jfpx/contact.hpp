@@ -6,7 +6,8 @@
 #include <cstdint>
 #include <span>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// Index of a sphere in the caller's order.
 using SphereIndex = std::uint32_t;
@@ -54,4 +55,5 @@ JFPX_HD constexpr Vec3 middle_point(const Vec3& normal, Real distance,
 /// Contacts sorted by (a, b), no pair twice. Valid until the next call on the collider.
 using ContactSpan = std::span<const SphereContact>;
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

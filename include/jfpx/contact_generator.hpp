@@ -7,7 +7,8 @@
 #include <concepts>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 struct Contact;
 
@@ -51,4 +52,5 @@ class JFPX_API ContactContext : public StepView {
 template <class G>
 concept ContactGenerator = std::copy_constructible<G> && std::invocable<const G&, ContactContext&>;
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

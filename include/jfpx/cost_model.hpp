@@ -5,7 +5,8 @@
 
 #include <string>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// What one call of a SphereCollider has to do. Counts, as doubles so that none overflows.
 struct ColliderWork {
@@ -72,4 +73,5 @@ struct CalibratedCosts {
 /// @throws std::bad_alloc
 JFPX_API CalibratedCosts calibrated_costs();
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

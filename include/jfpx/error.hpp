@@ -5,7 +5,8 @@
 
 #include <stdexcept>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// Base of all errors that jfpx throws by itself. The message is a sentence for a user.
 class JFPX_API Error : public std::runtime_error {
@@ -64,4 +65,5 @@ class JFPX_API FileError : public Error {
   ~FileError() override;
 };
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -7,7 +7,8 @@
 #include <concepts>
 #include <optional>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// Names a force of one World. Never used twice.
 struct ForceId {
@@ -122,8 +123,8 @@ struct JFPX_API AeroControl {
   Mat3 tensor() const;
 };
 
-/// The weight of the liquid that a sphere, a box or an assembly displaces, exactly, against
-/// gravity, in the middle of the displaced liquid. What assemblies displace twice counts twice.
+/// The weight of the liquid that a sphere, a box or an compound displaces, exactly, against
+/// gravity, in the middle of the displaced liquid. What compounds displace twice counts twice.
 struct JFPX_API Buoyancy {
   HalfSpace liquid = {};      ///< the solid side is liquid; the normal points up
   Real density = 1000;        ///< [kg/m^3], >= 0
@@ -146,4 +147,5 @@ struct JFPX_API Explosion {
   void operator()(ForceContext& context) const;
 };
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

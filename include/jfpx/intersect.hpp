@@ -6,7 +6,8 @@
 
 #include <jfpx/collide.hpp>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// [m], a bound on what rounding does to heights and lengths of this size.
 JFPX_HD constexpr Real rounding_margin(Real size) { return 32 * kEpsilon * size; }
@@ -60,4 +61,5 @@ JFPX_HD inline bool may_touch(const Box& a, const Transform& pose_a, const Box& 
   return true;
 }
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

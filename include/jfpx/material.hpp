@@ -5,7 +5,8 @@
 
 #include <cstdint>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 enum class CombineRule : std::uint8_t {
   geometric_mean,  ///< sqrt(a * b): equal coefficients stay what they are, 0 stays 0
@@ -56,4 +57,5 @@ struct MaterialSettings {
   friend bool operator==(const MaterialSettings&, const MaterialSettings&) = default;
 };
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

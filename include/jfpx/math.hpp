@@ -8,7 +8,8 @@
 #include <cmath>
 #include <limits>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// Machine epsilon of Real; the project's threshold for "no direction" (DESIGN: contact).
 inline constexpr Real kEpsilon = std::numeric_limits<Real>::epsilon();
@@ -308,4 +309,5 @@ JFPX_HD constexpr Aabb merged(const Aabb& a, const Aabb& b) {
   return r;
 }
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -9,7 +9,8 @@
 #include <span>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// Names a particle of one ParticleWorld for its whole life. The id of a removed particle never
 /// comes back.
@@ -111,4 +112,5 @@ class JFPX_API ParticleWorld {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -6,7 +6,8 @@
 #include <functional>
 #include <limits>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// A half-line, or a part of one.
 struct Ray {
@@ -29,4 +30,5 @@ struct RayHit {
 /// Says of which bodies a query shall hear; an empty one, of all.
 using BodyFilter = std::function<bool(BodyId)>;
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

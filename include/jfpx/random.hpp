@@ -6,7 +6,8 @@
 
 #include <cstdint>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// splitmix64 (Steele, Lea, Flood 2014): 64 bits of state, passes BigCrush. Not for cryptography.
 class Random {
@@ -38,4 +39,5 @@ class Random {
   std::uint64_t state_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

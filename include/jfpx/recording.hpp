@@ -10,7 +10,8 @@
 #include <string>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// What a recording says about its run.
 struct RecordingHeader {
@@ -76,4 +77,5 @@ struct StateDifference {
 JFPX_API std::optional<StateDifference> first_difference(std::span<const BodyState> expected,
                                                          std::span<const BodyState> actual);
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

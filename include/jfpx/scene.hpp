@@ -8,7 +8,8 @@
 #include <string_view>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// Settings of the native contact resolver (thesis 4.4.6).
 struct ResolverSettings {
@@ -66,4 +67,5 @@ JFPX_API Scene load_scene(const std::string& path);
 /// Writes to_json() to the path, all or nothing. @throws FileError
 JFPX_API void save_scene(const Scene& scene, const std::string& path);
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -6,7 +6,8 @@
 #include <variant>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 struct Sphere {
   Real radius = Real(0.5);  ///< [m], > 0
@@ -35,29 +36,29 @@ struct Plane {
   friend bool operator==(const Plane&, const Plane&) = default;
 };
 
-/// A sphere or a box that belongs to an assembly, placed in the axes of the body.
-struct AssemblyPart {
+/// A sphere or a box that belongs to an compound, placed in the axes of the body.
+struct CompoundPart {
   std::variant<Sphere, Box> shape = Sphere{};
   Vec3 position = {};  ///< [m], body axes, of the part's centre
   Quat orientation = {};
   Real density = 1;  ///< [-], in (0, 1e9], relative to the other parts
-  friend bool operator==(const AssemblyPart&, const AssemblyPart&) = default;
+  friend bool operator==(const CompoundPart&, const CompoundPart&) = default;
 };
 
 /// Spheres and boxes that move as one body (thesis 4.4.5) and never touch each other. The body's
 /// mass is shared out by density times volume; where parts overlap it counts for both. The centre
 /// of mass of a movable body must be the origin of its axes, to a thousandth of its reach; engines
 /// take the origin for it. See centred().
-struct Assembly {
-  std::vector<AssemblyPart> parts;  ///< at least one
-  friend bool operator==(const Assembly&, const Assembly&) = default;
+struct Compound {
+  std::vector<CompoundPart> parts;  ///< at least one
+  friend bool operator==(const Compound&, const Compound&) = default;
 };
 
-/// The assembly moved in its axes so that the centre of mass is the origin.
-/// @param assembly each part in the ranges that validate() asks for
-JFPX_API Assembly centred(Assembly assembly);
+/// The compound moved in its axes so that the centre of mass is the origin.
+/// @param compound each part in the ranges that validate() asks for
+JFPX_API Compound centred(Compound compound);
 
-using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Assembly>;
+using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound>;
 
 /// A sphere placed in the world: what the collider works on. Laid out as four Reals.
 struct alignas(4 * sizeof(Real)) SphereInstance {
@@ -67,4 +68,5 @@ struct alignas(4 * sizeof(Real)) SphereInstance {
 };
 static_assert(sizeof(SphereInstance) == 4 * sizeof(Real));
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,13 +5,15 @@
 #include <jfpx/build.hpp>
 #include <jfpx/contact.hpp>
 #include <jfpx/cost_model.hpp>
+#include <jfpx/simd_level.hpp>
 
 #include <memory>
 #include <span>
 #include <string_view>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 /// How pairs are found. All give the same contacts, bit for bit.
 enum class SphereAlgorithm : std::uint8_t {
@@ -34,9 +36,6 @@ enum class ChoiceReason : std::uint8_t {
 };
 /// A short text for a table, for example "device failed".
 JFPX_API std::string_view to_string(ChoiceReason reason) noexcept;
-
-/// Widest vector instructions that may be used. A level that the processor lacks is lowered.
-enum class SimdLevel : std::uint8_t { automatic, scalar, sse2, avx2, avx512 };
 
 /// With `Backend::automatic` backend and algorithm are chosen call by call, from `costs` and from
 /// the times of the last calls. Where CUDA can't be had, x86 computes; when the device fails or its
@@ -109,4 +108,5 @@ class JFPX_API SphereCollider {
 JFPX_API std::unique_ptr<SphereCollider> make_sphere_collider(
     const SphereColliderOptions& options = {});
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,8 @@
 
 #include <span>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 class BodyStore;
 
@@ -33,4 +34,5 @@ class JFPX_API StepView {
   double time_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

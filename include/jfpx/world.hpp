@@ -17,7 +17,8 @@
 #include <utility>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 
 struct WorldSettings {
   SphereColliderOptions collider;              ///< who finds sphere contacts, and how; what else
@@ -26,7 +27,7 @@ struct WorldSettings {
 };
 
 /// One contact of the native engine; boxes that touch along a face have several, and so have
-/// assemblies. Of two spheres `a` has the lower index; `a` is the sphere where a sphere meets a
+/// compounds. Of two spheres `a` has the lower index; `a` is the sphere where a sphere meets a
 /// box, half-space or plane, else the movable one where the other is not, else the lower index.
 struct Contact {
   /// BodyId::index, for World::body_at(); the place in the scene until a body is removed
@@ -70,7 +71,7 @@ struct StepReport {
   bool non_finite = false;
   BodyId non_finite_body;                                  ///< the first such body
   std::uint32_t awake = 0;                                 ///< movable bodies awake after the step
-  Backend backend = Backend::x86;                          ///< who found sphere contacts
+  Backend backend = Backend::cpu;                          ///< who found sphere contacts
   SphereAlgorithm algorithm = SphereAlgorithm::automatic;  ///< and how
   ChoiceReason choice = ChoiceReason::fixed;               ///< and why they did
   std::string device_failure;  ///< why x86 took over from a device in this step; else empty
@@ -198,7 +199,7 @@ class JFPX_API World {
                                   const Quat& orientation = {}) const;
 
   double time() const;  ///< [s], completed steps times dt
-  /// Contacts of the last step, in order: where spheres, or spheres of assemblies, touch each
+  /// Contacts of the last step, in order: where spheres, or spheres of compounds, touch each
   /// other, by (a, b); then all others by (a, b); then those of contact generators in their order.
   /// Those of the same a and b come by a's part, then b's part, spheres before boxes; the points of
   /// two parts in the order of their test. None after a failed step, or when bodies were added or
@@ -227,4 +228,5 @@ class JFPX_API World {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx

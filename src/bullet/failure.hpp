@@ -7,7 +7,9 @@
 #include <new>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// Whether memory was wanting, which there may be again in the next step.
 inline bool is_shortage(const std::exception& error) noexcept {
@@ -25,4 +27,6 @@ inline std::string text_of(const std::exception& error) noexcept {
   }
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,7 +1,7 @@
 /// What to ask for in time: bodies, algorithms and manifolds lie anywhere.
 #pragma once
 
-#include "src/prefetch.hpp"
+#include "src/base/prefetch.hpp"
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
@@ -9,7 +9,9 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// Some bytes behind an address that may be null or of something that has gone: there, arithmetic
 /// with pointers is undefined.
@@ -87,4 +89,6 @@ inline void prefetch_island_state(const btCollisionObject* object) {
   prefetch_at(object, kGuess + 24);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,9 @@
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 class BulletEngine final : public Engine {
@@ -42,4 +44,6 @@ std::unique_ptr<Engine> make_bullet_engine(EngineKind kind, const Scene& scene,
   return std::make_unique<BulletEngine>(kind, scene, options);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,7 +1,9 @@
 /// What the tool does with Bullet worlds in more than one place.
 #include "src/tool/bullet_world.hpp"
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
                                      const RunOptions& options) {
@@ -56,4 +58,6 @@ std::string device_failure(const bullet::SceneWorld& world) {
   return solver == nullptr ? std::string() : solver->stats().device_failure;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,9 @@
 
 #include "src/tool/engine.hpp"
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
                                      const RunOptions& options);
@@ -19,4 +21,6 @@ std::string sphere_backend(const bullet::SceneWorld& world);
 /// Why x86 took over from a device in dispatcher or solver; empty if in neither.
 std::string device_failure(const bullet::SceneWorld& world);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,6 +1,6 @@
 /// jfpx calibrate: measures this machine for the automatic choice of backend and algorithm.
-#include "src/cost_cache.hpp"
-#include "src/cost_model.hpp"
+#include "src/sphere_collider/cost_cache.hpp"
+#include "src/sphere_collider/cost_model.hpp"
 #include "src/tool/calibration.hpp"
 #include "src/tool/commands.hpp"
 #include "src/tool/cost_fit.hpp"
@@ -11,7 +11,9 @@
 
 #include <memory>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 struct Options {
@@ -100,4 +102,6 @@ void add_calibrate_command(CLI::App& app, int& status) {
   command->callback([options, &status] { status = run(*options); });
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

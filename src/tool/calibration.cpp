@@ -5,7 +5,7 @@
 #include <jfpx/random.hpp>
 #include <jfpx/sphere_collider.hpp>
 
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 #include "src/tool/cost_fit.hpp"
 
 #include <algorithm>
@@ -13,7 +13,9 @@
 #include <limits>
 #include <memory>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -101,7 +103,7 @@ class Bench {
  private:
   static std::vector<SpherePair> some_pairs(std::span<const SphereInstance> spheres,
                                             std::uint32_t count) {
-    const auto collider = make_sphere_collider({.backend = Backend::x86});
+    const auto collider = make_sphere_collider({.backend = Backend::cpu});
     const ContactSpan contacts = collider->find_contacts(spheres);
     Random random(1);
     std::vector<SpherePair> pairs(count);
@@ -131,10 +133,10 @@ constexpr Term kCopiedTerms[] = {&CostTerms::call_us, &CostTerms::byte_ns, &Cost
 
 void measure_x86(Bench& bench, CostModel* costs) {
   using enum SphereAlgorithm;
-  costs->x86_all_pairs = fit_costs(bench.search(Backend::x86, all_pairs, kFew), kAllPairsTerms);
+  costs->x86_all_pairs = fit_costs(bench.search(Backend::cpu, all_pairs, kFew), kAllPairsTerms);
   costs->x86_sorted_tiles =
-      fit_costs(bench.search(Backend::x86, sorted_tiles, kMany), kSortedTerms);
-  costs->x86_given_pairs = fit_costs(bench.given(Backend::x86, {}), kGivenTerms);
+      fit_costs(bench.search(Backend::cpu, sorted_tiles, kMany), kSortedTerms);
+  costs->x86_given_pairs = fit_costs(bench.given(Backend::cpu, {}), kGivenTerms);
 }
 
 /// @throws BackendUnavailable, DeviceError
@@ -190,4 +192,6 @@ Calibration calibrate(const std::function<void(std::uint64_t, std::uint64_t)>& p
   return result;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

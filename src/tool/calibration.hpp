@@ -7,7 +7,9 @@
 #include <functional>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 struct Calibration {
   CostModel costs;      ///< cuda: the defaults where it is not usable
@@ -17,4 +19,6 @@ struct Calibration {
 /// Takes seconds, one thread. `progress(done, total)` is called after each measurement.
 Calibration calibrate(const std::function<void(std::uint64_t, std::uint64_t)>& progress);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,9 @@
 
 #include <CLI/CLI.hpp>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 void add_scenes_command(CLI::App& app, int& status);
 void add_devices_command(CLI::App& app, int& status);
@@ -15,4 +17,6 @@ void add_compare_command(CLI::App& app, int& status);
 void add_replay_command(CLI::App& app, int& status);
 void add_preload_command(CLI::App& app, int& status);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

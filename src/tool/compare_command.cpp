@@ -1,6 +1,7 @@
 /// jfpx compare: prints what a comparison found.
 #include "src/tool/commands.hpp"
 #include "src/tool/comparison.hpp"
+#include "src/tool/options.hpp"
 #include "src/tool/output.hpp"
 #include "src/tool/precision.hpp"
 
@@ -9,7 +10,9 @@
 
 #include <memory>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 std::size_t count_spheres(const Scene& scene) {
@@ -100,4 +103,6 @@ void add_compare_command(CLI::App& app, int& status) {
   command->callback([options, &status] { status = run(*options); });
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

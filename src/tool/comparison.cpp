@@ -8,7 +8,9 @@
 #include "src/tool/native_engine.hpp"
 #include "src/tool/output.hpp"
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 Comparison compare(const Scene& scene, const RunOptions& given) {
   RunOptions options = given;
@@ -59,4 +61,6 @@ Comparison compare(const Scene& scene, const RunOptions& given) {
   return result;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

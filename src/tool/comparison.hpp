@@ -3,7 +3,9 @@
 
 #include "src/tool/engine.hpp"
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 /// What a comparison found. `stock` and `jfpx` are two Bullet worlds that differ in their parts.
 struct Comparison {
@@ -31,4 +33,6 @@ struct Comparison {
 /// Steps the three side by side. @throws BackendUnavailable in a build without Bullet.
 Comparison compare(const Scene& scene, const RunOptions& options);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

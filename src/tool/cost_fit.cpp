@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 CostTerms fit_costs(std::span<const CostSample> samples, std::span<double CostTerms::*const> which,
                     const CostTerms& known) {
@@ -51,9 +53,9 @@ double crossover(const CostTerms& a, const CostTerms& b) {
   const auto b_wins = [&](double n) {
     return microseconds(b, search_work(n, 3 * n)) < microseconds(a, search_work(n, 3 * n));
   };
-  constexpr double kMost = 1e8;
-  if (!b_wins(kMost)) return 0;
-  double low = 0, high = kMost;
+  constexpr double kMax = 1e8;
+  if (!b_wins(kMax)) return 0;
+  double low = 0, high = kMax;
   while (high - low > 1) {
     const double middle = std::floor((low + high) / 2);
     (b_wins(middle) ? high : low) = middle;
@@ -76,4 +78,6 @@ ColliderWork test_work(double spheres, double pairs) {
               spheres * sizeof(SphereInstance) + pairs * (sizeof(SpherePair) + sizeof(PairResult))};
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

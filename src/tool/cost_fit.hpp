@@ -6,7 +6,9 @@
 #include <span>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 struct CostSample {
   ColliderWork work;
@@ -27,4 +29,6 @@ ColliderWork search_work(double spheres, double contacts);
 /// What test_pairs() does.
 ColliderWork test_work(double spheres, double pairs);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

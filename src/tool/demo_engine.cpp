@@ -3,14 +3,16 @@
 
 #include <jfpx/error.hpp>
 
-#include "examples/demos/input_script.hpp"
+#include "src/demos/input_script.hpp"
 #include "src/tool/native_engine.hpp"
 
 #include <fmt/format.h>
 
 #include <chrono>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 std::unique_ptr<demos::Demo> make_demo(const RunOptions& options) {
@@ -78,4 +80,6 @@ std::string describe_demo(const std::string& name) {
   return text;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

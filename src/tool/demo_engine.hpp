@@ -6,7 +6,9 @@
 
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 /// The demo or scene that the options name, as a demo, with the inputs of a script; "" is no input.
 /// @param start receives the scene that the demo starts with; without bodies, if it has none
@@ -17,4 +19,6 @@ std::unique_ptr<Engine> make_demo_engine(const RunOptions& options, const std::s
 /// Name, summary and controls of a demo, for a user.
 std::string describe_demo(const std::string& name);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,11 +1,13 @@
 /// Which names are scenes and demos.
 #include "src/tool/demo_names.hpp"
 
-#include "examples/demos/demo.hpp"
+#include "src/demos/demo.hpp"
 
 #include <algorithm>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 template <class Entry>
@@ -19,4 +21,6 @@ bool is_scene(const std::string& name) { return has(scenes::all(), name); }
 bool is_demo(const std::string& name) { return has(demos::all(), name); }
 bool is_only_a_demo(const std::string& name) { return is_demo(name) && !is_scene(name); }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,11 +5,15 @@
 
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 bool is_scene(const std::string& name);
 bool is_demo(const std::string& name);
 /// True for a demo that is no scene, because more than bodies belongs to it.
 bool is_only_a_demo(const std::string& name);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

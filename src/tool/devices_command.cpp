@@ -6,7 +6,9 @@
 
 #include <fmt/format.h>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 void add_devices_command(CLI::App& app, int&) {
   CLI::App* command = app.add_subcommand("devices", "Show which backends can be used, and why not");
@@ -20,4 +22,6 @@ void add_devices_command(CLI::App& app, int&) {
   });
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

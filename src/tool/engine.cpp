@@ -12,7 +12,9 @@
 #include <algorithm>
 #include <iterator>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 /// Read once: a command may make several engines, and why the file is not used is told once.
@@ -39,10 +41,6 @@ EngineKind parse_engine(std::string_view name) {
   }
   throw InvalidArgument(
       fmt::format("engine is \"{}\"; it must be one of {}", name, fmt::join(kEngineNames, ", ")));
-}
-
-CLI::Validator engine_name() {
-  return CLI::IsMember(std::vector<std::string>(std::begin(kEngineNames), std::end(kEngineNames)));
 }
 
 StageTimes& StageTimes::operator+=(const StageTimes& other) {
@@ -85,4 +83,6 @@ std::unique_ptr<Engine> make_engine(EngineKind kind, const Scene& scene,
   return make_bullet_engine(kind, scene, options);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

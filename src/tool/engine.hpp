@@ -4,7 +4,7 @@
 #include <jfpx/body.hpp>
 #include <jfpx/sphere_collider.hpp>
 
-#include "src/tool/options.hpp"
+#include "src/tool/run_options.hpp"
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -13,18 +13,13 @@
 #include <string_view>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::tool {
-
-enum class EngineKind : std::uint8_t { native, bullet, bullet_stock };
-/// Their names, in this order.
-inline constexpr const char* kEngineNames[] = {"native", "bullet", "bullet-stock"};
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 std::string_view to_string(EngineKind kind);
 /// @throws InvalidArgument for a name that to_string() does not give.
 EngineKind parse_engine(std::string_view name);
-/// Accepts the names of engines.
-CLI::Validator engine_name();
-
 /// Milliseconds spent in each stage.
 struct StageTimes {
   double integrate = 0, broad = 0, detect = 0, solve = 0, total = 0;
@@ -58,4 +53,6 @@ int report_trouble(const std::string& device_failure, const std::string& trouble
 /// What the run options say about the sphere collider.
 SphereColliderOptions collider_options(const RunOptions& options);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

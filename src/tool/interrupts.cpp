@@ -1,7 +1,9 @@
 /// Ctrl-C as an exception; see the header.
 #include "src/tool/interrupts.hpp"
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 volatile std::sig_atomic_t g_signal = 0;
@@ -28,4 +30,6 @@ void Interrupts::check() {
   if (g_signal != 0) throw Interrupted{g_signal};
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -6,7 +6,9 @@
 #include <array>
 #include <csignal>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 /// The user, or the system, wants the process to end.
 struct Interrupted {
@@ -30,4 +32,6 @@ class Interrupts {
   std::array<struct sigaction, kSignals.size()> before_{};
 };
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

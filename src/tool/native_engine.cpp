@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 class NativeEngine final : public Engine {
@@ -53,4 +55,6 @@ std::unique_ptr<Engine> make_native_engine(const Scene& scene, const RunOptions&
   return std::make_unique<NativeEngine>(scene, options);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,9 @@
 
 #include "src/tool/engine.hpp"
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 std::unique_ptr<Engine> make_native_engine(const Scene& scene, const RunOptions& options);
 
@@ -13,4 +15,6 @@ std::unique_ptr<Engine> make_native_engine(const Scene& scene, const RunOptions&
 StageTimes stage_times(const StepReport& report);
 std::string trouble_of(const StepReport& report);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,9 @@
 #include "src/tool/commands.hpp"
 #include "src/tool/comparison.hpp"
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 std::unique_ptr<Engine> make_bullet_engine(EngineKind kind, const Scene&, const RunOptions&) {
   throw BackendUnavailable(std::string(to_string(kind)) + ": built without Bullet");
@@ -21,4 +23,6 @@ void add_preload_command(CLI::App& app, int&) {
   command->callback([] { throw BackendUnavailable("preload: built without Bullet"); });
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,31 +1,15 @@
-/// What the commands that run scenes have in common on their command lines.
+/// Options and validators; see the header.
 #include "src/tool/options.hpp"
 
-#include <jfpx/error.hpp>
-
-#include "examples/scenes/scenes.hpp"
-#include "src/tool/demo_names.hpp"
-
 #include <charconv>
-#include <filesystem>
+#include <iterator>
+#include <string>
 #include <system_error>
+#include <vector>
 
-namespace jfpx::inline JFPX_ABI::tool {
-namespace {
-
-bool looks_like_file(const std::string& name) {
-  return name.find('/') != std::string::npos || name.ends_with(".json") ||
-         std::filesystem::exists(name);
-}
-
-/// The option that a file can't follow, if one was given.
-const char* option_of_named_scenes(const RunOptions& options) {
-  if (options.spheres) return "--spheres";
-  if (options.boxes) return "--boxes";
-  return options.seed == RunOptions{}.seed ? nullptr : "--seed";
-}
-
-}  // namespace
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 CLI::Validator whole_number() {
   return {[](std::string& text) {
@@ -36,6 +20,23 @@ CLI::Validator whole_number() {
             return whole ? "" : "is " + text + "; it must be a whole number from 0 to 2^64 - 1";
           },
           ""};
+}
+
+CLI::Validator engine_name() {
+  return CLI::IsMember(std::vector<std::string>(std::begin(kEngineNames), std::end(kEngineNames)));
+}
+
+CLI::Validator backend_name() {
+  return {[](std::string& text) {
+            return parse_backend(text) ? "" : "is " + text + "; it must be auto, cpu or cuda";
+          },
+          ""};
+}
+
+void add_backend_option(CLI::App& app, Backend& backend, const std::string& help) {
+  app.add_option_function<std::string>(
+         "--backend", [&backend](const std::string& text) { backend = *parse_backend(text); }, help)
+      ->check(backend_name());
 }
 
 void add_scene_options(CLI::App& app, RunOptions& options, const std::string& scene) {
@@ -56,12 +57,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_option("--steps", options.steps, "Number of steps")
       ->check(whole_number())
       ->capture_default_str();
-  app.add_option_function<std::string>(
-         "--backend",
-         [&options](const std::string& text) { options.backend = *parse_backend(text); },
-         "Who finds sphere contacts: auto, x86 or cuda [auto]")
-      ->check(CLI::IsMember({"auto", "x86", "cuda"}));
-  app.add_option("--threads", options.threads, "Threads on x86, 0 = one per core")
+  add_backend_option(app, options.backend);
+  app.add_option("--threads", options.threads, "CPU threads, 0 = one per core")
       ->check(whole_number())
       ->capture_default_str();
   app.add_option("--minimum-batch", options.minimum_batch,
@@ -83,31 +80,6 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_flag("--quiet", options.quiet, "Print nothing but what --hash and --json - ask for");
 }
 
-scenes::Options scene_options(const RunOptions& options) {
-  return {.spheres = options.spheres, .boxes = options.boxes, .seed = options.seed};
-}
-
-Scene load(const RunOptions& options) {
-  Scene scene;
-  if (!is_scene(options.scene) && looks_like_file(options.scene)) {
-    if (const char* option = option_of_named_scenes(options)) {
-      throw InvalidArgument(std::string(option) + " goes with a named scene; " + options.scene +
-                            " is a file");
-    }
-    scene = load_scene(options.scene);
-  } else {
-    if (is_only_a_demo(options.scene)) {
-      throw InvalidArgument("\"" + options.scene +
-                            "\" is a demo: more than rigid bodies belongs to it, so that only the "
-                            "native engine has it; try: jfpx run " +
-                            options.scene);
-    }
-    scene = scenes::make(options.scene, scene_options(options));
-  }
-  if (options.dt) scene.dt = *options.dt;
-  if (options.no_sleep) scene.sleep.enabled = false;
-  validate(scene);
-  return scene;
-}
-
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

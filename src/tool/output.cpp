@@ -3,7 +3,7 @@
 
 #include <jfpx/error.hpp>
 
-#include "src/file.hpp"
+#include "src/base/file.hpp"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,9 @@
 #include <type_traits>
 #include <unistd.h>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
   if (*this && path_ != "-") file_.emplace(path_);
@@ -76,4 +78,6 @@ std::string hex_bits(Real value) {
 std::string text(Real value) { return fmt::format("{}", value); }
 std::string ms(double value) { return fmt::format("{:.3f}", value); }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

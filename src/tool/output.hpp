@@ -3,7 +3,7 @@
 
 #include <jfpx/config.hpp>
 
-#include "src/atomic_file.hpp"
+#include "src/base/atomic_file.hpp"
 #include "src/tool/interrupts.hpp"
 
 #include <cstdint>
@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 /// Where results go: a file that appears only when it is complete; "-" is stdout, "" is nothing.
 class OutputFile {
@@ -68,4 +70,6 @@ std::string text(Real value);
 /// Milliseconds with three decimals.
 std::string ms(double value);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -11,7 +11,9 @@
 #include <string_view>
 #include <unistd.h>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 /// The same program in the other precision: NAME and NAME-f64 lie side by side.
@@ -56,4 +58,6 @@ void switch_precision_if_asked(int argc, char** argv) {
   switch_precision(asked_precision(argc, argv), argv);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

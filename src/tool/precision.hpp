@@ -6,7 +6,9 @@
 #include <string>
 #include <string_view>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 
 /// What this build computes in, as --precision calls it.
 inline constexpr std::string_view kPrecision = sizeof(Real) == 4 ? "float" : "double";
@@ -20,4 +22,6 @@ void switch_precision(const std::string& precision, char** argv);
 /// recording of it. @throws FileError for a broken recording, too.
 void switch_precision_if_asked(int argc, char** argv);
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

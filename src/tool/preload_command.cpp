@@ -14,7 +14,9 @@
 #include <unistd.h>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 struct PreloadOptions {
@@ -85,14 +87,14 @@ void add_preload_command(CLI::App& app, int&) {
   command->add_flag("--summary", options->summary, "Say on stderr at exit what was done");
   command->add_flag("--verify", options->verify,
                     "Recompute every sphere pair with Bullet's algorithm and compare (slow)");
-  command->add_option("--backend", options->backend, "auto, x86 or cuda [auto]")
-      ->check(CLI::IsMember({"auto", "x86", "cuda"}));
+  command->add_option("--backend", options->backend, "Backend: auto, cpu or cuda [auto]")
+      ->check(backend_name());
   command
       ->add_option("--parts", options->parts,
                    "Which of dispatcher, solver and world (its update of boxes) [all]")
       ->delimiter(',')
       ->check(CLI::IsMember({"dispatcher", "solver", "world"}));
-  command->add_option("--threads", options->threads, "Threads on x86, 0 = one per core [1]")
+  command->add_option("--threads", options->threads, "CPU threads, 0 = one per core [1]")
       ->check(CLI::Range(0u, 256u));
   command
       ->add_option("--minimum-batch", options->minimum_batch,
@@ -105,4 +107,6 @@ void add_preload_command(CLI::App& app, int&) {
   command->callback([options] { start(*options); });
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -3,13 +3,16 @@
 
 #include "src/tool/commands.hpp"
 #include "src/tool/engine.hpp"
+#include "src/tool/options.hpp"
 #include "src/tool/output.hpp"
 
 #include <fmt/format.h>
 
 #include <memory>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 struct Options {
@@ -53,13 +56,8 @@ void add_replay_command(CLI::App& app, int& status) {
       ->required();
   command->add_option("--engine", options->engine, "native, bullet or bullet-stock [the recorded]")
       ->check(engine_name());
-  command
-      ->add_option_function<std::string>(
-          "--backend",
-          [options](const std::string& text) { options->run.backend = *parse_backend(text); },
-          "auto, x86 or cuda [auto]")
-      ->check(CLI::IsMember({"auto", "x86", "cuda"}));
-  command->add_option("--threads", options->run.threads, "Threads on x86, 0 = one per core")
+  add_backend_option(*command, options->run.backend);
+  command->add_option("--threads", options->run.threads, "CPU threads, 0 = one per core")
       ->check(whole_number())
       ->capture_default_str();
   command->add_flag("--hash", options->run.hash, "Print the hash of the final state");
@@ -67,4 +65,6 @@ void add_replay_command(CLI::App& app, int& status) {
   command->callback([options, &status] { status = replay(*options); });
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

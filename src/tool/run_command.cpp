@@ -5,6 +5,7 @@
 #include "src/tool/commands.hpp"
 #include "src/tool/demo_engine.hpp"
 #include "src/tool/engine.hpp"
+#include "src/tool/options.hpp"
 #include "src/tool/output.hpp"
 #include "src/tool/precision.hpp"
 
@@ -15,7 +16,9 @@
 #include <memory>
 #include <optional>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 struct Options {
@@ -152,4 +155,6 @@ void add_run_command(CLI::App& app, int& status) {
   });
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

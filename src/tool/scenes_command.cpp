@@ -1,6 +1,6 @@
 /// jfpx scenes: what can be run, and any of it as JSON.
-#include "examples/demos/demo.hpp"
-#include "examples/scenes/scenes.hpp"
+#include "src/demos/demo.hpp"
+#include "src/scenes/scenes.hpp"
 #include "src/tool/commands.hpp"
 #include "src/tool/demo_engine.hpp"
 #include "src/tool/options.hpp"
@@ -10,7 +10,9 @@
 
 #include <memory>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 struct ScenesOptions {
@@ -67,4 +69,6 @@ void add_scenes_command(CLI::App& app, int&) {
   });
 }
 
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -7,7 +7,9 @@
 
 #include <limits>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 int g_created = 0;
@@ -174,4 +176,6 @@ TEST_F(Algorithm, MakesADispatcherOfOursStepAside) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

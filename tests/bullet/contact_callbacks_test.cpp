@@ -1,7 +1,9 @@
 /// The global contact callbacks: what they hear, and in which order, is compared entry by entry.
 #include "tests/bullet/twin_worlds.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 /// Takes all callbacks off at the end of a test.
@@ -170,4 +172,6 @@ TEST_F(ContactCallbacks, MayDispatchAnotherCacheFromInside) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

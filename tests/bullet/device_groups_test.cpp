@@ -2,11 +2,13 @@
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/error.hpp>
 
-#include "src/row_order.hpp"
+#include "src/contact_solver/row_order.hpp"
 #include "tests/bullet/stock_bits.hpp"
-#include "tests/support/group_double.hpp"
+#include "tests/contact_solver/group_double.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 using test::GroupDouble;
@@ -21,13 +23,13 @@ WorldParts with_double(const SolverWorld& world) {
   return parts;
 }
 
-TEST(DeviceGroups, MoveRandomWorldsAsStock) {
+TEST(GpuIslandSolver, MoveRandomWorldsAsStock) {
   const SolverTotals totals =
       expect_stocks_bits(wanted_solver_steps() / 2, with_double, make_stock);
   EXPECT_GT(totals.on_device, totals.steps / 8) << "groups that x86 solves show nothing";
 }
 
-TEST(DeviceGroups, MoveAHeapAsStockWithContactAndFrictionInEitherOrder) {
+TEST(GpuIslandSolver, MoveAHeapAsStockWithContactAndFrictionInEitherOrder) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   const SolverWorld world = make_large_heap(seed);
@@ -49,7 +51,7 @@ WorldParts with_slightly_wrong_double(const SolverWorld& world) {
   return parts;
 }
 
-TEST(DeviceGroups, ShowAnErrorOfOneBit) {
+TEST(GpuIslandSolver, ShowAnErrorOfOneBit) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   int failed = 0;
@@ -60,7 +62,7 @@ TEST(DeviceGroups, ShowAnErrorOfOneBit) {
 }
 
 /// The device fails in its third group, before or after it has filled its results.
-TEST(DeviceGroups, ADeviceThatFailsIsReplacedInTheSameGroupAndReportedOnce) {
+TEST(GpuIslandSolver, ADeviceThatFailsIsReplacedInTheSameGroupAndReportedOnce) {
   int groups = 0;
   WorldParts parts;
   parts.solver = [&] {
@@ -86,20 +88,20 @@ TEST(DeviceGroups, ADeviceThatFailsIsReplacedInTheSameGroupAndReportedOnce) {
   EXPECT_EQ(solver.stats().device_failure, "the device is gone");
 }
 
-TEST(DeviceGroups, ABackendThatCantBeHadIsUnavailableAndAutomaticDoesWithout) {
+TEST(GpuIslandSolver, ABackendThatCantBeHadIsUnavailableAndAutomaticDoesWithout) {
   EXPECT_THROW(ConstraintSolver({.backend = Backend::cuda, .device = 1000}), BackendUnavailable);
   const ConstraintSolver solver({.backend = Backend::automatic, .device = 1000});
   EXPECT_EQ(solver.stats().device_failure, "");
 }
 
-TEST(DeviceGroups, AreNotAskedForOnX86) {
+TEST(GpuIslandSolver, AreNotAskedForOnX86) {
   int groups = 0;
   WorldParts parts;
   parts.solver = [&] {
     auto device = std::make_unique<GroupDouble>(7);
     device->before_solve = [&] { ++groups; };
     return std::make_unique<ConstraintSolver>(
-        std::move(device), ConstraintSolverOptions{.backend = Backend::x86, .minimum_batch = 0});
+        std::move(device), ConstraintSolverOptions{.backend = Backend::cpu, .minimum_batch = 0});
   };
   Twins twins({.parts = parts});
   twins.both([](BulletWorld& w) { add_heap(w, 60, 17); });
@@ -109,7 +111,7 @@ TEST(DeviceGroups, AreNotAskedForOnX86) {
 
 /// Such as that of a contact without a normal, which pushes nobody: it would be another NaN on a
 /// GPU than on x86, so that Bullet has to solve the group.
-TEST(DeviceGroups, ADirectionThatIsNoNumberBreaksTheGroup) {
+TEST(GpuIslandSolver, ADirectionThatIsNoNumberBreaksTheGroup) {
   GroupDouble device(1);
   for (const Real normal : {Real(1), Real(0)}) {
     const GroupInputs in = device.inputs({.bodies = 2, .contacts = 1});
@@ -184,4 +186,6 @@ TEST(RowOrder, KeepsTheOrderOfEveryBody) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

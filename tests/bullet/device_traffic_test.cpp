@@ -9,7 +9,9 @@
 #include <cstring>
 #include <utility>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 constexpr std::size_t kBlock = 4096;
@@ -45,14 +47,14 @@ class WatchedCollider final : public SphereCollider {
     pairs_.assign(pairs.begin(), pairs.end());
     return x86_->find_touching(spheres, pairs);
   }
-  Backend backend() const noexcept override { return Backend::x86; }
+  Backend backend() const noexcept override { return Backend::cpu; }
   SphereAlgorithm algorithm() const noexcept override { return x86_->algorithm(); }
 
  private:
   std::size_t* blocks_;
   std::vector<SphereInstance> spheres_;
   std::vector<SpherePair> pairs_;
-  std::unique_ptr<SphereCollider> x86_ = make_sphere_collider({.backend = Backend::x86});
+  std::unique_ptr<SphereCollider> x86_ = make_sphere_collider({.backend = Backend::cpu});
 };
 
 constexpr int kSide = 40;
@@ -148,4 +150,6 @@ TEST(DeviceTraffic, ADeviceIsSentNothingOfARestingWorld) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

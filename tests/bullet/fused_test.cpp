@@ -4,7 +4,9 @@
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
 #include <gtest/gtest.h>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 TEST(FusedProducts, OfAProgramForAnyProcessorAreNotThere) {
@@ -23,4 +25,6 @@ TEST(FusedProducts, AreFoundAndSaid) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -3,9 +3,13 @@
 
 #include <jfpx/bullet/dispatcher.hpp>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// Only where the processor has FMA.
 DispatcherOptions options_of_fused_unit();
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

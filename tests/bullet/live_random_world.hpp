@@ -6,7 +6,9 @@
 #include <set>
 #include <utility>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// Sets g_current while it is made; happen() and step() want it set by the caller.
 class LiveWorld {
@@ -45,4 +47,6 @@ class LiveWorld {
   std::set<std::pair<std::size_t, std::size_t>> ignored_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

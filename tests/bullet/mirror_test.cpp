@@ -3,14 +3,16 @@
 
 #include <algorithm>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 TwinOptions with_threads(unsigned threads) {
   TwinOptions options;
   options.ours = [threads](btCollisionConfiguration* c) {
     return std::make_unique<CollisionDispatcher>(
-        c, DispatcherOptions{.collider = {.backend = Backend::x86, .threads = threads},
+        c, DispatcherOptions{.collider = {.backend = Backend::cpu, .threads = threads},
                              .minimum_batch = 0});
   };
   return options;
@@ -104,7 +106,7 @@ TEST(PairMirror, ServesADispatcherThatReleasesInASubclass) {
   }
 }
 
-TEST(QuietCommit, HasTheSameBitsForAnyNumberOfThreads) {
+TEST(UnorderedCommit, HasTheSameBitsForAnyNumberOfThreads) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   for (const unsigned threads : {1u, 2u, 5u}) {
@@ -117,7 +119,7 @@ TEST(QuietCommit, HasTheSameBitsForAnyNumberOfThreads) {
   }
 }
 
-TEST(QuietCommit, ServesSpheresOnBoxesThatTurn) {
+TEST(UnorderedCommit, ServesSpheresOnBoxesThatTurn) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   Twins twins;
@@ -137,7 +139,7 @@ TEST(QuietCommit, ServesSpheresOnBoxesThatTurn) {
   EXPECT_GT(twins.stats().sphere_boxes, 1000u);
 }
 
-TEST(QuietCommit, ServesSpheresBetweenPlanes) {
+TEST(UnorderedCommit, ServesSpheresBetweenPlanes) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   Twins twins;
@@ -165,7 +167,7 @@ TEST(QuietCommit, ServesSpheresBetweenPlanes) {
   EXPECT_GT(twins.stats().sphere_planes, 1000u);
 }
 
-TEST(QuietCommit, LeavesPerturbationToBullet) {
+TEST(UnorderedCommit, LeavesPerturbationToBullet) {
   Twins twins;
   for (BulletWorld* w : {&twins.stock(), &twins.ours()}) {
     auto* configuration = static_cast<btDefaultCollisionConfiguration*>(w->configuration.get());
@@ -186,4 +188,6 @@ TEST(QuietCommit, LeavesPerturbationToBullet) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,7 +1,7 @@
 /// Characters, multi-bodies, serialisation, several threads: stock and ours stay the same.
 #include <jfpx/bullet/scene_world.hpp>
 
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 #include "tests/bullet/twin_worlds.hpp"
 
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
@@ -15,7 +15,9 @@
 #include <cstring>
 #include <thread>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 /// A ghost with a pair cache of its own, which the controller dispatches several times a step.
@@ -207,7 +209,7 @@ TEST(MoreSituations, DispatchersInSeveralThreadsAreIndependent) {
     for (unsigned i = 0; i < 3; ++i) {
       threads.emplace_back([&, i] {
         SceneWorldOptions options;
-        options.dispatch = {.collider = {.backend = Backend::x86, .threads = 1 + i},
+        options.dispatch = {.collider = {.backend = Backend::cpu, .threads = 1 + i},
                             .minimum_batch = 0};
         hashes[i] = run(options);
       });
@@ -217,4 +219,6 @@ TEST(MoreSituations, DispatchersInSeveralThreadsAreIndependent) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

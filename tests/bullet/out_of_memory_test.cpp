@@ -6,7 +6,9 @@
 #include "tests/bullet/twin_worlds.hpp"
 #include "tests/support/failing_new.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 using test::FailingNew;
@@ -122,4 +124,6 @@ TEST(OutOfMemoryInBullet, AllPartsTogether) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <ostream>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 // `random` is a Random, or test::Bytes.
@@ -282,4 +284,6 @@ std::ostream& operator<<(std::ostream& out, const RandomWorld& world) {
   return out;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

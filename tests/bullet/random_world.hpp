@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 enum class ShapeKind : std::uint8_t { sphere, box, plane, compound, capsule };
 
@@ -142,4 +144,6 @@ std::optional<Failure> run(const RandomWorld& world, RunTotals* totals,
 /// Takes away steps, bodies, joints, events and settings for as long as the world fails.
 RandomWorld shrink(RandomWorld world, MakeDispatcher ours = make_ours);
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

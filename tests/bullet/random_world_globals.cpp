@@ -3,7 +3,9 @@
 
 #include <cstdio>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 std::string bits_of(btScalar value) {
@@ -82,4 +84,6 @@ void Globals::set_callbacks(unsigned bits) {
   gCalculateCombinedFrictionCallback = (bits & kCombine) != 0 ? sum_of_frictions : friction_;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -3,7 +3,9 @@
 
 #include "tests/bullet/random_world.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// Changes them, and puts them back at the end. The callbacks write into the log of g_current.
 class Globals {
@@ -33,4 +35,6 @@ struct LoggingReport : btCollisionWorld::ContactResultCallback {
                            const btCollisionObjectWrapper* b, int, int j) override;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <utility>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 std::string first_log_difference(const std::vector<std::string>& stock,
@@ -85,4 +87,6 @@ std::optional<Failure> run(const RandomWorld& world, RunTotals* totals, MakeDisp
   return std::nullopt;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -8,7 +8,9 @@
 #include <limits>
 #include <sstream>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 std::uint64_t wanted_steps() { return wanted_world_steps(10'000, 100'000); }
@@ -130,4 +132,6 @@ TEST(RandomWorlds, AreTheSameForTheSameSeed) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

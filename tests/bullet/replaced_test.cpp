@@ -4,7 +4,9 @@
 
 #include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 void logging_near_callback(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
@@ -241,4 +243,6 @@ TEST(ContinuousDispatch, LowersTheTimeOfImpactAsBulletDoes) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

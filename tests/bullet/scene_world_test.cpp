@@ -11,7 +11,9 @@
 #include <limits>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 BodyDef ball(const Vec3& position, Real radius = Real(0.5)) {
@@ -188,7 +190,7 @@ BodyDef angle_iron(const Vec3& position) {
   return def;
 }
 
-TEST(SceneWorld, AssembliesStartAsTheSceneSaysAndHaveTheInertiaOfTheNativeWorld) {
+TEST(SceneWorld, CompoundsStartAsTheSceneSaysAndHaveTheInertiaOfTheNativeWorld) {
   Scene scene;
   scene.dt = Real(1) / 1024;
   scene.bodies = {angle_iron({1, 2, 3})};
@@ -215,7 +217,7 @@ TEST(SceneWorld, AssembliesStartAsTheSceneSaysAndHaveTheInertiaOfTheNativeWorld)
   EXPECT_NEAR(length(difference), 0, 2e-3);
 }
 
-TEST(SceneWorld, AnAssemblyComesToRestOnTheGround) {
+TEST(SceneWorld, AnCompoundComesToRestOnTheGround) {
   Scene scene;
   scene.bodies = {angle_iron({0, 2, 0})};
   BodyDef ground;
@@ -325,4 +327,6 @@ TEST(SceneWorld, CanBeMovedAndHasTheDispatcherAskedFor) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -7,7 +7,9 @@
 #include <limits>
 #include <utility>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 TEST(Situations, NoPairsAtAll) {
@@ -462,4 +464,6 @@ TEST(Situations, CentresThatAreCoincidentDenormalInfiniteOrNotANumber) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

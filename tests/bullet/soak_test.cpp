@@ -6,7 +6,9 @@
 
 #include "tests/bullet/twin_worlds.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 TEST(Soak, ABulletWorldWithAllOurPartsKeepsItsMemoryFlat) {
@@ -48,4 +50,6 @@ TEST(Soak, ABulletWorldWithAllOurPartsKeepsItsMemoryFlat) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

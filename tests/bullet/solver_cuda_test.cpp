@@ -2,9 +2,11 @@
 #include <jfpx/bullet/constraint_solver.hpp>
 
 #include "tests/bullet/stock_bits.hpp"
-#include "tests/cuda/cuda_fixture.hpp"
+#include "tests/sphere_collider/cuda/cuda_fixture.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 class CudaSolver : public test::Cuda {};
@@ -55,11 +57,13 @@ TEST_F(CudaSolver, IsReplacedByX86InTheGroupInWhichItFailsAndSaysSoOnce) {
       return;
     }
     EXPECT_LT(solver.stats().on_device, 3u);
-    EXPECT_NE(solver.stats().device_failure.find("src/cuda/"), std::string::npos)
+    EXPECT_NE(solver.stats().device_failure.find("/cuda/"), std::string::npos)
         << solver.stats().device_failure;
   }
   ADD_FAILURE() << "more than 100 CUDA calls";
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

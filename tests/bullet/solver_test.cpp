@@ -14,7 +14,9 @@
 #include <stdexcept>
 #include <utility>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 TEST(ConstraintSolver, MovesRandomWorldsAsStock) {
@@ -587,4 +589,6 @@ TEST(DynamicsWorld, OwnsTheSolverThatItIsNotGiven) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

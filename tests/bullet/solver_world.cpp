@@ -5,7 +5,9 @@
 #include <ostream>
 #include <utility>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 // `random` is a Random, or test::Bytes.
@@ -207,4 +209,6 @@ SolverWorld shrink(SolverWorld world, MakeParts parts, MakeDispatcher dispatcher
   return world;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -4,7 +4,9 @@
 
 #include "tests/bullet/random_world.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 inline constexpr std::uint64_t kJointKinds = 11;
 
@@ -62,4 +64,6 @@ std::optional<Failure> run(const SolverWorld& world, SolverTotals* totals,
 /// Takes away steps, bodies, joints, events and changes for as long as the world fails.
 SolverWorld shrink(SolverWorld world, MakeParts parts, MakeDispatcher dispatcher = make_stock);
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

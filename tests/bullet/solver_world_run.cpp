@@ -2,14 +2,16 @@
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dynamics_world.hpp>
 
-#include "src/bullet/point_fields.hpp"
+#include "src/bullet/dispatch/point_fields.hpp"
 #include "tests/bullet/live_random_world.hpp"
 #include "tests/bullet/random_world_globals.hpp"
 #include "tests/bullet/solver_world.hpp"
 
 extern int gNumSplitImpulseRecoveries;
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 btVector3 to_bullet(const Vec3& v) { return {v.x, v.y, v.z}; }
@@ -260,4 +262,6 @@ std::optional<Failure> run(const SolverWorld& world, SolverTotals* totals, MakeP
   return std::nullopt;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

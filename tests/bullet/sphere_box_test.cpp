@@ -1,5 +1,5 @@
 /// The closest points of spheres and boxes: every bit is btGjkPairDetector's.
-#include "src/bullet/sphere_box.hpp"
+#include "src/bullet/dispatch/sphere_box.hpp"
 
 #include "tests/bullet/twin_worlds.hpp"
 
@@ -11,7 +11,9 @@
 #include <cmath>
 #include <numbers>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 using Bits = std::conditional_t<sizeof(Real) == 8, std::uint64_t, std::uint32_t>;
@@ -191,4 +193,6 @@ TEST(SphereBox, HasEveryBitOfExtremeNumbers) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

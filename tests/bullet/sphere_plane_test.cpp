@@ -1,13 +1,15 @@
 /// Spheres and planes: every bit is btConvexPlaneCollisionAlgorithm's, for any numbers.
-#include "src/bullet/contact_point.hpp"
-#include "src/bullet/point_fields.hpp"
+#include "src/bullet/dispatch/contact_point.hpp"
+#include "src/bullet/dispatch/point_fields.hpp"
 #include "tests/bullet/twin_worlds.hpp"
 
 #include <BulletCollision/CollisionDispatch/btConvexPlaneCollisionAlgorithm.h>
 
 #include <cmath>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 btVector3 random_vector(Random& random, Real extent) {
@@ -146,4 +148,6 @@ TEST(SpherePlane, HasEveryBitOfExtremeNumbersOrLeavesThem) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -3,10 +3,12 @@
 #include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/error.hpp>
 
-#include "src/bullet/convex_check.hpp"
+#include "src/bullet/dispatch/convex_check.hpp"
 #include "tests/bullet/twin_worlds.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 /// Hands over to a real collider, then lets a test spoil the results or fail.
@@ -25,13 +27,13 @@ class SpoiledCollider : public SphereCollider {
     spoil_(results_);
     return results_;
   }
-  Backend backend() const noexcept override { return Backend::x86; }
+  Backend backend() const noexcept override { return Backend::cpu; }
   SphereAlgorithm algorithm() const noexcept override { return SphereAlgorithm::automatic; }
   ChoiceReason reason() const noexcept override { return ChoiceReason::kept; }
 
  private:
   Spoil spoil_;
-  std::unique_ptr<SphereCollider> good_ = make_sphere_collider({.backend = Backend::x86});
+  std::unique_ptr<SphereCollider> good_ = make_sphere_collider({.backend = Backend::cpu});
   std::vector<PairResult> results_;
 };
 
@@ -144,7 +146,7 @@ TEST(FailingCollider, IsGivenUpAndTheBitsStay) {
   EXPECT_EQ(twins.stats().batches, 30u) << "x86 must take over in the same dispatch";
   EXPECT_EQ(twins.stats().device_failure, "the device is gone");
   EXPECT_EQ(twins.stats().last_fallback, Fallback::none);
-  EXPECT_EQ(twins.ours().ours()->backend(), Backend::x86);
+  EXPECT_EQ(twins.ours().ours()->backend(), Backend::cpu);
   twins.ours().ours()->reset_stats();
   EXPECT_EQ(twins.stats().device_failure, "the device is gone");
 }
@@ -361,4 +363,6 @@ TEST(FirstDifference, SeesAPlantedErrorOfTheColliderInTheManifold) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,9 @@
 
 #include <sstream>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 std::string report(const SolverWorld& world, const Failure& failure, MakeParts parts,
@@ -64,4 +66,6 @@ SolverWorld make_large_heap(std::uint64_t seed) {
   return world;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

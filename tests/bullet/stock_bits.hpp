@@ -3,7 +3,9 @@
 
 #include "tests/bullet/solver_world.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// World-steps that a test of a solver makes: JFPX_TEST_WORLD_STEPS, or as many as fit.
 std::uint64_t wanted_solver_steps();
@@ -15,4 +17,6 @@ SolverTotals expect_stocks_bits(std::uint64_t steps, MakeParts parts, MakeDispat
 /// contact and friction begin to take turns.
 SolverWorld make_large_heap(std::uint64_t seed);
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -10,7 +10,9 @@
 #include <cmath>
 #include <limits>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// What g_leftovers leaves on the stack for those who read it uninitialised. Numbers that differ
 /// from each other: where all are the same, their differences are 0.
@@ -128,4 +130,6 @@ inline bool is_accident_of_stock(const SolverWorld& world, const Failure& failur
          });
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

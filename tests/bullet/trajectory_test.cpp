@@ -2,10 +2,12 @@
 #include <jfpx/bullet/scene_world.hpp>
 #include <jfpx/bullet/verify.hpp>
 
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 #include "tests/bullet/twin_worlds.hpp"
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 struct Case {
@@ -104,4 +106,6 @@ TEST(TrajectoryOfManyBodies, IsStocks) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -20,7 +20,9 @@
 #include <string>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// A fresh seed for a random test, or the one in the environment.
 inline std::uint64_t test_seed() {
@@ -213,4 +215,6 @@ inline void add_heap(BulletWorld& w, int count, std::uint64_t seed, btScalar edg
   }
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

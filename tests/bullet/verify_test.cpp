@@ -6,7 +6,9 @@
 
 #include <limits>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 namespace {
 
 /// Two equal worlds of stock dispatchers in which two spheres touch and one floats.
@@ -248,4 +250,6 @@ TEST_F(Contacts, OfBodiesInAnotherOrderThanTheirProxies) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -28,11 +28,10 @@ case $step in
     ln -s "$root" "$work/c++/jfpx"
     accepts -S "$work/c++/jfpx" -DJFPX_CUDA=OFF -DJFPX_VIEWER=OFF -DJFPX_TESTS=OFF
     ;;
-  no_tool) accepts -S "$root" -DJFPX_CUDA=OFF -DJFPX_TOOL=OFF -DJFPX_TESTS=ON ;;
-  no_examples)
-    accepts -S "$root" -DJFPX_CUDA=OFF -DJFPX_TESTS=OFF -DJFPX_EXAMPLES=OFF
-    said "viewer off (JFPX_EXAMPLES=OFF)" || fail "the summary says nothing of the viewer: $(cat "$work/log")"
-    refuses "the viewer is one of the examples" -S "$root" -DJFPX_VIEWER=ON -DJFPX_EXAMPLES=OFF
+  no_tool)
+    accepts -S "$root" -DJFPX_CUDA=OFF -DJFPX_TOOL=OFF -DJFPX_TESTS=ON
+    said "viewer off (JFPX_TOOL=OFF)" || fail "the summary says nothing of the viewer: $(cat "$work/log")"
+    refuses "JFPX_TOOL=OFF, which turns all programs off" -S "$root" -DJFPX_VIEWER=ON -DJFPX_TOOL=OFF
     ;;
   absolute)
     for folder in BINDIR LIBDIR INCLUDEDIR; do

@@ -1,7 +1,7 @@
 /// Demos as such: the table, how inputs become actions, and runs that repeat.
 #include <jfpx/error.hpp>
 
-#include "examples/demos/input_script.hpp"
+#include "src/demos/input_script.hpp"
 #include "tests/world/support.hpp"
 
 #include <gmock/gmock.h>

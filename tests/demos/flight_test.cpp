@@ -1,6 +1,6 @@
 /// The aircraft of flight against an integration of its equations of motion in double with small
 /// steps, written down a second time.
-#include "examples/demos/demo.hpp"
+#include "src/demos/demo.hpp"
 
 #include <gtest/gtest.h>
 

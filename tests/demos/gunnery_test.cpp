@@ -1,5 +1,5 @@
 /// The two ballistic demos: rounds fly as the formulas say, end when they should, and push crates.
-#include "examples/demos/demo.hpp"
+#include "src/demos/demo.hpp"
 #include "tests/world/support.hpp"
 
 #include <gmock/gmock.h>

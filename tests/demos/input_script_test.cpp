@@ -1,5 +1,5 @@
 /// Input scripts: text there and back, every way to be wrong, playing.
-#include "examples/demos/input_script.hpp"
+#include "src/demos/input_script.hpp"
 
 #include <jfpx/error.hpp>
 

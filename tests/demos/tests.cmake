@@ -6,5 +6,5 @@ jfpx_add_test(demos_test SOURCES
   LINK jfpx_demos)
 foreach(target IN ITEMS demos_test demos_test_f64)
   target_compile_definitions(${target} PRIVATE
-    JFPX_INPUTS="${PROJECT_SOURCE_DIR}/examples/demos/inputs/")
+    JFPX_INPUTS="${PROJECT_SOURCE_DIR}/src/demos/inputs/")
 endforeach()

@@ -6,7 +6,9 @@
 
 #include <sstream>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// @param least the world, shrunk
 template <class World>
@@ -16,4 +18,6 @@ template <class World>
   fuzz::report_finding(text.str());
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -13,7 +13,9 @@
 /// Each target defines it: tries one input, and returns 0 whatever the input is.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
-namespace jfpx::inline JFPX_ABI::fuzz {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace fuzz {
 
 /// Ends the program, so that the fuzzer keeps the input. Of what its processes write, libFuzzer
 /// passes on the lines with "ERROR:" alone.
@@ -29,4 +31,6 @@ inline void require(bool holds, const char* what) {
   if (!holds) report_finding(std::string("not so: ") + what);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::fuzz
+}  // namespace fuzz
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -2,7 +2,7 @@
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
-#include "src/hash64.hpp"
+#include "src/base/hash64.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -12,7 +12,8 @@
 #include <span>
 #include <string_view>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 namespace {
 
 using fuzz::require;
@@ -110,7 +111,8 @@ void read_precision(const std::string& path, std::string_view bytes) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace jfpx;

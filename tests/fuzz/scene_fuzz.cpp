@@ -9,13 +9,14 @@
 #include <optional>
 #include <string_view>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 namespace {
 
 using fuzz::require;
 
 /// Larger ones say nothing more and take long.
-constexpr std::size_t kMostBodies = 24, kMostParts = 48;
+constexpr std::size_t kMaxBodies = 24, kMaxParts = 48;
 constexpr int kSteps = 3;
 
 std::optional<Scene> parsed(std::string_view text) {
@@ -29,15 +30,15 @@ std::optional<Scene> parsed(std::string_view text) {
 bool is_small(const Scene& scene) {
   std::size_t parts = 0;
   for (const BodyDef& body : scene.bodies) {
-    const auto* assembly = std::get_if<Assembly>(&body.shape);
-    if (assembly != nullptr) parts += assembly->parts.size();
+    const auto* compound = std::get_if<Compound>(&body.shape);
+    if (compound != nullptr) parts += compound->parts.size();
   }
-  return scene.bodies.size() <= kMostBodies && parts <= kMostParts;
+  return scene.bodies.size() <= kMaxBodies && parts <= kMaxParts;
 }
 
 std::optional<World> made(const Scene& scene, BroadPhase broad_phase) {
   try {
-    return World(scene, {.collider = {.backend = Backend::x86}, .broad_phase = broad_phase});
+    return World(scene, {.collider = {.backend = Backend::cpu}, .broad_phase = broad_phase});
   } catch (const InvalidScene&) {
     return std::nullopt;  // half-spaces and planes that move
   }
@@ -64,7 +65,8 @@ void step(const Scene& scene) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace jfpx;

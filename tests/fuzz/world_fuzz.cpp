@@ -10,7 +10,8 @@
 #include <optional>
 #include <variant>
 
-namespace jfpx::inline JFPX_ABI {
+namespace jfpx {
+inline namespace JFPX_ABI {
 namespace {
 
 using fuzz::add_drawn_force;
@@ -21,8 +22,8 @@ using fuzz::draw_state;
 using fuzz::require;
 using test::Bytes;
 
-constexpr std::size_t kMostBodies = 20, kMostForces = 8;
-constexpr int kMostCalls = 48;
+constexpr std::size_t kMaxBodies = 20, kMaxForces = 8;
+constexpr int kMaxCalls = 48;
 
 /// What a call returned, or the text of the error that refused it.
 template <class Result>
@@ -55,7 +56,7 @@ auto outcome(Call call) {
 class Twins {
  public:
   Twins(const Scene& scene, const WorldSettings& settings)
-      : first_(scene, WorldSettings{.collider = {.backend = Backend::x86}}),
+      : first_(scene, WorldSettings{.collider = {.backend = Backend::cpu}}),
         second_(scene, settings) {}
 
   const World& world() const { return first_; }
@@ -144,7 +145,7 @@ void push(Bytes& bytes, Twins& twins) {
 
 void change_forces(Bytes& bytes, Twins& twins) {
   const auto forces = twins.world().forces();
-  if (forces.size() < kMostForces && bytes.chance(Real(0.7))) {
+  if (forces.size() < kMaxForces && bytes.chance(Real(0.7))) {
     twins.both([&](World& w) { return add_drawn_force(bytes, w); });
   } else {
     const ForceId id =
@@ -155,7 +156,7 @@ void change_forces(Bytes& bytes, Twins& twins) {
 
 void change_generators(Bytes& bytes, Twins& twins) {
   const auto generators = twins.world().contact_generators();
-  if (generators.size() < kMostForces && bytes.chance(Real(0.6))) {
+  if (generators.size() < kMaxForces && bytes.chance(Real(0.6))) {
     const GeneratedContact contact = draw_contact(bytes, twins.world().bodies());
     twins.both([&](World& w) {
       return w.add_contact_generator([contact](ContactContext& context) { context.add(contact); });
@@ -170,7 +171,7 @@ void change_generators(Bytes& bytes, Twins& twins) {
 void call_anything(Bytes& bytes, Twins& twins) {
   switch (bytes.below(10)) {
     case 0:
-      if (twins.world().bodies().size() >= kMostBodies) break;
+      if (twins.world().bodies().size() >= kMaxBodies) break;
       twins.both([def = draw_body(bytes)](World& w) { return w.add(def); });
       break;
     case 1:
@@ -202,7 +203,8 @@ void call_anything(Bytes& bytes, Twins& twins) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI
+}  // namespace JFPX_ABI
+}  // namespace jfpx
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace jfpx;
@@ -215,7 +217,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const InvalidScene&) {
     return 0;
   }
-  for (int calls = 0; calls < kMostCalls && !bytes.used_up(); ++calls) {
+  for (int calls = 0; calls < kMaxCalls && !bytes.used_up(); ++calls) {
     call_anything(bytes, *twins);
   }
   return 0;

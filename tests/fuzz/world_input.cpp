@@ -4,7 +4,9 @@
 #include <optional>
 #include <utility>
 
-namespace jfpx::inline JFPX_ABI::fuzz {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace fuzz {
 namespace {
 
 using test::Bytes;
@@ -27,10 +29,10 @@ Vec3 draw_direction(Bytes& bytes) {
 Sphere draw_sphere(Bytes& bytes) { return {bytes.number(Real(0.1), Real(1.5))}; }
 Box draw_box(Bytes& bytes) { return {bytes.vector(Real(0.1), Real(1.5))}; }
 
-Assembly draw_assembly(Bytes& bytes) {
-  Assembly assembly;
+Compound draw_compound(Bytes& bytes) {
+  Compound compound;
   for (std::uint64_t n = bytes.below(4); n > 0; --n) {
-    AssemblyPart part;
+    CompoundPart part;
     if (bytes.chance(Real(0.5))) {
       part.shape = draw_sphere(bytes);
     } else {
@@ -39,9 +41,9 @@ Assembly draw_assembly(Bytes& bytes) {
     part.position = bytes.vector(-2, 2);
     part.orientation = draw_orientation(bytes);
     part.density = bytes.number(Real(0.1), 3);
-    assembly.parts.push_back(part);
+    compound.parts.push_back(part);
   }
-  return bytes.chance(Real(0.9)) ? centred(std::move(assembly)) : assembly;
+  return bytes.chance(Real(0.9)) ? centred(std::move(compound)) : compound;
 }
 
 Shape draw_shape(Bytes& bytes) {
@@ -54,7 +56,7 @@ Shape draw_shape(Bytes& bytes) {
     case 3:
       return Plane{draw_direction(bytes), bytes.number(-2, 2)};
     case 4:
-      return draw_assembly(bytes);
+      return draw_compound(bytes);
     default:
       return draw_sphere(bytes);
   }
@@ -139,7 +141,7 @@ Scene draw_scene(Bytes& bytes) {
 
 WorldSettings draw_settings(Bytes& bytes) {
   WorldSettings settings;
-  settings.collider.backend = Backend::x86;
+  settings.collider.backend = Backend::cpu;
   settings.collider.algorithm = SphereAlgorithm{static_cast<std::uint8_t>(bytes.below(3))};
   settings.collider.simd = SimdLevel{static_cast<std::uint8_t>(bytes.below(5))};
   settings.collider.threads = bytes.chance(Real(0.05)) ? 2 : 1;
@@ -226,4 +228,6 @@ ForceId add_drawn_force(Bytes bytes, World& world) {
   }
 }
 
-}  // namespace jfpx::inline JFPX_ABI::fuzz
+}  // namespace fuzz
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,9 @@
 
 #include "tests/support/bytes.hpp"
 
-namespace jfpx::inline JFPX_ABI::fuzz {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace fuzz {
 
 Scene draw_scene(test::Bytes& bytes);
 BodyDef draw_body(test::Bytes& bytes);
@@ -19,4 +21,6 @@ BodyId draw_id(test::Bytes& bytes, std::span<const BodyId> bodies);
 /// Adds the force that the bytes ask for.
 ForceId add_drawn_force(test::Bytes bytes, World& world);
 
-}  // namespace jfpx::inline JFPX_ABI::fuzz
+}  // namespace fuzz
+}  // namespace JFPX_ABI
+}  // namespace jfpx

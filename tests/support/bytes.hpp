@@ -8,7 +8,9 @@
 #include <limits>
 #include <span>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 /// Each draw takes one or two bytes, so that a fuzzer which changes a byte changes one choice. When
 /// the bytes are used up, pseudo-random numbers follow, the same ones each time.
@@ -89,4 +91,6 @@ class Bytes {
   Random beyond_{0};
 };
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

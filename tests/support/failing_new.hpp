@@ -7,7 +7,9 @@
 #include <functional>
 #include <new>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 /// Which allocations fail.
 enum class Shortage {
@@ -49,4 +51,6 @@ bool runs_out(std::size_t k, Shortage shortage, Call call) {
   return true;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -8,7 +8,9 @@
 #include <string>
 #include <sys/wait.h>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 struct ProcessResult {
   int status = -1;     ///< exit status; 128 + signal if it was killed
@@ -29,4 +31,6 @@ inline ProcessResult run_process(const std::string& command) {
   return result;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

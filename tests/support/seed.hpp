@@ -10,7 +10,9 @@
 #include <random>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 /// A fresh seed, or the one in JFPX_TEST_SEED. Lives as long as the test that uses it.
 class Seed {
@@ -33,4 +35,6 @@ class Seed {
   ::testing::ScopedTrace trace_{__FILE__, __LINE__, text_};
 };
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

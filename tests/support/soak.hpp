@@ -13,7 +13,9 @@
 #include <string>
 #include <unistd.h>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 /// Steps of a soak; JFPX_SOAK_STEPS=1000000 asks for the long one.
 inline std::uint64_t soak_steps() {
@@ -51,4 +53,6 @@ void expect_flat_memory(std::uint64_t steps, Step step) {
   testing::Test::RecordProperty("resident_bytes", std::to_string(resident_at_end));
 }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -11,7 +11,9 @@
 #include <memory>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 struct ColliderCase {
   std::string name;  ///< letters, digits and underscores
@@ -44,4 +46,6 @@ class SphereColliderContract : public testing::TestWithParam<ColliderCase> {
   std::unique_ptr<SphereCollider> collider_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

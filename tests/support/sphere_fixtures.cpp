@@ -1,7 +1,7 @@
 /// Sphere sets, oracle and comparison: see the header.
 #include "tests/support/sphere_fixtures.hpp"
 
-#include "src/shared/sphere_pair.hpp"
+#include "src/collide/sphere_pair.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,9 @@
 #include <random>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 namespace {
 
 using Spheres = std::vector<SphereInstance>;
@@ -278,7 +280,7 @@ std::vector<SphereContact> brute_force(std::span<const SphereInstance> spheres) 
   const auto n = static_cast<SphereIndex>(spheres.size());
   for (SphereIndex a = 0; a < n; ++a) {
     for (SphereIndex b = a + 1; b < n; ++b) {
-      const PairResult r = shared::test_sphere_pair(spheres[a], spheres[b]);
+      const PairResult r = detail::test_sphere_pair(spheres[a], spheres[b]);
       if (r.touching != 0) contacts.push_back({a, b, r.normal, r.distance});
     }
   }
@@ -324,4 +326,6 @@ std::size_t scaled(std::size_t n) {
 
 std::string seed_note() { return "repeat with JFPX_TEST_SEED=" + std::to_string(base_seed()); }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -11,7 +11,9 @@
 #include <string_view>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 /// A way to place n spheres. Every kind works for every n, 0 and 1 included.
 struct SphereKind {
@@ -31,7 +33,7 @@ std::vector<SphereInstance> make_gas(std::size_t n, Real radius, Real contacts, 
 std::vector<SphereInstance> make_lattice(std::size_t n, Real spacing);
 void shuffle(std::vector<SphereInstance>& spheres, Random& random);
 
-/// Every pair a < b through shared::test_sphere_pair: what find_contacts() must equal.
+/// Every pair a < b through detail::test_sphere_pair: what find_contacts() must equal.
 std::vector<SphereContact> brute_force(std::span<const SphereInstance> spheres);
 
 /// Success if both hold the same results in the same order with the same bits (any NaN equals any
@@ -52,4 +54,6 @@ std::size_t scaled(std::size_t n);
 /// To be streamed into a failing assertion or SCOPED_TRACE: how to repeat this run.
 std::string seed_note();
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -8,7 +8,9 @@
 #include <stdlib.h>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 class TemporaryFolder {
  public:
@@ -34,4 +36,6 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

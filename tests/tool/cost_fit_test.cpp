@@ -9,7 +9,9 @@
 
 #include <cmath>
 
-namespace jfpx::inline JFPX_ABI::tool {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
 namespace {
 
 using Term = double CostTerms::*;
@@ -87,4 +89,6 @@ TEST(Crossover, IsTheFirstSizeThatPays) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::tool
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -3,8 +3,8 @@
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
 
-#include "examples/demos/demo.hpp"
-#include "examples/scenes/scenes.hpp"
+#include "src/demos/demo.hpp"
+#include "src/scenes/scenes.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -1,21 +1,21 @@
 /// Camera, keys and mouse, clock and player: all of the viewer that needs no picture.
-#include "examples/viewer/controls.hpp"
+#include "src/viewer/controls.hpp"
 
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
-#include "examples/scenes/scenes.hpp"
-#include "examples/viewer/comparison.hpp"
-#include "examples/viewer/draw_order.hpp"
-#include "examples/viewer/exchangeable_collider.hpp"
-#include "examples/viewer/forces.hpp"
-#include "examples/viewer/image.hpp"
-#include "examples/viewer/islands.hpp"
-#include "examples/viewer/player.hpp"
-#include "examples/viewer/step_clock.hpp"
-#include "examples/viewer/timing.hpp"
-#include "examples/viewer/values.hpp"
-#include "src/cost_cache.hpp"
+#include "src/scenes/scenes.hpp"
+#include "src/sphere_collider/cost_cache.hpp"
+#include "src/viewer/comparison.hpp"
+#include "src/viewer/draw_order.hpp"
+#include "src/viewer/exchangeable_collider.hpp"
+#include "src/viewer/forces.hpp"
+#include "src/viewer/image.hpp"
+#include "src/viewer/islands.hpp"
+#include "src/viewer/player.hpp"
+#include "src/viewer/step_clock.hpp"
+#include "src/viewer/timing.hpp"
+#include "src/viewer/values.hpp"
 #include "tests/support/seed.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/viewer/us_keyboard.hpp"
@@ -411,10 +411,10 @@ TEST(Player, SwitchingTheBackendKeepsTheBits) {
   Player straight = player_of(scene), switched = player_of(scene);
   for (int i = 0; i < 60; ++i) {
     if (i == 10) {
-      EXPECT_TRUE(switched.switch_to({.backend = Backend::x86}));
+      EXPECT_TRUE(switched.switch_to({.backend = Backend::cpu}));
     }
     if (i == 25) {
-      EXPECT_TRUE(switched.switch_to({.backend = Backend::x86, .threads = 3}));
+      EXPECT_TRUE(switched.switch_to({.backend = Backend::cpu, .threads = 3}));
     }
     if (i == 40) {
       EXPECT_TRUE(switched.switch_to({}));
@@ -558,7 +558,7 @@ TEST(Player, ARecordingIsPlayedAndGoesOnLiveAndReplays) {
   EXPECT_TRUE(played.step_back());
   EXPECT_EQ(played.shown().step, 14u);
   EXPECT_FALSE(played.at_end());
-  EXPECT_FALSE(played.switch_to({.backend = Backend::x86}));
+  EXPECT_FALSE(played.switch_to({.backend = Backend::cpu}));
   played.step();
   EXPECT_EQ(played.shown().step, 16u);
   EXPECT_EQ(played.shown().computed_by, "x86");
@@ -791,10 +791,10 @@ TEST(Comparison, EnergyIsKineticPlusPotential) {
   EXPECT_NEAR(energy(scene, std::vector{turned}), 24 + 62.5 + 210, 1e-3);
 }
 
-TEST(Comparison, EnergyOfAnAssemblyHasItsArms) {
+TEST(Comparison, EnergyOfAnCompoundHasItsArms) {
   Scene scene;
   BodyDef dumbbell;
-  dumbbell.shape = Assembly{
+  dumbbell.shape = Compound{
       {{.shape = Sphere{1}, .position = {-3, 0, 0}}, {.shape = Sphere{1}, .position = {3, 0, 0}}}};
   dumbbell.mass = 2;
   dumbbell.acceleration = {};
@@ -806,10 +806,10 @@ TEST(Comparison, EnergyOfAnAssemblyHasItsArms) {
   EXPECT_NEAR(energy(scene, std::vector{state}), 3.5, 1e-4);
 }
 
-TEST(Stage, PartsOfAnAssemblyAreDrawnAndPickedWhereTheyAre) {
+TEST(Stage, PartsOfAnCompoundAreDrawnAndPickedWhereTheyAre) {
   Scene scene;
   BodyDef body;
-  body.shape = Assembly{{{.shape = Sphere{1}, .position = {-3, 0, 0}},
+  body.shape = Compound{{{.shape = Sphere{1}, .position = {-3, 0, 0}},
                          {.shape = Box{{1, 1, 1}}, .position = {3, 0, 0}}}};
   body.position = {0, 5, 0};
   body.orientation = {Real(0.70710678), 0, 0, Real(0.70710678)};  // x points up

@@ -1,9 +1,9 @@
 /// Demos in the viewer: scripts and keys steer them, and pictures show it.
-#include "examples/viewer/demo_show.hpp"
+#include "src/viewer/demo_show.hpp"
 
 #include <jfpx/error.hpp>
 
-#include "examples/viewer/scene_choice.hpp"
+#include "src/viewer/scene_choice.hpp"
 #include "tests/viewer/gl_fixture.hpp"
 
 #include <gmock/gmock.h>

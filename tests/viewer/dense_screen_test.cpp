@@ -1,7 +1,7 @@
 /// Windows with more pixels than units, as on screens of high density: all is as large as ever, and
 /// finer.
-#include "examples/viewer/image.hpp"
-#include "examples/viewer/scene_show.hpp"
+#include "src/viewer/image.hpp"
+#include "src/viewer/scene_show.hpp"
 #include "tests/viewer/row_of_balls.hpp"
 #include "tests/viewer/user.hpp"
 #include "tests/viewer/window_fixture.hpp"
@@ -61,7 +61,7 @@ TEST_F(DenseScreen, WidgetsAreWhereTheyWereAndAreHit) {
     user.drag_in("speed", 0.5, 1);
     EXPECT_EQ(user.show().speed, 4) << density;
     user.click("x86");
-    EXPECT_EQ(scene(user).player().choice().backend, Backend::x86) << density;
+    EXPECT_EQ(scene(user).player().choice().backend, Backend::cpu) << density;
   }
 }
 

@@ -3,15 +3,17 @@
 
 #include <jfpx/error.hpp>
 
-#include "examples/viewer/renderer.hpp"
-#include "examples/viewer/window.hpp"
+#include "src/viewer/renderer.hpp"
+#include "src/viewer/window.hpp"
 
 #include <gtest/gtest.h>
 
 #include <memory>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 /// Tests that draw derive from this; they are skipped, with the reason, where OpenGL is missing.
 class GlTest : public ::testing::Test {
@@ -43,4 +45,6 @@ class GlTest : public ::testing::Test {
   inline static std::string reason_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,9 +1,9 @@
 /// The window as a user has it: keys, another size, the end; events come from SDL's queue.
 #include <jfpx/recording.hpp>
 
-#include "examples/scenes/scenes.hpp"
-#include "examples/viewer/demo_show.hpp"
-#include "examples/viewer/scene_show.hpp"
+#include "src/scenes/scenes.hpp"
+#include "src/viewer/demo_show.hpp"
+#include "src/viewer/scene_show.hpp"
 #include "tests/viewer/window_fixture.hpp"
 
 #include <fstream>

@@ -2,9 +2,9 @@
 /// comes.
 #include <jfpx/recording.hpp>
 
-#include "examples/scenes/scenes.hpp"
-#include "examples/viewer/demo_show.hpp"
-#include "examples/viewer/scene_show.hpp"
+#include "src/scenes/scenes.hpp"
+#include "src/viewer/demo_show.hpp"
+#include "src/viewer/scene_show.hpp"
 #include "tests/viewer/row_of_balls.hpp"
 #include "tests/viewer/user.hpp"
 #include "tests/viewer/window_fixture.hpp"

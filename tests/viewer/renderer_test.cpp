@@ -1,5 +1,5 @@
 /// Pictures: what is drawn is where it must be, in its colour, hidden by what is before it.
-#include "examples/viewer/stage.hpp"
+#include "src/viewer/stage.hpp"
 #include "tests/support/seed.hpp"
 #include "tests/viewer/gl_fixture.hpp"
 

@@ -1,11 +1,13 @@
 /// A scene whose contacts and places in the picture are plain to see.
 #pragma once
 
-#include "examples/viewer/options.hpp"
+#include "src/viewer/options.hpp"
 
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 inline constexpr view::Size kRowSize{800, 640};
 /// Fast: what counts is where things are.
@@ -32,4 +34,6 @@ inline view::ViewOptions row_of_balls(const std::string& path) {
   return options;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -5,7 +5,7 @@ jfpx_add_test(panel_test SOURCES viewer/panel_test.cpp viewer/dense_screen_test.
 jfpx_add_test(renderer_test SOURCES viewer/renderer_test.cpp LINK jfpx_viewer)
 foreach(suffix IN ITEMS "" "_f64")
   target_compile_definitions(demo_show_test${suffix} PRIVATE
-    JFPX_INPUT_FOLDER="${PROJECT_SOURCE_DIR}/examples/demos/inputs")
+    JFPX_INPUT_FOLDER="${PROJECT_SOURCE_DIR}/src/demos/inputs")
   target_compile_definitions(renderer_test${suffix} PRIVATE
     JFPX_REFERENCE_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/viewer/reference")
 endforeach()

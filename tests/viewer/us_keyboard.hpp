@@ -5,7 +5,9 @@
 
 #include <SDL.h>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 inline SDL_Scancode us_scancode(SDL_Keycode code) {
   if (code >= SDLK_a && code <= SDLK_z) {
@@ -16,4 +18,6 @@ inline SDL_Scancode us_scancode(SDL_Keycode code) {
   return SDL_GetScancodeFromKey(code);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

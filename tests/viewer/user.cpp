@@ -35,7 +35,9 @@ extern "C" void SDL_GetWindowSize(SDL_Window* window, int* width, int* height) {
   }
 }
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 User::User(view::ViewOptions options, double density)
     : app_(on_screen(std::move(options), density)) {
@@ -158,4 +160,6 @@ void User::press(bool down) {
   if (!down) frame();  // what the panel asked for shows in the next picture
 }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

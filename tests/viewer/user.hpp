@@ -1,14 +1,16 @@
 /// A user of the window, who reads its panel and clicks what is there.
 #pragma once
 
-#include "examples/viewer/interactive.hpp"
-#include "examples/viewer/widgets.hpp"
+#include "src/viewer/interactive.hpp"
+#include "src/viewer/widgets.hpp"
 
 #include <string>
 #include <string_view>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 /// Knows of the panel what it says and where its widgets are drawn; all else goes through SDL's
 /// events.
@@ -60,4 +62,6 @@ class User {
   view::App app_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,6 +1,6 @@
 /// The program jfpx-view as a user meets it: pictures, exit statuses, errors.
-#include "examples/viewer/image.hpp"
-#include "examples/viewer/window.hpp"
+#include "src/viewer/image.hpp"
+#include "src/viewer/window.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
 

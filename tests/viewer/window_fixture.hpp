@@ -3,7 +3,7 @@
 
 #include <jfpx/error.hpp>
 
-#include "examples/viewer/interactive.hpp"
+#include "src/viewer/interactive.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/viewer/us_keyboard.hpp"
 
@@ -13,7 +13,9 @@
 #include <cstdlib>
 #include <filesystem>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 /// Tests that open windows derive from this; they are skipped, with the reason, where OpenGL is
 /// missing. What the viewer writes goes to the folder.
@@ -51,4 +53,6 @@ inline void push_key(SDL_Keycode code, bool down) {
   SDL_PushEvent(&event);
 }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,7 +1,7 @@
 /// Warm steps allocate nothing. A program of its own, because it replaces operator new.
 #include <jfpx/particle.hpp>
 
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ namespace jfpx {
 namespace {
 
 /// `automatic` takes memory when it first tries another way.
-const WorldSettings kFixed{.collider = {.backend = Backend::x86}};
+const WorldSettings kFixed{.collider = {.backend = Backend::cpu}};
 
 TEST(Allocation, StepsOverTheSameContactsAllocateNothing) {
   // At rest and awake: the same contacts step after step.
@@ -125,7 +125,7 @@ TEST(Allocation, NeitherCarryingNorEventsAllocateInWarmSteps) {
   EXPECT_GT(begun, 0u);
 }
 
-// The original keeps six pieces of memory for each contact of each step, for ever.
+// The original keeps six sub_shapes of memory for each contact of each step, for ever.
 TEST(Erratum, E31_contacts_keep_no_memory) {
   const long before = alive;
   {
@@ -140,12 +140,12 @@ TEST(Erratum, E31_contacts_keep_no_memory) {
   EXPECT_EQ(alive, before);
 }
 
-TEST(Allocation, WarmStepsOfAssembliesAllocateNothingWithAnyBroadPhase) {
+TEST(Allocation, WarmStepsOfCompoundsAllocateNothingWithAnyBroadPhase) {
   for (const BroadPhase way : {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {
     Scene scene;
     for (int i = 0; i < 10; ++i) {
       BodyDef def;
-      def.shape = Assembly{{{.shape = Sphere{}, .position = {0, 0, -1}},
+      def.shape = Compound{{{.shape = Sphere{}, .position = {0, 0, -1}},
                             {.shape = Sphere{}, .position = {0, 0, 1}},
                             {.shape = Box{{Real(0.2), Real(0.2), 1}}}}};
       def.position = {static_cast<Real>(i) * Real(0.9), Real(0.5), 0};

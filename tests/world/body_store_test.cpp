@@ -1,7 +1,7 @@
 /// Bodies: ids, free motion, forces, sleep.
-#include "src/body_store.hpp"
+#include "src/world/body_store.hpp"
 
-#include "src/shared/power.hpp"
+#include "src/base/power.hpp"
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
@@ -114,8 +114,8 @@ TEST(Erratum, E19_nothing_moves_an_immovable_body) {
 
 TEST(Erratum, E23_inertia_of_a_box_is_a_third_of_the_half_sizes) {
   // m/3 (b^2 + c^2) = 1/3 * 2 for a cube of half size 1.
-  EXPECT_NEAR(shared::moments_of_inertia(Box{{1, 1, 1}}, 1).x, Real(2) / 3, kEpsilon);
-  const Vec3 moments = shared::moments_of_inertia(Box{{1, 2, 3}}, 3);
+  EXPECT_NEAR(detail::moments_of_inertia(Box{{1, 1, 1}}, 1).x, Real(2) / 3, kEpsilon);
+  const Vec3 moments = detail::moments_of_inertia(Box{{1, 2, 3}}, 3);
   EXPECT_EQ(moments, (Vec3{13, 10, 5}));
 }
 

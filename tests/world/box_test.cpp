@@ -46,9 +46,9 @@ test::Sums box_sums(const World& world) {
     const BodyState& s = states[i];
     const auto* box = std::get_if<Box>(&def.shape);
     const Vec3 moments = box != nullptr
-                             ? shared::moments_of_inertia(*box, def.mass)
-                             : shared::moments_of_inertia(std::get<Sphere>(def.shape), def.mass);
-    const Mat3 inertia = shared::in_world_axes(diagonal(moments), to_matrix(s.orientation));
+                             ? detail::moments_of_inertia(*box, def.mass)
+                             : detail::moments_of_inertia(std::get<Sphere>(def.shape), def.mass);
+    const Mat3 inertia = detail::in_world_axes(diagonal(moments), to_matrix(s.orientation));
     const Vec3 spin = inertia * s.angular_velocity;
     const Vec3 orbit = cross(s.position, s.velocity) * def.mass;
     total.energy += static_cast<double>(

@@ -2,10 +2,10 @@
 #include <jfpx/broad_phase.hpp>
 #include <jfpx/error.hpp>
 
-#include "src/narrow_phase.hpp"
-#include "src/shared/bounding_sphere.hpp"
-#include "src/shared/sphere_pair.hpp"
-#include "tests/world/contact_oracle.hpp"
+#include "src/collide/bounding_sphere.hpp"
+#include "src/collide/sphere_pair.hpp"
+#include "src/world/contact_finder.hpp"
+#include "tests/collide/contact_oracle.hpp"
 #include "tests/world/shape_zoo.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ std::vector<SpherePair> all_touching(const Spheres& spheres) {
   std::vector<SpherePair> pairs;
   for (auto a = spheres.begin(); a != spheres.end(); ++a) {
     for (auto b = std::next(a); b != spheres.end(); ++b) {
-      if (shared::test_sphere_pair(a->second, b->second).touching != 0) {
+      if (detail::test_sphere_pair(a->second, b->second).touching != 0) {
         pairs.push_back({a->first, b->first});
       }
     }
@@ -103,7 +103,7 @@ TEST(SphereHierarchy, FindsAllPairsThroughInsertionsMovesAndRemovals) {
     std::vector<SphereHierarchy::Leaf> found, expected;
     tree.find_touching(query, &found);
     for (const auto& [leaf, sphere] : spheres) {
-      if (shared::test_sphere_pair(sphere, query).touching != 0) expected.push_back(leaf);
+      if (detail::test_sphere_pair(sphere, query).touching != 0) expected.push_back(leaf);
     }
     ASSERT_EQ(found, expected);
   }
@@ -185,9 +185,9 @@ TEST(SphereHierarchy, NumbersTooLargeToSquareLoseNoPair) {
 
 TEST(Erratum, E32_a_hierarchy_lives_grows_and_loses_its_leaves) {
   // Ours is made of values; the original's crashed at the first use and freed one child twice.
-  EXPECT_EQ(shared::growth({{0, 0, 0}, 2}, {{1, 0, 0}, 0.5_r}), 0);  // inside
+  EXPECT_EQ(detail::growth({{0, 0, 0}, 2}, {{1, 0, 0}, 0.5_r}), 0);  // inside
   // Around 1 at 0 and 1 at 4: radius 3, grown by 9 - 1.
-  EXPECT_NEAR(shared::growth({{0, 0, 0}, 1}, {{4, 0, 0}, 1}), 8, 600 * double{kEpsilon});
+  EXPECT_NEAR(detail::growth({{0, 0, 0}, 1}, {{4, 0, 0}, 1}), 8, 600 * double{kEpsilon});
   SphereHierarchy tree;
   std::vector<SphereHierarchy::Leaf> leaves;
   for (int i = 0; i < 100; ++i) leaves.push_back(tree.insert({{static_cast<Real>(i), 0, 0}, 1}));
@@ -215,7 +215,7 @@ TEST(BroadPhase, AllWaysFindTheSameContactsThroughInsertionsAndRemovals) {
   std::size_t contacts = 0;
   for (int round = 0; round < 30; ++round) {
     BodyStore bodies(0.01_r, SleepSettings{});
-    std::vector<NarrowPhase> ways;
+    std::vector<ContactFinder> ways;
     for (const BroadPhase way :
          {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {
       ways.emplace_back(make_sphere_collider(), way);
@@ -227,7 +227,7 @@ TEST(BroadPhase, AllWaysFindTheSameContactsThroughInsertionsAndRemovals) {
       } else {
         bodies.add(test::random_body(&random, 2));
       }
-      for (NarrowPhase& way : ways) way.set_bodies(bodies);
+      for (ContactFinder& way : ways) way.set_bodies(bodies);
       for (int move = 0; move < 3; ++move) {
         for (const BodyId id : bodies.ids()) {
           if (!bodies.movable(id.index)) continue;
@@ -235,7 +235,7 @@ TEST(BroadPhase, AllWaysFindTheSameContactsThroughInsertionsAndRemovals) {
                           random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * 0.1_r);
         }
         const std::vector<Contact> expected = test::ContactOracle(bodies).contacts();
-        for (NarrowPhase& way : ways) {
+        for (ContactFinder& way : ways) {
           std::vector<Contact> found;
           way.find_contacts(bodies, &found);
           ASSERT_EQ(found, expected) << round << ", change " << change;
@@ -253,7 +253,7 @@ TEST(BroadPhase, BoxesMayBeAsSmallAsNumbersGo) {
     for (const Real half :
          {Real(1e-15), Real(1e-22), Real(1e-30), std::numeric_limits<Real>::min()}) {
       BodyDef body = test::ball({0, 1, 0});
-      body.shape = Assembly{{{.shape = Sphere{1}}, {.shape = Box{{half, half, half}}}}};
+      body.shape = Compound{{{.shape = Sphere{1}}, {.shape = Box{{half, half, half}}}}};
       Scene scene;
       scene.bodies = {body, test::ball({1, 1, 0}), test::ground()};
       WorldSettings settings;

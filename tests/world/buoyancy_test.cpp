@@ -1,5 +1,5 @@
-/// What floats: boxes and assemblies; spheres are in force_test.cpp.
-#include "src/shared/submerged.hpp"
+/// What floats: boxes and compounds; spheres are in force_test.cpp.
+#include "src/world/submerged.hpp"
 #include "tests/world/force_support.hpp"
 
 #include <algorithm>
@@ -39,8 +39,8 @@ TEST(Submerged, PartsOfBoxesHaveTheVolumeOfTheFormula) {
     const Vec3 normal = normalized(direction);
     const Real reach = dot(normal, box.half_extents);
     const Real offset = random.uniform(-1.2_r, 1.2_r) * reach;
-    shared::Submerged below;
-    shared::add_submerged(box, {}, {normal, offset}, &below);
+    detail::Submerged below;
+    detail::add_submerged(box, {}, {normal, offset}, &below);
     std::array<double, 3> size{}, n{};
     double total = 1;
     for (int k = 0; k < 3; ++k) {
@@ -68,9 +68,9 @@ TEST(Submerged, WhatIsBelowAndAboveIsTheWholeBox) {
     const Vec3 normal = normalized(random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
     if (length_squared(normal) < 0.5_r) continue;
     const Real offset = random.uniform(-2, 2);
-    shared::Submerged both;
-    shared::add_submerged(box, pose, {normal, offset}, &both);
-    shared::add_submerged(box, pose, {-normal, -offset}, &both);
+    detail::Submerged both;
+    detail::add_submerged(box, pose, {normal, offset}, &both);
+    detail::add_submerged(box, pose, {-normal, -offset}, &both);
     const Vec3& h = box.half_extents;
     const Real volume = 8 * h.x * h.y * h.z;
     ASSERT_NEAR(both.volume, volume, 100 * kEpsilon * volume);
@@ -82,8 +82,8 @@ TEST(Submerged, TheMiddleIsThatOfManyPoints) {
   const Box box{{1, 0.5_r, 2}};
   const Transform pose = make_transform(normalized(Quat{2, 0.3_r, -0.5_r, 0.7_r}), {1, 2, 3});
   const HalfSpace liquid{normalized(Vec3{0.2_r, 1, 0.1_r}), 2.3_r};
-  shared::Submerged below;
-  shared::add_submerged(box, pose, liquid, &below);
+  detail::Submerged below;
+  detail::add_submerged(box, pose, liquid, &below);
   constexpr int kSide = 100;
   double sum[3] = {}, count = 0;
   for (int n = 0; n < kSide * kSide * kSide; ++n) {
@@ -121,14 +121,14 @@ TEST(BuoyancyForce, ABoxIsLiftedByTheLiquidItDisplaces) {
   }
 }
 
-TEST(BuoyancyForce, AnAssemblyOfTwoHalvesFloatsAsTheWhole) {
+TEST(BuoyancyForce, AnCompoundOfTwoHalvesFloatsAsTheWhole) {
   BodyDef whole = plank({1, 0.25_r, 0.5_r}, 400), halves = whole;
-  Assembly assembly;
+  Compound compound;
   for (const Real side : {-0.5_r, 0.5_r}) {
-    assembly.parts.push_back({.shape = Box{{0.5_r, 0.25_r, 0.5_r}}, .position = {side, 0, 0}});
+    compound.parts.push_back({.shape = Box{{0.5_r, 0.25_r, 0.5_r}}, .position = {side, 0, 0}});
   }
-  assembly.parts.push_back({.shape = Sphere{0.1_r}, .density = 1e-6_r});
-  halves.shape = assembly;
+  compound.parts.push_back({.shape = Sphere{0.1_r}, .density = 1e-6_r});
+  halves.shape = compound;
   whole.orientation = halves.orientation = normalized(Quat{1, 0.1_r, 0, 0.2_r});
   World one = world_of({whole}), two = world_of({halves});
   for (World* world : {&one, &two}) world->add_force(Buoyancy{.density = 1000, .gravity = 10});

@@ -4,7 +4,9 @@
 
 #include <thread>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 namespace {
 
 Scene crowd(std::uint64_t seed) {
@@ -77,4 +79,6 @@ TEST(Concurrency, WorldsInSeveralThreadsAreIndependent) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

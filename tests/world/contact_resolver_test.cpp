@@ -1,5 +1,5 @@
 /// The resolver on contacts made by hand, where the right answer can be written down.
-#include "src/contact_resolver.hpp"
+#include "src/world/contact_resolver.hpp"
 
 #include "tests/world/linear_scan.hpp"
 #include "tests/world/support.hpp"
@@ -144,7 +144,7 @@ TEST(Erratum, E04_contact_axes_are_orthonormal_for_every_normal) {
     if (i == 0) normal = {0.8_r, 0.6_r, 0};
     if (i < 7 && i > 0) normal = Vec3{}, normal[(i - 1) % 3] = i <= 3 ? 1 : -1;
     if (length_squared(normal) < 0.5_r) continue;
-    const shared::ContactBasis b = shared::contact_basis(normal);
+    const detail::ContactBasis b = detail::contact_basis(normal);
     ASSERT_NEAR(length(b.tangent), 1, kTolerance);
     ASSERT_NEAR(length(b.bitangent), 1, kTolerance);
     ASSERT_NEAR(dot(b.tangent, normal), 0, kTolerance);
@@ -363,11 +363,11 @@ TEST(ContactResolver, TheTournamentChoosesAsTheLinearScanDoesBitForBit) {
 
 TEST(WantedVelocityChange, BouncesOnTheSpeedOfTheHitButNotOnTheWeight) {
   // Closing at 2, of which 0.5 came from this step's gravity: back at 0.5 * 1.5.
-  EXPECT_EQ(shared::wanted_velocity_change(-2, -0.5_r, 0.5_r, 0.25_r), 2.75_r);
-  EXPECT_EQ(shared::wanted_velocity_change(-0.25_r, 0, 1, 0.25_r), 0.25_r);  // too slow to bounce
-  EXPECT_EQ(shared::wanted_velocity_change(-2, -3, 1, 0.25_r), 2);  // weight alone: no bounce
-  EXPECT_EQ(shared::wanted_velocity_change(-2, 1, 1, 0.25_r), 4);   // pulled apart: no gain
-  EXPECT_EQ(shared::wanted_velocity_change(3, 0, 1, 0.25_r), -3);   // leaving: nothing to do
+  EXPECT_EQ(detail::target_delta_velocity(-2, -0.5_r, 0.5_r, 0.25_r), 2.75_r);
+  EXPECT_EQ(detail::target_delta_velocity(-0.25_r, 0, 1, 0.25_r), 0.25_r);  // too slow to bounce
+  EXPECT_EQ(detail::target_delta_velocity(-2, -3, 1, 0.25_r), 2);  // weight alone: no bounce
+  EXPECT_EQ(detail::target_delta_velocity(-2, 1, 1, 0.25_r), 4);   // pulled apart: no gain
+  EXPECT_EQ(detail::target_delta_velocity(3, 0, 1, 0.25_r), -3);   // leaving: nothing to do
 }
 
 }  // namespace

@@ -8,7 +8,9 @@
 #include <utility>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 /// Balls of mass 2 and radius 1 that nothing else pulls, far enough apart not to touch.
 inline World world_of(std::vector<BodyDef> bodies, Real dt = Real(0.01)) {
@@ -26,4 +28,6 @@ inline void expect_near(const Vec3& actual, const Vec3& expected, double toleran
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(actual[i], expected[i], tolerance) << "xyz"[i];
 }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -7,9 +7,11 @@
 #include <span>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
-/// Same interface and same choices as Tournament, in O(n).
+/// Same interface and same choices as IndexedPriorityQueue, in O(n).
 class LinearScan {
  public:
   void assign(std::span<const Real> keys) { keys_.assign(keys.begin(), keys.end()); }
@@ -27,4 +29,6 @@ class LinearScan {
   std::vector<Real> keys_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,5 +1,5 @@
 /// mixed over a long time: balls and boxes in a pit stay in it, stay finite and gain no energy.
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
@@ -21,8 +21,8 @@ double energy(const World& world) {
         transform_transpose(to_matrix(states[i].orientation), states[i].angular_velocity);
     const auto* box = std::get_if<Box>(&def.shape);
     const Vec3 moments = box != nullptr
-                             ? shared::moments_of_inertia(*box, def.mass)
-                             : shared::moments_of_inertia(std::get<Sphere>(def.shape), def.mass);
+                             ? detail::moments_of_inertia(*box, def.mass)
+                             : detail::moments_of_inertia(std::get<Sphere>(def.shape), def.mass);
     sum += static_cast<double>(def.mass * length_squared(states[i].velocity) / 2 +
                                dot(component_product(moments, spin), spin) / 2 -
                                def.mass * dot(def.acceleration, states[i].position));

@@ -10,17 +10,19 @@
 
 #include <array>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 namespace {
 
 const std::array<WorldSettings, 5> kSettings{{
-    {.collider = {.backend = Backend::x86, .algorithm = SphereAlgorithm::all_pairs}},
-    {.collider = {.backend = Backend::x86,
+    {.collider = {.backend = Backend::cpu, .algorithm = SphereAlgorithm::all_pairs}},
+    {.collider = {.backend = Backend::cpu,
                   .algorithm = SphereAlgorithm::sorted_tiles,
                   .threads = 3}},
     {.collider = {}},
-    {.collider = {.backend = Backend::x86}, .broad_phase = BroadPhase::hierarchy},
-    {.collider = {.backend = Backend::x86}, .broad_phase = BroadPhase::brute_force},
+    {.collider = {.backend = Backend::cpu}, .broad_phase = BroadPhase::hierarchy},
+    {.collider = {.backend = Backend::cpu}, .broad_phase = BroadPhase::brute_force},
 }};
 
 /// All shapes, in contact.
@@ -111,9 +113,9 @@ TEST(OutOfMemoryInAWorld, WhatFailedToComeHasLeftNoTrace) {
   SCOPED_TRACE(trace(seed));
   const Scene scene = crowd(seed);
   BodyDef def;
-  def.shape = Assembly{
+  def.shape = Compound{
       {{.shape = Sphere{}, .position = {0, 0, -1}}, {.shape = Box{}, .position = {0, 0, 1}}}};
-  def.shape = centred(std::get<Assembly>(def.shape));
+  def.shape = centred(std::get<Compound>(def.shape));
   const auto body = [&](World& world) { world.add(def); };
   const auto force = [](World& world) { world.add_force(Drag{.linear = 1}); };
   const auto generator = [](World& world) {
@@ -273,4 +275,6 @@ TEST(OutOfMemoryInRecordings, FramesAreWrittenWithoutMemoryAndReadTheNextTime) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

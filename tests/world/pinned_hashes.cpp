@@ -5,9 +5,9 @@
 #include <jfpx/random.hpp>
 #include <jfpx/world.hpp>
 
-#include "examples/demos/demo.hpp"
-#include "examples/scenes/scenes.hpp"
-#include "src/hash64.hpp"
+#include "src/base/hash64.hpp"
+#include "src/demos/demo.hpp"
+#include "src/scenes/scenes.hpp"
 
 #include <cinttypes>
 #include <cstdio>
@@ -61,7 +61,7 @@ SimdLevel simd_of(unsigned threads) {
 /// False, with a line that says why, if the run goes wrong, resolves nothing, or ends elsewhere.
 bool check(const Pin& pin, unsigned threads) {
   WorldSettings settings;
-  settings.collider = {.backend = Backend::x86, .threads = threads, .simd = simd_of(threads)};
+  settings.collider = {.backend = Backend::cpu, .threads = threads, .simd = simd_of(threads)};
   // Of small sets, threads share the rows of all pairs alone.
   if (threads > 1 && pin.spheres < 20000) {
     settings.collider.algorithm = SphereAlgorithm::all_pairs;

@@ -3,7 +3,9 @@
 
 #include "tests/world/support.hpp"
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 inline Quat random_turn(Random* random) {
   Quat q;
@@ -19,37 +21,39 @@ inline Vec3 random_direction(Random* random) {
   return normalized(rotate(random_turn(random), {1, 0, 0}));
 }
 
-inline std::variant<Sphere, Box> random_piece(Random* random) {
+inline std::variant<Sphere, Box> random_sub_shape(Random* random) {
   if (random->below(2) == 0) return Sphere{random->uniform(0.1_r, 0.6_r)};
   return Box{random->uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {0.5_r, 0.7_r, 0.9_r})};
 }
 
 /// One to five parts of any kind.
-inline Assembly random_assembly(Random* random) {
-  Assembly assembly;
+inline Compound random_compound(Random* random) {
+  Compound compound;
   for (std::uint64_t left = 1 + random->below(5); left > 0; --left) {
-    AssemblyPart part;
-    part.shape = random_piece(random);
+    CompoundPart part;
+    part.shape = random_sub_shape(random);
     part.position = random->uniform_in_box({-1, -1, -1}, {1, 1, 1});
     part.orientation = random_turn(random);
     part.density = random->uniform(0.5_r, 2);
-    assembly.parts.push_back(part);
+    compound.parts.push_back(part);
   }
-  return centred(assembly);
+  return centred(compound);
 }
 
-/// A third each of spheres, boxes and assemblies, some immovable, and now and then a wall.
+/// A third each of spheres, boxes and compounds, some immovable, and now and then a wall.
 inline BodyDef random_body(Random* random, Real room) {
   BodyDef def;
   const std::uint64_t kind = random->below(31);
   if (kind == 0) def.shape = HalfSpace{rotate(random_turn(random), {1, 0, 0}), -room};
   if (kind == 1) def.shape = Plane{rotate(random_turn(random), {1, 0, 0}), random->uniform(-1, 1)};
-  if (kind > 1) def.shape = std::visit([](auto s) -> Shape { return s; }, random_piece(random));
-  if (kind > 20) def.shape = random_assembly(random);
+  if (kind > 1) def.shape = std::visit([](auto s) -> Shape { return s; }, random_sub_shape(random));
+  if (kind > 20) def.shape = random_compound(random);
   def.mass = kind < 2 || random->below(6) == 0 ? Real(0) : random->uniform(0.5_r, 2);
   def.position = random->uniform_in_box({-room, -room, -room}, {room, room, room});
   def.orientation = random_turn(random);
   return def;
 }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -7,7 +7,9 @@
 
 #include <deque>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 namespace {
 
 /// A box of half-spaces.
@@ -87,4 +89,6 @@ TEST(Soak, ParticlesThatComeAndGoKeepTheirMemoryFlat) {
 }
 
 }  // namespace
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

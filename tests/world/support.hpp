@@ -4,8 +4,8 @@
 #include <jfpx/random.hpp>
 #include <jfpx/world.hpp>
 
-#include "src/body_store.hpp"
-#include "src/shared/inertia.hpp"
+#include "src/scene/inertia.hpp"
+#include "src/world/body_store.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,9 @@
 #include <random>
 #include <string>
 
-namespace jfpx::inline JFPX_ABI::test {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
 
 /// A Real that is written as a decimal number.
 constexpr Real operator""_r(long double value) { return static_cast<Real>(value); }
@@ -83,7 +85,7 @@ inline Sums sums(std::span<const BodyDef> bodies, std::span<const BodyState> sta
     if (!(m > 0)) continue;
     const BodyState& s = states[i];
     const double inertia = static_cast<double>(
-        shared::moments_of_inertia(std::get<Sphere>(bodies[i].shape), bodies[i].mass).x);
+        detail::moments_of_inertia(std::get<Sphere>(bodies[i].shape), bodies[i].mass).x);
     const double x[3] = {s.position.x, s.position.y, s.position.z};
     const double v[3] = {s.velocity.x, s.velocity.y, s.velocity.z};
     const double w[3] = {s.angular_velocity.x, s.angular_velocity.y, s.angular_velocity.z};
@@ -99,4 +101,6 @@ inline Sums sums(std::span<const BodyDef> bodies, std::span<const BodyState> sta
 }
 inline Sums sums(const World& world) { return sums(world.scene().bodies, world.states()); }
 
-}  // namespace jfpx::inline JFPX_ABI::test
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

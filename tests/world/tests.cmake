@@ -1,31 +1,25 @@
 jfpx_add_test(world_parts_test INTERNAL SOURCES
   world/body_store_test.cpp
-  world/box_pair_test.cpp
-  world/collide_test.cpp
+  world/broad_phase_test.cpp
+  world/compound_test.cpp
   world/contact_resolver_test.cpp
-  world/inertia_tensor_test.cpp
-  world/intersect_test.cpp
-  world/pair_oracle_test.cpp
-  world/power_test.cpp
-  world/scene_validate_test.cpp
-  world/tournament_test.cpp)
+  world/indexed_priority_queue_test.cpp)
 jfpx_add_test(world_test SOURCES
   world/box_test.cpp
   world/buoyancy_test.cpp
   world/contact_events_test.cpp
   world/contact_generator_test.cpp
+  world/erratum_test.cpp
   world/force_registry_test.cpp
   world/force_test.cpp
-  world/inertia_test.cpp
   world/kinematic_test.cpp
   world/mixed_test.cpp
   world/motion_test.cpp
+  world/particle_test.cpp
   world/query_test.cpp
+  world/recording_test.cpp
   world/rest_test.cpp
   world/world_test.cpp)
-jfpx_add_test(particle_test SOURCES world/particle_test.cpp)
-jfpx_add_test(assembly_test INTERNAL SOURCES world/assembly_test.cpp)
-jfpx_add_test(broad_phase_test INTERNAL SOURCES world/broad_phase_test.cpp)
 jfpx_add_test(concurrency_test SOURCES world/concurrency_test.cpp)
 jfpx_add_test(soak_test SOURCES world/soak_test.cpp)
 # These replace operator new: programs of their own.

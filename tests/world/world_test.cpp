@@ -1,7 +1,7 @@
 /// The world as its users see it: bodies come and go, reports, failures, contacts, determinism.
 #include <jfpx/error.hpp>
 
-#include "examples/scenes/scenes.hpp"
+#include "src/scenes/scenes.hpp"
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
@@ -53,7 +53,7 @@ TEST(World, ReportsWhatAStepDid) {
   const StepReport report = world.step();
   EXPECT_EQ(report.step, 2u);
   EXPECT_EQ(report.awake, 2u);
-  EXPECT_EQ(report.backend, Backend::x86);
+  EXPECT_EQ(report.backend, Backend::cpu);
   EXPECT_EQ(report.contacts, world.contacts().size());
   EXPECT_LE(report.integrate_ms + report.detect_ms + report.resolve_ms,
             report.total_ms * 1.001 + 1e-6);
@@ -252,7 +252,7 @@ class FailingCollider final : public SphereCollider {
                                          std::span<const SpherePair>) override {
     return {};
   }
-  Backend backend() const noexcept override { return Backend::x86; }
+  Backend backend() const noexcept override { return Backend::cpu; }
   SphereAlgorithm algorithm() const noexcept override { return SphereAlgorithm::all_pairs; }
 
  private:

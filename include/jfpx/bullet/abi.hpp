@@ -15,10 +15,14 @@
 #error "jfpx keeps the bits of Bullet's scalar code: undefine BT_USE_SSE and BT_USE_NEON"
 #endif
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 static_assert(std::is_same_v<btScalar, Real>,
               "jfpx::bullet goes with Bullet in float, jfpx::bullet_f64 with Bullet in double "
               "(BT_USE_DOUBLE_PRECISION): the two are mixed here");
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -7,7 +7,9 @@
 #include <BulletCollision/CollisionDispatch/btActivatingCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btCollisionCreateFunc.h>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// What btSphereSphereCollisionAlgorithm does, bit for bit, with jfpx's own arithmetic. One pair at
 /// a time, so it is not faster: it is for those who want jfpx's contacts in a dispatcher of their
@@ -51,4 +53,6 @@ class JFPX_API SphereSphereAlgorithm final : public btActivatingCollisionAlgorit
   btPersistentManifold* manifold_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -12,11 +12,12 @@
 #include <string>
 #include <string_view>
 
-namespace jfpx::inline JFPX_ABI {
-class GroupSolver;
-}
+namespace jfpx {
+inline namespace JFPX_ABI {
 
-namespace jfpx::inline JFPX_ABI::bullet {
+class GroupSolver;
+
+namespace bullet {
 
 struct ConstraintSolverOptions {
   Build headers = Build::of_these_headers;  ///< leave it: what the caller includes
@@ -93,4 +94,6 @@ class JFPX_API ConstraintSolver : public btSequentialImpulseConstraintSolver {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -8,7 +8,9 @@
 #include <string>
 #include <string_view>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// Why a dispatch was left to Bullet's own code as a whole. The bits are the same either way.
 enum class Fallback : std::uint8_t {
@@ -50,4 +52,6 @@ struct DispatchStats {
   double commit_ms = 0;           ///< wall clock of batches: the ordered walk
 };
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

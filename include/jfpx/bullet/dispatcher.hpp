@@ -10,7 +10,9 @@
 
 #include <memory>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 struct DispatcherOptions {
   SphereColliderOptions collider = {};  ///< who tests the sphere pairs
@@ -76,4 +78,6 @@ class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -9,7 +9,9 @@
 #include <cstddef>
 #include <memory>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 struct DynamicsWorldOptions {
   Build headers = Build::of_these_headers;  ///< leave it: what the caller includes
@@ -65,4 +67,6 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -7,7 +7,9 @@
 
 #include <limits>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// True if the compiler of *this translation unit* makes one operation of a product and a sum, as
 /// g++ does with -march=native unless told -ffp-contract=off. Bullet's headers are compiled into
@@ -20,4 +22,6 @@ namespace jfpx::inline JFPX_ABI::bullet {
   return a * b + c != 0;                // 1 - kStep^2 is 1 if it is rounded
 }
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

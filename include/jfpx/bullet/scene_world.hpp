@@ -11,7 +11,9 @@
 #include <span>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 enum class DispatcherKind : std::uint8_t { stock, jfpx };
 enum class SolverKind : std::uint8_t { stock, jfpx };
@@ -44,9 +46,9 @@ struct StageTimes {
 /// dynamic tree broadphase. What a body of the scene becomes:
 /// - mass 0 is a static body; a half-space is a static plane and follows no pose; Bullet has no
 ///   two-sided plane;
-/// - an assembly is a btCompoundShape in its principal axes, with the inertia of the native engine;
+/// - an compound is a btCompoundShape in its principal axes, with the inertia of the native engine;
 /// - a kinematic body is one of Bullet's, moved by its velocities before each step;
-/// - a given inertia, but for an assembly, must be diagonal, for Bullet keeps moments about the
+/// - a given inertia, but for an compound, must be diagonal, for Bullet keeps moments about the
 ///   axes of the shape;
 /// - damping: Bullet's is the share of velocity *lost* per second, with the same law of decay;
 /// - friction and restitution: Bullet multiplies the values of two bodies, so they stay as they are
@@ -92,4 +94,6 @@ class JFPX_API SceneWorld {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
-namespace jfpx::inline JFPX_ABI::bullet {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
 
 /// The first place where two things differ.
 struct Difference {
@@ -64,4 +66,6 @@ class JFPX_API ContactCheck {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::bullet
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

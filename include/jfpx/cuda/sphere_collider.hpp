@@ -8,7 +8,9 @@
 
 struct CUstream_st;
 
-namespace jfpx::inline JFPX_ABI::cuda {
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
 
 /// A cudaStream_t, without the CUDA headers.
 using Stream = CUstream_st*;
@@ -71,4 +73,6 @@ class JFPX_API DeviceSphereCollider {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace jfpx::inline JFPX_ABI::cuda
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,19 @@
+/// Name and vector instruction sets of the processor.
+#pragma once
+
+#include <jfpx/simd_level.hpp>
+
+#include <string>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// The widest level that this processor and the operating system support.
+SimdLevel widest_simd_level() noexcept;
+/// `wanted`, lowered to what there is; `automatic` is the widest.
+SimdLevel usable_simd_level(SimdLevel wanted) noexcept;
+/// E.g. "AMD EPYC 9654 96-Core Processor, AVX-512".
+std::string describe_processor();
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

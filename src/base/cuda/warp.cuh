@@ -1,0 +1,66 @@
+/// Reductions, scans and searches across the lanes of a warp.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <bit>
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+inline constexpr unsigned kFullWarp = 0xffffffffu;
+
+__device__ inline unsigned lane_id() { return threadIdx.x % 32; }
+__device__ inline unsigned lanes_below() { return (1u << lane_id()) - 1; }
+
+/// Sum, maximum and union over a warp; every lane gets it.
+template <typename T, typename Combine>
+__device__ inline T warp_reduce(T value, Combine combine) {
+  for (unsigned d = 16; d != 0; d /= 2) {
+    value = combine(value, __shfl_xor_sync(kFullWarp, value, static_cast<int>(d)));
+  }
+  return value;
+}
+
+__device__ inline unsigned warp_max(unsigned value) {
+#if __CUDA_ARCH__ >= 800
+  return __reduce_max_sync(kFullWarp, value);
+#else
+  return warp_reduce(value, [](unsigned p, unsigned q) { return p > q ? p : q; });
+#endif
+}
+
+/// Largest number of a warp; every lane gets it. Not for NaN.
+__device__ inline Real warp_max(Real x) {
+#if __CUDA_ARCH__ >= 800 && !defined(JFPX_DOUBLE_PRECISION)
+  const auto in_order = [](int bits) { return bits ^ (bits >> 31 & 0x7fffffff); };
+  return std::bit_cast<Real>(
+      in_order(__reduce_max_sync(kFullWarp, in_order(std::bit_cast<int>(x)))));
+#else
+  return warp_reduce(x, [](Real p, Real q) { return q > p ? q : p; });
+#endif
+}
+
+/// Sum of the values of this lane and those below.
+__device__ inline unsigned warp_inclusive_sum(unsigned value) {
+  for (unsigned d = 1; d < 32; d *= 2) {
+    const unsigned below = __shfl_up_sync(kFullWarp, value, d);
+    if (lane_id() >= d) value += below;
+  }
+  return value;
+}
+
+/// Of sums that grow from lane to lane: the lane with the first one beyond i, or the last lane.
+__device__ inline unsigned owner_of(std::uint32_t i, std::uint32_t sum) {
+  unsigned owner = 0;
+  for (unsigned step = 16; step != 0; step /= 2) {
+    if (__shfl_sync(kFullWarp, sum, owner + step - 1) <= i) owner += step;
+  }
+  return owner;
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

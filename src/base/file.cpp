@@ -1,0 +1,47 @@
+/// Whole files, with errors that say which file and why.
+#include "src/base/file.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/base/atomic_file.hpp"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+struct Close {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, Close>;
+
+}  // namespace
+
+std::string file_message(const std::string& path, std::string_view what, int error_number) {
+  return path + ": " + std::string(what) + ": " + std::strerror(error_number);
+}
+
+std::string read_file(const std::string& path) {
+  const File file(std::fopen(path.c_str(), "rb"));
+  if (!file) throw FileError(file_message(path, "can't be opened", errno));
+  std::string content;
+  char buffer[1 << 16];
+  for (std::size_t n; (n = std::fread(buffer, 1, sizeof buffer, file.get())) > 0;) {
+    content.append(buffer, n);
+  }
+  if (std::ferror(file.get()) != 0) throw FileError(file_message(path, "can't be read", errno));
+  return content;
+}
+
+void write_file(const std::string& path, std::string_view content) {
+  AtomicFile file(path);
+  file.write(content);
+  file.finish();
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

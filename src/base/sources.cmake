@@ -1,0 +1,12 @@
+list(APPEND JFPX_SOURCES
+  ${CMAKE_CURRENT_LIST_DIR}/atomic_file.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/build.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/error.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/file.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/thread_pool.cpp)
+list(APPEND JFPX_CUDA_SOURCES
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/cuda_try.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/device_buffer.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/device_code.cu
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/probe.cpp)

@@ -1,0 +1,265 @@
+/// One dispatch: a read-only pre-pass over all pairs, the collider, then a commit that does for
+/// each pair what Bullet would have done: in any order where that can't be observed, in Bullet's
+/// elsewhere.
+#include "src/bullet/dispatch/batch_engine.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/bullet/dispatch/pair_check.hpp"
+#include "src/bullet/failure.hpp"
+#include "src/bullet/prefetch.hpp"
+
+#include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
+#include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
+#include <LinearMath/btQuickprof.h>
+
+#include <chrono>
+#include <exception>
+#include <functional>
+#include <new>
+#include <typeinfo>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds(Clock::time_point begin, Clock::time_point end) {
+  return std::chrono::duration<double, std::milli>(end - begin).count();
+}
+
+std::span<const btBroadphasePair> pairs_of(btOverlappingPairCache& cache) {
+  const int n = cache.getNumOverlappingPairs();
+  // Bullet asserts when an empty cache is asked for its array.
+  if (n <= 0) return {};
+  return {cache.getOverlappingPairArrayPtr(), static_cast<std::size_t>(n)};
+}
+
+/// Sets a flag for the time of a dispatch, also when a callback throws.
+class Running {
+ public:
+  explicit Running(bool* flag) : flag_(flag) { *flag_ = true; }
+  ~Running() { *flag_ = false; }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+ private:
+  bool* flag_;
+};
+
+/// Whether pairs of spheres get Bullet's own algorithm. The table of create functions is protected.
+bool has_bullets_sphere_function(const btCollisionDispatcher& dispatcher) {
+  struct Access : btCollisionDispatcher {
+    static constexpr auto table() { return &Access::m_doubleDispatchContactPoints; }
+  };
+  const btCollisionAlgorithmCreateFunc* function =
+      (dispatcher.*Access::table())[SPHERE_SHAPE_PROXYTYPE][SPHERE_SHAPE_PROXYTYPE];
+  return function != nullptr &&
+         typeid(*function) == typeid(btSphereSphereCollisionAlgorithm::CreateFunc);
+}
+
+}  // namespace
+
+BatchEngine::BatchEngine(std::unique_ptr<SphereCollider> collider, const DispatcherOptions& options)
+    : collider_(std::move(collider)),
+      minimum_batch_(options.minimum_batch),
+      verify_(options.verify),
+      pool_(options.collider.threads) {
+  verify_build(options.collider.headers);
+  if (collider_ == nullptr) throw InvalidArgument("collider is null; it must be a SphereCollider");
+  if (options.fuses_products) {
+    stats_.warning =
+        "the program is compiled with fused multiply-add, also in Bullet's headers: its bits are "
+        "not those of other builds; compile it with -ffp-contract=off";
+  }
+}
+
+Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatcher,
+                                          std::size_t pairs, const btDispatcherInfo& info) const {
+  if (running_) return Fallback::nested;
+  if (pairs == 0 || pairs < minimum_batch_) return Fallback::small_batch;
+  if (dispatcher.getNearCallback() != btNearCallback(btCollisionDispatcher::defaultNearCallback)) {
+    return Fallback::near_callback;
+  }
+  if (!has_bullets_sphere_function(dispatcher)) return Fallback::create_function;
+  if (info.m_dispatchFunc != btDispatcherInfo::DISPATCH_DISCRETE) return Fallback::continuous;
+  return Fallback::none;
+}
+
+/// Everything before the commit, and all that may throw. False and `*fallback` set if there is
+/// nothing to do or something failed that x86 needs too.
+bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
+                          btOverlappingPairCache& cache, Fallback* fallback) {
+  try {
+    if (!batch_.gather(pairs_, {&dispatcher, traits.tells_releases}, pool_)) {
+      *fallback = Fallback::no_spheres;
+      return false;
+    }
+    find_touching();
+    // A cache of another class may show its user more of the walk than the pairs.
+    quiet_ = typeid(cache) == typeid(btHashedOverlappingPairCache) &&
+             is_quiet(batch_, traits.may_override_filter);
+    if (quiet_) {
+      quiet_commit_.reserve(pairs_.size());
+    } else {
+      add(ordered_commit_.plan(batch_, touching_, traits.may_override_filter));
+    }
+    return true;
+  } catch (const std::exception& error) {
+    stats_.failure = text_of(error);
+    batch_.forget_all();
+    *fallback = Fallback::out_of_memory;
+    return false;
+  }
+}
+
+/// If the collider fails, for example because its device is lost, x86 takes over for good. What x86
+/// itself can want is memory, which the next dispatch may find.
+void BatchEngine::find_touching() {
+  try {
+    touching_ = collider_->find_touching(batch_.spheres(), batch_.pairs());
+    batch_.expect_contacts(touching_.size());
+    const TransferredBytes bytes = collider_->transferred();
+    stats_.to_device += bytes.to_device;
+    stats_.from_device += bytes.from_device;
+    if (const auto why = collider_->device_failure(); !why.empty()) stats_.device_failure = why;
+  } catch (const std::exception& error) {
+    const bool on_x86 = !stats_.device_failure.empty() || collider_->backend() == Backend::cpu;
+    if (on_x86 && is_shortage(error)) throw;
+    stats_.device_failure = text_of(error);
+    collider_ = make_sphere_collider({.backend = Backend::cpu, .threads = pool_.threads()});
+    touching_ = collider_->find_touching(batch_.spheres(), batch_.pairs());
+  }
+}
+
+bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
+                           btOverlappingPairCache& cache, const btDispatcherInfo& info,
+                           btDispatcher* argument) {
+  ++stats_.dispatches;
+  const std::span<const btBroadphasePair> pairs = pairs_of(cache);
+  Fallback fallback = reason_to_fall_back(dispatcher, pairs.size(), info);
+  const auto start = fallback == Fallback::none ? Clock::now() : Clock::time_point{};
+  if (fallback == Fallback::none) {
+    pairs_ = pairs;
+    prepare(dispatcher, traits, cache, &fallback);
+  }
+  stats_.last_fallback = fallback;
+  if (fallback != Fallback::none) {
+    ++stats_.fallbacks[static_cast<std::size_t>(fallback)];
+    return false;
+  }
+  ++stats_.batches;
+  stats_.pairs += pairs.size();
+  const auto prepared = Clock::now();
+  commit(dispatcher, cache, info, argument);
+  stats_.prepare_ms += milliseconds(start, prepared);
+  stats_.commit_ms += milliseconds(prepared, Clock::now());
+  return true;
+}
+
+void BatchEngine::commit(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                         const btDispatcherInfo& info, btDispatcher* argument) {
+  const Running running(&running_);
+  BT_PROFILE("processAllOverlappingPairs");
+  if (quiet_) {
+    commit_quietly(dispatcher, cache, info);
+    return;
+  }
+  const auto verify = [&](std::size_t i, bool current) { check(dispatcher, info, i, current); };
+  OrderedCommit::Visited visited;
+  if (verify_) visited = std::ref(verify);  // which needs no memory
+  stats_.written +=
+      ordered_commit_.run(dispatcher, cache, info, argument, batch_, pairs_, touching_, visited);
+}
+
+void BatchEngine::commit_quietly(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                                 const btDispatcherInfo& info) {
+  const std::size_t n = pairs_.size();
+  if (verify_) convex_check_.remember(batch_);
+  add(quiet_commit_.run(dispatcher, batch_, touching_, pool_));
+  if (verify_) check_convex(dispatcher, info);
+  quiet_commit_.sort_left(pairs_, info.m_deterministicOverlappingPairs);
+  visit_left(dispatcher, cache, info);
+  if (!verify_) return;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (batch_.kind(i) != PairKind::spheres || !batch_.both_are_spheres(i)) continue;
+    check(dispatcher, info, i, dispatcher.needsCollision(batch_.body_a(i), batch_.body_b(i)));
+  }
+}
+
+void BatchEngine::visit_left(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                             const btDispatcherInfo& info) {
+  constexpr std::size_t kAhead = 4;
+  const std::span<const std::uint32_t> left = quiet_commit_.left();
+  const std::size_t n = pairs_.size();
+  // The array may grow, and move, while Bullet's algorithms run.
+  const auto visit = [&](std::size_t i) {
+    if (i >= pairs_of(cache).size()) return;
+    (*dispatcher.getNearCallback())(cache.getOverlappingPairArrayPtr()[i], dispatcher, info);
+  };
+  for (std::size_t k = 0; k < left.size(); ++k) {
+    if (k + kAhead < left.size()) {
+      const std::size_t i = left[k + kAhead];
+      prefetch_for_contact(*batch_.body_a(i));
+      prefetch_for_contact(*batch_.body_b(i));
+      if (batch_.manifold(i) != nullptr) {
+        prefetch_header(batch_.manifold(i));
+        prefetch_first_point(batch_.manifold(i));
+      }
+    }
+    visit(left[k]);
+  }
+  for (std::size_t i = n; i < pairs_of(cache).size(); ++i) visit(i);
+}
+
+void BatchEngine::add(const CommitCounts& counts) {
+  stats_.sphere_pairs += counts.sphere_pairs;
+  stats_.touching += counts.touching;
+  stats_.written += counts.written;
+  stats_.sphere_boxes += counts.sphere_boxes;
+  stats_.sphere_planes += counts.sphere_planes;
+}
+
+void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info,
+                        std::size_t i, bool current) {
+  ++stats_.verified;
+  const btPersistentManifold* manifold = batch_.manifold(i);
+  const PairContact* contact = first_contact(touching_, i);
+  const bool touch = contact != touching_.data() + touching_.size() && contact->pair == i;
+  const auto difference =
+      check_pair(&dispatcher, info, *batch_.body_a(i), *batch_.body_b(i), touch ? contact : nullptr,
+                 *manifold, current ? manifold : nullptr);
+  note(difference);
+}
+
+/// Pairs of a sphere and something else. Nobody listens: that is what quiet means.
+void BatchEngine::check_convex(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info) {
+  convex_check_.for_each(
+      quiet_commit_.left(), [&](std::size_t i, const btPersistentManifold& before) {
+        const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
+        if (!dispatcher.needsCollision(a, b)) return;
+        ++stats_.verified;
+        note(check_update(*pairs_[i].m_algorithm, info, *a, *b, before, batch_.manifold(i)));
+      });
+}
+
+void BatchEngine::note(const std::optional<FieldDifference>& difference) {
+  if (!difference) return;
+  if (stats_.mismatches++ == 0) stats_.first_mismatch = to_text(*difference);
+}
+
+void BatchEngine::reset_stats() {
+  std::string device_failure = std::move(stats_.device_failure);
+  std::string warning = std::move(stats_.warning);
+  stats_ = {};
+  stats_.warning = std::move(warning);
+  stats_.device_failure = std::move(device_failure);
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

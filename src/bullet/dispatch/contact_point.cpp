@@ -1,0 +1,140 @@
+/// The flat form of btManifoldResult::addContactPoint for two spheres (btManifoldResult.cpp of
+/// Bullet 3.24), and of btConvexConvexAlgorithm for a sphere and a box. Bullet's inline functions
+/// do the vector arithmetic, so the operations are Bullet's.
+#include "src/bullet/dispatch/contact_point.hpp"
+
+#include <jfpx/math.hpp>
+
+#include "src/bullet/dispatch/body_wrapper.hpp"
+#include "src/bullet/dispatch/sphere_box.hpp"
+#include "src/bullet/dispatch/sphere_plane.hpp"
+
+#include <BulletCollision/CollisionDispatch/btCollisionObject.h>
+#include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionShapes/btConvexInternalShape.h>
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
+
+#include <new>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+/// Bullet's limit on combined friction, with its order of comparisons: NaN passes.
+btScalar clamp_friction(btScalar friction) {
+  constexpr btScalar kMaxFriction = 10;
+  if (friction < -kMaxFriction) return -kMaxFriction;
+  if (friction > kMaxFriction) return kMaxFriction;
+  return friction;
+}
+
+void combine_materials(const BodyState& a, const BodyState& b, btManifoldPoint* point) {
+  point->m_combinedFriction = clamp_friction(a.friction * b.friction);
+  point->m_combinedRestitution = a.restitution * b.restitution;
+  point->m_combinedRollingFriction =
+      clamp_friction(a.rolling_friction * b.friction + b.rolling_friction * a.friction);
+  point->m_combinedSpinningFriction =
+      clamp_friction(a.spinning_friction * b.friction + b.spinning_friction * a.friction);
+}
+
+}  // namespace
+
+bool contacts_are_heard() {
+  return gContactStartedCallback != nullptr || gContactEndedCallback != nullptr ||
+         gContactDestroyedCallback != nullptr ||
+         gCalculateCombinedFrictionCallback != &btManifoldResult::calculateCombinedFriction ||
+         gCalculateCombinedRestitutionCallback != &btManifoldResult::calculateCombinedRestitution ||
+         gCalculateCombinedRollingFrictionCallback !=
+             &btManifoldResult::calculateCombinedRollingFriction ||
+         gCalculateCombinedSpinningFrictionCallback !=
+             &btManifoldResult::calculateCombinedSpinningFriction ||
+         gCalculateCombinedContactDampingCallback !=
+             &btManifoldResult::calculateCombinedContactDamping ||
+         gCalculateCombinedContactStiffnessCallback !=
+             &btManifoldResult::calculateCombinedContactStiffness;
+}
+
+int special_collision_flags() {
+  int special = btCollisionObject::CF_HAS_CONTACT_STIFFNESS_DAMPING |
+                btCollisionObject::CF_HAS_FRICTION_ANCHOR;
+  if (gContactAddedCallback != nullptr) special |= btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK;
+  return special;
+}
+
+void write_contact(btPersistentManifold* manifold, const PairContact& contact, const BodyState& a,
+                   const BodyState& b, Real radius_b) {
+  if (contact.distance > manifold->getContactBreakingThreshold()) return;
+  const btVector3 normal(contact.normal.x, contact.normal.y, contact.normal.z);
+  const btVector3 on_b = b.pose.getOrigin() + radius_b * normal;
+  const btVector3 on_a = on_b + normal * contact.distance;
+
+  // btPersistentManifold::addManifoldPoint on an empty manifold. The point is made in its place: a
+  // copy right behind the writes would wait for them to leave the store buffer.
+  manifold->setNumContacts(1);
+  auto* point = new (&manifold->getContactPoint(0))
+      btManifoldPoint(a.pose.invXform(on_a), b.pose.invXform(on_b), normal, contact.distance);
+  point->m_positionWorldOnA = on_a;
+  point->m_positionWorldOnB = on_b;
+  combine_materials(a, b, point);
+  btPlaneSpace1(normal, point->m_lateralFrictionDir1, point->m_lateralFrictionDir2);
+}
+
+bool update_sphere_plane(btPersistentManifold* manifold, const btCollisionObject& body_a,
+                         const btCollisionObject& body_b, bool sphere_first) {
+  const btCollisionObject& sphere = sphere_first ? body_a : body_b;
+  const btCollisionObject& plane = sphere_first ? body_b : body_a;
+  const SpherePlaneContact contact = find_closest_points(
+      sphere.getWorldTransform(), static_cast<const btSphereShape&>(*sphere.getCollisionShape()),
+      plane.getWorldTransform(),
+      static_cast<const btStaticPlaneShape&>(*plane.getCollisionShape()));
+  // Which of two NaN an operation returns is up to the compiler.
+  const btVector3 sum = contact.normal_on_plane + contact.point_on_plane;
+  if (!is_finite(sum.x() + sum.y() + sum.z() + contact.distance)) return false;
+  const bool touching = contact.distance < manifold->getContactBreakingThreshold();
+  if (!touching && manifold->getNumContacts() == 0) return true;
+  const btCollisionObjectWrapper a = wrapper_of(body_a);
+  const btCollisionObjectWrapper b = wrapper_of(body_b);
+  btManifoldResult result(&a, &b);
+  result.setPersistentManifold(manifold);
+  if (touching) {
+    result.addContactPoint(contact.normal_on_plane, contact.point_on_plane, contact.distance);
+  }
+  if (manifold->getNumContacts() != 0) result.refreshContactPoints();
+  return true;
+}
+
+bool update_sphere_box(btPersistentManifold* manifold, const btCollisionObject& body_a,
+                       const btCollisionObject& body_b, bool sphere_first) {
+  const auto* shape_a = static_cast<const btConvexInternalShape*>(body_a.getCollisionShape());
+  const auto* shape_b = static_cast<const btConvexInternalShape*>(body_b.getCollisionShape());
+  const btConvexInternalShape* box = sphere_first ? shape_b : shape_a;
+  SphereBoxInput input = {.pose_a = body_a.getWorldTransform(),
+                          .pose_b = body_b.getWorldTransform(),
+                          .margin_a = shape_a->getMargin(),
+                          .margin_b = shape_b->getMargin(),
+                          .core = box->getImplicitShapeDimensions(),
+                          .sphere_first = sphere_first,
+                          .maximum_distance_squared = 0};
+  const btScalar reach = input.margin_a + input.margin_b + manifold->getContactBreakingThreshold();
+  input.maximum_distance_squared = reach * reach;
+  SphereBoxContact contact;
+  const SphereBoxAnswer answer = find_closest_points(input, &contact);
+  if (answer == SphereBoxAnswer::unknown) return false;
+  if (answer == SphereBoxAnswer::apart && manifold->getNumContacts() == 0) return true;
+  const btCollisionObjectWrapper a = wrapper_of(body_a);
+  const btCollisionObjectWrapper b = wrapper_of(body_b);
+  btManifoldResult result(&a, &b);
+  result.setPersistentManifold(manifold);
+  if (answer == SphereBoxAnswer::contact) {
+    result.addContactPoint(contact.normal_on_b, contact.point_on_b, contact.distance);
+  }
+  result.refreshContactPoints();
+  return true;
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,81 @@
+/// The dispatcher that users see: a batch where the engine can, Bullet's own dispatch elsewhere.
+#include <jfpx/bullet/dispatcher.hpp>
+
+#include "src/bullet/dispatch/batch_engine.hpp"
+
+#include <typeinfo>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+struct CollisionDispatcher::Impl {
+  BatchEngine engine;
+};
+
+CollisionDispatcher::CollisionDispatcher(btCollisionConfiguration* configuration,
+                                         const DispatcherOptions& options)
+    : CollisionDispatcher(configuration, make_sphere_collider(options.collider), options) {}
+
+CollisionDispatcher::CollisionDispatcher(btCollisionConfiguration* configuration,
+                                         std::unique_ptr<SphereCollider> collider,
+                                         const DispatcherOptions& options)
+    : btCollisionDispatcher(configuration),
+      impl_(new Impl{BatchEngine(std::move(collider), options)}) {}
+
+CollisionDispatcher::~CollisionDispatcher() = default;
+
+void CollisionDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pair_cache,
+                                                    const btDispatcherInfo& dispatch_info,
+                                                    btDispatcher* dispatcher) {
+  const bool subclass = typeid(*this) != typeid(CollisionDispatcher);
+  const DispatcherTraits traits{.may_override_filter = subclass, .tells_releases = !subclass};
+  if (!impl_->engine.dispatch(*this, traits, *pair_cache, dispatch_info, dispatcher)) {
+    btCollisionDispatcher::dispatchAllCollisionPairs(pair_cache, dispatch_info, dispatcher);
+  }
+}
+
+void CollisionDispatcher::releaseManifold(btPersistentManifold* manifold) {
+  impl_->engine.forget(manifold);
+  btCollisionDispatcher::releaseManifold(manifold);
+}
+
+std::size_t CollisionDispatcher::minimum_batch() const noexcept {
+  return impl_->engine.minimum_batch();
+}
+void CollisionDispatcher::set_minimum_batch(std::size_t pairs) noexcept {
+  impl_->engine.set_minimum_batch(pairs);
+}
+bool CollisionDispatcher::verify() const noexcept { return impl_->engine.verify(); }
+void CollisionDispatcher::set_verify(bool on) noexcept { impl_->engine.set_verify(on); }
+Backend CollisionDispatcher::backend() const noexcept { return impl_->engine.backend(); }
+ChoiceReason CollisionDispatcher::reason() const noexcept { return impl_->engine.reason(); }
+const DispatchStats& CollisionDispatcher::stats() const noexcept { return impl_->engine.stats(); }
+void CollisionDispatcher::reset_stats() { impl_->engine.reset_stats(); }
+
+std::string_view to_string(Fallback fallback) noexcept {
+  switch (fallback) {
+    case Fallback::none:
+      return "none";
+    case Fallback::small_batch:
+      return "small batch";
+    case Fallback::no_spheres:
+      return "no spheres";
+    case Fallback::near_callback:
+      return "near callback replaced";
+    case Fallback::create_function:
+      return "create function replaced";
+    case Fallback::continuous:
+      return "continuous dispatch";
+    case Fallback::nested:
+      return "nested dispatch";
+    case Fallback::out_of_memory:
+      return "out of memory";
+  }
+  return "unknown";
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

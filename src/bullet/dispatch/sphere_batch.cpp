@@ -1,0 +1,127 @@
+/// Reads bodies. Memory latency is all there is to it: everything is prefetched.
+#include "src/bullet/dispatch/sphere_batch.hpp"
+
+#include "src/bullet/dispatch/contact_point.hpp"
+#include "src/bullet/prefetch.hpp"
+
+#include <BulletCollision/CollisionDispatch/btGhostObject.h>
+#include <BulletCollision/CollisionShapes/btBoxShape.h>
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <algorithm>
+#include <limits>
+#include <typeinfo>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+constexpr std::size_t kBodyChunk = 1024;
+
+/// True for exactly the classes whose checkCollideWithOverride is known to be free of side effects.
+/// typeid compares addresses here: a copy of the class in another library counts as foreign, which
+/// costs time and no bits.
+bool is_bullets_own_class(const btCollisionObject& body) {
+  const std::type_info* type = &typeid(body);
+  return type == &typeid(btRigidBody) || type == &typeid(btCollisionObject) ||
+         type == &typeid(btGhostObject) || type == &typeid(btPairCachingGhostObject);
+}
+
+}  // namespace
+
+std::uint8_t SphereBatch::read_body(std::size_t number) {
+  constexpr Real kNaN = std::numeric_limits<Real>::quiet_NaN();
+  const btCollisionObject& body = *bodies_[number];
+  unsigned traits = body.isActive() ? kActive : 0;
+  if (body.*BodyFields::check_collide_with != 0) {
+    traits |= is_bullets_own_class(body) ? kHasIgnoreList : kHasIgnoreList | kOverridesFilter;
+  }
+  if ((body.getCollisionFlags() & special_flags_) != 0) traits |= kCustomMaterial;
+  if (copies_states_) states_[number] = state_of(body);
+  const btCollisionShape* shape = body.getCollisionShape();
+  if (shape->getShapeType() == SPHERE_SHAPE_PROXYTYPE) {
+    traits |= kSphere;
+    const btVector3& centre = body.getWorldTransform().getOrigin();
+    spheres_[number] = {{centre.x(), centre.y(), centre.z()},
+                        static_cast<const btSphereShape*>(shape)->getRadius()};
+  } else {
+    if (&typeid(*shape) == &typeid(btBoxShape)) traits |= kBox;
+    if (&typeid(*shape) == &typeid(btStaticPlaneShape)) traits |= kPlane;
+    spheres_[number] = {{}, kNaN};
+  }
+  return static_cast<std::uint8_t>(traits);
+}
+
+void SphereBatch::prefetch_states(std::size_t i) const {
+  for (const SphereIndex number : {pairs()[i].a, pairs()[i].b}) {
+    if (copies_states_) {
+      prefetch_ends(&states_[number], sizeof(BodyState));
+    } else {
+      prefetch_for_contact(*bodies_[number]);
+    }
+  }
+}
+
+SphereBatch::Summary SphereBatch::read_bodies(std::size_t begin, std::size_t end) {
+  const ProxyTable& proxies = mirror_.proxies();
+  constexpr std::size_t kAhead = 12;
+  Summary summary;
+  for (std::size_t i = begin; i < end + 3 * kAhead; ++i) {
+    // Proxy, body, shape: each is asked for when the one before it has come.
+    if (i < end && proxies.in_use(i)) prefetch(&proxies.proxy(i)->m_clientObject);
+    if (const std::size_t k = i - kAhead; i >= begin + kAhead && k < end) {
+      bodies_[k] = proxies.in_use(k)
+                       ? static_cast<const btCollisionObject*>(proxies.proxy(k)->m_clientObject)
+                       : nullptr;
+      if (bodies_[k] != nullptr) {
+        copies_states_ ? prefetch_for_contact(*bodies_[k]) : prefetch_place(*bodies_[k]);
+      }
+    }
+    if (const std::size_t k = i - 2 * kAhead; i >= begin + 2 * kAhead && k < end) {
+      if (bodies_[k] != nullptr) {
+        prefetch_ends(bodies_[k]->getCollisionShape(), sizeof(btSphereShape));
+      }
+    }
+    if (i < begin + 3 * kAhead) continue;
+    const std::size_t k = i - 3 * kAhead;
+    if (bodies_[k] == nullptr) continue;
+    traits_[k] = read_body(k);
+    summary.traits |= traits_[k];
+    summary.collision_flags |= bodies_[k]->getCollisionFlags();
+    summary.spheres += (traits_[k] & kSphere) != 0 ? 1 : 0;
+  }
+  return summary;
+}
+
+bool SphereBatch::gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner,
+                         ThreadPool& pool) {
+  mirror_.refresh(pairs, owner, pool);
+  const std::size_t n = mirror_.proxies().size();
+  bodies_.resize(n);
+  spheres_.resize(n);
+  traits_.resize(n);
+  copies_states_ = expected_contacts_ > n;
+  if (copies_states_) states_.resize(n);
+  special_flags_ = special_collision_flags();
+  summaries_.resize((n + kBodyChunk - 1) / kBodyChunk);
+  pool.run(summaries_.size(), [&](std::size_t chunk) {
+    const std::size_t begin = chunk * kBodyChunk;
+    summaries_[chunk] = read_bodies(begin, std::min(n, begin + kBodyChunk));
+  });
+  Summary all;
+  for (const Summary& part : summaries_) {
+    all.traits |= part.traits;
+    all.collision_flags |= part.collision_flags;
+    all.spheres += part.spheres;
+  }
+  any_trait_ = all.traits;
+  any_collision_flag_ = all.collision_flags;
+  return all.spheres >= 2;
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

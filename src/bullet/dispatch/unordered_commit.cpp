@@ -1,0 +1,220 @@
+/// Most pairs need no more than a look at the number of points; the others are visited.
+#include "src/bullet/dispatch/unordered_commit.hpp"
+
+#include "src/bullet/dispatch/contact_point.hpp"
+#include "src/bullet/prefetch.hpp"
+
+#include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <typeinfo>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+class Committer {
+ public:
+  /// `touching` are the contacts of all pairs.
+  Committer(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
+            std::span<const PairContact> touching, std::size_t begin, std::size_t end)
+      : dispatcher_(dispatcher),
+        batch_(batch),
+        next_(first_contact(touching, begin)),
+        last_(touching.data() + touching.size()),
+        begin_(begin),
+        end_(end) {}
+
+  /// Writes the pairs that are left to Bullet to `left` and returns their number.
+  std::size_t run(std::uint32_t* left) {
+    const std::span<const std::uint32_t> visits = find_visits();
+    counts_.sphere_pairs += end_ - begin_ - visits.size();
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < std::min(visits.size(), kVisitsAhead); ++k) ask_for(visits[k]);
+    for (std::size_t k = 0; k < visits.size(); ++k) {
+      if (k + kVisitsAhead < visits.size()) ask_for(visits[k + kVisitsAhead]);
+      const std::uint32_t i = visits[k];
+      const bool touch = next_ != last_ && next_->pair == i;
+      if (!commit(i, touch ? next_++ : nullptr)) left[count++] = i;
+    }
+    return count;
+  }
+  const CommitCounts& counts() const { return counts_; }
+
+ private:
+  /// A look takes a nanosecond, memory some hundred.
+  static constexpr std::size_t kCountsAhead = 128;
+  /// Visits take longer, and need a dozen cache lines each.
+  static constexpr std::size_t kVisitsAhead = 10;
+
+  /// The pairs that need more than a look at the number of their manifold's points: those that
+  /// touch or have touched, and all that are not of two spheres. None can do with less, for Bullet
+  /// would also clear points that a user has put there. The loop does nothing else, so that memory
+  /// alone limits it.
+  std::span<const std::uint32_t> find_visits() {
+    std::size_t count = 0;
+    for (std::size_t i = begin_; i < std::min(end_, begin_ + kCountsAhead); ++i) ask_for_count(i);
+    for (std::size_t i = begin_; i < end_; ++i) {
+      if (i + kCountsAhead < end_) ask_for_count(i + kCountsAhead);
+      found_[count] = static_cast<std::uint32_t>(i);
+      const bool enough =
+          batch_.kind(i) == PairKind::spheres && batch_.manifold(i)->getNumContacts() == 0;
+      count += enough ? 0 : 1;
+    }
+    return with_touching({found_.data(), count});
+  }
+  /// The union of two ascending lists: `found`, and the pairs of this part that touch.
+  std::span<const std::uint32_t> with_touching(std::span<const std::uint32_t> found) {
+    auto out = visits_.begin();
+    const PairContact* touching = next_;
+    const PairContact* const end = first_contact({next_, last_}, end_);
+    for (const std::uint32_t i : found) {
+      while (touching != end && touching->pair < i) *out++ = touching++->pair;
+      if (touching != end && touching->pair == i) ++touching;
+      *out++ = i;
+    }
+    while (touching != end) *out++ = touching++->pair;
+    return {visits_.begin(), out};
+  }
+  void ask_for_count(std::size_t i) const {
+    if (batch_.kind(i) == PairKind::spheres) prefetch_count(batch_.manifold(i));
+  }
+  void ask_for(std::size_t i) const {
+    if (batch_.kind(i) == PairKind::other) return;
+    prefetch_header(batch_.manifold(i));
+    prefetch_first_point(batch_.manifold(i));
+    if (batch_.kind(i) == PairKind::spheres) {
+      batch_.prefetch_states(i);
+    } else {
+      prefetch_for_contact(*batch_.body_a(i));
+      prefetch_for_contact(*batch_.body_b(i));
+    }
+  }
+
+  /// `contact` is null if the spheres do not touch. False if the pair is left to Bullet.
+  bool commit(std::size_t i, const PairContact* contact) {
+    switch (batch_.kind(i)) {
+      case PairKind::other:
+        if (batch_.both_are_spheres(i)) count_pair(contact);
+        return false;
+      case PairKind::spheres:
+        return commit_spheres(i, contact);
+      case PairKind::convex:
+        return commit_with(kBox, (batch_.trait_a(i) & kSphere) != 0, i, update_sphere_box,
+                           &counts_.sphere_boxes);
+      case PairKind::convex_plane:
+        return commit_with(kPlane, true, i, update_sphere_plane, &counts_.sphere_planes);
+      case PairKind::plane_convex:
+        return commit_with(kPlane, false, i, update_sphere_plane, &counts_.sphere_planes);
+    }
+    return false;
+  }
+
+  bool commit_spheres(std::size_t i, const PairContact* contact) {
+    btPersistentManifold* manifold = batch_.manifold(i);
+    if (!batch_.both_are_spheres(i)) return false;  // the shape was exchanged under the algorithm
+    count_pair(contact);
+    const unsigned traits = batch_.either_trait(i);
+    if ((traits & kActive) == 0) return true;
+    if ((traits & kCustomMaterial) != 0 || manifold->getBody0() != batch_.body_a(i)) return false;
+    if (contact != nullptr && !has_stocks_bits(*contact)) return false;
+    if ((traits & kHasIgnoreList) != 0 && !needs_collision(i)) return true;
+    ++counts_.written;
+    manifold->setNumContacts(0);  // btPersistentManifold::clearManifold without callbacks
+    if (contact == nullptr) return true;
+    write_contact(manifold, *contact, batch_.state_a(i), batch_.state_b(i), batch_.radius_b(i));
+    return true;
+  }
+
+  /// Qualified: nobody has overridden it.
+  bool needs_collision(std::size_t i) const {
+    return dispatcher_.btCollisionDispatcher::needsCollision(batch_.body_a(i), batch_.body_b(i));
+  }
+
+  /// A sphere and a body that has the trait `other`.
+  template <class Update>
+  bool commit_with(BodyTrait other, bool sphere_first, std::size_t i, Update update,
+                   std::uint64_t* count) {
+    const unsigned a_is = batch_.trait_a(i), b_is = batch_.trait_b(i);
+    // The shapes may have been exchanged under the algorithm.
+    if (((sphere_first ? a_is : b_is) & kSphere) == 0) return false;
+    if (((sphere_first ? b_is : a_is) & other) == 0) return false;
+    if ((batch_.either_trait(i) & kActive) == 0) return true;
+    const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
+    const btCollisionShape* sphere = (sphere_first ? a : b)->getCollisionShape();
+    if (&typeid(*sphere) != &typeid(btSphereShape)) return false;
+    if ((batch_.either_trait(i) & kHasIgnoreList) != 0 && !needs_collision(i)) return true;
+    if (!update(batch_.manifold(i), *a, *b, sphere_first)) return false;
+    ++*count;
+    return true;
+  }
+
+  void count_pair(const PairContact* contact) {
+    ++counts_.sphere_pairs;
+    counts_.touching += contact != nullptr ? 1 : 0;
+  }
+
+  btCollisionDispatcher& dispatcher_;
+  const SphereBatch& batch_;
+  const PairContact *next_, *last_;
+  std::size_t begin_, end_;
+  std::array<std::uint32_t, kPairChunk> found_, visits_;
+  CommitCounts counts_;
+};
+
+}  // namespace
+
+bool is_quiet(const SphereBatch& batch, bool ask_all) {
+  if (ask_all || (batch.any_trait() & kOverridesFilter) != 0) return false;
+  if (contacts_are_heard() || gContactProcessedCallback != nullptr) return false;
+  return gContactAddedCallback == nullptr ||
+         (batch.any_collision_flag() & btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK) == 0;
+}
+
+void UnorderedCommit::reserve(std::size_t pairs) {
+  left_.resize(pairs);
+  chunks_.resize((pairs + kPairChunk - 1) / kPairChunk);
+}
+
+CommitCounts UnorderedCommit::run(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
+                                  std::span<const PairContact> touching, ThreadPool& pool) {
+  const std::size_t n = batch.pairs().size();
+  pool.run(chunks_.size(), [&](std::size_t chunk) {
+    const std::size_t begin = chunk * kPairChunk;
+    Committer committer(dispatcher, batch, touching, begin, std::min(n, begin + kPairChunk));
+    chunks_[chunk].left = committer.run(&left_[begin]);
+    chunks_[chunk].counts = committer.counts();
+  });
+  CommitCounts sum;
+  left_count_ = 0;
+  for (std::size_t chunk = 0; chunk < chunks_.size(); ++chunk) {
+    const Chunk& part = chunks_[chunk];
+    std::memmove(&left_[left_count_], &left_[chunk * kPairChunk],
+                 part.left * sizeof(std::uint32_t));
+    left_count_ += part.left;
+    sum.sphere_pairs += part.counts.sphere_pairs;
+    sum.touching += part.counts.touching;
+    sum.written += part.counts.written;
+    sum.sphere_boxes += part.counts.sphere_boxes;
+    sum.sphere_planes += part.counts.sphere_planes;
+  }
+  return sum;
+}
+
+void UnorderedCommit::sort_left(std::span<const btBroadphasePair> pairs, bool deterministic) {
+  if (!deterministic) return;  // ascending already: the order of the array
+  const auto ids = [&](std::uint32_t i) {
+    return std::pair(pairs[i].m_pProxy0->m_uniqueId, pairs[i].m_pProxy1->m_uniqueId);
+  };
+  std::sort(left_.begin(), left_.begin() + static_cast<std::ptrdiff_t>(left_count_),
+            [&](std::uint32_t p, std::uint32_t q) { return ids(p) > ids(q); });
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,116 @@
+/// The engine that libjfpx-bullet-preload loads: batches for dispatchers that know nothing of jfpx.
+#include "src/bullet/preload/preload_engine.hpp"
+
+#include "src/bullet/dispatch/batch_engine.hpp"
+#include "src/bullet/preload/lease_pool.hpp"
+#include "src/bullet/preload/preload_options.hpp"
+#include "src/bullet/preload/preload_solver.hpp"
+
+#include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
+
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <typeinfo>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+std::unique_ptr<BatchEngine> make_engine() {
+  const PreloadOptions& from = preload_options();
+  DispatcherOptions options;
+  options.collider.backend = from.backend;
+  options.collider.threads = from.threads;
+  options.collider.costs = calibrated_costs().costs;
+  if (from.minimum_batch) options.minimum_batch = *from.minimum_batch;
+  options.verify = from.verify;
+  return std::make_unique<BatchEngine>(make_sphere_collider(options.collider), options);
+}
+
+/// Never destroyed: threads may dispatch, and the summary is written, while the process ends.
+LeasePool<BatchEngine>& pool() {
+  static auto& made = *new LeasePool<BatchEngine>(make_engine);
+  return made;
+}
+
+/// @param backend who computed, if somebody did
+DispatchStats sum_of_stats(std::string_view* backend) {
+  DispatchStats sum;
+  pool().for_each_idle([&](const BatchEngine& engine) {
+    const DispatchStats& stats = engine.stats();
+    sum.dispatches += stats.dispatches;
+    sum.batches += stats.batches;
+    sum.pairs += stats.pairs;
+    sum.sphere_pairs += stats.sphere_pairs;
+    sum.touching += stats.touching;
+    sum.written += stats.written;
+    sum.sphere_boxes += stats.sphere_boxes;
+    sum.sphere_planes += stats.sphere_planes;
+    sum.verified += stats.verified;
+    if (sum.mismatches == 0) sum.first_mismatch = stats.first_mismatch;
+    sum.mismatches += stats.mismatches;
+    for (std::size_t i = 0; i < kFallbackCount; ++i) sum.fallbacks[i] += stats.fallbacks[i];
+    sum.to_device += stats.to_device;
+    sum.from_device += stats.from_device;
+    if (!stats.failure.empty()) sum.failure = stats.failure;
+    if (!stats.device_failure.empty()) sum.device_failure = stats.device_failure;
+    sum.prepare_ms += stats.prepare_ms;
+    sum.commit_ms += stats.commit_ms;
+    if (stats.batches > 0) *backend = to_string(engine.backend());
+  });
+  if (const std::string why = pool().why(); !why.empty()) sum.failure = why;
+  return sum;
+}
+
+}  // namespace
+
+extern "C" {
+
+JFPX_API bool jfpx_preload_try_dispatch(void* dispatcher, void* pair_cache, const void* info,
+                                        void* argument) {
+  const LeasePool<BatchEngine>::Lease engine(pool());
+  if (engine.get() == nullptr) return false;
+  btCollisionDispatcher& own = *static_cast<btCollisionDispatcher*>(dispatcher);
+  const bool subclass = typeid(own) != typeid(btCollisionDispatcher);
+  const DispatcherTraits traits{.may_override_filter = subclass, .tells_releases = false};
+  return engine.get()->dispatch(own, traits, *static_cast<btOverlappingPairCache*>(pair_cache),
+                                *static_cast<const btDispatcherInfo*>(info),
+                                static_cast<btDispatcher*>(argument));
+}
+
+JFPX_API void jfpx_preload_print_summary(const char* prefix) {
+  using Count = unsigned long long;
+  std::string_view backend = "none";
+  const DispatchStats stats = sum_of_stats(&backend);
+  std::fprintf(stderr, "%sBullet in %s: %llu dispatches, %llu batches (%.*s)\n", prefix,
+               sizeof(Real) == 4 ? "float" : "double", Count{stats.dispatches},
+               Count{stats.batches}, static_cast<int>(backend.size()), backend.data());
+  std::fprintf(stderr,
+               "%sin batches: %llu pairs, %llu of spheres, %llu touching, %llu written, "
+               "%.1f ms of collider, %.1f ms of commit\n",
+               prefix, Count{stats.pairs}, Count{stats.sphere_pairs}, Count{stats.touching},
+               Count{stats.written}, stats.prepare_ms, stats.commit_ms);
+  for (std::size_t i = 0; i < kFallbackCount; ++i) {
+    if (stats.fallbacks[i] == 0) continue;
+    const std::string_view reason = to_string(static_cast<Fallback>(i));
+    std::fprintf(stderr, "%sleft to Bullet: %llu (%.*s)\n", prefix, Count{stats.fallbacks[i]},
+                 static_cast<int>(reason.size()), reason.data());
+  }
+  if (stats.verified > 0) {
+    std::fprintf(stderr, "%sverified: %llu sphere pairs, %llu mismatches %s\n", prefix,
+                 Count{stats.verified}, Count{stats.mismatches}, stats.first_mismatch.c_str());
+  }
+  for (const std::string& why : {stats.failure, stats.device_failure}) {
+    if (!why.empty()) std::fprintf(stderr, "%sfailed: %s\n", prefix, why.c_str());
+  }
+  print_solver_summary(prefix);
+}
+
+}  // extern "C"
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,153 @@
+/// Groups and boxes of worlds that know nothing of jfpx; see the header.
+#include "src/bullet/preload/preload_solver.hpp"
+
+#include <jfpx/bullet/constraint_solver.hpp>
+
+#include "src/bullet/preload/lease_pool.hpp"
+#include "src/bullet/preload/preload_options.hpp"
+#include "src/bullet/world/aabb_update.hpp"
+
+#include <atomic>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <typeinfo>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+/// All that a solver of Bullet's keeps from one group to the next.
+struct SolverState : btSequentialImpulseConstraintSolver {
+  static void copy(const btSequentialImpulseConstraintSolver& from,
+                   btSequentialImpulseConstraintSolver* to) {
+    const auto field = [&](auto member) { to->*member = from.*member; };
+    field(&SolverState::m_resolveSingleConstraintRowGeneric);
+    field(&SolverState::m_resolveSingleConstraintRowLowerLimit);
+    field(&SolverState::m_resolveSplitPenetrationImpulse);
+    field(&SolverState::m_cachedSolverMode);
+    field(&SolverState::m_leastSquaresResidual);
+    field(&SolverState::m_btSeed2);
+    field(&SolverState::m_analyticsData);
+  }
+};
+
+std::unique_ptr<ConstraintSolver> make_solver() {
+  const PreloadOptions& from = preload_options();
+  ConstraintSolverOptions options;
+  options.backend = from.backend;
+  options.threads = from.threads;
+  if (from.minimum_batch) options.minimum_batch = *from.minimum_batch;
+  return std::make_unique<ConstraintSolver>(options);
+}
+
+/// Never destroyed, as what follows: threads may solve, and the summary is written, while the
+/// process ends.
+LeasePool<ConstraintSolver>& pool() {
+  static auto& made = *new LeasePool<ConstraintSolver>(make_solver);
+  return made;
+}
+
+std::atomic<std::uint64_t> g_small{0}, g_boxes{0};
+
+std::size_t minimum_batch() {
+  return preload_options().minimum_batch.value_or(ConstraintSolverOptions{}.minimum_batch);
+}
+
+ConstraintSolverStats sum_of_stats() {
+  ConstraintSolverStats sum;
+  pool().for_each_idle([&](const ConstraintSolver& solver) {
+    const ConstraintSolverStats& stats = solver.stats();
+    sum.groups += stats.groups;
+    sum.on_device += stats.on_device;
+    sum.contacts += stats.contacts;
+    sum.joints += stats.joints;
+    sum.sweeps += stats.sweeps;
+    for (std::size_t i = 0; i < kSolverFallbacks; ++i) sum.fallbacks[i] += stats.fallbacks[i];
+    if (!stats.device_failure.empty()) sum.device_failure = stats.device_failure;
+  });
+  sum.fallbacks[static_cast<std::size_t>(SolverFallback::small)] += g_small;
+  return sum;
+}
+
+/// All that a solver remembers goes there and back, also when something in between throws.
+class TakenOver {
+ public:
+  TakenOver(btSequentialImpulseConstraintSolver* original, ConstraintSolver* solver)
+      : original_(original), solver_(solver) {
+    SolverState::copy(*original_, solver_);
+  }
+  ~TakenOver() { SolverState::copy(*solver_, original_); }
+  TakenOver(const TakenOver&) = delete;
+  TakenOver& operator=(const TakenOver&) = delete;
+
+ private:
+  btSequentialImpulseConstraintSolver* original_;
+  ConstraintSolver* solver_;
+};
+
+}  // namespace
+
+void print_solver_summary(const char* prefix) {
+  using Count = unsigned long long;
+  const ConstraintSolverStats stats = sum_of_stats();
+  if (g_boxes > 0) {
+    std::fprintf(stderr, "%sworld: %llu updates of all boxes\n", prefix, Count{g_boxes});
+  }
+  if (stats.groups > 0) {
+    std::fprintf(stderr, "%ssolver: %llu groups, %llu contacts, %llu joints\n", prefix,
+                 Count{stats.groups}, Count{stats.contacts}, Count{stats.joints});
+  }
+  if (stats.on_device > 0) {
+    std::fprintf(stderr, "%ssolver: %llu of the groups on a GPU\n", prefix, Count{stats.on_device});
+  }
+  for (const std::string& why : {pool().why(), stats.device_failure}) {
+    if (!why.empty()) std::fprintf(stderr, "%ssolver: failed: %s\n", prefix, why.c_str());
+  }
+  for (std::size_t i = 0; i < kSolverFallbacks; ++i) {
+    if (stats.fallbacks[i] == 0) continue;
+    const std::string_view reason = to_string(static_cast<SolverFallback>(i));
+    std::fprintf(stderr, "%sgroups left to Bullet: %llu (%.*s)\n", prefix,
+                 Count{stats.fallbacks[i]}, static_cast<int>(reason.size()), reason.data());
+  }
+}
+
+extern "C" {
+
+/// Serves Bullet's own class only: what others do with what they inherit is not known.
+JFPX_API bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count, void** manifolds,
+                                     int manifold_count, void** joints, int joint_count,
+                                     const void* info, void* drawer, void* dispatcher) {
+  auto* own = static_cast<btSequentialImpulseConstraintSolver*>(solver);
+  if (typeid(*own) != typeid(btSequentialImpulseConstraintSolver)) return false;
+  if (static_cast<std::size_t>(manifold_count) < minimum_batch()) {
+    g_small.fetch_add(1, std::memory_order_relaxed);
+    return false;
+  }
+  const LeasePool<ConstraintSolver>::Lease lease(pool());
+  if (lease.get() == nullptr) return false;
+  const TakenOver taken_over(own, lease.get());
+  lease.get()->solveGroup(reinterpret_cast<btCollisionObject**>(bodies), body_count,
+                          reinterpret_cast<btPersistentManifold**>(manifolds), manifold_count,
+                          reinterpret_cast<btTypedConstraint**>(joints), joint_count,
+                          *static_cast<const btContactSolverInfo*>(info),
+                          static_cast<btIDebugDraw*>(drawer),
+                          static_cast<btDispatcher*>(dispatcher));
+  return true;
+}
+
+/// Serves every world: the function is all that Bullet's does, through what is public of it.
+JFPX_API bool jfpx_preload_try_update_boxes(void* world) {
+  thread_local AabbUpdate update;
+  if (!update.run(*static_cast<btCollisionWorld*>(world))) return false;
+  g_boxes.fetch_add(1, std::memory_order_relaxed);
+  return true;
+}
+
+}  // extern "C"
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,154 @@
+/// Walks manifolds in chunks; see the header.
+#include "src/bullet/solver/contact_scan.hpp"
+
+#include "src/bullet/prefetch.hpp"
+
+#include <algorithm>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+constexpr std::size_t kChunk = 512;        ///< manifolds
+constexpr std::int32_t kLate = INT32_MIN;  ///< in place of an id: a late body
+
+bool is_light(const btRigidBody& body) {
+  const btScalar inverse = body.getInvMass();
+  return (btVector3(inverse, inverse, inverse) * body.getLinearFactor()).fuzzyZero();
+}
+bool is_anisotropic(const btCollisionObject& object) {
+  return object.hasAnisotropicFriction(btCollisionObject::CF_ANISOTROPIC_FRICTION);
+}
+
+struct Side {
+  std::int32_t id;
+  bool light, anisotropic;
+};
+
+Side side_of(btCollisionObject* object, std::span<const std::uint8_t> marks) {
+  const int companion = object->getCompanionId();
+  if (companion >= 0) {
+    const std::uint8_t mark = marks[static_cast<std::size_t>(companion) + 1];
+    const std::int32_t id = companion + 1;
+    return {(mark & kUnmoved) != 0 ? ~id : id, (mark & kLight) != 0, (mark & kAnisotropic) != 0};
+  }
+  const btRigidBody* body = moving_body(object);
+  if (body == nullptr) return {rows::kFixedBody, true, is_anisotropic(*object)};
+  return {kLate, is_light(*body), is_anisotropic(*object)};
+}
+
+btCollisionObject* object_of(const btCollisionObject* object) {
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): as Bullet's own solver does
+  return const_cast<btCollisionObject*>(object);
+}
+
+}  // namespace
+
+btRigidBody* moving_body(btCollisionObject* object) {
+  btRigidBody* body = btRigidBody::upcast(object);
+  if (body == nullptr) return nullptr;
+  return body->getInvMass() != 0 || body->isKinematicObject() ? body : nullptr;
+}
+
+std::uint8_t marks_of(const btRigidBody& body) {
+  const btVector3 masses =
+      btVector3(body.getInvMass(), body.getInvMass(), body.getInvMass()) * body.getLinearFactor();
+  const btMatrix3x3& inertia = body.getInvInertiaTensorWorld();
+  unsigned marks = 0;
+  if (masses.fuzzyZero()) marks |= kLight;
+  if (masses.isZero() && inertia[0].isZero() && inertia[1].isZero() && inertia[2].isZero()) {
+    marks |= kUnmoved;
+  }
+  if (is_anisotropic(body)) marks |= kAnisotropic;
+  return static_cast<std::uint8_t>(marks);
+}
+
+void ContactScan::run(ThreadPool& pool, std::span<btPersistentManifold* const> manifolds,
+                      std::span<const std::uint8_t> marks) {
+  constexpr std::size_t kMax = MANIFOLD_CACHE_SIZE;
+  found_.reserve(kMax * manifolds.size(), "contacts of a solver");
+  found_pairs_.reserve(kMax * manifolds.size(), "contacts of a solver");
+  late_.clear();
+  const std::size_t chunks = (manifolds.size() + kChunk - 1) / kChunk;
+  chunks_.reserve(chunks, "contacts of a solver");
+  pool.run(chunks, [&](std::size_t chunk) { scan(manifolds, chunk, marks); });
+  count_ = 0;
+  any_late_ = any_rolling_ = any_anisotropic_ = false;
+  for (std::size_t i = 0; i < chunks; ++i) {
+    any_rolling_ |= chunks_[i].rolling;
+    any_late_ |= chunks_[i].late;
+    any_anisotropic_ |= chunks_[i].anisotropic;
+    count_ += chunks_[i].count;
+  }
+  refs_.reserve(count_, "contacts of a solver");
+  pairs_.reserve(count_, "contacts of a solver");
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < chunks; ++i) {
+    std::copy_n(found_.data() + kMax * kChunk * i, chunks_[i].count, refs_.data() + next);
+    std::copy_n(found_pairs_.data() + kMax * kChunk * i, chunks_[i].count, pairs_.data() + next);
+    next += chunks_[i].count;
+  }
+}
+
+void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::size_t chunk,
+                       std::span<const std::uint8_t> marks) {
+  const std::size_t first = chunk * kChunk, last = std::min(first + kChunk, manifolds.size());
+  ContactRef* const refs = found_.data() + MANIFOLD_CACHE_SIZE * first;
+  cpu::RowPair* const pairs = found_pairs_.data() + MANIFOLD_CACHE_SIZE * first;
+  std::uint32_t count = 0;
+  bool rolling = false, late = false, anisotropic = false;
+  for (std::size_t i = first; i < last; ++i) {
+    if (i + kManifoldsAhead < last) {
+      prefetch_header(manifolds[i + kManifoldsAhead]);
+      prefetch(&manifolds[i + kManifoldsAhead]->getContactPoint(0).m_distance1);
+    }
+    if (i + kObjectsAhead < last) {
+      prefetch_island_state(manifolds[i + kObjectsAhead]->getBody0());
+      prefetch_island_state(manifolds[i + kObjectsAhead]->getBody1());
+    }
+    btPersistentManifold* manifold = manifolds[i];
+    const int points = manifold->getNumContacts();
+    const Side a = side_of(object_of(manifold->getBody0()), marks);
+    const Side b = side_of(object_of(manifold->getBody1()), marks);
+    late |= a.id == kLate || b.id == kLate;
+    if (a.light && b.light) continue;
+    for (int k = 0; k < points; ++k) {
+      const btManifoldPoint& point = manifold->getContactPoint(k);
+      if (!(point.getDistance() <= manifold->getContactProcessingThreshold())) continue;
+      const bool rolls = point.m_combinedRollingFriction > 0;
+      rolling |= rolls;
+      anisotropic |= a.anisotropic || b.anisotropic;
+      refs[count] = {manifold, k, a.anisotropic || b.anisotropic, rolls};
+      pairs[count++] = {a.id, b.id};
+    }
+  }
+  chunks_[chunk] = {count, rolling, late, anisotropic};
+}
+
+void ContactScan::find_late(std::span<btPersistentManifold* const> manifolds,
+                            std::size_t first_id) {
+  if (!any_late_) return;
+  // Also where a manifold has no contact: Bullet writes these bodies back too.
+  for (btPersistentManifold* manifold : manifolds) {
+    for (const btCollisionObject* object : {manifold->getBody0(), manifold->getBody1()}) {
+      btCollisionObject* late = object_of(object);
+      if (late->getCompanionId() >= 0 || moving_body(late) == nullptr) continue;
+      late_.push_back({late, late->getCompanionId()});
+      late->setCompanionId(static_cast<int>(first_id + late_.size()) - 2);
+    }
+  }
+  const auto settle = [&](const btCollisionObject* object, std::int32_t* id) {
+    if (*id != kLate) return;
+    *id = object->getCompanionId() + 1;
+    if ((marks_of(*btRigidBody::upcast(object)) & kUnmoved) != 0) *id = ~*id;
+  };
+  for (std::size_t i = 0; i < count_; ++i) {
+    settle(refs_[i].manifold->getBody0(), &pairs_[i].a);
+    settle(refs_[i].manifold->getBody1(), &pairs_[i].b);
+  }
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,172 @@
+/// Steps of a world; see the header.
+#include <jfpx/bullet/dynamics_world.hpp>
+#include <jfpx/error.hpp>
+
+#include "src/base/thread_pool.hpp"
+#include "src/bullet/world/aabb_update.hpp"
+#include "src/bullet/world/islands.hpp"
+
+#include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
+#include <LinearMath/btQuickprof.h>
+
+#include <algorithm>
+#include <atomic>
+#include <string>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+constexpr int kBodiesAChunk = 256;
+
+int island_of(const btTypedConstraint* constraint) {
+  const int tag = constraint->getRigidBodyA().getIslandTag();
+  return tag >= 0 ? tag : constraint->getRigidBodyB().getIslandTag();
+}
+bool is_movable(const btCollisionObject& object) { return !object.isStaticOrKinematicObject(); }
+
+}  // namespace
+
+struct DynamicsWorld::Impl {
+  ThreadPool pool;
+  IslandSolver islands;
+  AabbUpdate boxes;
+  std::size_t minimum_batch;
+
+  explicit Impl(const DynamicsWorldOptions& options)
+      : pool(options.threads), islands(pool), minimum_batch(options.minimum_batch) {}
+
+  /// Calls run(bodies, count) for all parts of the array, at once.
+  template <class Run>
+  void in_parts(btAlignedObjectArray<btRigidBody*>& bodies, const Run& run) {
+    const int count = bodies.size();
+    const int chunks = (count + kBodiesAChunk - 1) / kBodiesAChunk;
+    pool.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
+      const int first = static_cast<int>(chunk) * kBodiesAChunk;
+      run(&bodies[first], std::min(kBodiesAChunk, count - first));
+    });
+  }
+  /// Whether the path of some body may be cut short by continuous collision.
+  bool has_swept_bodies(btAlignedObjectArray<btRigidBody*>& bodies, const btDispatcherInfo& info) {
+    if (!info.m_useContinuous) return false;
+    std::atomic<bool> found{false};
+    in_parts(bodies, [&](btRigidBody** part, int count) {
+      if (std::any_of(part, part + count, [](const btRigidBody* body) {
+            return body->getCcdSquareMotionThreshold() != 0;
+          })) {
+        found.store(true, std::memory_order_relaxed);
+      }
+    });
+    return found;
+  }
+};
+
+DynamicsWorld::DynamicsWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+                             btConstraintSolver* solver, btCollisionConfiguration* configuration,
+                             const DynamicsWorldOptions& options)
+    : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration) {
+  verify_build(options.headers);
+  impl_ = std::make_unique<Impl>(options);
+}
+DynamicsWorld::~DynamicsWorld() = default;
+
+std::size_t DynamicsWorld::minimum_batch() const noexcept { return impl_->minimum_batch; }
+void DynamicsWorld::set_minimum_batch(std::size_t bodies) noexcept {
+  impl_->minimum_batch = bodies;
+}
+bool DynamicsWorld::is_small() const noexcept {
+  return static_cast<std::size_t>(m_nonStaticRigidBodies.size()) < impl_->minimum_batch;
+}
+
+void DynamicsWorld::predictUnconstraintMotion(btScalar dt) {
+  if (is_small()) {
+    btDiscreteDynamicsWorld::predictUnconstraintMotion(dt);
+    return;
+  }
+  BT_PROFILE("predictUnconstraintMotion");
+  impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+    for (int i = 0; i < count; ++i) {
+      if (!is_movable(*bodies[i])) continue;
+      bodies[i]->applyDamping(dt);
+      bodies[i]->predictIntegratedTransform(dt, bodies[i]->getInterpolationWorldTransform());
+    }
+  });
+}
+
+void DynamicsWorld::createPredictiveContacts(btScalar dt) {
+  if (is_small() || impl_->has_swept_bodies(m_nonStaticRigidBodies, getDispatchInfo())) {
+    btDiscreteDynamicsWorld::createPredictiveContacts(dt);
+    return;
+  }
+  BT_PROFILE("createPredictiveContacts");
+  releasePredictiveContacts();
+  impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+    for (int i = 0; i < count; ++i) bodies[i]->setHitFraction(1);
+  });
+}
+
+void DynamicsWorld::integrateTransforms(btScalar dt) {
+  if (is_small() || m_applySpeculativeContactRestitution ||
+      impl_->has_swept_bodies(m_nonStaticRigidBodies, getDispatchInfo())) {
+    btDiscreteDynamicsWorld::integrateTransforms(dt);
+    return;
+  }
+  BT_PROFILE("integrateTransforms");
+  impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+    integrateTransformsInternal(bodies, count, dt);
+  });
+}
+
+void DynamicsWorld::updateAabbs() {
+  if (is_small() || !impl_->boxes.run(*this)) btDiscreteDynamicsWorld::updateAabbs();
+}
+
+bool DynamicsWorld::has_bullets_islands() const noexcept {
+  return m_islandManager != nullptr &&
+         typeid(*m_islandManager) == typeid(btSimulationIslandManager);
+}
+
+void DynamicsWorld::calculateSimulationIslands() {
+  if (is_small() || !has_bullets_islands()) {
+    btDiscreteDynamicsWorld::calculateSimulationIslands();
+    return;
+  }
+  BT_PROFILE("calculateSimulationIslands");
+  btUnionFind& unions = getSimulationIslandManager()->getUnionFind();
+  const auto unite = [&](const btCollisionObject& a, const btCollisionObject& b) {
+    if (is_movable(a) && is_movable(b)) unions.unite(a.getIslandTag(), b.getIslandTag());
+  };
+  number_and_unite(*this, &unions);
+  for (int i = 0; i < m_predictiveManifolds.size(); ++i) {
+    unite(*m_predictiveManifolds[i]->getBody0(), *m_predictiveManifolds[i]->getBody1());
+  }
+  for (int i = 0; i < m_constraints.size(); ++i) {
+    if (!m_constraints[i]->isEnabled()) continue;
+    unite(m_constraints[i]->getRigidBodyA(), m_constraints[i]->getRigidBodyB());
+  }
+  store_islands(*this, &unions);
+}
+
+void DynamicsWorld::solveConstraints(btContactSolverInfo& info) {
+  btSimulationIslandManager& manager = *getSimulationIslandManager();
+  if (is_small() || !has_bullets_islands() || !manager.getSplitIslands() ||
+      !impl_->islands.reserve_geometric(*this, m_constraints.size())) {
+    btDiscreteDynamicsWorld::solveConstraints(info);
+    return;
+  }
+  BT_PROFILE("solveConstraints");
+  m_sortedConstraints.copyFromArray(m_constraints);
+  m_sortedConstraints.quickSort([](const btTypedConstraint* l, const btTypedConstraint* r) {
+    return island_of(l) < island_of(r);
+  });
+  m_constraintSolver->prepareSolve(getNumCollisionObjects(), getDispatcher()->getNumManifolds());
+  impl_->islands.solve(*this, manager.getUnionFind(), *m_constraintSolver, info,
+                       m_sortedConstraints.size() > 0 ? &m_sortedConstraints[0] : nullptr,
+                       m_sortedConstraints.size());
+  m_constraintSolver->allSolved(info, getDebugDrawer());
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

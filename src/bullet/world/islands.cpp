@@ -1,0 +1,322 @@
+/// Follows btSimulationIslandManager.cpp and the island callback of btDiscreteDynamicsWorld.cpp of
+/// Bullet 3.24 step by step; see the header.
+#include "src/bullet/world/islands.hpp"
+
+#include <jfpx/bullet/dispatcher.hpp>
+#include <jfpx/error.hpp>
+
+#include "src/base/reserve.hpp"
+#include "src/bullet/prefetch.hpp"
+
+#include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>
+#include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <LinearMath/btQuickprof.h>
+
+#include <algorithm>
+#include <atomic>
+#include <new>
+#include <typeinfo>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+constexpr int kManifoldsAChunk = 4096;
+
+void prefetch_island_state_of(const btCollisionObjectArray& objects, int i) {
+  if (i < objects.size()) prefetch_island_state(objects[i]);
+}
+const btCollisionObject* object_of(const btBroadphaseProxy* proxy) {
+  return static_cast<const btCollisionObject*>(proxy->m_clientObject);
+}
+bool merges(const btCollisionObject* object) {
+  return object != nullptr && object->mergesSimulationIslands();
+}
+int island_of(const btCollisionObject& a, const btCollisionObject& b) {
+  return a.getIslandTag() >= 0 ? a.getIslandTag() : b.getIslandTag();
+}
+int island_of(const btTypedConstraint& constraint) {
+  return island_of(constraint.getRigidBodyA(), constraint.getRigidBodyB());
+}
+
+/// Kinematic objects that move wake whatever they overlap.
+void wake(const btCollisionObject& kinematic, const btCollisionObject& other) {
+  if (kinematic.isKinematicObject() && kinematic.getActivationState() != ISLAND_SLEEPING &&
+      kinematic.hasContactResponse()) {
+    other.activate();
+  }
+}
+
+/// Whether the manifold is one that islands are solved with. `kinematic` becomes true if that may
+/// depend on whom kinematic objects have woken.
+bool is_wanted(btDispatcher& dispatcher, const btPersistentManifold& manifold, bool only_touching,
+               bool* kinematic) {
+  if (only_touching && manifold.getNumContacts() == 0) return false;
+  const btCollisionObject &a = *manifold.getBody0(), &b = *manifold.getBody1();
+  if (a.isKinematicObject() || b.isKinematicObject()) *kinematic = true;
+  if (a.getActivationState() == ISLAND_SLEEPING && b.getActivationState() == ISLAND_SLEEPING) {
+    return false;
+  }
+  return dispatcher.needsResponse(&a, &b);
+}
+
+void prefetch_manifold(btPersistentManifold* const* manifolds, int i, int count) {
+  if (i + 2 * kManifoldsAhead < count) prefetch_header(manifolds[i + 2 * kManifoldsAhead]);
+  if (i + kManifoldsAhead < count) {
+    prefetch_island_state(manifolds[i + kManifoldsAhead]->getBody0());
+    prefetch_island_state(manifolds[i + kManifoldsAhead]->getBody1());
+  }
+}
+
+}  // namespace
+
+void number_and_unite(btCollisionWorld& world, btUnionFind* unions) {
+  btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  int count = 0;
+  for (int i = 0; i < objects.size(); ++i) {
+    prefetch_island_state_of(objects, i + kObjectsAhead);
+    btCollisionObject* object = objects[i];
+    if (!object->isStaticOrKinematicObject()) object->setIslandTag(count++);
+    object->setCompanionId(-1);
+    object->setHitFraction(1);
+  }
+  unions->reset(count);
+  btOverlappingPairCache* cache = world.getPairCache();
+  const int pairs = cache->getNumOverlappingPairs();
+  if (pairs == 0) return;
+  const btBroadphasePair* pair = cache->getOverlappingPairArrayPtr();
+  for (int i = 0; i < pairs; ++i) {
+    if (i + 2 * kObjectsAhead < pairs) {
+      prefetch(pair[i + 2 * kObjectsAhead].m_pProxy0);
+      prefetch(pair[i + 2 * kObjectsAhead].m_pProxy1);
+    }
+    if (i + kObjectsAhead < pairs) {
+      prefetch_island_state(object_of(pair[i + kObjectsAhead].m_pProxy0));
+      prefetch_island_state(object_of(pair[i + kObjectsAhead].m_pProxy1));
+    }
+    const btCollisionObject* a = object_of(pair[i].m_pProxy0);
+    const btCollisionObject* b = object_of(pair[i].m_pProxy1);
+    if (merges(a) && merges(b)) unions->unite(a->getIslandTag(), b->getIslandTag());
+  }
+}
+
+void store_islands(btCollisionWorld& world, btUnionFind* unions) {
+  btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  int index = 0;
+  for (int i = 0; i < objects.size(); ++i) {
+    prefetch_island_state_of(objects, i + kObjectsAhead);
+    btCollisionObject* object = objects[i];
+    if (object->isStaticOrKinematicObject()) {
+      object->setIslandTag(-1);
+      object->setCompanionId(-2);
+    } else {
+      object->setIslandTag(unions->find(index));
+      unions->getElement(index).m_sz = i;
+      object->setCompanionId(-1);
+      ++index;
+    }
+  }
+}
+
+bool IslandSolver::reserve_geometric(btCollisionWorld& world, int constraint_count) noexcept {
+  const auto manifolds = static_cast<std::size_t>(world.getDispatcher()->getNumManifolds());
+  try {
+    found_.reserve(manifolds, "manifolds of islands");
+    found_island_.reserve(manifolds, "manifolds of islands");
+    jfpx::reserve_geometric(&chunk_counts_, manifolds / std::size_t{kManifoldsAChunk} + 1);
+    jfpx::reserve_geometric(&manifolds_, manifolds);
+    jfpx::reserve_geometric(&bodies_, static_cast<std::size_t>(world.getNumCollisionObjects()));
+    jfpx::reserve_geometric(&constraints_, static_cast<std::size_t>(constraint_count));
+  } catch (const OutOfMemory&) {
+    return false;
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+  return true;
+}
+
+void IslandSolver::solve(btCollisionWorld& world, btUnionFind& unions, btConstraintSolver& solver,
+                         const btContactSolverInfo& info, btTypedConstraint** constraints,
+                         int constraint_count) {
+  {
+    BT_PROFILE("islandUnionFindAndQuickSort");
+    unions.sortIslands();
+    update_sleep(world.getCollisionObjectArray(), unions);
+    collect_manifolds(world);
+  }
+  BT_PROFILE("processIslands");
+  solve_awake(world, unions, solver, info, constraints, constraint_count);
+}
+
+/// An island sleeps if none of its objects is awake; one that doesn't has no sleepers.
+void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& unions) {
+  const int count = unions.getNumElements();
+  const auto object = [&](int k) { return objects[unions.getElement(k).m_sz]; };
+  for (int first = 0, last = 0; first < count; first = last) {
+    const int island = unions.getElement(first).m_id;
+    bool asleep = true;
+    for (last = first; last < count && unions.getElement(last).m_id == island; ++last) {
+      if (last + kObjectsAhead < count) prefetch_island_state(object(last + kObjectsAhead));
+      const btCollisionObject& o = *object(last);
+      const int state = o.getActivationState();
+      if (o.getIslandTag() == island && (state == ACTIVE_TAG || state == DISABLE_DEACTIVATION)) {
+        asleep = false;
+      }
+    }
+    for (int k = first; k < last; ++k) {
+      btCollisionObject& o = *object(k);
+      if (o.getIslandTag() != island) continue;
+      if (asleep) {
+        o.setActivationState(ISLAND_SLEEPING);
+      } else if (o.getActivationState() == ISLAND_SLEEPING) {
+        o.setActivationState(WANTS_DEACTIVATION);
+        o.setDeactivationTime(0);
+      }
+    }
+  }
+}
+
+/// False for a class of the user's, who may override how manifolds are asked for, and may not
+/// expect to be asked from several threads.
+bool is_plain(const btDispatcher& dispatcher) {
+  const std::type_info& type = typeid(dispatcher);
+  return type == typeid(btCollisionDispatcher) || type == typeid(CollisionDispatcher);
+}
+
+/// Lists the manifolds that islands are solved with, and their islands.
+void IslandSolver::collect_manifolds(btCollisionWorld& world) {
+  btDispatcher& dispatcher = *world.getDispatcher();
+  const bool only_touching = world.getDispatchInfo().m_deterministicOverlappingPairs;
+  const int count = dispatcher.getNumManifolds();
+  const bool plain = is_plain(dispatcher);
+  if (plain && collect_at_once(dispatcher, only_touching)) return;
+  btPersistentManifold** manifolds = plain ? dispatcher.getInternalManifoldPointer() : nullptr;
+  count_ = 0;
+  for (int i = 0; i < count; ++i) {
+    if (plain) prefetch_manifold(manifolds, i, count);
+    btPersistentManifold* manifold =
+        plain ? manifolds[i] : dispatcher.getManifoldByIndexInternal(i);
+    if (only_touching && manifold->getNumContacts() == 0) continue;
+    const btCollisionObject &a = *manifold->getBody0(), &b = *manifold->getBody1();
+    if (a.getActivationState() == ISLAND_SLEEPING && b.getActivationState() == ISLAND_SLEEPING) {
+      continue;
+    }
+    wake(a, b);
+    wake(b, a);
+    if (!dispatcher.needsResponse(&a, &b)) continue;
+    const auto at = static_cast<std::size_t>(count_++);
+    found_[at] = manifold;
+    found_island_[at] = island_of(a, b);
+  }
+}
+
+/// The same on all threads, in chunks, of a plain dispatcher. Not where kinematic objects wake
+/// others.
+bool IslandSolver::collect_at_once(btDispatcher& dispatcher, bool only_touching) {
+  constexpr int kChunk = kManifoldsAChunk;
+  const int count = dispatcher.getNumManifolds();
+  const int chunks = (count + kChunk - 1) / kChunk;
+  btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();
+  chunk_counts_.assign(static_cast<std::size_t>(chunks), 0);
+  std::atomic<bool> kinematic{false};
+  pool_.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
+    const int first = static_cast<int>(chunk) * kChunk, last = std::min(count, first + kChunk);
+    bool seen = false;
+    int next = first;
+    for (int i = first; i < last; ++i) {
+      prefetch_manifold(manifolds, i, last);
+      if (!is_wanted(dispatcher, *manifolds[i], only_touching, &seen)) continue;
+      const auto at = static_cast<std::size_t>(next++);
+      found_[at] = manifolds[i];
+      found_island_[at] = island_of(*manifolds[i]->getBody0(), *manifolds[i]->getBody1());
+    }
+    chunk_counts_[chunk] = next - first;
+    if (seen) kinematic.store(true, std::memory_order_relaxed);
+  });
+  if (kinematic) return false;
+  count_ = 0;
+  for (int chunk = 0; chunk < chunks; ++chunk) {
+    const int size = chunk_counts_[static_cast<std::size_t>(chunk)];
+    std::copy_n(found_.data() + chunk * kChunk, size, found_.data() + count_);
+    std::copy_n(found_island_.data() + chunk * kChunk, size, found_island_.data() + count_);
+    count_ += size;
+  }
+  return true;
+}
+
+/// Bullet's sort is not stable: the order is that of this very sort, on keys that compare alike.
+void IslandSolver::sort_manifolds(bool by_pair) {
+  keys_.resizeNoInitialize(count_);
+  if (!by_pair) {
+    for (int i = 0; i < count_; ++i) {
+      keys_[i] = {found_island_[static_cast<std::size_t>(i)], i};
+    }
+    keys_.quickSort([](const IslandKey& l, const IslandKey& r) { return l.island < r.island; });
+    return;
+  }
+  pair_keys_.resizeNoInitialize(count_);
+  for (int i = 0; i < count_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    pair_keys_[i] = {found_island_[at], found_[at]->getBody0()->getBroadphaseHandle()->m_uniqueId,
+                     found_[at]->getBody1()->getBroadphaseHandle()->m_uniqueId, i};
+  }
+  pair_keys_.quickSort([](const PairKey& l, const PairKey& r) {
+    if (l.island != r.island) return l.island < r.island;
+    return l.uid0 != r.uid0 ? l.uid0 < r.uid0 : l.uid1 < r.uid1;
+  });
+  for (int i = 0; i < count_; ++i) keys_[i] = {pair_keys_[i].island, pair_keys_[i].index};
+}
+
+void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
+                               btConstraintSolver& solver, const btContactSolverInfo& info,
+                               btTypedConstraint** constraints, int constraint_count) {
+  sort_manifolds(world.getDispatchInfo().m_deterministicOverlappingPairs);
+  const btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  const auto begin_group = [&] {
+    bodies_.clear();
+    manifolds_.clear();
+    constraints_.clear();
+  };
+  const auto solve_group = [&] {
+    solver.solveGroup(bodies_.data(), static_cast<int>(bodies_.size()), manifolds_.data(),
+                      static_cast<int>(manifolds_.size()), constraints_.data(),
+                      static_cast<int>(constraints_.size()), info, world.getDebugDrawer(),
+                      world.getDispatcher());
+    begin_group();
+  };
+  begin_group();  // what a solver that threw left behind may be gone
+  int key = 0, joint = 0;
+  for (int first = 0, last = 0; first < unions.getNumElements(); first = last) {
+    const int island = unions.getElement(first).m_id;
+    const std::size_t bodies_before = bodies_.size();
+    bool awake = false;
+    for (last = first; last < unions.getNumElements() && unions.getElement(last).m_id == island;
+         ++last) {
+      bodies_.push_back(objects[unions.getElement(last).m_sz]);
+      awake |= bodies_.back()->isActive();
+    }
+    const int first_key = key;
+    while (key < keys_.size() && keys_[key].island == island) ++key;
+    if (!awake) {
+      bodies_.resize(bodies_before);
+      continue;
+    }
+    for (int k = first_key; k < key; ++k) {
+      manifolds_.push_back(found_[static_cast<std::size_t>(keys_[k].index)]);
+    }
+    while (joint < constraint_count && island_of(*constraints[joint]) < island) ++joint;
+    for (; joint < constraint_count && island_of(*constraints[joint]) == island; ++joint) {
+      constraints_.push_back(constraints[joint]);
+    }
+    // Small islands are gathered into one group.
+    const int size = static_cast<int>(constraints_.size() + manifolds_.size());
+    if (info.m_minimumSolverBatchSize <= 1 || size > info.m_minimumSolverBatchSize) solve_group();
+  }
+  solve_group();  // as Bullet does, also where nothing is left
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,326 @@
+/// Builds a Bullet world from a scene.
+#include <jfpx/bullet/dynamics_world.hpp>
+#include <jfpx/bullet/scene_world.hpp>
+#include <jfpx/error.hpp>
+
+#include "src/bullet/world/timed_world.hpp"
+#include "src/scene/compound.hpp"
+#include "src/scene/inertia_tensor.hpp"
+#include "src/scene/principal_inertia.hpp"
+#include "src/world/integrate.hpp"
+
+#include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
+#include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
+#include <BulletCollision/CollisionShapes/btBoxShape.h>
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <array>
+#include <map>
+#include <string>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+btVector3 to_bullet(const Vec3& v) { return {v.x, v.y, v.z}; }
+btQuaternion to_bullet(const Quat& q) { return {q.x, q.y, q.z, q.w}; }
+Vec3 from_bullet(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
+Quat from_bullet(const btQuaternion& q) { return {q.w(), q.x(), q.y(), q.z()}; }
+
+bool is_half_space(const BodyDef& def) { return std::holds_alternative<HalfSpace>(def.shape); }
+
+/// The axes of Bullet's body, in those of ours: Bullet wants principal ones.
+btTransform principal_axes(const PrincipalInertia& inertia) {
+  const Mat3& m = inertia.axes;
+  return btTransform(
+      btMatrix3x3(m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2)));
+}
+
+/// Makes shapes and keeps them; equal shapes once if they are shared.
+class ShapeStore {
+ public:
+  explicit ShapeStore(bool share) : share_(share) {}
+
+  /// @param axes of Bullet's body in those of ours; other than the identity for compounds only
+  btCollisionShape* get(const Shape& shape, const btTransform& axes) {
+    if (const auto* compound = std::get_if<Compound>(&shape)) return make(*compound, axes);
+    if (const auto* plane = std::get_if<HalfSpace>(&shape)) return make(*plane);
+    if (const auto* box = std::get_if<Box>(&shape)) return make(*box);
+    return make(std::get<Sphere>(shape));
+  }
+
+ private:
+  using Key = std::array<Real, 3>;
+
+  btCollisionShape* make(const Sphere& sphere) {
+    return get(Key{sphere.radius, 0, 0}, [&] { return new btSphereShape(sphere.radius); });
+  }
+  btCollisionShape* make(const Box& box) {
+    const Vec3& h = box.half_extents;
+    return get(Key{h.x, h.y, h.z}, [&] { return new btBoxShape(to_bullet(h)); });
+  }
+  btCollisionShape* make(const HalfSpace& plane) {
+    shapes_.emplace_back(new btStaticPlaneShape(to_bullet(plane.normal), plane.offset));
+    return shapes_.back().get();
+  }
+
+  btCollisionShape* make(const Compound& compound, const btTransform& axes) {
+    auto shape = std::make_unique<btCompoundShape>();
+    for (const CompoundPart& part : compound.parts) {
+      const btTransform place(to_bullet(normalized(part.orientation)), to_bullet(part.position));
+      btCollisionShape* child = std::visit([this](const auto& s) { return make(s); }, part.shape);
+      shape->addChildShape(axes.inverse() * place, child);
+    }
+    shapes_.push_back(std::move(shape));
+    return shapes_.back().get();
+  }
+
+  template <class Make>
+  btCollisionShape* get(const Key& key, Make make) {
+    if (share_) {
+      const auto found = shared_.find(key);
+      if (found != shared_.end()) return found->second;
+    }
+    shapes_.emplace_back(make());
+    if (share_) shared_.emplace(key, shapes_.back().get());
+    return shapes_.back().get();
+  }
+
+  bool share_;
+  std::vector<std::unique_ptr<btCollisionShape>> shapes_;
+  std::map<Key, btCollisionShape*> shared_;
+};
+
+/// Bullet multiplies the coefficients of two bodies; of square roots that is the geometric mean.
+void require_bullet(const MaterialSettings& materials) {
+  for (const auto& [field, rule] : {std::pair("friction", materials.friction),
+                                    std::pair("restitution", materials.restitution)}) {
+    if (rule == CombineRule::geometric_mean || rule == CombineRule::product) continue;
+    throw InvalidScene(std::string("scene: materials.") + field + " is " + to_string(rule) +
+                       "; Bullet multiplies what two bodies have, so there it must be "
+                       "geometric_mean or product");
+  }
+}
+
+/// Bullet's bodies have their moments of inertia about the axes of their shape, which an compound
+/// can be turned to; and Bullet has no two-sided plane.
+void require_bullet(const BodyDef& def, std::size_t body) {
+  const auto refuse = [body](const char* what) {
+    throw InvalidScene("body " + std::to_string(body) + ": " + what);
+  };
+  if (std::holds_alternative<Plane>(def.shape)) {
+    refuse(
+        "shape is a two-sided plane, which Bullet does not have; it must be a half-space or a "
+        "box to run in Bullet");
+  }
+  if (std::holds_alternative<Compound>(def.shape)) return;
+  if (def.mass > 0 && def.inertia && !is_diagonal(*def.inertia)) {
+    refuse("inertia has products of inertia; for Bullet it must be diagonal");
+  }
+}
+
+/// Of an compound that can move; of all others nothing.
+PrincipalInertia inertia_of(const BodyDef& def) {
+  const auto* compound = std::get_if<Compound>(&def.shape);
+  if (compound == nullptr || !(def.mass > 0)) return {};
+  return principal_inertia(def.inertia ? symmetric_part(*def.inertia)
+                                       : mass_properties(*compound, def.mass).inertia);
+}
+
+Real factor(CombineRule rule, Real coefficient) {
+  return rule == CombineRule::product ? coefficient : square_root(coefficient);
+}
+
+std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const PrincipalInertia& own,
+                                       const MaterialSettings& materials, btCollisionShape* shape,
+                                       bool can_sleep) {
+  const Real mass = is_half_space(def) ? 0 : def.mass;
+  const bool compound = std::holds_alternative<Compound>(def.shape);
+  btVector3 inertia(0, 0, 0);
+  if (compound) inertia = to_bullet(own.moments);
+  if (mass > 0 && !compound) shape->calculateLocalInertia(mass, inertia);
+  if (mass > 0 && !compound && def.inertia) {
+    inertia = {(*def.inertia)(0, 0), (*def.inertia)(1, 1), (*def.inertia)(2, 2)};
+  }
+  btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, shape, inertia);
+  if (!is_half_space(def)) {
+    info.m_startWorldTransform = btTransform(to_bullet(def.orientation), to_bullet(def.position));
+  }
+  if (compound) info.m_startWorldTransform *= principal_axes(own);
+  info.m_linearDamping = 1 - def.linear_damping;
+  info.m_angularDamping = 1 - def.angular_damping;
+  info.m_friction = factor(materials.friction, def.friction);
+  info.m_restitution = factor(materials.restitution, def.restitution);
+  auto body = std::make_unique<btRigidBody>(info);
+  body->setFlags(body->getFlags() | BT_DISABLE_WORLD_GRAVITY);
+  if (def.kinematic) {
+    body->setCollisionFlags(body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    body->setActivationState(DISABLE_DEACTIVATION);
+  }
+  if (mass > 0) body->setGravity(to_bullet(def.acceleration));
+  if (mass > 0 || def.kinematic) {
+    body->setLinearVelocity(to_bullet(def.velocity));
+    body->setAngularVelocity(to_bullet(def.angular_velocity));
+  }
+  if (mass > 0 && !can_sleep) {
+    body->setActivationState(DISABLE_DEACTIVATION);
+  }
+  return body;
+}
+
+std::unique_ptr<btCollisionDispatcher> make_dispatcher(btCollisionConfiguration* configuration,
+                                                       const SceneWorldOptions& options) {
+  if (options.dispatcher == DispatcherKind::stock) {
+    return std::make_unique<btCollisionDispatcher>(configuration);
+  }
+  if (options.make_collider) {
+    return std::make_unique<CollisionDispatcher>(configuration, options.make_collider(),
+                                                 options.dispatch);
+  }
+  return std::make_unique<CollisionDispatcher>(configuration, options.dispatch);
+}
+
+std::unique_ptr<btSequentialImpulseConstraintSolver> make_solver(const SceneWorldOptions& options) {
+  if (options.solver == SolverKind::stock) {
+    return std::make_unique<btSequentialImpulseConstraintSolver>();
+  }
+  return std::make_unique<ConstraintSolver>(options.solve);
+}
+
+std::unique_ptr<btDiscreteDynamicsWorld> make_world(btCollisionDispatcher* dispatcher,
+                                                    btBroadphaseInterface* broadphase,
+                                                    btConstraintSolver* solver,
+                                                    btCollisionConfiguration* configuration,
+                                                    const SceneWorldOptions& options,
+                                                    StageTimes* times) {
+  if (options.world == WorldKind::stock) {
+    return std::make_unique<TimedWorld<btDiscreteDynamicsWorld>>(times, dispatcher, broadphase,
+                                                                 solver, configuration);
+  }
+  return std::make_unique<TimedWorld<DynamicsWorld>>(times, dispatcher, broadphase, solver,
+                                                     configuration, options.step);
+}
+
+}  // namespace
+
+/// Members in the order in which Bullet needs them to be made, and so destroyed in reverse.
+struct SceneWorld::Impl {
+  Scene scene;
+  ShapeStore shapes;
+  btDefaultCollisionConfiguration configuration;
+  std::unique_ptr<btCollisionDispatcher> dispatcher;
+  btDbvtBroadphase broadphase;
+  std::unique_ptr<btSequentialImpulseConstraintSolver> solver;
+  std::vector<std::unique_ptr<btRigidBody>> owned;
+  std::vector<btRigidBody*> bodies;
+  std::vector<PrincipalInertia> inertia;  ///< by body; the default for all but movable compounds
+  StageTimes times;
+  std::unique_ptr<btDiscreteDynamicsWorld> world;
+
+  Impl(Scene source, const SceneWorldOptions& options)
+      : scene(std::move(source)),
+        shapes(options.share_shapes),
+        dispatcher(make_dispatcher(&configuration, options)),
+        solver(make_solver(options)),
+        world(make_world(dispatcher.get(), &broadphase, solver.get(), &configuration, options,
+                         &times)) {
+    world->setGravity({0, 0, 0});
+    world->getDispatchInfo().m_deterministicOverlappingPairs = options.deterministic_pairs;
+    for (const BodyDef& def : scene.bodies) {
+      require_bullet(def, bodies.size());
+      inertia.push_back(inertia_of(def));
+      const bool can_sleep = scene.sleep.enabled && def.can_sleep;
+      btCollisionShape* shape = shapes.get(def.shape, principal_axes(inertia.back()));
+      owned.push_back(make_body(def, inertia.back(), scene.materials, shape, can_sleep));
+      bodies.push_back(owned.back().get());
+      world->addRigidBody(bodies.back());
+    }
+  }
+  /// As the native engine moves them; Bullet finds their velocities from the way.
+  void move_kinematic_bodies(Real dt) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const BodyDef& def = scene.bodies[i];
+      if (!def.kinematic) continue;
+      const btTransform& pose = bodies[i]->getWorldTransform();
+      bodies[i]->setWorldTransform(
+          btTransform(to_bullet(detail::integrated_orientation(from_bullet(pose.getRotation()),
+                                                               def.angular_velocity, dt)),
+                      pose.getOrigin() + to_bullet(def.velocity * dt)));
+    }
+  }
+  ~Impl() {
+    // Bullet scans all pairs once for every body that leaves a world; without pairs it need not.
+    btOverlappingPairCache* cache = broadphase.getOverlappingPairCache();
+    while (cache->getNumOverlappingPairs() > 0) {
+      const btBroadphasePair& last =
+          cache->getOverlappingPairArrayPtr()[cache->getNumOverlappingPairs() - 1];
+      cache->removeOverlappingPair(last.m_pProxy0, last.m_pProxy1, dispatcher.get());
+    }
+  }
+};
+
+SceneWorld::SceneWorld(const Scene& scene, const SceneWorldOptions& options) {
+  validate(scene);
+  require_bullet(scene.materials);
+  impl_ = std::make_unique<Impl>(scene, options);
+}
+SceneWorld::~SceneWorld() = default;
+SceneWorld::SceneWorld(SceneWorld&&) noexcept = default;
+SceneWorld& SceneWorld::operator=(SceneWorld&&) noexcept = default;
+
+void SceneWorld::step(Real dt) {
+  if (!(dt > kEpsilon) || !is_finite(dt)) {
+    throw InvalidArgument("dt is " + std::to_string(dt) +
+                          " s; it must be finite and larger than the machine epsilon");
+  }
+  impl_->move_kinematic_bodies(dt);
+  // No sub-steps: Bullet then makes one step of the full length and keeps no remainder.
+  impl_->world->stepSimulation(dt, 0, dt);
+}
+void SceneWorld::step() { step(impl_->scene.dt); }
+
+std::vector<BodyState> SceneWorld::states() const {
+  std::vector<BodyState> states;
+  states.reserve(impl_->bodies.size());
+  for (std::size_t i = 0; i < impl_->bodies.size(); ++i) {
+    const btRigidBody& body = *impl_->bodies[i];
+    const BodyDef& def = impl_->scene.bodies[i];
+    if (is_half_space(def)) {
+      states.push_back({def.position, def.orientation, {}, {}});
+      continue;
+    }
+    btTransform pose = body.getWorldTransform();
+    if (impl_->inertia[i].axes != Mat3{}) pose *= principal_axes(impl_->inertia[i]).inverse();
+    states.push_back({from_bullet(pose.getOrigin()), from_bullet(pose.getRotation()),
+                      from_bullet(body.getLinearVelocity()),
+                      from_bullet(body.getAngularVelocity())});
+  }
+  return states;
+}
+std::uint64_t SceneWorld::state_hash() const { return jfpx::state_hash(states()); }
+const StageTimes& SceneWorld::last_step() const noexcept { return impl_->times; }
+
+const Scene& SceneWorld::scene() const noexcept { return impl_->scene; }
+btDiscreteDynamicsWorld& SceneWorld::world() noexcept { return *impl_->world; }
+const btDiscreteDynamicsWorld& SceneWorld::world() const noexcept { return *impl_->world; }
+btCollisionDispatcher& SceneWorld::dispatcher() noexcept { return *impl_->dispatcher; }
+CollisionDispatcher* SceneWorld::jfpx_dispatcher() noexcept {
+  return dynamic_cast<CollisionDispatcher*>(impl_->dispatcher.get());
+}
+const CollisionDispatcher* SceneWorld::jfpx_dispatcher() const noexcept {
+  return dynamic_cast<const CollisionDispatcher*>(impl_->dispatcher.get());
+}
+const ConstraintSolver* SceneWorld::jfpx_solver() const noexcept {
+  return dynamic_cast<const ConstraintSolver*>(impl_->solver.get());
+}
+std::span<btRigidBody* const> SceneWorld::bodies() const noexcept { return impl_->bodies; }
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

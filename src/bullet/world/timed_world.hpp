@@ -1,0 +1,72 @@
+/// A dynamics world that knows how long its stages take.
+#pragma once
+
+#include <jfpx/bullet/scene_world.hpp>
+
+#include <chrono>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+/// Times the stages by overriding the virtual function of each. Bullet's profiler callbacks would
+/// do too, but they are global and belong to the user.
+template <class World>
+class TimedWorld final : public World {
+ public:
+  /// @param times outlives the world
+  template <class... Arguments>
+  explicit TimedWorld(StageTimes* times, const Arguments&... arguments)
+      : World(arguments...), times_(*times) {}
+
+  int stepSimulation(btScalar dt, int max_sub_steps, btScalar fixed_dt) override {
+    times_ = {};
+    int sub_steps = 0;
+    time(&times_.total, [&] { sub_steps = World::stepSimulation(dt, max_sub_steps, fixed_dt); });
+    return sub_steps;
+  }
+  void updateAabbs() override {
+    time(&times_.broadphase, [&] { World::updateAabbs(); });
+  }
+  void computeOverlappingPairs() override {
+    time(&times_.broadphase, [&] { World::computeOverlappingPairs(); });
+  }
+  void performDiscreteCollisionDetection() override {
+    const double broadphase = times_.broadphase;
+    time(&times_.dispatch, [&] { World::performDiscreteCollisionDetection(); });
+    times_.dispatch -= times_.broadphase - broadphase;
+  }
+  void solveConstraints(btContactSolverInfo& info) override {
+    time(&times_.solve, [&] { World::solveConstraints(info); });
+  }
+
+ protected:
+  void predictUnconstraintMotion(btScalar dt) override {
+    time(&times_.integrate, [&] { World::predictUnconstraintMotion(dt); });
+  }
+  void integrateTransforms(btScalar dt) override {
+    time(&times_.integrate, [&] { World::integrateTransforms(dt); });
+  }
+  void updateActivationState(btScalar dt) override {
+    time(&times_.integrate, [&] { World::updateActivationState(dt); });
+  }
+  void calculateSimulationIslands() override {
+    time(&times_.islands, [&] { World::calculateSimulationIslands(); });
+  }
+
+ private:
+  template <class Stage>
+  static void time(double* milliseconds, Stage stage) {
+    const auto start = std::chrono::steady_clock::now();
+    stage();
+    const std::chrono::duration<double, std::milli> taken =
+        std::chrono::steady_clock::now() - start;
+    *milliseconds += taken.count();
+  }
+
+  StageTimes& times_;
+};
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

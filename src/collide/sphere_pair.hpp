@@ -1,0 +1,60 @@
+/// The one definition of sphere-sphere contact arithmetic, for g++, clang and nvcc alike.
+#pragma once
+
+#include <jfpx/contact.hpp>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace detail {
+
+/// The contact of spheres whose centres are d = a - b, of length len, apart. Coincident centres
+/// have the normal (1,0,0) (E7).
+JFPX_HD inline PairResult sphere_pair_contact(const Vec3& d, Real len, Real sum) {
+  PairResult r;
+  r.touching = 1;
+  r.distance = len - sum;
+  r.normal = {1, 0, 0};
+  if (len > kEpsilon) {
+    const Real k = Real(1) / len;
+    r.normal = d * k;
+  }
+  return r;
+}
+
+/// Tests two spheres in Bullet's order of operations (btSphereSphereCollisionAlgorithm): each
+/// operation is one IEEE rounding, the normal is scaled by a reciprocal, and the rejection is
+/// negated so that a NaN makes a contact.
+JFPX_HD inline PairResult test_sphere_pair(const SphereInstance& a, const SphereInstance& b) {
+  const Vec3 d = a.centre - b.centre;
+  const Real len = square_root((d.x * d.x + d.y * d.y) + d.z * d.z);
+  const Real sum = a.radius + b.radius;
+  if (len > sum) return {};
+  return sphere_pair_contact(d, len, sum);
+}
+
+/// The same without a branch, for lists in which touching and not touching are mixed: `*contact`
+/// is written in any case.
+JFPX_HD inline bool find_sphere_contact(const SphereInstance& a, const SphereInstance& b,
+                                        PairContact* contact) {
+  const Vec3 d = a.centre - b.centre;
+  const Real len = square_root((d.x * d.x + d.y * d.y) + d.z * d.z);
+  const Real sum = a.radius + b.radius;
+  const PairResult r = sphere_pair_contact(d, len, sum);
+  contact->normal = r.normal;
+  contact->distance = r.distance;
+  return !(len > sum);
+}
+
+/// The same for spheres that count as touching up to a distance of `threshold`.
+JFPX_HD inline PairResult test_sphere_pair(const SphereInstance& a, const SphereInstance& b,
+                                           Real threshold) {
+  const Vec3 d = a.centre - b.centre;
+  const Real len = square_root((d.x * d.x + d.y * d.y) + d.z * d.z);
+  const Real sum = a.radius + b.radius;
+  if (len > sum + threshold) return {};
+  return sphere_pair_contact(d, len, sum);
+}
+
+}  // namespace detail
+}  // namespace JFPX_ABI
+}  // namespace jfpx

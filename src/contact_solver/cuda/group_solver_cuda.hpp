@@ -1,0 +1,15 @@
+/// The cuda row of the backend table: groups of contacts.
+#pragma once
+
+#include "src/contact_solver/group_solver.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// @throws BackendUnavailable, DeviceError
+std::unique_ptr<GroupSolver> make_group_solver(int device);
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

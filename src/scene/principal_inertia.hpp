@@ -1,0 +1,18 @@
+/// The axes in which an inertia tensor is diagonal.
+#pragma once
+
+#include <jfpx/math.hpp>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+struct PrincipalInertia {
+  Vec3 moments;  ///< [kg m^2]
+  Mat3 axes;     ///< columns, right-handed; the identity for a tensor that is diagonal to rounding
+};
+
+/// @param tensor finite and symmetric; its upper half is read
+JFPX_API PrincipalInertia principal_inertia(const Mat3& tensor);
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

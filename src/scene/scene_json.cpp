@@ -1,0 +1,437 @@
+/// Scenes as JSON: strict reading with errors that name the place, writing that keeps every bit.
+#include "src/scene/scene_json.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/base/file.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <optional>
+#include <set>
+#include <variant>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+// Numbers are Reals: shortest text that reads back to the same bits, in either precision.
+using Json = nlohmann::basic_json<nlohmann::ordered_map, std::vector, std::string, bool,
+                                  std::int64_t, std::uint64_t, Real>;
+
+[[noreturn]] void fail(const std::string& where, const std::string& what) {
+  throw InvalidScene(where + ": " + what);
+}
+
+const char* kind_of(const Json& value) {
+  if (value.is_array()) return "an array";
+  if (value.is_object()) return "an object";
+  if (value.is_string()) return "a string";
+  if (value.is_boolean()) return "a boolean";
+  return value.is_null() ? "null" : "a number";
+}
+
+/// Of what holds others only what it is: to write them takes a stack as deep as they are nested.
+std::string text_of(const Json& json) { return json.is_structured() ? kind_of(json) : json.dump(); }
+
+void read(const Json& json, const std::string& where, Real& out) {
+  if (!json.is_number()) fail(where, std::string("is ") + kind_of(json) + "; it must be a number");
+  out = json.get<Real>();
+}
+void read(const Json& json, const std::string& where, bool& out) {
+  if (!json.is_boolean())
+    fail(where, std::string("is ") + kind_of(json) + "; it must be a boolean");
+  out = json.get<bool>();
+}
+void read(const Json& json, const std::string& where, std::string& out) {
+  if (!json.is_string()) fail(where, std::string("is ") + kind_of(json) + "; it must be a string");
+  out = json.get<std::string>();
+}
+void read(const Json& json, const std::string& where, std::uint32_t& out) {
+  if (!json.is_number_unsigned() || json.get<std::uint64_t>() > 0xffffffffu) {
+    fail(where, "is " + text_of(json) + "; it must be a whole number from 0 to 4294967295");
+  }
+  out = json.get<std::uint32_t>();
+}
+void read(const Json& json, const std::string& where, CombineRule& out) {
+  std::string name, names;
+  read(json, where, name);
+  // Past the last rule there are no names.
+  for (std::uint8_t i = 0; to_string(CombineRule{i}) != nullptr; ++i) {
+    out = CombineRule{i};
+    if (name == to_string(out)) return;
+    names += (i == 0 ? "" : ", ") + std::string(to_string(out));
+  }
+  fail(where, "is " + text_of(json) + "; it must be one of " + names);
+}
+void read_array(const Json& json, const std::string& where, std::span<Real* const> out) {
+  if (!json.is_array() || json.size() != out.size()) {
+    fail(where, "must be an array of " + std::to_string(out.size()) + " numbers");
+  }
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    read(json[i], where + "[" + std::to_string(i) + "]", *out[i]);
+  }
+}
+void read(const Json& json, const std::string& where, Vec3& v) {
+  Real* const parts[] = {&v.x, &v.y, &v.z};
+  read_array(json, where, parts);
+}
+void read(const Json& json, const std::string& where, std::optional<Mat3>& m) {
+  if (!json.is_array() || json.size() != 3) fail(where, "must be an array of 3 rows");
+  m.emplace();
+  for (std::size_t i = 0; i < 3; ++i) {
+    read(json[i], where + "[" + std::to_string(i) + "]", m->row[i]);
+  }
+}
+void read(const Json& json, const std::string& where, Quat& q) {
+  Real* const parts[] = {&q.w, &q.x, &q.y, &q.z};
+  read_array(json, where, parts);
+}
+
+void read(const Json& json, const std::string& where, Shape& shape);
+void read(const Json& json, const std::string& where, std::variant<Sphere, Box>& shape);
+void read(const Json& json, const std::string& where, std::vector<CompoundPart>& parts);
+void read(const Json& json, const std::string& where, ResolverSettings& settings);
+void read(const Json& json, const std::string& where, SleepSettings& settings);
+void read(const Json& json, const std::string& where, MaterialSettings& settings);
+
+/// Reads the fields of one object and complains about those that nobody asked for.
+class ObjectReader {
+ public:
+  ObjectReader(const Json& json, std::string where) : json_(json), where_(std::move(where)) {
+    if (!json.is_object())
+      fail(where_, std::string("is ") + kind_of(json) + "; it must be an object");
+  }
+  template <typename T>
+  void optional(const char* name, T& out) {
+    if (const Json* value = find(name)) read(*value, path(name), out);
+  }
+  template <typename T>
+  void required(const char* name, T& out) {
+    read(at(name), path(name), out);
+  }
+  const Json* find(const char* name) {
+    known_.insert(name);
+    const auto it = json_.find(name);
+    return it == json_.end() ? nullptr : &*it;
+  }
+  const Json& at(const char* name) {
+    const Json* value = find(name);
+    if (value == nullptr) fail(where_, std::string("has no field \"") + name + "\"");
+    return *value;
+  }
+  std::string path(const char* name) const { return where_ + "." + name; }
+  void reject_unknown() const {
+    for (const auto& item : json_.items()) {
+      if (known_.contains(item.key())) continue;
+      std::string names;
+      for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
+      fail(where_, "has an unknown field \"" + item.key() + "\"; known fields are " + names);
+    }
+  }
+
+ private:
+  const Json& json_;
+  std::string where_;
+  std::set<std::string> known_;
+};
+
+void read_fields(ObjectReader* object, Sphere* sphere) {
+  object->required("radius", sphere->radius);
+}
+void read_fields(ObjectReader* object, Box* box) {
+  object->required("half_extents", box->half_extents);
+}
+void read_fields(ObjectReader* object, HalfSpace* half_space) {
+  object->required("normal", half_space->normal);
+  object->required("offset", half_space->offset);
+}
+void read_fields(ObjectReader* object, Plane* plane) {
+  object->required("normal", plane->normal);
+  object->required("offset", plane->offset);
+}
+void read_fields(ObjectReader* object, Compound* compound) {
+  object->required("parts", compound->parts);
+}
+
+template <class T>
+constexpr const char* kTypeName = nullptr;
+template <>
+constexpr const char* kTypeName<Sphere> = "sphere";
+template <>
+constexpr const char* kTypeName<Box> = "box";
+template <>
+constexpr const char* kTypeName<HalfSpace> = "half_space";
+template <>
+constexpr const char* kTypeName<Plane> = "plane";
+template <>
+constexpr const char* kTypeName<Compound> = "compound";
+
+/// Reads the one of the shapes that the field "type" names.
+template <class... Shapes>
+void read_shape(const Json& json, const std::string& where, std::variant<Shapes...>* shape) {
+  ObjectReader object(json, where);
+  std::string type;
+  object.required("type", type);
+  const auto read_if = [&](auto value) {
+    if (type != kTypeName<decltype(value)>) return false;
+    read_fields(&object, &value);
+    *shape = std::move(value);
+    return true;
+  };
+  if (!(read_if(Shapes{}) || ...)) {
+    std::string names;
+    std::size_t left = sizeof...(Shapes);
+    const auto list = [&](const char* name) {
+      names += names.empty() ? "" : left == 1 ? " or " : ", ";
+      names += name;
+      --left;
+    };
+    (list(kTypeName<Shapes>), ...);
+    fail(object.path("type"), "is \"" + type + "\"; it must be " + names);
+  }
+  object.reject_unknown();
+}
+void read(const Json& json, const std::string& where, Shape& shape) {
+  read_shape(json, where, &shape);
+}
+void read(const Json& json, const std::string& where, std::variant<Sphere, Box>& shape) {
+  read_shape(json, where, &shape);
+}
+
+void read(const Json& json, const std::string& where, CompoundPart& part) {
+  ObjectReader object(json, where);
+  object.required("shape", part.shape);
+  object.optional("position", part.position);
+  object.optional("orientation", part.orientation);
+  object.optional("density", part.density);
+  object.reject_unknown();
+}
+void read(const Json& json, const std::string& where, std::vector<CompoundPart>& parts) {
+  if (!json.is_array()) fail(where, std::string("is ") + kind_of(json) + "; it must be an array");
+  parts.clear();
+  for (const Json& json_part : json) {
+    const std::string place = where + "[" + std::to_string(parts.size()) + "]";
+    read(json_part, place, parts.emplace_back());
+  }
+}
+
+void read(const Json& json, const std::string& where, BodyDef& body) {
+  ObjectReader object(json, where);
+  object.required("shape", body.shape);
+  object.optional("mass", body.mass);
+  object.optional("kinematic", body.kinematic);
+  object.optional("inertia", body.inertia);
+  object.optional("position", body.position);
+  object.optional("orientation", body.orientation);
+  object.optional("velocity", body.velocity);
+  object.optional("angular_velocity", body.angular_velocity);
+  object.optional("acceleration", body.acceleration);
+  object.optional("linear_damping", body.linear_damping);
+  object.optional("angular_damping", body.angular_damping);
+  object.optional("friction", body.friction);
+  object.optional("restitution", body.restitution);
+  object.optional("can_sleep", body.can_sleep);
+  object.reject_unknown();
+}
+
+void read(const Json& json, const std::string& where, ResolverSettings& settings) {
+  ObjectReader object(json, where);
+  object.optional("max_iterations", settings.max_iterations);
+  object.optional("velocity_epsilon", settings.velocity_epsilon);
+  object.optional("position_epsilon", settings.position_epsilon);
+  object.optional("restitution_velocity", settings.restitution_velocity);
+  object.optional("angular_limit", settings.angular_limit);
+  object.reject_unknown();
+}
+
+void read(const Json& json, const std::string& where, SleepSettings& settings) {
+  ObjectReader object(json, where);
+  object.optional("enabled", settings.enabled);
+  object.optional("epsilon", settings.epsilon);
+  object.optional("bias", settings.bias);
+  object.reject_unknown();
+}
+
+void read(const Json& json, const std::string& where, MaterialSettings& settings) {
+  ObjectReader object(json, where);
+  object.optional("friction", settings.friction);
+  object.optional("restitution", settings.restitution);
+  object.reject_unknown();
+}
+
+Scene scene_from(const Json& json) {
+  ObjectReader object(json, "scene");
+  const Json& version = object.at("jfpx_scene");
+  if (version != kSceneSchemaVersion) {
+    fail("scene.jfpx_scene", "is " + text_of(version) + "; this build reads schema version " +
+                                 std::to_string(kSceneSchemaVersion));
+  }
+  Scene scene;
+  object.optional("name", scene.name);
+  object.optional("dt", scene.dt);
+  object.optional("resolver", scene.resolver);
+  object.optional("sleep", scene.sleep);
+  object.optional("materials", scene.materials);
+  const Json& bodies = object.at("bodies");
+  if (!bodies.is_array())
+    fail("scene.bodies", std::string("is ") + kind_of(bodies) + "; it must be an array");
+  scene.bodies.reserve(bodies.size());
+  for (const Json& json_body : bodies) {
+    const std::string where = "body " + std::to_string(scene.bodies.size());
+    read(json_body, where, scene.bodies.emplace_back());
+  }
+  object.reject_unknown();
+  validate(scene);
+  return scene;
+}
+
+/// The parser needs no stack, but whoever copies or writes what it made does.
+void require_shallow(std::string_view text) {
+  constexpr int kDeepest = 64;
+  int depth = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '"') in_string = !in_string;
+    if (in_string && c == '\\') ++i;  // what it escapes
+    if (in_string) continue;
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (depth > kDeepest) {
+      throw InvalidScene("arrays and objects are nested more than " + std::to_string(kDeepest) +
+                         " deep");
+    }
+  }
+}
+
+Json parse(std::string_view text) {
+  require_shallow(text);
+  try {
+    return Json::parse(text);
+  } catch (const nlohmann::json::exception& error) {
+    // "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
+    const std::string what = error.what();
+    const std::size_t end = what.find("] ");
+    throw InvalidScene("broken JSON: " + (end == std::string::npos ? what : what.substr(end + 2)));
+  }
+}
+
+Json to_value(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
+Json to_value(const Quat& q) { return Json::array({q.w, q.x, q.y, q.z}); }
+
+template <class... Shapes>
+Json to_value(const std::variant<Shapes...>& shape);
+
+/// JSON is UTF-8; a name may be any bytes.
+std::string quoted(const std::string& text) {
+  return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Json fields_of(const Sphere& s) { return {{"radius", s.radius}}; }
+Json fields_of(const Box& b) { return {{"half_extents", to_value(b.half_extents)}}; }
+Json fields_of(const HalfSpace& h) {
+  return {{"normal", to_value(h.normal)}, {"offset", h.offset}};
+}
+Json fields_of(const Plane& p) { return {{"normal", to_value(p.normal)}, {"offset", p.offset}}; }
+Json fields_of(const Compound& compound) {
+  Json parts = Json::array();
+  for (const CompoundPart& part : compound.parts) {
+    parts.push_back({{"shape", to_value(part.shape)},
+                     {"position", to_value(part.position)},
+                     {"orientation", to_value(part.orientation)},
+                     {"density", part.density}});
+  }
+  return {{"parts", parts}};
+}
+
+template <class... Shapes>
+Json to_value(const std::variant<Shapes...>& shape) {
+  return std::visit(
+      []<class T>(const T& value) {
+        Json json = {{"type", kTypeName<T>}};
+        json.update(fields_of(value));
+        return json;
+      },
+      shape);
+}
+
+Json to_value(const BodyDef& b) {
+  Json json = {{"shape", to_value(b.shape)},
+               {"mass", b.mass},
+               {"kinematic", b.kinematic},
+               {"position", to_value(b.position)},
+               {"orientation", to_value(b.orientation)},
+               {"velocity", to_value(b.velocity)},
+               {"angular_velocity", to_value(b.angular_velocity)},
+               {"acceleration", to_value(b.acceleration)},
+               {"linear_damping", b.linear_damping},
+               {"angular_damping", b.angular_damping},
+               {"friction", b.friction},
+               {"restitution", b.restitution},
+               {"can_sleep", b.can_sleep}};
+  if (b.inertia) {
+    const auto& row = b.inertia->row;
+    json["inertia"] = Json::array({to_value(row[0]), to_value(row[1]), to_value(row[2])});
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string to_json(const Scene& scene) {
+  validate(scene);
+  const ResolverSettings& r = scene.resolver;
+  const Json resolver = {{"max_iterations", r.max_iterations},
+                         {"velocity_epsilon", r.velocity_epsilon},
+                         {"position_epsilon", r.position_epsilon},
+                         {"restitution_velocity", r.restitution_velocity},
+                         {"angular_limit", r.angular_limit}};
+  const Json sleep = {{"enabled", scene.sleep.enabled},
+                      {"epsilon", scene.sleep.epsilon},
+                      {"bias", scene.sleep.bias}};
+  const Json materials = {{"friction", to_string(scene.materials.friction)},
+                          {"restitution", to_string(scene.materials.restitution)}};
+  // By hand around the values, so that a file has one line a body.
+  std::string text = "{\"jfpx_scene\": " + std::to_string(kSceneSchemaVersion) +
+                     ",\n \"name\": " + quoted(scene.name) +
+                     ",\n \"dt\": " + Json(scene.dt).dump() +
+                     ",\n \"resolver\": " + resolver.dump() + ",\n \"sleep\": " + sleep.dump() +
+                     ",\n \"materials\": " + materials.dump() + ",\n \"bodies\": [";
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    text += (i == 0 ? "\n  " : ",\n  ") + to_value(scene.bodies[i]).dump();
+  }
+  return text + "\n]}\n";
+}
+
+Scene from_json(std::string_view text) { return scene_from(parse(text)); }
+
+Scene load_scene(const std::string& path) {
+  const std::string text = read_file(path);
+  try {
+    return from_json(text);
+  } catch (const InvalidScene& error) {
+    throw InvalidScene(path + ": " + error.what());
+  }
+}
+
+void save_scene(const Scene& scene, const std::string& path) { write_file(path, to_json(scene)); }
+
+std::string recording_header_to_json(const RecordingHeader& header) {
+  return "{\"engine\": " + quoted(header.engine) + ", \"backend\": " + quoted(header.backend) +
+         ", \"scene\": " + to_json(header.scene) + "}";
+}
+
+RecordingHeader recording_header_from_json(std::string_view text) {
+  const Json json = parse(text);
+  ObjectReader object(json, "recording");
+  RecordingHeader header;
+  object.required("engine", header.engine);
+  object.required("backend", header.backend);
+  header.scene = scene_from(object.at("scene"));
+  object.reject_unknown();
+  return header;
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,130 @@
+/// Scenes of spheres on lattices: pile, gas, columns, lattice, polydisperse, and the
+/// all-overlapping cluster.
+#include "src/scenes/makers.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace scenes {
+namespace {
+
+constexpr Real kRadius = Real(0.5);
+
+Vec3 jitter(Random& random, Real amount) {
+  return random.uniform_in_box({-amount, -amount, -amount}, {amount, amount, amount});
+}
+
+}  // namespace
+
+Scene make_pile(const Counts& counts) {
+  constexpr Real kSpacing = Real(1.1);
+  Scene scene;
+  scene.name = "pile";
+  Random random(counts.seed);
+  const std::uint32_t side = cube_side(counts.spheres);
+  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
+    const Vec3 site = lattice_site(i, side) * kSpacing + Vec3{0, Real(0.6), 0};
+    scene.bodies.push_back(sphere_at(site + jitter(random, Real(0.04)), kRadius, 1));
+  }
+  const Real width = static_cast<Real>(side - 1) * kSpacing;
+  const Real gap = Real(0.6);
+  add_container(scene, {-gap, 0, -gap}, {width + gap, 2 * width + 2, width + gap}, false, {});
+  return scene;
+}
+
+Scene make_gas(const Counts& counts) {
+  // Volume fraction 0.30: a sphere of radius 1/2 in a cell of edge cbrt(pi / 6 / 0.30).
+  constexpr Real kSpacing = Real(1.2040);
+  Scene scene;
+  scene.name = "gas";
+  Random random(counts.seed);
+  const std::uint32_t side = cube_side(counts.spheres);
+  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
+    const Vec3 site = lattice_site(i, side) * kSpacing;
+    BodyDef body = sphere_at(site + jitter(random, Real(0.09)), kRadius, 1);
+    body.velocity = random.uniform_in_box({-3, -3, -3}, {3, 3, 3});
+    body.acceleration = {};
+    body.friction = 0;
+    body.restitution = Real(0.9);
+    body.can_sleep = false;
+    scene.bodies.push_back(body);
+  }
+  const Real width = static_cast<Real>(side - 1) * kSpacing;
+  const Real gap = kSpacing * Real(0.5);
+  BodyDef smooth;
+  smooth.friction = 0;
+  smooth.restitution = 1;
+  add_container(scene, {-gap, -gap, -gap}, {width + gap, width + gap, width + gap}, true, smooth);
+  return scene;
+}
+
+Scene make_columns(const Counts& counts) {
+  constexpr std::uint32_t kHeight = 32;
+  constexpr Real kOverlap = Real(0.75);  // neighbours start a quarter of a diameter into each other
+  Scene scene;
+  scene.name = "columns";
+  const std::uint32_t columns = (counts.spheres + kHeight - 1) / kHeight;
+  std::uint32_t side = 1;
+  while (std::uint64_t{side} * side < columns) ++side;
+  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
+    const std::uint32_t column = i / kHeight, row = column / side;
+    const Vec3 position{static_cast<Real>(column % side) * 4,
+                        kRadius + static_cast<Real>(i % kHeight) * kOverlap,
+                        static_cast<Real>(row) * 4};
+    scene.bodies.push_back(sphere_at(position, kRadius, 1));
+  }
+  BodyDef ground;
+  const Real reach = static_cast<Real>(side) * 2 + 100;
+  ground.shape = Box{{reach, 1, reach}};
+  ground.position = {static_cast<Real>(side - 1) * 2, -1, static_cast<Real>(side - 1) * 2};
+  ground.mass = 0;
+  scene.bodies.push_back(ground);
+  return scene;
+}
+
+Scene make_overlap(const Counts& counts) {
+  Scene scene;
+  scene.name = "overlap";
+  Random random(counts.seed);
+  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
+    scene.bodies.push_back(sphere_at(Vec3{0, 10, 0} + jitter(random, Real(0.05)), kRadius, 1));
+  }
+  return scene;
+}
+
+Scene make_lattice(const Counts& counts) {
+  constexpr Real kSpacing = Real(0.97);  // axis neighbours overlap by 3 %, diagonal ones are apart
+  Scene scene;
+  scene.name = "lattice";
+  std::uint32_t side = cube_side(counts.spheres);
+  if (std::uint64_t{side} * side * side > counts.spheres) --side;
+  const std::uint32_t count = side * side * side;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    BodyDef body = sphere_at(lattice_site(i, side) * kSpacing, kRadius, 1);
+    body.acceleration = {};
+    scene.bodies.push_back(body);
+  }
+  return scene;
+}
+
+Scene make_polydisperse(const Counts& counts) {
+  Scene scene;
+  scene.name = "polydisperse";
+  Random random(counts.seed);
+  // Radii over four decades, each decade as many spheres as the next: 10^-u by four exact factors
+  // and a linear spread inside the decade, so that no library function decides the bits.
+  constexpr Real kDecades[] = {Real(5), Real(0.5), Real(0.05), Real(0.005)};
+  const Real width = Real(8) * static_cast<Real>(cube_side(counts.spheres));
+  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
+    const Real radius = kDecades[random.below(4)] * random.uniform(Real(0.1), 1);
+    const Vec3 position =
+        random.uniform_in_box({0, radius, 0}, {width, width * Real(0.25) + radius, width});
+    const Real mass = radius * radius * radius * 8;
+    scene.bodies.push_back(sphere_at(position, radius, mass));
+  }
+  add_container(scene, {-6, 0, -6}, {width + 6, width, width + 6}, false, {});
+  return scene;
+}
+
+}  // namespace scenes
+}  // namespace JFPX_ABI
+}  // namespace jfpx

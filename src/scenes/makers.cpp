@@ -1,0 +1,51 @@
+/// Parts that several scenes share: lattice sites, spheres, containers.
+#include "src/scenes/makers.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace scenes {
+
+std::uint32_t cube_side(std::uint32_t n) {
+  std::uint64_t side = 1;
+  while (side * side * side < n) ++side;
+  return static_cast<std::uint32_t>(side);
+}
+
+Vec3 lattice_site(std::uint32_t i, std::uint32_t side) {
+  const std::uint64_t layer = std::uint64_t{side} * side;
+  const std::uint64_t in_layer = i % layer, storey = i / layer, row = in_layer / side;
+  return {static_cast<Real>(in_layer % side), static_cast<Real>(storey), static_cast<Real>(row)};
+}
+
+BodyDef sphere_at(const Vec3& position, Real radius, Real mass) {
+  BodyDef body;
+  body.shape = Sphere{radius};
+  body.mass = mass;
+  body.position = position;
+  return body;
+}
+
+void add_container(Scene& scene, const Vec3& lower, const Vec3& upper, bool closed,
+                   const BodyDef& material) {
+  constexpr Real kThickness = 2;
+  const Vec3 centre = (lower + upper) * Real(0.5);
+  const Vec3 half = (upper - lower) * Real(0.5);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const Real side : {Real(-1), Real(1)}) {
+      const bool lid = axis == 1 && side > 0;
+      if (lid && !closed) continue;
+      BodyDef wall = material;
+      wall.mass = 0;
+      Box box{half + Vec3{kThickness, kThickness, kThickness}};
+      box.half_extents[axis] = kThickness * Real(0.5);
+      wall.shape = box;
+      wall.position = centre;
+      wall.position[axis] += side * (half[axis] + kThickness * Real(0.5));
+      scene.bodies.push_back(wall);
+    }
+  }
+}
+
+}  // namespace scenes
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,37 @@
+/// The makers behind the table of named scenes, and the parts that they share.
+#pragma once
+
+#include <jfpx/random.hpp>
+#include <jfpx/scene.hpp>
+
+#include "src/scenes/scenes.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace scenes {
+
+Scene make_boxes_and_balls(const Counts& counts);
+Scene make_big_ballistic(const Counts& counts);
+Scene make_mixed(const Counts& counts);
+Scene make_pile(const Counts& counts);
+Scene make_gas(const Counts& counts);
+Scene make_columns(const Counts& counts);
+Scene make_overlap(const Counts& counts);
+Scene make_lattice(const Counts& counts);
+Scene make_polydisperse(const Counts& counts);
+
+/// Smallest integer whose cube is at least n.
+std::uint32_t cube_side(std::uint32_t n);
+/// Site i of a cubic lattice with `side` sites along x and z and as many layers in y as needed.
+Vec3 lattice_site(std::uint32_t i, std::uint32_t side);
+
+/// A solid sphere of density 1 would weigh little; scenes give the mass instead.
+BodyDef sphere_at(const Vec3& position, Real radius, Real mass);
+/// Adds static box walls, 1 m thick or more, around the inner box [lower, upper]: floor and four
+/// sides, and a lid if `closed`.
+void add_container(Scene& scene, const Vec3& lower, const Vec3& upper, bool closed,
+                   const BodyDef& material);
+
+}  // namespace scenes
+}  // namespace JFPX_ABI
+}  // namespace jfpx

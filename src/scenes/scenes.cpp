@@ -1,0 +1,108 @@
+/// The table of named scenes.
+#include "src/scenes/scenes.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/scenes/makers.hpp"
+
+#include <cmath>
+#include <unistd.h>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace scenes {
+namespace {
+
+constexpr Entry kScenes[] = {
+    {"boxes-and-balls", "the thesis' benchmark: a leaning tower of balls falls on a ground", 448,
+     Boxes::on_request, make_boxes_and_balls},
+    {"big-ballistic", "two crates on a ground, and a volley of as many rounds as asked for", 0,
+     Boxes::none, make_big_ballistic},
+    {"mixed", "balls and boxes of many sizes fall into a pit of half-spaces", 1000,
+     Boxes::as_many_as_spheres, make_mixed},
+    {"pile", "a jittered lattice of spheres falls into an open box and comes to rest", 2048,
+     Boxes::none, make_pile},
+    {"gas", "fast spheres without gravity in a closed box, volume fraction 0.30", 4096, Boxes::none,
+     make_gas},
+    {"columns", "stacks of 32 spheres that start a quarter into each other", 1024, Boxes::none,
+     make_columns},
+    {"overlap", "all spheres at one point, within 5 cm: every pair touches", 256, Boxes::none,
+     make_overlap},
+    {"lattice", "a cubic lattice of n^3 spheres with exactly 3n^2(n-1) contacts", 1000, Boxes::none,
+     make_lattice},
+    {"polydisperse", "radii over four decades, from 0.5 mm to 5 m", 2000, Boxes::none,
+     make_polydisperse},
+};
+
+std::uint32_t boxes_of(const Entry& entry, std::uint32_t spheres,
+                       const std::optional<std::uint32_t>& asked) {
+  if (asked && entry.boxes == Boxes::none) {
+    throw InvalidArgument("boxes is " + std::to_string(*asked) + "; \"" + std::string(entry.name) +
+                          "\" has no boxes to count");
+  }
+  return asked.value_or(entry.boxes == Boxes::as_many_as_spheres ? spheres : 0);
+}
+
+void require_memory(std::uint64_t bodies) {
+  // Twice the bodies, because a world copies them.
+  const double needed = 2.0 * static_cast<double>(bodies) * sizeof(BodyDef);
+  const double present =
+      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
+  if (needed <= present) return;
+  constexpr double kMiB = 1024.0 * 1024.0;
+  throw OutOfMemory("a scene of " + std::to_string(bodies) + " bodies needs about " +
+                    std::to_string(static_cast<std::uint64_t>(needed / kMiB)) +
+                    " MiB; this machine has " +
+                    std::to_string(static_cast<std::uint64_t>(present / kMiB)) + " MiB");
+}
+
+}  // namespace
+
+std::span<const Entry> all() { return kScenes; }
+
+Scene make(std::string_view name, const Options& options) {
+  std::string names;
+  for (const Entry& entry : kScenes) {
+    if (entry.name == name) {
+      Counts counts{.spheres = options.spheres.value_or(entry.default_spheres),
+                    .boxes = 0,
+                    .seed = options.seed};
+      counts.boxes = boxes_of(entry, counts.spheres, options.boxes);
+      require_memory(std::uint64_t{counts.spheres} + counts.boxes);
+      return entry.make(counts);
+    }
+    names += names.empty() ? "" : ", ";
+    names += entry.name;
+  }
+  throw InvalidArgument("there is no scene called \"" + std::string(name) + "\"; scenes are " +
+                        names);
+}
+
+std::vector<SphereInstance> spheres_of(const Scene& scene) {
+  std::vector<SphereInstance> spheres;
+  for (const BodyDef& body : scene.bodies) {
+    if (const Sphere* sphere = std::get_if<Sphere>(&body.shape)) {
+      spheres.push_back({body.position, sphere->radius});
+    }
+  }
+  return spheres;
+}
+
+std::vector<SphereInstance> random_spheres(std::uint32_t count, Real contacts_per_sphere,
+                                           std::uint64_t seed) {
+  // With density rho, a sphere of diameter 1 has rho * 4/3 pi neighbours within reach, each shared
+  // by two.
+  const double density =
+      static_cast<double>(contacts_per_sphere) * 2 / (4.0 / 3.0 * 3.14159265358979);
+  const Real width = static_cast<Real>(std::cbrt(static_cast<double>(count) / density));
+  Random random(seed);
+  std::vector<SphereInstance> spheres(count);
+  for (SphereInstance& sphere : spheres) {
+    sphere = {random.uniform_in_box({}, {width, width, width}), Real(0.5)};
+  }
+  return spheres;
+}
+
+}  // namespace scenes
+}  // namespace JFPX_ABI
+}  // namespace jfpx

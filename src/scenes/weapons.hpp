@@ -1,0 +1,26 @@
+/// The weapons of the ballistic demos and the rigid rounds that they fire.
+#pragma once
+
+#include <jfpx/body.hpp>
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace scenes {
+
+enum class Weapon : std::uint8_t { pistol, artillery, fireball, laser };
+inline constexpr std::array<std::string_view, 4> kWeaponNames{"pistol", "artillery", "fireball",
+                                                              "laser"};
+
+/// Where rounds of big-ballistic start.
+inline constexpr Vec3 kBigGun{0, 3, 0};
+
+/// A round of big-ballistic as it leaves the gun, with the numbers of the original.
+BodyDef big_round(Weapon weapon);
+
+}  // namespace scenes
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,134 @@
+/// Default costs, and cost models as JSON files.
+#include "src/sphere_collider/cost_model.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/base/file.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFormat = 1;
+constexpr const char* kFormatName = "jfpx_cost_model";
+constexpr const char* kPrecision = sizeof(Real) == 4 ? "float" : "double";
+
+struct Way {
+  const char* name;
+  CostTerms CostModel::*terms;
+};
+constexpr Way kWays[] = {
+    {"x86_all_pairs", &CostModel::x86_all_pairs},
+    {"x86_sorted_tiles", &CostModel::x86_sorted_tiles},
+    {"x86_given_pairs", &CostModel::x86_given_pairs},
+    {"cuda_all_pairs", &CostModel::cuda_all_pairs},
+    {"cuda_sorted_tiles", &CostModel::cuda_sorted_tiles},
+    {"cuda_given_pairs", &CostModel::cuda_given_pairs},
+};
+
+struct Term {
+  const char* name;
+  double CostTerms::*value;
+};
+constexpr Term kTerms[] = {
+    {"call_us", &CostTerms::call_us},       {"byte_ns", &CostTerms::byte_ns},
+    {"sphere_ns", &CostTerms::sphere_ns},   {"pair_ns", &CostTerms::pair_ns},
+    {"contact_ns", &CostTerms::contact_ns},
+};
+
+double read_cost(const Json& json, const char* name) {
+  const Json& value = json.at(name);
+  if (!value.is_number()) throw FileError(std::string(name) + " is no number");
+  return value.get<double>();
+}
+
+MeasuredCostModel from_json_value(const Json& json) {
+  if (!json.is_object() || !json.contains(kFormatName)) throw FileError("is no cost model");
+  if (json[kFormatName] != kFormat) throw FileError("is a cost model of another format");
+  if (json.at("precision") != kPrecision) throw FileError("is of the other precision");
+  MeasuredCostModel model;
+  json.at("machine").get_to(model.origin.machine);
+  json.at("driver").get_to(model.origin.driver);
+  json.at("version").get_to(model.origin.version);
+  for (const Way& way : kWays) {
+    for (const Term& term : kTerms) {
+      model.costs.*way.terms.*term.value = read_cost(json.at(way.name), term.name);
+    }
+  }
+  model.costs.cuda_start_ms = read_cost(json, "cuda_start_ms");
+  const std::string fault = find_fault(model.costs);
+  if (!fault.empty()) throw FileError(fault);
+  return model;
+}
+
+bool is_cost(double value) { return std::isfinite(value) && value >= 0; }
+
+std::string fault_of(const std::string& name, double value) {
+  return name + " is " + std::to_string(value) + "; it must be finite and >= 0";
+}
+
+}  // namespace
+
+// From jfpx calibrate on those two machines. Double costs what twice
+// as wide data cost.
+CostModel::CostModel() {
+  constexpr double kWide = sizeof(Real) / 4.0;
+  x86_all_pairs = {.call_us = 0.05, .sphere_ns = 6, .pair_ns = 0.175 * kWide, .contact_ns = 5};
+  x86_sorted_tiles = {.call_us = 0.2, .sphere_ns = 52 * kWide, .contact_ns = 11};
+  x86_given_pairs = {.call_us = 0.05, .pair_ns = 5};
+  cuda_all_pairs = {.call_us = 13, .byte_ns = 0.05, .sphere_ns = 2.5, .pair_ns = 0.0006 * kWide};
+  cuda_sorted_tiles = {.call_us = 41, .byte_ns = 0.05};
+  cuda_given_pairs = {.call_us = 15, .byte_ns = 0.05};
+}
+
+std::string find_fault(const CostModel& model) {
+  for (const Way& way : kWays) {
+    for (const Term& term : kTerms) {
+      const double value = model.*way.terms.*term.value;
+      if (!is_cost(value)) return fault_of(std::string(way.name) + "." + term.name, value);
+    }
+  }
+  if (!is_cost(model.cuda_start_ms)) return fault_of("cuda_start_ms", model.cuda_start_ms);
+  return {};
+}
+
+std::string to_json(const MeasuredCostModel& model) {
+  Json json = {{kFormatName, kFormat},
+               {"precision", kPrecision},
+               {"version", model.origin.version},
+               {"machine", model.origin.machine},
+               {"driver", model.origin.driver}};
+  for (const Way& way : kWays) {
+    for (const Term& term : kTerms) {
+      json[way.name][term.name] = model.costs.*way.terms.*term.value;
+    }
+  }
+  json["cuda_start_ms"] = model.costs.cuda_start_ms;
+  return json.dump(2) + "\n";
+}
+
+void save_cost_model(const MeasuredCostModel& model, const std::string& path) {
+  const std::string fault = find_fault(model.costs);
+  if (!fault.empty()) throw InvalidArgument("cost model: " + fault);
+  write_file(path, to_json(model));
+}
+
+MeasuredCostModel load_cost_model(const std::string& path) {
+  const std::string text = read_file(path);
+  try {
+    return from_json_value(Json::parse(text));
+  } catch (const FileError& error) {
+    throw FileError(path + ": " + error.what());
+  } catch (const Json::exception&) {
+    throw FileError(path + ": is broken JSON or lacks a part of a cost model");
+  }
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

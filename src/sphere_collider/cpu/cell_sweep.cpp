@@ -1,0 +1,228 @@
+/// The sweep over classes of radii; see the header for the idea.
+#include "src/sphere_collider/cpu/cell_sweep.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <type_traits>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cpu {
+namespace {
+
+/// Radii are binned by exponent and the two highest bits of the mantissa: four bins an octave.
+using RealBits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
+constexpr int kBinShift = std::numeric_limits<Real>::digits - 1 - 2;
+constexpr std::size_t kBins = std::size_t{1} << (sizeof(Real) * 8 - 1 - kBinShift);
+
+/// Bins that a class spans. Wide classes are sorted less often, but a wide class of small spheres
+/// with a large one among them has many in a cell: those are narrowed.
+constexpr std::size_t kWidest = 16;
+constexpr std::size_t kNarrowest = 4;
+/// Other targets in a sphere's own cell, on average, from which on a class is narrowed.
+constexpr double kCrowded = 8;
+constexpr Real kOneBin = Real(1.5);  ///< largest/smallest radius up to which no bins are made
+
+constexpr Real kLargest = std::numeric_limits<Real>::max();
+
+/// Up to so many targets are tested against everyone, without cells.
+constexpr std::size_t kFewTargets = 32;
+
+std::uint64_t to_unsigned(std::int64_t v) { return static_cast<std::uint64_t>(v); }
+
+std::size_t bin_of(Real radius) {
+  return static_cast<std::size_t>(std::bit_cast<RealBits>(radius) >> kBinShift);
+}
+
+std::size_t queries_per_chunk(std::size_t queries) {
+  return std::max<std::size_t>(2048, (queries + 1023) / 1024);
+}
+
+/// Rows around a query's own cell: all nine, or, where a pair must not be found from both sides,
+/// the own one and the four with higher numbers.
+int make_rows(const CellGrid& grid, bool self, std::array<CellRow, 9>* rows) {
+  int count = 0;
+  if (self) (*rows)[static_cast<std::size_t>(count++)] = {0, 0};
+  for (std::int64_t dz = -1; dz <= 1; ++dz) {
+    for (std::int64_t dy = -1; dy <= 1; ++dy) {
+      if (self && (dz < 0 || (dz == 0 && dy <= 0))) continue;
+      (*rows)[static_cast<std::size_t>(count++)] = {dz * grid.slab() + dy * grid.row() - 1, 0};
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
+void CellSweep::find_pairs(std::span<const SphereInstance> spheres, const Kernels& kernels,
+                           ThreadPool& pool, PairChunks* pairs) {
+  sort_by_radius(spheres);
+  const std::uint32_t* order = bins_.size() > 1 ? order_.data() : nullptr;
+  const auto part = [&](std::size_t from, std::size_t to) {
+    return SphereSubset{spheres, order != nullptr ? order + from : nullptr, to - from};
+  };
+  std::size_t begin = 0;
+  for (std::size_t first = 0; first < bins_.size();) {
+    const Real largest = bins_[first].largest;
+    const Real reach = enlarged_radius(largest);
+    bool by_cell = false;
+    std::size_t next = first;
+    SphereSubset targets{};
+    for (std::size_t width = kWidest;; width /= 2, next = first) {
+      while (next < bins_.size() && bins_[next].bin + width > bins_[first].bin) ++next;
+      targets = part(begin, bins_[next - 1].end);
+      // Where the sum of two radii can overflow, everything touches: the claim of CellAxis fails.
+      by_cell = targets.count > kFewTargets && largest < kLargest / 8;
+      if (by_cell) grid_.fit(targets, 2 * reach);
+      place(targets, by_cell, pool, &targets_);
+      if (!by_cell || width == kNarrowest || next == first + 1 || !is_crowded(targets_)) break;
+    }
+    search(kernels, targets_, by_cell, pool, pairs);
+    begin += targets.count;
+    if (next < bins_.size()) {
+      if (by_cell) {  // smaller spheres reach less far: sorted anew, fewer targets are near
+        grid_.fit(targets, reach + enlarged_radius(bins_[next].largest));
+        place(targets, by_cell, pool, &targets_);
+      }
+      place(part(begin, spheres.size()), by_cell, pool, &queries_);
+      search(kernels, queries_, by_cell, pool, pairs);
+    }
+    first = next;
+  }
+}
+
+/// Fills bins_ from the largest radii to the smallest, and order_.
+void CellSweep::sort_by_radius(std::span<const SphereInstance> spheres) {
+  Real smallest = kLargest;
+  Real largest = 0;
+  for (const SphereInstance& s : spheres) {
+    smallest = std::min(smallest, s.radius);
+    largest = std::max(largest, s.radius);
+  }
+  bins_.clear();
+  if (largest <= smallest * kOneBin) {
+    bins_.push_back({0, spheres.size(), largest});
+    return;
+  }
+  std::uint32_t* next = bin_ends_.reserve(kBins, "bins of radii");
+  std::fill_n(next, kBins, 0u);
+  for (const SphereInstance& s : spheres) ++next[bin_of(s.radius)];
+  std::uint32_t sum = 0;
+  for (std::size_t bin = kBins; bin-- > 0;) {
+    const std::uint32_t count = std::exchange(next[bin], sum);
+    sum += count;
+    if (count > 0) bins_.push_back({bin, sum, 0});
+  }
+  order_.reserve(spheres.size(), "indices of spheres");
+  for (std::uint32_t i = 0; i < spheres.size(); ++i) order_[next[bin_of(spheres[i].radius)]++] = i;
+  std::size_t begin = 0;
+  for (RadiusBin& bin : bins_) {
+    for (; begin < bin.end; ++begin) {
+      bin.largest = std::max(bin.largest, spheres[order_[begin]].radius);
+    }
+  }
+}
+
+bool CellSweep::is_crowded(const SphereTable& table) const {
+  const std::int64_t* cell = table.columns().cell;
+  double others = 0;  // twice over: every sphere counts those before it in its cell
+  std::uint32_t cell_begin = 0;
+  for (std::uint32_t i = 0; i < table.count(); ++i) {
+    if (cell[i] != cell[cell_begin]) cell_begin = i;
+    others += 2.0 * (i - cell_begin);
+  }
+  return others > kCrowded * table.count();
+}
+
+/// Fills a table with a subset; in order of cells, without the spheres that no target is near.
+void CellSweep::place(const SphereSubset& subset, bool by_cell, ThreadPool& pool,
+                      SphereTable* table) {
+  if (!by_cell) {
+    table->fill(
+        pool, subset.spheres, subset.count, [&](std::size_t i) { return subset.id(i); },
+        [](std::size_t) { return std::int64_t{0}; });
+    return;
+  }
+  const auto cell_bits = static_cast<unsigned>(std::bit_width(to_unsigned(grid_.cells())));
+  const auto index_bits = static_cast<unsigned>(std::bit_width(subset.count));
+  if (cell_bits + index_bits <= 64) {
+    place_by_cell(
+        subset, cell_bits, index_bits, pool, &items_, table,
+        [&](std::uint64_t cell, std::uint32_t i) { return (cell << index_bits) | i; },
+        [](std::uint64_t item) { return item; },
+        [&](std::uint64_t item) { return item & ((std::uint64_t{1} << index_bits) - 1); });
+  } else {
+    place_by_cell(
+        subset, cell_bits, 0, pool, &wide_items_, table,
+        [](std::uint64_t cell, std::uint32_t i) {
+          return WideItem{cell, i};
+        },
+        [](const WideItem& item) { return item.cell; },
+        [](const WideItem& item) { return item.index; });
+  }
+}
+
+/// Items hold a cell, in bits [low_bit, low_bit + cell_bits) of key(item), and an index.
+template <class Item, class Pack, class Key, class Index>
+void CellSweep::place_by_cell(const SphereSubset& subset, unsigned cell_bits, unsigned low_bit,
+                              ThreadPool& pool, ItemBuffers<Item>* buffers, SphereTable* table,
+                              const Pack& pack, const Key& key, const Index& index) {
+  const std::uint64_t nowhere = to_unsigned(grid_.cells());  // behind all cells
+  Item* items = buffers->items.reserve(subset.count, "cells of spheres");
+  Item* spare = buffers->spare.reserve(subset.count, "cells of spheres");
+  constexpr std::size_t kChunk = 8192;
+  pool.run((subset.count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    const std::size_t end = std::min(subset.count, (chunk + 1) * kChunk);
+    for (std::size_t i = chunk * kChunk; i < end; ++i) {
+      const std::int64_t cell = grid_.cell(subset[i].centre);
+      items[i] = pack(cell == CellGrid::kNowhere ? nowhere : to_unsigned(cell),
+                      static_cast<std::uint32_t>(i));
+    }
+  });
+  items = sorter_.sort(pool, items, spare, subset.count, low_bit, cell_bits, key);
+  const auto cell_of = [&](const Item& item) { return key(item) >> low_bit; };
+  const Item* end = std::partition_point(
+      items, items + subset.count, [&](const Item& item) { return cell_of(item) != nowhere; });
+  table->fill(
+      pool, subset.spheres, static_cast<std::size_t>(end - items),
+      [&](std::size_t i) { return subset.id(static_cast<std::size_t>(index(items[i]))); },
+      [&](std::size_t i) { return static_cast<std::int64_t>(cell_of(items[i])); });
+}
+
+void CellSweep::search(const Kernels& kernels, const SphereTable& queries, bool by_cell,
+                       ThreadPool& pool, PairChunks* pairs) {
+  const bool self = &queries == &targets_;
+  const std::size_t step = queries_per_chunk(queries.count());
+  const std::size_t chunks = (queries.count() + step - 1) / step;
+  const std::size_t first_chunk = pairs->add(chunks);
+  pool.run(chunks, [&](std::size_t chunk) {
+    PairSearch s{queries.columns(), targets_.columns(), self, 0, 0, nullptr};
+    s.first = static_cast<std::uint32_t>(chunk * step);
+    s.last = static_cast<std::uint32_t>(std::min<std::size_t>(s.first + step, queries.count()));
+    std::array<CellRow, 9> rows{};
+    int row_count = 0;
+    if (by_cell) {
+      row_count = make_rows(grid_, self, &rows);
+      const std::int64_t* const cells = s.targets.cell;
+      for (CellRow& row : rows) {
+        const std::int64_t low = s.queries.cell[s.first] + row.offset;
+        row.cursor = static_cast<std::uint32_t>(
+            std::lower_bound(cells, cells + s.targets.count, low) - cells);
+      }
+    }
+    pairs->fill(first_chunk + chunk, [&](PairSink* sink) {
+      s.sink = sink;
+      if (by_cell) {
+        kernels.search_rows(s, rows.data(), row_count);
+      } else {
+        kernels.search_all(s);
+      }
+    });
+  });
+}
+
+}  // namespace cpu
+}  // namespace JFPX_ABI
+}  // namespace jfpx

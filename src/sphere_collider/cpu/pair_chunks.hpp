@@ -1,0 +1,80 @@
+/// Pairs that the kernels found, in the chunks of the search.
+#pragma once
+
+#include "src/base/buffer.hpp"
+#include "src/sphere_collider/cpu/kernels.hpp"
+
+#include <span>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cpu {
+
+/// Each chunk has its own buffer, so that threads share nothing and nothing depends on who was
+/// first. Buffers are kept for the next search.
+class PairChunks {
+ public:
+  void clear() noexcept { used_ = 0; }
+  std::size_t size() const noexcept { return used_; }
+
+  /// Adds empty chunks; returns the index of the first.
+  std::size_t add(std::size_t chunks) {
+    const std::size_t first = used_;
+    if (chunks_.size() < first + chunks) {
+      try {
+        chunks_.resize(first + chunks);
+      } catch (const std::bad_alloc&) {
+        throw OutOfMemory("out of memory: " + std::to_string((first + chunks) * sizeof(Chunk)) +
+                          " bytes needed for " + std::to_string(first + chunks) +
+                          " lists of pairs");
+      }
+    }
+    for (std::size_t i = first; i < first + chunks; ++i) chunks_[i].count = 0;
+    used_ = first + chunks;
+    return first;
+  }
+
+  /// Calls search(sink) and keeps what it appends to the sink as the pairs of that chunk.
+  template <class Search>
+  void fill(std::size_t chunk, const Search& search) {
+    Filler filler(&chunks_[chunk]);
+    search(&filler);
+    filler.close();
+  }
+
+  /// (lower index << 32) | higher index
+  std::span<const std::uint64_t> operator[](std::size_t chunk) const {
+    return {chunks_[chunk].pairs.data(), chunks_[chunk].count};
+  }
+
+ private:
+  struct Chunk {
+    Buffer<std::uint64_t> pairs;
+    std::size_t count = 0;
+  };
+
+  struct Filler : PairSink {
+    explicit Filler(Chunk* c)
+        : PairSink{c->pairs.data(), c->pairs.data() + c->pairs.capacity(), grow_chunk}, chunk(c) {}
+    void close() { chunk->count = static_cast<std::size_t>(next - chunk->pairs.data()); }
+
+    static void grow_chunk(PairSink* sink) {
+      auto* self = static_cast<Filler*>(sink);
+      Buffer<std::uint64_t>& pairs = self->chunk->pairs;
+      const auto used = static_cast<std::size_t>(self->next - pairs.data());
+      pairs.reserve(std::max<std::size_t>(1024, 2 * pairs.capacity()), "pairs of spheres", used);
+      self->next = pairs.data() + used;
+      self->end = pairs.data() + pairs.capacity();
+    }
+
+    Chunk* chunk;
+  };
+
+  std::vector<Chunk> chunks_;
+  std::size_t used_ = 0;
+};
+
+}  // namespace cpu
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,175 @@
+/// Sphere contacts on x86: vector filter, then the exact test, in canonical order.
+#include "src/sphere_collider/cpu/sphere_collider_cpu.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/base/cpu.hpp"
+#include "src/collide/sphere_pair.hpp"
+#include "src/sphere_collider/cpu/cell_sweep.hpp"
+#include "src/sphere_collider/cpu/contact_writer.hpp"
+#include "src/sphere_collider/cpu/pair_filter.hpp"
+#include "src/sphere_collider/sphere_input.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cpu {
+namespace {
+
+const Kernels& kernels_for(SimdLevel usable) noexcept {
+  switch (usable) {
+    case SimdLevel::avx512:
+      return kAvx512Kernels;
+    case SimdLevel::avx2:
+      return kAvx2Kernels;
+    case SimdLevel::sse2:
+      return kSse2Kernels;
+    default:
+      return kScalarKernels;
+  }
+}
+
+/// Below so many spheres all pairs are faster than sorting, with vectors (bench/results).
+constexpr std::size_t kAllPairsBelow = 512;
+
+class SphereColliderCpu final : public SphereCollider {
+ public:
+  explicit SphereColliderCpu(const SphereColliderOptions& options)
+      : wanted_(options.algorithm),
+        kernels_(kernels_for(usable_simd_level(options.simd))),
+        pool_(options.threads) {}
+
+  ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
+    detail::check_spheres(spheres);
+    used_ = wanted_;
+    if (used_ == SphereAlgorithm::automatic) {
+      used_ = spheres.size() < kAllPairsBelow ? SphereAlgorithm::all_pairs
+                                              : SphereAlgorithm::sorted_tiles;
+    }
+    pairs_.clear();
+    if (used_ == SphereAlgorithm::all_pairs) {
+      find_all_pairs(spheres);
+      return writer_.write_sorted(spheres, pairs_, pool_);
+    }
+    sweep_.find_pairs(spheres, kernels_, pool_, &pairs_);
+    return writer_.write_unsorted(spheres, pairs_, pool_);
+  }
+
+  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
+                                         std::span<const SpherePair> pairs) override {
+    results_.reserve(pairs.size(), "pair results");
+    pool_.run(chunks_of(pairs), [&](std::size_t chunk) {
+      PairResult* out = results_.data() + chunk * kPairChunk;
+      constexpr std::size_t kAhead = 12;  // spheres come from anywhere: ask for them in time
+      const std::span<const SpherePair> part = chunk_of(spheres, pairs, chunk);
+      for (std::size_t i = 0; i < part.size(); ++i) {
+        const SpherePair later = part[std::min(i + kAhead, part.size() - 1)];
+        __builtin_prefetch(&spheres[later.a]);
+        __builtin_prefetch(&spheres[later.b]);
+        *out++ = detail::test_sphere_pair(spheres[part[i].a], spheres[part[i].b]);
+      }
+    });
+    return {results_.data(), pairs.size()};
+  }
+
+  std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                             std::span<const SpherePair> pairs) override {
+    detail::check_count(pairs);
+    touching_.reserve(pairs.size(), "touching pairs");
+    // One thread writes without gaps; several each into the place of their chunk.
+    const bool gaps = pool_.threads() > 1;
+    std::size_t total = 0;
+    touching_counts_.resize(chunks_of(pairs));
+    pool_.run(touching_counts_.size(), [&](std::size_t chunk) {
+      PairContact* const begin = touching_.data() + (gaps ? chunk * kPairChunk : total);
+      PairContact* out = begin;
+      const std::span<const SpherePair> part = chunk_of(spheres, pairs, chunk);
+      std::array<std::uint32_t, kPairChunk> candidates;
+      const std::size_t count =
+          find_candidates(spheres.data(), part.data(), part.size(), candidates.data());
+      for (std::size_t k = 0; k < count; ++k) {
+        const SpherePair pair = part[candidates[k]];
+        const bool touch = detail::find_sphere_contact(spheres[pair.a], spheres[pair.b], out);
+        out->pair = static_cast<std::uint32_t>(chunk * kPairChunk + candidates[k]);
+        out += touch ? 1 : 0;
+      }
+      touching_counts_[chunk] = static_cast<std::size_t>(out - begin);
+      if (!gaps) total += touching_counts_[chunk];
+    });
+    for (std::size_t chunk = 0; gaps && chunk < touching_counts_.size(); ++chunk) {
+      const PairContact* from = touching_.data() + chunk * kPairChunk;
+      total = static_cast<std::size_t>(
+          std::copy(from, from + touching_counts_[chunk], touching_.data() + total) -
+          touching_.data());
+    }
+    return {touching_.data(), total};
+  }
+
+  Backend backend() const noexcept override { return Backend::cpu; }
+  SphereAlgorithm algorithm() const noexcept override { return used_; }
+
+ private:
+  static constexpr std::size_t kPairChunk = 4096;
+  static std::size_t chunks_of(std::span<const SpherePair> pairs) {
+    return (pairs.size() + kPairChunk - 1) / kPairChunk;
+  }
+  /// The pairs of a chunk, checked.
+  static std::span<const SpherePair> chunk_of(std::span<const SphereInstance> spheres,
+                                              std::span<const SpherePair> pairs,
+                                              std::size_t chunk) {
+    const std::size_t begin = chunk * kPairChunk, end = std::min(pairs.size(), begin + kPairChunk);
+    SphereIndex largest = 0;
+    for (std::size_t i = begin; i < end; ++i) largest = std::max({largest, pairs[i].a, pairs[i].b});
+    if (largest >= spheres.size()) detail::reject_pair(pairs, spheres.size());
+    return pairs.subspan(begin, end - begin);
+  }
+
+  void find_all_pairs(std::span<const SphereInstance> spheres) {
+    table_.fill(
+        pool_, spheres, spheres.size(), [](std::size_t i) { return static_cast<SphereIndex>(i); },
+        [](std::size_t) { return std::int64_t{0}; });
+    constexpr std::size_t kRows = 64;  // short rows, long rows: many chunks even the work out
+    const std::size_t chunks = (spheres.size() + kRows - 1) / kRows;
+    pairs_.add(chunks);
+    pool_.run(chunks, [&](std::size_t chunk) {
+      pairs_.fill(chunk, [&](PairSink* sink) {
+        const std::size_t end = std::min(spheres.size(), (chunk + 1) * kRows);
+        kernels_.search_all({table_.columns(), table_.columns(), true,
+                             static_cast<SphereIndex>(chunk * kRows), static_cast<SphereIndex>(end),
+                             sink});
+      });
+    });
+  }
+
+  SphereAlgorithm wanted_;
+  SphereAlgorithm used_ = SphereAlgorithm::automatic;
+  const Kernels& kernels_;
+  ThreadPool pool_;
+  SphereTable table_;
+  CellSweep sweep_;
+  PairChunks pairs_;
+  ContactWriter writer_;
+  Buffer<PairResult> results_;
+  Buffer<PairContact> touching_;
+  std::vector<std::size_t> touching_counts_;  ///< by chunk
+};
+
+}  // namespace
+
+BackendStatus probe() {
+  return {.backend = Backend::cpu,
+          .compiled = true,
+          .usable = true,
+          .device = describe_processor(),
+          .reason = {}};
+}
+
+std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
+  return std::make_unique<SphereColliderCpu>(options);
+}
+
+}  // namespace cpu
+}  // namespace JFPX_ABI
+}  // namespace jfpx

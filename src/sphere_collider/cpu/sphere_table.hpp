@@ -1,0 +1,74 @@
+/// Spheres as columns for the kernels, in an order of our own.
+#pragma once
+
+#include <jfpx/shape.hpp>
+
+#include "src/base/buffer.hpp"
+#include "src/base/thread_pool.hpp"
+#include "src/sphere_collider/cpu/kernels.hpp"
+
+#include <cmath>
+#include <limits>
+#include <span>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cpu {
+
+/// A radius with the filter's slack (kernels.inl): >= r*(1 + 6u) + t with u = epsilon/2, t = the
+/// root of the smallest normal number; twice that much, to cover its own rounding.
+inline Real enlarged_radius(Real r) {
+  static const Real slack = 2 * std::sqrt(std::numeric_limits<Real>::min());
+  return r * (1 + 6 * kEpsilon) + slack;
+}
+
+class SphereTable {
+ public:
+  /// Column i is sphere id_of(i) in cell cell_of(i).
+  template <class Id, class Cell>
+  void fill(ThreadPool& pool, std::span<const SphereInstance> spheres, std::size_t count,
+            const Id& id_of, const Cell& cell_of) {
+    reserve(count + kMaxLanes);
+    count_ = static_cast<std::uint32_t>(count);
+    constexpr std::size_t kChunk = 8192;
+    pool.run((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+      const std::size_t end = std::min(count, (chunk + 1) * kChunk);
+      for (std::size_t i = chunk * kChunk; i < end; ++i) {
+        const std::uint32_t id = id_of(i);
+        set(i, spheres[id], id, cell_of(i));
+      }
+    });
+    for (std::size_t i = count; i < count + kMaxLanes; ++i) set(i, {}, 0, kNoCell);
+  }
+
+  std::uint32_t count() const noexcept { return count_; }
+  SphereColumns columns() const noexcept {
+    return {x_.data(), y_.data(), z_.data(), reach_.data(), id_.data(), cell_.data(), count_};
+  }
+
+ private:
+  void reserve(std::size_t count) {
+    for (Buffer<Real>* column : {&x_, &y_, &z_, &reach_}) {
+      column->reserve(count, "coordinates of spheres");
+    }
+    id_.reserve(count, "indices of spheres");
+    cell_.reserve(count, "cells of spheres");
+  }
+  void set(std::size_t i, const SphereInstance& s, std::uint32_t id, std::int64_t cell) {
+    x_[i] = s.centre.x;
+    y_[i] = s.centre.y;
+    z_[i] = s.centre.z;
+    reach_[i] = enlarged_radius(s.radius);
+    id_[i] = id;
+    cell_[i] = cell;
+  }
+
+  Buffer<Real> x_, y_, z_, reach_;
+  Buffer<std::uint32_t> id_;
+  Buffer<std::int64_t> cell_;
+  std::uint32_t count_ = 0;
+};
+
+}  // namespace cpu
+}  // namespace JFPX_ABI
+}  // namespace jfpx

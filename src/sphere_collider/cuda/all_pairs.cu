@@ -1,0 +1,132 @@
+/// All pairs by tiles (thesis 4.5.2): the spheres of a tile's rows and columns in shared memory, on
+/// a lattice around them all. The outcome is a bit matrix, from which contacts come out in
+/// canonical order.
+#include "src/sphere_collider/cuda/lattice.cuh"
+#include "src/sphere_collider/cuda/tiles.cuh"
+
+#include <algorithm>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+namespace {
+
+constexpr unsigned kThreads = kTile;  // one a row
+constexpr unsigned kEmitThreads = 256;
+
+/// Row r of tiles has tiles - r tiles on and right of the diagonal. A band's first row of tiles is
+/// paired with its last, the second with the last but one, and so on: all pairs have `width` tiles.
+struct TileGrid {
+  std::uint32_t tiles, first, rows;
+  __host__ __device__ std::uint32_t width() const { return 2 * (tiles - first) - rows + 1; }
+  __host__ __device__ std::uint32_t height() const { return (rows + 1) / 2; }
+};
+
+__host__ __device__ TileGrid tile_grid(const AllPairsArgs& args) {
+  return {(args.n + kTile - 1) / kTile, args.first_row / kTile, (args.rows + kTile - 1) / kTile};
+}
+
+struct TileStorage {
+  SphereInstance columns[kTile];
+  LatticeRecord row_records[kTile], column_records[kTile];
+  std::uint32_t words[kTile][kWordsPerTile + 1];
+  LatticeStorage lattice;
+};
+
+/// Fills the words of the 32 rows of a warp: which columns of the tile they may touch.
+__device__ void fill_words(TileStorage& s) {
+  const unsigned first_row = threadIdx.x - lane_id();
+  const LatticeFragment rows = load_fragment(s.row_records + first_row);
+  for (unsigned w = 0; w < kWordsPerTile; ++w) {
+    const LatticeFragment columns = load_fragment(s.column_records + 32 * w);
+    put_bytes(lattice_bytes(rows, columns), &s.words[first_row][w], kWordsPerTile + 1);
+  }
+  __syncwarp();
+}
+
+__global__ void __launch_bounds__(kThreads) all_pairs(AllPairsArgs args) {
+  wait_for_previous_kernel();
+  __shared__ TileStorage s;
+  const TileGrid grid = tile_grid(args);
+  std::uint32_t tile_row = grid.first + blockIdx.y;
+  std::uint32_t tile_column = tile_row + blockIdx.x;
+  if (tile_column >= grid.tiles) {
+    const std::uint32_t mirrored = grid.rows - 1 - blockIdx.y;
+    if (mirrored == blockIdx.y) return;  // the middle row of an odd band has no partner
+    tile_row = grid.first + mirrored;
+    tile_column = tile_column - grid.tiles + tile_row;
+  }
+  const std::uint32_t last = args.n - 1;
+  const std::uint32_t a = tile_row * kTile + threadIdx.x, first_b = tile_column * kTile;
+
+  const SphereInstance row = load_sphere(args.spheres + min(a, last));
+  const SphereInstance column = load_sphere(args.spheres + min(first_b + threadIdx.x, last));
+  if (tile_row == tile_column && a <= last && !is_valid(row)) report_invalid(args.state, a);
+  s.columns[threadIdx.x] = column;
+  const Lattice lattice = lattice_of_block(row, column, s.lattice);
+  s.row_records[threadIdx.x] = record_of(row_terms(on_lattice(lattice, row)));
+  s.column_records[place_of_column(threadIdx.x)] =
+      record_of(column_terms(on_lattice(lattice, column)));
+  __syncthreads();
+  fill_words(s);
+
+  std::uint32_t count = 0;
+  for (unsigned w = 0; w < kWordsPerTile; ++w) {
+    std::uint32_t word = s.words[threadIdx.x][w] & pair_bits(a, first_b + 32 * w, args.n);
+    if (word != 0) word = exactly_touching(word, row, s.columns + 32 * w);
+    s.words[threadIdx.x][w] = word;
+    count += static_cast<unsigned>(__popc(word));
+  }
+  if (args.count && count != 0 && a <= last) atomicAdd(&args.counts[a], count);
+  __syncthreads();
+
+  // A row's words of this tile are one 32-byte sector of the matrix.
+  const std::uint32_t stride = mask_stride(args.n);
+  for (unsigned i = threadIdx.x; i < kTile * kWordsPerTile; i += kThreads) {
+    const unsigned local = i / kWordsPerTile, w = i % kWordsPerTile;
+    const std::size_t band_row = std::size_t{tile_row - grid.first} * kTile + local;
+    args.masks[band_row * stride + tile_column * kWordsPerTile + w] = s.words[local][w];
+  }
+}
+
+/// A warp a row.
+__global__ void __launch_bounds__(kEmitThreads) mask_emit(MaskEmitArgs args) {
+  wait_for_previous_kernel();
+  const std::uint32_t row = (blockIdx.x * kEmitThreads + threadIdx.x) / 32;
+  const unsigned long long total = args.offsets[args.n];
+  const std::uint32_t invalid = first_invalid(args.state);
+  const bool complete = total <= args.output.capacity;
+  if (args.first_row == 0 && row == 0 && lane_id() == 0) {
+    write_count(args.output, total, invalid, complete);
+  }
+  if (row >= args.rows || !complete || invalid != kNoSphere) return;
+  const std::uint32_t a = args.first_row + row;
+  unsigned long long at = args.offsets[a];
+  const unsigned long long end = args.offsets[a + 1];
+  const std::uint32_t stride = mask_stride(args.n);
+  const std::uint32_t* words = args.masks + std::size_t{row} * stride;
+  const SphereInstance sphere = load_sphere(args.spheres + a);
+  for (std::uint32_t w = a / kTile * kWordsPerTile; at != end; w += 32) {
+    const std::uint32_t word = w + lane_id() < stride ? words[w + lane_id()] : 0;
+    at = emit_row(args.output, at, a, sphere, w, word,
+                  [&](std::uint32_t b) { return load_sphere(args.spheres + b); });
+  }
+}
+
+}  // namespace
+
+void launch_all_pairs(const AllPairsArgs& args, cudaStream_t stream) {
+  const TileGrid grid = tile_grid(args);
+  launch(all_pairs, grid.width(), grid.height(), kThreads, stream, args);
+}
+
+void launch_mask_emit(const MaskEmitArgs& args, cudaStream_t stream) {
+  constexpr unsigned kRowsPerBlock = kEmitThreads / 32;
+  // Of no rows there is still the count to write.
+  const unsigned blocks = args.rows / kRowsPerBlock + (args.rows % kRowsPerBlock != 0 ? 1 : 0);
+  launch(mask_emit, std::max(blocks, 1u), 1, kEmitThreads, stream, args);
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

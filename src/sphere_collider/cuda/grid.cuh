@@ -1,0 +1,250 @@
+/// What the phases of the large-N search share: where its cells are in the table.
+#pragma once
+
+#include "src/sphere_collider/cuda/grid_cells.hpp"
+#include "src/sphere_collider/cuda/tiles.cuh"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+inline constexpr unsigned kGridThreads = 256;
+inline constexpr unsigned kGridWarps = kGridThreads / 32;
+
+// Positive floating-point numbers are ordered as their bits are.
+__device__ inline Real half_0_of(const SearchState* state) {
+  return std::bit_cast<Real>(static_cast<RealBits>(state->largest_half));
+}
+__device__ inline unsigned long long bits_of(Real x) {
+  return static_cast<unsigned long long>(std::bit_cast<RealBits>(x));
+}
+
+/// A number from 1 on that grows with x; ordered(-x) falls with it.
+__device__ inline unsigned long long ordered(Real x) {
+  constexpr unsigned kShift = sizeof(Real) == 4 ? 32 : 0;
+  const unsigned long long bits = static_cast<unsigned long long>(std::bit_cast<RealBits>(x))
+                                  << kShift;
+  constexpr unsigned long long kSign = 1ull << 63;
+  return (bits & kSign) != 0 ? ~bits : bits | kSign;
+}
+__device__ inline Real from_ordered(unsigned long long key) {
+  constexpr unsigned kShift = sizeof(Real) == 4 ? 32 : 0;
+  constexpr unsigned long long kSign = 1ull << 63;
+  const unsigned long long bits = (key & kSign) != 0 ? key & ~kSign : ~key;
+  return std::bit_cast<Real>(static_cast<RealBits>(bits >> kShift));
+}
+
+/// Spheres as other phases of the same launch wrote them: not through the read-only cache.
+__device__ inline SphereInstance load_sorted(const SphereInstance* p) {
+  SphereInstance s;
+  if constexpr (sizeof(Real) == 4) {
+    const float4 v = *reinterpret_cast<const float4*>(p);
+    s = {{v.x, v.y, v.z}, v.w};
+  } else {
+    const double2 lo = reinterpret_cast<const double2*>(p)[0];
+    const double2 hi = reinterpret_cast<const double2*>(p)[1];
+    s = {{static_cast<Real>(lo.x), static_cast<Real>(lo.y), static_cast<Real>(hi.x)},
+         static_cast<Real>(hi.y)};
+  }
+  return s;
+}
+
+/// The box of cells of one level that spheres can be in, and its first bucket.
+struct LevelBox {
+  std::int32_t x0, y0, z0;
+  std::int32_t nx, ny, nz;
+  std::uint32_t base;
+};
+
+/// Where the row (y, z) of the level begins, less the first x: cell x is x buckets on.
+__device__ inline std::uint32_t row_of_box(const LevelBox& box, std::int32_t y, std::int32_t z) {
+  const auto yz = static_cast<std::uint32_t>((z - box.z0) * box.ny + (y - box.y0));
+  return box.base + yz * static_cast<std::uint32_t>(box.nx) - static_cast<std::uint32_t>(box.x0);
+}
+
+/// Where cells are in the table. If the cells of all levels, from the lowest to the highest
+/// coordinates there are, fit into the table, each has a bucket of its own ("dense"): rows follow
+/// rows, and what is near in y and z is not far in memory. Else rows start at hashed places, and a
+/// bucket can hold spheres of several cells.
+struct GridPlan {
+  GridScale scale;
+  bool dense;
+  bool single;      ///< dense, and all spheres are on level 0
+  Real inverse_yz;  ///< inverse cell width of level 0, in y and z
+  std::uint32_t buckets;
+  std::uint32_t coarse_shift;  ///< 2^coarse_shift consecutive buckets are a coarse bucket
+  LevelBox boxes[kLastLevel + 1];
+
+  /// Cell x of the row has the bucket row + x, modulo `mask() + 1`.
+  template <bool kDense>
+  __device__ std::uint32_t row(std::int32_t y, std::int32_t z, int level) const {
+    if constexpr (!kDense) return row_of(y, z, level);
+    return row_of_box(boxes[level], y, z);
+  }
+  template <bool kDense>
+  __device__ std::uint32_t mask() const {
+    return kDense ? ~0u : buckets - 1;
+  }
+  template <bool kDense>
+  __device__ std::uint32_t bucket(const GridCell& cell) const {
+    return (row<kDense>(cell.y, cell.z, cell.level) + static_cast<std::uint32_t>(cell.x)) &
+           mask<kDense>();
+  }
+  __device__ std::uint32_t bucket_of(const SphereInstance& s) const {
+    if (single) {
+      const LevelBox& box = boxes[0];
+      const std::int32_t y = cell_of(s.centre.y, inverse_yz) - box.y0;
+      const std::int32_t z = cell_of(s.centre.z, inverse_yz) - box.z0;
+      const std::int32_t x = cell_of(s.centre.x, scale.inverse_x) - box.x0;
+      return static_cast<std::uint32_t>((z * box.ny + y) * box.nx + x);
+    }
+    const GridCell cell = grid_cell_of(s, scale);
+    return dense ? bucket<true>(cell) : bucket<false>(cell);
+  }
+};
+
+inline constexpr std::uint32_t kSamples = 4096;
+
+/// Spheres smaller than a cell can share it with others at little cost, and each level that there
+/// is costs all finer spheres a look at it. So the last level is the first one on which a sphere
+/// shares its cell with no more than about two, by what a sample of all spheres says.
+__device__ inline int last_level(const SearchState& state, std::uint32_t n) {
+  const auto smallest = static_cast<RealBits>(~state.smallest_half);
+  const int finest = level_for(std::bit_cast<Real>(smallest), {half_0_of(&state)});
+  const std::uint64_t samples = n < kSamples ? n : kSamples;
+  for (int level = 0; level < finest; ++level) {
+    if (state.same_cell[level] * std::uint64_t{n} <= samples * samples) return level;
+  }
+  return finest > 0 ? finest : 0;
+}
+
+/// The plan of a search, the same in every block. All threads of a block.
+__device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
+  __syncthreads();
+  if (threadIdx.x < 32) {
+    const SearchState& state = *args.state;
+    const int level = static_cast<int>(lane_id());
+    GridScale scale{half_0_of(args.state), last_level(state, args.n)};
+    Real x_cells = 2;  // of a cell of the last level
+    const Vec3 high{from_ordered(state.farthest[0]), from_ordered(state.farthest[2]),
+                    from_ordered(state.farthest[4])};
+    const Vec3 low{-from_ordered(state.farthest[1]), -from_ordered(state.farthest[3]),
+                   -from_ordered(state.farthest[5])};
+    constexpr unsigned long long kTooMany = 1ull << 40;
+    LevelBox box{};
+    unsigned long long cells = 0, cells_to_here = 0, all_cells = 0;
+    while (true) {
+      scale.inverse_x = x_cells * inverse_width(half_cell_of(scale.half_0, scale.last_level));
+      if (level <= scale.last_level) {
+        const Real inverse = inverse_width(half_cell_of(scale.half_0, level));
+        const auto extent = [&](Real from, Real to, Real inverse_cell, std::int32_t& first) {
+          first = cell_of(from, inverse_cell);
+          return std::int64_t{cell_of(to, inverse_cell)} - first + 1;
+        };
+        const std::int64_t nx = extent(low.x, high.x, scale.inverse_x, box.x0);
+        const std::int64_t ny = extent(low.y, high.y, inverse, box.y0);
+        const std::int64_t nz = extent(low.z, high.z, inverse, box.z0);
+        box.nx = static_cast<std::int32_t>(nx);
+        box.ny = static_cast<std::int32_t>(ny);
+        box.nz = static_cast<std::int32_t>(nz);
+        const auto rows = static_cast<unsigned long long>(ny * nz);
+        const auto row = static_cast<unsigned long long>(nx);
+        cells = rows < (1ull << 32) && row < (1ull << 31) ? min(rows * row, kTooMany) : kTooMany;
+      }
+      cells_to_here = cells;
+      for (unsigned d = 1; d < 32; d *= 2) {
+        const unsigned long long below = __shfl_up_sync(kFullWarp, cells_to_here, d);
+        if (lane_id() >= d) cells_to_here += below;
+      }
+      all_cells = __shfl_sync(kFullWarp, cells_to_here, 31);
+      if (all_cells <= args.table_size || x_cells == 1) break;
+      x_cells = 1;
+      cells = 0;
+    }
+    box.base = static_cast<std::uint32_t>(cells_to_here - cells);
+    plan.boxes[level] = box;
+    if (level == 0) {
+      const bool dense = all_cells <= args.table_size && state.has_far == 0;
+      if (!dense) scale.inverse_x = 0;
+      plan.scale = scale;
+      plan.dense = dense;
+      plan.single = dense && scale.last_level == 0;
+      plan.inverse_yz = inverse_width(half_cell_of(scale.half_0, 0));
+      plan.buckets = dense ? static_cast<std::uint32_t>(all_cells) : args.table_size;
+      plan.coarse_shift = 0;
+      while ((plan.buckets - 1) >> plan.coarse_shift >= args.coarse_buckets) ++plan.coarse_shift;
+    }
+  }
+  __syncthreads();
+}
+
+/// The plan that another kernel made. All threads of a block.
+__device__ inline void copy_plan(const GridArgs& args, GridPlan& plan) {
+  static_assert(sizeof(GridPlan) % sizeof(std::uint32_t) == 0);
+  const auto* const from = reinterpret_cast<const std::uint32_t*>(args.plan);
+  auto* const to = reinterpret_cast<std::uint32_t*>(&plan);
+  for (unsigned k = threadIdx.x; k < sizeof(GridPlan) / sizeof(std::uint32_t); k += kGridThreads) {
+    to[k] = from[k];
+  }
+  __syncthreads();
+}
+
+/// The part of `count` items that this block takes: consecutive ones, from a multiple of `unit` on.
+struct Span {
+  std::uint64_t first, past;
+};
+__device__ inline Span span_of_block(std::uint64_t count, unsigned unit) {
+  const std::uint64_t units = (count + unit - 1) / unit;
+  const std::uint64_t first = units * blockIdx.x / gridDim.x * unit;
+  const std::uint64_t past = units * (blockIdx.x + 1) / gridDim.x * unit;
+  return {first, past < count ? past : count};
+}
+
+/// Sum of `value` over the threads of the block before this one; `total` becomes that of all.
+__device__ inline unsigned long long block_exclusive_sum(unsigned long long value,
+                                                         unsigned long long* warp_sums,
+                                                         unsigned long long& total,
+                                                         unsigned warps) {
+  unsigned long long inclusive = value;
+  for (unsigned d = 1; d < 32; d *= 2) {
+    const unsigned long long below = __shfl_up_sync(kFullWarp, inclusive, d);
+    if (lane_id() >= d) inclusive += below;
+  }
+  if (lane_id() == 31) warp_sums[threadIdx.x / 32] = inclusive;
+  __syncthreads();
+  unsigned long long before = inclusive - value;
+  total = 0;
+  for (unsigned w = 0; w < warps; ++w) {
+    if (w < threadIdx.x / 32) before += warp_sums[w];
+    total += warp_sums[w];
+  }
+  return before;
+}
+template <unsigned kWarps = kGridWarps>
+__device__ inline unsigned long long block_exclusive_sum(unsigned long long value,
+                                                         unsigned long long* warp_sums,
+                                                         unsigned long long& total) {
+  return block_exclusive_sum(value, warp_sums, total, kWarps);
+}
+
+/// Sum over the block, for all its threads.
+__device__ inline unsigned long long block_sum(unsigned long long value,
+                                               unsigned long long* warp_sums) {
+  __syncthreads();
+  unsigned long long total = 0;
+  block_exclusive_sum(value, warp_sums, total);
+  __syncthreads();
+  return total;
+}
+
+/// Sum of what the blocks before this one left in `sums`.
+__device__ inline unsigned long long sum_of_blocks_before(const unsigned long long* sums,
+                                                          unsigned long long* warp_sums) {
+  unsigned long long mine = 0;
+  for (unsigned k = threadIdx.x; k < blockIdx.x; k += kGridThreads) mine += sums[k];
+  return block_sum(mine, warp_sums);
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,145 @@
+/// All phases of the large-N search in one launch: up to some 10^5 spheres, where launches would
+/// take most of the time.
+#include "src/sphere_collider/cuda/grid_build.cuh"
+#include "src/sphere_collider/cuda/grid_direct.cuh"
+#include "src/sphere_collider/cuda/grid_emit.cuh"
+#include "src/sphere_collider/cuda/grid_launch.hpp"
+#include "src/sphere_collider/cuda/grid_search.cuh"
+
+#include <algorithm>
+#include <cooperative_groups.h>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+namespace {
+
+namespace cg = cooperative_groups;
+
+constexpr unsigned kBlocksPerMultiprocessor = sizeof(Real) == 4 ? 4 : 3;
+
+union PhaseStorage {
+  BuildStorage build;
+  DirectStorage direct;
+  SearchStorage<true> dense_search;
+  SearchStorage<false> search;
+  EmitStorage emit;
+  CrowdedStorage crowded;
+};
+
+/// The state of this search; clears that of the next one. All blocks, before their first barrier.
+__device__ SearchState* take_state(TurningStates& states) {
+  return states.states + states.turn % 2;
+}
+/// By one thread, after the first barrier.
+__device__ void clear_next_state(TurningStates& states) { states.states[++states.turn % 2] = {}; }
+
+/// Whether these spheres could be searched without sorting them; then that is done.
+__device__ bool search_without_sorting(const GridArgs& args, const SearchOutput& output,
+                                       DirectStorage& storage, const cg::grid_group& grid) {
+  const DirectPlan plan = make_direct_plan(args);
+  if (plan.room == 0) return false;
+  insert(args, plan);
+  grid.sync();
+  if (args.state->cell_is_full == 0) {
+    find_directly(args, plan, storage);
+    grid.sync();
+    if (args.state->block_is_full == 0) {
+      emit_directly(args, output, storage);
+      return true;
+    }
+  }
+  clear_table(args);
+  grid.sync();
+  return false;
+}
+
+__global__ void __launch_bounds__(kGridThreads, kBlocksPerMultiprocessor)
+    grid_search(const __grid_constant__ GridArgs arguments,
+                const __grid_constant__ SearchOutput output) {
+  __shared__ PhaseStorage storage;
+  __shared__ GridPlan plan;
+  const cg::grid_group grid = cg::this_grid();
+  const bool one = blockIdx.x == 0 && threadIdx.x == 0;
+  GridArgs args = arguments;
+  args.state = take_state(*args.states);
+
+  clear_table(args);
+  clear_counts(args);
+  measure(args, storage.build);
+  grid.sync();
+  if (one) clear_next_state(*args.states);
+  if (args.state->valid_before != 0) {
+    if (one) write_count(output, 0, first_invalid(args.state), false);
+    return;
+  }
+  if (needs_sample(*args.state)) {
+    sample_cells(args, storage.build);
+    grid.sync();
+  }
+  if (search_without_sorting(args, output, storage.direct, grid)) return;
+  make_plan(args, plan);
+  assign(args, plan);
+  grid.sync();
+  sum_table(args, plan, storage.build);
+  grid.sync();
+  scan_table(args, plan, storage.build);
+  grid.sync();
+  scatter(args);
+  grid.sync();
+  if (plan.dense) {
+    Searcher<true>(args, plan, storage.dense_search).run();
+  } else {
+    Searcher<false>(args, plan, storage.search).run();
+  }
+  grid.sync();
+  const bool complete = is_complete(args, output);
+  if (one) write_count(output, args.state->contacts, kNoSphere, complete);
+  if (!complete) return;
+  sum_counts(args, storage.emit);
+  grid.sync();
+  emit(args, output, storage.emit);
+  if (args.state->overflow == 0) return;
+  grid.sync();
+  place_overflow(args);
+  grid.sync();
+  emit_crowded(args, output, storage.crowded);
+}
+
+}  // namespace
+
+unsigned most_grid_blocks(int device) {
+  int per_multiprocessor = 0, multiprocessors = 0;
+  JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&per_multiprocessor, grid_search,
+                                                              kGridThreads, 0));
+  JFPX_CUDA_TRY(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
+  return std::min(static_cast<unsigned>(per_multiprocessor * multiprocessors), kMaxGridBlocks);
+}
+
+void launch_in_one(const GridArgs& args, const SearchOutput& output, unsigned most_blocks,
+                   cudaStream_t stream) {
+  GridArgs shared_out = args;
+  // While there are threads to spare, several share a sphere: half the device is enough.
+  const std::uint64_t threads = std::uint64_t{most_blocks} * kGridThreads / 2;
+  while (shared_out.lanes < 8 && 2 * shared_out.lanes * std::uint64_t{args.n} <= threads) {
+    shared_out.lanes *= 2;
+  }
+  std::uint64_t wanted = (shared_out.lanes * std::uint64_t{args.n} - 1) / kGridThreads + 1;
+  if (args.slots != nullptr) {
+    wanted = (std::uint64_t{args.n} - 1) / (kGridWarps * kSpheresOfWarp) + 1;
+  }
+  cudaLaunchAttribute cooperative{};
+  cooperative.id = cudaLaunchAttributeCooperative;
+  cooperative.val.cooperative = 1;
+  cudaLaunchConfig_t config{};
+  config.gridDim = static_cast<unsigned>(std::min<std::uint64_t>(wanted, most_blocks));
+  config.blockDim = kGridThreads;
+  config.stream = stream;
+  config.attrs = &cooperative;
+  config.numAttrs = 1;
+  JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, grid_search, shared_out, output));
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

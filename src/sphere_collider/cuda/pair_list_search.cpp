@@ -1,0 +1,44 @@
+/// The touching pairs of a list: count, scan, emit, so that they come in the order of the list.
+#include "src/sphere_collider/cuda/pair_list_search.hpp"
+
+#include "src/sphere_collider/cuda/kernels.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+std::span<const PairContact> PairListSearch::find(const MemoryPool& pool, cudaStream_t stream,
+                                                  std::span<const SphereInstance> spheres,
+                                                  std::span<const SpherePair> pairs) {
+  transferred_ = {};
+  if (pairs.empty()) return {};
+  transferred_.to_device = spheres_.update(pool, stream, spheres, "spheres") +
+                           pairs_.update(pool, stream, pairs, "pairs");
+  const std::size_t room = pairs.size() + pairs.size() / 4 + 64;
+  const std::size_t most_blocks = touching_blocks(room) + 1;
+  counts_.grow(pool, stream, most_blocks, "counts of touching pairs");
+  sums_.grow(pool, stream, most_blocks, "sums of touching pairs");
+  scratch_.grow(pool, stream, scan_scratch_bytes(most_blocks), "bytes for a scan");
+  touching_.grow(room, "touching pairs on the host");
+  total_.grow(1, "number of touching pairs");
+
+  const TouchingArgs args{.spheres = spheres_.data(),
+                          .pairs = pairs_.data(),
+                          .m = pairs.size(),
+                          .counts = counts_.data(),
+                          .sums = sums_.data(),
+                          .touching = touching_.data(),
+                          .total = total_.data()};
+  launch_count_touching(args, stream);
+  exclusive_scan(counts_.data(), sums_.data(), touching_blocks(pairs.size()) + 1, scratch_.data(),
+                 scratch_.size(), stream);
+  launch_emit_touching(args, stream);
+  JFPX_CUDA_TRY(cudaStreamSynchronize(stream));
+  const std::size_t total = *total_.data();
+  transferred_.from_device = total * sizeof(PairContact) + sizeof(unsigned long long);
+  return {touching_.data(), total};
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,38 @@
+/// Prefix sums, by CUB (decoupled look-back: Merrill and Garland 2016).
+#include "src/base/cuda/cuda_try.hpp"
+#include "src/sphere_collider/cuda/kernels.hpp"
+
+#include <cub/device/device_scan.cuh>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+namespace {
+
+cudaError_t scan(void* scratch, std::size_t& bytes, const std::uint32_t* in,
+                 unsigned long long* out, std::size_t n, cudaStream_t stream) {
+  // CUB takes the last error of the thread for its own, also one that a call of the user's has
+  // left.
+  static_cast<void>(cudaGetLastError());
+  return cub::DeviceScan::ExclusiveScan(scratch, bytes, in, out, ::cuda::std::plus<>{}, 0ull,
+                                        static_cast<std::uint32_t>(n), stream);
+}
+
+}  // namespace
+
+std::size_t scan_scratch_bytes(std::size_t n) {
+  std::size_t bytes = 0;
+  const std::uint32_t* in = nullptr;
+  unsigned long long* out = nullptr;
+  JFPX_CUDA_TRY(scan(nullptr, bytes, in, out, n, nullptr));
+  return bytes;
+}
+
+void exclusive_scan(const std::uint32_t* values, unsigned long long* sums, std::size_t n,
+                    void* scratch, std::size_t scratch_bytes, cudaStream_t stream) {
+  JFPX_CUDA_TRY(scan(scratch, scratch_bytes, values, sums, n, stream));
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,183 @@
+/// Sphere contacts on a GPU, from host memory to host memory.
+#include "src/sphere_collider/cuda/sphere_collider_cuda.hpp"
+
+#include <jfpx/cuda/sphere_collider.hpp>
+#include <jfpx/error.hpp>
+
+#include "src/base/cuda/device_buffer.hpp"
+#include "src/base/cuda/probe.hpp"
+#include "src/sphere_collider/cuda/pair_list_search.hpp"
+#include "src/sphere_collider/sphere_input.hpp"
+
+#include <algorithm>
+#include <nvtx3/nvtx3.hpp>
+#include <string>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+namespace {
+
+/// Up to here kernels write contacts straight into host memory: no copy, no second wait.
+constexpr std::size_t kMaxMappedSpheres = 20'000;
+
+void check_pairs(std::span<const SpherePair> pairs, std::size_t n) {
+  if (std::any_of(pairs.begin(), pairs.end(), [n](SpherePair p) { return p.a >= n || p.b >= n; })) {
+    detail::reject_pair(pairs, n);
+  }
+}
+
+/// More than `count`, so that a collider whose input grows slowly does not grow each time.
+std::size_t with_slack(std::size_t count) { return count + count / 4 + 64; }
+
+class SphereColliderCuda final : public SphereCollider {
+ public:
+  explicit SphereColliderCuda(const SphereColliderOptions& options)
+      : device_(options.device),
+        stream_(device_),
+        pool_(device_),
+        searcher_(stream_.get(), device_, options.algorithm) {
+    const DeviceGuard guard(device_);
+    count_.grow(1, "contact count");
+  }
+  ~SphereColliderCuda() override { static_cast<void>(cudaStreamSynchronize(stream_.get())); }
+
+  ContactSpan find_contacts(std::span<const SphereInstance> spheres) override;
+  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
+                                         std::span<const SpherePair> pairs) override;
+
+  std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                             std::span<const SpherePair> pairs) override;
+  TransferredBytes transferred() const noexcept override { return pair_list_.transferred(); }
+
+  Backend backend() const noexcept override { return Backend::cuda; }
+  SphereAlgorithm algorithm() const noexcept override { return algorithm_; }
+
+ private:
+  void upload(std::span<const SphereInstance> spheres);
+  /// Leaves the contacts in contacts_on_host_ if `mapped`, else on the device. Returns their
+  /// number.
+  std::size_t search(std::span<const SphereInstance> spheres, bool mapped);
+  /// What it reserves stays with what it had if there is no memory for more.
+  void reserve_geometric(std::size_t spheres, std::size_t contacts, bool mapped);
+  void wait() { JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get())); }
+
+  int device_;
+  OwnedStream stream_;
+  MemoryPool pool_;
+  DeviceSphereCollider searcher_;
+  std::size_t spheres_reserved_ = 0, contacts_reserved_ = 0;
+  DeviceBuffer<SphereInstance> spheres_;
+  DeviceBuffer<SphereContact> contacts_;
+  DeviceBuffer<SpherePair> pairs_;
+  DeviceBuffer<PairResult> results_;
+  PinnedBuffer<ContactCount> count_;
+  PinnedBuffer<SphereContact> contacts_on_host_;
+  PinnedBuffer<PairResult> results_on_host_;
+  PairListSearch pair_list_;
+  SphereAlgorithm algorithm_ = SphereAlgorithm::automatic;
+};
+
+void SphereColliderCuda::upload(std::span<const SphereInstance> spheres) {
+  if (spheres.size() > spheres_.size()) {
+    spheres_.grow(pool_, stream_.get(), with_slack(spheres.size()), "spheres");
+  }
+  JFPX_CUDA_TRY(cudaMemcpyAsync(spheres_.data(), spheres.data(), spheres.size_bytes(),
+                                cudaMemcpyHostToDevice, stream_.get()));
+}
+
+std::size_t SphereColliderCuda::search(std::span<const SphereInstance> spheres, bool mapped) {
+  reserve_geometric(spheres.size(), 4 * spheres.size(), mapped);
+  while (true) {
+    searcher_.find_contacts(spheres_.data(), spheres.size(),
+                            mapped ? contacts_on_host_.data() : contacts_.data(),
+                            mapped ? contacts_on_host_.size() : contacts_.size(), count_.data());
+    wait();
+    const ContactCount& count = *count_.data();
+    if (count.first_invalid != kNoSphere) detail::reject_sphere(spheres);
+    if (count.complete != 0) return count.contacts;
+    reserve_geometric(spheres.size(), count.contacts, mapped);
+  }
+}
+
+void SphereColliderCuda::reserve_geometric(std::size_t spheres, std::size_t contacts, bool mapped) {
+  if (spheres > spheres_reserved_ || contacts > contacts_reserved_) {
+    const std::size_t more_spheres =
+        spheres > spheres_reserved_ ? with_slack(spheres) : spheres_reserved_;
+    const std::size_t more_contacts =
+        contacts > contacts_reserved_ ? with_slack(contacts) : contacts_reserved_;
+    searcher_.reserve(more_spheres, more_contacts);
+    spheres_reserved_ = more_spheres;
+    contacts_reserved_ = more_contacts;
+  }
+  if (mapped && contacts > contacts_on_host_.size()) {
+    contacts_on_host_.grow(with_slack(contacts), "contacts on the host");
+  } else if (!mapped && contacts > contacts_.size()) {
+    contacts_.grow(pool_, stream_.get(), with_slack(contacts), "contacts");
+  }
+}
+
+ContactSpan SphereColliderCuda::find_contacts(std::span<const SphereInstance> spheres) {
+  const nvtx3::scoped_range range("jfpx find_contacts");
+  detail::check_count(spheres);
+  algorithm_ = searcher_.algorithm_for(spheres.size());
+  if (spheres.empty()) return {};
+  const DeviceGuard guard(device_);
+  upload(spheres);
+  const bool mapped = spheres.size() <= kMaxMappedSpheres;
+  const std::size_t found = search(spheres, mapped);
+  if (!mapped && found > 0) {
+    contacts_on_host_.grow(with_slack(found), "contacts on the host");
+    JFPX_CUDA_TRY(cudaMemcpyAsync(contacts_on_host_.data(), contacts_.data(),
+                                  found * sizeof(SphereContact), cudaMemcpyDeviceToHost,
+                                  stream_.get()));
+    wait();
+  }
+  return {contacts_on_host_.data(), found};
+}
+
+std::span<const PairResult> SphereColliderCuda::test_pairs(std::span<const SphereInstance> spheres,
+                                                           std::span<const SpherePair> pairs) {
+  const nvtx3::scoped_range range("jfpx test_pairs");
+  check_pairs(pairs, spheres.size());
+  if (pairs.empty()) return {};
+  const DeviceGuard guard(device_);
+  upload(spheres);
+  const std::size_t room = with_slack(pairs.size());
+  pairs_.grow(pool_, stream_.get(), room, "pairs");
+  if (room > results_.size()) {
+    results_.grow(pool_, stream_.get(), room, "pair results");
+    // In double a result has padding, which no kernel writes but the copy reads.
+    JFPX_CUDA_TRY(cudaMemsetAsync(results_.data(), 0, room * sizeof(PairResult), stream_.get()));
+  }
+  results_on_host_.grow(room, "pair results on the host");
+  JFPX_CUDA_TRY(cudaMemcpyAsync(pairs_.data(), pairs.data(), pairs.size_bytes(),
+                                cudaMemcpyHostToDevice, stream_.get()));
+  searcher_.test_pairs(spheres_.data(), pairs_.data(), pairs.size(), results_.data());
+  JFPX_CUDA_TRY(cudaMemcpyAsync(results_on_host_.data(), results_.data(),
+                                pairs.size() * sizeof(PairResult), cudaMemcpyDeviceToHost,
+                                stream_.get()));
+  wait();
+  return {results_on_host_.data(), pairs.size()};
+}
+
+std::span<const PairContact> SphereColliderCuda::find_touching(
+    std::span<const SphereInstance> spheres, std::span<const SpherePair> pairs) {
+  const nvtx3::scoped_range range("jfpx find_touching");
+  detail::check_count(pairs);
+  check_pairs(pairs, spheres.size());
+  const DeviceGuard guard(device_);
+  return pair_list_.find(pool_, stream_.get(), spheres, pairs);
+}
+
+}  // namespace
+
+std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
+  const BackendStatus status = probe(options.device);
+  if (!status.usable) throw BackendUnavailable("cuda: " + status.reason);
+  return std::make_unique<SphereColliderCuda>(options);
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,85 @@
+/// Makes sphere colliders: checks the options and resolves the backend.
+#include <jfpx/error.hpp>
+#include <jfpx/sphere_collider.hpp>
+
+#include "src/base/thread_pool.hpp"
+#include "src/sphere_collider/automatic_sphere_collider.hpp"
+#include "src/sphere_collider/backend_table.hpp"
+#include "src/sphere_collider/cost_model.hpp"
+#include "src/sphere_collider/sphere_input.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+std::unique_ptr<SphereCollider> make_named(const SphereColliderOptions& options) {
+  const BackendRow& row = backend_row(options.backend);
+  const BackendStatus status = row.probe();
+  if (!status.usable) {
+    throw BackendUnavailable(std::string(to_string(options.backend)) + ": " + status.reason);
+  }
+  return row.make_sphere_collider(options);
+}
+
+}  // namespace
+
+SphereCollider::~SphereCollider() = default;
+
+std::span<const PairContact> SphereCollider::find_touching(std::span<const SphereInstance> spheres,
+                                                           std::span<const SpherePair> pairs) {
+  detail::check_count(pairs);
+  touching_.clear();
+  std::uint32_t pair = 0;
+  for (const PairResult& result : test_pairs(spheres, pairs)) {
+    if (result.touching != 0) touching_.push_back({result.normal, result.distance, pair});
+    ++pair;
+  }
+  return touching_;
+}
+
+std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
+  verify_build(options.headers);
+  ThreadPool::check(options.threads);
+  if (options.algorithm > SphereAlgorithm::sorted_tiles) {
+    throw InvalidArgument("algorithm is none of SphereAlgorithm");
+  }
+  if (options.simd > SimdLevel::avx512) throw InvalidArgument("simd is none of SimdLevel");
+  const std::string fault = find_fault(options.costs);
+  if (!fault.empty()) throw InvalidArgument("costs: " + fault);
+  if (options.backend != Backend::automatic) return make_named(options);
+  return std::make_unique<AutomaticSphereCollider>(options, make_named,
+                                                   backend_row(Backend::cuda).compiled);
+}
+
+std::string_view to_string(SphereAlgorithm algorithm) noexcept {
+  switch (algorithm) {
+    case SphereAlgorithm::automatic:
+      return "automatic";
+    case SphereAlgorithm::all_pairs:
+      return "all pairs";
+    case SphereAlgorithm::sorted_tiles:
+      return "sorted tiles";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(ChoiceReason reason) noexcept {
+  switch (reason) {
+    case ChoiceReason::fixed:
+      return "fixed";
+    case ChoiceReason::predicted:
+      return "predicted";
+    case ChoiceReason::measured:
+      return "measured";
+    case ChoiceReason::kept:
+      return "kept";
+    case ChoiceReason::trial:
+      return "trial";
+    case ChoiceReason::device_failed:
+      return "device failed";
+  }
+  return "unknown";
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,58 @@
+/// Loads the scene that the options name.
+#include "src/tool/run_options.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/tool/demo_names.hpp"
+
+#include <filesystem>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace tool {
+namespace {
+
+bool looks_like_file(const std::string& name) {
+  return name.find('/') != std::string::npos || name.ends_with(".json") ||
+         std::filesystem::exists(name);
+}
+
+/// The option that a file can't follow, if one was given.
+const char* option_of_named_scenes(const RunOptions& options) {
+  if (options.spheres) return "--spheres";
+  if (options.boxes) return "--boxes";
+  return options.seed == RunOptions{}.seed ? nullptr : "--seed";
+}
+
+}  // namespace
+
+scenes::Options scene_options(const RunOptions& options) {
+  return {.spheres = options.spheres, .boxes = options.boxes, .seed = options.seed};
+}
+
+Scene load(const RunOptions& options) {
+  Scene scene;
+  if (!is_scene(options.scene) && looks_like_file(options.scene)) {
+    if (const char* option = option_of_named_scenes(options)) {
+      throw InvalidArgument(std::string(option) + " goes with a named scene; " + options.scene +
+                            " is a file");
+    }
+    scene = load_scene(options.scene);
+  } else {
+    if (is_only_a_demo(options.scene)) {
+      throw InvalidArgument("\"" + options.scene +
+                            "\" is a demo: more than rigid bodies belongs to it, so that only the "
+                            "native engine has it; try: jfpx run " +
+                            options.scene);
+    }
+    scene = scenes::make(options.scene, scene_options(options));
+  }
+  if (options.dt) scene.dt = *options.dt;
+  if (options.no_sleep) scene.sleep.enabled = false;
+  validate(scene);
+  return scene;
+}
+
+}  // namespace tool
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,67 @@
+/// Where the bodies of a scene are: a ball around nearly all that moves.
+#include "src/viewer/bounds.hpp"
+
+#include "src/viewer/values.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace view {
+namespace {
+
+constexpr std::size_t kSurveyed = 4000;
+
+struct Spread {
+  Real low, high;
+};
+/// The ends, when one value in fifty is left out at each. Sorts partly.
+Spread spread(std::vector<Real>& values) {
+  const std::size_t left_out = values.size() / 50;
+  const auto low = values.begin() + static_cast<std::ptrdiff_t>(left_out);
+  const auto high = values.end() - 1 - static_cast<std::ptrdiff_t>(left_out);
+  std::nth_element(values.begin(), low, values.end());
+  const Real lowest = *low;
+  std::nth_element(values.begin(), high, values.end());
+  return {lowest, *high};
+}
+
+}  // namespace
+
+Survey::Survey(const Scene& scene) {
+  const std::size_t stride = std::max(scene.bodies.size() / kSurveyed, std::size_t{1});
+  for (const bool wanted : {true, false}) {
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+      const BodyDef& body = scene.bodies[i];
+      if ((body.mass > 0) != wanted || is_endless(body.shape)) continue;
+      largest_ = std::max(largest_, size_of(body.shape));
+      if (i % stride == 0) bodies_.push_back(static_cast<std::uint32_t>(i));
+    }
+    if (!bodies_.empty()) break;
+  }
+}
+
+Bounds Survey::bounds(const std::vector<BodyState>& states) const {
+  constexpr Bounds kNothing{{0, 1, 0}, 4};
+  if (bodies_.empty()) return kNothing;
+  Vec3 low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<Real> along;
+    along.reserve(bodies_.size());
+    for (const std::uint32_t body : bodies_) {
+      const Real place = states[body].position[axis];
+      if (std::isfinite(place)) along.push_back(place);  // what left the numbers has no order
+    }
+    if (along.empty()) return kNothing;
+    const Spread s = spread(along);
+    low[axis] = s.low;
+    high[axis] = s.high;
+  }
+  const Vec3 half = (high - low) * Real(0.5);
+  return {(low + high) * Real(0.5), length(half) + largest_, half};
+}
+
+}  // namespace view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

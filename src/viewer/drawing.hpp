@@ -1,0 +1,99 @@
+/// What a picture shows: plain lists of instances, ready for the GPU.
+#pragma once
+
+#include <jfpx/math.hpp>
+
+#include <cstdint>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace view {
+
+/// How a surface looks; known to the shaders by number.
+enum class Pattern : std::uint8_t {
+  plain,
+  solid_ball,    ///< coloured, with an 8 at two poles
+  striped_ball,  ///< the same with white caps
+  crate,
+  wall,
+  glass,
+};
+
+/// sRGB colour and pattern.
+struct Paint {
+  std::uint8_t r = 255, g = 255, b = 255;
+  Pattern pattern = Pattern::plain;
+  friend bool operator==(const Paint&, const Paint&) = default;
+};
+
+inline constexpr Paint kGroundPaint{124, 130, 138};
+
+struct SphereItem {
+  float centre[3], radius;
+  float turn[4];  ///< x, y, z, w
+  Paint paint;
+};
+struct BoxItem {
+  float centre[3], half_extents[3];
+  float turn[4];
+  Paint paint;
+};
+struct LineItem {
+  float from[3], to[3];
+  std::uint8_t rgba[4];
+  float width;  ///< in units: Viewport::unit
+};
+struct GroundItem {
+  float normal[3], height;  ///< height of the eye over the plane
+  float u[3], eye_u;        ///< an axis of the grid, and where the eye is along it
+  float v[3], eye_v;
+  Paint paint;
+  float cell;  ///< [m]
+};
+
+/// One picture. Positions are given in the world and kept relative to the eye, so that worlds far
+/// from the origin keep their digits.
+class Drawing {
+ public:
+  explicit Drawing(const Vec3& eye) : eye_(eye) {}
+
+  /// Room for so many spheres in all, so that adding them is cheap.
+  void reserve_spheres(std::size_t count) { spheres_.reserve(count); }
+  void add_sphere(const Vec3& centre, Real radius, const Quat& turn, Paint paint);
+  void add_box(const Vec3& centre, const Vec3& half_extents, const Quat& turn, Paint paint);
+  void add_line(const Vec3& from, const Vec3& to, Paint paint, float width,
+                std::uint8_t alpha = 255);
+  /// The plane dot(normal, p) = offset with a grid; not seen from below.
+  void add_ground(const Vec3& normal, Real offset, Real cell, Paint paint);
+  /// A ball around all that throws shadows.
+  void set_bounds(const Vec3& centre, Real radius);
+  /// Typical size of a body: how far contact shadows reach.
+  void set_detail(Real metres) { detail_ = static_cast<float>(metres); }
+
+  const Vec3& eye() const { return eye_; }
+  const std::vector<SphereItem>& spheres() const { return spheres_; }
+  const std::vector<BoxItem>& boxes() const { return boxes_; }
+  const std::vector<BoxItem>& glass() const { return glass_; }
+  /// How near the nearest box, of glass or not, comes to the eye [m]; infinite without boxes.
+  float nearest_box() const;
+  const std::vector<LineItem>& lines() const { return lines_; }
+  const std::vector<GroundItem>& grounds() const { return grounds_; }
+  const Vec3& bounds_centre() const { return bounds_centre_; }
+  Real bounds_radius() const { return bounds_radius_; }
+  float detail() const { return detail_; }
+
+ private:
+  Vec3 eye_;
+  std::vector<SphereItem> spheres_;
+  std::vector<BoxItem> boxes_, glass_;
+  std::vector<LineItem> lines_;
+  std::vector<GroundItem> grounds_;
+  Vec3 bounds_centre_;
+  Real bounds_radius_ = 1;
+  float detail_ = 1;
+};
+
+}  // namespace view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,69 @@
+/// The native engine as a run.
+#include <jfpx/error.hpp>
+
+#include "src/viewer/exchangeable_collider.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace view {
+namespace {
+
+class NativeRun final : public Run {
+ public:
+  NativeRun(const Scene& scene, const EngineChoice& choice, std::uint64_t first_step)
+      : NativeRun(scene, choice, first_step,
+                  std::make_unique<ExchangeableCollider>(
+                      make_sphere_collider(collider_options(choice)))) {}
+
+  void step() override { report_ = world_.step(); }
+
+  Moment moment() override {
+    Moment moment;
+    moment.step = first_step_ + report_.step;
+    moment.states = world_.states();
+    for (const BodyId id : world_.bodies()) moment.awake.push_back(world_.awake(id) ? 1 : 0);
+    moment.contacts.assign(world_.contacts().begin(), world_.contacts().end());
+    moment.times = {report_.integrate_ms, 0, report_.detect_ms, report_.resolve_ms,
+                    report_.total_ms};
+    moment.iterations = report_.position_iterations + report_.velocity_iterations;
+    moment.computed_by = to_string(report_.backend);
+    if (report_.non_finite) {
+      moment.trouble = "body " + std::to_string(report_.non_finite_body.index) +
+                       " left the finite numbers; the state is frozen";
+    }
+    return moment;
+  }
+
+  EngineChoice choice() const override { return choice_; }
+  bool switch_to(const EngineChoice& choice) override {
+    if (choice.engine != EngineKind::native) return false;
+    collider_->exchange(make_sphere_collider(collider_options(choice)));
+    choice_ = choice;
+    return true;
+  }
+
+ private:
+  NativeRun(const Scene& scene, const EngineChoice& choice, std::uint64_t first_step,
+            std::unique_ptr<ExchangeableCollider> collider)
+      : choice_(choice),
+        first_step_(first_step),
+        collider_(collider.get()),
+        world_(scene, std::move(collider)) {}
+
+  EngineChoice choice_;
+  std::uint64_t first_step_;
+  ExchangeableCollider* collider_;  // owned by the world
+  World world_;
+  StepReport report_;
+};
+
+}  // namespace
+
+std::unique_ptr<Run> detail::make_native_run(const Scene& scene, const EngineChoice& choice,
+                                             std::uint64_t first_step) {
+  return std::make_unique<NativeRun>(scene, choice, first_step);
+}
+
+}  // namespace view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,25 @@
+/// What stands in for Bullet in a build without it.
+#include <jfpx/error.hpp>
+
+#include "src/viewer/run.hpp"
+#include "src/viewer/show.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace view {
+
+bool has_engine(EngineKind engine) { return engine == EngineKind::native; }
+
+std::unique_ptr<Run> detail::make_bullet_run(const Scene&, const EngineChoice& choice,
+                                             std::uint64_t) {
+  throw BackendUnavailable(std::string(kEngineNames[static_cast<std::size_t>(choice.engine)]) +
+                           ": built without Bullet");
+}
+
+std::unique_ptr<Show> make_side_by_side(const ViewOptions&) {
+  throw BackendUnavailable("side by side: built without Bullet");
+}
+
+}  // namespace view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,188 @@
+/// The command line of jfpx-view.
+#include "src/viewer/options.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/tool/demo_names.hpp"
+#include "src/viewer/show.hpp"
+
+#include <algorithm>
+#include <charconv>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace view {
+namespace {
+
+constexpr int kLargestSize = 8192;
+
+Size parse_size(const std::string& text) {
+  Size size;
+  const char* end = text.data() + text.size();
+  const auto [x, bad_width] = std::from_chars(text.data(), end, size.width);
+  if (bad_width == std::errc() && x != end && *x == 'x') {
+    const auto [rest, bad_height] = std::from_chars(x + 1, end, size.height);
+    const int smallest = std::min(size.width, size.height);
+    const int largest = std::max(size.width, size.height);
+    if (bad_height == std::errc() && rest == end && smallest >= 16 && largest <= kLargestSize) {
+      return size;
+    }
+  }
+  throw CLI::ValidationError("--size", "is " + text +
+                                           "; it must be WIDTHxHEIGHT, each from 16 to " +
+                                           std::to_string(kLargestSize) + ", as in 1280x720");
+}
+
+Vec3 parse_point(const std::string& option, const std::string& text) {
+  Vec3 point;
+  const char *from = text.data(), *end = text.data() + text.size();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [rest, bad] = std::from_chars(from, end, point[axis]);
+    const bool last = axis == 2;
+    if (bad != std::errc() || !(absolute(point[axis]) <= Real(1e9)) ||
+        (last ? rest != end : rest == end || *rest != ',')) {
+      throw CLI::ValidationError(option, "is " + text + "; it must be X,Y,Z in metres");
+    }
+    from = rest + 1;
+  }
+  return point;
+}
+
+void check_recording(const ViewOptions& options) {
+  const tool::RunOptions& run = options.run;
+  if (options.side_by_side) {
+    throw InvalidArgument("--side-by-side takes its steps anew; " + run.scene + " is a recording");
+  }
+  if (run.spheres || run.boxes || run.dt || run.seed != tool::RunOptions{}.seed || run.no_sleep) {
+    throw InvalidArgument(
+        run.scene +
+        " is a recording: --spheres, --boxes, --seed, --dt and --no-sleep can't change it");
+  }
+  if (options.choice != EngineChoice{}) {
+    throw InvalidArgument(run.scene +
+                          " is a recording: it begins on its own engine and backend, and the panel "
+                          "lets it go on with others");
+  }
+}
+
+void check_demo(const ViewOptions& options) {
+  const char* unused = options.run.no_sleep                           ? "--no-sleep"
+                       : options.colouring != ViewOptions{}.colouring ? "--colours"
+                                                                      : nullptr;
+  if (unused == nullptr) return;
+  throw InvalidArgument(std::string(unused) + " goes with a scene; " + options.run.scene +
+                        " is a demo");
+}
+
+}  // namespace
+
+void add_view_options(CLI::App& app, ViewOptions& options) {
+  tool::add_scene_options(app, options.run,
+                          "Name of a scene or demo (see: jfpx scenes), a JSON file, or a recording "
+                          "(.rec)");
+  app.add_flag("--side-by-side", options.side_by_side,
+               "Native, stock Bullet and Bullet with jfpx, in step");
+  app.add_option_function<std::string>(
+         "--engine",
+         [&options](const std::string& name) { options.choice.engine = parse_engine(name); },
+         "native, bullet (with jfpx) or bullet-stock [native]")
+      ->check(tool::engine_name());
+  tool::add_backend_option(app, options.choice.backend,
+                           "Finds sphere contacts, and solves in Bullet: auto, cpu or cuda [auto]");
+  app.add_option("--threads", options.choice.threads, "CPU threads, 0 = one per core")
+      ->check(tool::whole_number())
+      ->capture_default_str();
+  const auto add_part = [&](const char* name, bool* jfpx, const char* what) {
+    app.add_option_function<std::string>(
+           name, [jfpx](const std::string& whose) { *jfpx = whose == "jfpx"; }, what)
+        ->check(CLI::IsMember({"stock", "jfpx"}));
+  };
+  add_part("--solver", &options.choice.jfpx_solver,
+           "Engine bullet: whose solver, stock or jfpx [jfpx]");
+  add_part("--world", &options.choice.jfpx_world,
+           "Engine bullet: whose world, stock or jfpx [jfpx]");
+  app.add_option("--minimum-batch", options.choice.minimum_batch,
+                 "Engine bullet: pairs, bodies or manifolds below which a part is left to Bullet's "
+                 "own code")
+      ->check(tool::whole_number())
+      ->capture_default_str();
+  app.add_flag("--headless", options.headless, "No window, no display");
+  app.add_option("--frames", options.frames,
+                 "Steps to run, of a recording as many as it has [headless: 120; window: until "
+                 "closed]")
+      ->check(tool::whole_number());
+  app.add_option("--screenshot", options.screenshot, "Write the last frame to this PNG file");
+  app.add_option("--record", options.record,
+                 "Write every frame to this folder as frame-000001.png and so on");
+  app.add_option("--recording", options.recording,
+                 "Write the states of all steps to this file, for: jfpx replay");
+  app.add_option_function<std::string>(
+      "--size", [&options](const std::string& text) { options.size = parse_size(text); },
+      "Size of the picture or window [1280x720]");
+  app.add_option_function<std::string>(
+         "--quality",
+         [&options](const std::string& name) {
+           options.quality = name == "low"    ? kLowQuality
+                             : name == "high" ? kHighQuality
+                                              : kMediumQuality;
+         },
+         "low, medium or high [medium]")
+      ->check(CLI::IsMember({"low", "medium", "high"}));
+  app.add_option_function<std::string>(
+         "--colours",
+         [&options](const std::string& name) {
+           const auto* found =
+               std::find(std::begin(kColouringNames), std::end(kColouringNames), name);
+           options.colouring = static_cast<Colouring>(found - std::begin(kColouringNames));
+         },
+         "What colours tell: bodies, speed, sleep, penetration, contacts or islands [bodies]")
+      ->check(CLI::IsMember(
+          std::vector<std::string>(std::begin(kColouringNames), std::end(kColouringNames))));
+  app.add_flag("--contacts", options.contacts, "Draw contact points and normals");
+  app.add_flag("--forces", options.forces, "Draw what pushes each body, its weight aside");
+  app.add_flag("--panel", options.panel, "Show the panel in headless pictures too");
+  app.add_option("--input", options.input, "Inputs of a demo, from this file");
+  app.add_option_function<std::string>(
+      "--eye", [&options](const std::string& text) { options.eye = parse_point("--eye", text); },
+      "Where the camera is: X,Y,Z [m]");
+  app.add_option_function<std::string>(
+      "--target",
+      [&options](const std::string& text) { options.target = parse_point("--target", text); },
+      "What it looks at: X,Y,Z [m]");
+  app.add_flag_callback(
+      "--no-render", [&options] { options.render = false; },
+      "Open no window and draw nothing: for timing the engine alone");
+  app.add_flag("--fullscreen", options.fullscreen, "Start in full screen");
+  app.add_flag("--paused", options.paused, "Start paused");
+}
+
+void check(const ViewOptions& options) {
+  const std::string& scene = options.run.scene;
+  if (!options.input.empty() && (options.side_by_side || !tool::is_demo(scene))) {
+    throw InvalidArgument("--input goes with a demo; " + scene + " is a scene");
+  }
+  if (is_recording(scene)) check_recording(options);
+  if (options.side_by_side && options.choice.engine != EngineKind::native) {
+    throw InvalidArgument("--side-by-side shows all engines: --engine can't choose one");
+  }
+  if (shows_demo(options)) check_demo(options);
+  if (!options.recording.empty() && (options.side_by_side || shows_demo(options))) {
+    throw InvalidArgument(options.recording + ": only a scene on one engine can be recorded");
+  }
+  if (options.eye.has_value() != options.target.has_value()) {
+    throw InvalidArgument("--eye and --target go together");
+  }
+  if (options.eye && length(*options.target - *options.eye) <= kEpsilon) {
+    throw InvalidArgument("--eye and --target are the same point");
+  }
+  if (options.paused && (options.headless || !options.render)) {
+    throw InvalidArgument("--paused goes with a window");
+  }
+  if (!options.render && (!options.screenshot.empty() || !options.record.empty())) {
+    throw InvalidArgument("--no-render draws nothing that --screenshot or --record could write");
+  }
+}
+
+}  // namespace view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,121 @@
+/// Plays a run.
+#include "src/viewer/player.hpp"
+
+#include <jfpx/error.hpp>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace view {
+namespace {
+
+std::size_t bytes_of(const Moment& moment) {
+  return sizeof moment + moment.states.size() * (sizeof(BodyState) + 1) +
+         moment.contacts.size() * sizeof(Contact);
+}
+
+constexpr const char* kNotOneRun =
+    "another engine or other settings went on with the run: no replay could";
+
+[[noreturn]] void refuse_recording(const std::string& path, const char* why) {
+  throw InvalidArgument(path + ": " + why);
+}
+
+}  // namespace
+
+Player::Player(std::unique_ptr<Run> run, Scene scene)
+    : scene_(std::move(scene)), run_(std::move(run)) {
+  keep(run_->moment());
+}
+
+void Player::keep(Moment moment) {
+  bytes_ += bytes_of(moment);
+  history_.push_back(std::move(moment));
+  while (history_.size() > 2 && (bytes_ > kHistoryBytes || history_.size() > kHistoryLength)) {
+    bytes_ -= bytes_of(history_.front());
+    history_.pop_front();
+  }
+  shown_ = history_.size() - 1;
+}
+
+void Player::step() {
+  if (at_end()) return;
+  if (in_the_past()) {
+    ++shown_;
+    return;
+  }
+  run_->step();
+  Moment moment = run_->moment();
+  moment.dt = scene_.dt;
+  moment.time = history_.back().time + static_cast<double>(scene_.dt);
+  if (recording_) recording_->append(moment.states);
+  keep(std::move(moment));
+}
+
+bool Player::step_back() {
+  if (shown_ == 0) return false;
+  --shown_;
+  return true;
+}
+
+void Player::restart() {
+  if (!run_->rewind()) run_ = make_run(scene_, run_->choice());
+  history_.clear();
+  bytes_ = 0;
+  keep(run_->moment());
+  changed_ = false;
+  if (!recording_path_.empty()) record_to(recording_path_);
+}
+
+bool Player::switch_to(const EngineChoice& choice) {
+  if (choice == run_->choice()) return true;
+  if (run_->switch_to(choice)) return true;
+  go_on_with(scene_, choice);
+  return false;
+}
+
+void Player::set_settings(const RunSettings& settings) {
+  Scene changed = scene_;
+  changed.dt = settings.dt;
+  changed.resolver = settings.resolver;
+  changed.sleep = settings.sleep;
+  validate(changed);
+  go_on_with(std::move(changed), run_->choice());
+}
+
+void Player::go_on_with(Scene scene, const EngineChoice& choice) {
+  run_ = continue_run(scene, history_.back(), choice);
+  scene_ = std::move(scene);
+  shown_ = history_.size() - 1;
+  changed_ = true;
+  recording_.reset();
+}
+
+RecordingHeader Player::header() const {
+  return {.engine = std::string(kEngineNames[static_cast<std::size_t>(run_->choice().engine)]),
+          .backend = std::string(to_string(run_->choice().backend)),
+          .scene = scene_};
+}
+
+void Player::save_recording(const std::string& path) const {
+  if (changed_) refuse_recording(path, kNotOneRun);
+  if (history_.front().step != 0) refuse_recording(path, "the first steps are no longer kept");
+  RecordingWriter recording(path, header());
+  for (std::size_t i = 1; i < history_.size(); ++i) recording.append(history_[i].states);
+  recording.finish();
+}
+
+void Player::record_to(const std::string& path) {
+  recording_path_ = path;
+  recording_.reset();  // removes its part, which lies where that of the next one will
+  recording_.emplace(path, header());
+}
+
+void Player::finish_recording() {
+  if (recording_path_.empty()) return;
+  if (!recording_) refuse_recording(recording_path_, kNotOneRun);
+  recording_->finish();
+}
+
+}  // namespace view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,79 @@
+/// Draws pictures with OpenGL 3.3: ray-cast spheres, boxes, grounds, soft shadows.
+#pragma once
+
+#include "src/viewer/camera.hpp"
+#include "src/viewer/drawing.hpp"
+#include "src/viewer/gl.hpp"
+#include "src/viewer/image.hpp"
+
+#include <memory>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace view {
+
+/// What beauty may cost.
+struct Quality {
+  int supersample = 1;         ///< samples along an edge of a pixel, all shaded
+  int samples = 4;             ///< multisampling of edges
+  int shadow_size = 2048;      ///< texels along an edge of the shadow map; 0 for none
+  int shadow_taps = 16;        ///< for each of the two loops of a soft shadow
+  int occlusion_samples = 12;  ///< 0 for no ambient occlusion
+  friend bool operator==(const Quality&, const Quality&) = default;
+};
+inline constexpr Quality kLowQuality{1, 4, 1024, 4, 0};
+inline constexpr Quality kMediumQuality{};
+inline constexpr Quality kHighQuality{2, 4, 4096, 24, 24};
+
+/// A rectangle of the output, in pixels from its lower left corner.
+struct Viewport {
+  int x = 0, y = 0, width = 0, height = 0;
+  float unit = 1;  ///< pixels that widths of lines are counted in
+};
+
+/// Needs a current context for its whole life. A picture takes one draw call a kind of item and
+/// pass, whatever the number of bodies.
+class Renderer {
+ public:
+  explicit Renderer(const Quality& quality = {});
+  ~Renderer();
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+
+  void set_quality(const Quality& quality);
+  const Quality& quality() const;
+
+  /// Room for spheres that somebody else writes, CUDA for example: they are in every picture,
+  /// besides those of the drawing. @return a buffer of that many SphereItems, of the renderer
+  GLuint resident_spheres(std::size_t count);
+
+  /// Draws into the viewport of a framebuffer; 0 is the window.
+  void draw(const Drawing& drawing, const View& view, const Viewport& viewport,
+            GLuint framebuffer = 0);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A framebuffer without a window, whose pixels can be read.
+class Canvas {
+ public:
+  Canvas(int width, int height);
+  int width() const { return width_; }
+  int height() const { return height_; }
+  GLuint framebuffer() const { return framebuffer_.name(); }
+  Image read() const { return read_pixels(framebuffer(), width_, height_); }
+
+  /// The lower left part of a framebuffer.
+  static Image read_pixels(GLuint framebuffer, int width, int height);
+
+ private:
+  int width_, height_;
+  GlTexture colour_;
+  GlFramebuffer framebuffer_;
+};
+
+}  // namespace view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

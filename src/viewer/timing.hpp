@@ -1,0 +1,51 @@
+/// What a run cost, for the line at its end: the thesis' comparison with rendering on and off.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace view {
+
+/// Measures wall clock since it was made or last asked.
+class Stopwatch {
+ public:
+  /// [s]
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - start_).count();
+    start_ = now;
+    return seconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+class Timing {
+ public:
+  /// @param count how many steps took about as long
+  void add_step(double ms, std::uint64_t count = 1) {
+    step_ms_.push_back(ms);
+    steps_ += count;
+  }
+  void add_picture(double ms) { picture_ms_.push_back(ms); }
+  /// "120 steps, 0.123 ms each; rendering on: 120 pictures, 4.567 ms each (medians)"
+  std::string text(bool rendering) const;
+
+ private:
+  std::vector<double> step_ms_, picture_ms_;
+  std::uint64_t steps_ = 0;
+};
+
+/// The middle value; of an even number the mean of the two in the middle; 0 of none.
+double median(std::vector<double> values);
+
+}  // namespace view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

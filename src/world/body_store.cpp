@@ -1,0 +1,247 @@
+/// Bodies come, move freely, sleep, wake and go.
+#include "src/world/body_store.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/base/power.hpp"
+#include "src/base/reserve.hpp"
+#include "src/scene/compound.hpp"
+#include "src/scene/inertia.hpp"
+#include "src/scene/inertia_tensor.hpp"
+#include "src/world/integrate.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+Real kept_per_step(Real kept_per_second, Real dt) {
+  return static_cast<Real>(detail::power(kept_per_second, dt));
+}
+
+/// Of a solid body of a shape that can move.
+Mat3 tensor_of(const Shape& shape, Real mass) {
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) {
+    return diagonal(detail::moments_of_inertia(*sphere, mass));
+  }
+  if (const auto* box = std::get_if<Box>(&shape)) {
+    return diagonal(detail::moments_of_inertia(*box, mass));
+  }
+  return mass_properties(std::get<Compound>(shape), mass).inertia;
+}
+
+/// The shape with unit vectors and quaternions made so to rounding.
+Shape normalized(Shape shape) {
+  const auto scale = [](auto* wall) {
+    const Real k = Real(1) / length(wall->normal);
+    wall->normal *= k;
+    wall->offset *= k;
+  };
+  if (auto* half_space = std::get_if<HalfSpace>(&shape)) scale(half_space);
+  if (auto* plane = std::get_if<Plane>(&shape)) scale(plane);
+  if (auto* compound = std::get_if<Compound>(&shape)) {
+    for (CompoundPart& part : compound->parts) part.orientation = normalized(part.orientation);
+  }
+  return shape;
+}
+
+bool before(BodyId a, BodyId b) { return a.index < b.index; }
+
+}  // namespace
+
+BodyStore::BodyStore(Real dt, const SleepSettings& sleep)
+    : dt_(dt), sleep_(sleep), motion_kept_(kept_per_step(sleep.bias, dt)) {}
+
+/// All or nothing: a slot is there once it has a generation. remove() never needs memory.
+void BodyStore::add_slot() {
+  const std::size_t slots = capacity() + 1;
+  reserve_geometric(&free_, slots);
+  reserve_geometric(&ids_, slots);
+  const auto all = [slots](auto&... arrays) { (arrays.resize(slots), ...); };
+  all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
+      moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion, moving.awake);
+  all(shape_, radius_, mass_, inverse_mass_, friction_, restitution_, body_inverse_inertia_,
+      tensor_, acceleration_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_,
+      generation_);
+  free_.push_back(static_cast<std::uint32_t>(slots - 1));
+}
+
+BodyId BodyStore::add(const BodyDef& def) {
+  Shape shape = normalized(def.shape);  // may throw, so before anything changes
+  if (free_.empty()) add_slot();
+  const std::uint32_t i = free_.back();
+  const BodyId id{i, generation_[i]};
+  ids_.insert(std::upper_bound(ids_.begin(), ids_.end(), id, before), id);
+  free_.pop_back();
+
+  shape_[i] = std::move(shape);
+  const auto* sphere = std::get_if<Sphere>(&def.shape);
+  radius_[i] = sphere != nullptr ? sphere->radius : Real(0);
+  friction_[i] = def.friction;
+  restitution_[i] = def.restitution;
+  mass_[i] = def.mass;
+  inverse_mass_[i] = def.mass > 0 ? Real(1) / def.mass : Real(0);
+  set_inertia(i, def);
+  acceleration_[i] = def.acceleration;
+  velocity_kept_[i] = kept_per_step(def.linear_damping, dt_);
+  angular_velocity_kept_[i] = kept_per_step(def.angular_damping, dt_);
+  kinematic_[i] = def.kinematic ? 1 : 0;
+  can_sleep_[i] = sleep_.enabled && def.can_sleep ? 1 : 0;
+  moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
+  moving.motion[i] = 0;
+  moving.awake[i] = 0;
+  if (movable(i)) ++movable_count_;
+  if (kinematic(i)) ++kinematic_count_;
+  set_state(i, {def.position, def.orientation, def.velocity, def.angular_velocity});
+  return id;
+}
+
+void BodyStore::set_inertia(std::uint32_t i, const BodyDef& def) {
+  if (!movable(i)) {  // no inverse inertia, on purpose (erratum E26)
+    body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
+    return;
+  }
+  const Mat3 tensor = def.inertia ? symmetric_part(*def.inertia) : tensor_of(shape_[i], def.mass);
+  body_inverse_inertia_[i] = inverse_inertia(tensor);
+  // The largest entry of such a matrix is on its diagonal.
+  const Vec3 moments{tensor(0, 0), tensor(1, 1), tensor(2, 2)};
+  const bool like_a_sphere =
+      moments.x == moments.y && moments.y == moments.z && is_diagonal(tensor);
+  tensor_[i] = like_a_sphere ? diagonal({0, 0, 0})
+                             : tensor * (Real(1) / std::max({moments.x, moments.y, moments.z}));
+}
+
+void BodyStore::remove(BodyId id) noexcept {
+  // A slot whose generations are used up is given up: an id never comes back.
+  if (generation_[id.index] + 1 != 0) free_.push_back(id.index);
+  ++generation_[id.index];
+  ids_.erase(std::lower_bound(ids_.begin(), ids_.end(), id, before));
+  if (movable(id.index)) --movable_count_;
+  if (kinematic(id.index)) --kinematic_count_;
+  moving.awake[id.index] = 0;
+}
+
+bool BodyStore::contains(BodyId id) const noexcept {
+  const auto place = std::lower_bound(ids_.begin(), ids_.end(), id, before);
+  return place != ids_.end() && *place == id;
+}
+
+std::uint32_t BodyStore::require(BodyId id) const {
+  if (contains(id)) return id.index;
+  throw InvalidArgument("body id (index " + std::to_string(id.index) + ", generation " +
+                        std::to_string(id.generation) +
+                        ") is unknown; it must be of a living body of this world");
+}
+
+BodyState BodyStore::state(std::uint32_t i) const {
+  return {moving.position[i], moving.orientation[i], moving.velocity[i],
+          moving.angular_velocity[i]};
+}
+
+void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
+  moving.position[i] = state.position;
+  moving.orientation[i] = normalized(state.orientation);
+  const bool moves = movable(i) || kinematic(i);
+  moving.velocity[i] = moves ? state.velocity : Vec3{};
+  moving.angular_velocity[i] = moves ? state.angular_velocity : Vec3{};
+  refresh_inertia(i);
+  wake(i);
+  if (!kinematic(i)) return;
+  moving.awake[i] = moving.velocity[i] == Vec3{} && moving.angular_velocity[i] == Vec3{} ? 0 : 1;
+  moving.motion[i] = 2 * sleep_.epsilon;
+}
+
+void BodyStore::displace(std::uint32_t i, const Vec3& shift, const Vec3& turn) {
+  moving.position[i] += shift;
+  if (turn == Vec3{}) return;
+  moving.orientation[i] = rotated_by(moving.orientation[i], turn);
+  refresh_inertia(i);
+}
+
+void BodyStore::apply_force(std::uint32_t i, const Vec3& force) {
+  if (!movable(i)) return;
+  moving.force[i] += force;
+  wake(i);
+}
+
+void BodyStore::apply_torque(std::uint32_t i, const Vec3& torque) {
+  if (!movable(i)) return;
+  moving.torque[i] += torque;
+  wake(i);
+}
+
+void BodyStore::wake(std::uint32_t i) {
+  if (!movable(i)) return;
+  moving.awake[i] = 1;
+  moving.motion[i] = 2 * sleep_.epsilon;
+}
+
+void BodyStore::wake_by_touch(std::uint32_t sleeper, std::uint32_t toucher) {
+  // Passing the motion on, instead of topping it up, lets bodies that touch fall asleep together:
+  // topped up, they would wake each other in turn for ever.
+  moving.awake[sleeper] = 1;
+  moving.motion[sleeper] = moving.motion[toucher];
+}
+
+void BodyStore::keep_awake(std::uint32_t i) {
+  moving.motion[i] = std::max(moving.motion[i], 2 * sleep_.epsilon);
+}
+
+bool BodyStore::carries() const {
+  return kinematic_count_ > 0 && std::ranges::any_of(ids_, [this](BodyId id) {
+           return kinematic(id.index) && moving.awake[id.index] != 0;
+         });
+}
+
+void BodyStore::integrate() {
+  for (const BodyId id : ids_) {
+    if (moving.awake[id.index] != 0) {
+      kinematic(id.index) ? move(id.index) : integrate(id.index);
+    }
+    moving.force[id.index] = moving.torque[id.index] = {};
+  }
+}
+
+void BodyStore::integrate(std::uint32_t i) {
+  moving.last_acceleration[i] = add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]);
+  const Vec3 angular_acceleration = moving.inverse_inertia[i] * moving.torque[i];
+  moving.velocity[i] = detail::integrated_velocity(moving.velocity[i], moving.last_acceleration[i],
+                                                   dt_, velocity_kept_[i]);
+  moving.angular_velocity[i] = detail::integrated_velocity(
+      moving.angular_velocity[i], angular_acceleration, dt_, angular_velocity_kept_[i]);
+  if (tensor_[i](0, 0) > 0) {
+    moving.angular_velocity[i] = detail::precessed(moving.angular_velocity[i], tensor_[i],
+                                                   to_matrix(moving.orientation[i]), dt_);
+  }
+  if (can_sleep_[i] != 0 && falls_asleep(i)) return;
+  move(i);
+}
+
+void BodyStore::move(std::uint32_t i) {
+  moving.position[i] = detail::integrated_position(moving.position[i], moving.velocity[i], dt_);
+  moving.orientation[i] =
+      detail::integrated_orientation(moving.orientation[i], moving.angular_velocity[i], dt_);
+  refresh_inertia(i);
+}
+
+/// Asked before the body is moved: a body at rest would fall asleep a step's weight too deep.
+bool BodyStore::falls_asleep(std::uint32_t i) {
+  moving.motion[i] =
+      detail::mean_motion(moving.motion[i], moving.velocity[i], moving.angular_velocity[i],
+                          motion_kept_, 10 * sleep_.epsilon);
+  if (!(moving.motion[i] < sleep_.epsilon)) return false;
+  moving.awake[i] = 0;
+  moving.velocity[i] = moving.angular_velocity[i] = {};
+  return true;
+}
+
+void BodyStore::refresh_inertia(std::uint32_t i) {
+  moving.inverse_inertia[i] =
+      detail::in_world_axes(body_inverse_inertia_[i], to_matrix(moving.orientation[i]));
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

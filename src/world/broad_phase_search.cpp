@@ -1,0 +1,63 @@
+/// The collider alone, or behind a tree, or behind nothing.
+#include "src/world/broad_phase_search.hpp"
+
+#include <jfpx/error.hpp>
+
+#include <string>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+BroadPhaseSearch::BroadPhaseSearch(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
+    : collider_(std::move(collider)), broad_phase_(broad_phase) {
+  if (broad_phase <= BroadPhase::brute_force) return;
+  throw InvalidArgument("broad_phase is " + std::to_string(static_cast<int>(broad_phase)) +
+                        "; it must be cells, hierarchy or brute_force");
+}
+
+void BroadPhaseSearch::set_spheres(std::span<const SphereInstance> spheres) {
+  if (broad_phase_ == BroadPhase::hierarchy) hierarchy_.assign(spheres);
+}
+
+ContactSpan BroadPhaseSearch::find(std::span<const SphereInstance> spheres) {
+  if (broad_phase_ == BroadPhase::cells) return collider_->find_contacts(spheres);
+  touches_.clear();
+  if (broad_phase_ == BroadPhase::brute_force) {
+    test_every_pair(spheres);
+  } else {
+    for (std::size_t i = 0; i < spheres.size(); ++i) {
+      hierarchy_.update(static_cast<SphereHierarchy::Leaf>(i), spheres[i]);
+    }
+    hierarchy_.find_pairs(&pairs_);
+    test_pairs(spheres);
+  }
+  return touches_;
+}
+
+/// In parts: all pairs of many spheres would fill the memory.
+void BroadPhaseSearch::test_every_pair(std::span<const SphereInstance> spheres) {
+  constexpr std::size_t kPart = 4096;
+  pairs_.clear();
+  for (SphereIndex a = 0; a < spheres.size(); ++a) {
+    for (SphereIndex b = a + 1; b < spheres.size(); ++b) {
+      pairs_.push_back({a, b});
+      if (pairs_.size() < kPart) continue;
+      test_pairs(spheres);
+      pairs_.clear();
+    }
+  }
+  test_pairs(spheres);
+}
+
+/// Appends those of pairs_ that touch.
+void BroadPhaseSearch::test_pairs(std::span<const SphereInstance> spheres) {
+  const std::span<const PairResult> results = collider_->test_pairs(spheres, pairs_);
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const PairResult& r = results[i];
+    if (r.touching != 0) touches_.push_back({pairs_[i].a, pairs_[i].b, r.normal, r.distance});
+  }
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

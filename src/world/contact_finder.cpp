@@ -1,0 +1,159 @@
+/// Gathers bounds, asks the collider, and tests what is no pair of spheres.
+#include "src/world/contact_finder.hpp"
+
+#include <jfpx/intersect.hpp>
+
+#include <algorithm>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+bool near(const SphereInstance& a, const SphereInstance& b) {
+  const Real most = a.radius + b.radius;
+  return length_squared(a.centre - b.centre) <= most * most * (1 + 64 * kEpsilon);
+}
+
+template <class T>
+void sort_if_needed(std::vector<T>* items) {
+  if (!std::ranges::is_sorted(*items)) std::ranges::sort(*items);
+}
+
+/// Appends the contacts of two sub_shapes of which one is no sphere.
+class PairTest {
+ public:
+  using SubShape = SubShapeTable::SubShape;
+
+  PairTest(const BodyStore& bodies, const SubShapeTable& sub_shapes, std::vector<Contact>* contacts)
+      : bodies_(bodies), sub_shapes_(sub_shapes), contacts_(contacts) {}
+
+  /// Body a owns sub_shape p, body b sub_shape q; only q may be a wall.
+  void operator()(std::uint32_t a, std::uint32_t b, SubShape p, SubShape q) const {
+    if (sub_shapes_.is_wall(q)) {
+      const HalfSpace solid = sub_shapes_.wall(q).solid_for(bodies_.moving.position[a]);
+      if (sub_shapes_.is_sphere(p)) {
+        add(a, b, collide(sub_shapes_.bounds(p), solid), 1);
+      } else {
+        add(a, b, collide(sub_shapes_.box(p).box, sub_shapes_.box(p).pose, solid));
+      }
+    } else if (sub_shapes_.is_sphere(p)) {
+      add(a, b, collide(sub_shapes_.bounds(p), sub_shapes_.box(q).box, sub_shapes_.box(q).pose), 1);
+    } else if (sub_shapes_.is_sphere(q)) {
+      add(a, b, collide(sub_shapes_.bounds(q), sub_shapes_.box(p).box, sub_shapes_.box(p).pose),
+          -1);
+    } else {
+      const SubShapeTable::PosedBox &first = sub_shapes_.box(p), &second = sub_shapes_.box(q);
+      if (!may_touch(first.box, first.pose, second.box, second.pose)) return;
+      add(a, b, collide(first.box, first.pose, second.box, second.pose));
+    }
+  }
+
+ private:
+  /// @param side 1 if the sphere of the touch is a's, -1 if it is b's
+  void add(std::uint32_t a, std::uint32_t b, const Touch& touch, Real side) const {
+    if (!touch.touching) return;
+    const Vec3 normal = side < 0 ? -touch.normal : touch.normal;
+    contacts_->push_back({a, b, normal, touch.point, touch.distance});
+  }
+  void add(std::uint32_t a, std::uint32_t b, const Manifold& manifold) const {
+    for (int i = 0; i < manifold.count; ++i) {
+      const ManifoldPoint& p = manifold.points[i];
+      contacts_->push_back({a, b, manifold.normal, p.point, p.distance});
+    }
+  }
+
+  const BodyStore& bodies_;
+  const SubShapeTable& sub_shapes_;
+  std::vector<Contact>* contacts_;
+};
+
+}  // namespace
+
+ContactFinder::ContactFinder(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
+    : touches_(std::move(collider), broad_phase) {}
+
+void ContactFinder::set_bodies(const BodyStore& bodies) {
+  sub_shapes_.set_bodies(bodies);
+  sub_shapes_.place(bodies);
+  touches_.set_spheres(sub_shapes_.bounds());
+}
+
+std::uint64_t ContactFinder::find_contacts(const BodyStore& bodies,
+                                           std::vector<Contact>* contacts) {
+  sub_shapes_.place(bodies);
+  candidates_.clear();
+  find_sphere_pairs(bodies, contacts);
+  const std::uint64_t sphere_contacts = contacts->size();
+  find_obstacles(bodies);
+  sort_if_needed(&candidates_);
+  const PairTest test(bodies, sub_shapes_, contacts);
+  for (const Candidate& c : candidates_) test(c.a, c.b, c.sub_shape_a, c.sub_shape_b);
+  return sphere_contacts;
+}
+
+/// Whether x is body a of its contacts with y.
+bool ContactFinder::comes_first(const BodyStore& bodies, std::uint32_t x, std::uint32_t y) const {
+  const bool x_is_sphere = bodies.radius(x) > 0, y_is_sphere = bodies.radius(y) > 0;
+  const bool compound = std::holds_alternative<Compound>(bodies.shape(x)) ||
+                        std::holds_alternative<Compound>(bodies.shape(y));
+  if (!compound && x_is_sphere && y_is_sphere) return x < y;
+  if (!compound && x_is_sphere != y_is_sphere) return x_is_sphere;
+  if (bodies.movable(x) != bodies.movable(y)) return bodies.movable(x);
+  return x < y;
+}
+
+ContactFinder::Candidate ContactFinder::ordered(const BodyStore& bodies, SubShape x,
+                                                SubShape y) const {
+  const std::uint32_t of_x = sub_shapes_.body(x), of_y = sub_shapes_.body(y);
+  if (comes_first(bodies, of_x, of_y)) return {of_x, of_y, x, y};
+  return {of_y, of_x, y, x};
+}
+
+/// Pairs in which a box takes part become candidates.
+void ContactFinder::find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts) {
+  const ContactSpan found = touches_.find(sub_shapes_.bounds());
+  hits_.clear();
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const std::uint32_t a = sub_shapes_.body(found[i].a), b = sub_shapes_.body(found[i].b);
+    if (a == b || (!bodies.movable(a) && !bodies.movable(b))) continue;
+    const Candidate pair = ordered(bodies, found[i].a, found[i].b);
+    if (sub_shapes_.is_sphere(found[i].b)) {
+      hits_.push_back({pair, i});
+    } else {
+      candidates_.push_back(pair);
+    }
+  }
+  sort_if_needed(&hits_);
+  for (const SphereHit& hit : hits_) {
+    const SphereContact& c = found[hit.index];
+    const Vec3 point = middle_point(c.normal, c.distance, sub_shapes_.bounds(c.b));
+    const Vec3 normal = hit.pair.sub_shape_a == c.a ? c.normal : -c.normal;
+    contacts->push_back({hit.pair.a, hit.pair.b, normal, point, c.distance});
+  }
+}
+
+void ContactFinder::find_obstacles(const BodyStore& bodies) {
+  for (SubShape sub_shape = 0; sub_shape < sub_shapes_.fixed_begin(); ++sub_shape) {
+    const std::uint32_t body = sub_shapes_.body(sub_shape);
+    if (!bodies.movable(body)) continue;
+    for (SubShape fixed = sub_shapes_.fixed_begin(); fixed < sub_shapes_.size(); ++fixed) {
+      if (may_touch(sub_shape, fixed, bodies.moving.position[body])) {
+        candidates_.push_back(ordered(bodies, sub_shape, fixed));
+      }
+    }
+  }
+}
+
+/// @param centre of mass of the body that the sub_shape belongs to
+bool ContactFinder::may_touch(SubShape sub_shape, SubShape fixed, const Vec3& centre) const {
+  if (!sub_shapes_.is_wall(fixed))
+    return near(sub_shapes_.bounds(sub_shape), sub_shapes_.bounds(fixed));
+  const HalfSpace solid = sub_shapes_.wall(fixed).solid_for(centre);
+  if (sub_shapes_.is_sphere(sub_shape))
+    return jfpx::may_touch(sub_shapes_.bounds(sub_shape), solid);
+  return jfpx::may_touch(sub_shapes_.box(sub_shape).box, sub_shapes_.box(sub_shape).pose, solid);
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

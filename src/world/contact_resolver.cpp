@@ -1,0 +1,10 @@
+/// The resolver of the engine: a tournament picks.
+#include "src/world/contact_resolver.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+template class BasicContactResolver<IndexedPriorityQueue>;
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

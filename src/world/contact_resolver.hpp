@@ -1,0 +1,387 @@
+/// Resolves contacts one at a time, worst first: penetrations, then velocities (thesis 4.4.6).
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include "src/world/body_store.hpp"
+#include "src/world/contact_response.hpp"
+#include "src/world/indexed_priority_queue.hpp"
+
+#include <numeric>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// What resolving took.
+struct ResolverReport {
+  std::uint64_t position_iterations = 0;
+  std::uint64_t velocity_iterations = 0;
+  bool exhausted = false;  ///< a loop stopped at its limit with work left
+};
+
+/// Both loops take the worst contact, resolve it alone, and refresh every contact of the bodies
+/// that it moved (errata E6, E10, E11). `Queue` says which is worst; all queues that prefer the
+/// largest key and then the lowest index give the same bits. Buffers only grow.
+template <class Queue>
+class BasicContactResolver {
+ public:
+  /// @param contacts a and b are indices of `bodies`; of two movable bodies in contact both or none
+  ///   are awake. Contacts without an awake body are left alone.
+  /// @param generated how many of the last contacts were made and not found: they are no spheres'
+  ///   and form no patches
+  ResolverReport resolve(BodyStore& bodies, std::span<const Contact> contacts,
+                         const ResolverSettings& settings, std::size_t generated = 0);
+
+ private:
+  struct alignas(64) Row {  // a cache line in float, two in double
+    std::uint32_t a, b;
+    Vec3 normal, arm_a, arm_b;  ///< arms: from the centre of mass to the contact
+    Real from_acceleration;     ///< [m/s], of the separating velocity
+    Real friction, restitution;
+    std::uint32_t first, last;  ///< rows of the same two bodies with the same normal: [first, last)
+  };
+  /// What is done at once for rows of the same two bodies.
+  struct Patch {
+    const Row& row;     ///< the worst of them
+    Vec3 arm_a, arm_b;  ///< to where it is done
+    Real amount;
+    Real reach = 0;  ///< [m], mean distance of the points from their centre; 0 for one point
+  };
+  /// Shares of a patch's friction, whose squares add up to 1.
+  struct Grip {
+    Real sliding, turning;
+  };
+  using RowIndex = std::uint32_t;
+
+  void prepare(std::span<const Contact> contacts, std::size_t generated);
+  void add_row(const Contact& contact, const Vec3& arm_a, const Vec3& arm_b);
+  void group_patches();
+  Patch patch_of(RowIndex worst, Real kept) const;
+  void index_rows_by_body();
+  std::span<const RowIndex> rows_of(std::uint32_t body) const;
+  Vec3 lever_arm(std::uint32_t body, const Contact& contact, Real side) const;
+
+  void resolve_positions(ResolverReport* report);
+  void project(const Patch& patch);
+  void displace(std::uint32_t body, const detail::Displacement& displacement);
+
+  void resolve_velocities(ResolverReport* report);
+  void apply_impulse(const Patch& patch);
+  Grip share_friction(const Patch& patch, const Vec3& velocity) const;
+  Real spin(const Row& row) const;
+  void apply_spin_friction(const Row& row, Real most);
+  void push(std::uint32_t body, const Vec3& arm, const Vec3& impulse);
+  Vec3 relative_velocity(const Row& row, const Vec3& arm_a, const Vec3& arm_b) const;
+  Real wanted_change(const Row& row) const;
+  std::uint64_t limit() const;
+
+  BodyStore* bodies_ = nullptr;  ///< of the call in progress
+  ResolverSettings settings_;
+  std::vector<Row> rows_;
+  std::vector<Real> keys_;
+  Queue queue_;
+  std::vector<std::uint32_t> first_row_;  ///< by body: where its part of body_rows_ starts
+  std::vector<RowIndex> body_rows_;
+};
+
+extern template class BasicContactResolver<IndexedPriorityQueue>;
+using ContactResolver = BasicContactResolver<IndexedPriorityQueue>;
+
+template <class Queue>
+ResolverReport BasicContactResolver<Queue>::resolve(BodyStore& bodies,
+                                                    std::span<const Contact> contacts,
+                                                    const ResolverSettings& settings,
+                                                    std::size_t generated) {
+  bodies_ = &bodies;
+  settings_ = settings;
+  prepare(contacts, generated);
+  ResolverReport report;
+  if (rows_.empty()) return report;
+  index_rows_by_body();
+  resolve_positions(&report);
+  resolve_velocities(&report);
+  return report;
+}
+
+/// keys_ becomes the penetrations.
+template <class Queue>
+void BasicContactResolver<Queue>::prepare(std::span<const Contact> contacts,
+                                          std::size_t generated) {
+  const MotionArrays& moving = bodies_->moving;
+  const auto asleep = [&moving](const Contact& c) {
+    return moving.awake[c.a] == 0 && moving.awake[c.b] == 0;
+  };
+  rows_.clear();
+  keys_.clear();
+  for (const Contact& c : contacts.first(contacts.size() - generated)) {
+    if (!asleep(c)) add_row(c, lever_arm(c.a, c, -1), lever_arm(c.b, c, 1));
+  }
+  group_patches();
+  for (const Contact& c : contacts.last(generated)) {
+    if (asleep(c)) continue;
+    add_row(c, c.point - moving.position[c.a], c.point - moving.position[c.b]);
+  }
+}
+
+/// As a patch of its own.
+template <class Queue>
+void BasicContactResolver<Queue>::add_row(const Contact& c, const Vec3& arm_a, const Vec3& arm_b) {
+  const MotionArrays& moving = bodies_->moving;
+  Vec3 acceleration;
+  if (moving.awake[c.a] != 0) acceleration += moving.last_acceleration[c.a];
+  if (moving.awake[c.b] != 0) acceleration -= moving.last_acceleration[c.b];
+  const auto row = static_cast<RowIndex>(rows_.size());
+  rows_.push_back({c.a, c.b, c.normal, arm_a, arm_b, dot(acceleration, c.normal) * bodies_->dt(),
+                   c.friction, c.restitution, row, row + 1});
+  keys_.push_back(-c.distance);
+}
+
+template <class Queue>
+void BasicContactResolver<Queue>::group_patches() {
+  for (RowIndex first = 0, last = 0; first < rows_.size(); first = last) {
+    const Row& head = rows_[first];
+    while (last < rows_.size() && rows_[last].a == head.a && rows_[last].b == head.b &&
+           rows_[last].normal == head.normal) {
+      ++last;
+    }
+    for (RowIndex i = first; i < last; ++i) rows_[i].first = first, rows_[i].last = last;
+  }
+}
+
+/// Where boxes touch along a face, all corners that want something are served at once, by the mean
+/// of what they want at the centre of it: corner after corner, each push would turn the box onto
+/// the next corner, and a box at rest would wander. Velocities are linear in the arm, so the mean
+/// is what the centre itself wants. A corner that wants more than the mean stays the worst, and
+/// weighs more the next time.
+template <class Queue>
+typename BasicContactResolver<Queue>::Patch BasicContactResolver<Queue>::patch_of(RowIndex worst,
+                                                                                  Real kept) const {
+  const Row& row = rows_[worst];
+  Patch patch{row, row.arm_a, row.arm_b, queue_.key(worst) - kept};
+  if (row.last - row.first == 1) return patch;
+  Real sum = 0;
+  Vec3 arm_a, arm_b;
+  for (RowIndex i = row.first; i < row.last; ++i) {
+    const Real wanted = queue_.key(i) - kept;
+    if (!(wanted > 0)) continue;
+    sum += wanted;
+    arm_a += rows_[i].arm_a * wanted;
+    arm_b += rows_[i].arm_b * wanted;
+  }
+  patch.arm_a = arm_a * (Real(1) / sum);
+  patch.arm_b = arm_b * (Real(1) / sum);
+  patch.amount = 0;
+  for (RowIndex i = row.first; i < row.last; ++i) {
+    const Real wanted = queue_.key(i) - kept;
+    if (!(wanted > 0)) continue;
+    patch.amount += wanted / sum * wanted;
+    patch.reach += wanted / sum * length(rows_[i].arm_a - patch.arm_a);
+  }
+  return patch;
+}
+
+/// A sphere's arm is taken along the normal: the difference of two points far from the origin
+/// would have lost its digits. `side` is -1 for body a, 1 for body b (erratum E2).
+template <class Queue>
+Vec3 BasicContactResolver<Queue>::lever_arm(std::uint32_t body, const Contact& contact,
+                                            Real side) const {
+  const Real radius = bodies_->radius(body);
+  if (radius > 0) return contact.normal * (side * (radius + contact.distance * Real(0.5)));
+  return contact.point - bodies_->moving.position[body];
+}
+
+/// Counting sort of the rows by movable body; each body's rows stay in order.
+template <class Queue>
+void BasicContactResolver<Queue>::index_rows_by_body() {
+  first_row_.assign(bodies_->capacity() + 1, 0);
+  for (const Row& row : rows_) {
+    for (const std::uint32_t body : {row.a, row.b}) {
+      if (bodies_->movable(body)) ++first_row_[body];
+    }
+  }
+  std::partial_sum(first_row_.begin(), first_row_.end(), first_row_.begin());
+  body_rows_.resize(first_row_.back());
+  // Each entry is now the end of its body's part; filling from the back makes it the start.
+  for (auto i = static_cast<RowIndex>(rows_.size()); i-- > 0;) {
+    for (const std::uint32_t body : {rows_[i].a, rows_[i].b}) {
+      if (bodies_->movable(body)) body_rows_[--first_row_[body]] = i;
+    }
+  }
+}
+
+template <class Queue>
+std::span<const std::uint32_t> BasicContactResolver<Queue>::rows_of(std::uint32_t body) const {
+  return std::span(body_rows_).subspan(first_row_[body], first_row_[body + 1] - first_row_[body]);
+}
+
+template <class Queue>
+std::uint64_t BasicContactResolver<Queue>::limit() const {
+  return settings_.max_iterations != 0 ? settings_.max_iterations
+                                       : std::uint64_t{8} * bodies_->movable_count();
+}
+
+template <class Queue>
+void BasicContactResolver<Queue>::resolve_positions(ResolverReport* report) {
+  // A little of the allowed depth is left as slack: resolved to nothing, a body at rest would sink
+  // and jump by the whole depth for ever; resolved to the limit itself, rounding and neighbours
+  // would bring the contact back at once.
+  const Real kept_depth = settings_.position_epsilon * Real(15.0 / 16.0);
+  queue_.assign(keys_);
+  for (std::uint64_t left = limit();; --left) {
+    const RowIndex worst = queue_.top();
+    const Real depth = queue_.key(worst);
+    if (!(depth > settings_.position_epsilon)) return;
+    if (left == 0) break;
+    project(patch_of(worst, kept_depth));
+    ++report->position_iterations;
+  }
+  report->exhausted = true;
+}
+
+/// Moves both bodies apart by the patch's amount, shared by how easily each yields (erratum E6a).
+template <class Queue>
+void BasicContactResolver<Queue>::project(const Patch& patch) {
+  const MotionArrays& moving = bodies_->moving;
+  const Row& row = patch.row;
+  const auto inverse_effective_mass = [&](std::uint32_t body, const Vec3& arm) {
+    return bodies_->inverse_mass(body) +
+           detail::angular_inverse_effective_mass(row.normal, arm, moving.inverse_inertia[body]);
+  };
+  const Real total_yield =
+      inverse_effective_mass(row.a, patch.arm_a) + inverse_effective_mass(row.b, patch.arm_b);
+  const auto share = [&](std::uint32_t body, const Vec3& arm, Real signed_depth) {
+    return detail::projection(row.normal, arm, bodies_->inverse_mass(body),
+                              moving.inverse_inertia[body], signed_depth, total_yield,
+                              settings_.angular_limit);
+  };
+  const detail::Displacement of_a = share(row.a, patch.arm_a, patch.amount);
+  const detail::Displacement of_b = share(row.b, patch.arm_b, -patch.amount);
+  displace(row.a, of_a);
+  displace(row.b, of_b);
+}
+
+/// Moves a body and re-estimates the depth of its contacts without new detection (Millington 2007,
+/// 14.4): moving a by +n makes the contact shallower, moving b deeper (erratum E10).
+template <class Queue>
+void BasicContactResolver<Queue>::displace(std::uint32_t body,
+                                           const detail::Displacement& displacement) {
+  if (!bodies_->movable(body)) return;
+  bodies_->displace(body, displacement.shift, displacement.turn);
+  for (const RowIndex i : rows_of(body)) {
+    const Row& row = rows_[i];
+    const bool is_a = row.a == body;
+    const Vec3 moved =
+        detail::point_velocity(displacement.shift, displacement.turn, is_a ? row.arm_a : row.arm_b);
+    const Real opened = dot(moved, row.normal);
+    queue_.update(i, queue_.key(i) + opened * (is_a ? Real(-1) : Real(1)));
+  }
+}
+
+template <class Queue>
+void BasicContactResolver<Queue>::resolve_velocities(ResolverReport* report) {
+  for (RowIndex i = 0; i < rows_.size(); ++i) keys_[i] = wanted_change(rows_[i]);
+  queue_.assign(keys_);
+  for (std::uint64_t left = limit();; --left) {
+    const RowIndex worst = queue_.top();
+    const Real wanted = queue_.key(worst);
+    if (!(wanted > settings_.velocity_epsilon)) return;
+    if (left == 0) break;
+    const Patch patch = patch_of(worst, 0);
+    apply_impulse(patch);
+    for (const std::uint32_t body : {patch.row.a, patch.row.b}) {
+      if (!bodies_->movable(body)) continue;
+      for (const RowIndex i : rows_of(body)) queue_.update(i, wanted_change(rows_[i]));
+    }
+    ++report->velocity_iterations;
+  }
+  report->exhausted = true;
+}
+
+template <class Queue>
+inline Vec3 BasicContactResolver<Queue>::relative_velocity(const Row& row, const Vec3& arm_a,
+                                                           const Vec3& arm_b) const {
+  const MotionArrays& moving = bodies_->moving;
+  return detail::point_velocity(moving.velocity[row.a], moving.angular_velocity[row.a], arm_a) -
+         detail::point_velocity(moving.velocity[row.b], moving.angular_velocity[row.b], arm_b);
+}
+
+template <class Queue>
+Real BasicContactResolver<Queue>::wanted_change(const Row& row) const {
+  return detail::target_delta_velocity(
+      dot(row.normal, relative_velocity(row, row.arm_a, row.arm_b)), row.from_acceleration,
+      row.restitution, settings_.restitution_velocity);
+}
+
+/// Gives both bodies equal and opposite impulses at one common point, so that momentum and angular
+/// momentum stay (errata E2, E3, E5).
+template <class Queue>
+void BasicContactResolver<Queue>::apply_impulse(const Patch& patch) {
+  const Row& row = patch.row;
+  const MotionArrays& moving = bodies_->moving;
+  const detail::ContactBasis basis = detail::contact_basis(row.normal);
+  Mat3 response = diagonal({0, 0, 0});
+  Vec3 velocity = relative_velocity(row, patch.arm_a, patch.arm_b);
+  for (const bool is_a : {true, false}) {
+    const std::uint32_t body = is_a ? row.a : row.b;
+    if (!bodies_->movable(body)) continue;
+    detail::add_response(basis, is_a ? patch.arm_a : patch.arm_b, bodies_->inverse_mass(body),
+                         moving.inverse_inertia[body], &response);
+    // What the next step's acceleration will add along the surface is stopped now as well: a body
+    // held by friction would creep downhill otherwise (Millington 2007, 15.2).
+    const Vec3 coming = moving.last_acceleration[body] * (is_a ? bodies_->dt() : -bodies_->dt());
+    velocity += coming;
+  }
+  const Vec3 local_velocity = detail::to_contact(basis, velocity);
+  const Grip grip = share_friction(patch, local_velocity);
+  const Vec3 local =
+      detail::contact_impulse(response, local_velocity, patch.amount, row.friction * grip.sliding);
+  const Vec3 impulse = detail::to_world(basis, local);
+  push(row.a, patch.arm_a, impulse);
+  push(row.b, patch.arm_b, -impulse);
+  if (patch.reach > 0)
+    apply_spin_friction(row, row.friction * grip.turning * local.x * patch.reach);
+}
+
+/// A patch that slides and turns has one friction for both: it acts against the velocity of its
+/// points, of which sliding and turning are parts at right angles in the mean.
+template <class Queue>
+typename BasicContactResolver<Queue>::Grip BasicContactResolver<Queue>::share_friction(
+    const Patch& patch, const Vec3& velocity) const {
+  if (!(patch.reach > 0)) return {1, 0};
+  const Real slide = square_root(velocity.y * velocity.y + velocity.z * velocity.z);
+  const Real turn = absolute(spin(patch.row)) * patch.reach;
+  const Real both = square_root(slide * slide + turn * turn);
+  return both > 0 ? Grip{slide / both, turn / both} : Grip{1, 0};
+}
+
+template <class Queue>
+Real BasicContactResolver<Queue>::spin(const Row& row) const {
+  const MotionArrays& moving = bodies_->moving;
+  return dot(row.normal, moving.angular_velocity[row.a] - moving.angular_velocity[row.b]);
+}
+
+/// Friction against turning about the normal, which a push at the centre of a patch does not feel.
+/// @param most largest angular impulse that friction has
+template <class Queue>
+void BasicContactResolver<Queue>::apply_spin_friction(const Row& row, Real most) {
+  MotionArrays& moving = bodies_->moving;
+  const Vec3 turned_a = moving.inverse_inertia[row.a] * row.normal;
+  const Vec3 turned_b = moving.inverse_inertia[row.b] * row.normal;
+  const Real inverse_effective_mass = dot(row.normal, turned_a + turned_b);
+  if (!(inverse_effective_mass > 0)) return;
+  const Real stop = -spin(row) / inverse_effective_mass;
+  const Real impulse = stop > most ? most : stop < -most ? -most : stop;
+  moving.angular_velocity[row.a] += turned_a * impulse;
+  moving.angular_velocity[row.b] -= turned_b * impulse;
+}
+
+template <class Queue>
+void BasicContactResolver<Queue>::push(std::uint32_t body, const Vec3& arm, const Vec3& impulse) {
+  if (!bodies_->movable(body)) return;
+  MotionArrays& moving = bodies_->moving;
+  moving.velocity[body] += impulse * bodies_->inverse_mass(body);
+  moving.angular_velocity[body] += moving.inverse_inertia[body] * cross(arm, impulse);
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,52 @@
+/// One step of one rigid body's motion, and its memory of having moved (thesis 4.4.2).
+#pragma once
+
+#include <jfpx/math.hpp>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace detail {
+
+/// Velocity after a step: accelerated, then damped once (erratum E18). `kept` is damping^dt.
+JFPX_HD constexpr Vec3 integrated_velocity(const Vec3& velocity, const Vec3& acceleration, Real dt,
+                                           Real kept) {
+  return add_scaled(velocity, acceleration, dt) * kept;
+}
+
+/// Position after a step at the new velocity: semi-implicit Euler.
+JFPX_HD constexpr Vec3 integrated_position(const Vec3& position, const Vec3& velocity, Real dt) {
+  return add_scaled(position, velocity, dt);
+}
+
+JFPX_HD inline Quat integrated_orientation(const Quat& orientation, const Vec3& angular_velocity,
+                                           Real dt) {
+  return normalized(add_scaled(orientation, angular_velocity, dt));
+}
+
+/// Angular velocity after the gyroscopic part of a step: it turns about the axis of the angular
+/// momentum when the moments differ. One Newton step of the implicit equation in body axes (Catto,
+/// Numerical Methods, GDC 2015): never gains energy, where the explicit term explodes.
+/// @param inertia in body axes, up to a common factor
+/// @param axes    of the body, as columns
+JFPX_HD inline Vec3 precessed(const Vec3& angular_velocity, const Mat3& inertia, const Mat3& axes,
+                              Real dt) {
+  const Vec3 w = transform_transpose(axes, angular_velocity);
+  const Vec3 momentum = inertia * w;
+  const Mat3 slope = skew_symmetric(w) * inertia + skew_symmetric(momentum) * Real(-1);
+  Mat3 inverse;
+  if (!invert(inertia + slope * dt, &inverse)) return angular_velocity;
+  return axes * (w - inverse * (cross(w, momentum) * dt));
+}
+
+/// Recency-weighted mean of v.v + w.w. `kept` is bias^dt; the mean is capped, so that a body that
+/// was fast for long is not kept awake for long.
+JFPX_HD constexpr Real mean_motion(Real mean, const Vec3& velocity, const Vec3& angular_velocity,
+                                   Real kept, Real cap) {
+  const Real now = length_squared(velocity) + length_squared(angular_velocity);
+  const Real next = kept * mean + (1 - kept) * now;
+  return next > cap ? cap : next;
+}
+
+}  // namespace detail
+}  // namespace JFPX_ABI
+}  // namespace jfpx

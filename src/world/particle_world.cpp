@@ -1,0 +1,229 @@
+/// The step of particles: integrate, detect, resolve.
+#include <jfpx/error.hpp>
+#include <jfpx/particle.hpp>
+
+#include "src/scene/scene_validate.hpp"
+#include "src/world/particle_resolver.hpp"
+
+#include <limits>
+#include <new>
+#include <string>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+template <class Value>
+void require(bool good, const char* field, const Value& value, const char* range) {
+  if (good) return;
+  throw InvalidArgument(std::string(field) + " is " + to_text(value) + "; it must be " + range);
+}
+
+bool in_world(const Vec3& v) {
+  return absolute(v.x) <= kMaxCoordinate && absolute(v.y) <= kMaxCoordinate &&
+         absolute(v.z) <= kMaxCoordinate;
+}
+
+void validate(const ParticleState& state) {
+  require(in_world(state.position), "position", state.position, "between -1e9 and 1e9");
+  require(is_finite(state.velocity), "velocity", state.velocity, "finite");
+}
+
+void validate(const ParticleDef& def) {
+  require(def.mass >= 0 && is_finite(def.mass), "mass", def.mass, "finite and >= 0");
+  require(!(def.mass > 0) || is_finite(Real(1) / def.mass), "mass", def.mass,
+          "0 or such that its inverse is finite");
+  validate(ParticleState{def.position, def.velocity});
+  require(is_finite(def.acceleration), "acceleration", def.acceleration, "finite");
+  require(def.damping > 0 && def.damping <= 1, "damping", def.damping, "in (0, 1]");
+  require(def.radius >= 0 && def.radius <= kMaxCoordinate, "radius", def.radius,
+          ">= 0 and at most 1e9");
+  require(def.restitution >= 0 && def.restitution <= 1, "restitution", def.restitution,
+          "in [0, 1]");
+}
+
+void validate(const ParticleSettings& settings) {
+  const auto positive = [](Real x) { return x > 0 && is_finite(x); };
+  require(settings.dt >= std::numeric_limits<Real>::min() && is_finite(settings.dt), "dt",
+          settings.dt, "finite, > 0 and not denormal");
+  for (const HalfSpace& ground : settings.grounds) {
+    require(absolute(length_squared(ground.normal) - 1) <= kUnitTolerance, "normal of a ground",
+            ground.normal, "a unit vector, to a thousandth");
+    require(absolute(ground.offset) <= kMaxCoordinate, "offset of a ground", ground.offset,
+            "between -1e9 and 1e9");
+  }
+  require(positive(settings.velocity_epsilon), "velocity_epsilon", settings.velocity_epsilon,
+          "finite and > 0");
+  require(positive(settings.position_epsilon), "position_epsilon", settings.position_epsilon,
+          "finite and > 0");
+  require(settings.restitution_velocity >= 0 && is_finite(settings.restitution_velocity),
+          "restitution_velocity", settings.restitution_velocity, "finite and >= 0");
+}
+
+}  // namespace
+
+struct ParticleWorld::Impl {
+  explicit Impl(const ParticleSettings& given)
+      : settings(given), particles(given.dt), collider(make_sphere_collider(given.collider)) {
+    for (HalfSpace& ground : settings.grounds) {
+      const Real scale = Real(1) / length(ground.normal);
+      ground.normal *= scale;
+      ground.offset *= scale;
+    }
+  }
+
+  std::uint32_t require_alive(ParticleId id) const {
+    if (particles.contains(id)) return id.index;
+    throw InvalidArgument("particle id (index " + std::to_string(id.index) + ", generation " +
+                          std::to_string(id.generation) +
+                          ") is unknown; it must be of a living particle of this world");
+  }
+
+  bool advance(ParticleReport* report);
+  bool all_in_world(ParticleReport* report) const;
+  void find_contacts();
+  void undo() noexcept {
+    std::swap(particles.moving, before);
+    contacts.clear();
+  }
+
+  ParticleSettings settings;
+  ParticleStore particles;
+  std::unique_ptr<SphereCollider> collider;
+  ParticleResolver resolver;
+  std::vector<SphereInstance> spheres;   ///< particles that have a size
+  std::vector<std::uint32_t> sphere_of;  ///< the particle behind each of them
+  std::vector<ParticleContact> contacts;
+  ParticleMotion before;  ///< the state that a failed step goes back to
+  std::uint64_t steps = 0;
+};
+
+void ParticleWorld::Impl::find_contacts() {
+  contacts.clear();
+  spheres.clear();
+  sphere_of.clear();
+  for (const ParticleId id : particles.ids()) {
+    if (!(particles.radius(id.index) > 0)) continue;
+    spheres.push_back({particles.moving.position[id.index], particles.radius(id.index)});
+    sphere_of.push_back(id.index);
+  }
+  for (const SphereContact& c : collider->find_contacts(spheres)) {
+    const std::uint32_t a = sphere_of[c.a], b = sphere_of[c.b];
+    if (!particles.movable(a) && !particles.movable(b)) continue;
+    const Real restitution = square_root(particles.restitution(a) * particles.restitution(b));
+    contacts.push_back({a, b, c.normal, c.distance, restitution});
+  }
+  for (const ParticleId id : particles.ids()) {
+    const std::uint32_t a = id.index;
+    if (!particles.movable(a)) continue;
+    for (const HalfSpace& ground : settings.grounds) {
+      const Real distance =
+          dot(ground.normal, particles.moving.position[a]) - ground.offset - particles.radius(a);
+      if (distance > 0) continue;
+      contacts.push_back(
+          {a, ParticleContact::kNoParticle, ground.normal, distance, particles.restitution(a)});
+    }
+  }
+}
+
+bool ParticleWorld::Impl::all_in_world(ParticleReport* report) const {
+  for (const ParticleId id : particles.ids()) {
+    if (in_world(particles.moving.position[id.index]) &&
+        is_finite(particles.moving.velocity[id.index])) {
+      continue;
+    }
+    report->non_finite = true;
+    report->non_finite_particle = id;
+    return false;
+  }
+  return true;
+}
+
+bool ParticleWorld::Impl::advance(ParticleReport* report) {
+  particles.integrate();
+  if (!all_in_world(report)) return false;
+  find_contacts();
+  report->contacts = contacts.size();
+  resolver.resolve(particles, contacts, settings, report);
+  return all_in_world(report);
+}
+
+ParticleReport ParticleWorld::step() {
+  Impl& w = *impl_;
+  ParticleReport report;
+  try {
+    w.before = w.particles.moving;
+  } catch (const std::bad_alloc&) {
+    throw OutOfMemory("no memory to keep the state of " + std::to_string(w.particles.ids().size()) +
+                      " particles during a step");
+  }
+  try {
+    if (w.advance(&report)) {
+      ++w.steps;
+    } else {
+      w.undo();
+    }
+  } catch (const std::bad_alloc&) {
+    const std::size_t needed = (w.contacts.size() + 1) * sizeof(ParticleContact);
+    w.undo();
+    throw OutOfMemory("no memory for the contacts of a step: more than " + std::to_string(needed) +
+                      " bytes are needed");
+  } catch (...) {
+    w.undo();
+    throw;
+  }
+  report.step = w.steps;
+  return report;
+}
+
+ParticleWorld::ParticleWorld(const ParticleSettings& settings) {
+  validate(settings);
+  impl_ = std::make_unique<Impl>(settings);
+}
+ParticleWorld::~ParticleWorld() = default;
+ParticleWorld::ParticleWorld(ParticleWorld&&) noexcept = default;
+ParticleWorld& ParticleWorld::operator=(ParticleWorld&&) noexcept = default;
+
+ParticleId ParticleWorld::add(const ParticleDef& particle) {
+  validate(particle);
+  return impl_->particles.add(particle);
+}
+
+void ParticleWorld::remove(ParticleId id) {
+  impl_->require_alive(id);
+  impl_->particles.remove(id);
+  impl_->contacts.clear();
+}
+
+std::span<const ParticleId> ParticleWorld::particles() const { return impl_->particles.ids(); }
+
+bool ParticleWorld::contains(ParticleId id) const noexcept { return impl_->particles.contains(id); }
+
+ParticleState ParticleWorld::state(ParticleId id) const {
+  const std::uint32_t i = impl_->require_alive(id);
+  return {impl_->particles.moving.position[i], impl_->particles.moving.velocity[i]};
+}
+
+void ParticleWorld::set_state(ParticleId id, const ParticleState& state) {
+  const std::uint32_t i = impl_->require_alive(id);
+  validate(state);
+  impl_->particles.set_state(i, state);
+}
+
+void ParticleWorld::apply_force(ParticleId id, const Vec3& force) {
+  const std::uint32_t i = impl_->require_alive(id);
+  require(is_finite(force), "force", force, "finite");
+  impl_->particles.moving.force[i] += force;
+}
+
+double ParticleWorld::time() const {
+  return static_cast<double>(impl_->steps) * static_cast<double>(impl_->settings.dt);
+}
+
+std::span<const ParticleContact> ParticleWorld::contacts() const { return impl_->contacts; }
+
+const ParticleSettings& ParticleWorld::settings() const { return impl_->settings; }
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

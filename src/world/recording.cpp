@@ -1,0 +1,252 @@
+/// Recordings: a header, one frame of raw states a step, and a checksum over all of it.
+///
+/// Layout, little-endian: magic (8 bytes), version and size of Real (4 bytes each), length of the
+/// header text (8 bytes), the text (JSON), frames of 13 Reals a body, and at the end the number of
+/// frames, the checksum of everything before it, and a closing magic (8 bytes each).
+#include <jfpx/error.hpp>
+#include <jfpx/recording.hpp>
+
+#include "src/base/atomic_file.hpp"
+#include "src/base/file.hpp"
+#include "src/base/hash64.hpp"
+#include "src/scene/scene_json.hpp"
+
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+
+constexpr std::array<char, 8> kMagic{'J', 'F', 'P', 'X', 'R', 'E', 'C', '\n'};
+constexpr std::array<char, 8> kEnd{'J', 'F', 'P', 'X', 'E', 'N', 'D', '\n'};
+constexpr std::uint32_t kVersion = 1;
+constexpr std::size_t kRealsPerBody = 13;
+constexpr std::size_t kPrefixSize = 24;
+constexpr std::size_t kTrailerSize = 24;
+/// Frames of no bodies take no bytes, so that any number of them could be claimed.
+constexpr std::uint64_t kMaxEmptyFrames = 10'000'000;
+
+static_assert(sizeof(BodyState) == kRealsPerBody * sizeof(Real), "a state has no padding");
+
+struct Field {
+  const char* name;
+  std::size_t index;
+};
+constexpr Field kFields[kRealsPerBody] = {
+    {"position.x", 0},          {"position.y", 1},          {"position.z", 2},
+    {"orientation.w", 3},       {"orientation.x", 4},       {"orientation.y", 5},
+    {"orientation.z", 6},       {"velocity.x", 7},          {"velocity.y", 8},
+    {"velocity.z", 9},          {"angular_velocity.x", 10}, {"angular_velocity.y", 11},
+    {"angular_velocity.z", 12},
+};
+
+struct Prefix {
+  std::array<char, 8> magic = kMagic;
+  std::uint32_t version = kVersion;
+  std::uint32_t real_size = sizeof(Real);
+  std::uint64_t header_size = 0;
+};
+static_assert(sizeof(Prefix) == kPrefixSize);
+
+struct Trailer {
+  std::uint64_t frames = 0;
+  std::uint64_t checksum = 0;
+  std::array<char, 8> end = kEnd;
+};
+static_assert(sizeof(Trailer) == kTrailerSize);
+
+Prefix read_prefix(std::ifstream& file, const std::string& path) {
+  if (!file) throw FileError(file_message(path, "can't be opened", errno));
+  Prefix prefix;
+  file.read(reinterpret_cast<char*>(&prefix), sizeof prefix);
+  if (!file || prefix.magic != kMagic) throw FileError(path + ": is not a jfpx recording");
+  if (prefix.version != kVersion) {
+    throw FileError(path + ": is a recording of version " + std::to_string(prefix.version) +
+                    "; this build reads version " + std::to_string(kVersion));
+  }
+  if (prefix.real_size != sizeof(float) && prefix.real_size != sizeof(double)) {
+    throw FileError(path + ": is corrupt: its numbers have " + std::to_string(prefix.real_size) +
+                    " bytes; it must be 4 or 8");
+  }
+  return prefix;
+}
+
+const char* precision_name(std::uint32_t real_size) {
+  return real_size == sizeof(float) ? "float" : "double";
+}
+
+}  // namespace
+
+struct RecordingWriter::Impl {
+  Impl(const std::string& path, std::size_t body_count) : file(path), bodies(body_count) {}
+
+  void write(const void* data, std::size_t size) {
+    hash.add_bytes(data, size);
+    file.write({static_cast<const char*>(data), size});
+  }
+
+  AtomicFile file;
+  Hash64 hash;
+  std::size_t bodies;
+  std::uint64_t frames = 0;
+};
+
+RecordingWriter::RecordingWriter(const std::string& path, const RecordingHeader& header)
+    : impl_(std::make_unique<Impl>(path, header.scene.bodies.size())) {
+  const std::string text = recording_header_to_json(header);
+  Prefix prefix;
+  prefix.header_size = text.size();
+  impl_->write(&prefix, sizeof prefix);
+  impl_->write(text.data(), text.size());
+}
+
+RecordingWriter::~RecordingWriter() = default;
+RecordingWriter::RecordingWriter(RecordingWriter&&) noexcept = default;
+RecordingWriter& RecordingWriter::operator=(RecordingWriter&&) noexcept = default;
+
+void RecordingWriter::append(std::span<const BodyState> states) {
+  if (states.size() != impl_->bodies) {
+    throw InvalidArgument("a frame has " + std::to_string(states.size()) +
+                          " bodies; the recorded scene has " + std::to_string(impl_->bodies));
+  }
+  if (states.empty() && impl_->frames == kMaxEmptyFrames) {
+    throw InvalidArgument("a recording without bodies has at most " +
+                          std::to_string(kMaxEmptyFrames) + " frames");
+  }
+  impl_->write(states.data(), states.size_bytes());
+  ++impl_->frames;
+}
+
+void RecordingWriter::finish() {
+  Impl& impl = *impl_;
+  impl.hash.add_word(impl.frames);
+  const Trailer trailer{.frames = impl.frames, .checksum = impl.hash.value()};
+  impl.file.write({reinterpret_cast<const char*>(&trailer), sizeof trailer});
+  impl.file.finish();
+}
+
+struct RecordingReader::Impl {
+  std::string path;
+  std::ifstream file;
+  RecordingHeader header;
+  std::uint64_t frames = 0;
+  std::uint64_t first_frame = 0;  ///< offset of the first frame in the file
+  std::size_t frame_size = 0;
+
+  [[noreturn]] void fail(const std::string& what) const { throw FileError(path + ": " + what); }
+
+  std::uint64_t file_size() {
+    file.seekg(0, std::ios::end);
+    return static_cast<std::uint64_t>(file.tellg());
+  }
+  void read_at(std::uint64_t offset, void* data, std::size_t size) {
+    file.seekg(static_cast<std::streamoff>(offset));
+    file.read(static_cast<char*>(data), static_cast<std::streamsize>(size));
+    if (!file) fail("is truncated");
+  }
+};
+
+RecordingReader::RecordingReader(const std::string& path) : impl_(std::make_unique<Impl>()) {
+  Impl& impl = *impl_;
+  impl.path = path;
+  impl.file.open(path, std::ios::binary);
+  const Prefix prefix = read_prefix(impl.file, path);
+  if (prefix.real_size != sizeof(Real)) {
+    impl.fail(std::string("was recorded in ") + precision_name(prefix.real_size) +
+              " precision; this build computes in " + precision_name(sizeof(Real)));
+  }
+  const std::uint64_t size = impl.file_size();
+  if (size < kPrefixSize + kTrailerSize || prefix.header_size > size - kPrefixSize - kTrailerSize) {
+    impl.fail("is truncated");
+  }
+  Trailer trailer;
+  impl.read_at(size - sizeof trailer, &trailer, sizeof trailer);
+  if (trailer.end != kEnd) impl.fail("is truncated");
+
+  Hash64 hash;
+  hash.add_bytes(&prefix, sizeof prefix);
+  std::string text(prefix.header_size, '\0');
+  impl.read_at(kPrefixSize, text.data(), text.size());
+  hash.add_bytes(text.data(), text.size());
+  impl.first_frame = kPrefixSize + text.size();
+  const std::uint64_t payload = size - impl.first_frame - kTrailerSize;
+  constexpr const char* kCorrupt = "is corrupt: its checksum does not match its content";
+  if (trailer.frames == 0 ? payload != 0 : payload % trailer.frames != 0) impl.fail(kCorrupt);
+  impl.frames = trailer.frames;
+  impl.frame_size = trailer.frames == 0 ? 0 : static_cast<std::size_t>(payload / trailer.frames);
+  std::vector<char> frame(impl.frame_size);
+  for (std::uint64_t k = 0; k < impl.frames && impl.frame_size > 0; ++k) {
+    impl.read_at(impl.first_frame + k * impl.frame_size, frame.data(), frame.size());
+    hash.add_bytes(frame.data(), frame.size());
+  }
+  if (impl.frame_size == 0) {
+    // A scene without bodies: each frame added only its length.
+    if (impl.frames > kMaxEmptyFrames) impl.fail(kCorrupt);
+    for (std::uint64_t k = 0; k < impl.frames; ++k) hash.add_bytes(nullptr, 0);
+  }
+  hash.add_word(trailer.frames);
+  if (hash.value() != trailer.checksum) impl.fail(kCorrupt);
+  try {
+    impl.header = recording_header_from_json(text);
+  } catch (const InvalidScene& error) {
+    impl.fail(std::string("is corrupt: ") + error.what());
+  }
+  if (impl.frames > 0 && impl.frame_size != impl.header.scene.bodies.size() * sizeof(BodyState)) {
+    impl.fail("is corrupt: its frames do not fit its scene");
+  }
+}
+
+RecordingReader::~RecordingReader() = default;
+RecordingReader::RecordingReader(RecordingReader&&) noexcept = default;
+RecordingReader& RecordingReader::operator=(RecordingReader&&) noexcept = default;
+
+const RecordingHeader& RecordingReader::header() const { return impl_->header; }
+std::uint64_t RecordingReader::steps() const { return impl_->frames; }
+
+std::vector<BodyState> RecordingReader::states(std::uint64_t step) {
+  if (step < 1 || step > impl_->frames) {
+    throw InvalidArgument("step is " + std::to_string(step) + "; the recording has steps 1 to " +
+                          std::to_string(impl_->frames));
+  }
+  std::vector<BodyState> states(impl_->header.scene.bodies.size());
+  impl_->read_at(impl_->first_frame + (step - 1) * impl_->frame_size, states.data(),
+                 impl_->frame_size);
+  return states;
+}
+
+std::string recording_precision(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return precision_name(read_prefix(file, path).real_size);
+}
+
+std::optional<StateDifference> first_difference(std::span<const BodyState> expected,
+                                                std::span<const BodyState> actual) {
+  const std::size_t common = std::min(expected.size(), actual.size());
+  for (std::size_t body = 0; body < common; ++body) {
+    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits are what is compared
+    if (std::memcmp(&expected[body], &actual[body], sizeof(BodyState)) == 0) continue;
+    Real e[kRealsPerBody], a[kRealsPerBody];
+    std::memcpy(e, &expected[body], sizeof e);
+    std::memcpy(a, &actual[body], sizeof a);
+    for (const Field& field : kFields) {
+      // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits are what is compared
+      if (std::memcmp(&e[field.index], &a[field.index], sizeof(Real)) != 0) {
+        return StateDifference{static_cast<std::uint32_t>(body), field.name, e[field.index],
+                               a[field.index]};
+      }
+    }
+  }
+  if (expected.size() == actual.size()) return std::nullopt;
+  return StateDifference{static_cast<std::uint32_t>(common), "existence",
+                         static_cast<Real>(expected.size() > common),
+                         static_cast<Real>(actual.size() > common)};
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

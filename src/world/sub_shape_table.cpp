@@ -1,0 +1,108 @@
+/// Takes bodies apart, and keeps their sub_shapes where they belong.
+#include "src/world/sub_shape_table.hpp"
+
+#include <algorithm>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+/// Larger than what the pair tests may find wrongly by rounding, so that a bound never hides a
+/// touch.
+constexpr Real kMargin = 1 + 64 * kEpsilon;
+
+Real bounding_radius(const Sphere& sphere) { return sphere.radius; }
+Real bounding_radius(const Box& box) {
+  constexpr Real kSquareIsLost = Real(1e-15);
+  const Vec3& h = box.half_extents;
+  const Real largest = std::max({h.x, h.y, h.z});
+  return largest < kSquareIsLost ? 2 * largest : length(h) * kMargin;
+}
+
+/// Calls visit(sub_shape, part or null) for each sub_shape of type T in the body.
+template <class T, class Visit>
+void for_each_sub_shape(const Shape& shape, Visit visit) {
+  if (const auto* whole = std::get_if<T>(&shape)) return visit(*whole, nullptr);
+  const auto* compound = std::get_if<Compound>(&shape);
+  if (compound == nullptr) return;
+  for (const CompoundPart& part : compound->parts) {
+    if (const auto* sub_shape = std::get_if<T>(&part.shape)) visit(*sub_shape, &part);
+  }
+}
+
+}  // namespace
+
+void SubShapeTable::set_bodies(const BodyStore& bodies) {
+  body_.clear();
+  bounds_.clear();
+  boxes_.clear();
+  walls_.clear();
+  part_.clear();
+  local_.clear();
+  kinematic_.clear();
+  const auto add = [&](std::uint32_t body, Real radius, const CompoundPart* part) {
+    body_.push_back(body);
+    bounds_.push_back({{}, radius});
+    part_.push_back(0);
+    if (part == nullptr) return;
+    local_.push_back(make_transform(part->orientation, part->position));
+    part_.back() = static_cast<std::uint32_t>(local_.size());
+  };
+  for (const BodyId id : bodies.ids()) {
+    for_each_sub_shape<Sphere>(bodies.shape(id.index),
+                               [&](const Sphere& s, const CompoundPart* part) {
+                                 add(id.index, bounding_radius(s), part);
+                               });
+  }
+  sphere_count_ = size();
+  for (const bool movable : {true, false}) {
+    for (const BodyId id : bodies.ids()) {
+      if (bodies.movable(id.index) != movable) continue;
+      for_each_sub_shape<Box>(bodies.shape(id.index),
+                              [&](const Box& box, const CompoundPart* part) {
+                                add(id.index, bounding_radius(box), part);
+                                boxes_.push_back({box, {}});
+                              });
+    }
+    if (movable) fixed_begin_ = size();
+  }
+  for (SubShape sub_shape = fixed_begin_; sub_shape < size(); ++sub_shape) {
+    place(bodies, sub_shape);
+    if (bodies.kinematic(body_[sub_shape])) kinematic_.push_back(sub_shape);
+  }
+  for (const BodyId id : bodies.ids()) {
+    const Shape& shape = bodies.shape(id.index);
+    if (const auto* half_space = std::get_if<HalfSpace>(&shape)) {
+      walls_.push_back({*half_space, false});
+    } else if (const auto* plane = std::get_if<Plane>(&shape)) {
+      walls_.push_back({{plane->normal, plane->offset}, true});
+    } else {
+      continue;
+    }
+    body_.push_back(id.index);
+  }
+}
+
+void SubShapeTable::place(const BodyStore& bodies) {
+  for (SubShape sub_shape = 0; sub_shape < fixed_begin_; ++sub_shape) place(bodies, sub_shape);
+  for (const SubShape sub_shape : kinematic_) place(bodies, sub_shape);
+}
+
+void SubShapeTable::place(const BodyStore& bodies, SubShape sub_shape) {
+  const std::uint32_t body = body_[sub_shape];
+  const Vec3& position = bodies.moving.position[body];
+  SphereInstance& bounds = bounds_[sub_shape];
+  bounds.centre = position;
+  if (is_sphere(sub_shape) && part_[sub_shape] == 0) return;
+  Transform pose = make_transform(bodies.moving.orientation[body], position);
+  if (part_[sub_shape] != 0) {
+    const Transform& local = local_[part_[sub_shape] - 1];
+    bounds.centre = transform_point(pose, local.origin);
+    if (is_sphere(sub_shape)) return;
+    pose = {pose.basis * local.basis, bounds.centre};
+  }
+  boxes_[sub_shape - sphere_count_].pose = pose;
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

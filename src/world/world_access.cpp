@@ -1,0 +1,172 @@
+/// What users do with a World between two steps: bodies, forces, states.
+#include <jfpx/error.hpp>
+
+#include "src/scene/scene_validate.hpp"
+#include "src/world/world_impl.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+void require_finite(const char* name, const Vec3& value) {
+  if (is_finite(value)) return;
+  throw InvalidArgument(std::string(name) + " is " + to_text(value) + "; it must be finite");
+}
+
+}  // namespace
+
+void World::Impl::require_native(const BodyDef& def, std::uint64_t body) {
+  const bool half_space = std::holds_alternative<HalfSpace>(def.shape);
+  if (def.mass > 0 && (half_space || std::holds_alternative<Plane>(def.shape))) {
+    throw InvalidScene("body " + std::to_string(body) + ": mass is " + to_text(def.mass) +
+                       "; it must be 0 for a " +
+                       (half_space ? "half-space, which fills half of the world"
+                                   : "plane, which divides the whole world"));
+  }
+}
+
+BodyId World::add(const BodyDef& body) {
+  const std::uint64_t number = impl_->bodies.ids().size();
+  validate_body_count(number + 1);
+  validate_body(body, number);
+  Impl::require_native(body, number);
+  const BodyId id = impl_->bodies.add(body);
+  impl_->bodies_changed = true;
+  impl_->shows_contacts = false;
+  return id;
+}
+
+void World::remove(BodyId id) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  impl_->wake_neighbours(body);
+  impl_->bodies.remove(id);
+  // The next body to be added may get its index.
+  std::erase_if(impl_->contacts, [body](const Contact& c) { return c.a == body || c.b == body; });
+  impl_->shows_contacts = false;
+  impl_->bodies_changed = true;
+}
+
+std::span<const BodyId> World::bodies() const { return impl_->bodies.ids(); }
+
+bool World::contains(BodyId id) const noexcept { return impl_->bodies.contains(id); }
+
+BodyId World::body_at(std::uint32_t index) const {
+  const std::span<const BodyId> ids = bodies();
+  const auto found = std::ranges::lower_bound(ids, index, {}, &BodyId::index);
+  if (found != ids.end() && found->index == index) return *found;
+  throw InvalidArgument("index is " + std::to_string(index) +
+                        "; it must be that of a living body of this world");
+}
+
+const Shape& World::shape(BodyId id) const {
+  return impl_->bodies.shape(impl_->bodies.require(id));
+}
+
+std::vector<BodyState> World::states() const {
+  std::vector<BodyState> states;
+  states.reserve(bodies().size());
+  for (const BodyId id : bodies()) states.push_back(impl_->bodies.state(id.index));
+  return states;
+}
+
+BodyState World::state(BodyId id) const { return impl_->bodies.state(impl_->bodies.require(id)); }
+
+void World::set_state(BodyId id, const BodyState& state) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  const std::string found = find_fault(state);
+  if (!found.empty()) throw InvalidArgument("state: " + found);
+  impl_->wake_neighbours(body);
+  impl_->bodies.set_state(body, state);
+  impl_->bodies_changed = true;
+}
+
+bool World::awake(BodyId id) const {
+  return impl_->bodies.moving.awake[impl_->bodies.require(id)] != 0;
+}
+
+void World::wake(BodyId id) { impl_->bodies.wake(impl_->bodies.require(id)); }
+
+Real World::mass(BodyId id) const { return impl_->bodies.mass(impl_->bodies.require(id)); }
+
+Mat3 World::inverse_inertia(BodyId id) const {
+  return impl_->bodies.moving.inverse_inertia[impl_->bodies.require(id)];
+}
+
+void World::apply_force(BodyId id, const Vec3& force) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  require_finite("force", force);
+  impl_->bodies.apply_force(body, force);
+}
+
+void World::apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  require_finite("force", force);
+  require_finite("point", point);
+  impl_->bodies.apply_force(body, force);
+  impl_->bodies.apply_torque(body, cross(point - impl_->bodies.moving.position[body], force));
+}
+
+void World::apply_torque(BodyId id, const Vec3& torque) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  require_finite("torque", torque);
+  impl_->bodies.apply_torque(body, torque);
+}
+
+Vec3 World::last_acceleration(BodyId id) const {
+  return impl_->bodies.moving.last_acceleration[impl_->bodies.require(id)];
+}
+
+ForceContext World::force_context() { return {impl_->bodies, impl_->time()}; }
+
+ForceId World::add_any(std::function<void(ForceContext&)> force) {
+  const ForceId id = impl_->forces.add(std::move(force));
+  impl_->wake_all();
+  return id;
+}
+
+std::function<void(ForceContext&)>& World::any_force(ForceId id) { return impl_->forces.at(id); }
+
+void World::remove_force(ForceId id) {
+  impl_->forces.remove(id);
+  impl_->wake_all();
+}
+
+std::span<const ForceId> World::forces() const { return impl_->forces.ids(); }
+
+ContactGeneratorId World::add_any_generator(std::function<void(ContactContext&)> generator) {
+  const ContactGeneratorId id = impl_->generators.add(std::move(generator));
+  impl_->wake_all();
+  return id;
+}
+
+std::function<void(ContactContext&)>& World::any_generator(ContactGeneratorId id) {
+  return impl_->generators.at(id);
+}
+
+void World::remove_contact_generator(ContactGeneratorId id) {
+  impl_->generators.remove(id);
+  impl_->wake_all();
+}
+
+std::span<const ContactGeneratorId> World::contact_generators() const {
+  return impl_->generators.ids();
+}
+
+double World::time() const { return impl_->time(); }
+
+std::span<const Contact> World::contacts() const {
+  return impl_->shows_contacts ? std::span<const Contact>(impl_->contacts)
+                               : std::span<const Contact>();
+}
+
+std::span<const ContactEvent> World::contact_events() const { return impl_->events.list(); }
+
+std::uint64_t World::state_hash() const { return jfpx::state_hash(states()); }
+
+const Scene& World::scene() const { return impl_->scene; }
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

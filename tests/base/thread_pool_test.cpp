@@ -1,0 +1,56 @@
+/// The pool runs every chunk once, sleeps, survives exceptions, and can be used again.
+#include "src/base/thread_pool.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cpu {
+namespace {
+
+TEST(ThreadPool, RunsEveryChunkOnce) {
+  for (const unsigned threads : {1u, 2u, 5u}) {
+    ThreadPool pool(threads);
+    EXPECT_EQ(pool.threads(), threads);
+    for (const std::size_t chunks : std::initializer_list<std::size_t>{0, 1, 2, 7, 1000}) {
+      std::vector<int> runs(chunks);
+      pool.run(chunks, [&](std::size_t i) { ++runs[i]; });
+      EXPECT_EQ(runs, std::vector<int>(chunks, 1));
+    }
+  }
+}
+
+TEST(ThreadPool, ManyShortLoopsInARow) {
+  ThreadPool pool(4);
+  std::vector<std::size_t> sums(3);
+  for (std::size_t i = 0; i < 2000; ++i) pool.run(3, [&](std::size_t c) { sums[c] += i; });
+  EXPECT_EQ(sums, std::vector<std::size_t>(3, 2000 * 1999 / 2));
+}
+
+TEST(ThreadPool, RethrowsTheErrorOfTheLowestChunkAndGoesOn) {
+  for (const unsigned threads : {1u, 3u}) {
+    ThreadPool pool(threads);
+    for (int repeat = 0; repeat < 50; ++repeat) {
+      try {
+        pool.run(100, [](std::size_t i) {
+          if (i >= 20) throw std::runtime_error(std::to_string(i));
+        });
+        ADD_FAILURE() << "nothing was thrown";
+      } catch (const std::runtime_error& e) {
+        EXPECT_STREQ(e.what(), "20");
+      }
+      std::vector<int> runs(10);
+      pool.run(10, [&](std::size_t i) { ++runs[i]; });
+      EXPECT_EQ(std::accumulate(runs.begin(), runs.end(), 0), 10);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace cpu
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,127 @@
+/// The contacts that a world must find, by testing every sub_shape of every body against every
+/// other.
+#pragma once
+
+#include <jfpx/collide.hpp>
+#include <jfpx/world.hpp>
+
+#include "src/collide/sphere_pair.hpp"
+#include "src/world/body_store.hpp"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+
+class ContactOracle {
+ public:
+  explicit ContactOracle(const BodyStore& bodies) : bodies_(bodies) {
+    for (const BodyId id : bodies.ids()) take_apart(id.index);
+    for (const SubShape& p : sub_shapes_) {
+      for (const SubShape& q : sub_shapes_) {
+        const bool movable = bodies.movable(p.body) || bodies.movable(q.body);
+        if (p.body != q.body && movable && comes_first(p.body, q.body)) test(p, q);
+      }
+    }
+    std::ranges::stable_sort(found_, {}, &Found::order);
+  }
+
+  std::vector<Contact> contacts() const {
+    std::vector<Contact> contacts;
+    for (const Found& f : found_) contacts.push_back(f.contact);
+    return contacts;
+  }
+
+ private:
+  struct SubShape {
+    std::uint32_t body = 0, part = 0;
+    Transform pose;
+    Shape shape;
+    bool is_sphere() const { return std::holds_alternative<Sphere>(shape); }
+    bool is_box() const { return std::holds_alternative<Box>(shape); }
+    SphereInstance sphere() const { return {pose.origin, std::get<Sphere>(shape).radius}; }
+    const Box& box() const { return std::get<Box>(shape); }
+  };
+  struct Found {
+    /// Sphere pairs first; bodies; of a body's sub_shapes the spheres first, each kind by part.
+    std::tuple<bool, std::uint32_t, std::uint32_t, bool, std::uint32_t, bool, std::uint32_t> order;
+    Contact contact;
+  };
+
+  void take_apart(std::uint32_t body) {
+    const BodyState state = bodies_.state(body);
+    const Transform pose = make_transform(state.orientation, state.position);
+    const auto* compound = std::get_if<Compound>(&bodies_.shape(body));
+    if (compound == nullptr) return sub_shapes_.push_back({body, 0, pose, bodies_.shape(body)});
+    std::uint32_t number = 0;
+    for (const CompoundPart& part : compound->parts) {
+      const Transform local = make_transform(part.orientation, part.position);
+      const Shape shape = std::visit([](const auto& s) -> Shape { return s; }, part.shape);
+      sub_shapes_.push_back({body, number++, pose * local, shape});
+    }
+  }
+
+  bool comes_first(std::uint32_t x, std::uint32_t y) const {
+    const Shape &a = bodies_.shape(x), &b = bodies_.shape(y);
+    if (!std::holds_alternative<Compound>(a) && !std::holds_alternative<Compound>(b)) {
+      const int spheres = std::holds_alternative<Sphere>(a) + std::holds_alternative<Sphere>(b);
+      if (spheres == 2) return x < y;
+      if (spheres == 1) return std::holds_alternative<Sphere>(a);
+    }
+    return std::pair(!bodies_.movable(x), x) < std::pair(!bodies_.movable(y), y);
+  }
+
+  void test(const SubShape& p, const SubShape& q) {
+    if (p.is_sphere() && q.is_sphere()) {
+      const bool swap = p.body > q.body;  // the collider sees the lower index first
+      const SphereInstance a = (swap ? q : p).sphere(), b = (swap ? p : q).sphere();
+      const PairResult r = detail::test_sphere_pair(a, b);
+      if (r.touching == 0) return;
+      add(p, q, swap ? -r.normal : r.normal, middle_point(r.normal, r.distance, b), r.distance);
+    } else if (p.is_sphere() && q.is_box()) {
+      add(p, q, collide(p.sphere(), q.box(), q.pose), false);
+    } else if (p.is_box() && q.is_sphere()) {
+      add(p, q, collide(q.sphere(), p.box(), p.pose), true);
+    } else if (p.is_box() && q.is_box()) {
+      add(p, q, collide(p.box(), p.pose, q.box(), q.pose));
+    } else if (p.is_sphere()) {
+      add(p, q, collide(p.sphere(), solid(q.shape, p.body)), false);
+    } else {
+      add(p, q, collide(p.box(), p.pose, solid(q.shape, p.body)));
+    }
+  }
+
+  /// A wall as a body meets it.
+  HalfSpace solid(const Shape& wall, std::uint32_t body) const {
+    if (const auto* half_space = std::get_if<HalfSpace>(&wall)) return *half_space;
+    const auto& plane = std::get<Plane>(wall);
+    const bool behind = dot(plane.normal, bodies_.moving.position[body]) < plane.offset;
+    return behind ? HalfSpace{-plane.normal, -plane.offset} : HalfSpace{plane.normal, plane.offset};
+  }
+
+  void add(const SubShape& p, const SubShape& q, const Vec3& normal, const Vec3& point,
+           Real distance) {
+    found_.push_back({{!(p.is_sphere() && q.is_sphere()), p.body, q.body, !p.is_sphere(), p.part,
+                       !q.is_sphere(), q.part},
+                      {p.body, q.body, normal, point, distance}});
+  }
+  void add(const SubShape& p, const SubShape& q, const Touch& t, bool flip) {
+    if (t.touching) add(p, q, flip ? -t.normal : t.normal, t.point, t.distance);
+  }
+  void add(const SubShape& p, const SubShape& q, const Manifold& m) {
+    for (int k = 0; k < m.count; ++k) {
+      add(p, q, m.normal, m.points[k].point, m.points[k].distance);
+    }
+  }
+
+  const BodyStore& bodies_;
+  std::vector<SubShape> sub_shapes_;
+  std::vector<Found> found_;
+};
+
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,22 @@
+/// Runs the pair tests on host and device.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <cstdint>
+#include <string>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+
+struct PairTestRun {
+  std::string failure;  ///< of a CUDA call; empty if all went well
+  int differences = 0;  ///< inputs for which host and device don't agree to the last bit
+  int touching_boxes = 0;
+};
+PairTestRun run_pair_tests(std::uint64_t seed, int count);
+
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

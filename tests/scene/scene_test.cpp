@@ -1,0 +1,277 @@
+/// Named scenes, and scenes as JSON: round trips, and every way to be wrong.
+#include <jfpx/error.hpp>
+#include <jfpx/scene.hpp>
+#include <jfpx/world.hpp>
+
+#include "src/scenes/scenes.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+
+namespace jfpx {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kMinimal =
+    R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "sphere", "radius": 1}}]})";
+
+/// What from_json() complains about; empty if it does not.
+std::string complaint(std::string_view text) {
+  try {
+    from_json(text);
+  } catch (const InvalidScene& error) {
+    return error.what();
+  }
+  return {};
+}
+
+std::string with_body(const std::string& fields) {
+  return R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "sphere", "radius": 1}, )" + fields +
+         "}]}";
+}
+
+TEST(NamedScenes, AreValidAndSurviveJson) {
+  for (const scenes::Entry& entry : scenes::all()) {
+    for (const std::uint32_t spheres : {0u, 1u, 2u, 33u}) {
+      const Scene scene = scenes::make(entry.name, {.spheres = spheres, .seed = 7});
+      EXPECT_EQ(scene.name, entry.name);
+      EXPECT_NO_THROW(validate(scene)) << entry.name;
+      EXPECT_EQ(from_json(to_json(scene)), scene) << entry.name;
+    }
+    EXPECT_EQ(scenes::spheres_of(scenes::make(entry.name)).size(), entry.default_spheres);
+  }
+}
+
+TEST(NamedScenes, SeedDecidesAndRepeats) {
+  EXPECT_EQ(scenes::make("pile", {.seed = 3}), scenes::make("pile", {.seed = 3}));
+  EXPECT_NE(scenes::make("pile", {.seed = 3}), scenes::make("pile", {.seed = 4}));
+}
+
+TEST(NamedScenes, TowerHasTheNumbersOfTheThesis) {
+  const Scene scene = scenes::make("boxes-and-balls");
+  ASSERT_EQ(scene.bodies.size(), 449u);
+  const BodyDef& top = scene.bodies[447];
+  EXPECT_NEAR(top.position.x, 134.2, 1e-4);
+  EXPECT_EQ(top.position.y, 1342);
+  EXPECT_EQ(top.mass, 20);
+  EXPECT_EQ(top.acceleration, (Vec3{0, Real(-9.8), 0}));
+  EXPECT_EQ(scene.dt, Real(0.01));
+}
+
+TEST(NamedScenes, TowerHasBoxesBesideItOnRequest) {
+  const Scene without = scenes::make("boxes-and-balls", {.spheres = 5});
+  const Scene scene = scenes::make("boxes-and-balls", {.spheres = 5, .boxes = 3});
+  ASSERT_EQ(scene.bodies.size(), 9u);
+  EXPECT_TRUE(std::equal(without.bodies.begin(), without.bodies.end(), scene.bodies.begin()));
+  const BodyDef& top = scene.bodies.back();
+  EXPECT_EQ(top.shape, Shape(Box{{1, 1, 1}}));
+  EXPECT_EQ(top.position, (Vec3{0, 16, 3}));
+  EXPECT_EQ(top.mass, 1);
+  EXPECT_EQ(top.acceleration, (Vec3{0, Real(-9.81), 0}));
+}
+
+TEST(NamedScenes, MixedCountsItsBallsAndBoxes) {
+  const auto boxes = [](const Scene& scene) {
+    return std::ranges::count_if(scene.bodies, [](const BodyDef& body) {
+      return std::holds_alternative<Box>(body.shape) && body.mass > 0;
+    });
+  };
+  const Scene even = scenes::make("mixed", {.spheres = 40});
+  EXPECT_EQ(even.bodies.size(), 40u + 40u + 5u);
+  EXPECT_EQ(boxes(even), 40);
+  const Scene odd = scenes::make("mixed", {.spheres = 3, .boxes = 10});
+  EXPECT_EQ(scenes::spheres_of(odd).size(), 3u);
+  EXPECT_EQ(boxes(odd), 10);
+  EXPECT_EQ(boxes(scenes::make("mixed", {.spheres = 7, .boxes = 0})), 0);
+  World world(even);  // in a way that nothing touches
+  EXPECT_EQ(world.step().contacts, 0u);
+}
+
+TEST(NamedScenes, BoxesAreRefusedWhereThereAreNone) {
+  EXPECT_THROW(scenes::make("pile", {.boxes = 3}), InvalidArgument);
+  EXPECT_THROW(scenes::make("big-ballistic", {.boxes = 0}), InvalidArgument);
+}
+
+TEST(NamedScenes, CratesStandFaceToFaceAndTheVolleyTouchesNothing) {
+  World world(scenes::make("big-ballistic", {.spheres = 9}));
+  std::uint64_t crate_contacts = 0;
+  world.step();
+  for (const Contact& c : world.contacts()) {
+    EXPECT_LT(c.a, 3u);  // crates are bodies 0 and 1, the ground is 2
+    EXPECT_LT(c.b, 3u);
+    EXPECT_NEAR(c.distance, 0, 0.003);  // one step of gravity
+    ++crate_contacts;
+  }
+  EXPECT_EQ(crate_contacts, 4u + 4u + 4u);
+}
+
+TEST(NamedScenes, LatticeRoundsDownToACube) {
+  EXPECT_EQ(scenes::make("lattice", {.spheres = 27}).bodies.size(), 27u);
+  EXPECT_EQ(scenes::make("lattice", {.spheres = 63}).bodies.size(), 27u);
+  EXPECT_EQ(scenes::make("lattice", {.spheres = 64}).bodies.size(), 64u);
+}
+
+TEST(NamedScenes, UnknownNameListsTheNames) {
+  try {
+    scenes::make("plie");
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("\"plie\""));
+    EXPECT_THAT(error.what(), HasSubstr("pile"));
+  }
+}
+
+TEST(NamedScenes, TooManySpheresAreRefusedBeforeMemoryIsTouched) {
+  try {
+    scenes::make("pile", {.spheres = 0xffffffffu});
+    FAIL();
+  } catch (const OutOfMemory& error) {
+    EXPECT_THAT(error.what(), HasSubstr("4294967295 bodies needs about"));
+  }
+}
+
+TEST(SceneJson, KeepsEveryBitOfEveryField) {
+  Scene scene;
+  scene.name = "a \"quoted\" name";
+  scene.dt = Real(1) / Real(3);
+  scene.resolver.max_iterations = 17;
+  scene.sleep.enabled = false;
+  scene.materials = {CombineRule::maximum, CombineRule::average};
+  BodyDef body;
+  body.shape = Box{{Real(0.1), Real(1e-30), Real(1e8)}};
+  body.mass = 0;
+  body.position = {Real(0.1), std::numeric_limits<Real>::denorm_min(), Real(-1e9)};
+  body.orientation = normalized(Quat{1, 2, 3, 4});
+  body.velocity = {Real(-0.0), 1, 2};
+  scene.bodies = {body, body, body, body, body};
+  scene.bodies[4].kinematic = true;
+  scene.bodies[4].inertia =
+      Mat3{{{1, Real(0.1), Real(-0.2)}, {Real(0.1), 1, 0}, {Real(-0.2), 0, 1}}};
+  scene.bodies[1].shape = HalfSpace{{0, 0, 1}, Real(-2.5)};
+  scene.bodies[2].shape = Plane{{0, 1, 0}, Real(0.1)};
+  scene.bodies[3].shape =
+      Compound{{{.shape = Sphere{Real(0.3)}, .position = {Real(0.1), 0, 7}, .density = Real(0.7)},
+                {.shape = Box{}, .orientation = normalized(Quat{4, 3, 2, 1})}}};
+  const Scene read = from_json(to_json(scene));
+  EXPECT_EQ(read, scene);
+  EXPECT_TRUE(std::signbit(read.bodies[0].velocity.x));
+}
+
+TEST(SceneJson, AbsentFieldsHaveDefaults) {
+  const Scene scene = from_json(kMinimal);
+  ASSERT_EQ(scene.bodies.size(), 1u);
+  BodyDef expected;
+  expected.shape = Sphere{1};
+  EXPECT_EQ(scene.bodies[0], expected);
+}
+
+TEST(SceneJson, BrokenTextGivesTheLineAndColumn) {
+  EXPECT_THAT(complaint("{\n\"jfpx_scene\": 1,\n oops}"), HasSubstr("line 3, column 2"));
+  EXPECT_THAT(complaint(""), HasSubstr("broken JSON"));
+  EXPECT_THAT(complaint(with_body("\"mass\": 1e999")), HasSubstr("broken JSON"));
+}
+
+/// To copy or write such a value takes a stack as deep.
+TEST(SceneJson, NestedAHundredThousandTimesIsAnError) {
+  const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
+  EXPECT_THAT(complaint("{\"jfpx_scene\": " + deep + ", \"bodies\": []}"),
+              HasSubstr("nested more than 64 deep"));
+  EXPECT_THAT(complaint("{\"jfpx_scene\": [[1]], \"bodies\": []}"),
+              HasSubstr("scene.jfpx_scene: is an array; "));
+  EXPECT_EQ(complaint("{\"jfpx_scene\": 1, \"name\": \"" + std::string(200, '[') + "\\\"" +
+                      std::string(200, '{') + "\", \"bodies\": []}"),
+            "");
+}
+
+TEST(SceneJson, EveryTruncationIsAnError) {
+  const std::string text = kMinimal;
+  for (std::size_t size = 0; size < text.size(); ++size) {
+    EXPECT_NE(complaint(text.substr(0, size)), "") << size;
+  }
+}
+
+TEST(SceneJson, WrongVersionIsNamed) {
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 2, "bodies": []})"), HasSubstr("is 2; this build reads"));
+  EXPECT_THAT(complaint(R"({"bodies": []})"), HasSubstr("has no field \"jfpx_scene\""));
+}
+
+TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
+  EXPECT_THAT(complaint(with_body("\"mass\": \"heavy\"")),
+              HasSubstr("body 0.mass: is a string; it must be a number"));
+  EXPECT_THAT(complaint(with_body("\"weight\": 1")),
+              HasSubstr("body 0: has an unknown field \"weight\"; known fields are"));
+  EXPECT_THAT(complaint(with_body("\"position\": [1, 2]")),
+              HasSubstr("body 0.position: must be an array of 3 numbers"));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"mass": 1}]})"),
+              HasSubstr("body 0: has no field \"shape\""));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "cone"}}]})"),
+              HasSubstr("\"cone\"; it must be sphere, box, half_space, plane or compound"));
+  const auto with_parts = [](const std::string& parts) {
+    return R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "compound", "parts": )" + parts +
+           "}}]}";
+  };
+  EXPECT_THAT(complaint(with_parts("{}")), HasSubstr("body 0.shape.parts: is an object; it must"));
+  EXPECT_THAT(complaint(with_parts("[]")), HasSubstr("body 0: parts is empty"));
+  EXPECT_THAT(
+      complaint(with_parts(R"([{"shape": {"type": "plane"}}])")),
+      HasSubstr("body 0.shape.parts[0].shape.type: is \"plane\"; it must be sphere or box"));
+  EXPECT_THAT(complaint(with_parts(R"([{"shape": {"type": "sphere", "radius": -1}}])")),
+              HasSubstr("body 0: parts[0].radius is -1; it must be > 0"));
+  EXPECT_THAT(complaint(with_body("\"can_sleep\": 1")), HasSubstr("must be a boolean"));
+  EXPECT_THAT(complaint(with_body("\"inertia\": [1, 1, 1]")),
+              HasSubstr("body 0.inertia[0]: must be an array of 3 numbers"));
+  EXPECT_THAT(complaint(with_body("\"inertia\": [[1, 0, 0]]")),
+              HasSubstr("body 0.inertia: must be an array of 3 rows"));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": 3})"), HasSubstr("must be an array"));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [], "resolver": {"max_iterations": -1}})"),
+              HasSubstr("must be a whole number"));
+}
+
+TEST(SceneJson, MaterialRulesAreNamed) {
+  for (const CombineRule rule :
+       {CombineRule::geometric_mean, CombineRule::product, CombineRule::minimum,
+        CombineRule::maximum, CombineRule::average}) {
+    const std::string text = R"({"jfpx_scene": 1, "bodies": [], "materials": {"friction": ")" +
+                             std::string(to_string(rule)) + R"("}})";
+    EXPECT_EQ(from_json(text).materials, (MaterialSettings{rule, CombineRule::geometric_mean}));
+  }
+  EXPECT_EQ(complaint(R"({"jfpx_scene": 1, "bodies": [], "materials": {"restitution": "sum"}})"),
+            "scene.materials.restitution: is \"sum\"; it must be one of geometric_mean, product, "
+            "minimum, maximum, average");
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [], "materials": {"friction": 1}})"),
+              HasSubstr("is a number; it must be a string"));
+}
+
+TEST(SceneJson, ValuesOutOfRangeAreInvalid) {
+  EXPECT_THAT(complaint(with_body("\"mass\": -1")), HasSubstr("mass"));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "dt": 0, "bodies": []})"), HasSubstr("dt"));
+}
+
+TEST(SceneFile, RoundTrips) {
+  const test::TemporaryFolder folder;
+  const Scene scene = scenes::make("columns", {.spheres = 40});
+  save_scene(scene, folder.file("scene.json"));
+  EXPECT_EQ(load_scene(folder.file("scene.json")), scene);
+  EXPECT_EQ(folder.entries(), 1u) << "nothing is left beside the file";
+}
+
+TEST(SceneFile, UnreadableAndUnwritablePathsAreNamed) {
+  const test::TemporaryFolder folder;
+  EXPECT_THROW(load_scene(folder.file("missing.json")), FileError);
+  EXPECT_THROW(save_scene(Scene{}, folder.file("no/such/folder.json")), FileError);
+  std::ofstream(folder.file("bad.json")) << "{";
+  try {
+    load_scene(folder.file("bad.json"));
+    FAIL();
+  } catch (const InvalidScene& error) {
+    EXPECT_THAT(error.what(), HasSubstr("bad.json: broken JSON"));
+  }
+}
+
+}  // namespace
+}  // namespace jfpx

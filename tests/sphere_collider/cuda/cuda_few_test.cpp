@@ -1,0 +1,76 @@
+/// Every kernel on as few spheres as bring it about, for checking tools that make it a thousand
+/// times slower: scripts/sanitize-cuda runs these. The oracle is x86.
+#include "tests/sphere_collider/cuda/cuda_fixture.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+namespace {
+
+/// Searches twice, so that what a search leaves to the next one counts.
+void expect_contacts_of_x86(const Spheres& spheres, SphereAlgorithm algorithm, const char* what) {
+  const auto x86 = make_sphere_collider({.backend = Backend::cpu});
+  const auto collider = make_sphere_collider({.backend = Backend::cuda, .algorithm = algorithm});
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    EXPECT_TRUE(same_bits(collider->find_contacts(spheres), x86->find_contacts(spheres)))
+        << what << ", N = " << spheres.size() << ", " << seed_note();
+  }
+}
+
+TEST_F(Cuda, FewSpheresInOneCluster) {
+  Random random(base_seed());
+  expect_contacts_of_x86(make_gas(300, Real(0.5), 3, random), SphereAlgorithm::automatic, "gas");
+}
+
+TEST_F(Cuda, FewSpheresAsAllPairs) {
+  Random random(base_seed());
+  expect_contacts_of_x86(make_gas(1100, Real(0.5), 3, random), SphereAlgorithm::all_pairs, "gas");
+}
+
+TEST_F(Cuda, FewSpheresInCellsWithRoom) {
+  Random random(base_seed());
+  expect_contacts_of_x86(make_gas(2000, Real(0.5), 3, random), SphereAlgorithm::sorted_tiles,
+                         "gas");
+}
+
+TEST_F(Cuda, FewSpheresInOneLaunch) {
+  Random random(base_seed());
+  for (const char* const name : {"polydisperse", "outliers", "one_giant"}) {
+    expect_contacts_of_x86(sphere_kind(name).make(1500, random), SphereAlgorithm::sorted_tiles,
+                           name);
+  }
+}
+
+TEST_F(Cuda, FewSpheresInManyLaunches) {
+  constexpr std::size_t kFewest = (1 << 18) + 1;
+  Random random(base_seed());
+  auto gas = make_gas(kFewest, Real(0.5), 1, random);
+  for (std::size_t i = 0; i < 50; ++i) gas[999 * i].centre = gas[7].centre;  // is crowded
+  expect_contacts_of_x86(gas, SphereAlgorithm::automatic, "gas with a crowd");
+  auto mixed = make_gas(kFewest, Real(0.5), 20, random);  // some ten spheres a widest cell
+  for (SphereInstance& s : mixed) s.radius *= random.uniform(Real(0.04), 1);
+  expect_contacts_of_x86(mixed, SphereAlgorithm::automatic, "radii over 1.4 decades");
+  for (std::size_t i = 0; i < 100; ++i) mixed[999 * i].centre *= 1e6;
+  expect_contacts_of_x86(mixed, SphereAlgorithm::automatic, "the same with outliers");
+}
+
+TEST_F(Cuda, FewPairsOfAList) {
+  Random random(base_seed());
+  const auto spheres = make_gas(200, Real(0.5), 3, random);
+  std::vector<SpherePair> pairs(5000);
+  for (SpherePair& p : pairs) {
+    p = {static_cast<SphereIndex>(random.below(200)), static_cast<SphereIndex>(random.below(200))};
+  }
+  const auto x86 = make_sphere_collider({.backend = Backend::cpu});
+  const auto collider = make();
+  EXPECT_TRUE(same_bits(collider->test_pairs(spheres, pairs), x86->test_pairs(spheres, pairs)))
+      << seed_note();
+  EXPECT_TRUE(
+      same_bits(collider->find_touching(spheres, pairs), x86->find_touching(spheres, pairs)))
+      << seed_note();
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,86 @@
+/// What tests of the CUDA backend share.
+#pragma once
+
+#include <jfpx/cuda/sphere_collider.hpp>
+
+#include "src/base/cuda/device_buffer.hpp"
+#include "src/base/cuda/probe.hpp"
+#include "tests/support/sphere_fixtures.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+
+using namespace cuda;
+using Spheres = std::vector<SphereInstance>;
+
+/// Tests that need a device: skipped without one, failed if the environment insists.
+class Cuda : public testing::Test {
+ protected:
+  void SetUp() override {
+    const BackendStatus status = probe();
+    usable_ = status.usable;
+    if (usable_) return;
+    if (std::getenv("JFPX_REQUIRE_CUDA") != nullptr) FAIL() << status.reason;
+    GTEST_SKIP() << status.reason;
+  }
+  void TearDown() override {
+    inject_fault(-1, cudaSuccess);
+    if (usable_) {
+      EXPECT_EQ(cudaGetLastError(), cudaSuccess) << "an error was left behind";
+    }
+  }
+
+  static std::unique_ptr<SphereCollider> make(
+      SphereAlgorithm algorithm = SphereAlgorithm::automatic) {
+    return make_sphere_collider({.backend = Backend::cuda, .algorithm = algorithm});
+  }
+  static std::size_t free_bytes() {
+    std::size_t free = 0, total = 0;
+    JFPX_CUDA_TRY(cudaDeviceSynchronize());
+    JFPX_CUDA_TRY(cudaMemGetInfo(&free, &total));
+    return free;
+  }
+
+ private:
+  bool usable_ = false;
+};
+
+/// Input and output of a search on a stream.
+struct DeviceData {
+  explicit DeviceData(const Spheres& input, std::size_t capacity) : stream(0), pool(0) {
+    spheres.grow(pool, stream.get(), input.size() + 1, "spheres");
+    contacts.grow(pool, stream.get(), capacity + 1, "contacts");
+    count.grow(1, "count");
+    upload(input);
+  }
+  ~DeviceData() { static_cast<void>(cudaStreamSynchronize(stream.get())); }
+  void upload(const Spheres& input) {
+    JFPX_CUDA_TRY(cudaMemcpyAsync(spheres.data(), input.data(),
+                                  input.size() * sizeof(SphereInstance), cudaMemcpyHostToDevice,
+                                  stream.get()));
+  }
+  void wait() const { JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get())); }
+  template <typename T>
+  std::vector<T> download(const T* from, std::size_t n) const {
+    std::vector<T> to(n);
+    JFPX_CUDA_TRY(
+        cudaMemcpyAsync(to.data(), from, n * sizeof(T), cudaMemcpyDeviceToHost, stream.get()));
+    wait();
+    return to;
+  }
+
+  OwnedStream stream;
+  MemoryPool pool;
+  DeviceBuffer<SphereInstance> spheres;
+  DeviceBuffer<SphereContact> contacts;
+  PinnedBuffer<ContactCount> count;
+};
+
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

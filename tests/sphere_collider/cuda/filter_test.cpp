@@ -1,0 +1,316 @@
+/// Hunts for pairs that touch and that the culling of the CUDA backend would lose. The same
+/// functions run in the kernels; here g++ compiles them, so no GPU is needed.
+#include "src/collide/sphere_pair.hpp"
+#include "src/sphere_collider/cuda/grid_cells.hpp"
+#include "src/sphere_collider/cuda/lattice.hpp"
+#include "src/sphere_collider/cuda/sphere_filter.hpp"
+#include "tests/support/sphere_fixtures.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+namespace {
+
+using Limits = std::numeric_limits<Real>;
+
+/// A number of any magnitude, with mantissas that round badly more often than chance has it.
+Real any_magnitude(Random& random) {
+  const int range = Limits::max_exponent - Limits::min_exponent + Limits::digits;
+  const int exponent = Limits::min_exponent - Limits::digits +
+                       static_cast<int>(random.below(static_cast<std::uint64_t>(range)));
+  const Real mantissa = random.below(4) == 0 ? 1 : random.uniform(1, 2);
+  const Real value = std::ldexp(mantissa, exponent - 1);
+  return value > 0 && is_finite(value) ? value : Limits::denorm_min();
+}
+
+/// Two spheres whose distance is the sum of their radii but for a few roundings, at any scale.
+struct Pair {
+  SphereInstance a, b;
+};
+Pair nearly_touching(Random& random) {
+  Pair p;
+  const Real scale = any_magnitude(random);
+  p.a.radius = scale;
+  p.b.radius = random.below(3) == 0 ? any_magnitude(random) : scale * random.uniform(Real(0.1), 3);
+  if (!(p.b.radius > 0) || !is_finite(p.b.radius)) p.b.radius = scale;
+  const Real offset = random.below(2) == 0 ? 0 : any_magnitude(random);
+  p.b.centre = Vec3{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)} * offset;
+  if (!is_finite(p.b.centre)) p.b.centre = {};
+  Vec3 direction{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
+  if (random.below(3) == 0) direction = {1, 0, 0};
+  direction = normalized(direction);
+  p.a.centre = p.b.centre + direction * (p.a.radius + p.b.radius);
+  for (int i = 0; i < 3; ++i) {
+    for (std::uint64_t k = random.below(4); k > 0; --k) {
+      const Real towards = random.below(2) == 0 ? Limits::max() : Limits::lowest();
+      p.a.centre[i] = std::nextafter(p.a.centre[i], towards);
+    }
+  }
+  if (!is_finite(p.a.centre)) p.a.centre = p.b.centre;
+  return p;
+}
+
+/// Whether the search looks from the smaller sphere (or, at equal levels, from either) into the
+/// cell of the other one.
+bool is_in_reach(const SphereInstance& from, const SphereInstance& to,
+                 const cuda::GridScale& scale) {
+  const cuda::GridCell cell = cuda::grid_cell_of(to, scale);
+  const Real half = cuda::half_cell_of(scale.half_0, cell.level);
+  const Real inverse = cuda::inverse_width(half);
+  const Real reach = cuda::reach_of(from.radius, half);
+  const std::int32_t cells[3] = {cell.x, cell.y, cell.z};
+  for (int i = 0; i < 3; ++i) {
+    const Real x = from.centre[i];
+    const Real cells_a_metre = i == 0 ? cuda::inverse_x_of(inverse, scale) : inverse;
+    if (cells[i] < cuda::cell_of(cuda::moved(x, -reach), cells_a_metre)) return false;
+    if (cells[i] > cuda::cell_of(cuda::moved(x, reach), cells_a_metre)) return false;
+  }
+  return true;
+}
+
+TEST(CudaFilter, LetsEveryTouchingPairThrough) {
+  Random random(base_seed());
+  int touching = 0;
+  for (int i = 0; i < 1'000'000; ++i) {
+    const Pair p = nearly_touching(random);
+    if (detail::test_sphere_pair(p.a, p.b).touching == 0) continue;
+    ++touching;
+    ASSERT_TRUE(cuda::closeness(p.a, p.b).near) << "pair " << i << ", " << seed_note();
+  }
+  EXPECT_GT(touching, 200'000) << "the hunt must meet touching pairs";
+}
+
+TEST(CudaFilter, DecidesAsTheExactTestDoes) {
+  Random random(base_seed());
+  int sure = 0, apart = 0;
+  for (int i = 0; i < 1'000'000; ++i) {
+    Pair p = nearly_touching(random);
+    p.a.radius *= 1 + static_cast<Real>(random.below(32)) * Limits::epsilon();
+    if (!is_finite(p.a.radius)) continue;
+    const bool touching = detail::test_sphere_pair(p.a, p.b).touching != 0;
+    apart += touching ? 0 : 1;
+    if (cuda::closeness(p.a, p.b).sure) {
+      ++sure;
+      ASSERT_TRUE(touching) << "pair " << i << ", " << seed_note();
+    }
+    ASSERT_EQ(cuda::touch(p.a, p.b), touching) << "pair " << i << ", " << seed_note();
+  }
+  EXPECT_GT(sure, 50'000) << "the hunt must meet pairs without doubt";
+  EXPECT_GT(apart, 50'000) << "the hunt must meet pairs that are just apart";
+}
+
+TEST(CudaFilter, ExcessLosesNoTouchingPairAndIsSureOfNoOther) {
+  Random random(base_seed());
+  int touching = 0, apart = 0, sure = 0, excluded = 0;
+  for (int i = 0; i < 2'000'000; ++i) {
+    Pair p = nearly_touching(random);
+    p.a.radius *= 1 + static_cast<Real>(random.below(64)) * (Limits::epsilon() / 2);
+    if (!is_finite(p.a.radius)) continue;
+    const Real sum = p.a.radius + p.b.radius;
+    const Real doubt = cuda::doubt_of(random.below(2) == 0 ? sum : sum * random.uniform(1, 4));
+    const Real excess = cuda::excess(p.a, p.b);
+    const bool is_touching = detail::test_sphere_pair(p.a, p.b).touching != 0;
+    (is_touching ? touching : apart) += 1;
+    if (excess > doubt) {
+      ++excluded;
+      ASSERT_FALSE(is_touching) << "pair " << i << ", " << seed_note();
+    }
+    if (excess < -doubt) {
+      ++sure;
+      ASSERT_TRUE(is_touching) << "pair " << i << ", " << seed_note();
+    }
+  }
+  EXPECT_GT(touching, 400'000) << "the hunt must meet touching pairs";
+  EXPECT_GT(apart, 100'000) << "the hunt must meet pairs that are just apart";
+  EXPECT_GT(sure, 10'000) << "what is never sure would pass";
+  EXPECT_GT(excluded, 1'000) << "what excludes nothing would pass";
+}
+
+// Where the square of the sum overflows, nothing is sure but what is true.
+TEST(CudaFilter, IsRightWhereSquaresOverflow) {
+  const Real huge = std::sqrt(Limits::max());
+  for (const Real scale : {Real(0.25), Real(0.5), Real(0.70710678), Real(1), Real(1.5), Real(2)}) {
+    for (const Real distance : {Real(0), Real(0.5), Real(0.9999999), Real(1), Real(1.9999999),
+                                Real(2), Real(2.0000002), Real(2.5)}) {
+      const SphereInstance a{{0, 0, 0}, huge * scale},
+          b{{huge * scale * distance, 0, 0}, huge * scale};
+      const bool touching = detail::test_sphere_pair(a, b).touching != 0;
+      EXPECT_EQ(cuda::touch(a, b), touching) << scale << " " << distance;
+      const Real doubt = cuda::doubt_of(a.radius + b.radius), excess = cuda::excess(a, b);
+      EXPECT_FALSE(touching && excess > doubt) << scale << " " << distance;
+      EXPECT_FALSE(!touching && excess < -doubt) << scale << " " << distance;
+    }
+  }
+}
+
+// A filter that lets everything through would pass the first test.
+TEST(CudaFilter, StopsPairsThatAreApartByMoreThanRoundings) {
+  Random random(base_seed());
+  for (int i = 0; i < 100'000; ++i) {
+    SphereInstance a{random.uniform_in_box({-9, -9, -9}, {9, 9, 9}), random.uniform(Real(0.1), 2)};
+    SphereInstance b{random.uniform_in_box({-9, -9, -9}, {9, 9, 9}), random.uniform(Real(0.1), 2)};
+    const Real gap = length(a.centre - b.centre) - (a.radius + b.radius);
+    if (gap > 64 * kEpsilon * 32) {
+      ASSERT_FALSE(cuda::closeness(a, b).near) << seed_note();
+    }
+  }
+}
+
+TEST(CudaGrid, TouchingSpheresAreInReachOfEachOther) {
+  Random random(base_seed());
+  int touching = 0;
+  for (int i = 0; i < 1'000'000; ++i) {
+    const Pair p = nearly_touching(random);
+    if (detail::test_sphere_pair(p.a, p.b).touching == 0) continue;
+    ++touching;
+    // A third, larger sphere may have set the scale.
+    Real half_0 = cuda::half_cell_for_radius(std::max(p.a.radius, p.b.radius));
+    if (random.below(2) == 0) half_0 = std::max(half_0, half_0 * random.uniform(1, 1000));
+    if (!is_finite(half_0)) continue;
+    cuda::GridScale scale{half_0, static_cast<int>(random.below(cuda::kLastLevel + 1))};
+    const int level_a = cuda::level_of(p.a, scale), level_b = cuda::level_of(p.b, scale);
+    if (random.below(2) == 0) {  // as narrow in x as half the cells of the finer level
+      const Real half = cuda::half_cell_of(half_0, std::max(level_a, level_b));
+      scale.inverse_x = 2 * cuda::inverse_width(half);
+    }
+    const auto note = [&] { return "pair " + std::to_string(i) + ", " + seed_note(); };
+    if (level_a >= level_b) {
+      ASSERT_TRUE(is_in_reach(p.a, p.b, scale)) << note();
+    }
+    if (level_b >= level_a) {
+      ASSERT_TRUE(is_in_reach(p.b, p.a, scale)) << note();
+    }
+    const bool a_is_wide = level_a < level_b;
+    const SphereInstance& wide = a_is_wide ? p.a : p.b;
+    const SphereInstance& fine = a_is_wide ? p.b : p.a;
+    if (level_a != level_b && cuda::is_far(wide)) {
+      ASSERT_GE(std::min(level_a, level_b), cuda::widest_far_level(fine, scale)) << note();
+    }
+  }
+  EXPECT_GT(touching, 200'000) << "the hunt must meet touching pairs";
+}
+
+TEST(CudaGrid, ASphereLooksAtFewCells) {
+  Random random(base_seed());
+  for (int i = 0; i < 200'000; ++i) {
+    const Pair p = nearly_touching(random);
+    const Real half_0 = cuda::half_cell_for_radius(std::max(p.a.radius, p.b.radius));
+    const cuda::GridCell cell = cuda::grid_cell_of(p.a, {half_0});
+    const Real half = cuda::half_cell_of(half_0, cell.level);
+    const Real reach = cuda::reach_of(p.a.radius, half), inverse = cuda::inverse_width(half);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Real x = p.a.centre[axis];
+      const std::int64_t cells = std::int64_t{cuda::cell_of(cuda::moved(x, reach), inverse)} -
+                                 cuda::cell_of(cuda::moved(x, -reach), inverse) + 1;
+      ASSERT_LE(cells, cuda::kRowsApart) << "pair " << i << ", " << seed_note();
+    }
+  }
+}
+
+TEST(CudaGrid, LevelsHalveFromTheLargestSphereOn) {
+  const Real half_0 = Real(0.75);
+  EXPECT_EQ(cuda::level_for(Real(0.75), {half_0}), 0);
+  EXPECT_EQ(cuda::level_for(Real(0.5), {half_0}), 0);
+  EXPECT_EQ(cuda::level_for(Real(0.375), {half_0}), 1);
+  EXPECT_EQ(cuda::level_for(std::nextafter(Real(0.375), Real(1)), {half_0}), 0);
+  EXPECT_EQ(cuda::level_for(Real(0.75) / 1024, {half_0}), 10);
+  EXPECT_EQ(cuda::level_for(Real(1e-30), {half_0}), cuda::kLastLevel);
+  EXPECT_EQ(cuda::level_for(Real(3), {half_0}), -2);
+  EXPECT_EQ(cuda::half_cell_of(half_0, 3), Real(0.09375));
+  EXPECT_EQ(cuda::level_for(Real(0.75) / 1024, {half_0, 6}), 6);
+  EXPECT_EQ(cuda::level_for(Real(0.375), {half_0, 6}), 1);
+}
+
+/// The sum of products of a row and a column, which must be exact in any order.
+float lattice_sum(const cuda::LatticeTerms& row, const cuda::LatticeTerms& column, Random& random) {
+  double exact = 0;
+  std::vector<float> products;
+  for (unsigned k = 0; k < cuda::kTerms; ++k) {
+    for (const float term : {row.values[k], column.values[k]}) {
+      EXPECT_LE(std::abs(term), 2048) << "half precision holds no more";
+      EXPECT_EQ(term, std::round(term));
+    }
+    products.push_back(row.values[k] * column.values[k]);
+    exact += static_cast<double>(row.values[k]) * static_cast<double>(column.values[k]);
+  }
+  float sum = 0;
+  while (!products.empty()) {
+    const std::size_t k = random.below(products.size());
+    sum += products[k];
+    products.erase(products.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  EXPECT_EQ(static_cast<double>(sum), exact);
+  return sum;
+}
+
+TEST(CudaLattice, LetsEveryTouchingPairThrough) {
+  Random random(base_seed());
+  int touching = 0;
+  for (int i = 0; i < 300'000 && !::testing::Test::HasFailure(); ++i) {
+    const Pair p = nearly_touching(random);
+    if (detail::test_sphere_pair(p.a, p.b).touching == 0) continue;
+    ++touching;
+    // What else is in the tile: nothing, or others up to anywhere.
+    Vec3 low, high;
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(p.a.centre[axis], p.b.centre[axis]);
+      high[axis] = std::max(p.a.centre[axis], p.b.centre[axis]);
+      if (random.below(3) == 0) low[axis] = std::min(low[axis], -any_magnitude(random));
+      if (random.below(3) == 0) high[axis] = std::max(high[axis], any_magnitude(random));
+    }
+    Real largest = std::max(p.a.radius, p.b.radius);
+    if (random.below(3) == 0) largest = std::max(largest, any_magnitude(random));
+    const cuda::Lattice lattice = cuda::lattice_around(low, high, largest);
+    const auto a = on_lattice(lattice, p.a), b = on_lattice(lattice, p.b);
+    ASSERT_LT(lattice_sum(row_terms(a), column_terms(b), random), 0)
+        << "pair " << i << ", " << seed_note();
+  }
+  EXPECT_GT(touching, 50'000) << "the hunt must meet touching pairs; " << seed_note();
+}
+
+TEST(CudaLattice, HoldsBackSpheresThatAreApart) {
+  Random random(base_seed());
+  for (int i = 0; i < 10'000; ++i) {
+    SphereInstance a{{0, 0, 0}, random.uniform(Real(0.5), 1)}, b{{}, random.uniform(Real(0.5), 1)};
+    const Vec3 direction = normalized(random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    b.centre = direction * ((a.radius + b.radius) * Real(1.1));
+    const cuda::Lattice lattice = cuda::lattice_around({-8, -8, -8}, {8, 8, 8}, 1);
+    const auto row = on_lattice(lattice, a), column = on_lattice(lattice, b);
+    ASSERT_GE(lattice_sum(row_terms(row), column_terms(column), random), 0) << seed_note();
+  }
+}
+
+// Lines along every axis and diagonal, a plane and a cube: with as many cells as buckets, no bucket
+// may hold many of them. A hash that ignored one coordinate would put 32 to 65 536 into one.
+TEST(CudaGrid, CellsFillTheTableEvenly) {
+  constexpr std::uint32_t kTable = 1 << 16;
+  const auto most_in_a_bucket = [&](auto&& cell) {
+    std::vector<int> load(kTable);
+    for (int i = 0; i < static_cast<int>(kTable); ++i) {
+      const Vec3 c = cell(i);
+      ++load[(cuda::row_of(static_cast<int>(c.y), static_cast<int>(c.z), 3) +
+              static_cast<std::uint32_t>(static_cast<int>(c.x))) %
+             kTable];
+    }
+    return *std::max_element(load.begin(), load.end());
+  };
+  const auto real = [](int i) { return static_cast<Real>(i); };
+  EXPECT_LT(most_in_a_bucket([&](int i) { return Vec3{real(i), 7, -3}; }), 24);
+  EXPECT_LT(most_in_a_bucket([&](int i) { return Vec3{5, real(i), 0}; }), 24);
+  EXPECT_LT(most_in_a_bucket([&](int i) { return Vec3{5, 0, real(-i)}; }), 24);
+  EXPECT_LT(most_in_a_bucket([&](int i) { return Vec3{real(i), real(i), real(i)}; }), 24);
+  EXPECT_LT(most_in_a_bucket([&](int i) { return Vec3{real(i % 256), 9, real(i / 256)}; }), 24);
+  EXPECT_LT(most_in_a_bucket([&](int i) {
+              return Vec3{real(i % 32 - 16), real(i / 32 % 32 - 16), real(i / 1024 - 32)};
+            }),
+            24);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

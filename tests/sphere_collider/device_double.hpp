@@ -1,0 +1,72 @@
+/// A device that isn't one: computes on x86, calls itself cuda, and fails when told to.
+#pragma once
+
+#include <jfpx/error.hpp>
+#include <jfpx/sphere_collider.hpp>
+
+#include "src/sphere_collider/automatic_sphere_collider.hpp"
+
+#include <functional>
+#include <memory>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+
+/// What happens to the device; shared by the colliders that live on it.
+struct Device {
+  std::function<void()> before_call = [] {};  ///< may throw
+  std::function<void()> when_made = [] {};    ///< may throw
+  int made = 0, alive = 0, calls = 0;
+};
+
+class DeviceDouble final : public SphereCollider {
+ public:
+  DeviceDouble(Device* device, SphereAlgorithm algorithm)
+      : device_(device),
+        x86_(make_sphere_collider({.backend = Backend::cpu, .algorithm = algorithm})) {
+    ++device_->made;
+    device_->when_made();
+    ++device_->alive;
+  }
+  ~DeviceDouble() override { --device_->alive; }
+
+  ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
+    ++device_->calls;
+    device_->before_call();
+    return x86_->find_contacts(spheres);
+  }
+  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
+                                         std::span<const SpherePair> pairs) override {
+    ++device_->calls;
+    device_->before_call();
+    return x86_->test_pairs(spheres, pairs);
+  }
+  Backend backend() const noexcept override { return Backend::cuda; }
+  SphereAlgorithm algorithm() const noexcept override { return x86_->algorithm(); }
+
+ private:
+  Device* device_;
+  std::unique_ptr<SphereCollider> x86_;
+};
+
+/// Makes x86 colliders, and doubles for cuda.
+inline SphereColliderMaker maker_with(Device* device) {
+  return [device](const SphereColliderOptions& options) -> std::unique_ptr<SphereCollider> {
+    if (options.backend != Backend::cuda) return make_sphere_collider(options);
+    return std::make_unique<DeviceDouble>(device, options.algorithm);
+  };
+}
+
+/// Costs that say: the device is ready and takes no time.
+inline SphereColliderOptions device_wins() {
+  SphereColliderOptions options;
+  options.costs.cuda_all_pairs = options.costs.cuda_sorted_tiles = {};
+  options.costs.cuda_given_pairs = {};
+  options.costs.cuda_start_ms = 0;
+  return options;
+}
+
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,138 @@
+/// Errata of the original that belong to no single part of the engine; the others are tested with
+/// the part that they concern.
+#include <jfpx/collide.hpp>
+#include <jfpx/error.hpp>
+#include <jfpx/particle.hpp>
+
+#include "src/scenes/scenes.hpp"
+#include "tests/world/support.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+using ::testing::HasSubstr;
+
+constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
+
+// The original flattens every deep contact to the epsilon and then takes any of them.
+TEST(Erratum, E06_the_deepest_contact_is_resolved_first) {
+  Scene scene;
+  for (const Real overlap : {0.2_r, 0.5_r, 0.3_r}) {
+    const Real y = 10 * static_cast<Real>(scene.bodies.size());
+    scene.bodies.push_back(test::ball({0, y, 0}));
+    scene.bodies.push_back(test::ball({2 - overlap, y, 0}));
+  }
+  scene.resolver.max_iterations = 2;
+  World world(scene);
+  const StepReport report = world.step();
+  EXPECT_EQ(report.position_iterations, 2u);
+  EXPECT_TRUE(report.iterations_exhausted);
+  const std::vector<BodyState> s = world.states();
+  const auto gap = [&](int i) { return s[2 * i + 1].position.x - s[2 * i].position.x; };
+  EXPECT_EQ(gap(0), 2 - 0.2_r);  // the two deeper ones have used up the limit
+  EXPECT_NEAR(gap(1), 2, 0.011);
+  EXPECT_NEAR(gap(2), 2, 0.011);
+}
+
+TEST(Erratum, E08_a_position_that_is_no_number_is_refused_and_reaches_no_other_body) {
+  Scene scene;
+  scene.bodies = {test::ball({0, 0, 0}), test::ball({5, 0, 0})};
+  World world(scene);
+  const std::uint64_t before = world.state_hash();
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const Real bad : {kNan, std::numeric_limits<Real>::infinity()}) {
+      BodyState state = world.states()[0];
+      state.position[axis] = bad;
+      EXPECT_THROW(world.set_state(world.bodies()[0], state), InvalidArgument);
+      scene.bodies[0].position = state.position;
+      EXPECT_THROW(World{scene}, InvalidScene);
+      const SphereInstance spheres[] = {{{1, 2, 3}, 1}, {state.position, 1}};
+      try {
+        make_sphere_collider()->find_contacts(spheres);
+        ADD_FAILURE() << "the original makes a contact of no numbers";
+      } catch (const InvalidArgument& error) {
+        EXPECT_THAT(error.what(), HasSubstr("sphere 1"));
+      }
+    }
+  }
+  EXPECT_EQ(world.state_hash(), before);
+  EXPECT_FALSE(world.step().non_finite);
+}
+
+// The original's early-out takes the radius off each coordinate.
+TEST(Erratum, E15b_half_spaces_at_any_angle_meet_spheres_by_their_distance) {
+  EXPECT_FALSE(collide(SphereInstance{{0.72_r, 0.96_r, 0}, 1}, HalfSpace{{0.6_r, 0.8_r, 0}, 0})
+                   .touching);  // 1.2 away
+  EXPECT_TRUE(collide(SphereInstance{{0, -0.5_r, 0}, 1}, HalfSpace{{0, -1, 0}, 0}).touching);
+  Scene scene;  // and so they do in a world
+  scene.bodies = {test::ball({0.72_r, 0.96_r, 0}), test::ball({0, -0.5_r, 20}),
+                  test::half_space({0.6_r, 0.8_r, 0}, 0)};
+  World world(scene);
+  world.step();
+  ASSERT_EQ(world.contacts().size(), 1u);
+  EXPECT_EQ(world.contacts()[0].a, 1u);
+  EXPECT_NEAR(world.contacts()[0].distance, -0.4 - 1, 1e-6);
+}
+
+// The original's fabs, and literals like 0.5, compute in double in the middle of float code.
+TEST(Erratum, E28_arithmetic_on_reals_stays_in_reals) {
+  const Vec3 v{1, 2, 3};
+  static_assert(std::is_same_v<decltype(absolute(v.x)), Real>);
+  static_assert(std::is_same_v<decltype(square_root(v.x)), Real>);
+  static_assert(std::is_same_v<decltype(dot(v, v)), Real>);
+  static_assert(std::is_same_v<decltype(length(v)), Real>);
+  static_assert(std::is_same_v<decltype(determinant(Mat3{})), Real>);
+  static_assert(std::is_same_v<decltype(determinant(Mat4{})), Real>);
+  static_assert(std::is_same_v<decltype(add_scaled(Quat{}, v, 1).w), Real>);
+  EXPECT_EQ(absolute(-std::numeric_limits<Real>::denorm_min()),
+            std::numeric_limits<Real>::denorm_min());
+}
+
+// The original deletes five kinds of objects through bases that can't; and prints from its tests of
+// boxes, which is most of the time that they take.
+TEST(Erratum, E31_what_is_deleted_through_a_base_has_a_virtual_destructor) {
+  static_assert(std::has_virtual_destructor_v<SphereCollider>);
+  static_assert(std::has_virtual_destructor_v<Error>);
+  static_assert(!std::is_polymorphic_v<World> && !std::is_polymorphic_v<ParticleWorld>);
+  static_assert(!std::is_copy_constructible_v<World> &&
+                std::is_nothrow_move_constructible_v<World>);
+  static_assert(std::is_trivially_copyable_v<Contact>, "contacts own nothing");
+}
+
+TEST(Erratum, E47_the_engine_prints_nothing) {
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  World world(scenes::make("mixed", {.spheres = 30}));
+  std::uint64_t contacts = 0;
+  for (int n = 0; n < 120; ++n) contacts += world.step().contacts;
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_GT(contacts, 1000u);
+}
+
+// The thesis prints 0.01^dt, its source says 0.05^dt, Millington 0.5^dt.
+TEST(Erratum, E55_the_bias_decides_how_soon_a_body_at_rest_sleeps) {
+  for (const Real bias : {0.01_r, 0.05_r, 0.5_r}) {
+    Scene scene;
+    scene.dt = 0.001_r;
+    scene.sleep.bias = bias;
+    scene.bodies = {test::ball({})};
+    scene.bodies[0].can_sleep = true;
+    World world(scene);
+    int steps = 0;
+    for (; world.awake(world.bodies()[0]) && steps < 5000; ++steps) world.step();
+    // From 2 epsilon to epsilon: bias^t = 1/2.
+    EXPECT_NEAR(steps * 0.001, std::log(0.5) / std::log(static_cast<double>(bias)), 0.002) << bias;
+  }
+}
+
+}  // namespace
+}  // namespace jfpx
