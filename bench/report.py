@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Turns benchmark results into tables and plots, compares and checks them.
+"""Generates tables and plots from benchmark results; compares and checks results.
 
-    report.py store RAW.json DEST.json   keep what says something, drop names of people and folders
-    report.py tables [--out FILE]        docs/benchmarks.md from all machines in bench/results
-    report.py plots [--out FOLDER]       the figures of the thesis; needs matplotlib
-    report.py compare A.json B.json      what changed by more than a tenth; status 1 if it got slower
-    report.py check [DOCUMENT...]        every result is whole, every one that a document names exists
+    report.py store RAW.json DEST.json   store a result without names of users, hosts and folders
+    report.py tables [--out FILE]        generate docs/benchmarks.md from all machines in bench/results
+    report.py plots [--out FOLDER]       draw the figures of the thesis; requires matplotlib
+    report.py compare A.json B.json      list changes of more than 10 %; status 1 if any is slower
+    report.py check [DOCUMENT...]        check all results, and that each result cited in a document exists
 
-Exit status: 0 all well, 1 a check failed, 2 bad usage or input.
+Exit status: 0 success, 1 a check failed, 2 invalid usage or input.
 """
 import argparse
 import pathlib
@@ -33,7 +33,7 @@ def parse(arguments):
     comparison = commands.add_parser("compare")
     comparison.add_argument("before", type=pathlib.Path)
     comparison.add_argument("after", type=pathlib.Path)
-    comparison.add_argument("--limit", type=float, default=0.1, help="share that is a change [0.1]")
+    comparison.add_argument("--limit", type=float, default=0.1, help="smallest relative change to report [0.1]")
     checker = commands.add_parser("check")
     checker.add_argument("documents", type=pathlib.Path, nargs="*")
     checker.add_argument("--root", type=pathlib.Path, default=ROOT)
@@ -46,7 +46,7 @@ def run(options):
     elif options.command == "tables":
         options.out.write_text(tables.document(results.machines(options.results)))
     elif options.command == "plots":
-        from reporting import plots  # the only part that needs matplotlib
+        from reporting import plots  # the only part that requires matplotlib
         plots.draw(results.machines(options.results), options.out)
     elif options.command == "compare":
         text, slower = compare.compare(results.load(options.before), results.load(options.after),
@@ -55,7 +55,7 @@ def run(options):
         return 1 if slower else 0
     elif options.command == "check":
         problems = check.problems(options.root, options.documents)
-        print("\n".join(problems) if problems else "all results are whole")
+        print("\n".join(problems) if problems else "all results are valid")
         return 1 if problems else 0
     return 0
 

@@ -15,7 +15,7 @@ if(NOT JFPX_HAS_BULLET)
   return()
 endif()
 
-# What a target links as jfpx_bullet3rd, its _f64 sibling links as jfpx_bullet3rd_f64.
+# A target that links jfpx_bullet3rd has a _f64 counterpart that links jfpx_bullet3rd_f64.
 add_library(jfpx_bullet3rd INTERFACE)
 target_link_libraries(jfpx_bullet3rd INTERFACE PkgConfig::JFPX_BULLET_F32)
 add_library(jfpx_bullet3rd_f64 INTERFACE)

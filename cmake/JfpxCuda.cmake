@@ -1,5 +1,5 @@
-# Decides whether the CUDA backend is built: sets JFPX_HAS_CUDA. The runtime is linked statically,
-# so that a program with the backend starts on a machine without a driver and can say so.
+# Decides whether the CUDA backend is built, and sets JFPX_HAS_CUDA. The runtime is linked statically, so that
+# a program with the backend starts on a machine without a driver and can report it.
 set(JFPX_HAS_CUDA OFF)
 if(JFPX_CUDA STREQUAL "OFF")
   jfpx_summary(cuda off "JFPX_CUDA=OFF")
@@ -7,14 +7,14 @@ if(JFPX_CUDA STREQUAL "OFF")
 endif()
 
 if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
-  # Machine code for Hopper, and code that the driver compiles for anything from Turing on. In another
-  # project for our own targets only.
+  # Machine code for Hopper, and PTX that the driver compiles for Turing and newer GPUs. As a subproject, only
+  # for the targets of jfpx.
   set(CMAKE_CUDA_ARCHITECTURES "75-virtual;90")
   if(PROJECT_IS_TOP_LEVEL)
     set(CMAKE_CUDA_ARCHITECTURES "75-virtual;90" CACHE STRING "CUDA architectures")
   endif()
 endif()
-# Goes on without the backend, unless it was asked for. The next configuration looks again.
+# Continues without the backend, unless JFPX_CUDA=ON. The next configuration searches again.
 macro(jfpx_without_cuda why remedy)
   unset(CMAKE_CUDA_COMPILER CACHE)
   if(JFPX_CUDA STREQUAL "ON")
@@ -29,7 +29,7 @@ if(NOT CMAKE_CUDA_COMPILER)
   jfpx_without_cuda("no CUDA compiler was found that works: see CMakeFiles/CMakeError.log"
     "Put nvcc on PATH, set CUDACXX, give it a host compiler that it takes by CUDAHOSTCXX")
 endif()
-# Asked before CMake tries the compiler: an old one knows not even the architectures.
+# Checked before CMake tests the compiler, because an old one does not support the architectures.
 execute_process(COMMAND ${CMAKE_CUDA_COMPILER} --version OUTPUT_VARIABLE output ERROR_QUIET)
 if(NOT output MATCHES "release ([0-9.]+)")
   jfpx_without_cuda("${CMAKE_CUDA_COMPILER} is not nvcc" "Set CUDACXX to nvcc")
@@ -40,9 +40,9 @@ endif()
 enable_language(CUDA)
 find_package(CUDAToolkit REQUIRED)
 set(JFPX_HAS_CUDA ON)
-# CMake 3.25 does not know CUDA20: the flag is given by hand (CUDA_STANDARD would decay to 17).
+# CMake 3.25 does not support CUDA_STANDARD 20 (it would decay to 17), so the flag is set explicitly.
 # --fmad=false: nvcc must round each operation once, as the host compilers do.
-# --expt-relaxed-constexpr: device code may call std::numeric_limits and our constexpr functions.
+# --expt-relaxed-constexpr: device code may call std::numeric_limits and jfpx's constexpr functions.
 target_compile_options(jfpx_build_flags INTERFACE
   "$<$<COMPILE_LANGUAGE:CUDA>:-std=c++20;--fmad=false;--expt-relaxed-constexpr;--Wreorder;-Xcompiler=-Wall;-Xcompiler=-Wextra;-Xcompiler=-Wconversion;-Xcompiler=-Wshadow;-Xcompiler=-ffp-contract=off>"
   "$<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<BOOL:${JFPX_WERROR}>>:-Werror=all-warnings;-Xcompiler=-Werror>")

@@ -1,9 +1,9 @@
-# The promise of equal bits rests on each operation being rounded once. g++ and clang contract a*b+c to
-# FMA when the target has it; users inline our headers (and Bullet's), so the flag against that is part of
-# the usage requirements.
+# Bit-exact results require that each operation is rounded once. g++ and clang contract a*b+c to FMA if the
+# target supports it. Users inline the headers of jfpx and Bullet, so the flag that disables contraction is a
+# usage requirement.
 set(JFPX_EXACT_FLAGS $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-ffp-contract=off>)
-# It is not enough: where it vectorises alternating sums and differences of products, g++ 12 makes
-# vfmaddsub of them without asking for that flag. So none of our own files may use FMA, whatever -march
-# users choose; AVX-512 brings its own. Files with kernels that are chosen at run time add what they need.
+# The flag is not sufficient: g++ 12 vectorises alternating sums and differences of products to vfmaddsub
+# regardless of it. Therefore FMA, and AVX-512, which includes FMA, are disabled for all files of jfpx, for
+# any -march that users choose. Files with kernels that are selected at run time enable what they need.
 set(JFPX_OWN_EXACT_FLAGS
   $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-mno-fma;-mno-fma4;-mno-avx512f>)

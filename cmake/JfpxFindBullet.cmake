@@ -1,9 +1,10 @@
-# jfpx_find_bullet(FOUND REASON RELATION VERSION): Bullet in both precisions, as the targets
-# PkgConfig::JFPX_BULLET_F32 and PkgConfig::JFPX_BULLET_F64; of a version that is `>= VERSION` or
-# `= VERSION`. If not found, REASON says why. A macro, as it leaves the variables of pkg_check_modules.
+# jfpx_find_bullet(FOUND REASON RELATION VERSION): finds Bullet in both precisions, as the targets
+# PkgConfig::JFPX_BULLET_F32 and PkgConfig::JFPX_BULLET_F64, with a version that is `>= VERSION` or
+# `= VERSION`. If Bullet is not found, REASON is set to the reason. A macro, because the variables of
+# pkg_check_modules must be set in the caller's scope.
 #
-# Through pkg-config: BulletConfig.cmake of Debian's package has a relative include directory and no
-# targets, and cannot name the double-precision libraries.
+# Uses pkg-config, because BulletConfig.cmake of Debian's package has a relative include directory, no targets,
+# and no double-precision libraries.
 macro(jfpx_find_bullet found reason relation version)
   find_package(PkgConfig QUIET)
   if(PKG_CONFIG_FOUND)

@@ -1,6 +1,6 @@
-# What `cmake --install` puts where: libraries with their CMake and pkg-config files, headers, programs.
-# All of it can be moved afterwards: no file names the prefix. Components as Debian splits them:
-# runtime, runtime_bullet, dev, tools.
+# Installation of libraries with their CMake and pkg-config files, headers and programs. The installation is
+# relocatable: no file contains the prefix. Components follow Debian's conventions: runtime, runtime_bullet,
+# dev, tools.
 if(JFPX_INSTALL)
   foreach(folder IN ITEMS BINDIR LIBDIR INCLUDEDIR)
     if(IS_ABSOLUTE "${CMAKE_INSTALL_${folder}}")
@@ -12,8 +12,8 @@ endif()
 set(JFPX_CMAKE_FOLDER ${CMAKE_INSTALL_LIBDIR}/cmake/jfpx)
 file(RELATIVE_PATH JFPX_LIBRARIES_FROM_PROGRAMS /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR})
 
-# jfpx_export(NAME [AS NAME] COMPONENT ...): NAME and NAME_f64 as jfpx::NAME and jfpx::NAME_f64 of the
-# installed package, as files libNAME and libNAME-f64, and with pkg-config files called likewise.
+# jfpx_export(NAME [AS NAME] COMPONENT ...): installs NAME and NAME_f64 as the imported targets jfpx::NAME and
+# jfpx::NAME_f64, as files libNAME and libNAME-f64, and with the pkg-config files NAME and NAME-f64.
 function(jfpx_export name)
   cmake_parse_arguments(arg "" "AS;COMPONENT" "" ${ARGN})
   if(NOT arg_AS)
@@ -22,7 +22,7 @@ function(jfpx_export name)
   foreach(suffix IN ITEMS "" "_f64")
     set(target ${name}${suffix})
     string(REPLACE "_" "-" file ${target})
-    # While the version is 0.x, each minor version may change what callers are compiled against.
+    # Until version 1.0, each minor version may change the ABI.
     set_target_properties(${target} PROPERTIES
       EXPORT_NAME ${arg_AS}${suffix} OUTPUT_NAME ${file}
       VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
@@ -33,7 +33,7 @@ function(jfpx_export name)
       target_link_options(${target} PRIVATE LINKER:--version-script=${exports} LINKER:--no-undefined)
       set_property(TARGET ${target} APPEND PROPERTY LINK_DEPENDS ${exports})
     endif()
-    if(JFPX_INSTALL)
+    if(JFPX_INSTALL AND JFPX_HAS_PRECISION${suffix})
       install(TARGETS ${target} EXPORT ${name}-targets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${arg_COMPONENT} NAMELINK_COMPONENT dev
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
@@ -45,12 +45,18 @@ function(jfpx_export name)
   endif()
 endfunction()
 
-# jfpx_install_programs(TARGET...): commands that find our libraries from where they are.
+# jfpx_install_programs(TARGET...): installs programs, which find the libraries by a relative path.
 function(jfpx_install_programs)
-  if(JFPX_INSTALL)
-    set_target_properties(${ARGN} PROPERTIES INSTALL_RPATH "$ORIGIN/${JFPX_LIBRARIES_FROM_PROGRAMS}")
-    install(TARGETS ${ARGN} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
+  if(NOT JFPX_INSTALL)
+    return()
   endif()
+  set_target_properties(${ARGN} PROPERTIES INSTALL_RPATH "$ORIGIN/${JFPX_LIBRARIES_FROM_PROGRAMS}")
+  foreach(target IN LISTS ARGN)
+    get_target_property(left_out ${target} EXCLUDE_FROM_ALL)
+    if(NOT left_out)
+      install(TARGETS ${target} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
+    endif()
+  endforeach()
 endfunction()
 
 function(_jfpx_install_pkg_config file suffix)

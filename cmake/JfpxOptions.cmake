@@ -1,11 +1,13 @@
-# What a user can switch. Programs and tests are on only when jfpx is the top-level project, so
-# that add_subdirectory() and FetchContent get the libraries and nothing else.
+# Options of the build. Programs and tests are enabled by default only if jfpx is the top-level project, so
+# that add_subdirectory() and FetchContent build only the libraries.
 set(JFPX_CUDA AUTO CACHE STRING "CUDA backend: AUTO (if nvcc is found), ON (required) or OFF")
 set_property(CACHE JFPX_CUDA PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_BULLET AUTO CACHE STRING "Bullet adapter: AUTO (if Bullet is found), ON (required) or OFF")
 set_property(CACHE JFPX_BULLET PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_VIEWER AUTO CACHE STRING "Viewer: AUTO (if SDL2, epoxy, imgui and libpng are found), ON (required) or OFF")
 set_property(CACHE JFPX_VIEWER PROPERTY STRINGS AUTO ON OFF)
+set(JFPX_PRECISIONS both CACHE STRING "Precisions that are built, tested and installed: float, double or both")
+set_property(CACHE JFPX_PRECISIONS PROPERTY STRINGS float double both)
 option(JFPX_TOOL "Build the programs: jfpx and, where its libraries are found, jfpx-view" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_EXAMPLES "Build the examples" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
@@ -21,6 +23,18 @@ foreach(option IN ITEMS JFPX_CUDA JFPX_BULLET JFPX_VIEWER)
   endif()
 endforeach()
 
+if(NOT JFPX_PRECISIONS MATCHES "^(float|double|both)$")
+  message(FATAL_ERROR "JFPX_PRECISIONS is \"${JFPX_PRECISIONS}\"; it takes float, double or both.")
+endif()
+# Indexed by the suffix of targets.
+set(JFPX_HAS_PRECISION ON)
+set(JFPX_HAS_PRECISION_f64 ON)
+if(JFPX_PRECISIONS STREQUAL "float")
+  set(JFPX_HAS_PRECISION_f64 OFF)
+elseif(JFPX_PRECISIONS STREQUAL "double")
+  set(JFPX_HAS_PRECISION OFF)
+endif()
+
 if(JFPX_FUZZ AND NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   message(FATAL_ERROR "JFPX_FUZZ=ON, but the compiler is ${CMAKE_CXX_COMPILER_ID}, which has no "
     "libFuzzer. Use scripts/fuzz or cmake --preset fuzz; both take clang++.")
@@ -33,7 +47,7 @@ if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYP
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
 endif()
 
-# Lines of the closing summary: "name|state|reason".
+# Lines of the summary at the end of the configuration: "name|state|reason".
 set(JFPX_SUMMARY "" CACHE INTERNAL "")
 function(jfpx_summary name state reason)
   set(JFPX_SUMMARY "${JFPX_SUMMARY};${name}|${state}|${reason}" CACHE INTERNAL "")

@@ -1,11 +1,11 @@
-# Debian packages, by `cpack` in a build folder: as Debian splits libraries, and with dependencies that
-# dpkg-shlibdeps finds. For distributions configure with the preset package: shared, prefix /usr.
+# Debian packages, created by `cpack` in a build folder: split by Debian's conventions, with dependencies from
+# dpkg-shlibdeps. For distributions, configure with the preset package: shared libraries, prefix /usr.
 set(version ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME jfpx)
 set(CPACK_PACKAGE_VENDOR jfpx)
 set(CPACK_PACKAGE_CONTACT "The jfpx authors <maintainers@jfpx.invalid>")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "") # each package has its own
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "") # set for each package
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
@@ -13,7 +13,7 @@ set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
-# Our own libraries are not installed while packages are made.
+# The libraries of jfpx are not installed while packages are created.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/src ${PROJECT_BINARY_DIR}/src/bullet)
 
 set(CPACK_COMPONENTS_ALL dev)
@@ -42,17 +42,17 @@ macro(_jfpx_describe_package component package section depends title text)
       RENAME copyright COMPONENT ${component})
   endif()
 endmacro()
-set(text "Contacts among spheres and rigid-body steps that have the same bits on x86, on CUDA, at any number of threads and inside Bullet.")
+set(text "Contacts among spheres and rigid-body steps that have the same bits on CPU and CUDA, with any number of threads and inside Bullet.")
 _jfpx_describe_package(runtime libjfpx${version} libs "" "rigid-body collision with the same bits everywhere" "${text}")
 _jfpx_describe_package(runtime_bullet libjfpx-bullet${version} libs "libjfpx${version} (= ${PROJECT_VERSION})"
   "jfpx inside Bullet: dispatcher, solver and world" "${text}")
 set(for_dev ${libraries})
 if(JFPX_HAS_BULLET)
-  list(APPEND for_dev libbullet-dev pkg-config) # jfpx-config.cmake finds the one by the other
+  list(APPEND for_dev libbullet-dev pkg-config) # jfpx-config.cmake finds Bullet with pkg-config
 endif()
 _jfpx_describe_package(dev libjfpx-dev libdevel "${for_dev}" "rigid-body collision with the same bits everywhere: headers" "${text}")
 if(JFPX_HAS_VIEWER)
-  # SDL loads them when it opens a window or draws without one.
+  # SDL loads them at run time, with or without a window.
   set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS "libegl1, libgl1-mesa-dri")
 endif()
 _jfpx_describe_package(tools jfpx-tools science "${libraries}" "commands of jfpx: run, compare, replay, view scenes"

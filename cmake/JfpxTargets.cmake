@@ -1,4 +1,4 @@
-# Helpers that make each target twice: NAME computes in float, NAME_f64 in double.
+# Functions that create each target in both precisions: NAME in float, NAME_f64 in double.
 find_package(Threads REQUIRED)
 include(GNUInstallDirs)
 include(JfpxExact)
@@ -6,7 +6,7 @@ include(JfpxExact)
 configure_file(${PROJECT_SOURCE_DIR}/include/jfpx/config.hpp.in
                ${PROJECT_BINARY_DIR}/include/jfpx/config.hpp @ONLY)
 
-# Flags of our own files only; nothing here reaches a user's target.
+# Flags for the files of jfpx only; they are not usage requirements.
 add_library(jfpx_warnings INTERFACE)
 target_compile_options(jfpx_warnings INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wconversion;-Wshadow>
@@ -17,9 +17,9 @@ target_include_directories(jfpx_build_flags INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(jfpx_build_flags INTERFACE ${JFPX_OWN_EXACT_FLAGS})
 target_link_libraries(jfpx_build_flags INTERFACE jfpx_warnings)
 
-# jfpx_add_library(NAME [STATIC|OBJECT] SOURCES ... [PUBLIC ...] [PRIVATE ...]): NAME and NAME_f64. A
-# linked target that has a _f64 sibling is linked as that sibling into NAME_f64. Without a kind,
-# BUILD_SHARED_LIBS decides: so for what is installed, and nothing else.
+# jfpx_add_library(NAME [STATIC|OBJECT] SOURCES ... [PUBLIC ...] [PRIVATE ...]): adds NAME and NAME_f64. Where
+# a linked target has a _f64 counterpart, NAME_f64 links that. Without a type, BUILD_SHARED_LIBS selects it;
+# only libraries that are installed omit the type.
 function(jfpx_add_library name)
   cmake_parse_arguments(arg "STATIC;OBJECT" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   set(kind "")
@@ -44,7 +44,7 @@ function(jfpx_add_library name)
   endforeach()
 endfunction()
 
-# jfpx_add_executable(NAME SOURCES ... [LINK ...]): NAME and NAME_f64.
+# jfpx_add_executable(NAME SOURCES ... [LINK ...]): adds NAME and NAME_f64.
 function(jfpx_add_executable name)
   cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
   foreach(suffix IN ITEMS "" "_f64")
@@ -55,6 +55,9 @@ function(jfpx_add_executable name)
 endfunction()
 
 function(_jfpx_configure target suffix public private)
+  if(NOT JFPX_HAS_PRECISION${suffix}) # built only if another target requires it
+    set_target_properties(${target} PROPERTIES EXCLUDE_FROM_ALL ON)
+  endif()
   foreach(scope IN ITEMS PUBLIC PRIVATE)
     string(TOLOWER ${scope} list)
     foreach(dependency IN LISTS ${list})
@@ -68,15 +71,15 @@ function(_jfpx_configure target suffix public private)
   set_target_properties(${target} PROPERTIES
     CXX_EXTENSIONS OFF CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON
     CUDA_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
-  # Tests stay as they are: they are most of what there is to compile. Less optimised, intrinsics' own
-  # headers look uninitialised to g++.
+  # Tests are not instrumented, because they are most of the code to compile. At -O1, g++ warns about
+  # uninitialised values in the headers of intrinsics.
   set(sources ${PROJECT_SOURCE_DIR}/src)
   cmake_path(IS_PREFIX sources "${CMAKE_CURRENT_SOURCE_DIR}" ours)
   if(JFPX_COVERAGE AND NOT suffix AND ours)
     target_compile_options(${target} PRIVATE -O1 --coverage -fprofile-update=atomic -Wno-uninitialized)
     target_link_options(${target} PUBLIC --coverage)
   endif()
-  # Tools that read sources (clangd, clang-tidy) shall read each once.
+  # Each source appears once in compile_commands.json, for clangd and clang-tidy.
   if(suffix)
     set_target_properties(${target} PROPERTIES EXPORT_COMPILE_COMMANDS OFF)
   endif()

@@ -1,5 +1,5 @@
-# Finds what the viewer needs: sets JFPX_HAS_VIEWER and the target jfpx_viewer3rd. Through
-# pkg-config, because Debian's imgui and epoxy come without CMake files.
+# Finds the libraries of the viewer, and sets JFPX_HAS_VIEWER and the target jfpx_viewer3rd. Uses pkg-config,
+# because Debian's imgui and epoxy have no CMake files.
 set(JFPX_HAS_VIEWER OFF)
 if(JFPX_VIEWER STREQUAL "OFF")
   jfpx_summary(viewer off "JFPX_VIEWER=OFF")

@@ -1,5 +1,8 @@
 # The examples run, and say what they should.
 foreach(suffix IN ITEMS "" "_f64")
+  if(NOT JFPX_HAS_PRECISION${suffix})
+    continue()
+  endif()
   add_test(NAME collider${suffix} COMMAND collider${suffix})
   set_tests_properties(collider${suffix} PROPERTIES
     PASS_REGULAR_EXPRESSION "spheres 0 and 1 overlap by 0.5\n$")

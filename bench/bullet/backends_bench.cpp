@@ -1,9 +1,9 @@
-/// Whole steps of a settled scene: a stock Bullet world against one of jfpx, on one thread, on all
-/// of them, with a GPU, or as it likes.
+/// Whole steps of a settled scene: a stock Bullet world against one of jfpx on one thread, on all
+/// threads, with a GPU, or with automatic choice.
 ///
-/// Both worlds begin with the same bodies, which a world of jfpx has moved until they have settled
-/// (or which have been read from --settled=FOLDER), step in turn, and end with the same state hash.
-/// No third world is there to take their caches. Wall clock; a ratio is the median of stock / jfpx.
+/// Both worlds start with the same bodies, which a world of jfpx has moved until they have settled
+/// (or which are read from --settled=FOLDER), step alternately, and end with the same state hash.
+/// No third world competes for the caches. Wall clock; a ratio is the median of stock / jfpx.
 #include "bench/bullet/step_parts.hpp"
 #include "src/scenes/scenes.hpp"
 
@@ -16,7 +16,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-std::string g_folder;  ///< settled states are kept here; empty: nowhere
+std::string g_folder;  ///< folder of settled states; empty: they are not stored
 bool g_only_settle = false;
 
 struct Case {
@@ -35,7 +35,7 @@ struct Rival {
   Backend backend;
   unsigned threads;  ///< at most; 0: one per core
 };
-/// Where a GPU is, the dispatcher may choose it too; the solver of "cuda" has to.
+/// If there is a GPU, the dispatcher may choose it, too; the solver of "cuda" must use it.
 constexpr Rival kRivals[] = {{"x86_1", Backend::cpu, 1}, {"auto_1", Backend::automatic, 1},
                              {"x86", Backend::cpu, 0},   {"cuda_8", Backend::cuda, 8},
                              {"cuda", Backend::cuda, 0}, {"auto", Backend::automatic, 0}};
@@ -93,7 +93,7 @@ void compare(benchmark::State& state, const Case& c, const Rival& rival) {
                            .solver = SolverKind::stock,
                            .world = WorldKind::stock});
   SceneWorld ours(scene, options_of(rival));
-  const int warm_up = 12;  // buffers grow
+  const int warm_up = 12;  // until the buffers have grown
   for (int i = 0; i < warm_up; ++i) {
     stock.step();
     ours.step();
@@ -126,7 +126,7 @@ void register_all() {
 }  // namespace JFPX_ABI
 }  // namespace jfpx
 
-/// --settled=FOLDER: keep settled states there; --only-settle: do no more than that.
+/// --settled=FOLDER stores settled states there; --only-settle exits after storing them.
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   for (int i = 1; i < argc; ++i) {

@@ -1,9 +1,9 @@
 /// dispatchAllCollisionPairs and whole steps: Bullet's dispatcher against ours, on the same state.
 ///
-/// Each benchmark owns two worlds that move identically. A sample steps both, one after the other
-/// and in alternating order, and takes the wall clock of the dispatch inside the step ("cold": the
-/// other stages have emptied the caches), then repeats the dispatch alone ("hot"). Counters are
-/// medians; a ratio is stock / jfpx, so larger than 1 means that jfpx is faster.
+/// Each benchmark owns two worlds that move identically. A sample steps both one after the other in
+/// alternating order and measures the wall clock of the dispatch in the step ("cold", because the
+/// other stages have evicted its data from the caches), then repeats the dispatch alone ("hot").
+/// Counters are medians; a ratio is stock / jfpx, so jfpx is faster if it is larger than 1.
 #include <jfpx/bullet/scene_world.hpp>
 
 #include "bench/bullet/series.hpp"
@@ -76,9 +76,8 @@ void compare_dispatch(benchmark::State& state, const char* name, std::uint32_t s
   state.counters["from_device"] = per_batch(stats.from_device);
 }
 
-/// A gas of random spheres at rest in the same place, three contacts a sphere: what the collider
-/// benchmark runs on, here through Bullet's dispatch, and beside it the collider alone, which finds
-/// the pairs too.
+/// A gas of random spheres at rest with three contacts per sphere, as in the collider benchmark:
+/// Bullet's dispatch, and the collider alone, which also finds the pairs.
 void random_gas(benchmark::State& state, std::uint32_t spheres) {
   const std::vector<SphereInstance> instances = scenes::random_spheres(spheres, 3, 1);
   const std::unique_ptr<SphereCollider> collider = make_sphere_collider();

@@ -1,5 +1,5 @@
-/// The native world against stock Bullet with its defaults: the same scene, step by step in turns,
-/// one thread each.
+/// Compares the native world with stock Bullet and its defaults: the same scene, with alternating
+/// steps of one thread each.
 #include <jfpx/bullet/scene_world.hpp>
 #include <jfpx/world.hpp>
 
@@ -14,7 +14,7 @@
 namespace jfpx {
 namespace {
 
-/// Of this thread's processor time: on a busy machine the wall clock tells about the others.
+/// CPU time of this thread, because on a busy machine the wall clock includes other processes.
 double now_ms() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -27,8 +27,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Steps from `from_step` on. Ratios are Bullet's time to ours, above 1 ours wins: of the sums, and
-/// the median of the steps'.
+/// Times steps from `from_step` on. A ratio is stock / native, so a value above 1 means that the
+/// native world is faster: `ratio` of the total times, `median_ratio` the median over the steps.
 void step_both(benchmark::State& state) {
   const auto half = static_cast<std::uint32_t>(state.range(0) / 2);
   const Scene scene = scenes::make("mixed", {.spheres = half, .boxes = half});

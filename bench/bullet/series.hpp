@@ -1,4 +1,4 @@
-/// What benchmarks of two Bullet worlds share: medians, turns, a main function.
+/// Shared code of benchmarks that compare two Bullet worlds: medians, alternation, main function.
 #pragma once
 
 #include <benchmark/benchmark.h>
@@ -18,8 +18,8 @@ inline double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Times of Bullet and of jfpx. Ratios are medians sample by sample: neighbours in time share the
-/// noise of the machine.
+/// Times of Bullet and of jfpx. A ratio is the median over pairs of samples, because samples that
+/// are adjacent in time have the same noise.
 struct Series {
   std::vector<double> stock, jfpx, ratio;
   void add(double stock_ms, double jfpx_ms) {
@@ -34,7 +34,7 @@ struct Series {
   }
 };
 
-/// Does two things in alternating order, so that neither is always the one after the other.
+/// Executes two functions in alternating order, so that neither always runs second.
 template <class First, class Second>
 void alternate(bool swap, First first, Second second) {
   if (swap) {

@@ -1,10 +1,10 @@
-/// Whole steps and their parts: a stock Bullet world against one with jfpx's dispatcher, solver and
-/// world.
+/// Compares whole steps and their parts between a stock Bullet world and a world with jfpx's
+/// dispatcher, solver and world.
 ///
-/// Each benchmark owns two worlds that move identically and steps both in alternating order. Parts
+/// Each benchmark owns two worlds with identical motion and steps both in alternating order. Parts
 /// are Bullet's profile zones. With one thread the clock is the CPU time of that thread, which
-/// other work on the machine disturbs little; with more it is the wall clock. Counters are medians;
-/// a ratio is the median of stock / jfpx, so larger than 1 means that jfpx is faster.
+/// other load affects little; with more threads it is the wall clock. Counters are medians. A ratio
+/// is the median of stock / jfpx, so a value above 1 means that jfpx is faster.
 #include "bench/bullet/step_parts.hpp"
 #include "src/scenes/scenes.hpp"
 

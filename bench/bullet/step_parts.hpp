@@ -1,4 +1,4 @@
-/// Times the parts of a Bullet step, by Bullet's profile zones.
+/// Times of the parts of a Bullet step, measured by Bullet's profile zones.
 #pragma once
 
 #include <jfpx/bullet/scene_world.hpp>
@@ -28,7 +28,7 @@ inline double now_ms() {
   return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_nsec) * 1e-6;
 }
 
-/// Zones that are timed, and the part that each is counted for, or taken away from.
+/// Profile zones, and the part to which each is added or from which it is subtracted.
 enum Part : std::size_t {
   kMotion,
   kBoxes,
@@ -37,7 +37,7 @@ enum Part : std::size_t {
   kSetUp,
   kSweeps,
   kFinish,
-  kBodies,  // this and the next are shares of kSetUp
+  kBodies,  // this and the next are included in kSetUp
   kScan,
   kParts
 };
@@ -89,15 +89,15 @@ struct Samples {
     total.push_back(now_ms() - start);
     for (std::size_t i = 0; i < kParts; ++i) parts[i].push_back(g_parts[i]);
   }
-  void report(benchmark::State& state, const std::string& who) const {
-    state.counters["step_" + who + "_ms"] = median(total);
+  void report(benchmark::State& state, const std::string& name) const {
+    state.counters["step_" + name + "_ms"] = median(total);
     for (std::size_t i = 0; i < kParts; ++i) {
-      state.counters[std::string(kPartNames[i]) + "_" + who + "_ms"] = median(parts[i]);
+      state.counters[std::string(kPartNames[i]) + "_" + name + "_ms"] = median(parts[i]);
     }
   }
 };
 
-/// Zones are timed as long as it lives.
+/// Measures the zones during its lifetime.
 class TimedZones {
  public:
   TimedZones() {
@@ -112,8 +112,8 @@ class TimedZones {
   TimedZones& operator=(const TimedZones&) = delete;
 };
 
-/// Steps both worlds, in alternating order, once for each iteration of the benchmark, and reports
-/// medians of their parts and of the ratio of whole steps.
+/// Steps both worlds in alternating order, once per iteration of the benchmark, and reports medians
+/// of their parts and of the ratio of whole steps.
 inline void step_in_turn(benchmark::State& state, SceneWorld& stock, SceneWorld& ours) {
   Samples stock_samples, our_samples;
   {

@@ -1,4 +1,4 @@
-"""What documents claim rests on files that exist, parse, and say where they come from."""
+"""Checks that the result files which documents cite exist, are valid and state their origin."""
 import re
 
 from . import results
@@ -19,7 +19,7 @@ def problems(root, documents=()):
             continue
         context = dict(data["context"])
         if path.parent == folder and path.name != results.THESIS:
-            # Beside these stands a page of the same name that says what the context does not.
+            # A page in the same folder documents the origin of these files.
             pages = "".join(p.read_text() for p in folder.glob("*.md") if path.name in p.read_text())
             if not pages:
                 found.append(f"{name}: no page in bench/results names it")

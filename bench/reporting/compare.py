@@ -1,4 +1,4 @@
-"""Two result files side by side."""
+"""Comparison of two result files."""
 
 
 def time_of(benchmark):
@@ -10,12 +10,12 @@ def by_name(data):
 
 
 def compare(before, after, limit):
-    """Lines for a reader, and whether anything got slower by more than `limit`."""
+    """A report, and whether any benchmark is slower by more than `limit`."""
     a, b = by_name(before), by_name(after)
     lines, slower = [], False
     for name in a:
         if name not in b:
-            lines.append(f"gone     {name}")
+            lines.append(f"removed  {name}")
             continue
         if a[name].get("time_unit") != b[name].get("time_unit"):
             lines.append(f"units    {name}: {a[name].get('time_unit')}, {b[name].get('time_unit')}")
@@ -23,13 +23,13 @@ def compare(before, after, limit):
         ratio = time_of(b[name]) / time_of(a[name])
         if ratio > 1 + limit:
             slower = True
-            lines.append(f"slower   {name}: {ratio:.2f} times as long")
+            lines.append(f"slower   {name}: {ratio:.2f} times the time")
         elif ratio < 1 / (1 + limit):
-            lines.append(f"faster   {name}: {ratio:.2f} times as long")
+            lines.append(f"faster   {name}: {ratio:.2f} times the time")
     lines += [f"new      {name}" for name in b if name not in a]
     if before["context"].get("machine") != after["context"].get("machine"):
-        lines.insert(0, "These are two machines: "
+        lines.insert(0, "The results are of two machines: "
                      f"{before['context'].get('machine')} and {after['context'].get('machine')}")
     if not lines:
-        lines.append(f"no change over {limit:.0%}")
+        lines.append(f"no change above {limit:.0%}")
     return "\n".join(lines), slower

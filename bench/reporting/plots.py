@@ -1,5 +1,4 @@
-"""The figures of thesis 5, with today's curves beside the published ones. SVG, the same bytes for
-the same data."""
+"""The figures of chapter 5 of the thesis, with present and published curves, as reproducible SVG files."""
 import pathlib
 
 import matplotlib
@@ -21,7 +20,7 @@ def curves(machine):
 
 
 def drawn_curves(machine):
-    """The same while every frame is drawn."""
+    """{backend: [(n, ms)]} of the rendering bench, with rendering."""
     found = {}
     for (mode, backend, n), b in parts(machine.get("rendering")):
         if mode == "on":
@@ -31,7 +30,7 @@ def drawn_curves(machine):
 
 def figure(title, limit=None):
     fig, axes = plt.subplots(figsize=(7, 4.5))
-    axes.set(xscale="log", yscale="log", xlabel="spheres", ylabel="ms a frame", title=title)
+    axes.set(xscale="log", yscale="log", xlabel="spheres", ylabel="ms per frame", title=title)
     axes.grid(True, which="both", linewidth=0.3)
     if limit:
         axes.set_xlim(1.7, limit)
@@ -39,14 +38,14 @@ def figure(title, limit=None):
 
 
 def draw_published(axes, rows, label):
-    for backend, style in (("x86", "C7o--"), ("cuda", "C8s--")):
+    for backend, style in (("cpu", "C7o--"), ("cuda", "C8s--")):
         axes.plot([r["spheres"] for r in rows], [r[f"{backend}_mean_ms"] for r in rows], style,
                   markersize=3, label=f"2010 {label}{backend}")
     for r in rows:
-        if "x86_note" in r:
-            axes.annotate("file of N = 16", (r["spheres"], r["x86_mean_ms"]), textcoords="offset points",
+        if "cpu_note" in r:
+            axes.annotate("file of N = 16", (r["spheres"], r["cpu_mean_ms"]), textcoords="offset points",
                           xytext=(4, -12), fontsize=7)
-            axes.plot([r["spheres"]], [r["x86_mean_ms"]], "rx")
+            axes.plot([r["spheres"]], [r["cpu_mean_ms"]], "rx")
 
 
 def save(fig, axes, path):
@@ -71,7 +70,7 @@ def draw(found, folder):
                 axes.plot(*zip(*shown), marker=".", label=f"{machine.name} {backend}")
             if "cuda" in mine:
                 cuda = dict(mine["cuda"])
-                n = crossover([(n, ms, cuda[n]) for n, ms in mine["x86"] if n in cuda])
+                n = crossover([(n, ms, cuda[n]) for n, ms in mine["cpu"] if n in cuda])
                 if n and n <= limit:
                     axes.axvline(n, color="C3", linewidth=0.6)
         save(fig, axes, folder / f"{name}.svg")

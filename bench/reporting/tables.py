@@ -1,4 +1,4 @@
-"""docs/benchmarks.md: everything in it is computed from the files in bench/results."""
+"""Generates docs/benchmarks.md from the files in bench/results."""
 import math
 
 BULLET_STAGES = ("integrate", "broadphase", "dispatch", "islands", "solve", "step")
@@ -6,7 +6,7 @@ NATIVE_STAGES = ("integrate", "detect", "resolve")
 
 
 def number(value):
-    """Three digits."""
+    """The value with three significant digits."""
     if value == 0:
         return "0"
     digits = max(0, 2 - math.floor(math.log10(abs(value))))
@@ -19,13 +19,13 @@ def table(head, rows):
 
 
 def parts(benchmarks):
-    """(parts of the name, values), without the name of the bench."""
+    """Pairs of the parts of a benchmark's name, without the name of the program, and its values."""
     return [(name.split("/")[1:], b) for name, b in benchmarks.items()]
 
 
 def crossover(rows):
-    """Where the ratio of two curves passes 1: (n, first, second) rows, straight in both logarithms.
-    None if the first is always the faster or always the slower one."""
+    """The n at which the ratio of two curves reaches 1, by log-log interpolation of (n, first, second)
+    rows. None if the first curve is always faster or always slower."""
     rows = sorted(rows)
     for (n0, a0, b0), (n1, a1, b1) in zip(rows, rows[1:]):
         low, high = math.log(a0 / b0), math.log(a1 / b1)
@@ -35,7 +35,7 @@ def crossover(rows):
 
 
 def exponent(points):
-    """Slope of a straight line through (log n, log time): least squares."""
+    """Slope of the least-squares line through (log n, log time)."""
     logs = [(math.log(n), math.log(t)) for n, t in points if n > 0 and t > 0]
     if len(logs) < 2:
         return None
@@ -47,8 +47,8 @@ def exponent(points):
 
 def origin(machine, bench, precision="float"):
     context = machine.context(bench, precision)
-    busy = f", load {context['load_avg']:.1f}" if "load_avg" in context else ""
-    return (f"`{context['command']}`, {context['date'][:10]}{busy}; data: "
+    load = f", load {context['load_avg']:.1f}" if "load_avg" in context else ""
+    return (f"`{context['command']}`, {context['date'][:10]}{load}; data: "
             f"[{bench}_{precision}.json](../bench/results/{machine.name}/{bench}_{precision}.json)\n")
 
 
@@ -69,14 +69,14 @@ def automatic(machine):
     head = ["scene", "N", "contacts", *[k.replace("_", " ") for k in columns(benchmarks)], "best fixed",
             "automatic chose last", "automatic / best"]
     return ("### The automatic choice\n\n" + origin(machine, "automatic") +
-            f"\nColumns of fixed choices are times divided by the best of the row. `automatic`: "
+            f"\nThe columns of fixed choices are times divided by the best time of the row. `automatic`: "
             f"{verdict(benchmarks)}.{in_double}\n\n" + table(head, rows) + "\n")
 
 
 def verdict(benchmarks):
     ratios = [b["ratio"] for b in benchmarks.values()]
     over = sum(ratio > 1.1 for ratio in ratios)
-    return f"worst ratio {max(ratios):.2f}, {over} of {len(ratios)} rows are over 1.10"
+    return f"worst ratio {max(ratios):.2f}; {over} of {len(ratios)} rows exceed 1.10"
 
 
 def columns(benchmarks):
@@ -96,32 +96,32 @@ def thesis(machine, published):
     old = {row["spheres"]: row for row in published["rendering_off"]}
     rows = []
     for n in sorted(ours):
-        x86, cuda = ours[n].get("x86"), ours[n].get("cuda")
+        cpu, cuda = ours[n].get("cpu"), ours[n].get("cuda")
         o = old.get(n)
-        mark = " (1)" if o and "x86_note" in o else ""
-        rows.append([n, int(x86["iterations"]), number(x86["real_time"]), number(x86["median_ms"]),
-                     number(x86["first_ms"]), number(x86["contacts"]),
+        mark = " (1)" if o and "cpu_note" in o else ""
+        rows.append([n, int(cpu["iterations"]), number(cpu["real_time"]), number(cpu["median_ms"]),
+                     number(cpu["first_ms"]), number(cpu["contacts"]),
                      *([number(cuda[k]) for k in ("real_time", "median_ms", "first_ms")] +
-                       [number(x86["median_ms"] / cuda["median_ms"])] if cuda else [""] * 4),
-                     *([number(o["x86_mean_ms"]) + mark, number(o["cuda_mean_ms"]),
-                        number(o["x86_mean_ms"] / o["cuda_mean_ms"]) + mark] if o else [""] * 3)])
-    text = ("### The thesis again: detection in `boxes-and-balls` (figures 5.1 and 5.2)\n\n" +
-            origin(machine, "thesis") + "\nMilliseconds of contact generation a frame, as the thesis timed "
-            "it, without rendering: mean over the frames, median, and the first frame apart. Ratios are of "
-            "medians. \"2010\" are the published means.\n\n" +
-            table(["N", "frames", "x86 mean", "median", "first", "contacts", "cuda mean", "median", "first",
-                   "x86 / cuda", "2010 x86", "2010 cuda", "2010 x86 / cuda"], rows) +
-            "\n(1) The published x86 file for 32 spheres is that of 16, byte for byte.\n\n")
-    with_cuda = [(n, b["x86"]["median_ms"], b["cuda"]["median_ms"]) for n, b in ours.items() if "cuda" in b]
+                       [number(cpu["median_ms"] / cuda["median_ms"])] if cuda else [""] * 4),
+                     *([number(o["cpu_mean_ms"]) + mark, number(o["cuda_mean_ms"]),
+                        number(o["cpu_mean_ms"] / o["cuda_mean_ms"]) + mark] if o else [""] * 3)])
+    text = ("### Detection in `boxes-and-balls` (figures 5.1 and 5.2 of the thesis)\n\n" +
+            origin(machine, "thesis") + "\nTime of contact generation per frame [ms], measured as in the "
+            "thesis, without rendering: mean over the frames, median, and the first frame separately. Ratios "
+            "are ratios of medians. \"2010\" marks the published means.\n\n" +
+            table(["N", "frames", "cpu mean", "median", "first", "contacts", "cuda mean", "median", "first",
+                   "cpu / cuda", "2010 cpu", "2010 cuda", "2010 cpu / cuda"], rows) +
+            "\n(1) The published CPU file for 32 spheres is that of 16, byte for byte.\n\n")
+    with_cuda = [(n, b["cpu"]["median_ms"], b["cuda"]["median_ms"]) for n, b in ours.items() if "cuda" in b]
     here = crossover(with_cuda) if with_cuda else None
-    there = crossover([(n, r["x86_mean_ms"], r["cuda_mean_ms"]) for n, r in old.items()
-                       if "x86_note" not in r])
-    text += f"CUDA pays from N = {there:.0f} in the published data (without the doubtful point)"
+    there = crossover([(n, r["cpu_mean_ms"], r["cuda_mean_ms"]) for n, r in old.items()
+                       if "cpu_note" not in r])
+    text += f"CUDA is faster from N = {there:.0f} in the published data (without the doubtful point)"
     text += (f", from N = {here:.0f} here.\n\n" if here else ".\n\n")
     last = max(n for n in old if n in ours)
-    return text + (f"At N = {last} this x86 code takes 1 / "
-                   f"{number(old[last]['x86_mean_ms'] / ours[last]['x86']['median_ms'])} of the published "
-                   "time: another processor and an optimised build are in that figure, too.\n\n")
+    return text + (f"At N = {last} the CPU backend takes 1 / "
+                   f"{number(old[last]['cpu_mean_ms'] / ours[last]['cpu']['median_ms'])} of the published "
+                   "time, on a different processor and in an optimised build.\n\n")
 
 
 def stages(machine):
@@ -140,15 +140,15 @@ def stages(machine):
         slopes = [exponent(series[scene, backend, stage]) for stage in NATIVE_STAGES]
         fits.append([scene, backend, *[f"{x:.2f}" if x is not None else "" for x in slopes]])
     return ("### Stages of a native step\n\n" + origin(machine, "stages") +
-            "\nMedians, ms. Allocations: of the median step.\n\n" +
-            table(["scene", "backend", "N", "contacts", *NATIVE_STAGES, "step", "detect ns a sphere",
+            "\nMedians in ms. Allocations are those of the median step.\n\n" +
+            table(["scene", "backend", "N", "contacts", *NATIVE_STAGES, "step", "detect ns per sphere",
                    "allocations", "computed last by"], rows) +
-            "\nTime grows as N to the power of:\n\n" + table(["scene", "backend", *NATIVE_STAGES], fits) + "\n" +
+            "\nExponent p of time ~ N^p:\n\n" + table(["scene", "backend", *NATIVE_STAGES], fits) + "\n" +
             floors(machine, benchmarks))
 
 
 def floors(machine, benchmarks):
-    """What the stages must read, write and compute at least, and how near they come to it."""
+    """The minimum of memory traffic and operations of each stage, and the ratio of the time to it."""
     context = machine.context("stages")
     if "copied_gb_a_second" not in context:
         return ""
@@ -164,12 +164,11 @@ def floors(machine, benchmarks):
             row += [number(size / 1e3), number(operations / 1e3), number(b[f"{stage}_ms"] / floor)]
         rows.append(row)
     head = [f"{stage} {what}" for stage in NATIVE_STAGES for what in ("kB", "kop", "x floor")]
-    return ("What a stage must read and write once (kB) and compute (kop, thousands of operations), and how many "
-            "times as long as that it takes, at the rates that one core showed in the same run: "
-            f"{number(gb)} GB/s in copies, {number(giga)} billion operations/s in vectors of 128 bits. Operations "
-            "are counted in `bench/world/floor.hpp`: of the formula for each contact, of an update for each body, "
-            "of each iteration that the resolver made. Below 1 a stage works in caches, in wider vectors, or on a "
-            "GPU.\n\n" +
+    return ("Minimum of memory traffic (kB) and operations (kop, thousands) of each stage, and the ratio of its time "
+            "to the larger of both at the rates of one core measured in the same run: "
+            f"{number(gb)} GB/s of copies, {number(giga)} billion operations/s in 128-bit vectors. The operations "
+            "are counted in `bench/world/floor.hpp`: per contact, per update of a body, and per iteration of the "
+            "resolver. A ratio below 1 means that a stage works in caches, in wider vectors, or on a GPU.\n\n" +
             table(["scene", "backend", "N", *head], rows) + "\n")
 
 
@@ -182,7 +181,7 @@ def rendering(machine, published):
         return ""
     off, on = ({row["spheres"]: row for row in published[f"rendering_{mode}"]} for mode in ("off", "on"))
     rows = []
-    for (backend, n), modes in sorted(ours.items(), key=lambda item: (item[0][0] != "x86", item[0][1])):
+    for (backend, n), modes in sorted(ours.items(), key=lambda item: (item[0][0] != "cpu", item[0][1])):
         mark = " (1)" if f"{backend}_note" in off[n] else ""
         before, after = off[n][f"{backend}_mean_ms"], on[n][f"{backend}_mean_ms"]
         rows.append([backend, n, *[number(modes[m][k]) for m in ("off", "on")
@@ -192,14 +191,14 @@ def rendering(machine, published):
                      f"{after / before:.2f}{mark}"])
     frames = int(next(iter(ours.values()))["on"]["iterations"])
     return ("### With rendering (figure 5.3)\n\n" + origin(machine, "rendering") +
-            f"\nMilliseconds of contact generation a frame, over {frames} frames, while none is drawn and while "
-            f"each is: {machine.context('rendering')['pictures']}, without a screen. \"Picture\": drawing one, "
-            "median. The ratio is of medians; \"2010\" are the published means.\n\n" +
+            f"\nTime of contact generation per frame [ms] over {frames} frames, without and with rendering of each "
+            f"frame: {machine.context('rendering')['pictures']}, without a screen. \"picture\" is the median time "
+            "of drawing. Ratios are ratios of medians; \"2010\" marks the published means.\n\n" +
             table(["backend", "N", "off mean", "median", "first", "on mean", "median", "first", "on / off", "picture",
                    "2010 off", "2010 on", "2010 on / off"], rows) +
-            "\n(1) The published x86 file for 32 spheres without rendering is that of 16, byte for byte.\n\n" +
-            "Drawing comes between two detections: it fills the processor's caches, and a GPU that has drawn takes a "
-            "while before it computes.\n\n")
+            "\n(1) The published CPU file for 32 spheres without rendering is that of 16, byte for byte.\n\n" +
+            "Drawing between two detections evicts data from the caches of the processor, and a GPU switches from "
+            "drawing to computing with a delay.\n\n")
 
 
 def bullet(machine):
@@ -214,11 +213,11 @@ def bullet(machine):
         ratios.append([scene, n, *[f"{b[f'{s}_ratio']:.2f}" for s in BULLET_STAGES],
                        "yes" if gain > 1.03 else "no" if gain > 0.97 else "slower"])
     return ("### Bullet's step in its parts\n\n" + origin(machine, "bullet_step") +
-            "\nStock Bullet: ms a step, and where they go.\n\n" +
+            "\nStock Bullet: ms per step, and the share of each stage.\n\n" +
             table(["scene", "N", "step", *BULLET_STAGES[:-1]], shares) +
-            "\nStock / jfpx, medians of the ratios step by step: above 1 jfpx is faster, on one thread. All parts are "
-            "jfpx's but Bullet's tree of boxes itself, in which the broadphase of jfpx finds pairs side by side. "
-            "Both worlds end with equal hashes.\n\n" +
+            "\nStock / jfpx, medians of the ratios of single steps on one thread: above 1, jfpx is faster. All parts "
+            "are jfpx's except Bullet's AABB tree, in which the broad phase of jfpx searches for several pairs at a "
+            "time. Both worlds end with equal hashes.\n\n" +
             table(["scene", "N", *BULLET_STAGES, "gain"], ratios) + "\n")
 
 
@@ -241,17 +240,17 @@ def precisions(machine):
     ratios = sorted(float(r[-1]) for r in rows if r[1] == "detect")
     return ("### Double against float\n\n" + origin(machine, "stages", "double") +
             f"\nTime in double divided by time in float. The median for detection is "
-            f"{ratios[len(ratios) // 2]:.2f}: vectors hold half as many spheres, and twice the bytes move. The "
-            "thesis computes in float only and leaves the comparison open (6.2).\n\n" +
+            f"{ratios[len(ratios) // 2]:.2f}: vectors contain half as many spheres, and the memory traffic doubles. "
+            "The thesis uses float only and leaves the comparison open (6.2).\n\n" +
             table(["scene", "stage", "N", "double / float"], rows) + "\n")
 
 
 def document(found):
     machines, published = found
     text = ("# Benchmarks\n\nGenerated by `bench/report.py tables` from the files in `bench/results`; do not edit. "
-            "`scripts/bench` measures this machine and writes this page again.\n\nProcessors are shared with other "
-            "work while they measure: compare figures within a table, not across machines or days. Times of a GPU "
-            "are absolute.\n\n")
+            "`scripts/bench` measures this machine and regenerates this page.\n\nThe processors were shared with other "
+            "work during the measurements: compare numbers within a table, not across machines or days. Times of a "
+            "GPU are absolute.\n\n")
     for machine in machines:
         first = next(iter(machine.files.values()))["context"]
         text += f"## {first['machine']}\n\n"

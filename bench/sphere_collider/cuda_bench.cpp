@@ -1,4 +1,5 @@
-/// Times the CUDA sphere search: on the device (graph replays between events) and host to host.
+/// Benchmarks of the CUDA sphere search: on the device (graph replays between events) and from host
+/// memory to host memory.
 #include <jfpx/cuda/sphere_collider.hpp>
 
 #include "bench/sphere_collider/inputs.hpp"
@@ -19,10 +20,10 @@ namespace {
 
 using namespace cuda;
 
-/// Pinned copy of an input, as a program that cares would hold it.
+/// Copy of an input in pinned memory, which transfers fastest.
 struct HostSpheres {
   explicit HostSpheres(const std::vector<SphereInstance>& spheres) : count(spheres.size()) {
-    memory.grow(count + 1, "spheres on the host");
+    memory.reserve(count + 1, "spheres on the host");
     std::memcpy(memory.data(), spheres.data(), count * sizeof(SphereInstance));
   }
   std::span<const SphereInstance> span() const { return {memory.data(), count}; }
@@ -30,20 +31,20 @@ struct HostSpheres {
   std::size_t count;
 };
 
-/// A search whose result fits, captured in a graph.
+/// Search with sufficient capacity, captured in a CUDA graph.
 class DeviceSearch {
  public:
   DeviceSearch(const HostSpheres& host, SphereAlgorithm algorithm, bool pairs_only)
       : stream_(0), pool_(0), collider_(stream_.get(), 0, algorithm) {
     const std::size_t n = host.count;
-    spheres_.grow(pool_, stream_.get(), n, "spheres");
-    count_.grow(1, "count");
+    spheres_.reserve(pool_, stream_.get(), n, "spheres");
+    count_.reserve(1, "count");
     JFPX_CUDA_TRY(cudaMemcpyAsync(spheres_.data(), host.memory.data(), n * sizeof(SphereInstance),
                                   cudaMemcpyHostToDevice, stream_.get()));
     std::size_t room = 4 * n + 64;
     do {
       collider_.reserve(n, room);
-      contacts_.grow(pool_, stream_.get(), room, "contacts");
+      contacts_.reserve(pool_, stream_.get(), room, "contacts");
       enqueue(n, pairs_only);
       JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get()));
       room = count_.data()->contacts;
@@ -64,7 +65,7 @@ class DeviceSearch {
   DeviceSearch(const DeviceSearch&) = delete;
   DeviceSearch& operator=(const DeviceSearch&) = delete;
 
-  /// Seconds a search, over `repeats` in a row.
+  /// Mean number of seconds per search, over `repeats` consecutive searches.
   double seconds(int repeats) {
     JFPX_CUDA_TRY(cudaEventRecord(events_[0], stream_.get()));
     for (int i = 0; i < repeats; ++i) JFPX_CUDA_TRY(cudaGraphLaunch(graph_, stream_.get()));
@@ -80,9 +81,9 @@ class DeviceSearch {
   void enqueue(std::size_t n, bool pairs_only) {
     if (pairs_only) {
       collider_.find_pairs(spheres_.data(), n, reinterpret_cast<SpherePair*>(contacts_.data()),
-                           contacts_.size(), count_.data());
+                           contacts_.capacity(), count_.data());
     } else {
-      collider_.find_contacts(spheres_.data(), n, contacts_.data(), contacts_.size(),
+      collider_.find_contacts(spheres_.data(), n, contacts_.data(), contacts_.capacity(),
                               count_.data());
     }
   }
@@ -121,7 +122,7 @@ void host_to_host(benchmark::State& state, const Input& input, std::size_t n) {
   report(state, n, contacts);
 }
 
-/// The copies that host_to_host can't do without, and nothing else.
+/// Only the copies that host_to_host requires.
 void copies_alone(benchmark::State& state, const Input& input, std::size_t n) {
   const HostSpheres host(input.make(n));
   const std::size_t contacts =
@@ -131,9 +132,9 @@ void copies_alone(benchmark::State& state, const Input& input, std::size_t n) {
   DeviceBuffer<SphereInstance> spheres;
   DeviceBuffer<SphereContact> on_device;
   PinnedBuffer<SphereContact> on_host;
-  spheres.grow(pool, stream.get(), n, "spheres");
-  on_device.grow(pool, stream.get(), contacts, "contacts");
-  on_host.grow(contacts, "contacts on the host");
+  spheres.reserve(pool, stream.get(), n, "spheres");
+  on_device.reserve(pool, stream.get(), contacts, "contacts");
+  on_host.reserve(contacts, "contacts on the host");
   for (auto _ : state) {
     JFPX_CUDA_TRY(cudaMemcpyAsync(spheres.data(), host.memory.data(), n * sizeof(SphereInstance),
                                   cudaMemcpyHostToDevice, stream.get()));

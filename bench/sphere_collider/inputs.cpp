@@ -47,7 +47,7 @@ Spheres polydisperse(std::size_t n) {
   return spheres;
 }
 
-/// Gases of 1000 spheres in places far apart.
+/// Groups of 1000 spheres, each a gas, far from each other.
 Spheres clusters(std::size_t n) {
   Random random(3);
   const Real side = side_of(1000, kUnitSphere / 8, 3);
@@ -89,7 +89,7 @@ Spheres far(std::size_t n) {
   return spheres;
 }
 
-/// Sphere 0 touches all others: each adds one contact to the gas.
+/// A gas in which sphere 0 also touches all others.
 Spheres giant(std::size_t n) {
   Spheres spheres = gas(n);
   const Real side = side_of(n, kUnitSphere / 8, 3);
@@ -97,14 +97,14 @@ Spheres giant(std::size_t n) {
   return spheres;
 }
 
-/// Groups of 7 spheres with one centre, far from the others: three contacts per sphere.
+/// Groups of 7 concentric spheres, far from each other: three contacts per sphere.
 Spheres coincident(std::size_t n) {
   Spheres spheres = gas(n);
   for (std::size_t i = n; i-- > 0;) spheres[i].centre = spheres[i - i % 7].centre * 16;
   return spheres;
 }
 
-/// One sphere in a hundred is up to 1e12 m away.
+/// A gas in which one sphere in a hundred is up to 1e12 m away.
 Spheres outliers(std::size_t n) {
   Random random(6);
   Spheres spheres = gas(n);
@@ -136,7 +136,7 @@ const Input& input(std::string_view name) {
   for (const Input& i : kInputs) {
     if (i.name == name) return i;
   }
-  throw InvalidArgument("no input is called " + std::string(name));
+  throw InvalidArgument("unknown input: " + std::string(name));
 }
 
 }  // namespace bench

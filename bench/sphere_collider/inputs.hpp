@@ -1,4 +1,5 @@
-/// Spheres to measure with: the gas that all figures refer to, and what breaks colliders.
+/// Inputs of the sphere benchmarks: a gas, which is the reference, and inputs that are difficult
+/// for broad phases.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -17,8 +18,8 @@ struct Input {
 };
 
 /// gas (three contacts per sphere), polydisperse (radii over four decades, as many contacts),
-/// clusters, line, plane, far (1e6 m from the origin), giant (one sphere over all others),
-/// coincident (groups of 7 with one centre), outliers, overlap (all touch all).
+/// clusters, line, plane, far (1e6 m from the origin), giant (one sphere contains all others),
+/// coincident (groups of 7 concentric spheres), outliers, overlap (all pairs touch).
 std::span<const Input> inputs();
 const Input& input(std::string_view name);
 

@@ -1,4 +1,4 @@
-/// Compiled with -O2, whatever the rest is compiled with: see benches.cmake.
+/// The reference loop. Always compiled with -O2, see benches.cmake.
 #include "bench/sphere_collider/plain_loop.hpp"
 
 #include "src/collide/sphere_pair.hpp"

@@ -1,4 +1,4 @@
-/// The yardstick of the sphere benchmarks.
+/// Reference of the sphere benchmarks.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -8,8 +8,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Every pair a < b through the shared arithmetic: what a compiler makes of it at -O2, without
-/// vectors.
+/// Tests every pair a < b with detail::test_sphere_pair(), compiled with -O2 and without vectors.
 void plain_loop(std::span<const SphereInstance> spheres, std::vector<SphereContact>* contacts);
 
 }  // namespace JFPX_ABI

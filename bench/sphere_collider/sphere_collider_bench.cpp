@@ -1,4 +1,5 @@
-/// Sphere contacts on x86: algorithms, vector widths and sizes, beside a plain scalar double loop.
+/// Benchmark of sphere contacts on the CPU: algorithms, vector widths and sizes, compared with a
+/// scalar double loop.
 #include <jfpx/random.hpp>
 #include <jfpx/sphere_collider.hpp>
 
@@ -16,8 +17,8 @@ namespace {
 
 using Spheres = std::vector<SphereInstance>;
 
-/// Side of a cube with `contacts` contacts a sphere: at volume fraction phi, uniformly random
-/// centres of equal spheres have 4*phi.
+/// Returns the side of a cube with `contacts` contacts per sphere: at volume fraction phi,
+/// uniformly random centres of equal spheres have 4*phi contacts.
 Real side_of_gas(std::size_t n, double contacts) {
   return static_cast<Real>(std::cbrt(static_cast<double>(n) * 4.18879020478639 * 4 / contacts));
 }
@@ -30,7 +31,7 @@ Spheres gas(std::size_t n, double contacts = 3) {
   return spheres;
 }
 
-/// No contacts at all: spheres of radius 1 on a lattice of spacing 3.
+/// No contacts: spheres of radius 1 on a cubic lattice with spacing 3.
 Spheres sparse(std::size_t n) {
   const auto edge = static_cast<std::size_t>(std::ceil(std::cbrt(static_cast<double>(n))));
   Spheres spheres(n);
@@ -42,7 +43,7 @@ Spheres sparse(std::size_t n) {
   return spheres;
 }
 
-/// The thesis' tower at rest (thesis 5): no contacts, along a line.
+/// The tower of the thesis at rest (thesis 5): spheres along a line, without contacts.
 Spheres tower(std::size_t n) {
   Spheres spheres(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -52,7 +53,7 @@ Spheres tower(std::size_t n) {
   return spheres;
 }
 
-/// Radii over four decades, evenly in the logarithm, about 3 contacts a sphere.
+/// Radii over four decades, uniform in the logarithm, with about 3 contacts per sphere.
 Spheres polydisperse(std::size_t n) {
   Random random(1);
   Spheres spheres(n);
@@ -72,7 +73,8 @@ Spheres giant_in_dust(std::size_t n) {
   return spheres;
 }
 
-/// One sphere of five times the radius in a gas: must not cost the others their small cells.
+/// A gas with one sphere of five times the radius, which must not increase the cell size of the
+/// others.
 Spheres larger_one(std::size_t n) {
   Spheres spheres = gas(n);
   spheres[n / 2].radius = 5;
@@ -97,7 +99,7 @@ void count(benchmark::State& state, std::size_t spheres, std::size_t contacts) {
   state.counters["spheres"] = n;
   state.counters["contacts"] = static_cast<double>(contacts);
   state.counters["spheres_per_s"] = Counter(n, Counter::kIsIterationInvariantRate);
-  // What has to be read and written at least, once each.
+  // Lower bound of the memory traffic: every input and output once.
   state.counters["bytes"] =
       n * sizeof(SphereInstance) + static_cast<double>(contacts) * sizeof(SphereContact);
 }
@@ -190,7 +192,7 @@ void add_all() {
 void test_pairs(benchmark::State& state) {
   const Spheres spheres = gas(100'000);
   Random random(3);
-  // Half of the pairs touch, half are random: no order helps a branch predictor or a cache.
+  // Half of the pairs touch and half are random, so neither branches nor accesses are predictable.
   const auto collider = make_sphere_collider({.backend = Backend::cpu});
   const ContactSpan contacts = collider->find_contacts(spheres);
   std::vector<SpherePair> pairs(static_cast<std::size_t>(state.range(0)));

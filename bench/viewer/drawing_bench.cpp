@@ -1,12 +1,12 @@
-/// What a picture of many balls costs, and which part of it: items made on the host, shadows,
-/// ambient occlusion, edges; from afar and near.
+/// Time of a picture of many balls and of its parts: items on the host, shadows, ambient occlusion,
+/// anti-aliasing; at a large and a small distance.
 #include "bench/viewer/screen.hpp"
 #include "bench/world/samples.hpp"
 #include "src/scenes/scenes.hpp"
 #include "src/viewer/colours.hpp"
 #include "src/viewer/renderer.hpp"
-#include "src/viewer/show.hpp"
-#include "src/viewer/stage.hpp"
+#include "src/viewer/scene_painter.hpp"
+#include "src/viewer/viewer.hpp"
 
 #include <fmt/format.h>
 
@@ -49,7 +49,7 @@ std::vector<Variant> variants() {
           {"high", kHighQuality}};
 }
 
-/// Balls that lie in a wide box, some twelve deep, in an order that says nothing of their places.
+/// Balls in a wide box, about twelve layers deep, in random order.
 std::vector<Vec3> pile(std::size_t count, Real side) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> jitter(-0.2f, 0.2f);
@@ -69,7 +69,7 @@ std::vector<Vec3> pile(std::size_t count, Real side) {
 
 class Gallery {
  public:
-  /// Times pictures of a pile; `closeness` 1 has all of it in the picture.
+  /// Times pictures of a pile, which is entirely visible for a `closeness` of 1.
   void pictures(benchmark::State& state, const Quality& quality, std::size_t balls, Real closeness,
                 int width, int height) {
     const Real side = 2 * std::cbrt(static_cast<Real>(balls));
@@ -87,19 +87,19 @@ class Gallery {
     }
     renderer_.set_quality(quality);
     time(state, [&] {
-      renderer_.draw(drawing, view, {0, 0, width, height}, canvas_.framebuffer());
+      renderer_.draw(drawing, view, {0, 0, width, height}, offscreen_.framebuffer());
     });
   }
 
-  /// Times pictures of a scene as jfpx-view draws them: items are made anew for each.
+  /// Times pictures of a scene as in jfpx-view, including the creation of the items.
   void views(benchmark::State& state, const Quality& quality, std::uint32_t balls) {
     ViewOptions options;
     options.run.scene = "gas";
     options.run.spheres = balls;
-    const std::unique_ptr<Show> show = make_show(options);
+    const std::unique_ptr<Viewer> viewer = make_viewer(options);
     renderer_.set_quality(quality);
     time(state, [&] {
-      show->draw(renderer_, {canvas_.framebuffer(), canvas_.width(), canvas_.height()});
+      viewer->draw(renderer_, {offscreen_.framebuffer(), offscreen_.width(), offscreen_.height()});
     });
   }
   std::string description() const {
@@ -113,7 +113,7 @@ class Gallery {
       draw();
       glFinish();
     };
-    picture();  // makes buffers
+    picture();  // allocates buffers
     std::vector<double> ms;
     for (auto _ : state) {
       ms.push_back(milliseconds_of(picture));
@@ -122,7 +122,7 @@ class Gallery {
     state.counters["median_ms"] = median(ms);
   }
 
-  /// Wall clock; where processors draw, their time, which other work on the machine lengthens less.
+  /// Wall time; for software rendering, processor time, which other load affects less.
   template <class Call>
   double milliseconds_of(const Call& call) const {
     const auto now = [this] {
@@ -138,21 +138,21 @@ class Gallery {
   Window window_ = Window::hidden();
   bool software_ = draws_in_software(window_);
   Renderer renderer_;
-  Canvas canvas_{kWidth, kHeight};
+  OffscreenFramebuffer offscreen_{kWidth, kHeight};
 };
 
-/// The host's part of a picture of a run.
+/// The work of the host for a picture of a run.
 void items(benchmark::State& state, std::uint32_t balls) {
   const Scene scene = scenes::make("gas", {.spheres = balls, .seed = 1});
-  const Stage stage(scene);
-  Moment moment;
+  const ScenePainter painter(scene);
+  Snapshot snapshot;
   for (const BodyDef& body : scene.bodies) {
-    moment.states.push_back({body.position, body.orientation, {}, {}});
+    snapshot.states.push_back({body.position, body.orientation, {}, {}});
   }
-  moment.awake.assign(scene.bodies.size(), 1);
+  snapshot.awake.assign(scene.bodies.size(), 1);
   for (auto _ : state) {
     Drawing drawing({0, 0, 100});
-    stage.draw(moment, moment, Real(0.5), Colouring::bodies, &drawing);
+    painter.draw(snapshot, snapshot, Real(0.5), Colouring::bodies, &drawing);
     benchmark::DoNotOptimize(drawing.spheres().data());
   }
 }
@@ -163,7 +163,7 @@ void register_all(Gallery* gallery) {
                                  [=](benchmark::State& state) { items(state, balls); })
         ->Unit(benchmark::kMillisecond);
     if (gallery == nullptr) continue;
-    // A stamp: hardly any pixels, so what remains is the cost of the spheres themselves.
+    // A tiny picture has few pixels, so its time is the cost per sphere.
     benchmark::RegisterBenchmark(("drawing/stamp/" + std::to_string(balls)).c_str(),
                                  [=](benchmark::State& state) {
                                    gallery->pictures(

@@ -1,11 +1,11 @@
-/// The thesis' figure 5.3: contact detection of a frame of boxes-and-balls while every frame is
-/// drawn, and while none is.
+/// Figure 5.3 of the thesis: time of contact detection per frame of boxes-and-balls with and
+/// without rendering.
 #include "bench/viewer/screen.hpp"
 #include "bench/world/samples.hpp"
 #include "src/scenes/scenes.hpp"
 #include "src/viewer/renderer.hpp"
 #include "src/viewer/run.hpp"
-#include "src/viewer/stage.hpp"
+#include "src/viewer/scene_painter.hpp"
 #include "src/viewer/timing.hpp"
 
 #include <fmt/format.h>
@@ -18,48 +18,50 @@ namespace {
 constexpr std::uint32_t kSizes[] = {2, 4, 8, 16, 32, 64, 128, 256, 448};
 constexpr int kFrames = 1000;
 
-/// A picture as large as the thesis' window, or a stamp where a processor has to draw it.
+/// A picture in the size of the thesis' window, or a small one for software rendering.
 class Screen {
  public:
   Screen()
-      : canvas_(draws_in_software(window_) ? 160 : 800, draws_in_software(window_) ? 120 : 600) {
+      : offscreen_(draws_in_software(window_) ? 160 : 800, draws_in_software(window_) ? 120 : 600) {
     camera_.look_at({0, 10, 50}, {0, 10, 0});
     camera_.fov_y = kPi / 4;
   }
 
-  void draw(const view::Stage& stage, const view::Moment& before, const view::Moment& now) {
-    const view::Bounds bounds = stage.bounds(now.states);
+  void draw(const view::ScenePainter& painter, const view::Snapshot& before,
+            const view::Snapshot& now) {
+    const view::Bounds bounds = painter.bounds(now.states);
     const view::View view = camera_.view(bounds.centre, bounds.radius);
     view::Drawing drawing(view.eye);
-    stage.draw(before, now, 1, view::Colouring::bodies, &drawing);
-    renderer_.draw(drawing, view, {0, 0, canvas_.width(), canvas_.height()}, canvas_.framebuffer());
+    painter.draw(before, now, 1, view::Colouring::bodies, &drawing);
+    renderer_.draw(drawing, view, {0, 0, offscreen_.width(), offscreen_.height()},
+                   offscreen_.framebuffer());
     glFinish();
   }
   std::string description() const {
-    return fmt::format("{} x {} by {}", canvas_.width(), canvas_.height(), window_.driver());
+    return fmt::format("{} x {} by {}", offscreen_.width(), offscreen_.height(), window_.driver());
   }
 
  private:
   view::Window window_ = view::Window::hidden();
   view::Renderer renderer_{view::kLowQuality};
-  view::Canvas canvas_;
+  view::OffscreenFramebuffer offscreen_;
   view::Camera camera_;
 };
 
-/// The first frame is reported apart: it makes buffers and, on a GPU, starts the device.
+/// The first frame, which allocates buffers and starts a GPU, is reported separately.
 void frames(benchmark::State& state, Backend backend, std::uint32_t spheres, Screen* screen) {
   const Scene scene = scenes::make("boxes-and-balls", {.spheres = spheres, .seed = 1});
   const auto run = view::make_run(scene, {.backend = backend});
-  const view::Stage stage(scene);
+  const view::ScenePainter painter(scene);
   std::vector<double> detect_ms, picture_ms;
-  view::Moment before = run->moment();
+  view::Snapshot before = run->snapshot();
   const auto frame = [&] {
     run->step();
-    view::Moment now = run->moment();
+    view::Snapshot now = run->snapshot();
     const double ms = now.times.detect;
     if (screen != nullptr) {
       view::Stopwatch watch;
-      screen->draw(stage, before, now);
+      screen->draw(painter, before, now);
       picture_ms.push_back(watch.lap() * 1e3);
     }
     before = std::move(now);

@@ -1,4 +1,4 @@
-/// What benchmarks that draw have in common: a context without a window, and doing without it.
+/// Shared code of benchmarks that draw: a context without a window, and its absence.
 #pragma once
 
 #include <jfpx/error.hpp>
@@ -13,13 +13,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bench {
 
-/// True where a processor draws.
+/// True for software rendering.
 inline bool draws_in_software(const view::Window& window) {
   return window.driver().find("llvmpipe") != std::string::npos;
 }
 
-/// The main() of benchmarks that `register_all` registers; it gets nullptr where there is no
-/// OpenGL. Screen::description() says in the results how large pictures are and who draws them.
+/// The main() of the benchmarks that `register_all` registers. Its argument is nullptr without
+/// OpenGL. Screen::description() adds the size of the pictures and the driver to the results.
 template <class Screen>
 int run_with_screen(int argc, char** argv, void (*register_all)(Screen*)) {
   std::unique_ptr<Screen> screen;

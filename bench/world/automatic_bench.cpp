@@ -1,4 +1,4 @@
-/// Backend::automatic against each fixed choice, on the same input in the same run.
+/// Benchmark of Backend::automatic against each fixed choice, with the same input in the same run.
 #include <jfpx/random.hpp>
 #include <jfpx/sphere_collider.hpp>
 
@@ -12,23 +12,24 @@ inline namespace JFPX_ABI {
 namespace bench {
 namespace {
 
+/// A collider to be compared.
 struct Contender {
   std::string name;
   SphereColliderOptions options;
   std::unique_ptr<SphereCollider> collider = {};
-  int calls = 1;                ///< in each round: about a millisecond of them
-  std::vector<double> us = {};  ///< a call, on average of each round
+  int calls = 1;                ///< per round: about one millisecond
+  std::vector<double> us = {};  ///< mean time of a call, by round
 };
 
-/// Larger searches among all pairs lose by far and would take long.
-constexpr std::size_t most_for_all_pairs(Backend backend) {
+/// Larger searches among all pairs are not competitive and would take too long.
+constexpr std::size_t max_spheres_for_all_pairs(Backend backend) {
   return backend == Backend::cpu ? 4096 : 16384;
 }
-/// Where its memory happens to lie makes a search among 32 spheres up to 1.6 times as long:
-/// colliders that choose the same then differ by chance. So each is made anew, elsewhere, this many
-/// times.
-constexpr int kPlaces = 5;
-constexpr int kRounds = 7;  ///< in each place
+/// The addresses of the buffers change the time of a search among 32 spheres by a factor of up to
+/// 1.6, so colliders that make the same choice differ by chance. Therefore each collider is made
+/// this many times at different addresses.
+constexpr int kPlacements = 5;
+constexpr int kRounds = 7;  ///< per placement
 
 std::vector<Contender> contenders_for(std::size_t n, const CostModel& costs) {
   std::vector<Contender> contenders;
@@ -38,21 +39,22 @@ std::vector<Contender> contenders_for(std::size_t n, const CostModel& costs) {
   for (const Backend backend : {Backend::cpu, Backend::cuda}) {
     if (backend == Backend::cuda && !cuda_is_usable()) continue;
     for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
-      if (algorithm == SphereAlgorithm::all_pairs && n > most_for_all_pairs(backend)) continue;
+      if (algorithm == SphereAlgorithm::all_pairs && n > max_spheres_for_all_pairs(backend))
+        continue;
       add(std::string(to_string(backend)) + "_" +
               (algorithm == SphereAlgorithm::all_pairs ? "all_pairs" : "sorted_tiles"),
           {.backend = backend, .algorithm = algorithm});
     }
   }
   SphereColliderOptions automatic{.costs = costs};
-  automatic.costs.cuda_start_ms = 0;  // the others have started it
+  automatic.costs.cuda_start_ms = 0;  // already started by the other colliders
   add("automatic", automatic);
   return contenders;
 }
 
-/// Makes all colliders anew, with gaps of random size between their memory.
-void place(std::vector<Contender>& contenders, std::span<const SphereInstance> spheres,
-           Random& random) {
+/// Makes all colliders again, with gaps of random size between their memory.
+void recreate(std::vector<Contender>& contenders, std::span<const SphereInstance> spheres,
+              Random& random) {
   std::vector<std::unique_ptr<std::byte[]>> gaps;
   for (Contender& c : contenders) {
     c.collider = make_sphere_collider(c.options);
@@ -61,9 +63,9 @@ void place(std::vector<Contender>& contenders, std::span<const SphereInstance> s
   }
 }
 
-/// Rounds in which everybody has a turn share the noise of the machine. In each the order is
-/// another, and a turn begins with calls that do not count: after waiting for a GPU a processor is
-/// slow.
+/// Measures all contenders in each round, so that they share the noise of the machine. The order is
+/// random in each round. The first calls of a contender are not timed, because a processor is slow
+/// after waiting for a GPU.
 void measure(std::vector<Contender>& contenders, std::span<const SphereInstance> spheres,
              Random& random) {
   for (Contender& c : contenders) {
@@ -72,8 +74,9 @@ void measure(std::vector<Contender>& contenders, std::span<const SphereInstance>
     const double us = microseconds_of(call);
     c.calls = static_cast<int>(std::clamp(1e3 / us, 1.0, 2000.0));
     if (c.name != "automatic") continue;
-    // It tries other ways after some 130 calls, but not before 8 ms: 50 calls or so, seldom again.
-    // What is measured comes later or, where calls take long, before.
+    // The first trials of other alternatives take place after about 130 calls and at least 8 ms,
+    // and later ones are rare. The measurement follows the first trials, or precedes them if calls
+    // are long.
     const double warm_up = us < 2e3 ? std::max(2e4 / us, std::clamp(2e5 / us, 250.0, 2000.0))
                                     : std::max(2e5 / us, 12.0);
     for (int i = 0; i < warm_up; ++i) call();
@@ -82,8 +85,8 @@ void measure(std::vector<Contender>& contenders, std::span<const SphereInstance>
   for (Contender& c : contenders) order.push_back(&c);
   for (int round = 0; round < kRounds; ++round) {
     for (std::size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[random.below(k)]);
-    for (Contender* turn : order) {
-      Contender& c = *turn;
+    for (Contender* contender : order) {
+      Contender& c = *contender;
       for (int i = 0; i < c.calls / 2; ++i) c.collider->find_contacts(spheres);
       c.us.push_back(microseconds_of([&] {
                        for (int i = 0; i < c.calls; ++i) c.collider->find_contacts(spheres);
@@ -93,8 +96,8 @@ void measure(std::vector<Contender>& contenders, std::span<const SphereInstance>
   }
 }
 
-/// Median of the ratios round by round to whoever of the others has the least median: what slows a
-/// round slows both.
+/// Returns the median, over the rounds, of the ratio to the contender with the smallest median.
+/// Disturbances of a round affect both.
 double ratio_to_best(const std::vector<Contender>& contenders) {
   const std::span others(contenders.data(), contenders.size() - 1);
   const auto best = std::min_element(others.begin(), others.end(),
@@ -112,8 +115,8 @@ void compare(benchmark::State& state, const Input& input, std::size_t n, const C
   double automatic = 0;
   for (auto _ : state) {
     Random random(1);
-    for (int i = 0; i < kPlaces; ++i) {
-      place(contenders, spheres, random);
+    for (int i = 0; i < kPlacements; ++i) {
+      recreate(contenders, spheres, random);
       measure(contenders, spheres, random);
     }
     for (const Contender& c : contenders) {
@@ -152,7 +155,7 @@ void register_all(const CostModel& costs) {
 }  // namespace JFPX_ABI
 }  // namespace jfpx
 
-/// An argument --costs=FILE names costs that `jfpx calibrate --json FILE` has measured.
+/// The option --costs=FILE reads costs that `jfpx calibrate --json FILE` measured.
 int main(int argc, char** argv) {
   constexpr std::string_view kCosts = "--costs=";
   jfpx::CostModel costs;

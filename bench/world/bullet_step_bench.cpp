@@ -1,4 +1,4 @@
-/// A step of Bullet in its parts: stock against jfpx's dispatcher, solver and world, which move
+/// The stages of a Bullet step: stock against jfpx's dispatcher, solver and world, which move
 /// identically.
 #include <jfpx/bullet/scene_world.hpp>
 
@@ -38,8 +38,8 @@ constexpr Run kRuns[] = {
     {"columns", 4096, 30, 31}, {"columns", 16384, 15, 15}, {"columns", 65536, 10, 7},
     {"overlap", 64, 0, 40},    {"overlap", 256, 0, 15},    {"overlap", 1024, 0, 5}};
 
-/// Both worlds step in turn, each first every other time. The ratio is the median of the ratios
-/// step by step: neighbours in time share the noise of the machine.
+/// The worlds step in alternating order. The ratio is the median of the ratios of single steps,
+/// because consecutive steps have the same noise of the machine.
 void steps(benchmark::State& state, const Run& run) {
   Scene scene = scenes::make(run.scene, {.spheres = run.spheres, .seed = 1});
   scene.sleep.enabled = false;

@@ -1,5 +1,5 @@
-/// What the first call of an automatic collider takes where it starts CUDA, and where the program
-/// has started it before. A process can start CUDA once, so this is a program of its own.
+/// Time of the first calls of an automatic collider that starts CUDA, and of one in a program that
+/// has started CUDA before. A separate program, because a process can start CUDA only once.
 #include <jfpx/random.hpp>
 #include <jfpx/sphere_collider.hpp>
 
@@ -20,7 +20,8 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
 
 int main(int count, char** arguments) {
   if (count > 2 || (count == 2 && std::strcmp(arguments[1], "--ahead") != 0)) {
-    std::fprintf(stderr, "usage: first_call [--ahead]   with --ahead available_backends() first\n");
+    std::fprintf(stderr,
+                 "usage: first_call [--ahead]   --ahead calls available_backends() first\n");
     return 2;
   }
   using Clock = std::chrono::steady_clock;

@@ -1,5 +1,4 @@
-/// What the benchmarks of this folder have in common: medians, and what a result must say of
-/// itself.
+/// Common parts of the benchmarks: statistics, timing, and the context of results.
 #pragma once
 
 #include <jfpx/backend.hpp>
@@ -33,8 +32,7 @@ inline bool cuda_is_usable() {
   return usable;
 }
 
-/// Wall clock where a GPU takes part. Else time of the processor, which other work on the machine
-/// lengthens less.
+/// Wall-clock time if a GPU is usable, otherwise CPU time, which depends less on other load.
 template <class Call>
 double microseconds_of(const Call& call) {
   const auto now = [] {
@@ -47,7 +45,7 @@ double microseconds_of(const Call& call) {
   return now() - start;
 }
 
-/// The program's name and arguments, without folders and without where the output goes.
+/// The program's name and arguments, without folders and output options.
 inline std::string command_line(int argc, char** argv) {
   const std::string_view program = argv[0];
   std::string command(program.substr(program.find_last_of('/') + 1));

@@ -1,4 +1,4 @@
-/// Stages of a native step: how they grow with the number of spheres, and what they allocate.
+/// Benchmark of the stages of a native step: times and allocations by the number of spheres.
 #include <jfpx/world.hpp>
 
 #include "bench/world/floor.hpp"

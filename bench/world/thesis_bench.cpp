@@ -1,4 +1,4 @@
-/// The thesis' figures 5.1 to 5.3: contact detection of a frame of boxes-and-balls, as it timed it.
+/// Benchmark of figures 5.1 to 5.3 of the thesis: contact detection per frame of boxes-and-balls.
 #include <jfpx/world.hpp>
 
 #include "bench/world/samples.hpp"
@@ -17,8 +17,8 @@ constexpr Size kSizes[] = {{2, 1000},   {4, 1000},   {8, 1000},   {16, 1000},   
                            {64, 1000},  {128, 1000}, {256, 1000}, {448, 1000},  {1024, 400},
                            {4096, 200}, {16384, 50}, {65536, 20}, {262144, 10}, {1000000, 5}};
 
-/// All that finds contacts in a frame: spheres with each other and with the ground. The first frame
-/// is reported apart: it makes buffers and, on a GPU, starts the device.
+/// The whole detection of a frame: spheres with each other and with the ground. The first frame is
+/// reported separately, because it allocates buffers and, on a GPU, starts the device.
 void frames(benchmark::State& state, Backend backend, const Size& size) {
   World world(scenes::make("boxes-and-balls", {.spheres = size.spheres, .seed = 1}),
               {.collider = {.backend = backend}});

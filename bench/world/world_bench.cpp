@@ -1,4 +1,5 @@
-/// Steps of the native world, and the resolver with a tournament against a scan of all contacts.
+/// Benchmarks of native steps, of rays, and of the resolver with a tournament tree and a linear
+/// scan.
 #include <jfpx/random.hpp>
 
 #include "src/scenes/scenes.hpp"
@@ -10,7 +11,7 @@
 namespace jfpx {
 namespace {
 
-/// One step of a scene that has settled for `warm_up` steps; per stage in the counters.
+/// One step of a scene after `warm_up` steps; the counters have the times of the stages.
 void step(benchmark::State& state, const char* name, std::uint32_t spheres, int warm_up) {
   World world(scenes::make(name, {.spheres = spheres, .seed = 1}));
   for (int n = 0; n < warm_up; ++n) world.step();
@@ -38,7 +39,7 @@ void step(benchmark::State& state, const char* name, std::uint32_t spheres, int 
 void step_pile_2048(benchmark::State& state) { step(state, "pile", 2048, 120); }
 void step_tower_448(benchmark::State& state) { step(state, "boxes-and-balls", 448, 400); }
 
-/// One ray across a pile, by the number of spheres.
+/// One ray into a pile, by the number of spheres.
 void cast_ray(benchmark::State& state) {
   const World world(
       scenes::make("pile", {.spheres = static_cast<std::uint32_t>(state.range(0)), .seed = 1}));
@@ -52,9 +53,9 @@ void cast_ray(benchmark::State& state) {
       benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
-/// A lattice with 19494 contacts whose spheres fly in all directions.
-struct Crowd {
-  Crowd() : bodies(Real(0.01), SleepSettings{}) {
+/// A lattice with 19494 contacts and random velocities.
+struct DenseLattice {
+  DenseLattice() : bodies(Real(0.01), SleepSettings{}) {
     Scene scene = scenes::make("lattice", {.spheres = 19 * 19 * 19, .seed = 1});
     World still(scene);
     still.step();
@@ -71,19 +72,19 @@ struct Crowd {
 
 template <class Queue>
 void resolve_20000(benchmark::State& state) {
-  const Crowd crowd;
+  const DenseLattice lattice;
   BasicContactResolver<Queue> resolver;
-  // As many iterations as the slow one can do in reasonable time.
+  // Limited to what the linear scan can do in reasonable time.
   const ResolverSettings settings{.max_iterations = static_cast<std::uint32_t>(state.range(0))};
   std::uint64_t iterations = 0;
   for (auto _ : state) {
     state.PauseTiming();
-    BodyStore bodies = crowd.bodies;
+    BodyStore bodies = lattice.bodies;
     state.ResumeTiming();
-    const ResolverReport report = resolver.resolve(bodies, crowd.contacts, settings);
+    const ResolverReport report = resolver.resolve(bodies, lattice.contacts, settings);
     iterations += report.position_iterations + report.velocity_iterations;
   }
-  state.counters["contacts"] = static_cast<double>(crowd.contacts.size());
+  state.counters["contacts"] = static_cast<double>(lattice.contacts.size());
   state.counters["iterations"] =
       benchmark::Counter(static_cast<double>(iterations), benchmark::Counter::kAvgIterations);
   state.counters["time_per_iteration"] = benchmark::Counter(

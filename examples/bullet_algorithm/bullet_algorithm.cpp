@@ -1,4 +1,4 @@
-/// For programs that keep a dispatcher of their own: jfpx's algorithm alone, in a stock dispatcher.
+/// jfpx's sphere-sphere algorithm in a stock dispatcher, for programs with their own dispatcher.
 #include <jfpx/bullet/algorithm.hpp>
 
 #include <btBulletDynamicsCommon.h>

@@ -1,4 +1,4 @@
-/// A Bullet program as everybody writes it, with three lines changed, each of which could be alone.
+/// A typical Bullet program with three changed lines, each of which is optional.
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dispatcher.hpp>
 #include <jfpx/bullet/dynamics_world.hpp>
@@ -27,7 +27,7 @@ int main() {
   bodies.back()->getWorldTransform().setOrigin(btVector3(0, -50, 0));
   for (int i = 0; i < 1000; ++i) {
     bodies.push_back(std::make_unique<btRigidBody>(1, nullptr, &sphere_shape, inertia));
-    // Ten layers of ten by ten, leaning a little so that they tumble.
+    // Ten layers of ten by ten spheres, slightly tilted so that they fall over.
     const int column = i % 10, row = i / 10 % 10, layer = i / 100;
     const btVector3 cell{btScalar(column), btScalar(layer), btScalar(row)};
     bodies.back()->getWorldTransform().setOrigin(

@@ -1,5 +1,5 @@
-/// Bullet's contact callbacks, a custom material and a sensor: with `stock` as argument the program
-/// uses Bullet's own dispatcher, and prints the same.
+/// Bullet's contact callbacks, a custom material and a sensor. With the argument `stock`, the
+/// program uses Bullet's own dispatcher and prints the same.
 #include <jfpx/bullet/dispatcher.hpp>
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
@@ -13,38 +13,38 @@
 namespace {
 
 constexpr int kBodies = 200;
-constexpr int kSensor = kBodies - 1;  ///< user index of the body that only feels
+constexpr int kSensor = kBodies - 1;  ///< user index of the body without contact response
 
-struct Heard {
-  int started = 0, ended = 0, added = 0, felt = 0;
+struct Calls {
+  int started = 0, ended = 0, added = 0, sensor = 0;
 };
-Heard g_heard;
+Calls g_calls;
 
 bool is_sensor(const btCollisionObject* body) { return body->getUserIndex() == kSensor; }
 
 void on_started(btPersistentManifold* const& manifold) {
-  ++g_heard.started;
-  if (is_sensor(manifold->getBody0()) || is_sensor(manifold->getBody1())) ++g_heard.felt;
+  ++g_calls.started;
+  if (is_sensor(manifold->getBody0()) || is_sensor(manifold->getBody1())) ++g_calls.sensor;
 }
-void on_ended(btPersistentManifold* const&) { ++g_heard.ended; }
+void on_ended(btPersistentManifold* const&) { ++g_calls.ended; }
 
-/// Every third body is icy: it slips, whatever it touches.
+/// Every third body is icy: its contacts have low friction.
 bool on_added(btManifoldPoint& point, const btCollisionObjectWrapper*, int, int,
               const btCollisionObjectWrapper*, int, int) {
   point.m_combinedFriction = btScalar(0.01);
-  ++g_heard.added;
+  ++g_calls.added;
   return true;
 }
 
 std::unique_ptr<btCollisionDispatcher> make_dispatcher(bool stock,
                                                        btCollisionConfiguration* configuration) {
   if (stock) return std::make_unique<btCollisionDispatcher>(configuration);
-  // A batch however small, to show that callbacks hear no difference.
+  // Also batches small dispatches, to show that callbacks receive the same calls.
   return std::make_unique<jfpx::bullet::CollisionDispatcher>(
       configuration, jfpx::bullet::DispatcherOptions{.minimum_batch = 0});
 }
 
-/// Spheres in a narrow heap, the last one a sensor in its middle.
+/// Adds spheres in a narrow heap; the last one is a sensor in its middle.
 void fill(btDiscreteDynamicsWorld* world, btCollisionShape* shape,
           std::vector<std::unique_ptr<btRigidBody>>* bodies) {
   btVector3 inertia;
@@ -87,8 +87,8 @@ int main(int argc, char** argv) {
   gContactAddedCallback = on_added;
   for (int second = 1; second <= 3; ++second) {
     for (int step = 0; step < 60; ++step) world.stepSimulation(btScalar(1) / 60, 1);
-    std::printf("second %d: %d started, %d ended, %d icy, %d felt by the sensor; sphere 0 at %a\n",
-                second, g_heard.started, g_heard.ended, g_heard.added, g_heard.felt,
+    std::printf("second %d: %d started, %d ended, %d icy, %d at the sensor; sphere 0 at %a\n",
+                second, g_calls.started, g_calls.ended, g_calls.added, g_calls.sensor,
                 double(bodies[0]->getWorldTransform().getOrigin().x()));
   }
   for (const auto& body : bodies) world.removeRigidBody(body.get());

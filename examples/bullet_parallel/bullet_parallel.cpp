@@ -1,5 +1,5 @@
-/// The same pile twice: on one thread, and with all cores and, where it pays, a GPU. Both end at
-/// the same place, to the last bit; the second says who computed and why.
+/// The same pile on one thread, and on all cores and a GPU where that is faster. The final
+/// positions are bit-identical; the second run prints the chosen backend and the reason.
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dispatcher.hpp>
 #include <jfpx/bullet/dynamics_world.hpp>
@@ -14,7 +14,7 @@
 
 namespace {
 
-/// Lets 4,000 balls fall and returns where the last one lies.
+/// Drops 4,000 balls and returns the final position of the last one.
 btVector3 let_fall(btDiscreteDynamicsWorld& world) {
   btStaticPlaneShape ground_shape(btVector3(0, 1, 0), 0);
   btSphereShape sphere_shape(btScalar(0.5));

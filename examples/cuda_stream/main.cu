@@ -1,5 +1,5 @@
-/// Finds contacts inside a CUDA program: the spheres are made on the device, the contacts are used
-/// there, and one graph replays "move, collide, push apart" without the host.
+/// Finds contacts inside a CUDA program. Spheres are created on the device, kernels use the
+/// contacts there, and one graph replays "collide, push apart" without the host.
 #include <jfpx/cuda/sphere_collider.hpp>
 #include <jfpx/error.hpp>
 
@@ -27,7 +27,7 @@ __device__ Real hash(std::uint32_t x) {
   return static_cast<Real>((x ^ (x >> 16)) >> 8) / Real(1 << 24);
 }
 
-/// Spheres of radius 1/2 in a cube that is half full.
+/// Spheres of radius 1/2 in a cube, at a volume fraction of about one half.
 __global__ void make_spheres(jfpx::SphereInstance* spheres) {
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= kSpheres) return;
@@ -35,7 +35,7 @@ __global__ void make_spheres(jfpx::SphereInstance* spheres) {
   spheres[i] = {{side * hash(3 * i), side * hash(3 * i + 1), side * hash(3 * i + 2)}, Real(0.5)};
 }
 
-/// A thread a sphere: its contacts as a are next to each other, sorted by b. Each pushes a away.
+/// One thread per sphere. The contacts (a, b) of a sphere a are consecutive; each pushes a away.
 __global__ void push_apart(jfpx::SphereInstance* spheres, const jfpx::SphereContact* contacts,
                            const jfpx::cuda::ContactCount* count) {
   const std::uint32_t a = blockIdx.x * blockDim.x + threadIdx.x;

@@ -4,7 +4,7 @@
 #include "src/base/cuda/cuda_try.hpp"
 
 #include <epoxy/gl.h>
-// After epoxy, which stands in for the header that it would include.
+// After epoxy, which replaces the OpenGL header that it would include.
 #include <cuda_gl_interop.h>
 
 namespace jfpx {
@@ -12,7 +12,7 @@ inline namespace JFPX_ABI {
 namespace cuda_view {
 namespace {
 
-/// Why CUDA can't reach what OpenGL draws with; empty if it can.
+/// Reason why CUDA can't access the device of OpenGL; empty if it can.
 std::string find_obstacle() {
   unsigned count = 0;
   int used = 0, shared = 0;
@@ -31,7 +31,7 @@ struct SharedBuffer::Impl {
   GLuint buffer;
   std::size_t bytes;
   cudaGraphicsResource_t resource = nullptr;
-  void *device = nullptr, *host = nullptr;  // on the detour
+  void *device = nullptr, *host = nullptr;  // for copies through the host
 
   Impl(GLuint name, std::size_t size) : buffer(name), bytes(size) {}
   ~Impl() {
@@ -43,8 +43,8 @@ struct SharedBuffer::Impl {
 
 SharedBuffer::SharedBuffer(unsigned buffer, std::size_t bytes, bool by_host)
     : impl_(std::make_unique<Impl>(buffer, bytes)),
-      detour_(by_host ? "asked for" : find_obstacle()) {
-  if (detour_.empty()) {
+      host_copy_reason_(by_host ? "requested" : find_obstacle()) {
+  if (host_copy_reason_.empty()) {
     JFPX_CUDA_TRY(cudaGraphicsGLRegisterBuffer(&impl_->resource, buffer,
                                                cudaGraphicsRegisterFlagsWriteDiscard));
     return;

@@ -1,4 +1,4 @@
-/// An OpenGL buffer that CUDA writes: in place where both are one device, else by way of the host.
+/// An OpenGL buffer that CUDA writes: directly if both use one device, otherwise through the host.
 #pragma once
 
 #include <jfpx/cuda/sphere_collider.hpp>
@@ -11,28 +11,28 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda_view {
 
-/// Needs the OpenGL context of the buffer for its whole life.
+/// Requires the OpenGL context of the buffer for its lifetime.
 class SharedBuffer {
  public:
   /// @param buffer  name of an OpenGL buffer of that many bytes
-  /// @param by_host whether to go by way of the host in any case
+  /// @param by_host copies through the host in any case
   /// @throws DeviceError, OutOfMemory
   SharedBuffer(unsigned buffer, std::size_t bytes, bool by_host);
   ~SharedBuffer();
   SharedBuffer(const SharedBuffer&) = delete;
   SharedBuffer& operator=(const SharedBuffer&) = delete;
 
-  /// Memory to write in the order of the stream, until the next unmap().
+  /// Device memory, valid in stream order until the next unmap().
   void* map(cuda::Stream stream);
-  /// What was written is in the buffer; OpenGL may use it.
+  /// Completes the write, after which OpenGL may use the buffer.
   void unmap(cuda::Stream stream);
-  /// Why bytes go by way of the host; empty if they do not.
-  const std::string& detour() const { return detour_; }
+  /// Reason why the data is copied through the host; empty if it is not.
+  const std::string& host_copy_reason() const { return host_copy_reason_; }
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
-  std::string detour_;
+  std::string host_copy_reason_;
 };
 
 }  // namespace cuda_view

@@ -1,6 +1,7 @@
-/// A world of jfpx's own: bodies come and go, contacts are heard, a force acts, a ray is cast.
+/// Example of a native world: bodies, a force, a rope, contact events and queries.
 #include <jfpx/world.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <optional>
 #include <span>
@@ -18,37 +19,58 @@ jfpx::BodyDef box(const jfpx::Vec3& half_extents, const jfpx::Vec3& position, Re
   return def;
 }
 
-jfpx::BodyDef ball(const jfpx::Vec3& position) {
+jfpx::BodyDef ball(const jfpx::Vec3& position, Real radius = Real(0.5), Real mass = 1) {
   jfpx::BodyDef def;
-  def.shape = jfpx::Sphere{Real(0.5)};
+  def.shape = jfpx::Sphere{radius};
   def.position = position;
+  def.mass = mass;
   def.restitution = Real(0.3);
   return def;
 }
 
+/// Contact generator: the distance of the centres of two bodies is at most `length`.
+struct Rope {
+  jfpx::BodyId a, b;
+  Real length = 1;  ///< [m]
+
+  void operator()(jfpx::ContactContext& context) const {
+    const jfpx::Vec3 from = context.state(a).position, d = context.state(b).position - from;
+    const Real distance = jfpx::length(d);
+    if (distance < length) return;
+    context.add({.a = a,
+                 .b = b,
+                 .normal = d * (1 / distance),
+                 .point = from,
+                 .distance = length - distance});
+  }
+};
+
 }  // namespace
 
 int main() {
-  // y is up by convention: BodyDef::acceleration is (0, -9.81, 0) unless a body says otherwise.
   jfpx::Scene scene;
-  scene.bodies.push_back(box({4, Real(0.5), 4}, {0, Real(-0.5), 0}, 0));  // mass 0: never moves
+  scene.bodies.push_back(box({4, Real(0.5), 4}, {0, Real(-0.5), 0}, 0));  // mass 0: immovable
   jfpx::World world(scene);
 
   const jfpx::BodyId crate = world.add(box({1, 1, 1}, {0, 1, 0}, 20));
   for (int i = 0; i < 5; ++i) world.add(ball({Real(i) - 2, 5, Real(i) - 2}));
   world.add_force(jfpx::Drag{.linear = Real(0.5), .wind = {8, 0, 0}});
 
+  const jfpx::BodyId hook = world.add(ball({-3, 6, 3}, Real(0.1), 0));
+  const jfpx::BodyId lamp = world.add(ball({-3, 5, 3}, Real(0.2), 10));
+  world.add_contact_generator(Rope{hook, lamp, 1});
+
   int began = 0, fell = 0;
   for (int n = 0; n < 600; ++n) {
     const jfpx::StepReport report = world.step();
-    // A body that has left the finite numbers: the step has not happened, nor will the next ones.
+    // The state of a body was no longer finite; the step and all later ones are undone.
     if (report.non_finite) world.remove(report.non_finite_body);
 
     for (const jfpx::ContactEvent& event : world.contact_events()) {
       if (event.phase == jfpx::ContactPhase::begin) ++began;
     }
 
-    // A copy of the list, because it changes with each body that goes.
+    // Iterates over a copy, because removal changes the list.
     const std::span<const jfpx::BodyId> ids = world.bodies();
     for (const jfpx::BodyId id : std::vector(ids.begin(), ids.end())) {
       if (world.state(id).position.y > -20) continue;
@@ -63,4 +85,14 @@ int main() {
   if (hit && hit->body == crate) {
     std::printf("the crate's top is at %.2f m\n", static_cast<double>(hit->point.y));
   }
+
+  for (const jfpx::BodyId id : world.overlapping(jfpx::Sphere{Real(1.5)}, {-3, 6, 3})) {
+    if (id == lamp) std::printf("the lamp hangs near its hook\n");
+  }
+  Real deepest = 0;  // of the contacts of the crate
+  for (const jfpx::Contact& contact : world.contacts()) {
+    if (contact.a == crate || contact.b == crate) deepest = std::min(deepest, contact.distance);
+  }
+  std::printf("the crate is %s, %.0f mm deep in the floor\n",
+              world.awake(crate) ? "awake" : "asleep", static_cast<double>(-deepest) * 1000);
 }

@@ -1,4 +1,4 @@
-/// A force of one's own: two balls pull each other as stars do, and circle.
+/// Example of a user-defined force: two bodies attract each other and circle around their centre.
 #include <jfpx/world.hpp>
 
 #include <cstdio>
@@ -32,7 +32,7 @@ jfpx::BodyDef star(const jfpx::Vec3& position, const jfpx::Vec3& velocity) {
 }  // namespace
 
 int main() {
-  // On a circle of radius 1 the pull at a distance of 2, 1/4, is v^2: v = 1/2, a round in 4 pi s.
+  // On a circle of radius 1, the force 1/4 at distance 2 equals v^2: v = 1/2, period 4 pi s.
   jfpx::Scene scene;
   scene.dt = jfpx::Real(0.01);
   scene.bodies = {star({1, 0, 0}, {0, jfpx::Real(0.5), 0}),

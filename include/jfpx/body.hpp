@@ -1,4 +1,4 @@
-/// Rigid bodies: what a scene says about one, and what a world knows about one.
+/// Rigid bodies: definition, id and state of motion.
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -10,40 +10,42 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Names a body of one World for the body's whole life. The id of a removed body never comes back.
-/// In another World it names whatever body has the same place there, or none.
+/// Identifies a body of one World for the lifetime of the body. The id of a removed body is never
+/// reused. In another World, the id refers to the body with the same index and generation, or to
+/// none.
 struct BodyId {
   std::uint32_t index = 0xffffffffu;
   std::uint32_t generation = 0;
   friend bool operator==(const BodyId&, const BodyId&) = default;
 };
 
-/// One rigid body as a scene describes it. SI units.
+/// Definition of a rigid body in a scene. SI units.
 struct BodyDef {
   Shape shape = Sphere{};
   Real mass = 1;  ///< [kg], >= 0; 0 means immovable
-  /// Only with mass 0, and not of half-spaces and planes: moves with its velocities, which nothing
-  /// changes but World::set_state(). Pushes others and is never pushed, however heavy they are.
+  /// A body that moves with its velocities, which only World::set_state() changes. It pushes other
+  /// bodies and is never pushed, whatever their mass. Requires mass 0; not for half-spaces and
+  /// planes.
   bool kinematic = false;
   /// [kg m^2], about the centre of mass, in body axes; that of the solid shape if absent.
-  /// Symmetric, positive definite, no principal moment larger than the sum of the others. Mass 0
-  /// has none.
+  /// Symmetric and positive definite, with no principal moment larger than the sum of the others.
+  /// Absent for mass 0.
   std::optional<Mat3> inertia;
   Vec3 position;  ///< [m], centre of mass
   Quat orientation;
-  Vec3 velocity;          ///< [m/s]; a body that is immovable and not kinematic stays at rest
-  Vec3 angular_velocity;  ///< [rad/s], world frame; likewise
-  /// [m/s^2], constant: gravity, unless set. Ignored by an immovable body.
+  Vec3 velocity;          ///< [m/s]; ignored if the body is immovable and not kinematic
+  Vec3 angular_velocity;  ///< [rad/s], world frame; ignored in the same case
+  /// [m/s^2], constant; gravity by default. Ignored for an immovable body.
   Vec3 acceleration{0, Real(-9.81), 0};
-  Real linear_damping = 1;    ///< [-], share of velocity kept per second, in (0, 1]
-  Real angular_damping = 1;   ///< [-], likewise for angular velocity
-  Real friction = Real(0.5);  ///< [-], >= 0; combined as Scene::materials says
-  Real restitution = 0;       ///< [-], in [0, 1]; likewise
+  Real linear_damping = 1;    ///< [-], fraction of velocity kept per second, in (0, 1]
+  Real angular_damping = 1;   ///< [-], the same for angular velocity
+  Real friction = Real(0.5);  ///< [-], >= 0; combined by the rule of Scene::materials
+  Real restitution = 0;       ///< [-], in [0, 1]; combined by the rule of Scene::materials
   bool can_sleep = true;
   friend bool operator==(const BodyDef&, const BodyDef&) = default;
 };
 
-/// The moving part of a body's state.
+/// State of motion of a body.
 struct BodyState {
   Vec3 position;  ///< [m]
   Quat orientation;
@@ -52,8 +54,8 @@ struct BodyState {
   friend bool operator==(const BodyState&, const BodyState&) = default;
 };
 
-/// Places and directions in the axes of the body and of the world (thesis 4.4.2). A body's own
-/// origin is its centre of mass.
+/// Transforms of points and directions between body and world axes (thesis 4.4.2). The origin of
+/// the body axes is the centre of mass.
 JFPX_HD constexpr Transform pose(const BodyState& body) {
   return make_transform(body.orientation, body.position);
 }
@@ -69,13 +71,13 @@ JFPX_HD constexpr Vec3 to_world_direction(const BodyState& body, const Vec3& loc
 JFPX_HD constexpr Vec3 to_local_direction(const BodyState& body, const Vec3& world) {
   return inverse_transform_direction(pose(body), world);
 }
-/// Velocity of the material point of the body that is at `point` in the world [m/s].
+/// Velocity of the body's material point at `point` in the world [m/s].
 JFPX_HD constexpr Vec3 velocity_at(const BodyState& body, const Vec3& point) {
   return body.velocity + cross(body.angular_velocity, point - body.position);
 }
 
-/// Hash over the bits of all states, in order: equal hashes mean the same world to the last bit.
-/// (-0 and 0 differ.) Float and double worlds have different hashes.
+/// Hash over the bits of all states, in order: equal hashes mean equal states to the last bit,
+/// where -0 differs from 0. Float and double worlds have different hashes.
 JFPX_API std::uint64_t state_hash(std::span<const BodyState> states) noexcept;
 
 }  // namespace JFPX_ABI

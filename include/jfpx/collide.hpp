@@ -1,5 +1,5 @@
-/// Pair tests between shapes, as pure functions. Sphere against sphere is the collider's
-/// (sphere_collider.hpp).
+/// Collision tests of pairs of shapes, as pure functions. Sphere-sphere tests belong to
+/// SphereCollider (sphere_collider.hpp).
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -7,30 +7,32 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// How a sphere touches a solid. Without a touch the other fields are 0.
+/// The contact of a sphere with a solid. Without a contact the other fields are 0.
 struct Touch {
   bool touching = false;
   Vec3 normal;        ///< [-], unit, from the solid to the sphere
-  Vec3 point;         ///< [m], world, the middle of the overlap
-  Real distance = 0;  ///< [m], <= 0: minus the penetration
+  Vec3 point;         ///< [m], world, middle of the overlap
+  Real distance = 0;  ///< [m], <= 0: negative penetration depth
   friend bool operator==(const Touch&, const Touch&) = default;
 };
 
-/// The touch that follows from its normal and distance.
+/// The contact of a sphere with the given normal and distance.
 JFPX_HD constexpr Touch make_touch(const SphereInstance& sphere, const Vec3& normal,
                                    Real distance) {
   return {true, normal, sphere.centre - normal * (sphere.radius + distance * Real(0.5)), distance};
 }
 
-/// Touching counts, however deep the sphere is inside.
+/// Sphere against half-space. A sphere that only touches is in contact, as is one at any depth
+/// inside.
 JFPX_HD constexpr Touch collide(const SphereInstance& sphere, const HalfSpace& half_space) {
   const Real distance = (dot(half_space.normal, sphere.centre) - half_space.offset) - sphere.radius;
   if (!(distance <= 0)) return {};
   return make_touch(sphere, half_space.normal, distance);
 }
 
-/// The nearest point of the box decides (Ericson 2005, 5.2.5). A centre on or inside the box has
-/// none that gives a direction: there the face of least depth does, x before y before z (E9).
+/// Sphere against box, by the point of the box that is closest to the centre (Ericson 2005, 5.2.5).
+/// A centre on or inside the box has no closest point that defines a direction; there the normal is
+/// that of the face of least depth, in the order x, y, z (erratum E9).
 JFPX_HD inline Touch collide(const SphereInstance& sphere, const Box& box, const Transform& pose) {
   const Vec3 local = transform_transpose(pose.basis, sphere.centre - pose.origin);
   Vec3 outside;
@@ -53,8 +55,8 @@ JFPX_HD inline Touch collide(const SphereInstance& sphere, const Box& box, const
   return make_touch(sphere, local[face] < 0 ? -axis : axis, -(sphere.radius + depth[face]));
 }
 
-/// A plane has no inside: the sphere is pushed to the side where its centre is, to the front if it
-/// is on the plane.
+/// Sphere against plane. A plane has no inside: the normal points to the side of the centre, and to
+/// the front if the centre is on the plane.
 JFPX_HD constexpr Touch collide(const SphereInstance& sphere, const Plane& plane) {
   const Real height = dot(plane.normal, sphere.centre) - plane.offset;
   const Real distance = (height < 0 ? -height : height) - sphere.radius;
@@ -62,24 +64,25 @@ JFPX_HD constexpr Touch collide(const SphereInstance& sphere, const Plane& plane
   return make_touch(sphere, height < 0 ? -plane.normal : plane.normal, distance);
 }
 
-/// One point of a manifold.
+/// One contact point of a manifold.
 struct ManifoldPoint {
-  Vec3 point;         ///< [m], world, the middle of the overlap
-  Real distance = 0;  ///< [m], <= 0: minus the penetration
+  Vec3 point;         ///< [m], world, middle of the overlap
+  Real distance = 0;  ///< [m], <= 0: negative penetration depth
   friend bool operator==(const ManifoldPoint&, const ManifoldPoint&) = default;
 };
 
-/// How two solids touch: one normal, up to eight points, none without a touch.
+/// The contact manifold of two solids: one normal and up to eight points; without a contact, no
+/// points.
 struct Manifold {
   Vec3 normal;              ///< [-], unit, from b to a
-  Real distance = 0;        ///< [m], <= 0: a moved by -distance along the normal no longer overlaps
-  int count = 0;            ///< of points
-  ManifoldPoint points[8];  ///< those beyond `count` are 0
+  Real distance = 0;        ///< [m], <= 0: moving a by -distance along the normal ends the overlap
+  int count = 0;            ///< number of points
+  ManifoldPoint points[8];  ///< points from `count` on are 0
   friend bool operator==(const Manifold&, const Manifold&) = default;
 };
 
-/// The corners of the box that are in the solid, each with its own depth (erratum E17), in the
-/// order of their signs: ---, +--, -+-, ++-, --+, ...
+/// Box against half-space: the corners of the box inside the solid, each with its own depth
+/// (erratum E17), in the order of the signs of their coordinates: ---, +--, -+-, ++-, --+, ...
 JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose,
                                    const HalfSpace& half_space) {
   Manifold manifold;
@@ -98,18 +101,19 @@ JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose,
   return manifold;
 }
 
-/// As against the half-space behind the plane, on the side where the centre of the box is, the
-/// front if it is on the plane.
+/// Box against plane: as against a half-space whose surface is the plane and whose normal points to
+/// the side of the box's centre, or to the front if the centre is on the plane.
 JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose, const Plane& plane) {
   const bool behind = dot(plane.normal, pose.origin) < plane.offset;
   return behind ? collide(box, pose, HalfSpace{-plane.normal, -plane.offset})
                 : collide(box, pose, HalfSpace{plane.normal, plane.offset});
 }
 
-/// Separating axes and clipping. Of equally good normals a face of a is preferred, then a face of
-/// b, then a pair of edges; near ties count as ties. Boxes whose gap is smaller than the rounding
-/// errors may touch; so may those with edges that are parallel but for less than
-/// 2 sqrt(epsilon), when the gap is smaller than that times their size.
+/// Box against box, by the separating-axis test and clipping. Of equally good normals, that of a
+/// face of a is preferred, then a face of b, then a pair of edges; near ties count as ties.
+/// Separated boxes may be reported as touching if the gap is smaller than the rounding errors, or
+/// if edges deviate from parallel by less than 2 sqrt(epsilon) and the gap is smaller than that
+/// times their size.
 JFPX_API Manifold collide(const Box& a, const Transform& pose_a, const Box& b,
                           const Transform& pose_b);
 

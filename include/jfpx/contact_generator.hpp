@@ -1,5 +1,5 @@
-/// Contacts that users make (thesis 4.3, contact generators): ropes, rods, and what else may keep
-/// two bodies apart or together.
+/// Contacts that users generate (contact generators, thesis 4.3): ropes, rods and other limits on
+/// the distance of two bodies.
 #pragma once
 
 #include <jfpx/step_view.hpp>
@@ -12,42 +12,42 @@ inline namespace JFPX_ABI {
 
 struct Contact;
 
-/// Names a contact generator of one World. Never used twice.
+/// Identifies a contact generator of one World. Never reused.
 struct ContactGeneratorId {
   std::uint64_t number = 0;
   friend bool operator==(const ContactGeneratorId&, const ContactGeneratorId&) = default;
 };
 
-/// What a contact generator asks for: that the bodies cease to approach each other along the
-/// normal, and part by `-distance` but for the resolver's position epsilon. Normal and bodies may
-/// be chosen so that "to part" means to come closer, as at the end of a rope.
+/// A contact made by a contact generator. The resolver stops the approach of the bodies along the
+/// normal, and moves them apart by `-distance`, up to its position epsilon. Normal and bodies may
+/// be chosen so that "apart" means closer together, as at the end of a rope.
 struct GeneratedContact {
-  BodyId a = {}, b = {};  ///< different; one of mass 0 stands for the surroundings, wherever it is
-  Vec3 normal = {};       ///< [-], unit, the way in which a is pushed; b goes the other way
-  Vec3 point = {};        ///< [m], world, where both are pushed: any point on the line of the push
+  BodyId a = {}, b = {};  ///< two different bodies; one may have mass 0 and represent the world
+  Vec3 normal = {};       ///< [-], unit, direction of the impulse on a; b receives the opposite
+  Vec3 point = {};        ///< [m], world, point of application: any point on the line of action
   Real distance = 0;      ///< [m], <= 0
-  Real friction = 0;      ///< [-], >= 0, across the normal
+  Real friction = 0;      ///< [-], >= 0, perpendicular to the normal
   Real restitution = 0;   ///< [-], in [0, 1]
 };
 
-/// What a contact generator sees, after bodies were moved and their contacts found, and where it
-/// leaves its own.
+/// View of the world that a contact generator receives after integration and detection, and
+/// recipient of its contacts.
 class JFPX_API ContactContext : public StepView {
  public:
   ContactContext(const BodyStore& bodies, double time, std::vector<Contact>* contacts)
       : StepView(bodies, time), contacts_(contacts) {}
 
-  /// Between two bodies of mass 0 nothing happens. Whoever sleeps is woken by the other.
-  /// @throws InvalidArgument for a body that does not live or a field that is out of its range; the
-  ///   step is then undone
+  /// Adds a contact. A contact of two bodies of mass 0 is ignored. An awake body wakes the other.
+  /// @throws InvalidArgument for a body that does not live or a field out of its range; the step is
+  ///   then undone
   void add(const GeneratedContact& contact);
 
  private:
   std::vector<Contact>* contacts_;
 };
 
-/// Anything that can be called with a ContactContext. It must do the same when called again in the
-/// same state, for a failed step is repeated. Exceptions undo the step and reach the caller of
+/// Any object callable with a ContactContext. Calls in the same state must have the same result,
+/// because a failed step is repeated. An exception undoes the step and propagates to the caller of
 /// World::step().
 template <class G>
 concept ContactGenerator = std::copy_constructible<G> && std::invocable<const G&, ContactContext&>;

@@ -1,4 +1,4 @@
-/// What sphere collision costs on a machine: the numbers behind Backend::automatic (thesis 5.4).
+/// Cost model of sphere collision on a machine, used by Backend::automatic (thesis 5.4).
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -8,68 +8,73 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// What one call of a SphereCollider has to do. Counts, as doubles so that none overflows.
+/// Amount of work of one SphereCollider call. The counts are doubles, so that none overflows.
 struct ColliderWork {
   double spheres = 0;   ///< [-]
-  double pairs = 0;     ///< [-], N*(N-1)/2 for find_contacts(), those given for test_pairs()
+  double pairs = 0;     ///< [-], N*(N-1)/2 for find_contacts(), the given pairs for test_pairs()
   double contacts = 0;  ///< [-], found; not counted for test_pairs()
   double bytes = 0;     ///< [-], input and output
 };
 
-/// Cost of one way to do it: a sum of terms, each >= 0.
+/// Cost of one backend and algorithm: coefficients of a linear model, each finite and >= 0.
 struct CostTerms {
-  double call_us = 0;     ///< [us] a call: launches, waiting, waking threads
-  double byte_ns = 0;     ///< [ns] a byte moved to and from the device
-  double sphere_ns = 0;   ///< [ns] a sphere
-  double pair_ns = 0;     ///< [ns] a pair that is looked at
-  double contact_ns = 0;  ///< [ns] a contact
+  double call_us = 0;     ///< [us] per call: launches, synchronization, waking threads
+  double byte_ns = 0;     ///< [ns] per byte copied to and from the device
+  double sphere_ns = 0;   ///< [ns] per sphere
+  double pair_ns = 0;     ///< [ns] per tested pair
+  double contact_ns = 0;  ///< [ns] per contact
   friend bool operator==(const CostTerms&, const CostTerms&) = default;
 };
 
-/// [us] that the work takes. One with `pair_ns` of 0 does not depend on the pairs, and so on.
+/// Predicted time of the work [us]: the linear combination of the terms and the counts.
 constexpr double microseconds(const CostTerms& t, const ColliderWork& work) {
   return t.call_us + 1e-3 * (t.byte_ns * work.bytes + t.sphere_ns * work.spheres +
                              t.pair_ns * work.pairs + t.contact_ns * work.contacts);
 }
 
-/// Costs of all ways, for this precision. The defaults are of an AMD EPYC of 2022 with AVX-512, one
-/// thread, and of an NVIDIA H200. Elsewhere, and where they are wrong, the times of
-/// the last calls correct them.
+/// Costs of all backends and algorithms, for this precision. The defaults were measured on an AMD
+/// EPYC of 2022 with AVX-512, with one thread, and on an NVIDIA H200. Backend::automatic corrects
+/// them by the times of the last calls.
 struct CostModel {
   CostTerms x86_all_pairs, x86_sorted_tiles, x86_given_pairs;
   CostTerms cuda_all_pairs, cuda_sorted_tiles, cuda_given_pairs;
-  double cuda_start_ms = 200;  ///< [ms] the first use of the device, >= 0
+  double cuda_start_ms = 200;  ///< [ms] first use of the device, >= 0
 
   JFPX_API CostModel();
   friend bool operator==(const CostModel&, const CostModel&) = default;
 };
 
-/// Where a cost model was measured: it holds there and nowhere else.
+/// Machine on which a cost model was measured. The model is valid on this machine only.
 struct CostModelOrigin {
   std::string machine;                 ///< processor and number of cores
-  std::string driver;                  ///< GPUs and their driver; empty where there is none
+  std::string driver;                  ///< GPUs and their driver; empty if there is none
   std::string version = JFPX_VERSION;  ///< of jfpx
   friend bool operator==(const CostModelOrigin&, const CostModelOrigin&) = default;
 };
 
+/// A cost model and its origin.
 struct MeasuredCostModel {
   CostModel costs;
   CostModelOrigin origin;
 };
 
-/// Writes JSON. @throws FileError; InvalidArgument for a term that is not finite or < 0.
+/// Writes a cost model as JSON.
+/// @throws FileError; InvalidArgument if a term is not finite or < 0.
 JFPX_API void save_cost_model(const MeasuredCostModel& model, const std::string& path);
-/// @throws FileError if the file can't be read, is no cost model, is one of the other precision or
-///   of another format, or holds a term that is not finite or < 0.
+/// Reads a cost model from JSON.
+/// @throws FileError if the file cannot be read, is not a cost model, has another precision or
+///   format, or contains a term that is not finite or < 0.
 JFPX_API MeasuredCostModel load_cost_model(const std::string& path);
 
+/// Result of calibrated_costs().
 struct CalibratedCosts {
   CostModel costs;      ///< the defaults unless `problem` is empty
-  std::string problem;  ///< why they are not those of this machine: one line
+  std::string problem;  ///< one line that explains why the defaults are used
 };
-/// What `jfpx calibrate` has measured on this machine, for SphereColliderOptions::costs. Looks in
-/// the user's cache folder ($XDG_CACHE_HOME, $HOME/.cache); a file that is missing, broken, or of
-/// another machine, driver or version is not used. Does not start a GPU. Thread-safe.
+/// Reads the costs that `jfpx calibrate` measured on this machine, for
+/// SphereColliderOptions::costs. The file is in the user's cache folder ($XDG_CACHE_HOME,
+/// $HOME/.cache). A file that is missing, damaged, or from another machine, driver or version is
+/// ignored. Does not start a GPU. Thread-safe.
 /// @throws std::bad_alloc
 JFPX_API CalibratedCosts calibrated_costs();
 

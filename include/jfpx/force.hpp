@@ -1,5 +1,6 @@
-/// Forces that act on the bodies of a World in every step: those of the thesis (4.4.3), and the
-/// way to write one's own.
+/// Forces that act on the bodies of a World in every step: those of the thesis (4.4.3) and the
+/// interface of user-defined forces. Aero, AeroControl and Explosion serve the demos of the thesis
+/// only.
 #pragma once
 
 #include <jfpx/step_view.hpp>
@@ -10,50 +11,53 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Names a force of one World. Never used twice.
+/// Identifies a force of one World. Never reused.
 struct ForceId {
   std::uint64_t number = 0;
   friend bool operator==(const ForceId&, const ForceId&) = default;
 };
 
-/// What a force sees of a world at the start of a step, and where it leaves its push. What a force
-/// adds reaches awake bodies only: a body that came to rest under its forces sleeps on, and gravity
-/// wakes nobody. Forces that must affect sleeping bodies call wake() or link(). An id that is not
-/// of a living body is an InvalidArgument, and the step is undone.
+/// View of the world that a force receives at the start of a step, and recipient of its
+/// contributions. Contributions affect awake bodies only: a body that has come to rest under its
+/// forces stays asleep, and gravity wakes no body. A force that must affect sleeping bodies calls
+/// wake() or link(). Functions throw InvalidArgument for an id that is not of a living body; the
+/// step is then undone.
 class JFPX_API ForceContext : public StepView {
  public:
   ForceContext(BodyStore& bodies, double time) : StepView(bodies, time), bodies_(&bodies) {}
 
-  /// Adds to the force [N] at the centre of mass, and to the torque [N m], in world axes. Nothing
-  /// happens to sleeping and immovable bodies.
+  /// Adds to the force [N] at the centre of mass, and to the torque [N m], in world axes. Has no
+  /// effect on sleeping and immovable bodies.
   void apply_force(BodyId id, const Vec3& force);
   void apply_torque(BodyId id, const Vec3& torque);
-  /// The force attacks at a point of the world [m].
+  /// Applies the force at a point of the world [m].
   void apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point);
 
   /// Wakes a movable body.
   void wake(BodyId id);
-  /// If one of two bodies is awake, so is the other, if movable: they fall asleep together.
+  /// If one of the two bodies is awake, wakes the other if it is movable, so that they fall asleep
+  /// together.
   void link(BodyId a, BodyId b);
 
  private:
   BodyStore* bodies_;
 };
 
-/// Anything that can be called with a ForceContext, a lambda for example. It must do the same when
-/// called again in the same state, for a failed step is repeated: what depends on time takes it
-/// from the context. Exceptions undo the step and reach the caller of World::step().
+/// Any object callable with a ForceContext, for example a lambda. Calls in the same state must have
+/// the same result, because a failed step is repeated; a force that depends on time must read it
+/// from the context. An exception undoes the step and propagates to the caller of World::step().
 template <class F>
 concept Force = std::copy_constructible<F> && std::invocable<const F&, ForceContext&>;
 
-/// A force that World::add_force() can check. @throws InvalidArgument naming force and field
+/// A force that World::add_force() can validate.
+/// @throws InvalidArgument with the names of the force and the field
 template <class F>
 concept CheckedForce = Force<F> && requires(const F& force, const ForceContext& context) {
   force.validate(context);
 };
 
-/// mass * acceleration on one body or on all, on top of BodyDef::acceleration, which is gravity
-/// already unless a body says otherwise.
+/// Force mass * acceleration on one body or on all, in addition to BodyDef::acceleration, which is
+/// gravity by default.
 struct JFPX_API Gravity {
   Vec3 acceleration{0, Real(-9.81), 0};  ///< [m/s^2], finite
   std::optional<BodyId> body = {};       ///< all bodies if absent
@@ -61,9 +65,9 @@ struct JFPX_API Gravity {
   void operator()(ForceContext& context) const;
 };
 
-/// Resistance of a medium: -(linear + quadratic * |u|) * u, where u is the velocity relative to
-/// the medium. Steps must be short against mass / (linear + quadratic * |u|), or it turns bodies
-/// around.
+/// Drag of a medium: -(linear + quadratic * |u|) * u, where u is the velocity relative to the
+/// medium. Steps must be short compared with mass / (linear + quadratic * |u|); in longer steps the
+/// drag reverses the velocity.
 struct JFPX_API Drag {
   Real linear = 0;     ///< [kg/s], >= 0
   Real quadratic = 0;  ///< [kg/m], >= 0
@@ -73,34 +77,34 @@ struct JFPX_API Drag {
   void operator()(ForceContext& context) const;
 };
 
-/// Where a spring is fixed: to a point of a body, or of the world where there is no body.
+/// Attachment point of a spring: a point of a body, or of the world if there is no body.
 struct Attachment {
   std::optional<BodyId> body = {};
   Vec3 point = {};  ///< [m], in body axes from the centre of mass; without a body in world axes
 };
 
-/// Pushes and pulls two attachments towards a distance, with equal and opposite forces along the
-/// line between them (errata E20, E21). Where the attachments meet there is no line and no force.
-/// Steps must be short against sqrt(mass / stiffness).
+/// Spring between two attachments, with equal and opposite forces along the line between them
+/// (errata E20, E21). At zero length the line is undefined and the force is zero. Steps must be
+/// short compared with sqrt(mass / stiffness).
 struct JFPX_API Spring {
-  Attachment a = {}, b = {};  ///< at least one has a body; not both the same
+  Attachment a = {}, b = {};  ///< at least one has a body; not both the same body
   Real stiffness = 0;         ///< [N/m], >= 0
-  Real damping = 0;           ///< [N s/m], >= 0, of the change of length
+  Real damping = 0;           ///< [N s/m], >= 0, times the rate of change of the length
   Real rest_length = 0;       ///< [m], >= 0
   void validate(const ForceContext& context) const;
   void operator()(ForceContext& context) const;
 };
 
-/// A spring that hangs slack when it is shorter than its rest length.
+/// A spring without force when it is shorter than its rest length.
 struct JFPX_API Bungee {
   Attachment a = {}, b = {};
-  Real stiffness = 0, damping = 0, rest_length = 0;  ///< as of Spring
+  Real stiffness = 0, damping = 0, rest_length = 0;  ///< as in Spring
   void validate(const ForceContext& context) const;
   void operator()(ForceContext& context) const;
 };
 
-/// A surface in the air: force = tensor * velocity through the air, both in body axes, at a point
-/// of the body. The air passes with v + omega x r - wind (erratum E27), so wings damp rolling.
+/// Aerodynamic surface: force = tensor * airspeed, both in body axes, at a point of the body. The
+/// airspeed is v + omega x r - wind (erratum E27), so that wings damp rolling.
 struct JFPX_API Aero {
   BodyId body = {};
   Mat3 tensor = diagonal({});  ///< [kg/s], body axes
@@ -110,23 +114,23 @@ struct JFPX_API Aero {
   void operator()(ForceContext& context) const;
 };
 
-/// An aerodynamic surface that can be steered between three tensors.
+/// Aerodynamic control surface that interpolates between three tensors.
 struct JFPX_API AeroControl {
   BodyId body = {};
   Mat3 lowest = diagonal({}), base = diagonal({}), highest = diagonal({});  ///< [kg/s]
   Vec3 point = {};   ///< [m], body axes, from the centre of mass
   Vec3 wind = {};    ///< [m/s], world axes
-  Real control = 0;  ///< [-]: lowest at -1, base at 0, highest at 1; beyond, as at the end
+  Real control = 0;  ///< [-]: lowest at -1, base at 0, highest at 1; clamped to [-1, 1]
   void validate(const ForceContext& context) const;
   void operator()(ForceContext& context) const;
-  /// The tensor that `control` chooses.
+  /// The tensor at `control`.
   Mat3 tensor() const;
 };
 
-/// The weight of the liquid that a sphere, a box or an compound displaces, exactly, against
-/// gravity, in the middle of the displaced liquid. What compounds displace twice counts twice.
+/// Exact buoyancy of spheres, boxes and compounds: the weight of the displaced liquid, against
+/// gravity, at the centroid of the displaced volume. Overlapping parts of a compound count twice.
 struct JFPX_API Buoyancy {
-  HalfSpace liquid = {};      ///< the solid side is liquid; the normal points up
+  HalfSpace liquid = {};      ///< its solid side is the liquid; the normal points up
   Real density = 1000;        ///< [kg/m^3], >= 0
   Real gravity = Real(9.81);  ///< [m/s^2], >= 0
   std::optional<BodyId> body = {};
@@ -134,15 +138,15 @@ struct JFPX_API Buoyancy {
   void operator()(ForceContext& context) const;
 };
 
-/// A pressure wave: a shell that grows from a point, pushes outwards what it passes, wakes it, and
-/// fades. Across the shell the push rises linearly to its middle and falls again.
+/// Pressure wave: a spherical shell that expands from a point, wakes the bodies in it, pushes them
+/// outwards and fades. Across the shell, the force rises linearly to the middle and falls again.
 struct JFPX_API Explosion {
   Vec3 centre = {};     ///< [m]
   Real start = 0;       ///< [s], of the world's time
-  Real peak_force = 0;  ///< [N], >= 0, in the middle of the shell at the start
+  Real peak_force = 0;  ///< [N], >= 0, in the middle of the shell at the start time
   Real speed = 340;     ///< [m/s], > 0, of the shell
   Real thickness = 10;  ///< [m], > 0, of the shell
-  Real duration = 1;    ///< [s], > 0: by then the push has faded to 0, linearly
+  Real duration = 1;    ///< [s], > 0: time of the linear fading to 0
   void validate(const ForceContext& context) const;
   void operator()(ForceContext& context) const;
 };

@@ -1,7 +1,7 @@
-/// Cheap tests that rule touches out before collide() looks closely (thesis 4.4.5: the intersection
-/// tester). They can't contradict it: where may_touch() is false, collide() with the same arguments
-/// finds nothing, to the last bit (errata E15, E15b, E57). Margins are several times the rounding
-/// errors of both.
+/// Conservative early-out tests that run before collide() (the intersection tester of thesis
+/// 4.4.5). If may_touch() returns false, collide() with the same arguments finds no contact,
+/// including in its rounding (errata E15, E15b, E57), because the margins are several times the
+/// rounding errors of both.
 #pragma once
 
 #include <jfpx/collide.hpp>
@@ -9,13 +9,14 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// [m], a bound on what rounding does to heights and lengths of this size.
+/// [m], bound of the rounding errors of heights and lengths of this size.
 JFPX_HD constexpr Real rounding_margin(Real size) { return 32 * kEpsilon * size; }
+/// Sum of the absolute values of the coordinates.
 JFPX_HD inline Real largest_sum(const Vec3& v) {
   return absolute(v.x) + absolute(v.y) + absolute(v.z);
 }
 
-/// Not conservative but equal to the full test, which is as cheap.
+/// Equal to the test in collide(), which is no more expensive.
 JFPX_HD constexpr bool may_touch(const SphereInstance& sphere, const HalfSpace& half_space) {
   return (dot(half_space.normal, sphere.centre) - half_space.offset) - sphere.radius <= 0;
 }
@@ -24,21 +25,21 @@ JFPX_HD constexpr bool may_touch(const SphereInstance& sphere, const Plane& plan
   return (height < 0 ? -height : height) - sphere.radius <= 0;
 }
 
-/// By the sphere around the box.
+/// Tests the bounding sphere of the box.
 JFPX_HD inline bool may_touch(const SphereInstance& sphere, const Box& box, const Transform& pose) {
-  const Real reach = sphere.radius + length(box.half_extents);
-  const Real farthest = reach + rounding_margin(reach);
-  return !(length_squared(sphere.centre - pose.origin) > farthest * farthest);
+  const Real sum = sphere.radius + length(box.half_extents);
+  const Real limit = sum + rounding_margin(sum);
+  return !(length_squared(sphere.centre - pose.origin) > limit * limit);
 }
 
-/// By the half-length of the box's shadow on the normal.
+/// Projects the box onto the normal.
 JFPX_HD inline bool may_touch(const Box& box, const Transform& pose, const HalfSpace& half_space) {
-  const Vec3 across = transform_transpose(pose.basis, half_space.normal);
-  const Vec3 shadow{absolute(across.x), absolute(across.y), absolute(across.z)};
+  const Vec3 local = transform_transpose(pose.basis, half_space.normal);
+  const Vec3 magnitude{absolute(local.x), absolute(local.y), absolute(local.z)};
   const Real height = dot(half_space.normal, pose.origin) - half_space.offset;
   const Real size =
       largest_sum(pose.origin) + largest_sum(box.half_extents) + absolute(half_space.offset);
-  return !(height - dot(shadow, box.half_extents) > rounding_margin(size));
+  return !(height - dot(magnitude, box.half_extents) > rounding_margin(size));
 }
 JFPX_HD inline bool may_touch(const Box& box, const Transform& pose, const Plane& plane) {
   const bool behind = dot(plane.normal, pose.origin) < plane.offset;
@@ -46,7 +47,7 @@ JFPX_HD inline bool may_touch(const Box& box, const Transform& pose, const Plane
                 : may_touch(box, pose, HalfSpace{plane.normal, plane.offset});
 }
 
-/// By each box in the axes of the other, seen as the sphere around it.
+/// Tests the bounding sphere of each box against the other box, along the axes of that box.
 JFPX_HD inline bool may_touch(const Box& a, const Transform& pose_a, const Box& b,
                               const Transform& pose_b) {
   const Vec3 between = pose_b.origin - pose_a.origin;

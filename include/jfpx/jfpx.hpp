@@ -1,8 +1,7 @@
-/// Everything of jfpx that needs neither CUDA nor Bullet.
+/// Includes all public headers of jfpx that require neither CUDA nor Bullet.
 #pragma once
 
 #include <jfpx/backend.hpp>
-#include <jfpx/broad_phase.hpp>
 #include <jfpx/build.hpp>
 #include <jfpx/collide.hpp>
 #include <jfpx/contact_generator.hpp>

@@ -1,4 +1,4 @@
-/// How the coefficients of two bodies become the one of their contact.
+/// Rules that combine the coefficients of two bodies into that of their contact.
 #pragma once
 
 #include <jfpx/math.hpp>
@@ -9,14 +9,14 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 enum class CombineRule : std::uint8_t {
-  geometric_mean,  ///< sqrt(a * b): equal coefficients stay what they are, 0 stays 0
+  geometric_mean,  ///< sqrt(a * b): preserves equal coefficients, and 0
   product,         ///< a * b, as in Bullet
   minimum,
   maximum,
   average  ///< a/2 + b/2
 };
 
-/// As it is written in a scene's JSON; null for a value that is no rule.
+/// Name in the JSON of a scene; null for a value outside the enumeration.
 constexpr const char* to_string(CombineRule rule) {
   switch (rule) {
     case CombineRule::geometric_mean:
@@ -33,7 +33,7 @@ constexpr const char* to_string(CombineRule rule) {
   return nullptr;
 }
 
-/// @param a,b >= 0
+/// Combines two coefficients. @param a,b >= 0
 JFPX_HD inline Real combined(CombineRule rule, Real a, Real b) {
   switch (rule) {
     case CombineRule::geometric_mean:
@@ -50,7 +50,7 @@ JFPX_HD inline Real combined(CombineRule rule, Real a, Real b) {
   return square_root(a * b);
 }
 
-/// Which rule is for what.
+/// Rules of a scene.
 struct MaterialSettings {
   CombineRule friction = CombineRule::geometric_mean;
   CombineRule restitution = CombineRule::geometric_mean;

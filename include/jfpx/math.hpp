@@ -1,6 +1,6 @@
-/// Vectors, quaternions, matrices, transforms and boxes: values, inline, the same bits on host and,
-/// with nvcc's --fmad=false, on the device. Every expression is a fixed sequence of single IEEE
-/// operations (thesis 4.2).
+/// Vectors, quaternions, matrices, transforms and axis-aligned boxes (thesis 4.2) as plain values
+/// with inline functions. Every expression is a fixed sequence of single IEEE operations, so host
+/// and device produce the same bits; device code must be compiled with nvcc's --fmad=false.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -11,13 +11,13 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Machine epsilon of Real; the project's threshold for "no direction" (DESIGN: contact).
+/// Machine epsilon of Real. A vector that is not longer has no direction.
 inline constexpr Real kEpsilon = std::numeric_limits<Real>::epsilon();
-/// The largest finite Real. A constant, for device code can't call numeric_limits.
+/// The largest finite Real, as a constant, because device code can't call numeric_limits.
 inline constexpr Real kMaxReal = std::numeric_limits<Real>::max();
 inline constexpr Real kPi = static_cast<Real>(3.14159265358979323846);
 
-/// Correctly rounded square root; nvcc and the host compilers agree bit for bit.
+/// Correctly rounded square root, with the same bits from nvcc and the host compilers.
 JFPX_HD inline Real square_root(Real x) {
 #if defined(__CUDA_ARCH__)
   return ::sqrt(x);
@@ -60,7 +60,7 @@ JFPX_HD constexpr Vec3 operator-(const Vec3& v) { return {-v.x, -v.y, -v.z}; }
 JFPX_HD constexpr Vec3 operator*(Vec3 v, Real s) { return v *= s; }
 JFPX_HD constexpr Vec3 operator*(Real s, Vec3 v) { return v *= s; }
 
-/// a.x*b.x + a.y*b.y + a.z*b.z, summed from the left.
+/// a.x*b.x + a.y*b.y + a.z*b.z, summed from left to right.
 JFPX_HD constexpr Real dot(const Vec3& a, const Vec3& b) {
   return (a.x * b.x + a.y * b.y) + a.z * b.z;
 }
@@ -70,13 +70,14 @@ JFPX_HD constexpr Vec3 cross(const Vec3& a, const Vec3& b) {
 JFPX_HD constexpr Vec3 component_product(const Vec3& a, const Vec3& b) {
   return {a.x * b.x, a.y * b.y, a.z * b.z};
 }
+/// v + direction * scale
 JFPX_HD constexpr Vec3 add_scaled(const Vec3& v, const Vec3& direction, Real scale) {
   return v + direction * scale;
 }
 JFPX_HD constexpr Real length_squared(const Vec3& v) { return dot(v, v); }
 JFPX_HD inline Real length(const Vec3& v) { return square_root(length_squared(v)); }
-/// v scaled to length 1; a vector no longer than kEpsilon has no direction and is returned as it
-/// is.
+/// v scaled to length 1. A vector not longer than kEpsilon has no direction and is returned
+/// unchanged.
 JFPX_HD inline Vec3 normalized(const Vec3& v) {
   const Real n = length(v);
   return n > kEpsilon ? v * (Real(1) / n) : v;
@@ -86,13 +87,13 @@ JFPX_HD inline bool is_finite(const Vec3& v) {
   return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
 }
 
-/// A rotation as w + xi + yj + zk. The default is the identity (erratum E24).
+/// A quaternion w + xi + yj + zk. The default is the identity rotation (erratum E24).
 struct Quat {
   Real w = 1, x = 0, y = 0, z = 0;
   friend bool operator==(const Quat&, const Quat&) = default;
 };
 
-/// Hamilton product: first b, then a.
+/// Hamilton product: the rotation b followed by the rotation a.
 JFPX_HD constexpr Quat operator*(const Quat& a, const Quat& b) {
   return {
       a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
@@ -102,21 +103,21 @@ JFPX_HD constexpr Quat conjugate(const Quat& q) { return {q.w, -q.x, -q.y, -q.z}
 JFPX_HD constexpr Real length_squared(const Quat& q) {
   return q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
 }
-/// q scaled to length 1; the identity when q is too short to have a direction (erratum E24).
+/// q scaled to length 1; the identity if q is not longer than kEpsilon (erratum E24).
 JFPX_HD inline Quat normalized(const Quat& q) {
   const Real n2 = length_squared(q);
   if (!(n2 > kEpsilon * kEpsilon)) return {};
   const Real k = Real(1) / square_root(n2);
   return {q.w * k, q.x * k, q.y * k, q.z * k};
 }
-/// q turned by the rotation vector `scale * omega` (world frame, [rad]) to first order, not
+/// q rotated by the rotation vector `scale * omega` (world frame, [rad]) to first order, not
 /// normalised: q + (scale/2) * omega * q (thesis 4.2.2).
 JFPX_HD constexpr Quat add_scaled(const Quat& q, const Vec3& omega, Real scale) {
   const Quat t = Quat{0, omega.x * scale, omega.y * scale, omega.z * scale} * q;
   const Real half = Real(0.5);
   return {q.w + t.w * half, q.x + t.x * half, q.y + t.y * half, q.z + t.z * half};
 }
-/// q turned by the small rotation vector `r` [rad], normalised (erratum E25).
+/// q rotated by the small rotation vector `r` (world frame, [rad]), normalised (erratum E25).
 JFPX_HD inline Quat rotated_by(const Quat& q, const Vec3& r) {
   return normalized(add_scaled(q, r, 1));
 }
@@ -124,7 +125,7 @@ JFPX_HD inline bool is_finite(const Quat& q) {
   return is_finite(q.w) && is_finite(q.x) && is_finite(q.y) && is_finite(q.z);
 }
 
-/// A 3x3 matrix, stored by rows. The default is the identity.
+/// A 3x3 matrix, stored in row-major order. The default is the identity.
 struct Mat3 {
   Vec3 row[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
@@ -138,7 +139,7 @@ JFPX_HD constexpr Mat3 diagonal(const Vec3& d) { return {{{d.x, 0, 0}, {0, d.y, 
 JFPX_HD constexpr Mat3 from_columns(const Vec3& a, const Vec3& b, const Vec3& c) {
   return {{{a.x, b.x, c.x}, {a.y, b.y, c.y}, {a.z, b.z, c.z}}};
 }
-/// The matrix S with S*v = cross(u, v).
+/// The matrix S with S*v = cross(u, v) for every v.
 JFPX_HD constexpr Mat3 skew_symmetric(const Vec3& u) {
   return {{{0, -u.z, u.y}, {u.z, 0, -u.x}, {-u.y, u.x, 0}}};
 }
@@ -161,13 +162,15 @@ JFPX_HD constexpr Mat3 operator*(const Mat3& m, Real s) {
 JFPX_HD constexpr Mat3 operator+(const Mat3& a, const Mat3& b) {
   return {{a.row[0] + b.row[0], a.row[1] + b.row[1], a.row[2] + b.row[2]}};
 }
+/// Linear interpolation of each entry: a for t = 0, b for t = 1.
 JFPX_HD constexpr Mat3 interpolate(const Mat3& a, const Mat3& b, Real t) {
   return a * (Real(1) - t) + b * t;
 }
 JFPX_HD constexpr Real determinant(const Mat3& m) {
   return dot(m.row[0], cross(m.row[1], m.row[2]));
 }
-/// Writes the inverse of m to *out. False, and *out untouched, when m is singular (erratum E26).
+/// Writes the inverse of m to *out. If m is singular, returns false and leaves *out unchanged
+/// (erratum E26).
 JFPX_HD inline bool invert(const Mat3& m, Mat3* out) {
   const Vec3 c0 = cross(m.row[1], m.row[2]);
   const Vec3 c1 = cross(m.row[2], m.row[0]);
@@ -177,7 +180,7 @@ JFPX_HD inline bool invert(const Mat3& m, Mat3* out) {
   *out = from_columns(c0, c1, c2) * (Real(1) / det);
   return true;
 }
-/// Rotation matrix of a unit quaternion: R*v = q v q* (erratum E14 had the transpose).
+/// Rotation matrix of a unit quaternion: R*v = q v q* (erratum E14 was the transpose).
 JFPX_HD constexpr Mat3 to_matrix(const Quat& q) {
   const Real x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
   const Real xx = q.x * x2, yy = q.y * y2, zz = q.z * z2;
@@ -187,9 +190,11 @@ JFPX_HD constexpr Mat3 to_matrix(const Quat& q) {
            {xy + wz, 1 - (xx + zz), yz - wx},
            {xz - wy, yz + wx, 1 - (xx + yy)}}};
 }
+/// The vector v rotated by the unit quaternion q.
 JFPX_HD constexpr Vec3 rotate(const Quat& q, const Vec3& v) { return to_matrix(q) * v; }
 
-/// A rigid motion: p -> basis * p + origin, with an orthonormal basis.
+/// A rigid transform: p -> basis * p + origin, with an orthonormal basis. The default is the
+/// identity.
 struct Transform {
   Mat3 basis;
   Vec3 origin;
@@ -210,15 +215,16 @@ JFPX_HD constexpr Vec3 transform_direction(const Transform& t, const Vec3& d) {
 JFPX_HD constexpr Vec3 inverse_transform_direction(const Transform& t, const Vec3& d) {
   return transform_transpose(t.basis, d);
 }
-/// First b, then a.
+/// Composition: the transform b followed by the transform a.
 JFPX_HD constexpr Transform operator*(const Transform& a, const Transform& b) {
   return {a.basis * b.basis, transform_point(a, b.origin)};
 }
+/// Inverse of a rigid transform.
 JFPX_HD constexpr Transform inverse(const Transform& t) {
   return {transposed(t.basis), -transform_transpose(t.basis, t.origin)};
 }
 
-/// A general 4x4 matrix, stored by rows. The default is the identity.
+/// A general 4x4 matrix, stored in row-major order. The default is the identity.
 struct Mat4 {
   Real m[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
   friend bool operator==(const Mat4&, const Mat4&) = default;
@@ -241,15 +247,16 @@ JFPX_HD constexpr Mat4 operator*(const Mat4& a, const Mat4& b) {
   }
   return r;
 }
-/// The point p, with w = 1 and no perspective division.
+/// Transforms the point p, with w = 1 and without perspective division.
 JFPX_HD constexpr Vec3 transform_point(const Mat4& a, const Vec3& p) {
   return {a.m[0][0] * p.x + a.m[0][1] * p.y + a.m[0][2] * p.z + a.m[0][3],
           a.m[1][0] * p.x + a.m[1][1] * p.y + a.m[1][2] * p.z + a.m[1][3],
           a.m[2][0] * p.x + a.m[2][1] * p.y + a.m[2][2] * p.z + a.m[2][3]};
 }
-/// Column c without its last element: the axes (0-2) and the origin (3) of an affine matrix.
+/// Column c without its last element: an axis (c = 0 to 2) or the origin (c = 3) of an affine
+/// matrix.
 JFPX_HD constexpr Vec3 axis(const Mat4& a, int c) { return {a.m[0][c], a.m[1][c], a.m[2][c]}; }
-/// Determinant of the 3x3 matrix that is left without row r and column c.
+/// Minor: the determinant of the 3x3 matrix that remains without row r and column c.
 JFPX_HD constexpr Real minor_determinant(const Mat4& a, int r, int c) {
   Mat3 s;
   for (int i = 0, k = 0; i < 4; ++i) {
@@ -265,7 +272,8 @@ JFPX_HD constexpr Real determinant(const Mat4& a) {
   return a.m[0][0] * minor_determinant(a, 0, 0) - a.m[0][1] * minor_determinant(a, 0, 1) +
          a.m[0][2] * minor_determinant(a, 0, 2) - a.m[0][3] * minor_determinant(a, 0, 3);
 }
-/// Writes the inverse to *out. False, and *out untouched, when a is singular (erratum E26).
+/// Writes the inverse of a to *out. If a is singular, returns false and leaves *out unchanged
+/// (erratum E26).
 JFPX_HD inline bool invert(const Mat4& a, Mat4* out) {
   const Real det = determinant(a);
   if (!(absolute(det) > 0) || !is_finite(Real(1) / det)) return false;
@@ -280,14 +288,14 @@ JFPX_HD inline bool invert(const Mat4& a, Mat4* out) {
   *out = r;
   return true;
 }
-/// OpenGL's order: out[4*column + row].
+/// Writes the matrix in the column-major order of OpenGL: out[4*column + row].
 JFPX_HD constexpr void fill_column_major(const Mat4& a, Real out[16]) {
   for (int j = 0; j < 4; ++j) {
     for (int i = 0; i < 4; ++i) out[4 * j + i] = a.m[i][j];
   }
 }
 
-/// An axis-aligned box. The default is empty.
+/// An axis-aligned bounding box. The default is empty.
 struct Aabb {
   Vec3 lower{std::numeric_limits<Real>::max(), std::numeric_limits<Real>::max(),
              std::numeric_limits<Real>::max()};
@@ -295,11 +303,12 @@ struct Aabb {
              std::numeric_limits<Real>::lowest()};
   friend bool operator==(const Aabb&, const Aabb&) = default;
 };
-/// True also when the boxes only touch.
+/// True if the boxes overlap or touch.
 JFPX_HD constexpr bool overlap(const Aabb& a, const Aabb& b) {
   return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y &&
          b.lower.y <= a.upper.y && a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
 }
+/// The smallest box that encloses both.
 JFPX_HD constexpr Aabb merged(const Aabb& a, const Aabb& b) {
   Aabb r;
   for (int i = 0; i < 3; ++i) {

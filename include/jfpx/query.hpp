@@ -1,4 +1,4 @@
-/// Questions about the bodies of a World: what a ray hits.
+/// Rays and their hits, for the queries of a World.
 #pragma once
 
 #include <jfpx/body.hpp>
@@ -9,16 +9,16 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// A half-line, or a part of one.
+/// A half-line or a segment.
 struct Ray {
   Vec3 origin;              ///< [m], within kMaxCoordinate
-  Vec3 direction{0, 0, 1};  ///< finite and not zero; its length does not matter
+  Vec3 direction{0, 0, 1};  ///< finite and not zero; of any length
   Real max_distance = std::numeric_limits<Real>::infinity();  ///< [m], >= 0
 };
 
-/// Where a ray enters a body. A ray that starts in a body, or on its surface, hits it at a distance
-/// of 0 with a normal against the ray. All numbers are finite: a wall that a ray would meet farther
-/// away than any Real is not hit.
+/// Point where a ray enters a body. A ray that starts in a body, or on its surface, hits it at
+/// distance 0 with a normal opposite to the ray. All numbers are finite: an intersection with a
+/// wall at a distance that Real cannot represent is no hit.
 struct RayHit {
   BodyId body;
   Real distance = 0;  ///< [m], from the origin
@@ -27,7 +27,7 @@ struct RayHit {
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
 
-/// Says of which bodies a query shall hear; an empty one, of all.
+/// Predicate that selects bodies; empty selects all.
 using BodyFilter = std::function<bool(BodyId)>;
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// A run written down: the scene and the state after every step, for replay and comparison.
+/// Recordings of runs: the scene and the state after every step, for replay and comparison.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -13,26 +13,26 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// What a recording says about its run.
+/// Description of the recorded run.
 struct RecordingHeader {
   std::string engine;   ///< "native", "bullet" or "bullet-stock"
-  std::string backend;  ///< as to_string(Backend)
+  std::string backend;  ///< name given by to_string(Backend)
   Scene scene;
   friend bool operator==(const RecordingHeader&, const RecordingHeader&) = default;
 };
 
-/// Writes a recording frame by frame. The file appears under its name only at finish(), complete;
-/// before that it lies beside it as NAME.part, which the destructor removes. Not thread-safe.
+/// Writes a recording frame by frame. finish() creates the complete file under its name; until then
+/// the data are in NAME.part in the same folder, which the destructor removes. Not thread-safe.
 class JFPX_API RecordingWriter {
  public:
-  /// @throws FileError if the file can't be made.
+  /// @throws FileError if the file cannot be created
   RecordingWriter(const std::string& path, const RecordingHeader& header);
   ~RecordingWriter();
   RecordingWriter(RecordingWriter&&) noexcept;
   RecordingWriter& operator=(RecordingWriter&&) noexcept;
 
-  /// The states of all bodies after the next step, in scene order.
-  /// @throws InvalidArgument if their number is not the scene's; FileError if the disk is full.
+  /// Appends the states of all bodies after the next step, in scene order.
+  /// @throws InvalidArgument if their number is not the scene's; FileError if the disk is full
   void append(std::span<const BodyState> states);
   /// Completes the file. @throws FileError
   void finish();
@@ -42,11 +42,11 @@ class JFPX_API RecordingWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Reads a recording. The whole file is checked when it is opened. Not thread-safe.
+/// Reads a recording. The constructor checks the whole file. Not thread-safe.
 class JFPX_API RecordingReader {
  public:
-  /// @throws FileError if the file can't be read, is no recording, is of another version or
-  ///   precision, is truncated, or its checksum is wrong.
+  /// @throws FileError if the file cannot be read, is not a recording, is of another version or
+  ///   precision, is truncated, or has a wrong checksum
   explicit RecordingReader(const std::string& path);
   ~RecordingReader();
   RecordingReader(RecordingReader&&) noexcept;
@@ -54,7 +54,7 @@ class JFPX_API RecordingReader {
 
   const RecordingHeader& header() const;
   std::uint64_t steps() const;
-  /// States after step `step`, from 1 to steps(). @throws InvalidArgument out of that range.
+  /// States after step `step`, from 1 to steps(). @throws InvalidArgument outside that range
   std::vector<BodyState> states(std::uint64_t step);
 
  private:
@@ -62,18 +62,19 @@ class JFPX_API RecordingReader {
   std::unique_ptr<Impl> impl_;
 };
 
-/// "float" or "double": which build wrote the recording. @throws FileError as RecordingReader.
+/// Precision of the build that wrote the recording: "float" or "double".
+/// @throws FileError if the file cannot be read or is not a recording of this version
 JFPX_API std::string recording_precision(const std::string& path);
 
-/// The first place where two frames differ.
+/// First difference of two frames.
 struct StateDifference {
-  std::uint32_t body = 0;  ///< position in the scene
+  std::uint32_t body = 0;  ///< index in the scene
   std::string field;       ///< for example "velocity.y"
   Real expected = 0, actual = 0;
 };
 
-/// The first body and field in which two frames differ in bits; empty if they are equal. Frames of
-/// different lengths differ in the field "existence" of the first body that only one has.
+/// The first body and field whose bits differ in two frames; empty if the frames are equal. Frames
+/// of different lengths differ in the field "existence" of the first body that only one contains.
 JFPX_API std::optional<StateDifference> first_difference(std::span<const BodyState> expected,
                                                          std::span<const BodyState> actual);
 

@@ -1,7 +1,8 @@
-/// A scene: bodies and settings as a plain value that any engine can run, and its JSON form.
+/// Scenes: bodies and settings as a plain value that every engine can run, and their JSON form.
 #pragma once
 
 #include <jfpx/body.hpp>
+#include <jfpx/build.hpp>
 #include <jfpx/material.hpp>
 
 #include <string>
@@ -13,23 +14,25 @@ inline namespace JFPX_ABI {
 
 /// Settings of the native contact resolver (thesis 4.4.6).
 struct ResolverSettings {
-  /// Most contacts corrected per step in each loop; 0 means 8 per movable body, as the thesis did.
+  /// Maximum number of contacts corrected per step, in each of the two loops; 0: 8 per movable
+  /// body, as in the thesis.
   std::uint32_t max_iterations = 0;
-  Real velocity_epsilon = Real(0.01);      ///< [m/s], > 0: smaller closing changes are left alone
-  Real position_epsilon = Real(0.01);      ///< [m], > 0: deeper penetrations are brought below it
+  Real velocity_epsilon = Real(0.01);      ///< [m/s], > 0: smaller velocity errors are ignored
+  Real position_epsilon = Real(0.01);      ///< [m], > 0: deeper penetrations are reduced below it
   Real restitution_velocity = Real(0.25);  ///< [m/s], >= 0: slower contacts do not bounce
-  Real angular_limit = Real(0.2);  ///< [rad], in (0, 1]: how far one projection may turn a body
+  Real angular_limit = Real(0.2);          ///< [rad], in (0, 1]: maximum rotation by one projection
   friend bool operator==(const ResolverSettings&, const ResolverSettings&) = default;
 };
 
 /// Settings of the native sleep test (thesis 4.4.2).
 struct SleepSettings {
   bool enabled = true;
-  Real epsilon = Real(0.3);  ///< [m^2/s^2], > 0: a body sleeps when its mean motion is below
-  Real bias = Real(0.05);    ///< [-], in (0, 1]: weight that one second leaves to the old mean
+  Real epsilon = Real(0.3);  ///< [m^2/s^2], > 0: a body whose mean motion is smaller falls asleep
+  Real bias = Real(0.05);    ///< [-], in (0, 1]: weight of the previous mean after one second
   friend bool operator==(const SleepSettings&, const SleepSettings&) = default;
 };
 
+/// Bodies and the settings of their simulation.
 struct Scene {
   std::string name = "unnamed";
   Real dt = Real(1) / Real(60);  ///< [s], > 0: length of a step
@@ -40,31 +43,35 @@ struct Scene {
   friend bool operator==(const Scene&, const Scene&) = default;
 };
 
-/// Version of the JSON form that to_json() writes; from_json() reads this one.
+/// Version of the JSON schema that to_json() writes and from_json() accepts.
 inline constexpr int kSceneSchemaVersion = 1;
-/// Largest distance from the origin, per axis, that a position may have: [m].
+/// [m], largest absolute value of a coordinate of a position.
 inline constexpr Real kMaxCoordinate = Real(1e9);
-/// How far from 1 the square of the length of a unit vector or quaternion may be: enough for
-/// numbers typed with four digits. Engines normalise what they are given.
+/// Largest deviation from 1 of the squared length of a unit vector or quaternion: sufficient for
+/// numbers typed with four digits. Engines normalise these values.
 inline constexpr Real kUnitTolerance = Real(1e-3);
 
-/// Checks everything that could reach a step. Returns normally if the scene is sound. Besides the
-/// ranges given with the fields: sizes, positions and offsets are at most kMaxCoordinate, masses
-/// and moments of inertia have finite inverses, dt is not denormal, 2^32 - 1 bodies at most.
-/// @throws InvalidScene naming the first bad body, field, its value and the allowed range.
+/// Checks every field that can affect a step. In addition to the ranges given with the fields,
+/// sizes, positions and offsets must not exceed kMaxCoordinate, masses and moments of inertia must
+/// have finite inverses, dt must not be denormal, and there may be at most 2^32 - 1 bodies.
+/// @throws InvalidScene naming the first invalid body, the field, its value and the allowed range.
 JFPX_API void validate(const Scene& scene);
 
-/// The scene as JSON text. Numbers are written so that from_json() gives back the same bits. What
-/// is no UTF-8 in the name becomes U+FFFD.
+/// The scene as JSON text. Numbers are written so that from_json() restores the same bits. Invalid
+/// UTF-8 in the name becomes U+FFFD.
+/// @throws InvalidScene as validate().
 JFPX_API std::string to_json(const Scene& scene);
-/// Parses and validates.
-/// @throws InvalidScene: broken JSON (with line and column), unknown or missing field, wrong type,
-///   unknown schema version or shape, value out of range.
+/// Parses and validates a scene. Also accepts "assembly", the name of a compound in version 0.1.
+/// @throws InvalidScene: malformed JSON (with line and column), unknown or missing field, wrong
+///   type, unknown schema version or shape, value out of range.
 JFPX_API Scene from_json(std::string_view text);
 
-/// @throws FileError if the file can't be read, and as from_json(), with the path in front.
+/// Reads a scene file.
+/// @throws FileError if the file can't be read; InvalidScene as from_json(), prefixed with the
+///   path.
 JFPX_API Scene load_scene(const std::string& path);
-/// Writes to_json() to the path, all or nothing. @throws FileError
+/// Writes to_json() to a file atomically: the path holds the complete file or is unchanged.
+/// @throws FileError; InvalidScene as to_json()
 JFPX_API void save_scene(const Scene& scene, const std::string& path);
 
 }  // namespace JFPX_ABI

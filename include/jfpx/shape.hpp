@@ -1,4 +1,5 @@
-/// Collision shapes as plain values.
+/// Collision shapes as plain values. A shape is centred at the origin of its body's axes, unless
+/// its description differs.
 #pragma once
 
 #include <jfpx/math.hpp>
@@ -9,58 +10,61 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
+/// A solid sphere.
 struct Sphere {
   Real radius = Real(0.5);  ///< [m], > 0
   friend bool operator==(const Sphere&, const Sphere&) = default;
 };
 
+/// A solid box, aligned with the axes of its body.
 struct Box {
   Vec3 half_extents{Real(0.5), Real(0.5), Real(0.5)};  ///< [m], each > 0
   friend bool operator==(const Box&, const Box&) = default;
 };
 
-/// All points p with dot(normal, p) <= offset are solid. In world coordinates: it does not follow
-/// its body's pose.
+/// A solid half-space: all points p with dot(normal, p) <= offset, in world coordinates. It ignores
+/// the pose of its body.
 struct HalfSpace {
   Vec3 normal{0, 1, 0};  ///< [-], unit
   Real offset = 0;       ///< [m]
   friend bool operator==(const HalfSpace&, const HalfSpace&) = default;
 };
 
-/// All points p with dot(normal, p) = offset: a wall without thickness. A body is pushed to the
-/// side where its centre of mass is, all parts of it, however far they reach through; to the front
-/// if it is on the plane. In world coordinates, as a half-space.
+/// A two-sided wall without thickness: all points p with dot(normal, p) = offset, in world
+/// coordinates. It ignores the pose of its body. A body collides with the side on which its centre
+/// of mass lies, however far parts of it penetrate; a centre on the plane counts as on the front.
 struct Plane {
-  Vec3 normal{0, 1, 0};  ///< [-], unit, to the front
+  Vec3 normal{0, 1, 0};  ///< [-], unit, points to the front
   Real offset = 0;       ///< [m]
   friend bool operator==(const Plane&, const Plane&) = default;
 };
 
-/// A sphere or a box that belongs to an compound, placed in the axes of the body.
+/// A sphere or a box of a compound, with its pose in the axes of the body.
 struct CompoundPart {
   std::variant<Sphere, Box> shape = Sphere{};
-  Vec3 position = {};  ///< [m], body axes, of the part's centre
+  Vec3 position = {};  ///< [m], body axes, centre of the part
   Quat orientation = {};
   Real density = 1;  ///< [-], in (0, 1e9], relative to the other parts
   friend bool operator==(const CompoundPart&, const CompoundPart&) = default;
 };
 
-/// Spheres and boxes that move as one body (thesis 4.4.5) and never touch each other. The body's
-/// mass is shared out by density times volume; where parts overlap it counts for both. The centre
-/// of mass of a movable body must be the origin of its axes, to a thousandth of its reach; engines
-/// take the origin for it. See centred().
+/// Spheres and boxes that move as one body (thesis 4.4.5) and do not collide with each other. The
+/// body's mass is distributed in proportion to density times volume; overlapping volume counts for
+/// each of the parts. The centre of mass of a movable body must be the origin of its axes, to a
+/// thousandth of its bounding radius, because engines use the origin as the centre of mass. See
+/// centred().
 struct Compound {
   std::vector<CompoundPart> parts;  ///< at least one
   friend bool operator==(const Compound&, const Compound&) = default;
 };
 
-/// The compound moved in its axes so that the centre of mass is the origin.
-/// @param compound each part in the ranges that validate() asks for
+/// The compound, translated so that its centre of mass is the origin.
+/// @param compound each part must be in the ranges that validate() requires
 JFPX_API Compound centred(Compound compound);
 
 using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound>;
 
-/// A sphere placed in the world: what the collider works on. Laid out as four Reals.
+/// A sphere in world coordinates, the input of SphereCollider. The layout is that of four Reals.
 struct alignas(4 * sizeof(Real)) SphereInstance {
   Vec3 centre;      ///< [m]
   Real radius = 0;  ///< [m], > 0

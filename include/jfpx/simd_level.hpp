@@ -1,4 +1,4 @@
-/// Vector instruction sets that the CPU backend can use.
+/// Vector instruction sets of the CPU backend.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -8,8 +8,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Widest vector instructions that may be used. A level that the processor lacks is lowered to the
-/// widest one that it has. Results do not depend on it.
+/// Widest vector instructions that may be used. A level that the processor does not support is
+/// lowered to the widest supported one. Results do not depend on the level.
 enum class SimdLevel : std::uint8_t { automatic, scalar, sse2, avx2, avx512 };
 
 }  // namespace JFPX_ABI

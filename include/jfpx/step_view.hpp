@@ -1,4 +1,4 @@
-/// What forces and contact generators see of a world in the middle of a step.
+/// Read access to a world for forces and contact generators, during a step.
 #pragma once
 
 #include <jfpx/body.hpp>
@@ -10,7 +10,7 @@ inline namespace JFPX_ABI {
 
 class BodyStore;
 
-/// Valid during the call that it is given to.
+/// Valid during the call that receives it.
 class JFPX_API StepView {
  public:
   StepView(const BodyStore& bodies, double time) : bodies_(&bodies), time_(time) {}
@@ -20,11 +20,11 @@ class JFPX_API StepView {
   std::span<const BodyId> bodies() const;  ///< living bodies in the order of their indices
   bool contains(BodyId id) const noexcept;
 
-  /// These throw InvalidArgument for a body that does not live; the step is then undone.
+  /// @throws InvalidArgument, in all four, for a body that does not live; the step is then undone
   BodyState state(BodyId id) const;
   const Shape& shape(BodyId id) const;
   Real mass(BodyId id) const;   ///< [kg]; 0: immovable or kinematic
-  bool awake(BodyId id) const;  ///< of mass 0: only what is kinematic and moves
+  bool awake(BodyId id) const;  ///< of the bodies of mass 0: only kinematic ones, while they move
 
  protected:
   std::uint32_t require(BodyId id) const;

@@ -12,7 +12,7 @@ from conan.tools.files import copy, load
 class Jfpx(ConanFile):
     name = "jfpx"
     license = "Zlib"
-    description = "Rigid-body collision with the same bits on x86, on CUDA and inside Bullet"
+    description = "Rigid-body collision with the same bits on the CPU, on CUDA and inside Bullet"
     topics = ("physics", "collision-detection", "deterministic", "cuda")
     package_type = "library"
     settings = "os", "arch", "compiler", "build_type"
@@ -20,7 +20,7 @@ class Jfpx(ConanFile):
     default_options = {"shared": False, "cuda": False}
 
     @property
-    def _root(self):  # the recipe lies inside the sources that it builds
+    def _root(self):  # the recipe is inside the sources that it builds
         return os.path.join(self.recipe_folder, "..", "..")
 
     def set_version(self):
@@ -40,7 +40,7 @@ class Jfpx(ConanFile):
     def validate(self):
         check_min_cppstd(self, 20)
         if self.settings.os != "Linux" or self.settings.arch != "x86_64":
-            raise ConanInvalidConfiguration("jfpx has been tried on x86-64 Linux only")
+            raise ConanInvalidConfiguration("jfpx supports x86-64 Linux only")
 
     def generate(self):
         CMakeDeps(self).generate()
@@ -60,7 +60,7 @@ class Jfpx(ConanFile):
         copy(self, "LICENSE", self.source_folder, os.path.join(self.package_folder, "licenses"))
 
     def package_info(self):
-        # The package's own files for CMake and pkg-config say more than Conan could: exact flags, both precisions.
+        # Consumers use the package's own CMake and pkg-config files, which contain the flags and both precisions.
         self.cpp_info.set_property("cmake_find_mode", "none")
         self.cpp_info.set_property("pkg_config_name", "none")
         self.cpp_info.builddirs.append(os.path.join("lib", "cmake", "jfpx"))

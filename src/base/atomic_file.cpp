@@ -1,4 +1,4 @@
-/// A file that appears under its path only when it is complete.
+/// Implementation of AtomicFile.
 #include "src/base/atomic_file.hpp"
 
 #include <jfpx/error.hpp>
@@ -15,16 +15,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Something is there, and renaming a file over it would destroy it.
+/// True if the path exists and is no regular file, so that renaming a file over it would destroy
+/// it.
 bool is_special(const std::string& path) {
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
   return fs::exists(status) && !fs::is_regular_file(status);
 }
 
-/// Where the links end, also where nothing is there yet.
+/// Target of a chain of symbolic links, which need not exist.
 std::string follow_links(const std::string& path) {
-  constexpr int kMaxLinks = 40;  // as Linux: links may go round in circles
+  constexpr int kMaxLinks = 40;  // the limit of Linux; links may form a cycle
   fs::path target = path;
   std::error_code ignored;
   for (int i = 0; i < kMaxLinks && fs::is_symlink(target, ignored); ++i) {
@@ -50,7 +51,7 @@ AtomicFile::~AtomicFile() {
 
 void AtomicFile::write(std::string_view bytes) {
   require_open();
-  if (bytes.empty()) return;  // fwrite may not be given null
+  if (bytes.empty()) return;  // fwrite does not accept a null pointer
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail();
 }
 
@@ -63,7 +64,7 @@ void AtomicFile::finish() {
 
 void AtomicFile::require_open() const {
   if (file_ == nullptr || failed_) {
-    throw FileError(path_ + (finished_ ? " is finished" : " could not be written before"));
+    throw FileError(path_ + (finished_ ? " is already finished" : ": an earlier write failed"));
   }
 }
 

@@ -1,4 +1,4 @@
-/// A file that appears under its path only when it is complete.
+/// Atomic file writer: the file appears under its path only when it is complete.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,20 +10,21 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Written beside its path and renamed at the end, so that the file is there whole or not at all.
-/// What was not finished is removed. A link stays one: the file that it leads to is written. A
-/// device or a pipe can't be replaced: what is written goes there at once.
+/// Writes to a temporary file beside its path and renames it in finish(), so that readers see
+/// either the complete file or none. The destructor removes an unfinished file. A symbolic link is
+/// kept, and its target is replaced. Devices and pipes can't be replaced and are written directly.
 class JFPX_API AtomicFile {
  public:
-  /// Opens at once, so that a bad path fails before a long run. @throws FileError
+  /// Opens the temporary file immediately, so that an invalid path fails before a long run.
+  /// @throws FileError
   explicit AtomicFile(std::string path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// @throws FileError, and from then on always: a part of it may be missing
+  /// @throws FileError; all later calls throw too, because part of the content may be missing
   void write(std::string_view bytes);
-  /// Nothing may be written afterwards. @throws FileError
+  /// Completes the file. No call of write() may follow. @throws FileError
   void finish();
 
  private:
@@ -31,8 +32,8 @@ class JFPX_API AtomicFile {
   [[noreturn]] void fail();
 
   std::string path_;
-  std::string target_;  ///< where the links of path_ end
-  std::string part_;    ///< where it is written; target_ itself if that is no ordinary file
+  std::string target_;  ///< path_ with symbolic links resolved
+  std::string part_;    ///< path of the temporary file; target_ itself if that is no regular file
   std::FILE* file_;
   bool finished_ = false, failed_ = false;
 };

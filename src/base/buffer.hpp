@@ -1,4 +1,4 @@
-/// Memory that only grows, is not initialised, and says what it was for when there is none left.
+/// Uninitialized growable buffer that reports the purpose of a failed allocation.
 #pragma once
 
 #include <jfpx/error.hpp>
@@ -15,7 +15,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Elements are trivial and not constructed. Growing drops the contents, unless they are kept.
+/// Elements are trivially copyable and not initialized. Growing discards the contents, apart from
+/// the elements to be kept.
 template <class T>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -37,8 +38,9 @@ class Buffer {
   T& operator[](std::size_t i) { return data_[i]; }
   const T& operator[](std::size_t i) const { return data_[i]; }
 
-  /// Room for `count` elements, the first `kept` of which stay. `purpose` is a plural noun.
-  /// @throws OutOfMemory; the buffer is then as before.
+  /// Makes the capacity at least `count`, and keeps the first `kept` elements. `purpose` is a
+  /// plural noun for the message of the exception.
+  /// @throws OutOfMemory; the buffer is then unchanged.
   T* reserve(std::size_t count, const char* purpose, std::size_t kept = 0) {
     if (count <= capacity_) return data_;
     T* fresh = allocate(count, purpose);
@@ -70,8 +72,8 @@ class Buffer {
       throw OutOfMemory("out of memory: " + std::to_string(bytes) + " bytes needed for " +
                         std::to_string(count) + " " + purpose);
     }
-    // Scattered access to megabytes is bound by address translation; this is a hint, so a refusal
-    // is no error.
+    // Huge pages, because random access to large buffers is bound by address translation. This is
+    // a hint, so a failure is not an error.
     if (bytes >= 2 * kHugePage) ::madvise(memory, bytes, MADV_HUGEPAGE);
     return static_cast<T*>(memory);
   }

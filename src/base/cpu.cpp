@@ -1,4 +1,4 @@
-/// Asks the processor through cpuid.
+/// Processor detection through the cpuid instruction.
 #include "src/base/cpu.hpp"
 
 #include <algorithm>
@@ -40,7 +40,7 @@ const char* name_of(SimdLevel level) {
 
 }  // namespace
 
-// __builtin_cpu_supports() also asks whether the operating system saves the wide registers.
+// __builtin_cpu_supports() also checks that the operating system saves the wide registers.
 SimdLevel widest_simd_level() noexcept {
   __builtin_cpu_init();
   if (__builtin_cpu_supports("popcnt") && __builtin_cpu_supports("avx2")) {

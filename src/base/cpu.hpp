@@ -10,9 +10,9 @@ inline namespace JFPX_ABI {
 
 /// The widest level that this processor and the operating system support.
 SimdLevel widest_simd_level() noexcept;
-/// `wanted`, lowered to what there is; `automatic` is the widest.
+/// `wanted`, or the widest supported level if that is narrower or `wanted` is `automatic`.
 SimdLevel usable_simd_level(SimdLevel wanted) noexcept;
-/// E.g. "AMD EPYC 9654 96-Core Processor, AVX-512".
+/// Name and widest instruction set, for example "AMD EPYC 9654 96-Core Processor, AVX-512".
 std::string describe_processor();
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,5 @@
-/// Home of the exceptions' vtables, so that they have one type across shared libraries.
+/// Destructors of the exceptions. Defining them here gives each class one vtable, and hence one
+/// type identity, across shared libraries.
 #include <jfpx/error.hpp>
 
 namespace jfpx {
@@ -10,7 +11,6 @@ InvalidArgument::~InvalidArgument() = default;
 BackendUnavailable::~BackendUnavailable() = default;
 OutOfMemory::~OutOfMemory() = default;
 DeviceError::~DeviceError() = default;
-BuildMismatch::~BuildMismatch() = default;
 FileError::~FileError() = default;
 
 }  // namespace JFPX_ABI

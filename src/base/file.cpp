@@ -1,4 +1,4 @@
-/// Whole files, with errors that say which file and why.
+/// Implementation of file.hpp with the C library.
 #include "src/base/file.hpp"
 
 #include <jfpx/error.hpp>

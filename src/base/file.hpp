@@ -1,4 +1,4 @@
-/// Whole files, with errors that say which file and why.
+/// Reading and writing of whole files. Errors name the file and the reason.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -9,12 +9,13 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// `PATH: what: reason from errno`, for FileError.
+/// The text "PATH: WHAT: REASON", for FileError. The reason is that of `error_number`, a value of
+/// errno.
 JFPX_API std::string file_message(const std::string& path, std::string_view what, int error_number);
 
-/// @throws FileError
+/// The content of a file. @throws FileError
 JFPX_API std::string read_file(const std::string& path);
-/// Through an AtomicFile: the file is there whole or not at all. @throws FileError
+/// Creates or replaces a file atomically: see AtomicFile. @throws FileError
 JFPX_API void write_file(const std::string& path, std::string_view content);
 
 }  // namespace JFPX_ABI

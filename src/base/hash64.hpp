@@ -1,4 +1,4 @@
-/// A 64-bit hash of words and bytes, fed bit by bit in order; for fingerprints and checksums.
+/// Incremental 64-bit hash of words and bytes, for state hashes and checksums.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,16 +10,17 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// FNV-1a (Fowler, Noll, Vo) over 64-bit words with a xor-shift between, closed by splitmix64's
-/// finaliser. Every word's change changes the value; not for cryptography.
+/// FNV-1a (Fowler, Noll, Vo) over 64-bit words with a xor-shift after each word, and the finalizer
+/// of splitmix64. Each step is a bijection of the state, so a change of one word changes the value.
+/// Not for cryptography.
 class Hash64 {
  public:
   constexpr void add_word(std::uint64_t word) {
     state_ = (state_ ^ word) * 0x00000100000001b3u;
     state_ ^= state_ >> 29;
   }
-  /// The bytes, as little-endian words; the last one is padded with zeros and followed by the
-  /// length.
+  /// Adds the bytes as little-endian words. The last word is padded with zeros, and the length
+  /// follows as a word.
   void add_bytes(const void* data, std::size_t size) {
     const auto* bytes = static_cast<const unsigned char*>(data);
     for (std::size_t i = 0; i < size; i += sizeof(std::uint64_t)) {
@@ -30,6 +31,7 @@ class Hash64 {
     }
     add_word(size);
   }
+  /// The hash of all words added so far.
   constexpr std::uint64_t value() const {
     std::uint64_t z = state_;
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;

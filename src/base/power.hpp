@@ -1,4 +1,5 @@
-/// Powers for damping and forgetting, the same bits with every compiler and C library.
+/// Powers for damping and exponential averaging, with the same bits for every compiler and C
+/// library.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -9,12 +10,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// Natural logarithm of x > 0, to about 2e-16 relative. frexp is exact; the rest is + - * /.
+/// Natural logarithm of x > 0, with a relative error of about 2e-16. frexp is exact; all other
+/// operations are + - * /.
 JFPX_HD inline double natural_logarithm(double x) {
   constexpr double kLn2 = 0x1.62e42fefa39efp-1;
   int exponent = 0;
   double mantissa = ::frexp(x, &exponent);
-  if (mantissa < 0x1.6a09e667f3bcdp-1) {  // sqrt(1/2): keeps the mantissa around 1
+  if (mantissa < 0x1.6a09e667f3bcdp-1) {  // sqrt(1/2): keeps the mantissa close to 1
     mantissa *= 2;
     --exponent;
   }
@@ -25,10 +27,10 @@ JFPX_HD inline double natural_logarithm(double x) {
   return exponent * kLn2 + 2 * s * series;
 }
 
-/// e^x for x <= 0. ldexp is exact, so only the range reduction and the series round.
+/// e^x for x <= 0. ldexp is exact, so rounding occurs only in the range reduction and the series.
 JFPX_HD inline double exponential(double x) {
   if (x < -745) return 0;
-  constexpr double kLn2High = 0x1.62e42feep-1;  // few enough bits that n * kLn2High is exact
+  constexpr double kLn2High = 0x1.62e42feep-1;  // short enough for n * kLn2High to be exact
   constexpr double kLn2Low = 0x1.a39ef35793c76p-33;
   const double n = ::floor(x * 0x1.71547652b82fep+0 + 0.5);
   const double r = (x - n * kLn2High) - n * kLn2Low;
@@ -37,10 +39,10 @@ JFPX_HD inline double exponential(double x) {
   return ::ldexp(series, static_cast<int>(n));
 }
 
-/// base^exponent for base in (0, 1] and exponent >= 0: what is left of a quantity of which `base`
-/// is kept per second, after `exponent` seconds. libm's pow differs between C libraries in the
-/// last bit, and a damping factor reaches every state.
-/// Relative error below 1e-15 * (1 + |exponent * ln(base)|).
+/// base^exponent for base in (0, 1] and exponent >= 0: the fraction of a quantity that remains
+/// after `exponent` seconds if the fraction `base` remains after one. Replaces std::pow, whose last
+/// bit differs between C libraries, because a damping factor affects every state. The relative
+/// error is below 1e-15 * (1 + |exponent * ln(base)|).
 JFPX_HD inline double power(double base, double exponent) {
   return exponential(exponent * natural_logarithm(base));
 }

@@ -1,4 +1,4 @@
-/// Asking for memory in time.
+/// Software prefetch of a cache line.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -6,11 +6,12 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Brings the cache line into the second-level cache; any address will do. Not into the first,
-/// whose few open requests are all taken when lines come from memory: the next one would wait.
+/// Prefetches the cache line of `address` into the L2 cache. The address may be invalid. The L1
+/// cache is not the target, because its few line-fill buffers are exhausted when lines come from
+/// memory, and the next request would stall.
 ///
-/// Not __builtin_prefetch: GCC takes a function that does nothing else for one without effects, and
-/// silently drops the calls to it that were not inlined.
+/// Uses inline assembly instead of __builtin_prefetch: GCC treats a function that contains only
+/// __builtin_prefetch as free of side effects and silently removes calls that were not inlined.
 inline void prefetch(const void* address) { asm volatile("prefetcht1 (%0)" : : "r"(address)); }
 
 }  // namespace JFPX_ABI

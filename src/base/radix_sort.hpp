@@ -1,5 +1,4 @@
-/// Stable radix sort (LSD) over a range of bits, in fixed chunks: the same permutation for any
-/// number of threads.
+/// Parallel, stable LSD radix sort over a range of key bits.
 #pragma once
 
 #include "src/base/buffer.hpp"
@@ -11,10 +10,14 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
+/// Sorts in chunks whose bounds depend on the number of items alone. The sort is stable, so the
+/// permutation is the same for any number of threads.
 class RadixSorter {
  public:
-  /// Sorts by bits [low, low + bits) of key(item). Works in `items` and `spare`; returns whichever
-  /// of them holds the result.
+  /// Sorts by the bits [low, low + bits) of key(item), and overwrites both `items` and `spare`.
+  /// @param count below 2^32; the size of both arrays
+  /// @return the array that holds the result, `items` or `spare`
+  /// @throws OutOfMemory
   template <class T, class Key>
   T* sort(ThreadPool& pool, T* items, T* spare, std::size_t count, unsigned low, unsigned bits,
           const Key& key) {
@@ -55,11 +58,11 @@ class RadixSorter {
   }
 
  private:
-  static constexpr unsigned kMaxBits = 11;  ///< as many streams as the first-level TLBs bear
+  static constexpr unsigned kMaxBits = 11;  ///< bits per digit, limited by the first-level TLB
   static constexpr std::size_t kChunk = 16384;
   static constexpr std::size_t kMaxChunks = 64;
 
-  Buffer<std::uint32_t> offsets_;
+  Buffer<std::uint32_t> offsets_;  ///< for each chunk and digit, the position of its next item
 };
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// Taking memory before anything changes, so that nothing has when there is none.
+/// Reserves memory before state changes, so that a failed allocation leaves the state unchanged.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,8 +10,9 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Room for `count` elements in all. Grows as push_back() does: a series of calls costs linear
-/// time.
+/// Reserves capacity for `count` elements in total. The capacity grows geometrically, as with
+/// push_back(), so that a series of calls takes linear time.
+/// @throws std::bad_alloc, std::length_error as std::vector::reserve()
 template <class T>
 void reserve_geometric(std::vector<T>* items, std::size_t count) {
   if (items->capacity() < count) items->reserve(std::max(count, 2 * items->capacity()));

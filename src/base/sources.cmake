@@ -4,7 +4,8 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cpu.cpp
   ${CMAKE_CURRENT_LIST_DIR}/error.cpp
   ${CMAKE_CURRENT_LIST_DIR}/file.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/thread_pool.cpp)
+  ${CMAKE_CURRENT_LIST_DIR}/thread_pool.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/time_chooser.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/cuda_try.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/device_buffer.cpp

@@ -1,4 +1,4 @@
-/// Chunks are taken from a shared counter; see the header.
+/// Implementation of ThreadPool: threads take chunks from a shared counter.
 #include "src/base/thread_pool.hpp"
 
 #include <jfpx/error.hpp>
@@ -26,7 +26,7 @@ ThreadPool::ThreadPool(unsigned threads) {
       workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
     }
   } catch (const std::system_error&) {
-    // Results do not depend on the number of threads: those that there are do all the work.
+    // Results do not depend on the number of threads, so the pool works with those that started.
   }
 }
 
@@ -34,7 +34,8 @@ ThreadPool::~ThreadPool() {
   for (std::jthread& worker : workers_) worker.request_stop();
 }
 
-void ThreadPool::run_shared(const Job& job) {
+void ThreadPool::run_shared(Job job) {
+  std::fegetenv(&job.environment);
   {
     const std::lock_guard lock(mutex_);
     job_ = job;
@@ -44,8 +45,8 @@ void ThreadPool::run_shared(const Job& job) {
   }
   started_.notify_all();
   take_chunks(job);
-  // All chunks are taken: workers that the system has not let run yet have nothing to come for, and
-  // on a busy machine waiting for them would cost more than the loop.
+  // All chunks are taken. Workers that the system has not scheduled yet would find no chunk, and on
+  // a loaded machine waiting for them would take longer than the loop.
   std::unique_lock lock(mutex_);
   open_ = false;
   finished_.wait(lock, [&] { return busy_ == 0; });
@@ -61,6 +62,7 @@ void ThreadPool::work(const std::stop_token& stop) {
     ++busy_;
     const Job job = job_;
     lock.unlock();
+    std::fesetenv(&job.environment);
     take_chunks(job);
     lock.lock();
     if (--busy_ == 0) finished_.notify_one();

@@ -1,4 +1,4 @@
-/// What our own code can fail of inside Bullet, where no exception may pass.
+/// Classification of exceptions inside Bullet's callbacks, through which none may propagate.
 #pragma once
 
 #include <jfpx/error.hpp>
@@ -11,19 +11,19 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Whether memory was wanting, which there may be again in the next step.
-inline bool is_shortage(const std::exception& error) noexcept {
+/// Whether an allocation failed, which may succeed again in the next step.
+inline bool is_out_of_memory(const std::exception& error) noexcept {
   return dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
          dynamic_cast<const OutOfMemory*>(&error) != nullptr;
 }
 
-/// What the error says, never nothing; also where there is no memory for it.
-inline std::string text_of(const std::exception& error) noexcept {
+/// The message of the error, never empty, even if there is no memory for a copy.
+inline std::string message_of(const std::exception& error) noexcept {
   try {
     const std::string text = error.what();
     return text.empty() ? "unknown" : text;
   } catch (const std::bad_alloc&) {
-    return "out of memory";  // short enough to need none
+    return "out of memory";  // short enough to be stored without an allocation
   }
 }
 

@@ -1,4 +1,4 @@
-/// What to ask for in time: bodies, algorithms and manifolds lie anywhere.
+/// Prefetches of Bullet's bodies, algorithms and manifolds, which are scattered in memory.
 #pragma once
 
 #include "src/base/prefetch.hpp"
@@ -13,10 +13,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Some bytes behind an address that may be null or of something that has gone: there, arithmetic
-/// with pointers is undefined.
+/// Prefetches `bytes` after an address that may be null or belong to a destroyed object, for which
+/// pointer arithmetic is undefined.
 inline void prefetch_at(const void* address, std::size_t bytes) {
-  // NOLINTNEXTLINE(performance-no-int-to-ptr): nothing is read through it
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): nothing is read through the pointer
   prefetch(reinterpret_cast<const void*>(reinterpret_cast<std::uintptr_t>(address) + bytes));
 }
 
@@ -25,13 +25,13 @@ inline void prefetch_bytes(const void* address, std::size_t bytes) {
   for (std::size_t i = 0; i < bytes; i += kCacheLine) prefetch_at(address, i);
 }
 
-/// For an object no larger than a cache line, which may lie across two.
+/// For an object no larger than a cache line, which may straddle two lines.
 inline void prefetch_ends(const void* address, std::size_t bytes) {
   prefetch(address);
   prefetch_at(address, bytes - 1);
 }
 
-/// Where the protected fields of a body lie.
+/// Pointers to the protected members of a body.
 struct BodyFields : btCollisionObject {
   static constexpr auto shape = &BodyFields::m_collisionShape;
   static constexpr auto friction = &BodyFields::m_friction;
@@ -39,34 +39,34 @@ struct BodyFields : btCollisionObject {
   static constexpr auto check_collide_with = &BodyFields::m_checkCollideWith;
 };
 
-/// Position, the fields from the shape to the activation, and whether there is a filter.
-inline void prefetch_place(const btCollisionObject& body) {
-  prefetch(&body.getWorldTransform() + 1);  // its end: the position is last
+/// Prefetches the position, the fields from the shape to the activation state, and the filter flag.
+inline void prefetch_geometry(const btCollisionObject& body) {
+  prefetch(&body.getWorldTransform() + 1);  // its end, because the position is last
   prefetch(&(body.*BodyFields::shape));
-  prefetch(&(body.*BodyFields::friction));  // right behind the activation
+  prefetch(&(body.*BodyFields::friction));  // directly after the activation state
   prefetch(&(body.*BodyFields::check_collide_with));
 }
 
-/// The same, and its class.
+/// Prefetches the same fields and the vtable pointer.
 inline void prefetch_state(const btCollisionObject& body) {
   prefetch(&body);
-  prefetch_place(body);
+  prefetch_geometry(body);
 }
 
-/// All that a contact of the body needs.
+/// Prefetches all fields that a contact of the body reads.
 inline void prefetch_for_contact(const btCollisionObject& body) {
   prefetch_state(body);
   prefetch(&(body.*BodyFields::spinning_friction));
 }
 
-/// The number of points of a manifold. It is private: two thresholds lie between it and the first
-/// public member behind.
+/// Prefetches the number of points of a manifold. The member is private; two thresholds lie between
+/// it and the next public member.
 inline void prefetch_count(const btPersistentManifold* manifold) {
   prefetch(reinterpret_cast<const char*>(&manifold->m_companionIdA) - 2 * sizeof(btScalar) -
            sizeof(int));
 }
 
-/// The bodies, the number of points and the thresholds of a manifold, which are its last fields.
+/// Prefetches the bodies, the number of points and the thresholds, the last fields of a manifold.
 inline void prefetch_header(const btPersistentManifold* manifold) {
   prefetch_at(manifold, sizeof(btPersistentManifold) - 48);
   prefetch_at(manifold, sizeof(btPersistentManifold) - 1);
@@ -78,11 +78,11 @@ inline void prefetch_first_point(const btPersistentManifold* manifold) {
   prefetch_at(manifold, kBytes);
 }
 
-/// How far ahead of its use: manifolds come from memory, their bodies seldom.
+/// Prefetch distances in elements: manifolds usually miss the caches, bodies rarely do.
 inline constexpr int kManifoldsAhead = 16, kObjectsAhead = 8;
 
-/// The flags, island tag, companion id and activation state of an object. Where they lie is
-/// private, so this is a guess, which costs nothing if it is wrong.
+/// Prefetches the flags, island tag, companion id and activation state of an object. The members
+/// are private, so the offset is a guess, which costs nothing if it is wrong.
 inline void prefetch_island_state(const btCollisionObject* object) {
   constexpr std::size_t kGuess = sizeof(btScalar) == 4 ? 224 : 400;
   prefetch_at(object, kGuess);

@@ -1,6 +1,6 @@
-/// Box against box: the separating-axis test over 15 axes (Gottschalk, Lin and Manocha 1996) and
-/// the contact points of the axis of least depth, by clipping face against face (Sutherland and
-/// Hodgman 1974) or between two edges.
+/// Box-box collision: the separating-axis test over 15 axes (Gottschalk, Lin and Manocha 1996), and
+/// the contact points for the axis of least penetration, by clipping face against face (Sutherland
+/// and Hodgman 1974) or from the closest points of two edges.
 #pragma once
 
 #include <jfpx/collide.hpp>
@@ -9,71 +9,72 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// Both boxes in the axes of box a: b's axes are the columns of `turn`, its centre is `offset`.
+/// Two boxes in the axes of box a: the axes of b are the columns of `rotation`, its centre is
+/// `offset`.
 struct BoxPair {
   Vec3 half_a, half_b;
-  Mat3 turn;
-  Vec3 offset;
-  Real size;  ///< [m], sum of the half diagonals: the scale of rounding errors
+  Mat3 rotation;
+  Vec3 offset;  ///< [m]
+  Real size;    ///< [m], sum of the half diagonals: the scale of the rounding errors
 };
 
-/// An axis on which the boxes overlap least so far. Faces of a are 0..2, faces of b 3..5, and edge
-/// i of a across edge j of b is 6 + 3 i + j.
+/// The tested axis with the least overlap. Face normals of a have the numbers 0 to 2, those of b 3
+/// to 5, and the cross product of edge i of a and edge j of b has the number 6 + 3 i + j.
 struct LeastOverlap {
-  int axis = -1;
-  Real distance = 0;  ///< <= 0
-  Real error = 0;     ///< what rounding may have done to the distance
-  Vec3 normal;        ///< axes of a, unit, from b to a
+  int axis = -1;      ///< number of the axis; -1: none tested
+  Real distance = 0;  ///< [m], <= 0
+  Real error = 0;     ///< [m], bound of the rounding error of `distance`
+  Vec3 normal;        ///< unit, in the axes of a, from b to a
 };
 
 JFPX_HD constexpr Vec3 unit_axis(int i) {
   return {i == 0 ? Real(1) : Real(0), i == 1 ? Real(1) : Real(0), i == 2 ? Real(1) : Real(0)};
 }
-/// Half the length of a box's shadow on an axis given in the box's axes.
-JFPX_HD inline Real shadow(const Vec3& half, const Vec3& axis) {
+/// Half the length of a box's projection onto an axis that is given in the box's axes.
+JFPX_HD inline Real projected_half_length(const Vec3& half, const Vec3& axis) {
   return dot(half, {absolute(axis.x), absolute(axis.y), absolute(axis.z)});
 }
 
-/// False if the unit vector `axis` separates the boxes. Otherwise takes it if it overlaps less than
-/// the best so far.
-JFPX_HD inline bool try_axis(const BoxPair& pair, int name, const Vec3& axis, Real error,
+/// False if the unit vector `axis` separates the boxes. Otherwise replaces *best by this axis,
+/// number `index`, if its overlap is smaller.
+JFPX_HD inline bool try_axis(const BoxPair& pair, int index, const Vec3& axis, Real error,
                              LeastOverlap* best) {
   const Real along = dot(axis, pair.offset);
-  const Real reach =
-      shadow(pair.half_a, axis) + shadow(pair.half_b, transform_transpose(pair.turn, axis));
-  const Real distance = absolute(along) - reach;
+  const Real sum = projected_half_length(pair.half_a, axis) +
+                   projected_half_length(pair.half_b, transform_transpose(pair.rotation, axis));
+  const Real distance = absolute(along) - sum;
   if (!(distance <= 0)) return false;
   if (best->axis < 0 || distance > best->distance) {
-    *best = {name, distance, error, along > 0 ? -axis : axis};
+    *best = {index, distance, error, along > 0 ? -axis : axis};
   }
   return true;
 }
 
-/// `later` where it overlaps less by more than its rounding errors and two per cent, else `first`:
-/// a box that lies flat keeps one and the same face, and its points, from step to step.
+/// `later` if its overlap is smaller by more than its rounding error and two per cent, else
+/// `first`. A box that lies flat thus keeps the same face, and its points, from step to step.
 JFPX_HD constexpr const LeastOverlap& preferred(const LeastOverlap& first,
                                                 const LeastOverlap& later) {
-  const Real handicap = later.error - first.distance * Real(0.02);
-  return later.axis >= 0 && later.distance > first.distance + handicap ? later : first;
+  const Real tolerance = later.error - first.distance * Real(0.02);
+  return later.axis >= 0 && later.distance > first.distance + tolerance ? later : first;
 }
 
-/// False if an axis separates the boxes.
+/// False if an axis separates the boxes. Otherwise writes the axis of least overlap to *best.
 JFPX_HD inline bool least_overlap(const BoxPair& pair, LeastOverlap* best) {
-  const Real noise = 8 * kEpsilon * pair.size;
+  const Real error = 8 * kEpsilon * pair.size;
   LeastOverlap face_a, face_b, edges;
   for (int i = 0; i < 3; ++i) {
-    if (!try_axis(pair, i, unit_axis(i), noise, &face_a)) return false;
-    if (!try_axis(pair, 3 + i, pair.turn.column(i), noise, &face_b)) return false;
+    if (!try_axis(pair, i, unit_axis(i), error, &face_a)) return false;
+    if (!try_axis(pair, 3 + i, pair.rotation.column(i), error, &face_b)) return false;
   }
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      const Vec3 axis = cross(unit_axis(i), pair.turn.column(j));
-      // Edges this parallel have no common normal to speak of: its error, epsilon / sine, would be
-      // larger than the gap that the faces miss, of the order of the sine (erratum E15).
+      const Vec3 axis = cross(unit_axis(i), pair.rotation.column(j));
+      // Nearly parallel edges have no well-defined common normal: its error, epsilon / sine, would
+      // exceed the gap that the face axes miss, which is of the order of the sine (erratum E15).
       const Real sine = length(axis);
       if (!(sine * sine > 4 * kEpsilon)) continue;
       const Vec3 unit = axis * (Real(1) / sine);
-      if (!try_axis(pair, 6 + 3 * i + j, unit, noise / sine, &edges)) return false;
+      if (!try_axis(pair, 6 + 3 * i + j, unit, error / sine, &edges)) return false;
     }
   }
   *best = preferred(preferred(face_a, face_b), edges);
@@ -87,8 +88,8 @@ struct Polygon {
   JFPX_HD constexpr void add(const Vec3& p) { corner[count++] = p; }
 };
 
-/// The part of a polygon where side * p[axis] <= limit. Four cuts of a quadrangle leave at most
-/// eight corners.
+/// The part of a polygon where side * p[axis] <= limit. A quadrilateral that is clipped four times
+/// has at most eight corners.
 JFPX_HD inline Polygon clipped(const Polygon& polygon, int axis, Real side, Real limit) {
   Polygon result;
   for (int i = 0; i < polygon.count; ++i) {
@@ -105,17 +106,18 @@ JFPX_HD inline Polygon clipped(const Polygon& polygon, int axis, Real side, Real
   return result;
 }
 
-/// The face of a box that looks most against `normal`, in the axes in which the box is posed.
-JFPX_HD inline Polygon facing_quad(const Vec3& half, const Mat3& turn, const Vec3& offset,
+/// The incident face: the face of a box whose outward normal is most antiparallel to `normal`, in
+/// the axes in which the pose (`rotation`, `offset`) is given.
+JFPX_HD inline Polygon facing_quad(const Vec3& half, const Mat3& rotation, const Vec3& offset,
                                    const Vec3& normal) {
-  const Vec3 local = transform_transpose(turn, normal);
+  const Vec3 local = transform_transpose(rotation, normal);
   int f = 0;
   for (int i = 1; i < 3; ++i) {
     if (absolute(local[i]) > absolute(local[f])) f = i;
   }
   const int u = (f + 1) % 3, v = (f + 2) % 3;
-  const Vec3 centre = add_scaled(offset, turn.column(f), local[f] > 0 ? -half[f] : half[f]);
-  const Vec3 to_u = turn.column(u) * half[u], to_v = turn.column(v) * half[v];
+  const Vec3 centre = add_scaled(offset, rotation.column(f), local[f] > 0 ? -half[f] : half[f]);
+  const Vec3 to_u = rotation.column(u) * half[u], to_v = rotation.column(v) * half[v];
   Polygon quad;
   quad.add(centre + to_u + to_v);
   quad.add(centre - to_u + to_v);
@@ -124,22 +126,23 @@ JFPX_HD inline Polygon facing_quad(const Vec3& half, const Mat3& turn, const Vec
   return quad;
 }
 
-/// The corner of a posed box that is farthest along `direction`.
-JFPX_HD inline Vec3 support(const Vec3& half, const Mat3& turn, const Vec3& offset,
+/// Support mapping: the corner of a posed box that is farthest along `direction`.
+JFPX_HD inline Vec3 support(const Vec3& half, const Mat3& rotation, const Vec3& offset,
                             const Vec3& direction) {
-  const Vec3 local = transform_transpose(turn, direction);
+  const Vec3 local = transform_transpose(rotation, direction);
   Vec3 corner;
   for (int i = 0; i < 3; ++i) corner[i] = local[i] < 0 ? -half[i] : half[i];
-  return turn * corner + offset;
+  return rotation * corner + offset;
 }
 
-/// Cuts the face of the other box (`turn`, `offset`) to the prism over the reference face, whose
-/// outward normal is +-axis `face` of the reference box, and keeps what is below the face.
-/// @param manifold gets points in the axes of the reference box
+/// Clips the incident face of the other box (`rotation`, `offset`) against the sides of the
+/// reference face, whose outward normal is `side` times axis `face` of the reference box, and keeps
+/// the points on or below the reference face.
+/// @param manifold receives the points, in the axes of the reference box
 JFPX_HD inline void face_points(const Vec3& half, int face, Real side, const Vec3& other_half,
-                                const Mat3& turn, const Vec3& offset, Manifold* manifold) {
+                                const Mat3& rotation, const Vec3& offset, Manifold* manifold) {
   const Vec3 outward = unit_axis(face) * side;
-  Polygon polygon = facing_quad(other_half, turn, offset, outward);
+  Polygon polygon = facing_quad(other_half, rotation, offset, outward);
   for (int k = 1; k < 3; ++k) {
     const int axis = (face + k) % 3;
     polygon = clipped(polygon, axis, 1, half[axis]);
@@ -152,31 +155,33 @@ JFPX_HD inline void face_points(const Vec3& half, int face, Real side, const Vec
     const Real distance = side * polygon.corner[i][face] - half[face];
     if (distance <= 0) keep(polygon.corner[i], distance);
   }
-  // Rounding may leave nothing of faces that touch along an edge.
+  // For faces that touch along an edge, rounding may remove all points.
   if (manifold->count == 0) {
-    keep(support(other_half, turn, offset, -outward), manifold->distance);
+    keep(support(other_half, rotation, offset, -outward), manifold->distance);
   }
 }
 
-/// The point half-way between edge i of a and edge j of b, those that face each other (Goldman
-/// 1990). The edges are not parallel.
+/// The midpoint between the closest points of two lines (Goldman 1990), clamped to the edges: edge
+/// i of a and edge j of b, of each direction the edge nearest to the other box. The edges must not
+/// be parallel.
 JFPX_HD inline Vec3 edge_point(const BoxPair& pair, int i, int j, const Vec3& normal) {
-  const Mat3 upright;
-  const Vec3 dir_a = unit_axis(i), dir_b = pair.turn.column(j);
-  Vec3 on_a = support(pair.half_a, upright, {}, -normal);
+  const Mat3 identity;
+  const Vec3 dir_a = unit_axis(i), dir_b = pair.rotation.column(j);
+  Vec3 on_a = support(pair.half_a, identity, {}, -normal);
   on_a[i] = 0;
-  Vec3 on_b = support(pair.half_b, pair.turn, pair.offset, normal);
+  Vec3 on_b = support(pair.half_b, pair.rotation, pair.offset, normal);
   on_b -= dir_b * dot(dir_b, on_b - pair.offset);
   const Vec3 across = on_b - on_a, common = cross(dir_a, dir_b);
-  // By determinants: with the cosine, edges at a small angle would lose twice the digits.
+  // Determinants lose half as many digits as the cosine does for edges at a small angle.
   const Real scale = Real(1) / length_squared(common);
-  const auto within = [](Real x, Real most) { return x > most ? most : x < -most ? -most : x; };
-  const Real s = within(dot(cross(across, dir_b), common) * scale, pair.half_a[i]);
-  const Real t = within(dot(cross(across, dir_a), common) * scale, pair.half_b[j]);
+  const auto clamp = [](Real x, Real limit) { return x > limit ? limit : x < -limit ? -limit : x; };
+  const Real s = clamp(dot(cross(across, dir_b), common) * scale, pair.half_a[i]);
+  const Real t = clamp(dot(cross(across, dir_a), common) * scale, pair.half_b[j]);
   return (add_scaled(on_a, dir_a, s) + add_scaled(on_b, dir_b, t)) * Real(0.5);
 }
 
-/// Touching counts. The normal points from b to a.
+/// The contact manifold of two boxes; boxes that only touch are in contact. The normal points from
+/// b to a.
 JFPX_HD inline Manifold collide_boxes(const Box& a, const Transform& pose_a, const Box& b,
                                       const Transform& pose_b) {
   const BoxPair pair{a.half_extents, b.half_extents, transposed(pose_a.basis) * pose_b.basis,
@@ -191,13 +196,13 @@ JFPX_HD inline Manifold collide_boxes(const Box& a, const Transform& pose_a, con
   const Transform* frame = &pose_a;
   if (least.axis < 3) {
     const Real side = least.normal[least.axis] > 0 ? Real(-1) : Real(1);
-    face_points(pair.half_a, least.axis, side, pair.half_b, pair.turn, pair.offset, &manifold);
+    face_points(pair.half_a, least.axis, side, pair.half_b, pair.rotation, pair.offset, &manifold);
   } else if (least.axis < 6) {
     frame = &pose_b;
     const int face = least.axis - 3;
-    const Real side = dot(least.normal, pair.turn.column(face)) > 0 ? Real(1) : Real(-1);
-    face_points(pair.half_b, face, side, pair.half_a, transposed(pair.turn),
-                -transform_transpose(pair.turn, pair.offset), &manifold);
+    const Real side = dot(least.normal, pair.rotation.column(face)) > 0 ? Real(1) : Real(-1);
+    face_points(pair.half_b, face, side, pair.half_a, transposed(pair.rotation),
+                -transform_transpose(pair.rotation, pair.offset), &manifold);
   } else {
     const int edges = least.axis - 6;
     manifold.points[manifold.count++] = {edge_point(pair, edges / 3, edges % 3, least.normal),

@@ -1,4 +1,4 @@
-/// Pair tests that are too long for a header.
+/// Pair tests of jfpx/collide.hpp that are not inline.
 #include <jfpx/collide.hpp>
 
 #include "src/collide/box_pair.hpp"

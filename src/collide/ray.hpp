@@ -1,5 +1,5 @@
-/// Where a ray enters a sphere, a box, a half-space, or crosses a plane. `direction` is a unit
-/// vector throughout, and solids contain their surface.
+/// Ray casts against a sphere, a box, a half-space and a plane. `direction` is always a unit
+/// vector, and solids include their surface.
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -8,16 +8,16 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// Where and how a ray enters a solid. Without a hit the other fields are 0.
+/// The point where a ray enters a solid. Without a hit the other fields are 0.
 struct RayEntry {
   bool hit = false;
   Real distance = 0;  ///< [m], >= 0
-  Vec3 normal;        ///< unit, outwards; against the ray where it starts inside
+  Vec3 normal;        ///< unit, outwards; opposite to the ray if it starts inside
 };
 
-/// The chord is found from the centre's distance to the line, not from the difference of two large
-/// squares, so that small spheres far away are hit where they are; and in radii, for the square of
-/// a small one may not be a number of Reals.
+/// The half chord is computed from the distance between the centre and the line, and not from the
+/// difference of two large squares, so that the result is accurate for small spheres far away.
+/// Lengths are divided by the radius, because the square of a small radius may underflow.
 JFPX_HD inline RayEntry enter(const Vec3& origin, const Vec3& direction,
                               const SphereInstance& sphere) {
   const Real r = sphere.radius;
@@ -35,8 +35,8 @@ JFPX_HD inline RayEntry enter(const Vec3& origin, const Vec3& direction,
           normalized(add_scaled(in_radii, direction, -half_chord))};
 }
 
-/// The part of the ray between each pair of faces (Kay and Kajiya 1986). Through an edge, the face
-/// whose axis comes first counts.
+/// Slab test (Kay and Kajiya 1986). A ray that enters through an edge hits the face whose axis
+/// comes first.
 JFPX_HD inline RayEntry enter(const Vec3& origin, const Vec3& direction, const Box& box,
                               const Transform& pose) {
   const Vec3 from = inverse_transform_point(pose, origin);
@@ -64,12 +64,12 @@ JFPX_HD constexpr RayEntry enter(const Vec3& origin, const Vec3& direction,
                                  const HalfSpace& half_space) {
   const Real height = dot(half_space.normal, origin) - half_space.offset;
   if (!(height > 0)) return {true, 0, -direction};
-  const Real sinking = -dot(half_space.normal, direction);
-  if (!(sinking > 0)) return {};
-  return {true, height / sinking, half_space.normal};
+  const Real descent = -dot(half_space.normal, direction);
+  if (!(descent > 0)) return {};
+  return {true, height / descent, half_space.normal};
 }
 
-/// From the side where it starts.
+/// The normal points to the side where the ray starts.
 JFPX_HD constexpr RayEntry enter(const Vec3& origin, const Vec3& direction, const Plane& plane) {
   const bool behind = dot(plane.normal, origin) < plane.offset;
   return behind ? enter(origin, direction, HalfSpace{-plane.normal, -plane.offset})

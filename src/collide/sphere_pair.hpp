@@ -1,4 +1,4 @@
-/// The one definition of sphere-sphere contact arithmetic, for g++, clang and nvcc alike.
+/// Sphere-sphere contact arithmetic, defined once for g++, clang and nvcc.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -7,8 +7,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// The contact of spheres whose centres are d = a - b, of length len, apart. Coincident centres
-/// have the normal (1,0,0) (E7).
+/// The contact of two spheres whose centres differ by d = a - b, of length len, and whose radii add
+/// up to sum. Coincident centres give the normal (1,0,0) (erratum E7).
 JFPX_HD inline PairResult sphere_pair_contact(const Vec3& d, Real len, Real sum) {
   PairResult r;
   r.touching = 1;
@@ -21,9 +21,9 @@ JFPX_HD inline PairResult sphere_pair_contact(const Vec3& d, Real len, Real sum)
   return r;
 }
 
-/// Tests two spheres in Bullet's order of operations (btSphereSphereCollisionAlgorithm): each
-/// operation is one IEEE rounding, the normal is scaled by a reciprocal, and the rejection is
-/// negated so that a NaN makes a contact.
+/// Tests two spheres with the order of operations of Bullet's btSphereSphereCollisionAlgorithm:
+/// each operation is one IEEE rounding, the normal is scaled by a reciprocal, and a NaN fails the
+/// rejection test and therefore gives a contact.
 JFPX_HD inline PairResult test_sphere_pair(const SphereInstance& a, const SphereInstance& b) {
   const Vec3 d = a.centre - b.centre;
   const Real len = square_root((d.x * d.x + d.y * d.y) + d.z * d.z);
@@ -32,8 +32,8 @@ JFPX_HD inline PairResult test_sphere_pair(const SphereInstance& a, const Sphere
   return sphere_pair_contact(d, len, sum);
 }
 
-/// The same without a branch, for lists in which touching and not touching are mixed: `*contact`
-/// is written in any case.
+/// The same without a branch, for lists that mix touching and separated pairs, where a branch would
+/// be unpredictable. Always writes *contact. Returns true if the spheres touch.
 JFPX_HD inline bool find_sphere_contact(const SphereInstance& a, const SphereInstance& b,
                                         PairContact* contact) {
   const Vec3 d = a.centre - b.centre;
@@ -45,7 +45,7 @@ JFPX_HD inline bool find_sphere_contact(const SphereInstance& a, const SphereIns
   return !(len > sum);
 }
 
-/// The same for spheres that count as touching up to a distance of `threshold`.
+/// The same test with a margin: spheres up to `threshold` apart are in contact.
 JFPX_HD inline PairResult test_sphere_pair(const SphereInstance& a, const SphereInstance& b,
                                            Real threshold) {
   const Vec3 d = a.centre - b.centre;

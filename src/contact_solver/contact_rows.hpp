@@ -1,10 +1,10 @@
-/// The arithmetic of Bullet's sequential impulse solver for one contact and its friction, on any
-/// number of contacts side by side.
+/// Arithmetic of Bullet's sequential impulse solver for a contact and its friction, for any number
+/// of contacts in parallel lanes.
 #pragma once
 
-// Included by sources that are compiled for processors which this one may not be (see
-// src/sphere_collider/cpu/kernels.hpp): templates over a type of internal linkage only, and no
-// other headers.
+// Sources that are compiled for other instruction sets include this header (see
+// src/sphere_collider/cpu/kernels.hpp). It therefore contains only templates over a type with
+// internal linkage, and includes no other headers.
 #include <jfpx/config.hpp>
 
 #include "src/contact_solver/row_layout.hpp"
@@ -13,14 +13,15 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace rows {
 
-// Every expression keeps the order of operations of Bullet 3.24's scalar row solver
-// (btSequentialImpulseConstraintSolver.cpp), each rounded once, because bits are compared. Also
-// where it looks redundant: 0 + x turns -0 into 0, and x - 0 * y is not always x.
+// Every expression preserves the order of operations of the scalar row solver of Bullet 3.24
+// (btSequentialImpulseConstraintSolver.cpp), with one rounding per operation, because results are
+// compared bit by bit. This includes operations that look redundant: 0 + x changes -0 to 0, and
+// x - 0 * y is not always x.
 //
-// `S` says what a number is: S::Vec holds S::kLanes of them, S::Mask one truth each. It also finds
-// the bodies that S::Id names.
+// `S` defines the arithmetic: S::Vec has S::kLanes numbers and S::Mask has one truth value per
+// lane. S also accesses the bodies that S::Id identifies.
 
-// For functions of rows: vectors passed through memory would cost more than the arithmetic.
+// Forces inlining of row functions: vectors passed through memory cost more than the arithmetic.
 #if defined(__CUDACC__)
 #define JFPX_ROW __host__ __device__ __forceinline__
 #else
@@ -55,7 +56,7 @@ template <class S>
 JFPX_ROW Vec3Of<S> cross(const Vec3Of<S>& a, const Vec3Of<S>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-/// `v` where the mask holds, else +0.
+/// `v` where the mask is true, else +0.
 template <class S>
 JFPX_ROW Vec3Of<S> keep(typename S::Mask mask, const Vec3Of<S>& v) {
   return {S::keep(mask, v.x), S::keep(mask, v.y), S::keep(mask, v.z)};
@@ -77,18 +78,18 @@ JFPX_ROW void store3(Real* fields, const Vec3Of<S>& v) {
   S::store(fields + 2 * kLanes, v.z);
 }
 
-/// What the rows of a contact need to know of one of its bodies.
+/// State of one body of a contact, as the setup of rows uses it.
 template <class S>
 struct BodyOf {
   using V3 = Vec3Of<S>;
-  typename S::Mask real;  ///< not Bullet's one fixed body, for which all else is 0
+  typename S::Mask real;  ///< false for Bullet's single fixed body, whose other fields are all 0
   V3 origin, linear, angular, forced_linear, forced_angular, angular_factor;
   V3 inertia[3];  ///< rows of the inverse inertia tensor
   typename S::Vec inverse_mass;
 
   JFPX_ROW V3 angular_response(const V3& torque) const {
-    const V3 turned = {dot(inertia[0], torque), dot(inertia[1], torque), dot(inertia[2], torque)};
-    return keep<S>(real, turned * angular_factor);
+    const V3 delta = {dot(inertia[0], torque), dot(inertia[1], torque), dot(inertia[2], torque)};
+    return keep<S>(real, delta * angular_factor);
   }
   JFPX_ROW V3 velocity_at(const V3& arm) const {
     return keep<S>(real, linear + cross(angular, arm));
@@ -117,7 +118,7 @@ JFPX_ROW BodyOf<S> gather_body(const Real* bodies, const typename S::Id* ids) {
   return b;
 }
 
-/// btPlaneSpace1: two directions orthogonal to n and to each other.
+/// btPlaneSpace1(): two directions orthogonal to n and to each other.
 template <class S>
 JFPX_ROW void plane_space(const Vec3Of<S>& n, Vec3Of<S>* p, Vec3Of<S>* q) {
   const auto zero = S::set(0);
@@ -132,9 +133,10 @@ JFPX_ROW void plane_space(const Vec3Of<S>& n, Vec3Of<S>* p, Vec3Of<S>* q) {
   *q = select<S>(steep, q_steep, q_flat);
 }
 
-/// The first half of a contact's setup: the contact's row, and the direction of friction, which
-/// goes into the axis of the friction row. The other direction goes into `second` where Bullet
-/// writes one, which the returned mask tells.
+/// First half of the setup of a contact: writes the row of the contact, and the friction direction
+/// as the axis of the friction row. Writes the second friction direction to `second`.
+/// @return the lanes in which Bullet stores the second direction, because the contact does not
+///   slide
 template <class S>
 JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real* in,
                                          const Real* bodies, const typename S::Id* ids, Real* row,
@@ -154,20 +156,20 @@ JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real
   const V3 angular_a = a.angular_response(torque_a), angular_b = b.angular_response(-torque_b);
   const auto denominator_a = S::keep(a.real, a.inverse_mass + dot(n, cross(angular_a, arm_a)));
   const auto denominator_b = S::keep(b.real, b.inverse_mass + dot(n, cross(-angular_b, arm_b)));
-  // Lanes without a contact have no body: 1 stands for 1/0.
+  // Lanes without a contact have no body: 1 replaces 1/0.
   const auto used = S::either(a.real, b.real);
   const auto inverse = S::select(
       used, S::set(settings.relaxation) / (denominator_a + denominator_b + cfm), S::set(1));
-  const V3 normal_a = keep<S>(a.real, n), turn_a = keep<S>(a.real, torque_a);
-  const V3 normal_b = keep<S>(b.real, -n), turn_b = keep<S>(b.real, -torque_b);
+  const V3 normal_a = keep<S>(a.real, n), jacobian_a = keep<S>(a.real, torque_a);
+  const V3 normal_b = keep<S>(b.real, -n), jacobian_b = keep<S>(b.real, -torque_b);
 
   const auto approach = dot(n, a.velocity_at(arm_a) - b.velocity_at(arm_b));
   auto bounce = S::select(S::less(S::absolute(approach), S::set(settings.restitution_threshold)),
                           zero, field(kInRestitution) * S::negate(approach));
   bounce = S::select(S::less_equal(bounce, zero), zero, bounce);
   const auto penetration = field(kInDistance) + S::set(settings.slop);
-  const auto velocity_a = dot(normal_a, a.forced_linear) + dot(turn_a, a.forced_angular);
-  const auto velocity_b = dot(normal_b, b.forced_linear) + dot(turn_b, b.forced_angular);
+  const auto velocity_a = dot(normal_a, a.forced_linear) + dot(jacobian_a, a.forced_angular);
+  const auto velocity_b = dot(normal_b, b.forced_linear) + dot(jacobian_b, b.forced_angular);
   auto velocity_error = bounce - (velocity_a + velocity_b);
   const auto apart = S::less(zero, penetration);
   velocity_error = S::select(apart, velocity_error - penetration * inverse_dt, velocity_error);
@@ -180,8 +182,8 @@ JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real
 
   const auto put = [&](int i, typename S::Vec v) { S::store(row + i * kLanes, v); };
   store3<S>(row + kRowAxis * kLanes, n);
-  store3<S>(row + kRowTurnA * kLanes, turn_a);
-  store3<S>(row + kRowTurnB * kLanes, turn_b);
+  store3<S>(row + kRowAngularJacobianA * kLanes, jacobian_a);
+  store3<S>(row + kRowAngularJacobianB * kLanes, jacobian_b);
   store3<S>(row + kRowAngularA * kLanes, angular_a);
   store3<S>(row + kRowAngularB * kLanes, angular_b);
   put(kRowInverse, inverse);
@@ -189,8 +191,8 @@ JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real
       S::keep(used, S::select(joined, position_impulse + velocity_impulse, velocity_impulse)));
   put(kRowCfm, cfm * inverse);
   put(kRowImpulse, settings.warm_start ? field(kInImpulse) * S::set(settings.warm_factor) : zero);
-  put(kRowPushRhs, S::keep(used, S::select(joined, zero, position_impulse)));
-  put(kRowPush, zero);
+  put(kRowSplitRhs, S::keep(used, S::select(joined, zero, position_impulse)));
+  put(kRowSplitImpulse, zero);
 
   const V3 velocity = a.forced_velocity_at(arm_a) - b.forced_velocity_at(arm_b);
   const V3 sideways = velocity - n * dot(n, velocity);
@@ -205,14 +207,14 @@ JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real
   return S::negate_mask(slides);
 }
 
-/// The other direction of friction, where Bullet has none yet.
+/// The second friction direction, if Bullet has not stored one yet.
 template <class S>
 JFPX_ROW Vec3Of<S> across(const Vec3Of<S>& direction, const Vec3Of<S>& normal) {
   const Vec3Of<S> v = cross(direction, normal);
   return v * (S::set(1) / S::square_root(dot(v, v)));
 }
 
-/// The second half: the friction row along the axis that is in it.
+/// Second half of the setup: writes the friction row along the axis that the row contains.
 template <class S>
 JFPX_ROW void set_up_friction(const RowSettings& settings, const Real* in, const Real* bodies,
                               const typename S::Id* ids, Real* row) {
@@ -225,22 +227,22 @@ JFPX_ROW void set_up_friction(const RowSettings& settings, const Real* in, const
   const V3 arm_a = point_a - a.origin, arm_b = point_b - b.origin;
   const V3 axis = load3<S>(row + kRowAxis * kLanes);
   const V3 axis_a = keep<S>(a.real, axis), axis_b = keep<S>(b.real, -axis);
-  const V3 turn_a = keep<S>(a.real, cross(arm_a, axis)),
-           turn_b = keep<S>(b.real, cross(arm_b, -axis));
-  const V3 angular_a = a.angular_response(turn_a), angular_b = b.angular_response(turn_b);
+  const V3 jacobian_a = keep<S>(a.real, cross(arm_a, axis)),
+           jacobian_b = keep<S>(b.real, cross(arm_b, -axis));
+  const V3 angular_a = a.angular_response(jacobian_a), angular_b = b.angular_response(jacobian_b);
   const auto denominator_a = S::keep(a.real, a.inverse_mass + dot(axis, cross(angular_a, arm_a)));
   const auto denominator_b = S::keep(b.real, b.inverse_mass + dot(axis, cross(-angular_b, arm_b)));
   const auto inverse = S::set(settings.relaxation) / (denominator_a + denominator_b);
-  const auto velocity_a = dot(axis_a, a.forced_linear) + dot(turn_a, a.angular);
-  const auto velocity_b = dot(axis_b, b.forced_linear) + dot(turn_b, b.angular);
+  const auto velocity_a = dot(axis_a, a.forced_linear) + dot(jacobian_a, a.angular);
+  const auto velocity_b = dot(axis_b, b.forced_linear) + dot(jacobian_b, b.angular);
   const auto velocity_impulse = (zero - (velocity_a + velocity_b)) * inverse;
   const auto offset = dot(point_a - point_b, axis);
   const auto anchor_error = S::negate(offset) * S::set(settings.friction_erp) / S::set(settings.dt);
   const auto anchored = S::less(zero, field(kInAnchor));
   const auto position_impulse = S::select(anchored, anchor_error * inverse, zero);
 
-  store3<S>(row + kRowTurnA * kLanes, turn_a);
-  store3<S>(row + kRowTurnB * kLanes, turn_b);
+  store3<S>(row + kRowAngularJacobianA * kLanes, jacobian_a);
+  store3<S>(row + kRowAngularJacobianB * kLanes, jacobian_b);
   store3<S>(row + kRowAngularA * kLanes, angular_a);
   store3<S>(row + kRowAngularB * kLanes, angular_b);
   S::store(row + kRowInverse * kLanes, inverse);
@@ -249,9 +251,9 @@ JFPX_ROW void set_up_friction(const RowSettings& settings, const Real* in, const
   S::store(row + kRowImpulse * kLanes, zero);
 }
 
-/// Velocities gained so far by the two bodies of a row, and how they take an impulse.
+/// Delta velocities of the two bodies of a row, to which impulses are applied.
 template <class S, bool kFactors>
-struct Movers {
+struct BodyVelocities {
   using V3 = Vec3Of<S>;
   static constexpr int kLanes = S::kLanes;
   const typename S::Id* ids;
@@ -260,7 +262,7 @@ struct Movers {
   V3 linear_a, angular_a, linear_b, angular_b;
   typename S::Vec mass_a, mass_b, pad_a, pad_b;
 
-  JFPX_ROW Movers(const typename S::Id* i, Real* v, const Real* f)
+  JFPX_ROW BodyVelocities(const typename S::Id* i, Real* v, const Real* f)
       : ids(i), velocities(v), factors(f) {
     typename S::Vec u[4];
     S::gather4(v, ids, kVelocityFields, u);
@@ -272,24 +274,26 @@ struct Movers {
     S::gather4(v + 4, ids + kLanes, kVelocityFields, u);
     angular_b = {u[0], u[1], u[2]}, pad_b = u[3];
   }
-  /// The velocity along the row, times -inverse, in Bullet's order.
-  JFPX_ROW typename S::Vec resist(typename S::Vec impulse, typename S::Vec inverse,
-                                  const V3& axis_a, const V3& axis_b, const V3& turn_a,
-                                  const V3& turn_b) const {
-    const auto velocity_a = dot(axis_a, linear_a) + dot(turn_a, angular_a);
-    const auto velocity_b = dot(axis_b, linear_b) + dot(turn_b, angular_b);
+  /// Subtracts the velocity along the row, times inverse, in Bullet's order of operations.
+  JFPX_ROW typename S::Vec subtract_velocity(typename S::Vec impulse, typename S::Vec inverse,
+                                             const V3& axis_a, const V3& axis_b,
+                                             const V3& jacobian_a, const V3& jacobian_b) const {
+    const auto velocity_a = dot(axis_a, linear_a) + dot(jacobian_a, angular_a);
+    const auto velocity_b = dot(axis_b, linear_b) + dot(jacobian_b, angular_b);
     impulse = impulse - velocity_a * inverse;
     return impulse - velocity_b * inverse;
   }
-  JFPX_ROW void push(typename S::Vec impulse, const V3& axis_a, const V3& axis_b, const Real* row,
-                     typename S::Mask active) {
+  /// Applies an impulse along the row in the active lanes and stores the velocities.
+  JFPX_ROW void apply_impulse(typename S::Vec impulse, const V3& axis_a, const V3& axis_b,
+                              const Real* row, typename S::Mask active) {
     const V3 response_a = load3<S>(row + kRowAngularA * kLanes);
     const V3 response_b = load3<S>(row + kRowAngularB * kLanes);
     V3 new_linear_a, new_angular_a, new_linear_b, new_angular_b;
     if constexpr (kFactors) {
-      move(ids, axis_a, response_a, impulse, linear_a, angular_a, &new_linear_a, &new_angular_a);
-      move(ids + kLanes, axis_b, response_b, impulse, linear_b, angular_b, &new_linear_b,
-           &new_angular_b);
+      add_with_factors(ids, axis_a, response_a, impulse, linear_a, angular_a, &new_linear_a,
+                       &new_angular_a);
+      add_with_factors(ids + kLanes, axis_b, response_b, impulse, linear_b, angular_b,
+                       &new_linear_b, &new_angular_b);
     } else {
       new_linear_a = linear_a + axis_a * mass_a * impulse;
       new_angular_a = angular_a + response_a * impulse;
@@ -303,27 +307,27 @@ struct Movers {
   }
 
  private:
-  JFPX_ROW void move(const typename S::Id* who, const V3& axis, const V3& response,
-                     typename S::Vec impulse, const V3& linear, const V3& angular, V3* new_linear,
-                     V3* new_angular) const {
+  JFPX_ROW void add_with_factors(const typename S::Id* body, const V3& axis, const V3& response,
+                                 typename S::Vec impulse, const V3& linear, const V3& angular,
+                                 V3* new_linear, V3* new_angular) const {
     typename S::Vec m[4], l[4], t[4];
-    S::gather4(factors, who, kFactorFields, m);
-    S::gather4(factors + 4, who, kFactorFields, l);
-    S::gather4(factors + 8, who, kFactorFields, t);
+    S::gather4(factors, body, kFactorFields, m);
+    S::gather4(factors + 4, body, kFactorFields, l);
+    S::gather4(factors + 8, body, kFactorFields, t);
     const V3 masses = {m[0], m[1], m[2]}, linear_factor = {l[0], l[1], l[2]};
     const V3 angular_factor = {t[0], t[1], t[2]};
     *new_linear = linear + axis * masses * impulse * linear_factor;
     *new_angular = angular + response * (angular_factor * impulse);
   }
-  JFPX_ROW void put(const typename S::Id* who, const V3& linear, typename S::Vec mass,
+  JFPX_ROW void put(const typename S::Id* body, const V3& linear, typename S::Vec mass,
                     const V3& angular, typename S::Vec pad) const {
     const typename S::Vec u[4] = {linear.x, linear.y, linear.z, mass};
     const typename S::Vec w[4] = {angular.x, angular.y, angular.z, pad};
-    S::scatter8(velocities, who, kVelocityFields, u, w);
+    S::scatter8(velocities, body, kVelocityFields, u, w);
   }
 };
 
-/// The largest squared residual of some rows, and whether one was not a number.
+/// The largest squared residual of a set of rows, and whether a residual is NaN.
 template <class S>
 struct Residual {
   typename S::Vec largest = S::set(0);
@@ -337,60 +341,62 @@ struct Residual {
   }
 };
 
-// `Found` below is a Residual<S>, or hands on to one later.
+// `Sum` below is a Residual<S>, or a type that adds to one later.
 
-/// One contact row, or its push against penetration (the split impulse), which differ in the fields
-/// that they use and in the velocities.
-template <class S, bool kFactors, bool kPush, class Found>
+/// Solves a contact row, or its split impulse against penetration. The two differ in the fields and
+/// in the velocities that they use.
+template <class S, bool kFactors, bool kSplitImpulse, class Sum>
 JFPX_ROW void solve_contact(const typename S::Id* ids, Real* velocities, const Real* factors,
-                            Real* row, Found* residual) {
+                            Real* row, Sum* residual) {
   constexpr int kLanes = S::kLanes;
   const auto zero = S::set(0);
-  Movers<S, kFactors> movers(ids, velocities, factors);
-  Real* const field = row + (kPush ? kRowPush : kRowImpulse) * kLanes;
+  BodyVelocities<S, kFactors> pair(ids, velocities, factors);
+  Real* const field = row + (kSplitImpulse ? kRowSplitImpulse : kRowImpulse) * kLanes;
   const auto before = S::load(field);
-  const auto rhs = S::load(row + (kPush ? kRowPushRhs : kRowRhs) * kLanes);
+  const auto rhs = S::load(row + (kSplitImpulse ? kRowSplitRhs : kRowRhs) * kLanes);
   const auto inverse = S::load(row + kRowInverse * kLanes);
-  const auto active = kPush ? S::differs(rhs, zero) : S::always();
+  const auto active = kSplitImpulse ? S::differs(rhs, zero) : S::always();
   const auto n = load3<S>(row + kRowAxis * kLanes);
   const auto axis_a = keep<S>(S::is_real(ids), n), axis_b = keep<S>(S::is_real(ids + kLanes), -n);
   auto impulse = rhs - before * S::load(row + kRowCfm * kLanes);
-  impulse = movers.resist(impulse, inverse, axis_a, axis_b, load3<S>(row + kRowTurnA * kLanes),
-                          load3<S>(row + kRowTurnB * kLanes));
+  impulse = pair.subtract_velocity(impulse, inverse, axis_a, axis_b,
+                                   load3<S>(row + kRowAngularJacobianA * kLanes),
+                                   load3<S>(row + kRowAngularJacobianB * kLanes));
   const auto sum = before + impulse;
   const auto pulls = S::less(sum, zero);
   impulse = S::select(pulls, zero - before, impulse);
   S::store(field, S::select(active, S::select(pulls, zero, sum), before));
-  movers.push(impulse, axis_a, axis_b, row, active);
+  pair.apply_impulse(impulse, axis_a, axis_b, row, active);
   residual->add(impulse, inverse, active);
 }
 
-/// A row whose impulse stays within `upper` either way, in the lanes that are active.
-template <class S, bool kFactors, class Found>
+/// Solves a row whose impulse is limited to [-upper, upper], in the active lanes.
+template <class S, bool kFactors, class Sum>
 JFPX_ROW void solve_limited(const typename S::Id* ids, Real* velocities, const Real* factors,
                             Real* row, const Vec3Of<S>& axis_a, const Vec3Of<S>& axis_b,
-                            typename S::Vec upper, typename S::Mask active, Found* residual) {
+                            typename S::Vec upper, typename S::Mask active, Sum* residual) {
   constexpr int kLanes = S::kLanes;
-  Movers<S, kFactors> movers(ids, velocities, factors);
+  BodyVelocities<S, kFactors> pair(ids, velocities, factors);
   const auto lower = S::negate(upper);
   const auto before = S::load(row + kRowImpulse * kLanes);
   const auto inverse = S::load(row + kRowInverse * kLanes);
   auto impulse = S::load(row + kRowRhs * kLanes) - before * S::set(0);
-  impulse = movers.resist(impulse, inverse, axis_a, axis_b, load3<S>(row + kRowTurnA * kLanes),
-                          load3<S>(row + kRowTurnB * kLanes));
+  impulse = pair.subtract_velocity(impulse, inverse, axis_a, axis_b,
+                                   load3<S>(row + kRowAngularJacobianA * kLanes),
+                                   load3<S>(row + kRowAngularJacobianB * kLanes));
   const auto sum = before + impulse;
   const auto below = S::less(sum, lower), above = S::less(upper, sum);
   impulse = S::select(below, lower - before, S::select(above, upper - before, impulse));
   const auto after = S::select(below, lower, S::select(above, upper, sum));
   S::store(row + kRowImpulse * kLanes, S::select(active, after, before));
-  movers.push(impulse, axis_a, axis_b, row, active);
+  pair.apply_impulse(impulse, axis_a, axis_b, row, active);
   residual->add(impulse, inverse, active);
 }
 
-/// One friction row, limited by the impulse of its contact.
-template <class S, bool kFactors, class Found>
+/// Solves a friction row, which the impulse of its contact limits.
+template <class S, bool kFactors, class Sum>
 JFPX_ROW void solve_friction(const typename S::Id* ids, Real* velocities, const Real* factors,
-                             const Real* contact, Real* row, Found* residual) {
+                             const Real* contact, Real* row, Sum* residual) {
   constexpr int kLanes = S::kLanes;
   const auto pressure = S::load(contact + kRowImpulse * kLanes);
   const auto active = S::less(S::set(0), pressure);
@@ -401,11 +407,12 @@ JFPX_ROW void solve_friction(const typename S::Id* ids, Real* velocities, const 
                              S::load(row + kRowFriction * kLanes) * pressure, active, residual);
 }
 
-/// One row against rolling or spinning: an impulse that only turns, limited by that of its contact.
-template <class S, bool kFactors, class Found>
+/// Solves a rolling or spinning friction row: an angular impulse, which the impulse of its contact
+/// limits.
+template <class S, bool kFactors, class Sum>
 JFPX_ROW void solve_rolling_friction(const typename S::Id* ids, Real* velocities,
                                      const Real* factors, const Real* contact, Real* row,
-                                     Found* residual) {
+                                     Sum* residual) {
   constexpr int kLanes = S::kLanes;
   const auto zero = S::set(0);
   const auto pressure = S::load(contact + kRowImpulse * kLanes);
@@ -416,20 +423,20 @@ JFPX_ROW void solve_rolling_friction(const typename S::Id* ids, Real* velocities
   const auto limit = strength * pressure;
   const auto upper = S::select(S::less(strength, limit), strength, limit);
   const Vec3Of<S> axis_a = {zero, zero, zero};
-  const Vec3Of<S> axis_b = -axis_a;  // as Bullet has it, and multiplies with it
+  const Vec3Of<S> axis_b = -axis_a;  // Bullet multiplies with it too
   solve_limited<S, kFactors>(ids, velocities, factors, row, axis_a, axis_b, upper, active,
                              residual);
 }
 
-/// Gives the bodies the impulses that the rows start with.
+/// Applies the initial impulses of the rows to the bodies.
 template <class S, bool kFactors>
 JFPX_ROW void warm_start(const typename S::Id* ids, Real* velocities, const Real* factors,
                          const Real* row) {
   constexpr int kLanes = S::kLanes;
-  Movers<S, kFactors> movers(ids, velocities, factors);
+  BodyVelocities<S, kFactors> pair(ids, velocities, factors);
   const auto n = load3<S>(row + kRowAxis * kLanes);
-  movers.push(S::load(row + kRowImpulse * kLanes), keep<S>(S::is_real(ids), n),
-              keep<S>(S::is_real(ids + kLanes), -n), row, S::always());
+  pair.apply_impulse(S::load(row + kRowImpulse * kLanes), keep<S>(S::is_real(ids), n),
+                     keep<S>(S::is_real(ids + kLanes), -n), row, S::always());
 }
 
 }  // namespace rows

@@ -1,4 +1,4 @@
-/// Selects the group solvers that this build contains.
+/// Selection of the group solvers that this build contains.
 #include "src/contact_solver/group_solver.hpp"
 
 #if JFPX_HAS_CUDA

@@ -1,4 +1,4 @@
-/// How the rows of the impulse solver, and what they are made from, lie in memory.
+/// Memory layout of the rows of the impulse solver and of their inputs.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -9,28 +9,28 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace rows {
 
-/// Rows lie in blocks of so many as a vector has lanes. A block is a list of fields; each field is
-/// one number a lane. No two rows of a block share a body that moves.
+/// Rows are stored in blocks of as many rows as a vector has lanes. A block is a list of fields,
+/// and a field has one number per lane. No two rows of a block share a moving body.
 enum RowField : int {
-  kRowAxis = 0,       ///< three: the normal, or the direction of friction
-  kRowTurnA = 3,      ///< three: arm x axis of body a; 0 for a fixed body
-  kRowTurnB = 6,      ///< three: arm x -axis of body b
-  kRowAngularA = 9,   ///< three: angular velocity gained by a from an impulse of 1
-  kRowAngularB = 12,  ///< three
-  kRowInverse = 15,   ///< impulse needed for a velocity of 1 along the axis
-  kRowRhs = 16,       ///< impulse asked for at the start
-  kRowImpulse = 17,   ///< impulse given so far
-  kRowFriction = 18,  ///< of a friction row: the coefficient
+  kRowAxis = 0,              ///< 3 fields: the normal, or the friction direction
+  kRowAngularJacobianA = 3,  ///< 3 fields: arm x axis of body a; 0 for a fixed body
+  kRowAngularJacobianB = 6,  ///< 3 fields: arm x -axis of body b
+  kRowAngularA = 9,          ///< 3 fields: angular velocity that a unit impulse adds to body a
+  kRowAngularB = 12,         ///< 3 fields
+  kRowInverse = 15,          ///< impulse that changes the velocity along the axis by 1
+  kRowRhs = 16,              ///< target impulse at the start
+  kRowImpulse = 17,          ///< accumulated impulse
+  kRowFriction = 18,         ///< friction row: the coefficient
   kFrictionFields = 19,
-  // A row against rolling or spinning is laid out like a friction row, but for its axis:
-  kRowPresent = 0,  ///< 1 where the contact has such a row, else 0
-  kRowCfm = 18,     ///< of a contact row: softness
-  kRowPushRhs = 19,
-  kRowPush = 20,  ///< impulse of the push against penetration so far
+  // A rolling or spinning friction row has the layout of a friction row, except for its axis:
+  kRowPresent = 0,  ///< 1 if the contact has this row, else 0
+  kRowCfm = 18,     ///< contact row: constraint force mixing (softness)
+  kRowSplitRhs = 19,
+  kRowSplitImpulse = 20,  ///< accumulated split impulse, which corrects penetration
   kContactFields = 21,
 };
 
-/// A contact as a manifold tells it, laid out as rows are.
+/// A contact point of a manifold, in the layout of rows.
 enum InputField : int {
   kInNormal = 0,
   kInPointA = 3,
@@ -41,23 +41,25 @@ enum InputField : int {
   kInImpulse = 12,
   kInCfm = 13,
   kInErp = 14,
-  kInAnchor = 15,  ///< 1 where the contact is anchored, else 0
+  kInAnchor = 15,  ///< 1 if the contact has a friction anchor, else 0
   kInputFields = 16,
 };
 
-/// A body is addressed by its id; those that no row moves have the complement ~id in its place.
-/// Id 0 is Bullet's one fixed body, at rest and all 0.
+/// A body is addressed by its id. A body that no row moves is addressed by the complement ~id.
+/// Id 0 is Bullet's single fixed body, which is at rest and all 0.
 inline constexpr std::int32_t kFixedBody = ~0;
-inline constexpr int kBodyFields = 32;     ///< see gather_body()
-inline constexpr int kVelocityFields = 8;  ///< linear gained, inverse mass; angular gained, unused
-inline constexpr int kFactorFields = 12;   ///< inverse masses; linear; angular factors; each padded
+inline constexpr int kBodyFields = 32;  ///< see gather_body()
+/// Delta linear velocity, inverse mass; delta angular velocity, unused.
+inline constexpr int kVelocityFields = 8;
+/// Inverse masses, linear factors, angular factors; each padded to 4.
+inline constexpr int kFactorFields = 12;
 
 /// The bodies of a contact.
 struct RowPair {
   std::int32_t a, b;
 };
 
-/// What a step says about all of its rows.
+/// Settings of a step that apply to all of its rows.
 struct RowSettings {
   Real dt, inverse_dt;
   Real relaxation;
@@ -72,18 +74,18 @@ struct RowSettings {
   bool friction_follows_velocity;
 };
 
-/// Rows against rolling and spinning of a contact: around the normal, and around two axes across
-/// it.
+/// Rolling and spinning friction rows per contact: one around the normal (spinning), and two around
+/// tangential axes (rolling).
 inline constexpr std::uint32_t kRollingFrictionRows = 3;
-/// Lanes of a block, whatever the instruction set.
+/// Upper limit of the lanes of a block, for all instruction sets.
 inline constexpr std::uint32_t kMaxLanes = 8;
 
-/// What became of a group of rows.
+/// Result of the sweeps over a group of rows.
 struct RowSweepReport {
-  int iterations = 0;        ///< sweeps done
-  Real residual = 0;         ///< the largest squared one of the last sweep
-  std::uint64_t pushed = 0;  ///< rows solved against penetration, over all sweeps
-  bool broken = false;       ///< something left the finite numbers: the result is worth nothing
+  int iterations = 0;                ///< completed sweeps
+  Real residual = 0;                 ///< largest squared residual of the last sweep
+  std::uint64_t split_impulses = 0;  ///< solved rows of the split impulse, over all sweeps
+  bool broken = false;               ///< a value is infinite or NaN: the result is invalid
 };
 
 }  // namespace rows

@@ -1,36 +1,44 @@
-/// Puts the contacts of a group in an order in which neighbours rarely wait for each other, and
-/// tells each contact when it is its turn at its bodies.
+/// Orders the contacts of a group for the dataflow sweeps of a GPU, and numbers the contacts at
+/// each body.
 #pragma once
 
 #include <jfpx/config.hpp>
 
-#include "src/contact_solver/row_walk.hpp"
+#include "src/base/buffer.hpp"
+#include "src/contact_solver/coloring.hpp"
+#include "src/contact_solver/dataflow_sweep.hpp"
 
 #include <span>
-#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Owns its buffers, which only grow. One thread at a time.
+/// Sorts contacts by color, so that neighbors in the schedule rarely depend on each other. Owns its
+/// buffers, which only grow. One thread at a time.
 class JFPX_API RowOrder {
  public:
-  /// Sorts contacts, given in the order that each body must keep, by level: one more than the
-  /// highest level of those before it that move one of its bodies.
-  /// @param places, contacts [pairs.size()]: by place, and which contact is there
-  /// @param moves [bodies]: places that move a body
-  void build(std::span<const rows::RowPair> pairs, std::size_t bodies, rows::Place* places,
-             std::uint32_t* contacts, std::uint32_t* moves);
-  /// The same order, of some places only: those of contacts with a mark.
-  /// @return how many
-  static std::uint32_t choose(std::span<const rows::Place> places, const std::uint32_t* contacts,
-                              std::span<const std::uint8_t> marks, std::size_t bodies,
-                              rows::Place* chosen, std::uint32_t* moves);
-  /// Of the last build().
-  std::uint32_t levels() const noexcept { return static_cast<std::uint32_t>(starts_.size()); }
+  /// Reserves memory for build(). @throws OutOfMemory
+  void reserve(std::size_t contacts, std::size_t bodies);
+  /// Schedules contacts, given in the order that each body must preserve.
+  /// @param schedule [pairs.size()] by slot
+  /// @param slot_contacts [pairs.size()] the index of the contact in each slot
+  /// @param contact_counts [bodies] the number of scheduled contacts that move a body
+  /// @throws OutOfMemory
+  void build(std::span<const rows::RowPair> pairs, std::size_t bodies,
+             rows::ScheduledContact* schedule, std::uint32_t* slot_contacts,
+             std::uint32_t* contact_counts);
+  /// Reduces a schedule to the contacts whose entry in `selected` is not 0, in the same order.
+  /// @return the number of selected contacts
+  static std::uint32_t select(std::span<const rows::ScheduledContact> schedule,
+                              const std::uint32_t* slot_contacts,
+                              std::span<const std::uint8_t> selected, std::size_t bodies,
+                              rows::ScheduledContact* reduced, std::uint32_t* contact_counts);
+  /// The number of colors of the last build().
+  std::uint32_t colors() const noexcept { return coloring_.colors(); }
 
  private:
-  std::vector<std::uint32_t> body_level_, contact_level_, starts_;
+  ContactColoring coloring_;
+  Buffer<std::uint32_t> next_slot_;  ///< by color
 };
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// Rows one at a time: what the row arithmetic of contact_rows.hpp needs to know of plain numbers.
+/// Scalar arithmetic for contact_rows.hpp: one row at a time.
 #pragma once
 
 #include <jfpx/math.hpp>
@@ -11,7 +11,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace rows {
 
-/// Bodies lie in arrays and go by their ids.
+/// One lane. Bodies are stored in arrays and addressed by their ids.
 struct OneLane {
   static constexpr int kLanes = 1;
   using Vec = Real;
@@ -37,7 +37,7 @@ struct OneLane {
   JFPX_HD static bool any(Mask m) { return m; }
   JFPX_HD static unsigned bits(Mask m) { return m ? 1 : 0; }
   JFPX_HD static Mask is_real(const Id* ids) { return *ids != kFixedBody; }
-  /// In double and rounded once, as Bullet does.
+  /// Computed in double and rounded once, as Bullet does.
   JFPX_HD static Vec residual(Vec impulse, Vec inverse) {
     return static_cast<Real>(static_cast<double>(impulse) * (1. / static_cast<double>(inverse)));
   }

@@ -1,4 +1,5 @@
 list(APPEND JFPX_SOURCES
+  ${CMAKE_CURRENT_LIST_DIR}/coloring.cpp
   ${CMAKE_CURRENT_LIST_DIR}/group_solver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/row_order.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_avx2.cpp

@@ -1,5 +1,5 @@
-/// ballistic: four weapons fire particles down a range (thesis 3.7), after Millington's demo of the
-/// same name.
+/// Demo ballistic: four weapons fire particles along a range (thesis 3.7), based on Millington's
+/// demo of the same name.
 #include <jfpx/particle.hpp>
 
 #include "src/demos/gunnery.hpp"
@@ -74,7 +74,7 @@ class Ballistic final : public GunDemo {
 
   ParticleSettings settings_;
   ParticleWorld world_;
-  std::vector<Round> rounds_;  ///< in flight, in the order in which they were fired
+  std::vector<Round> rounds_;  ///< rounds in flight, oldest first
 };
 
 StepReport Ballistic::advance() {

@@ -1,5 +1,5 @@
-/// big-ballistic: the same weapons fire rigid balls at two crates (thesis 3.7), after Millington's
-/// demo of the same name.
+/// Demo big-ballistic: the weapons of ballistic fire rigid balls at two crates (thesis 3.7), based
+/// on Millington's demo of the same name.
 #include "src/demos/gunnery.hpp"
 #include "src/scenes/weapons.hpp"
 
@@ -47,10 +47,10 @@ class BigBallistic final : public GunDemo {
 
   Options options_;
   World world_;
-  std::vector<Round> rounds_;  ///< in flight, in the order in which they were fired
+  std::vector<Round> rounds_;  ///< rounds in flight, oldest first
 };
 
-/// Bodies of the scene keep their indices: only rounds come and go.
+/// Bodies of the scene keep their indices, because only rounds are added and removed.
 bool BigBallistic::is_crate(std::uint32_t body) const {
   const std::vector<BodyDef>& bodies = world_.scene().bodies;
   return body < bodies.size() && std::holds_alternative<Box>(bodies[body].shape);
@@ -59,15 +59,15 @@ bool BigBallistic::is_crate(std::uint32_t body) const {
 bool BigBallistic::hit_a_crate(BodyId round) const {
   const std::span<const Contact> contacts = world_.contacts();
   return std::any_of(contacts.begin(), contacts.end(), [&](const Contact& c) {
-    return (c.a == round.index && is_crate(c.b)) || (c.b == round.index && is_crate(c.a));
+    return (c.a == round && is_crate(c.b.index)) || (c.b == round && is_crate(c.a.index));
   });
 }
 
-/// A round that hits a crate has pushed it when it is taken away. Grounds and other rounds it meets
-/// as any body does; in the original it passed through both.
+/// Removes a round after the step in which it hits a crate, so that its impulse has been applied.
+/// Rounds collide with the ground and with each other; in the original they pass through both.
 StepReport BigBallistic::advance() {
   StepReport report = world_.step();
-  std::vector<BodyId> gone;  // all are asked before any is removed, which ends all contacts
+  std::vector<BodyId> gone;  // collected first, because World::remove() clears the contacts
   for (const Round& round : rounds_) {
     const double age = world_.time() - round.fired;
     if (hit_a_crate(round.id) || spent(world_.state(round.id).position, age)) {

@@ -1,4 +1,4 @@
-/// What all demos share: the table, and how inputs become actions.
+/// The table of demos, and the mapping of inputs to actions.
 #include "src/demos/demo.hpp"
 
 #include <jfpx/error.hpp>
@@ -13,10 +13,10 @@ namespace demos {
 namespace {
 
 constexpr Entry kDemos[] = {
-    {"boxes-and-balls", "the thesis' benchmark: a leaning tower of balls falls on a ground",
+    {"boxes-and-balls", "the thesis' benchmark: a leaning tower of balls collapses",
      make_boxes_and_balls},
-    {"ballistic", "four weapons fire particles down a range", make_ballistic},
-    {"big-ballistic", "the same weapons fire rigid balls at two crates", make_big_ballistic},
+    {"ballistic", "four weapons fire particles along a range", make_ballistic},
+    {"big-ballistic", "four weapons fire rigid balls at two crates", make_big_ballistic},
     {"flight", "an aircraft with wings, rudder and tail takes off", make_flight},
 };
 
@@ -36,12 +36,13 @@ std::unique_ptr<Demo> make(std::string_view name, const Options& options) {
 StepReport Demo::step(std::span<const Input> inputs) {
   for (const Input& input : inputs) {
     if (input.control < controls_.size()) continue;
-    throw InvalidArgument("input of control " + std::to_string(input.control) + "; \"" +
-                          std::string(name()) + "\" has " + std::to_string(controls_.size()));
+    throw InvalidArgument("control is " + std::to_string(input.control) +
+                          "; it must be less than the number of controls of \"" +
+                          std::string(name()) + "\", " + std::to_string(controls_.size()));
   }
   std::vector<bool> acted(controls_.size());
   for (const Input& input : inputs) {
-    // A key that is down already is pressed again by keyboards that repeat: that is no news.
+    // Keyboards with key repeat report a press of a control that is already down; it is ignored.
     if (input.pressed && !down_[input.control]) {
       act(input.control);
       acted[input.control] = true;

@@ -1,4 +1,4 @@
-/// A demo: a scene with controls, stepped with inputs, the same for command, tests and viewer.
+/// Demos: scenes with user controls, used by the command, the tests and the viewer.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -16,22 +16,22 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace demos {
 
-/// Something that a user can do.
+/// An action that the user can trigger.
 struct Control {
-  std::string_view name;     ///< "fire": what input scripts call it
-  std::string_view summary;  ///< one line for a user
-  std::string_view key;      ///< of the thesis: "w", "1", "mouse"
-  bool repeats = false;      ///< acts in every step while it is down; else once a press
+  std::string_view name;     ///< the name in input scripts, for example "fire"
+  std::string_view summary;  ///< one line for the user
+  std::string_view key;      ///< key in the thesis: "w", "1", "mouse"
+  bool repeats = false;      ///< acts in every step while it is down; else once per press
 };
 
-/// A control goes down or comes up.
+/// A press or release of a control.
 struct Input {
-  std::size_t control = 0;  ///< place in controls()
+  std::size_t control = 0;  ///< index in controls()
   bool pressed = true;
 };
 
-/// One demo. Equal inputs in equal steps give equal bits: nothing else decides, no clock either.
-/// One owner.
+/// Interface of a demo. The states depend on the inputs of each step alone, and not on the clock:
+/// equal inputs give equal bits. Not thread-safe.
 class Demo {
  public:
   virtual ~Demo() = default;
@@ -41,25 +41,26 @@ class Demo {
   virtual std::string_view name() const = 0;
   virtual Real dt() const = 0;  ///< [s], length of a step
   std::span<const Control> controls() const { return controls_; }
-  /// One step, with what happened since the last. Inputs act in the order given (erratum E42); a
-  /// control that is pressed and released within one step still acts once.
-  /// @throws InvalidArgument for an input of no control, which changes nothing (E42); as
-  ///   World::step().
+  /// Advances the demo by one step with the inputs since the previous step. Inputs act in the given
+  /// order (erratum E42); a control that is pressed and released within one step acts once.
+  /// @throws InvalidArgument if an input has an invalid control; the demo is then unchanged (E42).
+  ///   Also throws as World::step().
   StepReport step(std::span<const Input> inputs = {});
 
-  /// What moves, for hashes: bodies in the order of World::states(), or the living rounds.
+  /// The moving objects, for hashes: bodies in the order of World::states(), or the rounds in
+  /// flight.
   virtual std::vector<BodyState> states() const = 0;
   std::uint64_t state_hash() const { return jfpx::state_hash(states()); }
-  /// Replaces the content of *view by what is to be drawn now.
+  /// Replaces the content of *view by a picture of the current state.
   virtual void draw(View* view) const = 0;
-  /// The rigid bodies of the demo; null where there are none.
+  /// The world of the demo's rigid bodies; null if the demo has none.
   virtual const World* world() const { return nullptr; }
 
  protected:
   explicit Demo(std::span<const Control> controls) : controls_(controls), down_(controls.size()) {}
 
  private:
-  /// The control acts in the coming step.
+  /// Applies a control before the next step.
   virtual void act(std::size_t control) = 0;
   virtual StepReport advance() = 0;
 
@@ -67,28 +68,32 @@ class Demo {
   std::vector<bool> down_;
 };
 
-/// The place of a control in controls(). @throws InvalidArgument listing the names.
+/// The index of a control in controls().
+/// @throws InvalidArgument for an unknown name; the message lists the names.
 std::size_t find_control(const Demo& demo, std::string_view name);
 
+/// Parameters of a demo.
 struct Options {
-  scenes::Options scene = {};   ///< for demos that are a named scene
-  std::optional<Real> dt = {};  ///< [s]; the demo's own if absent
+  scenes::Options scene = {};   ///< for demos that start from a named scene
+  std::optional<Real> dt = {};  ///< [s], length of a step; the demo's default if absent
   WorldSettings world = {};
 };
 
+/// One row of the table of demos.
 struct Entry {
   std::string_view name;
-  std::string_view summary;  ///< one line for a user
+  std::string_view summary;  ///< one line for the user
   std::unique_ptr<Demo> (*make)(const Options&);
 };
 
 /// The demos of the thesis, in a fixed order.
 std::span<const Entry> all();
 
-/// The demo called `name`; a named scene without controls of its own is one too.
-/// @throws InvalidArgument for an unknown name or a bad dt; as World and scenes::make().
+/// Creates the demo called `name`. The name of a scene is also valid.
+/// @throws InvalidArgument for an unknown name or an invalid dt. Also throws as World and
+///   scenes::make().
 std::unique_ptr<Demo> make(std::string_view name, const Options& options = {});
-/// Any scene as a demo: its one control starts it again.
+/// A demo of any scene. Its only control, "reset", restarts the scene.
 std::unique_ptr<Demo> make(const Scene& scene, const WorldSettings& settings = {});
 
 }  // namespace demos

@@ -1,5 +1,5 @@
-/// flight: an aircraft that a propeller pulls along the ground until its wings carry it (thesis
-/// 4.4.3), after Millington's demo of the same name.
+/// Demo flight: an aircraft accelerates along the ground and takes off (thesis 4.4.3), based on
+/// Millington's demo of the same name.
 #include "src/demos/makers.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ inline namespace JFPX_ABI {
 namespace demos {
 namespace {
 
-// The aircraft flies towards -x, so that +z is at the pilot's left.
+// The aircraft flies towards -x, so +z is to the left of the pilot.
 enum ControlId : std::size_t {
   kYawRight,
   kYawLeft,
@@ -28,13 +28,13 @@ constexpr Control kControls[] = {
     {"yaw-left", "turn the rudder to the left", "e", true},
     {"pitch-down", "lower both wings", "w", true},
     {"pitch-up", "raise both wings", "s", true},
-    {"roll-right", "raise the wing at the left, lower the other", "d", true},
-    {"roll-left", "lower the wing at the left, raise the other", "a", true},
-    {"level", "all surfaces to their middle", "x"},
-    {"reset", "back to the start, at rest", "r"},
+    {"roll-right", "raise the left wing and lower the right wing", "d", true},
+    {"roll-left", "lower the left wing and raise the right wing", "a", true},
+    {"level", "center all control surfaces", "x"},
+    {"reset", "restart at rest", "r"},
 };
-constexpr Real kTurnPerStep = Real(0.1);  ///< of a surface, while a key is down
-constexpr Real kCrashSpeed = 10;          ///< [m/s], downwards at the ground
+constexpr Real kDeflectionPerStep = Real(0.1);  ///< [-], of a surface while its key is down
+constexpr Real kCrashSpeed = 10;                ///< [m/s], downward speed at the ground
 
 enum Surface : std::size_t { kWingMinusZ, kWingPlusZ, kRudder, kSurfaces };
 
@@ -61,8 +61,8 @@ AeroControl wing(BodyId body, Real z) {
           .point = {-1, 0, z}};
 }
 
-/// The thesis' numbers, but the inertia is that of the mass (errata E22, E23), and damping acts
-/// once a step (E18). No ground: it holds the aircraft's centre, see below.
+/// The numbers of the thesis, but with the inertia that belongs to the mass (errata E22, E23) and
+/// with damping once per step (E18). The ground is no body: see keep_above_ground().
 Scene flight_scene(Real dt) {
   BodyDef aircraft;
   aircraft.shape = Box{{2, 1, 1}};
@@ -76,7 +76,7 @@ Scene flight_scene(Real dt) {
   return scene;
 }
 
-/// 10 N along the nose.
+/// A force of 10 N in the direction of the nose.
 struct Propulsion {
   BodyId body;
   void operator()(ForceContext& context) const {
@@ -84,6 +84,7 @@ struct Propulsion {
   }
 };
 
+/// A box of the drawing.
 struct Part {
   Vec3 size, position;  ///< [m], body axes
   Colour colour;
@@ -113,7 +114,7 @@ class Flight final : public Demo {
   BodyId aircraft() const { return world_.bodies().front(); }
   void add_forces();
   void reset();
-  void turn(Surface surface, Real by);
+  void deflect(Surface surface, Real change);
   void level();
   void act(std::size_t control) override;
   StepReport advance() override;
@@ -121,7 +122,7 @@ class Flight final : public Demo {
 
   World world_;
   std::array<ForceId, kSurfaces> surfaces_;
-  std::array<Real, kSurfaces> control_{};  ///< [-], in [-1, 1]
+  std::array<Real, kSurfaces> control_{};  ///< [-], deflections in [-1, 1]
 };
 
 void Flight::add_forces() {
@@ -142,36 +143,36 @@ void Flight::reset() {
   level();
 }
 
-void Flight::turn(Surface surface, Real by) {
-  control_[surface] = std::clamp(control_[surface] + by, Real(-1), Real(1));
+void Flight::deflect(Surface surface, Real change) {
+  control_[surface] = std::clamp(control_[surface] + change, Real(-1), Real(1));
   world_.force<AeroControl>(surfaces_[surface]).control = control_[surface];
 }
 
 void Flight::level() {
   for (const Surface surface : {kWingMinusZ, kWingPlusZ, kRudder}) {
-    turn(surface, -control_[surface]);
+    deflect(surface, -control_[surface]);
   }
 }
 
 void Flight::act(std::size_t control) {
   switch (control) {
     case kYawRight:
-      turn(kRudder, kTurnPerStep);
+      deflect(kRudder, kDeflectionPerStep);
       break;
     case kYawLeft:
-      turn(kRudder, -kTurnPerStep);
+      deflect(kRudder, -kDeflectionPerStep);
       break;
     case kPitchDown:
     case kPitchUp:
       for (const Surface side : {kWingMinusZ, kWingPlusZ}) {
-        turn(side, control == kPitchUp ? kTurnPerStep : -kTurnPerStep);
+        deflect(side, control == kPitchUp ? kDeflectionPerStep : -kDeflectionPerStep);
       }
       break;
     case kRollRight:
     case kRollLeft: {
-      const Real left = control == kRollRight ? kTurnPerStep : -kTurnPerStep;
-      turn(kWingPlusZ, left);
-      turn(kWingMinusZ, -left);
+      const Real left = control == kRollRight ? kDeflectionPerStep : -kDeflectionPerStep;
+      deflect(kWingPlusZ, left);
+      deflect(kWingMinusZ, -left);
       break;
     }
     case kLevel:
@@ -189,8 +190,8 @@ StepReport Flight::advance() {
   return report;
 }
 
-/// The ground holds the centre of mass, as in the original, but takes its downward speed too
-/// (erratum E22). Who comes down too fast starts again.
+/// The ground is a lower limit of the height of the centre of mass, as in the original, but also
+/// stops its downward velocity (erratum E22). An aircraft that descends too fast restarts.
 void Flight::keep_above_ground() {
   BodyState state = world_.state(aircraft());
   if (state.position.y >= 0) return;
@@ -210,7 +211,7 @@ void Flight::draw(View* view) const {
   const Vec3 behind = rotate(state.orientation, {4 + speed, 0, 0});
   view->camera.eye = state.position + Vec3{behind.x, 5, behind.z};
   view->camera.target = state.position;
-  // Small squares on the ground, a metre apart, so that one sees how fast it passes.
+  // Small squares on the ground, one metre apart, make the speed visible.
   const Real x = std::round(state.position.x), z = std::round(state.position.z);
   for (int i = -20; i <= 20; ++i) {
     for (int j = -20; j <= 20; ++j) {

@@ -1,4 +1,4 @@
-/// What the two ballistic demos share.
+/// Controls and drawing that both ballistic demos use.
 #include "src/demos/gunnery.hpp"
 
 namespace jfpx {

@@ -1,4 +1,4 @@
-/// What the two ballistic demos share: weapons, controls, and how long rounds live.
+/// Base of the two ballistic demos: weapons, controls, and the lifetime of rounds.
 #pragma once
 
 #include "src/demos/makers.hpp"
@@ -13,41 +13,41 @@ namespace demos {
 
 using scenes::Weapon;
 
-/// Controls of both demos. The weapons have the numbers of Weapon.
+/// Indices of the controls of both demos. Controls 0 to 3 are the values of Weapon.
 enum GunControl : std::size_t { kFire = 4, kResetGun = 5 };
 inline constexpr std::array<Control, 6> kGunControls{{{"pistol", "choose the pistol", "1"},
                                                       {"artillery", "choose the artillery", "2"},
                                                       {"fireball", "choose the fireball", "3"},
                                                       {"laser", "choose the laser", "4"},
                                                       {"fire", "fire one round", "mouse"},
-                                                      {"reset", "start again", "r"}}};
+                                                      {"reset", "restart", "r"}}};
 
-inline constexpr std::size_t kMaxRounds = 160;  ///< in flight; beyond, nothing is fired
-inline constexpr Real kLongestShot = 200;       ///< [m], along z
-inline constexpr double kOldestRound = 5;       ///< [s]; the original's never ended (E44, E45)
+inline constexpr std::size_t kMaxRounds = 160;  ///< in flight; then "fire" has no effect
+inline constexpr Real kMaxRange = 200;          ///< [m], along z
+inline constexpr double kMaxAge = 5;            ///< [s]; unlimited in the original (E44, E45)
 
-/// Who has flown far, long, or into the ground is taken away.
+/// True if a round must be removed: it is below the ground, out of range or too old.
 inline bool spent(const Vec3& position, double age) {
-  return position.y < 0 || position.z > kLongestShot || age > kOldestRound;
+  return position.y < 0 || position.z > kMaxRange || age > kMaxAge;
 }
 
-/// A demo with a gun: which weapon is chosen, and when it fires.
+/// Demo with a gun: selection of the weapon, and firing.
 class GunDemo : public Demo {
  protected:
   GunDemo() : Demo(kGunControls) {}
-  /// "laser, 3 of 160 rounds in flight"
+  /// A line of text, for example "laser, 3 of 160 rounds in flight".
   std::string gun_text() const;
 
  private:
   void act(std::size_t control) final;
-  virtual std::size_t rounds() const = 0;  ///< in flight
+  virtual std::size_t rounds() const = 0;  ///< number of rounds in flight
   virtual void fire(Weapon weapon) = 0;
   virtual void restart() = 0;
 
   Weapon weapon_ = Weapon::laser;
 };
 
-/// The gun's place, its shadow, and lines across the range.
+/// Draws a marker at the gun, its shadow, and lines across the range.
 void draw_range(View* view, const Vec3& gun);
 
 }  // namespace demos

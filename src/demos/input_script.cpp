@@ -1,4 +1,4 @@
-/// Input scripts as text, and their way into a demo.
+/// Parsing, writing, replay and recording of input scripts.
 #include "src/demos/input_script.hpp"
 
 #include <jfpx/error.hpp>
@@ -38,7 +38,7 @@ std::uint64_t step_of(const std::string& word, std::size_t line) {
 ScriptLine parse_line(const std::vector<std::string>& words, std::size_t line) {
   if (words.size() != 3) {
     fail(line, "has " + std::to_string(words.size()) +
-                   " words; it must be: STEP CONTROL press, or: STEP CONTROL release");
+                   " words; it must have the form STEP CONTROL press or STEP CONTROL release");
   }
   if (words[2] != "press" && words[2] != "release") {
     fail(line, "ends in \"" + words[2] + "\"; it must be press or release");
@@ -59,7 +59,7 @@ InputScript parse_input_script(std::string_view text) {
     if (words.empty()) continue;
     if (!head_seen) {
       if (words.size() != 3 || words[0] + " " + words[1] != kHead) {
-        fail(number, "must be: " + std::string(kHead) + " DEMO");
+        fail(number, "must have the form " + std::string(kHead) + " DEMO");
       }
       script.demo = words[2];
       head_seen = true;
@@ -68,11 +68,11 @@ InputScript parse_input_script(std::string_view text) {
     script.lines.push_back(parse_line(words, number));
     const std::size_t count = script.lines.size();
     if (count > 1 && script.lines[count - 1].step < script.lines[count - 2].step) {
-      fail(number, "step " + words[0] + " comes after step " +
-                       std::to_string(script.lines[count - 2].step) + "; steps must not go back");
+      fail(number, "step " + words[0] + " follows step " +
+                       std::to_string(script.lines[count - 2].step) + "; steps must not decrease");
     }
   }
-  if (!head_seen) fail(number + 1, "must be: " + std::string(kHead) + " DEMO");
+  if (!head_seen) fail(number + 1, "must have the form " + std::string(kHead) + " DEMO");
   return script;
 }
 
@@ -100,7 +100,7 @@ void save_input_script(const InputScript& script, const std::string& path) {
 
 ScriptPlayer::ScriptPlayer(const InputScript& script, const Demo& demo) {
   if (script.demo != demo.name()) {
-    throw InvalidArgument("the inputs are of \"" + script.demo + "\", not of \"" +
+    throw InvalidArgument("the input script is for the demo \"" + script.demo + "\", not for \"" +
                           std::string(demo.name()) + "\"");
   }
   for (const ScriptLine& line : script.lines) {
@@ -111,9 +111,9 @@ ScriptPlayer::ScriptPlayer(const InputScript& script, const Demo& demo) {
 
 std::span<const Input> ScriptPlayer::next() {
   ++step_;
-  const std::size_t first = place_;
-  while (place_ < steps_.size() && steps_[place_] <= step_) ++place_;
-  return std::span(inputs_).subspan(first, place_ - first);
+  const std::size_t first = next_;
+  while (next_ < steps_.size() && steps_[next_] <= step_) ++next_;
+  return std::span(inputs_).subspan(first, next_ - first);
 }
 
 ScriptRecorder::ScriptRecorder(const Demo& demo) {

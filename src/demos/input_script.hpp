@@ -1,4 +1,4 @@
-/// Inputs of a demo, written down: what makes a run with controls repeatable without hands.
+/// Input scripts: files with the inputs of a demo, which make an interactive run repeatable.
 #pragma once
 
 #include "src/demos/demo.hpp"
@@ -12,15 +12,16 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace demos {
 
-/// One line of a script: before step `step` (from 1), a control goes down or comes up.
+/// One line of a script: a control is pressed or released before step `step`.
 struct ScriptLine {
-  std::uint64_t step = 1;
-  std::string control;  ///< a Control's name
+  std::uint64_t step = 1;  ///< first step: 1
+  std::string control;     ///< name of the Control
   bool pressed = true;
   friend bool operator==(const ScriptLine&, const ScriptLine&) = default;
 };
 
-/// As a text file, a head and one line for each input, in the order of steps; # starts a comment:
+/// An input script. As a text file it has a header line and one line per input, in the order of the
+/// steps; # starts a comment:
 ///
 ///     jfpx-input 1 flight
 ///     60 pitch-up press
@@ -31,38 +32,39 @@ struct InputScript {
   friend bool operator==(const InputScript&, const InputScript&) = default;
 };
 
-/// @throws InvalidArgument naming the line and what is wrong with it.
+/// @throws InvalidArgument; the message names the line and the fault.
 InputScript parse_input_script(std::string_view text);
+/// The inverse of parse_input_script().
 std::string to_text(const InputScript& script);
-/// @throws FileError, and as parse_input_script() with the path in front.
+/// @throws FileError; InvalidArgument as parse_input_script(), prefixed with the path.
 InputScript load_input_script(const std::string& path);
-/// All or nothing. @throws FileError
+/// Writes the file atomically. @throws FileError
 void save_input_script(const InputScript& script, const std::string& path);
 
-/// Hands the inputs of a script to a demo, step by step.
+/// Supplies the inputs of a script to a demo, step by step.
 class ScriptPlayer {
  public:
-  /// @throws InvalidArgument if the script is of another demo, or names a control that the demo
-  ///   does not have.
+  /// @throws InvalidArgument if the script is for a different demo, or names a control that the
+  ///   demo does not have.
   ScriptPlayer(const InputScript& script, const Demo& demo);
 
-  /// The inputs of the next step. Valid until the next call.
+  /// The inputs of the next step. The span is valid until the next call.
   std::span<const Input> next();
   /// True when no input is left.
-  bool finished() const { return place_ == inputs_.size(); }
+  bool finished() const { return next_ == inputs_.size(); }
 
  private:
-  std::vector<std::uint64_t> steps_;  ///< of each input
+  std::vector<std::uint64_t> steps_;  ///< step of each input
   std::vector<Input> inputs_;
-  std::size_t place_ = 0;
-  std::uint64_t step_ = 0;
+  std::size_t next_ = 0;    ///< index of the next input
+  std::uint64_t step_ = 0;  ///< last step that was supplied
 };
 
-/// Writes a run down as it happens.
+/// Records the inputs of a run as a script.
 class ScriptRecorder {
  public:
   explicit ScriptRecorder(const Demo& demo);
-  /// Call it once for each Demo::step(), with the same inputs.
+  /// Must be called once for each Demo::step(), with the same inputs.
   void add_step(std::span<const Input> inputs);
   const InputScript& script() const { return script_; }
 

@@ -1,4 +1,4 @@
-/// The makers behind the table of demos, and what their drawings share.
+/// Factory functions of the demos, and the parts that their drawings share.
 #pragma once
 
 #include "src/demos/demo.hpp"
@@ -14,9 +14,11 @@ std::unique_ptr<Demo> make_flight(const Options& options);
 
 inline constexpr Colour kBlack{0, 0, 0}, kGrey{0.6F, 0.6F, 0.6F}, kShadow{0.2F, 0.2F, 0.2F};
 
-/// The item flattened onto the ground below it, `thickness` [-] of its height.
+/// The shadow of an item: the item flattened onto the ground.
+/// @param thickness [-], fraction of the item's height
 Item shadow_of(const Item& item, Real thickness);
-/// Lines along x, from -half_width to half_width, at z = 0, spacing, ... (count of them), y = 0.
+/// Adds `count` lines on the ground, along x from -half_width to half_width, at z = 0, spacing, 2
+/// spacing and so on.
 void add_ground_lines(View* view, Real half_width, Real spacing, int count);
 
 }  // namespace demos

@@ -1,4 +1,4 @@
-/// A scene as a demo: nothing to steer but a new start. And boxes-and-balls as the thesis shows it.
+/// Demo of any scene, whose only control is a restart; and the demo boxes-and-balls.
 #include "src/demos/makers.hpp"
 
 #include <algorithm>
@@ -10,12 +10,12 @@ inline namespace JFPX_ABI {
 namespace demos {
 namespace {
 
-constexpr Control kControls[] = {{"reset", "start again", "r"}};
+constexpr Control kControls[] = {{"reset", "restart", "r"}};
 
 constexpr std::array<Colour, 4> kColours{
     {{0.80F, 0.35F, 0.25F}, {0.30F, 0.55F, 0.80F}, {0.45F, 0.70F, 0.35F}, {0.85F, 0.70F, 0.30F}}};
 
-/// Looks along -z at all movable bodies, from far enough away to see them.
+/// A camera that looks along -z and shows all movable bodies.
 Camera camera_for(const Scene& scene) {
   Aabb bounds;
   for (const BodyDef& body : scene.bodies) {
@@ -23,8 +23,8 @@ Camera camera_for(const Scene& scene) {
   }
   if (!overlap(bounds, bounds)) return {};
   const Vec3 size = bounds.upper - bounds.lower, centre = (bounds.upper + bounds.lower) * Real(0.5);
-  const Real reach = std::max({size.x, size.y, size.z}) + 5;
-  return {.eye = centre + Vec3{0, reach * Real(0.4), reach * Real(1.3)}, .target = centre};
+  const Real extent = std::max({size.x, size.y, size.z}) + 5;
+  return {.eye = centre + Vec3{0, extent * Real(0.4), extent * Real(1.3)}, .target = centre};
 }
 
 class SceneDemo final : public Demo {
@@ -49,7 +49,7 @@ class SceneDemo final : public Demo {
     const std::vector<BodyState> states = world_.states();
     for (std::size_t i = 0; i < states.size(); ++i) {
       const BodyDef& def = scene_.bodies[i];
-      if (def.mass == 0) continue;  // walls would hide what they hold
+      if (def.mass == 0) continue;  // walls would hide the bodies between them
       view->items.push_back({.shape = def.shape,
                              .position = states[i].position,
                              .orientation = states[i].orientation,
@@ -74,7 +74,7 @@ std::unique_ptr<Demo> make(const Scene& scene, const WorldSettings& settings) {
   return std::make_unique<SceneDemo>(scene, settings, camera_for(scene), 0);
 }
 
-// Camera and lines of the original.
+// The camera and the ground lines are those of the original.
 std::unique_ptr<Demo> make_boxes_and_balls(const Options& options) {
   Scene scene = scenes::make("boxes-and-balls", options.scene);
   scene.dt = options.dt.value_or(scene.dt);

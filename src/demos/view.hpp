@@ -1,4 +1,4 @@
-/// What a demo shows: solid things, lines, a camera and text, for whoever draws them.
+/// Renderer-independent picture of a demo: solids, lines, a camera and text.
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -10,24 +10,27 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace demos {
 
+/// An RGB colour.
 struct Colour {
   float red = 0, green = 0, blue = 0;  ///< [-], in [0, 1]
 };
 
-/// A sphere or box. A shadow is its body squeezed onto the ground by `scale`.
+/// A sphere or box. A shadow is an item that `scale` flattens onto the ground.
 struct Item {
   Shape shape = {};
   Vec3 position = {};  ///< [m]
   Quat orientation = {};
   Colour colour = {};
-  Vec3 scale{1, 1, 1};  ///< [-], of the turned shape, along the axes of the world
+  Vec3 scale{1, 1, 1};  ///< [-], along the world axes, applied after the rotation
 };
 
+/// A line segment.
 struct Line {
   Vec3 from, to;  ///< [m]
   Colour colour = {};
 };
 
+/// A perspective camera.
 struct Camera {
   Vec3 eye{0, 10, 50};    ///< [m]
   Vec3 target{0, 10, 0};  ///< [m]
@@ -35,7 +38,7 @@ struct Camera {
   Real field_of_view = 45;  ///< [degrees], vertical
 };
 
-/// Near and far planes are the drawer's business: they must fit the items (erratum E43).
+/// A picture. The renderer must choose near and far planes that contain the items (erratum E43).
 struct View {
   std::vector<Item> items;
   std::vector<Line> lines;

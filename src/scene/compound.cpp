@@ -1,4 +1,4 @@
-/// Sums over the parts of an compound.
+/// Mass properties of compounds, as sums over their parts.
 #include "src/scene/compound.hpp"
 
 #include "src/scene/inertia.hpp"
@@ -7,7 +7,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-// In double: the cube of a small float is no float.
+// Computed in double, because the cube of a small float may underflow.
 double volume(const Sphere& sphere) {
   const auto r = static_cast<double>(sphere.radius);
   return 4.0 / 3.0 * 3.14159265358979323846 * r * r * r;
@@ -21,7 +21,7 @@ double weight(const CompoundPart& part) {
   return v * static_cast<double>(part.density);
 }
 
-/// Calls visit(part, its share of the mass).
+/// Calls visit(part, share) for each part, where share is its fraction of the mass.
 template <class Visit>
 void for_each_share(const Compound& compound, Visit visit) {
   double total = 0;
@@ -40,10 +40,10 @@ MassProperties mass_properties(const Compound& compound, Real mass) {
     const Vec3 moments =
         std::visit([&](const auto& shape) { return detail::moments_of_inertia(shape, part_mass); },
                    part.shape);
-    const Mat3 own =
+    const Mat3 rotated =
         detail::in_world_axes(diagonal(moments), to_matrix(normalized(part.orientation)));
     sum.centre += part.position * share;
-    sum.inertia = sum.inertia + own + detail::parallel_axis(part.position, part_mass);
+    sum.inertia = sum.inertia + rotated + detail::parallel_axis(part.position, part_mass);
   });
   return sum;
 }

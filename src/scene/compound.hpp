@@ -1,4 +1,4 @@
-/// Mass, centre and inertia of compounds.
+/// Mass properties of compounds.
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -6,16 +6,16 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// How the mass of an compound is spread. Not finite, or with a total of 0, where the parts are out
-/// of the range of numbers.
+/// Centre of mass and inertia of a compound. Not finite if the mass of a part, or the total, is
+/// outside the range of the numbers.
 struct MassProperties {
   Vec3 centre;   ///< [m], body axes
-  Mat3 inertia;  ///< [kg m^2], body axes, about their origin
+  Mat3 inertia;  ///< [kg m^2], body axes, about the origin
 };
-/// @param mass [kg], of the whole
+/// @param mass [kg], total mass of the compound
 JFPX_API MassProperties mass_properties(const Compound& compound, Real mass);
 
-/// Radius of the smallest sphere around a part's centre that holds it [m].
+/// [m], radius of the smallest sphere around the part's centre that encloses the part.
 Real bounding_radius(const CompoundPart& part);
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// Inertia tensors of the shapes, and how they turn with a body (thesis 4.1.5, 4.4.2).
+/// Inertia tensors of shapes and their rotation to world axes (thesis 4.1.5, 4.4.2).
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -7,25 +7,27 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// Principal moments of a solid sphere [kg m^2].
+/// [kg m^2], principal moments of a solid sphere.
 JFPX_HD constexpr Vec3 moments_of_inertia(const Sphere& sphere, Real mass) {
   const Real i = Real(0.4) * mass * sphere.radius * sphere.radius;
   return {i, i, i};
 }
 
-/// Principal moments of a solid box [kg m^2]: m/3 (b^2 + c^2) with half extents (erratum E23).
+/// [kg m^2], principal moments of a solid box: m/3 (b^2 + c^2) for half extents b and c (erratum
+/// E23).
 JFPX_HD constexpr Vec3 moments_of_inertia(const Box& box, Real mass) {
   const Vec3 h2 = component_product(box.half_extents, box.half_extents);
   return Vec3{h2.y + h2.z, h2.z + h2.x, h2.x + h2.y} * (mass / 3);
 }
 
-/// What a mass at `place` adds to the tensor about the origin (parallel axis theorem).
-JFPX_HD constexpr Mat3 parallel_axis(const Vec3& place, Real mass) {
-  const Mat3 cross_twice = skew_symmetric(place) * skew_symmetric(place);
+/// Contribution of a point mass at `position` to the tensor about the origin (parallel axis
+/// theorem).
+JFPX_HD constexpr Mat3 parallel_axis(const Vec3& position, Real mass) {
+  const Mat3 cross_twice = skew_symmetric(position) * skew_symmetric(position);
   return cross_twice * -mass;
 }
 
-/// R * tensor * R^T: a tensor of body axes in world axes.
+/// R * tensor * R^T: transforms a tensor from body axes to world axes.
 JFPX_HD constexpr Mat3 in_world_axes(const Mat3& tensor, const Mat3& rotation) {
   return rotation * tensor * transposed(rotation);
 }

@@ -1,4 +1,5 @@
-/// The tests are done in double, and on tensors scaled to a trace of 1: no product overflows.
+/// Validation and inversion of inertia tensors, in double and on tensors that are scaled to a trace
+/// of 1, so that no product overflows.
 #include "src/scene/inertia_tensor.hpp"
 
 #include <jfpx/scene.hpp>
@@ -7,7 +8,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// A symmetric matrix by its entries on and above the diagonal.
+/// A symmetric matrix, stored as its entries on and above the diagonal.
 struct Symmetric {
   double xx, yy, zz, xy, yz, zx;
 
@@ -31,11 +32,11 @@ Symmetric scaled(const Mat3& m, double scale) {
 }
 
 bool is_symmetric(const Mat3& m) {
-  const double noise = 16 * static_cast<double>(kEpsilon) * trace(m);
+  const double tolerance = 16 * static_cast<double>(kEpsilon) * trace(m);
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3;
     const double skew = static_cast<double>(m(i, j)) - static_cast<double>(m(j, i));
-    if (!(skew <= noise && skew >= -noise)) return false;
+    if (!(skew <= tolerance && skew >= -tolerance)) return false;
   }
   return true;
 }
@@ -50,12 +51,12 @@ const char* inertia_must_be(const Mat3& tensor) {
   if (!is_symmetric(tensor)) return "symmetric";
   const Symmetric i = scaled(tensor, trace(tensor));
   if (!i.positive_definite()) return "positive definite";
-  // The sum of mass times x x^T over a body, tr(I)/2 - I, has no negative direction; that is the
-  // triangle inequality of the moments. Equality, a flat body, is allowed as typed with four
-  // digits.
+  // The second moment of the mass, tr(I)/2 - I, is positive semidefinite, which is equivalent to
+  // the triangle inequality of the principal moments. Equality, a flat body, is accepted with the
+  // precision of four typed digits.
   const double half = 0.5 + static_cast<double>(kUnitTolerance);
-  const Symmetric spread{half - i.xx, half - i.yy, half - i.zz, -i.xy, -i.yz, -i.zx};
-  if (!spread.positive_definite()) {
+  const Symmetric second_moment{half - i.xx, half - i.yy, half - i.zz, -i.xy, -i.yz, -i.zx};
+  if (!second_moment.positive_definite()) {
     return "such that no principal moment exceeds the sum of the others";
   }
   const Mat3 inverse = inverse_inertia(tensor);

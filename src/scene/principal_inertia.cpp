@@ -1,4 +1,5 @@
-/// Cyclic Jacobi rotations (Golub and Van Loan, Matrix Computations, 8.5), in double.
+/// Principal inertia by the cyclic Jacobi method (Golub and Van Loan, Matrix Computations, 8.5), in
+/// double.
 #include "src/scene/principal_inertia.hpp"
 
 #include <cmath>
@@ -12,21 +13,21 @@ struct Matrix {
   double* operator[](int i) { return row[i]; }
 };
 
-/// Makes m[p][q] zero by a rotation in that plane, and turns the columns of `axes` with it.
+/// Eliminates tensor[p][q] by a rotation in that plane, and applies it to the columns of `axes`.
 void rotate(Matrix* tensor, Matrix* axes, int p, int q) {
   Matrix& m = *tensor;
   if (m[p][q] == 0) return;
   const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
   const double t = (theta < 0 ? -1 : 1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
   const double c = 1 / std::sqrt(t * t + 1), s = t * c;
-  const auto turn = [c, s](double* first, double* second) {
+  const auto rotate_pair = [c, s](double* first, double* second) {
     const double x = *first, y = *second;
     *first = c * x - s * y;
     *second = s * x + c * y;
   };
-  for (int k = 0; k < 3; ++k) turn(&m[k][p], &m[k][q]);
-  for (int k = 0; k < 3; ++k) turn(&m[p][k], &m[q][k]);
-  for (int k = 0; k < 3; ++k) turn(&(*axes)[k][p], &(*axes)[k][q]);
+  for (int k = 0; k < 3; ++k) rotate_pair(&m[k][p], &m[k][q]);
+  for (int k = 0; k < 3; ++k) rotate_pair(&m[p][k], &m[q][k]);
+  for (int k = 0; k < 3; ++k) rotate_pair(&(*axes)[k][p], &(*axes)[k][q]);
   m[p][q] = m[q][p] = 0;
 }
 
@@ -46,7 +47,7 @@ PrincipalInertia principal_inertia(const Mat3& tensor) {
       m[i][j] = noise ? 0 : x;
     }
   }
-  // Converges quadratically: from any tensor five sweeps reach rounding errors.
+  // Convergence is quadratic: five sweeps reduce any tensor to rounding errors.
   for (int sweep = 0; sweep < 8; ++sweep) {
     rotate(&m, &axes, 0, 1);
     rotate(&m, &axes, 0, 2);

@@ -1,4 +1,4 @@
-/// The axes in which an inertia tensor is diagonal.
+/// Principal axes and moments of inertia.
 #pragma once
 
 #include <jfpx/math.hpp>
@@ -6,12 +6,13 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
+/// Eigenvalues and eigenvectors of an inertia tensor.
 struct PrincipalInertia {
   Vec3 moments;  ///< [kg m^2]
   Mat3 axes;     ///< columns, right-handed; the identity for a tensor that is diagonal to rounding
 };
 
-/// @param tensor finite and symmetric; its upper half is read
+/// @param tensor finite and symmetric; only its upper triangle is read
 JFPX_API PrincipalInertia principal_inertia(const Mat3& tensor);
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,5 @@
-/// Scenes as JSON: strict reading with errors that name the place, writing that keeps every bit.
+/// JSON form of scenes and recording headers: a strict reader whose errors name the faulty field,
+/// and a writer that preserves every bit.
 #include "src/scene/scene_json.hpp"
 
 #include <jfpx/error.hpp>
@@ -7,15 +8,20 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <optional>
 #include <set>
+#include <string>
+#include <type_traits>
 #include <variant>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-// Numbers are Reals: shortest text that reads back to the same bits, in either precision.
+// Floating-point numbers are stored as Real, so that the shortest text that reads back to the same
+// bits is written in either precision.
 using Json = nlohmann::basic_json<nlohmann::ordered_map, std::vector, std::string, bool,
                                   std::int64_t, std::uint64_t, Real>;
 
@@ -31,7 +37,8 @@ const char* kind_of(const Json& value) {
   return value.is_null() ? "null" : "a number";
 }
 
-/// Of what holds others only what it is: to write them takes a stack as deep as they are nested.
+/// Text of a value for a message. Arrays and objects are named only by their kind, because writing
+/// them recurses once per nesting level.
 std::string text_of(const Json& json) { return json.is_structured() ? kind_of(json) : json.dump(); }
 
 void read(const Json& json, const std::string& where, Real& out) {
@@ -56,7 +63,7 @@ void read(const Json& json, const std::string& where, std::uint32_t& out) {
 void read(const Json& json, const std::string& where, CombineRule& out) {
   std::string name, names;
   read(json, where, name);
-  // Past the last rule there are no names.
+  // to_string() returns null past the last rule.
   for (std::uint8_t i = 0; to_string(CombineRule{i}) != nullptr; ++i) {
     out = CombineRule{i};
     if (name == to_string(out)) return;
@@ -95,7 +102,7 @@ void read(const Json& json, const std::string& where, ResolverSettings& settings
 void read(const Json& json, const std::string& where, SleepSettings& settings);
 void read(const Json& json, const std::string& where, MaterialSettings& settings);
 
-/// Reads the fields of one object and complains about those that nobody asked for.
+/// Reads the fields of one object and rejects the fields that were not read.
 class ObjectReader {
  public:
   ObjectReader(const Json& json, std::string where) : json_(json), where_(std::move(where)) {
@@ -167,14 +174,20 @@ constexpr const char* kTypeName<Plane> = "plane";
 template <>
 constexpr const char* kTypeName<Compound> = "compound";
 
-/// Reads the one of the shapes that the field "type" names.
+/// True if `type` is the name of shape T. Version 0.1 named a compound "assembly".
+template <class T>
+bool is_name_of(const std::string& type) {
+  return type == kTypeName<T> || (std::is_same_v<T, Compound> && type == "assembly");
+}
+
+/// Reads the shape that the field "type" names.
 template <class... Shapes>
 void read_shape(const Json& json, const std::string& where, std::variant<Shapes...>* shape) {
   ObjectReader object(json, where);
   std::string type;
   object.required("type", type);
   const auto read_if = [&](auto value) {
-    if (type != kTypeName<decltype(value)>) return false;
+    if (!is_name_of<decltype(value)>(type)) return false;
     read_fields(&object, &value);
     *shape = std::move(value);
     return true;
@@ -286,7 +299,7 @@ Scene scene_from(const Json& json) {
   return scene;
 }
 
-/// The parser needs no stack, but whoever copies or writes what it made does.
+/// Rejects deep nesting. The parser does not recurse, but copying and writing a parsed value does.
 void require_shallow(std::string_view text) {
   constexpr int kDeepest = 64;
   int depth = 0;
@@ -294,7 +307,7 @@ void require_shallow(std::string_view text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
     if (c == '"') in_string = !in_string;
-    if (in_string && c == '\\') ++i;  // what it escapes
+    if (in_string && c == '\\') ++i;  // skips the escaped character
     if (in_string) continue;
     if (c == '[' || c == '{') ++depth;
     if (c == ']' || c == '}') --depth;
@@ -305,10 +318,30 @@ void require_shallow(std::string_view text) {
   }
 }
 
+/// Parser callback that refuses a key that occurs twice in one object.
+class UniqueKeys {
+ public:
+  bool operator()(int, Json::parse_event_t event, const Json& parsed) {
+    if (event == Json::parse_event_t::object_start) keys_.emplace_back();
+    if (event == Json::parse_event_t::object_end) keys_.pop_back();
+    if (event == Json::parse_event_t::key) {
+      const auto& key = parsed.get_ref<const std::string&>();
+      if (std::ranges::find(keys_.back(), key) != keys_.back().end()) {
+        throw InvalidScene("\"" + key + "\" is given twice in one object");
+      }
+      keys_.back().push_back(key);
+    }
+    return true;
+  }
+
+ private:
+  std::vector<std::vector<std::string>> keys_;  ///< of the objects that enclose the current place
+};
+
 Json parse(std::string_view text) {
   require_shallow(text);
   try {
-    return Json::parse(text);
+    return Json::parse(text, UniqueKeys());
   } catch (const nlohmann::json::exception& error) {
     // "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
     const std::string what = error.what();
@@ -323,7 +356,8 @@ Json to_value(const Quat& q) { return Json::array({q.w, q.x, q.y, q.z}); }
 template <class... Shapes>
 Json to_value(const std::variant<Shapes...>& shape);
 
-/// JSON is UTF-8; a name may be any bytes.
+/// The text as a JSON string. JSON is UTF-8, but a name may contain any bytes; invalid sequences
+/// are replaced.
 std::string quoted(const std::string& text) {
   return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -392,7 +426,7 @@ std::string to_json(const Scene& scene) {
                       {"bias", scene.sleep.bias}};
   const Json materials = {{"friction", to_string(scene.materials.friction)},
                           {"restitution", to_string(scene.materials.restitution)}};
-  // By hand around the values, so that a file has one line a body.
+  // The outer structure is written by hand, so that a file has one line per body.
   std::string text = "{\"jfpx_scene\": " + std::to_string(kSceneSchemaVersion) +
                      ",\n \"name\": " + quoted(scene.name) +
                      ",\n \"dt\": " + Json(scene.dt).dump() +
@@ -428,6 +462,7 @@ RecordingHeader recording_header_from_json(std::string_view text) {
   RecordingHeader header;
   object.required("engine", header.engine);
   object.required("backend", header.backend);
+  if (header.backend == "x86") header.backend = "cpu";  // its name in version 0.1
   header.scene = scene_from(object.at("scene"));
   object.reject_unknown();
   return header;

@@ -1,4 +1,4 @@
-/// JSON text of what recordings carry besides the scene.
+/// JSON form of a recording's header.
 #pragma once
 
 #include <jfpx/recording.hpp>
@@ -7,7 +7,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 std::string recording_header_to_json(const RecordingHeader& header);
-/// @throws InvalidScene
+/// Reads the backend "x86" of version 0.1 as "cpu". @throws InvalidScene
 RecordingHeader recording_header_from_json(std::string_view text);
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// Refuses scenes that could not be simulated, and says why.
+/// Validation of scenes and bodies.
 #include "src/scene/scene_validate.hpp"
 
 #include <jfpx/error.hpp>
@@ -98,19 +98,19 @@ std::string find_fault(const Plane& plane, Real) { return find_fault(plane.norma
 
 std::string find_fault(const Compound& compound, Real mass) {
   if (compound.parts.empty()) return "parts is empty; it must have at least one sphere or box";
-  Real reach = 0;
+  Real radius = 0;
   for (std::size_t i = 0; i < compound.parts.size(); ++i) {
     const CompoundPart& part = compound.parts[i];
     const std::string found = find_fault(part);
     if (!found.empty()) return "parts[" + std::to_string(i) + "]." + found;
-    reach = std::max(reach, length(part.position) + bounding_radius(part));
+    radius = std::max(radius, length(part.position) + bounding_radius(part));
   }
   if (mass == 0) return {};
   const MassProperties whole = mass_properties(compound, mass);
   std::string found = find_moments_fault(principal_inertia(whole.inertia).moments);
-  if (!found.empty() || length(whole.centre) <= reach * kUnitTolerance) return found;
+  if (!found.empty() || length(whole.centre) <= radius * kUnitTolerance) return found;
   return fault("centre of mass of parts", whole.centre,
-               "the origin, to a thousandth of the body's reach; centred() moves it there");
+               "the origin, to a thousandth of the body's radius; centred() moves it there");
 }
 
 std::string find_fault(const BodyDef& def) {
@@ -129,11 +129,17 @@ std::string find_fault(const BodyDef& def) {
   if (def.kinematic && std::holds_alternative<Plane>(def.shape)) {
     return "kinematic is true; it must be false for a plane, which follows no pose";
   }
+  if (def.mass > 0 && std::holds_alternative<HalfSpace>(def.shape)) {
+    return fault("mass", def.mass, "0 for a half-space, which fills half of the world");
+  }
+  if (def.mass > 0 && std::holds_alternative<Plane>(def.shape)) {
+    return fault("mass", def.mass, "0 for a plane, which divides the whole world");
+  }
   if (def.inertia) {
     const char* range = inertia_must_be(*def.inertia);
     if (range != nullptr) return fault("inertia", *def.inertia, range);
   }
-  const Real solid_mass = def.inertia ? 0 : def.mass;  // 0: its inertia does not matter
+  const Real solid_mass = def.inertia ? 0 : def.mass;  // 0: the inertia of the shape is not used
   std::string found = std::visit(
       [solid_mass](const auto& shape) { return find_fault(shape, solid_mass); }, def.shape);
   if (!found.empty()) return found;
@@ -230,9 +236,9 @@ void validate_body_count(std::uint64_t bodies) {
 }
 
 void validate(const Scene& scene) {
-  // The smallest normal number: below it, dt and what is computed from it lose their digits.
+  // The smallest normal number: a denormal dt, and all values computed from it, lose digits.
   if (!(scene.dt >= std::numeric_limits<Real>::min() && is_finite(scene.dt))) {
-    throw InvalidScene("scene: " + fault("dt", scene.dt, "finite, > 0 and no denormal number"));
+    throw InvalidScene("scene: " + fault("dt", scene.dt, "finite, > 0 and not denormal"));
   }
   for (const std::string& found :
        {find_fault(scene.resolver), find_fault(scene.sleep), find_fault(scene.materials)}) {

@@ -1,4 +1,4 @@
-/// Checks of single parts of a scene, for those who add them one by one.
+/// Validation of single bodies and states, and text of values for messages.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -9,14 +9,16 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// @param body position in the scene, for the message @throws InvalidScene
+/// Checks all fields of a body.
+/// @param body index of the body in the scene, for the message
+/// @throws InvalidScene
 void validate_body(const BodyDef& def, std::uint64_t body);
-/// @throws InvalidScene if a SphereIndex could not count them
+/// @throws InvalidScene if the number of bodies exceeds the range of SphereIndex
 void validate_body_count(std::uint64_t bodies);
-/// Position and velocities finite and in range, orientation of unit length. Empty if so, else
-/// what is wrong, without naming the body.
+/// Checks that position and velocities are finite and in range, and that the orientation has unit
+/// length. Returns an empty string for a valid state, else a message that does not name the body.
 std::string find_fault(const BodyState& state);
-/// The shortest text that reads back as `value`, for messages.
+/// The shortest text that reads back as the same value, for messages.
 std::string to_text(Real value);
 std::string to_text(const Vec3& v);
 std::string to_text(const Quat& q);

@@ -1,4 +1,4 @@
-/// big-ballistic: two crates on a ground, and a volley of rounds if one is asked for.
+/// Scene big-ballistic: two crates on the ground, and an optional volley of rounds.
 #include "src/scenes/makers.hpp"
 #include "src/scenes/weapons.hpp"
 
@@ -7,14 +7,15 @@ inline namespace JFPX_ABI {
 namespace scenes {
 namespace {
 
-// Material of the demo that the original follows; its own friction, 0.01, was a slip (E44).
+// Material of Millington's demo, on which the original is based. The original's friction of 0.01
+// was an error (E44).
 void set_material(BodyDef* body) {
   body->friction = Real(0.9);
   body->restitution = Real(0.1);
 }
 
-/// Numbers of the original, except the place: there they started in the ground and in each other
-/// (E44), here they stand on the ground, face to face.
+/// The numbers of the original, except the position: the original's crates start inside the ground
+/// and inside each other (E44); these stand on the ground, face to face.
 BodyDef crate(Real z) {
   BodyDef def;
   def.shape = Box{{2, 2, 2}};
@@ -50,7 +51,7 @@ BodyDef big_round(Weapon weapon) {
   return round;
 }
 
-// The volley leaves a wall of guns, four abreast, one of each weapon.
+// The volley starts on a vertical grid with four columns, one per weapon.
 Scene make_big_ballistic(const Counts& counts) {
   Scene scene;
   scene.name = "big-ballistic";

@@ -1,5 +1,4 @@
-/// Scenes of spheres on lattices: pile, gas, columns, lattice, polydisperse, and the
-/// all-overlapping cluster.
+/// Scenes of spheres: pile, gas, columns, overlap, lattice and polydisperse.
 #include "src/scenes/makers.hpp"
 
 namespace jfpx {
@@ -59,7 +58,7 @@ Scene make_gas(const Counts& counts) {
 
 Scene make_columns(const Counts& counts) {
   constexpr std::uint32_t kHeight = 32;
-  constexpr Real kOverlap = Real(0.75);  // neighbours start a quarter of a diameter into each other
+  constexpr Real kSpacing = Real(0.75);  // neighbours initially overlap by a quarter of a diameter
   Scene scene;
   scene.name = "columns";
   const std::uint32_t columns = (counts.spheres + kHeight - 1) / kHeight;
@@ -68,13 +67,13 @@ Scene make_columns(const Counts& counts) {
   for (std::uint32_t i = 0; i < counts.spheres; ++i) {
     const std::uint32_t column = i / kHeight, row = column / side;
     const Vec3 position{static_cast<Real>(column % side) * 4,
-                        kRadius + static_cast<Real>(i % kHeight) * kOverlap,
+                        kRadius + static_cast<Real>(i % kHeight) * kSpacing,
                         static_cast<Real>(row) * 4};
     scene.bodies.push_back(sphere_at(position, kRadius, 1));
   }
   BodyDef ground;
-  const Real reach = static_cast<Real>(side) * 2 + 100;
-  ground.shape = Box{{reach, 1, reach}};
+  const Real half_width = static_cast<Real>(side) * 2 + 100;
+  ground.shape = Box{{half_width, 1, half_width}};
   ground.position = {static_cast<Real>(side - 1) * 2, -1, static_cast<Real>(side - 1) * 2};
   ground.mass = 0;
   scene.bodies.push_back(ground);
@@ -92,7 +91,8 @@ Scene make_overlap(const Counts& counts) {
 }
 
 Scene make_lattice(const Counts& counts) {
-  constexpr Real kSpacing = Real(0.97);  // axis neighbours overlap by 3 %, diagonal ones are apart
+  constexpr Real kSpacing =
+      Real(0.97);  // axis neighbours overlap by 3 %, diagonal neighbours do not
   Scene scene;
   scene.name = "lattice";
   std::uint32_t side = cube_side(counts.spheres);
@@ -110,8 +110,8 @@ Scene make_polydisperse(const Counts& counts) {
   Scene scene;
   scene.name = "polydisperse";
   Random random(counts.seed);
-  // Radii over four decades, each decade as many spheres as the next: 10^-u by four exact factors
-  // and a linear spread inside the decade, so that no library function decides the bits.
+  // Radii over four decades, with equal expected numbers of spheres per decade. A radius is one of
+  // four constants times a uniform factor, so that the bits do not depend on a library function.
   constexpr Real kDecades[] = {Real(5), Real(0.5), Real(0.05), Real(0.005)};
   const Real width = Real(8) * static_cast<Real>(cube_side(counts.spheres));
   for (std::uint32_t i = 0; i < counts.spheres; ++i) {

@@ -1,4 +1,4 @@
-/// Parts that several scenes share: lattice sites, spheres, containers.
+/// Lattice sites, spheres and containers of the named scenes.
 #include "src/scenes/makers.hpp"
 
 namespace jfpx {

@@ -1,4 +1,4 @@
-/// The makers behind the table of named scenes, and the parts that they share.
+/// Factory functions of the named scenes, and the parts that they share.
 #pragma once
 
 #include <jfpx/random.hpp>
@@ -20,15 +20,18 @@ Scene make_overlap(const Counts& counts);
 Scene make_lattice(const Counts& counts);
 Scene make_polydisperse(const Counts& counts);
 
-/// Smallest integer whose cube is at least n.
+/// The smallest integer whose cube is at least n.
 std::uint32_t cube_side(std::uint32_t n);
-/// Site i of a cubic lattice with `side` sites along x and z and as many layers in y as needed.
+/// Site i of a cubic lattice of spacing 1, with `side` sites along x and z and as many layers along
+/// y as required.
 Vec3 lattice_site(std::uint32_t i, std::uint32_t side);
 
-/// A solid sphere of density 1 would weigh little; scenes give the mass instead.
+/// A movable sphere.
 BodyDef sphere_at(const Vec3& position, Real radius, Real mass);
-/// Adds static box walls, 1 m thick or more, around the inner box [lower, upper]: floor and four
-/// sides, and a lid if `closed`.
+/// Adds static boxes, 2 m thick, as walls around the inner box [lower, upper]: a floor, four sides,
+/// and a lid if `closed`.
+/// @param material the walls' friction, restitution and other fields besides mass, shape and
+///   position
 void add_container(Scene& scene, const Vec3& lower, const Vec3& upper, bool closed,
                    const BodyDef& material);
 

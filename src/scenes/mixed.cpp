@@ -1,4 +1,4 @@
-/// mixed: balls and boxes of many sizes fall into a pit of half-spaces.
+/// Scene mixed: balls and boxes of many sizes fall into a pit of half-spaces.
 #include "src/scenes/makers.hpp"
 
 namespace jfpx {
@@ -6,7 +6,7 @@ inline namespace JFPX_ABI {
 namespace scenes {
 namespace {
 
-/// Uniform over all turns: a point of the unit ball in four dimensions, normalised.
+/// A uniformly distributed rotation: a point of the four-dimensional unit ball, normalised.
 Quat random_orientation(Random& random) {
   for (;;) {
     const Quat q{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1),
@@ -25,8 +25,9 @@ BodyDef half_space(const Vec3& normal, Real offset) {
 
 }  // namespace
 
-// Bodies stand on a lattice too wide for any two to touch, balls and boxes by turns as long as
-// there are both. The pit is a floor with four walls that lean outwards by 3 to 4.
+// Bodies start on a lattice that is wide enough to separate all of them. Balls and boxes alternate
+// until one kind is used up. The pit is a floor with four walls that lean outwards with a slope of
+// 3 to 4.
 Scene make_mixed(const Counts& counts) {
   constexpr Real kSpacing = Real(1.8);  // the longest diagonal of a box is 1.74
   Scene scene;
@@ -34,7 +35,7 @@ Scene make_mixed(const Counts& counts) {
   Random random(counts.seed);
   const std::uint64_t bodies = std::uint64_t{counts.spheres} + counts.boxes;
   std::uint32_t side = 1;
-  while (std::uint64_t{side} * side * side < 2 * bodies) ++side;  // half as high as wide
+  while (std::uint64_t{side} * side * side < 2 * bodies) ++side;  // the height is half the width
   std::uint32_t spheres = counts.spheres, boxes = counts.boxes;
   const Real width = static_cast<Real>(side - 1) * kSpacing;
   for (std::uint64_t i = 0; i < bodies; ++i) {
@@ -59,11 +60,11 @@ Scene make_mixed(const Counts& counts) {
     body.angular_damping = Real(0.8);
     scene.bodies.push_back(body);
   }
-  const Real reach = width * Real(0.5) + 1;
+  const Real half_width = width * Real(0.5) + 1;
   scene.bodies.push_back(half_space({0, 1, 0}, 0));
   for (const Vec3& inwards : {Vec3{1, 0, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}, Vec3{0, 0, -1}}) {
     const Vec3 normal = inwards * Real(0.8) + Vec3{0, Real(0.6), 0};
-    scene.bodies.push_back(half_space(normal, dot(normal, inwards * -reach)));
+    scene.bodies.push_back(half_space(normal, dot(normal, inwards * -half_width)));
   }
   return scene;
 }

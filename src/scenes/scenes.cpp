@@ -14,20 +14,20 @@ namespace scenes {
 namespace {
 
 constexpr Entry kScenes[] = {
-    {"boxes-and-balls", "the thesis' benchmark: a leaning tower of balls falls on a ground", 448,
+    {"boxes-and-balls", "the thesis' benchmark: a leaning tower of balls collapses", 448,
      Boxes::on_request, make_boxes_and_balls},
-    {"big-ballistic", "two crates on a ground, and a volley of as many rounds as asked for", 0,
-     Boxes::none, make_big_ballistic},
+    {"big-ballistic", "two crates on the ground, and a volley of --spheres rounds", 0, Boxes::none,
+     make_big_ballistic},
     {"mixed", "balls and boxes of many sizes fall into a pit of half-spaces", 1000,
      Boxes::as_many_as_spheres, make_mixed},
     {"pile", "a jittered lattice of spheres falls into an open box and comes to rest", 2048,
      Boxes::none, make_pile},
     {"gas", "fast spheres without gravity in a closed box, volume fraction 0.30", 4096, Boxes::none,
      make_gas},
-    {"columns", "stacks of 32 spheres that start a quarter into each other", 1024, Boxes::none,
-     make_columns},
-    {"overlap", "all spheres at one point, within 5 cm: every pair touches", 256, Boxes::none,
-     make_overlap},
+    {"columns", "stacks of 32 spheres that initially overlap by a quarter of a diameter", 1024,
+     Boxes::none, make_columns},
+    {"overlap", "all spheres within 5 cm of one point, so that every pair touches", 256,
+     Boxes::none, make_overlap},
     {"lattice", "a cubic lattice of n^3 spheres with exactly 3n^2(n-1) contacts", 1000, Boxes::none,
      make_lattice},
     {"polydisperse", "radii over four decades, from 0.5 mm to 5 m", 2000, Boxes::none,
@@ -35,16 +35,17 @@ constexpr Entry kScenes[] = {
 };
 
 std::uint32_t boxes_of(const Entry& entry, std::uint32_t spheres,
-                       const std::optional<std::uint32_t>& asked) {
-  if (asked && entry.boxes == Boxes::none) {
-    throw InvalidArgument("boxes is " + std::to_string(*asked) + "; \"" + std::string(entry.name) +
-                          "\" has no boxes to count");
+                       const std::optional<std::uint32_t>& requested) {
+  if (requested && entry.boxes == Boxes::none) {
+    throw InvalidArgument("boxes is " + std::to_string(*requested) +
+                          "; it must be absent, because \"" + std::string(entry.name) +
+                          "\" has no variable number of boxes");
   }
-  return asked.value_or(entry.boxes == Boxes::as_many_as_spheres ? spheres : 0);
+  return requested.value_or(entry.boxes == Boxes::as_many_as_spheres ? spheres : 0);
 }
 
 void require_memory(std::uint64_t bodies) {
-  // Twice the bodies, because a world copies them.
+  // Twice, because a world copies the bodies.
   const double needed = 2.0 * static_cast<double>(bodies) * sizeof(BodyDef);
   const double present =
       static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
@@ -90,8 +91,8 @@ std::vector<SphereInstance> spheres_of(const Scene& scene) {
 
 std::vector<SphereInstance> random_spheres(std::uint32_t count, Real contacts_per_sphere,
                                            std::uint64_t seed) {
-  // With density rho, a sphere of diameter 1 has rho * 4/3 pi neighbours within reach, each shared
-  // by two.
+  // At number density rho, a sphere of diameter 1 touches rho * 4/3 pi others on average, and two
+  // spheres share each contact.
   const double density =
       static_cast<double>(contacts_per_sphere) * 2 / (4.0 / 3.0 * 3.14159265358979);
   const Real width = static_cast<Real>(std::cbrt(static_cast<double>(count) / density));

@@ -1,4 +1,5 @@
-/// boxes-and-balls: the thesis' benchmark, a leaning tower of balls over a ground (thesis 5.2).
+/// Scene boxes-and-balls: the thesis' benchmark, a leaning tower of balls above the ground (thesis
+/// 5.2).
 #include "src/scenes/makers.hpp"
 
 namespace jfpx {
@@ -16,9 +17,10 @@ void set_material(BodyDef* body) {
 
 }  // namespace
 
-// Numbers of the original demo; its damping acted twice a step (E18), here once. The ground is one
-// half-space; the resolver may take 8 iterations per body in each loop. The thesis timed it without
-// boxes; where the original is told to have some, they fall in a second column beside the tower.
+// The numbers of the original demo. The original applies damping twice per step (E18), jfpx once.
+// The ground is one half-space, and the resolver is limited to 8 iterations per body in each loop.
+// The thesis timed the demo without boxes; optional boxes fall in a second column beside the tower,
+// as in the original.
 Scene make_boxes_and_balls(const Counts& counts) {
   Scene scene;
   scene.name = "boxes-and-balls";

@@ -1,4 +1,4 @@
-/// The weapons of the ballistic demos and the rigid rounds that they fire.
+/// The weapons of the ballistic demos and their rigid rounds.
 #pragma once
 
 #include <jfpx/body.hpp>
@@ -15,10 +15,10 @@ enum class Weapon : std::uint8_t { pistol, artillery, fireball, laser };
 inline constexpr std::array<std::string_view, 4> kWeaponNames{"pistol", "artillery", "fireball",
                                                               "laser"};
 
-/// Where rounds of big-ballistic start.
+/// [m], start position of the rounds of big-ballistic.
 inline constexpr Vec3 kBigGun{0, 3, 0};
 
-/// A round of big-ballistic as it leaves the gun, with the numbers of the original.
+/// The initial state of a round of big-ballistic, with the numbers of the original.
 BodyDef big_round(Weapon weapon);
 
 }  // namespace scenes

@@ -1,27 +1,29 @@
-/// Backend::automatic: who computes is chosen call by call (thesis 5.4).
+/// Backend::automatic: selects backend and algorithm for each call (thesis 5.4).
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>
 
-#include "src/sphere_collider/cost_chooser.hpp"
+#include "src/base/time_chooser.hpp"
 
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Makes the collider of a backend and algorithm that options name.
+/// Makes the collider for the backend and algorithm in the options.
 using SphereColliderMaker =
     std::function<std::unique_ptr<SphereCollider>(const SphereColliderOptions&)>;
 
-/// Hands each call to one of up to four colliders, x86 and CUDA with either algorithm, which are
-/// made when they are first needed. The device is first touched when what it would have saved so
-/// far is what touching it costs; where it can't be had, x86 stays, and nobody is told. When it
-/// fails, x86 computes that call and all others: device_failure() tells once.
+/// Forwards each call to one of up to four colliders, CPU and CUDA with either algorithm, which are
+/// made when they are first needed. The device is first used when the time that it would have saved
+/// so far equals the cost of starting it. If there is no device, the CPU computes all calls and no
+/// failure is reported. If the device fails, the CPU computes that call and all later ones, and
+/// device_failure() reports it once.
 class AutomaticSphereCollider final : public SphereCollider {
  public:
-  /// `options.backend` is `automatic`; `with_cuda` is whether `make` knows that backend.
+  /// `options.backend` is `automatic`; `with_cuda` states whether `make` supports CUDA.
   AutomaticSphereCollider(const SphereColliderOptions& options, SphereColliderMaker make,
                           bool with_cuda);
 
@@ -37,10 +39,19 @@ class AutomaticSphereCollider final : public SphereCollider {
   std::string_view device_failure() const noexcept override { return device_failure_; }
 
  private:
-  /// Calls of one kind: who is to do them.
+  /// A way to compute a call, and its cost.
+  struct Way {
+    Backend backend;
+    SphereAlgorithm algorithm;
+    CostTerms terms;
+  };
+  /// State of one kind of call: searches, or tests of given pairs.
   struct Calls {
-    CostChooser chooser;
-    // While these last, x86 does calls with the same counts without a further thought.
+    explicit Calls(std::vector<Way> ways_of_calls);
+
+    std::vector<Way> ways;
+    TimeChooser chooser;  ///< its alternatives are the ways
+    /// Further calls with the same counts that `by` computes without a new decision.
     int following = 0;
     std::size_t spheres = 0, pairs = 0;
     SphereCollider* by = nullptr;
@@ -48,13 +59,15 @@ class AutomaticSphereCollider final : public SphereCollider {
     ChoiceReason reason = ChoiceReason::fixed;
   };
 
+  static std::vector<Way> ways_to_search(const SphereColliderOptions& options, bool with_cuda);
+  static std::vector<Way> ways_to_test(const SphereColliderOptions& options, bool with_cuda);
   template <class Call, class Measure>
   auto compute(Calls& calls, const ColliderWork& expected, const Call& call,
                const Measure& measure);
-  bool goes_on(Calls& calls, std::size_t spheres, std::size_t pairs);
+  bool reuse_decision(Calls& calls, std::size_t spheres, std::size_t pairs);
   SphereCollider& collider(Backend backend, SphereAlgorithm algorithm);
   void start_device_if_it_pays();
-  /// `failure` is empty where there never was one.
+  /// `failure` is empty if there is no device.
   void give_up_device(std::string_view failure);
 
   SphereColliderOptions options_;

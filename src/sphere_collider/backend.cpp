@@ -1,5 +1,5 @@
-/// The backend table, explicit and without registration. The only file that asks whether CUDA was
-/// compiled in.
+/// The backend table, explicit and without registration. Only this file depends on whether the
+/// build includes CUDA.
 #include <jfpx/error.hpp>
 
 #include "src/sphere_collider/backend_table.hpp"
@@ -61,7 +61,7 @@ std::string_view to_string(Backend backend) noexcept {
 }
 
 std::optional<Backend> parse_backend(std::string_view text) noexcept {
-  if (text == "x86") return Backend::cpu;  // its name in version 0.1
+  if (text == "x86") return Backend::cpu;  // name of Backend::cpu in version 0.1
   for (const Backend backend : {Backend::automatic, Backend::cpu, Backend::cuda}) {
     if (text == to_string(backend)) return backend;
   }

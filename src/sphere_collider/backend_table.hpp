@@ -1,5 +1,4 @@
-/// The backend table: which backends exist, whether they can be used, and how to make their
-/// colliders.
+/// The backend table: probes and factories of all backends.
 #pragma once
 
 #include <jfpx/backend.hpp>
@@ -11,11 +10,12 @@ inline namespace JFPX_ABI {
 struct BackendRow {
   Backend backend;
   bool compiled;
-  BackendStatus (*probe)();  ///< never throws for a missing device
+  BackendStatus (*probe)();  ///< does not throw for a missing device
   std::unique_ptr<SphereCollider> (*make_sphere_collider)(const SphereColliderOptions&);
 };
 
-/// The row of a backend, which is not `automatic`. @throws InvalidArgument
+/// Returns the row of a backend other than `automatic`.
+/// @throws InvalidArgument for `automatic` and invalid values
 JFPX_API const BackendRow& backend_row(Backend backend);
 
 }  // namespace JFPX_ABI

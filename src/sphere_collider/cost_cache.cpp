@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 constexpr const char* kFileName =
     sizeof(Real) == 4 ? "cost-model-float.json" : "cost-model-double.json";
 
-/// The XDG base directory specification: what is not absolute is ignored.
+/// Follows the XDG base directory specification: relative paths are ignored.
 fs::path cache_folder() {
   const char* cache = std::getenv("XDG_CACHE_HOME");
   if (cache != nullptr && fs::path(cache).is_absolute()) return cache;
@@ -38,7 +38,8 @@ std::string first_line(const fs::path& path, const std::string& beginning = {}) 
   return {};
 }
 
-/// "Model: NVIDIA H200; Kernel Module ...", and so for each GPU.
+/// Returns the models of all GPUs and the driver, e.g. "NVIDIA H200; NVIDIA UNIX x86_64 Kernel
+/// Module ...".
 std::string describe_driver() {
   const fs::path proc = "/proc/driver/nvidia";
   const std::string version = first_line(proc / "version", "NVRM version: ");
@@ -95,10 +96,10 @@ CalibratedCosts calibrated_costs() {
 
 void store_costs(const CostModel& costs) {
   const std::string path = cost_model_path();
-  if (path.empty()) throw FileError("the costs can't be stored: HOME is not set");
+  if (path.empty()) throw FileError("cannot store the costs: HOME is not set");
   std::error_code error;
   fs::create_directories(fs::path(path).parent_path(), error);
-  if (error) throw FileError(path + ": its folder can't be made: " + error.message());
+  if (error) throw FileError(path + ": cannot create its folder: " + error.message());
   save_cost_model({costs, this_machine()}, path);
 }
 

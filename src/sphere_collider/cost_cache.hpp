@@ -1,4 +1,4 @@
-/// The cost model of this machine, in the user's cache folder: what calibrated_costs() reads.
+/// The cost model of this machine in the user's cache folder, which calibrated_costs() reads.
 #pragma once
 
 #include <jfpx/cost_model.hpp>
@@ -8,15 +8,15 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// $XDG_CACHE_HOME/jfpx, or ~/.cache/jfpx, and a name for each precision; empty where the
-/// environment names no home.
+/// Returns the path of the file, in $XDG_CACHE_HOME/jfpx or ~/.cache/jfpx, with one name per
+/// precision. Empty if the environment defines neither folder.
 JFPX_API std::string cost_model_path();
 
-/// Processor and cores, GPUs and driver. Does not start the GPU: it reads what the driver says in
-/// /proc.
+/// Returns processor, number of cores, GPUs and driver. Does not start the GPU: reads the driver's
+/// files in /proc.
 JFPX_API CostModelOrigin this_machine();
 
-/// @throws FileError
+/// Writes the costs with this_machine() as their origin. @throws FileError
 JFPX_API void store_costs(const CostModel& costs);
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// Default costs, and cost models as JSON files.
+/// Default costs; JSON files of cost models.
 #include "src/sphere_collider/cost_model.hpp"
 
 #include <jfpx/error.hpp>
@@ -44,14 +44,14 @@ constexpr Term kTerms[] = {
 
 double read_cost(const Json& json, const char* name) {
   const Json& value = json.at(name);
-  if (!value.is_number()) throw FileError(std::string(name) + " is no number");
+  if (!value.is_number()) throw FileError(std::string(name) + " is not a number");
   return value.get<double>();
 }
 
 MeasuredCostModel from_json_value(const Json& json) {
-  if (!json.is_object() || !json.contains(kFormatName)) throw FileError("is no cost model");
-  if (json[kFormatName] != kFormat) throw FileError("is a cost model of another format");
-  if (json.at("precision") != kPrecision) throw FileError("is of the other precision");
+  if (!json.is_object() || !json.contains(kFormatName)) throw FileError("is not a cost model");
+  if (json[kFormatName] != kFormat) throw FileError("is a cost model in another format");
+  if (json.at("precision") != kPrecision) throw FileError("has another precision");
   MeasuredCostModel model;
   json.at("machine").get_to(model.origin.machine);
   json.at("driver").get_to(model.origin.driver);
@@ -75,8 +75,8 @@ std::string fault_of(const std::string& name, double value) {
 
 }  // namespace
 
-// From jfpx calibrate on those two machines. Double costs what twice
-// as wide data cost.
+// Measured by jfpx calibrate on the machines that the header names. Costs of double are those of
+// data of twice the width.
 CostModel::CostModel() {
   constexpr double kWide = sizeof(Real) / 4.0;
   x86_all_pairs = {.call_us = 0.05, .sphere_ns = 6, .pair_ns = 0.175 * kWide, .contact_ns = 5};
@@ -126,7 +126,7 @@ MeasuredCostModel load_cost_model(const std::string& path) {
   } catch (const FileError& error) {
     throw FileError(path + ": " + error.what());
   } catch (const Json::exception&) {
-    throw FileError(path + ": is broken JSON or lacks a part of a cost model");
+    throw FileError(path + ": is damaged JSON or an incomplete cost model");
   }
 }
 

@@ -1,4 +1,4 @@
-/// What only the library and the command need of cost models.
+/// Internal functions on cost models, for the library and the command.
 #pragma once
 
 #include <jfpx/cost_model.hpp>
@@ -8,10 +8,10 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// The first term that is not finite or < 0, as a sentence; empty if all are good.
+/// Returns a message about the first term that is not finite or < 0; empty if all are valid.
 JFPX_API std::string find_fault(const CostModel& model);
 
-/// The content of the file that save_cost_model() writes.
+/// Returns the contents of the file that save_cost_model() writes.
 JFPX_API std::string to_json(const MeasuredCostModel& model);
 
 }  // namespace JFPX_ABI

@@ -2,7 +2,6 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/automatic_sphere_collider.cpp
   ${CMAKE_CURRENT_LIST_DIR}/backend.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cost_cache.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/cost_chooser.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cost_model.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sphere_collider.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/cell_grid.cpp
@@ -23,10 +22,10 @@ list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/pair_list_search.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/scan.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/sphere_collider_cuda.cpp)
-# Instruction sets beyond the baseline, for these sources only; chosen at run time (base/cpu.hpp). Why
-# they may not share inline functions with others: cpu/kernels.hpp.
+# These sources alone use instruction sets that the baseline does not include; base/cpu.hpp selects among
+# them at run time. cpu/kernels.hpp explains why they must not share inline functions with other sources.
 set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp
   PROPERTIES COMPILE_OPTIONS "-mavx2;-mpopcnt")
-# g++ 12 sees an uninitialised value in its own _mm512_undefined_epi32() (GCC bug 105593).
+# g++ 12 reports an uninitialized value in its own _mm512_undefined_epi32() (GCC bug 105593).
 set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx512.cpp
   PROPERTIES COMPILE_OPTIONS "-mavx512f;-mavx512bw;-mavx512dq;-mavx512vl;-mpopcnt;$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")

@@ -1,4 +1,4 @@
-/// Makes sphere colliders: checks the options and resolves the backend.
+/// Creation of sphere colliders: validates the options and selects the backend.
 #include <jfpx/error.hpp>
 #include <jfpx/sphere_collider.hpp>
 
@@ -38,12 +38,11 @@ std::span<const PairContact> SphereCollider::find_touching(std::span<const Spher
 }
 
 std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
-  verify_build(options.headers);
   ThreadPool::check(options.threads);
   if (options.algorithm > SphereAlgorithm::sorted_tiles) {
-    throw InvalidArgument("algorithm is none of SphereAlgorithm");
+    throw InvalidArgument("algorithm is not a value of SphereAlgorithm");
   }
-  if (options.simd > SimdLevel::avx512) throw InvalidArgument("simd is none of SimdLevel");
+  if (options.simd > SimdLevel::avx512) throw InvalidArgument("simd is not a value of SimdLevel");
   const std::string fault = find_fault(options.costs);
   if (!fault.empty()) throw InvalidArgument("costs: " + fault);
   if (options.backend != Backend::automatic) return make_named(options);

@@ -1,4 +1,4 @@
-/// Checks what callers hand to a sphere collider; one wording for all backends.
+/// Validation of the inputs of sphere colliders, with the same messages for all backends.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -14,7 +14,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// The shortest usual form of a value in a message, e.g. -1 or 1e+30.
+/// Formats a value for a message, e.g. -1 or 1e+30.
 inline std::string to_text(Real value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.9g", static_cast<double>(value));
@@ -27,7 +27,7 @@ inline bool is_valid(const SphereInstance& s) {
 
 [[noreturn]] inline void reject_sphere(std::span<const SphereInstance> spheres) {
   const auto bad = std::find_if_not(spheres.begin(), spheres.end(), is_valid);
-  if (bad == spheres.end()) throw InvalidArgument("a sphere was not valid while it was read");
+  if (bad == spheres.end()) throw InvalidArgument("a sphere was invalid when it was read");
   const std::string sphere = "sphere " + std::to_string(bad - spheres.begin()) + ": ";
   for (int i = 0; i < 3; ++i) {
     if (is_finite(bad->centre[i])) continue;
@@ -38,8 +38,9 @@ inline bool is_valid(const SphereInstance& s) {
                         "; it must be finite and > 0");
 }
 
-/// True if all centres are finite and all radii finite and > 0. Four comparisons at once through
-/// the compilers' vector types: baseline instructions, about one load a sphere.
+/// Returns whether all centres are finite and all radii are finite and > 0. Compares four values at
+/// a time with the compiler's vector types, which use baseline instructions: about one load per
+/// sphere.
 inline bool all_valid(std::span<const SphereInstance> spheres) {
   using Quad [[gnu::vector_size(4 * sizeof(Real)), gnu::may_alias]] = Real;
   constexpr Real kMax = std::numeric_limits<Real>::max();
@@ -53,7 +54,7 @@ inline bool all_valid(std::span<const SphereInstance> spheres) {
   return (good[0] & good[1] & good[2] & good[3]) != 0;
 }
 
-/// @throws InvalidArgument if a SphereIndex can't count the spheres.
+/// @throws InvalidArgument if the number of spheres exceeds the range of SphereIndex.
 inline void check_count(std::span<const SphereInstance> spheres) {
   constexpr std::size_t kMax = std::numeric_limits<SphereIndex>::max();
   if (spheres.size() > kMax) {
@@ -62,13 +63,13 @@ inline void check_count(std::span<const SphereInstance> spheres) {
   }
 }
 
-/// @throws InvalidArgument naming the first sphere and field that find_contacts() can't take.
+/// @throws InvalidArgument with the first sphere and field that find_contacts() does not accept.
 inline void check_spheres(std::span<const SphereInstance> spheres) {
   check_count(spheres);
   if (!all_valid(spheres)) reject_sphere(spheres);
 }
 
-/// @throws InvalidArgument if PairContact::pair can't count the pairs.
+/// @throws InvalidArgument if the number of pairs exceeds the range of PairContact::pair.
 inline void check_count(std::span<const SpherePair> pairs) {
   constexpr std::size_t kMax = std::numeric_limits<std::uint32_t>::max();
   if (pairs.size() > kMax) {
@@ -77,7 +78,7 @@ inline void check_count(std::span<const SpherePair> pairs) {
   }
 }
 
-/// @throws InvalidArgument naming the first pair that has an index >= `spheres`.
+/// @throws InvalidArgument with the first pair that has an index >= `spheres`.
 [[noreturn]] inline void reject_pair(std::span<const SpherePair> pairs, std::size_t spheres) {
   const auto bad = std::find_if(pairs.begin(), pairs.end(), [&](const SpherePair& p) {
     return p.a >= spheres || p.b >= spheres;

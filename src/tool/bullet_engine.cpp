@@ -1,4 +1,4 @@
-/// Bullet, stock or with jfpx's parts, behind the tool's interface.
+/// Bullet as an Engine, unmodified or with jfpx's parts.
 #include "src/tool/bullet_engine.hpp"
 
 #include "src/tool/bullet_world.hpp"

@@ -1,4 +1,4 @@
-/// Bullet behind the tool's interface. In a build without Bullet everything here throws.
+/// Bullet as an Engine. In a build without Bullet these functions throw.
 #pragma once
 
 #include "src/tool/engine.hpp"

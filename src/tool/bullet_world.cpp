@@ -1,4 +1,4 @@
-/// What the tool does with Bullet worlds in more than one place.
+/// Operations on Bullet worlds shared by the tool's commands.
 #include "src/tool/bullet_world.hpp"
 
 namespace jfpx {

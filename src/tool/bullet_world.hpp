@@ -1,4 +1,4 @@
-/// What the tool does with Bullet worlds in more than one place. Only for builds with Bullet.
+/// Operations on Bullet worlds shared by the tool's commands. Only for builds with Bullet.
 #pragma once
 
 #include <jfpx/bullet/scene_world.hpp>
@@ -12,13 +12,13 @@ namespace tool {
 bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
                                      const RunOptions& options);
 StageTimes last_step_times(const bullet::SceneWorld& world);
-/// Contact points in all manifolds.
+/// Number of contact points in all manifolds.
 std::uint64_t count_contacts(bullet::SceneWorld& world);
-/// Who tested the sphere pairs of the last dispatch: a backend, or "Bullet" where it was left to
-/// Bullet's own code.
+/// Name of the backend that tested the sphere pairs of the last dispatch, or "Bullet" if the
+/// dispatch was left to Bullet's own code.
 std::string sphere_backend(const bullet::SceneWorld& world);
 
-/// Why x86 took over from a device in dispatcher or solver; empty if in neither.
+/// Reason why the CPU replaced a device in the dispatcher or the solver; empty if it did not.
 std::string device_failure(const bullet::SceneWorld& world);
 
 }  // namespace tool

@@ -1,4 +1,4 @@
-/// jfpx calibrate: measures this machine for the automatic choice of backend and algorithm.
+/// jfpx calibrate: measures the costs that the automatic choice of backend and algorithm uses.
 #include "src/sphere_collider/cost_cache.hpp"
 #include "src/sphere_collider/cost_model.hpp"
 #include "src/tool/calibration.hpp"
@@ -27,25 +27,25 @@ std::string from_how_many(const CostTerms& a, const CostTerms& b) {
 }
 
 std::string report(const CostModel& costs) {
-  Table terms({"way", "call us", "byte ns", "sphere ns", "pair ns", "contact ns"});
+  Table terms({"method", "call us", "byte ns", "sphere ns", "pair ns", "contact ns"});
   const auto add = [&](const char* name, const CostTerms& t) {
     const auto number = [](double value) { return fmt::format("{:.4g}", value); };
     terms.add({name, number(t.call_us), number(t.byte_ns), number(t.sphere_ns), number(t.pair_ns),
                number(t.contact_ns)});
   };
-  add("x86, all pairs", costs.x86_all_pairs);
-  add("x86, sorted tiles", costs.x86_sorted_tiles);
-  add("x86, given pairs", costs.x86_given_pairs);
+  add("cpu, all pairs", costs.x86_all_pairs);
+  add("cpu, sorted tiles", costs.x86_sorted_tiles);
+  add("cpu, given pairs", costs.x86_given_pairs);
   add("cuda, all pairs", costs.cuda_all_pairs);
   add("cuda, sorted tiles", costs.cuda_sorted_tiles);
   add("cuda, given pairs", costs.cuda_given_pairs);
-  Table crossovers({"with 3 contacts a sphere", "pays from spheres"});
-  crossovers.add({"x86: sorted tiles instead of all pairs",
+  Table crossovers({"with 3 contacts per sphere", "faster from spheres"});
+  crossovers.add({"cpu: sorted tiles instead of all pairs",
                   from_how_many(costs.x86_all_pairs, costs.x86_sorted_tiles)});
   crossovers.add({"cuda: sorted tiles instead of all pairs",
                   from_how_many(costs.cuda_all_pairs, costs.cuda_sorted_tiles)});
   crossovers.add(
-      {"all pairs: cuda instead of x86", from_how_many(costs.x86_all_pairs, costs.cuda_all_pairs)});
+      {"all pairs: cuda instead of cpu", from_how_many(costs.x86_all_pairs, costs.cuda_all_pairs)});
   return fmt::format("{}\nstart of cuda: {:.0f} ms\n\n{}", terms.text(), costs.cuda_start_ms,
                      crossovers.text());
 }
@@ -68,7 +68,7 @@ MeasuredCostModel show(const Options& options) {
   const CalibratedCosts cached = calibrated_costs();
   if (cached.problem.empty()) return {cached.costs, this_machine()};
   if (!options.quiet) {
-    fmt::print(stderr, "jfpx: {}: these are the default costs\n", cached.problem);
+    fmt::print(stderr, "jfpx: {}: showing the default costs\n", cached.problem);
   }
   return {cached.costs, {.machine = "none: default costs", .driver = ""}};
 }
@@ -90,15 +90,15 @@ void add_calibrate_command(CLI::App& app, int& status) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
       "calibrate", "Measure this machine for the automatic choice of backend and algorithm");
-  command->add_flag("--show", options->show, "Measure nothing: show what is used now");
+  command->add_flag("--show", options->show, "Show the costs in use without measuring");
   command->add_option("--json", options->json,
-                      "Write the costs as JSON to this file, - for stdout");
-  command->add_flag("--quiet", options->quiet, "Print nothing but what --json - asks for");
+                      "Write the costs as JSON to this file; - writes to stdout");
+  command->add_flag("--quiet", options->quiet, "Print only the output of --json -");
   command->footer(
-      "Takes seconds. The costs are stored in the cache folder (XDG_CACHE_HOME) with machine,\n"
-      "driver and version; run, compare, replay and jfpx-view use them while all three are as "
-      "they\n"
-      "were. Programs of your own have load_cost_model() and SphereColliderOptions::costs.");
+      "Takes a few seconds. The costs are stored in the cache folder (XDG_CACHE_HOME) together\n"
+      "with the machine, the driver and the version. The commands run, compare and replay and\n"
+      "jfpx-view use them as long as these three are unchanged. Other programs load them with\n"
+      "calibrated_costs() and pass them in SphereColliderOptions::costs.");
   command->callback([options, &status] { status = run(*options); });
 }
 

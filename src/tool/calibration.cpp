@@ -1,4 +1,4 @@
-/// Measures what sphere collision costs on this machine.
+/// Measurement of the costs of sphere collision on this machine.
 #include "src/tool/calibration.hpp"
 
 #include <jfpx/error.hpp>
@@ -21,7 +21,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Us = std::chrono::duration<double, std::micro>;
 
-/// Contacts of a sphere: none, a heap, a crush.
+/// Contacts per sphere: a gas without contacts, a pile, a dense packing.
 constexpr Real kDensities[] = {0, 3, 12};
 constexpr std::uint32_t kFew[] = {4, 32, 128, 512, 2048};
 constexpr std::uint32_t kMany[] = {4, 128, 512, 2048, 8192, 32768};
@@ -37,12 +37,12 @@ std::vector<SphereInstance> make_spheres(std::uint32_t count, Real density) {
   return spheres;
 }
 
-/// The least time of a call: other work on the machine only adds to it.
+/// The minimum time of a call [us]; other load on the machine only increases the time.
 template <class Call>
 double least_us(const Call& call) {
   constexpr Us kBudget{8e3};
   constexpr int kLeast = 3;
-  call();  // grows buffers
+  call();  // allocates buffers
   double least = std::numeric_limits<double>::infinity();
   const Clock::time_point begin = Clock::now();
   for (int n = 0; n < kLeast || Clock::now() - begin < kBudget; ++n) {
@@ -60,7 +60,7 @@ class Bench {
 
   void expect(std::size_t measurements) { total_ += measurements; }
 
-  /// Samples of one way to search, for all densities.
+  /// Samples of one search algorithm at all densities.
   std::vector<CostSample> search(Backend backend, SphereAlgorithm algorithm,
                                  std::span<const std::uint32_t> sizes) {
     const auto collider = make_sphere_collider({.backend = backend, .algorithm = algorithm});
@@ -77,8 +77,8 @@ class Bench {
     return samples;
   }
 
-  /// Samples of given pairs, half of them touching; `copied` spheres with one pair tell what
-  /// moving bytes costs.
+  /// Samples of given pairs, half of them in contact. The `copied` numbers of spheres, each with
+  /// one pair, measure the cost of copying bytes.
   std::vector<CostSample> given(Backend backend, std::span<const std::uint32_t> copied) {
     const auto collider = make_sphere_collider({.backend = backend});
     std::vector<CostSample> samples;
@@ -131,7 +131,7 @@ constexpr Term kSortedTerms[] = {&CostTerms::call_us, &CostTerms::sphere_ns,
 constexpr Term kGivenTerms[] = {&CostTerms::call_us, &CostTerms::pair_ns};
 constexpr Term kCopiedTerms[] = {&CostTerms::call_us, &CostTerms::byte_ns, &CostTerms::pair_ns};
 
-void measure_x86(Bench& bench, CostModel* costs) {
+void measure_cpu(Bench& bench, CostModel* costs) {
   using enum SphereAlgorithm;
   costs->x86_all_pairs = fit_costs(bench.search(Backend::cpu, all_pairs, kFew), kAllPairsTerms);
   costs->x86_sorted_tiles =
@@ -157,8 +157,8 @@ void measure_cuda(Bench& bench, CostModel* costs) {
       fit_costs(bench.search(Backend::cuda, sorted_tiles, kManyForDevice), kSortedTerms, copies);
 }
 
-/// A device may be missing, and may fail at any time; that is no reason to know nothing of x86.
-/// @return why it could not be measured; empty if it was
+/// Measures a device, which may be missing or fail at any time, without losing the CPU's costs.
+/// @return the reason why it could not be measured; empty if it was
 template <class Measure>
 std::string try_device(const Measure& measure) {
   try {
@@ -177,13 +177,13 @@ Calibration calibrate(const std::function<void(std::uint64_t, std::uint64_t)>& p
   constexpr std::size_t kD = std::size(kDensities);
   bench.expect(kD * (std::size(kFew) + std::size(kMany)) + std::size(kPairs));
   double start_ms = 0;
-  // First, while nothing has started the device.
+  // Measured first, because any other use would start the device.
   result.no_cuda = try_device([&] { start_ms = measure_start(); });
   if (result.no_cuda.empty()) {
     bench.expect(kD * (std::size(kFewForDevice) + std::size(kManyForDevice)) + std::size(kPairs) +
                  std::size(kCopied));
   }
-  measure_x86(bench, &result.costs);
+  measure_cpu(bench, &result.costs);
   if (!result.no_cuda.empty()) return result;
   CostModel with_cuda = result.costs;
   with_cuda.cuda_start_ms = start_ms;

@@ -1,4 +1,4 @@
-/// Measures what sphere collision costs on this machine.
+/// Measurement of the costs of sphere collision on this machine.
 #pragma once
 
 #include <jfpx/cost_model.hpp>
@@ -12,11 +12,11 @@ inline namespace JFPX_ABI {
 namespace tool {
 
 struct Calibration {
-  CostModel costs;      ///< cuda: the defaults where it is not usable
-  std::string no_cuda;  ///< why cuda was not measured; empty if it was
+  CostModel costs;      ///< defaults for cuda if it is not usable
+  std::string no_cuda;  ///< reason why cuda was not measured; empty if it was
 };
 
-/// Takes seconds, one thread. `progress(done, total)` is called after each measurement.
+/// Takes a few seconds on one thread. Calls `progress(done, total)` after each measurement.
 Calibration calibrate(const std::function<void(std::uint64_t, std::uint64_t)>& progress);
 
 }  // namespace tool

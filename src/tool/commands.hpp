@@ -1,9 +1,11 @@
-/// The subcommands of jfpx: each adds itself to the command line and runs when it was chosen.
+/// The subcommands of jfpx. Each function adds one subcommand, which writes its exit status.
 #pragma once
 
 #include <jfpx/config.hpp>
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace jfpx {
 inline namespace JFPX_ABI {

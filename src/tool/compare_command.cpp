@@ -1,4 +1,4 @@
-/// jfpx compare: prints what a comparison found.
+/// jfpx compare: runs a comparison and prints its results.
 #include "src/tool/commands.hpp"
 #include "src/tool/comparison.hpp"
 #include "src/tool/options.hpp"
@@ -97,7 +97,8 @@ int run(const RunOptions& options) {
 void add_compare_command(CLI::App& app, int& status) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand(
-      "compare", "Run a scene natively, in stock Bullet and in Bullet with jfpx; compare all bits");
+      "compare",
+      "Run a scene natively, in stock Bullet and in Bullet with jfpx, and compare all bits");
   add_scene_options(*command, *options);
   add_run_options(*command, *options);
   command->callback([options, &status] { status = run(*options); });

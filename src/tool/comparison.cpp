@@ -1,4 +1,4 @@
-/// The main job: native jfpx, stock Bullet and Bullet with jfpx, step by step.
+/// Comparison of native jfpx, stock Bullet and Bullet with jfpx, step by step.
 #include "src/tool/comparison.hpp"
 
 #include <jfpx/bullet/verify.hpp>
@@ -14,7 +14,7 @@ namespace tool {
 
 Comparison compare(const Scene& scene, const RunOptions& given) {
   RunOptions options = given;
-  // Otherwise small scenes would compare Bullet's own code with itself.
+  // With the default, small scenes would compare Bullet's own code with itself.
   if (!options.minimum_batch) options.minimum_batch = 0;
   const auto native = make_native_engine(scene, options);
   bullet::SceneWorld stock = make_bullet_world(EngineKind::bullet_stock, scene, options);
@@ -36,7 +36,7 @@ Comparison compare(const Scene& scene, const RunOptions& given) {
     jfpx.step();
     result.ms_jfpx += last_step_times(jfpx);
     result.contacts_jfpx += count_contacts(jfpx);
-    // After the first difference all later ones follow from it.
+    // All later differences follow from the first one.
     if (result.first_difference.empty()) {
       const auto difference = bullet::first_difference(stock.world(), jfpx.world(), step);
       if (difference) result.first_difference = to_text(*difference);

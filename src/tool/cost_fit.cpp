@@ -1,4 +1,4 @@
-/// Costs from measured times: least squares of relative errors without negative terms.
+/// Estimation of cost model terms: nonnegative least squares of relative errors.
 #include "src/tool/cost_fit.hpp"
 
 #include <jfpx/contact.hpp>
@@ -13,7 +13,8 @@ namespace tool {
 CostTerms fit_costs(std::span<const CostSample> samples, std::span<double CostTerms::*const> which,
                     const CostTerms& known) {
   const std::size_t n = which.size();
-  // Columns: what one unit of a term adds, relative to the measured time; scaled to length 1.
+  // Each column is the contribution of one unit of a term relative to the measured time, normalized
+  // to length 1.
   std::vector<std::vector<double>> columns(n);
   std::vector<double> scale(n), rest(samples.size()), value(n, 0.0);
   for (std::size_t j = 0; j < n; ++j) {
@@ -30,7 +31,8 @@ CostTerms fit_costs(std::span<const CostSample> samples, std::span<double CostTe
   for (std::size_t i = 0; i < samples.size(); ++i) {
     rest[i] = 1 - microseconds(known, samples[i].work) / samples[i].us;
   }
-  // Coordinate descent: each term in turn takes its best value, or 0. Converges to the minimum.
+  // Coordinate descent sets one term at a time to its optimum, or to 0, and converges to the
+  // minimum.
   constexpr int kSweeps = 20000;
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     double largest_change = 0;

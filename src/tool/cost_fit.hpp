@@ -1,4 +1,4 @@
-/// Costs from measured times.
+/// Estimation of cost model terms from measured times.
 #pragma once
 
 #include <jfpx/cost_model.hpp>
@@ -15,18 +15,18 @@ struct CostSample {
   double us = 0;  ///< > 0
 };
 
-/// The terms of `which`, none negative, that come closest to the samples in the sum of squared
-/// relative errors; all other terms are those of `known`.
+/// Fits the terms in `which`, constrained to be nonnegative, by least squares of the relative
+/// errors; all other terms are those of `known`.
 CostTerms fit_costs(std::span<const CostSample> samples, std::span<double CostTerms::*const> which,
                     const CostTerms& known = {});
 
-/// Smallest whole number of spheres, with three contacts each, from which on `b` takes less time
-/// than `a`; 0 if it is none up to 10^8.
+/// Smallest number of spheres, with three contacts each, for which `b` takes less time than `a`; 0
+/// if there is none up to 10^8.
 double crossover(const CostTerms& a, const CostTerms& b);
 
-/// What find_contacts() does for so many spheres and contacts.
+/// The work of a find_contacts() call.
 ColliderWork search_work(double spheres, double contacts);
-/// What test_pairs() does.
+/// The work of a test_pairs() call.
 ColliderWork test_work(double spheres, double pairs);
 
 }  // namespace tool

@@ -1,4 +1,4 @@
-/// Demos behind the tool's interface.
+/// Demos, with their scripted inputs, as an Engine.
 #include "src/tool/demo_engine.hpp"
 
 #include <jfpx/error.hpp>
@@ -19,7 +19,7 @@ std::unique_ptr<demos::Demo> make_demo(const RunOptions& options) {
   const WorldSettings world{.collider = collider_options(options)};
   if (!is_demo(options.scene)) return demos::make(load(options), world);
   if (options.no_sleep) {
-    throw InvalidArgument("--no-sleep goes with a scene; " + options.scene + " is a demo");
+    throw InvalidArgument("--no-sleep requires a scene; " + options.scene + " is a demo");
   }
   return demos::make(options.scene,
                      {.scene = scene_options(options), .dt = options.dt, .world = world});
@@ -35,7 +35,7 @@ class DemoEngine final : public Engine {
     report_ = demo_->step(player_.next());
     const std::chrono::duration<double, std::milli> passed =
         std::chrono::steady_clock::now() - start;
-    report_.total_ms = passed.count();  // controls included
+    report_.total_ms = passed.count();  // includes the controls
     if (!report_.device_failure.empty()) device_failure_ = report_.device_failure;
   }
   std::vector<BodyState> states() const override { return demo_->states(); }
@@ -75,7 +75,7 @@ std::string describe_demo(const std::string& name) {
   }
   for (const demos::Control& control : demo->controls()) {
     text += fmt::format("  {:<12} {:<6} {}{}\n", control.name, control.key, control.summary,
-                        control.repeats ? ", in every step while it is down" : "");
+                        control.repeats ? ", in every step while the key is down" : "");
   }
   return text;
 }

@@ -1,4 +1,4 @@
-/// Demos behind the tool's interface: how one runs with its inputs.
+/// Demos, with their scripted inputs, as an Engine.
 #pragma once
 
 #include "src/tool/demo_names.hpp"
@@ -10,13 +10,15 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 
-/// The demo or scene that the options name, as a demo, with the inputs of a script; "" is no input.
-/// @param start receives the scene that the demo starts with; without bodies, if it has none
+/// Runs the selected demo, or the selected scene as a demo, with the inputs of a script.
+/// @param script path of an input script; empty: no inputs
+/// @param start receives the initial scene of the demo, which has no bodies if the demo has no
+/// scene
 /// @throws InvalidArgument, also for options that a demo does not have; FileError; as load()
 std::unique_ptr<Engine> make_demo_engine(const RunOptions& options, const std::string& script,
                                          Scene* start);
 
-/// Name, summary and controls of a demo, for a user.
+/// Name, summary and controls of a demo, as text.
 std::string describe_demo(const std::string& name);
 
 }  // namespace tool

@@ -1,4 +1,4 @@
-/// Which names are scenes and demos.
+/// Classification of the names of scenes and demos.
 #include "src/tool/demo_names.hpp"
 
 #include "src/demos/demo.hpp"

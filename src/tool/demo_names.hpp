@@ -1,4 +1,4 @@
-/// Which names are scenes and demos.
+/// Classification of the names of scenes and demos.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -11,7 +11,7 @@ namespace tool {
 
 bool is_scene(const std::string& name);
 bool is_demo(const std::string& name);
-/// True for a demo that is no scene, because more than bodies belongs to it.
+/// True for a demo that contains more than rigid bodies and therefore is not a scene.
 bool is_only_a_demo(const std::string& name);
 
 }  // namespace tool

@@ -1,7 +1,5 @@
-/// Makes engines by name.
+/// Creation of engines, and their common options.
 #include "src/tool/engine.hpp"
-
-#include <jfpx/error.hpp>
 
 #include "src/tool/bullet_engine.hpp"
 #include "src/tool/native_engine.hpp"
@@ -9,15 +7,12 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
-#include <iterator>
-
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 namespace {
 
-/// Read once: a command may make several engines, and why the file is not used is told once.
+/// Read once, because a command may create several engines and must print the warning once.
 const CostModel& costs_of_this_machine(bool quiet) {
   static const CostModel costs = [quiet] {
     const CalibratedCosts cached = calibrated_costs();
@@ -31,17 +26,6 @@ const CostModel& costs_of_this_machine(bool quiet) {
 }
 
 }  // namespace
-
-std::string_view to_string(EngineKind kind) { return kEngineNames[static_cast<int>(kind)]; }
-
-EngineKind parse_engine(std::string_view name) {
-  const auto* found = std::ranges::find(kEngineNames, name);
-  if (found != std::end(kEngineNames)) {
-    return static_cast<EngineKind>(found - std::begin(kEngineNames));
-  }
-  throw InvalidArgument(
-      fmt::format("engine is \"{}\"; it must be one of {}", name, fmt::join(kEngineNames, ", ")));
-}
 
 StageTimes& StageTimes::operator+=(const StageTimes& other) {
   integrate += other.integrate;
@@ -62,7 +46,7 @@ nlohmann::ordered_json to_json_value(const StageTimes& times) {
 
 int report_trouble(const std::string& device_failure, const std::string& trouble) {
   if (!device_failure.empty()) {
-    fmt::print(stderr, "jfpx: x86 has taken over: {}\n", device_failure);
+    fmt::print(stderr, "jfpx: the CPU has replaced the GPU: {}\n", device_failure);
   }
   if (trouble.empty()) return kSuccess;
   fmt::print(stderr, "jfpx: {}\n", trouble);

@@ -1,4 +1,4 @@
-/// Ctrl-C as an exception; see the header.
+/// Conversion of SIGINT and SIGTERM to an exception.
 #include "src/tool/interrupts.hpp"
 
 namespace jfpx {

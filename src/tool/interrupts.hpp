@@ -1,4 +1,4 @@
-/// Ctrl-C as an exception, so that a long run leaves no half files behind.
+/// Conversion of SIGINT and SIGTERM to an exception, so that a run leaves no partial files.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,13 +10,14 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 
-/// The user, or the system, wants the process to end.
+/// Thrown when a signal requests the end of the process.
 struct Interrupted {
   int signal;
 };
 
-/// While one lives, SIGINT and SIGTERM wait for check(); a second one ends the process at once.
-/// Signals that the process was started to ignore stay ignored. One at a time, in one thread.
+/// Defers SIGINT and SIGTERM to the next call of check() during its lifetime; a second signal ends
+/// the process immediately. Signals that were ignored at the start of the process stay ignored.
+/// Only one object may exist at a time, in one thread.
 class Interrupts {
  public:
   Interrupts();

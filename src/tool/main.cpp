@@ -18,7 +18,7 @@ namespace {
 
 using namespace jfpx;
 
-/// CLI11 only says that a command is missing where the first word is none of ours.
+/// Names an unknown command or option, which CLI11 reports as a missing command.
 std::string what_is_wrong(const CLI::App& app, const CLI::Error& error) {
   const std::vector<std::string> unknown = app.remaining(true);
   if (!app.get_subcommands().empty() || unknown.empty()) return error.what();
@@ -26,7 +26,7 @@ std::string what_is_wrong(const CLI::App& app, const CLI::Error& error) {
   return fmt::format("there is no {} \"{}\"", word.starts_with('-') ? "option" : "command", word);
 }
 
-/// What was printed may still lie in a buffer, with no disk to go to.
+/// Flushes stdout and reports output that could not be written.
 int finish_output(int status) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
   fmt::print(stderr, "jfpx: stdout can't be written: {}\n", std::strerror(errno));
@@ -34,9 +34,9 @@ int finish_output(int status) {
 }
 
 int run(int argc, char** argv) {
-  tool::switch_precision_if_asked(argc, argv);
+  tool::switch_precision_if_requested(argc, argv);
   CLI::App app("jfpx " JFPX_VERSION
-               ": rigid-body collision with the same bits on x86, on CUDA and inside Bullet.",
+               ": rigid-body collision with identical bits on the CPU, on CUDA and inside Bullet.",
                "jfpx");
   app.set_version_flag("--version", "jfpx " JFPX_VERSION);
   app.require_subcommand(1);
@@ -51,9 +51,9 @@ int run(int argc, char** argv) {
       "  jfpx run pile --spheres 2048 --steps 120 --hash\n"
       "  jfpx scenes gas --spheres 100 --export > gas.json && jfpx run gas.json\n"
       "\n"
-      "Exit status: 0 all well; 1 a check failed (mismatch, divergence); 2 bad usage or bad "
+      "Exit status: 0 success; 1 a check failed (mismatch, divergence); 2 invalid usage or "
       "input;\n"
-      "3 backend not usable. Results go to stdout, everything else to stderr.");
+      "3 backend not usable. Results are written to stdout, messages to stderr.");
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
     return "jfpx: " + what_is_wrong(*failed, error) + "\nRun with --help for more information.\n";
   });
@@ -79,7 +79,7 @@ int main(int argc, char** argv) {
   try {
     return finish_output(run(argc, argv));
   } catch (const tool::Interrupted& interrupted) {
-    // As if it had not been caught: the shell shall see why it ended.
+    // Ends the process by the signal itself, so that the shell sees the reason.
     std::signal(interrupted.signal, SIG_DFL);
     std::raise(interrupted.signal);
   } catch (const BackendUnavailable& error) {

@@ -1,4 +1,4 @@
-/// The native engine behind the tool's interface.
+/// The native engine as an Engine.
 #include "src/tool/native_engine.hpp"
 
 #include <fmt/format.h>
@@ -47,7 +47,7 @@ StageTimes stage_times(const StepReport& report) {
 
 std::string trouble_of(const StepReport& report) {
   if (!report.non_finite) return {};
-  return fmt::format("step {}: body {} left the finite numbers; the state is frozen", report.step,
+  return fmt::format("step {}: body {} became non-finite; the state is frozen", report.step,
                      report.non_finite_body.index);
 }
 

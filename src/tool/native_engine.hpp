@@ -1,4 +1,4 @@
-/// The native engine behind the tool's interface.
+/// The native engine as an Engine.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -11,7 +11,7 @@ namespace tool {
 
 std::unique_ptr<Engine> make_native_engine(const Scene& scene, const RunOptions& options);
 
-/// What a report says, in the tool's words.
+/// Conversions of a step report.
 StageTimes stage_times(const StepReport& report);
 std::string trouble_of(const StepReport& report);
 

@@ -1,9 +1,11 @@
-/// What stands in for Bullet in a build without it: an answer that says so.
+/// Replacements for a build without Bullet, which report that Bullet is missing.
 #include <jfpx/error.hpp>
 
 #include "src/tool/bullet_engine.hpp"
 #include "src/tool/commands.hpp"
 #include "src/tool/comparison.hpp"
+
+#include <CLI/CLI.hpp>
 
 namespace jfpx {
 inline namespace JFPX_ABI {

@@ -1,4 +1,4 @@
-/// Options and validators; see the header.
+/// Command-line options shared by several commands.
 #include "src/tool/options.hpp"
 
 #include <charconv>
@@ -44,12 +44,12 @@ void add_scene_options(CLI::App& app, RunOptions& options, const std::string& sc
   app.add_option("--spheres", options.spheres, "Number of spheres of a named scene")
       ->check(whole_number());
   app.add_option("--boxes", options.boxes,
-                 "Number of boxes, of named scenes that have some [see: jfpx scenes]")
+                 "Number of boxes, for named scenes with boxes (see: jfpx scenes)")
       ->check(whole_number());
   app.add_option("--seed", options.seed, "Seed of a named scene")
       ->check(whole_number())
       ->capture_default_str();
-  app.add_option("--dt", options.dt, "Length of a step in seconds [the scene's]");
+  app.add_option("--dt", options.dt, "Time step in seconds [default: the scene's]");
   app.add_flag("--no-sleep", options.no_sleep, "Keep all bodies awake");
 }
 
@@ -58,26 +58,27 @@ void add_run_options(CLI::App& app, RunOptions& options) {
       ->check(whole_number())
       ->capture_default_str();
   add_backend_option(app, options.backend);
-  app.add_option("--threads", options.threads, "CPU threads, 0 = one per core")
+  app.add_option("--threads", options.threads, "CPU threads; 0: one per core")
       ->check(whole_number())
       ->capture_default_str();
-  app.add_option("--minimum-batch", options.minimum_batch,
-                 "Bullet: pairs below which a dispatch, and manifolds below which a group of the "
-                 "solver, is left to Bullet's own code [compare: 0, so that jfpx computes; else "
-                 "what pays]")
+  app.add_option(
+         "--minimum-batch", options.minimum_batch,
+         "Bullet: smallest number of pairs in a dispatch, and of manifolds in a group, that "
+         "jfpx computes instead of Bullet [default: compare: 0; other commands: the "
+         "break-even point]")
       ->check(whole_number());
-  const CLI::IsMember whose({"stock", "jfpx"});
-  app.add_option("--solver", options.solver, "Bullet: whose constraint solver")
-      ->check(whose)
+  const CLI::IsMember implementation({"stock", "jfpx"});
+  app.add_option("--solver", options.solver, "Bullet: constraint solver, stock or jfpx")
+      ->check(implementation)
       ->capture_default_str();
-  app.add_option("--world", options.world, "Bullet: whose dynamics world")
-      ->check(whose)
+  app.add_option("--world", options.world, "Bullet: dynamics world, stock or jfpx")
+      ->check(implementation)
       ->capture_default_str();
   app.add_option("--json", options.json,
-                 "Write the results as JSON to this file, - for stdout, instead of a table");
+                 "Write the results as JSON to this file; - writes to stdout instead of a table");
   app.add_flag("--hash", options.hash,
-               "Print the hash of the final state, 16 hex digits, as the last line");
-  app.add_flag("--quiet", options.quiet, "Print nothing but what --hash and --json - ask for");
+               "Print the hash of the final state as the last line (16 hexadecimal digits)");
+  app.add_flag("--quiet", options.quiet, "Print only the output of --hash and --json -");
 }
 
 }  // namespace tool

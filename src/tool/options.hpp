@@ -1,4 +1,4 @@
-/// Command-line options that several commands share.
+/// Command-line options shared by several commands.
 #pragma once
 
 #include "src/tool/run_options.hpp"
@@ -9,10 +9,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 
-/// Accepts whole numbers of 64 bits. CLI11 by itself reads -1, and what is too large, as the
-/// largest one.
+/// Accepts unsigned 64-bit integers. CLI11 alone parses -1 and values out of range as the largest
+/// integer.
 CLI::Validator whole_number();
-/// Adds SCENE, with that as its help, and the options that choose and change a scene.
+/// Adds SCENE, with `scene` as its help text, and the options that select and modify a scene.
 void add_scene_options(
     CLI::App& app, RunOptions& options,
     const std::string& scene = "Name of a scene (see: jfpx scenes) or a JSON file");

@@ -1,4 +1,4 @@
-/// What the commands print and write: tables, progress, files.
+/// Output of the commands: tables, progress and files.
 #include "src/tool/output.hpp"
 
 #include <jfpx/error.hpp>

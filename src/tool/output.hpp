@@ -1,4 +1,4 @@
-/// What the commands print and write: tables, progress, files.
+/// Output of the commands: tables, progress and files.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -15,10 +15,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 
-/// Where results go: a file that appears only when it is complete; "-" is stdout, "" is nothing.
+/// Destination of results: a file that appears when it is complete, "-" for stdout, "" for none.
 class OutputFile {
  public:
-  /// Opens at once, so that a bad path fails before a long run. @throws FileError
+  /// Opens the file, so that an invalid path fails before a long run. @throws FileError
   explicit OutputFile(std::string path);
 
   explicit operator bool() const { return !path_.empty(); }
@@ -32,7 +32,8 @@ class OutputFile {
   std::optional<AtomicFile> file_;
 };
 
-/// Rows of cells; the first row is the head, the first column is left-aligned, others right.
+/// Rows of cells. The first row is the header; the first column is left-aligned, the others are
+/// right-aligned.
 class Table {
  public:
   explicit Table(std::vector<std::string> head) { rows_.push_back(std::move(head)); }
@@ -43,7 +44,7 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-/// A bar on stderr while a long run lasts; silent unless stderr is a terminal. Ctrl-C ends the run.
+/// Progress bar on stderr, shown only if stderr is a terminal. Ctrl-C ends the run.
 class Progress {
  public:
   Progress(std::string label, std::uint64_t total, bool quiet);
@@ -61,11 +62,11 @@ class Progress {
   bool shown_;
 };
 
-/// The hash as 16 lower-case hex digits.
+/// 16 lower-case hexadecimal digits.
 std::string hex(std::uint64_t value);
-/// The bits of a Real as lower-case hex digits.
+/// The bits of a Real in lower-case hexadecimal digits.
 std::string hex_bits(Real value);
-/// The shortest text that reads back to the same Real.
+/// The shortest text that parses to the same Real.
 std::string text(Real value);
 /// Milliseconds with three decimals.
 std::string ms(double value);

@@ -1,4 +1,4 @@
-/// Switching between the float and the double build of the command.
+/// Switching between the float and the double build of a program.
 #include "src/tool/precision.hpp"
 
 #include <jfpx/error.hpp>
@@ -16,18 +16,19 @@ inline namespace JFPX_ABI {
 namespace tool {
 namespace {
 
-/// The same program in the other precision: NAME and NAME-f64 lie side by side.
+/// The same program in the other precision: NAME and NAME-f64 are in the same folder.
 std::string sibling_of(const std::string& name) {
   constexpr std::string_view kSuffix = "-f64";
   return name.ends_with(kSuffix) ? name.substr(0, name.size() - kSuffix.size())
                                  : name + std::string(kSuffix);
 }
 
-std::string asked_precision(int argc, char** argv) {
+/// The precision that the arguments select; empty if they select none.
+std::string selected_precision(int argc, char** argv) {
   constexpr std::string_view kOption = "--precision";
   for (int i = 1; i < argc; ++i) {
     const std::string_view argument = argv[i];
-    if (argument == "--") break;  // what follows belongs to another program
+    if (argument == "--") break;  // the remaining arguments belong to another program
     if (argument == kOption && i + 1 < argc) return argv[i + 1];
     if (argument.starts_with(kOption) && argument.substr(kOption.size()).starts_with("=")) {
       return std::string(argument.substr(kOption.size() + 1));
@@ -50,12 +51,12 @@ void switch_precision(const std::string& precision, char** argv) {
   const std::string sibling =
       std::filesystem::path(own).replace_filename(sibling_of(own.filename())).string();
   execv(sibling.c_str(), argv);
-  throw Error(sibling + ", which computes in " + precision +
+  throw Error(sibling + ", the build in " + precision +
               " precision, can't be started: " + std::strerror(errno));
 }
 
-void switch_precision_if_asked(int argc, char** argv) {
-  switch_precision(asked_precision(argc, argv), argv);
+void switch_precision_if_requested(int argc, char** argv) {
+  switch_precision(selected_precision(argc, argv), argv);
 }
 
 }  // namespace tool

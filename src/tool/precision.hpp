@@ -1,4 +1,4 @@
-/// Switching between the float and the double build of the command.
+/// Switching between the float and the double build of a program.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,17 +10,17 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 
-/// What this build computes in, as --precision calls it.
+/// Precision of this build, as an argument of --precision.
 inline constexpr std::string_view kPrecision = sizeof(Real) == 4 ? "float" : "double";
 
-/// Runs the build of that precision, "float" or "double", with the same arguments in this process'
-/// place. Returns if that is this one, or there is no such precision.
-/// Bullet's float and double libraries export the same symbols, so one process can't hold both.
-/// @throws Error if the other build is not beside this one.
+/// Replaces this process by the program of the given precision, "float" or "double", with the same
+/// arguments. Returns if this program has that precision, or if there is no such precision.
+/// Two programs are necessary because Bullet's float and double libraries export the same symbols.
+/// @throws Error if the other program is not in the same folder.
 void switch_precision(const std::string& precision, char** argv);
-/// The same, when the arguments ask for the other precision: by --precision, or by `replay` of a
-/// recording of it. @throws FileError for a broken recording, too.
-void switch_precision_if_asked(int argc, char** argv);
+/// The same for the precision that the arguments select: by --precision, or by `replay` of a
+/// recording. @throws also FileError for an invalid recording.
+void switch_precision_if_requested(int argc, char** argv);
 
 }  // namespace tool
 }  // namespace JFPX_ABI

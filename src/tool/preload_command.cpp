@@ -1,4 +1,4 @@
-/// jfpx preload -- PROGRAM [ARGS]: runs an unmodified Bullet program with parts of jfpx.
+/// jfpx preload -- PROGRAM [ARGS]: runs an unmodified Bullet program with jfpx's parts.
 #include <jfpx/error.hpp>
 #include <jfpx/sphere_collider.hpp>
 
@@ -21,21 +21,21 @@ namespace {
 
 struct PreloadOptions {
   std::vector<std::string> command;
-  std::string backend, minimum_batch, threads;  ///< empty: what the environment says
+  std::string backend, minimum_batch, threads;  ///< empty: leaves the environment unchanged
   std::vector<std::string> parts;
   bool summary = false, verify = false;
 };
 
-/// The library beside this command, in the build tree as where it is installed.
+/// The library at its place relative to this program, in the build tree and when installed.
 std::string find_library() {
   namespace fs = std::filesystem;
   const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
   std::string path =
       (folder / JFPX_PRELOAD_FOLDER / "libjfpx-bullet-preload.so").lexically_normal().string();
   if (!fs::exists(path)) throw Error(path + " is missing");
-  // LD_PRELOAD has no way to quote.
+  // LD_PRELOAD has no syntax for quoting.
   if (path.find_first_of(" :") != std::string::npos) {
-    throw Error("\"" + path + "\" can't be preloaded: its name has a space or a colon in it");
+    throw Error("\"" + path + "\" can't be preloaded: its path contains a space or a colon");
   }
   return path;
 }
@@ -61,7 +61,7 @@ void set_environment(const PreloadOptions& options) {
 }
 
 [[noreturn]] void start(const PreloadOptions& options) {
-  // Asked here, where it can still be an error: inside the program it could only be a remark.
+  // Checked here, where it is an error: inside the program it could only be a warning.
   if (options.backend == "cuda") (void)make_sphere_collider({.backend = Backend::cuda});
   set_environment(options);
   std::vector<std::string> command = options.command;
@@ -79,31 +79,32 @@ void add_preload_command(CLI::App& app, int&) {
   CLI::App* command = app.add_subcommand(
       "preload",
       "Run an unmodified, dynamically linked Bullet program with jfpx's dispatcher, solver and "
-      "update of boxes");
+      "update of AABBs");
   auto options = std::make_shared<PreloadOptions>();
-  command->add_option("command", options->command, "The program and its arguments")
+  command->add_option("command", options->command, "Program and its arguments")
       ->required()
       ->type_name("PROGRAM [ARGS]");
-  command->add_flag("--summary", options->summary, "Say on stderr at exit what was done");
+  command->add_flag("--summary", options->summary, "Print a summary on stderr at exit");
   command->add_flag("--verify", options->verify,
                     "Recompute every sphere pair with Bullet's algorithm and compare (slow)");
   command->add_option("--backend", options->backend, "Backend: auto, cpu or cuda [auto]")
       ->check(backend_name());
   command
       ->add_option("--parts", options->parts,
-                   "Which of dispatcher, solver and world (its update of boxes) [all]")
+                   "Parts to replace: dispatcher, solver, world (update of AABBs) [default: all]")
       ->delimiter(',')
       ->check(CLI::IsMember({"dispatcher", "solver", "world"}));
-  command->add_option("--threads", options->threads, "CPU threads, 0 = one per core [1]")
+  command->add_option("--threads", options->threads, "CPU threads; 0: one per core [1]")
       ->check(CLI::Range(0u, 256u));
   command
-      ->add_option("--minimum-batch", options->minimum_batch,
-                   "Overlapping pairs below which a dispatch, and manifolds below which a group of "
-                   "the solver, is left to Bullet")
+      ->add_option(
+          "--minimum-batch", options->minimum_batch,
+          "Smallest number of overlapping pairs in a dispatch, and of manifolds in a group, "
+          "that jfpx computes instead of Bullet")
       ->check(whole_number());
   command->footer(
-      "The program's own exit status is returned; 2 if it can't be started. Programs that link\n"
-      "Bullet statically, and programs that are linked statically, run as without jfpx.");
+      "Returns the exit status of the program, or 2 if it can't be started. Programs that link\n"
+      "Bullet statically, and statically linked programs, run unchanged.");
   command->callback([options] { start(*options); });
 }
 

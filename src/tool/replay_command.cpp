@@ -1,4 +1,4 @@
-/// jfpx replay: runs a recording again and stops at the first step that differs.
+/// jfpx replay: repeats a recorded run and stops at the first step that differs.
 #include <jfpx/recording.hpp>
 
 #include "src/tool/commands.hpp"
@@ -51,13 +51,15 @@ int replay(Options options) {
 void add_replay_command(CLI::App& app, int& status) {
   auto options = std::make_shared<Options>();
   CLI::App* command =
-      app.add_subcommand("replay", "Run a recording again; stop at the first step that differs");
-  command->add_option("FILE", options->path, "Recording made by: jfpx run --record FILE")
+      app.add_subcommand("replay", "Repeat a recorded run; stop at the first step that differs");
+  command->add_option("FILE", options->path, "Recording written by: jfpx run --record FILE")
       ->required();
-  command->add_option("--engine", options->engine, "native, bullet or bullet-stock [the recorded]")
+  command
+      ->add_option("--engine", options->engine,
+                   "native, bullet or bullet-stock [default: the recorded engine]")
       ->check(engine_name());
   add_backend_option(*command, options->run.backend);
-  command->add_option("--threads", options->run.threads, "CPU threads, 0 = one per core")
+  command->add_option("--threads", options->run.threads, "CPU threads; 0: one per core")
       ->check(whole_number())
       ->capture_default_str();
   command->add_flag("--hash", options->run.hash, "Print the hash of the final state");

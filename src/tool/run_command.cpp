@@ -1,4 +1,4 @@
-/// jfpx run: one scene, one engine.
+/// jfpx run: runs a scene with one engine.
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
@@ -30,7 +30,7 @@ struct Options {
 struct Totals {
   std::uint64_t contacts = 0;
   StageTimes times;
-  std::map<std::string, std::uint64_t> choices;  ///< steps by who found sphere contacts, and why
+  std::map<std::string, std::uint64_t> choices;  ///< number of steps by Engine::choice()
 };
 
 std::string csv_row(std::uint64_t step, const Engine& engine) {
@@ -72,7 +72,7 @@ nlohmann::ordered_json to_json_value(const Options& options, const Scene& scene,
           {"ms", to_json_value(totals.times)}};
 }
 
-/// The engine, and the scene that it starts with.
+/// Creates the engine. @param scene receives the initial scene
 std::unique_ptr<Engine> start(const Options& options, Scene* scene) {
   const EngineKind kind = parse_engine(options.engine);
   if (options.input.empty() && !(kind == EngineKind::native && is_only_a_demo(options.run.scene))) {
@@ -80,10 +80,10 @@ std::unique_ptr<Engine> start(const Options& options, Scene* scene) {
     return make_engine(kind, *scene, options.run);
   }
   if (kind != EngineKind::native) {
-    throw InvalidArgument("--input goes with the native engine; engine is " + options.engine);
+    throw InvalidArgument("--input requires the native engine; engine is " + options.engine);
   }
   if (!options.run.record.empty()) {
-    throw InvalidArgument("--record goes with scenes; a demo is repeated by its --input");
+    throw InvalidArgument("--record requires a scene; a demo is repeated with --input");
   }
   return make_demo_engine(options.run, options.input, scene);
 }
@@ -122,12 +122,12 @@ int run(const Options& options) {
   return report_trouble(engine->device_failure(), engine->trouble());
 }
 
-/// What only one engine knows goes with no other.
+/// Rejects options of Bullet for engines without them.
 void check_engine(const CLI::App& command, const Options& options) {
   if (options.engine == to_string(EngineKind::bullet)) return;
   for (const char* option : {"--solver", "--world", "--minimum-batch"}) {
     if (command.count(option) == 0) continue;
-    throw InvalidArgument(std::string(option) + " goes with --engine bullet; engine is " +
+    throw InvalidArgument(std::string(option) + " requires --engine bullet; engine is " +
                           options.engine);
   }
 }
@@ -143,10 +143,10 @@ void add_run_command(CLI::App& app, int& status) {
       ->check(engine_name())
       ->capture_default_str();
   command->add_option("--input", options->input,
-                      "Run as a demo with the inputs of this file (see: jfpx scenes DEMO)");
+                      "Run as a demo with the inputs in this file (see: jfpx scenes DEMO)");
   command->add_option(
       "--csv", options->run.csv,
-      "Write one line a step to this file: step, contacts, awake bodies, milliseconds");
+      "Write one line per step to this file: step, contacts, awake bodies, milliseconds");
   command->add_option("--record", options->run.record,
                       "Write the state after every step to this file (see: jfpx replay)");
   command->callback([command, options, &status] {

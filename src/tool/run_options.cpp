@@ -1,11 +1,15 @@
-/// Loads the scene that the options name.
+/// Loading of the selected scene.
 #include "src/tool/run_options.hpp"
 
 #include <jfpx/error.hpp>
 
 #include "src/tool/demo_names.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <filesystem>
+#include <iterator>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -17,7 +21,7 @@ bool looks_like_file(const std::string& name) {
          std::filesystem::exists(name);
 }
 
-/// The option that a file can't follow, if one was given.
+/// The first option given that applies to named scenes only; nullptr if there is none.
 const char* option_of_named_scenes(const RunOptions& options) {
   if (options.spheres) return "--spheres";
   if (options.boxes) return "--boxes";
@@ -25,6 +29,17 @@ const char* option_of_named_scenes(const RunOptions& options) {
 }
 
 }  // namespace
+
+std::string_view to_string(EngineKind kind) { return kEngineNames[static_cast<int>(kind)]; }
+
+EngineKind parse_engine(std::string_view name) {
+  const auto* found = std::ranges::find(kEngineNames, name);
+  if (found != std::end(kEngineNames)) {
+    return static_cast<EngineKind>(found - std::begin(kEngineNames));
+  }
+  throw InvalidArgument(
+      fmt::format("engine is \"{}\"; it must be one of {}", name, fmt::join(kEngineNames, ", ")));
+}
 
 scenes::Options scene_options(const RunOptions& options) {
   return {.spheres = options.spheres, .boxes = options.boxes, .seed = options.seed};
@@ -34,15 +49,15 @@ Scene load(const RunOptions& options) {
   Scene scene;
   if (!is_scene(options.scene) && looks_like_file(options.scene)) {
     if (const char* option = option_of_named_scenes(options)) {
-      throw InvalidArgument(std::string(option) + " goes with a named scene; " + options.scene +
+      throw InvalidArgument(std::string(option) + " requires a named scene; " + options.scene +
                             " is a file");
     }
     scene = load_scene(options.scene);
   } else {
     if (is_only_a_demo(options.scene)) {
       throw InvalidArgument("\"" + options.scene +
-                            "\" is a demo: more than rigid bodies belongs to it, so that only the "
-                            "native engine has it; try: jfpx run " +
+                            "\" is a demo, which contains more than rigid bodies; only the native "
+                            "engine runs it; try: jfpx run " +
                             options.scene);
     }
     scene = scenes::make(options.scene, scene_options(options));

@@ -1,4 +1,4 @@
-/// Options of the commands that run scenes, as values.
+/// Values of the options that select and run a scene, without the command-line parser.
 #pragma once
 
 #include <jfpx/backend.hpp>
@@ -9,21 +9,26 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 
-/// Exit statuses; part of the command's contract.
+/// Exit statuses of `jfpx` and `jfpx-view`. They are part of the interface.
 enum ExitStatus : int { kSuccess = 0, kCheckFailed = 1, kBadUsage = 2, kBackendUnavailable = 3 };
 
+/// The native engine, Bullet with jfpx's parts, or unmodified Bullet.
 enum class EngineKind : std::uint8_t { native, bullet, bullet_stock };
-/// Their names, in this order.
+/// Names of the engines, in the order of EngineKind.
 inline constexpr const char* kEngineNames[] = {"native", "bullet", "bullet-stock"};
+std::string_view to_string(EngineKind kind);
+/// @throws InvalidArgument for a name that to_string() does not return.
+EngineKind parse_engine(std::string_view name);
 
-/// Which scene, and how to run it.
+/// The scene to run, and the settings of the run.
 struct RunOptions {
-  std::string scene;  ///< name or path of a JSON file
+  std::string scene;  ///< a name, or the path of a JSON file
   std::optional<std::uint32_t> spheres, boxes;
   std::optional<Real> dt;
   std::uint64_t seed = 1;
@@ -31,18 +36,18 @@ struct RunOptions {
   bool no_sleep = false;
   Backend backend = Backend::automatic;
   unsigned threads = 1;
-  std::optional<std::uint64_t> minimum_batch;   ///< pairs; absent: the command's default
-  std::string solver = "jfpx", world = "jfpx";  ///< Bullet's parts: "jfpx" or "stock"
+  std::optional<std::uint64_t> minimum_batch;   ///< [pairs]; empty: the command's default
+  std::string solver = "jfpx", world = "jfpx";  ///< parts of Bullet: "jfpx" or "stock"
   std::string json, csv, record;
   bool hash = false, quiet = false;
 };
 
-/// False where only JSON, or nothing, shall be on stdout.
+/// False if stdout receives only JSON, or nothing.
 inline bool wants_table(const RunOptions& options) { return !options.quiet && options.json != "-"; }
 
-/// What the options say about a named scene.
+/// The options of a named scene.
 scenes::Options scene_options(const RunOptions& options);
-/// The scene that the options name, changed as they say.
+/// Loads or generates the scene and applies the options to it.
 /// @throws InvalidArgument, InvalidScene, FileError, OutOfMemory
 Scene load(const RunOptions& options);
 

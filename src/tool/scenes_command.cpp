@@ -1,4 +1,4 @@
-/// jfpx scenes: what can be run, and any of it as JSON.
+/// jfpx scenes: lists, describes and exports scenes and demos.
 #include "src/demos/demo.hpp"
 #include "src/scenes/scenes.hpp"
 #include "src/tool/commands.hpp"
@@ -29,7 +29,7 @@ std::string list_text() {
     text += fmt::format("{:<{}}  {:>5} spheres  {}\n", entry.name, width, entry.default_spheres,
                         entry.summary);
   }
-  text += "\nDemos, which have controls too (jfpx scenes DEMO lists them):\n\n";
+  text += "\nDemos, which also have controls (jfpx scenes DEMO lists them):\n\n";
   for (const demos::Entry& entry : demos::all()) {
     text += fmt::format("{:<{}}  {}\n", entry.name, width, entry.summary);
   }

@@ -1,12 +1,11 @@
-/// The program's three ways to run.
+/// The three modes of the program.
 #include "src/viewer/app.hpp"
 
 #include <jfpx/error.hpp>
 
-#include "src/viewer/recorder.hpp"
-#include "src/viewer/show.hpp"
 #include "src/viewer/timing.hpp"
 #include "src/viewer/ui.hpp"
+#include "src/viewer/viewer.hpp"
 
 #include <fmt/format.h>
 
@@ -17,45 +16,45 @@ namespace {
 
 constexpr std::uint64_t kHeadlessFrames = 120;
 
-std::unique_ptr<Show> start(const ViewOptions& options) {
-  auto show = make_show(options);
-  if (!options.recording.empty()) show->record_to(options.recording);
-  return show;
+std::unique_ptr<Viewer> start(const ViewOptions& options) {
+  auto viewer = make_viewer(options);
+  if (!options.recording.empty()) viewer->record_to(options.recording);
+  return viewer;
 }
 
 int run_without_rendering(const ViewOptions& options) {
-  const auto show = start(options);
+  const auto viewer = start(options);
   Timing timing;
   const std::uint64_t frames = options.frames.value_or(kHeadlessFrames);
-  for (std::uint64_t i = 0; i < frames && !show->at_end(); ++i) {
-    show->step();
-    timing.add_step(show->engine_ms());
+  for (std::uint64_t i = 0; i < frames && !viewer->at_end(); ++i) {
+    viewer->step();
+    timing.add_step(viewer->engine_ms());
   }
-  finish(*show, timing, options);
-  return show->status();
+  finish(*viewer, timing, options);
+  return viewer->status();
 }
 
 int run_headless(const ViewOptions& options) {
-  const auto show = start(options);
+  const auto viewer = start(options);
   Window window = Window::hidden();
   Renderer renderer(options.quality);
-  const Canvas canvas(options.size.width, options.size.height);
-  Ui ui(canvas);
-  Recorder recorder(options.record);
+  const OffscreenFramebuffer offscreen(options.size.width, options.size.height);
+  Ui ui(offscreen);
+  ImageSequenceWriter image_sequence(options.record);
   Timing timing;
   const auto draw = [&] {
     Stopwatch watch;
     ui.begin(kRecordedFrame);
-    show->draw(renderer, {canvas.framebuffer(), canvas.width(), canvas.height()});
-    if (options.panel) show->panel();
-    ui.end(canvas.framebuffer(), canvas.width(), canvas.height());
+    viewer->draw(renderer, {offscreen.framebuffer(), offscreen.width(), offscreen.height()});
+    if (options.panel) viewer->panel();
+    ui.end(offscreen.framebuffer(), offscreen.width(), offscreen.height());
     glFinish();
     window.check_context();
     timing.add_picture(watch.lap() * 1e3);
   };
   const auto picture = [&] {
-    Image image = canvas.read();
-    window.check_context();  // what a lost context leaves is no picture
+    Image image = offscreen.read();
+    window.check_context();  // pixels read after a lost context are invalid
     return image;
   };
   std::exception_ptr failure;
@@ -68,36 +67,36 @@ int run_headless(const ViewOptions& options) {
     return failure == nullptr;
   };
   const std::uint64_t frames = options.frames.value_or(kHeadlessFrames);
-  // SDL makes an event of SIGINT and SIGTERM, which somebody must ask for.
-  for (std::uint64_t i = 0; i < frames && !show->at_end() && !SDL_QuitRequested(); ++i) {
-    show->step();
-    timing.add_step(show->engine_ms());
-    if (!recorder.on()) continue;
+  // SDL converts SIGINT and SIGTERM to events, which the loop must poll.
+  for (std::uint64_t i = 0; i < frames && !viewer->at_end() && !SDL_QuitRequested(); ++i) {
+    viewer->step();
+    timing.add_step(viewer->engine_ms());
+    if (!image_sequence.on()) continue;
     draw();
-    if (!write([&] { recorder.add(picture()); })) break;
+    if (!write([&] { image_sequence.add(picture()); })) break;
   }
-  if (!recorder.on()) show->home();  // else the last picture is that of the film
-  if (options.panel) {               // windows learn their size from a first, invisible frame
+  if (!image_sequence.on()) viewer->home();  // otherwise the last picture is that of the sequence
+  if (options.panel) {                       // Dear ImGui sizes windows in a first, invisible frame
     ui.begin(kRecordedFrame);
-    show->panel();
-    ui.end(canvas.framebuffer(), canvas.width(), canvas.height());
+    viewer->panel();
+    ui.end(offscreen.framebuffer(), offscreen.width(), offscreen.height());
   }
   draw();
   if (!options.screenshot.empty()) write([&] { write_png(picture(), options.screenshot); });
-  finish(*show, timing, options, failure);
-  return show->status();
+  finish(*viewer, timing, options, failure);
+  return viewer->status();
 }
 
 }  // namespace
 
-void finish(Show& show, const Timing& timing, const ViewOptions& options,
+void finish(Viewer& viewer, const Timing& timing, const ViewOptions& options,
             std::exception_ptr failure) {
   try {
-    show.finish_recording();
+    viewer.finish_recording();
   } catch (const Error&) {
     if (!failure) failure = std::current_exception();
   }
-  fmt::print("{}\n{}\n", show.summary(), timing.text(options.render));
+  fmt::print("{}\n{}\n", viewer.summary(), timing.text(options.render));
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -1,4 +1,4 @@
-/// The program's three ways to run: in a window, without one, and without drawing at all.
+/// The three modes of the program: in a window, headless, and without rendering.
 #pragma once
 
 #include "src/viewer/options.hpp"
@@ -9,20 +9,21 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-class Show;
+class Viewer;
 class Timing;
 
-/// [s] between two numbered pictures.
+/// Time between two numbered pictures [s].
 inline constexpr double kRecordedFrame = 1.0 / 60.0;
 
-/// @return the exit status. @throws what loading, engines, OpenGL and files throw.
+/// Runs the program in the mode that the options select. @return the exit status
+/// @throws exceptions of scene loading, engines, OpenGL and files
 int run_app(const ViewOptions& options);
-/// The same, in a window until it is closed.
+/// Runs the program in a window until the window is closed. @return the exit status
 int run_interactive(const ViewOptions& options);
 
-/// What is completed and printed at the end of a run, whatever could not be written before.
-/// @throws `failure`, or why the recording can't be written
-void finish(Show& show, const Timing& timing, const ViewOptions& options,
+/// Completes the recording and prints the summary, also after a failure to write a picture.
+/// @throws `failure`, or else the error of the recording
+void finish(Viewer& viewer, const Timing& timing, const ViewOptions& options,
             std::exception_ptr failure = nullptr);
 
 }  // namespace view

@@ -1,7 +1,7 @@
-/// Where the bodies of a scene are: a ball around nearly all that moves.
+/// Bounding sphere of the bodies of a scene, without outliers.
 #include "src/viewer/bounds.hpp"
 
-#include "src/viewer/values.hpp"
+#include "src/viewer/shapes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,12 +11,12 @@ inline namespace JFPX_ABI {
 namespace view {
 namespace {
 
-constexpr std::size_t kSurveyed = 4000;
+constexpr std::size_t kSampled = 4000;
 
 struct Spread {
   Real low, high;
 };
-/// The ends, when one value in fifty is left out at each. Sorts partly.
+/// The range of the values without 2 % of them at each end. Reorders the values.
 Spread spread(std::vector<Real>& values) {
   const std::size_t left_out = values.size() / 50;
   const auto low = values.begin() + static_cast<std::ptrdiff_t>(left_out);
@@ -29,8 +29,8 @@ Spread spread(std::vector<Real>& values) {
 
 }  // namespace
 
-Survey::Survey(const Scene& scene) {
-  const std::size_t stride = std::max(scene.bodies.size() / kSurveyed, std::size_t{1});
+BoundsEstimator::BoundsEstimator(const Scene& scene) {
+  const std::size_t stride = std::max(scene.bodies.size() / kSampled, std::size_t{1});
   for (const bool wanted : {true, false}) {
     for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
       const BodyDef& body = scene.bodies[i];
@@ -42,7 +42,7 @@ Survey::Survey(const Scene& scene) {
   }
 }
 
-Bounds Survey::bounds(const std::vector<BodyState>& states) const {
+Bounds BoundsEstimator::bounds(const std::vector<BodyState>& states) const {
   constexpr Bounds kNothing{{0, 1, 0}, 4};
   if (bodies_.empty()) return kNothing;
   Vec3 low, high;
@@ -51,7 +51,7 @@ Bounds Survey::bounds(const std::vector<BodyState>& states) const {
     along.reserve(bodies_.size());
     for (const std::uint32_t body : bodies_) {
       const Real place = states[body].position[axis];
-      if (std::isfinite(place)) along.push_back(place);  // what left the numbers has no order
+      if (std::isfinite(place)) along.push_back(place);  // NaN has no order
     }
     if (along.empty()) return kNothing;
     const Spread s = spread(along);

@@ -1,4 +1,4 @@
-/// Where the bodies of a scene are: a ball around nearly all that moves.
+/// Bounding sphere of the bodies of a scene, without outliers.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -10,20 +10,20 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// A ball that holds what is worth seeing.
+/// Bounding sphere, and the axis-aligned box inside it.
 struct Bounds {
   Vec3 centre;
   Real radius = 1;
-  Vec3 half_extents{};  ///< of the upright box around it
+  Vec3 half_extents{};  ///< of the axis-aligned box
 };
 
-/// The bodies that tell where a scene's crowd is: a few thousand of those that move or, in a scene
-/// where nothing does, of the rest.
-class Survey {
+/// Estimates the bounds of a scene from a sample of a few thousand movable bodies, or of immovable
+/// bodies in a scene without movable ones.
+class BoundsEstimator {
  public:
-  explicit Survey(const Scene& scene);
+  explicit BoundsEstimator(const Scene& scene);
 
-  /// The ball around them, leaving out the one in fifty that went astray on each side.
+  /// The bounds without the outermost 2 % of the sample at each end of each axis.
   Bounds bounds(const std::vector<BodyState>& states) const;
 
  private:
@@ -31,9 +31,9 @@ class Survey {
   Real largest_ = 0;  ///< radius of the largest body [m]
 };
 
-/// The bounds of a scene that is asked about once.
+/// The bounds of a scene that are needed only once.
 inline Bounds bounds_of(const Scene& scene, const std::vector<BodyState>& states) {
-  return Survey(scene).bounds(states);
+  return BoundsEstimator(scene).bounds(states);
 }
 
 }  // namespace view

@@ -1,6 +1,9 @@
-/// Bullet as a run: each of its three parts stock or jfpx's, exchangeable at any step.
-#include "src/viewer/bullet_moment.hpp"
+/// Bullet as a run, in which each of the three parts can be replaced at any step.
+#include "src/viewer/bullet_run.hpp"
+
 #include "src/viewer/exchangeable_collider.hpp"
+
+#include <BulletDynamics/Dynamics/btRigidBody.h>
 
 #include <limits>
 #include <utility>
@@ -9,6 +12,29 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 namespace {
+
+Vec3 from_bullet(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
+
+/// Bodies are added in the order of the scene.
+BodyId id_of(const btCollisionObject* body) {
+  return {static_cast<std::uint32_t>(body->getWorldArrayIndex()), 0};
+}
+
+std::vector<Contact> contacts_of(btCollisionDispatcher& dispatcher) {
+  std::vector<Contact> contacts;
+  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
+    const btPersistentManifold* manifold = dispatcher.getManifoldByIndexInternal(i);
+    for (int k = 0; k < manifold->getNumContacts(); ++k) {
+      const btManifoldPoint& point = manifold->getContactPoint(k);
+      const btVector3 middle =
+          (point.m_positionWorldOnA + point.m_positionWorldOnB) * btScalar(0.5);
+      contacts.push_back({id_of(manifold->getBody0()), id_of(manifold->getBody1()),
+                          from_bullet(point.m_normalWorldOnB), from_bullet(middle),
+                          point.getDistance()});
+    }
+  }
+  return contacts;
+}
 
 class BulletRun final : public Run {
  public:
@@ -21,12 +47,12 @@ class BulletRun final : public Run {
   }
 
   void step() override {
-    solver_->reset_stats();  // so that they tell who solved this step
+    solver_->reset_stats();  // limits the statistics to this step
     world_.step();
     ++step_;
   }
 
-  Moment moment() override { return moment_of(world_, step_); }
+  Snapshot snapshot() override { return snapshot_of(world_, step_); }
 
   EngineChoice choice() const override { return choice_; }
   bool switch_to(const EngineChoice& choice) override {
@@ -34,7 +60,7 @@ class BulletRun final : public Run {
     if (choice.backend != choice_.backend) {
       auto solver = make_solver(choice);
       collider_->exchange(make_sphere_collider(collider_options(choice)));
-      solver_ = std::move(solver);  // impulses to start from are in the manifolds
+      solver_ = std::move(solver);  // the manifolds store the impulses for warm starting
     }
     choice_ = choice;
     apply_choice();
@@ -48,7 +74,7 @@ class BulletRun final : public Run {
 
   bullet::SceneWorld make_world(const Scene& scene) {
     bullet::SceneWorldOptions options = world_options(choice_);
-    options.solver = bullet::SolverKind::stock;  // solver_ takes its place
+    options.solver = bullet::SolverKind::stock;  // replaced by solver_
     options.make_collider = [this] {
       auto collider =
           std::make_unique<ExchangeableCollider>(make_sphere_collider(collider_options(choice_)));
@@ -58,18 +84,18 @@ class BulletRun final : public Run {
     return bullet::SceneWorld(scene, options);
   }
 
-  // Each of the three parts leaves what is too small to Bullet's own code, and so everything: all
-  // choices differ in three numbers and share all that Bullet remembers.
+  // Each of the three parts leaves work below its minimum batch to Bullet's own code. The choices
+  // therefore differ in three numbers only and share the state of Bullet.
   void apply_choice() {
-    const auto least = [this](bool jfpx) {
+    const auto minimum = [this](bool jfpx) {
       return jfpx && choice_.engine == EngineKind::bullet ? choice_.minimum_batch
                                                           : std::numeric_limits<std::size_t>::max();
     };
-    world_.jfpx_dispatcher()->set_minimum_batch(least(true));
-    solver_->set_minimum_batch(least(choice_.jfpx_solver));
+    world_.jfpx_dispatcher()->set_minimum_batch(minimum(true));
+    solver_->set_minimum_batch(minimum(choice_.jfpx_solver));
     world_.world().setConstraintSolver(solver_.get());
     dynamic_cast<bullet::DynamicsWorld&>(world_.world())
-        .set_minimum_batch(least(choice_.jfpx_world));
+        .set_minimum_batch(minimum(choice_.jfpx_world));
   }
 
   EngineChoice choice_;
@@ -87,6 +113,36 @@ bullet::SceneWorldOptions world_options(const EngineChoice& choice) {
   options.solve.backend = choice.backend;
   options.solve.threads = options.step.threads = choice.threads;
   return options;
+}
+
+Snapshot snapshot_of(bullet::SceneWorld& world, std::uint64_t step) {
+  Snapshot snapshot;
+  snapshot.step = step;
+  snapshot.states = world.states();
+  for (const btRigidBody* body : world.bodies()) {
+    snapshot.awake.push_back(body->isActive() || body->isStaticObject() ? 1 : 0);
+  }
+  snapshot.contacts = contacts_of(world.dispatcher());
+  const bullet::StageTimes& t = world.last_step();
+  snapshot.times = {t.integrate, t.broadphase, t.dispatch, t.islands + t.solve, t.total};
+  snapshot.computed_by = "Bullet";
+  if (const bullet::CollisionDispatcher* dispatcher = world.jfpx_dispatcher()) {
+    const bullet::DispatchStats& stats = dispatcher->stats();
+    if (stats.batches > 0 && stats.last_fallback == bullet::Fallback::none) {
+      snapshot.computed_by = to_string(dispatcher->backend());
+    }
+    snapshot.trouble = stats.failure;
+  }
+  snapshot.solved_by = "Bullet";
+  const auto* solver =
+      dynamic_cast<const bullet::ConstraintSolver*>(world.world().getConstraintSolver());
+  if (solver != nullptr) {
+    const bullet::ConstraintSolverStats& stats = solver->stats();
+    if (stats.groups > 0) snapshot.solved_by = to_string(Backend::cpu);
+    if (stats.on_device > 0) snapshot.solved_by = to_string(Backend::cuda);
+    if (snapshot.trouble.empty()) snapshot.trouble = stats.device_failure;
+  }
+  return snapshot;
 }
 
 bool has_engine(EngineKind) { return true; }

@@ -1,4 +1,4 @@
-/// Where the picture is taken from, and how the camera moves.
+/// Camera: view for the renderer, projection, and motion.
 #include "src/viewer/camera.hpp"
 
 #include <algorithm>
@@ -47,7 +47,7 @@ void Camera::move(Real right, Real up, Real forward_distance) {
   eye_.y += up;
 }
 
-// The eye comes back from the focus rounded: a camera that nobody moves must keep its bits.
+// Computing the eye from the focus rounds, so a camera at rest must return early to keep its bits.
 void Camera::orbit(Real yaw, Real pitch) {
   if (yaw == 0 && pitch == 0) return;
   const Vec3 centre = focus();
@@ -71,7 +71,7 @@ View Camera::view(const Vec3& centre, Real radius) const {
   view.fov_y = fov_y;
   const Real away = length(centre - eye_);
   view.far_plane = std::max((away + radius) * 8, Real(10));
-  // Half of depth's values lie within twice the near plane: it goes out as far as may be.
+  // Half of the depth values lie within twice the near distance, which is therefore maximized.
   view.near_plane = std::max((away - radius) * Real(0.5), view.far_plane * kLeastNear);
   return view;
 }

@@ -1,4 +1,4 @@
-/// Where the picture is taken from, and how the camera moves.
+/// Camera: view for the renderer, projection, and motion.
 #pragma once
 
 #include <jfpx/math.hpp>
@@ -9,40 +9,41 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// An eye with axes: what the renderer needs.
+/// Position, axes, field of view and clip planes of a camera.
 struct View {
   Vec3 eye;
   Vec3 right{1, 0, 0}, up{0, 1, 0}, forward{0, 0, -1};  ///< unit, orthogonal
-  Real fov_y = Real(0.8);                               ///< [rad], whole vertical angle
-  /// [m]; the renderer takes the near one back where what it draws is nearer.
+  Real fov_y = Real(0.8);                               ///< full vertical angle [rad]
+  /// [m]; the renderer moves the near plane closer if it draws something in front of it.
   Real near_plane = Real(0.1), far_plane = 1000;
 };
 
-/// The near plane stays as far out as this share of the far one: depth has so many digits.
+/// Smallest ratio of the near to the far plane, limited by the resolution of the depth buffer.
 inline constexpr Real kLeastNear = Real(2e-5);
 
-/// Where a point appears, in pixels from the upper left corner; nothing if it is behind the eye.
+/// Position in the picture, in pixels from the upper left corner.
 struct Pixel {
   Real x = 0, y = 0;
 };
+/// Projects a point; empty if it lies behind the eye.
 std::optional<Pixel> project(const View& view, const Vec3& point, int width, int height);
-/// The direction of the ray through a pixel, unit.
+/// Unit direction of the ray through a pixel.
 Vec3 ray_through(const View& view, Real x, Real y, int width, int height);
 
-/// A camera that walks, looks around, and circles a focus. Angles in radians.
+/// A camera that walks, turns, and orbits a focus. Angles are in radians.
 class Camera {
  public:
-  /// Pitch is kept within this, so that up stays up (erratum E41).
+  /// Limit of the pitch, which keeps the camera upright (erratum E41).
   static constexpr Real kMaxPitch = Real(89) * kPi / 180;
 
   void look_at(const Vec3& eye, const Vec3& target);
-  /// Adds to both angles; positive yaw turns left, positive pitch up.
+  /// Adds to both angles. Positive yaw turns left, positive pitch turns up.
   void turn(Real yaw, Real pitch);
-  /// Moves along its own axes [m].
+  /// Moves along the right axis, the vertical, and the forward axis of the camera [m].
   void move(Real right, Real up, Real forward);
-  /// Circles the focus by the angles; the focus stays in the middle. None moves no bit.
+  /// Orbits the focus, which stays at the centre of the picture. Angles of 0 change no bit.
   void orbit(Real yaw, Real pitch);
-  /// Multiplies the distance to the focus; 1 moves no bit.
+  /// Multiplies the distance to the focus. A factor of 1 changes no bit.
   void zoom(Real factor);
 
   const Vec3& eye() const { return eye_; }
@@ -51,7 +52,7 @@ class Camera {
   Real pitch() const { return pitch_; }
   Real distance() const { return distance_; }
   Vec3 forward() const;
-  /// The clip planes enclose a ball around `centre`, and the ground some way beyond it.
+  /// The view, with clip planes around a ball at `centre` and some of the ground behind it.
   View view(const Vec3& centre, Real radius) const;
 
   friend bool operator==(const Camera&, const Camera&) = default;

@@ -1,4 +1,4 @@
-/// Colours of bodies: by number, and by a value between 0 and 1.
+/// Colours of bodies by index and by a value in [0, 1].
 #include "src/viewer/colours.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ Paint ball_paint(std::uint32_t index) {
                                                   {22, 118, 78},
                                                   {134, 30, 42},
                                                   {34, 34, 38}}};
-  // Scattered, so that neighbours differ in colour and kind.
+  // Hashed, so that neighbouring indices differ in colour and pattern.
   const std::uint32_t scattered = (index * 2654435761u) >> 8;
   Paint paint = kPool[scattered % kPool.size()];
   paint.pattern = (scattered >> 5) % 5 < 2 ? Pattern::striped_ball : Pattern::solid_ball;
@@ -35,7 +35,7 @@ Paint scale_paint(Real value) {
   // Five points of the colour map viridis (van der Walt and Smith).
   static constexpr std::array<Paint, 5> kPoints = {
       {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}}};
-  const Real at = value > 0 ? std::min(value, Real(1)) * 4 : 0;  // also of what is no number
+  const Real at = value > 0 ? std::min(value, Real(1)) * 4 : 0;  // also for NaN
   const auto i = static_cast<std::size_t>(std::min(at, Real(3)));
   const Real share = at - static_cast<Real>(i);
   const auto mix = [share](std::uint8_t a, std::uint8_t b) {
@@ -47,10 +47,10 @@ Paint scale_paint(Real value) {
 }
 
 Paint hue_paint(std::uint32_t number) {
-  // Multiples of the golden ratio, of a turn, stay apart (Knuth 1998, 6.4).
-  const float turn = static_cast<float>(number * 2654435769u) * 0x1p-32f * 6;
-  const auto channel = [turn](float at) {
-    const float from_peak = std::fabs(std::fmod(turn + at, 6.0f) - 3);
+  // Multiples of the golden ratio modulo 1 are well separated (Knuth 1998, 6.4).
+  const float hue = static_cast<float>(number * 2654435769u) * 0x1p-32f * 6;
+  const auto channel = [hue](float at) {
+    const float from_peak = std::fabs(std::fmod(hue + at, 6.0f) - 3);
     return static_cast<std::uint8_t>(62 + 178 * std::clamp(from_peak - 1, 0.0f, 1.0f));
   };
   return {channel(0), channel(4), channel(2), Pattern::plain};

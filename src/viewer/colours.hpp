@@ -1,4 +1,4 @@
-/// Colours of bodies: by number, and by a value between 0 and 1.
+/// Colours of bodies by index and by a value in [0, 1].
 #pragma once
 
 #include "src/viewer/drawing.hpp"
@@ -7,15 +7,15 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// The colours of a set of pool balls, solid and striped in turn.
+/// Colour of a pool ball, solid or striped.
 Paint ball_paint(std::uint32_t index);
-/// Wood in slightly different tones.
+/// Wood in one of several tones.
 Paint crate_paint(std::uint32_t index);
-/// Dark blue over green to yellow, equally bright steps; values are clamped to [0, 1].
+/// Perceptually uniform colour map from dark blue over green to yellow; clamps to [0, 1].
 Paint scale_paint(Real value);
-/// One of many hues, far from those of the numbers beside it.
+/// One of many hues; neighbouring numbers have distant hues.
 Paint hue_paint(std::uint32_t number);
-/// The paint in the dark: for bodies that sleep.
+/// Darker paint, for sleeping bodies.
 Paint dimmed(Paint paint);
 
 }  // namespace view

@@ -1,4 +1,4 @@
-/// What differs between runs.
+/// Differences between runs: contacts bit by bit, drift and energy.
 #include "src/viewer/comparison.hpp"
 
 #include <algorithm>
@@ -9,20 +9,20 @@ inline namespace JFPX_ABI {
 namespace view {
 namespace {
 
-/// All that a contact says, as bytes without padding.
+/// All fields of a contact as bytes without padding.
 struct Bits {
   std::uint32_t bodies[2];
   Real numbers[7];
   Contact contact;
 
   explicit Bits(const Contact& c)
-      : bodies{c.a, c.b},
+      : bodies{c.a.index, c.b.index},
         numbers{c.normal.x, c.normal.y, c.normal.z, c.point.x, c.point.y, c.point.z, c.distance},
         contact(c) {}
   int compare(const Bits& other) const {
     const int ids = std::memcmp(bodies, other.bodies, sizeof bodies);
     if (ids != 0) return ids;
-    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits are what is compared here
+    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): compares the bits
     return std::memcmp(numbers, other.numbers, sizeof numbers);
   }
   bool operator<(const Bits& other) const { return compare(other) < 0; }
@@ -62,7 +62,7 @@ Mat3 inertia_of(const Compound& compound, Real mass) {
     const Real m = mass * weight(part) / whole;
     const Mat3 own = std::visit([m](const auto& s) { return inertia_of(s, m); }, part.shape);
     const Mat3 turn = to_matrix(part.orientation), arm = skew_symmetric(part.position);
-    sum = sum + turn * own * transposed(turn) + arm * transposed(arm) * m;  // parallel axes
+    sum = sum + turn * own * transposed(turn) + arm * transposed(arm) * m;  // parallel axis theorem
   }
   return sum;
 }

@@ -1,4 +1,4 @@
-/// What differs between runs: contacts bit by bit, drift, energy.
+/// Differences between runs: contacts bit by bit, drift and energy.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -11,15 +11,15 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Contacts that only one of the two lists has, each counted as often as it is there; two are the
-/// same if all their bits are. The order of the lists does not matter.
+/// The multiset symmetric difference of two lists of contacts. Contacts are equal if all their bits
+/// are equal; the order of the lists is irrelevant.
 std::vector<Contact> different_contacts(std::span<const Contact> expected,
                                         std::span<const Contact> actual);
 
-/// Mean distance between the same movable bodies in two runs [m].
+/// Mean distance between corresponding movable bodies of two runs [m].
 double drift(const Scene& scene, std::span<const BodyState> a, std::span<const BodyState> b);
 
-/// Kinetic energy, and potential energy in each body's own constant acceleration [J].
+/// Kinetic energy plus potential energy in the constant acceleration of each body [J].
 double energy(const Scene& scene, std::span<const BodyState> states);
 
 }  // namespace view

@@ -1,4 +1,4 @@
-/// Keys and mouse: events in their order become commands and motion.
+/// Conversion of keyboard and mouse events to commands and camera motion.
 #include "src/viewer/controls.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 constexpr Real kRadiansPerPixel = Real(0.0045);
 constexpr double kBodiesPerSecond = 12;  // walking speed
 constexpr double kFaster = 5;
-constexpr int kStill = 2;  // [units] by which a mouse may move in a click
+constexpr int kStill = 2;  // largest motion of the mouse during a click [units]
 
 std::optional<std::size_t> motion_of(SDL_Scancode key) {
   switch (key) {
@@ -96,21 +96,21 @@ std::span<const KeyHelp> key_help() {
   static constexpr KeyHelp kHelp[] = {
       {"F1", "this help"},
       {"F2", "panel"},
-      {"W A S D", "walk; Q and E: down and up; Shift: faster (as a US keyboard has them)"},
-      {"drag", "look around, or circle the focus"},
+      {"W A S D", "walk; Q and E: down and up; Shift: faster (positions on a US keyboard)"},
+      {"drag", "look around, or orbit the focus"},
       {"wheel", "walking speed, or distance to the focus"},
-      {"O", "circle or walk"},
-      {"H or Home", "show everything again"},
-      {"click", "pick a body: its contacts are listed", Feature::picking},
+      {"O", "orbit or walk"},
+      {"H or Home", "reset the camera"},
+      {"click", "pick a body and list its contacts", Feature::picking},
       {"Space", "pause"},
       {". or Right", "one step"},
       {", or Left", "one step back", Feature::history},
       {"- or Down", "slow motion"},
       {"+ or Up", "faster"},
-      {"F5 or R", "start again"},
+      {"F5 or R", "restart"},
       {"C", "contact points and normals"},
-      {"F", "forces, weight aside"},
-      {"V", "what colours tell", Feature::colouring},
+      {"F", "forces without weight"},
+      {"V", "property shown by colours", Feature::colouring},
       {"F9", "save all steps for jfpx replay", Feature::saving},
       {"F10", "record numbered pictures"},
       {"F12", "screenshot"},
@@ -122,7 +122,7 @@ std::span<const KeyHelp> key_help() {
 
 void Controls::set_demo_keys(std::vector<std::string> names) {
   demo_names_ = std::move(names);
-  // Keys that are down may be the demo's now, and so may be their release.
+  // A pressed key may now belong to the demo, which would receive its release.
   down_.reset();
   touched_.reset();
 }
@@ -134,7 +134,7 @@ void Controls::handle(const SDL_Event& event, bool keyboard, bool mouse) {
       break;
     case SDL_KEYDOWN:
     case SDL_KEYUP:
-      // A release is heard even while the panel has the keyboard, or the key would stick.
+      // A release is processed even while the panel captures the keyboard, or the key would stick.
       if (keyboard || event.type == SDL_KEYUP) key(event.key);
       break;
     case SDL_MOUSEBUTTONDOWN:

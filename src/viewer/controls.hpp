@@ -1,4 +1,4 @@
-/// Keys and mouse: events in their order become commands and motion.
+/// Conversion of keyboard and mouse events to commands and camera motion.
 #pragma once
 
 #include "src/viewer/camera.hpp"
@@ -37,48 +37,48 @@ enum class Command : std::uint8_t {
   fullscreen,
 };
 
-/// What not every show has.
+/// Features that only some viewers have.
 enum class Feature : std::uint8_t { none, picking, history, colouring, saving };
 
 /// One line of the help.
 struct KeyHelp {
-  std::string_view keys, what;
-  Feature of = Feature::none;  ///< that the keys belong to
+  std::string_view keys, action;
+  Feature of = Feature::none;  ///< feature that the keys belong to
 };
 std::span<const KeyHelp> key_help();
 
-/// A click without a drag, in the window's units.
+/// A click without a drag, in units of the window.
 struct Click {
   int x, y;
 };
 
-/// A demo's key went down or up: the one where a US keyboard has that name, in SDL's words and
-/// lower case.
+/// Press or release of a key of a demo. The name is SDL's name of the key at that position of a US
+/// keyboard, in lower case.
 struct DemoKey {
   std::string name;
   bool pressed;
 };
 
-/// Events act in the order in which they came, and all of them: a key that is pressed and released
-/// between two frames still acts once (erratum E42). Keys without a meaning do nothing. Keys to
-/// walk and those of demos count by their place, so that they lie together on any keyboard; others
-/// by what is written on them.
+/// Processes every event in order: a key that is pressed and released between two frames still acts
+/// once (erratum E42). Unknown keys are ignored. Keys for walking and keys of demos are identified
+/// by their position (scancode), so that they are adjacent on any keyboard layout; other keys are
+/// identified by their label (keycode).
 class Controls {
  public:
-  /// Keys that belong to a demo are kept from the camera: see take_demo_keys(). Keys that are down
-  /// walk no more.
+  /// Sets the keys of a demo, which take_demo_keys() returns instead of moving the camera. Keys
+  /// that are down stop moving it.
   void set_demo_keys(std::vector<std::string> names);
-  /// @param keyboard, mouse whether the panel leaves them to the scene
+  /// @param keyboard, mouse false while the panel captures the device
   void handle(const SDL_Event& event, bool keyboard = true, bool mouse = true);
   std::vector<Command> take_commands() { return std::exchange(commands_, {}); }
   std::vector<Click> take_clicks() { return std::exchange(clicks_, {}); }
   std::vector<DemoKey> take_demo_keys() { return std::exchange(demo_keys_, {}); }
   bool looking() const { return looking_; }
 
-  /// Moves the camera by what happened since the last call; `scale` is the size of a body [m].
+  /// Moves the camera by the events since the last call. @param scale size of a body [m]
   void move(Camera* camera, double seconds, Real scale);
 
-  bool orbit = true;  ///< circle the focus instead of walking
+  bool orbit = true;  ///< orbit the focus instead of walking
 
  private:
   enum Motion : std::size_t { kLeft, kRight, kBack, kAhead, kDown, kUp, kMotions };
@@ -96,7 +96,7 @@ class Controls {
   std::bitset<kMotions> down_, touched_;
   bool fast_ = false, looking_ = false, dragged_ = false;
   float turn_x_ = 0, turn_y_ = 0, wheel_ = 0;
-  int drag_x_ = 0, drag_y_ = 0;  ///< [units] since the button went down
+  int drag_x_ = 0, drag_y_ = 0;  ///< [units] since the press of the button
   double speed_ = 1;
 };
 

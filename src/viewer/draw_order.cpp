@@ -1,4 +1,4 @@
-/// In which order spheres are drawn.
+/// Sorting of spheres by distance for drawing.
 #include "src/viewer/draw_order.hpp"
 
 #include <algorithm>
@@ -10,16 +10,16 @@ inline namespace JFPX_ABI {
 namespace view {
 namespace {
 
-constexpr std::uint32_t kShells = 2048;  // of equal distance; one more for what is not seen
-constexpr float kBeyond = -1;            // stands for the distance of what is not seen
+constexpr std::uint32_t kShells = 2048;  // bins of distance; one more for invisible items
+constexpr float kInvisible = -1;         // in place of the distance of an invisible item
 
-/// The sides of what a camera sees, from the eye, in its axes.
+/// Side planes of the view frustum, in coordinates of the camera.
 class Frustum {
  public:
   Frustum(const View& view, Real aspect)
       : axes_{view.right, view.up, view.forward},
         slopes_{std::tan(view.fov_y / 2) * aspect, std::tan(view.fov_y / 2)} {
-    // An edge is smoothed over a pixel: so much wider, on any screen.
+    // Anti-aliasing smooths edges over a pixel, so the frustum is widened by more than a pixel.
     for (Real& slope : slopes_) slope += Real(0.01);
     for (int i = 0; i < 2; ++i) lengths_[i] = std::sqrt(1 + slopes_[i] * slopes_[i]);
   }
@@ -50,7 +50,7 @@ const std::vector<SphereItem>& DrawOrder::sort(const std::vector<SphereItem>& it
   nearest_ = HUGE_VALF;
   for (std::size_t i = 0; i < items.size(); ++i) {
     const float(&c)[3] = items[i].centre;
-    distances_[i] = kBeyond;
+    distances_[i] = kInvisible;
     if (!frustum.meets({Real(c[0]), Real(c[1]), Real(c[2])}, Real(items[i].radius))) continue;
     const float front = std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) - items[i].radius;
     if (!std::isfinite(front)) continue;
@@ -62,7 +62,7 @@ const std::vector<SphereItem>& DrawOrder::sort(const std::vector<SphereItem>& it
   const auto shell_of = [&](float distance) {
     return distance < 0 ? kShells : static_cast<std::uint32_t>((distance - nearest_) * scale);
   };
-  // Counts become places: the end of the shell before, which moves on as items are put there.
+  // Counting sort: each offset is the end of the previous shell and advances with each item.
   ends_.assign(kShells + 2, 0);
   for (const float distance : distances_) ++ends_[shell_of(distance) + 1];
   for (std::uint32_t s = 1; s < ends_.size(); ++s) ends_[s] += ends_[s - 1];

@@ -1,4 +1,4 @@
-/// In which order spheres are drawn.
+/// Sorting of spheres by distance for drawing.
 #pragma once
 
 #include "src/viewer/camera.hpp"
@@ -12,18 +12,18 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Sorts spheres front to back, so that most of what is hidden is found to be so before it is
-/// shaded; those outside of the picture, which may still throw shadows into it, come last.
+/// Sorts spheres front to back, so that the depth test rejects most hidden spheres before shading.
+/// Spheres outside the view frustum, which may still cast shadows into it, come last.
 class DrawOrder {
  public:
-  /// @param aspect width of the picture over its height
-  /// @return the items in order, valid until the next call
+  /// @param aspect ratio of the width of the picture to its height
+  /// @return the sorted items, valid until the next call
   const std::vector<SphereItem>& sort(const std::vector<SphereItem>& items, const View& view,
                                       Real aspect);
   std::size_t all() const { return ordered_.size(); }
-  /// How many of them, the first ones, are in the picture.
+  /// Number of items in the view frustum; they come first.
   std::size_t visible() const { return visible_; }
-  /// How near the nearest of these comes to the eye [m]; infinite where there is none.
+  /// Distance of the nearest visible surface from the eye [m]; infinite if nothing is visible.
   float nearest() const { return nearest_; }
 
  private:

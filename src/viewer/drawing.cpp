@@ -1,4 +1,4 @@
-/// What a picture shows: plain lists of instances, ready for the GPU.
+/// Content of a picture: lists of instances in the layout of the GPU buffers.
 #include "src/viewer/drawing.hpp"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ void put(float (&out)[4], const Quat& q) {
   out[3] = static_cast<float>(q.w);
 }
 
-/// From the eye, which is at the origin, to a box.
+/// Distance from the eye, which is the origin, to a box.
 float distance_to(const BoxItem& item) {
   const Vec3 centre{Real(item.centre[0]), Real(item.centre[1]), Real(item.centre[2])};
   const Quat turn{Real(item.turn[3]), Real(item.turn[0]), Real(item.turn[1]), Real(item.turn[2])};
@@ -70,7 +70,7 @@ void Drawing::add_line(const Vec3& from, const Vec3& to, Paint paint, float widt
 }
 
 void Drawing::add_ground(const Vec3& normal, Real offset, Real cell, Paint paint) {
-  // Axes of the grid: along the world's where the plane is level.
+  // The axes of the grid are parallel to those of the world if the plane is horizontal.
   const Vec3 n = normalized(normal);
   const Vec3 hint = std::fabs(n.x) < Real(0.9) ? Vec3{1, 0, 0} : Vec3{0, 0, 1};
   const Vec3 u = normalized(hint - n * dot(hint, n));

@@ -1,4 +1,4 @@
-/// What a picture shows: plain lists of instances, ready for the GPU.
+/// Content of a picture: lists of instances in the layout of the GPU buffers.
 #pragma once
 
 #include <jfpx/math.hpp>
@@ -10,11 +10,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// How a surface looks; known to the shaders by number.
+/// Appearance of a surface; the shaders use the numeric values.
 enum class Pattern : std::uint8_t {
   plain,
   solid_ball,    ///< coloured, with an 8 at two poles
-  striped_ball,  ///< the same with white caps
+  striped_ball,  ///< coloured, with an 8 at two poles and white caps
   crate,
   wall,
   glass,
@@ -42,40 +42,40 @@ struct BoxItem {
 struct LineItem {
   float from[3], to[3];
   std::uint8_t rgba[4];
-  float width;  ///< in units: Viewport::unit
+  float width;  ///< [Viewport::unit]
 };
 struct GroundItem {
-  float normal[3], height;  ///< height of the eye over the plane
-  float u[3], eye_u;        ///< an axis of the grid, and where the eye is along it
+  float normal[3], height;  ///< height of the eye above the plane
+  float u[3], eye_u;        ///< an axis of the grid, and the coordinate of the eye on it
   float v[3], eye_v;
   Paint paint;
   float cell;  ///< [m]
 };
 
-/// One picture. Positions are given in the world and kept relative to the eye, so that worlds far
-/// from the origin keep their digits.
+/// Content of one picture. Positions are given in world coordinates and stored relative to the eye,
+/// which preserves precision far from the origin.
 class Drawing {
  public:
   explicit Drawing(const Vec3& eye) : eye_(eye) {}
 
-  /// Room for so many spheres in all, so that adding them is cheap.
+  /// Reserves memory for `count` spheres.
   void reserve_spheres(std::size_t count) { spheres_.reserve(count); }
   void add_sphere(const Vec3& centre, Real radius, const Quat& turn, Paint paint);
   void add_box(const Vec3& centre, const Vec3& half_extents, const Quat& turn, Paint paint);
   void add_line(const Vec3& from, const Vec3& to, Paint paint, float width,
                 std::uint8_t alpha = 255);
-  /// The plane dot(normal, p) = offset with a grid; not seen from below.
+  /// Adds the plane dot(normal, p) = offset with a grid; it is invisible from below.
   void add_ground(const Vec3& normal, Real offset, Real cell, Paint paint);
-  /// A ball around all that throws shadows.
+  /// Sets a bounding sphere of everything that casts shadows.
   void set_bounds(const Vec3& centre, Real radius);
-  /// Typical size of a body: how far contact shadows reach.
+  /// Sets the typical size of a body, which is the radius of ambient occlusion [m].
   void set_detail(Real metres) { detail_ = static_cast<float>(metres); }
 
   const Vec3& eye() const { return eye_; }
   const std::vector<SphereItem>& spheres() const { return spheres_; }
   const std::vector<BoxItem>& boxes() const { return boxes_; }
   const std::vector<BoxItem>& glass() const { return glass_; }
-  /// How near the nearest box, of glass or not, comes to the eye [m]; infinite without boxes.
+  /// Distance of the nearest box, including glass, from the eye [m]; infinite without boxes.
   float nearest_box() const;
   const std::vector<LineItem>& lines() const { return lines_; }
   const std::vector<GroundItem>& grounds() const { return grounds_; }

@@ -1,4 +1,4 @@
-/// A collider that can be exchanged while its owner lives.
+/// A sphere collider that delegates to a replaceable one.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>
@@ -12,7 +12,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// With the costs that `jfpx calibrate` has measured on this machine, if it has.
+/// Options with the costs measured by `jfpx calibrate` on this machine, or the default costs.
 inline SphereColliderOptions collider_options(const EngineChoice& choice) {
   SphereColliderOptions options;
   options.backend = choice.backend;
@@ -21,7 +21,8 @@ inline SphereColliderOptions collider_options(const EngineChoice& choice) {
   return options;
 }
 
-/// All colliders give the same bits, so a run can't tell.
+/// Delegates to a collider that can be replaced during the lifetime of the owner. All colliders
+/// return identical bits, so a replacement does not change the run.
 class ExchangeableCollider final : public SphereCollider {
  public:
   explicit ExchangeableCollider(std::unique_ptr<SphereCollider> first) : now_(std::move(first)) {}

@@ -1,4 +1,4 @@
-/// Forces on bodies, as arrows.
+/// Forces on bodies, drawn as arrows.
 #include "src/viewer/forces.hpp"
 
 #include <algorithm>
@@ -9,11 +9,11 @@ namespace view {
 namespace {
 
 constexpr Paint kForce{90, 225, 255};
-constexpr Real kLongest = 5;            // in units
-constexpr Real kLeast = Real(0.01);     // of the reference
-constexpr Real kHeadShare = Real(0.3);  // of the arrow
+constexpr Real kLongest = 5;            // [units]
+constexpr Real kLeast = Real(0.01);     // relative to the reference
+constexpr Real kHeadShare = Real(0.3);  // relative to the length of the arrow
 
-/// The median weight; 0 where most bodies have none.
+/// The median weight; 0 if most bodies have none.
 Real typical_weight(const Scene& scene) {
   std::vector<Real> weights;
   for (const BodyDef& body : scene.bodies) {
@@ -29,7 +29,7 @@ Real typical_weight(const Scene& scene) {
 
 void draw_arrow(const Vec3& from, const Vec3& way, Drawing* drawing) {
   const Vec3 tip = from + way;
-  const Vec3 across = cross(way, tip - drawing->eye());  // so that the head is seen in full
+  const Vec3 across = cross(way, tip - drawing->eye());  // turns the head towards the eye
   const Real width = length(across);
   drawing->add_line(from, tip, kForce, 3);
   if (!(width > 0)) return;
@@ -39,7 +39,7 @@ void draw_arrow(const Vec3& from, const Vec3& way, Drawing* drawing) {
   drawing->add_line(tip, neck - side, kForce, 3);
 }
 
-std::vector<Vec3> forces_between(const Scene& scene, const Moment& before, const Moment& now) {
+std::vector<Vec3> forces_between(const Scene& scene, const Snapshot& before, const Snapshot& now) {
   std::vector<Vec3> forces(scene.bodies.size());
   if (before.step == now.step) return forces;
   for (std::size_t i = 0; i < forces.size(); ++i) {
@@ -51,7 +51,7 @@ std::vector<Vec3> forces_between(const Scene& scene, const Moment& before, const
   return forces;
 }
 
-void draw_forces(const Scene& scene, const Moment& before, const Moment& now, Real unit,
+void draw_forces(const Scene& scene, const Snapshot& before, const Snapshot& now, Real unit,
                  Drawing* drawing) {
   const std::vector<Vec3> forces = forces_between(scene, before, now);
   Real reference = typical_weight(scene);

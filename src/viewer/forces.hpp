@@ -1,10 +1,10 @@
-/// Forces on bodies, as arrows.
+/// Forces on bodies, drawn as arrows.
 #pragma once
 
 #include <jfpx/scene.hpp>
 
 #include "src/viewer/drawing.hpp"
-#include "src/viewer/moment.hpp"
+#include "src/viewer/snapshot.hpp"
 
 #include <vector>
 
@@ -12,18 +12,19 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// What pushed each body in the step between two moments, its weight aside [N]: its mass times how
-/// its velocity changed beyond its own acceleration. So a body at rest feels what holds it, one
-/// that falls freely nothing, and any engine can be asked. Zero where there is no step between.
-std::vector<Vec3> forces_between(const Scene& scene, const Moment& before, const Moment& now);
+/// Mean force on each body in the step between two snapshots, without its weight [N]: the mass
+/// times the change of velocity that the body's own acceleration does not explain. A body at rest
+/// has the supporting force, a freely falling body has none. The definition is independent of the
+/// engine. Zero if there is no step between the snapshots.
+std::vector<Vec3> forces_between(const Scene& scene, const Snapshot& before, const Snapshot& now);
 
 /// Adds an arrow with its tail at `from`.
 void draw_arrow(const Vec3& from, const Vec3& way, Drawing* drawing);
 
-/// Adds an arrow at each body. Twice as long is four times the force; as long as `unit` is the
-/// weight of a typical body, or the largest force where nothing has weight. None is longer than
-/// five units, nor drawn below a hundredth of the weight.
-void draw_forces(const Scene& scene, const Moment& before, const Moment& now, Real unit,
+/// Adds an arrow at each body. Its length is proportional to the square root of the force; `unit`
+/// is the length for the weight of a typical body, or for the largest force if no body has weight.
+/// The length is limited to five units; forces below a hundredth of the reference are omitted.
+void draw_forces(const Scene& scene, const Snapshot& before, const Snapshot& now, Real unit,
                  Drawing* drawing);
 
 }  // namespace view

@@ -12,7 +12,8 @@ namespace {
 
 constexpr Vec3 kTowardsSun{Real(-0.52), Real(0.80), Real(0.34)};
 constexpr Real kGoldenAngle = Real(2.39996323);
-constexpr Real kSunBlur = Real(0.045);  // tangent: a sun some times as wide as the real one
+constexpr Real kSunBlur =
+    Real(0.045);  // tangent of the angular radius, several times that of the sun
 
 void put(float (&out)[4], const Vec3& v, Real w) {
   out[0] = static_cast<float>(v.x);
@@ -65,7 +66,7 @@ FrameBlock make_frame_block(const Drawing& drawing, const View& view, const Qual
   put(block.viewport, {width, height, view.far_plane},
       static_cast<Real>(viewport.unit) * static_cast<Real>(quality.supersample));
 
-  // The shadow map covers what throws shadows, or what is near when that is far too much.
+  // The shadow map covers all casters, or the surroundings of the eye if the scene is much larger.
   const Vec3 towards = drawing.bounds_centre() - view.eye;
   const Real radius = std::min(drawing.bounds_radius() * Real(1.02),
                                3 * length(towards) + static_cast<Real>(drawing.detail()));

@@ -9,7 +9,7 @@ namespace view {
 
 inline constexpr int kMaxTaps = 32;
 
-/// Laid out as std140 wants it.
+/// Has the std140 layout.
 struct FrameBlock {
   float view_projection[16];
   float light[16];

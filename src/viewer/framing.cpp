@@ -1,7 +1,8 @@
-/// Where the camera stands at first.
+/// Initial position of the camera.
 #include "src/viewer/framing.hpp"
 
-#include "src/viewer/values.hpp"
+#include "src/viewer/scene_painter.hpp"
+#include "src/viewer/shapes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,15 +14,15 @@ namespace {
 
 constexpr Real kMargin = Real(1.1);
 
-/// How far back from the focus the eye must be to have nearly all that moves in the picture.
+/// Distance of the eye from the focus at which nearly all movable bodies are in the picture.
 Real distance_for(const Camera& camera, const Bounds& bounds, const Scene& scene,
-                  const Moment& moment, Real aspect) {
+                  const Snapshot& snapshot, Real aspect) {
   const View view = camera.view(bounds.centre, bounds.radius);
   const Real tall = std::tan(camera.fov_y / 2), wide = tall * aspect;
   std::vector<Real> needed;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const BodyDef& body = scene.bodies[i];
-    const Vec3 p = moment.states[i].position - bounds.centre;
+    const Vec3 p = snapshot.states[i].position - bounds.centre;
     if (body.mass == 0 || length(p) > bounds.radius) continue;
     const Real size = size_of(body.shape);
     needed.push_back(std::max((std::fabs(dot(p, view.right)) + size) / wide,
@@ -34,14 +35,14 @@ Real distance_for(const Camera& camera, const Bounds& bounds, const Scene& scene
 
 }  // namespace
 
-Camera camera_for(const ViewOptions& options, const Scene& scene, const Moment& moment) {
+Camera initial_camera(const ViewOptions& options, const Scene& scene, const Snapshot& snapshot) {
   Camera camera;
   if (options.eye) {
     camera.look_at(*options.eye, *options.target);
     return camera;
   }
-  Bounds bounds = bounds_of(scene, moment.states);
-  const Real largest = Stage(scene).large_size() * 60;
+  Bounds bounds = bounds_of(scene, snapshot.states);
+  const Real largest = ScenePainter(scene).large_size() * 60;
   const Vec3& half = bounds.half_extents;
   const bool tall = half.y > 4 * std::max(half.x, half.z);
   if (tall && bounds.radius > largest) {
@@ -52,7 +53,7 @@ Camera camera_for(const ViewOptions& options, const Scene& scene, const Moment& 
       static_cast<Real>(options.size.width) / static_cast<Real>(options.size.height);
   const Vec3 from = normalized(Vec3{Real(0.55), Real(0.36), Real(0.95)});
   camera.look_at(bounds.centre + from, bounds.centre);
-  camera.look_at(bounds.centre + from * distance_for(camera, bounds, scene, moment, aspect),
+  camera.look_at(bounds.centre + from * distance_for(camera, bounds, scene, snapshot, aspect),
                  bounds.centre);
   return camera;
 }

@@ -1,4 +1,4 @@
-/// Where the camera stands at first.
+/// Initial position of the camera.
 #pragma once
 
 #include "src/viewer/camera.hpp"
@@ -8,9 +8,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Sees all that moves, from the front, the right and above; a tower too tall for its bodies to be
-/// seen is shown from its foot. --eye and --target go first.
-Camera camera_for(const ViewOptions& options, const Scene& scene, const Moment& moment);
+/// Shows all movable bodies from the front, the right and above. Shows only the lower part of a
+/// tower that is too tall for its bodies to be visible. --eye and --target take precedence.
+Camera initial_camera(const ViewOptions& options, const Scene& scene, const Snapshot& snapshot);
 
 }  // namespace view
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// OpenGL objects that clean up after themselves.
+/// RAII wrappers of OpenGL objects.
 #include "src/viewer/gl.hpp"
 
 #include <jfpx/error.hpp>
@@ -21,7 +21,7 @@ std::string log_of(GLuint shader) {
 }
 
 void attach(GLuint program, GLenum stage, std::string_view defines, std::string_view source) {
-  std::string head = "#version 330 core\n#define MOST_TAPS " + std::to_string(kMaxTaps) + "\n";
+  std::string head = "#version 330 core\n#define MAX_TAPS " + std::to_string(kMaxTaps) + "\n";
   if (epoxy_has_gl_extension("GL_ARB_conservative_depth")) {
     head += "#extension GL_ARB_conservative_depth : enable\n";
   }
@@ -34,7 +34,7 @@ void attach(GLuint program, GLenum stage, std::string_view defines, std::string_
   glShaderSource(shader, 4, parts.data(), sizes.data());
   glCompileShader(shader);
   glAttachShader(program, shader);
-  glDeleteShader(shader);  // lives on in the program
+  glDeleteShader(shader);  // deleted with the program
   GLint compiled = 0;
   glGetShaderiv(shader, GL_COMPILE_STATUS, &compiled);
   if (compiled == GL_FALSE) throw BackendUnavailable("OpenGL rejects a shader: " + log_of(shader));

@@ -1,4 +1,4 @@
-/// OpenGL objects that clean up after themselves.
+/// RAII wrappers of OpenGL objects.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,7 +12,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Owns one OpenGL name. The context in which it was made must be current when it ends.
+/// Owns one OpenGL name. Its context must be current on destruction.
 template <void (*release)(GLuint)>
 class GlName {
  public:
@@ -32,7 +32,7 @@ class GlName {
   GLuint name_ = 0;
 };
 
-// Functions, because epoxy's names are pointers that are set at the first call.
+// Wrappers, because epoxy's functions are pointers that are set at the first call.
 inline void release_buffer(GLuint name) { glDeleteBuffers(1, &name); }
 inline void release_array(GLuint name) { glDeleteVertexArrays(1, &name); }
 inline void release_texture(GLuint name) { glDeleteTextures(1, &name); }
@@ -48,22 +48,22 @@ using GlFramebuffer = GlName<release_framebuffer>;
 
 GlBuffer make_buffer();
 GlVertexArray make_vertex_array();
-/// A texture of width x height texels that are fetched without filtering.
+/// A texture without filtering.
 GlTexture make_texture(GLenum format, int width, int height);
-/// @param samples per pixel; 0 or 1 for a plain one
+/// @param samples number of samples per pixel; 0 or 1: not multisampled
 GlRenderbuffer make_renderbuffer(GLenum format, int width, int height, int samples);
-/// Two textures as a target: `colour` may be 0. @throws BackendUnavailable if the driver
-/// rejects it.
+/// A framebuffer with two textures; `colour` may be 0.
+/// @throws BackendUnavailable if the driver rejects it
 GlFramebuffer make_framebuffer(GLuint colour, GLuint depth);
 
-/// A linked program. Sources are joined behind `#version 330 core` and the frame's declarations.
+/// A linked program. The sources follow `#version 330 core` and the declarations of frame.glsl.
 class GlProgram {
  public:
-  /// @param defines lines that come first, for example "#define SHADOW_PASS\n"
+  /// @param defines lines that precede the sources, for example "#define SHADOW_PASS\n"
   /// @throws BackendUnavailable with the driver's message if it does not compile or link.
   GlProgram(std::string_view vertex, std::string_view fragment, std::string_view defines = "");
   void use() const { glUseProgram(program_.name()); }
-  /// Where a uniform is, or -1, which OpenGL ignores. The name must end with a zero.
+  /// Location of a uniform, or -1, which OpenGL ignores. The name must be null-terminated.
   GLint at(const char* uniform) const { return glGetUniformLocation(program_.name(), uniform); }
 
  private:

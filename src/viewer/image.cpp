@@ -1,11 +1,14 @@
-/// Pictures in memory and as PNG files.
+/// Images in memory, as PNG files, and as numbered sequences of files.
 #include "src/viewer/image.hpp"
 
 #include <jfpx/error.hpp>
 
 #include "src/base/atomic_file.hpp"
 
+#include <fmt/format.h>
+
 #include <cstring>
+#include <filesystem>
 #include <png.h>
 #include <string>
 
@@ -51,6 +54,24 @@ Image read_png(const std::string& path) {
   }
   png_image_free(&png);
   throw FileError(path + ": " + png.message);
+}
+
+ImageSequenceWriter::ImageSequenceWriter(std::string folder) : folder_(std::move(folder)) {
+  if (folder_.empty()) return;
+  std::error_code error;
+  std::filesystem::create_directories(folder_, error);
+  if (error) throw FileError(folder_ + ": " + error.message());
+}
+
+void ImageSequenceWriter::add(const Image& image) {
+  write_png(image, fmt::format("{}/frame-{:06}.png", folder_, ++frames_));
+}
+
+std::string free_name(const std::string& stem, const std::string& ending) {
+  for (unsigned number = 1;; ++number) {
+    std::string name = fmt::format("{}-{}{}", stem, number, ending);
+    if (!std::filesystem::exists(name)) return name;
+  }
 }
 
 }  // namespace view

@@ -1,4 +1,4 @@
-/// Pictures in memory and as PNG files.
+/// Images in memory, as PNG files, and as numbered sequences of files.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -11,7 +11,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Rows from the top, three bytes a pixel, sRGB.
+/// Rows from top to bottom, three bytes per pixel, sRGB.
 struct Image {
   int width = 0, height = 0;
   std::vector<std::uint8_t> rgb;
@@ -23,12 +23,31 @@ struct Image {
   }
 };
 
-/// Writes a PNG, all or nothing. @throws FileError
+/// Writes a PNG file completely or not at all. @throws FileError
 void write_png(const Image& image, const std::string& path);
-/// Leaves nothing behind. @throws FileError as write_png(), before there is a picture
+/// Checks that write_png() can write the file, without creating it. @throws FileError as
+/// write_png()
 void require_writable(const std::string& path);
 /// @throws FileError
 Image read_png(const std::string& path);
+
+/// Writes numbered images to a folder, for conversion to a film.
+class ImageSequenceWriter {
+ public:
+  /// Creates the folder; an empty name disables the writer. @throws FileError
+  explicit ImageSequenceWriter(std::string folder);
+  bool on() const { return !folder_.empty(); }
+  const std::string& folder() const { return folder_; }
+  /// Writes frame-000001.png and so on. @throws FileError
+  void add(const Image& image);
+
+ private:
+  std::string folder_;
+  unsigned frames_ = 0;
+};
+
+/// The first of STEM-1, STEM-2, ... with the ending that does not exist yet.
+std::string free_name(const std::string& stem, const std::string& ending);
 
 }  // namespace view
 }  // namespace JFPX_ABI

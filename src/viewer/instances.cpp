@@ -1,4 +1,4 @@
-/// Instance buffers: all spheres, boxes or lines of a picture in one draw call each.
+/// Instance buffers, which draw all spheres, boxes or lines of a picture in one call each.
 #include "src/viewer/instances.hpp"
 
 #include <cstddef>
@@ -34,7 +34,7 @@ Instances::Instances(std::span<const Field> fields, std::size_t stride, GLenum m
   GLuint location = 0;
   for (const Field& field : fields) {
     glEnableVertexAttribArray(location);
-    // NOLINTNEXTLINE(performance-no-int-to-ptr): OpenGL takes offsets as pointers
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): OpenGL passes offsets as pointers
     const auto* offset = reinterpret_cast<const void*>(field.offset);
     glVertexAttribPointer(location, field.components, field.type,
                           field.type == GL_UNSIGNED_BYTE ? GL_TRUE : GL_FALSE,

@@ -1,4 +1,4 @@
-/// Instance buffers: all spheres, boxes or lines of a picture in one draw call each.
+/// Instance buffers, which draw all spheres, boxes or lines of a picture in one call each.
 #pragma once
 
 #include "src/viewer/drawing.hpp"
@@ -10,10 +10,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// A vertex array over one buffer of items that advance once an instance.
+/// A vertex array over one buffer of items, which advances once per instance.
 class Instances {
  public:
-  /// Where a field of an item lies. Bytes are read as numbers from 0 to 1.
+  /// Location of a field in an item. Bytes are normalized to [0, 1].
   struct Field {
     int components;
     GLenum type;
@@ -21,10 +21,10 @@ class Instances {
   };
   Instances(std::span<const Field> fields, std::size_t stride, GLenum mode, int vertices);
   void upload_bytes(const void* data, std::size_t items);
-  /// Room for so many items, which somebody else fills. @return the buffer
+  /// Allocates memory for items that the caller writes. @return the buffer
   GLuint reserve(std::size_t items);
   void draw() const { draw(static_cast<std::size_t>(count_)); }
-  /// Only the first ones.
+  /// Draws the first `items` items.
   void draw(std::size_t items) const;
 
  private:

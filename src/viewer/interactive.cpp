@@ -1,4 +1,4 @@
-/// The program in a window.
+/// The program in a window: the loop of events, steps and pictures.
 #include "src/viewer/interactive.hpp"
 
 #include <jfpx/error.hpp>
@@ -16,11 +16,11 @@ inline namespace JFPX_ABI {
 namespace view {
 namespace {
 
-constexpr double kLongestFrame = 0.25;  // [s]; after a stall the clock does not catch up
+constexpr double kLongestFrame = 0.25;  // [s]; limits the steps after a stall
 constexpr double kNoticeTime = 4;       // [s]
 
 void add_help(const KeyHelp& line) {
-  for (const std::string_view text : {line.keys, line.what}) {
+  for (const std::string_view text : {line.keys, line.action}) {
     ImGui::TableNextColumn();
     widget::text(std::string(text));
   }
@@ -30,40 +30,41 @@ void add_help(const KeyHelp& line) {
 
 App::App(const ViewOptions& options)
     : options_(options),
-      show_(make_show(options)),
+      viewer_(make_viewer(options)),
       window_(
           Window::open("jfpx-view: " + options.run.scene, options.size.width, options.size.height)),
       renderer_(options.quality),
       ui_(window_),
-      recorder_(options.record),
-      seen_{0, options.size.width, options.size.height, 1} {
+      image_sequence_(options.record),
+      last_target_{0, options.size.width, options.size.height, 1} {
   if (options.fullscreen) window_.set_fullscreen(true);
-  show_->paused = options.paused;
-  meet_show();
+  viewer_->paused = options.paused;
+  attach_viewer();
 }
 
 bool App::frame(double seconds) {
   read_events();
-  controls_.move(&show_->camera, seconds, show_->body_size());
-  const std::uint64_t before = show_->steps();
+  controls_.move(&viewer_->camera, seconds, viewer_->body_size());
+  const std::uint64_t before = viewer_->steps();
   const std::uint64_t last = options_.frames.value_or(std::numeric_limits<std::uint64_t>::max());
   try {
-    show_->advance(recorder_.on() ? kRecordedFrame : seconds, last > before ? last - before : 0);
+    viewer_->advance(image_sequence_.on() ? kRecordedFrame : seconds,
+                     last > before ? last - before : 0);
   } catch (const FileError& error) {
-    fail_or_tell(error, false);
+    fail_or_notify(error, false);
   }
-  if (show_->steps() > before) {
-    timing_.add_step(show_->engine_ms(), show_->steps() - before);
+  if (viewer_->steps() > before) {
+    timing_.add_step(viewer_->engine_ms(), viewer_->steps() - before);
   }
-  quit_ = quit_ || (options_.frames && (show_->steps() >= last || show_->at_end()));
-  if (quit_) wanted_picture_ = options_.screenshot;
+  quit_ = quit_ || (options_.frames && (viewer_->steps() >= last || viewer_->at_end()));
+  if (quit_) requested_picture_ = options_.screenshot;
   draw(seconds);
   return !quit_;
 }
 
 int App::finish() {
-  view::finish(*show_, timing_, options_, failure_);
-  return std::max(status_, show_->status());
+  view::finish(*viewer_, timing_, options_, failure_);
+  return std::max(status_, viewer_->status());
 }
 
 void App::read_events() {
@@ -74,34 +75,34 @@ void App::read_events() {
     controls_.handle(event, !ui_.wants_keyboard(), !ui_.wants_mouse());
   }
   window_.capture_mouse(controls_.looking());
-  for (const DemoKey& key : controls_.take_demo_keys()) show_->demo_key(key);
-  for (const Command command : controls_.take_commands()) try_to_obey(command);
-  for (const Click& click : controls_.take_clicks()) {  // in the middle of its unit
-    show_->pick(static_cast<Real>(click.x) + Real(0.5), static_cast<Real>(click.y) + Real(0.5),
-                window_.width(), window_.height());
+  for (const DemoKey& key : controls_.take_demo_keys()) viewer_->demo_key(key);
+  for (const Command command : controls_.take_commands()) try_to_execute(command);
+  for (const Click& click : controls_.take_clicks()) {  // at the centre of the unit
+    viewer_->pick(static_cast<Real>(click.x) + Real(0.5), static_cast<Real>(click.y) + Real(0.5),
+                  window_.width(), window_.height());
   }
 }
 
-/// Tells the controls what the show that is new wants of them, and records it if that was asked
-/// for.
-void App::meet_show() {
-  controls_.set_demo_keys(show_->demo_keys());
-  controls_.orbit = !show_->walks();
-  if (!options_.recording.empty()) show_->record_to(options_.recording);
+/// Configures the controls for a new viewer, and starts its recording if the options request one.
+void App::attach_viewer() {
+  controls_.set_demo_keys(viewer_->demo_keys());
+  controls_.orbit = !viewer_->walks();
+  if (!options_.recording.empty()) viewer_->record_to(options_.recording);
 }
 
-/// What the panel asked for while it was drawn.
-void App::grant_wishes() {
-  for (const Command command : std::exchange(show_->commands, {})) try_to_obey(command);
-  if (!show_->next) return;
+/// Executes the commands that the panel issued while it was drawn.
+void App::apply_panel_requests() {
+  for (const Command command : std::exchange(viewer_->commands, {})) try_to_execute(command);
+  if (!viewer_->next) return;
   try {
-    open(*std::exchange(show_->next, std::nullopt));
+    open(*std::exchange(viewer_->next, std::nullopt));
   } catch (const Error& error) {
-    show_->message = error.what();
+    viewer_->message = error.what();
   }
 }
 
-/// A scene or a recording that was dropped on the window; the path is SDL's to be freed.
+/// Opens a scene or a recording that was dropped on the window. Frees the path, which SDL
+/// allocated.
 void App::open_file(char* path) {
   const std::unique_ptr<char, void (*)(void*)> owner(path, SDL_free);
   ViewOptions next = options_;
@@ -116,36 +117,36 @@ void App::open_file(char* path) {
   try {
     open(next);
   } catch (const Error& error) {
-    tell(error.what());
+    notify(error.what());
   }
 }
 
-/// Shows something else, as what is shown is. @throws what loading and engines throw; nothing has
-/// changed then.
+/// Replaces the viewer and keeps its display settings.
+/// @throws exceptions of scene loading and engines; nothing has changed then
 void App::open(const ViewOptions& next) {
   check(next);
-  std::unique_ptr<Show> fresh = make_show(next);
-  fresh->paused = show_->paused;
-  fresh->speed = show_->speed;
-  fresh->colouring = show_->colouring;
-  fresh->contacts = show_->contacts;
-  fresh->forces = show_->forces;
-  status_ = std::max(status_, show_->status());
-  show_ = std::move(fresh);
-  meet_show();
+  std::unique_ptr<Viewer> fresh = make_viewer(next);
+  fresh->paused = viewer_->paused;
+  fresh->speed = viewer_->speed;
+  fresh->colouring = viewer_->colouring;
+  fresh->contacts = viewer_->contacts;
+  fresh->forces = viewer_->forces;
+  status_ = std::max(status_, viewer_->status());
+  viewer_ = std::move(fresh);
+  attach_viewer();
   window_.set_title("jfpx-view: " + next.run.scene);
 }
 
-/// What can't be done now is told and changes nothing.
-void App::try_to_obey(Command command) {
+/// Executes a command. A command that fails is reported in the window and has no effect.
+void App::try_to_execute(Command command) {
   try {
-    obey(command);
+    execute(command);
   } catch (const Error& error) {
-    tell(error.what());
+    notify(error.what());
   }
 }
 
-void App::obey(Command command) {
+void App::execute(Command command) {
   switch (command) {
     case Command::quit:
       quit_ = true;
@@ -157,46 +158,46 @@ void App::obey(Command command) {
       panel_ = !panel_;
       break;
     case Command::pause:
-      show_->paused = !show_->paused;
+      viewer_->paused = !viewer_->paused;
       break;
     case Command::step:
-      show_->paused = true;
-      show_->step();
+      viewer_->paused = true;
+      viewer_->step();
       break;
     case Command::step_back:
-      show_->paused = true;
-      show_->step_back();
+      viewer_->paused = true;
+      viewer_->step_back();
       break;
     case Command::slower:
-      show_->speed = std::max(show_->speed / 2, 1.0 / 64);
+      viewer_->speed = std::max(viewer_->speed / 2, 1.0 / 64);
       break;
     case Command::faster:
-      show_->speed = std::min(show_->speed * 2, 16.0);
+      viewer_->speed = std::min(viewer_->speed * 2, 16.0);
       break;
     case Command::restart:
-      show_->restart();
+      viewer_->restart();
       break;
     case Command::orbit:
       controls_.orbit = !controls_.orbit;
       break;
     case Command::home:
-      show_->home();
+      viewer_->home();
       break;
     case Command::contacts:
-      show_->contacts = !show_->contacts;
+      viewer_->contacts = !viewer_->contacts;
       break;
     case Command::forces:
-      show_->forces = !show_->forces;
+      viewer_->forces = !viewer_->forces;
       break;
     case Command::colouring:
-      show_->colouring = static_cast<Colouring>((static_cast<std::size_t>(show_->colouring) + 1) %
-                                                std::size(kColouringNames));
+      viewer_->colouring = static_cast<Colouring>(
+          (static_cast<std::size_t>(viewer_->colouring) + 1) % std::size(kColouringNames));
       break;
     case Command::screenshot:
-      wanted_picture_ = free_name("jfpx-view", ".png");
+      requested_picture_ = free_name("jfpx-view", ".png");
       break;
     case Command::record:
-      toggle_recorder();
+      toggle_image_sequence();
       break;
     case Command::save:
       save_recording();
@@ -207,45 +208,45 @@ void App::obey(Command command) {
   }
 }
 
-void App::toggle_recorder() {
-  if (recorder_.on()) {
-    recorder_ = Recorder("");
-    tell("no more pictures are recorded");
+void App::toggle_image_sequence() {
+  if (image_sequence_.on()) {
+    image_sequence_ = ImageSequenceWriter("");
+    notify("stopped recording pictures");
     return;
   }
   const std::string folder = free_name("jfpx-view-frames", "");
-  recorder_ = Recorder(folder);
-  tell("pictures go to " + folder);
+  image_sequence_ = ImageSequenceWriter(folder);
+  notify("recording pictures to " + folder);
 }
 
 void App::save_recording() {
   const std::string name = free_name("jfpx-view", ".rec");
-  show_->save_recording(name);
-  tell("wrote " + name);
+  viewer_->save_recording(name);
+  notify("wrote " + name);
 }
 
 void App::write_pictures(const Target& target) {
-  const bool picture_by_key = wanted_picture_ != options_.screenshot;
+  const bool picture_by_key = requested_picture_ != options_.screenshot;
   try {
-    if (!wanted_picture_.empty()) save_picture(target);
+    if (!requested_picture_.empty()) save_picture(target);
   } catch (const FileError& error) {
-    fail_or_tell(error, picture_by_key);
+    fail_or_notify(error, picture_by_key);
   }
-  if (!recorder_.on()) return;
-  const bool film_by_key = recorder_.folder() != options_.record;
+  if (!image_sequence_.on()) return;
+  const bool film_by_key = image_sequence_.folder() != options_.record;
   try {
-    recorder_.add(picture(target));
+    image_sequence_.add(picture(target));
   } catch (const FileError& error) {
-    recorder_ = Recorder("");
-    fail_or_tell(error, film_by_key);
+    image_sequence_ = ImageSequenceWriter("");
+    fail_or_notify(error, film_by_key);
   }
 }
 
-/// What the command line asked for must be written, or the program ends; a key's wish is told to
-/// have failed. Called while the error is handled.
-void App::fail_or_tell(const Error& error, bool by_key) {
+/// Ends the program if a file given on the command line can't be written; reports the failure of a
+/// command in the window. Called while the exception is handled.
+void App::fail_or_notify(const Error& error, bool by_key) {
   if (by_key) {
-    tell(error.what());
+    notify(error.what());
     return;
   }
   if (!failure_) failure_ = std::current_exception();
@@ -253,45 +254,45 @@ void App::fail_or_tell(const Error& error, bool by_key) {
 }
 
 void App::save_picture(const Target& target) {
-  const std::string name = std::exchange(wanted_picture_, {});
+  const std::string name = std::exchange(requested_picture_, {});
   write_png(picture(target), name);
-  tell("wrote " + name);
+  notify("wrote " + name);
 }
 
-void App::tell(const std::string& what) {
-  notice_ = what;
+void App::notify(const std::string& text) {
+  notice_ = text;
   notice_left_ = kNoticeTime;
 }
 
 void App::draw(double seconds) {
   if (window_.minimised()) {
-    draw_unseen(seconds);
+    draw_minimised(seconds);
   } else {
-    seen_ = {0, window_.pixel_width(), window_.pixel_height(), window_.pixel_ratio()};
-    draw_to(seen_, seconds);
+    last_target_ = {0, window_.pixel_width(), window_.pixel_height(), window_.pixel_ratio()};
+    draw_to(last_target_, seconds);
     window_.swap();
   }
-  grant_wishes();
+  apply_panel_requests();
 }
 
-/// A window that is minimised has no pixels to read. A picture that is wanted is drawn as large as
-/// the window was.
-void App::draw_unseen(double seconds) {
-  if (wanted_picture_.empty() && !recorder_.on()) {
+/// Draws requested pictures offscreen in the last size of the window, because a minimised window
+/// has no pixels.
+void App::draw_minimised(double seconds) {
+  if (requested_picture_.empty() && !image_sequence_.on()) {
     SDL_Delay(20);
     return;
   }
-  const Canvas canvas(seen_.width, seen_.height);
-  Target target = seen_;
-  target.framebuffer = canvas.framebuffer();
+  const OffscreenFramebuffer offscreen(last_target_.width, last_target_.height);
+  Target target = last_target_;
+  target.framebuffer = offscreen.framebuffer();
   draw_to(target, seconds);
 }
 
 void App::draw_to(const Target& target, double seconds) {
   Stopwatch watch;
   ui_.begin(seconds);
-  show_->draw(renderer_, target);
-  if (panel_) show_->panel();
+  viewer_->draw(renderer_, target);
+  if (panel_) viewer_->panel();
   if (help_) show_help();
   show_notice(seconds);
   ui_.end(target.framebuffer, target.width, target.height);
@@ -299,10 +300,10 @@ void App::draw_to(const Target& target, double seconds) {
   write_pictures(target);
 }
 
-/// What was drawn last. Taken before the swap, which may leave the back buffer undefined. What a
-/// lost context leaves is no picture.
+/// Reads the last picture. Must be called before the swap, which may leave the back buffer
+/// undefined. Pixels read after a lost context are invalid.
 Image App::picture(const Target& target) const {
-  Image image = Canvas::read_pixels(target.framebuffer, target.width, target.height);
+  Image image = OffscreenFramebuffer::read_pixels(target.framebuffer, target.width, target.height);
   window_.check_context();
   return image;
 }
@@ -312,9 +313,9 @@ void App::show_help() {
                           ImGuiCond_Always, {0.5f, 0.5f});
   ImGui::Begin("Keys", &help_, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
   if (ImGui::BeginTable("keys", 2)) {
-    for (const KeyHelp& line : show_->demo_help()) add_help(line);
+    for (const KeyHelp& line : viewer_->demo_help()) add_help(line);
     for (const KeyHelp& line : key_help()) {
-      if (show_->has(line.of)) add_help(line);
+      if (viewer_->has(line.of)) add_help(line);
     }
     ImGui::EndTable();
   }

@@ -1,6 +1,4 @@
 /// The native engine as a run.
-#include <jfpx/error.hpp>
-
 #include "src/viewer/exchangeable_collider.hpp"
 
 namespace jfpx {
@@ -17,21 +15,21 @@ class NativeRun final : public Run {
 
   void step() override { report_ = world_.step(); }
 
-  Moment moment() override {
-    Moment moment;
-    moment.step = first_step_ + report_.step;
-    moment.states = world_.states();
-    for (const BodyId id : world_.bodies()) moment.awake.push_back(world_.awake(id) ? 1 : 0);
-    moment.contacts.assign(world_.contacts().begin(), world_.contacts().end());
-    moment.times = {report_.integrate_ms, 0, report_.detect_ms, report_.resolve_ms,
-                    report_.total_ms};
-    moment.iterations = report_.position_iterations + report_.velocity_iterations;
-    moment.computed_by = to_string(report_.backend);
+  Snapshot snapshot() override {
+    Snapshot snapshot;
+    snapshot.step = first_step_ + report_.step;
+    snapshot.states = world_.states();
+    for (const BodyId id : world_.bodies()) snapshot.awake.push_back(world_.awake(id) ? 1 : 0);
+    snapshot.contacts.assign(world_.contacts().begin(), world_.contacts().end());
+    snapshot.times = {report_.integrate_ms, 0, report_.detect_ms, report_.resolve_ms,
+                      report_.total_ms};
+    snapshot.iterations = report_.position_iterations + report_.velocity_iterations;
+    snapshot.computed_by = to_string(report_.backend);
     if (report_.non_finite) {
-      moment.trouble = "body " + std::to_string(report_.non_finite_body.index) +
-                       " left the finite numbers; the state is frozen";
+      snapshot.trouble = "body " + std::to_string(report_.non_finite_body.index) +
+                         " became non-finite; the state is frozen";
     }
-    return moment;
+    return snapshot;
   }
 
   EngineChoice choice() const override { return choice_; }

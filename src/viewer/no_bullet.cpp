@@ -1,8 +1,8 @@
-/// What stands in for Bullet in a build without it.
+/// Replacements for a build without Bullet, which report that Bullet is missing.
 #include <jfpx/error.hpp>
 
 #include "src/viewer/run.hpp"
-#include "src/viewer/show.hpp"
+#include "src/viewer/viewer.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -12,11 +12,10 @@ bool has_engine(EngineKind engine) { return engine == EngineKind::native; }
 
 std::unique_ptr<Run> detail::make_bullet_run(const Scene&, const EngineChoice& choice,
                                              std::uint64_t) {
-  throw BackendUnavailable(std::string(kEngineNames[static_cast<std::size_t>(choice.engine)]) +
-                           ": built without Bullet");
+  throw BackendUnavailable(std::string(to_string(choice.engine)) + ": built without Bullet");
 }
 
-std::unique_ptr<Show> make_side_by_side(const ViewOptions&) {
+std::unique_ptr<Viewer> make_side_by_side(const ViewOptions&) {
   throw BackendUnavailable("side by side: built without Bullet");
 }
 

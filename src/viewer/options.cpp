@@ -1,10 +1,14 @@
-/// The command line of jfpx-view.
+/// Options of jfpx-view, and the parser of its command line.
 #include "src/viewer/options.hpp"
 
 #include <jfpx/error.hpp>
 
 #include "src/tool/demo_names.hpp"
-#include "src/viewer/show.hpp"
+#include "src/tool/options.hpp"
+#include "src/tool/precision.hpp"
+#include "src/viewer/viewer.hpp"
+
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <charconv>
@@ -51,17 +55,19 @@ Vec3 parse_point(const std::string& option, const std::string& text) {
 void check_recording(const ViewOptions& options) {
   const tool::RunOptions& run = options.run;
   if (options.side_by_side) {
-    throw InvalidArgument("--side-by-side takes its steps anew; " + run.scene + " is a recording");
+    throw InvalidArgument("--side-by-side can't play a recording; " + run.scene +
+                          " is a recording");
   }
   if (run.spheres || run.boxes || run.dt || run.seed != tool::RunOptions{}.seed || run.no_sleep) {
     throw InvalidArgument(
         run.scene +
-        " is a recording: --spheres, --boxes, --seed, --dt and --no-sleep can't change it");
+        " is a recording: --spheres, --boxes, --seed, --dt and --no-sleep do not apply");
   }
   if (options.choice != EngineChoice{}) {
-    throw InvalidArgument(run.scene +
-                          " is a recording: it begins on its own engine and backend, and the panel "
-                          "lets it go on with others");
+    throw InvalidArgument(
+        run.scene +
+        " is a recording: it starts with the recorded engine and backend; the panel "
+        "selects others");
   }
 }
 
@@ -70,52 +76,50 @@ void check_demo(const ViewOptions& options) {
                        : options.colouring != ViewOptions{}.colouring ? "--colours"
                                                                       : nullptr;
   if (unused == nullptr) return;
-  throw InvalidArgument(std::string(unused) + " goes with a scene; " + options.run.scene +
+  throw InvalidArgument(std::string(unused) + " requires a scene; " + options.run.scene +
                         " is a demo");
 }
 
-}  // namespace
-
+/// Adds the options except --precision; they write to `options`.
 void add_view_options(CLI::App& app, ViewOptions& options) {
   tool::add_scene_options(app, options.run,
                           "Name of a scene or demo (see: jfpx scenes), a JSON file, or a recording "
                           "(.rec)");
   app.add_flag("--side-by-side", options.side_by_side,
-               "Native, stock Bullet and Bullet with jfpx, in step");
+               "Step native jfpx, stock Bullet and Bullet with jfpx together and compare them");
   app.add_option_function<std::string>(
          "--engine",
-         [&options](const std::string& name) { options.choice.engine = parse_engine(name); },
-         "native, bullet (with jfpx) or bullet-stock [native]")
+         [&options](const std::string& name) { options.choice.engine = tool::parse_engine(name); },
+         "Engine: native, bullet (with jfpx) or bullet-stock [native]")
       ->check(tool::engine_name());
-  tool::add_backend_option(app, options.choice.backend,
-                           "Finds sphere contacts, and solves in Bullet: auto, cpu or cuda [auto]");
-  app.add_option("--threads", options.choice.threads, "CPU threads, 0 = one per core")
+  tool::add_backend_option(
+      app, options.choice.backend,
+      "Backend of sphere contacts and of jfpx's solver in Bullet: auto, cpu or cuda [auto]");
+  app.add_option("--threads", options.choice.threads, "CPU threads; 0: one per core")
       ->check(tool::whole_number())
       ->capture_default_str();
-  const auto add_part = [&](const char* name, bool* jfpx, const char* what) {
+  const auto add_part = [&](const char* name, bool* jfpx, const char* help) {
     app.add_option_function<std::string>(
-           name, [jfpx](const std::string& whose) { *jfpx = whose == "jfpx"; }, what)
+           name, [jfpx](const std::string& value) { *jfpx = value == "jfpx"; }, help)
         ->check(CLI::IsMember({"stock", "jfpx"}));
   };
-  add_part("--solver", &options.choice.jfpx_solver,
-           "Engine bullet: whose solver, stock or jfpx [jfpx]");
-  add_part("--world", &options.choice.jfpx_world,
-           "Engine bullet: whose world, stock or jfpx [jfpx]");
+  add_part("--solver", &options.choice.jfpx_solver, "Engine bullet: solver, stock or jfpx [jfpx]");
+  add_part("--world", &options.choice.jfpx_world, "Engine bullet: world, stock or jfpx [jfpx]");
   app.add_option("--minimum-batch", options.choice.minimum_batch,
-                 "Engine bullet: pairs, bodies or manifolds below which a part is left to Bullet's "
-                 "own code")
+                 "Engine bullet: smallest number of pairs, bodies or manifolds that a part of jfpx "
+                 "computes instead of Bullet")
       ->check(tool::whole_number())
       ->capture_default_str();
-  app.add_flag("--headless", options.headless, "No window, no display");
+  app.add_flag("--headless", options.headless, "Render without a window and a display");
   app.add_option("--frames", options.frames,
-                 "Steps to run, of a recording as many as it has [headless: 120; window: until "
+                 "Number of steps; a recording ends earlier [default: headless: 120; window: until "
                  "closed]")
       ->check(tool::whole_number());
-  app.add_option("--screenshot", options.screenshot, "Write the last frame to this PNG file");
+  app.add_option("--screenshot", options.screenshot, "Write the last picture to this PNG file");
   app.add_option("--record", options.record,
-                 "Write every frame to this folder as frame-000001.png and so on");
+                 "Write every picture to this folder as frame-000001.png and so on");
   app.add_option("--recording", options.recording,
-                 "Write the states of all steps to this file, for: jfpx replay");
+                 "Write the states of all steps to this file (see: jfpx replay)");
   app.add_option_function<std::string>(
       "--size", [&options](const std::string& text) { options.size = parse_size(text); },
       "Size of the picture or window [1280x720]");
@@ -135,51 +139,81 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
                std::find(std::begin(kColouringNames), std::end(kColouringNames), name);
            options.colouring = static_cast<Colouring>(found - std::begin(kColouringNames));
          },
-         "What colours tell: bodies, speed, sleep, penetration, contacts or islands [bodies]")
+         "Property shown by colours: bodies, speed, sleep, penetration, contacts or islands "
+         "[bodies]")
       ->check(CLI::IsMember(
           std::vector<std::string>(std::begin(kColouringNames), std::end(kColouringNames))));
   app.add_flag("--contacts", options.contacts, "Draw contact points and normals");
-  app.add_flag("--forces", options.forces, "Draw what pushes each body, its weight aside");
-  app.add_flag("--panel", options.panel, "Show the panel in headless pictures too");
-  app.add_option("--input", options.input, "Inputs of a demo, from this file");
+  app.add_flag("--forces", options.forces, "Draw the force on each body, without its weight");
+  app.add_flag("--panel", options.panel, "Viewer the panel in headless pictures too");
+  app.add_option("--input", options.input, "Input script of a demo");
   app.add_option_function<std::string>(
       "--eye", [&options](const std::string& text) { options.eye = parse_point("--eye", text); },
-      "Where the camera is: X,Y,Z [m]");
+      "Position of the camera: X,Y,Z [m]");
   app.add_option_function<std::string>(
       "--target",
       [&options](const std::string& text) { options.target = parse_point("--target", text); },
-      "What it looks at: X,Y,Z [m]");
+      "Point that the camera looks at: X,Y,Z [m]");
   app.add_flag_callback(
       "--no-render", [&options] { options.render = false; },
-      "Open no window and draw nothing: for timing the engine alone");
+      "Draw nothing and open no window, to time the engine alone");
   app.add_flag("--fullscreen", options.fullscreen, "Start in full screen");
   app.add_flag("--paused", options.paused, "Start paused");
+}
+
+}  // namespace
+
+std::optional<int> parse_command_line(int argc, char** argv, ViewOptions& options) {
+  CLI::App app("jfpx-view: shows scenes that run on the native engine or on Bullet.", "jfpx-view");
+  app.set_version_flag("--version", "jfpx-view " JFPX_VERSION);
+  std::string precision(tool::kPrecision);
+  const CLI::Option* precision_option =
+      app.add_option("--precision", precision, "float or double; a recording has its own precision")
+          ->check(CLI::IsMember({"float", "double"}))
+          ->capture_default_str();
+  app.footer(
+      "Examples:\n"
+      "  jfpx-view pile --spheres 2000\n"
+      "  jfpx-view --side-by-side pile\n"
+      "  jfpx-view pile --headless --frames 200 --screenshot pile.png --size 1600x900 --quality "
+      "high\n"
+      "\n"
+      "F1 in the window lists all keys. Exit status: 0 success; 1 a check failed; 2 invalid usage\n"
+      "or input; 3 backend, display or OpenGL not usable.");
+  add_view_options(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? tool::kSuccess : tool::kBadUsage;
+  }
+  options.precision_is_given = !precision_option->empty();
+  return std::nullopt;
 }
 
 void check(const ViewOptions& options) {
   const std::string& scene = options.run.scene;
   if (!options.input.empty() && (options.side_by_side || !tool::is_demo(scene))) {
-    throw InvalidArgument("--input goes with a demo; " + scene + " is a scene");
+    throw InvalidArgument("--input requires a demo; " + scene + " is a scene");
   }
   if (is_recording(scene)) check_recording(options);
   if (options.side_by_side && options.choice.engine != EngineKind::native) {
-    throw InvalidArgument("--side-by-side shows all engines: --engine can't choose one");
+    throw InvalidArgument("--side-by-side runs all engines; it can't be combined with --engine");
   }
-  if (shows_demo(options)) check_demo(options);
-  if (!options.recording.empty() && (options.side_by_side || shows_demo(options))) {
+  if (selects_demo(options)) check_demo(options);
+  if (!options.recording.empty() && (options.side_by_side || selects_demo(options))) {
     throw InvalidArgument(options.recording + ": only a scene on one engine can be recorded");
   }
   if (options.eye.has_value() != options.target.has_value()) {
-    throw InvalidArgument("--eye and --target go together");
+    throw InvalidArgument("--eye and --target must be given together");
   }
   if (options.eye && length(*options.target - *options.eye) <= kEpsilon) {
     throw InvalidArgument("--eye and --target are the same point");
   }
   if (options.paused && (options.headless || !options.render)) {
-    throw InvalidArgument("--paused goes with a window");
+    throw InvalidArgument("--paused requires a window");
   }
   if (!options.render && (!options.screenshot.empty() || !options.record.empty())) {
-    throw InvalidArgument("--no-render draws nothing that --screenshot or --record could write");
+    throw InvalidArgument("--no-render can't be combined with --screenshot or --record");
   }
 }
 

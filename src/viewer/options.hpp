@@ -1,10 +1,10 @@
-/// The command line of jfpx-view.
+/// Options of jfpx-view, and the parser of its command line.
 #pragma once
 
-#include "src/tool/options.hpp"
+#include "src/tool/run_options.hpp"
+#include "src/viewer/colouring.hpp"
 #include "src/viewer/renderer.hpp"
 #include "src/viewer/run.hpp"
-#include "src/viewer/stage.hpp"
 
 #include <optional>
 
@@ -17,30 +17,32 @@ struct Size {
 };
 
 struct ViewOptions {
-  tool::RunOptions run;  ///< which scene
+  tool::RunOptions run;  ///< selects the scene
   EngineChoice choice;
   bool side_by_side = false;
   bool headless = false;
-  std::optional<std::uint64_t> frames;  ///< steps before the last picture
-  std::string screenshot;               ///< PNG of the last frame
-  std::string record;                   ///< folder for numbered PNGs
-  std::string recording;                ///< file for the states of all steps
+  std::optional<std::uint64_t> frames;  ///< number of steps
+  std::string screenshot;               ///< PNG file of the last picture
+  std::string record;                   ///< folder of numbered PNG files
+  std::string recording;                ///< file of the states of all steps
   Size size;
   Quality quality = kMediumQuality;
   Colouring colouring = Colouring::bodies;
-  bool contacts = false;  ///< draw them
-  bool forces = false;    ///< likewise
-  bool panel = false;     ///< show it in headless pictures
-  bool render = true;     ///< the thesis' switch "rendering on / off"
+  bool contacts = false;  ///< draw contacts
+  bool forces = false;    ///< draw forces
+  bool panel = false;     ///< show the panel in headless pictures
+  bool render = true;     ///< "rendering on / off" of the thesis
   bool fullscreen = false;
-  bool paused = false;  ///< at first
-  std::string input;    ///< file with an input script, for a demo
+  bool paused = false;  ///< start paused
+  std::string input;    ///< input script of a demo
   std::optional<Vec3> eye, target;
+  bool precision_is_given = false;  ///< --precision, which overrides that of a recording
 };
 
-/// Fills `app` with options that write to `options`, which must outlive it.
-void add_view_options(CLI::App& app, ViewOptions& options);
-/// Checks what depends on more than one option. @throws InvalidArgument
+/// Parses the command line; prints the help, the version or an error message.
+/// @return the exit status if the program must end, otherwise nothing
+std::optional<int> parse_command_line(int argc, char** argv, ViewOptions& options);
+/// Checks combinations of options. @throws InvalidArgument
 void check(const ViewOptions& options);
 
 }  // namespace view

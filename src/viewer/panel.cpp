@@ -1,8 +1,7 @@
-/// The panel of a run: what runs, on what, how fast, and what is known about a body.
+/// The panel of a run: controls, scene, engine, settings, counters, and the picked body.
 #include <jfpx/error.hpp>
 
-#include "src/viewer/scene_choice.hpp"
-#include "src/viewer/scene_show.hpp"
+#include "src/viewer/scene_viewer.hpp"
 #include "src/viewer/widgets.hpp"
 
 #include <fmt/format.h>
@@ -18,17 +17,17 @@ namespace view {
 namespace {
 
 constexpr float kWidth = 330;      // [units]
-constexpr float kItemWidth = 170;  // of a slider or a field, its label not counted
+constexpr float kItemWidth = 170;  // of a slider or a field without its label
 constexpr float kTextWidth = 320;
 constexpr float kTableWidth = 300;
-constexpr float kMargin = 12;        // between a panel and the window's edge
-constexpr double kUnnoticed = 0.95;  // share of the speed that was asked for
+constexpr float kMargin = 12;          // between a panel and the edge of the window
+constexpr double kAsRequested = 0.95;  // fraction of the requested speed
 constexpr std::uint64_t kMaxSpheres = 2'000'000;
 
-/// A slider over a Real. @return whether the user has let go of a new value.
+/// A slider for a Real. @return true when the user releases a changed value
 bool slide(const char* label, Real* value, float low, float high) {
   auto number = static_cast<float>(*value);
-  if (widget::slider(label, &number, low, high, "%.5f")) {  // to which it is rounded
+  if (widget::slider(label, &number, low, high, "%.5f")) {  // also rounds the value
     *value = static_cast<Real>(std::clamp(number, low, high));
   }
   return ImGui::IsItemDeactivatedAfterEdit();
@@ -36,7 +35,7 @@ bool slide(const char* label, Real* value, float low, float high) {
 
 }  // namespace
 
-void SceneShow::panel() {
+void SceneViewer::panel() {
   ImGui::SetNextWindowPos({kMargin, kMargin}, ImGuiCond_FirstUseEver);
   ImGui::SetNextWindowSize({kWidth, 0}, ImGuiCond_FirstUseEver);
   if (ImGui::Begin("jfpx", nullptr, ImGuiWindowFlags_AlwaysAutoResize)) {
@@ -47,7 +46,7 @@ void SceneShow::panel() {
       show_engine_choice();
       show_settings();
     } catch (const Error& error) {
-      message = error.what();  // what was asked for can't be had; the run goes on as before
+      message = error.what();  // the request failed; the run is unchanged
       fill_fields();
     }
     if (!message.empty()) widget::warning(message, kTextWidth);
@@ -58,16 +57,16 @@ void SceneShow::panel() {
   show_picked();
 }
 
-void SceneShow::fill_fields() {
+void SceneViewer::fill_fields() {
   const auto& bodies = player_.scene().bodies;
-  wanted_spheres_ = static_cast<std::uint64_t>(std::count_if(
+  sphere_field_ = static_cast<std::uint64_t>(std::count_if(
       bodies.begin(), bodies.end(),
       [](const BodyDef& body) { return std::holds_alternative<Sphere>(body.shape); }));
-  wanted_seed_ = options_.run.seed;
-  wanted_settings_ = player_.settings();
+  seed_field_ = options_.run.seed;
+  settings_field_ = player_.settings();
 }
 
-void SceneShow::show_controls() {
+void SceneViewer::show_controls() {
   show_run_buttons(true);
   for (const auto& [label, command] :
        {std::pair("Picture", Command::screenshot), std::pair("Film", Command::record),
@@ -79,97 +78,97 @@ void SceneShow::show_controls() {
   if (widget::slider("speed", &rate, 0.01f, 4, "%.2f x")) {
     speed = static_cast<double>(rate);
   }
-  if (clock_.kept() < kUnnoticed) {
-    widget::text(fmt::format("too slow for that: {:.2f} x", speed * clock_.kept()));
+  if (clock_.kept() < kAsRequested) {
+    widget::text(fmt::format("too slow: {:.2f} x", speed * clock_.kept()));
   }
   widget::text(fmt::format("step {}, {:.2f} s{}", player_.shown().step, player_.shown().time,
-                           player_.in_the_past() ? "  (looking back)"
+                           player_.in_the_past() ? "  (history)"
                            : player_.at_end()    ? "  (end of recording)"
                                                  : ""));
 }
 
-void SceneShow::show_scene_choice() {
+void SceneViewer::show_scene_choice() {
   if (!widget::heading("Scene", true)) return;
-  ViewOptions wish = options_;
-  wish.choice = player_.choice();
+  ViewOptions request = options_;
+  request.choice = player_.choice();
   bool changed = false;
   if (const auto chosen = choose_scene(player_.scene().name)) {
-    wish.run.scene = *chosen;
-    wish.run.spheres.reset();
-    wish.run.boxes.reset();
+    request.run.scene = *chosen;
+    request.run.spheres.reset();
+    request.run.boxes.reset();
     changed = true;
   }
-  if (widget::number("spheres", &wanted_spheres_)) {
-    wish.run.spheres = static_cast<std::uint32_t>(std::min(wanted_spheres_, kMaxSpheres));
+  if (widget::number("spheres", &sphere_field_)) {
+    request.run.spheres = static_cast<std::uint32_t>(std::min(sphere_field_, kMaxSpheres));
     changed = true;
   }
-  if (widget::number("seed", &wanted_seed_)) {
-    wish.run.seed = wanted_seed_;
+  if (widget::number("seed", &seed_field_)) {
+    request.run.seed = seed_field_;
     changed = true;
   }
   if (!changed) return;
   message.clear();
-  if (is_playable(wish.run.scene)) {  // which takes less
-    wish.choice.engine = EngineKind::native;
-    wish.run.no_sleep = false;
-    wish.colouring = Colouring::bodies;
+  if (is_playable(request.run.scene)) {  // demos do not support these options
+    request.choice.engine = EngineKind::native;
+    request.run.no_sleep = false;
+    request.colouring = Colouring::bodies;
   }
-  next = wish;
-  fill_fields();  // which stay if that can't be had
+  next = request;
+  fill_fields();  // remain if the request fails
 }
 
-void SceneShow::show_engine_choice() {
+void SceneViewer::show_engine_choice() {
   if (!widget::heading("Engine", true)) return;
-  EngineChoice wish = player_.choice();
-  int engine = static_cast<int>(wish.engine);
+  EngineChoice request = player_.choice();
+  int engine = static_cast<int>(request.engine);
   for (int i = 0; i < 3; ++i) {
     if (!has_engine(static_cast<EngineKind>(i))) continue;
     if (i > 0) ImGui::SameLine();
-    widget::radio(kEngineNames[static_cast<std::size_t>(i)].data(), &engine, i);
+    widget::radio(tool::kEngineNames[i], &engine, i);
   }
-  wish.engine = static_cast<EngineKind>(engine);
-  int backend = static_cast<int>(wish.backend);
+  request.engine = static_cast<EngineKind>(engine);
+  int backend = static_cast<int>(request.backend);
   for (int i = 0; i < 3; ++i) {
     if (i > 0) ImGui::SameLine();
     widget::radio(to_string(static_cast<Backend>(i)).data(), &backend, i);
   }
-  wish.backend = static_cast<Backend>(backend);
-  if (wish.engine == EngineKind::bullet) {
-    widget::check("jfpx' solver", &wish.jfpx_solver);
+  request.backend = static_cast<Backend>(backend);
+  if (request.engine == EngineKind::bullet) {
+    widget::check("jfpx solver", &request.jfpx_solver);
     ImGui::SameLine();
-    widget::check("jfpx' world", &wish.jfpx_world);
+    widget::check("jfpx world", &request.jfpx_world);
   }
-  if (wish == player_.choice()) return;
-  message = player_.switch_to(wish) ? "Switched: the bits stay the same."
-                                    : "Another engine goes on from the same state.";
+  if (request == player_.choice()) return;
+  message = player_.switch_to(request) ? "Switched; the bits are unchanged."
+                                       : "Another engine continues from the same state.";
 }
 
-void SceneShow::show_settings() {
+void SceneViewer::show_settings() {
   if (!widget::heading("Settings", false)) return;
-  // While a widget is held its value is the user's, and is taken over when he lets go.
-  if (!ImGui::IsAnyItemActive()) wanted_settings_ = player_.settings();
-  bool changed = slide("dt [s]", &wanted_settings_.dt, 1e-4f, 0.05f);
-  std::uint64_t iterations = wanted_settings_.resolver.max_iterations;
+  // An active widget holds the user's value, which takes effect when the widget is released.
+  if (!ImGui::IsAnyItemActive()) settings_field_ = player_.settings();
+  bool changed = slide("dt [s]", &settings_field_.dt, 1e-4f, 0.05f);
+  std::uint64_t iterations = settings_field_.resolver.max_iterations;
   changed |= widget::number("iterations, 0 = 8N", &iterations);
   constexpr std::uint64_t kMax = std::numeric_limits<std::uint32_t>::max();
-  wanted_settings_.resolver.max_iterations = static_cast<std::uint32_t>(std::min(iterations, kMax));
-  changed |= slide("velocity eps [m/s]", &wanted_settings_.resolver.velocity_epsilon, 1e-5f, 1);
-  changed |= slide("position eps [m]", &wanted_settings_.resolver.position_epsilon, 1e-5f, 1);
+  settings_field_.resolver.max_iterations = static_cast<std::uint32_t>(std::min(iterations, kMax));
+  changed |= slide("velocity eps [m/s]", &settings_field_.resolver.velocity_epsilon, 1e-5f, 1);
+  changed |= slide("position eps [m]", &settings_field_.resolver.position_epsilon, 1e-5f, 1);
   changed |=
-      slide("restitution from [m/s]", &wanted_settings_.resolver.restitution_velocity, 1e-3f, 5);
-  changed |= slide("sleep eps [m2/s2]", &wanted_settings_.sleep.epsilon, 1e-4f, 5);
-  changed |= widget::check("sleep", &wanted_settings_.sleep.enabled);
-  if (widget::button("The scene's own")) {
-    wanted_settings_ = own_settings_;
+      slide("restitution from [m/s]", &settings_field_.resolver.restitution_velocity, 1e-3f, 5);
+  changed |= slide("sleep eps [m2/s2]", &settings_field_.sleep.epsilon, 1e-4f, 5);
+  changed |= widget::check("sleep", &settings_field_.sleep.enabled);
+  if (widget::button("Scene defaults")) {
+    settings_field_ = scene_settings_;
     changed = true;
   }
   if (!changed) return;
-  player_.set_settings(wanted_settings_);
+  player_.set_settings(settings_field_);
   message.clear();
 }
 
-void SceneShow::show_counters() {
-  const Moment& now = player_.shown();
+void SceneViewer::show_counters() {
+  const Snapshot& now = player_.shown();
   ImGui::Separator();
   const auto awake = std::count(now.awake.begin(), now.awake.end(), std::uint8_t{1});
   widget::text(fmt::format("{} bodies, {} awake, {} contacts", now.states.size(), awake,
@@ -192,7 +191,7 @@ void SceneShow::show_counters() {
     for (std::size_t i = first; i < history.size(); ++i) {
       values[i - first] = static_cast<float>(history[i].times.*field);
     }
-    // What stands behind ### keeps the plot the same one while its label changes.
+    // The text after ### is the identity of the plot, which is constant while the label changes.
     const std::string label = fmt::format("{:.3f} ms {}###{}", now.times.*field, name, name);
     ImGui::PlotLines(label.c_str(), values.data(), static_cast<int>(values.size()), 0, nullptr, 0,
                      FLT_MAX, {kItemWidth, 26});
@@ -209,9 +208,9 @@ void SceneShow::show_counters() {
   widget::check("forces", &forces);
 }
 
-void SceneShow::show_picked() {
+void SceneViewer::show_picked() {
   if (!picked_) return;
-  // What stands behind ### keeps the window the same one for all bodies.
+  // The text after ### is the identity of the window, which is the same for all bodies.
   const std::string title = fmt::format("body {}###body", *picked_);
   ImGui::SetNextWindowPos({ImGui::GetIO().DisplaySize.x - kMargin, kMargin}, ImGuiCond_Always,
                           {1, 0});
@@ -222,8 +221,8 @@ void SceneShow::show_picked() {
   ImGui::End();
 }
 
-void SceneShow::show_body(std::uint32_t body) {
-  const Moment& now = player_.shown();
+void SceneViewer::show_body(std::uint32_t body) {
+  const Snapshot& now = player_.shown();
   const BodyState& state = now.states[body];
   widget::text(fmt::format("at ({:.3f}, {:.3f}, {:.3f})", state.position.x, state.position.y,
                            state.position.z));
@@ -236,10 +235,11 @@ void SceneShow::show_body(std::uint32_t body) {
   for (const char* head : {"with", "depth [mm]", "normal"}) ImGui::TableSetupColumn(head);
   ImGui::TableHeadersRow();
   for (const Contact& contact : now.contacts) {
-    if (contact.a != body && contact.b != body) continue;
-    const Vec3 n = contact.a == body ? contact.normal : -contact.normal;
+    const std::uint32_t a = contact.a.index, b = contact.b.index;
+    if (a != body && b != body) continue;
+    const Vec3 n = a == body ? contact.normal : -contact.normal;
     ImGui::TableNextColumn();
-    widget::text(fmt::format("{}", contact.a == body ? contact.b : contact.a));
+    widget::text(fmt::format("{}", a == body ? b : a));
     ImGui::TableNextColumn();
     widget::text(fmt::format("{:.3f}", -contact.distance * 1000));
     ImGui::TableNextColumn();

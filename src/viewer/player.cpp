@@ -1,4 +1,4 @@
-/// Plays a run.
+/// Playback of a run: steps forward, and backward through a history.
 #include "src/viewer/player.hpp"
 
 #include <jfpx/error.hpp>
@@ -8,13 +8,13 @@ inline namespace JFPX_ABI {
 namespace view {
 namespace {
 
-std::size_t bytes_of(const Moment& moment) {
-  return sizeof moment + moment.states.size() * (sizeof(BodyState) + 1) +
-         moment.contacts.size() * sizeof(Contact);
+std::size_t bytes_of(const Snapshot& snapshot) {
+  return sizeof snapshot + snapshot.states.size() * (sizeof(BodyState) + 1) +
+         snapshot.contacts.size() * sizeof(Contact);
 }
 
 constexpr const char* kNotOneRun =
-    "another engine or other settings went on with the run: no replay could";
+    "the engine or the settings changed during the run, which can't be replayed";
 
 [[noreturn]] void refuse_recording(const std::string& path, const char* why) {
   throw InvalidArgument(path + ": " + why);
@@ -24,12 +24,12 @@ constexpr const char* kNotOneRun =
 
 Player::Player(std::unique_ptr<Run> run, Scene scene)
     : scene_(std::move(scene)), run_(std::move(run)) {
-  keep(run_->moment());
+  keep(run_->snapshot());
 }
 
-void Player::keep(Moment moment) {
-  bytes_ += bytes_of(moment);
-  history_.push_back(std::move(moment));
+void Player::keep(Snapshot snapshot) {
+  bytes_ += bytes_of(snapshot);
+  history_.push_back(std::move(snapshot));
   while (history_.size() > 2 && (bytes_ > kHistoryBytes || history_.size() > kHistoryLength)) {
     bytes_ -= bytes_of(history_.front());
     history_.pop_front();
@@ -44,11 +44,11 @@ void Player::step() {
     return;
   }
   run_->step();
-  Moment moment = run_->moment();
-  moment.dt = scene_.dt;
-  moment.time = history_.back().time + static_cast<double>(scene_.dt);
-  if (recording_) recording_->append(moment.states);
-  keep(std::move(moment));
+  Snapshot snapshot = run_->snapshot();
+  snapshot.dt = scene_.dt;
+  snapshot.time = history_.back().time + static_cast<double>(scene_.dt);
+  if (recording_) recording_->append(snapshot.states);
+  keep(std::move(snapshot));
 }
 
 bool Player::step_back() {
@@ -61,7 +61,7 @@ void Player::restart() {
   if (!run_->rewind()) run_ = make_run(scene_, run_->choice());
   history_.clear();
   bytes_ = 0;
-  keep(run_->moment());
+  keep(run_->snapshot());
   changed_ = false;
   if (!recording_path_.empty()) record_to(recording_path_);
 }
@@ -69,7 +69,7 @@ void Player::restart() {
 bool Player::switch_to(const EngineChoice& choice) {
   if (choice == run_->choice()) return true;
   if (run_->switch_to(choice)) return true;
-  go_on_with(scene_, choice);
+  continue_with(scene_, choice);
   return false;
 }
 
@@ -79,10 +79,10 @@ void Player::set_settings(const RunSettings& settings) {
   changed.resolver = settings.resolver;
   changed.sleep = settings.sleep;
   validate(changed);
-  go_on_with(std::move(changed), run_->choice());
+  continue_with(std::move(changed), run_->choice());
 }
 
-void Player::go_on_with(Scene scene, const EngineChoice& choice) {
+void Player::continue_with(Scene scene, const EngineChoice& choice) {
   run_ = continue_run(scene, history_.back(), choice);
   scene_ = std::move(scene);
   shown_ = history_.size() - 1;
@@ -91,14 +91,15 @@ void Player::go_on_with(Scene scene, const EngineChoice& choice) {
 }
 
 RecordingHeader Player::header() const {
-  return {.engine = std::string(kEngineNames[static_cast<std::size_t>(run_->choice().engine)]),
+  return {.engine = std::string(to_string(run_->choice().engine)),
           .backend = std::string(to_string(run_->choice().backend)),
           .scene = scene_};
 }
 
 void Player::save_recording(const std::string& path) const {
   if (changed_) refuse_recording(path, kNotOneRun);
-  if (history_.front().step != 0) refuse_recording(path, "the first steps are no longer kept");
+  if (history_.front().step != 0)
+    refuse_recording(path, "the first steps are no longer in the history");
   RecordingWriter recording(path, header());
   for (std::size_t i = 1; i < history_.size(); ++i) recording.append(history_[i].states);
   recording.finish();
@@ -106,7 +107,7 @@ void Player::save_recording(const std::string& path) const {
 
 void Player::record_to(const std::string& path) {
   recording_path_ = path;
-  recording_.reset();  // removes its part, which lies where that of the next one will
+  recording_.reset();  // removes its temporary file, whose name the next writer uses
   recording_.emplace(path, header());
 }
 

@@ -1,5 +1,4 @@
-/// A recording as a run: its states one after another.
-#include <jfpx/error.hpp>
+/// A recording as a run, which returns its states in order.
 #include <jfpx/recording.hpp>
 
 #include "src/viewer/run.hpp"
@@ -12,7 +11,7 @@ namespace {
 class RecordedRun final : public Run {
  public:
   explicit RecordedRun(RecordingReader recording) : recording_(std::move(recording)) {
-    choice_.engine = parse_engine(recording_.header().engine);
+    choice_.engine = tool::parse_engine(recording_.header().engine);
     if (const auto backend = parse_backend(recording_.header().backend)) choice_.backend = *backend;
     rewind();
   }
@@ -20,13 +19,13 @@ class RecordedRun final : public Run {
   void step() override { states_ = recording_.states(++step_); }
   bool at_end() const override { return step_ == recording_.steps(); }
 
-  Moment moment() override {
-    Moment moment;
-    moment.step = step_;
-    moment.states = states_;
-    moment.awake.assign(states_.size(), 1);
-    moment.computed_by = "the recording";
-    return moment;
+  Snapshot snapshot() override {
+    Snapshot snapshot;
+    snapshot.step = step_;
+    snapshot.states = states_;
+    snapshot.awake.assign(states_.size(), 1);
+    snapshot.computed_by = "the recording";
+    return snapshot;
   }
 
   bool rewind() override {

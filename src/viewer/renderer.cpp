@@ -1,5 +1,5 @@
-/// Draws pictures with OpenGL 3.3, in passes: shadow map, depth and normals, ambient occlusion,
-/// colour, tone mapping.
+/// OpenGL 3.3 renderer. Its passes are shadow map, depth and normals, ambient occlusion, colour,
+/// and tone mapping.
 #include "src/viewer/renderer.hpp"
 
 #include <jfpx/error.hpp>
@@ -22,7 +22,7 @@ enum Pass { kShadowPass, kGeometryPass, kColourPass, kPasses };
 constexpr const char* kPassDefines[kPasses] = {"#define SHADOW_PASS\n", "#define GEOMETRY_PASS\n",
                                                "#define COLOUR_PASS\n"};
 
-/// Buffers of one size.
+/// Render targets of one size.
 struct Targets {
   int width, height;
   GlTexture normals, depth, occlusion, blurred, light;
@@ -81,7 +81,8 @@ void bind_texture(GLenum unit, const GlTexture& texture) {
 
 void draw_screen() { glDrawArrays(GL_TRIANGLES, 0, 3); }
 
-/// The view with a near plane that cuts off nothing as far away as that, in the corners too.
+/// The view with a near plane that does not clip anything at the distance `nearest` or beyond, even
+/// in the corners.
 View clear_of(float nearest, View view, Real aspect) {
   const Real tangent = std::tan(view.fov_y / 2);
   const Real to_corner = std::sqrt(1 + tangent * tangent * (1 + aspect * aspect));
@@ -167,7 +168,7 @@ struct Renderer::Impl {
     program.use();
     glBindVertexArray(empty.name());
     for (const GroundItem& item : drawing.grounds()) {
-      if (!(item.height > 0)) continue;  // seen from inside
+      if (!(item.height > 0)) continue;  // invisible from below
       glUniform4f(program.at("plane"), item.normal[0], item.normal[1], item.normal[2], item.height);
       glUniform4f(program.at("grid_u"), item.u[0], item.u[1], item.u[2], item.eye_u);
       glUniform4f(program.at("grid_v"), item.v[0], item.v[1], item.v[2], item.eye_v);
@@ -182,7 +183,7 @@ struct Renderer::Impl {
     glViewport(0, 0, shadow_map->size, shadow_map->size);
     glClear(GL_DEPTH_BUFFER_BIT);
     if (quality.shadow_size == 0) return;
-    glEnable(GL_DEPTH_CLAMP);  // what stands between the sun and the map shades too
+    glEnable(GL_DEPTH_CLAMP);  // casters between the sun and the shadow map count
     draw_bodies(kShadowPass);
     glDisable(GL_DEPTH_CLAMP);
   }
@@ -234,7 +235,7 @@ struct Renderer::Impl {
     line.use();
     glUniform1f(line.at("opacity"), 1.0f);
     lines.draw();
-    // What bodies hide shows through them, faintly: contacts lie inside.
+    // Hidden lines are drawn faintly, because contacts lie inside bodies.
     glUniform1f(line.at("opacity"), 0.4f);
     glDisable(GL_DEPTH_TEST);
     lines.draw();
@@ -276,7 +277,7 @@ GLuint Renderer::resident_spheres(std::size_t count) {
 
 void Renderer::draw(const Drawing& drawing, const View& view, const Viewport& viewport,
                     GLuint framebuffer) {
-  if (viewport.width <= 0 || viewport.height <= 0) return;  // no room left
+  if (viewport.width <= 0 || viewport.height <= 0) return;  // nothing is visible
   Impl& r = *impl_;
   r.resize(viewport.width * r.quality.supersample, viewport.height * r.quality.supersample);
   r.upload(drawing, view, viewport);
@@ -291,6 +292,29 @@ void Renderer::draw(const Drawing& drawing, const View& view, const Viewport& vi
   r.draw_occlusion(drawing);
   r.draw_colours(drawing);
   r.resolve_to(viewport, framebuffer);
+}
+
+OffscreenFramebuffer::OffscreenFramebuffer(int width, int height)
+    : width_(width),
+      height_(height),
+      colour_(make_texture(GL_RGBA8, width, height)),
+      framebuffer_(make_framebuffer(colour_.name(), 0)) {}
+
+Image OffscreenFramebuffer::read_pixels(GLuint framebuffer, int width, int height) {
+  Image image{width, height, {}};
+  const auto row = static_cast<std::size_t>(width) * 3;
+  image.rgb.resize(row * static_cast<std::size_t>(height));
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
+  glReadBuffer(framebuffer == 0 ? GL_BACK : GL_COLOR_ATTACHMENT0);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, width, height, GL_RGB, GL_UNSIGNED_BYTE, image.rgb.data());
+  // The rows of OpenGL start at the bottom.
+  for (std::size_t y = 0; y < static_cast<std::size_t>(height) / 2; ++y) {
+    std::uint8_t* upper = &image.rgb[y * row];
+    std::swap_ranges(upper, upper + row,
+                     &image.rgb[(static_cast<std::size_t>(height) - 1 - y) * row]);
+  }
+  return image;
 }
 
 }  // namespace view

@@ -1,4 +1,4 @@
-/// Draws pictures with OpenGL 3.3: ray-cast spheres, boxes, grounds, soft shadows.
+/// OpenGL 3.3 renderer: ray-cast spheres, boxes, grounds, soft shadows.
 #pragma once
 
 #include "src/viewer/camera.hpp"
@@ -12,13 +12,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// What beauty may cost.
+/// Quality settings of a picture.
 struct Quality {
-  int supersample = 1;         ///< samples along an edge of a pixel, all shaded
-  int samples = 4;             ///< multisampling of edges
-  int shadow_size = 2048;      ///< texels along an edge of the shadow map; 0 for none
-  int shadow_taps = 16;        ///< for each of the two loops of a soft shadow
-  int occlusion_samples = 12;  ///< 0 for no ambient occlusion
+  int supersample = 1;         ///< shaded samples per pixel along each axis
+  int samples = 4;             ///< samples of multisample anti-aliasing
+  int shadow_size = 2048;      ///< width of the shadow map [texels]; 0: no shadows
+  int shadow_taps = 16;        ///< in each of the two loops of a soft shadow
+  int occlusion_samples = 12;  ///< 0: no ambient occlusion
   friend bool operator==(const Quality&, const Quality&) = default;
 };
 inline constexpr Quality kLowQuality{1, 4, 1024, 4, 0};
@@ -28,11 +28,11 @@ inline constexpr Quality kHighQuality{2, 4, 4096, 24, 24};
 /// A rectangle of the output, in pixels from its lower left corner.
 struct Viewport {
   int x = 0, y = 0, width = 0, height = 0;
-  float unit = 1;  ///< pixels that widths of lines are counted in
+  float unit = 1;  ///< unit of line widths [pixels]
 };
 
-/// Needs a current context for its whole life. A picture takes one draw call a kind of item and
-/// pass, whatever the number of bodies.
+/// Draws pictures. Requires a current context for its lifetime. A picture takes one draw call per
+/// kind of item and pass, independent of the number of bodies.
 class Renderer {
  public:
   explicit Renderer(const Quality& quality = {});
@@ -43,8 +43,8 @@ class Renderer {
   void set_quality(const Quality& quality);
   const Quality& quality() const;
 
-  /// Room for spheres that somebody else writes, CUDA for example: they are in every picture,
-  /// besides those of the drawing. @return a buffer of that many SphereItems, of the renderer
+  /// Allocates `count` SphereItems that the caller writes, for example with CUDA. They are part of
+  /// every picture, in addition to the drawing. @return the buffer, which the renderer owns
   GLuint resident_spheres(std::size_t count);
 
   /// Draws into the viewport of a framebuffer; 0 is the window.
@@ -56,16 +56,16 @@ class Renderer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A framebuffer without a window, whose pixels can be read.
-class Canvas {
+/// A framebuffer without a window, for reading its pixels.
+class OffscreenFramebuffer {
  public:
-  Canvas(int width, int height);
+  OffscreenFramebuffer(int width, int height);
   int width() const { return width_; }
   int height() const { return height_; }
   GLuint framebuffer() const { return framebuffer_.name(); }
   Image read() const { return read_pixels(framebuffer(), width_, height_); }
 
-  /// The lower left part of a framebuffer.
+  /// Reads the lower left part of a framebuffer.
   static Image read_pixels(GLuint framebuffer, int width, int height);
 
  private:

@@ -1,9 +1,5 @@
-/// Makes runs.
+/// Creation of runs.
 #include "src/viewer/run.hpp"
-
-#include <jfpx/error.hpp>
-
-#include <string>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -20,19 +16,11 @@ std::unique_ptr<Run> make_run_from(const Scene& scene, const EngineChoice& choic
 
 }  // namespace
 
-EngineKind parse_engine(std::string_view name) {
-  for (const EngineKind kind : {EngineKind::native, EngineKind::bullet, EngineKind::bullet_stock}) {
-    if (name == kEngineNames[static_cast<std::size_t>(kind)]) return kind;
-  }
-  throw InvalidArgument("engine is \"" + std::string(name) +
-                        "\"; it must be native, bullet or bullet-stock");
-}
-
 std::unique_ptr<Run> make_run(const Scene& scene, const EngineChoice& choice) {
   return make_run_from(scene, choice, 0);
 }
 
-std::unique_ptr<Run> continue_run(const Scene& scene, const Moment& from,
+std::unique_ptr<Run> continue_run(const Scene& scene, const Snapshot& from,
                                   const EngineChoice& choice) {
   return make_run_from(with_states(scene, from.states), choice, from.step);
 }

@@ -1,9 +1,10 @@
-/// A scene that runs on one engine, whichever it is.
+/// Interface of a scene that runs on one of the engines.
 #pragma once
 
 #include <jfpx/backend.hpp>
 
-#include "src/viewer/moment.hpp"
+#include "src/tool/run_options.hpp"
+#include "src/viewer/snapshot.hpp"
 
 #include <memory>
 #include <string>
@@ -13,18 +14,16 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-enum class EngineKind : std::uint8_t { native, bullet, bullet_stock };
-inline constexpr std::string_view kEngineNames[] = {"native", "bullet", "bullet-stock"};
+using tool::EngineKind;
 
-/// @throws InvalidArgument for a name that is not in kEngineNames.
-EngineKind parse_engine(std::string_view name);
-
+/// The engine of a run and its settings. Another choice with the same kind of engine keeps the
+/// bits.
 struct EngineChoice {
   EngineKind engine = EngineKind::native;
-  Backend backend = Backend::automatic;  ///< of sphere contacts, and of rows of Bullet's solver
-  unsigned threads = 1;                  ///< x86, 0 = one per core
-  bool jfpx_solver = true, jfpx_world = true;  ///< of EngineKind::bullet; else Bullet's own
-  std::size_t minimum_batch = 0;               ///< likewise: less is left to Bullet's own code
+  Backend backend = Backend::automatic;  ///< of sphere contacts, and of jfpx's solver in Bullet
+  unsigned threads = 1;                  ///< on the CPU; 0: one per core
+  bool jfpx_solver = true, jfpx_world = true;  ///< parts of EngineKind::bullet; false: Bullet's
+  std::size_t minimum_batch = 0;               ///< smaller work is left to Bullet's own code
   friend bool operator==(const EngineChoice&, const EngineChoice&) = default;
 };
 
@@ -32,35 +31,37 @@ class Run {
  public:
   virtual ~Run() = default;
   virtual void step() = 0;
-  /// No step is left: a recording is over.
+  /// True at the end of a recording, after which no step follows.
   virtual bool at_end() const { return false; }
-  virtual Moment moment() = 0;
-  /// Goes back to the first step. @return false if a run of the scene that is made anew does that.
+  virtual Snapshot snapshot() = 0;
+  /// Returns to the first step. @return false if the caller must create a new run instead.
   virtual bool rewind() { return false; }
   virtual EngineChoice choice() const = 0;
-  /// Goes on with another choice and the same bits: everything that the engine remembers stays.
-  /// @return false if that takes another engine; the run is as before.
-  /// @throws BackendUnavailable; the run is as before.
+  /// Continues with another choice. The internal state of the engine is kept, and so are the bits.
+  /// @return false if another engine is necessary; the run is unchanged
+  /// @throws BackendUnavailable; the run is unchanged
   virtual bool switch_to(const EngineChoice& choice) = 0;
 };
 
 /// @throws InvalidScene, BackendUnavailable, OutOfMemory
 std::unique_ptr<Run> make_run(const Scene& scene, const EngineChoice& choice);
-/// A run whose states are in a file. It has no contacts; another engine or backend goes on live.
+/// A run whose states are read from a file. It has no contacts. Another engine or backend continues
+/// it by simulation.
 struct Recorded {
   Scene scene;
   std::unique_ptr<Run> run;
 };
 /// @throws FileError
 Recorded open_recording(const std::string& path);
-/// Whether a scene's name is that of a recording: it ends with ".rec".
+/// True if the name of a scene is that of a recording, which ends with ".rec".
 bool is_recording(std::string_view scene);
 
-/// Engines that this build has, in the order of EngineKind.
+/// True if this build contains the engine.
 bool has_engine(EngineKind engine);
 
-/// A run with the scene's settings that starts from the states of another. The step counts on.
-std::unique_ptr<Run> continue_run(const Scene& scene, const Moment& from,
+/// Creates a run with the settings of the scene that starts from a snapshot and continues its step
+/// count.
+std::unique_ptr<Run> continue_run(const Scene& scene, const Snapshot& from,
                                   const EngineChoice& choice);
 
 /// The scene with its bodies in the given states.

@@ -1,12 +1,14 @@
-/// Native jfpx, stock Bullet and Bullet with jfpx in step, one camera, every difference marked.
+/// Viewer of native jfpx, stock Bullet and Bullet with jfpx in lockstep, with all differences
+/// marked.
 #include <jfpx/bullet/scene_world.hpp>
 #include <jfpx/bullet/verify.hpp>
 
-#include "src/viewer/bullet_moment.hpp"
+#include "src/viewer/bullet_run.hpp"
 #include "src/viewer/comparison.hpp"
 #include "src/viewer/framing.hpp"
-#include "src/viewer/show.hpp"
+#include "src/viewer/scene_painter.hpp"
 #include "src/viewer/timing.hpp"
+#include "src/viewer/viewer.hpp"
 
 #include <fmt/format.h>
 
@@ -24,14 +26,14 @@ namespace {
 enum Column : std::size_t { kNative, kStock, kJfpx, kColumns };
 constexpr std::array<const char*, kColumns> kTitles = {"native jfpx", "stock Bullet",
                                                        "Bullet with jfpx"};
-/// Of native and of Bullet, which both of its columns share.
+/// Colours of the paths of native jfpx and of Bullet; both Bullet columns share one.
 constexpr std::array<Paint, 2> kTrails = {{{255, 170, 40}, {90, 190, 255}}};
-constexpr std::size_t kTraced = 6;     // bodies whose paths are drawn
+constexpr std::size_t kTraced = 6;     // number of bodies with drawn paths
 constexpr std::size_t kTrail = 240;    // steps of a path
 constexpr std::size_t kPlotted = 600;  // steps of a plot
-constexpr std::size_t kTimed = 60;     // steps whose median time is shown
-constexpr float kWideColumn = 260;     // [units] that have room for large titles
-constexpr float kStrip = 0.26f;        // share of the height below the pictures
+constexpr std::size_t kTimed = 60;     // steps of the displayed median time
+constexpr float kWideColumn = 260;     // smallest width for large titles [units]
+constexpr float kStrip = 0.26f;        // fraction of the height below the pictures
 
 bullet::SceneWorld make_stock_world(const Scene& scene) {
   return bullet::SceneWorld(scene, {.dispatcher = bullet::DispatcherKind::stock,
@@ -43,17 +45,17 @@ bullet::SceneWorld make_jfpx_world(const Scene& scene, const EngineChoice& choic
   bullet::SceneWorldOptions world = world_options(choice);
   if (!choice.jfpx_solver) world.solver = bullet::SolverKind::stock;
   if (!choice.jfpx_world) world.world = bullet::WorldKind::stock;
-  // By default 0: small scenes would compare Bullet's code with itself.
+  // The default is 0, because small scenes would compare Bullet's code with itself.
   world.dispatch.minimum_batch = world.solve.minimum_batch = choice.minimum_batch;
   return bullet::SceneWorld(scene, world);
 }
 
-/// The three engines, in step, and what was found about them.
+/// The three engines in lockstep, and the differences between them.
 struct Trio {
   std::unique_ptr<Run> native;
   bullet::SceneWorld stock, jfpx;
   bullet::ContactCheck check;
-  std::array<Moment, kColumns> before, now;
+  std::array<Snapshot, kColumns> before, now;
   std::vector<Contact> different;  ///< contacts of the last step that only one Bullet world has
   std::uint64_t differences = 0;   ///< of all steps
   std::string first_difference;
@@ -66,7 +68,7 @@ struct Trio {
             make_run(scene, {EngineKind::native, options.choice.backend, options.choice.threads})),
         stock(make_stock_world(scene)),
         jfpx(make_jfpx_world(scene, options.choice)) {
-    look(0);
+    record(0);
     before = now;
   }
 
@@ -78,17 +80,17 @@ struct Trio {
     stock.step();
     check.compare(stock.world(), step);
     jfpx.step();
-    look(step);
+    record(step);
     different = different_contacts(now[kStock].contacts, now[kJfpx].contacts);
     differences += different.size();
-    if (!first_difference.empty()) return;  // all later ones follow from the first
+    if (!first_difference.empty()) return;  // all later differences follow from the first
     const auto difference = bullet::first_difference(stock.world(), jfpx.world(), step);
     if (difference) first_difference = to_text(*difference);
   }
 
  private:
-  void look(std::uint64_t step) {
-    now = {native->moment(), moment_of(stock, step), moment_of(jfpx, step)};
+  void record(std::uint64_t step) {
+    now = {native->snapshot(), snapshot_of(stock, step), snapshot_of(jfpx, step)};
     const Scene& scene = stock.scene();
     for (std::size_t i = 0; i < kColumns; ++i) {
       now[i].dt = scene.dt;
@@ -100,12 +102,12 @@ struct Trio {
   }
 };
 
-class SideBySide final : public Show {
+class SideBySide final : public Viewer {
  public:
   explicit SideBySide(const ViewOptions& options)
       : options_(options),
         scene_(tool::load(options.run)),
-        stage_(scene_),
+        painter_(scene_),
         trio_(std::make_unique<Trio>(scene_, options)) {
     colouring = options.colouring;
     contacts = options.contacts;
@@ -128,7 +130,7 @@ class SideBySide final : public Show {
     column.size.width = std::max(options_.size.width / 3, 1);
     column.size.height =
         std::max(static_cast<int>(static_cast<float>(options_.size.height) * (1 - kStrip)), 1);
-    camera = camera_for(column, scene_, trio_->now[kNative]);
+    camera = initial_camera(column, scene_, trio_->now[kNative]);
   }
   void draw(Renderer& renderer, const Target& target) override;
 
@@ -139,10 +141,10 @@ class SideBySide final : public Show {
   std::uint64_t steps() const override { return trio_->now[kNative].step; }
   double engine_ms() const override {
     double sum = 0;
-    for (const Moment& moment : trio_->now) sum += moment.times.total;
+    for (const Snapshot& snapshot : trio_->now) sum += snapshot.times.total;
     return sum;
   }
-  Real body_size() const override { return stage_.body_size(); }
+  Real body_size() const override { return painter_.body_size(); }
   std::string summary() const override;
 
  private:
@@ -158,7 +160,7 @@ class SideBySide final : public Show {
 
   ViewOptions options_;
   Scene scene_;
-  Stage stage_;
+  ScenePainter painter_;
   std::unique_ptr<Trio> trio_;
   std::array<std::deque<std::vector<Vec3>>, kTrails.size()> trails_;
 };
@@ -188,20 +190,21 @@ void SideBySide::draw_trails(Drawing* drawing) const {
 }
 
 void SideBySide::draw(Renderer& renderer, const Target& target) {
-  options_.size = {target.width, target.height};  // what home() is to fill
+  options_.size = {target.width, target.height};  // for home()
   const int strip = static_cast<int>(static_cast<float>(target.height) * kStrip);
   const int top_height = target.height - strip;
-  const Bounds bounds = stage_.bounds(trio_->now[kNative].states);
+  const Bounds bounds = painter_.bounds(trio_->now[kNative].states);
   const View view = camera.view(bounds.centre, bounds.radius);
   for (std::size_t column = 0; column < kColumns; ++column) {
     Drawing drawing(view.eye);
-    const Moment& now = trio_->now[column];
-    stage_.draw(trio_->before[column], now, share(), colouring, &drawing);
-    if (contacts) stage_.draw_contacts(now.contacts, false, &drawing);
-    if (forces) stage_.draw_forces(trio_->before[column], now, &drawing);
-    if (column != kNative) stage_.draw_contacts(trio_->different, true, &drawing);
+    const Snapshot& now = trio_->now[column];
+    painter_.draw(trio_->before[column], now, share(), colouring, &drawing);
+    if (contacts) painter_.draw_contacts(now.contacts, false, &drawing);
+    if (forces) painter_.draw_forces(trio_->before[column], now, &drawing);
+    if (column != kNative) painter_.draw_contacts(trio_->different, true, &drawing);
     draw_trails(&drawing);
-    // All as wide: the renderer makes new buffers for each other size. They may overlap by a pixel.
+    // Equal widths, because the renderer recreates its buffers when the size changes. The columns
+    // may overlap by a pixel.
     const int width = (target.width + 2) / 3;
     const int left = (target.width - width) * static_cast<int>(column) / 2;
     renderer.draw(drawing, view, {left, strip, width, top_height, target.unit}, target.framebuffer);
@@ -247,7 +250,7 @@ void SideBySide::draw_plots(const Target& target, int top_height) const {
   const auto plot = [&](const char* id, const std::vector<float>& values, const std::string& text) {
     const std::size_t first = values.size() > kPlotted ? values.size() - kPlotted : 0;
     ImGui::BeginGroup();
-    ImGui::AlignTextToFramePadding();  // or the first stands higher than those on its line
+    ImGui::AlignTextToFramePadding();  // aligns the first text with the others
     ImGui::TextUnformatted(text.c_str());
     ImGui::PlotLines(id, values.data() + first, static_cast<int>(values.size() - first), 0, nullptr,
                      FLT_MAX, FLT_MAX, {width, height});
@@ -280,7 +283,7 @@ std::string SideBySide::summary() const {
 
 }  // namespace
 
-std::unique_ptr<Show> make_side_by_side(const ViewOptions& options) {
+std::unique_ptr<Viewer> make_side_by_side(const ViewOptions& options) {
   return std::make_unique<SideBySide>(options);
 }
 

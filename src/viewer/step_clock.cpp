@@ -1,4 +1,4 @@
-/// Turns wall time into whole steps.
+/// Conversion of wall time to fixed steps.
 #include "src/viewer/step_clock.hpp"
 
 #include "src/viewer/timing.hpp"
@@ -11,21 +11,21 @@ inline namespace JFPX_ABI {
 namespace view {
 namespace {
 
-constexpr double kMemory = 0.97;  // from one picture to the next
+constexpr double kDecay = 0.97;  // per picture
 
 }  // namespace
 
-void StepClock::advance(double seconds, double dt, std::uint64_t most,
+void StepClock::advance(double seconds, double dt, std::uint64_t max_steps,
                         const std::function<void()>& step) {
-  const double asked = seconds > 0 && std::isfinite(seconds) ? seconds : 0;
-  rest_ += asked;
-  asked_ = asked_ * kMemory + asked;
-  lost_ *= kMemory;
+  const double elapsed = seconds > 0 && std::isfinite(seconds) ? seconds : 0;
+  rest_ += elapsed;
+  elapsed_ = elapsed_ * kDecay + elapsed;
+  dropped_ *= kDecay;
   Stopwatch watch;
   double spent = 0;
-  for (std::uint64_t made = 0; rest_ >= dt && made < most; ++made) {
-    if (made >= kSureSteps && (spent += watch.lap()) > patience) {
-      lost_ += rest_;
+  for (std::uint64_t made = 0; rest_ >= dt && made < max_steps; ++made) {
+    if (made >= kSureSteps && (spent += watch.lap()) > budget) {
+      dropped_ += rest_;
       rest_ = 0;
       break;
     }

@@ -1,4 +1,4 @@
-/// Turns wall time into whole steps and the share of the next one.
+/// Conversion of wall time to fixed steps and the fraction of the next one.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,25 +12,26 @@ namespace view {
 
 class StepClock {
  public:
-  /// So many steps are made for one picture however long they take.
+  /// Number of steps per picture that are computed regardless of their duration.
   static constexpr std::uint64_t kSureSteps = 8;
 
-  /// Makes the steps of `dt` that are due after `seconds` more, `most` of them at most. Those that
-  /// `patience` has not sufficed for are given up: a machine that is too slow shows slow motion
-  /// instead of freezing. Bad times count as none.
-  void advance(double seconds, double dt, std::uint64_t most, const std::function<void()>& step);
-  /// How far into the step that is shown: 0 to 1.
+  /// Advances by `seconds` and computes the steps of length `dt` that are due, at most `max_steps`.
+  /// Drops steps beyond the time budget, so that a slow machine shows slow motion instead of
+  /// freezing. Negative and non-finite times count as zero.
+  void advance(double seconds, double dt, std::uint64_t max_steps,
+               const std::function<void()>& step);
+  /// Position in the shown step, in [0, 1].
   double share() const { return share_; }
-  /// Which share of the time of late was not given up: 0 to 1.
-  double kept() const { return asked_ > 0 ? 1 - lost_ / asked_ : 1; }
-  /// Shows the step that is shown, whole.
+  /// Fraction of the recent time that was not dropped, in [0, 1].
+  double kept() const { return elapsed_ > 0 ? 1 - dropped_ / elapsed_ : 1; }
+  /// Moves to the end of the shown step.
   void settle() { rest_ = 0, share_ = 1; }
 
-  double patience = 0.03;  ///< [s] of wall clock for the steps of one picture
+  double budget = 0.03;  ///< wall time for the steps of one picture [s]
 
  private:
   double rest_ = 0, share_ = 1;
-  double asked_ = 0, lost_ = 0;  ///< [s]; what is long past fades
+  double elapsed_ = 0, dropped_ = 0;  ///< [s], exponentially weighted sums
 };
 
 }  // namespace view

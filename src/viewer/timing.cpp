@@ -1,4 +1,4 @@
-/// What a run cost.
+/// Durations of steps and pictures for the summary of a run.
 #include "src/viewer/timing.hpp"
 
 #include <fmt/format.h>

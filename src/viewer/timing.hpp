@@ -1,4 +1,5 @@
-/// What a run cost, for the line at its end: the thesis' comparison with rendering on and off.
+/// Durations of steps and pictures for the summary of a run, as in the thesis' comparison with
+/// rendering on and off.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,7 +13,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Measures wall clock since it was made or last asked.
+/// Measures wall time since its creation or the last lap().
 class Stopwatch {
  public:
   /// [s]
@@ -29,7 +30,7 @@ class Stopwatch {
 
 class Timing {
  public:
-  /// @param count how many steps took about as long
+  /// @param count number of steps with this mean duration
   void add_step(double ms, std::uint64_t count = 1) {
     step_ms_.push_back(ms);
     steps_ += count;
@@ -43,7 +44,7 @@ class Timing {
   std::uint64_t steps_ = 0;
 };
 
-/// The middle value; of an even number the mean of the two in the middle; 0 of none.
+/// The median; the mean of the two middle values of an even number; 0 for no values.
 double median(std::vector<double> values);
 
 }  // namespace view

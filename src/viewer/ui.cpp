@@ -15,7 +15,7 @@ inline namespace JFPX_ABI {
 namespace view {
 namespace {
 
-constexpr float kTextSize = 13;  // [units], that of the default font
+constexpr float kTextSize = 13;  // of the default font [units]
 
 }  // namespace
 
@@ -24,12 +24,15 @@ Ui::Ui(Window& window) : window_(&window), width_(window.width()), height_(windo
   ImGui_ImplSDL2_InitForOpenGL(window.sdl(), window.context());
 }
 
-Ui::Ui(const Canvas& canvas) : width_(canvas.width()), height_(canvas.height()) { set_up(); }
+Ui::Ui(const OffscreenFramebuffer& offscreen)
+    : width_(offscreen.width()), height_(offscreen.height()) {
+  set_up();
+}
 
 void Ui::set_up() {
   IMGUI_CHECKVERSION();
   ImGui::CreateContext();
-  ImGui::GetIO().IniFilename = nullptr;  // leaves no files behind
+  ImGui::GetIO().IniFilename = nullptr;  // writes no settings file
   ImGui::StyleColorsDark();
   ImGuiStyle& style = ImGui::GetStyle();
   style.WindowRounding = 7;
@@ -54,8 +57,8 @@ void Ui::handle(const SDL_Event& event) { ImGui_ImplSDL2_ProcessEvent(&event); }
 bool Ui::wants_keyboard() const { return ImGui::GetIO().WantTextInput; }
 bool Ui::wants_mouse() const { return ImGui::GetIO().WantCaptureMouse; }
 
-/// Letters have as many pixels as the screen gives them, and keep their size in units. A window may
-/// be moved to another screen.
+/// Renders the font at the resolution of the screen with a constant size in units. The resolution
+/// changes when the window is moved to another screen.
 void Ui::fit_text(float pixel_ratio) {
   if (pixel_ratio == pixel_ratio_) return;
   pixel_ratio_ = pixel_ratio;
@@ -65,7 +68,7 @@ void Ui::fit_text(float pixel_ratio) {
   io.Fonts->Clear();
   io.Fonts->AddFontDefault(&font);
   io.FontGlobalScale = 1 / pixel_ratio;
-  ImGui_ImplOpenGL3_DestroyDeviceObjects();  // the next frame makes them anew
+  ImGui_ImplOpenGL3_DestroyDeviceObjects();  // the next frame recreates them
 }
 
 void Ui::begin(double seconds) {
@@ -83,7 +86,7 @@ void Ui::begin(double seconds) {
   } else {
     ImGui::GetIO().DeltaTime = std::max(static_cast<float>(seconds), 1e-4f);
   }
-  if (!seen) {  // a window that is minimised would have no size
+  if (!seen) {  // a minimised window has no size
     ImGui::GetIO().DisplaySize = {static_cast<float>(width_), static_cast<float>(height_)};
   }
   ImGui::NewFrame();

@@ -1,4 +1,4 @@
-/// Text and panels over the picture: Dear ImGui on a window or on a canvas.
+/// Text and panels over the picture: Dear ImGui in a window or an offscreen framebuffer.
 #pragma once
 
 #include "src/viewer/renderer.hpp"
@@ -8,11 +8,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// One at a time, in the thread of its OpenGL context.
+/// Dear ImGui context. Only one object may exist at a time, in the thread of its OpenGL context.
 class Ui {
  public:
-  explicit Ui(Window& window);  ///< takes events from the window
-  explicit Ui(const Canvas& canvas);
+  explicit Ui(Window& window);  ///< for a window, with its events
+  explicit Ui(const OffscreenFramebuffer& offscreen);
   ~Ui();
   Ui(const Ui&) = delete;
   Ui& operator=(const Ui&) = delete;
@@ -21,15 +21,15 @@ class Ui {
   bool wants_keyboard() const;
   bool wants_mouse() const;
   void begin(double seconds);
-  /// Draws all that was asked for since begin().
+  /// Draws all widgets since begin().
   void end(GLuint framebuffer, int width, int height);
 
  private:
   void set_up();
   void fit_text(float pixel_ratio);
   Window* window_ = nullptr;
-  int width_ = 0, height_ = 0;  ///< [units] of the canvas, or of the window when it was last seen
-  float pixel_ratio_ = 0;       ///< that the text was made for
+  int width_ = 0, height_ = 0;  ///< [units]; of a window, when it was last visible
+  float pixel_ratio_ = 0;       ///< of the current font
 };
 
 }  // namespace view

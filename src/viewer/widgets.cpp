@@ -1,4 +1,4 @@
-/// Dear ImGui's widgets as the panels use them.
+/// Wrappers of Dear ImGui's widgets.
 #include "src/viewer/widgets.hpp"
 
 #include <fmt/format.h>
@@ -16,8 +16,8 @@ const ImVec4 kWarning{1.0f, 0.55f, 0.35f, 1.0f};
 
 PanelLog* log() { return static_cast<PanelLog*>(ImGui::GetIO().UserData); }
 
-/// Notes the item that was added last; `width` is that of the part that reacts to the mouse.
-void note(const std::string& label, float width, const std::string& value) {
+/// Logs the last item. @param width of the part that reacts to the mouse
+void log_item(const std::string& label, float width, const std::string& value) {
   if (log() == nullptr) return;
   const ImVec2 item = ImGui::GetItemRectMin(), end = ImGui::GetItemRectMax();
   const ImVec2 from = ImGui::GetWindowDrawList()->GetClipRectMin();
@@ -27,60 +27,60 @@ void note(const std::string& label, float width, const std::string& value) {
                               value};
   if (seen.left < seen.right && seen.top < seen.bottom) log()->widgets[label] = seen;
 }
-void note(const std::string& label, const std::string& value = {}) {
-  note(label, ImGui::GetItemRectSize().x, value);
+void log_item(const std::string& label, const std::string& value = {}) {
+  log_item(label, ImGui::GetItemRectSize().x, value);
 }
 
 const char* on_or_off(bool on) { return on ? "on" : "off"; }
 
-void note_text(const std::string& text) {
+void log_text(const std::string& text) {
   if (log() != nullptr) log()->texts.push_back(text);
 }
 
 }  // namespace
 
-void tell(PanelLog* log) { ImGui::GetIO().UserData = log; }
+void set_log(PanelLog* log) { ImGui::GetIO().UserData = log; }
 
 void text(const std::string& text) {
   ImGui::TextUnformatted(text.c_str());
-  note_text(text);
+  log_text(text);
 }
 
 void warning(const std::string& text, float width) {
   ImGui::PushTextWrapPos(width);
   ImGui::TextColored(kWarning, "%s", text.c_str());
   ImGui::PopTextWrapPos();
-  note_text(text);
+  log_text(text);
 }
 
 bool button(const char* label) {
   const bool pressed = ImGui::Button(label);
-  note(label);
+  log_item(label);
   return pressed;
 }
 
 bool check(const char* label, bool* on) {
   const bool changed = ImGui::Checkbox(label, on);
-  note(label, on_or_off(*on));
+  log_item(label, on_or_off(*on));
   return changed;
 }
 
 bool radio(const char* label, int* value, int own) {
   const bool chosen = ImGui::RadioButton(label, value, own);
-  note(label, on_or_off(*value == own));
+  log_item(label, on_or_off(*value == own));
   return chosen;
 }
 
 bool slider(const char* label, float* value, float low, float high, const char* format) {
   const bool moved =
       ImGui::SliderFloat(label, value, low, high, format, ImGuiSliderFlags_Logarithmic);
-  note(label, ImGui::CalcItemWidth(), fmt::format("{:g}", *value));
+  log_item(label, ImGui::CalcItemWidth(), fmt::format("{:g}", *value));
   return moved;
 }
 
 bool number(const char* label, std::uint64_t* value) {
   std::string text = std::to_string(*value);
-  text.resize(24);  // room for all 64 bits
+  text.resize(24);  // holds any 64-bit number
   if (ImGui::InputText(label, text.data(), text.size(),
                        ImGuiInputTextFlags_CharsDecimal | ImGuiInputTextFlags_AutoSelectAll)) {
     const char* end = text.data() + text.find('\0');
@@ -88,27 +88,27 @@ bool number(const char* label, std::uint64_t* value) {
     const auto [rest, error] = std::from_chars(text.data(), end, typed);
     if (rest == end && error == std::errc()) *value = typed;
   }
-  note(label, ImGui::CalcItemWidth(), std::to_string(*value));
+  log_item(label, ImGui::CalcItemWidth(), std::to_string(*value));
   return ImGui::IsItemDeactivatedAfterEdit();
 }
 
 bool heading(const char* label, bool open_at_first) {
   const bool open = ImGui::CollapsingHeader(
       label, open_at_first ? ImGuiTreeNodeFlags_DefaultOpen : ImGuiTreeNodeFlags_None);
-  note(label);
+  log_item(label);
   return open;
 }
 
 bool open_list(const char* label, const std::string& chosen) {
   const float width = ImGui::CalcItemWidth();
   const bool open = ImGui::BeginCombo(label, chosen.c_str());
-  if (!open) note(label, width, chosen);  // else the last item is the list's
+  if (!open) log_item(label, width, chosen);  // an open list contains the last item
   return open;
 }
 
 bool entry(const std::string& label, bool chosen) {
   const bool pressed = ImGui::Selectable(label.c_str(), chosen);
-  note(label, on_or_off(chosen));
+  log_item(label, on_or_off(chosen));
   return pressed;
 }
 

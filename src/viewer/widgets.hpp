@@ -1,4 +1,4 @@
-/// Dear ImGui's widgets as the panels use them: each can tell where it is and what it says.
+/// Wrappers of Dear ImGui's widgets, which can log their positions and contents.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,39 +12,39 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// What a panel shows: for those who operate it without seeing it. Of widgets with the same label
-/// the last one counts.
+/// Content of the panels, for tests. The last of several widgets with the same label is kept.
 struct PanelLog {
   struct Widget {
-    float left = 0, top = 0, right = 0, bottom = 0;  ///< what is seen of it, in the window's units
-    std::string value;                               ///< that it shows; "on" or "off" of a choice
+    float left = 0, top = 0, right = 0, bottom = 0;  ///< visible rectangle [units]
+    std::string value;                               ///< displayed value; "on" or "off" of a choice
   };
   std::map<std::string, Widget> widgets;  ///< by label
-  std::vector<std::string> texts;         ///< in the order of the panel
+  std::vector<std::string> texts;         ///< in the order of the panels
 };
 
 namespace widget {
 
-/// From now on all panels of the current Dear ImGui context add to `log`, until nullptr is given or
-/// the context ends.
-void tell(PanelLog* log);
+/// Makes all panels of the current Dear ImGui context add to `log`, until nullptr is set or the
+/// context is destroyed.
+void set_log(PanelLog* log);
 
 void text(const std::string& text);
-/// Text in a colour that can't be overlooked, broken into lines at `width` [units].
+/// Text in a conspicuous colour, wrapped at `width` [units].
 void warning(const std::string& text, float width);
 
-// All of these return true when the user has done something with them.
+// The following functions return true if the user has just operated the widget.
 bool button(const char* label);
 bool check(const char* label, bool* on);
-/// One of several; `own` is the value that it stands for.
+/// One of several choices; `own` is its value.
 bool radio(const char* label, int* value, int own);
-/// Logarithmic. True whenever the value moves.
+/// Logarithmic scale. True whenever the value changes.
 bool slider(const char* label, float* value, float low, float high, const char* format);
-/// True when something was typed and the field left; what is no number leaves the value as it is.
+/// True if the field was edited and has lost the focus. Text that is not a number leaves the value
+/// unchanged.
 bool number(const char* label, std::uint64_t* value);
-/// True while what belongs to it is to be shown.
+/// True while the section is open.
 bool heading(const char* label, bool open_at_first);
-/// True while the list is open: then entries, and close_list() after them.
+/// True while the list is open; then add entries and call close_list().
 bool open_list(const char* label, const std::string& chosen);
 bool entry(const std::string& label, bool chosen);
 void close_list();

@@ -1,4 +1,4 @@
-/// A window with OpenGL 3.3, or only the context where no window shall be seen.
+/// A window with an OpenGL 3.3 context, or a context without a visible window.
 #include "src/viewer/window.hpp"
 
 #include <jfpx/error.hpp>
@@ -16,7 +16,7 @@ inline namespace JFPX_ABI {
 namespace view {
 namespace {
 
-constexpr Uint32 kPause = 8;  // [ms] between pictures that do not wait for the screen
+constexpr Uint32 kPause = 8;  // [ms] between pictures without vertical synchronization
 
 [[noreturn]] void refuse(const char* what) {
   throw BackendUnavailable(std::string(what) + ": " + SDL_GetError());
@@ -25,15 +25,15 @@ constexpr Uint32 kPause = 8;  // [ms] between pictures that do not wait for the 
 struct Extent {
   int width = 0, height = 0;
 };
-/// In what `ask` counts: units or pixels.
-Extent size_by(void (*ask)(SDL_Window*, int*, int*), SDL_Window* window) {
+/// The size of a window, in units or pixels as `query` returns it.
+Extent size_by(void (*query)(SDL_Window*, int*, int*), SDL_Window* window) {
   Extent extent;
-  ask(window, &extent.width, &extent.height);
+  query(window, &extent.width, &extent.height);
   return extent;
 }
 
-/// Mesa frees its own memory when a driver is unloaded at the end, or never. With the driver kept
-/// where it is, the leak sanitizer sees that its memory is in use, and reports ours only.
+/// Keeps the driver loaded, so that the leak sanitizer finds Mesa's memory in use and reports only
+/// leaks of this project. Mesa frees its memory when the driver is unloaded, or never.
 void keep_driver_for_leak_sanitizer() {
 #if defined(__SANITIZE_ADDRESS__)
   const auto keep = [](dl_phdr_info* library, std::size_t, void*) {
@@ -55,7 +55,7 @@ void Window::Quit::operator()(int*) const { SDL_Quit(); }
 
 Window::Window(const std::string& title, int width, int height, bool visible) {
   SDL_SetMainReady();
-  if (SDL_Init(SDL_INIT_VIDEO) != 0) refuse("the viewer finds no display");
+  if (SDL_Init(SDL_INIT_VIDEO) != 0) refuse("the viewer found no display");
   library_.reset(&started_);
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_MAJOR_VERSION, 3);
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_MINOR_VERSION, 3);
@@ -70,7 +70,7 @@ Window::Window(const std::string& title, int width, int height, bool visible) {
   keep_driver_for_leak_sanitizer();
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_RESET_NOTIFICATION, SDL_GL_CONTEXT_RESET_LOSE_CONTEXT);
   context_.reset(SDL_GL_CreateContext(window_.get()));
-  if (context_ == nullptr) {  // some drivers can't tell of resets
+  if (context_ == nullptr) {  // some drivers can't report resets
     SDL_GL_SetAttribute(SDL_GL_CONTEXT_RESET_NOTIFICATION, SDL_GL_CONTEXT_RESET_NO_NOTIFICATION);
     context_.reset(SDL_GL_CreateContext(window_.get()));
   }
@@ -88,17 +88,17 @@ Window Window::open(const std::string& title, int width, int height) {
 }
 
 Window Window::hidden() {
-  // Needs no X server; the user's SDL_VIDEODRIVER goes first.
+  // Requires no X server. SDL_VIDEODRIVER in the environment takes precedence.
   SDL_SetHintWithPriority(SDL_HINT_VIDEODRIVER, "offscreen", SDL_HINT_DEFAULT);
   return {"jfpx", 16, 16, false};
 }
 
-bool Window::tells_of_resets() const {
+bool Window::reports_resets() const {
   return epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_KHR_robustness");
 }
 
 void Window::check_context() const {
-  if (!tells_of_resets() || glGetGraphicsResetStatus() == GL_NO_ERROR) return;
+  if (!reports_resets() || glGetGraphicsResetStatus() == GL_NO_ERROR) return;
   throw BackendUnavailable("OpenGL lost its context: the graphics device was reset");
 }
 

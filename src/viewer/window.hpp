@@ -1,4 +1,4 @@
-/// A window with OpenGL 3.3, or only the context where no window shall be seen.
+/// A window with an OpenGL 3.3 context, or a context without a visible window.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,34 +12,34 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// One at a time, because SDL is one.
+/// Only one object may exist at a time, because SDL is global.
 class Window {
  public:
-  /// A visible window that can be resized.
+  /// A visible, resizable window.
   /// @throws BackendUnavailable if there is no display or no OpenGL 3.3.
   static Window open(const std::string& title, int width, int height);
-  /// A context without a window, which needs no display.
+  /// A context without a visible window, which requires no display.
   /// @throws BackendUnavailable if there is no OpenGL 3.3.
   static Window hidden();
 
-  /// Whether the driver says when the device was reset.
-  bool tells_of_resets() const;
-  /// @throws BackendUnavailable if the device was reset and all that it knew is gone.
+  /// True if the driver reports resets of the device.
+  bool reports_resets() const;
+  /// @throws BackendUnavailable if the device was reset, which invalidates all OpenGL objects.
   void check_context() const;
-  /// Shows what was drawn. @throws as check_context()
+  /// Presents the picture. @throws as check_context()
   void swap();  // NOLINT(bugprone-exception-escape): buffers, not windows
   void set_title(const std::string& title);
   void set_fullscreen(bool on);
   bool fullscreen() const { return fullscreen_; }
-  /// While captured, the mouse is hidden and reports movement without end.
+  /// A captured mouse is hidden and reports unbounded relative motion.
   void capture_mouse(bool on);
-  int width() const;   ///< in units, those of mouse coordinates
-  int height() const;  ///< likewise
-  /// Nobody sees it: what is drawn into it may get lost.
+  int width() const;   ///< [units], as mouse coordinates
+  int height() const;  ///< [units]
+  /// True if the window is invisible; its pixels may be undefined.
   bool minimised() const;
   int pixel_width() const;
   int pixel_height() const;
-  /// Pixels of a unit: 2 on many high-density screens.
+  /// Pixels per unit: 2 on many high-density screens.
   float pixel_ratio() const;
   SDL_Window* sdl() const { return window_.get(); }
   SDL_GLContext context() const { return context_.get(); }
@@ -62,7 +62,7 @@ class Window {
   std::unique_ptr<SDL_Window, CloseWindow> window_;
   std::unique_ptr<void, CloseContext> context_;
   bool fullscreen_ = false;
-  bool synchronised_ = false;  ///< pictures wait for the screen
+  bool synchronised_ = false;  ///< swap() waits for the screen
 };
 
 }  // namespace view

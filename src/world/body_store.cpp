@@ -1,4 +1,4 @@
-/// Bodies come, move freely, sleep, wake and go.
+/// Addition, removal, free motion and sleep of bodies.
 #include "src/world/body_store.hpp"
 
 #include <jfpx/error.hpp>
@@ -22,7 +22,7 @@ Real kept_per_step(Real kept_per_second, Real dt) {
   return static_cast<Real>(detail::power(kept_per_second, dt));
 }
 
-/// Of a solid body of a shape that can move.
+/// Inertia tensor of a solid body; `shape` must be one of a movable body.
 Mat3 tensor_of(const Shape& shape, Real mass) {
   if (const auto* sphere = std::get_if<Sphere>(&shape)) {
     return diagonal(detail::moments_of_inertia(*sphere, mass));
@@ -33,7 +33,7 @@ Mat3 tensor_of(const Shape& shape, Real mass) {
   return mass_properties(std::get<Compound>(shape), mass).inertia;
 }
 
-/// The shape with unit vectors and quaternions made so to rounding.
+/// The shape with normals and quaternions normalized to rounding error.
 Shape normalized(Shape shape) {
   const auto scale = [](auto* wall) {
     const Real k = Real(1) / length(wall->normal);
@@ -55,7 +55,8 @@ bool before(BodyId a, BodyId b) { return a.index < b.index; }
 BodyStore::BodyStore(Real dt, const SleepSettings& sleep)
     : dt_(dt), sleep_(sleep), motion_kept_(kept_per_step(sleep.bias, dt)) {}
 
-/// All or nothing: a slot is there once it has a generation. remove() never needs memory.
+/// Either adds a slot or changes nothing: capacity() counts generations, which grow last. Reserves
+/// memory for free_, so that remove() never allocates.
 void BodyStore::add_slot() {
   const std::size_t slots = capacity() + 1;
   reserve_geometric(&free_, slots);
@@ -70,7 +71,7 @@ void BodyStore::add_slot() {
 }
 
 BodyId BodyStore::add(const BodyDef& def) {
-  Shape shape = normalized(def.shape);  // may throw, so before anything changes
+  Shape shape = normalized(def.shape);  // may throw, hence before any change
   if (free_.empty()) add_slot();
   const std::uint32_t i = free_.back();
   const BodyId id{i, generation_[i]};
@@ -100,22 +101,21 @@ BodyId BodyStore::add(const BodyDef& def) {
 }
 
 void BodyStore::set_inertia(std::uint32_t i, const BodyDef& def) {
-  if (!movable(i)) {  // no inverse inertia, on purpose (erratum E26)
+  if (!movable(i)) {  // explicitly no inverse inertia (erratum E26)
     body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
     return;
   }
   const Mat3 tensor = def.inertia ? symmetric_part(*def.inertia) : tensor_of(shape_[i], def.mass);
   body_inverse_inertia_[i] = inverse_inertia(tensor);
-  // The largest entry of such a matrix is on its diagonal.
+  // The largest entry of a positive definite matrix is on its diagonal.
   const Vec3 moments{tensor(0, 0), tensor(1, 1), tensor(2, 2)};
-  const bool like_a_sphere =
-      moments.x == moments.y && moments.y == moments.z && is_diagonal(tensor);
-  tensor_[i] = like_a_sphere ? diagonal({0, 0, 0})
-                             : tensor * (Real(1) / std::max({moments.x, moments.y, moments.z}));
+  const bool isotropic = moments.x == moments.y && moments.y == moments.z && is_diagonal(tensor);
+  tensor_[i] = isotropic ? diagonal({0, 0, 0})
+                         : tensor * (Real(1) / std::max({moments.x, moments.y, moments.z}));
 }
 
 void BodyStore::remove(BodyId id) noexcept {
-  // A slot whose generations are used up is given up: an id never comes back.
+  // A slot is retired when its generations are exhausted, because ids are never reused.
   if (generation_[id.index] + 1 != 0) free_.push_back(id.index);
   ++generation_[id.index];
   ids_.erase(std::lower_bound(ids_.begin(), ids_.end(), id, before));
@@ -125,8 +125,8 @@ void BodyStore::remove(BodyId id) noexcept {
 }
 
 bool BodyStore::contains(BodyId id) const noexcept {
-  const auto place = std::lower_bound(ids_.begin(), ids_.end(), id, before);
-  return place != ids_.end() && *place == id;
+  const auto found = std::lower_bound(ids_.begin(), ids_.end(), id, before);
+  return found != ids_.end() && *found == id;
 }
 
 std::uint32_t BodyStore::require(BodyId id) const {
@@ -154,10 +154,10 @@ void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
   moving.motion[i] = 2 * sleep_.epsilon;
 }
 
-void BodyStore::displace(std::uint32_t i, const Vec3& shift, const Vec3& turn) {
+void BodyStore::displace(std::uint32_t i, const Vec3& shift, const Vec3& rotation) {
   moving.position[i] += shift;
-  if (turn == Vec3{}) return;
-  moving.orientation[i] = rotated_by(moving.orientation[i], turn);
+  if (rotation == Vec3{}) return;
+  moving.orientation[i] = rotated_by(moving.orientation[i], rotation);
   refresh_inertia(i);
 }
 
@@ -179,18 +179,18 @@ void BodyStore::wake(std::uint32_t i) {
   moving.motion[i] = 2 * sleep_.epsilon;
 }
 
-void BodyStore::wake_by_touch(std::uint32_t sleeper, std::uint32_t toucher) {
-  // Passing the motion on, instead of topping it up, lets bodies that touch fall asleep together:
-  // topped up, they would wake each other in turn for ever.
+void BodyStore::wake_by_contact(std::uint32_t sleeper, std::uint32_t awake) {
+  // Copying the motion, instead of raising it to a minimum, lets touching bodies fall asleep
+  // together; with a minimum, they would wake each other alternately without end.
   moving.awake[sleeper] = 1;
-  moving.motion[sleeper] = moving.motion[toucher];
+  moving.motion[sleeper] = moving.motion[awake];
 }
 
 void BodyStore::keep_awake(std::uint32_t i) {
   moving.motion[i] = std::max(moving.motion[i], 2 * sleep_.epsilon);
 }
 
-bool BodyStore::carries() const {
+bool BodyStore::has_moving_kinematic_body() const {
   return kinematic_count_ > 0 && std::ranges::any_of(ids_, [this](BodyId id) {
            return kinematic(id.index) && moving.awake[id.index] != 0;
          });
@@ -227,7 +227,8 @@ void BodyStore::move(std::uint32_t i) {
   refresh_inertia(i);
 }
 
-/// Asked before the body is moved: a body at rest would fall asleep a step's weight too deep.
+/// Called before the body is moved; afterwards, a body at rest would fall asleep too deep by the
+/// motion that gravity causes in a step.
 bool BodyStore::falls_asleep(std::uint32_t i) {
   moving.motion[i] =
       detail::mean_motion(moving.motion[i], moving.velocity[i], moving.angular_velocity[i],

@@ -1,4 +1,4 @@
-/// The collider alone, or behind a tree, or behind nothing.
+/// Search by the collider's own cells, by the tree of bounding spheres, or by all pairs.
 #include "src/world/broad_phase_search.hpp"
 
 #include <jfpx/error.hpp>
@@ -22,7 +22,7 @@ void BroadPhaseSearch::set_spheres(std::span<const SphereInstance> spheres) {
 
 ContactSpan BroadPhaseSearch::find(std::span<const SphereInstance> spheres) {
   if (broad_phase_ == BroadPhase::cells) return collider_->find_contacts(spheres);
-  touches_.clear();
+  contacts_.clear();
   if (broad_phase_ == BroadPhase::brute_force) {
     test_every_pair(spheres);
   } else {
@@ -32,17 +32,17 @@ ContactSpan BroadPhaseSearch::find(std::span<const SphereInstance> spheres) {
     hierarchy_.find_pairs(&pairs_);
     test_pairs(spheres);
   }
-  return touches_;
+  return contacts_;
 }
 
-/// In parts: all pairs of many spheres would fill the memory.
+/// Works in batches, because all pairs of many spheres would exhaust the memory.
 void BroadPhaseSearch::test_every_pair(std::span<const SphereInstance> spheres) {
-  constexpr std::size_t kPart = 4096;
+  constexpr std::size_t kBatch = 4096;
   pairs_.clear();
   for (SphereIndex a = 0; a < spheres.size(); ++a) {
     for (SphereIndex b = a + 1; b < spheres.size(); ++b) {
       pairs_.push_back({a, b});
-      if (pairs_.size() < kPart) continue;
+      if (pairs_.size() < kBatch) continue;
       test_pairs(spheres);
       pairs_.clear();
     }
@@ -50,12 +50,12 @@ void BroadPhaseSearch::test_every_pair(std::span<const SphereInstance> spheres) 
   test_pairs(spheres);
 }
 
-/// Appends those of pairs_ that touch.
+/// Appends the touching pairs of pairs_.
 void BroadPhaseSearch::test_pairs(std::span<const SphereInstance> spheres) {
   const std::span<const PairResult> results = collider_->test_pairs(spheres, pairs_);
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     const PairResult& r = results[i];
-    if (r.touching != 0) touches_.push_back({pairs_[i].a, pairs_[i].b, r.normal, r.distance});
+    if (r.touching != 0) contacts_.push_back({pairs_[i].a, pairs_[i].b, r.normal, r.distance});
   }
 }
 

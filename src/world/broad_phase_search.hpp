@@ -1,23 +1,25 @@
-/// Finds which of many bounds touch, in the way that was chosen.
+/// The broad phase of a world: finds the touching pairs of bounding spheres.
 #pragma once
 
-#include <jfpx/broad_phase.hpp>
-#include <jfpx/sphere_collider.hpp>
+#include <jfpx/world.hpp>
+
+#include "src/world/sphere_hierarchy.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Whatever the way, the collider has tested each touch, so that contacts, their bits and their
-/// order are the same.
+/// Searches as BroadPhase selects. The collider tests every pair in all of them, so the contacts,
+/// their bits and their order are the same.
 class BroadPhaseSearch {
  public:
-  /// @param collider not null @throws InvalidArgument for a broad phase that there is not
+  /// @param collider not null
+  /// @throws InvalidArgument if `broad_phase` is not a value of the enumeration
   BroadPhaseSearch(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase);
 
-  /// Must be called when the number of spheres changed, or what they stand for.
+  /// Must be called after the number of spheres, or the body that a sphere belongs to, has changed.
   void set_spheres(std::span<const SphereInstance> spheres);
   /// All touching pairs, sorted. Valid until the next call.
-  /// @throws what SphereCollider::find_contacts() throws
+  /// @throws the exceptions of SphereCollider::find_contacts()
   ContactSpan find(std::span<const SphereInstance> spheres);
 
   const SphereCollider& collider() const noexcept { return *collider_; }
@@ -30,7 +32,7 @@ class BroadPhaseSearch {
   BroadPhase broad_phase_;
   SphereHierarchy hierarchy_;
   std::vector<SpherePair> pairs_;
-  std::vector<SphereContact> touches_;
+  std::vector<SphereContact> contacts_;
 };
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// Checks the contacts that users make.
+/// Validation of the contacts of contact generators.
 #include <jfpx/contact_generator.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/scene.hpp>
@@ -22,8 +22,10 @@ void require(bool good, const char* field, const Value& value, const char* range
 }  // namespace
 
 void ContactContext::add(const GeneratedContact& contact) {
-  const std::uint32_t a = StepView::require(contact.a), b = StepView::require(contact.b);
-  if (a == b) throw InvalidArgument("generated contact: a and b are one body; they must be two");
+  StepView::require(contact.a);
+  StepView::require(contact.b);
+  if (contact.a == contact.b)
+    throw InvalidArgument("generated contact: a and b are one body; they must be two");
   const bool unit = absolute(length_squared(contact.normal) - 1) <= kUnitTolerance;
   jfpx::require(unit, "normal", contact.normal, "a unit vector, to a thousandth");
   jfpx::require(is_finite(contact.point), "point", contact.point, "finite");
@@ -34,8 +36,8 @@ void ContactContext::add(const GeneratedContact& contact) {
   jfpx::require(contact.restitution >= 0 && contact.restitution <= 1, "restitution",
                 contact.restitution, "in [0, 1]");
   if (!(mass(contact.a) > 0) && !(mass(contact.b) > 0)) return;
-  contacts_->push_back({a, b, normalized(contact.normal), contact.point, contact.distance,
-                        contact.friction, contact.restitution});
+  contacts_->push_back({contact.a, contact.b, normalized(contact.normal), contact.point,
+                        contact.distance, contact.friction, contact.restitution});
 }
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// Merges the touching pairs of two steps.
+/// Merge of the touching pairs of two steps.
 #include "src/world/contact_events.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ std::uint64_t pair_of(std::uint32_t low, std::uint32_t high) {
 
 }  // namespace
 
-void ContactEvents::update(const BodyStore& bodies, std::span<const Contact> contacts) {
+void ContactEvents::update(std::span<const Contact> contacts) {
   sort(contacts);
   next_.clear();
   std::size_t entry = 0;
@@ -26,13 +26,13 @@ void ContactEvents::update(const BodyStore& bodies, std::span<const Contact> con
     if (old.phase == ContactPhase::end) continue;
     const std::uint64_t pair = pair_of(old.a.index, old.b.index);
     while (entry < sorted_.size() && sorted_[entry].pair < pair) {
-      next_.push_back(next_pair(bodies, contacts, &entry));
+      next_.push_back(next_pair(contacts, &entry));
     }
     if (entry == sorted_.size() || sorted_[entry].pair > pair) {
       end(old);
       continue;
     }
-    ContactEvent now = next_pair(bodies, contacts, &entry);
+    ContactEvent now = next_pair(contacts, &entry);
     if (now.a == old.a && now.b == old.b) {
       now.phase = ContactPhase::stay;
     } else {
@@ -40,17 +40,17 @@ void ContactEvents::update(const BodyStore& bodies, std::span<const Contact> con
     }
     next_.push_back(now);
   }
-  while (entry < sorted_.size()) next_.push_back(next_pair(bodies, contacts, &entry));
+  while (entry < sorted_.size()) next_.push_back(next_pair(contacts, &entry));
   std::swap(events_, next_);
   cleared_ = false;
 }
 
-/// sorted_ becomes the contacts by pair. Contacts come in runs that are nearly all in order: sphere
-/// pairs, then others. What follows the first run is sorted by itself and merged with it.
+/// Sorts the contacts by pair into sorted_. The contacts consist of few sorted runs: sphere pairs,
+/// then others. The part after the first run is sorted separately and merged with it.
 void ContactEvents::sort(std::span<const Contact> contacts) {
   found_.clear();
   for (std::uint32_t i = 0; i < contacts.size(); ++i) {
-    const auto [low, high] = std::minmax(contacts[i].a, contacts[i].b);
+    const auto [low, high] = std::minmax(contacts[i].a.index, contacts[i].b.index);
     found_.push_back({pair_of(low, high), i});
   }
   const auto rest = std::is_sorted_until(found_.begin(), found_.end());
@@ -59,9 +59,8 @@ void ContactEvents::sort(std::span<const Contact> contacts) {
   std::merge(found_.begin(), rest, rest, found_.end(), sorted_.begin());
 }
 
-/// The pair that starts at an entry, as if it had just begun; `entry` moves on to the next pair.
-ContactEvent ContactEvents::next_pair(const BodyStore& bodies, std::span<const Contact> contacts,
-                                      std::size_t* entry) const {
+/// Returns a begin event of the pair at `entry`, and advances `entry` to the next pair.
+ContactEvent ContactEvents::next_pair(std::span<const Contact> contacts, std::size_t* entry) const {
   const std::uint64_t pair = sorted_[*entry].pair;
   const Contact* deepest = &contacts[sorted_[*entry].contact];
   ContactEvent event;
@@ -69,9 +68,9 @@ ContactEvent ContactEvents::next_pair(const BodyStore& bodies, std::span<const C
     const Contact& contact = contacts[sorted_[*entry].contact];
     if (contact.distance < deepest->distance) deepest = &contact;
   }
-  const bool swapped = deepest->a > deepest->b;
-  event.a = bodies.id(swapped ? deepest->b : deepest->a);
-  event.b = bodies.id(swapped ? deepest->a : deepest->b);
+  const bool swapped = deepest->a.index > deepest->b.index;
+  event.a = swapped ? deepest->b : deepest->a;
+  event.b = swapped ? deepest->a : deepest->b;
   event.normal = swapped ? -deepest->normal : deepest->normal;
   event.point = deepest->point;
   event.distance = deepest->distance;

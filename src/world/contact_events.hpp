@@ -1,9 +1,7 @@
-/// Who begins to touch whom, who goes on, and who ceases.
+/// Beginning, continuing and ending contacts between bodies.
 #pragma once
 
 #include <jfpx/world.hpp>
-
-#include "src/world/body_store.hpp"
 
 #include <cstddef>
 #include <span>
@@ -12,21 +10,22 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Compares the contacts of a step with those of the last step that succeeded. Buffers only grow.
+/// Compares the contacts of a step with those of the last successful step. Buffers grow and never
+/// shrink.
 class ContactEvents {
  public:
-  /// If memory runs out, nothing has changed.
-  /// @param contacts all of a step; a and b are indices of `bodies`
-  void update(const BodyStore& bodies, std::span<const Contact> contacts);
-  /// Forgets the events, but not who touched.
+  /// A failed allocation leaves the events unchanged.
+  /// @param contacts all of a step
+  void update(std::span<const Contact> contacts);
+  /// Clears the list of events, but keeps the pairs for the next comparison.
   void clear() noexcept { cleared_ = true; }
-  /// Sorted by (a.index, b.index); an end before the beginning that takes its indices.
+  /// Sorted by (a.index, b.index); an end event precedes a begin event with the same indices.
   std::span<const ContactEvent> list() const noexcept {
     return cleared_ ? std::span<const ContactEvent>() : events_;
   }
 
  private:
-  /// A contact and the pair of indices that it belongs to, lower one first.
+  /// A contact and the pair of its body indices, the lower one first.
   struct Entry {
     std::uint64_t pair;
     std::uint32_t contact;
@@ -34,8 +33,7 @@ class ContactEvents {
   };
 
   void sort(std::span<const Contact> contacts);
-  ContactEvent next_pair(const BodyStore& bodies, std::span<const Contact> contacts,
-                         std::size_t* entry) const;
+  ContactEvent next_pair(std::span<const Contact> contacts, std::size_t* entry) const;
 
   std::vector<Entry> found_, sorted_;
   std::vector<ContactEvent> events_, next_;

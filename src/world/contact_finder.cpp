@@ -1,4 +1,4 @@
-/// Gathers bounds, asks the collider, and tests what is no pair of spheres.
+/// Broad phase and pair tests of a world's contact detection.
 #include "src/world/contact_finder.hpp"
 
 #include <jfpx/intersect.hpp>
@@ -20,7 +20,7 @@ void sort_if_needed(std::vector<T>* items) {
   if (!std::ranges::is_sorted(*items)) std::ranges::sort(*items);
 }
 
-/// Appends the contacts of two sub_shapes of which one is no sphere.
+/// Appends the contacts of two sub-shapes, at least one of which is not a sphere.
 class PairTest {
  public:
   using SubShape = SubShapeTable::SubShape;
@@ -28,7 +28,7 @@ class PairTest {
   PairTest(const BodyStore& bodies, const SubShapeTable& sub_shapes, std::vector<Contact>* contacts)
       : bodies_(bodies), sub_shapes_(sub_shapes), contacts_(contacts) {}
 
-  /// Body a owns sub_shape p, body b sub_shape q; only q may be a wall.
+  /// Sub-shape p belongs to body a, q to body b; only q may be a wall.
   void operator()(std::uint32_t a, std::uint32_t b, SubShape p, SubShape q) const {
     if (sub_shapes_.is_wall(q)) {
       const HalfSpace solid = sub_shapes_.wall(q).solid_for(bodies_.moving.position[a]);
@@ -50,16 +50,16 @@ class PairTest {
   }
 
  private:
-  /// @param side 1 if the sphere of the touch is a's, -1 if it is b's
+  /// @param side 1 if the sphere belongs to a, -1 if it belongs to b
   void add(std::uint32_t a, std::uint32_t b, const Touch& touch, Real side) const {
     if (!touch.touching) return;
     const Vec3 normal = side < 0 ? -touch.normal : touch.normal;
-    contacts_->push_back({a, b, normal, touch.point, touch.distance});
+    contacts_->push_back({bodies_.id(a), bodies_.id(b), normal, touch.point, touch.distance});
   }
   void add(std::uint32_t a, std::uint32_t b, const Manifold& manifold) const {
     for (int i = 0; i < manifold.count; ++i) {
       const ManifoldPoint& p = manifold.points[i];
-      contacts_->push_back({a, b, manifold.normal, p.point, p.distance});
+      contacts_->push_back({bodies_.id(a), bodies_.id(b), manifold.normal, p.point, p.distance});
     }
   }
 
@@ -71,21 +71,21 @@ class PairTest {
 }  // namespace
 
 ContactFinder::ContactFinder(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
-    : touches_(std::move(collider), broad_phase) {}
+    : broad_phase_(std::move(collider), broad_phase) {}
 
 void ContactFinder::set_bodies(const BodyStore& bodies) {
   sub_shapes_.set_bodies(bodies);
-  sub_shapes_.place(bodies);
-  touches_.set_spheres(sub_shapes_.bounds());
+  sub_shapes_.update_poses(bodies);
+  broad_phase_.set_spheres(sub_shapes_.bounds());
 }
 
 std::uint64_t ContactFinder::find_contacts(const BodyStore& bodies,
                                            std::vector<Contact>* contacts) {
-  sub_shapes_.place(bodies);
+  sub_shapes_.update_poses(bodies);
   candidates_.clear();
   find_sphere_pairs(bodies, contacts);
   const std::uint64_t sphere_contacts = contacts->size();
-  find_obstacles(bodies);
+  find_fixed_candidates(bodies);
   sort_if_needed(&candidates_);
   const PairTest test(bodies, sub_shapes_, contacts);
   for (const Candidate& c : candidates_) test(c.a, c.b, c.sub_shape_a, c.sub_shape_b);
@@ -95,9 +95,9 @@ std::uint64_t ContactFinder::find_contacts(const BodyStore& bodies,
 /// Whether x is body a of its contacts with y.
 bool ContactFinder::comes_first(const BodyStore& bodies, std::uint32_t x, std::uint32_t y) const {
   const bool x_is_sphere = bodies.radius(x) > 0, y_is_sphere = bodies.radius(y) > 0;
+  if (x_is_sphere && y_is_sphere) return x < y;
   const bool compound = std::holds_alternative<Compound>(bodies.shape(x)) ||
                         std::holds_alternative<Compound>(bodies.shape(y));
-  if (!compound && x_is_sphere && y_is_sphere) return x < y;
   if (!compound && x_is_sphere != y_is_sphere) return x_is_sphere;
   if (bodies.movable(x) != bodies.movable(y)) return bodies.movable(x);
   return x < y;
@@ -110,9 +110,9 @@ ContactFinder::Candidate ContactFinder::ordered(const BodyStore& bodies, SubShap
   return {of_y, of_x, y, x};
 }
 
-/// Pairs in which a box takes part become candidates.
+/// Appends the contacts of two spheres; pairs with a box become candidates.
 void ContactFinder::find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts) {
-  const ContactSpan found = touches_.find(sub_shapes_.bounds());
+  const ContactSpan found = broad_phase_.find(sub_shapes_.bounds());
   hits_.clear();
   for (std::size_t i = 0; i < found.size(); ++i) {
     const std::uint32_t a = sub_shapes_.body(found[i].a), b = sub_shapes_.body(found[i].b);
@@ -129,11 +129,11 @@ void ContactFinder::find_sphere_pairs(const BodyStore& bodies, std::vector<Conta
     const SphereContact& c = found[hit.index];
     const Vec3 point = middle_point(c.normal, c.distance, sub_shapes_.bounds(c.b));
     const Vec3 normal = hit.pair.sub_shape_a == c.a ? c.normal : -c.normal;
-    contacts->push_back({hit.pair.a, hit.pair.b, normal, point, c.distance});
+    contacts->push_back({bodies.id(hit.pair.a), bodies.id(hit.pair.b), normal, point, c.distance});
   }
 }
 
-void ContactFinder::find_obstacles(const BodyStore& bodies) {
+void ContactFinder::find_fixed_candidates(const BodyStore& bodies) {
   for (SubShape sub_shape = 0; sub_shape < sub_shapes_.fixed_begin(); ++sub_shape) {
     const std::uint32_t body = sub_shapes_.body(sub_shape);
     if (!bodies.movable(body)) continue;
@@ -145,7 +145,7 @@ void ContactFinder::find_obstacles(const BodyStore& bodies) {
   }
 }
 
-/// @param centre of mass of the body that the sub_shape belongs to
+/// @param centre centre of mass of the body of `sub_shape`
 bool ContactFinder::may_touch(SubShape sub_shape, SubShape fixed, const Vec3& centre) const {
   if (!sub_shapes_.is_wall(fixed))
     return near(sub_shapes_.bounds(sub_shape), sub_shapes_.bounds(fixed));

@@ -1,4 +1,4 @@
-/// Finds the contacts of a world: spheres and boxes among themselves and against what stands still.
+/// Contact detection of a world: between movable bodies, and with immovable ones.
 #pragma once
 
 #include <jfpx/collide.hpp>
@@ -11,28 +11,28 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Sphere pairs are the collider's, and so are the candidates among movable boxes: it gets their
-/// bounding spheres too, or the broad phase finds for it which may touch. Every immovable box,
-/// half-space and plane is tested against every movable body. Contacts between immovable bodies,
-/// and within one body, are dropped.
+/// The broad phase and the sphere collider find the pairs of touching spheres, and, through
+/// bounding spheres, the candidate pairs of movable boxes. Every immovable box, half-space and
+/// plane is tested against every movable body. Contacts between immovable bodies, and within one
+/// body, are discarded.
 class ContactFinder {
  public:
   ContactFinder(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase);
 
-  /// Must be called when bodies came, went, or an immovable one was moved.
+  /// Must be called after bodies were added or removed, or an immovable body was moved.
   void set_bodies(const BodyStore& bodies);
 
-  /// Appends sphere pairs, then the others, each by (a, b), then by the sub_shapes of a and of b; a
-  /// and b are body indices, chosen as Contact says.
-  /// @returns the number of sphere pairs
-  /// @throws what SphereCollider::find_contacts() throws
+  /// Appends the contacts of two spheres, then all others, both sorted by the indices of (a, b),
+  /// then by the sub-shapes of a and of b. Contact defines the choice of a and b.
+  /// @returns the number of contacts of two spheres
+  /// @throws the exceptions of SphereCollider::find_contacts()
   std::uint64_t find_contacts(const BodyStore& bodies, std::vector<Contact>* contacts);
 
-  const SphereCollider& collider() const noexcept { return touches_.collider(); }
+  const SphereCollider& collider() const noexcept { return broad_phase_.collider(); }
 
  private:
   using SubShape = SubShapeTable::SubShape;
-  /// Two sub_shapes that may touch, in the order of their contact.
+  /// Two sub-shapes that may touch, in the order of their contact.
   struct Candidate {
     std::uint32_t a = 0, b = 0;
     SubShape sub_shape_a = 0, sub_shape_b = 0;
@@ -41,17 +41,17 @@ class ContactFinder {
   /// Two spheres that touch.
   struct SphereHit {
     Candidate pair;
-    std::uint64_t index = 0;  ///< in what the collider found
+    std::uint64_t index = 0;  ///< in the list of the collider
     friend auto operator<=>(const SphereHit&, const SphereHit&) = default;
   };
 
   bool comes_first(const BodyStore& bodies, std::uint32_t x, std::uint32_t y) const;
   Candidate ordered(const BodyStore& bodies, SubShape x, SubShape y) const;
   void find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts);
-  void find_obstacles(const BodyStore& bodies);
+  void find_fixed_candidates(const BodyStore& bodies);
   bool may_touch(SubShape sub_shape, SubShape fixed, const Vec3& centre) const;
 
-  BroadPhaseSearch touches_;
+  BroadPhaseSearch broad_phase_;
   SubShapeTable sub_shapes_;
   std::vector<SphereHit> hits_;
   std::vector<Candidate> candidates_;

@@ -1,4 +1,4 @@
-/// The resolver of the engine: a tournament picks.
+/// The resolver of the engine, with the tournament tree as its queue.
 #include "src/world/contact_resolver.hpp"
 
 namespace jfpx {

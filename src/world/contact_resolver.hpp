@@ -1,4 +1,5 @@
-/// Resolves contacts one at a time, worst first: penetrations, then velocities (thesis 4.4.6).
+/// Sequential contact resolver: the worst contact first, penetrations before velocities (thesis
+/// 4.4.6).
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -12,23 +13,24 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// What resolving took.
+/// Work of the resolver in a step.
 struct ResolverReport {
   std::uint64_t position_iterations = 0;
   std::uint64_t velocity_iterations = 0;
   bool exhausted = false;  ///< a loop stopped at its limit with work left
 };
 
-/// Both loops take the worst contact, resolve it alone, and refresh every contact of the bodies
-/// that it moved (errata E6, E10, E11). `Queue` says which is worst; all queues that prefer the
-/// largest key and then the lowest index give the same bits. Buffers only grow.
+/// Both loops take the worst contact, resolve it, and update every other contact of the bodies that
+/// were moved (errata E6, E10, E11). `Queue` selects the worst contact: IndexedPriorityQueue in the
+/// engine; tests and benchmarks also use the thesis' linear scan. All queues that prefer the
+/// largest key, then the lowest index, give the same bits. Buffers grow and never shrink.
 template <class Queue>
 class BasicContactResolver {
  public:
-  /// @param contacts a and b are indices of `bodies`; of two movable bodies in contact both or none
-  ///   are awake. Contacts without an awake body are left alone.
-  /// @param generated how many of the last contacts were made and not found: they are no spheres'
-  ///   and form no patches
+  /// @param contacts of `bodies`; of two movable bodies in contact both or none are awake. Contacts
+  ///   without an awake body are left alone.
+  /// @param generated number of contacts at the end that generators made: they do not use the radii
+  ///   of spheres and form no patches
   ResolverReport resolve(BodyStore& bodies, std::span<const Contact> contacts,
                          const ResolverSettings& settings, std::size_t generated = 0);
 
@@ -40,23 +42,23 @@ class BasicContactResolver {
     Real friction, restitution;
     std::uint32_t first, last;  ///< rows of the same two bodies with the same normal: [first, last)
   };
-  /// What is done at once for rows of the same two bodies.
+  /// A correction that serves several rows of the same two bodies.
   struct Patch {
-    const Row& row;     ///< the worst of them
-    Vec3 arm_a, arm_b;  ///< to where it is done
+    const Row& row;     ///< the worst row
+    Vec3 arm_a, arm_b;  ///< to the point of the correction
     Real amount;
-    Real reach = 0;  ///< [m], mean distance of the points from their centre; 0 for one point
+    Real radius = 0;  ///< [m], mean distance of the points from their centre; 0 for one point
   };
-  /// Shares of a patch's friction, whose squares add up to 1.
-  struct Grip {
-    Real sliding, turning;
+  /// Shares of a patch's friction against sliding and against spinning; their squares add up to 1.
+  struct FrictionShares {
+    Real sliding, spinning;
   };
   using RowIndex = std::uint32_t;
 
   void prepare(std::span<const Contact> contacts, std::size_t generated);
   void add_row(const Contact& contact, const Vec3& arm_a, const Vec3& arm_b);
   void group_patches();
-  Patch patch_of(RowIndex worst, Real kept) const;
+  Patch patch_of(RowIndex worst, Real slack) const;
   void index_rows_by_body();
   std::span<const RowIndex> rows_of(std::uint32_t body) const;
   Vec3 lever_arm(std::uint32_t body, const Contact& contact, Real side) const;
@@ -67,20 +69,20 @@ class BasicContactResolver {
 
   void resolve_velocities(ResolverReport* report);
   void apply_impulse(const Patch& patch);
-  Grip share_friction(const Patch& patch, const Vec3& velocity) const;
+  FrictionShares share_friction(const Patch& patch, const Vec3& velocity) const;
   Real spin(const Row& row) const;
-  void apply_spin_friction(const Row& row, Real most);
-  void push(std::uint32_t body, const Vec3& arm, const Vec3& impulse);
+  void apply_spin_friction(const Row& row, Real limit);
+  void add_impulse(std::uint32_t body, const Vec3& arm, const Vec3& impulse);
   Vec3 relative_velocity(const Row& row, const Vec3& arm_a, const Vec3& arm_b) const;
-  Real wanted_change(const Row& row) const;
+  Real target_delta_velocity(const Row& row) const;
   std::uint64_t limit() const;
 
-  BodyStore* bodies_ = nullptr;  ///< of the call in progress
+  BodyStore* bodies_ = nullptr;  ///< during resolve()
   ResolverSettings settings_;
   std::vector<Row> rows_;
   std::vector<Real> keys_;
   Queue queue_;
-  std::vector<std::uint32_t> first_row_;  ///< by body: where its part of body_rows_ starts
+  std::vector<std::uint32_t> first_row_;  ///< by body: start of its range in body_rows_
   std::vector<RowIndex> body_rows_;
 };
 
@@ -103,35 +105,36 @@ ResolverReport BasicContactResolver<Queue>::resolve(BodyStore& bodies,
   return report;
 }
 
-/// keys_ becomes the penetrations.
+/// Fills rows_, and keys_ with the penetrations.
 template <class Queue>
 void BasicContactResolver<Queue>::prepare(std::span<const Contact> contacts,
                                           std::size_t generated) {
   const MotionArrays& moving = bodies_->moving;
   const auto asleep = [&moving](const Contact& c) {
-    return moving.awake[c.a] == 0 && moving.awake[c.b] == 0;
+    return moving.awake[c.a.index] == 0 && moving.awake[c.b.index] == 0;
   };
   rows_.clear();
   keys_.clear();
   for (const Contact& c : contacts.first(contacts.size() - generated)) {
-    if (!asleep(c)) add_row(c, lever_arm(c.a, c, -1), lever_arm(c.b, c, 1));
+    if (!asleep(c)) add_row(c, lever_arm(c.a.index, c, -1), lever_arm(c.b.index, c, 1));
   }
   group_patches();
   for (const Contact& c : contacts.last(generated)) {
     if (asleep(c)) continue;
-    add_row(c, c.point - moving.position[c.a], c.point - moving.position[c.b]);
+    add_row(c, c.point - moving.position[c.a.index], c.point - moving.position[c.b.index]);
   }
 }
 
-/// As a patch of its own.
+/// Appends a row, initially a patch of its own.
 template <class Queue>
 void BasicContactResolver<Queue>::add_row(const Contact& c, const Vec3& arm_a, const Vec3& arm_b) {
   const MotionArrays& moving = bodies_->moving;
   Vec3 acceleration;
-  if (moving.awake[c.a] != 0) acceleration += moving.last_acceleration[c.a];
-  if (moving.awake[c.b] != 0) acceleration -= moving.last_acceleration[c.b];
+  const std::uint32_t a = c.a.index, b = c.b.index;
+  if (moving.awake[a] != 0) acceleration += moving.last_acceleration[a];
+  if (moving.awake[b] != 0) acceleration -= moving.last_acceleration[b];
   const auto row = static_cast<RowIndex>(rows_.size());
-  rows_.push_back({c.a, c.b, c.normal, arm_a, arm_b, dot(acceleration, c.normal) * bodies_->dt(),
+  rows_.push_back({a, b, c.normal, arm_a, arm_b, dot(acceleration, c.normal) * bodies_->dt(),
                    c.friction, c.restitution, row, row + 1});
   keys_.push_back(-c.distance);
 }
@@ -148,40 +151,40 @@ void BasicContactResolver<Queue>::group_patches() {
   }
 }
 
-/// Where boxes touch along a face, all corners that want something are served at once, by the mean
-/// of what they want at the centre of it: corner after corner, each push would turn the box onto
-/// the next corner, and a box at rest would wander. Velocities are linear in the arm, so the mean
-/// is what the centre itself wants. A corner that wants more than the mean stays the worst, and
-/// weighs more the next time.
+/// Where boxes touch along a face, one correction serves all corners with a positive key: the
+/// weighted mean of the keys, applied at the weighted centre of the corners. If corners were
+/// corrected one after the other, each impulse would rotate the box onto the next corner, and a box
+/// at rest would drift. Velocities are linear in the arm, so the mean is exact at the centre. A
+/// corner with a key above the mean remains the worst and has more weight in the next iteration.
 template <class Queue>
-typename BasicContactResolver<Queue>::Patch BasicContactResolver<Queue>::patch_of(RowIndex worst,
-                                                                                  Real kept) const {
+typename BasicContactResolver<Queue>::Patch BasicContactResolver<Queue>::patch_of(
+    RowIndex worst, Real slack) const {
   const Row& row = rows_[worst];
-  Patch patch{row, row.arm_a, row.arm_b, queue_.key(worst) - kept};
+  Patch patch{row, row.arm_a, row.arm_b, queue_.key(worst) - slack};
   if (row.last - row.first == 1) return patch;
   Real sum = 0;
   Vec3 arm_a, arm_b;
   for (RowIndex i = row.first; i < row.last; ++i) {
-    const Real wanted = queue_.key(i) - kept;
-    if (!(wanted > 0)) continue;
-    sum += wanted;
-    arm_a += rows_[i].arm_a * wanted;
-    arm_b += rows_[i].arm_b * wanted;
+    const Real weight = queue_.key(i) - slack;
+    if (!(weight > 0)) continue;
+    sum += weight;
+    arm_a += rows_[i].arm_a * weight;
+    arm_b += rows_[i].arm_b * weight;
   }
   patch.arm_a = arm_a * (Real(1) / sum);
   patch.arm_b = arm_b * (Real(1) / sum);
   patch.amount = 0;
   for (RowIndex i = row.first; i < row.last; ++i) {
-    const Real wanted = queue_.key(i) - kept;
-    if (!(wanted > 0)) continue;
-    patch.amount += wanted / sum * wanted;
-    patch.reach += wanted / sum * length(rows_[i].arm_a - patch.arm_a);
+    const Real weight = queue_.key(i) - slack;
+    if (!(weight > 0)) continue;
+    patch.amount += weight / sum * weight;
+    patch.radius += weight / sum * length(rows_[i].arm_a - patch.arm_a);
   }
   return patch;
 }
 
-/// A sphere's arm is taken along the normal: the difference of two points far from the origin
-/// would have lost its digits. `side` is -1 for body a, 1 for body b (erratum E2).
+/// The arm of a sphere is computed along the normal, because the difference of two points far from
+/// the origin loses precision. `side` is -1 for body a, 1 for body b (erratum E2).
 template <class Queue>
 Vec3 BasicContactResolver<Queue>::lever_arm(std::uint32_t body, const Contact& contact,
                                             Real side) const {
@@ -190,7 +193,7 @@ Vec3 BasicContactResolver<Queue>::lever_arm(std::uint32_t body, const Contact& c
   return contact.point - bodies_->moving.position[body];
 }
 
-/// Counting sort of the rows by movable body; each body's rows stay in order.
+/// Counting sort of the rows by movable body; the rows of a body keep their order.
 template <class Queue>
 void BasicContactResolver<Queue>::index_rows_by_body() {
   first_row_.assign(bodies_->capacity() + 1, 0);
@@ -201,7 +204,7 @@ void BasicContactResolver<Queue>::index_rows_by_body() {
   }
   std::partial_sum(first_row_.begin(), first_row_.end(), first_row_.begin());
   body_rows_.resize(first_row_.back());
-  // Each entry is now the end of its body's part; filling from the back makes it the start.
+  // Each entry is now the end of its body's range; filling from the back makes it the start.
   for (auto i = static_cast<RowIndex>(rows_.size()); i-- > 0;) {
     for (const std::uint32_t body : {rows_[i].a, rows_[i].b}) {
       if (bodies_->movable(body)) body_rows_[--first_row_[body]] = i;
@@ -222,23 +225,24 @@ std::uint64_t BasicContactResolver<Queue>::limit() const {
 
 template <class Queue>
 void BasicContactResolver<Queue>::resolve_positions(ResolverReport* report) {
-  // A little of the allowed depth is left as slack: resolved to nothing, a body at rest would sink
-  // and jump by the whole depth for ever; resolved to the limit itself, rounding and neighbours
-  // would bring the contact back at once.
-  const Real kept_depth = settings_.position_epsilon * Real(15.0 / 16.0);
+  // Contacts are resolved to slightly less than the allowed depth. Resolved to zero, a body at rest
+  // would repeatedly sink and be lifted by the whole depth; resolved to the limit itself, rounding
+  // and neighboring contacts would exceed the limit again immediately.
+  const Real slack = settings_.position_epsilon * Real(15.0 / 16.0);
   queue_.assign(keys_);
   for (std::uint64_t left = limit();; --left) {
     const RowIndex worst = queue_.top();
     const Real depth = queue_.key(worst);
     if (!(depth > settings_.position_epsilon)) return;
     if (left == 0) break;
-    project(patch_of(worst, kept_depth));
+    project(patch_of(worst, slack));
     ++report->position_iterations;
   }
   report->exhausted = true;
 }
 
-/// Moves both bodies apart by the patch's amount, shared by how easily each yields (erratum E6a).
+/// Moves both bodies apart by the amount of the patch, in proportion to their inverse effective
+/// masses (erratum E6a).
 template <class Queue>
 void BasicContactResolver<Queue>::project(const Patch& patch) {
   const MotionArrays& moving = bodies_->moving;
@@ -247,12 +251,12 @@ void BasicContactResolver<Queue>::project(const Patch& patch) {
     return bodies_->inverse_mass(body) +
            detail::angular_inverse_effective_mass(row.normal, arm, moving.inverse_inertia[body]);
   };
-  const Real total_yield =
+  const Real total_inverse_effective_mass =
       inverse_effective_mass(row.a, patch.arm_a) + inverse_effective_mass(row.b, patch.arm_b);
   const auto share = [&](std::uint32_t body, const Vec3& arm, Real signed_depth) {
     return detail::projection(row.normal, arm, bodies_->inverse_mass(body),
-                              moving.inverse_inertia[body], signed_depth, total_yield,
-                              settings_.angular_limit);
+                              moving.inverse_inertia[body], signed_depth,
+                              total_inverse_effective_mass, settings_.angular_limit);
   };
   const detail::Displacement of_a = share(row.a, patch.arm_a, patch.amount);
   const detail::Displacement of_b = share(row.b, patch.arm_b, -patch.amount);
@@ -266,12 +270,12 @@ template <class Queue>
 void BasicContactResolver<Queue>::displace(std::uint32_t body,
                                            const detail::Displacement& displacement) {
   if (!bodies_->movable(body)) return;
-  bodies_->displace(body, displacement.shift, displacement.turn);
+  bodies_->displace(body, displacement.translation, displacement.rotation);
   for (const RowIndex i : rows_of(body)) {
     const Row& row = rows_[i];
     const bool is_a = row.a == body;
-    const Vec3 moved =
-        detail::point_velocity(displacement.shift, displacement.turn, is_a ? row.arm_a : row.arm_b);
+    const Vec3 moved = detail::point_velocity(displacement.translation, displacement.rotation,
+                                              is_a ? row.arm_a : row.arm_b);
     const Real opened = dot(moved, row.normal);
     queue_.update(i, queue_.key(i) + opened * (is_a ? Real(-1) : Real(1)));
   }
@@ -279,18 +283,17 @@ void BasicContactResolver<Queue>::displace(std::uint32_t body,
 
 template <class Queue>
 void BasicContactResolver<Queue>::resolve_velocities(ResolverReport* report) {
-  for (RowIndex i = 0; i < rows_.size(); ++i) keys_[i] = wanted_change(rows_[i]);
+  for (RowIndex i = 0; i < rows_.size(); ++i) keys_[i] = target_delta_velocity(rows_[i]);
   queue_.assign(keys_);
   for (std::uint64_t left = limit();; --left) {
     const RowIndex worst = queue_.top();
-    const Real wanted = queue_.key(worst);
-    if (!(wanted > settings_.velocity_epsilon)) return;
+    if (!(queue_.key(worst) > settings_.velocity_epsilon)) return;
     if (left == 0) break;
     const Patch patch = patch_of(worst, 0);
     apply_impulse(patch);
     for (const std::uint32_t body : {patch.row.a, patch.row.b}) {
       if (!bodies_->movable(body)) continue;
-      for (const RowIndex i : rows_of(body)) queue_.update(i, wanted_change(rows_[i]));
+      for (const RowIndex i : rows_of(body)) queue_.update(i, target_delta_velocity(rows_[i]));
     }
     ++report->velocity_iterations;
   }
@@ -306,14 +309,14 @@ inline Vec3 BasicContactResolver<Queue>::relative_velocity(const Row& row, const
 }
 
 template <class Queue>
-Real BasicContactResolver<Queue>::wanted_change(const Row& row) const {
+Real BasicContactResolver<Queue>::target_delta_velocity(const Row& row) const {
   return detail::target_delta_velocity(
       dot(row.normal, relative_velocity(row, row.arm_a, row.arm_b)), row.from_acceleration,
       row.restitution, settings_.restitution_velocity);
 }
 
-/// Gives both bodies equal and opposite impulses at one common point, so that momentum and angular
-/// momentum stay (errata E2, E3, E5).
+/// Applies equal and opposite impulses to both bodies at one common point, which conserves momentum
+/// and angular momentum (errata E2, E3, E5).
 template <class Queue>
 void BasicContactResolver<Queue>::apply_impulse(const Patch& patch) {
   const Row& row = patch.row;
@@ -326,32 +329,32 @@ void BasicContactResolver<Queue>::apply_impulse(const Patch& patch) {
     if (!bodies_->movable(body)) continue;
     detail::add_response(basis, is_a ? patch.arm_a : patch.arm_b, bodies_->inverse_mass(body),
                          moving.inverse_inertia[body], &response);
-    // What the next step's acceleration will add along the surface is stopped now as well: a body
-    // held by friction would creep downhill otherwise (Millington 2007, 15.2).
+    // Friction also cancels the velocity that the acceleration of the next step will add along the
+    // surface; otherwise a body held by friction would creep downhill (Millington 2007, 15.2).
     const Vec3 coming = moving.last_acceleration[body] * (is_a ? bodies_->dt() : -bodies_->dt());
     velocity += coming;
   }
   const Vec3 local_velocity = detail::to_contact(basis, velocity);
-  const Grip grip = share_friction(patch, local_velocity);
-  const Vec3 local =
-      detail::contact_impulse(response, local_velocity, patch.amount, row.friction * grip.sliding);
+  const FrictionShares shares = share_friction(patch, local_velocity);
+  const Vec3 local = detail::contact_impulse(response, local_velocity, patch.amount,
+                                             row.friction * shares.sliding);
   const Vec3 impulse = detail::to_world(basis, local);
-  push(row.a, patch.arm_a, impulse);
-  push(row.b, patch.arm_b, -impulse);
-  if (patch.reach > 0)
-    apply_spin_friction(row, row.friction * grip.turning * local.x * patch.reach);
+  add_impulse(row.a, patch.arm_a, impulse);
+  add_impulse(row.b, patch.arm_b, -impulse);
+  if (patch.radius > 0)
+    apply_spin_friction(row, row.friction * shares.spinning * local.x * patch.radius);
 }
 
-/// A patch that slides and turns has one friction for both: it acts against the velocity of its
-/// points, of which sliding and turning are parts at right angles in the mean.
+/// A patch that slides and spins has one friction for both: it opposes the velocity of its points,
+/// whose sliding and spinning components are perpendicular on average.
 template <class Queue>
-typename BasicContactResolver<Queue>::Grip BasicContactResolver<Queue>::share_friction(
+typename BasicContactResolver<Queue>::FrictionShares BasicContactResolver<Queue>::share_friction(
     const Patch& patch, const Vec3& velocity) const {
-  if (!(patch.reach > 0)) return {1, 0};
+  if (!(patch.radius > 0)) return {1, 0};
   const Real slide = square_root(velocity.y * velocity.y + velocity.z * velocity.z);
-  const Real turn = absolute(spin(patch.row)) * patch.reach;
-  const Real both = square_root(slide * slide + turn * turn);
-  return both > 0 ? Grip{slide / both, turn / both} : Grip{1, 0};
+  const Real spin_speed = absolute(spin(patch.row)) * patch.radius;
+  const Real both = square_root(slide * slide + spin_speed * spin_speed);
+  return both > 0 ? FrictionShares{slide / both, spin_speed / both} : FrictionShares{1, 0};
 }
 
 template <class Queue>
@@ -360,23 +363,25 @@ Real BasicContactResolver<Queue>::spin(const Row& row) const {
   return dot(row.normal, moving.angular_velocity[row.a] - moving.angular_velocity[row.b]);
 }
 
-/// Friction against turning about the normal, which a push at the centre of a patch does not feel.
-/// @param most largest angular impulse that friction has
+/// Friction against spinning about the normal, which an impulse at the centre of the patch does not
+/// affect.
+/// @param limit largest angular impulse of the friction
 template <class Queue>
-void BasicContactResolver<Queue>::apply_spin_friction(const Row& row, Real most) {
+void BasicContactResolver<Queue>::apply_spin_friction(const Row& row, Real limit) {
   MotionArrays& moving = bodies_->moving;
-  const Vec3 turned_a = moving.inverse_inertia[row.a] * row.normal;
-  const Vec3 turned_b = moving.inverse_inertia[row.b] * row.normal;
-  const Real inverse_effective_mass = dot(row.normal, turned_a + turned_b);
+  const Vec3 response_a = moving.inverse_inertia[row.a] * row.normal;
+  const Vec3 response_b = moving.inverse_inertia[row.b] * row.normal;
+  const Real inverse_effective_mass = dot(row.normal, response_a + response_b);
   if (!(inverse_effective_mass > 0)) return;
   const Real stop = -spin(row) / inverse_effective_mass;
-  const Real impulse = stop > most ? most : stop < -most ? -most : stop;
-  moving.angular_velocity[row.a] += turned_a * impulse;
-  moving.angular_velocity[row.b] -= turned_b * impulse;
+  const Real impulse = stop > limit ? limit : stop < -limit ? -limit : stop;
+  moving.angular_velocity[row.a] += response_a * impulse;
+  moving.angular_velocity[row.b] -= response_b * impulse;
 }
 
 template <class Queue>
-void BasicContactResolver<Queue>::push(std::uint32_t body, const Vec3& arm, const Vec3& impulse) {
+void BasicContactResolver<Queue>::add_impulse(std::uint32_t body, const Vec3& arm,
+                                              const Vec3& impulse) {
   if (!bodies_->movable(body)) return;
   MotionArrays& moving = bodies_->moving;
   moving.velocity[body] += impulse * bodies_->inverse_mass(body);

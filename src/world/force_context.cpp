@@ -1,4 +1,4 @@
-/// What forces may do to bodies.
+/// Application of forces to the bodies of a world.
 #include <jfpx/force.hpp>
 
 #include "src/world/body_store.hpp"
@@ -28,7 +28,7 @@ void ForceContext::link(BodyId a, BodyId b) {
   const bool a_awake = bodies_->moving.awake[first] != 0;
   if (a_awake == (bodies_->moving.awake[second] != 0)) return;
   const std::uint32_t sleeper = a_awake ? second : first;
-  if (bodies_->movable(sleeper)) bodies_->wake_by_touch(sleeper, a_awake ? first : second);
+  if (bodies_->movable(sleeper)) bodies_->wake_by_contact(sleeper, a_awake ? first : second);
 }
 
 }  // namespace JFPX_ABI

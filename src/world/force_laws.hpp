@@ -1,4 +1,4 @@
-/// The laws behind the forces: one function a law, on plain numbers (thesis 4.4.3).
+/// Force laws as functions of plain numbers (thesis 4.4.3).
 #pragma once
 
 #include <jfpx/math.hpp>
@@ -7,13 +7,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// Resistance against moving with `velocity` through a medium.
+/// Drag at `velocity` relative to a medium.
 JFPX_HD inline Vec3 drag_force(const Vec3& velocity, Real linear, Real quadratic) {
   return velocity * -(linear + quadratic * length(velocity));
 }
 
-/// What a spring does to its end a; the other end feels the opposite. Positive length - rest
-/// pulls, negative pushes (erratum E21). A slack spring never pushes.
+/// Force of a spring on its end a; end b receives the opposite. A spring pulls if it is longer than
+/// its rest length and pushes if it is shorter (erratum E21). A slack spring never pushes.
 /// @param span     from end b to end a
 /// @param velocity of end a relative to end b
 JFPX_HD inline Vec3 spring_force(const Vec3& span, const Vec3& velocity, Real stiffness,
@@ -28,14 +28,14 @@ JFPX_HD inline Vec3 spring_force(const Vec3& span, const Vec3& velocity, Real st
   return axis * -pull;
 }
 
-/// Volume of the part of a sphere that lies below a plane at `height` over its centre: a cap.
+/// Volume of the spherical cap below a plane at `height` above the centre.
 JFPX_HD constexpr Real submerged_volume(Real radius, Real height) {
   if (!(height > -radius)) return 0;
   const Real depth = height < radius ? height + radius : 2 * radius;
   return kPi / 3 * depth * depth * (3 * radius - depth);
 }
 
-/// Share of an explosion's peak force at a distance from its centre, `age` after its start.
+/// Fraction of an explosion's peak force at a distance from its centre, `age` after its start.
 JFPX_HD inline Real blast(Real distance, Real age, Real speed, Real thickness, Real duration) {
   if (!(age >= 0 && age < duration)) return 0;
   const Real from_middle = absolute(distance - speed * age) / (thickness / 2);

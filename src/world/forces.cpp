@@ -1,4 +1,4 @@
-/// The forces that come with jfpx: which bodies they find, and what they do to them.
+/// Validation and application of the forces of force.hpp.
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 
@@ -13,7 +13,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// Checks the fields of one force, in the words of all other checks.
+/// Checks the fields of one force, with error messages in the common form.
 class Check {
  public:
   Check(const char* force, const ForceContext& context) : force_(force), context_(context) {}
@@ -64,7 +64,7 @@ class Check {
   const ForceContext& context_;
 };
 
-/// Calls act(id) for the one body, if it lives, or for all that are awake.
+/// Calls act(id) for the given body if it lives and is awake, or for all awake bodies.
 template <class Act>
 void for_awake(const ForceContext& context, const std::optional<BodyId>& body, Act act) {
   if (body) {
@@ -76,7 +76,7 @@ void for_awake(const ForceContext& context, const std::optional<BodyId>& body, A
   }
 }
 
-/// A point of a body, or of the world, and how it moves.
+/// Position and velocity of a point of a body or of the world.
 struct MovingPoint {
   Vec3 position, velocity;
 };
@@ -88,9 +88,9 @@ MovingPoint moving_point(const ForceContext& context, const Attachment& end) {
   return end.body ? moving_point(context.state(*end.body), end.point) : MovingPoint{end.point, {}};
 }
 
-/// The law of Spring and Bungee.
+/// Applies the force of a Spring or a Bungee.
 template <class S>
-void pull_together(ForceContext& context, const S& spring, bool slack) {
+void apply_spring(ForceContext& context, const S& spring, bool slack) {
   for (const Attachment& end : {spring.a, spring.b}) {
     if (end.body && !context.contains(*end.body)) return;
   }
@@ -103,25 +103,26 @@ void pull_together(ForceContext& context, const S& spring, bool slack) {
   if (spring.b.body) context.apply_force_at_point(*spring.b.body, -force, b.position);
 }
 
-/// The law of Aero and AeroControl.
-void blow(ForceContext& context, BodyId body, const Mat3& tensor, const Vec3& point,
-          const Vec3& wind) {
+/// Applies the force of an Aero or an AeroControl.
+void apply_aero(ForceContext& context, BodyId body, const Mat3& tensor, const Vec3& point,
+                const Vec3& wind) {
   if (!context.contains(body) || !context.awake(body)) return;
   const BodyState state = context.state(body);
   const Mat3 axes = to_matrix(state.orientation);
   const MovingPoint surface = moving_point(state, point);
-  const Vec3 through_air = transform_transpose(axes, surface.velocity - wind);
-  context.apply_force_at_point(body, axes * (tensor * through_air), surface.position);
+  const Vec3 airspeed = transform_transpose(axes, surface.velocity - wind);
+  context.apply_force_at_point(body, axes * (tensor * airspeed), surface.position);
 }
 
 Real submerged_volume(const Sphere& sphere, const Vec3& centre, const HalfSpace& liquid) {
   return detail::submerged_volume(sphere.radius, liquid.offset - dot(liquid.normal, centre));
 }
 
-/// The push of the displaced liquid acts in the middle of what it would fill.
-void float_box(ForceContext& context, BodyId body, const Box& box, const Transform& pose,
-               const HalfSpace& liquid, const Vec3& weight) {
-  // Around the origin, so that the middle does not lose digits to the distance from it.
+/// Applies the buoyancy of a box at the centroid of the displaced volume.
+void apply_box_buoyancy(ForceContext& context, BodyId body, const Box& box, const Transform& pose,
+                        const HalfSpace& liquid, const Vec3& weight) {
+  // Computed relative to the centre of the box, so that the centroid keeps its precision far from
+  // the origin.
   const HalfSpace below{liquid.normal, liquid.offset - dot(liquid.normal, pose.origin)};
   detail::Submerged part;
   detail::add_submerged(box, {pose.basis, {}}, below, &part);
@@ -159,12 +160,12 @@ void Drag::operator()(ForceContext& context) const {
 void Spring::validate(const ForceContext& context) const {
   Check("spring", context).spring(a, b, stiffness, damping, rest_length);
 }
-void Spring::operator()(ForceContext& context) const { pull_together(context, *this, false); }
+void Spring::operator()(ForceContext& context) const { apply_spring(context, *this, false); }
 
 void Bungee::validate(const ForceContext& context) const {
   Check("bungee", context).spring(a, b, stiffness, damping, rest_length);
 }
-void Bungee::operator()(ForceContext& context) const { pull_together(context, *this, true); }
+void Bungee::operator()(ForceContext& context) const { apply_spring(context, *this, true); }
 
 void Aero::validate(const ForceContext& context) const {
   const Check check("aero", context);
@@ -173,7 +174,9 @@ void Aero::validate(const ForceContext& context) const {
   check.finite("point", point);
   check.finite("wind", wind);
 }
-void Aero::operator()(ForceContext& context) const { blow(context, body, tensor, point, wind); }
+void Aero::operator()(ForceContext& context) const {
+  apply_aero(context, body, tensor, point, wind);
+}
 
 void AeroControl::validate(const ForceContext& context) const {
   const Check check("aero control", context);
@@ -186,7 +189,7 @@ void AeroControl::validate(const ForceContext& context) const {
   check.require(is_finite(control), "control", control, "finite");
 }
 void AeroControl::operator()(ForceContext& context) const {
-  blow(context, body, tensor(), point, wind);
+  apply_aero(context, body, tensor(), point, wind);
 }
 Mat3 AeroControl::tensor() const {
   const Real share = std::min(absolute(control), Real(1));
@@ -203,22 +206,22 @@ void Buoyancy::validate(const ForceContext& context) const {
   check.alive("body", body);
 }
 void Buoyancy::operator()(ForceContext& context) const {
-  const Vec3 weight = normalized(liquid.normal) * (density * gravity);  // of a cubic metre
+  const Vec3 weight = normalized(liquid.normal) * (density * gravity);  // [N/m^3]
   for_awake(context, body, [&](BodyId id) {
     const BodyState state = context.state(id);
     const Transform pose = make_transform(state.orientation, state.position);
     if (const auto* sphere = std::get_if<Sphere>(&context.shape(id))) {
       context.apply_force(id, weight * submerged_volume(*sphere, state.position, liquid));
     } else if (const auto* box = std::get_if<Box>(&context.shape(id))) {
-      float_box(context, id, *box, pose, liquid, weight);
+      apply_box_buoyancy(context, id, *box, pose, liquid, weight);
     } else if (const auto* compound = std::get_if<Compound>(&context.shape(id))) {
       for (const CompoundPart& part : compound->parts) {
-        const Transform place = pose * make_transform(part.orientation, part.position);
+        const Transform part_pose = pose * make_transform(part.orientation, part.position);
         if (const auto* ball = std::get_if<Sphere>(&part.shape)) {
-          const Vec3 push = weight * submerged_volume(*ball, place.origin, liquid);
-          context.apply_force_at_point(id, push, place.origin);
+          const Vec3 force = weight * submerged_volume(*ball, part_pose.origin, liquid);
+          context.apply_force_at_point(id, force, part_pose.origin);
         } else {
-          float_box(context, id, std::get<Box>(part.shape), place, liquid, weight);
+          apply_box_buoyancy(context, id, std::get<Box>(part.shape), part_pose, liquid, weight);
         }
       }
     }

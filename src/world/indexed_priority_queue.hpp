@@ -1,5 +1,5 @@
-/// A priority queue over the numbers 0..n-1 whose keys can change: largest key first, ties to the
-/// lowest number, which is what a scan from the front would pick.
+/// A priority queue of the numbers 0..n-1 with mutable keys: largest key first; of equal keys, the
+/// lowest number first, as in a linear scan.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,60 +12,60 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// A tournament (Knuth, The Art of Computer Programming 3, 5.2.3, trees of selection) of sixteen
-/// players a match. Most changes leave a match's winner what it was and end there, where a binary
-/// heap would move entries about; a match is lost only by the winner, and is played again within
-/// one cache line. Grows, never shrinks.
+/// A tournament tree (Knuth, The Art of Computer Programming 3, 5.2.3, trees of selection) with
+/// sixteen children per node. Most updates do not change the winner of a node and end there, where
+/// a binary heap would move entries. Only a smaller key of a winner requires a comparison of all
+/// children, which lie in one cache line. Buffers grow and never shrink.
 class IndexedPriorityQueue {
  public:
-  /// Replaces all keys, in O(n). Not empty; no NaN.
+  /// Replaces all keys, in O(n). @param keys not empty, no NaN
   void assign(std::span<const Real> keys);
   /// The number with the largest key, in O(log n).
   std::uint32_t top() const {
-    std::uint32_t winner = 0;
-    for (std::size_t round = count_; round-- > 1;) {
-      winner = winner * kPlayers + rounds_[round].winner[winner];
+    std::uint32_t node = 0;
+    for (std::size_t level = count_; level-- > 1;) {
+      node = node * kChildren + levels_[level].winner[node];
     }
-    return winner;
+    return node;
   }
-  Real key(std::uint32_t number) const { return rounds_[0].key[number]; }
+  Real key(std::uint32_t number) const { return levels_[0].key[number]; }
   /// Changes one key, in O(log n) at most.
   void update(std::uint32_t number, Real key) {
-    rounds_[0].key[number] = key;
-    std::uint32_t player = number;
-    for (std::size_t round = 1; round < count_ && settle(round, player, key); ++round) {
-      key = rounds_[round].key[player /= kPlayers];
+    levels_[0].key[number] = key;
+    std::uint32_t child = number;
+    for (std::size_t level = 1; level < count_ && update_parent(level, child, key); ++level) {
+      key = levels_[level].key[child /= kChildren];
     }
   }
 
  private:
-  static constexpr std::uint32_t kPlayers = 16;
+  static constexpr std::uint32_t kChildren = 16;
 
-  /// Round 0 has the numbers as its players, each later round the winners of the one before. Full
-  /// matches: players that are missing never win.
-  struct Round {
-    std::vector<Real> key;
-    std::vector<std::uint8_t> winner;  ///< of the match that each player won; none in round 0
+  /// Level 0 holds the leaves, each further level the parents of the level below. Levels are padded
+  /// to a multiple of kChildren with keys that never win.
+  struct Level {
+    std::vector<Real> key;             ///< largest key of the subtree
+    std::vector<std::uint8_t> winner;  ///< child with that key; empty in level 0
   };
 
-  /// Brings the match of a player whose key has become `key` up to date. False if nothing changed
-  /// for the rounds after it.
-  bool settle(std::size_t round, std::uint32_t player, Real key) {
-    const std::uint32_t match = player / kPlayers, seat = player % kPlayers;
-    Real& best = rounds_[round].key[match];
-    std::uint8_t& winner = rounds_[round].winner[match];
-    if (seat != winner && (key < best || (key == best && seat > winner))) return false;
-    if (seat == winner && key < best) {
-      play(round, match);
+  /// Updates the parent, in `level`, of a child whose key has become `key`. Returns false if
+  /// nothing changes for the levels above.
+  bool update_parent(std::size_t level, std::uint32_t child, Real key) {
+    const std::uint32_t parent = child / kChildren, position = child % kChildren;
+    Real& best = levels_[level].key[parent];
+    std::uint8_t& winner = levels_[level].winner[parent];
+    if (position != winner && (key < best || (key == best && position > winner))) return false;
+    if (position == winner && key < best) {
+      find_winner(level, parent);
     } else {
       best = key;
-      winner = static_cast<std::uint8_t>(seat);
+      winner = static_cast<std::uint8_t>(position);
     }
     return true;
   }
-  void play(std::size_t round, std::uint32_t match);
+  void find_winner(std::size_t level, std::uint32_t node);
 
-  std::vector<Round> rounds_;  ///< those beyond count_ are kept for their memory
+  std::vector<Level> levels_;  ///< those from count_ on are unused and keep their memory
   std::size_t count_ = 0;
 };
 

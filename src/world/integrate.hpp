@@ -1,4 +1,4 @@
-/// One step of one rigid body's motion, and its memory of having moved (thesis 4.4.2).
+/// Integration of one rigid body over one step, and its mean motion (thesis 4.4.2).
 #pragma once
 
 #include <jfpx/math.hpp>
@@ -23,11 +23,12 @@ JFPX_HD inline Quat integrated_orientation(const Quat& orientation, const Vec3& 
   return normalized(add_scaled(orientation, angular_velocity, dt));
 }
 
-/// Angular velocity after the gyroscopic part of a step: it turns about the axis of the angular
-/// momentum when the moments differ. One Newton step of the implicit equation in body axes (Catto,
-/// Numerical Methods, GDC 2015): never gains energy, where the explicit term explodes.
+/// Angular velocity after the gyroscopic term of a step: with unequal moments of inertia, it
+/// precesses about the angular momentum. One Newton step of the implicit equation in body axes
+/// (Catto, Numerical Methods, GDC 2015), which never gains energy, whereas the explicit term is
+/// unstable.
 /// @param inertia in body axes, up to a common factor
-/// @param axes    of the body, as columns
+/// @param axes    axes of the body, as columns
 JFPX_HD inline Vec3 precessed(const Vec3& angular_velocity, const Mat3& inertia, const Mat3& axes,
                               Real dt) {
   const Vec3 w = transform_transpose(axes, angular_velocity);
@@ -38,8 +39,8 @@ JFPX_HD inline Vec3 precessed(const Vec3& angular_velocity, const Mat3& inertia,
   return axes * (w - inverse * (cross(w, momentum) * dt));
 }
 
-/// Recency-weighted mean of v.v + w.w. `kept` is bias^dt; the mean is capped, so that a body that
-/// was fast for long is not kept awake for long.
+/// Recency-weighted mean of v.v + w.w. `kept` is bias^dt. The cap bounds the time that a fast body
+/// stays awake after it has stopped.
 JFPX_HD constexpr Real mean_motion(Real mean, const Vec3& velocity, const Vec3& angular_velocity,
                                    Real kept, Real cap) {
   const Real now = length_squared(velocity) + length_squared(angular_velocity);

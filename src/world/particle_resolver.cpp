@@ -1,5 +1,5 @@
-/// Deepest contact first, then largest wanted change of velocity first; the neighbours of what
-/// moved are looked at again.
+/// Resolution of particle contacts: the deepest first, then the one with the largest target change
+/// of velocity. Each correction updates the other contacts of its particles.
 #include "src/world/particle_resolver.hpp"
 
 #include "src/world/contact_response.hpp"
@@ -8,25 +8,25 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// Calls act(particle, sign) for the particles of a contact; moving along `sign` times the normal
-/// parts them.
+/// Calls act(particle, sign) for the particles of a contact. A motion along sign * normal separates
+/// them.
 template <class Act>
 void for_both(const ParticleContact& c, Act act) {
   act(c.a, Real(1));
   if (c.b != ParticleContact::kNoParticle) act(c.b, Real(-1));
 }
 
-/// Velocity of a relative to b along the normal; negative when they close.
+/// Velocity of a relative to b along the normal; negative if they approach.
 Real separating(const ParticleContact& c, std::span<const Vec3> velocity) {
   Vec3 relative = velocity[c.a];
   if (c.b != ParticleContact::kNoParticle) relative -= velocity[c.b];
   return dot(relative, c.normal);
 }
 
-/// The same of what the last step's acceleration added: a contact at rest must not bounce on it.
+/// Contribution of the last step's acceleration to separating(); restitution does not apply to it.
 Real separating_from_acceleration(const ParticleContact& c, const ParticleStore& particles) {
-  Vec3 relative = particles.gained(c.a);
-  if (c.b != ParticleContact::kNoParticle) relative -= particles.gained(c.b);
+  Vec3 relative = particles.velocity_gain(c.a);
+  if (c.b != ParticleContact::kNoParticle) relative -= particles.velocity_gain(c.b);
   return dot(relative, c.normal);
 }
 
@@ -39,16 +39,16 @@ void ParticleResolver::list_contacts_of(const ParticleStore& particles,
     for_both(c, [&](std::uint32_t p, Real) { ++first_[p + 1]; });
   }
   for (std::size_t p = 1; p < first_.size(); ++p) first_[p] += first_[p - 1];
-  of_.resize(first_.back());
+  contacts_of_.resize(first_.back());
   next_ = first_;
   for (std::uint32_t i = 0; i < contacts.size(); ++i) {
-    for_both(contacts[i], [&](std::uint32_t p, Real) { of_[next_[p]++] = i; });
+    for_both(contacts[i], [&](std::uint32_t p, Real) { contacts_of_[next_[p]++] = i; });
   }
 }
 
-/// Corrects the contact with the largest key until none is above epsilon.
-/// @param key     how much contact i wants to be corrected
-/// @param correct does it
+/// Corrects the contact with the largest key until no key exceeds epsilon.
+/// @param key     returns the required correction of contact i
+/// @param correct corrects a contact
 template <class Key, class Correct>
 std::uint64_t ParticleResolver::relax(std::span<const ParticleContact> contacts,
                                       std::uint64_t limit, Real epsilon, bool* exhausted, Key key,
@@ -61,7 +61,8 @@ std::uint64_t ParticleResolver::relax(std::span<const ParticleContact> contacts,
     if (!(queue_.key(worst) > epsilon)) return done;
     correct(worst);
     for_both(contacts[worst], [&](std::uint32_t p, Real) {
-      for (std::uint32_t k = first_[p]; k < first_[p + 1]; ++k) queue_.update(of_[k], key(of_[k]));
+      for (std::uint32_t k = first_[p]; k < first_[p + 1]; ++k)
+        queue_.update(contacts_of_[k], key(contacts_of_[k]));
     });
   }
   *exhausted |= queue_.key(queue_.top()) > epsilon;
@@ -82,24 +83,24 @@ void ParticleResolver::resolve(ParticleStore& particles, std::span<const Particl
 
   distance_.resize(contacts.size());
   for (std::size_t i = 0; i < contacts.size(); ++i) distance_[i] = contacts[i].distance;
-  const auto part = [&](std::uint32_t worst) {
+  const auto separate = [&](std::uint32_t worst) {
     const ParticleContact& c = contacts[worst];
-    const Real push = -distance_[worst] / inverse_mass(c);
+    const Real pseudo_impulse = -distance_[worst] / inverse_mass(c);
     for_both(c, [&](std::uint32_t p, Real side) {
-      const Vec3 shift = c.normal * (side * push * particles.inverse_mass(p));
+      const Vec3 shift = c.normal * (side * pseudo_impulse * particles.inverse_mass(p));
       particles.moving.position[p] += shift;
       for (std::uint32_t k = first_[p]; k < first_[p + 1]; ++k) {
-        const ParticleContact& neighbour = contacts[of_[k]];
-        const Real along = dot(neighbour.normal, shift);
-        distance_[of_[k]] += neighbour.a == p ? along : -along;
+        const ParticleContact& neighbor = contacts[contacts_of_[k]];
+        const Real along = dot(neighbor.normal, shift);
+        distance_[contacts_of_[k]] += neighbor.a == p ? along : -along;
       }
     });
   };
   report->position_iterations = relax(
       contacts, limit, settings.position_epsilon, &report->iterations_exhausted,
-      [&](std::uint32_t i) { return -distance_[i]; }, part);
+      [&](std::uint32_t i) { return -distance_[i]; }, separate);
 
-  const auto wanted = [&](std::uint32_t i) {
+  const auto target_change = [&](std::uint32_t i) {
     const ParticleContact& c = contacts[i];
     return detail::target_delta_velocity(separating(c, particles.moving.velocity),
                                          separating_from_acceleration(c, particles), c.restitution,
@@ -107,13 +108,13 @@ void ParticleResolver::resolve(ParticleStore& particles, std::span<const Particl
   };
   const auto bounce = [&](std::uint32_t worst) {
     const ParticleContact& c = contacts[worst];
-    const Real impulse = wanted(worst) / inverse_mass(c);
+    const Real impulse = target_change(worst) / inverse_mass(c);
     for_both(c, [&](std::uint32_t p, Real side) {
       particles.moving.velocity[p] += c.normal * (side * impulse * particles.inverse_mass(p));
     });
   };
   report->velocity_iterations = relax(contacts, limit, settings.velocity_epsilon,
-                                      &report->iterations_exhausted, wanted, bounce);
+                                      &report->iterations_exhausted, target_change, bounce);
 }
 
 }  // namespace JFPX_ABI

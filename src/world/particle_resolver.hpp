@@ -1,4 +1,4 @@
-/// Parts particles that overlap and lets them bounce: the thesis' two loops (4.4.6) without arms.
+/// Contact resolver of particles: the two loops of the thesis (4.4.6) without rotation.
 #pragma once
 
 #include "src/world/indexed_priority_queue.hpp"
@@ -7,10 +7,10 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Owns its buffers, which only grow.
+/// Owns buffers, which grow and never shrink.
 class ParticleResolver {
  public:
-  /// Counts its work in *report.
+  /// Counts its iterations in *report.
   void resolve(ParticleStore& particles, std::span<const ParticleContact> contacts,
                const ParticleSettings& settings, ParticleReport* report);
 
@@ -22,8 +22,8 @@ class ParticleResolver {
 
   IndexedPriorityQueue queue_;
   std::vector<Real> keys_, distance_;
-  /// Contacts of particle p: entries first_[p] to first_[p + 1] of of_.
-  std::vector<std::uint32_t> first_, of_, next_;
+  /// Contacts of particle p: contacts_of_[first_[p]] to contacts_of_[first_[p + 1] - 1].
+  std::vector<std::uint32_t> first_, contacts_of_, next_;
 };
 
 }  // namespace JFPX_ABI

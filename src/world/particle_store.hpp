@@ -1,4 +1,4 @@
-/// The particles of a world: one array per quantity, indexed by ParticleId::index.
+/// Storage of a world's particles: one array per quantity, indexed by ParticleId::index.
 #pragma once
 
 #include <jfpx/particle.hpp>
@@ -9,39 +9,40 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// What a step may change. Copied before each step, so that a failed one leaves no trace.
+/// State that a step changes. Copied before each step, so that a failed step can be undone.
 struct ParticleMotion {
   std::vector<Vec3> position;  ///< [m]
   std::vector<Vec3> velocity;  ///< [m/s]
-  std::vector<Vec3> force;     ///< [N], of the coming step
+  std::vector<Vec3> force;     ///< [N], for the next step
 };
 
-/// Owns the particles, their ids and their free motion. Slots of removed particles are reused
-/// under a new generation; loops run over ids(), in the order of indices.
+/// Owns the particles, their ids and their free motion. The slot of a removed particle is reused
+/// with a new generation. Loops visit ids(), in the order of indices.
 class ParticleStore {
  public:
   explicit ParticleStore(Real dt) : dt_(dt) {}
 
-  /// @param def must have passed validation @throws std::bad_alloc; nothing has changed then
+  /// @param def must have passed validation
+  /// @throws std::bad_alloc without a change
   ParticleId add(const ParticleDef& def);
   /// @param id must be contained
   void remove(ParticleId id) noexcept;
   bool contains(ParticleId id) const noexcept;
   std::span<const ParticleId> ids() const noexcept { return ids_; }
-  /// Slots ever used; indices are below it.
+  /// Number of slots ever used; upper bound of all indices.
   std::size_t capacity() const noexcept { return generation_.size(); }
 
-  /// Puts a particle somewhere; an immovable one stays at rest.
+  /// Replaces position and velocity; an immovable particle stays at rest.
   void set_state(std::uint32_t particle, const ParticleState& state);
-  /// One step of free motion: accelerated, damped once, then moved at the new velocity.
+  /// One step of free motion: acceleration, damping, then motion at the new velocity.
   void integrate();
 
   bool movable(std::uint32_t particle) const { return inverse_mass_[particle] > 0; }
   Real inverse_mass(std::uint32_t particle) const { return inverse_mass_[particle]; }
   Real radius(std::uint32_t particle) const { return radius_[particle]; }
   Real restitution(std::uint32_t particle) const { return restitution_[particle]; }
-  /// [m/s], of the velocity: what the last integrate() added to a particle at rest.
-  Vec3 gained(std::uint32_t particle) const { return gained_[particle]; }
+  /// [m/s], velocity that the last integrate() adds to a particle at rest.
+  Vec3 velocity_gain(std::uint32_t particle) const { return velocity_gain_[particle]; }
 
   ParticleMotion moving;
 
@@ -49,7 +50,7 @@ class ParticleStore {
   void add_slot();
 
   Real dt_;
-  std::vector<Vec3> acceleration_, gained_;
+  std::vector<Vec3> acceleration_, velocity_gain_;
   std::vector<Real> inverse_mass_, radius_, restitution_;
   std::vector<Real> kept_;  ///< damping^dt
   std::vector<std::uint32_t> generation_;

@@ -1,4 +1,4 @@
-/// The step of particles: integrate, detect, resolve.
+/// ParticleWorld: validation and the step of integration, detection and resolution.
 #include <jfpx/error.hpp>
 #include <jfpx/particle.hpp>
 
@@ -92,24 +92,24 @@ struct ParticleWorld::Impl {
   ParticleStore particles;
   std::unique_ptr<SphereCollider> collider;
   ParticleResolver resolver;
-  std::vector<SphereInstance> spheres;   ///< particles that have a size
-  std::vector<std::uint32_t> sphere_of;  ///< the particle behind each of them
+  std::vector<SphereInstance> spheres;     ///< particles with a radius > 0
+  std::vector<std::uint32_t> particle_of;  ///< by sphere
   std::vector<ParticleContact> contacts;
-  ParticleMotion before;  ///< the state that a failed step goes back to
+  ParticleMotion before;  ///< state that an undone step restores
   std::uint64_t steps = 0;
 };
 
 void ParticleWorld::Impl::find_contacts() {
   contacts.clear();
   spheres.clear();
-  sphere_of.clear();
+  particle_of.clear();
   for (const ParticleId id : particles.ids()) {
     if (!(particles.radius(id.index) > 0)) continue;
     spheres.push_back({particles.moving.position[id.index], particles.radius(id.index)});
-    sphere_of.push_back(id.index);
+    particle_of.push_back(id.index);
   }
   for (const SphereContact& c : collider->find_contacts(spheres)) {
-    const std::uint32_t a = sphere_of[c.a], b = sphere_of[c.b];
+    const std::uint32_t a = particle_of[c.a], b = particle_of[c.b];
     if (!particles.movable(a) && !particles.movable(b)) continue;
     const Real restitution = square_root(particles.restitution(a) * particles.restitution(b));
     contacts.push_back({a, b, c.normal, c.distance, restitution});

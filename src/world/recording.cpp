@@ -1,8 +1,8 @@
-/// Recordings: a header, one frame of raw states a step, and a checksum over all of it.
+/// Recordings: a header, one frame of raw states per step, and a checksum of the file.
 ///
 /// Layout, little-endian: magic (8 bytes), version and size of Real (4 bytes each), length of the
-/// header text (8 bytes), the text (JSON), frames of 13 Reals a body, and at the end the number of
-/// frames, the checksum of everything before it, and a closing magic (8 bytes each).
+/// header text (8 bytes), the text (JSON), frames of 13 Reals per body, and at the end the number
+/// of frames, the checksum of all preceding bytes, and a closing magic (8 bytes each).
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
@@ -29,7 +29,7 @@ constexpr std::uint32_t kVersion = 1;
 constexpr std::size_t kRealsPerBody = 13;
 constexpr std::size_t kPrefixSize = 24;
 constexpr std::size_t kTrailerSize = 24;
-/// Frames of no bodies take no bytes, so that any number of them could be claimed.
+/// Frames without bodies are empty, so a file of any size could claim any number of them.
 constexpr std::uint64_t kMaxEmptyFrames = 10'000'000;
 
 static_assert(sizeof(BodyState) == kRealsPerBody * sizeof(Real), "a state has no padding");
@@ -186,7 +186,7 @@ RecordingReader::RecordingReader(const std::string& path) : impl_(std::make_uniq
     hash.add_bytes(frame.data(), frame.size());
   }
   if (impl.frame_size == 0) {
-    // A scene without bodies: each frame added only its length.
+    // A scene without bodies: each frame contributed only its length to the hash.
     if (impl.frames > kMaxEmptyFrames) impl.fail(kCorrupt);
     for (std::uint64_t k = 0; k < impl.frames; ++k) hash.add_bytes(nullptr, 0);
   }
@@ -229,13 +229,13 @@ std::optional<StateDifference> first_difference(std::span<const BodyState> expec
                                                 std::span<const BodyState> actual) {
   const std::size_t common = std::min(expected.size(), actual.size());
   for (std::size_t body = 0; body < common; ++body) {
-    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits are what is compared
+    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): compares bits on purpose
     if (std::memcmp(&expected[body], &actual[body], sizeof(BodyState)) == 0) continue;
     Real e[kRealsPerBody], a[kRealsPerBody];
     std::memcpy(e, &expected[body], sizeof e);
     std::memcpy(a, &actual[body], sizeof a);
     for (const Field& field : kFields) {
-      // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits are what is compared
+      // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): compares bits on purpose
       if (std::memcmp(&e[field.index], &a[field.index], sizeof(Real)) != 0) {
         return StateDifference{static_cast<std::uint32_t>(body), field.name, e[field.index],
                                a[field.index]};

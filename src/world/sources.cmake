@@ -16,7 +16,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/state_hash.cpp
   ${CMAKE_CURRENT_LIST_DIR}/step_view.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sub_shape_table.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/waking.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/wake_propagation.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_access.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_queries.cpp)

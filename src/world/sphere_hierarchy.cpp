@@ -1,5 +1,6 @@
-/// Grows, shrinks, balances and searches the tree of bounding spheres.
-#include <jfpx/broad_phase.hpp>
+/// Insertion, removal, balancing and queries of the tree of bounding spheres.
+#include "src/world/sphere_hierarchy.hpp"
+
 #include <jfpx/error.hpp>
 
 #include "src/base/reserve.hpp"
@@ -26,8 +27,8 @@ void check(const SphereInstance& sphere) {
   throw InvalidArgument("radius is " + to_text(sphere.radius) + "; it must be finite and > 0");
 }
 
-/// Whether a node is too lopsided: one child has more than three quarters of the leaves.
-bool lopsided(std::uint32_t leaves, std::uint32_t of_child) {
+/// Whether one child holds more than three quarters of the leaves.
+bool unbalanced(std::uint32_t leaves, std::uint32_t of_child) {
   return of_child > 2 && std::uint64_t{4} * of_child > std::uint64_t{3} * leaves;
 }
 
@@ -104,7 +105,7 @@ const SphereInstance& SphereHierarchy::sphere(Leaf leaf) const {
   return nodes_[leaf].sphere;
 }
 
-/// Memory may run out: here, before the tree changes, and nowhere else.
+/// The only function that allocates; it runs before the tree changes.
 void SphereHierarchy::reserve_geometric(std::size_t free_nodes) {
   const std::size_t nodes = nodes_.size() + free_nodes - std::min(free_nodes, free_.size());
   jfpx::reserve_geometric(&nodes_, nodes);
@@ -133,7 +134,7 @@ void SphereHierarchy::set_sphere(Index leaf, const SphereInstance& sphere) {
   nodes_[leaf].leaves = 1;
 }
 
-/// Puts a leaf beside the node where the tree grows least by it.
+/// Makes the leaf a sibling of the node that it enlarges least.
 void SphereHierarchy::link(Index leaf) {
   if (root_ == kNone) {
     root_ = leaf;
@@ -145,7 +146,7 @@ void SphereHierarchy::link(Index leaf) {
     const auto [first, second] = nodes_[beside].child;
     const Real by_first = detail::growth(nodes_[first].bounds, bounds);
     const Real by_second = detail::growth(nodes_[second].bounds, bounds);
-    // Coincident spheres grow nothing anywhere: they go where there are fewer.
+    // Coincident spheres enlarge no node; they descend to the child with fewer leaves.
     const bool to_second = by_second < by_first || (!(by_first < by_second) &&
                                                     nodes_[second].leaves < nodes_[first].leaves);
     beside = to_second ? second : first;
@@ -160,7 +161,7 @@ void SphereHierarchy::link(Index leaf) {
   refit_up(parent);
 }
 
-/// Takes a leaf and its parent out; the sibling takes the parent's place.
+/// Removes a leaf and its parent; the sibling replaces the parent.
 void SphereHierarchy::unlink(Index leaf) {
   const Index parent = nodes_[leaf].parent;
   nodes_[leaf].parent = kNone;
@@ -177,11 +178,11 @@ void SphereHierarchy::unlink(Index leaf) {
   refit_up(above);
 }
 
-void SphereHierarchy::replace_child(Index above, Index old, Index by) {
-  if (above == kNone) {
-    root_ = by;
+void SphereHierarchy::replace_child(Index parent, Index old, Index replacement) {
+  if (parent == kNone) {
+    root_ = replacement;
   } else {
-    nodes_[above].child[nodes_[above].child[0] == old ? 0 : 1] = by;
+    nodes_[parent].child[nodes_[parent].child[0] == old ? 0 : 1] = replacement;
   }
 }
 
@@ -192,25 +193,25 @@ void SphereHierarchy::refit(Index node) {
   n.leaves = first.leaves + second.leaves;
 }
 
-/// Refits a node and all above it; then builds the largest lopsided part anew.
+/// Refits a node and all of its ancestors, then rebuilds the largest unbalanced subtree.
 void SphereHierarchy::refit_up(Index node) {
   Index worst = kNone;
   for (; node != kNone; node = nodes_[node].parent) {
     refit(node);
     for (const Index child : nodes_[node].child) {
-      if (lopsided(nodes_[node].leaves, nodes_[child].leaves)) worst = node;
+      if (unbalanced(nodes_[node].leaves, nodes_[child].leaves)) worst = node;
     }
   }
   if (worst == kNone) return;
   const Index parent = nodes_[worst].parent;
   scratch_.clear();
-  take_apart(worst);
+  collect_leaves(worst);
   replace_child(parent, worst, build(scratch_, parent));
   for (Index above = parent; above != kNone; above = nodes_[above].parent) refit(above);
 }
 
-/// Appends the leaves below a node to scratch_ and frees all others, the node itself included.
-void SphereHierarchy::take_apart(Index node) {
+/// Appends the leaves of a subtree to scratch_ and frees all of its inner nodes.
+void SphereHierarchy::collect_leaves(Index node) {
   if (nodes_[node].is_leaf()) {
     scratch_.push_back(node);
     return;
@@ -218,11 +219,11 @@ void SphereHierarchy::take_apart(Index node) {
   const auto [first, second] = nodes_[node].child;
   nodes_[node] = {};
   free_.push_back(node);
-  take_apart(first);
-  take_apart(second);
+  collect_leaves(first);
+  collect_leaves(second);
 }
 
-/// Splits the leaves at the median of the axis along which their centres reach farthest.
+/// Splits the leaves at the median of the axis along which their centres spread most.
 SphereHierarchy::Index SphereHierarchy::build(std::span<Index> leaves, Index parent) {
   if (leaves.size() == 1) {
     nodes_[leaves[0]].parent = parent;
@@ -269,7 +270,7 @@ void SphereHierarchy::add_pairs_between(Index a, Index b, std::vector<SpherePair
     if (touch(first.sphere, second.sphere)) pairs->push_back({std::min(a, b), std::max(a, b)});
     return;
   }
-  // The larger of the two is taken apart: its children are more likely to be clear of the other.
+  // Descend into the larger node: its children are more likely to be clear of the other.
   const bool split_first =
       second.is_leaf() || (!first.is_leaf() && first.bounds.radius > second.bounds.radius);
   const Index whole = split_first ? b : a;

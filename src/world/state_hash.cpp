@@ -1,4 +1,4 @@
-/// The hash that pins a state to the bit.
+/// Hash of the states of all bodies.
 #include <jfpx/body.hpp>
 
 #include "src/base/hash64.hpp"
@@ -9,8 +9,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-// One word for the precision, one for the number of bodies, then 13 for each body: the bits of each
-// Real, widened with zeros.
+// Hashed words: the size of Real, the number of bodies, then 13 words per body, each the
+// zero-extended bits of a Real.
 std::uint64_t state_hash(std::span<const BodyState> states) noexcept {
   using Bits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
   Hash64 hash;

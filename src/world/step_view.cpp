@@ -1,4 +1,4 @@
-/// Reads the body store.
+/// Read access to the body store.
 #include <jfpx/step_view.hpp>
 
 #include "src/world/body_store.hpp"

@@ -1,4 +1,4 @@
-/// Takes bodies apart, and keeps their sub_shapes where they belong.
+/// Decomposition of bodies into sub-shapes, and their poses.
 #include "src/world/sub_shape_table.hpp"
 
 #include <algorithm>
@@ -7,19 +7,18 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// Larger than what the pair tests may find wrongly by rounding, so that a bound never hides a
-/// touch.
+/// Exceeds the rounding errors of the pair tests, so that bounds never exclude a contact.
 constexpr Real kMargin = 1 + 64 * kEpsilon;
 
 Real bounding_radius(const Sphere& sphere) { return sphere.radius; }
 Real bounding_radius(const Box& box) {
-  constexpr Real kSquareIsLost = Real(1e-15);
+  constexpr Real kUnderflowLimit = Real(1e-15);  // below it, squares of floats are inexact or 0
   const Vec3& h = box.half_extents;
   const Real largest = std::max({h.x, h.y, h.z});
-  return largest < kSquareIsLost ? 2 * largest : length(h) * kMargin;
+  return largest < kUnderflowLimit ? 2 * largest : length(h) * kMargin;
 }
 
-/// Calls visit(sub_shape, part or null) for each sub_shape of type T in the body.
+/// Calls visit(sub_shape, part or null) for each sub-shape of type T in the body.
 template <class T, class Visit>
 void for_each_sub_shape(const Shape& shape, Visit visit) {
   if (const auto* whole = std::get_if<T>(&shape)) return visit(*whole, nullptr);
@@ -67,7 +66,7 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
     if (movable) fixed_begin_ = size();
   }
   for (SubShape sub_shape = fixed_begin_; sub_shape < size(); ++sub_shape) {
-    place(bodies, sub_shape);
+    update_pose(bodies, sub_shape);
     if (bodies.kinematic(body_[sub_shape])) kinematic_.push_back(sub_shape);
   }
   for (const BodyId id : bodies.ids()) {
@@ -83,12 +82,13 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
   }
 }
 
-void SubShapeTable::place(const BodyStore& bodies) {
-  for (SubShape sub_shape = 0; sub_shape < fixed_begin_; ++sub_shape) place(bodies, sub_shape);
-  for (const SubShape sub_shape : kinematic_) place(bodies, sub_shape);
+void SubShapeTable::update_poses(const BodyStore& bodies) {
+  for (SubShape sub_shape = 0; sub_shape < fixed_begin_; ++sub_shape)
+    update_pose(bodies, sub_shape);
+  for (const SubShape sub_shape : kinematic_) update_pose(bodies, sub_shape);
 }
 
-void SubShapeTable::place(const BodyStore& bodies, SubShape sub_shape) {
+void SubShapeTable::update_pose(const BodyStore& bodies, SubShape sub_shape) {
   const std::uint32_t body = body_[sub_shape];
   const Vec3& position = bodies.moving.position[body];
   SphereInstance& bounds = bounds_[sub_shape];

@@ -1,4 +1,4 @@
-/// The spheres, boxes and walls that bodies are made of, in flat arrays for the pair tests.
+/// Spheres, boxes and walls of all bodies, in flat arrays for the pair tests.
 #pragma once
 
 #include "src/world/body_store.hpp"
@@ -9,9 +9,9 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// A sub_shape is a body of one shape, or one part of an compound. Pieces are numbered: spheres,
-/// then boxes that can be moved, then those that can't (kinematic ones among them), then
-/// half-spaces and planes; each kind by body, then by part.
+/// A sub-shape is the shape of a simple body, or one part of a compound. Sub-shapes are numbered in
+/// this order: spheres, movable boxes, boxes of mass 0 (also kinematic ones), half-spaces and
+/// planes; within each kind by body, then by part.
 class SubShapeTable {
  public:
   using SubShape = std::uint32_t;
@@ -21,46 +21,45 @@ class SubShapeTable {
     Transform pose;
   };
   struct Wall {
-    HalfSpace solid;  ///< of a plane: what is behind it
+    HalfSpace solid;  ///< for a plane: its back side
     bool two_sided = false;
 
-    /// What is solid for a body whose centre of mass is at `centre`.
+    /// The solid half-space for a body whose centre of mass is at `centre`.
     HalfSpace solid_for(const Vec3& centre) const {
       if (!two_sided || !(dot(solid.normal, centre) < solid.offset)) return solid;
       return {-solid.normal, -solid.offset};
     }
   };
 
-  /// Must be called when bodies came, went, or an immovable one was moved.
+  /// Must be called after bodies were added or removed, or an immovable body was moved.
   void set_bodies(const BodyStore& bodies);
-  /// Puts the sub_shapes where their bodies are now.
-  void place(const BodyStore& bodies);
+  /// Moves the sub-shapes to the current poses of their bodies.
+  void update_poses(const BodyStore& bodies);
 
   std::uint32_t body(SubShape sub_shape) const { return body_[sub_shape]; }
   bool is_sphere(SubShape sub_shape) const { return sub_shape < sphere_count_; }
   bool is_wall(SubShape sub_shape) const { return sub_shape >= bounds_.size(); }
   const PosedBox& box(SubShape sub_shape) const { return boxes_[sub_shape - sphere_count_]; }
   const Wall& wall(SubShape sub_shape) const { return walls_[sub_shape - bounds_.size()]; }
-  /// The sphere itself, or a sphere around the box.
+  /// The sphere itself, or the bounding sphere of the box.
   const SphereInstance& bounds(SubShape sub_shape) const { return bounds_[sub_shape]; }
 
-  /// Of all spheres and movable boxes.
+  /// Bounding spheres of all spheres and movable boxes.
   std::span<const SphereInstance> bounds() const { return {bounds_.data(), fixed_begin_}; }
   SubShape size() const { return static_cast<SubShape>(body_.size()); }
   SubShape fixed_begin() const { return fixed_begin_; }  ///< the first box or wall of mass 0
 
  private:
-  void add_body(const BodyStore& bodies, std::uint32_t body);
-  void place(const BodyStore& bodies, SubShape sub_shape);
+  void update_pose(const BodyStore& bodies, SubShape sub_shape);
 
   SubShape sphere_count_ = 0, fixed_begin_ = 0;
-  std::vector<std::uint32_t> body_;     ///< by sub_shape
+  std::vector<std::uint32_t> body_;     ///< by sub-shape
   std::vector<SphereInstance> bounds_;  ///< of spheres and boxes
   std::vector<PosedBox> boxes_;
   std::vector<Wall> walls_;
-  std::vector<std::uint32_t> part_;  ///< by sphere or box: 0, or 1 + its index in local_
-  std::vector<Transform> local_;     ///< of parts, in body axes
-  std::vector<SubShape> kinematic_;  ///< boxes of mass 0 that move all the same
+  std::vector<std::uint32_t> part_;  ///< by sphere or box: 0, or 1 + index in local_
+  std::vector<Transform> local_;     ///< poses of parts, in body axes
+  std::vector<SubShape> kinematic_;  ///< kinematic boxes
 };
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// How much of a solid lies below a plane, and where the middle of that part is.
+/// Volume and centroid of the part of a solid below a plane.
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -7,16 +7,16 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// The part of a solid below a plane, as sums over its sub_shapes.
+/// The part of a solid below a plane, as sums over tetrahedra.
 struct Submerged {
   Real volume = 0;  ///< [m^3]
-  Vec3 moment;      ///< [m^4], volume times the middle
+  Vec3 moment;      ///< [m^4], volume times centroid
 };
 
-/// A corner of a tetrahedron; below the plane where height <= 0.
+/// A corner of a tetrahedron; below the plane if height <= 0.
 struct Corner {
   Vec3 point;       ///< [m]
-  Real height = 0;  ///< [m], over the plane
+  Real height = 0;  ///< [m], above the plane
 };
 
 JFPX_HD inline void add_tetrahedron(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d,
@@ -26,45 +26,46 @@ JFPX_HD inline void add_tetrahedron(const Vec3& a, const Vec3& b, const Vec3& c,
   sum->moment += (a + b + c + d) * (volume / 4);
 }
 
-/// Where the edge from a corner below to one above passes the plane.
-JFPX_HD constexpr Vec3 passage(const Corner& below, const Corner& above) {
+/// Intersection of the plane with the edge from a corner below to a corner above.
+JFPX_HD constexpr Vec3 intersection(const Corner& below, const Corner& above) {
   return add_scaled(below.point, above.point - below.point,
                     below.height / (below.height - above.height));
 }
 
-/// Adds three tetrahedra that fill the prism between the triangles a and b.
+/// Adds the prism between the triangles a and b, as three tetrahedra.
 JFPX_HD inline void add_prism(const Vec3 (&a)[3], const Vec3 (&b)[3], Submerged* sum) {
   add_tetrahedron(a[0], a[1], a[2], b[0], sum);
   add_tetrahedron(a[1], a[2], b[0], b[1], sum);
   add_tetrahedron(a[2], b[0], b[1], b[2], sum);
 }
 
-/// Adds the part of a tetrahedron below the plane: a tetrahedron, a prism on its side, or what is
-/// left when the tip is cut off, again a prism. Sorts the corners.
+/// Adds the part of a tetrahedron below the plane: a tetrahedron, or a prism if two or three
+/// corners are below. Sorts the corners.
 JFPX_HD inline void add_clipped(Corner (&c)[4], Submerged* sum) {
   int below = 0;
-  for (Corner& place : c) {
-    if (place.height > 0) continue;
-    const Corner corner = place;
-    place = c[below];
-    c[below++] = corner;
+  for (Corner& corner : c) {
+    if (corner.height > 0) continue;
+    const Corner lower = corner;
+    corner = c[below];
+    c[below++] = lower;
   }
   if (below == 0) return;
   if (below == 4) {
     add_tetrahedron(c[0].point, c[1].point, c[2].point, c[3].point, sum);
   } else if (below == 1) {
-    add_tetrahedron(c[0].point, passage(c[0], c[1]), passage(c[0], c[2]), passage(c[0], c[3]), sum);
+    add_tetrahedron(c[0].point, intersection(c[0], c[1]), intersection(c[0], c[2]),
+                    intersection(c[0], c[3]), sum);
   } else if (below == 2) {
-    add_prism({c[0].point, passage(c[0], c[2]), passage(c[0], c[3])},
-              {c[1].point, passage(c[1], c[2]), passage(c[1], c[3])}, sum);
+    add_prism({c[0].point, intersection(c[0], c[2]), intersection(c[0], c[3])},
+              {c[1].point, intersection(c[1], c[2]), intersection(c[1], c[3])}, sum);
   } else {
     add_prism({c[0].point, c[1].point, c[2].point},
-              {passage(c[0], c[3]), passage(c[1], c[3]), passage(c[2], c[3])}, sum);
+              {intersection(c[0], c[3]), intersection(c[1], c[3]), intersection(c[2], c[3])}, sum);
   }
 }
 
-/// A box is six tetrahedra around its diagonal from corner --- to corner +++, one for each order in
-/// which a path along three edges can take the axes (Kuhn's triangulation).
+/// Divides the box into six tetrahedra around its diagonal from corner --- to corner +++, one for
+/// each order of the axes on a path along three edges (Kuhn's triangulation).
 JFPX_HD inline void add_submerged(const Box& box, const Transform& pose, const HalfSpace& liquid,
                                   Submerged* sum) {
   const auto corner = [&](int signs) {

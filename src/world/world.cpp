@@ -1,4 +1,4 @@
-/// The step: forces, integrate, detect, wake, resolve (thesis 4.3). Read this file first.
+/// The step of a world: forces, integration, detection, waking, resolution (thesis 4.3).
 #include <jfpx/error.hpp>
 
 #include "src/world/world_impl.hpp"
@@ -18,27 +18,28 @@ double elapsed_ms(Clock::time_point since, Clock::time_point until) {
   return std::chrono::duration<double, std::milli>(until - since).count();
 }
 
-/// Rounded up: the body in the scene, in the store, in the copy that a step can go back to.
+/// Memory of a body, rounded up: in the scene, in the store and in the copy that undo() restores.
 constexpr std::size_t kBytesPerBody = 1024;
 
 void combine_materials(const BodyStore& bodies, const MaterialSettings& rules,
                        std::vector<Contact>* contacts) {
   for (Contact& c : *contacts) {
-    c.friction = combined(rules.friction, bodies.friction(c.a), bodies.friction(c.b));
-    c.restitution = combined(rules.restitution, bodies.restitution(c.a), bodies.restitution(c.b));
+    const std::uint32_t a = c.a.index, b = c.b.index;
+    c.friction = combined(rules.friction, bodies.friction(a), bodies.friction(b));
+    c.restitution = combined(rules.restitution, bodies.restitution(a), bodies.restitution(b));
   }
 }
 
-/// The first body whose state is not finite or has left the world.
+/// The first body whose state is not finite or that has left the world.
 std::optional<BodyId> find_runaway(const BodyStore& bodies) {
   const MotionArrays& moving = bodies.moving;
   for (const BodyId id : bodies.ids()) {
     const Vec3& x = moving.position[id.index];
     const bool in_world = absolute(x.x) <= kMaxCoordinate && absolute(x.y) <= kMaxCoordinate &&
                           absolute(x.z) <= kMaxCoordinate;
-    // A spin whose square overflows leaves no direction.
-    const bool is_turn = length_squared(moving.orientation[id.index]) > Real(0.5);
-    if (!in_world || !is_turn || !is_finite(moving.orientation[id.index]) ||
+    // An angular velocity whose square overflows makes the orientation zero.
+    const bool is_rotation = length_squared(moving.orientation[id.index]) > Real(0.5);
+    if (!in_world || !is_rotation || !is_finite(moving.orientation[id.index]) ||
         !is_finite(moving.velocity[id.index]) || !is_finite(moving.angular_velocity[id.index])) {
       return id;
     }
@@ -48,7 +49,7 @@ std::optional<BodyId> find_runaway(const BodyStore& bodies) {
 
 }  // namespace
 
-/// False when a body left the finite numbers; the report says which.
+/// Returns false, and names the body in the report, if a state is no longer finite.
 bool World::Impl::advance(StepReport* report) {
   const auto all_finite = [&] {
     const std::optional<BodyId> runaway = find_runaway(bodies);
@@ -69,7 +70,7 @@ bool World::Impl::advance(StepReport* report) {
   contacts_are_new = true;
   contacts.clear();
   report->sphere_contacts = contact_finder.find_contacts(bodies, &contacts);
-  // Text, which may find no memory: while the step can be undone.
+  // Copying the text may fail; here the step can still be undone.
   report->device_failure = contact_finder.collider().device_failure();
   report->contacts = contacts.size();
   combine_materials(bodies, scene.materials, &contacts);
@@ -78,7 +79,7 @@ bool World::Impl::advance(StepReport* report) {
   report->generated_contacts = contacts.size() - report->contacts;
 
   const Clock::time_point detected = Clock::now();
-  waking(contacts, &bodies);
+  propagate_waking(contacts, &bodies);
   const ResolverReport resolved =
       resolver.resolve(bodies, contacts, scene.resolver, report->generated_contacts);
   report->position_iterations = resolved.position_iterations;
@@ -86,7 +87,7 @@ bool World::Impl::advance(StepReport* report) {
   report->iterations_exhausted = resolved.exhausted;
 
   if (!all_finite()) return false;
-  events.update(bodies, std::span(contacts).first(report->contacts));
+  events.update(std::span(contacts).first(report->contacts));
 
   const Clock::time_point end = Clock::now();
   report->integrate_ms = elapsed_ms(start, integrated);

@@ -1,4 +1,4 @@
-/// What users do with a World between two steps: bodies, forces, states.
+/// Access to a World between two steps: bodies, states, forces and contact generators.
 #include <jfpx/error.hpp>
 
 #include "src/scene/scene_validate.hpp"
@@ -18,21 +18,10 @@ void require_finite(const char* name, const Vec3& value) {
 
 }  // namespace
 
-void World::Impl::require_native(const BodyDef& def, std::uint64_t body) {
-  const bool half_space = std::holds_alternative<HalfSpace>(def.shape);
-  if (def.mass > 0 && (half_space || std::holds_alternative<Plane>(def.shape))) {
-    throw InvalidScene("body " + std::to_string(body) + ": mass is " + to_text(def.mass) +
-                       "; it must be 0 for a " +
-                       (half_space ? "half-space, which fills half of the world"
-                                   : "plane, which divides the whole world"));
-  }
-}
-
 BodyId World::add(const BodyDef& body) {
   const std::uint64_t number = impl_->bodies.ids().size();
   validate_body_count(number + 1);
   validate_body(body, number);
-  Impl::require_native(body, number);
   const BodyId id = impl_->bodies.add(body);
   impl_->bodies_changed = true;
   impl_->shows_contacts = false;
@@ -40,11 +29,11 @@ BodyId World::add(const BodyDef& body) {
 }
 
 void World::remove(BodyId id) {
-  const std::uint32_t body = impl_->bodies.require(id);
-  impl_->wake_neighbours(body);
+  impl_->bodies.require(id);
+  impl_->wake_neighbors(id);
   impl_->bodies.remove(id);
-  // The next body to be added may get its index.
-  std::erase_if(impl_->contacts, [body](const Contact& c) { return c.a == body || c.b == body; });
+  // The slot of the body may be reused; no contact may refer to it.
+  std::erase_if(impl_->contacts, [id](const Contact& c) { return c.a == id || c.b == id; });
   impl_->shows_contacts = false;
   impl_->bodies_changed = true;
 }
@@ -78,7 +67,7 @@ void World::set_state(BodyId id, const BodyState& state) {
   const std::uint32_t body = impl_->bodies.require(id);
   const std::string found = find_fault(state);
   if (!found.empty()) throw InvalidArgument("state: " + found);
-  impl_->wake_neighbours(body);
+  impl_->wake_neighbors(id);
   impl_->bodies.set_state(body, state);
   impl_->bodies_changed = true;
 }

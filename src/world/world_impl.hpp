@@ -1,41 +1,35 @@
-/// What a World is made of.
+/// Members of a World and helpers of its functions.
 #pragma once
 
 #include <jfpx/world.hpp>
 
 #include "src/world/body_store.hpp"
+#include "src/world/callback_registry.hpp"
 #include "src/world/contact_events.hpp"
 #include "src/world/contact_finder.hpp"
 #include "src/world/contact_resolver.hpp"
-#include "src/world/registry.hpp"
-#include "src/world/waking.hpp"
+#include "src/world/wake_propagation.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
 struct World::Impl {
-  /// What this engine asks of a body beyond what every scene must be. @throws InvalidScene
-  static void require_native(const BodyDef& def, std::uint64_t body);
-
   Impl(const Scene& given, std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
       : scene(given),
         bodies(given.dt, given.sleep),
         contact_finder(std::move(collider), broad_phase) {
-    for (std::size_t i = 0; i < given.bodies.size(); ++i) {
-      require_native(given.bodies[i], i);
-      bodies.add(given.bodies[i]);
-    }
+    for (const BodyDef& def : given.bodies) bodies.add(def);
   }
 
-  /// Who rested on a body that goes away or is put elsewhere must notice.
-  void wake_neighbours(std::uint32_t body) {
+  /// Wakes the bodies in contact with a body that is removed or moved.
+  void wake_neighbors(BodyId body) {
     for (const Contact& c : contacts) {
-      if (c.a == body) bodies.wake(c.b);
-      if (c.b == body) bodies.wake(c.a);
+      if (c.a == body) bodies.wake(c.b.index);
+      if (c.b == body) bodies.wake(c.a.index);
     }
   }
 
-  /// What comes or goes and acts in every step is news to all bodies, whichever it may act on.
+  /// Wakes all bodies, because a new or removed callback may affect any of them.
   void wake_all() {
     for (const BodyId id : bodies.ids()) bodies.wake(id.index);
   }
@@ -53,18 +47,18 @@ struct World::Impl {
   Scene scene;
   BodyStore bodies;
   ContactFinder contact_finder;
-  Waking waking;
+  WakePropagation propagate_waking;
   ContactResolver resolver;
-  Registry<ForceContext, ForceId> forces{"force"};
-  Registry<ContactContext, ContactGeneratorId> generators{"contact generator"};
-  bool bodies_changed = true;  ///< since the narrow phase last heard of them
-  /// Of the last step that was not undone, whatever has been added since: who rests on whom.
+  CallbackRegistry<ForceContext, ForceId> forces{"force"};
+  CallbackRegistry<ContactContext, ContactGeneratorId> generators{"contact generator"};
+  bool bodies_changed = true;  ///< since the last call of contact_finder.set_bodies()
+  /// Contacts of the last step that was not undone, without those of removed bodies.
   std::vector<Contact> contacts;
   std::vector<Contact> contacts_before;  ///< of the step before it
-  bool contacts_are_new = false;         ///< in a step: they are already of this one
-  bool shows_contacts = false;           ///< users see none after a change or an undone step
+  bool contacts_are_new = false;         ///< during a step: `contacts` belongs to this step
+  bool shows_contacts = false;           ///< false after a change of bodies or an undone step
   ContactEvents events;
-  MotionArrays before;  ///< the state that a failed step goes back to
+  MotionArrays before;  ///< state that an undone step restores
   std::uint64_t steps = 0;
 };
 

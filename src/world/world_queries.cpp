@@ -1,4 +1,4 @@
-/// Rays and overlaps, against all bodies one by one: O(bodies), no structure to keep up to date.
+/// Ray and overlap queries: linear scans over all bodies, without an acceleration structure.
 #include <jfpx/collide.hpp>
 #include <jfpx/error.hpp>
 
@@ -14,21 +14,23 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-[[noreturn]] void refuse(const char* name, const std::string& value, const char* range) {
+[[noreturn]] void throw_invalid(const char* name, const std::string& value, const char* range) {
   throw InvalidArgument(std::string(name) + " is " + value + "; it must be " + range);
 }
 
-void require_place(const char* name, const Vec3& place) {
+void require_position(const char* name, const Vec3& position) {
   for (int i = 0; i < 3; ++i) {
-    if (!(absolute(place[i]) <= kMaxCoordinate))
-      refuse(name, to_text(place), "between -1e9 and 1e9");
+    if (!(absolute(position[i]) <= kMaxCoordinate))
+      throw_invalid(name, to_text(position), "between -1e9 and 1e9");
   }
 }
 
-/// Scaled first, for the square of a short or long vector's length may not be a number of Reals.
+/// Scales by a power of two before normalization, because the square of the length may overflow or
+/// underflow.
 Vec3 unit_direction(const Vec3& v) {
   const Real most = std::max({absolute(v.x), absolute(v.y), absolute(v.z)});
-  if (!is_finite(v) || !(most > 0)) refuse("ray direction", to_text(v), "finite and not zero");
+  if (!is_finite(v) || !(most > 0))
+    throw_invalid("ray direction", to_text(v), "finite and not zero");
   int exponent = 0;
   std::frexp(most, &exponent);
   const auto scaled = [exponent](Real x) { return std::ldexp(x, -exponent); };
@@ -37,9 +39,9 @@ Vec3 unit_direction(const Vec3& v) {
 
 /// A valid ray with a direction of length 1.
 Ray checked(const Ray& ray) {
-  require_place("ray origin", ray.origin);
+  require_position("ray origin", ray.origin);
   if (!(ray.max_distance >= 0)) {
-    refuse("ray max_distance", to_text(ray.max_distance), ">= 0; infinity is allowed");
+    throw_invalid("ray max_distance", to_text(ray.max_distance), ">= 0; infinity is allowed");
   }
   return {ray.origin, unit_direction(ray.direction), ray.max_distance};
 }
@@ -48,11 +50,11 @@ Transform pose_of(const BodyStore& bodies, std::uint32_t body) {
   return make_transform(bodies.moving.orientation[body], bodies.moving.position[body]);
 }
 
-/// Calls visit(shape, pose) for what the body is, or for each part of an compound.
+/// Calls visit(shape, pose) for the shape of the body, or for each part of a compound.
 template <class Visit>
 void for_each_sub_shape(const BodyStore& bodies, std::uint32_t body, const Visit& visit) {
   const Transform pose = pose_of(bodies, body);
-  const auto take_apart = [&](const auto& shape) {
+  const auto visit_parts = [&](const auto& shape) {
     using S = std::decay_t<decltype(shape)>;
     if constexpr (std::is_same_v<S, Compound>) {
       for (const CompoundPart& part : shape.parts) {
@@ -65,7 +67,7 @@ void for_each_sub_shape(const BodyStore& bodies, std::uint32_t body, const Visit
       visit(shape, Transform{});
     }
   };
-  std::visit(take_apart, bodies.shape(body));
+  std::visit(visit_parts, bodies.shape(body));
 }
 
 detail::RayEntry enter(const Ray& ray, const Sphere& sphere, const Transform& pose) {
@@ -79,7 +81,7 @@ detail::RayEntry enter(const Ray& ray, const Wall& wall, const Transform&) {
   return detail::enter(ray.origin, ray.direction, wall);
 }
 
-/// The first entry; of parts at the same distance, the first part's.
+/// The first entry into a body; of parts at the same distance, that of the first part.
 detail::RayEntry enter(const Ray& ray, const BodyStore& bodies, std::uint32_t body) {
   detail::RayEntry first;
   for_each_sub_shape(bodies, body, [&](const auto& shape, const Transform& pose) {
@@ -98,7 +100,7 @@ void for_each_hit(const Ray& given, const BodyStore& bodies, const BodyFilter& f
     const detail::RayEntry entry = enter(ray, bodies, id.index);
     if (!entry.hit || entry.distance > ray.max_distance) continue;
     const Vec3 point = add_scaled(ray.origin, ray.direction, entry.distance);
-    // Nearly parallel to a wall, which it then meets farther away than any Real.
+    // A ray nearly parallel to a wall may intersect it at a distance beyond the range of Real.
     if (!is_finite(point) || (filter && !filter(id))) continue;
     found(RayHit{id, entry.distance, point, entry.normal});
   }
@@ -163,9 +165,9 @@ std::vector<RayHit> World::cast_ray_through(const Ray& ray, const BodyFilter& fi
 }
 
 std::vector<BodyId> World::overlapping(const Sphere& sphere, const Vec3& centre) const {
-  require_place("sphere centre", centre);
+  require_position("sphere centre", centre);
   if (!(sphere.radius > 0 && sphere.radius <= kMaxCoordinate)) {
-    refuse("sphere radius", to_text(sphere.radius), "> 0 and at most 1e9");
+    throw_invalid("sphere radius", to_text(sphere.radius), "> 0 and at most 1e9");
   }
   return bodies_touching(SphereInstance{centre, sphere.radius}, impl_->bodies);
 }
@@ -175,7 +177,7 @@ std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
   const Vec3& h = box.half_extents;
   for (int i = 0; i < 3; ++i) {
     if (!(h[i] > 0 && h[i] <= kMaxCoordinate)) {
-      refuse("box half_extents", to_text(h), "> 0 and at most 1e9 each");
+      throw_invalid("box half_extents", to_text(h), "> 0 and at most 1e9 each");
     }
   }
   const std::string fault = find_fault(BodyState{centre, orientation, {}, {}});

@@ -1,4 +1,5 @@
-/// Vectors, quaternions, matrices and transforms against identities and hand-computed values.
+/// Tests of vectors, quaternions, matrices and transforms against identities and hand-computed
+/// values.
 #include <jfpx/math.hpp>
 #include <jfpx/random.hpp>
 
@@ -27,7 +28,7 @@ TEST(Vec3, CrossProductOfTheAxesIsRightHanded) {
   EXPECT_EQ(cross({0, 0, 1}, {1, 0, 0}), (Vec3{0, 1, 0}));
 }
 
-TEST(Vec3, NormalizedHasLengthOneAndLeavesZeroAlone) {
+TEST(Vec3, NormalizedHasLengthOneAndKeepsZero) {
   EXPECT_NEAR(length(normalized(Vec3{3, -4, 12})), 1, kTolerance);
   EXPECT_EQ(normalized(Vec3{}), Vec3{});
 }
@@ -40,7 +41,7 @@ TEST(Vec3, FiniteMeansNeitherNanNorInfinite) {
   EXPECT_FALSE(is_finite(Vec3{0, 0, std::numeric_limits<Real>::quiet_NaN()}));
 }
 
-TEST(Erratum, E14_a_quarter_turn_about_z_carries_x_to_y) {
+TEST(Erratum, E14_a_quarter_turn_about_z_maps_x_to_y) {
   const Real h = square_root(Real(0.5));
   expect_near(rotate(Quat{h, 0, 0, h}, {1, 0, 0}), {0, 1, 0});
   expect_near(transform_direction(make_transform(Quat{h, 0, 0, h}, {}), {1, 0, 0}), {0, 1, 0});
@@ -52,7 +53,7 @@ TEST(Erratum, E24_default_and_tiny_quaternions_are_the_identity) {
   EXPECT_EQ(normalized(Quat{0, Real(1e-25), 0, 0}), Quat{});
 }
 
-TEST(Erratum, E25_rotating_by_a_small_vector_turns_by_its_length) {
+TEST(Erratum, E25_a_rotation_vector_rotates_by_its_length) {
   const Quat q = rotated_by(Quat{}, {0, 0, Real(0.001)});
   expect_near(rotate(q, {1, 0, 0}), {std::cos(Real(0.001)), std::sin(Real(0.001)), 0}, Real(1e-6));
 }

@@ -1,4 +1,4 @@
-/// The deterministic power against the C library's.
+/// Tests of detail::power() against std::pow().
 #include "src/base/power.hpp"
 
 #include "tests/world/support.hpp"
@@ -26,7 +26,7 @@ TEST(Power, AgreesWithTheCLibrary) {
   }
 }
 
-TEST(Power, IsExactWhereNothingIsLostOrTimeStandsStill) {
+TEST(Power, IsExactForBaseOneAndSimpleExponents) {
   for (const double exponent : {1e-300, 1.0 / 60, 1.0, 1e30}) {
     EXPECT_EQ(detail::power(1, exponent), 1);
   }
@@ -35,7 +35,7 @@ TEST(Power, IsExactWhereNothingIsLostOrTimeStandsStill) {
   EXPECT_EQ(detail::power(0.25, 0.5), 0.5);
 }
 
-TEST(Power, VanishesQuietlyForLongTimesAndSmallBases) {
+TEST(Power, UnderflowsToZeroForLongTimesAndSmallBases) {
   EXPECT_EQ(detail::power(0.5, 1e6), 0);
   EXPECT_EQ(detail::power(1e-300, 2), 0);
   EXPECT_EQ(detail::power(0.5, std::numeric_limits<double>::max()), 0);

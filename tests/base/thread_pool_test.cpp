@@ -1,15 +1,18 @@
-/// The pool runs every chunk once, sleeps, survives exceptions, and can be used again.
+/// Tests of ThreadPool.
 #include "src/base/thread_pool.hpp"
 
 #include <gtest/gtest.h>
 
+#include <cfenv>
+#include <chrono>
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <thread>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
-namespace cpu {
 namespace {
 
 TEST(ThreadPool, RunsEveryChunkOnce) {
@@ -39,7 +42,7 @@ TEST(ThreadPool, RethrowsTheErrorOfTheLowestChunkAndGoesOn) {
         pool.run(100, [](std::size_t i) {
           if (i >= 20) throw std::runtime_error(std::to_string(i));
         });
-        ADD_FAILURE() << "nothing was thrown";
+        ADD_FAILURE() << "no exception was thrown";
       } catch (const std::runtime_error& e) {
         EXPECT_STREQ(e.what(), "20");
       }
@@ -50,7 +53,21 @@ TEST(ThreadPool, RethrowsTheErrorOfTheLowestChunkAndGoesOn) {
   }
 }
 
+TEST(ThreadPool, ComputesInTheFloatingPointEnvironmentOfTheCaller) {
+  ThreadPool pool(4);
+  constexpr std::size_t kChunks = 64;
+  for (const int mode : {FE_TONEAREST, FE_UPWARD, FE_DOWNWARD, FE_TONEAREST}) {
+    std::vector<int> modes(kChunks, -1);
+    std::fesetround(mode);
+    pool.run(kChunks, [&](std::size_t i) {
+      modes[i] = std::fegetround();
+      std::this_thread::sleep_for(std::chrono::microseconds(50));  // so that workers take part
+    });
+    std::fesetround(FE_TONEAREST);
+    EXPECT_EQ(modes, std::vector<int>(kChunks, mode));
+  }
+}
+
 }  // namespace
-}  // namespace cpu
 }  // namespace JFPX_ABI
 }  // namespace jfpx

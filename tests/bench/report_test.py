@@ -1,4 +1,4 @@
-"""Tests of bench/report.py: what it keeps, computes, flags and refuses."""
+"""Tests of bench/report.py: storing, computing, comparing and checking of results."""
 import contextlib
 import io
 import json
@@ -45,7 +45,7 @@ class Store(Folder):
         raw = result(a=1.23456789)
         raw["context"].update(host_name="host", executable="/home/me/x_bench", caches=[1], num_cpus=2)
         raw["context"].pop("machine")
-        raw["context"].update(x86="EPYC", cuda="H200")
+        raw["context"].update(cpu="EPYC", cuda="H200")
         raw["benchmarks"][0]["iterations"] = 7
         dest = self.folder / "new/folder/x_float.json"
         self.assertEqual(self.report("store", self.write("raw.json", raw), dest)[0], 0)
@@ -56,7 +56,7 @@ class Store(Folder):
         self.assertEqual(stored["benchmarks"][0]["real_time"], 1.2346)
         self.assertEqual(stored["benchmarks"][0]["iterations"], 7)
 
-    def test_what_is_no_result_is_refused_by_name(self):
+    def test_an_invalid_result_is_rejected_by_name(self):
         for content in ("", "{", "[]", "{}", '{"context": {}}', '{"context": 3, "benchmarks": []}'):
             path = self.write("raw.json", content)
             status, _, err = self.report("store", path, self.folder / "dest.json")
@@ -70,17 +70,17 @@ class Compare(Folder):
     def changes(self, before, after, limit=0.1):
         return compare.compare(before, after, limit)
 
-    def test_flags_what_changed_by_more_than_a_tenth_and_nothing_else(self):
+    def test_lists_changes_of_more_than_a_tenth_only(self):
         before = result(a=100, b=100, c=100, d=100)
         text, slower = self.changes(before, result(a=109, b=111, c=92, d=90))
-        self.assertEqual(text, "slower   b: 1.11 times as long\nfaster   d: 0.90 times as long")
+        self.assertEqual(text, "slower   b: 1.11 times the time\nfaster   d: 0.90 times the time")
         self.assertTrue(slower)
         self.assertEqual(self.changes(before, result(a=109, b=109, c=92, d=95)),
-                         ("no change over 10%", False))
+                         ("no change above 10%", False))
 
-    def test_names_what_came_and_went(self):
+    def test_lists_added_and_removed_benchmarks(self):
         text, slower = self.changes(result(a=1, b=1), result(b=1, c=1))
-        self.assertEqual(text, "gone     a\nnew      c")
+        self.assertEqual(text, "removed  a\nnew      c")
         self.assertFalse(slower)
 
     def test_does_not_compare_milliseconds_with_microseconds(self):
@@ -88,12 +88,12 @@ class Compare(Folder):
         other["benchmarks"][0]["time_unit"] = "us"
         self.assertIn("units", self.changes(result(a=1), other)[0])
 
-    def test_says_when_the_machines_differ(self):
+    def test_reports_different_machines(self):
         other = result(a=1)
         other["context"]["machine"] = "another"
         self.assertIn("two machines", self.changes(result(a=1), other)[0])
 
-    def test_exit_status_tells_whether_something_got_slower(self):
+    def test_exit_status_is_one_if_a_benchmark_is_slower(self):
         a, b = self.write("a.json", result(x=1)), self.write("b.json", result(x=2))
         self.assertEqual(self.report("compare", a, b)[0], 1)
         self.assertEqual(self.report("compare", b, a)[0], 0)
@@ -102,7 +102,7 @@ class Compare(Folder):
 
 
 class Numbers(unittest.TestCase):
-    def test_crossover_is_where_straight_lines_in_logarithms_meet(self):
+    def test_crossover_uses_log_log_interpolation(self):
         # n^2 / 1000 against 10: equal at n = 100.
         rows = [(n, n * n / 1000, 10) for n in (8, 64, 512)]
         self.assertAlmostEqual(tables.crossover(rows), 100, places=6)
@@ -111,10 +111,10 @@ class Numbers(unittest.TestCase):
 
     def test_crossover_of_the_published_data(self):
         published = results.load(ROOT / "bench/results" / results.THESIS)
-        rows = [(r["spheres"], r["x86_mean_ms"], r["cuda_mean_ms"]) for r in published["rendering_off"]]
-        # Our census of the thesis: 54 as published, straight lines in both logarithms.
+        rows = [(r["spheres"], r["cpu_mean_ms"], r["cuda_mean_ms"]) for r in published["rendering_off"]]
+        # 54 by log-log interpolation of the published data.
         self.assertEqual(round(tables.crossover(rows)), 54)
-        on = [(r["spheres"], r["x86_mean_ms"], r["cuda_mean_ms"]) for r in published["rendering_on"]]
+        on = [(r["spheres"], r["cpu_mean_ms"], r["cuda_mean_ms"]) for r in published["rendering_on"]]
         self.assertEqual(round(tables.crossover(on)), 60)
 
     def test_exponent_of_a_square_is_two(self):
@@ -143,7 +143,7 @@ class Page(Folder):
         rendering = result()
         rendering["context"]["pictures"] = "800 x 600 by a card"
         rendering["benchmarks"] = [
-            {"name": f"rendering/{mode}/x86/32/iterations:1000/manual_time", "real_time": t, "time_unit": "ms",
+            {"name": f"rendering/{mode}/cpu/32/iterations:1000/manual_time", "real_time": t, "time_unit": "ms",
              "iterations": 1000, "first_ms": 2, "median_ms": t, "picture_ms": 7}
             for mode, t in (("off", 0.5), ("on", 0.6))]
         self.write("results/box/rendering_float.json", rendering)
@@ -159,25 +159,25 @@ class Page(Folder):
         self.write(f"results/{results.THESIS}", (ROOT / "bench/results" / results.THESIS).read_text())
         return self.folder / "results"
 
-    def test_holds_the_figures_of_the_files(self):
+    def test_contains_the_numbers_of_the_files_with_the_present_name_of_the_cpu(self):
         out = self.folder / "page.md"
         status, _, err = self.report("tables", "--results", self.machine_folder(), "--out", out)
         self.assertEqual((status, err), (0, ""))
         page = out.read_text()
-        self.assertIn("| gas | 448 | 1300 | 1.00 | 1.50 | x86 all pairs | x86, all pairs | 1.10 |", page)
+        self.assertIn("| gas | 448 | 1300 | 1.00 | 1.50 | cpu all pairs | cpu, all pairs | 1.10 |", page)
         self.assertIn("0.220 (1)", page, "the doubtful point is marked")
         self.assertIn("`x_bench`, 2026-01-02", page)
         # 0.5 against 1 at 32, 4 against 2 at 448: ratios 1/2 and 2, so the geometric mean, 120.
         self.assertIn("from N = 120 here", page)
         self.assertIn("800 x 600 by a card", page)
         # Published at 32: 0.2199 (the file of 16) and 0.4747.
-        self.assertIn("| x86 | 32 | 0.500 | 0.500 | 2.00 | 0.600 | 0.600 | 2.00 | 1.20 | 7.00 | 0.220 (1) | 0.475 "
+        self.assertIn("| cpu | 32 | 0.500 | 0.500 | 2.00 | 0.600 | 0.600 | 2.00 | 1.20 | 7.00 | 0.220 (1) | 0.475 "
                       "| 2.16 (1) |", page)
-        self.assertIn("| gas | x86 | 1.00 | 1.00 | 1.00 |", page, "time grows as N")
-        # 2 kB at 2 GB/s is 1 us, 40 thousand operations at 4 billion a second 10 us; 100 us were taken.
-        self.assertIn("| gas | x86 | 100 |" + " 2.00 | 40.0 | 10.0 |" * 3, page)
+        self.assertIn("| gas | cpu | 1.00 | 1.00 | 1.00 |", page, "time is proportional to N")
+        # 2 kB at 2 GB/s take 1 us, 40 thousand operations at 4 billion per second 10 us, the stage 100 us.
+        self.assertIn("| gas | cpu | 100 |" + " 2.00 | 40.0 | 10.0 |" * 3, page)
 
-    def test_plots_are_drawn_and_repeat_to_the_byte(self):
+    def test_plots_are_drawn_and_reproducible(self):
         try:
             import matplotlib  # noqa: F401
         except ImportError:
@@ -196,24 +196,24 @@ class Check(Folder):
         super().setUp()
         self.write("bench/results/box/x_float.json", result(a=1))
         self.write("README.md", "see bench/results/box/x_float.json")
-        self.write("docs/page.md", "no claim")
+        self.write("docs/page.md", "no citation")
 
     def problems(self):
         status, out, _ = self.report("check", "--root", self.folder)
         return out if status else ""
 
-    def test_finds_nothing_where_all_is_well(self):
+    def test_finds_no_problem_in_valid_results(self):
         self.assertEqual(self.problems(), "")
 
-    def test_finds_a_claim_without_a_file(self):
+    def test_finds_a_citation_without_a_file(self):
         self.write("docs/page.md", "fast: bench/results/gone.md")
         self.assertIn("page.md names bench/results/gone.md", self.problems())
 
     def test_finds_a_broken_file(self):
         self.write("bench/results/box/y.json", "{")
-        self.assertIn("is no JSON", self.problems())
+        self.assertIn("invalid JSON", self.problems())
 
-    def test_finds_what_does_not_say_where_it_is_from(self):
+    def test_finds_a_file_without_its_origin(self):
         for key in ("machine", "date", "command"):
             bad = result(a=1)
             del bad["context"][key]

@@ -1,4 +1,4 @@
-# bench/report.py, and that every figure in the documents rests on a file that is there.
+# Tests of bench/report.py; checks that the result files cited in the documents exist.
 find_program(JFPX_PYTHON3 python3)
 if(JFPX_PYTHON3)
   add_test(NAME bench_report COMMAND ${JFPX_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/bench/report_test.py)

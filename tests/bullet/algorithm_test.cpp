@@ -1,4 +1,4 @@
-/// jfpx's algorithm in a stock dispatcher is not to be told from Bullet's.
+/// jfpx's algorithm in a stock dispatcher gives the same results as Bullet's.
 #include <jfpx/bullet/algorithm.hpp>
 
 #include "tests/bullet/random_world.hpp"
@@ -45,7 +45,7 @@ class Algorithm : public ::testing::Test {
   }
 };
 
-TEST_F(Algorithm, GivesStocksTrajectories) {
+TEST_F(Algorithm, MatchesStockTrajectories) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   Twins twins(options());
@@ -54,7 +54,7 @@ TEST_F(Algorithm, GivesStocksTrajectories) {
   EXPECT_GT(g_created, 80);
 }
 
-TEST_F(Algorithm, ServesChildrenOfCompoundsInEitherOrder) {
+TEST_F(Algorithm, SupportsChildrenOfCompoundsInEitherOrder) {
   Twins twins(options());
   twins.both([](BulletWorld& w) {
     w.add(w.keep(new btBoxShape(btVector3(50, 1, 50))), btVector3(0, -1, 0), 0);
@@ -78,7 +78,7 @@ TEST_F(Algorithm, ServesChildrenOfCompoundsInEitherOrder) {
   EXPECT_GT(g_created, 24);
 }
 
-TEST_F(Algorithm, AnswersContactTestsAlsoAtADistance) {
+TEST_F(Algorithm, SupportsContactTestsAtADistance) {
   struct Report : btCollisionWorld::ContactResultCallback {
     btScalar addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper* a, int, int,
                              const btCollisionObjectWrapper* b, int, int) override {
@@ -106,11 +106,11 @@ TEST_F(Algorithm, AnswersContactTestsAlsoAtADistance) {
     }
   });
   EXPECT_TRUE(twins.compare());
-  EXPECT_GT(far, 0u) << "some pair must be told apart by the threshold";
+  EXPECT_GT(far, 0u) << "the threshold must reject some pair";
   EXPECT_GT(twins.stock().log.size(), 20u);
 }
 
-TEST_F(Algorithm, TreatsSpecialValuesAsStock) {
+TEST_F(Algorithm, MatchesStockForSpecialValues) {
   const btScalar kValues[] = {0,
                               std::numeric_limits<btScalar>::denorm_min(),
                               std::numeric_limits<btScalar>::min(),
@@ -146,11 +146,11 @@ TEST_F(Algorithm, SurvivesAnExhaustedManifoldPool) {
         btCollisionDispatcher::CD_DISABLE_CONTACTPOOL_DYNAMIC_ALLOCATION);
   });
   ASSERT_TRUE(twins.step());
-  EXPECT_EQ(twins.ours().dispatcher->getNumManifolds(), 10) << "the pool must have run out";
+  EXPECT_EQ(twins.ours().dispatcher->getNumManifolds(), 10) << "the pool must be exhausted";
   ASSERT_TRUE(twins.step(20));
 }
 
-TEST_F(Algorithm, MovesRandomWorldsAsStock) {
+TEST_F(Algorithm, MatchesStockInRandomWorlds) {
   const std::uint64_t seed = test_seed();
   RunTotals totals;
   for (std::uint64_t i = 0; i < 200; ++i) {
@@ -162,7 +162,7 @@ TEST_F(Algorithm, MovesRandomWorldsAsStock) {
   }
 }
 
-TEST_F(Algorithm, MakesADispatcherOfOursStepAside) {
+TEST_F(Algorithm, DisablesTheBatchesOfOurDispatcher) {
   SphereSphereAlgorithm::CreateFunc create;
   Twins twins;
   twins.both([&](BulletWorld& w) {

@@ -1,4 +1,4 @@
-/// The global contact callbacks: what they hear, and in which order, is compared entry by entry.
+/// The calls of the global contact callbacks, and their order, are compared entry by entry.
 #include "tests/bullet/twin_worlds.hpp"
 
 namespace jfpx {
@@ -6,7 +6,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// Takes all callbacks off at the end of a test.
+/// Resets all callbacks at the end of a test.
 class ContactCallbacks : public ::testing::Test {
  protected:
   ~ContactCallbacks() override {
@@ -56,12 +56,12 @@ void flag_custom_material(BulletWorld& w, std::size_t stride) {
   }
 }
 
-bool heard(const BulletWorld& w, const std::string& event) {
+bool was_logged(const BulletWorld& w, const std::string& event) {
   return std::any_of(w.log.begin(), w.log.end(),
                      [&](const std::string& entry) { return entry.starts_with(event); });
 }
 
-TEST_F(ContactCallbacks, AllTogetherHearTheSame) {
+TEST_F(ContactCallbacks, AllTogetherReceiveTheSameCalls) {
   gContactAddedCallback = on_added;
   gContactProcessedCallback = on_processed;
   gContactDestroyedCallback = on_destroyed;
@@ -74,12 +74,12 @@ TEST_F(ContactCallbacks, AllTogetherHearTheSame) {
   });
   ASSERT_TRUE(twins.step(60));
   for (const char* event : {"added", "processed", "destroyed", "started", "ended"}) {
-    EXPECT_TRUE(heard(twins.ours(), event)) << event;
+    EXPECT_TRUE(was_logged(twins.ours(), event)) << event;
   }
   EXPECT_EQ(twins.stats().batches, 60u);
 }
 
-TEST_F(ContactCallbacks, EachAloneHearsTheSame) {
+TEST_F(ContactCallbacks, EachAloneReceivesTheSameCalls) {
   for (int which = 0; which < 5; ++which) {
     gContactAddedCallback = which == 0 ? on_added : nullptr;
     gContactProcessedCallback = which == 1 ? on_processed : nullptr;
@@ -98,7 +98,7 @@ TEST_F(ContactCallbacks, EachAloneHearsTheSame) {
   }
 }
 
-TEST_F(ContactCallbacks, AddedWithoutFlaggedBodiesHearsNothingAndBatchesWriteFlat) {
+TEST_F(ContactCallbacks, AddedIsNotCalledWithoutFlaggedBodies) {
   gContactAddedCallback = on_added;
   Twins twins;
   twins.both([](BulletWorld& w) { add_heap(w, 40, 23); });
@@ -107,7 +107,7 @@ TEST_F(ContactCallbacks, AddedWithoutFlaggedBodiesHearsNothingAndBatchesWriteFla
   EXPECT_GT(twins.stats().written, 0u);
 }
 
-TEST_F(ContactCallbacks, SetMidRunAreHeardFromTheNextStep) {
+TEST_F(ContactCallbacks, SetMidRunAreCalledFromTheNextStep) {
   Twins twins;
   twins.both([](BulletWorld& w) {
     add_heap(w, 50, 24);
@@ -117,20 +117,20 @@ TEST_F(ContactCallbacks, SetMidRunAreHeardFromTheNextStep) {
   gContactAddedCallback = on_added;
   gContactDestroyedCallback = on_destroyed;
   ASSERT_TRUE(twins.step(10));
-  // The points of the last step carry user data; now only their end is heard of.
+  // The points of the last step carry user data; only their destruction calls a callback now.
   gContactAddedCallback = nullptr;
   twins.both([](BulletWorld& w) { w.log.clear(); });
   ASSERT_TRUE(twins.step(1));
-  EXPECT_TRUE(heard(twins.ours(), "destroyed"));
+  EXPECT_TRUE(was_logged(twins.ours(), "destroyed"));
   gContactAddedCallback = on_added;
   gContactEndedCallback = on_ended;
   ASSERT_TRUE(twins.step(10));
-  EXPECT_TRUE(heard(twins.ours(), "added"));
-  EXPECT_TRUE(heard(twins.ours(), "destroyed"));
-  EXPECT_TRUE(heard(twins.ours(), "ended"));
+  EXPECT_TRUE(was_logged(twins.ours(), "added"));
+  EXPECT_TRUE(was_logged(twins.ours(), "destroyed"));
+  EXPECT_TRUE(was_logged(twins.ours(), "ended"));
 }
 
-TEST_F(ContactCallbacks, VerifyIsNotHeard) {
+TEST_F(ContactCallbacks, AreNotCalledByVerify) {
   gContactStartedCallback = on_started;
   gContactEndedCallback = on_ended;
   TwinOptions options;
@@ -145,7 +145,7 @@ TEST_F(ContactCallbacks, VerifyIsNotHeard) {
   EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
 }
 
-/// Dispatches the world's own pairs again from inside a dispatch.
+/// Dispatches the world's own pairs again during a dispatch.
 void on_started_dispatch_again(btPersistentManifold* const& manifold) {
   on_started(manifold);
   if (g_current->log.size() > 400) return;  // the inner dispatch starts contacts too
@@ -163,7 +163,7 @@ void on_started_dispatch_again(btPersistentManifold* const& manifold) {
   inside = false;
 }
 
-TEST_F(ContactCallbacks, MayDispatchAnotherCacheFromInside) {
+TEST_F(ContactCallbacks, MayDispatchAnotherCache) {
   gContactStartedCallback = on_started_dispatch_again;
   Twins twins;
   twins.both([](BulletWorld& w) { add_heap(w, 40, 26); });

@@ -1,5 +1,5 @@
-/// What the dispatcher hands to a collider stays as it is where nothing moves: a device, which is
-/// told what differs from the call before in blocks of 4 KiB, is sent nothing then.
+/// The dispatcher's input of a collider does not change if nothing moves. A device receives only
+/// blocks of 4 KiB that differ from the previous call, and therefore nothing.
 #include <jfpx/bullet/scene_world.hpp>
 
 #include <gtest/gtest.h>
@@ -27,17 +27,17 @@ std::size_t differing_blocks(std::span<const T> now, std::span<const T> before) 
   return blocks;
 }
 
-/// Has x86 do the work, and counts what a device would be sent.
+/// Computes on the CPU, and counts the bytes that would be sent to a device.
 class WatchedCollider final : public SphereCollider {
  public:
   explicit WatchedCollider(std::size_t* blocks) : blocks_(blocks) {}
 
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
-    return x86_->find_contacts(spheres);
+    return cpu_->find_contacts(spheres);
   }
   std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
                                          std::span<const SpherePair> pairs) override {
-    return x86_->test_pairs(spheres, pairs);
+    return cpu_->test_pairs(spheres, pairs);
   }
   std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
                                              std::span<const SpherePair> pairs) override {
@@ -45,16 +45,16 @@ class WatchedCollider final : public SphereCollider {
                differing_blocks(pairs, std::span<const SpherePair>(pairs_));
     spheres_.assign(spheres.begin(), spheres.end());
     pairs_.assign(pairs.begin(), pairs.end());
-    return x86_->find_touching(spheres, pairs);
+    return cpu_->find_touching(spheres, pairs);
   }
   Backend backend() const noexcept override { return Backend::cpu; }
-  SphereAlgorithm algorithm() const noexcept override { return x86_->algorithm(); }
+  SphereAlgorithm algorithm() const noexcept override { return cpu_->algorithm(); }
 
  private:
   std::size_t* blocks_;
   std::vector<SphereInstance> spheres_;
   std::vector<SpherePair> pairs_;
-  std::unique_ptr<SphereCollider> x86_ = make_sphere_collider({.backend = Backend::cpu});
+  std::unique_ptr<SphereCollider> cpu_ = make_sphere_collider({.backend = Backend::cpu});
 };
 
 constexpr int kSide = 40;
@@ -88,7 +88,7 @@ bool come_to_rest(SceneWorld* world) {
   return false;
 }
 
-/// Moves a sphere by hand and no farther than its box reaches, so that no pair comes or goes.
+/// Moves a sphere directly, but within its AABB, so that no pair is added or removed.
 void nudge(SceneWorld* world, std::size_t body) {
   btRigidBody* sphere = world->bodies()[body];
   sphere->getWorldTransform().getOrigin() += btVector3(0, btScalar(0.001), 0);
@@ -99,7 +99,7 @@ void dispatch(SceneWorld* world) {
       world->world().getPairCache(), world->world().getDispatchInfo(), &world->dispatcher());
 }
 
-TEST(DeviceTraffic, ListsOfARestingWorldStayAsTheyAre) {
+TEST(DeviceTraffic, ListsOfARestingWorldDoNotChange) {
   std::size_t blocks = 0;
   SceneWorldOptions options;
   options.dispatch.minimum_batch = 0;
@@ -123,7 +123,7 @@ TEST(DeviceTraffic, ListsOfARestingWorldStayAsTheyAre) {
   EXPECT_EQ(blocks, 0u);
 }
 
-TEST(DeviceTraffic, ADeviceIsSentNothingOfARestingWorld) {
+TEST(DeviceTraffic, NothingIsSentForARestingWorld) {
   const auto backends = available_backends();
   const bool usable = std::any_of(
       backends.begin(), backends.end(),

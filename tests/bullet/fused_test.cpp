@@ -1,4 +1,4 @@
-/// Programs whose compiler fuses products and sums are told.
+/// Programs whose compiler fuses products and sums get a warning in the statistics.
 #include "tests/bullet/fused_unit.hpp"
 
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
@@ -9,19 +9,23 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-TEST(FusedProducts, OfAProgramForAnyProcessorAreNotThere) {
+TEST(FusedProducts, AreAbsentFromAProgramForTheBaseline) {
   btDefaultCollisionConfiguration configuration;
   EXPECT_FALSE(fuses_products());
   EXPECT_EQ(CollisionDispatcher(&configuration).stats().warning, "");
+  EXPECT_EQ(CollisionDispatcher(&configuration, make_sphere_collider()).stats().warning, "");
+  EXPECT_EQ(SceneWorld(Scene{}).jfpx_dispatcher()->stats().warning, "");
 }
 
-TEST(FusedProducts, AreFoundAndSaid) {
-  if (!__builtin_cpu_supports("fma")) GTEST_SKIP() << "this processor does not fuse";
+TEST(FusedProducts, AreDetectedAndReported) {
+  if (!__builtin_cpu_supports("fma")) GTEST_SKIP() << "this processor has no FMA";
   btDefaultCollisionConfiguration configuration;
-  CollisionDispatcher dispatcher(&configuration, options_of_fused_unit());
-  EXPECT_NE(dispatcher.stats().warning.find("-ffp-contract=off"), std::string::npos);
-  dispatcher.reset_stats();
-  EXPECT_NE(dispatcher.stats().warning, "") << "what is compiled stays compiled";
+  const auto dispatcher = FusedUnit::dispatcher(&configuration, {});
+  EXPECT_NE(dispatcher->stats().warning.find("-ffp-contract=off"), std::string::npos);
+  dispatcher->reset_stats();
+  EXPECT_NE(dispatcher->stats().warning, "") << "the warning remains true";
+  EXPECT_NE(FusedUnit::dispatcher(&configuration, make_sphere_collider(), {})->stats().warning, "");
+  EXPECT_NE(FusedUnit::scene_world(Scene{}, {})->jfpx_dispatcher()->stats().warning, "");
 }
 
 }  // namespace

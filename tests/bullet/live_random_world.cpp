@@ -1,4 +1,4 @@
-/// A random world come to life: its bodies, joints and events.
+/// The bodies, joints and events of a running random world.
 #include "tests/bullet/live_random_world.hpp"
 
 #include "tests/bullet/random_world_globals.hpp"
@@ -216,7 +216,7 @@ void LiveWorld::leave(btRigidBody* body) {
 void LiveWorld::reshape(std::size_t i) {
   btRigidBody* body = bodies_[i];
   if (random_.bodies[i].shape == ShapeKind::plane) return;
-  // As Bullet wants it: the pairs are cleaned when the type of a shape changes.
+  // As Bullet requires, the pairs are cleaned when the type of a shape changes.
   if (body->isInWorld()) {
     live_.world.getPairCache()->cleanProxyFromPairs(body->getBroadphaseHandle(),
                                                     live_.dispatcher.get());
@@ -230,7 +230,7 @@ void LiveWorld::reshape(std::size_t i) {
   other_shapes_[i] = now;
 }
 
-void LiveWorld::happen(const RandomEvent& event) {
+void LiveWorld::apply(const RandomEvent& event) {
   btRigidBody *a = bodies_[event.a], *b = bodies_[event.b];
   btDispatcherInfo& info = live_.world.getDispatchInfo();
   switch (event.kind) {

@@ -1,4 +1,4 @@
-/// A random world come to life: one of the two that are compared.
+/// A running random world, one of the two that are compared.
 #pragma once
 
 #include "tests/bullet/random_world.hpp"
@@ -10,7 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Sets g_current while it is made; happen() and step() want it set by the caller.
+/// Sets g_current during construction; the caller must set it for apply() and step().
 class LiveWorld {
  public:
   LiveWorld(const RandomWorld& world, MakeDispatcher make_dispatcher, const WorldParts& parts = {});
@@ -19,7 +19,7 @@ class LiveWorld {
   LiveWorld& operator=(const LiveWorld&) = delete;
 
   BulletWorld& live() { return live_; }
-  void happen(const RandomEvent& event);
+  void apply(const RandomEvent& event);
   void set_near_callback(bool on);
   void step();  ///< one stepSimulation(); kinematic bodies are moved before
 
@@ -30,7 +30,7 @@ class LiveWorld {
   void add_body(std::size_t i);
   static void apply_traits(btRigidBody* made, const RandomBody& body);
   static void place(btRigidBody* body, const btVector3& position);
-  /// Puts the body into the world, at its first place if it has left the finite numbers.
+  /// Adds the body to the world, at its initial position if its state is not finite.
   void enter(std::size_t i);
   void add_joint(const RandomJoint& joint);
   void remove_joint(btTypedConstraint* joint);

@@ -1,5 +1,5 @@
-/// Whichever allocation of ours fails in a step of a Bullet world, Bullet's own code does that
-/// part: no exception passes through Bullet, and the bits stay.
+/// If any allocation of jfpx fails in a step of a Bullet world, Bullet's own code does that part.
+/// No exception propagates through Bullet, and the bits are unchanged.
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dynamics_world.hpp>
 
@@ -56,7 +56,8 @@ std::size_t expect_that_nothing_shows(const TwinOptions& options) {
       ours = true;
       const DispatchStats& stats = dispatcher->stats();
       left_to_bullet += stats.fallbacks[static_cast<std::size_t>(Fallback::out_of_memory)];
-      EXPECT_EQ(stats.last_fallback, Fallback::none) << "allocation " << k << ": given up for good";
+      EXPECT_EQ(stats.last_fallback, Fallback::none)
+          << "allocation " << k << ": disabled permanently";
       EXPECT_EQ(stats.device_failure, "") << "allocation " << k;
     }
     twins.both(empty);

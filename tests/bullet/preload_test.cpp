@@ -1,4 +1,4 @@
-/// Programs that were never changed, with and without the preloaded library.
+/// Unmodified programs with and without the preloaded library.
 #include <jfpx/backend.hpp>
 
 #include "tests/support/process.hpp"
@@ -20,7 +20,7 @@ using ::testing::Not;
 
 class Preload : public ::testing::Test {
  protected:
-  // Only matters to builds with a sanitizer, which want to be the first library of a program.
+  // For sanitizer builds, whose run-time library must otherwise be the first of a program.
   Preload() { setenv("ASAN_OPTIONS", "verify_asan_link_order=0:detect_leaks=0", 1); }
 
   static ProcessResult jfpx_command(const std::string& arguments) {
@@ -43,22 +43,22 @@ TEST_F(Preload, KeepsTheHashAndRunsBatches) {
   EXPECT_THAT(ours.output, HasSubstr(stock.output));
   EXPECT_THAT(ours.output, ContainsRegex(std::string(kPrecision) + ": 60 dispatches, 60 batches"));
   EXPECT_THAT(ours.output, ContainsRegex("[1-9][0-9]* touching, [1-9][0-9]* written"));
-  EXPECT_THAT(ours.output, ContainsRegex("verified: [1-9][0-9]* sphere pairs, 0 mismatches"));
-  EXPECT_THAT(ours.output, HasSubstr(": world: 60 updates of all boxes\n"));
-  // In three of the sixty steps rows are in random order, which is left to Bullet.
+  EXPECT_THAT(ours.output, ContainsRegex("verified: [1-9][0-9]* pairs, 0 mismatches\n"));
+  EXPECT_THAT(ours.output, HasSubstr(": world: 60 AABB updates\n"));
+  // In three of the sixty steps, rows are in random order, which is left to Bullet.
   EXPECT_THAT(ours.output,
               ContainsRegex(": solver: 114 groups, [1-9][0-9]* contacts, 57 joints\n"));
   EXPECT_THAT(ours.output, HasSubstr(": groups left to Bullet: 6 (solver mode)\n"));
 }
 
-TEST_F(Preload, OptionsComeBeforeTheEnvironment) {
-  const std::string asked = "JFPX_PRELOAD_BACKEND=x86 " JFPX_TOOL_PATH " preload ";
+TEST_F(Preload, OptionsTakePrecedenceOverTheEnvironment) {
+  const std::string with_variable = "JFPX_PRELOAD_BACKEND=cpu " JFPX_TOOL_PATH " preload ";
   const std::string shows = "-- printenv JFPX_PRELOAD_BACKEND";
-  EXPECT_EQ(run_process(asked + "--backend auto " + shows).output, "auto\n");
-  EXPECT_EQ(run_process(asked + shows).output, "x86\n");
+  EXPECT_EQ(run_process(with_variable + "--backend auto " + shows).output, "auto\n");
+  EXPECT_EQ(run_process(with_variable + shows).output, "cpu\n");
 }
 
-TEST_F(Preload, GivesThePartsThatAreAskedFor) {
+TEST_F(Preload, EnablesOnlyTheRequestedParts) {
   const std::string stock = alone("300").output;
   const auto with = [&](const std::string& options) {
     const ProcessResult ours =
@@ -68,17 +68,17 @@ TEST_F(Preload, GivesThePartsThatAreAskedFor) {
   };
   const std::string solver = with("--parts solver --threads 3 --minimum-batch 0");
   EXPECT_THAT(solver, HasSubstr(": solver: 114 groups"));
-  EXPECT_THAT(solver, Not(HasSubstr("updates of all boxes")));
+  EXPECT_THAT(solver, Not(HasSubstr("AABB updates")));
   EXPECT_THAT(solver, HasSubstr(": 0 dispatches"));
   const std::string others = with("--parts world,dispatcher --threads 0 --minimum-batch 0");
   EXPECT_THAT(others, Not(HasSubstr(": solver: ")));
-  EXPECT_THAT(others, HasSubstr(": world: 60 updates of all boxes"));
+  EXPECT_THAT(others, HasSubstr(": world: 60 AABB updates"));
   EXPECT_THAT(others, HasSubstr(": 60 dispatches, 60 batches"));
   EXPECT_EQ(jfpx_command("preload --parts islands -- echo 2>&1").status, 2);
   EXPECT_EQ(jfpx_command("preload --threads 257 -- echo 2>&1").status, 2);
 }
 
-TEST_F(Preload, SaysWhichSettingsMeanNothingAndRunsWithoutThem) {
+TEST_F(Preload, ReportsInvalidSettingsAndIgnoresThem) {
   const std::string stock = alone("300").output;
   setenv("JFPX_PRELOAD_THREADS", "300", 1);
   setenv("JFPX_PRELOAD_BACKEND", "gpu", 1);
@@ -91,12 +91,12 @@ TEST_F(Preload, SaysWhichSettingsMeanNothingAndRunsWithoutThem) {
   EXPECT_EQ(ours.status, 0);
   EXPECT_THAT(ours.output, HasSubstr(stock));
   EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_THREADS is \"300\"; it must be 0 to 256."));
-  EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_BACKEND is \"gpu\"; it must be auto, x86 or "));
+  EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_BACKEND is \"gpu\"; it must be auto, cpu or "));
   EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_MINIMUM_BATCH is \"-1\"; it must be a whole "));
 }
 
-TEST_F(Preload, SaysWhyThereIsNoGpuAndLeavesAllToBullet) {
-  if (available_backends()[1].usable) GTEST_SKIP() << "there is one";
+TEST_F(Preload, ReportsAMissingGpuAndLeavesEverythingToBullet) {
+  if (available_backends()[1].usable) GTEST_SKIP() << "a GPU is usable";
   setenv("JFPX_PRELOAD_BACKEND", "cuda", 1);
   const ProcessResult ours =
       jfpx_command("preload --summary --minimum-batch 0 -- " JFPX_STOCK_PROGRAM " 300 2>&1");
@@ -108,15 +108,15 @@ TEST_F(Preload, SaysWhyThereIsNoGpuAndLeavesAllToBullet) {
   EXPECT_THAT(ours.output, ContainsRegex(": solver: failed: cuda: [^\n]+\n"));
 }
 
-TEST_F(Preload, FindsThePrecisionOfTheProgramByItself) {
+TEST_F(Preload, DetectsThePrecisionOfTheProgram) {
   const ProcessResult result =
       jfpx_command("preload --summary --minimum-batch 0 -- " JFPX_OTHER_STOCK_PROGRAM " 50 2>&1");
   EXPECT_THAT(result.output, HasSubstr(run_process(JFPX_OTHER_STOCK_PROGRAM " 50").output));
-  EXPECT_THAT(result.output, HasSubstr("60 batches (x86)"));
+  EXPECT_THAT(result.output, HasSubstr("60 batches (cpu)"));
   EXPECT_THAT(result.output, Not(HasSubstr(kPrecision)));
 }
 
-TEST_F(Preload, ServesWorldsInSeveralThreads) {
+TEST_F(Preload, SupportsWorldsInSeveralThreads) {
   const std::string sizes = "200 100 0 1 150 200";
   const ProcessResult ours = jfpx_command(
       "preload --summary --minimum-batch 0 -- " JFPX_STOCK_PROGRAM " " + sizes + " 2>&1");
@@ -144,18 +144,18 @@ TEST_F(Preload, LeavesProgramsWithoutBulletUntouched) {
   EXPECT_EQ(result.output, "--precision double -- x\n");
 }
 
-TEST_F(Preload, SaysThatBulletWasNotUsed) {
+TEST_F(Preload, ReportsThatBulletWasNotUsed) {
   const ProcessResult result = jfpx_command("preload --summary -- " JFPX_STOCK_PROGRAM " 2>&1");
   EXPECT_THAT(result.output, HasSubstr(": Bullet was not used\n"));
 }
 
-TEST_F(Preload, KeepsWhatWasPreloadedBefore) {
+TEST_F(Preload, KeepsOtherPreloadedLibraries) {
   const ProcessResult result = run_process("LD_PRELOAD=libm.so.6 " JFPX_TOOL_PATH
                                            " preload -- sh -c 'echo $LD_PRELOAD' 2>&1");
   EXPECT_THAT(result.output, HasSubstr("libjfpx-bullet-preload.so:libm.so.6"));
 }
 
-TEST_F(Preload, SaysWhyAProgramDoesNotStart) {
+TEST_F(Preload, ReportsWhyAProgramDoesNotStart) {
   const ProcessResult missing = jfpx_command("preload -- /nowhere/at-all --x 2>&1");
   EXPECT_EQ(missing.status, 2);
   EXPECT_EQ(missing.output,
@@ -166,13 +166,13 @@ TEST_F(Preload, SaysWhyAProgramDoesNotStart) {
   EXPECT_EQ(jfpx_command("preload --backend abacus -- echo 2>&1").status, 2);
 }
 
-TEST_F(Preload, LeavesABulletThatItDoesNotKnowAlone) {
-  // The same library under the name of another version, as a distribution would ship it.
+TEST_F(Preload, LeavesAnUnsupportedBulletUnchanged) {
+  // The same library under the name of another version, as a distribution may ship it.
   const test::TemporaryFolder folder;
   const std::string library = folder.file("libBulletCollision-9.so");
   const ProcessResult copied = run_process("cp -L " JFPX_BULLET_COLLISION " " + library + " 2>&1");
   ASSERT_EQ(copied.status, 0) << copied.output;
-  // Listed before the program's own, it is the Bullet that everybody finds.
+  // Listed before the program's own library, it takes precedence in symbol lookup.
   const ProcessResult result =
       run_process("LD_PRELOAD=" + library +
                   " " JFPX_TOOL_PATH " preload --summary -- " JFPX_STOCK_PROGRAM " 30 2>&1");

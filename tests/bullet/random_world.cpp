@@ -1,4 +1,4 @@
-/// Making, printing and shrinking random worlds.
+/// Generation, printing and shrinking of random worlds.
 #include "tests/bullet/random_world.hpp"
 
 #include <algorithm>
@@ -45,8 +45,8 @@ RandomBody random_body(auto& random, const RandomWorld& world, Real edge, bool o
   if (mixed_sizes) body.size *= power_of_ten(random, -2, 1);
   if (chance(random, Real(0.2))) body.size = world.scale;
   body.position = random.uniform_in_box({0, 0, 0}, {edge, edge, edge});
-  // Coincident centres, of spheres only: Bullet's GJK leaves the unused fourth component of the
-  // normal uninitialised there, so that two stock worlds differ.
+  // Coincident centres only for spheres: Bullet's GJK leaves the unused fourth component of the
+  // normal uninitialized there, so that two stock worlds differ.
   if (chance(random, Real(0.05)) && body.shape == ShapeKind::sphere) {
     body.position = {edge / 2, edge / 2, edge / 2};
   }
@@ -105,7 +105,7 @@ RandomWorld draw_world(auto& random) {
     world.breaking_threshold = Real(0.02) * power_of_ten(random, -2, 1);
   if (chance(random, Real(0.3)))
     world.callbacks = static_cast<unsigned>(random.next()) & kAllCallbacks;
-  // Replaced near callbacks mean no batch at all: seldom interesting.
+  // Rare, because replaced near callbacks disable batches.
   if (chance(random, Real(0.8))) world.callbacks &= ~unsigned{kNear};
 
   const std::size_t count = 2 + random.below(chance(random, Real(0.1)) ? 40 : 12);

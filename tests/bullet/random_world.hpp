@@ -1,5 +1,5 @@
-/// Random Bullet worlds as plain values: made from a seed, run with two dispatchers side by side,
-/// and shrunk while they still fail.
+/// Random Bullet worlds as plain values: generated from a seed, run with two dispatchers side by
+/// side, and shrunk while they still fail.
 #pragma once
 
 #include "tests/bullet/twin_worlds.hpp"
@@ -82,7 +82,7 @@ struct RandomEvent {
   unsigned bits = 0;
 };
 
-/// Which global callbacks, and which near callback, are set.
+/// The global callbacks and the near callback that are set.
 enum CallbackBit : unsigned {
   kAdded = 1u << 0,
   kProcessed = 1u << 1,
@@ -118,13 +118,13 @@ struct RandomWorld {
 
 /// The same world for the same seed, in both precisions as far as numbers allow.
 RandomWorld make_random_world(std::uint64_t seed);
-RandomWorld make_random_world(test::Bytes& bytes);  ///< with what a fuzzer wants
-/// The whole world in a form that a person can rebuild.
+RandomWorld make_random_world(test::Bytes& bytes);  ///< from the bytes of a fuzzer
+/// A complete description of the world in readable form.
 std::ostream& operator<<(std::ostream& out, const RandomWorld& world);
 
 using MakeDispatcher = std::unique_ptr<btCollisionDispatcher> (*)(btCollisionConfiguration*,
                                                                   const RandomWorld&);
-/// Bullet's, and ours with the options of the world.
+/// Bullet's dispatcher, and ours with the options of the world.
 std::unique_ptr<btCollisionDispatcher> make_stock(btCollisionConfiguration*, const RandomWorld&);
 std::unique_ptr<btCollisionDispatcher> make_ours(btCollisionConfiguration*, const RandomWorld&);
 
@@ -141,7 +141,7 @@ struct RunTotals {
 std::optional<Failure> run(const RandomWorld& world, RunTotals* totals,
                            MakeDispatcher ours = make_ours);
 
-/// Takes away steps, bodies, joints, events and settings for as long as the world fails.
+/// Removes steps, bodies, joints, events and settings as long as the world fails.
 RandomWorld shrink(RandomWorld world, MakeDispatcher ours = make_ours);
 
 }  // namespace bullet

@@ -1,4 +1,4 @@
-/// Callbacks that log what they hear.
+/// Callbacks that log their calls.
 #include "tests/bullet/random_world_globals.hpp"
 
 #include <cstdio>
@@ -61,7 +61,7 @@ btScalar LoggingReport::addSingleResult(btManifoldPoint& point, const btCollisio
   return 0;
 }
 
-// set_verify() says that it calls combine callbacks twice.
+// set_verify() calls combine callbacks twice, as documented.
 Globals::Globals(const RandomWorld& world) : allowed_(world.verify ? ~unsigned{kCombine} : ~0u) {
   gContactBreakingThreshold = world.breaking_threshold;
   gDeactivationTime = btScalar(0.15);  // runs are too short for two seconds

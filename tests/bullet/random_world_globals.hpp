@@ -1,4 +1,4 @@
-/// Bullet's global settings and callbacks, as a random world wants them.
+/// Bullet's global settings and callbacks for a random world.
 #pragma once
 
 #include "tests/bullet/random_world.hpp"
@@ -7,7 +7,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Changes them, and puts them back at the end. The callbacks write into the log of g_current.
+/// Sets them, and restores them at the end. The callbacks write into the log of g_current.
 class Globals {
  public:
   explicit Globals(const RandomWorld& world);
@@ -15,7 +15,7 @@ class Globals {
   Globals(const Globals&) = delete;
   Globals& operator=(const Globals&) = delete;
 
-  /// Sets the callbacks of these CallbackBits, and takes the others off.
+  /// Sets the callbacks of these CallbackBits, and resets the others.
   void set_callbacks(unsigned bits);
 
  private:

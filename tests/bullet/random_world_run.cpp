@@ -1,4 +1,4 @@
-/// Running a random world twice at once, with Bullet's dispatcher and with another.
+/// Running a random world side by side with Bullet's dispatcher and with another one.
 #include "tests/bullet/live_random_world.hpp"
 #include "tests/bullet/random_world_globals.hpp"
 
@@ -74,7 +74,7 @@ std::optional<Failure> run(const RandomWorld& world, RunTotals* totals, MakeDisp
       if (event->kind == EventKind::callbacks) globals.set_callbacks(event->bits);
       for (LiveWorld* live : both) {
         g_current = &live->live();
-        live->happen(*event);
+        live->apply(*event);
       }
     }
     for (LiveWorld* live : both) {

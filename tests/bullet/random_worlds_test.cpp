@@ -1,5 +1,5 @@
-/// Random Bullet worlds never show which dispatcher they have.
-#include "tests/bullet/stock_elsewhere.hpp"
+/// Random Bullet worlds give the same results with either dispatcher.
+#include "tests/bullet/stack_residue.hpp"
 #include "tests/support/bytes.hpp"
 
 #include <cmath>
@@ -13,7 +13,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-std::uint64_t wanted_steps() { return wanted_world_steps(10'000, 100'000); }
+std::uint64_t wanted_steps() { return world_steps_to_run(10'000, 100'000); }
 
 std::string report(const RandomWorld& world, const Failure& failure) {
   const RandomWorld least = shrink(world);
@@ -23,20 +23,20 @@ std::string report(const RandomWorld& world, const Failure& failure) {
   return out.str();
 }
 
-TEST(RandomWorlds, MoveAsStockWorldsDo) {
+TEST(RandomWorlds, MatchStockWorlds) {
   const std::uint64_t seed = test_seed();
   RunTotals totals;
   int accidents = 0;
   for (std::uint64_t i = 0; totals.steps < wanted_steps(); ++i) {
     const RandomWorld world = make_random_world(seed + i);
     const auto failure = run(world, &totals);
-    if (failure && is_accident_of_stock(world, *failure)) {
+    if (failure && is_stock_nondeterminism(world, *failure)) {
       ++accidents;
       continue;
     }
     ASSERT_FALSE(failure) << "JFPX_TEST_SEED=" << seed + i << '\n' << report(world, *failure);
   }
-  EXPECT_GT(totals.batches, totals.steps / 4) << "worlds without batches show nothing";
+  EXPECT_GT(totals.batches, totals.steps / 4) << "enough worlds must run batches";
   EXPECT_GT(totals.touching, totals.steps / 2);
   EXPECT_GT(totals.written, totals.steps / 4);
   EXPECT_GT(totals.verified, 0u);
@@ -44,7 +44,7 @@ TEST(RandomWorlds, MoveAsStockWorldsDo) {
   RecordProperty("accidents_of_stock", accidents);
 }
 
-/// Finds what the real one finds, but for the distance of small overlaps.
+/// Finds the contacts of the real collider, but changes the distance of small overlaps.
 class SlightlyWrongCollider final : public SphereCollider {
  public:
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
@@ -74,7 +74,7 @@ std::unique_ptr<btCollisionDispatcher> make_slightly_wrong(btCollisionConfigurat
                                                DispatcherOptions{.minimum_batch = 0});
 }
 
-TEST(RandomWorlds, ShowAnErrorOfOneBitAndShrinkToTwoBodies) {
+TEST(RandomWorlds, RevealAnErrorOfOneBitAndShrinkToTwoBodies) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   int failed = 0;
@@ -92,7 +92,7 @@ TEST(RandomWorlds, ShowAnErrorOfOneBitAndShrinkToTwoBodies) {
     fewest_events = std::min<std::size_t>(fewest_events, least.events.size());
     shrunk << least;
   }
-  // About one world of forty shows its error only with a third body near.
+  // About one world in forty reveals its error only with a third body nearby.
   EXPECT_EQ(fewest_bodies, 2u) << shrunk.str();
   EXPECT_LE(fewest_events, 2u) << shrunk.str();
   EXPECT_GT(failed, 3) << "most worlds with touching spheres must fail";
@@ -107,18 +107,18 @@ RandomWorld fuzzed_world(const char* input) {
   return make_random_world(draws);
 }
 bool parts_from_itself(const RandomWorld& world) {
-  return stock_parts_from_stock(world.steps,
-                                [&] { return run(world, nullptr, DispatcherElsewhere::make); });
+  return stock_depends_on_residue(world.steps,
+                                  [&] { return run(world, nullptr, ResidueDispatcher::make); });
 }
 
-/// In the first, leftovers that are the same everywhere make no difference.
-TEST(AccidentsOfStock, AreFound) {
+/// In the first world, equal values everywhere on the stack make no difference.
+TEST(StockNondeterminism, IsDetected) {
   for (const char* world : {sizeof(Real) == 4 ? "huge-leftovers" : "rare-leftovers",
                             "coincident-capsule", "stock-reads-its-stack"}) {
     EXPECT_TRUE(parts_from_itself(fuzzed_world(world))) << world;
   }
 }
-TEST(AccidentsOfStock, AreNotSeenWhereNoneAre) {
+TEST(StockNondeterminism, IsNotReportedForDeterministicWorlds) {
   EXPECT_FALSE(parts_from_itself(fuzzed_world("seed-0")));
 }
 

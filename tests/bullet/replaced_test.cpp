@@ -1,4 +1,4 @@
-/// What a user may replace in a dispatcher: near callback, create function, filters, combine
+/// Parts of a dispatcher that a user may replace: near callback, create function, filters, combine
 /// callbacks. Event logs are compared entry by entry.
 #include "tests/bullet/twin_worlds.hpp"
 
@@ -105,8 +105,8 @@ TEST(ReplacedCreateFunction, MakesAllAlgorithms) {
   EXPECT_EQ(twins.stats().last_fallback, Fallback::create_function);
 }
 
-TEST(ReplacedCreateFunction, LeavesForeignAlgorithmsBehindWhenPutBack) {
-  // After the original function is back, batches run over pairs of both kinds.
+TEST(ReplacedCreateFunction, ForeignAlgorithmsRemainAfterItIsRestored) {
+  // After the original function is restored, batches contain pairs of both kinds.
   LoggingAlgorithm::CreateFunc create;
   btCollisionAlgorithmCreateFunc* original[2] = {};
   Twins twins;
@@ -127,7 +127,7 @@ TEST(ReplacedCreateFunction, LeavesForeignAlgorithmsBehindWhenPutBack) {
   EXPECT_GT(twins.stats().written, 100u) << "Bullet's own must not be";
 }
 
-/// Filters in a subclass, and notes every question.
+/// Filters in a subclass, and logs every call.
 template <class Base>
 class FilteringDispatcher : public Base {
  public:
@@ -138,7 +138,7 @@ class FilteringDispatcher : public Base {
   }
 };
 
-TEST(ReplacedFilter, IsAskedForEveryPairOnceInOrder) {
+TEST(ReplacedFilter, IsCalledOncePerPairInOrder) {
   TwinOptions options;
   options.stock = [](btCollisionConfiguration* c) {
     return std::make_unique<FilteringDispatcher<btCollisionDispatcher>>(c);
@@ -155,7 +155,7 @@ TEST(ReplacedFilter, IsAskedForEveryPairOnceInOrder) {
   EXPECT_GT(twins.stats().written, 100u);
 }
 
-/// A body that notes what it is asked about.
+/// A body that logs the calls of its filter.
 class AskedBody : public btRigidBody {
  public:
   AskedBody(btScalar mass, btCollisionShape* shape, const btVector3& inertia)
@@ -163,12 +163,12 @@ class AskedBody : public btRigidBody {
     m_checkCollideWith = 1;
   }
   bool checkCollideWithOverride(const btCollisionObject* other) const override {
-    log_event("asked " + name_of(this) + " about " + name_of(other));
+    log_event("filtered " + name_of(this) + " with " + name_of(other));
     return btRigidBody::checkCollideWithOverride(other);
   }
 };
 
-TEST(ReplacedFilter, OfABodyIsAskedForEveryPair) {
+TEST(ReplacedFilter, OfABodyIsCalledForEveryPair) {
   Twins twins;
   twins.both([](BulletWorld& w) {
     add_heap(w, 60, 16);
@@ -193,7 +193,7 @@ btScalar logging_combine(const btCollisionObject* a, const btCollisionObject* b)
   return btScalar(0.1) * static_cast<btScalar>((a->getUserIndex() + b->getUserIndex()) % 10);
 }
 
-/// Replaces a global callback for the time of a test.
+/// Replaces a global callback for the duration of a test.
 template <class Callback>
 class Replace {
  public:
@@ -218,7 +218,7 @@ TEST(ReplacedCombineCallback, OfEachKindDecides) {
     Twins twins;
     twins.both([](BulletWorld& w) {
       add_heap(w, 40, 17);
-      // Damping and stiffness are only combined for bodies that have some.
+      // Damping and stiffness are combined only for bodies that have them.
       for (std::size_t i = 0; i < w.bodies.size(); i += 3) {
         w.bodies[i]->setContactStiffnessAndDamping(1000, btScalar(0.3));
       }

@@ -1,4 +1,4 @@
-/// What a scene becomes in Bullet.
+/// Conversion of a scene to Bullet.
 #include <jfpx/bullet/scene_world.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/world.hpp>
@@ -75,7 +75,7 @@ TEST(SceneWorld, DampsByShareKeptPerSecond) {
   EXPECT_NEAR(world.states()[0].angular_velocity.z, 1, 1e-4);
 }
 
-TEST(SceneWorld, CombinesFrictionAndRestitutionAsTheSceneSays) {
+TEST(SceneWorld, CombinesFrictionAndRestitutionByTheRuleOfTheScene) {
   // sqrt(0.81 * 0.25) = 0.45 and sqrt(0.36 * 0.64) = 0.48
   Scene scene;
   scene.bodies = {ball({0, 0, 0}), ball({Real(0.9), 0, 0})};
@@ -92,7 +92,7 @@ TEST(SceneWorld, CombinesFrictionAndRestitutionAsTheSceneSays) {
   EXPECT_NEAR(manifold.getContactPoint(0).m_combinedRestitution, 0.48, 1e-6);
 }
 
-TEST(SceneWorld, MultipliesWhereTheSceneDoesAndRefusesWhatBulletCannotDo) {
+TEST(SceneWorld, MultipliesForTheProductRuleAndRejectsOtherRules) {
   Scene scene;
   scene.bodies = {ball({0, 0, 0}), ball({Real(0.9), 0, 0})};
   scene.bodies[0].friction = scene.bodies[0].restitution = Real(0.5);
@@ -112,8 +112,8 @@ TEST(SceneWorld, MultipliesWhereTheSceneDoesAndRefusesWhatBulletCannotDo) {
       ADD_FAILURE() << to_string(rule);
     } catch (const InvalidScene& error) {
       EXPECT_EQ(error.what(), std::string("scene: materials.restitution is ") + to_string(rule) +
-                                  "; Bullet multiplies what two bodies have, so there it must be "
-                                  "geometric_mean or product");
+                                  "; it must be geometric_mean or product, because Bullet "
+                                  "multiplies the coefficients of two bodies");
     }
     scene.materials = {rule, CombineRule::product};
     EXPECT_THROW(SceneWorld{scene}, InvalidScene);
@@ -140,7 +140,7 @@ TEST(SceneWorld, AKinematicBodyMovesByItsVelocitiesAndPushes) {
   EXPECT_GT(world.states()[0].velocity.x, Real(1.9));
 }
 
-TEST(SceneWorld, TakesADiagonalInertiaAndRefusesAnyOther) {
+TEST(SceneWorld, AcceptsADiagonalInertiaAndRejectsAnyOther) {
   Scene scene;
   scene.bodies = {ball({0, 0, 0}), ball({9, 0, 0})};
   scene.bodies[1].inertia = diagonal({1, 2, Real(2.5)});
@@ -155,7 +155,7 @@ TEST(SceneWorld, TakesADiagonalInertiaAndRefusesAnyOther) {
     ADD_FAILURE();
   } catch (const InvalidScene& error) {
     EXPECT_STREQ(error.what(),
-                 "body 1: inertia has products of inertia; for Bullet it must be diagonal");
+                 "body 1: inertia has products of inertia; it must be diagonal to run in Bullet");
   }
 }
 
@@ -167,7 +167,7 @@ TEST(SceneWorld, PlanesAndBoxesHoldABall) {
     ground.mass = 0;
     if (plane) {
       ground.shape = HalfSpace{{0, 1, 0}, Real(0.25)};
-      ground.position = {3, 3, 3};  // a half-space follows no pose
+      ground.position = {3, 3, 3};  // a half-space ignores the pose
     } else {
       ground.shape = Box{{5, 1, 5}};
       ground.position = {0, Real(-0.75), 0};
@@ -180,7 +180,7 @@ TEST(SceneWorld, PlanesAndBoxesHoldABall) {
   }
 }
 
-/// An angle of two bars: its tensor is not diagonal.
+/// An angle of two bars, whose inertia tensor is not diagonal.
 BodyDef angle_iron(const Vec3& position) {
   BodyDef def = ball(position);
   def.shape = centred({{{.shape = Box{{Real(1.5), Real(0.5), Real(0.5)}}},
@@ -190,7 +190,7 @@ BodyDef angle_iron(const Vec3& position) {
   return def;
 }
 
-TEST(SceneWorld, CompoundsStartAsTheSceneSaysAndHaveTheInertiaOfTheNativeWorld) {
+TEST(SceneWorld, CompoundsStartInTheirPosesWithTheInertiaOfTheNativeWorld) {
   Scene scene;
   scene.dt = Real(1) / 1024;
   scene.bodies = {angle_iron({1, 2, 3})};
@@ -206,7 +206,7 @@ TEST(SceneWorld, CompoundsStartAsTheSceneSaysAndHaveTheInertiaOfTheNativeWorld) 
   EXPECT_NEAR(s.orientation.y, def.orientation.y, 1e-6);
   EXPECT_NEAR(s.orientation.z, def.orientation.z, 1e-6);
 
-  // The same torque on both turns them the same way.
+  // The same torque rotates both in the same way.
   World native(scene);
   const Vec3 torque{2, Real(-1), 3};
   native.apply_torque(native.bodies()[0], torque);
@@ -217,7 +217,7 @@ TEST(SceneWorld, CompoundsStartAsTheSceneSaysAndHaveTheInertiaOfTheNativeWorld) 
   EXPECT_NEAR(length(difference), 0, 2e-3);
 }
 
-TEST(SceneWorld, AnCompoundComesToRestOnTheGround) {
+TEST(SceneWorld, ACompoundComesToRestOnTheGround) {
   Scene scene;
   scene.bodies = {angle_iron({0, 2, 0})};
   BodyDef ground;
@@ -231,7 +231,7 @@ TEST(SceneWorld, AnCompoundComesToRestOnTheGround) {
   EXPECT_LT(world.states()[0].position.y, Real(1.5));
 }
 
-TEST(SceneWorld, ATwoSidedPlaneIsRefusedByName) {
+TEST(SceneWorld, ATwoSidedPlaneIsRejected) {
   Scene scene;
   scene.bodies = {ball({0, 0, 0}), ball({0, 0, 0})};
   scene.bodies[1].shape = Plane{};
@@ -241,12 +241,12 @@ TEST(SceneWorld, ATwoSidedPlaneIsRefusedByName) {
     FAIL();
   } catch (const InvalidScene& error) {
     EXPECT_STREQ(error.what(),
-                 "body 1: shape is a two-sided plane, which Bullet does not have; it must be a "
-                 "half-space or a box to run in Bullet");
+                 "body 1: shape is a two-sided plane, which Bullet does not support; it must "
+                 "be a half-space or a box to run in Bullet");
   }
 }
 
-TEST(SceneWorld, PutsToSleepWhatMaySleep) {
+TEST(SceneWorld, PutsOnlyBodiesToSleepThatMaySleep) {
   for (const bool enabled : {true, false}) {
     Scene scene;
     scene.sleep.enabled = enabled;
@@ -280,7 +280,7 @@ TEST(SceneWorld, StaticBodiesStay) {
   EXPECT_EQ(world.states()[0].position, (Vec3{0, 0, 0}));
 }
 
-TEST(SceneWorld, TimesItsStages) {
+TEST(SceneWorld, MeasuresItsStages) {
   Scene scene;
   for (int i = 0; i < 50; ++i) scene.bodies.push_back(ball({Real(i) * Real(0.9), 0, 0}));
   SceneWorld world(scene);
@@ -303,7 +303,7 @@ TEST(SceneWorld, HashesItsStates) {
   EXPECT_NE(world.state_hash(), before);
 }
 
-TEST(SceneWorld, RefusesABadStepAndABadScene) {
+TEST(SceneWorld, RejectsAnInvalidStepAndAnInvalidScene) {
   SceneWorld world{Scene{}};
   for (const Real dt : {Real(0), Real(-1), kEpsilon, std::numeric_limits<Real>::quiet_NaN(),
                         std::numeric_limits<Real>::infinity()}) {
@@ -314,7 +314,7 @@ TEST(SceneWorld, RefusesABadStepAndABadScene) {
   EXPECT_THROW(SceneWorld{scene}, InvalidScene);
 }
 
-TEST(SceneWorld, CanBeMovedAndHasTheDispatcherAskedFor) {
+TEST(SceneWorld, CanBeMovedAndHasTheRequestedDispatcher) {
   Scene scene;
   scene.bodies = {ball({0, 0, 0})};
   SceneWorld first(scene, {.dispatcher = DispatcherKind::stock});

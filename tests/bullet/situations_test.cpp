@@ -1,4 +1,4 @@
-/// Bullet worlds with more than spheres in them: stock and ours stay the same to the last bit.
+/// Bullet worlds with special bodies and settings: stock and ours stay bit-identical.
 #include "tests/bullet/twin_worlds.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btSimpleBroadphase.h>
@@ -54,7 +54,7 @@ TEST(Situations, SleepersKeepTheirPointsAndWake) {
   ASSERT_TRUE(twins.step(250));
   int asleep = 0;
   for (auto& body : twins.ours().bodies) asleep += body->isActive() ? 0 : 1;
-  EXPECT_GT(asleep, 10) << "the scene must put bodies to sleep to mean anything";
+  EXPECT_GT(asleep, 10) << "the scene must put bodies to sleep";
   twins.both([](BulletWorld& w) { w.add_sphere(1, btVector3(1, 6, 1), 5); });
   ASSERT_TRUE(twins.step(120));
 }
@@ -119,7 +119,7 @@ TEST(Situations, SpecialMaterialFlags) {
         body.setCollisionFlags(body.getCollisionFlags() |
                                btCollisionObject::CF_HAS_FRICTION_ANCHOR);
       }
-      body.setFriction(btScalar(i % 7));  // products beyond the limit of 10
+      body.setFriction(btScalar(i % 7));  // products above the limit of 10
       body.setRollingFriction(btScalar(0.1) * btScalar(i % 5));
       body.setSpinningFriction(btScalar(-3) * btScalar(i % 3));
       body.setRestitution(btScalar(0.1) * btScalar(i % 11));
@@ -130,7 +130,7 @@ TEST(Situations, SpecialMaterialFlags) {
   ASSERT_TRUE(twins.step(80));
 }
 
-TEST(Situations, RadiiChangeByScaleAndByHand) {
+TEST(Situations, RadiiChangeByScalingAndDirectly) {
   Twins twins;
   twins.both([](BulletWorld& w) { add_heap(w, 50, 35); });
   for (int round = 1; round <= 10; ++round) {
@@ -149,14 +149,14 @@ TEST(Situations, RadiiChangeByScaleAndByHand) {
   }
 }
 
-TEST(Situations, ShapesAreExchangedUnderLivingAlgorithms) {
+TEST(Situations, ShapesAreExchangedWhileTheirAlgorithmsExist) {
   Twins twins;
   twins.both([](BulletWorld& w) { add_heap(w, 50, 36); });
   ASSERT_TRUE(twins.step(10));
   twins.both([](BulletWorld& w) {
     auto* cache = w.world.getPairCache();
     for (std::size_t i = 1; i < 20; ++i) {
-      // As Bullet wants it: the pairs are cleaned when the type of shape changes.
+      // As Bullet requires, the pairs are cleaned when the type of the shape changes.
       cache->cleanProxyFromPairs(w.bodies[i]->getBroadphaseHandle(), w.dispatcher.get());
       w.bodies[i]->setCollisionShape(
           w.keep(new btBoxShape(btVector3(btScalar(0.3), btScalar(0.3), btScalar(0.3)))));
@@ -184,7 +184,7 @@ TEST(Situations, ManifoldPoolExhaustedWithoutDynamicAllocation) {
   });
   ASSERT_TRUE(twins.step(60));
   EXPECT_GT(twins.ours().world.getPairCache()->getNumOverlappingPairs(), 40)
-      << "the pool must have run out to mean anything";
+      << "the pool must be exhausted";
 }
 
 TEST(Situations, ContinuousCollisionOfBodies) {
@@ -243,7 +243,7 @@ TEST(Situations, GhostObjectsWithPrivatePairCaches) {
   });
   for (int i = 0; i < 30; ++i) {
     ASSERT_TRUE(twins.step());
-    // What btKinematicCharacterController does: dispatch the ghost's own pairs several times.
+    // As in btKinematicCharacterController, the ghost's own pairs are dispatched several times.
     twins.both([&](BulletWorld& w) {
       auto* ghost = static_cast<btPairCachingGhostObject*>(w.objects[0].get());
       for (int k = 0; k < 3; ++k) {
@@ -296,9 +296,9 @@ TEST(Situations, SortedPairCache) {
   }
 }
 
-TEST(Situations, PointsThatAUserPutIntoAManifoldAreCleared) {
-  // As Bullet's own loader does when it restores a saved world: the spheres are apart, and the next
-  // dispatch must take the points away again.
+TEST(Situations, PointsAddedByTheUserAreCleared) {
+  // As Bullet's loader does when it restores a saved world. The spheres are apart, so the next
+  // dispatch must remove the points.
   Twins twins;
   twins.both([](BulletWorld& w) {
     w.world.setGravity(btVector3(0, 0, 0));
@@ -330,7 +330,7 @@ TEST(Situations, ANegativeBreakingThresholdRefusesShallowPoints) {
   ASSERT_TRUE(twins.step(5));
 }
 
-TEST(Situations, ManifoldsWithBodiesExchangedByHand) {
+TEST(Situations, ManifoldsWhoseBodiesTheUserExchanged) {
   Twins twins;
   twins.both([](BulletWorld& w) { add_heap(w, 40, 45); });
   ASSERT_TRUE(twins.step(2));
@@ -346,7 +346,7 @@ TEST(Situations, ManifoldsWithBodiesExchangedByHand) {
   EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
 }
 
-/// Adds a pair to the cache when it is first asked about one.
+/// Adds a pair to the cache in its first call.
 template <class Base>
 class PairAddingDispatcher : public Base {
  public:
@@ -447,7 +447,7 @@ TEST(Situations, CentresThatAreCoincidentDenormalInfiniteOrNotANumber) {
     for (int i = 0; i < 12; ++i) w.add_sphere(btScalar(0.5), btVector3(0, 0, 0));
   });
   ASSERT_TRUE(twins.dispatch());
-  // The pairs exist; now the centres are moved without the broadphase hearing of it.
+  // The pairs exist; the centres are now moved without an update of the broadphase.
   for (int axis = 0; axis < 3; ++axis) {
     twins.both([&](BulletWorld& w) {
       for (std::size_t i = 0; i < values.size(); ++i) {

@@ -1,4 +1,4 @@
-/// A Bullet world with all our parts where bodies come and go: its memory stays flat.
+/// A Bullet world with all parts of jfpx, with bodies added and removed, does not leak memory.
 #include "tests/support/soak.hpp"
 
 #include <jfpx/bullet/constraint_solver.hpp>
@@ -31,7 +31,7 @@ TEST(Soak, ABulletWorldWithAllOurPartsKeepsItsMemoryFlat) {
   const std::uint64_t steps = test::soak_steps();
   test::expect_flat_memory(steps, [&](std::uint64_t n) {
     if (n % 20 == 0) {
-      // One of the heap is taken out and thrown in again from above.
+      // A body is removed from the heap and dropped again from above.
       btRigidBody* body = w.bodies[1 + random.below(30)].get();
       w.world.removeRigidBody(body);
       btTransform pose = btTransform::getIdentity();

@@ -1,4 +1,5 @@
-/// Bullet's solver on the GPU: random worlds move as stock ones, and x86 takes over when it fails.
+/// The constraint solver on a GPU: random worlds have the results of stock Bullet, and the CPU
+/// replaces a GPU that fails.
 #include <jfpx/bullet/constraint_solver.hpp>
 
 #include "tests/bullet/stock_bits.hpp"
@@ -24,7 +25,7 @@ WorldParts with_our_world(const SolverWorld& world) {
 }
 TEST_F(CudaSolver, MovesRandomWorldsAsStock) {
   const SolverTotals totals = expect_stocks_bits(wanted_solver_steps(), on_cuda, make_stock);
-  EXPECT_GT(totals.on_device, totals.steps / 8) << "groups that x86 solves show nothing";
+  EXPECT_GT(totals.on_device, totals.steps / 8) << "groups that the CPU solves test nothing";
 }
 
 TEST_F(CudaSolver, MovesRandomWorldsAsStockWithOurDispatcherAndWorld) {
@@ -40,7 +41,7 @@ TEST_F(CudaSolver, MovesAHeapAsStockWithContactAndFrictionInEitherOrder) {
   EXPECT_GT(totals.on_device, 0u);
 }
 
-TEST_F(CudaSolver, IsReplacedByX86InTheGroupInWhichItFailsAndSaysSoOnce) {
+TEST_F(CudaSolver, IsReplacedByTheCpuInTheGroupInWhichItFailsAndReportsItOnce) {
   for (long call = 0; call < 100; ++call) {
     Twins twins({.parts = on_cuda({})});
     twins.both([](BulletWorld& w) { add_heap(w, 60, 17); });

@@ -1,8 +1,9 @@
-/// The constraint solver moves worlds as Bullet's does.
+/// The constraint solver has the results of Bullet's solver in random and in specific worlds.
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/error.hpp>
 
+#include "tests/bullet/joint_without_rtti.hpp"
 #include "tests/bullet/stock_bits.hpp"
 
 #include <BulletCollision/CollisionDispatch/btSimulationIslandManager.h>
@@ -21,7 +22,7 @@ namespace {
 
 TEST(ConstraintSolver, MovesRandomWorldsAsStock) {
   const SolverTotals totals = expect_stocks_bits(wanted_solver_steps(), our_solver, make_stock);
-  EXPECT_GT(totals.groups, totals.steps / 4) << "worlds that Bullet solves show nothing";
+  EXPECT_GT(totals.groups, totals.steps / 4) << "worlds that Bullet solves test nothing";
   EXPECT_GT(totals.contacts, totals.steps);
   EXPECT_GT(totals.joints, totals.steps / 20);
   for (std::size_t i = 0; i < kSolverFallbacks; ++i) {
@@ -37,7 +38,7 @@ TEST(DynamicsWorld, MovesRandomWorldsAsStockWithOurDispatcherAndSolver) {
   expect_stocks_bits(wanted_solver_steps() / 4, our_solver_and_world, make_ours);
 }
 
-/// Right but for the last bit of one velocity.
+/// Adds an error of one bit to one velocity.
 class SlightlyWrongSolver final : public ConstraintSolver {
  public:
   using ConstraintSolver::ConstraintSolver;
@@ -82,7 +83,7 @@ TEST(ConstraintSolver, ShowsAnErrorOfOneBitInRandomWorldsAndShrinksThem) {
     fewest_bodies = std::min<std::size_t>(fewest_bodies, least.base.used_bodies());
     shrunk << least;
   }
-  // Rare worlds keep a chain of joints, because without one of them another error comes first.
+  // A few worlds keep a chain of joints, because without one of them another error occurs first.
   EXPECT_LE(fewest_bodies, 3u) << shrunk.str();
   EXPECT_GT(failed, 10) << "most worlds with contacts must fail";
 }
@@ -98,7 +99,7 @@ TEST(ConstraintSolver, HasStocksBitsForAnyThreadsVectorsAndModes) {
       SolverTotals totals;
       const auto failure = run(world, &totals, our_solver_and_world, make_ours);
       EXPECT_FALSE(failure) << threads << " threads, vectors " << vectors << ": " << failure->what;
-      EXPECT_GT(totals.contacts, 12u * 1000u) << "too few to be shared";
+      EXPECT_GT(totals.contacts, 12u * 1000u) << "too few contacts for several threads";
     }
   }
 }
@@ -121,7 +122,7 @@ TEST(ConstraintSolver, LeavesGroupsThatExplodeToBullet) {
   Twins twins({.parts = plain_parts()});
   twins.both([](BulletWorld& w) {
     add_heap(w, 40, 7);
-    // Not a velocity: Bullet takes bodies with infinite boxes out of the simulation.
+    // A force instead of a velocity: Bullet removes bodies with infinite boxes from the simulation.
     constexpr btScalar kHuge = std::numeric_limits<btScalar>::max();
     for (std::size_t i = 1; i < 4; ++i) {
       w.bodies[i]->setMassProps(btScalar(0.01), btVector3(1, 1, 1));
@@ -151,7 +152,7 @@ TEST(ConstraintSolver, UsesRowSolversOfTheUser) {
   EXPECT_GT(fallbacks(twins.ours(), SolverFallback::row_solver), 0u);
 }
 
-/// A joint that does something of its own in every sweep.
+/// A joint that changes velocities itself in every sweep.
 struct OwnJoint final : btPoint2PointConstraint {
   using btPoint2PointConstraint::btPoint2PointConstraint;
   int calls = 0;
@@ -161,7 +162,7 @@ struct OwnJoint final : btPoint2PointConstraint {
   }
 };
 
-TEST(ConstraintSolver, LeavesJointsOfTheUsersClassesToBullet) {
+TEST(ConstraintSolver, LeavesJointsOfUserClassesToBullet) {
   std::vector<std::unique_ptr<OwnJoint>> joints;
   Twins twins({.parts = plain_parts()});
   twins.both([&](BulletWorld& w) {
@@ -173,6 +174,19 @@ TEST(ConstraintSolver, LeavesJointsOfTheUsersClassesToBullet) {
   twins.step(3);
   EXPECT_GT(joints[0]->calls, 0);
   EXPECT_EQ(joints[0]->calls, joints[1]->calls);
+  EXPECT_GT(fallbacks(twins.ours(), SolverFallback::constraints), 0u);
+  twins.both([&](BulletWorld& w) { w.world.removeConstraint(w.world.getConstraint(0)); });
+}
+
+TEST(ConstraintSolver, LeavesJointsWithoutRttiToBullet) {
+  std::vector<std::unique_ptr<btTypedConstraint>> joints;
+  Twins twins({.parts = plain_parts()});
+  twins.both([&](BulletWorld& w) {
+    add_heap(w, 30, 5);
+    joints.push_back(make_joint_without_rtti(*w.bodies[3], *w.bodies[4]));
+    w.world.addConstraint(joints.back().get());
+  });
+  ASSERT_TRUE(twins.step(3));
   EXPECT_GT(fallbacks(twins.ours(), SolverFallback::constraints), 0u);
   twins.both([&](BulletWorld& w) { w.world.removeConstraint(w.world.getConstraint(0)); });
 }
@@ -207,7 +221,7 @@ TEST(DynamicsWorld, LeavesSmallWorldsToBulletFromAnyStepOn) {
   twins.both([&](BulletWorld& w) { add_heap(w, 30, seed); });
   auto& world = dynamic_cast<DynamicsWorld&>(*twins.ours().made_world);
   for (int n = 0; n < 60; ++n) {
-    // 30 bodies move: all of the step is ours, ours at the limit, Bullet's.
+    // 30 bodies move. The limit is far below, reached, and not reached.
     const std::size_t minimum = std::array<std::size_t, 3>{0, 30, 31}[random.below(3)];
     world.set_minimum_batch(minimum);
     ASSERT_EQ(world.minimum_batch(), minimum);
@@ -233,7 +247,7 @@ std::vector<std::pair<int, int>> pairs_of(BulletWorld& world) {
   return pairs;
 }
 
-/// Hears of every overlap that is found, and lets odd neighbours be.
+/// Logs every overlap and rejects pairs with an odd sum of ids.
 struct LoggingFilter final : btOverlapFilterCallback {
   bool needBroadphaseCollision(btBroadphaseProxy* a, btBroadphaseProxy* b) const override {
     log_event("filter " + std::to_string(a->getUid()) + " " + std::to_string(b->getUid()));
@@ -264,7 +278,7 @@ TEST(DynamicsWorld, HasStocksPairsInStocksOrder) {
       if (step == 30) w.world.getPairCache()->setInternalGhostPairCallback(&ghosts);
       if (step == 40) w.world.getPairCache()->setOverlapFilterCallback(&filter);
       if (step == 44) w.world.getPairCache()->setOverlapFilterCallback(nullptr);
-      // Far away and back: leaves of the tree are taken out and put in elsewhere.
+      // Moves a body far away and back, so that its leaf is removed from the tree and reinserted.
       btRigidBody& body = *w.bodies[static_cast<std::size_t>(1 + step * 5)];
       body.translate(btVector3(step % 2 == 0 ? btScalar(100) : btScalar(0.3), 0, 0));
       if (step % 8 == 7) w.world.removeRigidBody(&body);
@@ -272,10 +286,10 @@ TEST(DynamicsWorld, HasStocksPairsInStocksOrder) {
     expect_same_pairs();
     if (HasFatalFailure()) return;
   }
-  EXPECT_GT(most, 1000u) << "too few for tables to grow";
+  EXPECT_GT(most, 1000u) << "too few pairs for the tables to grow";
 }
 
-/// Two worlds of 64 balls that slide on a box, stepped side by side.
+/// Two worlds of 64 balls that slide on a box, which take the same steps.
 class Sliding {
  public:
   explicit Sliding(const WorldParts& stock, const WorldParts& ours)
@@ -286,8 +300,8 @@ class Sliding {
     for (BulletWorld* w : {&stock_, &ours_}) {
       w->add(w->keep(new btBoxShape(btVector3(50, 1, 50))), btVector3(0, -1, 0), 0);
       for (int i = 0; i < 64; ++i) {
-        const btVector3 place{btScalar(i % 8) - 4, btScalar(0.49), btScalar(i / 8) - 4};
-        w->add_sphere(btScalar(0.5), place)->setLinearVelocity(btVector3(1, 0, 0));
+        const btVector3 position{btScalar(i % 8) - 4, btScalar(0.49), btScalar(i / 8) - 4};
+        w->add_sphere(btScalar(0.5), position)->setLinearVelocity(btVector3(1, 0, 0));
       }
     }
   }
@@ -306,7 +320,7 @@ class Sliding {
   BulletWorld stock_, ours_;
 };
 
-/// A user's solver: takes friction away and counts the iterations.
+/// A solver of the user, which removes friction and counts the iterations.
 template <class Base>
 class Slippery final : public Base {
  public:
@@ -347,9 +361,9 @@ TEST(ConstraintSolver, LeavesGroupsToASubclassThatOverridesAStep) {
   EXPECT_GT(mine.stats().fallbacks[static_cast<std::size_t>(SolverFallback::overridden)], 0u);
 }
 
-/// Hears of the joints of every group, also where there are none.
+/// Counts the calls of convertJoints(), including groups without joints.
 template <class Base>
-class JointListener final : public Base {
+class JointCounter final : public Base {
  public:
   int calls = 0;
 
@@ -361,23 +375,23 @@ class JointListener final : public Base {
   }
 };
 
-TEST(ConstraintSolver, LeavesGroupsToASubclassThatListensToJoints) {
+TEST(ConstraintSolver, LeavesGroupsToASubclassThatOverridesConvertJoints) {
   WorldParts stock, ours;
   stock.solver = [] {
-    return std::make_unique<JointListener<btSequentialImpulseConstraintSolver>>();
+    return std::make_unique<JointCounter<btSequentialImpulseConstraintSolver>>();
   };
-  ours.solver = [] { return std::make_unique<JointListener<ConstraintSolver>>(); };
+  ours.solver = [] { return std::make_unique<JointCounter<ConstraintSolver>>(); };
   Sliding worlds(stock, ours);
   worlds.expect_same(5);
   const auto& theirs =
-      dynamic_cast<JointListener<btSequentialImpulseConstraintSolver>&>(*worlds.stock().solver);
-  const auto& mine = dynamic_cast<JointListener<ConstraintSolver>&>(*worlds.ours().solver);
+      dynamic_cast<JointCounter<btSequentialImpulseConstraintSolver>&>(*worlds.stock().solver);
+  const auto& mine = dynamic_cast<JointCounter<ConstraintSolver>&>(*worlds.ours().solver);
   EXPECT_GT(theirs.calls, 0);
   EXPECT_EQ(mine.calls, theirs.calls);
 }
 
-/// Parts nothing by split impulses, once told so: a change of the mode, as in the first step, makes
-/// Bullet forget functions that were set.
+/// Applies no split impulses after soften(). The functions must be set after the first step,
+/// because Bullet resets them when the mode changes.
 template <class Base>
 class Soft final : public Base {
  public:
@@ -393,7 +407,7 @@ TEST(ConstraintSolver, UsesTheSplitImpulsesOfASubclass) {
   ours.solver = [] { return std::make_unique<Soft<ConstraintSolver>>(); };
   Sliding worlds(stock, ours);
   for (BulletWorld* w : {&worlds.stock(), &worlds.ours()}) {
-    w->world.getSolverInfo().m_splitImpulsePenetrationThreshold = 0;  // all that overlaps
+    w->world.getSolverInfo().m_splitImpulsePenetrationThreshold = 0;  // all overlaps
   }
   worlds.expect_same(1);
   auto& theirs = dynamic_cast<Soft<btSequentialImpulseConstraintSolver>&>(*worlds.stock().solver);
@@ -404,8 +418,8 @@ TEST(ConstraintSolver, UsesTheSplitImpulsesOfASubclass) {
   EXPECT_GT(mine.stats().fallbacks[static_cast<std::size_t>(SolverFallback::row_solver)], 0u);
 }
 
-TEST(ConstraintSolver, LeavesSweepsWithoutEndToBullet) {
-  constexpr int kForEver = 1'000'000'000;
+TEST(ConstraintSolver, LeavesEndlessSweepsToBullet) {
+  constexpr int kEndless = 1'000'000'000;
   WorldParts ours;
   ours.solver = our_solver({}).solver;
   for (const bool by_joint : {false, true}) {
@@ -413,11 +427,11 @@ TEST(ConstraintSolver, LeavesSweepsWithoutEndToBullet) {
     for (BulletWorld* w : {&worlds.stock(), &worlds.ours()}) {
       w->world.getSolverInfo().m_leastSquaresResidualThreshold = btScalar(1e30);
       if (!by_joint) {
-        w->world.getSolverInfo().m_numIterations = kForEver;
+        w->world.getSolverInfo().m_numIterations = kEndless;
         continue;
       }
       auto* joint = new btPoint2PointConstraint(*w->bodies[1], btVector3(0, 0, 0));
-      joint->setOverrideNumSolverIterations(kForEver);
+      joint->setOverrideNumSolverIterations(kEndless);
       w->world.addConstraint(joint);
     }
     worlds.expect_same(3);
@@ -446,13 +460,13 @@ struct Throwing final : btSequentialImpulseConstraintSolver {
   bool armed = false;
 };
 
-TEST(DynamicsWorld, ForgetsTheGroupInWhichASolverThrew) {
+TEST(DynamicsWorld, DiscardsTheGroupInWhichASolverThrew) {
   WorldParts stock, ours;
   stock.solver = ours.solver = [] { return std::make_unique<Throwing>(); };
   ours.world = our_world({}).world;
   Sliding worlds(stock, ours);
   for (BulletWorld* w : {&worlds.stock(), &worlds.ours()}) {
-    // All in one group, solved at the end: else Bullet itself would keep bodies that are gone.
+    // One group that is solved at the end: otherwise Bullet itself would keep removed bodies.
     w->world.getSolverInfo().m_minimumSolverBatchSize = 1 << 20;
   }
   worlds.expect_same(5);
@@ -472,7 +486,7 @@ struct CountingManager final : btSimulationIslandManager {
   }
   int stored = 0;
 };
-/// As Bullet's own worlds of multi-bodies do, with a manager of its own.
+/// A world with an island manager of its own, like Bullet's worlds of multi-bodies.
 template <class Base>
 class WithManager final : public Base {
  public:
@@ -488,7 +502,7 @@ class WithManager final : public Base {
   btSimulationIslandManager* bullets_;
 };
 
-TEST(DynamicsWorld, LeavesIslandsToAManagerOfTheUsers) {
+TEST(DynamicsWorld, LeavesIslandsToAManagerOfTheUser) {
   WorldParts stock, ours;
   stock.world = [](auto*... parts) {
     return std::make_unique<WithManager<btDiscreteDynamicsWorld>>(parts...);
@@ -503,7 +517,7 @@ TEST(DynamicsWorld, LeavesIslandsToAManagerOfTheUsers) {
       dynamic_cast<WithManager<btDiscreteDynamicsWorld>&>(worlds.stock().world).manager.stored, 5);
 }
 
-/// Adds a ball when the first pair is found after it was told to.
+/// Adds a ball when the first pair is added while it is armed.
 struct Spawner final : btOverlappingPairCallback {
   explicit Spawner(BulletWorld* w) : world(w) {}
   btBroadphasePair* addOverlappingPair(btBroadphaseProxy*, btBroadphaseProxy*) override {
@@ -542,7 +556,7 @@ TEST(DynamicsWorld, HasStocksPairsWhenACallbackAddsBodies) {
   worlds.ours().world.getPairCache()->setInternalGhostPairCallback(nullptr);
 }
 
-/// Takes the body out that Bullet complains about: once in the life of a program.
+/// Removes the body about which Bullet reports a warning, which happens once per process.
 class Remover final : public btIDebugDraw {
  public:
   explicit Remover(BulletWorld* w) : world_(w) {}
@@ -566,7 +580,7 @@ class Remover final : public btIDebugDraw {
   BulletWorld* world_;
 };
 
-TEST(DynamicsWorld, LetsADebugDrawerTakeBodiesOut) {
+TEST(DynamicsWorld, AllowsADebugDrawerToRemoveBodies) {
   WorldParts ours;
   ours.world = our_world({}).world;
   Sliding worlds({}, ours);
@@ -574,12 +588,12 @@ TEST(DynamicsWorld, LetsADebugDrawerTakeBodiesOut) {
   worlds.ours().world.setDebugDrawer(&remover);
   worlds.ours().bodies[7]->setLinearVelocity(btVector3(0, btScalar(1e9), 0));
   for (int i = 0; i < 5; ++i) worlds.ours().world.stepSimulation(btScalar(1) / 60, 0);
-  EXPECT_GT(remover.reports, 0) << "in a program that has had such a report before?";
+  EXPECT_GT(remover.reports, 0) << "has this process reported a warning before?";
   EXPECT_FALSE(worlds.ours().bodies[7]->isInWorld());
   worlds.ours().world.setDebugDrawer(nullptr);
 }
 
-TEST(DynamicsWorld, OwnsTheSolverThatItIsNotGiven) {
+TEST(DynamicsWorld, OwnsADefaultSolver) {
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher(&configuration);
   btDbvtBroadphase broadphase;

@@ -1,4 +1,4 @@
-/// Making and shrinking worlds for solvers; see the header.
+/// Generation and shrinking of solver worlds; see the header.
 #include "tests/bullet/solver_world.hpp"
 
 #include <cmath>
@@ -85,7 +85,7 @@ SolverJoint random_joint(auto& random, std::size_t bodies) {
   return joint;
 }
 
-/// More spheres than vectors have lanes, so deep in each other that they all touch.
+/// Adds more spheres than vectors have lanes, with so much overlap that all touch.
 void add_heap(auto& random, RandomWorld* world) {
   const std::uint64_t count = 20 + random.below(150);
   const Real edge = world->scale * std::cbrt(static_cast<Real>(count)) * random.uniform(1, 2);
@@ -111,7 +111,7 @@ SolverWorld draw_world(auto& random, RandomWorld base) {
   for (std::size_t i = 0; i < world.base.bodies.size(); ++i) {
     world.bodies.push_back(random_body(random));
   }
-  // A few factors put the whole world into the kernels with factors.
+  // A single factor selects the kernels with factors for the whole world.
   if (chance(random, Real(0.6))) {
     for (SolverBody& body : world.bodies) {
       body.linear_factor = body.angular_factor = {1, 1, 1};

@@ -1,5 +1,5 @@
-/// Random worlds with all that a constraint solver meets: joints of every type, solver settings
-/// that change, factors, gyroscopic forces, heaps. Run with Bullet's parts and with others.
+/// Random worlds for tests of a constraint solver: joints of every type, solver settings that
+/// change, factors, gyroscopic forces, heaps. They run with Bullet's components and with others.
 #pragma once
 
 #include "tests/bullet/random_world.hpp"
@@ -13,21 +13,21 @@ inline constexpr std::uint64_t kJointKinds = 11;
 struct SolverJoint {
   std::uint64_t kind = 0;  ///< below kJointKinds
   std::size_t a = 0, b = 0;
-  bool alone = false;  ///< of body a and the world, where the type can be
+  bool alone = false;  ///< joint of body a and the world, if the type supports it
   bool collide = true;
   bool limits = false, motor = false, feedback = false;
-  int iterations = -1;  ///< override
+  int iterations = -1;  ///< override; -1: none
   Real breaking = Real(1e30);
   Real low = 0, high = 0, speed = 0, strength = 0;
 };
 
-/// Bullet's solver settings from a step on.
+/// Change of Bullet's solver settings at a step.
 struct SolverChange {
   int step = 0;
   btContactSolverInfo info;
 };
 
-/// What a body has beyond a RandomBody.
+/// Properties of a body in addition to those of a RandomBody.
 struct SolverBody {
   Vec3 linear_factor = {1, 1, 1}, angular_factor = {1, 1, 1};
   int gyroscopic = 0;  ///< flags; 0: Bullet's default
@@ -41,11 +41,11 @@ struct SolverWorld {
   std::vector<SolverJoint> joints;
   std::vector<SolverChange> changes;
   unsigned threads = 1;
-  bool vectors = true;  ///< else the plain kernels
+  bool vectors = true;  ///< otherwise the scalar kernels
 };
 
 SolverWorld make_solver_world(std::uint64_t seed);
-SolverWorld make_solver_world(test::Bytes& bytes);  ///< with what a fuzzer wants
+SolverWorld make_solver_world(test::Bytes& bytes);  ///< from the bytes of a fuzzer
 std::ostream& operator<<(std::ostream& out, const SolverWorld& world);
 
 struct SolverTotals {
@@ -53,7 +53,7 @@ struct SolverTotals {
   std::uint64_t fallbacks[8] = {};
 };
 
-/// The parts under test, beside the dispatcher.
+/// Returns the components under test, except for the dispatcher.
 using MakeParts = WorldParts (*)(const SolverWorld&);
 WorldParts our_solver(const SolverWorld& world);
 WorldParts our_world(const SolverWorld& world);
@@ -61,7 +61,7 @@ WorldParts our_solver_and_world(const SolverWorld& world);
 
 std::optional<Failure> run(const SolverWorld& world, SolverTotals* totals,
                            MakeParts parts = our_solver, MakeDispatcher dispatcher = make_stock);
-/// Takes away steps, bodies, joints, events and changes for as long as the world fails.
+/// Removes steps, bodies, joints, events and changes as long as the world still fails.
 SolverWorld shrink(SolverWorld world, MakeParts parts, MakeDispatcher dispatcher = make_stock);
 
 }  // namespace bullet

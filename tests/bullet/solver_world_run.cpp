@@ -1,4 +1,4 @@
-/// Running a world for solvers twice at once, with Bullet's parts and with others.
+/// Runs a solver world twice in parallel, with Bullet's components and with others.
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dynamics_world.hpp>
 
@@ -16,7 +16,7 @@ namespace {
 
 btVector3 to_bullet(const Vec3& v) { return {v.x, v.y, v.z}; }
 
-/// One of the two worlds, with its joints. Joints outlive the world, which forgets them at its end.
+/// One of the two worlds, with its joints. The joints outlive the world.
 class LiveSolverWorld {
  public:
   LiveSolverWorld(const SolverWorld& world, MakeDispatcher dispatcher, const WorldParts& parts)
@@ -151,7 +151,7 @@ class LiveSolverWorld {
   LiveWorld live_;
 };
 
-/// What first_difference() does not look at, but users of a solver may.
+/// Compares state that first_difference() does not compare, but users of a solver may read.
 std::optional<std::string> compare_solvers(LiveSolverWorld& stock, LiveSolverWorld& ours) {
   FieldComparison c;
   for (std::size_t i = 0; i < stock.joints().size(); ++i) {
@@ -230,7 +230,7 @@ std::optional<Failure> run(const SolverWorld& world, SolverTotals* totals, MakeP
       if (event->kind == EventKind::callbacks) globals.set_callbacks(event->bits);
       for (LiveSolverWorld* live : both) {
         g_current = &live->live().live();
-        live->live().happen(*event);
+        live->live().apply(*event);
       }
     }
     for (int i = 0; i < 2; ++i) {

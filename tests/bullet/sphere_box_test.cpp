@@ -1,4 +1,4 @@
-/// The closest points of spheres and boxes: every bit is btGjkPairDetector's.
+/// The closest points of spheres and boxes match btGjkPairDetector bit for bit.
 #include "src/bullet/dispatch/sphere_box.hpp"
 
 #include "tests/bullet/twin_worlds.hpp"
@@ -38,7 +38,7 @@ struct Query {
   bool sphere_first;
 };
 
-/// What became of a query, for a count that shows that the random ones cover all.
+/// Counts of the results of queries, which show that the random ones cover all cases.
 struct Tally {
   int apart = 0, contact = 0, unknown = 0, wrong = 0;
 };
@@ -66,7 +66,7 @@ void ask_both(const Query& query, Tally* tally) {
   detector.getClosestPoints(stock_input, stock, nullptr);
 
   SphereBoxContact ours;
-  const SphereBoxAnswer answer = find_closest_points({.pose_a = pose_a,
+  const SphereBoxResult answer = find_closest_points({.pose_a = pose_a,
                                                       .pose_b = pose_b,
                                                       .margin_a = a->getMargin(),
                                                       .margin_b = b->getMargin(),
@@ -75,14 +75,14 @@ void ask_both(const Query& query, Tally* tally) {
                                                       .maximum_distance_squared = reach * reach},
                                                      &ours);
   switch (answer) {
-    case SphereBoxAnswer::unknown:
+    case SphereBoxResult::unknown:
       ++tally->unknown;
       return;
-    case SphereBoxAnswer::apart:
+    case SphereBoxResult::apart:
       ++tally->apart;
       tally->wrong += stock.calls != 0 ? 1 : 0;
       return;
-    case SphereBoxAnswer::contact:
+    case SphereBoxResult::contact:
       ++tally->contact;
       break;
   }

@@ -1,4 +1,4 @@
-/// Spheres and planes: every bit is btConvexPlaneCollisionAlgorithm's, for any numbers.
+/// Spheres and planes match btConvexPlaneCollisionAlgorithm bit for bit, for any values.
 #include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/dispatch/point_fields.hpp"
 #include "tests/bullet/twin_worlds.hpp"
@@ -25,12 +25,12 @@ btTransform random_pose(Random& random, Real extent) {
   return pose;
 }
 
-/// What became of the meetings, for counts that show that the random ones cover all.
+/// Counts of the results of encounters, which show that the random ones cover all cases.
 struct Tally {
   int apart = 0, touching = 0, left = 0;
 };
 
-/// A sphere and a plane that meet several times, so that points of earlier meetings are refreshed.
+/// A sphere and a plane in several encounters, so that points of earlier ones are refreshed.
 class Meeting {
  public:
   explicit Meeting(Random& random)
@@ -43,7 +43,7 @@ class Meeting {
     plane.setWorldTransform(random_pose(random, random.below(3) == 0 ? Real(1000) : Real(2)));
   }
 
-  /// Moves the sphere to where its surface is about that of the plane.
+  /// Moves the sphere so that its surface is near that of the plane.
   void place(Random& random) {
     const btScalar height = sphere_shape_.getRadius() * random.uniform(Real(-0.5), Real(1.1));
     btTransform pose = random_pose(random, 0);
@@ -54,7 +54,7 @@ class Meeting {
   }
   void set_radius(btScalar radius) { sphere_shape_.setUnscaledRadius(radius); }
 
-  /// Lets Bullet and us bring a manifold up to date, and compares.
+  /// Updates a manifold with Bullet and with jfpx, and compares.
   void meet(Tally* tally) {
     const btCollisionObject& a = sphere_first_ ? sphere : plane;
     const btCollisionObject& b = sphere_first_ ? plane : sphere;
@@ -128,12 +128,12 @@ TEST(SpherePlane, HasEveryBitOfExtremeNumbersOrLeavesThem) {
       const int axis = static_cast<int>(random.below(3));
       switch (k == 0 ? 0 : random.below(4)) {
         case 0:
-          break;  // an ordinary meeting first: its points are there later
+          break;  // an ordinary encounter first, whose points exist later
         case 1:
           meeting.sphere.getWorldTransform().getOrigin()[axis] = extreme;
           break;
         case 2:
-          // A pose that only scales, or worse: nothing says that a basis is one.
+          // A pose that scales, or worse, because Bullet does not require a valid basis.
           meeting.sphere.getWorldTransform().getBasis()[axis] = btVector3(0, extreme, 0);
           break;
         default:

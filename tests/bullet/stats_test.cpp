@@ -1,4 +1,4 @@
-/// The dispatcher's counters, its fallbacks with reasons, and that verify finds planted errors.
+/// The dispatcher's counters, its fallbacks with reasons, and detection of planted errors.
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/error.hpp>
@@ -11,7 +11,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// Hands over to a real collider, then lets a test spoil the results or fail.
+/// Forwards to a real collider, then lets a test modify the results or fail.
 class SpoiledCollider : public SphereCollider {
  public:
   using Spoil = std::function<void(std::span<PairResult>)>;
@@ -114,36 +114,18 @@ TEST(DispatchStats, EveryFallbackHasItsOwnText) {
   EXPECT_EQ(std::count(texts.begin(), texts.end(), "unknown"), 0);
 }
 
-/// A user may take any one of the three, and makes the collider for another library perhaps.
-TEST(BuildCheck, IsDoneByWhatReplacesAPartOfBullet) {
-  const Build other{detail::pack_build(JFPX_VERSION_MAJOR, JFPX_VERSION_MINOR + 1, sizeof(Real),
-                                       sizeof(detail::LayoutProbe))};
-  btDefaultCollisionConfiguration configuration;
-  EXPECT_THROW(CollisionDispatcher(&configuration, {.collider = {.headers = other}}),
-               BuildMismatch);
-  EXPECT_THROW(
-      CollisionDispatcher(&configuration, make_sphere_collider(), {.collider = {.headers = other}}),
-      BuildMismatch);
-  EXPECT_THROW(ConstraintSolver({.headers = other}), BuildMismatch);
-  CollisionDispatcher dispatcher(&configuration);
-  btDbvtBroadphase broadphase;
-  ConstraintSolver solver;
-  EXPECT_THROW(DynamicsWorld(&dispatcher, &broadphase, &solver, &configuration, {.headers = other}),
-               BuildMismatch);
-}
-
-TEST(FailingCollider, IsGivenUpAndTheBitsStay) {
+TEST(FailingCollider, IsReplacedAndTheBitsStay) {
   int calls = 0;
   Twins twins(with_collider([&](std::span<PairResult>) {
     if (++calls == 10) throw DeviceError("the device is gone");
   }));
   twins.both([](BulletWorld& w) { add_heap(w, 50, 51); });
   ASSERT_TRUE(twins.step(5));
-  EXPECT_EQ(twins.ours().ours()->reason(), ChoiceReason::kept) << "what the collider says";
+  EXPECT_EQ(twins.ours().ours()->reason(), ChoiceReason::kept) << "the reason of the collider";
   ASSERT_TRUE(twins.step(25));
   EXPECT_EQ(twins.ours().ours()->reason(), ChoiceReason::fixed);
-  EXPECT_EQ(calls, 10) << "it must not be asked again";
-  EXPECT_EQ(twins.stats().batches, 30u) << "x86 must take over in the same dispatch";
+  EXPECT_EQ(calls, 10) << "it must not be called again";
+  EXPECT_EQ(twins.stats().batches, 30u) << "the CPU must replace it in the same dispatch";
   EXPECT_EQ(twins.stats().device_failure, "the device is gone");
   EXPECT_EQ(twins.stats().last_fallback, Fallback::none);
   EXPECT_EQ(twins.ours().ours()->backend(), Backend::cpu);
@@ -160,13 +142,13 @@ TEST(FailingCollider, OfTheFirstDispatchLeavesNoTrace) {
   EXPECT_EQ(twins.stats().failure, "");
 }
 
-bool hear_nothing(btManifoldPoint&, const btCollisionObjectWrapper*, int, int,
-                  const btCollisionObjectWrapper*, int, int) {
+bool ignore_contact(btManifoldPoint&, const btCollisionObjectWrapper*, int, int,
+                    const btCollisionObjectWrapper*, int, int) {
   return false;
 }
 
-/// A GPU answers an invalid operation with another NaN than x86 does.
-TEST(OddCollider, MayHaveNaNsOfItsOwn) {
+/// A GPU returns a different NaN for an invalid operation than the CPU.
+TEST(OddCollider, MayReturnDifferentNaNs) {
   constexpr btScalar kInf = std::numeric_limits<btScalar>::infinity();
   constexpr btScalar kNan = std::numeric_limits<btScalar>::quiet_NaN();
   const std::vector<btScalar> values = {0, kInf, -kInf, kNan, btScalar(0.5)};
@@ -180,15 +162,15 @@ TEST(OddCollider, MayHaveNaNsOfItsOwn) {
       }
     }
   };
-  for (const bool heard : {false, true}) {  // both ways to write contacts
-    gContactAddedCallback = heard ? hear_nothing : nullptr;
+  for (const bool observed : {false, true}) {  // both ways of writing contacts
+    gContactAddedCallback = observed ? ignore_contact : nullptr;
     Twins twins(with_collider(negate_nans, true));
     twins.both([&](BulletWorld& w) {
       w.world.setGravity(btVector3(0, 0, 0));
       for (std::size_t i = 0; i < values.size(); ++i) {
         w.add_sphere(btScalar(0.5), btVector3(0, 0, 0));
       }
-      if (heard) w.bodies[0]->setCollisionFlags(btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+      if (observed) w.bodies[0]->setCollisionFlags(btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
     });
     ASSERT_TRUE(twins.dispatch());
     twins.both([&](BulletWorld& w) {
@@ -198,7 +180,7 @@ TEST(OddCollider, MayHaveNaNsOfItsOwn) {
     });
     const bool same = twins.dispatch();
     gContactAddedCallback = nullptr;
-    ASSERT_TRUE(same) << "heard: " << heard;
+    ASSERT_TRUE(same) << "observed: " << observed;
     EXPECT_GT(twins.stats().verified, 0u);
     EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
   }
@@ -206,7 +188,7 @@ TEST(OddCollider, MayHaveNaNsOfItsOwn) {
 }
 
 /// Of two NaNs an operation returns the first, and compilers exchange operands.
-TEST(Verify, LeavesTheSignOfANaNToCompilers) {
+TEST(Verify, IgnoresTheSignOfANaN) {
   constexpr btScalar kInf = std::numeric_limits<btScalar>::infinity();
   constexpr btScalar kNan = std::numeric_limits<btScalar>::quiet_NaN();
   const std::vector<btScalar> values = {kNan, -kNan, kInf, -kInf, btScalar(0.5)};
@@ -227,7 +209,7 @@ TEST(Verify, LeavesTheSignOfANaNToCompilers) {
   EXPECT_EQ(twins.stats().mismatches, 0u) << twins.stats().first_mismatch;
 }
 
-TEST(FailingCollider, NullIsAnErrorAndSoAreTooManyThreads) {
+TEST(FailingCollider, NullAndTooManyThreadsAreErrors) {
   btDefaultCollisionConfiguration configuration;
   EXPECT_THROW(
       CollisionDispatcher(&configuration, make_sphere_collider(), {.collider = {.threads = 257}}),
@@ -246,7 +228,7 @@ template <class Change>
 SpoiledCollider::Spoil in_first_touching(Change change) {
   return [change](std::span<PairResult> results) {
     for (PairResult& result : results) {
-      // Pairs with a box have a NaN, and nobody looks at them.
+      // Pairs with a box have a NaN, and their values are not read.
       if (result.touching == 0 || result.distance != result.distance) continue;
       change(&result);
       return;
@@ -271,8 +253,8 @@ TEST(Verify, FindsEveryPlantedError) {
     SCOPED_TRACE(error.name);
     Twins twins(with_collider(error.spoil, true));
     twins.both(add_row);
-    // The first dispatch runs Bullet's new algorithms; the collider's results are checked anyway
-    // from the second on.
+    // The first dispatch runs Bullet's new algorithms; the collider's results are checked from the
+    // second on.
     for (int i = 0; i < 2; ++i) {
       twins.ours().dispatcher->dispatchAllCollisionPairs(twins.ours().world.getPairCache(),
                                                          twins.ours().world.getDispatchInfo(),
@@ -285,7 +267,7 @@ TEST(Verify, FindsEveryPlantedError) {
   }
 }
 
-/// A sphere that rests on a box and on a plane, and lies there with points of several steps.
+/// A sphere that rests on a box and on a plane, with points of several steps.
 TEST(Verify, RecomputesSpheresOnBoxesAndPlanes) {
   Twins twins(with_collider([](std::span<PairResult>) {}, true));
   twins.both([](BulletWorld& w) {
@@ -325,7 +307,7 @@ TEST(Verify, FindsEveryPlantedErrorOfAPointThatPersists) {
   process();
   ASSERT_GT(manifold->getNumContacts(), 0);
   EXPECT_EQ(difference(), "");
-  EXPECT_EQ(difference(), "") << "the manifold must keep what it had";
+  EXPECT_EQ(difference(), "") << "the manifold must be unchanged";
   btManifoldPoint& point = manifold->getContactPoint(0);
   flip_last_bit(&point.m_distance1);
   EXPECT_EQ(difference(), "m_distance1");
@@ -339,7 +321,7 @@ TEST(Verify, FindsEveryPlantedErrorOfAPointThatPersists) {
   EXPECT_EQ(difference(), "number of points");
 }
 
-TEST(Verify, FindsNothingWhereNothingIs) {
+TEST(Verify, FindsNothingInACorrectWorld) {
   Twins twins(with_collider([](std::span<PairResult>) {}, true));
   twins.both([](BulletWorld& w) { add_heap(w, 50, 52); });
   ASSERT_TRUE(twins.step(30));

@@ -1,7 +1,7 @@
-/// Random worlds beside stock ones; see the header.
+/// Comparison of random worlds with stock Bullet; see the header.
 #include "tests/bullet/stock_bits.hpp"
 
-#include "tests/bullet/stock_elsewhere.hpp"
+#include "tests/bullet/stack_residue.hpp"
 
 #include <sstream>
 
@@ -21,7 +21,7 @@ std::string report(const SolverWorld& world, const Failure& failure, MakeParts p
 
 }  // namespace
 
-std::uint64_t wanted_solver_steps() { return wanted_world_steps(5'000, 100'000); }
+std::uint64_t wanted_solver_steps() { return world_steps_to_run(5'000, 100'000); }
 
 SolverTotals expect_stocks_bits(std::uint64_t steps, MakeParts parts, MakeDispatcher dispatcher) {
   const std::uint64_t seed = test_seed();
@@ -30,7 +30,7 @@ SolverTotals expect_stocks_bits(std::uint64_t steps, MakeParts parts, MakeDispat
   for (std::uint64_t i = 0; totals.steps < steps; ++i) {
     const SolverWorld world = make_solver_world(seed + i);
     const auto failure = run(world, &totals, parts, dispatcher);
-    if (failure && is_accident_of_stock(world, *failure)) {
+    if (failure && is_stock_nondeterminism(world, *failure)) {
       ++accidents;
       continue;
     }

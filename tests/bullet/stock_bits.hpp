@@ -1,4 +1,4 @@
-/// Runs random worlds for solvers beside stock ones and expects the same bits.
+/// Runs random solver worlds together with stock Bullet and expects the same bits.
 #pragma once
 
 #include "tests/bullet/solver_world.hpp"
@@ -7,14 +7,15 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// World-steps that a test of a solver makes: JFPX_TEST_WORLD_STEPS, or as many as fit.
+/// Number of world steps of a solver test: JFPX_TEST_WORLD_STEPS, or a default.
 std::uint64_t wanted_solver_steps();
 
-/// Runs random worlds with these parts beside stock ones. A failure is shrunk and printed.
+/// Runs random worlds with these components and with those of stock Bullet. Shrinks and prints a
+/// failure.
 SolverTotals expect_stocks_bits(std::uint64_t steps, MakeParts parts, MakeDispatcher dispatcher);
 
-/// A heap with more rows than threads and vectors can share badly; in the middle of its steps
-/// contact and friction begin to take turns.
+/// A heap with enough rows for several threads and full vectors. After half of its steps the solver
+/// mode changes to solve the friction of each contact directly after the contact.
 SolverWorld make_large_heap(std::uint64_t seed);
 
 }  // namespace bullet

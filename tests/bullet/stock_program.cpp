@@ -1,5 +1,5 @@
-/// A Bullet program that has never heard of jfpx: drops spheres, prints a hash of where they end.
-/// Each argument is the number of spheres of one more world; every world has a thread of its own.
+/// A Bullet program without jfpx, which drops spheres and prints a hash of their final positions.
+/// Each argument is the number of spheres of a further world; every world has its own thread.
 #include <btBulletDynamicsCommon.h>
 
 #include <cstdint>
@@ -23,7 +23,7 @@ std::uint64_t hash_of(const btRigidBody& body, std::uint64_t hash) {
   for (int i = 0; i < 3; ++i) hash = hash_of(body.getWorldTransform().getOrigin()[i], hash);
   return hash;
 }
-/// What a solver says of itself and remembers.
+/// The statistics and the state of a solver.
 std::uint64_t hash_of(const btSequentialImpulseConstraintSolver& solver, std::uint64_t hash) {
   const btSolverAnalyticsData& data = solver.m_analyticsData;
   hash = hash_of(data.m_numSolverCalls, hash_of(data.m_numIterationsUsed, hash));
@@ -58,7 +58,7 @@ std::uint64_t drop(int spheres) {
   }
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (int step = 0; step < 60; ++step) {
-    // In some steps rows are solved in a random order.
+    // In some steps, rows are solved in random order.
     const int mode = world.getSolverInfo().m_solverMode & ~SOLVER_RANDMIZE_ORDER;
     world.getSolverInfo().m_solverMode = step % 20 == 7 ? mode | SOLVER_RANDMIZE_ORDER : mode;
     world.stepSimulation(btScalar(1) / 60, 0);

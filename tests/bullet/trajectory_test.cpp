@@ -49,22 +49,22 @@ class Trajectory : public ::testing::TestWithParam<Case> {
   }
 };
 
-TEST_P(Trajectory, IsStocksWithEveryPairBatched) {
+TEST_P(Trajectory, MatchesStockWithEveryPairBatched) {
   SceneWorldOptions options;
   options.dispatch.minimum_batch = 0;
   expect_identical(options, false);
 }
 
-TEST_P(Trajectory, IsStocksWithSleepAndDefaults) { expect_identical({}, true); }
+TEST_P(Trajectory, MatchesStockWithSleepAndDefaults) { expect_identical({}, true); }
 
-TEST_P(Trajectory, IsStocksWithSortedPairs) {
+TEST_P(Trajectory, MatchesStockWithSortedPairs) {
   SceneWorldOptions options;
   options.dispatch.minimum_batch = 0;
   options.deterministic_pairs = true;
   expect_identical(options, true);
 }
 
-TEST_P(Trajectory, IsStocksAndVerifiedPairByPair) {
+TEST_P(Trajectory, MatchesStockAndPassesVerify) {
   SceneWorldOptions options;
   options.dispatch.minimum_batch = 0;
   options.dispatch.verify = true;
@@ -91,8 +91,8 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Trajectory,
                            return name;
                          });
 
-TEST(TrajectoryOfManyBodies, IsStocks) {
-  // Enough for several growths of every table, and for overflowing Bullet's pools of 4096.
+TEST(TrajectoryOfManyBodies, MatchesStock) {
+  // Enough to grow every table several times, and to overflow Bullet's pools of 4096.
   const Scene scene = scenes::make("pile", {.spheres = 3000, .seed = 7});
   SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock});
   SceneWorld ours(scene);

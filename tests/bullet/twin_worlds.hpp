@@ -1,5 +1,5 @@
-/// Two Bullet worlds made by the same recipe, one with Bullet's dispatcher and one with ours, that
-/// are stepped side by side and compared after every step.
+/// Two equal Bullet worlds, one with Bullet's dispatcher and one with ours, that are stepped side
+/// by side and compared after every step.
 #pragma once
 
 #include <jfpx/bullet/dispatcher.hpp>
@@ -24,13 +24,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// A fresh seed for a random test, or the one in the environment.
+/// A new seed for a random test, or the seed in JFPX_TEST_SEED.
 inline std::uint64_t test_seed() {
   const char* fixed = std::getenv("JFPX_TEST_SEED");
   return fixed != nullptr ? std::strtoull(fixed, nullptr, 0) : std::random_device{}();
 }
 
-/// A number that arithmetic stumbles over.
+/// A special or extreme value.
 inline Real random_extreme(Random& random) {
   using Limits = std::numeric_limits<Real>;
   constexpr Real kExtremes[] = {
@@ -39,10 +39,10 @@ inline Real random_extreme(Random& random) {
   return kExtremes[random.below(std::size(kExtremes))];
 }
 
-/// Steps of random worlds to run; JFPX_TEST_WORLD_STEPS asks for more, or for less.
-inline std::uint64_t wanted_world_steps(std::uint64_t in_slow_builds, std::uint64_t otherwise) {
-  const char* asked = std::getenv("JFPX_TEST_WORLD_STEPS");
-  if (asked != nullptr) return std::strtoull(asked, nullptr, 0);
+/// Number of steps of random worlds to run; JFPX_TEST_WORLD_STEPS overrides it.
+inline std::uint64_t world_steps_to_run(std::uint64_t in_slow_builds, std::uint64_t otherwise) {
+  const char* setting = std::getenv("JFPX_TEST_WORLD_STEPS");
+  if (setting != nullptr) return std::strtoull(setting, nullptr, 0);
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
   constexpr bool kSlow = true;
 #else
@@ -51,7 +51,7 @@ inline std::uint64_t wanted_world_steps(std::uint64_t in_slow_builds, std::uint6
   return kSlow ? in_slow_builds : otherwise;
 }
 
-/// Who makes the parts of a world that a test may replace.
+/// Factories of the parts of a world that a test may replace.
 struct WorldParts {
   std::function<std::unique_ptr<btSequentialImpulseConstraintSolver>()> solver = [] {
     return std::make_unique<btSequentialImpulseConstraintSolver>();
@@ -65,8 +65,8 @@ struct WorldParts {
       };
 };
 
-/// A Bullet world that owns everything. Made in two phases, because a dispatcher needs the
-/// configuration.
+/// A Bullet world that owns all of its parts. The dispatcher is created by a function, because it
+/// needs the configuration.
 struct BulletWorld {
   using MakeDispatcher =
       std::function<std::unique_ptr<btCollisionDispatcher>(btCollisionConfiguration*)>;
@@ -84,7 +84,7 @@ struct BulletWorld {
     for (int i = world.getNumCollisionObjects() - 1; i >= 0; --i) {
       world.removeCollisionObject(world.getCollisionObjectArray()[i]);
     }
-    // Of the last step's predictive contacts, which Bullet's world forgets.
+    // The predictive contacts of the last step, which Bullet's world does not release.
     while (dispatcher->getNumManifolds() > 0) {
       dispatcher->releaseManifold(dispatcher->getManifoldByIndexInternal(0));
     }
@@ -123,10 +123,10 @@ struct BulletWorld {
   std::vector<std::unique_ptr<btRigidBody>> bodies;
   std::unique_ptr<btDiscreteDynamicsWorld> made_world;
   btDiscreteDynamicsWorld& world = *made_world;
-  std::vector<std::string> log;  ///< what callbacks heard of this world
+  std::vector<std::string> log;  ///< calls of callbacks for this world
 };
 
-/// The world whose step is running: global callbacks write into its log.
+/// The world whose step is running; global callbacks write into its log.
 inline BulletWorld* g_current = nullptr;
 
 inline void log_event(std::string text) {
@@ -161,7 +161,7 @@ class Twins {
   BulletWorld& ours() { return ours_; }
   const DispatchStats& stats() { return ours_.ours()->stats(); }
 
-  /// Does the same to both worlds.
+  /// Applies an action to both worlds.
   template <class Action>
   void both(Action action) {
     for (BulletWorld* world : {&stock_, &ours_}) {
@@ -171,7 +171,7 @@ class Twins {
     g_current = nullptr;
   }
 
-  /// Steps both and compares worlds and logs. False after a failure.
+  /// Steps both and compares worlds and logs. Returns false after a failure.
   bool step(int steps = 1) {
     for (int i = 0; i < steps; ++i) {
       both([](BulletWorld& w) { w.world.stepSimulation(btScalar(1) / 60, 0); });
@@ -180,7 +180,7 @@ class Twins {
     }
     return true;
   }
-  /// Only the dispatch, of the bodies as they are.
+  /// Runs only the dispatch, for the current bodies.
   bool dispatch() {
     both([](BulletWorld& w) {
       w.dispatcher->dispatchAllCollisionPairs(w.world.getPairCache(), w.world.getDispatchInfo(),

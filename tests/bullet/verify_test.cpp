@@ -1,4 +1,4 @@
-/// The cross-checks must be able to fail: every kind of difference, planted by hand, is found.
+/// The cross-checks detect every kind of planted difference.
 #include <jfpx/bullet/verify.hpp>
 #include <jfpx/error.hpp>
 
@@ -192,7 +192,7 @@ TEST_F(Contacts, ThatBulletLostAreFound) {
   expect_mismatch("touching");
 }
 TEST_F(Contacts, ThatBulletInventedAreFound) {
-  // Apart by half a millimetre, with boxes that overlap: a pair without points.
+  // Half a millimetre apart, with overlapping AABBs: a pair without points.
   a_.bodies[1]->getWorldTransform().setOrigin(btVector3(btScalar(1.0005), 0, 0));
   capture_and_detect();
   ASSERT_EQ(check_.compare(a_.world, 1), 0u);
@@ -241,7 +241,7 @@ TEST_F(Contacts, ThatWereNotCapturedAreAnError) {
   EXPECT_THROW(forgotten.compare(a_.world, 1), InvalidArgument);
 }
 TEST_F(Contacts, OfBodiesInAnotherOrderThanTheirProxies) {
-  // Removal swaps the last body into the gap of the world's array.
+  // A removal moves the last body into the gap of the world's array.
   a_.add_sphere(btScalar(0.5), btVector3(0, btScalar(5.9), 0));
   a_.world.removeRigidBody(a_.bodies[0].get());
   capture_and_detect();

@@ -1,5 +1,5 @@
-/// Boxes against boxes, half-spaces and planes: by hand, and against an oracle in double that
-/// knows nothing of separating axes.
+/// Tests of boxes against boxes, half-spaces and planes, with hand-computed values and against an
+/// oracle in double that does not use separating axes.
 #include <jfpx/collide.hpp>
 
 #include "tests/world/support.hpp"
@@ -21,22 +21,23 @@ void expect_near(const Vec3& actual, const Vec3& expected, double tolerance = 16
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(actual[i], expected[i], tolerance) << "xyz"[i];
 }
 
-Transform turned(const Vec3& axis_times_tangent, const Vec3& origin) {
+Transform rotated_pose(const Vec3& axis_times_tangent, const Vec3& origin) {
   const Vec3& t = axis_times_tangent;
   return make_transform(normalized(Quat{1, t.x, t.y, t.z}), origin);
 }
 
 // ---------------------------------------------------------------------------------------------
-// The oracle: two convex polyhedra overlap if and only if an edge of one meets the other, for each
-// corner of what they share is a corner of one inside the other, or an edge of one in a face of
-// the other.
+// The oracle. Two convex polyhedra overlap if and only if an edge of one intersects the other: each
+// corner of the intersection is a corner of one inside the other, or an intersection of an edge of
+// one with a face of the other.
 
 struct PosedBox {
-  double half[3], axis[3][3], centre[3];  // axis[k] is the k-th axis, in the world
+  double half[3], axis[3][3], centre[3];  // axis[k] is the k-th axis, in world coordinates
 
-  PosedBox(const Box& box, const Transform& pose, double grown) {
+  /// @param margin added to the half extents; may be negative
+  PosedBox(const Box& box, const Transform& pose, double margin) {
     for (int k = 0; k < 3; ++k) {
-      half[k] = static_cast<double>(box.half_extents[k]) + grown;
+      half[k] = static_cast<double>(box.half_extents[k]) + margin;
       centre[k] = static_cast<double>(pose.origin[k]);
       for (int i = 0; i < 3; ++i) axis[k][i] = static_cast<double>(pose.basis(i, k));
     }
@@ -89,22 +90,22 @@ bool edge_meets(const PosedBox& a, const PosedBox& b) {
 }
 
 bool overlap(const Box& a, const Transform& pose_a, const Box& b, const Transform& pose_b,
-             double grown) {
-  const PosedBox first(a, pose_a, grown), second(b, pose_b, grown);
+             double margin) {
+  const PosedBox first(a, pose_a, margin), second(b, pose_b, margin);
   if (first.empty() || second.empty()) return false;
   return edge_meets(first, second) || edge_meets(second, first);
 }
 
-/// How far two boxes overlap along a direction; negative: a gap.
+/// The overlap of two boxes along a direction; negative: a gap.
 double overlap_along(const PosedBox& a, const PosedBox& b, const std::array<double, 3>& d) {
-  double reach = 0, between = 0;
+  double sum = 0, between = 0;
   for (int k = 0; k < 3; ++k) {
     double on_a = 0, on_b = 0;
     for (int i = 0; i < 3; ++i) on_a += a.axis[k][i] * d[i], on_b += b.axis[k][i] * d[i];
-    reach += a.half[k] * std::abs(on_a) + b.half[k] * std::abs(on_b);
+    sum += a.half[k] * std::abs(on_a) + b.half[k] * std::abs(on_b);
     between += d[k] * (a.centre[k] - b.centre[k]);
   }
-  return reach - between;
+  return sum - between;
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -128,7 +129,7 @@ Transform random_pose(Random* random, const Vec3& origin) {
   return make_transform(normalized(q), origin);
 }
 
-/// Cubes, plates and needles, in any pose, or nearly or exactly parallel.
+/// Two boxes (cubes, plates or needles) in arbitrary, nearly parallel or parallel poses.
 Case random_case(Random* random) {
   Case c;
   for (Box* box : {&c.a, &c.b}) {
@@ -137,16 +138,16 @@ Case random_case(Random* random) {
   }
   const Vec3 home = random->uniform_in_box({-5, -5, -5}, {5, 5, 5});
   c.pose_a = random_pose(random, home);
-  // Far enough to be apart in about half of the cases.
-  const Vec3 reach = c.a.half_extents + c.b.half_extents;
-  const Vec3 offset = random->uniform_in_box(-reach, reach) * 1.2_r;
+  // About half of the pairs are separated.
+  const Vec3 range = c.a.half_extents + c.b.half_extents;
+  const Vec3 offset = random->uniform_in_box(-range, range) * 1.2_r;
   const auto kind = random->below(4);
   if (kind == 0) {
     c.pose_b = {c.pose_a.basis, {}};
   } else if (kind == 1) {
     const Real tilt = log_uniform(random, 1e-6, 0.1);
-    c.pose_b =
-        c.pose_a * turned(random->uniform_in_box({-tilt, -tilt, -tilt}, {tilt, tilt, tilt}), {});
+    c.pose_b = c.pose_a *
+               rotated_pose(random->uniform_in_box({-tilt, -tilt, -tilt}, {tilt, tilt, tilt}), {});
   } else {
     c.pose_b = random_pose(random, {});
   }
@@ -154,13 +155,14 @@ Case random_case(Random* random) {
   return c;
 }
 
-/// How wrong distances may be: rounding errors, more of them where edges are nearly parallel.
+/// Bound of the error of a distance: rounding errors, which are larger if edges are nearly
+/// parallel.
 double tolerance(const Case& c) {
   double error = 1;  // in units of epsilon, relative to the size
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       const double sine = length(cross(c.pose_a.basis.column(i), c.pose_b.basis.column(j)));
-      // Below this the test skips the axis, and misses a gap of the order of the sine.
+      // Below this the test skips the axis, and misses gaps of the order of the sine.
       const double skipped = 2 * std::sqrt(kEps);
       error = std::max(error, sine > skipped * 0.99 ? 1 / sine : sine / kEps);
     }
@@ -169,7 +171,7 @@ double tolerance(const Case& c) {
   return 40 * kEps * (size * error + length(c.pose_a.origin));
 }
 
-TEST(BoxBox, AgreesWithTheOracleInTouchDepthAndDirection) {
+TEST(BoxBox, AgreesWithTheOracleInContactDepthAndDirection) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
@@ -187,8 +189,8 @@ TEST(BoxBox, AgreesWithTheOracleInTouchDepthAndDirection) {
     ++touches;
     ASSERT_NEAR(length(m.normal), 1, 64 * kEps);
     ASSERT_LE(m.distance, 0);
-    // Moved by the depth, the boxes just touch; a face is preferred to an edge that gets them
-    // apart on a way up to 2 % shorter.
+    // Translated by the depth, the boxes only touch. A face is preferred to a pair of edges whose
+    // depth is up to 2 % smaller.
     const auto moved = [&](double by) {
       Transform pose = c.pose_a;
       pose.origin += m.normal * static_cast<Real>(by);
@@ -197,7 +199,7 @@ TEST(BoxBox, AgreesWithTheOracleInTouchDepthAndDirection) {
     const double depth = -static_cast<double>(m.distance);
     ASSERT_FALSE(overlap(c.a, moved(depth + 2 * noise), c.b, c.pose_b, -noise / 4)) << n;
     ASSERT_TRUE(overlap(c.a, moved(depth / 1.03 - 2 * noise), c.b, c.pose_b, noise)) << n;
-    // No direction gets them apart on a way shorter by more than the preference for faces.
+    // In no direction is the depth smaller by more than the preference for faces.
     const PosedBox a(c.a, c.pose_a, 0), b(c.b, c.pose_b, 0);
     for (int k = 0; k < 20; ++k) {
       std::array<double, 3> d;
@@ -206,7 +208,7 @@ TEST(BoxBox, AgreesWithTheOracleInTouchDepthAndDirection) {
       for (double& x : d) x /= std::sqrt(norm);
       ASSERT_GE(overlap_along(a, b, d), depth / 1.03 - noise) << n;
     }
-    // The points are where the boxes overlap, and none is deeper than the whole.
+    // The points lie in the overlap of the boxes, and none is deeper than the manifold.
     for (int k = 0; k < m.count; ++k) {
       const ManifoldPoint& p = m.points[k];
       ASSERT_LE(p.distance, 0);
@@ -227,7 +229,7 @@ TEST(BoxBox, AgreesWithTheOracleInTouchDepthAndDirection) {
   EXPECT_GT(edges, 1000);
 }
 
-TEST(BoxBox, SwappedOrTurnedTogetherTheyTouchTheSameWay) {
+TEST(BoxBox, SwappedOrTransformedBoxesHaveTheSameContact) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
@@ -240,7 +242,7 @@ TEST(BoxBox, SwappedOrTurnedTogetherTheyTouchTheSameWay) {
     const Manifold others[] = {collide(c.b, c.pose_b, c.a, c.pose_a),
                                collide(c.a, world * c.pose_a, c.b, world * c.pose_b)};
     for (const Manifold& other : others) {
-      if (other.count == 0 || m.count == 0) {  // both, or it was a near miss
+      if (other.count == 0 || m.count == 0) {  // both, or the depth is within rounding errors
         ASSERT_GE(m.distance + other.distance, -4 * noise) << n;
         continue;
       }
@@ -270,8 +272,9 @@ void expect_points(const Manifold& m, const std::vector<ManifoldPoint>& expected
   }
 }
 
-TEST(BoxBox, AFaceOnAFaceGivesTheCornersOfWhatTheyShare) {
-  // A plate 4 x 1 x 4 with its top at y = 0, and a cube that stands on it 0.1 deep, over one edge.
+TEST(BoxBox, AFaceOnAFaceGivesTheCornersOfTheirIntersection) {
+  // A plate 4 x 1 x 4 with its top at y = 0, and a cube that penetrates it by 0.1 and extends over
+  // one edge.
   const Manifold m = collide(Box{{0.5_r, 0.5_r, 0.5_r}}, {{}, {2, 0.4_r, 0}}, Box{{2, 0.5_r, 2}},
                              {{}, {0, -0.5_r, 0}});
   EXPECT_EQ(m.normal, (Vec3{0, 1, 0}));
@@ -282,10 +285,10 @@ TEST(BoxBox, AFaceOnAFaceGivesTheCornersOfWhatTheyShare) {
                     {{2, -0.05_r, 0.5_r}, -0.1_r}});
 }
 
-TEST(BoxBox, AFaceTurnedByAnEighthOnAFaceGivesEightPoints) {
+TEST(BoxBox, AFaceRotatedByAnEighthOnAFaceGivesEightPoints) {
   const Real tangent = static_cast<Real>(std::tan(3.14159265358979323846 / 8));
-  const Manifold m =
-      collide(Box{{1, 1, 1}}, turned({0, tangent, 0}, {0, 1.9_r, 0}), Box{{1, 1, 1}}, Transform{});
+  const Manifold m = collide(Box{{1, 1, 1}}, rotated_pose({0, tangent, 0}, {0, 1.9_r, 0}),
+                             Box{{1, 1, 1}}, Transform{});
   expect_near(m.normal, {0, 1, 0});
   ASSERT_EQ(m.count, 8);
   // The octagon: corners at (+-1, +-t) and (+-t, +-1) with t = sqrt(2) - 1.
@@ -299,46 +302,47 @@ TEST(BoxBox, AFaceTurnedByAnEighthOnAFaceGivesEightPoints) {
 }
 
 TEST(BoxBox, CrossedEdgesGiveOnePoint) {
-  // Both stand on an edge: a along z, b along x; sqrt(2) from centre to edge.
+  // Both boxes stand on an edge, a along z and b along x, at the distance sqrt(2) from the centre.
   const Real t = static_cast<Real>(std::tan(3.14159265358979323846 / 8));
-  const Real reach = square_root(2.0_r);
-  const Manifold m = collide(Box{{1, 1, 5}}, turned({0, 0, t}, {0.3_r, 2 * reach - 0.2_r, 1}),
-                             Box{{5, 1, 1}}, turned({t, 0, 0}, {2, 0, 0.7_r}));
+  const Real radius = square_root(2.0_r);
+  const Manifold m =
+      collide(Box{{1, 1, 5}}, rotated_pose({0, 0, t}, {0.3_r, 2 * radius - 0.2_r, 1}),
+              Box{{5, 1, 1}}, rotated_pose({t, 0, 0}, {2, 0, 0.7_r}));
   expect_near(m.normal, {0, 1, 0});
   EXPECT_NEAR(m.distance, -0.2, 32 * kEps);
   ASSERT_EQ(m.count, 1);
-  expect_near(m.points[0].point, {0.3_r, reach - 0.1_r, 0.7_r}, 32 * kEps);
+  expect_near(m.points[0].point, {0.3_r, radius - 0.1_r, 0.7_r}, 32 * kEps);
 }
 
-TEST(BoxBox, AGapOfAnyKindIsNoTouch) {
+TEST(BoxBox, AnyGapIsNoContact) {
   const Box cube{{1, 1, 1}};
   const Transform home;
   EXPECT_EQ(collide(cube, home, cube, {{}, {2 + 4 * kEpsilon, 0, 0}}), Manifold{});
-  EXPECT_EQ(collide(cube, home, cube, {{}, {2, 0, 0}}).count, 4);  // touching counts
-  EXPECT_EQ(collide(cube, home, cube, turned({0.3_r, 0.2_r, 0.1_r}, {9, 9, 9})), Manifold{});
+  EXPECT_EQ(collide(cube, home, cube, {{}, {2, 0, 0}}).count, 4);  // touching is a contact
+  EXPECT_EQ(collide(cube, home, cube, rotated_pose({0.3_r, 0.2_r, 0.1_r}, {9, 9, 9})), Manifold{});
   const Real nan = std::numeric_limits<Real>::quiet_NaN();
   EXPECT_EQ(collide(cube, home, cube, {{}, {nan, 0, 0}}), Manifold{});
 }
 
-TEST(BoxBox, CoincidentBoxesPart) {
+TEST(BoxBox, CoincidentBoxesSeparateAlongX) {
   const Manifold m = collide(Box{{1, 2, 3}}, {}, Box{{1, 2, 3}}, {});
   EXPECT_EQ(m.normal, (Vec3{1, 0, 0}));
   EXPECT_EQ(m.distance, -2);
   EXPECT_EQ(m.count, 4);
 }
 
-TEST(Erratum, E15_boxes_overlap_wherever_they_are) {
+TEST(Erratum, E15_boxes_overlap_at_any_position) {
   const Box cube{{1, 1, 1}};
-  for (const Vec3& place : {Vec3{0, 0, 0}, Vec3{5, 0, 0}, Vec3{3, 4, 5}, Vec3{-100, 0, 7}}) {
-    const Manifold m = collide(cube, {{}, place}, cube, {{}, place + Vec3{1, 0, 0}});
+  for (const Vec3& position : {Vec3{0, 0, 0}, Vec3{5, 0, 0}, Vec3{3, 4, 5}, Vec3{-100, 0, 7}}) {
+    const Manifold m = collide(cube, {{}, position}, cube, {{}, position + Vec3{1, 0, 0}});
     EXPECT_EQ(m.normal, (Vec3{-1, 0, 0}));
     EXPECT_EQ(m.distance, -1);
     EXPECT_EQ(m.count, 4);
   }
 }
 
-TEST(Erratum, E16_a_sphere_behind_a_plane_is_pushed_back_where_it_came_from) {
-  // Centre 0.4 behind: it overlaps by 0.6, between the plane and its front at y = 0.6.
+TEST(Erratum, E16_a_sphere_behind_a_plane_is_pushed_to_the_side_of_its_centre) {
+  // The centre is 0.4 behind the plane, so the overlap is 0.6, from the plane to y = 0.6.
   const Plane plane{{0, 1, 0}, 0};
   const Touch behind = collide(SphereInstance{{7, -0.4_r, 0}, 1}, plane);
   ASSERT_TRUE(behind.touching);
@@ -382,7 +386,7 @@ TEST(BoxHalfSpace, EachCornerInsideHasItsOwnDepth) {
       double d = -static_cast<double>(solid.offset);
       for (int i = 0; i < 3; ++i) d += p[i] * static_cast<double>(solid.normal[i]);
       if (std::abs(d) < 40 * kEps) {
-        inside = -1;  // too close to call
+        inside = -1;  // within rounding errors
         break;
       }
       if (d > 0) continue;

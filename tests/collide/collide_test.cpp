@@ -1,4 +1,4 @@
-/// Sphere against half-space and box: by hand, and against a search over the box.
+/// Tests of spheres against half-spaces and boxes, with hand-computed values and properties.
 #include <jfpx/collide.hpp>
 
 #include "tests/world/support.hpp"
@@ -19,7 +19,8 @@ void expect_near(const Vec3& actual, const Vec3& expected, Real tolerance = kTol
 }
 
 TEST(SphereHalfSpace, ContactIsInTheMiddleOfTheOverlap) {
-  // Lowest point of the sphere at y = 1.5, surface at y = 2: middle at 1.75.
+  // The lowest point of the sphere is at y = 1.5 and the surface at y = 2, so the middle is at
+  // 1.75.
   const Touch touch = collide(SphereInstance{{3, 2.5, 4}, 1}, HalfSpace{{0, 1, 0}, 2});
   ASSERT_TRUE(touch.touching);
   EXPECT_EQ(touch.normal, (Vec3{0, 1, 0}));
@@ -27,19 +28,19 @@ TEST(SphereHalfSpace, ContactIsInTheMiddleOfTheOverlap) {
   EXPECT_EQ(touch.point, (Vec3{3, 1.75, 4}));
 }
 
-TEST(SphereHalfSpace, TouchingCountsAndAGapDoesNot) {
+TEST(SphereHalfSpace, TouchingIsAContactAndAGapIsNone) {
   const HalfSpace ground;
   EXPECT_TRUE(collide(SphereInstance{{0, 1, 0}, 1}, ground).touching);
   EXPECT_FALSE(collide(SphereInstance{{0, 1 + 2 * kEpsilon, 0}, 1}, ground).touching);
 }
 
-TEST(SphereHalfSpace, ASphereWhollyInsideIsPushedOut) {
+TEST(SphereHalfSpace, ASphereInsideIsPushedOut) {
   const Touch touch = collide(SphereInstance{{0, -5, 0}, 1}, HalfSpace{});
   EXPECT_EQ(touch.distance, -6);
   EXPECT_EQ(touch.point, (Vec3{0, -3, 0}));  // between 0 and -6
 }
 
-TEST(SphereBox, FaceEdgeAndCornerGiveTheNearestPoint) {
+TEST(SphereBox, FaceEdgeAndCornerGiveTheClosestPoint) {
   const Box box{{1, 2, 3}};
   const Transform pose{Mat3{}, {10, 0, 0}};
   Touch touch = collide(SphereInstance{{11.5, 1, 1}, 1}, box, pose);
@@ -60,8 +61,8 @@ TEST(SphereBox, FaceEdgeAndCornerGiveTheNearestPoint) {
 
 TEST(SphereBox, FollowsTheRotationOfTheBox) {
   const Real half = square_root(0.5_r);
-  const Transform turned = make_transform(Quat{half, 0, 0, half}, {});  // x to y, y to -x
-  const Touch touch = collide(SphereInstance{{0, 2.5, 0}, 1}, Box{{2, 1, 1}}, turned);
+  const Transform rotated = make_transform(Quat{half, 0, 0, half}, {});  // x to y, y to -x
+  const Touch touch = collide(SphereInstance{{0, 2.5, 0}, 1}, Box{{2, 1, 1}}, rotated);
   ASSERT_TRUE(touch.touching);
   expect_near(touch.normal, {0, 1, 0});
   EXPECT_NEAR(touch.distance, -0.5, 4 * kTolerance);
@@ -86,21 +87,21 @@ TEST(Erratum, E09_a_centre_inside_a_box_leaves_by_the_nearest_face) {
     ASSERT_TRUE(touch.touching);
     EXPECT_EQ(touch.normal, c.normal);
     EXPECT_EQ(touch.distance, -(0.5_r + c.depth));
-    // From the deepest point of the sphere half-way to the face.
+    // Half-way between the deepest point of the sphere and the face.
     expect_near(touch.point, c.centre + c.normal * ((c.depth - 0.5_r) / 2));
   }
 }
 
-TEST(SphereBox, MovingByTheContactEndsIt) {
+TEST(SphereBox, MovingByTheContactEndsTheOverlap) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
   int touches = 0;
   for (int i = 0; i < 20000; ++i) {
     const Box box{random.uniform_in_box({0.01_r, 0.1_r, 1}, {0.1_r, 1, 10})};
-    const Vec3 turn = random.uniform_in_box({-2, -2, -2}, {2, 2, 2});
-    const Transform pose = make_transform(
-        normalized(Quat{random.uniform(-1, 1), turn.x, turn.y, turn.z}), turn * Real(3));
+    const Vec3 v = random.uniform_in_box({-2, -2, -2}, {2, 2, 2});
+    const Transform pose =
+        make_transform(normalized(Quat{random.uniform(-1, 1), v.x, v.y, v.z}), v * Real(3));
     const SphereInstance sphere{
         transform_point(pose, random.uniform_in_box({-1, -2, -12}, {1, 2, 12})),
         random.uniform(0.01_r, 2)};
@@ -118,7 +119,7 @@ TEST(SphereBox, MovingByTheContactEndsIt) {
   EXPECT_GT(touches, 1000);
 }
 
-TEST(SphereBox, NumbersThatAreNotFiniteTouchNothing) {
+TEST(SphereBox, NonFiniteSpheresHaveNoContact) {
   const Real nan = std::numeric_limits<Real>::quiet_NaN();
   EXPECT_FALSE(collide(SphereInstance{{nan, 0, 0}, 1}, HalfSpace{}).touching);
   EXPECT_FALSE(

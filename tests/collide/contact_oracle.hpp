@@ -1,5 +1,5 @@
-/// The contacts that a world must find, by testing every sub_shape of every body against every
-/// other.
+/// Brute-force oracle for the contacts of a world, which tests all pairs of sub-shapes of all
+/// bodies.
 #pragma once
 
 #include <jfpx/collide.hpp>
@@ -16,10 +16,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
+/// Finds all contacts of the bodies in a store, in the order that World guarantees.
 class ContactOracle {
  public:
   explicit ContactOracle(const BodyStore& bodies) : bodies_(bodies) {
-    for (const BodyId id : bodies.ids()) take_apart(id.index);
+    for (const BodyId id : bodies.ids()) add_sub_shapes(id.index);
     for (const SubShape& p : sub_shapes_) {
       for (const SubShape& q : sub_shapes_) {
         const bool movable = bodies.movable(p.body) || bodies.movable(q.body);
@@ -46,12 +47,13 @@ class ContactOracle {
     const Box& box() const { return std::get<Box>(shape); }
   };
   struct Found {
-    /// Sphere pairs first; bodies; of a body's sub_shapes the spheres first, each kind by part.
+    /// Sort key: sphere pairs first, then by bodies, then by sub-shapes: spheres first, each kind
+    /// in the order of the parts.
     std::tuple<bool, std::uint32_t, std::uint32_t, bool, std::uint32_t, bool, std::uint32_t> order;
     Contact contact;
   };
 
-  void take_apart(std::uint32_t body) {
+  void add_sub_shapes(std::uint32_t body) {
     const BodyState state = bodies_.state(body);
     const Transform pose = make_transform(state.orientation, state.position);
     const auto* compound = std::get_if<Compound>(&bodies_.shape(body));
@@ -76,7 +78,7 @@ class ContactOracle {
 
   void test(const SubShape& p, const SubShape& q) {
     if (p.is_sphere() && q.is_sphere()) {
-      const bool swap = p.body > q.body;  // the collider sees the lower index first
+      const bool swap = p.body > q.body;  // the collider tests the lower index first
       const SphereInstance a = (swap ? q : p).sphere(), b = (swap ? p : q).sphere();
       const PairResult r = detail::test_sphere_pair(a, b);
       if (r.touching == 0) return;
@@ -94,7 +96,7 @@ class ContactOracle {
     }
   }
 
-  /// A wall as a body meets it.
+  /// The half-space with which a wall collides with a body.
   HalfSpace solid(const Shape& wall, std::uint32_t body) const {
     if (const auto* half_space = std::get_if<HalfSpace>(&wall)) return *half_space;
     const auto& plane = std::get<Plane>(wall);
@@ -106,7 +108,7 @@ class ContactOracle {
            Real distance) {
     found_.push_back({{!(p.is_sphere() && q.is_sphere()), p.body, q.body, !p.is_sphere(), p.part,
                        !q.is_sphere(), q.part},
-                      {p.body, q.body, normal, point, distance}});
+                      {bodies_.id(p.body), bodies_.id(q.body), normal, point, distance}});
   }
   void add(const SubShape& p, const SubShape& q, const Touch& t, bool flip) {
     if (t.touching) add(p, q, flip ? -t.normal : t.normal, t.point, t.distance);

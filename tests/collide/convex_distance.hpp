@@ -1,5 +1,5 @@
-/// The distance of two convex bodies in double, from their corners alone: an oracle that knows
-/// nothing of faces, edges and axes.
+/// Oracle for the distance of two convex bodies, in double and from their corners alone, without
+/// faces, edges or separating axes.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -24,8 +24,9 @@ inline double dot(const Point& a, const Point& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// The point of the convex hull of `points` (one to four) that is nearest to the origin, by trying
-/// every subset: its affine minimum must be a convex combination. `points` becomes that subset.
+/// The point of the convex hull of `points` (one to four) that is closest to the origin, and the
+/// smallest subset that contains it, which replaces `points`. Tests every subset: the closest point
+/// of its affine hull must be a convex combination.
 inline Point nearest_of_simplex(std::vector<Point>* points) {
   const auto n = points->size();
   double best = std::numeric_limits<double>::infinity();
@@ -36,7 +37,7 @@ inline Point nearest_of_simplex(std::vector<Point>* points) {
     for (unsigned i = 0; i < n; ++i) {
       if ((mask >> i & 1) != 0) subset.push_back((*points)[i]);
     }
-    // Minimise |p0 + sum t_k e_k|^2: the normal equations, by elimination with pivots.
+    // Minimises |p0 + sum t_k e_k|^2: the normal equations, by Gaussian elimination with pivoting.
     const std::size_t k = subset.size() - 1;
     double m[3][4] = {};
     for (std::size_t i = 0; i < k; ++i) {
@@ -45,7 +46,7 @@ inline Point nearest_of_simplex(std::vector<Point>* points) {
       }
       m[i][3] = -dot(subset[i + 1] - subset[0], subset[0]);
     }
-    // Points that span less than they are many: a smaller subset has the same minimum.
+    // Affinely dependent points are skipped, because a smaller subset has the same minimum.
     double size = 0;
     for (std::size_t i = 0; i < k; ++i) size = std::max(size, m[i][i]);
     bool regular = true;
@@ -81,8 +82,8 @@ inline Point nearest_of_simplex(std::vector<Point>* points) {
   return nearest;
 }
 
-/// Gilbert, Johnson and Keerthi 1988, on the differences of corners. The vector from b to a where
-/// they are nearest; zero if they overlap.
+/// The vector between the closest points, from b to a; zero if the bodies overlap. Uses the
+/// algorithm of Gilbert, Johnson and Keerthi (1988) on the differences of corners.
 inline Point separation(std::span<const Point> a, std::span<const Point> b) {
   const auto farthest = [](std::span<const Point> points, const Point& d, double sign) {
     const Point* best = &points[0];
@@ -96,7 +97,7 @@ inline Point separation(std::span<const Point> a, std::span<const Point> b) {
   for (int n = 0; n < 100; ++n) {
     const double squared = dot(v, v);
     if (squared == 0) return v;
-    // The difference that is farthest against v.
+    // The support point of the differences in the direction -v.
     const Point w = farthest(a, v, -1) - farthest(b, v, 1);
     if (squared - dot(v, w) <= 1e-14 * squared) return v;
     if (std::ranges::find(simplex, w) != simplex.end()) return v;

@@ -1,9 +1,9 @@
-/// The pair tests against a convex distance in double over random poses, and against themselves
-/// turned about.
+/// Tests of the pair tests in random poses, against a convex distance in double and against the
+/// same pair under a rigid transform.
 #include <jfpx/collide.hpp>
 
 #include "tests/collide/convex_distance.hpp"
-#include "tests/world/shape_zoo.hpp"
+#include "tests/world/random_bodies.hpp"
 
 #include <gtest/gtest.h>
 
@@ -47,14 +47,14 @@ Real log_uniform(Random* random, double low, double high) {
   return static_cast<Real>(low * std::pow(high / low, static_cast<double>(random->uniform())));
 }
 
-/// Cubes, plates and needles.
+/// A cube, plate or needle.
 Box random_box(Random* random) {
   const double thinnest = random->below(2) == 0 ? 0.3 : 0.003;
   return {{log_uniform(random, thinnest, 2), log_uniform(random, thinnest, 2),
            log_uniform(random, thinnest, 2)}};
 }
 
-TEST(SphereBoxOracle, TouchDepthNormalAndPointAreThoseOfTheNearestPoint) {
+TEST(SphereBoxOracle, ContactDepthNormalAndPointAreThoseOfTheClosestPoint) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
@@ -62,10 +62,10 @@ TEST(SphereBoxOracle, TouchDepthNormalAndPointAreThoseOfTheNearestPoint) {
   for (int n = 0; n < 100000; ++n) {
     const Box box = random_box(&random);
     const Vec3 home = random.uniform_in_box({-5, -5, -5}, {5, 5, 5});
-    const Transform pose = make_transform(test::random_turn(&random), home);
+    const Transform pose = make_transform(test::random_rotation(&random), home);
     const Real radius = log_uniform(&random, 0.01, 1);
-    const Vec3 reach = box.half_extents + Vec3{1, 1, 1} * (radius * 1.3_r);
-    const SphereInstance sphere{home + pose.basis * random.uniform_in_box(-reach, reach), radius};
+    const Vec3 range = box.half_extents + Vec3{1, 1, 1} * (radius * 1.3_r);
+    const SphereInstance sphere{home + pose.basis * random.uniform_in_box(-range, range), radius};
     const Touch touch = collide(sphere, box, pose);
 
     const Point centre = to_double(sphere.centre);
@@ -82,13 +82,13 @@ TEST(SphereBoxOracle, TouchDepthNormalAndPointAreThoseOfTheNearestPoint) {
     const double depth = -static_cast<double>(touch.distance);
     ASSERT_NEAR(length(touch.normal), 1, 64 * kEps);
     if (gap > noise) {
-      // The oracle's distance is good to 1e-14, so its direction only to the root.
+      // The oracle's distance has an error of 1e-14, and its direction the square root of that.
       const double coarse = 2e-7;
       ASSERT_NEAR(depth, r - gap, noise) << n;
       for (std::size_t i = 0; i < 3; ++i) {
         const double normal = static_cast<double>(touch.normal[static_cast<int>(i)]);
         ASSERT_NEAR(normal, away[i] / gap, noise / gap + coarse) << n;
-        // Half-way between the sphere's deepest point and the box.
+        // Half-way between the deepest point of the sphere and the box.
         const double middle = centre[i] - normal * (r + gap) / 2;
         ASSERT_NEAR(static_cast<double>(touch.point[static_cast<int>(i)]), middle,
                     noise * (1 + r / gap) + coarse * r)
@@ -97,7 +97,7 @@ TEST(SphereBoxOracle, TouchDepthNormalAndPointAreThoseOfTheNearestPoint) {
       continue;
     }
     ++inside;
-    // Out by the contact the sphere just touches; a shorter way in no direction of the axes.
+    // Translated by the contact, the sphere only touches; no axis direction has a smaller depth.
     const auto out = [&](const Vec3& d, double by) {
       const auto p = moved({centre}, d, by);
       return test::length(test::separation(p, corners(box, pose)));
@@ -114,7 +114,7 @@ TEST(SphereBoxOracle, TouchDepthNormalAndPointAreThoseOfTheNearestPoint) {
   EXPECT_GT(inside, 1000);
 }
 
-TEST(BoxBoxOracle, TouchAndDepthAgreeWithTheDistanceOfTheCorners) {
+TEST(BoxBoxOracle, ContactAndDepthAgreeWithTheConvexDistance) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
@@ -122,12 +122,12 @@ TEST(BoxBoxOracle, TouchAndDepthAgreeWithTheDistanceOfTheCorners) {
   for (int n = 0; n < 100000; ++n) {
     const Box a = random_box(&random), b = random_box(&random);
     const Vec3 home = random.uniform_in_box({-5, -5, -5}, {5, 5, 5});
-    const Transform pose_a = make_transform(test::random_turn(&random), home);
-    Transform pose_b = make_transform(test::random_turn(&random), {});
+    const Transform pose_a = make_transform(test::random_rotation(&random), home);
+    Transform pose_b = make_transform(test::random_rotation(&random), {});
     if (random.below(4) == 0) pose_b.basis = pose_a.basis;
-    const Real reach = length(a.half_extents) + length(b.half_extents);
-    pose_b.origin = home + random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * (reach * 0.7_r);
-    // Edges this close to parallel are judged by faces alone, which costs that much.
+    const Real sum = length(a.half_extents) + length(b.half_extents);
+    pose_b.origin = home + random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * (sum * 0.7_r);
+    // For nearly parallel edges only the face axes are tested, which causes an error of this size.
     double sine = 1;
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
@@ -137,14 +137,14 @@ TEST(BoxBoxOracle, TouchAndDepthAgreeWithTheDistanceOfTheCorners) {
       }
     }
     const double blunt = sine < 2 * std::sqrt(kEps) ? 2 * std::sqrt(kEps) : kEps / sine;
-    const double noise = 100 * static_cast<double>(reach) * blunt + 100 * kEps * 10;
+    const double noise = 100 * static_cast<double>(sum) * blunt + 100 * kEps * 10;
 
     const Manifold m = collide(a, pose_a, b, pose_b);
     const auto corners_a = corners(a, pose_a), corners_b = corners(b, pose_b);
     const double gap = test::length(test::separation(corners_a, corners_b));
     if (m.count == 0) {
       ++clear;
-      // Disjoint: overlapping boxes, made smaller by the noise, would have distance zero still.
+      // Separated: boxes that overlap by more than the noise would still overlap when shrunk by it.
       const auto smaller = [&](const Box& box) {
         Box shrunk = box;
         for (int i = 0; i < 3; ++i) {
@@ -161,8 +161,8 @@ TEST(BoxBoxOracle, TouchAndDepthAgreeWithTheDistanceOfTheCorners) {
     }
     ++touches;
     ASSERT_LE(gap, noise) << n;
-    // Moved by its depth along the normal, a has left b; and just so, but for faces being preferred
-    // to edges that part the boxes on a way up to 2 % shorter.
+    // Translated by its depth along the normal, a only touches b, up to the preference for faces
+    // over pairs of edges whose depth is up to 2 % smaller.
     const double depth = -static_cast<double>(m.distance), more = 0.01;
     const double left =
         test::length(test::separation(moved(corners_a, m.normal, depth + more), corners_b));
@@ -173,9 +173,10 @@ TEST(BoxBoxOracle, TouchAndDepthAgreeWithTheDistanceOfTheCorners) {
   EXPECT_GT(clear, 10000);
 }
 
-/// How two touches differ when all was moved by `world`.
-void expect_turned(const Touch& before, const Touch& after, const Transform& world, double noise) {
-  if (before.touching != after.touching) {  // within rounding of each other
+/// Compares two contacts, of which the second belongs to the pair transformed by `world`.
+void expect_transformed(const Touch& before, const Touch& after, const Transform& world,
+                        double noise) {
+  if (before.touching != after.touching) {  // only if the distance is within rounding errors
     ASSERT_GE(before.distance + after.distance, -noise);
     return;
   }
@@ -184,9 +185,9 @@ void expect_turned(const Touch& before, const Touch& after, const Transform& wor
   ASSERT_LE(length(world.basis * before.normal - after.normal), noise);
   ASSERT_LE(length(transform_point(world, before.point) - after.point), noise);
 }
-void expect_turned(const Manifold& before, const Manifold& after, const Transform& world,
-                   double noise) {
-  if (before.count != after.count) {  // a corner within rounding of the wall
+void expect_transformed(const Manifold& before, const Manifold& after, const Transform& world,
+                        double noise) {
+  if (before.count != after.count) {  // only if a corner is within rounding errors of the wall
     ASSERT_NEAR(before.distance, after.distance, noise);
     return;
   }
@@ -200,39 +201,40 @@ void expect_turned(const Manifold& before, const Manifold& after, const Transfor
   }
 }
 
-TEST(PairTests, TurnedTogetherTouchTheSameWay) {
+TEST(PairTests, TransformedPairsHaveTheSameContact) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
   for (int n = 0; n < 20000; ++n) {
-    const Transform world =
-        make_transform(test::random_turn(&random), random.uniform_in_box({-3, -3, -3}, {3, 3, 3}));
+    const Transform world = make_transform(test::random_rotation(&random),
+                                           random.uniform_in_box({-3, -3, -3}, {3, 3, 3}));
     const Box box = random_box(&random);
-    const Transform pose = make_transform(test::random_turn(&random), {});
+    const Transform pose = make_transform(test::random_rotation(&random), {});
     const Real radius = log_uniform(&random, 0.05, 1);
     const SphereInstance sphere{random.uniform_in_box({-2, -2, -2}, {2, 2, 2}), radius};
     const HalfSpace solid{test::random_direction(&random), random.uniform(-1, 1)};
     const Plane plane{solid.normal, solid.offset};
-    const SphereInstance sphere_there{transform_point(world, sphere.centre), radius};
+    const SphereInstance moved_sphere{transform_point(world, sphere.centre), radius};
     const Vec3 normal = world.basis * solid.normal;
-    const HalfSpace solid_there{normal, solid.offset + dot(normal, world.origin)};
-    const Plane plane_there{normal, solid_there.offset};
+    const HalfSpace moved_solid{normal, solid.offset + dot(normal, world.origin)};
+    const Plane moved_plane{normal, moved_solid.offset};
 
     const double noise = 400 * kEps;
-    expect_turned(collide(sphere, solid), collide(sphere_there, solid_there), world, noise);
-    expect_turned(collide(sphere, plane), collide(sphere_there, plane_there), world, noise);
-    expect_turned(collide(box, pose, solid), collide(box, world * pose, solid_there), world, noise);
+    expect_transformed(collide(sphere, solid), collide(moved_sphere, moved_solid), world, noise);
+    expect_transformed(collide(sphere, plane), collide(moved_sphere, moved_plane), world, noise);
+    expect_transformed(collide(box, pose, solid), collide(box, world * pose, moved_solid), world,
+                       noise);
     if (absolute(dot(plane.normal, pose.origin) - plane.offset) > 0.001_r) {  // else the side
-      expect_turned(collide(box, pose, plane), collide(box, world * pose, plane_there), world,
-                    noise);
+      expect_transformed(collide(box, pose, plane), collide(box, world * pose, moved_plane), world,
+                         noise);
     }
-    // The direction from the nearest point has its digits only as far as that is away.
+    // The relative error of the direction from the closest point grows as the distance shrinks.
     const Vec3 local = inverse_transform_point(pose, sphere.centre);
     Real gap = 0;
     for (int i = 0; i < 3; ++i) gap = std::max(gap, absolute(local[i]) - box.half_extents[i]);
     if (gap > 0.01_r) {
-      expect_turned(collide(sphere, box, pose), collide(sphere_there, box, world * pose), world,
-                    noise / static_cast<double>(gap));
+      expect_transformed(collide(sphere, box, pose), collide(moved_sphere, box, world * pose),
+                         world, noise / static_cast<double>(gap));
     }
     if (HasFatalFailure()) FAIL() << n;
   }

@@ -1,5 +1,5 @@
-/// The pair tests of shared/ and collide.hpp on the device: they compile with nvcc, and give the
-/// host's bits.
+/// Pair tests of src/collide on the device: they compile with nvcc, and give the same bits as on
+/// the host.
 #include <jfpx/intersect.hpp>
 #include <jfpx/random.hpp>
 
@@ -26,7 +26,7 @@ struct Input {
   Plane plane;
 };
 
-/// Everything that the pair tests say. Manifolds are the largest part.
+/// Results of all pair tests.
 struct Output {
   PairResult spheres;
   Touch sphere_box, sphere_half_space, sphere_plane;

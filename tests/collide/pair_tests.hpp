@@ -11,8 +11,8 @@ inline namespace JFPX_ABI {
 namespace test {
 
 struct PairTestRun {
-  std::string failure;  ///< of a CUDA call; empty if all went well
-  int differences = 0;  ///< inputs for which host and device don't agree to the last bit
+  std::string failure;  ///< name of the first CUDA error; empty if there was none
+  int differences = 0;  ///< inputs for which the results of host and device differ in any bit
   int touching_boxes = 0;
 };
 PairTestRun run_pair_tests(std::uint64_t seed, int count);

@@ -1,9 +1,9 @@
-/// Groups of contacts on the device have the bits of the same walkers on the host.
+/// Groups of contacts have the same bits on a GPU and on the host.
 #include <jfpx/error.hpp>
 
 #include "src/contact_solver/cuda/group_solver_cuda.hpp"
 #include "src/contact_solver/row_order.hpp"
-#include "tests/contact_solver/group_double.hpp"
+#include "tests/contact_solver/host_group_solver.hpp"
 #include "tests/sphere_collider/cuda/cuda_fixture.hpp"
 
 #include <cstring>
@@ -13,13 +13,13 @@ inline namespace JFPX_ABI {
 namespace test {
 namespace {
 
-/// Spheres and contacts that need not touch: numbers of the right size in every field.
+/// Random bodies and contacts, which need not touch: every field has a value of realistic size.
 struct RandomGroup {
   GroupSize size;
   GroupSweeps sweeps;
   std::vector<rows::RowPair> pairs;
   std::vector<Real> bodies, factors, contacts;
-  std::vector<std::uint8_t> pushed;
+  std::vector<std::uint8_t> split_impulses;  ///< by contact: may have a split impulse
 
   RandomGroup(std::size_t body_count, std::size_t contact_count, Random& random) {
     size = {.bodies = body_count, .contacts = contact_count, .factors = random.below(3) == 0};
@@ -73,7 +73,7 @@ struct RandomGroup {
     in[rows::kInErp] = Real(0.2);
     in[rows::kInAnchor] = random.below(8) == 0 ? Real(1) : Real(0);
     contacts.insert(contacts.end(), in, in + rows::kInputFields);
-    pushed.push_back(in[rows::kInDistance] <= Real(-0.04) ? 1 : 0);
+    split_impulses.push_back(in[rows::kInDistance] <= Real(-0.04) ? 1 : 0);
   }
   static Vec3 normalized(const Vec3& v) {
     return v * (1 / square_root(v.x * v.x + v.y * v.y + v.z * v.z));
@@ -85,11 +85,12 @@ struct RandomGroup {
     if (size.factors) std::copy(factors.begin(), factors.end(), in.factors);
     std::copy(contacts.begin(), contacts.end(), in.contacts);
     RowOrder order;
-    order.build(pairs, size.bodies, in.places, in.place_contacts, in.moves);
-    sweeps.push_count = sweeps.settings.split
-                            ? RowOrder::choose({in.places, size.contacts}, in.place_contacts,
-                                               pushed, size.bodies, in.push_places, in.push_moves)
-                            : 0;
+    order.build(pairs, size.bodies, in.schedule, in.slot_contacts, in.contact_counts);
+    sweeps.split_impulse_count =
+        sweeps.settings.split
+            ? RowOrder::select({in.schedule, size.contacts}, in.slot_contacts, split_impulses,
+                               size.bodies, in.split_impulse_schedule, in.split_impulse_counts)
+            : 0;
     return solver.solve(sweeps);
   }
 };
@@ -109,7 +110,7 @@ bool same_outcomes(const GroupSize& size, const GroupSolver& a, const GroupSolve
 }
 
 void expect_same(GroupSolver& device, RandomGroup& group, std::uint64_t seed) {
-  GroupDouble host(seed);
+  HostGroupSolver host(seed);
   host.threads = 1;
   const rows::RowSweepReport expected = group.solve_with(host);
   const rows::RowSweepReport report = group.solve_with(device);
@@ -117,12 +118,12 @@ void expect_same(GroupSolver& device, RandomGroup& group, std::uint64_t seed) {
   if (expected.broken) return;
   EXPECT_EQ(report.iterations, expected.iterations);
   EXPECT_EQ(report.residual, expected.residual);
-  EXPECT_EQ(report.pushed, expected.pushed);
+  EXPECT_EQ(report.split_impulses, expected.split_impulses);
   EXPECT_TRUE(same_outcomes(group.size, device, host))
       << group.size.contacts << " contacts of " << group.size.bodies << " bodies";
 }
 
-// Around the lanes of a warp, the threads of a block; few bodies, so that all wait for all.
+// Sizes around those of a warp and a block. With few bodies all contacts depend on each other.
 TEST_F(Cuda, GroupsOfAnySizeHaveTheBitsOfTheHost) {
   Random random(base_seed());
   const auto device = make_group_solver(0);
@@ -143,7 +144,7 @@ TEST_F(Cuda, FewContactsOfAGroup) {
   expect_same(*make_group_solver(0), group, base_seed());
 }
 
-// More contacts than an H200 has threads: each takes several.
+// More contacts than an H200 has threads, so that every thread solves several.
 TEST_F(Cuda, MoreContactsThanThreadsHaveTheBitsOfTheHost) {
   Random random(base_seed());
   const auto device = make_group_solver(0);
@@ -167,7 +168,7 @@ TEST_F(Cuda, AnyFailingCallOfAGroupIsAnErrorAndTheNextIsSolved) {
         make_group_solver(0);
         group.solve_with(*survivor);
       } catch (const BackendUnavailable&) {
-        threw = true;  // the device could not be asked
+        threw = true;  // the properties of the device were not available
       } catch (const std::exception& e) {
         threw = true;
         EXPECT_NE(std::string(e.what()).find("/cuda/"), std::string::npos) << e.what();

@@ -1,4 +1,5 @@
-/// Demos as such: the table, how inputs become actions, and runs that repeat.
+/// Tests of the demo interface: the table of demos, the mapping of inputs to actions, and
+/// repeatability.
 #include <jfpx/error.hpp>
 
 #include "src/demos/input_script.hpp"
@@ -17,14 +18,14 @@ using demos::Demo;
 using demos::Input;
 using ::testing::HasSubstr;
 
-TEST(Demos, RunDrawAndRepeatToTheBit) {
+TEST(Demos, RunDrawAndRepeatBitForBit) {
   for (const demos::Entry& entry : demos::all()) {
     SCOPED_TRACE(entry.name);
     const auto once = demos::make(entry.name), again = demos::make(entry.name);
     EXPECT_EQ(once->name(), entry.name);
     demos::View view;
     for (std::size_t n = 0; n < 40; ++n) {
-      // Every control is pressed in turn, and held for two steps.
+      // The controls are pressed one after the other, and each is held for two steps.
       std::vector<Input> inputs;
       const std::size_t count = once->controls().size();
       inputs.push_back({n % count, true});
@@ -38,7 +39,7 @@ TEST(Demos, RunDrawAndRepeatToTheBit) {
   }
 }
 
-TEST(Demos, ControlsHaveNamesThatScriptsCanHold) {
+TEST(Demos, ControlNamesAreValidInScripts) {
   for (const demos::Entry& entry : demos::all()) {
     SCOPED_TRACE(entry.name);
     const auto demo = demos::make(entry.name);
@@ -53,7 +54,7 @@ TEST(Demos, ControlsHaveNamesThatScriptsCanHold) {
   }
 }
 
-TEST(Demos, EveryNamedSceneIsOneAndMovesAsItsWorld) {
+TEST(Demos, EveryNamedSceneIsADemoAndMovesAsItsWorld) {
   for (const scenes::Entry& entry : scenes::all()) {
     const demos::Options options{.scene = {.spheres = 30, .seed = 2}};
     const auto demo = demos::make(entry.name, options);
@@ -83,7 +84,7 @@ TEST(Demos, BadNamesAndStepsAreRefused) {
   EXPECT_THROW(demos::make("boxes-and-balls", {.dt = Real(-1)}), Error);
 }
 
-TEST(ScriptRecorder, ARecordedRunRepeatsToTheBit) {
+TEST(ScriptRecorder, ARecordedRunRepeatsBitForBit) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   for (const demos::Entry& entry : demos::all()) {
@@ -108,7 +109,7 @@ TEST(ScriptRecorder, ARecordedRunRepeatsToTheBit) {
   }
 }
 
-TEST(ScriptPlayer, EveryDemoHasAScriptThatMakesADifference) {
+TEST(ScriptPlayer, EveryDemoHasAScriptThatChangesItsStates) {
   for (const demos::Entry& entry : demos::all()) {
     SCOPED_TRACE(entry.name);
     const demos::Options options{.scene = {.spheres = 3}};
@@ -125,7 +126,7 @@ TEST(ScriptPlayer, EveryDemoHasAScriptThatMakesADifference) {
   }
 }
 
-/// Counts what its controls do: 0 once a press, 1 in every step.
+/// A demo that records its actions: control 0 acts once per press, control 1 in every step.
 class Counter final : public Demo {
  public:
   static constexpr demos::Control kControls[] = {{"once", "acts once", "o"},
@@ -148,29 +149,29 @@ class Counter final : public Demo {
 
 void step(Counter* demo, std::vector<Input> inputs) { demo->step(inputs); }
 
-TEST(Erratum, E42_press_and_release_in_one_step_act_once_and_leave_nothing_stuck) {
+TEST(Erratum, E42_press_and_release_in_one_step_act_once_and_leave_no_control_down) {
   Counter demo;
   step(&demo, {{1, true}, {1, false}, {0, true}, {0, false}});
   step(&demo, {});
-  EXPECT_EQ(demo.acted, "10  ");  // last in, first out would leave both keys down
+  EXPECT_EQ(demo.acted, "10  ");  // in reverse order, both controls would stay down
 }
 
-TEST(Erratum, E42_an_input_of_no_control_is_refused_and_changes_nothing) {
+TEST(Erratum, E42_an_invalid_control_is_refused_and_changes_nothing) {
   Counter demo;
   try {
     step(&demo, {{1, true}, {2, true}});
     FAIL();
   } catch (const InvalidArgument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("input of control 2"));
+    EXPECT_THAT(error.what(), HasSubstr("control is 2; it must be less than"));
   }
   step(&demo, {});
   EXPECT_EQ(demo.acted, " ");
 }
 
-TEST(Demos, HeldControlsActInEveryStepAndOthersOnceAPress) {
+TEST(Demos, HeldControlsActInEveryStepAndOthersOncePerPress) {
   Counter demo;
   step(&demo, {{0, true}, {1, true}});
-  step(&demo, {{0, true}});  // a keyboard that repeats
+  step(&demo, {{0, true}});  // key repeat
   step(&demo, {{1, false}, {0, false}});
   step(&demo, {{0, true}});
   EXPECT_EQ(demo.acted, "01 1  0 ");

@@ -1,5 +1,5 @@
-/// The aircraft of flight against an integration of its equations of motion in double with small
-/// steps, written down a second time.
+/// Tests of the aircraft of the demo flight, against an independent integration of its equations of
+/// motion in double with small steps.
 #include "src/demos/demo.hpp"
 
 #include <gtest/gtest.h>
@@ -27,8 +27,8 @@ V cross(const V& a, const V& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-/// Position, velocity, angular velocity in world axes; the body's axes as rows: to body axes is a
-/// product, back is the transposed.
+/// Position, velocity and angular velocity in world axes, and the body's axes as the rows of a
+/// matrix that transforms from world axes to body axes.
 struct State {
   V x{}, v{}, w{};
   std::array<V, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
@@ -47,36 +47,35 @@ struct Controls {
   double minus_z = 0, plus_z = 0, rudder = 0;
 };
 
-/// What the errata change.
+/// Parameters that the errata change.
 struct Physics {
-  V inertia{2.5 / 3 * 2, 2.5 / 3 * 5,
-            2.5 / 3 * 5};  ///< the original's is {0.6, 1.5, 1.5}: E22, E23
-  double damping = 0.8;    ///< per second; its square there: E18
-  double arms = 1;         ///< share of omega x r that a surface feels; 0 there: E27
+  V inertia{2.5 / 3 * 2, 2.5 / 3 * 5, 2.5 / 3 * 5};  ///< in the original {0.6, 1.5, 1.5}: E22, E23
+  double damping = 0.8;  ///< per second; its square in the original: E18
+  double arms = 1;       ///< weight of omega x r in the flow at a surface; 0 in the original: E27
 };
 
-/// Acceleration and angular acceleration without damping, of the thesis' aircraft: 2.5 kg, pulled
-/// with 10 N, with four surfaces.
+/// Undamped acceleration and angular acceleration of the thesis' aircraft: 2.5 kg, a thrust of 10
+/// N, four surfaces.
 void accelerations(const State& s, const Controls& controls, const Physics& physics, V* linear,
                    V* angular) {
   const V w = to_body(s, s.w), v = to_body(s, s.v);
   V force{-10, 0, 0}, torque{};
   const auto surface = [&](const V& point, double yx, double yy, double zx, double zz) {
     const V air = v + physics.arms * cross(w, point);
-    const V push{0, yx * air[0] + yy * air[1], zx * air[0] + zz * air[2]};
-    force = force + push;
-    torque = torque + cross(point, push);
+    const V lift{0, yx * air[0] + yy * air[1], zx * air[0] + zz * air[2]};
+    force = force + lift;
+    torque = torque + cross(point, lift);
   };
   surface({-1, 0, -2}, -1 - 0.005 * controls.minus_z, -0.5, 0, 0);
   surface({-1, 0, 2}, -1 - 0.005 * controls.plus_z, -0.5, 0, 0);
   surface({2, 0.5, 0}, 0, 0, -0.01 * controls.rudder, 0);
   surface({2, 0, 0}, -1, -0.5, 0, -0.1);
   const V& inertia = physics.inertia;
-  const V turning =
+  const V net_torque =
       torque + -1.0 * cross(w, {inertia[0] * w[0], inertia[1] * w[1], inertia[2] * w[2]});
   *linear = (1 / 2.5) * to_world(s, force) + V{0, -9.81, 0};
-  *angular =
-      to_world(s, {turning[0] / inertia[0], turning[1] / inertia[1], turning[2] / inertia[2]});
+  *angular = to_world(
+      s, {net_torque[0] / inertia[0], net_torque[1] / inertia[1], net_torque[2] / inertia[2]});
 }
 
 State slope(const State& s, const Controls& controls, const Physics& physics) {
@@ -97,7 +96,8 @@ State moved(const State& s, const State& d, double dt) {
   for (int i = 0; i < 3; ++i) r.axes[i] = s.axes[i] + dt * d.axes[i];
   return r;
 }
-/// Runge and Kutta's step of fourth order; then the ground takes what goes down.
+/// One fourth-order Runge-Kutta step, after which the ground limits the height and stops the
+/// downward velocity.
 State next(const State& s, const Controls& controls, double dt, const Physics& physics = {}) {
   const State a = slope(s, controls, physics), b = slope(moved(s, a, dt / 2), controls, physics);
   const State c = slope(moved(s, b, dt / 2), controls, physics);
@@ -109,7 +109,7 @@ State next(const State& s, const Controls& controls, double dt, const Physics& p
   }
   return r;
 }
-/// The true flight without hands, to about 1e-3 m.
+/// The exact flight without input, to about 1e-3 m.
 State flown(double seconds) {
   constexpr int kStepsPerSecond = 4000;
   State s;
@@ -133,7 +133,7 @@ State double_state(const BodyState& b) {
 BodyState aircraft(const demos::Demo& demo) { return demo.states().front(); }
 double speed(const BodyState& s) { return static_cast<double>(length(s.velocity)); }
 
-/// The control goes down before the first of `steps` steps and comes up after the last.
+/// Takes `steps` steps with the control held down, and one with the control released.
 void hold(demos::Demo* demo, std::string_view control, int steps) {
   const std::size_t number = find_control(*demo, control);
   demo->step(std::vector<Input>{{number, true}});
@@ -144,9 +144,9 @@ void fly(demos::Demo* demo, int steps) {
   for (int n = 0; n < steps; ++n) demo->step();
 }
 
-// What validates the model: with the original's errors and the original's way to integrate it gives
-// what the original gave when it was run, at 60 Hz without hands.
-TEST(FlightModel, WithTheOriginalsErrorsGivesTheOriginalsFlight) {
+// Validates the model: with the errors and the integrator of the original it reproduces results of
+// the original, at 60 Hz without input.
+TEST(FlightModel, ReproducesTheOriginalWithItsErrors) {
   const Physics original{.inertia = {0.6, 1.5, 1.5}, .damping = 0.8, .arms = 0};
   const double dt = 1.0 / 60, kept = std::pow(0.8, dt);
   State s;
@@ -155,8 +155,8 @@ TEST(FlightModel, WithTheOriginalsErrorsGivesTheOriginalsFlight) {
     accelerations(s, {}, original, &linear, &angular);
     s.v = kept * (s.v + dt * linear);
     s.x = s.x + dt * s.v;
-    s.v = kept * s.v;            // damped again (E18)
-    if (s.x[1] < 0) s.x[1] = 0;  // and the downward speed stays (E22)
+    s.v = kept * s.v;            // second damping (E18)
+    if (s.x[1] < 0) s.x[1] = 0;  // the downward velocity remains (E22)
     if (n == 600) {
       EXPECT_NEAR(s.x[0], -69.85, 0.005);
       EXPECT_NEAR(s.x[1], 1.325, 0.0005);
@@ -168,7 +168,7 @@ TEST(FlightModel, WithTheOriginalsErrorsGivesTheOriginalsFlight) {
   EXPECT_NEAR(std::hypot(s.v[0], s.v[1]), 8.970, 0.0005);
 }
 
-TEST(Flight, WithoutHandsIsTheFlightOfTheEquations) {
+TEST(Flight, WithoutInputFollowsTheEquationsOfMotion) {
   // At 10 s and 20 s: (-107.55, 39.62), 19.07 m/s and (-279.11, 166.39), 22.46 m/s.
   for (const int seconds : {10, 20}) {
     const State s = flown(seconds);
@@ -183,12 +183,12 @@ TEST(Flight, WithoutHandsIsTheFlightOfTheEquations) {
       EXPECT_EQ(b.position.z, 0);
     }
     EXPECT_LT(error[0], 1);
-    EXPECT_NEAR(error[0] / error[1], 4, 1) << "the error goes with the length of the step";
+    EXPECT_NEAR(error[0] / error[1], 4, 1) << "the error is proportional to the length of a step";
   }
 }
 
-TEST(Flight, LiftCarriesItsWeightFromEightMetresASecond) {
-  // 3 kg/s of lift against 2.5 kg * 9.81 m/s^2: at 8.175 m/s.
+TEST(Flight, TakesOffAtEightMetresPerSecond) {
+  // A lift of 3 kg/s times the speed equals the weight, 2.5 kg * 9.81 m/s^2, at 8.175 m/s.
   const auto demo = demos::make("flight");
   BodyState before;
   int steps = 0;
@@ -202,7 +202,7 @@ TEST(Flight, LiftCarriesItsWeightFromEightMetresASecond) {
   EXPECT_NEAR(steps / 60.0, 2.73, 0.05);  // the original, damped twice, takes off after 6.98 s
 }
 
-TEST(Flight, ControlsTurnTheAircraftTheWayTheySayAndAsMuch) {
+TEST(Flight, ControlsRotateTheAircraftAsTheirNamesState) {
   struct Case {
     const char* control;
     Controls controls;
@@ -235,7 +235,7 @@ TEST(Flight, ControlsTurnTheAircraftTheWayTheySayAndAsMuch) {
   }
 }
 
-TEST(Flight, SurfacesStopAtTheirEndsAndLevelBringsThemBack) {
+TEST(Flight, DeflectionsAreLimitedAndResetByLevel) {
   const auto demo = demos::make("flight"), same = demos::make("flight");
   hold(demo.get(), "roll-right", 10);
   hold(same.get(), "roll-right", 200);
@@ -249,9 +249,9 @@ TEST(Flight, SurfacesStopAtTheirEndsAndLevelBringsThemBack) {
   EXPECT_EQ(view.text.back(), "wings: left +0.0, right +0.0; rudder +0.0");
 }
 
-TEST(Flight, WhoComesDownTooFastStartsAgainAtRest) {
+TEST(Flight, ACrashRestartsAtRest) {
   const auto demo = demos::make("flight");
-  fly(demo.get(), 300);  // in the air; then over on its back
+  fly(demo.get(), 300);  // takes off, and then rolls until it falls
   const std::size_t roll = find_control(*demo, "roll-right");
   demo->step(std::vector<Input>{{roll, true}});
   BodyState before = aircraft(*demo);
@@ -264,24 +264,24 @@ TEST(Flight, WhoComesDownTooFastStartsAgainAtRest) {
     }
     demo->step();
   }
-  FAIL() << "it never came down";
+  FAIL() << "the aircraft did not crash";
 }
 
-TEST(Erratum, E22_the_ground_takes_the_downward_speed) {
+TEST(Erratum, E22_the_ground_stops_the_downward_velocity) {
   const auto demo = demos::make("flight");
   for (int n = 0; n < 100; ++n) {
     demo->step();
     EXPECT_EQ(aircraft(*demo).position.y, 0);
-    EXPECT_EQ(aircraft(*demo).velocity.y, 0);  // the original keeps it, and sinks ever faster
+    EXPECT_EQ(aircraft(*demo).velocity.y, 0);  // in the original it remains, and grows
   }
 }
 
-TEST(Erratum, E22_the_aircraft_turns_with_the_inertia_of_its_mass) {
-  // A block of 2.5 kg, not of 1 kg: the original's turns 2.8 times as fast.
+TEST(Erratum, E22_the_aircraft_rotates_with_the_inertia_of_its_mass) {
+  // The inertia of a block of 2.5 kg; that of the original accelerates 2.8 times as fast.
   const auto demo = demos::make("flight");
   fly(demo.get(), 300);
   State ours = double_state(aircraft(*demo)), original = ours;
-  hold(demo.get(), "roll-right", 1);  // two steps with a tenth
+  hold(demo.get(), "roll-right", 1);  // two steps with a deflection of 0.1
   for (int n = 0; n < 2000; ++n) {
     ours = next(ours, {-0.1, 0.1, 0}, 1.0 / 60 / 1000);
     original = next(original, {-0.1, 0.1, 0}, 1.0 / 60 / 1000, {.inertia = {0.6, 1.5, 1.5}});

@@ -1,4 +1,5 @@
-/// The two ballistic demos: rounds fly as the formulas say, end when they should, and push crates.
+/// Tests of the two ballistic demos: trajectories and lifetime of rounds, and collisions with
+/// crates.
 #include "src/demos/demo.hpp"
 #include "tests/world/support.hpp"
 
@@ -19,7 +20,7 @@ using ::testing::HasSubstr;
 
 constexpr double kEps = std::numeric_limits<Real>::epsilon();
 
-/// Presses and releases controls within the coming step.
+/// Takes one step, within which the controls are pressed and released.
 void step(Demo* demo, std::vector<std::string_view> controls = {}) {
   std::vector<Input> inputs;
   for (const std::string_view control : controls) {
@@ -45,18 +46,18 @@ constexpr Shot kShots[] = {{"pistol", 0, 35, -1, 0.99},
                            {"fireball", 0, 10, 0.6, 0.9},
                            {"laser", 0, 100, 0, 0.99}};
 
-struct Place {
+struct Position {
   double y, z;
 };
-/// dv/dt = a - k v, k = -ln(damping), solved.
-Place flown(const Shot& shot, double t) {
+/// Solution of dv/dt = a - k v with k = -ln(damping).
+Position flown(const Shot& shot, double t) {
   const double k = -std::log(shot.damping), gone = (1 - std::exp(-k * t)) / k;
   return {1.5 + (shot.vy - shot.ay / k) * gone + shot.ay / k * t, shot.vz * gone};
 }
-/// When it is removed: in the ground, 200 m away, or 5 s old.
+/// [s], time of removal: the round reaches the ground, a range of 200 m, or an age of 5 s.
 double end_of(const Shot& shot) {
   const auto spent = [&](double t) {
-    const Place p = flown(shot, t);
+    const Position p = flown(shot, t);
     return p.y < 0 || p.z > 200;
   };
   double low = 0, high = 5;
@@ -65,7 +66,7 @@ double end_of(const Shot& shot) {
   return high;
 }
 
-TEST(Ballistic, RoundsFlyAndEndAsTheEquationSays) {
+TEST(Ballistic, RoundsFollowTheEquationOfMotion) {
   // Ends: 1.737 s at 60.27 m, 3.035 s at 119.56 m, 5 s at 38.87 m, 2.020 s at 200 m.
   for (const Shot& shot : kShots) {
     SCOPED_TRACE(shot.weapon);
@@ -74,12 +75,12 @@ TEST(Ballistic, RoundsFlyAndEndAsTheEquationSays) {
       step(demo.get(), {shot.weapon, "fire"});
       int steps = 1;
       for (; !demo->states().empty(); ++steps) {
-        const Place true_place = flown(shot, static_cast<double>(steps) / rate);
+        const Position exact = flown(shot, static_cast<double>(steps) / rate);
         const Vec3 position = demo->states()[0].position;
-        // Steps move at the velocity of their end: half a step's change of velocity ahead or
-        // behind.
-        ASSERT_NEAR(position.y, true_place.y, 65.0 / rate) << "step " << steps;
-        ASSERT_NEAR(position.z, true_place.z, 10.0 / rate) << "step " << steps;
+        // A step moves with the velocity at its end, which differs from the mean velocity by half
+        // the change of velocity in a step.
+        ASSERT_NEAR(position.y, exact.y, 65.0 / rate) << "step " << steps;
+        ASSERT_NEAR(position.z, exact.z, 10.0 / rate) << "step " << steps;
         ASSERT_EQ(position.x, 0);
         step(demo.get());
       }
@@ -88,7 +89,7 @@ TEST(Ballistic, RoundsFlyAndEndAsTheEquationSays) {
   }
 }
 
-TEST(Ballistic, FiresOnceAPressAndAsManyAsFit) {
+TEST(Ballistic, FiresOncePerPressUpToTheMaximum) {
   const auto demo = demos::make("ballistic");
   EXPECT_THAT(text(*demo), HasSubstr("laser, 0 of 160"));
   const std::size_t fire = find_control(*demo, "fire");
@@ -127,7 +128,7 @@ TEST(Erratum, E45_each_round_keeps_the_weapon_that_fired_it) {
   EXPECT_NEAR(demo->states()[1].velocity.z, 10 * f, 200 * kEps);
 }
 
-TEST(Erratum, E44_shots_move_once_a_step) {
+TEST(Erratum, E44_rounds_move_once_per_step) {
   const auto demo = demos::make("big-ballistic", {.dt = 0.01_r});
   step(demo.get(), {"laser", "fire"});
   const double q = std::pow(0.99, 0.01);
@@ -140,7 +141,7 @@ TEST(Erratum, E44_crates_stay_where_they_stand) {
   const auto demo = demos::make("big-ballistic");
   for (int n = 0; n < 300; ++n) step(demo.get());
   ASSERT_EQ(demo->states().size(), 3u);
-  for (const int crate : {0, 1}) {  // in the original they start in each other and burst apart
+  for (const int crate : {0, 1}) {  // in the original they overlap initially and fly apart
     const Vec3 position = demo->states()[crate].position;
     EXPECT_NEAR(position.x, 0, 0.01);
     EXPECT_NEAR(position.y, 2, 0.015);
@@ -156,10 +157,10 @@ TEST(Erratum, E44_crates_are_drawn_as_large_as_they_are) {
   EXPECT_EQ(std::ranges::count(view.items, Shape(Box{{2, 2, 2}}), &demos::Item::shape), 2 + 2);
 }
 
-TEST(BigBallistic, AShotPushesTheCrateByItsMomentumAndIsGone) {
-  // The pistol's 1.5 kg arrive at the front of the first crate (z = 48) after 2.43 s, at
-  // 19.5 m/s: 29 kg m/s for one crate or, with the other behind it, for both: 1.8 to 3.7 m/s, less
-  // what friction took since, 0.9 * 9.81 / 60 m/s a step.
+TEST(BigBallistic, ARoundTransfersItsMomentumToTheCrate) {
+  // The pistol's round of 1.5 kg hits the front of the first crate (z = 48) after 2.43 s with
+  // 19.5 m/s. Its 29 kg m/s accelerate one crate, or both, to 1.8 to 3.7 m/s, less the effect of
+  // friction since then, 0.9 * 9.81 / 60 m/s per step.
   const auto demo = demos::make("big-ballistic");
   step(demo.get(), {"pistol", "fire"});
   int steps = 1;
@@ -173,11 +174,11 @@ TEST(BigBallistic, AShotPushesTheCrateByItsMomentumAndIsGone) {
   double momentum = 0;
   for (const int crate : {0, 1}) momentum += 8 * demo->states()[crate].velocity.z;
   EXPECT_GT(momentum, 29 * 0.7);
-  EXPECT_LT(momentum, 29 * 1.15);  // restitution 0.1 gives a little more
+  EXPECT_LT(momentum, 29 * 1.15);  // a restitution of 0.1 adds momentum
 }
 
-TEST(BigBallistic, RoundsRestOnTheGroundUntilTheirTimeIsUp) {
-  // Artillery is back on the ground after 3 s, beyond the crates.
+TEST(BigBallistic, RoundsRestOnTheGroundUntilTheyExpire) {
+  // The artillery's round hits the ground after 3 s, behind the crates.
   const auto demo = demos::make("big-ballistic");
   step(demo.get(), {"artillery", "fire"});
   for (int n = 0; n < 240; ++n) step(demo.get());

@@ -1,4 +1,4 @@
-/// Input scripts: text there and back, every way to be wrong, playing.
+/// Tests of input scripts: round trips, errors, and replay.
 #include "src/demos/input_script.hpp"
 
 #include <jfpx/error.hpp>
@@ -14,7 +14,7 @@ namespace {
 using demos::InputScript;
 using ::testing::HasSubstr;
 
-/// What parse_input_script() complains about; empty if it does not.
+/// The message of the error that parse_input_script() throws; empty if it throws none.
 std::string complaint(std::string_view text) {
   try {
     demos::parse_input_script(text);
@@ -24,7 +24,7 @@ std::string complaint(std::string_view text) {
   return {};
 }
 
-TEST(InputScript, SurvivesText) {
+TEST(InputScript, RoundTripsThroughText) {
   InputScript script;
   script.demo = "flight";
   script.lines = {{1, "pitch-up", true}, {1, "level", true}, {18446744073709551615u, "x", false}};
@@ -42,8 +42,9 @@ TEST(InputScript, HasCommentsAndBlankLines) {
 }
 
 TEST(InputScript, ErrorsNameTheLine) {
-  EXPECT_THAT(complaint(""), HasSubstr("line 1: must be: jfpx-input 1 DEMO"));
-  EXPECT_THAT(complaint("\njfpx-input 2 flight"), HasSubstr("line 2: must be: jfpx-input 1"));
+  EXPECT_THAT(complaint(""), HasSubstr("line 1: must have the form jfpx-input 1 DEMO"));
+  EXPECT_THAT(complaint("\njfpx-input 2 flight"),
+              HasSubstr("line 2: must have the form jfpx-input 1"));
   EXPECT_THAT(complaint("jfpx-input 1"), HasSubstr("line 1"));
   const auto second = [](const std::string& line) {
     return complaint("jfpx-input 1 flight\n" + line);
@@ -56,10 +57,10 @@ TEST(InputScript, ErrorsNameTheLine) {
   EXPECT_THAT(second("1.5 level press"), HasSubstr("step is 1.5"));
   EXPECT_THAT(second("18446744073709551616 level press"),
               HasSubstr("step is 18446744073709551616"));
-  EXPECT_THAT(second("5 level press\n4 level release"), HasSubstr("line 3: step 4 comes after"));
+  EXPECT_THAT(second("5 level press\n4 level release"), HasSubstr("line 3: step 4 follows step 5"));
 }
 
-TEST(InputScript, FilesNameThemselves) {
+TEST(InputScript, ErrorsOfFilesNameTheFile) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("run.input");
   EXPECT_THROW(demos::load_input_script(path), FileError);
@@ -82,7 +83,7 @@ TEST(ScriptPlayer, RefusesAnotherDemoAndUnknownControls) {
                InvalidArgument);
 }
 
-TEST(ScriptPlayer, HandsOutEachStepsInputsInOrder) {
+TEST(ScriptPlayer, SuppliesTheInputsOfEachStepInOrder) {
   const auto demo = demos::make("ballistic");
   demos::ScriptPlayer player(
       {.demo = "ballistic", .lines = {{2, "pistol", true}, {2, "fire", true}, {4, "fire", false}}},

@@ -1,7 +1,7 @@
-/// What a fuzz target for Bullet worlds says when it found something.
+/// Report of a difference that a fuzz target for Bullet worlds has found.
 #pragma once
 
-#include "tests/bullet/stock_elsewhere.hpp"
+#include "tests/bullet/stack_residue.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 #include <sstream>
@@ -10,7 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// @param least the world, shrunk
+/// @param least the shrunk world
 template <class World>
 [[noreturn]] void report_difference(const Failure& failure, const World& least) {
   std::ostringstream text;

@@ -1,4 +1,4 @@
-/// What all fuzz targets share: how a finding is reported.
+/// Reporting of findings, for all fuzz targets.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,15 +10,15 @@
 #include <sstream>
 #include <string>
 
-/// Each target defines it: tries one input, and returns 0 whatever the input is.
+/// Entry point that each target defines: tests one input and returns 0.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace fuzz {
 
-/// Ends the program, so that the fuzzer keeps the input. Of what its processes write, libFuzzer
-/// passes on the lines with "ERROR:" alone.
+/// Reports a finding and aborts the program, so that the fuzzer keeps the input. Each line begins
+/// with "ERROR:", because libFuzzer forwards only such lines from its child processes.
 [[noreturn]] inline void report_finding(const std::string& what) {
   std::istringstream lines(what);
   for (std::string line; std::getline(lines, line);) {
@@ -27,8 +27,9 @@ namespace fuzz {
   std::abort();
 }
 
-inline void require(bool holds, const char* what) {
-  if (!holds) report_finding(std::string("not so: ") + what);
+/// Reports a violated property. `property` is a sentence that must hold.
+inline void require(bool holds, const char* property) {
+  if (!holds) report_finding(std::string("violated: ") + property);
 }
 
 }  // namespace fuzz

@@ -1,4 +1,4 @@
-/// Recordings: any file is one that can be read and written again, or a FileError.
+/// Fuzzer of recordings: any file can be read and written again, or causes a FileError.
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
@@ -19,7 +19,7 @@ namespace {
 using fuzz::require;
 using Input = std::span<const std::uint8_t>;
 
-/// Bytes of a file, with the checksum that the reader will compute.
+/// Bytes of a file, and the checksum that the reader computes.
 class File {
  public:
   void add(const void* data, std::size_t size) {
@@ -45,8 +45,8 @@ std::uint8_t take_byte(Input* input) {
   return byte;
 }
 
-/// A file that is right but for its text and frames. The input has the length of the text (2
-/// bytes), the number of frames (1 byte), the text and the frames.
+/// A file that is valid except for its text and frames. The input consists of the length of the
+/// text (2 bytes), the number of frames (1 byte), the text and the frames.
 std::string file_around(Input input, std::size_t frame_size) {
   const std::size_t low = take_byte(&input);
   const std::size_t wanted = low | static_cast<std::size_t>(take_byte(&input)) << 8;
@@ -71,7 +71,7 @@ std::string file_around(Input input, std::size_t frame_size) {
   return file.sealed(frames);
 }
 
-/// The first byte says how much of the rest is taken as it is.
+/// The first byte selects whether the rest is the whole file or is embedded in a valid one.
 std::string file_of(Input input) {
   const std::uint8_t mode = take_byte(&input);
   if (mode % 4 == 0) return {input.begin(), input.end()};

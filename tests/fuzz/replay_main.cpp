@@ -1,5 +1,5 @@
-/// Runs a fuzz target over files and folders of inputs where libFuzzer is not at hand: so each
-/// input that ever found something stays a test with every compiler.
+/// Main program that runs a fuzz target on files and folders of inputs without libFuzzer, so that
+/// the corpus is a regression test with every compiler.
 #include "tests/fuzz/fuzz.hpp"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ void replay(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) jfpx::fuzz::report_finding(path.string() + " can't be read");
   const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
-  // Named before it runs: what crashes has a name then.
+  // Printed first, so that the output names the input of a crash.
   std::printf("%s, %zu bytes\n", path.c_str(), bytes.size());
   std::fflush(stdout);
   LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
@@ -35,7 +35,7 @@ void replay(const fs::path& path) {
 int main(int count, char** arguments) {
   std::size_t inputs = 0;
   for (int i = 1; i < count; ++i) {
-    if (arguments[i][0] == '-') continue;  // an option of libFuzzer
+    if (arguments[i][0] == '-') continue;  // ignores options of libFuzzer
     for (const fs::path& path : inputs_of(arguments[i])) {
       replay(path);
       ++inputs;

@@ -1,5 +1,5 @@
-/// Scene files: any text is a scene that survives JSON to the last bit, or an InvalidScene; and any
-/// scene can be stepped, with the same bits for every broad phase.
+/// Fuzz target for scene files: every text is a scene that round-trips through JSON bit for bit, or
+/// an InvalidScene; and every scene can be stepped, with the same bits for every broad phase.
 #include <jfpx/error.hpp>
 #include <jfpx/world.hpp>
 
@@ -15,7 +15,7 @@ namespace {
 
 using fuzz::require;
 
-/// Larger ones say nothing more and take long.
+/// Larger scenes take longer without testing more.
 constexpr std::size_t kMaxBodies = 24, kMaxParts = 48;
 constexpr int kSteps = 3;
 
@@ -40,22 +40,23 @@ std::optional<World> made(const Scene& scene, BroadPhase broad_phase) {
   try {
     return World(scene, {.collider = {.backend = Backend::cpu}, .broad_phase = broad_phase});
   } catch (const InvalidScene&) {
-    return std::nullopt;  // half-spaces and planes that move
+    return std::nullopt;  // movable half-spaces and planes
   }
 }
 
 void step(const Scene& scene) {
   std::optional<World> world = made(scene, BroadPhase::cells);
   std::optional<World> other = made(scene, BroadPhase::hierarchy);
-  require(world.has_value() == other.has_value(), "both worlds refuse the scene");
+  require(world.has_value() == other.has_value(), "both worlds reject the scene, or none does");
   if (!world) return;
   for (int n = 0; n < kSteps; ++n) {
     const std::uint64_t before = world->state_hash();
     const StepReport report = world->step(), other_report = other->step();
-    require(report.non_finite == other_report.non_finite, "both worlds say if a body ran away");
-    require(!report.non_finite || world->state_hash() == before, "a failed step is undone");
-    require(world->state_hash() == other->state_hash(), "broad phases give the same bits");
-    require(std::ranges::equal(world->contacts(), other->contacts()), "and the same contacts");
+    require(report.non_finite == other_report.non_finite, "both worlds report non-finite states");
+    require(!report.non_finite || world->state_hash() == before, "a failed step is rolled back");
+    require(world->state_hash() == other->state_hash(), "broad phases give the same states");
+    require(std::ranges::equal(world->contacts(), other->contacts()),
+            "broad phases give the same contacts");
     for (const BodyState& state : world->states()) {
       require(is_finite(state.position) && is_finite(state.orientation) &&
                   is_finite(state.velocity) && is_finite(state.angular_velocity),
@@ -74,10 +75,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!scene) return 0;
   const std::string text = to_json(*scene);
   const std::optional<Scene> again = parsed(text);
-  fuzz::require(again && *again == *scene, "a scene survives JSON");
-  fuzz::require(to_json(*again) == text, "and has one JSON form");
+  fuzz::require(again && *again == *scene, "a scene round-trips through JSON");
+  fuzz::require(to_json(*again) == text, "the JSON form of a scene is unique");
   if (!is_small(*scene)) return 0;
-  // As many iterations as a user asks for is right, but nothing to wait for here.
+  // A large number of iterations is valid but would slow down the fuzzer.
   scene->resolver.max_iterations = std::min(scene->resolver.max_iterations, 500u);
   step(*scene);
   return 0;

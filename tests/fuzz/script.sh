@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What scripts/fuzz makes of targets that can't start, find something, find nothing. Usage: script.sh FUZZ
+# Tests scripts/fuzz with targets that fail to start, find something, or find nothing. Usage: script.sh FUZZ
 set -euo pipefail
 fuzz=$1
 work=$(mktemp -d)
@@ -10,7 +10,7 @@ fail() {
   echo "$*" >&2
   exit 1
 }
-target() { # what it does
+target() { # SHELL_COMMANDS
   printf '#!/bin/sh\n%s\n' "$1" >"$work/bin/fuzz_scene"
   chmod +x "$work/bin/fuzz_scene"
 }
@@ -28,8 +28,8 @@ target 'sleep 0.1; for a; do case $a in -artifact_prefix=*) echo x >"${a#*=}cras
 expect 1 -t 1 -o found
 [ -e "$work/found/findings/scene/crash" ] || fail "the finding is not in the caller's folder"
 target 'echo "#7: cov: 1"'
-expect 0 -t 1 -o found # what an earlier run found is no finding of this one
+expect 0 -t 1 -o found # findings of earlier runs do not count
 
 touch "$work/mine/file"
 expect 2 --bundle mine
-[ -e "$work/mine/file" ] || fail "a folder that is no bundle was emptied"
+[ -e "$work/mine/file" ] || fail "a folder that is not a bundle was emptied"

@@ -1,5 +1,5 @@
-/// Bullet worlds made of a fuzzer's bytes, with joints and changing settings: our solver, our world
-/// or all three parts beside Bullet's, all bits compared after each step.
+/// Bullet worlds generated from a fuzzer's bytes, with joints and changing settings: our solver,
+/// our world or all three parts beside Bullet's, with all bits compared after each step.
 #include "tests/fuzz/bullet_fuzz.hpp"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const SolverWorld world = make_solver_world(bytes);
   const MakeParts ours = kParts[std::min<std::uint64_t>(parts, 2)];
   const auto failure = run(world, nullptr, ours, dispatcher);
-  if (failure && !is_accident_of_stock(world, *failure)) {
+  if (failure && !is_stock_nondeterminism(world, *failure)) {
     report_difference(*failure, shrink(world, ours, dispatcher));
   }
   return 0;

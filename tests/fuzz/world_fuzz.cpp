@@ -1,5 +1,5 @@
-/// Random calls of World's interface, of two worlds beside each other that find contacts in
-/// different ways: equal results, equal errors, equal bits. Refused calls change nothing.
+/// Fuzzer of the interface of World: makes the same calls on two worlds that find contacts with
+/// different algorithms. Results, errors and bits are equal, and calls that throw change nothing.
 #include <jfpx/error.hpp>
 
 #include "tests/fuzz/fuzz.hpp"
@@ -25,7 +25,7 @@ using test::Bytes;
 constexpr std::size_t kMaxBodies = 20, kMaxForces = 8;
 constexpr int kMaxCalls = 48;
 
-/// What a call returned, or the text of the error that refused it.
+/// The result of a call, or the message of its exception.
 template <class Result>
 struct Outcome {
   std::optional<Result> result;
@@ -61,16 +61,16 @@ class Twins {
 
   const World& world() const { return first_; }
 
-  /// The same call for both. Void, or something with an ==.
+  /// Makes the same call on both worlds. It returns void, or a type with an ==.
   template <class Call>
   auto both(Call call) {
     const std::uint64_t before = first_.state_hash();
     const std::size_t bodies = first_.bodies().size();
     const auto first = outcome([&] { return call(first_); });
     const auto second = outcome([&] { return call(second_); });
-    require(first == second, "both worlds say the same");
+    require(first == second, "both worlds have the same result");
     require(first.result || (first_.state_hash() == before && first_.bodies().size() == bodies),
-            "a refused call changes nothing");
+            "a call that throws changes nothing");
     compare();
     return first.result;
   }
@@ -120,10 +120,10 @@ void query(Bytes& bytes, Twins& twins) {
     if (bytes.chance(Real(0.5))) ray.max_distance = bytes.number(0, 10);
     const auto nearest = twins.both([&](World& w) { return w.cast_ray(ray); });
     const auto all = twins.both([&](World& w) { return w.cast_ray_through(ray); });
-    require(nearest.has_value() == all.has_value(), "both refuse a ray");
+    require(nearest.has_value() == all.has_value(), "both reject the ray");
     if (!all) return;
     require(nearest->has_value() == !all->empty(), "a ray that hits has a first hit");
-    if (!all->empty()) require(**nearest == all->front(), "which is the first of all hits");
+    if (!all->empty()) require(**nearest == all->front(), "the first hit is the first of all hits");
     return;
   }
   const Vec3 centre = bytes.vector(-5, 5);

@@ -1,4 +1,4 @@
-/// Drawing bodies, forces and settings; see the header.
+/// Bodies, forces and settings drawn from the bytes of a fuzzer.
 #include "tests/fuzz/world_input.hpp"
 
 #include <optional>
@@ -215,7 +215,7 @@ ForceId add_drawn_force(Bytes bytes, World& world) {
       return world.add_force(explosion);
     }
     default: {
-      // One of a user's own, that checks nothing.
+      // A user-defined force without validation.
       const BodyId id = draw_id(bytes, bodies);
       const Vec3 force = bytes.vector(-50, 50), point = bytes.vector(-3, 3);
       return world.add_force([id, force, point](ForceContext& context) {

@@ -1,4 +1,4 @@
-/// Bodies, forces and settings for a World from a fuzzer's bytes: mostly sound, now and then not.
+/// Bodies, forces and settings for a World from the bytes of a fuzzer: mostly valid, sometimes not.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -15,10 +15,10 @@ BodyState draw_state(test::Bytes& bytes);
 WorldSettings draw_settings(test::Bytes& bytes);
 GeneratedContact draw_contact(test::Bytes& bytes, std::span<const BodyId> bodies);
 
-/// A living body, or one that has gone, or never was.
+/// The id of a living body, or of a removed one, or an unknown one.
 BodyId draw_id(test::Bytes& bytes, std::span<const BodyId> bodies);
 
-/// Adds the force that the bytes ask for.
+/// Adds a force drawn from the bytes.
 ForceId add_drawn_force(test::Bytes bytes, World& world);
 
 }  // namespace fuzz

@@ -1,4 +1,4 @@
-/// Which matrices are inertia tensors, against sums over points; and their inverses.
+/// Tests of the validation and inversion of inertia tensors, against sums over points.
 #include "src/scene/inertia_tensor.hpp"
 
 #include "tests/world/support.hpp"
@@ -12,7 +12,7 @@ namespace {
 
 using test::operator""_r;
 
-/// Of a few points with mass: sum of m (x.x 1 - x x^T).
+/// The inertia of `count` random point masses: sum of m (x.x 1 - x x^T).
 Mat3 of_points(Random* random, int count) {
   Mat3 tensor = diagonal({0, 0, 0});
   for (int i = 0; i < count; ++i) {
@@ -27,7 +27,7 @@ Mat3 of_points(Random* random, int count) {
   return tensor;
 }
 
-TEST(InertiaTensor, OfAnyPointsIsOneAndItsInverseIsTheInverse) {
+TEST(InertiaTensor, OfAnyPointsIsValidAndInverted) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
@@ -47,21 +47,23 @@ TEST(InertiaTensor, OfAnyPointsIsOneAndItsInverseIsTheInverse) {
   }
 }
 
-TEST(InertiaTensor, IsTurnedWithItsBodyAndStaysOne) {
-  // Moments (1, 2, x) in turned axes: a tensor for 1 < x < 3, at the ends to a thousandth.
-  const Mat3 turn = to_matrix(normalized(Quat{1, 2, 3, 4}));
-  const auto turned = [&turn](Real z) { return turn * diagonal({1, 2, z}) * transposed(turn); };
+TEST(InertiaTensor, StaysValidUnderRotation) {
+  // Moments (1, 2, z) in rotated axes are valid for 1 <= z <= 3, with a tolerance of a thousandth.
+  const Mat3 rotation = to_matrix(normalized(Quat{1, 2, 3, 4}));
+  const auto rotated = [&rotation](Real z) {
+    return rotation * diagonal({1, 2, z}) * transposed(rotation);
+  };
   for (const Real good : {1.001_r, 2.5_r, Real(3)}) {
-    EXPECT_EQ(inertia_must_be(turned(good)), nullptr) << good;
+    EXPECT_EQ(inertia_must_be(rotated(good)), nullptr) << good;
   }
   for (const Real bad : {0.97_r, 3.03_r}) {
-    EXPECT_STREQ(inertia_must_be(turned(bad)),
+    EXPECT_STREQ(inertia_must_be(rotated(bad)),
                  "such that no principal moment exceeds the sum of the others");
   }
-  EXPECT_STREQ(inertia_must_be(turned(-0.1_r)), "positive definite");
+  EXPECT_STREQ(inertia_must_be(rotated(-0.1_r)), "positive definite");
 }
 
-TEST(InertiaTensor, OfAnyScaleIsJudgedTheSame) {
+TEST(InertiaTensor, ValidityDoesNotDependOnTheScale) {
   for (const Real scale : {1e-30_r, 1e30_r}) {
     EXPECT_EQ(inertia_must_be(diagonal({2, 3, 4}) * scale), nullptr) << scale;
     EXPECT_NE(inertia_must_be(diagonal({2, 3, 6}) * scale), nullptr) << scale;
@@ -71,12 +73,12 @@ TEST(InertiaTensor, OfAnyScaleIsJudgedTheSame) {
   }
 }
 
-TEST(InertiaTensor, MustHaveAnInverseInTheNumbersOfTheEngine) {
+TEST(InertiaTensor, MustHaveAFiniteInverse) {
   const Real tiny = std::numeric_limits<Real>::denorm_min();
   EXPECT_STREQ(inertia_must_be(diagonal({tiny, tiny, tiny})), "such that its inverse is finite");
 }
 
-TEST(InertiaTensor, LastDigitsMayDiffer) {
+TEST(InertiaTensor, LastDigitsMayBeAsymmetric) {
   const Mat3 tensor{{{2, 0.1_r, 0}, {0.1_r * (1 + 2 * kEpsilon), 3, 0}, {0, 0, 4}}};
   EXPECT_EQ(inertia_must_be(tensor), nullptr);
   const Mat3 mean = symmetric_part(tensor);

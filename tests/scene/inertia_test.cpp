@@ -1,4 +1,4 @@
-/// Bodies with an inertia of their own, and what is derived from a body's state.
+/// Tests of bodies with a given inertia, and of quantities that are derived from a body's state.
 #include <jfpx/error.hpp>
 
 #include "tests/world/support.hpp"
@@ -25,7 +25,7 @@ World world_of(const BodyDef& def, Real dt = 0.001_r) {
   return World(scene);
 }
 
-TEST(Inertia, OfABoxGivenByHandMovesABallAsABox) {
+TEST(Inertia, OfABoxMakesABallRotateAsABox) {
   BodyDef box = spinning({});
   box.shape = Box{{0.5_r, 1, 1.5_r}};
   World as_box = world_of(box);
@@ -35,27 +35,27 @@ TEST(Inertia, OfABoxGivenByHandMovesABallAsABox) {
   EXPECT_EQ(as_ball.states(), as_box.states());
 }
 
-TEST(Inertia, InTurnedAxesIsTheSameBodyTurned) {
-  // The body whose tensor is turned by q, unturned, moves as the one with principal axes that
-  // stands turned by q.
+TEST(Inertia, InRotatedAxesEqualsThatOfARotatedBody) {
+  // A body in the identity orientation whose tensor is rotated by q moves as the body with
+  // principal axes whose orientation is q.
   const Quat q = normalized(Quat{0.7_r, 0.1_r, -0.5_r, 0.4_r});
   const Mat3 r = to_matrix(q), principal = diagonal({1, 2, 2.5_r});
-  World turned_tensor = world_of(spinning(r * principal * transposed(r)));
-  BodyDef turned_body = spinning(principal);
-  turned_body.orientation = q;
-  World turned = world_of(turned_body);
+  World rotated_tensor = world_of(spinning(r * principal * transposed(r)));
+  BodyDef rotated_body = spinning(principal);
+  rotated_body.orientation = q;
+  World rotated = world_of(rotated_body);
   for (int n = 0; n < 2000; ++n) {
-    turned_tensor.step();
-    turned.step();
-    const Vec3 a = turned_tensor.states()[0].angular_velocity;
-    const Vec3 b = turned.states()[0].angular_velocity;
+    rotated_tensor.step();
+    rotated.step();
+    const Vec3 a = rotated_tensor.states()[0].angular_velocity;
+    const Vec3 b = rotated.states()[0].angular_velocity;
     for (int k = 0; k < 3; ++k) ASSERT_NEAR(a[k], b[k], 2e-3) << n;
   }
-  // It did tumble: the axis of rotation moved.
-  EXPECT_GT(length(turned.states()[0].angular_velocity - Vec3{0.3_r, 2, -0.5_r}), 0.3_r);
+  // The body tumbles: its axis of rotation has changed.
+  EXPECT_GT(length(rotated.states()[0].angular_velocity - Vec3{0.3_r, 2, -0.5_r}), 0.3_r);
 }
 
-TEST(Inertia, FreeSpinKeepsTheAngularMomentumAndGainsNoEnergy) {
+TEST(Inertia, FreeRotationKeepsTheAngularMomentumAndGainsNoEnergy) {
   const Mat3 tensor{{{2, 0.5_r, -0.3_r}, {0.5_r, 1.5_r, 0.2_r}, {-0.3_r, 0.2_r, 2.5_r}}};
   World world = world_of(spinning(tensor), 0.0005_r);
   const auto momentum = [&] {
@@ -71,7 +71,7 @@ TEST(Inertia, FreeSpinKeepsTheAngularMomentumAndGainsNoEnergy) {
   EXPECT_GE(energy(), e0 * 0.99_r);
 }
 
-TEST(Inertia, ATorqueTurnsByTheInverseTensor) {
+TEST(Inertia, ATorqueAcceleratesByTheInverseTensor) {
   // Inverse of ((2, 1, 0), (1, 2, 0), (0, 0, 3)): ((2, -1, 0), (-1, 2, 0), (0, 0, 1)) / 3.
   BodyDef def = spinning(Mat3{{{2, 1, 0}, {1, 2, 0}, {0, 0, 3}}});
   def.angular_velocity = {};
@@ -85,7 +85,7 @@ TEST(Inertia, ATorqueTurnsByTheInverseTensor) {
   EXPECT_NEAR(world.inverse_inertia(world.bodies()[0])(0, 1), -1.0 / 3, 1e-6);
 }
 
-TEST(Inertia, OfABodyWithoutMassDoesNotMatter) {
+TEST(Inertia, OfABodyWithoutMassIsIgnored) {
   BodyDef def = spinning(Mat3{});
   def.mass = 0;
   World world = world_of(def);
@@ -97,7 +97,7 @@ TEST(Inertia, OfABodyWithoutMassDoesNotMatter) {
 }
 
 TEST(DerivedData, PointsAndDirectionsGoToTheWorldAndBack) {
-  // A quarter turn about z carries x to y.
+  // A quarter turn about z maps x to y.
   const BodyState body{{10, 20, 30}, normalized(Quat{1, 0, 0, 1}), {}, {}};
   const Vec3 point = to_world_point(body, {1, 2, 3});
   EXPECT_NEAR(point.x, 8, 1e-5);
@@ -117,7 +117,7 @@ TEST(DerivedData, PointsAndDirectionsGoToTheWorldAndBack) {
   }
 }
 
-TEST(DerivedData, VelocityAtAPointIsHowItMoves) {
+TEST(DerivedData, VelocityAtAPointIsItsRateOfChange) {
   BodyDef def = spinning({});
   def.velocity = {1, -2, 3};
   World world = world_of(def, 1e-3_r);
@@ -131,7 +131,7 @@ TEST(DerivedData, VelocityAtAPointIsHowItMoves) {
   EXPECT_EQ(velocity_at(before, before.position), def.velocity);
 }
 
-TEST(DerivedData, OfAStrangeBodyIsAnError) {
+TEST(DerivedData, OfAnInvalidBodyIdIsAnError) {
   World world = world_of(spinning({}));
   EXPECT_THROW(world.mass(BodyId{}), InvalidArgument);
   EXPECT_THROW(world.inverse_inertia(BodyId{}), InvalidArgument);

@@ -1,5 +1,6 @@
-/// Named scenes, and scenes as JSON: round trips, and every way to be wrong.
+/// Tests of the named scenes and of the JSON form of scenes: round trips and every kind of error.
 #include <jfpx/error.hpp>
+#include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
 #include <jfpx/world.hpp>
 
@@ -16,11 +17,12 @@ namespace jfpx {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr const char* kMinimal =
     R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "sphere", "radius": 1}}]})";
 
-/// What from_json() complains about; empty if it does not.
+/// The message of the error that from_json() throws; empty if it throws none.
 std::string complaint(std::string_view text) {
   try {
     from_json(text);
@@ -35,7 +37,7 @@ std::string with_body(const std::string& fields) {
          "}]}";
 }
 
-TEST(NamedScenes, AreValidAndSurviveJson) {
+TEST(NamedScenes, AreValidAndRoundTripThroughJson) {
   for (const scenes::Entry& entry : scenes::all()) {
     for (const std::uint32_t spheres : {0u, 1u, 2u, 33u}) {
       const Scene scene = scenes::make(entry.name, {.spheres = spheres, .seed = 7});
@@ -47,7 +49,7 @@ TEST(NamedScenes, AreValidAndSurviveJson) {
   }
 }
 
-TEST(NamedScenes, SeedDecidesAndRepeats) {
+TEST(NamedScenes, DependOnTheSeedAndRepeat) {
   EXPECT_EQ(scenes::make("pile", {.seed = 3}), scenes::make("pile", {.seed = 3}));
   EXPECT_NE(scenes::make("pile", {.seed = 3}), scenes::make("pile", {.seed = 4}));
 }
@@ -88,11 +90,11 @@ TEST(NamedScenes, MixedCountsItsBallsAndBoxes) {
   EXPECT_EQ(scenes::spheres_of(odd).size(), 3u);
   EXPECT_EQ(boxes(odd), 10);
   EXPECT_EQ(boxes(scenes::make("mixed", {.spheres = 7, .boxes = 0})), 0);
-  World world(even);  // in a way that nothing touches
+  World world(even);  // no two bodies touch at the start
   EXPECT_EQ(world.step().contacts, 0u);
 }
 
-TEST(NamedScenes, BoxesAreRefusedWhereThereAreNone) {
+TEST(NamedScenes, ANumberOfBoxesIsRefusedByScenesWithoutBoxes) {
   EXPECT_THROW(scenes::make("pile", {.boxes = 3}), InvalidArgument);
   EXPECT_THROW(scenes::make("big-ballistic", {.boxes = 0}), InvalidArgument);
 }
@@ -102,8 +104,8 @@ TEST(NamedScenes, CratesStandFaceToFaceAndTheVolleyTouchesNothing) {
   std::uint64_t crate_contacts = 0;
   world.step();
   for (const Contact& c : world.contacts()) {
-    EXPECT_LT(c.a, 3u);  // crates are bodies 0 and 1, the ground is 2
-    EXPECT_LT(c.b, 3u);
+    EXPECT_LT(c.a.index, 3u);  // crates are bodies 0 and 1, the ground is 2
+    EXPECT_LT(c.b.index, 3u);
     EXPECT_NEAR(c.distance, 0, 0.003);  // one step of gravity
     ++crate_contacts;
   }
@@ -126,7 +128,7 @@ TEST(NamedScenes, UnknownNameListsTheNames) {
   }
 }
 
-TEST(NamedScenes, TooManySpheresAreRefusedBeforeMemoryIsTouched) {
+TEST(NamedScenes, TooManySpheresAreRefusedBeforeAnyAllocation) {
   try {
     scenes::make("pile", {.spheres = 0xffffffffu});
     FAIL();
@@ -154,12 +156,26 @@ TEST(SceneJson, KeepsEveryBitOfEveryField) {
       Mat3{{{1, Real(0.1), Real(-0.2)}, {Real(0.1), 1, 0}, {Real(-0.2), 0, 1}}};
   scene.bodies[1].shape = HalfSpace{{0, 0, 1}, Real(-2.5)};
   scene.bodies[2].shape = Plane{{0, 1, 0}, Real(0.1)};
+  scene.bodies[1].mass = scene.bodies[2].mass = 0;
   scene.bodies[3].shape =
       Compound{{{.shape = Sphere{Real(0.3)}, .position = {Real(0.1), 0, 7}, .density = Real(0.7)},
                 {.shape = Box{}, .orientation = normalized(Quat{4, 3, 2, 1})}}};
   const Scene read = from_json(to_json(scene));
   EXPECT_EQ(read, scene);
   EXPECT_TRUE(std::signbit(read.bodies[0].velocity.x));
+}
+
+/// Files of version 0.1 name the shape "assembly".
+TEST(SceneJson, TheOldNameOfACompoundIsRead) {
+  const std::string with_old_name =
+      R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "assembly", "parts": [)"
+      R"({"shape": {"type": "box", "half_extents": [1, 2, 3]}}]}}]})";
+  const Scene scene = from_json(with_old_name);
+  EXPECT_EQ(scene.bodies.at(0).shape, Shape(Compound{{{.shape = Box{{1, 2, 3}}}}}));
+  const std::string written = to_json(scene);
+  EXPECT_THAT(written, HasSubstr("\"compound\""));
+  EXPECT_THAT(written, Not(HasSubstr("assembly")));
+  EXPECT_EQ(from_json(written), scene);
 }
 
 TEST(SceneJson, AbsentFieldsHaveDefaults) {
@@ -170,13 +186,30 @@ TEST(SceneJson, AbsentFieldsHaveDefaults) {
   EXPECT_EQ(scene.bodies[0], expected);
 }
 
+TEST(SceneJson, AKeyThatIsGivenTwiceIsAnError) {
+  const auto complaint = [](const char* text) -> std::string {
+    try {
+      from_json(text);
+    } catch (const InvalidScene& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(complaint(R"({"version": 1, "dt": 0.01, "dt": 0.02, "bodies": []})"),
+            "\"dt\" is given twice in one object");
+  EXPECT_EQ(complaint(R"({"version": 1, "bodies": [{"mass": 1}, {"mass": 2, "mass": 2}]})"),
+            "\"mass\" is given twice in one object");
+  EXPECT_EQ(complaint(R"({"version": 1, "bodies": [{"mass": 1}, {"mass": 1}]})").find("twice"),
+            std::string::npos);
+}
+
 TEST(SceneJson, BrokenTextGivesTheLineAndColumn) {
   EXPECT_THAT(complaint("{\n\"jfpx_scene\": 1,\n oops}"), HasSubstr("line 3, column 2"));
   EXPECT_THAT(complaint(""), HasSubstr("broken JSON"));
   EXPECT_THAT(complaint(with_body("\"mass\": 1e999")), HasSubstr("broken JSON"));
 }
 
-/// To copy or write such a value takes a stack as deep.
+/// Copying or writing such a value would recurse once per nesting level.
 TEST(SceneJson, NestedAHundredThousandTimesIsAnError) {
   const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
   EXPECT_THAT(complaint("{\"jfpx_scene\": " + deep + ", \"bodies\": []}"),
@@ -250,6 +283,15 @@ TEST(SceneJson, MaterialRulesAreNamed) {
 TEST(SceneJson, ValuesOutOfRangeAreInvalid) {
   EXPECT_THAT(complaint(with_body("\"mass\": -1")), HasSubstr("mass"));
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "dt": 0, "bodies": []})"), HasSubstr("dt"));
+}
+
+/// Recordings of version 0.1 name the backend "x86".
+TEST(RecordingHeader, TheOldNameOfTheCpuBackendIsRead) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("old.rec");
+  RecordingWriter writer(path, {.engine = "native", .backend = "x86", .scene = {}});
+  writer.finish();
+  EXPECT_EQ(RecordingReader(path).header().backend, "cpu");
 }
 
 TEST(SceneFile, RoundTrips) {

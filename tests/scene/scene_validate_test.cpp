@@ -1,4 +1,4 @@
-/// Every way in which a scene can be wrong, one at a time.
+/// Tests of the validation of scenes, with one fault at a time.
 #include "src/scene/scene_validate.hpp"
 
 #include <jfpx/error.hpp>
@@ -19,7 +19,7 @@ constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 constexpr Real kDenormal = std::numeric_limits<Real>::denorm_min();
 
-Scene sound() {
+Scene valid_scene() {
   Scene scene;
   scene.bodies.resize(4);
   scene.bodies[1].shape = Box{};
@@ -44,13 +44,13 @@ std::string message(const Scene& scene) {
   return "";
 }
 
-TEST(Validate, ASoundSceneAndAnEmptyOnePass) {
-  EXPECT_EQ(message(sound()), "");
+TEST(Validate, AValidSceneAndAnEmptyOnePass) {
+  EXPECT_EQ(message(valid_scene()), "");
   EXPECT_EQ(message(Scene{}), "");
 }
 
-TEST(Validate, TheEndsOfTheRangesPass) {
-  Scene scene = sound();
+TEST(Validate, TheLimitsOfTheRangesPass) {
+  Scene scene = valid_scene();
   scene.dt = std::numeric_limits<Real>::min();
   scene.resolver = {.max_iterations = 0xffffffffu,
                     .velocity_epsilon = kDenormal,
@@ -70,16 +70,16 @@ TEST(Validate, TheEndsOfTheRangesPass) {
 }
 
 TEST(Validate, MessagesNameBodyFieldValueAndRange) {
-  Scene scene = sound();
+  Scene scene = valid_scene();
   scene.bodies[3].mass = -1;
   EXPECT_EQ(message(scene), "body 3: mass is -1; it must be finite and >= 0");
-  scene = sound();
+  scene = valid_scene();
   scene.bodies[1].velocity = {0.5_r, kNan, -2};
   EXPECT_EQ(message(scene), "body 1: velocity is (0.5, nan, -2); it must be finite");
-  scene = sound();
+  scene = valid_scene();
   scene.dt = 0;
-  EXPECT_EQ(message(scene), "scene: dt is 0; it must be finite, > 0 and no denormal number");
-  scene = sound();
+  EXPECT_EQ(message(scene), "scene: dt is 0; it must be finite, > 0 and not denormal");
+  scene = valid_scene();
   scene.bodies[0].shape = Sphere{0};
   scene.bodies[1].mass = kInfinity;
   EXPECT_EQ(message(scene), "body 0: radius is 0; it must be > 0 and at most 1e9");
@@ -177,7 +177,7 @@ TEST(Validate, EveryFieldIsChecked) {
   };
   for (const Fault& fault : faults) {
     for (const Real value : fault.values) {
-      Scene scene = sound();
+      Scene scene = valid_scene();
       fault.put(scene, value);
       const std::string text = message(scene);
       EXPECT_NE(text.find(std::string(": ") + fault.field + " is "), std::string::npos)
@@ -186,15 +186,15 @@ TEST(Validate, EveryFieldIsChecked) {
   }
 }
 
-TEST(Validate, ARuleThatIsNoneIsRefused) {
-  Scene scene = sound();
+TEST(Validate, AnInvalidRuleIsRefused) {
+  Scene scene = valid_scene();
   scene.materials.restitution = static_cast<CombineRule>(5);
   EXPECT_EQ(message(scene),
             "scene: materials.restitution is 5; it must be one of the rules of CombineRule");
 }
 
-TEST(Validate, AKinematicBodyHasNoMassAndAPose) {
-  Scene scene = sound();
+TEST(Validate, AKinematicBodyHasZeroMassAndAPose) {
+  Scene scene = valid_scene();
   scene.bodies[0].kinematic = true;
   EXPECT_EQ(message(scene), "body 0: mass is 1; it must be 0 for a kinematic body");
   scene.bodies[0].mass = 0;
@@ -207,9 +207,19 @@ TEST(Validate, AKinematicBodyHasNoMassAndAPose) {
             "body 2: kinematic is true; it must be false for a plane, which follows no pose");
 }
 
-TEST(Validate, AnInertiaMustBeOneOfABody) {
+TEST(Validate, AHalfSpaceAndAPlaneHaveZeroMass) {
+  Scene scene = valid_scene();
+  scene.bodies[2].mass = 1;
+  EXPECT_EQ(message(scene),
+            "body 2: mass is 1; it must be 0 for a half-space, which fills half of the world");
+  scene.bodies[2].shape = Plane{{0, 1, 0}, 0};
+  EXPECT_EQ(message(scene),
+            "body 2: mass is 1; it must be 0 for a plane, which divides the whole world");
+}
+
+TEST(Validate, AnInertiaMustBeValid) {
   const auto complaint = [](const Mat3& inertia) {
-    Scene scene = sound();
+    Scene scene = valid_scene();
     scene.bodies[1].inertia = inertia;
     return message(scene);
   };
@@ -222,17 +232,17 @@ TEST(Validate, AnInertiaMustBeOneOfABody) {
   EXPECT_NE(complaint(diagonal({1, 1, kInfinity})), "");
   EXPECT_NE(complaint(diagonal({1, 1, 2.1_r})), "");
   EXPECT_NE(complaint(Mat3{{{1, 0.1_r, 0}, {0, 1, 0}, {0, 0, 1}}}), "");
-  // A body whose shape alone would have no finite inertia may have one by word.
-  Scene scene = sound();
+  // A given inertia makes a body valid whose shape alone would have no finite inertia.
+  Scene scene = valid_scene();
   scene.bodies[0].mass = std::numeric_limits<Real>::min();
   scene.bodies[0].shape = Sphere{square_root(std::numeric_limits<Real>::min())};
   scene.bodies[0].inertia = Mat3{};
   EXPECT_EQ(message(scene), "");
 }
 
-TEST(Validate, MassesThatMakeNoFiniteInertiaAreRefused) {
+TEST(Validate, MassesWithoutFiniteInertiaAreRefused) {
   const Real tiny = square_root(std::numeric_limits<Real>::min());
-  Scene scene = sound();
+  Scene scene = valid_scene();
   scene.bodies[0].mass = std::numeric_limits<Real>::min();
   scene.bodies[0].shape = Sphere{tiny};
   EXPECT_NE(message(scene).find("body 0: moment of inertia is "), std::string::npos);
@@ -242,26 +252,26 @@ TEST(Validate, MassesThatMakeNoFiniteInertiaAreRefused) {
   EXPECT_EQ(message(scene), "");
 }
 
-TEST(Validate, AnCompoundNeedsPartsAroundItsCentreOfMass) {
-  Scene scene = sound();
+TEST(Validate, ACompoundNeedsPartsAroundItsCentreOfMass) {
+  Scene scene = valid_scene();
   scene.bodies[5].shape = Compound{};
   EXPECT_EQ(message(scene), "body 5: parts is empty; it must have at least one sphere or box");
-  scene = sound();
+  scene = valid_scene();
   auto& compound = std::get<Compound>(scene.bodies[5].shape);
   for (CompoundPart& part : compound.parts) part.position.y += 0.5_r;
   EXPECT_EQ(message(scene),
             "body 5: centre of mass of parts is (0, 0.5, 0); it must be the origin, to a "
-            "thousandth of the body's reach; centred() moves it there");
-  scene.bodies[5].mass = 0;  // has none
+            "thousandth of the body's radius; centred() moves it there");
+  scene.bodies[5].mass = 0;  // an immovable body has no centre of mass
   EXPECT_EQ(message(scene), "");
   scene.bodies[5].mass = 1;
   scene.bodies[5].shape = centred(compound);
   EXPECT_EQ(message(scene), "");
 }
 
-TEST(Validate, AnCompoundWithoutFiniteInertiaIsRefused) {
+TEST(Validate, ACompoundWithoutFiniteInertiaIsRefused) {
   const Real tiny = square_root(std::numeric_limits<Real>::min());
-  Scene scene = sound();
+  Scene scene = valid_scene();
   scene.bodies[5].mass = std::numeric_limits<Real>::min();
   scene.bodies[5].shape = Compound{{{.shape = Sphere{tiny}}}};
   EXPECT_NE(message(scene).find("body 5: moments of inertia is "), std::string::npos);
@@ -272,7 +282,7 @@ TEST(Validate, MoreBodiesThanIndicesAreRefused) {
   EXPECT_THROW(validate_body_count(0x100000000u), InvalidScene);
 }
 
-TEST(Validate, AWorldRefusesABadSceneAndABadBody) {
+TEST(Validate, AWorldRefusesAnInvalidSceneAndAnInvalidBody) {
   Scene scene;
   scene.bodies = {test::ball({kNan, 0, 0})};
   EXPECT_THROW(World{scene}, InvalidScene);

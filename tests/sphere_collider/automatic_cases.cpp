@@ -1,4 +1,4 @@
-/// The contract of SphereCollider where backend and algorithm are chosen call by call.
+/// The contract of SphereCollider with Backend::automatic.
 #include "tests/support/sphere_collider_contract.hpp"
 
 namespace jfpx {
@@ -6,7 +6,7 @@ inline namespace JFPX_ABI {
 namespace test {
 namespace {
 
-/// As `automatic`, but the device, if there is one, is expected to cost nothing.
+/// Like `automatic`, but with predicted costs of zero for the device.
 ColliderCase device_first() {
   ColliderCase c{"device_first", {}};
   c.options.costs.cuda_all_pairs = c.options.costs.cuda_sorted_tiles = {};

@@ -1,4 +1,5 @@
-/// Backend::automatic: the device is used when it pays, and its failures cost nothing but time.
+/// Backend::automatic: uses the device when it is expected to be faster, and replaces it when it
+/// fails, without changing a result.
 #include <jfpx/world.hpp>
 
 #include "src/scenes/scenes.hpp"
@@ -43,10 +44,10 @@ TEST_F(AutomaticCollider, UsesTheDeviceWhereTheModelExpectsIt) {
   EXPECT_EQ(collider->device_failure(), "");
 }
 
-TEST_F(AutomaticCollider, LeavesTheDeviceAloneUntilItWouldHavePaid) {
+TEST_F(AutomaticCollider, DoesNotStartTheDeviceBeforeItPays) {
   SphereColliderOptions options = device_wins();
   options.costs.cuda_start_ms = 10;
-  // All pairs of 1001 spheres, 500500, take 20 ns each: 10.01 ms, whatever they really take.
+  // The model predicts 20 ns for each of the 500500 pairs of 1001 spheres: 10.01 ms.
   options.algorithm = SphereAlgorithm::all_pairs;
   options.costs.x86_all_pairs = {.pair_ns = 20};
   const auto collider = make(options);
@@ -60,7 +61,7 @@ TEST_F(AutomaticCollider, LeavesTheDeviceAloneUntilItWouldHavePaid) {
   EXPECT_EQ(collider->backend(), Backend::cuda);
 }
 
-TEST_F(AutomaticCollider, ADeviceThatIsNotThereIsAskedForOnceAndNotMentioned) {
+TEST_F(AutomaticCollider, AMissingDeviceIsProbedOnceAndNotReported) {
   device_.when_made = [] { throw BackendUnavailable("cuda: no CUDA driver is installed"); };
   const auto collider = make(device_wins());
   const auto spheres = make_gas(300, 1, 3, random_);
@@ -83,36 +84,36 @@ TEST_F(AutomaticCollider, AFailingDeviceIsReplacedInTheSameCallAndReportedOnce) 
       for (const bool given : {false, true}) {
         device_ = {};
         const auto collider = make(device_wins());
-        const auto x86 = make_sphere_collider({.backend = Backend::cpu});
+        const auto cpu = make_sphere_collider({.backend = Backend::cpu});
         const auto spheres = make_gas(300, 1, 3, random_);
         const auto pairs = some_pairs(300, 1000, random_);
         (when_made ? device_.when_made : device_.before_call) = [&] {
           if (when_made || device_.calls == 4) fail();
         };
-        std::string failures_told;
+        std::string reported_failures;
         for (int i = 0; i < 10; ++i) {
           if (given) {
             ASSERT_TRUE(
-                same_bits(collider->test_pairs(spheres, pairs), x86->test_pairs(spheres, pairs)))
+                same_bits(collider->test_pairs(spheres, pairs), cpu->test_pairs(spheres, pairs)))
                 << seed_note();
           } else {
             ASSERT_TRUE(same_bits(collider->find_contacts(spheres), brute_force(spheres)))
                 << seed_note();
           }
-          failures_told += collider->device_failure();
-          const bool failed = !failures_told.empty();
+          reported_failures += collider->device_failure();
+          const bool failed = !reported_failures.empty();
           EXPECT_EQ(collider->backend(), failed ? Backend::cpu : Backend::cuda);
           EXPECT_EQ(collider->reason() == ChoiceReason::device_failed, failed);
         }
-        EXPECT_EQ(failures_told, "the device is gone");
-        EXPECT_EQ(device_.alive, 0) << "what failed must be let go";
-        EXPECT_EQ(device_.calls, when_made ? 0 : 4) << "it must not be asked again";
+        EXPECT_EQ(reported_failures, "the device is gone");
+        EXPECT_EQ(device_.alive, 0) << "the failed collider must be destroyed";
+        EXPECT_EQ(device_.calls, when_made ? 0 : 4) << "the device must not be used again";
       }
     }
   }
 }
 
-TEST_F(AutomaticCollider, BadInputIsNoFailureOfTheDevice) {
+TEST_F(AutomaticCollider, InvalidInputIsNotADeviceFailure) {
   const auto collider = make(device_wins());
   auto spheres = make_gas(300, 1, 3, random_);
   spheres[7].radius = -1;
@@ -122,7 +123,7 @@ TEST_F(AutomaticCollider, BadInputIsNoFailureOfTheDevice) {
   EXPECT_EQ(collider->backend(), Backend::cuda);
 }
 
-TEST_F(AutomaticCollider, WhenX86FailsThereIsNobodyLeft) {
+TEST_F(AutomaticCollider, AFailureOfTheCpuIsThrown) {
   SphereColliderOptions options;
   for (const bool memory : {false, true}) {
     AutomaticSphereCollider collider(
@@ -140,7 +141,7 @@ TEST_F(AutomaticCollider, WhenX86FailsThereIsNobodyLeft) {
   }
 }
 
-TEST_F(AutomaticCollider, KeepsToTheAlgorithmThatWasAskedFor) {
+TEST_F(AutomaticCollider, KeepsTheRequestedAlgorithm) {
   for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
     const auto collider = make_sphere_collider({.algorithm = algorithm});
     for (const std::size_t n : {2u, 200u, 3000u}) {
@@ -150,19 +151,19 @@ TEST_F(AutomaticCollider, KeepsToTheAlgorithmThatWasAskedFor) {
   }
 }
 
-TEST_F(AutomaticCollider, NoticesANewSizeAtOnce) {
+TEST_F(AutomaticCollider, AdaptsToANewSizeInTheSameCall) {
   const auto collider = make_sphere_collider();
   const auto few = make_gas(2, 1, 3, random_), many = make_gas(20000, 1, 3, random_);
-  for (int i = 0; i < 50; ++i) collider->find_contacts(few);  // decided together
+  for (int i = 0; i < 50; ++i) collider->find_contacts(few);  // share a decision
   collider->find_contacts(many);
   EXPECT_EQ(collider->algorithm(), SphereAlgorithm::sorted_tiles);
   collider->find_contacts(few);
   EXPECT_EQ(collider->algorithm(), SphereAlgorithm::all_pairs);
 }
 
-TEST_F(AutomaticCollider, AFailureInOneKindOfCallIsNotToldByTheNextOfTheOther) {
+TEST_F(AutomaticCollider, AFailureInOneKindOfCallIsNotReportedByTheNextOfTheOther) {
   SphereColliderOptions options = device_wins();
-  options.costs.x86_all_pairs = {};  // searches are for x86, a microsecond each: decided together
+  options.costs.x86_all_pairs = {};  // searches use the CPU; one decision covers many of them
   const auto collider = make(options);
   const auto spheres = make_gas(20, 1, 3, random_);
   const auto pairs = some_pairs(20, 50, random_);
@@ -175,7 +176,7 @@ TEST_F(AutomaticCollider, AFailureInOneKindOfCallIsNotToldByTheNextOfTheOther) {
   EXPECT_EQ(collider->reason(), ChoiceReason::device_failed);
 }
 
-TEST_F(AutomaticCollider, RefusesCostsThatAreNone) {
+TEST_F(AutomaticCollider, RejectsInvalidCosts) {
   for (const double bad :
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     SphereColliderOptions options;
@@ -190,17 +191,17 @@ TEST_F(AutomaticCollider, RefusesCostsThatAreNone) {
   }
 }
 
-TEST_F(AutomaticCollider, StepReportsNameWhoComputedAndTheFailureOnce) {
+TEST_F(AutomaticCollider, StepReportsNameTheBackendAndTheFailureOnce) {
   const Scene scene = scenes::make("gas", {.spheres = 400, .seed = 1});
   World world(scene, make(device_wins()));
-  World on_x86(scene, {.collider = {.backend = Backend::cpu}});
+  World on_cpu(scene, {.collider = {.backend = Backend::cpu}});
   device_.before_call = [&] {
     if (device_.calls == 4) throw DeviceError("the device is gone");
   };
   for (int step = 1; step <= 20; ++step) {
     const StepReport report = world.step();
-    on_x86.step();
-    ASSERT_EQ(world.state_hash(), on_x86.state_hash());
+    on_cpu.step();
+    ASSERT_EQ(world.state_hash(), on_cpu.state_hash());
     EXPECT_EQ(report.backend, step < 4 ? Backend::cuda : Backend::cpu);
     EXPECT_EQ(report.choice == ChoiceReason::device_failed, step >= 4);
     EXPECT_EQ(report.device_failure, step == 4 ? "the device is gone" : "");

@@ -1,4 +1,4 @@
-/// The backend table: it tells the truth, and asking for what is not there is an error.
+/// The backend table: its rows are correct, and requesting an unavailable backend is an error.
 #include <jfpx/error.hpp>
 #include <jfpx/sphere_collider.hpp>
 
@@ -23,7 +23,7 @@ TEST(Backends, RowsComeInAFixedOrderAndExplainThemselves) {
   }
 }
 
-TEST(Backends, CudaIsCompiledAsTheBuildSays) {
+TEST(Backends, CudaIsCompiledAccordingToTheBuild) {
   EXPECT_EQ(available_backends()[1].compiled, bool{JFPX_HAS_CUDA});
   if (!JFPX_HAS_CUDA) {
     EXPECT_EQ(available_backends()[1].reason, "built without CUDA");

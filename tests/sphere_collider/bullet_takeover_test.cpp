@@ -1,4 +1,5 @@
-/// A device that fails inside Bullet: batches go on, the bits stay, the stats say why.
+/// A device that fails inside Bullet: batches continue, the bits do not change, and the statistics
+/// report the failure.
 #include "tests/bullet/twin_worlds.hpp"
 #include "tests/sphere_collider/device_double.hpp"
 
@@ -8,7 +9,7 @@ namespace bullet {
 namespace {
 
 TEST(DeviceTakeover, KeepsBatchesGoingAndBulletsBits) {
-  test::Device device;  // the first calls are its own, however long they take
+  test::Device device;  // computes the first calls, whatever their measured times
   device.before_call = [&] {
     if (device.calls == 4) throw DeviceError("the device is gone");
   };

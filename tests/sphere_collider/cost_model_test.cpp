@@ -65,7 +65,7 @@ TEST(CostModel, SurvivesItsFileToTheLastBit) {
   EXPECT_EQ(folder.entries(), 1u);
 }
 
-TEST(CostModel, AFileThatIsNotOneIsRefusedByName) {
+TEST(CostModel, AnInvalidFileIsRejectedWithItsName) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("costs.json");
   expect_refused(path, "can't be opened");
@@ -115,14 +115,14 @@ TEST(CostModel, EveryTruncationIsFound) {
   std::stringstream text;
   text << std::ifstream(path).rdbuf();
   const std::string whole = text.str();
-  // The last character is a line feed, which nobody misses.
+  // The last character is a line feed, which JSON does not require.
   for (std::size_t size = 0; size + 1 < whole.size(); ++size) {
     std::ofstream(path, std::ios::trunc) << whole.substr(0, size);
     ASSERT_THROW(load_cost_model(path), FileError) << size;
   }
 }
 
-TEST(CostModel, IsNotSavedWithATermThatIsNone) {
+TEST(CostModel, IsNotSavedWithAnInvalidTerm) {
   const test::TemporaryFolder folder;
   MeasuredCostModel model = example();
   model.costs.cuda_start_ms = std::numeric_limits<double>::infinity();

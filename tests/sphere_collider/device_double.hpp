@@ -1,4 +1,5 @@
-/// A device that isn't one: computes on x86, calls itself cuda, and fails when told to.
+/// Test double of a device collider: computes on the CPU, reports Backend::cuda, and fails on
+/// request.
 #pragma once
 
 #include <jfpx/error.hpp>
@@ -13,7 +14,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// What happens to the device; shared by the colliders that live on it.
+/// State of the simulated device, shared by its colliders.
 struct Device {
   std::function<void()> before_call = [] {};  ///< may throw
   std::function<void()> when_made = [] {};    ///< may throw
@@ -24,7 +25,7 @@ class DeviceDouble final : public SphereCollider {
  public:
   DeviceDouble(Device* device, SphereAlgorithm algorithm)
       : device_(device),
-        x86_(make_sphere_collider({.backend = Backend::cpu, .algorithm = algorithm})) {
+        cpu_(make_sphere_collider({.backend = Backend::cpu, .algorithm = algorithm})) {
     ++device_->made;
     device_->when_made();
     ++device_->alive;
@@ -34,23 +35,23 @@ class DeviceDouble final : public SphereCollider {
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
     ++device_->calls;
     device_->before_call();
-    return x86_->find_contacts(spheres);
+    return cpu_->find_contacts(spheres);
   }
   std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
                                          std::span<const SpherePair> pairs) override {
     ++device_->calls;
     device_->before_call();
-    return x86_->test_pairs(spheres, pairs);
+    return cpu_->test_pairs(spheres, pairs);
   }
   Backend backend() const noexcept override { return Backend::cuda; }
-  SphereAlgorithm algorithm() const noexcept override { return x86_->algorithm(); }
+  SphereAlgorithm algorithm() const noexcept override { return cpu_->algorithm(); }
 
  private:
   Device* device_;
-  std::unique_ptr<SphereCollider> x86_;
+  std::unique_ptr<SphereCollider> cpu_;
 };
 
-/// Makes x86 colliders, and doubles for cuda.
+/// Makes CPU colliders, and test doubles for cuda.
 inline SphereColliderMaker maker_with(Device* device) {
   return [device](const SphereColliderOptions& options) -> std::unique_ptr<SphereCollider> {
     if (options.backend != Backend::cuda) return make_sphere_collider(options);
@@ -58,7 +59,7 @@ inline SphereColliderMaker maker_with(Device* device) {
   };
 }
 
-/// Costs that say: the device is ready and takes no time.
+/// Options whose costs state that the device has been started and takes no time.
 inline SphereColliderOptions device_wins() {
   SphereColliderOptions options;
   options.costs.cuda_all_pairs = options.costs.cuda_sorted_tiles = {};

@@ -15,7 +15,7 @@ using Limits = std::numeric_limits<Real>;
 constexpr Real kNan = Limits::quiet_NaN();
 constexpr Real kInf = Limits::infinity();
 
-/// Message of the InvalidArgument that `call` throws; a failure if it throws none.
+/// Returns the message of the InvalidArgument that `call` throws; the test fails if it throws none.
 template <class Call>
 std::string message_of(Call&& call) {
   try {
@@ -88,10 +88,10 @@ TEST_P(SphereColliderContract, PermutedInputGivesTheSameContacts) {
 }
 
 // Oracle in long double (64 bits of mantissa against 24 or 53). With u = epsilon/2, the computed
-// difference of two coordinates is off by u of itself, len by at most 4u of itself (three roundings
-// inside the root, halved by it, one of the root, one of the difference), the sum of radii by u.
-// So depth is off by at most 5u*(len + sum) + u*|depth|; the normal adds a reciprocal and a
-// product.
+// difference of two coordinates has a relative error of u, len one of at most 4u (three roundings
+// inside the root, which halves them, one of the root, one of the difference), and the sum of radii
+// one of u. So the error of depth is at most 5u*(len + sum) + u*|depth|; the normal adds a
+// reciprocal and a product.
 TEST_P(SphereColliderContract, AgreesWithALongDoubleOracle) {
   using Wide = long double;
   const Wide u = static_cast<Wide>(Limits::epsilon()) / 2;
@@ -134,7 +134,7 @@ TEST_P(SphereColliderContract, AgreesWithALongDoubleOracle) {
 
 TEST_P(SphereColliderContract, ExchangedSpheresTouchAsDeeplyWithTheOppositeNormal) {
   for (const SphereKind& kind : sphere_kinds()) {
-    if (kind.name == "huge") continue;  // distances are NaN, which equals nothing
+    if (kind.name == "huge") continue;  // distances are NaN, which compares unequal
     Random random(base_seed());
     const auto spheres = kind.make(300, random);
     std::vector<SpherePair> pairs, exchanged;
@@ -150,7 +150,7 @@ TEST_P(SphereColliderContract, ExchangedSpheresTouchAsDeeplyWithTheOppositeNorma
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       const auto [a, b] = pairs[i];
       ASSERT_EQ(there[i].distance, back[i].distance) << kind.name << ", " << seed_note();
-      // Centres that nearly coincide part along x, whichever sphere is first.
+      // The normal of nearly coincident centres is (1,0,0), whichever sphere is first.
       const bool along_x = there[i].normal == Vec3{1, 0, 0} && back[i].normal == Vec3{1, 0, 0};
       ASSERT_TRUE(there[i].normal == -back[i].normal ||
                   (along_x && length(spheres[a].centre - spheres[b].centre) <= 2 * kEpsilon))
@@ -180,8 +180,8 @@ TEST_P(SphereColliderContract, TestPairsFollowsTheSharedArithmeticInTheGivenOrde
   }
 }
 
-// Bullet rejects a pair only if len > sum: a NaN on either side makes a contact, an infinite length
-// does not, and a length whose square underflows is 0 (bullet: normal (1,0,0)).
+// Bullet rejects a pair only if len > sum: a NaN on either side results in a contact, an infinite
+// length does not, and a length whose square underflows is 0 (in Bullet: normal (1,0,0)).
 TEST_P(SphereColliderContract, TestPairsTreatsOddValuesAsBulletDoes) {
   const Real tiny = Limits::denorm_min();
   const std::vector<SphereInstance> spheres = {{{0, 0, 0}, 1},       {{kNan, 0, 0}, 1},
@@ -211,7 +211,7 @@ TEST_P(SphereColliderContract, TestPairsTreatsOddValuesAsBulletDoes) {
   EXPECT_EQ(touching(0, 5), 0u) << "the square overflows";
   EXPECT_EQ(touching(6, 9), 1u) << "the square underflows";
   EXPECT_EQ(touching(8, 9), 0u);
-  EXPECT_EQ(touching(9, 9), 1u) << "two points in one place: 0 > 0 is false";
+  EXPECT_EQ(touching(9, 9), 1u) << "two coincident points: 0 > 0 is false";
 }
 
 TEST_P(SphereColliderContract, NoSpheresAndNoPairsAreFine) {
@@ -242,7 +242,7 @@ TEST_P(SphereColliderContract, FindContactsNamesTheFirstBadSphereFieldAndValue) 
     for (const Real bad : {kNan, kInf, -kInf, Real(-1), Real(0)}) {
       auto spheres = good;
       spheres[index].radius = bad;
-      spheres.back().radius = -7;  // a later one: not the one to be named
+      spheres.back().radius = -7;  // a later sphere, which the message must not name
       if (index == good.size() - 1) spheres[index].radius = bad;
       const std::string message = message_of([&] { collider().find_contacts(spheres); });
       EXPECT_EQ(message.find(name + "radius is "), 0u) << message;
@@ -274,10 +274,10 @@ TEST_P(SphereColliderContract, MorePairsThanAContactCanNumberAreRejected) {
 
 TEST_P(SphereColliderContract, FindsNoneSomeAndAllOfManyPairsTouching) {
   Random random(base_seed());
-  for (const Real reach : {Real(0), Real(1), Real(1e3)}) {
+  for (const Real radius : {Real(0), Real(1), Real(1e3)}) {
     std::vector<SphereInstance> spheres(3000);
-    for (SphereInstance& s : spheres) s = {random.uniform_in_box({1, 1, 1}, {9, 9, 9}), reach};
-    std::vector<SpherePair> pairs(20000);  // several chunks, the last one not full
+    for (SphereInstance& s : spheres) s = {random.uniform_in_box({1, 1, 1}, {9, 9, 9}), radius};
+    std::vector<SpherePair> pairs(20000);  // several chunks, the last one incomplete
     for (SpherePair& p : pairs) {
       p.a = static_cast<SphereIndex>(random.below(spheres.size()));
       p.b = (p.a + 1) % static_cast<SphereIndex>(spheres.size());
@@ -286,8 +286,8 @@ TEST_P(SphereColliderContract, FindsNoneSomeAndAllOfManyPairsTouching) {
     const auto expected = touching_of(results);
     ASSERT_TRUE(same_bits(collider().find_touching(spheres, pairs), expected)) << seed_note();
     const std::size_t most = pairs.size();
-    EXPECT_EQ(expected.size() == 0, reach == 0);
-    EXPECT_EQ(expected.size() == most, reach == 1e3);
+    EXPECT_EQ(expected.size() == 0, radius == 0);
+    EXPECT_EQ(expected.size() == most, radius == 1e3);
   }
 }
 
@@ -320,7 +320,7 @@ TEST_P(SphereColliderContract, StaysUsableAfterAnError) {
   EXPECT_TRUE(same_bits(collider().find_contacts(spheres), expected)) << seed_note();
 }
 
-TEST_P(SphereColliderContract, AColliderServesSetsOfAnySizeInAnyOrder) {
+TEST_P(SphereColliderContract, AcceptsSetsOfAnySizeInAnyOrder) {
   Random random(base_seed());
   for (const std::size_t n : std::initializer_list<std::size_t>{2000, 3, 0, 700, 1, 2500, 64}) {
     const auto spheres = sphere_kind("uniform").make(n, random);

@@ -1,4 +1,4 @@
-/// Who computes can't be seen: any order of backends, algorithms and widths gives the same states.
+/// States do not depend on the sequence of backends, algorithms and vector widths.
 #include <jfpx/random.hpp>
 #include <jfpx/world.hpp>
 
@@ -14,7 +14,7 @@ namespace {
 
 bool cuda_is_usable() { return available_backends()[1].usable; }
 
-/// Asks another collider each time, at random.
+/// Forwards each call to a random collider.
 class RandomSwitcher final : public SphereCollider {
  public:
   explicit RandomSwitcher(std::uint64_t seed) : random_(seed) {

@@ -1,8 +1,9 @@
-# The contract of every SphereCollider (sphere_collider_test.cpp), once for each way to make one.
+# The contract of SphereCollider (sphere_collider_test.cpp), once for each backend.
 jfpx_add_test(sphere_collider_cpu_test
   SOURCES
     sphere_collider/sphere_collider_test.cpp
     sphere_collider/cpu/cpu_cases.cpp
+    sphere_collider/backend_test.cpp
     sphere_collider/cpu/sphere_collider_cpu_test.cpp
     support/sphere_fixtures.cpp)
 jfpx_add_test(automatic_contract_test
@@ -20,19 +21,15 @@ endif()
 jfpx_add_test(automatic_test INTERNAL
   SOURCES
     sphere_collider/automatic_sphere_collider_test.cpp
-    sphere_collider/backend_test.cpp
-    sphere_collider/cost_chooser_test.cpp
     sphere_collider/cost_model_test.cpp
     sphere_collider/switching_test.cpp
     ${bullet_takeover}
     support/sphere_fixtures.cpp
   LINK ${bullet_library} nlohmann_json::nlohmann_json)
-if(NOT BUILD_SHARED_LIBS)
-  foreach(target IN ITEMS automatic_test automatic_test_f64)
-    target_compile_definitions(${target} PRIVATE JFPX_HAS_CUDA=$<BOOL:${JFPX_HAS_CUDA}>)
-  endforeach()
-endif()
-# Replaces operator new: a program of its own.
+foreach(target IN ITEMS sphere_collider_cpu_test sphere_collider_cpu_test_f64)
+  target_compile_definitions(${target} PRIVATE JFPX_HAS_CUDA=$<BOOL:${JFPX_HAS_CUDA}>)
+endforeach()
+# A separate program, because it replaces operator new.
 jfpx_add_test(sphere_collider_allocation_test
   SOURCES
     sphere_collider/cpu/allocation_test.cpp

@@ -1,4 +1,4 @@
-/// Numbers and choices taken from the bytes of a fuzzer: what a Random is to a random test.
+/// Generator of numbers and choices from the input bytes of a fuzzer, with the interface of Random.
 #pragma once
 
 #include <jfpx/random.hpp>
@@ -12,8 +12,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// Each draw takes one or two bytes, so that a fuzzer which changes a byte changes one choice. When
-/// the bytes are used up, pseudo-random numbers follow, the same ones each time.
+/// Each draw consumes one or two bytes, so that a mutation of one byte changes one choice. After
+/// the last byte, a fixed sequence of pseudo-random numbers follows.
 class Bytes {
  public:
   explicit Bytes(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -38,10 +38,10 @@ class Bytes {
   std::uint64_t below(std::uint64_t n) { return (n <= 256 ? next_byte() : next()) % n; }
   bool chance(Real share) { return static_cast<Real>(next_byte()) < 256 * share; }
 
-  /// Mostly in [low, high), now and then a number that breaks things, good or bad.
+  /// A number that is mostly in [low, high), and occasionally a valid or invalid edge case.
   Real number(Real low, Real high) {
     using Limits = std::numeric_limits<Real>;
-    constexpr std::array<Real, 24> kOdd{
+    constexpr std::array<Real, 24> kEdgeCases{
         0,
         Real(-0.0),
         1,
@@ -68,7 +68,7 @@ class Bytes {
         Real(0.5),
     };
     const std::uint64_t kind = next_byte();
-    if (kind < kOdd.size()) return kOdd[kind];
+    if (kind < kEdgeCases.size()) return kEdgeCases[kind];
     const std::uint64_t fraction = kind << 8 | next_byte();
     return low + (high - low) * (static_cast<Real>(fraction) * static_cast<Real>(1.0 / 65536.0));
   }
@@ -81,14 +81,14 @@ class Bytes {
 
  private:
   std::uint64_t next_byte() {
-    if (bytes_.empty()) return beyond_.next() >> 56;
+    if (bytes_.empty()) return padding_.next() >> 56;
     const std::uint8_t byte = bytes_.front();
     bytes_ = bytes_.subspan(1);
     return byte;
   }
 
   std::span<const std::uint8_t> bytes_;
-  Random beyond_{0};
+  Random padding_{0};
 };
 
 }  // namespace test

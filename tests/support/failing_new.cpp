@@ -1,4 +1,4 @@
-/// Replaces operator new of a test program.
+/// Replacement of operator new in a test program.
 #include "tests/support/failing_new.hpp"
 
 #include <atomic>
@@ -53,12 +53,12 @@ FailingNew::FailingNew(std::size_t k, Shortage shortage) {
 FailingNew::~FailingNew() { first_failure = kNever; }
 bool FailingNew::failed() { return has_failed; }
 
-std::size_t living_allocations() { return alive; }
+std::size_t live_allocations() { return alive; }
 
 std::size_t with_every_failure(
     const std::function<bool(std::size_t k, Shortage shortage)>& attempt) {
   std::size_t failures = 0;
-  for (const Shortage shortage : {Shortage::once, Shortage::for_good}) {
+  for (const Shortage shortage : {Shortage::once, Shortage::permanent}) {
     for (std::size_t k = 0; attempt(k, shortage); ++k) ++failures;
   }
   return failures;

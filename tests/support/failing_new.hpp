@@ -1,4 +1,4 @@
-/// Memory that runs out on request, for a whole program: see with_every_failure().
+/// Injection of allocation failures into a whole program: see with_every_failure().
 #pragma once
 
 #include <jfpx/error.hpp>
@@ -13,12 +13,12 @@ namespace test {
 
 /// Which allocations fail.
 enum class Shortage {
-  once,     ///< only that one
-  for_good  ///< and all after it
+  once,      ///< one allocation
+  permanent  ///< that allocation and all later ones
 };
 
-/// While it lives, operator new fails from its k-th call on. Programs that link failing_new.cpp
-/// have a replaced operator new; one FailingNew at a time.
+/// During its lifetime, the k-th call of operator new fails, and with Shortage::permanent all later
+/// calls too. Requires that the program links failing_new.cpp. At most one object may exist.
 class FailingNew {
  public:
   FailingNew(std::size_t k, Shortage shortage);
@@ -26,19 +26,20 @@ class FailingNew {
   FailingNew(const FailingNew&) = delete;
   FailingNew& operator=(const FailingNew&) = delete;
 
-  static bool failed();  ///< whether the call came to that allocation
+  static bool failed();  ///< whether an allocation has failed
 };
 
-/// Allocations that were not freed yet.
-std::size_t living_allocations();
+/// Number of allocations that have not been freed.
+std::size_t live_allocations();
 
-/// Calls `attempt(k, shortage)` for k = 0, 1, ... and both shortages, for as long as it says that
-/// an allocation failed. @returns how many did
+/// For both shortages, calls `attempt(k, shortage)` for k = 0, 1, ... as long as it returns true,
+/// which must mean that an allocation failed.
+/// @return number of calls that returned true
 std::size_t with_every_failure(
     const std::function<bool(std::size_t k, Shortage shortage)>& attempt);
 
-/// The call, with the k-th allocation failing. @returns whether it ended in an error, that of
-/// memory
+/// Makes the call with a failing k-th allocation.
+/// @return whether the call threw OutOfMemory or std::bad_alloc
 template <class Call>
 bool runs_out(std::size_t k, Shortage shortage, Call call) {
   FailingNew failing(k, shortage);
@@ -46,7 +47,7 @@ bool runs_out(std::size_t k, Shortage shortage, Call call) {
     call();
     return false;
   } catch (const OutOfMemory&) {
-  } catch (const std::bad_alloc&) {  // where even the message found no memory
+  } catch (const std::bad_alloc&) {  // a small allocation, for example of the message
   }
   return true;
 }

@@ -1,4 +1,4 @@
-/// Runs a command and keeps what it said.
+/// Runs a command and captures its output.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,6 +12,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
+/// Exit status and output of a process.
 struct ProcessResult {
   int status = -1;     ///< exit status; 128 + signal if it was killed
   std::string output;  ///< stdout, and stderr if the command line redirects it

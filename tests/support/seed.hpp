@@ -1,4 +1,5 @@
-/// The seed of a random test, told in any case: in failures, and before a crash or a time limit.
+/// Seed of a random test, which is always reported: with each failure, and on stdout before a crash
+/// or a timeout.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -14,7 +15,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// A fresh seed, or the one in JFPX_TEST_SEED. Lives as long as the test that uses it.
+/// A random seed, or the value of JFPX_TEST_SEED. Must exist as long as the test that uses it.
 class Seed {
  public:
   Seed() {

@@ -1,5 +1,5 @@
-/// What every sphere collider must do, whatever its backend: the tests are in
-/// sphere_collider_test.cpp, each backend instantiates them for its own options.
+/// Contract of all sphere colliders. The tests are in sphere_collider_test.cpp; each backend
+/// instantiates them for its own options.
 #pragma once
 
 #include <jfpx/error.hpp>
@@ -15,11 +15,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
+/// Parameter of the contract.
 struct ColliderCase {
   std::string name;  ///< letters, digits and underscores
   SphereColliderOptions options;
 };
-/// Named by gtest on a failure.
+/// Name that gtest prints on a failure.
 inline void PrintTo(const ColliderCase& c, std::ostream* os) { *os << c.name; }
 inline std::string case_name(const testing::TestParamInfo<ColliderCase>& info) {
   return info.param.name;
@@ -27,8 +28,8 @@ inline std::string case_name(const testing::TestParamInfo<ColliderCase>& info) {
 
 /// Instantiate with
 ///   INSTANTIATE_TEST_SUITE_P(Cuda, SphereColliderContract, testing::Values(...), case_name);
-/// in a source of the same program. Where the backend is not usable the tests are skipped, with
-/// its reason; they fail if the environment has JFPX_REQUIRE_CUDA=1.
+/// in a source of the same program. If the backend is unusable, the tests are skipped with the
+/// reason; they fail if the environment variable JFPX_REQUIRE_CUDA is set.
 class SphereColliderContract : public testing::TestWithParam<ColliderCase> {
  protected:
   void SetUp() override {

@@ -1,4 +1,4 @@
-/// Sphere sets, oracle and comparison: see the header.
+/// Sphere sets, oracle and comparison; see the header.
 #include "tests/support/sphere_fixtures.hpp"
 
 #include "src/collide/sphere_pair.hpp"
@@ -19,8 +19,8 @@ namespace {
 using Spheres = std::vector<SphereInstance>;
 using Limits = std::numeric_limits<Real>;
 
-/// Side of a cube in which n spheres of radius r have about c contacts each: uniformly random
-/// centres at volume fraction phi have 4*phi contacts per sphere (each pair counted once).
+/// Returns the side of a cube in which n spheres of radius r have about c contacts each: uniformly
+/// random centres at volume fraction phi have 4*phi contacts per sphere (each pair counted once).
 Real side_for(std::size_t n, Real r, Real c) {
   const double volume = static_cast<double>(n) * 4.0 / 3.0 * 3.14159265358979 * std::pow(r, 3);
   return static_cast<Real>(std::cbrt(volume * 4.0 / static_cast<double>(c)));
@@ -41,15 +41,15 @@ Spheres lattice(std::size_t n, Random& random) {
   return spheres;
 }
 
-/// Dense clumps, far apart, with dust between.
+/// Dense clusters that are far apart, with a few spheres between them.
 Spheres clusters(std::size_t n, Random& random) {
   Spheres spheres(n);
   Vec3 middle;
   for (std::size_t i = 0; i < n; ++i) {
     if (i % 50 == 0) middle = random.uniform_in_box({-1e4, -1e4, -1e4}, {1e4, 1e4, 1e4});
-    const Real reach = i % 10 == 0 ? Real(1000) : Real(4);
+    const Real extent = i % 10 == 0 ? Real(1000) : Real(4);
     spheres[i].centre =
-        middle + random.uniform_in_box({-reach, -reach, -reach}, {reach, reach, reach});
+        middle + random.uniform_in_box({-extent, -extent, -extent}, {extent, extent, extent});
     spheres[i].radius = random.uniform(Real(0.2), Real(1));
   }
   shuffle(spheres, random);
@@ -86,7 +86,7 @@ Spheres plane(std::size_t n, Random& random) {
   return spheres;
 }
 
-/// Radii over four decades, evenly in the logarithm.
+/// Radii over four decades, uniform in the logarithm.
 Spheres polydisperse(std::size_t n, Random& random) {
   Spheres spheres(n);
   for (SphereInstance& s : spheres) {
@@ -97,13 +97,13 @@ Spheres polydisperse(std::size_t n, Random& random) {
   return spheres;
 }
 
-Spheres one_giant(std::size_t n, Random& random) {
+Spheres one_large(std::size_t n, Random& random) {
   Spheres spheres = make_gas(n, Real(0.01), 2, random);
   if (n > 0) spheres[random.below(n)] = {{0, 0, 0}, 1000};
   return spheres;
 }
 
-/// A gas 1e6 to 1e9 m from the origin, where few coordinates are left to choose from.
+/// A gas 1e6 to 1e9 m from the origin, where the spacing of representable coordinates is large.
 Spheres far(std::size_t n, Random& random) {
   Spheres spheres = make_gas(n, 1, 3, random);
   const Real distance = static_cast<Real>(std::pow(10.0, 6 + static_cast<int>(random.below(4))));
@@ -115,18 +115,19 @@ Spheres far(std::size_t n, Random& random) {
   return spheres;
 }
 
-/// A gas with a few spheres extremely far away on either side.
+/// A gas with a few spheres that are extremely far away.
 Spheres outliers(std::size_t n, Random& random) {
   Spheres spheres = make_gas(n, 1, 3, random);
   for (std::size_t i = 0; i < n; i += 100) {
-    const Real reach = static_cast<Real>(std::pow(10.0, static_cast<int>(random.below(30))));
+    const Real extent = static_cast<Real>(std::pow(10.0, static_cast<int>(random.below(30))));
     spheres[random.below(n)].centre =
-        random.uniform_in_box({-reach, -reach, -reach}, {reach, reach, reach});
+        random.uniform_in_box({-extent, -extent, -extent}, {extent, extent, extent});
   }
   return spheres;
 }
 
-/// Neighbours at exactly r_a + r_b, or one unit in the last place beside it.
+/// Neighbours at a distance of exactly r_a + r_b, or with radii that differ by one unit in the last
+/// place.
 Spheres touching(std::size_t n, Random& random) {
   std::size_t edge = 1;
   while (edge * edge * edge < n) ++edge;
@@ -142,7 +143,7 @@ Spheres touching(std::size_t n, Random& random) {
   return spheres;
 }
 
-/// Separations whose squares underflow, and radii down to the smallest number.
+/// Distances whose squares underflow, and radii down to the smallest positive number.
 Spheres subnormal(std::size_t n, Random& random) {
   Spheres spheres(n);
   const Real scales[] = {Limits::denorm_min(), Limits::min(), std::sqrt(Limits::min()),
@@ -160,8 +161,8 @@ Spheres huge(std::size_t n, Random& random) {
   Spheres spheres(n);
   const Real root = std::sqrt(Limits::max());
   for (SphereInstance& s : spheres) {
-    const Real reach = random.below(2) == 0 ? root : Limits::max() / 2;
-    s.centre = random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * reach * 2;
+    const Real extent = random.below(2) == 0 ? root : Limits::max() / 2;
+    s.centre = random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * extent * 2;
     const Real radii[] = {Limits::denorm_min(), 1, root / 8, root, Limits::max()};
     s.radius = random.below(20) == 0 ? radii[random.below(5)] : root * random.uniform(0, Real(0.2));
     s.radius = std::max(Limits::denorm_min(), s.radius);
@@ -177,7 +178,7 @@ constexpr SphereKind kKinds[] = {
     {"line", line},
     {"plane", plane},
     {"polydisperse", polydisperse},
-    {"one_giant", one_giant},
+    {"one_large", one_large},
     {"far", far},
     {"outliers", outliers},
     {"touching", touching},
@@ -185,7 +186,8 @@ constexpr SphereKind kKinds[] = {
     {"huge", huge},
 };
 
-/// Equal bits, or both NaN: IEEE leaves sign and payload of a NaN open, and x86 and CUDA differ.
+/// Equal bits, or both NaN: IEEE 754 does not specify the sign and payload of a NaN, and x86 and
+/// CUDA differ.
 bool same(Real a, Real b) {
   return std::memcmp(&a, &b, sizeof a) == 0 || (std::isnan(a) && std::isnan(b));
 }
@@ -243,7 +245,7 @@ const SphereKind& sphere_kind(std::string_view name) {
   for (const SphereKind& kind : kKinds) {
     if (kind.name == name) return kind;
   }
-  ADD_FAILURE() << "no kind of sphere set is called " << name;
+  ADD_FAILURE() << "there is no sphere kind " << name;
   return kKinds[0];
 }
 

@@ -1,4 +1,4 @@
-/// A folder that lives as long as a test.
+/// Temporary folder of a test.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,6 +12,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
+/// Creates a folder, and removes it with its content in the destructor.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

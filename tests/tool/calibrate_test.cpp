@@ -1,4 +1,4 @@
-/// jfpx calibrate, and what the other commands make of its file.
+/// jfpx calibrate, and the use of its file by the other commands.
 #include <jfpx/cost_model.hpp>
 
 #include "tests/support/process.hpp"
@@ -18,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// The command with a cache folder of its own.
+/// Runs the command with a separate cache folder.
 class Calibrate : public testing::Test {
  protected:
   test::ProcessResult jfpx(const std::string& arguments, const char* redirect = "2>&1") {
@@ -38,7 +38,7 @@ class Calibrate : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(Calibrate, StoresCostsThatProgramsCanAskFor) {
+TEST_F(Calibrate, StoresCostsThatProgramsCanLoad) {
   setenv("XDG_CACHE_HOME", folder_.file("").c_str(), 1);
   const CalibratedCosts before = calibrated_costs();
   EXPECT_EQ(before.problem, "this machine was not measured yet");
@@ -57,9 +57,9 @@ TEST_F(Calibrate, StoresCostsThatProgramsCanAskFor) {
 TEST_F(Calibrate, StoresCostsThatTheOtherCommandsUse) {
   const auto result = jfpx("calibrate");
   EXPECT_EQ(result.status, 0) << result.output;
-  EXPECT_THAT(result.output, HasSubstr("x86, sorted tiles"));
+  EXPECT_THAT(result.output, HasSubstr("cpu, sorted tiles"));
   EXPECT_THAT(result.output, HasSubstr(path()));
-  EXPECT_THAT(result.output, Not(HasSubstr("measuring"))) << "progress is for terminals";
+  EXPECT_THAT(result.output, Not(HasSubstr("measuring"))) << "progress is shown on terminals only";
   const MeasuredCostModel model = load_cost_model(path());
   EXPECT_GT(model.costs.x86_all_pairs.pair_ns, 0.0);
   EXPECT_GT(model.costs.x86_sorted_tiles.sphere_ns, 0.0);
@@ -74,16 +74,16 @@ TEST_F(Calibrate, StoresCostsThatTheOtherCommandsUse) {
             model.costs.x86_all_pairs.pair_ns);
 }
 
-TEST_F(Calibrate, WithoutAFileTheDefaultsAreUsedAndOneLineSaysSo) {
+TEST_F(Calibrate, WithoutAFileTheDefaultsAreUsedAndReportedInOneLine) {
   const auto run = jfpx(kRun);
   EXPECT_EQ(run.status, 0);
   EXPECT_THAT(run.output, HasSubstr("default costs are used"));
   EXPECT_THAT(run.output, HasSubstr("this machine was not measured yet"));
   EXPECT_THAT(jfpx(std::string(kRun) + " --quiet").output, Not(HasSubstr("costs")));
-  EXPECT_THAT(jfpx(std::string(kRun) + " --backend x86").output, Not(HasSubstr("costs")));
+  EXPECT_THAT(jfpx(std::string(kRun) + " --backend cpu").output, Not(HasSubstr("costs")));
   const auto shown = jfpx("calibrate --show");
   EXPECT_EQ(shown.status, 0);
-  EXPECT_THAT(shown.output, HasSubstr("these are the default costs"));
+  EXPECT_THAT(shown.output, HasSubstr("showing the default costs"));
   EXPECT_EQ(folder_.entries(), 0u) << "only calibrate writes";
 }
 
@@ -99,7 +99,7 @@ TEST_F(Calibrate, ABrokenFileIsIgnoredWithOneLineAndTheSameBits) {
   }
   std::filesystem::remove(path());
   std::filesystem::create_directory(path());
-  EXPECT_EQ(jfpx(kRun).status, 0) << "a folder in its place";
+  EXPECT_EQ(jfpx(kRun).status, 0) << "a folder instead of the file";
 }
 
 TEST_F(Calibrate, AFileOfAnotherMachineDriverOrVersionIsIgnored) {
@@ -114,13 +114,13 @@ TEST_F(Calibrate, AFileOfAnotherMachineDriverOrVersionIsIgnored) {
   }
 }
 
-TEST_F(Calibrate, DefaultCostsDoNotPassForMeasuredOnes) {
+TEST_F(Calibrate, DefaultCostsAreNotAcceptedAsMeasured) {
   write(jfpx("calibrate --show --json -", "2>/dev/null").output);
   EXPECT_EQ(load_cost_model(path()).costs, CostModel());
   EXPECT_THAT(jfpx(kRun).output, HasSubstr("was measured on another machine: none"));
 }
 
-TEST_F(Calibrate, AFolderThatCanNotBeMadeIsAnErrorOfCalibrateOnly) {
+TEST_F(Calibrate, AFolderThatCannotBeCreatedIsAnErrorOfCalibrateOnly) {
   std::ofstream(folder_.file("jfpx")) << "a file where the folder should be";
   EXPECT_EQ(jfpx(kRun).status, 0);
   const auto result = jfpx("calibrate --quiet");

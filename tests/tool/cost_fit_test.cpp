@@ -1,4 +1,4 @@
-/// Costs from measured times, against costs that are known.
+/// Estimation of cost model terms, tested against known costs.
 #include "src/tool/cost_fit.hpp"
 
 #include <jfpx/random.hpp>
@@ -18,7 +18,7 @@ using Term = double CostTerms::*;
 constexpr Term kTerms[] = {&CostTerms::call_us, &CostTerms::sphere_ns, &CostTerms::pair_ns,
                            &CostTerms::contact_ns};
 
-/// Times of a machine with these costs, each wrong by up to `noise` of itself.
+/// Times of a machine with these costs, each with a relative error of up to `noise`.
 std::vector<CostSample> times_of(const CostTerms& costs, double noise, Random& random) {
   std::vector<CostSample> samples;
   for (const double n : {32.0, 128.0, 512.0, 2048.0}) {
@@ -32,15 +32,15 @@ std::vector<CostSample> times_of(const CostTerms& costs, double noise, Random& r
 }
 
 CostTerms random_costs(Random& random) {
-  const auto any = [&](double most) { return most * static_cast<double>(random.uniform()); };
-  return {.call_us = any(10),
+  const auto up_to = [&](double max) { return max * static_cast<double>(random.uniform()); };
+  return {.call_us = up_to(10),
           .byte_ns = 0,
-          .sphere_ns = any(100),
-          .pair_ns = any(1),
-          .contact_ns = any(50)};
+          .sphere_ns = up_to(100),
+          .pair_ns = up_to(1),
+          .contact_ns = up_to(50)};
 }
 
-TEST(CostFit, FindsTheCostsThatMadeTheTimes) {
+TEST(CostFit, RecoversTheCostsFromExactTimes) {
   Random random(test::base_seed());
   for (int k = 0; k < 50; ++k) {
     const CostTerms costs = random_costs(random);
@@ -51,7 +51,7 @@ TEST(CostFit, FindsTheCostsThatMadeTheTimes) {
   }
 }
 
-TEST(CostFit, IsAsCloseAsTheTimesAre) {
+TEST(CostFit, IsAsAccurateAsTheTimes) {
   Random random(test::base_seed());
   for (int k = 0; k < 50; ++k) {
     const CostTerms costs = random_costs(random);
@@ -63,7 +63,7 @@ TEST(CostFit, IsAsCloseAsTheTimesAre) {
 }
 
 TEST(CostFit, NoTermIsNegative) {
-  // Falling times: without the limit spheres would have to give time back.
+  // The times decrease: without the constraint the cost of a sphere would be negative.
   const std::vector<CostSample> samples = {{search_work(10, 0), 10}, {search_work(1000, 0), 5}};
   const CostTerms found = fit_costs(samples, kTerms);
   for (const Term term : kTerms) EXPECT_GE(found.*term, 0.0);
@@ -71,7 +71,7 @@ TEST(CostFit, NoTermIsNegative) {
   EXPECT_NEAR(found.call_us, 6, 1e-6);
 }
 
-TEST(CostFit, KnownTermsAreKeptAndTakenOff) {
+TEST(CostFit, KnownTermsAreKeptAndSubtracted) {
   constexpr Term kCall[] = {&CostTerms::call_us};
   const ColliderWork work = search_work(100, 0);  // 100 spheres of 4 Reals each
   const CostTerms known{.byte_ns = 10};
@@ -81,8 +81,8 @@ TEST(CostFit, KnownTermsAreKeptAndTakenOff) {
   EXPECT_NEAR(found.call_us, 3, 1e-9);
 }
 
-TEST(Crossover, IsTheFirstSizeThatPays) {
-  // n(n-1)/2 pairs of 2 ns against 99 ns a sphere: n - 1 > 99, so from 101 on.
+TEST(Crossover, IsTheSmallestSizeThatIsFaster) {
+  // n(n-1)/2 pairs of 2 ns against 99 ns per sphere: n - 1 > 99, so n >= 101.
   EXPECT_EQ(crossover({.pair_ns = 2}, {.sphere_ns = 99}), 101);
   EXPECT_EQ(crossover({.sphere_ns = 1}, {.sphere_ns = 2}), 0);
   EXPECT_EQ(crossover({.call_us = 1}, {}), 1);

@@ -1,3 +1,3 @@
 #!/bin/sh
-# A jfpx whose comparisons take what waits for them down: as when memory runs out.
+# Stand-in for jfpx that kills its parent process, as the kernel does when memory runs out.
 [ "$1" = --help ] || kill -KILL "$PPID"

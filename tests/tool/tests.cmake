@@ -6,18 +6,18 @@ jfpx_add_test(cost_fit_test SOURCES
   support/sphere_fixtures.cpp)
 foreach(suffix IN ITEMS "" "_f64")
   add_dependencies(tool_test${suffix} jfpx_tool jfpx_tool_f64)
-  # In quotes, as shells run it.
+  # Quoted, because a shell runs the command.
   target_compile_definitions(tool_test${suffix} PRIVATE
     "JFPX_TOOL_PATH=\"\\\"$<TARGET_FILE:jfpx_tool${suffix}>\\\"\""
     JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
 endforeach()
 
-# The matrix of scripts/identity, small.
+# A reduced matrix of scripts/identity.
 if(JFPX_HAS_BULLET)
   add_test(NAME identity COMMAND ${PROJECT_SOURCE_DIR}/scripts/identity
     --jfpx $<TARGET_FILE:jfpx_tool> --spheres 6 --steps 10 --threads "1 3")
   set_tests_properties(identity PROPERTIES PASS_REGULAR_EXPRESSION "all 36 comparisons are identical")
 endif()
-add_test(NAME identity_counts_what_dies COMMAND ${PROJECT_SOURCE_DIR}/scripts/identity
+add_test(NAME identity_counts_killed_comparisons COMMAND ${PROJECT_SOURCE_DIR}/scripts/identity
   --jfpx ${CMAKE_CURRENT_SOURCE_DIR}/tool/killer.sh --only "overlap" --precision float --threads 1)
-set_tests_properties(identity_counts_what_dies PROPERTIES PASS_REGULAR_EXPRESSION "2 of 2 comparisons FAILED")
+set_tests_properties(identity_counts_killed_comparisons PROPERTIES PASS_REGULAR_EXPRESSION "2 of 2 comparisons FAILED")

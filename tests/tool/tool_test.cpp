@@ -1,4 +1,4 @@
-/// The jfpx command as a user meets it: output, exit statuses, errors, files.
+/// The jfpx command: output, exit statuses, errors and files.
 #include <jfpx/backend.hpp>
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
@@ -25,11 +25,11 @@ using ::testing::Not;
 
 constexpr const char* kOtherPrecision = sizeof(Real) == 4 ? "double" : "float";
 
-/// The command with these arguments; stderr is part of the output.
+/// Runs the command; its output includes stderr.
 ProcessResult jfpx_command(const std::string& arguments) {
   return test::run_process(std::string(JFPX_TOOL_PATH) + " " + arguments + " 2>&1");
 }
-/// As jfpx_command(), stdout only.
+/// Runs the command; its output is stdout only.
 ProcessResult jfpx_stdout(const std::string& arguments) {
   return test::run_process(std::string(JFPX_TOOL_PATH) + " " + arguments + " 2>/dev/null");
 }
@@ -47,7 +47,7 @@ void expect_fails(const std::string& arguments, int status, const std::string& m
   EXPECT_THAT(result.output, HasSubstr(message)) << arguments;
 }
 
-/// Two spheres, of which one is past kMaxCoordinate after a step.
+/// Two spheres, one of which exceeds kMaxCoordinate after a step.
 void save_runaway(const std::string& path) {
   Scene scene;
   scene.dt = 1;
@@ -90,7 +90,7 @@ TEST(Tool, OptionsThatWouldDoNothingAreRefused) {
   for (const std::string engine : {"native", "bullet-stock"}) {
     for (const std::string option : {"--solver stock", "--world jfpx", "--minimum-batch 3"}) {
       expect_fails("run pile --engine " + engine + " " + option, 2,
-                   "goes with --engine bullet; engine is " + engine);
+                   "requires --engine bullet; engine is " + engine);
     }
   }
 }
@@ -103,7 +103,7 @@ TEST(Tool, OutputThatIsLostIsAnError) {
     EXPECT_EQ(result.status, 2) << arguments;
     EXPECT_THAT(result.output, HasSubstr("No space left on device")) << arguments;
   }
-  // By a link, which is what breaks if it goes wrong.
+  // Through a symbolic link, which a faulty implementation would replace.
   const test::TemporaryFolder folder;
   std::filesystem::create_symlink("/dev/full", folder.file("full"));
   expect_fails("run pile --steps 1 --csv " + folder.file("full"), 2, "can't be written: No space");
@@ -120,7 +120,7 @@ TEST(Tool, ResultsGoThroughLinksToDevices) {
   EXPECT_EQ(folder.entries(), 1u);
 }
 
-TEST(Tool, JsonOnStdoutIsAllThatIsThere) {
+TEST(Tool, JsonIsTheOnlyOutputOnStdout) {
   for (const std::string command : {"run", JFPX_HAS_BULLET ? "compare" : "run"}) {
     const ProcessResult result = jfpx_stdout(command + " pile --spheres 8 --steps 2 --json -");
     EXPECT_EQ(nlohmann::json::parse(result.output)["steps"], 2) << command;
@@ -129,12 +129,13 @@ TEST(Tool, JsonOnStdoutIsAllThatIsThere) {
 
 TEST(Tool, AnInterruptedRunLeavesNoFiles) {
   const test::TemporaryFolder folder;
-  // Else it would send a second signal, to the whole group, which ends the program at once.
+  // Without --foreground, timeout also signals the process group; a second signal ends the program
+  // immediately.
   const ProcessResult result =
       test::run_process("timeout --foreground --preserve-status -s INT 0.5 " JFPX_TOOL_PATH
                         " run pile --spheres 50 --steps 100000000 --quiet --record " +
                         folder.file("run.rec") + " --csv " + folder.file("run.csv"));
-  EXPECT_EQ(result.status, 130) << "as if it had not noticed";
+  EXPECT_EQ(result.status, 130) << "ends by the signal";
   EXPECT_EQ(folder.entries(), 0u);
 }
 
@@ -155,7 +156,7 @@ TEST(Tool, SceneFilesAreChecked) {
   expect_fails("run " + path, 2, "scene.json: broken JSON");
   save_scene(scenes::make("pile", {.spheres = 5}), path);
   for (const std::string option : {"--spheres", "--seed"}) {
-    expect_fails("run " + path + " " + option + " 3", 2, option + " goes with a named scene");
+    expect_fails("run " + path + " " + option + " 3", 2, option + " requires a named scene");
   }
   EXPECT_EQ(jfpx_command("run " + path + " --steps 2").status, 0);
 }
@@ -165,7 +166,7 @@ TEST(Tool, ABodyThatRunsAwayIsNamedAndStatusOne) {
   const std::string path = folder.file("scene.json");
   const std::string recording = folder.file("run.rec");
   save_runaway(path);
-  const std::string message = "step 0: body 1 left the finite numbers";
+  const std::string message = "step 0: body 1 became non-finite";
   expect_fails("run " + path + " --steps 3 --record " + recording, 1, message);
   expect_fails("replay " + recording, 1, message);
 }
@@ -202,7 +203,7 @@ TEST(Tool, DemosAreListedWithTheirControls) {
   }
 }
 
-TEST(Tool, DemosRunWithTheirInputsAndRepeat) {
+TEST(Tool, DemosRunWithTheirInputsAndRepeatExactly) {
   const test::TemporaryFolder folder;
   const std::string script = folder.file("shots.input");
   std::ofstream(script) << "jfpx-input 1 ballistic\n2 fire press\n2 fire release\n5 fire press\n";
@@ -226,23 +227,24 @@ TEST(Tool, ASceneWithoutInputsIsTheSameAsADemo) {
   EXPECT_EQ(jfpx_stdout(arguments + " --input " + script).output, jfpx_stdout(arguments).output);
 }
 
-TEST(Tool, DemosRefuseWhatTheyCannotDo) {
+TEST(Tool, OptionsThatDemosDoNotSupportAreRejected) {
   const test::TemporaryFolder folder;
   const std::string script = folder.file("x.input");
   std::ofstream(script) << "jfpx-input 1 flight\n1 fire press\n";
   expect_fails("run flight --input " + script, 2, "\"flight\" has no control \"fire\"");
-  expect_fails("run ballistic --input " + script, 2, "are of \"flight\", not of \"ballistic\"");
+  expect_fails("run ballistic --input " + script, 2,
+               "is for the demo \"flight\", not for \"ballistic\"");
   expect_fails("run flight --input " + folder.file("none.input"), 2, "none.input");
   expect_fails("run flight --engine bullet", 2, "only the native engine");
   expect_fails("compare ballistic", 2, "only the native engine");
   expect_fails("scenes flight --export", 2, "only the native engine");
-  expect_fails("run flight --record " + folder.file("a.rec"), 2, "--record goes with scenes");
-  expect_fails("run flight --no-sleep", 2, "--no-sleep goes with a scene");
+  expect_fails("run flight --record " + folder.file("a.rec"), 2, "--record requires a scene");
+  expect_fails("run flight --no-sleep", 2, "--no-sleep requires a scene");
   expect_fails("run pile --boxes 3", 2, "boxes");
   expect_fails("run flight --dt 0", 2, "dt");
 }
 
-TEST(Tool, DevicesTellsTheTruth) {
+TEST(Tool, DevicesReportsEveryBackend) {
   const ProcessResult result = jfpx_stdout("devices");
   EXPECT_EQ(result.status, 0);
   for (const BackendStatus& status : available_backends()) {
@@ -251,7 +253,7 @@ TEST(Tool, DevicesTellsTheTruth) {
   }
 }
 
-TEST(Tool, CudaThatCannotBeHadIsStatusThreeWithTheReason) {
+TEST(Tool, UnusableCudaIsStatusThreeWithTheReason) {
   if (cuda_usable()) GTEST_SKIP() << "CUDA is usable here";
   std::string reason;
   for (const BackendStatus& status : available_backends()) {
@@ -270,6 +272,13 @@ TEST(Tool, HashIsTheLastLineAndRepeats) {
   EXPECT_THAT(loud.output, ::testing::EndsWith("\n" + quiet.output));
   EXPECT_EQ(jfpx_stdout(arguments + " --quiet --threads 3").output, quiet.output);
   EXPECT_NE(jfpx_stdout(arguments + " --quiet --seed 2").output, quiet.output);
+}
+
+TEST(Tool, TheOldNameX86SelectsTheCpu) {
+  const std::string arguments = "run pile --spheres 9 --steps 2 --quiet --json - --backend ";
+  for (const std::string name : {"cpu", "x86"}) {
+    EXPECT_EQ(nlohmann::json::parse(jfpx_stdout(arguments + name).output)["backend"], "cpu");
+  }
 }
 
 TEST(Tool, PrecisionSwitchesTheBuild) {
@@ -372,14 +381,14 @@ TEST(Tool, CompareReallyComparesContacts) {
   const auto json = nlohmann::json::parse(
       jfpx_stdout("compare overlap --spheres 100 --steps 1 --quiet --json -").output);
   EXPECT_EQ(json["contacts_compared"], 100 * 99 / 2);
-  EXPECT_EQ(json["batches"], 1) << "by default every dispatch is computed by jfpx";
+  EXPECT_EQ(json["batches"], 1) << "by default jfpx computes every dispatch";
 }
 
-TEST(Tool, CompareSaysWhatWentWrongInTheNativeWorld) {
+TEST(Tool, CompareReportsTroubleOfTheNativeWorld) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("scene.json");
   save_runaway(path);
-  expect_fails("compare " + path + " --steps 3", 1, "body 1 left the finite numbers");
+  expect_fails("compare " + path + " --steps 3", 1, "body 1 became non-finite");
   const auto troubled =
       nlohmann::json::parse(jfpx_stdout("compare " + path + " --steps 3 --json -").output);
   EXPECT_NE(troubled["trouble"], "");
@@ -388,7 +397,7 @@ TEST(Tool, CompareSaysWhatWentWrongInTheNativeWorld) {
   EXPECT_TRUE(fine["device_failure"].is_string());
 }
 
-TEST(Tool, CompareUsesOurSolverUnlessToldOtherwise) {
+TEST(Tool, CompareUsesTheJfpxSolverByDefault) {
   const std::string arguments = "compare pile --spheres 60 --steps 40 --quiet --json - ";
   const auto ours = nlohmann::json::parse(jfpx_stdout(arguments).output);
   const auto stock = nlohmann::json::parse(jfpx_stdout(arguments + "--solver stock").output);

@@ -1,7 +1,7 @@
-/// Windows with more pixels than units, as on screens of high density: all is as large as ever, and
-/// finer.
+/// Windows with more pixels than units, as on high-density screens: sizes in units are unchanged
+/// and the resolution is higher.
 #include "src/viewer/image.hpp"
-#include "src/viewer/scene_show.hpp"
+#include "src/viewer/scene_viewer.hpp"
 #include "tests/viewer/row_of_balls.hpp"
 #include "tests/viewer/user.hpp"
 #include "tests/viewer/window_fixture.hpp"
@@ -16,20 +16,20 @@ namespace {
 using namespace view;
 using test::kRowSize;
 
-constexpr double kDensities[] = {1, 1.5, 2};
+constexpr double kDensities[] = {1, 1.5, 2};  // pixels per unit
 
 class DenseScreen : public test::WindowTest {
  protected:
   ViewOptions row() const { return test::row_of_balls(folder.file("row.json")); }
-  static const SceneShow& scene(test::User& user) {
-    return dynamic_cast<const SceneShow&>(user.show());
+  static const SceneViewer& scene(test::User& user) {
+    return dynamic_cast<const SceneViewer&>(user.viewer());
   }
 };
 
-TEST_F(DenseScreen, TheBodyIsPickedWhoseProjectedCentreIsClicked) {
+TEST_F(DenseScreen, AClickOnTheProjectedCentrePicksTheBody) {
   for (const double density : kDensities) {
     test::User user(row(), density);
-    user.show().paused = true;
+    user.viewer().paused = true;
     ASSERT_EQ(user.window().pixel_width(), std::lround(kRowSize.width * density));
     for (const std::uint32_t k : {2u, 0u, 3u, 1u}) {
       const auto at = project(scene(user).view(), scene(user).player().shown().states[k].position,
@@ -40,11 +40,11 @@ TEST_F(DenseScreen, TheBodyIsPickedWhoseProjectedCentreIsClicked) {
   }
 }
 
-TEST_F(DenseScreen, WidgetsAreWhereTheyWereAndAreHit) {
+TEST_F(DenseScreen, WidgetsKeepTheirPositionsAndReactToClicks) {
   std::map<std::string, PanelLog::Widget> expected;
   for (const double density : kDensities) {
     test::User user(row(), density);
-    user.show().paused = true;
+    user.viewer().paused = true;
     user.frame();
     if (density == 1) expected = user.panel().widgets;
     EXPECT_GT(expected.size(), 15u);
@@ -57,27 +57,15 @@ TEST_F(DenseScreen, WidgetsAreWhereTheyWereAndAreHit) {
       EXPECT_NEAR(now.bottom, widget.bottom, 2) << label << density;
     }
     user.click("Step");
-    EXPECT_EQ(user.show().steps(), 1u) << density;
+    EXPECT_EQ(user.viewer().steps(), 1u) << density;
     user.drag_in("speed", 0.5, 1);
-    EXPECT_EQ(user.show().speed, 4) << density;
-    user.click("x86");
+    EXPECT_EQ(user.viewer().speed, 4) << density;
+    user.click("cpu");
     EXPECT_EQ(scene(user).player().choice().backend, Backend::cpu) << density;
   }
 }
 
-TEST_F(DenseScreen, TheMouseTurnsAsFar) {
-  Camera expected;
-  for (const double density : kDensities) {
-    test::User user(row(), density);
-    const Camera before = user.show().camera;
-    user.drag(600, 500, 680, 470);
-    EXPECT_NE(user.show().camera, before) << density;
-    if (density == 1) expected = user.show().camera;
-    EXPECT_EQ(user.show().camera, expected) << density;
-  }
-}
-
-/// Mean difference of what is seen at the middles of the units.
+/// Mean difference at the centres of the units.
 double difference(const Image& coarse, const Image& fine) {
   double sum = 0;
   for (int y = 0; y < coarse.height; ++y) {
@@ -91,11 +79,11 @@ double difference(const Image& coarse, const Image& fine) {
   return sum / static_cast<double>(coarse.rgb.size());
 }
 
-TEST_F(DenseScreen, ThePictureFillsItAndLooksTheSameWithAllItsPixels) {
+TEST_F(DenseScreen, ThePictureHasAllPixelsAndLooksTheSame) {
   Image coarse;
   for (const double density : kDensities) {
     ViewOptions options = row();
-    options.contacts = options.forces = true;  // lines, whose width counts
+    options.contacts = options.forces = true;  // lines have a width in units
     test::User user(options, density);
     user.click("Step");
     user.click_at(790, 630);

@@ -1,4 +1,4 @@
-/// One OpenGL context for all tests of a program, or the reason why there is none.
+/// OpenGL context shared by the tests of a program.
 #pragma once
 
 #include <jfpx/error.hpp>
@@ -15,7 +15,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// Tests that draw derive from this; they are skipped, with the reason, where OpenGL is missing.
+/// Base of tests that draw. They are skipped with the reason if OpenGL is not available.
 class GlTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -35,9 +35,9 @@ class GlTest : public ::testing::Test {
   static view::Image picture(const view::Drawing& drawing, const view::View& view, int width,
                              int height, const view::Quality& quality = view::kLowQuality) {
     view::Renderer renderer(quality);
-    view::Canvas canvas(width, height);
-    renderer.draw(drawing, view, {0, 0, width, height}, canvas.framebuffer());
-    return canvas.read();
+    view::OffscreenFramebuffer offscreen(width, height);
+    renderer.draw(drawing, view, {0, 0, width, height}, offscreen.framebuffer());
+    return offscreen.read();
   }
 
  private:

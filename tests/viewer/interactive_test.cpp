@@ -1,9 +1,9 @@
-/// The window as a user has it: keys, another size, the end; events come from SDL's queue.
+/// The interactive program: keys, sizes of the window, its end, and files that can't be written.
 #include <jfpx/recording.hpp>
 
 #include "src/scenes/scenes.hpp"
-#include "src/viewer/demo_show.hpp"
-#include "src/viewer/scene_show.hpp"
+#include "src/viewer/demo_viewer.hpp"
+#include "src/viewer/scene_viewer.hpp"
 #include "tests/viewer/window_fixture.hpp"
 
 #include <fstream>
@@ -18,12 +18,11 @@ int pauses = 0;
 
 }  // namespace
 
-// SDL's offscreen driver minimises nothing: this is linked instead of SDL's own.
+// These replace functions of SDL, whose offscreen driver can't minimise a window or wait for the
+// screen.
 extern "C" Uint32 SDL_GetWindowFlags(SDL_Window*) {
   return minimised ? SDL_WINDOW_MINIMIZED : SDL_WINDOW_SHOWN;
 }
-
-// Likewise, for a driver that can't wait for the screen, or can.
 extern "C" int SDL_GL_SetSwapInterval(int) { return interval_is_refused ? -1 : 0; }
 extern "C" void SDL_Delay(Uint32) { ++pauses; }
 
@@ -34,23 +33,25 @@ using namespace view;
 namespace fs = std::filesystem;
 
 constexpr Size kSize{160, 120};
+constexpr std::uint64_t kUnlimited = 1'000'000;
 
 class Interactive : public test::WindowTest {
  protected:
-  static ViewOptions options(std::uint64_t frames) {
+  static ViewOptions options(std::uint64_t frames, const std::string& screenshot = "") {
     ViewOptions options;
     options.run.scene = "pile";
     options.run.spheres = 20;
     options.frames = frames;
     options.size = kSize;
     options.quality = kLowQuality;
+    options.screenshot = screenshot;
     return options;
   }
   void TearDown() override {
     minimised = interval_is_refused = false;
     WindowTest::TearDown();
   }
-  /// Keys that are down and up again before the first picture.
+  /// Presses and releases keys before the next picture.
   static void press(std::initializer_list<SDL_Keycode> keys) {
     for (const SDL_Keycode code : keys) {
       for (const bool down : {true, false}) test::push_key(code, down);
@@ -71,36 +72,18 @@ TEST_F(Interactive, KeysTakePicturesFilmsAndRecordings) {
   EXPECT_EQ(folder.entries(), 3u);
 }
 
-TEST_F(Interactive, AWindowClosesAfterAsManyStepsAsWereWanted) {
+TEST_F(Interactive, AWindowClosesAfterTheGivenNumberOfSteps) {
   App app(options(5));
   EXPECT_TRUE(app.frame(3.5 / 60));
   EXPECT_FALSE(app.frame(7.5 / 60));
-  EXPECT_EQ(app.show().steps(), 5u);
-}
-
-TEST_F(Interactive, F1ShowsTheHelp) {
-  const auto brightness_of_the_middle = [](std::initializer_list<SDL_Keycode> keys) {
-    start_events();
-    press(keys);
-    ViewOptions wish = options(30);
-    wish.screenshot = "picture.png";
-    EXPECT_EQ(run_interactive(wish), 0);
-    const Image image = read_png("picture.png");
-    int sum = 0;
-    for (int x = 40; x < 120; ++x) sum += image.at(x, 60)[1];
-    return sum;
-  };
-  const int panel_away = brightness_of_the_middle({SDLK_F2});
-  EXPECT_LT(brightness_of_the_middle({SDLK_F2, SDLK_F1}), panel_away * 2 / 3);
+  EXPECT_EQ(app.viewer().steps(), 5u);
 }
 
 TEST_F(Interactive, AWindowThatIsClosedStillWritesItsLastPicture) {
   SDL_Event quit{};
   quit.type = SDL_QUIT;
   SDL_PushEvent(&quit);
-  ViewOptions wish = options(1'000'000);
-  wish.screenshot = "last.png";
-  EXPECT_EQ(run_interactive(wish), 0);
+  EXPECT_EQ(run_interactive(options(kUnlimited, "last.png")), 0);
   EXPECT_EQ(read_png("last.png").width, kSize.width);
 }
 
@@ -113,28 +96,46 @@ TEST_F(Interactive, AWindowOfAnotherSizeHasPicturesOfThatSize) {
   };
   bool done = false;
   SDL_AddEventWatch(resize, &done);
-  ViewOptions wish = options(3);
-  wish.screenshot = "resized.png";
-  EXPECT_EQ(run_interactive(wish), 0);
+  EXPECT_EQ(run_interactive(options(3, "resized.png")), 0);
   ASSERT_TRUE(done);
   EXPECT_EQ(read_png("resized.png").width, 200);
   EXPECT_EQ(read_png("resized.png").height, 90);
+  start_events();
+  ViewOptions full = options(2, "full.png");
+  full.fullscreen = true;
+  EXPECT_EQ(run_interactive(full), 0);
+  EXPECT_GT(read_png("full.png").width, kSize.width);
+}
+
+TEST_F(Interactive, HomeShowsEverythingInAWindowOfAnotherShape) {
+  ViewOptions square = options(kUnlimited);
+  square.size = {160, 160};
+  App app(square);
+  app.viewer().paused = true;
+  app.frame(0);
+  const Real before = app.viewer().camera.distance();
+  SDL_SetWindowSize(app.window().sdl(), 40, 160);
+  app.frame(0);
+  ASSERT_EQ(app.window().pixel_width(), 40);
+  press({SDLK_h});
+  app.frame(0);
+  EXPECT_GT(app.viewer().camera.distance(), before * 2);
 }
 
 TEST_F(Interactive, AWindowThatStartsPausedMakesNoStep) {
-  ViewOptions wish = options(1'000'000);
-  wish.paused = true;
-  App app(wish);
+  ViewOptions paused = options(kUnlimited);
+  paused.paused = true;
+  App app(paused);
   app.frame(1);
-  EXPECT_EQ(app.show().steps(), 0u);
+  EXPECT_EQ(app.viewer().steps(), 0u);
   press({SDLK_SPACE});
   app.frame(1);
-  EXPECT_GT(app.show().steps(), 0u);
-  wish.headless = true;
-  EXPECT_THROW(check(wish), InvalidArgument);
+  EXPECT_GT(app.viewer().steps(), 0u);
+  paused.headless = true;
+  EXPECT_THROW(check(paused), InvalidArgument);
 }
 
-TEST_F(Interactive, AFileThatIsDroppedOnTheWindowIsShown) {
+TEST_F(Interactive, AFileDroppedOnTheWindowIsOpened) {
   save_scene(scenes::make("gas", {.spheres = 3}), "three.json");
   std::ofstream("broken.json") << "{";
   const auto drop = [](const char* path) {
@@ -143,14 +144,14 @@ TEST_F(Interactive, AFileThatIsDroppedOnTheWindowIsShown) {
     event.drop.file = SDL_strdup(path);
     SDL_PushEvent(&event);
   };
-  App app(options(1'000'000));
+  App app(options(kUnlimited));
   const auto bodies = [&app] {
-    return dynamic_cast<const SceneShow&>(app.show()).player().scene().bodies.size();
+    return dynamic_cast<const SceneViewer&>(app.viewer()).player().scene().bodies.size();
   };
   for (int i = 0; i < 3; ++i) app.frame(kRecordedFrame);
   press({SDLK_F9});
   app.frame(0);
-  const std::size_t own = bodies();
+  const std::size_t before = bodies();
   drop("three.json");
   app.frame(0);
   const std::size_t three = bodies();
@@ -162,23 +163,8 @@ TEST_F(Interactive, AFileThatIsDroppedOnTheWindowIsShown) {
   }
   drop("jfpx-view-1.rec");
   app.frame(0);
-  EXPECT_EQ(bodies(), own);
+  EXPECT_EQ(bodies(), before);
   EXPECT_EQ(app.finish(), 0);
-}
-
-TEST_F(Interactive, EverythingIsShownAgainInAWindowOfAnotherShape) {
-  ViewOptions wish = options(1'000'000);
-  wish.size = {160, 160};
-  App app(wish);
-  app.show().paused = true;
-  app.frame(0);
-  const Real before = app.show().camera.distance();
-  SDL_SetWindowSize(app.window().sdl(), 40, 160);
-  app.frame(0);
-  ASSERT_EQ(app.window().pixel_width(), 40);
-  press({SDLK_h});
-  app.frame(0);
-  EXPECT_GT(app.show().camera.distance(), before * 2);
 }
 
 int buffers_made = 0;
@@ -190,10 +176,10 @@ void counted_storage(GLenum target, GLsizei samples, GLenum format, GLsizei widt
 
 TEST_F(Interactive, PicturesSideBySideShareTheirBuffers) {
   if (!has_engine(EngineKind::bullet)) GTEST_SKIP() << "built without Bullet";
-  ViewOptions wish = options(1'000'000);
-  wish.side_by_side = true;
-  wish.size = {161, 120};  // no multiple of 3
-  App app(wish);
+  ViewOptions three = options(kUnlimited);
+  three.side_by_side = true;
+  three.size = {161, 120};  // not a multiple of 3
+  App app(three);
   app.frame(0);
   make_storage = std::exchange(epoxy_glRenderbufferStorageMultisample, counted_storage);
   app.frame(0);
@@ -204,22 +190,20 @@ TEST_F(Interactive, PicturesSideBySideShareTheirBuffers) {
   epoxy_glRenderbufferStorageMultisample = make_storage;
 }
 
-TEST_F(Interactive, WithoutAScreenToWaitForPicturesPause) {
+TEST_F(Interactive, PicturesPauseIfTheDriverCannotWaitForTheScreen) {
   interval_is_refused = true;
-  App app(options(1'000'000));
+  App app(options(kUnlimited));
   app.frame(0);
   const int before = pauses;
   app.frame(0);
   EXPECT_GT(pauses, before);
 }
 
-TEST_F(Interactive, AWindowThatIsMinimisedStillHasPictures) {
+TEST_F(Interactive, AMinimisedWindowStillHasPictures) {
   const auto take = [](const char* name, bool unseen) {
     start_events();
-    ViewOptions wish = options(1'000'000);
-    wish.screenshot = std::string(name) + ".png";
-    App app(wish);
-    app.show().paused = true;
+    App app(options(kUnlimited, std::string(name) + ".png"));
+    app.viewer().paused = true;
     for (int i = 0; i < 2; ++i) EXPECT_TRUE(app.frame(0));  // panels learn their size
     minimised = unseen;
     press({SDLK_F10});
@@ -233,57 +217,46 @@ TEST_F(Interactive, AWindowThatIsMinimisedStillHasPictures) {
   take("unseen", true);
   EXPECT_EQ(read_png("unseen.png").rgb, read_png("seen.png").rgb);
   EXPECT_EQ(read_png("jfpx-view-frames-2/frame-000001.png").width, kSize.width);
-}
-
-TEST_F(Interactive, AWindowThatIsMinimisedFromTheStartHasAPictureToo) {
-  minimised = true;
-  ViewOptions wish = options(2);
-  wish.screenshot = "unseen.png";
-  EXPECT_EQ(run_interactive(wish), 0);
-  EXPECT_EQ(read_png("unseen.png").width, kSize.width);
-  wish.screenshot = "missing/unseen.png";
+  minimised = true;  // from the start
   start_events();
-  EXPECT_THROW(run_interactive(wish), FileError);
+  EXPECT_EQ(run_interactive(options(2, "start.png")), 0);
+  EXPECT_EQ(read_png("start.png").width, kSize.width);
 }
 
-TEST_F(Interactive, TheCameraOfADemoFollowsWhileNobodyMovesIt) {
-  ViewOptions wish = options(1'000'000);
-  wish.run = {};
-  wish.run.scene = "flight";
-  App app(wish);
+TEST_F(Interactive, TheCameraOfADemoFollowsUntilTheUserMovesIt) {
+  ViewOptions flight = options(kUnlimited);
+  flight.run = {};
+  flight.run.scene = "flight";
+  App app(flight);
+  Camera& camera = app.viewer().camera;
+  const Vec3 start = camera.eye();
   for (int i = 0; i < 200; ++i) app.frame(kRecordedFrame);
-  app.show().paused = true;
+  EXPECT_GT(length(camera.eye() - start), 5);
+  app.viewer().paused = true;
   app.frame(0);
   demos::View shown;
-  dynamic_cast<const DemoShow&>(app.show()).demo().draw(&shown);
-  EXPECT_GT(app.show().steps(), 100u);
-  EXPECT_LT(length(app.show().camera.eye() - shown.camera.eye), 1e-3);
+  dynamic_cast<const DemoViewer&>(app.viewer()).demo().draw(&shown);
+  EXPECT_LT(length(camera.eye() - shown.camera.eye), 1e-3);
+  app.viewer().paused = false;
+  camera.move(1, 0, 0);
+  const Vec3 moved = camera.eye();
+  for (int i = 0; i < 10; ++i) app.frame(kRecordedFrame);
+  EXPECT_EQ(camera.eye(), moved);
 }
 
-TEST_F(Interactive, FullScreenFillsTheScreen) {
-  ViewOptions wish = options(2);
-  wish.fullscreen = true;
-  wish.screenshot = "full.png";
-  EXPECT_EQ(run_interactive(wish), 0);
-  EXPECT_GT(read_png("full.png").width, kSize.width);
-}
-
-TEST_F(Interactive, WhatCannotBeWrittenIsToldAndTheWindowStays) {
+TEST_F(Interactive, FailuresOfCommandsAreReportedAndThoseOfOptionsAreErrors) {
   fs::remove_all(fs::current_path());
   press({SDLK_F12, SDLK_F10, SDLK_F9});
   EXPECT_EQ(run_interactive(options(3)), 0);
   start_events();
-  ViewOptions wish = options(3);
-  wish.screenshot = "last.png";  // asked for on the command line: an error
-  EXPECT_THROW(run_interactive(wish), FileError);
+  EXPECT_THROW(run_interactive(options(3, "last.png")), FileError);
 }
 
-TEST_F(Interactive, WhatCannotBeWrittenAtTheEndLeavesTheRestWhole) {
+TEST_F(Interactive, AFailedScreenshotLeavesTheRecordingComplete) {
   fs::create_directory("pictures");
-  ViewOptions wish = options(3);
-  wish.screenshot = "pictures/last.png";
-  wish.recording = "run.rec";
-  App app(wish);
+  ViewOptions both = options(3, "pictures/last.png");
+  both.recording = "run.rec";
+  App app(both);
   fs::remove("pictures");
   while (app.frame(kRecordedFrame)) {
   }
@@ -291,20 +264,20 @@ TEST_F(Interactive, WhatCannotBeWrittenAtTheEndLeavesTheRestWhole) {
   EXPECT_EQ(RecordingReader("run.rec").steps(), 3u);
 }
 
-TEST_F(Interactive, AFilmOfTheCommandLineMustBeWrittenAndOneOfAKeyIsTold) {
-  ViewOptions wish = options(1'000'000);
-  wish.record = "film";
+TEST_F(Interactive, AFilmFailsTheRunOnlyIfTheCommandLineRequestedIt) {
+  ViewOptions film = options(kUnlimited);
+  film.record = "film";
   {
-    App app(wish);
+    App app(film);
     EXPECT_TRUE(app.frame(0));
-    press({SDLK_F10, SDLK_F10});  // no more, and another one
+    press({SDLK_F10, SDLK_F10});  // ends it and starts another one
     EXPECT_TRUE(app.frame(0));
     fs::remove_all("jfpx-view-frames-1");
     EXPECT_TRUE(app.frame(0));
     EXPECT_EQ(app.finish(), 0);
   }
   start_events();
-  App app(wish);
+  App app(film);
   fs::remove_all("film");
   EXPECT_FALSE(app.frame(0));
   EXPECT_THROW(app.finish(), FileError);

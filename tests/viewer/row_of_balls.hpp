@@ -1,4 +1,4 @@
-/// A scene whose contacts and places in the picture are plain to see.
+/// A scene with known contacts and positions in the picture.
 #pragma once
 
 #include "src/viewer/options.hpp"
@@ -10,11 +10,11 @@ inline namespace JFPX_ABI {
 namespace test {
 
 inline constexpr view::Size kRowSize{800, 640};
-/// Fast: what counts is where things are.
+/// A fast quality for tests of positions.
 inline constexpr view::Quality kSketch{.samples = 1, .shadow_size = 0, .occlusion_samples = 0};
 
-/// Four balls in a row, each touching its neighbours, to the right of the panel. @param path of the
-/// scene file that is written
+/// Four balls in a row that touch their neighbours, to the right of the panel.
+/// @param path of the scene file, which is written
 inline view::ViewOptions row_of_balls(const std::string& path) {
   Scene scene;
   for (int i = 0; i < 4; ++i) {

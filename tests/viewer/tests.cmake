@@ -1,19 +1,27 @@
-jfpx_add_test(controls_test SOURCES viewer/controls_test.cpp LINK jfpx_viewer)
-jfpx_add_test(demo_show_test SOURCES viewer/demo_show_test.cpp LINK jfpx_viewer)
-jfpx_add_test(interactive_test SOURCES viewer/interactive_test.cpp LINK jfpx_viewer)
-jfpx_add_test(panel_test SOURCES viewer/panel_test.cpp viewer/dense_screen_test.cpp viewer/user.cpp LINK jfpx_viewer)
-jfpx_add_test(renderer_test SOURCES viewer/renderer_test.cpp LINK jfpx_viewer)
+jfpx_add_test(controls_test SINGLE SOURCES
+  viewer/controls_test.cpp
+  viewer/player_test.cpp
+  viewer/scene_painter_test.cpp
+  LINK jfpx_viewer)
+jfpx_add_test(demo_viewer_test SINGLE SOURCES viewer/demo_viewer_test.cpp LINK jfpx_viewer)
+jfpx_add_test(interactive_test SINGLE SOURCES viewer/interactive_test.cpp LINK jfpx_viewer)
+jfpx_add_test(panel_test SINGLE SOURCES
+  viewer/panel_test.cpp
+  viewer/dense_screen_test.cpp
+  viewer/user.cpp
+  LINK jfpx_viewer)
+jfpx_add_test(renderer_test SINGLE SOURCES viewer/renderer_test.cpp LINK jfpx_viewer)
 foreach(suffix IN ITEMS "" "_f64")
-  target_compile_definitions(demo_show_test${suffix} PRIVATE
+  target_compile_definitions(demo_viewer_test${suffix} PRIVATE
     JFPX_INPUT_FOLDER="${PROJECT_SOURCE_DIR}/src/demos/inputs")
   target_compile_definitions(renderer_test${suffix} PRIVATE
     JFPX_REFERENCE_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/viewer/reference")
 endforeach()
 
-# What the viewer shows is what the tool says.
+# Compares the output of the viewer with that of the tool.
 if(JFPX_TOOL)
   jfpx_add_test(view_test SOURCES viewer/view_test.cpp LINK jfpx_viewer)
-  # Loaded into the program, whichever precision: a device that is reset.
+  # Loaded into the program in either precision: simulates the reset of a device.
   add_library(lost_context MODULE viewer/lost_context.cpp)
   target_link_libraries(lost_context PRIVATE jfpx_build_flags jfpx_viewer3rd)
   foreach(suffix IN ITEMS "" "_f64")

@@ -1,4 +1,4 @@
-/// Where a US keyboard has its keys: the letters, and those without, before SDL has a video driver.
+/// Scancodes of the keys of a US keyboard, also before SDL has initialized a video driver.
 #pragma once
 
 #include <jfpx/config.hpp>

@@ -1,4 +1,4 @@
-/// A user of the window.
+/// Simulated user of the window.
 #include "tests/viewer/user.hpp"
 
 #include "tests/viewer/window_fixture.hpp"
@@ -20,8 +20,8 @@ double screen_density = 1;
 
 }  // namespace
 
-// SDL's offscreen driver has no mouse, and its units are pixels: these are linked instead of SDL's
-// own. On a dense screen a window has more pixels than units.
+// These replace functions of SDL, whose offscreen driver has no mouse and uses pixels as units. On
+// a dense screen a window has more pixels than units.
 extern "C" SDL_Window* SDL_GetMouseFocus() { return mouse.window; }
 extern "C" Uint32 SDL_GetMouseState(int* x, int* y) {
   if (x != nullptr) *x = mouse.x;
@@ -42,8 +42,8 @@ namespace test {
 User::User(view::ViewOptions options, double density)
     : app_(on_screen(std::move(options), density)) {
   mouse = {app_.window().sdl()};
-  view::widget::tell(&log_);
-  for (int i = 0; i < 3; ++i) frame();  // panels learn their size from the first ones
+  view::widget::set_log(&log_);
+  for (int i = 0; i < 3; ++i) frame();  // Dear ImGui sizes panels in the first frames
 }
 
 User::~User() {
@@ -93,7 +93,7 @@ void User::drag_in(const std::string& label, double from, double to) {
 void User::choose(const std::string& list, const std::string& entry) {
   const auto before = log_.widgets;
   click(list);
-  frame();  // the list learns its size from its first one
+  frame();  // Dear ImGui sizes the list in its first frame
   const auto is_new = [&before](const auto& widget) { return !before.contains(widget.first); };
   for (int i = 0; i < 20 && !sees(entry); ++i) {
     const auto seen = std::find_if(log_.widgets.begin(), log_.widgets.end(), is_new);
@@ -157,7 +157,7 @@ void User::press(bool down) {
   event.button.y = mouse.y;
   SDL_PushEvent(&event);
   frame();
-  if (!down) frame();  // what the panel asked for shows in the next picture
+  if (!down) frame();  // shows the effect of the click
 }
 
 }  // namespace test

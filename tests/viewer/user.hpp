@@ -1,4 +1,4 @@
-/// A user of the window, who reads its panel and clicks what is there.
+/// Simulated user of the window, for tests of the panel.
 #pragma once
 
 #include "src/viewer/interactive.hpp"
@@ -12,41 +12,40 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// Knows of the panel what it says and where its widgets are drawn; all else goes through SDL's
-/// events.
+/// Reads the log of the panel and operates its widgets by SDL events at their positions.
 class User {
  public:
-  /// @param density pixels of a unit of the window; the options' size is in units
+  /// @param density pixels per unit of the window; the size in the options is in units
   /// @throws as view::App
   explicit User(view::ViewOptions options, double density = 1);
   ~User();
   User(const User&) = delete;
   User& operator=(const User&) = delete;
 
-  view::Show& show() { return app_.show(); }
+  view::Viewer& viewer() { return app_.viewer(); }
   view::Window& window() { return app_.window(); }
 
   int finish() { return app_.finish(); }  ///< as view::App
 
-  /// One picture, `seconds` after the last. @return false if it was the last one
+  /// Draws one picture, `seconds` after the previous one. @return false if it was the last one
   bool frame(double seconds = 0);
   const view::PanelLog& panel() const { return log_; }
   bool sees(const std::string& label) const { return log_.widgets.contains(label); }
-  /// What a widget shows, or "" if there is no such widget.
+  /// The displayed value of a widget, or "" if there is no such widget.
   std::string value(const std::string& label) const;
-  /// Whether some text of the panel has that in it.
+  /// True if a text of the panel contains `part`.
   bool reads(std::string_view part) const;
   const std::vector<std::string>& texts() const { return log_.texts; }
 
-  // Of a widget that is not there: std::runtime_error.
+  // These throw std::runtime_error if the widget does not exist.
   void click(const std::string& label) { drag_in(label, 0.5, 0.5); }
-  /// Presses at one share of the widget's width, from the left, and lets go at another.
+  /// Drags the mouse between two positions in the widget, as fractions of its width from the left.
   void drag_in(const std::string& label, double from, double to);
-  /// Opens a list and clicks one of its entries, which may have to be scrolled to.
+  /// Opens a list, scrolls to one of its entries and clicks it.
   void choose(const std::string& list, const std::string& entry);
   /// Replaces the text of a field.
   void type(const std::string& field, const std::string& text);
-  // In the window's units:
+  // In units of the window:
   void click_at(Real x, Real y);
   void drag(Real from_x, Real from_y, Real to_x, Real to_y);
 
@@ -55,7 +54,7 @@ class User {
   void move_to(float x, float y);
   void press(bool down);
 
-  /// Makes the screen as dense as that, and the size one in pixels.
+  /// Sets the density of the screen and converts the size to pixels.
   static view::ViewOptions on_screen(view::ViewOptions options, double density);
 
   view::PanelLog log_;

@@ -1,4 +1,4 @@
-/// The program jfpx-view as a user meets it: pictures, exit statuses, errors.
+/// The program jfpx-view: pictures, exit statuses and errors.
 #include "src/viewer/image.hpp"
 #include "src/viewer/window.hpp"
 #include "tests/support/process.hpp"
@@ -16,23 +16,23 @@ namespace jfpx {
 namespace {
 
 using ::testing::HasSubstr;
-using ::testing::MatchesRegex;
 
+constexpr const char* kOwnPrecision = sizeof(Real) == 4 ? "float" : "double";
 constexpr const char* kOtherPrecision = sizeof(Real) == 4 ? "double" : "float";
 
-/// The program with these arguments; stderr is part of the output.
+/// Runs the program; its output includes stderr.
 test::ProcessResult jfpx_view(const std::string& arguments, const std::string& environment = "") {
   return test::run_process(environment + " " JFPX_VIEW_PATH " " + arguments + " 2>&1");
 }
 
-/// One sentence, and nothing else, tells what is wrong.
+/// Expects the status and a single message.
 void expect_fails(const test::ProcessResult& result, int status, const std::string& message) {
   EXPECT_EQ(result.status, status) << result.output;
   EXPECT_THAT(result.output, HasSubstr(message));
   EXPECT_THAT(result.output, ::testing::StartsWith("jfpx-view: "));
 }
 
-/// Brightest minus darkest green.
+/// Range of the green values.
 int contrast(const view::Image& image) {
   int low = 255, high = 0;
   for (std::size_t i = 1; i < image.rgb.size(); i += 3) {
@@ -58,17 +58,6 @@ class Pictures : public ::testing::Test {
     EXPECT_EQ(result.status, 0) << result.output;
     return view::read_png(path);
   }
-
-  /// A run that gets a SIGTERM when its second picture is there. Its status is the last line.
-  test::ProcessResult terminated(const std::string& arguments, const std::string& environment) {
-    const std::string film = folder.file("film");
-    return test::run_process(environment +
-                             " " JFPX_VIEW_PATH
-                             " pile --spheres 400 --size 160x120 --quality low --record " +
-                             film + " " + arguments + " 2>&1 & until [ -e " + film +
-                             "/frame-000002.png ] || ! kill -0 $!; do sleep 0.05; done; "
-                             "kill -TERM $!; wait $!; echo status $?");
-  }
 };
 
 TEST_F(Pictures, OfEveryNamedSceneAreNotBlank) {
@@ -81,23 +70,17 @@ TEST_F(Pictures, OfEveryNamedSceneAreNotBlank) {
   }
 }
 
-TEST_F(Pictures, AreTheSameEveryTimeAndChangeWithTime) {
-  const auto first = take("pile --spheres 60 --frames 30");
-  EXPECT_EQ(first.rgb, take("pile --spheres 60 --frames 30").rgb);
-  EXPECT_NE(first.rgb, take("pile --spheres 60 --frames 10").rgb);
-}
-
-TEST_F(Pictures, ComeInBothPrecisions) {
-  const auto image =
-      take(std::string("pile --spheres 30 --frames 5 --precision ") + kOtherPrecision);
-  EXPECT_GT(contrast(image), 80);
-}
-
-TEST_F(Pictures, ThePanelHasAPlaceInThem) {
-  const auto without = take("pile --spheres 30 --frames 5");
-  const auto with = take("pile --spheres 30 --frames 5 --panel");
-  EXPECT_NE(with.rgb, without.rgb);
-  EXPECT_LT(with.at(20, 60)[0], 90) << "the panel is dark";
+TEST_F(Pictures, DependOnTimeAndOptionsOnly) {
+  const std::string scene = "pile --spheres 60 --frames 60";
+  const auto plain = take(scene);
+  EXPECT_EQ(plain.rgb, take(scene).rgb);
+  EXPECT_NE(plain.rgb, take("pile --spheres 60 --frames 10").rgb);
+  for (const char* option :
+       {" --colours islands", " --colours speed", " --colours sleep", " --colours penetration",
+        " --colours contacts", " --forces", " --contacts"}) {
+    EXPECT_NE(take(scene + option).rgb, plain.rgb) << option;
+  }
+  EXPECT_LT(take(scene + " --panel").at(20, 60)[0], 90) << "the panel is dark";
 }
 
 TEST_F(Pictures, SideBySideFindsNoDifference) {
@@ -110,7 +93,7 @@ TEST_F(Pictures, SideBySideFindsNoDifference) {
   EXPECT_THAT(result.output, HasSubstr("0 different contacts"));
   EXPECT_THAT(result.output, HasSubstr("worlds identical"));
   EXPECT_THAT(result.output, HasSubstr(" 0 mismatches"));
-  // Below the titles Bullet's two pictures are the same, and the native one is another.
+  // Below the titles the two pictures of Bullet are equal, and the native one differs.
   const auto image = view::read_png(folder.file("three.png"));
   int same = 0, other = 0;
   for (int y = 50; y < 100; ++y) {
@@ -123,169 +106,30 @@ TEST_F(Pictures, SideBySideFindsNoDifference) {
   EXPECT_LT(other, 50 * 96);
 }
 
-TEST_F(Pictures, AreRecordedWithNumbers) {
-  const auto result =
-      jfpx_view("gas --spheres 8 --frames 3 --headless --size 64x48 --quality low --record " +
-                folder.file("film") + " --screenshot " + folder.file("last.png"));
-  EXPECT_EQ(result.status, 0) << result.output;
-  for (const char* name :
-       {"film/frame-000001.png", "film/frame-000002.png", "film/frame-000003.png"}) {
-    EXPECT_TRUE(std::filesystem::exists(folder.file(name))) << name;
-  }
-  EXPECT_EQ(view::read_png(folder.file("last.png")).rgb,
-            view::read_png(folder.file("film/frame-000003.png")).rgb);
-}
-
-TEST_F(Pictures, ColoursAndArrowsShow) {
-  const auto plain = take("pile --spheres 60 --frames 60");
-  for (const char* what :
-       {"--colours islands", "--colours speed", "--colours sleep", "--colours penetration",
-        "--colours contacts", "--forces", "--contacts"}) {
-    EXPECT_NE(take(std::string("pile --spheres 60 --frames 60 ") + what).rgb, plain.rgb) << what;
+TEST_F(Pictures, ARunEndsNormallyWhenItIsTerminated) {
+  for (const std::string kind : {"--headless --frames 100000000", ""}) {
+    const std::string film = folder.file(kind.empty() ? "window" : "headless");
+    // Sends SIGTERM when the second picture exists; the last line is the status of the program.
+    const auto result = test::run_process(
+        "SDL_VIDEODRIVER=offscreen " JFPX_VIEW_PATH
+        " pile --spheres 400 --size 160x120 --quality low --screenshot " +
+        film + ".png --record " + film + " " + kind + " 2>&1 & until [ -e " + film +
+        "/frame-000002.png ] || ! kill -0 $!; do sleep 0.05; done; "
+        "kill -TERM $!; wait $!; echo status $?");
+    EXPECT_THAT(result.output, HasSubstr("status 0"));
+    EXPECT_THAT(result.output, HasSubstr("rendering on"));
+    EXPECT_THAT(result.output, HasSubstr("engine native"));
+    EXPECT_GT(contrast(view::read_png(film + ".png")), 80);
   }
 }
 
-TEST_F(Pictures, AWindowThatIsClosedInTheMiddleEndsWell) {
-  const auto result = terminated("", "SDL_VIDEODRIVER=offscreen");
-  EXPECT_THAT(result.output, HasSubstr("status 0"));  // the program's own
-  EXPECT_THAT(result.output, HasSubstr("rendering on"));
-  EXPECT_THAT(result.output, HasSubstr("engine native"));
-}
-
-TEST_F(Pictures, ARunWithoutAWindowEndsWellWhenItIsTerminated) {
-  const std::string path = folder.file("last.png");
-  const auto result = terminated("--headless --frames 100000000 --screenshot " + path, "");
-  EXPECT_THAT(result.output, HasSubstr("status 0"));
-  EXPECT_THAT(result.output, HasSubstr("rendering on"));
-  EXPECT_GT(contrast(view::read_png(path)), 80);
-}
-
-TEST_F(Pictures, AWindowRunsAndClosesAtItsLastFrame) {
-  const auto result =
-      jfpx_view("pile --spheres 20 --frames 10 --size 160x120 --quality low --screenshot " +
-                    folder.file("last.png"),
-                "SDL_VIDEODRIVER=offscreen");
-  EXPECT_EQ(result.status, 0) << result.output;
-  EXPECT_THAT(result.output, HasSubstr("rendering on"));
-  EXPECT_GT(contrast(view::read_png(folder.file("last.png"))), 80);
-}
-
-TEST(View, RunsWithoutRenderingForTiming) {
-  const auto result = jfpx_view("pile --spheres 20 --frames 10 --no-render", "env -u DISPLAY");
-  EXPECT_EQ(result.status, 0) << result.output;
-  EXPECT_THAT(result.output, HasSubstr("10 steps"));
-  EXPECT_THAT(result.output, HasSubstr("rendering off"));
-}
-
-TEST(View, StatesAreRecordedAndPlayedBack) {
-  const test::TemporaryFolder folder;
-  const std::string path = folder.file("gas.rec");
-  const auto recorded = jfpx_view("gas --spheres 9 --frames 7 --no-render --recording " + path);
-  EXPECT_EQ(recorded.status, 0) << recorded.output;
-  const auto played = jfpx_view(path + " --frames 70 --no-render");
-  EXPECT_EQ(played.status, 0) << played.output;
-  EXPECT_THAT(played.output, HasSubstr("step 7,"));
-  EXPECT_THAT(played.output, HasSubstr("7 steps,"));
-  const std::string again = folder.file("again.rec");
-  EXPECT_EQ(jfpx_view(path + " --frames 70 --no-render --recording " + again).status, 0);
-  const auto replayed = test::run_process(JFPX_TOOL_PATH " replay " + again + " 2>&1");
-  EXPECT_EQ(replayed.status, 0) << replayed.output;
-  for (const char* change :
-       {" --spheres 5", " --boxes 1", " --dt 0.01", " --seed 2", " --no-sleep", " --engine bullet",
-        " --backend x86", " --threads 3", " --side-by-side"}) {
-    expect_fails(jfpx_view(path + change + " --no-render"), 2, "is a recording");
-  }
-  std::ofstream(path, std::ios::app) << "more";
-  expect_fails(jfpx_view(path + " --no-render"), 2, path);
-  expect_fails(jfpx_view("flight --frames 2 --no-render --recording " + path), 2,
-               "can be recorded");
-}
-
-TEST(View, ARecordingIsPlayedInThePrecisionInWhichItWasMade) {
-  const test::TemporaryFolder folder;
-  const std::string path = folder.file("gas.rec");
-  const auto recorded =
-      jfpx_view(std::string("gas --spheres 9 --frames 7 --no-render --precision ") +
-                kOtherPrecision + " --recording " + path);
-  ASSERT_EQ(recorded.status, 0) << recorded.output;
-  const auto played = jfpx_view(path + " --no-render");
-  EXPECT_EQ(played.status, 0) << played.output;
-  EXPECT_THAT(played.output, HasSubstr("step 7,"));
-  const std::string own = sizeof(Real) == 4 ? "float" : "double";
-  expect_fails(jfpx_view(path + " --no-render --precision " + own), 2, kOtherPrecision);
-}
-
-TEST(View, TellsTheHashThatTheToolTells) {
-  for (const std::string engine : {"native", "bullet"}) {
-    if (!JFPX_HAS_BULLET && engine == "bullet") continue;
-    const std::string run = " pile --spheres 40 --engine " + engine;
-    const auto ran = test::run_process(JFPX_TOOL_PATH " run" + run + " --steps 30 --hash --quiet");
-    ASSERT_EQ(ran.status, 0) << ran.output;
-    EXPECT_THAT(jfpx_view(run + " --frames 30 --no-render").output,
-                HasSubstr("hash " + ran.output.substr(0, 16)));
-  }
-}
-
-TEST(View, BulletsPartsAreChosenByName) {
-  if (!JFPX_HAS_BULLET) GTEST_SKIP() << "built without Bullet";
-  for (const char* parts : {"--solver stock", "--world stock", "--solver stock --world stock"}) {
-    const auto result =
-        jfpx_view(std::string("pile --engine bullet --spheres 30 --frames 9 --no-render ") + parts);
-    EXPECT_EQ(result.status, 0) << result.output;
-  }
-  EXPECT_EQ(jfpx_view("pile --no-render --solver mine").status, 2);
-}
-
-TEST(View, BadUsageIsStatusTwo) {
-  expect_fails(jfpx_view("plie --headless"), 2, "there is no scene called \"plie\"");
-  expect_fails(jfpx_view("missing.json --headless"), 2, "missing.json: can't be opened");
-  expect_fails(jfpx_view("pile --headless --spheres 4 --eye 1,2,3"), 2, "--target");
-  expect_fails(jfpx_view("pile --headless --eye 1,2,3 --target 1,2,3"), 2, "same point");
-  expect_fails(jfpx_view("pile --no-render --screenshot a.png"), 2, "--no-render");
-  expect_fails(jfpx_view("flight --no-render --no-sleep"), 2, "--no-sleep goes with a scene");
-  expect_fails(jfpx_view("flight --no-render --colours speed"), 2, "--colours goes with a scene");
-  expect_fails(jfpx_view("--side-by-side pile --no-render --engine bullet"), 2, "all engines");
-  for (const char* size : {"0x0", "15x100", "100x9000", "100", "x", "1e3x100", "-5x100"}) {
-    EXPECT_EQ(jfpx_view(std::string("pile --headless --size ") + size).status, 2) << size;
-  }
-  EXPECT_EQ(jfpx_view("pile --headless --eye 1,2 --target 0,0,0").status, 2);
-  EXPECT_EQ(jfpx_view("pile --headless --eye nan,2,3 --target 0,0,0").status, 2);
-  EXPECT_EQ(jfpx_view("pile --headless --colours mood").status, 2);
-  EXPECT_EQ(jfpx_view("pile --headless --frames -1").status, 2);
-}
-
-TEST(View, ABrokenSceneFileIsNamed) {
-  const test::TemporaryFolder folder;
-  const std::string path = folder.file("broken.json");
-  std::ofstream(path) << "{\"jfpx_scene\": 1, \"bodies\": [";
-  expect_fails(jfpx_view(path + " --headless"), 2, path);
-}
-
-TEST(View, NoDisplayIsStatusThree) {
-  expect_fails(
-      jfpx_view("pile --spheres 2", "env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=x11"), 3,
-      "display");
-  // A driver without OpenGL.
-  expect_fails(jfpx_view("pile --spheres 2 --headless", "SDL_VIDEODRIVER=dummy"), 3, "OpenGL");
-}
-
-TEST_F(Pictures, AnOldOpenGlIsStatusThree) {
-  {
-    const view::Window window = view::Window::hidden();
-    const std::string driver = reinterpret_cast<const char*>(glGetString(GL_VERSION));
-    if (driver.find("Mesa") == std::string::npos) GTEST_SKIP() << driver << " can't pretend";
-  }
-  expect_fails(jfpx_view("pile --spheres 2 --headless", "MESA_GL_VERSION_OVERRIDE=3.2"), 3,
-               "OpenGL 3.3");
-}
-
-TEST_F(Pictures, ALostContextIsOneSentenceStatusThreeAndWhatWasWrittenIsWhole) {
+TEST_F(Pictures, ALostContextIsStatusThreeAndLeavesCompletePictures) {
   {
     const auto window = view::Window::hidden();
-    if (!window.tells_of_resets()) GTEST_SKIP() << window.driver() << " can't tell";
+    if (!window.reports_resets()) GTEST_SKIP() << window.driver() << " can't report resets";
   }
-  // The device is asked after a picture was drawn, and again after it was read; in a window, where
-  // drawing needs not be over before, after it was read and after it was shown.
+  // The status is queried after drawing a picture and after reading it; in a window, where drawing
+  // may be asynchronous, after reading and after presenting it.
   for (const std::string kind : {"--headless", ""}) {
     for (const int healthy : {0, 1, 2, 3, 5}) {
       const std::string folder_name = folder.file("film" + kind + std::to_string(healthy));
@@ -309,6 +153,18 @@ TEST_F(Pictures, ALostContextIsOneSentenceStatusThreeAndWhatWasWrittenIsWhole) {
   EXPECT_FALSE(std::filesystem::exists(folder.file("last.png")));
 }
 
+TEST_F(Pictures, AnUnsupportedOpenGlIsStatusThree) {
+  // A video driver without OpenGL.
+  expect_fails(jfpx_view("pile --spheres 2 --headless", "SDL_VIDEODRIVER=dummy"), 3, "OpenGL");
+  {
+    const view::Window window = view::Window::hidden();
+    const std::string driver = reinterpret_cast<const char*>(glGetString(GL_VERSION));
+    if (driver.find("Mesa") == std::string::npos) GTEST_SKIP() << driver << " has no override";
+  }
+  expect_fails(jfpx_view("pile --spheres 2 --headless", "MESA_GL_VERSION_OVERRIDE=3.2"), 3,
+               "OpenGL 3.3");
+}
+
 TEST_F(Pictures, AFileThatCannotBeWrittenIsNamedAndNothingIsLeft) {
   expect_fails(jfpx_view("pile --spheres 2 --headless --frames 1 --size 32x32 --screenshot " +
                          folder.file("no/such/folder.png")),
@@ -316,11 +172,93 @@ TEST_F(Pictures, AFileThatCannotBeWrittenIsNamedAndNothingIsLeft) {
   EXPECT_EQ(folder.entries(), 0u);
 }
 
+TEST(View, RunsWithoutRenderingForTiming) {
+  const auto result = jfpx_view("pile --spheres 20 --frames 10 --no-render", "env -u DISPLAY");
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("10 steps"));
+  EXPECT_THAT(result.output, HasSubstr("rendering off"));
+}
+
+TEST(View, StatesAreRecordedAndPlayedBack) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("gas.rec");
+  const auto recorded = jfpx_view("gas --spheres 9 --frames 7 --no-render --recording " + path);
+  EXPECT_EQ(recorded.status, 0) << recorded.output;
+  const std::string again = folder.file("again.rec");
+  const auto played = jfpx_view(path + " --frames 70 --no-render --recording " + again);
+  EXPECT_EQ(played.status, 0) << played.output;
+  EXPECT_THAT(played.output, HasSubstr("step 7,"));
+  EXPECT_THAT(played.output, HasSubstr("7 steps,"));
+  const auto replayed = test::run_process(JFPX_TOOL_PATH " replay " + again + " 2>&1");
+  EXPECT_EQ(replayed.status, 0) << replayed.output;
+  for (const char* change :
+       {" --spheres 5", " --boxes 1", " --dt 0.01", " --seed 2", " --no-sleep", " --engine bullet",
+        " --backend x86", " --threads 3", " --side-by-side"}) {
+    expect_fails(jfpx_view(path + change + " --no-render"), 2, "is a recording");
+  }
+  std::ofstream(path, std::ios::app) << "more";
+  expect_fails(jfpx_view(path + " --no-render"), 2, path);
+  expect_fails(jfpx_view("flight --frames 2 --no-render --recording " + path), 2,
+               "can be recorded");
+}
+
+TEST(View, ARecordingIsPlayedInThePrecisionInWhichItWasMade) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("gas.rec");
+  const auto recorded =
+      jfpx_view(std::string("gas --spheres 9 --frames 7 --no-render --precision ") +
+                kOtherPrecision + " --recording " + path);
+  ASSERT_EQ(recorded.status, 0) << recorded.output;
+  const auto played = jfpx_view(path + " --no-render");
+  EXPECT_EQ(played.status, 0) << played.output;
+  EXPECT_THAT(played.output, HasSubstr("step 7,"));
+  expect_fails(jfpx_view(path + " --no-render --precision " + kOwnPrecision), 2, kOtherPrecision);
+}
+
+TEST(View, PrintsTheSameHashAsTheTool) {
+  for (const std::string parts :
+       {"native", "bullet", "bullet --solver stock", "bullet --world stock"}) {
+    if (!JFPX_HAS_BULLET && parts != "native") continue;
+    const std::string run = " pile --spheres 40 --engine " + parts;
+    const auto ran = test::run_process(JFPX_TOOL_PATH " run" + run + " --steps 30 --hash --quiet");
+    ASSERT_EQ(ran.status, 0) << ran.output;
+    EXPECT_THAT(jfpx_view(run + " --frames 30 --no-render").output,
+                HasSubstr("hash " + ran.output.substr(0, 16)));
+  }
+}
+
+TEST(View, BadUsageIsStatusTwo) {
+  expect_fails(jfpx_view("plie --headless"), 2, "there is no scene called \"plie\"");
+  expect_fails(jfpx_view("missing.json --headless"), 2, "missing.json: can't be opened");
+  expect_fails(jfpx_view("pile --headless --spheres 4 --eye 1,2,3"), 2, "--target");
+  expect_fails(jfpx_view("pile --headless --eye 1,2,3 --target 1,2,3"), 2, "same point");
+  expect_fails(jfpx_view("pile --no-render --screenshot a.png"), 2, "--no-render");
+  expect_fails(jfpx_view("flight --no-render --no-sleep"), 2, "--no-sleep requires a scene");
+  expect_fails(jfpx_view("flight --no-render --colours speed"), 2, "--colours requires a scene");
+  expect_fails(jfpx_view("--side-by-side pile --no-render --engine bullet"), 2, "all engines");
+  for (const char* bad :
+       {"--size 0x0", "--size 15x100", "--size 100x9000", "--size 100", "--size x",
+        "--size 1e3x100", "--size -5x100", "--eye 1,2 --target 0,0,0",
+        "--eye nan,2,3 --target 0,0,0", "--colours mood", "--frames -1", "--solver mine"}) {
+    EXPECT_EQ(jfpx_view(std::string("pile --headless ") + bad).status, 2) << bad;
+  }
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("broken.json");
+  std::ofstream(path) << "{\"jfpx_scene\": 1, \"bodies\": [";
+  expect_fails(jfpx_view(path + " --headless"), 2, path);
+}
+
+TEST(View, NoDisplayIsStatusThree) {
+  expect_fails(
+      jfpx_view("pile --spheres 2", "env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=x11"), 3,
+      "display");
+}
+
 TEST(View, HelpNamesTheOptionsAndExitStatuses) {
   const auto help = jfpx_view("--help");
   EXPECT_EQ(help.status, 0);
   for (const char* word : {"recording (.rec)", "--headless", "--screenshot", "--side-by-side",
-                           "--engine", "Exit status"}) {
+                           "--engine", "--precision", "Exit status"}) {
     EXPECT_THAT(help.output, HasSubstr(word));
   }
   EXPECT_EQ(jfpx_view("--version").output, "jfpx-view " JFPX_VERSION "\n");

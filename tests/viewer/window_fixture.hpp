@@ -1,4 +1,4 @@
-/// Windows without a display, in a folder of their own.
+/// Base of tests that open windows, without a display and in a temporary folder.
 #pragma once
 
 #include <jfpx/error.hpp>
@@ -17,8 +17,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// Tests that open windows derive from this; they are skipped, with the reason, where OpenGL is
-/// missing. What the viewer writes goes to the folder.
+/// Base of tests that open windows. They are skipped with the reason if OpenGL is not available.
+/// The temporary folder is the current folder.
 class WindowTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -33,7 +33,7 @@ class WindowTest : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::current_path(before_); }
 
-  /// Lets events be pushed before there is a window.
+  /// Allows events to be pushed before a window exists.
   static void start_events() {
     SDL_SetMainReady();
     ASSERT_EQ(SDL_Init(SDL_INIT_EVENTS), 0) << SDL_GetError();

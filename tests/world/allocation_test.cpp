@@ -1,4 +1,4 @@
-/// Warm steps allocate nothing. A program of its own, because it replaces operator new.
+/// Tests that warm steps allocate nothing. A separate program, because it replaces operator new.
 #include <jfpx/particle.hpp>
 
 #include "src/scenes/scenes.hpp"
@@ -38,7 +38,7 @@ void operator delete(void* memory, std::size_t) noexcept { release(memory); }
 namespace jfpx {
 namespace {
 
-/// `automatic` takes memory when it first tries another way.
+/// `automatic` allocates when it first tries another algorithm or device.
 const WorldSettings kFixed{.collider = {.backend = Backend::cpu}};
 
 TEST(Allocation, StepsOverTheSameContactsAllocateNothing) {
@@ -125,7 +125,7 @@ TEST(Allocation, NeitherCarryingNorEventsAllocateInWarmSteps) {
   EXPECT_GT(begun, 0u);
 }
 
-// The original keeps six sub_shapes of memory for each contact of each step, for ever.
+// The original leaks six blocks of memory for each contact of each step.
 TEST(Erratum, E31_contacts_keep_no_memory) {
   const long before = alive;
   {

@@ -1,4 +1,4 @@
-/// Bodies: ids, free motion, forces, sleep.
+/// Tests of the body store: ids, free motion, forces, sleep.
 #include "src/world/body_store.hpp"
 
 #include "src/base/power.hpp"
@@ -17,7 +17,7 @@ constexpr Real kDt = 0.01_r;
 
 BodyStore make_store(const SleepSettings& sleep = {}) { return BodyStore(kDt, sleep); }
 
-TEST(BodyStore, AnIdNeverComesBackThoughItsIndexDoes) {
+TEST(BodyStore, AnIdIsNeverReusedThoughItsIndexIs) {
   BodyStore store = make_store();
   const BodyId a = store.add(test::ball({0, 0, 0}));
   const BodyId b = store.add(test::ball({1, 0, 0}));
@@ -144,7 +144,7 @@ TEST(Erratum, E29_a_weak_force_wakes_a_body_for_long_enough_to_move_it) {
   EXPECT_NEAR(store.moving.velocity[i].x, 5, 1e-4);
 }
 
-TEST(Erratum, E30_a_body_that_nobody_configured_moves_and_is_awake) {
+TEST(Erratum, E30_a_default_body_moves_and_is_awake) {
   BodyStore store = make_store();
   BodyDef def;
   def.velocity = {1, 0, 0};
@@ -193,7 +193,7 @@ TEST(Sleep, AFastPastIsForgottenInBoundedTime) {
   EXPECT_EQ(steps, 77);
 }
 
-TEST(Sleep, IsNotForThoseWhoMayNot) {
+TEST(Sleep, RespectsCanSleepAndTheSettings) {
   BodyStore off = make_store({.enabled = false, .epsilon = 0.3_r, .bias = 0.05_r});
   BodyDef def = test::ball({});
   def.can_sleep = true;

@@ -1,4 +1,4 @@
-/// Worlds with movable boxes: falling, standing, sliding, spinning, hitting.
+/// Tests of worlds with movable boxes: falling, standing, sliding, spinning, colliding.
 #include <jfpx/collide.hpp>
 
 #include "tests/world/support.hpp"
@@ -149,7 +149,7 @@ TEST(Boxes, StayOnASlopeBelowTheAngleOfFriction) {
     for (int n = 0; n < 600; ++n) world.step();
     EXPECT_EQ(world.states(), resting);
 
-    // Kept awake, it creeps: the loops serve corners that close, and let the others open.
+    // An awake box creeps: the loops correct corners that approach, and let the others separate.
     World awake = on_a_slope(steepness, false);
     for (int n = 0; n < 60; ++n) awake.step();
     const Vec3 then = awake.states()[0].position;
@@ -164,7 +164,7 @@ TEST(Boxes, SpinningOnTheGroundAreStoppedByFriction) {
   Scene scene = on_the_ground({def});
   scene.dt = 0.001_r;
   World world(scene);
-  // The corners are sqrt(1/2) from the middle: mu m g sqrt(1/2) against I = m/6.
+  // The corners are sqrt(1/2) from the centre: mu m g sqrt(1/2) against I = m/6.
   const double slowing = 0.5 * kG * std::sqrt(0.5) * 6;
   for (int n = 0; n < 120; ++n) world.step();
   EXPECT_NEAR(world.states()[0].angular_velocity.y, 5 - slowing * 0.12, 0.1);
@@ -199,8 +199,8 @@ TEST(Erratum, E23_a_box_has_the_inertia_of_a_solid_box) {
 }
 
 TEST(FreeSpin, ASymmetricTopPrecessesAboutItsAngularMomentum) {
-  // Moments about x and y are 2.5 times the one about z. The axis goes round with L / I_x; in
-  // these units that is the length of (0.5, 0, 3 / 2.5) = 1.3 rad/s.
+  // Moments about x and y are 2.5 times the one about z. The axis precesses with L / I_x; in these
+  // units that is the length of (0.5, 0, 3 / 2.5) = 1.3 rad/s.
   BodyDef def = floating(box_at({0, 0, 0}, {0.5_r, 0.5_r, 1}));
   def.angular_velocity = {0.5_r, 0, 3};
   Scene scene;
@@ -212,7 +212,7 @@ TEST(FreeSpin, ASymmetricTopPrecessesAboutItsAngularMomentum) {
   const auto half_round = static_cast<int>(std::lround(round / 0.0005 / 2));
   const auto axis = [&world] { return to_matrix(world.states()[0].orientation).column(2); };
   for (int n = 0; n < half_round; ++n) world.step();
-  // Opposite on the cone: twice the angle between axis and momentum away.
+  // The opposite side of the cone: at twice the angle between axis and momentum.
   const double between = 2 * std::atan2(0.5, 1.2);
   EXPECT_NEAR(std::acos(static_cast<double>(axis().z)), between, 0.01);
   for (int n = 0; n < half_round; ++n) world.step();
@@ -239,7 +239,7 @@ TEST(FreeSpin, AboutTheMiddleAxisTumblesWithoutGainingEnergy) {
     lowest = std::min(lowest, to_matrix(world.states()[0].orientation)(1, 1));
     ASSERT_LE(box_sums(world).energy, energy * (1 + 1e-4));
   }
-  EXPECT_LT(lowest, -0.9_r);  // upside down on its way
+  EXPECT_LT(lowest, -0.9_r);  // the box was upside down in between
   EXPECT_GT(box_sums(world).energy, 0.9 * energy);
 }
 
@@ -253,7 +253,7 @@ TEST(FreeSpin, ACubeSpinsAsABallDoes) {
   EXPECT_EQ(world.states()[0].angular_velocity, (Vec3{1, 2, 3}));
 }
 
-/// Boxes and balls in a heap, all in motion towards the middle.
+/// Boxes and balls in a heap, all moving towards the centre.
 Scene cloud(Random* random, int count) {
   Scene scene;
   for (int i = 0; i < count; ++i) {
@@ -273,13 +273,13 @@ Scene cloud(Random* random, int count) {
 TEST(Boxes, HittingEachOtherKeepTheMomentaAndGainNoEnergy) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
-  // Rough or bouncing, not both: restitution of the normal velocity (Newton's) with friction can
-  // gain energy when a push along the normal makes a corner slide (Kane and Levinson 1985).
+  // Either friction or restitution, not both: Newton's restitution of the normal velocity can gain
+  // energy with friction, when a normal impulse makes a corner slide (Kane and Levinson 1985).
   for (const bool rough : {true, false}) {
     Random random(seed);
     Scene scene = cloud(&random, 40);
     for (BodyDef& def : scene.bodies) (rough ? def.restitution : def.friction) = 0;
-    scene.resolver.position_epsilon = 100;  // projections turn boxes without momentum
+    scene.resolver.position_epsilon = 100;  // projections rotate boxes without momentum
     scene.dt = 0.001_r;
     World world(scene);
     const test::Sums before = box_sums(world);
@@ -320,12 +320,13 @@ TEST(Boxes, AllTouchingPairsAreFoundInOrder) {
   };
   const auto sphere = [&](std::uint32_t i) { return std::get_if<Sphere>(&scene.bodies[i].shape); };
   const auto box = [&](std::uint32_t i) { return std::get_if<Box>(&scene.bodies[i].shape); };
+  const auto id = [&](std::uint32_t i) { return world.bodies()[i]; };
   const auto touch = [&](std::uint32_t a, std::uint32_t b, const Touch& t) {
-    if (t.touching) expected.push_back({a, b, t.normal, t.point, t.distance});
+    if (t.touching) expected.push_back({id(a), id(b), t.normal, t.point, t.distance});
   };
   const auto touches = [&](std::uint32_t a, std::uint32_t b, const Manifold& m) {
     for (int k = 0; k < m.count; ++k) {
-      expected.push_back({a, b, m.normal, m.points[k].point, m.points[k].distance});
+      expected.push_back({id(a), id(b), m.normal, m.points[k].point, m.points[k].distance});
     }
   };
   const auto count = static_cast<std::uint32_t>(scene.bodies.size());
@@ -347,8 +348,8 @@ TEST(Boxes, AllTouchingPairsAreFoundInOrder) {
     }
   }
   std::vector<Contact> found(world.contacts().begin(), world.contacts().end());
-  std::erase_if(found, [&](const Contact& c) { return sphere(c.a) && sphere(c.b); });
-  for (Contact& c : found) c.friction = c.restitution = 0;  // not of the pair tests
+  std::erase_if(found, [&](const Contact& c) { return sphere(c.a.index) && sphere(c.b.index); });
+  for (Contact& c : found) c.friction = c.restitution = 0;  // the pair tests do not set them
   EXPECT_GT(found.size(), 50u);
   EXPECT_EQ(found, expected);
 }

@@ -1,12 +1,12 @@
-/// The tree of bounding spheres against all pairs, and worlds that use it against those that don't.
-#include <jfpx/broad_phase.hpp>
+/// Tests of the tree of bounding spheres against all pairs, and of worlds with each broad phase.
 #include <jfpx/error.hpp>
 
 #include "src/collide/bounding_sphere.hpp"
 #include "src/collide/sphere_pair.hpp"
 #include "src/world/contact_finder.hpp"
+#include "src/world/sphere_hierarchy.hpp"
 #include "tests/collide/contact_oracle.hpp"
-#include "tests/world/shape_zoo.hpp"
+#include "tests/world/random_bodies.hpp"
 
 #include <gtest/gtest.h>
 
@@ -36,7 +36,8 @@ std::vector<SpherePair> all_touching(const Spheres& spheres) {
   return pairs;
 }
 
-/// Spheres of one of many kinds: even, over decades, in a line, on one place, far out, tiny.
+/// Spheres of one of several kinds: of similar size, over decades of sizes, in a line, coincident,
+/// far from the origin, tiny.
 SphereInstance random_sphere(Random* random, std::uint64_t kind) {
   const Vec3 p = random->uniform_in_box({-1, -1, -1}, {1, 1, 1});
   const Real r = random->uniform(0.01_r, 0.2_r);
@@ -71,8 +72,8 @@ TEST(SphereHierarchy, FindsAllPairsThroughInsertionsMovesAndRemovals) {
     SphereHierarchy tree(round % 4 == 0 ? 0 : 0.3_r);
     Spheres spheres;
     for (int n = 0; n < 300; ++n) {
-      const std::uint64_t what = random.below(n < 150 ? 4 : 8);
-      if (what < 3 || spheres.empty()) {
+      const std::uint64_t action = random.below(n < 150 ? 4 : 8);
+      if (action < 3 || spheres.empty()) {
         const SphereInstance sphere = random_sphere(&random, kind);
         const SphereHierarchy::Leaf leaf = tree.insert(sphere);
         ASSERT_TRUE(spheres.emplace(leaf, sphere).second);
@@ -80,12 +81,12 @@ TEST(SphereHierarchy, FindsAllPairsThroughInsertionsMovesAndRemovals) {
       }
       const auto chosen =
           std::next(spheres.begin(), static_cast<std::ptrdiff_t>(random.below(spheres.size())));
-      if (what < 5) {
+      if (action < 5) {
         tree.remove(chosen->first);
         spheres.erase(chosen);
       } else {
         const SphereInstance other = random_sphere(&random, kind);
-        if (what < 7) {
+        if (action < 7) {
           chosen->second.centre += (other.centre - chosen->second.centre) * 0.01_r;
         } else {
           chosen->second = other;
@@ -109,7 +110,7 @@ TEST(SphereHierarchy, FindsAllPairsThroughInsertionsMovesAndRemovals) {
   }
 }
 
-TEST(SphereHierarchy, OfAnySizeIsBuiltAtOnceOrOneByOne) {
+TEST(SphereHierarchy, FindsAllPairsBuiltAsAWholeOrOneByOne) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
@@ -132,7 +133,7 @@ TEST(SphereHierarchy, OfAnySizeIsBuiltAtOnceOrOneByOne) {
   }
 }
 
-TEST(SphereHierarchy, StaysShallowWhenSpheresComeInALineOrOnOnePlace) {
+TEST(SphereHierarchy, StaysShallowForSpheresInALineOrAtOnePoint) {
   SphereHierarchy line, place;
   for (int i = 0; i < 20000; ++i) line.insert({{static_cast<Real>(3 * i), 0, 0}, 1});
   for (int i = 0; i < 5000; ++i) place.insert({{7, 7, 7}, 1});
@@ -151,7 +152,7 @@ TEST(SphereHierarchy, FollowsSmallMovesWithoutChange) {
   EXPECT_EQ(pairs.size(), 1u);
 }
 
-TEST(SphereHierarchy, RefusesWhatItCannotHold) {
+TEST(SphereHierarchy, RefusesInvalidSpheres) {
   SphereHierarchy tree;
   const auto leaf = tree.insert({{0, 0, 0}, 1});
   for (const SphereInstance& bad :
@@ -184,9 +185,9 @@ TEST(SphereHierarchy, NumbersTooLargeToSquareLoseNoPair) {
 }
 
 TEST(Erratum, E32_a_hierarchy_lives_grows_and_loses_its_leaves) {
-  // Ours is made of values; the original's crashed at the first use and freed one child twice.
+  // The original crashed at the first use and freed one child twice.
   EXPECT_EQ(detail::growth({{0, 0, 0}, 2}, {{1, 0, 0}, 0.5_r}), 0);  // inside
-  // Around 1 at 0 and 1 at 4: radius 3, grown by 9 - 1.
+  // A sphere around radius 1 at 0 and radius 1 at 4 has radius 3; the growth is 9 - 1.
   EXPECT_NEAR(detail::growth({{0, 0, 0}, 1}, {{4, 0, 0}, 1}), 8, 600 * double{kEpsilon});
   SphereHierarchy tree;
   std::vector<SphereHierarchy::Leaf> leaves;
@@ -247,8 +248,8 @@ TEST(BroadPhase, AllWaysFindTheSameContactsThroughInsertionsAndRemovals) {
   EXPECT_GT(contacts, 10000u);
 }
 
-/// The squares of their edges are 0 in float.
-TEST(BroadPhase, BoxesMayBeAsSmallAsNumbersGo) {
+/// The squares of the edges are 0 in float.
+TEST(BroadPhase, BoxesMayBeAsSmallAsRealAllows) {
   for (const BroadPhase way : {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {
     for (const Real half :
          {Real(1e-15), Real(1e-22), Real(1e-30), std::numeric_limits<Real>::min()}) {
@@ -264,7 +265,7 @@ TEST(BroadPhase, BoxesMayBeAsSmallAsNumbersGo) {
   }
 }
 
-TEST(BroadPhase, WorldsRunTheSameWhicheverIsChosen) {
+TEST(BroadPhase, WorldsHaveTheSameBitsWithEveryBroadPhase) {
   Random random(5);
   Scene scene;
   for (int i = 0; i < 150; ++i) {

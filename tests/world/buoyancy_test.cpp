@@ -1,4 +1,4 @@
-/// What floats: boxes and compounds; spheres are in force_test.cpp.
+/// Tests of the buoyancy of boxes and compounds; force_test.cpp tests spheres.
 #include "src/world/submerged.hpp"
 #include "tests/world/force_support.hpp"
 
@@ -13,8 +13,8 @@ using test::operator""_r;
 using test::expect_near;
 using test::world_of;
 
-/// Volume of the box [0, size] with n . p <= d, for n > 0: a corner tetrahedron with what sticks
-/// out of the box taken off, and what that takes off twice put back.
+/// Volume of the box [0, size] with n . p <= d, for n > 0, by inclusion and exclusion: a corner
+/// tetrahedron minus the tetrahedra outside the box, plus their intersections.
 double cut_volume(const std::array<double, 3>& size, const std::array<double, 3>& n, double d) {
   double sum = 0;
   for (int corner = 0; corner < 8; ++corner) {
@@ -37,8 +37,8 @@ TEST(Submerged, PartsOfBoxesHaveTheVolumeOfTheFormula) {
     const Box box{random.uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {2, 2, 2})};
     const Vec3 direction = random.uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {1, 1, 1});
     const Vec3 normal = normalized(direction);
-    const Real reach = dot(normal, box.half_extents);
-    const Real offset = random.uniform(-1.2_r, 1.2_r) * reach;
+    const Real half_extent = dot(normal, box.half_extents);
+    const Real offset = random.uniform(-1.2_r, 1.2_r) * half_extent;
     detail::Submerged below;
     detail::add_submerged(box, {}, {normal, offset}, &below);
     std::array<double, 3> size{}, n{};
@@ -48,14 +48,14 @@ TEST(Submerged, PartsOfBoxesHaveTheVolumeOfTheFormula) {
       n[k] = normal[k];
       total *= size[k];
     }
-    const double expected = cut_volume(size, n, static_cast<double>(offset + reach));
+    const double expected = cut_volume(size, n, static_cast<double>(offset + half_extent));
     // The formula divides small differences by the product of the normal's components.
     const double noise = 50 * static_cast<double>(kEpsilon) + 1e-11;
     ASSERT_NEAR(below.volume, expected, noise * total);
   }
 }
 
-TEST(Submerged, WhatIsBelowAndAboveIsTheWholeBox) {
+TEST(Submerged, TheVolumesBelowAndAboveAddUpToTheBox) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
@@ -78,7 +78,7 @@ TEST(Submerged, WhatIsBelowAndAboveIsTheWholeBox) {
   }
 }
 
-TEST(Submerged, TheMiddleIsThatOfManyPoints) {
+TEST(Submerged, TheCentroidAgreesWithSampling) {
   const Box box{{1, 0.5_r, 2}};
   const Transform pose = make_transform(normalized(Quat{2, 0.3_r, -0.5_r, 0.7_r}), {1, 2, 3});
   const HalfSpace liquid{normalized(Vec3{0.2_r, 1, 0.1_r}), 2.3_r};
@@ -121,7 +121,7 @@ TEST(BuoyancyForce, ABoxIsLiftedByTheLiquidItDisplaces) {
   }
 }
 
-TEST(BuoyancyForce, AnCompoundOfTwoHalvesFloatsAsTheWhole) {
+TEST(BuoyancyForce, ACompoundOfTwoHalvesFloatsAsTheWhole) {
   BodyDef whole = plank({1, 0.25_r, 0.5_r}, 400), halves = whole;
   Compound compound;
   for (const Real side : {-0.5_r, 0.5_r}) {
@@ -134,7 +134,7 @@ TEST(BuoyancyForce, AnCompoundOfTwoHalvesFloatsAsTheWhole) {
   for (World* world : {&one, &two}) world->add_force(Buoyancy{.density = 1000, .gravity = 10});
   one.step();
   two.step();
-  // The ball is below the surface to a half and more, and counts beside the halves.
+  // More than half of the ball is below the surface, and it counts in addition to the halves.
   const Real difference =
       two.last_acceleration(two.bodies()[0]).y - one.last_acceleration(one.bodies()[0]).y;
   EXPECT_NEAR(difference, 4.0 / 3 * 3.14159265 * 0.001 / 2 * 1e4 / 400, 1e-4);
@@ -142,8 +142,8 @@ TEST(BuoyancyForce, AnCompoundOfTwoHalvesFloatsAsTheWhole) {
 }
 
 TEST(BuoyancyForce, ATiltedPlankRightsItselfAndATallOneFallsOver) {
-  // Half as heavy as water. Flat: metacentre at width^2 / (12 draught) over the middle of what is
-  // displaced: 16 / (12 * 0.2) - 0.1 > 0. On end, 0.16 / (12 * 2) - 1 < 0.
+  // Half the density of water. Flat: the metacentre is width^2 / (12 draught) above the centre of
+  // buoyancy: 16 / (12 * 0.2) - 0.1 > 0. On end, 0.16 / (12 * 2) - 1 < 0.
   for (const bool flat : {true, false}) {
     BodyDef def = flat ? plank({2, 0.2_r, 1}, 500) : plank({0.2_r, 2, 1}, 500);
     def.orientation = normalized(Quat{1, 0, 0, 0.1_r});  // by 11 degrees

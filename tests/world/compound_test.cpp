@@ -1,4 +1,4 @@
-/// Bodies of several parts, and planes: mass, contacts, motion.
+/// Tests of compounds and planes: mass, contacts, motion.
 #include "src/scene/compound.hpp"
 
 #include <jfpx/error.hpp>
@@ -7,7 +7,7 @@
 #include "src/scene/principal_inertia.hpp"
 #include "src/world/contact_finder.hpp"
 #include "tests/collide/contact_oracle.hpp"
-#include "tests/world/shape_zoo.hpp"
+#include "tests/world/random_bodies.hpp"
 
 #include <gtest/gtest.h>
 
@@ -24,8 +24,8 @@ constexpr double kEps = static_cast<double>(kEpsilon);
 CompoundPart sphere_part(const Vec3& position, Real radius) {
   return {.shape = Sphere{radius}, .position = position};
 }
-CompoundPart box_part(const Vec3& position, const Vec3& half_extents, const Quat& turn = {}) {
-  return {.shape = Box{half_extents}, .position = position, .orientation = turn};
+CompoundPart box_part(const Vec3& position, const Vec3& half_extents, const Quat& rotation = {}) {
+  return {.shape = Box{half_extents}, .position = position, .orientation = rotation};
 }
 BodyDef body_of(Compound compound, const Vec3& position, Real mass = 1) {
   BodyDef def;
@@ -37,7 +37,7 @@ BodyDef body_of(Compound compound, const Vec3& position, Real mass = 1) {
 }
 /// Two balls of radius 1/2 whose centres are 2 apart, along z.
 Compound dumbbell() { return {{sphere_part({0, 0, -1}, 0.5_r), sphere_part({0, 0, 1}, 0.5_r)}}; }
-/// An angle of two bars: 3 x 1 and 1 x 2, lying against each other.
+/// An L of two adjacent bars: 3 x 1 and 1 x 2.
 Compound angle_iron() {
   return centred(
       {{box_part({0, 0, 0}, {1.5_r, 0.5_r, 0.5_r}), box_part({-1, 1.5_r, 0}, {0.5_r, 1, 0.5_r})}});
@@ -81,14 +81,14 @@ TEST(Compound, ABoxCutInAnyDirectionKeepsItsInertia) {
   Random random(seed);
   for (int n = 0; n < 1000; ++n) {
     const Vec3 h = random.uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {2, 2, 2});
-    const Quat turn = test::random_turn(&random);
-    const Real cut = random.uniform(-0.9_r, 0.9_r) * h.x;  // the plane x = cut parts the box
+    const Quat rotation = test::random_rotation(&random);
+    const Real cut = random.uniform(-0.9_r, 0.9_r) * h.x;  // the plane x = cut divides the box
     const Vec3 low{(h.x + cut) / 2, h.y, h.z}, high{(h.x - cut) / 2, h.y, h.z};
-    const Compound halves{{box_part(rotate(turn, {(cut - h.x) / 2, 0, 0}), low, turn),
-                           box_part(rotate(turn, {(cut + h.x) / 2, 0, 0}), high, turn)}};
+    const Compound halves{{box_part(rotate(rotation, {(cut - h.x) / 2, 0, 0}), low, rotation),
+                           box_part(rotate(rotation, {(cut + h.x) / 2, 0, 0}), high, rotation)}};
     const MassProperties found = mass_properties(halves, 2);
     const Mat3 expected =
-        detail::in_world_axes(diagonal(detail::moments_of_inertia(Box{h}, 2)), to_matrix(turn));
+        detail::in_world_axes(diagonal(detail::moments_of_inertia(Box{h}, 2)), to_matrix(rotation));
     ASSERT_LE(length(found.centre), 16 * kEpsilon);
     const PrincipalInertia principal = principal_inertia(found.inertia);
     const Mat3 again = detail::in_world_axes(diagonal(principal.moments), principal.axes);
@@ -112,7 +112,7 @@ TEST(PrincipalInertia, OfADiagonalTensorLeavesTheAxes) {
 }
 
 TEST(Compound, SpinsFreelyAsTheBoxThatItsPartsMakeUp) {
-  // Body axes turned against the box, so that the tensor has all six numbers.
+  // Body axes rotated relative to the box, so that all six entries of the tensor are nonzero.
   const Quat inside = normalized(Quat{1, 0.3_r, -0.4_r, 0.7_r});
   const Vec3 h{0.3_r, 0.6_r, 1};
   BodyDef whole = test::ball({});
@@ -168,8 +168,8 @@ TEST(Compound, PartsOfOneBodyNeverTouchEachOther) {
   EXPECT_EQ(world.step().contacts, 0u);
 }
 
-TEST(Compound, ContactsOfTwoBodiesComeTogether) {
-  // Two dumbbells side by side: both balls touch, and one ball touches a third body in between.
+TEST(Compound, ContactsOfTwoBodiesAreConsecutive) {
+  // Two dumbbells side by side: both balls touch, and one ball also touches a third body.
   Scene scene;
   scene.bodies = {body_of(dumbbell(), {0, 0, 0}), body_of(dumbbell(), {0.9_r, 0, 0}),
                   body_of({{sphere_part({}, 0.5_r)}}, {0, 0.9_r, 1})};
@@ -177,7 +177,7 @@ TEST(Compound, ContactsOfTwoBodiesComeTogether) {
   World world(scene);
   EXPECT_EQ(world.step().sphere_contacts, 3u);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-  for (const Contact& c : world.contacts()) pairs.emplace_back(c.a, c.b);
+  for (const Contact& c : world.contacts()) pairs.emplace_back(c.a.index, c.b.index);
   EXPECT_EQ(pairs, (decltype(pairs){{0, 1}, {0, 1}, {0, 2}}));
 }
 
@@ -194,7 +194,7 @@ TEST(Compound, FallsAsABallDoes) {
 TEST(Compound, ADumbbellThatFellOnOneEndComesToRestOnBoth) {
   BodyDef def = body_of(dumbbell(), {0, 3, 0});
   def.orientation = normalized(Quat{1, 0.4_r, 0, 0});
-  def.linear_damping = def.angular_damping = 0.7_r;  // else it would roll on
+  def.linear_damping = def.angular_damping = 0.7_r;  // otherwise it would keep rolling
   Scene scene;
   scene.bodies = {def, test::ground()};
   World world(scene);
@@ -212,17 +212,17 @@ TEST(Compound, AnAngleIronFallsAsleepFlatOnTheGround) {
   def.can_sleep = true;
   Scene scene;
   scene.bodies = {def, test::ground()};
-  scene.sleep.epsilon = 0.05_r;  // the usual 0.3 would catch it while it tips over
+  scene.sleep.epsilon = 0.05_r;  // at the default of 0.3 it would fall asleep while it tips over
   World world(scene);
   for (int n = 0; n < 900; ++n) world.step();
   EXPECT_FALSE(world.awake(world.bodies()[0]));
-  // On four corners at least, of one bar or of both ends of the angle, none of them deep.
+  // At least four corners touch, of one bar or of both ends of the L, none of them deep.
   EXPECT_GE(world.contacts().size(), 4u);
   for (const Contact& c : world.contacts()) EXPECT_GT(c.distance, -0.02);
 }
 
 TEST(Compound, ARollingDumbbellAcceleratesByItsInertia) {
-  // Two wheels on a heavy axle that does not reach the ground, down a slope whose sine is 0.2:
+  // Two wheels on a heavy axle that does not touch the ground, down a slope whose sine is 0.2:
   // a = g sin / (1 + I / (M r^2)).
   const double wheel = 4.0 / 3.0 * 3.14159265358979323846 * 0.125, axle = 8 * 0.01 * 10;
   const double per_mass = (2 * wheel * 0.4 * 0.25 + axle * 2.0 / 3.0 * 0.01) / (2 * wheel + axle);
@@ -238,7 +238,7 @@ TEST(Compound, ARollingDumbbellAcceleratesByItsInertia) {
   for (int n = 0; n < 120; ++n) world.step();
   const BodyState s = world.states()[0];
   EXPECT_NEAR(s.velocity.x, 2 * expected, 0.01 * 2 * expected);
-  // Rolls, does not slide; up to a centimetre deep, on what is left of its radius.
+  // Rolls without sliding; up to a centimetre deep, which reduces the effective radius.
   EXPECT_NEAR(-s.angular_velocity.z * 0.5_r, s.velocity.x, 0.1);
   EXPECT_NEAR(s.position.z, 0, 1e-3);
 }
@@ -296,7 +296,7 @@ TEST(Compound, RunsTheSameWithAnyNumberOfThreadsAndAlgorithm) {
   }
 }
 
-/// Kinetic and potential, in double.
+/// Kinetic and potential energy, in double.
 double energy(const World& world) {
   double sum = 0;
   const auto states = world.states();
@@ -313,7 +313,7 @@ double energy(const World& world) {
   return sum;
 }
 
-/// JFPX_LONG_STEPS makes it longer.
+/// JFPX_LONG_STEPS sets another number of steps.
 TEST(Compound, ALongRunStaysFiniteGainsNoEnergyAndStaysAboveTheGround) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
@@ -322,7 +322,7 @@ TEST(Compound, ALongRunStaysFiniteGainsNoEnergyAndStaysAboveTheGround) {
   for (int i = 0; i < 12; ++i) {
     const Vec3 place = random.uniform_in_box({-3, 4, -3}, {3, 12, 3});
     BodyDef def = body_of(test::random_compound(&random), place, random.uniform(1, 5));
-    def.orientation = test::random_turn(&random);
+    def.orientation = test::random_rotation(&random);
     def.can_sleep = i % 2 == 0;
     scene.bodies.push_back(def);
   }
@@ -363,7 +363,7 @@ TEST(PlaneBody, PushesAllPartsToTheSideOfTheCentreOfMass) {
   BodyDef wall;
   wall.shape = Plane{{0, 1, 0}, 0};
   wall.mass = 0;
-  // Upright, the centre 0.1 above: the lower ball is wholly below, and yet pushed up.
+  // Upright with the centre 0.1 above the plane: the lower ball is below, but is pushed up.
   BodyDef def = body_of(dumbbell(), {0, 0.1_r, 0});
   def.orientation = normalized(Quat{1, 1, 0, 0});
   def.acceleration = {};

@@ -1,6 +1,6 @@
-/// What may run at the same time: const functions of one world, and different worlds. Says most
-/// under the thread sanitizer.
-#include "tests/world/shape_zoo.hpp"
+/// Tests of concurrent use: const functions of one world, and different worlds. Most useful with
+/// the thread sanitizer.
+#include "tests/world/random_bodies.hpp"
 
 #include <thread>
 
@@ -9,7 +9,7 @@ inline namespace JFPX_ABI {
 namespace test {
 namespace {
 
-Scene crowd(std::uint64_t seed) {
+Scene dense_scene(std::uint64_t seed) {
   Random random(seed);
   Scene scene;
   for (int i = 0; i < 30; ++i) scene.bodies.push_back(random_body(&random, 2));
@@ -18,52 +18,52 @@ Scene crowd(std::uint64_t seed) {
   return scene;
 }
 
-/// All that a const World can be asked.
-struct Answers {
+/// Results of the const functions of a World.
+struct Results {
   std::uint64_t hash = 0;
   std::vector<BodyState> states;
   std::vector<RayHit> hits;
   std::vector<BodyId> touched;
   std::vector<Contact> contacts;
   std::size_t events = 0, awake = 0;
-  friend bool operator==(const Answers&, const Answers&) = default;
+  friend bool operator==(const Results&, const Results&) = default;
 };
-Answers ask(const World& world) {
-  Answers answers;
-  answers.hash = world.state_hash();
-  answers.states = world.states();
-  answers.hits = world.cast_ray_through({.origin = {-9, 0, 0}, .direction = {1, 0, 0}});
-  answers.touched = world.overlapping(Box{{1, 1, 1}}, {0, 0, 0});
-  answers.contacts.assign(world.contacts().begin(), world.contacts().end());
-  answers.events = world.contact_events().size();
-  for (const BodyId id : world.bodies()) answers.awake += world.awake(id) ? 1 : 0;
-  return answers;
+Results query(const World& world) {
+  Results results;
+  results.hash = world.state_hash();
+  results.states = world.states();
+  results.hits = world.cast_ray_through({.origin = {-9, 0, 0}, .direction = {1, 0, 0}});
+  results.touched = world.overlapping(Box{{1, 1, 1}}, {0, 0, 0});
+  results.contacts.assign(world.contacts().begin(), world.contacts().end());
+  results.events = world.contact_events().size();
+  for (const BodyId id : world.bodies()) results.awake += world.awake(id) ? 1 : 0;
+  return results;
 }
 
-TEST(Concurrency, ConstFunctionsOfAWorldRunBesideEachOther) {
+TEST(Concurrency, ConstFunctionsOfAWorldRunConcurrently) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
-  World world(crowd(seed));
+  World world(dense_scene(seed));
   for (int n = 0; n < 5; ++n) {
     world.step();
-    const Answers expected = ask(world);
-    std::vector<Answers> answers(4);
+    const Results expected = query(world);
+    std::vector<Results> results(4);
     {
       std::vector<std::jthread> threads;
-      for (Answers& mine : answers) {
+      for (Results& mine : results) {
         threads.emplace_back([&mine, &world] {
-          for (int i = 0; i < 20; ++i) mine = ask(world);
+          for (int i = 0; i < 20; ++i) mine = query(world);
         });
       }
     }
-    for (const Answers& theirs : answers) EXPECT_TRUE(theirs == expected) << n;
+    for (const Results& found : results) EXPECT_TRUE(found == expected) << n;
   }
 }
 
 TEST(Concurrency, WorldsInSeveralThreadsAreIndependent) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
-  const Scene scene = crowd(seed);
+  const Scene scene = dense_scene(seed);
   const auto run = [&scene] {
     World world(scene, {.collider = {.threads = 2}});
     for (int n = 0; n < 50; ++n) world.step();

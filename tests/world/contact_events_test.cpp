@@ -1,4 +1,4 @@
-/// Contact events: across beginnings, rests, sleep, removal, moves by hand and failed steps.
+/// Tests of contact events: begin and end, rest, sleep, removal, set_state() and failed steps.
 #include <jfpx/error.hpp>
 
 #include "tests/world/support.hpp"
@@ -15,7 +15,7 @@ namespace {
 using test::operator""_r;
 
 /// Phases and indices of a step's events, as "+0-1 =0-2 -1-2".
-std::string told(const World& world) {
+std::string to_string_of_events(const World& world) {
   std::string text;
   for (const ContactEvent& e : world.contact_events()) {
     if (!text.empty()) text += ' ';
@@ -26,7 +26,7 @@ std::string told(const World& world) {
 }
 std::string step(World* world) {
   world->step();
-  return told(*world);
+  return to_string_of_events(*world);
 }
 
 BodyDef heavy(const Vec3& position) {
@@ -42,7 +42,7 @@ World two_resting_balls() {
   return World(scene);
 }
 
-TEST(ContactEvents, OfNothingAreNone) {
+TEST(ContactEvents, OfAnEmptyWorldAreNone) {
   World world{Scene{}};
   EXPECT_TRUE(world.contact_events().empty());
   EXPECT_EQ(step(&world), "");
@@ -71,7 +71,7 @@ TEST(ContactEvents, BeginStayAndEndWithABounce) {
   EXPECT_EQ(story.find("++"), std::string::npos) << story;
 }
 
-TEST(ContactEvents, TellTheDeepestContactOfAPairWhoeverIsFirstInIt) {
+TEST(ContactEvents, DescribeTheDeepestContactOfAPairInEitherOrder) {
   Scene scene;
   BodyDef box = test::ball({0, 0.4_r, 0});
   box.shape = Box{{1, 0.5_r, 1}};
@@ -101,16 +101,16 @@ TEST(ContactEvents, OfARemovedBodyEndInTheNextStep) {
   World world = two_resting_balls();
   step(&world);
   const BodyId gone = world.bodies()[0];
-  // As a game does: remove while reading. The list stays as it is.
+  // A body is removed while the list is read; the list remains valid.
   const auto events = world.contact_events();
   world.remove(events[0].a);
-  EXPECT_EQ(told(world), "+0-1 +0-2");
+  EXPECT_EQ(to_string_of_events(world), "+0-1 +0-2");
   EXPECT_EQ(step(&world), "-0-1 -0-2");
   EXPECT_EQ(world.contact_events()[0].a, gone);
   EXPECT_EQ(step(&world), "");
 }
 
-TEST(ContactEvents, TellTheNewBodyOfAnIndexFromTheOld) {
+TEST(ContactEvents, DistinguishANewBodyFromTheOldOneWithItsIndex) {
   World world = two_resting_balls();
   step(&world);
   const BodyId old = world.bodies()[0];
@@ -122,7 +122,7 @@ TEST(ContactEvents, TellTheNewBodyOfAnIndexFromTheOld) {
   EXPECT_EQ(world.contact_events()[1].a, fresh);
 }
 
-TEST(ContactEvents, FollowABodyThatIsPutElsewhere) {
+TEST(ContactEvents, FollowABodyThatIsMoved) {
   World world = two_resting_balls();
   step(&world);
   world.set_state(world.bodies()[1], {{50, 0.995_r, 0}, {}, {}, {}});
@@ -139,7 +139,7 @@ TEST(ContactEvents, OfAFailedStepAreNoneAndTheNextComparesWithTheLastThatSucceed
     if (fail) throw InvalidArgument("on purpose");
   });
   EXPECT_THROW(world.step(), InvalidArgument);
-  EXPECT_EQ(told(world), "");
+  EXPECT_EQ(to_string_of_events(world), "");
   EXPECT_THROW(world.step(), InvalidArgument);
   fail = false;
   EXPECT_EQ(step(&world), "=0-1 =0-2");
@@ -149,7 +149,7 @@ TEST(ContactEvents, OfAFailedStepAreNoneAndTheNextComparesWithTheLastThatSucceed
   runaway.velocity.y = std::numeric_limits<Real>::max() / 2;
   const BodyId id = world.add(runaway);
   ASSERT_TRUE(world.step().non_finite);
-  EXPECT_EQ(told(world), "");
+  EXPECT_EQ(to_string_of_events(world), "");
   world.remove(id);
   world.remove_force(force);
   EXPECT_EQ(step(&world), "=0-1 =0-2");
@@ -175,7 +175,7 @@ TEST(ContactEvents, AreTheDifferencesOfTheContactListsInARandomWorld) {
   for (int n = 0; n < 200; ++n) {
     world.step();
     Pairs now;
-    for (const Contact& c : world.contacts()) ++now[std::minmax(c.a, c.b)];
+    for (const Contact& c : world.contacts()) ++now[std::minmax(c.a.index, c.b.index)];
     std::pair<std::uint32_t, std::uint32_t> last{0, 0};
     std::size_t touching = 0;
     for (const ContactEvent& e : world.contact_events()) {

@@ -1,4 +1,4 @@
-/// Contacts that users make: ropes, rods, and what may go wrong with them.
+/// Tests of contact generators: ropes, rods and errors.
 #include <jfpx/error.hpp>
 
 #include "tests/world/support.hpp"
@@ -13,8 +13,8 @@ namespace {
 
 using test::operator""_r;
 
-/// The whole of a contact generator of one's own: when a rope between two points of two bodies is
-/// taut, its ends go no further apart.
+/// A user-defined contact generator: a rope between points of two bodies, whose ends cannot
+/// separate further when it is taut.
 struct Rope {
   BodyId a, b;
   Real length = 1;
@@ -30,7 +30,7 @@ struct Rope {
   }
 };
 
-/// Keeps two centres at one distance: pulls or pushes.
+/// A rod: keeps two centres at a constant distance.
 struct Rod {
   BodyId a, b;
   Real length = 1;
@@ -54,7 +54,7 @@ BodyDef weight(const Vec3& position) {
 }
 BodyDef nail() { return test::ball({0, 0, 0}, 0.1_r, 0); }
 
-/// A nail at the origin and the given bodies.
+/// An immovable body at the origin, and the given bodies.
 World world_of(std::vector<BodyDef> bodies, Real dt = 0.002_r) {
   Scene scene;
   scene.dt = dt;
@@ -82,11 +82,11 @@ TEST(ContactGenerator, ABallOnARopeSwingsAsAPendulum) {
   EXPECT_NEAR(crossing, period / 4, 0.02 * period);
 }
 
-TEST(ContactGenerator, ASlackRopeIsNotThere) {
+TEST(ContactGenerator, ASlackRopeHasNoEffect) {
   World world = world_of({weight({0, -1, 0})});
   World free = world_of({weight({0, -1, 0})});
   world.add_contact_generator(Rope{world.bodies()[0], world.bodies()[1], 2});
-  // 1 m to fall: 0.45 s.
+  // A fall of 1 m takes 0.45 s.
   for (int n = 0; n < 220; ++n) {
     ASSERT_EQ(world.step().generated_contacts, 0u);
     free.step();
@@ -107,9 +107,9 @@ TEST(ContactGenerator, ARopeBetweenPointsOfBodiesKeepsTheMomenta) {
   b.velocity = {2, -0.3_r, 0.1_r};
   b.angular_velocity = {1, 2, 3};
   World world = world_of({a, b});
-  world.remove(world.bodies()[0]);  // no nail
+  world.remove(world.bodies()[0]);  // the immovable body
   const BodyId first = world.bodies()[0], second = world.bodies()[1];
-  // Tied to the surfaces, off the line of the centres: the pull turns both.
+  // Attached to the surfaces, off the line of centres, so that the rope rotates both bodies.
   world.add_contact_generator(Rope{first, second, 2.5_r, {0, 0.5_r, 0}, {0, 0, 0.5_r}});
   const auto now = [&] {
     const std::vector<BodyDef> defs = {a, b};
@@ -132,8 +132,8 @@ TEST(ContactGenerator, ARopeBetweenPointsOfBodiesKeepsTheMomenta) {
 
 TEST(ContactGenerator, ARodPullsAndPushes) {
   BodyDef b = test::ball({1, 0, 0}, 0.1_r), c = test::ball({0, 2, 0}, 0.1_r);
-  b.velocity = {-1, 3, 0};  // inwards: only a push holds it off
-  c.velocity = {1, 4, 0};   // outwards
+  b.velocity = {-1, 3, 0};  // inwards: the rod must push
+  c.velocity = {1, 4, 0};   // outwards: the rod must pull
   World world = world_of({b, c});
   world.add_contact_generator(Rod{world.bodies()[0], world.bodies()[1], 1});
   world.add_contact_generator(Rod{world.bodies()[0], world.bodies()[2], 2});
@@ -142,12 +142,12 @@ TEST(ContactGenerator, ARodPullsAndPushes) {
     ASSERT_NEAR(length(world.states()[1].position), 1, 2e-3) << n;
     ASSERT_NEAR(length(world.states()[2].position), 2, 2e-3) << n;
   }
-  // What was along the rod is gone, what was across stays.
+  // The velocity along the rod is gone; the perpendicular component remains.
   EXPECT_NEAR(length(world.states()[1].velocity), 3, 0.1);
   EXPECT_NEAR(length(world.states()[2].velocity), 1, 0.1);
 }
 
-TEST(ContactGenerator, TheyActInTheOrderInWhichTheyCame) {
+TEST(ContactGenerator, ActInTheOrderOfTheirAddition) {
   World world = world_of({weight({0, -1, 0})});
   const BodyId a = world.bodies()[0], b = world.bodies()[1];
   const auto mark = [a, b](Real depth) {
@@ -171,7 +171,7 @@ TEST(ContactGenerator, TheyActInTheOrderInWhichTheyCame) {
   EXPECT_EQ(world.contact_generators().size(), 3u);
 }
 
-TEST(ContactGenerator, AreRemovedOnceAndNeverComeBack) {
+TEST(ContactGenerator, AreRemovedOnceAndTheirIdsAreNeverReused) {
   World world = world_of({weight({0, -2, 0})});
   const Rope rope{world.bodies()[0], world.bodies()[1], 2};
   const ContactGeneratorId first = world.add_contact_generator(rope);
@@ -191,7 +191,7 @@ TEST(ContactGenerator, AreRemovedOnceAndNeverComeBack) {
   }
 }
 
-TEST(ContactGenerator, WhatHangsAtRestSleepsAndWakesWithTheOtherEnd) {
+TEST(ContactGenerator, ABodyHangingAtRestSleepsAndWakesWithTheOtherEnd) {
   BodyDef lower = weight({0, -2, 0}), upper = weight({0, -1, 0});
   lower.can_sleep = upper.can_sleep = true;
   World world = world_of({upper, lower}, 0.01_r);
@@ -208,7 +208,7 @@ TEST(ContactGenerator, WhatHangsAtRestSleepsAndWakesWithTheOtherEnd) {
     world.step();
   }
   EXPECT_TRUE(world.awake(c));
-  world.remove_contact_generator(second);  // cut
+  world.remove_contact_generator(second);  // cuts the rope
   for (int n = 0; n < 100; ++n) world.step();
   EXPECT_LT(world.state(c).position.y, -5);
 }
@@ -263,7 +263,7 @@ TEST(ContactGenerator, ABadContactUndoesTheStepAndIsNamed) {
   }
 }
 
-TEST(ContactGenerator, BetweenBodiesOfMassZeroNothingHappens) {
+TEST(ContactGenerator, BetweenBodiesOfMassZeroHasNoEffect) {
   World world = world_of({test::ground()});
   world.add_contact_generator([](ContactContext& context) {
     context.add({.a = context.bodies()[0], .b = context.bodies()[1], .normal = {0, 1, 0}});

@@ -1,4 +1,4 @@
-/// The resolver on contacts made by hand, where the right answer can be written down.
+/// Tests of the contact resolver on small sets of contacts with known solutions.
 #include "src/world/contact_resolver.hpp"
 
 #include "tests/world/linear_scan.hpp"
@@ -15,12 +15,12 @@ using test::operator""_r;
 
 constexpr Real kTolerance = 64 * kEpsilon;
 
-/// Bodies, and the contacts that the caller makes among them.
+/// Bodies, and contacts that the test adds.
 struct Scenario {
   explicit Scenario(std::span<const BodyDef> defs) : bodies(0.01_r, SleepSettings{}) {
     for (const BodyDef& def : defs) bodies.add(def);
   }
-  /// The contact of two spheres, as the collider would find it.
+  /// Adds the contact of two spheres, as the collider would find it.
   void touch(std::uint32_t a, std::uint32_t b) {
     const Vec3 d = bodies.moving.position[a] - bodies.moving.position[b];
     const Real len = length(d);
@@ -28,7 +28,7 @@ struct Scenario {
     const Real distance = len - (bodies.radius(a) + bodies.radius(b));
     const SphereInstance sphere_b{bodies.moving.position[b], bodies.radius(b)};
     contacts.push_back(
-        {a, b, normal, middle_point(normal, distance, sphere_b), distance,
+        {bodies.id(a), bodies.id(b), normal, middle_point(normal, distance, sphere_b), distance,
          combined(CombineRule::geometric_mean, bodies.friction(a), bodies.friction(b)),
          combined(CombineRule::geometric_mean, bodies.restitution(a), bodies.restitution(b))});
   }
@@ -51,7 +51,7 @@ BodyDef moving(BodyDef def, const Vec3& velocity, Real friction = 0, Real restit
 }
 
 /// Ball a at the origin passes ball b on its right and hits it with closing speed 1.
-/// The arms are +-0.95 x. Along x one impulse unit changes the closing speed by 1 + 1 = 2, along y
+/// The arms are +-0.95 x. Along x, a unit impulse changes the closing speed by 1 + 1 = 2, along y
 /// by 2 (1 + 0.95^2 / 0.4) = 6.5125. So e = 0 needs 0.5 along x, and 1/6.5125 stops the sliding.
 Scenario glancing(Real friction) {
   const BodyDef defs[] = {moving(test::ball({0, 0, 0}), {1, 1, 0}, friction),
@@ -92,7 +92,7 @@ TEST(ContactResolver, WithoutFrictionNothingSpins) {
 
 TEST(ContactResolver, FrictionIsAConeAndNotABox) {
   // Sliding along the diagonal of the tangent plane: the friction impulse is mu * normal impulse
-  // in that direction, not in each.
+  // in that direction, not in each axis.
   const BodyDef defs[] = {moving(test::ball({0, 0, 0}), {1, 3, 3}, 0.1_r),
                           moving(test::ball({1.9_r, 0, 0}), {}, 0.1_r)};
   Scenario s(defs);
@@ -124,7 +124,7 @@ TEST(Erratum, E02_E03_arms_are_each_bodys_own_and_angular_momentum_stays) {
       return test::sums(defs, states);
     };
     const test::Sums before = now();
-    s.resolve({.position_epsilon = 100});  // velocities only: positions stay
+    s.resolve({.position_epsilon = 100});  // resolves velocities only
     const test::Sums after = now();
     const double tolerance = 40 * static_cast<double>(kEpsilon) * (before.scale + 100);
     for (int k = 0; k < 3; ++k) {
@@ -181,7 +181,7 @@ TEST(Erratum, E06_penetration_is_resolved_and_shared_by_mass) {
   s.touch(0, 1);
   const ResolverReport report = s.resolve();
   EXPECT_EQ(report.position_iterations, 1u);
-  // Down to 15/16 of epsilon: apart by 0.4 - 0.009375, the light ball three times as far.
+  // Resolved to 15/16 of epsilon: moved apart by 0.4 - 0.009375, the light ball three times as far.
   const double apart = 0.4 - 0.01 * 15 / 16;
   EXPECT_NEAR(s.bodies.moving.position[0].x, -apart / 4, kTolerance);
   EXPECT_NEAR(s.bodies.moving.position[1].x, 1.6 + apart * 3 / 4, kTolerance);
@@ -194,7 +194,7 @@ TEST(Erratum, E06_immovable_bodies_are_not_moved_and_make_no_numbers_of_zero_mas
                           test::ball({1.5_r, 0.1_r, 0}, 1, 0)};
   Scenario s(defs);
   s.touch(0, 1);
-  s.contacts.push_back({0, 2, {1, 0, 0}, {}, -1});
+  s.contacts.push_back({s.bodies.id(0), s.bodies.id(2), {1, 0, 0}, {}, -1});
   s.resolve();
   EXPECT_EQ(s.bodies.state(0), (BodyState{{0, 0, 0}, {}, {}, {}}));
   EXPECT_EQ(s.bodies.state(2), (BodyState{{1.5_r, 0.1_r, 0}, {}, {}, {}}));
@@ -202,8 +202,8 @@ TEST(Erratum, E06_immovable_bodies_are_not_moved_and_make_no_numbers_of_zero_mas
 }
 
 TEST(Erratum, E10_moving_one_body_deepens_and_lightens_its_other_contacts) {
-  // A row of five balls, each 0.3 into the next: after the resolver its own idea of the depths must
-  // agree with the distances.
+  // A row of five balls that overlap by 0.3 each. Afterwards, the depths that the resolver has
+  // estimated must agree with the distances.
   std::vector<BodyDef> defs;
   for (int i = 0; i < 5; ++i) defs.push_back(test::ball({static_cast<Real>(i) * 1.7_r, 0, 0}));
   Scenario s(defs);
@@ -228,10 +228,10 @@ TEST(Erratum, E11_contacts_in_which_the_moved_body_is_second_are_refreshed) {
                           test::ground()};
   Scenario s(defs);
   s.touch(0, 1);
-  s.contacts.push_back({1, 2, {0, 1, 0}, {0, 0, 0}, 0});
+  s.contacts.push_back({s.bodies.id(1), s.bodies.id(2), {0, 1, 0}, {0, 0, 0}, 0});
   const ResolverReport report = s.resolve({.max_iterations = 100});
   EXPECT_FALSE(report.exhausted);
-  // Each contact closes no faster than the epsilon.
+  // No contact approaches faster than the epsilon.
   EXPECT_GE(s.velocity(0).y - s.velocity(1).y, -0.01_r);
   EXPECT_GE(s.velocity(1).y, -0.01_r);
   EXPECT_LE(s.velocity(0).y, kTolerance);
@@ -262,39 +262,40 @@ TEST(ContactResolver, ProjectionTurnsABodyThatIsHitOffCentreButNotTooFar) {
   cube.shape = Box{{1, 1, 1}};
   const BodyDef defs[] = {cube, test::ground()};
   Scenario s(defs);
-  s.contacts.push_back({0, 1, {0, 1, 0}, {1, -0.05_r, 0}, -0.1_r});
+  s.contacts.push_back({s.bodies.id(0), s.bodies.id(1), {0, 1, 0}, {1, -0.05_r, 0}, -0.1_r});
   s.resolve();
-  // Yields: 1 by shifting; r x n = (0,0,1), I = 2/3, so 1.5 by turning, about +z.
+  // Inverse effective mass: 1 by translation; r x n = (0,0,1), I = 2/3, so 1.5 by rotation about
+  // +z.
   const double depth = 0.1 - 0.01 * 15 / 16;
   EXPECT_NEAR(s.bodies.moving.position[0].y, 0.9 + depth / 2.5, kTolerance);
   EXPECT_NEAR(2 * s.bodies.moving.orientation[0].z, 1.5 * depth / 2.5, 1e-4);
 
   Scenario deep(defs);
-  deep.contacts.push_back({0, 1, {0, 1, 0}, {1, -0.5_r, 0}, -1});
+  deep.contacts.push_back({deep.bodies.id(0), deep.bodies.id(1), {0, 1, 0}, {1, -0.5_r, 0}, -1});
   deep.resolve({.angular_limit = 0.2_r});
-  // Turning would take 0.6 of the depth; the limit allows 0.2 of the arm's length of 1.
+  // Rotation would resolve 0.6 of the depth; the limit allows 0.2 at the arm's length of 1.
   EXPECT_NEAR(deep.bodies.moving.position[0].y, 0.9 + (1 - 0.01 * 15 / 16) - 0.2, kTolerance);
   EXPECT_NEAR(2 * deep.bodies.moving.orientation[0].z, 0.2, 2e-3);
 }
 
 TEST(ContactResolver, ProjectionTurnsAThinRodNoFurtherEither) {
-  // Pushed near its own axis: easily turned about that, and not at all where the push would turn a
-  // body that is alike about all axes.
+  // A contact near the axis of the rod: the rod rotates easily about that axis, but hardly about
+  // the axis about which the same contact would rotate an isotropic body.
   BodyDef rod = test::ball({0, 0, 0});
   rod.shape = Box{{1, 0.01_r, 0.01_r}};
   const BodyDef defs[] = {rod, test::ground()};
   Scenario s(defs);
-  s.contacts.push_back({0, 1, {0, 1, 0}, {1, 0, 0.01_r}, -1});
+  s.contacts.push_back({s.bodies.id(0), s.bodies.id(1), {0, 1, 0}, {1, 0, 0.01_r}, -1});
   s.resolve({.max_iterations = 1, .angular_limit = 0.2_r});
-  const Quat& turned = s.bodies.moving.orientation[0];
-  EXPECT_NEAR(2 * std::acos(std::min(1.0, std::fabs(double(turned.w)))), 0.2, 2e-3);
-  // The contact's point has come up by the whole depth all the same.
-  const Vec3 point = s.bodies.moving.position[0] +
-                     cross(Vec3{2 * turned.x, 2 * turned.y, 2 * turned.z}, Vec3{1, 0, 0.01_r});
+  const Quat& q = s.bodies.moving.orientation[0];
+  EXPECT_NEAR(2 * std::acos(std::min(1.0, std::fabs(double(q.w)))), 0.2, 2e-3);
+  // The contact point has still moved by the whole depth.
+  const Vec3 point =
+      s.bodies.moving.position[0] + cross(Vec3{2 * q.x, 2 * q.y, 2 * q.z}, Vec3{1, 0, 0.01_r});
   EXPECT_NEAR(point.y, 1 - 0.01 * 15 / 16, 1e-2);
 }
 
-TEST(ContactResolver, SleepersAreLeftAlone) {
+TEST(ContactResolver, SleepingBodiesAreNotMoved) {
   const BodyDef defs[] = {test::ball({0, 0, 0}), test::ball({1, 0, 0})};
   Scenario s(defs);
   s.bodies.moving.awake.assign(2, 0);
@@ -316,8 +317,8 @@ TEST(ContactResolver, MassesOfThirtyOrdersOfMagnitudeStayFinite) {
   }
 }
 
-/// Balls thrown into a small box, all overlapping somebody, with random velocities.
-Scenario crowd(std::uint64_t seed, std::uint32_t count) {
+/// Balls at random places in a small volume, most of them overlapping, with random velocities.
+Scenario dense_cloud(std::uint64_t seed, std::uint32_t count) {
   Random random(seed);
   std::vector<BodyDef> defs;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -326,7 +327,7 @@ Scenario crowd(std::uint64_t seed, std::uint32_t count) {
     def.velocity = random.uniform_in_box({-5, -5, -5}, {5, 5, 5});
     def.friction = random.uniform();
     def.restitution = random.uniform();
-    // A lattice now and then, so that equal depths and velocities are common.
+    // A regular lattice for even seeds, so that equal depths and velocities are common.
     if (seed % 2 == 0) {
       def.position = {static_cast<Real>(i % 5), static_cast<Real>(i / 5 % 5),
                       static_cast<Real>(i / 25)};
@@ -345,29 +346,30 @@ Scenario crowd(std::uint64_t seed, std::uint32_t count) {
   return s;
 }
 
-TEST(ContactResolver, TheTournamentChoosesAsTheLinearScanDoesBitForBit) {
+TEST(ContactResolver, TheTournamentTreeGivesTheBitsOfTheLinearScan) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   for (std::uint64_t k = 0; k < 10; ++k) {
-    Scenario s = crowd(seed + k, 100);
+    Scenario s = dense_cloud(seed + k, 100);
     BodyStore copy = s.bodies;
-    const ResolverReport with_tournament = s.resolve();
+    const ResolverReport with_tree = s.resolve();
     BasicContactResolver<test::LinearScan> scanner;
     const ResolverReport with_scan = scanner.resolve(copy, s.contacts, {});
-    ASSERT_GT(with_tournament.position_iterations, 100u);
-    ASSERT_EQ(with_tournament.position_iterations, with_scan.position_iterations);
-    ASSERT_EQ(with_tournament.velocity_iterations, with_scan.velocity_iterations);
+    ASSERT_GT(with_tree.position_iterations, 100u);
+    ASSERT_EQ(with_tree.position_iterations, with_scan.position_iterations);
+    ASSERT_EQ(with_tree.velocity_iterations, with_scan.velocity_iterations);
     for (std::uint32_t i = 0; i < 100; ++i) ASSERT_EQ(s.bodies.state(i), copy.state(i)) << i;
   }
 }
 
-TEST(WantedVelocityChange, BouncesOnTheSpeedOfTheHitButNotOnTheWeight) {
-  // Closing at 2, of which 0.5 came from this step's gravity: back at 0.5 * 1.5.
+TEST(TargetDeltaVelocity, BouncesOnTheImpactSpeedButNotOnTheWeight) {
+  // Approach at 2, of which 0.5 is from this step's gravity: rebound at 0.5 * 1.5.
   EXPECT_EQ(detail::target_delta_velocity(-2, -0.5_r, 0.5_r, 0.25_r), 2.75_r);
   EXPECT_EQ(detail::target_delta_velocity(-0.25_r, 0, 1, 0.25_r), 0.25_r);  // too slow to bounce
   EXPECT_EQ(detail::target_delta_velocity(-2, -3, 1, 0.25_r), 2);  // weight alone: no bounce
-  EXPECT_EQ(detail::target_delta_velocity(-2, 1, 1, 0.25_r), 4);   // pulled apart: no gain
-  EXPECT_EQ(detail::target_delta_velocity(3, 0, 1, 0.25_r), -3);   // leaving: nothing to do
+  EXPECT_EQ(detail::target_delta_velocity(-2, 1, 1, 0.25_r), 4);   // accelerated apart: no gain
+  EXPECT_EQ(detail::target_delta_velocity(3, 0, 1, 0.25_r),
+            -3);  // separating: no correction needed
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
-/// Errata of the original that belong to no single part of the engine; the others are tested with
-/// the part that they concern.
+/// Tests of errata that concern several parts of the engine; the tests of a part contain its own.
 #include <jfpx/collide.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/particle.hpp>
@@ -22,7 +21,7 @@ using ::testing::HasSubstr;
 
 constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
 
-// The original flattens every deep contact to the epsilon and then takes any of them.
+// The original clamps the depth of every contact to the epsilon and then picks any of them.
 TEST(Erratum, E06_the_deepest_contact_is_resolved_first) {
   Scene scene;
   for (const Real overlap : {0.2_r, 0.5_r, 0.3_r}) {
@@ -37,7 +36,7 @@ TEST(Erratum, E06_the_deepest_contact_is_resolved_first) {
   EXPECT_TRUE(report.iterations_exhausted);
   const std::vector<BodyState> s = world.states();
   const auto gap = [&](int i) { return s[2 * i + 1].position.x - s[2 * i].position.x; };
-  EXPECT_EQ(gap(0), 2 - 0.2_r);  // the two deeper ones have used up the limit
+  EXPECT_EQ(gap(0), 2 - 0.2_r);  // the two deeper contacts have used the limit
   EXPECT_NEAR(gap(1), 2, 0.011);
   EXPECT_NEAR(gap(2), 2, 0.011);
 }
@@ -57,7 +56,7 @@ TEST(Erratum, E08_a_position_that_is_no_number_is_refused_and_reaches_no_other_b
       const SphereInstance spheres[] = {{{1, 2, 3}, 1}, {state.position, 1}};
       try {
         make_sphere_collider()->find_contacts(spheres);
-        ADD_FAILURE() << "the original makes a contact of no numbers";
+        ADD_FAILURE() << "the original makes a contact of NaNs";
       } catch (const InvalidArgument& error) {
         EXPECT_THAT(error.what(), HasSubstr("sphere 1"));
       }
@@ -67,22 +66,22 @@ TEST(Erratum, E08_a_position_that_is_no_number_is_refused_and_reaches_no_other_b
   EXPECT_FALSE(world.step().non_finite);
 }
 
-// The original's early-out takes the radius off each coordinate.
+// The early-out of the original subtracts the radius from each coordinate.
 TEST(Erratum, E15b_half_spaces_at_any_angle_meet_spheres_by_their_distance) {
   EXPECT_FALSE(collide(SphereInstance{{0.72_r, 0.96_r, 0}, 1}, HalfSpace{{0.6_r, 0.8_r, 0}, 0})
                    .touching);  // 1.2 away
   EXPECT_TRUE(collide(SphereInstance{{0, -0.5_r, 0}, 1}, HalfSpace{{0, -1, 0}, 0}).touching);
-  Scene scene;  // and so they do in a world
+  Scene scene;  // the same in a world
   scene.bodies = {test::ball({0.72_r, 0.96_r, 0}), test::ball({0, -0.5_r, 20}),
                   test::half_space({0.6_r, 0.8_r, 0}, 0)};
   World world(scene);
   world.step();
   ASSERT_EQ(world.contacts().size(), 1u);
-  EXPECT_EQ(world.contacts()[0].a, 1u);
+  EXPECT_EQ(world.contacts()[0].a.index, 1u);
   EXPECT_NEAR(world.contacts()[0].distance, -0.4 - 1, 1e-6);
 }
 
-// The original's fabs, and literals like 0.5, compute in double in the middle of float code.
+// In the original, fabs and literals such as 0.5 compute in double within float code.
 TEST(Erratum, E28_arithmetic_on_reals_stays_in_reals) {
   const Vec3 v{1, 2, 3};
   static_assert(std::is_same_v<decltype(absolute(v.x)), Real>);
@@ -96,8 +95,8 @@ TEST(Erratum, E28_arithmetic_on_reals_stays_in_reals) {
             std::numeric_limits<Real>::denorm_min());
 }
 
-// The original deletes five kinds of objects through bases that can't; and prints from its tests of
-// boxes, which is most of the time that they take.
+// The original deletes objects of five classes through bases without a virtual destructor, and
+// prints in its box tests, which takes most of their time.
 TEST(Erratum, E31_what_is_deleted_through_a_base_has_a_virtual_destructor) {
   static_assert(std::has_virtual_destructor_v<SphereCollider>);
   static_assert(std::has_virtual_destructor_v<Error>);
@@ -118,7 +117,7 @@ TEST(Erratum, E47_the_engine_prints_nothing) {
   EXPECT_GT(contacts, 1000u);
 }
 
-// The thesis prints 0.01^dt, its source says 0.05^dt, Millington 0.5^dt.
+// The thesis prints 0.01^dt, its source uses 0.05^dt, Millington 0.5^dt.
 TEST(Erratum, E55_the_bias_decides_how_soon_a_body_at_rest_sleeps) {
   for (const Real bias : {0.01_r, 0.05_r, 0.5_r}) {
     Scene scene;

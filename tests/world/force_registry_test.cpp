@@ -1,4 +1,4 @@
-/// Forces as part of a world: applied by hand, added, ordered, checked, removed, failing, asleep.
+/// Tests of forces in a world: application, addition, order, validation, removal, errors, sleep.
 #include "tests/world/force_support.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ TEST(AppliedForce, AcceleratesForOneStepOnly) {
   expect_near(world.state(id).velocity, {0.04_r, 0.02_r, 0}, 1e-7);
 }
 
-TEST(AppliedForce, TorqueAndForceAtAPointTurn) {
+TEST(AppliedForce, TorqueAndForceAtAPointRotate) {
   // I = 0.4 m r^2 = 0.8; torque about the centre (0,1,0) x (8,0,0) = (0,0,-8).
   World world = world_of({ball_at({5, 0, 0}), ball_at({-5, 0, 0})});
   const BodyId a = world.bodies()[0], b = world.bodies()[1];
@@ -40,7 +40,7 @@ TEST(AppliedForce, TorqueAndForceAtAPointTurn) {
   expect_near(world.state(b).angular_velocity, {0, 0, -0.1_r}, 1e-7);
 }
 
-TEST(AppliedForce, RefusesStrangeBodiesAndNumbers) {
+TEST(AppliedForce, RefusesUnknownBodiesAndBadNumbers) {
   World world = world_of({ball_at({0, 0, 0})});
   const BodyId id = world.bodies()[0];
   const Real nan = std::numeric_limits<Real>::quiet_NaN();
@@ -109,7 +109,7 @@ TEST(Erratum, E29_a_small_steady_force_moves_a_body_that_may_sleep) {
   EXPECT_NEAR(world.state(id).velocity.x, 0.01, 1e-5);  // 0.01 m/s^2 for 1 s
 }
 
-TEST(Forces, ActInTheOrderInWhichTheyCame) {
+TEST(Forces, ActInTheOrderOfTheirAddition) {
   World world = world_of({ball_at({0, 0, 0})});
   const BodyId id = world.bodies()[0];
   std::vector<int> order;
@@ -125,7 +125,7 @@ TEST(Forces, ActInTheOrderInWhichTheyCame) {
   world.step();
   EXPECT_EQ(order, (std::vector<int>{0, 1, 2, 0, 2, 3}));
 
-  // The small one drowns in the sum unless it comes last.
+  // The small force is lost in the sum unless it is added last.
   const Real big = Real(4) / kEpsilon;
   for (const Real x : {big, -big, Real(2)}) {
     world.add_force([id, x](ForceContext& context) { context.apply_force(id, {x, 0, 0}); });
@@ -134,7 +134,7 @@ TEST(Forces, ActInTheOrderInWhichTheyCame) {
   EXPECT_EQ(world.last_acceleration(id).x, 1);
 }
 
-TEST(Forces, AreRemovedOnceAndNeverComeBack) {
+TEST(Forces, AreRemovedOnceAndTheirIdsAreNeverReused) {
   World world = world_of({ball_at({0, 0, 0})});
   const ForceId first = world.add_force(Gravity{});
   world.remove_force(first);
@@ -151,7 +151,7 @@ TEST(Forces, AreRemovedOnceAndNeverComeBack) {
   EXPECT_EQ(world.last_acceleration(world.bodies()[0]), (Vec3{0, 0, 1}));
 }
 
-/// As large as std::function keeps in itself.
+/// As large as the local buffer of std::function.
 struct Wind {
   Real strength = 0;
   void operator()(ForceContext& context) const {
@@ -159,7 +159,7 @@ struct Wind {
   }
 };
 
-TEST(Forces, StayWhereTheyAreUntilTheyAreRemoved) {
+TEST(Forces, KeepTheirAddressUntilTheyAreRemoved) {
   World world = world_of({ball_at({0, 0, 0})});
   const ForceId before = world.add_force(Drag{.linear = 0});
   const ForceId id = world.add_force(Wind{1});
@@ -172,18 +172,18 @@ TEST(Forces, StayWhereTheyAreUntilTheyAreRemoved) {
   EXPECT_GT(world.last_acceleration(world.bodies()[0]).x, 2);
 }
 
-TEST(Forces, OfARemovedBodyDoNothing) {
+TEST(Forces, OfARemovedBodyHaveNoEffect) {
   World world = world_of({ball_at({0, 0, 0}), ball_at({9, 0, 0})});
   const BodyId gone = world.bodies()[0], left = world.bodies()[1];
   world.add_force(Spring{.a = {gone}, .b = {left}, .stiffness = 5});
   world.add_force(Gravity{{0, -1, 0}, gone});
   world.add_force(Aero{.body = gone, .tensor = diagonal({1, 1, 1}), .wind = {1, 1, 1}});
   world.remove(gone);
-  const BodyId heir = world.add(ball_at({0, 0, 0}));  // in the same slot
-  ASSERT_EQ(heir.index, gone.index);
+  const BodyId successor = world.add(ball_at({0, 0, 0}));  // in the same slot
+  ASSERT_EQ(successor.index, gone.index);
   world.step();
   EXPECT_EQ(world.last_acceleration(left), Vec3{});
-  EXPECT_EQ(world.last_acceleration(heir), Vec3{});
+  EXPECT_EQ(world.last_acceleration(successor), Vec3{});
 }
 
 /// The message of the InvalidArgument that adding `force` throws.
@@ -197,7 +197,7 @@ std::string refusal(World* world, const F& force) {
   return "no error";
 }
 
-TEST(Forces, AreCheckedWhenTheyCome) {
+TEST(Forces, AreValidatedWhenTheyAreAdded) {
   World world = world_of({ball_at({0, 0, 0})});
   const BodyId id = world.bodies()[0], strange{5, 1};
   const Real nan = std::numeric_limits<Real>::quiet_NaN();
@@ -229,7 +229,7 @@ TEST(Forces, AreCheckedWhenTheyCome) {
   EXPECT_TRUE(world.forces().empty());
 }
 
-TEST(Forces, ThatThrowLeaveNoTrace) {
+TEST(Forces, ThatThrowLeaveTheStateUnchanged) {
   World world = world_of({ball_at({0, 0, 0}, {1, 0, 0})});
   World twin = world_of({ball_at({0, 0, 0}, {1, 0, 0})});
   bool fails = true;
@@ -251,7 +251,7 @@ TEST(Forces, ThatThrowLeaveNoTrace) {
   EXPECT_NEAR(world.states()[0].velocity.z, 0.03, 1e-6);  // 6 N / 2 kg for one step
 }
 
-TEST(Forces, OnAStrangeBodyUndoTheStep) {
+TEST(Forces, OnAnUnknownBodyUndoTheStep) {
   World world = world_of({ball_at({0, 0, 0}, {1, 0, 0})});
   const auto before = world.states();
   world.add_force([](ForceContext& context) { context.apply_force({7, 0}, {1, 0, 0}); });
@@ -259,7 +259,7 @@ TEST(Forces, OnAStrangeBodyUndoTheStep) {
   EXPECT_EQ(world.states(), before);
 }
 
-TEST(Forces, ThatAreNoNewsLetABodySleep) {
+TEST(Forces, WithoutAChangeLetABodySleep) {
   BodyDef def = ball_at({0, 1, 0});
   def.can_sleep = true;
   World world = world_of({def, test::ground()});
@@ -267,7 +267,7 @@ TEST(Forces, ThatAreNoNewsLetABodySleep) {
   for (int n = 0; n < 500; ++n) world.step();
   const BodyId id = world.bodies()[0];
   ASSERT_FALSE(world.awake(id));
-  world.add_force(Gravity{{3, 0, 0}});  // news: everything wakes
+  world.add_force(Gravity{{3, 0, 0}});  // a new force wakes all bodies
   EXPECT_TRUE(world.awake(id));
   for (int n = 0; n < 100; ++n) world.step();
   EXPECT_GT(world.states()[0].velocity.x, 1);

@@ -1,4 +1,4 @@
-/// Worlds of a few balls for the tests of forces.
+/// Worlds of a few balls for tests of forces.
 #pragma once
 
 #include "tests/world/support.hpp"
@@ -12,7 +12,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// Balls of mass 2 and radius 1 that nothing else pulls, far enough apart not to touch.
+/// Balls of mass 2 and radius 1 without gravity, to be placed so that they do not touch.
 inline World world_of(std::vector<BodyDef> bodies, Real dt = Real(0.01)) {
   Scene scene;
   scene.dt = dt;

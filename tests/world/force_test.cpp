@@ -1,4 +1,4 @@
-/// Forces against mechanics: springs, drag, wings, liquids, explosions.
+/// Tests of forces against analytic mechanics: springs, drag, wings, buoyancy, explosions.
 #include "tests/world/force_support.hpp"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ TEST(SpringForce, SwingsWithItsPeriodAndKeepsItsEnergy) {
     ASSERT_NEAR(x, amplitude * std::cos(n * step + phase) / std::cos(phase),
                 1e4 * kEps * (1 + 0.01 * n))
         << n;
-    // The energy of the method swings by omega dt / 2 around a constant one, and never runs away.
+    // The energy of the method oscillates by omega dt / 2 around a constant and stays bounded.
     ASSERT_NEAR(v * v + 4 * x * x, 36, 36 * (omega * dt / 2 + 1e-3));
   }
   // Two frequencies, hence two periods: dt^2/24 apart, relative to the period.
@@ -126,7 +126,7 @@ TEST(DragForce, AFallWithQuadraticDragEndsAtTheTerminalVelocity) {
   world.add_force(Gravity{});
   world.add_force(Drag{.quadratic = 0.1_r, .wind = {3, 0, 0}});
   for (int n = 0; n < 3000; ++n) world.step();
-  // m g = k v^2; the wind takes the ball along.
+  // m g = k v^2; the wind carries the ball along.
   expect_near(world.states()[0].velocity, {3, static_cast<Real>(-std::sqrt(2 * 9.81 / 0.1)), 0},
               1e-3);
 }
@@ -142,7 +142,7 @@ TEST(AeroForce, LiftPointsUpWhenFlyingForwards) {
   expect_near(world.last_acceleration(id), {0, 5, 0}, 1e-6);  // -1 * -10 / 2 kg
 }
 
-TEST(AeroForce, IsMeantInBodyAxes) {
+TEST(AeroForce, UsesBodyAxes) {
   Mat3 tensor = diagonal({});
   tensor(1, 0) = -1;
   const Real half = square_root(0.5_r);
@@ -161,7 +161,8 @@ TEST(Erratum, E27_drifting_with_the_wind_feels_no_air) {
   world.add_force(Aero{.body = id, .tensor = diagonal({-1, -1, -1}), .wind = {3, 4, 5}});
   world.step();
   EXPECT_EQ(world.last_acceleration(id), Vec3{});
-  world.force<Aero>(world.forces()[0]).wind = {3, 4, 7};  // now from behind: along, not against
+  world.force<Aero>(world.forces()[0]).wind = {3, 4,
+                                               7};  // now from behind, in the direction of motion
   world.step();
   expect_near(world.last_acceleration(id), {0, 0, 1}, 1e-6);
 }
@@ -175,7 +176,7 @@ TEST(Erratum, E27_wings_damp_rolling) {
     world.add_force(Aero{.body = id, .tensor = diagonal({0, -0.5_r, 0}), .point = {0, 0, side}});
   }
   world.step();
-  // Each wing moves with 4 m/s and feels 2 N on an arm of 2 m: 8 N m against I = 0.8.
+  // Each wing moves at 4 m/s; its force is 2 N on an arm of 2 m: 8 N m in all, with I = 0.8.
   expect_near(world.state(id).angular_velocity, {2 - 0.1_r, 0, 0}, 1e-6);
   EXPECT_EQ(world.last_acceleration(id), Vec3{});
 }

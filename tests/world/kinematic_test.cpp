@@ -1,4 +1,5 @@
-/// Kinematic bodies: they move as told, push, carry, and are never pushed.
+/// Tests of kinematic bodies: they move with given velocities, push and carry other bodies, and are
+/// never pushed.
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
@@ -71,7 +72,7 @@ TEST(Kinematic, IsNeverPushedHoweverHeavyTheOther) {
 }
 
 TEST(Kinematic, PushesToItsOwnSpeedAndThrowsWithRestitution) {
-  // Hit at speed 2 by what does not give way: off with (1 + e) times 2.
+  // Hit by an unyielding body at speed 2: leaves at (1 + e) times 2.
   for (const Real e : {Real(0), 0.5_r, Real(1)}) {
     for (const Shape& shape : {Shape(Sphere{1}), Shape(Box{{1, 1, 1}})}) {
       BodyDef pusher = kinematic(shape, {0, 0, 0}, {2, 0, 0});
@@ -84,7 +85,7 @@ TEST(Kinematic, PushesToItsOwnSpeedAndThrowsWithRestitution) {
   }
 }
 
-TEST(Kinematic, AnElevatorLiftsWhatStandsOnIt) {
+TEST(Kinematic, AnElevatorLiftsABodyOnIt) {
   World world = world_of({platform({0, 0.5_r, 0}), cube({0, 0.5_r, 0}), cube({0, 1.5_r, 0})});
   for (int n = 0; n < 240; ++n) world.step();
   const auto states = world.states();
@@ -103,7 +104,7 @@ TEST(Kinematic, AConveyorDragsByFriction) {
   EXPECT_NEAR(world.states()[1].velocity.x, 2, 0.02);
 }
 
-TEST(Kinematic, ATurntableTakesABoxRound) {
+TEST(Kinematic, ATurntableCarriesABoxAround) {
   BodyDef table = platform({});
   table.angular_velocity = {0, 1, 0};
   BodyDef passenger = cube({1, 0.5_r, 0});
@@ -116,8 +117,8 @@ TEST(Kinematic, ATurntableTakesABoxRound) {
   EXPECT_NEAR(std::hypot(at.x, at.z), 1, 0.05);
 }
 
-TEST(Kinematic, WhatItCarriesSlowlyStaysAwakeUntilItStops) {
-  // 0.1 m/s is far below the sleep epsilon; a sleeper would lose its speed.
+TEST(Kinematic, ABodyThatItCarriesSlowlyStaysAwakeUntilItStops) {
+  // 0.1 m/s is far below the sleep epsilon; a body that fell asleep would lose its speed.
   std::vector<BodyDef> bodies = {platform({0.1_r, 0, 0})};
   for (int i = 0; i < 3; ++i) {
     bodies.push_back(cube({0, 0.5_r + static_cast<Real>(i), 0}));
@@ -140,14 +141,14 @@ TEST(Kinematic, WhatItCarriesSlowlyStaysAwakeUntilItStops) {
   for (int n = 0; n < 240; ++n) report = world.step();
   EXPECT_EQ(report.awake, 0u);
 
-  // And wakes when it starts again.
+  // It wakes when the platform starts again.
   s = world.state(id);
   s.velocity = {1, 0, 0};
   world.set_state(id, s);
   EXPECT_EQ(world.step().awake, 3u);
 }
 
-TEST(Kinematic, WakesTheSleeperThatItReaches) {
+TEST(Kinematic, WakesASleepingBodyThatItHits) {
   BodyDef sleeper = test::ball({5, 0, 0});
   sleeper.can_sleep = true;
   World world = world_of({kinematic(Box{{1, 1, 1}}, {0, 0, 0}, {2, 0, 0}), sleeper});
@@ -172,14 +173,14 @@ TEST(Kinematic, ASpringFromItWakesTheBodyAtItsOtherEnd) {
   EXPECT_LT(world.state(pulled).velocity.x, -0.1_r);
 }
 
-TEST(Kinematic, PassesThroughWhatIsAsImmovable) {
+TEST(Kinematic, PassesThroughImmovableBodies) {
   World world = world_of({kinematic(Sphere{1}, {0, 3, 0}, {0, -2, 0}),
                           kinematic(Box{{1, 1, 1}}, {0, -3, 0}, {0, 2, 0}), test::ground()});
   for (int n = 0; n < 120; ++n) EXPECT_EQ(world.step().contacts, 0u);
   EXPECT_NEAR(world.states()[0].position.y, -1, 1e-3);
 }
 
-TEST(Kinematic, AStepThatFailsTakesItBack) {
+TEST(Kinematic, AFailedStepRestoresItsState) {
   World world = world_of({kinematic(Sphere{1}, {0.99e9_r, 0, 0}, {9e7_r, 0, 0})});
   const auto before = world.states();
   StepReport report;

@@ -1,4 +1,4 @@
-/// The queue that the thesis used, a scan over all contacts: the oracle of the tournament.
+/// The linear scan of the thesis: the reference for the tournament tree.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -11,7 +11,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// Same interface and same choices as IndexedPriorityQueue, in O(n).
+/// Has the interface and the results of IndexedPriorityQueue, in O(n).
 class LinearScan {
  public:
   void assign(std::span<const Real> keys) { keys_.assign(keys.begin(), keys.end()); }

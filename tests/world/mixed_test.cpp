@@ -1,4 +1,5 @@
-/// mixed over a long time: balls and boxes in a pit stay in it, stay finite and gain no energy.
+/// Long run of the scene `mixed`: balls and boxes in a pit stay inside and finite, and gain no
+/// energy.
 #include "src/scenes/scenes.hpp"
 #include "tests/world/support.hpp"
 
@@ -30,7 +31,7 @@ double energy(const World& world) {
   return sum;
 }
 
-/// How deep the centre of a body may come to a wall: what its smallest extent leaves.
+/// Smallest distance of a body's centre from a wall that it touches: its smallest extent.
 Real extent(const Shape& shape) {
   if (const auto* box = std::get_if<Box>(&shape)) {
     return std::min({box->half_extents.x, box->half_extents.y, box->half_extents.z});
@@ -38,7 +39,7 @@ Real extent(const Shape& shape) {
   return std::get<Sphere>(shape).radius;
 }
 
-/// The largest share of a body's extent that is missing between its centre and a wall.
+/// The largest penetration of a wall, as a fraction of the body's smallest extent.
 Real worst_intrusion(const World& world) {
   const std::vector<BodyState> states = world.states();
   Real worst = 0;
@@ -71,7 +72,7 @@ TEST(Mixed, StaysFiniteInItsPitAndGainsNoEnergyForTenThousandSteps) {
     gain = std::max(gain, now - least);
     intrusion = std::max(intrusion, worst_intrusion(world));
   }
-  // Projection lifts what it parts, by centimetres at most.
+  // Projection lifts the bodies that it separates, by centimetres at most.
   EXPECT_LT(gain, 2e-3 * start);
   EXPECT_LT(intrusion, 0.75) << "1 would be a centre that has gone through";
   EXPECT_LT(energy(world), start);

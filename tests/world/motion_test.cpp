@@ -1,4 +1,4 @@
-/// Worlds against mechanics: falling, flying, bouncing, rolling, sliding, hitting.
+/// Tests of worlds against analytic mechanics: fall, flight, bounce, rolling, sliding, impact.
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
@@ -76,12 +76,12 @@ TEST(Motion, BounceReachesTheSquareOfTheRestitutionOfTheHeight) {
       if (hit && s.velocity.y < -0.5_r) break;
       if (hit) top = std::max(top, static_cast<double>(s.position.y) - 1);
     }
-    // A step at the speed of the hit, 9.9 m/s, is 9.9 mm long.
+    // At the impact speed of 9.9 m/s, a step covers 9.9 mm.
     EXPECT_NEAR(top, static_cast<double>(e * e) * 5, 0.02) << "e " << e;
   }
 }
 
-TEST(Motion, CoefficientsOfTwoBodiesCombineAsTheSceneSays) {
+TEST(Motion, CoefficientsOfTwoBodiesCombineByTheRuleOfTheScene) {
   const struct {
     CombineRule rule;
     double of_half_and_eighth;
@@ -91,7 +91,7 @@ TEST(Motion, CoefficientsOfTwoBodiesCombineAsTheSceneSays) {
                {CombineRule::maximum, 0.5},
                {CombineRule::average, 0.3125}};
   for (const auto& [rule, expected] : cases) {
-    // Bounces: a hit at speed 4 that no acceleration caused leaves with e times 4.
+    // Bounce: an impact at speed 4 without acceleration rebounds at e times 4.
     Scene scene;
     BodyDef def = test::ball({0, 1, 0});
     def.velocity = {0, -4, 0};
@@ -105,7 +105,7 @@ TEST(Motion, CoefficientsOfTwoBodiesCombineAsTheSceneSays) {
     EXPECT_NEAR(bouncing.states()[0].velocity.y, 4 * expected, 1e-5) << to_string(rule);
     EXPECT_NEAR(bouncing.contacts()[0].restitution, expected, 1e-7) << to_string(rule);
 
-    // Slides: the first hit takes mu times 4 from the speed along the ground.
+    // Sliding: the first impact reduces the speed along the ground by mu times 4.
     def.velocity = {30, -4, 0};
     def.restitution = floor.restitution = 0;
     def.friction = 0.125_r;
@@ -118,7 +118,7 @@ TEST(Motion, CoefficientsOfTwoBodiesCombineAsTheSceneSays) {
   }
 }
 
-TEST(Motion, NewtonsCradleLetsAsManyBallsGoAsCame) {
+TEST(Motion, NewtonsCradleReleasesAsManyBallsAsHitIt) {
   for (const std::size_t coming : {1u, 2u, 3u}) {
     Scene scene;
     scene.dt = 0.001_r;
@@ -173,7 +173,7 @@ TEST(Motion, ASlidingBallLosesTwoSeventhsOfItsSpeedAndThenRolls) {
   floor.friction = 0.25_r;
   scene.bodies = {def, floor};
   World world(scene);
-  // Sliding ends after t = 2 v / (7 mu g); until then the speed falls with mu g.
+  // Sliding ends after t = 2 v / (7 mu g); until then the speed decreases with mu g.
   const double end = 2 * 7 / (7 * 0.25 * kG);
   double t = 0;
   for (; t < end / 2; t += 0.005) world.step();
@@ -182,11 +182,11 @@ TEST(Motion, ASlidingBallLosesTwoSeventhsOfItsSpeedAndThenRolls) {
   const BodyState s = world.states()[0];
   EXPECT_NEAR(s.velocity.x, 5, 0.05);
   EXPECT_NEAR(-s.angular_velocity.z, 5, 0.05);
-  // Way: 12 v^2 / (49 mu g) sliding, then 5 m/s.
+  // Distance: 12 v^2 / (49 mu g) sliding, then 5 m/s.
   EXPECT_NEAR(s.position.x, 12 * 49 / (49 * 0.25 * kG) + 5 * (t - end), 0.1);
 }
 
-TEST(Motion, ABallThatMayNotTurnSlidesToAStopAfterVSquaredOverTwoMuG) {
+TEST(Motion, ABallThatCannotRotateSlidesToAStopAfterVSquaredOverTwoMuG) {
   Scene scene;
   scene.dt = 0.001_r;
   BodyDef def = falling({0, 1, 0});
@@ -200,7 +200,7 @@ TEST(Motion, ABallThatMayNotTurnSlidesToAStopAfterVSquaredOverTwoMuG) {
   for (int n = 0; n < 1000; ++n) {
     world.step();
     BodyState s = world.state(id);
-    s.angular_velocity = {};  // held by hand
+    s.angular_velocity = {};  // prevents rotation
     world.set_state(id, s);
   }
   EXPECT_NEAR(world.state(id).position.x, 9 / (2 * 0.5 * kG), 0.02);
@@ -216,7 +216,7 @@ TEST(Motion, FrictionTurnsBothBallsTheSameWayInAGlancingHit) {
   World world(scene);
   for (int n = 0; n < 10; ++n) world.step();
   const auto states = world.states();
-  // a passes below b and drags b's underside along +x: both turn about +z.
+  // a passes below b and drags b's underside along +x: both rotate about +z.
   EXPECT_GT(states[0].angular_velocity.z, 0.1_r);
   EXPECT_GT(states[1].angular_velocity.z, 0.1_r);
   EXPECT_NEAR(states[0].angular_velocity.z, states[1].angular_velocity.z, 1e-5);
@@ -315,7 +315,7 @@ TEST(Motion, EnergyNeverGrowsInAClosedBox) {
       ASSERT_LE(now, energy * (1 + 200 * static_cast<double>(kEpsilon))) << n;
       energy = now;
     }
-    if (run == 3) {  // elastic and smooth: all of it is kept, but for hits slower than 0.25 m/s
+    if (run == 3) {  // elastic and frictionless: only impacts slower than 0.25 m/s lose energy
       EXPECT_GT(energy, 0.97 * first);
     }
   }

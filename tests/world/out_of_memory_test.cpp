@@ -1,12 +1,12 @@
-/// Whichever allocation fails, in a step, when something comes, or in reading and writing: it is an
-/// error, nothing has happened, nothing leaks, and what follows has the same bits as ever.
+/// Tests with every allocation failing once, in steps, additions, reading and writing: the failure
+/// is an error, the state is unchanged, nothing leaks, and later results have the same bits.
 #include <jfpx/error.hpp>
 #include <jfpx/particle.hpp>
 #include <jfpx/recording.hpp>
 
 #include "tests/support/failing_new.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/world/shape_zoo.hpp"
+#include "tests/world/random_bodies.hpp"
 
 #include <array>
 
@@ -25,8 +25,8 @@ const std::array<WorldSettings, 5> kSettings{{
     {.collider = {.backend = Backend::cpu}, .broad_phase = BroadPhase::brute_force},
 }};
 
-/// All shapes, in contact.
-Scene crowd(std::uint64_t seed) {
+/// Bodies of all shapes, in contact.
+Scene dense_scene(std::uint64_t seed) {
   Random random(seed);
   Scene scene;
   for (int i = 0; i < 40; ++i) scene.bodies.push_back(random_body(&random, 2));
@@ -42,7 +42,7 @@ Scene crowd(std::uint64_t seed) {
   return scene;
 }
 
-/// The same world each time.
+/// Makes the same world in every call.
 World make_world(const Scene& scene, const WorldSettings& settings, int steps) {
   World world(scene, settings);
   const BodyId first = world.bodies()[0], second = world.bodies()[1];
@@ -54,7 +54,7 @@ World make_world(const Scene& scene, const WorldSettings& settings, int steps) {
   return world;
 }
 
-/// All that a user can see of the next steps.
+/// Observable results of a step.
 struct Moment {
   std::uint64_t hash = 0;
   std::vector<Contact> contacts;
@@ -72,17 +72,17 @@ std::vector<Moment> follow(World& world, int steps) {
   return moments;
 }
 
-TEST(OutOfMemoryInAWorld, AStepHasNotHappenedWhicheverAllocationFails) {
+TEST(OutOfMemoryInAWorld, AStepIsUndoneWhicheverAllocationFails) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
-  const Scene scene = crowd(seed);
+  const Scene scene = dense_scene(seed);
   for (std::size_t i = 0; i < kSettings.size(); ++i) {
     for (const int warm : {0, 1, 4}) {
       SCOPED_TRACE("settings " + std::to_string(i) + " after " + std::to_string(warm) + " steps");
-      World untroubled = make_world(scene, kSettings[i], warm);
-      const std::vector<Moment> expected = follow(untroubled, 3);
+      World undisturbed = make_world(scene, kSettings[i], warm);
+      const std::vector<Moment> expected = follow(undisturbed, 3);
       const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
-        const std::size_t alive = living_allocations();
+        const std::size_t alive = live_allocations();
         {
           World world = make_world(scene, kSettings[i], warm);
           const std::uint64_t before = world.state_hash();
@@ -98,7 +98,7 @@ TEST(OutOfMemoryInAWorld, AStepHasNotHappenedWhicheverAllocationFails) {
             EXPECT_TRUE(follow(world, 2) == rest) << k;
           }
         }
-        EXPECT_EQ(living_allocations(), alive) << k;
+        EXPECT_EQ(live_allocations(), alive) << k;
         return FailingNew::failed() && !testing::Test::HasFailure();
       });
       if (warm == 0) {
@@ -108,10 +108,10 @@ TEST(OutOfMemoryInAWorld, AStepHasNotHappenedWhicheverAllocationFails) {
   }
 }
 
-TEST(OutOfMemoryInAWorld, WhatFailedToComeHasLeftNoTrace) {
+TEST(OutOfMemoryInAWorld, AFailedAdditionLeavesNoTrace) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
-  const Scene scene = crowd(seed);
+  const Scene scene = dense_scene(seed);
   BodyDef def;
   def.shape = Compound{
       {{.shape = Sphere{}, .position = {0, 0, -1}}, {.shape = Box{}, .position = {0, 0, 1}}}};
@@ -131,10 +131,10 @@ TEST(OutOfMemoryInAWorld, WhatFailedToComeHasLeftNoTrace) {
       if (into_a_gap) world.step();
       return world;
     };
-    World untroubled = make();
-    come(untroubled);
-    const std::vector<Moment> expected = follow(untroubled, 3);
-    const std::vector<BodyId> bodies(untroubled.bodies().begin(), untroubled.bodies().end());
+    World undisturbed = make();
+    come(undisturbed);
+    const std::vector<Moment> expected = follow(undisturbed, 3);
+    const std::vector<BodyId> bodies(undisturbed.bodies().begin(), undisturbed.bodies().end());
     return with_every_failure([&](std::size_t k, Shortage shortage) {
       World world = make();
       const std::size_t contacts = world.contacts().size(), count = world.bodies().size();
@@ -156,14 +156,14 @@ TEST(OutOfMemoryInAWorld, WhatFailedToComeHasLeftNoTrace) {
   }
 }
 
-TEST(OutOfMemoryInAWorld, BodiesLeaveAndMoveWithoutMemory) {
-  World world = make_world(crowd(1), kSettings[0], 2);
+TEST(OutOfMemoryInAWorld, BodiesAreRemovedAndMovedWithoutMemory) {
+  World world = make_world(dense_scene(1), kSettings[0], 2);
   BodyState state = world.state(world.bodies()[1]);
   state.position.y += 1;
   const BodyId gone = world.bodies()[0], moved = world.bodies()[1], pushed = world.bodies()[2];
   const ForceId force = world.forces()[0];
   {
-    const FailingNew failing(0, Shortage::for_good);
+    const FailingNew failing(0, Shortage::permanent);
     world.remove(gone);
     world.set_state(moved, state);
     world.apply_force(pushed, {1, 2, 3});
@@ -173,21 +173,21 @@ TEST(OutOfMemoryInAWorld, BodiesLeaveAndMoveWithoutMemory) {
   EXPECT_EQ(world.state(moved).position, state.position);
 }
 
-TEST(OutOfMemoryInAWorld, AWorldThatCannotBeMadeLeavesNothingBehind) {
-  const Scene scene = crowd(2);
+TEST(OutOfMemoryInAWorld, AFailedConstructionLeaksNothing) {
+  const Scene scene = dense_scene(2);
   for (const WorldSettings& settings : kSettings) {
-    { const World first(scene, settings); }  // what is made once and kept
+    { const World first(scene, settings); }  // allocates objects that are made once and kept
     const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
-      const std::size_t alive = living_allocations();
+      const std::size_t alive = live_allocations();
       runs_out(k, shortage, [&] { const World world(scene, settings); });
-      EXPECT_EQ(living_allocations(), alive) << k;
+      EXPECT_EQ(live_allocations(), alive) << k;
       return FailingNew::failed() && !testing::Test::HasFailure();
     });
     EXPECT_GT(failures, 20u);
   }
 }
 
-TEST(OutOfMemoryAmongParticles, NothingHasHappenedWhicheverAllocationFails) {
+TEST(OutOfMemoryAmongParticles, AFailedAllocationLeavesTheStateUnchanged) {
   const auto make = [] {
     ParticleWorld world({.grounds = {HalfSpace{}}});
     for (int i = 0; i < 16; ++i) {
@@ -208,9 +208,9 @@ TEST(OutOfMemoryAmongParticles, NothingHasHappenedWhicheverAllocationFails) {
   const auto step = [](ParticleWorld& world) { world.step(); };
   const auto add = [](ParticleWorld& world) { world.add({.position = {0, 3, 0}, .radius = 1}); };
   const auto happens = [&](const auto& happen) {
-    ParticleWorld untroubled = make();
-    happen(untroubled);
-    const std::vector<ParticleState> expected = end(untroubled);
+    ParticleWorld undisturbed = make();
+    happen(undisturbed);
+    const std::vector<ParticleState> expected = end(undisturbed);
     return with_every_failure([&](std::size_t k, Shortage shortage) {
       ParticleWorld world = make();
       if (runs_out(k, shortage, [&] { happen(world); })) {
@@ -225,7 +225,7 @@ TEST(OutOfMemoryAmongParticles, NothingHasHappenedWhicheverAllocationFails) {
   EXPECT_GT(happens(add), 0u);
 }
 
-TEST(OutOfMemoryInACollider, TheNextCallFindsEverything) {
+TEST(OutOfMemoryInACollider, ACallAfterAFailedOneFindsAllContacts) {
   Random random(3);
   std::vector<SphereInstance> spheres(700);
   for (SphereInstance& sphere : spheres) {
@@ -233,8 +233,8 @@ TEST(OutOfMemoryInACollider, TheNextCallFindsEverything) {
   }
   const std::vector<SpherePair> pairs{{0, 1}, {5, 3}, {699, 0}};
   for (const WorldSettings& settings : kSettings) {
-    const auto untroubled = make_sphere_collider(settings.collider);
-    const ContactSpan found = untroubled->find_contacts(spheres);
+    const auto undisturbed = make_sphere_collider(settings.collider);
+    const ContactSpan found = undisturbed->find_contacts(spheres);
     const std::vector<SphereContact> expected(found.begin(), found.end());
     const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
       const auto collider = make_sphere_collider(settings.collider);
@@ -249,16 +249,16 @@ TEST(OutOfMemoryInACollider, TheNextCallFindsEverything) {
   }
 }
 
-// Not so the JSON in a recording's head, and in scene files: the library that reads and writes it
-// ends the program when a small allocation fails.
-TEST(OutOfMemoryInRecordings, FramesAreWrittenWithoutMemoryAndReadTheNextTime) {
+// Does not hold for the JSON in the header of a recording and in scene files: the JSON library
+// terminates the program when a small allocation fails.
+TEST(OutOfMemoryInRecordings, FramesAreWrittenWithoutMemoryAndReadOnTheNextAttempt) {
   const TemporaryFolder folder;
   const std::string path = folder.file("run.rec");
-  const RecordingHeader header{.engine = "native", .backend = "x86", .scene = crowd(4)};
+  const RecordingHeader header{.engine = "native", .backend = "cpu", .scene = dense_scene(4)};
   const std::vector<BodyState> states(header.scene.bodies.size());
   RecordingWriter writer(path, header);
   {
-    const FailingNew failing(0, Shortage::for_good);
+    const FailingNew failing(0, Shortage::permanent);
     writer.append(states);
     writer.append(states);
     writer.finish();

@@ -1,4 +1,4 @@
-/// Particles: flight, bounces and rest against formulas; ids, bad input, equal bits.
+/// Tests of particles: flight, bounces and rest against formulas; ids, bad input, determinism.
 #include <jfpx/error.hpp>
 #include <jfpx/particle.hpp>
 
@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 constexpr double kEps = std::numeric_limits<Real>::epsilon();
 constexpr HalfSpace kGround{{0, 1, 0}, 0};
 
-/// A particle that nothing pulls.
+/// A particle without gravity.
 ParticleDef free_particle(const Vec3& position, const Vec3& velocity = {}, Real radius = 0) {
   ParticleDef def;
   def.position = position;
@@ -51,8 +51,8 @@ TEST(Particle, FliesAsAProjectileWithDrag) {
   EXPECT_NEAR(world.state(id).position.z, dt * 40 * sum, 1e5 * kEps);
 }
 
-TEST(Particle, ComesCloserToTheTrueFlightWithShorterSteps) {
-  // dv/dt = a - k v with k = -ln(damping): y(1 s) in closed form. The error goes with dt.
+TEST(Particle, ConvergesToTheExactFlightWithShorterSteps) {
+  // dv/dt = a - k v with k = -ln(damping): y(1 s) in closed form. The error is proportional to dt.
   const double k = -std::log(0.5), a = -9.81;
   const double y = (5 - a / k) * (1 - std::exp(-k)) / k + a / k;
   double error[2];
@@ -102,7 +102,7 @@ TEST(Particle, ElasticHitOfUnequalMassesKeepsMomentumAndEnergy) {
   light.velocity = {-2, 0, 0};
   const ParticleId a = world.add(heavy), b = world.add(light);
   step(&world, 10);
-  // u1 = ((m1 - m2) v1 + 2 m2 v2) / (m1 + m2), u2 likewise.
+  // u1 = ((m1 - m2) v1 + 2 m2 v2) / (m1 + m2), u2 by symmetry.
   EXPECT_NEAR(world.state(a).velocity.x, 0, 100 * kEps);
   EXPECT_NEAR(world.state(b).velocity.x, 4, 100 * kEps);
 }
@@ -119,7 +119,7 @@ TEST(Particle, RestitutionIsTheRatioOfSpeeds) {
   }
 }
 
-TEST(Particle, APushRunsThroughARow) {
+TEST(Particle, AnImpulsePropagatesThroughARow) {
   ParticleWorld world({.dt = 0.01_r});
   std::vector<ParticleId> row;
   for (int i = 0; i < 6; ++i) {
@@ -241,12 +241,12 @@ TEST(Particle, AGasKeepsItsMomentumAndNeverGainsEnergy) {
   EXPECT_LT(energy[1], energy[0] * (1 + 100 * kEps));
 }
 
-TEST(Particle, ColliderAndRepeatsDoNotShowInTheBits) {
+TEST(Particle, HasTheSameBitsWithAnyColliderAndRepeat) {
   std::vector<ParticleState> first;
   const SphereColliderOptions ways[] = {
       {.algorithm = SphereAlgorithm::all_pairs},
       {.algorithm = SphereAlgorithm::all_pairs},
-      {.algorithm = SphereAlgorithm::all_pairs, .threads = 3},  // rows are shared out by 64
+      {.algorithm = SphereAlgorithm::all_pairs, .threads = 3},  // threads process blocks of 64 rows
       {.algorithm = SphereAlgorithm::sorted_tiles, .threads = 3, .simd = SimdLevel::scalar}};
   for (const SphereColliderOptions& collider : ways) {
     Random random(7);
@@ -266,7 +266,7 @@ TEST(Particle, ColliderAndRepeatsDoNotShowInTheBits) {
   }
 }
 
-TEST(Particle, IdsOfRemovedParticlesNeverComeBack) {
+TEST(Particle, IdsOfRemovedParticlesAreNeverReused) {
   ParticleWorld world;
   const ParticleId a = world.add({}), b = world.add({});
   world.remove(a);
@@ -284,7 +284,7 @@ TEST(Particle, IdsOfRemovedParticlesNeverComeBack) {
   EXPECT_EQ(world.state(c).position, (Vec3{1, 2, 3}));
 }
 
-TEST(Particle, NothingIsAWorldToo) {
+TEST(Particle, AnEmptyWorldSteps) {
   ParticleWorld world({.grounds = {kGround}});
   EXPECT_EQ(world.step().step, 1u);
   EXPECT_EQ(world.step().step, 2u);
@@ -337,7 +337,7 @@ TEST(Particle, BadFieldsAreNamedWithValueAndRange) {
   EXPECT_THROW(world.set_state(id, {{kInf, 0, 0}, {}}), InvalidArgument);
 }
 
-TEST(Particle, FliesOnFromTheStateItIsGiven) {
+TEST(Particle, ContinuesFromTheStateThatIsSet) {
   ParticleWorld moved, made;
   const ParticleId id = moved.add({});
   moved.step();

@@ -1,7 +1,7 @@
-/// Hashes of native runs, equal for every compiler and optimisation level. A changed hash is a
-/// change of what every user computes: pin the new one only with a line in CHANGELOG.md.
-/// A plain program, so that flavours/ can build it quickly in many ways. Arguments are numbers of
-/// threads to compute with, in turn; without any, it is 1.
+/// Pinned hashes of native runs, equal for every compiler and optimization level. A changed hash
+/// means changed results for every user; a new hash requires an entry in CHANGELOG.md. A program
+/// without a test framework, so that flavours/ can build it quickly in many ways. The arguments are
+/// numbers of threads, used one after the other; the default is 1.
 #include <jfpx/random.hpp>
 #include <jfpx/world.hpp>
 
@@ -51,18 +51,19 @@ constexpr DemoPin kDemoPins[] = {
     {"flight", 900, 0xc255fca24d5f635eu, 0xa3eabd790ad788b7u},
 };
 
-/// Each vector width has its turn with some number of threads; the widest there is with one.
+/// Vector width for a number of threads: every width occurs; 1 thread uses the widest available.
 SimdLevel simd_of(unsigned threads) {
   constexpr SimdLevel kLevels[] = {SimdLevel::automatic, SimdLevel::scalar, SimdLevel::sse2,
                                    SimdLevel::avx2, SimdLevel::avx512};
   return kLevels[(threads - 1) % std::size(kLevels)];
 }
 
-/// False, with a line that says why, if the run goes wrong, resolves nothing, or ends elsewhere.
+/// Returns false and prints the reason if the run fails, resolves nothing, or ends with another
+/// hash.
 bool check(const Pin& pin, unsigned threads) {
   WorldSettings settings;
   settings.collider = {.backend = Backend::cpu, .threads = threads, .simd = simd_of(threads)};
-  // Of small sets, threads share the rows of all pairs alone.
+  // Small sets use several threads only in the all-pairs search.
   if (threads > 1 && pin.spheres < 20000) {
     settings.collider.algorithm = SphereAlgorithm::all_pairs;
   }
@@ -78,15 +79,15 @@ bool check(const Pin& pin, unsigned threads) {
   const bool same = world.state_hash() == expected;
   std::printf("%-16s %5" PRIu32 " spheres %5d steps  %016" PRIx64 "  %s\n", pin.scene, pin.spheres,
               pin.steps, world.state_hash(),
-              !finite         ? "WRONG: a body ran away"
+              !finite         ? "WRONG: a body is not finite"
               : resolved == 0 ? "WRONG: no contact was resolved"
               : !same         ? "WRONG: another hash is pinned"
                               : "as pinned");
   return finite && resolved > 0 && same;
 }
 
-/// A demo under random hands that leave its reset alone. The hash is over the states of all steps,
-/// because rounds come and go.
+/// A demo with random inputs except its reset. The hash covers the states of all steps, because
+/// rounds are added and removed.
 bool check(const DemoPin& pin) {
   const auto demo = demos::make(pin.demo);
   const std::size_t reset = find_control(*demo, "reset");
@@ -108,7 +109,7 @@ bool check(const DemoPin& pin) {
   const bool same = hash.value() == expected;
   std::printf("%-16s  as a demo  %5d steps  %016" PRIx64 "  %s\n", pin.demo, pin.steps,
               hash.value(),
-              !finite ? "WRONG: a body ran away"
+              !finite ? "WRONG: a body is not finite"
               : !same ? "WRONG: another hash is pinned"
                       : "as pinned");
   return finite && same;

@@ -1,4 +1,4 @@
-/// Rays and overlaps: by hand, against distance functions in double, and with bad input.
+/// Tests of rays and overlaps: known cases, distance functions in double, and bad input.
 #include <jfpx/error.hpp>
 
 #include "tests/world/support.hpp"
@@ -67,7 +67,7 @@ struct Solid {
     }
     return outside > 0 ? std::sqrt(outside) : inside;
   }
-  /// The point of a box next to p.
+  /// The point of a box nearest to p.
   Point nearest(const Point& p, double shrunk_by) const {
     Point local = to_local(p);
     const Point h = to_double(std::get<Box>(shape).half_extents);
@@ -78,8 +78,8 @@ struct Solid {
   }
 };
 
-/// Where a ray is deeper in a solid than `margin`, by steps that can't jump over such a place (Hart
-/// 1996, sphere tracing); infinity if nowhere before `end`.
+/// Distance at which a ray is first deeper in a solid than `margin`, by sphere tracing (Hart 1996),
+/// which cannot step over such a point; infinity if there is none before `end`.
 double march(const Solid& solid, const Point& origin, const Point& direction, double end,
              double margin) {
   for (double t = 0; t < end;) {
@@ -90,7 +90,7 @@ double march(const Solid& solid, const Point& origin, const Point& direction, do
   return std::numeric_limits<double>::infinity();
 }
 
-/// Balls, boxes and a half-space, some in each other.
+/// Balls, boxes and a half-space, some of them overlapping.
 Scene random_scene(Random* random, int bodies) {
   Scene scene;
   for (int i = 0; i < bodies; ++i) {
@@ -113,14 +113,14 @@ Vec3 random_direction(Random* random) {
   const Vec3 v = random->uniform_in_box({-1, -1, -1}, {1, 1, 1});
   Vec3 axis{};
   axis[static_cast<int>(random->below(3))] = random->below(2) != 0 ? Real(1) : Real(-1);
-  return random->below(4) == 0 ? axis : v;  // parallel to faces now and then
+  return random->below(4) == 0 ? axis : v;  // parallel to faces in a quarter of the cases
 }
 
-TEST(RayCast, HitsWhatTheDistanceFunctionsSayAndNothingElse) {
+TEST(RayCast, AgreesWithTheDistanceFunctions) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
-  const double margin = 4e-5;  // 20 m in float: a step of 2e-6, some ten of which add up
+  const double margin = 4e-5;  // 20 m in float: a step of 2e-6, about ten of which add up
   std::uint64_t hits = 0, inside = 0;
   for (int run = 0; run < 300; ++run) {
     const Scene scene = random_scene(&random, 12);
@@ -146,7 +146,7 @@ TEST(RayCast, HitsWhatTheDistanceFunctionsSayAndNothingElse) {
           ++inside;
           continue;
         }
-        // On the surface, not in the solid before, and against the normal of this very face.
+        // On the surface, outside the solid before it, and against the normal of this face.
         const Point there = along(origin, direction, t);
         ASSERT_NEAR(solid.distance(there), 0, margin) << "body " << hit.body.index;
         ASSERT_GE(march(solid, origin, direction, t - 1e-3, margin), t - 1e-3);
@@ -163,7 +163,7 @@ TEST(RayCast, HitsWhatTheDistanceFunctionsSayAndNothingElse) {
         ASSERT_GE(march(solid, origin, direction, ray.max_distance - margin, margin), 1e9) << body;
       }
       hits += found.size();
-      // The closest is the first of all, which are sorted.
+      // The closest hit is the first of the sorted list.
       for (std::size_t k = 1; k < found.size(); ++k) {
         ASSERT_LE(std::pair(found[k - 1].distance, found[k - 1].body.index),
                   std::pair(found[k].distance, found[k].body.index));
@@ -201,8 +201,8 @@ TEST(RayCast, GivesDistancePointAndNormal) {
   EXPECT_EQ(hits[2], (RayHit{world.bodies()[0], 20, {20, 0.5_r, 0}, {-1, 0, 0}}));
 }
 
-/// Half a radius beside the centre the normal is (-sqrt(3)/2, 1/2, 0), however small the radius and
-/// its square are.
+/// Half a radius beside the centre, the normal is (-sqrt(3)/2, 1/2, 0) for any radius, even if its
+/// square underflows.
 TEST(RayCast, SmallSpheresHaveUnitNormalsAndAreHitWhereTheyAre) {
   const Real least = std::numeric_limits<Real>::denorm_min();
   for (const Real radius : {kEpsilon, kEpsilon / 2, 1e-9_r, 1e-20_r, 4096 * least, 4 * least}) {
@@ -229,7 +229,7 @@ TEST(RayCast, EndsAtItsMaximumDistanceInclusive) {
   EXPECT_FALSE(World{Scene{}}.cast_ray({}));
 }
 
-TEST(RayCast, FromInsideHitsAtOnceAgainstTheRay) {
+TEST(RayCast, FromInsideHitsAtDistanceZeroAgainstTheRay) {
   const World world = three_in_a_row();
   for (const Vec3& from : {Vec3{5, 0.5_r, 0}, Vec3{10, 0, 0}, Vec3{30, 0, 0}}) {
     const auto hit = world.cast_ray({from, {0, 2, 0}});
@@ -240,7 +240,7 @@ TEST(RayCast, FromInsideHitsAtOnceAgainstTheRay) {
   }
 }
 
-TEST(RayCast, HearsOnlyOfBodiesThatTheFilterWants) {
+TEST(RayCast, FindsOnlyBodiesThatTheFilterSelects) {
   const World world = three_in_a_row();
   const BodyId ball = world.bodies()[2];
   const auto not_the_ball = [ball](BodyId id) { return id != ball; };
@@ -267,8 +267,8 @@ TEST(RayCast, TheLengthOfTheDirectionDoesNotMatter) {
   }
 }
 
-/// The ray meets the half-space at 2 m / sinking; of the plane it is the normal that leans.
-TEST(RayCast, WallsFartherAwayThanNumbersReachAreNotHit) {
+/// The ray intersects the half-space at 2 m / sinking; for the plane, the normal is tilted instead.
+TEST(RayCast, WallsBeyondTheRangeOfRealAreNotHit) {
   constexpr Real kDenormal = std::numeric_limits<Real>::denorm_min();
   BodyDef plane = test::half_space({1, 0, kDenormal}, 0);
   plane.shape = Plane{{1, 0, kDenormal}, 0};
@@ -292,7 +292,7 @@ TEST(RayCast, WallsFartherAwayThanNumbersReachAreNotHit) {
   EXPECT_EQ(*far, (RayHit{ids[0], 2 / sinking, {2 / sinking, 0, 0}, {0, 0, -1}}));
 }
 
-TEST(RayCast, SeesBodiesWhereTheyAreNow) {
+TEST(RayCast, FindsBodiesAtTheirCurrentPositions) {
   World world = three_in_a_row();
   world.set_state(world.bodies()[2], {{7, 0, 0}, {}, {}, {}});
   EXPECT_EQ(world.cast_ray({{0, 0, 0}, {1, 0, 0}})->distance, 6);
@@ -310,7 +310,7 @@ std::string complaint(const Call& call) {
   return "";
 }
 
-TEST(RayCast, RefusesWhatIsNoRay) {
+TEST(RayCast, RefusesInvalidRays) {
   const World world = three_in_a_row();
   const auto said = [&world](const Ray& ray) { return complaint([&] { world.cast_ray(ray); }); };
   EXPECT_EQ(said({{0, 0, 0}, {0, 0, 0}}),
@@ -327,7 +327,7 @@ TEST(RayCast, RefusesWhatIsNoRay) {
   EXPECT_NE(complaint([&] { world.cast_ray_through({{0, 0, 0}, {0, 0, 0}}); }), "");
 }
 
-TEST(Overlap, OfASphereIsWhatTheDistanceFunctionsSay) {
+TEST(Overlap, OfASphereAgreesWithTheDistanceFunctions) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
@@ -353,8 +353,8 @@ TEST(Overlap, OfASphereIsWhatTheDistanceFunctionsSay) {
   EXPECT_GT(touching, 1000u);
 }
 
-/// Distance of two boxes, from above: by going to and fro between the points nearest to each other
-/// (Cheney and Goldstein 1959), until it is `enough`. Edges that are nearly parallel take long.
+/// Upper bound of the distance of two boxes, by alternating projections (Cheney and Goldstein 1959)
+/// until it is at most `enough`. Nearly parallel edges converge slowly.
 double gap(const Solid& a, const Solid& b, double shrunk_by, double enough, int most = 300000) {
   Point p = a.centre, q = b.centre;
   double distance = 1e300;
@@ -367,7 +367,7 @@ double gap(const Solid& a, const Solid& b, double shrunk_by, double enough, int 
   return distance;
 }
 
-TEST(Overlap, OfABoxIsWhatTheDistanceFunctionsSay) {
+TEST(Overlap, OfABoxAgreesWithTheDistanceFunctions) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
@@ -400,8 +400,7 @@ TEST(Overlap, OfABoxIsWhatTheDistanceFunctionsSay) {
             distance = std::min(distance, solid.distance(box.to_world(local)));
           }
         } else if (found.contains(body)) {
-          // As near as collide() promises for edges that are nearly parallel, and 1 mm for the
-          // oracle.
+          // The tolerance of collide() for nearly parallel edges, and 1 mm for the oracle.
           const double size = static_cast<double>(length(std::get<Box>(def.shape).half_extents) +
                                                   length(std::get<Box>(solid.shape).half_extents));
           const double near = 2 * std::sqrt(static_cast<double>(kEpsilon)) * size + 1e-3;
@@ -430,7 +429,7 @@ TEST(Overlap, ComesInTheOrderOfBodiesAndCountsAnExactTouch) {
   EXPECT_THAT(World{Scene{}}.overlapping(Sphere{}, {}), ElementsAre());
 }
 
-TEST(Overlap, RefusesWhatCouldBeNoBody) {
+TEST(Overlap, RefusesInvalidShapes) {
   const World world = three_in_a_row();
   const auto sphere = [&world](Real radius, const Vec3& centre) {
     return complaint([&] { world.overlapping(Sphere{radius}, centre); });

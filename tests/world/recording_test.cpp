@@ -1,4 +1,4 @@
-/// Recordings: round trip, every kind of damage, and where two frames differ.
+/// Tests of recordings: round trip, damaged files, and the difference of two frames.
 #include <jfpx/error.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/recording.hpp>
@@ -37,7 +37,7 @@ std::vector<BodyState> random_states(std::size_t bodies, std::uint64_t seed) {
 
 RecordingHeader header_of(std::uint32_t spheres) {
   return {
-      .engine = "native", .backend = "x86", .scene = scenes::make("overlap", {.spheres = spheres})};
+      .engine = "native", .backend = "cpu", .scene = scenes::make("overlap", {.spheres = spheres})};
 }
 
 void write_recording(const std::string& path, std::uint32_t spheres, std::uint64_t steps) {
@@ -141,7 +141,7 @@ TEST(Recording, EveryTruncationIsFound) {
   }
 }
 
-TEST(Recording, ErrorsSayWhatIsWrong) {
+TEST(Recording, ErrorsNameTheCause) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("run.rec");
   const auto complaint = [&path] {
@@ -189,7 +189,7 @@ TEST(Recording, OfABadSceneIsCorruptThoughItsChecksumIsRight) {
   overwrite(path, bad);
   try {
     RecordingReader reader(path);
-    ADD_FAILURE() << "a header that is no header was read";
+    ADD_FAILURE() << "an invalid header was accepted";
   } catch (const FileError& error) {
     EXPECT_THAT(error.what(), HasSubstr("run.rec: is corrupt: body 0: has an unknown field"));
   }
@@ -206,7 +206,7 @@ TEST(Recording, OfNumbersThatAreNeitherFloatNorDoubleHasNoPrecision) {
   EXPECT_THROW(RecordingReader{path}, FileError);
 }
 
-TEST(Recording, OfANameThatIsNoUtf8IsReadBackWithAReplacement) {
+TEST(Recording, WithANameThatIsNotUtf8IsReadBackWithAReplacement) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("run.rec");
   RecordingHeader header = header_of(1);
@@ -215,11 +215,11 @@ TEST(Recording, OfANameThatIsNoUtf8IsReadBackWithAReplacement) {
   EXPECT_EQ(RecordingReader(path).header().scene.name, "caf\xef\xbf\xbd");
 }
 
-TEST(Recording, GoesWhereALinkLeads) {
+TEST(Recording, IsWrittenThroughASymbolicLink) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("run.rec"), link = folder.file("link.rec");
   std::filesystem::create_symlink("run.rec", link);
-  for (const std::uint64_t steps : {1u, 2u}) {  // nothing is there, then a file
+  for (const std::uint64_t steps : {1u, 2u}) {  // first without a file, then with one
     write_recording(link, 3, steps);
     EXPECT_TRUE(std::filesystem::is_symlink(link));
     EXPECT_FALSE(std::filesystem::is_symlink(path));
@@ -228,7 +228,7 @@ TEST(Recording, GoesWhereALinkLeads) {
   }
 }
 
-TEST(Recording, GoesIntoAPipeThatStaysOne) {
+TEST(Recording, IsWrittenIntoAPipeWithoutReplacingIt) {
   const test::TemporaryFolder folder;
   const std::string pipe = folder.file("pipe"), path = folder.file("run.rec");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);

@@ -1,4 +1,4 @@
-/// Worlds that come to rest: nothing sinks, nothing trembles, sleepers sleep and wake.
+/// Tests of worlds that come to rest: no sinking, no jitter, sleeping and waking.
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 
@@ -28,7 +28,7 @@ Scene on_the_ground(std::vector<BodyDef> bodies) {
   return scene;
 }
 
-TEST(Rest, ABallOnTheGroundNeitherSinksNorTrembles) {
+TEST(Rest, ABallOnTheGroundNeitherSinksNorJitters) {
   const Scene scene = on_the_ground({heavy({0, 1, 0}, false)});
   World world(scene);
   for (int n = 0; n < 60; ++n) world.step();
@@ -76,7 +76,7 @@ TEST(Rest, AStackOfTenKeepsEachContactWithinTheEpsilonAndFallsAsleep) {
 }
 
 TEST(Rest, AHeapOfBallsComesToRestAboveTheGround) {
-  // The tower of the thesis, short: it leans, falls over and lies side by side.
+  // A short tower of the thesis: it leans, falls over, and its balls come to lie side by side.
   std::vector<BodyDef> balls;
   for (int i = 0; i < 6; ++i) {
     const Real y = 1 + 3 * static_cast<Real>(i);
@@ -132,7 +132,7 @@ TEST(Sleep, TouchingBallsFallAsleepTogetherAndKeepTheirContacts) {
   EXPECT_EQ(world.states(), before);
 }
 
-TEST(Sleep, AHitWakesAllThatTouch) {
+TEST(Sleep, AHitWakesAllBodiesInContact) {
   World world = sleeping_row();
   BodyDef shot = heavy({-2.2_r, 1, 0}, true);
   shot.velocity = {10, 0, 0};
@@ -144,20 +144,20 @@ TEST(Sleep, AHitWakesAllThatTouch) {
   EXPECT_GT(world.states()[3].velocity.x, 0.5_r);
 }
 
-TEST(Sleep, TheSurroundingsWakeNobody) {
+TEST(Sleep, ImmovableBodiesWakeNoBody) {
   World world = sleeping_row();
   const auto before = world.states();
   for (int n = 0; n < 60; ++n) EXPECT_EQ(world.step().awake, 0u);
   EXPECT_EQ(world.states(), before);
 }
 
-TEST(Sleep, WhoIsWokenFeelsAForceThatHasChanged) {
+TEST(Sleep, AWokenBodyRespondsToAChangedForce) {
   World world = sleeping_row();
   const ForceId lift = world.add_force(Gravity{{0, 0, 0}});
   for (int n = 0; n < 120; ++n) world.step();
   const BodyId first = world.bodies()[0];
   world.force<Gravity>(lift).acceleration = {0, 50, 0};
-  EXPECT_EQ(world.step().awake, 0u) << "a change alone wakes nobody";
+  EXPECT_EQ(world.step().awake, 0u) << "a change alone wakes no body";
   world.wake(first);
   EXPECT_TRUE(world.awake(first));
   for (int n = 0; n < 10; ++n) world.step();
@@ -170,7 +170,7 @@ TEST(Sleep, WhoIsWokenFeelsAForceThatHasChanged) {
   EXPECT_THROW(world.wake(first), InvalidArgument);
 }
 
-TEST(Sleep, WhoLosesTheSupportWakesAndFalls) {
+TEST(Sleep, ABodyThatLosesItsSupportWakesAndFalls) {
   for (const bool remove : {true, false}) {
     World world(on_the_ground({heavy({0, 0.995_r, 0}, true), heavy({0, 2.99_r, 0}, true)}));
     for (int n = 0; n < 120; ++n) world.step();
@@ -186,11 +186,11 @@ TEST(Sleep, WhoLosesTheSupportWakesAndFalls) {
   }
 }
 
-/// What rests on a body is known until a step has found what it rests on now.
-TEST(Sleep, WhoLosesTheSupportAfterOtherChangesWakesToo) {
+/// The contacts of a body remain known until the next step has found its new ones.
+TEST(Sleep, ABodyThatLosesItsSupportAfterOtherChangesWakesToo) {
   using Change = void (*)(World&);
   const Change changes[] = {
-      [](World& w) { w.remove(w.bodies()[0]); },  // the other pedestal
+      [](World& w) { w.remove(w.bodies()[0]); },  // the other support
       [](World& w) {
         w.add(test::ball({50, 50, 50}, 1));
       },
@@ -228,7 +228,7 @@ TEST(Sleep, WhoLosesTheSupportAfterOtherChangesWakesToo) {
   }
 }
 
-TEST(Sleep, OneThatMayNotSleepKeepsItsNeighboursAwake) {
+TEST(Sleep, ABodyThatCannotSleepKeepsItsNeighborsAwake) {
   World world(on_the_ground({heavy({0, 0.995_r, 0}, false), heavy({1.995_r, 0.995_r, 0}, true)}));
   StepReport report;
   for (int n = 0; n < 300; ++n) report = world.step();

@@ -1,9 +1,10 @@
-/// Worlds that never come to rest, with bodies and forces that come and go: memory stays flat.
+/// Long runs of worlds that never come to rest, with bodies and forces that are added and removed:
+/// the memory use stays constant.
 #include "tests/support/soak.hpp"
 
 #include <jfpx/particle.hpp>
 
-#include "tests/world/shape_zoo.hpp"
+#include "tests/world/random_bodies.hpp"
 
 #include <deque>
 
@@ -23,7 +24,7 @@ std::vector<BodyDef> walls(Real room) {
   return bodies;
 }
 
-/// One that bounces for ever.
+/// A body that does not come to rest.
 BodyDef bouncing_body(Random* random, Real room) {
   BodyDef def;
   do {
@@ -35,7 +36,7 @@ BodyDef bouncing_body(Random* random, Real room) {
   return def;
 }
 
-TEST(Soak, AWorldWhereBodiesComeAndGoKeepsItsMemoryFlat) {
+TEST(Soak, AWorldWithChangingBodiesKeepsItsMemoryFlat) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
   Random random(seed);
@@ -62,7 +63,7 @@ TEST(Soak, AWorldWhereBodiesComeAndGoKeepsItsMemoryFlat) {
   EXPECT_EQ(failed, 0u);
 }
 
-TEST(Soak, ParticlesThatComeAndGoKeepTheirMemoryFlat) {
+TEST(Soak, ParticlesThatAreAddedAndRemovedKeepTheirMemoryFlat) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
   Random random(seed);

@@ -1,4 +1,4 @@
-/// Small scenes and sums that the tests of the world share.
+/// Small scenes and conserved quantities for the tests of worlds.
 #pragma once
 
 #include <jfpx/random.hpp>
@@ -17,10 +17,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// A Real that is written as a decimal number.
+/// A Real from a decimal literal.
 constexpr Real operator""_r(long double value) { return static_cast<Real>(value); }
 
-/// A seed that differs from run to run; JFPX_TEST_SEED fixes it. Show it with SCOPED_TRACE.
+/// A seed that differs in every run, or that of JFPX_TEST_SEED. Report it with SCOPED_TRACE.
 inline std::uint64_t fresh_seed() {
   if (const char* fixed = std::getenv("JFPX_TEST_SEED")) return std::strtoull(fixed, nullptr, 0);
   std::random_device device;
@@ -28,7 +28,7 @@ inline std::uint64_t fresh_seed() {
 }
 inline std::string trace(std::uint64_t seed) { return "JFPX_TEST_SEED=" + std::to_string(seed); }
 
-/// A ball that nothing pulls, damps or lets sleep.
+/// A ball without gravity, damping, friction and sleep.
 inline BodyDef ball(const Vec3& position, Real radius = 1, Real mass = 1) {
   BodyDef def;
   def.shape = Sphere{radius};
@@ -47,16 +47,16 @@ inline BodyDef half_space(const Vec3& normal, Real offset) {
 }
 inline BodyDef ground() { return half_space({0, 1, 0}, 0); }
 
-/// Ten bodies like the lowest, stacked, stay where they are to a millimetre for ten seconds.
+/// Expects that a stack of ten bodies like the lowest moves less than a millimetre in ten seconds.
 inline void expect_that_ten_stand(const BodyDef& lowest, Real height) {
   Scene scene;
   for (int i = 0; i < 10; ++i) {
     scene.bodies.push_back(lowest);
-    // A hundredth of a millimetre into each other, so that all touch though the sums round.
+    // An overlap of a hundredth of a millimetre, so that all touch despite rounding.
     scene.bodies.back().position.y += (height - Real(1e-5)) * static_cast<Real>(i);
   }
   scene.bodies.push_back(ground());
-  scene.resolver.position_epsilon = Real(5e-5);  // ten of them are half a millimetre
+  scene.resolver.position_epsilon = Real(5e-5);  // ten of them add up to half a millimetre
   scene.resolver.velocity_epsilon = Real(1e-3);
   scene.resolver.max_iterations = 100000;
   World world(scene);
@@ -76,7 +76,7 @@ inline void expect_that_ten_stand(const BodyDef& lowest, Real height) {
 struct Sums {
   double energy = 0;  ///< kinetic
   double momentum[3] = {}, angular_momentum[3] = {};
-  double scale = 0;  ///< of the momenta, for tolerances
+  double scale = 0;  ///< magnitude of the momenta, for tolerances
 };
 inline Sums sums(std::span<const BodyDef> bodies, std::span<const BodyState> states) {
   Sums total;

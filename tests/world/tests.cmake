@@ -30,10 +30,14 @@ jfpx_add_test(out_of_memory_test SOURCES
 
 jfpx_add_executable(pinned_hashes SOURCES world/pinned_hashes.cpp LINK jfpx jfpx_demos)
 foreach(suffix IN ITEMS "" "_f64")
+  if(NOT JFPX_HAS_PRECISION${suffix})
+    continue()
+  endif()
   add_test(NAME PinnedHashes${suffix} COMMAND pinned_hashes${suffix})
   add_test(NAME PinnedHashes.WithAnyNumberOfThreads${suffix} COMMAND pinned_hashes${suffix} 2 3 4 5 6 7 8)
 endforeach()
-add_test(NAME PinnedHashes.WithEveryCompiler
+# Builds the engine with two compilers, at two optimization levels each: scripts/check compilers.
+add_test(NAME PinnedHashes.WithEveryCompiler CONFIGURATIONS Compilers
   COMMAND ${CMAKE_COMMAND} -DBINARY_DIR=${PROJECT_BINARY_DIR}/flavours
     -DCONFIG_DIR=${PROJECT_BINARY_DIR}/include -DLAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
     -P ${CMAKE_CURRENT_LIST_DIR}/flavours/run.cmake)

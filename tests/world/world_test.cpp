@@ -1,4 +1,4 @@
-/// The world as its users see it: bodies come and go, reports, failures, contacts, determinism.
+/// Tests of World: addition and removal of bodies, reports, failures, contacts, determinism.
 #include <jfpx/error.hpp>
 
 #include "src/scenes/scenes.hpp"
@@ -23,7 +23,7 @@ Scene two_balls() {
   return scene;
 }
 
-TEST(World, OfNothingSteps) {
+TEST(World, AnEmptyWorldSteps) {
   World world{Scene{}};
   const StepReport report = world.step();
   EXPECT_EQ(report.step, 1u);
@@ -70,15 +70,31 @@ TEST(World, ContactsAreSpherePairsFirstEachByBody) {
   const StepReport report = world.step();
   EXPECT_EQ(report.sphere_contacts, 3u);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-  for (const Contact& c : world.contacts()) pairs.push_back({c.a, c.b});
-  // The immovable ball 4 touches half-spaces too, which is nobody's contact.
+  for (const Contact& c : world.contacts()) pairs.push_back({c.a.index, c.b.index});
+  // The immovable ball 4 touches the half-spaces too, which is no contact.
   EXPECT_EQ(pairs, (std::vector<std::pair<std::uint32_t, std::uint32_t>>{
                        {1, 2}, {1, 4}, {2, 4}, {1, 0}, {1, 3}, {2, 0}, {2, 3}}));
   EXPECT_EQ(world.contacts()[3].normal, (Vec3{0, 1, 0}));
   EXPECT_EQ(world.contacts()[3].distance, 0.9_r - 1);
 }
 
-TEST(World, BodiesComeAndGoAtAnyTime) {
+TEST(World, ContactsNameANewBodyByItsOwnId) {
+  World world(two_balls());
+  const BodyId old = world.bodies()[0], other = world.bodies()[1];
+  world.step();
+  ASSERT_EQ(world.contacts().size(), 1u);
+  EXPECT_EQ(world.contacts()[0].a, old);
+  EXPECT_EQ(world.contacts()[0].b, other);
+  world.remove(old);
+  const BodyId fresh = world.add(test::ball({0, 0, 0}));
+  ASSERT_EQ(fresh.index, old.index);
+  world.step();
+  ASSERT_EQ(world.contacts().size(), 1u);
+  EXPECT_EQ(world.contacts()[0].a, fresh);
+  EXPECT_EQ(world.contacts()[0].b, other);
+}
+
+TEST(World, BodiesAreAddedAndRemovedAtAnyTime) {
   World world(two_balls());
   world.step();
   const BodyId first = world.bodies()[0], second = world.bodies()[1];
@@ -96,7 +112,7 @@ TEST(World, BodiesComeAndGoAtAnyTime) {
   world.step();
 }
 
-TEST(World, AStrangeIdIsAnError) {
+TEST(World, AnUnknownIdIsAnError) {
   World world(two_balls());
   const BodyId gone = world.bodies()[0];
   world.remove(gone);
@@ -106,7 +122,7 @@ TEST(World, AStrangeIdIsAnError) {
   EXPECT_THROW(world.set_state({7, 0}, {}), InvalidArgument);
 }
 
-TEST(World, AnIdOfAnotherWorldNamesTheBodyInItsPlaceOrNone) {
+TEST(World, AnIdOfAnotherWorldRefersToTheSameIndexOrNone) {
   Scene more = two_balls();
   more.bodies.push_back(test::ball({9, 0, 0}));
   World here(two_balls());
@@ -114,7 +130,7 @@ TEST(World, AnIdOfAnotherWorldNamesTheBodyInItsPlaceOrNone) {
   EXPECT_EQ(here.state(other.bodies()[1]), here.states()[1]);
   EXPECT_THROW(here.state(other.bodies()[2]), InvalidArgument);
   here.remove(here.bodies()[1]);
-  here.add(test::ball({5, 0, 0}));  // in the same place, but another body
+  here.add(test::ball({5, 0, 0}));  // the same index, but another generation
   EXPECT_THROW(here.state(other.bodies()[1]), InvalidArgument);
 }
 
@@ -145,7 +161,7 @@ TEST(World, ASpinWithoutADirectionIsUndone) {
   EXPECT_NO_THROW(world.set_state(world.bodies()[0], before[0]));
 }
 
-TEST(World, SetStateRefusesWhatAnySceneWould) {
+TEST(World, SetStateRefusesInvalidStates) {
   World world(two_balls());
   const BodyId id = world.bodies()[0];
   const auto before = world.states();
@@ -171,7 +187,7 @@ TEST(World, AnObstacleCanBeMoved) {
   EXPECT_EQ(world.step().contacts, 1u);
 }
 
-TEST(World, NamesTheBodyOfAnIndexAndItsShape) {
+TEST(World, FindsTheBodyOfAnIndexAndItsShape) {
   Scene scene;
   scene.bodies = {test::ball({0, 0, 0}), test::ball({5, 0, 0}, 2), test::ball({9, 0, 0})};
   World world(scene);
@@ -180,7 +196,7 @@ TEST(World, NamesTheBodyOfAnIndexAndItsShape) {
   EXPECT_FALSE(world.contains(first));
   EXPECT_TRUE(world.contains(third));
   EXPECT_FALSE(world.contains({}));
-  EXPECT_EQ(world.body_at(third.index), third) << "not its place in bodies()";
+  EXPECT_EQ(world.body_at(third.index), third) << "an index is not a position in bodies()";
   EXPECT_THROW(world.body_at(first.index), InvalidArgument);
   EXPECT_THROW(world.body_at(3), InvalidArgument);
   EXPECT_EQ(world.shape(second), Shape(Sphere{2}));
@@ -229,7 +245,7 @@ TEST(World, ARunawayBodyIsNamedAndTheStateKept) {
   EXPECT_NE(world.states()[0], before[0]);
 }
 
-TEST(World, LeavingTheWorldCountsAsRunningAway) {
+TEST(World, LeavingTheCoordinateRangeIsReported) {
   Scene scene;
   scene.dt = 1;
   scene.bodies = {test::ball({0.999e9_r, 0, 0})};
@@ -239,7 +255,7 @@ TEST(World, LeavingTheWorldCountsAsRunningAway) {
   EXPECT_EQ(world.states()[0].position.x, 0.999e9_r);
 }
 
-/// Finds nothing, and fails in the ways that a collider may.
+/// A collider that finds nothing, and fails on demand.
 class FailingCollider final : public SphereCollider {
  public:
   explicit FailingCollider(const int* fails) : fails_(fails) {}
@@ -259,7 +275,7 @@ class FailingCollider final : public SphereCollider {
   const int* fails_;
 };
 
-TEST(World, AStepThatThrowsLeavesNoTrace) {
+TEST(World, AStepThatThrowsLeavesTheStateUnchanged) {
   Scene scene = two_balls();
   for (BodyDef& def : scene.bodies) def.acceleration = {0, -9.81_r, 0};
   int fails = 0;
@@ -292,7 +308,7 @@ TEST(World, CanBeMoved) {
   EXPECT_EQ(a.state_hash(), hash);
 }
 
-/// The hash after some steps must be the same however they are computed.
+/// Expects the same hash after some steps with each algorithm and number of threads.
 void expect_one_hash(const Scene& scene, int steps, std::span<const SphereAlgorithm> algorithms) {
   std::optional<std::uint64_t> expected;
   for (const SphereAlgorithm algorithm : algorithms) {
@@ -310,13 +326,13 @@ TEST(Determinism, ThreadsAlgorithmsAndRepeatsGiveTheSameBits) {
   for (const std::string_view name : {"pile", "gas", "polydisperse"}) {
     expect_one_hash(scenes::make(name, {.spheres = 200, .seed = 3}), 40,
                     std::array{automatic, all_pairs, sorted_tiles});
-    // Enough for threads to share the sorting and searching of cells.
+    // Enough spheres for several threads to sort and search cells.
     expect_one_hash(scenes::make(name, {.spheres = 20'000, .seed = 3}), 2,
                     std::array{automatic, sorted_tiles});
   }
 }
 
-TEST(StateHash, SeesEveryBitOfEveryField) {
+TEST(StateHash, DependsOnEveryBitOfEveryField) {
   const BodyState state{{1, 2, 3}, {1, 0, 0, 0}, {4, 5, 6}, {7, 8, 9}};
   std::vector<BodyState> states(3, state);
   const std::uint64_t hash = state_hash(states);
@@ -332,7 +348,7 @@ TEST(StateHash, SeesEveryBitOfEveryField) {
   EXPECT_NE(state_hash(states), hash);
 }
 
-TEST(StateHash, TellsMinusZeroFromZeroAndOneOrderFromAnother) {
+TEST(StateHash, DistinguishesMinusZeroFromZeroAndTheOrderOfBodies) {
   BodyState plus, minus;
   minus.velocity.x = -Real(0);
   const BodyState one[] = {plus, minus}, other[] = {minus, plus}, same[] = {plus, plus};

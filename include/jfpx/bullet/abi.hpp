@@ -1,5 +1,4 @@
-/// Refuses, when a program is compiled, a Bullet that is built in another way than the one whose
-/// bits jfpx keeps.
+/// Compile-time checks that Bullet is configured as the build whose bits jfpx reproduces.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -20,8 +19,8 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 static_assert(std::is_same_v<btScalar, Real>,
-              "jfpx::bullet goes with Bullet in float, jfpx::bullet_f64 with Bullet in double "
-              "(BT_USE_DOUBLE_PRECISION): the two are mixed here");
+              "jfpx::bullet requires Bullet in float, jfpx::bullet_f64 requires Bullet in double "
+              "(BT_USE_DOUBLE_PRECISION); this build mixes the two");
 
 }  // namespace bullet
 }  // namespace JFPX_ABI

@@ -1,6 +1,7 @@
-/// The sphere-sphere algorithm alone, for programs that keep their own dispatcher.
+/// The sphere-sphere algorithm alone, for programs with their own dispatcher.
 #pragma once
 
+#include <jfpx/build.hpp>
 #include <jfpx/bullet/abi.hpp>
 
 #include <BulletCollision/BroadphaseCollision/btDispatcher.h>
@@ -11,22 +12,23 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// What btSphereSphereCollisionAlgorithm does, bit for bit, with jfpx's own arithmetic. One pair at
-/// a time, so it is not faster: it is for those who want jfpx's contacts in a dispatcher of their
-/// own, and for checking one against the other. Register it before bodies overlap:
+/// Bit-identical replacement for btSphereSphereCollisionAlgorithm with jfpx's own arithmetic. It
+/// processes one pair at a time, so it is not faster; its uses are jfpx contacts in a custom
+/// dispatcher, and checks of one implementation against the other. Register it before bodies
+/// overlap:
 ///
 ///     jfpx::bullet::SphereSphereAlgorithm::CreateFunc create;  // must outlive the dispatcher
 ///     constexpr int kSphere = SPHERE_SHAPE_PROXYTYPE;
 ///     dispatcher.registerCollisionCreateFunc(kSphere, kSphere, &create);
 ///
-/// and, for contactTest() and contactPairTest(), registerClosestPointsCreateFunc() likewise. It
-/// serves children of compounds too. A jfpx::bullet::CollisionDispatcher needs none of this, and
-/// leaves sphere pairs to Bullet's one-by-one path when it finds another create function.
-/// Threads: as Bullet's algorithms.
+/// and, for contactTest() and contactPairTest(), with registerClosestPointsCreateFunc() as well. It
+/// also supports children of compounds. A jfpx::bullet::CollisionDispatcher does not need it, and
+/// uses Bullet's path of one pair at a time when another create function is registered.
+/// Thread safety is that of Bullet's algorithms.
 class JFPX_API SphereSphereAlgorithm final : public btActivatingCollisionAlgorithm {
  public:
-  /// Takes a manifold from the dispatcher, as Bullet's algorithm does when it is created through
-  /// its create function. Without one (the pool is exhausted) the algorithm does nothing.
+  /// Takes a manifold from the dispatcher, as Bullet's algorithm does when its create function
+  /// creates it. If the manifold pool is exhausted, the algorithm does nothing.
   SphereSphereAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
                         const btCollisionObjectWrapper* body0,
                         const btCollisionObjectWrapper* body1);
@@ -37,12 +39,12 @@ class JFPX_API SphereSphereAlgorithm final : public btActivatingCollisionAlgorit
   void processCollision(const btCollisionObjectWrapper* body0,
                         const btCollisionObjectWrapper* body1, const btDispatcherInfo& info,
                         btManifoldResult* result) override;
-  /// Always 1, as in Bullet, which does not implement it for spheres either.
+  /// Always 1, because Bullet does not implement it for spheres.
   btScalar calculateTimeOfImpact(btCollisionObject* body0, btCollisionObject* body1,
                                  const btDispatcherInfo& info, btManifoldResult* result) override;
   void getAllContactManifolds(btManifoldArray& manifolds) override;
 
-  /// Ignores a shared manifold, as Bullet's does: inside compounds every child has its own.
+  /// Ignores a shared manifold, as Bullet does: in a compound, every child has its own.
   struct JFPX_API CreateFunc final : btCollisionAlgorithmCreateFunc {
     btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
                                                    const btCollisionObjectWrapper* body0,

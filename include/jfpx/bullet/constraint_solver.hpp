@@ -1,4 +1,4 @@
-/// The constraint solver that puts jfpx into a Bullet program: one line changes, every bit stays.
+/// Constraint solver for Bullet programs with results that are bit-identical to Bullet's solver.
 #pragma once
 
 #include <jfpx/bullet/abi.hpp>
@@ -14,66 +14,62 @@
 
 namespace jfpx {
 inline namespace JFPX_ABI {
-
-class GroupSolver;
-
 namespace bullet {
 
 struct ConstraintSolverOptions {
-  Build headers = Build::of_these_headers;  ///< leave it: what the caller includes
-  /// Who sweeps over the rows. `automatic`: x86, or a GPU where that has been faster. `cuda`: a GPU
-  /// whenever it can (not groups with joints or with friction that depends on the direction).
+  /// Computing device of the sweeps. `automatic`: the CPU, or a GPU where that has been faster.
+  /// `cuda`: a GPU for all groups that it supports (not groups with joints or with anisotropic
+  /// friction).
   Backend backend = Backend::automatic;
   int device = 0;                         ///< cuda: ordinal of the GPU
-  unsigned threads = 1;                   ///< 0: one per core, at most 256
-  SimdLevel simd = SimdLevel::automatic;  ///< vectors of rows: AVX2 or none
-  /// Manifolds below which a group is left to Bullet's own code.
+  unsigned threads = 1;                   ///< at most 256; 0: one per core
+  SimdLevel simd = SimdLevel::automatic;  ///< vector instructions for rows: AVX2 or none
+  /// Groups with fewer manifolds are solved by Bullet's own code.
   std::size_t minimum_batch = 24;
 };
 
-/// Why a group was left to Bullet's own code.
+/// Reason why a group was solved by Bullet's own code.
 enum class SolverFallback : std::uint8_t {
-  small,        ///< fewer manifolds than the minimum
-  overridden,   ///< a subclass overrides a step of Bullet's, such as convertContacts()
-  mode,         ///< random order, cached directions of friction; no iterations, or over 65,536
-  row_solver,   ///< the user, or a subclass, has set a row solver
-  constraints,  ///< a constraint of a class that is not Bullet's
-  not_finite,   ///< something left the finite numbers: done again by Bullet, for its NaNs
-  out_of_memory,
+  small,          ///< fewer manifolds than the minimum
+  overridden,     ///< a subclass overrides a step of Bullet's solver, such as convertContacts()
+  mode,           ///< random order, cached friction directions, no iterations, or more than 65,536
+  row_solver,     ///< the user, or a subclass, has set a row solver
+  constraints,    ///< a constraint of a class that Bullet does not define
+  not_finite,     ///< a value is infinite or NaN; Bullet repeats the group to produce its NaNs
+  out_of_memory,  ///< memory for the group could not be allocated
 };
 inline constexpr std::size_t kSolverFallbacks = 7;
 
-/// A short text for a table, for example "small group".
+/// Returns a short text for a table, for example "small group".
 JFPX_API std::string_view to_string(SolverFallback fallback) noexcept;
 
 struct ConstraintSolverStats {
-  std::uint64_t groups = 0;                                 ///< solved by jfpx
-  std::uint64_t on_device = 0;                              ///< of these: on the GPU
-  std::uint64_t contacts = 0;                               ///< in these
-  std::uint64_t joints = 0;                                 ///< constraints in these
-  std::uint64_t sweeps = 0;                                 ///< over their rows
+  std::uint64_t groups = 0;     ///< groups solved by jfpx
+  std::uint64_t on_device = 0;  ///< groups solved by jfpx on the GPU
+  std::uint64_t contacts = 0;   ///< contacts in the groups solved by jfpx
+  std::uint64_t joints = 0;     ///< constraints in the groups solved by jfpx
+  std::uint64_t sweeps = 0;     ///< sweeps over the rows of these groups
   std::array<std::uint64_t, kSolverFallbacks> fallbacks{};  ///< groups, by SolverFallback
-  std::string device_failure;  ///< why the GPU was given up and x86 took over; empty: it was not
+  /// Why the GPU is no longer used and the CPU replaces it; empty if the GPU has not failed.
+  std::string device_failure;
 };
 
-/// A btSequentialImpulseConstraintSolver that solves independent rows side by side, in vectors and
-/// threads. Velocities, transforms, impulses, directions of friction and analytics are those of
-/// btSequentialImpulseConstraintSolver, bit for bit: rows depend on each other only through bodies
-/// that move, and each body meets its rows in Bullet's order.
+/// A btSequentialImpulseConstraintSolver that solves independent rows in parallel, in vector lanes
+/// and in threads. Velocities, transforms, impulses, friction directions and analytics are
+/// bit-identical to those of btSequentialImpulseConstraintSolver: rows depend on each other only
+/// through moving bodies, and the rows of each body are solved in Bullet's order.
 ///
-/// Groups that it does not cover are solved by the base class; stats() says how often and why.
-/// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
-/// As in Bullet, one thread at a time; different solvers are independent.
+/// The base class solves the groups that this class does not support; stats() counts them by
+/// reason. Programs that include Bullet's headers need -ffp-contract=off, which linking
+/// jfpx::bullet adds. As in Bullet, only one thread at a time may use a solver; different solvers
+/// are independent.
 class JFPX_API ConstraintSolver : public btSequentialImpulseConstraintSolver {
  public:
   BT_DECLARE_ALIGNED_ALLOCATOR();
 
-  /// @throws InvalidArgument for more than 256 threads; BackendUnavailable if the backend is asked
-  ///   for by name and can't be had; BuildMismatch (build.hpp).
+  /// @throws InvalidArgument for more than 256 threads; BackendUnavailable if the backend is
+  ///   selected by name and not available.
   explicit ConstraintSolver(const ConstraintSolverOptions& options = {});
-  /// For jfpx's own tests, which bring a device of their own: GroupSolver is not installed.
-  /// options.backend says when it is used.
-  ConstraintSolver(std::unique_ptr<GroupSolver> device, const ConstraintSolverOptions& options);
   ~ConstraintSolver() override;
   ConstraintSolver(const ConstraintSolver&) = delete;
   ConstraintSolver& operator=(const ConstraintSolver&) = delete;
@@ -87,9 +83,10 @@ class JFPX_API ConstraintSolver : public btSequentialImpulseConstraintSolver {
   void set_minimum_batch(std::size_t manifolds) noexcept;
 
   const ConstraintSolverStats& stats() const noexcept;
-  void reset_stats();  ///< keeps `device_failure`: what failed stays given up
+  void reset_stats();  ///< keeps `device_failure`, because a failed GPU is not used again
 
  private:
+  friend struct ConstraintSolverTestAccess;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

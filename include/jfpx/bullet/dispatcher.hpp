@@ -1,4 +1,4 @@
-/// The dispatcher that puts jfpx into a Bullet program: one line changes, every bit stays.
+/// Drop-in replacement for btCollisionDispatcher with bit-identical results.
 #pragma once
 
 #include <jfpx/bullet/abi.hpp>
@@ -9,72 +9,92 @@
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
 
 #include <memory>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
+class SceneWorld;
+
 struct DispatcherOptions {
-  SphereColliderOptions collider = {};  ///< who tests the sphere pairs
-  /// Pairs below which a dispatch is left to Bullet. A gas, the worst case, since nothing touches
-  /// and Bullet is quick to say so, breaks even below 100 pairs; there is little to win before 256.
+  SphereColliderOptions collider = {};  ///< the collider that tests the sphere pairs
+  /// Dispatches of fewer pairs run in Bullet's own code. A gas is the worst case, because nothing
+  /// touches and Bullet rejects such pairs cheaply: it breaks even below 100 pairs. The gain is
+  /// small below 256.
   std::size_t minimum_batch = 256;
-  bool verify = false;  ///< as set_verify()
-  /// Leave it as it is: tells how the program is compiled. If so, stats().warning says it.
-  bool fuses_products = bullet::fuses_products();
+  bool verify = false;  ///< see set_verify()
 };
 
-/// A btCollisionDispatcher that tests all sphere-sphere pairs at once. Manifolds, their order,
-/// every field of every point, callbacks and so trajectories are those of btCollisionDispatcher,
-/// bit for bit. No create function is registered: the pairs keep Bullet's own algorithms.
+/// A btCollisionDispatcher that tests all sphere-sphere pairs of a dispatch in one batch.
+/// Manifolds, their order, every field of every point, callbacks, and therefore trajectories are
+/// those of btCollisionDispatcher, bit for bit. No create function is registered: the pairs keep
+/// Bullet's own algorithms.
 ///
-/// Not noticed, in contrast to Bullet: a callback that moves bodies, changes radii, writes into
-/// manifolds of other pairs or changes the pair cache while a dispatch is running.
+/// Unlike in Bullet, a callback that moves bodies, changes radii, writes into the manifolds of
+/// other pairs or changes the pair cache while a dispatch is running takes effect only in the next
+/// dispatch.
 ///
-/// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
-/// As in Bullet, one thread at a time; different dispatchers are independent.
+/// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds;
+/// stats().warning reports a program that is compiled otherwise. As in Bullet, only one thread at a
+/// time may use a dispatcher; different dispatchers are independent.
 class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
  public:
-  /// @throws BackendUnavailable if options.collider asks for a backend by name that can't be had;
-  ///   InvalidArgument for a bad option; BuildMismatch (build.hpp).
-  explicit CollisionDispatcher(btCollisionConfiguration* configuration,
-                               const DispatcherOptions& options = {});
-  /// Uses the given collider; of options.collider only `headers` and `threads` count.
+  // The constructors are inlined into the program, to check how it is compiled.
+
+  /// @throws BackendUnavailable if options.collider names a backend that is unavailable;
+  ///   InvalidArgument for an invalid option.
+  [[gnu::always_inline]] explicit CollisionDispatcher(btCollisionConfiguration* configuration,
+                                                      const DispatcherOptions& options = {})
+      : CollisionDispatcher(CallerIsFused{fuses_products()}, configuration,
+                            make_sphere_collider(options.collider), options) {}
+  /// Uses the given collider; of options.collider, only `threads` is used.
   /// @throws InvalidArgument if `collider` is null, or for more than 256 threads.
-  CollisionDispatcher(btCollisionConfiguration* configuration,
-                      std::unique_ptr<SphereCollider> collider,
-                      const DispatcherOptions& options = {});
+  [[gnu::always_inline]] CollisionDispatcher(btCollisionConfiguration* configuration,
+                                             std::unique_ptr<SphereCollider> collider,
+                                             const DispatcherOptions& options = {})
+      : CollisionDispatcher(CallerIsFused{fuses_products()}, configuration, std::move(collider),
+                            options) {}
   ~CollisionDispatcher() override;
   CollisionDispatcher(const CollisionDispatcher&) = delete;
   CollisionDispatcher& operator=(const CollisionDispatcher&) = delete;
 
-  /// As in Bullet, for any pair cache. If the collider throws, x86 tests the pairs of this call and
-  /// of all later ones, with the same bits, and stats().device_failure says why.
+  /// As in Bullet, for any pair cache. If the collider throws, the CPU tests the pairs of this call
+  /// and of all later calls, with identical bits, and stats().device_failure holds the reason.
   void dispatchAllCollisionPairs(btOverlappingPairCache* pair_cache,
                                  const btDispatcherInfo& dispatch_info,
                                  btDispatcher* dispatcher) override;
-  /// As in Bullet; also forgets what was remembered of the manifold.
+  /// As in Bullet; also drops the cached reference to the manifold.
   void releaseManifold(btPersistentManifold* manifold) override;
 
   std::size_t minimum_batch() const noexcept;
   void set_minimum_batch(std::size_t pairs) noexcept;
 
-  /// Recompute every pair of a batch that was not left to Bullet with Bullet's own algorithm,
-  /// compare all fields, count in stats(). Slow. Global contact callbacks are taken off meanwhile:
-  /// no other thread may use Bullet then. User-set combine callbacks are called twice.
+  /// If on, recomputes every pair of a batch that was not processed by Bullet with Bullet's own
+  /// algorithm, compares all fields and counts differences in stats(). Slow. Global contact
+  /// callbacks are disabled during the check, so no other thread may use Bullet then. Combine
+  /// callbacks of the user are called twice.
   void set_verify(bool on) noexcept;
   bool verify() const noexcept;
 
-  /// Who tested the last batch of sphere pairs.
+  /// Backend that tested the last batch of sphere pairs.
   Backend backend() const noexcept;
-  /// Why that one did.
+  /// Reason for the choice of that backend.
   ChoiceReason reason() const noexcept;
 
   const DispatchStats& stats() const noexcept;
-  void reset_stats();  ///< keeps `failure` and `device_failure`: what failed stays given up
+  void reset_stats();  ///< keeps `warning` and `device_failure`, which remain true
 
  private:
+  friend SceneWorld;
   struct Impl;
+  struct CallerIsFused {
+    bool value;
+  };
+
+  CollisionDispatcher(CallerIsFused caller, btCollisionConfiguration* configuration,
+                      std::unique_ptr<SphereCollider> collider, const DispatcherOptions& options);
+
   std::unique_ptr<Impl> impl_;
 };
 

@@ -1,4 +1,4 @@
-/// Whether a program's own copy of Bullet's inline arithmetic has Bullet's bits.
+/// Test for fused multiply-add in the code of the calling program.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -11,14 +11,14 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// True if the compiler of *this translation unit* makes one operation of a product and a sum, as
-/// g++ does with -march=native unless told -ffp-contract=off. Bullet's headers are compiled into
-/// the program; then even a world without jfpx has other bits than one whose program is compiled
-/// for any x86-64. Always inlined: each caller answers for itself.
+/// True if the compiler fuses a product and a sum of *this translation unit* into one operation, as
+/// g++ does with -march=native unless -ffp-contract=off is given. Bullet's headers are compiled
+/// into the program, so even a world without jfpx then differs in bits from one whose program is
+/// compiled for the x86-64 baseline. Always inlined, so that the result is the caller's own.
 [[gnu::always_inline]] inline bool fuses_products() noexcept {
   constexpr btScalar kStep = std::numeric_limits<btScalar>::epsilon();
   btScalar a = 1 + kStep, b = 1 - kStep, c = -1;
-  asm("" : "+m"(a), "+m"(b), "+m"(c));  // not to be computed by the compiler
+  asm("" : "+m"(a), "+m"(b), "+m"(c));  // prevents constant folding
   return a * b + c != 0;                // 1 - kStep^2 is 1 if it is rounded
 }
 

@@ -1,4 +1,4 @@
-/// Cross-checks: two Bullet worlds against each other, and Bullet's contacts against jfpx's own.
+/// Comparison of two Bullet worlds, and of Bullet's contacts with those of SphereCollider.
 #pragma once
 
 #include <jfpx/bullet/abi.hpp>
@@ -15,30 +15,30 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// The first place where two things differ.
+/// The first difference between two worlds or lists of contacts.
 struct Difference {
-  std::uint64_t step = 0;   ///< as the caller counts
+  std::uint64_t step = 0;   ///< as passed by the caller
   std::string what;         ///< "world", "body", "manifold", "pair"
-  std::uint64_t index = 0;  ///< in the array of bodies or manifolds; of a pair: the lower body
-  std::uint64_t other = 0;  ///< of a pair: the other body; of a manifold: the point; else 0
+  std::uint64_t index = 0;  ///< into the array of bodies or manifolds; pair: the lower body
+  std::uint64_t other = 0;  ///< pair: the other body; manifold: the point; otherwise 0
   std::string field;        ///< for example "m_localPointA.x"
   double expected = 0, actual = 0;
   std::uint64_t expected_bits = 0, actual_bits = 0;  ///< 32 bits wide for float and int
 };
 
-/// One line for a user: step, place, field, both values, both in hex.
+/// One line of text: step, location, field, and both values in decimal and hexadecimal.
 JFPX_API std::string to_text(const Difference& difference);
 
 /// Compares two worlds bit by bit: all manifolds in the order of the dispatchers' arrays, with
-/// their bodies, thresholds and every field of every point (of m_userPersistentData only whether
+/// their bodies, thresholds and every field of every point (for m_userPersistentData, only whether
 /// it is set); then all bodies in array order with transforms, velocities and activation.
-/// @param step is only passed on.
-/// @return the first difference, or nothing if the worlds are the same.
+/// @param step is copied into the result.
+/// @return the first difference; empty if the worlds are identical.
 JFPX_API std::optional<Difference> first_difference(btDynamicsWorld& expected,
                                                     btDynamicsWorld& actual, std::uint64_t step);
 
-/// Compares what SphereCollider::find_contacts says about the spheres of a Bullet world with the
-/// points that Bullet made of them in the same step: same pairs, and the same bits of normal,
+/// Compares the contacts that SphereCollider::find_contacts() finds among the spheres of a Bullet
+/// world with the points that Bullet creates in the same step: pairs, and the bits of normal,
 /// distance and point on sphere b.
 class JFPX_API ContactCheck {
  public:
@@ -47,18 +47,18 @@ class JFPX_API ContactCheck {
   ContactCheck(ContactCheck&&) noexcept;
   ContactCheck& operator=(ContactCheck&&) noexcept;
 
-  /// Remembers the world as a step will see it. To be called right before the step, which must be
-  /// a single one, of a world whose bodies move by themselves (no motion states).
+  /// Stores the spheres. Call it directly before the step, which must have no substeps, of a world
+  /// without motion states.
   void capture(const btDynamicsWorld& world);
-  /// Compares after the step. Left out are pairs that Bullet's filters keep apart: groups and
-  /// masks, static against static, ignore lists. Two sleeping bodies keep the points that they
-  /// had, which are compared, and get no new ones, so that missing points are no difference.
-  /// @return the contacts compared
+  /// Compares after the step. Pairs that Bullet filters out are skipped: groups and masks, two
+  /// static bodies, ignore lists. Two sleeping bodies keep their existing points, which are
+  /// compared, and get no new ones, so a missing point is not a difference.
+  /// @return the number of contacts compared
   /// @throws InvalidArgument if a captured sphere is not finite, or nothing was captured.
   std::uint64_t compare(btDynamicsWorld& world, std::uint64_t step);
 
   std::uint64_t compared() const noexcept;    ///< contacts compared so far
-  std::uint64_t mismatches() const noexcept;  ///< of these, different, missing or too many
+  std::uint64_t mismatches() const noexcept;  ///< different, missing or extra contacts
   const std::optional<Difference>& first() const noexcept;
 
  private:

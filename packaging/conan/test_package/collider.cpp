@@ -1,4 +1,4 @@
-/// Two spheres that touch.
+/// Finds the contact of two touching spheres.
 #include <jfpx/sphere_collider.hpp>
 
 #include <cstdio>

@@ -1,4 +1,4 @@
-"""A program of someone else, built against the package and run: in both precisions, by CMake's files and pkg-config's."""
+"""Builds and runs a program that uses the package, in both precisions, with its CMake and pkg-config files."""
 import os
 
 from conan import ConanFile
@@ -18,7 +18,7 @@ class JfpxTest(ConanFile):
 
     def generate(self):
         toolchain = CMakeToolchain(self)
-        toolchain.user_presets_path = False  # nothing beside these files
+        toolchain.user_presets_path = False  # creates no CMakeUserPresets.json
         toolchain.generate()
 
     def build(self):

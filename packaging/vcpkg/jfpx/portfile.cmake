@@ -1,9 +1,9 @@
-# The port lies inside the sources that it builds.
+# The port is inside the sources that it builds.
 get_filename_component(SOURCE_PATH "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
 
 set(cuda -DJFPX_CUDA=OFF)
 if("cuda" IN_LIST FEATURES)
-  vcpkg_find_cuda(OUT_CUDA_TOOLKIT_ROOT cuda_root) # comes with vcpkg's port cuda, and sets NVCC
+  vcpkg_find_cuda(OUT_CUDA_TOOLKIT_ROOT cuda_root) # defined by vcpkg's port cuda; sets NVCC
   set(cuda -DJFPX_CUDA=ON "-DCMAKE_CUDA_COMPILER=${NVCC}" "-DCUDAToolkit_ROOT=${cuda_root}")
 endif()
 vcpkg_cmake_configure(

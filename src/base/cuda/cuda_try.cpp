@@ -1,4 +1,4 @@
-/// Turns CUDA errors into exceptions.
+/// Conversion of CUDA errors to exceptions.
 #include "src/base/cuda/cuda_try.hpp"
 
 #include <jfpx/error.hpp>

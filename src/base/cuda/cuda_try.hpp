@@ -1,4 +1,4 @@
-/// Every CUDA call goes through JFPX_CUDA_TRY: failures become exceptions, none stays behind.
+/// JFPX_CUDA_TRY, which wraps every CUDA call: converts errors to exceptions and clears them.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -11,25 +11,26 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// @throws DeviceError with the call, file:line and CUDA's name of the error.
+/// @throws DeviceError with the call, file:line and CUDA's name of the error
 [[noreturn]] JFPX_API void throw_device_error(cudaError_t error, const char* call, const char* file,
                                               int line);
-/// @throws OutOfMemory with the bytes if `error` says so, DeviceError otherwise.
+/// @throws OutOfMemory with the number of bytes if `error` is a failed allocation, otherwise
+/// DeviceError
 [[noreturn]] JFPX_API void throw_allocation_error(cudaError_t error, std::size_t bytes,
                                                   const char* what, const char* call,
                                                   const char* file, int line);
 
-/// For tests: makes the CUDA call number `calls` from now (0: the next) of this thread fail with
-/// `error` instead of being made, once. A negative number disarms.
+/// Fault injection for tests: the CUDA call number `calls` from now (0: the next one) of this
+/// thread is not made and returns `error`, once. A negative number disables the injection.
 JFPX_API void inject_fault(long calls, cudaError_t error);
-/// The error that the next call must fail with; cudaSuccess nearly always.
+/// The error that the next call must return; cudaSuccess unless a test has injected a fault.
 JFPX_API cudaError_t take_injected_fault() noexcept;
 
 }  // namespace cuda
 }  // namespace JFPX_ABI
 }  // namespace jfpx
 
-/// The result of `call`, or of the fault that a test put in its place. Leaves no sticky error.
+/// The result of `call`, or the fault that a test has injected. Clears the error.
 #define JFPX_CUDA_RESULT(call)                                              \
   [&]() -> cudaError_t {                                                    \
     const cudaError_t injected = ::jfpx::cuda::take_injected_fault();       \
@@ -45,7 +46,7 @@ JFPX_API cudaError_t take_injected_fault() noexcept;
       ::jfpx::cuda::throw_device_error(jfpx_error, #call, __FILE__, __LINE__); \
   } while (false)
 
-/// As JFPX_CUDA_TRY, for a call that takes `bytes` of memory for `what`.
+/// As JFPX_CUDA_TRY, for a call that allocates `bytes` bytes for `what`.
 #define JFPX_CUDA_TRY_ALLOC(call, bytes, what)                                                  \
   do {                                                                                          \
     const cudaError_t jfpx_error = JFPX_CUDA_RESULT(call);                                      \

@@ -1,4 +1,4 @@
-/// Device memory from stream-ordered pools.
+/// Allocation of device memory from stream-ordered pools, and of pinned host memory.
 #include "src/base/cuda/device_buffer.hpp"
 
 #include <cstdint>
@@ -13,7 +13,7 @@ MemoryPool::MemoryPool(int device) {
   properties.location.type = cudaMemLocationTypeDevice;
   properties.location.id = device;
   JFPX_CUDA_TRY(cudaMemPoolCreate(&pool_, &properties));
-  // Without a threshold each synchronisation would hand the free memory back to the system.
+  // Without a release threshold, every synchronization returns unused memory to the driver.
   std::uint64_t keep = UINT64_MAX;
   const cudaError_t error =
       JFPX_CUDA_RESULT(cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &keep));
@@ -28,6 +28,10 @@ DeviceMemory::DeviceMemory(const MemoryPool& pool, cudaStream_t stream, std::siz
   JFPX_CUDA_TRY_ALLOC(cudaMallocFromPoolAsync(&data_, bytes, pool.get(), stream), bytes, what);
   bytes_ = bytes;
   stream_ = stream;
+}
+
+PinnedMemory::PinnedMemory(std::size_t bytes, const char* what) {
+  JFPX_CUDA_TRY_ALLOC(cudaHostAlloc(&data_, bytes, cudaHostAllocMapped), bytes, what);
 }
 
 }  // namespace cuda

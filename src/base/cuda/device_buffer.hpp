@@ -1,18 +1,19 @@
-/// Streams, events, device and pinned memory with owners. The only place that takes or frees them.
+/// Owners of CUDA streams, device memory and pinned host memory. All allocations of the library are
+/// made here.
 #pragma once
 
 #include "src/base/cuda/cuda_try.hpp"
+#include "src/base/cuda/growable_array.hpp"
 
-#include <algorithm>
 #include <cstddef>
-#include <limits>
 #include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Makes `device` current for its lifetime; colliders of several devices can share a thread.
+/// Makes `device` the current device for its lifetime, so that colliders of several devices can
+/// share a thread.
 class DeviceGuard {
  public:
   explicit DeviceGuard(int device) {
@@ -32,7 +33,7 @@ class DeviceGuard {
   bool changed_ = false;
 };
 
-/// A stream of its own, not ordered with the default stream.
+/// Owner of a stream that does not synchronize with the default stream.
 class OwnedStream {
  public:
   explicit OwnedStream(int device) {
@@ -48,8 +49,8 @@ class OwnedStream {
   cudaStream_t stream_ = nullptr;
 };
 
-/// A pool of device memory. It keeps what is freed for the next use, and gives everything back to
-/// the device when it goes.
+/// Pool of device memory. It keeps freed memory for later allocations, and returns all memory to
+/// the device when it is destroyed.
 class MemoryPool {
  public:
   explicit MemoryPool(int device);
@@ -62,11 +63,11 @@ class MemoryPool {
   cudaMemPool_t pool_ = nullptr;
 };
 
-/// Bytes on the device, taken from a pool in the order of a stream.
+/// Owner of device memory that is allocated from a pool and freed in stream order.
 class DeviceMemory {
  public:
   DeviceMemory() = default;
-  /// @throws OutOfMemory naming `what` and the bytes.
+  /// @throws OutOfMemory with `what` and the number of bytes.
   DeviceMemory(const MemoryPool& pool, cudaStream_t stream, std::size_t bytes, const char* what);
   ~DeviceMemory() {
     if (data_ != nullptr) static_cast<void>(cudaFreeAsync(data_, stream_));
@@ -90,47 +91,69 @@ class DeviceMemory {
   cudaStream_t stream_ = nullptr;
 };
 
-/// Values on the device; grow() drops the old ones.
+/// Owner of page-locked host memory that the device can address.
+class PinnedMemory {
+ public:
+  PinnedMemory() = default;
+  /// @throws OutOfMemory with `what` and the number of bytes.
+  PinnedMemory(std::size_t bytes, const char* what);
+  ~PinnedMemory() {
+    if (data_ != nullptr) static_cast<void>(cudaFreeHost(data_));
+  }
+  PinnedMemory(PinnedMemory&& other) noexcept : data_(std::exchange(other.data_, nullptr)) {}
+  PinnedMemory& operator=(PinnedMemory&& other) noexcept {
+    std::swap(data_, other.data_);
+    return *this;
+  }
+  void* data() const noexcept { return data_; }
+
+ private:
+  void* data_ = nullptr;
+};
+
+/// Growable array in device memory. Growing discards the contents.
 template <typename T>
 class DeviceBuffer {
  public:
-  void grow(const MemoryPool& pool, cudaStream_t stream, std::size_t count, const char* what) {
-    if (count <= size_) return;
-    const std::size_t most = std::numeric_limits<std::size_t>::max() / sizeof(T);
-    memory_ = DeviceMemory(pool, stream, std::min(count, most) * sizeof(T), what);
-    size_ = count;
+  /// Makes the capacity at least `count`; a reallocation makes it exactly `count`.
+  /// @return whether the buffer was reallocated.
+  /// @throws OutOfMemory with `what` and the number of bytes; the buffer is then unchanged.
+  bool reserve(const MemoryPool& pool, cudaStream_t stream, std::size_t count, const char* what) {
+    return array_.reserve(
+        count, [&](std::size_t bytes) { return DeviceMemory(pool, stream, bytes, what); });
   }
-  T* data() const noexcept { return static_cast<T*>(memory_.data()); }
-  std::size_t size() const noexcept { return size_; }
+  /// The same, but a reallocation adds slack, so that a count that grows slowly reallocates seldom.
+  bool reserve_geometric(const MemoryPool& pool, cudaStream_t stream, std::size_t count,
+                         const char* what) {
+    return array_.reserve_geometric(
+        count, [&](std::size_t bytes) { return DeviceMemory(pool, stream, bytes, what); });
+  }
+  T* data() const noexcept { return array_.data(); }
+  std::size_t capacity() const noexcept { return array_.capacity(); }
 
  private:
-  DeviceMemory memory_;
-  std::size_t size_ = 0;
+  GrowableArray<T, DeviceMemory> array_;
 };
 
-/// Page-locked host memory that the device can address; grow() drops the old values.
+/// Growable array in page-locked host memory that the device can address. Growing discards the
+/// contents.
 template <typename T>
 class PinnedBuffer {
  public:
-  PinnedBuffer() = default;
-  ~PinnedBuffer() { static_cast<void>(cudaFreeHost(data_)); }
-  PinnedBuffer(const PinnedBuffer&) = delete;
-  PinnedBuffer& operator=(const PinnedBuffer&) = delete;
-  void grow(std::size_t count, const char* what) {
-    if (count <= size_) return;
-    void* fresh = nullptr;
-    JFPX_CUDA_TRY_ALLOC(cudaHostAlloc(&fresh, count * sizeof(T), cudaHostAllocMapped),
-                        count * sizeof(T), what);
-    static_cast<void>(cudaFreeHost(data_));
-    data_ = static_cast<T*>(fresh);
-    size_ = count;
+  /// As DeviceBuffer::reserve().
+  bool reserve(std::size_t count, const char* what) {
+    return array_.reserve(count, [&](std::size_t bytes) { return PinnedMemory(bytes, what); });
   }
-  T* data() const noexcept { return data_; }
-  std::size_t size() const noexcept { return size_; }
+  /// As DeviceBuffer::reserve_geometric().
+  bool reserve_geometric(std::size_t count, const char* what) {
+    return array_.reserve_geometric(count,
+                                    [&](std::size_t bytes) { return PinnedMemory(bytes, what); });
+  }
+  T* data() const noexcept { return array_.data(); }
+  std::size_t capacity() const noexcept { return array_.capacity(); }
 
  private:
-  T* data_ = nullptr;
-  std::size_t size_ = 0;
+  GrowableArray<T, PinnedMemory> array_;
 };
 
 }  // namespace cuda

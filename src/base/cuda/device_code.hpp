@@ -1,4 +1,4 @@
-/// Which code of this build the current device runs.
+/// Queries which code of this build the current device runs.
 #pragma once
 
 #include <jfpx/config.hpp>

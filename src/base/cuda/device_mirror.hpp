@@ -1,4 +1,4 @@
-/// An array of the host on the device, to which only what has changed is sent.
+/// Copy of a host array in device memory; only blocks that have changed are uploaded.
 #pragma once
 
 #include "src/base/cuda/device_buffer.hpp"
@@ -12,47 +12,45 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Compares with what was sent last. That reads as much as sending would, but the bus is slower
-/// than memory, and nobody has to be trusted to say what changed.
+/// Compares each block with a host copy of what was uploaded last. The comparison reads as many
+/// bytes as an upload would, but memory is faster than the bus, and callers need not track changes.
 template <typename T>
 class DeviceMirror {
  public:
-  /// Enqueues what makes the device's copy equal to `values`, which may change at once. Wait for
-  /// the stream before the next call.
-  /// @return bytes sent.
+  /// Enqueues the copies that make the device array equal to `values`. The caller may change
+  /// `values` after the call, and must synchronize the stream before the next call.
+  /// @return number of bytes uploaded.
   std::size_t update(const MemoryPool& pool, cudaStream_t stream, std::span<const T> values,
                      const char* what) {
-    std::size_t known = std::exchange(known_, 0);  // should anything throw, all is sent again
-    if (values.size() > device_.size()) {
-      const std::size_t room = values.size() + values.size() / 4 + 64;
-      device_.grow(pool, stream, room, what);
-      host_.grow(room, what);
-      known = 0;
-    }
-    std::size_t bytes = 0, begin = 0, end = 0;  // of the range that is to be sent next
+    // After an exception, the next call uploads everything.
+    std::size_t uploaded = std::exchange(uploaded_, 0);
+    // Each buffer has a capacity of its own: the allocation of the second one may have failed.
+    if (device_.reserve_geometric(pool, stream, values.size(), what)) uploaded = 0;
+    if (host_.reserve_geometric(values.size(), what)) uploaded = 0;
+    std::size_t bytes = 0, begin = 0, end = 0;  // [begin, end) is the range to upload next
     for (std::size_t i = 0; i < values.size(); i += kBlock) {
       const std::size_t past = std::min(values.size(), i + kBlock);
       const std::size_t size = (past - i) * sizeof(T);
-      if (past <= known && std::memcmp(host_.data() + i, values.data() + i, size) == 0) continue;
+      if (past <= uploaded && std::memcmp(host_.data() + i, values.data() + i, size) == 0) continue;
       std::memcpy(host_.data() + i, values.data() + i, size);
       if (begin == end || i - end > kGap) {
-        bytes += send(stream, begin, end);
+        bytes += upload(stream, begin, end);
         begin = i;
       }
       end = past;
     }
-    bytes += send(stream, begin, end);
-    known_ = values.size();
+    bytes += upload(stream, begin, end);
+    uploaded_ = values.size();
     return bytes;
   }
   const T* data() const noexcept { return device_.data(); }
 
  private:
   static constexpr std::size_t kBlock = 4096 / sizeof(T);
-  /// Shorter gaps are sent along: another copy takes longer.
+  /// Shorter gaps between changed blocks are uploaded too, because a separate copy takes longer.
   static constexpr std::size_t kGap = 65536 / sizeof(T);
 
-  std::size_t send(cudaStream_t stream, std::size_t begin, std::size_t end) {
+  std::size_t upload(cudaStream_t stream, std::size_t begin, std::size_t end) {
     const std::size_t bytes = (end - begin) * sizeof(T);
     if (bytes == 0) return 0;
     JFPX_CUDA_TRY(cudaMemcpyAsync(device_.data() + begin, host_.data() + begin, bytes,
@@ -62,7 +60,8 @@ class DeviceMirror {
 
   DeviceBuffer<T> device_;
   PinnedBuffer<T> host_;
-  std::size_t known_ = 0;  ///< values that the device has as the host's copy has them
+  std::size_t uploaded_ =
+      0;  ///< number of leading values that are equal on the device and in host_
 };
 
 }  // namespace cuda

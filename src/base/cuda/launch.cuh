@@ -10,9 +10,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Launches a kernel, with bytes of dynamic shared memory, that may be set up while the one before
-/// it on the stream still runs; the kernel must begin with wait_for_previous_kernel(). Saves about
-/// a microsecond a kernel.
+/// Launches a kernel with the given amount of dynamic shared memory. The launch may overlap with
+/// the previous kernel of the stream, so the kernel must begin with wait_for_previous_kernel().
+/// This saves about a microsecond per kernel.
 template <typename... Parameters, typename... Arguments>
 void launch_sharing(std::size_t shared_bytes, void (*kernel)(Parameters...), unsigned blocks_x,
                     unsigned blocks_y, unsigned threads, cudaStream_t stream,
@@ -26,7 +26,7 @@ void launch_sharing(std::size_t shared_bytes, void (*kernel)(Parameters...), uns
   config.dynamicSmemBytes = shared_bytes;
   config.stream = stream;
   config.attrs = &overlap;
-  config.numAttrs = has_hopper_code() ? 1 : 0;  // older code does not wait
+  config.numAttrs = has_hopper_code() ? 1 : 0;  // code for older devices does not wait
   JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, kernel, Parameters(arguments)...));
 }
 template <typename... Parameters, typename... Arguments>
@@ -35,7 +35,7 @@ void launch(void (*kernel)(Parameters...), unsigned blocks_x, unsigned blocks_y,
   launch_sharing(0, kernel, blocks_x, blocks_y, threads, stream, arguments...);
 }
 
-/// All that earlier kernels wrote can be read after it.
+/// Waits until the writes of all earlier kernels of the stream are visible.
 __device__ inline void wait_for_previous_kernel() {
 #if __CUDA_ARCH__ >= 900
   cudaGridDependencySynchronize();

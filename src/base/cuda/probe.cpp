@@ -1,4 +1,4 @@
-/// Asks the CUDA runtime whether a device can be used, and turns its answer into a sentence.
+/// Queries the CUDA runtime for a usable device, and explains why a device cannot be used.
 #include "src/base/cuda/probe.hpp"
 
 #include "src/base/cuda/device_code.hpp"
@@ -22,7 +22,7 @@ std::string capability(const cudaDeviceProp& properties) {
   return std::to_string(properties.major) + "." + std::to_string(properties.minor);
 }
 
-/// Whether the current build has code for the device. Leaves the caller's device current.
+/// Whether this build has code for the device. The current device of the caller stays current.
 cudaError_t code_for(int device) {
   int previous = 0;
   cudaError_t error = cudaGetDevice(&previous);

@@ -1,4 +1,4 @@
-/// Asks whether a CUDA device can be used.
+/// Queries whether a CUDA device can be used.
 #pragma once
 
 #include <jfpx/backend.hpp>
@@ -11,11 +11,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Never throws for a missing or unusable device; leaves no sticky CUDA error behind.
+/// Status of a device. Does not throw for a missing or unusable device, and leaves no CUDA error
+/// behind.
 BackendStatus probe(int device = 0);
 
-/// A sentence on what `error` of the first CUDA calls means, where the driver supports CUDA up to
-/// `driver` (0: there is none) and this build was made for `runtime`; 13000 stands for 13.0.
+/// Explains an `error` of the first CUDA calls, given the CUDA version that the driver supports (0:
+/// no driver is installed) and the version of the runtime that this build uses. 13000 denotes
+/// version 13.0.
 std::string why_unusable(cudaError_t error, int driver, int runtime);
 
 }  // namespace cuda

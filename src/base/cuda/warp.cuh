@@ -1,4 +1,7 @@
 /// Reductions, scans and searches across the lanes of a warp.
+///
+/// cub::WarpReduce and cub::WarpScan compute the same sums, but return a reduction in lane 0 only,
+/// and require a TempStorage per warp in shared memory, which these shuffles do not need.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -15,13 +18,18 @@ inline constexpr unsigned kFullWarp = 0xffffffffu;
 __device__ inline unsigned lane_id() { return threadIdx.x % 32; }
 __device__ inline unsigned lanes_below() { return (1u << lane_id()) - 1; }
 
-/// Sum, maximum and union over a warp; every lane gets it.
+/// Reduction over the 32 lanes of a warp, returned in every lane.
 template <typename T, typename Combine>
 __device__ inline T warp_reduce(T value, Combine combine) {
   for (unsigned d = 16; d != 0; d /= 2) {
     value = combine(value, __shfl_xor_sync(kFullWarp, value, static_cast<int>(d)));
   }
   return value;
+}
+
+template <typename T>
+__device__ inline T warp_sum(T value) {
+  return warp_reduce(value, [](T p, T q) { return p + q; });
 }
 
 __device__ inline unsigned warp_max(unsigned value) {
@@ -32,7 +40,7 @@ __device__ inline unsigned warp_max(unsigned value) {
 #endif
 }
 
-/// Largest number of a warp; every lane gets it. Not for NaN.
+/// Maximum over the lanes of a warp, returned in every lane. No value may be NaN.
 __device__ inline Real warp_max(Real x) {
 #if __CUDA_ARCH__ >= 800 && !defined(JFPX_DOUBLE_PRECISION)
   const auto in_order = [](int bits) { return bits ^ (bits >> 31 & 0x7fffffff); };
@@ -43,16 +51,18 @@ __device__ inline Real warp_max(Real x) {
 #endif
 }
 
-/// Sum of the values of this lane and those below.
-__device__ inline unsigned warp_inclusive_sum(unsigned value) {
+/// Sum of the values of this lane and of all lower lanes.
+template <typename T>
+__device__ inline T warp_inclusive_sum(T value) {
   for (unsigned d = 1; d < 32; d *= 2) {
-    const unsigned below = __shfl_up_sync(kFullWarp, value, d);
+    const T below = __shfl_up_sync(kFullWarp, value, d);
     if (lane_id() >= d) value += below;
   }
   return value;
 }
 
-/// Of sums that grow from lane to lane: the lane with the first one beyond i, or the last lane.
+/// Binary search in sums that do not decrease from lane to lane.
+/// @return the first lane with sum > i, or the last lane.
 __device__ inline unsigned owner_of(std::uint32_t i, std::uint32_t sum) {
   unsigned owner = 0;
   for (unsigned step = 16; step != 0; step /= 2) {

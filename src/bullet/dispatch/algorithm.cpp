@@ -1,4 +1,4 @@
-/// One pair of spheres, as btSphereSphereCollisionAlgorithm (Bullet 3.24) treats it.
+/// Equivalent of btSphereSphereCollisionAlgorithm of Bullet 3.24 for one pair of spheres.
 #include <jfpx/bullet/algorithm.hpp>
 
 #include "src/collide/sphere_pair.hpp"
@@ -15,16 +15,16 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-// Bullet's default pool element is the largest of its own algorithms, and a larger object would
-// overrun it without a word. Not above the algorithm that this one stands in for is enough for
-// every pool that holds Bullet's.
+// Bullet does not check that an object fits into an element of its pool, whose default size is that
+// of its largest algorithm. An object no larger than the algorithm that it replaces fits into every
+// pool that Bullet's algorithm fits into.
 static_assert(sizeof(SphereSphereAlgorithm) <= sizeof(btSphereSphereCollisionAlgorithm));
 static_assert(alignof(SphereSphereAlgorithm) <= 16, "the alignment of Bullet's pools");
 
 namespace {
 
 SphereInstance sphere_of(const btCollisionObjectWrapper& body) {
-  // The wrapper's transform: of the child, where the body is a compound.
+  // The wrapper's transform, which is that of the child if the body is a compound.
   const btVector3& centre = body.getWorldTransform().getOrigin();
   return {{centre.x(), centre.y(), centre.z()},
           static_cast<const btSphereShape*>(body.getCollisionShape())->getRadius()};

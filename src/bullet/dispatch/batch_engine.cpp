@@ -1,11 +1,11 @@
-/// One dispatch: a read-only pre-pass over all pairs, the collider, then a commit that does for
-/// each pair what Bullet would have done: in any order where that can't be observed, in Bullet's
-/// elsewhere.
+/// One dispatch: a read-only pass over all pairs, the collider, then a commit with the effect of
+/// Bullet's algorithms: in any order where the order is unobservable, otherwise in Bullet's order.
 #include "src/bullet/dispatch/batch_engine.hpp"
 
 #include <jfpx/error.hpp>
 
 #include "src/bullet/dispatch/pair_check.hpp"
+#include "src/bullet/exact_class.hpp"
 #include "src/bullet/failure.hpp"
 #include "src/bullet/prefetch.hpp"
 
@@ -17,7 +17,6 @@
 #include <exception>
 #include <functional>
 #include <new>
-#include <typeinfo>
 #include <utility>
 
 namespace jfpx {
@@ -34,12 +33,12 @@ double milliseconds(Clock::time_point begin, Clock::time_point end) {
 
 std::span<const btBroadphasePair> pairs_of(btOverlappingPairCache& cache) {
   const int n = cache.getNumOverlappingPairs();
-  // Bullet asserts when an empty cache is asked for its array.
+  // Bullet asserts that the array of a cache is not empty.
   if (n <= 0) return {};
   return {cache.getOverlappingPairArrayPtr(), static_cast<std::size_t>(n)};
 }
 
-/// Sets a flag for the time of a dispatch, also when a callback throws.
+/// Sets a flag for the duration of a dispatch, even if a callback throws.
 class Running {
  public:
   explicit Running(bool* flag) : flag_(flag) { *flag_ = true; }
@@ -51,15 +50,14 @@ class Running {
   bool* flag_;
 };
 
-/// Whether pairs of spheres get Bullet's own algorithm. The table of create functions is protected.
-bool has_bullets_sphere_function(const btCollisionDispatcher& dispatcher) {
+/// Whether Bullet's own algorithm is registered for sphere pairs. The table is protected.
+bool has_stock_sphere_function(const btCollisionDispatcher& dispatcher) {
   struct Access : btCollisionDispatcher {
     static constexpr auto table() { return &Access::m_doubleDispatchContactPoints; }
   };
   const btCollisionAlgorithmCreateFunc* function =
       (dispatcher.*Access::table())[SPHERE_SHAPE_PROXYTYPE][SPHERE_SHAPE_PROXYTYPE];
-  return function != nullptr &&
-         typeid(*function) == typeid(btSphereSphereCollisionAlgorithm::CreateFunc);
+  return function != nullptr && is_exactly<btSphereSphereCollisionAlgorithm::CreateFunc>(*function);
 }
 
 }  // namespace
@@ -69,13 +67,13 @@ BatchEngine::BatchEngine(std::unique_ptr<SphereCollider> collider, const Dispatc
       minimum_batch_(options.minimum_batch),
       verify_(options.verify),
       pool_(options.collider.threads) {
-  verify_build(options.collider.headers);
   if (collider_ == nullptr) throw InvalidArgument("collider is null; it must be a SphereCollider");
-  if (options.fuses_products) {
-    stats_.warning =
-        "the program is compiled with fused multiply-add, also in Bullet's headers: its bits are "
-        "not those of other builds; compile it with -ffp-contract=off";
-  }
+}
+
+void BatchEngine::warn_of_fused_products() {
+  stats_.warning =
+      "the program, which includes Bullet's headers, is compiled with fused multiply-add, so its "
+      "results differ from those of other builds; compile it with -ffp-contract=off";
 }
 
 Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatcher,
@@ -85,40 +83,40 @@ Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatche
   if (dispatcher.getNearCallback() != btNearCallback(btCollisionDispatcher::defaultNearCallback)) {
     return Fallback::near_callback;
   }
-  if (!has_bullets_sphere_function(dispatcher)) return Fallback::create_function;
+  if (!has_stock_sphere_function(dispatcher)) return Fallback::create_function;
   if (info.m_dispatchFunc != btDispatcherInfo::DISPATCH_DISCRETE) return Fallback::continuous;
   return Fallback::none;
 }
 
-/// Everything before the commit, and all that may throw. False and `*fallback` set if there is
-/// nothing to do or something failed that x86 needs too.
+/// Runs everything before the commit, including everything that may throw. Returns false and sets
+/// `*fallback` if there are no sphere pairs or if an operation failed that the CPU also requires.
 bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                           btOverlappingPairCache& cache, Fallback* fallback) {
   try {
-    if (!batch_.gather(pairs_, {&dispatcher, traits.tells_releases}, pool_)) {
+    if (!batch_.gather(pairs_, {&dispatcher, traits.reports_releases}, pool_)) {
       *fallback = Fallback::no_spheres;
       return false;
     }
     find_touching();
-    // A cache of another class may show its user more of the walk than the pairs.
-    quiet_ = typeid(cache) == typeid(btHashedOverlappingPairCache) &&
-             is_quiet(batch_, traits.may_override_filter);
-    if (quiet_) {
-      quiet_commit_.reserve(pairs_.size());
+    // A user's cache class may observe more of the traversal than the pairs.
+    unordered_ = is_exactly<btHashedOverlappingPairCache>(cache) &&
+                 is_order_unobservable(batch_, traits.may_override_filter);
+    if (unordered_) {
+      unordered_commit_.reserve(pairs_.size());
     } else {
       add(ordered_commit_.plan(batch_, touching_, traits.may_override_filter));
     }
     return true;
   } catch (const std::exception& error) {
-    stats_.failure = text_of(error);
-    batch_.forget_all();
+    stats_.failure = message_of(error);
+    batch_.invalidate();
     *fallback = Fallback::out_of_memory;
     return false;
   }
 }
 
-/// If the collider fails, for example because its device is lost, x86 takes over for good. What x86
-/// itself can want is memory, which the next dispatch may find.
+/// If the collider fails, for example because its device is lost, the CPU replaces it permanently.
+/// The CPU itself can only run out of memory, in which case the next dispatch tries again.
 void BatchEngine::find_touching() {
   try {
     touching_ = collider_->find_touching(batch_.spheres(), batch_.pairs());
@@ -128,9 +126,9 @@ void BatchEngine::find_touching() {
     stats_.from_device += bytes.from_device;
     if (const auto why = collider_->device_failure(); !why.empty()) stats_.device_failure = why;
   } catch (const std::exception& error) {
-    const bool on_x86 = !stats_.device_failure.empty() || collider_->backend() == Backend::cpu;
-    if (on_x86 && is_shortage(error)) throw;
-    stats_.device_failure = text_of(error);
+    const bool on_cpu = !stats_.device_failure.empty() || collider_->backend() == Backend::cpu;
+    if (on_cpu && is_out_of_memory(error)) throw;
+    stats_.device_failure = message_of(error);
     collider_ = make_sphere_collider({.backend = Backend::cpu, .threads = pool_.threads()});
     touching_ = collider_->find_touching(batch_.spheres(), batch_.pairs());
   }
@@ -165,25 +163,25 @@ void BatchEngine::commit(btCollisionDispatcher& dispatcher, btOverlappingPairCac
                          const btDispatcherInfo& info, btDispatcher* argument) {
   const Running running(&running_);
   BT_PROFILE("processAllOverlappingPairs");
-  if (quiet_) {
-    commit_quietly(dispatcher, cache, info);
+  if (unordered_) {
+    commit_unordered(dispatcher, cache, info);
     return;
   }
   const auto verify = [&](std::size_t i, bool current) { check(dispatcher, info, i, current); };
   OrderedCommit::Visited visited;
-  if (verify_) visited = std::ref(verify);  // which needs no memory
+  if (verify_) visited = std::ref(verify);  // std::ref avoids an allocation
   stats_.written +=
       ordered_commit_.run(dispatcher, cache, info, argument, batch_, pairs_, touching_, visited);
 }
 
-void BatchEngine::commit_quietly(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
-                                 const btDispatcherInfo& info) {
+void BatchEngine::commit_unordered(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                                   const btDispatcherInfo& info) {
   const std::size_t n = pairs_.size();
   if (verify_) convex_check_.remember(batch_);
-  add(quiet_commit_.run(dispatcher, batch_, touching_, pool_));
+  add(unordered_commit_.run(dispatcher, batch_, touching_, pool_));
   if (verify_) check_convex(dispatcher, info);
-  quiet_commit_.sort_left(pairs_, info.m_deterministicOverlappingPairs);
-  visit_left(dispatcher, cache, info);
+  unordered_commit_.sort_remaining(pairs_, info.m_deterministicOverlappingPairs);
+  visit_remaining(dispatcher, cache, info);
   if (!verify_) return;
   for (std::size_t i = 0; i < n; ++i) {
     if (batch_.kind(i) != PairKind::spheres || !batch_.both_are_spheres(i)) continue;
@@ -191,19 +189,19 @@ void BatchEngine::commit_quietly(btCollisionDispatcher& dispatcher, btOverlappin
   }
 }
 
-void BatchEngine::visit_left(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
-                             const btDispatcherInfo& info) {
+void BatchEngine::visit_remaining(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                                  const btDispatcherInfo& info) {
   constexpr std::size_t kAhead = 4;
-  const std::span<const std::uint32_t> left = quiet_commit_.left();
+  const std::span<const std::uint32_t> remaining = unordered_commit_.remaining();
   const std::size_t n = pairs_.size();
-  // The array may grow, and move, while Bullet's algorithms run.
+  // The array may grow and be reallocated while Bullet's algorithms run.
   const auto visit = [&](std::size_t i) {
     if (i >= pairs_of(cache).size()) return;
     (*dispatcher.getNearCallback())(cache.getOverlappingPairArrayPtr()[i], dispatcher, info);
   };
-  for (std::size_t k = 0; k < left.size(); ++k) {
-    if (k + kAhead < left.size()) {
-      const std::size_t i = left[k + kAhead];
+  for (std::size_t k = 0; k < remaining.size(); ++k) {
+    if (k + kAhead < remaining.size()) {
+      const std::size_t i = remaining[k + kAhead];
       prefetch_for_contact(*batch_.body_a(i));
       prefetch_for_contact(*batch_.body_b(i));
       if (batch_.manifold(i) != nullptr) {
@@ -211,7 +209,7 @@ void BatchEngine::visit_left(btCollisionDispatcher& dispatcher, btOverlappingPai
         prefetch_first_point(batch_.manifold(i));
       }
     }
-    visit(left[k]);
+    visit(remaining[k]);
   }
   for (std::size_t i = n; i < pairs_of(cache).size(); ++i) visit(i);
 }
@@ -229,17 +227,18 @@ void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInf
   ++stats_.verified;
   const btPersistentManifold* manifold = batch_.manifold(i);
   const PairContact* contact = first_contact(touching_, i);
-  const bool touch = contact != touching_.data() + touching_.size() && contact->pair == i;
+  const bool touches = contact != touching_.data() + touching_.size() && contact->pair == i;
   const auto difference =
-      check_pair(&dispatcher, info, *batch_.body_a(i), *batch_.body_b(i), touch ? contact : nullptr,
-                 *manifold, current ? manifold : nullptr);
+      check_pair(&dispatcher, info, *batch_.body_a(i), *batch_.body_b(i),
+                 touches ? contact : nullptr, *manifold, current ? manifold : nullptr);
   note(difference);
 }
 
-/// Pairs of a sphere and something else. Nobody listens: that is what quiet means.
+/// Checks pairs of a sphere and a box or plane. No callback is set, because the order of the commit
+/// is unobservable.
 void BatchEngine::check_convex(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info) {
   convex_check_.for_each(
-      quiet_commit_.left(), [&](std::size_t i, const btPersistentManifold& before) {
+      unordered_commit_.remaining(), [&](std::size_t i, const btPersistentManifold& before) {
         const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
         if (!dispatcher.needsCollision(a, b)) return;
         ++stats_.verified;

@@ -1,4 +1,4 @@
-/// What turns a dispatch into a batch, for any btCollisionDispatcher.
+/// Batched dispatch of all pairs of a pair cache, for any btCollisionDispatcher.
 #pragma once
 
 #include <jfpx/bullet/dispatcher.hpp>
@@ -14,27 +14,29 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// What the engine must know of the class of a dispatcher.
+/// Properties of the class of a dispatcher.
 struct DispatcherTraits {
-  bool may_override_filter;  ///< needsCollision must be asked about every pair
-  bool tells_releases;       ///< forget() is called for every manifold that it releases
+  bool may_override_filter;  ///< needsCollision() must be called for every pair
+  bool reports_releases;     ///< note_release() is called for every manifold that it releases
 };
 
-/// Any engine can serve any dispatcher: what it keeps from one dispatch to the next is checked
-/// before it is used. One dispatch at a time.
+/// An engine can run the dispatches of any dispatcher, one at a time: state that is kept between
+/// dispatches is validated before it is used.
 class JFPX_API BatchEngine {
  public:
   /// @throws InvalidArgument if `collider` is null.
   BatchEngine(std::unique_ptr<SphereCollider> collider, const DispatcherOptions& options);
 
-  /// Does what dispatcher.btCollisionDispatcher::dispatchAllCollisionPairs would do.
-  /// @return false if this dispatch must be left to Bullet: nothing was done, and stats().
-  ///   last_fallback says why.
+  /// Has the effect of dispatcher.btCollisionDispatcher::dispatchAllCollisionPairs.
+  /// @return false if Bullet must run this dispatch: nothing has been changed, and
+  ///   stats().last_fallback is the reason.
   bool dispatch(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                 btOverlappingPairCache& cache, const btDispatcherInfo& info,
                 btDispatcher* argument);
-  /// The dispatcher is about to release a manifold.
-  void forget(const btPersistentManifold* manifold) noexcept { batch_.forget(manifold); }
+  /// Must be called before the dispatcher releases a manifold.
+  void note_release(const btPersistentManifold* manifold) noexcept {
+    batch_.note_release(manifold);
+  }
 
   std::size_t minimum_batch() const noexcept { return minimum_batch_; }
   void set_minimum_batch(std::size_t pairs) noexcept { minimum_batch_ = pairs; }
@@ -44,6 +46,8 @@ class JFPX_API BatchEngine {
   ChoiceReason reason() const noexcept { return collider_->reason(); }
   const DispatchStats& stats() const noexcept { return stats_; }
   void reset_stats();
+  /// Sets stats().warning, which outlives reset_stats().
+  void warn_of_fused_products();
 
  private:
   Fallback reason_to_fall_back(const btCollisionDispatcher& dispatcher, std::size_t pairs,
@@ -53,10 +57,10 @@ class JFPX_API BatchEngine {
   void find_touching();
   void commit(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
               const btDispatcherInfo& info, btDispatcher* argument);
-  void commit_quietly(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
-                      const btDispatcherInfo& info);
-  void visit_left(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
-                  const btDispatcherInfo& info);
+  void commit_unordered(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                        const btDispatcherInfo& info);
+  void visit_remaining(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                       const btDispatcherInfo& info);
   void add(const CommitCounts& counts);
   void check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info, std::size_t i,
              bool current);
@@ -69,14 +73,14 @@ class JFPX_API BatchEngine {
   bool running_ = false;
   ThreadPool pool_;
   SphereBatch batch_;
-  UnorderedCommit quiet_commit_;
+  UnorderedCommit unordered_commit_;
   OrderedCommit ordered_commit_;
-  ConvexCheck convex_check_;  ///< of set_verify()
+  ConvexCheck convex_check_;  ///< for set_verify()
   DispatchStats stats_;
-  // Of the dispatch that is running:
+  // State of the running dispatch:
   std::span<const btBroadphasePair> pairs_;
   std::span<const PairContact> touching_;
-  bool quiet_ = false;
+  bool unordered_ = false;
 };
 
 }  // namespace bullet

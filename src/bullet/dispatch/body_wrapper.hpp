@@ -1,4 +1,4 @@
-/// A body as Bullet's algorithms want to be handed it.
+/// Construction of the object wrapper that Bullet's algorithms take.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,7 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// As the dispatcher makes it: no child of another shape.
+/// Same as the dispatcher's wrapper for a body, which is not a child of another shape.
 inline btCollisionObjectWrapper wrapper_of(const btCollisionObject& body) {
   return {nullptr, body.getCollisionShape(), &body, body.getWorldTransform(), -1, -1};
 }

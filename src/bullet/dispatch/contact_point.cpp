@@ -1,4 +1,4 @@
-/// The flat form of btManifoldResult::addContactPoint for two spheres (btManifoldResult.cpp of
+/// Specialization of btManifoldResult::addContactPoint for two spheres (btManifoldResult.cpp of
 /// Bullet 3.24), and of btConvexConvexAlgorithm for a sphere and a box. Bullet's inline functions
 /// do the vector arithmetic, so the operations are Bullet's.
 #include "src/bullet/dispatch/contact_point.hpp"
@@ -23,7 +23,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// Bullet's limit on combined friction, with its order of comparisons: NaN passes.
+/// Bullet's limit of combined friction, with its order of comparisons: a NaN is returned unchanged.
 btScalar clamp_friction(btScalar friction) {
   constexpr btScalar kMaxFriction = 10;
   if (friction < -kMaxFriction) return -kMaxFriction;
@@ -31,7 +31,7 @@ btScalar clamp_friction(btScalar friction) {
   return friction;
 }
 
-void combine_materials(const BodyState& a, const BodyState& b, btManifoldPoint* point) {
+void combine_materials(const PackedBody& a, const PackedBody& b, btManifoldPoint* point) {
   point->m_combinedFriction = clamp_friction(a.friction * b.friction);
   point->m_combinedRestitution = a.restitution * b.restitution;
   point->m_combinedRollingFriction =
@@ -42,7 +42,7 @@ void combine_materials(const BodyState& a, const BodyState& b, btManifoldPoint* 
 
 }  // namespace
 
-bool contacts_are_heard() {
+bool contacts_are_observed() {
   return gContactStartedCallback != nullptr || gContactEndedCallback != nullptr ||
          gContactDestroyedCallback != nullptr ||
          gCalculateCombinedFrictionCallback != &btManifoldResult::calculateCombinedFriction ||
@@ -64,15 +64,15 @@ int special_collision_flags() {
   return special;
 }
 
-void write_contact(btPersistentManifold* manifold, const PairContact& contact, const BodyState& a,
-                   const BodyState& b, Real radius_b) {
+void write_contact(btPersistentManifold* manifold, const PairContact& contact, const PackedBody& a,
+                   const PackedBody& b, Real radius_b) {
   if (contact.distance > manifold->getContactBreakingThreshold()) return;
   const btVector3 normal(contact.normal.x, contact.normal.y, contact.normal.z);
   const btVector3 on_b = b.pose.getOrigin() + radius_b * normal;
   const btVector3 on_a = on_b + normal * contact.distance;
 
-  // btPersistentManifold::addManifoldPoint on an empty manifold. The point is made in its place: a
-  // copy right behind the writes would wait for them to leave the store buffer.
+  // btPersistentManifold::addManifoldPoint for an empty manifold. The point is constructed in
+  // place, because a copy directly after the writes would stall on store forwarding.
   manifold->setNumContacts(1);
   auto* point = new (&manifold->getContactPoint(0))
       btManifoldPoint(a.pose.invXform(on_a), b.pose.invXform(on_b), normal, contact.distance);
@@ -90,7 +90,7 @@ bool update_sphere_plane(btPersistentManifold* manifold, const btCollisionObject
       sphere.getWorldTransform(), static_cast<const btSphereShape&>(*sphere.getCollisionShape()),
       plane.getWorldTransform(),
       static_cast<const btStaticPlaneShape&>(*plane.getCollisionShape()));
-  // Which of two NaN an operation returns is up to the compiler.
+  // The compiler determines which of two NaNs an operation returns.
   const btVector3 sum = contact.normal_on_plane + contact.point_on_plane;
   if (!is_finite(sum.x() + sum.y() + sum.z() + contact.distance)) return false;
   const bool touching = contact.distance < manifold->getContactBreakingThreshold();
@@ -118,17 +118,18 @@ bool update_sphere_box(btPersistentManifold* manifold, const btCollisionObject& 
                           .core = box->getImplicitShapeDimensions(),
                           .sphere_first = sphere_first,
                           .maximum_distance_squared = 0};
-  const btScalar reach = input.margin_a + input.margin_b + manifold->getContactBreakingThreshold();
-  input.maximum_distance_squared = reach * reach;
+  const btScalar extended_distance =
+      input.margin_a + input.margin_b + manifold->getContactBreakingThreshold();
+  input.maximum_distance_squared = extended_distance * extended_distance;
   SphereBoxContact contact;
-  const SphereBoxAnswer answer = find_closest_points(input, &contact);
-  if (answer == SphereBoxAnswer::unknown) return false;
-  if (answer == SphereBoxAnswer::apart && manifold->getNumContacts() == 0) return true;
+  const SphereBoxResult answer = find_closest_points(input, &contact);
+  if (answer == SphereBoxResult::unknown) return false;
+  if (answer == SphereBoxResult::apart && manifold->getNumContacts() == 0) return true;
   const btCollisionObjectWrapper a = wrapper_of(body_a);
   const btCollisionObjectWrapper b = wrapper_of(body_b);
   btManifoldResult result(&a, &b);
   result.setPersistentManifold(manifold);
-  if (answer == SphereBoxAnswer::contact) {
+  if (answer == SphereBoxResult::contact) {
     result.addContactPoint(contact.normal_on_b, contact.point_on_b, contact.distance);
   }
   result.refreshContactPoints();

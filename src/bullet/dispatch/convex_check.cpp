@@ -1,4 +1,4 @@
-/// Recomputes pairs of a sphere and a box or a plane with Bullet's own algorithm and compares.
+/// Check of sphere-box and sphere-plane pairs against Bullet's own algorithm.
 #include "src/bullet/dispatch/convex_check.hpp"
 
 #include "src/bullet/dispatch/body_wrapper.hpp"

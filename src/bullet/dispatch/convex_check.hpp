@@ -1,4 +1,4 @@
-/// Recomputes pairs of a sphere and a box or a plane with Bullet's own algorithm and compares.
+/// Check of sphere-box and sphere-plane pairs against Bullet's own algorithm.
 #pragma once
 
 #include "src/bullet/dispatch/point_fields.hpp"
@@ -13,8 +13,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Lets `algorithm` start from `before` and compares what it makes of the manifold with what the
-/// manifold is now. The manifold keeps what it has.
+/// Runs `algorithm` on the manifold `before` and compares the result with the current manifold,
+/// which is left unchanged.
 /// @return the first field that differs.
 std::optional<FieldDifference> check_update(btCollisionAlgorithm& algorithm,
                                             const btDispatcherInfo& info,
@@ -23,16 +23,16 @@ std::optional<FieldDifference> check_update(btCollisionAlgorithm& algorithm,
                                             const btPersistentManifold& before,
                                             btPersistentManifold* manifold);
 
-/// Manifolds with points that persist, as they were before a dispatch.
+/// Copies of the manifolds with persistent points before a dispatch.
 class ConvexCheck {
  public:
   void remember(const SphereBatch& batch);
-  /// Calls check(pair, manifold before) for each remembered pair that is not among those `left`,
-  /// which are ascending.
+  /// Calls check(pair, manifold before) for each stored pair that is not in `excluded`, which is
+  /// ascending.
   template <class Check>
-  void for_each(std::span<const std::uint32_t> left, const Check& check) const {
+  void for_each(std::span<const std::uint32_t> excluded, const Check& check) const {
     for (const Before& before : before_) {
-      if (std::binary_search(left.begin(), left.end(), before.pair)) continue;
+      if (std::binary_search(excluded.begin(), excluded.end(), before.pair)) continue;
       check(before.pair, before.manifold);
     }
   }

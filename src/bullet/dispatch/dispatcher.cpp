@@ -1,9 +1,10 @@
-/// The dispatcher that users see: a batch where the engine can, Bullet's own dispatch elsewhere.
+/// The public dispatcher: runs a batch where the engine supports it, and Bullet's dispatch
+/// elsewhere.
 #include <jfpx/bullet/dispatcher.hpp>
 
 #include "src/bullet/dispatch/batch_engine.hpp"
+#include "src/bullet/exact_class.hpp"
 
-#include <typeinfo>
 #include <utility>
 
 namespace jfpx {
@@ -14,30 +15,29 @@ struct CollisionDispatcher::Impl {
   BatchEngine engine;
 };
 
-CollisionDispatcher::CollisionDispatcher(btCollisionConfiguration* configuration,
-                                         const DispatcherOptions& options)
-    : CollisionDispatcher(configuration, make_sphere_collider(options.collider), options) {}
-
-CollisionDispatcher::CollisionDispatcher(btCollisionConfiguration* configuration,
+CollisionDispatcher::CollisionDispatcher(CallerIsFused caller,
+                                         btCollisionConfiguration* configuration,
                                          std::unique_ptr<SphereCollider> collider,
                                          const DispatcherOptions& options)
     : btCollisionDispatcher(configuration),
-      impl_(new Impl{BatchEngine(std::move(collider), options)}) {}
+      impl_(new Impl{BatchEngine(std::move(collider), options)}) {
+  if (caller.value) impl_->engine.warn_of_fused_products();
+}
 
 CollisionDispatcher::~CollisionDispatcher() = default;
 
 void CollisionDispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* pair_cache,
                                                     const btDispatcherInfo& dispatch_info,
                                                     btDispatcher* dispatcher) {
-  const bool subclass = typeid(*this) != typeid(CollisionDispatcher);
-  const DispatcherTraits traits{.may_override_filter = subclass, .tells_releases = !subclass};
+  const bool subclass = !is_exactly<CollisionDispatcher>(*this);
+  const DispatcherTraits traits{.may_override_filter = subclass, .reports_releases = !subclass};
   if (!impl_->engine.dispatch(*this, traits, *pair_cache, dispatch_info, dispatcher)) {
     btCollisionDispatcher::dispatchAllCollisionPairs(pair_cache, dispatch_info, dispatcher);
   }
 }
 
 void CollisionDispatcher::releaseManifold(btPersistentManifold* manifold) {
-  impl_->engine.forget(manifold);
+  impl_->engine.note_release(manifold);
   btCollisionDispatcher::releaseManifold(manifold);
 }
 

@@ -1,4 +1,4 @@
-/// The walk in Bullet's order.
+/// Traversal of the pairs in Bullet's order.
 #include "src/bullet/dispatch/ordered_commit.hpp"
 
 #include "src/bullet/dispatch/contact_point.hpp"
@@ -28,11 +28,11 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     const std::size_t i = (reinterpret_cast<std::uintptr_t>(&pair) -
                            reinterpret_cast<std::uintptr_t>(pairs_.data())) /
                           sizeof(btBroadphasePair);
-    if (i >= pairs_.size()) {  // added by a callback during this walk
+    if (i >= pairs_.size()) {  // added by a callback during this traversal
       visit_stock(pair);
       return false;
     }
-    ask_for(i + kAhead);
+    prefetch_commit(i + kAhead);
     const bool current = visit(i, pair);
     if (visited_ && batch_.kind(i) == PairKind::spheres && batch_.both_are_spheres(i)) {
       visited_(i, current);
@@ -42,10 +42,10 @@ class OrderedCommit::Walk final : public btOverlapCallback {
   std::uint64_t written() const { return written_; }
 
  private:
-  /// Commits in flight: enough to hide memory, few enough to stay in the cache.
+  /// Prefetch distance: long enough to hide memory latency, short enough for the cache.
   static constexpr std::size_t kAhead = 12;
 
-  void ask_for(std::size_t i) const {
+  void prefetch_commit(std::size_t i) const {
     if (i >= pairs_.size() || actions_[i] != Action::commit) return;
     prefetch_header(batch_.manifold(i));
     prefetch_first_point(batch_.manifold(i));
@@ -64,7 +64,7 @@ class OrderedCommit::Walk final : public btOverlapCallback {
   }
 
   bool visit(std::size_t i, btBroadphasePair& pair) {
-    // A callback may set one of its own on the way.
+    // A callback may set a near callback during the traversal.
     if (dispatcher_.getNearCallback() != &btCollisionDispatcher::defaultNearCallback) {
       visit_stock(pair);
       return false;
@@ -76,24 +76,24 @@ class OrderedCommit::Walk final : public btOverlapCallback {
         return true;
       case Action::skip:
         return true;
-      case Action::ask:
+      case Action::filter:
         dispatcher_.needsCollision(a, b);
         return true;
       case Action::commit:
         break;
     }
     btPersistentManifold* manifold = batch_.manifold(i);
-    // Asked for every contact, because a callback may set another one.
+    // Evaluated for every contact, because a callback may set another callback.
     const PairContact* contact = contacts_[i] != kNone ? &touching_[contacts_[i]] : nullptr;
-    const bool is_odd = contact != nullptr && !has_stocks_bits(*contact);
-    if (contacts_are_heard() || is_odd || !is_plain(*manifold, *a, *b)) {
+    const bool is_not_finite = contact != nullptr && !has_finite_values(*contact);
+    if (contacts_are_observed() || is_not_finite || !is_plain(*manifold, *a, *b)) {
       visit_stock(pair);
-      return false;  // the near callback asks the filter itself, and does not say what it heard
+      return false;  // the near callback calls the filter itself and does not return its result
     }
     if (!dispatcher_.needsCollision(a, b)) return false;
     ++written_;
     manifold->setNumContacts(0);
-    // Materials as they are now: callbacks may change those of their bodies.
+    // The current materials, because callbacks may change those of their bodies.
     if (contact != nullptr) {
       write_contact(manifold, *contact, state_of(*a), state_of(*b), batch_.radius_b(i));
     }
@@ -112,7 +112,7 @@ class OrderedCommit::Walk final : public btOverlapCallback {
 };
 
 CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairContact> touching,
-                                 bool ask_all) {
+                                 bool may_override_filter) {
   constexpr std::size_t kAhead = 16;
   const std::size_t n = batch.pairs().size();
   actions_.assign(n, Action::stock);
@@ -132,8 +132,8 @@ CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairC
     if (contacts_[i] != kNone || batch.manifold(i)->getNumContacts() != 0) {
       actions_[i] = Action::commit;
     } else {
-      const bool ask = ask_all || (batch.either_trait(i) & kOverridesFilter) != 0;
-      actions_[i] = ask ? Action::ask : Action::skip;
+      const bool filtered = may_override_filter || (batch.either_trait(i) & kOverridesFilter) != 0;
+      actions_[i] = filtered ? Action::filter : Action::skip;
     }
   }
   return counts;

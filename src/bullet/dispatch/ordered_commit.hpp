@@ -1,4 +1,4 @@
-/// The commit of pairs one by one in Bullet's order, for dispatches that somebody listens to.
+/// Commit of pairs one at a time in Bullet's order, for dispatches whose order is observable.
 #pragma once
 
 #include "src/bullet/dispatch/unordered_commit.hpp"
@@ -12,19 +12,20 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// One walk over all pairs, driven by the pair cache itself, so that the order is Bullet's for
-/// every kind of cache. A pair that touches is written in place if nobody could hear it, and goes
-/// through Bullet's near callback otherwise, as everything that is not two spheres.
+/// One traversal of all pairs, driven by the pair cache itself, so that the order is Bullet's for
+/// every class of cache. A touching pair is written in place if no callback can observe it;
+/// otherwise it is passed to Bullet's near callback, like every pair that is not of two spheres.
 class OrderedCommit {
  public:
-  /// Called with each sphere pair behind its visit, and whether its manifold is now what the
-  /// contacts say; false if a filter may have kept it as it was.
+  /// Called after the visit of each sphere pair. `current` is false if a filter may have left its
+  /// manifold unchanged, and true if the manifold matches the contacts.
   using Visited = std::function<void(std::size_t i, bool current)>;
 
-  /// Decides what the walk does at each pair, as the manifolds are now. `ask_all` when the
-  /// dispatcher's class may override needsCollision. The only part that can throw by itself.
-  CommitCounts plan(const SphereBatch& batch, std::span<const PairContact> touching, bool ask_all);
-  /// @return manifolds written.
+  /// Determines the action for each pair from the current manifolds. `may_override_filter`: the
+  /// dispatcher's class may override needsCollision(). The only function that can throw by itself.
+  CommitCounts plan(const SphereBatch& batch, std::span<const PairContact> touching,
+                    bool may_override_filter);
+  /// @return the number of manifolds written.
   std::uint64_t run(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
                     const btDispatcherInfo& info, btDispatcher* argument, const SphereBatch& batch,
                     std::span<const btBroadphasePair> pairs, std::span<const PairContact> touching,
@@ -32,9 +33,9 @@ class OrderedCommit {
 
  private:
   enum class Action : std::uint8_t {
-    stock,   ///< not two spheres, or not (yet) a pair with Bullet's own sphere-sphere algorithm
-    skip,    ///< does not touch and has no points: nothing could change
-    ask,     ///< as skip, but a user's override of the collision filter must be asked
+    stock,   ///< not two spheres, or a pair without Bullet's own sphere-sphere algorithm
+    skip,    ///< does not touch and has no points, so nothing can change
+    filter,  ///< as skip, but a user's override of the collision filter must be called
     commit,  ///< touches or has points
   };
   class Walk;
@@ -42,7 +43,7 @@ class OrderedCommit {
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
   std::vector<Action> actions_;
-  std::vector<std::uint32_t> contacts_;  ///< by pair: the number of its contact, or kNone
+  std::vector<std::uint32_t> contacts_;  ///< by pair: the index of its contact, or kNone
 };
 
 }  // namespace bullet

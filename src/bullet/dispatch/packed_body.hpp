@@ -1,4 +1,4 @@
-/// What a contact needs of a body, side by side: Bullet keeps it in five cache lines of its own.
+/// Compact copy of the body fields that a contact reads; in Bullet they occupy five cache lines.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -9,12 +9,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-struct BodyState {
+struct PackedBody {
   btTransform pose;
   btScalar friction, restitution, rolling_friction, spinning_friction;
 };
 
-inline BodyState state_of(const btCollisionObject& body) {
+inline PackedBody state_of(const btCollisionObject& body) {
   return {body.getWorldTransform(), body.getFriction(), body.getRestitution(),
           body.getRollingFriction(), body.getSpinningFriction()};
 }

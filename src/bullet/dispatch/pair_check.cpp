@@ -1,4 +1,4 @@
-/// Recomputes a sphere pair with Bullet's own algorithm and compares.
+/// Check of a sphere pair against Bullet's own algorithm.
 #include "src/bullet/dispatch/pair_check.hpp"
 
 #include "src/bullet/dispatch/body_wrapper.hpp"
@@ -15,18 +15,18 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// While it lives, nobody hears of the scratch manifold.
-class CallbacksOff {
+/// Disables the global contact callbacks during its lifetime, for the scratch manifold.
+class CallbacksDisabled {
  public:
-  CallbacksOff() = default;
-  ~CallbacksOff() {
+  CallbacksDisabled() = default;
+  ~CallbacksDisabled() {
     gContactAddedCallback = added_;
     gContactStartedCallback = started_;
     gContactEndedCallback = ended_;
     gContactDestroyedCallback = destroyed_;
   }
-  CallbacksOff(const CallbacksOff&) = delete;
-  CallbacksOff& operator=(const CallbacksOff&) = delete;
+  CallbacksDisabled(const CallbacksDisabled&) = delete;
+  CallbacksDisabled& operator=(const CallbacksDisabled&) = delete;
 
  private:
   ContactAddedCallback added_ = std::exchange(gContactAddedCallback, nullptr);
@@ -43,8 +43,8 @@ std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDisp
                                           const PairContact* contact,
                                           const btPersistentManifold& thresholds,
                                           const btPersistentManifold* manifold) {
-  const CallbacksOff callbacks_off;
-  // Users may have exchanged the bodies of the manifold.
+  const CallbacksDisabled callbacks_disabled;
+  // The bodies of the manifold, which the user may have exchanged.
   btPersistentManifold scratch(thresholds.getBody0(), thresholds.getBody1(), 0,
                                thresholds.getContactBreakingThreshold(),
                                thresholds.getContactProcessingThreshold());
@@ -57,7 +57,7 @@ std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDisp
 
   FieldComparison compare;
   const bool expected = scratch.getNumContacts() != 0;
-  // Bullet refuses a touching point if a user has set a negative breaking threshold.
+  // Bullet rejects a touching point if the user has set a negative breaking threshold.
   const bool accepted =
       contact != nullptr && !(contact->distance > thresholds.getContactBreakingThreshold());
   compare("touching", expected ? 1 : 0, accepted ? 1 : 0);
@@ -65,8 +65,8 @@ std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDisp
     const btManifoldPoint& point = scratch.getContactPoint(0);
     const btVector3& normal = point.m_normalWorldOnB;
     const PairContact stock{{normal.x(), normal.y(), normal.z()}, point.m_distance1, contact->pair};
-    compare("contact is finite", has_stocks_bits(stock), has_stocks_bits(*contact));
-    if (has_stocks_bits(*contact)) {
+    compare("contact is finite", has_finite_values(stock), has_finite_values(*contact));
+    if (has_finite_values(*contact)) {
       compare("distance", stock.distance, contact->distance);
       compare("normal.x", stock.normal.x, contact->normal.x);
       compare("normal.y", stock.normal.y, contact->normal.y);

@@ -1,4 +1,4 @@
-/// Recomputes a sphere pair with Bullet's own algorithm and compares.
+/// Check of a sphere pair against Bullet's own algorithm.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -13,10 +13,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Runs btSphereSphereCollisionAlgorithm on a scratch manifold and compares the outcome with the
-/// collider's contact, null if it found none, and, unless `manifold` is null, with the manifold as
-/// it is now. Of a contact that is left to Bullet (has_stocks_bits()) the collider's numbers may be
-/// others. Global contact callbacks are taken off meanwhile.
+/// Runs btSphereSphereCollisionAlgorithm on a scratch manifold and compares the result with the
+/// collider's contact, which is null if it found none, and, unless `manifold` is null, with the
+/// current manifold. If the contact is not finite, only that property is compared, because Bullet
+/// computes such contacts. Global contact callbacks are disabled during the check.
 /// @return the first field that differs.
 std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDispatcherInfo& info,
                                           const btCollisionObject& body_a,

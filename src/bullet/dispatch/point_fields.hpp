@@ -1,5 +1,4 @@
-/// The fields of a contact point and a manifold by name, for comparisons that never look at
-/// padding.
+/// Comparison of contact points and manifolds by named field, which never reads padding.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -16,14 +15,14 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// A field in which two things differ, its values as numbers and as bits.
+/// A field that differs, with both values as numbers and as bits.
 struct FieldDifference {
   std::string field;
   double expected = 0, actual = 0;
   std::uint64_t expected_bits = 0, actual_bits = 0;
 };
 
-/// Collects the first field that differs in bits.
+/// Records the first field whose bits differ.
 class FieldComparison {
  public:
   void operator()(const char* name, btScalar expected, btScalar actual) {
@@ -39,7 +38,7 @@ class FieldComparison {
                 static_cast<std::uint32_t>(expected), static_cast<std::uint32_t>(actual)};
     }
   }
-  /// All four components: the unused one is copied about by Bullet like the others.
+  /// Compares all four components, because Bullet copies the unused one like the others.
   void operator()(const char* name, const btVector3& expected, const btVector3& actual) {
     static constexpr const char* kSuffix[] = {".x", ".y", ".z", ".w"};
     for (int i = 0; i < 4 && !first_; ++i) {
@@ -64,8 +63,8 @@ class FieldComparison {
   std::optional<FieldDifference> first_;
 };
 
-/// Every field of a point. Of the user's pointer only whether it is set: two worlds may well have
-/// different ones.
+/// Compares every field of a point. Of the user's pointer, only whether it is set is compared,
+/// because two worlds may have different ones.
 inline void compare_points(const btManifoldPoint& e, const btManifoldPoint& a, FieldComparison* c) {
   (*c)("m_localPointA", e.m_localPointA, a.m_localPointA);
   (*c)("m_localPointB", e.m_localPointB, a.m_localPointB);

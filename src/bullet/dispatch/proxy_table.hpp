@@ -1,4 +1,4 @@
-/// Numbers the broadphase proxies that a list of pairs names, and keeps the numbers while it does.
+/// Assignment of stable indices to the broadphase proxies of a list of pairs.
 #pragma once
 
 #include "src/base/prefetch.hpp"
@@ -13,8 +13,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// An open-addressing hash table over proxy addresses. Keyed by address because that is the only
-/// name of a proxy that needs no look at it: unique ids of btDbvtBroadphase grow without bound, and
+/// An open-addressing hash table over proxy addresses. The address is the only key that can be read
+/// without dereferencing the proxy; besides, unique ids of btDbvtBroadphase grow without bound, and
 /// array indices belong to one world.
 class ProxyTable {
  public:
@@ -29,18 +29,19 @@ class ProxyTable {
     }
   }
 
-  /// Numbers run from 0 to here. Those without a user belong to proxies that may be gone.
+  /// Upper bound of the indices. An index without references belongs to a proxy that may have been
+  /// destroyed.
   std::size_t size() const { return proxies_.size(); }
   bool in_use(std::size_t number) const { return users_[number] != 0; }
   btBroadphaseProxy* proxy(std::size_t number) const { return proxies_[number]; }
-  /// True when it is time to number anew, because most numbers have no user.
+  /// True if most indices have no reference, so that the table should be rebuilt.
   bool wasteful() const { return proxies_.size() > 2 * in_use_ + 1024; }
 
-  /// Brings the proxy's place into the cache. Lookups are as random as the pairs, and a table of
-  /// some thousand proxies is larger than the first-level cache.
+  /// Prefetches the proxy's entry. Lookups are as random as the pairs, and a table of a few
+  /// thousand proxies is larger than the L1 cache.
   void prefetch(const btBroadphaseProxy* proxy) const { jfpx::prefetch(&entries_[home(proxy)]); }
 
-  /// The number of the proxy, which has one user more; a new one gets the next number.
+  /// Adds a reference to the proxy and returns its index; a new proxy gets the next index.
   std::uint32_t acquire(btBroadphaseProxy* proxy) {
     Entry* entry = find(proxy);
     if (entry->proxy == nullptr) entry = add(proxy, entry);
@@ -55,8 +56,8 @@ class ProxyTable {
     std::uint32_t number;
   };
 
-  /// Two rounds of multiplying and folding. One round (Fibonacci hashing) is not enough: proxies
-  /// lie at nearly equal distances, which it maps to runs of 17 to 25 occupied entries.
+  /// Two rounds of multiplication and folding. One round (Fibonacci hashing) is insufficient:
+  /// proxies lie at nearly equal distances, which it maps to runs of 17 to 25 occupied entries.
   std::size_t home(const btBroadphaseProxy* proxy) const {
     constexpr std::uint64_t kMultiplier = 0x9e3779b97f4a7c15u;
     std::uint64_t hash = reinterpret_cast<std::uintptr_t>(proxy) * kMultiplier;

@@ -1,7 +1,8 @@
-/// Reads bodies. Memory latency is all there is to it: everything is prefetched.
+/// Gathering of bodies, which is bound by memory latency; all reads are prefetched.
 #include "src/bullet/dispatch/sphere_batch.hpp"
 
 #include "src/bullet/dispatch/contact_point.hpp"
+#include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
 
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
@@ -22,10 +23,8 @@ namespace {
 constexpr std::size_t kBodyChunk = 1024;
 
 /// True for exactly the classes whose checkCollideWithOverride is known to be free of side effects.
-/// typeid compares addresses here: a copy of the class in another library counts as foreign, which
-/// costs time and no bits.
-bool is_bullets_own_class(const btCollisionObject& body) {
-  const std::type_info* type = &typeid(body);
+bool has_stock_filter(const btCollisionObject& body) {
+  const std::type_info* type = type_info_of(body);
   return type == &typeid(btRigidBody) || type == &typeid(btCollisionObject) ||
          type == &typeid(btGhostObject) || type == &typeid(btPairCachingGhostObject);
 }
@@ -37,7 +36,7 @@ std::uint8_t SphereBatch::read_body(std::size_t number) {
   const btCollisionObject& body = *bodies_[number];
   unsigned traits = body.isActive() ? kActive : 0;
   if (body.*BodyFields::check_collide_with != 0) {
-    traits |= is_bullets_own_class(body) ? kHasIgnoreList : kHasIgnoreList | kOverridesFilter;
+    traits |= has_stock_filter(body) ? kHasIgnoreList : kHasIgnoreList | kOverridesFilter;
   }
   if ((body.getCollisionFlags() & special_flags_) != 0) traits |= kCustomMaterial;
   if (copies_states_) states_[number] = state_of(body);
@@ -48,8 +47,9 @@ std::uint8_t SphereBatch::read_body(std::size_t number) {
     spheres_[number] = {{centre.x(), centre.y(), centre.z()},
                         static_cast<const btSphereShape*>(shape)->getRadius()};
   } else {
-    if (&typeid(*shape) == &typeid(btBoxShape)) traits |= kBox;
-    if (&typeid(*shape) == &typeid(btStaticPlaneShape)) traits |= kPlane;
+    const std::type_info* type = type_info_of(*shape);
+    if (type == &typeid(btBoxShape)) traits |= kBox;
+    if (type == &typeid(btStaticPlaneShape)) traits |= kPlane;
     spheres_[number] = {{}, kNaN};
   }
   return static_cast<std::uint8_t>(traits);
@@ -58,7 +58,7 @@ std::uint8_t SphereBatch::read_body(std::size_t number) {
 void SphereBatch::prefetch_states(std::size_t i) const {
   for (const SphereIndex number : {pairs()[i].a, pairs()[i].b}) {
     if (copies_states_) {
-      prefetch_ends(&states_[number], sizeof(BodyState));
+      prefetch_ends(&states_[number], sizeof(PackedBody));
     } else {
       prefetch_for_contact(*bodies_[number]);
     }
@@ -66,18 +66,18 @@ void SphereBatch::prefetch_states(std::size_t i) const {
 }
 
 SphereBatch::Summary SphereBatch::read_bodies(std::size_t begin, std::size_t end) {
-  const ProxyTable& proxies = mirror_.proxies();
+  const ProxyTable& proxies = table_.proxies();
   constexpr std::size_t kAhead = 12;
   Summary summary;
   for (std::size_t i = begin; i < end + 3 * kAhead; ++i) {
-    // Proxy, body, shape: each is asked for when the one before it has come.
+    // Proxy, body and shape are prefetched in sequence, each after its predecessor has arrived.
     if (i < end && proxies.in_use(i)) prefetch(&proxies.proxy(i)->m_clientObject);
     if (const std::size_t k = i - kAhead; i >= begin + kAhead && k < end) {
       bodies_[k] = proxies.in_use(k)
                        ? static_cast<const btCollisionObject*>(proxies.proxy(k)->m_clientObject)
                        : nullptr;
       if (bodies_[k] != nullptr) {
-        copies_states_ ? prefetch_for_contact(*bodies_[k]) : prefetch_place(*bodies_[k]);
+        copies_states_ ? prefetch_for_contact(*bodies_[k]) : prefetch_geometry(*bodies_[k]);
       }
     }
     if (const std::size_t k = i - 2 * kAhead; i >= begin + 2 * kAhead && k < end) {
@@ -98,8 +98,8 @@ SphereBatch::Summary SphereBatch::read_bodies(std::size_t begin, std::size_t end
 
 bool SphereBatch::gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner,
                          ThreadPool& pool) {
-  mirror_.refresh(pairs, owner, pool);
-  const std::size_t n = mirror_.proxies().size();
+  table_.refresh(pairs, owner, pool);
+  const std::size_t n = table_.proxies().size();
   bodies_.resize(n);
   spheres_.resize(n);
   traits_.resize(n);

@@ -1,8 +1,8 @@
 /// GJK in two parts, as in Bullet 3.24 (btGjkPairDetector.cpp): a test whether the cores, a point
 /// and a box, intersect, and the distance between them (G. van den Bergen, "A Fast and Robust GJK
-/// Implementation for Collision Detection of Convex Objects", 1999). The first follows libccd's
-/// GJK, which is what Bullet uses, triangle distance in double and fuzzy comparisons included.
-/// Bullet's own inline functions and simplex solver do the arithmetic that they can.
+/// Implementation for Collision Detection of Convex Objects", 1999). The first part follows
+/// libccd's GJK, which Bullet uses, including the triangle distance in double and the fuzzy
+/// comparisons. Bullet's own inline functions and simplex solver do the arithmetic where possible.
 #include "src/bullet/dispatch/sphere_box.hpp"
 
 #include <jfpx/math.hpp>
@@ -19,7 +19,7 @@ namespace {
 constexpr btScalar kRelativeError = sizeof(btScalar) == 8 ? btScalar(1.0e-12) : btScalar(1.0e-6);
 constexpr int kMaxIterations = 1000;
 
-/// The cores moved to the middle of the two bodies, where the numbers are small.
+/// The cores relative to the midpoint of the two bodies, which keeps the values small.
 class Cores {
  public:
   explicit Cores(const SphereBoxInput& input)
@@ -34,7 +34,7 @@ class Cores {
   }
 
   const btVector3& offset() const { return offset_; }
-  /// The point of a that is farthest along `axis` minus the point of b that is farthest against it.
+  /// The support point of a along `axis` minus the support point of b along -`axis`.
   btVector3 support(const btVector3& axis, btVector3* on_a, btVector3* on_b) const {
     const btVector3 local = (sphere_first_ ? -axis : axis) * box_.getBasis();
     const btVector3 corner(btFsels(local.x(), half_.x(), -half_.x()),
@@ -70,7 +70,7 @@ btVector3 triple_cross(const btVector3& a, const btVector3& b, const btVector3& 
   return a.cross(b).cross(c);
 }
 
-/// Squared distance of `p` and the segment from `x0` to `b`. Two ways of rounding it are in use.
+/// Squared distance of `p` and the segment from `x0` to `b`. Bullet uses both ways of rounding.
 btScalar segment_distance2(const btVector3& p, const btVector3& x0, const btVector3& b,
                            bool by_point) {
   btVector3 d = b - x0;
@@ -125,7 +125,7 @@ enum class Step : std::uint8_t { go_on, intersect, apart };
 class CoreSimplex {
  public:
   void add(const btVector3& v) { points_[size_++] = v; }
-  /// Drops points that can't matter and sets the next direction.
+  /// Removes points that cannot contribute and sets the next direction.
   Step reduce(btVector3* direction) {
     switch (size_) {
       case 2:
@@ -244,7 +244,7 @@ bool cores_intersect(const Cores& cores) {
   return false;
 }
 
-/// Bullet's distance iteration. False if it ends without a simplex that has an answer.
+/// Bullet's distance iteration. Returns false if it ends without a valid simplex.
 bool find_closest_simplex(const Cores& cores, btScalar maximum_distance_squared,
                           btVoronoiSimplexSolver* simplex, btVector3* axis,
                           btScalar* squared_distance) {
@@ -278,25 +278,26 @@ bool find_closest_simplex(const Cores& cores, btScalar maximum_distance_squared,
 
 }  // namespace
 
-SphereBoxAnswer find_closest_points(const SphereBoxInput& input, SphereBoxContact* contact) {
+SphereBoxResult find_closest_points(const SphereBoxInput& input, SphereBoxContact* contact) {
   const Cores cores(input);
-  if (cores_intersect(cores)) return SphereBoxAnswer::unknown;
+  if (cores_intersect(cores)) return SphereBoxResult::unknown;
   btVoronoiSimplexSolver simplex;
   btVector3 axis;
   btScalar squared_distance;
   if (!find_closest_simplex(cores, input.maximum_distance_squared, &simplex, &axis,
                             &squared_distance)) {
-    return SphereBoxAnswer::unknown;
+    return SphereBoxResult::unknown;
   }
-  if (simplex.numVertices() == 0) return SphereBoxAnswer::unknown;  // too far for these numbers
+  if (simplex.numVertices() == 0)
+    return SphereBoxResult::unknown;  // the distance exceeds BT_LARGE_FLOAT
   const btScalar length2 = axis.length2();
-  if (!(length2 > SIMD_EPSILON * SIMD_EPSILON)) return SphereBoxAnswer::unknown;
+  if (!(length2 > SIMD_EPSILON * SIMD_EPSILON)) return SphereBoxResult::unknown;
   const btScalar margin = input.margin_a + input.margin_b;
   const btScalar k = btScalar(1) / btSqrt(length2);
   const btScalar distance = (btScalar(1) / k) - margin;
-  if (!(distance + margin >= gGjkEpaPenetrationTolerance)) return SphereBoxAnswer::unknown;
+  if (!(distance + margin >= gGjkEpaPenetrationTolerance)) return SphereBoxResult::unknown;
   if (!(distance < 0 || distance * distance < input.maximum_distance_squared)) {
-    return SphereBoxAnswer::apart;
+    return SphereBoxResult::apart;
   }
   btVector3 on_a, on_b;
   simplex.compute_points(on_a, on_b);
@@ -308,10 +309,10 @@ SphereBoxAnswer find_closest_points(const SphereBoxInput& input, SphereBoxContac
   const btScalar opposite_gap = (-normal).dot(cores.support(normal)) - margin;
   if (opposite_gap > gap) normal *= -1;
   *contact = {normal, on_b + cores.offset(), distance};
-  // Which of two NaN an operation returns is up to the compiler.
+  // The compiler determines which of two NaNs an operation returns.
   const btVector3 sum = contact->normal_on_b + contact->point_on_b;
-  if (!is_finite(sum.x() + sum.y() + sum.z())) return SphereBoxAnswer::unknown;
-  return SphereBoxAnswer::contact;
+  if (!is_finite(sum.x() + sum.y() + sum.z())) return SphereBoxResult::unknown;
+  return SphereBoxResult::contact;
 }
 
 }  // namespace bullet

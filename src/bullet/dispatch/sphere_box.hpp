@@ -1,4 +1,4 @@
-/// The closest points of a sphere and a box, as btGjkPairDetector finds them.
+/// Closest points of a sphere and a box, computed as btGjkPairDetector does.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -11,10 +11,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// What the detector needs to know of two convex shapes, one of them a sphere and the other a box.
+/// Input of the detector: two convex shapes, one a sphere and the other a box.
 struct SphereBoxInput {
   btTransform pose_a, pose_b;
-  btScalar margin_a, margin_b;  ///< a sphere's is its radius
+  btScalar margin_a, margin_b;  ///< the margin of a sphere is its radius
   btVector3 core;               ///< half extents of the box, margin excluded
   bool sphere_first;
   btScalar maximum_distance_squared;
@@ -26,15 +26,15 @@ struct SphereBoxContact {
   btScalar distance;
 };
 
-enum class SphereBoxAnswer : std::uint8_t {
+enum class SphereBoxResult : std::uint8_t {
   apart,
   contact,
-  unknown,  ///< deep or degenerate: Bullet goes on with its penetration depth solver
+  unknown,  ///< deep or degenerate: Bullet continues with its penetration depth solver
 };
 
-/// Does what btGjkPairDetector::getClosestPointsNonVirtual of Bullet 3.24 does, operation by
-/// operation, up to where the penetration depth solver would be asked.
-SphereBoxAnswer find_closest_points(const SphereBoxInput& input, SphereBoxContact* contact);
+/// Reproduces btGjkPairDetector::getClosestPointsNonVirtual of Bullet 3.24, operation by operation,
+/// up to the call of the penetration depth solver.
+SphereBoxResult find_closest_points(const SphereBoxInput& input, SphereBoxContact* contact);
 
 }  // namespace bullet
 }  // namespace JFPX_ABI

@@ -1,5 +1,5 @@
-/// The lowest point of a sphere above a plane. Bullet's inline functions do the arithmetic, and its
-/// btSphereShape says where that point is.
+/// The lowest point of a sphere above a plane, which btSphereShape computes. Bullet's inline
+/// functions do the arithmetic.
 #include "src/bullet/dispatch/sphere_plane.hpp"
 
 #include <BulletCollision/CollisionShapes/btSphereShape.h>

@@ -1,4 +1,4 @@
-/// The closest points of a sphere and a plane, as btConvexPlaneCollisionAlgorithm finds them.
+/// Closest points of a sphere and a plane, computed as btConvexPlaneCollisionAlgorithm does.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -18,8 +18,8 @@ struct SpherePlaneContact {
   btScalar distance;
 };
 
-/// Does what btConvexPlaneCollisionAlgorithm::processCollision of Bullet 3.24 does, operation by
-/// operation. The shapes are of exactly these classes.
+/// Reproduces btConvexPlaneCollisionAlgorithm::processCollision of Bullet 3.24, operation by
+/// operation. The shapes must be of exactly these classes.
 SpherePlaneContact find_closest_points(const btTransform& sphere_pose, const btSphereShape& sphere,
                                        const btTransform& plane_pose,
                                        const btStaticPlaneShape& plane);

@@ -1,7 +1,7 @@
-# libjfpx-bullet-preload.so for LD_PRELOAD, and beside it the engines that it loads: one a precision.
+# libjfpx-bullet-preload.so for LD_PRELOAD, and the engines that it loads, one per precision.
 
-# The engines know the layout of Bullet's classes, so they serve the Bullet that they are compiled
-# against and no other: recognised by the name that the run-time linker knows it by.
+# The engines depend on the layout of Bullet's classes, so they support only the Bullet that they are
+# compiled against, which is identified by the name of its library for the run-time linker.
 set(names "")
 foreach(precision IN ITEMS F32 F64)
   foreach(part IN ITEMS Collision Dynamics)
@@ -23,7 +23,7 @@ foreach(suffix IN ITEMS "" "_f64")
     preload/preload_engine.cpp preload/preload_options.cpp preload/preload_solver.cpp)
   _jfpx_configure(${engine} "${suffix}" "" "jfpx_bullet")
   target_link_options(${engine} PRIVATE LINKER:--exclude-libs,ALL)
-  # What shared libraries do not export is missed now, not in the user's program.
+  # Reports a symbol that no shared library exports here instead of in the user's program.
   if(NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
     target_link_options(${engine} PRIVATE LINKER:--no-undefined)
   endif()
@@ -37,14 +37,19 @@ target_compile_definitions(jfpx_bullet_preload PRIVATE
   JFPX_ENGINE="$<TARGET_FILE_NAME:jfpx_bullet_engine>"
   JFPX_ENGINE_F64="$<TARGET_FILE_NAME:jfpx_bullet_engine_f64>"
   ${names})
-# It must not bring a C++ library into programs that have none.
+# It must not load a C++ library into programs that have none.
 target_link_options(jfpx_bullet_preload PRIVATE LINKER:--as-needed)
 set_target_properties(jfpx_bullet_preload PROPERTIES
   OUTPUT_NAME jfpx-bullet-preload CXX_EXTENSIONS OFF CXX_VISIBILITY_PRESET hidden)
-add_dependencies(jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64)
+set(modules jfpx_bullet_preload)
+foreach(suffix IN ITEMS "" "_f64")
+  if(JFPX_HAS_PRECISION${suffix})
+    add_dependencies(jfpx_bullet_preload jfpx_bullet_engine${suffix})
+    list(APPEND modules jfpx_bullet_engine${suffix})
+  endif()
+endforeach()
 
-# As installed: libraries in ../lib (or what it is called here) of the command.
-set(modules jfpx_bullet_preload jfpx_bullet_engine jfpx_bullet_engine_f64)
+# Same layout as the installation: the libraries are in ../lib (or its local name) of the command.
 set_target_properties(${modules} PROPERTIES
   LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/${CMAKE_INSTALL_LIBDIR} INSTALL_RPATH "$ORIGIN")
 if(JFPX_INSTALL)

@@ -1,10 +1,10 @@
-/// libjfpx-bullet-preload.so: gives unmodified, dynamically linked Bullet programs jfpx's dispatch,
-/// solver and update of boxes.
+/// libjfpx-bullet-preload.so: replaces dispatch, solver and AABB update of unmodified, dynamically
+/// linked Bullet programs by those of jfpx.
 ///
-/// Listed in LD_PRELOAD, its definitions come before Bullet's in symbol lookup, also for the
-/// vtables inside Bullet's libraries, which are not linked with -Bsymbolic. This file needs no
-/// Bullet and no C++ library, because it is loaded into programs that have neither; the engine of
-/// the right precision is loaded when Bullet first calls one of the functions.
+/// If it is listed in LD_PRELOAD, symbol lookup finds its definitions before Bullet's, also for the
+/// vtables inside Bullet's libraries, which are not linked with -Bsymbolic. This file depends on
+/// neither Bullet nor the C++ library, because it is loaded into programs that have neither; the
+/// engine of the right precision is loaded when Bullet first calls one of the functions.
 #include "src/bullet/preload/preload_engine.hpp"
 
 #include <cerrno>
@@ -27,17 +27,17 @@ namespace {
 
 using namespace jfpx::preload;
 
-/// A function of Bullet's that is defined here too. Found at its first call.
+/// A function of Bullet that this library also defines. Resolved at its first call.
 struct Function {
   const char* symbol;
-  const char* part;  ///< as JFPX_PRELOAD_PARTS calls it
+  const char* part;  ///< its name in JFPX_PRELOAD_PARTS
   const char *library, *library_f64;
   const char* attempt_symbol;  ///< in the engine
   pthread_once_t found = PTHREAD_ONCE_INIT;
   void* original = nullptr;
-  bool is_private = false;  ///< loaded with RTLD_LOCAL, so that others may exist beside it
+  bool is_private = false;  ///< loaded with RTLD_LOCAL, so that other copies may exist
   const void* base = nullptr;
-  void* attempt = nullptr;  ///< null if left to Bullet as a whole
+  void* attempt = nullptr;  ///< null if Bullet's function is always used
 };
 Function g_dispatch{.symbol = JFPX_DISPATCH,
                     .part = "dispatcher",
@@ -66,8 +66,8 @@ const char* file_name(const char* path) {
   return slash == nullptr ? path : slash + 1;
 }
 
-/// Whether the environment asks for the part: JFPX_PRELOAD_PARTS lists some, or is not set.
-bool is_wanted(const char* part) {
+/// Whether JFPX_PRELOAD_PARTS lists the part or is not set.
+bool is_enabled(const char* part) {
   const char* at = std::getenv("JFPX_PRELOAD_PARTS");
   if (at == nullptr || *at == '\0') return true;
   const std::size_t length = std::strlen(part);
@@ -80,25 +80,26 @@ bool is_wanted(const char* part) {
   }
 }
 
-/// The definition that the caller's library would use without this one, if it is no global one.
+/// The definition that the caller's library would use without this library, if it is not global.
 void* private_definition(const char* symbol, const void* caller) {
   Dl_info info;
   if (dladdr(caller, &info) == 0) return nullptr;
   void* library = dlopen(info.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
   if (library == nullptr) return nullptr;
-  // The handle is kept: a library that calls Bullet is in use.
+  // The handle is not closed, because a library that calls Bullet is in use.
   return dlsym(library, symbol);
 }
 
-/// The definition behind the one here, for the caller.
+/// The next definition after the one in this library, for the caller.
 void* definition(const char* symbol, const void* caller, bool* is_private) {
   void* next = dlsym(RTLD_NEXT, symbol);
   *is_private = next == nullptr;
   return next != nullptr ? next : private_definition(symbol, caller);
 }
 
-/// The engine for the precision of the Bullet that the function is in; null, and a reason, if that
-/// is not one that the engines were compiled for, whose classes may be laid out in another way.
+/// The engine for the precision of the Bullet library that contains the function. Null, with a
+/// reason in g_reason, if the engines were compiled for another version, whose class layout may
+/// differ.
 const char* engine_for(const Function& function, const void* address) {
   Dl_info info;
   if (dladdr(address, &info) == 0) return nullptr;
@@ -110,8 +111,8 @@ const char* engine_for(const Function& function, const void* address) {
   return nullptr;
 }
 
-/// The engine that serves the function and all others that the caller can reach: Bullet's libraries
-/// work on the same classes.
+/// The engine for the function and for all others that the caller can reach. All must have the same
+/// engine, because Bullet's libraries share their classes.
 const char* common_engine(const Function& function, const void* caller) {
   const char* engine = engine_for(function, function.original);
   for (const Function* other : {&g_dispatch, &g_solve, &g_update_boxes}) {
@@ -142,18 +143,18 @@ void find_function() {
   function.original = definition(function.symbol, t_caller, &function.is_private);
   Dl_info info;
   if (function.original == nullptr || dladdr(function.original, &info) == 0) {
-    // Somebody called the function that is defined here, so a definition behind it must exist.
-    std::fprintf(stderr, "jfpx preload: Bullet's %s can't be found\n", function.symbol);
+    // A caller reached the definition in this library, so Bullet's own must exist.
+    std::fprintf(stderr, "jfpx preload: symbol %s of Bullet is not found\n", function.symbol);
     std::abort();
   }
   function.base = info.dli_fbase;
-  if (!is_wanted(function.part)) return;
+  if (!is_enabled(function.part)) return;
   pthread_mutex_lock(&g_mutex);
   if (const char* engine = common_engine(function, t_caller)) load_engine(&function, engine);
   pthread_mutex_unlock(&g_mutex);
 }
 
-/// What a caller gets: `attempt`, which is null if there is none, and `original` if that declines.
+/// The functions for a caller: `attempt`, which may be null, and `original` if it returns false.
 template <class Attempt, class Original>
 struct Choice {
   Attempt attempt;
@@ -176,10 +177,10 @@ Choice<Attempt, Original> choose(Function* function, const void* caller) {
           reinterpret_cast<Original>(function->original)};
 }
 
-/// Reports at exit when the environment asks for it.
+/// Prints the summary at exit if JFPX_PRELOAD_SUMMARY is set.
 __attribute__((destructor)) void summarise() {
-  const char* asked = std::getenv("JFPX_PRELOAD_SUMMARY");
-  if (asked == nullptr || *asked == '\0' || std::strcmp(asked, "0") == 0) return;
+  const char* setting = std::getenv("JFPX_PRELOAD_SUMMARY");
+  if (setting == nullptr || *setting == '\0' || std::strcmp(setting, "0") == 0) return;
   char prefix[256];
   std::snprintf(prefix, sizeof prefix, "jfpx preload: %s: ", program_invocation_short_name);
   if (g_print_summary != nullptr) {
@@ -209,8 +210,8 @@ void jfpx_preload_dispatch(void* dispatcher, void* pair_cache, const void* info,
   original(dispatcher, pair_cache, info, argument);
 }
 
-/// Bullet's returns a float or a double: both come in the same register, which is passed on as it
-/// is, and Bullet's is always 0.
+/// Bullet's function returns a float or a double in the same register, which is passed through
+/// unchanged; its value is always 0.
 double jfpx_preload_solve(void* solver, void** bodies, int body_count, void** manifolds,
                           int manifold_count, void** joints, int joint_count, const void* info,
                           void* drawer, void* dispatcher) {

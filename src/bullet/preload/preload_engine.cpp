@@ -1,8 +1,10 @@
-/// The engine that libjfpx-bullet-preload loads: batches for dispatchers that know nothing of jfpx.
+/// The engine that libjfpx-bullet-preload loads: batches for the dispatchers of unmodified
+/// programs.
 #include "src/bullet/preload/preload_engine.hpp"
 
 #include "src/bullet/dispatch/batch_engine.hpp"
-#include "src/bullet/preload/lease_pool.hpp"
+#include "src/bullet/exact_class.hpp"
+#include "src/bullet/preload/object_pool.hpp"
 #include "src/bullet/preload/preload_options.hpp"
 #include "src/bullet/preload/preload_solver.hpp"
 
@@ -12,7 +14,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <typeinfo>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -30,13 +32,13 @@ std::unique_ptr<BatchEngine> make_engine() {
   return std::make_unique<BatchEngine>(make_sphere_collider(options.collider), options);
 }
 
-/// Never destroyed: threads may dispatch, and the summary is written, while the process ends.
-LeasePool<BatchEngine>& pool() {
-  static auto& made = *new LeasePool<BatchEngine>(make_engine);
+/// Never destroyed, because threads may dispatch, and the summary is written, during process exit.
+ObjectPool<BatchEngine>& pool() {
+  static auto& made = *new ObjectPool<BatchEngine>(make_engine);
   return made;
 }
 
-/// @param backend who computed, if somebody did
+/// @param backend is set to the backend of the batches, if there are any
 DispatchStats sum_of_stats(std::string_view* backend) {
   DispatchStats sum;
   pool().for_each_idle([&](const BatchEngine& engine) {
@@ -61,7 +63,7 @@ DispatchStats sum_of_stats(std::string_view* backend) {
     sum.commit_ms += stats.commit_ms;
     if (stats.batches > 0) *backend = to_string(engine.backend());
   });
-  if (const std::string why = pool().why(); !why.empty()) sum.failure = why;
+  if (std::string failure = pool().failure(); !failure.empty()) sum.failure = std::move(failure);
   return sum;
 }
 
@@ -71,11 +73,11 @@ extern "C" {
 
 JFPX_API bool jfpx_preload_try_dispatch(void* dispatcher, void* pair_cache, const void* info,
                                         void* argument) {
-  const LeasePool<BatchEngine>::Lease engine(pool());
+  const ObjectPool<BatchEngine>::Handle engine(pool());
   if (engine.get() == nullptr) return false;
   btCollisionDispatcher& own = *static_cast<btCollisionDispatcher*>(dispatcher);
-  const bool subclass = typeid(own) != typeid(btCollisionDispatcher);
-  const DispatcherTraits traits{.may_override_filter = subclass, .tells_releases = false};
+  const bool subclass = !is_exactly<btCollisionDispatcher>(own);
+  const DispatcherTraits traits{.may_override_filter = subclass, .reports_releases = false};
   return engine.get()->dispatch(own, traits, *static_cast<btOverlappingPairCache*>(pair_cache),
                                 *static_cast<const btDispatcherInfo*>(info),
                                 static_cast<btDispatcher*>(argument));
@@ -89,8 +91,8 @@ JFPX_API void jfpx_preload_print_summary(const char* prefix) {
                sizeof(Real) == 4 ? "float" : "double", Count{stats.dispatches},
                Count{stats.batches}, static_cast<int>(backend.size()), backend.data());
   std::fprintf(stderr,
-               "%sin batches: %llu pairs, %llu of spheres, %llu touching, %llu written, "
-               "%.1f ms of collider, %.1f ms of commit\n",
+               "%sbatches: %llu pairs, %llu sphere pairs, %llu touching, %llu written, "
+               "%.1f ms prepare, %.1f ms commit\n",
                prefix, Count{stats.pairs}, Count{stats.sphere_pairs}, Count{stats.touching},
                Count{stats.written}, stats.prepare_ms, stats.commit_ms);
   for (std::size_t i = 0; i < kFallbackCount; ++i) {
@@ -100,11 +102,12 @@ JFPX_API void jfpx_preload_print_summary(const char* prefix) {
                  static_cast<int>(reason.size()), reason.data());
   }
   if (stats.verified > 0) {
-    std::fprintf(stderr, "%sverified: %llu sphere pairs, %llu mismatches %s\n", prefix,
-                 Count{stats.verified}, Count{stats.mismatches}, stats.first_mismatch.c_str());
+    std::fprintf(stderr, "%sverified: %llu pairs, %llu mismatches%s%s\n", prefix,
+                 Count{stats.verified}, Count{stats.mismatches},
+                 stats.first_mismatch.empty() ? "" : "; first: ", stats.first_mismatch.c_str());
   }
-  for (const std::string& why : {stats.failure, stats.device_failure}) {
-    if (!why.empty()) std::fprintf(stderr, "%sfailed: %s\n", prefix, why.c_str());
+  for (const std::string& failure : {stats.failure, stats.device_failure}) {
+    if (!failure.empty()) std::fprintf(stderr, "%sfailed: %s\n", prefix, failure.c_str());
   }
   print_solver_summary(prefix);
 }

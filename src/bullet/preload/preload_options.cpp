@@ -1,4 +1,4 @@
-/// Reading the environment; see the header.
+/// Parsing of the environment variables.
 #include "src/bullet/preload/preload_options.hpp"
 
 #include "src/base/thread_pool.hpp"
@@ -14,14 +14,14 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// Empty if not set.
+/// The value of the variable; empty if it is not set.
 std::string_view setting(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? std::string_view{} : value;
 }
 
 void ignore(const char* name, std::string_view value, const char* allowed) {
-  std::fprintf(stderr, "jfpx preload: %s is \"%.*s\"; it must be %s. It is ignored\n", name,
+  std::fprintf(stderr, "jfpx preload: %s is \"%.*s\"; it must be %s. The value is ignored.\n", name,
                static_cast<int>(value.size()), value.data(), allowed);
 }
 
@@ -42,10 +42,10 @@ PreloadOptions read() {
     if (const auto backend = parse_backend(text)) {
       options.backend = *backend;
     } else {
-      ignore(kBackend, text, "auto, x86 or cuda");
+      ignore(kBackend, text, "auto, cpu or cuda");
     }
   }
-  static_assert(ThreadPool::kMaxThreads == 256, "the text says so");
+  static_assert(ThreadPool::kMaxThreads == 256, "the message below contains the limit");
   if (const auto threads = number("JFPX_PRELOAD_THREADS", ThreadPool::kMaxThreads, "0 to 256")) {
     options.threads = static_cast<unsigned>(*threads);
   }

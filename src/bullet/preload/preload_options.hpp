@@ -1,4 +1,4 @@
-/// What the environment tells the preloaded parts.
+/// Options of the preloaded parts, read from the environment.
 #pragma once
 
 #include <jfpx/backend.hpp>
@@ -17,7 +17,7 @@ struct PreloadOptions {
   bool verify = false;                       ///< JFPX_PRELOAD_VERIFY
 };
 
-/// Read once. A value that means nothing is told on stderr, and as good as none. Thread-safe.
+/// Read once. An invalid value is reported on stderr and ignored. Thread-safe.
 const PreloadOptions& preload_options();
 
 }  // namespace bullet

@@ -1,9 +1,10 @@
-/// Groups and boxes of worlds that know nothing of jfpx; see the header.
+/// Solving of groups and updates of AABBs for the worlds of unmodified programs.
 #include "src/bullet/preload/preload_solver.hpp"
 
 #include <jfpx/bullet/constraint_solver.hpp>
 
-#include "src/bullet/preload/lease_pool.hpp"
+#include "src/bullet/exact_class.hpp"
+#include "src/bullet/preload/object_pool.hpp"
 #include "src/bullet/preload/preload_options.hpp"
 #include "src/bullet/world/aabb_update.hpp"
 
@@ -12,14 +13,13 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <typeinfo>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// All that a solver of Bullet's keeps from one group to the next.
+/// The state that Bullet's solver keeps from one group to the next.
 struct SolverState : btSequentialImpulseConstraintSolver {
   static void copy(const btSequentialImpulseConstraintSolver& from,
                    btSequentialImpulseConstraintSolver* to) {
@@ -43,14 +43,14 @@ std::unique_ptr<ConstraintSolver> make_solver() {
   return std::make_unique<ConstraintSolver>(options);
 }
 
-/// Never destroyed, as what follows: threads may solve, and the summary is written, while the
-/// process ends.
-LeasePool<ConstraintSolver>& pool() {
-  static auto& made = *new LeasePool<ConstraintSolver>(make_solver);
+/// Never destroyed, like the counters below, because threads may solve, and the summary is written,
+/// during process exit.
+ObjectPool<ConstraintSolver>& pool() {
+  static auto& made = *new ObjectPool<ConstraintSolver>(make_solver);
   return made;
 }
 
-std::atomic<std::uint64_t> g_small{0}, g_boxes{0};
+std::atomic<std::uint64_t> g_small{0}, g_aabb_updates{0};
 
 std::size_t minimum_batch() {
   return preload_options().minimum_batch.value_or(ConstraintSolverOptions{}.minimum_batch);
@@ -72,16 +72,17 @@ ConstraintSolverStats sum_of_stats() {
   return sum;
 }
 
-/// All that a solver remembers goes there and back, also when something in between throws.
-class TakenOver {
+/// Copies the state from the program's solver to jfpx's, and back at the end of its lifetime, even
+/// if an exception is thrown.
+class SolverStateTransfer {
  public:
-  TakenOver(btSequentialImpulseConstraintSolver* original, ConstraintSolver* solver)
+  SolverStateTransfer(btSequentialImpulseConstraintSolver* original, ConstraintSolver* solver)
       : original_(original), solver_(solver) {
     SolverState::copy(*original_, solver_);
   }
-  ~TakenOver() { SolverState::copy(*solver_, original_); }
-  TakenOver(const TakenOver&) = delete;
-  TakenOver& operator=(const TakenOver&) = delete;
+  ~SolverStateTransfer() { SolverState::copy(*solver_, original_); }
+  SolverStateTransfer(const SolverStateTransfer&) = delete;
+  SolverStateTransfer& operator=(const SolverStateTransfer&) = delete;
 
  private:
   btSequentialImpulseConstraintSolver* original_;
@@ -93,18 +94,18 @@ class TakenOver {
 void print_solver_summary(const char* prefix) {
   using Count = unsigned long long;
   const ConstraintSolverStats stats = sum_of_stats();
-  if (g_boxes > 0) {
-    std::fprintf(stderr, "%sworld: %llu updates of all boxes\n", prefix, Count{g_boxes});
+  if (g_aabb_updates > 0) {
+    std::fprintf(stderr, "%sworld: %llu AABB updates\n", prefix, Count{g_aabb_updates});
   }
   if (stats.groups > 0) {
     std::fprintf(stderr, "%ssolver: %llu groups, %llu contacts, %llu joints\n", prefix,
                  Count{stats.groups}, Count{stats.contacts}, Count{stats.joints});
   }
   if (stats.on_device > 0) {
-    std::fprintf(stderr, "%ssolver: %llu of the groups on a GPU\n", prefix, Count{stats.on_device});
+    std::fprintf(stderr, "%ssolver: %llu groups on a GPU\n", prefix, Count{stats.on_device});
   }
-  for (const std::string& why : {pool().why(), stats.device_failure}) {
-    if (!why.empty()) std::fprintf(stderr, "%ssolver: failed: %s\n", prefix, why.c_str());
+  for (const std::string& failure : {pool().failure(), stats.device_failure}) {
+    if (!failure.empty()) std::fprintf(stderr, "%ssolver: failed: %s\n", prefix, failure.c_str());
   }
   for (std::size_t i = 0; i < kSolverFallbacks; ++i) {
     if (stats.fallbacks[i] == 0) continue;
@@ -116,33 +117,33 @@ void print_solver_summary(const char* prefix) {
 
 extern "C" {
 
-/// Serves Bullet's own class only: what others do with what they inherit is not known.
+/// Supports only Bullet's own class, because a derived class may use the inherited state itself.
 JFPX_API bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count, void** manifolds,
                                      int manifold_count, void** joints, int joint_count,
                                      const void* info, void* drawer, void* dispatcher) {
   auto* own = static_cast<btSequentialImpulseConstraintSolver*>(solver);
-  if (typeid(*own) != typeid(btSequentialImpulseConstraintSolver)) return false;
+  if (!is_exactly<btSequentialImpulseConstraintSolver>(*own)) return false;
   if (static_cast<std::size_t>(manifold_count) < minimum_batch()) {
     g_small.fetch_add(1, std::memory_order_relaxed);
     return false;
   }
-  const LeasePool<ConstraintSolver>::Lease lease(pool());
-  if (lease.get() == nullptr) return false;
-  const TakenOver taken_over(own, lease.get());
-  lease.get()->solveGroup(reinterpret_cast<btCollisionObject**>(bodies), body_count,
-                          reinterpret_cast<btPersistentManifold**>(manifolds), manifold_count,
-                          reinterpret_cast<btTypedConstraint**>(joints), joint_count,
-                          *static_cast<const btContactSolverInfo*>(info),
-                          static_cast<btIDebugDraw*>(drawer),
-                          static_cast<btDispatcher*>(dispatcher));
+  const ObjectPool<ConstraintSolver>::Handle ours(pool());
+  if (ours.get() == nullptr) return false;
+  const SolverStateTransfer transfer(own, ours.get());
+  ours.get()->solveGroup(reinterpret_cast<btCollisionObject**>(bodies), body_count,
+                         reinterpret_cast<btPersistentManifold**>(manifolds), manifold_count,
+                         reinterpret_cast<btTypedConstraint**>(joints), joint_count,
+                         *static_cast<const btContactSolverInfo*>(info),
+                         static_cast<btIDebugDraw*>(drawer),
+                         static_cast<btDispatcher*>(dispatcher));
   return true;
 }
 
-/// Serves every world: the function is all that Bullet's does, through what is public of it.
+/// Supports every class of world, because the function uses only the public interface.
 JFPX_API bool jfpx_preload_try_update_boxes(void* world) {
   thread_local AabbUpdate update;
   if (!update.run(*static_cast<btCollisionWorld*>(world))) return false;
-  g_boxes.fetch_add(1, std::memory_order_relaxed);
+  g_aabb_updates.fetch_add(1, std::memory_order_relaxed);
   return true;
 }
 

@@ -1,4 +1,4 @@
-/// The part of the preloaded engine that solves groups and updates boxes.
+/// The part of the preloaded engine that solves groups and updates AABBs.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -7,7 +7,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Writes what was done so far to stderr, every line after `prefix`; nothing where nothing was.
+/// Writes a summary of all work so far to stderr, with `prefix` before every line. Writes nothing
+/// if there was no work.
 void print_solver_summary(const char* prefix);
 
 }  // namespace bullet

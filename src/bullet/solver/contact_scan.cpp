@@ -1,4 +1,4 @@
-/// Walks manifolds in chunks; see the header.
+/// Scans manifolds in chunks; see the header.
 #include "src/bullet/solver/contact_scan.hpp"
 
 #include "src/bullet/prefetch.hpp"
@@ -10,10 +10,10 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kChunk = 512;        ///< manifolds
-constexpr std::int32_t kLate = INT32_MIN;  ///< in place of an id: a late body
+constexpr std::size_t kChunk = 512;            ///< manifolds
+constexpr std::int32_t kUnlisted = INT32_MIN;  ///< replaces the id of an unlisted body
 
-bool is_light(const btRigidBody& body) {
+bool has_infinite_mass(const btRigidBody& body) {
   const btScalar inverse = body.getInvMass();
   return (btVector3(inverse, inverse, inverse) * body.getLinearFactor()).fuzzyZero();
 }
@@ -23,23 +23,24 @@ bool is_anisotropic(const btCollisionObject& object) {
 
 struct Side {
   std::int32_t id;
-  bool light, anisotropic;
+  bool infinite_mass, anisotropic;
 };
 
-Side side_of(btCollisionObject* object, std::span<const std::uint8_t> marks) {
+Side side_of(btCollisionObject* object, std::span<const std::uint8_t> flags) {
   const int companion = object->getCompanionId();
   if (companion >= 0) {
-    const std::uint8_t mark = marks[static_cast<std::size_t>(companion) + 1];
+    const std::uint8_t flag = flags[static_cast<std::size_t>(companion) + 1];
     const std::int32_t id = companion + 1;
-    return {(mark & kUnmoved) != 0 ? ~id : id, (mark & kLight) != 0, (mark & kAnisotropic) != 0};
+    return {(flag & kImmovable) != 0 ? ~id : id, (flag & kInfiniteMass) != 0,
+            (flag & kAnisotropic) != 0};
   }
   const btRigidBody* body = moving_body(object);
   if (body == nullptr) return {rows::kFixedBody, true, is_anisotropic(*object)};
-  return {kLate, is_light(*body), is_anisotropic(*object)};
+  return {kUnlisted, has_infinite_mass(*body), is_anisotropic(*object)};
 }
 
 btCollisionObject* object_of(const btCollisionObject* object) {
-  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): as Bullet's own solver does
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): Bullet's own solver does the same
   return const_cast<btCollisionObject*>(object);
 }
 
@@ -51,33 +52,33 @@ btRigidBody* moving_body(btCollisionObject* object) {
   return body->getInvMass() != 0 || body->isKinematicObject() ? body : nullptr;
 }
 
-std::uint8_t marks_of(const btRigidBody& body) {
+std::uint8_t body_flags(const btRigidBody& body) {
   const btVector3 masses =
       btVector3(body.getInvMass(), body.getInvMass(), body.getInvMass()) * body.getLinearFactor();
   const btMatrix3x3& inertia = body.getInvInertiaTensorWorld();
-  unsigned marks = 0;
-  if (masses.fuzzyZero()) marks |= kLight;
+  unsigned flags = 0;
+  if (masses.fuzzyZero()) flags |= kInfiniteMass;
   if (masses.isZero() && inertia[0].isZero() && inertia[1].isZero() && inertia[2].isZero()) {
-    marks |= kUnmoved;
+    flags |= kImmovable;
   }
-  if (is_anisotropic(body)) marks |= kAnisotropic;
-  return static_cast<std::uint8_t>(marks);
+  if (is_anisotropic(body)) flags |= kAnisotropic;
+  return static_cast<std::uint8_t>(flags);
 }
 
 void ContactScan::run(ThreadPool& pool, std::span<btPersistentManifold* const> manifolds,
-                      std::span<const std::uint8_t> marks) {
+                      std::span<const std::uint8_t> flags) {
   constexpr std::size_t kMax = MANIFOLD_CACHE_SIZE;
   found_.reserve(kMax * manifolds.size(), "contacts of a solver");
   found_pairs_.reserve(kMax * manifolds.size(), "contacts of a solver");
-  late_.clear();
+  unlisted_.clear();
   const std::size_t chunks = (manifolds.size() + kChunk - 1) / kChunk;
   chunks_.reserve(chunks, "contacts of a solver");
-  pool.run(chunks, [&](std::size_t chunk) { scan(manifolds, chunk, marks); });
+  pool.run(chunks, [&](std::size_t chunk) { scan(manifolds, chunk, flags); });
   count_ = 0;
-  any_late_ = any_rolling_ = any_anisotropic_ = false;
+  any_unlisted_ = any_rolling_ = any_anisotropic_ = false;
   for (std::size_t i = 0; i < chunks; ++i) {
     any_rolling_ |= chunks_[i].rolling;
-    any_late_ |= chunks_[i].late;
+    any_unlisted_ |= chunks_[i].unlisted;
     any_anisotropic_ |= chunks_[i].anisotropic;
     count_ += chunks_[i].count;
   }
@@ -92,12 +93,12 @@ void ContactScan::run(ThreadPool& pool, std::span<btPersistentManifold* const> m
 }
 
 void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::size_t chunk,
-                       std::span<const std::uint8_t> marks) {
+                       std::span<const std::uint8_t> flags) {
   const std::size_t first = chunk * kChunk, last = std::min(first + kChunk, manifolds.size());
   ContactRef* const refs = found_.data() + MANIFOLD_CACHE_SIZE * first;
   cpu::RowPair* const pairs = found_pairs_.data() + MANIFOLD_CACHE_SIZE * first;
   std::uint32_t count = 0;
-  bool rolling = false, late = false, anisotropic = false;
+  bool rolling = false, unlisted = false, anisotropic = false;
   for (std::size_t i = first; i < last; ++i) {
     if (i + kManifoldsAhead < last) {
       prefetch_header(manifolds[i + kManifoldsAhead]);
@@ -109,10 +110,10 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
     }
     btPersistentManifold* manifold = manifolds[i];
     const int points = manifold->getNumContacts();
-    const Side a = side_of(object_of(manifold->getBody0()), marks);
-    const Side b = side_of(object_of(manifold->getBody1()), marks);
-    late |= a.id == kLate || b.id == kLate;
-    if (a.light && b.light) continue;
+    const Side a = side_of(object_of(manifold->getBody0()), flags);
+    const Side b = side_of(object_of(manifold->getBody1()), flags);
+    unlisted |= a.id == kUnlisted || b.id == kUnlisted;
+    if (a.infinite_mass && b.infinite_mass) continue;
     for (int k = 0; k < points; ++k) {
       const btManifoldPoint& point = manifold->getContactPoint(k);
       if (!(point.getDistance() <= manifold->getContactProcessingThreshold())) continue;
@@ -123,29 +124,29 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
       pairs[count++] = {a.id, b.id};
     }
   }
-  chunks_[chunk] = {count, rolling, late, anisotropic};
+  chunks_[chunk] = {count, rolling, unlisted, anisotropic};
 }
 
-void ContactScan::find_late(std::span<btPersistentManifold* const> manifolds,
-                            std::size_t first_id) {
-  if (!any_late_) return;
-  // Also where a manifold has no contact: Bullet writes these bodies back too.
+void ContactScan::register_unlisted(std::span<btPersistentManifold* const> manifolds,
+                                    std::size_t first_id) {
+  if (!any_unlisted_) return;
+  // Manifolds without contacts too: Bullet also writes their bodies back.
   for (btPersistentManifold* manifold : manifolds) {
     for (const btCollisionObject* object : {manifold->getBody0(), manifold->getBody1()}) {
-      btCollisionObject* late = object_of(object);
-      if (late->getCompanionId() >= 0 || moving_body(late) == nullptr) continue;
-      late_.push_back({late, late->getCompanionId()});
-      late->setCompanionId(static_cast<int>(first_id + late_.size()) - 2);
+      btCollisionObject* unlisted = object_of(object);
+      if (unlisted->getCompanionId() >= 0 || moving_body(unlisted) == nullptr) continue;
+      unlisted_.push_back({unlisted, unlisted->getCompanionId()});
+      unlisted->setCompanionId(static_cast<int>(first_id + unlisted_.size()) - 2);
     }
   }
-  const auto settle = [&](const btCollisionObject* object, std::int32_t* id) {
-    if (*id != kLate) return;
+  const auto resolve = [&](const btCollisionObject* object, std::int32_t* id) {
+    if (*id != kUnlisted) return;
     *id = object->getCompanionId() + 1;
-    if ((marks_of(*btRigidBody::upcast(object)) & kUnmoved) != 0) *id = ~*id;
+    if ((body_flags(*btRigidBody::upcast(object)) & kImmovable) != 0) *id = ~*id;
   };
   for (std::size_t i = 0; i < count_; ++i) {
-    settle(refs_[i].manifold->getBody0(), &pairs_[i].a);
-    settle(refs_[i].manifold->getBody1(), &pairs_[i].b);
+    resolve(refs_[i].manifold->getBody0(), &pairs_[i].a);
+    resolve(refs_[i].manifold->getBody1(), &pairs_[i].b);
   }
 }
 

@@ -1,4 +1,4 @@
-/// Finds the contacts of a group that Bullet's solver would make rows of.
+/// Finds the contacts of a group for which Bullet's solver creates rows.
 #pragma once
 
 #include "src/base/buffer.hpp"
@@ -14,64 +14,67 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// What the scan must know of a body, by the body's id.
-enum BodyMark : std::uint8_t {
-  kLight = 1,        ///< inverse mass is zero by Bullet's measure
-  kUnmoved = 2,      ///< rows change no velocity of it
-  kAnisotropic = 4,  ///< its friction depends on the direction
+/// Properties of a body that the scan uses.
+enum BodyFlag : std::uint8_t {
+  kInfiniteMass = 1,  ///< the inverse mass is zero within Bullet's tolerance
+  kImmovable = 2,     ///< rows do not change its velocities
+  kAnisotropic = 4,   ///< has anisotropic friction
 };
 
 struct ContactRef {
   btPersistentManifold* manifold;
   int point;
   bool anisotropic;  ///< one of the bodies has anisotropic friction
-  bool rolling;      ///< has rolling friction
+  bool rolling;      ///< the contact has rolling friction
 
   btManifoldPoint& get() const { return manifold->getContactPoint(point); }
 };
 
-/// A body that takes part and has no id yet: kinematic and not in the group's list.
-struct LateBody {
+/// A kinematic body that a contact or joint refers to, but that is not in the list of the group and
+/// therefore has no id yet.
+struct UnlistedBody {
   btCollisionObject* object;
-  int companion;  ///< Bullet's companion id before
+  int companion;  ///< its previous companion id
 };
 
 class ContactScan {
  public:
-  /// Lists the contacts in Bullet's order. Ids are companion ids plus one; bodies without one are
-  /// fixed, or late.
+  /// Lists the contacts in Bullet's order. An id is the companion id plus one; bodies without
+  /// companion id are fixed or unlisted.
+  /// @param flags by id: BodyFlag bits
   void run(ThreadPool& pool, std::span<btPersistentManifold* const> manifolds,
-           std::span<const std::uint8_t> marks);
-  /// Gives late bodies ids from `first_id` on, and the companion ids that belong to them.
-  void find_late(std::span<btPersistentManifold* const> manifolds, std::size_t first_id);
+           std::span<const std::uint8_t> flags);
+  /// Assigns ids from `first_id` on, and the matching companion ids, to unlisted bodies.
+  void register_unlisted(std::span<btPersistentManifold* const> manifolds, std::size_t first_id);
 
   std::span<const ContactRef> contacts() const { return {refs_.data(), count_}; }
   std::span<const cpu::RowPair> pairs() const { return {pairs_.data(), count_}; }
-  std::span<const LateBody> late() const { return late_; }
-  void forget_late() noexcept { late_.clear(); }
+  std::span<const UnlistedBody> unlisted() const { return unlisted_; }
+  void clear_unlisted() noexcept { unlisted_.clear(); }
   bool any_rolling() const { return any_rolling_; }
   bool any_anisotropic() const { return any_anisotropic_; }
 
  private:
   struct Chunk {
     std::uint32_t count;
-    bool rolling, late, anisotropic;
+    bool rolling, unlisted, anisotropic;
   };
   void scan(std::span<btPersistentManifold* const> manifolds, std::size_t chunk,
-            std::span<const std::uint8_t> marks);
+            std::span<const std::uint8_t> flags);
 
   Buffer<ContactRef> found_, refs_;
   Buffer<cpu::RowPair> found_pairs_, pairs_;
   Buffer<Chunk> chunks_;
-  std::vector<LateBody> late_;
+  std::vector<UnlistedBody> unlisted_;
   std::size_t count_ = 0;
-  bool any_late_ = false, any_rolling_ = false, any_anisotropic_ = false;
+  bool any_unlisted_ = false, any_rolling_ = false, any_anisotropic_ = false;
 };
 
-/// The object as a body if Bullet's solver takes notice of its motion: it has a finite mass or is
-/// kinematic. Else null.
+/// Returns the object as a rigid body if Bullet's solver uses its motion, because its mass is
+/// finite or it is kinematic; else null.
 btRigidBody* moving_body(btCollisionObject* object);
-std::uint8_t marks_of(const btRigidBody& body);
+/// The BodyFlag bits of a body.
+std::uint8_t body_flags(const btRigidBody& body);
 
 }  // namespace bullet
 }  // namespace JFPX_ABI

@@ -1,4 +1,5 @@
-/// As btSequentialImpulseConstraintSolver::convertContact() of Bullet 3.24 chooses them.
+/// Friction directions as btSequentialImpulseConstraintSolver::convertContact() of Bullet 3.24
+/// computes them; see the header.
 #include "src/bullet/solver/friction_directions.hpp"
 
 #include "src/bullet/solver/rolling_friction_rows.hpp"
@@ -24,7 +25,7 @@ void set_friction_directions(const ContactRef& contact, const rows::RowSettings&
     for (std::size_t i = 0; i < 3; ++i) point.m_lateralFrictionDir2.m_floats[i] = second[i * lanes];
   }
   if (contact.anisotropic) {
-    turn_by_anisotropy(contact, &point.m_lateralFrictionDir1, kMode);
+    apply_anisotropic_friction(contact, &point.m_lateralFrictionDir1, kMode);
     put_lane(one, lanes, point.m_lateralFrictionDir1);
   }
   if (two == nullptr) return;
@@ -32,7 +33,7 @@ void set_friction_directions(const ContactRef& contact, const rows::RowSettings&
     point.m_lateralFrictionDir2 = point.m_lateralFrictionDir1.cross(point.m_normalWorldOnB);
     point.m_lateralFrictionDir2.normalize();
   }
-  if (contact.anisotropic) turn_by_anisotropy(contact, &point.m_lateralFrictionDir2, kMode);
+  if (contact.anisotropic) apply_anisotropic_friction(contact, &point.m_lateralFrictionDir2, kMode);
   put_lane(two, lanes, point.m_lateralFrictionDir2);
   if (second != nullptr && !settings.friction_follows_velocity) {
     point.m_contactPointFlags |= BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED;

@@ -1,4 +1,4 @@
-/// The directions in which a contact is held by friction.
+/// Friction directions of a contact.
 #pragma once
 
 #include "src/bullet/solver/contact_scan.hpp"
@@ -10,10 +10,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Leaves the directions of friction in the contact, as Bullet does, and in the rows.
-/// @param second  the other direction in the plane of the contact; null if it does not slide
-/// @param one,two the contact's lane of its rows: where the direction comes first. `two` is null if
-///   there is friction in one direction only.
+/// Stores the friction directions in the contact, as Bullet does, and in the rows.
+/// @param second  the second direction in the contact plane, in the lane of the contact; null if
+/// the
+///   contact slides
+/// @param one,two the lane of the contact in its friction rows, which start with the direction.
+///   `two` is null if there is only one friction direction.
 void set_friction_directions(const ContactRef& contact, const rows::RowSettings& settings,
                              std::size_t lanes, const Real* second, Real* one, Real* two);
 

@@ -1,9 +1,10 @@
-/// Packs groups for a device and brings the results back; see the header.
+/// Packing of groups for a device, and transfer of the results; see the header.
 #include "src/bullet/solver/gpu_island_solver.hpp"
 
 #include <jfpx/error.hpp>
 
 #include "src/bullet/prefetch.hpp"
+#include "src/bullet/solver/chunks.hpp"
 #include "src/bullet/solver/row_inputs.hpp"
 
 #include <LinearMath/btQuickprof.h>
@@ -18,62 +19,55 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kContactsAChunk = 128, kBodiesAChunk = 256;
-/// Where a group is decided at all: smaller ones are done before a device has answered.
-constexpr std::size_t kLeastContacts = 400;
-/// Where a device would take longer by so much, a trial is not worth what it costs.
-constexpr double kFarTooLong = 4;
-constexpr double kStartMs = 200;  ///< the first use of the device
+constexpr std::size_t kContactsPerChunk = 128, kBodiesPerChunk = 256;
+/// Minimum size of a group for the device: the CPU solves smaller groups before a device responds.
+constexpr std::size_t kMinContacts = 400;
+/// Ratio of predicted times at which a trial of the device costs more than it can save.
+constexpr double kMaxSlowdown = 4;
+constexpr double kStartMs = 200;  ///< duration of the first use of the device
 
-/// Turns that the last row waits for, for each level of the contacts and iteration: measured 1.4 to
-/// 1.6 in piles.
-constexpr double kTurnsALevel = 1.5;
+/// Rows on the longest dependency chain per color and iteration: 1.4 to 1.6 were measured in piles.
+constexpr double kSequentialRowsPerColor = 1.5;
 
-/// `spheres` stands for turns one after the other, `pairs` for contacts, `contacts` for contacts
-/// times iterations. Packing a contact, or making its rows, is shared by the threads; sweeps gain
-/// little from them. Of an AMD EPYC of 2022 with AVX2, and of an NVIDIA H200.
-CostTerms x86_costs(unsigned threads) {
-  return {.call_us = 5, .pair_ns = 150.0 / threads, .contact_ns = 23};
+/// Indices of the alternatives of the chooser.
+constexpr std::size_t kCpu = 0, kGpu = 1;
+
+/// Predicted times [us] to solve a group, from measurements on an AMD EPYC of 2022 with AVX2 and on
+/// an NVIDIA H200. The threads share the packing of contacts and the setup of rows; sweeps gain
+/// little from more threads.
+double cpu_us(double contacts, int iterations, unsigned threads) {
+  return 5 + 1e-3 * contacts * (150.0 / threads + 23 * iterations);
 }
-CostTerms cuda_costs(unsigned threads) {
-  return {.call_us = 120, .sphere_ns = 900, .pair_ns = 20 + 170.0 / threads};
-}
-
-template <class Work>
-void in_chunks(ThreadPool& pool, std::size_t count, std::size_t chunk, const Work& work) {
-  pool.run((count + chunk - 1) / chunk,
-           [&](std::size_t i) { work(i * chunk, std::min(count, (i + 1) * chunk)); });
+double gpu_us(double contacts, double colors, int iterations, unsigned threads) {
+  return 120 + 1e-3 * (900 * kSequentialRowsPerColor * colors * iterations +
+                       contacts * (20 + 170.0 / threads));
 }
 
-/// As in the rows: deep enough that positions are corrected apart from velocities.
-bool may_be_pushed(const btManifoldPoint& point, const rows::RowSettings& settings) {
+/// The condition of set_up_contact() for a split impulse: positions are corrected separately from
+/// velocities if the contact is deep enough.
+bool may_have_split_impulse(const btManifoldPoint& point, const rows::RowSettings& settings) {
   return settings.split && !(settings.split_threshold < point.m_distance1 + settings.slop);
 }
 
 }  // namespace
 
 GpuIslandSolver::GpuIslandSolver(Backend backend, GroupSolverMaker make, unsigned threads)
-    : backend_(backend),
-      make_(std::move(make)),
-      x86_(x86_costs(threads)),
-      cuda_(cuda_costs(threads)) {
+    : backend_(backend), make_(std::move(make)), threads_(threads) {
   if (backend_ == Backend::cuda) {
     if (make_ == nullptr) throw BackendUnavailable("cuda: built without CUDA");
     solver_ = make_();
   }
   if (backend_ == Backend::automatic && make_ != nullptr) {
-    asleep_ = true;
-    chooser_.emplace(
-        std::vector<CostChooser::Way>{{Backend::cpu, SphereAlgorithm::automatic, x86_},
-                                      {Backend::cuda, SphereAlgorithm::automatic, cuda_, true}},
-        true);
+    dormant_ = true;
+    const TimeChooser::Alternative alternatives[] = {{}, {.dormant = true}};
+    chooser_.emplace(alternatives);
   }
 }
 
-ColliderWork GpuIslandSolver::work_of(std::size_t contacts, int iterations) const {
+std::array<double, 2> GpuIslandSolver::predicted_us(std::size_t contacts, int iterations) const {
   const auto n = static_cast<double>(contacts);
-  const double levels = levels_a_contact_ * n;
-  return {.spheres = kTurnsALevel * levels * iterations, .pairs = n, .contacts = n * iterations};
+  return {cpu_us(n, iterations, threads_),
+          gpu_us(n, colors_per_contact_ * n, iterations, threads_)};
 }
 
 bool GpuIslandSolver::choose(const ContactScan& scan, const btContactSolverInfo& info) {
@@ -83,58 +77,63 @@ bool GpuIslandSolver::choose(const ContactScan& scan, const btContactSolverInfo&
     return false;
   }
   if (!chooser_) return solver_ != nullptr;
-  if (contacts < kLeastContacts) return false;
-  if (asleep_ && chooser_->missed_us() >= 1e3 * kStartMs) start();
+  if (contacts < kMinContacts) return false;
+  if (dormant_ && chooser_->missed_us() >= 1e3 * kStartMs) start();
   if (!chooser_) return false;
-  work_ = work_of(contacts, info.m_numIterations);
+  const std::array<double, 2> predicted = predicted_us(contacts, info.m_numIterations);
+  const std::size_t choice = chooser_->choose(static_cast<double>(contacts), predicted).alternative;
+  timed_contacts_ = contacts;
+  timed_prediction_us_ = predicted[choice];
   timed_ = true;
-  const bool device = chooser_->way(chooser_->choose(work_).way).backend == Backend::cuda;
   since_ = Clock::now();
-  return device;
+  return choice == kGpu;
 }
 
 void GpuIslandSolver::start() {
-  asleep_ = false;
+  dormant_ = false;
   try {
     solver_ = make_();
     chooser_->wake();
   } catch (const std::exception&) {
-    chooser_.reset();  // there is none: nobody needs to know
+    chooser_.reset();  // the machine has no usable device, which is no failure
   }
 }
 
-void GpuIslandSolver::give_up(const std::string& why) {
+void GpuIslandSolver::disable(const std::string& why) {
   failure_ = why.empty() ? "unknown" : why;
   solver_.reset();
   chooser_.reset();
   timed_ = false;
 }
 
-void GpuIslandSolver::finished(std::uint32_t levels) {
-  if (!timed_ || !chooser_) return;  // levels of another group than that of work_
-  if (levels > 0) levels_a_contact_ = levels / work_.pairs;
+void GpuIslandSolver::finished(std::uint32_t colors) {
+  if (!timed_ || !chooser_) return;  // timed_contacts_ belongs to another group
+  if (colors > 0) colors_per_contact_ = colors / static_cast<double>(timed_contacts_);
   const std::chrono::duration<double, std::micro> us = Clock::now() - since_;
-  chooser_->record(work_, us.count());
+  chooser_->record(us.count(), timed_prediction_us_);
   timed_ = false;
 }
 
 std::optional<rows::RowSweepReport> GpuIslandSolver::solve(const DeviceGroup& group) {
+  // Outside of the try block: a lack of host memory does not disable the device.
+  order_.reserve(group.scan.contacts().size(), group.bodies);
   try {
     pack(group);
     const auto contacts = static_cast<double>(group.scan.contacts().size());
-    levels_a_contact_ = order_.levels() / contacts;
+    colors_per_contact_ = order_.colors() / contacts;
     if (chooser_) {
-      const ColliderWork work = work_of(group.scan.contacts().size(), group.info.m_numIterations);
-      if (microseconds(cuda_, work) > kFarTooLong * microseconds(x86_, work)) {
+      const std::array<double, 2> predicted =
+          predicted_us(group.scan.contacts().size(), group.info.m_numIterations);
+      if (predicted[kGpu] > kMaxSlowdown * predicted[kCpu]) {
         timed_ = false;
         return std::nullopt;
       }
     }
     return solve_packed(group);
-  } catch (const std::bad_alloc&) {  // of the host, not of the device
+  } catch (const std::bad_alloc&) {  // memory of the host
     throw;
   } catch (const std::exception& error) {
-    give_up(error.what());
+    disable(error.what());
     return std::nullopt;
   }
 }
@@ -148,8 +147,8 @@ void GpuIslandSolver::pack(const DeviceGroup& group) {
                        .rolling_frictions = scan.any_rolling() ? number_rolling_frictions(scan) : 0,
                        .factors = group.factors};
   const GroupInputs in = solver_->inputs(size);
-  pushed_.resize(size.contacts);
-  in_chunks(pool, size.bodies, kBodiesAChunk, [&](std::size_t first, std::size_t last) {
+  split_impulse_candidates_.resize(size.contacts);
+  in_chunks(pool, size.bodies, kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
     const std::size_t count = last - first;
     std::copy_n(group.host.body(first), count * rows::kBodyFields,
                 in.bodies + first * rows::kBodyFields);
@@ -158,14 +157,14 @@ void GpuIslandSolver::pack(const DeviceGroup& group) {
                 in.factors + first * rows::kFactorFields);
   });
   std::atomic<bool> warm{false};
-  // The order takes one thread about as long as all others need for the rest.
-  pool.run(1 + (size.contacts + kContactsAChunk - 1) / kContactsAChunk, [&](std::size_t i) {
+  // One thread builds the order in about the time that the others need for the rest.
+  pool.run(1 + (size.contacts + kContactsPerChunk - 1) / kContactsPerChunk, [&](std::size_t i) {
     if (i == 0) {
-      order_.build(scan.pairs(), size.bodies, in.places, in.place_contacts, in.moves);
+      order_.build(scan.pairs(), size.bodies, in.schedule, in.slot_contacts, in.contact_counts);
       return;
     }
-    const std::size_t first = (i - 1) * kContactsAChunk;
-    const std::size_t last = std::min(size.contacts, first + kContactsAChunk);
+    const std::size_t first = (i - 1) * kContactsPerChunk;
+    const std::size_t last = std::min(size.contacts, first + kContactsPerChunk);
     if (pack_contacts(group, in, first, last)) warm.store(true, std::memory_order_relaxed);
   });
   warm_ = warm && group.settings.warm_start;
@@ -175,17 +174,18 @@ void GpuIslandSolver::pack(const DeviceGroup& group) {
     pool.run(size.rolling_frictions, [&](std::size_t k) {
       in.rolling_frictions[rolling_frictions_[k]] = static_cast<std::uint32_t>(k);
       std::fill_n(in.rolling_friction_rows + k * kRows, kRows, Real(0));
-      group.make_rolling_frictions(scan.contacts()[rolling_frictions_[k]],
-                                   in.rolling_friction_rows + k * kRows);
+      group.set_up_rolling_friction(scan.contacts()[rolling_frictions_[k]],
+                                    in.rolling_friction_rows + k * kRows);
     });
   }
-  push_count_ = group.settings.split
-                    ? RowOrder::choose({in.places, size.contacts}, in.place_contacts, pushed_,
-                                       size.bodies, in.push_places, in.push_moves)
-                    : 0;
+  split_impulse_count_ = group.settings.split
+                             ? RowOrder::select({in.schedule, size.contacts}, in.slot_contacts,
+                                                split_impulse_candidates_, size.bodies,
+                                                in.split_impulse_schedule, in.split_impulse_counts)
+                             : 0;
 }
 
-/// @return whether a contact has an impulse to start with
+/// @return whether any contact has an initial impulse
 bool GpuIslandSolver::pack_contacts(const DeviceGroup& group, const GroupInputs& in,
                                     std::size_t first, std::size_t last) {
   constexpr std::size_t kAhead = 4;
@@ -195,7 +195,7 @@ bool GpuIslandSolver::pack_contacts(const DeviceGroup& group, const GroupInputs&
     if (i + kAhead < last) prefetch_bytes(&contacts[i + kAhead].get(), sizeof(btManifoldPoint));
     const btManifoldPoint& point = contacts[i].get();
     pack_contact(point, group.info, 1, in.contacts + i * rows::kInputFields);
-    pushed_[i] = may_be_pushed(point, group.settings) ? 1 : 0;
+    split_impulse_candidates_[i] = may_have_split_impulse(point, group.settings) ? 1 : 0;
     warm |= point.m_appliedImpulse != 0;
   }
   return warm;
@@ -214,7 +214,7 @@ rows::RowSweepReport GpuIslandSolver::solve_packed(const DeviceGroup& group) {
   const int mode = group.info.m_solverMode;
   const rows::RowSweepReport report = solver_->solve(
       {.settings = group.settings,
-       .push_count = push_count_,
+       .split_impulse_count = split_impulse_count_,
        .iterations = group.info.m_numIterations,
        .threshold = group.info.m_leastSquaresResidualThreshold,
        .directions = group.directions,
@@ -222,11 +222,11 @@ rows::RowSweepReport GpuIslandSolver::solve_packed(const DeviceGroup& group) {
        .warm_start = warm_});
   if (report.broken) return report;
   const Real* velocities = solver_->velocities();
-  in_chunks(group.host.pool(), group.bodies, kBodiesAChunk,
+  in_chunks(group.host.pool(), group.bodies, kBodiesPerChunk,
             [&](std::size_t first, std::size_t last) {
               for (std::size_t i = first; i < last; ++i) {
                 const Real* v = velocities + i * rows::kOutcomeVelocities;
-                for (Real* to : {group.host.velocity(i), group.host.push(i)}) {
+                for (Real* to : {group.host.velocity(i), group.host.push_velocity(i)}) {
                   std::copy_n(v, 3, to);
                   std::copy_n(v + 3, 3, to + 4);
                   v += 6;
@@ -239,7 +239,7 @@ rows::RowSweepReport GpuIslandSolver::solve_packed(const DeviceGroup& group) {
 void GpuIslandSolver::write_back(const DeviceGroup& group) const {
   const std::span<const ContactRef> contacts = group.scan.contacts();
   const rows::ContactOutcome* outcomes = solver_->outcomes();
-  in_chunks(group.host.pool(), contacts.size(), kContactsAChunk,
+  in_chunks(group.host.pool(), contacts.size(), kContactsPerChunk,
             [&](std::size_t first, std::size_t last) {
               constexpr std::size_t kAhead = 4;
               for (std::size_t i = first; i < last; ++i) {
@@ -251,7 +251,7 @@ void GpuIslandSolver::write_back(const DeviceGroup& group) const {
             });
 }
 
-/// As Bullet leaves a point: see ConstraintSolver's set_friction_directions().
+/// Writes the fields that Bullet writes; see set_friction_directions().
 void GpuIslandSolver::write_back(const DeviceGroup& group, const rows::ContactOutcome& from,
                                  btManifoldPoint& point) {
   point.m_lateralFrictionDir1.setValue(from.direction[0], from.direction[1], from.direction[2]);

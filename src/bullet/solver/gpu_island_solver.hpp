@@ -1,17 +1,17 @@
-/// Groups whose contacts are solved on a device: what goes there, what comes back, and when it is
-/// worth it.
+/// Solves groups of contacts on a device: packing, results, and the choice between device and CPU.
 #pragma once
 
 #include <jfpx/backend.hpp>
 
+#include "src/base/time_chooser.hpp"
 #include "src/bullet/solver/contact_scan.hpp"
 #include "src/contact_solver/cpu/row_solver.hpp"
 #include "src/contact_solver/group_solver.hpp"
 #include "src/contact_solver/row_order.hpp"
-#include "src/sphere_collider/cost_chooser.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>
 
+#include <array>
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -24,47 +24,53 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// A group whose bodies are packed and whose contacts are found.
+/// A group with packed bodies and scanned contacts.
 struct DeviceGroup {
-  cpu::RowSolver& host;  ///< has the bodies, and gets their velocities
+  cpu::RowSolver& host;  ///< contains the bodies, and receives their velocities
   const ContactScan& scan;
   const btContactSolverInfo& info;
   const rows::RowSettings& settings;
   std::size_t bodies;
-  std::uint32_t directions;  ///< of friction
+  std::uint32_t directions;  ///< number of friction directions
   bool factors;
-  /// Makes the kRollingFrictionRows rows of a contact with rolling friction; called by several
+  /// Sets up the kRollingFrictionRows rows of a contact with rolling friction. Called by several
   /// threads.
-  std::function<void(const ContactRef&, Real* rows)> make_rolling_frictions;
+  std::function<void(const ContactRef&, Real* rows)> set_up_rolling_friction;
 };
 
-/// As Backend says: never, always, or where it is expected to be faster.
+/// Uses the device never, always, or when it is expected to be faster, as Backend specifies.
 class GpuIslandSolver {
  public:
-  /// @throws what `make` throws, if the backend is cuda; with `automatic` it is called when the
-  ///   device has become worth starting.
-  /// @param threads that x86 has
+  /// @param make creates the solver on the device. It is called in the constructor if the backend
+  ///   is cuda, and with `automatic` as soon as the expected gain justifies the start.
+  /// @param threads number of threads of the CPU
+  /// @throws BackendUnavailable if the backend is cuda and `make` is null, and all exceptions of
+  ///   that call of `make`
   GpuIslandSolver(Backend backend, GroupSolverMaker make, unsigned threads);
 
-  /// Who is to solve the group: the device? From here to finished() is its time.
+  /// @return whether the device is to solve the group. The time from this call to finished() is the
+  ///   time of the group.
   bool choose(const ContactScan& scan, const btContactSolverInfo& info);
-  /// Solves a chosen group. Bullet's bodies and points are only read.
-  /// @return nothing if the device can't, or would take far too long
+  /// Solves a group for which choose() returned true. Only reads Bullet's bodies and points.
+  /// @return nothing if the device fails, or is predicted to be much slower
+  /// @throws OutOfMemory, std::bad_alloc if the host has no memory for the group
   std::optional<rows::RowSweepReport> solve(const DeviceGroup& group);
-  /// Leaves impulses and directions of friction of the last group in the points.
+  /// Writes impulses and friction directions of the last group to the contact points.
   void write_back(const DeviceGroup& group) const;
-  /// @param levels of the group's order, as x86 has found it; 0: x86 has not
-  void finished(std::uint32_t levels);
-  /// The group was not solved: its time tells nothing.
+  /// Records the time of the group.
+  /// @param colors number of colors of the contacts, if the CPU has colored them; else 0
+  void finished(std::uint32_t colors);
+  /// Discards the time of a group that was not solved.
   void abandon() noexcept { timed_ = false; }
 
-  /// Why the device was given up; empty if it was not.
+  /// Why the device is no longer used; empty if it has not failed.
   const std::string& failure() const noexcept { return failure_; }
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  ColliderWork work_of(std::size_t contacts, int iterations) const;
+  /// [us] on the CPU and on the device.
+  std::array<double, 2> predicted_us(std::size_t contacts, int iterations) const;
   void pack(const DeviceGroup& group);
   bool pack_contacts(const DeviceGroup& group, const GroupInputs& in, std::size_t first,
                      std::size_t last);
@@ -73,21 +79,22 @@ class GpuIslandSolver {
   static void write_back(const DeviceGroup& group, const rows::ContactOutcome& from,
                          btManifoldPoint& point);
   void start();
-  void give_up(const std::string& why);
+  void disable(const std::string& why);
 
   Backend backend_;
   GroupSolverMaker make_;
-  CostTerms x86_, cuda_;
-  std::optional<CostChooser> chooser_;
-  bool asleep_ = false;
+  unsigned threads_;
+  std::optional<TimeChooser> chooser_;
+  bool dormant_ = false;  ///< the device has not been started
   std::unique_ptr<GroupSolver> solver_;
   RowOrder order_;
-  std::vector<std::uint8_t> pushed_;              ///< by contact: may have to be pushed apart
-  std::vector<std::uint32_t> rolling_frictions_;  ///< contacts with rows against rolling
-  std::uint32_t push_count_ = 0;
-  bool warm_ = false;            ///< some contact has an impulse to start with
-  double levels_a_contact_ = 0;  ///< of the last group
-  ColliderWork work_;            ///< of the group that is timed
+  std::vector<std::uint8_t> split_impulse_candidates_;  ///< by contact: 1 if it may have one
+  std::vector<std::uint32_t> rolling_frictions_;        ///< contacts with rolling friction
+  std::uint32_t split_impulse_count_ = 0;
+  bool warm_ = false;               ///< whether any contact has an initial impulse
+  double colors_per_contact_ = 0;   ///< of the last group
+  std::size_t timed_contacts_ = 0;  ///< of the timed group
+  double timed_prediction_us_ = 0;
   Clock::time_point since_;
   bool timed_ = false;
   std::string failure_;

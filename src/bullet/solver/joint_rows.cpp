@@ -1,6 +1,8 @@
 /// Follows gResolveSingleConstraintRowGeneric of Bullet 3.24; see the header.
 #include "src/bullet/solver/joint_rows.hpp"
 
+#include "src/bullet/exact_class.hpp"
+
 #include <btBulletDynamicsCommon.h>
 
 #include <algorithm>
@@ -16,7 +18,7 @@ void store(Real* to, const btVector3& v) { std::copy_n(v.m_floats, 3, to); }
 
 std::size_t slot_of(std::int32_t id) { return static_cast<std::size_t>(id < 0 ? ~id : id); }
 
-/// The impulse's share of one body.
+/// Applies the impulse to one body.
 void apply(cpu::RowSolver& solver, std::int32_t id, const btVector3& axis,
            const btVector3& response, btScalar impulse) {
   if (id < 0) return;
@@ -27,6 +29,7 @@ void apply(cpu::RowSolver& solver, std::int32_t id, const btVector3& axis,
   store(velocity + 4, load(velocity + 4) + response * (impulse * load(factors + 8)));
 }
 
+/// A class compiled with -fno-rtti is not Bullet's.
 bool is_known_joint(const btTypedConstraint& constraint) {
   static const std::type_info* const kKnown[] = {&typeid(btPoint2PointConstraint),
                                                  &typeid(btHingeConstraint),
@@ -40,8 +43,10 @@ bool is_known_joint(const btTypedConstraint& constraint) {
                                                  &typeid(btUniversalConstraint),
                                                  &typeid(btHinge2Constraint),
                                                  &typeid(btGearConstraint)};
-  return std::any_of(std::begin(kKnown), std::end(kKnown),
-                     [&](const std::type_info* known) { return *known == typeid(constraint); });
+  const std::type_info* const type = type_info_of(constraint);
+  return type != nullptr &&
+         std::any_of(std::begin(kKnown), std::end(kKnown),
+                     [&](const std::type_info* known) { return *known == *type; });
 }
 
 }  // namespace
@@ -54,8 +59,8 @@ bool are_known_joints(std::span<btTypedConstraint* const> joints) {
 void JointRows::sweep(int iteration, cpu::RowResidual* residual) {
   for (btSolverConstraint& row : rows_) {
     if (iteration >= row.m_overrideNumSolverIterations) continue;
-    const btScalar left = solve(row);
-    const btScalar squared = left * left;
+    const btScalar change = solve(row);
+    const btScalar squared = change * change;
     if (squared > residual->largest) residual->largest = squared;
     if (squared != squared) residual->broken = true;
   }

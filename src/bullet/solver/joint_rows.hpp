@@ -1,4 +1,4 @@
-/// Rows of joints, solved one after the other on the velocities of the row solver.
+/// Rows of joints, which are solved serially on the velocities of the row solver.
 #pragma once
 
 #include "src/contact_solver/cpu/row_solver.hpp"
@@ -12,14 +12,14 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Whether all are of classes of Bullet's, of which we know that they do all in their rows.
+/// Whether all joints are of classes that Bullet defines and that act only through their rows.
 bool are_known_joints(std::span<btTypedConstraint* const> joints);
 
-/// The rows are Bullet's own, as btSequentialImpulseConstraintSolver::convertJoints() makes them;
-/// impulses are left in them.
+/// Solves the rows that btSequentialImpulseConstraintSolver::convertJoints() creates, and stores
+/// the impulses in them.
 class JointRows final : public cpu::SerialRows {
  public:
-  /// @param ids by solver body: the id, with the complement for bodies that rows do not move
+  /// @param ids by solver body: the id, or its complement for a body that rows do not move
   JointRows(cpu::RowSolver& solver, std::span<btSolverConstraint> joint_rows,
             std::span<const std::int32_t> ids)
       : solver_(solver), rows_(joint_rows), ids_(ids) {}

@@ -1,4 +1,4 @@
-/// Follows btSequentialImpulseConstraintSolver::convertContact() of Bullet 3.24; see the header.
+/// Rows as in btSequentialImpulseConstraintSolver::convertContact() of Bullet 3.24; see the header.
 #include "src/bullet/solver/rolling_friction_rows.hpp"
 
 namespace jfpx {
@@ -6,7 +6,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// What Bullet keeps for its own subclasses.
+/// Access to protected functions of Bullet's solver.
 struct Access : btSequentialImpulseConstraintSolver {
   using btSequentialImpulseConstraintSolver::applyAnisotropicFriction;
   static constexpr auto set_up() { return &Access::setupTorsionalFrictionConstraint; }
@@ -33,8 +33,8 @@ class RollingFrictions {
       for (int i = 0; i < 3; ++i) *at(field + i) = v.m_floats[i];
     };
     *at(rows::kRowPresent) = 1;
-    put3(rows::kRowTurnA, row.m_relpos1CrossNormal);
-    put3(rows::kRowTurnB, row.m_relpos2CrossNormal);
+    put3(rows::kRowAngularJacobianA, row.m_relpos1CrossNormal);
+    put3(rows::kRowAngularJacobianB, row.m_relpos2CrossNormal);
     put3(rows::kRowAngularA, row.m_angularComponentA);
     put3(rows::kRowAngularB, row.m_angularComponentB);
     *at(rows::kRowInverse) = row.m_jacDiagABInv;
@@ -56,10 +56,10 @@ class RollingFrictions {
 
 }  // namespace
 
-void turn_by_anisotropy(const ContactRef& contact, btVector3* axis, int mode) {
+void apply_anisotropic_friction(const ContactRef& contact, btVector3* axis, int mode) {
   for (const btCollisionObject* object :
        {contact.manifold->getBody0(), contact.manifold->getBody1()}) {
-    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): it only reads
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): the function only reads
     Access::applyAnisotropicFriction(const_cast<btCollisionObject*>(object), *axis, mode);
   }
 }
@@ -76,7 +76,7 @@ void set_up_rolling_frictions(btSequentialImpulseConstraintSolver& solver, int f
   for (btVector3& axis : axes) {
     to += rows::kFrictionFields * lanes;
     axis.normalize();
-    turn_by_anisotropy(contact, &axis, btCollisionObject::CF_ANISOTROPIC_ROLLING_FRICTION);
+    apply_anisotropic_friction(contact, &axis, btCollisionObject::CF_ANISOTROPIC_ROLLING_FRICTION);
     if (axis.length() > 0.001) rolling_frictions.put(axis, point.m_combinedRollingFriction, to);
   }
 }

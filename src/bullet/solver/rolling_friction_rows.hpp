@@ -1,5 +1,5 @@
-/// Rows against rolling and spinning of a contact, which Bullet's own function sets up: they are
-/// seldom many.
+/// Rolling and spinning friction rows of a contact. Bullet's own function sets them up, because
+/// they are usually few.
 #pragma once
 
 #include "src/bullet/solver/contact_scan.hpp"
@@ -10,14 +10,14 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Friction that depends on the direction, which is a matter for Bullet.
+/// Applies the anisotropic friction of both bodies to an axis, with Bullet's own function.
 /// @param mode one of btCollisionObject::AnisotropicFrictionFlags
-void turn_by_anisotropy(const ContactRef& contact, btVector3* axis, int mode);
+void apply_anisotropic_friction(const ContactRef& contact, btVector3* axis, int mode);
 
-/// Fills the kRollingFrictionRows rows of a contact, where they are not to stay 0. Safe for
-/// different contacts at once.
-/// @param fixed Bullet's solver body that stands for all bodies without one
-/// @param to    the contact's lane of the rows, all 0
+/// Sets up those of the kRollingFrictionRows rows of a contact that are not 0. Thread-safe for
+/// different contacts.
+/// @param fixed index of the solver body that replaces all bodies without a solver body
+/// @param to    the lane of the contact in its rows, which are all 0
 void set_up_rolling_frictions(btSequentialImpulseConstraintSolver& solver, int fixed,
                               btScalar relaxation, const ContactRef& contact, Real* to,
                               std::size_t lanes);

@@ -1,4 +1,4 @@
-/// What a step, a body and a contact look like to the row solver; see the header.
+/// Conversion of settings, bodies and contacts; see the header.
 #include "src/bullet/solver/row_inputs.hpp"
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
@@ -12,7 +12,7 @@ namespace {
 
 void put(Real* to, const btVector3& v) { std::copy_n(v.m_floats, 3, to); }
 
-/// Softness and error reduction of a contact.
+/// Softness (cfm) and error reduction (erp) of a contact.
 void contact_softness(const btManifoldPoint& point, const btContactSolverInfo& info, Real* cfm,
                       Real* erp) {
   const int flags = point.m_contactPointFlags;

@@ -1,4 +1,4 @@
-/// Translates Bullet's settings, bodies and contacts for the row solver.
+/// Conversion of Bullet's settings, bodies and contacts to the inputs of the row solver.
 #pragma once
 
 #include "src/contact_solver/row_layout.hpp"
@@ -14,13 +14,14 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 rows::RowSettings row_settings(const btContactSolverInfo& info);
-/// As btSequentialImpulseConstraintSolver::convertBodies(). The body must have an original.
+/// Adds gyroscopic impulses as btSequentialImpulseConstraintSolver::convertBodies() does. The body
+/// must have an original body.
 void add_gyroscopic_impulses(const btContactSolverInfo& info, btSolverBody* body);
-/// Fills kBodyFields numbers as gather_body() reads them. The body must have an original.
+/// Writes the kBodyFields numbers that gather_body() reads. The body must have an original body.
 void pack_body(const btSolverBody& body, Real* to);
-/// Fills kFactorFields numbers.
+/// Writes kFactorFields numbers.
 void pack_factors(const btSolverBody& body, Real* to);
-/// Writes the contact into its lane of a block of inputs.
+/// Writes the contact to its lane of a block of inputs.
 void pack_contact(const btManifoldPoint& point, const btContactSolverInfo& info, std::size_t lanes,
                   Real* to);
 

@@ -1,4 +1,4 @@
-/// Compares Bullet's sphere-sphere points with those of find_contacts.
+/// Comparison of Bullet's sphere-sphere contact points with those of find_contacts().
 #include <jfpx/bullet/verify.hpp>
 #include <jfpx/error.hpp>
 
@@ -17,7 +17,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// One point that Bullet holds for two captured spheres, a before b.
+/// A contact point of Bullet between two captured spheres, a before b.
 struct BulletPoint {
   SphereIndex a, b;
   btManifoldPoint point;
@@ -39,14 +39,14 @@ struct ContactCheck::Impl {
   std::optional<Difference> first;
 
   std::vector<BulletPoint> points_of(btDynamicsWorld& world) const;
-  bool kept_apart(btDynamicsWorld& world, SphereIndex a, SphereIndex b) const;
+  bool are_filtered(btDynamicsWorld& world, SphereIndex a, SphereIndex b) const;
   void mismatch(const FieldDifference& field, SphereIndex a, SphereIndex b, std::uint64_t step);
   void compare_contact(const SphereContact& contact, const btManifoldPoint& point,
                        std::uint64_t step);
 };
 
-/// From the pair cache, not from the dispatcher's array: that one also has the predictive contacts
-/// of continuous collision, which are no touching.
+/// Reads the pair cache instead of the dispatcher's array, which also has the predictive contacts
+/// of continuous collision, whose spheres do not touch.
 std::vector<BulletPoint> ContactCheck::Impl::points_of(btDynamicsWorld& world) const {
   const auto by_proxy = [](const btCollisionObject* body, const btBroadphaseProxy* proxy) {
     return body->getBroadphaseHandle()->getUid() < proxy->getUid();
@@ -76,7 +76,7 @@ std::vector<BulletPoint> ContactCheck::Impl::points_of(btDynamicsWorld& world) c
   return points;
 }
 
-bool ContactCheck::Impl::kept_apart(btDynamicsWorld& world, SphereIndex a, SphereIndex b) const {
+bool ContactCheck::Impl::are_filtered(btDynamicsWorld& world, SphereIndex a, SphereIndex b) const {
   const btCollisionObject& body_a = *bodies[a];
   const btCollisionObject& body_b = *bodies[b];
   return !world.getPairCache()->needsBroadphaseCollision(bodies[a]->getBroadphaseHandle(),
@@ -138,8 +138,8 @@ void ContactCheck::capture(const btDynamicsWorld& world) {
       impl.bodies.push_back(all[i]);
     }
   }
-  // Bullet puts the body with the lower proxy id first; with the same order here, normals have the
-  // same direction.
+  // Bullet puts the body with the lower proxy id first; the same order here gives normals the same
+  // direction.
   std::sort(impl.bodies.begin(), impl.bodies.end(), [](const auto* a, const auto* b) {
     return a->getBroadphaseHandle()->getUid() < b->getBroadphaseHandle()->getUid();
   });
@@ -158,23 +158,23 @@ std::uint64_t ContactCheck::compare(btDynamicsWorld& world, std::uint64_t step) 
   const std::vector<BulletPoint> points = impl.points_of(world);
   std::uint64_t compared = 0;
   std::size_t k = 0;
-  // Both lists are sorted by (a, b): a merge.
-  const auto too_many = [&](const BulletPoint& p) {
+  // Both lists are sorted by (a, b), so they are merged.
+  const auto extra = [&](const BulletPoint& p) {
     ++compared;
     impl.mismatch({"touching", 1, 0, 1, 0}, p.a, p.b, step);
   };
   for (const SphereContact& contact : contacts) {
     const BulletPoint key{contact.a, contact.b, {}};
-    while (k < points.size() && points[k] < key) too_many(points[k++]);
+    while (k < points.size() && points[k] < key) extra(points[k++]);
     if (k < points.size() && !(key < points[k])) {
       ++compared;
       impl.compare_contact(contact, points[k++].point, step);
-    } else if (!impl.kept_apart(world, contact.a, contact.b)) {
+    } else if (!impl.are_filtered(world, contact.a, contact.b)) {
       ++compared;
       impl.mismatch({"touching", 0, 1, 0, 1}, contact.a, contact.b, step);
     }
   }
-  while (k < points.size()) too_many(points[k++]);
+  while (k < points.size()) extra(points[k++]);
   impl.compared += compared;
   return compared;
 }

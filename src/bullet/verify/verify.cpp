@@ -1,4 +1,4 @@
-/// Compares two Bullet worlds.
+/// Bitwise comparison of two Bullet worlds.
 #include <jfpx/bullet/verify.hpp>
 
 #include "src/bullet/dispatch/point_fields.hpp"

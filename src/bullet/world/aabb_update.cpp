@@ -1,27 +1,28 @@
-/// Follows btDbvtBroadphase and btHashedOverlappingPairCache of Bullet 3.24; see the header.
+/// Reproduces btDbvtBroadphase and btHashedOverlappingPairCache of Bullet 3.24.
 #include "src/bullet/world/aabb_update.hpp"
 
 #include "src/base/reserve.hpp"
+#include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
 
 #include <LinearMath/btQuickprof.h>
 
 #include <new>
-#include <typeinfo>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// Where the tables of a pair cache lie, which only its subclasses may name.
+/// Pointers to the protected tables of a pair cache.
 struct PairTables : btHashedOverlappingPairCache {
   static constexpr auto heads = &PairTables::m_hashTable;
   static constexpr auto next = &PairTables::m_next;
   static constexpr auto ghosts = &PairTables::m_ghostPairCallback;
 };
 
-/// The cache's own hash, which is private. Were it another, each pair would be left to Bullet.
+/// Copy of the cache's hash function, which is private. If it differed, the results would be the
+/// same, but Bullet would search for every pair.
 unsigned hash_of(int id0, int id1) {
   unsigned key = static_cast<unsigned>(id0) | (static_cast<unsigned>(id1) << 16);
   key += ~(key << 15);
@@ -33,20 +34,20 @@ unsigned hash_of(int id0, int id1) {
   return key;
 }
 
-/// Makes the tree leave the search for overlaps to the caller. It says whether there is one to do
-/// by saying that a cleanup is needed.
-class OwnSearch {
+/// Defers the tree's search for overlaps to the caller. The tree requests the search by setting its
+/// cleanup flag.
+class DeferredSearch {
  public:
-  explicit OwnSearch(btDbvtBroadphase& tree) : tree_(tree) { tree_.m_deferedcollide = true; }
-  ~OwnSearch() {
+  explicit DeferredSearch(btDbvtBroadphase& tree) : tree_(tree) { tree_.m_deferedcollide = true; }
+  ~DeferredSearch() {
     tree_.m_deferedcollide = false;
     tree_.m_needcleanup |= cleanup_;
   }
-  OwnSearch(const OwnSearch&) = delete;
-  OwnSearch& operator=(const OwnSearch&) = delete;
+  DeferredSearch(const DeferredSearch&) = delete;
+  DeferredSearch& operator=(const DeferredSearch&) = delete;
 
   template <class Update>
-  bool wanted_after(const Update& update) {
+  bool needed_after(const Update& update) {
     cleanup_ |= tree_.m_needcleanup;
     tree_.m_needcleanup = false;
     update();
@@ -79,25 +80,25 @@ void prefetch_body(btCollisionObjectArray& objects, int i) {
 
 bool AabbUpdate::run(btCollisionWorld& world) {
   btBroadphaseInterface& broadphase = *world.getBroadphase();
-  if (typeid(broadphase) != typeid(btDbvtBroadphase)) return false;
+  if (!is_exactly<btDbvtBroadphase>(broadphase)) return false;
   auto& tree = static_cast<btDbvtBroadphase&>(broadphase);
   btOverlappingPairCache& pair_cache = *tree.m_paircache;
-  if (typeid(pair_cache) != typeid(btHashedOverlappingPairCache)) return false;
+  if (!is_exactly<btHashedOverlappingPairCache>(pair_cache)) return false;
   auto& cache = static_cast<btHashedOverlappingPairCache&>(pair_cache);
   if (tree.m_deferedcollide || cache.getOverlapFilterCallback() != nullptr) return false;
-  // Both are called in the middle of the update, and may add and remove bodies.
+  // Both are called during the update, and may add and remove bodies.
   if (cache.*PairTables::ghosts != nullptr || world.getDebugDrawer() != nullptr) return false;
   const int leaves = tree.m_sets[0].m_leaves + tree.m_sets[1].m_leaves;
   if (!reserve_geometric(static_cast<std::size_t>(leaves))) return false;
 
-  BT_PROFILE("updateAabbs");  // Bullet's own name, for those who profile
-  OwnSearch search(tree);
+  BT_PROFILE("updateAabbs");  // Bullet's own name of the profile zone
+  DeferredSearch search(tree);
   btCollisionObjectArray& objects = world.getCollisionObjectArray();
   for (int i = 0; i < objects.size(); ++i) {
     prefetch_body(objects, i);
     btCollisionObject* object = objects[i];
     if (!world.getForceUpdateAllAabbs() && !object->isActive()) continue;
-    if (!search.wanted_after([&] { world.updateSingleAabb(object); })) continue;
+    if (!search.needed_after([&] { world.updateSingleAabb(object); })) continue;
     const auto* proxy = static_cast<const btDbvtProxy*>(object->getBroadphaseHandle());
     pairs_.clear();
     find_overlaps(tree.m_sets[btDbvtBroadphase::FIXED_SET].m_root, proxy->leaf);
@@ -108,7 +109,8 @@ bool AabbUpdate::run(btCollisionWorld& world) {
   return true;
 }
 
-/// No leaf is found twice, and the stack holds no node above another.
+/// `leaves` elements suffice: no leaf is found twice, and no node in the stack is an ancestor of
+/// another.
 bool AabbUpdate::reserve_geometric(std::size_t leaves) noexcept {
   try {
     jfpx::reserve_geometric(&stack_, leaves);
@@ -119,8 +121,8 @@ bool AabbUpdate::reserve_geometric(std::size_t leaves) noexcept {
   }
 }
 
-// btDbvt::collideTTpersistentStack() for a leaf: the leaves that overlap it, in its order. Both
-// children of a node are looked at together, so that they come from memory together.
+// btDbvt::collideTTpersistentStack() for a leaf: finds the overlapping leaves in Bullet's order.
+// Both children of a node are tested together, so that their cache misses overlap.
 void AabbUpdate::find_overlaps(const btDbvtNode* root, const btDbvtNode* leaf) {
   const auto overlaps = [&](const btDbvtNode* node) {
     return node != leaf && Intersect(node->volume, leaf->volume);
@@ -144,12 +146,12 @@ void AabbUpdate::find_overlaps(const btDbvtNode* root, const btDbvtNode* leaf) {
   }
 }
 
-/// Adds the pairs that the cache does not have, in order.
+/// Adds the pairs that are not in the cache, in order.
 void AabbUpdate::add_pairs(btHashedOverlappingPairCache& cache) {
   btAlignedObjectArray<int>& heads = cache.*PairTables::heads;
   btAlignedObjectArray<int>& next = cache.*PairTables::next;
   btBroadphasePairArray& known = cache.getOverlappingPairArray();
-  // The cache takes its capacity, a power of two, for the size of the table.
+  // The cache uses its capacity, a power of two, as the size of the table.
   const unsigned mask = static_cast<unsigned>(known.capacity()) - 1;
   for (Pair& pair : pairs_) {
     pair.swapped = pair.a->m_uniqueId > pair.b->m_uniqueId;
@@ -166,7 +168,7 @@ void AabbUpdate::add_pairs(btHashedOverlappingPairCache& cache) {
     prefetch(&next[pair.index]);
   }
   for (const Pair& pair : pairs_) {
-    // Pairs that are added on the way may move others to another list: those are left to Bullet.
+    // Added pairs may move others to a different list; Bullet's own search handles those.
     int index = pair.index;
     while (index != BT_NULL_PAIR &&
            (known[index].m_pProxy0 != pair.a || known[index].m_pProxy1 != pair.b)) {

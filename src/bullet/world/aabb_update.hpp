@@ -1,5 +1,5 @@
-/// What a step does to the boxes of bodies in Bullet's dynamic tree, with the same results in the
-/// same order, asking for memory ahead of its use.
+/// Update of the AABBs in Bullet's dynamic tree, with the same results in the same order, and with
+/// software prefetching.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -13,21 +13,21 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// In large worlds more than half of Bullet's update goes into finding again, one after the other,
-/// pairs that the hash table has since long: each takes several reads from memory.
+/// In large worlds, Bullet spends more than half of the update on finding pairs that are already in
+/// the hash table, one after the other; each takes several reads from memory.
 class JFPX_API AabbUpdate {
  public:
-  /// btCollisionWorld::updateAabbs(). False, and nothing is done, if the broadphase is not Bullet's
-  /// own tree over Bullet's own hash table, as it is by default, if the user filters or hears of
-  /// pairs or draws, or if there is no memory.
+  /// Has the effect of btCollisionWorld::updateAabbs(). Returns false and changes nothing if the
+  /// broadphase is not Bullet's default, its own tree with its own hash table, if a pair filter, a
+  /// ghost pair callback or a debug drawer is set, or if there is not enough memory.
   bool run(btCollisionWorld& world);
 
  private:
   struct Pair {
     btDbvtProxy *a, *b;  ///< by ascending id
     bool swapped;        ///< `a` is the body that has moved
-    int* slot;           ///< where a search in the hash table begins
-    int index;           ///< into the pairs, of the first to compare with
+    int* slot;           ///< the hash table's slot of the pair
+    int index;           ///< index of the first pair to compare with
   };
 
   bool reserve_geometric(std::size_t leaves) noexcept;

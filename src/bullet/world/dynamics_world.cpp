@@ -1,8 +1,9 @@
-/// Steps of a world; see the header.
+/// The stages of a step of a dynamics world.
 #include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/error.hpp>
 
 #include "src/base/thread_pool.hpp"
+#include "src/bullet/exact_class.hpp"
 #include "src/bullet/world/aabb_update.hpp"
 #include "src/bullet/world/islands.hpp"
 
@@ -18,7 +19,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr int kBodiesAChunk = 256;
+constexpr int kBodiesPerChunk = 256;
 
 int island_of(const btTypedConstraint* constraint) {
   const int tag = constraint->getRigidBodyA().getIslandTag();
@@ -37,21 +38,21 @@ struct DynamicsWorld::Impl {
   explicit Impl(const DynamicsWorldOptions& options)
       : pool(options.threads), islands(pool), minimum_batch(options.minimum_batch) {}
 
-  /// Calls run(bodies, count) for all parts of the array, at once.
+  /// Calls run(bodies, count) for all chunks of the array in parallel.
   template <class Run>
-  void in_parts(btAlignedObjectArray<btRigidBody*>& bodies, const Run& run) {
+  void in_chunks(btAlignedObjectArray<btRigidBody*>& bodies, const Run& run) {
     const int count = bodies.size();
-    const int chunks = (count + kBodiesAChunk - 1) / kBodiesAChunk;
+    const int chunks = (count + kBodiesPerChunk - 1) / kBodiesPerChunk;
     pool.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
-      const int first = static_cast<int>(chunk) * kBodiesAChunk;
-      run(&bodies[first], std::min(kBodiesAChunk, count - first));
+      const int first = static_cast<int>(chunk) * kBodiesPerChunk;
+      run(&bodies[first], std::min(kBodiesPerChunk, count - first));
     });
   }
-  /// Whether the path of some body may be cut short by continuous collision.
+  /// Whether continuous collision may shorten the path of any body.
   bool has_swept_bodies(btAlignedObjectArray<btRigidBody*>& bodies, const btDispatcherInfo& info) {
     if (!info.m_useContinuous) return false;
     std::atomic<bool> found{false};
-    in_parts(bodies, [&](btRigidBody** part, int count) {
+    in_chunks(bodies, [&](btRigidBody** part, int count) {
       if (std::any_of(part, part + count, [](const btRigidBody* body) {
             return body->getCcdSquareMotionThreshold() != 0;
           })) {
@@ -66,7 +67,6 @@ DynamicsWorld::DynamicsWorld(btDispatcher* dispatcher, btBroadphaseInterface* br
                              btConstraintSolver* solver, btCollisionConfiguration* configuration,
                              const DynamicsWorldOptions& options)
     : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration) {
-  verify_build(options.headers);
   impl_ = std::make_unique<Impl>(options);
 }
 DynamicsWorld::~DynamicsWorld() = default;
@@ -85,7 +85,7 @@ void DynamicsWorld::predictUnconstraintMotion(btScalar dt) {
     return;
   }
   BT_PROFILE("predictUnconstraintMotion");
-  impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+  impl_->in_chunks(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
     for (int i = 0; i < count; ++i) {
       if (!is_movable(*bodies[i])) continue;
       bodies[i]->applyDamping(dt);
@@ -101,7 +101,7 @@ void DynamicsWorld::createPredictiveContacts(btScalar dt) {
   }
   BT_PROFILE("createPredictiveContacts");
   releasePredictiveContacts();
-  impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+  impl_->in_chunks(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
     for (int i = 0; i < count; ++i) bodies[i]->setHitFraction(1);
   });
 }
@@ -113,7 +113,7 @@ void DynamicsWorld::integrateTransforms(btScalar dt) {
     return;
   }
   BT_PROFILE("integrateTransforms");
-  impl_->in_parts(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+  impl_->in_chunks(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
     integrateTransformsInternal(bodies, count, dt);
   });
 }
@@ -122,13 +122,12 @@ void DynamicsWorld::updateAabbs() {
   if (is_small() || !impl_->boxes.run(*this)) btDiscreteDynamicsWorld::updateAabbs();
 }
 
-bool DynamicsWorld::has_bullets_islands() const noexcept {
-  return m_islandManager != nullptr &&
-         typeid(*m_islandManager) == typeid(btSimulationIslandManager);
+bool DynamicsWorld::has_stock_island_manager() const noexcept {
+  return m_islandManager != nullptr && is_exactly<btSimulationIslandManager>(*m_islandManager);
 }
 
 void DynamicsWorld::calculateSimulationIslands() {
-  if (is_small() || !has_bullets_islands()) {
+  if (is_small() || !has_stock_island_manager()) {
     btDiscreteDynamicsWorld::calculateSimulationIslands();
     return;
   }
@@ -150,7 +149,7 @@ void DynamicsWorld::calculateSimulationIslands() {
 
 void DynamicsWorld::solveConstraints(btContactSolverInfo& info) {
   btSimulationIslandManager& manager = *getSimulationIslandManager();
-  if (is_small() || !has_bullets_islands() || !manager.getSplitIslands() ||
+  if (is_small() || !has_stock_island_manager() || !manager.getSplitIslands() ||
       !impl_->islands.reserve_geometric(*this, m_constraints.size())) {
     btDiscreteDynamicsWorld::solveConstraints(info);
     return;

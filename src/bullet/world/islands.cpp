@@ -1,11 +1,12 @@
-/// Follows btSimulationIslandManager.cpp and the island callback of btDiscreteDynamicsWorld.cpp of
-/// Bullet 3.24 step by step; see the header.
+/// Reproduces btSimulationIslandManager.cpp, and the island callback of
+/// btDiscreteDynamicsWorld.cpp, of Bullet 3.24 step by step.
 #include "src/bullet/world/islands.hpp"
 
 #include <jfpx/bullet/dispatcher.hpp>
 #include <jfpx/error.hpp>
 
 #include "src/base/reserve.hpp"
+#include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>
@@ -16,14 +17,13 @@
 #include <algorithm>
 #include <atomic>
 #include <new>
-#include <typeinfo>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr int kManifoldsAChunk = 4096;
+constexpr int kManifoldsPerChunk = 4096;
 
 void prefetch_island_state_of(const btCollisionObjectArray& objects, int i) {
   if (i < objects.size()) prefetch_island_state(objects[i]);
@@ -41,7 +41,7 @@ int island_of(const btTypedConstraint& constraint) {
   return island_of(constraint.getRigidBodyA(), constraint.getRigidBodyB());
 }
 
-/// Kinematic objects that move wake whatever they overlap.
+/// Moving kinematic objects wake the objects that they overlap.
 void wake(const btCollisionObject& kinematic, const btCollisionObject& other) {
   if (kinematic.isKinematicObject() && kinematic.getActivationState() != ISLAND_SLEEPING &&
       kinematic.hasContactResponse()) {
@@ -49,10 +49,10 @@ void wake(const btCollisionObject& kinematic, const btCollisionObject& other) {
   }
 }
 
-/// Whether the manifold is one that islands are solved with. `kinematic` becomes true if that may
-/// depend on whom kinematic objects have woken.
-bool is_wanted(btDispatcher& dispatcher, const btPersistentManifold& manifold, bool only_touching,
-               bool* kinematic) {
+/// Whether the manifold belongs to the islands to solve. Sets `kinematic` if the result may depend
+/// on objects that kinematic objects have woken.
+bool needs_solving(btDispatcher& dispatcher, const btPersistentManifold& manifold,
+                   bool only_touching, bool* kinematic) {
   if (only_touching && manifold.getNumContacts() == 0) return false;
   const btCollisionObject &a = *manifold.getBody0(), &b = *manifold.getBody1();
   if (a.isKinematicObject() || b.isKinematicObject()) *kinematic = true;
@@ -125,7 +125,7 @@ bool IslandSolver::reserve_geometric(btCollisionWorld& world, int constraint_cou
   try {
     found_.reserve(manifolds, "manifolds of islands");
     found_island_.reserve(manifolds, "manifolds of islands");
-    jfpx::reserve_geometric(&chunk_counts_, manifolds / std::size_t{kManifoldsAChunk} + 1);
+    jfpx::reserve_geometric(&chunk_counts_, manifolds / std::size_t{kManifoldsPerChunk} + 1);
     jfpx::reserve_geometric(&manifolds_, manifolds);
     jfpx::reserve_geometric(&bodies_, static_cast<std::size_t>(world.getNumCollisionObjects()));
     jfpx::reserve_geometric(&constraints_, static_cast<std::size_t>(constraint_count));
@@ -150,7 +150,7 @@ void IslandSolver::solve(btCollisionWorld& world, btUnionFind& unions, btConstra
   solve_awake(world, unions, solver, info, constraints, constraint_count);
 }
 
-/// An island sleeps if none of its objects is awake; one that doesn't has no sleepers.
+/// An island sleeps if none of its objects is awake; otherwise all of its objects are woken.
 void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& unions) {
   const int count = unions.getNumElements();
   const auto object = [&](int k) { return objects[unions.getElement(k).m_sz]; };
@@ -178,20 +178,20 @@ void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& un
   }
 }
 
-/// False for a class of the user's, who may override how manifolds are asked for, and may not
-/// expect to be asked from several threads.
+/// False for a class of the user, which may override access to the manifolds, and whose overrides
+/// need not be thread-safe.
 bool is_plain(const btDispatcher& dispatcher) {
-  const std::type_info& type = typeid(dispatcher);
-  return type == typeid(btCollisionDispatcher) || type == typeid(CollisionDispatcher);
+  return is_exactly<btCollisionDispatcher>(dispatcher) ||
+         is_exactly<CollisionDispatcher>(dispatcher);
 }
 
-/// Lists the manifolds that islands are solved with, and their islands.
+/// Lists the manifolds of the islands to solve, and their islands.
 void IslandSolver::collect_manifolds(btCollisionWorld& world) {
   btDispatcher& dispatcher = *world.getDispatcher();
   const bool only_touching = world.getDispatchInfo().m_deterministicOverlappingPairs;
   const int count = dispatcher.getNumManifolds();
   const bool plain = is_plain(dispatcher);
-  if (plain && collect_at_once(dispatcher, only_touching)) return;
+  if (plain && collect_in_parallel(dispatcher, only_touching)) return;
   btPersistentManifold** manifolds = plain ? dispatcher.getInternalManifoldPointer() : nullptr;
   count_ = 0;
   for (int i = 0; i < count; ++i) {
@@ -212,10 +212,9 @@ void IslandSolver::collect_manifolds(btCollisionWorld& world) {
   }
 }
 
-/// The same on all threads, in chunks, of a plain dispatcher. Not where kinematic objects wake
-/// others.
-bool IslandSolver::collect_at_once(btDispatcher& dispatcher, bool only_touching) {
-  constexpr int kChunk = kManifoldsAChunk;
+/// Parallel version for a plain dispatcher. Returns false if kinematic objects may wake others.
+bool IslandSolver::collect_in_parallel(btDispatcher& dispatcher, bool only_touching) {
+  constexpr int kChunk = kManifoldsPerChunk;
   const int count = dispatcher.getNumManifolds();
   const int chunks = (count + kChunk - 1) / kChunk;
   btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();
@@ -227,7 +226,7 @@ bool IslandSolver::collect_at_once(btDispatcher& dispatcher, bool only_touching)
     int next = first;
     for (int i = first; i < last; ++i) {
       prefetch_manifold(manifolds, i, last);
-      if (!is_wanted(dispatcher, *manifolds[i], only_touching, &seen)) continue;
+      if (!needs_solving(dispatcher, *manifolds[i], only_touching, &seen)) continue;
       const auto at = static_cast<std::size_t>(next++);
       found_[at] = manifolds[i];
       found_island_[at] = island_of(*manifolds[i]->getBody0(), *manifolds[i]->getBody1());
@@ -246,7 +245,8 @@ bool IslandSolver::collect_at_once(btDispatcher& dispatcher, bool only_touching)
   return true;
 }
 
-/// Bullet's sort is not stable: the order is that of this very sort, on keys that compare alike.
+/// Bullet's sort is not stable, so the order is reproduced by the same sort on keys that compare
+/// identically.
 void IslandSolver::sort_manifolds(bool by_pair) {
   keys_.resizeNoInitialize(count_);
   if (!by_pair) {
@@ -286,7 +286,7 @@ void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
                       world.getDispatcher());
     begin_group();
   };
-  begin_group();  // what a solver that threw left behind may be gone
+  begin_group();  // discards pointers that a solver's exception has left, which may dangle
   int key = 0, joint = 0;
   for (int first = 0, last = 0; first < unions.getNumElements(); first = last) {
     const int island = unions.getElement(first).m_id;
@@ -310,11 +310,11 @@ void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
     for (; joint < constraint_count && island_of(*constraints[joint]) == island; ++joint) {
       constraints_.push_back(constraints[joint]);
     }
-    // Small islands are gathered into one group.
+    // Small islands are collected into one group.
     const int size = static_cast<int>(constraints_.size() + manifolds_.size());
     if (info.m_minimumSolverBatchSize <= 1 || size > info.m_minimumSolverBatchSize) solve_group();
   }
-  solve_group();  // as Bullet does, also where nothing is left
+  solve_group();  // as in Bullet, even if the group is empty
 }
 
 }  // namespace bullet

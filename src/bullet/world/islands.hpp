@@ -1,5 +1,5 @@
-/// What Bullet's island manager does, with the same results in the same order, reading each object
-/// and manifold once where it reads them for every comparison of a sort.
+/// Equivalent of Bullet's island manager with the same results in the same order. It reads each
+/// object and manifold once, where Bullet reads them in every comparison of a sort.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -20,17 +20,17 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 /// btSimulationIslandManager::updateActivationState(): numbers the movable objects, and unites
-/// those whose boxes overlap.
+/// those whose AABBs overlap.
 void number_and_unite(btCollisionWorld& world, btUnionFind* unions);
-/// btSimulationIslandManager::storeIslandActivationState(): tells objects their islands.
+/// btSimulationIslandManager::storeIslandActivationState(): writes island tags to the objects.
 void store_islands(btCollisionWorld& world, btUnionFind* unions);
 
-/// Builds the islands of a world, and solves those that are awake in groups as Bullet forms them.
+/// Builds the islands of a world, and solves the awake ones in the same groups as Bullet.
 class IslandSolver {
  public:
   explicit IslandSolver(ThreadPool& pool) : pool_(pool) {}
 
-  /// Takes all memory that solve() will need. @returns false if it can't be had
+  /// Reserves all memory that solve() needs. @returns false if an allocation fails
   bool reserve_geometric(btCollisionWorld& world, int constraint_count) noexcept;
   /// @param constraints sorted by island
   void solve(btCollisionWorld& world, btUnionFind& unions, btConstraintSolver& solver,
@@ -38,7 +38,7 @@ class IslandSolver {
              int constraint_count);
 
  private:
-  /// What manifolds are sorted by; `index` is into found_.
+  /// Sort keys of manifolds; `index` refers to found_.
   struct IslandKey {
     int island, index;
   };
@@ -48,7 +48,7 @@ class IslandSolver {
 
   static void update_sleep(btCollisionObjectArray& objects, btUnionFind& unions);
   void collect_manifolds(btCollisionWorld& world);
-  bool collect_at_once(btDispatcher& dispatcher, bool only_touching);
+  bool collect_in_parallel(btDispatcher& dispatcher, bool only_touching);
   void sort_manifolds(bool by_pair);
   void solve_awake(btCollisionWorld& world, btUnionFind& unions, btConstraintSolver& solver,
                    const btContactSolverInfo& info, btTypedConstraint** constraints,

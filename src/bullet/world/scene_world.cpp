@@ -35,19 +35,20 @@ Quat from_bullet(const btQuaternion& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
 bool is_half_space(const BodyDef& def) { return std::holds_alternative<HalfSpace>(def.shape); }
 
-/// The axes of Bullet's body, in those of ours: Bullet wants principal ones.
+/// The axes of the Bullet body relative to those of the scene's body: Bullet requires principal
+/// axes.
 btTransform principal_axes(const PrincipalInertia& inertia) {
   const Mat3& m = inertia.axes;
   return btTransform(
       btMatrix3x3(m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2)));
 }
 
-/// Makes shapes and keeps them; equal shapes once if they are shared.
+/// Creates and owns shapes; if they are shared, equal shapes are created once.
 class ShapeStore {
  public:
   explicit ShapeStore(bool share) : share_(share) {}
 
-  /// @param axes of Bullet's body in those of ours; other than the identity for compounds only
+  /// @param axes of the Bullet body relative to the scene's; identity for all but compounds
   btCollisionShape* get(const Shape& shape, const btTransform& axes) {
     if (const auto* compound = std::get_if<Compound>(&shape)) return make(*compound, axes);
     if (const auto* plane = std::get_if<HalfSpace>(&shape)) return make(*plane);
@@ -97,35 +98,36 @@ class ShapeStore {
   std::map<Key, btCollisionShape*> shared_;
 };
 
-/// Bullet multiplies the coefficients of two bodies; of square roots that is the geometric mean.
+/// Bullet multiplies the coefficients of two bodies; the product of square roots is the geometric
+/// mean.
 void require_bullet(const MaterialSettings& materials) {
   for (const auto& [field, rule] : {std::pair("friction", materials.friction),
                                     std::pair("restitution", materials.restitution)}) {
     if (rule == CombineRule::geometric_mean || rule == CombineRule::product) continue;
     throw InvalidScene(std::string("scene: materials.") + field + " is " + to_string(rule) +
-                       "; Bullet multiplies what two bodies have, so there it must be "
-                       "geometric_mean or product");
+                       "; it must be geometric_mean or product, because Bullet multiplies the "
+                       "coefficients of two bodies");
   }
 }
 
-/// Bullet's bodies have their moments of inertia about the axes of their shape, which an compound
-/// can be turned to; and Bullet has no two-sided plane.
+/// Bullet stores moments of inertia about the axes of the shape, to which only a compound can be
+/// rotated, and has no two-sided plane.
 void require_bullet(const BodyDef& def, std::size_t body) {
   const auto refuse = [body](const char* what) {
     throw InvalidScene("body " + std::to_string(body) + ": " + what);
   };
   if (std::holds_alternative<Plane>(def.shape)) {
     refuse(
-        "shape is a two-sided plane, which Bullet does not have; it must be a half-space or a "
+        "shape is a two-sided plane, which Bullet does not support; it must be a half-space or a "
         "box to run in Bullet");
   }
   if (std::holds_alternative<Compound>(def.shape)) return;
   if (def.mass > 0 && def.inertia && !is_diagonal(*def.inertia)) {
-    refuse("inertia has products of inertia; for Bullet it must be diagonal");
+    refuse("inertia has products of inertia; it must be diagonal to run in Bullet");
   }
 }
 
-/// Of an compound that can move; of all others nothing.
+/// The principal inertia of a movable compound; the default for all other bodies.
 PrincipalInertia inertia_of(const BodyDef& def) {
   const auto* compound = std::get_if<Compound>(&def.shape);
   if (compound == nullptr || !(def.mass > 0)) return {};
@@ -174,18 +176,6 @@ std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const PrincipalInerti
   return body;
 }
 
-std::unique_ptr<btCollisionDispatcher> make_dispatcher(btCollisionConfiguration* configuration,
-                                                       const SceneWorldOptions& options) {
-  if (options.dispatcher == DispatcherKind::stock) {
-    return std::make_unique<btCollisionDispatcher>(configuration);
-  }
-  if (options.make_collider) {
-    return std::make_unique<CollisionDispatcher>(configuration, options.make_collider(),
-                                                 options.dispatch);
-  }
-  return std::make_unique<CollisionDispatcher>(configuration, options.dispatch);
-}
-
 std::unique_ptr<btSequentialImpulseConstraintSolver> make_solver(const SceneWorldOptions& options) {
   if (options.solver == SolverKind::stock) {
     return std::make_unique<btSequentialImpulseConstraintSolver>();
@@ -209,7 +199,8 @@ std::unique_ptr<btDiscreteDynamicsWorld> make_world(btCollisionDispatcher* dispa
 
 }  // namespace
 
-/// Members in the order in which Bullet needs them to be made, and so destroyed in reverse.
+/// Members are in the order in which Bullet requires their construction, and are destroyed in
+/// reverse.
 struct SceneWorld::Impl {
   Scene scene;
   ShapeStore shapes;
@@ -223,10 +214,10 @@ struct SceneWorld::Impl {
   StageTimes times;
   std::unique_ptr<btDiscreteDynamicsWorld> world;
 
-  Impl(Scene source, const SceneWorldOptions& options)
+  Impl(bool caller_is_fused, Scene source, const SceneWorldOptions& options)
       : scene(std::move(source)),
         shapes(options.share_shapes),
-        dispatcher(make_dispatcher(&configuration, options)),
+        dispatcher(make_dispatcher(caller_is_fused, &configuration, options)),
         solver(make_solver(options)),
         world(make_world(dispatcher.get(), &broadphase, solver.get(), &configuration, options,
                          &times)) {
@@ -242,7 +233,20 @@ struct SceneWorld::Impl {
       world->addRigidBody(bodies.back());
     }
   }
-  /// As the native engine moves them; Bullet finds their velocities from the way.
+  static std::unique_ptr<btCollisionDispatcher> make_dispatcher(
+      bool caller_is_fused, btCollisionConfiguration* configuration,
+      const SceneWorldOptions& options) {
+    if (options.dispatcher == DispatcherKind::stock) {
+      return std::make_unique<btCollisionDispatcher>(configuration);
+    }
+    std::unique_ptr<SphereCollider> collider =
+        options.make_collider ? options.make_collider()
+                              : make_sphere_collider(options.dispatch.collider);
+    return std::unique_ptr<btCollisionDispatcher>(
+        new CollisionDispatcher(CollisionDispatcher::CallerIsFused{caller_is_fused}, configuration,
+                                std::move(collider), options.dispatch));
+  }
+  /// Moves them as the native engine does; Bullet derives their velocities from the displacement.
   void move_kinematic_bodies(Real dt) {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const BodyDef& def = scene.bodies[i];
@@ -255,7 +259,8 @@ struct SceneWorld::Impl {
     }
   }
   ~Impl() {
-    // Bullet scans all pairs once for every body that leaves a world; without pairs it need not.
+    // Bullet scans all pairs for every body that is removed from a world; removing the pairs first
+    // avoids the scans.
     btOverlappingPairCache* cache = broadphase.getOverlappingPairCache();
     while (cache->getNumOverlappingPairs() > 0) {
       const btBroadphasePair& last =
@@ -265,10 +270,10 @@ struct SceneWorld::Impl {
   }
 };
 
-SceneWorld::SceneWorld(const Scene& scene, const SceneWorldOptions& options) {
+SceneWorld::SceneWorld(bool caller_is_fused, const Scene& scene, const SceneWorldOptions& options) {
   validate(scene);
   require_bullet(scene.materials);
-  impl_ = std::make_unique<Impl>(scene, options);
+  impl_ = std::make_unique<Impl>(caller_is_fused, scene, options);
 }
 SceneWorld::~SceneWorld() = default;
 SceneWorld::SceneWorld(SceneWorld&&) noexcept = default;
@@ -280,7 +285,7 @@ void SceneWorld::step(Real dt) {
                           " s; it must be finite and larger than the machine epsilon");
   }
   impl_->move_kinematic_bodies(dt);
-  // No sub-steps: Bullet then makes one step of the full length and keeps no remainder.
+  // Without substeps, Bullet makes one step of the full length and keeps no remainder.
   impl_->world->stepSimulation(dt, 0, dt);
 }
 void SceneWorld::step() { step(impl_->scene.dt); }

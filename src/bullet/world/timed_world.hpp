@@ -1,4 +1,4 @@
-/// A dynamics world that knows how long its stages take.
+/// A dynamics world that measures the time of its stages.
 #pragma once
 
 #include <jfpx/bullet/scene_world.hpp>
@@ -9,12 +9,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Times the stages by overriding the virtual function of each. Bullet's profiler callbacks would
-/// do too, but they are global and belong to the user.
+/// Measures each stage by overriding its virtual function. Bullet's profiler callbacks would also
+/// work, but they are global and reserved for the user.
 template <class World>
 class TimedWorld final : public World {
  public:
-  /// @param times outlives the world
+  /// @param times must outlive the world
   template <class... Arguments>
   explicit TimedWorld(StageTimes* times, const Arguments&... arguments)
       : World(arguments...), times_(*times) {}

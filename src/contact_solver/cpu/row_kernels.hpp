@@ -1,53 +1,53 @@
-/// The vector kernels of the row solver: one table of functions per instruction set.
+/// Vector kernels of the row solver: one table of functions per instruction set.
 #pragma once
 
-// What may be included here, and why so little: src/sphere_collider/cpu/kernels.hpp.
+// The includes are restricted; see src/sphere_collider/cpu/kernels.hpp for the reason.
 #include "src/contact_solver/row_layout.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
-/// The arrays that sweeps work on. Block i has ids at 2 * lanes * i: those of all bodies a, then b.
+/// Arrays of a sweep. The ids of block i start at 2 * lanes * i: all bodies a, then all bodies b.
 struct RowArrays {
   const std::int32_t* ids;
   Real* velocities;
-  Real* pushes;         ///< velocities that only correct positions (the split impulse)
-  const Real* factors;  ///< null where all factors are 1
+  Real* push_velocities;  ///< velocities of the split impulse, which only correct positions
+  const Real* factors;    ///< null if all factors are 1
   Real* contacts;
   Real* frictions;
-  std::uint32_t directions;          ///< of friction: rows a contact, one after the other
-  const std::uint32_t* push_blocks;  ///< blocks with a row that pushes
-  const std::uint32_t* rolling_friction_blocks;  ///< blocks with a row against rolling or spinning
-  Real* rolling_frictions;                       ///< kRollingFrictionRows of them for each of those
+  std::uint32_t directions;                   ///< friction rows per contact, in consecutive order
+  const std::uint32_t* split_impulse_blocks;  ///< blocks with a row of the split impulse
+  const std::uint32_t* rolling_friction_blocks;  ///< blocks with rolling or spinning friction
+  Real* rolling_frictions;                       ///< kRollingFrictionRows rows per such block
 };
 
 using rows::kRollingFrictionRows;
 
 struct RowResidual {
-  Real largest = 0;     ///< squared
-  bool broken = false;  ///< a residual is not a number
+  Real largest = 0;     ///< largest squared residual
+  bool broken = false;  ///< whether a residual is NaN
 };
 
-/// All run blocks [first, last), one after the other.
+/// Sweeps over the blocks [first, last) in their order.
 using RowSweep = void (*)(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                           RowResidual* residual);
 
 struct RowKernels {
   unsigned lanes;
-  /// Sets up the contacts of a block, and finds the directions of friction: see set_up_contact().
-  /// @return one bit a lane: whether `second` holds the other direction
+  /// Sets up the contacts of a block and their friction directions; see set_up_contact().
+  /// @return one bit per lane: whether `second` holds the second direction
   unsigned (*set_up_contacts)(const rows::RowSettings& settings, const Real* inputs,
                               const Real* bodies, const std::int32_t* ids, Real* contacts,
                               Real* frictions, Real* second);
   void (*set_up_frictions)(const rows::RowSettings& settings, const Real* inputs,
                            const Real* bodies, const std::int32_t* ids, Real* frictions);
-  // [1]: with factors
+  // Index 1: with factors.
   RowSweep warm_starts[2];
   RowSweep contacts[2];
   RowSweep frictions[2];
-  RowSweep both[2];               ///< contact and friction of a block by turns
-  RowSweep pushes[2];             ///< blocks are indices into push_blocks
+  RowSweep both[2];               ///< the friction of each block directly after its contacts
+  RowSweep split_impulses[2];     ///< blocks are indices into split_impulse_blocks
   RowSweep rolling_frictions[2];  ///< blocks are indices into rolling_friction_blocks
 };
 

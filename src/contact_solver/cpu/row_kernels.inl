@@ -1,4 +1,4 @@
-/// The kernels of the row solver over a type Simd, which the including source has defined.
+/// Kernels of the row solver as templates over a type Simd, which the including source defines.
 #include "src/contact_solver/contact_rows.hpp"
 #include "src/contact_solver/cpu/row_kernels.hpp"
 
@@ -20,13 +20,13 @@ Real* contact_of(const RowArrays& arrays, std::uint32_t block) {
 Real* friction_of(const RowArrays& arrays, std::uint32_t block) {
   return arrays.frictions + std::size_t{rows::kFrictionFields} * kLanes * arrays.directions * block;
 }
-void report(const BlockResidual& found, RowResidual* residual) {
+void reduce(const BlockResidual& sum, RowResidual* residual) {
   Real lanes[kLanes];
-  Simd::store(lanes, found.largest);
+  Simd::store(lanes, sum.largest);
   for (const Real lane : lanes) {
     if (lane > residual->largest) residual->largest = lane;
   }
-  if (Simd::any(found.broken)) residual->broken = true;
+  if (Simd::any(sum.broken)) residual->broken = true;
 }
 
 unsigned set_up_contacts(const rows::RowSettings& settings, const Real* inputs, const Real* bodies,
@@ -40,11 +40,11 @@ void set_up_frictions(const rows::RowSettings& settings, const Real* inputs, con
 }
 
 template <bool kFactors>
-void solve_frictions(const RowArrays& arrays, std::uint32_t block, BlockResidual* found) {
+void solve_frictions(const RowArrays& arrays, std::uint32_t block, BlockResidual* sum) {
   Real* row = friction_of(arrays, block);
   for (std::uint32_t k = 0; k < arrays.directions; ++k) {
     rows::solve_friction<Simd, kFactors>(ids_of(arrays, block), arrays.velocities, arrays.factors,
-                                         contact_of(arrays, block), row, found);
+                                         contact_of(arrays, block), row, sum);
     row += rows::kFrictionFields * kLanes;
   }
 }
@@ -60,60 +60,60 @@ void sweep_warm_starts(const RowArrays& arrays, std::uint32_t first, std::uint32
 template <bool kFactors>
 void sweep_contacts(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                     RowResidual* residual) {
-  BlockResidual found;
+  BlockResidual sum;
   for (std::uint32_t i = first; i < last; ++i) {
     rows::solve_contact<Simd, kFactors, false>(ids_of(arrays, i), arrays.velocities, arrays.factors,
-                                               contact_of(arrays, i), &found);
+                                               contact_of(arrays, i), &sum);
   }
-  report(found, residual);
+  reduce(sum, residual);
 }
 template <bool kFactors>
 void sweep_frictions(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                      RowResidual* residual) {
-  BlockResidual found;
+  BlockResidual sum;
   for (std::uint32_t i = first; i < last; ++i) {
-    solve_frictions<kFactors>(arrays, i, &found);
+    solve_frictions<kFactors>(arrays, i, &sum);
   }
-  report(found, residual);
+  reduce(sum, residual);
 }
 template <bool kFactors>
 void sweep_both(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                 RowResidual* residual) {
-  BlockResidual found;
+  BlockResidual sum;
   for (std::uint32_t i = first; i < last; ++i) {
     rows::solve_contact<Simd, kFactors, false>(ids_of(arrays, i), arrays.velocities, arrays.factors,
-                                               contact_of(arrays, i), &found);
-    solve_frictions<kFactors>(arrays, i, &found);
+                                               contact_of(arrays, i), &sum);
+    solve_frictions<kFactors>(arrays, i, &sum);
   }
-  report(found, residual);
+  reduce(sum, residual);
 }
 template <bool kFactors>
-void sweep_pushes(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
-                  RowResidual* residual) {
-  BlockResidual found;
+void sweep_split_impulses(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
+                          RowResidual* residual) {
+  BlockResidual sum;
   for (std::uint32_t k = first; k < last; ++k) {
-    const std::uint32_t i = arrays.push_blocks[k];
-    rows::solve_contact<Simd, kFactors, true>(ids_of(arrays, i), arrays.pushes, arrays.factors,
-                                              contact_of(arrays, i), &found);
+    const std::uint32_t i = arrays.split_impulse_blocks[k];
+    rows::solve_contact<Simd, kFactors, true>(ids_of(arrays, i), arrays.push_velocities,
+                                              arrays.factors, contact_of(arrays, i), &sum);
   }
-  report(found, residual);
+  reduce(sum, residual);
 }
 
 template <bool kFactors>
 void sweep_rolling_frictions(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                              RowResidual* residual) {
-  BlockResidual found;
+  BlockResidual sum;
   for (std::uint32_t k = first; k < last; ++k) {
     const std::uint32_t i = arrays.rolling_friction_blocks[k];
     Real* row = arrays.rolling_frictions +
                 std::size_t{rows::kFrictionFields} * kLanes * kRollingFrictionRows * k;
     for (std::uint32_t t = 0; t < kRollingFrictionRows; ++t) {
       rows::solve_rolling_friction<Simd, kFactors>(
-          ids_of(arrays, i), arrays.velocities, arrays.factors, contact_of(arrays, i), row, &found);
+          ids_of(arrays, i), arrays.velocities, arrays.factors, contact_of(arrays, i), row, &sum);
       row += rows::kFrictionFields * kLanes;
     }
   }
-  report(found, residual);
+  reduce(sum, residual);
 }
 
 constexpr RowKernels kKernels = {
@@ -124,7 +124,7 @@ constexpr RowKernels kKernels = {
     {sweep_contacts<false>, sweep_contacts<true>},
     {sweep_frictions<false>, sweep_frictions<true>},
     {sweep_both<false>, sweep_both<true>},
-    {sweep_pushes<false>, sweep_pushes<true>},
+    {sweep_split_impulses<false>, sweep_split_impulses<true>},
     {sweep_rolling_frictions<false>, sweep_rolling_frictions<true>},
 };
 

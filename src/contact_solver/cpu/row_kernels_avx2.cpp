@@ -1,4 +1,4 @@
-/// The kernels of the row solver for AVX2.
+/// Kernels of the row solver for AVX2.
 #include "src/contact_solver/cpu/row_kernels.hpp"
 
 #include <immintrin.h>
@@ -8,7 +8,7 @@ inline namespace JFPX_ABI {
 namespace cpu {
 namespace {
 
-/// Where the fields of body `id` begin. Bodies that no row moves come as complements.
+/// The first field of body `id`. The id of a body that no row moves is its complement.
 template <class T>
 T* field_of(T* base, std::int32_t id, int stride) {
   return base + std::ptrdiff_t{id ^ (id >> 31)} * stride;
@@ -103,7 +103,7 @@ struct Simd {
     const __m256i fixed = _mm256_cmpeq_epi32(id, _mm256_set1_epi32(rows::kFixedBody));
     return negate_mask(_mm256_castsi256_ps(fixed));
   }
-  /// In double and rounded once, as Bullet does.
+  /// Computed in double and rounded once, as Bullet does.
   static __m128 residual(__m128 impulse, __m128 inverse) {
     const __m256d quotient = _mm256_div_pd(_mm256_set1_pd(1), _mm256_cvtps_pd(inverse));
     return _mm256_cvtpd_ps(_mm256_mul_pd(_mm256_cvtps_pd(impulse), quotient));
@@ -113,7 +113,7 @@ struct Simd {
         residual(_mm256_extractf128_ps(impulse, 1), _mm256_extractf128_ps(inverse, 1)),
         residual(_mm256_castps256_ps128(impulse), _mm256_castps256_ps128(inverse)));
   }
-  /// In each half: four vectors of x y z w become one of x, one of y, one of z, one of w.
+  /// Transposes four vectors of x y z w, in each half, to one vector each of x, y, z and w.
   static void transpose(const Vec* r, Vec* out) {
     const Vec t0 = _mm256_unpacklo_ps(r[0], r[1]), t1 = _mm256_unpackhi_ps(r[0], r[1]);
     const Vec t2 = _mm256_unpacklo_ps(r[2], r[3]), t3 = _mm256_unpackhi_ps(r[2], r[3]);

@@ -1,4 +1,4 @@
-/// The kernels of the row solver for any processor: blocks of one row.
+/// Kernels of the row solver for any processor: blocks of one row.
 #include "src/contact_solver/cpu/row_kernels.hpp"
 #include "src/contact_solver/scalar_lane.hpp"
 

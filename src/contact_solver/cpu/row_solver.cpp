@@ -1,9 +1,10 @@
-/// Scheduling and running the sweeps; see the header.
+/// Scheduling of rows in blocks, and the threads that sweep over them; see the header.
 #include "src/contact_solver/cpu/row_solver.hpp"
 
 #include "src/base/cpu.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <chrono>
 #include <cmath>
@@ -16,10 +17,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Blocks that a thread takes at a time: about a microsecond's work, ten times what taking costs.
-constexpr std::uint32_t kTicketBlocks = 12;
-/// With fewer blocks than this waking a second thread costs more than it helps.
+/// Blocks of a work item: about a microsecond of work, ten times the cost of claiming the item.
+constexpr std::uint32_t kBlocksPerItem = 12;
+/// Below this number of blocks, waking a second thread costs more than it saves.
 constexpr std::uint32_t kBlocksPerThread = 64;
+/// First of the two alternatives of the chooser; the other is one thread.
+constexpr std::size_t kSeveralThreads = 0;
+/// [us] Shorter than any sweep over a block, so that the chooser measures both alternatives.
+constexpr double kLowerBoundBlockUs = 1e-4;
 
 const RowKernels& row_kernels(SimdLevel simd) {
   return usable_simd_level(simd) >= SimdLevel::avx2 ? kAvx2RowKernels : kScalarRowKernels;
@@ -33,14 +38,15 @@ bool all_finite(const Real* values, std::size_t count) {
   return finite;
 }
 
-/// How long to wait for other threads, which may have to wait for a processor themselves.
-class Patience {
+/// Bounded waiting for other threads, which may be waiting for a processor themselves: spins first,
+/// then yields.
+class Backoff {
  public:
-  /// @param endless else it ends after some tens of microseconds on processors that are free, and
-  /// after some time slices of others on those that are not
-  explicit Patience(bool endless) : endless_(endless) {}
+  /// @param endless without it the wait ends after some tens of microseconds on a free processor,
+  ///   and after some time slices of other threads on a busy one
+  explicit Backoff(bool endless) : endless_(endless) {}
 
-  /// Waits a moment; false once it has ended.
+  /// Waits a moment. @return false when the limit is reached
   bool wait() {
     if (waits_ < kSpins) {
       __builtin_ia32_pause();
@@ -51,7 +57,7 @@ class Patience {
     ++waits_;
     return true;
   }
-  void renew() { waits_ = 0; }
+  void reset() { waits_ = 0; }
 
  private:
   static constexpr std::uint64_t kSpins = 1000, kYields = 50;
@@ -61,61 +67,61 @@ class Patience {
 
 }  // namespace
 
-/// Passes over the blocks, repeated until the residual is small. Tickets are numbered through all
-/// passes and iterations, and taken in order. A ticket is taken when it can be run at once: so
-/// those who wait hold up nobody, and may leave.
+/// Passes over the blocks, repeated until the residual is small. Work items are numbered through
+/// all passes and iterations and claimed in order. A thread claims an item only when the item can
+/// run immediately, so a waiting thread blocks no other one and may leave.
 struct RowSolver::Program {
   struct Pass {
     RowSweep sweep;
-    const Ticket* tickets;
-    std::uint64_t ticket_count;
+    const WorkItem* items;
+    std::uint64_t item_count;
   };
 
   RowArrays arrays;
   Pass passes[3];
   std::size_t pass_count = 0;
-  std::uint64_t iterations = 0;        ///< with the serial rows
-  std::uint64_t block_iterations = 0;  ///< with the blocks
+  std::uint64_t iterations = 0;        ///< iterations of the serial rows and of all
+  std::uint64_t block_iterations = 0;  ///< iterations that include the blocks
   SerialRows* serial = nullptr;
   Real threshold = -1;
-  std::atomic<Real>* residuals = nullptr;  ///< one an iteration
+  std::atomic<Real>* residuals = nullptr;  ///< one per iteration
   std::atomic<std::uint64_t> next{0}, done{0};
   std::atomic<bool> broken{false}, ended{false};
 
-  /// The serial rows are one ticket, the first.
-  std::uint64_t serial_tickets() const { return serial == nullptr ? 0 : 1; }
-  std::uint64_t tickets_an_iteration() const {
-    std::uint64_t count = serial_tickets();
-    for (std::size_t i = 0; i < pass_count; ++i) count += passes[i].ticket_count;
+  /// The serial rows are one work item, the first of an iteration.
+  std::uint64_t serial_items() const { return serial == nullptr ? 0 : 1; }
+  std::uint64_t items_per_iteration() const {
+    std::uint64_t count = serial_items();
+    for (std::size_t i = 0; i < pass_count; ++i) count += passes[i].item_count;
     return count;
   }
-  void add(RowSweep sweep, const Ticket* list, std::uint64_t count) {
+  void add(RowSweep sweep, const WorkItem* list, std::uint64_t count) {
     passes[pass_count++] = {sweep, list, count};
   }
 
-  /// Takes tickets until there are none; false if patience has ended before.
-  bool join(Patience patience) {
-    const std::uint64_t per_iteration = tickets_an_iteration();
+  /// Runs work items until none is left. @return false if the backoff reached its limit before
+  bool join(Backoff backoff) {
+    const std::uint64_t per_iteration = items_per_iteration();
     std::uint64_t number = next.load(std::memory_order_relaxed);
     for (;;) {
       const std::uint64_t iteration = per_iteration == 0 ? iterations : number / per_iteration;
       if (iteration >= iterations) return true;
       const std::uint64_t start = iteration * per_iteration;
-      const Work work = work_of(number - start, iteration);
-      if (done.load(std::memory_order_acquire) < start + work.after) {
+      const Task task = task_of(number - start, iteration);
+      if (done.load(std::memory_order_acquire) < start + task.after) {
         if (ended.load(std::memory_order_relaxed)) return true;
-        if (!patience.wait()) return false;
+        if (!backoff.wait()) return false;
         number = next.load(std::memory_order_relaxed);
         continue;
       }
       if (iteration > 0 && is_last(iteration - 1)) ended.store(true, std::memory_order_relaxed);
       if (ended.load(std::memory_order_relaxed)) return true;
       if (!next.compare_exchange_weak(number, number + 1, std::memory_order_relaxed)) continue;
-      patience.renew();
+      backoff.reset();
       RowResidual residual;
-      if (work.sweep != nullptr) {
-        work.sweep(arrays, work.first, work.last, &residual);
-      } else if (work.is_serial) {
+      if (task.sweep != nullptr) {
+        task.sweep(arrays, task.first, task.last, &residual);
+      } else if (task.is_serial) {
         serial->sweep(static_cast<int>(iteration), &residual);
       }
       if (residual.broken) broken.store(true, std::memory_order_relaxed);
@@ -125,27 +131,27 @@ struct RowSolver::Program {
     }
   }
   bool is_done() const {
-    return done.load(std::memory_order_acquire) >= iterations * tickets_an_iteration();
+    return done.load(std::memory_order_acquire) >= iterations * items_per_iteration();
   }
 
-  /// What a ticket asks for. It may begin when the `after` tickets of its iteration before it, and
-  /// all of earlier iterations, are done.
-  struct Work {
+  /// The task of a work item. It may begin when the first `after` items of its iteration, and all
+  /// items of earlier iterations, are done.
+  struct Task {
     RowSweep sweep = nullptr;
     bool is_serial = false;
     std::uint32_t first = 0, last = 0;
     std::uint64_t after = 0;
   };
-  Work work_of(std::uint64_t number, std::uint64_t iteration) const {
-    if (number < serial_tickets()) return {.is_serial = true};
-    std::uint64_t start = serial_tickets();
+  Task task_of(std::uint64_t number, std::uint64_t iteration) const {
+    if (number < serial_items()) return {.is_serial = true};
+    std::uint64_t start = serial_items();
     const Pass* pass = passes;
-    for (; number - start >= pass->ticket_count; ++pass) start += pass->ticket_count;
-    const Ticket& ticket = pass->tickets[number - start];
+    for (; number - start >= pass->item_count; ++pass) start += pass->item_count;
+    const WorkItem& item = pass->items[number - start];
     return {.sweep = iteration < block_iterations ? pass->sweep : nullptr,
-            .first = ticket.first,
-            .last = ticket.last,
-            .after = start + ticket.after};
+            .first = item.first,
+            .last = item.last,
+            .after = start + item.after};
   }
   bool is_last(std::uint64_t iteration) const {
     return iteration + 1 == iterations ||
@@ -171,88 +177,71 @@ void RowSolver::resize_bodies(std::size_t count) {
   bodies_.reserve(count * rows::kBodyFields, "bodies of a solver", body_count_ * rows::kBodyFields);
   velocities_.reserve(count * rows::kVelocityFields, "velocities of a solver",
                       body_count_ * rows::kVelocityFields);
-  pushes_.reserve(count * rows::kVelocityFields, "velocities of a solver",
-                  body_count_ * rows::kVelocityFields);
+  push_velocities_.reserve(count * rows::kVelocityFields, "velocities of a solver",
+                           body_count_ * rows::kVelocityFields);
   factors_.reserve(count * rows::kFactorFields, "factors of a solver",
                    body_count_ * rows::kFactorFields);
   body_count_ = count;
   std::fill_n(body(0), rows::kBodyFields, Real(0));
   std::fill_n(velocity(0), rows::kVelocityFields, Real(0));
-  std::fill_n(push(0), rows::kVelocityFields, Real(0));
+  std::fill_n(push_velocity(0), rows::kVelocityFields, Real(0));
   std::fill_n(factors(0), rows::kFactorFields, Real(0));
 }
 
-// A contact's level is one more than the highest of those before it that move one of its bodies.
-// Rows of a level are independent, and level by level is an order that keeps each body's.
 void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t directions) {
   directions_ = directions;
-  rolling_friction_choice_.count = rolling_friction_choice_.ticket_count = 0;
-  const auto slot = [](std::int32_t id) { return static_cast<std::size_t>(id); };
+  rolling_friction_blocks_.count = rolling_friction_blocks_.item_count = 0;
   const std::uint32_t lanes = kernels_.lanes;
-  contact_level_.reserve(pairs.size(), "contacts of a solver");
-  level_count_.reserve(pairs.size(), "contacts of a solver");
-  level_end_.reserve(pairs.size(), "contacts of a solver");
-  body_level_.reserve(body_count_, "bodies of a solver");
-  std::fill_n(body_level_.data(), body_count_, 0u);
-  levels_ = 0;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const auto [a, b] = pairs[i];
-    std::uint32_t level = 0;
-    if (a >= 0) level = body_level_[slot(a)];
-    if (b >= 0) level = std::max(level, body_level_[slot(b)]);
-    if (a >= 0) body_level_[slot(a)] = level + 1;
-    if (b >= 0) body_level_[slot(b)] = level + 1;
-    contact_level_[i] = level;
-    if (level == levels_) level_count_[levels_++] = 0;
-    ++level_count_[level];
-  }
+  coloring_.build(pairs, body_count_);
+  next_lane_.reserve(pairs.size(), "contacts of a solver");
+  color_end_.reserve(pairs.size(), "contacts of a solver");
   blocks_ = 0;
-  for (std::uint32_t level = 0; level < levels_; ++level) {
-    const std::uint32_t first = blocks_;
-    blocks_ += (level_count_[level] + lanes - 1) / lanes;
-    level_end_[level] = blocks_;
-    level_count_[level] = first * lanes;  // from here on: the level's next free lane
+  for (std::uint32_t color = 0; color < coloring_.colors(); ++color) {
+    next_lane_[color] = blocks_ * lanes;
+    blocks_ += (coloring_.contacts_of(color) + lanes - 1) / lanes;
+    color_end_[color] = blocks_;
   }
-  const std::size_t places = std::size_t{blocks_} * lanes;
-  order_.reserve(places, "contacts of a solver");
-  ids_.reserve(2 * places, "contacts of a solver");
-  contacts_.reserve(places * rows::kContactFields, "rows of a solver");
-  frictions_.reserve(places * directions * rows::kFrictionFields, "rows of a solver");
-  std::fill_n(order_.data(), places, kNoContact);
-  std::fill_n(ids_.data(), 2 * places, rows::kFixedBody);
+  const std::size_t slots = std::size_t{blocks_} * lanes;
+  order_.reserve(slots, "contacts of a solver");
+  ids_.reserve(2 * slots, "contacts of a solver");
+  contacts_.reserve(slots * rows::kContactFields, "rows of a solver");
+  frictions_.reserve(slots * directions * rows::kFrictionFields, "rows of a solver");
+  std::fill_n(order_.data(), slots, kNoContact);
+  std::fill_n(ids_.data(), 2 * slots, rows::kFixedBody);
+  const std::uint32_t* const colors = coloring_.colors_of_contacts();
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const std::uint32_t place = level_count_[contact_level_[i]]++;
-    order_[place] = static_cast<std::uint32_t>(i);
-    std::int32_t* ids = ids_.data() + std::size_t{place / lanes} * 2 * lanes + place % lanes;
+    const std::uint32_t slot = next_lane_[colors[i]]++;
+    order_[slot] = static_cast<std::uint32_t>(i);
+    std::int32_t* ids = ids_.data() + std::size_t{slot / lanes} * 2 * lanes + slot % lanes;
     ids[0] = pairs[i].a;
     ids[lanes] = pairs[i].b;
   }
-  make_tickets({level_end_.data(), levels_}, &tickets_, &ticket_count_);
+  make_work_items({color_end_.data(), coloring_.colors()}, &items_, &item_count_);
 }
 
-// Long levels are cut, so that threads share them; a run of short levels becomes one ticket,
-// because one thread alone is done with them sooner than several that wait for each other.
-void RowSolver::make_tickets(std::span<const std::uint32_t> level_ends, Buffer<Ticket>* tickets,
-                             std::uint32_t* count) {
-  const std::uint32_t total = level_ends.empty() ? 0 : level_ends.back();
-  tickets->reserve(total, "tickets of a solver");
+// Large colors are split, so that threads share them. A run of small colors becomes one work item,
+// because one thread completes them sooner than several threads that wait for each other.
+void RowSolver::make_work_items(std::span<const std::uint32_t> color_ends, Buffer<WorkItem>* items,
+                                std::uint32_t* count) {
+  const std::uint32_t total = color_ends.empty() ? 0 : color_ends.back();
+  items->reserve(total, "work items of a solver");
   *count = 0;
   const auto add = [&](std::uint32_t first, std::uint32_t last, std::uint32_t after) {
-    (*tickets)[(*count)++] = {first, last, after};
+    (*items)[(*count)++] = {first, last, after};
   };
-  std::uint32_t first = 0, begin = 0;  // of the run of short levels; of the level
+  std::uint32_t first = 0, begin = 0;  // of the run of small colors; of the color
   const auto flush = [&](std::uint32_t end) {
     if (first < end) add(first, end, *count);
   };
-  for (const std::uint32_t end : level_ends) {
-    if (end - begin > kTicketBlocks) {
+  for (const std::uint32_t end : color_ends) {
+    if (end - begin > kBlocksPerItem) {
       flush(begin);
       const std::uint32_t after = *count;
-      for (std::uint32_t i = begin; i < end; i += kTicketBlocks) {
-        add(i, std::min(end, i + kTicketBlocks), after);
+      for (std::uint32_t i = begin; i < end; i += kBlocksPerItem) {
+        add(i, std::min(end, i + kBlocksPerItem), after);
       }
       first = end;
-    } else if (end - first >= kTicketBlocks) {
+    } else if (end - first >= kBlocksPerItem) {
       flush(end);
       first = end;
     }
@@ -261,14 +250,15 @@ void RowSolver::make_tickets(std::span<const std::uint32_t> level_ends, Buffer<T
   flush(total);
 }
 
-/// Threads that find something to do at the same time: no more than a level has tickets on average.
+/// The number of threads that can work concurrently: at most the average number of work items that
+/// do not depend on each other.
 unsigned RowSolver::useful_threads() const {
   std::uint32_t stages = 0;
-  for (std::uint32_t i = 0; i < ticket_count_; ++i) {
-    if (i == 0 || tickets_[i].after != tickets_[i - 1].after) ++stages;
+  for (std::uint32_t i = 0; i < item_count_; ++i) {
+    if (i == 0 || items_[i].after != items_[i - 1].after) ++stages;
   }
-  const std::uint32_t at_once = ticket_count_ / std::max(stages, 1u);
-  return std::clamp(std::min(at_once, blocks_ / kBlocksPerThread), 1u, pool_.threads());
+  const std::uint32_t concurrent = item_count_ / std::max(stages, 1u);
+  return std::clamp(std::min(concurrent, blocks_ / kBlocksPerThread), 1u, pool_.threads());
 }
 
 unsigned RowSolver::set_up_contacts(const rows::RowSettings& settings, std::uint32_t block,
@@ -286,17 +276,18 @@ void RowSolver::set_up_frictions(const rows::RowSettings& settings, std::uint32_
 
 RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_factors) {
   const std::size_t factors = with_factors ? 1 : 0;
-  std::uint64_t pushing = 0;
-  if (settings.push) {
-    // Most contacts are not deep enough to be pushed apart: only blocks with one that is are swept.
-    choose(
+  std::uint64_t split_rows = 0;
+  if (settings.split_impulse) {
+    // Most contacts do not penetrate deeply enough for a split impulse: only blocks that contain
+    // such a contact are swept.
+    select(
         [&](std::uint32_t block) {
-          const Real* rhs = contact_rows(block) + std::size_t{rows::kRowPushRhs} * kernels_.lanes;
+          const Real* rhs = contact_rows(block) + std::size_t{rows::kRowSplitRhs} * kernels_.lanes;
           const auto here = std::count_if(rhs, rhs + kernels_.lanes, [](Real r) { return r != 0; });
-          pushing += static_cast<std::uint64_t>(here);
+          split_rows += static_cast<std::uint64_t>(here);
           return here > 0;
         },
-        &push_choice_);
+        &split_impulse_blocks_);
   }
   const auto iterations =
       static_cast<std::size_t>(std::max({settings.iterations, settings.serial_iterations, 0}));
@@ -309,64 +300,74 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
 
   RowArrays arrays{.ids = ids_.data(),
                    .velocities = velocities_.data(),
-                   .pushes = pushes_.data(),
+                   .push_velocities = push_velocities_.data(),
                    .factors = with_factors ? factors_.data() : nullptr,
                    .contacts = contacts_.data(),
                    .frictions = frictions_.data(),
                    .directions = directions_,
-                   .push_blocks = push_choice_.blocks.data(),
-                   .rolling_friction_blocks = rolling_friction_choice_.blocks.data(),
+                   .split_impulse_blocks = split_impulse_blocks_.blocks.data(),
+                   .rolling_friction_blocks = rolling_friction_blocks_.blocks.data(),
                    .rolling_frictions = rolling_frictions_.data()};
-  Program warm, push, main;
-  for (Program* program : {&warm, &push, &main}) {
+  Program warm, split, main;
+  for (Program* program : {&warm, &split, &main}) {
     program->arrays = arrays;
     program->iterations = program->block_iterations = block_iterations;
     program->threshold = settings.threshold;
   }
-  warm.add(kernels_.warm_starts[factors], tickets_.data(), ticket_count_);
+  warm.add(kernels_.warm_starts[factors], items_.data(), item_count_);
   warm.iterations = settings.warm_start ? 1 : 0;
   warm.residuals = residuals_.get() + 2 * iterations;
-  push.add(kernels_.pushes[factors], push_choice_.tickets.data(), push_choice_.ticket_count);
-  push.iterations = pushing > 0 ? block_iterations : 0;
-  push.residuals = residuals_.get() + iterations;
+  split.add(kernels_.split_impulses[factors], split_impulse_blocks_.items.data(),
+            split_impulse_blocks_.item_count);
+  split.iterations = split_rows > 0 ? block_iterations : 0;
+  split.residuals = residuals_.get() + iterations;
   main.residuals = residuals_.get();
   main.iterations = iterations;
   main.serial = settings.serial;
   if (settings.interleave) {
-    main.add(kernels_.both[factors], tickets_.data(), ticket_count_);
+    main.add(kernels_.both[factors], items_.data(), item_count_);
   } else {
-    main.add(kernels_.contacts[factors], tickets_.data(), ticket_count_);
-    main.add(kernels_.frictions[factors], tickets_.data(), ticket_count_);
+    main.add(kernels_.contacts[factors], items_.data(), item_count_);
+    main.add(kernels_.frictions[factors], items_.data(), item_count_);
   }
-  main.add(kernels_.rolling_frictions[factors], rolling_friction_choice_.tickets.data(),
-           rolling_friction_choice_.ticket_count);
-  // The first stays whatever happens, so that somebody ends the work. Others leave when they are
-  // kept waiting: then there are more threads than processors for them, and they are in the way.
+  main.add(kernels_.rolling_frictions[factors], rolling_friction_blocks_.items.data(),
+           rolling_friction_blocks_.item_count);
+  // The first participant always stays, so that the work is completed. The others leave when they
+  // wait for long: then there are more threads than free processors, and they only take time from
+  // the threads that work.
   const unsigned most = useful_threads();
-  ThreadChoice& choice = thread_choices_[std::bit_width(blocks_)];
+  TimeChooser& chooser = thread_choosers_[std::bit_width(blocks_)];
+  const auto predicted_us = [&](int sweeps) {
+    return kLowerBoundBlockUs * static_cast<double>(blocks_) * (sweeps + 1);
+  };
+  unsigned threads = 1;
+  if (most > 1) {
+    const double us = predicted_us(settings.iterations);
+    if (chooser.choose(blocks_, std::array{us, us}).alternative == kSeveralThreads) threads = most;
+  }
   const auto start = most > 1 ? Clock::now() : Clock::time_point{};
-  pool_.run(choice.several() ? most : 1, [&](std::size_t participant) {
-    Patience patience(participant == 0);
-    if (!warm.join(patience) || !push.join(patience)) return;
+  pool_.run(threads, [&](std::size_t participant) {
+    Backoff backoff(participant == 0);
+    if (!warm.join(backoff) || !split.join(backoff)) return;
     while (!warm.is_done()) {
-      if (!patience.wait()) return;
+      if (!backoff.wait()) return;
     }
-    main.join(patience);
+    main.join(backoff);
   });
 
   RowSweepReport report;
   report.iterations = main.iterations_done();
   if (most > 1) {
-    const std::chrono::duration<double> taken = Clock::now() - start;
-    choice.record(taken.count() / (static_cast<double>(blocks_) * (report.iterations + 1)));
+    const std::chrono::duration<double, std::micro> us = Clock::now() - start;
+    chooser.record(us.count(), predicted_us(report.iterations));
   }
   if (report.iterations > 0) {
     report.residual = residuals_[static_cast<std::size_t>(report.iterations) - 1];
   }
-  report.pushed = pushing * static_cast<std::uint64_t>(push.iterations_done());
+  report.split_impulses = split_rows * static_cast<std::uint64_t>(split.iterations_done());
   const std::size_t numbers = body_count_ * rows::kVelocityFields;
-  report.broken = main.broken || push.broken || !all_finite(velocities_.data(), numbers) ||
-                  !all_finite(pushes_.data(), numbers);
+  report.broken = main.broken || split.broken || !all_finite(velocities_.data(), numbers) ||
+                  !all_finite(push_velocities_.data(), numbers);
   return report;
 }
 

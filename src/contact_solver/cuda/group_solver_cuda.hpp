@@ -1,4 +1,4 @@
-/// The cuda row of the backend table: groups of contacts.
+/// Group solver on a GPU: the CUDA entry of group_solver.cpp.
 #pragma once
 
 #include "src/contact_solver/group_solver.hpp"

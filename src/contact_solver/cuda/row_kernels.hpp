@@ -1,8 +1,8 @@
-/// The launchers of the row solver, for host code. All enqueue on a stream, check the launch,
-/// allocate nothing and wait for nothing.
+/// Launch functions of the row solver, for host code. Each enqueues work on a stream and checks the
+/// launch; none allocates memory or synchronizes.
 #pragma once
 
-#include "src/contact_solver/row_walk.hpp"
+#include "src/contact_solver/dataflow_sweep.hpp"
 
 #include <cuda_runtime_api.h>
 
@@ -10,35 +10,37 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// What the kernels tell of a group. Zero bytes at the start; followed by two times as many
-/// `largest` as the group has iterations: those of the sweeps, then those of the push.
-struct RowFindings {
-  unsigned long long pushing;  ///< contacts to be pushed apart
-  std::uint32_t broken;        ///< 1: something is not a finite number
-  std::uint32_t stuck;         ///< 1: walkers waited for ever; the result is worth nothing
+/// Results of the kernels for a group. All bytes must be 0 at the start. `largest` follows in
+/// memory, with two entries per iteration: first all of the sweeps, then all of the split impulse.
+struct SweepResults {
+  unsigned long long split_impulses;  ///< number of contacts with a split impulse
+  std::uint32_t broken;               ///< 1: a value is infinite or NaN
+  std::uint32_t stuck;  ///< 1: the dependencies did not resolve; the result is invalid
   /// Bits of the largest squared residual of an iteration, as a double.
   JFPX_HD unsigned long long* largest() { return reinterpret_cast<unsigned long long*>(this + 1); }
   static constexpr std::size_t bytes(int iterations) {
-    return sizeof(RowFindings) + 2 * sizeof(double) * static_cast<std::size_t>(iterations);
+    return sizeof(SweepResults) + 2 * sizeof(double) * static_cast<std::size_t>(iterations);
   }
 };
 
 struct RowSweepArgs {
   rows::RowGroupArrays group;
-  rows::RowProgram main, push;
-  RowFindings* findings;
-  std::uint32_t iterations;  ///< the findings have room for
+  rows::RowProgram main, split_impulse;
+  SweepResults* results;
+  std::uint32_t iterations;  ///< capacity of `results`
 };
 
-/// Makes the rows, and puts every body's cells at rest.
+/// Writes the rows, and resets the cells of all bodies to rest.
 void launch_row_setup(const RowSweepArgs& args, cudaStream_t stream);
 
-/// Thread blocks of launch_row_sweeps() that `device`, the current one, holds at the same time.
-unsigned most_row_blocks(int device);
-/// All sweeps and pushes. `most_blocks` is the answer of most_row_blocks().
-void launch_row_sweeps(const RowSweepArgs& args, unsigned most_blocks, cudaStream_t stream);
+/// The number of thread blocks of launch_row_sweeps() that can be resident on `device`, which must
+/// be the current device.
+unsigned max_row_blocks(int device);
+/// Runs all sweeps, including those of the split impulse.
+/// @param max_blocks the result of max_row_blocks()
+void launch_row_sweeps(const RowSweepArgs& args, unsigned max_blocks, cudaStream_t stream);
 
-/// Fills outcomes and velocities.
+/// Writes outcomes and velocities.
 void launch_row_finish(const RowSweepArgs& args, cudaStream_t stream);
 
 }  // namespace cuda

@@ -1,4 +1,4 @@
-/// Fits a grid to spheres, wherever and however far apart they are.
+/// Fitting of a grid to spheres at any positions and distances.
 #include "src/sphere_collider/cpu/cell_grid.hpp"
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace cpu {
 
 namespace {
 
-/// The median of up to 64 targets: the middle of where most are, whatever a few outliers do.
+/// Returns the median of a sample of up to 64 targets, which is robust against outliers.
 Real typical_coordinate(const SphereSubset& targets, int axis) {
   std::array<Real, 64> sample{};
   const std::size_t count = std::min(sample.size(), targets.count);

@@ -1,4 +1,4 @@
-/// The sweep over classes of radii; see the header for the idea.
+/// The sweep over classes of radii; the header describes the algorithm.
 #include "src/sphere_collider/cpu/cell_sweep.hpp"
 
 #include <algorithm>
@@ -12,22 +12,23 @@ inline namespace JFPX_ABI {
 namespace cpu {
 namespace {
 
-/// Radii are binned by exponent and the two highest bits of the mantissa: four bins an octave.
+/// Radii are binned by the exponent and the two highest bits of the mantissa: four bins per octave.
 using RealBits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
 constexpr int kBinShift = std::numeric_limits<Real>::digits - 1 - 2;
 constexpr std::size_t kBins = std::size_t{1} << (sizeof(Real) * 8 - 1 - kBinShift);
 
-/// Bins that a class spans. Wide classes are sorted less often, but a wide class of small spheres
-/// with a large one among them has many in a cell: those are narrowed.
+/// Number of bins of a class. Wide classes need fewer sorts, but a wide class of small spheres with
+/// a large one among them has many spheres per cell. Such classes are narrowed.
 constexpr std::size_t kWidest = 16;
 constexpr std::size_t kNarrowest = 4;
-/// Other targets in a sphere's own cell, on average, from which on a class is narrowed.
-constexpr double kCrowded = 8;
-constexpr Real kOneBin = Real(1.5);  ///< largest/smallest radius up to which no bins are made
+/// A class is narrowed if the average number of other targets in the cell of a sphere exceeds this.
+constexpr double kDense = 8;
+constexpr Real kOneBin =
+    Real(1.5);  ///< no bins are made up to this ratio of largest to smallest radius
 
 constexpr Real kLargest = std::numeric_limits<Real>::max();
 
-/// Up to so many targets are tested against everyone, without cells.
+/// Up to this number of targets, all pairs are tested, without cells.
 constexpr std::size_t kFewTargets = 32;
 
 std::uint64_t to_unsigned(std::int64_t v) { return static_cast<std::uint64_t>(v); }
@@ -40,8 +41,8 @@ std::size_t queries_per_chunk(std::size_t queries) {
   return std::max<std::size_t>(2048, (queries + 1023) / 1024);
 }
 
-/// Rows around a query's own cell: all nine, or, where a pair must not be found from both sides,
-/// the own one and the four with higher numbers.
+/// Makes the rows around the cell of a query: all nine, or, if `self`, only its own row and the
+/// four rows with higher numbers, so that each pair is found once.
 int make_rows(const CellGrid& grid, bool self, std::array<CellRow, 9>* rows) {
   int count = 0;
   if (self) (*rows)[static_cast<std::size_t>(count++)] = {0, 0};
@@ -66,27 +67,27 @@ void CellSweep::find_pairs(std::span<const SphereInstance> spheres, const Kernel
   std::size_t begin = 0;
   for (std::size_t first = 0; first < bins_.size();) {
     const Real largest = bins_[first].largest;
-    const Real reach = enlarged_radius(largest);
+    const Real extended = extended_radius(largest);
     bool by_cell = false;
     std::size_t next = first;
     SphereSubset targets{};
     for (std::size_t width = kWidest;; width /= 2, next = first) {
       while (next < bins_.size() && bins_[next].bin + width > bins_[first].bin) ++next;
       targets = part(begin, bins_[next - 1].end);
-      // Where the sum of two radii can overflow, everything touches: the claim of CellAxis fails.
+      // If the sum of two radii can overflow, the claim of CellAxis does not hold.
       by_cell = targets.count > kFewTargets && largest < kLargest / 8;
-      if (by_cell) grid_.fit(targets, 2 * reach);
-      place(targets, by_cell, pool, &targets_);
-      if (!by_cell || width == kNarrowest || next == first + 1 || !is_crowded(targets_)) break;
+      if (by_cell) grid_.fit(targets, 2 * extended);
+      fill_table(targets, by_cell, pool, &targets_);
+      if (!by_cell || width == kNarrowest || next == first + 1 || !is_dense(targets_)) break;
     }
     search(kernels, targets_, by_cell, pool, pairs);
     begin += targets.count;
     if (next < bins_.size()) {
-      if (by_cell) {  // smaller spheres reach less far: sorted anew, fewer targets are near
-        grid_.fit(targets, reach + enlarged_radius(bins_[next].largest));
-        place(targets, by_cell, pool, &targets_);
+      if (by_cell) {  // smaller spheres allow smaller cells with fewer targets
+        grid_.fit(targets, extended + extended_radius(bins_[next].largest));
+        fill_table(targets, by_cell, pool, &targets_);
       }
-      place(part(begin, spheres.size()), by_cell, pool, &queries_);
+      fill_table(part(begin, spheres.size()), by_cell, pool, &queries_);
       search(kernels, queries_, by_cell, pool, pairs);
     }
     first = next;
@@ -125,20 +126,21 @@ void CellSweep::sort_by_radius(std::span<const SphereInstance> spheres) {
   }
 }
 
-bool CellSweep::is_crowded(const SphereTable& table) const {
+bool CellSweep::is_dense(const SphereTable& table) const {
   const std::int64_t* cell = table.columns().cell;
-  double others = 0;  // twice over: every sphere counts those before it in its cell
+  double others = 0;  // twice the pairs: each sphere counts the previous ones in its cell
   std::uint32_t cell_begin = 0;
   for (std::uint32_t i = 0; i < table.count(); ++i) {
     if (cell[i] != cell[cell_begin]) cell_begin = i;
     others += 2.0 * (i - cell_begin);
   }
-  return others > kCrowded * table.count();
+  return others > kDense * table.count();
 }
 
-/// Fills a table with a subset; in order of cells, without the spheres that no target is near.
-void CellSweep::place(const SphereSubset& subset, bool by_cell, ThreadPool& pool,
-                      SphereTable* table) {
+/// Fills a table with a subset. If `by_cell`, the table is sorted by cell and omits spheres that
+/// are not near any target.
+void CellSweep::fill_table(const SphereSubset& subset, bool by_cell, ThreadPool& pool,
+                           SphereTable* table) {
   if (!by_cell) {
     table->fill(
         pool, subset.spheres, subset.count, [&](std::size_t i) { return subset.id(i); },
@@ -148,13 +150,13 @@ void CellSweep::place(const SphereSubset& subset, bool by_cell, ThreadPool& pool
   const auto cell_bits = static_cast<unsigned>(std::bit_width(to_unsigned(grid_.cells())));
   const auto index_bits = static_cast<unsigned>(std::bit_width(subset.count));
   if (cell_bits + index_bits <= 64) {
-    place_by_cell(
+    fill_by_cell(
         subset, cell_bits, index_bits, pool, &items_, table,
         [&](std::uint64_t cell, std::uint32_t i) { return (cell << index_bits) | i; },
         [](std::uint64_t item) { return item; },
         [&](std::uint64_t item) { return item & ((std::uint64_t{1} << index_bits) - 1); });
   } else {
-    place_by_cell(
+    fill_by_cell(
         subset, cell_bits, 0, pool, &wide_items_, table,
         [](std::uint64_t cell, std::uint32_t i) {
           return WideItem{cell, i};
@@ -164,12 +166,12 @@ void CellSweep::place(const SphereSubset& subset, bool by_cell, ThreadPool& pool
   }
 }
 
-/// Items hold a cell, in bits [low_bit, low_bit + cell_bits) of key(item), and an index.
+/// Items consist of a cell, in bits [low_bit, low_bit + cell_bits) of key(item), and an index.
 template <class Item, class Pack, class Key, class Index>
-void CellSweep::place_by_cell(const SphereSubset& subset, unsigned cell_bits, unsigned low_bit,
-                              ThreadPool& pool, ItemBuffers<Item>* buffers, SphereTable* table,
-                              const Pack& pack, const Key& key, const Index& index) {
-  const std::uint64_t nowhere = to_unsigned(grid_.cells());  // behind all cells
+void CellSweep::fill_by_cell(const SphereSubset& subset, unsigned cell_bits, unsigned low_bit,
+                             ThreadPool& pool, ItemBuffers<Item>* buffers, SphereTable* table,
+                             const Pack& pack, const Key& key, const Index& index) {
+  const std::uint64_t nowhere = to_unsigned(grid_.cells());  // greater than all cells
   Item* items = buffers->items.reserve(subset.count, "cells of spheres");
   Item* spare = buffers->spare.reserve(subset.count, "cells of spheres");
   constexpr std::size_t kChunk = 8192;

@@ -1,4 +1,4 @@
-/// Pairs among very many spheres of any sizes: sorted cells, one grid for each class of radii.
+/// Pair search among many spheres of any sizes: sorted cells, with one grid per class of radii.
 #pragma once
 
 #include "src/base/radix_sort.hpp"
@@ -12,24 +12,25 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
-/// A hierarchical grid (Krijgsman et al. 2014, doi 10.1007/s40571-014-0020-9) whose cells are never
-/// stored. Spheres are put into classes of similar radii. For each class, from the largest radii to
-/// the smallest, the spheres of the class (targets) are sorted by cell; they are tested against
-/// each other and against all smaller spheres (queries), sorted by the same cells. A query's
-/// neighbours lie in nine rows of three consecutive cells, so in nine runs of the sorted targets,
-/// and each run's begin only moves forward as the queries go on: no table of cells, so nothing
-/// depends on how large or how empty the world is. Spheres of one class in one cell can't all be
-/// apart, so the work is O(N log N + contacts) for each class that is there.
+/// A hierarchical grid (Krijgsman et al. 2014, doi 10.1007/s40571-014-0020-9) without stored cells.
+/// Spheres are divided into classes of similar radii. For each class, from the largest radii to the
+/// smallest, the spheres of the class (targets) are sorted by cell and tested against each other
+/// and against all smaller spheres (queries), which are sorted by the same cells. The neighbours of
+/// a query lie in nine rows of three consecutive cells, and therefore in nine runs of the sorted
+/// targets. The begin of each run only moves forward as the queries advance. There is no table of
+/// cells, so time and memory do not depend on the extent of the world or on how much of it is
+/// empty. The number of disjoint spheres of one class in one cell is bounded, so the work is O(N
+/// log N + contacts) for each class that occurs.
 class CellSweep {
  public:
-  /// Adds every pair that touches to `pairs` in new chunks, and some that just do not.
+  /// Adds every pair that touches to `pairs` in new chunks, and some pairs that are slightly apart.
   void find_pairs(std::span<const SphereInstance> spheres, const Kernels& kernels, ThreadPool& pool,
                   PairChunks* pairs);
 
  private:
   struct RadiusBin {
     std::size_t bin;
-    std::size_t end;  ///< in order_; begins where the bin before ends
+    std::size_t end;  ///< in order_; begins at the end of the previous bin
     Real largest;
   };
   struct WideItem {
@@ -42,22 +43,22 @@ class CellSweep {
   };
 
   void sort_by_radius(std::span<const SphereInstance> spheres);
-  bool is_crowded(const SphereTable& table) const;
-  void place(const SphereSubset& subset, bool by_cell, ThreadPool& pool, SphereTable* table);
+  bool is_dense(const SphereTable& table) const;
+  void fill_table(const SphereSubset& subset, bool by_cell, ThreadPool& pool, SphereTable* table);
   template <class Item, class Pack, class Key, class Index>
-  void place_by_cell(const SphereSubset& subset, unsigned cell_bits, unsigned low_bit,
-                     ThreadPool& pool, ItemBuffers<Item>* buffers, SphereTable* table,
-                     const Pack& pack, const Key& key, const Index& index);
-  /// `queries` against targets_; among themselves if they are targets_.
+  void fill_by_cell(const SphereSubset& subset, unsigned cell_bits, unsigned low_bit,
+                    ThreadPool& pool, ItemBuffers<Item>* buffers, SphereTable* table,
+                    const Pack& pack, const Key& key, const Index& index);
+  /// Tests `queries` against targets_, or among themselves if they are targets_.
   void search(const Kernels& kernels, const SphereTable& queries, bool by_cell, ThreadPool& pool,
               PairChunks* pairs);
 
-  std::vector<RadiusBin> bins_;  ///< those that are not empty, from the largest radii down
+  std::vector<RadiusBin> bins_;  ///< the bins that are not empty, in descending order of radii
   Buffer<std::uint32_t> bin_ends_;
-  Buffer<std::uint32_t> order_;  ///< spheres by bin; unused if there is but one
+  Buffer<std::uint32_t> order_;  ///< spheres by bin; unused if there is only one bin
   CellGrid grid_;
   RadixSorter sorter_;
-  ItemBuffers<std::uint64_t> items_;  ///< cell and index in one word, where they fit
+  ItemBuffers<std::uint64_t> items_;  ///< cell and index in one word, if they fit
   ItemBuffers<WideItem> wide_items_;
   SphereTable targets_, queries_;
 };

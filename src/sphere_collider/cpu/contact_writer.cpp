@@ -1,6 +1,6 @@
-/// Count, scan, emit: every contact is written once, at its final place, whoever writes it. Pairs
-/// are first divided into buckets of neighbouring lower spheres, so that the rest of the sort stays
-/// in the cache of one core.
+/// Count, scan and emit: every contact is written once, at a position that does not depend on the
+/// thread. Pairs are first divided into buckets of neighbouring lower spheres, so that the rest of
+/// the sort stays in the cache of one core.
 #include "src/sphere_collider/cpu/contact_writer.hpp"
 
 #include "src/collide/sphere_pair.hpp"
@@ -17,7 +17,7 @@ namespace {
 std::uint32_t lower(std::uint64_t pair) { return static_cast<std::uint32_t>(pair >> 32); }
 std::uint32_t higher(std::uint64_t pair) { return static_cast<std::uint32_t>(pair); }
 
-/// The exact test; appends the contact if there is one.
+/// Applies the exact test; appends the contact if there is one.
 SphereContact* append_contact(std::span<const SphereInstance> spheres, std::uint32_t a,
                               std::uint32_t b, SphereContact* out) {
   const PairResult r = detail::test_sphere_pair(spheres[a], spheres[b]);
@@ -26,7 +26,7 @@ SphereContact* append_contact(std::span<const SphereInstance> spheres, std::uint
   return out + 1;
 }
 
-/// LSD radix sort by the higher sphere, for rows that are too long to be compared.
+/// LSD radix sort by the higher sphere, for rows that are too long for a comparison sort.
 void sort_long_row(std::uint64_t* row, std::uint64_t* spare, std::size_t count) {
   constexpr unsigned kBits = 11;
   std::uint64_t* const home = row;
@@ -44,8 +44,9 @@ void sort_long_row(std::uint64_t* row, std::uint64_t* spare, std::size_t count) 
   if (row != home) std::copy_n(row, count, home);
 }
 
-/// Sorts in registers, by exchange: the order of a row is random, so a comparison must not be a
-/// branch. (By value: what std::min refers to is overwritten by the first half of the exchange.)
+/// Sorts in registers by compare-exchange. The order of a row is random, so branches on comparisons
+/// would be unpredictable. (Copies the values, because the first assignment of the exchange would
+/// overwrite the object to which std::min refers.)
 template <std::size_t Count>
 void sort_short_row(std::uint64_t* row) {
   std::uint64_t v[Count];
@@ -63,7 +64,7 @@ void sort_short_row(std::uint64_t* row) {
   std::copy_n(v, Count, row);
 }
 
-/// A row's pairs have the same lower sphere.
+/// Sorts a row: pairs with the same lower sphere.
 void sort_row(std::uint64_t* row, std::uint64_t* spare, std::size_t count) {
   switch (count) {
     case 0:
@@ -109,7 +110,7 @@ ContactSpan ContactWriter::write_sorted(std::span<const SphereInstance> spheres,
 ContactSpan ContactWriter::write_unsorted(std::span<const SphereInstance> spheres,
                                           const PairChunks& pairs, ThreadPool& pool) {
   const auto bits = static_cast<unsigned>(std::bit_width(spheres.size()));
-  bucket_bits_ = bits > 18 ? bits - 8 : 10;  // at most 256 buckets, so many streams as a TLB bears
+  bucket_bits_ = bits > 18 ? bits - 8 : 10;  // at most 256 buckets: streams that fit in the TLB
   buckets_ = (spheres.size() >> bucket_bits_) + 1;
   row_end_.reserve(buckets_ << bucket_bits_, "rows of pairs");
   divide(pairs, pool);
@@ -160,7 +161,7 @@ void ContactWriter::make_rows(std::size_t bucket, std::size_t spheres) {
   for (std::uint64_t i = begin; i < end; ++i) {
     rows_[row_end_[lower(divided_[i])]++] = divided_[i];
   }
-  // The bucket's pairs are copied: their place serves as scratch.
+  // The pairs of the bucket have been copied, so their memory serves as scratch space.
   std::uint64_t row = begin;
   for (std::size_t a = first; a < last; ++a) {
     sort_row(rows_.data() + row, divided_.data() + begin, row_end_[a] - row);
@@ -170,7 +171,7 @@ void ContactWriter::make_rows(std::size_t bucket, std::size_t spheres) {
 
 std::uint64_t ContactWriter::write_rows(std::span<const SphereInstance> spheres,
                                         std::size_t bucket) {
-  constexpr std::uint64_t kAhead = 16;  // spheres come from anywhere: ask for them in time
+  constexpr std::uint64_t kAhead = 16;  // prefetch distance: accesses to spheres are random
   const std::uint64_t begin = sections_[bucket].begin;
   const std::uint64_t end = sections_[bucket + 1].begin;
   SphereContact* out = contacts_.data() + begin;
@@ -181,7 +182,7 @@ std::uint64_t ContactWriter::write_rows(std::span<const SphereInstance> spheres,
   return static_cast<std::uint64_t>(out - (contacts_.data() + begin));
 }
 
-/// The filter lets a few pairs through that just do not touch: their places are closed up.
+/// Removes the gaps that remain where candidates do not touch.
 ContactSpan ContactWriter::close_gaps(std::size_t sections) {
   SphereContact* out = contacts_.data();
   for (std::size_t i = 0; i < sections; ++i) {

@@ -1,4 +1,4 @@
-/// Turns pairs that may touch into contacts in canonical order.
+/// Conversion of candidate pairs into contacts in canonical order.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -10,17 +10,19 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
+/// Applies the exact test to candidate pairs and writes the contacts sorted by (a, b). Owns its
+/// buffers, which only grow.
 class ContactWriter {
  public:
-  /// Pairs that are in order already, chunk by chunk.
+  /// Requires pairs that are sorted across all chunks.
   ContactSpan write_sorted(std::span<const SphereInstance> spheres, const PairChunks& pairs,
                            ThreadPool& pool);
-  /// Pairs in any order.
+  /// Accepts pairs in any order.
   ContactSpan write_unsorted(std::span<const SphereInstance> spheres, const PairChunks& pairs,
                              ThreadPool& pool);
 
  private:
-  /// A run of candidates, and how many of them touch.
+  /// A run of candidates, and the number of them that touch.
   struct Section {
     std::uint64_t begin;
     std::uint64_t touching;
@@ -33,11 +35,11 @@ class ContactWriter {
 
   Buffer<SphereContact> contacts_;
   Buffer<Section> sections_;
-  unsigned bucket_bits_ = 0;  ///< a bucket has the pairs of 2^bucket_bits_ lower spheres
+  unsigned bucket_bits_ = 0;  ///< a bucket holds the pairs of 2^bucket_bits_ lower spheres
   std::size_t buckets_ = 0;
   Buffer<std::uint64_t> offsets_;  ///< per chunk and bucket
   Buffer<std::uint64_t> divided_;  ///< pairs by bucket
-  Buffer<std::uint64_t> rows_;     ///< pairs by lower sphere: its row
+  Buffer<std::uint64_t> rows_;     ///< pairs by lower sphere; the pairs of one are its row
   Buffer<std::uint64_t> row_end_;  ///< per sphere: end of its row
 };
 

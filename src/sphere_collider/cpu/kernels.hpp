@@ -1,10 +1,11 @@
-/// The vector kernels of the x86 sphere collider: one table of functions per instruction set.
+/// The vector kernels of the CPU sphere collider: one table of functions per instruction set.
 #pragma once
 
-// Only macros, types and declarations may be included here: the sources of the kernels are compiled
-// for processors that this one may not be. An inline function that such a source emits is a COMDAT
-// symbol; the linker keeps one copy for the whole program and may keep that one. Hence no standard
-// containers, no Vec3, and everything in the kernels' sources has internal linkage.
+// Only macros, types and declarations may be included here, because the sources of the kernels are
+// compiled for instruction sets that the processor may not support. An inline function that such a
+// source emits is a COMDAT symbol, of which the linker keeps one copy for the whole program,
+// possibly that one. Therefore the sources of the kernels use neither standard containers nor Vec3,
+// and all their definitions have internal linkage.
 #include <jfpx/config.hpp>
 
 #include <cstdint>
@@ -13,30 +14,30 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
-/// Widest vector, in elements. Columns are followed by so many elements that may be read.
+/// Widest vector, in elements. This many elements after the end of a column are readable.
 inline constexpr std::uint32_t kMaxLanes = 16;
 
-/// Spheres as a structure of arrays. `reach` is the radius, enlarged: see enlarged_radius().
+/// Spheres as a structure of arrays. `reach` is the extended radius, see extended_radius().
 struct SphereColumns {
   const Real* x;
   const Real* y;
   const Real* z;
   const Real* reach;
   const std::uint32_t* id;   ///< index in the caller's order
-  const std::int64_t* cell;  ///< ascending; kNoCell in the elements that follow the last
+  const std::int64_t* cell;  ///< ascending; kNoCell in the elements after the last
   std::uint32_t count;
 };
 inline constexpr std::int64_t kNoCell = INT64_MAX;
 
-/// Where kernels append pairs, as (lower index << 32) | higher index.
+/// Output of the kernels: pairs, as (lower index << 32) | higher index.
 struct PairSink {
   std::uint64_t* next;
   std::uint64_t* end;
-  void (*grow)(PairSink* sink);  ///< makes room for kMaxLanes more; may throw
+  void (*grow)(PairSink* sink);  ///< reserves kMaxLanes more elements; may throw
 };
 
-/// Queries [first, last) against targets; the same columns twice if `self`: then a sphere meets
-/// only those behind it.
+/// Tests queries [first, last) against targets. If `self`, both are the same columns and a sphere
+/// is tested only against later ones.
 struct PairSearch {
   SphereColumns queries;
   SphereColumns targets;
@@ -46,19 +47,20 @@ struct PairSearch {
   PairSink* sink;
 };
 
-/// Three consecutive cells of the targets for each query: those from `cell + offset` on. `cursor`
-/// is a target at or before the first of them; it moves on with the queries.
+/// Three consecutive cells of targets for each query, starting at `cell + offset`. `cursor` is a
+/// target at or before the first of them and advances with the queries.
 struct CellRow {
   std::int64_t offset;
   std::uint32_t cursor;
 };
 
-/// Both append every pair that touches (DESIGN: filter then exact), and a few that just do not.
+/// Conservative filters. Both functions append every pair that touches and a few pairs that are
+/// slightly apart; the exact test follows.
 struct Kernels {
-  /// Every query against every target.
+  /// Tests every query against every target.
   void (*search_all)(const PairSearch& search);
-  /// Every query against the targets in its rows. If `self`, rows[0] is its own row from its own
-  /// cell on.
+  /// Tests every query against the targets in its rows. If `self`, rows[0] is the row of the query
+  /// itself, starting at its own cell.
   void (*search_rows)(const PairSearch& search, CellRow* rows, int row_count);
 };
 

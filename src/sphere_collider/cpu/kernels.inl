@@ -1,12 +1,22 @@
-/// Bodies of the kernels, for any instruction set. Included, once each, by the kernels_*.cpp, which
-/// define `Simd`, and `RowSimd` for short runs of targets, in an anonymous namespace before. See
-/// kernels.hpp for what may be used here.
+/// Definitions of the kernels, as templates over a vector type. Each kernels_*.cpp includes this
+/// file, defines its vector type and instantiates the kernels for it. kernels.hpp states the
+/// restrictions that apply here.
+#include "src/sphere_collider/cpu/kernels.hpp"
+
+// A vector type S has the following members; masks have one bit per lane.
+//   kLanes                    number of lanes, at most kMaxLanes
+//   Vec                       vector of kLanes Reals, with the operators + - *
+//   load(p), set(v)           read kLanes Reals from p; set all lanes to v
+//   not_greater(a, b)         mask of the lanes for which a > b is false
+//   cells_below(cell, bound)  mask of the cells, out of kLanes, that are less than bound
+//   count(mask)               number of set bits
+//   append(out, id, others, mask)  see append_bits(); may write kLanes elements
 
 // The filter. Let u = epsilon/2, R = r_a + r_b (exact), t = 2^-63 (float) or 2^-511 (double), the
 // square root of the smallest normal number; reach >= r*(1 + 6u) + t. A pair is dropped iff D > W,
 //     D = fl(fl(dx*dx + dy*dy) + dz*dz),   W = fl(w*w),   w = fl(reach_a + reach_b),
-// where D is the very value whose root the exact test takes. Claim: the exact test then finds
-// len > s, so no contact is dropped. w > R*(1 + 6u)*(1 - u) and w*w >= (2t)^2 is normal, so
+// where D is the same value of which the exact test takes the root. Claim: the exact test then
+// finds len > s, so no contact is dropped. w > R*(1 + 6u)*(1 - u) and w*w >= (2t)^2 is normal, so
 //     D > W >= w*w*(1 - u) > R^2 * (1 + 8u)   and   len >= sqrt(D)*(1 - u) > R*(1 + 2u) > s,
 // since s = fl(R) <= R*(1 + u). If w*w overflows, W = inf drops nothing. If D overflows and W does
 // not, len = inf > w >= s. Centres and radii are finite: differences may be infinite, their squares
@@ -28,18 +38,18 @@ inline Query<S> load_query(const SphereColumns& q, std::uint32_t i) {
   return {S::set(q.x[i]), S::set(q.y[i]), S::set(q.z[i]), S::set(q.reach[i]), q.id[i]};
 }
 
-/// One bit per target from `at` on: set if the filter keeps it.
+/// Returns one bit per target, starting at `at`: set if the filter keeps the target.
 template <class S>
 inline std::uint32_t kept(const Query<S>& q, const SphereColumns& t, std::uint32_t at) {
-  const typename S::Vec dx = S::sub(q.x, S::load(t.x + at));
-  const typename S::Vec dy = S::sub(q.y, S::load(t.y + at));
-  const typename S::Vec dz = S::sub(q.z, S::load(t.z + at));
-  const typename S::Vec w = S::add(q.reach, S::load(t.reach + at));
-  const typename S::Vec square = S::add(S::add(S::mul(dx, dx), S::mul(dy, dy)), S::mul(dz, dz));
-  return S::not_greater(square, S::mul(w, w));
+  const typename S::Vec dx = q.x - S::load(t.x + at);
+  const typename S::Vec dy = q.y - S::load(t.y + at);
+  const typename S::Vec dz = q.z - S::load(t.z + at);
+  const typename S::Vec w = q.reach + S::load(t.reach + at);
+  const typename S::Vec square = dx * dx + dy * dy + dz * dz;
+  return S::not_greater(square, w * w);
 }
 
-/// Appends pairs. A copy of the sink's pointers, so that they stay in registers.
+/// Appends pairs. Copies the pointers of the sink, so that they stay in registers.
 class Appender {
  public:
   explicit Appender(PairSink* sink) : sink_(sink), next_(sink->next), end_(sink->end) {}
@@ -64,7 +74,8 @@ class Appender {
   std::uint64_t* end_;
 };
 
-/// What the instruction sets without a compress instruction use.
+/// Appends the pairs of `id` with those of `others` whose mask bit is set and returns the new end.
+/// For instruction sets without a compress instruction.
 [[maybe_unused]] inline std::uint64_t* append_bits(std::uint64_t* out, std::uint32_t id,
                                                    const std::uint32_t* others,
                                                    std::uint32_t mask) {
@@ -77,61 +88,65 @@ class Appender {
   return out;
 }
 
-void search_all(const PairSearch& s) {
-  constexpr std::uint32_t kLanes = Simd::kLanes;
-  Appender pairs(s.sink);
-  const SphereColumns queries = s.queries;  // copies: vector stores may alias anything else
-  const SphereColumns targets = s.targets;
-  const bool self = s.self;
-  const std::uint32_t last = s.last;
+template <class S>
+void search_all(const PairSearch& search) {
+  constexpr std::uint32_t kLanes = S::kLanes;
+  Appender pairs(search.sink);
+  const SphereColumns queries = search.queries;  // copies: vector stores may alias all other memory
+  const SphereColumns targets = search.targets;
+  const bool self = search.self;
+  const std::uint32_t last = search.last;
   const std::uint32_t count = targets.count;
-  for (std::uint32_t i = s.first; i < last; ++i) {
-    const Query<Simd> q = load_query<Simd>(queries, i);
+  for (std::uint32_t i = search.first; i < last; ++i) {
+    const Query<S> q = load_query<S>(queries, i);
     std::uint32_t at = self ? i + 1 : 0;
-    // Two vectors a turn halve the branches on what is mostly empty.
+    // Two vectors per iteration halve the number of branches on masks that are mostly zero.
     for (; at + 2 * kLanes <= count; at += 2 * kLanes) {
       const std::uint32_t first = kept(q, targets, at);
       const std::uint32_t second = kept(q, targets, at + kLanes);
       if ((first | second) == 0) continue;
-      pairs.append<Simd>(q.id, targets.id + at, first);
-      pairs.append<Simd>(q.id, targets.id + at + kLanes, second);
+      pairs.append<S>(q.id, targets.id + at, first);
+      pairs.append<S>(q.id, targets.id + at + kLanes, second);
     }
     for (; at < count; at += kLanes) {
       const std::uint32_t left = count - at;
       const std::uint32_t valid = left < kLanes ? (1u << left) - 1 : ~0u;
       const std::uint32_t mask = kept(q, targets, at) & valid;
-      if (mask != 0) pairs.append<Simd>(q.id, targets.id + at, mask);
+      if (mask != 0) pairs.append<S>(q.id, targets.id + at, mask);
     }
   }
 }
 
-/// Targets of cells [low, high), from row.cursor on. Cells ascend, so both bounds cut a prefix off
-/// each vector: no table of cells, no unpredictable branch.
-inline void search_row(const Query<RowSimd>& q, const SphereColumns& t, std::int64_t low,
+/// Tests the targets in cells [low, high), starting at the cursor. Cells ascend, so each bound
+/// selects a prefix of each vector. This needs neither a table of cells nor an unpredictable
+/// branch.
+template <class S>
+inline void search_row(const Query<S>& q, const SphereColumns& t, std::int64_t low,
                        std::int64_t high, std::uint32_t* cursor, Appender* pairs) {
-  constexpr std::uint32_t kLanes = RowSimd::kLanes;
+  constexpr std::uint32_t kAll = (1u << S::kLanes) - 1;
   std::uint32_t passed = 0;
   std::uint32_t at = *cursor;
   for (;;) {
-    const std::uint32_t below = RowSimd::cells_below(t.cell + at, low);
-    const std::uint32_t inside = RowSimd::cells_below(t.cell + at, high);
-    passed += RowSimd::count(below);
-    pairs->append<RowSimd>(q.id, t.id + at, kept(q, t, at) & inside & ~below);
-    if (inside != RowSimd::kAll) [[likely]]
+    const std::uint32_t below = S::cells_below(t.cell + at, low);
+    const std::uint32_t inside = S::cells_below(t.cell + at, high);
+    passed += S::count(below);
+    pairs->append<S>(q.id, t.id + at, kept(q, t, at) & inside & ~below);
+    if (inside != kAll) [[likely]]
       break;
-    at += kLanes;
+    at += S::kLanes;
   }
   *cursor += passed;
 }
 
-void search_rows(const PairSearch& s, CellRow* rows, int row_count) {
-  Appender pairs(s.sink);
-  const SphereColumns queries = s.queries;  // copies: vector stores may alias anything else
-  const SphereColumns targets = s.targets;
-  const bool self = s.self;
-  const std::uint32_t last = s.last;
-  for (std::uint32_t i = s.first; i < last; ++i) {
-    const Query<RowSimd> q = load_query<RowSimd>(queries, i);
+template <class S>
+void search_rows(const PairSearch& search, CellRow* rows, int row_count) {
+  Appender pairs(search.sink);
+  const SphereColumns queries = search.queries;  // copies: vector stores may alias all other memory
+  const SphereColumns targets = search.targets;
+  const bool self = search.self;
+  const std::uint32_t last = search.last;
+  for (std::uint32_t i = search.first; i < last; ++i) {
+    const Query<S> q = load_query<S>(queries, i);
     const std::int64_t cell = queries.cell[i];
     int row = 0;
     if (self) {

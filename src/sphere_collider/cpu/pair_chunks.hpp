@@ -1,4 +1,4 @@
-/// Pairs that the kernels found, in the chunks of the search.
+/// Pairs found by the kernels, in one list per chunk of the search.
 #pragma once
 
 #include "src/base/buffer.hpp"
@@ -11,8 +11,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
-/// Each chunk has its own buffer, so that threads share nothing and nothing depends on who was
-/// first. Buffers are kept for the next search.
+/// Each chunk has its own buffer, so that threads share no data and the result does not depend on
+/// their timing. Buffers are kept for the next search.
 class PairChunks {
  public:
   void clear() noexcept { used_ = 0; }
@@ -35,7 +35,7 @@ class PairChunks {
     return first;
   }
 
-  /// Calls search(sink) and keeps what it appends to the sink as the pairs of that chunk.
+  /// Calls search(sink) and stores the pairs that it appends to the sink in the chunk.
   template <class Search>
   void fill(std::size_t chunk, const Search& search) {
     Filler filler(&chunks_[chunk]);
@@ -43,7 +43,7 @@ class PairChunks {
     filler.close();
   }
 
-  /// (lower index << 32) | higher index
+  /// Returns the pairs of a chunk as (lower index << 32) | higher index.
   std::span<const std::uint64_t> operator[](std::size_t chunk) const {
     return {chunks_[chunk].pairs.data(), chunks_[chunk].count};
   }

@@ -1,5 +1,5 @@
-/// Which pairs of a list of sphere pairs may touch: several at a time, with the vectors that every
-/// x86-64 processor has.
+/// Vector filter for lists of sphere pairs, with the SSE2 instructions that every x86-64 processor
+/// supports.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -15,17 +15,17 @@ namespace cpu {
 #if defined(JFPX_DOUBLE_PRECISION)
 using RealLanes = __m128d;
 inline RealLanes square_root(RealLanes x) { return _mm_sqrt_pd(x); }
-/// One bit a lane: set unless x is greater than y.
+/// Returns one bit per lane: set unless x > y.
 inline int not_greater(RealLanes x, RealLanes y) { return _mm_movemask_pd(_mm_cmpngt_pd(x, y)); }
 #else
 using RealLanes = __m128;
 inline RealLanes square_root(RealLanes x) { return _mm_sqrt_ps(x); }
-/// One bit a lane: set unless x is greater than y.
+/// Returns one bit per lane: set unless x > y.
 inline int not_greater(RealLanes x, RealLanes y) { return _mm_movemask_ps(_mm_cmpngt_ps(x, y)); }
 #endif
 inline constexpr std::size_t kPairLanes = sizeof(RealLanes) / sizeof(Real);
 
-/// The same sphere, first or second, of as many pairs.
+/// The first or the second spheres of kPairLanes pairs.
 struct SphereLanes {
   RealLanes x, y, z, radius;
 };
@@ -45,7 +45,7 @@ inline SphereLanes load_lanes(const SphereInstance* spheres, const SpherePair* p
 #endif
 }
 
-/// One bit a pair: set unless the distance of the centres is greater than the sum of the radii.
+/// Returns one bit per pair: set unless the distance of the centres exceeds the sum of the radii.
 inline unsigned touching_lanes(const SphereInstance* spheres, const SpherePair* pairs) {
   const SphereLanes a = load_lanes(spheres, pairs, &SpherePair::a);
   const SphereLanes b = load_lanes(spheres, pairs, &SpherePair::b);
@@ -55,14 +55,14 @@ inline unsigned touching_lanes(const SphereInstance* spheres, const SpherePair* 
 }
 static_assert(sizeof(SphereInstance) == 4 * sizeof(Real));
 
-/// Writes the positions in the list, ascending, of all pairs that touch, and of a few more at its
-/// end, to `found`, which has room for all. The filter compares the numbers that the exact test
-/// compares, each rounded alike. No branch depends on them: in lists in which touching and not
-/// touching are mixed nothing could predict it.
-/// @return their number
+/// Writes the ascending indices of all pairs that touch, and of a few more at the end of the list,
+/// to `found`, which must have room for `count` indices. The filter compares the same values as the
+/// exact test, with the same roundings. It does not branch on the result, which is unpredictable in
+/// lists that mix pairs that touch with pairs that do not.
+/// @return the number of indices
 inline std::size_t find_candidates(const SphereInstance* spheres, const SpherePair* pairs,
                                    std::size_t count, std::uint32_t* found) {
-  constexpr std::size_t kAhead = 16;  // spheres come from anywhere: ask for them in time
+  constexpr std::size_t kAhead = 16;  // prefetch distance: accesses to spheres are random
   std::size_t kept = 0, i = 0;
   for (; i + kPairLanes <= count; i += kPairLanes) {
     if (i + kAhead + kPairLanes <= count) {

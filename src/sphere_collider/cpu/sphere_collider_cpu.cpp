@@ -1,4 +1,4 @@
-/// Sphere contacts on x86: vector filter, then the exact test, in canonical order.
+/// Sphere contacts on the CPU: vector filter, then the exact test, in canonical order.
 #include "src/sphere_collider/cpu/sphere_collider_cpu.hpp"
 
 #include <jfpx/error.hpp>
@@ -31,19 +31,20 @@ const Kernels& kernels_for(SimdLevel usable) noexcept {
   }
 }
 
-/// Below so many spheres all pairs are faster than sorting, with vectors (bench/results).
+/// Below this number of spheres, testing all pairs with vectors is faster than sorting
+/// (bench/results).
 constexpr std::size_t kAllPairsBelow = 512;
 
 class SphereColliderCpu final : public SphereCollider {
  public:
   explicit SphereColliderCpu(const SphereColliderOptions& options)
-      : wanted_(options.algorithm),
+      : requested_(options.algorithm),
         kernels_(kernels_for(usable_simd_level(options.simd))),
         pool_(options.threads) {}
 
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
     detail::check_spheres(spheres);
-    used_ = wanted_;
+    used_ = requested_;
     if (used_ == SphereAlgorithm::automatic) {
       used_ = spheres.size() < kAllPairsBelow ? SphereAlgorithm::all_pairs
                                               : SphereAlgorithm::sorted_tiles;
@@ -62,7 +63,7 @@ class SphereColliderCpu final : public SphereCollider {
     results_.reserve(pairs.size(), "pair results");
     pool_.run(chunks_of(pairs), [&](std::size_t chunk) {
       PairResult* out = results_.data() + chunk * kPairChunk;
-      constexpr std::size_t kAhead = 12;  // spheres come from anywhere: ask for them in time
+      constexpr std::size_t kAhead = 12;  // prefetch distance: accesses to spheres are random
       const std::span<const SpherePair> part = chunk_of(spheres, pairs, chunk);
       for (std::size_t i = 0; i < part.size(); ++i) {
         const SpherePair later = part[std::min(i + kAhead, part.size() - 1)];
@@ -78,7 +79,7 @@ class SphereColliderCpu final : public SphereCollider {
                                              std::span<const SpherePair> pairs) override {
     detail::check_count(pairs);
     touching_.reserve(pairs.size(), "touching pairs");
-    // One thread writes without gaps; several each into the place of their chunk.
+    // One thread writes without gaps. Several threads write at the offsets of their chunks.
     const bool gaps = pool_.threads() > 1;
     std::size_t total = 0;
     touching_counts_.resize(chunks_of(pairs));
@@ -115,7 +116,7 @@ class SphereColliderCpu final : public SphereCollider {
   static std::size_t chunks_of(std::span<const SpherePair> pairs) {
     return (pairs.size() + kPairChunk - 1) / kPairChunk;
   }
-  /// The pairs of a chunk, checked.
+  /// Returns the pairs of a chunk after checking their indices.
   static std::span<const SpherePair> chunk_of(std::span<const SphereInstance> spheres,
                                               std::span<const SpherePair> pairs,
                                               std::size_t chunk) {
@@ -130,7 +131,7 @@ class SphereColliderCpu final : public SphereCollider {
     table_.fill(
         pool_, spheres, spheres.size(), [](std::size_t i) { return static_cast<SphereIndex>(i); },
         [](std::size_t) { return std::int64_t{0}; });
-    constexpr std::size_t kRows = 64;  // short rows, long rows: many chunks even the work out
+    constexpr std::size_t kRows = 64;  // rows differ in length: many chunks balance the load
     const std::size_t chunks = (spheres.size() + kRows - 1) / kRows;
     pairs_.add(chunks);
     pool_.run(chunks, [&](std::size_t chunk) {
@@ -143,7 +144,7 @@ class SphereColliderCpu final : public SphereCollider {
     });
   }
 
-  SphereAlgorithm wanted_;
+  SphereAlgorithm requested_;
   SphereAlgorithm used_ = SphereAlgorithm::automatic;
   const Kernels& kernels_;
   ThreadPool pool_;

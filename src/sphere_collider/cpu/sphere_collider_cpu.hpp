@@ -1,4 +1,4 @@
-/// The x86 row of the backend table.
+/// The CPU row of the backend table.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>

@@ -1,4 +1,4 @@
-/// Spheres as columns for the kernels, in an order of our own.
+/// Spheres as columns for the kernels, in an order chosen by the caller.
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -15,16 +15,18 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
-/// A radius with the filter's slack (kernels.inl): >= r*(1 + 6u) + t with u = epsilon/2, t = the
-/// root of the smallest normal number; twice that much, to cover its own rounding.
-inline Real enlarged_radius(Real r) {
+/// Returns the extended radius of the filter (kernels.inl): at least r*(1 + 6u) + t with
+/// u = epsilon/2 and t = the root of the smallest normal number. Uses twice that slack, to cover
+/// its own rounding.
+inline Real extended_radius(Real r) {
   static const Real slack = 2 * std::sqrt(std::numeric_limits<Real>::min());
   return r * (1 + 6 * kEpsilon) + slack;
 }
 
+/// Owns the columns, which only grow.
 class SphereTable {
  public:
-  /// Column i is sphere id_of(i) in cell cell_of(i).
+  /// Element i becomes sphere id_of(i) in cell cell_of(i).
   template <class Id, class Cell>
   void fill(ThreadPool& pool, std::span<const SphereInstance> spheres, std::size_t count,
             const Id& id_of, const Cell& cell_of) {
@@ -58,7 +60,7 @@ class SphereTable {
     x_[i] = s.centre.x;
     y_[i] = s.centre.y;
     z_[i] = s.centre.z;
-    reach_[i] = enlarged_radius(s.radius);
+    reach_[i] = extended_radius(s.radius);
     id_[i] = id;
     cell_[i] = cell;
   }

@@ -1,8 +1,9 @@
-/// All pairs by tiles (thesis 4.5.2): the spheres of a tile's rows and columns in shared memory, on
-/// a lattice around them all. The outcome is a bit matrix, from which contacts come out in
-/// canonical order.
-#include "src/sphere_collider/cuda/lattice.cuh"
-#include "src/sphere_collider/cuda/tiles.cuh"
+/// Test of all pairs in tiles (thesis 4.5.2). The spheres of the rows and columns of a tile are in
+/// shared memory, quantized relative to their common bounds. The result is a bit matrix, from which
+/// contacts are written in canonical order.
+#include "src/sphere_collider/cuda/all_pairs.hpp"
+#include "src/sphere_collider/cuda/quantized_filter.cuh"
+#include "src/sphere_collider/cuda/search.cuh"
 
 #include <algorithm>
 
@@ -11,11 +12,12 @@ inline namespace JFPX_ABI {
 namespace cuda {
 namespace {
 
-constexpr unsigned kThreads = kTile;  // one a row
+constexpr unsigned kThreads = kTile;  // one per row
 constexpr unsigned kEmitThreads = 256;
 
-/// Row r of tiles has tiles - r tiles on and right of the diagonal. A band's first row of tiles is
-/// paired with its last, the second with the last but one, and so on: all pairs have `width` tiles.
+/// Tiles of a band. Row r of tiles has `tiles - r` tiles on and right of the diagonal. The first
+/// row of a band is paired with its last row, the second with the last but one, and so on, so that
+/// all pairs have `width` tiles.
 struct TileGrid {
   std::uint32_t tiles, first, rows;
   __host__ __device__ std::uint32_t width() const { return 2 * (tiles - first) - rows + 1; }
@@ -28,18 +30,18 @@ __host__ __device__ TileGrid tile_grid(const AllPairsArgs& args) {
 
 struct TileStorage {
   SphereInstance columns[kTile];
-  LatticeRecord row_records[kTile], column_records[kTile];
+  QuantizedRecord row_records[kTile], column_records[kTile];
   std::uint32_t words[kTile][kWordsPerTile + 1];
-  LatticeStorage lattice;
+  QuantizationStorage quantization;
 };
 
-/// Fills the words of the 32 rows of a warp: which columns of the tile they may touch.
+/// Fills the words of the 32 rows of a warp with the columns of the tile that may touch.
 __device__ void fill_words(TileStorage& s) {
   const unsigned first_row = threadIdx.x - lane_id();
-  const LatticeFragment rows = load_fragment(s.row_records + first_row);
+  const QuantizedFragment rows = load_fragment(s.row_records + first_row);
   for (unsigned w = 0; w < kWordsPerTile; ++w) {
-    const LatticeFragment columns = load_fragment(s.column_records + 32 * w);
-    put_bytes(lattice_bytes(rows, columns), &s.words[first_row][w], kWordsPerTile + 1);
+    const QuantizedFragment columns = load_fragment(s.column_records + 32 * w);
+    put_bytes(overlap_bytes(rows, columns), &s.words[first_row][w], kWordsPerTile + 1);
   }
   __syncwarp();
 }
@@ -52,7 +54,7 @@ __global__ void __launch_bounds__(kThreads) all_pairs(AllPairsArgs args) {
   std::uint32_t tile_column = tile_row + blockIdx.x;
   if (tile_column >= grid.tiles) {
     const std::uint32_t mirrored = grid.rows - 1 - blockIdx.y;
-    if (mirrored == blockIdx.y) return;  // the middle row of an odd band has no partner
+    if (mirrored == blockIdx.y) return;  // the middle row of an odd band is not paired
     tile_row = grid.first + mirrored;
     tile_column = tile_column - grid.tiles + tile_row;
   }
@@ -63,10 +65,10 @@ __global__ void __launch_bounds__(kThreads) all_pairs(AllPairsArgs args) {
   const SphereInstance column = load_sphere(args.spheres + min(first_b + threadIdx.x, last));
   if (tile_row == tile_column && a <= last && !is_valid(row)) report_invalid(args.state, a);
   s.columns[threadIdx.x] = column;
-  const Lattice lattice = lattice_of_block(row, column, s.lattice);
-  s.row_records[threadIdx.x] = record_of(row_terms(on_lattice(lattice, row)));
-  s.column_records[place_of_column(threadIdx.x)] =
-      record_of(column_terms(on_lattice(lattice, column)));
+  const Quantization quantization = quantization_of_block(row, column, s.quantization);
+  s.row_records[threadIdx.x] = record_of(row_terms(quantized(quantization, row)));
+  s.column_records[column_slot(threadIdx.x)] =
+      record_of(column_terms(quantized(quantization, column)));
   __syncthreads();
   fill_words(s);
 
@@ -80,7 +82,7 @@ __global__ void __launch_bounds__(kThreads) all_pairs(AllPairsArgs args) {
   if (args.count && count != 0 && a <= last) atomicAdd(&args.counts[a], count);
   __syncthreads();
 
-  // A row's words of this tile are one 32-byte sector of the matrix.
+  // The words of a row in this tile are one 32-byte sector of the matrix.
   const std::uint32_t stride = mask_stride(args.n);
   for (unsigned i = threadIdx.x; i < kTile * kWordsPerTile; i += kThreads) {
     const unsigned local = i / kWordsPerTile, w = i % kWordsPerTile;
@@ -89,7 +91,7 @@ __global__ void __launch_bounds__(kThreads) all_pairs(AllPairsArgs args) {
   }
 }
 
-/// A warp a row.
+/// Each warp writes the contacts of one row.
 __global__ void __launch_bounds__(kEmitThreads) mask_emit(MaskEmitArgs args) {
   wait_for_previous_kernel();
   const std::uint32_t row = (blockIdx.x * kEmitThreads + threadIdx.x) / 32;
@@ -122,7 +124,7 @@ void launch_all_pairs(const AllPairsArgs& args, cudaStream_t stream) {
 
 void launch_mask_emit(const MaskEmitArgs& args, cudaStream_t stream) {
   constexpr unsigned kRowsPerBlock = kEmitThreads / 32;
-  // Of no rows there is still the count to write.
+  // At least one block, because it also writes the count.
   const unsigned blocks = args.rows / kRowsPerBlock + (args.rows % kRowsPerBlock != 0 ? 1 : 0);
   launch(mask_emit, std::max(blocks, 1u), 1, kEmitThreads, stream, args);
 }

@@ -1,10 +1,14 @@
-/// Chooses the kernels of a search and owns their memory.
+/// Selects the kernels of a search on the device and owns their memory.
 #include <jfpx/cuda/sphere_collider.hpp>
 #include <jfpx/error.hpp>
 
 #include "src/base/cuda/device_buffer.hpp"
 #include "src/base/cuda/probe.hpp"
-#include "src/sphere_collider/cuda/kernels.hpp"
+#include "src/sphere_collider/cuda/all_pairs.hpp"
+#include "src/sphere_collider/cuda/fused_search.hpp"
+#include "src/sphere_collider/cuda/grid.hpp"
+#include "src/sphere_collider/cuda/pair_list.hpp"
+#include "src/sphere_collider/cuda/scan.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -17,19 +21,20 @@ inline namespace JFPX_ABI {
 namespace cuda {
 namespace {
 
-/// Up to here all pairs beat the grid (measured on an H200: bench/results).
+/// Largest number of spheres for which the test of all pairs is faster than the grid (measured on
+/// an H200: bench/results).
 constexpr std::size_t kMaxForAllPairs = 4500;
-/// Most memory for the bit matrix of all pairs; larger searches are done in bands of rows, twice.
+/// Limit of the bit matrix of all pairs. Larger searches process bands of rows, in two passes.
 constexpr std::size_t kMaskBytes = std::size_t{256} << 20;
 
-/// The grid counts twice as many in 32 bits.
+/// Limit of the grid, which computes with twice the number of spheres in 32 bits.
 constexpr std::size_t kMaxSpheres = std::size_t{1} << 31;
 
 constexpr std::size_t kMaskWords = kMaskBytes / sizeof(std::uint32_t);
 constexpr std::size_t kStateWords = sizeof(SearchState) / sizeof(std::uint32_t);
 static_assert(sizeof(SearchState) % 16 == 0);
 
-/// Words for the bit matrix of a search among up to `n` spheres: all of it or a band of it.
+/// Number of words of the bit matrix, or of a band of it, for up to `n` spheres.
 std::size_t mask_words(std::size_t n) {
   const std::size_t stride = mask_stride(static_cast<std::uint32_t>(n));
   const std::size_t all = (n + kTile - 1) / kTile * kTile * stride;
@@ -41,7 +46,7 @@ std::uint32_t table_size_for(std::size_t n) {
       std::min(std::bit_ceil(std::max<std::size_t>(2 * n, 1024)), std::size_t{1} << 31));
 }
 
-/// Kernels copy 8 bytes at a time.
+/// Kernels copy 8 bytes at a time, so the address must be a multiple of 8.
 void require_words(const void* output, const char* name) {
   if (std::bit_cast<std::uintptr_t>(output) % 8 == 0) return;
   throw InvalidArgument(std::string("the address of the ") + name + " is not a multiple of 8");
@@ -63,7 +68,7 @@ struct DeviceSphereCollider::Impl {
         pool(device) {
     const DeviceGuard guard(device);
     has_fused = fused_search_supported();
-    grid_blocks = most_grid_blocks(device);
+    limits = grid_limits(device);
     reserve(0, 0);
   }
 
@@ -82,7 +87,7 @@ struct DeviceSphereCollider::Impl {
   std::uint32_t* counts() const { return counters.data() + kStateWords; }
   void scan_counts(std::uint32_t n) {
     exclusive_scan(counts(), offsets.data(), std::size_t{n} + 1, scan_scratch.data(),
-                   scan_scratch.size(), stream);
+                   scan_scratch.capacity(), stream);
   }
 
   int device;
@@ -90,26 +95,26 @@ struct DeviceSphereCollider::Impl {
   SphereAlgorithm algorithm;
   MemoryPool pool;
   bool has_fused = false;
-  unsigned grid_blocks = 0;
+  GridLimits limits{};
   std::size_t spheres_reserved = 0, contacts_asked = 0, contacts_reserved = 0;
 
-  DeviceBuffer<std::uint32_t> counters;  // SearchState, then contacts of each sphere
+  DeviceBuffer<std::uint32_t> counters;  // SearchState, then the number of contacts of each sphere
   DeviceBuffer<unsigned long long> offsets;
   DeviceBuffer<unsigned char> scan_scratch;
   DeviceBuffer<std::uint32_t> masks;
 
   DeviceBuffer<std::uint32_t> table;
   DeviceBuffer<unsigned long long> block_sums;
-  DeviceBuffer<std::uint32_t> places, ranks;
+  DeviceBuffer<std::uint32_t> positions, ranks;
   DeviceBuffer<unsigned char> plan;
   DeviceBuffer<SphereInstance> sorted;
   DeviceBuffer<std::uint32_t> ids;
-  DeviceBuffer<TurningStates> states;
+  DeviceBuffer<AlternatingStates> states;
   DeviceBuffer<CoarseBuckets> coarse;
   DeviceBuffer<unsigned char> scratch;
 
   DeviceBuffer<OverflowPair> overflow;
-  DeviceBuffer<std::uint32_t> crowded, giants, crowded_b;
+  DeviceBuffer<std::uint32_t> long_rows, very_long_rows, long_row_neighbors;
 };
 
 void DeviceSphereCollider::Impl::reserve(std::size_t n, std::size_t contacts) {
@@ -118,22 +123,22 @@ void DeviceSphereCollider::Impl::reserve(std::size_t n, std::size_t contacts) {
                           std::to_string(kMaxSpheres));
   }
   const DeviceGuard guard(device);
-  const std::size_t most = std::max(n, spheres_reserved);
-  // Few spheres need no memory for contacts, but more may be asked for later.
+  const std::size_t max_spheres = std::max(n, spheres_reserved);
+  // The search of few spheres needs no memory for contacts, but a later one may.
   contacts = std::max(contacts, contacts_asked);
-  if (uses_grid(most)) {
-    const std::size_t bytes = grid_scratch_bytes(most, contacts);
-    scratch.grow(pool, stream, bytes, "scratch memory");
+  if (uses_grid(max_spheres)) {
+    const std::size_t bytes = grid_scratch_bytes(max_spheres, contacts);
+    scratch.reserve(pool, stream, bytes, "scratch memory");
   }
-  if (n > spheres_reserved || counters.size() == 0) {
+  if (n > spheres_reserved || counters.capacity() == 0) {
     reserve_spheres(n);
     spheres_reserved = n;
   }
   if (uses_grid(spheres_reserved) && contacts > contacts_reserved) {
-    overflow.grow(pool, stream, contacts, "pairs of crowded spheres");
-    crowded.grow(pool, stream, contacts / kSlots + 1, "crowded spheres");
-    giants.grow(pool, stream, contacts / kLongList + 1, "giant spheres");
-    crowded_b.grow(pool, stream, contacts, "partners of crowded spheres");
+    overflow.reserve(pool, stream, contacts, "pairs of long rows");
+    long_rows.reserve(pool, stream, contacts / kSlots + 1, "long rows");
+    very_long_rows.reserve(pool, stream, contacts / kMaxLongRow + 1, "very long rows");
+    long_row_neighbors.reserve(pool, stream, contacts, "neighbors of long rows");
     contacts_reserved = contacts;
   }
   contacts_asked = contacts;
@@ -141,25 +146,26 @@ void DeviceSphereCollider::Impl::reserve(std::size_t n, std::size_t contacts) {
 
 void DeviceSphereCollider::Impl::reserve_spheres(std::size_t n) {
   const std::size_t table_size = uses_grid(n) ? table_size_for(n) : 0;
-  counters.grow(pool, stream, kStateWords + n + 4, "contact counts");
-  offsets.grow(pool, stream, n + 1, "contact offsets");
+  counters.reserve(pool, stream, kStateWords + n + 4, "contact counts");
+  offsets.reserve(pool, stream, n + 1, "contact offsets");
   if (algorithm != SphereAlgorithm::sorted_tiles) {
     const bool all = algorithm == SphereAlgorithm::all_pairs;
-    const std::size_t most = all ? n : std::min(n, kMaxForAllPairs);
-    masks.grow(pool, stream, mask_words(most), "pair masks");
-    scan_scratch.grow(pool, stream, scan_scratch_bytes(most + 1), "scan scratch");
+    const std::size_t max_spheres = all ? n : std::min(n, kMaxForAllPairs);
+    masks.reserve(pool, stream, mask_words(max_spheres), "pair masks");
+    scan_scratch.reserve(pool, stream, scan_scratch_bytes(max_spheres + 1), "scan scratch");
   }
   if (uses_grid(n)) {
-    table.grow(pool, stream, table_size + 4, "cell table");
-    block_sums.grow(pool, stream, kMaxGridBlocks + grid_sums(n) + n / kBin + 3, "sums of blocks");
-    plan.grow(pool, stream, grid_plan_bytes(), "the plan of the cells");
-    ranks.grow(pool, stream, n, "ranks in the cell table");
-    places.grow(pool, stream, n, "places in the cell table");
-    sorted.grow(pool, stream, n + kReadBeyond, "sorted spheres");
-    ids.grow(pool, stream, n, "sorted indices");
-    coarse.grow(pool, stream, 1, "coarse buckets");
-    states.grow(pool, stream, 1, "states of searches");
-    JFPX_CUDA_TRY(cudaMemsetAsync(states.data(), 0, sizeof(TurningStates), stream));
+    table.reserve(pool, stream, table_size + 4, "cell table");
+    block_sums.reserve(pool, stream, limits.max_blocks() + grid_sums(n, limits) + n / kBin + 3,
+                       "sums of blocks");
+    plan.reserve(pool, stream, grid_plan_bytes(), "plan of the cells");
+    ranks.reserve(pool, stream, n, "ranks in the cell table");
+    positions.reserve(pool, stream, n, "positions in the cell table");
+    sorted.reserve(pool, stream, n + kReadBeyond, "sorted spheres");
+    ids.reserve(pool, stream, n, "sorted indices");
+    coarse.reserve(pool, stream, 1, "coarse buckets");
+    states.reserve(pool, stream, 1, "states of searches");
+    JFPX_CUDA_TRY(cudaMemsetAsync(states.data(), 0, sizeof(AlternatingStates), stream));
   }
 }
 
@@ -187,8 +193,8 @@ void DeviceSphereCollider::Impl::find_among_all_pairs(const SphereInstance* d_sp
   JFPX_CUDA_TRY(
       cudaMemsetAsync(counters.data(), 0, (kStateWords + n + 1) * sizeof(std::uint32_t), stream));
   const std::size_t stride = std::max(mask_stride(n), 1u);
-  const auto band =
-      static_cast<std::uint32_t>(std::min<std::size_t>(masks.size() / stride / kTile * kTile, n));
+  const auto band = static_cast<std::uint32_t>(
+      std::min<std::size_t>(masks.capacity() / stride / kTile * kTile, n));
   AllPairsArgs search{d_spheres, n, 0, band, masks.data(), counts(), true, state()};
   MaskEmitArgs emit{d_spheres, n, 0, band, masks.data(), offsets.data(), state(), output};
   const auto for_each_band = [&](auto&& work) {
@@ -218,43 +224,41 @@ void DeviceSphereCollider::Impl::find_among_all_pairs(const SphereInstance* d_sp
 
 void DeviceSphereCollider::Impl::find_in_grid(const SphereInstance* d_spheres, std::uint32_t n,
                                               const SearchOutput& output) {
-  const std::uint32_t table_size = table_size_for(n);
-  GridArgs grid{.spheres = d_spheres,
-                .n = n,
-                .table_size = table_size,
-                .table = table.data(),
-                .places = places.data(),
-                .ranks = ranks.data(),
-                .sorted = sorted.data(),
-                .ids = ids.data(),
-                .table_sums = block_sums.data(),
-                .count_sums = block_sums.data() + kMaxGridBlocks,
-                .bin_sums = block_sums.data() + kMaxGridBlocks + grid_sums(n),
-                .counts = counts(),
-                .coarse = coarse.data(),
-                .overflow = overflow.data(),
-                .capacity = contacts_reserved,
-                .offsets = offsets.data(),
-                .crowded = crowded.data(),
-                .giants = giants.data(),
-                .crowded_b = crowded_b.data(),
-                .state = state(),
-                .states = states.data(),
-                .plan = reinterpret_cast<GridPlan*>(plan.data())};
-  use_grid_scratch(grid, scratch.data());
-  launch_grid_search(grid, output, grid_blocks, stream);
+  unsigned long long* const count_sums = block_sums.data() + limits.max_blocks();
+  const GridArgs grid{.input = {.spheres = d_spheres, .n = n},
+                      .table = {.size = table_size_for(n),
+                                .starts = table.data(),
+                                .positions = positions.data(),
+                                .ranks = ranks.data(),
+                                .sorted = sorted.data(),
+                                .ids = ids.data(),
+                                .sums = block_sums.data(),
+                                .coarse = coarse.data()},
+                      .rows = {.counts = counts(),
+                               .sums = count_sums,
+                               .bin_sums = count_sums + grid_sums(n, limits),
+                               .offsets = offsets.data(),
+                               .capacity = contacts_reserved,
+                               .overflow = overflow.data(),
+                               .long_rows = long_rows.data(),
+                               .very_long_rows = very_long_rows.data(),
+                               .long_row_neighbors = long_row_neighbors.data()},
+                      .scratch = grid_scratch(n, scratch.data()),
+                      .state = state(),
+                      .states = states.data(),
+                      .plan = reinterpret_cast<GridPlan*>(plan.data())};
+  launch_grid_search(grid, output, limits, stream);
 }
 
-DeviceSphereCollider::DeviceSphereCollider(Stream stream, int device, SphereAlgorithm algorithm,
-                                           Build headers)
-    : impl_((verify_build(headers), std::make_unique<Impl>(stream, device, algorithm))) {}
+DeviceSphereCollider::DeviceSphereCollider(Stream stream, int device, SphereAlgorithm algorithm)
+    : impl_(std::make_unique<Impl>(stream, device, algorithm)) {}
 DeviceSphereCollider::~DeviceSphereCollider() {
   if (impl_ == nullptr) return;
   try {
-    const DeviceGuard guard(impl_->device);  // whose default stream the memory may be freed on
+    const DeviceGuard guard(impl_->device);  // the memory may be freed on its default stream
     impl_.reset();
   } catch (const DeviceError&) {
-    impl_.reset();  // of a device that is lost
+    impl_.reset();  // the device is lost
   }
 }
 DeviceSphereCollider::DeviceSphereCollider(DeviceSphereCollider&&) noexcept = default;

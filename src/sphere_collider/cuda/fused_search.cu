@@ -1,7 +1,10 @@
-/// Small N: the whole search in one launch, by one cluster of thread blocks.
+/// Search among few spheres in one launch of one thread block cluster.
 #include "src/base/cuda/cuda_try.hpp"
-#include "src/sphere_collider/cuda/lattice.cuh"
-#include "src/sphere_collider/cuda/tiles.cuh"
+#include "src/sphere_collider/cuda/fused_search.hpp"
+#include "src/sphere_collider/cuda/quantized_filter.cuh"
+#include "src/sphere_collider/cuda/search.cuh"
+
+#include <cub/block/block_scan.cuh>
 
 #include <cooperative_groups.h>
 
@@ -12,27 +15,29 @@ namespace {
 
 namespace cg = cooperative_groups;
 
-constexpr unsigned kBlocks = 16;  // the largest cluster that Hopper can have
+constexpr unsigned kBlocks = 16;  // largest cluster that Hopper supports
 constexpr unsigned kThreads = 512;
 constexpr unsigned kWarps = kThreads / 32;
 constexpr unsigned kMaxTiles = kFusedSpheres / 32;  // of 32 rows each
 static_assert(kMaxTiles == 2 * kBlocks && kFusedSpheres == 2 * kThreads);
 [[maybe_unused]] constexpr unsigned kRowsOfWarp = 64 / kWarps;
 
-// [[maybe_unused]]: clusters exist from Hopper on, so the code for older devices has an empty
-// kernel.
+using RowSums = cub::BlockScan<std::uint32_t, kThreads, cub::BLOCK_SCAN_WARP_SCANS>;
+
+// [[maybe_unused]]: clusters require Hopper, so the kernel is empty in code for older devices.
 struct FusedStorage {
   SphereInstance spheres[kFusedSpheres];
-  LatticeRecord rows[kFusedSpheres], columns[kFusedSpheres];
-  LatticeStorage lattice;
+  QuantizedRecord rows[kFusedSpheres], columns[kFusedSpheres];
+  QuantizationStorage quantization;
   std::uint32_t words[64][kMaxTiles + 1];  // of the two rows of tiles of this block
   std::uint32_t counts[kFusedSpheres];     // contacts of each row, gathered from all blocks
   std::uint32_t offsets[kFusedSpheres];    // contacts before each row
-  std::uint32_t warp_sums[kWarps];
+  RowSums::TempStorage sums;
   std::uint32_t valid_before[kWarps];  // ~(lowest index of an invalid sphere), 0 if there is none
 };
 
-/// The two rows of tiles of a block: the first ones are long, the last ones short.
+/// The two rows of tiles that a block tests: one from the start, where rows are long, and one from
+/// the end, where they are short.
 struct TilesOfBlock {
   unsigned tiles, rows[2];
   __device__ TilesOfBlock(std::uint32_t n, unsigned block)
@@ -40,32 +45,19 @@ struct TilesOfBlock {
   __device__ unsigned of_row(unsigned k) const { return rows[k] < tiles ? tiles - rows[k] : 0; }
 };
 
-/// offsets becomes the exclusive scan of counts; returns the total. All threads of the block.
+/// Sets `offsets` to the exclusive scan of `counts`. Call from all threads of the block.
+/// @return the sum of all counts.
 [[maybe_unused]] __device__ std::uint32_t scan_rows(FusedStorage& s) {
   constexpr unsigned kPerThread = kFusedSpheres / kThreads;
-  std::uint32_t sum = 0;
-  for (unsigned k = 0; k < kPerThread; ++k) sum += s.counts[kPerThread * threadIdx.x + k];
-  std::uint32_t inclusive = sum;
-  for (unsigned d = 1; d < 32; d *= 2) {
-    const std::uint32_t below = __shfl_up_sync(kFullWarp, inclusive, d);
-    if (lane_id() >= d) inclusive += below;
-  }
-  if (lane_id() == 31) s.warp_sums[threadIdx.x / 32] = inclusive;
-  __syncthreads();
-  std::uint32_t before = inclusive - sum, total = 0;
-  for (unsigned w = 0; w < kThreads / 32; ++w) {
-    if (w < threadIdx.x / 32) before += s.warp_sums[w];
-    total += s.warp_sums[w];
-  }
-  for (unsigned k = 0; k < kPerThread; ++k) {
-    s.offsets[kPerThread * threadIdx.x + k] = before;
-    before += s.counts[kPerThread * threadIdx.x + k];
-  }
+  std::uint32_t values[kPerThread], total = 0;
+  for (unsigned k = 0; k < kPerThread; ++k) values[k] = s.counts[kPerThread * threadIdx.x + k];
+  RowSums(s.sums).ExclusiveSum(values, values, total);
+  for (unsigned k = 0; k < kPerThread; ++k) s.offsets[kPerThread * threadIdx.x + k] = values[k];
   __syncthreads();
   return total;
 }
 
-/// Loads all spheres, and brings them onto a lattice. All threads of the block.
+/// Loads and quantizes all spheres. Call from all threads of the block.
 [[maybe_unused]] __device__ void load_spheres(const FusedArgs& args, unsigned tiles,
                                               FusedStorage& s) {
   SphereInstance mine[2];
@@ -77,26 +69,26 @@ struct TilesOfBlock {
   }
   valid_before = warp_max(valid_before);
   if (lane_id() == 0) s.valid_before[threadIdx.x / 32] = valid_before;
-  const Lattice lattice = lattice_of_block(mine[0], mine[1], s.lattice);
+  const Quantization quantization = quantization_of_block(mine[0], mine[1], s.quantization);
   for (unsigned k = 0; k < 2; ++k) {
     const unsigned i = k * kThreads + threadIdx.x;
     s.counts[i] = 0;
     if (i >= 32 * tiles) continue;
     s.spheres[i] = mine[k];
-    const LatticeSphere on = on_lattice(lattice, mine[k]);
+    const QuantizedSphere on = quantized(quantization, mine[k]);
     s.rows[i] = record_of(row_terms(on));
-    s.columns[place_of_column(i)] = record_of(column_terms(on));
+    s.columns[column_slot(i)] = record_of(column_terms(on));
   }
 }
 
-/// Fills the words of the block's rows: which columns they may touch.
+/// Fills the words of the rows of this block with the columns that may touch.
 [[maybe_unused]] __device__ void fill_words(const TilesOfBlock& mine, FusedStorage& s) {
   const unsigned first = mine.of_row(0), all = first + mine.of_row(1);
   for (unsigned t = threadIdx.x / 32; t < all; t += kWarps) {
     const unsigned k = t < first ? 0 : 1, row = mine.rows[k];
     const unsigned column = row + (k == 0 ? t : t - first);
     put_bytes(
-        lattice_bytes(load_fragment(s.rows + 32 * row), load_fragment(s.columns + 32 * column)),
+        overlap_bytes(load_fragment(s.rows + 32 * row), load_fragment(s.columns + 32 * column)),
         &s.words[32 * k][column], kMaxTiles + 1);
   }
 }
@@ -116,11 +108,11 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
 
   const TilesOfBlock tiles(n, cluster.block_rank());
   load_spheres(args, tiles.tiles, s);
-  cluster.sync();  // nobody writes into a block that has not started
+  cluster.sync();  // remote shared memory may be written only after all blocks have started
   fill_words(tiles, s);
   __syncthreads();
 
-  // A warp has rows of both rows of tiles. Lane w keeps word w of a row.
+  // Each warp has rows of both rows of tiles. Lane w keeps word w of a row.
   const auto row = [&](unsigned k) {
     const unsigned local = k * kWarps + warp;
     return 32 * tiles.rows[local / 32] + local % 32;
@@ -134,8 +126,7 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
       words[k] = s.words[k * kWarps + warp][lane_id()] & pair_bits(a, 32 * lane_id(), n);
       words[k] = exactly_touching(words[k], s.spheres[a], s.spheres + 32 * lane_id());
     }
-    const unsigned count = warp_reduce(static_cast<unsigned>(__popc(words[k])),
-                                       [](unsigned p, unsigned q) { return p + q; });
+    const unsigned count = warp_sum(static_cast<unsigned>(__popc(words[k])));
     if (lane_id() < kBlocks) *cluster.map_shared_rank(&s.counts[a], lane_id()) = count;
   }
   cluster.sync();
@@ -157,7 +148,7 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
 #endif
 }
 
-/// Shared memory and cluster size beyond what every device grants.
+/// Allows shared memory and a cluster size above the portable limits.
 void allow_resources() {
   JFPX_CUDA_TRY(cudaFuncSetAttribute(fused_search, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                      static_cast<int>(sizeof(FusedStorage))));
@@ -189,9 +180,10 @@ bool fused_search_supported() {
   if (!has_hopper_code()) return false;
   allow_resources();
   const Launch launch;
-  int most_blocks = 0;
-  JFPX_CUDA_TRY(cudaOccupancyMaxPotentialClusterSize(&most_blocks, fused_search, &launch.config));
-  return most_blocks >= static_cast<int>(kBlocks);
+  int max_cluster_size = 0;
+  JFPX_CUDA_TRY(
+      cudaOccupancyMaxPotentialClusterSize(&max_cluster_size, fused_search, &launch.config));
+  return max_cluster_size >= static_cast<int>(kBlocks);
 }
 
 void launch_fused_search(const FusedArgs& args, cudaStream_t stream) {

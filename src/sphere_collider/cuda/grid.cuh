@@ -1,8 +1,12 @@
-/// What the phases of the large-N search share: where its cells are in the table.
+/// Device functions that the phases of the grid search share: the plan of the cell table, and
+/// block-wide sums.
 #pragma once
 
+#include "src/sphere_collider/cuda/grid.hpp"
 #include "src/sphere_collider/cuda/grid_cells.hpp"
-#include "src/sphere_collider/cuda/tiles.cuh"
+#include "src/sphere_collider/cuda/search.cuh"
+
+#include <cub/block/block_scan.cuh>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -11,7 +15,7 @@ namespace cuda {
 inline constexpr unsigned kGridThreads = 256;
 inline constexpr unsigned kGridWarps = kGridThreads / 32;
 
-// Positive floating-point numbers are ordered as their bits are.
+// The bits of positive floating-point numbers are ordered like the numbers.
 __device__ inline Real half_0_of(const SearchState* state) {
   return std::bit_cast<Real>(static_cast<RealBits>(state->largest_half));
 }
@@ -19,7 +23,7 @@ __device__ inline unsigned long long bits_of(Real x) {
   return static_cast<unsigned long long>(std::bit_cast<RealBits>(x));
 }
 
-/// A number from 1 on that grows with x; ordered(-x) falls with it.
+/// Monotone map of x to the integers from 1 on; ordered(-x) decreases with x.
 __device__ inline unsigned long long ordered(Real x) {
   constexpr unsigned kShift = sizeof(Real) == 4 ? 32 : 0;
   const unsigned long long bits = static_cast<unsigned long long>(std::bit_cast<RealBits>(x))
@@ -34,7 +38,7 @@ __device__ inline Real from_ordered(unsigned long long key) {
   return std::bit_cast<Real>(static_cast<RealBits>(bits >> kShift));
 }
 
-/// Spheres as other phases of the same launch wrote them: not through the read-only cache.
+/// Loads a sphere that another phase of the same launch wrote, not through the read-only cache.
 __device__ inline SphereInstance load_sorted(const SphereInstance* p) {
   SphereInstance s;
   if constexpr (sizeof(Real) == 4) {
@@ -49,23 +53,23 @@ __device__ inline SphereInstance load_sorted(const SphereInstance* p) {
   return s;
 }
 
-/// The box of cells of one level that spheres can be in, and its first bucket.
+/// Bounds of the cells of one level that can contain spheres, and their first bucket.
 struct LevelBox {
   std::int32_t x0, y0, z0;
   std::int32_t nx, ny, nz;
   std::uint32_t base;
 };
 
-/// Where the row (y, z) of the level begins, less the first x: cell x is x buckets on.
+/// First bucket of the row (y, z) of the level, minus the first x: cell x has bucket row + x.
 __device__ inline std::uint32_t row_of_box(const LevelBox& box, std::int32_t y, std::int32_t z) {
   const auto yz = static_cast<std::uint32_t>((z - box.z0) * box.ny + (y - box.y0));
   return box.base + yz * static_cast<std::uint32_t>(box.nx) - static_cast<std::uint32_t>(box.x0);
 }
 
-/// Where cells are in the table. If the cells of all levels, from the lowest to the highest
-/// coordinates there are, fit into the table, each has a bucket of its own ("dense"): rows follow
-/// rows, and what is near in y and z is not far in memory. Else rows start at hashed places, and a
-/// bucket can hold spheres of several cells.
+/// Layout of the cell table. If the cells of all levels between the lowest and the highest
+/// coordinates fit into the table, each cell has its own bucket ("dense"): rows follow rows, so
+/// that cells that are close in y and z are close in memory. Otherwise the first bucket of a row is
+/// hashed, and a bucket can hold spheres of several cells.
 struct GridPlan {
   GridScale scale;
   bool dense;
@@ -75,7 +79,7 @@ struct GridPlan {
   std::uint32_t coarse_shift;  ///< 2^coarse_shift consecutive buckets are a coarse bucket
   LevelBox boxes[kLastLevel + 1];
 
-  /// Cell x of the row has the bucket row + x, modulo `mask() + 1`.
+  /// Cell x of the row has bucket row + x, modulo `mask() + 1`.
   template <bool kDense>
   __device__ std::uint32_t row(std::int32_t y, std::int32_t z, int level) const {
     if constexpr (!kDense) return row_of(y, z, level);
@@ -105,9 +109,9 @@ struct GridPlan {
 
 inline constexpr std::uint32_t kSamples = 4096;
 
-/// Spheres smaller than a cell can share it with others at little cost, and each level that there
-/// is costs all finer spheres a look at it. So the last level is the first one on which a sphere
-/// shares its cell with no more than about two, by what a sample of all spheres says.
+/// The finest level in use: the first one on which a sphere shares its cell with about two others
+/// at most, estimated from a sample of all spheres. Spheres that are smaller than a cell can share
+/// it at little cost, whereas each level adds a search of that level to every finer sphere.
 __device__ inline int last_level(const SearchState& state, std::uint32_t n) {
   const auto smallest = static_cast<RealBits>(~state.smallest_half);
   const int finest = level_for(std::bit_cast<Real>(smallest), {half_0_of(&state)});
@@ -118,14 +122,14 @@ __device__ inline int last_level(const SearchState& state, std::uint32_t n) {
   return finest > 0 ? finest : 0;
 }
 
-/// The plan of a search, the same in every block. All threads of a block.
+/// Makes the plan of a search, which is equal in all blocks. Call from all threads of the block.
 __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
   __syncthreads();
   if (threadIdx.x < 32) {
     const SearchState& state = *args.state;
     const int level = static_cast<int>(lane_id());
-    GridScale scale{half_0_of(args.state), last_level(state, args.n)};
-    Real x_cells = 2;  // of a cell of the last level
+    GridScale scale{half_0_of(args.state), last_level(state, args.input.n)};
+    Real x_cells = 2;  // cells in x per cell width of the last level
     const Vec3 high{from_ordered(state.farthest[0]), from_ordered(state.farthest[2]),
                     from_ordered(state.farthest[4])};
     const Vec3 low{-from_ordered(state.farthest[1]), -from_ordered(state.farthest[3]),
@@ -151,34 +155,31 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
         const auto row = static_cast<unsigned long long>(nx);
         cells = rows < (1ull << 32) && row < (1ull << 31) ? min(rows * row, kTooMany) : kTooMany;
       }
-      cells_to_here = cells;
-      for (unsigned d = 1; d < 32; d *= 2) {
-        const unsigned long long below = __shfl_up_sync(kFullWarp, cells_to_here, d);
-        if (lane_id() >= d) cells_to_here += below;
-      }
+      cells_to_here = warp_inclusive_sum(cells);
       all_cells = __shfl_sync(kFullWarp, cells_to_here, 31);
-      if (all_cells <= args.table_size || x_cells == 1) break;
+      if (all_cells <= args.table.size || x_cells == 1) break;
       x_cells = 1;
       cells = 0;
     }
     box.base = static_cast<std::uint32_t>(cells_to_here - cells);
     plan.boxes[level] = box;
     if (level == 0) {
-      const bool dense = all_cells <= args.table_size && state.has_far == 0;
+      const bool dense = all_cells <= args.table.size && state.has_far == 0;
       if (!dense) scale.inverse_x = 0;
       plan.scale = scale;
       plan.dense = dense;
       plan.single = dense && scale.last_level == 0;
       plan.inverse_yz = inverse_width(half_cell_of(scale.half_0, 0));
-      plan.buckets = dense ? static_cast<std::uint32_t>(all_cells) : args.table_size;
+      plan.buckets = dense ? static_cast<std::uint32_t>(all_cells) : args.table.size;
       plan.coarse_shift = 0;
-      while ((plan.buckets - 1) >> plan.coarse_shift >= args.coarse_buckets) ++plan.coarse_shift;
+      while ((plan.buckets - 1) >> plan.coarse_shift >= args.table.coarse_buckets)
+        ++plan.coarse_shift;
     }
   }
   __syncthreads();
 }
 
-/// The plan that another kernel made. All threads of a block.
+/// Copies the plan that another kernel made. Call from all threads of the block.
 __device__ inline void copy_plan(const GridArgs& args, GridPlan& plan) {
   static_assert(sizeof(GridPlan) % sizeof(std::uint32_t) == 0);
   const auto* const from = reinterpret_cast<const std::uint32_t*>(args.plan);
@@ -189,7 +190,7 @@ __device__ inline void copy_plan(const GridArgs& args, GridPlan& plan) {
   __syncthreads();
 }
 
-/// The part of `count` items that this block takes: consecutive ones, from a multiple of `unit` on.
+/// Share of this block of `count` items: a range that starts at a multiple of `unit`.
 struct Span {
   std::uint64_t first, past;
 };
@@ -200,49 +201,35 @@ __device__ inline Span span_of_block(std::uint64_t count, unsigned unit) {
   return {first, past < count ? past : count};
 }
 
-/// Sum of `value` over the threads of the block before this one; `total` becomes that of all.
+/// Block-wide sums. Threads must synchronize before they reuse a TempStorage.
+using BlockSums = cub::BlockScan<unsigned long long, kGridThreads, cub::BLOCK_SCAN_WARP_SCANS>;
+
+/// Sum of `value` over the lower threads of the block; `total` becomes the sum over all threads.
 __device__ inline unsigned long long block_exclusive_sum(unsigned long long value,
-                                                         unsigned long long* warp_sums,
-                                                         unsigned long long& total,
-                                                         unsigned warps) {
-  unsigned long long inclusive = value;
-  for (unsigned d = 1; d < 32; d *= 2) {
-    const unsigned long long below = __shfl_up_sync(kFullWarp, inclusive, d);
-    if (lane_id() >= d) inclusive += below;
-  }
-  if (lane_id() == 31) warp_sums[threadIdx.x / 32] = inclusive;
-  __syncthreads();
-  unsigned long long before = inclusive - value;
-  total = 0;
-  for (unsigned w = 0; w < warps; ++w) {
-    if (w < threadIdx.x / 32) before += warp_sums[w];
-    total += warp_sums[w];
-  }
+                                                         BlockSums::TempStorage& storage,
+                                                         unsigned long long& total) {
+  unsigned long long before = 0;
+  BlockSums(storage).ExclusiveSum(value, before, total);
   return before;
 }
-template <unsigned kWarps = kGridWarps>
-__device__ inline unsigned long long block_exclusive_sum(unsigned long long value,
-                                                         unsigned long long* warp_sums,
-                                                         unsigned long long& total) {
-  return block_exclusive_sum(value, warp_sums, total, kWarps);
-}
 
-/// Sum over the block, for all its threads.
+/// Sum over the threads of the block, returned in every thread. (cub::BlockReduce returns it in one
+/// thread.)
 __device__ inline unsigned long long block_sum(unsigned long long value,
-                                               unsigned long long* warp_sums) {
+                                               BlockSums::TempStorage& storage) {
   __syncthreads();
   unsigned long long total = 0;
-  block_exclusive_sum(value, warp_sums, total);
+  block_exclusive_sum(value, storage, total);
   __syncthreads();
   return total;
 }
 
-/// Sum of what the blocks before this one left in `sums`.
+/// Sum of the entries of `sums` of all lower blocks. Call from all threads of the block.
 __device__ inline unsigned long long sum_of_blocks_before(const unsigned long long* sums,
-                                                          unsigned long long* warp_sums) {
+                                                          BlockSums::TempStorage& storage) {
   unsigned long long mine = 0;
   for (unsigned k = threadIdx.x; k < blockIdx.x; k += kGridThreads) mine += sums[k];
-  return block_sum(mine, warp_sums);
+  return block_sum(mine, storage);
 }
 
 }  // namespace cuda

@@ -1,4 +1,4 @@
-/// The cells of the large-N search: a hierarchy of infinite grids, hashed row by row.
+/// Cells of the grid search: a hierarchy of unbounded grids, hashed by row.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -12,53 +12,55 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Level l has cells half as wide as level l-1; those of level 0 are as wide as the largest sphere.
-/// Spheres more than 2^31 times smaller share the last level. Spheres so far from the origin that
-/// coordinates are too coarse for their level ("far") go to a wider one, which can be negative.
+/// Cells of level l are half as wide as those of level l - 1; cells of level 0 are as wide as the
+/// largest sphere. Spheres more than 2^31 times smaller share the last level. Spheres so far from
+/// the origin that coordinates are too coarse for their level ("far") are on a wider one, which can
+/// be negative.
 inline constexpr int kLastLevel = 31;
 
-/// Cells of one level between the origin and its farthest sphere, at most. Two bits fewer than Real
-/// is exact in: a cell is at least two roundings wide, and neighbours stay neighbours.
+/// Largest number of cells of one level between the origin and a sphere. It has two bits fewer than
+/// Real represents exactly: a cell is at least two rounding errors wide, so that neighboring cells
+/// are distinct.
 inline constexpr Real kMaxCells =
     std::numeric_limits<Real>::digits == 24 ? Real(1 << 22) : Real(1 << 29);
-/// Squares of lengths below this underflow, and no cell need be narrower: 2^-73, double 2^-536.
+/// Squares of shorter lengths underflow, and no narrower cell is needed: 2^-73, in double 2^-536.
 inline constexpr Real kShortest =
     std::numeric_limits<Real>::digits == 24 ? Real(0x1p-73) : Real(0x1p-536);
 
-/// Half the cell width that a radius asks for.
+/// Half the cell width that a radius requires.
 JFPX_HD inline Real half_cell_for_radius(Real radius) {
   return radius > kShortest ? radius : kShortest;
 }
-/// Half the cell width that the distance from the origin asks for.
-JFPX_HD inline Real half_cell_for_place(const Vec3& p) {
+/// Half the cell width that the distance from the origin requires.
+JFPX_HD inline Real half_cell_for_position(const Vec3& p) {
   const Real x = absolute(p.x), y = absolute(p.y), z = absolute(p.z);
   const Real xy = x > y ? x : y;
   return (xy > z ? xy : z) * (1 / (2 * kMaxCells));
 }
 
-/// The bits of a Real as an integer; adding to the exponent field multiplies by powers of two.
+/// The bits of a Real as an integer: adding to the exponent field multiplies by a power of two.
 using RealBits = std::conditional_t<sizeof(Real) == 4, std::int32_t, std::int64_t>;
 inline constexpr int kMantissaBits = std::numeric_limits<Real>::digits - 1;
 JFPX_HD inline int exponent_of(Real x) {
   return static_cast<int>(std::bit_cast<RealBits>(x) >> kMantissaBits);
 }
 
-/// Half the width of the cells of `level`, if level 0 has `half_0`: half_0 / 2^level, exactly. All
-/// levels in use are between kShortest and what Real can hold, so that no number here is subnormal.
+/// Half the cell width of `level`, where level 0 has `half_0`: exactly half_0 / 2^level. All levels
+/// in use are between kShortest and the largest Real, so that no value here is subnormal.
 JFPX_HD inline Real half_cell_of(Real half_0, int level) {
   return std::bit_cast<Real>(std::bit_cast<RealBits>(half_0) -
                              (static_cast<RealBits>(level) << kMantissaBits));
 }
 
-/// What the cells of all levels follow from.
+/// Parameters that determine the cells of all levels.
 struct GridScale {
-  Real half_0;                  ///< half cell width of level 0: what the largest radius asks for
-  int last_level = kLastLevel;  ///< finer levels would hold hardly a sphere a cell
-  Real inverse_x = 0;           ///< inverse width in x of the cells of all levels; 0: cubes
+  Real half_0;                  ///< half cell width of level 0, which the largest radius requires
+  int last_level = kLastLevel;  ///< finest level in use
+  Real inverse_x = 0;           ///< inverse cell width in x on all levels; 0: cells are cubes
 };
 
-/// The finest level with half cells no smaller than `half`: floor(log2(half_0 / half)), if there is
-/// such a level.
+/// The finest level whose half cell width is at least `half`: floor(log2(half_0 / half)), if that
+/// level exists.
 JFPX_HD inline int level_for(Real half, const GridScale& scale) {
   const int level = exponent_of(scale.half_0) - exponent_of(half);
   if (level > scale.last_level) return scale.last_level;
@@ -67,28 +69,28 @@ JFPX_HD inline int level_for(Real half, const GridScale& scale) {
 
 /// The level of a sphere.
 JFPX_HD inline int level_of(const SphereInstance& s, const GridScale& scale) {
-  const Real radius = half_cell_for_radius(s.radius), place = half_cell_for_place(s.centre);
-  return level_for(radius > place ? radius : place, scale);
+  const Real radius = half_cell_for_radius(s.radius), position = half_cell_for_position(s.centre);
+  return level_for(radius > position ? radius : position, scale);
 }
 JFPX_HD inline bool is_far(const SphereInstance& s) {
-  return half_cell_for_place(s.centre) > half_cell_for_radius(s.radius);
+  return half_cell_for_position(s.centre) > half_cell_for_radius(s.radius);
 }
 
-/// The widest level on which `s` can touch a far sphere: a far sphere on a level wider than that
-/// of `s` has its largest coordinate m beyond kMaxCells of its half cells, and touches `s` only if
-/// m differs by less than three of them. So half_cell_for_place differs by a factor less than
-/// 1 + 2^-20, and the level by less than two. (A level that is wider than that of `s` is not the
-/// last one: the far sphere's place alone decided about it.)
+/// The widest level on which `s` can touch a far sphere. A far sphere on a level wider than that of
+/// `s` has its largest coordinate m beyond kMaxCells of its half cells, and touches `s` only if m
+/// differs by less than three of them. Hence half_cell_for_position differs by a factor less than 1
+/// + 2^-20, and the level by less than two. (A level that is wider than that of `s` is not the last
+/// one: it depends on the distance of the far sphere from the origin alone.)
 JFPX_HD inline int widest_far_level(const SphereInstance& s, const GridScale& scale) {
-  const Real place = half_cell_for_place(s.centre);
-  return place > 0 ? level_for(place, {scale.half_0}) - 1 : kLastLevel;
+  const Real position = half_cell_for_position(s.centre);
+  return position > 0 ? level_for(position, {scale.half_0}) - 1 : kLastLevel;
 }
 
 /// Inverse cell width of a level.
 JFPX_HD inline Real inverse_width(Real half) { return Real(0.5) / half; }
 
-/// Ordinal of the cell that holds the coordinate. Rounded product, floor and saturation are all
-/// monotone: x <= y implies cell_of(x) <= cell_of(y), which is all that the search relies on.
+/// Index of the cell that contains the coordinate. The rounded product, floor and saturation are
+/// monotone: x <= y implies cell_of(x) <= cell_of(y). The search depends on no other property.
 JFPX_HD inline std::int32_t cell_of(Real x, Real inverse_cell_width) {
   constexpr Real kLimit = 1 << 30;
   Real cell = x * inverse_cell_width;
@@ -101,30 +103,30 @@ JFPX_HD inline std::int32_t cell_of(Real x, Real inverse_cell_width) {
 #endif
 }
 
-/// How far, along one axis, the centre of a sphere of a level with half cell width `half` can be
-/// from the centre of `s` if they touch.
+/// Search radius: upper bound, along one axis, of the distance between the centre of `s` and the
+/// centre of a touching sphere of a level with half cell width `half`.
 ///
 /// Proof, with u and t of sphere_filter.hpp. Such a sphere has a radius <= half, so that the sum of
 /// the radii, as computed, is s <= fl(r + half). Step 1 there gives dx^2 <= s^2 (1+8u) + 4t for
-/// touching spheres, hence |dx| <= s (1+4u) + 2 sqrt(t), and 2 sqrt(t) < kShortest. The reach is
-/// larger. A coordinate y <= x + reach, in real numbers, is also <= fl(x + reach), because y is a
-/// Real and rounding is monotone.
-JFPX_HD inline Real reach_of(Real radius, Real half) {
+/// touching spheres, hence |dx| <= s (1+4u) + 2 sqrt(t), and 2 sqrt(t) < kShortest. The search
+/// radius is larger. A coordinate y <= x + search_radius, in real numbers, is also <= fl(x +
+/// search_radius), because y is a Real and rounding is monotone.
+JFPX_HD inline Real search_radius_of(Real radius, Real half) {
   return (radius + half) * (1 + 8 * std::numeric_limits<Real>::epsilon()) + kShortest;
 }
 
-/// x moved by `reach` and kept finite.
-JFPX_HD inline Real moved(Real x, Real reach) {
+/// x + distance, clamped to finite values.
+JFPX_HD inline Real moved(Real x, Real distance) {
   constexpr Real kMax = std::numeric_limits<Real>::max();
-  const Real y = x + reach;
+  const Real y = x + distance;
   return y > kMax ? kMax : y < -kMax ? -kMax : y;
 }
 
-/// Key of the row (y, z) of a level: where in the hash table it starts. Cell x of the row is x
-/// buckets on, modulo the size of the table: neighbours in x are neighbours in memory.
+/// Key of the row (y, z) of a level: its first bucket in the hash table. Cell x of the row has
+/// bucket key + x, modulo the table size, so that neighbors in x are adjacent in memory.
 inline constexpr std::uint32_t kRowY = 0x9e3779b1u, kRowZ = 0x85ebca77u, kRowLevel = 0xc2b2ae3du;
 JFPX_HD inline std::uint32_t row_of(std::int32_t y, std::int32_t z, int level) {
-  // Finaliser of MurmurHash3 (Appleby), a bijection: every input bit reaches every output bit.
+  // Finalizer of MurmurHash3 (Appleby), a bijection: each input bit affects each output bit.
   std::uint32_t h = static_cast<std::uint32_t>(y) * kRowY + static_cast<std::uint32_t>(z) * kRowZ +
                     static_cast<std::uint32_t>(level) * kRowLevel;
   h = (h ^ (h >> 16)) * 0x85ebca6bu;
@@ -132,7 +134,7 @@ JFPX_HD inline std::uint32_t row_of(std::int32_t y, std::int32_t z, int level) {
   return h ^ (h >> 16);
 }
 
-/// Rows of one level whose y and z differ by no more than this have different keys.
+/// Rows of one level have different keys if their y and z differ by no more than this.
 inline constexpr int kRowsApart = 8;
 constexpr bool rows_have_different_keys() {
   for (int y = -kRowsApart; y <= kRowsApart; ++y) {
@@ -146,12 +148,12 @@ constexpr bool rows_have_different_keys() {
 }
 static_assert(rows_have_different_keys());
 
-/// Inverse width in x of the cells of a level, if it is `inverse` in y and z.
+/// Inverse cell width in x of a level whose inverse cell width in y and z is `inverse`.
 JFPX_HD inline Real inverse_x_of(Real inverse, const GridScale& scale) {
   return scale.inverse_x > 0 ? scale.inverse_x : inverse;
 }
 
-/// The cell of a sphere at its own level.
+/// The cell of a sphere on its own level.
 struct GridCell {
   std::int32_t x, y, z;
   int level;

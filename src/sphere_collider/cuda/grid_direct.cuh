@@ -1,5 +1,5 @@
-/// Some 10^4 to 10^5 spheres of one size or nearly so: each cell of one grid has room for a few
-/// spheres, so that nothing is sorted. Three barriers instead of eight.
+/// Grid search without sorting, for about 10^4 spheres of similar radius: each cell of a single
+/// grid has slots for a few spheres. It needs three grid barriers instead of eight.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid_build.cuh"
@@ -10,28 +10,28 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-inline constexpr unsigned kLanesOfSphere = 9;  // one for each row of cells around a sphere
+inline constexpr unsigned kLanesOfSphere = 9;  // one per row of cells around a sphere
 inline constexpr unsigned kSpheresOfWarp = 32 / kLanesOfSphere;
-inline constexpr std::uint32_t kLeastRoom = 6, kMaxRoom = 16;  // spheres of a cell
-inline constexpr std::uint32_t kDirectPairs = 1024;            // of the spheres of a block
+inline constexpr std::uint32_t kMinCellSlots = 6, kMaxCellSlots = 16;  // slots of a cell
+inline constexpr std::uint32_t kDirectPairs = 1024;                    // pairs of a block
 
-/// The cells from the lowest to the highest coordinates there are.
+/// Cells between the lowest and the highest coordinates.
 struct DirectPlan {
   Real half, inverse;
   std::int32_t x0, y0, z0;
   std::int32_t nx, ny, nz;
-  std::uint32_t room;  ///< spheres that a cell can hold; 0: these spheres need another way
+  std::uint32_t cell_slots;  ///< slots of a cell; 0: the direct search does not apply
 };
 
 struct DirectStorage {
   alignas(8) unsigned char staged[kGridWarps][32 * sizeof(SphereContact)];
-  unsigned long long warp_sums[kGridWarps];
+  BlockSums::TempStorage sums;
   std::uint32_t found;
-  std::uint32_t counts[kGridThreads], starts[kGridThreads];  // pairs of a sphere; pairs before it
-  std::uint32_t partners[kDirectPairs];                      // as found
-  std::uint32_t ranks[kDirectPairs];  // which of its sphere's pairs, and (low 8 bits) which sphere
-  std::uint32_t grouped[kDirectPairs];  // partners by sphere
-  std::uint32_t sorted[kDirectPairs];   // and in order
+  std::uint32_t counts[kGridThreads], starts[kGridThreads];  // row lengths and their exclusive sums
+  std::uint32_t neighbors[kDirectPairs];                     // in the order of discovery
+  std::uint32_t ranks[kDirectPairs];    // rank in the row, and (low 8 bits) the sphere
+  std::uint32_t grouped[kDirectPairs];  // neighbors by row
+  std::uint32_t sorted[kDirectPairs];   // neighbors by row, sorted
   std::uint8_t owners[kDirectPairs];
 };
 static_assert(kGridThreads <= 256);
@@ -39,8 +39,8 @@ static_assert(kGridThreads <= 256);
 __device__ inline DirectPlan make_direct_plan(const GridArgs& args) {
   const SearchState& state = *args.state;
   DirectPlan plan{};
-  if (args.slots == nullptr || args.n > gridDim.x * kGridThreads || state.has_far != 0 ||
-      last_level(state, args.n) != 0) {
+  if (args.scratch.slots == nullptr || args.input.n > gridDim.x * kGridThreads ||
+      state.has_far != 0 || last_level(state, args.input.n) != 0) {
     return plan;
   }
   plan.half = half_0_of(args.state);
@@ -54,48 +54,49 @@ __device__ inline DirectPlan make_direct_plan(const GridArgs& args) {
   plan.x0 = first(0), plan.y0 = first(1), plan.z0 = first(2);
   const std::int64_t nx = count(0, plan.x0), ny = count(1, plan.y0), nz = count(2, plan.z0);
   const double cells = static_cast<double>(nx) * static_cast<double>(ny) * static_cast<double>(nz);
-  const double room = static_cast<double>(args.n) * kDirectSlots / cells;
-  if (room < kLeastRoom) return plan;
+  const double cell_slots = static_cast<double>(args.input.n) * kDirectSlots / cells;
+  if (cell_slots < kMinCellSlots) return plan;
   plan.nx = static_cast<std::int32_t>(nx);
   plan.ny = static_cast<std::int32_t>(ny);
   plan.nz = static_cast<std::int32_t>(nz);
-  plan.room = room < kMaxRoom ? static_cast<std::uint32_t>(room) : kMaxRoom;
+  plan.cell_slots =
+      cell_slots < kMaxCellSlots ? static_cast<std::uint32_t>(cell_slots) : kMaxCellSlots;
   return plan;
 }
 
-/// Puts spheres into their cells.
+/// Inserts spheres into the slots of their cells.
 __device__ inline void insert(const GridArgs& args, const DirectPlan& plan) {
-  for (std::uint64_t i = grid_thread(); i < args.n; i += all_threads()) {
-    const SphereInstance sphere = load_sphere(args.spheres + i);
+  for (std::uint64_t i = grid_thread(); i < args.input.n; i += all_threads()) {
+    const SphereInstance sphere = load_sphere(args.input.spheres + i);
     const std::int32_t x = cell_of(sphere.centre.x, plan.inverse) - plan.x0;
     const std::int32_t y = cell_of(sphere.centre.y, plan.inverse) - plan.y0;
     const std::int32_t z = cell_of(sphere.centre.z, plan.inverse) - plan.z0;
     const auto cell = static_cast<std::uint32_t>((z * plan.ny + y) * plan.nx + x);
-    const std::uint32_t at = atomicAdd(&args.table[cell], 1u);
-    if (at < plan.room) {
-      const std::size_t slot = std::size_t{cell} * plan.room + at;
-      args.slots[slot] = sphere;
-      args.slot_ids[slot] = static_cast<std::uint32_t>(i);
+    const std::uint32_t at = atomicAdd(&args.table.starts[cell], 1u);
+    if (at < plan.cell_slots) {
+      const std::size_t slot = std::size_t{cell} * plan.cell_slots + at;
+      args.scratch.slots[slot] = sphere;
+      args.scratch.slot_ids[slot] = static_cast<std::uint32_t>(i);
     } else {
       args.state->cell_is_full = 1;
     }
   }
 }
 
-/// A lane looks through its share of the rows of cells around sphere `a`, number `local` of the
-/// block, for partners after it.
+/// A lane tests its share of the rows of cells around sphere `a`, which has index `local` in the
+/// block, for neighbors b > a.
 __device__ inline void search_directly(const GridArgs& args, const DirectPlan& plan,
                                        std::uint32_t a, unsigned local, unsigned lane,
                                        DirectStorage& s) {
   constexpr std::int32_t kCellsAtOnce = 3;
   constexpr unsigned kAtOnce = 4;
-  const SphereInstance self = load_sphere(args.spheres + a);
-  const Real reach = reach_of(self.radius, plan.half);
+  const SphereInstance self = load_sphere(args.input.spheres + a);
+  const Real search_radius = search_radius_of(self.radius, plan.half);
   const auto low = [&](Real x, std::int32_t first) {
-    return max(cell_of(moved(x, -reach), plan.inverse) - first, 0);
+    return max(cell_of(moved(x, -search_radius), plan.inverse) - first, 0);
   };
   const auto high = [&](Real x, std::int32_t first, std::int32_t count) {
-    return min(cell_of(moved(x, reach), plan.inverse) - first, count - 1);
+    return min(cell_of(moved(x, search_radius), plan.inverse) - first, count - 1);
   };
   const std::int32_t x0 = low(self.centre.x, plan.x0), x1 = high(self.centre.x, plan.x0, plan.nx);
   const std::int32_t y0 = low(self.centre.y, plan.y0), y1 = high(self.centre.y, plan.y0, plan.ny);
@@ -110,44 +111,44 @@ __device__ inline void search_directly(const GridArgs& args, const DirectPlan& p
       std::uint32_t ends[kCellsAtOnce];
 #pragma unroll
       for (std::int32_t k = 0; k < kCellsAtOnce; ++k) {
-        ends[k] = x + k <= x1 ? args.table[cell + static_cast<std::uint32_t>(k)] : 0;
+        ends[k] = x + k <= x1 ? args.table.starts[cell + static_cast<std::uint32_t>(k)] : 0;
       }
       ends[1] += ends[0], ends[2] += ends[1];
-      // Candidates are numbered through the cells; where one cell ends, its free slots are skipped.
+      // Candidates are numbered across the cells; free slots at the end of a cell are skipped.
       const auto slot_of = [&](std::uint32_t i) {
         const std::uint32_t skipped = i < ends[0]   ? 0
-                                      : i < ends[1] ? plan.room - ends[0]
-                                                    : 2 * plan.room - ends[1];
-        return std::size_t{cell} * plan.room + i + skipped;
+                                      : i < ends[1] ? plan.cell_slots - ends[0]
+                                                    : 2 * plan.cell_slots - ends[1];
+        return std::size_t{cell} * plan.cell_slots + i + skipped;
       };
       for (std::uint32_t first = 0; first < ends[2]; first += kAtOnce) {
         SphereInstance others[kAtOnce];
 #pragma unroll
         for (unsigned k = 0; k < kAtOnce; ++k) {
-          others[k] = load_sorted(args.slots + slot_of(min(first + k, ends[2] - 1)));
+          others[k] = load_sorted(args.scratch.slots + slot_of(min(first + k, ends[2] - 1)));
         }
 #pragma unroll
         for (unsigned k = 0; k < kAtOnce; ++k) {
           if (first + k >= ends[2] || !touch(self, others[k])) continue;
-          const std::uint32_t b = args.slot_ids[slot_of(first + k)];
+          const std::uint32_t b = args.scratch.slot_ids[slot_of(first + k)];
           if (b <= a) continue;
           const std::uint32_t rank = atomicAdd(&s.counts[local], 1u);
           const std::uint32_t at = atomicAdd(&s.found, 1u);
-          if (at < kDirectPairs) s.partners[at] = b, s.ranks[at] = rank << 8 | local;
+          if (at < kDirectPairs) s.neighbors[at] = b, s.ranks[at] = rank << 8 | local;
         }
       }
     }
   }
 }
 
-/// The pairs of the block's spheres, sorted; leaves their number.
+/// Finds and sorts the pairs of the spheres of the block, and writes their number to Table::sums.
 __device__ inline void find_directly(const GridArgs& args, const DirectPlan& plan,
                                      DirectStorage& s) {
   __syncthreads();
   s.counts[threadIdx.x] = 0;
   if (threadIdx.x == 0) s.found = 0;
   __syncthreads();
-  const Span span = span_of_block(args.n, 1);
+  const Span span = span_of_block(args.input.n, 1);
   const unsigned group = lane_id() / kLanesOfSphere;
   if (group < kSpheresOfWarp) {
     for (std::uint64_t a = span.first + threadIdx.x / 32 * kSpheresOfWarp + group; a < span.past;
@@ -159,20 +160,20 @@ __device__ inline void find_directly(const GridArgs& args, const DirectPlan& pla
   __syncthreads();
   unsigned long long total = 0;
   s.starts[threadIdx.x] =
-      static_cast<std::uint32_t>(block_exclusive_sum(s.counts[threadIdx.x], s.warp_sums, total));
+      static_cast<std::uint32_t>(block_exclusive_sum(s.counts[threadIdx.x], s.sums, total));
   if (threadIdx.x == 0) {
-    args.table_sums[blockIdx.x] = total;
+    args.table.sums[blockIdx.x] = total;
     if (total > kDirectPairs) args.state->block_is_full = 1;
   }
   if (total > kDirectPairs) return;
   __syncthreads();
   for (std::uint32_t k = threadIdx.x; k < total; k += kGridThreads) {
-    s.grouped[s.starts[s.ranks[k] & 255u] + (s.ranks[k] >> 8)] = s.partners[k];
+    s.grouped[s.starts[s.ranks[k] & 255u] + (s.ranks[k] >> 8)] = s.neighbors[k];
   }
   __syncthreads();
   for (std::uint32_t k = threadIdx.x; k < total; k += kGridThreads) {
     const unsigned owner = s.ranks[k] & 255u;
-    const std::uint32_t start = s.starts[owner], b = s.partners[k];
+    const std::uint32_t start = s.starts[owner], b = s.neighbors[k];
     std::uint32_t at = start;
     for (std::uint32_t other = 0; other < s.counts[owner]; ++other) {
       at += s.grouped[start + other] < b ? 1 : 0;
@@ -182,28 +183,29 @@ __device__ inline void find_directly(const GridArgs& args, const DirectPlan& pla
   }
 }
 
-/// Writes what find_directly() left in the block.
+/// Writes the pairs that find_directly() left in shared memory to the output.
 __device__ inline void emit_directly(const GridArgs& args, const SearchOutput& output,
                                      DirectStorage& s) {
-  unsigned long long sums = 0;  // of all blocks, and (low 32 bits) of those before this one
+  unsigned long long sums = 0;  // over all blocks, and (low 32 bits) over lower blocks
   for (unsigned k = threadIdx.x; k < gridDim.x; k += kGridThreads) {
-    const unsigned long long sum = args.table_sums[k];
+    const unsigned long long sum = args.table.sums[k];
     sums += sum << 32 | (k < blockIdx.x ? sum : 0);
   }
-  static_assert(std::uint64_t{kMaxGridBlocks} * kDirectPairs < (1ull << 32));
-  sums = block_sum(sums, s.warp_sums);
+  // There are at most as many blocks as spheres.
+  static_assert(std::uint64_t{kMaxDirect} * kDirectPairs < (1ull << 32));
+  sums = block_sum(sums, s.sums);
   const unsigned long long all = sums >> 32, before = sums & 0xffffffffull;
   const bool complete = all <= output.capacity;
   if (blockIdx.x == 0 && threadIdx.x == 0) write_count(output, all, kNoSphere, complete);
   if (!complete) return;
-  const auto total = static_cast<std::uint32_t>(args.table_sums[blockIdx.x]);
-  const auto first_a = static_cast<std::uint32_t>(span_of_block(args.n, 1).first);
+  const auto total = static_cast<std::uint32_t>(args.table.sums[blockIdx.x]);
+  const auto first_a = static_cast<std::uint32_t>(span_of_block(args.input.n, 1).first);
   for (std::uint32_t first = threadIdx.x & ~31u; first < total; first += kGridThreads) {
     const std::uint32_t c = first + lane_id();
     if (c < total) {
       const std::uint32_t a = first_a + s.owners[c], b = s.sorted[c];
-      write_or_stage(output, before + c, a, b, load_sphere(args.spheres + a),
-                     load_sphere(args.spheres + b), s.staged[threadIdx.x / 32]);
+      write_or_stage(output, before + c, a, b, load_sphere(args.input.spheres + a),
+                     load_sphere(args.input.spheres + b), s.staged[threadIdx.x / 32]);
     }
     if (output.contacts != nullptr) {
       write_staged(s.staged[threadIdx.x / 32], min(32u, total - first),

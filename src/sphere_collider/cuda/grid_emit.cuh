@@ -1,6 +1,6 @@
-/// The last phases of the large-N search: from the partners of each sphere to contacts sorted by
-/// (a, b). Where the contacts of an a go is known from the sum of the counts before it; only the
-/// b's of one a are sorted.
+/// Last phases of the grid search: from the neighbors of each sphere to contacts sorted by (a, b).
+/// The sum of the row lengths before it gives the index of row a in the output; only the b's of a
+/// row are sorted.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid.cuh"
@@ -9,47 +9,48 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-inline constexpr std::uint32_t kWindowWords = 1024;  // bits of a giant's list: indices at once / 32
+inline constexpr std::uint32_t kWindowWords = 1024;  // words of the bit set of a window
 inline constexpr std::uint32_t kWindow = 32 * kWindowWords;
 
 struct EmitStorage {
   alignas(8) unsigned char staged[kGridWarps][32 * sizeof(SphereContact)];
-  unsigned long long shift[kGridThreads];  // from a contact's number in the tile to its place
-  unsigned long long warp_sums[kGridWarps];
-  std::uint32_t partners[kSlots * kGridThreads];  // of the tile's spheres, sorted, without gaps
+  unsigned long long shift[kGridThreads];  // index in the output minus index in the tile
+  BlockSums::TempStorage sums;
+  std::uint32_t neighbors[kSlots * kGridThreads];  // of the rows of the tile, sorted, without gaps
   std::uint8_t owners[kSlots * kGridThreads];
 };
-struct CrowdedStorage {
-  std::uint32_t words[kGridWarps * kLongList];
+struct LongRowStorage {
+  std::uint32_t words[kGridWarps * kMaxLongRow];
   std::uint32_t group_counts[kWindowWords / 32];
   std::uint32_t before;
 };
-static_assert(kGridWarps * kLongList >= kWindowWords);
+static_assert(kGridWarps * kMaxLongRow >= kWindowWords);
 
 __device__ inline unsigned long long contacts_found(const SearchState& state) {
-  return state.contacts + state.crowded_contacts;
+  return state.contacts + state.long_row_contacts;
 }
 __device__ inline bool is_complete(const GridArgs& args, const SearchOutput& output) {
   const unsigned long long total = contacts_found(*args.state);
-  return total <= args.capacity && total <= output.capacity;
+  return total <= args.rows.capacity && total <= output.capacity;
 }
 
-/// Leaves a sphere with more than kSlots pairs to the phases that follow.
-__device__ inline void put_off(const GridArgs& args, std::uint32_t a, std::uint32_t count,
-                               unsigned long long offset) {
-  if (count > kLongList) {
-    args.giants[atomicAdd(&args.state->giants, 1u)] = a;
+/// Leaves a row that is too long for this phase to later phases.
+__device__ inline void defer_row(const GridArgs& args, std::uint32_t a, std::uint32_t count,
+                                 unsigned long long offset) {
+  if (count > kMaxLongRow) {
+    args.rows.very_long_rows[atomicAdd(&args.state->very_long_rows, 1u)] = a;
   } else {
-    args.crowded[atomicAdd(&args.state->crowded, 1u)] = a;
+    args.rows.long_rows[atomicAdd(&args.state->long_rows, 1u)] = a;
   }
-  args.offsets[a] = offset;
+  args.rows.offsets[a] = offset;
 }
-/// The same where the first partners are in slots.
-__device__ inline void put_off_slots(const GridArgs& args, std::uint32_t a, std::uint32_t count,
-                                     unsigned long long offset) {
-  put_off(args, a, count, offset);
+/// The same for a row whose first neighbors are in slots.
+__device__ inline void defer_row_in_slots(const GridArgs& args, std::uint32_t a,
+                                          std::uint32_t count, unsigned long long offset) {
+  defer_row(args, a, count, offset);
   for (std::uint32_t k = 0; k < kSlots; ++k) {
-    args.crowded_b[offset + k] = args.partners[std::size_t{args.places[a]} * kSlots + k];
+    args.rows.long_row_neighbors[offset + k] =
+        args.scratch.neighbors[std::size_t{args.table.positions[a]} * kSlots + k];
   }
 }
 
@@ -59,13 +60,13 @@ __device__ inline void exchange(std::uint32_t& p, std::uint32_t& q) {
   p = low;
 }
 
-/// A thread sorts the partners of its sphere: the first eight by a network (19 exchanges, Knuth
+/// A thread sorts a row: the first eight neighbors by a sorting network (19 exchanges, Knuth
 /// 5.3.4), further ones, which are rare, by insertion.
-__device__ inline void sort_partners(const std::uint32_t* partners, std::uint32_t count,
-                                     std::uint32_t* sorted, std::uint8_t* owners) {
+__device__ inline void sort_neighbors(const std::uint32_t* neighbors, std::uint32_t count,
+                                      std::uint32_t* sorted, std::uint8_t* owners) {
   std::uint32_t v[8];
 #pragma unroll
-  for (unsigned k = 0; k < 8; ++k) v[k] = k < count ? partners[k] : ~0u;
+  for (unsigned k = 0; k < 8; ++k) v[k] = k < count ? neighbors[k] : ~0u;
   exchange(v[0], v[2]), exchange(v[1], v[3]), exchange(v[4], v[6]), exchange(v[5], v[7]);
   exchange(v[0], v[4]), exchange(v[1], v[5]), exchange(v[2], v[6]), exchange(v[3], v[7]);
   exchange(v[0], v[1]), exchange(v[2], v[3]), exchange(v[4], v[5]), exchange(v[6], v[7]);
@@ -77,7 +78,7 @@ __device__ inline void sort_partners(const std::uint32_t* partners, std::uint32_
     if (k < count) sorted[k] = v[k], owners[k] = static_cast<std::uint8_t>(threadIdx.x);
   }
   for (std::uint32_t k = 8; k < count; ++k) {
-    const std::uint32_t b = partners[k];
+    const std::uint32_t b = neighbors[k];
     std::uint32_t to = k;
     for (; to > 0 && sorted[to - 1] > b; --to) sorted[to] = sorted[to - 1];
     sorted[to] = b;
@@ -85,7 +86,8 @@ __device__ inline void sort_partners(const std::uint32_t* partners, std::uint32_
   }
 }
 
-/// A lane puts a contact on its warp's stage, for write_staged(); a pair goes to its place at once.
+/// A lane writes a contact to the staging buffer of its warp, for write_staged(), or a pair
+/// directly to the output.
 __device__ inline void write_or_stage(const SearchOutput& output, unsigned long long at,
                                       std::uint32_t a, std::uint32_t b, const SphereInstance& sa,
                                       const SphereInstance& sb, unsigned char* staged) {
@@ -97,7 +99,7 @@ __device__ inline void write_or_stage(const SearchOutput& output, unsigned long 
   reinterpret_cast<SphereContact*>(staged)[lane_id()] = {a, b, r.normal, r.distance};
 }
 
-/// A warp writes the contacts that its lanes hold to consecutive places, in whole sectors.
+/// A warp writes the staged contacts of its lanes to consecutive indices, in whole memory sectors.
 __device__ inline void write_staged(unsigned char* staged, unsigned count, SphereContact* to) {
   static_assert(sizeof(SphereContact) % 8 == 0);
   constexpr unsigned kWords = sizeof(SphereContact) / 8;
@@ -112,43 +114,43 @@ __device__ inline void write_staged(unsigned char* staged, unsigned count, Spher
   __syncwarp();
 }
 
-/// Brings the counts into the order of the spheres' indices and leaves the sum of each block.
+/// Stores the row lengths by index instead of by position, and sums those of each block.
 __device__ inline void sum_counts(const GridArgs& args, EmitStorage& s) {
-  const Span span = span_of_block(args.n, 1);
+  const Span span = span_of_block(args.input.n, 1);
   unsigned long long sum = 0;
   for (std::uint64_t a = span.first + threadIdx.x; a < span.past; a += kGridThreads) {
-    const std::uint32_t count = args.counts[args.places[a]];
-    args.ranks[a] = count;
+    const std::uint32_t count = args.rows.counts[args.table.positions[a]];
+    args.table.ranks[a] = count;
     sum += count;
   }
-  sum = block_sum(sum, s.warp_sums);
-  if (threadIdx.x == 0) args.count_sums[blockIdx.x] = sum;
+  sum = block_sum(sum, s.sums);
+  if (threadIdx.x == 0) args.rows.sums[blockIdx.x] = sum;
 }
 
-/// A block writes the contacts of up to kGridThreads consecutive a's, which are consecutive in the
-/// output: first a thread a sphere, to sort its partners, then a thread a contact. Returns their
-/// number.
+/// A block writes the rows of up to kGridThreads consecutive a's, which are consecutive in the
+/// output. First each thread sorts a row, then each thread writes a contact.
+/// @return the number of contacts of these rows.
 __device__ inline unsigned long long emit_tile(const GridArgs& args, const SearchOutput& output,
                                                std::uint64_t first_a, std::uint64_t past_a,
                                                unsigned long long before, EmitStorage& s) {
   __syncthreads();
   const std::uint64_t mine = first_a + threadIdx.x;
   const auto a = static_cast<std::uint32_t>(mine);
-  const std::uint32_t count = mine < past_a ? args.ranks[mine] : 0;
+  const std::uint32_t count = mine < past_a ? args.table.ranks[mine] : 0;
   const std::uint32_t few = count > kSlots ? 0 : count;
-  const std::uint32_t* const partners =
-      args.partners + (few != 0 ? std::size_t{args.places[mine]} * kSlots : 0);
-  // Both sums at once: of few, at most kSlots * kGridThreads, and of all contacts.
+  const std::uint32_t* const neighbors =
+      args.scratch.neighbors + (few != 0 ? std::size_t{args.table.positions[mine]} * kSlots : 0);
+  // One scan for two sums: of the slots in use, at most kSlots * kGridThreads, and of all contacts.
   constexpr unsigned kFewBits = 16;
   unsigned long long total = 0;
-  const unsigned long long sums = block_exclusive_sum(
-      static_cast<unsigned long long>(count) << kFewBits | few, s.warp_sums, total);
+  const unsigned long long sums =
+      block_exclusive_sum(static_cast<unsigned long long>(count) << kFewBits | few, s.sums, total);
   const auto start = static_cast<std::uint32_t>(sums & ((1u << kFewBits) - 1));
   const auto fews = static_cast<std::uint32_t>(total & ((1u << kFewBits) - 1));
   const unsigned long long offset = before + (sums >> kFewBits);
-  sort_partners(partners, few, s.partners + start, s.owners + start);
+  sort_neighbors(neighbors, few, s.neighbors + start, s.owners + start);
   s.shift[threadIdx.x] = offset - start;
-  if (count > kSlots) put_off_slots(args, a, count, offset);
+  if (count > kSlots) defer_row_in_slots(args, a, count, offset);
   __syncthreads();
   const bool stages = fews == total >> kFewBits && output.contacts != nullptr;
   for (std::uint32_t first = threadIdx.x & ~31u; first < fews; first += kGridThreads) {
@@ -156,14 +158,14 @@ __device__ inline unsigned long long emit_tile(const GridArgs& args, const Searc
     unsigned char* const staged = s.staged[threadIdx.x / 32];
     if (c < fews) {
       const unsigned owner = s.owners[c];
-      const std::uint32_t of = static_cast<std::uint32_t>(first_a) + owner, b = s.partners[c];
+      const std::uint32_t of = static_cast<std::uint32_t>(first_a) + owner, b = s.neighbors[c];
       if (stages) {
-        const PairResult r =
-            detail::test_sphere_pair(load_sphere(args.spheres + of), load_sphere(args.spheres + b));
+        const PairResult r = detail::test_sphere_pair(load_sphere(args.input.spheres + of),
+                                                      load_sphere(args.input.spheres + b));
         reinterpret_cast<SphereContact*>(staged)[lane_id()] = {of, b, r.normal, r.distance};
       } else {
-        write_contact(output, s.shift[owner] + c, of, b, load_sphere(args.spheres + of),
-                      load_sphere(args.spheres + b));
+        write_contact(output, s.shift[owner] + c, of, b, load_sphere(args.input.spheres + of),
+                      load_sphere(args.input.spheres + b));
       }
     }
     if (stages) write_staged(staged, min(32u, fews - first), output.contacts + before + first);
@@ -172,24 +174,25 @@ __device__ inline unsigned long long emit_tile(const GridArgs& args, const Searc
 }
 
 __device__ inline void emit(const GridArgs& args, const SearchOutput& output, EmitStorage& s) {
-  const Span span = span_of_block(args.n, 1);
-  unsigned long long before = sum_of_blocks_before(args.count_sums, s.warp_sums);
+  const Span span = span_of_block(args.input.n, 1);
+  unsigned long long before = sum_of_blocks_before(args.rows.sums, s.sums);
   for (std::uint64_t a = span.first; a < span.past; a += kGridThreads) {
     before += emit_tile(args, output, a, span.past, before, s);
   }
 }
 
-/// Puts the pairs beyond kSlots of each sphere behind the others.
+/// Appends the overflow pairs of each long row to those that were in slots.
 __device__ inline void place_overflow(const GridArgs& args) {
   const std::uint64_t stride = std::uint64_t{gridDim.x} * kGridThreads;
   for (std::uint64_t k = std::uint64_t{blockIdx.x} * kGridThreads + threadIdx.x;
        k < args.state->overflow; k += stride) {
-    const OverflowPair pair = args.overflow[k];
-    args.crowded_b[args.offsets[pair.a] + pair.rank] = pair.b;
+    const OverflowPair pair = args.rows.overflow[k];
+    args.rows.long_row_neighbors[args.rows.offsets[pair.a] + pair.rank] = pair.b;
   }
 }
 
-/// A warp sorts `length` ids by Batcher's bitonic network; there is room up to a power of two.
+/// A warp sorts `length` ids by Batcher's bitonic network. The array has room for the next power of
+/// two.
 __device__ inline void sort_ids(std::uint32_t* ids, std::uint32_t length) {
   std::uint32_t padded = 32;
   while (padded < length) padded *= 2;
@@ -209,18 +212,19 @@ __device__ inline void sort_ids(std::uint32_t* ids, std::uint32_t length) {
   __syncwarp();
 }
 
-/// A warp writes the contacts of up to kLongList partners in order. Few of them are not sorted:
-/// each goes where as many are smaller.
-__device__ inline void emit_crowded_sphere(const GridArgs& args, const SearchOutput& output,
-                                           std::uint32_t a, std::uint32_t* ids) {
+/// A warp writes a row of up to kMaxLongRow contacts in order. A short row is not sorted: the rank
+/// of a neighbor is the number of smaller ones.
+__device__ inline void emit_long_row(const GridArgs& args, const SearchOutput& output,
+                                     std::uint32_t a, std::uint32_t* ids) {
   constexpr std::uint32_t kFew = 64;
-  const unsigned long long offset = args.offsets[a];
-  const std::uint32_t length = args.ranks[a];
-  for (unsigned i = lane_id(); i < length; i += 32) ids[i] = args.crowded_b[offset + i];
+  const unsigned long long offset = args.rows.offsets[a];
+  const std::uint32_t length = args.table.ranks[a];
+  for (unsigned i = lane_id(); i < length; i += 32)
+    ids[i] = args.rows.long_row_neighbors[offset + i];
   const bool few = length <= kFew;
   if (!few) sort_ids(ids, length);
   __syncwarp();
-  const SphereInstance sphere = load_sphere(args.spheres + a);
+  const SphereInstance sphere = load_sphere(args.input.spheres + a);
   for (unsigned i = lane_id(); i < length; i += 32) {
     const std::uint32_t b = ids[i];
     std::uint32_t rank = i;
@@ -228,26 +232,27 @@ __device__ inline void emit_crowded_sphere(const GridArgs& args, const SearchOut
       rank = 0;
       for (unsigned k = 0; k < length; ++k) rank += ids[k] < b ? 1 : 0;
     }
-    write_contact(output, offset + rank, a, b, sphere, load_sphere(args.spheres + b));
+    write_contact(output, offset + rank, a, b, sphere, load_sphere(args.input.spheres + b));
   }
   __syncwarp();
 }
 
-/// Of the partners of `a`, takes those in [window, window + kWindow) in order: they become bits of
-/// a set. Windows are independent, so a sphere with a million partners is spread over many blocks.
+/// Writes the contacts of a very long row whose neighbors are in [window, window + kWindow), in
+/// order: the neighbors become bits of a set. Windows are independent, so that a row with a million
+/// neighbors is distributed over many blocks.
 __device__ inline void emit_window(const GridArgs& args, const SearchOutput& output,
                                    std::uint32_t a, unsigned long long offset, std::uint32_t length,
-                                   std::uint32_t window, CrowdedStorage& s) {
+                                   std::uint32_t window, LongRowStorage& s) {
   for (unsigned w = threadIdx.x; w < kWindowWords; w += kGridThreads) s.words[w] = 0;
   if (threadIdx.x == 0) s.before = 0;
   __syncthreads();
   std::uint32_t smaller = 0;
-  constexpr unsigned kAtOnce = 16;  // loads in flight: a list can be as long as there are spheres
+  constexpr unsigned kAtOnce = 16;  // loads in flight: a row can have n - 1 neighbors
   for (std::uint32_t first = threadIdx.x; first < length; first += kAtOnce * kGridThreads) {
     std::uint32_t b[kAtOnce];
     for (unsigned k = 0; k < kAtOnce; ++k) {
       const std::uint64_t i = first + std::uint64_t{k} * kGridThreads;
-      b[k] = i < length ? args.crowded_b[offset + i] : ~0u;
+      b[k] = i < length ? args.rows.long_row_neighbors[offset + i] : ~0u;
     }
     for (unsigned k = 0; k < kAtOnce; ++k) {
       smaller += b[k] < window ? 1 : 0;
@@ -256,37 +261,37 @@ __device__ inline void emit_window(const GridArgs& args, const SearchOutput& out
       }
     }
   }
-  smaller = warp_reduce(smaller, [](unsigned p, unsigned q) { return p + q; });
+  smaller = warp_sum(smaller);
   if (lane_id() == 0) atomicAdd(&s.before, smaller);
   __syncthreads();
   for (unsigned g = threadIdx.x / 32; g < kWindowWords / 32; g += kGridWarps) {
     const auto count = static_cast<unsigned>(__popc(s.words[32 * g + lane_id()]));
-    s.group_counts[g] = warp_reduce(count, [](unsigned p, unsigned q) { return p + q; });
+    s.group_counts[g] = warp_sum(count);
   }
   __syncthreads();
-  const SphereInstance sphere = load_sphere(args.spheres + a);
+  const SphereInstance sphere = load_sphere(args.input.spheres + a);
   for (unsigned g = threadIdx.x / 32; g < kWindowWords / 32; g += kGridWarps) {
     unsigned long long at = offset + s.before;
     for (unsigned k = 0; k < g; ++k) at += s.group_counts[k];
     emit_row(output, at, a, sphere, window / 32 + 32 * g, s.words[32 * g + lane_id()],
-             [&](std::uint32_t b) { return load_sphere(args.spheres + b); });
+             [&](std::uint32_t b) { return load_sphere(args.input.spheres + b); });
   }
 }
 
-/// First a warp a crowded sphere, then a block a giant and one window of its partners' indices.
-__device__ inline void emit_crowded(const GridArgs& args, const SearchOutput& output,
-                                    CrowdedStorage& s) {
+/// First each warp writes a long row, then each block a window of a very long row.
+__device__ inline void emit_long_rows(const GridArgs& args, const SearchOutput& output,
+                                      LongRowStorage& s) {
   const unsigned warp = threadIdx.x / 32;
-  for (std::uint32_t i = blockIdx.x * kGridWarps + warp; i < args.state->crowded;
+  for (std::uint32_t i = blockIdx.x * kGridWarps + warp; i < args.state->long_rows;
        i += gridDim.x * kGridWarps) {
-    emit_crowded_sphere(args, output, args.crowded[i], s.words + warp * kLongList);
+    emit_long_row(args, output, args.rows.long_rows[i], s.words + warp * kMaxLongRow);
   }
-  const std::uint32_t windows = (args.n - 1) / kWindow + 1;
-  const unsigned long long items = std::uint64_t{args.state->giants} * windows;
+  const std::uint32_t windows = (args.input.n - 1) / kWindow + 1;
+  const unsigned long long items = std::uint64_t{args.state->very_long_rows} * windows;
   for (unsigned long long item = blockIdx.x; item < items; item += gridDim.x) {
     __syncthreads();
-    const std::uint32_t a = args.giants[item / windows];
-    emit_window(args, output, a, args.offsets[a], args.ranks[a],
+    const std::uint32_t a = args.rows.very_long_rows[item / windows];
+    emit_window(args, output, a, args.rows.offsets[a], args.table.ranks[a],
                 static_cast<std::uint32_t>(item % windows) * kWindow, s);
   }
 }

@@ -1,9 +1,9 @@
-/// All phases of the large-N search in one launch: up to some 10^5 spheres, where launches would
-/// take most of the time.
+/// Grid search in one cooperative launch, for up to some 10^5 spheres, where launches would
+/// dominate the time.
 #include "src/sphere_collider/cuda/grid_build.cuh"
 #include "src/sphere_collider/cuda/grid_direct.cuh"
 #include "src/sphere_collider/cuda/grid_emit.cuh"
-#include "src/sphere_collider/cuda/grid_launch.hpp"
+#include "src/sphere_collider/cuda/grid_one_launch.hpp"
 #include "src/sphere_collider/cuda/grid_search.cuh"
 
 #include <algorithm>
@@ -24,21 +24,24 @@ union PhaseStorage {
   SearchStorage<true> dense_search;
   SearchStorage<false> search;
   EmitStorage emit;
-  CrowdedStorage crowded;
+  LongRowStorage long_rows;
 };
 
-/// The state of this search; clears that of the next one. All blocks, before their first barrier.
-__device__ SearchState* take_state(TurningStates& states) {
-  return states.states + states.turn % 2;
+/// The state of this search. All blocks call it before their first grid barrier.
+__device__ SearchState* current_state(AlternatingStates& states) {
+  return states.states + states.searches % 2;
 }
-/// By one thread, after the first barrier.
-__device__ void clear_next_state(TurningStates& states) { states.states[++states.turn % 2] = {}; }
+/// Clears the state of the next search. Call from one thread, after the first grid barrier.
+__device__ void clear_next_state(AlternatingStates& states) {
+  states.states[++states.searches % 2] = {};
+}
 
-/// Whether these spheres could be searched without sorting them; then that is done.
+/// Performs the direct search, if it applies.
+/// @return whether it has written the result.
 __device__ bool search_without_sorting(const GridArgs& args, const SearchOutput& output,
                                        DirectStorage& storage, const cg::grid_group& grid) {
   const DirectPlan plan = make_direct_plan(args);
-  if (plan.room == 0) return false;
+  if (plan.cell_slots == 0) return false;
   insert(args, plan);
   grid.sync();
   if (args.state->cell_is_full == 0) {
@@ -62,7 +65,7 @@ __global__ void __launch_bounds__(kGridThreads, kBlocksPerMultiprocessor)
   const cg::grid_group grid = cg::this_grid();
   const bool one = blockIdx.x == 0 && threadIdx.x == 0;
   GridArgs args = arguments;
-  args.state = take_state(*args.states);
+  args.state = current_state(*args.states);
 
   clear_table(args);
   clear_counts(args);
@@ -103,36 +106,35 @@ __global__ void __launch_bounds__(kGridThreads, kBlocksPerMultiprocessor)
   grid.sync();
   place_overflow(args);
   grid.sync();
-  emit_crowded(args, output, storage.crowded);
+  emit_long_rows(args, output, storage.long_rows);
 }
 
 }  // namespace
 
-unsigned most_grid_blocks(int device) {
-  int per_multiprocessor = 0, multiprocessors = 0;
+unsigned resident_grid_blocks(unsigned multiprocessors) {
+  int per_multiprocessor = 0;
   JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&per_multiprocessor, grid_search,
                                                               kGridThreads, 0));
-  JFPX_CUDA_TRY(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
-  return std::min(static_cast<unsigned>(per_multiprocessor * multiprocessors), kMaxGridBlocks);
+  return static_cast<unsigned>(per_multiprocessor) * multiprocessors;
 }
 
-void launch_in_one(const GridArgs& args, const SearchOutput& output, unsigned most_blocks,
+void launch_in_one(const GridArgs& args, const SearchOutput& output, unsigned max_blocks,
                    cudaStream_t stream) {
   GridArgs shared_out = args;
-  // While there are threads to spare, several share a sphere: half the device is enough.
-  const std::uint64_t threads = std::uint64_t{most_blocks} * kGridThreads / 2;
-  while (shared_out.lanes < 8 && 2 * shared_out.lanes * std::uint64_t{args.n} <= threads) {
+  // Several threads share a sphere as long as this occupies no more than half of the device.
+  const std::uint64_t threads = std::uint64_t{max_blocks} * kGridThreads / 2;
+  while (shared_out.lanes < 8 && 2 * shared_out.lanes * std::uint64_t{args.input.n} <= threads) {
     shared_out.lanes *= 2;
   }
-  std::uint64_t wanted = (shared_out.lanes * std::uint64_t{args.n} - 1) / kGridThreads + 1;
-  if (args.slots != nullptr) {
-    wanted = (std::uint64_t{args.n} - 1) / (kGridWarps * kSpheresOfWarp) + 1;
+  std::uint64_t wanted = (shared_out.lanes * std::uint64_t{args.input.n} - 1) / kGridThreads + 1;
+  if (args.scratch.slots != nullptr) {
+    wanted = (std::uint64_t{args.input.n} - 1) / (kGridWarps * kSpheresOfWarp) + 1;
   }
   cudaLaunchAttribute cooperative{};
   cooperative.id = cudaLaunchAttributeCooperative;
   cooperative.val.cooperative = 1;
   cudaLaunchConfig_t config{};
-  config.gridDim = static_cast<unsigned>(std::min<std::uint64_t>(wanted, most_blocks));
+  config.gridDim = static_cast<unsigned>(std::min<std::uint64_t>(wanted, max_blocks));
   config.blockDim = kGridThreads;
   config.stream = stream;
   config.attrs = &cooperative;

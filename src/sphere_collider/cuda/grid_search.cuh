@@ -1,4 +1,4 @@
-/// The search phase for large N: only neighbouring cells are looked at.
+/// Search phase for spheres of any radii: tests the spheres of neighboring cells on all levels.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid.cuh"
@@ -8,10 +8,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-inline constexpr unsigned kRowsAtOnce = 5;  // rows that a thread looks up before it tests
-inline constexpr unsigned kHeld = 8;        // candidates that a thread keeps
+inline constexpr unsigned kRowsAtOnce = 5;  // rows that a thread looks up at a time
+inline constexpr unsigned kHeld = 8;        // candidates that a thread holds
 
-/// Also the row that was looked at, where a candidate may be of another one.
+/// Identification of the row that was searched, because a hashed bucket may hold candidates of
+/// other rows.
 struct HeldRows {
   std::uint32_t range_keys[kRowsAtOnce][kGridThreads];
   std::uint32_t keys[kHeld][kGridThreads];
@@ -22,13 +23,13 @@ template <bool kDense>
 struct SearchStorage {
   uint2 ranges[kRowsAtOnce][kGridThreads];  // candidates of a row
   std::uint32_t held[kHeld][kGridThreads];  // positions of candidates that may touch
-  std::uint32_t next_turn;                  // of a warp of the block
+  std::uint32_t next_work_item;             // for a warp of the block
   std::conditional_t<kDense, NoRows, HeldRows> rows;
 };
 
-/// A warp takes spheres in the order of the table; `lanes` threads share a sphere, each takes every
-/// so many-th row. A sphere looks at its own level (each pair from the sphere whose cell comes
-/// first in the order of z, y, x) and at all wider levels where a partner can be.
+/// A warp takes spheres in the order of the table. `lanes` threads share a sphere, and each takes
+/// every `lanes`-th row. A sphere searches its own level (each pair is found from the sphere whose
+/// cell comes first in the order of z, y, x) and all wider levels on which it can have a neighbor.
 template <bool kDense>
 class Searcher {
  public:
@@ -37,33 +38,30 @@ class Searcher {
 
   __device__ void run() {
     const std::uint32_t spheres_of_warp = 32 / args_.lanes;
-    const std::uint32_t chunks = (args_.n - 1) / spheres_of_warp + 1;
-    // The warps of a block are always at chunks that are near each other, and share what they read.
-    if (threadIdx.x == 0) storage_.next_turn = kGridWarps;
+    const std::uint32_t chunks = (args_.input.n - 1) / spheres_of_warp + 1;
+    // The warps of a block take adjacent chunks at any time, so that they share cache lines.
+    if (threadIdx.x == 0) storage_.next_work_item = kGridWarps;
     __syncthreads();
-    std::uint32_t turn = threadIdx.x / 32;
+    std::uint32_t work_item = threadIdx.x / 32;
     while (true) {
       const std::uint32_t chunk =
-          (turn / kGridWarps * gridDim.x + blockIdx.x) * kGridWarps + turn % kGridWarps;
+          (work_item / kGridWarps * gridDim.x + blockIdx.x) * kGridWarps + work_item % kGridWarps;
       if (chunk >= chunks) break;
       search(chunk * spheres_of_warp + lane_id() / args_.lanes, lane_id() % args_.lanes);
-      if (lane_id() == 0) turn = atomicAdd(&storage_.next_turn, 1u);
-      turn = __shfl_sync(kFullWarp, turn, 0);
+      if (lane_id() == 0) work_item = atomicAdd(&storage_.next_work_item, 1u);
+      work_item = __shfl_sync(kFullWarp, work_item, 0);
     }
-    unsigned long long found = found_;
-    for (unsigned d = 16; d != 0; d /= 2) {
-      found += __shfl_xor_sync(kFullWarp, found, static_cast<int>(d));
-    }
+    const auto found = warp_sum(static_cast<unsigned long long>(found_));
     if (lane_id() == 0 && found != 0) atomicAdd(&args_.state->contacts, found);
   }
 
  private:
-  /// All lanes of a warp together: hits of all are tested 32 at a time.
+  /// Call from all lanes of a warp together, because they test held candidates 32 at a time.
   __device__ void search(std::uint32_t position, unsigned lane) {
     position_ = position;
-    bool searching = position < args_.n;
+    bool searching = position < args_.input.n;
     if (searching) {
-      self_ = load_sorted(args_.sorted + position);
+      self_ = load_sorted(args_.table.sorted + position);
       cell_ = grid_cell_of(self_, plan_.scale);
       levels_ = args_.state->levels & static_cast<std::uint32_t>((1ull << max(cell_.level, 0)) - 1);
       widest_far_ = kDense ? cell_.level : widest_far_level(self_, plan_.scale);
@@ -81,11 +79,11 @@ class Searcher {
   __device__ void enter_level(int level, unsigned lane) {
     const Real half = half_cell_of(plan_.scale.half_0, level);
     const Real inverse = inverse_width(half);
-    const Real reach = reach_of(self_.radius, half);
-    const auto low = [&](Real x, Real scale) { return cell_of(moved(x, -reach), scale); };
-    const auto high = [&](Real x, Real scale) { return cell_of(moved(x, reach), scale); };
+    const Real search_radius = search_radius_of(self_.radius, half);
+    const auto low = [&](Real x, Real scale) { return cell_of(moved(x, -search_radius), scale); };
+    const auto high = [&](Real x, Real scale) { return cell_of(moved(x, search_radius), scale); };
     level_ = level;
-    doubt_ = doubt_of(self_.radius + half);
+    error_bound_ = error_bound_of(self_.radius + half);
     const Real inverse_x = inverse_x_of(inverse, plan_.scale);
     x0_ = low(self_.centre.x, inverse_x), x1_ = high(self_.centre.x, inverse_x);
     y0_ = low(self_.centre.y, inverse), y1_ = high(self_.centre.y, inverse);
@@ -118,7 +116,7 @@ class Searcher {
     }
   }
 
-  /// Goes on to the next wider level with a possible partner, if there is one.
+  /// Continues with the next wider level that can have a neighbor, if there is one.
   __device__ bool leave_level(unsigned lane) {
     int next = level_ - 1;
     if (next < widest_far_) {
@@ -130,9 +128,9 @@ class Searcher {
     return true;
   }
 
-  /// Looks up the next rows of the level. A row that goes on at the start of the table has
-  /// candidates from n on: those from 0 on. (2 n fits into 32 bits: for more spheres than 2^31 no
-  /// device has the memory.)
+  /// Looks up the next rows of the level. A row that wraps around to the start of the table
+  /// continues with candidates from n on, which denote positions from 0 on. (2 n fits into 32 bits,
+  /// because no device has the memory for more than 2^31 spheres.)
   __device__ void collect_ranges() {
     uint2 ranges[kRowsAtOnce];
     std::uint32_t keys[kRowsAtOnce];
@@ -145,9 +143,9 @@ class Searcher {
       const std::uint32_t first = (key + static_cast<std::uint32_t>(x0)) & plan_.mask<kDense>();
       std::uint32_t past = first + static_cast<std::uint32_t>(x1_ - x0) + 1;
       std::uint32_t wrapped = 0;
-      if (!kDense && past > plan_.buckets) past -= plan_.buckets, wrapped = args_.n;
-      ranges[k] = {own_row_is_next_ ? position_ + 1 : args_.table[first],
-                   args_.table[past] + wrapped};
+      if (!kDense && past > plan_.buckets) past -= plan_.buckets, wrapped = args_.input.n;
+      ranges[k] = {own_row_is_next_ ? position_ + 1 : args_.table.starts[first],
+                   args_.table.starts[past] + wrapped};
       keys[k] = key;
       own_row_is_next_ = false;
       skip_rows(args_.lanes);
@@ -161,12 +159,12 @@ class Searcher {
     }
   }
 
-  /// Where candidate `at` is.
+  /// Position of candidate `at`.
   __device__ std::uint32_t position_of(std::uint32_t at) const {
-    return kDense || at < args_.n ? at : at - args_.n;
+    return kDense || at < args_.input.n ? at : at - args_.input.n;
   }
 
-  /// Holds the candidates in the lanes' lists that may touch, two of each lane at a time.
+  /// Holds those candidates of each lane that may touch. Tests two per lane in a step.
   __device__ void filter_candidates() {
     std::uint32_t at = 0, end = 0, key = 0;
     unsigned next = 0;
@@ -180,10 +178,10 @@ class Searcher {
       if (!__any_sync(kFullWarp, at < end)) return;
       if (at < end) {
         const std::uint32_t first = position_of(at), second = position_of(min(at + 1, end - 1));
-        const Real to_first = excess(self_, load_sorted(args_.sorted + first));
-        const Real to_second = excess(self_, load_sorted(args_.sorted + second));
-        if (!(to_first > doubt_)) hold(first, key, to_first);
-        if (second != first && !(to_second > doubt_)) hold(second, key, to_second);
+        const Real to_first = excess(self_, load_sorted(args_.table.sorted + first));
+        const Real to_second = excess(self_, load_sorted(args_.table.sorted + second));
+        if (!(to_first > error_bound_)) hold(first, key, to_first);
+        if (second != first && !(to_second > error_bound_)) hold(second, key, to_second);
         at += 2;
       }
       if (__any_sync(kFullWarp, held_ > kHeld - 2)) accept_held();
@@ -191,7 +189,7 @@ class Searcher {
   }
 
   __device__ void hold(std::uint32_t other, std::uint32_t key, Real its_excess) {
-    in_doubt_ = in_doubt_ || !(its_excess < -doubt_);
+    uncertain_ = uncertain_ || !(its_excess < -error_bound_);
     storage_.held[held_][threadIdx.x] = other;
     if constexpr (!kDense) {
       storage_.rows.keys[held_][threadIdx.x] = key;
@@ -200,15 +198,15 @@ class Searcher {
     ++held_;
   }
 
-  /// Takes those of the held candidates that are in the row that was looked at. All lanes
-  /// together, so that each has something to do: candidate i of the warp belongs to the lane with
-  /// the first sum beyond i. Where places are hashed, others are in the same buckets by chance;
-  /// they have their own turn, or none. A touching sphere of that row is in one of the cells looked
-  /// at, and all of these are different buckets: it is met once.
+  /// Accepts the held candidates that are in the row that was searched. Call from all lanes
+  /// together, which share the work: candidate i of the warp belongs to the first lane with sum >
+  /// i. A hashed bucket may contain spheres of other rows, which are found when their own row is
+  /// searched, or not at all. A touching sphere of the row is in one of the cells searched, and all
+  /// of these are different buckets, so that it is found exactly once.
   __device__ void accept_held() {
     const unsigned sum = warp_inclusive_sum(held_);
     const unsigned all = __shfl_sync(kFullWarp, sum, 31);
-    const bool in_doubt = __any_sync(kFullWarp, in_doubt_);
+    const bool uncertain = __any_sync(kFullWarp, uncertain_);
     __syncwarp();
     for (unsigned first = 0; first < all; first += 32) {
       const unsigned i = first + lane_id();
@@ -220,22 +218,22 @@ class Searcher {
       const unsigned slot = i - (owners_sum - owners_held);
       const unsigned thread = threadIdx.x - lane_id() + owner;
       const std::uint32_t other = storage_.held[slot][thread];
-      if (in_doubt &&
-          !touch(load_sorted(args_.sorted + position), load_sorted(args_.sorted + other))) {
+      if (uncertain && !touch(load_sorted(args_.table.sorted + position),
+                              load_sorted(args_.table.sorted + other))) {
         continue;
       }
       accept(position, other, slot, thread);
     }
     __syncwarp();
     held_ = 0;
-    in_doubt_ = false;
+    uncertain_ = false;
   }
 
   __device__ void accept(std::uint32_t position, std::uint32_t other_position, unsigned slot,
                          unsigned thread) {
-    const std::uint32_t id = args_.ids[position], other_id = args_.ids[other_position];
+    const std::uint32_t id = args_.table.ids[position], other_id = args_.table.ids[other_position];
     if constexpr (!kDense) {
-      const SphereInstance other = load_sorted(args_.sorted + other_position);
+      const SphereInstance other = load_sorted(args_.table.sorted + other_position);
       const std::uint32_t key = storage_.rows.keys[slot][thread];
       if (!is_in_row(other, key, storage_.rows.levels[slot][thread])) return;
     }
@@ -249,11 +247,11 @@ class Searcher {
     return cell.level == level && row_of(cell.y, cell.z, cell.level) == key;
   }
 
-  /// Gives the pair to its sphere a, which is at `position`.
+  /// Appends b to row a, whose sphere is at `position`.
   __device__ void add_pair(std::uint32_t position, std::uint32_t a, std::uint32_t b) {
     const std::uint32_t rank = count_up(position);
     if (rank < kSlots) {
-      args_.partners[std::size_t{position} * kSlots + rank] = b;
+      args_.scratch.neighbors[std::size_t{position} * kSlots + rank] = b;
       return;
     }
     const unsigned active = __activemask();
@@ -263,16 +261,17 @@ class Searcher {
       at = atomicAdd(&args_.state->overflow, static_cast<unsigned>(__popc(active)));
     }
     at = __shfl_sync(active, at, leader) + static_cast<unsigned>(__popc(active & lanes_below()));
-    if (at < args_.capacity) args_.overflow[at] = {a, b, rank};
+    if (at < args_.rows.capacity) args_.rows.overflow[at] = {a, b, rank};
   }
 
-  /// One atomic for all lanes of the same sphere a: a huge one has a million pairs.
+  /// One atomic for all lanes with the same sphere a, because a large sphere can have a million
+  /// pairs.
   __device__ std::uint32_t count_up(std::uint32_t position) {
     const unsigned peers = __match_any_sync(__activemask(), position);
     const int leader = __ffs(static_cast<int>(peers)) - 1;
     std::uint32_t rank = 0;
     if (static_cast<int>(lane_id()) == leader) {
-      rank = atomicAdd(&args_.counts[position], static_cast<unsigned>(__popc(peers)));
+      rank = atomicAdd(&args_.rows.counts[position], static_cast<unsigned>(__popc(peers)));
     }
     return __shfl_sync(peers, rank, leader) + static_cast<unsigned>(__popc(peers & lanes_below()));
   }
@@ -281,21 +280,21 @@ class Searcher {
   const GridPlan& plan_;
   SearchStorage<kDense>& storage_;
   std::uint32_t found_ = 0;  // pairs that this thread added
-  // The sphere that is searched for.
+  // The sphere whose neighbors are searched.
   std::uint32_t position_ = 0;
   SphereInstance self_;
   GridCell cell_{};
-  std::uint32_t levels_ = 0;  // wider levels to visit
+  std::uint32_t levels_ = 0;  // wider levels that remain to be searched
   int widest_far_ = 0;
-  // The level that is looked at, its cells in reach, and its next row.
+  // The level that is searched, its cells within the search radius, and its next row.
   int level_ = 0;
-  Real doubt_ = 0;  // of excess(), there
+  Real error_bound_ = 0;  // of excess() on this level
   std::int32_t x0_ = 0, x1_ = 0, y0_ = 0, y1_ = 0, z1_ = 0, y_ = 0, z_ = 0;
-  std::uint32_t row_ = 0, next_row_ = 0, next_slice_ = 0;  // where it is in a dense table
+  std::uint32_t row_ = 0, next_row_ = 0, next_slice_ = 0;  // buckets in a dense table
   bool own_row_is_next_ = false;
-  unsigned ranges_ = 0;    // rows that were looked up
-  unsigned held_ = 0;      // candidates that wait to be taken
-  bool in_doubt_ = false;  // whether one of them may not touch
+  unsigned ranges_ = 0;     // non-empty rows that were looked up
+  unsigned held_ = 0;       // candidates held
+  bool uncertain_ = false;  // whether one of them may be apart
 };
 
 }  // namespace cuda

@@ -1,5 +1,8 @@
-/// Tests given pairs: the batch that Bullet's pair cache asks for.
-#include "src/sphere_collider/cuda/tiles.cuh"
+/// Tests of given pairs, such as the overlapping pairs of Bullet's pair cache.
+#include "src/sphere_collider/cuda/pair_list.hpp"
+#include "src/sphere_collider/cuda/search.cuh"
+
+#include <cub/block/block_scan.cuh>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -21,12 +24,12 @@ __global__ void __launch_bounds__(kThreads)
 
 constexpr unsigned kRounds = kTouchingPerBlock / kThreads;
 
-/// The pair of this thread in a round of its block.
+/// Index of the pair that this thread tests in a round of its block.
 __device__ std::size_t pair_of_round(unsigned round) {
   return blockIdx.x * kTouchingPerBlock + round * kThreads + threadIdx.x;
 }
 
-/// Whether pair i is there and touches.
+/// Whether pair i exists and touches.
 __device__ bool find_contact(const TouchingArgs& args, std::size_t i, PairContact* contact) {
   if (i >= args.m) return false;
   const SpherePair pair = args.pairs[i];
@@ -49,19 +52,14 @@ __global__ void __launch_bounds__(kThreads) count_touching(TouchingArgs args) {
 
 __global__ void __launch_bounds__(kThreads) emit_touching(TouchingArgs args) {
   wait_for_previous_kernel();
-  __shared__ unsigned of_warp[kThreads / 32];
+  using Sums = cub::BlockScan<unsigned, kThreads, cub::BLOCK_SCAN_WARP_SCANS>;
+  __shared__ Sums::TempStorage storage;
   unsigned long long base = args.sums[blockIdx.x];
   for (unsigned round = 0; round < kRounds; ++round) {
     PairContact contact;
     const bool touch = find_contact(args, pair_of_round(round), &contact);
-    const unsigned votes = __ballot_sync(kFullWarp, touch);
-    if (lane_id() == 0) of_warp[threadIdx.x / 32] = static_cast<unsigned>(__popc(votes));
-    __syncthreads();
-    unsigned before = static_cast<unsigned>(__popc(votes & lanes_below())), all = 0;
-    for (unsigned warp = 0; warp < kThreads / 32; ++warp) {
-      if (warp < threadIdx.x / 32) before += of_warp[warp];
-      all += of_warp[warp];
-    }
+    unsigned before = 0, all = 0;
+    Sums(storage).ExclusiveSum(touch ? 1u : 0u, before, all);
     if (touch) args.touching[base + before] = contact;
     base += all;
     __syncthreads();

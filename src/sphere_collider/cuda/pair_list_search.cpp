@@ -1,7 +1,9 @@
-/// The touching pairs of a list: count, scan, emit, so that they come in the order of the list.
+/// The touching pairs of a list: kernels count, scan and emit them, which keeps the order of the
+/// list.
 #include "src/sphere_collider/cuda/pair_list_search.hpp"
 
-#include "src/sphere_collider/cuda/kernels.hpp"
+#include "src/sphere_collider/cuda/pair_list.hpp"
+#include "src/sphere_collider/cuda/scan.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -14,13 +16,12 @@ std::span<const PairContact> PairListSearch::find(const MemoryPool& pool, cudaSt
   if (pairs.empty()) return {};
   transferred_.to_device = spheres_.update(pool, stream, spheres, "spheres") +
                            pairs_.update(pool, stream, pairs, "pairs");
-  const std::size_t room = pairs.size() + pairs.size() / 4 + 64;
-  const std::size_t most_blocks = touching_blocks(room) + 1;
-  counts_.grow(pool, stream, most_blocks, "counts of touching pairs");
-  sums_.grow(pool, stream, most_blocks, "sums of touching pairs");
-  scratch_.grow(pool, stream, scan_scratch_bytes(most_blocks), "bytes for a scan");
-  touching_.grow(room, "touching pairs on the host");
-  total_.grow(1, "number of touching pairs");
+  const std::size_t sums = touching_blocks(pairs.size()) + 1;
+  counts_.reserve_geometric(pool, stream, sums, "counts of touching pairs");
+  sums_.reserve_geometric(pool, stream, sums, "sums of touching pairs");
+  scratch_.reserve_geometric(pool, stream, scan_scratch_bytes(sums), "scan scratch");
+  touching_.reserve_geometric(pairs.size(), "touching pairs on the host");
+  total_.reserve(1, "number of touching pairs");
 
   const TouchingArgs args{.spheres = spheres_.data(),
                           .pairs = pairs_.data(),
@@ -30,8 +31,7 @@ std::span<const PairContact> PairListSearch::find(const MemoryPool& pool, cudaSt
                           .touching = touching_.data(),
                           .total = total_.data()};
   launch_count_touching(args, stream);
-  exclusive_scan(counts_.data(), sums_.data(), touching_blocks(pairs.size()) + 1, scratch_.data(),
-                 scratch_.size(), stream);
+  exclusive_scan(counts_.data(), sums_.data(), sums, scratch_.data(), scratch_.capacity(), stream);
   launch_emit_touching(args, stream);
   JFPX_CUDA_TRY(cudaStreamSynchronize(stream));
   const std::size_t total = *total_.data();

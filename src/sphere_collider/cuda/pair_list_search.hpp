@@ -1,4 +1,4 @@
-/// The touching pairs of a list, from host memory to host memory.
+/// Search of the touching pairs of a list, from host memory to host memory.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>
@@ -9,10 +9,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Keeps spheres and pairs on the device between calls.
+/// Finds touching pairs. Keeps the spheres and pairs in device memory between calls, and uploads
+/// only changes.
 class PairListSearch {
  public:
-  /// Indices must have been checked. Waits for the stream.
+  /// Indices must be valid. Synchronizes the stream.
   std::span<const PairContact> find(const MemoryPool& pool, cudaStream_t stream,
                                     std::span<const SphereInstance> spheres,
                                     std::span<const SpherePair> pairs);
@@ -24,7 +25,7 @@ class PairListSearch {
   DeviceBuffer<std::uint32_t> counts_;
   DeviceBuffer<unsigned long long> sums_;
   DeviceBuffer<std::byte> scratch_;
-  PinnedBuffer<PairContact> touching_;  ///< written by the kernel, touching pairs alone
+  PinnedBuffer<PairContact> touching_;  ///< mapped: the kernel writes the touching pairs here
   PinnedBuffer<unsigned long long> total_;
   TransferredBytes transferred_;
 };

@@ -1,6 +1,6 @@
-/// Prefix sums, by CUB (decoupled look-back: Merrill and Garland 2016).
+/// Device-wide prefix sums by CUB (decoupled look-back: Merrill and Garland 2016).
 #include "src/base/cuda/cuda_try.hpp"
-#include "src/sphere_collider/cuda/kernels.hpp"
+#include "src/sphere_collider/cuda/scan.hpp"
 
 #include <cub/device/device_scan.cuh>
 
@@ -11,8 +11,8 @@ namespace {
 
 cudaError_t scan(void* scratch, std::size_t& bytes, const std::uint32_t* in,
                  unsigned long long* out, std::size_t n, cudaStream_t stream) {
-  // CUB takes the last error of the thread for its own, also one that a call of the user's has
-  // left.
+  // CUB reports the last error of the thread as its own, even if an earlier call of the user caused
+  // it.
   static_cast<void>(cudaGetLastError());
   return cub::DeviceScan::ExclusiveScan(scratch, bytes, in, out, ::cuda::std::plus<>{}, 0ull,
                                         static_cast<std::uint32_t>(n), stream);

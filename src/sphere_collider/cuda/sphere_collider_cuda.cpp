@@ -1,4 +1,4 @@
-/// Sphere contacts on a GPU, from host memory to host memory.
+/// Sphere collider on a GPU, from host memory to host memory.
 #include "src/sphere_collider/cuda/sphere_collider_cuda.hpp"
 
 #include <jfpx/cuda/sphere_collider.hpp>
@@ -18,7 +18,8 @@ inline namespace JFPX_ABI {
 namespace cuda {
 namespace {
 
-/// Up to here kernels write contacts straight into host memory: no copy, no second wait.
+/// Up to this number of spheres, kernels write the contacts directly into mapped host memory, which
+/// saves a copy and a synchronization.
 constexpr std::size_t kMaxMappedSpheres = 20'000;
 
 void check_pairs(std::span<const SpherePair> pairs, std::size_t n) {
@@ -26,9 +27,6 @@ void check_pairs(std::span<const SpherePair> pairs, std::size_t n) {
     detail::reject_pair(pairs, n);
   }
 }
-
-/// More than `count`, so that a collider whose input grows slowly does not grow each time.
-std::size_t with_slack(std::size_t count) { return count + count / 4 + 64; }
 
 class SphereColliderCuda final : public SphereCollider {
  public:
@@ -38,7 +36,7 @@ class SphereColliderCuda final : public SphereCollider {
         pool_(device_),
         searcher_(stream_.get(), device_, options.algorithm) {
     const DeviceGuard guard(device_);
-    count_.grow(1, "contact count");
+    count_.reserve(1, "contact count");
   }
   ~SphereColliderCuda() override { static_cast<void>(cudaStreamSynchronize(stream_.get())); }
 
@@ -55,10 +53,10 @@ class SphereColliderCuda final : public SphereCollider {
 
  private:
   void upload(std::span<const SphereInstance> spheres);
-  /// Leaves the contacts in contacts_on_host_ if `mapped`, else on the device. Returns their
-  /// number.
+  /// Leaves the contacts in contacts_on_host_ if `mapped`, otherwise on the device.
+  /// @return the number of contacts.
   std::size_t search(std::span<const SphereInstance> spheres, bool mapped);
-  /// What it reserves stays with what it had if there is no memory for more.
+  /// Every buffer stays as it is if there is no memory for a larger one.
   void reserve_geometric(std::size_t spheres, std::size_t contacts, bool mapped);
   void wait() { JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get())); }
 
@@ -79,9 +77,7 @@ class SphereColliderCuda final : public SphereCollider {
 };
 
 void SphereColliderCuda::upload(std::span<const SphereInstance> spheres) {
-  if (spheres.size() > spheres_.size()) {
-    spheres_.grow(pool_, stream_.get(), with_slack(spheres.size()), "spheres");
-  }
+  spheres_.reserve_geometric(pool_, stream_.get(), spheres.size(), "spheres");
   JFPX_CUDA_TRY(cudaMemcpyAsync(spheres_.data(), spheres.data(), spheres.size_bytes(),
                                 cudaMemcpyHostToDevice, stream_.get()));
 }
@@ -89,9 +85,9 @@ void SphereColliderCuda::upload(std::span<const SphereInstance> spheres) {
 std::size_t SphereColliderCuda::search(std::span<const SphereInstance> spheres, bool mapped) {
   reserve_geometric(spheres.size(), 4 * spheres.size(), mapped);
   while (true) {
-    searcher_.find_contacts(spheres_.data(), spheres.size(),
-                            mapped ? contacts_on_host_.data() : contacts_.data(),
-                            mapped ? contacts_on_host_.size() : contacts_.size(), count_.data());
+    searcher_.find_contacts(
+        spheres_.data(), spheres.size(), mapped ? contacts_on_host_.data() : contacts_.data(),
+        mapped ? contacts_on_host_.capacity() : contacts_.capacity(), count_.data());
     wait();
     const ContactCount& count = *count_.data();
     if (count.first_invalid != kNoSphere) detail::reject_sphere(spheres);
@@ -102,18 +98,16 @@ std::size_t SphereColliderCuda::search(std::span<const SphereInstance> spheres, 
 
 void SphereColliderCuda::reserve_geometric(std::size_t spheres, std::size_t contacts, bool mapped) {
   if (spheres > spheres_reserved_ || contacts > contacts_reserved_) {
-    const std::size_t more_spheres =
-        spheres > spheres_reserved_ ? with_slack(spheres) : spheres_reserved_;
-    const std::size_t more_contacts =
-        contacts > contacts_reserved_ ? with_slack(contacts) : contacts_reserved_;
+    const std::size_t more_spheres = geometric_capacity(spheres_reserved_, spheres);
+    const std::size_t more_contacts = geometric_capacity(contacts_reserved_, contacts);
     searcher_.reserve(more_spheres, more_contacts);
     spheres_reserved_ = more_spheres;
     contacts_reserved_ = more_contacts;
   }
-  if (mapped && contacts > contacts_on_host_.size()) {
-    contacts_on_host_.grow(with_slack(contacts), "contacts on the host");
-  } else if (!mapped && contacts > contacts_.size()) {
-    contacts_.grow(pool_, stream_.get(), with_slack(contacts), "contacts");
+  if (mapped) {
+    contacts_on_host_.reserve_geometric(contacts, "contacts on the host");
+  } else {
+    contacts_.reserve_geometric(pool_, stream_.get(), contacts, "contacts");
   }
 }
 
@@ -127,7 +121,7 @@ ContactSpan SphereColliderCuda::find_contacts(std::span<const SphereInstance> sp
   const bool mapped = spheres.size() <= kMaxMappedSpheres;
   const std::size_t found = search(spheres, mapped);
   if (!mapped && found > 0) {
-    contacts_on_host_.grow(with_slack(found), "contacts on the host");
+    contacts_on_host_.reserve_geometric(found, "contacts on the host");
     JFPX_CUDA_TRY(cudaMemcpyAsync(contacts_on_host_.data(), contacts_.data(),
                                   found * sizeof(SphereContact), cudaMemcpyDeviceToHost,
                                   stream_.get()));
@@ -143,14 +137,13 @@ std::span<const PairResult> SphereColliderCuda::test_pairs(std::span<const Spher
   if (pairs.empty()) return {};
   const DeviceGuard guard(device_);
   upload(spheres);
-  const std::size_t room = with_slack(pairs.size());
-  pairs_.grow(pool_, stream_.get(), room, "pairs");
-  if (room > results_.size()) {
-    results_.grow(pool_, stream_.get(), room, "pair results");
-    // In double a result has padding, which no kernel writes but the copy reads.
-    JFPX_CUDA_TRY(cudaMemsetAsync(results_.data(), 0, room * sizeof(PairResult), stream_.get()));
+  pairs_.reserve_geometric(pool_, stream_.get(), pairs.size(), "pairs");
+  if (results_.reserve_geometric(pool_, stream_.get(), pairs.size(), "pair results")) {
+    // In double precision a result has padding, which no kernel writes but the copy reads.
+    JFPX_CUDA_TRY(cudaMemsetAsync(results_.data(), 0, results_.capacity() * sizeof(PairResult),
+                                  stream_.get()));
   }
-  results_on_host_.grow(room, "pair results on the host");
+  results_on_host_.reserve_geometric(pairs.size(), "pair results on the host");
   JFPX_CUDA_TRY(cudaMemcpyAsync(pairs_.data(), pairs.data(), pairs.size_bytes(),
                                 cudaMemcpyHostToDevice, stream_.get()));
   searcher_.test_pairs(spheres_.data(), pairs_.data(), pairs.size(), results_.data());

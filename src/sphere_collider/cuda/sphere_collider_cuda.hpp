@@ -1,4 +1,4 @@
-/// The cuda row of the backend table.
+/// Factory of the CUDA sphere collider, for the table of backends.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>

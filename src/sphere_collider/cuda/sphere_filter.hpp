@@ -1,5 +1,5 @@
-/// Cheap tests that are right wherever they decide: what they leave in doubt goes through the exact
-/// formula.
+/// Filtered predicates for sphere pairs: cheap tests that never contradict the exact one. Pairs
+/// that they cannot decide need the exact formula.
 #pragma once
 
 #include "src/collide/sphere_pair.hpp"
@@ -10,7 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Fused multiply-add on host and device, whatever the contraction flags say.
+/// Fused multiply-add on host and device, independent of the compiler's contraction flags.
 template <typename T>
 JFPX_HD inline T fused(T a, T b, T c) {
 #if defined(__CUDA_ARCH__)
@@ -20,10 +20,10 @@ JFPX_HD inline T fused(T a, T b, T c) {
 #endif
 }
 
-/// What can be said of two spheres without a square root.
+/// Bounds on the distance of two spheres, without a square root.
 struct Closeness {
-  bool near;  ///< false only if detail::test_sphere_pair() says that they do not touch
-  bool sure;  ///< true only if it says that they touch
+  bool near;     ///< false only if detail::test_sphere_pair() reports that they do not touch
+  bool certain;  ///< true only if it reports that they touch
 };
 
 /// Spheres must be valid (finite, radius > 0).
@@ -36,16 +36,15 @@ struct Closeness {
 ///  2. This test computes d2 <= D(1+u)^3 + 3t <= s^2 (1 + 9u) + 8t for any u <= 2^-24.
 ///  3. They are near iff d2 <= bound, and bound >= (s^2 (1-u) - t)(1+16u)(1-u) + min(1-u)
 ///     >= s^2 (1 + 9u) + 8t, because min, the smallest normal number, is 2^24 t or more.
-///  4. Overflow: if d2 overflows to infinity then s^2 (1+9u) + 8t exceeds the largest finite
-///  number,
-///     and the bound, which is larger by 4u s^2, overflows as well; infinity <= infinity passes.
-///  5. It is sure iff fl(d2 (1+16u) + min) < fl(s^2), where d2 >= D(1-u)^3 - 3t. Let both sides be
+/// 4. Overflow: if d2 overflows to infinity then s^2 (1+9u) + 8t exceeds the largest finite number,
+///    and the bound, which is larger by 4u s^2, overflows as well; infinity <= infinity passes.
+///  5. It is certain iff fl(d2 (1+16u) + min) < fl(s^2), where d2 >= D(1-u)^3 - 3t. Let both sides
+///  be
 ///     finite. Then d2 (1+15u) + min/2 < s^2 (1+u) + t, and the exact test computes
 ///     q <= D(1+u)^3 + 3t <= d2 (1+7u) + 8t < (s^2 (1+u) + t)(1-7u) - min/4 + 8t < s^2 (1-5u), as
 ///     min/4 exceeds 9t. So fl(sqrt(q)) <= s (1-2u)(1+u) < s: they touch.
-///  6. If fl(s^2) overflows in 5, the left side is finite, hence d2 (1+7u) + 8t, hence q; s^2
-///  exceeds
-///     all finite numbers, hence sqrt(q) < s and, as rounding is monotone, fl(sqrt(q)) <= s.
+/// 6. If fl(s^2) overflows in 5, the left side is finite, hence d2 (1+7u) + 8t, hence q; s^2
+///    exceeds all finite numbers, hence sqrt(q) < s and, as rounding is monotone, fl(sqrt(q)) <= s.
 JFPX_HD inline Closeness closeness(const SphereInstance& a, const SphereInstance& b) {
   constexpr Real kSlack = 1 + 8 * std::numeric_limits<Real>::epsilon();
   constexpr Real kLeast = std::numeric_limits<Real>::min();
@@ -57,17 +56,17 @@ JFPX_HD inline Closeness closeness(const SphereInstance& a, const SphereInstance
   return {!(d2 > fused(s2, kSlack, kLeast)), fused(d2, kSlack, kLeast) < s2};
 }
 
-/// What detail::test_sphere_pair(a, b) says about valid spheres, nearly always without its square
+/// Equals detail::test_sphere_pair(a, b).touching for valid spheres, but rarely computes its square
 /// root.
 JFPX_HD inline bool touch(const SphereInstance& a, const SphereInstance& b) {
   const Closeness c = closeness(a, b);
-  return c.near && (c.sure || detail::test_sphere_pair(a, b).touching != 0);
+  return c.near && (c.certain || detail::test_sphere_pair(a, b).touching != 0);
 }
 
-/// The square of the distance of the centres less that of the sum of the radii, nearly: half the
-/// instructions of closeness(). With e = excess(a, b) and d = doubt_of(S), where S is at least the
-/// computed sum of the radii: spheres that touch have !(e > d), and spheres with e < -d touch.
-/// Spheres must be valid.
+/// Approximates the squared distance of the centres minus the squared sum of the radii, with half
+/// the instructions of closeness(). Let e = excess(a, b) and d = error_bound_of(S), where S is at
+/// least the computed sum of the radii: spheres that touch have !(e > d), and spheres with e < -d
+/// touch. Spheres must be valid.
 ///
 /// Proof, with u, t, D and s as above and p = fl(s^2), so that |p - s^2| <= u s^2 + t.
 ///  1. If they touch, D <= s^2 (1+9u) + 8t. Each of the three sums is rounded from a number between
@@ -77,10 +76,11 @@ JFPX_HD inline bool touch(const SphereInstance& a, const SphereInstance& b) {
 ///     none is less than -p, and all errors together are at most 4.1u s^2 + 5t. If e < -d then
 ///     D < s^2 - d + 4.1u s^2 + 5t. But spheres that do not touch have fl(sqrt(q)) > s, hence
 ///     q >= s^2 (1-2u), with q <= D (1+u)^3 + 3t: D >= s^2 (1-6u) - 4t.
-///  3. d >= 18u S^2 (1-u)^3 - 18u t + min (1-u) >= 16u s^2 + 2^23 t: more than 1 and 2 ask for.
-///  4. Overflow: if S^2 overflows, d is infinite, and nothing is excluded and nothing sure, NaN
-///     included. Else p is finite; where a sum overflows, D exceeds p by far more than touching
-///     spheres can have it, and e is infinite.
+/// 3. d >= 18u S^2 (1-u)^3 - 18u t + min (1-u) >= 16u s^2 + 2^23 t, which is more than 1 and 2
+///    require.
+/// 4. Overflow: if S^2 overflows, d is infinite, so that no pair is excluded and no pair is
+///    certain, even if e is NaN. Otherwise p is finite; where a sum overflows, D exceeds p by far
+///    more than it can for touching spheres, and e is infinite.
 JFPX_HD inline Real excess(const SphereInstance& a, const SphereInstance& b) {
   const Real dx = a.centre.x - b.centre.x;
   const Real dy = a.centre.y - b.centre.y;
@@ -88,7 +88,7 @@ JFPX_HD inline Real excess(const SphereInstance& a, const SphereInstance& b) {
   const Real s = a.radius + b.radius;
   return fused(dx, dx, fused(dy, dy, fused(dz, dz, -(s * s))));
 }
-JFPX_HD inline Real doubt_of(Real largest_sum) {
+JFPX_HD inline Real error_bound_of(Real largest_sum) {
   constexpr Real kSlack = 9 * std::numeric_limits<Real>::epsilon();
   return fused(largest_sum * largest_sum, kSlack, std::numeric_limits<Real>::min());
 }

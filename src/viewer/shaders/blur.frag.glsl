@@ -1,4 +1,4 @@
-// Removes the 4 x 4 pattern of the occlusion pass, without mixing near and far.
+// Removes the 4 x 4 noise pattern of the occlusion pass with a depth-aware blur.
 uniform sampler2D source;
 uniform sampler2D normal_map;
 in vec3 ray;

@@ -1,4 +1,4 @@
-// Boxes: crates, plain ones, walls with a line every metre, and glass.
+// Boxes: crates, plain boxes, walls with a line every metre, and glass.
 flat in vec3 local_normal;
 flat in vec3 normal;
 flat in vec3 size;
@@ -65,7 +65,7 @@ void main() {
   vec2 uv = n.x > 0.5 ? local.zy : n.y > 0.5 ? local.xz : local.xy;
   vec2 face = n.x > 0.5 ? size.zy : n.y > 0.5 ? size.xz : size.xy;
   float seed = dot(local_normal, vec3(1.3, 2.7, 4.1));
-  if (pattern == 5) {  // glass: clear in the middle, seen at the edges
+  if (pattern == 5) {  // glass: transparent in the middle, visible at the edges
     vec2 edge = face - abs(uv);
     float width = pixel_size(length(at)) * 1.2;
     float rim = 1.0 - smoothstep(width, 2.0 * width, min(edge.x, edge.y));

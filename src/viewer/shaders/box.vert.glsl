@@ -1,4 +1,4 @@
-// A cube of 36 vertices, scaled, turned and put in its place.
+// A cube of 36 vertices, scaled, rotated and translated.
 layout(location = 0) in vec3 centre;
 layout(location = 1) in vec3 half_extents;
 layout(location = 2) in vec4 turn;

@@ -1,5 +1,5 @@
-// What every shader knows of a frame. Positions are relative to the eye, in world axes, so that
-// large coordinates keep their digits.
+// Uniforms of a frame, shared by all shaders. Positions are relative to the eye, in world axes, which
+// preserves the precision of large coordinates.
 layout(std140) uniform Frame {
   mat4 view_projection;
   mat4 light;      // position -> shadow map: xy and depth in [0, 1]
@@ -7,10 +7,10 @@ layout(std140) uniform Frame {
   vec4 ray_y;      // half a viewport up
   vec4 ray_z;      // forward; w: near plane
   vec4 sun;        // direction towards the sun; w: tangent of its blur
-  vec4 viewport;   // width, height in samples; z: far plane; w: samples of a unit of line widths
-  vec4 shadow;     // metres a texel, metres across, metres deep; w: taps, 0 for no shadows
-  vec4 occlusion;  // radius in metres; y: samples, 0 for none; z: distance where fog takes over
-  vec4 taps[MOST_TAPS];  // direction by the golden angle; z: where it lies on a disk of radius sqrt(taps)
+  vec4 viewport;   // width, height in samples; z: far plane; w: samples per unit of line widths
+  vec4 shadow;     // metres per texel, width and depth in metres; w: taps, 0 for no shadows
+  vec4 occlusion;  // radius in metres; y: samples, 0 for none; z: distance of full fog
+  vec4 taps[MAX_TAPS];  // direction by the golden angle; z: radius on a disk of radius sqrt(taps)
 };
 
 float pixel_size(float at_distance) { return ray_x.w * at_distance; }

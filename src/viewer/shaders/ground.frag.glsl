@@ -1,6 +1,6 @@
-// An endless plane with a grid, by ray casting.
-uniform vec4 plane;    // normal; w: height of the eye over it
-uniform vec4 grid_u;   // direction in the plane; w: where the eye is along it, within ten cells
+// An infinite plane with a grid, by ray casting.
+uniform vec4 plane;    // normal; w: height of the eye above it
+uniform vec4 grid_u;   // direction in the plane; w: coordinate of the eye modulo 100 cells
 uniform vec4 grid_v;
 uniform vec4 surface;  // colour; w: edge of a cell in metres
 in vec3 ray;

@@ -21,13 +21,13 @@ float noise_of_pixel() {
 }
 
 // Percentage-closer soft shadows (Fernando 2005): the blur grows with the distance to the blocker,
-// so that shadows are sharp where things touch.
+// so that contact shadows are sharp.
 float sunlight(vec3 p, vec3 n, float most_taps) {
   if (shadow.w < 1.0) return 1.0;
   float facing = max(dot(n, sun.xyz), 0.05);
   vec3 at = (light * vec4(p + n * shadow.x * 1.5, 1.0)).xyz;
   if (any(lessThan(at.xy, vec2(0.001))) || any(greaterThan(at.xy, vec2(0.999)))) return 1.0;
-  // How depth changes along the map on a surface with this normal, so that it does not shade itself.
+  // Depth gradient of a surface with this normal in the map, which prevents self-shadowing.
   vec3 n_light = vec3(light[0][0] * n.x + light[1][0] * n.y + light[2][0] * n.z,
                       light[0][1] * n.x + light[1][1] * n.y + light[2][1] * n.z, 0.0) * shadow.y;
   vec2 slope = clamp(n_light.xy / facing, -6.0, 6.0) * (shadow.y / shadow.z);
@@ -70,7 +70,7 @@ vec3 fogged(vec3 colour, vec3 p) {
   return mix(haze, colour, exp(-far_away * far_away));
 }
 
-// A surface of the given colour; gloss 1 is a clear coat that mirrors the sky.
+// A surface of the given colour; gloss 1 is a clear coat that reflects the sky.
 vec3 shaded(vec3 albedo, vec3 n, vec3 p, float gloss, float most_taps) {
   vec3 to_eye = -normalize(p);
   float open = ambient_light();

@@ -1,4 +1,4 @@
-// One triangle over the whole viewport, as far away as can be.
+// A triangle that covers the viewport at the maximum depth.
 out vec3 ray;
 
 void main() {

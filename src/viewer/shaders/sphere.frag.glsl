@@ -1,4 +1,4 @@
-// Ray-cast sphere: exact silhouette, depth and normal at any size on the screen.
+// Ray-cast sphere with exact silhouette, depth and normal at any size on the screen.
 #ifdef GL_ARB_conservative_depth
 layout(depth_greater) out float gl_FragDepth;
 #endif
@@ -51,7 +51,7 @@ void main() {
   float inner = sqrt(max(ball.w * ball.w - miss * miss, 0.0));
   vec3 p = direction * (along - inner);
   vec3 n = normalize(p - ball.xyz);
-  // What comes nearer than the near plane lies before its quad, against what was promised.
+  // A fragment in front of the near plane would violate the conservative depth of the quad.
   gl_FragDepth = max(depth_of(p), gl_FragCoord.z);
 #ifdef COLOUR_PASS
   int pattern = int(colour.w * 255.0 + 0.5);
@@ -60,7 +60,7 @@ void main() {
     float facing = max(dot(n, -direction), 0.15);
     base = pool_ball(rotate_back(orientation, n), base, pattern == 2, width / (ball.w * facing));
   }
-  // A ball of a few pixels has no room for the fine parts of its shade.
+  // A ball of a few pixels needs fewer shading samples.
   float taps_wanted = 4.0 + ball.w / width;
   result = vec4(shaded(base, n, p, 1.0, taps_wanted), coverage);
 #else

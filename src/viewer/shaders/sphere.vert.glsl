@@ -1,10 +1,10 @@
-// A quad that covers a sphere exactly as seen from the eye, or from the sun.
+// A quad that covers the exact silhouette of a sphere for the camera or the sun.
 layout(location = 0) in vec4 place;  // centre, radius
 layout(location = 1) in vec4 turn;
 layout(location = 2) in vec4 paint;  // colour; w: pattern
 
 #ifdef SMOOTH_EDGES
-const float kMargin = 0.6;  // pixels, for the half of an edge that lies outside
+const float kMargin = 0.6;  // pixels, for the outer half of an anti-aliased edge
 #else
 const float kMargin = 0.0;
 #endif
@@ -28,13 +28,13 @@ void main() {
   gl_Position = vec4((light * vec4(p, 1.0)).xyz * 2.0 - 1.0, 1.0);
 #else
   float d = length(place.xyz);
-  if (d <= radius * 1.0005) {  // the eye is inside: nothing to see
+  if (d <= radius * 1.0005) {  // the eye is inside: invisible
     at = vec3(0.0);
     gl_Position = vec4(0.0, 0.0, -2.0, 1.0);
     return;
   }
-  // Before the front of the sphere, so that no fragment lies before the quad, and behind the near
-  // plane in the corners of the picture, too.
+  // In front of the sphere, so that no fragment lies in front of the quad, and behind the near plane
+  // even in the corners of the picture.
   vec3 axis = place.xyz / d;
   float distance = max(d - radius, ray_z.w * 1.01 * length(ray_x.xyz + ray_y.xyz + ray_z.xyz));
   float half_size = distance * radius / sqrt((d - radius) * (d + radius)) + kMargin * pixel_size(distance);

@@ -1,6 +1,6 @@
-// Light to picture: averages the samples of each pixel after tone mapping, then sRGB.
+// Tone mapping: averages the tone-mapped samples of each pixel and converts to sRGB.
 uniform sampler2D source;
-uniform int scale;  // samples along an edge of a pixel
+uniform int scale;  // samples per pixel along each axis
 uniform ivec2 origin;
 in vec3 ray;
 layout(location = 0) out vec4 result;

@@ -1,4 +1,5 @@
-/// The contract of SphereCollider on x86: every algorithm, vector width and some thread counts.
+/// The contract of SphereCollider on the CPU: every algorithm, every vector width and some thread
+/// counts.
 #include "tests/support/sphere_collider_contract.hpp"
 
 namespace jfpx {

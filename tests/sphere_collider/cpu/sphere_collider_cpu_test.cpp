@@ -1,4 +1,4 @@
-/// What only the x86 collider has: sizes beyond brute force, the automatic choice, the processor.
+/// Tests of the CPU collider only: large inputs, the automatic choice of the algorithm, options.
 #include "tests/support/sphere_collider_contract.hpp"
 
 #include <set>
@@ -31,7 +31,7 @@ TEST(SphereColliderCpu, TwentyThousandSpheresEqualBruteForce) {
   }
 }
 
-// Beyond brute force: the two algorithms share the vector filter and nothing else.
+// Too large for brute force. The two algorithms have only the vector filter in common.
 TEST(SphereColliderCpu, AlgorithmsAgreeOnAllKindsOfTensOfThousands) {
   const auto sorted = make(SphereAlgorithm::sorted_tiles, 2);
   const auto all = make(SphereAlgorithm::all_pairs, 2);
@@ -44,17 +44,17 @@ TEST(SphereColliderCpu, AlgorithmsAgreeOnAllKindsOfTensOfThousands) {
   }
 }
 
-// A row longer than any comparison sort would be kind to, and one sphere in every cell's way.
-TEST(SphereColliderCpu, AGiantTouchesEveryGrain) {
+// One row is too long for a comparison sort, and one sphere overlaps all cells.
+TEST(SphereColliderCpu, ALargeSphereTouchesEverySmallOne) {
   Random random(base_seed());
-  auto spheres = sphere_kind("one_giant").make(100000, random);
+  auto spheres = sphere_kind("one_large").make(100000, random);
   const auto collider = make(SphereAlgorithm::sorted_tiles, 2);
   const ContactSpan contacts = collider->find_contacts(spheres);
   std::set<SphereIndex> touched;
-  SphereIndex giant = 0;
-  while (spheres[giant].radius < 1) ++giant;
+  SphereIndex large = 0;
+  while (spheres[large].radius < 1) ++large;
   for (const SphereContact& c : contacts) {
-    if (c.a == giant || c.b == giant) touched.insert(c.a == giant ? c.b : c.a);
+    if (c.a == large || c.b == large) touched.insert(c.a == large ? c.b : c.a);
   }
   EXPECT_EQ(touched.size(), spheres.size() - 1) << seed_note();
   EXPECT_TRUE(std::is_sorted(contacts.begin(), contacts.end(), [](const auto& p, const auto& q) {
@@ -62,7 +62,7 @@ TEST(SphereColliderCpu, AGiantTouchesEveryGrain) {
   }));
 }
 
-// So wide on every axis that the number of cells overflows 64 bits: empty ones are skipped.
+// The number of cells overflows 64 bits, so empty cells are skipped.
 TEST(SphereColliderCpu, ClustersAtTheCornersOfAnEnormousWorldAreFound) {
   Random random(base_seed());
   std::vector<SphereInstance> spheres;
@@ -74,7 +74,8 @@ TEST(SphereColliderCpu, ClustersAtTheCornersOfAnEnormousWorldAreFound) {
     for (int i = 0; i < 300; ++i) {
       const Vec3 offset = random.uniform_in_box({-9, -9, -9}, {9, 9, 9}) * radius;
       spheres.push_back({middle + offset, radius});
-      spheres.push_back({offset * Real(0.001), radius * Real(0.001)});  // dust in the middle
+      spheres.push_back(
+          {offset * Real(0.001), radius * Real(0.001)});  // small spheres in the middle
     }
   }
   shuffle(spheres, random);
@@ -83,10 +84,10 @@ TEST(SphereColliderCpu, ClustersAtTheCornersOfAnEnormousWorldAreFound) {
       << seed_note();
 }
 
-// Empty cells are skipped, and still there are more than 64 bits can count: about two a sphere on
-// each axis, (2 * 10^6)^3 > 2^62. So cells are halved in number. Who touches is known: who lies at
-// the same place.
-TEST(SphereColliderCpu, AMillionSpheresStrewnAcrossAnEnormousWorldAreFound) {
+// Even without empty cells the number of cells exceeds 64 bits: about two per sphere on each axis,
+// (2 * 10^6)^3 > 2^62. Therefore cells are merged. The contacts are known: spheres with the same
+// centre.
+TEST(SphereColliderCpu, AMillionSpheresAcrossAnEnormousWorldAreFound) {
   Random random(base_seed());
   constexpr std::size_t kCount = 1'000'000, kTouching = 1000;
   constexpr Real kFar = Real(1e9);
@@ -106,9 +107,9 @@ TEST(SphereColliderCpu, AMillionSpheresStrewnAcrossAnEnormousWorldAreFound) {
   EXPECT_EQ(found, expected) << seed_note();
 }
 
-// A body that fell out of the world must not make everyone else's cells coarse: this takes a
-// fraction of a second, or minutes.
-TEST(SphereColliderCpu, OneSphereAtTheEndOfTheWorldChangesNothingForTheOthers) {
+// A body that fell out of the world must not increase the cell size of the others. Otherwise this
+// test takes minutes instead of a fraction of a second.
+TEST(SphereColliderCpu, DistantSpheresDoNotCoarsenTheCellsOfTheOthers) {
   Random random(base_seed());
   auto spheres = make_gas(200000, 1, 3, random);
   const auto collider = make(SphereAlgorithm::sorted_tiles, 2);
@@ -119,7 +120,7 @@ TEST(SphereColliderCpu, OneSphereAtTheEndOfTheWorldChangesNothingForTheOthers) {
   EXPECT_TRUE(same_bits(collider->find_contacts(spheres), expected)) << seed_note();
 }
 
-TEST(SphereColliderCpu, AutomaticChoosesBySizeAndSaysWhat) {
+TEST(SphereColliderCpu, AutomaticChoosesBySizeAndReportsTheAlgorithm) {
   Random random(base_seed());
   const auto collider = make(SphereAlgorithm::automatic);
   EXPECT_EQ(collider->algorithm(), SphereAlgorithm::automatic);
@@ -137,7 +138,7 @@ TEST(SphereColliderCpu, TheBackendTableNamesTheProcessor) {
   EXPECT_NE(status.device.find(", "), std::string::npos) << status.device;
 }
 
-TEST(SphereColliderCpu, OptionsThatAreNoneAreRejected) {
+TEST(SphereColliderCpu, InvalidOptionsAreRejected) {
   for (const Backend backend : {Backend::automatic, Backend::cpu}) {
     EXPECT_THROW(
         make_sphere_collider({.backend = backend, .algorithm = static_cast<SphereAlgorithm>(3)}),

@@ -1,4 +1,4 @@
-/// The contract of SphereCollider on CUDA: every algorithm.
+/// Instantiates the SphereCollider contract for CUDA: one case per algorithm.
 #include "tests/support/sphere_collider_contract.hpp"
 
 namespace jfpx {

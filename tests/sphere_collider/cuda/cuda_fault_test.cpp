@@ -1,4 +1,4 @@
-/// What the CUDA collider does when the device or the memory is not there, or goes.
+/// Behaviour of the CUDA collider when the device or memory is missing or lost.
 #include <jfpx/error.hpp>
 
 #include "tests/sphere_collider/cuda/cuda_fixture.hpp"
@@ -10,7 +10,7 @@ inline namespace JFPX_ABI {
 namespace test {
 namespace {
 
-TEST(CudaBackend, WithoutADeviceItIsUnavailableAndSaysWhy) {
+TEST(CudaBackend, WithoutADeviceItIsUnavailableWithAReason) {
   const BackendStatus status = probe();
   if (status.usable) GTEST_SKIP() << "there is a device: " << status.device;
   EXPECT_FALSE(status.reason.empty());
@@ -23,12 +23,6 @@ TEST(CudaBackend, WithoutADeviceItIsUnavailableAndSaysWhy) {
   }
   EXPECT_THROW(DeviceSphereCollider(nullptr), BackendUnavailable);
   EXPECT_EQ(make_sphere_collider({})->backend(), Backend::cpu);
-}
-
-TEST(CudaBackend, HeadersOfAnotherBuildAreRefusedBeforeTheDeviceIsAsked) {
-  const Build other{detail::pack_build(JFPX_VERSION_MAJOR, JFPX_VERSION_MINOR + 1, sizeof(Real),
-                                       sizeof(detail::LayoutProbe))};
-  EXPECT_THROW(DeviceSphereCollider(nullptr, 0, SphereAlgorithm::automatic, other), BuildMismatch);
 }
 
 TEST(CudaBackend, ADeviceThatIsNotThereIsUnavailable) {
@@ -47,7 +41,8 @@ TEST(CudaBackend, ADriverThatIsMissingOrTooOldIsNamed) {
             0u);
 }
 
-/// Fails every CUDA call of `work` in turn, until it makes fewer calls than that.
+/// Runs `work` repeatedly: in run k, its CUDA call number k fails. Ends when `work` makes fewer
+/// calls.
 template <typename Work>
 void with_every_call_failing(cudaError_t error, Work&& work) {
   for (long call = 0; call < 500; ++call) {
@@ -80,7 +75,7 @@ TEST_F(Cuda, AnyFailingCallIsAnErrorAndTheColliderGoesOn) {
          {SphereAlgorithm::automatic, SphereAlgorithm::sorted_tiles}) {
       std::unique_ptr<SphereCollider> collider;
       with_every_call_failing(error, [&] {
-        collider = make(algorithm);  // anew each time: what grows, grows under the fault
+        collider = make(algorithm);  // a new one, so that buffers grow while a call fails
         collider->find_contacts(spheres);
         collider->test_pairs(spheres, pairs);
         collider->find_touching(spheres, pairs);
@@ -96,6 +91,37 @@ TEST_F(Cuda, AnyFailingCallIsAnErrorAndTheColliderGoesOn) {
   }
 }
 
+// The copies of a list in device memory and in pinned memory grow one after the other. If the
+// second allocation fails, the next call must still grow the second copy.
+TEST_F(Cuda, AFailedCallForAPairListLeavesTheColliderUsable) {
+  Random random(base_seed());
+  const auto spheres = sphere_kind("uniform").make(3000, random);
+  std::vector<SpherePair> pairs(20'000);
+  for (SpherePair& p : pairs) {
+    p = {static_cast<SphereIndex>(random.below(3000)),
+         static_cast<SphereIndex>(random.below(3000))};
+  }
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const auto expected = cpu->find_touching(spheres, pairs);
+  const std::vector<SpherePair> few(10, {1, 2});
+  for (long call = 0; call < 100; ++call) {
+    const auto collider = make();
+    collider->find_touching(std::span(spheres).first(10), few);
+    inject_fault(call, cudaErrorMemoryAllocation);
+    bool threw = false;
+    try {
+      collider->find_touching(spheres, pairs);
+    } catch (const Error&) {
+      threw = true;
+    }
+    inject_fault(-1, cudaSuccess);
+    ASSERT_TRUE(same_bits(collider->find_touching(spheres, pairs), expected))
+        << "call " << call << ", " << seed_note();
+    if (!threw) return;
+  }
+  ADD_FAILURE() << "more than 100 CUDA calls";
+}
+
 TEST_F(Cuda, NothingLeaksWhetherItFailsOrNot) {
   Random random(base_seed());
   const auto spheres = sphere_kind("uniform").make(30'000, random);
@@ -105,6 +131,33 @@ TEST_F(Cuda, NothingLeaksWhetherItFailsOrNot) {
   for (int i = 0; i < 10; ++i) use();
   with_every_call_failing(cudaErrorMemoryAllocation, use);
   EXPECT_EQ(free_bytes(), before);
+}
+
+// Buffers have slack. A size that grows by one element per call must use it, instead of a
+// reallocation per call. A reallocated buffer has another address, because the old one is freed
+// last.
+TEST_F(Cuda, SlowlyGrowingCallsReallocateSeldom) {
+  const auto spheres = make_lattice(30, Real(1.9));
+  const auto collider = make();
+  const void* last[3] = {};
+  int reallocations[3] = {};
+  const auto note = [&](int which, const void* data) {
+    if (data == last[which]) return;
+    last[which] = data;
+    ++reallocations[which];
+  };
+  std::vector<SpherePair> pairs;
+  for (SphereIndex i = 0; i < 1200; ++i) {
+    pairs.push_back({i, i + 1});
+    if (i < 1000) continue;
+    note(0, collider->test_pairs(spheres, pairs).data());
+    note(1, collider->find_touching(spheres, pairs).data());
+    const std::size_t n = 21'000 + 20 * (i - 1000);  // contacts are copied, not mapped
+    note(2, collider->find_contacts(std::span(spheres).first(n)).data());
+  }
+  EXPECT_EQ(reallocations[0], 1) << "test_pairs";
+  EXPECT_EQ(reallocations[1], 1) << "find_touching";
+  EXPECT_EQ(reallocations[2], 1) << "find_contacts";
 }
 
 TEST_F(Cuda, WarmCallsTakeNoMemory) {
@@ -119,7 +172,7 @@ TEST_F(Cuda, WarmCallsTakeNoMemory) {
   EXPECT_EQ(free_bytes(), before);
 }
 
-// Memory is taken away for real: all of it but less than a search needs.
+// The test allocates all device memory except for less than a search needs.
 TEST_F(Cuda, WithoutDeviceMemoryASearchNamesTheBytesAndTheColliderGoesOn) {
   constexpr std::size_t kLeft = std::size_t{256} << 20;
   Random random(base_seed());
@@ -148,12 +201,12 @@ TEST_F(Cuda, WithoutDeviceMemoryASearchNamesTheBytesAndTheColliderGoesOn) {
   EXPECT_TRUE(same_bits(collider->find_contacts(few), expected)) << seed_note();
 }
 
-/// In a process of its own: a kernel that reads where nothing is takes the device from the process.
-/// Exits with 0 if everything is refused with a reason and can still be destroyed.
+/// Runs in a separate process: after a kernel reads an invalid address, the process cannot use the
+/// device any more. Exits with 0 if every call throws and every object can still be destroyed.
 [[noreturn]] void lose_the_device() {
   const auto check = [](bool holds, const char* what) {
     if (holds) return;
-    std::fprintf(stderr, "not so: %s\n", what);
+    std::fprintf(stderr, "check failed: %s\n", what);
     std::exit(1);
   };
   {
@@ -187,7 +240,7 @@ TEST_F(Cuda, WithoutDeviceMemoryASearchNamesTheBytesAndTheColliderGoesOn) {
       check(is_refused([&] { collider->test_pairs(spheres, pairs); }), "test_pairs is refused");
     }
     const BackendStatus status = probe();
-    check(!status.usable && !status.reason.empty(), "the backend says that it is not usable");
+    check(!status.usable && !status.reason.empty(), "the backend reports that it is not usable");
     try {
       make_sphere_collider({.backend = Backend::cuda});
       check(false, "no new collider can be made");

@@ -1,5 +1,5 @@
-/// Every kernel on as few spheres as bring it about, for checking tools that make it a thousand
-/// times slower: scripts/sanitize-cuda runs these. The oracle is x86.
+/// Every kernel with the smallest input that launches it, for checking tools that slow it down a
+/// thousand times: scripts/sanitize-cuda runs these tests. The reference is the CPU.
 #include "tests/sphere_collider/cuda/cuda_fixture.hpp"
 
 namespace jfpx {
@@ -7,37 +7,35 @@ inline namespace JFPX_ABI {
 namespace test {
 namespace {
 
-/// Searches twice, so that what a search leaves to the next one counts.
-void expect_contacts_of_x86(const Spheres& spheres, SphereAlgorithm algorithm, const char* what) {
-  const auto x86 = make_sphere_collider({.backend = Backend::cpu});
+/// Searches twice, because a search clears the state of the next one.
+void expect_cpu_contacts(const Spheres& spheres, SphereAlgorithm algorithm, const char* what) {
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
   const auto collider = make_sphere_collider({.backend = Backend::cuda, .algorithm = algorithm});
   for (int repeat = 0; repeat < 2; ++repeat) {
-    EXPECT_TRUE(same_bits(collider->find_contacts(spheres), x86->find_contacts(spheres)))
+    EXPECT_TRUE(same_bits(collider->find_contacts(spheres), cpu->find_contacts(spheres)))
         << what << ", N = " << spheres.size() << ", " << seed_note();
   }
 }
 
 TEST_F(Cuda, FewSpheresInOneCluster) {
   Random random(base_seed());
-  expect_contacts_of_x86(make_gas(300, Real(0.5), 3, random), SphereAlgorithm::automatic, "gas");
+  expect_cpu_contacts(make_gas(300, Real(0.5), 3, random), SphereAlgorithm::automatic, "gas");
 }
 
 TEST_F(Cuda, FewSpheresAsAllPairs) {
   Random random(base_seed());
-  expect_contacts_of_x86(make_gas(1100, Real(0.5), 3, random), SphereAlgorithm::all_pairs, "gas");
+  expect_cpu_contacts(make_gas(1100, Real(0.5), 3, random), SphereAlgorithm::all_pairs, "gas");
 }
 
 TEST_F(Cuda, FewSpheresInCellsWithRoom) {
   Random random(base_seed());
-  expect_contacts_of_x86(make_gas(2000, Real(0.5), 3, random), SphereAlgorithm::sorted_tiles,
-                         "gas");
+  expect_cpu_contacts(make_gas(2000, Real(0.5), 3, random), SphereAlgorithm::sorted_tiles, "gas");
 }
 
 TEST_F(Cuda, FewSpheresInOneLaunch) {
   Random random(base_seed());
-  for (const char* const name : {"polydisperse", "outliers", "one_giant"}) {
-    expect_contacts_of_x86(sphere_kind(name).make(1500, random), SphereAlgorithm::sorted_tiles,
-                           name);
+  for (const char* const name : {"polydisperse", "outliers", "one_large"}) {
+    expect_cpu_contacts(sphere_kind(name).make(1500, random), SphereAlgorithm::sorted_tiles, name);
   }
 }
 
@@ -45,13 +43,14 @@ TEST_F(Cuda, FewSpheresInManyLaunches) {
   constexpr std::size_t kFewest = (1 << 18) + 1;
   Random random(base_seed());
   auto gas = make_gas(kFewest, Real(0.5), 1, random);
-  for (std::size_t i = 0; i < 50; ++i) gas[999 * i].centre = gas[7].centre;  // is crowded
-  expect_contacts_of_x86(gas, SphereAlgorithm::automatic, "gas with a crowd");
-  auto mixed = make_gas(kFewest, Real(0.5), 20, random);  // some ten spheres a widest cell
+  for (std::size_t i = 0; i < 50; ++i) gas[999 * i].centre = gas[7].centre;  // a long row
+  expect_cpu_contacts(gas, SphereAlgorithm::automatic, "gas with coincident spheres");
+  auto mixed =
+      make_gas(kFewest, Real(0.5), 20, random);  // about ten spheres per cell of the widest level
   for (SphereInstance& s : mixed) s.radius *= random.uniform(Real(0.04), 1);
-  expect_contacts_of_x86(mixed, SphereAlgorithm::automatic, "radii over 1.4 decades");
+  expect_cpu_contacts(mixed, SphereAlgorithm::automatic, "radii over 1.4 decades");
   for (std::size_t i = 0; i < 100; ++i) mixed[999 * i].centre *= 1e6;
-  expect_contacts_of_x86(mixed, SphereAlgorithm::automatic, "the same with outliers");
+  expect_cpu_contacts(mixed, SphereAlgorithm::automatic, "the same with outliers");
 }
 
 TEST_F(Cuda, FewPairsOfAList) {
@@ -61,12 +60,12 @@ TEST_F(Cuda, FewPairsOfAList) {
   for (SpherePair& p : pairs) {
     p = {static_cast<SphereIndex>(random.below(200)), static_cast<SphereIndex>(random.below(200))};
   }
-  const auto x86 = make_sphere_collider({.backend = Backend::cpu});
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
   const auto collider = make();
-  EXPECT_TRUE(same_bits(collider->test_pairs(spheres, pairs), x86->test_pairs(spheres, pairs)))
+  EXPECT_TRUE(same_bits(collider->test_pairs(spheres, pairs), cpu->test_pairs(spheres, pairs)))
       << seed_note();
   EXPECT_TRUE(
-      same_bits(collider->find_touching(spheres, pairs), x86->find_touching(spheres, pairs)))
+      same_bits(collider->find_touching(spheres, pairs), cpu->find_touching(spheres, pairs)))
       << seed_note();
 }
 

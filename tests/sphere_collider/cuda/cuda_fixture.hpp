@@ -1,4 +1,4 @@
-/// What tests of the CUDA backend share.
+/// Fixtures of the tests of the CUDA backend.
 #pragma once
 
 #include <jfpx/cuda/sphere_collider.hpp>
@@ -18,7 +18,7 @@ namespace test {
 using namespace cuda;
 using Spheres = std::vector<SphereInstance>;
 
-/// Tests that need a device: skipped without one, failed if the environment insists.
+/// Tests that need a device. Without one they are skipped, or fail if JFPX_REQUIRE_CUDA is set.
 class Cuda : public testing::Test {
  protected:
   void SetUp() override {
@@ -31,7 +31,7 @@ class Cuda : public testing::Test {
   void TearDown() override {
     inject_fault(-1, cudaSuccess);
     if (usable_) {
-      EXPECT_EQ(cudaGetLastError(), cudaSuccess) << "an error was left behind";
+      EXPECT_EQ(cudaGetLastError(), cudaSuccess) << "a CUDA error was not cleared";
     }
   }
 
@@ -53,9 +53,9 @@ class Cuda : public testing::Test {
 /// Input and output of a search on a stream.
 struct DeviceData {
   explicit DeviceData(const Spheres& input, std::size_t capacity) : stream(0), pool(0) {
-    spheres.grow(pool, stream.get(), input.size() + 1, "spheres");
-    contacts.grow(pool, stream.get(), capacity + 1, "contacts");
-    count.grow(1, "count");
+    spheres.reserve(pool, stream.get(), input.size() + 1, "spheres");
+    contacts.reserve(pool, stream.get(), capacity + 1, "contacts");
+    count.reserve(1, "count");
     upload(input);
   }
   ~DeviceData() { static_cast<void>(cudaStreamSynchronize(stream.get())); }

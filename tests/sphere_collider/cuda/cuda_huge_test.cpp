@@ -1,4 +1,5 @@
-/// Sizes that need more than 32 bits or most of a large GPU. Skipped where memory is short.
+/// Sizes that need more than 32 bits or most of the memory of a large GPU. Skipped if there is
+/// less.
 #include "tests/sphere_collider/cuda/cuda_fixture.hpp"
 
 #include <cstdio>
@@ -10,7 +11,7 @@ namespace {
 
 constexpr double kGiga = 1e9;
 
-/// Slices of what is on the device, so that the host need not hold it at once.
+/// Downloads an array in slices, so that the host need not hold all of it.
 template <typename T, typename Check>
 void for_each_slice(const DeviceData& data, const T* from, std::uint64_t count, Check&& check) {
   constexpr std::uint64_t kSlice = 1 << 25;
@@ -20,8 +21,8 @@ void for_each_slice(const DeviceData& data, const T* from, std::uint64_t count, 
 }
 
 // 465^3 = 100 544 625 spheres, spacing 1.99 of 2: neighbours along the axes touch, those on
-// diagonals are 2.81 apart. So sphere a touches a+1, a+465 and a+465^2 where these are in the same
-// row, layer and cube: 3 * 465^2 * 464 contacts, each of which is looked at.
+// diagonals are 2.81 apart. So sphere a touches a+1, a+465 and a+465^2 if these are in the same
+// row, layer and cube: 3 * 465^2 * 464 contacts, each of which is checked.
 TEST_F(Cuda, AHundredMillionSpheresOfALatticeHaveAllTheirContacts) {
   constexpr std::uint64_t kN = 465, kSpheres = kN * kN * kN, kContacts = 3 * kN * kN * (kN - 1);
   const std::size_t before = free_bytes();
@@ -81,7 +82,7 @@ TEST_F(Cuda, MoreThanFourThousandMillionPairsAreFoundInOrder) {
     const Spheres spheres(kSpheres, {{-1, 2, 3}, Real(0.25)});
     DeviceData data(spheres, 1);
     DeviceBuffer<SpherePair> pairs;
-    pairs.grow(data.pool, data.stream.get(), kPairs, "pairs");
+    pairs.reserve(data.pool, data.stream.get(), kPairs, "pairs");
     DeviceSphereCollider collider(data.stream.get(), 0, algorithm);
     collider.reserve(kSpheres, kPairs);
     collider.find_pairs(data.spheres.data(), kSpheres, pairs.data(), kPairs, data.count.data());

@@ -1,8 +1,8 @@
-/// What only the CUDA collider promises: streams, graphs, threads, any size.
+/// Promises of the CUDA collider alone: streams, graphs, threads, any size.
 #include <jfpx/error.hpp>
 
 #include "src/collide/sphere_pair.hpp"
-#include "src/sphere_collider/cuda/kernels.hpp"
+#include "src/sphere_collider/cuda/grid.hpp"
 #include "tests/sphere_collider/cuda/cuda_fixture.hpp"
 
 #include <array>
@@ -17,8 +17,8 @@ namespace {
 constexpr SphereAlgorithm kAlgorithms[] = {SphereAlgorithm::all_pairs,
                                            SphereAlgorithm::sorted_tiles};
 
-// Tile, block, warp and buffer boundaries: 256 rows a tile, 32 bits a word, the largest N of one
-// launch and of mapped output.
+// Boundaries of tiles, blocks, warps and buffers: 256 rows per tile, 32 bits per word, the largest
+// N of one launch and of mapped output.
 TEST_F(Cuda, EqualsBruteForceAroundEveryBoundary) {
   Random random(base_seed());
   for (const SphereAlgorithm algorithm :
@@ -55,61 +55,62 @@ TEST_F(Cuda, AllPairsInBandsAgreesWithTheGrid) {
       << seed_note();
 }
 
-// Up to kMaxDirect spheres of about one size are not sorted, unless a cell has no room for its
-// spheres or a block none for its pairs: both are found out half-way. The oracle is x86.
+// Up to kMaxDirect spheres of similar radius are not sorted, unless a cell has too few slots for
+// its spheres or a block too few for its pairs, which the kernel detects on the way. The reference
+// is the CPU.
 TEST_F(Cuda, SearchesWithoutSortingEqualX86) {
-  const auto x86 = make_sphere_collider({.backend = Backend::cpu, .threads = 0});
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu, .threads = 0});
   const auto collider = make(SphereAlgorithm::sorted_tiles);
   Random random(base_seed());
   const auto check = [&](const Spheres& spheres, const char* what) {
     for (int repeat = 0; repeat < 2; ++repeat) {
-      ASSERT_TRUE(same_bits(collider->find_contacts(spheres), x86->find_contacts(spheres)))
+      ASSERT_TRUE(same_bits(collider->find_contacts(spheres), cpu->find_contacts(spheres)))
           << what << ", N = " << spheres.size() << ", " << seed_note();
     }
   };
   for (const std::size_t n : {10'000u, kMaxDirect - 1, kMaxDirect, kMaxDirect + 1, 100'000u}) {
     check(make_gas(n, Real(0.5), 3, random), "gas");
   }
-  auto crowded = make_gas(20'000, Real(0.5), 3, random);
-  for (std::size_t i = 0; i < 40; ++i) crowded[500 * i].centre = crowded[7].centre;
-  check(crowded, "a cell without room");
+  auto clustered = make_gas(20'000, Real(0.5), 3, random);
+  for (std::size_t i = 0; i < 40; ++i) clustered[500 * i].centre = clustered[7].centre;
+  check(clustered, "a cell with too few slots");
   // Eight spheres a cell, each in contact with 32: the first 45 have nearly all of these as b.
   auto dense = make_lattice(28, Real(0.5));
   for (SphereInstance& s : dense) s.radius = Real(0.5);
   for (std::size_t i = dense.size(); i > 1; --i) std::swap(dense[i - 1], dense[random.below(i)]);
-  check(dense, "a block without room");
+  check(dense, "a block with too few slots");
   check(make_gas(10'000, Real(0.5), 3, random), "gas again");
   auto wide = make_gas(20'000, Real(0.5), 3, random);
   for (SphereInstance& s : wide) s.radius *= random.uniform(Real(0.4), 1);
   check(wide, "radii that differ by more than two");
 }
 
-// Beyond 2^18 spheres each phase of the grid is a launch of its own. The oracle is x86.
+// For more than 2^18 spheres each phase of the grid search is a launch. The reference is the CPU.
 TEST_F(Cuda, SearchesOfManyLaunchesEqualX86) {
   constexpr std::size_t kEdge = 1 << 18;
-  const auto x86 = make_sphere_collider({.backend = Backend::cpu, .threads = 0});
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu, .threads = 0});
   const auto collider = make();
   for (const std::string_view name :
        {"uniform", "lattice", "line", "plane", "polydisperse", "far", "outliers", "touching"}) {
     Random random(base_seed());
     const std::size_t n = kEdge - 1 + random.below(3) + random.below(2) * random.below(50'000);
     const auto spheres = sphere_kind(name).make(n, random);
-    ASSERT_TRUE(same_bits(collider->find_contacts(spheres), x86->find_contacts(spheres)))
+    ASSERT_TRUE(same_bits(collider->find_contacts(spheres), cpu->find_contacts(spheres)))
         << name << ", N = " << n << ", " << seed_note();
   }
 }
 
-// A crowd in a corner of a gas: more spheres than one block sorts in shared memory, and lists of
-// all lengths for spheres of one level.
-TEST_F(Cuda, SearchesOfManyLaunchesStandACrowd) {
-  const auto x86 = make_sphere_collider({.backend = Backend::cpu, .threads = 0});
+// A dense cluster in a corner of a gas: more spheres than one block sorts in shared memory, and
+// rows of all lengths for spheres of one level.
+TEST_F(Cuda, SearchesOfManyLaunchesHandleDenseClusters) {
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu, .threads = 0});
   const auto collider = make();
   Random random(base_seed());
-  for (const std::size_t crowd : {1'000, 5'000}) {
+  for (const std::size_t cluster : {1'000, 5'000}) {
     auto spheres = make_gas(280'000, Real(0.5), 3, random);
-    for (std::size_t i = 0; i < crowd; ++i) spheres[53 * i].centre *= Real(0.03);
-    ASSERT_TRUE(same_bits(collider->find_contacts(spheres), x86->find_contacts(spheres)))
-        << crowd << ", " << seed_note();
+    for (std::size_t i = 0; i < cluster; ++i) spheres[53 * i].centre *= Real(0.03);
+    ASSERT_TRUE(same_bits(collider->find_contacts(spheres), cpu->find_contacts(spheres)))
+        << cluster << ", " << seed_note();
   }
 }
 
@@ -124,10 +125,10 @@ TEST_F(Cuda, SearchesOfManyLaunchesNameBadSpheresAndGrowTheirBuffers) {
   for (std::size_t i = 0; i < 500; ++i) spheres[599 * i].centre = between;
   EXPECT_EQ(collider->find_contacts(spheres).size(), 500u * 499 / 2);
   for (std::size_t i = 0; i < kN; ++i) spheres[i].centre = spheres[i / 200 * 200].centre;
-  const auto x86 = make_sphere_collider({.backend = Backend::cpu, .threads = 0});
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu, .threads = 0});
   const ContactSpan contacts = collider->find_contacts(spheres);
   EXPECT_GT(contacts.size(), 20'000'000u);
-  EXPECT_TRUE(same_bits(contacts, x86->find_contacts(spheres)));
+  EXPECT_TRUE(same_bits(contacts, cpu->find_contacts(spheres)));
   spheres[123'456].radius = -1;
   spheres[200'000].centre.x = std::numeric_limits<Real>::infinity();
   try {
@@ -138,18 +139,18 @@ TEST_F(Cuda, SearchesOfManyLaunchesNameBadSpheresAndGrowTheirBuffers) {
   }
 }
 
-// One sphere over 100 000 others: its list is as long as there are spheres. With index 0 it is a in
-// all of its pairs, with the last index b.
-TEST_F(Cuda, AGiantTouchesEverySphere) {
-  for (const std::size_t giant : {std::size_t{0}, std::size_t{55'555}, std::size_t{99'999}}) {
+// One sphere contains 100 000 others: its row can have n - 1 contacts. With index 0 it is a in all
+// of its pairs, with the last index b.
+TEST_F(Cuda, ALargeSphereTouchesAllOthers) {
+  for (const std::size_t large : {std::size_t{0}, std::size_t{55'555}, std::size_t{99'999}}) {
     Random random(base_seed());
     auto spheres = make_gas(100'000, Real(0.5), 1, random);
-    spheres[giant] = {{0, 0, 0}, 10'000};
+    spheres[large] = {{0, 0, 0}, 10'000};
     const auto collider = make();
     const ContactSpan contacts = collider->find_contacts(spheres);
     std::size_t found = 0;
-    for (const SphereContact& c : contacts) found += c.a == giant || c.b == giant ? 1 : 0;
-    EXPECT_EQ(found, spheres.size() - 1) << giant;
+    for (const SphereContact& c : contacts) found += c.a == large || c.b == large ? 1 : 0;
+    EXPECT_EQ(found, spheres.size() - 1) << large;
     EXPECT_TRUE(std::is_sorted(contacts.begin(), contacts.end(), [](const auto& p, const auto& q) {
       return std::pair(p.a, p.b) < std::pair(q.a, q.b);
     }));
@@ -167,7 +168,7 @@ TEST_F(Cuda, TwentyRepeatsGiveTheSameBits) {
   }
 }
 
-// What the promise of equal bits stands on: pairs of all magnitudes, near and far, on both sides.
+// Evidence for the promise of equal bits: pairs of all magnitudes, near and far, on both devices.
 TEST_F(Cuda, AThousandMillionPairsHaveTheBitsOfX86) {
   constexpr std::size_t kSpheres = 1 << 20, kPairs = 1 << 24, kRounds = 60;
   const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
@@ -197,15 +198,15 @@ TEST_F(Cuda, AThousandMillionPairsHaveTheBitsOfX86) {
     ASSERT_TRUE(same_bits(results, expected)) << "round " << round << ", " << seed_note();
     for (const PairResult& r : expected) touching += r.touching;
   }
-  EXPECT_GT(touching, kPairs / 10) << "the test must meet touching pairs";
+  EXPECT_GT(touching, kPairs / 10) << "the test must cover touching pairs";
 }
 
-// The device is told what differs from the list before, in blocks of 4 KiB, and sends back what
-// touches: nothing moves for a list that rests.
-TEST_F(Cuda, OnlyWhatChangedInAListOfPairsIsSent) {
+// Blocks of 4 KiB that differ from the previous list are uploaded, and touching pairs are
+// downloaded: an unchanged list causes no upload.
+TEST_F(Cuda, OnlyChangedBlocksOfAPairListAreUploaded) {
   Random random(base_seed());
   const auto collider = make();
-  const auto x86 = make_sphere_collider({.backend = Backend::cpu});
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
   auto spheres = sphere_kind("uniform").make(60'000, random);
   std::vector<SpherePair> pairs(300'000);
   for (SpherePair& p : pairs) {
@@ -214,7 +215,7 @@ TEST_F(Cuda, OnlyWhatChangedInAListOfPairsIsSent) {
   }
   for (SphereIndex i = 0; i < 1000; ++i) pairs[300 * i] = {i, i};
   const auto find = [&] {
-    const auto expected = x86->find_touching(spheres, pairs);
+    const auto expected = cpu->find_touching(spheres, pairs);
     EXPECT_TRUE(same_bits(collider->find_touching(spheres, pairs), expected)) << seed_note();
     EXPECT_EQ(collider->transferred().from_device, expected.size() * sizeof(PairContact) + 8);
     return collider->transferred().to_device;
@@ -229,7 +230,7 @@ TEST_F(Cuda, OnlyWhatChangedInAListOfPairsIsSent) {
   EXPECT_EQ(find(), 2 * 4096u);
   collider->find_contacts(spheres);
   collider->test_pairs(spheres, pairs);
-  EXPECT_EQ(find(), 0u) << "other calls have memory of their own";
+  EXPECT_EQ(find(), 0u) << "other calls use other buffers";
   pairs.resize(299'000);
   EXPECT_EQ(find(), 0u);
   pairs.resize(300'500, {5, 5});
@@ -406,7 +407,7 @@ TEST_F(Cuda, AbsurdSizesAreRefusedAndNothingIsLost) {
   EXPECT_TRUE(same_bits(data.download(data.contacts.data(), expected.size()), expected));
 }
 
-TEST_F(Cuda, ErrorsThatAUserHasLeftAreNotTheCollidersOwn) {
+TEST_F(Cuda, EarlierCudaErrorsOfTheUserAreNotReported) {
   Random random(base_seed());
   const auto spheres = sphere_kind("uniform").make(2000, random);
   const auto expected = brute_force(spheres);
@@ -419,7 +420,7 @@ TEST_F(Cuda, ErrorsThatAUserHasLeftAreNotTheCollidersOwn) {
   }
 }
 
-/// How much shared memory a kernel may have is set before its launch, for all threads at once.
+/// The limit of dynamic shared memory is set before each launch, and applies to all host threads.
 TEST_F(Cuda, LargeCollidersInSeveralThreadsAreIndependent) {
   Random random(base_seed());
   const auto spheres = sphere_kind("uniform").make(600'000, random);
@@ -430,7 +431,7 @@ TEST_F(Cuda, LargeCollidersInSeveralThreadsAreIndependent) {
     data.wait();
     return data.count.data()->contacts;
   };
-  constexpr int kRounds = 500;  // before, one launch of 5,000 failed
+  constexpr int kRounds = 500;  // an earlier version failed in one launch of 5,000
   {
     DeviceData data(spheres, 0);
     DeviceSphereCollider collider(data.stream.get());

@@ -1,8 +1,8 @@
-/// Hunts for pairs that touch and that the culling of the CUDA backend would lose. The same
-/// functions run in the kernels; here g++ compiles them, so no GPU is needed.
+/// Searches for touching pairs that the culling of the CUDA backend would lose. The functions are
+/// those of the kernels, compiled for the host, so that no GPU is needed.
 #include "src/collide/sphere_pair.hpp"
 #include "src/sphere_collider/cuda/grid_cells.hpp"
-#include "src/sphere_collider/cuda/lattice.hpp"
+#include "src/sphere_collider/cuda/quantized_filter.hpp"
 #include "src/sphere_collider/cuda/sphere_filter.hpp"
 #include "tests/support/sphere_fixtures.hpp"
 
@@ -17,7 +17,7 @@ namespace {
 
 using Limits = std::numeric_limits<Real>;
 
-/// A number of any magnitude, with mantissas that round badly more often than chance has it.
+/// A number of any magnitude. Powers of two, for which rounding is special, are frequent.
 Real any_magnitude(Random& random) {
   const int range = Limits::max_exponent - Limits::min_exponent + Limits::digits;
   const int exponent = Limits::min_exponent - Limits::digits +
@@ -27,7 +27,7 @@ Real any_magnitude(Random& random) {
   return value > 0 && is_finite(value) ? value : Limits::denorm_min();
 }
 
-/// Two spheres whose distance is the sum of their radii but for a few roundings, at any scale.
+/// Two spheres whose distance is the sum of their radii up to a few rounding errors, at any scale.
 struct Pair {
   SphereInstance a, b;
 };
@@ -54,20 +54,19 @@ Pair nearly_touching(Random& random) {
   return p;
 }
 
-/// Whether the search looks from the smaller sphere (or, at equal levels, from either) into the
-/// cell of the other one.
-bool is_in_reach(const SphereInstance& from, const SphereInstance& to,
-                 const cuda::GridScale& scale) {
+/// Whether a search from sphere `from` covers the cell of `to`.
+bool covers_cell_of(const SphereInstance& from, const SphereInstance& to,
+                    const cuda::GridScale& scale) {
   const cuda::GridCell cell = cuda::grid_cell_of(to, scale);
   const Real half = cuda::half_cell_of(scale.half_0, cell.level);
   const Real inverse = cuda::inverse_width(half);
-  const Real reach = cuda::reach_of(from.radius, half);
+  const Real search_radius = cuda::search_radius_of(from.radius, half);
   const std::int32_t cells[3] = {cell.x, cell.y, cell.z};
   for (int i = 0; i < 3; ++i) {
     const Real x = from.centre[i];
     const Real cells_a_metre = i == 0 ? cuda::inverse_x_of(inverse, scale) : inverse;
-    if (cells[i] < cuda::cell_of(cuda::moved(x, -reach), cells_a_metre)) return false;
-    if (cells[i] > cuda::cell_of(cuda::moved(x, reach), cells_a_metre)) return false;
+    if (cells[i] < cuda::cell_of(cuda::moved(x, -search_radius), cells_a_metre)) return false;
+    if (cells[i] > cuda::cell_of(cuda::moved(x, search_radius), cells_a_metre)) return false;
   }
   return true;
 }
@@ -81,56 +80,57 @@ TEST(CudaFilter, LetsEveryTouchingPairThrough) {
     ++touching;
     ASSERT_TRUE(cuda::closeness(p.a, p.b).near) << "pair " << i << ", " << seed_note();
   }
-  EXPECT_GT(touching, 200'000) << "the hunt must meet touching pairs";
+  EXPECT_GT(touching, 200'000) << "the test must cover touching pairs";
 }
 
 TEST(CudaFilter, DecidesAsTheExactTestDoes) {
   Random random(base_seed());
-  int sure = 0, apart = 0;
+  int certain = 0, apart = 0;
   for (int i = 0; i < 1'000'000; ++i) {
     Pair p = nearly_touching(random);
     p.a.radius *= 1 + static_cast<Real>(random.below(32)) * Limits::epsilon();
     if (!is_finite(p.a.radius)) continue;
     const bool touching = detail::test_sphere_pair(p.a, p.b).touching != 0;
     apart += touching ? 0 : 1;
-    if (cuda::closeness(p.a, p.b).sure) {
-      ++sure;
+    if (cuda::closeness(p.a, p.b).certain) {
+      ++certain;
       ASSERT_TRUE(touching) << "pair " << i << ", " << seed_note();
     }
     ASSERT_EQ(cuda::touch(p.a, p.b), touching) << "pair " << i << ", " << seed_note();
   }
-  EXPECT_GT(sure, 50'000) << "the hunt must meet pairs without doubt";
-  EXPECT_GT(apart, 50'000) << "the hunt must meet pairs that are just apart";
+  EXPECT_GT(certain, 50'000) << "the test must cover certain pairs";
+  EXPECT_GT(apart, 50'000) << "the test must cover pairs that are just apart";
 }
 
-TEST(CudaFilter, ExcessLosesNoTouchingPairAndIsSureOfNoOther) {
+TEST(CudaFilter, ExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
   Random random(base_seed());
-  int touching = 0, apart = 0, sure = 0, excluded = 0;
+  int touching = 0, apart = 0, certain = 0, excluded = 0;
   for (int i = 0; i < 2'000'000; ++i) {
     Pair p = nearly_touching(random);
     p.a.radius *= 1 + static_cast<Real>(random.below(64)) * (Limits::epsilon() / 2);
     if (!is_finite(p.a.radius)) continue;
     const Real sum = p.a.radius + p.b.radius;
-    const Real doubt = cuda::doubt_of(random.below(2) == 0 ? sum : sum * random.uniform(1, 4));
+    const Real bound =
+        cuda::error_bound_of(random.below(2) == 0 ? sum : sum * random.uniform(1, 4));
     const Real excess = cuda::excess(p.a, p.b);
     const bool is_touching = detail::test_sphere_pair(p.a, p.b).touching != 0;
     (is_touching ? touching : apart) += 1;
-    if (excess > doubt) {
+    if (excess > bound) {
       ++excluded;
       ASSERT_FALSE(is_touching) << "pair " << i << ", " << seed_note();
     }
-    if (excess < -doubt) {
-      ++sure;
+    if (excess < -bound) {
+      ++certain;
       ASSERT_TRUE(is_touching) << "pair " << i << ", " << seed_note();
     }
   }
-  EXPECT_GT(touching, 400'000) << "the hunt must meet touching pairs";
-  EXPECT_GT(apart, 100'000) << "the hunt must meet pairs that are just apart";
-  EXPECT_GT(sure, 10'000) << "what is never sure would pass";
-  EXPECT_GT(excluded, 1'000) << "what excludes nothing would pass";
+  EXPECT_GT(touching, 400'000) << "the test must cover touching pairs";
+  EXPECT_GT(apart, 100'000) << "the test must cover pairs that are just apart";
+  EXPECT_GT(certain, 10'000) << "a filter that is never certain would pass";
+  EXPECT_GT(excluded, 1'000) << "a filter that excludes nothing would pass";
 }
 
-// Where the square of the sum overflows, nothing is sure but what is true.
+// No decision may be wrong if the square of the sum of the radii overflows.
 TEST(CudaFilter, IsRightWhereSquaresOverflow) {
   const Real huge = std::sqrt(Limits::max());
   for (const Real scale : {Real(0.25), Real(0.5), Real(0.70710678), Real(1), Real(1.5), Real(2)}) {
@@ -140,14 +140,14 @@ TEST(CudaFilter, IsRightWhereSquaresOverflow) {
           b{{huge * scale * distance, 0, 0}, huge * scale};
       const bool touching = detail::test_sphere_pair(a, b).touching != 0;
       EXPECT_EQ(cuda::touch(a, b), touching) << scale << " " << distance;
-      const Real doubt = cuda::doubt_of(a.radius + b.radius), excess = cuda::excess(a, b);
-      EXPECT_FALSE(touching && excess > doubt) << scale << " " << distance;
-      EXPECT_FALSE(!touching && excess < -doubt) << scale << " " << distance;
+      const Real bound = cuda::error_bound_of(a.radius + b.radius), excess = cuda::excess(a, b);
+      EXPECT_FALSE(touching && excess > bound) << scale << " " << distance;
+      EXPECT_FALSE(!touching && excess < -bound) << scale << " " << distance;
     }
   }
 }
 
-// A filter that lets everything through would pass the first test.
+// A filter that accepts every pair would pass the first test.
 TEST(CudaFilter, StopsPairsThatAreApartByMoreThanRoundings) {
   Random random(base_seed());
   for (int i = 0; i < 100'000; ++i) {
@@ -160,14 +160,14 @@ TEST(CudaFilter, StopsPairsThatAreApartByMoreThanRoundings) {
   }
 }
 
-TEST(CudaGrid, TouchingSpheresAreInReachOfEachOther) {
+TEST(CudaGrid, TouchingSpheresAreWithinTheSearchRadius) {
   Random random(base_seed());
   int touching = 0;
   for (int i = 0; i < 1'000'000; ++i) {
     const Pair p = nearly_touching(random);
     if (detail::test_sphere_pair(p.a, p.b).touching == 0) continue;
     ++touching;
-    // A third, larger sphere may have set the scale.
+    // The scale may depend on a third, larger sphere.
     Real half_0 = cuda::half_cell_for_radius(std::max(p.a.radius, p.b.radius));
     if (random.below(2) == 0) half_0 = std::max(half_0, half_0 * random.uniform(1, 1000));
     if (!is_finite(half_0)) continue;
@@ -179,10 +179,10 @@ TEST(CudaGrid, TouchingSpheresAreInReachOfEachOther) {
     }
     const auto note = [&] { return "pair " + std::to_string(i) + ", " + seed_note(); };
     if (level_a >= level_b) {
-      ASSERT_TRUE(is_in_reach(p.a, p.b, scale)) << note();
+      ASSERT_TRUE(covers_cell_of(p.a, p.b, scale)) << note();
     }
     if (level_b >= level_a) {
-      ASSERT_TRUE(is_in_reach(p.b, p.a, scale)) << note();
+      ASSERT_TRUE(covers_cell_of(p.b, p.a, scale)) << note();
     }
     const bool a_is_wide = level_a < level_b;
     const SphereInstance& wide = a_is_wide ? p.a : p.b;
@@ -191,21 +191,23 @@ TEST(CudaGrid, TouchingSpheresAreInReachOfEachOther) {
       ASSERT_GE(std::min(level_a, level_b), cuda::widest_far_level(fine, scale)) << note();
     }
   }
-  EXPECT_GT(touching, 200'000) << "the hunt must meet touching pairs";
+  EXPECT_GT(touching, 200'000) << "the test must cover touching pairs";
 }
 
-TEST(CudaGrid, ASphereLooksAtFewCells) {
+TEST(CudaGrid, ASphereSearchesFewCells) {
   Random random(base_seed());
   for (int i = 0; i < 200'000; ++i) {
     const Pair p = nearly_touching(random);
     const Real half_0 = cuda::half_cell_for_radius(std::max(p.a.radius, p.b.radius));
     const cuda::GridCell cell = cuda::grid_cell_of(p.a, {half_0});
     const Real half = cuda::half_cell_of(half_0, cell.level);
-    const Real reach = cuda::reach_of(p.a.radius, half), inverse = cuda::inverse_width(half);
+    const Real search_radius = cuda::search_radius_of(p.a.radius, half),
+               inverse = cuda::inverse_width(half);
     for (int axis = 0; axis < 3; ++axis) {
       const Real x = p.a.centre[axis];
-      const std::int64_t cells = std::int64_t{cuda::cell_of(cuda::moved(x, reach), inverse)} -
-                                 cuda::cell_of(cuda::moved(x, -reach), inverse) + 1;
+      const std::int64_t cells =
+          std::int64_t{cuda::cell_of(cuda::moved(x, search_radius), inverse)} -
+          cuda::cell_of(cuda::moved(x, -search_radius), inverse) + 1;
       ASSERT_LE(cells, cuda::kRowsApart) << "pair " << i << ", " << seed_note();
     }
   }
@@ -226,12 +228,13 @@ TEST(CudaGrid, LevelsHalveFromTheLargestSphereOn) {
 }
 
 /// The sum of products of a row and a column, which must be exact in any order.
-float lattice_sum(const cuda::LatticeTerms& row, const cuda::LatticeTerms& column, Random& random) {
+float quantized_sum(const cuda::QuantizedTerms& row, const cuda::QuantizedTerms& column,
+                    Random& random) {
   double exact = 0;
   std::vector<float> products;
   for (unsigned k = 0; k < cuda::kTerms; ++k) {
     for (const float term : {row.values[k], column.values[k]}) {
-      EXPECT_LE(std::abs(term), 2048) << "half precision holds no more";
+      EXPECT_LE(std::abs(term), 2048) << "half precision represents no larger integer";
       EXPECT_EQ(term, std::round(term));
     }
     products.push_back(row.values[k] * column.values[k]);
@@ -247,14 +250,14 @@ float lattice_sum(const cuda::LatticeTerms& row, const cuda::LatticeTerms& colum
   return sum;
 }
 
-TEST(CudaLattice, LetsEveryTouchingPairThrough) {
+TEST(CudaQuantizedFilter, LetsEveryTouchingPairThrough) {
   Random random(base_seed());
   int touching = 0;
   for (int i = 0; i < 300'000 && !::testing::Test::HasFailure(); ++i) {
     const Pair p = nearly_touching(random);
     if (detail::test_sphere_pair(p.a, p.b).touching == 0) continue;
     ++touching;
-    // What else is in the tile: nothing, or others up to anywhere.
+    // The bounds of the tile may contain other spheres, at any distance.
     Vec3 low, high;
     for (int axis = 0; axis < 3; ++axis) {
       low[axis] = std::min(p.a.centre[axis], p.b.centre[axis]);
@@ -264,28 +267,28 @@ TEST(CudaLattice, LetsEveryTouchingPairThrough) {
     }
     Real largest = std::max(p.a.radius, p.b.radius);
     if (random.below(3) == 0) largest = std::max(largest, any_magnitude(random));
-    const cuda::Lattice lattice = cuda::lattice_around(low, high, largest);
-    const auto a = on_lattice(lattice, p.a), b = on_lattice(lattice, p.b);
-    ASSERT_LT(lattice_sum(row_terms(a), column_terms(b), random), 0)
+    const cuda::Quantization quantization = cuda::quantization_around(low, high, largest);
+    const auto a = quantized(quantization, p.a), b = quantized(quantization, p.b);
+    ASSERT_LT(quantized_sum(row_terms(a), column_terms(b), random), 0)
         << "pair " << i << ", " << seed_note();
   }
-  EXPECT_GT(touching, 50'000) << "the hunt must meet touching pairs; " << seed_note();
+  EXPECT_GT(touching, 50'000) << "the test must cover touching pairs; " << seed_note();
 }
 
-TEST(CudaLattice, HoldsBackSpheresThatAreApart) {
+TEST(CudaQuantizedFilter, RejectsSpheresThatAreApart) {
   Random random(base_seed());
   for (int i = 0; i < 10'000; ++i) {
     SphereInstance a{{0, 0, 0}, random.uniform(Real(0.5), 1)}, b{{}, random.uniform(Real(0.5), 1)};
     const Vec3 direction = normalized(random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
     b.centre = direction * ((a.radius + b.radius) * Real(1.1));
-    const cuda::Lattice lattice = cuda::lattice_around({-8, -8, -8}, {8, 8, 8}, 1);
-    const auto row = on_lattice(lattice, a), column = on_lattice(lattice, b);
-    ASSERT_GE(lattice_sum(row_terms(row), column_terms(column), random), 0) << seed_note();
+    const cuda::Quantization quantization = cuda::quantization_around({-8, -8, -8}, {8, 8, 8}, 1);
+    const auto row = quantized(quantization, a), column = quantized(quantization, b);
+    ASSERT_GE(quantized_sum(row_terms(row), column_terms(column), random), 0) << seed_note();
   }
 }
 
-// Lines along every axis and diagonal, a plane and a cube: with as many cells as buckets, no bucket
-// may hold many of them. A hash that ignored one coordinate would put 32 to 65 536 into one.
+// Lines along every axis and diagonal, a plane and a cube, each with as many cells as buckets: no
+// bucket may hold many cells. A hash that ignored a coordinate would put 32 to 65 536 into one.
 TEST(CudaGrid, CellsFillTheTableEvenly) {
   constexpr std::uint32_t kTable = 1 << 16;
   const auto most_in_a_bucket = [&](auto&& cell) {

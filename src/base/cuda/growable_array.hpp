@@ -1,0 +1,57 @@
+/// Arrays whose capacity only grows, over any kind of memory.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// Capacity for `count` elements, given the current capacity: unchanged if it suffices, otherwise a
+/// quarter more than `count`. A count that grows in small steps then causes O(log count)
+/// reallocations.
+constexpr std::size_t geometric_capacity(std::size_t capacity, std::size_t count) {
+  return count <= capacity ? capacity : std::max(count, count + count / 4 + 64);
+}
+
+/// Uninitialized array whose capacity only grows. Growing discards the contents.
+/// @tparam Memory owner of a block of bytes: default-constructible (no bytes), movable, data().
+template <typename T, typename Memory>
+class GrowableArray {
+ public:
+  GrowableArray() = default;
+  GrowableArray(const GrowableArray&) = delete;
+  GrowableArray& operator=(const GrowableArray&) = delete;
+
+  /// If the capacity is smaller than `count`, reallocates to exactly `count` elements, in the
+  /// Memory that `allocate(bytes)` returns. If that throws, the array is unchanged.
+  /// @return whether the array was reallocated.
+  template <typename Allocate>
+  bool reserve(std::size_t count, const Allocate& allocate) {
+    if (count <= capacity_) return false;
+    // A number of bytes that overflows is clamped, so that the allocation fails.
+    constexpr std::size_t kMaxCount = std::numeric_limits<std::size_t>::max() / sizeof(T);
+    memory_ = allocate(std::min(count, kMaxCount) * sizeof(T));
+    capacity_ = count;
+    return true;
+  }
+  /// The same, but a reallocation adds the slack of geometric_capacity().
+  template <typename Allocate>
+  bool reserve_geometric(std::size_t count, const Allocate& allocate) {
+    return reserve(geometric_capacity(capacity_, count), allocate);
+  }
+  T* data() const noexcept { return static_cast<T*>(memory_.data()); }
+  std::size_t capacity() const noexcept { return capacity_; }
+
+ private:
+  Memory memory_;
+  std::size_t capacity_ = 0;
+};
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,118 @@
+/// Data of the pairs of a pair cache that is kept from one dispatch to the next.
+#pragma once
+
+#include <jfpx/contact.hpp>
+
+#include "src/base/thread_pool.hpp"
+#include "src/bullet/dispatch/proxy_table.hpp"
+
+#include <BulletCollision/BroadphaseCollision/btBroadphaseProxy.h>
+#include <BulletCollision/BroadphaseCollision/btCollisionAlgorithm.h>
+#include <BulletCollision/BroadphaseCollision/btDispatcher.h>
+
+#include <array>
+#include <span>
+#include <vector>
+
+class btPersistentManifold;
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+/// Number of pairs per chunk of a parallel loop.
+inline constexpr std::size_t kPairChunk = 4096;
+
+/// Class of Bullet's algorithm of a pair.
+enum class PairKind : std::uint8_t {
+  other,         ///< no algorithm yet, or one that only Bullet can run
+  spheres,       ///< btSphereSphereCollisionAlgorithm with a manifold
+  convex,        ///< btConvexConvexAlgorithm with a manifold, without perturbation
+  convex_plane,  ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane second
+  plane_convex,  ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane first
+};
+
+/// The dispatcher that created the algorithms of the pairs.
+struct PairOwner {
+  const btDispatcher* dispatcher;
+  /// Whether note_release() is called for every manifold that this dispatcher releases. If so, the
+  /// manifold of an algorithm is read once; otherwise it is read in every refresh(), because an
+  /// algorithm may have been destroyed and another one created at the same address.
+  bool reports_releases;
+};
+
+/// One entry per pair, in the order of the pair array. An entry is valid as long as the array holds
+/// the same proxies and the same algorithm, and the algorithm's manifold has not been released. No
+/// cached pointer is dereferenced before that is established.
+class PairTable {
+ public:
+  void refresh(std::span<const btBroadphasePair> pairs, const PairOwner& owner, ThreadPool& pool);
+  /// Must be called before a manifold is released.
+  void note_release(const btPersistentManifold* manifold) noexcept;
+  /// Discards all entries. Required after refresh() has thrown.
+  void invalidate() noexcept { invalid_ = true; }
+
+  /// The indices of the two proxies of every pair.
+  std::span<const SpherePair> pairs() const { return pairs_; }
+  PairKind kind(std::size_t i) const { return links_[i].kind(); }
+  /// Null for PairKind::other.
+  btPersistentManifold* manifold(std::size_t i) const { return links_[i].manifold(); }
+  const ProxyTable& proxies() const { return proxies_; }
+
+ private:
+  /// The manifold, the kind, and whether the link may be cached; otherwise it is read again in
+  /// every dispatch. Packed into one word, because every dispatch streams all links twice.
+  class Link {
+   public:
+    Link() = default;
+    Link(btPersistentManifold* manifold, PairKind kind, bool cacheable)
+        : bits_(reinterpret_cast<std::uintptr_t>(manifold) | static_cast<std::uintptr_t>(kind) |
+                (cacheable ? 0 : kNotCacheable)) {}
+    /// False for null, and for a user's pool whose alignment is lower than that of Bullet's pools.
+    static bool can_hold(const btPersistentManifold* manifold) {
+      return manifold != nullptr &&
+             (reinterpret_cast<std::uintptr_t>(manifold) & (kKind | kNotCacheable)) == 0;
+    }
+    btPersistentManifold* manifold() const {
+      // NOLINTNEXTLINE(performance-no-int-to-ptr): the word also holds the kind
+      return reinterpret_cast<btPersistentManifold*>(bits_ & ~(kKind | kNotCacheable));
+    }
+    PairKind kind() const { return static_cast<PairKind>(bits_ & kKind); }
+    bool cacheable() const { return (bits_ & kNotCacheable) == 0; }
+
+   private:
+    static constexpr std::uintptr_t kKind = 7, kNotCacheable = 8;
+    std::uintptr_t bits_ = 0;
+  };
+  static Link read_link(btCollisionAlgorithm* algorithm, const PairOwner& owner);
+
+  struct Key {
+    const btBroadphaseProxy* proxy0 = nullptr;
+    const btBroadphaseProxy* proxy1 = nullptr;
+    const btCollisionAlgorithm* algorithm = nullptr;
+  };
+  void resize(std::size_t pairs);
+  void clear();
+  void build_release_filter();
+  std::array<std::uint64_t, 2> release_bits_of(const btPersistentManifold* manifold) const;
+  bool was_released(const btPersistentManifold* manifold) const;
+  std::size_t find_changed(std::span<const btBroadphasePair> pairs, std::size_t begin,
+                           std::size_t end, std::uint32_t* changed) const;
+  void update(std::span<const btBroadphasePair> pairs, std::span<const std::uint32_t> changed,
+              const PairOwner& owner);
+
+  ProxyTable proxies_;
+  std::vector<Key> keys_;
+  std::vector<SpherePair> pairs_;
+  std::vector<Link> links_;
+  std::vector<std::uint32_t> changed_;
+  std::vector<std::size_t> changed_counts_;  ///< by chunk
+  std::vector<const btPersistentManifold*> released_;
+  std::vector<std::uint64_t> release_bits_;  ///< Bloom filter; a false positive costs one read
+  int release_shift_ = 0;
+  bool invalid_ = false;  ///< entries are unusable, or too many manifolds have been released
+};
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,87 @@
+/// Thread-safe pool of objects that are borrowed for the duration of one call.
+#pragma once
+
+#include "src/bullet/failure.hpp"
+
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+/// Holds one object for each concurrent call. An unmodified program may use its own objects in
+/// several threads, and their destruction cannot be observed, so jfpx's counterparts are not tied
+/// to them. Thread-safe.
+template <class Object>
+class ObjectPool {
+ public:
+  using Maker = std::unique_ptr<Object> (*)();
+
+  explicit ObjectPool(Maker make) : make_(make) {}
+
+  /// Borrows an object for its lifetime, and returns it even if an exception is thrown.
+  class Handle {
+   public:
+    explicit Handle(ObjectPool& pool) : pool_(pool), object_(pool.take()) {}
+    ~Handle() {
+      if (object_ != nullptr) pool_.give_back(std::move(object_));
+    }
+    Handle(const Handle&) = delete;
+    Handle& operator=(const Handle&) = delete;
+    /// Null if no object could be created: failure() has the reason, or memory was exhausted.
+    Object* get() const { return object_.get(); }
+
+   private:
+    ObjectPool& pool_;
+    std::unique_ptr<Object> object_;
+  };
+
+  /// Calls visit(object) for every object that is not borrowed.
+  template <class Visit>
+  void for_each_idle(Visit visit) {
+    const std::lock_guard lock(mutex_);
+    for (const auto& object : idle_) visit(*object);
+  }
+  /// Reason why the pool can create no objects, permanently; otherwise empty.
+  std::string failure() {
+    const std::lock_guard lock(mutex_);
+    return failure_;
+  }
+
+ private:
+  std::unique_ptr<Object> take() noexcept {
+    const std::lock_guard lock(mutex_);
+    if (!idle_.empty()) {
+      std::unique_ptr<Object> object = std::move(idle_.back());
+      idle_.pop_back();
+      return object;
+    }
+    if (!failure_.empty()) return nullptr;
+    try {
+      idle_.reserve(created_ + 1);
+      std::unique_ptr<Object> object = make_();
+      ++created_;
+      return object;
+    } catch (const std::exception& error) {
+      if (!is_out_of_memory(error)) failure_ = message_of(error);
+      return nullptr;
+    }
+  }
+  void give_back(std::unique_ptr<Object> object) noexcept {
+    const std::lock_guard lock(mutex_);
+    idle_.push_back(std::move(object));  // take() has reserved the capacity
+  }
+
+  Maker make_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Object>> idle_;
+  std::size_t created_ = 0;
+  std::string failure_;
+};
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,96 @@
+/// State of a ConstraintSolver and the stages in which it solves a group.
+#pragma once
+
+#include <jfpx/bullet/constraint_solver.hpp>
+
+#include "src/bullet/solver/contact_scan.hpp"
+#include "src/bullet/solver/gpu_island_solver.hpp"
+#include "src/contact_solver/cpu/row_solver.hpp"
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+inline constexpr std::size_t kBodiesPerChunk = 256;
+inline constexpr std::size_t kBlocksPerChunk = 16;
+
+/// Each stage is defined in a file of its own.
+struct ConstraintSolver::Impl {
+  using Steps = std::array<const void*, 8>;
+
+  ConstraintSolver& self;
+  const Steps own_steps;                        ///< steps of this class, without overriders
+  const btSingleConstraintRowSolver own_split;  ///< row solver that Bullet sets
+  cpu::RowSolver solver;
+  std::optional<GpuIslandSolver> device;  ///< always present after construction
+  std::size_t minimum_batch;
+  ConstraintSolverStats stats;
+  ContactScan scan;
+  std::vector<std::uint8_t> flags;  ///< by id: BodyFlag bits
+  std::atomic<bool> factors{false}, warm{false};
+
+  // State of one group, valid while the group is solved.
+  std::span<btCollisionObject*> bodies;
+  std::span<btTypedConstraint*> joints;
+  std::vector<std::int32_t> joint_ids;       ///< by solver body; see JointRows
+  std::vector<UnlistedBody> joint_unlisted;  ///< unlisted bodies of joints
+  const btContactSolverInfo* info = nullptr;
+  rows::RowSettings settings{};
+  bool on_device = false;
+
+  Impl(ConstraintSolver& owner, const ConstraintSolverOptions& options);
+
+  /// Solves the group. @return the reason if it is not solved; all data that Bullet's solver reads
+  ///   is then unchanged
+  std::optional<SolverFallback> solve(std::span<btPersistentManifold* const> manifolds);
+
+  // group_fallback.cpp
+  Steps steps() const;
+  int max_iterations() const;
+  /// The reason why the group is not solved here, if there is one.
+  std::optional<SolverFallback> fallback_reason(int manifold_count) const;
+  SolverFallback restore(SolverFallback reason);
+
+  // group_bodies.cpp
+  void set_up_bodies();
+  void set_up_body(std::size_t i, btCollisionObject* object);
+  void set_up_joints();
+  void set_up_unlisted_bodies(std::span<btPersistentManifold* const> manifolds);
+  void pack(const btSolverBody& body, std::size_t id);
+  void clear_velocities(std::size_t id);
+
+  // group_rows.cpp
+  void set_up_rows();
+  void set_up_contacts();
+  void prefetch_block(std::uint32_t block) const;
+  void set_up_block(std::uint32_t block);
+  void set_up_rolling_frictions();
+  void set_up_rolling_friction(const ContactRef& contact, Real* to, std::size_t lanes);
+
+  // constraint_solver.cpp
+  void set_up(std::span<btPersistentManifold* const> manifolds);
+  rows::RowSweepReport solve_rows();
+  rows::RowSweepReport sweep();
+  DeviceGroup device_group();
+  std::uint32_t directions() const {
+    return (info->m_solverMode & SOLVER_USE_2_FRICTION_DIRECTIONS) != 0 ? 2 : 1;
+  }
+
+  // group_write_back.cpp
+  void write_back();
+  void write_back_impulses(std::uint32_t block);
+  void write_back_bodies();
+  void record_analytics(const rows::RowSweepReport& report, int manifold_count);
+};
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

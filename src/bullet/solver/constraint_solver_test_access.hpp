@@ -1,0 +1,23 @@
+/// Access for tests that replace the GPU of a ConstraintSolver.
+#pragma once
+
+#include <jfpx/bullet/constraint_solver.hpp>
+
+#include <memory>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+class GroupSolver;
+
+namespace bullet {
+
+struct JFPX_API ConstraintSolverTestAccess {
+  /// Makes a solver that uses `device` as its GPU, as options.backend specifies.
+  static std::unique_ptr<ConstraintSolver> make(std::unique_ptr<GroupSolver> device,
+                                                const ConstraintSolverOptions& options);
+};
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,117 @@
+/// Setup of the bodies of a group, including those that only joints or manifolds refer to.
+#include "src/bullet/prefetch.hpp"
+#include "src/bullet/solver/chunks.hpp"
+#include "src/bullet/solver/constraint_solver_impl.hpp"
+#include "src/bullet/solver/row_inputs.hpp"
+
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <LinearMath/btQuickprof.h>
+
+#include <algorithm>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+void ConstraintSolver::Impl::set_up_bodies() {
+  BT_PROFILE("convertBodies");
+  const std::size_t count = bodies.size();
+  self.m_tmpSolverBodyPool.resizeNoInitialize(0);
+  self.m_tmpSolverBodyPool.reserve(static_cast<int>(count) + 1);
+  self.m_tmpSolverBodyPool.resizeNoInitialize(static_cast<int>(count));
+  solver.resize_bodies(count + 1);
+  flags.assign(count + 1, kInfiniteMass | kImmovable);
+  factors = false;
+  warm = false;
+  in_chunks(solver.pool(), count, kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      if (i + 8 < last) prefetch_bytes(bodies[i + 8], sizeof(btRigidBody));
+      set_up_body(i, bodies[i]);
+    }
+  });
+}
+
+/// As Bullet's convertBodies(). A body for which Bullet creates no solver body keeps its index here
+/// and is replaced by the fixed body, which does not change any result.
+void ConstraintSolver::Impl::set_up_body(std::size_t i, btCollisionObject* object) {
+  object->setCompanionId(-1);
+  btSolverBody& body = self.m_tmpSolverBodyPool[static_cast<int>(i)];
+  btRigidBody* original = moving_body(object);
+  self.initSolverBody(&body, original, settings.dt);
+  clear_velocities(i + 1);
+  if (original == nullptr) return;
+  object->setCompanionId(static_cast<int>(i));
+  if (original->getInvMass() != 0) add_gyroscopic_impulses(*info, &body);
+  pack(body, i + 1);
+  flags[i + 1] = body_flags(*original);
+}
+
+void ConstraintSolver::Impl::pack(const btSolverBody& body, std::size_t id) {
+  pack_body(body, solver.body(id));
+  solver.velocity(id)[3] = solver.push_velocity(id)[3] = body.m_invMass[0];
+  pack_factors(body, solver.factors(id));
+  const btVector3 ones(1, 1, 1);
+  if (body.m_linearFactor != ones || body.m_angularFactor != ones) {
+    factors.store(true, std::memory_order_relaxed);
+  }
+}
+
+void ConstraintSolver::Impl::clear_velocities(std::size_t id) {
+  std::fill_n(solver.velocity(id), rows::kVelocityFields, Real(0));
+  std::fill_n(solver.push_velocity(id), rows::kVelocityFields, Real(0));
+}
+
+/// Bullet creates the rows of joints. The bodies that Bullet adds for them receive ids here.
+void ConstraintSolver::Impl::set_up_joints() {
+  btAlignedObjectArray<btSolverBody>& pool = self.m_tmpSolverBodyPool;
+  self.m_fixedBodyId = -1;
+  self.m_maxOverrideNumSolverIterations = 0;
+  for (btTypedConstraint* joint : joints) {
+    for (btRigidBody* body : {&joint->getRigidBodyA(), &joint->getRigidBodyB()}) {
+      if (body->getCompanionId() < 0) joint_unlisted.push_back({body, body->getCompanionId()});
+    }
+  }
+  self.convertJoints(joints.data(), static_cast<int>(joints.size()), *info);
+  // Joints without rows too: Bullet adds their bodies when it solves the joints.
+  for (btTypedConstraint* joint : joints) {
+    if (!joint->isEnabled()) continue;
+    self.getOrInitSolverBody(joint->getRigidBodyA(), settings.dt);
+    self.getOrInitSolverBody(joint->getRigidBodyB(), settings.dt);
+  }
+  const auto count = static_cast<std::size_t>(pool.size());
+  solver.resize_bodies(count + 1);
+  flags.resize(count + 1, kInfiniteMass | kImmovable);
+  joint_ids.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const btSolverBody& body = pool[static_cast<int>(i)];
+    if (i >= bodies.size()) {
+      clear_velocities(i + 1);
+      if (body.m_originalBody != nullptr) {
+        pack(body, i + 1);
+        flags[i + 1] = body_flags(*body.m_originalBody);
+      }
+    }
+    const auto id = static_cast<std::int32_t>(i) + 1;
+    const bool moved = (flags[i + 1] & kImmovable) == 0;
+    joint_ids[i] = body.m_originalBody == nullptr ? rows::kFixedBody : (moved ? id : ~id);
+  }
+}
+
+/// Adds the bodies that Bullet adds when it finds them in a manifold.
+void ConstraintSolver::Impl::set_up_unlisted_bodies(
+    std::span<btPersistentManifold* const> manifolds) {
+  const auto next_id = static_cast<std::size_t>(self.m_tmpSolverBodyPool.size()) + 1;
+  scan.register_unlisted(manifolds, next_id);
+  solver.resize_bodies(next_id + scan.unlisted().size());
+  for (const UnlistedBody& unlisted : scan.unlisted()) {
+    const auto id = static_cast<std::size_t>(unlisted.object->getCompanionId()) + 1;
+    btSolverBody& body = self.m_tmpSolverBodyPool.expandNonInitializing();
+    self.initSolverBody(&body, unlisted.object, settings.dt);
+    clear_velocities(id);
+    pack(body, id);
+  }
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

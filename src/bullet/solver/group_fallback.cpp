@@ -1,0 +1,75 @@
+/// Rules by which a group falls back to Bullet's own solver.
+#include "src/bullet/solver/constraint_solver_impl.hpp"
+#include "src/bullet/solver/joint_rows.hpp"
+#include "src/bullet/virtual_table.hpp"
+
+#include <algorithm>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+/// One residual per iteration is stored, and reset for each group. More iterations mean that the
+/// user iterates until the threshold is reached; Bullet's solver needs no memory for them.
+constexpr int kMaxIterations = 1 << 16;
+/// SOLVER_SIMD has no effect on Linux; SOLVER_FRICTION_SEPARATE and SOLVER_CACHE_FRIENDLY have no
+/// effect at all.
+constexpr int kUnsupportedModes = SOLVER_RANDMIZE_ORDER | SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
+
+}  // namespace
+
+/// The steps of Bullet's solver that this class does not execute one by one, as the object
+/// currently overrides them.
+///
+/// The functions are read from the virtual table, because typeid cannot replace the comparison: a
+/// subclass that overrides none of these steps must keep the accelerated solver, and the typeid of
+/// a subclass compiled with -fno-rtti is invalid.
+ConstraintSolver::Impl::Steps ConstraintSolver::Impl::steps() const {
+  return {virtual_function(&self, &ConstraintSolver::convertContacts),
+          virtual_function(&self, &ConstraintSolver::convertBodies),
+          virtual_function(&self, &ConstraintSolver::convertJoints),
+          virtual_function(&self, &ConstraintSolver::solveSingleIteration),
+          virtual_function(&self, &ConstraintSolver::solveGroupCacheFriendlySetup),
+          virtual_function(&self, &ConstraintSolver::solveGroupCacheFriendlyIterations),
+          virtual_function(&self, &ConstraintSolver::solveGroupCacheFriendlySplitImpulseIterations),
+          virtual_function(&self, &ConstraintSolver::solveGroupCacheFriendlyFinish)};
+}
+
+/// The maximum over the settings of the world and of all joints.
+int ConstraintSolver::Impl::max_iterations() const {
+  int iterations = info->m_numIterations;
+  for (const btTypedConstraint* joint : joints) {
+    iterations = std::max(iterations, joint->getOverrideNumSolverIterations());
+  }
+  return iterations;
+}
+
+std::optional<SolverFallback> ConstraintSolver::Impl::fallback_reason(int manifold_count) const {
+  if (static_cast<std::size_t>(manifold_count) < minimum_batch) return SolverFallback::small;
+  if (steps() != own_steps) return SolverFallback::overridden;
+  if ((info->m_solverMode & kUnsupportedModes) != 0 || info->m_numIterations <= 0 ||
+      max_iterations() > kMaxIterations) {
+    return SolverFallback::mode;
+  }
+  if (self.m_resolveSingleConstraintRowGeneric != self.getScalarConstraintRowSolverGeneric() ||
+      self.m_resolveSingleConstraintRowLowerLimit !=
+          self.getScalarConstraintRowSolverLowerLimit() ||
+      self.m_resolveSplitPenetrationImpulse != own_split) {
+    return SolverFallback::row_solver;
+  }
+  if (!are_known_joints(joints)) return SolverFallback::constraints;
+  return std::nullopt;
+}
+
+/// Restores the companion ids that Bullet's solver reads.
+SolverFallback ConstraintSolver::Impl::restore(SolverFallback reason) {
+  for (const UnlistedBody& body : scan.unlisted()) body.object->setCompanionId(body.companion);
+  for (const UnlistedBody& body : joint_unlisted) body.object->setCompanionId(body.companion);
+  device->abandon();
+  return reason;
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

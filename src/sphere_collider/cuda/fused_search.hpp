@@ -1,0 +1,27 @@
+/// Search among up to 1024 spheres: one launch of one thread block cluster.
+#pragma once
+
+#include "src/sphere_collider/cuda/search.hpp"
+
+#include <cuda_runtime_api.h>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+inline constexpr std::uint32_t kFusedSpheres = 1024;
+
+struct FusedArgs {
+  const SphereInstance* spheres;
+  std::uint32_t n;  ///< at most kFusedSpheres
+  SearchOutput output;
+};
+/// Whether the current device can run the search: it requires clusters of 16 thread blocks, which
+/// Hopper supports, and code that was compiled for them.
+bool fused_search_supported();
+/// Enqueues the search. Does not allocate or wait.
+void launch_fused_search(const FusedArgs& args, cudaStream_t stream);
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

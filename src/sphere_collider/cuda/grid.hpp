@@ -1,0 +1,139 @@
+/// Search among many spheres: sorted into the cells of a hierarchy of grids.
+#pragma once
+
+#include "src/sphere_collider/cuda/search.hpp"
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// Neighbors that a sphere keeps in its own slots; further ones go to a list for all spheres.
+inline constexpr std::uint32_t kSlots = 16;
+/// Longest row, that is, number of contacts with the same a, in the staging buffer. A longer row is
+/// not staged at all.
+inline constexpr std::uint32_t kMaxStaged = 18;
+/// Elements after the last sphere that a search reads and does not use.
+inline constexpr std::uint32_t kReadBeyond = 2;
+/// Longest row that one warp sorts. Longer rows are sorted by many blocks.
+inline constexpr std::uint32_t kMaxLongRow = 1024;
+
+/// The pair a < b; `rank` counts the pairs of a in the order of discovery.
+struct OverflowPair {
+  std::uint32_t a, b, rank;
+};
+
+/// Double-buffered state of searches in one launch: each search clears the state of the next one.
+struct AlternatingStates {
+  SearchState states[2];
+  std::uint32_t searches;  ///< number of searches so far; its parity selects the next state
+  std::uint32_t padding[3];
+};
+
+/// Largest number of spheres of the direct search, which does not sort them.
+inline constexpr std::uint32_t kMaxDirect = 24'000;
+/// Slots per sphere in the cells of the direct search.
+inline constexpr std::uint32_t kDirectSlots = 12;
+
+/// Coarse buckets of a search of many launches.
+inline constexpr unsigned kCoarseBuckets = 2048;
+struct CoarseBuckets {
+  /// Padded to a memory sector: atomics on values in the same sector are serialized.
+  struct alignas(32) Counter {
+    std::uint32_t value;
+  };
+  Counter counts[kCoarseBuckets];
+  Counter next[kCoarseBuckets];  ///< position of the next sphere
+  std::uint32_t starts[kCoarseBuckets + 4];
+};
+
+/// Limits of a device that determine launch configurations and buffer sizes.
+struct GridLimits {
+  unsigned multiprocessors;
+  unsigned resident_blocks;  ///< blocks of the search in one launch that can run at the same time
+  std::size_t shared_bytes;  ///< largest amount of shared memory of a block
+  /// Largest number of blocks among which the table and the spheres are divided. It is not less
+  /// than resident_blocks, as a multiprocessor runs at most 8 blocks of 256 threads at a time.
+  constexpr unsigned max_blocks() const { return multiprocessors * 16; }
+};
+/// @pre `device` is the current device. @throws DeviceError
+GridLimits grid_limits(int device);
+
+/// Contacts of one level are counted in bins of this number of consecutive a's, each of which one
+/// block copies, ...
+inline constexpr std::uint32_t kBin = 256;
+/// ... and summed in groups of this number of bins.
+inline constexpr std::uint32_t kBinsOfSum = 64;
+/// Number of sums of blocks or groups of bins in a search among n spheres.
+constexpr std::size_t grid_sums(std::size_t n, const GridLimits& limits) {
+  return limits.max_blocks() + n / (kBin * kBinsOfSum) / 2 * 2 + 2;
+}
+
+struct GridPlan;
+/// sizeof(GridPlan), which only device code defines.
+std::size_t grid_plan_bytes();
+
+/// Arrays are 16-byte aligned and have 15 spare bytes at the end.
+struct GridArgs {
+  struct Input {
+    const SphereInstance* spheres;
+    std::uint32_t n;  ///< at least 1
+  };
+  /// The spheres sorted by bucket. The position of a sphere is its index in that order.
+  struct Table {
+    std::uint32_t size;        ///< largest number of buckets: a power of two
+    std::uint32_t* starts;     ///< [size + 1] histogram, then first positions, of the buckets
+    std::uint32_t* positions;  ///< [n] bucket, then position, of a sphere
+    std::uint32_t* ranks;      ///< [n] rank in its bucket, then row length, of a sphere
+    SphereInstance* sorted;    ///< [n + kReadBeyond] spheres by position
+    std::uint32_t* ids;        ///< [n] their indices
+    unsigned long long* sums;  ///< [blocks] spheres in the buckets of each block
+    CoarseBuckets* coarse;
+    std::uint32_t coarse_buckets = kCoarseBuckets;  ///< largest number of coarse buckets in use
+  };
+  /// Row a holds the pairs (a, b), a < b.
+  struct Rows {
+    std::uint32_t* counts;          ///< [n] row lengths by position
+    unsigned long long* sums;       ///< [grid_sums(n)] pairs of each block, or of kBinsOfSum bins
+    unsigned long long* bin_sums;   ///< [n / kBin + 1] pairs of the spheres of a bin
+    unsigned long long* offsets;    ///< [n] a StagedList, then for long rows the contacts before it
+    unsigned long long capacity;    ///< largest number of pairs that the arrays can hold
+    OverflowPair* overflow;         ///< [capacity] pairs for which a sphere has no slot
+    std::uint32_t* long_rows;       ///< [capacity / kSlots + 1] a's with up to kMaxLongRow pairs
+    std::uint32_t* very_long_rows;  ///< [capacity / kMaxLongRow + 1] a's with more pairs
+    std::uint32_t* long_row_neighbors;  ///< [capacity] b's of both, by index in the output
+  };
+  /// Arrays that share memory, because no two phases that use different ones overlap.
+  struct Scratch {
+    SphereInstance* slots;           ///< [kDirectSlots * n] slots of cells; null if n > kMaxDirect
+    std::uint32_t* slot_ids;         ///< [kDirectSlots * n] indices of the spheres there
+    SphereInstance* partitioned;     ///< [n] spheres by coarse bucket
+    std::uint32_t* partitioned_ids;  ///< [n] their indices
+    std::uint32_t* neighbors;        ///< [n][kSlots] the first b's of a row, by position
+    SphereContact* staging;          ///< [capacity] contacts, or pairs, of short rows by position
+  };
+  Input input;
+  Table table;
+  Rows rows;
+  Scratch scratch;
+  SearchState* state;
+  AlternatingStates* states;  ///< for searches in one launch, instead of `state`
+  GridPlan* plan;             ///< for searches of several launches
+  std::uint32_t lanes = 1;    ///< threads per sphere in the search: a power of two
+};
+
+/// Number of bytes that the arrays of GridArgs::Scratch need.
+std::size_t grid_scratch_bytes(std::size_t n, std::size_t capacity);
+/// The arrays of a search among n spheres, in that memory.
+GridArgs::Scratch grid_scratch(std::uint32_t n, unsigned char* memory);
+
+/// Enqueues the whole search. Does not allocate or wait.
+void launch_grid_search(const GridArgs& args, const SearchOutput& output, const GridLimits& limits,
+                        cudaStream_t stream);
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

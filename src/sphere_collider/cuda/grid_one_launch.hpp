@@ -1,0 +1,20 @@
+/// Grid search in one cooperative launch.
+#pragma once
+
+#include "src/sphere_collider/cuda/grid.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// Largest number of blocks of the search that can run at the same time.
+/// @param multiprocessors of the current device
+/// @throws DeviceError
+unsigned resident_grid_blocks(unsigned multiprocessors);
+/// Enqueues all phases as one launch of up to `max_blocks` blocks, with grid barriers between them.
+void launch_in_one(const GridArgs& args, const SearchOutput& output, unsigned max_blocks,
+                   cudaStream_t stream);
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,321 @@
+/// Search phase for spheres of similar radius. Each thread finds all neighbors b > a of one sphere,
+/// so that threads share no list, and computes the contacts while both spheres are near in memory.
+/// Contacts are staged in the order of positions until their indices in the output are known.
+#pragma once
+
+#include "src/sphere_collider/cuda/grid_search.cuh"
+#include "src/sphere_collider/cuda/grid_staging.cuh"
+#include "src/sphere_collider/cuda/sphere_filter.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+inline constexpr unsigned kAtOnce = 2;  // candidates that a thread tests in a step
+static_assert(kAtOnce <= kReadBeyond);
+inline constexpr unsigned kColumn = kMaxStaged + kAtOnce;  // candidates that a thread holds
+inline constexpr unsigned kRowsHeld = 5;  // rows whose candidates a thread tests together
+inline constexpr unsigned kRanked = 8;    // neighbors that are sorted in registers
+
+/// The only level of such a grid.
+struct SingleLevel {
+  __device__ explicit SingleLevel(const GridPlan& plan)
+      : box(plan.boxes[0]),
+        half(plan.scale.half_0),
+        inverse_x(plan.scale.inverse_x),
+        inverse_yz(plan.inverse_yz) {}
+  LevelBox box;
+  Real half, inverse_x, inverse_yz;
+};
+
+/// The cells that can contain neighbors of a sphere.
+struct CellRange {
+  std::int32_t x0, x1, y0, y1, z0, z1;
+};
+__device__ inline CellRange neighbor_cells(const SingleLevel& level, const SphereInstance& s) {
+  const Real search_radius = search_radius_of(s.radius, level.half);
+  const LevelBox& box = level.box;
+  const auto low = [&](Real x, Real scale, std::int32_t first) {
+    return max(cell_of(moved(x, -search_radius), scale), first);
+  };
+  const auto high = [&](Real x, Real scale, std::int32_t first, std::int32_t count) {
+    return min(cell_of(moved(x, search_radius), scale), first + (count - 1));
+  };
+  return {low(s.centre.x, level.inverse_x, box.x0),
+          high(s.centre.x, level.inverse_x, box.x0, box.nx),
+          low(s.centre.y, level.inverse_yz, box.y0),
+          high(s.centre.y, level.inverse_yz, box.y0, box.ny),
+          low(s.centre.z, level.inverse_yz, box.z0),
+          high(s.centre.z, level.inverse_yz, box.z0, box.nz)};
+}
+
+/// Iterates over the rows of a range of cells.
+class Rows {
+ public:
+  __device__ Rows(const LevelBox& box, const CellRange& near)
+      : cells_(static_cast<std::uint32_t>(near.x1 - near.x0 + 1)),
+        rows_y_(near.y1 - near.y0 + 1),
+        left_(rows_y_ * (near.z1 - near.z0 + 1)),
+        left_y_(rows_y_) {
+    first_ = row_of_box(box, near.y0, near.z0) + static_cast<std::uint32_t>(near.x0);
+    next_y_ = static_cast<std::uint32_t>(box.nx);
+    next_z_ = static_cast<std::uint32_t>((box.ny - rows_y_ + 1) * box.nx);
+  }
+  __device__ std::int32_t left() const { return left_; }
+  /// The positions of the spheres in the next row; empty after the last row.
+  __device__ uint2 next(const std::uint32_t* table) {
+    if (left_ <= 0) return {0, 0};
+    const uint2 positions{table[first_], table[first_ + cells_]};
+    skip();
+    return positions;
+  }
+  __device__ void skip() {
+    --left_;
+    const bool last = --left_y_ == 0;
+    first_ += last ? next_z_ : next_y_;
+    left_y_ = last ? rows_y_ : left_y_;
+  }
+
+ private:
+  std::uint32_t cells_, first_, next_y_, next_z_;
+  std::int32_t rows_y_, left_, left_y_;
+};
+
+/// Shared memory of a warp. A lane has a column of each array: every 32nd element from its own
+/// index on.
+struct SingleLevelStorage {
+  std::uint32_t held[kColumn * 32];  // positions of neighbors
+  union {
+    uint2 ranges[kRowsHeld * 32];  // candidates of a row
+    alignas(8) unsigned char staged[32 * sizeof(SphereContact)];
+  };
+};
+
+class SingleLevelSearcher {
+ public:
+  __device__ SingleLevelSearcher(const GridArgs& args, const SearchOutput& output,
+                                 SingleLevelStorage& storage)
+      : args_(args), staging_(staging_output(args, output)), s_(storage), top_(&held(0)) {}
+
+  /// Call from all lanes of a warp, for consecutive positions.
+  __device__ void run(std::uint32_t position) {
+    const bool searching = position < args_.input.n;
+    position_ = searching ? position : 0;
+    const SingleLevel level(*args_.plan);
+    CellRange near{0, 0, 0, -1, 0, -1};
+    if (searching) {
+      self_ = load_sorted(args_.table.sorted + position);
+      id_ = args_.table.ids[position];
+      near = neighbor_cells(level, self_);
+    }
+    error_bound_ = error_bound_of(2 * level.half);
+    Rows rows(level.box, near);
+    while (__any_sync(kFullWarp, rows.left() > 0)) {
+      uint2 ranges[kRowsHeld];
+#pragma unroll
+      for (unsigned k = 0; k < kRowsHeld; ++k) ranges[k] = rows.next(args_.table.starts);
+      uint2* past = &s_.ranges[lane_id()];
+      unsigned steps = 0;
+#pragma unroll
+      for (unsigned k = 0; k < kRowsHeld; ++k) {
+        *past = ranges[k];
+        past += ranges[k].x < ranges[k].y ? 32 : 0;
+        steps += (ranges[k].y - ranges[k].x + kAtOnce - 1) / kAtOnce;
+      }
+      test_candidates(past, warp_max(steps));
+    }
+    keep_neighbors();
+    if (not_kept_ != 0) not_kept_ += kept_, kept_ = 0;
+    sort_neighbors();
+    write_to_staging_buffer(searching);
+  }
+
+ private:
+  /// Holds the spheres that may touch, of those in the ranges before `past_ranges`. Tests kAtOnce
+  /// spheres of a range in a step.
+  __device__ void test_candidates(const uint2* past_ranges, unsigned steps) {
+    const uint2* next = &s_.ranges[lane_id()];
+    std::uint32_t* const full = &held(kMaxStaged);
+    std::uint32_t at = 0, past = 0;
+    for (; steps != 0; --steps) {
+      if (at >= past && next < past_ranges) {
+        const uint2 range = *next;
+        at = range.x, past = range.y;
+        next += 32;
+      }
+      SphereInstance others[kAtOnce];  // the array has spare elements at the end
+#pragma unroll
+      for (unsigned k = 0; k < kAtOnce; ++k) others[k] = load_sorted(args_.table.sorted + at + k);
+#pragma unroll
+      for (unsigned k = 0; k < kAtOnce; ++k) {
+        const Real e = excess(self_, others[k]);
+        if (at + k < past && !(e > error_bound_)) {
+          *top_ = at + k;
+          top_ += 32;
+          largest_excess_ = ::fmax(largest_excess_, e);
+        }
+      }
+      at = min(at + kAtOnce, past);
+      if (__any_sync(kFullWarp, top_ > full)) keep_neighbors();
+    }
+  }
+
+  /// Keeps those held spheres that touch and have a larger index. If there are too many, only
+  /// counts them.
+  __device__ void keep_neighbors() {
+    const bool uncertain = __any_sync(kFullWarp, !(largest_excess_ < -error_bound_));
+    std::uint32_t* to = &held(kept_);
+    for (const std::uint32_t* from = to; from < top_; from += 32) {
+      const std::uint32_t position = *from;
+      if (args_.table.ids[position] <= id_) continue;
+      if (uncertain && !touch(self_, load_sorted(args_.table.sorted + position))) continue;
+      *to = position;
+      to += 32;
+      ++kept_;
+    }
+    if (kept_ > kMaxStaged) not_kept_ += kept_, kept_ = 0;
+    top_ = &held(kept_);
+    largest_excess_ = -std::numeric_limits<Real>::infinity();
+    __syncwarp();
+  }
+  __device__ std::uint32_t& held(unsigned k) { return s_.held[32 * k + lane_id()]; }
+
+  /// Sorts the first kRanked neighbors by rank, that is, by the number of smaller ones. Further
+  /// ones, which are rare, are inserted.
+  __device__ void sort_neighbors() {
+    std::uint32_t positions[kRanked], ids[kRanked];
+    unsigned ranks[kRanked] = {};
+#pragma unroll
+    for (unsigned k = 0; k < kRanked; ++k) {
+      positions[k] = k < kept_ ? held(k) : 0;
+    }
+#pragma unroll
+    for (unsigned k = 0; k < kRanked; ++k) ids[k] = k < kept_ ? args_.table.ids[positions[k]] : ~0u;
+#pragma unroll
+    for (unsigned k = 1; k < kRanked; ++k) {
+#pragma unroll
+      for (unsigned j = 0; j < k; ++j) {
+        if (ids[k] < ids[j]) {
+          ++ranks[j];
+        } else {
+          ++ranks[k];
+        }
+      }
+    }
+#pragma unroll
+    for (unsigned k = 0; k < kRanked; ++k) {
+      if (k < kept_) held(ranks[k]) = positions[k];
+    }
+    for (unsigned k = kRanked; k < kept_; ++k) {
+      const std::uint32_t position = held(k), id = args_.table.ids[position];
+      unsigned to = k;
+      for (; to > 0 && args_.table.ids[held(to - 1)] > id; --to) {
+        held(to) = held(to - 1);
+      }
+      held(to) = position;
+    }
+  }
+
+  __device__ void write_to_staging_buffer(bool searching) {
+    const unsigned sum = warp_inclusive_sum(kept_);
+    const unsigned all = __shfl_sync(kFullWarp, sum, 31);
+    unsigned long long index = 0;
+    if (lane_id() == 0) index = atomicAdd(&args_.state->contacts, all);
+    index = __shfl_sync(kFullWarp, index, 0);
+    if (searching) {
+      args_.rows.offsets[id_] = staged_list(index + sum - kept_, kept_).bits;
+      atomicAdd(&args_.rows.bin_sums[id_ / kBin],
+                static_cast<unsigned long long>(kept_ + not_kept_));
+    }
+    if (not_kept_ != 0) {
+      args_.rows.offsets[id_] = staged_list(not_kept_, StagedList::kNotStaged).bits;
+      args_.table.positions[id_] = position_;
+      atomicAdd(&args_.state->long_row_contacts, static_cast<unsigned long long>(not_kept_));
+      atomicAdd(&args_.state->overflow, 1ull);
+    }
+    if (index + all <= args_.rows.capacity) write(index, sum, all);
+  }
+
+  /// Contact i of the warp belongs to the first lane with sum > i.
+  __device__ void write(unsigned long long index, unsigned sum, unsigned all) {
+    const unsigned start = sum - kept_;
+    const std::uint32_t first_position = __shfl_sync(kFullWarp, position_, 0);
+    __syncwarp();
+    for (unsigned first = 0; first < all; first += 32) {
+      const unsigned i = first + lane_id();
+      const unsigned owner = owner_of(i, sum);
+      const unsigned slot = i - __shfl_sync(kFullWarp, start, owner);
+      const std::uint32_t a = __shfl_sync(kFullWarp, id_, owner);
+      if (i < all) {
+        const std::uint32_t position = s_.held[32 * slot + owner];
+        const std::uint32_t b = args_.table.ids[position];
+        const SphereInstance self = load_sorted(args_.table.sorted + first_position + owner);
+        write_or_stage(staging_, index + i, a, b, self, load_sorted(args_.table.sorted + position),
+                       s_.staged);
+      }
+      if (staging_.contacts != nullptr) {
+        write_staged(s_.staged, min(32u, all - first), staging_.contacts + index + first);
+      }
+    }
+  }
+
+  const GridArgs& args_;
+  SearchOutput staging_;
+  SingleLevelStorage& s_;
+  std::uint32_t position_ = 0, id_ = 0;
+  SphereInstance self_;
+  Real error_bound_ = 0;                                          // of excess()
+  Real largest_excess_ = -std::numeric_limits<Real>::infinity();  // of the spheres held
+  std::uint32_t* top_;                                            // slot of the next sphere to hold
+  unsigned kept_ = 0;           // neighbors b > a among the spheres held
+  std::uint32_t not_kept_ = 0;  // neighbors for which the column had no slot
+};
+
+/// A warp finds the neighbors of a sphere whose row is too long for the staging buffer.
+__device__ inline void list_neighbors(const GridArgs& args, const SingleLevel& level,
+                                      std::uint32_t a) {
+  const std::uint32_t position = args.table.positions[a];
+  const SphereInstance self = load_sorted(args.table.sorted + position);
+  unsigned long long at = args.rows.offsets[a];
+  Rows rows(level.box, neighbor_cells(level, self));
+  while (rows.left() > 0) {
+    uint2 mine{0, 0};  // the row of this lane
+    for (unsigned k = 0; k < 32 && rows.left() > 0; ++k) {
+      if (k == lane_id()) {
+        mine = rows.next(args.table.starts);
+      } else {
+        rows.skip();
+      }
+    }
+    const std::uint32_t sum = warp_inclusive_sum(mine.y - mine.x);
+    const std::uint32_t candidates = __shfl_sync(kFullWarp, sum, 31);
+    for (std::uint32_t first = 0; first < candidates; first += 32) {
+      const std::uint32_t i = first + lane_id();
+      const unsigned owner = owner_of(i, sum);
+      const std::uint32_t past = __shfl_sync(kFullWarp, mine.y, owner);
+      const std::uint32_t k = past - (__shfl_sync(kFullWarp, sum, owner) - i);
+      std::uint32_t b = 0;
+      if (i < candidates && touch(self, load_sorted(args.table.sorted + k))) b = args.table.ids[k];
+      const unsigned found = __ballot_sync(kFullWarp, b > a);
+      if (b > a)
+        args.rows.long_row_neighbors[at + static_cast<unsigned>(__popc(found & lanes_below()))] = b;
+      at += static_cast<unsigned>(__popc(found));
+    }
+  }
+}
+
+__device__ inline void list_long_rows(const GridArgs& args) {
+  const SingleLevel level(*args.plan);
+  const std::uint32_t long_rows = args.state->long_rows,
+                      all = long_rows + args.state->very_long_rows;
+  for (std::uint32_t k = blockIdx.x * kGridWarps + threadIdx.x / 32; k < all;
+       k += gridDim.x * kGridWarps) {
+    list_neighbors(
+        args, level,
+        k < long_rows ? args.rows.long_rows[k] : args.rows.very_long_rows[k - long_rows]);
+  }
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

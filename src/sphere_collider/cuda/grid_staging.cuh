@@ -1,0 +1,126 @@
+/// Staging buffer: holds contacts in the order of cells until their places in the output are known.
+#pragma once
+
+#include "src/sphere_collider/cuda/grid_emit.cuh"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// Location of a row in the staging buffer: 59 bits index, 5 bits length. A long row is not staged;
+/// the first field is then its length.
+struct StagedList {
+  static constexpr unsigned kCountBits = 5, kNotStaged = 31;
+  unsigned long long bits;
+  __device__ bool is_long() const { return (bits & kNotStaged) == kNotStaged; }
+  __device__ unsigned long long index() const { return bits >> kCountBits; }
+  __device__ std::uint32_t staged() const {
+    return is_long() ? 0 : static_cast<std::uint32_t>(bits & kNotStaged);
+  }
+  __device__ std::uint32_t count() const {
+    return static_cast<std::uint32_t>(is_long() ? index() : bits & kNotStaged);
+  }
+};
+static_assert(kMaxStaged < StagedList::kNotStaged);
+__device__ inline StagedList staged_list(unsigned long long index, unsigned count) {
+  return {index << StagedList::kCountBits | count};
+}
+
+/// The staging buffer as an output of the same kind as `output`.
+__device__ inline SearchOutput staging_output(const GridArgs& args, const SearchOutput& output) {
+  if (output.contacts != nullptr)
+    return {args.scratch.staging, nullptr, args.rows.capacity, nullptr};
+  return {nullptr, reinterpret_cast<SpherePair*>(args.scratch.staging), args.rows.capacity,
+          nullptr};
+}
+
+static_assert(kBin == kGridThreads);
+__device__ inline std::uint32_t bins_of(std::uint32_t n) { return (n - 1) / kBin + 1; }
+
+struct CopyStorage {
+  // Index of a row minus its index in the tile.
+  unsigned long long from[kGridThreads], to[kGridThreads];
+  BlockSums::TempStorage sums;
+  std::uint8_t owners[kMaxStaged * kGridThreads];
+};
+
+/// A block copies `count` records of kWords words each.
+template <unsigned kWords>
+__device__ inline void copy_words(const void* staging, void* output, std::uint32_t count,
+                                  const CopyStorage& s) {
+  constexpr unsigned kAtOnce = 4;
+  const auto* const from = static_cast<const unsigned long long*>(staging);
+  auto* const to = static_cast<unsigned long long*>(output);
+  const std::uint32_t words = count * kWords;
+  for (std::uint32_t first = threadIdx.x; first < words; first += kAtOnce * kGridThreads) {
+    unsigned long long values[kAtOnce], indices[kAtOnce];
+#pragma unroll
+    for (unsigned k = 0; k < kAtOnce; ++k) {
+      const std::uint32_t w = min(first + k * kGridThreads, words - 1), record = w / kWords;
+      const unsigned owner = s.owners[record], word = w % kWords;
+      values[k] = from[(s.from[owner] + record) * kWords + word];
+      indices[k] = (s.to[owner] + record) * kWords + word;
+    }
+#pragma unroll
+    for (unsigned k = 0; k < kAtOnce; ++k) {
+      if (first + k * kGridThreads < words) to[indices[k]] = values[k];
+    }
+  }
+}
+
+/// Sums the pairs of kBinsOfSum bins each.
+__device__ inline void sum_bins(const GridArgs& args) {
+  const std::uint32_t bins = bins_of(args.input.n);
+  const unsigned warps = gridDim.x * kGridWarps;
+  for (std::uint32_t sum = blockIdx.x * kGridWarps + threadIdx.x / 32; sum * kBinsOfSum < bins;
+       sum += warps) {
+    unsigned long long mine = 0;
+    for (std::uint32_t k = lane_id(); k < kBinsOfSum; k += 32) {
+      if (sum * kBinsOfSum + k < bins) mine += args.rows.bin_sums[sum * kBinsOfSum + k];
+    }
+    mine = warp_sum(mine);
+    if (lane_id() == 0) args.rows.sums[sum] = mine;
+  }
+}
+
+/// A block copies the rows of a bin, one per thread, from the staging buffer to the output.
+__device__ inline void copy_bin(const GridArgs& args, const SearchOutput& output, CopyStorage& s) {
+  const std::uint32_t bin = blockIdx.x, first_bin = bin / kBinsOfSum * kBinsOfSum;
+  const std::uint32_t a = bin * kBin + threadIdx.x;
+  const StagedList list{a < args.input.n ? args.rows.offsets[a] : 0};
+  unsigned long long mine =
+      threadIdx.x < bin - first_bin ? args.rows.bin_sums[first_bin + threadIdx.x] : 0;
+  for (std::uint32_t k = threadIdx.x; k < bin / kBinsOfSum; k += kGridThreads) {
+    mine += args.rows.sums[k];
+  }
+  const unsigned long long before = block_sum(mine, s.sums);
+  const std::uint32_t count = list.count(), staged = list.staged();
+  // One scan for two sums: of staged contacts, at most kMaxStaged * kGridThreads, and of all
+  // contacts.
+  constexpr unsigned kStagedBits = 16;
+  unsigned long long total = 0;
+  const unsigned long long sums = block_exclusive_sum(
+      static_cast<unsigned long long>(count) << kStagedBits | staged, s.sums, total);
+  const auto start = static_cast<std::uint32_t>(sums & ((1u << kStagedBits) - 1));
+  const auto all = static_cast<std::uint32_t>(total & ((1u << kStagedBits) - 1));
+  s.from[threadIdx.x] = list.index() - start;
+  s.to[threadIdx.x] = before + (sums >> kStagedBits) - start;
+  for (std::uint32_t k = 0; k < staged; ++k) {
+    s.owners[start + k] = static_cast<std::uint8_t>(threadIdx.x);
+  }
+  if (list.is_long()) {
+    args.table.ranks[a] = count;
+    defer_row(args, a, count, before + (sums >> kStagedBits));
+  }
+  __syncthreads();
+  static_assert(sizeof(SpherePair) == 8 && sizeof(SphereContact) % 8 == 0);
+  if (output.contacts != nullptr) {
+    copy_words<sizeof(SphereContact) / 8>(args.scratch.staging, output.contacts, all, s);
+  } else {
+    copy_words<1>(args.scratch.staging, output.pairs, all, s);
+  }
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

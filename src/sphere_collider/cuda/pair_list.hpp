@@ -1,0 +1,41 @@
+/// Tests of given pairs of spheres.
+#pragma once
+
+#include <jfpx/sphere_collider.hpp>
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// Enqueues results[i] = test of pairs[i], for i < m. Does not allocate or wait.
+void launch_test_pairs(const SphereInstance* spheres, const SpherePair* pairs, std::size_t m,
+                       PairResult* results, cudaStream_t stream);
+
+/// Number of pairs that a block counts, and then writes.
+inline constexpr std::size_t kTouchingPerBlock = 2048;
+constexpr std::size_t touching_blocks(std::size_t m) {
+  return (m + kTouchingPerBlock - 1) / kTouchingPerBlock;
+}
+
+struct TouchingArgs {
+  const SphereInstance* spheres;
+  const SpherePair* pairs;
+  std::size_t m;
+  std::uint32_t* counts;     ///< [touching_blocks(m) + 1]; the last one becomes 0
+  unsigned long long* sums;  ///< exclusive scan of `counts`
+  PairContact* touching;     ///< [m], may be mapped host memory
+  unsigned long long* total;
+};
+/// Enqueues the count of the touching pairs of each block. Does not allocate or wait.
+void launch_count_touching(const TouchingArgs& args, cudaStream_t stream);
+/// Enqueues the output of the touching pairs, in the order of the list. Does not allocate or wait.
+void launch_emit_touching(const TouchingArgs& args, cudaStream_t stream);
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,85 @@
+/// Device functions that the sphere searches share: loading, validation and output.
+#pragma once
+
+#include "src/base/cuda/launch.cuh"
+#include "src/base/cuda/warp.cuh"
+#include "src/collide/sphere_pair.hpp"
+#include "src/sphere_collider/cuda/search.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// Loads a sphere through the read-only cache: no thread may write it during the kernel.
+__device__ inline SphereInstance load_sphere(const SphereInstance* p) {
+  SphereInstance s;
+  if constexpr (sizeof(Real) == 4) {
+    const float4 v = __ldg(reinterpret_cast<const float4*>(p));
+    s = {{v.x, v.y, v.z}, v.w};
+  } else {
+    const double2 lo = __ldg(reinterpret_cast<const double2*>(p));
+    const double2 hi = __ldg(reinterpret_cast<const double2*>(p) + 1);
+    s = {{static_cast<Real>(lo.x), static_cast<Real>(lo.y), static_cast<Real>(hi.x)},
+         static_cast<Real>(hi.y)};
+  }
+  return s;
+}
+
+__device__ inline bool is_valid(const SphereInstance& s) {
+  return is_finite(s.centre) && is_finite(s.radius) && s.radius > 0;
+}
+
+/// Records that sphere `i` is invalid. The lowest index is kept.
+__device__ inline void report_invalid(SearchState* state, std::uint32_t i) {
+  atomicMax(&state->valid_before, ~i);
+}
+__device__ inline std::uint32_t first_invalid(std::uint32_t valid_before) {
+  return valid_before == 0 ? kNoSphere : ~valid_before;
+}
+__device__ inline std::uint32_t first_invalid(const SearchState* state) {
+  return first_invalid(state->valid_before);
+}
+
+/// Writes the contact of the touching pair a < b to index `at` of the output.
+__device__ inline void write_contact(const SearchOutput& output, unsigned long long at,
+                                     std::uint32_t a, std::uint32_t b, const SphereInstance& sa,
+                                     const SphereInstance& sb) {
+  if (output.contacts == nullptr) {
+    output.pairs[at] = {a, b};
+    return;
+  }
+  const PairResult r = detail::test_sphere_pair(sa, sb);
+  output.contacts[at] = {a, b, r.normal, r.distance};
+}
+
+/// Writes the outcome of a search. Call from one thread.
+__device__ inline void write_count(const SearchOutput& output, unsigned long long contacts,
+                                   std::uint32_t invalid, bool complete) {
+  const bool valid = invalid == kNoSphere;
+  *output.count = {valid ? contacts : 0, invalid, valid && complete ? 1u : 0u};
+}
+
+/// A warp writes the contacts of row `a`, given as 32 words of a bit mask, one word per lane: lane
+/// l holds the neighbors 32*(first_word + l) to +31.
+/// @return the output index after the last contact.
+template <typename LoadSphere>
+__device__ inline unsigned long long emit_row(const SearchOutput& output, unsigned long long at,
+                                              std::uint32_t a, const SphereInstance& sa,
+                                              std::uint32_t first_word, std::uint32_t my_word,
+                                              LoadSphere load) {
+  for (unsigned left = __ballot_sync(kFullWarp, my_word != 0); left != 0; left &= left - 1) {
+    const int owner = __ffs(static_cast<int>(left)) - 1;
+    const unsigned word = __shfl_sync(kFullWarp, my_word, owner);
+    if ((word >> lane_id() & 1u) != 0) {
+      const std::uint32_t b = 32 * (first_word + static_cast<std::uint32_t>(owner)) + lane_id();
+      const auto rank = static_cast<unsigned>(__popc(word & lanes_below()));
+      write_contact(output, at + rank, a, b, sa, load(b));
+    }
+    at += static_cast<unsigned>(__popc(word));
+  }
+  return at;
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

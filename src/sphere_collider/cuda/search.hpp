@@ -1,0 +1,43 @@
+/// State and output of a sphere search, as the kernels of all searches use them.
+#pragma once
+
+#include <jfpx/contact.hpp>
+#include <jfpx/cuda/sphere_collider.hpp>
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// Counters that the kernels of one search share. All bytes are zero at the start of a search.
+struct alignas(16) SearchState {
+  unsigned long long contacts;       ///< contacts found by the grid, without long_row_contacts
+  unsigned long long overflow;       ///< pairs for GridArgs::Rows::overflow, written or not
+  unsigned long long largest_half;   ///< bits of the largest half cell width that a radius requires
+  unsigned long long smallest_half;  ///< ~bits of the smallest one
+  unsigned long long farthest[6];    ///< ordered bits of the largest x, -x, y, -y, z, -z
+  std::uint32_t valid_before;        ///< ~(lowest index of an invalid sphere), 0 if there is none
+  std::uint32_t levels;              ///< bit l is set if there are spheres on grid level l
+  std::uint32_t long_rows;           ///< entries of GridArgs::Rows::long_rows
+  std::uint32_t very_long_rows;      ///< entries of GridArgs::Rows::very_long_rows
+  std::uint32_t has_far;             ///< 1: there are spheres far from the origin (grid_cells.hpp)
+  std::uint32_t blocks_sampled;      ///< blocks that have finished their part of the sample
+  std::uint32_t blocks_counted;      ///< blocks that have counted coarse buckets
+  std::uint32_t cell_is_full;        ///< 1: a cell of the direct search has no free slot
+  std::uint32_t block_is_full;       ///< 1: a block of the direct search found too many pairs
+  unsigned long long long_row_contacts;  ///< contacts of rows that the staging buffer cannot hold
+  std::uint32_t same_cell[32];           ///< pairs of a sample in the same cell, by level
+};
+
+/// Destination of the result of a search. `contacts` or `pairs` is null.
+struct SearchOutput {
+  SphereContact* contacts;
+  SpherePair* pairs;
+  unsigned long long capacity;
+  ContactCount* count;
+};
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

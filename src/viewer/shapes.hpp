@@ -1,0 +1,25 @@
+/// Extents of shapes, and intersections of rays with them.
+#pragma once
+
+#include <jfpx/scene.hpp>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace view {
+
+/// Distance along the unit direction of a ray at which it enters a shape; kMaxReal if the ray
+/// misses the shape or the shape lies behind its origin. Planes are never hit, because they do not
+/// move.
+Real ray_distance(const Shape& shape, const BodyState& state, const Vec3& from,
+                  const Vec3& direction);
+
+/// Radius of a ball around the body's position that contains the shape [m]; 0 for planes.
+Real size_of(const Shape& shape);
+/// The state of a part of a compound body, at rest.
+BodyState placed(const CompoundPart& part, const BodyState& body);
+/// True for half-spaces and planes, whose extent is infinite.
+bool is_endless(const Shape& shape);
+
+}  // namespace view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

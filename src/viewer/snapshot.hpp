@@ -1,0 +1,55 @@
+/// Snapshot of a run: everything that a picture or the panel shows.
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace view {
+
+/// Duration of each stage of a step [ms].
+struct StageTimes {
+  double integrate = 0, broad = 0, detect = 0, solve = 0, total = 0;
+};
+
+struct Snapshot {
+  std::uint64_t step = 0;
+  double time = 0;                  ///< [s] since the run began
+  Real dt = 0;                      ///< [s], of the last step
+  std::vector<BodyState> states;    ///< in the order of the scene's bodies
+  std::vector<std::uint8_t> awake;  ///< in the same order, 1 or 0
+  std::vector<Contact> contacts;    ///< BodyId::index is the index in the scene
+  StageTimes times;
+  std::uint64_t iterations = 0;  ///< of the native resolver, both loops
+  std::string computed_by;       ///< backend of the sphere contacts
+  std::string solved_by;         ///< backend of Bullet's solver; empty for a native run
+  std::string trouble;           ///< reason why the run can't continue meaningfully
+};
+
+/// Linear interpolation between two steps, because pictures are not synchronous with steps.
+inline Vec3 interpolate(const Vec3& a, const Vec3& b, Real share) { return a + (b - a) * share; }
+
+/// Normalized linear interpolation along the shorter arc; its angular velocity is nearly constant
+/// for the small rotation of a step.
+inline Quat interpolate(const Quat& a, const Quat& b, Real share) {
+  const Real way = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -share : share;
+  const Real rest = 1 - share;
+  return normalized(Quat{a.w * rest + b.w * way, a.x * rest + b.x * way, a.y * rest + b.y * way,
+                         a.z * rest + b.z * way});
+}
+
+/// Position and orientation; the velocities are zero.
+inline BodyState interpolate(const BodyState& a, const BodyState& b, Real share) {
+  return {interpolate(a.position, b.position, share),
+          interpolate(a.orientation, b.orientation, share),
+          {},
+          {}};
+}
+
+}  // namespace view
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,63 @@
+/// Callbacks of a world that run in every step: forces and contact generators.
+#pragma once
+
+#include <jfpx/error.hpp>
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Calls the callbacks in the order of their addition, which is that of the ids: floating-point
+/// sums depend on the order, and so does the choice among equal contacts.
+template <class Context, class Id>
+class CallbackRegistry {
+ public:
+  using Function = std::function<void(Context&)>;
+
+  /// @param kind noun for error messages
+  explicit CallbackRegistry(const char* kind) : kind_(kind) {}
+
+  Id add(Function function) {
+    ids_.reserve(ids_.size() + 1);
+    functions_.push_back(std::make_unique<Function>(std::move(function)));
+    ids_.push_back({next_});
+    return {next_++};
+  }
+  /// @throws InvalidArgument if the id is unknown, as does at()
+  void remove(Id id) {
+    const auto position = static_cast<std::ptrdiff_t>(position_of(id));
+    ids_.erase(ids_.begin() + position);
+    functions_.erase(functions_.begin() + position);
+  }
+  /// The address is valid until the callback is removed.
+  Function& at(Id id) { return *functions_[position_of(id)]; }
+  const std::vector<Id>& ids() const noexcept { return ids_; }
+  bool empty() const noexcept { return ids_.empty(); }
+
+  void call(Context& context) const {
+    for (const auto& function : functions_) (*function)(context);
+  }
+
+ private:
+  std::size_t position_of(Id id) const {
+    const auto found = std::ranges::lower_bound(ids_, id.number, {}, &Id::number);
+    if (found != ids_.end() && *found == id) return static_cast<std::size_t>(found - ids_.begin());
+    throw InvalidArgument(kind_ + (' ' + std::to_string(id.number)) +
+                          " is unknown; it must be one of this world that was not removed");
+  }
+
+  const char* kind_;
+  std::uint64_t next_ = 0;
+  std::vector<Id> ids_;  ///< ascending
+  std::vector<std::unique_ptr<Function>> functions_;
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# Checks that includes between the folders of src point one way, from higher layers to lower ones, and that
+# include/jfpx depends on nothing in src. A folder may include itself and every folder listed before it;
+# the exceptions below it are folders of the same height that do not use each other.
+set -u
+cd "$(dirname "$0")/../.."
+declare -A allowed=(
+  [base]=""
+  [collide]="base"
+  [scene]="base collide"
+  [sphere_collider]="base collide scene"
+  [contact_solver]="base collide scene sphere_collider"
+  [world]="base collide scene sphere_collider contact_solver"
+  [bullet]="base collide scene sphere_collider contact_solver"
+  [scenes]=""
+  [demos]="base scenes"
+  [tool]="base collide scene sphere_collider contact_solver world bullet scenes demos"
+  [viewer]="base collide scene sphere_collider contact_solver world bullet scenes demos tool"
+)
+# SceneWorld integrates kinematic bodies with the code of the native world.
+exceptions="bullet/world/scene_world.cpp->world"
+status=0
+arrows=0
+for folder in src/*/; do
+  folder=$(basename "$folder")
+  [ -n "${allowed[$folder]+x}" ] || { echo "src/$folder has no layer: add it to tests/docs/layers.sh"; status=1; }
+done
+while IFS=: read -r file target; do
+  from=${file#src/} from=${from%%/*} to=${target%%/*}
+  arrows=$((arrows + 1))
+  [ "$from" != "$to" ] || continue
+  [[ " $exceptions " != *" ${file#src/}->$to "* ]] || continue
+  [[ " ${allowed[$from]-} " == *" $to "* ]] || { echo "$file includes src/$target, but $from may not use $to"; status=1; }
+done < <(grep -rHoE '^ *#include "src/[^"]+' src | sed 's/ *#include "src\///')
+# Backends of a folder: shared code must not include a backend, and backends do not include each other.
+while IFS=: read -r file target; do
+  case "$file" in */cpu/*) own=cpu ;; */cuda/*) own=cuda ;; *) own= ;; esac
+  case "$target" in */cpu/*) other=cpu ;; */cuda/*) other=cuda ;; *) continue ;; esac
+  [ -z "$own" ] || [ "$own" = "$other" ] || { echo "$file includes src/$target, another backend"; status=1; }
+done < <(grep -rHoE '^ *#include "src/[^"]+' src | sed 's/ *#include "src\///')
+if grep -rnE '#include "src/|#include <src/' include; then
+  echo "include/jfpx may not use src"
+  status=1
+fi
+[ "$arrows" -gt 300 ] || { echo "only $arrows includes were found"; status=1; }
+exit $status
