@@ -109,6 +109,7 @@ TEST_F(Preload, ReportsAMissingGpuAndLeavesEverythingToBullet) {
 }
 
 TEST_F(Preload, DetectsThePrecisionOfTheProgram) {
+  if (!JFPX_HAS_BOTH_PRECISIONS) GTEST_SKIP() << "built in one precision";
   const ProcessResult result =
       jfpx_command("preload --summary --minimum-batch 0 -- " JFPX_OTHER_STOCK_PROGRAM " 50 2>&1");
   EXPECT_THAT(result.output, HasSubstr(run_process(JFPX_OTHER_STOCK_PROGRAM " 50").output));

@@ -107,7 +107,7 @@ if(JFPX_TOOL)
     endif()
     set(collision ${JFPX_BULLET_${precision}_LINK_LIBRARIES})
     list(FILTER collision INCLUDE REGEX "BulletCollision")
-    add_dependencies(bullet_preload_test${suffix}
+    jfpx_test_runs(bullet_preload_test${suffix}
       jfpx_tool jfpx_tool_f64 jfpx_bullet_preload bullet_stock_program bullet_stock_program_f64)
     target_compile_definitions(bullet_preload_test${suffix} PRIVATE
       JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"

@@ -55,10 +55,23 @@ case $step in
       said "cuda off (no CUDA compiler was found that works" || fail "$(cat "$work/log")"
     done
     ;;
+  # One precision compiles nothing of the other.
+  precisions)
+    list() { ninja -C "$work/build" -t commands all | grep -oE ' -o [^ ]+[.]dir/[^ ]+[.]o ' >"$work/objects"; }
+    accepts -S "$root" -DJFPX_CUDA=OFF -DJFPX_VIEWER=OFF -DJFPX_PRECISIONS=float
+    list
+    grep -q 'jfpx.dir' "$work/objects" || fail "float compiles nothing"
+    ! grep '_f64.dir' "$work/objects" || fail "float compiles double"
+    accepts -S "$root" -DJFPX_CUDA=OFF -DJFPX_VIEWER=OFF -DJFPX_PRECISIONS=double
+    list
+    grep -q 'jfpx_f64.dir' "$work/objects" || fail "double compiles nothing"
+    ! grep -E '(jfpx|_tool|_test|_scenes)[.]dir' "$work/objects" || fail "double compiles float"
+    refuses "it takes float, double or both" -S "$root" -DJFPX_PRECISIONS=half
+    ;;
   # What a build folder was once configured with does not decide what a preset builds there.
   presets)
     presets=$(sed -n '/"name": "base", "hidden": true, "generator"/,/}},/p' "$root/CMakePresets.json")
-    switches=$(sed -nE 's/^(option\(|set\()(JFPX_[A-Z]+) ("|AUTO CACHE).*/\2/p' "$root/cmake/JfpxOptions.cmake" | grep -v SUMMARY)
+    switches=$(sed -nE 's/^(option\(|set\()(JFPX_[A-Z]+) ("|(AUTO|both) CACHE).*/\2/p' "$root/cmake/JfpxOptions.cmake" | grep -v SUMMARY)
     [ "$(wc -w <<<"$switches")" -ge 11 ] || fail "only $switches were found"
     for switch in $switches; do
       grep -qF "\"$switch\": " <<<"$presets" || fail "the preset base does not set $switch"

@@ -5,7 +5,7 @@ jfpx_add_test(cost_fit_test SOURCES
   ${PROJECT_SOURCE_DIR}/src/tool/cost_fit.cpp
   support/sphere_fixtures.cpp)
 foreach(suffix IN ITEMS "" "_f64")
-  add_dependencies(tool_test${suffix} jfpx_tool jfpx_tool_f64)
+  jfpx_test_runs(tool_test${suffix} jfpx_tool jfpx_tool_f64)
   # Quoted, because a shell runs the command.
   target_compile_definitions(tool_test${suffix} PRIVATE
     "JFPX_TOOL_PATH=\"\\\"$<TARGET_FILE:jfpx_tool${suffix}>\\\"\""

@@ -25,7 +25,7 @@ if(JFPX_TOOL)
   add_library(lost_context MODULE viewer/lost_context.cpp)
   target_link_libraries(lost_context PRIVATE jfpx_build_flags jfpx_viewer3rd)
   foreach(suffix IN ITEMS "" "_f64")
-    add_dependencies(view_test${suffix} jfpx_view jfpx_view_f64 jfpx_tool${suffix} lost_context)
+    jfpx_test_runs(view_test${suffix} jfpx_view jfpx_view_f64 jfpx_tool${suffix} lost_context)
     target_compile_definitions(view_test${suffix} PRIVATE
       JFPX_VIEW_PATH="$<TARGET_FILE:jfpx_view${suffix}>"
       JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
