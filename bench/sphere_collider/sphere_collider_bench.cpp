@@ -189,7 +189,7 @@ void add_all() {
   add("coincident/all_pairs", coincident, 2'000, all_pairs, SimdLevel::automatic);
 }
 
-void test_pairs(benchmark::State& state) {
+void find_touching(benchmark::State& state) {
   const Spheres spheres = gas(100'000);
   Random random(3);
   // Half of the pairs touch and half are random, so neither branches nor accesses are predictable.
@@ -201,10 +201,10 @@ void test_pairs(benchmark::State& state) {
     p = {c.a, c.b};
     if (random.below(2) == 0) p.b = static_cast<SphereIndex>(random.below(spheres.size()));
   }
-  for (auto _ : state) benchmark::DoNotOptimize(collider->test_pairs(spheres, pairs).data());
+  for (auto _ : state) benchmark::DoNotOptimize(collider->find_touching(spheres, pairs).data());
   state.SetItemsProcessed(state.iterations() * state.range(0));
 }
-BENCHMARK(test_pairs)->Arg(130'000)->Unit(benchmark::kMicrosecond);
+BENCHMARK(find_touching)->Arg(130'000)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace JFPX_ABI

@@ -26,7 +26,8 @@ struct SphereContact {
   friend bool operator==(const SphereContact&, const SphereContact&) = default;
 };
 
-/// Result of a tested pair. If `touching` is 0, the other fields are 0.
+/// Result of a tested pair, see cuda::DeviceSphereCollider::test_pairs(). If `touching` is 0, the
+/// other fields are 0.
 struct PairResult {
   Vec3 normal;                 ///< [-], unit, from b to a
   Real distance = 0;           ///< [m], <= 0; NaN if an input is NaN, as in Bullet

@@ -11,9 +11,9 @@ inline namespace JFPX_ABI {
 /// Amount of work of one SphereCollider call. The counts are doubles, so that none overflows.
 struct ColliderWork {
   double spheres = 0;   ///< [-]
-  double pairs = 0;     ///< [-], N*(N-1)/2 for find_contacts(), the given pairs for test_pairs()
-  double contacts = 0;  ///< [-], found; not counted for test_pairs()
-  double bytes = 0;     ///< [-], input and output
+  double pairs = 0;     ///< [-], N*(N-1)/2 for find_contacts(), the list for find_touching()
+  double contacts = 0;  ///< [-], found; not counted for find_touching()
+  double bytes = 0;     ///< [-], input and output; for find_touching() as if every pair touched
 };
 
 /// Cost of one backend and algorithm: coefficients of a linear model, each finite and >= 0.

@@ -10,7 +10,6 @@
 #include <memory>
 #include <span>
 #include <string_view>
-#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -74,18 +73,13 @@ class JFPX_API SphereCollider {
   ///   stays usable after any of them.
   virtual ContactSpan find_contacts(std::span<const SphereInstance> spheres) = 0;
 
-  /// Tests the given pairs; result i belongs to pairs[i]. Reproduces Bullet's
-  /// btSphereSphereCollisionAlgorithm for all values: a NaN results in a contact, and no value is
-  /// rejected.
-  /// @throws InvalidArgument if an index in `pairs` is out of range; OutOfMemory; DeviceError.
-  virtual std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                                 std::span<const SpherePair> pairs) = 0;
-
-  /// Like test_pairs(), but returns only the pairs that touch, in the order of the list. Suits the
-  /// output of a broad phase, of which few pairs touch.
-  /// @throws the errors of test_pairs(); InvalidArgument for 2^32 pairs or more.
+  /// Finds the touching pairs of a list, in the order of the list. Suits the output of a broad
+  /// phase, of which few pairs touch. Reproduces Bullet's btSphereSphereCollisionAlgorithm for all
+  /// values: a NaN results in a contact, and no value is rejected.
+  /// @throws InvalidArgument if an index in `pairs` is out of range, or for 2^32 pairs or more;
+  ///   OutOfMemory; DeviceError. The collider stays usable after any of them.
   virtual std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
-                                                     std::span<const SpherePair> pairs);
+                                                     std::span<const SpherePair> pairs) = 0;
 
   /// Bytes copied by the last find_touching(). For a list similar to that of the previous call,
   /// only the differences are copied to the device. Zero on the CPU.
@@ -103,9 +97,6 @@ class JFPX_API SphereCollider {
 
  protected:
   SphereCollider() = default;
-
- private:
-  std::vector<PairContact> touching_;  ///< result of the default find_touching()
 };
 
 /// Makes a collider. Thread-safe.

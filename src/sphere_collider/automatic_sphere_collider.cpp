@@ -14,13 +14,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Work of testing given pairs. It is the same for test_pairs() and find_touching(), because the
-/// cost of a pair hardly depends on which results are returned.
+/// Work of find_touching(). The bytes are those of the first call with a list whose pairs all
+/// touch, because the changes and the touching pairs are unknown before the call.
 ColliderWork work_of(std::span<const SphereInstance> spheres, std::span<const SpherePair> pairs) {
   const auto n = static_cast<double>(spheres.size()), m = static_cast<double>(pairs.size());
   return {.spheres = n,
           .pairs = m,
-          .bytes = n * sizeof(SphereInstance) + m * (sizeof(SpherePair) + sizeof(PairResult))};
+          .bytes = n * sizeof(SphereInstance) + m * (sizeof(SpherePair) + sizeof(PairContact))};
 }
 
 ChoiceReason choice_reason(TimeChooser::Reason reason) {
@@ -154,16 +154,6 @@ ContactSpan AutomaticSphereCollider::find_contacts(std::span<const SphereInstanc
         contacts_per_sphere_ = contacts / std::max(n, 1.0);
         return work(contacts);
       });
-}
-
-std::span<const PairResult> AutomaticSphereCollider::test_pairs(
-    std::span<const SphereInstance> spheres, std::span<const SpherePair> pairs) {
-  if (reuse_decision(given_, spheres.size(), pairs.size()))
-    return given_.by->test_pairs(spheres, pairs);
-  const ColliderWork work = work_of(spheres, pairs);
-  return compute(
-      given_, work, [&](SphereCollider& collider) { return collider.test_pairs(spheres, pairs); },
-      [&](std::span<const PairResult>) { return work; });
 }
 
 std::span<const PairContact> AutomaticSphereCollider::find_touching(

@@ -28,8 +28,6 @@ class AutomaticSphereCollider final : public SphereCollider {
                           bool with_cuda);
 
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override;
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                         std::span<const SpherePair> pairs) override;
   std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
                                              std::span<const SpherePair> pairs) override;
   TransferredBytes transferred() const noexcept override { return transferred_; }

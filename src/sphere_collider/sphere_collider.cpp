@@ -6,7 +6,6 @@
 #include "src/sphere_collider/automatic_sphere_collider.hpp"
 #include "src/sphere_collider/backend_table.hpp"
 #include "src/sphere_collider/cost_model.hpp"
-#include "src/sphere_collider/sphere_input.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -24,18 +23,6 @@ std::unique_ptr<SphereCollider> make_named(const SphereColliderOptions& options)
 }  // namespace
 
 SphereCollider::~SphereCollider() = default;
-
-std::span<const PairContact> SphereCollider::find_touching(std::span<const SphereInstance> spheres,
-                                                           std::span<const SpherePair> pairs) {
-  detail::check_count(pairs);
-  touching_.clear();
-  std::uint32_t pair = 0;
-  for (const PairResult& result : test_pairs(spheres, pairs)) {
-    if (result.touching != 0) touching_.push_back({result.normal, result.distance, pair});
-    ++pair;
-  }
-  return touching_;
-}
 
 std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
   ThreadPool::check(options.threads);

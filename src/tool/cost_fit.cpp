@@ -76,8 +76,8 @@ ColliderWork test_work(double spheres, double pairs) {
   return {.spheres = spheres,
           .pairs = pairs,
           .contacts = 0,
-          .bytes =
-              spheres * sizeof(SphereInstance) + pairs * (sizeof(SpherePair) + sizeof(PairResult))};
+          .bytes = spheres * sizeof(SphereInstance) +
+                   pairs * (sizeof(SpherePair) + sizeof(PairContact))};
 }
 
 }  // namespace tool

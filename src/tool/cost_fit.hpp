@@ -26,7 +26,7 @@ double crossover(const CostTerms& a, const CostTerms& b);
 
 /// The work of a find_contacts() call.
 ColliderWork search_work(double spheres, double contacts);
-/// The work of a test_pairs() call.
+/// The work of a find_touching() call: all bytes are copied, as if every pair touched.
 ColliderWork test_work(double spheres, double pairs);
 
 }  // namespace tool

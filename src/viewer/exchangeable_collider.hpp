@@ -31,10 +31,11 @@ class ExchangeableCollider final : public SphereCollider {
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
     return now_->find_contacts(spheres);
   }
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                         std::span<const SpherePair> pairs) override {
-    return now_->test_pairs(spheres, pairs);
+  std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                             std::span<const SpherePair> pairs) override {
+    return now_->find_touching(spheres, pairs);
   }
+  TransferredBytes transferred() const noexcept override { return now_->transferred(); }
   Backend backend() const noexcept override { return now_->backend(); }
   SphereAlgorithm algorithm() const noexcept override { return now_->algorithm(); }
 

@@ -30,7 +30,7 @@ ContactSpan BroadPhaseSearch::find(std::span<const SphereInstance> spheres) {
       hierarchy_.update(static_cast<SphereHierarchy::Leaf>(i), spheres[i]);
     }
     hierarchy_.find_pairs(&pairs_);
-    test_pairs(spheres);
+    add_touching(spheres);
   }
   return contacts_;
 }
@@ -43,19 +43,17 @@ void BroadPhaseSearch::test_every_pair(std::span<const SphereInstance> spheres) 
     for (SphereIndex b = a + 1; b < spheres.size(); ++b) {
       pairs_.push_back({a, b});
       if (pairs_.size() < kBatch) continue;
-      test_pairs(spheres);
+      add_touching(spheres);
       pairs_.clear();
     }
   }
-  test_pairs(spheres);
+  add_touching(spheres);
 }
 
 /// Appends the touching pairs of pairs_.
-void BroadPhaseSearch::test_pairs(std::span<const SphereInstance> spheres) {
-  const std::span<const PairResult> results = collider_->test_pairs(spheres, pairs_);
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    const PairResult& r = results[i];
-    if (r.touching != 0) contacts_.push_back({pairs_[i].a, pairs_[i].b, r.normal, r.distance});
+void BroadPhaseSearch::add_touching(std::span<const SphereInstance> spheres) {
+  for (const PairContact& c : collider_->find_touching(spheres, pairs_)) {
+    contacts_.push_back({pairs_[c.pair].a, pairs_[c.pair].b, c.normal, c.distance});
   }
 }
 

@@ -19,14 +19,14 @@ class BroadPhaseSearch {
   /// Must be called after the number of spheres, or the body that a sphere belongs to, has changed.
   void set_spheres(std::span<const SphereInstance> spheres);
   /// All touching pairs, sorted. Valid until the next call.
-  /// @throws the exceptions of SphereCollider::find_contacts()
+  /// @throws the exceptions of SphereCollider::find_contacts() and find_touching()
   ContactSpan find(std::span<const SphereInstance> spheres);
 
   const SphereCollider& collider() const noexcept { return *collider_; }
 
  private:
   void test_every_pair(std::span<const SphereInstance> spheres);
-  void test_pairs(std::span<const SphereInstance> spheres);
+  void add_touching(std::span<const SphereInstance> spheres);
 
   std::unique_ptr<SphereCollider> collider_;
   BroadPhase broad_phase_;

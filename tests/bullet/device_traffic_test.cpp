@@ -35,10 +35,6 @@ class WatchedCollider final : public SphereCollider {
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
     return cpu_->find_contacts(spheres);
   }
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                         std::span<const SpherePair> pairs) override {
-    return cpu_->test_pairs(spheres, pairs);
-  }
   std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
                                              std::span<const SpherePair> pairs) override {
     *blocks_ = differing_blocks(spheres, std::span<const SphereInstance>(spheres_)) +

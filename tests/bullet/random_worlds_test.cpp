@@ -50,21 +50,21 @@ class SlightlyWrongCollider final : public SphereCollider {
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
     return right_->find_contacts(spheres);
   }
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                         std::span<const SpherePair> pairs) override {
-    const auto results = right_->test_pairs(spheres, pairs);
-    results_.assign(results.begin(), results.end());
-    for (PairResult& result : results_) {
-      result.distance = std::nextafter(result.distance, -std::numeric_limits<Real>::infinity());
+  std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                             std::span<const SpherePair> pairs) override {
+    const auto touching = right_->find_touching(spheres, pairs);
+    touching_.assign(touching.begin(), touching.end());
+    for (PairContact& contact : touching_) {
+      contact.distance = std::nextafter(contact.distance, -std::numeric_limits<Real>::infinity());
     }
-    return results_;
+    return touching_;
   }
   Backend backend() const noexcept override { return right_->backend(); }
   SphereAlgorithm algorithm() const noexcept override { return right_->algorithm(); }
 
  private:
   std::unique_ptr<SphereCollider> right_ = make_sphere_collider();
-  std::vector<PairResult> results_;
+  std::vector<PairContact> touching_;
 };
 
 std::unique_ptr<btCollisionDispatcher> make_slightly_wrong(btCollisionConfiguration* configuration,

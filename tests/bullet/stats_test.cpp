@@ -14,18 +14,18 @@ namespace {
 /// Forwards to a real collider, then lets a test modify the results or fail.
 class SpoiledCollider : public SphereCollider {
  public:
-  using Spoil = std::function<void(std::span<PairResult>)>;
+  using Spoil = std::function<void(std::vector<PairContact>*)>;
   explicit SpoiledCollider(Spoil spoil) : spoil_(std::move(spoil)) {}
 
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
     return good_->find_contacts(spheres);
   }
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                         std::span<const SpherePair> pairs) override {
-    const auto results = good_->test_pairs(spheres, pairs);
-    results_.assign(results.begin(), results.end());
-    spoil_(results_);
-    return results_;
+  std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                             std::span<const SpherePair> pairs) override {
+    const auto touching = good_->find_touching(spheres, pairs);
+    touching_.assign(touching.begin(), touching.end());
+    spoil_(&touching_);
+    return touching_;
   }
   Backend backend() const noexcept override { return Backend::cpu; }
   SphereAlgorithm algorithm() const noexcept override { return SphereAlgorithm::automatic; }
@@ -34,7 +34,7 @@ class SpoiledCollider : public SphereCollider {
  private:
   Spoil spoil_;
   std::unique_ptr<SphereCollider> good_ = make_sphere_collider({.backend = Backend::cpu});
-  std::vector<PairResult> results_;
+  std::vector<PairContact> touching_;
 };
 
 TwinOptions with_collider(SpoiledCollider::Spoil spoil, bool verify = false) {
@@ -116,7 +116,7 @@ TEST(DispatchStats, EveryFallbackHasItsOwnText) {
 
 TEST(FailingCollider, IsReplacedAndTheBitsStay) {
   int calls = 0;
-  Twins twins(with_collider([&](std::span<PairResult>) {
+  Twins twins(with_collider([&](std::vector<PairContact>*) {
     if (++calls == 10) throw DeviceError("the device is gone");
   }));
   twins.both([](BulletWorld& w) { add_heap(w, 50, 51); });
@@ -134,7 +134,7 @@ TEST(FailingCollider, IsReplacedAndTheBitsStay) {
 }
 
 TEST(FailingCollider, OfTheFirstDispatchLeavesNoTrace) {
-  Twins twins(with_collider([](std::span<PairResult>) { throw DeviceError(""); }));
+  Twins twins(with_collider([](std::vector<PairContact>*) { throw DeviceError(""); }));
   twins.both(add_row);
   ASSERT_TRUE(twins.step(5));
   EXPECT_EQ(twins.stats().batches, 5u);
@@ -153,9 +153,9 @@ TEST(OddCollider, MayReturnDifferentNaNs) {
   constexpr btScalar kNan = std::numeric_limits<btScalar>::quiet_NaN();
   const std::vector<btScalar> values = {0, kInf, -kInf, kNan, btScalar(0.5)};
   int nans = 0;
-  const auto negate_nans = [&](std::span<PairResult> results) {
-    for (PairResult& r : results) {
-      for (Real* x : {&r.normal.x, &r.normal.y, &r.normal.z, &r.distance}) {
+  const auto negate_nans = [&](std::vector<PairContact>* touching) {
+    for (PairContact& c : *touching) {
+      for (Real* x : {&c.normal.x, &c.normal.y, &c.normal.z, &c.distance}) {
         if (*x == *x) continue;
         ++nans;
         *x = -*x;
@@ -193,7 +193,7 @@ TEST(Verify, IgnoresTheSignOfANaN) {
   constexpr btScalar kNan = std::numeric_limits<btScalar>::quiet_NaN();
   const std::vector<btScalar> values = {kNan, -kNan, kInf, -kInf, btScalar(0.5)};
   const std::size_t count = values.size() * values.size() * values.size();
-  Twins twins(with_collider([](std::span<PairResult>) {}, true));
+  Twins twins(with_collider([](std::vector<PairContact>*) {}, true));
   twins.both([&](BulletWorld& w) {
     for (std::size_t i = 0; i < count; ++i) w.add_sphere(btScalar(0.5), btVector3(0, 0, 0));
   });
@@ -224,16 +224,22 @@ void flip_last_bit(Value* value) {
   using Bits = std::conditional_t<sizeof(Value) == 8, std::uint64_t, std::uint32_t>;
   *value = std::bit_cast<Value>(static_cast<Bits>(std::bit_cast<Bits>(*value) ^ 1u));
 }
+/// Returns the first touching pair of spheres. Pairs with a box have a NaN, and their values are
+/// not read.
+std::vector<PairContact>::iterator first_of_spheres(std::vector<PairContact>* touching) {
+  return std::find_if(touching->begin(), touching->end(),
+                      [](const PairContact& c) { return c.distance == c.distance; });
+}
 template <class Change>
 SpoiledCollider::Spoil in_first_touching(Change change) {
-  return [change](std::span<PairResult> results) {
-    for (PairResult& result : results) {
-      // Pairs with a box have a NaN, and their values are not read.
-      if (result.touching == 0 || result.distance != result.distance) continue;
-      change(&result);
-      return;
-    }
+  return [change](std::vector<PairContact>* touching) {
+    const auto first = first_of_spheres(touching);
+    if (first != touching->end()) change(&*first);
   };
+}
+void lose_first_touching(std::vector<PairContact>* touching) {
+  const auto first = first_of_spheres(touching);
+  if (first != touching->end()) touching->erase(first);
 }
 
 struct PlantedError {
@@ -241,11 +247,11 @@ struct PlantedError {
   SpoiledCollider::Spoil spoil;
 };
 const PlantedError kPlantedErrors[] = {
-    {"normal.x", in_first_touching([](PairResult* r) { flip_last_bit(&r->normal.x); })},
-    {"normal.y", in_first_touching([](PairResult* r) { flip_last_bit(&r->normal.y); })},
-    {"normal.z", in_first_touching([](PairResult* r) { flip_last_bit(&r->normal.z); })},
-    {"distance", in_first_touching([](PairResult* r) { flip_last_bit(&r->distance); })},
-    {"touching", in_first_touching([](PairResult* r) { r->touching = 0; })},
+    {"normal.x", in_first_touching([](PairContact* c) { flip_last_bit(&c->normal.x); })},
+    {"normal.y", in_first_touching([](PairContact* c) { flip_last_bit(&c->normal.y); })},
+    {"normal.z", in_first_touching([](PairContact* c) { flip_last_bit(&c->normal.z); })},
+    {"distance", in_first_touching([](PairContact* c) { flip_last_bit(&c->distance); })},
+    {"touching", lose_first_touching},
 };
 
 TEST(Verify, FindsEveryPlantedError) {
@@ -269,7 +275,7 @@ TEST(Verify, FindsEveryPlantedError) {
 
 /// A sphere that rests on a box and on a plane, with points of several steps.
 TEST(Verify, RecomputesSpheresOnBoxesAndPlanes) {
-  Twins twins(with_collider([](std::span<PairResult>) {}, true));
+  Twins twins(with_collider([](std::vector<PairContact>*) {}, true));
   twins.both([](BulletWorld& w) {
     w.add(w.keep(new btBoxShape(btVector3(5, 1, 5))), btVector3(0, -1, 0), 0);
     w.add(w.keep(new btStaticPlaneShape(btVector3(1, 3, 0).normalized(), btScalar(-0.5))),
@@ -322,7 +328,7 @@ TEST(Verify, FindsEveryPlantedErrorOfAPointThatPersists) {
 }
 
 TEST(Verify, FindsNothingInACorrectWorld) {
-  Twins twins(with_collider([](std::span<PairResult>) {}, true));
+  Twins twins(with_collider([](std::vector<PairContact>*) {}, true));
   twins.both([](BulletWorld& w) { add_heap(w, 50, 52); });
   ASSERT_TRUE(twins.step(30));
   EXPECT_GT(twins.stats().verified, 1000u);

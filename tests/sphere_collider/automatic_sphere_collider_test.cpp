@@ -93,8 +93,8 @@ TEST_F(AutomaticCollider, AFailingDeviceIsReplacedInTheSameCallAndReportedOnce) 
         std::string reported_failures;
         for (int i = 0; i < 10; ++i) {
           if (given) {
-            ASSERT_TRUE(
-                same_bits(collider->test_pairs(spheres, pairs), cpu->test_pairs(spheres, pairs)))
+            ASSERT_TRUE(same_bits(collider->find_touching(spheres, pairs),
+                                  cpu->find_touching(spheres, pairs)))
                 << seed_note();
           } else {
             ASSERT_TRUE(same_bits(collider->find_contacts(spheres), brute_force(spheres)))
@@ -169,7 +169,7 @@ TEST_F(AutomaticCollider, AFailureInOneKindOfCallIsNotReportedByTheNextOfTheOthe
   const auto pairs = some_pairs(20, 50, random_);
   for (int i = 0; i < 20; ++i) collider->find_contacts(spheres);
   device_.before_call = [] { throw DeviceError("the device is gone"); };
-  collider->test_pairs(spheres, pairs);
+  collider->find_touching(spheres, pairs);
   EXPECT_EQ(collider->device_failure(), "the device is gone");
   collider->find_contacts(spheres);
   EXPECT_EQ(collider->device_failure(), "");

@@ -37,11 +37,11 @@ class DeviceDouble final : public SphereCollider {
     device_->before_call();
     return cpu_->find_contacts(spheres);
   }
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                         std::span<const SpherePair> pairs) override {
+  std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                             std::span<const SpherePair> pairs) override {
     ++device_->calls;
     device_->before_call();
-    return cpu_->test_pairs(spheres, pairs);
+    return cpu_->find_touching(spheres, pairs);
   }
   Backend backend() const noexcept override { return Backend::cuda; }
   SphereAlgorithm algorithm() const noexcept override { return cpu_->algorithm(); }

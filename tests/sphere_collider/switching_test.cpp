@@ -30,9 +30,9 @@ class RandomSwitcher final : public SphereCollider {
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
     return next().find_contacts(spheres);
   }
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                         std::span<const SpherePair> pairs) override {
-    return next().test_pairs(spheres, pairs);
+  std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
+                                             std::span<const SpherePair> pairs) override {
+    return next().find_touching(spheres, pairs);
   }
   Backend backend() const noexcept override { return colliders_[current_]->backend(); }
   SphereAlgorithm algorithm() const noexcept override { return colliders_[current_]->algorithm(); }

@@ -45,7 +45,7 @@ testing::AssertionResult same_bits(std::span<const PairResult> actual,
 testing::AssertionResult same_bits(std::span<const PairContact> actual,
                                    std::span<const PairContact> expected);
 
-/// Returns the expected result of find_touching() for these results of test_pairs().
+/// Returns the expected result of find_touching() for these results of detail::test_sphere_pair().
 std::vector<PairContact> touching_of(std::span<const PairResult> results);
 
 /// Base of all seeds of this run: JFPX_TEST_SEED if set, else random.

@@ -264,8 +264,8 @@ class FailingCollider final : public SphereCollider {
     if (*fails_ == 2) throw std::bad_alloc();
     return {};
   }
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance>,
-                                         std::span<const SpherePair>) override {
+  std::span<const PairContact> find_touching(std::span<const SphereInstance>,
+                                             std::span<const SpherePair>) override {
     return {};
   }
   Backend backend() const noexcept override { return Backend::cpu; }

@@ -58,23 +58,6 @@ class SphereColliderCpu final : public SphereCollider {
     return writer_.write_unsorted(spheres, pairs_, pool_);
   }
 
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                         std::span<const SpherePair> pairs) override {
-    results_.reserve(pairs.size(), "pair results");
-    pool_.run(chunks_of(pairs), [&](std::size_t chunk) {
-      PairResult* out = results_.data() + chunk * kPairChunk;
-      constexpr std::size_t kAhead = 12;  // prefetch distance: accesses to spheres are random
-      const std::span<const SpherePair> part = chunk_of(spheres, pairs, chunk);
-      for (std::size_t i = 0; i < part.size(); ++i) {
-        const SpherePair later = part[std::min(i + kAhead, part.size() - 1)];
-        __builtin_prefetch(&spheres[later.a]);
-        __builtin_prefetch(&spheres[later.b]);
-        *out++ = detail::test_sphere_pair(spheres[part[i].a], spheres[part[i].b]);
-      }
-    });
-    return {results_.data(), pairs.size()};
-  }
-
   std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
                                              std::span<const SpherePair> pairs) override {
     detail::check_count(pairs);
@@ -152,7 +135,6 @@ class SphereColliderCpu final : public SphereCollider {
   CellSweep sweep_;
   PairChunks pairs_;
   ContactWriter writer_;
-  Buffer<PairResult> results_;
   Buffer<PairContact> touching_;
   std::vector<std::size_t> touching_counts_;  ///< by chunk
 };

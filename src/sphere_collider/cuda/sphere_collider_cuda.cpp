@@ -41,9 +41,6 @@ class SphereColliderCuda final : public SphereCollider {
   ~SphereColliderCuda() override { static_cast<void>(cudaStreamSynchronize(stream_.get())); }
 
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override;
-  std::span<const PairResult> test_pairs(std::span<const SphereInstance> spheres,
-                                         std::span<const SpherePair> pairs) override;
-
   std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
                                              std::span<const SpherePair> pairs) override;
   TransferredBytes transferred() const noexcept override { return pair_list_.transferred(); }
@@ -67,11 +64,8 @@ class SphereColliderCuda final : public SphereCollider {
   std::size_t spheres_reserved_ = 0, contacts_reserved_ = 0;
   DeviceBuffer<SphereInstance> spheres_;
   DeviceBuffer<SphereContact> contacts_;
-  DeviceBuffer<SpherePair> pairs_;
-  DeviceBuffer<PairResult> results_;
   PinnedBuffer<ContactCount> count_;
   PinnedBuffer<SphereContact> contacts_on_host_;
-  PinnedBuffer<PairResult> results_on_host_;
   PairListSearch pair_list_;
   SphereAlgorithm algorithm_ = SphereAlgorithm::automatic;
 };
@@ -128,30 +122,6 @@ ContactSpan SphereColliderCuda::find_contacts(std::span<const SphereInstance> sp
     wait();
   }
   return {contacts_on_host_.data(), found};
-}
-
-std::span<const PairResult> SphereColliderCuda::test_pairs(std::span<const SphereInstance> spheres,
-                                                           std::span<const SpherePair> pairs) {
-  const nvtx3::scoped_range range("jfpx test_pairs");
-  check_pairs(pairs, spheres.size());
-  if (pairs.empty()) return {};
-  const DeviceGuard guard(device_);
-  upload(spheres);
-  pairs_.reserve_geometric(pool_, stream_.get(), pairs.size(), "pairs");
-  if (results_.reserve_geometric(pool_, stream_.get(), pairs.size(), "pair results")) {
-    // In double precision a result has padding, which no kernel writes but the copy reads.
-    JFPX_CUDA_TRY(cudaMemsetAsync(results_.data(), 0, results_.capacity() * sizeof(PairResult),
-                                  stream_.get()));
-  }
-  results_on_host_.reserve_geometric(pairs.size(), "pair results on the host");
-  JFPX_CUDA_TRY(cudaMemcpyAsync(pairs_.data(), pairs.data(), pairs.size_bytes(),
-                                cudaMemcpyHostToDevice, stream_.get()));
-  searcher_.test_pairs(spheres_.data(), pairs_.data(), pairs.size(), results_.data());
-  JFPX_CUDA_TRY(cudaMemcpyAsync(results_on_host_.data(), results_.data(),
-                                pairs.size() * sizeof(PairResult), cudaMemcpyDeviceToHost,
-                                stream_.get()));
-  wait();
-  return {results_on_host_.data(), pairs.size()};
 }
 
 std::span<const PairContact> SphereColliderCuda::find_touching(

@@ -77,7 +77,6 @@ TEST_F(Cuda, AnyFailingCallIsAnErrorAndTheColliderGoesOn) {
       with_every_call_failing(error, [&] {
         collider = make(algorithm);  // a new one, so that buffers grow while a call fails
         collider->find_contacts(spheres);
-        collider->test_pairs(spheres, pairs);
         collider->find_touching(spheres, pairs);
       });
       const auto survivor = make(algorithm);
@@ -86,9 +85,25 @@ TEST_F(Cuda, AnyFailingCallIsAnErrorAndTheColliderGoesOn) {
       with_every_call_failing(error, [&] { survivor->find_touching(spheres, pairs); });
       EXPECT_EQ(survivor->find_touching(spheres, pairs).size(), touching);
       EXPECT_TRUE(same_bits(survivor->find_contacts(spheres), expected)) << seed_note();
-      EXPECT_EQ(survivor->test_pairs(spheres, pairs).size(), pairs.size());
     }
   }
+}
+
+TEST_F(Cuda, AFailingTestOfPairsOnAStreamIsAnError) {
+  const auto spheres = make_lattice(2, Real(1.9));
+  DeviceData data(spheres, 0);
+  DeviceBuffer<SpherePair> pairs;
+  DeviceBuffer<PairResult> results;
+  pairs.reserve(data.pool, data.stream.get(), 1, "pairs");
+  results.reserve(data.pool, data.stream.get(), 1, "results");
+  const SpherePair pair{0, 1};
+  JFPX_CUDA_TRY(
+      cudaMemcpyAsync(pairs.data(), &pair, sizeof pair, cudaMemcpyHostToDevice, data.stream.get()));
+  DeviceSphereCollider collider(data.stream.get());
+  with_every_call_failing(cudaErrorLaunchOutOfResources, [&] {
+    collider.test_pairs(data.spheres.data(), pairs.data(), 1, results.data());
+  });
+  EXPECT_EQ(data.download(results.data(), 1)[0].touching, 1u);
 }
 
 // The copies of a list in device memory and in pinned memory grow one after the other. If the
@@ -139,8 +154,8 @@ TEST_F(Cuda, NothingLeaksWhetherItFailsOrNot) {
 TEST_F(Cuda, SlowlyGrowingCallsReallocateSeldom) {
   const auto spheres = make_lattice(30, Real(1.9));
   const auto collider = make();
-  const void* last[3] = {};
-  int reallocations[3] = {};
+  const void* last[2] = {};
+  int reallocations[2] = {};
   const auto note = [&](int which, const void* data) {
     if (data == last[which]) return;
     last[which] = data;
@@ -150,14 +165,12 @@ TEST_F(Cuda, SlowlyGrowingCallsReallocateSeldom) {
   for (SphereIndex i = 0; i < 1200; ++i) {
     pairs.push_back({i, i + 1});
     if (i < 1000) continue;
-    note(0, collider->test_pairs(spheres, pairs).data());
-    note(1, collider->find_touching(spheres, pairs).data());
+    note(0, collider->find_touching(spheres, pairs).data());
     const std::size_t n = 21'000 + 20 * (i - 1000);  // contacts are copied, not mapped
-    note(2, collider->find_contacts(std::span(spheres).first(n)).data());
+    note(1, collider->find_contacts(std::span(spheres).first(n)).data());
   }
-  EXPECT_EQ(reallocations[0], 1) << "test_pairs";
-  EXPECT_EQ(reallocations[1], 1) << "find_touching";
-  EXPECT_EQ(reallocations[2], 1) << "find_contacts";
+  EXPECT_EQ(reallocations[0], 1) << "find_touching";
+  EXPECT_EQ(reallocations[1], 1) << "find_contacts";
 }
 
 TEST_F(Cuda, WarmCallsTakeNoMemory) {
@@ -237,7 +250,8 @@ TEST_F(Cuda, WithoutDeviceMemoryASearchNamesTheBytesAndTheColliderGoesOn) {
     for (int i = 0; i < 2; ++i) {
       check(is_refused([&] { collider->find_contacts(spheres); }), "find_contacts is refused");
       check(is_refused([&] { grid->find_contacts(spheres); }), "the grid is refused");
-      check(is_refused([&] { collider->test_pairs(spheres, pairs); }), "test_pairs is refused");
+      check(is_refused([&] { collider->find_touching(spheres, pairs); }),
+            "find_touching is refused");
     }
     const BackendStatus status = probe();
     check(!status.usable && !status.reason.empty(), "the backend reports that it is not usable");

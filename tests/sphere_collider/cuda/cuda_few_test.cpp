@@ -1,5 +1,6 @@
 /// Every kernel with the smallest input that launches it, for checking tools that slow it down a
 /// thousand times: scripts/sanitize-cuda runs these tests. The reference is the CPU.
+#include "src/collide/sphere_pair.hpp"
 #include "tests/sphere_collider/cuda/cuda_fixture.hpp"
 
 namespace jfpx {
@@ -62,11 +63,22 @@ TEST_F(Cuda, FewPairsOfAList) {
   }
   const auto cpu = make_sphere_collider({.backend = Backend::cpu});
   const auto collider = make();
-  EXPECT_TRUE(same_bits(collider->test_pairs(spheres, pairs), cpu->test_pairs(spheres, pairs)))
-      << seed_note();
   EXPECT_TRUE(
       same_bits(collider->find_touching(spheres, pairs), cpu->find_touching(spheres, pairs)))
       << seed_note();
+}
+
+TEST_F(Cuda, FewPairsOnAStream) {
+  Random random(base_seed());
+  const auto spheres = make_gas(200, Real(0.5), 3, random);
+  std::vector<SpherePair> pairs(1000);
+  std::vector<PairResult> expected;
+  for (SpherePair& p : pairs) {
+    p = {static_cast<SphereIndex>(random.below(200)), static_cast<SphereIndex>(random.below(200))};
+    expected.push_back(detail::test_sphere_pair(spheres[p.a], spheres[p.b]));
+  }
+  DeviceData data(spheres, 0);
+  EXPECT_TRUE(same_bits(test_pairs(data, pairs), expected)) << seed_note();
 }
 
 }  // namespace

@@ -81,6 +81,23 @@ struct DeviceData {
   PinnedBuffer<ContactCount> count;
 };
 
+/// Returns the results of DeviceSphereCollider::test_pairs() for the spheres of `data`.
+inline std::vector<PairResult> test_pairs(const DeviceData& data,
+                                          std::span<const SpherePair> pairs) {
+  DeviceBuffer<SpherePair> d_pairs;
+  DeviceBuffer<PairResult> results;
+  d_pairs.reserve(data.pool, data.stream.get(), pairs.size() + 1, "pairs");
+  results.reserve(data.pool, data.stream.get(), pairs.size() + 1, "results");
+  JFPX_CUDA_TRY(cudaMemcpyAsync(d_pairs.data(), pairs.data(), pairs.size_bytes(),
+                                cudaMemcpyHostToDevice, data.stream.get()));
+  // In double precision a result has padding, which no kernel writes but the copy reads.
+  JFPX_CUDA_TRY(cudaMemsetAsync(results.data(), 0, results.capacity() * sizeof(PairResult),
+                                data.stream.get()));
+  DeviceSphereCollider collider(data.stream.get());
+  collider.test_pairs(data.spheres.data(), d_pairs.data(), pairs.size(), results.data());
+  return data.download(results.data(), pairs.size());
+}
+
 }  // namespace test
 }  // namespace JFPX_ABI
 }  // namespace jfpx

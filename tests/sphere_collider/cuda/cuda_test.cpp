@@ -194,9 +194,10 @@ TEST_F(Cuda, AThousandMillionPairsHaveTheBitsOfX86) {
       workers.emplace_back(work, kPairs * t / threads, kPairs * (t + 1) / threads);
     }
     workers.clear();
-    const auto results = collider->test_pairs(spheres, pairs);
-    ASSERT_TRUE(same_bits(results, expected)) << "round " << round << ", " << seed_note();
-    for (const PairResult& r : expected) touching += r.touching;
+    const auto found = collider->find_touching(spheres, pairs);
+    ASSERT_TRUE(same_bits(found, touching_of(expected)))
+        << "round " << round << ", " << seed_note();
+    touching += found.size();
   }
   EXPECT_GT(touching, kPairs / 10) << "the test must cover touching pairs";
 }
@@ -229,7 +230,6 @@ TEST_F(Cuda, OnlyChangedBlocksOfAPairListAreUploaded) {
   std::swap(pairs[100'000], pairs[200'000]);
   EXPECT_EQ(find(), 2 * 4096u);
   collider->find_contacts(spheres);
-  collider->test_pairs(spheres, pairs);
   EXPECT_EQ(find(), 0u) << "other calls use other buffers";
   pairs.resize(299'000);
   EXPECT_EQ(find(), 0u);
@@ -245,6 +245,37 @@ TEST_F(Cuda, OnlyChangedBlocksOfAPairListAreUploaded) {
     }
     find();
   }
+}
+
+TEST_F(Cuda, GivenPairsOnAStreamHaveTheBitsOfX86) {
+  for (const SphereKind& kind : sphere_kinds()) {
+    Random random(base_seed());
+    for (const std::size_t m : {1, 255, 256, 257, 20'000}) {  // blocks have 256 threads
+      const auto spheres = kind.make(400, random);
+      std::vector<SpherePair> pairs(m);
+      std::vector<PairResult> expected;
+      for (SpherePair& p : pairs) {
+        p = {static_cast<SphereIndex>(random.below(400)),
+             static_cast<SphereIndex>(random.below(400))};
+        expected.push_back(detail::test_sphere_pair(spheres[p.a], spheres[p.b]));
+      }
+      DeviceData data(spheres, 0);
+      ASSERT_TRUE(same_bits(test_pairs(data, pairs), expected))
+          << kind.name << ", " << m << " pairs, " << seed_note();
+    }
+  }
+}
+
+TEST_F(Cuda, GivenPairsOnAStreamTreatNaNAsBulletDoes) {
+  constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
+  const Spheres spheres = {{{0, 0, 0}, 1}, {{kNan, 0, 0}, 1}, {{0, 0, 0}, kNan}, {{9, 0, 0}, 1}};
+  DeviceData data(spheres, 0);
+  const std::vector<SpherePair> pairs = {{0, 1}, {2, 3}, {0, 3}};
+  const auto results = test_pairs(data, pairs);
+  EXPECT_EQ(results[0].touching, 1u) << "NaN in a centre";
+  EXPECT_EQ(results[1].touching, 1u) << "NaN in a radius";
+  EXPECT_EQ(results[2].touching, 0u);
+  EXPECT_TRUE(test_pairs(data, {}).empty());
 }
 
 TEST_F(Cuda, ASearchOnAStreamLeavesContactsOnTheDevice) {
