@@ -1,4 +1,5 @@
-/// Contact search among spheres: the narrow phase that the thesis moved to the GPU (thesis 4.5).
+/// Contact search among spheres: the narrow phase, which the thesis computes on the GPU
+/// (thesis 4.5).
 #pragma once
 
 #include <jfpx/backend.hpp>
@@ -67,14 +68,15 @@ class JFPX_API SphereCollider {
 
   /// Finds all touching pairs among `spheres`, sorted by (a, b). The number of contacts is limited
   /// only by memory.
-  /// @param spheres at most 2^32 - 1, with finite centres and finite radii > 0 [m]
+  /// @param spheres at most 2^32 - 1 (on a GPU 2^31), with finite centres and finite radii
+  ///   > 0 [m]
   /// @throws InvalidArgument if a value is not finite or a radius is not > 0; the message names the
   ///   first such sphere and field. OutOfMemory with the number of bytes; DeviceError. The collider
   ///   stays usable after any of them.
   virtual ContactSpan find_contacts(std::span<const SphereInstance> spheres) = 0;
 
-  /// Finds the touching pairs of a list, in the order of the list. Suits the output of a broad
-  /// phase, of which few pairs touch. Reproduces Bullet's btSphereSphereCollisionAlgorithm for all
+  /// Finds the touching pairs of a list, in the order of the list. Intended for the pairs of a
+  /// broad phase, few of which touch. Reproduces Bullet's btSphereSphereCollisionAlgorithm for all
   /// values: a NaN results in a contact, and no value is rejected.
   /// @throws InvalidArgument if an index in `pairs` is out of range, or for 2^32 pairs or more;
   ///   OutOfMemory; DeviceError. The collider stays usable after any of them.
@@ -91,8 +93,8 @@ class JFPX_API SphereCollider {
   virtual SphereAlgorithm algorithm() const noexcept = 0;
   /// Reason for the backend and algorithm of the last call.
   virtual ChoiceReason reason() const noexcept { return ChoiceReason::fixed; }
-  /// Message of the device failure because of which the CPU took over in the last call; empty after
-  /// all other calls.
+  /// If the device failed in the last call and the CPU computed it instead, the message of that
+  /// failure; otherwise empty.
   virtual std::string_view device_failure() const noexcept { return {}; }
 
  protected:

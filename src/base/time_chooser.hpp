@@ -51,8 +51,8 @@ class JFPX_API TimeChooser {
   ///   measurements
   /// @param predicted_us [us] by alternative
   Decision choose(double size, std::span<const double> predicted_us);
-  /// Records the call that the last choose() decided. May be omitted if that call was not executed
-  /// or not timed.
+  /// Records the time of the call for which choose() was last called. May be omitted if that call
+  /// was not executed or not timed.
   /// @param us [us] measured
   /// @param predicted_us [us] prediction for the alternative and the work actually done
   void record(double us, double predicted_us);
@@ -82,8 +82,8 @@ class JFPX_API TimeChooser {
     std::size_t samples = 0;                ///< measurements since the size changed
     double correction = 1;  ///< lower quartile of the ratios: timing errors only add
     double warm_size = -1;  ///< largest size for which its buffers have grown
-    double waited_us = 0;   ///< time spent since its last trial
-    double patience = 1;    ///< doubles with each unsuccessful trial
+    double waited_us = 0;   ///< total time of all calls since its last trial
+    double patience = 1;    ///< factor of the time to the next trial; unsuccessful trials double it
 
     double cost() const { return predicted_us * correction; }
   };
@@ -100,10 +100,10 @@ class JFPX_API TimeChooser {
   std::size_t incumbent_ = kNone;  ///< the alternative in use
   std::size_t current_ = kNone;    ///< the incumbent, or the alternative on trial
   Reason reason_ = Reason::fixed;
-  bool prolonged_ = false;   ///< the last trial
+  bool prolonged_ = false;   ///< whether the last trial was prolonged
   int stay_ = 0;             ///< decisions during which the selection does not change
-  double size_ = 0;          ///< of the last choose()
-  double regime_size_ = -1;  ///< size for which the ratios were measured
+  double size_ = 0;          ///< argument of the last choose()
+  double regime_size_ = -1;  ///< size at which the current measurements began
   double missed_us_ = 0;
 };
 

@@ -21,7 +21,7 @@ inline namespace JFPX_ABI {
 /// of the earlier contacts that move one of its bodies, which is its level in the dependency graph.
 /// Solving the colors in ascending order therefore gives the results of the serial order.
 ///
-/// Owns its buffers, which only grow: a warm call allocates nothing. One thread at a time.
+/// Owns its buffers, which only grow, so that most calls allocate nothing. One thread at a time.
 class JFPX_API ContactColoring {
  public:
   /// Reserves memory for build(). @throws OutOfMemory

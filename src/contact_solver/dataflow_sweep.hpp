@@ -1,6 +1,6 @@
-/// Dependency-driven (dataflow) sweeps over a group of contacts, without colors and barriers: each
-/// contact waits only for the earlier contacts at its two bodies, so that all sweeps overlap.
-/// Compiled by g++ and nvcc.
+/// Dependency-driven (dataflow) sweeps over a group of contacts, without barriers: each contact
+/// waits only for the earlier contacts at its two bodies, so that all sweeps overlap. Compiled by
+/// g++ and nvcc.
 #pragma once
 
 #include "src/contact_solver/contact_rows.hpp"
@@ -10,19 +10,28 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace rows {
 
+// A step is the work on one contact in one pass, for example on its friction rows. A worker
+// executes all steps of its contacts, in the order of passes and, within a pass, in the order of
+// the schedule.
+//
 // The velocities of a body are stored in cells of 16 bytes, which are loaded and stored atomically.
-// Each cell contains the number of rows that have moved the body: the sequence number of the next
-// row. A thread that finds the sequence number of its row in all cells of a body has also received
-// the velocities, in the same 16-byte loads, and no other thread writes the cells before this
-// thread does. So no lock, flag or fence is needed. The first unsolved row in Bullet's order never
-// waits. Hence the sweeps terminate if every worker preserves that order and makes progress.
+// Each cell contains the body's sequence number: the number of steps that have moved the body. A
+// worker that finds the sequence number of its step in all cells of a body has also received the
+// velocities, in the same 16-byte loads, and no other worker writes the cells before this worker
+// does. The rows of a contact are changed only by the worker of the contact; the programs for
+// velocities and for the split impulse change different fields. So no lock, flag or fence is
+// needed.
+//
+// In the schedule, every contact follows the contacts that it depends on (see RowOrder). So the
+// first step that is not done, in the order of passes and of the schedule, never waits, and its
+// worker has no earlier step to execute. Hence the sweeps terminate if every worker makes progress.
 
 inline constexpr int kCellNumbers = sizeof(Real) == 4 ? 3 : 1;
 inline constexpr int kBodyCells = 6 / kCellNumbers;
 
 struct alignas(16) Cell {
   Real numbers[kCellNumbers];
-  std::uint32_t sequence;  ///< number of rows that have moved the body
+  std::uint32_t sequence;  ///< number of steps that have moved the body
 };
 static_assert(sizeof(Cell) == 16);
 
@@ -35,8 +44,9 @@ struct ScheduledContact {
   std::uint32_t slot;            ///< slot in the schedule of all contacts, which addresses the rows
 };
 
-/// Passes of a program: the warm start, then the passes of each iteration. The first three begin
-/// with the row of the contact.
+/// Kinds of passes over the scheduled contacts. `both` solves each contact and then its friction.
+/// `frictions` and `rolling_frictions` need only the impulse of the contact row, the others all of
+/// it.
 enum class RowStep : std::uint8_t {
   warm_start,
   contacts,
@@ -45,6 +55,7 @@ enum class RowStep : std::uint8_t {
   rolling_frictions,
   split_impulse
 };
+/// Sequence of passes: the warm start, then `steps` in each iteration.
 struct RowProgram {
   RowStep steps[3];
   std::uint32_t steps_per_iteration, iterations;
@@ -96,8 +107,9 @@ struct RowGroupArrays {
 };
 inline constexpr int kOutcomeVelocities = 12;
 
-/// One of the two bodies of a row, in a worker's local copy of their velocities. Elements of the
-/// copy are selected by value, not by address, so that a GPU keeps them in registers.
+/// One of the two bodies of a row: whether it is body b, whether it is not Bullet's fixed body, and
+/// whether rows move it. A worker has a local copy of the velocities of both bodies. Elements of
+/// the copy are selected by value, not by address, so that a GPU keeps them in registers.
 struct LocalBody {
   bool second, real, moved;
 };
@@ -116,7 +128,7 @@ struct LocalLane : OneLane {
   }
 };
 
-/// Defers the last residual until no other thread waits for the row, because its division is slow.
+/// Defers the last residual until no other thread waits for the step, because its division is slow.
 struct DeferredResidual {
   Residual<OneLane> sum;
   Real impulse = 0, inverse = 1;
@@ -179,7 +191,7 @@ JFPX_ROW bool set_up_slot(const RowGroupArrays& group, std::uint32_t slot) {
 }
 
 /// Writes the impulses of the contact in a slot to its outcome.
-/// @return whether the outcome has no NaN, because the bits of a NaN differ between processors
+/// @return whether the outcome contains no NaN, whose bits would differ between processors
 JFPX_ROW bool finish_slot(const RowGroupArrays& group, std::uint32_t slot) {
   ContactOutcome& outcome = group.outcomes[group.contacts[slot]];
   outcome.impulse = group.contact_at(slot)[kRowImpulse];
@@ -209,9 +221,9 @@ JFPX_ROW bool finish_body(const RowGroupArrays& group, std::uint32_t body) {
   return finite;
 }
 
-/// State of a thread that solves some contacts of a program in all passes. `Cells` loads and stores
-/// cells atomically. A `Results` object receives the largest squared residual of every iteration,
-/// and a call of broken() for a residual that is NaN.
+/// Solves some contacts of a program in all passes, one step at a time, for one thread. `Cells`
+/// loads and stores cells atomically. A `Results` object receives the largest squared residual of
+/// every iteration, and a call of broken() for a residual that is NaN.
 template <class Cells, bool kFactors, bool kSplitImpulse>
 class SweepWorker {
  public:
@@ -234,9 +246,11 @@ class SweepWorker {
 
   JFPX_ROW bool done() const { return pass_ >= passes_; }
 
-  /// Solves the next row if all earlier rows of its bodies are solved. Must not be called when
+  /// Executes the next step if all earlier steps at its bodies are done. Must not be called when
   /// done().
-  /// @return 0 if the row is solved, else a lower bound of the number of rows to solve before it
+  /// @return 0 if the step was executed, else a lower bound of the number of steps that must
+  /// precede
+  ///   it
   template <class Results>
   JFPX_ROW std::uint32_t step(Results* results) {
     std::uint32_t missing = 0;
@@ -251,7 +265,7 @@ class SweepWorker {
     solve(&residual);
     if (bodies_[0].moved) publish(scheduled_.a, sequence_a_, 0);
     if (bodies_[1].moved) publish(scheduled_.b, sequence_b_, 1);
-    // From here on no other thread waits for this row.
+    // From here on no other thread waits for this step.
     store_impulse();
     residual.finish();
     largest_ = residual.sum.largest;
@@ -301,7 +315,7 @@ class SweepWorker {
 
   /// Loads the velocities of a body if its sequence number has been reached.
   /// @param side 0 for body a, 1 for body b
-  /// @return 0 if so, else the number of rows before it
+  /// @return 0 if so, else the number of steps at the body that must precede it
   JFPX_ROW std::uint32_t poll(std::int32_t body, std::uint32_t sequence, int side, bool* has) {
     const Cell* cells = order_.cells + std::size_t{static_cast<std::uint32_t>(body)} * kBodyCells;
     Cell read[kBodyCells];
@@ -319,7 +333,7 @@ class SweepWorker {
     *has = true;
     return 0;
   }
-  /// Stores the velocities of a body, and the sequence number of its next row.
+  /// Stores the velocities of a body, and the sequence number of its next step.
   JFPX_ROW void publish(std::int32_t body, std::uint32_t sequence, int side) {
     Cell* cells = order_.cells + std::size_t{static_cast<std::uint32_t>(body)} * kBodyCells;
     const Real* v = velocities_ + kVelocityFields * side;

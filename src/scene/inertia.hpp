@@ -1,4 +1,4 @@
-/// Inertia tensors of shapes and their rotation to world axes (thesis 4.1.5, 4.4.2).
+/// Inertia tensors of solid shapes, and their transformation between axes (thesis 4.1.5, 4.4.2).
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -27,7 +27,8 @@ JFPX_HD constexpr Mat3 parallel_axis(const Vec3& position, Real mass) {
   return cross_twice * -mass;
 }
 
-/// R * tensor * R^T: transforms a tensor from body axes to world axes.
+/// R * tensor * R^T: transforms a tensor from body axes to world axes, or from the axes of a part
+/// to those of its compound.
 JFPX_HD constexpr Mat3 in_world_axes(const Mat3& tensor, const Mat3& rotation) {
   return rotation * tensor * transposed(rotation);
 }

@@ -9,10 +9,10 @@ inline namespace JFPX_ABI {
 /// Eigenvalues and eigenvectors of an inertia tensor.
 struct PrincipalInertia {
   Vec3 moments;  ///< [kg m^2]
-  Mat3 axes;     ///< columns, right-handed; the identity for a tensor that is diagonal to rounding
+  Mat3 axes;     ///< columns, right-handed; the identity if the tensor is diagonal up to rounding
 };
 
-/// @param tensor finite and symmetric; only its upper triangle is read
+/// The moments are not sorted. @param tensor finite and symmetric; only its upper triangle is read
 JFPX_API PrincipalInertia principal_inertia(const Mat3& tensor);
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,4 @@
-/// Validation of single bodies and states, and text of values for messages.
+/// Validation of single bodies and states, and conversion of values to text for messages.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -10,15 +10,16 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Checks all fields of a body.
-/// @param body index of the body in the scene, for the message
+/// @param body index of the body in the scene (or in World::bodies()), for the message
 /// @throws InvalidScene
 void validate_body(const BodyDef& def, std::uint64_t body);
 /// @throws InvalidScene if the number of bodies exceeds the range of SphereIndex
 void validate_body_count(std::uint64_t bodies);
-/// Checks that position and velocities are finite and in range, and that the orientation has unit
-/// length. Returns an empty string for a valid state, else a message that does not name the body.
+/// Checks that the coordinates are within kMaxCoordinate, the velocities are finite and the
+/// orientation has unit length to kUnitTolerance. Returns an empty string for a valid state, else a
+/// message with field, value and range, without the body.
 std::string find_fault(const BodyState& state);
-/// The shortest text that reads back as the same value, for messages.
+/// The shortest text that converts back to the same value.
 std::string to_text(Real value);
 std::string to_text(const Vec3& v);
 std::string to_text(const Quat& q);

@@ -16,11 +16,11 @@ inline namespace JFPX_ABI {
 using SphereColliderMaker =
     std::function<std::unique_ptr<SphereCollider>(const SphereColliderOptions&)>;
 
-/// Forwards each call to one of up to four colliders, CPU and CUDA with either algorithm, which are
-/// made when they are first needed. The device is first used when the time that it would have saved
-/// so far equals the cost of starting it. If there is no device, the CPU computes all calls and no
-/// failure is reported. If the device fails, the CPU computes that call and all later ones, and
-/// device_failure() reports it once.
+/// Forwards each call to one of up to four colliders (CPU and CUDA, with either algorithm), which
+/// are made when they are first needed. The device is first used when the time that it would have
+/// saved so far reaches the cost of starting it. If there is no device, the CPU computes all calls
+/// and no failure is reported. If the device fails, the CPU computes that call and all later ones,
+/// and device_failure() reports it once.
 class AutomaticSphereCollider final : public SphereCollider {
  public:
   /// `options.backend` is `automatic`; `with_cuda` states whether `make` supports CUDA.
@@ -37,7 +37,7 @@ class AutomaticSphereCollider final : public SphereCollider {
   std::string_view device_failure() const noexcept override { return device_failure_; }
 
  private:
-  /// A way to compute a call, and its cost.
+  /// A backend and algorithm that can compute a call, and their predicted cost.
   struct Way {
     Backend backend;
     SphereAlgorithm algorithm;
@@ -48,8 +48,8 @@ class AutomaticSphereCollider final : public SphereCollider {
     explicit Calls(std::vector<Way> ways_of_calls);
 
     std::vector<Way> ways;
-    TimeChooser chooser;  ///< its alternatives are the ways
-    /// Further calls with the same counts that `by` computes without a new decision.
+    TimeChooser chooser;  ///< alternative i is ways[i]
+    /// Number of further calls with the same counts that `by` computes without a new decision.
     int following = 0;
     std::size_t spheres = 0, pairs = 0;
     SphereCollider* by = nullptr;
@@ -65,7 +65,7 @@ class AutomaticSphereCollider final : public SphereCollider {
   bool reuse_decision(Calls& calls, std::size_t spheres, std::size_t pairs);
   SphereCollider& collider(Backend backend, SphereAlgorithm algorithm);
   void start_device_if_it_pays();
-  /// `failure` is empty if there is no device.
+  /// Removes CUDA from all later decisions. `failure` is empty if there is no device.
   void give_up_device(std::string_view failure);
 
   SphereColliderOptions options_;
@@ -73,7 +73,7 @@ class AutomaticSphereCollider final : public SphereCollider {
   Calls search_, given_;
   const Calls* last_ = &search_;
   std::unique_ptr<SphereCollider> colliders_[2][2];  ///< by backend and algorithm
-  double contacts_per_sphere_ = 1;                   ///< in the last search that was decided alone
+  double contacts_per_sphere_ = 1;                   ///< in the last search that was measured
   bool device_asleep_;
   bool device_lost_ = false;
   std::string device_failure_;

@@ -25,6 +25,8 @@ inline bool is_valid(const SphereInstance& s) {
   return is_finite(s.centre) && is_finite(s.radius) && s.radius > 0;
 }
 
+/// @throws InvalidArgument with the first invalid sphere and field. If all spheres are valid, the
+/// caller has changed them during the search, which the message then reports.
 [[noreturn]] inline void reject_sphere(std::span<const SphereInstance> spheres) {
   const auto bad = std::find_if_not(spheres.begin(), spheres.end(), is_valid);
   if (bad == spheres.end()) throw InvalidArgument("a sphere was invalid when it was read");
@@ -38,9 +40,9 @@ inline bool is_valid(const SphereInstance& s) {
                         "; it must be finite and > 0");
 }
 
-/// Returns whether all centres are finite and all radii are finite and > 0. Compares four values at
-/// a time with the compiler's vector types, which use baseline instructions: about one load per
-/// sphere.
+/// Returns whether all centres are finite and all radii are finite and > 0. Compares the four
+/// values of a sphere at a time with the compiler's vector types, which use baseline instructions.
+/// The time is about that of loading the spheres.
 inline bool all_valid(std::span<const SphereInstance> spheres) {
   using Quad [[gnu::vector_size(4 * sizeof(Real)), gnu::may_alias]] = Real;
   constexpr Real kMax = std::numeric_limits<Real>::max();
@@ -63,7 +65,8 @@ inline void check_count(std::span<const SphereInstance> spheres) {
   }
 }
 
-/// @throws InvalidArgument with the first sphere and field that find_contacts() does not accept.
+/// @throws InvalidArgument if there are too many spheres, or with the first sphere and field that
+/// find_contacts() does not accept.
 inline void check_spheres(std::span<const SphereInstance> spheres) {
   check_count(spheres);
   if (!all_valid(spheres)) reject_sphere(spheres);

@@ -16,7 +16,7 @@ inline namespace JFPX_ABI {
 namespace tool {
 namespace {
 
-struct Options {
+struct CalibrateOptions {
   std::string json;
   bool show = false, quiet = false;
 };
@@ -50,7 +50,7 @@ std::string report(const CostModel& costs) {
                      crossovers.text());
 }
 
-MeasuredCostModel measure(const Options& options) {
+MeasuredCostModel measure(const CalibrateOptions& options) {
   std::unique_ptr<Progress> progress;
   const Calibration result = calibrate([&](std::uint64_t done, std::uint64_t total) {
     if (!progress) progress = std::make_unique<Progress>("measuring", total, options.quiet);
@@ -64,7 +64,7 @@ MeasuredCostModel measure(const Options& options) {
   return {result.costs, this_machine()};
 }
 
-MeasuredCostModel show(const Options& options) {
+MeasuredCostModel show(const CalibrateOptions& options) {
   const CalibratedCosts cached = calibrated_costs();
   if (cached.problem.empty()) return {cached.costs, this_machine()};
   if (!options.quiet) {
@@ -73,7 +73,7 @@ MeasuredCostModel show(const Options& options) {
   return {cached.costs, {.machine = "none: default costs", .driver = ""}};
 }
 
-int run(const Options& options) {
+int run(const CalibrateOptions& options) {
   OutputFile json(options.json);
   const MeasuredCostModel model = options.show ? show(options) : measure(options);
   json.write(to_json(model));
@@ -87,7 +87,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_calibrate_command(CLI::App& app, int& status) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateOptions>();
   CLI::App* command = app.add_subcommand(
       "calibrate", "Measure this machine for the automatic choice of backend and algorithm");
   command->add_flag("--show", options->show, "Show the costs in use without measuring");

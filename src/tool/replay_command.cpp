@@ -15,13 +15,13 @@ inline namespace JFPX_ABI {
 namespace tool {
 namespace {
 
-struct Options {
+struct ReplayOptions {
   std::string path;
   std::string engine;
   RunOptions run;
 };
 
-int replay(Options options) {
+int replay(ReplayOptions options) {
   RecordingReader recording(options.path);
   const RecordingHeader& header = recording.header();
   if (options.engine.empty()) options.engine = header.engine;
@@ -49,7 +49,7 @@ int replay(Options options) {
 }  // namespace
 
 void add_replay_command(CLI::App& app, int& status) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReplayOptions>();
   CLI::App* command =
       app.add_subcommand("replay", "Repeat a recorded run; stop at the first step that differs");
   command->add_option("FILE", options->path, "Recording written by: jfpx run --record FILE")

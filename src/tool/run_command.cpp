@@ -21,7 +21,7 @@ inline namespace JFPX_ABI {
 namespace tool {
 namespace {
 
-struct Options {
+struct CommandOptions {
   RunOptions run;
   std::string engine = "native";
   std::string input;  ///< path of an input script
@@ -39,7 +39,7 @@ std::string csv_row(std::uint64_t step, const Engine& engine) {
                      engine.awake(), t.integrate, t.broad, t.detect, t.solve, t.total);
 }
 
-std::string summary(const Options& options, const Scene& scene, const Engine& engine,
+std::string summary(const CommandOptions& options, const Scene& scene, const Engine& engine,
                     const Totals& totals) {
   const double steps = std::max(1.0, static_cast<double>(options.run.steps));
   const StageTimes& t = totals.times;
@@ -55,7 +55,7 @@ std::string summary(const Options& options, const Scene& scene, const Engine& en
       engine.backend(), engine.contacts(), engine.awake(), table.text(), choices.text());
 }
 
-nlohmann::ordered_json to_json_value(const Options& options, const Scene& scene,
+nlohmann::ordered_json to_json_value(const CommandOptions& options, const Scene& scene,
                                      const Engine& engine, const Totals& totals) {
   return {{"scene", scene.name},
           {"bodies", scene.bodies.size()},
@@ -73,7 +73,7 @@ nlohmann::ordered_json to_json_value(const Options& options, const Scene& scene,
 }
 
 /// Creates the engine. @param scene receives the initial scene
-std::unique_ptr<Engine> start(const Options& options, Scene* scene) {
+std::unique_ptr<Engine> start(const CommandOptions& options, Scene* scene) {
   const EngineKind kind = parse_engine(options.engine);
   if (options.input.empty() && !(kind == EngineKind::native && is_only_a_demo(options.run.scene))) {
     *scene = load(options.run);
@@ -88,7 +88,7 @@ std::unique_ptr<Engine> start(const Options& options, Scene* scene) {
   return make_demo_engine(options.run, options.input, scene);
 }
 
-int run(const Options& options) {
+int run(const CommandOptions& options) {
   Scene scene;
   const auto engine = start(options, &scene);
   OutputFile csv(options.run.csv), json(options.run.json);
@@ -123,7 +123,7 @@ int run(const Options& options) {
 }
 
 /// Rejects options of Bullet for engines without them.
-void check_engine(const CLI::App& command, const Options& options) {
+void check_engine(const CLI::App& command, const CommandOptions& options) {
   if (options.engine == to_string(EngineKind::bullet)) return;
   for (const char* option : {"--solver", "--world", "--minimum-batch"}) {
     if (command.count(option) == 0) continue;
@@ -135,7 +135,7 @@ void check_engine(const CLI::App& command, const Options& options) {
 }  // namespace
 
 void add_run_command(CLI::App& app, int& status) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CommandOptions>();
   CLI::App* command = app.add_subcommand("run", "Run a scene with one engine");
   add_scene_options(*command, options->run);
   add_run_options(*command, options->run);

@@ -33,7 +33,8 @@ Mat3 tensor_of(const Shape& shape, Real mass) {
   return mass_properties(std::get<Compound>(shape), mass).inertia;
 }
 
-/// The shape with normals and quaternions normalized to rounding error.
+/// The shape with normals and quaternions scaled to unit length; validation tolerates deviations up
+/// to kUnitTolerance.
 Shape normalized(Shape shape) {
   const auto scale = [](auto* wall) {
     const Real k = Real(1) / length(wall->normal);
@@ -55,8 +56,9 @@ bool before(BodyId a, BodyId b) { return a.index < b.index; }
 BodyStore::BodyStore(Real dt, const SleepSettings& sleep)
     : dt_(dt), sleep_(sleep), motion_kept_(kept_per_step(sleep.bias, dt)) {}
 
-/// Either adds a slot or changes nothing: capacity() counts generations, which grow last. Reserves
-/// memory for free_, so that remove() never allocates.
+/// Adds an unused slot. If an allocation fails, capacity() is unchanged, because generation_ grows
+/// last. Reserves memory for free_ and ids_, so that remove() and the rest of add() do not
+/// allocate.
 void BodyStore::add_slot() {
   const std::size_t slots = capacity() + 1;
   reserve_geometric(&free_, slots);
@@ -101,7 +103,7 @@ BodyId BodyStore::add(const BodyDef& def) {
 }
 
 void BodyStore::set_inertia(std::uint32_t i, const BodyDef& def) {
-  if (!movable(i)) {  // explicitly no inverse inertia (erratum E26)
+  if (!movable(i)) {  // infinite inertia: the inverse is zero (erratum E26)
     body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
     return;
   }
@@ -115,7 +117,7 @@ void BodyStore::set_inertia(std::uint32_t i, const BodyDef& def) {
 }
 
 void BodyStore::remove(BodyId id) noexcept {
-  // A slot is retired when its generations are exhausted, because ids are never reused.
+  // Ids are never reused, so the slot is not reused after its last generation.
   if (generation_[id.index] + 1 != 0) free_.push_back(id.index);
   ++generation_[id.index];
   ids_.erase(std::lower_bound(ids_.begin(), ids_.end(), id, before));
@@ -151,7 +153,7 @@ void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
   wake(i);
   if (!kinematic(i)) return;
   moving.awake[i] = moving.velocity[i] == Vec3{} && moving.angular_velocity[i] == Vec3{} ? 0 : 1;
-  moving.motion[i] = 2 * sleep_.epsilon;
+  moving.motion[i] = 2 * sleep_.epsilon;  // wake_by_contact() copies it to bodies in contact
 }
 
 void BodyStore::displace(std::uint32_t i, const Vec3& shift, const Vec3& rotation) {
@@ -227,8 +229,9 @@ void BodyStore::move(std::uint32_t i) {
   refresh_inertia(i);
 }
 
-/// Called before the body is moved; afterwards, a body at rest would fall asleep too deep by the
-/// motion that gravity causes in a step.
+/// Updates the mean motion and puts the body to sleep if it is small. Must be called before move():
+/// the velocity already contains the gravity of this step, and a body at rest that moved by it
+/// before falling asleep would remain deeper in the ground.
 bool BodyStore::falls_asleep(std::uint32_t i) {
   moving.motion[i] =
       detail::mean_motion(moving.motion[i], moving.velocity[i], moving.angular_velocity[i],

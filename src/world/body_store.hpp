@@ -10,7 +10,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// State that a step changes. Copied before each step, so that a failed step can be undone.
+/// State that a step changes, indexed by BodyId::index. World::step() copies it before each step,
+/// so that a failed step can be undone.
 struct MotionArrays {
   std::vector<Vec3> position;  ///< [m]
   std::vector<Quat> orientation;
@@ -18,52 +19,58 @@ struct MotionArrays {
   std::vector<Vec3> angular_velocity;   ///< [rad/s], world axes
   std::vector<Vec3> force;              ///< [N], for the next step
   std::vector<Vec3> torque;             ///< [N m], for the next step
-  std::vector<Vec3> last_acceleration;  ///< [m/s^2], in the last step
+  std::vector<Vec3> last_acceleration;  ///< [m/s^2], in the last step in which the body was awake
   std::vector<Mat3> inverse_inertia;    ///< [1/(kg m^2)], world axes
-  std::vector<Real> motion;             ///< [m^2/s^2], recency-weighted mean (thesis 4.4.2)
-  std::vector<std::uint8_t> awake;      ///< 1 or 0; for mass 0: 1 for a moving kinematic body
+  /// [m^2/s^2], recency-weighted mean of v^2 + w^2, compared with SleepSettings::epsilon (thesis
+  /// 4.4.2)
+  std::vector<Real> motion;
+  std::vector<std::uint8_t> awake;  ///< 1 or 0; a body of mass 0: 1 if kinematic and moving
 };
 
-/// Owns the bodies, their ids and their free motion. The slot of a removed body is reused with a
-/// new generation. Loops visit ids(), in the order of indices.
+/// Owns the bodies and their ids, and integrates their free motion. The arrays have unused slots,
+/// so loops over the bodies iterate over ids(), which is sorted by index. The slot of a removed
+/// body is reused with a new generation.
 class BodyStore {
  public:
   BodyStore(Real dt, const SleepSettings& sleep);
 
   /// @param def must have passed validation
-  /// @throws std::bad_alloc without a change
+  /// @throws std::bad_alloc; the store is then unchanged
   BodyId add(const BodyDef& def);
-  /// @param id must be contained
+  /// @param id of a body in the store
   void remove(BodyId id) noexcept;
   bool contains(BodyId id) const noexcept;
-  /// The index of a contained body. @throws InvalidArgument for any other
+  /// Returns the index of a body in the store. @throws InvalidArgument for an unknown id
   std::uint32_t require(BodyId id) const;
   std::span<const BodyId> ids() const noexcept { return ids_; }
   /// The id of the body that currently has the index.
   BodyId id(std::uint32_t body) const { return {body, generation_[body]}; }
-  /// Number of slots ever used; upper bound of all indices.
+  /// Number of slots; all indices are below it.
   std::size_t capacity() const noexcept { return generation_.size(); }
   std::uint32_t movable_count() const noexcept { return movable_count_; }
 
   BodyState state(std::uint32_t body) const;
-  /// Replaces position, orientation and velocities, and wakes the body.
+  /// Replaces position, orientation and velocities. Wakes a movable body; makes a kinematic body
+  /// awake if it has a velocity; the velocities of an immovable body remain 0.
   void set_state(std::uint32_t body, const BodyState& state);
 
-  /// Adds to the force and torque of the next step and wakes the body (erratum E29). Has no effect
-  /// on an immovable body.
+  /// Adds to the force or torque of the next step and wakes the body (erratum E29). Has no effect
+  /// on a body of mass 0.
   void apply_force(std::uint32_t body, const Vec3& force);
   void apply_torque(std::uint32_t body, const Vec3& torque);
-  /// Wakes the body with a motion of twice the sleep epsilon, so that a weak force has time to act.
+  /// Wakes a body and sets its mean motion to twice the sleep epsilon, so that a weak force has
+  /// time to act. Has no effect on a body of mass 0.
   void wake(std::uint32_t body);
-  /// Wakes the body with the motion of an awake body in contact with it.
+  /// Wakes a movable body and sets its mean motion to that of an awake body in contact with it.
   void wake_by_contact(std::uint32_t sleeper, std::uint32_t awake);
-  /// Raises the motion of an awake body to at least twice the sleep epsilon.
+  /// Raises the mean motion of an awake body to at least twice the sleep epsilon.
   void keep_awake(std::uint32_t body);
 
-  /// Moves a body without a change of velocity.
+  /// Translates and rotates a body, and does not change its velocities.
   void displace(std::uint32_t body, const Vec3& shift, const Vec3& rotation);
 
-  /// Advances all awake bodies by one step of free motion, and puts bodies at rest to sleep.
+  /// Advances all awake bodies by one step of free motion, puts bodies at rest to sleep, and clears
+  /// the accumulated forces and torques.
   void integrate();
 
   bool movable(std::uint32_t body) const { return inverse_mass_[body] > 0; }
@@ -75,7 +82,7 @@ class BodyStore {
   Real inverse_mass(std::uint32_t body) const { return inverse_mass_[body]; }
   Real friction(std::uint32_t body) const { return friction_[body]; }
   Real restitution(std::uint32_t body) const { return restitution_[body]; }
-  /// [m]; 0 for a body that is not a sphere
+  /// [m]; 0 for a body that is not a sphere, as for compounds
   Real radius(std::uint32_t body) const { return radius_[body]; }
   Real dt() const { return dt_; }
 
@@ -91,19 +98,21 @@ class BodyStore {
 
   Real dt_;
   SleepSettings sleep_;
-  Real motion_kept_;  ///< bias^dt
+  Real motion_kept_;  ///< SleepSettings::bias^dt: weight of the previous mean motion
 
   std::vector<Shape> shape_;
   std::vector<Real> radius_, mass_, inverse_mass_, friction_, restitution_;
   std::vector<Mat3> body_inverse_inertia_;  ///< body axes
-  std::vector<Mat3> tensor_;  ///< body axes, relative to the largest moment; 0 if isotropic
-  std::vector<Vec3> acceleration_;
+  /// Inertia in body axes, divided by its largest diagonal entry, for the gyroscopic term; zero if
+  /// that term is zero (isotropic inertia or mass 0).
+  std::vector<Mat3> tensor_;
+  std::vector<Vec3> acceleration_;                           ///< BodyDef::acceleration
   std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^dt
   std::vector<std::uint8_t> can_sleep_, kinematic_;
   std::vector<std::uint32_t> generation_;
 
-  std::vector<BodyId> ids_;
-  std::vector<std::uint32_t> free_;
+  std::vector<BodyId> ids_;          ///< sorted by index
+  std::vector<std::uint32_t> free_;  ///< indices of unused slots
   std::uint32_t movable_count_ = 0, kinematic_count_ = 0;
 };
 

@@ -3,6 +3,8 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/reserve.hpp"
+
 #include <algorithm>
 #include <cstdint>
 #include <functional>
@@ -25,7 +27,7 @@ class CallbackRegistry {
   explicit CallbackRegistry(const char* kind) : kind_(kind) {}
 
   Id add(Function function) {
-    ids_.reserve(ids_.size() + 1);
+    reserve_geometric(&ids_, ids_.size() + 1);
     functions_.push_back(std::make_unique<Function>(std::move(function)));
     ids_.push_back({next_});
     return {next_++};

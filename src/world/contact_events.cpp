@@ -1,4 +1,4 @@
-/// Merge of the touching pairs of two steps.
+/// Computation of contact events by a merge of the sorted pairs of two steps.
 #include "src/world/contact_events.hpp"
 
 #include <algorithm>
@@ -45,8 +45,8 @@ void ContactEvents::update(std::span<const Contact> contacts) {
   cleared_ = false;
 }
 
-/// Sorts the contacts by pair into sorted_. The contacts consist of few sorted runs: sphere pairs,
-/// then others. The part after the first run is sorted separately and merged with it.
+/// Fills sorted_ with the contacts, sorted by pair. Most contacts are between spheres and already
+/// sorted, so only the part after the first sorted run is sorted and then merged with it.
 void ContactEvents::sort(std::span<const Contact> contacts) {
   found_.clear();
   for (std::uint32_t i = 0; i < contacts.size(); ++i) {
@@ -59,7 +59,8 @@ void ContactEvents::sort(std::span<const Contact> contacts) {
   std::merge(found_.begin(), rest, rest, found_.end(), sorted_.begin());
 }
 
-/// Returns a begin event of the pair at `entry`, and advances `entry` to the next pair.
+/// Returns a begin event for the pair at position `entry` of sorted_, and advances `entry` to the
+/// next pair.
 ContactEvent ContactEvents::next_pair(std::span<const Contact> contacts, std::size_t* entry) const {
   const std::uint64_t pair = sorted_[*entry].pair;
   const Contact* deepest = &contacts[sorted_[*entry].contact];

@@ -1,4 +1,4 @@
-/// Beginning, continuing and ending contacts between bodies.
+/// Events of contacts between bodies: begin, stay and end.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -14,10 +14,10 @@ inline namespace JFPX_ABI {
 /// shrink.
 class ContactEvents {
  public:
-  /// A failed allocation leaves the events unchanged.
-  /// @param contacts all of a step
+  /// Computes the events of a successful step. A failed allocation leaves the events unchanged.
+  /// @param contacts all detected contacts of the step, without those of contact generators
   void update(std::span<const Contact> contacts);
-  /// Clears the list of events, but keeps the pairs for the next comparison.
+  /// Makes list() empty until the next update(), which still compares with the current pairs.
   void clear() noexcept { cleared_ = true; }
   /// Sorted by (a.index, b.index); an end event precedes a begin event with the same indices.
   std::span<const ContactEvent> list() const noexcept {
@@ -25,10 +25,10 @@ class ContactEvents {
   }
 
  private:
-  /// A contact and the pair of its body indices, the lower one first.
+  /// A contact and the pair of its bodies.
   struct Entry {
-    std::uint64_t pair;
-    std::uint32_t contact;
+    std::uint64_t pair;     ///< lower body index in the upper half, higher one in the lower half
+    std::uint32_t contact;  ///< index in the contacts
     friend auto operator<=>(const Entry&, const Entry&) = default;
   };
 
@@ -37,7 +37,7 @@ class ContactEvents {
 
   std::vector<Entry> found_, sorted_;
   std::vector<ContactEvent> events_, next_;
-  bool cleared_ = false;
+  bool cleared_ = false;  ///< whether clear() was called after the last update()
 };
 
 }  // namespace JFPX_ABI

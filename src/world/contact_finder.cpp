@@ -10,6 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
+/// Whether two bounding spheres overlap, with a margin for rounding errors.
 bool near(const SphereInstance& a, const SphereInstance& b) {
   const Real most = a.radius + b.radius;
   return length_squared(a.centre - b.centre) <= most * most * (1 + 64 * kEpsilon);
@@ -110,7 +111,8 @@ ContactFinder::Candidate ContactFinder::ordered(const BodyStore& bodies, SubShap
   return {of_y, of_x, y, x};
 }
 
-/// Appends the contacts of two spheres; pairs with a box become candidates.
+/// Appends the contacts of two spheres to `contacts`, and the pairs with a box to candidates_. In a
+/// pair of the collider, a < b, and spheres are numbered before boxes; so b is a box if either is.
 void ContactFinder::find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts) {
   const ContactSpan found = broad_phase_.find(sub_shapes_.bounds());
   hits_.clear();
@@ -133,6 +135,8 @@ void ContactFinder::find_sphere_pairs(const BodyStore& bodies, std::vector<Conta
   }
 }
 
+/// Appends the pairs of a movable and a fixed sub-shape that may touch. Tests all of them: takes
+/// O(movable * fixed) time.
 void ContactFinder::find_fixed_candidates(const BodyStore& bodies) {
   for (SubShape sub_shape = 0; sub_shape < sub_shapes_.fixed_begin(); ++sub_shape) {
     const std::uint32_t body = sub_shapes_.body(sub_shape);
@@ -145,7 +149,8 @@ void ContactFinder::find_fixed_candidates(const BodyStore& bodies) {
   }
 }
 
-/// @param centre centre of mass of the body of `sub_shape`
+/// Conservative test: false only if the sub-shapes do not touch.
+/// @param centre centre of mass of the body of `sub_shape`, which selects the side of a plane
 bool ContactFinder::may_touch(SubShape sub_shape, SubShape fixed, const Vec3& centre) const {
   if (!sub_shapes_.is_wall(fixed))
     return near(sub_shapes_.bounds(sub_shape), sub_shapes_.bounds(fixed));

@@ -1,4 +1,4 @@
-/// Contact detection of a world: between movable bodies, and with immovable ones.
+/// Contact detection of a world: broad phase and pair tests of all shapes.
 #pragma once
 
 #include <jfpx/collide.hpp>
@@ -11,19 +11,22 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// The broad phase and the sphere collider find the pairs of touching spheres, and, through
-/// bounding spheres, the candidate pairs of movable boxes. Every immovable box, half-space and
-/// plane is tested against every movable body. Contacts between immovable bodies, and within one
-/// body, are discarded.
+/// The broad phase tests all spheres and the bounding spheres of movable boxes: it finds the
+/// contacts of two spheres and the candidate pairs of a box with a sphere or a box. The "fixed"
+/// sub-shapes, which are the boxes of mass 0 (immovable or kinematic), half-spaces and planes, are
+/// not in the broad phase: each of them is tested against every sub-shape of every movable body.
+/// Contacts within one body, or between two bodies of mass 0, are discarded.
 class ContactFinder {
  public:
   ContactFinder(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase);
 
-  /// Must be called after bodies were added or removed, or an immovable body was moved.
+  /// Must be called after a body was added or removed, or got another state by set_state().
   void set_bodies(const BodyStore& bodies);
 
-  /// Appends the contacts of two spheres, then all others, both sorted by the indices of (a, b),
-  /// then by the sub-shapes of a and of b. Contact defines the choice of a and b.
+  /// Finds the contacts of the current poses: those of two spheres, then all others, both sorted by
+  /// (a.index, b.index), then by the sub-shapes of a and of b. Contact defines which body is a.
+  /// Friction and restitution are left 0.
+  /// @param contacts empty; receives the contacts
   /// @returns the number of contacts of two spheres
   /// @throws the exceptions of SphereCollider::find_contacts()
   std::uint64_t find_contacts(const BodyStore& bodies, std::vector<Contact>* contacts);
@@ -32,16 +35,16 @@ class ContactFinder {
 
  private:
   using SubShape = SubShapeTable::SubShape;
-  /// Two sub-shapes that may touch, in the order of their contact.
+  /// Two sub-shapes that may touch.
   struct Candidate {
-    std::uint32_t a = 0, b = 0;
+    std::uint32_t a = 0, b = 0;  ///< bodies, in the order that Contact defines
     SubShape sub_shape_a = 0, sub_shape_b = 0;
     friend auto operator<=>(const Candidate&, const Candidate&) = default;
   };
-  /// Two spheres that touch.
+  /// Two spheres that touch, sortable by body and sub-shape.
   struct SphereHit {
     Candidate pair;
-    std::uint64_t index = 0;  ///< in the list of the collider
+    std::uint64_t index = 0;  ///< in the contacts that the collider returned
     friend auto operator<=>(const SphereHit&, const SphereHit&) = default;
   };
 

@@ -1,4 +1,4 @@
-/// The resolver of the engine, with the tournament tree as its queue.
+/// Explicit instantiation of the engine's resolver, BasicContactResolver<IndexedPriorityQueue>.
 #include "src/world/contact_resolver.hpp"
 
 namespace jfpx {

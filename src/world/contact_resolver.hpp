@@ -1,5 +1,5 @@
-/// Sequential contact resolver: the worst contact first, penetrations before velocities (thesis
-/// 4.4.6).
+/// Sequential contact resolver: corrects penetrations, then velocities, always the worst contact
+/// first (thesis 4.4.6).
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -13,24 +13,28 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Work of the resolver in a step.
+/// Iteration counts of the resolver in a step.
 struct ResolverReport {
   std::uint64_t position_iterations = 0;
   std::uint64_t velocity_iterations = 0;
   bool exhausted = false;  ///< a loop stopped at its limit with work left
 };
 
-/// Both loops take the worst contact, resolve it, and update every other contact of the bodies that
-/// were moved (errata E6, E10, E11). `Queue` selects the worst contact: IndexedPriorityQueue in the
-/// engine; tests and benchmarks also use the thesis' linear scan. All queues that prefer the
-/// largest key, then the lowest index, give the same bits. Buffers grow and never shrink.
+/// There are two loops, one for positions and one for velocities. Each iteration takes the worst
+/// contact, resolves it, and updates the keys of all contacts of its two bodies (errata E6, E10,
+/// E11). The key of a contact is its penetration in the first loop, and the required change of its
+/// separating velocity in the second.
+///
+/// `Queue` has the functions of IndexedPriorityQueue, which the engine uses; tests and benchmarks
+/// also use the linear scan of the thesis. All queues that select the largest key, and the lowest
+/// index among equal keys, give the same bits. Buffers grow and never shrink.
 template <class Queue>
 class BasicContactResolver {
  public:
-  /// @param contacts of `bodies`; of two movable bodies in contact both or none are awake. Contacts
-  ///   without an awake body are left alone.
-  /// @param generated number of contacts at the end that generators made: they do not use the radii
-  ///   of spheres and form no patches
+  /// @param contacts between `bodies`. Two movable bodies in contact must be both awake or both
+  ///   asleep. Contacts without an awake body are ignored.
+  /// @param generated number of contacts, at the end of `contacts`, that come from contact
+  ///   generators. They act at Contact::point, even on spheres, and form no patches.
   ResolverReport resolve(BodyStore& bodies, std::span<const Contact> contacts,
                          const ResolverSettings& settings, std::size_t generated = 0);
 
@@ -38,18 +42,20 @@ class BasicContactResolver {
   struct alignas(64) Row {  // a cache line in float, two in double
     std::uint32_t a, b;
     Vec3 normal, arm_a, arm_b;  ///< arms: from the centre of mass to the contact
-    Real from_acceleration;     ///< [m/s], of the separating velocity
+    Real from_acceleration;     ///< [m/s], part of the separating velocity that this step's
+                                ///< accelerations have added
     Real friction, restitution;
     std::uint32_t first, last;  ///< rows of the same two bodies with the same normal: [first, last)
   };
-  /// A correction that serves several rows of the same two bodies.
+  /// One correction for one or several rows of the same two bodies with the same normal.
   struct Patch {
     const Row& row;     ///< the worst row
     Vec3 arm_a, arm_b;  ///< to the point of the correction
-    Real amount;
-    Real radius = 0;  ///< [m], mean distance of the points from their centre; 0 for one point
+    Real amount;        ///< of the correction: [m] in the position loop, [m/s] in the velocity loop
+    Real radius = 0;    ///< [m], mean distance of the points from their centre; 0 for one point
   };
-  /// Shares of a patch's friction against sliding and against spinning; their squares add up to 1.
+  /// Fractions of a patch's friction that act against sliding and against spinning; their squares
+  /// add up to 1.
   struct FrictionShares {
     Real sliding, spinning;
   };
@@ -139,6 +145,8 @@ void BasicContactResolver<Queue>::add_row(const Contact& c, const Vec3& arm_a, c
   keys_.push_back(-c.distance);
 }
 
+/// Sets the range [first, last) of each row to the consecutive rows with the same bodies and
+/// normal.
 template <class Queue>
 void BasicContactResolver<Queue>::group_patches() {
   for (RowIndex first = 0, last = 0; first < rows_.size(); first = last) {
@@ -151,11 +159,13 @@ void BasicContactResolver<Queue>::group_patches() {
   }
 }
 
-/// Where boxes touch along a face, one correction serves all corners with a positive key: the
-/// weighted mean of the keys, applied at the weighted centre of the corners. If corners were
-/// corrected one after the other, each impulse would rotate the box onto the next corner, and a box
-/// at rest would drift. Velocities are linear in the arm, so the mean is exact at the centre. A
-/// corner with a key above the mean remains the worst and has more weight in the next iteration.
+/// Where boxes touch along a face, all corners with key > slack are corrected together. The weight
+/// of a corner is key - slack; the amount is the weighted mean of these values, applied at the
+/// weighted centre of the corners. If corners were corrected one after the other, each impulse
+/// would rotate the box onto the next corner, and a box at rest would drift. Velocities are linear
+/// in the arm, so the mean is exact at the centre. A corner with a key above the mean remains the
+/// worst and has more weight in the next iteration.
+/// @param slack part of the key that is not corrected
 template <class Queue>
 typename BasicContactResolver<Queue>::Patch BasicContactResolver<Queue>::patch_of(
     RowIndex worst, Real slack) const {
@@ -183,8 +193,9 @@ typename BasicContactResolver<Queue>::Patch BasicContactResolver<Queue>::patch_o
   return patch;
 }
 
-/// The arm of a sphere is computed along the normal, because the difference of two points far from
-/// the origin loses precision. `side` is -1 for body a, 1 for body b (erratum E2).
+/// The vector from the centre of mass to the contact. For a sphere it is computed from the normal,
+/// because the difference of two points far from the origin loses precision (erratum E2).
+/// @param side -1 for body a, 1 for body b
 template <class Queue>
 Vec3 BasicContactResolver<Queue>::lever_arm(std::uint32_t body, const Contact& contact,
                                             Real side) const {
@@ -217,6 +228,7 @@ std::span<const std::uint32_t> BasicContactResolver<Queue>::rows_of(std::uint32_
   return std::span(body_rows_).subspan(first_row_[body], first_row_[body + 1] - first_row_[body]);
 }
 
+/// Maximum number of iterations of each loop.
 template <class Queue>
 std::uint64_t BasicContactResolver<Queue>::limit() const {
   return settings_.max_iterations != 0 ? settings_.max_iterations
@@ -225,9 +237,10 @@ std::uint64_t BasicContactResolver<Queue>::limit() const {
 
 template <class Queue>
 void BasicContactResolver<Queue>::resolve_positions(ResolverReport* report) {
-  // Contacts are resolved to slightly less than the allowed depth. Resolved to zero, a body at rest
-  // would repeatedly sink and be lifted by the whole depth; resolved to the limit itself, rounding
-  // and neighboring contacts would exceed the limit again immediately.
+  // Penetrations are reduced to slightly less than position_epsilon. If they were reduced to zero,
+  // a body at rest would repeatedly sink and be lifted by position_epsilon. If they were reduced to
+  // position_epsilon itself, rounding errors and neighboring contacts would exceed it again
+  // immediately.
   const Real slack = settings_.position_epsilon * Real(15.0 / 16.0);
   queue_.assign(keys_);
   for (std::uint64_t left = limit();; --left) {
@@ -241,8 +254,8 @@ void BasicContactResolver<Queue>::resolve_positions(ResolverReport* report) {
   report->exhausted = true;
 }
 
-/// Moves both bodies apart by the amount of the patch, in proportion to their inverse effective
-/// masses (erratum E6a).
+/// Moves the bodies apart by the amount of the patch, each in proportion to its inverse effective
+/// mass (erratum E6a).
 template <class Queue>
 void BasicContactResolver<Queue>::project(const Patch& patch) {
   const MotionArrays& moving = bodies_->moving;
@@ -264,8 +277,9 @@ void BasicContactResolver<Queue>::project(const Patch& patch) {
   displace(row.b, of_b);
 }
 
-/// Moves a body and re-estimates the depth of its contacts without new detection (Millington 2007,
-/// 14.4): moving a by +n makes the contact shallower, moving b deeper (erratum E10).
+/// Moves a body and updates the depths of its contacts to first order, without new detection
+/// (Millington 2007, 14.4). A displacement along the normal reduces the depth if the body is a, and
+/// increases it if the body is b (erratum E10).
 template <class Queue>
 void BasicContactResolver<Queue>::displace(std::uint32_t body,
                                            const detail::Displacement& displacement) {
@@ -329,8 +343,8 @@ void BasicContactResolver<Queue>::apply_impulse(const Patch& patch) {
     if (!bodies_->movable(body)) continue;
     detail::add_response(basis, is_a ? patch.arm_a : patch.arm_b, bodies_->inverse_mass(body),
                          moving.inverse_inertia[body], &response);
-    // Friction also cancels the velocity that the acceleration of the next step will add along the
-    // surface; otherwise a body held by friction would creep downhill (Millington 2007, 15.2).
+    // Friction also cancels the tangential velocity that the same acceleration will add in the next
+    // step; otherwise a body held by friction would creep downhill (Millington 2007, 15.2).
     const Vec3 coming = moving.last_acceleration[body] * (is_a ? bodies_->dt() : -bodies_->dt());
     velocity += coming;
   }
@@ -345,8 +359,9 @@ void BasicContactResolver<Queue>::apply_impulse(const Patch& patch) {
     apply_spin_friction(row, row.friction * shares.spinning * local.x * patch.radius);
 }
 
-/// A patch that slides and spins has one friction for both: it opposes the velocity of its points,
-/// whose sliding and spinning components are perpendicular on average.
+/// Sliding and spinning share the friction of a patch: friction opposes the velocity of the contact
+/// points, whose sliding and spinning components are perpendicular on average.
+/// @param velocity of the patch, in contact axes
 template <class Queue>
 typename BasicContactResolver<Queue>::FrictionShares BasicContactResolver<Queue>::share_friction(
     const Patch& patch, const Vec3& velocity) const {
@@ -357,6 +372,7 @@ typename BasicContactResolver<Queue>::FrictionShares BasicContactResolver<Queue>
   return both > 0 ? FrictionShares{slide / both, spin_speed / both} : FrictionShares{1, 0};
 }
 
+/// [rad/s], relative angular velocity about the normal.
 template <class Queue>
 Real BasicContactResolver<Queue>::spin(const Row& row) const {
   const MotionArrays& moving = bodies_->moving;

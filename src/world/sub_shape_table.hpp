@@ -31,9 +31,9 @@ class SubShapeTable {
     }
   };
 
-  /// Must be called after bodies were added or removed, or an immovable body was moved.
+  /// Must be called after a body was added or removed, or got another state by set_state().
   void set_bodies(const BodyStore& bodies);
-  /// Moves the sub-shapes to the current poses of their bodies.
+  /// Updates the poses of all sub-shapes from their bodies, except immovable boxes and walls.
   void update_poses(const BodyStore& bodies);
 
   std::uint32_t body(SubShape sub_shape) const { return body_[sub_shape]; }

@@ -1,12 +1,13 @@
-/// Sweeps over contacts that propagate a property of bodies.
+/// Propagation of a property of bodies through contacts, by repeated sweeps.
 #include "src/world/wake_propagation.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// Calls `pass` for all contacts until no call returns true. Sweeps alternate in direction: the
-/// contacts are sorted, so that one sweep covers all chains of rising indices.
+/// Calls pass(contact) for all contacts, repeatedly, until a sweep changes nothing; `pass` returns
+/// true if it has changed a body. Contacts are sorted by body index, so a forward sweep propagates
+/// along chains of increasing indices, and a backward sweep along decreasing ones.
 template <class Pass>
 void propagate(std::span<const Contact> contacts, const Pass& pass) {
   for (bool changed = true; changed;) {

@@ -1,4 +1,4 @@
-/// Propagation of waking through the islands of a step.
+/// Propagation of waking through bodies in contact.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -8,17 +8,17 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Owns a buffer, which grows and never shrinks.
+/// Function object that owns its buffer, which grows and never shrinks.
 class WakePropagation {
  public:
-  /// Wakes every body in contact with an awake body, transitively; immovable bodies are never awake
-  /// and wake no body (thesis 4.4.6, matchAwakeState). A body that a moving kinematic body carries,
-  /// directly or through others and at any speed, stays awake, because a sleeping body has no
-  /// velocity.
+  /// Wakes every movable body in contact with an awake body, transitively (thesis 4.4.6,
+  /// matchAwakeState). Immovable bodies are never awake and do not propagate waking. Bodies in
+  /// contact with a moving kinematic body, directly or through other movable bodies, are kept awake
+  /// at any speed: a sleeping body has no velocity and could not be carried.
   void operator()(std::span<const Contact> contacts, BodyStore* bodies);
 
  private:
-  std::vector<std::uint8_t> carried_;  ///< by body
+  std::vector<std::uint8_t> carried_;  ///< by body: 1 if kept awake by a moving kinematic body
 };
 
 }  // namespace JFPX_ABI

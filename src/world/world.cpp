@@ -18,7 +18,8 @@ double elapsed_ms(Clock::time_point since, Clock::time_point until) {
   return std::chrono::duration<double, std::milli>(until - since).count();
 }
 
-/// Memory of a body, rounded up: in the scene, in the store and in the copy that undo() restores.
+/// Upper estimate of the memory per body: in the scene, in the body store and in the copy that
+/// undo() restores. Used in an error message only.
 constexpr std::size_t kBytesPerBody = 1024;
 
 void combine_materials(const BodyStore& bodies, const MaterialSettings& rules,
@@ -30,14 +31,14 @@ void combine_materials(const BodyStore& bodies, const MaterialSettings& rules,
   }
 }
 
-/// The first body whose state is not finite or that has left the world.
+/// The first body whose state is not finite or that has a coordinate above kMaxCoordinate.
 std::optional<BodyId> find_runaway(const BodyStore& bodies) {
   const MotionArrays& moving = bodies.moving;
   for (const BodyId id : bodies.ids()) {
     const Vec3& x = moving.position[id.index];
     const bool in_world = absolute(x.x) <= kMaxCoordinate && absolute(x.y) <= kMaxCoordinate &&
                           absolute(x.z) <= kMaxCoordinate;
-    // An angular velocity whose square overflows makes the orientation zero.
+    // If the square of the angular velocity overflows, normalized() returns a zero quaternion.
     const bool is_rotation = length_squared(moving.orientation[id.index]) > Real(0.5);
     if (!in_world || !is_rotation || !is_finite(moving.orientation[id.index]) ||
         !is_finite(moving.velocity[id.index]) || !is_finite(moving.angular_velocity[id.index])) {
@@ -49,7 +50,8 @@ std::optional<BodyId> find_runaway(const BodyStore& bodies) {
 
 }  // namespace
 
-/// Returns false, and names the body in the report, if a state is no longer finite.
+/// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
+/// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
 bool World::Impl::advance(StepReport* report) {
   const auto all_finite = [&] {
     const std::optional<BodyId> runaway = find_runaway(bodies);
@@ -70,7 +72,7 @@ bool World::Impl::advance(StepReport* report) {
   contacts_are_new = true;
   contacts.clear();
   report->sphere_contacts = contact_finder.find_contacts(bodies, &contacts);
-  // Copying the text may fail; here the step can still be undone.
+  // Copying the string may throw; at this point the step can still be undone.
   report->device_failure = contact_finder.collider().device_failure();
   report->contacts = contacts.size();
   combine_materials(bodies, scene.materials, &contacts);

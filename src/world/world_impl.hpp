@@ -37,6 +37,8 @@ struct World::Impl {
   double time() const { return static_cast<double>(steps) * static_cast<double>(scene.dt); }
 
   bool advance(StepReport* report);
+  /// Restores the state before the step, including the contacts that wake_neighbors() uses, and
+  /// empties World::contacts() and World::contact_events().
   void undo() noexcept {
     std::swap(bodies.moving, before);
     if (contacts_are_new) std::swap(contacts, contacts_before);
@@ -51,12 +53,14 @@ struct World::Impl {
   ContactResolver resolver;
   CallbackRegistry<ForceContext, ForceId> forces{"force"};
   CallbackRegistry<ContactContext, ContactGeneratorId> generators{"contact generator"};
-  bool bodies_changed = true;  ///< since the last call of contact_finder.set_bodies()
+  bool bodies_changed = true;  ///< whether contact_finder.set_bodies() must be called
   /// Contacts of the last step that was not undone, without those of removed bodies.
   std::vector<Contact> contacts;
-  std::vector<Contact> contacts_before;  ///< of the step before it
-  bool contacts_are_new = false;         ///< during a step: `contacts` belongs to this step
-  bool shows_contacts = false;           ///< false after a change of bodies or an undone step
+  std::vector<Contact> contacts_before;  ///< during a step: those of the previous step, for undo()
+  bool contacts_are_new = false;  ///< whether `contacts` and `contacts_before` have been swapped
+  /// Whether World::contacts() returns `contacts`; false after a body was added or removed, or a
+  /// step undone.
+  bool shows_contacts = false;
   ContactEvents events;
   MotionArrays before;  ///< state that an undone step restores
   std::uint64_t steps = 0;

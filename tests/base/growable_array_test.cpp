@@ -99,6 +99,14 @@ TEST(GeometricCapacity, IsNeverLessThanTheCount) {
   }
 }
 
+TEST(GeometricCapacity, SlackDoesNotExceedTheLimit) {
+  constexpr std::size_t kLimit = std::size_t{1} << 31;
+  EXPECT_EQ(geometric_capacity(0, kLimit - 1000, kLimit), kLimit);
+  EXPECT_EQ(geometric_capacity(0, kLimit, kLimit), kLimit);
+  EXPECT_EQ(geometric_capacity(0, kLimit + 1, kLimit), kLimit + 1);  // reported by its own number
+  EXPECT_EQ(geometric_capacity(kLimit, kLimit - 1, kLimit), kLimit);
+}
+
 }  // namespace
 }  // namespace cuda
 }  // namespace JFPX_ABI

@@ -2,7 +2,8 @@
 set(no_rtti "")
 if(NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
   set(no_rtti bullet/no_rtti_test.cpp bullet/no_rtti_unit.cpp)
-  set_source_files_properties(bullet/no_rtti_unit.cpp PROPERTIES COMPILE_OPTIONS "-fno-rtti")
+  set_source_files_properties(bullet/no_rtti_unit.cpp PROPERTIES
+    COMPILE_OPTIONS "-fno-rtti" SKIP_PRECOMPILE_HEADERS ON)
 endif()
 jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   ${no_rtti}
@@ -25,7 +26,7 @@ jfpx_add_test(bullet_verify_test INTERNAL SOURCES
   LINK jfpx_bullet)
 # After the options that linking jfpx::bullet adds.
 set_source_files_properties(bullet/fused_unit.cpp PROPERTIES
-  COMPILE_OPTIONS "-O3;-mfma;-ffp-contract=fast")
+  COMPILE_OPTIONS "-O3;-mfma;-ffp-contract=fast" SKIP_PRECOMPILE_HEADERS ON)
 jfpx_add_test(bullet_trajectory_test SOURCES
   bullet/trajectory_test.cpp
   LINK jfpx_bullet)
@@ -50,7 +51,8 @@ jfpx_add_test(bullet_solver_test SOURCES
   bullet/solver_test.cpp
   ${solver_worlds}
   LINK jfpx_bullet)
-set_source_files_properties(bullet/joint_without_rtti.cpp PROPERTIES COMPILE_OPTIONS "-fno-rtti")
+set_source_files_properties(bullet/joint_without_rtti.cpp PROPERTIES
+  COMPILE_OPTIONS "-fno-rtti" SKIP_PRECOMPILE_HEADERS ON)
 jfpx_add_test(bullet_gpu_island_solver_test SOURCES
   ${random_worlds}
   ${solver_worlds}

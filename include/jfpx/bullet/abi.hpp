@@ -1,4 +1,4 @@
-/// Compile-time checks that Bullet is configured as the build whose bits jfpx reproduces.
+/// Compile-time checks of Bullet's configuration: jfpx reproduces the bits of one configuration.
 #pragma once
 
 #include <jfpx/config.hpp>

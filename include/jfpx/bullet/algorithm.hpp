@@ -13,22 +13,21 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 /// Bit-identical replacement for btSphereSphereCollisionAlgorithm with jfpx's own arithmetic. It
-/// processes one pair at a time, so it is not faster; its uses are jfpx contacts in a custom
-/// dispatcher, and checks of one implementation against the other. Register it before bodies
-/// overlap:
+/// processes one pair at a time, so it is not faster. It serves to compute jfpx's contacts in a
+/// custom dispatcher, and to compare the two implementations. Register it before bodies overlap:
 ///
 ///     jfpx::bullet::SphereSphereAlgorithm::CreateFunc create;  // must outlive the dispatcher
 ///     constexpr int kSphere = SPHERE_SHAPE_PROXYTYPE;
 ///     dispatcher.registerCollisionCreateFunc(kSphere, kSphere, &create);
 ///
 /// and, for contactTest() and contactPairTest(), with registerClosestPointsCreateFunc() as well. It
-/// also supports children of compounds. A jfpx::bullet::CollisionDispatcher does not need it, and
-/// uses Bullet's path of one pair at a time when another create function is registered.
+/// also supports children of compounds. A jfpx::bullet::CollisionDispatcher does not need it: with
+/// any SPHERE/SPHERE create function other than Bullet's, every dispatch runs in Bullet's code.
 /// Thread safety is that of Bullet's algorithms.
 class JFPX_API SphereSphereAlgorithm final : public btActivatingCollisionAlgorithm {
  public:
-  /// Takes a manifold from the dispatcher, as Bullet's algorithm does when its create function
-  /// creates it. If the manifold pool is exhausted, the algorithm does nothing.
+  /// Gets a new manifold from the dispatcher, as Bullet's create function makes Bullet's algorithm
+  /// do. If the manifold pool is exhausted, the algorithm does nothing.
   SphereSphereAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
                         const btCollisionObjectWrapper* body0,
                         const btCollisionObjectWrapper* body1);
@@ -44,7 +43,8 @@ class JFPX_API SphereSphereAlgorithm final : public btActivatingCollisionAlgorit
                                  const btDispatcherInfo& info, btManifoldResult* result) override;
   void getAllContactManifolds(btManifoldArray& manifolds) override;
 
-  /// Ignores a shared manifold, as Bullet does: in a compound, every child has its own.
+  /// Create function for a dispatcher. It ignores a manifold in the construction info, as Bullet's
+  /// does: in a compound, every child has a manifold of its own.
   struct JFPX_API CreateFunc final : btCollisionAlgorithmCreateFunc {
     btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
                                                    const btCollisionObjectWrapper* body0,

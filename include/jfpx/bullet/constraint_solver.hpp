@@ -17,9 +17,9 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 struct ConstraintSolverOptions {
-  /// Computing device of the sweeps. `automatic`: the CPU, or a GPU where that has been faster.
-  /// `cuda`: a GPU for all groups that it supports (not groups with joints or with anisotropic
-  /// friction).
+  /// Computing device of the sweeps. `automatic`: the CPU, or a GPU where it has measured faster.
+  /// `cuda`: a GPU for all groups that it supports; the CPU for groups with joints, with
+  /// anisotropic friction, or with more than 1024 iterations.
   Backend backend = Backend::automatic;
   int device = 0;                         ///< cuda: ordinal of the GPU
   unsigned threads = 1;                   ///< at most 256; 0: one per core
@@ -67,8 +67,8 @@ class JFPX_API ConstraintSolver : public btSequentialImpulseConstraintSolver {
  public:
   BT_DECLARE_ALIGNED_ALLOCATOR();
 
-  /// @throws InvalidArgument for more than 256 threads; BackendUnavailable if the backend is
-  ///   selected by name and not available.
+  /// @throws InvalidArgument for more than 256 threads; BackendUnavailable if the backend is `cuda`
+  ///   and no usable GPU is available.
   explicit ConstraintSolver(const ConstraintSolverOptions& options = {});
   ~ConstraintSolver() override;
   ConstraintSolver(const ConstraintSolver&) = delete;

@@ -19,7 +19,7 @@ enum class Fallback : std::uint8_t {
   no_spheres,       ///< fewer than two spheres among the bodies of the pairs
   near_callback,    ///< the user has set a near callback
   create_function,  ///< the user has registered another SPHERE/SPHERE create function
-  continuous,       ///< dispatchFunc is not DISPATCH_DISCRETE
+  continuous,       ///< m_dispatchFunc is not DISPATCH_DISCRETE
   nested,           ///< called by a callback inside another dispatch of this dispatcher
   out_of_memory,    ///< see DispatchStats::failure; the next dispatch tries again
 };
@@ -46,7 +46,7 @@ struct DispatchStats {
   std::uint64_t to_device = 0;    ///< bytes that the collider sent to a device
   std::uint64_t from_device = 0;  ///< bytes that the collider received from a device
   std::string failure;            ///< error of the last dispatch that ran out of memory
-  std::string device_failure;     ///< reason why the CPU replaced the device; empty: it did not
+  std::string device_failure;     ///< why the CPU replaced the device; empty if it has not
   std::string warning;            ///< set if the program fuses products and sums; see fused.hpp
   double prepare_ms = 0;          ///< wall clock of batches: gather, collider, read manifolds
   double commit_ms = 0;           ///< wall clock of batches: update of the manifolds

@@ -19,9 +19,9 @@ class SceneWorld;
 
 struct DispatcherOptions {
   SphereColliderOptions collider = {};  ///< the collider that tests the sphere pairs
-  /// Dispatches of fewer pairs run in Bullet's own code. A gas is the worst case, because nothing
-  /// touches and Bullet rejects such pairs cheaply: it breaks even below 100 pairs. The gain is
-  /// small below 256.
+  /// Dispatches of fewer pairs run in Bullet's own code. In the worst case, a gas, in which no
+  /// pairs touch and Bullet rejects them cheaply, a batch breaks even at fewer than 100 pairs; the
+  /// gain is small below 256 pairs.
   std::size_t minimum_batch = 256;
   bool verify = false;  ///< see set_verify()
 };
@@ -70,10 +70,10 @@ class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
   std::size_t minimum_batch() const noexcept;
   void set_minimum_batch(std::size_t pairs) noexcept;
 
-  /// If on, recomputes every pair of a batch that was not processed by Bullet with Bullet's own
-  /// algorithm, compares all fields and counts differences in stats(). Slow. Global contact
-  /// callbacks are disabled during the check, so no other thread may use Bullet then. Combine
-  /// callbacks of the user are called twice.
+  /// If on, Bullet's own algorithm recomputes every pair that jfpx has updated; all fields are
+  /// compared, and stats() counts the differences. Slow. Global contact callbacks are disabled
+  /// during the check, so no other thread may use Bullet during a dispatch. Combine callbacks of
+  /// the user are called twice.
   void set_verify(bool on) noexcept;
   bool verify() const noexcept;
 

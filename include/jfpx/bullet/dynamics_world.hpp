@@ -15,20 +15,21 @@ namespace bullet {
 
 struct DynamicsWorldOptions {
   unsigned threads = 1;           ///< 0: one per core, at most 256
-  std::size_t minimum_batch = 0;  ///< steps with fewer bodies run in Bullet's own code
+  std::size_t minimum_batch = 0;  ///< with fewer non-static bodies, Bullet's own code runs
 };
 
-/// A btDiscreteDynamicsWorld that sorts islands by compact keys instead of through pointers,
-/// predicts and integrates bodies in parallel, and looks up the overlapping pairs of a
+/// A btDiscreteDynamicsWorld that sorts manifolds by island with compact keys instead of through
+/// pointers, predicts and integrates bodies in parallel, and looks up the overlapping pairs of a
 /// btDbvtBroadphase with software prefetching. Pairs, groups, their order, sleeping, velocities and
 /// transforms are those of btDiscreteDynamicsWorld, bit for bit.
 ///
-/// In steps with continuous collision of any body, bodies are integrated one at a time, because
-/// each sees the new positions of those before it. All overrides and calls of the user work as in
-/// Bullet; while islands are split, buildAndProcessIslands() of Bullet's own island manager and the
-/// world's protected m_solverIslandCallback are not used. A different island manager builds the
-/// islands itself, and Bullet updates the AABBs while a debug drawer or a ghost pair callback is
-/// set, because either may change the world.
+/// In steps with continuous collision of any body, bodies are integrated one at a time, because the
+/// sweep of each body depends on the new positions of the bodies before it. All overrides and calls
+/// of the user work as in Bullet, with one exception: while islands are split,
+/// buildAndProcessIslands() of Bullet's own island manager and the world's protected
+/// m_solverIslandCallback are not used. An island manager of another class builds the islands
+/// itself. While a debug drawer or a ghost pair callback is set, Bullet updates the AABBs, because
+/// either may change the world.
 ///
 /// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
 /// As in Bullet, only one thread at a time may use a world; different worlds are independent.
@@ -36,8 +37,8 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
  public:
   BT_DECLARE_ALIGNED_ALLOCATOR();
 
-  /// As in Bullet, the caller owns the parts; the world creates and owns a solver if `solver` is
-  /// null.
+  /// As in Bullet, the caller owns the arguments. If `solver` is null, the world creates and owns a
+  /// solver.
   /// @throws InvalidArgument for more than 256 threads.
   DynamicsWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
                 btConstraintSolver* solver, btCollisionConfiguration* configuration,

@@ -13,8 +13,9 @@ namespace bullet {
 
 /// True if the compiler fuses a product and a sum of *this translation unit* into one operation, as
 /// g++ does with -march=native unless -ffp-contract=off is given. Bullet's headers are compiled
-/// into the program, so even a world without jfpx then differs in bits from one whose program is
-/// compiled for the x86-64 baseline. Always inlined, so that the result is the caller's own.
+/// into the program, so the bits of a world, with or without jfpx, then differ from those of a
+/// program that is compiled for the x86-64 baseline. Always inlined, so that the result describes
+/// the calling file.
 [[gnu::always_inline]] inline bool fuses_products() noexcept {
   constexpr btScalar kStep = std::numeric_limits<btScalar>::epsilon();
   btScalar a = 1 + kStep, b = 1 - kStep, c = -1;

@@ -32,7 +32,7 @@ struct SceneWorldOptions {
   bool deterministic_pairs = false;  ///< btDispatcherInfo::m_deterministicOverlappingPairs
 };
 
-/// Wall-clock times of the stages of one step: [ms].
+/// Wall-clock times of the stages of one step [ms].
 struct StageTimes {
   double integrate = 0;   ///< prediction, integration, activation
   double broadphase = 0;  ///< AABBs and overlapping pairs
@@ -44,8 +44,8 @@ struct StageTimes {
 
 /// Owns a btDiscreteDynamicsWorld built from a scene, with Bullet's default configuration and
 /// dynamic tree broadphase. The bodies of the scene are mapped to Bullet as follows:
-/// - mass 0: a static body. A half-space: a static plane, which ignores the body's pose. Bullet has
-///   no two-sided plane;
+/// - mass 0: a static body;
+/// - half-space: a static plane, which ignores the body's pose (Bullet has no two-sided plane);
 /// - compound: a btCompoundShape in its principal axes, with the inertia of the native engine;
 /// - kinematic body: a kinematic body of Bullet, moved by its velocities before each step;
 /// - given inertia: must be diagonal except for compounds, because Bullet stores moments about the
@@ -71,7 +71,7 @@ class JFPX_API SceneWorld {
   SceneWorld(SceneWorld&&) noexcept;
   SceneWorld& operator=(SceneWorld&&) noexcept;
 
-  /// Runs exactly one internal step of Bullet of length dt: [s], larger than the machine epsilon.
+  /// Runs exactly one internal step of Bullet. dt: its length [s], larger than the machine epsilon.
   /// @throws InvalidArgument for any other dt.
   void step(Real dt);
   void step();  ///< one step of the scene's dt

@@ -47,8 +47,8 @@ class JFPX_API ContactCheck {
   ContactCheck(ContactCheck&&) noexcept;
   ContactCheck& operator=(ContactCheck&&) noexcept;
 
-  /// Stores the spheres. Call it directly before the step, which must have no substeps, of a world
-  /// without motion states.
+  /// Stores the spheres. Call it directly before each step. The world must have no motion states,
+  /// and the step no substeps.
   void capture(const btDynamicsWorld& world);
   /// Compares after the step. Pairs that Bullet filters out are skipped: groups and masks, two
   /// static bodies, ignore lists. Two sleeping bodies keep their existing points, which are

@@ -19,15 +19,16 @@ inline constexpr std::uint32_t kNoSphere = 0xffffffffu;
 
 /// Result of a search, in memory that the device can write: device or mapped host memory.
 struct ContactCount {
-  std::uint64_t contacts = 0;  ///< number of touching pairs; exact even if not complete
+  /// Number of touching pairs; exact even if the result is not complete; 0 if a sphere is invalid.
+  std::uint64_t contacts = 0;
   std::uint32_t first_invalid = kNoSphere;  ///< lowest index of an invalid sphere
   std::uint32_t complete = 0;               ///< 1: all contacts were written, 0: none were
 };
 
 /// Finds contacts on the device, in the order of one stream. Only the constructor, reserve() and
 /// the destructor allocate or wait, so that all other calls can be captured in a CUDA graph.
-/// Captured work is valid until a reserve() that grows a buffer. Not thread-safe. Objects are
-/// independent of each other, also on the same device.
+/// Captured work is valid until reserve() grows a buffer or the object is destroyed. Not
+/// thread-safe. Objects are independent of each other, also on the same device.
 class JFPX_API DeviceSphereCollider {
  public:
   /// Uses `device`, and enqueues all work on `stream`, which must belong to that device, outlive
@@ -48,15 +49,15 @@ class JFPX_API DeviceSphereCollider {
   /// Enqueues the search for all touching pairs among `n` spheres. On completion *d_count is set
   /// and, if it is complete, d_contacts[0 .. contacts) holds the contacts sorted by (a, b). The
   /// result is complete if the number of contacts exceeds neither `capacity` nor the reservation,
-  /// and every sphere is valid (all values finite, radius > 0). Otherwise read *d_count, reserve,
-  /// and enqueue again.
+  /// and every sphere is valid (all values finite, radius > 0). Otherwise, no contact is
+  /// written; *d_count then contains the number to reserve, or the index of an invalid sphere.
   /// @param d_spheres device memory, 4*sizeof(Real)-aligned, unchanged until completion
   /// @param d_contacts device memory, 8-aligned (as d_pairs below); may be null if `capacity` is 0
-  /// @throws InvalidArgument if `n` exceeds the reservation or an output is not aligned,
+  /// @throws InvalidArgument if `n` exceeds the reservation or d_contacts is not aligned,
   /// DeviceError.
   void find_contacts(const SphereInstance* d_spheres, std::size_t n, SphereContact* d_contacts,
                      std::size_t capacity, ContactCount* d_count);
-  /// The same, but writes only the indices: 8 bytes per contact.
+  /// Like find_contacts(), but writes only the indices: 8 bytes per contact.
   void find_pairs(const SphereInstance* d_spheres, std::size_t n, SpherePair* d_pairs,
                   std::size_t capacity, ContactCount* d_count);
 

@@ -20,17 +20,19 @@ namespace cuda {
                                                   const char* what, const char* call,
                                                   const char* file, int line);
 
-/// Fault injection for tests: the CUDA call number `calls` from now (0: the next one) of this
-/// thread is not made and returns `error`, once. A negative number disables the injection.
+/// Fault injection for tests. The next `calls` CUDA calls of this thread are made as usual; the one
+/// after them is not made and returns `error`. A negative number disables the injection.
 JFPX_API void inject_fault(long calls, cudaError_t error);
-/// The error that the next call must return; cudaSuccess unless a test has injected a fault.
+/// Counts a CUDA call, and returns the error that a test has injected for it, otherwise
+/// cudaSuccess.
 JFPX_API cudaError_t take_injected_fault() noexcept;
 
 }  // namespace cuda
 }  // namespace JFPX_ABI
 }  // namespace jfpx
 
-/// The result of `call`, or the fault that a test has injected. Clears the error.
+/// The result of `call`, or the error that a test has injected. Clears CUDA's last error of the
+/// thread, so that a later cudaGetLastError() does not report it.
 #define JFPX_CUDA_RESULT(call)                                              \
   [&]() -> cudaError_t {                                                    \
     const cudaError_t injected = ::jfpx::cuda::take_injected_fault();       \
@@ -39,6 +41,7 @@ JFPX_API cudaError_t take_injected_fault() noexcept;
     return result;                                                          \
   }()
 
+/// Makes a CUDA call. @throws DeviceError if it fails
 #define JFPX_CUDA_TRY(call)                                                    \
   do {                                                                         \
     const cudaError_t jfpx_error = JFPX_CUDA_RESULT(call);                     \

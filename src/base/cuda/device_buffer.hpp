@@ -1,5 +1,5 @@
-/// Owners of CUDA streams, device memory and pinned host memory. All allocations of the library are
-/// made here.
+/// Owners of CUDA streams, device memory and pinned host memory. The library allocates device and
+/// pinned memory only through these classes.
 #pragma once
 
 #include "src/base/cuda/cuda_try.hpp"
@@ -122,7 +122,7 @@ class DeviceBuffer {
     return array_.reserve(
         count, [&](std::size_t bytes) { return DeviceMemory(pool, stream, bytes, what); });
   }
-  /// The same, but a reallocation adds slack, so that a count that grows slowly reallocates seldom.
+  /// The same, but a reallocation adds slack, so that a slowly growing count rarely causes one.
   bool reserve_geometric(const MemoryPool& pool, cudaStream_t stream, std::size_t count,
                          const char* what) {
     return array_.reserve_geometric(

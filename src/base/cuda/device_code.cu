@@ -1,4 +1,5 @@
-/// Queries the attributes of an empty kernel; all kernels of a build have the same architectures.
+/// Queries the attributes of an empty kernel. They apply to all kernels, because all are compiled
+/// for the same architectures.
 #include "src/base/cuda/cuda_try.hpp"
 #include "src/base/cuda/device_code.hpp"
 

@@ -1,4 +1,4 @@
-/// Queries which code of this build the current device runs.
+/// Queries about the device code of this build that the current device runs.
 #pragma once
 
 #include <jfpx/config.hpp>

@@ -12,8 +12,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Compares each block with a host copy of what was uploaded last. The comparison reads as many
-/// bytes as an upload would, but memory is faster than the bus, and callers need not track changes.
+/// Compares each block of the array with a host copy of the values that were uploaded last. The
+/// comparison reads as many bytes as an upload would, but host memory is faster than the bus, and
+/// callers need not track changes.
 template <typename T>
 class DeviceMirror {
  public:
@@ -24,7 +25,7 @@ class DeviceMirror {
                      const char* what) {
     // After an exception, the next call uploads everything.
     std::size_t uploaded = std::exchange(uploaded_, 0);
-    // Each buffer has a capacity of its own: the allocation of the second one may have failed.
+    // The capacities can differ, because an earlier allocation of host_ may have failed.
     if (device_.reserve_geometric(pool, stream, values.size(), what)) uploaded = 0;
     if (host_.reserve_geometric(values.size(), what)) uploaded = 0;
     std::size_t bytes = 0, begin = 0, end = 0;  // [begin, end) is the range to upload next
@@ -60,8 +61,8 @@ class DeviceMirror {
 
   DeviceBuffer<T> device_;
   PinnedBuffer<T> host_;
-  std::size_t uploaded_ =
-      0;  ///< number of leading values that are equal on the device and in host_
+  /// Number of leading values that are equal on the device and in host_.
+  std::size_t uploaded_ = 0;
 };
 
 }  // namespace cuda

@@ -12,10 +12,13 @@ inline namespace JFPX_ABI {
 namespace cuda {
 
 /// Capacity for `count` elements, given the current capacity: unchanged if it suffices, otherwise a
-/// quarter more than `count`. A count that grows in small steps then causes O(log count)
-/// reallocations.
-constexpr std::size_t geometric_capacity(std::size_t capacity, std::size_t count) {
-  return count <= capacity ? capacity : std::max(count, count + count / 4 + 64);
+/// quarter more than `count`, but not more than `limit` unless `count` is. A count that grows in
+/// small steps then causes O(log count) reallocations.
+constexpr std::size_t geometric_capacity(
+    std::size_t capacity, std::size_t count,
+    std::size_t limit = std::numeric_limits<std::size_t>::max()) {
+  if (count <= capacity) return capacity;
+  return std::max(count, std::min(count + count / 4 + 64, limit));
 }
 
 /// Uninitialized array whose capacity only grows. Growing discards the contents.

@@ -17,12 +17,12 @@ std::string version_text(int version) {
   return std::to_string(version / 1000) + "." + std::to_string(version % 1000 / 10);
 }
 
-/// Compute capability "9.0".
+/// Compute capability, for example "9.0".
 std::string capability(const cudaDeviceProp& properties) {
   return std::to_string(properties.major) + "." + std::to_string(properties.minor);
 }
 
-/// Whether this build has code for the device. The current device of the caller stays current.
+/// cudaSuccess if this build has code for the device. Restores the current device.
 cudaError_t code_for(int device) {
   int previous = 0;
   cudaError_t error = cudaGetDevice(&previous);

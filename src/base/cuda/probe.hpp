@@ -15,9 +15,10 @@ namespace cuda {
 /// behind.
 BackendStatus probe(int device = 0);
 
-/// Explains an `error` of the first CUDA calls, given the CUDA version that the driver supports (0:
-/// no driver is installed) and the version of the runtime that this build uses. 13000 denotes
-/// version 13.0.
+/// Returns the reason why a device cannot be used.
+/// @param error of the first CUDA calls
+/// @param driver CUDA version that the driver supports, 13000 for 13.0; 0: no driver is installed
+/// @param runtime version of the CUDA runtime that this build uses
 std::string why_unusable(cudaError_t error, int driver, int runtime);
 
 }  // namespace cuda

@@ -1,7 +1,7 @@
 /// Reductions, scans and searches across the lanes of a warp.
 ///
-/// cub::WarpReduce and cub::WarpScan compute the same sums, but return a reduction in lane 0 only,
-/// and require a TempStorage per warp in shared memory, which these shuffles do not need.
+/// cub::WarpReduce and cub::WarpScan use the same shuffles, but a reduction is returned in lane 0
+/// only, and callers must declare a TempStorage per warp.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -43,6 +43,7 @@ __device__ inline unsigned warp_max(unsigned value) {
 /// Maximum over the lanes of a warp, returned in every lane. No value may be NaN.
 __device__ inline Real warp_max(Real x) {
 #if __CUDA_ARCH__ >= 800 && !defined(JFPX_DOUBLE_PRECISION)
+  // Orders the bits of floats as signed integers. The map is its own inverse.
   const auto in_order = [](int bits) { return bits ^ (bits >> 31 & 0x7fffffff); };
   return std::bit_cast<Real>(
       in_order(__reduce_max_sync(kFullWarp, in_order(std::bit_cast<int>(x)))));
@@ -61,8 +62,9 @@ __device__ inline T warp_inclusive_sum(T value) {
   return value;
 }
 
-/// Binary search in sums that do not decrease from lane to lane.
-/// @return the first lane with sum > i, or the last lane.
+/// Binary search in the inclusive sums of all lanes. Call from all lanes of the warp; `i` may
+/// differ between them.
+/// @return the first lane with sum > i, or the last lane if there is none.
 __device__ inline unsigned owner_of(std::uint32_t i, std::uint32_t sum) {
   unsigned owner = 0;
   for (unsigned step = 16; step != 0; step /= 2) {

@@ -1,5 +1,5 @@
-/// One dispatch: a read-only pass over all pairs, the collider, then a commit with the effect of
-/// Bullet's algorithms: in any order where the order is unobservable, otherwise in Bullet's order.
+/// The stages of a dispatch: a read-only pass over all pairs, the collider, and a commit with the
+/// effect of Bullet's algorithms, in Bullet's order unless the order is unobservable.
 #include "src/bullet/dispatch/batch_engine.hpp"
 
 #include <jfpx/error.hpp>
@@ -50,7 +50,8 @@ class Running {
   bool* flag_;
 };
 
-/// Whether Bullet's own algorithm is registered for sphere pairs. The table is protected.
+/// Whether Bullet's own algorithm is registered for sphere pairs. `Access` reads a protected
+/// member.
 bool has_stock_sphere_function(const btCollisionDispatcher& dispatcher) {
   struct Access : btCollisionDispatcher {
     static constexpr auto table() { return &Access::m_doubleDispatchContactPoints; }
@@ -88,8 +89,9 @@ Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatche
   return Fallback::none;
 }
 
-/// Runs everything before the commit, including everything that may throw. Returns false and sets
-/// `*fallback` if there are no sphere pairs or if an operation failed that the CPU also requires.
+/// Runs all stages before the commit, and all operations that may throw. Returns false and sets
+/// `*fallback` if there are fewer than two spheres, or if an operation failed (failures of a device
+/// are handled in find_touching()).
 bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                           btOverlappingPairCache& cache, Fallback* fallback) {
   try {
@@ -98,7 +100,7 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
       return false;
     }
     find_touching();
-    // A user's cache class may observe more of the traversal than the pairs.
+    // A pair cache of a user's class may observe the traversal itself.
     unordered_ = is_exactly<btHashedOverlappingPairCache>(cache) &&
                  is_order_unobservable(batch_, traits.may_override_filter);
     if (unordered_) {
@@ -115,8 +117,8 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
   }
 }
 
-/// If the collider fails, for example because its device is lost, the CPU replaces it permanently.
-/// The CPU itself can only run out of memory, in which case the next dispatch tries again.
+/// If the collider fails, for example because its device is lost, a CPU collider replaces it
+/// permanently. A CPU collider that runs out of memory is kept, and the next dispatch tries again.
 void BatchEngine::find_touching() {
   try {
     touching_ = collider_->find_touching(batch_.spheres(), batch_.pairs());
@@ -234,8 +236,8 @@ void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInf
   note(difference);
 }
 
-/// Checks pairs of a sphere and a box or plane. No callback is set, because the order of the commit
-/// is unobservable.
+/// Checks pairs of a sphere and a box or plane after an unordered commit. Bullet's algorithm calls
+/// no global callback here, because otherwise the order would be observable.
 void BatchEngine::check_convex(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info) {
   convex_check_.for_each(
       unordered_commit_.remaining(), [&](std::size_t i, const btPersistentManifold& before) {

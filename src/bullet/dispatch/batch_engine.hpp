@@ -20,15 +20,16 @@ struct DispatcherTraits {
   bool reports_releases;     ///< note_release() is called for every manifold that it releases
 };
 
-/// An engine can run the dispatches of any dispatcher, one at a time: state that is kept between
-/// dispatches is validated before it is used.
+/// Runs dispatches as batches. One engine may serve several dispatchers, one call at a time,
+/// because it validates the state that it keeps between dispatches before it uses it.
 class JFPX_API BatchEngine {
  public:
   /// @throws InvalidArgument if `collider` is null.
   BatchEngine(std::unique_ptr<SphereCollider> collider, const DispatcherOptions& options);
 
   /// Has the effect of dispatcher.btCollisionDispatcher::dispatchAllCollisionPairs.
-  /// @return false if Bullet must run this dispatch: nothing has been changed, and
+  /// @param argument the dispatcher that is passed on to the traversal of the pair cache
+  /// @return false if Bullet must run this dispatch: no body or manifold has been changed, and
   ///   stats().last_fallback is the reason.
   bool dispatch(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                 btOverlappingPairCache& cache, const btDispatcherInfo& info,
@@ -46,7 +47,7 @@ class JFPX_API BatchEngine {
   ChoiceReason reason() const noexcept { return collider_->reason(); }
   const DispatchStats& stats() const noexcept { return stats_; }
   void reset_stats();
-  /// Sets stats().warning, which outlives reset_stats().
+  /// Sets stats().warning, which reset_stats() keeps.
   void warn_of_fused_products();
 
  private:

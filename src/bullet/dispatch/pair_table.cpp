@@ -24,9 +24,10 @@ struct AlgorithmFields : btCollisionAlgorithm {
   static constexpr auto dispatcher = &AlgorithmFields::m_dispatcher;
 };
 
-/// Access to private members through explicit instantiation, which the language exempts from access
-/// checks. An algorithm stores the number of perturbations that its configuration had when it was
-/// created, and which of its bodies was the plane.
+/// Access to two private members through explicit instantiation, which the language exempts from
+/// access checks: the number of perturbations, which a btConvexConvexAlgorithm copies from its
+/// configuration when it is created, and whether the plane is the first body of a
+/// btConvexPlaneCollisionAlgorithm.
 struct PerturbationTag {
   friend int btConvexConvexAlgorithm::*member_of(PerturbationTag);
 };
@@ -101,7 +102,7 @@ void PairTable::build_release_filter() {
   }
 }
 
-/// The highest bits of a hash, and the bits that follow them.
+/// Two indices of bits in the filter: the highest bits of a hash, and the bits that follow them.
 std::array<std::uint64_t, 2> PairTable::release_bits_of(
     const btPersistentManifold* manifold) const {
   const std::uint64_t hash = reinterpret_cast<std::uintptr_t>(manifold) * 0x9e3779b97f4a7c15u;

@@ -32,7 +32,8 @@ enum class PairKind : std::uint8_t {
   plane_convex,  ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane first
 };
 
-/// The dispatcher that created the algorithms of the pairs.
+/// The dispatcher that runs the dispatch. Its own algorithms may be cached; an algorithm that
+/// another dispatcher has created is read in every refresh().
 struct PairOwner {
   const btDispatcher* dispatcher;
   /// Whether note_release() is called for every manifold that this dispatcher releases. If so, the
@@ -46,6 +47,7 @@ struct PairOwner {
 /// cached pointer is dereferenced before that is established.
 class PairTable {
  public:
+  /// Updates the entries to the current pair array. May throw; see invalidate().
   void refresh(std::span<const btBroadphasePair> pairs, const PairOwner& owner, ThreadPool& pool);
   /// Must be called before a manifold is released.
   void note_release(const btPersistentManifold* manifold) noexcept;
@@ -60,15 +62,15 @@ class PairTable {
   const ProxyTable& proxies() const { return proxies_; }
 
  private:
-  /// The manifold, the kind, and whether the link may be cached; otherwise it is read again in
-  /// every dispatch. Packed into one word, because every dispatch streams all links twice.
+  /// The manifold and the kind of a pair, and whether they may be cached; otherwise they are read
+  /// again in every dispatch. Packed into one word, because every dispatch streams all links twice.
   class Link {
    public:
     Link() = default;
     Link(btPersistentManifold* manifold, PairKind kind, bool cacheable)
         : bits_(reinterpret_cast<std::uintptr_t>(manifold) | static_cast<std::uintptr_t>(kind) |
                 (cacheable ? 0 : kNotCacheable)) {}
-    /// False for null, and for a user's pool whose alignment is lower than that of Bullet's pools.
+    /// False for null, and for a manifold whose alignment is lower than that of Bullet's pools.
     static bool can_hold(const btPersistentManifold* manifold) {
       return manifold != nullptr &&
              (reinterpret_cast<std::uintptr_t>(manifold) & (kKind | kNotCacheable)) == 0;
@@ -110,7 +112,7 @@ class PairTable {
   std::vector<const btPersistentManifold*> released_;
   std::vector<std::uint64_t> release_bits_;  ///< Bloom filter; a false positive costs one read
   int release_shift_ = 0;
-  bool invalid_ = false;  ///< entries are unusable, or too many manifolds have been released
+  bool invalid_ = false;  ///< refresh() must rebuild all entries
 };
 
 }  // namespace bullet

@@ -70,7 +70,8 @@ SphereBatch::Summary SphereBatch::read_bodies(std::size_t begin, std::size_t end
   constexpr std::size_t kAhead = 12;
   Summary summary;
   for (std::size_t i = begin; i < end + 3 * kAhead; ++i) {
-    // Proxy, body and shape are prefetched in sequence, each after its predecessor has arrived.
+    // Software pipeline: proxy, body and shape are prefetched kAhead iterations apart, because the
+    // address of each is read from its predecessor.
     if (i < end && proxies.in_use(i)) prefetch(&proxies.proxy(i)->m_clientObject);
     if (const std::size_t k = i - kAhead; i >= begin + kAhead && k < end) {
       bodies_[k] = proxies.in_use(k)

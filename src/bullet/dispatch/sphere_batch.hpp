@@ -24,7 +24,7 @@ enum BodyTrait : std::uint8_t {
   kBox = 8,              ///< exactly a btBoxShape
   kPlane = 16,           ///< exactly a btStaticPlaneShape
   kHasIgnoreList = 32,   ///< has an ignore list or a filter, which must be evaluated
-  kCustomMaterial = 64,  ///< contacts need more than write_contact()
+  kCustomMaterial = 64,  ///< write_contact() is insufficient for its contacts
 };
 
 /// The first contact of pair `pair` or of a later pair.
@@ -34,10 +34,11 @@ inline const PairContact* first_contact(std::span<const PairContact> touching, s
       [](const PairContact& contact, std::size_t i) { return contact.pair < i; });
 }
 
+/// Bodies and pairs of one dispatch, in the form that the collider and the commit read.
 class SphereBatch {
  public:
-  /// Sets the expected number of contacts. If bodies have several contacts each, gather() copies
-  /// the fields that contacts read; if few bodies have any, they are read on demand.
+  /// Sets the expected number of contacts. If it is larger than the number of bodies, gather()
+  /// copies the body fields that contacts need; otherwise they are read on demand.
   void expect_contacts(std::size_t contacts) { expected_contacts_ = contacts; }
   /// Reads the bodies of `pairs`. Returns false if there are fewer than two spheres among them.
   bool gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner, ThreadPool& pool);
@@ -47,8 +48,8 @@ class SphereBatch {
   /// Discards all cached data. Required after gather() has thrown.
   void invalidate() noexcept { table_.invalidate(); }
 
-  /// One entry per body. Bodies that are not spheres have a radius of NaN, so that every pair with
-  /// one is reported as touching and is rejected where touching pairs are handled, which costs less
+  /// One entry per body. A body that is not a sphere has a radius of NaN. The collider therefore
+  /// reports each of its pairs as touching, and the commit rejects these pairs, which costs less
   /// than a test of every pair.
   std::span<const SphereInstance> spheres() const { return spheres_; }
   std::span<const SpherePair> pairs() const { return table_.pairs(); }

@@ -1,4 +1,5 @@
-/// A scan over the numbers of points, which is all that most pairs need, and visits to the others.
+/// Two passes per chunk: a scan of the numbers of contact points, which completes most pairs, and a
+/// visit of each other pair.
 #include "src/bullet/dispatch/unordered_commit.hpp"
 
 #include "src/bullet/dispatch/contact_point.hpp"
@@ -19,9 +20,10 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
+/// Commits the pairs [begin, end).
 class Committer {
  public:
-  /// `touching` are the contacts of all pairs.
+  /// @param touching contacts of all pairs, not only of this range
   Committer(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
             std::span<const PairContact> touching, std::size_t begin, std::size_t end)
       : dispatcher_(dispatcher),
@@ -120,7 +122,7 @@ class Committer {
 
   bool commit_spheres(std::size_t i, const PairContact* contact) {
     btPersistentManifold* manifold = batch_.manifold(i);
-    if (!batch_.both_are_spheres(i)) return false;  // a shape was exchanged, the algorithm was not
+    if (!batch_.both_are_spheres(i)) return false;  // the user has replaced a shape
     count_pair(contact);
     const unsigned traits = batch_.either_trait(i);
     if ((traits & kActive) == 0) return true;
@@ -139,12 +141,13 @@ class Committer {
     return dispatcher_.btCollisionDispatcher::needsCollision(batch_.body_a(i), batch_.body_b(i));
   }
 
-  /// Updates the pair of a sphere and a body with the trait `other`.
+  /// Updates the pair of a sphere and a body with the trait `other`. Returns false if Bullet must
+  /// process the pair.
   template <class Update>
   bool commit_with(BodyTrait other, bool sphere_first, std::size_t i, Update update,
                    std::uint64_t* count) {
     const unsigned a_is = batch_.trait_a(i), b_is = batch_.trait_b(i);
-    // The shapes may have been exchanged since the algorithm was created.
+    // The user may have replaced a shape since the algorithm was created.
     if (((sphere_first ? a_is : b_is) & kSphere) == 0) return false;
     if (((sphere_first ? b_is : a_is) & other) == 0) return false;
     if ((batch_.either_trait(i) & kActive) == 0) return true;

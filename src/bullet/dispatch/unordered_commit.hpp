@@ -25,13 +25,14 @@ struct CommitCounts {
 /// `may_override_filter`: the dispatcher's class may override needsCollision().
 bool is_order_unobservable(const SphereBatch& batch, bool may_override_filter);
 
-/// Updates the manifolds of sphere pairs. Each belongs to one pair, so threads share no data.
-/// Bullet creates and releases manifolds, because the order of those operations is observable.
+/// Updates the manifolds of pairs of spheres, and of spheres with boxes and planes. Each manifold
+/// belongs to one pair, so threads share no data. Bullet creates and releases the manifolds,
+/// because the order of those operations is observable.
 class UnorderedCommit {
  public:
   /// Reserves memory; the only function that can throw.
   void reserve(std::size_t pairs);
-  /// Updates all pairs that do not depend on the order.
+  /// Updates the pairs that do not require Bullet, and lists the others in remaining().
   CommitCounts run(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
                    std::span<const PairContact> touching, ThreadPool& pool);
   /// Sorts the remaining pairs into the order in which btHashedOverlappingPairCache visits them,

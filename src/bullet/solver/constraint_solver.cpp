@@ -1,4 +1,5 @@
-/// Solves a group of bodies and contacts as rows; see the header.
+/// The solver's interface and the sequence of its stages; constraint_solver_impl.hpp names the
+/// files of the other stages.
 #include <jfpx/error.hpp>
 
 #include "src/bullet/solver/constraint_solver_impl.hpp"
@@ -42,7 +43,7 @@ std::optional<SolverFallback> ConstraintSolver::Impl::solve(
     return restore(SolverFallback::out_of_memory);
   }
   if (report.broken) return restore(SolverFallback::not_finite);
-  // Worlds in different threads share the counter, in Bullet too.
+  // Atomic, because worlds in different threads share Bullet's global counter.
   std::atomic_ref(gNumSplitImpulseRecoveries)
       .fetch_add(static_cast<int>(report.split_impulses), std::memory_order_relaxed);
   record_analytics(report, static_cast<int>(manifolds.size()));
@@ -136,7 +137,7 @@ btScalar ConstraintSolver::solveGroup(btCollisionObject** bodies, int body_count
                                       btTypedConstraint** constraints, int constraint_count,
                                       const btContactSolverInfo& info, btIDebugDraw* debug_drawer,
                                       btDispatcher* dispatcher) {
-  // As Bullet does: row solvers that the user has set are lost when the mode changes.
+  // As in Bullet, a change of the mode replaces row solvers that the user has set.
   if (info.m_solverMode != m_cachedSolverMode) {
     setupSolverFunctions((info.m_solverMode & SOLVER_SIMD) != 0);
     m_cachedSolverMode = info.m_solverMode;

@@ -22,19 +22,20 @@ namespace bullet {
 inline constexpr std::size_t kBodiesPerChunk = 256;
 inline constexpr std::size_t kBlocksPerChunk = 16;
 
-/// Each stage is defined in a file of its own.
+/// Each stage is defined in the file that is named above its declarations.
 struct ConstraintSolver::Impl {
   using Steps = std::array<const void*, 8>;
 
   ConstraintSolver& self;
-  const Steps own_steps;                        ///< steps of this class, without overriders
-  const btSingleConstraintRowSolver own_split;  ///< row solver that Bullet sets
+  const Steps own_steps;                        ///< functions of this class, without overrides
+  const btSingleConstraintRowSolver own_split;  ///< split impulse row solver of Bullet
   cpu::RowSolver solver;
   std::optional<GpuIslandSolver> device;  ///< always present after construction
   std::size_t minimum_batch;
   ConstraintSolverStats stats;
   ContactScan scan;
   std::vector<std::uint8_t> flags;  ///< by id: BodyFlag bits
+  /// Whether any body has a factor other than 1, and whether any contact has an initial impulse.
   std::atomic<bool> factors{false}, warm{false};
 
   // State of one group, valid while the group is solved.

@@ -11,8 +11,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 /// Stores the friction directions in the contact, as Bullet does, and in the rows.
-/// @param second  the second direction in the contact plane, in the lane of the contact; null if
-/// the
+/// @param second the second direction in the contact plane, in the lane of the contact; null if the
 ///   contact slides
 /// @param one,two the lane of the contact in its friction rows, which start with the direction.
 ///   `two` is null if there is only one friction direction.

@@ -26,7 +26,7 @@ constexpr std::size_t kMinContacts = 400;
 constexpr double kMaxSlowdown = 4;
 constexpr double kStartMs = 200;  ///< duration of the first use of the device
 
-/// Rows on the longest dependency chain per color and iteration: 1.4 to 1.6 were measured in piles.
+/// Length of the longest chain of dependent steps, per color and iteration; 1.4 to 1.6 in piles.
 constexpr double kSequentialRowsPerColor = 1.5;
 
 /// Indices of the alternatives of the chooser.
@@ -95,7 +95,7 @@ void GpuIslandSolver::start() {
     solver_ = make_();
     chooser_->wake();
   } catch (const std::exception&) {
-    chooser_.reset();  // the machine has no usable device, which is no failure
+    chooser_.reset();  // a machine without a usable device is not a failure
   }
 }
 
@@ -107,7 +107,7 @@ void GpuIslandSolver::disable(const std::string& why) {
 }
 
 void GpuIslandSolver::finished(std::uint32_t colors) {
-  if (!timed_ || !chooser_) return;  // timed_contacts_ belongs to another group
+  if (!timed_ || !chooser_) return;  // this group is not timed
   if (colors > 0) colors_per_contact_ = colors / static_cast<double>(timed_contacts_);
   const std::chrono::duration<double, std::micro> us = Clock::now() - since_;
   chooser_->record(us.count(), timed_prediction_us_);
@@ -115,7 +115,7 @@ void GpuIslandSolver::finished(std::uint32_t colors) {
 }
 
 std::optional<rows::RowSweepReport> GpuIslandSolver::solve(const DeviceGroup& group) {
-  // Outside of the try block: a lack of host memory does not disable the device.
+  // Outside the try block, because a lack of host memory must not disable the device.
   order_.reserve(group.scan.contacts().size(), group.bodies);
   try {
     pack(group);

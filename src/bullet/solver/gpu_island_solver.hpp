@@ -38,7 +38,8 @@ struct DeviceGroup {
   std::function<void(const ContactRef&, Real* rows)> set_up_rolling_friction;
 };
 
-/// Uses the device never, always, or when it is expected to be faster, as Backend specifies.
+/// Solves groups on a device: none (`cpu`), all that the device supports (`cuda`), or those for
+/// which it is expected to be faster (`automatic`).
 class GpuIslandSolver {
  public:
   /// @param make creates the solver on the device. It is called in the constructor if the backend
@@ -48,8 +49,8 @@ class GpuIslandSolver {
   ///   that call of `make`
   GpuIslandSolver(Backend backend, GroupSolverMaker make, unsigned threads);
 
-  /// @return whether the device is to solve the group. The time from this call to finished() is the
-  ///   time of the group.
+  /// Chooses the CPU or the device for a group, and starts the clock that finished() stops.
+  /// @return whether the device is to solve the group
   bool choose(const ContactScan& scan, const btContactSolverInfo& info);
   /// Solves a group for which choose() returned true. Only reads Bullet's bodies and points.
   /// @return nothing if the device fails, or is predicted to be much slower
@@ -57,10 +58,10 @@ class GpuIslandSolver {
   std::optional<rows::RowSweepReport> solve(const DeviceGroup& group);
   /// Writes impulses and friction directions of the last group to the contact points.
   void write_back(const DeviceGroup& group) const;
-  /// Records the time of the group.
+  /// Records the time since choose() as the time of the group.
   /// @param colors number of colors of the contacts, if the CPU has colored them; else 0
   void finished(std::uint32_t colors);
-  /// Discards the time of a group that was not solved.
+  /// Stops the clock without a record, because the group was not solved.
   void abandon() noexcept { timed_ = false; }
 
   /// Why the device is no longer used; empty if it has not failed.
@@ -69,7 +70,7 @@ class GpuIslandSolver {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// [us] on the CPU and on the device.
+  /// Predicted times on the CPU and on the device [us].
   std::array<double, 2> predicted_us(std::size_t contacts, int iterations) const;
   void pack(const DeviceGroup& group);
   bool pack_contacts(const DeviceGroup& group, const GroupInputs& in, std::size_t first,

@@ -1,4 +1,5 @@
-/// Kernels of the row solver: one thread per contact, which waits for its sequence numbers.
+/// Kernels of the row solver. In the sweeps, each thread solves some contacts and waits for their
+/// sequence numbers; in the others, each thread processes one contact.
 #include "src/base/cuda/launch.cuh"
 #include "src/base/cuda/warp.cuh"
 #include "src/contact_solver/cuda/row_kernels.hpp"

@@ -16,8 +16,8 @@ constexpr unsigned kThreads = kTile;  // one per row
 constexpr unsigned kEmitThreads = 256;
 
 /// Tiles of a band. Row r of tiles has `tiles - r` tiles on and right of the diagonal. The first
-/// row of a band is paired with its last row, the second with the last but one, and so on, so that
-/// all pairs have `width` tiles.
+/// row of a band is paired with its last row, the second with the last but one, and so on. Then the
+/// two rows together always have width() tiles, and the tiles fill a rectangular grid of blocks.
 struct TileGrid {
   std::uint32_t tiles, first, rows;
   __host__ __device__ std::uint32_t width() const { return 2 * (tiles - first) - rows + 1; }
@@ -54,7 +54,7 @@ __global__ void __launch_bounds__(kThreads) all_pairs(AllPairsArgs args) {
   std::uint32_t tile_column = tile_row + blockIdx.x;
   if (tile_column >= grid.tiles) {
     const std::uint32_t mirrored = grid.rows - 1 - blockIdx.y;
-    if (mirrored == blockIdx.y) return;  // the middle row of an odd band is not paired
+    if (mirrored == blockIdx.y) return;  // an odd band: its middle row has no partner
     tile_row = grid.first + mirrored;
     tile_column = tile_column - grid.tiles + tile_row;
   }

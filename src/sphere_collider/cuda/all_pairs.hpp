@@ -23,7 +23,7 @@ struct AllPairsArgs {
   std::uint32_t n;
   std::uint32_t first_row, rows;  ///< the band of rows to test; first_row is a multiple of kTile
   std::uint32_t* masks;           ///< [rows rounded up to kTile][mask_stride(n)]
-  std::uint32_t* counts;          ///< [n + 1] contacts per sphere a; zero at the start
+  std::uint32_t* counts;          ///< [n + 1] row lengths, and a 0; must be 0 initially
   bool count;                     ///< whether to add to `counts`
   SearchState* state;
 };

@@ -24,11 +24,9 @@ namespace {
 /// Largest number of spheres for which the test of all pairs is faster than the grid (measured on
 /// an H200: bench/results).
 constexpr std::size_t kMaxForAllPairs = 4500;
-/// Limit of the bit matrix of all pairs. Larger searches process bands of rows, in two passes.
+/// Largest size of the bit matrix of all pairs. Larger searches process bands of rows, in two
+/// passes: one counts the contacts, one writes them.
 constexpr std::size_t kMaskBytes = std::size_t{256} << 20;
-
-/// Limit of the grid, which computes with twice the number of spheres in 32 bits.
-constexpr std::size_t kMaxSpheres = std::size_t{1} << 31;
 
 constexpr std::size_t kMaskWords = kMaskBytes / sizeof(std::uint32_t);
 constexpr std::size_t kStateWords = sizeof(SearchState) / sizeof(std::uint32_t);
@@ -124,7 +122,8 @@ void DeviceSphereCollider::Impl::reserve(std::size_t n, std::size_t contacts) {
   }
   const DeviceGuard guard(device);
   const std::size_t max_spheres = std::max(n, spheres_reserved);
-  // The search of few spheres needs no memory for contacts, but a later one may.
+  // A search of all pairs needs no memory for contacts, but a later reserve() of more spheres may
+  // select the grid, which must then have memory for all contacts requested so far.
   contacts = std::max(contacts, contacts_asked);
   if (uses_grid(max_spheres)) {
     const std::size_t bytes = grid_scratch_bytes(max_spheres, contacts);
@@ -255,7 +254,7 @@ DeviceSphereCollider::DeviceSphereCollider(Stream stream, int device, SphereAlgo
 DeviceSphereCollider::~DeviceSphereCollider() {
   if (impl_ == nullptr) return;
   try {
-    const DeviceGuard guard(impl_->device);  // the memory may be freed on its default stream
+    const DeviceGuard guard(impl_->device);  // stream 0 is that of the current device
     impl_.reset();
   } catch (const DeviceError&) {
     impl_.reset();  // the device is lost

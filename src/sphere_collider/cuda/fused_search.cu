@@ -24,12 +24,15 @@ static_assert(kMaxTiles == 2 * kBlocks && kFusedSpheres == 2 * kThreads);
 
 using RowSums = cub::BlockScan<std::uint32_t, kThreads, cub::BLOCK_SCAN_WARP_SCANS>;
 
-// [[maybe_unused]]: clusters require Hopper, so the kernel is empty in code for older devices.
+// Functions and constants are [[maybe_unused]], because clusters require Hopper, so that the kernel
+// is empty in code for older devices.
+
+/// Shared memory of a block.
 struct FusedStorage {
   SphereInstance spheres[kFusedSpheres];
   QuantizedRecord rows[kFusedSpheres], columns[kFusedSpheres];
   QuantizationStorage quantization;
-  std::uint32_t words[64][kMaxTiles + 1];  // of the two rows of tiles of this block
+  std::uint32_t words[64][kMaxTiles + 1];  // bit matrix of the 2 x 32 rows of this block
   std::uint32_t counts[kFusedSpheres];     // contacts of each row, gathered from all blocks
   std::uint32_t offsets[kFusedSpheres];    // contacts before each row
   RowSums::TempStorage sums;
@@ -37,7 +40,8 @@ struct FusedStorage {
 };
 
 /// The two rows of tiles that a block tests: one from the start, where rows are long, and one from
-/// the end, where they are short.
+/// the end, where they are short, so that blocks have equal work if n is kFusedSpheres. of_row(k)
+/// is the number of tiles of row k on and right of the diagonal.
 struct TilesOfBlock {
   unsigned tiles, rows[2];
   __device__ TilesOfBlock(std::uint32_t n, unsigned block)
@@ -112,7 +116,7 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
   fill_words(tiles, s);
   __syncthreads();
 
-  // Each warp has rows of both rows of tiles. Lane w keeps word w of a row.
+  // Each warp tests kRowsOfWarp rows of the bit matrix. Lane w keeps word w of each.
   const auto row = [&](unsigned k) {
     const unsigned local = k * kWarps + warp;
     return 32 * tiles.rows[local / 32] + local % 32;

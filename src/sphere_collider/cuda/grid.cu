@@ -1,5 +1,5 @@
-/// Grid search in several launches. Spheres are sorted by counting into the cells of a hierarchy of
-/// grids, and each sphere is tested against the spheres of neighboring cells. There are no world
+/// Grid search in several launches. A counting sort puts the spheres into the cells of a hierarchy
+/// of grids, and each sphere is tested against the spheres of neighboring cells. There are no world
 /// bounds and no cell size to choose, and radii may differ by any factor. Each phase is a launch
 /// with its own number of threads.
 #include "src/sphere_collider/cuda/grid_build.cuh"
@@ -32,7 +32,7 @@ __global__ void __launch_bounds__(kGridThreads) measure_phase(GridArgs args) {
 
 constexpr unsigned kPlanThreads = 1024;
 
-/// The block that finishes the sample last makes the plan.
+/// Samples the cells. The last block to finish makes the plan.
 __global__ void __launch_bounds__(kPlanThreads) plan_phase(GridArgs args) {
   wait_for_previous_kernel();
   __shared__ BuildStorage storage;
@@ -65,7 +65,8 @@ __global__ void __launch_bounds__(TileStorage<kLarge>::kThreads, 1) partition_ph
   partition(args, plan, *reinterpret_cast<TileStorage<kLarge>*>(dynamic_storage), sums);
 }
 
-/// Blocks of 512 threads per multiprocessor, limited by shared memory, of which Turing has less.
+/// Resident blocks of 512 threads per multiprocessor for which sort_phase is compiled. Shared
+/// memory limits them, of which Turing has less.
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
 constexpr unsigned kSortBlocks = 2;
 #else
@@ -83,8 +84,8 @@ __global__ void __launch_bounds__(kThreads, kThreads == 512 ? kSortBlocks : 1)
   sort_coarse<kThreads>(args, plan, capacity, sort_storage(dynamic_storage, capacity), sums);
 }
 
-/// Blocks per multiprocessor that a search is compiled for. Multiprocessors of Turing have 1024
-/// threads.
+/// Resident blocks per multiprocessor for which the searches are compiled. A multiprocessor of
+/// Turing has 1024 threads, that is, four blocks.
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
 constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 4 : 3;
 #else
@@ -100,7 +101,8 @@ __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
       .run(blockIdx.x * kGridThreads + threadIdx.x);
 }
 
-/// A block that searches hashed cells needs more of the L1 cache.
+/// Resident blocks per multiprocessor of search_phase. Fewer blocks search hashed cells, because
+/// each needs more of the L1 cache.
 template <bool kDense>
 constexpr unsigned kLevelBlocks = kDense ? kSearchBlocks : std::min(kSearchBlocks, 4u);
 
@@ -129,7 +131,7 @@ __global__ void __launch_bounds__(kGridThreads) sum_phase(GridArgs args, SearchO
   }
 }
 
-/// Enough blocks for all threads of a multiprocessor: 2048, on Turing 1024.
+/// Resident blocks per multiprocessor that use all its threads: 2048, on Turing 1024.
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
 constexpr unsigned kCopyBlocks = 4;
 #else
@@ -197,9 +199,9 @@ void launch_sort(const GridArgs& args, const GridLimits& limits, cudaStream_t st
   } else {
     launch_partition<false>(args, max_bytes, stream);
   }
-  // If spheres are spread evenly, a coarse bucket has between n / kCoarseBuckets and twice as many
-  // spheres. If they do not fit, they are not copied to shared memory, which leaves more of it for
-  // buckets.
+  // If the spheres are distributed evenly, a coarse bucket has between n / coarse_buckets and twice
+  // as many. If n / coarse_buckets spheres do not fit into shared memory, none are copied to it,
+  // which leaves more of it for buckets.
   constexpr std::uint32_t kMaxBuckets = 8192, kMaxSpheres = (1 << 16) - 4;
   const std::uint32_t buckets = args.table.size / args.table.coarse_buckets,
                       spheres = args.input.n / args.table.coarse_buckets;
@@ -247,8 +249,8 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, const GridL
 /// Largest number of spheres that are searched in one launch (measured on an H200: bench/results).
 constexpr std::uint32_t kMaxInOneLaunch = 1 << 18;
 
-/// Mean number of spheres of a coarse bucket, and smallest number of coarse buckets. Fewer buckets
-/// need fewer atomics; smaller buckets allow more blocks to sort.
+/// Intended mean number of spheres of a coarse bucket, and smallest limit of the number of coarse
+/// buckets. Fewer buckets need fewer atomics; more buckets are sorted by more blocks.
 constexpr std::uint32_t kSpheresOfCoarse = 1024, kFewestCoarse = 256;
 
 constexpr std::size_t rounded(std::size_t bytes) { return (bytes + 255) / 256 * 256; }

@@ -15,7 +15,8 @@ namespace cuda {
 inline constexpr unsigned kGridThreads = 256;
 inline constexpr unsigned kGridWarps = kGridThreads / 32;
 
-// The bits of positive floating-point numbers are ordered like the numbers.
+/// The half cell width of level 0. The state holds its bits, because the bits of positive
+/// floating-point numbers are ordered like the numbers, so that atomicMax() applies.
 __device__ inline Real half_0_of(const SearchState* state) {
   return std::bit_cast<Real>(static_cast<RealBits>(state->largest_half));
 }
@@ -23,7 +24,7 @@ __device__ inline unsigned long long bits_of(Real x) {
   return static_cast<unsigned long long>(std::bit_cast<RealBits>(x));
 }
 
-/// Monotone map of x to the integers from 1 on; ordered(-x) decreases with x.
+/// Increasing map of Real to integers > 0, for atomicMax() on a value that is 0 initially.
 __device__ inline unsigned long long ordered(Real x) {
   constexpr unsigned kShift = sizeof(Real) == 4 ? 32 : 0;
   const unsigned long long bits = static_cast<unsigned long long>(std::bit_cast<RealBits>(x))
@@ -31,6 +32,7 @@ __device__ inline unsigned long long ordered(Real x) {
   constexpr unsigned long long kSign = 1ull << 63;
   return (bits & kSign) != 0 ? ~bits : bits | kSign;
 }
+/// Inverse of ordered().
 __device__ inline Real from_ordered(unsigned long long key) {
   constexpr unsigned kShift = sizeof(Real) == 4 ? 32 : 0;
   constexpr unsigned long long kSign = 1ull << 63;
@@ -38,7 +40,8 @@ __device__ inline Real from_ordered(unsigned long long key) {
   return std::bit_cast<Real>(static_cast<RealBits>(bits >> kShift));
 }
 
-/// Loads a sphere that another phase of the same launch wrote, not through the read-only cache.
+/// Loads a sphere without the read-only cache, because an earlier phase of the same launch may have
+/// written it.
 __device__ inline SphereInstance load_sorted(const SphereInstance* p) {
   SphereInstance s;
   if constexpr (sizeof(Real) == 4) {
@@ -66,10 +69,10 @@ __device__ inline std::uint32_t row_of_box(const LevelBox& box, std::int32_t y, 
   return box.base + yz * static_cast<std::uint32_t>(box.nx) - static_cast<std::uint32_t>(box.x0);
 }
 
-/// Layout of the cell table. If the cells of all levels between the lowest and the highest
-/// coordinates fit into the table, each cell has its own bucket ("dense"): rows follow rows, so
-/// that cells that are close in y and z are close in memory. Otherwise the first bucket of a row is
-/// hashed, and a bucket can hold spheres of several cells.
+/// Layout of the cell table. It is dense if the cells of all levels between the lowest and the
+/// highest coordinates fit into the table and no sphere is far: then each cell has its own bucket,
+/// and rows follow rows, so that cells that are close in y and z are close in memory. Otherwise the
+/// first bucket of a row is hashed, and a bucket can hold spheres of several cells.
 struct GridPlan {
   GridScale scale;
   bool dense;
@@ -110,8 +113,8 @@ struct GridPlan {
 inline constexpr std::uint32_t kSamples = 4096;
 
 /// The finest level in use: the first one on which a sphere shares its cell with about two others
-/// at most, estimated from a sample of all spheres. Spheres that are smaller than a cell can share
-/// it at little cost, whereas each level adds a search of that level to every finer sphere.
+/// at most, estimated from a sample of all spheres. All smaller spheres are on this level, too.
+/// Sharing a cell costs little, whereas each level is searched once more for every smaller sphere.
 __device__ inline int last_level(const SearchState& state, std::uint32_t n) {
   const auto smallest = static_cast<RealBits>(~state.smallest_half);
   const int finest = level_for(std::bit_cast<Real>(smallest), {half_0_of(&state)});
@@ -179,7 +182,7 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
   __syncthreads();
 }
 
-/// Copies the plan that another kernel made. Call from all threads of the block.
+/// Copies the plan that plan_phase() made. Call from all threads of the block.
 __device__ inline void copy_plan(const GridArgs& args, GridPlan& plan) {
   static_assert(sizeof(GridPlan) % sizeof(std::uint32_t) == 0);
   const auto* const from = reinterpret_cast<const std::uint32_t*>(args.plan);
@@ -190,10 +193,11 @@ __device__ inline void copy_plan(const GridArgs& args, GridPlan& plan) {
   __syncthreads();
 }
 
-/// Share of this block of `count` items: a range that starts at a multiple of `unit`.
+/// Range of items, without `past`.
 struct Span {
   std::uint64_t first, past;
 };
+/// The items of this block, if `count` items are divided evenly. `first` is a multiple of `unit`.
 __device__ inline Span span_of_block(std::uint64_t count, unsigned unit) {
   const std::uint64_t units = (count + unit - 1) / unit;
   const std::uint64_t first = units * blockIdx.x / gridDim.x * unit;

@@ -1,4 +1,14 @@
-/// Search among many spheres: sorted into the cells of a hierarchy of grids.
+/// Search among many spheres, which are sorted into the cells of a hierarchy of grids.
+///
+/// There are four variants. All write the same contacts:
+///  - direct (grid_direct.cuh): up to kMaxDirect spheres of similar radius, not sorted;
+///  - in one cooperative launch (grid_one_launch.cu): up to kMaxInOneLaunch spheres (grid.cu), if
+///    the direct search, which the same kernel tries first, does not apply;
+///  - single-level (grid_single_level.cuh): more spheres, of similar radius, in several launches;
+///  - multi-level (grid_search.cuh): more spheres, of any radii, in several launches.
+///
+/// The word row has two meanings. A row of cells consists of the cells of one level with the same y
+/// and z. Row a of the output, or of GridArgs::Rows, consists of the contacts (a, b), a < b.
 #pragma once
 
 #include "src/sphere_collider/cuda/search.hpp"
@@ -13,10 +23,9 @@ namespace cuda {
 
 /// Neighbors that a sphere keeps in its own slots; further ones go to a list for all spheres.
 inline constexpr std::uint32_t kSlots = 16;
-/// Longest row, that is, number of contacts with the same a, in the staging buffer. A longer row is
-/// not staged at all.
+/// Largest number of contacts of a row in the staging buffer. No contact of a longer row is staged.
 inline constexpr std::uint32_t kMaxStaged = 18;
-/// Elements after the last sphere that a search reads and does not use.
+/// Number of elements after the last sphere that a search reads, but does not use.
 inline constexpr std::uint32_t kReadBeyond = 2;
 /// Longest row that one warp sorts. Longer rows are sorted by many blocks.
 inline constexpr std::uint32_t kMaxLongRow = 1024;
@@ -35,11 +44,12 @@ struct AlternatingStates {
 
 /// Largest number of spheres of the direct search, which does not sort them.
 inline constexpr std::uint32_t kMaxDirect = 24'000;
-/// Slots per sphere in the cells of the direct search.
+/// Total number of slots in the cells of the direct search, divided by the number of spheres.
 inline constexpr std::uint32_t kDirectSlots = 12;
 
-/// Coarse buckets of a search of many launches.
+/// Largest number of coarse buckets of a search in several launches.
 inline constexpr unsigned kCoarseBuckets = 2048;
+/// Histogram of the coarse buckets, and the positions of their spheres.
 struct CoarseBuckets {
   /// Padded to a memory sector: atomics on values in the same sector are serialized.
   struct alignas(32) Counter {
@@ -62,12 +72,13 @@ struct GridLimits {
 /// @pre `device` is the current device. @throws DeviceError
 GridLimits grid_limits(int device);
 
-/// Contacts of one level are counted in bins of this number of consecutive a's, each of which one
-/// block copies, ...
+/// The single-level search counts contacts in bins of this number of consecutive rows. One block
+/// copies a bin to the output.
 inline constexpr std::uint32_t kBin = 256;
-/// ... and summed in groups of this number of bins.
+/// Number of consecutive bins whose counts are summed before the copy.
 inline constexpr std::uint32_t kBinsOfSum = 64;
-/// Number of sums of blocks or groups of bins in a search among n spheres.
+/// Number of elements of GridArgs::Rows::sums in a search among n spheres: enough for one sum per
+/// block or per kBinsOfSum bins. It is even, so that the array after it is 16-byte aligned.
 constexpr std::size_t grid_sums(std::size_t n, const GridLimits& limits) {
   return limits.max_blocks() + n / (kBin * kBinsOfSum) / 2 * 2 + 2;
 }
@@ -76,7 +87,7 @@ struct GridPlan;
 /// sizeof(GridPlan), which only device code defines.
 std::size_t grid_plan_bytes();
 
-/// Arrays are 16-byte aligned and have 15 spare bytes at the end.
+/// Arguments of a grid search. Arrays are 16-byte aligned and have 15 spare bytes at the end.
 struct GridArgs {
   struct Input {
     const SphereInstance* spheres;
@@ -86,11 +97,11 @@ struct GridArgs {
   struct Table {
     std::uint32_t size;        ///< largest number of buckets: a power of two
     std::uint32_t* starts;     ///< [size + 1] histogram, then first positions, of the buckets
-    std::uint32_t* positions;  ///< [n] bucket, then position, of a sphere
-    std::uint32_t* ranks;      ///< [n] rank in its bucket, then row length, of a sphere
+    std::uint32_t* positions;  ///< [n] first the bucket, then the position, of a sphere
+    std::uint32_t* ranks;      ///< [n] first the rank in its bucket, then the length of its row
     SphereInstance* sorted;    ///< [n + kReadBeyond] spheres by position
     std::uint32_t* ids;        ///< [n] their indices
-    unsigned long long* sums;  ///< [blocks] spheres in the buckets of each block
+    unsigned long long* sums;  ///< [blocks] spheres in the buckets of each block; direct: its pairs
     CoarseBuckets* coarse;
     std::uint32_t coarse_buckets = kCoarseBuckets;  ///< largest number of coarse buckets in use
   };
@@ -99,14 +110,15 @@ struct GridArgs {
     std::uint32_t* counts;          ///< [n] row lengths by position
     unsigned long long* sums;       ///< [grid_sums(n)] pairs of each block, or of kBinsOfSum bins
     unsigned long long* bin_sums;   ///< [n / kBin + 1] pairs of the spheres of a bin
-    unsigned long long* offsets;    ///< [n] a StagedList, then for long rows the contacts before it
+    unsigned long long* offsets;    ///< [n] StagedList; of a long row, then its index in the output
     unsigned long long capacity;    ///< largest number of pairs that the arrays can hold
     OverflowPair* overflow;         ///< [capacity] pairs for which a sphere has no slot
     std::uint32_t* long_rows;       ///< [capacity / kSlots + 1] a's with up to kMaxLongRow pairs
     std::uint32_t* very_long_rows;  ///< [capacity / kMaxLongRow + 1] a's with more pairs
     std::uint32_t* long_row_neighbors;  ///< [capacity] b's of both, by index in the output
   };
-  /// Arrays that share memory, because no two phases that use different ones overlap.
+  /// Arrays that share memory, because they are not in use at the same time: slots and slot_ids,
+  /// partitioned and partitioned_ids, neighbors, staging.
   struct Scratch {
     SphereInstance* slots;           ///< [kDirectSlots * n] slots of cells; null if n > kMaxDirect
     std::uint32_t* slot_ids;         ///< [kDirectSlots * n] indices of the spheres there
@@ -127,7 +139,7 @@ struct GridArgs {
 
 /// Number of bytes that the arrays of GridArgs::Scratch need.
 std::size_t grid_scratch_bytes(std::size_t n, std::size_t capacity);
-/// The arrays of a search among n spheres, in that memory.
+/// The arrays of a search among n spheres, in `memory` of grid_scratch_bytes().
 GridArgs::Scratch grid_scratch(std::uint32_t n, unsigned char* memory);
 
 /// Enqueues the whole search. Does not allocate or wait.

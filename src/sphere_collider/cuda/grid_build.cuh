@@ -1,4 +1,5 @@
-/// First phases of the grid search in one launch: validation, bounds, and a counting sort by cell.
+/// First phases of the grid search: validation and bounds of the spheres and a sample of the cells,
+/// for one or several launches, and the counting sort by cell for one launch.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid.cuh"
@@ -22,8 +23,9 @@ __device__ inline std::uint64_t grid_thread() {
 }
 __device__ inline std::uint64_t all_threads() { return std::uint64_t{gridDim.x} * kGridThreads; }
 
-/// Whether all other blocks have passed this point; if so, their earlier writes are visible. Call
-/// from all threads of the block.
+/// Returns true in the last block of the kernel that calls it, in which all earlier writes of the
+/// other blocks are visible. `blocks_passed` must be 0 initially. Call from all threads of the
+/// block.
 __device__ inline bool is_last_block(std::uint32_t& blocks_passed) {
   __shared__ bool last;
   __threadfence();
@@ -48,8 +50,8 @@ __device__ inline void clear_counts(const GridArgs& args) {
   clear(args.rows.counts, args.input.n * sizeof(*args.rows.counts));
 }
 
-/// Validates the spheres, and computes the largest and the smallest cell that a radius requires and
-/// the bounds of all centres.
+/// Validates the spheres, and computes the largest and the smallest half cell width that a radius
+/// requires and the bounds of all centres.
 __device__ inline void measure(const GridArgs& args, BuildStorage& s) {
   constexpr Real kNone = -std::numeric_limits<Real>::max();
   // Maximum of: half cell width, minus half cell width, x, -x, y, -y, z, -z.
@@ -111,8 +113,9 @@ __device__ inline bool needs_sample(const SearchState& state) {
   return level_for(smallest, {half_0_of(&state)}) > 0;
 }
 
-/// Counts, for each level, the pairs of a sample that would share a cell. A slot of the hash table
-/// of the block holds 19 bits of the hash of a cell and its number of spheres.
+/// Counts, for each level but the finest, the pairs of sampled spheres that share a cell if that
+/// level is the last one. A block counts a level at a time, in a hash table: a slot holds 19 bits
+/// of the hash of a cell, and in the low 13 bits its number of spheres.
 __device__ inline void sample_cells(const GridArgs& args, BuildStorage& s) {
   const GridScale all_levels{half_0_of(args.state)};
   const Real smallest = std::bit_cast<Real>(static_cast<RealBits>(~args.state->smallest_half));
@@ -178,7 +181,7 @@ __device__ inline void assign(const GridArgs& args, const GridPlan& plan) {
   if (lane_id() == 0 && levels != 0) atomicOr(&args.state->levels, levels);
 }
 
-/// First half of the scan of the table: the sum of the share of each block.
+/// First half of the scan of the table: sums the counts of the buckets of each block.
 __device__ inline void sum_table(const GridArgs& args, const GridPlan& plan, BuildStorage& s) {
   const Span span = span_of_block(plan.buckets, 4);
   unsigned long long sum = 0;

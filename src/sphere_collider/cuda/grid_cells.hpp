@@ -12,15 +12,16 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Cells of level l are half as wide as those of level l - 1; cells of level 0 are as wide as the
-/// largest sphere. Spheres more than 2^31 times smaller share the last level. Spheres so far from
-/// the origin that coordinates are too coarse for their level ("far") are on a wider one, which can
-/// be negative.
+/// Finest level. Cells of level l are half as wide as those of level l - 1; cells of level 0 are as
+/// wide as the diameter of the largest sphere. A sphere is on the finest level whose cells are not
+/// narrower than its diameter; those more than 2^31 times smaller than the largest share the last
+/// level. A "far" sphere is so far from the origin that its coordinates are too coarse for cells of
+/// that level. It is on a wider level, whose number can be negative.
 inline constexpr int kLastLevel = 31;
 
-/// Largest number of cells of one level between the origin and a sphere. It has two bits fewer than
-/// Real represents exactly: a cell is at least two rounding errors wide, so that neighboring cells
-/// are distinct.
+/// Largest number of cells of one level between the origin and a sphere. In float it has two bits
+/// fewer than the significand, so that a cell is at least two units in the last place wide, and
+/// neighboring cells are distinct. In double the limit is lower, because cell indices have 32 bits.
 inline constexpr Real kMaxCells =
     std::numeric_limits<Real>::digits == 24 ? Real(1 << 22) : Real(1 << 29);
 /// Squares of shorter lengths underflow, and no narrower cell is needed: 2^-73, in double 2^-536.
@@ -60,7 +61,7 @@ struct GridScale {
 };
 
 /// The finest level whose half cell width is at least `half`: floor(log2(half_0 / half)), if that
-/// level exists.
+/// level exists, but at most the last level in use.
 JFPX_HD inline int level_for(Real half, const GridScale& scale) {
   const int level = exponent_of(scale.half_0) - exponent_of(half);
   if (level > scale.last_level) return scale.last_level;
@@ -76,11 +77,14 @@ JFPX_HD inline bool is_far(const SphereInstance& s) {
   return half_cell_for_position(s.centre) > half_cell_for_radius(s.radius);
 }
 
-/// The widest level on which `s` can touch a far sphere. A far sphere on a level wider than that of
-/// `s` has its largest coordinate m beyond kMaxCells of its half cells, and touches `s` only if m
-/// differs by less than three of them. Hence half_cell_for_position differs by a factor less than 1
-/// + 2^-20, and the level by less than two. (A level that is wider than that of `s` is not the last
-/// one: it depends on the distance of the far sphere from the origin alone.)
+/// The widest level on which `s` can touch a far sphere; kLastLevel if there is none.
+///
+/// Proof. Consider a far sphere on a wider level than `s`, with half cell width h. The largest
+/// magnitude of its coordinates exceeds kMaxCells * h. Both radii are at most h, so the spheres
+/// touch only if that magnitude differs by less than 3 h between them. Hence
+/// half_cell_for_position() differs by a factor of less than 1 + 2^-20, and the level that it
+/// requires by less than two. The far sphere is on that level: finer ones are replaced
+/// by the last level, but a level that is wider than another is not the last.
 JFPX_HD inline int widest_far_level(const SphereInstance& s, const GridScale& scale) {
   const Real position = half_cell_for_position(s.centre);
   return position > 0 ? level_for(position, {scale.half_0}) - 1 : kLastLevel;
@@ -122,8 +126,8 @@ JFPX_HD inline Real moved(Real x, Real distance) {
   return y > kMax ? kMax : y < -kMax ? -kMax : y;
 }
 
-/// Key of the row (y, z) of a level: its first bucket in the hash table. Cell x of the row has
-/// bucket key + x, modulo the table size, so that neighbors in x are adjacent in memory.
+/// Key of the row of cells (y, z) of a level. Cell x of the row has bucket key + x, modulo the size
+/// of the hash table, so that neighbors in x are adjacent in memory.
 inline constexpr std::uint32_t kRowY = 0x9e3779b1u, kRowZ = 0x85ebca77u, kRowLevel = 0xc2b2ae3du;
 JFPX_HD inline std::uint32_t row_of(std::int32_t y, std::int32_t z, int level) {
   // Finalizer of MurmurHash3 (Appleby), a bijection: each input bit affects each output bit.

@@ -1,5 +1,5 @@
 /// Grid search without sorting, for about 10^4 spheres of similar radius: each cell of a single
-/// grid has slots for a few spheres. It needs three grid barriers instead of eight.
+/// grid has slots for a few spheres. It needs four grid barriers fewer than the sorted search.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid_build.cuh"
@@ -13,9 +13,9 @@ namespace cuda {
 inline constexpr unsigned kLanesOfSphere = 9;  // one per row of cells around a sphere
 inline constexpr unsigned kSpheresOfWarp = 32 / kLanesOfSphere;
 inline constexpr std::uint32_t kMinCellSlots = 6, kMaxCellSlots = 16;  // slots of a cell
-inline constexpr std::uint32_t kDirectPairs = 1024;                    // pairs of a block
+inline constexpr std::uint32_t kDirectPairs = 1024;  // largest number of pairs of a block
 
-/// Cells between the lowest and the highest coordinates.
+/// Grid of the cells between the lowest and the highest coordinates.
 struct DirectPlan {
   Real half, inverse;
   std::int32_t x0, y0, z0;
@@ -29,10 +29,10 @@ struct DirectStorage {
   std::uint32_t found;
   std::uint32_t counts[kGridThreads], starts[kGridThreads];  // row lengths and their exclusive sums
   std::uint32_t neighbors[kDirectPairs];                     // in the order of discovery
-  std::uint32_t ranks[kDirectPairs];    // rank in the row, and (low 8 bits) the sphere
+  std::uint32_t ranks[kDirectPairs];    // rank in the row, and (low 8 bits) the row in the block
   std::uint32_t grouped[kDirectPairs];  // neighbors by row
   std::uint32_t sorted[kDirectPairs];   // neighbors by row, sorted
-  std::uint8_t owners[kDirectPairs];
+  std::uint8_t owners[kDirectPairs];    // rows of the sorted neighbors
 };
 static_assert(kGridThreads <= 256);
 
@@ -141,7 +141,8 @@ __device__ inline void search_directly(const GridArgs& args, const DirectPlan& p
   }
 }
 
-/// Finds and sorts the pairs of the spheres of the block, and writes their number to Table::sums.
+/// Finds and sorts the pairs (a, b) of the spheres a of the block, and writes their number to
+/// Table::sums.
 __device__ inline void find_directly(const GridArgs& args, const DirectPlan& plan,
                                      DirectStorage& s) {
   __syncthreads();
@@ -191,7 +192,7 @@ __device__ inline void emit_directly(const GridArgs& args, const SearchOutput& o
     const unsigned long long sum = args.table.sums[k];
     sums += sum << 32 | (k < blockIdx.x ? sum : 0);
   }
-  // There are at most as many blocks as spheres.
+  // The low half cannot overflow: there are at most as many blocks as spheres.
   static_assert(std::uint64_t{kMaxDirect} * kDirectPairs < (1ull << 32));
   sums = block_sum(sums, s.sums);
   const unsigned long long all = sums >> 32, before = sums & 0xffffffffull;

@@ -1,6 +1,6 @@
-/// Last phases of the grid search: from the neighbors of each sphere to contacts sorted by (a, b).
-/// The sum of the row lengths before it gives the index of row a in the output; only the b's of a
-/// row are sorted.
+/// Last phases of the grid search: writes the neighbors of each sphere as contacts in the order
+/// of (a, b). Row a starts in the output at the sum of the lengths of all lower rows, so that only
+/// the b's of each row need to be sorted.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid.cuh"
@@ -17,12 +17,12 @@ struct EmitStorage {
   unsigned long long shift[kGridThreads];  // index in the output minus index in the tile
   BlockSums::TempStorage sums;
   std::uint32_t neighbors[kSlots * kGridThreads];  // of the rows of the tile, sorted, without gaps
-  std::uint8_t owners[kSlots * kGridThreads];
+  std::uint8_t owners[kSlots * kGridThreads];      // their rows in the tile
 };
 struct LongRowStorage {
-  std::uint32_t words[kGridWarps * kMaxLongRow];
-  std::uint32_t group_counts[kWindowWords / 32];
-  std::uint32_t before;
+  std::uint32_t words[kGridWarps * kMaxLongRow];  // neighbors of a row per warp, or a bit set
+  std::uint32_t group_counts[kWindowWords / 32];  // neighbors in each 32 words of the bit set
+  std::uint32_t before;                           // neighbors below the window
 };
 static_assert(kGridWarps * kMaxLongRow >= kWindowWords);
 
@@ -34,7 +34,7 @@ __device__ inline bool is_complete(const GridArgs& args, const SearchOutput& out
   return total <= args.rows.capacity && total <= output.capacity;
 }
 
-/// Leaves a row that is too long for this phase to later phases.
+/// Lists a row that is too long for this phase, for a later phase.
 __device__ inline void defer_row(const GridArgs& args, std::uint32_t a, std::uint32_t count,
                                  unsigned long long offset) {
   if (count > kMaxLongRow) {
@@ -44,7 +44,7 @@ __device__ inline void defer_row(const GridArgs& args, std::uint32_t a, std::uin
   }
   args.rows.offsets[a] = offset;
 }
-/// The same for a row whose first neighbors are in slots.
+/// The same for a row whose first neighbors are in slots, which it copies.
 __device__ inline void defer_row_in_slots(const GridArgs& args, std::uint32_t a,
                                           std::uint32_t count, unsigned long long offset) {
   defer_row(args, a, count, offset);
@@ -86,8 +86,8 @@ __device__ inline void sort_neighbors(const std::uint32_t* neighbors, std::uint3
   }
 }
 
-/// A lane writes a contact to the staging buffer of its warp, for write_staged(), or a pair
-/// directly to the output.
+/// A lane writes a contact to `staged`, the shared memory of its warp for write_staged(), or a pair
+/// directly to index `at` of the output.
 __device__ inline void write_or_stage(const SearchOutput& output, unsigned long long at,
                                       std::uint32_t a, std::uint32_t b, const SphereInstance& sa,
                                       const SphereInstance& sb, unsigned char* staged) {
@@ -99,7 +99,8 @@ __device__ inline void write_or_stage(const SearchOutput& output, unsigned long 
   reinterpret_cast<SphereContact*>(staged)[lane_id()] = {a, b, r.normal, r.distance};
 }
 
-/// A warp writes the staged contacts of its lanes to consecutive indices, in whole memory sectors.
+/// A warp copies the contacts that its lanes have written to `staged` to consecutive indices, so
+/// that it writes whole memory sectors.
 __device__ inline void write_staged(unsigned char* staged, unsigned count, SphereContact* to) {
   static_assert(sizeof(SphereContact) % 8 == 0);
   constexpr unsigned kWords = sizeof(SphereContact) / 8;
@@ -140,7 +141,8 @@ __device__ inline unsigned long long emit_tile(const GridArgs& args, const Searc
   const std::uint32_t few = count > kSlots ? 0 : count;
   const std::uint32_t* const neighbors =
       args.scratch.neighbors + (few != 0 ? std::size_t{args.table.positions[mine]} * kSlots : 0);
-  // One scan for two sums: of the slots in use, at most kSlots * kGridThreads, and of all contacts.
+  // One scan computes two sums: of the slots in use (low bits, at most kSlots * kGridThreads), and
+  // of all contacts.
   constexpr unsigned kFewBits = 16;
   unsigned long long total = 0;
   const unsigned long long sums =
@@ -152,6 +154,7 @@ __device__ inline unsigned long long emit_tile(const GridArgs& args, const Searc
   s.shift[threadIdx.x] = offset - start;
   if (count > kSlots) defer_row_in_slots(args, a, count, offset);
   __syncthreads();
+  // Without long rows, the contacts of the tile are consecutive in the output.
   const bool stages = fews == total >> kFewBits && output.contacts != nullptr;
   for (std::uint32_t first = threadIdx.x & ~31u; first < fews; first += kGridThreads) {
     const std::uint32_t c = first + lane_id();

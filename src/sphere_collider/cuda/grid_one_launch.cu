@@ -1,5 +1,5 @@
-/// Grid search in one cooperative launch, for up to some 10^5 spheres, where launches would
-/// dominate the time.
+/// Grid search in one cooperative launch, for up to some 10^5 spheres, where the overhead of
+/// several launches would dominate the time.
 #include "src/sphere_collider/cuda/grid_build.cuh"
 #include "src/sphere_collider/cuda/grid_direct.cuh"
 #include "src/sphere_collider/cuda/grid_emit.cuh"
@@ -27,7 +27,7 @@ union PhaseStorage {
   LongRowStorage long_rows;
 };
 
-/// The state of this search. All blocks call it before their first grid barrier.
+/// The state of this search. Call before the first grid barrier.
 __device__ SearchState* current_state(AlternatingStates& states) {
   return states.states + states.searches % 2;
 }
@@ -121,7 +121,7 @@ unsigned resident_grid_blocks(unsigned multiprocessors) {
 void launch_in_one(const GridArgs& args, const SearchOutput& output, unsigned max_blocks,
                    cudaStream_t stream) {
   GridArgs shared_out = args;
-  // Several threads share a sphere as long as this occupies no more than half of the device.
+  // Up to 8 threads share a sphere, as long as they are no more than half of the resident threads.
   const std::uint64_t threads = std::uint64_t{max_blocks} * kGridThreads / 2;
   while (shared_out.lanes < 8 && 2 * shared_out.lanes * std::uint64_t{args.input.n} <= threads) {
     shared_out.lanes *= 2;

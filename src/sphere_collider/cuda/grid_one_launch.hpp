@@ -7,7 +7,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Largest number of blocks of the search that can run at the same time.
+/// Largest number of blocks of this search that can be resident on the device.
 /// @param multiprocessors of the current device
 /// @throws DeviceError
 unsigned resident_grid_blocks(unsigned multiprocessors);

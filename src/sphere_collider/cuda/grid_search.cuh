@@ -1,4 +1,4 @@
-/// Search phase for spheres of any radii: tests the spheres of neighboring cells on all levels.
+/// Search phase for spheres of any radii: tests the spheres in neighboring cells of all levels.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid.cuh"
@@ -11,8 +11,8 @@ namespace cuda {
 inline constexpr unsigned kRowsAtOnce = 5;  // rows that a thread looks up at a time
 inline constexpr unsigned kHeld = 8;        // candidates that a thread holds
 
-/// Identification of the row that was searched, because a hashed bucket may hold candidates of
-/// other rows.
+/// Keys and levels of the rows of cells that were searched, because a hashed bucket may also hold
+/// spheres of other rows.
 struct HeldRows {
   std::uint32_t range_keys[kRowsAtOnce][kGridThreads];
   std::uint32_t keys[kHeld][kGridThreads];
@@ -27,9 +27,10 @@ struct SearchStorage {
   std::conditional_t<kDense, NoRows, HeldRows> rows;
 };
 
-/// A warp takes spheres in the order of the table. `lanes` threads share a sphere, and each takes
-/// every `lanes`-th row. A sphere searches its own level (each pair is found from the sphere whose
-/// cell comes first in the order of z, y, x) and all wider levels on which it can have a neighbor.
+/// Warps process the spheres in the order of the table. GridArgs::lanes threads share a sphere, and
+/// each searches every `lanes`-th row of cells. The search covers the own level of the sphere (a
+/// pair is found from the sphere whose cell is first in the order of z, y, x or, in one cell, from
+/// the lower position) and all wider levels on which the sphere can have a neighbor.
 template <bool kDense>
 class Searcher {
  public:
@@ -129,8 +130,8 @@ class Searcher {
   }
 
   /// Looks up the next rows of the level. A row that wraps around to the start of the table
-  /// continues with candidates from n on, which denote positions from 0 on. (2 n fits into 32 bits,
-  /// because no device has the memory for more than 2^31 spheres.)
+  /// continues with candidates from n on, which denote positions from 0 on. Candidates are less
+  /// than 2 n and fit into 32 bits, because DeviceSphereCollider accepts at most 2^31 spheres.
   __device__ void collect_ranges() {
     uint2 ranges[kRowsAtOnce];
     std::uint32_t keys[kRowsAtOnce];
@@ -164,7 +165,7 @@ class Searcher {
     return kDense || at < args_.input.n ? at : at - args_.input.n;
   }
 
-  /// Holds those candidates of each lane that may touch. Tests two per lane in a step.
+  /// Tests the candidates of each lane, two in a step, and holds those that may touch.
   __device__ void filter_candidates() {
     std::uint32_t at = 0, end = 0, key = 0;
     unsigned next = 0;
@@ -200,9 +201,10 @@ class Searcher {
 
   /// Accepts the held candidates that are in the row that was searched. Call from all lanes
   /// together, which share the work: candidate i of the warp belongs to the first lane with sum >
-  /// i. A hashed bucket may contain spheres of other rows, which are found when their own row is
-  /// searched, or not at all. A touching sphere of the row is in one of the cells searched, and all
-  /// of these are different buckets, so that it is found exactly once.
+  /// i. A hashed bucket may contain spheres of other rows. They are rejected here, because they are
+  /// found when their own row is searched, if it is within the search radius. A touching sphere of
+  /// the row is in one of the cells searched, and all of these are different buckets, so that it is
+  /// found exactly once.
   __device__ void accept_held() {
     const unsigned sum = warp_inclusive_sum(held_);
     const unsigned all = __shfl_sync(kFullWarp, sum, 31);
@@ -294,7 +296,7 @@ class Searcher {
   bool own_row_is_next_ = false;
   unsigned ranges_ = 0;     // non-empty rows that were looked up
   unsigned held_ = 0;       // candidates held
-  bool uncertain_ = false;  // whether one of them may be apart
+  bool uncertain_ = false;  // whether one of them may not touch
 };
 
 }  // namespace cuda

@@ -1,5 +1,5 @@
 /// Search phase for spheres of similar radius. Each thread finds all neighbors b > a of one sphere,
-/// so that threads share no list, and computes the contacts while both spheres are near in memory.
+/// so that threads share no list, and computes the contacts while both spheres are in the cache.
 /// Contacts are staged in the order of positions until their indices in the output are known.
 #pragma once
 
@@ -17,7 +17,7 @@ inline constexpr unsigned kColumn = kMaxStaged + kAtOnce;  // candidates that a 
 inline constexpr unsigned kRowsHeld = 5;  // rows whose candidates a thread tests together
 inline constexpr unsigned kRanked = 8;    // neighbors that are sorted in registers
 
-/// The only level of such a grid.
+/// Level 0 of a grid with one level, copied from the plan.
 struct SingleLevel {
   __device__ explicit SingleLevel(const GridPlan& plan)
       : box(plan.boxes[0]),
@@ -81,8 +81,8 @@ class Rows {
   std::int32_t rows_y_, left_, left_y_;
 };
 
-/// Shared memory of a warp. A lane has a column of each array: every 32nd element from its own
-/// index on.
+/// Shared memory of a warp. Lane l uses the elements l, l + 32, l + 64, ... of `held` and `ranges`,
+/// its column.
 struct SingleLevelStorage {
   std::uint32_t held[kColumn * 32];  // positions of neighbors
   union {
@@ -125,14 +125,15 @@ class SingleLevelSearcher {
       test_candidates(past, warp_max(steps));
     }
     keep_neighbors();
+    // No contact of a long row is staged.
     if (not_kept_ != 0) not_kept_ += kept_, kept_ = 0;
     sort_neighbors();
     write_to_staging_buffer(searching);
   }
 
  private:
-  /// Holds the spheres that may touch, of those in the ranges before `past_ranges`. Tests kAtOnce
-  /// spheres of a range in a step.
+  /// Tests the spheres in the ranges before `past_ranges`, kAtOnce of a range in a step, and holds
+  /// those that may touch.
   __device__ void test_candidates(const uint2* past_ranges, unsigned steps) {
     const uint2* next = &s_.ranges[lane_id()];
     std::uint32_t* const full = &held(kMaxStaged);
@@ -160,8 +161,8 @@ class SingleLevelSearcher {
     }
   }
 
-  /// Keeps those held spheres that touch and have a larger index. If there are too many, only
-  /// counts them.
+  /// Keeps those held spheres that touch and have a larger index. If there are more than
+  /// kMaxStaged, only counts them.
   __device__ void keep_neighbors() {
     const bool uncertain = __any_sync(kFullWarp, !(largest_excess_ < -error_bound_));
     std::uint32_t* to = &held(kept_);
@@ -267,11 +268,11 @@ class SingleLevelSearcher {
   Real error_bound_ = 0;                                          // of excess()
   Real largest_excess_ = -std::numeric_limits<Real>::infinity();  // of the spheres held
   std::uint32_t* top_;                                            // slot of the next sphere to hold
-  unsigned kept_ = 0;           // neighbors b > a among the spheres held
-  std::uint32_t not_kept_ = 0;  // neighbors for which the column had no slot
+  unsigned kept_ = 0;           // neighbors b > a at the start of the column
+  std::uint32_t not_kept_ = 0;  // neighbors that were only counted, because the row is long
 };
 
-/// A warp finds the neighbors of a sphere whose row is too long for the staging buffer.
+/// A warp finds the neighbors b > a of a sphere whose row was not staged, in any order.
 __device__ inline void list_neighbors(const GridArgs& args, const SingleLevel& level,
                                       std::uint32_t a) {
   const std::uint32_t position = args.table.positions[a];
@@ -304,6 +305,7 @@ __device__ inline void list_neighbors(const GridArgs& args, const SingleLevel& l
   }
 }
 
+/// Writes the neighbors of all rows that were not staged to Rows::long_row_neighbors.
 __device__ inline void list_long_rows(const GridArgs& args) {
   const SingleLevel level(*args.plan);
   const std::uint32_t long_rows = args.state->long_rows,

@@ -1,6 +1,6 @@
-/// Two-level counting sort of many spheres by cell, without random access to global memory: first
-/// into coarse buckets of consecutive cells (a tile of spheres is sorted in shared memory and
-/// written in runs), then each block sorts a coarse bucket.
+/// Two-level counting sort of many spheres by cell, which avoids random access to global memory.
+/// The first level sorts tiles of spheres in shared memory and writes them in runs to coarse
+/// buckets of consecutive cells. On the second level, each block sorts a coarse bucket.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid_build.cuh"
@@ -11,8 +11,9 @@ namespace cuda {
 
 inline constexpr unsigned kCountThreads = 1024;
 
-/// Tile of spheres. A larger tile writes longer runs and needs fewer atomics. The large tile needs
-/// most of the shared memory of Hopper, the small one less than 64 KiB, which every device has.
+/// Tile of spheres in shared memory. A larger tile writes longer runs and needs fewer atomics. The
+/// large tile needs most of the shared memory of Hopper. The small one needs less than 64 KiB,
+/// which every supported device has.
 template <bool kLarge>
 struct TileStorage {
   static constexpr unsigned kThreads = kLarge ? 1024 : 512;
@@ -82,7 +83,7 @@ __device__ inline void count_coarse(const GridArgs& args, const GridPlan& plan,
   if (threadIdx.x == 0) args.table.coarse->starts[kCoarseBuckets] = args.input.n;
 }
 
-/// Sorts a tile of spheres by coarse bucket.
+/// Sorts a tile of spheres by coarse bucket, and writes it to Scratch::partitioned.
 template <bool kLarge>
 __device__ inline void partition(const GridArgs& args, const GridPlan& plan, TileStorage<kLarge>& s,
                                  CountSumStorage<TileStorage<kLarge>::kThreads>& sums) {
@@ -142,7 +143,7 @@ __device__ inline void partition(const GridArgs& args, const GridPlan& plan, Til
   }
 }
 
-/// Capacity of the shared memory in which a block sorts a coarse bucket.
+/// Number of buckets and spheres for which a block that sorts a coarse bucket has shared memory.
 struct SortCapacity {
   std::uint32_t buckets;  ///< a multiple of 4
   std::uint32_t spheres;  ///< less than 2^16
@@ -152,10 +153,10 @@ struct SortCapacity {
   }
 };
 struct SortStorage {
-  std::uint32_t* counts;    // spheres of a bucket, then the position of its next one
-  SphereInstance* spheres;  // of the coarse bucket
-  std::uint32_t* ids;
-  std::uint16_t* order;
+  std::uint32_t* counts;    // spheres of each bucket, then the position of its next sphere
+  SphereInstance* spheres;  // spheres of the coarse bucket
+  std::uint32_t* ids;       // their indices
+  std::uint16_t* order;     // their order by bucket, as indices of `spheres`
 };
 __device__ inline SortStorage sort_storage(unsigned char* memory, const SortCapacity& capacity) {
   auto* const spheres = reinterpret_cast<SphereInstance*>(memory);
@@ -204,9 +205,9 @@ __device__ inline void start_buckets(const GridArgs& args, std::uint64_t first_b
   }
 }
 
-/// Sorts the spheres [first, past) of a coarse bucket by bucket, and writes the starts of its
-/// buckets to the table. If everything fits, the sort is done in shared memory; otherwise spheres
-/// are written at random, for a part of the buckets at a time.
+/// A block sorts the spheres of a coarse bucket by bucket, and writes the starts of its buckets to
+/// the table. If all spheres and buckets fit, they are sorted in shared memory. Otherwise each pass
+/// over the spheres scatters those of some of the buckets to global memory.
 template <unsigned kThreads>
 __device__ inline void sort_coarse(const GridArgs& args, const GridPlan& plan,
                                    const SortCapacity& capacity, const SortStorage& s,
@@ -227,7 +228,7 @@ __device__ inline void sort_coarse(const GridArgs& args, const GridPlan& plan,
   for (std::uint64_t buckets = first_bucket; buckets < past_bucket; buckets += capacity.buckets) {
     const auto count =
         static_cast<std::uint32_t>(min(past_bucket - buckets, std::uint64_t{capacity.buckets}));
-    const auto bucket_of = [&](const SphereInstance& sphere) {  // count or more: in another pass
+    const auto bucket_of = [&](const SphereInstance& sphere) {  // >= count: not in this pass
       return plan.bucket_of(sphere) - static_cast<std::uint32_t>(buckets);
     };
     for (std::uint32_t k = threadIdx.x; k < (count + 3) / 4 * 4; k += blockDim.x) s.counts[k] = 0;

@@ -1,4 +1,5 @@
-/// Staging buffer: holds contacts in the order of cells until their places in the output are known.
+/// Staging buffer in global memory: holds the contacts of the single-level search, in the order of
+/// cells, until their indices in the output are known.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid_emit.cuh"
@@ -7,8 +8,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Location of a row in the staging buffer: 59 bits index, 5 bits length. A long row is not staged;
-/// the first field is then its length.
+/// Location of a row in the staging buffer: index (59 bits) and length (5 bits). For a long row,
+/// which is not staged, the second field is kNotStaged and the first one is the length.
 struct StagedList {
   static constexpr unsigned kCountBits = 5, kNotStaged = 31;
   unsigned long long bits;
@@ -38,13 +39,13 @@ static_assert(kBin == kGridThreads);
 __device__ inline std::uint32_t bins_of(std::uint32_t n) { return (n - 1) / kBin + 1; }
 
 struct CopyStorage {
-  // Index of a row minus its index in the tile.
+  // Start of a row in the staging buffer and in the output, each minus its start in the bin.
   unsigned long long from[kGridThreads], to[kGridThreads];
   BlockSums::TempStorage sums;
-  std::uint8_t owners[kMaxStaged * kGridThreads];
+  std::uint8_t owners[kMaxStaged * kGridThreads];  // row of each staged contact of the bin
 };
 
-/// A block copies `count` records of kWords words each.
+/// A block copies the `count` staged records of a bin, of kWords 8-byte words each, to the output.
 template <unsigned kWords>
 __device__ inline void copy_words(const void* staging, void* output, std::uint32_t count,
                                   const CopyStorage& s) {
@@ -68,7 +69,7 @@ __device__ inline void copy_words(const void* staging, void* output, std::uint32
   }
 }
 
-/// Sums the pairs of kBinsOfSum bins each.
+/// Sums the pairs of each group of kBinsOfSum bins.
 __device__ inline void sum_bins(const GridArgs& args) {
   const std::uint32_t bins = bins_of(args.input.n);
   const unsigned warps = gridDim.x * kGridWarps;
@@ -83,7 +84,8 @@ __device__ inline void sum_bins(const GridArgs& args) {
   }
 }
 
-/// A block copies the rows of a bin, one per thread, from the staging buffer to the output.
+/// A block copies the rows of a bin from the staging buffer to the output, and lists its long rows
+/// for a later phase.
 __device__ inline void copy_bin(const GridArgs& args, const SearchOutput& output, CopyStorage& s) {
   const std::uint32_t bin = blockIdx.x, first_bin = bin / kBinsOfSum * kBinsOfSum;
   const std::uint32_t a = bin * kBin + threadIdx.x;
@@ -95,8 +97,8 @@ __device__ inline void copy_bin(const GridArgs& args, const SearchOutput& output
   }
   const unsigned long long before = block_sum(mine, s.sums);
   const std::uint32_t count = list.count(), staged = list.staged();
-  // One scan for two sums: of staged contacts, at most kMaxStaged * kGridThreads, and of all
-  // contacts.
+  // One scan computes two sums: of staged contacts (low bits, at most kMaxStaged * kGridThreads),
+  // and of all contacts.
   constexpr unsigned kStagedBits = 16;
   unsigned long long total = 0;
   const unsigned long long sums = block_exclusive_sum(

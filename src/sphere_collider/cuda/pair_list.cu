@@ -29,7 +29,7 @@ __device__ std::size_t pair_of_round(unsigned round) {
   return blockIdx.x * kTouchingPerBlock + round * kThreads + threadIdx.x;
 }
 
-/// Whether pair i exists and touches.
+/// Returns whether pair i exists and touches, and computes its contact.
 __device__ bool find_contact(const TouchingArgs& args, std::size_t i, PairContact* contact) {
   if (i >= args.m) return false;
   const SpherePair pair = args.pairs[i];

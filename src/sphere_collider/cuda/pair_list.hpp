@@ -12,11 +12,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Enqueues results[i] = test of pairs[i], for i < m. Does not allocate or wait.
+/// Enqueues the tests of m pairs; results[i] belongs to pairs[i]. Does not allocate or wait.
 void launch_test_pairs(const SphereInstance* spheres, const SpherePair* pairs, std::size_t m,
                        PairResult* results, cudaStream_t stream);
 
-/// Number of pairs that a block counts, and then writes.
+/// Number of pairs that a block tests.
 inline constexpr std::size_t kTouchingPerBlock = 2048;
 constexpr std::size_t touching_blocks(std::size_t m) {
   return (m + kTouchingPerBlock - 1) / kTouchingPerBlock;
@@ -26,10 +26,10 @@ struct TouchingArgs {
   const SphereInstance* spheres;
   const SpherePair* pairs;
   std::size_t m;
-  std::uint32_t* counts;     ///< [touching_blocks(m) + 1]; the last one becomes 0
-  unsigned long long* sums;  ///< exclusive scan of `counts`
-  PairContact* touching;     ///< [m], may be mapped host memory
-  unsigned long long* total;
+  std::uint32_t* counts;      ///< [touching_blocks(m) + 1] per block, and a 0
+  unsigned long long* sums;   ///< exclusive scan of `counts`
+  PairContact* touching;      ///< [m], may be mapped host memory
+  unsigned long long* total;  ///< number of touching pairs, may be in mapped host memory
 };
 /// Enqueues the count of the touching pairs of each block. Does not allocate or wait.
 void launch_count_touching(const TouchingArgs& args, cudaStream_t stream);

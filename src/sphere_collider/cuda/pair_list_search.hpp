@@ -1,4 +1,4 @@
-/// Search of the touching pairs of a list, from host memory to host memory.
+/// Search for the touching pairs of a list, from host memory to host memory.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>

@@ -50,8 +50,8 @@ __device__ inline QuantizedRecord record_of(const QuantizedTerms& terms) {
   return {{pair(v[0], v[1]), pair(v[2], v[3]), pair(v[4], v[5]), pair(v[6], v[7])}};
 }
 
-/// Part of 32 records that lane l holds: word l % 4 of records l / 4, 8 + l / 4, 16 + l / 4 and 24
-/// + l / 4.
+/// Part of 32 records that one lane holds, in the layout of ldmatrix and mma: in lane l, words[i]
+/// is word l % 4 of record 8 i + l / 4.
 struct QuantizedFragment {
   std::uint32_t words[4];
 };
@@ -81,13 +81,14 @@ __device__ inline ProductSums multiply(std::uint32_t rows_0, std::uint32_t rows_
   return s;
 }
 
-/// Slot of the record of column k. This order gives each lane consecutive columns.
+/// Slot in which the record of column k is stored. With this permutation, the products of a lane
+/// are those of eight consecutive columns.
 __device__ inline unsigned column_slot(unsigned k) {
   return k / 32 * 32 + k % 8 / 2 * 8 + k % 32 / 8 * 2 + k % 2;
 }
 
-/// One bit per pair that may touch: rows l / 4, 8 + l / 4, 16 + l / 4 and 24 + l / 4, in this
-/// order, with columns 8 (l % 4) to 8 (l % 4) + 7.
+/// Part of the results of 32 x 32 overlap tests that one lane holds. In lane l, bit j of of_rows[i]
+/// is set if row 8 i + l / 4 may touch column 8 (l % 4) + j.
 struct OverlapBytes {
   std::uint32_t of_rows[4];
 };
@@ -101,7 +102,7 @@ __device__ inline OverlapBytes overlap_bytes(const QuantizedFragment& rows,
     for (unsigned r = 0; r < 4; r += 2) {
       const ProductSums s = multiply(rows.words[r], rows.words[r + 1], columns.words[c]);
 #pragma unroll
-      for (unsigned k = 0; k < 4; ++k) {  // column 1 before 0: the sign becomes the lowest bit
+      for (unsigned k = 0; k < 4; ++k) {  // higher columns first: a sign enters as the lowest bit
         const float value = s.values[k ^ 1];
         std::uint32_t& byte = bytes.of_rows[r + k / 2];
         byte = __funnelshift_l(std::bit_cast<std::uint32_t>(value), byte, 1);

@@ -1,5 +1,5 @@
-/// Conservative overlap test of spheres with quantized coordinates: integers small enough for
-/// tensor cores to compute with exactly. No touching pair fails the test.
+/// Conservative overlap test of spheres with quantized coordinates. These are integers, so small
+/// that tensor cores compute with them exactly. No touching pair fails the test.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid_cells.hpp"
@@ -10,15 +10,16 @@ inline namespace JFPX_ABI {
 namespace cuda {
 
 /// Largest magnitude of a quantized coordinate. Half precision represents all integers up to this
-/// magnitude, and their doubles, exactly.
+/// magnitude, and twice these integers, exactly.
 inline constexpr Real kMaxQuantized = 1023;
 
-/// Quantized sphere. All four values are integers; the radius is rounded up.
+/// Quantized sphere. All four values are integers; the radius includes a margin for all rounding
+/// errors.
 struct QuantizedSphere {
   float x, y, z, radius;
 };
 
-/// Maps a box to fixed-point coordinates.
+/// Mapping of the points in a box to quantized coordinates.
 struct Quantization {
   Vec3 origin;  ///< centre of the box, up to rounding
   Real scale;   ///< quantized units per metre
@@ -76,17 +77,18 @@ JFPX_HD inline QuantizedSphere quantized(const Quantization& quantization,
           static_cast<float>(to_whole(radius, Real(1)))};
 }
 
-/// Terms of the squared distance of the centres minus the squared sum of the radii minus 1, which
-/// is negative if the spheres may touch. It is the dot product of kTerms numbers of either sphere.
-/// All of them are integers that half precision represents exactly (up to 2048), so the products
-/// are exact. No partial sum, in any order, reaches 2^24 in magnitude (2 * 3 * 1023^2 + 2 * 1024^2
-/// for the products of coordinates and of radii, twice 3 * 1023^2 + 2048 for the others), so single
+/// The overlap test as a dot product. The squared distance of the centres, minus the squared sum of
+/// the radii, minus 1, is negative iff the quantized spheres overlap. It is the dot product of
+/// row_terms() of one sphere and column_terms() of the other, kTerms numbers each. All of them are
+/// integers that half precision represents exactly (up to 2048), so the products are exact. No
+/// partial sum, in any order, reaches 2^24 in magnitude (2 * 3 * 1023^2 + 2 * 1024^2 for the
+/// products of coordinates and of radii, twice 3 * 1023^2 + 2048 for the others), so single
 /// precision adds them without error.
 inline constexpr unsigned kTerms = 8;
 struct QuantizedTerms {
   float values[kTerms];
 };
-/// An integer below 2^22 as upper * kUpperPart + lower.
+/// An integer of magnitude below 2^22, as upper * kUpperPart + lower.
 inline constexpr float kUpperPart = 2048;
 struct QuantizedParts {
   float upper, lower;
@@ -95,7 +97,7 @@ JFPX_HD inline QuantizedParts parts_of(float whole) {
   const float upper = to_whole(whole, 1 / kUpperPart);
   return {upper, fused(upper, -kUpperPart, whole)};
 }
-/// Squared distance from the origin minus the squared radius.
+/// Power of the origin with respect to the sphere: squared distance minus squared radius.
 JFPX_HD inline float power_of_origin(const QuantizedSphere& s) {
   return fused(s.x, s.x, fused(s.y, s.y, fused(s.z, s.z, -(s.radius * s.radius))));
 }

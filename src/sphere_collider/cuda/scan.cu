@@ -11,8 +11,7 @@ namespace {
 
 cudaError_t scan(void* scratch, std::size_t& bytes, const std::uint32_t* in,
                  unsigned long long* out, std::size_t n, cudaStream_t stream) {
-  // CUB reports the last error of the thread as its own, even if an earlier call of the user caused
-  // it.
+  // CUB returns CUDA's last error of the thread, even if an earlier call of the program caused it.
   static_cast<void>(cudaGetLastError());
   return cub::DeviceScan::ExclusiveScan(scratch, bytes, in, out, ::cuda::std::plus<>{}, 0ull,
                                         static_cast<std::uint32_t>(n), stream);

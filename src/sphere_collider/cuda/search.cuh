@@ -52,7 +52,8 @@ __device__ inline void write_contact(const SearchOutput& output, unsigned long l
   output.contacts[at] = {a, b, r.normal, r.distance};
 }
 
-/// Writes the outcome of a search. Call from one thread.
+/// Writes the ContactCount of a search, with 0 contacts if a sphere is invalid. Call from one
+/// thread.
 __device__ inline void write_count(const SearchOutput& output, unsigned long long contacts,
                                    std::uint32_t invalid, bool complete) {
   const bool valid = invalid == kNoSphere;

@@ -4,16 +4,22 @@
 #include <jfpx/contact.hpp>
 #include <jfpx/cuda/sphere_collider.hpp>
 
+#include <cstddef>
 #include <cstdint>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
+/// Largest number of spheres of a search: the grid computes with twice that number in 32 bits.
+inline constexpr std::size_t kMaxSpheres = std::size_t{1} << 31;
+
 /// Counters that the kernels of one search share. All bytes are zero at the start of a search.
 struct alignas(16) SearchState {
-  unsigned long long contacts;       ///< contacts found by the grid, without long_row_contacts
-  unsigned long long overflow;       ///< pairs for GridArgs::Rows::overflow, written or not
+  unsigned long long contacts;  ///< contacts that the grid found, without long_row_contacts
+  /// Pairs for GridArgs::Rows::overflow, including those for which it has no capacity. The
+  /// single-level search does not use that array, and counts rows that were not staged here.
+  unsigned long long overflow;
   unsigned long long largest_half;   ///< bits of the largest half cell width that a radius requires
   unsigned long long smallest_half;  ///< ~bits of the smallest one
   unsigned long long farthest[6];    ///< ordered bits of the largest x, -x, y, -y, z, -z
@@ -27,10 +33,10 @@ struct alignas(16) SearchState {
   std::uint32_t cell_is_full;        ///< 1: a cell of the direct search has no free slot
   std::uint32_t block_is_full;       ///< 1: a block of the direct search found too many pairs
   unsigned long long long_row_contacts;  ///< contacts of rows that the staging buffer cannot hold
-  std::uint32_t same_cell[32];           ///< pairs of a sample in the same cell, by level
+  std::uint32_t same_cell[32];           ///< pairs of sampled spheres in one cell, by level
 };
 
-/// Destination of the result of a search. `contacts` or `pairs` is null.
+/// Destination of the result of a search. Either `contacts` or `pairs` is null.
 struct SearchOutput {
   SphereContact* contacts;
   SpherePair* pairs;

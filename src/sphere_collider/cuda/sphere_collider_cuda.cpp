@@ -7,6 +7,7 @@
 #include "src/base/cuda/device_buffer.hpp"
 #include "src/base/cuda/probe.hpp"
 #include "src/sphere_collider/cuda/pair_list_search.hpp"
+#include "src/sphere_collider/cuda/search.hpp"
 #include "src/sphere_collider/sphere_input.hpp"
 
 #include <algorithm>
@@ -53,7 +54,7 @@ class SphereColliderCuda final : public SphereCollider {
   /// Leaves the contacts in contacts_on_host_ if `mapped`, otherwise on the device.
   /// @return the number of contacts.
   std::size_t search(std::span<const SphereInstance> spheres, bool mapped);
-  /// Every buffer stays as it is if there is no memory for a larger one.
+  /// A buffer is unchanged if there is no memory for a larger one.
   void reserve_geometric(std::size_t spheres, std::size_t contacts, bool mapped);
   void wait() { JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get())); }
 
@@ -92,7 +93,7 @@ std::size_t SphereColliderCuda::search(std::span<const SphereInstance> spheres, 
 
 void SphereColliderCuda::reserve_geometric(std::size_t spheres, std::size_t contacts, bool mapped) {
   if (spheres > spheres_reserved_ || contacts > contacts_reserved_) {
-    const std::size_t more_spheres = geometric_capacity(spheres_reserved_, spheres);
+    const std::size_t more_spheres = geometric_capacity(spheres_reserved_, spheres, kMaxSpheres);
     const std::size_t more_contacts = geometric_capacity(contacts_reserved_, contacts);
     searcher_.reserve(more_spheres, more_contacts);
     spheres_reserved_ = more_spheres;

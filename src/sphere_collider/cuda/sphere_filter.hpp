@@ -20,31 +20,32 @@ JFPX_HD inline T fused(T a, T b, T c) {
 #endif
 }
 
-/// Bounds on the distance of two spheres, without a square root.
+/// Result of closeness() for two spheres.
 struct Closeness {
   bool near;     ///< false only if detail::test_sphere_pair() reports that they do not touch
   bool certain;  ///< true only if it reports that they touch
 };
 
-/// Spheres must be valid (finite, radius > 0).
+/// Compares the squared distance of the centres with the squared sum of the radii, with a slack
+/// that exceeds all rounding errors. Spheres must be valid (finite, radius > 0).
 ///
-/// Proof. u = epsilon/2 is the unit roundoff, t = 2^-150 (float) half the smallest subnormal. Both
-/// tests start from the same differences dx, dy, dz; D is their true sum of squares, s the sum of
-/// the radii as both compute it.
-///  1. The exact test computes q >= D(1-u)^3 - 3t and touches iff fl(sqrt(q)) <= s, so that
+/// Proof. u = epsilon/2 is the unit roundoff, t = 2^-150 (float) is half the smallest subnormal.
+/// Both tests start from the same differences dx, dy, dz. D is their true sum of squares, and s is
+/// the sum of the radii as both tests compute it.
+///  1. The exact test computes q >= D(1-u)^3 - 3t and reports a contact iff fl(sqrt(q)) <= s. Then
 ///     q <= s^2 / (1-u)^2 and D <= (s^2 / (1-u)^2 + 3t) / (1-u)^3.
 ///  2. This test computes d2 <= D(1+u)^3 + 3t <= s^2 (1 + 9u) + 8t for any u <= 2^-24.
-///  3. They are near iff d2 <= bound, and bound >= (s^2 (1-u) - t)(1+16u)(1-u) + min(1-u)
+///  3. It sets `near` iff d2 <= bound, and bound >= (s^2 (1-u) - t)(1+16u)(1-u) + min(1-u)
 ///     >= s^2 (1 + 9u) + 8t, because min, the smallest normal number, is 2^24 t or more.
-/// 4. Overflow: if d2 overflows to infinity then s^2 (1+9u) + 8t exceeds the largest finite number,
-///    and the bound, which is larger by 4u s^2, overflows as well; infinity <= infinity passes.
-///  5. It is certain iff fl(d2 (1+16u) + min) < fl(s^2), where d2 >= D(1-u)^3 - 3t. Let both sides
-///  be
-///     finite. Then d2 (1+15u) + min/2 < s^2 (1+u) + t, and the exact test computes
+///  4. Overflow: if d2 overflows to infinity, s^2 (1+9u) + 8t exceeds the largest finite number.
+///     The bound is larger by 4u s^2 and overflows as well; infinity <= infinity passes.
+///  5. It sets `certain` iff fl(d2 (1+16u) + min) < fl(s^2), where d2 >= D(1-u)^3 - 3t. Let both
+///     sides be finite. Then d2 (1+15u) + min/2 < s^2 (1+u) + t, and the exact test computes
 ///     q <= D(1+u)^3 + 3t <= d2 (1+7u) + 8t < (s^2 (1+u) + t)(1-7u) - min/4 + 8t < s^2 (1-5u), as
-///     min/4 exceeds 9t. So fl(sqrt(q)) <= s (1-2u)(1+u) < s: they touch.
-/// 6. If fl(s^2) overflows in 5, the left side is finite, hence d2 (1+7u) + 8t, hence q; s^2
-///    exceeds all finite numbers, hence sqrt(q) < s and, as rounding is monotone, fl(sqrt(q)) <= s.
+///     min/4 exceeds 9t. So fl(sqrt(q)) <= s (1-2u)(1+u) < s: the spheres touch.
+///  6. If fl(s^2) overflows in 5, the left side is finite, hence d2 (1+7u) + 8t, hence q; s^2
+///     exceeds all finite numbers, hence sqrt(q) < s and, as rounding is monotone, also
+///     fl(sqrt(q)) <= s.
 JFPX_HD inline Closeness closeness(const SphereInstance& a, const SphereInstance& b) {
   constexpr Real kSlack = 1 + 8 * std::numeric_limits<Real>::epsilon();
   constexpr Real kLeast = std::numeric_limits<Real>::min();
@@ -56,7 +57,7 @@ JFPX_HD inline Closeness closeness(const SphereInstance& a, const SphereInstance
   return {!(d2 > fused(s2, kSlack, kLeast)), fused(d2, kSlack, kLeast) < s2};
 }
 
-/// Equals detail::test_sphere_pair(a, b).touching for valid spheres, but rarely computes its square
+/// Equals detail::test_sphere_pair(a, b).touching for valid spheres, but rarely computes a square
 /// root.
 JFPX_HD inline bool touch(const SphereInstance& a, const SphereInstance& b) {
   const Closeness c = closeness(a, b);
@@ -72,15 +73,15 @@ JFPX_HD inline bool touch(const SphereInstance& a, const SphereInstance& b) {
 ///  1. If they touch, D <= s^2 (1+9u) + 8t. Each of the three sums is rounded from a number between
 ///     -p and D (1+3u) + 3t, whose magnitude is at most s^2 (1+13u) + 12t. So all errors together
 ///     are at most 4.1u s^2 + 5t, and e <= 13.1u s^2 + 13t.
-///  2. If e < 0, so are the sums before it, as a square was added to each. As rounding is monotone
-///     none is less than -p, and all errors together are at most 4.1u s^2 + 5t. If e < -d then
-///     D < s^2 - d + 4.1u s^2 + 5t. But spheres that do not touch have fl(sqrt(q)) > s, hence
-///     q >= s^2 (1-2u), with q <= D (1+u)^3 + 3t: D >= s^2 (1-6u) - 4t.
-/// 3. d >= 18u S^2 (1-u)^3 - 18u t + min (1-u) >= 16u s^2 + 2^23 t, which is more than 1 and 2
-///    require.
-/// 4. Overflow: if S^2 overflows, d is infinite, so that no pair is excluded and no pair is
-///    certain, even if e is NaN. Otherwise p is finite; where a sum overflows, D exceeds p by far
-///    more than it can for touching spheres, and e is infinite.
+///  2. If e < 0, the sums before it are negative too, as each addition adds a square. As rounding
+///     is monotone, none is less than -p, and all errors together are at most 4.1u s^2 + 5t. If
+///     e < -d then D < s^2 - d + 4.1u s^2 + 5t. But spheres that do not touch have fl(sqrt(q)) > s,
+///     hence q >= s^2 (1-2u), with q <= D (1+u)^3 + 3t: D >= s^2 (1-6u) - 4t.
+///  3. d >= 18u S^2 (1-u)^3 - 18u t + min (1-u) >= 16u s^2 + 2^23 t, which is more than 1 and 2
+///     require.
+///  4. Overflow: if S^2 overflows, d is infinite, so that no pair is excluded and no pair is
+///     certain, even if e is NaN. Otherwise p is finite; where a sum overflows, D exceeds p by far
+///     more than it can for touching spheres, and e is infinite.
 JFPX_HD inline Real excess(const SphereInstance& a, const SphereInstance& b) {
   const Real dx = a.centre.x - b.centre.x;
   const Real dy = a.centre.y - b.centre.y;
@@ -88,6 +89,7 @@ JFPX_HD inline Real excess(const SphereInstance& a, const SphereInstance& b) {
   const Real s = a.radius + b.radius;
   return fused(dx, dx, fused(dy, dy, fused(dz, dz, -(s * s))));
 }
+/// The bound d of excess() for pairs whose sum of radii is at most `largest_sum`.
 JFPX_HD inline Real error_bound_of(Real largest_sum) {
   constexpr Real kSlack = 9 * std::numeric_limits<Real>::epsilon();
   return fused(largest_sum * largest_sum, kSlack, std::numeric_limits<Real>::min());
