@@ -66,9 +66,8 @@ struct DynamicsWorld::Impl {
 DynamicsWorld::DynamicsWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
                              btConstraintSolver* solver, btCollisionConfiguration* configuration,
                              const DynamicsWorldOptions& options)
-    : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration) {
-  impl_ = std::make_unique<Impl>(options);
-}
+    : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration),
+      impl_(std::make_unique<Impl>(options)) {}
 DynamicsWorld::~DynamicsWorld() = default;
 
 std::size_t DynamicsWorld::minimum_batch() const noexcept { return impl_->minimum_batch; }

@@ -77,7 +77,7 @@ struct RowSolver::Program {
     std::uint64_t item_count;
   };
 
-  RowArrays arrays;
+  RowArrays arrays{};
   Pass passes[3];
   std::size_t pass_count = 0;
   std::uint64_t iterations = 0;        ///< iterations of the serial rows and of all
