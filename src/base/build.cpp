@@ -5,8 +5,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-template <>
-const char LibraryUsesSameCompilerSwitches<sizeof(LayoutProbe)>::value = 1;
+template <std::size_t layout>
+const char LibraryUsesSameCompilerSwitches<layout>::value = 1;
+template struct LibraryUsesSameCompilerSwitches<sizeof(LayoutProbe)>;
 
 }  // namespace detail
 }  // namespace JFPX_ABI
