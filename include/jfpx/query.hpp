@@ -27,7 +27,8 @@ struct RayHit {
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
 
-/// Predicate that selects bodies; empty selects all.
+/// Predicate that selects bodies; empty selects all. A query calls it for bodies that the ray hits,
+/// at most once for each, in unspecified order.
 using BodyFilter = std::function<bool(BodyId)>;
 
 }  // namespace JFPX_ABI

@@ -11,6 +11,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/particle_resolver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_world.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/query_tree.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sphere_hierarchy.cpp
   ${CMAKE_CURRENT_LIST_DIR}/state_hash.cpp

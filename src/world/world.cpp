@@ -109,6 +109,7 @@ StepReport World::step() {
                       " bodies during a step");
   }
   w.contacts_are_new = false;
+  w.query_tree.invalidate();
   try {
     if (w.advance(&report)) {
       ++w.steps;

@@ -23,7 +23,7 @@ BodyId World::add(const BodyDef& body) {
   validate_body_count(number + 1);
   validate_body(body, number);
   const BodyId id = impl_->bodies.add(body);
-  impl_->bodies_changed = true;
+  impl_->note_change();
   impl_->shows_contacts = false;
   return id;
 }
@@ -35,7 +35,7 @@ void World::remove(BodyId id) {
   // The slot of the body may be reused; no contact may refer to it.
   std::erase_if(impl_->contacts, [id](const Contact& c) { return c.a == id || c.b == id; });
   impl_->shows_contacts = false;
-  impl_->bodies_changed = true;
+  impl_->note_change();
 }
 
 std::span<const BodyId> World::bodies() const { return impl_->bodies.ids(); }
@@ -69,7 +69,7 @@ void World::set_state(BodyId id, const BodyState& state) {
   if (!found.empty()) throw InvalidArgument("state: " + found);
   impl_->wake_neighbors(id);
   impl_->bodies.set_state(body, state);
-  impl_->bodies_changed = true;
+  impl_->note_change();
 }
 
 bool World::awake(BodyId id) const {

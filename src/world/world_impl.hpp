@@ -8,6 +8,7 @@
 #include "src/world/contact_events.hpp"
 #include "src/world/contact_finder.hpp"
 #include "src/world/contact_resolver.hpp"
+#include "src/world/lazy_query_tree.hpp"
 #include "src/world/wake_propagation.hpp"
 
 namespace jfpx {
@@ -34,6 +35,12 @@ struct World::Impl {
     for (const BodyId id : bodies.ids()) bodies.wake(id.index);
   }
 
+  /// Must be called after a body was added or removed, or got another state by set_state().
+  void note_change() noexcept {
+    bodies_changed = true;
+    query_tree.invalidate();
+  }
+
   double time() const { return static_cast<double>(steps) * static_cast<double>(scene.dt); }
 
   bool advance(StepReport* report);
@@ -54,6 +61,7 @@ struct World::Impl {
   CallbackRegistry<ForceContext, ForceId> forces{"force"};
   CallbackRegistry<ContactContext, ContactGeneratorId> generators{"contact generator"};
   bool bodies_changed = true;  ///< whether contact_finder.set_bodies() must be called
+  LazyQueryTree query_tree;
   /// Contacts of the last step that was not undone, without those of removed bodies.
   std::vector<Contact> contacts;
   std::vector<Contact> contacts_before;  ///< during a step: those of the previous step, for undo()

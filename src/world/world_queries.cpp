@@ -1,9 +1,10 @@
-/// Ray and overlap queries: linear scans over all bodies, without an acceleration structure.
+/// Ray and overlap queries: exact tests of the bodies that a bounding-volume tree selects.
 #include <jfpx/collide.hpp>
 #include <jfpx/error.hpp>
 
 #include "src/collide/ray.hpp"
 #include "src/scene/scene_validate.hpp"
+#include "src/world/posed_sub_shapes.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>
@@ -46,30 +47,6 @@ Ray checked(const Ray& ray) {
   return {ray.origin, unit_direction(ray.direction), ray.max_distance};
 }
 
-Transform pose_of(const BodyStore& bodies, std::uint32_t body) {
-  return make_transform(bodies.moving.orientation[body], bodies.moving.position[body]);
-}
-
-/// Calls visit(shape, pose) for the shape of the body, or for each part of a compound.
-template <class Visit>
-void for_each_sub_shape(const BodyStore& bodies, std::uint32_t body, const Visit& visit) {
-  const Transform pose = pose_of(bodies, body);
-  const auto visit_parts = [&](const auto& shape) {
-    using S = std::decay_t<decltype(shape)>;
-    if constexpr (std::is_same_v<S, Compound>) {
-      for (const CompoundPart& part : shape.parts) {
-        const Transform local = make_transform(part.orientation, part.position);
-        std::visit([&](const auto& s) { visit(s, pose * local); }, part.shape);
-      }
-    } else if constexpr (std::is_same_v<S, Sphere> || std::is_same_v<S, Box>) {
-      visit(shape, pose);
-    } else {
-      visit(shape, Transform{});
-    }
-  };
-  std::visit(visit_parts, bodies.shape(body));
-}
-
 detail::RayEntry enter(const Ray& ray, const Sphere& sphere, const Transform& pose) {
   return detail::enter(ray.origin, ray.direction, SphereInstance{pose.origin, sphere.radius});
 }
@@ -84,27 +61,29 @@ detail::RayEntry enter(const Ray& ray, const Wall& wall, const Transform&) {
 /// The first entry into a body; of parts at the same distance, that of the first part.
 detail::RayEntry enter(const Ray& ray, const BodyStore& bodies, std::uint32_t body) {
   detail::RayEntry first;
-  for_each_sub_shape(bodies, body, [&](const auto& shape, const Transform& pose) {
+  for_each_posed_sub_shape(bodies, body, [&](const auto& shape, const Transform& pose) {
     const detail::RayEntry entry = enter(ray, shape, pose);
     if (entry.hit && (!first.hit || entry.distance < first.distance)) first = entry;
   });
   return first;
 }
 
-/// Calls `found` with each hit, in the order of bodies.
-template <class Found>
-void for_each_hit(const Ray& given, const BodyStore& bodies, const BodyFilter& filter,
-                  const Found& found) {
-  const Ray ray = checked(given);
-  for (const BodyId id : bodies.ids()) {
-    const detail::RayEntry entry = enter(ray, bodies, id.index);
-    if (!entry.hit || entry.distance > ray.max_distance) continue;
-    const Vec3 point = add_scaled(ray.origin, ray.direction, entry.distance);
-    // A ray nearly parallel to a wall may intersect it at a distance beyond the range of Real.
-    if (!is_finite(point) || (filter && !filter(id))) continue;
-    found(RayHit{id, entry.distance, point, entry.normal});
-  }
+/// The hit of a body within the ray's length.
+std::optional<RayHit> hit_of(const Ray& ray, const BodyStore& bodies, std::uint32_t body) {
+  const detail::RayEntry entry = enter(ray, bodies, body);
+  if (!entry.hit || entry.distance > ray.max_distance) return std::nullopt;
+  const Vec3 point = add_scaled(ray.origin, ray.direction, entry.distance);
+  // A ray nearly parallel to a wall may intersect it at a distance beyond the range of Real.
+  if (!is_finite(point)) return std::nullopt;
+  return RayHit{bodies.id(body), entry.distance, point, entry.normal};
 }
+
+/// Order of the hits of a ray. No two hits are equal.
+bool before(const RayHit& a, const RayHit& b) {
+  return std::tuple(a.distance, a.body.index) < std::tuple(b.distance, b.body.index);
+}
+
+bool accepts(const BodyFilter& filter, BodyId body) { return !filter || filter(body); }
 
 bool touch(const SphereInstance& sphere, const Sphere& other, const Transform& pose) {
   return !(length(sphere.centre - pose.origin) > sphere.radius + other.radius);
@@ -133,34 +112,46 @@ bool touch(const PosedBox& box, const Wall& wall, const Transform&) {
 }
 
 /// @param solid a SphereInstance or a PosedBox
+/// @param extents half extents of its bounds around `centre`
 template <class Solid>
-std::vector<BodyId> bodies_touching(const Solid& solid, const BodyStore& bodies) {
+std::vector<BodyId> bodies_touching(const Solid& solid, const Vec3& centre, const Vec3& extents,
+                                    const QueryTree& tree, const BodyStore& bodies) {
   std::vector<BodyId> found;
-  for (const BodyId id : bodies.ids()) {
+  tree.visit_around(centre, extents, [&](std::uint32_t body) {
     bool touches = false;
-    for_each_sub_shape(bodies, id.index, [&](const auto& shape, const Transform& pose) {
+    for_each_posed_sub_shape(bodies, body, [&](const auto& shape, const Transform& pose) {
       touches = touches || touch(solid, shape, pose);
     });
-    if (touches) found.push_back(id);
-  }
+    if (touches) found.push_back(bodies.id(body));
+  });
+  std::ranges::sort(found, {}, &BodyId::index);
   return found;
 }
 
 }  // namespace
 
-std::optional<RayHit> World::cast_ray(const Ray& ray, const BodyFilter& filter) const {
+std::optional<RayHit> World::cast_ray(const Ray& given, const BodyFilter& filter) const {
+  const Ray ray = checked(given);
+  const BodyStore& bodies = impl_->bodies;
   std::optional<RayHit> closest;
-  for_each_hit(ray, impl_->bodies, filter, [&closest](const RayHit& hit) {
-    if (!closest || hit.distance < closest->distance) closest = hit;
+  impl_->query_tree.get(bodies).visit_along(ray, [&](std::uint32_t body) {
+    const std::optional<RayHit> hit = hit_of(ray, bodies, body);
+    if (hit && (!closest || before(*hit, *closest)) && accepts(filter, hit->body)) closest = hit;
+    return closest ? closest->distance : ray.max_distance;
   });
   return closest;
 }
 
-std::vector<RayHit> World::cast_ray_through(const Ray& ray, const BodyFilter& filter) const {
+std::vector<RayHit> World::cast_ray_through(const Ray& given, const BodyFilter& filter) const {
+  const Ray ray = checked(given);
+  const BodyStore& bodies = impl_->bodies;
   std::vector<RayHit> hits;
-  for_each_hit(ray, impl_->bodies, filter, [&hits](const RayHit& hit) { hits.push_back(hit); });
-  std::ranges::sort(hits, {},
-                    [](const RayHit& hit) { return std::tuple(hit.distance, hit.body.index); });
+  impl_->query_tree.get(bodies).visit_along(ray, [&](std::uint32_t body) {
+    const std::optional<RayHit> hit = hit_of(ray, bodies, body);
+    if (hit && accepts(filter, hit->body)) hits.push_back(*hit);
+    return ray.max_distance;
+  });
+  std::ranges::sort(hits, before);
   return hits;
 }
 
@@ -169,7 +160,9 @@ std::vector<BodyId> World::overlapping(const Sphere& sphere, const Vec3& centre)
   if (!(sphere.radius > 0 && sphere.radius <= kMaxCoordinate)) {
     throw_invalid("sphere radius", to_text(sphere.radius), "> 0 and at most 1e9");
   }
-  return bodies_touching(SphereInstance{centre, sphere.radius}, impl_->bodies);
+  const BodyStore& bodies = impl_->bodies;
+  return bodies_touching(SphereInstance{centre, sphere.radius}, centre,
+                         half_extents(sphere, Transform{}), impl_->query_tree.get(bodies), bodies);
 }
 
 std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
@@ -183,7 +176,9 @@ std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
   const std::string fault = find_fault(BodyState{centre, orientation, {}, {}});
   if (!fault.empty()) throw InvalidArgument("box " + fault);
   const Transform pose = make_transform(normalized(orientation), centre);
-  return bodies_touching(PosedBox{box, pose}, impl_->bodies);
+  const BodyStore& bodies = impl_->bodies;
+  return bodies_touching(PosedBox{box, pose}, centre, half_extents(box, pose),
+                         impl_->query_tree.get(bodies), bodies);
 }
 
 }  // namespace JFPX_ABI

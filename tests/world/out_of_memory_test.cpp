@@ -156,6 +156,30 @@ TEST(OutOfMemoryInAWorld, AFailedAdditionLeavesNoTrace) {
   }
 }
 
+TEST(OutOfMemoryInAWorld, AQueryAfterAFailedOneFindsTheSame) {
+  const std::uint64_t seed = fresh_seed();
+  SCOPED_TRACE(trace(seed));
+  const Scene scene = dense_scene(seed);
+  const Ray ray{.origin = {-9, 0, 0}, .direction = {1, 0, 0}};
+  World undisturbed = make_world(scene, kSettings[0], 3);
+  const std::vector<RayHit> hits = undisturbed.cast_ray_through(ray);
+  const std::vector<BodyId> touched = undisturbed.overlapping(Sphere{1}, {});
+  const std::vector<Moment> expected = follow(undisturbed, 2);
+  const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
+    World world = make_world(scene, kSettings[0], 3);
+    runs_out(k, shortage, [&] {
+      world.cast_ray_through(ray);
+      world.overlapping(Sphere{1}, {});
+    });
+    const bool failed = FailingNew::failed();
+    EXPECT_EQ(world.cast_ray_through(ray), hits) << k;
+    EXPECT_EQ(world.overlapping(Sphere{1}, {}), touched) << k;
+    EXPECT_TRUE(follow(world, 2) == expected) << k;
+    return failed && !testing::Test::HasFailure();
+  });
+  EXPECT_GT(failures, 5u);
+}
+
 TEST(OutOfMemoryInAWorld, BodiesAreRemovedAndMovedWithoutMemory) {
   World world = make_world(dense_scene(1), kSettings[0], 2);
   BodyState state = world.state(world.bodies()[1]);

@@ -3,7 +3,8 @@ jfpx_add_test(world_parts_test INTERNAL SOURCES
   world/broad_phase_test.cpp
   world/compound_test.cpp
   world/contact_resolver_test.cpp
-  world/indexed_priority_queue_test.cpp)
+  world/indexed_priority_queue_test.cpp
+  world/query_tree_test.cpp)
 jfpx_add_test(world_test SOURCES
   world/box_test.cpp
   world/buoyancy_test.cpp

@@ -1,0 +1,152 @@
+/// Ray and overlap queries by a linear scan: the reference for the tree of a World.
+#pragma once
+
+#include <jfpx/collide.hpp>
+#include <jfpx/world.hpp>
+
+#include "src/collide/ray.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <type_traits>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+
+/// Tests all bodies in the order of World::bodies(), with the arithmetic of the queries of a World.
+/// Valid until the world changes.
+class LinearQueries {
+ public:
+  explicit LinearQueries(const World& world) {
+    for (const BodyId id : world.bodies()) {
+      const BodyState state = world.state(id);
+      bodies_.push_back({id, &world.shape(id), state.position, state.orientation});
+    }
+  }
+
+  std::optional<RayHit> cast_ray(const Ray& ray, const BodyFilter& filter = {}) const {
+    std::optional<RayHit> closest;
+    for_each_hit(ray, filter, [&closest](const RayHit& hit) {
+      if (!closest || hit.distance < closest->distance) closest = hit;
+    });
+    return closest;
+  }
+
+  std::vector<RayHit> cast_ray_through(const Ray& ray, const BodyFilter& filter = {}) const {
+    std::vector<RayHit> hits;
+    for_each_hit(ray, filter, [&hits](const RayHit& hit) { hits.push_back(hit); });
+    std::ranges::stable_sort(hits, {}, &RayHit::distance);
+    return hits;
+  }
+
+  std::vector<BodyId> overlapping(const Sphere& sphere, const Vec3& centre) const {
+    const SphereInstance solid{centre, sphere.radius};
+    return bodies_touching([&](const auto& shape, const Transform& pose) {
+      using S = std::decay_t<decltype(shape)>;
+      if constexpr (std::is_same_v<S, Sphere>) {
+        return !(length(centre - pose.origin) > sphere.radius + shape.radius);
+      } else if constexpr (std::is_same_v<S, Box>) {
+        return collide(solid, shape, pose).touching;
+      } else {
+        return collide(solid, shape).touching;
+      }
+    });
+  }
+
+  /// @param orientation of length 1
+  std::vector<BodyId> overlapping(const Box& box, const Vec3& centre,
+                                  const Quat& orientation) const {
+    const Transform at = make_transform(normalized(orientation), centre);
+    return bodies_touching([&](const auto& shape, const Transform& pose) {
+      using S = std::decay_t<decltype(shape)>;
+      if constexpr (std::is_same_v<S, Sphere>) {
+        return collide(SphereInstance{pose.origin, shape.radius}, box, at).touching;
+      } else if constexpr (std::is_same_v<S, Box>) {
+        return collide(box, at, shape, pose).count > 0;
+      } else {
+        return collide(box, at, shape).count > 0;
+      }
+    });
+  }
+
+ private:
+  struct Body {
+    BodyId id;
+    const Shape* shape;
+    Vec3 position;
+    Quat orientation;
+  };
+
+  template <class Visit>
+  static void for_each_sub_shape(const Body& body, const Visit& visit) {
+    const auto visit_parts = [&](const auto& shape) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, Compound>) {
+        const Transform pose = make_transform(body.orientation, body.position);
+        for (const CompoundPart& part : shape.parts) {
+          const Transform local = make_transform(part.orientation, part.position);
+          std::visit([&](const auto& s) { visit(s, pose * local); }, part.shape);
+        }
+      } else {
+        visit(shape, make_transform(body.orientation, body.position));
+      }
+    };
+    std::visit(visit_parts, *body.shape);
+  }
+
+  static detail::RayEntry enter(const Ray& ray, const Sphere& sphere, const Transform& pose) {
+    return detail::enter(ray.origin, ray.direction, SphereInstance{pose.origin, sphere.radius});
+  }
+  static detail::RayEntry enter(const Ray& ray, const Box& box, const Transform& pose) {
+    return detail::enter(ray.origin, ray.direction, box, pose);
+  }
+  template <class Wall>
+  static detail::RayEntry enter(const Ray& ray, const Wall& wall, const Transform&) {
+    return detail::enter(ray.origin, ray.direction, wall);
+  }
+
+  /// Scaled by a power of two before the normalization, as in a World.
+  static Vec3 unit_direction(const Vec3& v) {
+    int exponent = 0;
+    std::frexp(std::max({absolute(v.x), absolute(v.y), absolute(v.z)}), &exponent);
+    const auto scaled = [exponent](Real x) { return std::ldexp(x, -exponent); };
+    return normalized(Vec3{scaled(v.x), scaled(v.y), scaled(v.z)});
+  }
+
+  template <class Found>
+  void for_each_hit(const Ray& given, const BodyFilter& filter, const Found& found) const {
+    const Ray ray{given.origin, unit_direction(given.direction), given.max_distance};
+    for (const Body& body : bodies_) {
+      detail::RayEntry first;
+      for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
+        const detail::RayEntry entry = enter(ray, shape, pose);
+        if (entry.hit && (!first.hit || entry.distance < first.distance)) first = entry;
+      });
+      if (!first.hit || first.distance > ray.max_distance) continue;
+      const Vec3 point = add_scaled(ray.origin, ray.direction, first.distance);
+      if (!is_finite(point) || (filter && !filter(body.id))) continue;
+      found(RayHit{body.id, first.distance, point, first.normal});
+    }
+  }
+
+  template <class Touches>
+  std::vector<BodyId> bodies_touching(const Touches& touches) const {
+    std::vector<BodyId> found;
+    for (const Body& body : bodies_) {
+      bool any = false;
+      for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
+        any = any || touches(shape, pose);
+      });
+      if (any) found.push_back(body.id);
+    }
+    return found;
+  }
+
+  std::vector<Body> bodies_;
+};
+
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx
