@@ -2,6 +2,7 @@
 #include <jfpx/world.hpp>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <span>
@@ -59,6 +60,8 @@ int main() {
   const jfpx::BodyId hook = world.add(ball({-3, 6, 3}, Real(0.1), 0));
   const jfpx::BodyId lamp = world.add(ball({-3, 5, 3}, Real(0.2), 10));
   world.add_contact_generator(Rope{hook, lamp, 1});
+  constexpr std::uint32_t kDecoration = 2;  // a bit of its own
+  world.set_filter(lamp, {.category = kDecoration, .mask = 0});
 
   int began = 0, fell = 0;
   for (int n = 0; n < 600; ++n) {

@@ -19,6 +19,19 @@ struct BodyId {
   friend bool operator==(const BodyId&, const BodyId&) = default;
 };
 
+/// Selects the bodies with which a body collides, as in Box2D and Bullet: see may_collide().
+struct CollisionFilter {
+  std::uint32_t category = 1;        ///< bits of the categories to which the body belongs
+  std::uint32_t mask = 0xffffffffu;  ///< bits of the categories with which it collides
+  friend bool operator==(const CollisionFilter&, const CollisionFilter&) = default;
+};
+
+/// Whether the filters let two bodies collide: each body has a category that is in the mask of the
+/// other.
+constexpr bool may_collide(const CollisionFilter& a, const CollisionFilter& b) {
+  return (a.category & b.mask) != 0 && (b.category & a.mask) != 0;
+}
+
 /// Definition of a rigid body in a scene. SI units.
 struct BodyDef {
   Shape shape = Sphere{};
@@ -42,6 +55,7 @@ struct BodyDef {
   Real friction = Real(0.5);  ///< [-], >= 0; combined by the rule of Scene::materials
   Real restitution = 0;       ///< [-], in [0, 1]; combined by the rule of Scene::materials
   bool can_sleep = true;
+  CollisionFilter filter;
   friend bool operator==(const BodyDef&, const BodyDef&) = default;
 };
 

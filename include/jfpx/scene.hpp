@@ -32,6 +32,12 @@ struct SleepSettings {
   friend bool operator==(const SleepSettings&, const SleepSettings&) = default;
 };
 
+/// Two different bodies of a scene, by their indices in Scene::bodies.
+struct BodyPair {
+  std::uint32_t a = 0, b = 0;
+  friend bool operator==(const BodyPair&, const BodyPair&) = default;
+};
+
 /// Bodies and the settings of their simulation.
 struct Scene {
   std::string name = "unnamed";
@@ -40,6 +46,9 @@ struct Scene {
   ResolverSettings resolver;
   SleepSettings sleep;
   MaterialSettings materials;
+  /// Pairs of bodies that do not collide, whatever their filters. The order of the pairs and of the
+  /// two bodies of a pair has no effect, and a pair may occur more than once.
+  std::vector<BodyPair> ignored_pairs;
   friend bool operator==(const Scene&, const Scene&) = default;
 };
 
@@ -53,7 +62,8 @@ inline constexpr Real kUnitTolerance = Real(1e-3);
 
 /// Checks every field that can affect a step. In addition to the ranges given with the fields,
 /// sizes, positions and offsets must not exceed kMaxCoordinate, masses and moments of inertia must
-/// have finite inverses, dt must not be denormal, and there may be at most 2^32 - 1 bodies.
+/// have finite inverses, dt must not be denormal, there may be at most 2^32 - 1 bodies, and an
+/// ignored pair must consist of two different bodies of the scene.
 /// @throws InvalidScene naming the first invalid body, the field, its value and the allowed range.
 JFPX_API void validate(const Scene& scene);
 

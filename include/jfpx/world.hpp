@@ -157,6 +157,18 @@ class JFPX_API World {
   /// @throws InvalidArgument for an unknown id
   Vec3 last_acceleration(BodyId id) const;
 
+  /// @throws InvalidArgument for an unknown id, as do all functions below
+  CollisionFilter filter(BodyId id) const;
+  /// Replaces the filter from the next step on. A change wakes the body and the bodies in contact
+  /// with it.
+  void set_filter(BodyId id, const CollisionFilter& filter);
+  /// Whether the two bodies do not collide, whatever their filters. The order has no effect.
+  bool pair_ignored(BodyId a, BodyId b) const;
+  /// Adds the pair to the ignored pairs or removes it, from the next step on; the removal of a body
+  /// removes its pairs. A change wakes both bodies and the bodies in contact with them.
+  /// @throws InvalidArgument also if both are the same body
+  void set_pair_ignored(BodyId a, BodyId b, bool ignored);
+
   /// Applies a force [N] at the centre of mass or at a point in the world [m], or a torque [N m],
   /// in the next step. Vectors are in world axes. Several calls add up. Wakes the body (erratum
   /// E29); has no effect on a body of mass 0 (erratum E19).

@@ -98,6 +98,8 @@ void read(const Json& json, const std::string& where, Quat& q) {
 void read(const Json& json, const std::string& where, Shape& shape);
 void read(const Json& json, const std::string& where, std::variant<Sphere, Box>& shape);
 void read(const Json& json, const std::string& where, std::vector<CompoundPart>& parts);
+void read(const Json& json, const std::string& where, CollisionFilter& filter);
+void read(const Json& json, const std::string& where, std::vector<BodyPair>& pairs);
 void read(const Json& json, const std::string& where, ResolverSettings& settings);
 void read(const Json& json, const std::string& where, SleepSettings& settings);
 void read(const Json& json, const std::string& where, MaterialSettings& settings);
@@ -220,13 +222,33 @@ void read(const Json& json, const std::string& where, CompoundPart& part) {
   object.optional("density", part.density);
   object.reject_unknown();
 }
-void read(const Json& json, const std::string& where, std::vector<CompoundPart>& parts) {
+void read(const Json& json, const std::string& where, BodyPair& pair) {
+  if (!json.is_array() || json.size() != 2) fail(where, "must be an array of 2 indices of bodies");
+  read(json[0], where + "[0]", pair.a);
+  read(json[1], where + "[1]", pair.b);
+}
+
+template <class T>
+void read_list(const Json& json, const std::string& where, std::vector<T>& list) {
   if (!json.is_array()) fail(where, std::string("is ") + kind_of(json) + "; it must be an array");
-  parts.clear();
-  for (const Json& json_part : json) {
-    const std::string place = where + "[" + std::to_string(parts.size()) + "]";
-    read(json_part, place, parts.emplace_back());
+  list.clear();
+  for (const Json& item : json) {
+    const std::string place = where + "[" + std::to_string(list.size()) + "]";
+    read(item, place, list.emplace_back());
   }
+}
+void read(const Json& json, const std::string& where, std::vector<CompoundPart>& parts) {
+  read_list(json, where, parts);
+}
+void read(const Json& json, const std::string& where, std::vector<BodyPair>& pairs) {
+  read_list(json, where, pairs);
+}
+
+void read(const Json& json, const std::string& where, CollisionFilter& filter) {
+  ObjectReader object(json, where);
+  object.optional("category", filter.category);
+  object.optional("mask", filter.mask);
+  object.reject_unknown();
 }
 
 void read(const Json& json, const std::string& where, BodyDef& body) {
@@ -245,6 +267,7 @@ void read(const Json& json, const std::string& where, BodyDef& body) {
   object.optional("friction", body.friction);
   object.optional("restitution", body.restitution);
   object.optional("can_sleep", body.can_sleep);
+  object.optional("filter", body.filter);
   object.reject_unknown();
 }
 
@@ -286,6 +309,7 @@ Scene scene_from(const Json& json) {
   object.optional("resolver", scene.resolver);
   object.optional("sleep", scene.sleep);
   object.optional("materials", scene.materials);
+  object.optional("ignored_pairs", scene.ignored_pairs);
   const Json& bodies = object.at("bodies");
   if (!bodies.is_array())
     fail("scene.bodies", std::string("is ") + kind_of(bodies) + "; it must be an array");
@@ -408,6 +432,10 @@ Json to_value(const BodyDef& b) {
     const auto& row = b.inertia->row;
     json["inertia"] = Json::array({to_value(row[0]), to_value(row[1]), to_value(row[2])});
   }
+  // Newer fields are left out where they have their defaults, so that older versions read the file.
+  if (b.filter != CollisionFilter{}) {
+    json["filter"] = {{"category", b.filter.category}, {"mask", b.filter.mask}};
+  }
   return json;
 }
 
@@ -426,12 +454,18 @@ std::string to_json(const Scene& scene) {
                       {"bias", scene.sleep.bias}};
   const Json materials = {{"friction", to_string(scene.materials.friction)},
                           {"restitution", to_string(scene.materials.restitution)}};
+  std::string pairs;
+  if (!scene.ignored_pairs.empty()) {
+    Json list = Json::array();
+    for (const BodyPair& pair : scene.ignored_pairs) list.push_back({pair.a, pair.b});
+    pairs = ",\n \"ignored_pairs\": " + list.dump();
+  }
   // The outer structure is written by hand, so that a file has one line per body.
   std::string text = "{\"jfpx_scene\": " + std::to_string(kSceneSchemaVersion) +
                      ",\n \"name\": " + quoted(scene.name) +
                      ",\n \"dt\": " + Json(scene.dt).dump() +
                      ",\n \"resolver\": " + resolver.dump() + ",\n \"sleep\": " + sleep.dump() +
-                     ",\n \"materials\": " + materials.dump() + ",\n \"bodies\": [";
+                     ",\n \"materials\": " + materials.dump() + pairs + ",\n \"bodies\": [";
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     text += (i == 0 ? "\n  " : ",\n  ") + to_value(scene.bodies[i]).dump();
   }

@@ -13,6 +13,7 @@
 #include <charconv>
 #include <initializer_list>
 #include <limits>
+#include <span>
 #include <utility>
 
 namespace jfpx {
@@ -187,6 +188,17 @@ std::string find_fault(const MaterialSettings& materials) {
   return {};
 }
 
+std::string find_fault(std::span<const BodyPair> ignored_pairs, std::uint64_t bodies) {
+  for (std::size_t i = 0; i < ignored_pairs.size(); ++i) {
+    const auto [a, b] = ignored_pairs[i];
+    if (a != b && a < bodies && b < bodies) continue;
+    return "ignored_pairs[" + std::to_string(i) + "] is (" + std::to_string(a) + ", " +
+           std::to_string(b) + "); it must be two different indices of the scene's " +
+           std::to_string(bodies) + " bodies";
+  }
+  return {};
+}
+
 std::string find_fault(const SleepSettings& sleep) {
   if (!(sleep.epsilon > 0 && is_finite(sleep.epsilon))) {
     return fault("sleep.epsilon", sleep.epsilon, "finite and > 0");
@@ -246,6 +258,8 @@ void validate(const Scene& scene) {
   }
   validate_body_count(scene.bodies.size());
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) validate_body(scene.bodies[i], i);
+  const std::string found = find_fault(scene.ignored_pairs, scene.bodies.size());
+  if (!found.empty()) throw InvalidScene("scene: " + found);
 }
 
 }  // namespace JFPX_ABI

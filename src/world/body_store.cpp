@@ -68,7 +68,7 @@ void BodyStore::add_slot() {
       moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion, moving.awake);
   all(shape_, radius_, mass_, inverse_mass_, friction_, restitution_, body_inverse_inertia_,
       tensor_, acceleration_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_,
-      generation_);
+      filter_, generation_);
   free_.push_back(static_cast<std::uint32_t>(slots - 1));
 }
 
@@ -93,6 +93,7 @@ BodyId BodyStore::add(const BodyDef& def) {
   angular_velocity_kept_[i] = kept_per_step(def.angular_damping, dt_);
   kinematic_[i] = def.kinematic ? 1 : 0;
   can_sleep_[i] = sleep_.enabled && def.can_sleep ? 1 : 0;
+  set_filter(i, def.filter);
   moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
   moving.motion[i] = 0;
   moving.awake[i] = 0;
@@ -124,6 +125,8 @@ void BodyStore::remove(BodyId id) noexcept {
   if (movable(id.index)) --movable_count_;
   if (kinematic(id.index)) --kinematic_count_;
   moving.awake[id.index] = 0;
+  ignored_.erase_body(id.index);
+  set_filter(id.index, {});
 }
 
 bool BodyStore::contains(BodyId id) const noexcept {
@@ -154,6 +157,27 @@ void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
   if (!kinematic(i)) return;
   moving.awake[i] = moving.velocity[i] == Vec3{} && moving.angular_velocity[i] == Vec3{} ? 0 : 1;
   moving.motion[i] = 2 * sleep_.epsilon;  // wake_by_contact() copies it to bodies in contact
+}
+
+void BodyStore::set_filter(std::uint32_t i, const CollisionFilter& filter) noexcept {
+  if (filter_[i] != CollisionFilter{}) --filtered_count_;
+  filter_[i] = filter;
+  if (filter_[i] != CollisionFilter{}) ++filtered_count_;
+  update_filters_in_use();
+}
+
+void BodyStore::set_pair_ignored(const BodyPair& pair, bool ignored) {
+  ignored ? ignored_.insert(pair) : ignored_.erase(pair);
+  update_filters_in_use();
+}
+
+void BodyStore::set_ignored_pairs(std::span<const BodyPair> pairs) {
+  ignored_.assign(pairs);
+  update_filters_in_use();
+}
+
+void BodyStore::update_filters_in_use() noexcept {
+  filters_in_use_ = filtered_count_ > 0 || !ignored_.empty();
 }
 
 void BodyStore::displace(std::uint32_t i, const Vec3& shift, const Vec3& rotation) {

@@ -3,6 +3,8 @@
 
 #include <jfpx/scene.hpp>
 
+#include "src/world/ignored_pairs.hpp"
+
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -73,6 +75,19 @@ class BodyStore {
   /// the accumulated forces and torques.
   void integrate();
 
+  const CollisionFilter& filter(std::uint32_t body) const { return filter_[body]; }
+  void set_filter(std::uint32_t body, const CollisionFilter& filter) noexcept;
+  bool pair_ignored(const BodyPair& pair) const noexcept { return ignored_.contains(pair); }
+  /// @throws std::bad_alloc; the store is then unchanged
+  void set_pair_ignored(const BodyPair& pair, bool ignored);
+  /// Replaces the ignored pairs. @throws std::bad_alloc; the store is then unchanged
+  void set_ignored_pairs(std::span<const BodyPair> pairs);
+  /// Whether the filters let two bodies collide, and they are not an ignored pair.
+  bool may_collide(std::uint32_t a, std::uint32_t b) const noexcept {
+    return !filters_in_use_ ||
+           (jfpx::may_collide(filter_[a], filter_[b]) && !ignored_.contains({a, b}));
+  }
+
   bool movable(std::uint32_t body) const { return inverse_mass_[body] > 0; }
   bool kinematic(std::uint32_t body) const { return kinematic_[body] != 0; }
   /// Whether a kinematic body is in motion.
@@ -95,6 +110,7 @@ class BodyStore {
   void move(std::uint32_t body);
   bool falls_asleep(std::uint32_t body);
   void refresh_inertia(std::uint32_t body);
+  void update_filters_in_use() noexcept;
 
   Real dt_;
   SleepSettings sleep_;
@@ -109,7 +125,12 @@ class BodyStore {
   std::vector<Vec3> acceleration_;                           ///< BodyDef::acceleration
   std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^dt
   std::vector<std::uint8_t> can_sleep_, kinematic_;
+  std::vector<CollisionFilter> filter_;  ///< the default in unused slots
   std::vector<std::uint32_t> generation_;
+
+  IgnoredPairs ignored_;
+  std::uint32_t filtered_count_ = 0;  ///< number of bodies whose filter is not the default
+  bool filters_in_use_ = false;       ///< whether may_collide() may return false
 
   std::vector<BodyId> ids_;          ///< sorted by index
   std::vector<std::uint32_t> free_;  ///< indices of unused slots

@@ -118,7 +118,7 @@ void ContactFinder::find_sphere_pairs(const BodyStore& bodies, std::vector<Conta
   hits_.clear();
   for (std::size_t i = 0; i < found.size(); ++i) {
     const std::uint32_t a = sub_shapes_.body(found[i].a), b = sub_shapes_.body(found[i].b);
-    if (a == b || (!bodies.movable(a) && !bodies.movable(b))) continue;
+    if (a == b || (!bodies.movable(a) && !bodies.movable(b)) || !bodies.may_collide(a, b)) continue;
     const Candidate pair = ordered(bodies, found[i].a, found[i].b);
     if (sub_shapes_.is_sphere(found[i].b)) {
       hits_.push_back({pair, i});
@@ -142,7 +142,8 @@ void ContactFinder::find_fixed_candidates(const BodyStore& bodies) {
     const std::uint32_t body = sub_shapes_.body(sub_shape);
     if (!bodies.movable(body)) continue;
     for (SubShape fixed = sub_shapes_.fixed_begin(); fixed < sub_shapes_.size(); ++fixed) {
-      if (may_touch(sub_shape, fixed, bodies.moving.position[body])) {
+      if (may_touch(sub_shape, fixed, bodies.moving.position[body]) &&
+          bodies.may_collide(body, sub_shapes_.body(fixed))) {
         candidates_.push_back(ordered(bodies, sub_shape, fixed));
       }
     }

@@ -15,7 +15,8 @@ inline namespace JFPX_ABI {
 /// contacts of two spheres and the candidate pairs of a box with a sphere or a box. The "fixed"
 /// sub-shapes, which are the boxes of mass 0 (immovable or kinematic), half-spaces and planes, are
 /// not in the broad phase: each of them is tested against every sub-shape of every movable body.
-/// Contacts within one body, or between two bodies of mass 0, are discarded.
+/// Contacts within one body, between two bodies of mass 0, and of pairs that
+/// BodyStore::may_collide() excludes, are discarded.
 class ContactFinder {
  public:
   ContactFinder(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase);

@@ -7,6 +7,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/contact_resolver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/ignored_pairs.cpp
   ${CMAKE_CURRENT_LIST_DIR}/indexed_priority_queue.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_resolver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_store.cpp
@@ -20,4 +21,5 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/wake_propagation.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_access.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/world_properties.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_queries.cpp)

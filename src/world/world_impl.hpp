@@ -20,6 +20,7 @@ struct World::Impl {
         bodies(given.dt, given.sleep),
         contact_finder(std::move(collider), broad_phase) {
     for (const BodyDef& def : given.bodies) bodies.add(def);
+    bodies.set_ignored_pairs(given.ignored_pairs);  // a body of the scene has the index of its slot
   }
 
   /// Wakes the bodies in contact with a body that is removed or moved.
@@ -28,6 +29,12 @@ struct World::Impl {
       if (c.a == body) bodies.wake(c.b.index);
       if (c.b == body) bodies.wake(c.a.index);
     }
+  }
+
+  /// Wakes a body and the bodies in contact with it.
+  void wake_with_neighbors(BodyId body) {
+    bodies.wake(body.index);
+    wake_neighbors(body);
   }
 
   /// Wakes all bodies, because a new or removed callback may affect any of them.

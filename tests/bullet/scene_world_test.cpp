@@ -1,7 +1,10 @@
 /// Conversion of a scene to Bullet.
 #include <jfpx/bullet/scene_world.hpp>
+#include <jfpx/bullet/verify.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/world.hpp>
+
+#include "tests/bullet/twin_worlds.hpp"
 
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
@@ -9,7 +12,10 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
+#include <set>
 #include <string>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -257,6 +263,109 @@ TEST(SceneWorld, PutsOnlyBodiesToSleepThatMaySleep) {
     for (int i = 0; i < 300; ++i) world.step();
     EXPECT_EQ(world.bodies()[0]->isActive(), !enabled);
     EXPECT_TRUE(world.bodies()[1]->isActive());
+  }
+}
+
+using Pairs = std::set<std::pair<std::uint32_t, std::uint32_t>>;
+
+/// Pairs of scene bodies whose spheres touch after the last step.
+Pairs touching_pairs(SceneWorld& world) {
+  std::map<const btCollisionObject*, std::uint32_t> index;
+  for (const btRigidBody* body : world.bodies()) {
+    index.emplace(body, static_cast<std::uint32_t>(index.size()));
+  }
+  Pairs pairs;
+  for (int i = 0; i < world.dispatcher().getNumManifolds(); ++i) {
+    const btPersistentManifold& m = *world.dispatcher().getManifoldByIndexInternal(i);
+    for (int k = 0; k < m.getNumContacts(); ++k) {
+      if (m.getContactPoint(k).getDistance() > 0) continue;
+      pairs.insert(std::minmax(index.at(m.getBody0()), index.at(m.getBody1())));
+    }
+  }
+  return pairs;
+}
+
+/// A heap of balls, some of them immovable, with random filters and ignored pairs.
+Scene filtered_heap(Random* random) {
+  Scene scene;
+  const auto category = [random] {
+    constexpr std::uint32_t kCategories[] = {1, 2, 1u << 31};
+    return kCategories[random->below(3)];
+  };
+  for (int i = 0; i < 60; ++i) {
+    scene.bodies.push_back(
+        ball(random->uniform_in_box({0, 1, 0}, {3, 4, 3}), random->uniform(Real(0.2), Real(0.6))));
+    BodyDef& body = scene.bodies.back();
+    if (random->below(5) == 0) body.mass = 0;
+    if (random->below(2) == 0) body.filter = {category(), ~category()};
+  }
+  BodyDef ground;
+  ground.shape = HalfSpace{};
+  ground.mass = 0;
+  ground.filter = {.category = 1u << 31, .mask = ~2u};
+  scene.bodies.push_back(ground);
+  for (int i = 0; i < 90; ++i) {
+    const auto a = static_cast<std::uint32_t>(random->below(scene.bodies.size()));
+    const auto b = static_cast<std::uint32_t>(random->below(scene.bodies.size()));
+    if (a != b) scene.ignored_pairs.push_back({a, b});
+  }
+  return scene;
+}
+
+TEST(SceneWorld, FiltersTouchTheSamePairsAsTheNativeWorld) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Random random(seed);
+  std::size_t touching = 0, excluded = 0;
+  for (int round = 0; round < 20; ++round) {
+    Scene scene = filtered_heap(&random);
+    for (BodyDef& body : scene.bodies) body.acceleration = {};  // both test the initial poses
+    scene.bodies.pop_back();  // Bullet's contacts with planes are rounded differently
+    std::erase_if(scene.ignored_pairs, [&](const BodyPair& pair) {
+      return std::max(pair.a, pair.b) >= scene.bodies.size();
+    });
+    World native(scene);
+    native.step();
+    Pairs expected;
+    for (const Contact& c : native.contacts()) expected.insert(std::minmax(c.a.index, c.b.index));
+    for (const DispatcherKind kind : {DispatcherKind::stock, DispatcherKind::jfpx}) {
+      SceneWorld world(scene, {.dispatcher = kind, .dispatch = {.minimum_batch = 0}});
+      world.step();
+      ASSERT_EQ(touching_pairs(world), expected) << round;
+    }
+    touching += expected.size();
+    Scene plain = scene;
+    plain.ignored_pairs.clear();
+    for (BodyDef& body : plain.bodies) body.filter = {};
+    SceneWorld all(plain);
+    all.step();
+    excluded += touching_pairs(all).size() - expected.size();
+  }
+  EXPECT_GT(touching, 100u);
+  EXPECT_GT(excluded, 100u);
+}
+
+TEST(SceneWorld, WithFiltersMovesAsStock) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Random random(seed);
+  for (int round = 0; round < 6; ++round) {
+    const Scene scene = filtered_heap(&random);
+    SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock,
+                             .solver = SolverKind::stock,
+                             .world = WorldKind::stock});
+    SceneWorld ours(scene, {.dispatch = {.minimum_batch = 0}});
+    ContactCheck check;
+    for (std::uint64_t step = 1; step <= 90; ++step) {
+      check.capture(stock.world());
+      stock.step();
+      ours.step();
+      check.compare(stock.world(), step);
+      const auto difference = first_difference(stock.world(), ours.world(), step);
+      ASSERT_FALSE(difference) << to_text(*difference);
+      ASSERT_EQ(check.mismatches(), 0u) << to_text(*check.first());
+    }
+    EXPECT_GT(ours.jfpx_dispatcher()->stats().batches, 0u);
   }
 }
 

@@ -24,7 +24,10 @@ class ContactOracle {
     for (const SubShape& p : sub_shapes_) {
       for (const SubShape& q : sub_shapes_) {
         const bool movable = bodies.movable(p.body) || bodies.movable(q.body);
-        if (p.body != q.body && movable && comes_first(p.body, q.body)) test(p, q);
+        if (p.body == q.body || !movable || !comes_first(p.body, q.body)) continue;
+        const CollisionFilter &f = bodies.filter(p.body), &g = bodies.filter(q.body);
+        const bool filters_match = (f.category & g.mask) != 0 && (g.category & f.mask) != 0;
+        if (filters_match && !bodies.pair_ignored({p.body, q.body})) test(p, q);
       }
     }
     std::ranges::stable_sort(found_, {}, &Found::order);

@@ -150,6 +150,8 @@ TEST(SceneJson, KeepsEveryBitOfEveryField) {
   body.position = {Real(0.1), std::numeric_limits<Real>::denorm_min(), Real(-1e9)};
   body.orientation = normalized(Quat{1, 2, 3, 4});
   body.velocity = {Real(-0.0), 1, 2};
+  body.filter = {.category = 0xffffffffu, .mask = 0};
+  scene.ignored_pairs = {{0, 1}, {4, 2}, {0, 1}};
   scene.bodies = {body, body, body, body, body};
   scene.bodies[4].kinematic = true;
   scene.bodies[4].inertia =
@@ -184,6 +186,42 @@ TEST(SceneJson, AbsentFieldsHaveDefaults) {
   BodyDef expected;
   expected.shape = Sphere{1};
   EXPECT_EQ(scene.bodies[0], expected);
+}
+
+/// So that older versions read files without newer features.
+TEST(SceneJson, FiltersAreWrittenOnlyIfTheyAreNotTheDefault) {
+  Scene scene = from_json(kMinimal);
+  EXPECT_THAT(to_json(scene), Not(HasSubstr("filter")));
+  EXPECT_THAT(to_json(scene), Not(HasSubstr("ignored_pairs")));
+  scene.bodies.push_back(scene.bodies[0]);
+  scene.bodies[1].filter.mask = 6;
+  scene.ignored_pairs = {{1, 0}};
+  const std::string text = to_json(scene);
+  EXPECT_THAT(text, HasSubstr("\"filter\":{\"category\":1,\"mask\":6}"));
+  EXPECT_THAT(text, HasSubstr("\"ignored_pairs\": [[1,0]]"));
+  EXPECT_EQ(from_json(text), scene);
+}
+
+TEST(SceneJson, ErrorsOfFiltersNameFieldValueAndRange) {
+  EXPECT_EQ(complaint(with_body("\"filter\": {\"category\": -1}")),
+            "body 0.filter.category: is -1; it must be a whole number from 0 to 4294967295");
+  EXPECT_EQ(complaint(with_body("\"filter\": {\"mask\": 4294967296}")),
+            "body 0.filter.mask: is 4294967296; it must be a whole number from 0 to 4294967295");
+  EXPECT_EQ(complaint(with_body("\"filter\": {\"group\": 1}")),
+            "body 0.filter: has an unknown field \"group\"; known fields are category, mask");
+  EXPECT_EQ(complaint(with_body("\"filter\": 3")),
+            "body 0.filter: is a number; it must be an object");
+  const auto with_pairs = [](const std::string& pairs) {
+    return R"({"jfpx_scene": 1, "bodies": [], "ignored_pairs": )" + pairs + "}";
+  };
+  EXPECT_EQ(complaint(with_pairs("3")), "scene.ignored_pairs: is a number; it must be an array");
+  EXPECT_EQ(complaint(with_pairs("[[0]]")),
+            "scene.ignored_pairs[0]: must be an array of 2 indices of bodies");
+  EXPECT_EQ(complaint(with_pairs("[[0, 0.5]]")),
+            "scene.ignored_pairs[0][1]: is 0.5; it must be a whole number from 0 to 4294967295");
+  EXPECT_EQ(complaint(with_pairs("[[0, 1]]")),
+            "scene: ignored_pairs[0] is (0, 1); it must be two different indices of the scene's 0 "
+            "bodies");
 }
 
 TEST(SceneJson, AKeyThatIsGivenTwiceIsAnError) {

@@ -193,6 +193,22 @@ TEST(Validate, AnInvalidRuleIsRefused) {
             "scene: materials.restitution is 5; it must be one of the rules of CombineRule");
 }
 
+TEST(Validate, AnIgnoredPairIsOfTwoDifferentBodiesOfTheScene) {
+  Scene scene = valid_scene();
+  scene.ignored_pairs = {{0, 5}, {5, 0}, {0, 5}};
+  EXPECT_EQ(message(scene), "");
+  scene.ignored_pairs = {{0, 5}, {3, 3}};
+  EXPECT_EQ(message(scene),
+            "scene: ignored_pairs[1] is (3, 3); it must be two different indices of the scene's 6 "
+            "bodies");
+  scene.ignored_pairs = {{0, 6}};
+  EXPECT_EQ(message(scene),
+            "scene: ignored_pairs[0] is (0, 6); it must be two different indices of the scene's 6 "
+            "bodies");
+  scene.ignored_pairs = {{0xffffffffu, 0}};
+  EXPECT_NE(message(scene), "");
+}
+
 TEST(Validate, AKinematicBodyHasZeroMassAndAPose) {
   Scene scene = valid_scene();
   scene.bodies[0].kinematic = true;

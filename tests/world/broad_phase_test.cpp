@@ -209,6 +209,15 @@ TEST(Erratum, E33_pairs_inside_one_child_are_reported) {
   EXPECT_EQ(pairs, (std::vector<SpherePair>{{leaves[0], leaves[1]}, {leaves[2], leaves[3]}}));
 }
 
+/// Replaces the filter of one body, and ignores a pair or ceases to ignore it.
+void change_filters(Random* random, BodyStore* bodies) {
+  const auto any_body = [&] { return bodies->ids()[random->below(bodies->ids().size())].index; };
+  const auto bits = [&] { return static_cast<std::uint32_t>(random->below(8)); };
+  bodies->set_filter(any_body(), {bits(), ~bits()});
+  const BodyPair pair{any_body(), any_body()};
+  if (pair.a != pair.b) bodies->set_pair_ignored(pair, random->below(3) > 0);
+}
+
 TEST(BroadPhase, AllWaysFindTheSameContactsThroughInsertionsAndRemovals) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
@@ -228,6 +237,7 @@ TEST(BroadPhase, AllWaysFindTheSameContactsThroughInsertionsAndRemovals) {
       } else {
         bodies.add(test::random_body(&random, 2));
       }
+      if (round % 2 != 0) change_filters(&random, &bodies);
       for (ContactFinder& way : ways) way.set_bodies(bodies);
       for (int move = 0; move < 3; ++move) {
         for (const BodyId id : bodies.ids()) {
@@ -271,8 +281,10 @@ TEST(BroadPhase, WorldsHaveTheSameBitsWithEveryBroadPhase) {
   for (int i = 0; i < 150; ++i) {
     BodyDef def = test::random_body(&random, 4);
     def.position.y += 5;
+    if (i % 5 == 0) def.filter = {.category = 2, .mask = 1};  // touch no body of their kind
     if (def.mass > 0) scene.bodies.push_back(def);
   }
+  scene.ignored_pairs = {{1, 2}, {7, 3}, {0, 50}};
   scene.bodies.push_back(test::ground());
   std::uint64_t expected = 0;
   for (const BroadPhase way : {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {

@@ -38,6 +38,8 @@ Scene dense_scene(std::uint64_t seed) {
   platform.velocity = {1, 0, 0};
   scene.bodies.push_back(platform);
   scene.bodies.push_back(ground());
+  scene.bodies[4].filter = {.category = 2, .mask = 1};
+  scene.ignored_pairs = {{8, 9}, {2, 6}};
   scene.resolver.max_iterations = 100;
   return scene;
 }
@@ -124,6 +126,10 @@ TEST(OutOfMemoryInAWorld, AFailedAdditionLeavesNoTrace) {
       context.add({.a = far[0], .b = far[1], .normal = {1, 0, 0}});
     });
   };
+  const auto pair = [](World& world) {
+    world.set_pair_ignored(world.bodies()[1], world.bodies()[7], true);
+    world.set_pair_ignored(world.bodies()[7], world.bodies()[3], true);
+  };
   const auto comes = [&](const auto& come, bool into_a_gap) {
     const auto make = [&] {
       World world = make_world(scene, kSettings[0], 3);
@@ -153,6 +159,7 @@ TEST(OutOfMemoryInAWorld, AFailedAdditionLeavesNoTrace) {
     EXPECT_GT(comes(body, into_a_gap), 0u);
     EXPECT_GT(comes(force, into_a_gap), 0u);
     EXPECT_GT(comes(generator, into_a_gap), 0u);
+    EXPECT_GT(comes(pair, into_a_gap), 0u);
   }
 }
 
@@ -181,14 +188,18 @@ TEST(OutOfMemoryInAWorld, AQueryAfterAFailedOneFindsTheSame) {
 }
 
 TEST(OutOfMemoryInAWorld, BodiesAreRemovedAndMovedWithoutMemory) {
-  World world = make_world(dense_scene(1), kSettings[0], 2);
+  Scene scene = dense_scene(1);
+  scene.ignored_pairs = {{0, 1}, {3, 0}, {3, 4}};
+  World world = make_world(scene, kSettings[0], 2);
   BodyState state = world.state(world.bodies()[1]);
   state.position.y += 1;
   const BodyId gone = world.bodies()[0], moved = world.bodies()[1], pushed = world.bodies()[2];
   const ForceId force = world.forces()[0];
   {
     const FailingNew failing(0, Shortage::permanent);
+    world.set_filter(gone, {.category = 2});
     world.remove(gone);
+    world.set_pair_ignored(world.bodies()[2], world.bodies()[3], false);
     world.set_state(moved, state);
     world.apply_force(pushed, {1, 2, 3});
     world.remove_force(force);

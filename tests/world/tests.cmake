@@ -11,6 +11,7 @@ jfpx_add_test(world_test SOURCES
   world/contact_events_test.cpp
   world/contact_generator_test.cpp
   world/erratum_test.cpp
+  world/filter_test.cpp
   world/force_registry_test.cpp
   world/force_test.cpp
   world/kinematic_test.cpp

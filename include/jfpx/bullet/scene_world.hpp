@@ -55,6 +55,10 @@ struct StageTimes {
 /// - friction and restitution: Bullet multiplies the values of two bodies, so they are unchanged
 ///   where the scene's rule is the product and are square roots where it is the geometric mean;
 /// - acceleration: the gravity of the body; the gravity of the world is zero;
+/// - filters: the collision filter groups and masks of Bullet, if any filter is not the default. A
+///   kinematic body then also gets contact points with other bodies of mass 0, which have no
+///   effect;
+/// - ignored pairs: btCollisionObject::setIgnoreCollisionCheck();
 /// - a body that must not sleep, and every body of a scene without sleep: DISABLE_DEACTIVATION.
 ///   Bullet's sleep thresholds keep their defaults, because Bullet measures motion differently.
 ///

@@ -18,6 +18,7 @@
 #include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <string>
@@ -223,6 +224,8 @@ struct SceneWorld::Impl {
                          &times)) {
     world->setGravity({0, 0, 0});
     world->getDispatchInfo().m_deterministicOverlappingPairs = options.deterministic_pairs;
+    const bool filtered = std::ranges::any_of(
+        scene.bodies, [](const BodyDef& def) { return def.filter != CollisionFilter{}; });
     for (const BodyDef& def : scene.bodies) {
       require_bullet(def, bodies.size());
       inertia.push_back(inertia_of(def));
@@ -230,7 +233,11 @@ struct SceneWorld::Impl {
       btCollisionShape* shape = shapes.get(def.shape, principal_axes(inertia.back()));
       owned.push_back(make_body(def, inertia.back(), scene.materials, shape, can_sleep));
       bodies.push_back(owned.back().get());
-      world->addRigidBody(bodies.back());
+      add_to_world(bodies.back(), def.filter, filtered);
+    }
+    for (const BodyPair& pair : scene.ignored_pairs) {
+      bodies[pair.a]->setIgnoreCollisionCheck(bodies[pair.b], true);
+      bodies[pair.b]->setIgnoreCollisionCheck(bodies[pair.a], true);
     }
   }
   static std::unique_ptr<btCollisionDispatcher> make_dispatcher(
@@ -245,6 +252,11 @@ struct SceneWorld::Impl {
     return std::unique_ptr<btCollisionDispatcher>(
         new CollisionDispatcher(CollisionDispatcher::CallerIsFused{caller_is_fused}, configuration,
                                 std::move(collider), options.dispatch));
+  }
+  /// Without filters, Bullet's defaults also exclude the pairs of two bodies of mass 0.
+  void add_to_world(btRigidBody* body, const CollisionFilter& filter, bool filtered) {
+    if (!filtered) return world->addRigidBody(body);
+    world->addRigidBody(body, static_cast<int>(filter.category), static_cast<int>(filter.mask));
   }
   /// Moves them as the native engine does; Bullet derives their velocities from the displacement.
   void move_kinematic_bodies(Real dt) {

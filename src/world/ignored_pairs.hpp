@@ -1,0 +1,33 @@
+/// Set of pairs of bodies that do not collide.
+#pragma once
+
+#include <jfpx/scene.hpp>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Pairs of BodyId::index, without an order within a pair. A sorted array: a query takes
+/// logarithmic time, a change linear time.
+class IgnoredPairs {
+ public:
+  /// Replaces all pairs; takes O(n log n) time. @throws std::bad_alloc
+  void assign(std::span<const BodyPair> pairs);
+  /// Has no effect if the pair is in the set. @throws std::bad_alloc; the set is then unchanged
+  void insert(const BodyPair& pair);
+  /// Has no effect if the pair is not in the set.
+  void erase(const BodyPair& pair) noexcept;
+  /// Erases all pairs of a body.
+  void erase_body(std::uint32_t body) noexcept;
+  bool contains(const BodyPair& pair) const noexcept;
+  bool empty() const noexcept { return keys_.empty(); }
+
+ private:
+  std::vector<std::uint64_t> keys_;  ///< lower index in the upper half; sorted, no duplicates
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
