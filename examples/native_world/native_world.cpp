@@ -46,6 +46,12 @@ struct Rope {
   }
 };
 
+/// Change of the number of bodies in contact.
+int change_of_count(const jfpx::ContactEvent& event) {
+  if (event.phase == jfpx::ContactPhase::stay) return 0;
+  return event.phase == jfpx::ContactPhase::begin ? 1 : -1;
+}
+
 }  // namespace
 
 int main() {
@@ -63,7 +69,11 @@ int main() {
   constexpr std::uint32_t kDecoration = 2;  // a bit of its own
   world.set_filter(lamp, {.category = kDecoration, .mask = 0});
 
-  int began = 0, fell = 0;
+  jfpx::BodyDef zone = box({4, 2, 4}, {0, 2, 0}, 0);
+  zone.sensor = true;
+  const jfpx::BodyId above_floor = world.add(zone);
+
+  int began = 0, fell = 0, visitors = 0;
   for (int n = 0; n < 600; ++n) {
     const jfpx::StepReport report = world.step();
     // The state of a body was no longer finite; the step and all later ones are undone.
@@ -71,6 +81,9 @@ int main() {
 
     for (const jfpx::ContactEvent& event : world.contact_events()) {
       if (event.phase == jfpx::ContactPhase::begin) ++began;
+    }
+    for (const jfpx::ContactEvent& event : world.contact_events()) {
+      if (event.a == above_floor || event.b == above_floor) visitors += change_of_count(event);
     }
 
     // Iterates over a copy, because removal changes the list.
@@ -83,8 +96,11 @@ int main() {
   }
   std::printf("%d touches, %d balls were blown off the floor\n", began, fell);
 
+  std::printf("bodies above the floor: %d\n", visitors);
+
+  const auto is_solid = [&world](jfpx::BodyId id) { return !world.sensor(id); };
   const std::optional<jfpx::RayHit> hit =
-      world.cast_ray({.origin = {0, 10, 0}, .direction = {0, -1, 0}});
+      world.cast_ray({.origin = {0, 10, 0}, .direction = {0, -1, 0}}, is_solid);
   if (hit && hit->body == crate) {
     std::printf("the crate's top is at %.2f m\n", static_cast<double>(hit->point.y));
   }
@@ -94,7 +110,8 @@ int main() {
   }
   Real deepest = 0;  // of the contacts of the crate
   for (const jfpx::Contact& contact : world.contacts()) {
-    if (contact.a == crate || contact.b == crate) deepest = std::min(deepest, contact.distance);
+    const bool of_crate = contact.a == crate || contact.b == crate;
+    if (of_crate && !contact.sensor) deepest = std::min(deepest, contact.distance);
   }
   std::printf("the crate is %s, %.0f mm deep in the floor\n",
               world.awake(crate) ? "awake" : "asleep", static_cast<double>(-deepest) * 1000);

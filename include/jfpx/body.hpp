@@ -56,6 +56,9 @@ struct BodyDef {
   Real restitution = 0;       ///< [-], in [0, 1]; combined by the rule of Scene::materials
   bool can_sleep = true;
   CollisionFilter filter;
+  /// A sensor has contacts and contact events, but they are not resolved and wake no body: it
+  /// neither pushes other bodies nor is pushed. Contacts of contact generators are resolved.
+  bool sensor = false;
   friend bool operator==(const BodyDef&, const BodyDef&) = default;
 };
 

@@ -48,6 +48,9 @@ struct Contact {
   Real distance = 0;     ///< [m], <= 0: the negative penetration depth
   Real friction = 0;     ///< [-], >= 0, of the pair
   Real restitution = 0;  ///< [-], in [0, 1], of the pair
+  /// Whether a or b is a sensor, so that the contact is not resolved; false for a contact of a
+  /// contact generator.
+  bool sensor = false;
   friend bool operator==(const Contact&, const Contact&) = default;
 };
 
@@ -58,7 +61,7 @@ enum class ContactPhase : std::uint8_t {
 };
 
 /// Contact of two bodies after a step, compared with the step before. At least one of the bodies is
-/// movable.
+/// movable. One or both may be sensors.
 struct ContactEvent {
   ContactPhase phase = ContactPhase::begin;
   BodyId a, b;  ///< a.index < b.index; the bodies of an end event may have been removed
@@ -71,9 +74,9 @@ struct ContactEvent {
 
 /// Result of one step. Times are wall-clock times.
 struct StepReport {
-  std::uint64_t step = 0;                ///< number of completed steps, without undone ones
-  std::uint64_t contacts = 0;            ///< contacts found by contact detection
-  std::uint64_t sphere_contacts = 0;     ///< of these, contacts between two spheres
+  std::uint64_t step = 0;             ///< number of completed steps, without undone ones
+  std::uint64_t contacts = 0;         ///< contacts found by detection, including those of sensors
+  std::uint64_t sphere_contacts = 0;  ///< of these, contacts between two spheres
   std::uint64_t generated_contacts = 0;  ///< contacts of generators, not included in `contacts`
   std::uint64_t position_iterations = 0;
   std::uint64_t velocity_iterations = 0;
@@ -146,7 +149,7 @@ class JFPX_API World {
   /// @throws InvalidArgument for an unknown id, as do mass() and inverse_inertia()
   bool awake(BodyId id) const;
   /// Wakes the body, as apply_force() does; has no effect on a body of mass 0. The next step also
-  /// wakes the bodies in contact with it.
+  /// wakes the bodies in contact with it, except through contacts of sensors.
   /// @throws InvalidArgument for an unknown id
   void wake(BodyId id);
   Real mass(BodyId id) const;  ///< [kg]; 0: immovable or kinematic
@@ -157,7 +160,9 @@ class JFPX_API World {
   /// @throws InvalidArgument for an unknown id
   Vec3 last_acceleration(BodyId id) const;
 
-  /// @throws InvalidArgument for an unknown id, as do all functions below
+  /// BodyDef::sensor. @throws InvalidArgument for an unknown id
+  bool sensor(BodyId id) const;
+  /// @throws InvalidArgument for an unknown id, as do the three functions below
   CollisionFilter filter(BodyId id) const;
   /// Replaces the filter from the next step on. A change wakes the body and the bodies in contact
   /// with it.
@@ -220,7 +225,8 @@ class JFPX_API World {
   std::span<const ContactGeneratorId> contact_generators() const;
 
   /// The first hit of a ray; of bodies at the same distance, the one with the lowest index. Queries
-  /// find all bodies, including sleeping and immovable ones. They use a bounding-volume tree and
+  /// find all bodies, including sleeping and immovable ones and sensors, whatever
+  /// their collision filters. They use a bounding-volume tree and
   /// take O(log bodies) time for usual scenes, plus the time of the results. The first query after
   /// a step, and after a body was added, removed or moved by set_state(), builds the tree in
   /// O(bodies) time, about 20 nanoseconds per body; concurrent queries wait for it. Half-spaces and

@@ -268,6 +268,7 @@ void read(const Json& json, const std::string& where, BodyDef& body) {
   object.optional("restitution", body.restitution);
   object.optional("can_sleep", body.can_sleep);
   object.optional("filter", body.filter);
+  object.optional("sensor", body.sensor);
   object.reject_unknown();
 }
 
@@ -436,6 +437,7 @@ Json to_value(const BodyDef& b) {
   if (b.filter != CollisionFilter{}) {
     json["filter"] = {{"category", b.filter.category}, {"mask", b.filter.mask}};
   }
+  if (b.sensor) json["sensor"] = true;
   return json;
 }
 

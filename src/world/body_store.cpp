@@ -68,7 +68,7 @@ void BodyStore::add_slot() {
       moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion, moving.awake);
   all(shape_, radius_, mass_, inverse_mass_, friction_, restitution_, body_inverse_inertia_,
       tensor_, acceleration_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_,
-      filter_, generation_);
+      sensor_, filter_, generation_);
   free_.push_back(static_cast<std::uint32_t>(slots - 1));
 }
 
@@ -93,12 +93,14 @@ BodyId BodyStore::add(const BodyDef& def) {
   angular_velocity_kept_[i] = kept_per_step(def.angular_damping, dt_);
   kinematic_[i] = def.kinematic ? 1 : 0;
   can_sleep_[i] = sleep_.enabled && def.can_sleep ? 1 : 0;
+  sensor_[i] = def.sensor ? 1 : 0;
   set_filter(i, def.filter);
   moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
   moving.motion[i] = 0;
   moving.awake[i] = 0;
   if (movable(i)) ++movable_count_;
   if (kinematic(i)) ++kinematic_count_;
+  if (sensor(i)) ++sensor_count_;
   set_state(i, {def.position, def.orientation, def.velocity, def.angular_velocity});
   return id;
 }
@@ -124,6 +126,7 @@ void BodyStore::remove(BodyId id) noexcept {
   ids_.erase(std::lower_bound(ids_.begin(), ids_.end(), id, before));
   if (movable(id.index)) --movable_count_;
   if (kinematic(id.index)) --kinematic_count_;
+  if (sensor(id.index)) --sensor_count_;
   moving.awake[id.index] = 0;
   ignored_.erase_body(id.index);
   set_filter(id.index, {});

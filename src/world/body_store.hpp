@@ -75,6 +75,8 @@ class BodyStore {
   /// the accumulated forces and torques.
   void integrate();
 
+  bool sensor(std::uint32_t body) const { return sensor_[body] != 0; }
+  bool has_sensors() const { return sensor_count_ > 0; }
   const CollisionFilter& filter(std::uint32_t body) const { return filter_[body]; }
   void set_filter(std::uint32_t body, const CollisionFilter& filter) noexcept;
   bool pair_ignored(const BodyPair& pair) const noexcept { return ignored_.contains(pair); }
@@ -124,7 +126,7 @@ class BodyStore {
   std::vector<Mat3> tensor_;
   std::vector<Vec3> acceleration_;                           ///< BodyDef::acceleration
   std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^dt
-  std::vector<std::uint8_t> can_sleep_, kinematic_;
+  std::vector<std::uint8_t> can_sleep_, kinematic_, sensor_;
   std::vector<CollisionFilter> filter_;  ///< the default in unused slots
   std::vector<std::uint32_t> generation_;
 
@@ -134,7 +136,7 @@ class BodyStore {
 
   std::vector<BodyId> ids_;          ///< sorted by index
   std::vector<std::uint32_t> free_;  ///< indices of unused slots
-  std::uint32_t movable_count_ = 0, kinematic_count_ = 0;
+  std::uint32_t movable_count_ = 0, kinematic_count_ = 0, sensor_count_ = 0;
 };
 
 }  // namespace JFPX_ABI

@@ -3,7 +3,10 @@
 
 #include "src/world/world_impl.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <functional>
+#include <iterator>
 #include <new>
 #include <optional>
 #include <utility>
@@ -31,6 +34,11 @@ void combine_materials(const BodyStore& bodies, const MaterialSettings& rules,
   }
 }
 
+void mark_sensors(const BodyStore& bodies, std::vector<Contact>* contacts) {
+  if (!bodies.has_sensors()) return;
+  for (Contact& c : *contacts) c.sensor = bodies.sensor(c.a.index) || bodies.sensor(c.b.index);
+}
+
 /// The first body whose state is not finite or that has a coordinate above kMaxCoordinate.
 std::optional<BodyId> find_runaway(const BodyStore& bodies) {
   const MotionArrays& moving = bodies.moving;
@@ -49,6 +57,15 @@ std::optional<BodyId> find_runaway(const BodyStore& bodies) {
 }
 
 }  // namespace
+
+/// The contacts that wake bodies and are resolved: all but those of sensors, in the same order.
+std::span<const Contact> World::Impl::contacts_to_resolve() {
+  if (!bodies.has_sensors()) return contacts;
+  resolved.clear();
+  std::ranges::copy_if(contacts, std::back_inserter(resolved), std::logical_not(),
+                       &Contact::sensor);
+  return resolved;
+}
 
 /// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
 /// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
@@ -76,17 +93,19 @@ bool World::Impl::advance(StepReport* report) {
   report->device_failure = contact_finder.collider().device_failure();
   report->contacts = contacts.size();
   combine_materials(bodies, scene.materials, &contacts);
+  mark_sensors(bodies, &contacts);
   ContactContext contact_context(bodies, time(), &contacts);
   generators.call(contact_context);
   report->generated_contacts = contacts.size() - report->contacts;
 
   const Clock::time_point detected = Clock::now();
-  propagate_waking(contacts, &bodies);
-  const ResolverReport resolved =
-      resolver.resolve(bodies, contacts, scene.resolver, report->generated_contacts);
-  report->position_iterations = resolved.position_iterations;
-  report->velocity_iterations = resolved.velocity_iterations;
-  report->iterations_exhausted = resolved.exhausted;
+  const std::span<const Contact> active = contacts_to_resolve();
+  propagate_waking(active, &bodies);
+  const ResolverReport resolution =
+      resolver.resolve(bodies, active, scene.resolver, report->generated_contacts);
+  report->position_iterations = resolution.position_iterations;
+  report->velocity_iterations = resolution.velocity_iterations;
+  report->iterations_exhausted = resolution.exhausted;
 
   if (!all_finite()) return false;
   events.update(std::span(contacts).first(report->contacts));

@@ -23,9 +23,10 @@ struct World::Impl {
     bodies.set_ignored_pairs(given.ignored_pairs);  // a body of the scene has the index of its slot
   }
 
-  /// Wakes the bodies in contact with a body that is removed or moved.
+  /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
     for (const Contact& c : contacts) {
+      if (c.sensor) continue;
       if (c.a == body) bodies.wake(c.b.index);
       if (c.b == body) bodies.wake(c.a.index);
     }
@@ -47,6 +48,8 @@ struct World::Impl {
     bodies_changed = true;
     query_tree.invalidate();
   }
+
+  std::span<const Contact> contacts_to_resolve();
 
   double time() const { return static_cast<double>(steps) * static_cast<double>(scene.dt); }
 
@@ -71,6 +74,7 @@ struct World::Impl {
   LazyQueryTree query_tree;
   /// Contacts of the last step that was not undone, without those of removed bodies.
   std::vector<Contact> contacts;
+  std::vector<Contact> resolved;  ///< during a step with sensors: the contacts of other bodies
   std::vector<Contact> contacts_before;  ///< during a step: those of the previous step, for undo()
   bool contacts_are_new = false;  ///< whether `contacts` and `contacts_before` have been swapped
   /// Whether World::contacts() returns `contacts`; false after a body was added or removed, or a

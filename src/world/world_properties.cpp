@@ -8,6 +8,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
+bool World::sensor(BodyId id) const { return impl_->bodies.sensor(impl_->bodies.require(id)); }
+
 CollisionFilter World::filter(BodyId id) const {
   return impl_->bodies.filter(impl_->bodies.require(id));
 }

@@ -297,6 +297,7 @@ Scene filtered_heap(Random* random) {
         ball(random->uniform_in_box({0, 1, 0}, {3, 4, 3}), random->uniform(Real(0.2), Real(0.6))));
     BodyDef& body = scene.bodies.back();
     if (random->below(5) == 0) body.mass = 0;
+    body.sensor = random->below(8) == 0;
     if (random->below(2) == 0) body.filter = {category(), ~category()};
   }
   BodyDef ground;
@@ -343,6 +344,24 @@ TEST(SceneWorld, FiltersTouchTheSamePairsAsTheNativeWorld) {
   }
   EXPECT_GT(touching, 100u);
   EXPECT_GT(excluded, 100u);
+}
+
+TEST(SceneWorld, SensorsHaveContactPointsWithoutResponse) {
+  Scene scene;
+  scene.bodies = {ball({0, 2, 0}), ball({0, 0, 0})};
+  scene.bodies[1].mass = 0;
+  scene.bodies[1].sensor = true;
+  Scene alone = scene;
+  alone.bodies.pop_back();
+  SceneWorld world(scene), free(alone);
+  std::size_t touched = 0;
+  for (int n = 0; n < 90; ++n) {
+    world.step();
+    free.step();
+    touched += touching_pairs(world).size();
+    ASSERT_EQ(world.states()[0], free.states()[0]) << n;
+  }
+  EXPECT_GT(touched, 5u);
 }
 
 TEST(SceneWorld, WithFiltersMovesAsStock) {

@@ -154,6 +154,7 @@ TEST(SceneJson, KeepsEveryBitOfEveryField) {
   scene.ignored_pairs = {{0, 1}, {4, 2}, {0, 1}};
   scene.bodies = {body, body, body, body, body};
   scene.bodies[4].kinematic = true;
+  scene.bodies[2].sensor = true;
   scene.bodies[4].inertia =
       Mat3{{{1, Real(0.1), Real(-0.2)}, {Real(0.1), 1, 0}, {Real(-0.2), 0, 1}}};
   scene.bodies[1].shape = HalfSpace{{0, 0, 1}, Real(-2.5)};
@@ -189,15 +190,18 @@ TEST(SceneJson, AbsentFieldsHaveDefaults) {
 }
 
 /// So that older versions read files without newer features.
-TEST(SceneJson, FiltersAreWrittenOnlyIfTheyAreNotTheDefault) {
+TEST(SceneJson, NewerFieldsAreWrittenOnlyIfTheyAreNotTheDefault) {
   Scene scene = from_json(kMinimal);
   EXPECT_THAT(to_json(scene), Not(HasSubstr("filter")));
+  EXPECT_THAT(to_json(scene), Not(HasSubstr("sensor")));
   EXPECT_THAT(to_json(scene), Not(HasSubstr("ignored_pairs")));
   scene.bodies.push_back(scene.bodies[0]);
   scene.bodies[1].filter.mask = 6;
+  scene.bodies[1].sensor = true;
   scene.ignored_pairs = {{1, 0}};
   const std::string text = to_json(scene);
   EXPECT_THAT(text, HasSubstr("\"filter\":{\"category\":1,\"mask\":6}"));
+  EXPECT_THAT(text, HasSubstr("\"sensor\":true"));
   EXPECT_THAT(text, HasSubstr("\"ignored_pairs\": [[1,0]]"));
   EXPECT_EQ(from_json(text), scene);
 }

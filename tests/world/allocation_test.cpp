@@ -106,7 +106,9 @@ TEST(Allocation, NeitherCarryingNorEventsAllocateInWarmSteps) {
   platform.kinematic = true;
   platform.velocity = {Real(0.2), 0, 0};
   platform.restitution = 1;
-  scene.bodies = {platform};
+  BodyDef zone = test::ball({1, 1, 1}, 2, 0);
+  zone.sensor = true;
+  scene.bodies = {platform, zone};
   for (int i = 0; i < 9; ++i) {
     BodyDef def = test::ball({static_cast<Real>(i % 3), 1, static_cast<Real>(i / 3)}, Real(0.4));
     def.acceleration = {0, Real(-9.81), 0};

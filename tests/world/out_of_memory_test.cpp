@@ -38,6 +38,9 @@ Scene dense_scene(std::uint64_t seed) {
   platform.velocity = {1, 0, 0};
   scene.bodies.push_back(platform);
   scene.bodies.push_back(ground());
+  BodyDef zone = ball({0, 0, 0}, 1, 0);
+  zone.sensor = true;
+  scene.bodies.push_back(zone);
   scene.bodies[4].filter = {.category = 2, .mask = 1};
   scene.ignored_pairs = {{8, 9}, {2, 6}};
   scene.resolver.max_iterations = 100;

@@ -21,6 +21,7 @@ jfpx_add_test(world_test SOURCES
   world/query_test.cpp
   world/recording_test.cpp
   world/rest_test.cpp
+  world/sensor_test.cpp
   world/world_test.cpp)
 jfpx_add_test(concurrency_test SOURCES world/concurrency_test.cpp)
 jfpx_add_test(soak_test SOURCES world/soak_test.cpp)

@@ -166,6 +166,9 @@ std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const PrincipalInerti
     body->setCollisionFlags(body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
     body->setActivationState(DISABLE_DEACTIVATION);
   }
+  if (def.sensor) {
+    body->setCollisionFlags(body->getCollisionFlags() | btCollisionObject::CF_NO_CONTACT_RESPONSE);
+  }
   if (mass > 0) body->setGravity(to_bullet(def.acceleration));
   if (mass > 0 || def.kinematic) {
     body->setLinearVelocity(to_bullet(def.velocity));
