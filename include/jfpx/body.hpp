@@ -59,6 +59,7 @@ struct BodyDef {
   /// A sensor has contacts and contact events, but they are not resolved and wake no body: it
   /// neither pushes other bodies nor is pushed. Contacts of contact generators are resolved.
   bool sensor = false;
+  std::uint64_t user_data = 0;  ///< any value, for the program; has no effect
   friend bool operator==(const BodyDef&, const BodyDef&) = default;
 };
 

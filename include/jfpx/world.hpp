@@ -146,7 +146,7 @@ class JFPX_API World {
   /// @throws InvalidArgument for an unknown id or a value out of the range of validate()
   void set_state(BodyId id, const BodyState& state);
   /// Whether the body is awake. A body of mass 0 is awake only if it is kinematic and moves.
-  /// @throws InvalidArgument for an unknown id, as do mass() and inverse_inertia()
+  /// @throws InvalidArgument for an unknown id, as do mass(), inverse_inertia() and inertia()
   bool awake(BodyId id) const;
   /// Wakes the body, as apply_force() does; has no effect on a body of mass 0. The next step also
   /// wakes the bodies in contact with it, except through contacts of sensors.
@@ -155,14 +155,39 @@ class JFPX_API World {
   Real mass(BodyId id) const;  ///< [kg]; 0: immovable or kinematic
   /// [1/(kg m^2)], world axes, about the centre of mass; zero for mass 0.
   Mat3 inverse_inertia(BodyId id) const;
+  /// [kg m^2], body axes, about the centre of mass; zero for mass 0.
+  Mat3 inertia(BodyId id) const;
+
   /// Acceleration of the centre of mass [m/s^2] in the last step in which the body was awake:
   /// BodyDef::acceleration and forces, without contacts and damping; zero for mass 0.
   /// @throws InvalidArgument for an unknown id
   Vec3 last_acceleration(BodyId id) const;
 
-  /// BodyDef::sensor. @throws InvalidArgument for an unknown id
+  /// Fields of BodyDef. A new value acts from the next step on. A change of friction wakes the body
+  /// and the bodies in contact with it, and a change of acceleration, mass or inertia the body;
+  /// restitution and damping do not affect bodies at rest.
+  /// @throws InvalidArgument, as do all functions up to set_user_data(), for an unknown id or a
+  ///   value out of the range of validate()
+  Real friction(BodyId id) const;
+  void set_friction(BodyId id, Real friction);
+  Real restitution(BodyId id) const;
+  void set_restitution(BodyId id, Real restitution);
+  Vec3 acceleration(BodyId id) const;  ///< [m/s^2], BodyDef::acceleration
+  void set_acceleration(BodyId id, const Vec3& acceleration);
+  Real linear_damping(BodyId id) const;
+  Real angular_damping(BodyId id) const;
+  void set_damping(BodyId id, Real linear, Real angular);
+  /// [kg], > 0. The inertia becomes that of the solid shape with this mass, unless it was given by
+  /// BodyDef::inertia or set_inertia(). A mass of 0 remains 0, and no other mass becomes 0.
+  void set_mass(BodyId id, Real mass);
+  /// [kg m^2], as BodyDef::inertia; absent: that of the solid shape. Has no effect on a body of
+  /// mass 0.
+  void set_inertia(BodyId id, const std::optional<Mat3>& inertia);
+  std::uint64_t user_data(BodyId id) const;
+  void set_user_data(BodyId id, std::uint64_t user_data);
+
+  /// BodyDef::sensor. @throws InvalidArgument for an unknown id, as do the functions of filters
   bool sensor(BodyId id) const;
-  /// @throws InvalidArgument for an unknown id, as do the three functions below
   CollisionFilter filter(BodyId id) const;
   /// Replaces the filter from the next step on. A change wakes the body and the bodies in contact
   /// with it.

@@ -57,6 +57,12 @@ void read(const Json& json, const std::string& where, std::uint32_t& out) {
   }
   out = json.get<std::uint32_t>();
 }
+void read(const Json& json, const std::string& where, std::uint64_t& out) {
+  if (!json.is_number_unsigned()) {
+    fail(where, "is " + text_of(json) + "; it must be a whole number from 0 to 2^64 - 1");
+  }
+  out = json.get<std::uint64_t>();
+}
 void read(const Json& json, const std::string& where, CombineRule& out) {
   std::string name, names;
   read(json, where, name);
@@ -253,6 +259,7 @@ void read(const Json& json, const std::string& where, BodyDef& body) {
   object.optional("can_sleep", body.can_sleep);
   object.optional("filter", body.filter);
   object.optional("sensor", body.sensor);
+  object.optional("user_data", body.user_data);
   object.reject_unknown();
 }
 

@@ -78,6 +78,7 @@ Json to_value(const BodyDef& b) {
     json["filter"] = {{"category", b.filter.category}, {"mask", b.filter.mask}};
   }
   if (b.sensor) json["sensor"] = true;
+  if (b.user_data != 0) json["user_data"] = b.user_data;
   return json;
 }
 

@@ -77,18 +77,30 @@ std::string find_moments_fault(const Vec3& moments) {
   return fault("moments of inertia", moments, "such that they and their inverses are finite");
 }
 
-std::string find_fault(const Sphere& sphere, Real mass) {
-  std::string found = find_fault(sphere);
-  if (!found.empty() || mass == 0) return found;
+std::string find_solid_fault(const Sphere& sphere, Real mass) {
   const Real inertia = detail::moments_of_inertia(sphere, mass).x;
   if (has_inverse(inertia)) return {};
   return fault("moment of inertia", inertia, "such that it and its inverse are finite");
+}
+std::string find_solid_fault(const Box& box, Real mass) {
+  return find_moments_fault(detail::moments_of_inertia(box, mass));
+}
+std::string find_solid_fault(const Compound& compound, Real mass) {
+  return find_moments_fault(principal_inertia(mass_properties(compound, mass).inertia).moments);
+}
+std::string find_solid_fault(const HalfSpace&, Real) { return {}; }
+std::string find_solid_fault(const Plane&, Real) { return {}; }
+
+std::string find_fault(const Sphere& sphere, Real mass) {
+  std::string found = find_fault(sphere);
+  if (!found.empty() || mass == 0) return found;
+  return find_solid_fault(sphere, mass);
 }
 
 std::string find_fault(const Box& box, Real mass) {
   std::string found = find_fault(box);
   if (!found.empty() || mass == 0) return found;
-  return find_moments_fault(detail::moments_of_inertia(box, mass));
+  return find_solid_fault(box, mass);
 }
 
 std::string find_fault(const HalfSpace& half_space, Real) {
@@ -107,20 +119,16 @@ std::string find_fault(const Compound& compound, Real mass) {
     radius = std::max(radius, length(part.position) + bounding_radius(part));
   }
   if (mass == 0) return {};
-  const MassProperties whole = mass_properties(compound, mass);
-  std::string found = find_moments_fault(principal_inertia(whole.inertia).moments);
-  if (!found.empty() || length(whole.centre) <= radius * kUnitTolerance) return found;
-  return fault("centre of mass of parts", whole.centre,
+  std::string found = find_solid_fault(compound, mass);
+  const Vec3 centre = mass_properties(compound, mass).centre;
+  if (!found.empty() || length(centre) <= radius * kUnitTolerance) return found;
+  return fault("centre of mass of parts", centre,
                "the origin, to a thousandth of the body's radius; centred() moves it there");
 }
 
 std::string find_fault(const BodyDef& def) {
-  if (!(def.mass >= 0 && is_finite(def.mass))) {
-    return fault("mass", def.mass, "finite and >= 0");
-  }
-  if (def.mass > 0 && !is_finite(Real(1) / def.mass)) {
-    return fault("mass", def.mass, "0 or such that its inverse is finite");
-  }
+  std::string found = find_mass_fault(def.mass);
+  if (!found.empty()) return found;
   if (def.kinematic && def.mass > 0) {
     return fault("mass", def.mass, "0 for a kinematic body");
   }
@@ -136,30 +144,20 @@ std::string find_fault(const BodyDef& def) {
   if (def.mass > 0 && std::holds_alternative<Plane>(def.shape)) {
     return fault("mass", def.mass, "0 for a plane, which divides the whole world");
   }
-  if (def.inertia) {
-    const char* range = inertia_must_be(*def.inertia);
-    if (range != nullptr) return fault("inertia", *def.inertia, range);
-  }
+  if (def.inertia) found = find_inertia_fault(*def.inertia);
+  if (!found.empty()) return found;
   const Real solid_mass = def.inertia ? 0 : def.mass;  // 0: the inertia of the shape is not used
-  std::string found = std::visit(
-      [solid_mass](const auto& shape) { return find_fault(shape, solid_mass); }, def.shape);
+  found = std::visit([solid_mass](const auto& shape) { return find_fault(shape, solid_mass); },
+                     def.shape);
   if (!found.empty()) return found;
   found = find_fault(BodyState{def.position, def.orientation, def.velocity, def.angular_velocity});
   if (!found.empty()) return found;
-  if (!is_finite(def.acceleration)) return fault("acceleration", def.acceleration, "finite");
-  if (!(def.linear_damping > 0 && def.linear_damping <= 1)) {
-    return fault("linear_damping", def.linear_damping, "in (0, 1]");
-  }
-  if (!(def.angular_damping > 0 && def.angular_damping <= 1)) {
-    return fault("angular_damping", def.angular_damping, "in (0, 1]");
-  }
-  if (!(def.friction >= 0 && is_finite(def.friction))) {
-    return fault("friction", def.friction, "finite and >= 0");
-  }
-  if (!(def.restitution >= 0 && def.restitution <= 1)) {
-    return fault("restitution", def.restitution, "in [0, 1]");
-  }
-  return {};
+  found = find_acceleration_fault(def.acceleration);
+  if (!found.empty()) return found;
+  found = find_damping_fault(def.linear_damping, def.angular_damping);
+  if (!found.empty()) return found;
+  found = find_friction_fault(def.friction);
+  return found.empty() ? find_restitution_fault(def.restitution) : found;
 }
 
 std::string find_fault(const ResolverSettings& resolver) {
@@ -233,6 +231,42 @@ std::string find_fault(const BodyState& state) {
     return fault("angular_velocity", state.angular_velocity, "finite");
   }
   return {};
+}
+
+std::string find_mass_fault(Real mass) {
+  if (!(mass >= 0 && is_finite(mass))) return fault("mass", mass, "finite and >= 0");
+  if (mass == 0 || is_finite(Real(1) / mass)) return {};
+  return fault("mass", mass, "0 or such that its inverse is finite");
+}
+
+std::string find_inertia_fault(const Mat3& inertia) {
+  const char* range = inertia_must_be(inertia);
+  return range != nullptr ? fault("inertia", inertia, range) : std::string();
+}
+
+std::string find_inertia_fault(const Shape& shape, Real mass) {
+  return std::visit([mass](const auto& s) { return find_solid_fault(s, mass); }, shape);
+}
+
+std::string find_acceleration_fault(const Vec3& acceleration) {
+  if (is_finite(acceleration)) return {};
+  return fault("acceleration", acceleration, "finite");
+}
+
+std::string find_damping_fault(Real linear, Real angular) {
+  if (!(linear > 0 && linear <= 1)) return fault("linear_damping", linear, "in (0, 1]");
+  if (!(angular > 0 && angular <= 1)) return fault("angular_damping", angular, "in (0, 1]");
+  return {};
+}
+
+std::string find_friction_fault(Real friction) {
+  if (friction >= 0 && is_finite(friction)) return {};
+  return fault("friction", friction, "finite and >= 0");
+}
+
+std::string find_restitution_fault(Real restitution) {
+  if (restitution >= 0 && restitution <= 1) return {};
+  return fault("restitution", restitution, "in [0, 1]");
 }
 
 void validate_body(const BodyDef& def, std::uint64_t body) {

@@ -19,6 +19,15 @@ void validate_body_count(std::uint64_t bodies);
 /// orientation has unit length to kUnitTolerance. Returns an empty string for a valid state, else a
 /// message with field, value and range, without the body.
 std::string find_fault(const BodyState& state);
+/// Checks of single fields of a body, with results as those of find_fault().
+std::string find_mass_fault(Real mass);
+std::string find_inertia_fault(const Mat3& inertia);
+/// Checks the inertia of a solid body of a valid shape that can be movable.
+std::string find_inertia_fault(const Shape& shape, Real mass);
+std::string find_acceleration_fault(const Vec3& acceleration);
+std::string find_damping_fault(Real linear, Real angular);
+std::string find_friction_fault(Real friction);
+std::string find_restitution_fault(Real restitution);
 /// The shortest text that converts back to the same value.
 std::string to_text(Real value);
 std::string to_text(const Vec3& v);

@@ -66,9 +66,10 @@ void BodyStore::add_slot() {
   const auto all = [slots](auto&... arrays) { (arrays.resize(slots), ...); };
   all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
       moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion, moving.awake);
-  all(shape_, radius_, mass_, inverse_mass_, friction_, restitution_, body_inverse_inertia_,
-      tensor_, acceleration_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_,
-      sensor_, filter_, generation_);
+  all(shape_, radius_, mass_, inverse_mass_, friction_, restitution_, inertia_,
+      body_inverse_inertia_, tensor_, acceleration_, linear_damping_, angular_damping_,
+      velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_, sensor_, inertia_given_,
+      user_data_, filter_, generation_);
   free_.push_back(static_cast<std::uint32_t>(slots - 1));
 }
 
@@ -87,10 +88,10 @@ BodyId BodyStore::add(const BodyDef& def) {
   restitution_[i] = def.restitution;
   mass_[i] = def.mass;
   inverse_mass_[i] = def.mass > 0 ? Real(1) / def.mass : Real(0);
-  set_inertia(i, def);
+  compute_inertia(i, def.inertia);
   acceleration_[i] = def.acceleration;
-  velocity_kept_[i] = kept_per_step(def.linear_damping, dt_);
-  angular_velocity_kept_[i] = kept_per_step(def.angular_damping, dt_);
+  set_damping(i, def.linear_damping, def.angular_damping);
+  user_data_[i] = def.user_data;
   kinematic_[i] = def.kinematic ? 1 : 0;
   can_sleep_[i] = sleep_.enabled && def.can_sleep ? 1 : 0;
   sensor_[i] = def.sensor ? 1 : 0;
@@ -105,18 +106,38 @@ BodyId BodyStore::add(const BodyDef& def) {
   return id;
 }
 
-void BodyStore::set_inertia(std::uint32_t i, const BodyDef& def) {
+void BodyStore::set_mass(std::uint32_t i, Real mass) {
+  mass_[i] = mass;
+  inverse_mass_[i] = Real(1) / mass;
+  if (!inertia_given(i)) set_inertia(i, std::nullopt);
+}
+
+void BodyStore::set_inertia(std::uint32_t i, const std::optional<Mat3>& given) {
+  compute_inertia(i, given);
+  refresh_inertia(i);
+}
+
+void BodyStore::compute_inertia(std::uint32_t i, const std::optional<Mat3>& given) {
+  inertia_given_[i] = given && movable(i) ? 1 : 0;
   if (!movable(i)) {  // infinite inertia: the inverse is zero (erratum E26)
-    body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
+    inertia_[i] = body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
     return;
   }
-  const Mat3 tensor = def.inertia ? symmetric_part(*def.inertia) : tensor_of(shape_[i], def.mass);
+  const Mat3 tensor = given ? symmetric_part(*given) : tensor_of(shape_[i], mass_[i]);
+  inertia_[i] = tensor;
   body_inverse_inertia_[i] = inverse_inertia(tensor);
   // The largest entry of a positive definite matrix is on its diagonal.
   const Vec3 moments{tensor(0, 0), tensor(1, 1), tensor(2, 2)};
   const bool isotropic = moments.x == moments.y && moments.y == moments.z && is_diagonal(tensor);
   tensor_[i] = isotropic ? diagonal({0, 0, 0})
                          : tensor * (Real(1) / std::max({moments.x, moments.y, moments.z}));
+}
+
+void BodyStore::set_damping(std::uint32_t i, Real linear, Real angular) {
+  linear_damping_[i] = linear;
+  angular_damping_[i] = angular;
+  velocity_kept_[i] = kept_per_step(linear, dt_);
+  angular_velocity_kept_[i] = kept_per_step(angular, dt_);
 }
 
 void BodyStore::remove(BodyId id) noexcept {

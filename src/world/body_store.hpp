@@ -6,6 +6,7 @@
 #include "src/world/ignored_pairs.hpp"
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -75,6 +76,23 @@ class BodyStore {
   /// the accumulated forces and torques.
   void integrate();
 
+  /// Replaces the mass of a movable body, and its inertia unless that was given. @param mass > 0
+  void set_mass(std::uint32_t body, Real mass);
+  /// [kg m^2], body axes; zero for mass 0
+  const Mat3& inertia(std::uint32_t body) const { return inertia_[body]; }
+  bool inertia_given(std::uint32_t body) const { return inertia_given_[body] != 0; }
+  /// Has no effect on a body of mass 0. @param given absent: the inertia of the solid shape
+  void set_inertia(std::uint32_t body, const std::optional<Mat3>& given);
+  void set_friction(std::uint32_t body, Real friction) { friction_[body] = friction; }
+  void set_restitution(std::uint32_t body, Real value) { restitution_[body] = value; }
+  /// Without the acceleration by forces. [m/s^2]
+  const Vec3& acceleration(std::uint32_t body) const { return acceleration_[body]; }
+  void set_acceleration(std::uint32_t body, const Vec3& value) { acceleration_[body] = value; }
+  Real linear_damping(std::uint32_t body) const { return linear_damping_[body]; }
+  Real angular_damping(std::uint32_t body) const { return angular_damping_[body]; }
+  void set_damping(std::uint32_t body, Real linear, Real angular);
+  std::uint64_t user_data(std::uint32_t body) const { return user_data_[body]; }
+  void set_user_data(std::uint32_t body, std::uint64_t value) { user_data_[body] = value; }
   bool sensor(std::uint32_t body) const { return sensor_[body] != 0; }
   bool has_sensors() const { return sensor_count_ > 0; }
   const CollisionFilter& filter(std::uint32_t body) const { return filter_[body]; }
@@ -107,7 +125,7 @@ class BodyStore {
 
  private:
   void add_slot();
-  void set_inertia(std::uint32_t body, const BodyDef& def);
+  void compute_inertia(std::uint32_t body, const std::optional<Mat3>& given);
   void integrate(std::uint32_t body);
   void move(std::uint32_t body);
   bool falls_asleep(std::uint32_t body);
@@ -120,13 +138,15 @@ class BodyStore {
 
   std::vector<Shape> shape_;
   std::vector<Real> radius_, mass_, inverse_mass_, friction_, restitution_;
-  std::vector<Mat3> body_inverse_inertia_;  ///< body axes
+  std::vector<Mat3> inertia_, body_inverse_inertia_;  ///< body axes
   /// Inertia in body axes, divided by its largest diagonal entry, for the gyroscopic term; zero if
   /// that term is zero (isotropic inertia or mass 0).
   std::vector<Mat3> tensor_;
   std::vector<Vec3> acceleration_;                           ///< BodyDef::acceleration
+  std::vector<Real> linear_damping_, angular_damping_;       ///< those of BodyDef
   std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^dt
-  std::vector<std::uint8_t> can_sleep_, kinematic_, sensor_;
+  std::vector<std::uint8_t> can_sleep_, kinematic_, sensor_, inertia_given_;
+  std::vector<std::uint64_t> user_data_;
   std::vector<CollisionFilter> filter_;  ///< the default in unused slots
   std::vector<std::uint32_t> generation_;
 

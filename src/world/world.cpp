@@ -23,7 +23,7 @@ double elapsed_ms(Clock::time_point since, Clock::time_point until) {
 
 /// Upper estimate of the memory per body: in the scene, in the body store and in the copy that
 /// undo() restores. Used in an error message only.
-constexpr std::size_t kBytesPerBody = 1024;
+constexpr std::size_t kBytesPerBody = 1280;
 
 void combine_materials(const BodyStore& bodies, const MaterialSettings& rules,
                        std::vector<Contact>* contacts) {

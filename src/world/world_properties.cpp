@@ -1,12 +1,103 @@
 /// Properties of the bodies of a World that can be changed between two steps.
 #include <jfpx/error.hpp>
 
+#include "src/scene/scene_validate.hpp"
 #include "src/world/world_impl.hpp"
 
+#include <optional>
 #include <string>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
+namespace {
+
+/// @param fault the message, or an empty string for a valid value
+void require_valid(const std::string& fault) {
+  if (!fault.empty()) throw InvalidArgument(fault);
+}
+
+}  // namespace
+
+Mat3 World::inertia(BodyId id) const { return impl_->bodies.inertia(impl_->bodies.require(id)); }
+
+void World::set_mass(BodyId id, Real mass) {
+  BodyStore& bodies = impl_->bodies;
+  const std::uint32_t body = bodies.require(id);
+  require_valid(find_mass_fault(mass));
+  if (bodies.movable(body) != (mass > 0)) {
+    throw InvalidArgument(
+        "mass is " + to_text(mass) + "; it must be " +
+        (bodies.movable(body) ? "> 0 for a movable body" : "0 for an immovable or kinematic body"));
+  }
+  if (bodies.mass(body) == mass) return;
+  if (!bodies.inertia_given(body)) require_valid(find_inertia_fault(bodies.shape(body), mass));
+  bodies.set_mass(body, mass);
+  bodies.wake(body);
+}
+
+void World::set_inertia(BodyId id, const std::optional<Mat3>& inertia) {
+  BodyStore& bodies = impl_->bodies;
+  const std::uint32_t body = bodies.require(id);
+  if (inertia) require_valid(find_inertia_fault(*inertia));
+  if (!bodies.movable(body)) return;
+  if (!inertia) require_valid(find_inertia_fault(bodies.shape(body), bodies.mass(body)));
+  bodies.set_inertia(body, inertia);
+  bodies.wake(body);
+}
+
+Real World::friction(BodyId id) const { return impl_->bodies.friction(impl_->bodies.require(id)); }
+
+void World::set_friction(BodyId id, Real friction) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  require_valid(find_friction_fault(friction));
+  if (impl_->bodies.friction(body) == friction) return;
+  impl_->bodies.set_friction(body, friction);
+  impl_->wake_with_neighbors(id);
+}
+
+Real World::restitution(BodyId id) const {
+  return impl_->bodies.restitution(impl_->bodies.require(id));
+}
+
+void World::set_restitution(BodyId id, Real restitution) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  require_valid(find_restitution_fault(restitution));
+  impl_->bodies.set_restitution(body, restitution);
+}
+
+Vec3 World::acceleration(BodyId id) const {
+  return impl_->bodies.acceleration(impl_->bodies.require(id));
+}
+
+void World::set_acceleration(BodyId id, const Vec3& acceleration) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  require_valid(find_acceleration_fault(acceleration));
+  if (impl_->bodies.acceleration(body) == acceleration) return;
+  impl_->bodies.set_acceleration(body, acceleration);
+  impl_->bodies.wake(body);
+}
+
+Real World::linear_damping(BodyId id) const {
+  return impl_->bodies.linear_damping(impl_->bodies.require(id));
+}
+
+Real World::angular_damping(BodyId id) const {
+  return impl_->bodies.angular_damping(impl_->bodies.require(id));
+}
+
+void World::set_damping(BodyId id, Real linear, Real angular) {
+  const std::uint32_t body = impl_->bodies.require(id);
+  require_valid(find_damping_fault(linear, angular));
+  impl_->bodies.set_damping(body, linear, angular);
+}
+
+std::uint64_t World::user_data(BodyId id) const {
+  return impl_->bodies.user_data(impl_->bodies.require(id));
+}
+
+void World::set_user_data(BodyId id, std::uint64_t user_data) {
+  impl_->bodies.set_user_data(impl_->bodies.require(id), user_data);
+}
 
 bool World::sensor(BodyId id) const { return impl_->bodies.sensor(impl_->bodies.require(id)); }
 

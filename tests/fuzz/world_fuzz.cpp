@@ -17,6 +17,7 @@ namespace {
 using fuzz::add_drawn_force;
 using fuzz::draw_body;
 using fuzz::draw_contact;
+using fuzz::draw_filter;
 using fuzz::draw_id;
 using fuzz::draw_state;
 using fuzz::require;
@@ -88,6 +89,7 @@ class Twins {
     require(!failed || (first_.state_hash() == before && first_.time() == time &&
                         first_.contacts().empty() && first_.contact_events().empty()),
             "a failed step leaves no trace");
+    if (!failed) check_contacts(std::get<1>(*done));
   }
 
   void move() {
@@ -97,12 +99,30 @@ class Twins {
   }
 
  private:
+  /// Checks the first `detected` contacts; the others are those of contact generators.
+  void check_contacts(std::uint64_t detected) const {
+    for (const Contact& c : first_.contacts()) {
+      if (detected == 0) return require(!c.sensor, "contacts of generators are resolved");
+      --detected;
+      require(may_collide(first_.filter(c.a), first_.filter(c.b)), "contacts match the filters");
+      require(!first_.pair_ignored(c.a, c.b), "ignored pairs have no contacts");
+      require(c.sensor == (first_.sensor(c.a) || first_.sensor(c.b)), "sensors are marked");
+    }
+  }
+
+  static auto properties(const World& w, BodyId id) {
+    return std::tuple(w.mass(id), w.inertia(id), w.friction(id), w.restitution(id),
+                      w.acceleration(id), w.linear_damping(id), w.angular_damping(id),
+                      w.user_data(id), w.filter(id));
+  }
+
   void compare() const {
     require(std::ranges::equal(first_.bodies(), second_.bodies()), "equal bodies");
     require(first_.state_hash() == second_.state_hash(), "equal bits");
     require(std::ranges::equal(first_.contacts(), second_.contacts()), "equal contacts");
     require(std::ranges::equal(first_.contact_events(), second_.contact_events()), "equal events");
     for (const BodyId id : first_.bodies()) {
+      require(properties(first_, id) == properties(second_, id), "equal properties");
       const BodyState state = first_.state(id);
       require(is_finite(state.position) && is_finite(state.orientation) &&
                   is_finite(state.velocity) && is_finite(state.angular_velocity),
@@ -168,8 +188,67 @@ void change_generators(Bytes& bytes, Twins& twins) {
   }
 }
 
+void change_properties(Bytes& bytes, Twins& twins) {
+  const BodyId id = draw_id(bytes, twins.world().bodies());
+  switch (bytes.below(9)) {
+    case 0: {
+      if (twins.world().bodies().size() >= kMaxBodies) break;
+      BodyDef def = draw_body(bytes);
+      def.filter = draw_filter(bytes);
+      def.sensor = bytes.chance(Real(0.7));
+      def.user_data = bytes.next();
+      twins.both([&](World& w) { return w.add(def); });
+      break;
+    }
+    case 1: {
+      const CollisionFilter filter = draw_filter(bytes);
+      const auto set = twins.both([&](World& w) { w.set_filter(id, filter); });
+      require(!set || twins.world().filter(id) == filter, "a filter is what was set");
+      break;
+    }
+    case 2: {
+      const BodyId other = draw_id(bytes, twins.world().bodies());
+      const bool ignored = bytes.chance(Real(0.7));
+      const auto set = twins.both([&](World& w) { w.set_pair_ignored(id, other, ignored); });
+      require(!set || twins.world().pair_ignored(other, id) == ignored, "a pair is what was set");
+      break;
+    }
+    case 3: {
+      const Real mass = bytes.number(Real(0.1), 5);
+      const auto set = twins.both([&](World& w) { w.set_mass(id, mass); });
+      require(!set || twins.world().mass(id) == mass, "a mass is what was set");
+      break;
+    }
+    case 4: {
+      std::optional<Mat3> inertia;
+      if (bytes.chance(Real(0.7))) inertia = diagonal(bytes.vector(1, 2));
+      twins.both([&](World& w) { w.set_inertia(id, inertia); });
+      break;
+    }
+    case 5: {
+      const Real friction = bytes.number(0, 2), restitution = bytes.number(0, 1);
+      twins.both([&](World& w) { w.set_friction(id, friction); });
+      twins.both([&](World& w) { w.set_restitution(id, restitution); });
+      break;
+    }
+    case 6:
+      twins.both([id, a = bytes.vector(-10, 10)](World& w) { w.set_acceleration(id, a); });
+      break;
+    case 7: {
+      const Real linear = bytes.number(Real(0.5), 1), angular = bytes.number(Real(0.5), 1);
+      twins.both([&](World& w) { w.set_damping(id, linear, angular); });
+      break;
+    }
+    default:
+      twins.both([id, data = bytes.next()](World& w) { w.set_user_data(id, data); });
+  }
+}
+
 void call_anything(Bytes& bytes, Twins& twins) {
-  switch (bytes.below(10)) {
+  const std::uint64_t byte = bytes.below(256);
+  // Inputs of the corpus keep their meaning: this byte was a step.
+  if (byte % 20 == 18) return change_properties(bytes, twins);
+  switch (byte % 10) {
     case 0:
       if (twins.world().bodies().size() >= kMaxBodies) break;
       twins.both([def = draw_body(bytes)](World& w) { return w.add(def); });

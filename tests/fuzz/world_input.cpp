@@ -111,6 +111,13 @@ BodyDef draw_body(Bytes& bytes) {
   return def;
 }
 
+CollisionFilter draw_filter(Bytes& bytes) {
+  CollisionFilter filter;
+  if (bytes.chance(Real(0.6))) filter.category = static_cast<std::uint32_t>(bytes.below(8));
+  if (bytes.chance(Real(0.6))) filter.mask = ~static_cast<std::uint32_t>(bytes.below(8));
+  return filter;
+}
+
 BodyState draw_state(Bytes& bytes) {
   BodyState state;
   state.position = bytes.vector(-3, 3);

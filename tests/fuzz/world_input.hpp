@@ -11,6 +11,7 @@ namespace fuzz {
 
 Scene draw_scene(test::Bytes& bytes);
 BodyDef draw_body(test::Bytes& bytes);
+CollisionFilter draw_filter(test::Bytes& bytes);
 BodyState draw_state(test::Bytes& bytes);
 WorldSettings draw_settings(test::Bytes& bytes);
 GeneratedContact draw_contact(test::Bytes& bytes, std::span<const BodyId> bodies);

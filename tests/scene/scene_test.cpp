@@ -155,6 +155,7 @@ TEST(SceneJson, KeepsEveryBitOfEveryField) {
   scene.bodies = {body, body, body, body, body};
   scene.bodies[4].kinematic = true;
   scene.bodies[2].sensor = true;
+  scene.bodies[3].user_data = 0xffffffffffffffffu;
   scene.bodies[4].inertia =
       Mat3{{{1, Real(0.1), Real(-0.2)}, {Real(0.1), 1, 0}, {Real(-0.2), 0, 1}}};
   scene.bodies[1].shape = HalfSpace{{0, 0, 1}, Real(-2.5)};
@@ -194,19 +195,29 @@ TEST(SceneJson, NewerFieldsAreWrittenOnlyIfTheyAreNotTheDefault) {
   Scene scene = from_json(kMinimal);
   EXPECT_THAT(to_json(scene), Not(HasSubstr("filter")));
   EXPECT_THAT(to_json(scene), Not(HasSubstr("sensor")));
+  EXPECT_THAT(to_json(scene), Not(HasSubstr("user_data")));
   EXPECT_THAT(to_json(scene), Not(HasSubstr("ignored_pairs")));
   scene.bodies.push_back(scene.bodies[0]);
   scene.bodies[1].filter.mask = 6;
   scene.bodies[1].sensor = true;
+  scene.bodies[1].user_data = 9007199254740993u;
   scene.ignored_pairs = {{1, 0}};
   const std::string text = to_json(scene);
   EXPECT_THAT(text, HasSubstr("\"filter\":{\"category\":1,\"mask\":6}"));
   EXPECT_THAT(text, HasSubstr("\"sensor\":true"));
+  EXPECT_THAT(text, HasSubstr("\"user_data\":9007199254740993"));
   EXPECT_THAT(text, HasSubstr("\"ignored_pairs\": [[1,0]]"));
   EXPECT_EQ(from_json(text), scene);
 }
 
-TEST(SceneJson, ErrorsOfFiltersNameFieldValueAndRange) {
+TEST(SceneJson, ErrorsOfNewerFieldsNameFieldValueAndRange) {
+  EXPECT_EQ(complaint(with_body("\"user_data\": -1")),
+            "body 0.user_data: is -1; it must be a whole number from 0 to 2^64 - 1");
+  EXPECT_THAT(complaint(with_body("\"user_data\": 1.5")), HasSubstr("is 1.5; it must be a whole"));
+  EXPECT_THAT(complaint(with_body("\"user_data\": 18446744073709551616")),
+              HasSubstr("body 0.user_data: is "));
+  EXPECT_EQ(complaint(with_body("\"sensor\": 1")),
+            "body 0.sensor: is a number; it must be a boolean");
   EXPECT_EQ(complaint(with_body("\"filter\": {\"category\": -1}")),
             "body 0.filter.category: is -1; it must be a whole number from 0 to 4294967295");
   EXPECT_EQ(complaint(with_body("\"filter\": {\"mask\": 4294967296}")),

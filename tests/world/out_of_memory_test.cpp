@@ -201,6 +201,9 @@ TEST(OutOfMemoryInAWorld, BodiesAreRemovedAndMovedWithoutMemory) {
   {
     const FailingNew failing(0, Shortage::permanent);
     world.set_filter(gone, {.category = 2});
+    world.set_mass(pushed, 2);
+    world.set_friction(moved, 1);
+    world.set_damping(moved, 1, 1);
     world.remove(gone);
     world.set_pair_ignored(world.bodies()[2], world.bodies()[3], false);
     world.set_state(moved, state);

@@ -18,6 +18,7 @@ jfpx_add_test(world_test SOURCES
   world/mixed_test.cpp
   world/motion_test.cpp
   world/particle_test.cpp
+  world/property_test.cpp
   world/query_test.cpp
   world/recording_test.cpp
   world/rest_test.cpp
