@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <type_traits>
 #include <vector>
 
 namespace jfpx {
@@ -16,6 +17,21 @@ inline namespace JFPX_ABI {
 template <class T>
 void reserve_geometric(std::vector<T>* items, std::size_t count) {
   if (items->capacity() < count) items->reserve(std::max(count, 2 * items->capacity()));
+}
+
+/// As items->resize(count), but the capacity grows geometrically even if the size was reduced
+/// before, so that a buffer whose size varies from step to step soon stops to allocate.
+template <class T>
+void resize_geometric(std::vector<T>* items, std::size_t count) {
+  reserve_geometric(items, count);
+  items->resize(count);
+}
+/// As items->assign(count, value), but the capacity grows geometrically.
+template <class T>
+void assign_geometric(std::vector<T>* items, std::size_t count,
+                      const std::type_identity_t<T>& value) {
+  reserve_geometric(items, count);
+  items->assign(count, value);
 }
 
 }  // namespace JFPX_ABI

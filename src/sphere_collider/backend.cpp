@@ -15,14 +15,16 @@ namespace {
 
 #if JFPX_HAS_CUDA
 BackendStatus probe_cuda() { return cuda::probe(); }
-std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOptions& options) {
+std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOptions& options,
+                                                          ThreadPool*) {
   return cuda::make_sphere_collider(options);
 }
 #else
 BackendStatus probe_cuda() {
   return {.backend = Backend::cuda, .device = {}, .reason = "built without CUDA"};
 }
-std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOptions&) {
+std::unique_ptr<SphereCollider> make_cuda_sphere_collider(const SphereColliderOptions&,
+                                                          ThreadPool*) {
   throw BackendUnavailable("cuda: built without CUDA");
 }
 #endif

@@ -4,6 +4,8 @@
 #include <jfpx/backend.hpp>
 #include <jfpx/sphere_collider.hpp>
 
+#include "src/base/thread_pool.hpp"
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 
@@ -11,8 +13,17 @@ struct BackendRow {
   Backend backend;
   bool compiled;
   BackendStatus (*probe)();  ///< does not throw for a missing device
-  std::unique_ptr<SphereCollider> (*make_sphere_collider)(const SphereColliderOptions&);
+  /// The pool may be null; the CPU then has a pool of its own.
+  std::unique_ptr<SphereCollider> (*make_sphere_collider)(const SphereColliderOptions&,
+                                                          ThreadPool* pool);
 };
+
+/// Makes a collider whose CPU backend runs on a given pool, which the caller shares with it,
+/// instead of on `options.threads` threads of its own.
+/// @param pool outlives the collider; calls of the collider and other uses must not overlap
+/// @throws as make_sphere_collider(options)
+std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options,
+                                                     ThreadPool* pool);
 
 /// Returns the row of a backend other than `automatic`.
 /// @throws InvalidArgument for `automatic` and invalid values

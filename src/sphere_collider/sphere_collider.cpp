@@ -11,13 +11,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-std::unique_ptr<SphereCollider> make_named(const SphereColliderOptions& options) {
+std::unique_ptr<SphereCollider> make_named(const SphereColliderOptions& options, ThreadPool* pool) {
   const BackendRow& row = backend_row(options.backend);
   const BackendStatus status = row.probe();
   if (!status.usable) {
     throw BackendUnavailable(std::string(to_string(options.backend)) + ": " + status.reason);
   }
-  return row.make_sphere_collider(options);
+  return row.make_sphere_collider(options, pool);
 }
 
 }  // namespace
@@ -25,6 +25,11 @@ std::unique_ptr<SphereCollider> make_named(const SphereColliderOptions& options)
 SphereCollider::~SphereCollider() = default;
 
 std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
+  return make_sphere_collider(options, nullptr);
+}
+
+std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options,
+                                                     ThreadPool* pool) {
   ThreadPool::check(options.threads);
   if (options.algorithm > SphereAlgorithm::sorted_tiles) {
     throw InvalidArgument("algorithm is not a value of SphereAlgorithm");
@@ -32,8 +37,9 @@ std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions
   if (options.simd > SimdLevel::avx512) throw InvalidArgument("simd is not a value of SimdLevel");
   const std::string fault = find_fault(options.costs);
   if (!fault.empty()) throw InvalidArgument("costs: " + fault);
-  if (options.backend != Backend::automatic) return make_named(options);
-  return std::make_unique<AutomaticSphereCollider>(options, make_named,
+  if (options.backend != Backend::automatic) return make_named(options, pool);
+  const auto make = [pool](const SphereColliderOptions& named) { return make_named(named, pool); };
+  return std::make_unique<AutomaticSphereCollider>(options, make,
                                                    backend_row(Backend::cuda).compiled);
 }
 

@@ -37,10 +37,11 @@ constexpr std::size_t kAllPairsBelow = 512;
 
 class SphereColliderCpu final : public SphereCollider {
  public:
-  explicit SphereColliderCpu(const SphereColliderOptions& options)
+  SphereColliderCpu(const SphereColliderOptions& options, ThreadPool* pool)
       : requested_(options.algorithm),
         kernels_(kernels_for(usable_simd_level(options.simd))),
-        pool_(options.threads) {}
+        own_pool_(pool == nullptr ? std::make_unique<ThreadPool>(options.threads) : nullptr),
+        pool_(pool == nullptr ? *own_pool_ : *pool) {}
 
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
     detail::check_spheres(spheres);
@@ -130,7 +131,8 @@ class SphereColliderCpu final : public SphereCollider {
   SphereAlgorithm requested_;
   SphereAlgorithm used_ = SphereAlgorithm::automatic;
   const Kernels& kernels_;
-  ThreadPool pool_;
+  std::unique_ptr<ThreadPool> own_pool_;  ///< null if the pool is shared
+  ThreadPool& pool_;
   SphereTable table_;
   CellSweep sweep_;
   PairChunks pairs_;
@@ -149,8 +151,9 @@ BackendStatus probe() {
           .reason = {}};
 }
 
-std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
-  return std::make_unique<SphereColliderCpu>(options);
+std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options,
+                                                     ThreadPool* pool) {
+  return std::make_unique<SphereColliderCpu>(options, pool);
 }
 
 }  // namespace cpu

@@ -3,12 +3,16 @@
 
 #include <jfpx/sphere_collider.hpp>
 
+#include "src/base/thread_pool.hpp"
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
 BackendStatus probe();
-std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options);
+/// @param pool null: the collider has options.threads threads of its own
+std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options,
+                                                     ThreadPool* pool);
 
 }  // namespace cpu
 }  // namespace JFPX_ABI

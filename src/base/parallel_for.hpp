@@ -1,0 +1,26 @@
+/// Loop over a range in chunks of a fixed size, on a thread pool.
+#pragma once
+
+#include "src/base/thread_pool.hpp"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Calls body(first, last) for the chunks of [0, count), of `chunk` items each but the last one,
+/// from any thread and in any order. The chunks do not depend on the number of threads.
+/// @param pool null: one chunk in the calling thread
+template <class Body>
+void parallel_for(ThreadPool* pool, std::size_t count, std::size_t chunk, const Body& body) {
+  if (pool == nullptr) {
+    if (count > 0) body(std::size_t{0}, count);
+    return;
+  }
+  pool->run((count + chunk - 1) / chunk,
+            [&](std::size_t i) { body(i * chunk, std::min(count, (i + 1) * chunk)); });
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
