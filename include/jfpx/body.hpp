@@ -54,6 +54,9 @@ struct BodyDef {
   Real angular_damping = 1;   ///< [-], the same for angular velocity
   Real friction = Real(0.5);  ///< [-], >= 0; combined by the rule of Scene::materials
   Real restitution = 0;       ///< [-], in [0, 1]; combined by the rule of Scene::materials
+  /// [m], >= 0: torques that oppose rolling and spinning are limited to this length times the
+  /// normal force. The larger value of two bodies counts. Solver::soft_step only.
+  Real rolling_friction = 0, spinning_friction = 0;
   bool can_sleep = true;
   CollisionFilter filter;
   /// A sensor has contacts and contact events, but they are not resolved and wake no body: it

@@ -4,6 +4,8 @@
 
 #include <jfpx/shape.hpp>
 
+#include <cstdint>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 
@@ -68,6 +70,8 @@ JFPX_HD constexpr Touch collide(const SphereInstance& sphere, const Plane& plane
 struct ManifoldPoint {
   Vec3 point;         ///< [m], world, middle of the overlap
   Real distance = 0;  ///< [m], <= 0: negative penetration depth
+  /// Corners, edges and faces that form the point; equal from step to step while they do.
+  std::uint32_t feature = 0;
   friend bool operator==(const ManifoldPoint&, const ManifoldPoint&) = default;
 };
 
@@ -94,7 +98,7 @@ JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose,
     const Real distance = dot(half_space.normal, vertex) - half_space.offset;
     if (!(distance <= 0)) continue;
     manifold.points[manifold.count++] = {vertex - half_space.normal * (distance * Real(0.5)),
-                                         distance};
+                                         distance, static_cast<std::uint32_t>(corner)};
     if (distance < manifold.distance) manifold.distance = distance;
   }
   if (manifold.count > 0) manifold.normal = half_space.normal;

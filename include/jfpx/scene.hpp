@@ -12,7 +12,39 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Settings of the native contact resolver (thesis 4.4.6).
+/// Algorithm that resolves the contacts of a native world.
+enum class Solver : std::uint8_t {
+  soft_step,    ///< substeps over soft contacts with warm starting: stacks and heaps come to rest
+  worst_first,  ///< the thesis' resolver (4.4.6): one correction after the other, in one thread
+};
+/// Name in the JSON of a scene; null for a value outside the enumeration.
+constexpr const char* to_string(Solver solver) {
+  switch (solver) {
+    case Solver::soft_step:
+      return "soft_step";
+    case Solver::worst_first:
+      return "worst_first";
+  }
+  return nullptr;
+}
+
+/// Settings of Solver::soft_step.
+struct SoftStepSettings {
+  /// Number of substeps per step, in [1, 64]. More substeps make contacts stiffer.
+  std::uint32_t substeps = 4;
+  /// [Hz], >= 0, frequency of the contact springs between movable bodies; twice that against
+  /// immovable and kinematic bodies. 0, and values above it, mean a quarter of the substep rate.
+  Real contact_hertz = 0;
+  Real damping_ratio = 1;   ///< [-], in [0.01, 1000], of the contact springs
+  Real push_out_speed = 3;  ///< [m/s], > 0: maximum speed that removes a penetration
+  Real restitution_threshold = Real(0.25);  ///< [m/s], >= 0: slower contacts do not bounce
+  /// [m], >= 0: pairs closer than this are in the solver before they touch; for small bodies, pairs
+  /// closer than 8 % of the smaller radius or half extent.
+  Real speculative_margin = Real(0.02);
+  friend bool operator==(const SoftStepSettings&, const SoftStepSettings&) = default;
+};
+
+/// Settings of Solver::worst_first (thesis 4.4.6).
 struct ResolverSettings {
   /// Maximum number of contacts corrected per step, in each of the two loops; 0: 8 per movable
   /// body, as in the thesis.
@@ -24,11 +56,18 @@ struct ResolverSettings {
   friend bool operator==(const ResolverSettings&, const ResolverSettings&) = default;
 };
 
-/// Settings of the native sleep test (thesis 4.4.2).
+/// Settings of the native sleep tests. Solver::soft_step puts an island of touching bodies to sleep
+/// when all of them have been slower than `speed` for `time`; Solver::worst_first tests the mean
+/// motion of each body (thesis 4.4.2).
 struct SleepSettings {
   bool enabled = true;
-  Real epsilon = Real(0.3);  ///< [m^2/s^2], > 0: a body whose mean motion is smaller falls asleep
-  Real bias = Real(0.05);    ///< [-], in (0, 1]: weight of the previous mean after one second
+  /// [m/s], >= 0, limit of the velocity and of the angular velocity times the bounding radius, a
+  /// tenth of which counts for spheres; soft_step. A body on which a force or torque acts must be
+  /// 25 times slower.
+  Real speed = Real(0.05);
+  Real time = Real(0.5);     ///< [s], >= 0; soft_step
+  Real epsilon = Real(0.3);  ///< [m^2/s^2], > 0: threshold of the mean motion; worst_first
+  Real bias = Real(0.05);    ///< [-], in (0, 1]: weight of the mean after one second; worst_first
   friend bool operator==(const SleepSettings&, const SleepSettings&) = default;
 };
 
@@ -43,6 +82,8 @@ struct Scene {
   std::string name = "unnamed";
   Real dt = Real(1) / Real(60);  ///< [s], > 0: length of a step
   std::vector<BodyDef> bodies;
+  Solver solver = Solver::soft_step;
+  SoftStepSettings soft_step;
   ResolverSettings resolver;
   SleepSettings sleep;
   MaterialSettings materials;
@@ -52,8 +93,9 @@ struct Scene {
   friend bool operator==(const Scene&, const Scene&) = default;
 };
 
-/// Version of the JSON schema that to_json() writes and from_json() accepts.
-inline constexpr int kSceneSchemaVersion = 1;
+/// Version of the JSON schema that to_json() writes. from_json() also reads version 1, in which a
+/// scene without a "solver" has Solver::worst_first.
+inline constexpr int kSceneSchemaVersion = 2;
 /// [m], largest absolute value of a coordinate of a position.
 inline constexpr Real kMaxCoordinate = Real(1e9);
 /// Largest deviation from 1 of the squared length of a unit vector or quaternion: sufficient for

@@ -19,6 +19,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
+class ThreadPool;
+
 /// Algorithm that finds the pairs of touching bounds. All of them give the same contacts, bit for
 /// bit. Queries (World::cast_ray() and others) do not use it.
 enum class BroadPhase : std::uint8_t {
@@ -28,7 +30,8 @@ enum class BroadPhase : std::uint8_t {
 };
 
 struct WorldSettings {
-  /// Device and algorithm that find sphere contacts. The rest of a step runs in the calling thread.
+  /// Device and algorithm that find sphere contacts. Its `threads` also run the other parts of a
+  /// step with Solver::soft_step.
   SphereColliderOptions collider;
   BroadPhase broad_phase = BroadPhase::cells;
 };
@@ -104,10 +107,11 @@ class JFPX_API World {
   /// @throws InvalidScene, BackendUnavailable, OutOfMemory; InvalidArgument for a bad setting
   explicit World(const Scene& scene, const WorldSettings& settings = {});
   /// As above, with the given collider, which may be a user's implementation.
-  /// @throws InvalidArgument if the collider is null or `broad_phase` is not a value of the
-  ///   enumeration; InvalidScene, OutOfMemory
+  /// @param threads of the other parts of a step, as SphereColliderOptions::threads
+  /// @throws InvalidArgument if the collider is null, `broad_phase` is not a value of the
+  ///   enumeration or `threads` is too large; InvalidScene, OutOfMemory
   World(const Scene& scene, std::unique_ptr<SphereCollider> collider,
-        BroadPhase broad_phase = BroadPhase::cells);
+        BroadPhase broad_phase = BroadPhase::cells, unsigned threads = 1);
   ~World();
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
@@ -285,7 +289,9 @@ class JFPX_API World {
   /// contact as detected, before it was resolved; an end event describes it as last detected.
   /// Sleeping bodies stay in contact. The contacts of a removed body end in the next step. The list
   /// is empty after a failed step; the next successful step compares with the last successful one.
-  /// Valid until the next step, even if bodies are added or removed while the list is read.
+  /// Valid until the next step, even if bodies are added or removed while the list is read. The
+  /// first call after a step computes the list.
+  /// @throws std::bad_alloc
   std::span<const ContactEvent> contact_events() const;
   /// state_hash() of states().
   std::uint64_t state_hash() const;
@@ -300,6 +306,9 @@ class JFPX_API World {
   std::function<void(ContactContext&)>& any_generator(ContactGeneratorId id);
 
   struct Impl;
+  static std::unique_ptr<Impl> make_impl(const Scene& scene, std::unique_ptr<ThreadPool> pool,
+                                         std::unique_ptr<SphereCollider> collider,
+                                         BroadPhase broad_phase);
   std::unique_ptr<Impl> impl_;
 };
 

@@ -35,15 +35,15 @@ JFPX_HD inline Real projected_half_length(const Vec3& half, const Vec3& axis) {
   return dot(half, {absolute(axis.x), absolute(axis.y), absolute(axis.z)});
 }
 
-/// False if the unit vector `axis` separates the boxes. Otherwise replaces *best by this axis,
-/// number `index`, if its overlap is smaller.
+/// False if the unit vector `axis` separates the boxes by more than `margin`. Otherwise replaces
+/// *best by this axis, number `index`, if its overlap is smaller.
 JFPX_HD inline bool try_axis(const BoxPair& pair, int index, const Vec3& axis, Real error,
-                             LeastOverlap* best) {
+                             Real margin, LeastOverlap* best) {
   const Real along = dot(axis, pair.offset);
   const Real sum = projected_half_length(pair.half_a, axis) +
                    projected_half_length(pair.half_b, transform_transpose(pair.rotation, axis));
   const Real distance = absolute(along) - sum;
-  if (!(distance <= 0)) return false;
+  if (!(distance <= margin)) return false;
   if (best->axis < 0 || distance > best->distance) {
     *best = {index, distance, error, along > 0 ? -axis : axis};
   }
@@ -58,13 +58,14 @@ JFPX_HD constexpr const LeastOverlap& preferred(const LeastOverlap& first,
   return later.axis >= 0 && later.distance > first.distance + tolerance ? later : first;
 }
 
-/// False if an axis separates the boxes. Otherwise writes the axis of least overlap to *best.
-JFPX_HD inline bool least_overlap(const BoxPair& pair, LeastOverlap* best) {
+/// False if an axis separates the boxes by more than `margin`. Otherwise writes the axis of least
+/// overlap, or of the largest separation, to *best.
+JFPX_HD inline bool least_overlap(const BoxPair& pair, Real margin, LeastOverlap* best) {
   const Real error = 8 * kEpsilon * pair.size;
   LeastOverlap face_a, face_b, edges;
   for (int i = 0; i < 3; ++i) {
-    if (!try_axis(pair, i, unit_axis(i), error, &face_a)) return false;
-    if (!try_axis(pair, 3 + i, pair.rotation.column(i), error, &face_b)) return false;
+    if (!try_axis(pair, i, unit_axis(i), error, margin, &face_a)) return false;
+    if (!try_axis(pair, 3 + i, pair.rotation.column(i), error, margin, &face_b)) return false;
   }
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
@@ -74,33 +75,40 @@ JFPX_HD inline bool least_overlap(const BoxPair& pair, LeastOverlap* best) {
       const Real sine = length(axis);
       if (!(sine * sine > 4 * kEpsilon)) continue;
       const Vec3 unit = axis * (Real(1) / sine);
-      if (!try_axis(pair, 6 + 3 * i + j, unit, error / sine, &edges)) return false;
+      if (!try_axis(pair, 6 + 3 * i + j, unit, error / sine, margin, &edges)) return false;
     }
   }
   *best = preferred(preferred(face_a, face_b), edges);
   return true;
 }
 
-/// A convex polygon in the axes of a reference box.
+/// A convex polygon in the axes of a reference box. Edges are numbered: 0 to 3 are those of the
+/// incident face, 4 to 7 lie in the planes that clip it.
 struct Polygon {
   Vec3 corner[8];
+  int edge[8] = {};  ///< from each corner to the next one
   int count = 0;
-  JFPX_HD constexpr void add(const Vec3& p) { corner[count++] = p; }
+  JFPX_HD constexpr void add(const Vec3& p, int edge_after) {
+    edge[count] = edge_after;
+    corner[count++] = p;
+  }
 };
 
 /// The part of a polygon where side * p[axis] <= limit. A quadrilateral that is clipped four times
 /// has at most eight corners.
-JFPX_HD inline Polygon clipped(const Polygon& polygon, int axis, Real side, Real limit) {
+/// @param plane number of the edge along the clipping plane
+JFPX_HD inline Polygon clipped(const Polygon& polygon, int axis, Real side, Real limit, int plane) {
   Polygon result;
   for (int i = 0; i < polygon.count; ++i) {
     const Vec3& from = polygon.corner[i];
     const Vec3& to = polygon.corner[i + 1 == polygon.count ? 0 : i + 1];
     const Real d_from = side * from[axis] - limit, d_to = side * to[axis] - limit;
-    if (d_from <= 0) result.add(from);
+    const int edge = polygon.edge[i];
+    if (d_from <= 0) result.add(from, d_from < 0 || d_to <= 0 ? edge : plane);
     if ((d_from < 0 && d_to > 0) || (d_from > 0 && d_to < 0)) {
       Vec3 cut = add_scaled(from, to - from, d_from / (d_from - d_to));
       cut[axis] = side * limit;
-      result.add(cut);
+      result.add(cut, d_from < 0 ? plane : edge);
     }
   }
   return result;
@@ -108,8 +116,9 @@ JFPX_HD inline Polygon clipped(const Polygon& polygon, int axis, Real side, Real
 
 /// The incident face: the face of a box whose outward normal is most antiparallel to `normal`, in
 /// the axes in which the pose (`rotation`, `offset`) is given.
+/// @param face receives its number, 0 to 5
 JFPX_HD inline Polygon facing_quad(const Vec3& half, const Mat3& rotation, const Vec3& offset,
-                                   const Vec3& normal) {
+                                   const Vec3& normal, int* face) {
   const Vec3 local = transform_transpose(rotation, normal);
   int f = 0;
   for (int i = 1; i < 3; ++i) {
@@ -118,11 +127,12 @@ JFPX_HD inline Polygon facing_quad(const Vec3& half, const Mat3& rotation, const
   const int u = (f + 1) % 3, v = (f + 2) % 3;
   const Vec3 centre = add_scaled(offset, rotation.column(f), local[f] > 0 ? -half[f] : half[f]);
   const Vec3 to_u = rotation.column(u) * half[u], to_v = rotation.column(v) * half[v];
+  *face = 2 * f + (local[f] > 0 ? 0 : 1);
   Polygon quad;
-  quad.add(centre + to_u + to_v);
-  quad.add(centre - to_u + to_v);
-  quad.add(centre - to_u - to_v);
-  quad.add(centre + to_u - to_v);
+  quad.add(centre + to_u + to_v, 0);
+  quad.add(centre - to_u + to_v, 1);
+  quad.add(centre - to_u - to_v, 2);
+  quad.add(centre + to_u - to_v, 3);
   return quad;
 }
 
@@ -137,27 +147,32 @@ JFPX_HD inline Vec3 support(const Vec3& half, const Mat3& rotation, const Vec3& 
 
 /// Clips the incident face of the other box (`rotation`, `offset`) against the sides of the
 /// reference face, whose outward normal is `side` times axis `face` of the reference box, and keeps
-/// the points on or below the reference face.
+/// the points at most `margin` above the reference face.
 /// @param manifold receives the points, in the axes of the reference box
 JFPX_HD inline void face_points(const Vec3& half, int face, Real side, const Vec3& other_half,
-                                const Mat3& rotation, const Vec3& offset, Manifold* manifold) {
+                                const Mat3& rotation, const Vec3& offset, Real margin,
+                                Manifold* manifold) {
   const Vec3 outward = unit_axis(face) * side;
-  Polygon polygon = facing_quad(other_half, rotation, offset, outward);
+  int incident = 0;
+  Polygon polygon = facing_quad(other_half, rotation, offset, outward, &incident);
   for (int k = 1; k < 3; ++k) {
     const int axis = (face + k) % 3;
-    polygon = clipped(polygon, axis, 1, half[axis]);
-    polygon = clipped(polygon, axis, -1, half[axis]);
+    polygon = clipped(polygon, axis, 1, half[axis], 2 * k + 2);
+    polygon = clipped(polygon, axis, -1, half[axis], 2 * k + 3);
   }
-  const auto keep = [&](const Vec3& p, Real distance) {
-    manifold->points[manifold->count++] = {add_scaled(p, outward, distance * Real(-0.5)), distance};
+  const auto keep = [&](const Vec3& p, Real distance, int feature) {
+    const int faces = 6 * (2 * face + (side > 0 ? 0 : 1)) + incident;
+    manifold->points[manifold->count++] = {add_scaled(p, outward, distance * Real(-0.5)), distance,
+                                           static_cast<std::uint32_t>(64 * faces + feature)};
   };
   for (int i = 0; i < polygon.count; ++i) {
     const Real distance = side * polygon.corner[i][face] - half[face];
-    if (distance <= 0) keep(polygon.corner[i], distance);
+    const int before = polygon.edge[i == 0 ? polygon.count - 1 : i - 1];
+    if (distance <= margin) keep(polygon.corner[i], distance, 8 * before + polygon.edge[i]);
   }
   // For faces that touch along an edge, rounding may remove all points.
-  if (manifold->count == 0) {
-    keep(support(other_half, rotation, offset, -outward), manifold->distance);
+  if (manifold->count == 0 && manifold->distance <= 0) {
+    keep(support(other_half, rotation, offset, -outward), manifold->distance, 0);
   }
 }
 
@@ -180,38 +195,59 @@ JFPX_HD inline Vec3 edge_point(const BoxPair& pair, int i, int j, const Vec3& no
   return (add_scaled(on_a, dir_a, s) + add_scaled(on_b, dir_b, t)) * Real(0.5);
 }
 
-/// The contact manifold of two boxes; boxes that only touch are in contact. The normal points from
-/// b to a.
-JFPX_HD inline Manifold collide_boxes(const Box& a, const Transform& pose_a, const Box& b,
-                                      const Transform& pose_b) {
-  const BoxPair pair{a.half_extents, b.half_extents, transposed(pose_a.basis) * pose_b.basis,
-                     transform_transpose(pose_a.basis, pose_b.origin - pose_a.origin),
-                     length(a.half_extents) + length(b.half_extents)};
-  LeastOverlap least;
+/// Two boxes in the axes of the first.
+JFPX_HD inline BoxPair make_box_pair(const Box& a, const Transform& pose_a, const Box& b,
+                                     const Transform& pose_b) {
+  return {a.half_extents, b.half_extents, transposed(pose_a.basis) * pose_b.basis,
+          transform_transpose(pose_a.basis, pose_b.origin - pose_a.origin),
+          length(a.half_extents) + length(b.half_extents)};
+}
+
+/// The contact manifold of two boxes for an axis of least overlap. The normal points from b to a.
+/// Feature numbers of a reference face of b, and of edges, are above those of a.
+/// @param margin points with at most this distance are in the manifold
+JFPX_HD inline Manifold box_manifold(const BoxPair& pair, const LeastOverlap& least,
+                                     const Transform& pose_a, const Transform& pose_b,
+                                     Real margin) {
+  constexpr std::uint32_t kFeaturesOfBox = 36 * 64;
   Manifold manifold;
-  if (!least_overlap(pair, &least)) return manifold;
   manifold.distance = least.distance;
   manifold.normal = pose_a.basis * least.normal;
 
   const Transform* frame = &pose_a;
+  std::uint32_t first_feature = 0;
   if (least.axis < 3) {
     const Real side = least.normal[least.axis] > 0 ? Real(-1) : Real(1);
-    face_points(pair.half_a, least.axis, side, pair.half_b, pair.rotation, pair.offset, &manifold);
+    face_points(pair.half_a, least.axis, side, pair.half_b, pair.rotation, pair.offset, margin,
+                &manifold);
   } else if (least.axis < 6) {
     frame = &pose_b;
+    first_feature = kFeaturesOfBox;
     const int face = least.axis - 3;
     const Real side = dot(least.normal, pair.rotation.column(face)) > 0 ? Real(1) : Real(-1);
     face_points(pair.half_b, face, side, pair.half_a, transposed(pair.rotation),
-                -transform_transpose(pair.rotation, pair.offset), &manifold);
+                -transform_transpose(pair.rotation, pair.offset), margin, &manifold);
   } else {
     const int edges = least.axis - 6;
     manifold.points[manifold.count++] = {edge_point(pair, edges / 3, edges % 3, least.normal),
-                                         least.distance};
+                                         least.distance,
+                                         2 * kFeaturesOfBox + static_cast<std::uint32_t>(edges)};
   }
   for (int i = 0; i < manifold.count; ++i) {
     manifold.points[i].point = transform_point(*frame, manifold.points[i].point);
+    manifold.points[i].feature += first_feature;
   }
   return manifold;
+}
+
+/// The contact manifold of two boxes; boxes that only touch are in contact. The normal points from
+/// b to a.
+JFPX_HD inline Manifold collide_boxes(const Box& a, const Transform& pose_a, const Box& b,
+                                      const Transform& pose_b) {
+  const BoxPair pair = make_box_pair(a, pose_a, b, pose_b);
+  LeastOverlap least;
+  if (!least_overlap(pair, 0, &least)) return {};
+  return box_manifold(pair, least, pose_a, pose_b, 0);
 }
 
 }  // namespace detail

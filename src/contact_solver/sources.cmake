@@ -1,10 +1,13 @@
 list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/coloring.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/contact_cache.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/greedy_coloring.cpp
   ${CMAKE_CURRENT_LIST_DIR}/group_solver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/row_order.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_avx2.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_scalar.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/cpu/row_solver.cpp)
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/row_solver.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/soft_step_solver.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/group_solver_cuda.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/row_kernels.cu)

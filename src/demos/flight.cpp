@@ -71,6 +71,7 @@ Scene flight_scene(Real dt) {
   aircraft.can_sleep = false;
   Scene scene;
   scene.name = "flight";
+  scene.solver = Solver::worst_first;
   scene.dt = dt;
   scene.bodies = {aircraft};
   return scene;

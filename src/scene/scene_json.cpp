@@ -63,12 +63,14 @@ void read(const Json& json, const std::string& where, std::uint64_t& out) {
   }
   out = json.get<std::uint64_t>();
 }
-void read(const Json& json, const std::string& where, CombineRule& out) {
+/// An enumeration whose to_string() returns null past the last value.
+template <class Enum>
+requires std::is_enum_v<Enum>
+void read(const Json& json, const std::string& where, Enum& out) {
   std::string name, names;
   read(json, where, name);
-  // to_string() returns null past the last rule.
-  for (std::uint8_t i = 0; to_string(CombineRule{i}) != nullptr; ++i) {
-    out = CombineRule{i};
+  for (std::uint8_t i = 0; to_string(Enum{i}) != nullptr; ++i) {
+    out = Enum{i};
     if (name == to_string(out)) return;
     names += (i == 0 ? "" : ", ") + std::string(to_string(out));
   }
@@ -103,6 +105,7 @@ void read(const Json& json, const std::string& where, std::variant<Sphere, Box>&
 void read(const Json& json, const std::string& where, std::vector<CompoundPart>& parts);
 void read(const Json& json, const std::string& where, CollisionFilter& filter);
 void read(const Json& json, const std::string& where, std::vector<BodyPair>& pairs);
+void read(const Json& json, const std::string& where, SoftStepSettings& settings);
 void read(const Json& json, const std::string& where, ResolverSettings& settings);
 void read(const Json& json, const std::string& where, SleepSettings& settings);
 void read(const Json& json, const std::string& where, MaterialSettings& settings);
@@ -256,10 +259,23 @@ void read(const Json& json, const std::string& where, BodyDef& body) {
   object.optional("angular_damping", body.angular_damping);
   object.optional("friction", body.friction);
   object.optional("restitution", body.restitution);
+  object.optional("rolling_friction", body.rolling_friction);
+  object.optional("spinning_friction", body.spinning_friction);
   object.optional("can_sleep", body.can_sleep);
   object.optional("filter", body.filter);
   object.optional("sensor", body.sensor);
   object.optional("user_data", body.user_data);
+  object.reject_unknown();
+}
+
+void read(const Json& json, const std::string& where, SoftStepSettings& settings) {
+  ObjectReader object(json, where);
+  object.optional("substeps", settings.substeps);
+  object.optional("contact_hertz", settings.contact_hertz);
+  object.optional("damping_ratio", settings.damping_ratio);
+  object.optional("push_out_speed", settings.push_out_speed);
+  object.optional("restitution_threshold", settings.restitution_threshold);
+  object.optional("speculative_margin", settings.speculative_margin);
   object.reject_unknown();
 }
 
@@ -276,6 +292,8 @@ void read(const Json& json, const std::string& where, ResolverSettings& settings
 void read(const Json& json, const std::string& where, SleepSettings& settings) {
   ObjectReader object(json, where);
   object.optional("enabled", settings.enabled);
+  object.optional("speed", settings.speed);
+  object.optional("time", settings.time);
   object.optional("epsilon", settings.epsilon);
   object.optional("bias", settings.bias);
   object.reject_unknown();
@@ -291,13 +309,17 @@ void read(const Json& json, const std::string& where, MaterialSettings& settings
 Scene scene_from(const Json& json) {
   ObjectReader object(json, "scene");
   const Json& version = object.at("jfpx_scene");
-  if (version != kSceneSchemaVersion) {
-    fail("scene.jfpx_scene", "is " + text_of(version) + "; this build reads schema version " +
+  if (version != kSceneSchemaVersion && version != 1) {
+    fail("scene.jfpx_scene", "is " + text_of(version) +
+                                 "; this build reads schema versions 1 and " +
                                  std::to_string(kSceneSchemaVersion));
   }
   Scene scene;
+  if (version == 1) scene.solver = Solver::worst_first;  // the only one of that version
   object.optional("name", scene.name);
   object.optional("dt", scene.dt);
+  object.optional("solver", scene.solver);
+  object.optional("soft_step", scene.soft_step);
   object.optional("resolver", scene.resolver);
   object.optional("sleep", scene.sleep);
   object.optional("materials", scene.materials);

@@ -77,6 +77,8 @@ Json to_value(const BodyDef& b) {
   if (b.filter != CollisionFilter{}) {
     json["filter"] = {{"category", b.filter.category}, {"mask", b.filter.mask}};
   }
+  if (b.rolling_friction > 0) json["rolling_friction"] = b.rolling_friction;
+  if (b.spinning_friction > 0) json["spinning_friction"] = b.spinning_friction;
   if (b.sensor) json["sensor"] = true;
   if (b.user_data != 0) json["user_data"] = b.user_data;
   return json;
@@ -86,6 +88,13 @@ Json to_value(const BodyDef& b) {
 
 std::string to_json(const Scene& scene) {
   validate(scene);
+  const SoftStepSettings& s = scene.soft_step;
+  const Json soft_step = {{"substeps", s.substeps},
+                          {"contact_hertz", s.contact_hertz},
+                          {"damping_ratio", s.damping_ratio},
+                          {"push_out_speed", s.push_out_speed},
+                          {"restitution_threshold", s.restitution_threshold},
+                          {"speculative_margin", s.speculative_margin}};
   const ResolverSettings& r = scene.resolver;
   const Json resolver = {{"max_iterations", r.max_iterations},
                          {"velocity_epsilon", r.velocity_epsilon},
@@ -93,6 +102,8 @@ std::string to_json(const Scene& scene) {
                          {"restitution_velocity", r.restitution_velocity},
                          {"angular_limit", r.angular_limit}};
   const Json sleep = {{"enabled", scene.sleep.enabled},
+                      {"speed", scene.sleep.speed},
+                      {"time", scene.sleep.time},
                       {"epsilon", scene.sleep.epsilon},
                       {"bias", scene.sleep.bias}};
   const Json materials = {{"friction", to_string(scene.materials.friction)},
@@ -106,7 +117,8 @@ std::string to_json(const Scene& scene) {
   // The outer structure is written by hand, so that a file has one line per body.
   std::string text = "{\"jfpx_scene\": " + std::to_string(kSceneSchemaVersion) +
                      ",\n \"name\": " + quoted(scene.name) +
-                     ",\n \"dt\": " + Json(scene.dt).dump() +
+                     ",\n \"dt\": " + Json(scene.dt).dump() + ",\n \"solver\": \"" +
+                     to_string(scene.solver) + "\",\n \"soft_step\": " + soft_step.dump() +
                      ",\n \"resolver\": " + resolver.dump() + ",\n \"sleep\": " + sleep.dump() +
                      ",\n \"materials\": " + materials.dump() + pairs + ",\n \"bodies\": [";
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {

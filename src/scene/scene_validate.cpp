@@ -157,7 +157,38 @@ std::string find_fault(const BodyDef& def) {
   found = find_damping_fault(def.linear_damping, def.angular_damping);
   if (!found.empty()) return found;
   found = find_friction_fault(def.friction);
-  return found.empty() ? find_restitution_fault(def.restitution) : found;
+  if (found.empty()) found = find_restitution_fault(def.restitution);
+  if (!found.empty()) return found;
+  if (!(def.rolling_friction >= 0 && is_finite(def.rolling_friction))) {
+    return fault("rolling_friction", def.rolling_friction, "finite and >= 0");
+  }
+  if (!(def.spinning_friction >= 0 && is_finite(def.spinning_friction))) {
+    return fault("spinning_friction", def.spinning_friction, "finite and >= 0");
+  }
+  return {};
+}
+
+std::string find_fault(const SoftStepSettings& soft_step) {
+  if (!(soft_step.substeps >= 1 && soft_step.substeps <= 64)) {
+    return fault("soft_step.substeps", static_cast<Real>(soft_step.substeps), "from 1 to 64");
+  }
+  if (!(soft_step.contact_hertz >= 0 && is_finite(soft_step.contact_hertz))) {
+    return fault("soft_step.contact_hertz", soft_step.contact_hertz, "finite and >= 0");
+  }
+  if (!(soft_step.damping_ratio >= Real(0.01) && soft_step.damping_ratio <= 1000)) {
+    return fault("soft_step.damping_ratio", soft_step.damping_ratio, "in [0.01, 1000]");
+  }
+  if (!(soft_step.push_out_speed > 0 && is_finite(soft_step.push_out_speed))) {
+    return fault("soft_step.push_out_speed", soft_step.push_out_speed, "finite and > 0");
+  }
+  if (!(soft_step.restitution_threshold >= 0 && is_finite(soft_step.restitution_threshold))) {
+    return fault("soft_step.restitution_threshold", soft_step.restitution_threshold,
+                 "finite and >= 0");
+  }
+  if (!(soft_step.speculative_margin >= 0 && soft_step.speculative_margin <= kMaxCoordinate)) {
+    return fault("soft_step.speculative_margin", soft_step.speculative_margin, "in [0, 1e9]");
+  }
+  return {};
 }
 
 std::string find_fault(const ResolverSettings& resolver) {
@@ -200,6 +231,12 @@ std::string find_fault(std::span<const BodyPair> ignored_pairs, std::uint64_t bo
 std::string find_fault(const SleepSettings& sleep) {
   if (!(sleep.epsilon > 0 && is_finite(sleep.epsilon))) {
     return fault("sleep.epsilon", sleep.epsilon, "finite and > 0");
+  }
+  if (!(sleep.speed >= 0 && is_finite(sleep.speed))) {
+    return fault("sleep.speed", sleep.speed, "finite and >= 0");
+  }
+  if (!(sleep.time >= 0 && is_finite(sleep.time))) {
+    return fault("sleep.time", sleep.time, "finite and >= 0");
   }
   if (!(sleep.bias > 0 && sleep.bias <= 1)) return fault("sleep.bias", sleep.bias, "in (0, 1]");
   return {};
@@ -286,8 +323,12 @@ void validate(const Scene& scene) {
   if (!(scene.dt >= std::numeric_limits<Real>::min() && is_finite(scene.dt))) {
     throw InvalidScene("scene: " + fault("dt", scene.dt, "finite, > 0 and not denormal"));
   }
-  for (const std::string& found :
-       {find_fault(scene.resolver), find_fault(scene.sleep), find_fault(scene.materials)}) {
+  if (to_string(scene.solver) == nullptr) {
+    throw InvalidScene("scene: " + fault("solver", static_cast<Real>(scene.solver),
+                                         "one of the values of Solver"));
+  }
+  for (const std::string& found : {find_fault(scene.soft_step), find_fault(scene.resolver),
+                                   find_fault(scene.sleep), find_fault(scene.materials)}) {
     if (!found.empty()) throw InvalidScene("scene: " + found);
   }
   validate_body_count(scene.bodies.size());

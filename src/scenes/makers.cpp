@@ -1,4 +1,4 @@
-/// Lattice sites, spheres and containers of the named scenes.
+/// Lattice sites, bodies and containers of the named scenes.
 #include "src/scenes/makers.hpp"
 
 namespace jfpx {
@@ -23,6 +23,31 @@ BodyDef sphere_at(const Vec3& position, Real radius, Real mass) {
   body.mass = mass;
   body.position = position;
   return body;
+}
+
+BodyDef box_at(const Vec3& position, const Vec3& half_extents, Real mass) {
+  BodyDef body;
+  body.shape = Box{half_extents};
+  body.mass = mass;
+  body.position = position;
+  return body;
+}
+
+void add_ground(Scene& scene) {
+  BodyDef ground;
+  ground.shape = HalfSpace{{0, 1, 0}, 0};
+  ground.mass = 0;
+  scene.bodies.push_back(ground);
+}
+
+void add_balls(Scene& scene, std::uint32_t count, const Vec3& target) {
+  constexpr Real kRadius = Real(0.3), kSpeed = 20;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Real time = static_cast<Real>(i + 1);
+    BodyDef ball = sphere_at(target - Vec3{0, 0, kSpeed * time + kRadius}, kRadius, 50);
+    ball.velocity = {0, ball.acceleration.y * time * Real(-0.5), kSpeed};
+    scene.bodies.push_back(ball);
+  }
 }
 
 void add_container(Scene& scene, const Vec3& lower, const Vec3& upper, bool closed,

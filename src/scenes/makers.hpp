@@ -19,6 +19,12 @@ Scene make_columns(const Counts& counts);
 Scene make_overlap(const Counts& counts);
 Scene make_lattice(const Counts& counts);
 Scene make_polydisperse(const Counts& counts);
+Scene make_tower(const Counts& counts);
+Scene make_pyramid(const Counts& counts);
+Scene make_wall(const Counts& counts);
+Scene make_mass_ratio(const Counts& counts);
+Scene make_slope(const Counts& counts);
+Scene make_giant(const Counts& counts);
 
 /// The smallest integer whose cube is at least n.
 std::uint32_t cube_side(std::uint32_t n);
@@ -28,6 +34,13 @@ Vec3 lattice_site(std::uint32_t i, std::uint32_t side);
 
 /// A movable sphere.
 BodyDef sphere_at(const Vec3& position, Real radius, Real mass);
+/// A movable box.
+BodyDef box_at(const Vec3& position, const Vec3& half_extents, Real mass);
+/// Adds the ground, the half-space y <= 0.
+void add_ground(Scene& scene);
+/// Adds balls of radius 0.3 m and 50 kg that fly along z at 20 m/s. Ball i hits the target after
+/// i + 1 seconds.
+void add_balls(Scene& scene, std::uint32_t count, const Vec3& target);
 /// Adds static boxes, 2 m thick, as walls around the inner box [lower, upper]: a floor, four sides,
 /// and a lid if `closed`.
 /// @param material the walls' friction, restitution and other fields besides mass, shape and

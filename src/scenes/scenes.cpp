@@ -32,6 +32,18 @@ constexpr Entry kScenes[] = {
      make_lattice},
     {"polydisperse", "radii over four decades, from 0.5 mm to 5 m", 2000, Boxes::none,
      make_polydisperse},
+    {"tower", "--boxes crates on top of each other, and --spheres balls that hit them", 0,
+     Boxes::as_listed, make_tower, 20},
+    {"pyramid", "a pyramid of 20 rows of crates, and --spheres balls that hit it", 0,
+     Boxes::as_listed, make_pyramid, 210},
+    {"wall", "a wall of 80 bricks, which a ball hits after one second", 1, Boxes::as_listed,
+     make_wall, 80},
+    {"mass-ratio", "boxes and spheres of 100 kg and 1000 kg, each on a box of 1 kg", 4,
+     Boxes::as_listed, make_mass_ratio, 4},
+    {"slope", "boxes on slopes one degree below and above the angle of friction", 0,
+     Boxes::as_listed, make_slope, 8},
+    {"giant", "one sphere of radius 20 m on a bed of spheres of radius 0.1 m", 4000, Boxes::none,
+     make_giant},
 };
 
 std::uint32_t boxes_of(const Entry& entry, std::uint32_t spheres,
@@ -41,7 +53,8 @@ std::uint32_t boxes_of(const Entry& entry, std::uint32_t spheres,
                           "; it must be absent, because \"" + std::string(entry.name) +
                           "\" has no variable number of boxes");
   }
-  return requested.value_or(entry.boxes == Boxes::as_many_as_spheres ? spheres : 0);
+  return requested.value_or(entry.boxes == Boxes::as_many_as_spheres ? spheres
+                                                                     : entry.default_boxes);
 }
 
 void require_memory(std::uint64_t bodies) {

@@ -31,6 +31,7 @@ enum class Boxes : std::uint8_t {
   none,                ///< the number is fixed, and can't be set
   on_request,          ///< none by default; the number can be set
   as_many_as_spheres,  ///< one per sphere by default; the number can be set
+  as_listed,           ///< Entry::default_boxes by default; the number can be set
 };
 
 /// One row of the table of named scenes.
@@ -40,6 +41,7 @@ struct Entry {
   std::uint32_t default_spheres;
   Boxes boxes;
   Scene (*make)(const Counts& counts);
+  std::uint32_t default_boxes = 0;  ///< of Boxes::as_listed
 };
 
 /// All named scenes, in a fixed order.

@@ -24,6 +24,7 @@ void set_material(BodyDef* body) {
 Scene make_boxes_and_balls(const Counts& counts) {
   Scene scene;
   scene.name = "boxes-and-balls";
+  scene.solver = Solver::worst_first;
   scene.dt = Real(0.01);
   for (std::uint32_t i = 0; i < counts.spheres; ++i) {
     const Real y = 1 + 3 * static_cast<Real>(i);

@@ -11,6 +11,7 @@
 #include "src/world/integrate.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -49,12 +50,38 @@ Shape normalized(Shape shape) {
   return shape;
 }
 
+/// Radius of a sphere about the origin of the body's axes that encloses the shape.
+Real extent_of(const Shape& shape) {
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
+  if (const auto* box = std::get_if<Box>(&shape)) return length(box->half_extents);
+  const auto* compound = std::get_if<Compound>(&shape);
+  if (compound == nullptr) return std::numeric_limits<Real>::infinity();
+  Real extent = 0;
+  for (const CompoundPart& part : compound->parts) {
+    extent = std::max(extent, length(part.position) + bounding_radius(part));
+  }
+  return extent;
+}
+
 bool before(BodyId a, BodyId b) { return a.index < b.index; }
 
 }  // namespace
 
-BodyStore::BodyStore(Real dt, const SleepSettings& sleep)
-    : dt_(dt), sleep_(sleep), motion_kept_(kept_per_step(sleep.bias, dt)) {}
+bool is_in_world(const BodyState& state) {
+  const Vec3& x = state.position;
+  const bool is_near = absolute(x.x) <= kMaxCoordinate && absolute(x.y) <= kMaxCoordinate &&
+                       absolute(x.z) <= kMaxCoordinate;
+  // If the square of the angular velocity overflows, normalized() returns a zero quaternion.
+  const bool is_rotation = length_squared(state.orientation) > Real(0.5);
+  return is_near && is_rotation && is_finite(state.orientation) && is_finite(state.velocity) &&
+         is_finite(state.angular_velocity);
+}
+
+BodyStore::BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps)
+    : dt_(dt),
+      substep_(dt / static_cast<Real>(substeps)),
+      sleep_(sleep),
+      motion_kept_(kept_per_step(sleep.bias, dt)) {}
 
 /// Adds an unused slot. If an allocation fails, capacity() is unchanged, because generation_ grows
 /// last. Reserves memory for free_ and ids_, so that remove() and the rest of add() do not
@@ -65,11 +92,12 @@ void BodyStore::add_slot() {
   reserve_geometric(&ids_, slots);
   const auto all = [slots](auto&... arrays) { (arrays.resize(slots), ...); };
   all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
-      moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion, moving.awake);
-  all(shape_, radius_, mass_, inverse_mass_, friction_, restitution_, inertia_,
-      body_inverse_inertia_, tensor_, acceleration_, linear_damping_, angular_damping_,
-      velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_, sensor_, inertia_given_,
-      user_data_, filter_, generation_);
+      moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion,
+      moving.rest_time, moving.awake);
+  all(shape_, radius_, extent_, mass_, inverse_mass_, friction_, restitution_, rolling_friction_,
+      spinning_friction_, inertia_, body_inverse_inertia_, tensor_, acceleration_, linear_damping_,
+      angular_damping_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_, sensor_,
+      inertia_given_, user_data_, filter_, generation_);
   free_.push_back(static_cast<std::uint32_t>(slots - 1));
 }
 
@@ -84,7 +112,10 @@ BodyId BodyStore::add(const BodyDef& def) {
   shape_[i] = std::move(shape);
   const auto* sphere = std::get_if<Sphere>(&def.shape);
   radius_[i] = sphere != nullptr ? sphere->radius : Real(0);
+  extent_[i] = extent_of(shape_[i]);
   friction_[i] = def.friction;
+  rolling_friction_[i] = def.rolling_friction;
+  spinning_friction_[i] = def.spinning_friction;
   restitution_[i] = def.restitution;
   mass_[i] = def.mass;
   inverse_mass_[i] = def.mass > 0 ? Real(1) / def.mass : Real(0);
@@ -97,7 +128,7 @@ BodyId BodyStore::add(const BodyDef& def) {
   sensor_[i] = def.sensor ? 1 : 0;
   set_filter(i, def.filter);
   moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
-  moving.motion[i] = 0;
+  moving.motion[i] = moving.rest_time[i] = 0;
   moving.awake[i] = 0;
   if (movable(i)) ++movable_count_;
   if (kinematic(i)) ++kinematic_count_;
@@ -136,8 +167,8 @@ void BodyStore::compute_inertia(std::uint32_t i, const std::optional<Mat3>& give
 void BodyStore::set_damping(std::uint32_t i, Real linear, Real angular) {
   linear_damping_[i] = linear;
   angular_damping_[i] = angular;
-  velocity_kept_[i] = kept_per_step(linear, dt_);
-  angular_velocity_kept_[i] = kept_per_step(angular, dt_);
+  velocity_kept_[i] = kept_per_step(linear, substep_);
+  angular_velocity_kept_[i] = kept_per_step(angular, substep_);
 }
 
 void BodyStore::remove(BodyId id) noexcept {
@@ -227,6 +258,7 @@ void BodyStore::wake(std::uint32_t i) {
   if (!movable(i)) return;
   moving.awake[i] = 1;
   moving.motion[i] = 2 * sleep_.epsilon;
+  moving.rest_time[i] = 0;
 }
 
 void BodyStore::wake_by_contact(std::uint32_t sleeper, std::uint32_t awake) {
@@ -234,6 +266,7 @@ void BodyStore::wake_by_contact(std::uint32_t sleeper, std::uint32_t awake) {
   // together; with a minimum, they would wake each other alternately without end.
   moving.awake[sleeper] = 1;
   moving.motion[sleeper] = moving.motion[awake];
+  moving.rest_time[sleeper] = 0;
 }
 
 void BodyStore::keep_awake(std::uint32_t i) {
@@ -288,6 +321,67 @@ bool BodyStore::falls_asleep(std::uint32_t i) {
   moving.awake[i] = 0;
   moving.velocity[i] = moving.angular_velocity[i] = {};
   return true;
+}
+
+Vec3 BodyStore::predicted_motion(std::uint32_t i) const {
+  if (moving.awake[i] == 0) return {};
+  const Vec3 acceleration =
+      movable(i) ? add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]) : Vec3{};
+  const Vec3 motion = add_scaled(moving.velocity[i], acceleration, dt_) * dt_;
+  constexpr Real kFarthest = 2 * kMaxCoordinate;
+  const bool stays = absolute(motion.x) <= kFarthest && absolute(motion.y) <= kFarthest &&
+                     absolute(motion.z) <= kFarthest;
+  return stays ? motion : Vec3{};
+}
+
+void BodyStore::update_acceleration(std::uint32_t i) {
+  moving.last_acceleration[i] = add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]);
+}
+
+void BodyStore::accelerate(std::uint32_t i, const Quat& orientation, Vec3* velocity,
+                           Vec3* angular_velocity) const {
+  *velocity = detail::integrated_velocity(*velocity, moving.last_acceleration[i], substep_,
+                                          velocity_kept_[i]);
+  *angular_velocity =
+      detail::integrated_velocity(*angular_velocity, moving.inverse_inertia[i] * moving.torque[i],
+                                  substep_, angular_velocity_kept_[i]);
+  if (tensor_[i](0, 0) > 0) {
+    // Unlike precessed(), this does not rotate the velocity to and fro: rounding makes axes not
+    // quite orthonormal, always to the same side, and with many substeps energy would grow
+    // noticeably.
+    const Mat3 axes = to_matrix(orientation);
+    const Vec3 w = transform_transpose(axes, *angular_velocity);
+    Vec3 change;
+    if (detail::gyroscopic_change(w, tensor_[i], substep_, &change)) {
+      *angular_velocity += axes * change;
+    }
+  }
+}
+
+void BodyStore::end_step(std::uint32_t i, const BodyState& state) {
+  moving.position[i] = state.position;
+  moving.orientation[i] = state.orientation;
+  moving.velocity[i] = state.velocity;
+  moving.angular_velocity[i] = state.angular_velocity;
+  if (!is_round(i)) refresh_inertia(i);
+}
+
+/// A body that a force drives must be slower before it may sleep: at the ordinary speed, a damped
+/// spring would still be far from its equilibrium. The rotation of a sphere counts less, because it
+/// moves the surface within itself, and no friction ends a rotation about the contact normal.
+void BodyStore::update_rest_time(std::uint32_t i, bool is_driven) {
+  constexpr Real kDriven = Real(0.04), kRotationOfSphere = Real(0.1);
+  const Real limit = is_driven ? sleep_.speed * kDriven : sleep_.speed;
+  const Real weight = radius_[i] > 0 ? kRotationOfSphere : Real(1);
+  const Real spin = length(moving.angular_velocity[i]) * extent_[i] * weight;
+  const Real speed = std::max(length(moving.velocity[i]), spin);
+  const bool is_slow = can_sleep_[i] != 0 && speed <= limit;
+  moving.rest_time[i] = is_slow ? moving.rest_time[i] + dt_ : Real(0);
+}
+
+void BodyStore::put_to_sleep(std::uint32_t i) {
+  moving.awake[i] = 0;
+  moving.velocity[i] = moving.angular_velocity[i] = {};
 }
 
 void BodyStore::refresh_inertia(std::uint32_t i) {

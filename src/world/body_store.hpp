@@ -27,15 +27,21 @@ struct MotionArrays {
   /// [m^2/s^2], recency-weighted mean of v^2 + w^2, compared with SleepSettings::epsilon (thesis
   /// 4.4.2)
   std::vector<Real> motion;
+  std::vector<Real> rest_time;      ///< [s], since when the body is slow; soft_step
   std::vector<std::uint8_t> awake;  ///< 1 or 0; a body of mass 0: 1 if kinematic and moving
 };
+
+/// Whether all values of a state are finite, and no coordinate is above kMaxCoordinate.
+bool is_in_world(const BodyState& state);
 
 /// Owns the bodies and their ids, and integrates their free motion. The arrays have unused slots,
 /// so loops over the bodies iterate over ids(), which is sorted by index. The slot of a removed
 /// body is reused with a new generation.
 class BodyStore {
  public:
-  BodyStore(Real dt, const SleepSettings& sleep);
+  /// @param dt       [s], length of a step
+  /// @param substeps number of calls of accelerate() per step
+  BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps = 1);
 
   /// @param def must have passed validation
   /// @throws std::bad_alloc; the store is then unchanged
@@ -107,19 +113,46 @@ class BodyStore {
     return !filters_in_use_ ||
            (jfpx::may_collide(filter_[a], filter_[b]) && !ignored_.contains({a, b}));
   }
+  /// Sets last_acceleration of an awake movable body for this step.
+  void update_acceleration(std::uint32_t body);
+  /// Velocities after the accelerations and the damping of a substep, without contacts.
+  /// @param orientation at the start of the substep
+  void accelerate(std::uint32_t body, const Quat& orientation, Vec3* velocity,
+                  Vec3* angular_velocity) const;
+  /// Ends a step of an awake body at the given pose and clears the accumulated force and torque.
+  void end_step(std::uint32_t body, const BodyState& state);
+  /// Updates the time for which the body has been slow.
+  void update_rest_time(std::uint32_t body, bool is_driven);
+  /// Whether the body has been slow for long enough to sleep.
+  bool is_at_rest(std::uint32_t body) const { return moving.rest_time[body] >= sleep_.time; }
+  void put_to_sleep(std::uint32_t body);
 
   bool movable(std::uint32_t body) const { return inverse_mass_[body] > 0; }
+  /// Whether the body is a movable sphere whose inertia is the same about every axis.
+  bool is_round(std::uint32_t body) const {
+    return movable(body) && radius_[body] > 0 && !(tensor_[body](0, 0) > 0);
+  }
   bool kinematic(std::uint32_t body) const { return kinematic_[body] != 0; }
   /// Whether a kinematic body is in motion.
   bool has_moving_kinematic_body() const;
   const Shape& shape(std::uint32_t body) const { return shape_[body]; }
   Real mass(std::uint32_t body) const { return mass_[body]; }
   Real inverse_mass(std::uint32_t body) const { return inverse_mass_[body]; }
+  std::span<const Real> radii() const { return radius_; }
+  std::span<const Real> frictions() const { return friction_; }
+  std::span<const Real> restitutions() const { return restitution_; }
+  std::span<const Real> rolling_frictions() const { return rolling_friction_; }
+  std::span<const Real> spinning_frictions() const { return spinning_friction_; }
   Real friction(std::uint32_t body) const { return friction_[body]; }
   Real restitution(std::uint32_t body) const { return restitution_[body]; }
   /// [m]; 0 for a body that is not a sphere, as for compounds
   Real radius(std::uint32_t body) const { return radius_[body]; }
+  /// [m], of the bounding sphere about the centre of mass; infinite for half-spaces and planes
+  Real extent(std::uint32_t body) const { return extent_[body]; }
   Real dt() const { return dt_; }
+  /// Displacement of the centre of mass during the next step, without contacts and damping [m];
+  /// zero for a body at rest, and for one so fast that it leaves the world.
+  Vec3 predicted_motion(std::uint32_t body) const;
 
   MotionArrays moving;
 
@@ -132,19 +165,20 @@ class BodyStore {
   void refresh_inertia(std::uint32_t body);
   void update_filters_in_use() noexcept;
 
-  Real dt_;
+  Real dt_, substep_;
   SleepSettings sleep_;
   Real motion_kept_;  ///< SleepSettings::bias^dt: weight of the previous mean motion
 
   std::vector<Shape> shape_;
-  std::vector<Real> radius_, mass_, inverse_mass_, friction_, restitution_;
+  std::vector<Real> radius_, extent_, mass_, inverse_mass_, friction_, restitution_;
+  std::vector<Real> rolling_friction_, spinning_friction_;
   std::vector<Mat3> inertia_, body_inverse_inertia_;  ///< body axes
   /// Inertia in body axes, divided by its largest diagonal entry, for the gyroscopic term; zero if
   /// that term is zero (isotropic inertia or mass 0).
   std::vector<Mat3> tensor_;
   std::vector<Vec3> acceleration_;                           ///< BodyDef::acceleration
   std::vector<Real> linear_damping_, angular_damping_;       ///< those of BodyDef
-  std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^dt
+  std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^substep
   std::vector<std::uint8_t> can_sleep_, kinematic_, sensor_, inertia_given_;
   std::vector<std::uint64_t> user_data_;
   std::vector<CollisionFilter> filter_;  ///< the default in unused slots

@@ -14,40 +14,11 @@ std::uint64_t pair_of(std::uint32_t low, std::uint32_t high) {
 
 }  // namespace
 
-void ContactEvents::update(std::span<const Contact> contacts) {
-  sort(contacts);
-  next_.clear();
-  std::size_t entry = 0;
-  const auto end = [this](const ContactEvent& old) {
-    next_.push_back(old);
-    next_.back().phase = ContactPhase::end;
-  };
-  for (const ContactEvent& old : events_) {
-    if (old.phase == ContactPhase::end) continue;
-    const std::uint64_t pair = pair_of(old.a.index, old.b.index);
-    while (entry < sorted_.size() && sorted_[entry].pair < pair) {
-      next_.push_back(next_pair(contacts, &entry));
-    }
-    if (entry == sorted_.size() || sorted_[entry].pair > pair) {
-      end(old);
-      continue;
-    }
-    ContactEvent now = next_pair(contacts, &entry);
-    if (now.a == old.a && now.b == old.b) {
-      now.phase = ContactPhase::stay;
-    } else {
-      end(old);
-    }
-    next_.push_back(now);
-  }
-  while (entry < sorted_.size()) next_.push_back(next_pair(contacts, &entry));
-  std::swap(events_, next_);
-  cleared_ = false;
-}
-
-/// Fills sorted_ with the contacts, sorted by pair. Most contacts are between spheres and already
-/// sorted, so only the part after the first sorted run is sorted and then merged with it.
-void ContactEvents::sort(std::span<const Contact> contacts) {
+/// Most contacts are between spheres and already sorted, so only the part after the first sorted
+/// run is sorted and then merged with it.
+void ContactEvents::PairList::start(std::span<const Contact> contacts) {
+  contacts_ = contacts;
+  next_ = 0;
   found_.clear();
   for (std::uint32_t i = 0; i < contacts.size(); ++i) {
     const auto [low, high] = std::minmax(contacts[i].a.index, contacts[i].b.index);
@@ -59,14 +30,12 @@ void ContactEvents::sort(std::span<const Contact> contacts) {
   std::merge(found_.begin(), rest, rest, found_.end(), sorted_.begin());
 }
 
-/// Returns a begin event for the pair at position `entry` of sorted_, and advances `entry` to the
-/// next pair.
-ContactEvent ContactEvents::next_pair(std::span<const Contact> contacts, std::size_t* entry) const {
-  const std::uint64_t pair = sorted_[*entry].pair;
-  const Contact* deepest = &contacts[sorted_[*entry].contact];
+ContactEvent ContactEvents::PairList::take() {
+  const std::uint64_t pair = sorted_[next_].pair;
+  const Contact* deepest = &contacts_[sorted_[next_].contact];
   ContactEvent event;
-  for (; *entry < sorted_.size() && sorted_[*entry].pair == pair; ++*entry, ++event.contacts) {
-    const Contact& contact = contacts[sorted_[*entry].contact];
+  for (; next_ < sorted_.size() && sorted_[next_].pair == pair; ++next_, ++event.contacts) {
+    const Contact& contact = contacts_[sorted_[next_].contact];
     if (contact.distance < deepest->distance) deepest = &contact;
   }
   const bool swapped = deepest->a.index > deepest->b.index;
@@ -76,6 +45,41 @@ ContactEvent ContactEvents::next_pair(std::span<const Contact> contacts, std::si
   event.point = deepest->point;
   event.distance = deepest->distance;
   return event;
+}
+
+void ContactEvents::compute(std::span<const Contact> before, std::span<const Contact> after) const {
+  before_.start(before);
+  after_.start(after);
+  events_.clear();
+  const auto add = [this](ContactEvent event, ContactPhase phase) {
+    event.phase = phase;
+    events_.push_back(event);
+  };
+  while (!before_.at_end() || !after_.at_end()) {
+    if (before_.at_end() || (!after_.at_end() && after_.pair() < before_.pair())) {
+      add(after_.take(), ContactPhase::begin);
+    } else if (after_.at_end() || before_.pair() < after_.pair()) {
+      add(before_.take(), ContactPhase::end);
+    } else {
+      const ContactEvent old = before_.take(), now = after_.take();
+      const bool stays = now.a == old.a && now.b == old.b;
+      // A new body may have the index of an old one.
+      if (!stays) add(old, ContactPhase::end);
+      add(now, stays ? ContactPhase::stay : ContactPhase::begin);
+    }
+  }
+}
+
+std::span<const ContactEvent> ContactEvents::between(std::span<const Contact> before,
+                                                     std::span<const Contact> after) const {
+  if (!current_.load(std::memory_order_acquire)) {
+    const std::lock_guard lock(computing_);
+    if (!current_.load(std::memory_order_relaxed)) {
+      compute(before, after);
+      current_.store(true, std::memory_order_release);
+    }
+  }
+  return events_;
 }
 
 }  // namespace JFPX_ABI

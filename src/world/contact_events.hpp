@@ -3,26 +3,27 @@
 
 #include <jfpx/world.hpp>
 
+#include <atomic>
 #include <cstddef>
+#include <mutex>
 #include <span>
 #include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Compares the contacts of a step with those of the last successful step. Buffers grow and never
+/// Compares the contacts of two steps, when the events are asked for. Buffers grow and never
 /// shrink.
 class ContactEvents {
  public:
-  /// Computes the events of a successful step. A failed allocation leaves the events unchanged.
-  /// @param contacts all detected contacts of the step, without those of contact generators
-  void update(std::span<const Contact> contacts);
-  /// Makes list() empty until the next update(), which still compares with the current pairs.
-  void clear() noexcept { cleared_ = true; }
-  /// Sorted by (a.index, b.index); an end event precedes a begin event with the same indices.
-  std::span<const ContactEvent> list() const noexcept {
-    return cleared_ ? std::span<const ContactEvent>() : events_;
-  }
+  /// Must be called when one of the lists of contacts changes.
+  void invalidate() noexcept { current_.store(false, std::memory_order_relaxed); }
+  /// Events between two lists of detected contacts, sorted by (a.index, b.index); an end event
+  /// precedes a begin event with the same indices. Valid until invalidate(). Several threads may
+  /// call it with the same lists.
+  /// @throws std::bad_alloc; the next call tries again
+  std::span<const ContactEvent> between(std::span<const Contact> before,
+                                        std::span<const Contact> after) const;
 
  private:
   /// A contact and the pair of its bodies.
@@ -31,13 +32,27 @@ class ContactEvents {
     std::uint32_t contact;  ///< index in the contacts
     friend auto operator<=>(const Entry&, const Entry&) = default;
   };
+  /// The pairs of a list of contacts, in ascending order.
+  class PairList {
+   public:
+    void start(std::span<const Contact> contacts);
+    bool at_end() const { return next_ == sorted_.size(); }
+    std::uint64_t pair() const { return sorted_[next_].pair; }
+    /// The current pair as an event without phase. Advances to the next pair.
+    ContactEvent take();
 
-  void sort(std::span<const Contact> contacts);
-  ContactEvent next_pair(std::span<const Contact> contacts, std::size_t* entry) const;
+   private:
+    std::span<const Contact> contacts_;
+    std::vector<Entry> found_, sorted_;
+    std::size_t next_ = 0;
+  };
 
-  std::vector<Entry> found_, sorted_;
-  std::vector<ContactEvent> events_, next_;
-  bool cleared_ = false;  ///< whether clear() was called after the last update()
+  void compute(std::span<const Contact> before, std::span<const Contact> after) const;
+
+  mutable std::atomic<bool> current_{false};
+  mutable std::mutex computing_;
+  mutable PairList before_, after_;
+  mutable std::vector<ContactEvent> events_;
 };
 
 }  // namespace JFPX_ABI

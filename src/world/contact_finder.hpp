@@ -4,8 +4,11 @@
 #include <jfpx/collide.hpp>
 #include <jfpx/world.hpp>
 
+#include "src/base/thread_pool.hpp"
+#include "src/contact_solver/contact_set.hpp"
 #include "src/world/body_store.hpp"
 #include "src/world/broad_phase_search.hpp"
+#include "src/world/near_pair_test.hpp"
 #include "src/world/sub_shape_table.hpp"
 
 namespace jfpx {
@@ -32,6 +35,17 @@ class ContactFinder {
   /// @throws the exceptions of SphereCollider::find_contacts()
   std::uint64_t find_contacts(const BodyStore& bodies, std::vector<Contact>* contacts);
 
+  /// Finds the contacts of the current poses, as find_contacts() does, and all pairs that may touch
+  /// during the step: those that are closer than a margin, and those that meet at their velocities.
+  /// Forces of the step must have been added up.
+  /// @param margin   [m], >= 0: SoftStepSettings::speculative_margin
+  /// @param near     receives all pairs, each list sorted by key
+  /// @param touching receives the contacts with distance <= 0
+  /// @returns the number of contacts of two spheres in `touching`
+  /// @throws the exceptions of SphereCollider::find_contacts()
+  std::uint64_t find_near_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
+                                   soft_step::ContactSet* near, std::vector<Contact>* touching);
+
   const SphereCollider& collider() const noexcept { return broad_phase_.collider(); }
 
  private:
@@ -54,11 +68,37 @@ class ContactFinder {
   void find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts);
   void find_fixed_candidates(const BodyStore& bodies);
   bool may_touch(SubShape sub_shape, SubShape fixed, const Vec3& centre) const;
+  /// What a chunk of a parallel loop finds.
+  struct Part {
+    NearPairs near;
+    std::vector<Candidate> candidates, compounds;
+    void clear() {
+      near.clear();
+      candidates.clear();
+      compounds.clear();
+    }
+  };
+  void sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool);
+  void test_sphere_pairs(const BodyStore& bodies, ContactSpan pairs, Part* part);
+  bool may_meet(const BodyStore& bodies, SubShape sub_shape, SubShape fixed) const;
+  void find_fixed_pairs(const BodyStore& bodies, SubShape first, SubShape last, Part* part);
+  struct Results;
+  void test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
+                       Results* results, ThreadPool* pool);
+  std::span<Part> start_parts(std::size_t count);
+  void merge_by_bodies(std::size_t middle, std::span<Contact> contacts);
 
   BroadPhaseSearch broad_phase_;
   SubShapeTable sub_shapes_;
   std::vector<SphereHit> hits_;
   std::vector<Candidate> candidates_;
+  // Of find_near_contacts():
+  std::vector<Vec3> motion_;           ///< by body [m]
+  std::vector<SphereInstance> swept_;  ///< by sub-shape, without walls: bounds of the step's motion
+  std::vector<Real> margins_;          ///< by sub-shape [m]
+  std::vector<Candidate> compounds_;   ///< pairs of spheres, at least one of a compound
+  std::vector<Part> parts_;
+  std::vector<Contact> merged_;  ///< copy of the contacts of compounds
 };
 
 }  // namespace JFPX_ABI

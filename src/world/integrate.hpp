@@ -23,20 +23,30 @@ JFPX_HD inline Quat integrated_orientation(const Quat& orientation, const Vec3& 
   return normalized(add_scaled(orientation, angular_velocity, dt));
 }
 
-/// Angular velocity after the gyroscopic term of a step: with unequal moments of inertia, it
-/// precesses about the angular momentum. One Newton step of the implicit equation in body axes
-/// (Catto, Numerical Methods, GDC 2015), which never gains energy, whereas the explicit term is
-/// unstable.
+/// Change of the angular velocity, in body axes, by the gyroscopic term of a step: with unequal
+/// moments of inertia, it precesses about the angular momentum. One Newton step of the implicit
+/// equation (Catto, Numerical Methods, GDC 2015), which never gains energy, whereas the explicit
+/// term is unstable.
+/// @param w       angular velocity in body axes
 /// @param inertia in body axes, up to a common factor
-/// @param axes    axes of the body, as columns
-JFPX_HD inline Vec3 precessed(const Vec3& angular_velocity, const Mat3& inertia, const Mat3& axes,
-                              Real dt) {
-  const Vec3 w = transform_transpose(axes, angular_velocity);
+/// @param change  receives the change
+/// @returns false if rounding has made the equation singular
+JFPX_HD inline bool gyroscopic_change(const Vec3& w, const Mat3& inertia, Real dt, Vec3* change) {
   const Vec3 momentum = inertia * w;
   const Mat3 slope = skew_symmetric(w) * inertia + skew_symmetric(momentum) * Real(-1);
   Mat3 inverse;
-  if (!invert(inertia + slope * dt, &inverse)) return angular_velocity;
-  return axes * (w - inverse * (cross(w, momentum) * dt));
+  if (!invert(inertia + slope * dt, &inverse)) return false;
+  *change = -(inverse * (cross(w, momentum) * dt));
+  return true;
+}
+
+/// Angular velocity after the gyroscopic term of a step.
+/// @param axes axes of the body, as columns
+JFPX_HD inline Vec3 precessed(const Vec3& angular_velocity, const Mat3& inertia, const Mat3& axes,
+                              Real dt) {
+  const Vec3 w = transform_transpose(axes, angular_velocity);
+  Vec3 change;
+  return gyroscopic_change(w, inertia, dt, &change) ? axes * (w + change) : angular_velocity;
 }
 
 /// Recency-weighted mean of v.v + w.w. `kept` is bias^dt. The cap bounds the time that a fast body

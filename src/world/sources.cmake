@@ -9,11 +9,14 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/forces.cpp
   ${CMAKE_CURRENT_LIST_DIR}/ignored_pairs.cpp
   ${CMAKE_CURRENT_LIST_DIR}/indexed_priority_queue.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/islands.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/near_contacts.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_resolver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/query_tree.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/soft_step.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sphere_hierarchy.cpp
   ${CMAKE_CURRENT_LIST_DIR}/state_hash.cpp
   ${CMAKE_CURRENT_LIST_DIR}/step_view.cpp

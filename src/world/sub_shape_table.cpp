@@ -1,6 +1,8 @@
 /// Decomposition of bodies into sub-shapes, and their poses.
 #include "src/world/sub_shape_table.hpp"
 
+#include "src/base/parallel_for.hpp"
+
 #include <algorithm>
 
 namespace jfpx {
@@ -18,14 +20,16 @@ Real bounding_radius(const Box& box) {
   return largest < kUnderflowLimit ? 2 * largest : length(h) * kMargin;
 }
 
-/// Calls visit(sub_shape, part or null) for each sub-shape of type T in the body.
+/// Calls visit(sub_shape, part or null, index of the part) for each sub-shape of type T in the
+/// body.
 template <class T, class Visit>
 void for_each_sub_shape(const Shape& shape, Visit visit) {
-  if (const auto* whole = std::get_if<T>(&shape)) return visit(*whole, nullptr);
+  if (const auto* whole = std::get_if<T>(&shape)) return visit(*whole, nullptr, 0);
   const auto* compound = std::get_if<Compound>(&shape);
   if (compound == nullptr) return;
-  for (const CompoundPart& part : compound->parts) {
-    if (const auto* sub_shape = std::get_if<T>(&part.shape)) visit(*sub_shape, &part);
+  for (std::uint32_t i = 0; i < compound->parts.size(); ++i) {
+    const CompoundPart& part = compound->parts[i];
+    if (const auto* sub_shape = std::get_if<T>(&part.shape)) visit(*sub_shape, &part, i);
   }
 }
 
@@ -33,14 +37,17 @@ void for_each_sub_shape(const Shape& shape, Visit visit) {
 
 void SubShapeTable::set_bodies(const BodyStore& bodies) {
   body_.clear();
+  number_.clear();
   bounds_.clear();
   boxes_.clear();
   walls_.clear();
   part_.clear();
   local_.clear();
   kinematic_.clear();
-  const auto add = [&](std::uint32_t body, Real radius, const CompoundPart* part) {
+  const auto add = [&](std::uint32_t body, Real radius, const CompoundPart* part,
+                       std::uint32_t number) {
     body_.push_back(body);
+    number_.push_back(number);
     bounds_.push_back({{}, radius});
     part_.push_back(0);
     if (part == nullptr) return;
@@ -49,8 +56,8 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
   };
   for (const BodyId id : bodies.ids()) {
     for_each_sub_shape<Sphere>(bodies.shape(id.index),
-                               [&](const Sphere& s, const CompoundPart* part) {
-                                 add(id.index, bounding_radius(s), part);
+                               [&](const Sphere& s, const CompoundPart* part, std::uint32_t i) {
+                                 add(id.index, bounding_radius(s), part, i);
                                });
   }
   sphere_count_ = size();
@@ -58,8 +65,8 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
     for (const BodyId id : bodies.ids()) {
       if (bodies.movable(id.index) != movable) continue;
       for_each_sub_shape<Box>(bodies.shape(id.index),
-                              [&](const Box& box, const CompoundPart* part) {
-                                add(id.index, bounding_radius(box), part);
+                              [&](const Box& box, const CompoundPart* part, std::uint32_t i) {
+                                add(id.index, bounding_radius(box), part, i);
                                 boxes_.push_back({box, {}});
                               });
     }
@@ -79,12 +86,14 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
       continue;
     }
     body_.push_back(id.index);
+    number_.push_back(0);
   }
 }
 
-void SubShapeTable::update_poses(const BodyStore& bodies) {
-  for (SubShape sub_shape = 0; sub_shape < fixed_begin_; ++sub_shape)
-    update_pose(bodies, sub_shape);
+void SubShapeTable::update_poses(const BodyStore& bodies, ThreadPool* pool) {
+  parallel_for(pool, fixed_begin_, 1024, [&](std::size_t first, std::size_t last) {
+    for (auto i = static_cast<SubShape>(first); i < last; ++i) update_pose(bodies, i);
+  });
   for (const SubShape sub_shape : kinematic_) update_pose(bodies, sub_shape);
 }
 

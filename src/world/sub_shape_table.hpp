@@ -1,6 +1,7 @@
 /// Spheres, boxes and walls of all bodies, in flat arrays for the pair tests.
 #pragma once
 
+#include "src/base/thread_pool.hpp"
 #include "src/world/body_store.hpp"
 
 #include <span>
@@ -34,9 +35,12 @@ class SubShapeTable {
   /// Must be called after a body was added or removed, or got another state by set_state().
   void set_bodies(const BodyStore& bodies);
   /// Updates the poses of all sub-shapes from their bodies, except immovable boxes and walls.
-  void update_poses(const BodyStore& bodies);
+  /// @param pool null: in the calling thread
+  void update_poses(const BodyStore& bodies, ThreadPool* pool = nullptr);
 
   std::uint32_t body(SubShape sub_shape) const { return body_[sub_shape]; }
+  /// Index of the sub-shape in its compound; 0 in a simple body.
+  std::uint32_t part(SubShape sub_shape) const { return number_[sub_shape]; }
   bool is_sphere(SubShape sub_shape) const { return sub_shape < sphere_count_; }
   bool is_wall(SubShape sub_shape) const { return sub_shape >= bounds_.size(); }
   const PosedBox& box(SubShape sub_shape) const { return boxes_[sub_shape - sphere_count_]; }
@@ -46,6 +50,8 @@ class SubShapeTable {
 
   /// Bounding spheres of all spheres and movable boxes.
   std::span<const SphereInstance> bounds() const { return {bounds_.data(), fixed_begin_}; }
+  /// Number of spheres and boxes: all sub-shapes but walls.
+  SubShape bounded_size() const { return static_cast<SubShape>(bounds_.size()); }
   SubShape size() const { return static_cast<SubShape>(body_.size()); }
   SubShape fixed_begin() const { return fixed_begin_; }  ///< the first box or wall of mass 0
 
@@ -54,6 +60,7 @@ class SubShapeTable {
 
   SubShape sphere_count_ = 0, fixed_begin_ = 0;
   std::vector<std::uint32_t> body_;     ///< by sub-shape
+  std::vector<std::uint32_t> number_;   ///< by sub-shape: its index in the compound
   std::vector<SphereInstance> bounds_;  ///< of spheres and boxes
   std::vector<PosedBox> boxes_;
   std::vector<Wall> walls_;

@@ -1,6 +1,8 @@
-/// The step of a world: forces, integration, detection, waking, resolution (thesis 4.3).
+/// The step of a world, with either solver.
 #include <jfpx/error.hpp>
 
+#include "src/base/parallel_for.hpp"
+#include "src/sphere_collider/backend_table.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>
@@ -25,13 +27,15 @@ double elapsed_ms(Clock::time_point since, Clock::time_point until) {
 /// undo() restores. Used in an error message only.
 constexpr std::size_t kBytesPerBody = 1280;
 
-void combine_materials(const BodyStore& bodies, const MaterialSettings& rules,
+void combine_materials(const BodyStore& bodies, const MaterialSettings& rules, ThreadPool* pool,
                        std::vector<Contact>* contacts) {
-  for (Contact& c : *contacts) {
-    const std::uint32_t a = c.a.index, b = c.b.index;
-    c.friction = combined(rules.friction, bodies.friction(a), bodies.friction(b));
-    c.restitution = combined(rules.restitution, bodies.restitution(a), bodies.restitution(b));
-  }
+  parallel_for(pool, contacts->size(), 1024, [&](std::size_t first, std::size_t last) {
+    for (Contact& c : std::span(*contacts).subspan(first, last - first)) {
+      const std::uint32_t a = c.a.index, b = c.b.index;
+      c.friction = combined(rules.friction, bodies.friction(a), bodies.friction(b));
+      c.restitution = combined(rules.restitution, bodies.restitution(a), bodies.restitution(b));
+    }
+  });
 }
 
 void mark_sensors(const BodyStore& bodies, std::vector<Contact>* contacts) {
@@ -39,19 +43,10 @@ void mark_sensors(const BodyStore& bodies, std::vector<Contact>* contacts) {
   for (Contact& c : *contacts) c.sensor = bodies.sensor(c.a.index) || bodies.sensor(c.b.index);
 }
 
-/// The first body whose state is not finite or that has a coordinate above kMaxCoordinate.
+/// The first body that is_in_world() refuses.
 std::optional<BodyId> find_runaway(const BodyStore& bodies) {
-  const MotionArrays& moving = bodies.moving;
   for (const BodyId id : bodies.ids()) {
-    const Vec3& x = moving.position[id.index];
-    const bool in_world = absolute(x.x) <= kMaxCoordinate && absolute(x.y) <= kMaxCoordinate &&
-                          absolute(x.z) <= kMaxCoordinate;
-    // If the square of the angular velocity overflows, normalized() returns a zero quaternion.
-    const bool is_rotation = length_squared(moving.orientation[id.index]) > Real(0.5);
-    if (!in_world || !is_rotation || !is_finite(moving.orientation[id.index]) ||
-        !is_finite(moving.velocity[id.index]) || !is_finite(moving.angular_velocity[id.index])) {
-      return id;
-    }
+    if (!is_in_world(bodies.state(id.index))) return id;
   }
   return std::nullopt;
 }
@@ -67,36 +62,72 @@ std::span<const Contact> World::Impl::contacts_to_resolve() {
   return resolved;
 }
 
-/// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
-/// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
-bool World::Impl::advance(StepReport* report) {
-  const auto all_finite = [&] {
-    const std::optional<BodyId> runaway = find_runaway(bodies);
-    report->non_finite = runaway.has_value();
-    if (runaway) report->non_finite_body = *runaway;
-    return !runaway;
-  };
-  const Clock::time_point start = Clock::now();
-  ForceContext context(bodies, time());
-  forces.call(context);
-  bodies.integrate();
-  if (!all_finite()) return false;
+/// Whether no body has run away. @param runaway the first one that has
+bool World::Impl::all_finite(const std::optional<BodyId>& runaway, StepReport* report) {
+  report->non_finite = runaway.has_value();
+  if (runaway) report->non_finite_body = *runaway;
+  return !runaway;
+}
 
-  const Clock::time_point integrated = Clock::now();
+/// Detects the contacts of the current poses and calls the contact generators.
+void World::Impl::find_contacts(StepReport* report) {
   if (bodies_changed) contact_finder.set_bodies(bodies);
   bodies_changed = false;
   std::swap(contacts, contacts_before);
+  detected_count_before = detected_count;
   contacts_are_new = true;
-  contacts.clear();
-  report->sphere_contacts = contact_finder.find_contacts(bodies, &contacts);
+  if (scene.solver == Solver::worst_first) contacts.clear();
+  report->sphere_contacts =
+      scene.solver == Solver::soft_step
+          ? contact_finder.find_near_contacts(bodies, scene.soft_step.speculative_margin,
+                                              pool.get(), &soft_step.contacts(), &contacts)
+          : contact_finder.find_contacts(bodies, &contacts);
   // Copying the string may throw; at this point the step can still be undone.
   report->device_failure = contact_finder.collider().device_failure();
   report->contacts = contacts.size();
-  combine_materials(bodies, scene.materials, &contacts);
+  combine_materials(bodies, scene.materials, pool.get(), &contacts);
   mark_sensors(bodies, &contacts);
   ContactContext contact_context(bodies, time(), &contacts);
   generators.call(contact_context);
   report->generated_contacts = contacts.size() - report->contacts;
+  detected_count = report->contacts;
+}
+
+/// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
+/// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
+bool World::Impl::advance(StepReport* report) {
+  return scene.solver == Solver::soft_step ? advance_soft_step(report)
+                                           : advance_worst_first(report);
+}
+
+/// Detection, then integration and contacts in substeps. Until commit(), only arrays that
+/// save_for_undo() copies change.
+bool World::Impl::advance_soft_step(StepReport* report) {
+  const Clock::time_point start = Clock::now();
+  ForceContext context(bodies, time());
+  forces.call(context);
+  const Clock::time_point forced = Clock::now();
+  find_contacts(report);
+  soft_step.add_generated(bodies, std::span(contacts).subspan(report->contacts));
+  const Clock::time_point detected = Clock::now();
+  if (!all_finite(soft_step.solve(&bodies), report)) return false;
+  soft_step.commit(&bodies);
+  report->integrate_ms = elapsed_ms(start, forced);
+  report->detect_ms = elapsed_ms(forced, detected);
+  report->resolve_ms = elapsed_ms(detected, Clock::now());
+  return true;
+}
+
+/// Integration, then detection, then resolution (thesis 4.3).
+bool World::Impl::advance_worst_first(StepReport* report) {
+  const Clock::time_point start = Clock::now();
+  ForceContext context(bodies, time());
+  forces.call(context);
+  bodies.integrate();
+  if (!all_finite(find_runaway(bodies), report)) return false;
+
+  const Clock::time_point integrated = Clock::now();
+  find_contacts(report);
 
   const Clock::time_point detected = Clock::now();
   const std::span<const Contact> active = contacts_to_resolve();
@@ -106,15 +137,58 @@ bool World::Impl::advance(StepReport* report) {
   report->position_iterations = resolution.position_iterations;
   report->velocity_iterations = resolution.velocity_iterations;
   report->iterations_exhausted = resolution.exhausted;
-
-  if (!all_finite()) return false;
-  events.update(std::span(contacts).first(report->contacts));
-
-  const Clock::time_point end = Clock::now();
+  if (!all_finite(find_runaway(bodies), report)) return false;
   report->integrate_ms = elapsed_ms(start, integrated);
   report->detect_ms = elapsed_ms(integrated, detected);
-  report->resolve_ms = elapsed_ms(detected, end);
+  report->resolve_ms = elapsed_ms(detected, Clock::now());
   return true;
+}
+
+/// Copies the arrays that a step changes before it can fail. Copying all of them would take longer
+/// than some stages of a step on many threads.
+void World::Impl::save_for_undo() {
+  const MotionArrays& now = bodies.moving;
+  if (scene.solver == Solver::worst_first) {
+    before = now;
+    return;
+  }
+  pool->run(6, [&](std::size_t array) {
+    switch (array) {
+      case 0:
+        return void(before.force = now.force);
+      case 1:
+        return void(before.torque = now.torque);
+      case 2:
+        return void(before.last_acceleration = now.last_acceleration);
+      case 3:
+        return void(before.motion = now.motion);
+      case 4:
+        return void(before.rest_time = now.rest_time);
+      default:
+        return void(before.awake = now.awake);
+    }
+  });
+}
+
+/// Restores the state before the step, including the contacts that wake_neighbors() uses, and
+/// empties World::contacts() and World::contact_events().
+void World::Impl::undo() noexcept {
+  MotionArrays& now = bodies.moving;
+  if (scene.solver == Solver::worst_first) {
+    std::swap(now, before);
+  } else {
+    std::swap(now.force, before.force);
+    std::swap(now.torque, before.torque);
+    std::swap(now.last_acceleration, before.last_acceleration);
+    std::swap(now.motion, before.motion);
+    std::swap(now.rest_time, before.rest_time);
+    std::swap(now.awake, before.awake);
+  }
+  if (contacts_are_new) {
+    std::swap(contacts, contacts_before);
+    detected_count = detected_count_before;
+  }
+  shows_contacts = shows_events = false;
 }
 
 StepReport World::step() {
@@ -122,17 +196,18 @@ StepReport World::step() {
   StepReport report;
   const Clock::time_point start = Clock::now();
   try {
-    w.before = w.bodies.moving;
+    w.save_for_undo();
   } catch (const std::bad_alloc&) {
     throw OutOfMemory("no memory to keep the state of " + std::to_string(w.bodies.ids().size()) +
                       " bodies during a step");
   }
   w.contacts_are_new = false;
   w.query_tree.invalidate();
+  w.events.invalidate();
   try {
     if (w.advance(&report)) {
       ++w.steps;
-      w.shows_contacts = true;
+      w.shows_contacts = w.shows_events = true;
     } else {
       w.undo();
     }
@@ -157,14 +232,24 @@ StepReport World::step() {
   return report;
 }
 
-World::World(const Scene& scene, const WorldSettings& settings)
-    : World(scene, make_sphere_collider(settings.collider), settings.broad_phase) {}
+World::World(const Scene& scene, const WorldSettings& settings) {
+  auto pool = std::make_unique<ThreadPool>(settings.collider.threads);
+  auto collider = make_sphere_collider(settings.collider, pool.get());
+  impl_ = make_impl(scene, std::move(pool), std::move(collider), settings.broad_phase);
+}
 
-World::World(const Scene& scene, std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase) {
+World::World(const Scene& scene, std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase,
+             unsigned threads) {
   if (collider == nullptr) throw InvalidArgument("collider is null; it must be a sphere collider");
+  impl_ = make_impl(scene, std::make_unique<ThreadPool>(threads), std::move(collider), broad_phase);
+}
+
+std::unique_ptr<World::Impl> World::make_impl(const Scene& scene, std::unique_ptr<ThreadPool> pool,
+                                              std::unique_ptr<SphereCollider> collider,
+                                              BroadPhase broad_phase) {
   validate(scene);
   try {
-    impl_ = std::make_unique<Impl>(scene, std::move(collider), broad_phase);
+    return std::make_unique<Impl>(scene, std::move(pool), std::move(collider), broad_phase);
   } catch (const std::bad_alloc&) {
     throw OutOfMemory("no memory for a world of " + std::to_string(scene.bodies.size()) +
                       " bodies: about " + std::to_string(scene.bodies.size() * kBytesPerBody) +

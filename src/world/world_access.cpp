@@ -32,8 +32,7 @@ void World::remove(BodyId id) {
   impl_->bodies.require(id);
   impl_->wake_neighbors(id);
   impl_->bodies.remove(id);
-  // The slot of the body may be reused; no contact may refer to it.
-  std::erase_if(impl_->contacts, [id](const Contact& c) { return c.a == id || c.b == id; });
+  impl_->soft_step.forget(id.index);
   impl_->shows_contacts = false;
   impl_->note_change();
 }
@@ -151,7 +150,12 @@ std::span<const Contact> World::contacts() const {
                                : std::span<const Contact>();
 }
 
-std::span<const ContactEvent> World::contact_events() const { return impl_->events.list(); }
+std::span<const ContactEvent> World::contact_events() const {
+  if (!impl_->shows_events) return {};
+  return impl_->events.between(
+      std::span(impl_->contacts_before).first(impl_->detected_count_before),
+      std::span(impl_->contacts).first(impl_->detected_count));
+}
 
 std::uint64_t World::state_hash() const { return jfpx::state_hash(states()); }
 

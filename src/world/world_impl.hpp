@@ -9,16 +9,22 @@
 #include "src/world/contact_finder.hpp"
 #include "src/world/contact_resolver.hpp"
 #include "src/world/lazy_query_tree.hpp"
+#include "src/world/soft_step.hpp"
 #include "src/world/wake_propagation.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
 struct World::Impl {
-  Impl(const Scene& given, std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
-      : scene(given),
-        bodies(given.dt, given.sleep),
-        contact_finder(std::move(collider), broad_phase) {
+  /// @param threads null: one thread
+  Impl(const Scene& given, std::unique_ptr<ThreadPool> threads,
+       std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
+      : pool(std::move(threads)),
+        scene(given),
+        bodies(given.dt, given.sleep,
+               given.solver == Solver::soft_step ? given.soft_step.substeps : 1),
+        contact_finder(std::move(collider), broad_phase),
+        soft_step(given.soft_step, given.materials, given.dt, pool.get()) {
     for (const BodyDef& def : given.bodies) bodies.add(def);
     bodies.set_ignored_pairs(given.ignored_pairs);  // a body of the scene has the index of its slot
   }
@@ -26,9 +32,9 @@ struct World::Impl {
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
     for (const Contact& c : contacts) {
-      if (c.sensor) continue;
-      if (c.a == body) bodies.wake(c.b.index);
-      if (c.b == body) bodies.wake(c.a.index);
+      if (c.sensor || (c.a != body && c.b != body)) continue;
+      const BodyId other = c.a == body ? c.b : c.a;
+      if (bodies.contains(other)) bodies.wake(other.index);
     }
   }
 
@@ -54,32 +60,35 @@ struct World::Impl {
   double time() const { return static_cast<double>(steps) * static_cast<double>(scene.dt); }
 
   bool advance(StepReport* report);
-  /// Restores the state before the step, including the contacts that wake_neighbors() uses, and
-  /// empties World::contacts() and World::contact_events().
-  void undo() noexcept {
-    std::swap(bodies.moving, before);
-    if (contacts_are_new) std::swap(contacts, contacts_before);
-    shows_contacts = false;
-    events.clear();
-  }
+  bool advance_soft_step(StepReport* report);
+  bool advance_worst_first(StepReport* report);
+  static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
+  void find_contacts(StepReport* report);
+  void save_for_undo();
+  void undo() noexcept;
 
+  std::unique_ptr<ThreadPool> pool;  ///< of the collider, if make_sphere_collider() made it, too
   Scene scene;
   BodyStore bodies;
   ContactFinder contact_finder;
-  WakePropagation propagate_waking;
+  SoftStep soft_step;                ///< of Solver::soft_step
+  WakePropagation propagate_waking;  ///< of Solver::worst_first, like the resolver
   ContactResolver resolver;
   CallbackRegistry<ForceContext, ForceId> forces{"force"};
   CallbackRegistry<ContactContext, ContactGeneratorId> generators{"contact generator"};
   bool bodies_changed = true;  ///< whether contact_finder.set_bodies() must be called
   LazyQueryTree query_tree;
-  /// Contacts of the last step that was not undone, without those of removed bodies.
+  /// Contacts of the last step that was not undone. Bodies may have been removed since.
   std::vector<Contact> contacts;
   std::vector<Contact> resolved;  ///< during a step with sensors: the contacts of other bodies
-  std::vector<Contact> contacts_before;  ///< during a step: those of the previous step, for undo()
+  std::vector<Contact> contacts_before;  ///< those of the step before, for events and undo()
+  /// Numbers of detected contacts in both lists; the others are those of contact generators.
+  std::size_t detected_count = 0, detected_count_before = 0;
   bool contacts_are_new = false;  ///< whether `contacts` and `contacts_before` have been swapped
   /// Whether World::contacts() returns `contacts`; false after a body was added or removed, or a
   /// step undone.
   bool shows_contacts = false;
+  bool shows_events = false;  ///< whether the last step was not undone
   ContactEvents events;
   MotionArrays before;  ///< state that an undone step restores
   std::uint64_t steps = 0;

@@ -56,7 +56,7 @@ done
 
 # Fields of a scene, as the reader asks for them.
 while read -r field; do
-  grep -qE "\`([a-z]+\.)?$field\`" docs/scenes.md || complain "docs/scenes.md: no field $field"
+  grep -qE "\`([a-z_]+\.)?$field\`" docs/scenes.md || complain "docs/scenes.md: no field $field"
 done < <(sed '/RecordingHeader recording_header_from_json/,$d' src/scene/scene_json.cpp |
   grep -oE '(required|optional|at)\("[a-z_]+"' | cut -d'"' -f2 | sort -u)
 

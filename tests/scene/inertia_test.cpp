@@ -12,6 +12,9 @@ namespace {
 
 using test::operator""_r;
 
+JFPX_SOLVER_SUITE(Inertia);
+JFPX_SOLVER_SUITE(DerivedData);
+
 BodyDef spinning(const std::optional<Mat3>& inertia) {
   BodyDef def = test::ball({0, 0, 0});
   def.inertia = inertia;
@@ -19,13 +22,13 @@ BodyDef spinning(const std::optional<Mat3>& inertia) {
   return def;
 }
 World world_of(const BodyDef& def, Real dt = 0.001_r) {
-  Scene scene;
+  Scene scene = test::empty_scene();
   scene.dt = dt;
   scene.bodies = {def};
   return World(scene);
 }
 
-TEST(Inertia, OfABoxMakesABallRotateAsABox) {
+TEST_P(Inertia, OfABoxMakesABallRotateAsABox) {
   BodyDef box = spinning({});
   box.shape = Box{{0.5_r, 1, 1.5_r}};
   World as_box = world_of(box);
@@ -35,7 +38,7 @@ TEST(Inertia, OfABoxMakesABallRotateAsABox) {
   EXPECT_EQ(as_ball.states(), as_box.states());
 }
 
-TEST(Inertia, InRotatedAxesEqualsThatOfARotatedBody) {
+TEST_P(Inertia, InRotatedAxesEqualsThatOfARotatedBody) {
   // A body in the identity orientation whose tensor is rotated by q moves as the body with
   // principal axes whose orientation is q.
   const Quat q = normalized(Quat{0.7_r, 0.1_r, -0.5_r, 0.4_r});
@@ -55,7 +58,7 @@ TEST(Inertia, InRotatedAxesEqualsThatOfARotatedBody) {
   EXPECT_GT(length(rotated.states()[0].angular_velocity - Vec3{0.3_r, 2, -0.5_r}), 0.3_r);
 }
 
-TEST(Inertia, FreeRotationKeepsTheAngularMomentumAndGainsNoEnergy) {
+TEST_P(Inertia, FreeRotationKeepsTheAngularMomentumAndGainsNoEnergy) {
   const Mat3 tensor{{{2, 0.5_r, -0.3_r}, {0.5_r, 1.5_r, 0.2_r}, {-0.3_r, 0.2_r, 2.5_r}}};
   World world = world_of(spinning(tensor), 0.0005_r);
   const auto momentum = [&] {
@@ -71,7 +74,7 @@ TEST(Inertia, FreeRotationKeepsTheAngularMomentumAndGainsNoEnergy) {
   EXPECT_GE(energy(), e0 * 0.99_r);
 }
 
-TEST(Inertia, ATorqueAcceleratesByTheInverseTensor) {
+TEST_P(Inertia, ATorqueAcceleratesByTheInverseTensor) {
   // Inverse of ((2, 1, 0), (1, 2, 0), (0, 0, 3)): ((2, -1, 0), (-1, 2, 0), (0, 0, 1)) / 3.
   BodyDef def = spinning(Mat3{{{2, 1, 0}, {1, 2, 0}, {0, 0, 3}}});
   def.angular_velocity = {};
@@ -85,7 +88,7 @@ TEST(Inertia, ATorqueAcceleratesByTheInverseTensor) {
   EXPECT_NEAR(world.inverse_inertia(world.bodies()[0])(0, 1), -1.0 / 3, 1e-6);
 }
 
-TEST(Inertia, OfABodyWithoutMassIsIgnored) {
+TEST_P(Inertia, OfABodyWithoutMassIsIgnored) {
   BodyDef def = spinning(Mat3{});
   def.mass = 0;
   World world = world_of(def);
@@ -96,7 +99,7 @@ TEST(Inertia, OfABodyWithoutMassIsIgnored) {
   EXPECT_EQ(world.mass(world.bodies()[0]), 0);
 }
 
-TEST(DerivedData, PointsAndDirectionsGoToTheWorldAndBack) {
+TEST_P(DerivedData, PointsAndDirectionsGoToTheWorldAndBack) {
   // A quarter turn about z maps x to y.
   const BodyState body{{10, 20, 30}, normalized(Quat{1, 0, 0, 1}), {}, {}};
   const Vec3 point = to_world_point(body, {1, 2, 3});
@@ -117,7 +120,7 @@ TEST(DerivedData, PointsAndDirectionsGoToTheWorldAndBack) {
   }
 }
 
-TEST(DerivedData, VelocityAtAPointIsItsRateOfChange) {
+TEST_P(DerivedData, VelocityAtAPointIsItsRateOfChange) {
   BodyDef def = spinning({});
   def.velocity = {1, -2, 3};
   World world = world_of(def, 1e-3_r);
@@ -131,7 +134,7 @@ TEST(DerivedData, VelocityAtAPointIsItsRateOfChange) {
   EXPECT_EQ(velocity_at(before, before.position), def.velocity);
 }
 
-TEST(DerivedData, OfAnInvalidBodyIdIsAnError) {
+TEST_P(DerivedData, OfAnInvalidBodyIdIsAnError) {
   World world = world_of(spinning({}));
   EXPECT_THROW(world.mass(BodyId{}), InvalidArgument);
   EXPECT_THROW(world.inverse_inertia(BodyId{}), InvalidArgument);

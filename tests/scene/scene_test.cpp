@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 constexpr const char* kMinimal =
-    R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "sphere", "radius": 1}}]})";
+    R"({"jfpx_scene": 2, "bodies": [{"shape": {"type": "sphere", "radius": 1}}]})";
 
 /// The message of the error that from_json() throws; empty if it throws none.
 std::string complaint(std::string_view text) {
@@ -33,7 +33,7 @@ std::string complaint(std::string_view text) {
 }
 
 std::string with_body(const std::string& fields) {
-  return R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "sphere", "radius": 1}, )" + fields +
+  return R"({"jfpx_scene": 2, "bodies": [{"shape": {"type": "sphere", "radius": 1}, )" + fields +
          "}]}";
 }
 
@@ -141,8 +141,15 @@ TEST(SceneJson, KeepsEveryBitOfEveryField) {
   Scene scene;
   scene.name = "a \"quoted\" name";
   scene.dt = Real(1) / Real(3);
+  scene.solver = Solver::worst_first;
+  scene.soft_step = {.substeps = 64,
+                     .contact_hertz = Real(0.1),
+                     .damping_ratio = Real(1) / Real(7),
+                     .push_out_speed = std::numeric_limits<Real>::denorm_min(),
+                     .restitution_threshold = Real(1e30),
+                     .speculative_margin = Real(0.3)};
   scene.resolver.max_iterations = 17;
-  scene.sleep.enabled = false;
+  scene.sleep = {.enabled = false, .speed = Real(0.7), .time = Real(1) / Real(3)};
   scene.materials = {CombineRule::maximum, CombineRule::average};
   BodyDef body;
   body.shape = Box{{Real(0.1), Real(1e-30), Real(1e8)}};
@@ -155,6 +162,8 @@ TEST(SceneJson, KeepsEveryBitOfEveryField) {
   scene.bodies = {body, body, body, body, body};
   scene.bodies[4].kinematic = true;
   scene.bodies[2].sensor = true;
+  scene.bodies[1].rolling_friction = Real(0.1);
+  scene.bodies[2].spinning_friction = Real(1e-30);
   scene.bodies[3].user_data = 0xffffffffffffffffu;
   scene.bodies[4].inertia =
       Mat3{{{1, Real(0.1), Real(-0.2)}, {Real(0.1), 1, 0}, {Real(-0.2), 0, 1}}};
@@ -188,6 +197,47 @@ TEST(SceneJson, AbsentFieldsHaveDefaults) {
   BodyDef expected;
   expected.shape = Sphere{1};
   EXPECT_EQ(scene.bodies[0], expected);
+  EXPECT_EQ(scene.solver, Solver::soft_step);
+  EXPECT_EQ(scene.soft_step, SoftStepSettings{});
+  EXPECT_EQ(scene.sleep, SleepSettings{});
+}
+
+/// So that files of version 0.1 run as before.
+TEST(SceneJson, AFileOfVersion1HasTheThesisResolver) {
+  const Scene scene = from_json(R"({"jfpx_scene": 1, "bodies": []})");
+  EXPECT_EQ(scene.solver, Solver::worst_first);
+  const std::string written = to_json(scene);
+  EXPECT_THAT(written, HasSubstr("{\"jfpx_scene\": 2,"));
+  EXPECT_THAT(written, HasSubstr("\"solver\": \"worst_first\""));
+  EXPECT_EQ(from_json(written), scene);
+}
+
+TEST(SceneJson, SolversAreNamed) {
+  for (const Solver solver : {Solver::soft_step, Solver::worst_first}) {
+    for (const char* version : {"1", "2"}) {
+      const std::string text = R"({"jfpx_scene": )" + std::string(version) +
+                               R"(, "bodies": [], "solver": ")" + to_string(solver) + R"("})";
+      EXPECT_EQ(from_json(text).solver, solver);
+    }
+  }
+  EXPECT_EQ(complaint(R"({"jfpx_scene": 2, "bodies": [], "solver": "fast"})"),
+            "scene.solver: is \"fast\"; it must be one of soft_step, worst_first");
+  EXPECT_EQ(complaint(R"({"jfpx_scene": 2, "bodies": [], "solver": 1})"),
+            "scene.solver: is a number; it must be a string");
+}
+
+TEST(SceneJson, SettingsOfTheSoftStepMayBeGivenInPart) {
+  const Scene scene = from_json(R"({"jfpx_scene": 2, "bodies": [], "soft_step": {"substeps": 8}})");
+  EXPECT_EQ(scene.soft_step, SoftStepSettings{.substeps = 8});
+  EXPECT_EQ(
+      complaint(R"({"jfpx_scene": 2, "bodies": [], "soft_step": {"iterations": 8}})"),
+      "scene.soft_step: has an unknown field \"iterations\"; known fields are "
+      "contact_hertz, damping_ratio, push_out_speed, restitution_threshold, speculative_margin, "
+      "substeps");
+  EXPECT_EQ(complaint(R"({"jfpx_scene": 2, "bodies": [], "soft_step": {"substeps": 0.5}})"),
+            "scene.soft_step.substeps: is 0.5; it must be a whole number from 0 to 4294967295");
+  EXPECT_EQ(complaint(R"({"jfpx_scene": 2, "bodies": [], "soft_step": {"substeps": 65}})"),
+            "scene: soft_step.substeps is 65; it must be from 1 to 64");
 }
 
 /// So that older versions read files without newer features.
@@ -195,16 +245,22 @@ TEST(SceneJson, NewerFieldsAreWrittenOnlyIfTheyAreNotTheDefault) {
   Scene scene = from_json(kMinimal);
   EXPECT_THAT(to_json(scene), Not(HasSubstr("filter")));
   EXPECT_THAT(to_json(scene), Not(HasSubstr("sensor")));
+  EXPECT_THAT(to_json(scene), Not(HasSubstr("rolling_friction")));
+  EXPECT_THAT(to_json(scene), Not(HasSubstr("spinning_friction")));
   EXPECT_THAT(to_json(scene), Not(HasSubstr("user_data")));
   EXPECT_THAT(to_json(scene), Not(HasSubstr("ignored_pairs")));
   scene.bodies.push_back(scene.bodies[0]);
   scene.bodies[1].filter.mask = 6;
   scene.bodies[1].sensor = true;
+  scene.bodies[1].rolling_friction = Real(0.5);
+  scene.bodies[1].spinning_friction = Real(0.25);
   scene.bodies[1].user_data = 9007199254740993u;
   scene.ignored_pairs = {{1, 0}};
   const std::string text = to_json(scene);
   EXPECT_THAT(text, HasSubstr("\"filter\":{\"category\":1,\"mask\":6}"));
   EXPECT_THAT(text, HasSubstr("\"sensor\":true"));
+  EXPECT_THAT(text, HasSubstr("\"rolling_friction\":0.5"));
+  EXPECT_THAT(text, HasSubstr("\"spinning_friction\":0.25"));
   EXPECT_THAT(text, HasSubstr("\"user_data\":9007199254740993"));
   EXPECT_THAT(text, HasSubstr("\"ignored_pairs\": [[1,0]]"));
   EXPECT_EQ(from_json(text), scene);
@@ -282,7 +338,9 @@ TEST(SceneJson, EveryTruncationIsAnError) {
 }
 
 TEST(SceneJson, WrongVersionIsNamed) {
-  EXPECT_THAT(complaint(R"({"jfpx_scene": 2, "bodies": []})"), HasSubstr("is 2; this build reads"));
+  EXPECT_EQ(complaint(R"({"jfpx_scene": 3, "bodies": []})"),
+            "scene.jfpx_scene: is 3; this build reads schema versions 1 and 2");
+  EXPECT_NE(complaint(R"({"jfpx_scene": 0, "bodies": []})"), "");
   EXPECT_THAT(complaint(R"({"bodies": []})"), HasSubstr("has no field \"jfpx_scene\""));
 }
 

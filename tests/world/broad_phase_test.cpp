@@ -286,18 +286,23 @@ TEST(BroadPhase, WorldsHaveTheSameBitsWithEveryBroadPhase) {
   }
   scene.ignored_pairs = {{1, 2}, {7, 3}, {0, 50}};
   scene.bodies.push_back(test::ground());
-  std::uint64_t expected = 0;
-  for (const BroadPhase way : {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {
-    WorldSettings settings;
-    settings.broad_phase = way;
-    World world(scene, settings);
-    for (int n = 0; n < 100; ++n) {
-      world.step();
-      if (n == 30) world.remove(world.bodies()[17]);
-      if (n == 60) world.add(test::ball({0, 9, 0}));
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    scene.solver = solver;
+    std::uint64_t expected = 0;
+    for (const BroadPhase way :
+         {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {
+      WorldSettings settings;
+      settings.broad_phase = way;
+      World world(scene, settings);
+      for (int n = 0; n < 100; ++n) {
+        world.step();
+        if (n == 30) world.remove(world.bodies()[17]);
+        if (n == 60) world.add(test::ball({0, 9, 0}));
+      }
+      if (expected == 0) expected = world.state_hash();
+      EXPECT_EQ(world.state_hash(), expected) << static_cast<int>(way);
     }
-    if (expected == 0) expected = world.state_hash();
-    EXPECT_EQ(world.state_hash(), expected) << static_cast<int>(way);
   }
   WorldSettings settings;
   settings.broad_phase = static_cast<BroadPhase>(3);

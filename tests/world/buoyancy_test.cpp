@@ -10,6 +10,7 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::BuoyancyForce;
 using test::expect_near;
 using test::world_of;
 
@@ -106,7 +107,7 @@ BodyDef plank(const Vec3& half_extents, Real density) {
   return def;
 }
 
-TEST(BuoyancyForce, ABoxIsLiftedByTheLiquidItDisplaces) {
+TEST_P(BuoyancyForce, ABoxIsLiftedByTheLiquidItDisplaces) {
   // 2 x 2 x 2 m, 800 kg; a depth of h displaces 4 h m^3.
   for (const Real depth : {-0.5_r, 0.0_r, 0.5_r, 1.0_r, 1.75_r, 2.0_r, 5.0_r}) {
     BodyDef def = plank({1, 1, 1}, 100);
@@ -121,7 +122,7 @@ TEST(BuoyancyForce, ABoxIsLiftedByTheLiquidItDisplaces) {
   }
 }
 
-TEST(BuoyancyForce, ACompoundOfTwoHalvesFloatsAsTheWhole) {
+TEST_P(BuoyancyForce, ACompoundOfTwoHalvesFloatsAsTheWhole) {
   BodyDef whole = plank({1, 0.25_r, 0.5_r}, 400), halves = whole;
   Compound compound;
   for (const Real side : {-0.5_r, 0.5_r}) {
@@ -141,7 +142,7 @@ TEST(BuoyancyForce, ACompoundOfTwoHalvesFloatsAsTheWhole) {
   expect_near(two.states()[0].angular_velocity, one.states()[0].angular_velocity, 2e-3);
 }
 
-TEST(BuoyancyForce, ATiltedPlankRightsItselfAndATallOneFallsOver) {
+TEST_P(BuoyancyForce, ATiltedPlankRightsItselfAndATallOneFallsOver) {
   // Half the density of water. Flat: the metacentre is width^2 / (12 draught) above the centre of
   // buoyancy: 16 / (12 * 0.2) - 0.1 > 0. On end, 0.16 / (12 * 2) - 1 < 0.
   for (const bool flat : {true, false}) {

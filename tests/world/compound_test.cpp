@@ -112,30 +112,34 @@ TEST(PrincipalInertia, OfADiagonalTensorLeavesTheAxes) {
 }
 
 TEST(Compound, SpinsFreelyAsTheBoxThatItsPartsMakeUp) {
-  // Body axes rotated relative to the box, so that all six entries of the tensor are nonzero.
-  const Quat inside = normalized(Quat{1, 0.3_r, -0.4_r, 0.7_r});
-  const Vec3 h{0.3_r, 0.6_r, 1};
-  BodyDef whole = test::ball({});
-  whole.shape = Box{h};
-  whole.orientation = normalized(Quat{1, 1, 0.2_r, 0});
-  whole.angular_velocity = {0.1_r, 3, 0.2_r};  // about the middle axis: tumbles
-  BodyDef halves = whole;
-  halves.position = {10, 0, 0};
-  halves.orientation = whole.orientation * conjugate(inside);
-  halves.shape = Compound{{box_part(rotate(inside, {-0.15_r, 0, 0}), {0.15_r, 0.6_r, 1}, inside),
-                           box_part(rotate(inside, {0.15_r, 0, 0}), {0.15_r, 0.6_r, 1}, inside)}};
-  Scene scene;
-  scene.bodies = {whole, halves};
-  World world(scene);
-  for (int n = 0; n < 120; ++n) world.step();
-  const auto states = world.states();
-  EXPECT_NEAR(length(states[0].angular_velocity - states[1].angular_velocity), 0, 1e4 * kEps);
-  const Mat3 axes = to_matrix(states[0].orientation);
-  const Mat3 others = to_matrix(states[1].orientation * inside);
-  for (int i = 0; i < 3; ++i) {
-    EXPECT_NEAR(length(axes.column(i) - others.column(i)), 0, 1e4 * kEps);
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    // Body axes rotated relative to the box, so that all six entries of the tensor are nonzero.
+    const Quat inside = normalized(Quat{1, 0.3_r, -0.4_r, 0.7_r});
+    const Vec3 h{0.3_r, 0.6_r, 1};
+    BodyDef whole = test::ball({});
+    whole.shape = Box{h};
+    whole.orientation = normalized(Quat{1, 1, 0.2_r, 0});
+    whole.angular_velocity = {0.1_r, 3, 0.2_r};  // about the middle axis: tumbles
+    BodyDef halves = whole;
+    halves.position = {10, 0, 0};
+    halves.orientation = whole.orientation * conjugate(inside);
+    halves.shape = Compound{{box_part(rotate(inside, {-0.15_r, 0, 0}), {0.15_r, 0.6_r, 1}, inside),
+                             box_part(rotate(inside, {0.15_r, 0, 0}), {0.15_r, 0.6_r, 1}, inside)}};
+    Scene scene;
+    scene.solver = solver;
+    scene.bodies = {whole, halves};
+    World world(scene);
+    for (int n = 0; n < 120; ++n) world.step();
+    const auto states = world.states();
+    EXPECT_NEAR(length(states[0].angular_velocity - states[1].angular_velocity), 0, 1e4 * kEps);
+    const Mat3 axes = to_matrix(states[0].orientation);
+    const Mat3 others = to_matrix(states[1].orientation * inside);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(length(axes.column(i) - others.column(i)), 0, 1e4 * kEps);
+    }
+    EXPECT_GT(length(states[0].angular_velocity - whole.angular_velocity), 1);
   }
-  EXPECT_GT(length(states[0].angular_velocity - whole.angular_velocity), 1);
 }
 
 TEST(Compound, AllContactsAreFoundInOrder) {
@@ -182,94 +186,114 @@ TEST(Compound, ContactsOfTwoBodiesAreConsecutive) {
 }
 
 TEST(Compound, FallsAsABallDoes) {
-  Scene scene;
-  scene.bodies = {body_of(angle_iron(), {0, 0, 0}), test::ball({100, 0, 0})};
-  scene.bodies[1].acceleration = {0, -9.81_r, 0};
-  World world(scene);
-  for (int n = 0; n < 60; ++n) world.step();
-  EXPECT_EQ(world.states()[0].position.y, world.states()[1].position.y);
-  EXPECT_EQ(world.states()[0].angular_velocity, Vec3{});
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    Scene scene;
+    scene.solver = solver;
+    scene.bodies = {body_of(angle_iron(), {0, 0, 0}), test::ball({100, 0, 0})};
+    scene.bodies[1].acceleration = {0, -9.81_r, 0};
+    World world(scene);
+    for (int n = 0; n < 60; ++n) world.step();
+    EXPECT_EQ(world.states()[0].position.y, world.states()[1].position.y);
+    EXPECT_EQ(world.states()[0].angular_velocity, Vec3{});
+  }
 }
 
 TEST(Compound, ADumbbellThatFellOnOneEndComesToRestOnBoth) {
-  BodyDef def = body_of(dumbbell(), {0, 3, 0});
-  def.orientation = normalized(Quat{1, 0.4_r, 0, 0});
-  def.linear_damping = def.angular_damping = 0.7_r;  // otherwise it would keep rolling
-  Scene scene;
-  scene.bodies = {def, test::ground()};
-  World world(scene);
-  for (int n = 0; n < 900; ++n) world.step();
-  const BodyState s = world.states()[0];
-  EXPECT_NEAR(s.position.y, 0.5, 0.0101);
-  EXPECT_NEAR(rotate(s.orientation, {0, 0, 1}).y, 0, 0.0101);
-  EXPECT_EQ(world.contacts().size(), 2u);
-  EXPECT_LT(length(s.velocity), 0.05_r);
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    BodyDef def = body_of(dumbbell(), {0, 3, 0});
+    def.orientation = normalized(Quat{1, 0.4_r, 0, 0});
+    def.linear_damping = def.angular_damping = 0.7_r;  // otherwise it would keep rolling
+    Scene scene;
+    scene.solver = solver;
+    scene.bodies = {def, test::ground()};
+    World world(scene);
+    for (int n = 0; n < 900; ++n) world.step();
+    const BodyState s = world.states()[0];
+    EXPECT_NEAR(s.position.y, 0.5, 0.0101);
+    EXPECT_NEAR(rotate(s.orientation, {0, 0, 1}).y, 0, 0.0101);
+    EXPECT_EQ(world.contacts().size(), 2u);
+    EXPECT_LT(length(s.velocity), 0.05_r);
+  }
 }
 
 TEST(Compound, AnAngleIronFallsAsleepFlatOnTheGround) {
-  BodyDef def = body_of(angle_iron(), {0, 4, 0});
-  def.orientation = normalized(Quat{0.9_r, 0.2_r, 0.1_r, -0.3_r});
-  def.can_sleep = true;
-  Scene scene;
-  scene.bodies = {def, test::ground()};
-  scene.sleep.epsilon = 0.05_r;  // at the default of 0.3 it would fall asleep while it tips over
-  World world(scene);
-  for (int n = 0; n < 900; ++n) world.step();
-  EXPECT_FALSE(world.awake(world.bodies()[0]));
-  // At least four corners touch, of one bar or of both ends of the L, none of them deep.
-  EXPECT_GE(world.contacts().size(), 4u);
-  for (const Contact& c : world.contacts()) EXPECT_GT(c.distance, -0.02);
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    BodyDef def = body_of(angle_iron(), {0, 4, 0});
+    def.orientation = normalized(Quat{0.9_r, 0.2_r, 0.1_r, -0.3_r});
+    def.can_sleep = true;
+    Scene scene;
+    scene.solver = solver;
+    scene.bodies = {def, test::ground()};
+    scene.sleep.epsilon = 0.05_r;  // at the default of 0.3 it would fall asleep while it tips over
+    World world(scene);
+    for (int n = 0; n < 900; ++n) world.step();
+    EXPECT_FALSE(world.awake(world.bodies()[0]));
+    // At least four corners touch, of one bar or of both ends of the L, none of them deep.
+    EXPECT_GE(world.contacts().size(), 4u);
+    for (const Contact& c : world.contacts()) EXPECT_GT(c.distance, -0.02);
+  }
 }
 
 TEST(Compound, ARollingDumbbellAcceleratesByItsInertia) {
-  // Two wheels on a heavy axle that does not touch the ground, down a slope whose sine is 0.2:
-  // a = g sin / (1 + I / (M r^2)).
-  const double wheel = 4.0 / 3.0 * 3.14159265358979323846 * 0.125, axle = 8 * 0.01 * 10;
-  const double per_mass = (2 * wheel * 0.4 * 0.25 + axle * 2.0 / 3.0 * 0.01) / (2 * wheel + axle);
-  const double expected = 9.81 * 0.2 / (1 + per_mass / 0.25);
-  Compound compound = dumbbell();
-  compound.parts.push_back(box_part({}, {0.1_r, 0.1_r, 1}));
-  compound.parts.back().density = 10;
-  Scene scene;
-  const Real sine = 0.2_r, cosine = square_root(0.96_r);
-  scene.bodies = {body_of(compound, {0, 0.5_r, 0}, 7), test::ground()};
-  scene.bodies[0].acceleration = {9.81_r * sine, -9.81_r * cosine, 0};
-  World world(scene);
-  for (int n = 0; n < 120; ++n) world.step();
-  const BodyState s = world.states()[0];
-  EXPECT_NEAR(s.velocity.x, 2 * expected, 0.01 * 2 * expected);
-  // Rolls without sliding; up to a centimetre deep, which reduces the effective radius.
-  EXPECT_NEAR(-s.angular_velocity.z * 0.5_r, s.velocity.x, 0.1);
-  EXPECT_NEAR(s.position.z, 0, 1e-3);
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    // Two wheels on a heavy axle that does not touch the ground, down a slope whose sine is 0.2:
+    // a = g sin / (1 + I / (M r^2)).
+    const double wheel = 4.0 / 3.0 * 3.14159265358979323846 * 0.125, axle = 8 * 0.01 * 10;
+    const double per_mass = (2 * wheel * 0.4 * 0.25 + axle * 2.0 / 3.0 * 0.01) / (2 * wheel + axle);
+    const double expected = 9.81 * 0.2 / (1 + per_mass / 0.25);
+    Compound compound = dumbbell();
+    compound.parts.push_back(box_part({}, {0.1_r, 0.1_r, 1}));
+    compound.parts.back().density = 10;
+    Scene scene;
+    scene.solver = solver;
+    const Real sine = 0.2_r, cosine = square_root(0.96_r);
+    scene.bodies = {body_of(compound, {0, 0.5_r, 0}, 7), test::ground()};
+    scene.bodies[0].acceleration = {9.81_r * sine, -9.81_r * cosine, 0};
+    World world(scene);
+    for (int n = 0; n < 120; ++n) world.step();
+    const BodyState s = world.states()[0];
+    EXPECT_NEAR(s.velocity.x, 2 * expected, 0.01 * 2 * expected);
+    // Rolls without sliding; up to a centimetre deep, which reduces the effective radius.
+    EXPECT_NEAR(-s.angular_velocity.z * 0.5_r, s.velocity.x, 0.1);
+    EXPECT_NEAR(s.position.z, 0, 1e-3);
+  }
 }
 
 TEST(Compound, ThrownBodiesKeepMomentumWhenTheyMeet) {
-  const std::uint64_t seed = test::fresh_seed();
-  SCOPED_TRACE(test::trace(seed));
-  Random random(seed);
-  Scene scene;
-  for (int i = 0; i < 20; ++i) {
-    BodyDef def = body_of(test::random_compound(&random), {}, random.uniform(1, 5));
-    def.position = random.uniform_in_box({-4, -4, -4}, {4, 4, 4});
-    def.velocity = -def.position;
-    def.angular_velocity = random.uniform_in_box({-2, -2, -2}, {2, 2, 2});
-    def.acceleration = {};
-    scene.bodies.push_back(def);
-  }
-  World world(scene);
-  const auto momentum = [&] {
-    Vec3 sum;
-    const auto states = world.states();
-    for (std::size_t i = 0; i < states.size(); ++i) {
-      sum += states[i].velocity * scene.bodies[i].mass;
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    const std::uint64_t seed = test::fresh_seed();
+    SCOPED_TRACE(test::trace(seed));
+    Random random(seed);
+    Scene scene;
+    scene.solver = solver;
+    for (int i = 0; i < 20; ++i) {
+      BodyDef def = body_of(test::random_compound(&random), {}, random.uniform(1, 5));
+      def.position = random.uniform_in_box({-4, -4, -4}, {4, 4, 4});
+      def.velocity = -def.position;
+      def.angular_velocity = random.uniform_in_box({-2, -2, -2}, {2, 2, 2});
+      def.acceleration = {};
+      scene.bodies.push_back(def);
     }
-    return sum;
-  };
-  const Vec3 before = momentum();
-  std::uint64_t contacts = 0;
-  for (int n = 0; n < 120; ++n) contacts += world.step().contacts;
-  EXPECT_GT(contacts, 20u);
-  EXPECT_NEAR(length(momentum() - before), 0, 1e4 * kEps);
+    World world(scene);
+    const auto momentum = [&] {
+      Vec3 sum;
+      const auto states = world.states();
+      for (std::size_t i = 0; i < states.size(); ++i) {
+        sum += states[i].velocity * scene.bodies[i].mass;
+      }
+      return sum;
+    };
+    const Vec3 before = momentum();
+    std::uint64_t contacts = 0;
+    for (int n = 0; n < 120; ++n) contacts += world.step().contacts;
+    EXPECT_GT(contacts, 20u);
+    EXPECT_NEAR(length(momentum() - before), 0, 1e4 * kEps);
+  }
 }
 
 TEST(Compound, RunsTheSameWithAnyNumberOfThreadsAndAlgorithm) {
@@ -281,17 +305,21 @@ TEST(Compound, RunsTheSameWithAnyNumberOfThreadsAndAlgorithm) {
     if (def.mass > 0) scene.bodies.push_back(def);
   }
   scene.bodies.push_back(test::half_space({0, 1, 0}, -1));
-  std::uint64_t expected = 0;
-  for (const SphereAlgorithm algorithm :
-       {SphereAlgorithm::automatic, SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
-    for (const unsigned threads : {1u, 2u, 8u}) {
-      WorldSettings settings;
-      settings.collider.algorithm = algorithm;
-      settings.collider.threads = threads;
-      World world(scene, settings);
-      for (int n = 0; n < 120; ++n) world.step();
-      if (expected == 0) expected = world.state_hash();
-      EXPECT_EQ(world.state_hash(), expected) << threads;
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    scene.solver = solver;
+    std::uint64_t expected = 0;
+    for (const SphereAlgorithm algorithm :
+         {SphereAlgorithm::automatic, SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+      for (const unsigned threads : {1u, 2u, 8u}) {
+        WorldSettings settings;
+        settings.collider.algorithm = algorithm;
+        settings.collider.threads = threads;
+        World world(scene, settings);
+        for (int n = 0; n < 120; ++n) world.step();
+        if (expected == 0) expected = world.state_hash();
+        EXPECT_EQ(world.state_hash(), expected) << threads;
+      }
     }
   }
 }
@@ -315,47 +343,55 @@ double energy(const World& world) {
 
 /// JFPX_LONG_STEPS sets another number of steps.
 TEST(Compound, ALongRunStaysFiniteGainsNoEnergyAndStaysAboveTheGround) {
-  const std::uint64_t seed = test::fresh_seed();
-  SCOPED_TRACE(test::trace(seed));
-  Random random(seed);
-  Scene scene;
-  for (int i = 0; i < 12; ++i) {
-    const Vec3 place = random.uniform_in_box({-3, 4, -3}, {3, 12, 3});
-    BodyDef def = body_of(test::random_compound(&random), place, random.uniform(1, 5));
-    def.orientation = test::random_rotation(&random);
-    def.can_sleep = i % 2 == 0;
-    scene.bodies.push_back(def);
-  }
-  scene.bodies.push_back(test::ground());
-  World world(scene);
-  const double at_first = energy(world);
-  const char* more = std::getenv("JFPX_LONG_STEPS");
-  const int steps = more != nullptr ? std::atoi(more) : 2000;
-  for (int n = 0; n < steps; ++n) {
-    ASSERT_FALSE(world.step().non_finite) << n;
-    for (const BodyState& s : world.states()) ASSERT_GT(s.position.y, -0.05) << n;
-    ASSERT_LE(energy(world), at_first * 1.01) << n;
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    const std::uint64_t seed = test::fresh_seed();
+    SCOPED_TRACE(test::trace(seed));
+    Random random(seed);
+    Scene scene;
+    scene.solver = solver;
+    for (int i = 0; i < 12; ++i) {
+      const Vec3 place = random.uniform_in_box({-3, 4, -3}, {3, 12, 3});
+      BodyDef def = body_of(test::random_compound(&random), place, random.uniform(1, 5));
+      def.orientation = test::random_rotation(&random);
+      def.can_sleep = i % 2 == 0;
+      scene.bodies.push_back(def);
+    }
+    scene.bodies.push_back(test::ground());
+    World world(scene);
+    const double at_first = energy(world);
+    const char* more = std::getenv("JFPX_LONG_STEPS");
+    const int steps = more != nullptr ? std::atoi(more) : 2000;
+    for (int n = 0; n < steps; ++n) {
+      ASSERT_FALSE(world.step().non_finite) << n;
+      for (const BodyState& s : world.states()) ASSERT_GT(s.position.y, -0.05) << n;
+      ASSERT_LE(energy(world), at_first * 1.01) << n;
+    }
   }
 }
 
 TEST(PlaneBody, HoldsBodiesOnTheSideWhereTheyAre) {
-  // Gravity presses each body to the plane z = 1 from its own side.
-  Scene scene;
-  BodyDef wall;
-  wall.shape = Plane{{0, 0, 1}, 1};
-  wall.mass = 0;
-  scene.bodies = {wall, test::ball({0, 0, 3}, 0.5_r), test::ball({0, 0, -1}, 0.5_r),
-                  body_of(dumbbell(), {4, 0, 3.5_r}), body_of(dumbbell(), {-4, 0, -1.5_r})};
-  for (std::size_t i = 1; i < 5; ++i) {
-    scene.bodies[i].acceleration = {0, 0, scene.bodies[i].position.z > 1 ? -9.81_r : 9.81_r};
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    // Gravity presses each body to the plane z = 1 from its own side.
+    Scene scene;
+    scene.solver = solver;
+    BodyDef wall;
+    wall.shape = Plane{{0, 0, 1}, 1};
+    wall.mass = 0;
+    scene.bodies = {wall, test::ball({0, 0, 3}, 0.5_r), test::ball({0, 0, -1}, 0.5_r),
+                    body_of(dumbbell(), {4, 0, 3.5_r}), body_of(dumbbell(), {-4, 0, -1.5_r})};
+    for (std::size_t i = 1; i < 5; ++i) {
+      scene.bodies[i].acceleration = {0, 0, scene.bodies[i].position.z > 1 ? -9.81_r : 9.81_r};
+    }
+    World world(scene);
+    for (int n = 0; n < 300; ++n) world.step();
+    const auto states = world.states();
+    EXPECT_NEAR(states[1].position.z, 1.5, 0.0101);
+    EXPECT_NEAR(states[2].position.z, 0.5, 0.0101);
+    EXPECT_NEAR(states[3].position.z, 2.5, 0.0101);
+    EXPECT_NEAR(states[4].position.z, -0.5, 0.0101);
   }
-  World world(scene);
-  for (int n = 0; n < 300; ++n) world.step();
-  const auto states = world.states();
-  EXPECT_NEAR(states[1].position.z, 1.5, 0.0101);
-  EXPECT_NEAR(states[2].position.z, 0.5, 0.0101);
-  EXPECT_NEAR(states[3].position.z, 2.5, 0.0101);
-  EXPECT_NEAR(states[4].position.z, -0.5, 0.0101);
 }
 
 TEST(PlaneBody, PushesAllPartsToTheSideOfTheCentreOfMass) {

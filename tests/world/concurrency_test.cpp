@@ -9,9 +9,11 @@ inline namespace JFPX_ABI {
 namespace test {
 namespace {
 
+JFPX_SOLVER_SUITE(Concurrency);
+
 Scene dense_scene(std::uint64_t seed) {
   Random random(seed);
-  Scene scene;
+  Scene scene = empty_scene();
   for (int i = 0; i < 30; ++i) scene.bodies.push_back(random_body(&random, 2));
   scene.bodies.push_back(ground());
   scene.resolver.max_iterations = 50;
@@ -40,7 +42,7 @@ Results query(const World& world) {
   return results;
 }
 
-TEST(Concurrency, ConstFunctionsOfAWorldRunConcurrently) {
+TEST_P(Concurrency, ConstFunctionsOfAWorldRunConcurrently) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
   World world(dense_scene(seed)), twin(dense_scene(seed));
@@ -62,7 +64,7 @@ TEST(Concurrency, ConstFunctionsOfAWorldRunConcurrently) {
   }
 }
 
-TEST(Concurrency, WorldsInSeveralThreadsAreIndependent) {
+TEST_P(Concurrency, WorldsInSeveralThreadsAreIndependent) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
   const Scene scene = dense_scene(seed);

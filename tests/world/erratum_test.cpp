@@ -23,7 +23,7 @@ constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
 
 // The original clamps the depth of every contact to the epsilon and then picks any of them.
 TEST(Erratum, E06_the_deepest_contact_is_resolved_first) {
-  Scene scene;
+  Scene scene = test::thesis_scene();
   for (const Real overlap : {0.2_r, 0.5_r, 0.3_r}) {
     const Real y = 10 * static_cast<Real>(scene.bodies.size());
     scene.bodies.push_back(test::ball({0, y, 0}));
@@ -120,7 +120,7 @@ TEST(Erratum, E47_the_engine_prints_nothing) {
 // The thesis prints 0.01^dt, its source uses 0.05^dt, Millington 0.5^dt.
 TEST(Erratum, E55_the_bias_decides_how_soon_a_body_at_rest_sleeps) {
   for (const Real bias : {0.01_r, 0.05_r, 0.5_r}) {
-    Scene scene;
+    Scene scene = test::thesis_scene();
     scene.dt = 0.001_r;
     scene.sleep.bias = bias;
     scene.bodies = {test::ball({})};

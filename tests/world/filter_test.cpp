@@ -41,8 +41,9 @@ BodyDef heavy(const Vec3& position) {
 constexpr std::uint32_t kLower = 8;  ///< category of the lower ball
 
 /// A stack of two balls on the ground, asleep.
-World sleeping_stack() {
+World sleeping_stack(Solver solver) {
   Scene scene;
+  scene.solver = solver;
   scene.bodies = {heavy({0, 0.995_r, 0}), heavy({0, 2.99_r, 0}), test::ground()};
   scene.bodies[0].filter = {.category = kLower};
   World world(scene);
@@ -95,20 +96,26 @@ TEST(CollisionFilter, AppliesToEveryKindOfShape) {
 }
 
 TEST(CollisionFilter, AFallingBodyPassesThroughABodyThatItIgnores) {
-  Scene scene;
-  scene.bodies = {heavy({0, 1.5_r, 0}), heavy({9, 1.5_r, 0}), test::ground()};
-  scene.bodies[0].filter.mask = 2;
-  World world(scene);
-  for (int n = 0; n < 120; ++n) {
-    world.step();
-    for (const ContactEvent& event : world.contact_events()) {
-      EXPECT_EQ(event.a, world.bodies()[1]);
-      EXPECT_EQ(event.b, world.bodies()[2]);
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    Scene scene;
+    scene.solver = solver;
+    scene.bodies = {heavy({0, 1.5_r, 0}), heavy({9, 1.5_r, 0}), test::ground()};
+    scene.bodies[0].filter.mask = 2;
+    World world(scene);
+    for (int n = 0; n < 120; ++n) {
+      world.step();
+      for (const ContactEvent& event : world.contact_events()) {
+        EXPECT_EQ(event.a, world.bodies()[1]);
+        EXPECT_EQ(event.b, world.bodies()[2]);
+      }
     }
+    // A free fall: a parabola, or a sum of steps.
+    const double fallen =
+        solver == Solver::soft_step ? 9.81 * 2 * 2 / 2 : 9.81 / 3600 * 120 * 121 / 2;
+    EXPECT_NEAR(world.states()[0].position.y, 1.5 - fallen, 1e-3);
+    EXPECT_NEAR(world.states()[1].position.y, 1, 0.011);
   }
-  // After 120 steps, a free fall is g dt^2 120 * 121 / 2 deep.
-  EXPECT_NEAR(world.states()[0].position.y, 1.5 - 9.81 / 3600 * 120 * 121 / 2, 1e-3);
-  EXPECT_NEAR(world.states()[1].position.y, 1, 0.011);
 }
 
 TEST(CollisionFilter, AChangeTakesEffectInTheNextStepAndEndsTheContact) {
@@ -132,48 +139,58 @@ TEST(CollisionFilter, AChangeTakesEffectInTheNextStepAndEndsTheContact) {
 }
 
 TEST(CollisionFilter, AChangeWakesTheBodyAndThoseInContact) {
-  const auto expect_fall = [](const auto& change, bool lower_falls) {
-    World world = sleeping_stack();
-    const BodyId lower = world.bodies()[0], upper = world.bodies()[1];
-    ASSERT_FALSE(world.awake(lower) || world.awake(upper));
-    change(world);
-    for (int n = 0; n < 90; ++n) world.step();
-    EXPECT_LT(world.state(upper).position.y, 2);
-    EXPECT_EQ(world.state(lower).position.y < 0.9_r, lower_falls);
-  };
-  // The upper ball falls to the ground, through the lower one.
-  expect_fall([](World& w) { w.set_filter(w.bodies()[1], {.mask = ~kLower}); }, false);
-  expect_fall([](World& w) { w.set_pair_ignored(w.bodies()[0], w.bodies()[1], true); }, false);
-  // The ground lets both fall.
-  expect_fall([](World& w) { w.set_filter(w.bodies()[2], {.category = 0}); }, true);
-  expect_fall(
-      [](World& w) {
-        w.set_pair_ignored(w.bodies()[2], w.bodies()[0], true);
-        w.set_pair_ignored(w.bodies()[2], w.bodies()[1], true);
-      },
-      true);
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    const auto expect_fall = [solver](const auto& change, bool lower_falls) {
+      World world = sleeping_stack(solver);
+      const BodyId lower = world.bodies()[0], upper = world.bodies()[1];
+      ASSERT_FALSE(world.awake(lower) || world.awake(upper));
+      change(world);
+      for (int n = 0; n < 90; ++n) world.step();
+      EXPECT_LT(world.state(upper).position.y, 2);
+      EXPECT_EQ(world.state(lower).position.y < 0.9_r, lower_falls);
+    };
+    // The upper ball falls to the ground, through the lower one.
+    expect_fall([](World& w) { w.set_filter(w.bodies()[1], {.mask = ~kLower}); }, false);
+    expect_fall([](World& w) { w.set_pair_ignored(w.bodies()[0], w.bodies()[1], true); }, false);
+    // The ground lets both fall.
+    expect_fall([](World& w) { w.set_filter(w.bodies()[2], {.category = 0}); }, true);
+    expect_fall(
+        [](World& w) {
+          w.set_pair_ignored(w.bodies()[2], w.bodies()[0], true);
+          w.set_pair_ignored(w.bodies()[2], w.bodies()[1], true);
+        },
+        true);
+  }
 }
 
 TEST(CollisionFilter, TheSameValueAgainWakesNothing) {
-  World world = sleeping_stack();
-  const BodyId lower = world.bodies()[0], upper = world.bodies()[1];
-  world.set_filter(lower, world.filter(lower));
-  world.set_pair_ignored(lower, upper, false);
-  EXPECT_FALSE(world.awake(lower) || world.awake(upper));
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    World world = sleeping_stack(solver);
+    const BodyId lower = world.bodies()[0], upper = world.bodies()[1];
+    world.set_filter(lower, world.filter(lower));
+    world.set_pair_ignored(lower, upper, false);
+    EXPECT_FALSE(world.awake(lower) || world.awake(upper));
+  }
 }
 
 TEST(CollisionFilter, DoesNotSpreadWakingThroughPairsThatDoNotCollide) {
-  Scene scene;
-  scene.bodies = {heavy({0, 0.995_r, 0}), heavy({1.5_r, 0.995_r, 0}), test::ground()};
-  scene.ignored_pairs = {{0, 1}};
-  World world(scene);
-  for (int n = 0; n < 200; ++n) world.step();
-  const BodyId first = world.bodies()[0], second = world.bodies()[1];
-  ASSERT_FALSE(world.awake(first) || world.awake(second));
-  world.wake(first);
-  world.step();
-  EXPECT_TRUE(world.awake(first));
-  EXPECT_FALSE(world.awake(second));
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    Scene scene;
+    scene.solver = solver;
+    scene.bodies = {heavy({0, 0.995_r, 0}), heavy({1.5_r, 0.995_r, 0}), test::ground()};
+    scene.ignored_pairs = {{0, 1}};
+    World world(scene);
+    for (int n = 0; n < 200; ++n) world.step();
+    const BodyId first = world.bodies()[0], second = world.bodies()[1];
+    ASSERT_FALSE(world.awake(first) || world.awake(second));
+    world.wake(first);
+    world.step();
+    EXPECT_TRUE(world.awake(first));
+    EXPECT_FALSE(world.awake(second));
+  }
 }
 
 TEST(IgnoredPairs, OfASceneMayBeListedTwiceAndInEitherOrder) {

@@ -11,10 +11,14 @@ namespace {
 
 using test::operator""_r;
 using test::ball_at;
+using test::Erratum;
 using test::expect_near;
 using test::world_of;
 
-TEST(AppliedForce, AcceleratesForOneStepOnly) {
+JFPX_SOLVER_SUITE(AppliedForce);
+JFPX_SOLVER_SUITE(Forces);
+
+TEST_P(AppliedForce, AcceleratesForOneStepOnly) {
   World world = world_of({ball_at({0, 0, 0})});
   const BodyId id = world.bodies()[0];
   world.apply_force(id, {8, 0, 0});
@@ -27,7 +31,7 @@ TEST(AppliedForce, AcceleratesForOneStepOnly) {
   expect_near(world.state(id).velocity, {0.04_r, 0.02_r, 0}, 1e-7);
 }
 
-TEST(AppliedForce, TorqueAndForceAtAPointRotate) {
+TEST_P(AppliedForce, TorqueAndForceAtAPointRotate) {
   // I = 0.4 m r^2 = 0.8; torque about the centre (0,1,0) x (8,0,0) = (0,0,-8).
   World world = world_of({ball_at({5, 0, 0}), ball_at({-5, 0, 0})});
   const BodyId a = world.bodies()[0], b = world.bodies()[1];
@@ -40,7 +44,7 @@ TEST(AppliedForce, TorqueAndForceAtAPointRotate) {
   expect_near(world.state(b).angular_velocity, {0, 0, -0.1_r}, 1e-7);
 }
 
-TEST(AppliedForce, RefusesUnknownBodiesAndBadNumbers) {
+TEST_P(AppliedForce, RefusesUnknownBodiesAndBadNumbers) {
   World world = world_of({ball_at({0, 0, 0})});
   const BodyId id = world.bodies()[0];
   const Real nan = std::numeric_limits<Real>::quiet_NaN();
@@ -55,7 +59,7 @@ TEST(AppliedForce, RefusesUnknownBodiesAndBadNumbers) {
   EXPECT_EQ(world.state(id), BodyState{});
 }
 
-TEST(Erratum, E19_nothing_pushes_an_immovable_body) {
+TEST_P(Erratum, E19_nothing_pushes_an_immovable_body) {
   BodyDef rock = ball_at({0, 50, 0});
   rock.mass = 0;
   rock.acceleration = {0, -9.81_r, 0};
@@ -82,7 +86,7 @@ TEST(Erratum, E19_nothing_pushes_an_immovable_body) {
   EXPECT_FALSE(world.awake(id));
 }
 
-TEST(Erratum, E20_every_force_can_be_made_and_checked) {
+TEST_P(Erratum, E20_every_force_can_be_made_and_checked) {
   static_assert(CheckedForce<Gravity> && CheckedForce<Drag> && CheckedForce<Spring>);
   static_assert(CheckedForce<Bungee> && CheckedForce<Aero> && CheckedForce<AeroControl>);
   static_assert(CheckedForce<Buoyancy> && CheckedForce<Explosion>);
@@ -94,7 +98,7 @@ TEST(Erratum, E20_every_force_can_be_made_and_checked) {
   expect_near(world.last_acceleration(id), {0, -4 - 5, 0}, 1e-5);
 }
 
-TEST(Erratum, E29_a_small_steady_force_moves_a_body_that_may_sleep) {
+TEST_P(Erratum, E29_a_small_steady_force_moves_a_body_that_may_sleep) {
   BodyDef def = ball_at({0, 0, 0});
   def.can_sleep = true;
   World world = world_of({def});
@@ -109,7 +113,7 @@ TEST(Erratum, E29_a_small_steady_force_moves_a_body_that_may_sleep) {
   EXPECT_NEAR(world.state(id).velocity.x, 0.01, 1e-5);  // 0.01 m/s^2 for 1 s
 }
 
-TEST(Forces, ActInTheOrderOfTheirAddition) {
+TEST_P(Forces, ActInTheOrderOfTheirAddition) {
   World world = world_of({ball_at({0, 0, 0})});
   const BodyId id = world.bodies()[0];
   std::vector<int> order;
@@ -134,7 +138,7 @@ TEST(Forces, ActInTheOrderOfTheirAddition) {
   EXPECT_EQ(world.last_acceleration(id).x, 1);
 }
 
-TEST(Forces, AreRemovedOnceAndTheirIdsAreNeverReused) {
+TEST_P(Forces, AreRemovedOnceAndTheirIdsAreNeverReused) {
   World world = world_of({ball_at({0, 0, 0})});
   const ForceId first = world.add_force(Gravity{});
   world.remove_force(first);
@@ -159,7 +163,7 @@ struct Wind {
   }
 };
 
-TEST(Forces, KeepTheirAddressUntilTheyAreRemoved) {
+TEST_P(Forces, KeepTheirAddressUntilTheyAreRemoved) {
   World world = world_of({ball_at({0, 0, 0})});
   const ForceId before = world.add_force(Drag{.linear = 0});
   const ForceId id = world.add_force(Wind{1});
@@ -172,7 +176,7 @@ TEST(Forces, KeepTheirAddressUntilTheyAreRemoved) {
   EXPECT_GT(world.last_acceleration(world.bodies()[0]).x, 2);
 }
 
-TEST(Forces, OfARemovedBodyHaveNoEffect) {
+TEST_P(Forces, OfARemovedBodyHaveNoEffect) {
   World world = world_of({ball_at({0, 0, 0}), ball_at({9, 0, 0})});
   const BodyId gone = world.bodies()[0], left = world.bodies()[1];
   world.add_force(Spring{.a = {gone}, .b = {left}, .stiffness = 5});
@@ -197,7 +201,7 @@ std::string refusal(World* world, const F& force) {
   return "no error";
 }
 
-TEST(Forces, AreValidatedWhenTheyAreAdded) {
+TEST_P(Forces, AreValidatedWhenTheyAreAdded) {
   World world = world_of({ball_at({0, 0, 0})});
   const BodyId id = world.bodies()[0], strange{5, 1};
   const Real nan = std::numeric_limits<Real>::quiet_NaN();
@@ -229,7 +233,7 @@ TEST(Forces, AreValidatedWhenTheyAreAdded) {
   EXPECT_TRUE(world.forces().empty());
 }
 
-TEST(Forces, ThatThrowLeaveTheStateUnchanged) {
+TEST_P(Forces, ThatThrowLeaveTheStateUnchanged) {
   World world = world_of({ball_at({0, 0, 0}, {1, 0, 0})});
   World twin = world_of({ball_at({0, 0, 0}, {1, 0, 0})});
   bool fails = true;
@@ -251,7 +255,7 @@ TEST(Forces, ThatThrowLeaveTheStateUnchanged) {
   EXPECT_NEAR(world.states()[0].velocity.z, 0.03, 1e-6);  // 6 N / 2 kg for one step
 }
 
-TEST(Forces, OnAnUnknownBodyUndoTheStep) {
+TEST_P(Forces, OnAnUnknownBodyUndoTheStep) {
   World world = world_of({ball_at({0, 0, 0}, {1, 0, 0})});
   const auto before = world.states();
   world.add_force([](ForceContext& context) { context.apply_force({7, 0}, {1, 0, 0}); });
@@ -259,7 +263,7 @@ TEST(Forces, OnAnUnknownBodyUndoTheStep) {
   EXPECT_EQ(world.states(), before);
 }
 
-TEST(Forces, WithoutAChangeLetABodySleep) {
+TEST_P(Forces, WithoutAChangeLetABodySleep) {
   BodyDef def = ball_at({0, 1, 0});
   def.can_sleep = true;
   World world = world_of({def, test::ground()});
@@ -273,7 +277,7 @@ TEST(Forces, WithoutAChangeLetABodySleep) {
   EXPECT_GT(world.states()[0].velocity.x, 1);
 }
 
-TEST(Forces, ASpringWakesTheBodyAtItsOtherEnd) {
+TEST_P(Forces, ASpringWakesTheBodyAtItsOtherEnd) {
   BodyDef a = ball_at({0, 0, 0}), b = ball_at({5, 0, 0});
   a.can_sleep = b.can_sleep = true;
   World world = world_of({a, b});
@@ -287,7 +291,7 @@ TEST(Forces, ASpringWakesTheBodyAtItsOtherEnd) {
   EXPECT_LT(world.state(second).velocity.x, 0);
 }
 
-TEST(Forces, GiveTheSameBitsInEveryRun) {
+TEST_P(Forces, GiveTheSameBitsInEveryRun) {
   std::uint64_t hashes[2];
   for (std::uint64_t& hash : hashes) {
     World world = world_of({ball_at({0, 5, 0}, {1, 0, 0}), ball_at({4, 5, 0}), test::ground()});

@@ -11,6 +11,8 @@ namespace {
 
 using test::operator""_r;
 
+JFPX_SOLVER_SUITE(Kinematic);
+
 BodyDef kinematic(const Shape& shape, const Vec3& position, const Vec3& velocity) {
   BodyDef def = test::ball(position);
   def.shape = shape;
@@ -30,12 +32,12 @@ BodyDef cube(const Vec3& position) {
   return def;
 }
 World world_of(std::vector<BodyDef> bodies) {
-  Scene scene;
+  Scene scene = test::empty_scene();
   scene.bodies = std::move(bodies);
   return World(scene);
 }
 
-TEST(Kinematic, MovesByItsVelocitiesAlone) {
+TEST_P(Kinematic, MovesByItsVelocitiesAlone) {
   BodyDef def = kinematic(Sphere{1}, {1, 2, 3}, {0.5_r, 0, -1});
   def.angular_velocity = {0, 0, 1};
   def.acceleration = {9, 9, 9};
@@ -56,7 +58,7 @@ TEST(Kinematic, MovesByItsVelocitiesAlone) {
   EXPECT_TRUE(world.awake(id));
 }
 
-TEST(Kinematic, IsNeverPushedHoweverHeavyTheOther) {
+TEST_P(Kinematic, IsNeverPushedHoweverHeavyTheOther) {
   const BodyDef pusher = kinematic(Sphere{1}, {0, 0, 0}, {1, 0, 0});
   BodyDef truck = test::ball({3, 0, 0}, 1, 1e6_r);
   truck.velocity = {-5, 0, 0};
@@ -71,7 +73,7 @@ TEST(Kinematic, IsNeverPushedHoweverHeavyTheOther) {
   EXPECT_GT(hit.states()[1].velocity.x, 0.989_r);
 }
 
-TEST(Kinematic, PushesToItsOwnSpeedAndThrowsWithRestitution) {
+TEST_P(Kinematic, PushesToItsOwnSpeedAndThrowsWithRestitution) {
   // Hit by an unyielding body at speed 2: leaves at (1 + e) times 2.
   for (const Real e : {Real(0), 0.5_r, Real(1)}) {
     for (const Shape& shape : {Shape(Sphere{1}), Shape(Box{{1, 1, 1}})}) {
@@ -85,7 +87,7 @@ TEST(Kinematic, PushesToItsOwnSpeedAndThrowsWithRestitution) {
   }
 }
 
-TEST(Kinematic, AnElevatorLiftsABodyOnIt) {
+TEST_P(Kinematic, AnElevatorLiftsABodyOnIt) {
   World world = world_of({platform({0, 0.5_r, 0}), cube({0, 0.5_r, 0}), cube({0, 1.5_r, 0})});
   for (int n = 0; n < 240; ++n) world.step();
   const auto states = world.states();
@@ -95,7 +97,7 @@ TEST(Kinematic, AnElevatorLiftsABodyOnIt) {
   EXPECT_NEAR(states[1].velocity.y, 0.5, 0.02);
 }
 
-TEST(Kinematic, AConveyorDragsByFriction) {
+TEST_P(Kinematic, AConveyorDragsByFriction) {
   World world = world_of({platform({2, 0, 0}), cube({0, 0.5_r, 0})});
   // Friction 0.5 accelerates with g/2: at speed 2 after 0.41 s.
   for (int n = 0; n < 12; ++n) world.step();
@@ -104,7 +106,7 @@ TEST(Kinematic, AConveyorDragsByFriction) {
   EXPECT_NEAR(world.states()[1].velocity.x, 2, 0.02);
 }
 
-TEST(Kinematic, ATurntableCarriesABoxAround) {
+TEST_P(Kinematic, ATurntableCarriesABoxAround) {
   BodyDef table = platform({});
   table.angular_velocity = {0, 1, 0};
   BodyDef passenger = cube({1, 0.5_r, 0});
@@ -117,7 +119,7 @@ TEST(Kinematic, ATurntableCarriesABoxAround) {
   EXPECT_NEAR(std::hypot(at.x, at.z), 1, 0.05);
 }
 
-TEST(Kinematic, ABodyThatItCarriesSlowlyStaysAwakeUntilItStops) {
+TEST_P(Kinematic, ABodyThatItCarriesSlowlyStaysAwakeUntilItStops) {
   // 0.1 m/s is far below the sleep epsilon; a body that fell asleep would lose its speed.
   std::vector<BodyDef> bodies = {platform({0.1_r, 0, 0})};
   for (int i = 0; i < 3; ++i) {
@@ -148,7 +150,7 @@ TEST(Kinematic, ABodyThatItCarriesSlowlyStaysAwakeUntilItStops) {
   EXPECT_EQ(world.step().awake, 3u);
 }
 
-TEST(Kinematic, WakesASleepingBodyThatItHits) {
+TEST_P(Kinematic, WakesASleepingBodyThatItHits) {
   BodyDef sleeper = test::ball({5, 0, 0});
   sleeper.can_sleep = true;
   World world = world_of({kinematic(Box{{1, 1, 1}}, {0, 0, 0}, {2, 0, 0}), sleeper});
@@ -160,7 +162,7 @@ TEST(Kinematic, WakesASleepingBodyThatItHits) {
   EXPECT_NEAR(world.state(id).velocity.x, 2, 0.011);
 }
 
-TEST(Kinematic, ASpringFromItWakesTheBodyAtItsOtherEnd) {
+TEST_P(Kinematic, ASpringFromItWakesTheBodyAtItsOtherEnd) {
   BodyDef sleeper = test::ball({5, 0, 0});
   sleeper.can_sleep = true;
   World world = world_of({kinematic(Sphere{1}, {0, 0, 0}, {}), sleeper});
@@ -173,14 +175,14 @@ TEST(Kinematic, ASpringFromItWakesTheBodyAtItsOtherEnd) {
   EXPECT_LT(world.state(pulled).velocity.x, -0.1_r);
 }
 
-TEST(Kinematic, PassesThroughImmovableBodies) {
+TEST_P(Kinematic, PassesThroughImmovableBodies) {
   World world = world_of({kinematic(Sphere{1}, {0, 3, 0}, {0, -2, 0}),
                           kinematic(Box{{1, 1, 1}}, {0, -3, 0}, {0, 2, 0}), test::ground()});
   for (int n = 0; n < 120; ++n) EXPECT_EQ(world.step().contacts, 0u);
   EXPECT_NEAR(world.states()[0].position.y, -1, 1e-3);
 }
 
-TEST(Kinematic, AFailedStepRestoresItsState) {
+TEST_P(Kinematic, AFailedStepRestoresItsState) {
   World world = world_of({kinematic(Sphere{1}, {0.99e9_r, 0, 0}, {9e7_r, 0, 0})});
   const auto before = world.states();
   StepReport report;

@@ -12,14 +12,16 @@ using test::operator""_r;
 
 constexpr double kG = 9.81;
 
+JFPX_SOLVER_SUITE(Motion);
+
 BodyDef falling(const Vec3& position) {
   BodyDef def = test::ball(position);
   def.acceleration = {0, -9.81_r, 0};
   return def;
 }
 
-TEST(Motion, FreeFallIsTheDiscreteSumAndNearlyTheParabola) {
-  Scene scene;
+TEST_P(Motion, FreeFallIsTheDiscreteSumOrTheParabola) {
+  Scene scene = test::empty_scene();
   scene.dt = Real(1) / 64;
   scene.bodies = {falling({0, 100, 0})};
   World world(scene);
@@ -27,17 +29,18 @@ TEST(Motion, FreeFallIsTheDiscreteSumAndNearlyTheParabola) {
   for (int n = 1; n <= 256; ++n) {
     world.step();
     const BodyState s = world.states()[0];
-    // v_n = -g n dt, y_n = y_0 - g dt^2 (1 + 2 + ... + n).
-    ASSERT_NEAR(s.velocity.y, -kG * n * dt, 100 * static_cast<double>(kEpsilon) * n);
-    ASSERT_NEAR(s.position.y, 100 - kG * dt * dt * n * (n + 1) / 2,
-                100 * static_cast<double>(kEpsilon) * n);
+    // v_n = -g n dt, y_n = y_0 - g dt^2 (1 + 2 + ... + n); the soft step has no error.
     const double t = n * dt;
+    const double fallen =
+        GetParam() == Solver::soft_step ? kG * t * t / 2 : kG * dt * dt * n * (n + 1) / 2;
+    ASSERT_NEAR(s.velocity.y, -kG * n * dt, 100 * static_cast<double>(kEpsilon) * n);
+    ASSERT_NEAR(s.position.y, 100 - fallen, 100 * static_cast<double>(kEpsilon) * n);
     ASSERT_NEAR(s.position.y, 100 - kG * t * t / 2, kG * t * dt);
   }
 }
 
-TEST(Motion, ProjectileWithDragFollowsTheGeometricSums) {
-  Scene scene;
+TEST_P(Motion, ProjectileWithDragFollowsTheGeometricSums) {
+  Scene scene = test::empty_scene();
   scene.dt = 0.01_r;
   BodyDef def = falling({0, 0, 0});
   def.velocity = {30, 40, 0};
@@ -45,7 +48,8 @@ TEST(Motion, ProjectileWithDragFollowsTheGeometricSums) {
   scene.bodies = {def};
   World world(scene);
   for (int n = 0; n < 300; ++n) world.step();
-  const double q = std::pow(0.5, 0.01), dt = 0.01, n = 300;
+  const double dt = 0.01 / test::substeps(scene), n = 300 * test::substeps(scene);
+  const double q = std::pow(0.5, dt);
   const double qn = std::pow(q, n);
   // v_n = v_0 q^n + a dt q (1 - q^n)/(1 - q); x_n = dt * (v_1 + ... + v_n).
   const double fall = -kG * dt * q / (1 - q);
@@ -53,13 +57,17 @@ TEST(Motion, ProjectileWithDragFollowsTheGeometricSums) {
   const BodyState s = world.states()[0];
   EXPECT_NEAR(s.velocity.x, 30 * qn, 1e-3);
   EXPECT_NEAR(s.velocity.y, 40 * qn + fall * (1 - qn), 1e-3);
-  EXPECT_NEAR(s.position.x, 30 * kept, 1e-3);
-  EXPECT_NEAR(s.position.y, 40 * kept + fall * (n * dt - kept), 2e-3);
+  // The soft step moves by the mean of the velocities before and after a substep: half of the sum
+  // of the changes more.
+  const double mean = GetParam() == Solver::soft_step ? dt / 2 : 0;
+  const double y_change = 40 - (40 * qn + fall * (1 - qn));
+  EXPECT_NEAR(s.position.x, 30 * kept + mean * 30 * (1 - qn), 1e-3);
+  EXPECT_NEAR(s.position.y, 40 * kept + fall * (n * dt - kept) + mean * y_change, 2e-3);
 }
 
-TEST(Motion, BounceReachesTheSquareOfTheRestitutionOfTheHeight) {
+TEST_P(Motion, BounceReachesTheSquareOfTheRestitutionOfTheHeight) {
   for (const Real e : {Real(0), 0.3_r, 0.5_r, 0.8_r, Real(1)}) {
-    Scene scene;
+    Scene scene = test::empty_scene();
     scene.dt = 0.001_r;
     BodyDef def = falling({0, 1 + 5, 0});
     def.restitution = e;
@@ -81,7 +89,7 @@ TEST(Motion, BounceReachesTheSquareOfTheRestitutionOfTheHeight) {
   }
 }
 
-TEST(Motion, CoefficientsOfTwoBodiesCombineByTheRuleOfTheScene) {
+TEST_P(Motion, CoefficientsOfTwoBodiesCombineByTheRuleOfTheScene) {
   const struct {
     CombineRule rule;
     double of_half_and_eighth;
@@ -92,7 +100,7 @@ TEST(Motion, CoefficientsOfTwoBodiesCombineByTheRuleOfTheScene) {
                {CombineRule::average, 0.3125}};
   for (const auto& [rule, expected] : cases) {
     // Bounce: an impact at speed 4 without acceleration rebounds at e times 4.
-    Scene scene;
+    Scene scene = test::empty_scene();
     BodyDef def = test::ball({0, 1, 0});
     def.velocity = {0, -4, 0};
     def.restitution = 0.5_r;
@@ -114,13 +122,17 @@ TEST(Motion, CoefficientsOfTwoBodiesCombineByTheRuleOfTheScene) {
     scene.materials = {rule, CombineRule::geometric_mean};
     World sliding(scene);
     sliding.step();
-    EXPECT_NEAR(sliding.states()[0].velocity.x, 30 - 4 * expected, 1e-5) << to_string(rule);
+    // With soft contacts, friction is limited by the normal impulse before the last sweep, which
+    // the relaxation of the springs has reduced by 1.4 %.
+    const double lag = GetParam() == Solver::soft_step ? 0.014 : 0;
+    EXPECT_NEAR(sliding.states()[0].velocity.x, 30 - 4 * expected, 1e-5 + lag * 4 * expected)
+        << to_string(rule);
   }
 }
 
 TEST(Motion, NewtonsCradleReleasesAsManyBallsAsHitIt) {
   for (const std::size_t coming : {1u, 2u, 3u}) {
-    Scene scene;
+    Scene scene = test::thesis_scene();
     scene.dt = 0.001_r;
     for (std::size_t i = 0; i < 5; ++i) {
       BodyDef def = test::ball({2 * static_cast<Real>(i), 0, 0});
@@ -144,9 +156,9 @@ TEST(Motion, NewtonsCradleReleasesAsManyBallsAsHitIt) {
   }
 }
 
-TEST(Motion, ABallRollsDownASlopeWithFiveSeventhsOfThePull) {
+TEST_P(Motion, ABallRollsDownASlopeWithFiveSeventhsOfThePull) {
   const double angle = 0.3;
-  Scene scene;
+  Scene scene = test::empty_scene();
   scene.dt = 0.01_r;
   BodyDef def = falling({0, 0, 0});
   def.friction = 1;
@@ -163,8 +175,8 @@ TEST(Motion, ABallRollsDownASlopeWithFiveSeventhsOfThePull) {
   EXPECT_GT(s.velocity.x, 0);
 }
 
-TEST(Motion, ASlidingBallLosesTwoSeventhsOfItsSpeedAndThenRolls) {
-  Scene scene;
+TEST_P(Motion, ASlidingBallLosesTwoSeventhsOfItsSpeedAndThenRolls) {
+  Scene scene = test::empty_scene();
   scene.dt = 0.005_r;
   BodyDef def = falling({0, 1, 0});
   def.velocity = {7, 0, 0};
@@ -186,8 +198,8 @@ TEST(Motion, ASlidingBallLosesTwoSeventhsOfItsSpeedAndThenRolls) {
   EXPECT_NEAR(s.position.x, 12 * 49 / (49 * 0.25 * kG) + 5 * (t - end), 0.1);
 }
 
-TEST(Motion, ABallThatCannotRotateSlidesToAStopAfterVSquaredOverTwoMuG) {
-  Scene scene;
+TEST_P(Motion, ABallThatCannotRotateSlidesToAStopAfterVSquaredOverTwoMuG) {
+  Scene scene = test::empty_scene();
   scene.dt = 0.001_r;
   BodyDef def = falling({0, 1, 0});
   def.velocity = {3, 0, 0};
@@ -207,8 +219,8 @@ TEST(Motion, ABallThatCannotRotateSlidesToAStopAfterVSquaredOverTwoMuG) {
   EXPECT_NEAR(world.state(id).velocity.x, 0, 0.01);
 }
 
-TEST(Motion, FrictionTurnsBothBallsTheSameWayInAGlancingHit) {
-  Scene scene;
+TEST_P(Motion, FrictionTurnsBothBallsTheSameWayInAGlancingHit) {
+  Scene scene = test::empty_scene();
   BodyDef a = test::ball({0, 0, 0}), b = test::ball({2.05_r, 0.5_r, 0});
   a.velocity = {6, 0, 0};
   a.friction = b.friction = 0.5_r;
@@ -223,7 +235,7 @@ TEST(Motion, FrictionTurnsBothBallsTheSameWayInAGlancingHit) {
 }
 
 TEST(Motion, FirstHitOfTheTowerIsWhenTheSecondBallHasFallenOntoTheFirst) {
-  Scene scene;
+  Scene scene = test::thesis_scene();
   scene.dt = 0.01_r;
   for (int i = 0; i < 8; ++i) {
     const Real y = 1 + 3 * static_cast<Real>(i);
@@ -255,12 +267,13 @@ TEST(Motion, FirstHitOfTheTowerIsWhenTheSecondBallHasFallenOntoTheFirst) {
   EXPECT_EQ(first, 46);
 }
 
-TEST(Motion, MomentumIsConservedInACloud) {
+TEST_P(Motion, MomentumIsConservedInACloud) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
-  Scene scene;
+  Scene scene = test::empty_scene();
   scene.resolver.position_epsilon = 100;  // projections move bodies without momentum
+  scene.soft_step.push_out_speed = 1e-6_r;
   for (int i = 0; i < 60; ++i) {
     BodyDef def =
         test::ball(random.uniform_in_box({-4, -4, -4}, {4, 4, 4}), 1, random.uniform(1, 5));
@@ -271,14 +284,17 @@ TEST(Motion, MomentumIsConservedInACloud) {
   }
   World world(scene);
   const test::Sums before = test::sums(world);
-  std::uint64_t impulses = 0;
-  for (int n = 0; n < 60; ++n) impulses += world.step().velocity_iterations;
-  EXPECT_GT(impulses, 50u);
+  std::uint64_t contacts = 0;
+  for (int n = 0; n < 60; ++n) contacts += world.step().contacts;
+  EXPECT_GT(contacts, 50u);
   const test::Sums after = test::sums(world);
   const double tolerance = 20 * static_cast<double>(kEpsilon) * before.scale;
   for (int k = 0; k < 3; ++k) {
     EXPECT_NEAR(after.momentum[k], before.momentum[k], tolerance);
-    EXPECT_NEAR(after.angular_momentum[k], before.angular_momentum[k], tolerance);
+    // Soft contacts keep the normal of the start of the step, and in a step at 8 m/s the arms turn
+    // by 0.13 m in 2 m.
+    const double turned = GetParam() == Solver::soft_step ? 0.01 * before.scale : 0;
+    EXPECT_NEAR(after.angular_momentum[k], before.angular_momentum[k], tolerance + turned);
   }
 }
 
@@ -287,7 +303,7 @@ TEST(Motion, EnergyNeverGrowsInAClosedBox) {
   SCOPED_TRACE(test::trace(seed));
   for (std::uint64_t run = 0; run < 6; ++run) {
     Random random(seed + run);
-    Scene scene;
+    Scene scene = test::thesis_scene();
     for (int i = 0; i < 60; ++i) {
       BodyDef def =
           test::ball(random.uniform_in_box({-4, -4, -4}, {4, 4, 4}), 1, random.uniform(1, 5));

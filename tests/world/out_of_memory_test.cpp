@@ -25,10 +25,13 @@ const std::array<WorldSettings, 5> kSettings{{
     {.collider = {.backend = Backend::cpu}, .broad_phase = BroadPhase::brute_force},
 }};
 
+JFPX_SOLVER_SUITE(OutOfMemoryInAWorld);
+
 /// Bodies of all shapes, in contact.
-Scene dense_scene(std::uint64_t seed) {
+Scene dense_scene(std::uint64_t seed, Solver solver) {
   Random random(seed);
   Scene scene;
+  scene.solver = solver;
   for (int i = 0; i < 40; ++i) scene.bodies.push_back(random_body(&random, 2));
   BodyDef platform;
   platform.shape = Box{{3, Real(0.2), 3}};
@@ -77,10 +80,10 @@ std::vector<Moment> follow(World& world, int steps) {
   return moments;
 }
 
-TEST(OutOfMemoryInAWorld, AStepIsUndoneWhicheverAllocationFails) {
+TEST_P(OutOfMemoryInAWorld, AStepIsUndoneWhicheverAllocationFails) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
-  const Scene scene = dense_scene(seed);
+  const Scene scene = dense_scene(seed, GetParam());
   for (std::size_t i = 0; i < kSettings.size(); ++i) {
     for (const int warm : {0, 1, 4}) {
       SCOPED_TRACE("settings " + std::to_string(i) + " after " + std::to_string(warm) + " steps");
@@ -113,10 +116,10 @@ TEST(OutOfMemoryInAWorld, AStepIsUndoneWhicheverAllocationFails) {
   }
 }
 
-TEST(OutOfMemoryInAWorld, AFailedAdditionLeavesNoTrace) {
+TEST_P(OutOfMemoryInAWorld, AFailedAdditionLeavesNoTrace) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
-  const Scene scene = dense_scene(seed);
+  const Scene scene = dense_scene(seed, GetParam());
   BodyDef def;
   def.shape = Compound{
       {{.shape = Sphere{}, .position = {0, 0, -1}}, {.shape = Box{}, .position = {0, 0, 1}}}};
@@ -166,10 +169,10 @@ TEST(OutOfMemoryInAWorld, AFailedAdditionLeavesNoTrace) {
   }
 }
 
-TEST(OutOfMemoryInAWorld, AQueryAfterAFailedOneFindsTheSame) {
+TEST_P(OutOfMemoryInAWorld, AQueryAfterAFailedOneFindsTheSame) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
-  const Scene scene = dense_scene(seed);
+  const Scene scene = dense_scene(seed, GetParam());
   const Ray ray{.origin = {-9, 0, 0}, .direction = {1, 0, 0}};
   World undisturbed = make_world(scene, kSettings[0], 3);
   const std::vector<RayHit> hits = undisturbed.cast_ray_through(ray);
@@ -190,8 +193,8 @@ TEST(OutOfMemoryInAWorld, AQueryAfterAFailedOneFindsTheSame) {
   EXPECT_GT(failures, 5u);
 }
 
-TEST(OutOfMemoryInAWorld, BodiesAreRemovedAndMovedWithoutMemory) {
-  Scene scene = dense_scene(1);
+TEST_P(OutOfMemoryInAWorld, BodiesAreRemovedAndMovedWithoutMemory) {
+  Scene scene = dense_scene(1, GetParam());
   scene.ignored_pairs = {{0, 1}, {3, 0}, {3, 4}};
   World world = make_world(scene, kSettings[0], 2);
   BodyState state = world.state(world.bodies()[1]);
@@ -214,8 +217,8 @@ TEST(OutOfMemoryInAWorld, BodiesAreRemovedAndMovedWithoutMemory) {
   EXPECT_EQ(world.state(moved).position, state.position);
 }
 
-TEST(OutOfMemoryInAWorld, AFailedConstructionLeaksNothing) {
-  const Scene scene = dense_scene(2);
+TEST_P(OutOfMemoryInAWorld, AFailedConstructionLeaksNothing) {
+  const Scene scene = dense_scene(2, GetParam());
   for (const WorldSettings& settings : kSettings) {
     { const World first(scene, settings); }  // allocates objects that are made once and kept
     const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
@@ -299,7 +302,8 @@ TEST(OutOfMemoryInACollider, ACallAfterAFailedOneFindsAllContacts) {
 TEST(OutOfMemoryInRecordings, FramesAreWrittenWithoutMemoryAndReadOnTheNextAttempt) {
   const TemporaryFolder folder;
   const std::string path = folder.file("run.rec");
-  const RecordingHeader header{.engine = "native", .backend = "cpu", .scene = dense_scene(4)};
+  const RecordingHeader header{
+      .engine = "native", .backend = "cpu", .scene = dense_scene(4, Solver::soft_step)};
   const std::vector<BodyState> states(header.scene.bodies.size());
   RecordingWriter writer(path, header);
   {

@@ -25,6 +25,7 @@ struct Pin {
   std::uint64_t float_hash, double_hash;
 };
 
+/// With Solver::worst_first.
 constexpr Pin kPins[] = {
     {"boxes-and-balls", 16, 300, 0xe05d748f56476ecau, 0xe6d10396327e15fau},
     {"pile", 100, 100, 0x8f7cb142a91b08deu, 0x5082c8d7fa98388cu},
@@ -37,6 +38,20 @@ constexpr Pin kPins[] = {
     {"big-ballistic", 12, 200, 0x9afc83700278eeeau, 0x91aef0ced8d642f8u},
     // Enough for several threads to sort and search cells.
     {"polydisperse", 20000, 3, 0x83f37a5b83aeda08u, 0x505dd13569439f7bu},
+};
+
+/// With Solver::soft_step.
+constexpr Pin kSoftStepPins[] = {
+    {"pile", 100, 100, 0x9b8a4d9550881d92u, 0x02a3175917cf0e20u},
+    {"gas", 200, 100, 0x0112c24a6278fb40u, 0xcd9ee8f16dbb38bbu},
+    {"columns", 64, 60, 0x06dfcddc0c5aa0c0u, 0xd6b87d53723ca676u},
+    {"overlap", 32, 60, 0x4ec28c53d290e486u, 0xb0ffe7a1c6cb0e1au},
+    {"lattice", 125, 30, 0x12fe35aa43849c7cu, 0x5e3c7d1436dd222cu},
+    {"polydisperse", 100, 60, 0x5ad1cb6069470eaeu, 0x1e360e239ce66ff5u},
+    {"mixed", 40, 150, 0x0e603284cbc78e8bu, 0xe3eaeda9653300bcu},
+    // Enough for several threads to solve the contacts of a color.
+    {"polydisperse", 20000, 3, 0x42242a3c8720054bu, 0x6b51d5a10b82b3beu},
+    {"columns", 20000, 3, 0xa7a54b4fac730d89u, 0x02842e8f2cfd7c4bu},
 };
 
 struct DemoPin {
@@ -60,25 +75,29 @@ SimdLevel simd_of(unsigned threads) {
 
 /// Returns false and prints the reason if the run fails, resolves nothing, or ends with another
 /// hash.
-bool check(const Pin& pin, unsigned threads) {
+bool check(const Pin& pin, Solver solver, unsigned threads) {
   WorldSettings settings;
   settings.collider = {.backend = Backend::cpu, .threads = threads, .simd = simd_of(threads)};
   // Small sets use several threads only in the all-pairs search.
   if (threads > 1 && pin.spheres < 20000) {
     settings.collider.algorithm = SphereAlgorithm::all_pairs;
   }
-  World world(scenes::make(pin.scene, {.spheres = pin.spheres, .seed = 1}), settings);
+  Scene scene = scenes::make(pin.scene, {.spheres = pin.spheres, .seed = 1});
+  scene.solver = solver;
+  World world(scene, settings);
   std::uint64_t resolved = 0;
   bool finite = true;
   for (int n = 0; n < pin.steps; ++n) {
     const StepReport report = world.step();
-    resolved += report.position_iterations + report.velocity_iterations;
+    resolved += solver == Solver::worst_first
+                    ? report.position_iterations + report.velocity_iterations
+                    : report.contacts;
     finite = finite && !report.non_finite;
   }
   const std::uint64_t expected = sizeof(Real) == 4 ? pin.float_hash : pin.double_hash;
   const bool same = world.state_hash() == expected;
-  std::printf("%-16s %5" PRIu32 " spheres %5d steps  %016" PRIx64 "  %s\n", pin.scene, pin.spheres,
-              pin.steps, world.state_hash(),
+  std::printf("%-11s %-16s %5" PRIu32 " spheres %5d steps  %016" PRIx64 "  %s\n", to_string(solver),
+              pin.scene, pin.spheres, pin.steps, world.state_hash(),
               !finite         ? "WRONG: a body is not finite"
               : resolved == 0 ? "WRONG: no contact was resolved"
               : !same         ? "WRONG: another hash is pinned"
@@ -124,7 +143,10 @@ int main(int count, char** arguments) {
     const unsigned long threads = i < count ? std::strtoul(arguments[i], nullptr, 10) : 1;
     std::printf("with %lu threads:\n", threads);
     for (const jfpx::Pin& pin : jfpx::kPins) {
-      all = jfpx::check(pin, static_cast<unsigned>(threads)) && all;
+      all = jfpx::check(pin, jfpx::Solver::worst_first, static_cast<unsigned>(threads)) && all;
+    }
+    for (const jfpx::Pin& pin : jfpx::kSoftStepPins) {
+      all = jfpx::check(pin, jfpx::Solver::soft_step, static_cast<unsigned>(threads)) && all;
     }
   }
   for (const jfpx::DemoPin& pin : jfpx::kDemoPins) all = jfpx::check(pin) && all;

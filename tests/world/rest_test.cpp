@@ -13,6 +13,9 @@ namespace {
 
 using test::operator""_r;
 
+JFPX_SOLVER_SUITE(Rest);
+JFPX_SOLVER_SUITE(Sleep);
+
 BodyDef heavy(const Vec3& position, bool can_sleep, Real radius = 1) {
   BodyDef def = test::ball(position, radius);
   def.acceleration = {0, -9.81_r, 0};
@@ -22,13 +25,13 @@ BodyDef heavy(const Vec3& position, bool can_sleep, Real radius = 1) {
 }
 
 Scene on_the_ground(std::vector<BodyDef> bodies) {
-  Scene scene;
+  Scene scene = test::empty_scene();
   scene.bodies = std::move(bodies);
   scene.bodies.push_back(test::ground());
   return scene;
 }
 
-TEST(Rest, ABallOnTheGroundNeitherSinksNorJitters) {
+TEST_P(Rest, ABallOnTheGroundNeitherSinksNorJitters) {
   const Scene scene = on_the_ground({heavy({0, 1, 0}, false)});
   World world(scene);
   for (int n = 0; n < 60; ++n) world.step();
@@ -41,11 +44,11 @@ TEST(Rest, ABallOnTheGroundNeitherSinksNorJitters) {
   }
 }
 
-TEST(Rest, ABallOnABoxRestsAsOnTheGround) {
+TEST_P(Rest, ABallOnABoxRestsAsOnTheGround) {
   BodyDef table = test::ground();
   table.shape = Box{{5, 1, 5}};
   table.position = {0, -1, 0};
-  Scene scene;
+  Scene scene = test::empty_scene();
   scene.bodies = {heavy({0.3_r, 1, 0.2_r}, false), table};
   World world(scene);
   for (int n = 0; n < 300; ++n) world.step();
@@ -53,11 +56,11 @@ TEST(Rest, ABallOnABoxRestsAsOnTheGround) {
   EXPECT_NEAR(world.states()[0].position.x, 0.3, 1e-4);
 }
 
-TEST(Rest, AStackOfTenMovesLessThanAMillimetreInTenSeconds) {
+TEST_P(Rest, AStackOfTenMovesLessThanAMillimetreInTenSeconds) {
   test::expect_that_ten_stand(heavy({0, 1, 0}, false), 2);
 }
 
-TEST(Rest, AStackOfTenKeepsEachContactWithinTheEpsilonAndFallsAsleep) {
+TEST_P(Rest, AStackOfTenKeepsEachContactWithinTheEpsilonAndFallsAsleep) {
   std::vector<BodyDef> balls;
   for (int i = 0; i < 10; ++i) {
     balls.push_back(heavy({0, 1 + 2 * static_cast<Real>(i), 0}, true));
@@ -75,7 +78,7 @@ TEST(Rest, AStackOfTenKeepsEachContactWithinTheEpsilonAndFallsAsleep) {
   }
 }
 
-TEST(Rest, AHeapOfBallsComesToRestAboveTheGround) {
+TEST_P(Rest, AHeapOfBallsComesToRestAboveTheGround) {
   // A short tower of the thesis: it leans, falls over, and its balls come to lie side by side.
   std::vector<BodyDef> balls;
   for (int i = 0; i < 6; ++i) {
@@ -90,12 +93,16 @@ TEST(Rest, AHeapOfBallsComesToRestAboveTheGround) {
   for (int n = 0; n < 6000; ++n) report = world.step();
   EXPECT_EQ(report.awake, 0u);
   for (std::size_t i = 0; i < 6; ++i) {
-    EXPECT_NEAR(world.states()[i].position.y, 1, scene.resolver.position_epsilon + 1e-5_r);
+    const Real height = world.states()[i].position.y;
+    EXPECT_GE(height, 1 - scene.resolver.position_epsilon - 1e-5_r);
+    // With the soft step, a ball may rest on others.
+    const Real highest = GetParam() == Solver::worst_first ? 1 + 1e-5_r : 4;
+    EXPECT_LE(height, highest);
   }
 }
 
 TEST(Erratum, E07_coincident_centres_part_along_x_and_stay_finite) {
-  Scene scene;
+  Scene scene = test::thesis_scene();
   scene.bodies = {test::ball({5, 5, 5}), test::ball({5, 5, 5})};
   World world(scene);
   const StepReport report = world.step();
@@ -107,7 +114,9 @@ TEST(Erratum, E07_coincident_centres_part_along_x_and_stay_finite) {
 }
 
 TEST(Erratum, E06_a_ball_on_the_ground_does_not_sink) {
-  World world(on_the_ground({heavy({0, 1, 0}, false)}));
+  Scene scene = test::thesis_scene();
+  scene.bodies = {heavy({0, 1, 0}, false), test::ground()};
+  World world(scene);
   for (int n = 0; n < 600; ++n) world.step();
   EXPECT_GT(world.states()[0].position.y, 0.98_r);  // the original: 0.02 after 600 steps
 }
@@ -121,7 +130,7 @@ World sleeping_row() {
   return world;
 }
 
-TEST(Sleep, TouchingBallsFallAsleepTogetherAndKeepTheirContacts) {
+TEST_P(Sleep, TouchingBallsFallAsleepTogetherAndKeepTheirContacts) {
   World world = sleeping_row();
   for (std::size_t i = 0; i < 4; ++i) EXPECT_FALSE(world.awake(world.bodies()[i]));
   const auto before = world.states();
@@ -132,7 +141,7 @@ TEST(Sleep, TouchingBallsFallAsleepTogetherAndKeepTheirContacts) {
   EXPECT_EQ(world.states(), before);
 }
 
-TEST(Sleep, AHitWakesAllBodiesInContact) {
+TEST_P(Sleep, AHitWakesAllBodiesInContact) {
   World world = sleeping_row();
   BodyDef shot = heavy({-2.2_r, 1, 0}, true);
   shot.velocity = {10, 0, 0};
@@ -144,14 +153,14 @@ TEST(Sleep, AHitWakesAllBodiesInContact) {
   EXPECT_GT(world.states()[3].velocity.x, 0.5_r);
 }
 
-TEST(Sleep, ImmovableBodiesWakeNoBody) {
+TEST_P(Sleep, ImmovableBodiesWakeNoBody) {
   World world = sleeping_row();
   const auto before = world.states();
   for (int n = 0; n < 60; ++n) EXPECT_EQ(world.step().awake, 0u);
   EXPECT_EQ(world.states(), before);
 }
 
-TEST(Sleep, AWokenBodyRespondsToAChangedForce) {
+TEST_P(Sleep, AWokenBodyRespondsToAChangedForce) {
   World world = sleeping_row();
   const ForceId lift = world.add_force(Gravity{{0, 0, 0}});
   for (int n = 0; n < 120; ++n) world.step();
@@ -162,7 +171,8 @@ TEST(Sleep, AWokenBodyRespondsToAChangedForce) {
   EXPECT_TRUE(world.awake(first));
   for (int n = 0; n < 10; ++n) world.step();
   EXPECT_GT(world.state(first).velocity.y, 1);
-  EXPECT_FALSE(world.awake(world.bodies()[1]));
+  // The soft step finds contacts before bodies move, so that the touching neighbors wake too.
+  EXPECT_EQ(world.awake(world.bodies()[1]), GetParam() == Solver::soft_step);
   const BodyId ground = world.bodies()[4];
   world.wake(ground);
   EXPECT_FALSE(world.awake(ground)) << "of mass 0";
@@ -170,7 +180,7 @@ TEST(Sleep, AWokenBodyRespondsToAChangedForce) {
   EXPECT_THROW(world.wake(first), InvalidArgument);
 }
 
-TEST(Sleep, ABodyThatLosesItsSupportWakesAndFalls) {
+TEST_P(Sleep, ABodyThatLosesItsSupportWakesAndFalls) {
   for (const bool remove : {true, false}) {
     World world(on_the_ground({heavy({0, 0.995_r, 0}, true), heavy({0, 2.99_r, 0}, true)}));
     for (int n = 0; n < 120; ++n) world.step();
@@ -187,7 +197,7 @@ TEST(Sleep, ABodyThatLosesItsSupportWakesAndFalls) {
 }
 
 /// The contacts of a body remain known until the next step has found its new ones.
-TEST(Sleep, ABodyThatLosesItsSupportAfterOtherChangesWakesToo) {
+TEST_P(Sleep, ABodyThatLosesItsSupportAfterOtherChangesWakesToo) {
   using Change = void (*)(World&);
   const Change changes[] = {
       [](World& w) { w.remove(w.bodies()[0]); },  // the other support
@@ -213,7 +223,7 @@ TEST(Sleep, ABodyThatLosesItsSupportAfterOtherChangesWakesToo) {
     pedestals[0].mass = pedestals[1].mass = 0;
     pedestals[0].position = {-5, -0.5_r, 0};
     pedestals[1].position = {5, -0.5_r, 0};
-    Scene scene;
+    Scene scene = test::empty_scene();
     scene.bodies = {pedestals[0], pedestals[1], heavy({-5, 0.995_r, 0}, true),
                     heavy({5, 0.995_r, 0}, true)};
     World world(scene);
@@ -228,8 +238,8 @@ TEST(Sleep, ABodyThatLosesItsSupportAfterOtherChangesWakesToo) {
   }
 }
 
-TEST(Sleep, ABodyThatCannotSleepKeepsItsNeighborsAwake) {
-  World world(on_the_ground({heavy({0, 0.995_r, 0}, false), heavy({1.995_r, 0.995_r, 0}, true)}));
+TEST_P(Sleep, ABodyThatCannotSleepKeepsItsNeighborsAwake) {
+  World world(on_the_ground({heavy({0, 0.995_r, 0}, false), heavy({0, 2.99_r, 0}, true)}));
   StepReport report;
   for (int n = 0; n < 300; ++n) report = world.step();
   EXPECT_EQ(report.awake, 2u);

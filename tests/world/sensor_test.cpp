@@ -12,6 +12,8 @@ namespace {
 
 using test::operator""_r;
 
+JFPX_SOLVER_SUITE(Sensor);
+
 BodyDef sensor(BodyDef def) {
   def.sensor = true;
   return def;
@@ -31,12 +33,12 @@ BodyDef moving_sensor(const Vec3& position, const Vec3& velocity) {
   return sensor(def);
 }
 World world_of(std::vector<BodyDef> bodies) {
-  Scene scene;
+  Scene scene = test::empty_scene();
   scene.bodies = std::move(bodies);
   return World(scene);
 }
 
-TEST(Sensor, ReportsABodyThatPassesThroughWithoutChangingItsMotion) {
+TEST_P(Sensor, ReportsABodyThatPassesThroughWithoutChangingItsMotion) {
   BodyDef gate = test::ball({0, -5, 0}, 1, 0);
   gate.shape = Box{{1, 0.5_r, 1}};
   for (const BodyDef& zone : {sensor(gate), sensor(test::ball({0, -5, 0}, 1, 0)),
@@ -72,7 +74,7 @@ TEST(Sensor, ReportsABodyThatPassesThroughWithoutChangingItsMotion) {
   }
 }
 
-TEST(Sensor, ThatIsMovableFallsThroughEverything) {
+TEST_P(Sensor, ThatIsMovableFallsThroughEverything) {
   World world = world_of({sensor(heavy({0, 3, 0})), heavy({0, 1, 0}), test::ground()});
   World alone = world_of({sensor(heavy({0, 3, 0}))});
   for (int n = 0; n < 90; ++n) {
@@ -83,7 +85,7 @@ TEST(Sensor, ThatIsMovableFallsThroughEverything) {
   EXPECT_NEAR(world.states()[1].position.y, 1, 0.011);
 }
 
-TEST(Sensor, TwoThatOverlapAreReported) {
+TEST_P(Sensor, TwoThatOverlapAreReported) {
   World world = world_of({sensor(test::ball({0, 0, 0})), sensor(test::ball({1, 0, 0}, 1, 0))});
   const StepReport report = world.step();
   EXPECT_EQ(report.contacts, 1u);
@@ -93,7 +95,7 @@ TEST(Sensor, TwoThatOverlapAreReported) {
   EXPECT_TRUE(world.sensor(world.bodies()[0]));
 }
 
-TEST(Sensor, WakesNothingAndKeepsNothingAwake) {
+TEST_P(Sensor, WakesNothingAndKeepsNothingAwake) {
   // A kinematic sensor passes a ball that falls asleep meanwhile; a movable one passes later.
   World world = world_of(
       {heavy({0, 0.995_r, 0}), moving_sensor({-2.5_r, 1, 0}, {0.5_r, 0, 0}), test::ground()});
@@ -134,7 +136,7 @@ TEST(Sensor, WakesNothingAndKeepsNothingAwake) {
   EXPECT_FALSE(world.awake(ball));
 }
 
-TEST(Sensor, ThatSleepsIsNotWokenByContacts) {
+TEST_P(Sensor, ThatSleepsIsNotWokenByContacts) {
   BodyDef resting = sensor(test::ball({0, 0, 0}));
   resting.can_sleep = true;
   World world = world_of({resting});
@@ -153,7 +155,7 @@ TEST(Sensor, ThatSleepsIsNotWokenByContacts) {
   EXPECT_NEAR(world.states()[1].position.x, -3, 1e-4);
 }
 
-TEST(Sensor, IsMovedByContactGenerators) {
+TEST_P(Sensor, IsMovedByContactGenerators) {
   BodyDef lamp = sensor(heavy({0, 4, 0}));
   World world = world_of({test::ball({0, 5, 0}, 0.1_r, 0), lamp});
   const BodyId hook = world.bodies()[0], hung = world.bodies()[1];
@@ -172,7 +174,7 @@ TEST(Sensor, IsMovedByContactGenerators) {
   EXPECT_TRUE(world.awake(hung));
 }
 
-TEST(Sensor, LeavesItsIndexToABodyThatIsNone) {
+TEST_P(Sensor, LeavesItsIndexToABodyThatIsNone) {
   World world = world_of({sensor(test::ball({0, 0, 0})), test::ball({1.5_r, 0, 0})});
   const BodyId old = world.bodies()[0];
   world.remove(old);
@@ -187,13 +189,13 @@ TEST(Sensor, LeavesItsIndexToABodyThatIsNone) {
 
 /// The other bodies move as in a world without the sensors, to the last bit, and have the same
 /// contacts in the same order.
-TEST(Sensor, ChangesNoBitOfOtherBodiesInRandomWorlds) {
+TEST_P(Sensor, ChangesNoBitOfOtherBodiesInRandomWorlds) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
   std::uint64_t sensed = 0, resolved = 0;
   for (int round = 0; round < 12; ++round) {
-    Scene scene;
+    Scene scene = test::empty_scene();
     scene.resolver.max_iterations = 400;
     for (int i = 0; i < 30; ++i) {
       scene.bodies.push_back(test::random_body(&random, 2));

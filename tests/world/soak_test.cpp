@@ -36,12 +36,14 @@ BodyDef bouncing_body(Random* random, Real room) {
   return def;
 }
 
-TEST(Soak, AWorldWithChangingBodiesKeepsItsMemoryFlat) {
+JFPX_SOLVER_SUITE(Soak);
+
+TEST_P(Soak, AWorldWithChangingBodiesKeepsItsMemoryFlat) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
   Random random(seed);
   constexpr Real kRoom = 3;
-  Scene scene;
+  Scene scene = empty_scene();
   scene.bodies = walls(kRoom);
   World world(scene);
   std::deque<BodyId> bodies;

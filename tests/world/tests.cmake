@@ -24,6 +24,12 @@ jfpx_add_test(world_test SOURCES
   world/rest_test.cpp
   world/sensor_test.cpp
   world/world_test.cpp)
+jfpx_add_test(quality_test SOURCES
+  world/equilibrium_test.cpp
+  world/friction_test.cpp
+  world/heap_test.cpp
+  world/impact_test.cpp
+  world/stack_test.cpp)
 jfpx_add_test(concurrency_test SOURCES world/concurrency_test.cpp)
 jfpx_add_test(soak_test SOURCES world/soak_test.cpp)
 # These replace operator new: programs of their own.

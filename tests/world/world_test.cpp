@@ -46,36 +46,44 @@ TEST(World, StartsInTheStateOfTheScene) {
 }
 
 TEST(World, ReportsWhatAStepDid) {
-  Scene scene = two_balls();
-  scene.bodies.push_back(test::half_space({0, 1, 0}, -0.5_r));
-  World world(scene);
-  world.step();
-  const StepReport report = world.step();
-  EXPECT_EQ(report.step, 2u);
-  EXPECT_EQ(report.awake, 2u);
-  EXPECT_EQ(report.backend, Backend::cpu);
-  EXPECT_EQ(report.contacts, world.contacts().size());
-  EXPECT_LE(report.integrate_ms + report.detect_ms + report.resolve_ms,
-            report.total_ms * 1.001 + 1e-6);
-  EXPECT_FALSE(report.iterations_exhausted);
-  EXPECT_FALSE(report.non_finite);
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    Scene scene = two_balls();
+    scene.solver = solver;
+    scene.bodies.push_back(test::half_space({0, 1, 0}, -0.5_r));
+    World world(scene);
+    world.step();
+    const StepReport report = world.step();
+    EXPECT_EQ(report.step, 2u);
+    EXPECT_EQ(report.awake, 2u);
+    EXPECT_EQ(report.backend, Backend::cpu);
+    EXPECT_EQ(report.contacts, world.contacts().size());
+    EXPECT_LE(report.integrate_ms + report.detect_ms + report.resolve_ms,
+              report.total_ms * 1.001 + 1e-6);
+    EXPECT_FALSE(report.iterations_exhausted);
+    EXPECT_FALSE(report.non_finite);
+  }
 }
 
 TEST(World, ContactsAreSpherePairsFirstEachByBody) {
-  Scene scene;
-  scene.bodies = {test::half_space({0, 1, 0}, 0), test::ball({0, 0.9_r, 0}),
-                  test::ball({1.5_r, 0.9_r, 0}), test::half_space({0, 0, 1}, -0.9_r),
-                  test::ball({0, 0.9_r, 0}, 1, 0)};
-  World world(scene);
-  const StepReport report = world.step();
-  EXPECT_EQ(report.sphere_contacts, 3u);
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-  for (const Contact& c : world.contacts()) pairs.push_back({c.a.index, c.b.index});
-  // The immovable ball 4 touches the half-spaces too, which is no contact.
-  EXPECT_EQ(pairs, (std::vector<std::pair<std::uint32_t, std::uint32_t>>{
-                       {1, 2}, {1, 4}, {2, 4}, {1, 0}, {1, 3}, {2, 0}, {2, 3}}));
-  EXPECT_EQ(world.contacts()[3].normal, (Vec3{0, 1, 0}));
-  EXPECT_EQ(world.contacts()[3].distance, 0.9_r - 1);
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    Scene scene;
+    scene.solver = solver;
+    scene.bodies = {test::half_space({0, 1, 0}, 0), test::ball({0, 0.9_r, 0}),
+                    test::ball({1.5_r, 0.9_r, 0}), test::half_space({0, 0, 1}, -0.9_r),
+                    test::ball({0, 0.9_r, 0}, 1, 0)};
+    World world(scene);
+    const StepReport report = world.step();
+    EXPECT_EQ(report.sphere_contacts, 3u);
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+    for (const Contact& c : world.contacts()) pairs.push_back({c.a.index, c.b.index});
+    // The immovable ball 4 touches the half-spaces too, which is no contact.
+    EXPECT_EQ(pairs, (std::vector<std::pair<std::uint32_t, std::uint32_t>>{
+                         {1, 2}, {1, 4}, {2, 4}, {1, 0}, {1, 3}, {2, 0}, {2, 3}}));
+    EXPECT_EQ(world.contacts()[3].normal, (Vec3{0, 1, 0}));
+    EXPECT_EQ(world.contacts()[3].distance, 0.9_r - 1);
+  }
 }
 
 TEST(World, ContactsNameANewBodyByItsOwnId) {
@@ -135,30 +143,38 @@ TEST(World, AnIdOfAnotherWorldRefersToTheSameIndexOrNone) {
 }
 
 TEST(World, AHugeStepIsUndoneWhereItLeadsOutOfTheWorld) {
-  Scene scene;
-  scene.dt = std::numeric_limits<Real>::max();
-  scene.bodies = {test::ball({0, 0, 0}), test::half_space({0, 1, 0}, -1)};
-  World resting(scene);
-  EXPECT_FALSE(resting.step().non_finite);
-  EXPECT_EQ(resting.states()[0].position, Vec3{});
-  scene.bodies[0].velocity = {1, 0, 0};
-  World flying(scene);
-  const auto before = flying.states();
-  const StepReport report = flying.step();
-  EXPECT_TRUE(report.non_finite);
-  EXPECT_EQ(report.non_finite_body, flying.bodies()[0]);
-  EXPECT_EQ(flying.states(), before);
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    Scene scene;
+    scene.solver = solver;
+    scene.dt = std::numeric_limits<Real>::max();
+    scene.bodies = {test::ball({0, 0, 0}), test::half_space({0, 1, 0}, -1)};
+    World resting(scene);
+    EXPECT_FALSE(resting.step().non_finite);
+    EXPECT_EQ(resting.states()[0].position, Vec3{});
+    scene.bodies[0].velocity = {1, 0, 0};
+    World flying(scene);
+    const auto before = flying.states();
+    const StepReport report = flying.step();
+    EXPECT_TRUE(report.non_finite);
+    EXPECT_EQ(report.non_finite_body, flying.bodies()[0]);
+    EXPECT_EQ(flying.states(), before);
+  }
 }
 
 TEST(World, ASpinWithoutADirectionIsUndone) {
-  Scene scene;
-  scene.bodies = {test::ball({0, 0, 0})};
-  scene.bodies[0].angular_velocity = {0, std::sqrt(std::numeric_limits<Real>::max()) * 1000, 0};
-  World world(scene);
-  const auto before = world.states();
-  EXPECT_TRUE(world.step().non_finite);
-  EXPECT_EQ(world.states(), before);
-  EXPECT_NO_THROW(world.set_state(world.bodies()[0], before[0]));
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    Scene scene;
+    scene.solver = solver;
+    scene.bodies = {test::ball({0, 0, 0})};
+    scene.bodies[0].angular_velocity = {0, std::sqrt(std::numeric_limits<Real>::max()) * 1000, 0};
+    World world(scene);
+    const auto before = world.states();
+    EXPECT_TRUE(world.step().non_finite);
+    EXPECT_EQ(world.states(), before);
+    EXPECT_NO_THROW(world.set_state(world.bodies()[0], before[0]));
+  }
 }
 
 TEST(World, SetStateRefusesInvalidStates) {
@@ -225,34 +241,42 @@ TEST(World, AMovableHalfSpaceIsRefusedByName) {
 }
 
 TEST(World, ARunawayBodyIsNamedAndTheStateKept) {
-  Scene scene = two_balls();
-  BodyDef runaway = test::ball({0, 50, 0});
-  runaway.velocity = {0, std::numeric_limits<Real>::max() / 2, 0};
-  scene.bodies.push_back(runaway);
-  World world(scene);
-  const auto before = world.states();
-  const BodyId id = world.bodies()[2];
-  for (int n = 0; n < 3; ++n) {
-    const StepReport report = world.step();
-    ASSERT_TRUE(report.non_finite);
-    ASSERT_EQ(report.non_finite_body, id);
-    ASSERT_EQ(report.step, 0u);
-    ASSERT_EQ(world.states(), before);
-    ASSERT_TRUE(world.contacts().empty());
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    Scene scene = two_balls();
+    scene.solver = solver;
+    BodyDef runaway = test::ball({0, 50, 0});
+    runaway.velocity = {0, std::numeric_limits<Real>::max() / 2, 0};
+    scene.bodies.push_back(runaway);
+    World world(scene);
+    const auto before = world.states();
+    const BodyId id = world.bodies()[2];
+    for (int n = 0; n < 3; ++n) {
+      const StepReport report = world.step();
+      ASSERT_TRUE(report.non_finite);
+      ASSERT_EQ(report.non_finite_body, id);
+      ASSERT_EQ(report.step, 0u);
+      ASSERT_EQ(world.states(), before);
+      ASSERT_TRUE(world.contacts().empty());
+    }
+    world.remove(id);
+    EXPECT_FALSE(world.step().non_finite);
+    EXPECT_NE(world.states()[0], before[0]);
   }
-  world.remove(id);
-  EXPECT_FALSE(world.step().non_finite);
-  EXPECT_NE(world.states()[0], before[0]);
 }
 
 TEST(World, LeavingTheCoordinateRangeIsReported) {
-  Scene scene;
-  scene.dt = 1;
-  scene.bodies = {test::ball({0.999e9_r, 0, 0})};
-  scene.bodies[0].velocity = {1e7_r, 0, 0};
-  World world(scene);
-  EXPECT_TRUE(world.step().non_finite);
-  EXPECT_EQ(world.states()[0].position.x, 0.999e9_r);
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    Scene scene;
+    scene.solver = solver;
+    scene.dt = 1;
+    scene.bodies = {test::ball({0.999e9_r, 0, 0})};
+    scene.bodies[0].velocity = {1e7_r, 0, 0};
+    World world(scene);
+    EXPECT_TRUE(world.step().non_finite);
+    EXPECT_EQ(world.states()[0].position.x, 0.999e9_r);
+  }
 }
 
 /// A collider that finds nothing, and fails on demand.
@@ -276,24 +300,28 @@ class FailingCollider final : public SphereCollider {
 };
 
 TEST(World, AStepThatThrowsLeavesTheStateUnchanged) {
-  Scene scene = two_balls();
-  for (BodyDef& def : scene.bodies) def.acceleration = {0, -9.81_r, 0};
-  int fails = 0;
-  World world(scene, std::make_unique<FailingCollider>(&fails));
-  World twin(scene, std::make_unique<FailingCollider>(&fails));
-  world.step();
-  twin.step();
-  const auto before = world.states();
-  fails = 1;
-  EXPECT_THROW(world.step(), DeviceError);
-  EXPECT_EQ(world.states(), before);
-  fails = 2;
-  EXPECT_THROW(world.step(), OutOfMemory);
-  EXPECT_EQ(world.states(), before);
-  fails = 0;
-  EXPECT_EQ(world.step().step, 2u);
-  twin.step();
-  EXPECT_EQ(world.state_hash(), twin.state_hash());
+  for (const Solver solver : test::kSolvers) {
+    SCOPED_TRACE(to_string(solver));
+    Scene scene = two_balls();
+    scene.solver = solver;
+    for (BodyDef& def : scene.bodies) def.acceleration = {0, -9.81_r, 0};
+    int fails = 0;
+    World world(scene, std::make_unique<FailingCollider>(&fails));
+    World twin(scene, std::make_unique<FailingCollider>(&fails));
+    world.step();
+    twin.step();
+    const auto before = world.states();
+    fails = 1;
+    EXPECT_THROW(world.step(), DeviceError);
+    EXPECT_EQ(world.states(), before);
+    fails = 2;
+    EXPECT_THROW(world.step(), OutOfMemory);
+    EXPECT_EQ(world.states(), before);
+    fails = 0;
+    EXPECT_EQ(world.step().step, 2u);
+    twin.step();
+    EXPECT_EQ(world.state_hash(), twin.state_hash());
+  }
 }
 
 TEST(World, NeedsACollider) { EXPECT_THROW(World(two_balls(), nullptr), InvalidArgument); }
@@ -309,14 +337,18 @@ TEST(World, CanBeMoved) {
 }
 
 /// Expects the same hash after some steps with each algorithm and number of threads.
-void expect_one_hash(const Scene& scene, int steps, std::span<const SphereAlgorithm> algorithms) {
-  std::optional<std::uint64_t> expected;
-  for (const SphereAlgorithm algorithm : algorithms) {
-    for (const unsigned threads : {1u, 2u, 3u, 8u}) {
-      World world(scene, {.collider = {.algorithm = algorithm, .threads = threads}});
-      for (int n = 0; n < steps; ++n) world.step();
-      if (!expected) expected = world.state_hash();
-      ASSERT_EQ(world.state_hash(), *expected) << scene.name << ", threads " << threads;
+void expect_one_hash(Scene scene, int steps, std::span<const SphereAlgorithm> algorithms) {
+  for (const Solver solver : test::kSolvers) {
+    scene.solver = solver;
+    std::optional<std::uint64_t> expected;
+    for (const SphereAlgorithm algorithm : algorithms) {
+      for (const unsigned threads : {1u, 2u, 3u, 8u}) {
+        World world(scene, {.collider = {.algorithm = algorithm, .threads = threads}});
+        for (int n = 0; n < steps; ++n) world.step();
+        if (!expected) expected = world.state_hash();
+        ASSERT_EQ(world.state_hash(), *expected)
+            << scene.name << ", " << to_string(solver) << ", threads " << threads;
+      }
     }
   }
 }

@@ -1,0 +1,173 @@
+/// Matching of the contacts of consecutive steps; see the header.
+#include "src/contact_solver/contact_cache.hpp"
+
+#include "src/base/parallel_for.hpp"
+#include "src/base/reserve.hpp"
+
+#include <algorithm>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+namespace {
+
+/// The impulse with its friction projected into the plane perpendicular to `normal`.
+KeptImpulse turned(const KeptImpulse& kept, const Vec3& normal) {
+  return {kept.friction - normal * dot(kept.friction, normal), kept.normal};
+}
+
+constexpr std::size_t kContactsPerChunk = 2048;
+
+/// Finds contacts of a sorted list by ascending keys.
+template <class Contact>
+class Finder {
+ public:
+  /// @param first key that is not above those to be found
+  Finder(const std::vector<Contact>& sorted, const ContactKey& first)
+      : next_(std::ranges::lower_bound(sorted, first, {}, &Contact::key)),
+        begin_(sorted.begin()),
+        end_(sorted.end()) {}
+
+  /// @param key not below that of the last call
+  /// @param index receives the index of the contact
+  bool find(const ContactKey& key, std::uint32_t* index) {
+    while (next_ != end_ && next_->key < key) ++next_;
+    *index = static_cast<std::uint32_t>(next_ - begin_);
+    return next_ != end_ && next_->key == key;
+  }
+
+ private:
+  typename std::vector<Contact>::const_iterator next_, begin_, end_;
+};
+
+}  // namespace
+
+void ContactCache::match(std::span<const std::uint8_t> movable, ThreadPool* pool) {
+  ContactSet& now = current_;
+  const auto spheres = static_cast<std::uint32_t>(now.spheres.size());
+  resize_geometric(&now.impulses, spheres + now.points.size());
+  resize_geometric(&now.rolling_impulses, now.size());
+  resize_geometric(&now.colors, now.size());
+  coloring_.start(movable.size());
+  parallel_for(pool, spheres, kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+    match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
+  });
+  parallel_for(
+      pool, now.manifolds.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+        match_manifolds(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
+      });
+  for (std::uint32_t i = 0; i < now.size(); ++i) {
+    if (now.colors[i] < kColors) continue;
+    const ContactKey& key = now.key(i);
+    if (movable[key.a] == 0 || movable[key.b] == 0) {
+      now.colors[i] = kFixedColor;
+    } else {
+      coloring_.add(key, &now.colors[i]);
+    }
+  }
+  coloring_.finish();
+}
+
+/// Keeps the color and the rolling impulse. @param i,before contacts of this and of the last step
+void ContactCache::keep(std::uint32_t i, std::uint32_t before) {
+  current_.rolling_impulses[i] = last_.rolling_impulses[before];
+  const std::uint8_t color = last_.colors[before];
+  if (color >= kColors) return;
+  current_.colors[i] = color;
+  coloring_.keep(current_.key(i).a, current_.key(i).b, color);
+}
+
+void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last) {
+  Finder<SphereContactInput> finder(last_.spheres, current_.spheres[first].key);
+  for (std::uint32_t i = first; i < last; ++i) {
+    const SphereContactInput& contact = current_.spheres[i];
+    current_.impulses[i] = {};
+    current_.rolling_impulses[i] = {};
+    current_.colors[i] = kNoColor;
+    std::uint32_t before = 0;
+    if (!finder.find(contact.key, &before)) continue;
+    keep(i, before);
+    current_.impulses[i] = turned(last_.impulses[before], contact.normal);
+  }
+}
+
+void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last) {
+  const auto spheres = static_cast<std::uint32_t>(current_.spheres.size());
+  const auto spheres_before = static_cast<std::uint32_t>(last_.spheres.size());
+  Finder<ManifoldInput> finder(last_.manifolds, current_.manifolds[first].key);
+  for (std::uint32_t m = first; m < last; ++m) {
+    const ManifoldInput& contact = current_.manifolds[m];
+    current_.rolling_impulses[spheres + m] = {};
+    current_.colors[spheres + m] = kNoColor;
+    for (std::uint32_t p = 0; p < contact.count; ++p) {
+      current_.impulses[spheres + contact.first + p] = {};
+    }
+    std::uint32_t old = 0;
+    if (!finder.find(contact.key, &old)) continue;
+    const ManifoldInput& before = last_.manifolds[old];
+    keep(spheres + m, spheres_before + old);
+    match_points(contact, spheres, before, spheres_before);
+  }
+}
+
+/// Gives each point the impulse of the point with the same feature. An old point without successor
+/// gives its impulse to the nearest new point: where edges of two boxes coincide, rounding decides
+/// which features meet there, and a stack that lost its impulses now and then would not come to
+/// rest.
+/// @param first,first_before numbers of the impulses of the first points of both steps
+void ContactCache::match_points(const ManifoldInput& contact, std::uint32_t first,
+                                const ManifoldInput& before, std::uint32_t first_before) {
+  constexpr Real kSameDirection = Real(0.9);
+  const bool is_same_side = dot(contact.normal, before.normal) > kSameDirection;
+  const std::uint32_t end = contact.first + contact.count;
+  for (std::uint32_t q = before.first; q < before.first + before.count; ++q) {
+    const PointInput& old = last_.points[q];
+    std::uint32_t next = contact.first;
+    while (next < end && current_.points[next].feature != old.feature) ++next;
+    if (next == end && is_same_side) {
+      Real nearest = kMaxReal;
+      for (std::uint32_t p = contact.first; p < end; ++p) {
+        const Real distance2 = length_squared(current_.points[p].arm_a - old.arm_a);
+        if (distance2 < nearest) nearest = distance2, next = p;
+      }
+    }
+    if (next == end) continue;
+    const KeptImpulse kept = turned(last_.impulses[first_before + q], contact.normal);
+    KeptImpulse& impulse = current_.impulses[first + next];
+    impulse.friction += kept.friction;
+    impulse.normal += kept.normal;
+  }
+}
+
+/// The impulses of removed manifolds stay unused until the next step.
+void ContactCache::forget(std::uint32_t body) noexcept {
+  ContactSet& set = last_;
+  const auto involved = [body](const ContactKey& key) { return key.a == body || key.b == body; };
+  // Points keep their indices, so their impulses must keep their distance from the first one.
+  const auto spheres = static_cast<std::uint32_t>(set.spheres.size());
+  std::uint32_t kept = 0, kept_spheres = 0;
+  for (std::uint32_t i = 0; i < spheres; ++i) {
+    if (involved(set.spheres[i].key)) continue;
+    set.spheres[kept] = set.spheres[i];
+    set.impulses[kept] = set.impulses[i];
+    set.rolling_impulses[kept] = set.rolling_impulses[i];
+    set.colors[kept++] = set.colors[i];
+  }
+  kept_spheres = kept;
+  std::copy(set.impulses.begin() + spheres, set.impulses.end(), set.impulses.begin() + kept);
+  std::uint32_t kept_manifolds = 0;
+  for (std::uint32_t m = 0; m < set.manifolds.size(); ++m) {
+    if (involved(set.manifolds[m].key)) continue;
+    set.rolling_impulses[kept] = set.rolling_impulses[spheres + m];
+    set.colors[kept++] = set.colors[spheres + m];
+    set.manifolds[kept_manifolds++] = set.manifolds[m];
+  }
+  set.spheres.resize(kept_spheres);
+  set.manifolds.resize(kept_manifolds);
+  set.rolling_impulses.resize(kept);
+  set.colors.resize(kept);
+}
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

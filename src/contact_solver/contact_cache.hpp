@@ -1,0 +1,47 @@
+/// Contacts of this step and of the last one, and the transfer of impulses and colors.
+#pragma once
+
+#include "src/base/thread_pool.hpp"
+#include "src/contact_solver/contact_set.hpp"
+#include "src/contact_solver/greedy_coloring.hpp"
+
+#include <span>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Owns the contacts of two steps. Buffers grow and never shrink.
+class ContactCache {
+ public:
+  /// Contacts of the current step. The caller replaces the three lists of contacts and calls
+  /// match().
+  ContactSet& current() { return current_; }
+  const ContactSet& current() const { return current_; }
+  /// Contacts of the last completed step.
+  const ContactSet& last() const { return last_; }
+
+  /// Gives each contact the impulses and the color that the same contact had in the last step, and
+  /// colors the new ones. Friction impulses are turned into the new tangent planes.
+  /// @param movable by body: 1 if its motion can change
+  /// @param pool null: in the calling thread
+  void match(std::span<const std::uint8_t> movable, ThreadPool* pool);
+  /// Completes the step: the current contacts become the last ones. Does not allocate.
+  void commit() noexcept { std::swap(last_, current_); }
+  /// Removes the contacts of a body.
+  void forget(std::uint32_t body) noexcept;
+
+ private:
+  void match_spheres(std::uint32_t first, std::uint32_t last);
+  void match_manifolds(std::uint32_t first, std::uint32_t last);
+  void match_points(const ManifoldInput& contact, std::uint32_t first, const ManifoldInput& before,
+                    std::uint32_t first_before);
+  void keep(std::uint32_t i, std::uint32_t before);
+
+  ContactSet current_, last_;
+  GreedyColoring coloring_;
+};
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,87 @@
+/// Contacts of a step for the soft-step solver, with what they keep for the next step.
+#pragma once
+
+#include <jfpx/math.hpp>
+
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Identifies a contact from step to step: two bodies, and a part of each.
+struct ContactKey {
+  std::uint32_t a = 0, b = 0;
+  std::uint32_t part_a = 0, part_b = 0;
+  /// `part_a` of the contacts of contact generators; those of shapes have lower numbers.
+  static constexpr std::uint32_t kGenerated = 0xffffffffu;
+  bool is_generated() const { return part_a == kGenerated; }
+  friend auto operator<=>(const ContactKey&, const ContactKey&) = default;
+};
+
+/// Two spheres that touch, or that may touch during the step.
+struct SphereContactInput {
+  ContactKey key;
+  Vec3 normal;        ///< unit, from b to a
+  Real distance = 0;  ///< [m], along the normal; > 0: a gap
+};
+
+/// Any other contact, with one normal and one or several points.
+struct ManifoldInput {
+  ContactKey key;
+  Vec3 normal;                         ///< unit, from b to a
+  std::uint32_t first = 0, count = 0;  ///< range of points
+  /// [-], of a generated contact; the others combine those of the bodies.
+  Real friction = 0, restitution = 0;
+};
+struct PointInput {
+  Vec3 arm_a, arm_b;          ///< [m], world axes, from the centres of mass
+  Real distance = 0;          ///< [m]
+  std::uint32_t feature = 0;  ///< identifies the point within its manifold
+};
+
+/// Impulses of a contact point on body a [N s], in world axes.
+struct KeptImpulse {
+  Vec3 friction;
+  Real normal = 0;
+};
+
+/// Contacts of one step. Both lists are sorted by key. Contacts are numbered: first those of
+/// spheres, then the manifolds. Impulses are numbered alike: one for each contact of spheres, then
+/// one for each point.
+struct ContactSet {
+  std::vector<SphereContactInput> spheres;
+  std::vector<ManifoldInput> manifolds;
+  std::vector<PointInput> points;
+
+  std::vector<KeptImpulse> impulses;   ///< by contact of spheres or point
+  std::vector<Vec3> rolling_impulses;  ///< [N m s], by contact: torque impulse on body a
+  std::vector<std::uint8_t> colors;    ///< by contact
+
+  std::uint32_t size() const {
+    return static_cast<std::uint32_t>(spheres.size() + manifolds.size());
+  }
+  bool is_sphere(std::uint32_t contact) const { return contact < spheres.size(); }
+  const ManifoldInput& manifold(std::uint32_t contact) const {
+    return manifolds[contact - spheres.size()];
+  }
+  const ContactKey& key(std::uint32_t contact) const {
+    return is_sphere(contact) ? spheres[contact].key : manifold(contact).key;
+  }
+  /// Index of the first impulse of a contact.
+  std::uint32_t first_impulse(std::uint32_t contact) const {
+    if (is_sphere(contact)) return contact;
+    return static_cast<std::uint32_t>(spheres.size()) + manifold(contact).first;
+  }
+  /// Number of impulses of a contact.
+  std::uint32_t impulse_count(std::uint32_t contact) const {
+    return is_sphere(contact) ? 1 : manifold(contact).count;
+  }
+};
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

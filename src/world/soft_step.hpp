@@ -1,0 +1,73 @@
+/// The step of Solver::soft_step: contacts, waking, substeps, sleep.
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include "src/base/thread_pool.hpp"
+#include "src/contact_solver/contact_cache.hpp"
+#include "src/contact_solver/cpu/soft_step_solver.hpp"
+#include "src/world/body_store.hpp"
+#include "src/world/islands.hpp"
+
+#include <optional>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Moves the bodies of a world by one step. Owns its buffers, which grow and never shrink, and the
+/// contacts of the last step, whose impulses and colors are part of the state of the world.
+///
+/// A step: the caller fills contacts() and calls add_generated(), solve() and commit(). Without
+/// commit(), the next step has the contacts of the last completed one, and no pose or velocity has
+/// changed.
+class SoftStep {
+ public:
+  /// @param pool outlives the object
+  SoftStep(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
+           ThreadPool* pool);
+
+  /// Contacts of the current step, for ContactFinder::find_near_contacts().
+  soft_step::ContactSet& contacts() { return cache_.current(); }
+  /// Adds the contacts of contact generators.
+  void add_generated(const BodyStore& bodies, std::span<const Contact> generated);
+  /// Computes the motion of the step. Wakes bodies and updates accelerations. Forces must have been
+  /// added up.
+  /// @returns the first body that is_in_world() refuses, if there is one
+  std::optional<BodyId> solve(BodyStore* bodies);
+  /// Moves the bodies, clears forces, and puts islands to sleep.
+  void commit(BodyStore* bodies) noexcept;
+  /// Removes the contacts of a removed body.
+  void forget(std::uint32_t body) noexcept { cache_.forget(body); }
+
+ private:
+  bool will_touch(const BodyStore& bodies, std::uint32_t contact) const;
+  void prepare(const BodyStore& bodies);
+  void find_near();
+  void wake_touched(BodyStore* bodies);
+  void load_bodies(BodyStore* bodies);
+  void accelerate(const BodyStore& bodies, bool is_first);
+  void move(const BodyStore& bodies);
+  BodyState state(const BodyStore& bodies, std::uint32_t body) const;
+  std::optional<BodyId> find_runaway(const BodyStore& bodies);
+  bool store_bodies(BodyStore* bodies);
+  void put_islands_to_sleep(BodyStore* bodies);
+
+  soft_step::StepConstants constants_;
+  SoftStepSettings settings_;
+  MaterialSettings materials_;
+  ThreadPool* pool_;
+  soft_step::ContactCache cache_;
+  soft_step::SoftStepSolver solver_{pool_};
+  Islands islands_;
+
+  std::vector<soft_step::SolverBody> bodies_;  ///< by body
+  std::vector<Quat> orientation_;              ///< by body, during the step
+  std::vector<Vec3> free_velocity_;            ///< by body: after the accelerations of a substep
+  std::vector<Vec3> free_angular_velocity_;
+  std::vector<std::uint8_t> movable_;  ///< by body
+  std::vector<std::uint8_t> near_;     ///< by body: 1 if it has a contact
+  std::vector<std::uint8_t> marked_;   ///< by label of an island
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
