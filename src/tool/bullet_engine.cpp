@@ -24,16 +24,17 @@ class BulletEngine final : public Engine {
   std::uint32_t awake() const override {
     std::uint32_t awake = 0;
     for (const btRigidBody* body : world_.bodies()) {
-      awake += !body->isStaticObject() && body->isActive() ? 1 : 0;
+      awake += !body->isStaticOrKinematicObject() && body->isActive() ? 1 : 0;
     }
     return awake;
   }
+  StepMeasures measures() const override { return measures_of(world_); }
   StageTimes times() const override { return last_step_times(world_); }
   std::string backend() const override { return sphere_backend(world_); }
   std::string device_failure() const override { return tool::device_failure(world_); }
 
  private:
-  bullet::SceneWorld world_;
+  mutable bullet::SceneWorld world_;  // Bullet's accessors of manifolds are not const
   std::uint64_t contacts_ = 0;
 };
 

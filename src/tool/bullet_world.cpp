@@ -1,6 +1,10 @@
 /// Operations on Bullet worlds shared by the tool's commands.
 #include "src/tool/bullet_world.hpp"
 
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <algorithm>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
@@ -41,6 +45,28 @@ std::uint64_t count_contacts(bullet::SceneWorld& world) {
         static_cast<std::uint64_t>(dispatcher.getManifoldByIndexInternal(i)->getNumContacts());
   }
   return contacts;
+}
+
+StepMeasures measures_of(bullet::SceneWorld& world) {
+  btCollisionDispatcher& dispatcher = world.dispatcher();
+  Penetrations penetrations;
+  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
+    const btPersistentManifold* manifold = dispatcher.getManifoldByIndexInternal(i);
+    if (!manifold->getBody0()->hasContactResponse() ||
+        !manifold->getBody1()->hasContactResponse()) {
+      continue;
+    }
+    for (int k = 0; k < manifold->getNumContacts(); ++k) {
+      const Real distance = manifold->getContactPoint(k).getDistance();
+      if (distance <= 0) penetrations.add(distance);
+    }
+  }
+  Real speed = 0;
+  for (const btRigidBody* body : world.bodies()) {
+    if (body->isStaticOrKinematicObject()) continue;
+    speed = std::max<Real>(speed, body->getLinearVelocity().length());
+  }
+  return {penetrations.deepest(), penetrations.mean(), speed};
 }
 
 std::string sphere_backend(const bullet::SceneWorld& world) {

@@ -14,6 +14,8 @@ bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
 StageTimes last_step_times(const bullet::SceneWorld& world);
 /// Number of contact points in all manifolds.
 std::uint64_t count_contacts(bullet::SceneWorld& world);
+/// Measures of the last step. Contact points with a positive distance are not penetrations.
+StepMeasures measures_of(bullet::SceneWorld& world);
 /// Name of the backend that tested the sphere pairs of the last dispatch, or "Bullet" if the
 /// dispatch was left to Bullet's own code.
 std::string sphere_backend(const bullet::SceneWorld& world);

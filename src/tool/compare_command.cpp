@@ -37,7 +37,7 @@ std::string report(const Scene& scene, const RunOptions& options, const Comparis
   add("stock Bullet", result.hash_stock, result.contacts_stock, result.ms_stock);
   add("Bullet with jfpx", result.hash_jfpx, result.contacts_jfpx, result.ms_jfpx);
   return fmt::format(
-      "{}: {} spheres, {} steps of {} s, {} precision, backend {}\n\n{}\n"
+      "{}: {} spheres, {} steps of {} s, {} precision, backend {}, native resolver {}\n\n{}\n"
       "contacts and times are summed over all steps\n\n"
       "dispatches by jfpx     {} of {}\n"
       "groups solved by jfpx  {}{}\n"
@@ -45,7 +45,7 @@ std::string report(const Scene& scene, const RunOptions& options, const Comparis
       "contact mismatches     {}{}\n"
       "Bullet's trajectories  {}\n",
       scene.name, count_spheres(scene), options.steps, text(scene.dt), kPrecision, result.backend,
-      engines.text(), result.batches, options.steps, result.groups,
+      resolver_name(scene.solver), engines.text(), result.batches, options.steps, result.groups,
       result.groups_on_device == 0 ? "" : fmt::format(", {} on the GPU", result.groups_on_device),
       result.contacts_compared, result.contact_mismatches,
       result.contact_mismatches == 0 ? "" : "; first: " + result.first_contact_mismatch,
@@ -60,6 +60,7 @@ nlohmann::ordered_json to_json_value(const Scene& scene, const RunOptions& optio
           {"spheres", count_spheres(scene)},
           {"steps", options.steps},
           {"backend", result.backend},
+          {"resolver", resolver_name(scene.solver)},
           {"precision", kPrecision},
           {"threads", options.threads},
           {"batches", result.batches},

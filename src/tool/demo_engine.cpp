@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 
 namespace jfpx {
@@ -18,8 +19,9 @@ namespace {
 std::unique_ptr<demos::Demo> make_demo(const RunOptions& options) {
   const WorldSettings world{.collider = collider_options(options)};
   if (!is_demo(options.scene)) return demos::make(load(options), world);
-  if (options.no_sleep) {
-    throw InvalidArgument("--no-sleep requires a scene; " + options.scene + " is a demo");
+  if (const char* option = option_of_scenes(options)) {
+    throw InvalidArgument(std::string(option) + " requires a scene; " + options.scene +
+                          " is a demo");
   }
   return demos::make(options.scene,
                      {.scene = scene_options(options), .dt = options.dt, .world = world});
@@ -41,8 +43,20 @@ class DemoEngine final : public Engine {
   std::vector<BodyState> states() const override { return demo_->states(); }
   std::uint64_t contacts() const override { return report_.contacts; }
   std::uint32_t awake() const override { return report_.awake; }
+  StepMeasures measures() const override {
+    if (demo_->world() != nullptr) return measures_of(*demo_->world(), report_);
+    StepMeasures measures;
+    for (const BodyState& state : demo_->states()) {
+      measures.largest_speed = std::max(measures.largest_speed, length(state.velocity));
+    }
+    return measures;
+  }
   StageTimes times() const override { return stage_times(report_); }
   std::string backend() const override { return std::string(to_string(report_.backend)); }
+  std::string resolver() const override {
+    const World* world = demo_->world();
+    return world == nullptr ? std::string() : std::string(resolver_name(world->scene().solver));
+  }
   std::string device_failure() const override { return device_failure_; }
   std::string trouble() const override { return trouble_of(report_); }
 

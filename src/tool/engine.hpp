@@ -8,6 +8,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -23,6 +24,31 @@ struct StageTimes {
 };
 nlohmann::ordered_json to_json_value(const StageTimes& times);
 
+/// Measures of the last step.
+struct StepMeasures {
+  /// [m], >= 0, of the contact points as detected in the step, without those of sensors; 0 without
+  /// contacts.
+  Real deepest_penetration = 0, mean_penetration = 0;
+  Real largest_speed = 0;  ///< [m/s], of the movable bodies after the step
+};
+
+/// Deepest and mean penetration of a sequence of contact points.
+class Penetrations {
+ public:
+  /// @param distance [m], <= 0
+  void add(Real distance) {
+    deepest_ = std::max(deepest_, -distance);
+    sum_ -= static_cast<double>(distance);
+    ++count_;
+  }
+  Real deepest() const { return deepest_; }
+  Real mean() const { return static_cast<Real>(count_ > 0 ? sum_ / count_ : 0); }
+
+ private:
+  Real deepest_ = 0;
+  double sum_ = 0, count_ = 0;
+};
+
 class Engine {
  public:
   virtual ~Engine() = default;
@@ -30,8 +56,11 @@ class Engine {
   virtual std::vector<BodyState> states() const = 0;
   virtual std::uint64_t contacts() const = 0;  ///< number of contact points after the last step
   virtual std::uint32_t awake() const = 0;     ///< number of movable bodies awake
+  virtual StepMeasures measures() const = 0;   ///< computed by each call
   virtual StageTimes times() const = 0;        ///< of the last step
   virtual std::string backend() const = 0;     ///< computed the sphere contacts of the last step
+  /// Name of the native resolver; empty for Bullet and for demos without a world.
+  virtual std::string resolver() const { return {}; }
   /// The backend, its algorithm and the reason for the choice, as a table entry.
   virtual std::string choice() const { return backend(); }
   /// Reason why the CPU replaced a device at some step; empty if it did not.

@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <span>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
@@ -20,8 +23,12 @@ class NativeEngine final : public Engine {
   std::vector<BodyState> states() const override { return world_.states(); }
   std::uint64_t contacts() const override { return report_.contacts; }
   std::uint32_t awake() const override { return report_.awake; }
+  StepMeasures measures() const override { return measures_of(world_, report_); }
   StageTimes times() const override { return stage_times(report_); }
   std::string backend() const override { return std::string(to_string(report_.backend)); }
+  std::string resolver() const override {
+    return std::string(resolver_name(world_.scene().solver));
+  }
   std::string choice() const override {
     return fmt::format("{}, {}, {}", to_string(report_.backend), to_string(report_.algorithm),
                        to_string(report_.choice));
@@ -36,6 +43,20 @@ class NativeEngine final : public Engine {
 };
 
 }  // namespace
+
+StepMeasures measures_of(const World& world, const StepReport& report) {
+  Penetrations penetrations;
+  // Contacts of generators follow the detected ones; a failed step has none.
+  const std::span<const Contact> contacts = world.contacts();
+  for (const Contact& c : contacts.first(std::min<std::size_t>(report.contacts, contacts.size()))) {
+    if (!c.sensor) penetrations.add(c.distance);
+  }
+  Real speed = 0;
+  for (const BodyId id : world.bodies()) {
+    if (world.mass(id) > 0) speed = std::max(speed, length(world.state(id).velocity));
+  }
+  return {penetrations.deepest(), penetrations.mean(), speed};
+}
 
 StageTimes stage_times(const StepReport& report) {
   return {.integrate = report.integrate_ms,

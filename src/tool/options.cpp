@@ -51,6 +51,15 @@ void add_scene_options(CLI::App& app, RunOptions& options, const std::string& sc
       ->capture_default_str();
   app.add_option("--dt", options.dt, "Time step in seconds [default: the scene's]");
   app.add_flag("--no-sleep", options.no_sleep, "Keep all bodies awake");
+  app.add_option_function<std::string>(
+         "--resolver",
+         [&options](const std::string& name) { options.resolver = parse_resolver(name); },
+         "Native engine: resolver of contacts, soft-step or worst-first [default: the scene's]")
+      ->check(CLI::IsMember(
+          std::vector<std::string>(std::begin(kResolverNames), std::end(kResolverNames))));
+  app.add_option("--substeps", options.substeps,
+                 "Resolver soft-step: number of substeps per step, 1 to 64 [default: the scene's]")
+      ->check(whole_number());
 }
 
 void add_run_options(CLI::App& app, RunOptions& options) {

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <optional>
@@ -35,8 +36,10 @@ struct Totals {
 
 std::string csv_row(std::uint64_t step, const Engine& engine) {
   const StageTimes t = engine.times();
-  return fmt::format("{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", step, engine.contacts(),
-                     engine.awake(), t.integrate, t.broad, t.detect, t.solve, t.total);
+  const StepMeasures m = engine.measures();
+  return fmt::format("{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{}\n", step,
+                     engine.contacts(), engine.awake(), t.integrate, t.broad, t.detect, t.solve,
+                     t.total, m.deepest_penetration, m.mean_penetration, m.largest_speed);
 }
 
 std::string summary(const CommandOptions& options, const Scene& scene, const Engine& engine,
@@ -48,24 +51,35 @@ std::string summary(const CommandOptions& options, const Scene& scene, const Eng
              ms(t.solve / steps), ms(t.total / steps)});
   Table choices({"sphere contacts by", "steps"});
   for (const auto& [choice, count] : totals.choices) choices.add({choice, std::to_string(count)});
+  const StepMeasures m = engine.measures();
   return fmt::format(
-      "{}: {} bodies, {} steps of {} s, engine {}, backend {}\n"
-      "contacts at the end {}, awake {}\n\n{}\n{}",
+      "{}: {} bodies, {} steps of {} s, engine {}{}{}, backend {}\n"
+      "contacts at the end {}, awake {}\n"
+      "penetration at the end {:.3g} m deepest, {:.3g} m mean; largest speed {:.3g} m/s\n\n{}\n{}",
       scene.name, scene.bodies.size(), options.run.steps, text(scene.dt), options.engine,
-      engine.backend(), engine.contacts(), engine.awake(), table.text(), choices.text());
+      engine.resolver().empty() ? "" : ", resolver ", engine.resolver(), engine.backend(),
+      engine.contacts(), engine.awake(), m.deepest_penetration, m.mean_penetration, m.largest_speed,
+      table.text(), choices.text());
 }
 
 nlohmann::ordered_json to_json_value(const CommandOptions& options, const Scene& scene,
                                      const Engine& engine, const Totals& totals) {
+  const StepMeasures m = engine.measures();
+  nlohmann::ordered_json resolver;  // null for an engine without one
+  if (!engine.resolver().empty()) resolver = engine.resolver();
   return {{"scene", scene.name},
           {"bodies", scene.bodies.size()},
           {"steps", options.run.steps},
           {"engine", options.engine},
+          {"resolver", resolver},
           {"backend", engine.backend()},
           {"precision", kPrecision},
           {"contacts", engine.contacts()},
           {"contacts_total", totals.contacts},
           {"awake", engine.awake()},
+          {"deepest_penetration", m.deepest_penetration},
+          {"mean_penetration", m.mean_penetration},
+          {"largest_speed", m.largest_speed},
           {"choices", totals.choices},
           {"device_failure", engine.device_failure()},
           {"hash", hex(state_hash(engine.states()))},
@@ -99,7 +113,9 @@ int run(const CommandOptions& options) {
                                       .backend = std::string(to_string(options.run.backend)),
                                       .scene = scene});
   }
-  csv.write("step,contacts,awake,integrate_ms,broad_ms,detect_ms,solve_ms,total_ms\n");
+  csv.write(
+      "step,contacts,awake,integrate_ms,broad_ms,detect_ms,solve_ms,total_ms,"
+      "deepest_penetration,mean_penetration,largest_speed\n");
   Totals totals;
   {
     Progress progress(scene.name, options.run.steps, options.run.quiet);
@@ -122,14 +138,18 @@ int run(const CommandOptions& options) {
   return report_trouble(engine->device_failure(), engine->trouble());
 }
 
-/// Rejects options of Bullet for engines without them.
+/// Rejects options of one engine for the others.
 void check_engine(const CLI::App& command, const CommandOptions& options) {
-  if (options.engine == to_string(EngineKind::bullet)) return;
-  for (const char* option : {"--solver", "--world", "--minimum-batch"}) {
-    if (command.count(option) == 0) continue;
-    throw InvalidArgument(std::string(option) + " requires --engine bullet; engine is " +
-                          options.engine);
-  }
+  const auto require = [&](EngineKind engine, std::initializer_list<const char*> names) {
+    if (options.engine == to_string(engine)) return;
+    for (const char* option : names) {
+      if (command.count(option) == 0) continue;
+      throw InvalidArgument(fmt::format("{} requires --engine {}; engine is {}", option,
+                                        to_string(engine), options.engine));
+    }
+  };
+  require(EngineKind::bullet, {"--solver", "--world", "--minimum-batch"});
+  require(EngineKind::native, {"--resolver", "--substeps"});
 }
 
 }  // namespace
@@ -146,7 +166,8 @@ void add_run_command(CLI::App& app, int& status) {
                       "Run as a demo with the inputs in this file (see: jfpx scenes DEMO)");
   command->add_option(
       "--csv", options->run.csv,
-      "Write one line per step to this file: step, contacts, awake bodies, milliseconds");
+      "Write one line per step to this file: step, contacts, awake bodies, milliseconds, "
+      "deepest and mean penetration [m], largest speed [m/s]");
   command->add_option("--record", options->run.record,
                       "Write the state after every step to this file (see: jfpx replay)");
   command->callback([command, options, &status] {

@@ -28,17 +28,31 @@ const char* option_of_named_scenes(const RunOptions& options) {
   return options.seed == RunOptions{}.seed ? nullptr : "--seed";
 }
 
+/// The index of a name in a list. @throws InvalidArgument naming `what` if there is none
+template <std::size_t N>
+std::size_t find_name(const char* what, const char* const (&names)[N], std::string_view name) {
+  const auto* found = std::ranges::find(names, name);
+  if (found != std::end(names)) return static_cast<std::size_t>(found - std::begin(names));
+  throw InvalidArgument(
+      fmt::format("{} is \"{}\"; it must be one of {}", what, name, fmt::join(names, ", ")));
+}
+
 }  // namespace
 
 std::string_view to_string(EngineKind kind) { return kEngineNames[static_cast<int>(kind)]; }
 
 EngineKind parse_engine(std::string_view name) {
-  const auto* found = std::ranges::find(kEngineNames, name);
-  if (found != std::end(kEngineNames)) {
-    return static_cast<EngineKind>(found - std::begin(kEngineNames));
-  }
-  throw InvalidArgument(
-      fmt::format("engine is \"{}\"; it must be one of {}", name, fmt::join(kEngineNames, ", ")));
+  return static_cast<EngineKind>(find_name("engine", kEngineNames, name));
+}
+
+Solver parse_resolver(std::string_view name) {
+  return static_cast<Solver>(find_name("resolver", kResolverNames, name));
+}
+
+const char* option_of_scenes(const RunOptions& options) {
+  if (options.no_sleep) return "--no-sleep";
+  if (options.resolver) return "--resolver";
+  return options.substeps ? "--substeps" : nullptr;
 }
 
 scenes::Options scene_options(const RunOptions& options) {
@@ -64,6 +78,14 @@ Scene load(const RunOptions& options) {
   }
   if (options.dt) scene.dt = *options.dt;
   if (options.no_sleep) scene.sleep.enabled = false;
+  if (options.resolver) scene.solver = *options.resolver;
+  if (options.substeps) {
+    if (scene.solver != Solver::soft_step) {
+      throw InvalidArgument(fmt::format("--substeps requires --resolver soft-step; resolver is {}",
+                                        resolver_name(scene.solver)));
+    }
+    scene.soft_step.substeps = *options.substeps;
+  }
   validate(scene);
   return scene;
 }

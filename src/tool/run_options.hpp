@@ -26,6 +26,14 @@ std::string_view to_string(EngineKind kind);
 /// @throws InvalidArgument for a name that to_string() does not return.
 EngineKind parse_engine(std::string_view name);
 
+/// Names of the native resolvers in options and results, in the order of Solver.
+inline constexpr const char* kResolverNames[] = {"soft-step", "worst-first"};
+inline std::string_view resolver_name(Solver solver) {
+  return kResolverNames[static_cast<int>(solver)];
+}
+/// @throws InvalidArgument for a name that resolver_name() does not return.
+Solver parse_resolver(std::string_view name);
+
 /// The scene to run, and the settings of the run.
 struct RunOptions {
   std::string scene;  ///< a name, or the path of a JSON file
@@ -34,6 +42,8 @@ struct RunOptions {
   std::uint64_t seed = 1;
   std::uint64_t steps = 120;
   bool no_sleep = false;
+  std::optional<Solver> resolver;         ///< replaces Scene::solver
+  std::optional<std::uint32_t> substeps;  ///< replaces SoftStepSettings::substeps
   Backend backend = Backend::automatic;
   unsigned threads = 1;
   std::optional<std::uint64_t> minimum_batch;   ///< [pairs]; empty: the command's default
@@ -47,6 +57,9 @@ inline bool wants_table(const RunOptions& options) { return !options.quiet && op
 
 /// The options of a named scene.
 scenes::Options scene_options(const RunOptions& options);
+/// The option given that a demo does not have, as it applies to scenes only; nullptr if there is
+/// none.
+const char* option_of_scenes(const RunOptions& options);
 /// Loads or generates the scene and applies the options to it.
 /// @throws InvalidArgument, InvalidScene, FileError, OutOfMemory
 Scene load(const RunOptions& options);

@@ -39,9 +39,9 @@ std::string list_text() {
 std::string describe(const Scene& scene) {
   std::size_t movable = 0;
   for (const BodyDef& body : scene.bodies) movable += body.mass > 0 ? 1 : 0;
-  return fmt::format("{}: {} bodies, {} of them movable, {} spheres, dt {} s\n", scene.name,
-                     scene.bodies.size(), movable, scenes::spheres_of(scene).size(),
-                     text(scene.dt));
+  return fmt::format("{}: {} bodies, {} of them movable, {} spheres, dt {} s, resolver {}\n",
+                     scene.name, scene.bodies.size(), movable, scenes::spheres_of(scene).size(),
+                     text(scene.dt), resolver_name(scene.solver));
 }
 
 }  // namespace

@@ -24,6 +24,8 @@ class NativeRun final : public Run {
     snapshot.times = {report_.integrate_ms, 0, report_.detect_ms, report_.resolve_ms,
                       report_.total_ms};
     snapshot.iterations = report_.position_iterations + report_.velocity_iterations;
+    const Scene& scene = world_.scene();
+    if (scene.solver == Solver::soft_step) snapshot.substeps = scene.soft_step.substeps;
     snapshot.computed_by = to_string(report_.backend);
     if (report_.non_finite) {
       snapshot.trouble = "body " + std::to_string(report_.non_finite_body.index) +
@@ -34,7 +36,7 @@ class NativeRun final : public Run {
 
   EngineChoice choice() const override { return choice_; }
   bool switch_to(const EngineChoice& choice) override {
-    if (choice.engine != EngineKind::native) return false;
+    if (choice.engine != EngineKind::native || choice.threads != choice_.threads) return false;
     collider_->exchange(make_sphere_collider(collider_options(choice)));
     choice_ = choice;
     return true;
@@ -46,7 +48,7 @@ class NativeRun final : public Run {
       : choice_(choice),
         first_step_(first_step),
         collider_(collider.get()),
-        world_(scene, std::move(collider)) {}
+        world_(scene, std::move(collider), BroadPhase::cells, choice.threads) {}
 
   EngineChoice choice_;
   std::uint64_t first_step_;

@@ -58,10 +58,12 @@ void check_recording(const ViewOptions& options) {
     throw InvalidArgument("--side-by-side can't play a recording; " + run.scene +
                           " is a recording");
   }
-  if (run.spheres || run.boxes || run.dt || run.seed != tool::RunOptions{}.seed || run.no_sleep) {
+  if (run.spheres || run.boxes || run.dt || run.seed != tool::RunOptions{}.seed ||
+      tool::option_of_scenes(run) != nullptr) {
     throw InvalidArgument(
         run.scene +
-        " is a recording: --spheres, --boxes, --seed, --dt and --no-sleep do not apply");
+        " is a recording: --spheres, --boxes, --seed, --dt, --no-sleep, --resolver and --substeps "
+        "do not apply");
   }
   if (options.choice != EngineChoice{}) {
     throw InvalidArgument(
@@ -72,9 +74,8 @@ void check_recording(const ViewOptions& options) {
 }
 
 void check_demo(const ViewOptions& options) {
-  const char* unused = options.run.no_sleep                           ? "--no-sleep"
-                       : options.colouring != ViewOptions{}.colouring ? "--colours"
-                                                                      : nullptr;
+  const char* unused = tool::option_of_scenes(options.run);
+  if (unused == nullptr && options.colouring != ViewOptions{}.colouring) unused = "--colours";
   if (unused == nullptr) return;
   throw InvalidArgument(std::string(unused) + " requires a scene; " + options.run.scene +
                         " is a demo");

@@ -24,6 +24,8 @@ constexpr float kMargin = 12;          // between a panel and the edge of the wi
 constexpr double kAsRequested = 0.95;  // fraction of the requested speed
 constexpr std::uint64_t kMaxSpheres = 2'000'000;
 
+constexpr std::uint64_t kMaxCount = std::numeric_limits<std::uint32_t>::max();
+
 /// A slider for a Real. @return true when the user releases a changed value
 bool slide(const char* label, Real* value, float low, float high) {
   auto number = static_cast<float>(*value);
@@ -31,6 +33,14 @@ bool slide(const char* label, Real* value, float low, float high) {
     *value = static_cast<Real>(std::clamp(number, low, high));
   }
   return ImGui::IsItemDeactivatedAfterEdit();
+}
+
+/// A field for a number of 32 bits. @return true when the user leaves it after a change
+bool count(const char* label, std::uint32_t* value) {
+  std::uint64_t number = *value;
+  const bool changed = widget::number(label, &number);
+  *value = static_cast<std::uint32_t>(std::min(number, kMaxCount));
+  return changed;
 }
 
 }  // namespace
@@ -111,6 +121,8 @@ void SceneViewer::show_scene_choice() {
   if (is_playable(request.run.scene)) {  // demos do not support these options
     request.choice.engine = EngineKind::native;
     request.run.no_sleep = false;
+    request.run.resolver.reset();
+    request.run.substeps.reset();
     request.colouring = Colouring::bodies;
   }
   next = request;
@@ -148,15 +160,7 @@ void SceneViewer::show_settings() {
   // An active widget holds the user's value, which takes effect when the widget is released.
   if (!ImGui::IsAnyItemActive()) settings_field_ = player_.settings();
   bool changed = slide("dt [s]", &settings_field_.dt, 1e-4f, 0.05f);
-  std::uint64_t iterations = settings_field_.resolver.max_iterations;
-  changed |= widget::number("iterations, 0 = 8N", &iterations);
-  constexpr std::uint64_t kMax = std::numeric_limits<std::uint32_t>::max();
-  settings_field_.resolver.max_iterations = static_cast<std::uint32_t>(std::min(iterations, kMax));
-  changed |= slide("velocity eps [m/s]", &settings_field_.resolver.velocity_epsilon, 1e-5f, 1);
-  changed |= slide("position eps [m]", &settings_field_.resolver.position_epsilon, 1e-5f, 1);
-  changed |=
-      slide("restitution from [m/s]", &settings_field_.resolver.restitution_velocity, 1e-3f, 5);
-  changed |= slide("sleep eps [m2/s2]", &settings_field_.sleep.epsilon, 1e-4f, 5);
+  if (player_.choice().engine == EngineKind::native) changed |= show_resolver_settings();
   changed |= widget::check("sleep", &settings_field_.sleep.enabled);
   if (widget::button("Scene defaults")) {
     settings_field_ = scene_settings_;
@@ -167,15 +171,48 @@ void SceneViewer::show_settings() {
   message.clear();
 }
 
+/// Shows the choice of the resolver and the settings that it uses. @return true if one has changed
+bool SceneViewer::show_resolver_settings() {
+  int chosen = static_cast<int>(settings_field_.solver);
+  for (int i = 0; i < static_cast<int>(std::size(tool::kResolverNames)); ++i) {
+    if (i > 0) ImGui::SameLine();
+    widget::radio(tool::kResolverNames[i], &chosen, i);
+  }
+  const auto solver = static_cast<Solver>(chosen);
+  bool changed = solver != settings_field_.solver;
+  settings_field_.solver = solver;
+  SleepSettings& sleep = settings_field_.sleep;
+  if (solver == Solver::soft_step) {
+    SoftStepSettings& soft = settings_field_.soft_step;
+    changed |= count("substeps", &soft.substeps);
+    changed |= slide("contact [Hz], 0 = auto", &soft.contact_hertz, 0, 1000);
+    changed |= slide("damping ratio", &soft.damping_ratio, 0.01f, 1000);
+    changed |= slide("push-out [m/s]", &soft.push_out_speed, 0.01f, 100);
+    changed |= slide("restitution from [m/s]", &soft.restitution_threshold, 1e-3f, 5);
+    changed |= slide("margin [m]", &soft.speculative_margin, 0, 1);
+    changed |= slide("sleep speed [m/s]", &sleep.speed, 1e-4f, 5);
+    changed |= slide("sleep time [s]", &sleep.time, 0.01f, 10);
+  } else {
+    ResolverSettings& resolver = settings_field_.resolver;
+    changed |= count("iterations, 0 = 8N", &resolver.max_iterations);
+    changed |= slide("velocity eps [m/s]", &resolver.velocity_epsilon, 1e-5f, 1);
+    changed |= slide("position eps [m]", &resolver.position_epsilon, 1e-5f, 1);
+    changed |= slide("restitution from [m/s]", &resolver.restitution_velocity, 1e-3f, 5);
+    changed |= slide("sleep eps [m2/s2]", &sleep.epsilon, 1e-4f, 5);
+  }
+  return changed;
+}
+
 void SceneViewer::show_counters() {
   const Snapshot& now = player_.shown();
   ImGui::Separator();
   const auto awake = std::count(now.awake.begin(), now.awake.end(), std::uint8_t{1});
   widget::text(fmt::format("{} bodies, {} awake, {} contacts", now.states.size(), awake,
                            now.contacts.size()));
-  widget::text(now.solved_by.empty()
-                   ? fmt::format("spheres by {}, {} corrections", now.computed_by, now.iterations)
-                   : fmt::format("spheres by {}, solved by {}", now.computed_by, now.solved_by));
+  const std::string solved = !now.solved_by.empty() ? "solved by " + now.solved_by
+                             : now.substeps > 0     ? fmt::format("{} substeps", now.substeps)
+                                                    : fmt::format("{} corrections", now.iterations);
+  widget::text(fmt::format("spheres by {}, {}", now.computed_by, solved));
   if (!now.trouble.empty()) widget::warning(now.trouble, kTextWidth);
   const std::array<std::pair<const char*, double StageTimes::*>, 5> stages = {
       {{"integrate", &StageTimes::integrate},

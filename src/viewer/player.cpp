@@ -76,6 +76,8 @@ bool Player::switch_to(const EngineChoice& choice) {
 void Player::set_settings(const RunSettings& settings) {
   Scene changed = scene_;
   changed.dt = settings.dt;
+  changed.solver = settings.solver;
+  changed.soft_step = settings.soft_step;
   changed.resolver = settings.resolver;
   changed.sleep = settings.sleep;
   validate(changed);

@@ -15,6 +15,8 @@ namespace view {
 /// Settings that can be changed while a scene runs.
 struct RunSettings {
   Real dt = 0;  ///< [s]
+  Solver solver = Solver::soft_step;
+  SoftStepSettings soft_step;
   ResolverSettings resolver;
   SleepSettings sleep;
 };
@@ -52,7 +54,9 @@ class Player {
   /// Completes the file of record_to(), if any. No step may follow.
   /// @throws InvalidArgument if the steps are not those of one run; FileError
   void finish_recording();
-  RunSettings settings() const { return {scene_.dt, scene_.resolver, scene_.sleep}; }
+  RunSettings settings() const {
+    return {scene_.dt, scene_.solver, scene_.soft_step, scene_.resolver, scene_.sleep};
+  }
   /// Continues from the newest snapshot with other settings.
   /// @throws InvalidScene, BackendUnavailable; nothing has changed then
   void set_settings(const RunSettings& settings);

@@ -16,12 +16,12 @@ namespace view {
 
 using tool::EngineKind;
 
-/// The engine of a run and its settings. Another choice with the same kind of engine keeps the
-/// bits.
+/// The engine of a run and its settings. Another choice with the same kind of engine and the same
+/// number of threads keeps the bits.
 struct EngineChoice {
   EngineKind engine = EngineKind::native;
   Backend backend = Backend::automatic;  ///< of sphere contacts, and of jfpx's solver in Bullet
-  unsigned threads = 1;                  ///< on the CPU; 0: one per core
+  unsigned threads = 1;                  ///< on the CPU, fixed for a run; 0: one per core
   bool jfpx_solver = true, jfpx_world = true;  ///< parts of EngineKind::bullet; false: Bullet's
   std::size_t minimum_batch = 0;               ///< smaller work is left to Bullet's own code
   friend bool operator==(const EngineChoice&, const EngineChoice&) = default;

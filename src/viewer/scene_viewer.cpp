@@ -74,11 +74,14 @@ bool SceneViewer::walks() const { return tool::is_demo(options_.run.scene); }
 std::string SceneViewer::summary() const {
   const Snapshot& now = player_.shown();
   const EngineChoice choice = player_.choice();
+  const bool native = choice.engine == EngineKind::native;
   return fmt::format(
-      "{}: {} bodies, step {}, {} contacts, engine {}, spheres by {}{}{}, hash {:016x}{}{}",
+      "{}: {} bodies, step {}, {} contacts, engine {}{}{}, spheres by {}{}{}, hash {:016x}{}{}",
       player_.scene().name, player_.scene().bodies.size(), now.step, now.contacts.size(),
-      to_string(choice.engine), now.computed_by, now.solved_by.empty() ? "" : ", solved by ",
-      now.solved_by, state_hash(now.states), now.trouble.empty() ? "" : "; ", now.trouble);
+      to_string(choice.engine), native ? ", resolver " : "",
+      native ? tool::resolver_name(player_.scene().solver) : "", now.computed_by,
+      now.solved_by.empty() ? "" : ", solved by ", now.solved_by, state_hash(now.states),
+      now.trouble.empty() ? "" : "; ", now.trouble);
 }
 
 std::unique_ptr<Viewer> make_scene_viewer(const ViewOptions& options) {

@@ -44,6 +44,7 @@ class SceneViewer final : public Viewer {
   void show_scene_choice();
   void show_engine_choice();
   void show_settings();
+  bool show_resolver_settings();
   void show_counters();
   void show_picked();
   void show_body(std::uint32_t body);

@@ -24,7 +24,8 @@ struct Snapshot {
   std::vector<std::uint8_t> awake;  ///< in the same order, 1 or 0
   std::vector<Contact> contacts;    ///< BodyId::index is the index in the scene
   StageTimes times;
-  std::uint64_t iterations = 0;  ///< of the native resolver, both loops
+  std::uint32_t substeps = 0;    ///< of the native resolver soft-step; 0: another one
+  std::uint64_t iterations = 0;  ///< of the native resolver worst-first, both loops
   std::string computed_by;       ///< backend of the sphere contacts
   std::string solved_by;         ///< backend of Bullet's solver; empty for a native run
   std::string trouble;           ///< reason why the run can't continue meaningfully

@@ -3,6 +3,7 @@
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
 
+#include "src/base/hash64.hpp"
 #include "src/demos/demo.hpp"
 #include "src/scenes/scenes.hpp"
 #include "tests/support/process.hpp"
@@ -12,8 +13,11 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 
 namespace jfpx {
 namespace {
@@ -82,6 +86,9 @@ TEST(Tool, BadUsageIsStatusTwo) {
   expect_fails("run pile --solver ode", 2, "ode");
   expect_fails("run pile --world ode", 2, "ode");
   expect_fails("run pile --precision half", 2, "half");
+  expect_fails("run pile --resolver best-first", 2, "best-first");
+  expect_fails("run pile --substeps 0", 2, "substeps is 0");
+  expect_fails("run pile --substeps 65", 2, "substeps is 65");
   expect_fails("scenes --export", 2, "SCENE");
   expect_fails("scenes --spheres 5", 2, "SCENE");
 }
@@ -92,6 +99,16 @@ TEST(Tool, OptionsThatWouldDoNothingAreRefused) {
       expect_fails("run pile --engine " + engine + " " + option, 2,
                    "requires --engine bullet; engine is " + engine);
     }
+  }
+  for (const std::string engine : {"bullet", "bullet-stock"}) {
+    for (const std::string option : {"--resolver soft-step", "--substeps 2"}) {
+      expect_fails("run pile --engine " + engine + " " + option, 2,
+                   "requires --engine native; engine is " + engine);
+    }
+  }
+  for (const std::string command : {"run", "compare", "scenes"}) {
+    expect_fails(command + " pile --resolver worst-first --substeps 2", 2,
+                 "--substeps requires --resolver soft-step; resolver is worst-first");
   }
 }
 
@@ -187,6 +204,10 @@ TEST(Tool, ScenesAreListedDescribedAndExported) {
     EXPECT_THAT(list.output, HasSubstr(std::string(entry.name)));
   }
   EXPECT_THAT(jfpx_stdout("scenes pile --spheres 30").output, HasSubstr("pile: 35 bodies, 30"));
+  for (const std::string resolver : {"soft-step", "worst-first"}) {
+    EXPECT_THAT(jfpx_stdout("scenes pile --spheres 3 --resolver " + resolver).output,
+                HasSubstr("resolver " + resolver + "\n"));
+  }
   const ProcessResult text = jfpx_stdout("scenes gas --spheres 10 --seed 5 --export");
   EXPECT_EQ(from_json(text.output), scenes::make("gas", {.spheres = 10, .seed = 5}));
 }
@@ -240,6 +261,8 @@ TEST(Tool, OptionsThatDemosDoNotSupportAreRejected) {
   expect_fails("scenes flight --export", 2, "only the native engine");
   expect_fails("run flight --record " + folder.file("a.rec"), 2, "--record requires a scene");
   expect_fails("run flight --no-sleep", 2, "--no-sleep requires a scene");
+  expect_fails("run flight --resolver worst-first", 2, "--resolver requires a scene");
+  expect_fails("run flight --substeps 2", 2, "--substeps requires a scene");
   expect_fails("run pile --boxes 3", 2, "boxes");
   expect_fails("run flight --dt 0", 2, "dt");
 }
@@ -272,6 +295,82 @@ TEST(Tool, HashIsTheLastLineAndRepeats) {
   EXPECT_THAT(loud.output, ::testing::EndsWith("\n" + quiet.output));
   EXPECT_EQ(jfpx_stdout(arguments + " --quiet --threads 3").output, quiet.output);
   EXPECT_NE(jfpx_stdout(arguments + " --quiet --seed 2").output, quiet.output);
+}
+
+TEST(Tool, TheResolverAndItsSubstepsAreSelected) {
+  const std::string arguments = "run pile --spheres 30 --steps 40 --quiet --hash --resolver ";
+  const std::string worst_first = jfpx_stdout(arguments + "worst-first").output;
+  const std::string soft_step = jfpx_stdout(arguments + "soft-step").output;
+  EXPECT_THAT(soft_step, MatchesRegex("[0-9a-f]{16}\n"));
+  EXPECT_NE(soft_step, worst_first);
+  EXPECT_NE(jfpx_stdout(arguments + "soft-step --substeps 7").output, soft_step);
+  EXPECT_EQ(jfpx_stdout(arguments + "soft-step --threads 3").output, soft_step);
+  for (const std::string resolver : {"soft-step", "worst-first"}) {
+    const std::string command = "run pile --spheres 3 --steps 1 --resolver " + resolver;
+    EXPECT_EQ(nlohmann::json::parse(jfpx_stdout(command + " --json -").output)["resolver"],
+              resolver);
+    EXPECT_THAT(jfpx_stdout(command).output, HasSubstr("resolver " + resolver));
+  }
+}
+
+/// The cells of a CSV file.
+std::vector<std::vector<std::string>> read_csv(const std::string& path) {
+  std::vector<std::vector<std::string>> rows;
+  std::ifstream file(path);
+  for (std::string line, cell; std::getline(file, line);) {
+    std::istringstream cells(line);
+    for (rows.emplace_back(); std::getline(cells, cell, ',');) rows.back().push_back(cell);
+  }
+  return rows;
+}
+
+/// A ball that begins 4 mm below the ground and another that flies at 3 m/s.
+void save_two_balls(const std::string& path) {
+  Scene scene;
+  scene.bodies.resize(3);
+  for (BodyDef& body : scene.bodies) {
+    body.shape = Sphere{Real(0.5)};
+    body.acceleration = {};
+  }
+  scene.bodies[0].position = {0, Real(0.496), 0};
+  scene.bodies[1].position = {9, 9, 9};
+  scene.bodies[1].velocity = {0, 3, 0};
+  scene.bodies[2].shape = HalfSpace{{0, 1, 0}, 0};
+  scene.bodies[2].mass = 0;
+  save_scene(scene, path);
+}
+
+TEST(Tool, RunReportsPenetrationSpeedAndAwakeBodies) {
+  const test::TemporaryFolder folder;
+  save_two_balls(folder.file("balls.json"));
+  for (const std::string engine :
+       {"native --resolver soft-step", "native --resolver worst-first", "bullet", "bullet-stock"}) {
+    if (!JFPX_HAS_BULLET && engine.starts_with("bullet")) continue;
+    const std::string run = "run " + folder.file("balls.json") + " --steps 1 --engine " + engine;
+    const auto json =
+        nlohmann::json::parse(jfpx_stdout(run + " --json - --csv " + folder.file("a.csv")).output);
+    EXPECT_NEAR(json["deepest_penetration"], 0.004, 1e-5) << engine;
+    EXPECT_EQ(json["mean_penetration"], json["deepest_penetration"]) << engine;
+    EXPECT_NEAR(json["largest_speed"], 3, 1e-5) << engine;
+    EXPECT_EQ(json["awake"], 2) << engine;
+    EXPECT_EQ(json["resolver"].is_null(), engine.starts_with("bullet"));
+    const auto csv = read_csv(folder.file("a.csv"));
+    ASSERT_EQ(csv.size(), 2u);
+    // Columns of later versions follow those of the first one.
+    EXPECT_THAT(csv[0],
+                ::testing::ElementsAre("step", "contacts", "awake", "integrate_ms", "broad_ms",
+                                       "detect_ms", "solve_ms", "total_ms", "deepest_penetration",
+                                       "mean_penetration", "largest_speed"));
+    ASSERT_EQ(csv[1].size(), csv[0].size());
+    EXPECT_NEAR(std::stod(csv[1][8]), 0.004, 1e-5) << engine;
+    EXPECT_NEAR(std::stod(csv[1][10]), 3, 1e-5) << engine;
+    EXPECT_THAT(jfpx_stdout(run).output, HasSubstr("penetration at the end 0.004 m deepest"));
+  }
+  const auto none =
+      nlohmann::json::parse(jfpx_stdout("run gas --spheres 0 --steps 1 --json -").output);
+  for (const char* field : {"deepest_penetration", "mean_penetration", "largest_speed", "awake"}) {
+    EXPECT_EQ(none[field], 0) << field;
+  }
 }
 
 TEST(Tool, TheOldNameX86SelectsTheCpu) {
@@ -333,6 +432,66 @@ TEST(Tool, ReplayFindsARecordingEqual) {
     EXPECT_THAT(result.output, HasSubstr("40 steps"));
     EXPECT_THAT(result.output, HasSubstr("bit for bit"));
   }
+}
+
+TEST(Tool, ReplayUsesTheRecordedResolver) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  for (const Solver solver : {Solver::soft_step, Solver::worst_first}) {
+    const std::string resolver = solver == Solver::soft_step ? "soft-step" : "worst-first";
+    const std::string record = "run pile --spheres 40 --steps 50 --threads 2 --quiet --record ";
+    ASSERT_EQ(jfpx_command(record + path + " --resolver " + resolver).status, 0);
+    EXPECT_EQ(RecordingReader(path).header().scene.solver, solver);
+    for (const std::string threads : {"1", "3"}) {
+      const ProcessResult result = jfpx_command("replay --threads " + threads + " " + path);
+      EXPECT_EQ(result.status, 0) << result.output;
+      EXPECT_THAT(result.output, HasSubstr("50 steps"));
+    }
+  }
+}
+
+/// Rewrites a recording of Solver::worst_first as one of version 0.1, whose scenes have no solver.
+void rewrite_as_version_0_1(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes(std::istreambuf_iterator<char>(file), {});
+  constexpr std::size_t kPrefix = 24, kTrailer = 24, kHeaderSize = 16;
+  std::uint64_t size = 0, frames = 0;
+  std::memcpy(&size, &bytes[kHeaderSize], sizeof size);
+  std::memcpy(&frames, &bytes[bytes.size() - kTrailer], sizeof frames);
+  auto header = nlohmann::ordered_json::parse(bytes.substr(kPrefix, size));
+  ASSERT_EQ(header["scene"]["solver"], "worst_first");
+  header["backend"] = "x86";
+  header["scene"]["jfpx_scene"] = 1;
+  for (const char* field : {"solver", "soft_step"}) header["scene"].erase(field);
+  for (const char* field : {"speed", "time"}) header["scene"]["sleep"].erase(field);
+  const std::string text = header.dump();
+  const std::string states = bytes.substr(kPrefix + size, bytes.size() - kPrefix - size - kTrailer);
+  size = text.size();
+  std::memcpy(&bytes[kHeaderSize], &size, sizeof size);
+  Hash64 hash;
+  hash.add_bytes(bytes.data(), kPrefix);
+  hash.add_bytes(text.data(), text.size());
+  const std::size_t frame = states.size() / frames;
+  for (std::uint64_t i = 0; i < frames; ++i) hash.add_bytes(&states[i * frame], frame);
+  hash.add_word(frames);
+  const std::uint64_t checksum = hash.value();
+  std::string trailer = bytes.substr(bytes.size() - kTrailer);
+  std::memcpy(&trailer[sizeof frames], &checksum, sizeof checksum);
+  std::ofstream(path, std::ios::binary) << bytes.substr(0, kPrefix) << text << states << trailer;
+}
+
+TEST(Tool, ReplayOfVersion01ResolvesWorstFirst) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("old.rec");
+  ASSERT_EQ(jfpx_command(
+                "run pile --spheres 40 --steps 50 --quiet --resolver worst-first --record " + path)
+                .status,
+            0);
+  rewrite_as_version_0_1(path);
+  EXPECT_EQ(RecordingReader(path).header().scene.solver, Solver::worst_first);
+  const ProcessResult result = jfpx_command("replay " + path);
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("bit for bit"));
 }
 
 TEST(Tool, ReplayStopsAtTheFirstStepThatDiffers) {
@@ -408,6 +567,14 @@ TEST(Tool, CompareUsesTheJfpxSolverByDefault) {
   EXPECT_LE(ours["groups_on_device"], ours["groups"]);
   EXPECT_EQ(stock["groups_on_device"], 0);
   EXPECT_EQ(ours["hash_jfpx"], stock["hash_jfpx"]);
+}
+
+TEST(Tool, CompareRunsTheSelectedResolver) {
+  const std::string arguments = "pile --spheres 40 --steps 30 --quiet --resolver worst-first ";
+  const auto json = nlohmann::json::parse(jfpx_stdout("compare --json - " + arguments).output);
+  EXPECT_EQ(json["resolver"], "worst-first");
+  EXPECT_EQ(json["hash_native"].get<std::string>() + "\n",
+            jfpx_stdout("run --hash " + arguments).output);
 }
 
 TEST(Tool, BulletEnginesRunAndAgree) {

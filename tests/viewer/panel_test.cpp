@@ -30,6 +30,10 @@ ViewOptions options_for(const std::string& scene) {
   options.quality = test::kSketch;
   return options;
 }
+ViewOptions worst_first(ViewOptions options) {
+  options.run.resolver = Solver::worst_first;
+  return options;
+}
 ViewOptions paused(ViewOptions options) {
   options.paused = true;
   return options;
@@ -235,8 +239,70 @@ TEST_F(Panel, AnInvalidRequestIsReportedAndTheFieldsKeepTheirValues) {
   EXPECT_EQ(user.viewer().steps(), 1u);
 }
 
-TEST_F(Panel, SolverSettingsTakeEffect) {
+TEST_F(Panel, SettingsOfSoftStepTakeEffect) {
   test::User user(paused(options_for("pile")));
+  user.click("Settings");
+  user.frame();
+  const Scene before = player(user).scene();
+  const auto now = [&]() -> const Scene& { return player(user).scene(); };
+  user.type("substeps", "7");
+  EXPECT_EQ(now().soft_step.substeps, 7u);
+  user.drag_in("contact [Hz], 0 = auto", 0.5, 1);
+  EXPECT_EQ(now().soft_step.contact_hertz, 1000);
+  user.drag_in("contact [Hz], 0 = auto", 0.5, 0);
+  EXPECT_EQ(now().soft_step.contact_hertz, 0);
+  user.drag_in("damping ratio", 0.5, 1);
+  EXPECT_EQ(now().soft_step.damping_ratio, 1000);
+  user.drag_in("push-out [m/s]", 0.5, 1);
+  EXPECT_EQ(now().soft_step.push_out_speed, 100);
+  user.drag_in("restitution from [m/s]", 0.5, 1);
+  EXPECT_EQ(now().soft_step.restitution_threshold, 5);
+  user.drag_in("margin [m]", 0.5, 1);
+  EXPECT_EQ(now().soft_step.speculative_margin, 1);
+  user.drag_in("sleep speed [m/s]", 0.5, 1);
+  EXPECT_EQ(now().sleep.speed, 5);
+  user.drag_in("sleep time [s]", 0.5, 1);
+  EXPECT_EQ(now().sleep.time, 10);
+  EXPECT_EQ(now().resolver, before.resolver);
+  user.click("Step");
+  EXPECT_TRUE(user.reads("7 substeps"));
+  user.type("substeps", "65");
+  EXPECT_TRUE(user.reads("soft_step.substeps is 65"));
+  EXPECT_EQ(user.value("substeps"), "7");
+  user.click("Scene defaults");
+  EXPECT_EQ(now(), before);
+}
+
+TEST_F(Panel, TheResolverIsExchangedAndOnlyItsSettingsAreShown) {
+  test::User user(paused(options_for("pile")));
+  user.click("Settings");
+  user.frame();
+  EXPECT_EQ(user.value("soft-step"), "on");
+  EXPECT_FALSE(user.sees("velocity eps [m/s]"));
+  for (int i = 0; i < 3; ++i) user.click("Step");
+  const std::uint64_t before = hash(user);
+  user.click("worst-first");
+  EXPECT_EQ(player(user).scene().solver, Solver::worst_first);
+  EXPECT_EQ(hash(user), before);
+  EXPECT_TRUE(user.sees("velocity eps [m/s]"));
+  EXPECT_FALSE(user.sees("substeps"));
+  EXPECT_FALSE(user.sees("sleep speed [m/s]"));
+  user.click("Step");
+  EXPECT_TRUE(user.reads(" corrections"));
+  user.click("soft-step");
+  EXPECT_TRUE(user.sees("sleep speed [m/s]"));
+  user.click("Step");
+  EXPECT_TRUE(user.reads(" substeps"));
+  EXPECT_EQ(user.viewer().steps(), 5u);
+  if (!has_engine(EngineKind::bullet)) return;
+  user.click("bullet-stock");  // has its own solver
+  EXPECT_FALSE(user.sees("soft-step"));
+  EXPECT_FALSE(user.sees("sleep speed [m/s]"));
+  EXPECT_TRUE(user.sees("dt [s]"));
+}
+
+TEST_F(Panel, SettingsOfWorstFirstTakeEffect) {
+  test::User user(paused(worst_first(options_for("pile"))));
   user.click("Settings");
   user.frame();
   const Scene before = player(user).scene();
@@ -264,7 +330,7 @@ TEST_F(Panel, SolverSettingsTakeEffect) {
 }
 
 TEST_F(Panel, RestartKeepsTheSettings) {
-  test::User user(paused(options_for("pile")));
+  test::User user(paused(worst_first(options_for("pile"))));
   user.click("Settings");
   user.frame();
   user.drag_in("dt [s]", 0.5, 0);

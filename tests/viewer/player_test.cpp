@@ -47,21 +47,45 @@ TEST(Player, SteppingBackAndAheadShowsTheSameBits) {
 
 TEST(Player, SwitchingTheBackendKeepsTheBits) {
   const Scene scene = scenes::make("pile", {.spheres = 60});
-  Player straight = player_of(scene), switched = player_of(scene);
+  Player straight = player_of(scene), switched = player_of(scene, {.threads = 3});
   for (int i = 0; i < 60; ++i) {
     if (i == 10) {
-      EXPECT_TRUE(switched.switch_to({.backend = Backend::cpu}));
-    }
-    if (i == 25) {
       EXPECT_TRUE(switched.switch_to({.backend = Backend::cpu, .threads = 3}));
     }
     if (i == 40) {
-      EXPECT_TRUE(switched.switch_to({}));
+      EXPECT_TRUE(switched.switch_to({.threads = 3}));
     }
     straight.step();
     switched.step();
     ASSERT_EQ(hash(straight), hash(switched)) << i;
   }
+}
+
+TEST(Player, AnotherNumberOfThreadsContinuesInANewWorld) {
+  Player player = player_of(scenes::make("pile", {.spheres = 60}));
+  for (int i = 0; i < 20; ++i) player.step();
+  const std::uint64_t before = hash(player);
+  EXPECT_FALSE(player.switch_to({.threads = 3}));
+  EXPECT_EQ(player.choice().threads, 3u);
+  EXPECT_EQ(hash(player), before);
+  player.step();
+  EXPECT_EQ(player.shown().step, 21u);
+}
+
+TEST(Player, AnotherResolverContinuesFromTheSameState) {
+  const Scene scene = scenes::make("pile", {.spheres = 60});
+  Player player = player_of(scene), straight = player_of(scene);
+  for (int i = 0; i < 30; ++i) player.step(), straight.step();
+  EXPECT_EQ(player.shown().substeps, scene.soft_step.substeps);
+  RunSettings settings = player.settings();
+  settings.solver = Solver::worst_first;
+  player.set_settings(settings);
+  EXPECT_EQ(player.scene().solver, Solver::worst_first);
+  EXPECT_EQ(hash(player), hash(straight));
+  player.step(), straight.step();
+  EXPECT_EQ(player.shown().step, 31u);
+  EXPECT_EQ(player.shown().substeps, 0u);
+  EXPECT_NE(hash(player), hash(straight));
 }
 
 TEST(Player, SwitchingBulletsPartsAndBackendsAtRandomKeepsTheBits) {

@@ -191,9 +191,9 @@ TEST(View, StatesAreRecordedAndPlayedBack) {
   EXPECT_THAT(played.output, HasSubstr("7 steps,"));
   const auto replayed = test::run_process(JFPX_TOOL_PATH " replay " + again + " 2>&1");
   EXPECT_EQ(replayed.status, 0) << replayed.output;
-  for (const char* change :
-       {" --spheres 5", " --boxes 1", " --dt 0.01", " --seed 2", " --no-sleep", " --engine bullet",
-        " --backend x86", " --threads 3", " --side-by-side"}) {
+  for (const char* change : {" --spheres 5", " --boxes 1", " --dt 0.01", " --seed 2", " --no-sleep",
+                             " --resolver worst-first", " --substeps 2", " --engine bullet",
+                             " --backend x86", " --threads 3", " --side-by-side"}) {
     expect_fails(jfpx_view(path + change + " --no-render"), 2, "is a recording");
   }
   std::ofstream(path, std::ios::app) << "more";
@@ -217,9 +217,9 @@ TEST(View, ARecordingIsPlayedInThePrecisionInWhichItWasMade) {
 }
 
 TEST(View, PrintsTheSameHashAsTheTool) {
-  for (const std::string parts :
-       {"native", "bullet", "bullet --solver stock", "bullet --world stock"}) {
-    if (!JFPX_HAS_BULLET && parts != "native") continue;
+  for (const std::string parts : {"native", "native --threads 3", "native --resolver worst-first",
+                                  "bullet", "bullet --solver stock", "bullet --world stock"}) {
+    if (!JFPX_HAS_BULLET && parts.starts_with("bullet")) continue;
     const std::string run = " pile --spheres 40 --engine " + parts;
     const auto ran = test::run_process(JFPX_TOOL_PATH " run" + run + " --steps 30 --hash --quiet");
     ASSERT_EQ(ran.status, 0) << ran.output;
@@ -235,6 +235,7 @@ TEST(View, BadUsageIsStatusTwo) {
   expect_fails(jfpx_view("pile --headless --eye 1,2,3 --target 1,2,3"), 2, "same point");
   expect_fails(jfpx_view("pile --no-render --screenshot a.png"), 2, "--no-render");
   expect_fails(jfpx_view("flight --no-render --no-sleep"), 2, "--no-sleep requires a scene");
+  expect_fails(jfpx_view("flight --no-render --substeps 2"), 2, "--substeps requires a scene");
   expect_fails(jfpx_view("flight --no-render --colours speed"), 2, "--colours requires a scene");
   expect_fails(jfpx_view("--side-by-side pile --no-render --engine bullet"), 2, "all engines");
   for (const char* bad :
