@@ -80,8 +80,8 @@ struct StepReport {
   std::uint64_t step = 0;             ///< number of completed steps, without undone ones
   std::uint64_t contacts = 0;         ///< contacts found by detection, including those of sensors
   std::uint64_t sphere_contacts = 0;  ///< of these, contacts between two spheres
-  std::uint64_t generated_contacts = 0;  ///< contacts of generators, not included in `contacts`
-  std::uint64_t position_iterations = 0;
+  std::uint64_t generated_contacts = 0;   ///< contacts of generators, not included in `contacts`
+  std::uint64_t position_iterations = 0;  ///< of Solver::worst_first, as the two fields below
   std::uint64_t velocity_iterations = 0;
   bool iterations_exhausted = false;  ///< a solver loop stopped at its limit with work left
   /// A value of a body is no longer finite, or a coordinate exceeds kMaxCoordinate; the step was
@@ -95,6 +95,8 @@ struct StepReport {
   ChoiceReason choice = ChoiceReason::fixed;               ///< reason for backend and algorithm
   /// Error of a device whose work the CPU took over in this step; empty if there was none.
   std::string device_failure;
+  /// With Solver::soft_step, `integrate_ms` is the time of forces, and `resolve_ms` includes the
+  /// integration in substeps.
   double integrate_ms = 0, detect_ms = 0, resolve_ms = 0, total_ms = 0;
 };
 
@@ -124,10 +126,11 @@ class JFPX_API World {
   /// @throws InvalidArgument if the id is not of a living body of this world
   void remove(BodyId id);
 
-  /// Advances the world by the dt of the scene: forces, integration, detection, resolution. Physics
-  /// throws no exceptions: when a value is no longer finite, or a coordinate exceeds
-  /// kMaxCoordinate, the step is undone and StepReport::non_finite is set. Further steps are also
-  /// undone until that body is removed or gets another state.
+  /// Advances the world by the dt of the scene. Scene::solver selects the stages: forces, detection
+  /// and substeps, or forces, integration, detection and resolution. Physics throws no exceptions:
+  /// when a value is no longer finite, or a coordinate exceeds kMaxCoordinate, the step is undone
+  /// and StepReport::non_finite is set. Further steps are also undone until that body is removed or
+  /// gets another state.
   /// @throws OutOfMemory, DeviceError and the exceptions of forces and contact generators; the
   ///   state is then as before the step
   StepReport step();

@@ -156,9 +156,9 @@ void SoftStep::load_bodies(BodyStore* bodies) {
 /// Starts a substep: applies accelerations, and, unless it is the first of the step, the contact
 /// impulses of the last substep again. A body without contacts moves by the mean of its velocities
 /// before and after, so that its path is an exact parabola; with contacts, the mean would contain a
-/// part of the acceleration that impulses have cancelled. Forces may depend on the
-/// position, and are constant in a step: they move the body as in the semi-implicit Euler method
-/// for the whole step, because a spring would gain energy otherwise.
+/// part of the acceleration that impulses have cancelled. Forces may depend on the position, and
+/// are constant in a step: they move the body as in the semi-implicit Euler method for the whole
+/// step, because a spring would gain energy otherwise.
 void SoftStep::accelerate(const BodyStore& bodies, bool is_first) {
   const Real half_step = constants_.h * bodies.dt() * Real(0.5);
   const std::span<const BodyId> ids = bodies.ids();
