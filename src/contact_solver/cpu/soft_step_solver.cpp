@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 namespace jfpx {
@@ -279,12 +280,11 @@ BodyPair SoftStepSolver::pair_of(const ManifoldRow& row, std::span<SolverBody> b
           &properties_.inverse_inertia[row.b]};
 }
 
-/// Calls operation.template operator()<fixed>(row) for all rows, in the order of the solver.
+/// Calls operation(row, is_fixed) for all rows, in the order of the solver.
 template <class Operation>
 void SoftStepSolver::sweep(const Operation& operation) {
   const auto run = [&](auto* kind_rows, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      operation.template operator()<false>(&kind_rows->rows[i]);
+    for (std::size_t i = begin; i < end; ++i) operation(&kind_rows->rows[i], std::false_type());
   };
   run(&spheres_, 0, spheres_.begin[1]);
   run(&manifolds_, 0, manifolds_.begin[1]);
@@ -310,16 +310,16 @@ void SoftStepSolver::sweep(const Operation& operation) {
     for (std::size_t i = first; i < last; ++i) {
       const FixedContact& fixed = fixed_[i];
       if (fixed.is_sphere_row) {
-        operation.template operator()<true>(&spheres_.rows[fixed.row]);
+        operation(&spheres_.rows[fixed.row], std::true_type());
       } else {
-        operation.template operator()<true>(&manifolds_.rows[fixed.row]);
+        operation(&manifolds_.rows[fixed.row], std::true_type());
       }
     }
   });
 }
 
 void SoftStepSolver::warm_start(std::span<SolverBody> bodies) {
-  sweep([&]<bool kFixed, class Row>(Row* row) {
+  sweep([&]<class Row, bool kFixed>(Row* row, std::bool_constant<kFixed>) {
     if constexpr (std::is_same_v<Row, SphereRow>) {
       soft_step::warm_start<kFixed>(*row, &bodies[row->a], &bodies[row->b]);
     } else {
@@ -329,7 +329,7 @@ void SoftStepSolver::warm_start(std::span<SolverBody> bodies) {
 }
 
 void SoftStepSolver::solve(std::span<SolverBody> bodies, bool soft) {
-  sweep([&]<bool kFixed, class Row>(Row* row) {
+  sweep([&]<class Row, bool kFixed>(Row* row, std::bool_constant<kFixed>) {
     if constexpr (std::is_same_v<Row, SphereRow>) {
       soft_step::solve<kFixed>(row, &bodies[row->a], &bodies[row->b], constants_, soft);
     } else {
@@ -339,7 +339,7 @@ void SoftStepSolver::solve(std::span<SolverBody> bodies, bool soft) {
 }
 
 void SoftStepSolver::restitute(std::span<SolverBody> bodies) {
-  sweep([&]<bool kFixed, class Row>(Row* row) {
+  sweep([&]<class Row, bool kFixed>(Row* row, std::bool_constant<kFixed>) {
     if constexpr (std::is_same_v<Row, SphereRow>) {
       soft_step::restitute<kFixed>(*row, &bodies[row->a], &bodies[row->b]);
     } else {
