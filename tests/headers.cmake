@@ -24,3 +24,11 @@ if(JFPX_HAS_BULLET AND with_bullet)
   add_library(bullet_headers_alone OBJECT ${with_bullet})
   target_link_libraries(bullet_headers_alone PRIVATE jfpx_bullet jfpx_warnings)
 endif()
+
+# An older standard is refused by name, before the errors that follow from it.
+file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/headers/cxx17.cpp "#include <jfpx/jfpx.hpp>\n")
+add_test(NAME Headers.RequireCxx20ByName COMMAND ${CMAKE_CXX_COMPILER} -std=c++17 -fsyntax-only
+  -I ${PROJECT_SOURCE_DIR}/include -I ${PROJECT_BINARY_DIR}/include
+  ${CMAKE_CURRENT_BINARY_DIR}/headers/cxx17.cpp)
+set_tests_properties(Headers.RequireCxx20ByName PROPERTIES
+  PASS_REGULAR_EXPRESSION "jfpx requires C\\+\\+20")

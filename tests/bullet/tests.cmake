@@ -48,6 +48,7 @@ set_source_files_properties(bullet/random_worlds_test.cpp PROPERTIES
 jfpx_add_test(bullet_solver_test SOURCES
   ${random_worlds}
   bullet/joint_without_rtti.cpp
+  bullet/soft_body_test.cpp
   bullet/solver_test.cpp
   ${solver_worlds}
   LINK jfpx_bullet)
