@@ -20,8 +20,7 @@ void IgnoredPairs::assign(std::span<const BodyPair> pairs) {
   keys.reserve(pairs.size());
   for (const BodyPair& pair : pairs) keys.push_back(key_of(pair));
   std::ranges::sort(keys);
-  const auto duplicates = std::ranges::unique(keys);
-  keys.erase(duplicates.begin(), duplicates.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   keys_ = std::move(keys);
 }
 
