@@ -19,8 +19,6 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-class ThreadPool;
-
 /// Algorithm that finds the pairs of touching bounds. All of them give the same contacts, bit for
 /// bit. Queries (World::cast_ray() and others) do not use it.
 enum class BroadPhase : std::uint8_t {
@@ -309,9 +307,6 @@ class JFPX_API World {
   std::function<void(ContactContext&)>& any_generator(ContactGeneratorId id);
 
   struct Impl;
-  static std::unique_ptr<Impl> make_impl(const Scene& scene, std::unique_ptr<ThreadPool> pool,
-                                         std::unique_ptr<SphereCollider> collider,
-                                         BroadPhase broad_phase);
   std::unique_ptr<Impl> impl_;
 };
 

@@ -42,13 +42,13 @@ class Finder {
 
 }  // namespace
 
-void ContactCache::match(std::span<const std::uint8_t> movable, ThreadPool* pool) {
+void ContactCache::match(std::span<const Real> inverse_mass, ThreadPool* pool) {
   ContactSet& now = current_;
   const auto spheres = static_cast<std::uint32_t>(now.spheres.size());
   resize_geometric(&now.impulses, spheres + now.points.size());
   resize_geometric(&now.rolling_impulses, now.size());
   resize_geometric(&now.colors, now.size());
-  coloring_.start(movable.size());
+  coloring_.start(inverse_mass.size());
   parallel_for(pool, spheres, kContactsPerChunk, [&](std::size_t first, std::size_t last) {
     match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
   });
@@ -59,7 +59,7 @@ void ContactCache::match(std::span<const std::uint8_t> movable, ThreadPool* pool
   for (std::uint32_t i = 0; i < now.size(); ++i) {
     if (now.colors[i] < kColors) continue;
     const ContactKey& key = now.key(i);
-    if (movable[key.a] == 0 || movable[key.b] == 0) {
+    if (!(inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0)) {
       now.colors[i] = kFixedColor;
     } else {
       coloring_.add(key, &now.colors[i]);

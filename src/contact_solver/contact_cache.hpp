@@ -23,9 +23,9 @@ class ContactCache {
 
   /// Gives each contact the impulses and the color that the same contact had in the last step, and
   /// colors the new ones. Friction impulses are turned into the new tangent planes.
-  /// @param movable by body: 1 if its motion can change
+  /// @param inverse_mass by body [1/kg]; 0: immovable or kinematic
   /// @param pool null: in the calling thread
-  void match(std::span<const std::uint8_t> movable, ThreadPool* pool);
+  void match(std::span<const Real> inverse_mass, ThreadPool* pool);
   /// Completes the step: the current contacts become the last ones. Does not allocate.
   void commit() noexcept { std::swap(last_, current_); }
   /// Removes the contacts of a body.

@@ -71,6 +71,14 @@ struct ContactSet {
   const ContactKey& key(std::uint32_t contact) const {
     return is_sphere(contact) ? spheres[contact].key : manifold(contact).key;
   }
+  const Vec3& normal(std::uint32_t contact) const {
+    return is_sphere(contact) ? spheres[contact].normal : manifold(contact).normal;
+  }
+  /// Distance of a point of a contact; that of two spheres has point 0 only.
+  Real distance(std::uint32_t contact, std::uint32_t point) const {
+    return is_sphere(contact) ? spheres[contact].distance
+                              : points[manifold(contact).first + point].distance;
+  }
   /// Index of the first impulse of a contact.
   std::uint32_t first_impulse(std::uint32_t contact) const {
     if (is_sphere(contact)) return contact;

@@ -352,8 +352,8 @@ class SweepWorker {
     Real factors[2 * kFactorFields];
     if constexpr (kFactors) load_factors(factors);
     if (kSplitImpulse || step_ == RowStep::contacts || step_ == RowStep::both) {
-      solve_contact<LocalLane, kFactors, kSplitImpulse>(bodies_, velocities_, factors, row_,
-                                                        residual);
+      solve_contact<LocalLane, kFactors, kSplitImpulse>(
+          bodies_, velocities_, kFactors ? factors : nullptr, row_, residual);
     }
     if constexpr (!kSplitImpulse) {
       if (step_ == RowStep::frictions) {

@@ -56,7 +56,7 @@ JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& sett
           settings.push_out_speed / 6};
 }
 
-/// Motion of a body during a step, as the contacts of the step see it.
+/// Motion of a body during a step, for the rows of its contacts.
 struct alignas(16 * sizeof(Real)) SolverBody {
   Vec3 velocity;             ///< [m/s]
   Real inverse_mass = 0;     ///< [1/kg]; 0: immovable or kinematic

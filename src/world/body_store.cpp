@@ -289,7 +289,7 @@ void BodyStore::integrate() {
 }
 
 void BodyStore::integrate(std::uint32_t i) {
-  moving.last_acceleration[i] = add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]);
+  update_acceleration(i);
   const Vec3 angular_acceleration = moving.inverse_inertia[i] * moving.torque[i];
   moving.velocity[i] = detail::integrated_velocity(moving.velocity[i], moving.last_acceleration[i],
                                                    dt_, velocity_kept_[i]);
@@ -325,8 +325,7 @@ bool BodyStore::falls_asleep(std::uint32_t i) {
 
 Vec3 BodyStore::predicted_motion(std::uint32_t i) const {
   if (moving.awake[i] == 0) return {};
-  const Vec3 acceleration =
-      movable(i) ? add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]) : Vec3{};
+  const Vec3 acceleration = movable(i) ? acceleration_of_step(i) : Vec3{};
   const Vec3 motion = add_scaled(moving.velocity[i], acceleration, dt_) * dt_;
   constexpr Real kFarthest = 2 * kMaxCoordinate;
   const bool stays = absolute(motion.x) <= kFarthest && absolute(motion.y) <= kFarthest &&
@@ -335,7 +334,12 @@ Vec3 BodyStore::predicted_motion(std::uint32_t i) const {
 }
 
 void BodyStore::update_acceleration(std::uint32_t i) {
-  moving.last_acceleration[i] = add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]);
+  moving.last_acceleration[i] = acceleration_of_step(i);
+}
+
+/// Acceleration of a movable body by its constant acceleration and the accumulated force.
+Vec3 BodyStore::acceleration_of_step(std::uint32_t i) const {
+  return add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]);
 }
 
 void BodyStore::accelerate(std::uint32_t i, const Quat& orientation, Vec3* velocity,

@@ -138,6 +138,7 @@ class BodyStore {
   const Shape& shape(std::uint32_t body) const { return shape_[body]; }
   Real mass(std::uint32_t body) const { return mass_[body]; }
   Real inverse_mass(std::uint32_t body) const { return inverse_mass_[body]; }
+  std::span<const Real> inverse_masses() const { return inverse_mass_; }
   std::span<const Real> radii() const { return radius_; }
   std::span<const Real> frictions() const { return friction_; }
   std::span<const Real> restitutions() const { return restitution_; }
@@ -159,6 +160,7 @@ class BodyStore {
  private:
   void add_slot();
   void compute_inertia(std::uint32_t body, const std::optional<Mat3>& given);
+  Vec3 acceleration_of_step(std::uint32_t body) const;
   void integrate(std::uint32_t body);
   void move(std::uint32_t body);
   bool falls_asleep(std::uint32_t body);

@@ -12,7 +12,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Compares the contacts of two steps, when the events are asked for. Buffers grow and never
+/// Compares the contacts of two steps on demand. Buffers grow and never
 /// shrink.
 class ContactEvents {
  public:

@@ -20,7 +20,7 @@ std::uint32_t Islands::find(std::uint32_t body) {
     std::uint32_t parent = std::atomic_ref(parent_[body]).load(kRelaxed);
     if (parent == body) return body;
     const std::uint32_t above = std::atomic_ref(parent_[parent]).load(kRelaxed);
-    // Path halving. If another thread has changed the parent, its change is as good.
+    // Path halving. If another thread has changed the parent, this change is not needed.
     if (above != parent) {
       std::atomic_ref(parent_[body]).compare_exchange_strong(parent, above, kRelaxed);
     }

@@ -33,9 +33,7 @@ struct Refilled {
 
   void grow_to(std::size_t new_size) {
     size = new_size;
-    if (items->size() >= size) return;
-    reserve_geometric(items, size);
-    items->resize(size);
+    if (items->size() < size) resize_geometric(items, size);
   }
   void finish() { items->resize(size); }
 };

@@ -66,56 +66,65 @@ void SoftStep::prepare(const BodyStore& bodies) {
   free_angular_velocity_.resize(capacity);
   marked_.resize(capacity);
   islands_.reserve(capacity);
-  assign_geometric(&movable_, capacity, 0);
-  for (const BodyId id : bodies.ids()) movable_[id.index] = bodies.movable(id.index) ? 1 : 0;
 }
 
-/// Whether the bodies of a contact touch, or meet during the step at their velocities.
-bool SoftStep::will_touch(const BodyStore& bodies, std::uint32_t contact) const {
+/// Whether condition(distance of a point, its normal impulse) holds for a point of a contact.
+template <class Condition>
+bool SoftStep::any_point(std::uint32_t contact, const Condition& condition) const {
   const ContactSet& set = cache_.current();
-  const ContactKey& key = set.key(contact);
-  const Vec3 motion = bodies.predicted_motion(key.a) - bodies.predicted_motion(key.b);
-  const auto closes = [&](const Vec3& normal, Real distance, std::uint32_t impulse) {
-    return distance <= 0 || distance + dot(motion, normal) <= 0 || set.impulses[impulse].normal > 0;
-  };
-  if (set.is_sphere(contact)) {
-    return closes(set.spheres[contact].normal, set.spheres[contact].distance, contact);
-  }
-  const soft_step::ManifoldInput& manifold = set.manifold(contact);
   const std::uint32_t first = set.first_impulse(contact);
-  for (std::uint32_t i = 0; i < manifold.count; ++i) {
-    if (closes(manifold.normal, set.points[manifold.first + i].distance, first + i)) return true;
+  for (std::uint32_t i = 0; i < set.impulse_count(contact); ++i) {
+    if (condition(set.distance(contact, i), set.impulses[first + i].normal)) return true;
   }
   return false;
 }
 
-/// Wakes the islands that touch an awake body or a kinematic body in motion.
-void SoftStep::wake_touched(BodyStore* bodies) {
-  const std::vector<std::uint8_t>& awake = bodies->moving.awake;
-  const auto rests = [&](BodyId id) { return bodies->movable(id.index) && awake[id.index] == 0; };
-  if (std::ranges::none_of(bodies->ids(), rests)) return;
-  islands_.reset(bodies->capacity());
+/// Whether the bodies of a contact touch, or meet during the step at their velocities.
+bool SoftStep::will_touch(const BodyStore& bodies, std::uint32_t contact) const {
+  const ContactKey& key = cache_.current().key(contact);
+  const Vec3 motion = bodies.predicted_motion(key.a) - bodies.predicted_motion(key.b);
+  const Real opening = dot(motion, cache_.current().normal(contact));
+  return any_point(contact, [opening](Real distance, Real impulse) {
+    return distance <= 0 || distance + opening <= 0 || impulse > 0;
+  });
+}
+
+/// Unites the movable bodies of the contacts for which touches(contact) holds, and marks the
+/// islands that touch a kinematic body in motion: a sleeping body has no velocity and could not be
+/// carried by it.
+template <class Touches>
+void SoftStep::find_islands(const BodyStore& bodies, const Touches& touches) {
+  islands_.reset(bodies.capacity());
   std::ranges::fill(marked_, std::uint8_t{0});
   const ContactSet& set = cache_.current();
   parallel_for(pool_, set.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
       const ContactKey& key = set.key(i);
-      if (movable_[key.a] != 0 && movable_[key.b] != 0 && will_touch(*bodies, i)) {
+      if (bodies.movable(key.a) && bodies.movable(key.b) && touches(i)) {
         islands_.unite(key.a, key.b);
       }
     }
   });
-  for (const BodyId id : bodies->ids()) {
-    if (movable_[id.index] != 0 && awake[id.index] != 0) marked_[islands_.find(id.index)] = 1;
-  }
+  const auto carries = [&](std::uint32_t body) {
+    return !bodies.movable(body) && bodies.moving.awake[body] != 0;
+  };
   for (std::uint32_t i = 0; i < set.size(); ++i) {
     const ContactKey& key = set.key(i);
-    if (movable_[key.a] != 0 && movable_[key.b] != 0) continue;
-    const bool a_moves = movable_[key.a] == 0 && awake[key.a] != 0;
-    const bool b_moves = movable_[key.b] == 0 && awake[key.b] != 0;
-    if ((a_moves || b_moves) && will_touch(*bodies, i)) {
-      marked_[islands_.find(a_moves ? key.b : key.a)] = 1;
+    if ((carries(key.a) || carries(key.b)) && touches(i)) {
+      marked_[islands_.find(carries(key.a) ? key.b : key.a)] = 1;
     }
+  }
+}
+
+/// Wakes the islands that touch an awake body or a kinematic body in motion.
+void SoftStep::wake_touched(BodyStore* bodies) {
+  const auto rests = [&](BodyId id) {
+    return bodies->movable(id.index) && bodies->moving.awake[id.index] == 0;
+  };
+  if (std::ranges::none_of(bodies->ids(), rests)) return;
+  find_islands(*bodies, [&](std::uint32_t contact) { return will_touch(*bodies, contact); });
+  for (const BodyId id : bodies->ids()) {
+    if (bodies->movable(id.index) && !rests(id)) marked_[islands_.find(id.index)] = 1;
   }
   for (const BodyId id : bodies->ids()) {
     if (rests(id) && marked_[islands_.find(id.index)] != 0) bodies->wake(id.index);
@@ -124,7 +133,7 @@ void SoftStep::wake_touched(BodyStore* bodies) {
 
 /// Marks the bodies that have a contact in this step.
 void SoftStep::find_near() {
-  assign_geometric(&near_, movable_.size(), 0);
+  assign_geometric(&near_, bodies_.size(), 0);
   const ContactSet& set = cache_.current();
   parallel_for(pool_, set.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
@@ -141,7 +150,7 @@ void SoftStep::load_bodies(BodyStore* bodies) {
     for (const BodyId id : ids.subspan(first, last - first)) {
       const std::uint32_t i = id.index;
       const MotionArrays& moving = bodies->moving;
-      if (movable_[i] != 0 && moving.awake[i] != 0) bodies->update_acceleration(i);
+      if (bodies->movable(i) && moving.awake[i] != 0) bodies->update_acceleration(i);
       SolverBody& body = bodies_[i];
       body = {};
       body.velocity = moving.velocity[i];
@@ -165,7 +174,7 @@ void SoftStep::accelerate(const BodyStore& bodies, bool is_first) {
   parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
     for (const BodyId id : ids.subspan(first, last - first)) {
       const std::uint32_t i = id.index;
-      if (movable_[i] == 0 || bodies.moving.awake[i] == 0) continue;
+      if (!bodies.movable(i) || bodies.moving.awake[i] == 0) continue;
       SolverBody& body = bodies_[i];
       Vec3 velocity = body.velocity, angular_velocity = body.angular_velocity;
       bodies.accelerate(i, orientation_[i], &velocity, &angular_velocity);
@@ -237,7 +246,7 @@ bool SoftStep::store_bodies(BodyStore* bodies) {
       if (moving.awake[i] != 0) {
         bodies->end_step(i, state(*bodies, i));
         const bool is_driven = !(moving.force[i] == Vec3{} && moving.torque[i] == Vec3{});
-        if (movable_[i] != 0) {
+        if (bodies->movable(i)) {
           bodies->update_rest_time(i, is_driven);
           if (bodies->is_at_rest(i)) any_rests.store(true, std::memory_order_relaxed);
         }
@@ -250,42 +259,15 @@ bool SoftStep::store_bodies(BodyStore* bodies) {
 
 /// Islands whose bodies have all been slow for long enough fall asleep.
 void SoftStep::put_islands_to_sleep(BodyStore* bodies) {
-  const MotionArrays& moving = bodies->moving;
   const auto is_awake = [&](BodyId id) {
-    return movable_[id.index] != 0 && moving.awake[id.index] != 0;
+    return bodies->movable(id.index) && bodies->moving.awake[id.index] != 0;
   };
-  islands_.reset(bodies->capacity());
-  std::ranges::fill(marked_, std::uint8_t{0});
-  const ContactSet& set = cache_.current();
-  const auto touches = [&](std::uint32_t contact) {
-    const std::uint32_t first = set.first_impulse(contact);
-    for (std::uint32_t i = 0; i < set.impulse_count(contact); ++i) {
-      const Real distance = set.is_sphere(contact)
-                                ? set.spheres[contact].distance
-                                : set.points[set.manifold(contact).first + i].distance;
-      if (distance <= 0 || set.impulses[first + i].normal > 0) return true;
-    }
-    return false;
-  };
-  parallel_for(pool_, set.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
-    for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
-      const ContactKey& key = set.key(i);
-      if (movable_[key.a] != 0 && movable_[key.b] != 0 && touches(i)) {
-        islands_.unite(key.a, key.b);
-      }
-    }
+  find_islands(*bodies, [this](std::uint32_t contact) {
+    return any_point(contact,
+                     [](Real distance, Real impulse) { return distance <= 0 || impulse > 0; });
   });
   for (const BodyId id : bodies->ids()) {
     if (is_awake(id) && !bodies->is_at_rest(id.index)) marked_[islands_.find(id.index)] = 1;
-  }
-  // A sleeping body has no velocity and could not be carried by a kinematic one.
-  for (std::uint32_t i = 0; i < set.size(); ++i) {
-    const ContactKey& key = set.key(i);
-    const bool a_carries = movable_[key.a] == 0 && moving.awake[key.a] != 0;
-    const bool b_carries = movable_[key.b] == 0 && moving.awake[key.b] != 0;
-    if ((a_carries || b_carries) && touches(i)) {
-      marked_[islands_.find(a_carries ? key.b : key.a)] = 1;
-    }
   }
   for (const BodyId id : bodies->ids()) {
     if (is_awake(id) && marked_[islands_.find(id.index)] == 0) bodies->put_to_sleep(id.index);
@@ -294,7 +276,7 @@ void SoftStep::put_islands_to_sleep(BodyStore* bodies) {
 
 std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
   prepare(*bodies);
-  cache_.match(movable_, pool_);
+  cache_.match(bodies->inverse_masses(), pool_);
   wake_touched(bodies);
   find_near();
   load_bodies(bodies);

@@ -40,7 +40,11 @@ class SoftStep {
   void forget(std::uint32_t body) noexcept { cache_.forget(body); }
 
  private:
+  template <class Condition>
+  bool any_point(std::uint32_t contact, const Condition& condition) const;
   bool will_touch(const BodyStore& bodies, std::uint32_t contact) const;
+  template <class Touches>
+  void find_islands(const BodyStore& bodies, const Touches& touches);
   void prepare(const BodyStore& bodies);
   void find_near();
   void wake_touched(BodyStore* bodies);
@@ -64,9 +68,8 @@ class SoftStep {
   std::vector<Quat> orientation_;              ///< by body, during the step
   std::vector<Vec3> free_velocity_;            ///< by body: after the accelerations of a substep
   std::vector<Vec3> free_angular_velocity_;
-  std::vector<std::uint8_t> movable_;  ///< by body
-  std::vector<std::uint8_t> near_;     ///< by body: 1 if it has a contact
-  std::vector<std::uint8_t> marked_;   ///< by label of an island
+  std::vector<std::uint8_t> near_;    ///< by body: 1 if it has a contact
+  std::vector<std::uint8_t> marked_;  ///< by label of an island
 };
 
 }  // namespace JFPX_ABI

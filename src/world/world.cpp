@@ -235,18 +235,19 @@ StepReport World::step() {
 World::World(const Scene& scene, const WorldSettings& settings) {
   auto pool = std::make_unique<ThreadPool>(settings.collider.threads);
   auto collider = make_sphere_collider(settings.collider, pool.get());
-  impl_ = make_impl(scene, std::move(pool), std::move(collider), settings.broad_phase);
+  impl_ = Impl::make(scene, std::move(pool), std::move(collider), settings.broad_phase);
 }
 
 World::World(const Scene& scene, std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase,
              unsigned threads) {
   if (collider == nullptr) throw InvalidArgument("collider is null; it must be a sphere collider");
-  impl_ = make_impl(scene, std::make_unique<ThreadPool>(threads), std::move(collider), broad_phase);
+  impl_ =
+      Impl::make(scene, std::make_unique<ThreadPool>(threads), std::move(collider), broad_phase);
 }
 
-std::unique_ptr<World::Impl> World::make_impl(const Scene& scene, std::unique_ptr<ThreadPool> pool,
-                                              std::unique_ptr<SphereCollider> collider,
-                                              BroadPhase broad_phase) {
+std::unique_ptr<World::Impl> World::Impl::make(const Scene& scene, std::unique_ptr<ThreadPool> pool,
+                                               std::unique_ptr<SphereCollider> collider,
+                                               BroadPhase broad_phase) {
   validate(scene);
   try {
     return std::make_unique<Impl>(scene, std::move(pool), std::move(collider), broad_phase);

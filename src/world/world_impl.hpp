@@ -16,7 +16,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 struct World::Impl {
-  /// @param threads null: one thread
+  /// Validates the scene. @throws InvalidScene, InvalidArgument, OutOfMemory
+  static std::unique_ptr<Impl> make(const Scene& scene, std::unique_ptr<ThreadPool> pool,
+                                    std::unique_ptr<SphereCollider> collider,
+                                    BroadPhase broad_phase);
   Impl(const Scene& given, std::unique_ptr<ThreadPool> threads,
        std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
       : pool(std::move(threads)),

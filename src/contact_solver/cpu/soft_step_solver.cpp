@@ -33,7 +33,7 @@ SoftStepSolver::Kind SoftStepSolver::kind_of(std::uint32_t contact) const {
   const auto is_active = [&](std::uint32_t body) {
     return is_movable(body) && properties_.awake[body] != 0;
   };
-  // A sleeping body that was not woken is only near: it neither moves nor is in the way.
+  // A body that is still asleep is near, but does not touch: the contact has no effect.
   const bool a_rests = is_movable(key.a) && !is_active(key.a);
   const bool b_rests = is_movable(key.b) && !is_active(key.b);
   if (a_rests || b_rests || (!is_active(key.a) && !is_active(key.b))) return Kind::asleep;
@@ -165,11 +165,8 @@ template <bool kFixed>
 void SoftStepSolver::fill(SphereRow* row, std::uint32_t contact) const {
   const ContactKey& key = contacts_->key(contact);
   const bool flipped = is_flipped(key);
-  const bool of_spheres = contacts_->is_sphere(contact);
-  const Real distance = of_spheres ? contacts_->spheres[contact].distance
-                                   : contacts_->points[contacts_->manifold(contact).first].distance;
-  const Vec3& normal =
-      of_spheres ? contacts_->spheres[contact].normal : contacts_->manifold(contact).normal;
+  const Real distance = contacts_->distance(contact, 0);
+  const Vec3& normal = contacts_->normal(contact);
   const KeptImpulse& kept = contacts_->impulses[contacts_->first_impulse(contact)];
   row->a = flipped ? key.b : key.a;
   row->b = flipped ? key.a : key.b;
@@ -196,9 +193,7 @@ template <bool kFixed>
 void SoftStepSolver::fill(ManifoldRow* row, std::uint32_t contact) {
   const ContactKey& key = contacts_->key(contact);
   const bool flipped = is_flipped(key);
-  const bool of_spheres = contacts_->is_sphere(contact);
-  const Vec3& normal =
-      of_spheres ? contacts_->spheres[contact].normal : contacts_->manifold(contact).normal;
+  const Vec3& normal = contacts_->normal(contact);
   row->a = flipped ? key.b : key.a;
   row->b = flipped ? key.a : key.b;
   row->count = contacts_->impulse_count(contact);
@@ -226,15 +221,13 @@ void SoftStepSolver::fill(ManifoldRow* row, std::uint32_t contact) {
   const SolverBody &start_a = start_[row->a], &start_b = start_[row->b];
   for (std::uint32_t i = 0; i < row->count; ++i) {
     PointRow& p = points_[row->first + i];
-    if (of_spheres) {
-      const SphereContactInput& spheres = contacts_->spheres[contact];
-      const Real half_overlap = spheres.distance < 0 ? spheres.distance * Real(0.5) : Real(0);
-      p.distance = spheres.distance;
+    p.distance = contacts_->distance(contact, i);
+    if (contacts_->is_sphere(contact)) {
+      const Real half_overlap = p.distance < 0 ? p.distance * Real(0.5) : Real(0);
       p.arm_a = -row->normal * (properties_.radius[row->a] + half_overlap);
       p.arm_b = row->normal * (properties_.radius[row->b] + half_overlap);
     } else {
       const PointInput& point = contacts_->points[contacts_->manifold(contact).first + i];
-      p.distance = point.distance;
       p.arm_a = flipped ? point.arm_b : point.arm_a;
       p.arm_b = flipped ? point.arm_a : point.arm_b;
     }
