@@ -28,7 +28,7 @@ struct CollisionFilter {
 
 /// Whether the filters let two bodies collide: each body has a category that is in the mask of the
 /// other.
-constexpr bool may_collide(const CollisionFilter& a, const CollisionFilter& b) {
+JFPX_HD constexpr bool may_collide(const CollisionFilter& a, const CollisionFilter& b) {
   return (a.category & b.mask) != 0 && (b.category & a.mask) != 0;
 }
 

@@ -3,6 +3,7 @@
 
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
+#include "src/contact_solver/contact_match.hpp"
 
 #include <algorithm>
 
@@ -10,11 +11,6 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 namespace {
-
-/// The impulse with its friction projected into the plane perpendicular to `normal`.
-KeptImpulse turned(const KeptImpulse& kept, const Vec3& normal) {
-  return {kept.friction - normal * dot(kept.friction, normal), kept.normal};
-}
 
 constexpr std::size_t kContactsPerChunk = 2048;
 
@@ -56,9 +52,10 @@ void ContactCache::match(std::span<const Real> inverse_mass, ThreadPool* pool) {
       pool, now.manifolds.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
         match_manifolds(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
       });
-  for (std::uint32_t i = 0; i < now.size(); ++i) {
+  const ContactView contacts = now.view();
+  for (std::uint32_t i = 0; i < contacts.size(); ++i) {
     if (now.colors[i] < kColors) continue;
-    const ContactKey& key = now.key(i);
+    const ContactKey& key = contacts.key(i);
     if (!(inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0)) {
       now.colors[i] = kFixedColor;
     } else {
@@ -74,7 +71,8 @@ void ContactCache::keep(std::uint32_t i, std::uint32_t before) {
   const std::uint8_t color = last_.colors[before];
   if (color >= kColors) return;
   current_.colors[i] = color;
-  coloring_.keep(current_.key(i).a, current_.key(i).b, color);
+  const ContactKey& key = current_.view().key(i);
+  coloring_.keep(key.a, key.b, color);
 }
 
 void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last) {
@@ -104,38 +102,8 @@ void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last) {
     }
     std::uint32_t old = 0;
     if (!finder.find(contact.key, &old)) continue;
-    const ManifoldInput& before = last_.manifolds[old];
     keep(spheres + m, spheres_before + old);
-    match_points(contact, spheres, before, spheres_before);
-  }
-}
-
-/// Gives each point the impulse of the point with the same feature. An old point without successor
-/// gives its impulse to the nearest new point: where edges of two boxes coincide, rounding decides
-/// which features meet there, and a stack that lost its impulses now and then would not come to
-/// rest.
-/// @param first,first_before numbers of the impulses of the first points of both steps
-void ContactCache::match_points(const ManifoldInput& contact, std::uint32_t first,
-                                const ManifoldInput& before, std::uint32_t first_before) {
-  constexpr Real kSameDirection = Real(0.9);
-  const bool is_same_side = dot(contact.normal, before.normal) > kSameDirection;
-  const std::uint32_t end = contact.first + contact.count;
-  for (std::uint32_t q = before.first; q < before.first + before.count; ++q) {
-    const PointInput& old = last_.points[q];
-    std::uint32_t next = contact.first;
-    while (next < end && current_.points[next].feature != old.feature) ++next;
-    if (next == end && is_same_side) {
-      Real nearest = kMaxReal;
-      for (std::uint32_t p = contact.first; p < end; ++p) {
-        const Real distance2 = length_squared(current_.points[p].arm_a - old.arm_a);
-        if (distance2 < nearest) nearest = distance2, next = p;
-      }
-    }
-    if (next == end) continue;
-    const KeptImpulse kept = turned(last_.impulses[first_before + q], contact.normal);
-    KeptImpulse& impulse = current_.impulses[first + next];
-    impulse.friction += kept.friction;
-    impulse.normal += kept.normal;
+    match_points(current_.view(), m, last_.view(), old);
   }
 }
 

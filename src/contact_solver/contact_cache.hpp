@@ -34,8 +34,6 @@ class ContactCache {
  private:
   void match_spheres(std::uint32_t first, std::uint32_t last);
   void match_manifolds(std::uint32_t first, std::uint32_t last);
-  void match_points(const ManifoldInput& contact, std::uint32_t first, const ManifoldInput& before,
-                    std::uint32_t first_before);
   void keep(std::uint32_t i, std::uint32_t before);
 
   ContactSet current_, last_;

@@ -18,7 +18,7 @@ struct ContactKey {
   std::uint32_t part_a = 0, part_b = 0;
   /// `part_a` of the contacts of contact generators; those of shapes have lower numbers.
   static constexpr std::uint32_t kGenerated = 0xffffffffu;
-  bool is_generated() const { return part_a == kGenerated; }
+  JFPX_HD bool is_generated() const { return part_a == kGenerated; }
   friend auto operator<=>(const ContactKey&, const ContactKey&) = default;
 };
 
@@ -49,44 +49,76 @@ struct KeptImpulse {
   Real normal = 0;
 };
 
-/// Contacts of one step. Both lists are sorted by key. Contacts are numbered: first those of
-/// spheres, then the manifolds. Impulses are numbered alike: one for each contact of spheres, then
-/// one for each point.
-struct ContactSet {
-  std::vector<SphereContactInput> spheres;
-  std::vector<ManifoldInput> manifolds;
-  std::vector<PointInput> points;
+/// The arrays of a ContactSet, in host memory or on a device. Both lists are sorted by key.
+/// Contacts are numbered: first those of spheres, then the manifolds. Impulses are numbered alike:
+/// one for each contact of spheres, then one for each point.
+struct ContactView {
+  SphereContactInput* spheres = nullptr;
+  ManifoldInput* manifolds = nullptr;
+  PointInput* points = nullptr;
+  KeptImpulse* impulses = nullptr;   ///< by contact of spheres or point
+  Vec3* rolling_impulses = nullptr;  ///< [N m s], by contact: torque impulse on body a
+  std::uint8_t* colors = nullptr;    ///< by contact
+  std::uint32_t sphere_count = 0, manifold_count = 0, point_count = 0;
 
-  std::vector<KeptImpulse> impulses;   ///< by contact of spheres or point
-  std::vector<Vec3> rolling_impulses;  ///< [N m s], by contact: torque impulse on body a
-  std::vector<std::uint8_t> colors;    ///< by contact
-
-  std::uint32_t size() const {
-    return static_cast<std::uint32_t>(spheres.size() + manifolds.size());
+  JFPX_HD std::uint32_t size() const { return sphere_count + manifold_count; }
+  JFPX_HD bool is_sphere(std::uint32_t contact) const { return contact < sphere_count; }
+  JFPX_HD const ManifoldInput& manifold(std::uint32_t contact) const {
+    return manifolds[contact - sphere_count];
   }
-  bool is_sphere(std::uint32_t contact) const { return contact < spheres.size(); }
-  const ManifoldInput& manifold(std::uint32_t contact) const {
-    return manifolds[contact - spheres.size()];
-  }
-  const ContactKey& key(std::uint32_t contact) const {
+  JFPX_HD const ContactKey& key(std::uint32_t contact) const {
     return is_sphere(contact) ? spheres[contact].key : manifold(contact).key;
   }
-  const Vec3& normal(std::uint32_t contact) const {
+  JFPX_HD const Vec3& normal(std::uint32_t contact) const {
     return is_sphere(contact) ? spheres[contact].normal : manifold(contact).normal;
   }
   /// Distance of a point of a contact; that of two spheres has point 0 only.
-  Real distance(std::uint32_t contact, std::uint32_t point) const {
+  JFPX_HD Real distance(std::uint32_t contact, std::uint32_t point) const {
     return is_sphere(contact) ? spheres[contact].distance
                               : points[manifold(contact).first + point].distance;
   }
   /// Index of the first impulse of a contact.
-  std::uint32_t first_impulse(std::uint32_t contact) const {
-    if (is_sphere(contact)) return contact;
-    return static_cast<std::uint32_t>(spheres.size()) + manifold(contact).first;
+  JFPX_HD std::uint32_t first_impulse(std::uint32_t contact) const {
+    return is_sphere(contact) ? contact : sphere_count + manifold(contact).first;
   }
   /// Number of impulses of a contact.
-  std::uint32_t impulse_count(std::uint32_t contact) const {
+  JFPX_HD std::uint32_t impulse_count(std::uint32_t contact) const {
     return is_sphere(contact) ? 1 : manifold(contact).count;
+  }
+  /// Whether condition(distance of a point, its normal impulse) holds for a point of a contact.
+  template <class Condition>
+  JFPX_HD bool any_point(std::uint32_t contact, const Condition& condition) const {
+    const std::uint32_t first = first_impulse(contact);
+    for (std::uint32_t i = 0; i < impulse_count(contact); ++i) {
+      if (condition(distance(contact, i), impulses[first + i].normal)) return true;
+    }
+    return false;
+  }
+};
+
+/// Contacts of one step, in host memory.
+struct ContactSet {
+  std::vector<SphereContactInput> spheres;
+  std::vector<ManifoldInput> manifolds;
+  std::vector<PointInput> points;
+  std::vector<KeptImpulse> impulses;
+  std::vector<Vec3> rolling_impulses;
+  std::vector<std::uint8_t> colors;
+
+  std::uint32_t size() const {
+    return static_cast<std::uint32_t>(spheres.size() + manifolds.size());
+  }
+  /// Valid until an array changes its size.
+  ContactView view() {
+    return {spheres.data(),
+            manifolds.data(),
+            points.data(),
+            impulses.data(),
+            rolling_impulses.data(),
+            colors.data(),
+            static_cast<std::uint32_t>(spheres.size()),
+            static_cast<std::uint32_t>(manifolds.size()),
+            static_cast<std::uint32_t>(points.size())};
   }
 };
 

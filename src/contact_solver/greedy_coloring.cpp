@@ -10,30 +10,13 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
-namespace {
-
-/// Finalizer of SplitMix64 (Steele, Lea and Flood 2014).
-std::uint64_t mixed(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
-
-std::uint64_t hash_of(const ContactKey& key) {
-  const std::uint64_t bodies = std::uint64_t{key.a} << 32 | key.b;
-  const std::uint64_t parts = std::uint64_t{key.part_a} << 32 | key.part_b;
-  return mixed(mixed(bodies + 0x9e3779b97f4a7c15u) ^ parts);
-}
-
-}  // namespace
-
 void GreedyColoring::start(std::size_t bodies) {
   assign_geometric(&used_, bodies, 0);
   uncolored_.clear();
 }
 
 void GreedyColoring::add(const ContactKey& key, std::uint8_t* color) {
-  uncolored_.push_back({hash_of(key), key, color});
+  uncolored_.push_back({color_order(key), key, color});
 }
 
 void GreedyColoring::finish() {

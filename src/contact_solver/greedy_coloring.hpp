@@ -19,6 +19,20 @@ inline constexpr std::uint8_t kFixedColor = 254;
 /// Color of a contact that has not been colored.
 inline constexpr std::uint8_t kNoColor = 255;
 
+/// Finalizer of SplitMix64 (Steele, Lea and Flood 2014).
+JFPX_HD constexpr std::uint64_t mixed(std::uint64_t x) {
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+/// Place of a contact in the order of coloring; equal values are ordered by key.
+JFPX_HD constexpr std::uint64_t color_order(const ContactKey& key) {
+  const std::uint64_t bodies = std::uint64_t{key.a} << 32 | key.b;
+  const std::uint64_t parts = std::uint64_t{key.part_a} << 32 | key.part_b;
+  return mixed(mixed(bodies + 0x9e3779b97f4a7c15u) ^ parts);
+}
+
 /// Assigns the lowest color that neither body has to each new contact, in the order of a hash of
 /// the key. The order is a function of the keys alone, and random orders need few rounds in
 /// parallel (Blelloch, Fineman and Shun 2012). A contact that persists keeps its color.

@@ -67,16 +67,6 @@ bool before(BodyId a, BodyId b) { return a.index < b.index; }
 
 }  // namespace
 
-bool is_in_world(const BodyState& state) {
-  const Vec3& x = state.position;
-  const bool is_near = absolute(x.x) <= kMaxCoordinate && absolute(x.y) <= kMaxCoordinate &&
-                       absolute(x.z) <= kMaxCoordinate;
-  // If the square of the angular velocity overflows, normalized() returns a zero quaternion.
-  const bool is_rotation = length_squared(state.orientation) > Real(0.5);
-  return is_near && is_rotation && is_finite(state.orientation) && is_finite(state.velocity) &&
-         is_finite(state.angular_velocity);
-}
-
 BodyStore::BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps)
     : dt_(dt),
       substep_(dt / static_cast<Real>(substeps)),
@@ -289,7 +279,7 @@ void BodyStore::integrate() {
 }
 
 void BodyStore::integrate(std::uint32_t i) {
-  update_acceleration(i);
+  moving.last_acceleration[i] = add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]);
   const Vec3 angular_acceleration = moving.inverse_inertia[i] * moving.torque[i];
   moving.velocity[i] = detail::integrated_velocity(moving.velocity[i], moving.last_acceleration[i],
                                                    dt_, velocity_kept_[i]);
@@ -323,69 +313,58 @@ bool BodyStore::falls_asleep(std::uint32_t i) {
   return true;
 }
 
-Vec3 BodyStore::predicted_motion(std::uint32_t i) const {
-  if (moving.awake[i] == 0) return {};
-  const Vec3 acceleration = movable(i) ? acceleration_of_step(i) : Vec3{};
-  const Vec3 motion = add_scaled(moving.velocity[i], acceleration, dt_) * dt_;
-  constexpr Real kFarthest = 2 * kMaxCoordinate;
-  const bool stays = absolute(motion.x) <= kFarthest && absolute(motion.y) <= kFarthest &&
-                     absolute(motion.z) <= kFarthest;
-  return stays ? motion : Vec3{};
+BodyView BodyStore::view() const {
+  return {.position = moving.position.data(),
+          .orientation = moving.orientation.data(),
+          .velocity = moving.velocity.data(),
+          .angular_velocity = moving.angular_velocity.data(),
+          .force = moving.force.data(),
+          .torque = moving.torque.data(),
+          .last_acceleration = moving.last_acceleration.data(),
+          .inverse_inertia = moving.inverse_inertia.data(),
+          .rest_time = moving.rest_time.data(),
+          .awake = moving.awake.data(),
+          .radius = radius_.data(),
+          .extent = extent_.data(),
+          .inverse_mass = inverse_mass_.data(),
+          .friction = friction_.data(),
+          .restitution = restitution_.data(),
+          .rolling_friction = rolling_friction_.data(),
+          .spinning_friction = spinning_friction_.data(),
+          .body_inverse_inertia = body_inverse_inertia_.data(),
+          .tensor = tensor_.data(),
+          .acceleration = acceleration_.data(),
+          .velocity_kept = velocity_kept_.data(),
+          .angular_velocity_kept = angular_velocity_kept_.data(),
+          .can_sleep = can_sleep_.data(),
+          .kinematic = kinematic_.data(),
+          .sensor = sensor_.data(),
+          .filter = filter_.data(),
+          .ignored = ignored_.keys().data(),
+          .ignored_count = static_cast<std::uint32_t>(ignored_.keys().size()),
+          .filters_in_use = filters_in_use_,
+          .ids = ids_.data(),
+          .count = static_cast<std::uint32_t>(ids_.size()),
+          .capacity = static_cast<std::uint32_t>(capacity()),
+          .dt = dt_,
+          .substep = substep_,
+          .sleep_speed = sleep_.speed,
+          .sleep_time = sleep_.time,
+          .woken_motion = 2 * sleep_.epsilon};
 }
 
-void BodyStore::update_acceleration(std::uint32_t i) {
-  moving.last_acceleration[i] = acceleration_of_step(i);
-}
-
-/// Acceleration of a movable body by its constant acceleration and the accumulated force.
-Vec3 BodyStore::acceleration_of_step(std::uint32_t i) const {
-  return add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]);
-}
-
-void BodyStore::accelerate(std::uint32_t i, const Quat& orientation, Vec3* velocity,
-                           Vec3* angular_velocity) const {
-  *velocity = detail::integrated_velocity(*velocity, moving.last_acceleration[i], substep_,
-                                          velocity_kept_[i]);
-  *angular_velocity =
-      detail::integrated_velocity(*angular_velocity, moving.inverse_inertia[i] * moving.torque[i],
-                                  substep_, angular_velocity_kept_[i]);
-  if (tensor_[i](0, 0) > 0) {
-    // Unlike precessed(), this does not rotate the velocity to and fro: rounding makes axes not
-    // quite orthonormal, always to the same side, and with many substeps energy would grow
-    // noticeably.
-    const Mat3 axes = to_matrix(orientation);
-    const Vec3 w = transform_transpose(axes, *angular_velocity);
-    Vec3 change;
-    if (detail::gyroscopic_change(w, tensor_[i], substep_, &change)) {
-      *angular_velocity += axes * change;
-    }
-  }
-}
-
-void BodyStore::end_step(std::uint32_t i, const BodyState& state) {
-  moving.position[i] = state.position;
-  moving.orientation[i] = state.orientation;
-  moving.velocity[i] = state.velocity;
-  moving.angular_velocity[i] = state.angular_velocity;
-  if (!is_round(i)) refresh_inertia(i);
-}
-
-/// A body that a force drives must be slower before it may sleep: at the ordinary speed, a damped
-/// spring would still be far from its equilibrium. The rotation of a sphere counts less, because it
-/// moves the surface within itself, and no friction ends a rotation about the contact normal.
-void BodyStore::update_rest_time(std::uint32_t i, bool is_driven) {
-  constexpr Real kDriven = Real(0.04), kRotationOfSphere = Real(0.1);
-  const Real limit = is_driven ? sleep_.speed * kDriven : sleep_.speed;
-  const Real weight = radius_[i] > 0 ? kRotationOfSphere : Real(1);
-  const Real spin = length(moving.angular_velocity[i]) * extent_[i] * weight;
-  const Real speed = std::max(length(moving.velocity[i]), spin);
-  const bool is_slow = can_sleep_[i] != 0 && speed <= limit;
-  moving.rest_time[i] = is_slow ? moving.rest_time[i] + dt_ : Real(0);
-}
-
-void BodyStore::put_to_sleep(std::uint32_t i) {
-  moving.awake[i] = 0;
-  moving.velocity[i] = moving.angular_velocity[i] = {};
+MotionPointers BodyStore::motion_pointers() {
+  return {.position = moving.position.data(),
+          .orientation = moving.orientation.data(),
+          .velocity = moving.velocity.data(),
+          .angular_velocity = moving.angular_velocity.data(),
+          .force = moving.force.data(),
+          .torque = moving.torque.data(),
+          .last_acceleration = moving.last_acceleration.data(),
+          .inverse_inertia = moving.inverse_inertia.data(),
+          .motion = moving.motion.data(),
+          .rest_time = moving.rest_time.data(),
+          .awake = moving.awake.data()};
 }
 
 void BodyStore::refresh_inertia(std::uint32_t i) {

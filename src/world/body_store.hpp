@@ -3,6 +3,7 @@
 
 #include <jfpx/scene.hpp>
 
+#include "src/world/body_view.hpp"
 #include "src/world/ignored_pairs.hpp"
 
 #include <cstdint>
@@ -31,16 +32,13 @@ struct MotionArrays {
   std::vector<std::uint8_t> awake;  ///< 1 or 0; a body of mass 0: 1 if kinematic and moving
 };
 
-/// Whether all values of a state are finite, and no coordinate is above kMaxCoordinate.
-bool is_in_world(const BodyState& state);
-
 /// Owns the bodies and their ids, and integrates their free motion. The arrays have unused slots,
 /// so loops over the bodies iterate over ids(), which is sorted by index. The slot of a removed
 /// body is reused with a new generation.
 class BodyStore {
  public:
   /// @param dt       [s], length of a step
-  /// @param substeps number of calls of accelerate() per step
+  /// @param substeps number of substeps of a step
   BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps = 1);
 
   /// @param def must have passed validation
@@ -113,25 +111,11 @@ class BodyStore {
     return !filters_in_use_ ||
            (jfpx::may_collide(filter_[a], filter_[b]) && !ignored_.contains({a, b}));
   }
-  /// Sets last_acceleration of an awake movable body for this step.
-  void update_acceleration(std::uint32_t body);
-  /// Velocities after the accelerations and the damping of a substep, without contacts.
-  /// @param orientation at the start of the substep
-  void accelerate(std::uint32_t body, const Quat& orientation, Vec3* velocity,
-                  Vec3* angular_velocity) const;
-  /// Ends a step of an awake body at the given pose and clears the accumulated force and torque.
-  void end_step(std::uint32_t body, const BodyState& state);
-  /// Updates the time for which the body has been slow.
-  void update_rest_time(std::uint32_t body, bool is_driven);
-  /// Whether the body has been slow for long enough to sleep.
-  bool is_at_rest(std::uint32_t body) const { return moving.rest_time[body] >= sleep_.time; }
-  void put_to_sleep(std::uint32_t body);
+  /// Pointers to the arrays. Valid until a body is added or removed, or the ignored pairs change.
+  BodyView view() const;
+  MotionPointers motion_pointers();
 
   bool movable(std::uint32_t body) const { return inverse_mass_[body] > 0; }
-  /// Whether the body is a movable sphere whose inertia is the same about every axis.
-  bool is_round(std::uint32_t body) const {
-    return movable(body) && radius_[body] > 0 && !(tensor_[body](0, 0) > 0);
-  }
   bool kinematic(std::uint32_t body) const { return kinematic_[body] != 0; }
   /// Whether a kinematic body is in motion.
   bool has_moving_kinematic_body() const;
@@ -139,11 +123,6 @@ class BodyStore {
   Real mass(std::uint32_t body) const { return mass_[body]; }
   Real inverse_mass(std::uint32_t body) const { return inverse_mass_[body]; }
   std::span<const Real> inverse_masses() const { return inverse_mass_; }
-  std::span<const Real> radii() const { return radius_; }
-  std::span<const Real> frictions() const { return friction_; }
-  std::span<const Real> restitutions() const { return restitution_; }
-  std::span<const Real> rolling_frictions() const { return rolling_friction_; }
-  std::span<const Real> spinning_frictions() const { return spinning_friction_; }
   Real friction(std::uint32_t body) const { return friction_[body]; }
   Real restitution(std::uint32_t body) const { return restitution_[body]; }
   /// [m]; 0 for a body that is not a sphere, as for compounds
@@ -151,16 +130,11 @@ class BodyStore {
   /// [m], of the bounding sphere about the centre of mass; infinite for half-spaces and planes
   Real extent(std::uint32_t body) const { return extent_[body]; }
   Real dt() const { return dt_; }
-  /// Displacement of the centre of mass during the next step, without contacts and damping [m];
-  /// zero for a body at rest, and for one so fast that it leaves the world.
-  Vec3 predicted_motion(std::uint32_t body) const;
-
   MotionArrays moving;
 
  private:
   void add_slot();
   void compute_inertia(std::uint32_t body, const std::optional<Mat3>& given);
-  Vec3 acceleration_of_step(std::uint32_t body) const;
   void integrate(std::uint32_t body);
   void move(std::uint32_t body);
   bool falls_asleep(std::uint32_t body);

@@ -26,7 +26,7 @@ class PairTest {
  public:
   using SubShape = SubShapeTable::SubShape;
 
-  PairTest(const BodyStore& bodies, const SubShapeTable& sub_shapes, std::vector<Contact>* contacts)
+  PairTest(const BodyStore& bodies, const SubShapeView& sub_shapes, std::vector<Contact>* contacts)
       : bodies_(bodies), sub_shapes_(sub_shapes), contacts_(contacts) {}
 
   /// Sub-shape p belongs to body a, q to body b; only q may be a wall.
@@ -44,7 +44,7 @@ class PairTest {
       add(a, b, collide(sub_shapes_.bounds(q), sub_shapes_.box(p).box, sub_shapes_.box(p).pose),
           -1);
     } else {
-      const SubShapeTable::PosedBox &first = sub_shapes_.box(p), &second = sub_shapes_.box(q);
+      const PosedBox &first = sub_shapes_.box(p), &second = sub_shapes_.box(q);
       if (!may_touch(first.box, first.pose, second.box, second.pose)) return;
       add(a, b, collide(first.box, first.pose, second.box, second.pose));
     }
@@ -65,7 +65,7 @@ class PairTest {
   }
 
   const BodyStore& bodies_;
-  const SubShapeTable& sub_shapes_;
+  const SubShapeView& sub_shapes_;
   std::vector<Contact>* contacts_;
 };
 
@@ -88,39 +88,24 @@ std::uint64_t ContactFinder::find_contacts(const BodyStore& bodies,
   const std::uint64_t sphere_contacts = contacts->size();
   find_fixed_candidates(bodies);
   sort_if_needed(&candidates_);
-  const PairTest test(bodies, sub_shapes_, contacts);
+  const SubShapeView sub_shapes = sub_shapes_.view();
+  const PairTest test(bodies, sub_shapes, contacts);
   for (const Candidate& c : candidates_) test(c.a, c.b, c.sub_shape_a, c.sub_shape_b);
   return sphere_contacts;
-}
-
-/// Whether x is body a of its contacts with y.
-bool ContactFinder::comes_first(const BodyStore& bodies, std::uint32_t x, std::uint32_t y) const {
-  const bool x_is_sphere = bodies.radius(x) > 0, y_is_sphere = bodies.radius(y) > 0;
-  if (x_is_sphere && y_is_sphere) return x < y;
-  const bool compound = std::holds_alternative<Compound>(bodies.shape(x)) ||
-                        std::holds_alternative<Compound>(bodies.shape(y));
-  if (!compound && x_is_sphere != y_is_sphere) return x_is_sphere;
-  if (bodies.movable(x) != bodies.movable(y)) return bodies.movable(x);
-  return x < y;
-}
-
-ContactFinder::Candidate ContactFinder::ordered(const BodyStore& bodies, SubShape x,
-                                                SubShape y) const {
-  const std::uint32_t of_x = sub_shapes_.body(x), of_y = sub_shapes_.body(y);
-  if (comes_first(bodies, of_x, of_y)) return {of_x, of_y, x, y};
-  return {of_y, of_x, y, x};
 }
 
 /// Appends the contacts of two spheres to `contacts`, and the pairs with a box to candidates_. In a
 /// pair of the collider, a < b, and spheres are numbered before boxes; so b is a box if either is.
 void ContactFinder::find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts) {
   const ContactSpan found = broad_phase_.find(sub_shapes_.bounds());
+  const BodyView view = bodies.view();
+  const SubShapeView sub_shapes = sub_shapes_.view();
   hits_.clear();
   for (std::size_t i = 0; i < found.size(); ++i) {
-    const std::uint32_t a = sub_shapes_.body(found[i].a), b = sub_shapes_.body(found[i].b);
+    const std::uint32_t a = sub_shapes.body(found[i].a), b = sub_shapes.body(found[i].b);
     if (a == b || (!bodies.movable(a) && !bodies.movable(b)) || !bodies.may_collide(a, b)) continue;
-    const Candidate pair = ordered(bodies, found[i].a, found[i].b);
-    if (sub_shapes_.is_sphere(found[i].b)) {
+    const Candidate pair = ordered(view, sub_shapes, found[i].a, found[i].b);
+    if (sub_shapes.is_sphere(found[i].b)) {
       hits_.push_back({pair, i});
     } else {
       candidates_.push_back(pair);
@@ -129,7 +114,7 @@ void ContactFinder::find_sphere_pairs(const BodyStore& bodies, std::vector<Conta
   sort_if_needed(&hits_);
   for (const SphereHit& hit : hits_) {
     const SphereContact& c = found[hit.index];
-    const Vec3 point = middle_point(c.normal, c.distance, sub_shapes_.bounds(c.b));
+    const Vec3 point = middle_point(c.normal, c.distance, sub_shapes.bounds(c.b));
     const Vec3 normal = hit.pair.sub_shape_a == c.a ? c.normal : -c.normal;
     contacts->push_back({bodies.id(hit.pair.a), bodies.id(hit.pair.b), normal, point, c.distance});
   }
@@ -138,13 +123,15 @@ void ContactFinder::find_sphere_pairs(const BodyStore& bodies, std::vector<Conta
 /// Appends the pairs of a movable and a fixed sub-shape that may touch. Tests all of them: takes
 /// O(movable * fixed) time.
 void ContactFinder::find_fixed_candidates(const BodyStore& bodies) {
-  for (SubShape sub_shape = 0; sub_shape < sub_shapes_.fixed_begin(); ++sub_shape) {
-    const std::uint32_t body = sub_shapes_.body(sub_shape);
+  const BodyView view = bodies.view();
+  const SubShapeView sub_shapes = sub_shapes_.view();
+  for (SubShape sub_shape = 0; sub_shape < sub_shapes.fixed_begin; ++sub_shape) {
+    const std::uint32_t body = sub_shapes.body(sub_shape);
     if (!bodies.movable(body)) continue;
-    for (SubShape fixed = sub_shapes_.fixed_begin(); fixed < sub_shapes_.size(); ++fixed) {
-      if (may_touch(sub_shape, fixed, bodies.moving.position[body]) &&
-          bodies.may_collide(body, sub_shapes_.body(fixed))) {
-        candidates_.push_back(ordered(bodies, sub_shape, fixed));
+    for (SubShape fixed = sub_shapes.fixed_begin; fixed < sub_shapes.count; ++fixed) {
+      if (may_touch(sub_shapes, sub_shape, fixed, bodies.moving.position[body]) &&
+          bodies.may_collide(body, sub_shapes.body(fixed))) {
+        candidates_.push_back(ordered(view, sub_shapes, sub_shape, fixed));
       }
     }
   }
@@ -152,13 +139,13 @@ void ContactFinder::find_fixed_candidates(const BodyStore& bodies) {
 
 /// Conservative test: false only if the sub-shapes do not touch.
 /// @param centre centre of mass of the body of `sub_shape`, which selects the side of a plane
-bool ContactFinder::may_touch(SubShape sub_shape, SubShape fixed, const Vec3& centre) const {
-  if (!sub_shapes_.is_wall(fixed))
-    return near(sub_shapes_.bounds(sub_shape), sub_shapes_.bounds(fixed));
-  const HalfSpace solid = sub_shapes_.wall(fixed).solid_for(centre);
-  if (sub_shapes_.is_sphere(sub_shape))
-    return jfpx::may_touch(sub_shapes_.bounds(sub_shape), solid);
-  return jfpx::may_touch(sub_shapes_.box(sub_shape).box, sub_shapes_.box(sub_shape).pose, solid);
+bool ContactFinder::may_touch(const SubShapeView& sub_shapes, SubShape sub_shape, SubShape fixed,
+                              const Vec3& centre) {
+  if (!sub_shapes.is_wall(fixed))
+    return near(sub_shapes.bounds(sub_shape), sub_shapes.bounds(fixed));
+  const HalfSpace solid = sub_shapes.wall(fixed).solid_for(centre);
+  if (sub_shapes.is_sphere(sub_shape)) return jfpx::may_touch(sub_shapes.bounds(sub_shape), solid);
+  return jfpx::may_touch(sub_shapes.box(sub_shape).box, sub_shapes.box(sub_shape).pose, solid);
 }
 
 }  // namespace JFPX_ABI

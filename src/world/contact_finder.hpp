@@ -50,12 +50,6 @@ class ContactFinder {
 
  private:
   using SubShape = SubShapeTable::SubShape;
-  /// Two sub-shapes that may touch.
-  struct Candidate {
-    std::uint32_t a = 0, b = 0;  ///< bodies, in the order that Contact defines
-    SubShape sub_shape_a = 0, sub_shape_b = 0;
-    friend auto operator<=>(const Candidate&, const Candidate&) = default;
-  };
   /// Two spheres that touch, sortable by body and sub-shape.
   struct SphereHit {
     Candidate pair;
@@ -63,25 +57,30 @@ class ContactFinder {
     friend auto operator<=>(const SphereHit&, const SphereHit&) = default;
   };
 
-  bool comes_first(const BodyStore& bodies, std::uint32_t x, std::uint32_t y) const;
-  Candidate ordered(const BodyStore& bodies, SubShape x, SubShape y) const;
   void find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts);
   void find_fixed_candidates(const BodyStore& bodies);
-  bool may_touch(SubShape sub_shape, SubShape fixed, const Vec3& centre) const;
+  static bool may_touch(const SubShapeView& sub_shapes, SubShape sub_shape, SubShape fixed,
+                        const Vec3& centre);
   /// What a chunk of a parallel loop finds.
   struct Part {
-    NearPairs near;
+    std::vector<soft_step::SphereContactInput> spheres;
+    std::vector<soft_step::ManifoldInput> manifolds;
+    std::vector<soft_step::PointInput> points;
+    std::vector<Contact> touching;  ///< those with distance <= 0, also of sensors
     std::vector<Candidate> candidates, compounds;
+    void add(const BodyStore& bodies, const NearPair& near);
     void clear() {
-      near.clear();
+      spheres.clear();
+      manifolds.clear();
+      points.clear();
+      touching.clear();
       candidates.clear();
       compounds.clear();
     }
   };
   void sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool);
-  void test_sphere_pairs(const BodyStore& bodies, ContactSpan pairs, Part* part);
-  bool may_meet(const BodyStore& bodies, SubShape sub_shape, SubShape fixed) const;
-  void find_fixed_pairs(const BodyStore& bodies, SubShape first, SubShape last, Part* part);
+  void test_sphere_pairs(const BodyStore& bodies, ContactSpan pairs, Part* part) const;
+  void find_fixed_pairs(SubShape first, SubShape last, Part* part) const;
   struct Results;
   void test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
                        Results* results, ThreadPool* pool);
@@ -95,7 +94,8 @@ class ContactFinder {
   // Of find_near_contacts():
   std::vector<Vec3> motion_;           ///< by body [m]
   std::vector<SphereInstance> swept_;  ///< by sub-shape, without walls: bounds of the step's motion
-  std::vector<Real> margins_;          ///< by sub-shape [m]
+  std::vector<Real> margins_;          ///< by sub-shape, without walls [m]
+  NearBounds near_;                    ///< of the arrays above, during a search
   std::vector<Candidate> compounds_;   ///< pairs of spheres, at least one of a compound
   std::vector<Part> parts_;
   std::vector<Contact> merged_;  ///< copy of the contacts of compounds

@@ -24,9 +24,11 @@ class IgnoredPairs {
   void erase_body(std::uint32_t body) noexcept;
   bool contains(const BodyPair& pair) const noexcept;
   bool empty() const noexcept { return keys_.empty(); }
+  /// By pair: the lower index in the upper half, the higher one in the lower half; sorted.
+  std::span<const std::uint64_t> keys() const noexcept { return keys_; }
 
  private:
-  std::vector<std::uint64_t> keys_;  ///< lower index in the upper half; sorted, no duplicates
+  std::vector<std::uint64_t> keys_;  ///< without duplicates
 };
 
 }  // namespace JFPX_ABI

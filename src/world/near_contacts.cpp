@@ -1,6 +1,4 @@
 /// The part of contact detection that finds pairs which may touch during a step.
-#include <jfpx/intersect.hpp>
-
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
 #include "src/world/contact_finder.hpp"
@@ -14,15 +12,7 @@ namespace {
 
 using soft_step::ContactSet;
 
-/// The margin of a sub-shape is at most this part of its size, so that small bodies do not collect
-/// contacts with everything around them.
-constexpr Real kMarginPerSize = Real(0.04);
 constexpr std::size_t kSubShapesPerChunk = 1024, kPairsPerChunk = 1024;
-
-Real smallest_half_extent(const Box& box) {
-  const Vec3& h = box.half_extents;
-  return std::min({h.x, h.y, h.z});
-}
 
 /// A list that is filled again in every step. Its vector keeps the items of the last step until
 /// they are overwritten, because constructing them again would take as long as filling them.
@@ -58,102 +48,66 @@ void append(ThreadPool* pool, std::span<Part> parts, const List& list, Refilled<
 
 }  // namespace
 
-/// Fills swept_ with spheres that enclose the motion of each sub-shape during the step.
+/// Fills near_: the bounds of the motion of all sub-shapes during the step.
 void ContactFinder::sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool) {
   motion_.resize(bodies.capacity());
+  swept_.resize(sub_shapes_.bounded_size());
+  margins_.resize(sub_shapes_.bounded_size());
+  near_ = {.bodies = bodies.view(),
+           .sub_shapes = sub_shapes_.view(),
+           .motion = motion_.data(),
+           .margins = margins_.data(),
+           .swept = swept_.data(),
+           .largest_margin = margin * Real(0.5)};
   parallel_for(pool, bodies.ids().size(), kSubShapesPerChunk,
                [&](std::size_t first, std::size_t last) {
                  for (const BodyId id : bodies.ids().subspan(first, last - first)) {
-                   motion_[id.index] = bodies.predicted_motion(id.index);
+                   motion_[id.index] = near_.bodies.predicted_motion(id.index);
                  }
                });
-  swept_.resize(sub_shapes_.bounded_size());
-  margins_.assign(sub_shapes_.size(), margin * Real(0.5));
   parallel_for(pool, swept_.size(), kSubShapesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (auto i = static_cast<SubShape>(first); i < last; ++i) {
-      const Real size = sub_shapes_.is_sphere(i) ? sub_shapes_.bounds(i).radius
-                                                 : smallest_half_extent(sub_shapes_.box(i).box);
-      margins_[i] = std::min(margins_[i], size * kMarginPerSize);
-      const std::uint32_t body = sub_shapes_.body(i);
-      const SphereInstance& bounds = sub_shapes_.bounds(i);
-      SphereInstance& swept = swept_[i];
-      swept = {bounds.centre, bounds.radius + margins_[i]};
-      if (bodies.moving.awake[body] != 0) {
-        const Vec3 half_motion = motion_[body] * Real(0.5);
-        const Real arm = length(bounds.centre - bodies.moving.position[body]);
-        const Real reach = sub_shapes_.is_sphere(i) ? arm : arm + bounds.radius;
-        const Real turned = length(bodies.moving.angular_velocity[body]) * bodies.dt();
-        swept.centre += half_motion;
-        swept.radius += length(half_motion) + std::min(turned, Real(2)) * reach;
-      }
-      // For the rounding errors of the centre and of the radius.
-      const Vec3& c = swept.centre;
-      const Real largest = std::max({absolute(c.x), absolute(c.y), absolute(c.z)});
-      swept.radius += 8 * kEpsilon * (largest + swept.radius);
-    }
+    for (auto i = static_cast<SubShape>(first); i < last; ++i) near_.sweep(i);
   });
 }
 
 /// Tests pairs of swept bounds: contacts of two spheres go to *part, pairs with a box or a part of
 /// a compound to its candidates. Spheres of compounds become manifolds, because their arms are not
 /// multiples of the normal.
-void ContactFinder::test_sphere_pairs(const BodyStore& bodies, ContactSpan pairs, Part* part) {
+void ContactFinder::test_sphere_pairs(const BodyStore& bodies, ContactSpan pairs,
+                                      Part* part) const {
+  const BodyView& view = near_.bodies;
+  const SubShapeView& sub_shapes = near_.sub_shapes;
   for (const SphereContact& pair : pairs) {
-    const std::uint32_t a = sub_shapes_.body(pair.a), b = sub_shapes_.body(pair.b);
-    if (a == b || (!bodies.movable(a) && !bodies.movable(b)) || !bodies.may_collide(a, b)) continue;
-    if (!sub_shapes_.is_sphere(pair.b)) {
-      part->candidates.push_back(ordered(bodies, pair.a, pair.b));
+    const PairKind kind = near_.kind_of(pair.a, pair.b);
+    if (kind == PairKind::none) continue;
+    if (kind != PairKind::spheres) {
+      auto& list = kind == PairKind::others ? part->candidates : part->compounds;
+      list.push_back(ordered(view, sub_shapes, pair.a, pair.b));
       continue;
     }
-    if (!(bodies.radius(a) > 0 && bodies.radius(b) > 0)) {
-      part->compounds.push_back(ordered(bodies, pair.a, pair.b));
-      continue;
-    }
-    const SphereInstance &x = sub_shapes_.bounds(pair.a), &y = sub_shapes_.bounds(pair.b);
-    const Real margin = 2 * std::min(margins_[pair.a], margins_[pair.b]);
-    const detail::SpeculativeContact c =
-        detail::find_speculative(x, y, motion_[a] - motion_[b], margin);
+    const detail::SpeculativeContact c = near_.test_spheres(pair.a, pair.b);
     if (!c.found) continue;
-    if (!bodies.sensor(a) && !bodies.sensor(b)) {
-      part->near.spheres.push_back({{a, b}, c.normal, c.distance});
+    const std::uint32_t a = sub_shapes.body(pair.a), b = sub_shapes.body(pair.b);
+    if (view.sensor[a] == 0 && view.sensor[b] == 0) {
+      part->spheres.push_back({{a, b}, c.normal, c.distance});
     }
     if (!(c.distance <= 0)) continue;
-    const Vec3 point = middle_point(c.normal, c.distance, y);
-    part->near.touching.push_back({bodies.id(a), bodies.id(b), c.normal, point, c.distance});
+    const Vec3 point = middle_point(c.normal, c.distance, sub_shapes.bounds(pair.b));
+    part->touching.push_back({bodies.id(a), bodies.id(b), c.normal, point, c.distance});
   }
-}
-
-/// Whether the swept bounds of a movable sub-shape touch a fixed one. Conservative.
-bool ContactFinder::may_meet(const BodyStore& bodies, SubShape sub_shape, SubShape fixed) const {
-  const SphereInstance& swept = swept_[sub_shape];
-  if (sub_shapes_.is_wall(fixed)) {
-    const Vec3& centre = bodies.moving.position[sub_shapes_.body(sub_shape)];
-    const HalfSpace solid = sub_shapes_.wall(fixed).solid_for(centre);
-    const Real height = dot(solid.normal, swept.centre) - solid.offset;
-    return height <= swept.radius + 8 * kEpsilon * absolute(solid.offset);
-  }
-  const Real most = swept.radius + swept_[fixed].radius;
-  if (!(length_squared(swept.centre - swept_[fixed].centre) <= most * most * (1 + 64 * kEpsilon)))
-    return false;
-  // The bounding sphere of a wide floor contains everything above it.
-  const Real moved = swept_[fixed].radius - sub_shapes_.bounds(fixed).radius;
-  const SubShapeTable::PosedBox& box = sub_shapes_.box(fixed);
-  const Real far = length(box.pose.origin) + swept_[fixed].radius + length(swept.centre);
-  return jfpx::may_touch(
-      SphereInstance{swept.centre, swept.radius + 2 * moved + 16 * kEpsilon * far}, box.box,
-      box.pose);
 }
 
 /// Appends the pairs of a movable and a fixed sub-shape whose swept bounds touch.
 /// @param first,last range of movable sub-shapes
-void ContactFinder::find_fixed_pairs(const BodyStore& bodies, SubShape first, SubShape last,
-                                     Part* part) {
+void ContactFinder::find_fixed_pairs(SubShape first, SubShape last, Part* part) const {
+  const BodyView& bodies = near_.bodies;
+  const SubShapeView& sub_shapes = near_.sub_shapes;
   for (SubShape sub_shape = first; sub_shape < last; ++sub_shape) {
-    const std::uint32_t body = sub_shapes_.body(sub_shape);
+    const std::uint32_t body = sub_shapes.body(sub_shape);
     if (!bodies.movable(body)) continue;
-    for (SubShape fixed = sub_shapes_.fixed_begin(); fixed < sub_shapes_.size(); ++fixed) {
-      if (bodies.may_collide(body, sub_shapes_.body(fixed)) && may_meet(bodies, sub_shape, fixed)) {
-        part->candidates.push_back(ordered(bodies, sub_shape, fixed));
+    for (SubShape fixed = sub_shapes.fixed_begin; fixed < sub_shapes.count; ++fixed) {
+      if (bodies.may_collide(body, sub_shapes.body(fixed)) && near_.may_meet(sub_shape, fixed)) {
+        part->candidates.push_back(ordered(bodies, sub_shapes, sub_shape, fixed));
       }
     }
   }
@@ -167,27 +121,42 @@ struct ContactFinder::Results {
   Refilled<Contact> touching;
 };
 
+/// Appends the contact of two sub-shapes.
+void ContactFinder::Part::add(const BodyStore& bodies, const NearPair& near) {
+  for (const NearPair::Touch& touch : std::span(near.touches, near.touch_count)) {
+    touching.push_back(
+        {bodies.id(near.key.a), bodies.id(near.key.b), near.normal, touch.point, touch.distance});
+  }
+  if (near.point_count == 0) return;
+  const auto first = static_cast<std::uint32_t>(points.size());
+  points.insert(points.end(), near.points, near.points + near.point_count);
+  manifolds.push_back({near.key, near.normal, first, near.point_count});
+}
+
 /// Runs the pair tests of a sorted list of candidates and appends the results.
 void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
                                     Results* results, ThreadPool* pool) {
   const std::span<Part> parts = start_parts(candidates.size());
   parallel_for(pool, candidates.size(), kPairsPerChunk, [&](std::size_t first, std::size_t last) {
-    NearPairTest test(bodies, sub_shapes_, margins_, &parts[first / kPairsPerChunk].near);
-    for (const Candidate& c : candidates.subspan(first, last - first)) {
-      test(c.a, c.b, c.sub_shape_a, c.sub_shape_b);
+    Part& part = parts[first / kPairsPerChunk];
+    NearPair near;
+    NearPairTest test(near_, &near);
+    for (const Candidate& pair : candidates.subspan(first, last - first)) {
+      test(pair);
+      part.add(bodies, near);
     }
   });
   auto first_point = static_cast<std::uint32_t>(results->points.size);
   for (Part& part : parts) {
-    for (soft_step::ManifoldInput& manifold : part.near.manifolds) manifold.first += first_point;
-    first_point += static_cast<std::uint32_t>(part.near.points.size());
+    for (soft_step::ManifoldInput& manifold : part.manifolds) manifold.first += first_point;
+    first_point += static_cast<std::uint32_t>(part.points.size());
   }
   append(
-      pool, parts, [](Part & p) -> auto& { return p.near.manifolds; }, &results->manifolds);
+      pool, parts, [](Part & p) -> auto& { return p.manifolds; }, &results->manifolds);
   append(
-      pool, parts, [](Part & p) -> auto& { return p.near.points; }, &results->points);
+      pool, parts, [](Part & p) -> auto& { return p.points; }, &results->points);
   append(
-      pool, parts, [](Part & p) -> auto& { return p.near.touching; }, &results->touching);
+      pool, parts, [](Part & p) -> auto& { return p.touching; }, &results->touching);
 }
 
 /// Merges the sorted ranges [0, middle) and [middle, size) of a list. Unlike std::inplace_merge(),
@@ -226,9 +195,9 @@ std::uint64_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real ma
     test_sphere_pairs(bodies, found.subspan(first, last - first), &parts[first / kPairsPerChunk]);
   });
   append(
-      pool, parts, [](Part & p) -> auto& { return p.near.spheres; }, &results.spheres);
+      pool, parts, [](Part & p) -> auto& { return p.spheres; }, &results.spheres);
   append(
-      pool, parts, [](Part & p) -> auto& { return p.near.touching; }, &results.touching);
+      pool, parts, [](Part & p) -> auto& { return p.touching; }, &results.touching);
   append(
       pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
   append(
@@ -246,7 +215,7 @@ std::uint64_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real ma
   parts = start_parts(sub_shapes_.fixed_begin());
   parallel_for(pool, sub_shapes_.fixed_begin(), kPairsPerChunk,
                [&](std::size_t first, std::size_t last) {
-                 find_fixed_pairs(bodies, static_cast<SubShape>(first), static_cast<SubShape>(last),
+                 find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last),
                                   &parts[first / kPairsPerChunk]);
                });
   append(

@@ -8,7 +8,6 @@
 
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
-#include "src/world/integrate.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -19,7 +18,7 @@ namespace {
 
 using soft_step::ContactKey;
 using soft_step::ContactSet;
-using soft_step::SolverBody;
+using soft_step::ContactView;
 
 constexpr std::size_t kBodiesPerChunk = 512, kContactsPerChunk = 2048;
 
@@ -68,209 +67,106 @@ void SoftStep::prepare(const BodyStore& bodies) {
   islands_.reserve(capacity);
 }
 
-/// Whether condition(distance of a point, its normal impulse) holds for a point of a contact.
-template <class Condition>
-bool SoftStep::any_point(std::uint32_t contact, const Condition& condition) const {
-  const ContactSet& set = cache_.current();
-  const std::uint32_t first = set.first_impulse(contact);
-  for (std::uint32_t i = 0; i < set.impulse_count(contact); ++i) {
-    if (condition(set.distance(contact, i), set.impulses[first + i].normal)) return true;
-  }
-  return false;
-}
-
-/// Whether the bodies of a contact touch, or meet during the step at their velocities.
-bool SoftStep::will_touch(const BodyStore& bodies, std::uint32_t contact) const {
-  const ContactKey& key = cache_.current().key(contact);
-  const Vec3 motion = bodies.predicted_motion(key.a) - bodies.predicted_motion(key.b);
-  const Real opening = dot(motion, cache_.current().normal(contact));
-  return any_point(contact, [opening](Real distance, Real impulse) {
-    return distance <= 0 || distance + opening <= 0 || impulse > 0;
-  });
-}
-
 /// Unites the movable bodies of the contacts for which touches(contact) holds, and marks the
 /// islands that touch a kinematic body in motion: a sleeping body has no velocity and could not be
 /// carried by it.
 template <class Touches>
-void SoftStep::find_islands(const BodyStore& bodies, const Touches& touches) {
-  islands_.reset(bodies.capacity());
+void SoftStep::find_islands(const BodyView& bodies, const Touches& touches) {
+  islands_.reset(bodies.capacity);
   std::ranges::fill(marked_, std::uint8_t{0});
-  const ContactSet& set = cache_.current();
-  parallel_for(pool_, set.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+  const ContactView contacts = cache_.current().view();
+  parallel_for(pool_, contacts.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
-      const ContactKey& key = set.key(i);
-      if (bodies.movable(key.a) && bodies.movable(key.b) && touches(i)) {
+      const ContactKey& key = contacts.key(i);
+      if (bodies.movable(key.a) && bodies.movable(key.b) && touches(contacts, i)) {
         islands_.unite(key.a, key.b);
       }
     }
   });
   const auto carries = [&](std::uint32_t body) {
-    return !bodies.movable(body) && bodies.moving.awake[body] != 0;
+    return !bodies.movable(body) && bodies.awake[body] != 0;
   };
-  for (std::uint32_t i = 0; i < set.size(); ++i) {
-    const ContactKey& key = set.key(i);
-    if ((carries(key.a) || carries(key.b)) && touches(i)) {
+  for (std::uint32_t i = 0; i < contacts.size(); ++i) {
+    const ContactKey& key = contacts.key(i);
+    if ((carries(key.a) || carries(key.b)) && touches(contacts, i)) {
       marked_[islands_.find(carries(key.a) ? key.b : key.a)] = 1;
     }
   }
 }
 
 /// Wakes the islands that touch an awake body or a kinematic body in motion.
-void SoftStep::wake_touched(BodyStore* bodies) {
+void SoftStep::wake_touched(BodyStore* store) {
+  const BodyView bodies = store->view();
   const auto rests = [&](BodyId id) {
-    return bodies->movable(id.index) && bodies->moving.awake[id.index] == 0;
+    return bodies.movable(id.index) && bodies.awake[id.index] == 0;
   };
-  if (std::ranges::none_of(bodies->ids(), rests)) return;
-  find_islands(*bodies, [&](std::uint32_t contact) { return will_touch(*bodies, contact); });
-  for (const BodyId id : bodies->ids()) {
-    if (bodies->movable(id.index) && !rests(id)) marked_[islands_.find(id.index)] = 1;
+  if (std::ranges::none_of(store->ids(), rests)) return;
+  find_islands(bodies, [&](const ContactView& contacts, std::uint32_t contact) {
+    return soft_step::will_touch(bodies, contacts, contact);
+  });
+  for (const BodyId id : store->ids()) {
+    if (bodies.movable(id.index) && !rests(id)) marked_[islands_.find(id.index)] = 1;
   }
-  for (const BodyId id : bodies->ids()) {
-    if (rests(id) && marked_[islands_.find(id.index)] != 0) bodies->wake(id.index);
+  for (const BodyId id : store->ids()) {
+    if (rests(id) && marked_[islands_.find(id.index)] != 0) store->wake(id.index);
   }
 }
 
 /// Marks the bodies that have a contact in this step.
 void SoftStep::find_near() {
   assign_geometric(&near_, bodies_.size(), 0);
-  const ContactSet& set = cache_.current();
-  parallel_for(pool_, set.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+  const ContactView contacts = cache_.current().view();
+  parallel_for(pool_, contacts.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
-      for (const std::uint32_t body : {set.key(i).a, set.key(i).b}) {
+      for (const std::uint32_t body : {contacts.key(i).a, contacts.key(i).b}) {
         std::atomic_ref(near_[body]).store(1, std::memory_order_relaxed);
       }
     }
   });
 }
 
-void SoftStep::load_bodies(BodyStore* bodies) {
-  const std::span<const BodyId> ids = bodies->ids();
-  parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (const BodyId id : ids.subspan(first, last - first)) {
-      const std::uint32_t i = id.index;
-      const MotionArrays& moving = bodies->moving;
-      if (bodies->movable(i) && moving.awake[i] != 0) bodies->update_acceleration(i);
-      SolverBody& body = bodies_[i];
-      body = {};
-      body.velocity = moving.velocity[i];
-      body.angular_velocity = moving.angular_velocity[i];
-      body.inverse_mass = bodies->inverse_mass(i);
-      if (bodies->is_round(i)) body.inverse_inertia = moving.inverse_inertia[i](0, 0);
-      orientation_[i] = moving.orientation[i];
-    }
-  });
-}
-
-/// Starts a substep: applies accelerations, and, unless it is the first of the step, the contact
-/// impulses of the last substep again. A body without contacts moves by the mean of its velocities
-/// before and after, so that its path is an exact parabola; with contacts, the mean would contain a
-/// part of the acceleration that impulses have cancelled. Forces may depend on the position, and
-/// are constant in a step: they move the body as in the semi-implicit Euler method for the whole
-/// step, because a spring would gain energy otherwise.
-void SoftStep::accelerate(const BodyStore& bodies, bool is_first) {
-  const Real half_step = constants_.h * bodies.dt() * Real(0.5);
+/// Calls stage(index) for all bodies.
+template <class Stage>
+void SoftStep::for_each_body(const BodyStore& bodies, const Stage& stage) {
   const std::span<const BodyId> ids = bodies.ids();
   parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (const BodyId id : ids.subspan(first, last - first)) {
-      const std::uint32_t i = id.index;
-      if (!bodies.movable(i) || bodies.moving.awake[i] == 0) continue;
-      SolverBody& body = bodies_[i];
-      Vec3 velocity = body.velocity, angular_velocity = body.angular_velocity;
-      bodies.accelerate(i, orientation_[i], &velocity, &angular_velocity);
-      if (near_[i] == 0) {
-        body.shift = add_scaled(body.shift, body.velocity - velocity, constants_.h * Real(0.5));
-        if (!(bodies.moving.force[i] == Vec3{})) {
-          body.shift = add_scaled(body.shift, bodies.moving.last_acceleration[i], half_step);
-        }
-      }
-      const Vec3 gained = is_first ? Vec3{} : body.velocity - free_velocity_[i];
-      const Vec3 spun = is_first ? Vec3{} : body.angular_velocity - free_angular_velocity_[i];
-      free_velocity_[i] = velocity;
-      free_angular_velocity_[i] = angular_velocity;
-      body.velocity = velocity + gained;
-      body.angular_velocity = angular_velocity + spun;
-    }
+    for (const BodyId id : ids.subspan(first, last - first)) stage(id.index);
   });
-}
-
-/// Ends a substep: integrates the velocities of all bodies that move.
-void SoftStep::move(const BodyStore& bodies) {
-  const std::span<const BodyId> ids = bodies.ids();
-  parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (const BodyId id : ids.subspan(first, last - first)) {
-      const std::uint32_t i = id.index;
-      if (bodies.moving.awake[i] == 0) continue;
-      SolverBody& body = bodies_[i];
-      body.shift = add_scaled(body.shift, body.velocity, constants_.h);
-      body.rotation = add_scaled(body.rotation, body.angular_velocity, constants_.h);
-      // After an overflow it is zero, and remains so until the step is undone.
-      Quat& orientation = orientation_[i];
-      if (orientation == Quat{0, 0, 0, 0}) continue;
-      orientation =
-          detail::integrated_orientation(orientation, body.angular_velocity, constants_.h);
-    }
-  });
-}
-
-/// State of an awake body at the end of the step.
-BodyState SoftStep::state(const BodyStore& bodies, std::uint32_t i) const {
-  return {bodies.moving.position[i] + bodies_[i].shift, orientation_[i], bodies_[i].velocity,
-          bodies_[i].angular_velocity};
 }
 
 std::optional<BodyId> SoftStep::find_runaway(const BodyStore& bodies) {
-  const std::span<const BodyId> ids = bodies.ids();
-  std::atomic<std::size_t> found{ids.size()};
-  parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      const std::uint32_t body = ids[i].index;
-      if (bodies.moving.awake[body] == 0 || is_in_world(state(bodies, body))) continue;
-      std::size_t lowest = found.load();
-      while (i < lowest && !found.compare_exchange_weak(lowest, i)) {
-      }
-      return;
+  constexpr std::uint32_t kNone = 0xffffffffu;
+  std::atomic<std::uint32_t> found{kNone};
+  for_each_body(bodies, [&](std::uint32_t i) {
+    if (bodies.moving.awake[i] == 0 || is_in_world(step_.state(i))) return;
+    std::uint32_t lowest = found.load();
+    while (i < lowest && !found.compare_exchange_weak(lowest, i)) {
     }
   });
-  return found < ids.size() ? std::optional(ids[found]) : std::nullopt;
+  return found == kNone ? std::nullopt : std::optional(bodies.id(found));
 }
 
 /// @returns whether a body has been slow for long enough to sleep
-bool SoftStep::store_bodies(BodyStore* bodies) {
-  const std::span<const BodyId> ids = bodies->ids();
+bool SoftStep::store_bodies(const BodyStore& bodies) {
   std::atomic<bool> any_rests{false};
-  parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (const BodyId id : ids.subspan(first, last - first)) {
-      const std::uint32_t i = id.index;
-      MotionArrays& moving = bodies->moving;
-      if (moving.awake[i] != 0) {
-        bodies->end_step(i, state(*bodies, i));
-        const bool is_driven = !(moving.force[i] == Vec3{} && moving.torque[i] == Vec3{});
-        if (bodies->movable(i)) {
-          bodies->update_rest_time(i, is_driven);
-          if (bodies->is_at_rest(i)) any_rests.store(true, std::memory_order_relaxed);
-        }
-      }
-      moving.force[i] = moving.torque[i] = {};
-    }
+  for_each_body(bodies, [&](std::uint32_t i) {
+    if (step_.store(i)) any_rests.store(true, std::memory_order_relaxed);
   });
   return any_rests;
 }
 
 /// Islands whose bodies have all been slow for long enough fall asleep.
-void SoftStep::put_islands_to_sleep(BodyStore* bodies) {
+void SoftStep::put_islands_to_sleep(const BodyStore& store) {
+  const BodyView bodies = store.view();
   const auto is_awake = [&](BodyId id) {
-    return bodies->movable(id.index) && bodies->moving.awake[id.index] != 0;
+    return bodies.movable(id.index) && bodies.awake[id.index] != 0;
   };
-  find_islands(*bodies, [this](std::uint32_t contact) {
-    return any_point(contact,
-                     [](Real distance, Real impulse) { return distance <= 0 || impulse > 0; });
-  });
-  for (const BodyId id : bodies->ids()) {
-    if (is_awake(id) && !bodies->is_at_rest(id.index)) marked_[islands_.find(id.index)] = 1;
+  find_islands(bodies, soft_step::has_touched);
+  for (const BodyId id : store.ids()) {
+    if (is_awake(id) && !bodies.is_at_rest(id.index)) marked_[islands_.find(id.index)] = 1;
   }
-  for (const BodyId id : bodies->ids()) {
-    if (is_awake(id) && marked_[islands_.find(id.index)] == 0) bodies->put_to_sleep(id.index);
+  for (const BodyId id : store.ids()) {
+    if (is_awake(id) && marked_[islands_.find(id.index)] == 0) step_.motion.put_to_sleep(id.index);
   }
 }
 
@@ -279,33 +175,43 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
   cache_.match(bodies->inverse_masses(), pool_);
   wake_touched(bodies);
   find_near();
-  load_bodies(bodies);
-  const soft_step::BodyProperties properties{
-      .inverse_inertia = bodies->moving.inverse_inertia,
-      .acceleration = bodies->moving.last_acceleration,
-      .radius = bodies->radii(),
-      .awake = bodies->moving.awake,
-      .friction = bodies->frictions(),
-      .restitution = bodies->restitutions(),
-      .rolling_friction = bodies->rolling_frictions(),
-      .spinning_friction = bodies->spinning_frictions(),
-      .rules = materials_,
-      .restitution_threshold = settings_.restitution_threshold};
-  solver_.build(cache_.current(), properties, constants_, bodies_);
+  step_ = {.bodies = bodies->view(),
+           .motion = bodies->motion_pointers(),
+           .solver = bodies_.data(),
+           .orientation = orientation_.data(),
+           .free_velocity = free_velocity_.data(),
+           .free_angular_velocity = free_angular_velocity_.data(),
+           .near = near_.data(),
+           .h = constants_.h};
+  for_each_body(*bodies, [this](std::uint32_t i) { step_.load(i); });
+  const BodyView& view = step_.bodies;
+  solver_.build({.contacts = cache_.current().view(),
+                 .properties = {.inverse_inertia = view.inverse_inertia,
+                                .acceleration = view.last_acceleration,
+                                .radius = view.radius,
+                                .awake = view.awake,
+                                .friction = view.friction,
+                                .restitution = view.restitution,
+                                .rolling_friction = view.rolling_friction,
+                                .spinning_friction = view.spinning_friction,
+                                .rules = materials_,
+                                .restitution_threshold = settings_.restitution_threshold},
+                 .start = bodies_.data()},
+                constants_);
   for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
-    accelerate(*bodies, substep == 0);
+    for_each_body(*bodies, [&](std::uint32_t i) { step_.accelerate(i, substep == 0); });
     if (substep == 0) solver_.warm_start(bodies_);
     solver_.solve(bodies_, true);
-    move(*bodies);
+    for_each_body(*bodies, [this](std::uint32_t i) { step_.move(i); });
     solver_.solve(bodies_, false);
   }
   solver_.restitute(bodies_);
-  solver_.store(&cache_.current());
+  solver_.store();
   return find_runaway(*bodies);
 }
 
 void SoftStep::commit(BodyStore* bodies) noexcept {
-  if (store_bodies(bodies)) put_islands_to_sleep(bodies);
+  if (store_bodies(*bodies)) put_islands_to_sleep(*bodies);
   cache_.commit();
 }
 

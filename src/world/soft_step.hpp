@@ -8,6 +8,7 @@
 #include "src/contact_solver/cpu/soft_step_solver.hpp"
 #include "src/world/body_store.hpp"
 #include "src/world/islands.hpp"
+#include "src/world/soft_step_stages.hpp"
 
 #include <optional>
 
@@ -40,21 +41,16 @@ class SoftStep {
   void forget(std::uint32_t body) noexcept { cache_.forget(body); }
 
  private:
-  template <class Condition>
-  bool any_point(std::uint32_t contact, const Condition& condition) const;
-  bool will_touch(const BodyStore& bodies, std::uint32_t contact) const;
-  template <class Touches>
-  void find_islands(const BodyStore& bodies, const Touches& touches);
   void prepare(const BodyStore& bodies);
-  void find_near();
+  template <class Touches>
+  void find_islands(const BodyView& bodies, const Touches& touches);
   void wake_touched(BodyStore* bodies);
-  void load_bodies(BodyStore* bodies);
-  void accelerate(const BodyStore& bodies, bool is_first);
-  void move(const BodyStore& bodies);
-  BodyState state(const BodyStore& bodies, std::uint32_t body) const;
+  void find_near();
+  template <class Stage>
+  void for_each_body(const BodyStore& bodies, const Stage& stage);
   std::optional<BodyId> find_runaway(const BodyStore& bodies);
-  bool store_bodies(BodyStore* bodies);
-  void put_islands_to_sleep(BodyStore* bodies);
+  bool store_bodies(const BodyStore& bodies);
+  void put_islands_to_sleep(const BodyStore& bodies);
 
   soft_step::StepConstants constants_;
   SoftStepSettings settings_;
@@ -64,6 +60,7 @@ class SoftStep {
   soft_step::SoftStepSolver solver_{pool_};
   Islands islands_;
 
+  soft_step::StepBodies step_;  ///< of the arrays below and the bodies, during a step
   std::vector<soft_step::SolverBody> bodies_;  ///< by body
   std::vector<Quat> orientation_;              ///< by body, during the step
   std::vector<Vec3> free_velocity_;            ///< by body: after the accelerations of a substep

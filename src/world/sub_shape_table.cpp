@@ -72,10 +72,6 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
     }
     if (movable) fixed_begin_ = size();
   }
-  for (SubShape sub_shape = fixed_begin_; sub_shape < size(); ++sub_shape) {
-    update_pose(bodies, sub_shape);
-    if (bodies.kinematic(body_[sub_shape])) kinematic_.push_back(sub_shape);
-  }
   for (const BodyId id : bodies.ids()) {
     const Shape& shape = bodies.shape(id.index);
     if (const auto* half_space = std::get_if<HalfSpace>(&shape)) {
@@ -88,29 +84,34 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
     body_.push_back(id.index);
     number_.push_back(0);
   }
-}
-
-void SubShapeTable::update_poses(const BodyStore& bodies, ThreadPool* pool) {
-  parallel_for(pool, fixed_begin_, 1024, [&](std::size_t first, std::size_t last) {
-    for (auto i = static_cast<SubShape>(first); i < last; ++i) update_pose(bodies, i);
-  });
-  for (const SubShape sub_shape : kinematic_) update_pose(bodies, sub_shape);
-}
-
-void SubShapeTable::update_pose(const BodyStore& bodies, SubShape sub_shape) {
-  const std::uint32_t body = body_[sub_shape];
-  const Vec3& position = bodies.moving.position[body];
-  SphereInstance& bounds = bounds_[sub_shape];
-  bounds.centre = position;
-  if (is_sphere(sub_shape) && part_[sub_shape] == 0) return;
-  Transform pose = make_transform(bodies.moving.orientation[body], position);
-  if (part_[sub_shape] != 0) {
-    const Transform& local = local_[part_[sub_shape] - 1];
-    bounds.centre = transform_point(pose, local.origin);
-    if (is_sphere(sub_shape)) return;
-    pose = {pose.basis * local.basis, bounds.centre};
+  const SubShapeView all = view();
+  for (SubShape sub_shape = fixed_begin_; sub_shape < bounded_size(); ++sub_shape) {
+    all.update_pose(bodies.view(), sub_shape);
+    if (bodies.kinematic(body_[sub_shape])) kinematic_.push_back(sub_shape);
   }
-  boxes_[sub_shape - sphere_count_].pose = pose;
+}
+
+SubShapeView SubShapeTable::view() {
+  return {.sphere_count = sphere_count_,
+          .fixed_begin = fixed_begin_,
+          .bounded_count = bounded_size(),
+          .count = size(),
+          .bodies = body_.data(),
+          .numbers = number_.data(),
+          .all_bounds = bounds_.data(),
+          .boxes = boxes_.data(),
+          .walls = walls_.data(),
+          .parts = part_.data(),
+          .local = local_.data()};
+}
+
+void SubShapeTable::update_poses(const BodyStore& store, ThreadPool* pool) {
+  const SubShapeView all = view();
+  const BodyView bodies = store.view();
+  parallel_for(pool, fixed_begin_, 1024, [&](std::size_t first, std::size_t last) {
+    for (auto i = static_cast<SubShape>(first); i < last; ++i) all.update_pose(bodies, i);
+  });
+  for (const SubShape sub_shape : kinematic_) all.update_pose(bodies, sub_shape);
 }
 
 }  // namespace JFPX_ABI

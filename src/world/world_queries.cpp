@@ -96,10 +96,6 @@ bool touch(const SphereInstance& sphere, const Wall& wall, const Transform&) {
   return collide(sphere, wall).touching;
 }
 
-struct PosedBox {
-  Box box;
-  Transform pose;
-};
 bool touch(const PosedBox& box, const Sphere& sphere, const Transform& pose) {
   return collide(SphereInstance{pose.origin, sphere.radius}, box.box, box.pose).touching;
 }

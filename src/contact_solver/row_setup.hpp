@@ -1,0 +1,201 @@
+/// Rows of a soft step: what the contacts of a step become, and what they keep of it.
+#pragma once
+
+#include <jfpx/material.hpp>
+
+#include "src/contact_solver/contact_basis.hpp"
+#include "src/contact_solver/contact_set.hpp"
+#include "src/contact_solver/greedy_coloring.hpp"
+#include "src/contact_solver/manifold_row.hpp"
+#include "src/contact_solver/sphere_row.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Properties of the bodies at the start of a step, as arrays by body.
+struct BodyProperties {
+  const Mat3* inverse_inertia = nullptr;  ///< [1/(kg m^2)], world axes
+  const Vec3* acceleration = nullptr;     ///< [m/s^2], of this step
+  const Real* radius = nullptr;           ///< [m]; 0: not a sphere
+  const std::uint8_t* awake = nullptr;    ///< of an immovable body: 0; kinematic: 1 if it moves
+  const Real *friction = nullptr, *restitution = nullptr;
+  const Real *rolling_friction = nullptr, *spinning_friction = nullptr;  ///< [m]
+  MaterialSettings rules;
+  Real restitution_threshold = 0;  ///< [m/s]
+};
+
+enum class RowKind : std::uint8_t { none, sphere, manifold };
+
+/// Groups of rows: without a color, the colors, with a fixed body.
+inline constexpr std::uint32_t kGroups = kColors + 2u, kFixedGroup = kGroups - 1;
+
+/// Makes rows of contacts. A row has the bodies of its contact in the order of a movable body a.
+struct RowSetup {
+  ContactView contacts;
+  BodyProperties properties;
+  const SolverBody* start = nullptr;  ///< by body, before the accelerations of the step
+
+  /// Whether body b of a contact becomes body a of its row, which must be movable.
+  JFPX_HD bool is_flipped(const ContactKey& key) const { return !is_movable(key.a); }
+
+  /// `none` for a contact without an awake movable body.
+  JFPX_HD RowKind kind_of(std::uint32_t contact) const {
+    const ContactKey& key = contacts.key(contact);
+    // A body that is still asleep is near, but does not touch: the contact has no effect.
+    const bool a_rests = is_movable(key.a) && !is_active(key.a);
+    const bool b_rests = is_movable(key.b) && !is_active(key.b);
+    if (a_rests || b_rests || (!is_active(key.a) && !is_active(key.b))) return RowKind::none;
+    // The arms of a generated contact are not multiples of the normal.
+    if (contacts.impulse_count(contact) != 1 || key.is_generated()) return RowKind::manifold;
+    if (rolls(key.a) || rolls(key.b)) return RowKind::manifold;
+    return is_round_or_fixed(key.a) && is_round_or_fixed(key.b) ? RowKind::sphere
+                                                                : RowKind::manifold;
+  }
+
+  JFPX_HD std::uint32_t group_of(std::uint32_t contact) const {
+    const std::uint8_t color = contacts.colors[contact];
+    if (color == kFixedColor) return kFixedGroup;
+    return color == kOverflowColor ? 0 : 1u + color;
+  }
+
+  /// Speed of separation after an impact, or 0. The speed of the impact is that at the start of the
+  /// step and what the bodies gain on the way, because impulses end the motion in the middle of a
+  /// step.
+  /// @param velocity of a's point relative to b's, at the start of the step
+  JFPX_HD Real rebound_speed(const Vec3& velocity, const Vec3& normal, Real distance,
+                             std::uint32_t a, std::uint32_t b, Real restitution) const {
+    if (!(restitution > 0)) return 0;
+    const Real closing = -dot(velocity, normal);
+    if (!(closing > 0)) return 0;
+    const auto acceleration = [this](std::uint32_t body) {
+      return start[body].inverse_mass > 0 ? properties.acceleration[body] : Vec3{};
+    };
+    const Real gap = distance > 0 ? distance : Real(0);
+    const Real gained = -2 * gap * dot(acceleration(a) - acceleration(b), normal);
+    const Real square = closing * closing + gained;
+    const Real speed = square > 0 ? square_root(square) : Real(0);
+    return speed > properties.restitution_threshold ? restitution * speed : Real(0);
+  }
+
+  template <bool kFixed>
+  JFPX_HD void fill(SphereRow* row, std::uint32_t contact) const {
+    const ContactKey& key = contacts.key(contact);
+    const bool flipped = is_flipped(key);
+    const Real distance = contacts.distance(contact, 0);
+    const Vec3& normal = contacts.normal(contact);
+    const KeptImpulse& kept = contacts.impulses[contacts.first_impulse(contact)];
+    row->a = flipped ? key.b : key.a;
+    row->b = flipped ? key.a : key.b;
+    row->normal = flipped ? -normal : normal;
+    row->distance = distance;
+    // Penetrating spheres share the middle of the overlap, so that angular momentum is conserved.
+    const Real half_overlap = distance < 0 ? distance * Real(0.5) : Real(0);
+    row->arm_a = properties.radius[row->a] + half_overlap;
+    row->arm_b = kFixed ? Real(0) : properties.radius[row->b] + half_overlap;
+    row->friction = combined(properties.rules.friction, properties.friction[row->a],
+                             properties.friction[row->b]);
+    row->friction_impulse = flipped ? -kept.friction : kept.friction;
+    row->normal_impulse = kept.normal;
+    row->peak_impulse = 0;
+    const SolverBody &a = start[row->a], &b = start[row->b];
+    set_masses<kFixed>(row, a, b);
+    const Real restitution = combined(properties.rules.restitution, properties.restitution[row->a],
+                                      properties.restitution[row->b]);
+    row->rebound = rebound_speed(relative_velocity<kFixed>(*row, a, b), row->normal, distance,
+                                 row->a, row->b, restitution);
+  }
+
+  template <bool kFixed>
+  JFPX_HD void fill(ManifoldRow* row, PointRow* points, std::uint32_t contact) const {
+    const ContactKey& key = contacts.key(contact);
+    const bool flipped = is_flipped(key);
+    const Vec3& normal = contacts.normal(contact);
+    row->a = flipped ? key.b : key.a;
+    row->b = flipped ? key.a : key.b;
+    row->count = contacts.impulse_count(contact);
+    const detail::ContactBasis basis = detail::contact_basis(flipped ? -normal : normal);
+    row->normal = basis.normal;
+    row->tangent = basis.tangent;
+    row->bitangent = basis.bitangent;
+    const Vec3& rolling = contacts.rolling_impulses[contact];
+    row->rolling_impulse = flipped ? -rolling : rolling;
+    Real restitution = 0;
+    if (key.is_generated()) {
+      row->friction = contacts.manifold(contact).friction;
+      row->rolling_friction = row->spinning_friction = 0;
+      restitution = contacts.manifold(contact).restitution;
+    } else {
+      row->friction = combined(properties.rules.friction, properties.friction[row->a],
+                               properties.friction[row->b]);
+      row->rolling_friction =
+          std::max(properties.rolling_friction[row->a], properties.rolling_friction[row->b]);
+      row->spinning_friction =
+          std::max(properties.spinning_friction[row->a], properties.spinning_friction[row->b]);
+      restitution = combined(properties.rules.restitution, properties.restitution[row->a],
+                             properties.restitution[row->b]);
+    }
+    const SolverBody &start_a = start[row->a], &start_b = start[row->b];
+    for (std::uint32_t i = 0; i < row->count; ++i) {
+      PointRow& p = points[i];
+      p.distance = contacts.distance(contact, i);
+      if (contacts.is_sphere(contact)) {
+        const Real half_overlap = p.distance < 0 ? p.distance * Real(0.5) : Real(0);
+        p.arm_a = -row->normal * (properties.radius[row->a] + half_overlap);
+        p.arm_b = row->normal * (properties.radius[row->b] + half_overlap);
+      } else {
+        const PointInput& point = contacts.points[contacts.manifold(contact).first + i];
+        p.arm_a = flipped ? point.arm_b : point.arm_a;
+        p.arm_b = flipped ? point.arm_a : point.arm_b;
+      }
+      const KeptImpulse& kept = contacts.impulses[contacts.first_impulse(contact) + i];
+      const Vec3 friction = flipped ? -kept.friction : kept.friction;
+      p.normal_impulse = kept.normal;
+      p.friction_x = dot(friction, row->tangent);
+      p.friction_y = dot(friction, row->bitangent);
+      p.peak_impulse = 0;
+      SolverBody a = start_a, b = start_b;
+      const BodyPair pair{&a, &b, &properties.inverse_inertia[row->a],
+                          &properties.inverse_inertia[row->b]};
+      set_masses<kFixed>(*row, &p, pair);
+      p.rebound = rebound_speed(relative_velocity(pair, p.arm_a, p.arm_b), row->normal, p.distance,
+                                row->a, row->b, restitution);
+    }
+  }
+
+  /// Writes the impulses of a row to its contact.
+  JFPX_HD void store(const SphereRow& row, std::uint32_t contact) const {
+    const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
+    contacts.impulses[contacts.first_impulse(contact)] = {row.friction_impulse * side,
+                                                          row.normal_impulse};
+  }
+  JFPX_HD void store(const ManifoldRow& row, const PointRow* points, std::uint32_t contact) const {
+    const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
+    contacts.rolling_impulses[contact] = row.rolling_impulse * side;
+    for (std::uint32_t p = 0; p < row.count; ++p) {
+      const Vec3 friction =
+          row.tangent * points[p].friction_x + row.bitangent * points[p].friction_y;
+      contacts.impulses[contacts.first_impulse(contact) + p] = {friction * side,
+                                                                points[p].normal_impulse};
+    }
+  }
+
+ private:
+  JFPX_HD bool is_movable(std::uint32_t body) const { return start[body].inverse_mass > 0; }
+  JFPX_HD bool is_active(std::uint32_t body) const {
+    return is_movable(body) && properties.awake[body] != 0;
+  }
+  JFPX_HD bool rolls(std::uint32_t body) const {
+    return properties.rolling_friction[body] > 0 || properties.spinning_friction[body] > 0;
+  }
+  /// Of a body: a movable sphere with the same inertia about every axis, or not in motion.
+  JFPX_HD bool is_round_or_fixed(std::uint32_t body) const {
+    return is_movable(body) ? start[body].inverse_inertia > 0 : properties.awake[body] == 0;
+  }
+};
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,118 @@
+/// The stages of a soft step for one body or one contact, for the processor and for devices.
+#pragma once
+
+#include "src/contact_solver/contact_set.hpp"
+#include "src/contact_solver/step_constants.hpp"
+#include "src/world/body_view.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Whether the bodies of a contact touch, or meet during the step at their velocities.
+JFPX_HD inline bool will_touch(const BodyView& bodies, const ContactView& contacts,
+                               std::uint32_t contact) {
+  const ContactKey& key = contacts.key(contact);
+  const Vec3 motion = bodies.predicted_motion(key.a) - bodies.predicted_motion(key.b);
+  const Real opening = dot(motion, contacts.normal(contact));
+  return contacts.any_point(contact, [opening](Real distance, Real impulse) {
+    return distance <= 0 || distance + opening <= 0 || impulse > 0;
+  });
+}
+
+/// Whether the bodies of a contact touched, or pushed each other, during the step.
+JFPX_HD inline bool has_touched(const ContactView& contacts, std::uint32_t contact) {
+  return contacts.any_point(
+      contact, [](Real distance, Real impulse) { return distance <= 0 || impulse > 0; });
+}
+
+/// The bodies of a step, as arrays by body.
+struct StepBodies {
+  BodyView bodies;
+  MotionPointers motion;  ///< of the same bodies
+  SolverBody* solver = nullptr;
+  Quat* orientation = nullptr;    ///< during the step
+  Vec3* free_velocity = nullptr;  ///< after the accelerations of a substep
+  Vec3* free_angular_velocity = nullptr;
+  const std::uint8_t* near = nullptr;  ///< 1 if the body has a contact
+  Real h = 0;                          ///< [s], length of a substep
+
+  /// Starts the step.
+  JFPX_HD void load(std::uint32_t i) const {
+    if (bodies.movable(i) && bodies.awake[i] != 0) {
+      motion.last_acceleration[i] = bodies.acceleration_of_step(i);
+    }
+    SolverBody body;
+    body.velocity = bodies.velocity[i];
+    body.angular_velocity = bodies.angular_velocity[i];
+    body.inverse_mass = bodies.inverse_mass[i];
+    if (bodies.is_round(i)) body.inverse_inertia = bodies.inverse_inertia[i](0, 0);
+    solver[i] = body;
+    orientation[i] = bodies.orientation[i];
+  }
+
+  /// Starts a substep: applies accelerations, and, unless it is the first of the step, the contact
+  /// impulses of the last substep again. A body without contacts moves by the mean of its
+  /// velocities before and after, so that its path is an exact parabola; with contacts, the mean
+  /// would contain a part of the acceleration that impulses have cancelled. Forces may depend on
+  /// the position, and are constant in a step: they move the body as in the semi-implicit Euler
+  /// method for the whole step, because a spring would gain energy otherwise.
+  JFPX_HD void accelerate(std::uint32_t i, bool is_first) const {
+    if (!bodies.movable(i) || bodies.awake[i] == 0) return;
+    SolverBody body = solver[i];
+    Vec3 velocity = body.velocity, angular_velocity = body.angular_velocity;
+    bodies.accelerate(i, orientation[i], &velocity, &angular_velocity);
+    if (near[i] == 0) {
+      body.shift = add_scaled(body.shift, body.velocity - velocity, h * Real(0.5));
+      if (!(bodies.force[i] == Vec3{})) {
+        const Real half_step = h * bodies.dt * Real(0.5);
+        body.shift = add_scaled(body.shift, bodies.last_acceleration[i], half_step);
+      }
+    }
+    const Vec3 gained = is_first ? Vec3{} : body.velocity - free_velocity[i];
+    const Vec3 spun = is_first ? Vec3{} : body.angular_velocity - free_angular_velocity[i];
+    free_velocity[i] = velocity;
+    free_angular_velocity[i] = angular_velocity;
+    body.velocity = velocity + gained;
+    body.angular_velocity = angular_velocity + spun;
+    solver[i] = body;
+  }
+
+  /// Ends a substep: integrates the velocities of a body that moves.
+  JFPX_HD void move(std::uint32_t i) const {
+    if (bodies.awake[i] == 0) return;
+    SolverBody& body = solver[i];
+    body.shift = add_scaled(body.shift, body.velocity, h);
+    body.rotation = add_scaled(body.rotation, body.angular_velocity, h);
+    // After an overflow it is zero, and remains so until the step is undone.
+    if (orientation[i] == Quat{0, 0, 0, 0}) return;
+    orientation[i] = detail::integrated_orientation(orientation[i], body.angular_velocity, h);
+  }
+
+  /// State of an awake body at the end of the step.
+  JFPX_HD BodyState state(std::uint32_t i) const {
+    return {bodies.position[i] + solver[i].shift, orientation[i], solver[i].velocity,
+            solver[i].angular_velocity};
+  }
+
+  /// Ends the step. @returns whether the body has been slow for long enough to sleep
+  JFPX_HD bool store(std::uint32_t i) const {
+    bool rests = false;
+    if (bodies.awake[i] != 0) {
+      motion.end_step(bodies, i, state(i));
+      if (bodies.movable(i)) {
+        const bool is_driven = !(bodies.force[i] == Vec3{} && bodies.torque[i] == Vec3{});
+        motion.update_rest_time(bodies, i, is_driven);
+        rests = bodies.is_at_rest(i);
+      }
+    }
+    motion.force[i] = motion.torque[i] = {};
+    return rests;
+  }
+};
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx
