@@ -307,6 +307,7 @@ class JFPX_API World {
   std::function<void(ContactContext&)>& any_generator(ContactGeneratorId id);
 
   struct Impl;
+  friend struct WorldAccess;
   std::unique_ptr<Impl> impl_;
 };
 

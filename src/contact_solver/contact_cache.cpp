@@ -59,7 +59,7 @@ void ContactCache::match(std::span<const Real> inverse_mass, ThreadPool* pool) {
     if (!(inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0)) {
       now.colors[i] = kFixedColor;
     } else {
-      coloring_.add(key, &now.colors[i]);
+      coloring_.add(key, i, &now.colors[i]);
     }
   }
   coloring_.finish();

@@ -19,6 +19,7 @@ class ContactCache {
   ContactSet& current() { return current_; }
   const ContactSet& current() const { return current_; }
   /// Contacts of the last completed step.
+  ContactSet& last() { return last_; }
   const ContactSet& last() const { return last_; }
 
   /// Gives each contact the impulses and the color that the same contact had in the last step, and

@@ -4,7 +4,6 @@
 #include "src/base/reserve.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <tuple>
 
 namespace jfpx {
@@ -15,18 +14,18 @@ void GreedyColoring::start(std::size_t bodies) {
   uncolored_.clear();
 }
 
-void GreedyColoring::add(const ContactKey& key, std::uint8_t* color) {
-  uncolored_.push_back({color_order(key), key, color});
+void GreedyColoring::add(const ContactKey& key, std::uint32_t contact, std::uint8_t* color) {
+  uncolored_.push_back({color_order(key), contact, key.a, key.b, color});
 }
 
 void GreedyColoring::finish() {
   std::ranges::sort(uncolored_, [](const Uncolored& x, const Uncolored& y) {
-    return std::tie(x.hash, x.key) < std::tie(y.hash, y.key);
+    return std::tie(x.order, x.contact) < std::tie(y.order, y.contact);
   });
   for (const Uncolored& contact : uncolored_) {
-    std::uint64_t &a = used_[contact.key.a], &b = used_[contact.key.b];
-    const int color = std::countr_one(a | b);
-    *contact.color = static_cast<std::uint8_t>(color);
+    std::uint64_t &a = used_[contact.a], &b = used_[contact.b];
+    const std::uint8_t color = lowest_free_color(a | b);
+    *contact.color = color;
     if (color == kOverflowColor) continue;
     a |= std::uint64_t{1} << color;
     b |= std::uint64_t{1} << color;

@@ -26,11 +26,18 @@ JFPX_HD constexpr std::uint64_t mixed(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// Place of a contact in the order of coloring; equal values are ordered by key.
+/// Place of a contact in the order of coloring; equal values are ordered by number of contact.
 JFPX_HD constexpr std::uint64_t color_order(const ContactKey& key) {
   const std::uint64_t bodies = std::uint64_t{key.a} << 32 | key.b;
   const std::uint64_t parts = std::uint64_t{key.part_a} << 32 | key.part_b;
   return mixed(mixed(bodies + 0x9e3779b97f4a7c15u) ^ parts);
+}
+
+/// The lowest color that is not in a set of colors; kOverflowColor if all are.
+JFPX_HD constexpr std::uint8_t lowest_free_color(std::uint64_t used) {
+  std::uint8_t color = 0;
+  while (color < kColors && (used >> color & 1) != 0) ++color;
+  return color;
 }
 
 /// Assigns the lowest color that neither body has to each new contact, in the order of a hash of
@@ -48,14 +55,15 @@ class GreedyColoring {
     std::atomic_ref(used_[a]).fetch_or(bit, std::memory_order_relaxed);
     std::atomic_ref(used_[b]).fetch_or(bit, std::memory_order_relaxed);
   }
-  /// @param color receives the color in finish()
-  void add(const ContactKey& key, std::uint8_t* color);
+  /// @param contact number of the contact
+  /// @param color   receives the color in finish()
+  void add(const ContactKey& key, std::uint32_t contact, std::uint8_t* color);
   void finish();
 
  private:
   struct Uncolored {
-    std::uint64_t hash;
-    ContactKey key;
+    std::uint64_t order;
+    std::uint32_t contact, a, b;
     std::uint8_t* color;
   };
   std::vector<std::uint64_t> used_;  ///< by body: the set of its colors

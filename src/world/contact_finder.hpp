@@ -46,6 +46,7 @@ class ContactFinder {
   std::uint64_t find_near_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
                                    soft_step::ContactSet* near, std::vector<Contact>* touching);
 
+  SubShapeTable& sub_shapes() noexcept { return sub_shapes_; }
   const SphereCollider& collider() const noexcept { return broad_phase_.collider(); }
 
  private:

@@ -29,6 +29,8 @@ class SoftStep {
 
   /// Contacts of the current step, for ContactFinder::find_near_contacts().
   soft_step::ContactSet& contacts() { return cache_.current(); }
+  /// Contacts of the last completed step, with their impulses and colors.
+  soft_step::ContactSet& last_contacts() { return cache_.last(); }
   /// Adds the contacts of contact generators.
   void add_generated(const BodyStore& bodies, std::span<const Contact> generated);
   /// Computes the motion of the step. Wakes bodies and updates accelerations. Forces must have been

@@ -5,6 +5,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/contact_events.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_finder.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_resolver.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/device_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces.cpp
   ${CMAKE_CURRENT_LIST_DIR}/ignored_pairs.cpp
@@ -24,5 +25,8 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/wake_propagation.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_access.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/world_on_device.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_properties.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_queries.cpp)
+list(APPEND JFPX_CUDA_SOURCES
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/world_cuda.cu)

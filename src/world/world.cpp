@@ -27,26 +27,10 @@ double elapsed_ms(Clock::time_point since, Clock::time_point until) {
 /// undo() restores. Used in an error message only.
 constexpr std::size_t kBytesPerBody = 1280;
 
-void combine_materials(const BodyStore& bodies, const MaterialSettings& rules, ThreadPool* pool,
-                       std::vector<Contact>* contacts) {
-  parallel_for(pool, contacts->size(), 1024, [&](std::size_t first, std::size_t last) {
-    for (Contact& c : std::span(*contacts).subspan(first, last - first)) {
-      const std::uint32_t a = c.a.index, b = c.b.index;
-      c.friction = combined(rules.friction, bodies.friction(a), bodies.friction(b));
-      c.restitution = combined(rules.restitution, bodies.restitution(a), bodies.restitution(b));
-    }
-  });
-}
-
-void mark_sensors(const BodyStore& bodies, std::vector<Contact>* contacts) {
-  if (!bodies.has_sensors()) return;
-  for (Contact& c : *contacts) c.sensor = bodies.sensor(c.a.index) || bodies.sensor(c.b.index);
-}
-
 /// The first body that is_in_world() refuses.
-std::optional<BodyId> find_runaway(const BodyStore& bodies) {
-  for (const BodyId id : bodies.ids()) {
-    if (!is_in_world(bodies.state(id.index))) return id;
+std::optional<BodyId> find_runaway(const BodyStore& store) {
+  for (const BodyId id : store.ids()) {
+    if (!is_in_world(store.state(id.index))) return id;
   }
   return std::nullopt;
 }
@@ -55,7 +39,7 @@ std::optional<BodyId> find_runaway(const BodyStore& bodies) {
 
 /// The contacts that wake bodies and are resolved: all but those of sensors, in the same order.
 std::span<const Contact> World::Impl::contacts_to_resolve() {
-  if (!bodies.has_sensors()) return contacts;
+  if (!store.has_sensors()) return contacts;
   resolved.clear();
   std::ranges::copy_if(contacts, std::back_inserter(resolved), std::logical_not(),
                        &Contact::sensor);
@@ -69,9 +53,22 @@ bool World::Impl::all_finite(const std::optional<BodyId>& runaway, StepReport* r
   return !runaway;
 }
 
+/// Sets the fields of detected contacts that follow from the properties of their bodies.
+void World::Impl::finish_contacts(std::vector<Contact>* list) const {
+  const MaterialSettings& rules = scene.materials;
+  parallel_for(pool.get(), list->size(), 1024, [&](std::size_t first, std::size_t last) {
+    for (Contact& c : std::span(*list).subspan(first, last - first)) {
+      const std::uint32_t a = c.a.index, b = c.b.index;
+      c.friction = combined(rules.friction, store.friction(a), store.friction(b));
+      c.restitution = combined(rules.restitution, store.restitution(a), store.restitution(b));
+      c.sensor = store.sensor(a) || store.sensor(b);
+    }
+  });
+}
+
 /// Detects the contacts of the current poses and calls the contact generators.
 void World::Impl::find_contacts(StepReport* report) {
-  if (bodies_changed) contact_finder.set_bodies(bodies);
+  if (bodies_changed) contact_finder.set_bodies(store);
   bodies_changed = false;
   std::swap(contacts, contacts_before);
   detected_count_before = detected_count;
@@ -79,15 +76,14 @@ void World::Impl::find_contacts(StepReport* report) {
   if (scene.solver == Solver::worst_first) contacts.clear();
   report->sphere_contacts =
       scene.solver == Solver::soft_step
-          ? contact_finder.find_near_contacts(bodies, scene.soft_step.speculative_margin,
-                                              pool.get(), &soft_step.contacts(), &contacts)
-          : contact_finder.find_contacts(bodies, &contacts);
+          ? contact_finder.find_near_contacts(store, scene.soft_step.speculative_margin, pool.get(),
+                                              &soft_step.contacts(), &contacts)
+          : contact_finder.find_contacts(store, &contacts);
   // Copying the string may throw; at this point the step can still be undone.
   report->device_failure = contact_finder.collider().device_failure();
   report->contacts = contacts.size();
-  combine_materials(bodies, scene.materials, pool.get(), &contacts);
-  mark_sensors(bodies, &contacts);
-  ContactContext contact_context(bodies, time(), &contacts);
+  finish_contacts(&contacts);
+  ContactContext contact_context(store, time(), &contacts);
   generators.call(contact_context);
   report->generated_contacts = contacts.size() - report->contacts;
   detected_count = report->contacts;
@@ -96,22 +92,27 @@ void World::Impl::find_contacts(StepReport* report) {
 /// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
 /// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
 bool World::Impl::advance(StepReport* report) {
-  return scene.solver == Solver::soft_step ? advance_soft_step(report)
-                                           : advance_worst_first(report);
+  if (can_step_on_device() && advance_on_device(report)) return !report->non_finite;
+  if (resident) leave_device();
+  const std::string failure = report->device_failure;
+  const bool completed =
+      scene.solver == Solver::soft_step ? advance_soft_step(report) : advance_worst_first(report);
+  if (!failure.empty()) report->device_failure = failure;
+  return completed;
 }
 
 /// Detection, then integration and contacts in substeps. Until commit(), only arrays that
 /// save_for_undo() copies change.
 bool World::Impl::advance_soft_step(StepReport* report) {
   const Clock::time_point start = Clock::now();
-  ForceContext context(bodies, time());
+  ForceContext context(store, time());
   forces.call(context);
   const Clock::time_point forced = Clock::now();
   find_contacts(report);
-  soft_step.add_generated(bodies, std::span(contacts).subspan(report->contacts));
+  soft_step.add_generated(store, std::span(contacts).subspan(report->contacts));
   const Clock::time_point detected = Clock::now();
-  if (!all_finite(soft_step.solve(&bodies), report)) return false;
-  soft_step.commit(&bodies);
+  if (!all_finite(soft_step.solve(&store), report)) return false;
+  soft_step.commit(&store);
   report->integrate_ms = elapsed_ms(start, forced);
   report->detect_ms = elapsed_ms(forced, detected);
   report->resolve_ms = elapsed_ms(detected, Clock::now());
@@ -121,23 +122,23 @@ bool World::Impl::advance_soft_step(StepReport* report) {
 /// Integration, then detection, then resolution (thesis 4.3).
 bool World::Impl::advance_worst_first(StepReport* report) {
   const Clock::time_point start = Clock::now();
-  ForceContext context(bodies, time());
+  ForceContext context(store, time());
   forces.call(context);
-  bodies.integrate();
-  if (!all_finite(find_runaway(bodies), report)) return false;
+  store.integrate();
+  if (!all_finite(find_runaway(store), report)) return false;
 
   const Clock::time_point integrated = Clock::now();
   find_contacts(report);
 
   const Clock::time_point detected = Clock::now();
   const std::span<const Contact> active = contacts_to_resolve();
-  propagate_waking(active, &bodies);
+  propagate_waking(active, &store);
   const ResolverReport resolution =
-      resolver.resolve(bodies, active, scene.resolver, report->generated_contacts);
+      resolver.resolve(store, active, scene.resolver, report->generated_contacts);
   report->position_iterations = resolution.position_iterations;
   report->velocity_iterations = resolution.velocity_iterations;
   report->iterations_exhausted = resolution.exhausted;
-  if (!all_finite(find_runaway(bodies), report)) return false;
+  if (!all_finite(find_runaway(store), report)) return false;
   report->integrate_ms = elapsed_ms(start, integrated);
   report->detect_ms = elapsed_ms(integrated, detected);
   report->resolve_ms = elapsed_ms(detected, Clock::now());
@@ -147,7 +148,9 @@ bool World::Impl::advance_worst_first(StepReport* report) {
 /// Copies the arrays that a step changes before it can fail. Copying all of them would take longer
 /// than some stages of a step on many threads.
 void World::Impl::save_for_undo() {
-  const MotionArrays& now = bodies.moving;
+  is_saved = !can_step_on_device() || !forces.ids().empty();
+  if (!is_saved) return;
+  const MotionArrays& now = bodies().moving;
   if (scene.solver == Solver::worst_first) {
     before = now;
     return;
@@ -173,8 +176,10 @@ void World::Impl::save_for_undo() {
 /// Restores the state before the step, including the contacts that wake_neighbors() uses, and
 /// empties World::contacts() and World::contact_events().
 void World::Impl::undo() noexcept {
-  MotionArrays& now = bodies.moving;
-  if (scene.solver == Solver::worst_first) {
+  MotionArrays& now = store.moving;
+  if (!is_saved) {
+    // Nothing has changed on the host.
+  } else if (scene.solver == Solver::worst_first) {
     std::swap(now, before);
   } else {
     std::swap(now.force, before.force);
@@ -198,7 +203,7 @@ StepReport World::step() {
   try {
     w.save_for_undo();
   } catch (const std::bad_alloc&) {
-    throw OutOfMemory("no memory to keep the state of " + std::to_string(w.bodies.ids().size()) +
+    throw OutOfMemory("no memory to keep the state of " + std::to_string(w.store.ids().size()) +
                       " bodies during a step");
   }
   w.contacts_are_new = false;
@@ -225,8 +230,10 @@ StepReport World::step() {
   report.backend = collider.backend();
   report.algorithm = collider.algorithm();
   report.choice = collider.reason();
-  for (const BodyId id : w.bodies.ids()) {
-    if (w.bodies.movable(id.index)) report.awake += w.bodies.moving.awake[id.index];
+  if (!w.resident) {
+    for (const BodyId id : w.store.ids()) {
+      if (w.store.movable(id.index)) report.awake += w.store.moving.awake[id.index];
+    }
   }
   report.total_ms = elapsed_ms(start, Clock::now());
   return report;
@@ -236,6 +243,9 @@ World::World(const Scene& scene, const WorldSettings& settings) {
   auto pool = std::make_unique<ThreadPool>(settings.collider.threads);
   auto collider = make_sphere_collider(settings.collider, pool.get());
   impl_ = Impl::make(scene, std::move(pool), std::move(collider), settings.broad_phase);
+  if (settings.collider.backend == Backend::cuda && scene.solver == Solver::soft_step) {
+    impl_->device = make_device_world(scene);
+  }
 }
 
 World::World(const Scene& scene, std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase,

@@ -19,27 +19,27 @@ void require_finite(const char* name, const Vec3& value) {
 }  // namespace
 
 BodyId World::add(const BodyDef& body) {
-  const std::uint64_t number = impl_->bodies.ids().size();
+  const std::uint64_t number = impl_->store.ids().size();
   validate_body_count(number + 1);
   validate_body(body, number);
-  const BodyId id = impl_->bodies.add(body);
+  const BodyId id = impl_->changed_bodies().add(body);
   impl_->note_change();
   impl_->shows_contacts = false;
   return id;
 }
 
 void World::remove(BodyId id) {
-  impl_->bodies.require(id);
+  impl_->store.require(id);
   impl_->wake_neighbors(id);
-  impl_->bodies.remove(id);
+  impl_->store.remove(id);
   impl_->soft_step.forget(id.index);
   impl_->shows_contacts = false;
   impl_->note_change();
 }
 
-std::span<const BodyId> World::bodies() const { return impl_->bodies.ids(); }
+std::span<const BodyId> World::bodies() const { return impl_->store.ids(); }
 
-bool World::contains(BodyId id) const noexcept { return impl_->bodies.contains(id); }
+bool World::contains(BodyId id) const noexcept { return impl_->store.contains(id); }
 
 BodyId World::body_at(std::uint32_t index) const {
   const std::span<const BodyId> ids = bodies();
@@ -49,65 +49,65 @@ BodyId World::body_at(std::uint32_t index) const {
                         "; it must be that of a living body of this world");
 }
 
-const Shape& World::shape(BodyId id) const {
-  return impl_->bodies.shape(impl_->bodies.require(id));
-}
+const Shape& World::shape(BodyId id) const { return impl_->store.shape(impl_->store.require(id)); }
 
 std::vector<BodyState> World::states() const {
   std::vector<BodyState> states;
   states.reserve(bodies().size());
-  for (const BodyId id : bodies()) states.push_back(impl_->bodies.state(id.index));
+  const BodyStore& store = impl_->bodies();
+  for (const BodyId id : bodies()) states.push_back(store.state(id.index));
   return states;
 }
 
-BodyState World::state(BodyId id) const { return impl_->bodies.state(impl_->bodies.require(id)); }
+BodyState World::state(BodyId id) const { return impl_->bodies().state(impl_->store.require(id)); }
 
 void World::set_state(BodyId id, const BodyState& state) {
-  const std::uint32_t body = impl_->bodies.require(id);
+  const std::uint32_t body = impl_->store.require(id);
   const std::string found = find_fault(state);
   if (!found.empty()) throw InvalidArgument("state: " + found);
   impl_->wake_neighbors(id);
-  impl_->bodies.set_state(body, state);
+  impl_->store.set_state(body, state);
   impl_->note_change();
 }
 
 bool World::awake(BodyId id) const {
-  return impl_->bodies.moving.awake[impl_->bodies.require(id)] != 0;
+  return impl_->bodies().moving.awake[impl_->store.require(id)] != 0;
 }
 
-void World::wake(BodyId id) { impl_->bodies.wake(impl_->bodies.require(id)); }
+void World::wake(BodyId id) { impl_->changed_bodies().wake(impl_->store.require(id)); }
 
-Real World::mass(BodyId id) const { return impl_->bodies.mass(impl_->bodies.require(id)); }
+Real World::mass(BodyId id) const { return impl_->store.mass(impl_->store.require(id)); }
 
 Mat3 World::inverse_inertia(BodyId id) const {
-  return impl_->bodies.moving.inverse_inertia[impl_->bodies.require(id)];
+  return impl_->bodies().moving.inverse_inertia[impl_->store.require(id)];
 }
 
 void World::apply_force(BodyId id, const Vec3& force) {
-  const std::uint32_t body = impl_->bodies.require(id);
+  const std::uint32_t body = impl_->store.require(id);
   require_finite("force", force);
-  impl_->bodies.apply_force(body, force);
+  impl_->changed_bodies().apply_force(body, force);
 }
 
 void World::apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point) {
-  const std::uint32_t body = impl_->bodies.require(id);
+  const std::uint32_t body = impl_->store.require(id);
   require_finite("force", force);
   require_finite("point", point);
-  impl_->bodies.apply_force(body, force);
-  impl_->bodies.apply_torque(body, cross(point - impl_->bodies.moving.position[body], force));
+  BodyStore& store = impl_->changed_bodies();
+  store.apply_force(body, force);
+  store.apply_torque(body, cross(point - store.moving.position[body], force));
 }
 
 void World::apply_torque(BodyId id, const Vec3& torque) {
-  const std::uint32_t body = impl_->bodies.require(id);
+  const std::uint32_t body = impl_->store.require(id);
   require_finite("torque", torque);
-  impl_->bodies.apply_torque(body, torque);
+  impl_->changed_bodies().apply_torque(body, torque);
 }
 
 Vec3 World::last_acceleration(BodyId id) const {
-  return impl_->bodies.moving.last_acceleration[impl_->bodies.require(id)];
+  return impl_->bodies().moving.last_acceleration[impl_->store.require(id)];
 }
 
-ForceContext World::force_context() { return {impl_->bodies, impl_->time()}; }
+ForceContext World::force_context() { return {impl_->changed_bodies(), impl_->time()}; }
 
 ForceId World::add_any(std::function<void(ForceContext&)> force) {
   const ForceId id = impl_->forces.add(std::move(force));
@@ -146,12 +146,14 @@ std::span<const ContactGeneratorId> World::contact_generators() const {
 double World::time() const { return impl_->time(); }
 
 std::span<const Contact> World::contacts() const {
-  return impl_->shows_contacts ? std::span<const Contact>(impl_->contacts)
-                               : std::span<const Contact>();
+  if (!impl_->shows_contacts) return {};
+  impl_->fetch_contacts();
+  return impl_->contacts;
 }
 
 std::span<const ContactEvent> World::contact_events() const {
   if (!impl_->shows_events) return {};
+  impl_->fetch_contacts();
   return impl_->events.between(
       std::span(impl_->contacts_before).first(impl_->detected_count_before),
       std::span(impl_->contacts).first(impl_->detected_count));

@@ -8,9 +8,12 @@
 #include "src/world/contact_events.hpp"
 #include "src/world/contact_finder.hpp"
 #include "src/world/contact_resolver.hpp"
+#include "src/world/device_world.hpp"
 #include "src/world/lazy_query_tree.hpp"
 #include "src/world/soft_step.hpp"
 #include "src/world/wake_propagation.hpp"
+
+#include <mutex>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -24,16 +27,35 @@ struct World::Impl {
        std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
       : pool(std::move(threads)),
         scene(given),
-        bodies(given.dt, given.sleep,
-               given.solver == Solver::soft_step ? given.soft_step.substeps : 1),
+        store(given.dt, given.sleep,
+              given.solver == Solver::soft_step ? given.soft_step.substeps : 1),
         contact_finder(std::move(collider), broad_phase),
         soft_step(given.soft_step, given.materials, given.dt, pool.get()) {
-    for (const BodyDef& def : given.bodies) bodies.add(def);
-    bodies.set_ignored_pairs(given.ignored_pairs);  // a body of the scene has the index of its slot
+    for (const BodyDef& def : given.bodies) store.add(def);
+    store.set_ignored_pairs(given.ignored_pairs);  // a body of the scene has the index of its slot
   }
+
+  /// The bodies for reading their motion, which it fetches from the device if it is newer there.
+  /// `store` alone serves for ids and properties. Const functions of a World may call it
+  /// concurrently.
+  const BodyStore& bodies() {
+    if (resident) fetch_motion();
+    return store;
+  }
+  /// The bodies for a change. The next step uploads the world again.
+  BodyStore& changed_bodies() {
+    if (resident) leave_device();
+    return store;
+  }
+  void fetch_motion();
+  /// Makes `contacts` and `contacts_before` those of the last two steps.
+  void fetch_contacts();
+  /// Fetches everything, so that the host has the state of the world.
+  void leave_device();
 
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
+    BodyStore& bodies = changed_bodies();
     for (const Contact& c : contacts) {
       if (c.sensor || (c.a != body && c.b != body)) continue;
       const BodyId other = c.a == body ? c.b : c.a;
@@ -43,12 +65,13 @@ struct World::Impl {
 
   /// Wakes a body and the bodies in contact with it.
   void wake_with_neighbors(BodyId body) {
-    bodies.wake(body.index);
+    changed_bodies().wake(body.index);
     wake_neighbors(body);
   }
 
   /// Wakes all bodies, because a new or removed callback may affect any of them.
   void wake_all() {
+    BodyStore& bodies = changed_bodies();
     for (const BodyId id : bodies.ids()) bodies.wake(id.index);
   }
 
@@ -65,6 +88,10 @@ struct World::Impl {
   bool advance(StepReport* report);
   bool advance_soft_step(StepReport* report);
   bool advance_worst_first(StepReport* report);
+  bool can_step_on_device() const { return device != nullptr && generators.ids().empty(); }
+  bool advance_on_device(StepReport* report);
+  void step_on_device(StepReport* report);
+  void finish_contacts(std::vector<Contact>* list) const;
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   void find_contacts(StepReport* report);
   void save_for_undo();
@@ -72,7 +99,8 @@ struct World::Impl {
 
   std::unique_ptr<ThreadPool> pool;  ///< of the collider, if make_sphere_collider() made it, too
   Scene scene;
-  BodyStore bodies;
+  /// Bodies. While `resident`, their motion may be older than that on the device.
+  BodyStore store;
   ContactFinder contact_finder;
   SoftStep soft_step;                ///< of Solver::soft_step
   WakePropagation propagate_waking;  ///< of Solver::worst_first, like the resolver
@@ -93,8 +121,20 @@ struct World::Impl {
   bool shows_contacts = false;
   bool shows_events = false;  ///< whether the last step was not undone
   ContactEvents events;
-  MotionArrays before;  ///< state that an undone step restores
+  MotionArrays before;    ///< state that an undone step restores
+  bool is_saved = false;  ///< whether `before` is that of the current step
   std::uint64_t steps = 0;
+
+  std::unique_ptr<DeviceWorld> device;  ///< null: the world is not stepped on a device
+  bool resident = false;                ///< whether the device has the state of the world
+  bool motion_is_current = true, contacts_are_current = true;
+  bool contacts_before_are_current = true;  ///< the flags of what the host has, while resident
+  std::mutex fetching;
+};
+
+/// Access to the members of a World, for tests.
+struct WorldAccess {
+  static World::Impl& impl(World& world) { return *world.impl_; }
 };
 
 }  // namespace JFPX_ABI

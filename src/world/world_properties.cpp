@@ -18,10 +18,10 @@ void require_valid(const std::string& fault) {
 
 }  // namespace
 
-Mat3 World::inertia(BodyId id) const { return impl_->bodies.inertia(impl_->bodies.require(id)); }
+Mat3 World::inertia(BodyId id) const { return impl_->store.inertia(impl_->store.require(id)); }
 
 void World::set_mass(BodyId id, Real mass) {
-  BodyStore& bodies = impl_->bodies;
+  BodyStore& bodies = impl_->store;
   const std::uint32_t body = bodies.require(id);
   require_valid(find_mass_fault(mass));
   if (bodies.movable(body) != (mass > 0)) {
@@ -31,99 +31,99 @@ void World::set_mass(BodyId id, Real mass) {
   }
   if (bodies.mass(body) == mass) return;
   if (!bodies.inertia_given(body)) require_valid(find_inertia_fault(bodies.shape(body), mass));
-  bodies.set_mass(body, mass);
+  impl_->changed_bodies().set_mass(body, mass);
   bodies.wake(body);
 }
 
 void World::set_inertia(BodyId id, const std::optional<Mat3>& inertia) {
-  BodyStore& bodies = impl_->bodies;
+  BodyStore& bodies = impl_->store;
   const std::uint32_t body = bodies.require(id);
   if (inertia) require_valid(find_inertia_fault(*inertia));
   if (!bodies.movable(body)) return;
   if (!inertia) require_valid(find_inertia_fault(bodies.shape(body), bodies.mass(body)));
-  bodies.set_inertia(body, inertia);
+  impl_->changed_bodies().set_inertia(body, inertia);
   bodies.wake(body);
 }
 
-Real World::friction(BodyId id) const { return impl_->bodies.friction(impl_->bodies.require(id)); }
+Real World::friction(BodyId id) const { return impl_->store.friction(impl_->store.require(id)); }
 
 void World::set_friction(BodyId id, Real friction) {
-  const std::uint32_t body = impl_->bodies.require(id);
+  const std::uint32_t body = impl_->store.require(id);
   require_valid(find_friction_fault(friction));
-  if (impl_->bodies.friction(body) == friction) return;
-  impl_->bodies.set_friction(body, friction);
+  if (impl_->store.friction(body) == friction) return;
+  impl_->changed_bodies().set_friction(body, friction);
   impl_->wake_with_neighbors(id);
 }
 
 Real World::restitution(BodyId id) const {
-  return impl_->bodies.restitution(impl_->bodies.require(id));
+  return impl_->store.restitution(impl_->store.require(id));
 }
 
 void World::set_restitution(BodyId id, Real restitution) {
-  const std::uint32_t body = impl_->bodies.require(id);
+  const std::uint32_t body = impl_->store.require(id);
   require_valid(find_restitution_fault(restitution));
-  impl_->bodies.set_restitution(body, restitution);
+  impl_->changed_bodies().set_restitution(body, restitution);
 }
 
 Vec3 World::acceleration(BodyId id) const {
-  return impl_->bodies.acceleration(impl_->bodies.require(id));
+  return impl_->store.acceleration(impl_->store.require(id));
 }
 
 void World::set_acceleration(BodyId id, const Vec3& acceleration) {
-  const std::uint32_t body = impl_->bodies.require(id);
+  const std::uint32_t body = impl_->store.require(id);
   require_valid(find_acceleration_fault(acceleration));
-  if (impl_->bodies.acceleration(body) == acceleration) return;
-  impl_->bodies.set_acceleration(body, acceleration);
-  impl_->bodies.wake(body);
+  if (impl_->store.acceleration(body) == acceleration) return;
+  impl_->changed_bodies().set_acceleration(body, acceleration);
+  impl_->changed_bodies().wake(body);
 }
 
 Real World::linear_damping(BodyId id) const {
-  return impl_->bodies.linear_damping(impl_->bodies.require(id));
+  return impl_->store.linear_damping(impl_->store.require(id));
 }
 
 Real World::angular_damping(BodyId id) const {
-  return impl_->bodies.angular_damping(impl_->bodies.require(id));
+  return impl_->store.angular_damping(impl_->store.require(id));
 }
 
 void World::set_damping(BodyId id, Real linear, Real angular) {
-  const std::uint32_t body = impl_->bodies.require(id);
+  const std::uint32_t body = impl_->store.require(id);
   require_valid(find_damping_fault(linear, angular));
-  impl_->bodies.set_damping(body, linear, angular);
+  impl_->changed_bodies().set_damping(body, linear, angular);
 }
 
 std::uint64_t World::user_data(BodyId id) const {
-  return impl_->bodies.user_data(impl_->bodies.require(id));
+  return impl_->store.user_data(impl_->store.require(id));
 }
 
 void World::set_user_data(BodyId id, std::uint64_t user_data) {
-  impl_->bodies.set_user_data(impl_->bodies.require(id), user_data);
+  impl_->store.set_user_data(impl_->store.require(id), user_data);
 }
 
-bool World::sensor(BodyId id) const { return impl_->bodies.sensor(impl_->bodies.require(id)); }
+bool World::sensor(BodyId id) const { return impl_->store.sensor(impl_->store.require(id)); }
 
 CollisionFilter World::filter(BodyId id) const {
-  return impl_->bodies.filter(impl_->bodies.require(id));
+  return impl_->store.filter(impl_->store.require(id));
 }
 
 void World::set_filter(BodyId id, const CollisionFilter& filter) {
-  const std::uint32_t body = impl_->bodies.require(id);
-  if (impl_->bodies.filter(body) == filter) return;
-  impl_->bodies.set_filter(body, filter);
+  const std::uint32_t body = impl_->store.require(id);
+  if (impl_->store.filter(body) == filter) return;
+  impl_->changed_bodies().set_filter(body, filter);
   impl_->wake_with_neighbors(id);
 }
 
 bool World::pair_ignored(BodyId a, BodyId b) const {
-  return impl_->bodies.pair_ignored({impl_->bodies.require(a), impl_->bodies.require(b)});
+  return impl_->store.pair_ignored({impl_->store.require(a), impl_->store.require(b)});
 }
 
 void World::set_pair_ignored(BodyId a, BodyId b, bool ignored) {
-  const BodyPair pair{impl_->bodies.require(a), impl_->bodies.require(b)};
+  const BodyPair pair{impl_->store.require(a), impl_->store.require(b)};
   if (a == b) {
     throw InvalidArgument("pair is (" + std::to_string(a.index) + ", " + std::to_string(b.index) +
                           "); it must be of two different bodies");
   }
-  if (impl_->bodies.pair_ignored(pair) == ignored) return;
-  impl_->bodies.set_pair_ignored(pair, ignored);
+  if (impl_->store.pair_ignored(pair) == ignored) return;
+  impl_->changed_bodies().set_pair_ignored(pair, ignored);
   impl_->wake_with_neighbors(a);
   impl_->wake_with_neighbors(b);
 }

@@ -1,0 +1,118 @@
+/// The world on a CUDA device: launches of the programs of a step.
+#include "src/base/cuda/device_buffer.hpp"
+#include "src/base/cuda/probe.hpp"
+#include "src/world/cuda/grid_team.cuh"
+#include "src/world/cuda/world_cuda.hpp"
+#include "src/world/device/device_step.hpp"
+
+#include <algorithm>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+namespace {
+
+template <class Program>
+__global__ void __launch_bounds__(GridTeam::kThreads)
+    run_program(const __grid_constant__ Program program, std::uint32_t* scratch) {
+  program(GridTeam(scratch));
+}
+
+int usable_device(int device) {
+  const BackendStatus status = probe(device);
+  if (!status.usable) throw BackendUnavailable("cuda: " + status.reason);
+  return device;
+}
+
+/// The stream, the memory and the launches of a DeviceStep.
+class CudaDevice {
+ public:
+  template <class T>
+  using Buffer = DeviceBuffer<T>;
+
+  explicit CudaDevice(int device)
+      : device_(usable_device(device)),
+        stream_(device_),
+        pool_(device_),
+        collider_(stream_.get(), device_) {
+    const DeviceGuard guard(device_);
+    JFPX_CUDA_TRY(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device_));
+  }
+
+  template <class T>
+  void reserve(Buffer<T>* buffer, std::size_t count, const char* what) {
+    const DeviceGuard guard(device_);
+    buffer->reserve_geometric(pool_, stream_.get(), count, what);
+  }
+  template <class T>
+  void upload(T* to, const T* from, std::size_t count) {
+    transfer(to, from, count, cudaMemcpyHostToDevice);
+  }
+  template <class T>
+  void download(T* to, const T* from, std::size_t count) {
+    transfer(to, from, count, cudaMemcpyDeviceToHost);
+  }
+  template <class T>
+  void copy(T* to, const T* from, std::size_t count) {
+    transfer(to, from, count, cudaMemcpyDeviceToDevice);
+  }
+
+  void find_pairs(const SphereInstance* spheres, std::size_t n, SpherePair* pairs,
+                  std::size_t capacity, ContactCount* count) {
+    collider_.reserve(n, capacity);
+    collider_.find_pairs(spheres, n, pairs, capacity, count);
+  }
+
+  template <class Program>
+  void run(const Program& program, std::size_t items) {
+    const DeviceGuard guard(device_);
+    int resident = 0;
+    JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, run_program<Program>,
+                                                                GridTeam::kThreads, 0));
+    const std::size_t most =
+        static_cast<std::size_t>(resident) * static_cast<unsigned>(processors_);
+    const std::size_t wanted = (items + GridTeam::kThreads - 1) / GridTeam::kThreads;
+    const auto blocks = static_cast<unsigned>(std::clamp<std::size_t>(wanted, 1, most));
+    scratch_.reserve(pool_, stream_.get(), GridTeam::scratch_words(blocks), "scratch memory");
+    cudaLaunchAttribute cooperative{};
+    cooperative.id = cudaLaunchAttributeCooperative;
+    cooperative.val.cooperative = 1;
+    cudaLaunchConfig_t config{};
+    config.gridDim = blocks;
+    config.blockDim = GridTeam::kThreads;
+    config.stream = stream_.get();
+    config.attrs = &cooperative;
+    config.numAttrs = 1;
+    JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, run_program<Program>, program, scratch_.data()));
+  }
+
+  void wait() {
+    const DeviceGuard guard(device_);
+    JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get()));
+  }
+
+ private:
+  template <class T>
+  void transfer(T* to, const T* from, std::size_t count, cudaMemcpyKind kind) {
+    if (count == 0) return;
+    const DeviceGuard guard(device_);
+    JFPX_CUDA_TRY(cudaMemcpyAsync(to, from, count * sizeof(T), kind, stream_.get()));
+  }
+
+  int device_;
+  OwnedStream stream_;
+  MemoryPool pool_;
+  DeviceSphereCollider collider_;
+  DeviceBuffer<std::uint32_t> scratch_;
+  int processors_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<DeviceWorld> make_world(const Scene& scene) {
+  return std::make_unique<device::DeviceStep<CudaDevice>>(scene, std::make_unique<CudaDevice>(0));
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

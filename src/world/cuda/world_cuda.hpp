@@ -1,0 +1,15 @@
+/// Factory of worlds on CUDA devices.
+#pragma once
+
+#include "src/world/device_world.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// A world on the first device. @throws BackendUnavailable with the reason, DeviceError
+std::unique_ptr<DeviceWorld> make_world(const Scene& scene);
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

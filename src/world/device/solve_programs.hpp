@@ -1,0 +1,367 @@
+/// Waking, rows and substeps of a soft step on a device.
+#pragma once
+
+#include "src/world/device/atomic.hpp"
+#include "src/world/device/islands.hpp"
+#include "src/world/device/sorted_range.hpp"
+#include "src/world/device/step_data.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+/// Wakes the islands that touch an awake body, starts the bodies, and assigns rows to contacts.
+struct PrepareProgram {
+  StepData data;
+
+  template <class Team>
+  JFPX_HD void operator()(const Team& team) const {
+    if (data.has_failed()) return;
+    const StepData& d = data;
+    const BodyView& bodies = d.step.bodies;
+    const soft_step::ContactView contacts = d.contacts();
+    if (d.counters->any_asleep != 0) wake_touched(team);
+    team.for_each(bodies.capacity, [&](std::uint32_t i) {
+      d.near_flag[i] = 0;
+      d.bucket[i] = {};
+    });
+    team.for_each(contacts.size(), [&](std::uint32_t i) {
+      d.near_flag[contacts.key(i).a] = 1;
+      d.near_flag[contacts.key(i).b] = 1;
+    });
+    team.for_each(bodies.count, [&](std::uint32_t i) { d.step.load(bodies.ids[i].index); });
+    place_rows(team);
+    sort_overflow(team);
+    place_points(team);
+    sort_fixed(team);
+    fill_rows(team);
+  }
+
+ private:
+  template <class Team>
+  JFPX_HD void wake_touched(const Team& team) const {
+    const StepData& d = data;
+    const BodyView& bodies = d.step.bodies;
+    find_islands(team, d, [&](const soft_step::ContactView& contacts, std::uint32_t i) {
+      return soft_step::will_touch(bodies, contacts, i);
+    });
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      if (bodies.movable(body) && bodies.awake[body] != 0) d.marked[island_of(d, body)] = 1;
+    });
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      if (bodies.movable(body) && bodies.awake[body] == 0 && d.marked[island_of(d, body)] != 0) {
+        d.step.motion.wake(bodies, body);
+      }
+    });
+  }
+
+  /// Assigns a row to each contact, sorted by bin.
+  template <class Team>
+  JFPX_HD void place_rows(const Team& team) const {
+    const StepData& d = data;
+    const soft_step::RowSetup setup = d.row_setup();
+    team.partition(
+        setup.contacts.size(), kBins, d.counters->bin_begin,
+        [&](std::uint32_t i) {
+          const soft_step::RowKind kind = setup.kind_of(i);
+          if (kind == soft_step::RowKind::none) return kNone;
+          const std::uint32_t group = setup.group_of(i);
+          return kind == soft_step::RowKind::sphere ? group : soft_step::kGroups + group;
+        },
+        [&](std::uint32_t i, std::uint32_t row) { d.row_contact[row] = i; });
+    team.once([&] {
+      const std::uint32_t* begin = d.counters->bin_begin;
+      for (std::uint32_t group = 1; group < soft_step::kFixedGroup; ++group) {
+        const std::uint32_t manifolds = soft_step::kGroups + group;
+        if (begin[group + 1] > begin[group] || begin[manifolds + 1] > begin[manifolds]) {
+          d.counters->last_group = group;
+        }
+      }
+    });
+  }
+
+  /// The rows without a color are solved in the order of their contacts.
+  template <class Team>
+  JFPX_HD void sort_overflow(const Team& team) const {
+    const StepData& d = data;
+    const std::uint32_t* begin = d.counters->bin_begin;
+    if (begin[1] == begin[0] && begin[soft_step::kGroups + 1] == begin[soft_step::kGroups]) return;
+    team.once([&] {
+      const auto by_number = [](std::uint32_t x, std::uint32_t y) { return x < y; };
+      for (const std::uint32_t bin : {0u, soft_step::kGroups}) {
+        sort_range(d.row_contact + begin[bin], begin[bin + 1] - begin[bin], by_number);
+      }
+    });
+  }
+
+  template <class Team>
+  JFPX_HD void place_points(const Team& team) const {
+    const StepData& d = data;
+    const soft_step::ContactView contacts = d.contacts();
+    const std::uint32_t first_row = first_manifold();
+    team.scan(
+        row_count() - first_row,
+        [&](std::uint32_t r) { return contacts.impulse_count(d.row_contact[first_row + r]); },
+        [&](std::uint32_t r, std::uint32_t first) { d.manifold_rows[r].first = first; });
+  }
+
+  /// Lists the rows with fixed bodies by movable body, in the order of their contacts.
+  template <class Team>
+  JFPX_HD void sort_fixed(const Team& team) const {
+    const StepData& d = data;
+    const soft_step::RowSetup setup = d.row_setup();
+    const std::uint32_t* begin = d.counters->bin_begin;
+    constexpr std::uint32_t kSpheres = soft_step::kFixedGroup;
+    constexpr std::uint32_t kManifolds = soft_step::kGroups + soft_step::kFixedGroup;
+    const std::uint32_t spheres = begin[kSpheres + 1] - begin[kSpheres];
+    const std::uint32_t all = spheres + (begin[kManifolds + 1] - begin[kManifolds]);
+    if (all == 0) return;
+    const auto row_of = [&](std::uint32_t k) {
+      return k < spheres ? begin[kSpheres] + k : begin[kManifolds] + (k - spheres);
+    };
+    const auto body_of = [&](std::uint32_t k) {
+      const soft_step::ContactKey& key = setup.contacts.key(d.row_contact[row_of(k)]);
+      return setup.is_flipped(key) ? key.b : key.a;
+    };
+    const BodyView& bodies = d.step.bodies;
+    team.for_each(all, [&](std::uint32_t k) { atomic_add(&d.bucket[body_of(k)].end, 1); });
+    std::uint32_t* next = d.first_contact;  // unused after the coloring
+    team.scan(
+        bodies.capacity, [&](std::uint32_t i) { return d.bucket[i].end - d.bucket[i].begin; },
+        [&](std::uint32_t i, std::uint32_t before) { next[i] = before; });
+    team.for_each(all, [&](std::uint32_t k) {
+      d.fixed[atomic_add(&next[body_of(k)], 1)] = {d.row_contact[row_of(k)], row_of(k)};
+    });
+    const std::uint32_t count = team.scan(
+        bodies.capacity,
+        [&](std::uint32_t i) { return d.bucket[i].end > d.bucket[i].begin ? 1u : 0u; },
+        [&](std::uint32_t i, std::uint32_t place) {
+          if (d.bucket[i].end > d.bucket[i].begin) d.fixed_bodies[place] = i;
+        });
+    team.for_each(count, [&](std::uint32_t k) {
+      const std::uint32_t body = d.fixed_bodies[k];
+      const std::uint32_t rows = d.bucket[body].end;
+      d.bucket[body] = {next[body] - rows, next[body]};
+      sort_range(d.fixed + d.bucket[body].begin, rows,
+                 [](const FixedRow& x, const FixedRow& y) { return x.contact < y.contact; });
+    });
+    team.once([&] { d.counters->fixed_bodies = count; });
+  }
+
+  template <class Team>
+  JFPX_HD void fill_rows(const Team& team) const {
+    const StepData& d = data;
+    const soft_step::RowSetup setup = d.row_setup();
+    const std::uint32_t* begin = d.counters->bin_begin;
+    const std::uint32_t manifolds = first_manifold();
+    team.for_each(row_count(), [&](std::uint32_t r) {
+      const std::uint32_t contact = d.row_contact[r];
+      bool rebounds = false;
+      if (r < manifolds) {
+        soft_step::SphereRow row;
+        r < begin[soft_step::kFixedGroup] ? setup.fill<false>(&row, contact)
+                                          : setup.fill<true>(&row, contact);
+        d.sphere_rows[r] = row;
+        rebounds = row.rebound > 0;
+      } else {
+        soft_step::ManifoldRow* row = &d.manifold_rows[r - manifolds];
+        soft_step::PointRow* points = d.point_rows + row->first;
+        const bool has_color = r < begin[soft_step::kGroups + soft_step::kFixedGroup];
+        has_color ? setup.fill<false>(row, points, contact)
+                  : setup.fill<true>(row, points, contact);
+        for (std::uint32_t p = 0; p < row->count; ++p) rebounds |= points[p].rebound > 0;
+      }
+      if (rebounds) d.counters->any_rebound = 1;
+    });
+  }
+
+  JFPX_HD std::uint32_t row_count() const { return data.counters->bin_begin[kBins]; }
+  JFPX_HD std::uint32_t first_manifold() const {
+    return data.counters->bin_begin[soft_step::kGroups];
+  }
+};
+
+/// The substeps and restitution.
+struct SolveProgram {
+  StepData data;
+
+  template <class Team>
+  JFPX_HD void operator()(const Team& team) const {
+    if (data.has_failed()) return;
+    const StepData& d = data;
+    const BodyView& bodies = d.step.bodies;
+    for (std::uint32_t substep = 0; substep < d.substeps; ++substep) {
+      team.for_each(bodies.count,
+                    [&](std::uint32_t i) { d.step.accelerate(bodies.ids[i].index, substep == 0); });
+      if (substep == 0) sweep(team, WarmStart{});
+      sweep(team, Solve{d.constants, true});
+      team.for_each(bodies.count, [&](std::uint32_t i) { d.step.move(bodies.ids[i].index); });
+      sweep(team, Solve{d.constants, false});
+    }
+    if (d.counters->any_rebound != 0) sweep(team, Restitute{});
+    const soft_step::RowSetup setup = d.row_setup();
+    const std::uint32_t manifolds = d.counters->bin_begin[soft_step::kGroups];
+    team.for_each(d.counters->bin_begin[kBins], [&](std::uint32_t r) {
+      if (r < manifolds) {
+        setup.store(d.sphere_rows[r], d.row_contact[r]);
+      } else {
+        const soft_step::ManifoldRow& row = d.manifold_rows[r - manifolds];
+        setup.store(row, d.point_rows + row.first, d.row_contact[r]);
+      }
+    });
+  }
+
+ private:
+  struct WarmStart {
+    template <bool kFixed>
+    JFPX_HD void run(soft_step::SphereRow* row, soft_step::SolverBody* a,
+                     soft_step::SolverBody* b) const {
+      soft_step::warm_start<kFixed>(*row, a, b);
+    }
+    template <bool kFixed>
+    JFPX_HD void run(soft_step::ManifoldRow* row, soft_step::PointRow* points,
+                     const soft_step::BodyPair& pair) const {
+      soft_step::warm_start<kFixed>(*row, points, pair);
+    }
+  };
+  struct Solve {
+    soft_step::StepConstants constants;
+    bool soft;
+    template <bool kFixed>
+    JFPX_HD void run(soft_step::SphereRow* row, soft_step::SolverBody* a,
+                     soft_step::SolverBody* b) const {
+      soft_step::solve<kFixed>(row, a, b, constants, soft);
+    }
+    template <bool kFixed>
+    JFPX_HD void run(soft_step::ManifoldRow* row, soft_step::PointRow* points,
+                     const soft_step::BodyPair& pair) const {
+      soft_step::solve<kFixed>(row, points, pair, constants, soft);
+    }
+  };
+  struct Restitute {
+    template <bool kFixed>
+    JFPX_HD void run(soft_step::SphereRow* row, soft_step::SolverBody* a,
+                     soft_step::SolverBody* b) const {
+      soft_step::restitute<kFixed>(*row, a, b);
+    }
+    template <bool kFixed>
+    JFPX_HD void run(soft_step::ManifoldRow* row, soft_step::PointRow* points,
+                     const soft_step::BodyPair& pair) const {
+      soft_step::restitute<kFixed>(*row, points, pair);
+    }
+  };
+
+  /// One row. @param r number of the row among the rows of both kinds
+  template <bool kFixed, class Operation>
+  JFPX_HD void run_row(const Operation& operation, std::uint32_t r) const {
+    const StepData& d = data;
+    const std::uint32_t manifolds = d.counters->bin_begin[soft_step::kGroups];
+    soft_step::SolverBody* bodies = d.step.solver;
+    if (r < manifolds) {
+      soft_step::SphereRow* row = &d.sphere_rows[r];
+      operation.template run<kFixed>(row, &bodies[row->a], &bodies[row->b]);
+    } else {
+      soft_step::ManifoldRow* row = &d.manifold_rows[r - manifolds];
+      const Mat3* inertia = d.step.bodies.inverse_inertia;
+      operation.template run<kFixed>(row, d.point_rows + row->first,
+                                     soft_step::BodyPair{&bodies[row->a], &bodies[row->b],
+                                                         &inertia[row->a], &inertia[row->b]});
+    }
+  }
+
+  /// All rows in the order of soft_step::SoftStepSolver.
+  template <class Team, class Operation>
+  JFPX_HD void sweep(const Team& team, const Operation& operation) const {
+    const StepData& d = data;
+    const std::uint32_t* begin = d.counters->bin_begin;
+    constexpr std::uint32_t kManifolds = soft_step::kGroups;
+    if (begin[1] > begin[0] || begin[kManifolds + 1] > begin[kManifolds]) {
+      team.once([&] {
+        for (std::uint32_t r = begin[0]; r < begin[1]; ++r) run_row<false>(operation, r);
+        for (std::uint32_t r = begin[kManifolds]; r < begin[kManifolds + 1]; ++r) {
+          run_row<false>(operation, r);
+        }
+      });
+    }
+    const std::uint32_t last_group = d.counters->last_group;
+    for (std::uint32_t group = 1; group <= last_group; ++group) {
+      const std::uint32_t first = begin[group], spheres = begin[group + 1] - first;
+      const std::uint32_t first_manifold = begin[kManifolds + group];
+      const std::uint32_t manifolds = begin[kManifolds + group + 1] - first_manifold;
+      if (spheres + manifolds == 0) continue;
+      team.for_each(spheres + manifolds, [&](std::uint32_t i) {
+        run_row<false>(operation, i < spheres ? first + i : first_manifold + (i - spheres));
+      });
+    }
+    if (d.counters->fixed_bodies == 0) return;
+    team.for_each(d.counters->fixed_bodies, [&](std::uint32_t i) {
+      const Range range = d.bucket[d.fixed_bodies[i]];
+      for (std::uint32_t k = range.begin; k < range.end; ++k) {
+        run_row<true>(operation, d.fixed[k].row);
+      }
+    });
+  }
+};
+
+/// Ends the step: moves the bodies, clears forces, and puts islands to sleep. Has no effect if a
+/// body has run away.
+struct CommitProgram {
+  StepData data;
+
+  template <class Team>
+  JFPX_HD void operator()(const Team& team) const {
+    if (data.has_failed()) return;
+    const StepData& d = data;
+    const BodyView& bodies = d.step.bodies;
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      if (bodies.awake[body] == 0 || is_in_world(d.step.state(body))) return;
+      atomic_min(&d.counters->runaway, body);
+    });
+    if (d.counters->runaway != kNone) return;
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      d.position_before[body] = bodies.position[body];
+      if (d.step.store(body)) d.counters->any_rests = 1;
+    });
+    if (d.counters->any_rests != 0) put_islands_to_sleep(team);
+    const std::uint32_t awake = team.count(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      return bodies.movable(body) && bodies.awake[body] != 0;
+    });
+    const std::uint32_t touching = team.count(
+        d.counters->spheres, [&](std::uint32_t i) { return d.now.view.spheres[i].distance <= 0; });
+    team.once([&] {
+      d.counters->awake = awake;
+      d.counters->touching_spheres = touching;
+      d.counters->completed = d.number;
+    });
+  }
+
+ private:
+  template <class Team>
+  JFPX_HD void put_islands_to_sleep(const Team& team) const {
+    const StepData& d = data;
+    const BodyView& bodies = d.step.bodies;
+    find_islands(team, d, [](const soft_step::ContactView& contacts, std::uint32_t i) {
+      return soft_step::has_touched(contacts, i);
+    });
+    const auto is_awake = [&](std::uint32_t body) {
+      return bodies.movable(body) && bodies.awake[body] != 0;
+    };
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      if (is_awake(body) && !bodies.is_at_rest(body)) d.marked[island_of(d, body)] = 1;
+    });
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      if (is_awake(body) && d.marked[island_of(d, body)] == 0) d.step.motion.put_to_sleep(body);
+    });
+  }
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,154 @@
+/// Memory of a soft step on a device.
+#pragma once
+
+#include <jfpx/cuda/sphere_collider.hpp>
+
+#include "src/contact_solver/row_setup.hpp"
+#include "src/world/near_pair_test.hpp"
+#include "src/world/soft_step_stages.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+inline constexpr std::uint32_t kNone = 0xffffffffu;
+
+/// Rows are grouped by kind, then by soft_step::kGroups.
+inline constexpr std::uint32_t kBins = 2 * soft_step::kGroups;
+
+/// Lists whose size is known only on the device. A step that needs more room than there is does not
+/// change the state of the world; the host reserves what `needed` says and repeats it.
+struct Capacity {
+  std::uint64_t pairs = 0;       ///< of swept bounds
+  std::uint32_t spheres = 0;     ///< contacts of two spheres
+  std::uint32_t candidates = 0;  ///< pairs of other sub-shapes, also the capacity of manifolds
+  std::uint32_t points = 0;      ///< of manifolds
+  std::uint32_t touches = 0;     ///< points of World::contacts(), except contacts of two spheres
+};
+
+/// Numbers that the stages of a step give each other and the host.
+struct Counters {
+  std::uint32_t failed = 0;          ///< 1: a list has no room, the step has no effect
+  std::uint32_t invalid_bounds = 0;  ///< 1: swept bounds are not finite, the step has no effect
+  Capacity needed;
+
+  std::uint32_t candidates = 0;
+  std::uint32_t touches = 0;
+  std::uint32_t uncolored = 0;
+  std::uint32_t any_asleep = 0;             ///< 1: a movable body sleeps at the start of the step
+  std::uint32_t any_rebound = 0;            ///< 1: a row has a speed of separation
+  std::uint32_t any_rests = 0;              ///< 1: a body has been slow for long enough to sleep
+  std::uint32_t runaway = kNone;            ///< index of the first body that is_in_world() refuses
+  std::uint32_t bin_begin[kBins + 1] = {};  ///< of rows; those of manifolds follow the others
+  std::uint32_t last_group = 0;             ///< the last color group that has rows
+  std::uint32_t fixed_bodies = 0;           ///< bodies with contacts with fixed bodies
+
+  std::uint32_t spheres = 0, manifolds = 0, points = 0;  ///< sizes of the contact set
+  std::uint32_t touching_spheres = 0;  ///< contacts of two spheres with distance <= 0
+  std::uint32_t sphere_touches = 0;    ///< items of the list of touches of two spheres
+  std::uint32_t awake = 0;             ///< movable bodies awake after the step
+  std::uint64_t completed = 0;         ///< StepData::number once the step is complete
+};
+
+/// A point of World::contacts() with its place in the order of that list. Those of two spheres that
+/// are bodies and no sensors are not in the list: they are in the contact set.
+struct Touch {
+  Candidate pair;
+  std::uint32_t number = 0;      ///< of the point in its pair
+  std::uint32_t of_spheres = 0;  ///< 1: both sub-shapes are spheres
+  Vec3 normal, point;
+  Real distance = 0;
+};
+
+/// Range of a list.
+struct Range {
+  std::uint32_t begin = 0, end = 0;
+};
+
+/// The contacts of a step on the device.
+struct DeviceContacts {
+  soft_step::ContactView view;    ///< the counts are set by each program: see now()
+  Range* spheres_of = nullptr;    ///< by body a: its contacts of two spheres
+  Range* manifolds_of = nullptr;  ///< by body a
+  std::uint32_t counts[3] = {};   ///< of the last step: spheres, manifolds, points
+};
+
+/// A contact with a fixed body.
+struct FixedRow {
+  std::uint32_t contact = 0;
+  std::uint32_t row = 0;  ///< in the rows of both kinds
+};
+
+/// Everything that the programs of a step use, passed to kernels by value.
+struct StepData {
+  soft_step::StepBodies step;
+  NearBounds near;
+  DeviceContacts now, last;
+  MaterialSettings materials;
+  soft_step::StepConstants constants;
+  Real restitution_threshold = 0;
+  std::uint32_t substeps = 0;
+  std::uint64_t number = 0;  ///< of the step, > 0
+  Capacity capacity;
+  Counters* counters = nullptr;
+
+  Vec3* motion = nullptr;           ///< by body
+  Vec3* position_before = nullptr;  ///< by body, at the start of the step
+  SpherePair* pairs = nullptr;      ///< of swept bounds
+  cuda::ContactCount* pair_count = nullptr;
+  std::uint8_t* pair_kind = nullptr;  ///< by pair
+  Candidate* candidates = nullptr;
+  NearPair* tested = nullptr;  ///< by candidate
+  Touch* touches = nullptr;
+  Range* bucket = nullptr;         ///< by body: a range of `order` or of `fixed`
+  std::uint32_t* order = nullptr;  ///< of manifolds: candidates, sorted by key
+
+  std::uint64_t* used_colors = nullptr;  ///< by body
+  std::uint64_t* first_order =
+      nullptr;  ///< by body: lowest color_order() of its uncolored contacts
+  std::uint32_t* first_contact = nullptr;  ///< by body: the lowest of them
+  std::uint32_t *uncolored = nullptr, *still_uncolored = nullptr;
+
+  std::uint32_t* parent = nullptr;    ///< by body, of the islands
+  std::uint8_t* marked = nullptr;     ///< by label of an island
+  std::uint8_t* near_flag = nullptr;  ///< by body: StepBodies::near
+
+  std::uint32_t* row_contact = nullptr;  ///< by row of either kind
+  std::uint32_t* row_place = nullptr;    ///< by contact: row, or kNone
+  soft_step::SphereRow* sphere_rows = nullptr;
+  soft_step::ManifoldRow* manifold_rows = nullptr;
+  soft_step::PointRow* point_rows = nullptr;
+  FixedRow* fixed = nullptr;
+  std::uint32_t* fixed_bodies = nullptr;
+
+  JFPX_HD soft_step::ContactView contacts() const {
+    soft_step::ContactView view = now.view;
+    view.sphere_count = counters->spheres;
+    view.manifold_count = counters->manifolds;
+    view.point_count = counters->points;
+    return view;
+  }
+  JFPX_HD soft_step::ContactView last_contacts() const {
+    soft_step::ContactView view = last.view;
+    view.sphere_count = last.counts[0];
+    view.manifold_count = last.counts[1];
+    view.point_count = last.counts[2];
+    return view;
+  }
+  JFPX_HD soft_step::RowSetup row_setup() const {
+    const BodyView& bodies = step.bodies;
+    return {contacts(),
+            {bodies.inverse_inertia, bodies.last_acceleration, bodies.radius, bodies.awake,
+             bodies.friction, bodies.restitution, bodies.rolling_friction, bodies.spinning_friction,
+             materials, restitution_threshold},
+            step.solver};
+  }
+  /// Whether an earlier stage has found that the step can't be completed.
+  JFPX_HD bool has_failed() const { return counters->failed != 0 || counters->invalid_bounds != 0; }
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx

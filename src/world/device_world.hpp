@@ -1,0 +1,59 @@
+/// The state of a world that lies on a device between steps.
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include "src/contact_solver/contact_set.hpp"
+#include "src/world/body_store.hpp"
+#include "src/world/sub_shape_table.hpp"
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Steps of Solver::soft_step on a device, with the bits of SoftStep. The caller uploads a world,
+/// then calls step() as often as it likes, and fetches what it needs. Not thread-safe.
+///
+/// All functions but the destructor throw DeviceError if the device fails, and OutOfMemory. After a
+/// failed step(), the state on the device is that before the step.
+class DeviceWorld {
+ public:
+  struct Result {
+    std::uint64_t contacts = 0;            ///< size of the list that fetch_contacts() returns
+    std::uint64_t sphere_contacts = 0;     ///< of these, of two spheres
+    std::uint32_t awake = 0;               ///< movable bodies awake after the step
+    std::optional<std::uint32_t> runaway;  ///< first body that is_in_world() refuses
+    /// The bounds of a body's motion are not finite: the step had no effect, and SoftStep reports
+    /// the error.
+    bool invalid_bounds = false;
+  };
+
+  virtual ~DeviceWorld() = default;
+
+  /// Replaces the state on the device.
+  /// @param last contacts of the last step, with their impulses and colors
+  virtual void upload(const BodyStore& bodies, SubShapeTable* sub_shapes,
+                      soft_step::ContactSet* last) = 0;
+  /// Replaces forces and torques, and which bodies are awake.
+  virtual void upload_forces(const BodyStore& bodies) = 0;
+  /// One step. If a body runs away, the state does not change.
+  virtual Result step() = 0;
+  /// Copies the motion of all bodies to the host.
+  virtual void fetch_motion(MotionArrays* moving) = 0;
+  /// Copies the contacts of the last step, with their impulses and colors.
+  virtual void fetch_contact_set(soft_step::ContactSet* last) = 0;
+  /// Makes the list of World::contacts() of the last step, or of the step before it, without
+  /// materials. @returns the number of contacts of two spheres, which come first
+  virtual std::uint64_t fetch_contacts(const BodyStore& bodies, bool of_step_before,
+                                       std::vector<Contact>* contacts) = 0;
+};
+
+/// A world on the first CUDA device. @throws BackendUnavailable with the reason, DeviceError
+std::unique_ptr<DeviceWorld> make_device_world(const Scene& scene);
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

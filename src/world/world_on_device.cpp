@@ -1,0 +1,105 @@
+/// Steps of a World on a device, and what the host fetches of them.
+#include <jfpx/error.hpp>
+
+#include "src/world/world_impl.hpp"
+
+#include <mutex>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+void World::Impl::fetch_motion() {
+  const std::lock_guard lock(fetching);
+  if (motion_is_current) return;
+  device->fetch_motion(&store.moving);
+  motion_is_current = true;
+}
+
+void World::Impl::fetch_contacts() {
+  if (!resident) return;
+  const std::lock_guard lock(fetching);
+  if (!contacts_are_current) {
+    device->fetch_contacts(store, false, &contacts);
+    finish_contacts(&contacts);
+    detected_count = contacts.size();
+    contacts_are_current = true;
+  }
+  if (!contacts_before_are_current) {
+    device->fetch_contacts(store, true, &contacts_before);
+    finish_contacts(&contacts_before);
+    detected_count_before = contacts_before.size();
+    contacts_before_are_current = true;
+  }
+}
+
+void World::Impl::leave_device() {
+  fetch_motion();
+  fetch_contacts();
+  device->fetch_contact_set(&soft_step.last_contacts());
+  resident = false;
+}
+
+/// One step on the device. If it fails, the processor takes over: the state is fetched, and later
+/// steps do not use the device.
+/// @returns false if the step is to be done on the host
+bool World::Impl::advance_on_device(StepReport* report) {
+  try {
+    step_on_device(report);
+    return resident;
+  } catch (const DeviceError& error) {
+    report->device_failure = error.what();
+  } catch (const OutOfMemory& error) {
+    report->device_failure = error.what();
+  }
+  if (resident) {
+    if (is_saved) {
+      // Without the forces of this step, which the host applies again.
+      store.moving.force = before.force;
+      store.moving.torque = before.torque;
+      store.moving.motion = before.motion;
+      store.moving.rest_time = before.rest_time;
+      store.moving.awake = before.awake;
+    }
+    leave_device();
+  }
+  device.reset();
+  if (!is_saved) save_for_undo();
+  return false;
+}
+
+/// Leaves the device without a step if that has to be done on the host.
+void World::Impl::step_on_device(StepReport* report) {
+  if (!resident) {
+    if (bodies_changed) contact_finder.set_bodies(store);
+    bodies_changed = false;
+    device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
+    resident = true;
+    motion_is_current = contacts_are_current = contacts_before_are_current = true;
+  }
+  if (!forces.ids().empty()) {
+    fetch_motion();
+    ForceContext context(store, time());
+    forces.call(context);
+    device->upload_forces(store);
+  }
+  const DeviceWorld::Result result = device->step();
+  if (result.invalid_bounds) {
+    leave_device();
+    return;
+  }
+  report->non_finite = result.runaway.has_value();
+  if (result.runaway) {
+    report->non_finite_body = store.id(*result.runaway);
+    return;
+  }
+  std::swap(contacts, contacts_before);
+  detected_count_before = detected_count;
+  contacts_before_are_current = contacts_are_current;
+  motion_is_current = contacts_are_current = false;
+  report->contacts = result.contacts;
+  report->sphere_contacts = result.sphere_contacts;
+  report->awake = result.awake;
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
