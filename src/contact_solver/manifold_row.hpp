@@ -17,7 +17,6 @@ struct PointRow {
   Real rebound = 0;                     ///< [m/s], as in SphereRow
   Real normal_impulse = 0;              ///< [N s]
   Real friction_x = 0, friction_y = 0;  ///< [N s], along the tangents
-  Real peak_impulse = 0;                ///< [N s]
 };
 
 struct ManifoldRow {
@@ -186,7 +185,7 @@ JFPX_HD inline void solve_normals(const ManifoldRow& row, PointRow* points, cons
     const Real normal_impulse = wanted > 0 ? wanted : Real(0);
     const Vec3 impulse = n * (normal_impulse - p.normal_impulse);
     p.normal_impulse = normal_impulse;
-    if (normal_impulse > p.peak_impulse) p.peak_impulse = normal_impulse;
+    if (normal_impulse > 0 && p.rebound < 0) p.rebound = -p.rebound;
     apply<kFixed>(pair, p.arm_a, p.arm_b, impulse);
     if (bias.projection > 0) project<kFixed>(pair, p, n * (bias.projection * p.normal_mass));
   }
@@ -214,7 +213,7 @@ JFPX_HD inline void restitute(const ManifoldRow& row, const PointRow* points,
                               const BodyPair& pair) {
   for (std::uint32_t i = 0; i < row.count; ++i) {
     const PointRow& p = points[i];
-    if (!(p.rebound > 0 && p.peak_impulse > 0)) continue;
+    if (!(p.rebound > 0)) continue;
     const Real closing = dot(relative_velocity(pair, p.arm_a, p.arm_b), row.normal);
     const Real change = p.normal_mass * (p.rebound - closing);
     const Real along = change > -p.normal_impulse ? change : -p.normal_impulse;

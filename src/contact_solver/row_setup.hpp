@@ -99,13 +99,12 @@ struct RowSetup {
                              properties.friction[row->b]);
     row->friction_impulse = flipped ? -kept.friction : kept.friction;
     row->normal_impulse = kept.normal;
-    row->peak_impulse = 0;
     const SolverBody &a = start[row->a], &b = start[row->b];
     set_masses<kFixed>(row, a, b);
     const Real restitution = combined(properties.rules.restitution, properties.restitution[row->a],
                                       properties.restitution[row->b]);
-    row->rebound = rebound_speed(relative_velocity<kFixed>(*row, a, b), row->normal, distance,
-                                 row->a, row->b, restitution);
+    row->rebound = -rebound_speed(relative_velocity<kFixed>(*row, a, b), row->normal, distance,
+                                  row->a, row->b, restitution);
   }
 
   template <bool kFixed>
@@ -155,13 +154,12 @@ struct RowSetup {
       p.normal_impulse = kept.normal;
       p.friction_x = dot(friction, row->tangent);
       p.friction_y = dot(friction, row->bitangent);
-      p.peak_impulse = 0;
       SolverBody a = start_a, b = start_b;
       const BodyPair pair{&a, &b, &properties.inverse_inertia[row->a],
                           &properties.inverse_inertia[row->b]};
       set_masses<kFixed>(*row, &p, pair);
-      p.rebound = rebound_speed(relative_velocity(pair, p.arm_a, p.arm_b), row->normal, p.distance,
-                                row->a, row->b, restitution);
+      p.rebound = -rebound_speed(relative_velocity(pair, p.arm_a, p.arm_b), row->normal, p.distance,
+                                 row->a, row->b, restitution);
     }
   }
 

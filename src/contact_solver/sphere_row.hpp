@@ -10,17 +10,19 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-struct SphereRow {
-  std::uint32_t a = 0, b = 0;  ///< bodies; a is movable
-  Vec3 normal;                 ///< from b to a
-  Real distance = 0;           ///< [m], at the start of the step
-  Real arm_a = 0, arm_b = 0;   ///< [m], from the centres to the common point
-  Real friction = 0;
-  Real normal_mass = 0, tangent_mass = 0;  ///< [kg]
-  Real rebound = 0;         ///< [m/s], speed of separation that restitution requires; 0: none
+/// Aligned, so that a device reads and writes it in few accesses; what a sweep changes is adjacent.
+struct alignas(4 * sizeof(Real)) SphereRow {
   Vec3 friction_impulse;    ///< [N s], on a, in the tangent plane
   Real normal_impulse = 0;  ///< [N s], on a
-  Real peak_impulse = 0;    ///< [N s], largest normal impulse of the step
+  Vec3 normal;              ///< from b to a
+  Real distance = 0;        ///< [m], at the start of the step
+  Real friction = 0;
+  Real arm_a = 0, arm_b = 0;               ///< [m], from the centres to the common point
+  Real normal_mass = 0, tangent_mass = 0;  ///< [kg]
+  /// [m/s], speed of separation that restitution requires; 0: none. Negative until the contact has
+  /// pushed in this step.
+  Real rebound = 0;
+  std::uint32_t a = 0, b = 0;  ///< bodies; a is movable
 };
 
 /// `kFixed`: body b does not move.
@@ -95,7 +97,7 @@ JFPX_HD inline void solve(SphereRow* row, SolverBody* a, SolverBody* b, const St
   const Real normal_impulse = wanted > 0 ? wanted : Real(0);
   const Real along = normal_impulse - row->normal_impulse;
   row->normal_impulse = normal_impulse;
-  if (normal_impulse > row->peak_impulse) row->peak_impulse = normal_impulse;
+  if (normal_impulse > 0 && row->rebound < 0) row->rebound = -row->rebound;
   apply<kFixed>(*row, n * along + tangential, tangential, a, b);
   if (bias.projection > 0) {
     const Vec3 impulse = n * (bias.projection * row->normal_mass);
@@ -108,7 +110,7 @@ JFPX_HD inline void solve(SphereRow* row, SolverBody* a, SolverBody* b, const St
 /// not kept for the next step.
 template <bool kFixed>
 JFPX_HD inline void restitute(const SphereRow& row, SolverBody* a, SolverBody* b) {
-  if (!(row.rebound > 0 && row.peak_impulse > 0)) return;
+  if (!(row.rebound > 0)) return;
   const Real closing = dot(relative_velocity<kFixed>(row, *a, *b), row.normal);
   const Real change = row.normal_mass * (row.rebound - closing);
   const Real along = change > -row.normal_impulse ? change : -row.normal_impulse;

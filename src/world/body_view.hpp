@@ -89,8 +89,10 @@ struct BodyView {
   /// @param orientation_now at the start of the substep
   JFPX_HD void accelerate(std::uint32_t i, const Quat& orientation_now, Vec3* v, Vec3* w) const {
     *v = detail::integrated_velocity(*v, last_acceleration[i], substep, velocity_kept[i]);
-    *w = detail::integrated_velocity(*w, inverse_inertia[i] * torque[i], substep,
-                                     angular_velocity_kept[i]);
+    // A product of the inertia with 0 is +0; it is not read then.
+    const bool is_driven = !(torque[i] == Vec3{});
+    const Vec3 angular = is_driven ? inverse_inertia[i] * torque[i] : Vec3{};
+    *w = detail::integrated_velocity(*w, angular, substep, angular_velocity_kept[i]);
     if (!(tensor[i](0, 0) > 0)) return;
     // Unlike precessed(), this does not rotate the velocity to and fro: rounding makes axes not
     // quite orthonormal, always to the same side, and with many substeps energy would grow

@@ -1,8 +1,6 @@
 /// Bounds of the motion of sub-shapes during a step.
 #pragma once
 
-#include <jfpx/intersect.hpp>
-
 #include "src/collide/speculative.hpp"
 #include "src/world/sub_shape_view.hpp"
 
@@ -83,12 +81,13 @@ struct NearBounds {
     if (!(length_squared(swept[i].centre - swept[fixed].centre) <=
           most * most * (1 + 64 * kEpsilon)))
       return false;
-    // The bounding sphere of a wide floor contains everything above it.
+    // The bounding sphere of a wide floor contains everything above it. During the step, no point
+    // of the box is farther than 2 * moved from the box at the start.
     const Real moved = swept[fixed].radius - sub_shapes.bounds(fixed).radius;
     const PosedBox& box = sub_shapes.box(fixed);
     const Real far = length(box.pose.origin) + swept[fixed].radius + length(swept[i].centre);
     const Real radius = swept[i].radius + 2 * moved + 16 * kEpsilon * far;
-    return may_touch(SphereInstance{swept[i].centre, radius}, box.box, box.pose);
+    return detail::distance_to_box(swept[i].centre, radius, box.box, box.pose).distance <= 0;
   }
 
  private:

@@ -24,6 +24,10 @@ class HostTeam {
     for (std::uint32_t i = start; i < n; ++i) f(i);
     for (std::uint32_t i = start; i-- > 0;) f(i);
   }
+  std::uint32_t first() const { return 0; }
+  std::uint32_t stride() const { return 1; }
+  void sync() const {}
+  const std::uint32_t* cached_bins(const std::uint32_t* numbers) const { return numbers; }
   template <class F>
   void once(const F& f) const {
     f();

@@ -6,6 +6,9 @@ jfpx_add_test(world_parts_test INTERNAL SOURCES
   world/indexed_priority_queue_test.cpp
   world/query_tree_test.cpp)
 jfpx_add_test(device_world_test INTERNAL SOURCES world/device_world_test.cpp)
+if(JFPX_HAS_CUDA)
+  jfpx_add_test(device_fault_test INTERNAL SOURCES world/device_fault_test.cpp LINK jfpx_cuda CUDA::cudart_static)
+endif()
 jfpx_add_test(world_test SOURCES
   world/box_test.cpp
   world/buoyancy_test.cpp

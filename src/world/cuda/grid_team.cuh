@@ -23,9 +23,52 @@ class GridTeam {
   }
 
   /// @param scratch device memory of scratch_words()
-  explicit JFPX_HD GridTeam(std::uint32_t* scratch) : block_sums_(scratch) {
+  /// @param is_cluster whether all blocks are one cluster, whose barrier is faster
+  JFPX_HD GridTeam(std::uint32_t* scratch, bool is_cluster)
+      : block_sums_(scratch), is_cluster_(is_cluster) {
 #if defined(__CUDA_ARCH__)
     block_bins_ = scratch + gridDim.x;
+#endif
+  }
+
+  /// The items of this thread are first(), first() + stride(), ...; the caller synchronizes.
+  JFPX_HD std::uint32_t first() const {
+#if defined(__CUDA_ARCH__)
+    return blockIdx.x * kThreads + threadIdx.x;
+#else
+    return 0;
+#endif
+  }
+  JFPX_HD std::uint32_t stride() const {
+#if defined(__CUDA_ARCH__)
+    return gridDim.x * kThreads;
+#else
+    return 1;
+#endif
+  }
+  /// Barrier of all threads. Writes before it are visible to all threads after it.
+  JFPX_HD void sync() const {
+#if defined(__CUDA_ARCH__)
+    namespace cg = cooperative_groups;
+    if (gridDim.x == 1) {
+      __syncthreads();
+    } else if (is_cluster_) {
+      __threadfence();  // the blocks have different first-level caches
+      cg::this_cluster().sync();
+    } else {
+      cg::this_grid().sync();
+    }
+#endif
+  }
+  /// A copy of an array of device::kBins + 1 numbers in fast memory. At most one exists at a time.
+  JFPX_HD const std::uint32_t* cached_bins(const std::uint32_t* numbers) const {
+#if defined(__CUDA_ARCH__)
+    __shared__ std::uint32_t copy[device::kBins + 1];
+    for (std::uint32_t i = threadIdx.x; i <= device::kBins; i += kThreads) copy[i] = numbers[i];
+    __syncthreads();
+    return copy;
+#else
+    return numbers;
 #endif
   }
 
@@ -143,8 +186,6 @@ class GridTeam {
 
  private:
 #if defined(__CUDA_ARCH__)
-  __device__ static void sync() { cooperative_groups::this_grid().sync(); }
-
   /// The items of this block.
   __device__ static device::Range chunk_of(std::uint32_t n) {
     const std::uint32_t tiles = (n + kThreads - 1) / kThreads;
@@ -195,6 +236,7 @@ class GridTeam {
 
   std::uint32_t* block_sums_;
   std::uint32_t* block_bins_ = nullptr;  ///< by block and bin
+  bool is_cluster_;
 };
 
 }  // namespace cuda

@@ -1,11 +1,13 @@
 /// The world on a CUDA device: launches of the programs of a step.
 #include "src/base/cuda/device_buffer.hpp"
+#include "src/base/cuda/device_code.hpp"
 #include "src/base/cuda/probe.hpp"
 #include "src/world/cuda/grid_team.cuh"
 #include "src/world/cuda/world_cuda.hpp"
 #include "src/world/device/device_step.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -13,10 +15,14 @@ namespace cuda {
 namespace {
 
 template <class Program>
-__global__ void __launch_bounds__(GridTeam::kThreads)
-    run_program(const __grid_constant__ Program program, std::uint32_t* scratch) {
-  program(GridTeam(scratch));
+__global__ void __launch_bounds__(GridTeam::kThreads, 3)
+    run_program(const __grid_constant__ Program program, std::uint32_t* scratch, bool is_cluster) {
+  program(GridTeam(scratch, is_cluster));
 }
+
+/// Launches of up to this number of blocks use one cluster. More than 8 are not portable, and all
+/// Hopper GPUs support 16.
+constexpr unsigned kClusterBlocks = 16;
 
 int usable_device(int device) {
   const BackendStatus status = probe(device);
@@ -66,24 +72,30 @@ class CudaDevice {
   template <class Program>
   void run(const Program& program, std::size_t items) {
     const DeviceGuard guard(device_);
-    int resident = 0;
-    JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, run_program<Program>,
-                                                                GridTeam::kThreads, 0));
-    const std::size_t most =
-        static_cast<std::size_t>(resident) * static_cast<unsigned>(processors_);
+    const Launch& limits = limits_of<Program>();
     const std::size_t wanted = (items + GridTeam::kThreads - 1) / GridTeam::kThreads;
-    const auto blocks = static_cast<unsigned>(std::clamp<std::size_t>(wanted, 1, most));
+    auto blocks = static_cast<unsigned>(std::clamp<std::size_t>(wanted, 1, limits.most_blocks));
+    if (limits.has_clusters && blocks <= 2 * kClusterBlocks) {
+      blocks = std::min(blocks, kClusterBlocks);
+    }
+    const bool is_cluster = limits.has_clusters && blocks > 1 && blocks <= kClusterBlocks;
     scratch_.reserve(pool_, stream_.get(), GridTeam::scratch_words(blocks), "scratch memory");
-    cudaLaunchAttribute cooperative{};
-    cooperative.id = cudaLaunchAttributeCooperative;
-    cooperative.val.cooperative = 1;
+    cudaLaunchAttribute attribute{};
+    if (is_cluster) {
+      attribute.id = cudaLaunchAttributeClusterDimension;
+      attribute.val.clusterDim = {blocks, 1, 1};
+    } else {
+      attribute.id = cudaLaunchAttributeCooperative;
+      attribute.val.cooperative = 1;
+    }
     cudaLaunchConfig_t config{};
     config.gridDim = blocks;
     config.blockDim = GridTeam::kThreads;
     config.stream = stream_.get();
-    config.attrs = &cooperative;
+    config.attrs = &attribute;
     config.numAttrs = 1;
-    JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, run_program<Program>, program, scratch_.data()));
+    JFPX_CUDA_TRY(
+        cudaLaunchKernelEx(&config, run_program<Program>, program, scratch_.data(), is_cluster));
   }
 
   void wait() {
@@ -92,6 +104,30 @@ class CudaDevice {
   }
 
  private:
+  /// What a launch of a program can use.
+  struct Launch {
+    std::size_t most_blocks = 0;  ///< that are resident at the same time; 0: not yet known
+    bool has_clusters = false;
+  };
+
+  template <class Program>
+  const Launch& limits_of() {
+    Launch& limits = std::get<Limits<Program>>(limits_);
+    if (limits.most_blocks > 0) return limits;
+    int resident = 0;
+    JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, run_program<Program>,
+                                                                GridTeam::kThreads, 0));
+    limits.has_clusters = has_hopper_code();
+    if (limits.has_clusters) {
+      JFPX_CUDA_TRY(cudaFuncSetAttribute(run_program<Program>,
+                                         cudaFuncAttributeNonPortableClusterSizeAllowed, 1));
+    }
+    limits.most_blocks = static_cast<std::size_t>(resident) * static_cast<unsigned>(processors_);
+    return limits;
+  }
+  template <class Program>
+  struct Limits : Launch {};
+
   template <class T>
   void transfer(T* to, const T* from, std::size_t count, cudaMemcpyKind kind) {
     if (count == 0) return;
@@ -105,6 +141,11 @@ class CudaDevice {
   DeviceSphereCollider collider_;
   DeviceBuffer<std::uint32_t> scratch_;
   int processors_ = 0;
+  std::tuple<Limits<device::BoundsProgram>, Limits<device::SphereProgram>,
+             Limits<device::ShapeProgram>, Limits<device::MatchProgram>,
+             Limits<device::PrepareProgram>, Limits<device::SolveProgram>,
+             Limits<device::CommitProgram>>
+      limits_;
 };
 
 }  // namespace

@@ -30,8 +30,8 @@ struct BoundsProgram {
   }
 };
 
-/// Makes the contact set of the pairs of swept bounds, and of all pairs with fixed sub-shapes.
-struct ContactProgram {
+/// Makes the contacts of two spheres from the pairs of swept bounds.
+struct SphereProgram {
   StepData data;
 
   template <class Team>
@@ -48,14 +48,58 @@ struct ContactProgram {
       });
       return;
     }
-    find_spheres(team);
-    find_candidates(team);
+    const auto pairs = static_cast<std::uint32_t>(d.pair_count->contacts);
+    team.for_each(pairs, [&](std::uint32_t i) { test(i); });
+    const std::uint32_t found = team.scan(
+        pairs, [&](std::uint32_t i) { return d.pair_kind[i] == PairResultKind::spheres ? 1u : 0u; },
+        [&](std::uint32_t i, std::uint32_t place) {
+          if (d.pair_kind[i] != PairResultKind::spheres || place >= d.capacity.spheres) return;
+          const std::uint32_t *bodies = d.near.sub_shapes.bodies, a = bodies[d.pairs[i].a],
+                              b = bodies[d.pairs[i].b];
+          const NormalDistance result = d.pair_results[i];
+          d.now.view.spheres[place] = {{a, b, 0, 0}, result.normal, result.distance};
+        });
     team.once([&] {
       Counters& c = *d.counters;
-      c.needed.spheres = c.spheres;
-      c.needed.candidates = c.candidates;
-      if (c.spheres > d.capacity.spheres || c.candidates > d.capacity.candidates) c.failed = 1;
+      c.spheres = c.needed.spheres = found;
+      if (found > d.capacity.spheres) c.failed = 1;
     });
+  }
+
+ private:
+  JFPX_HD void test(std::uint32_t i) const {
+    const StepData& d = data;
+    const SpherePair pair = d.pairs[i];
+    const PairKind kind = d.near.kind_of(pair.a, pair.b);
+    PairResultKind result =
+        kind == PairKind::none ? PairResultKind::ignored : PairResultKind::candidate;
+    if (kind == PairKind::spheres) {
+      const std::uint8_t* sensor = d.step.bodies.sensor;
+      const std::uint32_t* bodies = d.near.sub_shapes.bodies;
+      const bool any_sensor = sensor[bodies[pair.a]] != 0 || sensor[bodies[pair.b]] != 0;
+      const detail::SpeculativeContact contact = d.near.test_spheres(pair.a, pair.b);
+      if (!contact.found || (any_sensor && !(contact.distance <= 0))) {
+        result = PairResultKind::ignored;
+      } else {
+        result = any_sensor ? PairResultKind::sensor : PairResultKind::spheres;
+        d.pair_results[i] = {contact.normal, contact.distance};
+      }
+    }
+    d.pair_kind[i] = result;
+    if (result == PairResultKind::candidate) d.counters->any_candidate_pair = 1;
+    if (result == PairResultKind::sensor) d.counters->any_sensor_pair = 1;
+  }
+};
+
+/// Makes the contacts of all other sub-shapes.
+struct ShapeProgram {
+  StepData data;
+
+  template <class Team>
+  JFPX_HD void operator()(const Team& team) const {
+    if (data.has_failed()) return;
+    const StepData& d = data;
+    find_candidates(team);
     if (d.counters->failed != 0) return;
     team.for_each(d.counters->candidates,
                   [&](std::uint32_t i) { NearPairTest(d.near, &d.tested[i])(d.candidates[i]); });
@@ -65,43 +109,8 @@ struct ContactProgram {
   }
 
  private:
-  enum Kind : std::uint8_t { kIgnored, kSpheres, kSensor, kCandidate };
-
   JFPX_HD std::uint32_t pair_count() const {
     return static_cast<std::uint32_t>(data.pair_count->contacts);
-  }
-
-  template <class Team>
-  JFPX_HD void find_spheres(const Team& team) const {
-    const StepData& d = data;
-    const BodyView& bodies = d.step.bodies;
-    const SubShapeView& sub_shapes = d.near.sub_shapes;
-    team.for_each(pair_count(), [&](std::uint32_t i) {
-      const SpherePair pair = d.pairs[i];
-      const PairKind kind = d.near.kind_of(pair.a, pair.b);
-      Kind result = kind == PairKind::none ? kIgnored : kCandidate;
-      if (kind == PairKind::spheres) {
-        const bool any_sensor = bodies.sensor[sub_shapes.body(pair.a)] != 0 ||
-                                bodies.sensor[sub_shapes.body(pair.b)] != 0;
-        const detail::SpeculativeContact contact = d.near.test_spheres(pair.a, pair.b);
-        result = !contact.found          ? kIgnored
-                 : !any_sensor           ? kSpheres
-                 : contact.distance <= 0 ? kSensor
-                                         : kIgnored;
-      }
-      d.pair_kind[i] = result;
-    });
-    const std::uint32_t found = team.scan(
-        pair_count(), [&](std::uint32_t i) { return d.pair_kind[i] == kSpheres ? 1u : 0u; },
-        [&](std::uint32_t i, std::uint32_t place) {
-          if (d.pair_kind[i] != kSpheres || place >= d.capacity.spheres) return;
-          const SpherePair pair = d.pairs[i];
-          const detail::SpeculativeContact contact = d.near.test_spheres(pair.a, pair.b);
-          d.now.view.spheres[place] = {{sub_shapes.body(pair.a), sub_shapes.body(pair.b), 0, 0},
-                                       contact.normal,
-                                       contact.distance};
-        });
-    team.once([&] { d.counters->spheres = found; });
   }
 
   template <class Team>
@@ -109,12 +118,15 @@ struct ContactProgram {
     const StepData& d = data;
     const BodyView& bodies = d.step.bodies;
     const SubShapeView& sub_shapes = d.near.sub_shapes;
-    const std::uint32_t of_pairs = team.scan(
-        pair_count(), [&](std::uint32_t i) { return d.pair_kind[i] == kCandidate ? 1u : 0u; },
-        [&](std::uint32_t i, std::uint32_t place) {
-          if (d.pair_kind[i] != kCandidate || place >= d.capacity.candidates) return;
-          d.candidates[place] = ordered(bodies, sub_shapes, d.pairs[i].a, d.pairs[i].b);
-        });
+    const auto is_candidate = [&](std::uint32_t i) {
+      return d.pair_kind[i] == PairResultKind::candidate ? 1u : 0u;
+    };
+    const std::uint32_t of_pairs =
+        team.scan(d.counters->any_candidate_pair != 0 ? pair_count() : 0, is_candidate,
+                  [&](std::uint32_t i, std::uint32_t place) {
+                    if (is_candidate(i) == 0 || place >= d.capacity.candidates) return;
+                    d.candidates[place] = ordered(bodies, sub_shapes, d.pairs[i].a, d.pairs[i].b);
+                  });
     const auto for_each_met = [&](std::uint32_t i, const auto& visit) {
       const std::uint32_t body = sub_shapes.body(i);
       if (!bodies.movable(body)) return;
@@ -143,7 +155,11 @@ struct ContactProgram {
                                                  ++place;
                                                });
                                              });
-    team.once([&] { d.counters->candidates = of_pairs + of_fixed; });
+    team.once([&] {
+      Counters& c = *d.counters;
+      c.candidates = c.needed.candidates = of_pairs + of_fixed;
+      if (c.candidates > d.capacity.candidates) c.failed = 1;
+    });
   }
 
   /// Lists the points of World::contacts(), except contacts of two spheres.
@@ -169,19 +185,22 @@ struct ContactProgram {
                                 near.touches[k].distance};
           }
         });
+    const auto is_sensor = [&](std::uint32_t i) {
+      return d.pair_kind[i] == PairResultKind::sensor ? 1u : 0u;
+    };
     const std::uint32_t of_sensors = team.scan(
-        pair_count(), [&](std::uint32_t i) { return d.pair_kind[i] == kSensor ? 1u : 0u; },
+        d.counters->any_sensor_pair != 0 ? pair_count() : 0, is_sensor,
         [&](std::uint32_t i, std::uint32_t before) {
           const std::uint32_t place = of_candidates + before;
-          if (d.pair_kind[i] != kSensor || place >= d.capacity.touches) return;
+          if (is_sensor(i) == 0 || place >= d.capacity.touches) return;
           const std::uint32_t a = d.pairs[i].a, b = d.pairs[i].b;
-          const detail::SpeculativeContact contact = d.near.test_spheres(a, b);
+          const NormalDistance result = d.pair_results[i];
           d.touches[place] = {{sub_shapes.body(a), sub_shapes.body(b), a, b},
                               0,
                               1,
-                              contact.normal,
-                              middle_point(contact.normal, contact.distance, sub_shapes.bounds(b)),
-                              contact.distance};
+                              result.normal,
+                              middle_point(result.normal, result.distance, sub_shapes.bounds(b)),
+                              result.distance};
         });
     const std::uint32_t stored =
         of_candidates < d.capacity.touches ? of_candidates : d.capacity.touches;

@@ -152,6 +152,7 @@ class DeviceStep final : public DeviceWorld {
  private:
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
+  static constexpr std::size_t kManyContacts = 65536;
 
   struct Properties {
     Buffer<Real> radius, extent, inverse_mass, friction, restitution, rolling_friction,
@@ -203,7 +204,8 @@ class DeviceStep final : public DeviceWorld {
     Buffer<SphereInstance> swept;
     Buffer<SpherePair> pairs;
     Buffer<cuda::ContactCount> pair_count;
-    Buffer<std::uint8_t> pair_kind;
+    Buffer<PairResultKind> pair_kind;
+    Buffer<NormalDistance> pair_results;
     Buffer<Candidate> candidates;
     Buffer<NearPair> tested;
     Buffer<Range> bucket;
@@ -379,6 +381,7 @@ class DeviceStep final : public DeviceWorld {
     d.capacity = c;
     d.pairs = room(&s.pairs, c.pairs);
     d.pair_kind = room(&s.pair_kind, c.pairs);
+    d.pair_results = room(&s.pair_results, c.pairs);
     d.candidates = room(&s.candidates, c.candidates);
     d.tested = room(&s.tested, c.candidates);
     d.order = room(&s.order, c.candidates);
@@ -442,10 +445,12 @@ class DeviceStep final : public DeviceWorld {
     device_->run(BoundsProgram{d}, std::max(bodies, sub_shapes));
     device_->find_pairs(d.near.swept, d.near.sub_shapes.fixed_begin, d.pairs, capacity_.pairs,
                         d.pair_count);
-    device_->run(ContactProgram{d}, contacts);
+    device_->run(SphereProgram{d}, contacts);
+    device_->run(ShapeProgram{d}, contacts);
     device_->run(MatchProgram{d}, contacts);
     device_->run(PrepareProgram{d}, contacts);
-    device_->run(SolveProgram{d}, contacts);
+    // One color at a time. Of many blocks, the barrier takes longer than the rows (measured).
+    device_->run(SolveProgram{d}, contacts / (contacts < kManyContacts ? 4 : 12));
     device_->run(CommitProgram{d}, contacts);
   }
 

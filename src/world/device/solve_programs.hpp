@@ -164,14 +164,14 @@ struct PrepareProgram {
         r < begin[soft_step::kFixedGroup] ? setup.fill<false>(&row, contact)
                                           : setup.fill<true>(&row, contact);
         d.sphere_rows[r] = row;
-        rebounds = row.rebound > 0;
+        rebounds = row.rebound < 0;
       } else {
         soft_step::ManifoldRow* row = &d.manifold_rows[r - manifolds];
         soft_step::PointRow* points = d.point_rows + row->first;
         const bool has_color = r < begin[soft_step::kGroups + soft_step::kFixedGroup];
         has_color ? setup.fill<false>(row, points, contact)
                   : setup.fill<true>(row, points, contact);
-        for (std::uint32_t p = 0; p < row->count; ++p) rebounds |= points[p].rebound > 0;
+        for (std::uint32_t p = 0; p < row->count; ++p) rebounds |= points[p].rebound < 0;
       }
       if (rebounds) d.counters->any_rebound = 1;
     });
@@ -192,22 +192,23 @@ struct SolveProgram {
     if (data.has_failed()) return;
     const StepData& d = data;
     const BodyView& bodies = d.step.bodies;
+    const Sweep sweep{team.cached_bins(d.counters->bin_begin), d.counters->last_group,
+                      d.counters->fixed_bodies};
     for (std::uint32_t substep = 0; substep < d.substeps; ++substep) {
       team.for_each(bodies.count,
                     [&](std::uint32_t i) { d.step.accelerate(bodies.ids[i].index, substep == 0); });
-      if (substep == 0) sweep(team, WarmStart{});
-      sweep(team, Solve{d.constants, true});
+      if (substep == 0) run(team, sweep, WarmStart{});
+      run(team, sweep, Solve<true>{d.constants});
       team.for_each(bodies.count, [&](std::uint32_t i) { d.step.move(bodies.ids[i].index); });
-      sweep(team, Solve{d.constants, false});
+      run(team, sweep, Solve<false>{d.constants});
     }
-    if (d.counters->any_rebound != 0) sweep(team, Restitute{});
+    if (d.counters->any_rebound != 0) run(team, sweep, Restitute{});
     const soft_step::RowSetup setup = d.row_setup();
-    const std::uint32_t manifolds = d.counters->bin_begin[soft_step::kGroups];
-    team.for_each(d.counters->bin_begin[kBins], [&](std::uint32_t r) {
-      if (r < manifolds) {
+    team.for_each(sweep.begin[kBins], [&](std::uint32_t r) {
+      if (r < sweep.first_manifold()) {
         setup.store(d.sphere_rows[r], d.row_contact[r]);
       } else {
-        const soft_step::ManifoldRow& row = d.manifold_rows[r - manifolds];
+        const soft_step::ManifoldRow& row = d.manifold_rows[r - sweep.first_manifold()];
         setup.store(row, d.point_rows + row.first, d.row_contact[r]);
       }
     });
@@ -215,6 +216,7 @@ struct SolveProgram {
 
  private:
   struct WarmStart {
+    static constexpr bool kChangesRow = false, kMoves = false;
     template <bool kFixed>
     JFPX_HD void run(soft_step::SphereRow* row, soft_step::SolverBody* a,
                      soft_step::SolverBody* b) const {
@@ -226,21 +228,24 @@ struct SolveProgram {
       soft_step::warm_start<kFixed>(*row, points, pair);
     }
   };
+  /// @tparam kSoft whether penetrations are pushed out
+  template <bool kSoft>
   struct Solve {
-    soft_step::StepConstants constants;
-    bool soft;
+    static constexpr bool kChangesRow = true, kMoves = kSoft;
+    const soft_step::StepConstants& constants;
     template <bool kFixed>
     JFPX_HD void run(soft_step::SphereRow* row, soft_step::SolverBody* a,
                      soft_step::SolverBody* b) const {
-      soft_step::solve<kFixed>(row, a, b, constants, soft);
+      soft_step::solve<kFixed>(row, a, b, constants, kSoft);
     }
     template <bool kFixed>
     JFPX_HD void run(soft_step::ManifoldRow* row, soft_step::PointRow* points,
                      const soft_step::BodyPair& pair) const {
-      soft_step::solve<kFixed>(row, points, pair, constants, soft);
+      soft_step::solve<kFixed>(row, points, pair, constants, kSoft);
     }
   };
   struct Restitute {
+    static constexpr bool kChangesRow = false, kMoves = false;
     template <bool kFixed>
     JFPX_HD void run(soft_step::SphereRow* row, soft_step::SolverBody* a,
                      soft_step::SolverBody* b) const {
@@ -253,55 +258,127 @@ struct SolveProgram {
     }
   };
 
-  /// One row. @param r number of the row among the rows of both kinds
+  /// Writes what an operation has changed of a body.
+  /// @param shift that of the body before
+  template <class Operation>
+  JFPX_HD static void store(const soft_step::SolverBody& body, const Vec3& shift,
+                            soft_step::SolverBody* to) {
+    to->velocity = body.velocity;
+    to->inverse_mass = body.inverse_mass;
+    to->angular_velocity = body.angular_velocity;
+    to->inverse_inertia = body.inverse_inertia;
+    if constexpr (Operation::kMoves) {
+      if (!(shift == body.shift)) to->shift = body.shift;
+    }
+  }
+
+  /// The rows of the step.
+  struct Sweep {
+    const std::uint32_t* begin;  ///< Counters::bin_begin
+    std::uint32_t last_group;
+    std::uint32_t fixed_bodies;
+    JFPX_HD std::uint32_t first_manifold() const { return begin[soft_step::kGroups]; }
+    /// Number of rows of a group of either kind.
+    JFPX_HD std::uint32_t spheres(std::uint32_t group) const {
+      return begin[group + 1] - begin[group];
+    }
+    JFPX_HD std::uint32_t manifolds(std::uint32_t group) const {
+      return spheres(soft_step::kGroups + group);
+    }
+  };
+
+  /// @param row a copy of row r, because the compiler can't know that rows and bodies do not
+  /// overlap
   template <bool kFixed, class Operation>
-  JFPX_HD void run_row(const Operation& operation, std::uint32_t r) const {
-    const StepData& d = data;
-    const std::uint32_t manifolds = d.counters->bin_begin[soft_step::kGroups];
-    soft_step::SolverBody* bodies = d.step.solver;
-    if (r < manifolds) {
-      soft_step::SphereRow* row = &d.sphere_rows[r];
-      operation.template run<kFixed>(row, &bodies[row->a], &bodies[row->b]);
+  JFPX_HD void run_row(const Operation& operation, std::uint32_t r,
+                       soft_step::SphereRow row) const {
+    soft_step::SphereRow* at = &data.sphere_rows[r];
+    soft_step::SolverBody* bodies = data.step.solver;
+    soft_step::SolverBody a = bodies[row.a], b = bodies[row.b];
+    const Vec3 shift_a = a.shift, shift_b = b.shift;
+    const Real rebound = row.rebound;
+    operation.template run<kFixed>(&row, &a, &b);
+    store<Operation>(a, shift_a, &bodies[row.a]);
+    if constexpr (!kFixed) store<Operation>(b, shift_b, &bodies[row.b]);
+    if constexpr (Operation::kChangesRow) {
+      at->friction_impulse = row.friction_impulse;
+      at->normal_impulse = row.normal_impulse;
+      if (rebound != row.rebound) at->rebound = row.rebound;
+    }
+  }
+
+  /// @param m index in manifold_rows
+  template <bool kFixed, class Operation>
+  JFPX_HD void run_manifold(const Operation& operation, std::uint32_t m) const {
+    soft_step::ManifoldRow* row = &data.manifold_rows[m];
+    soft_step::SolverBody* bodies = data.step.solver;
+    const Mat3* inertia = data.step.bodies.inverse_inertia;
+    operation.template run<kFixed>(
+        row, data.point_rows + row->first,
+        soft_step::BodyPair{&bodies[row->a], &bodies[row->b], &inertia[row->a], &inertia[row->b]});
+  }
+
+  /// @param r number of the row among the rows of both kinds
+  template <bool kFixed, class Operation>
+  JFPX_HD void run_any(const Sweep& sweep, const Operation& operation, std::uint32_t r) const {
+    if (r < sweep.first_manifold()) {
+      run_row<kFixed>(operation, r, data.sphere_rows[r]);
     } else {
-      soft_step::ManifoldRow* row = &d.manifold_rows[r - manifolds];
-      const Mat3* inertia = d.step.bodies.inverse_inertia;
-      operation.template run<kFixed>(row, d.point_rows + row->first,
-                                     soft_step::BodyPair{&bodies[row->a], &bodies[row->b],
-                                                         &inertia[row->a], &inertia[row->b]});
+      run_manifold<kFixed>(operation, r - sweep.first_manifold());
     }
   }
 
   /// All rows in the order of soft_step::SoftStepSolver.
   template <class Team, class Operation>
-  JFPX_HD void sweep(const Team& team, const Operation& operation) const {
+  JFPX_HD void run(const Team& team, const Sweep& sweep, const Operation& operation) const {
     const StepData& d = data;
-    const std::uint32_t* begin = d.counters->bin_begin;
     constexpr std::uint32_t kManifolds = soft_step::kGroups;
-    if (begin[1] > begin[0] || begin[kManifolds + 1] > begin[kManifolds]) {
+    if (sweep.spheres(0) + sweep.manifolds(0) > 0) {
       team.once([&] {
-        for (std::uint32_t r = begin[0]; r < begin[1]; ++r) run_row<false>(operation, r);
-        for (std::uint32_t r = begin[kManifolds]; r < begin[kManifolds + 1]; ++r) {
-          run_row<false>(operation, r);
+        for (const std::uint32_t bin : {0u, kManifolds}) {
+          for (std::uint32_t r = sweep.begin[bin]; r < sweep.begin[bin + 1]; ++r) {
+            run_any<false>(sweep, operation, r);
+          }
         }
       });
     }
-    const std::uint32_t last_group = d.counters->last_group;
-    for (std::uint32_t group = 1; group <= last_group; ++group) {
-      const std::uint32_t first = begin[group], spheres = begin[group + 1] - first;
-      const std::uint32_t first_manifold = begin[kManifolds + group];
-      const std::uint32_t manifolds = begin[kManifolds + group + 1] - first_manifold;
-      if (spheres + manifolds == 0) continue;
-      team.for_each(spheres + manifolds, [&](std::uint32_t i) {
-        run_row<false>(operation, i < spheres ? first + i : first_manifold + (i - spheres));
-      });
-    }
-    if (d.counters->fixed_bodies == 0) return;
-    team.for_each(d.counters->fixed_bodies, [&](std::uint32_t i) {
+    run_colors(team, sweep, operation);
+    if (sweep.fixed_bodies == 0) return;
+    team.for_each(sweep.fixed_bodies, [&](std::uint32_t i) {
       const Range range = d.bucket[d.fixed_bodies[i]];
       for (std::uint32_t k = range.begin; k < range.end; ++k) {
-        run_row<true>(operation, d.fixed[k].row);
+        run_any<true>(sweep, operation, d.fixed[k].row);
       }
     });
+  }
+
+  /// A thread reads its first row of a color before the barrier, to hide the latency of the read:
+  /// no other row changes it.
+  template <class Team, class Operation>
+  JFPX_HD void run_colors(const Team& team, const Sweep& sweep, const Operation& operation) const {
+    const StepData& d = data;
+    soft_step::SphereRow next;
+    const auto read_ahead = [&](std::uint32_t group) {
+      if (group <= sweep.last_group && team.first() < sweep.spheres(group)) {
+        next = d.sphere_rows[sweep.begin[group] + team.first()];
+      }
+    };
+    read_ahead(1);
+    for (std::uint32_t group = 1; group <= sweep.last_group; ++group) {
+      const std::uint32_t spheres = sweep.spheres(group), all = spheres + sweep.manifolds(group);
+      const std::uint32_t first = sweep.begin[group];
+      const std::uint32_t manifold =
+          sweep.begin[soft_step::kGroups + group] - sweep.first_manifold();
+      for (std::uint32_t i = team.first(); i < all; i += team.stride()) {
+        if (i >= spheres) {
+          run_manifold<false>(operation, manifold + (i - spheres));
+        } else {
+          run_row<false>(operation, first + i, i == team.first() ? next : d.sphere_rows[first + i]);
+        }
+      }
+      read_ahead(group + 1);
+      if (all > 0) team.sync();
+    }
   }
 };
 

@@ -34,6 +34,8 @@ struct Counters {
   std::uint32_t invalid_bounds = 0;  ///< 1: swept bounds are not finite, the step has no effect
   Capacity needed;
 
+  std::uint32_t any_candidate_pair = 0;  ///< 1: a pair of bounds is a candidate
+  std::uint32_t any_sensor_pair = 0;     ///< 1: a pair of bounds is of spheres, one a sensor
   std::uint32_t candidates = 0;
   std::uint32_t touches = 0;
   std::uint32_t uncolored = 0;
@@ -50,6 +52,20 @@ struct Counters {
   std::uint32_t sphere_touches = 0;    ///< items of the list of touches of two spheres
   std::uint32_t awake = 0;             ///< movable bodies awake after the step
   std::uint64_t completed = 0;         ///< StepData::number once the step is complete
+};
+
+/// What a pair of swept bounds becomes.
+enum class PairResultKind : std::uint8_t {
+  ignored,
+  spheres,   ///< a contact of two spheres
+  sensor,    ///< two spheres that touch, at least one of a sensor
+  candidate  ///< a pair of other sub-shapes
+};
+
+/// The contact of two spheres.
+struct NormalDistance {
+  Vec3 normal;
+  Real distance = 0;
 };
 
 /// A point of World::contacts() with its place in the order of that list. Those of two spheres that
@@ -98,7 +114,8 @@ struct StepData {
   Vec3* position_before = nullptr;  ///< by body, at the start of the step
   SpherePair* pairs = nullptr;      ///< of swept bounds
   cuda::ContactCount* pair_count = nullptr;
-  std::uint8_t* pair_kind = nullptr;  ///< by pair
+  PairResultKind* pair_kind = nullptr;     ///< by pair
+  NormalDistance* pair_results = nullptr;  ///< by pair, of spheres and sensors
   Candidate* candidates = nullptr;
   NearPair* tested = nullptr;  ///< by candidate
   Touch* touches = nullptr;
