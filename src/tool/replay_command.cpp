@@ -59,9 +59,7 @@ void add_replay_command(CLI::App& app, int& status) {
                    "native, bullet or bullet-stock [default: the recorded engine]")
       ->check(engine_name());
   add_backend_option(*command, options->run.backend);
-  command->add_option("--threads", options->run.threads, "CPU threads; 0: one per core")
-      ->check(whole_number())
-      ->capture_default_str();
+  add_threads_option(*command, options->run.threads);
   command->add_flag("--hash", options->run.hash, "Print the hash of the final state");
   command->add_flag("--quiet", options->run.quiet, "Print only a difference");
   command->callback([options, &status] { status = replay(*options); });
