@@ -1,5 +1,6 @@
 /// The jfpx command: output, exit statuses, errors and files.
 #include <jfpx/backend.hpp>
+#include <jfpx/recorded_world.hpp>
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
 
@@ -531,6 +532,25 @@ TEST(Tool, ReplayOfVersion01ResolvesWorstFirst) {
   const ProcessResult result = jfpx_command("replay " + path);
   EXPECT_EQ(result.status, 0) << result.output;
   EXPECT_THAT(result.output, HasSubstr("bit for bit"));
+}
+
+TEST(Tool, ReplayRepeatsForcesAndChangesOfBodies) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  RecordedWorld world(path, scenes::make("pile", {.spheres = 20}));
+  world.add_force(Drag{.linear = Real(0.5)});
+  for (int step = 0; step < 20; ++step) {
+    if (step == 5) world.remove(world.world().bodies()[3]);
+    if (step == 7) world.add(BodyDef());
+    if (step == 9) world.apply_force(world.world().bodies()[4], {50, 0, 0});
+    world.step();
+  }
+  world.finish();
+  const ProcessResult result = jfpx_command("replay " + path);
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("bit for bit"));
+  expect_fails("replay --engine " + std::string(JFPX_HAS_BULLET ? "bullet " : "native --x ") + path,
+               2, JFPX_HAS_BULLET ? "only the native engine repeats" : "--x");
 }
 
 TEST(Tool, ReplayStopsAtTheFirstStepThatDiffers) {
