@@ -128,13 +128,18 @@ ConstraintSolver::~ConstraintSolver() = default;
 
 std::unique_ptr<ConstraintSolver> ConstraintSolverTestAccess::make(
     std::unique_ptr<GroupSolver> device, const ConstraintSolverOptions& options) {
+  const auto made = std::make_shared<std::unique_ptr<GroupSolver>>(std::move(device));
+  return make([made] { return std::move(*made); }, GpuIslandSolver::kStartMs, options);
+}
+
+std::unique_ptr<ConstraintSolver> ConstraintSolverTestAccess::make(
+    std::function<std::unique_ptr<GroupSolver>()> make, double start_ms,
+    const ConstraintSolverOptions& options) {
   ConstraintSolverOptions without_gpu = options;
   without_gpu.backend = Backend::cpu;
   auto solver = std::make_unique<ConstraintSolver>(without_gpu);
   ConstraintSolver::Impl& impl = *solver->impl_;
-  const auto made = std::make_shared<std::unique_ptr<GroupSolver>>(std::move(device));
-  impl.device.emplace(
-      options.backend, [made] { return std::move(*made); }, impl.solver.pool().threads());
+  impl.device.emplace(options.backend, std::move(make), impl.solver.pool().threads(), start_ms);
   return solver;
 }
 
