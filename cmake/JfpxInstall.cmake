@@ -83,7 +83,7 @@ function(_jfpx_install_pkg_config file suffix)
   elseif(NOT BUILD_SHARED_LIBS)
     string(APPEND libraries " -pthread")
     if(JFPX_HAS_CUDA)
-      string(APPEND libraries " -L${CUDAToolkit_LIBRARY_DIR} -lcudart_static -ldl -lrt")
+      string(APPEND libraries " -L\${libdir}/jfpx -lcudart_static -ldl -lrt")
     endif()
   endif()
   configure_file(${PROJECT_SOURCE_DIR}/cmake/jfpx.pc.in ${PROJECT_BINARY_DIR}/${file}.pc @ONLY)
@@ -105,6 +105,12 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/jfpx DESTINATION ${CMAKE_INSTALL
   FILES_MATCHING PATTERN *.hpp ${left_out})
 install(FILES ${PROJECT_BINARY_DIR}/include/jfpx/config.hpp
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/jfpx COMPONENT dev)
+
+# Programs that link a static jfpx need the CUDA runtime, but no toolkit.
+if(JFPX_HAS_CUDA AND NOT BUILD_SHARED_LIBS)
+  get_target_property(cudart CUDA::cudart_static IMPORTED_LOCATION)
+  install(FILES ${cudart} DESTINATION ${CMAKE_INSTALL_LIBDIR}/jfpx COMPONENT dev)
+endif()
 
 include(CMakePackageConfigHelpers)
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/jfpx-config.cmake.in

@@ -26,8 +26,8 @@ struct BackendStatus {
 
 /// Probes all backends and returns their status in a fixed order: cpu, cuda. Does not throw for a
 /// missing device and leaves no CUDA error pending. If there is a GPU, the first call starts CUDA,
-/// which takes some tenths of a second; otherwise `automatic` starts it in the first call that uses
-/// the GPU. Thread-safe.
+/// which takes some tenths of a second; otherwise `automatic` starts it on another thread.
+/// Thread-safe.
 JFPX_API std::vector<BackendStatus> available_backends();
 
 /// Returns "auto", "cpu" or "cuda".

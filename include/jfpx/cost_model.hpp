@@ -38,7 +38,9 @@ constexpr double microseconds(const CostTerms& t, const ColliderWork& work) {
 struct CostModel {
   CostTerms x86_all_pairs, x86_sorted_tiles, x86_given_pairs;
   CostTerms cuda_all_pairs, cuda_sorted_tiles, cuda_given_pairs;
-  double cuda_start_ms = 200;  ///< [ms] first use of the device, >= 0
+  /// [ms] First use of the device, >= 0. When the predicted gain exceeds it, another thread starts
+  /// the device while the CPU goes on; 0 states that it is started already, and uses it at once.
+  double cuda_start_ms = 200;
 
   JFPX_API CostModel();
   friend bool operator==(const CostModel&, const CostModel&) = default;

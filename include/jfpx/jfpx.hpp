@@ -13,6 +13,7 @@
 #include <jfpx/particle.hpp>
 #include <jfpx/query.hpp>
 #include <jfpx/random.hpp>
+#include <jfpx/recorded_world.hpp>
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
 #include <jfpx/sphere_collider.hpp>

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -124,6 +125,13 @@ JFPX_HD inline Quat rotated_by(const Quat& q, const Vec3& r) {
 JFPX_HD inline bool is_finite(const Quat& q) {
   return is_finite(q.w) && is_finite(q.x) && is_finite(q.y) && is_finite(q.z);
 }
+/// The unit quaternion that rotates by `angle` [rad] about `axis`, counterclockwise as seen from
+/// the tip of the axis. Uses no functions of the C library, so its bits are the same on all
+/// machines.
+/// @param axis finite and longer than kEpsilon, of any length
+/// @param angle from -10^6 to 10^6
+/// @throws InvalidArgument
+JFPX_API Quat from_axis_angle(const Vec3& axis, Real angle);
 
 /// A 3x3 matrix, stored in row-major order. The default is the identity.
 struct Mat3 {
@@ -169,8 +177,8 @@ JFPX_HD constexpr Mat3 interpolate(const Mat3& a, const Mat3& b, Real t) {
 JFPX_HD constexpr Real determinant(const Mat3& m) {
   return dot(m.row[0], cross(m.row[1], m.row[2]));
 }
-/// Writes the inverse of m to *out. If m is singular, returns false and leaves *out unchanged
-/// (erratum E26).
+/// inverse(m) for device code: writes it to *out. If m is singular, returns false and leaves *out
+/// unchanged (erratum E26).
 JFPX_HD inline bool invert(const Mat3& m, Mat3* out) {
   const Vec3 c0 = cross(m.row[1], m.row[2]);
   const Vec3 c1 = cross(m.row[2], m.row[0]);
@@ -179,6 +187,11 @@ JFPX_HD inline bool invert(const Mat3& m, Mat3* out) {
   if (!(absolute(det) > 0) || !is_finite(Real(1) / det)) return false;
   *out = from_columns(c0, c1, c2) * (Real(1) / det);
   return true;
+}
+/// Inverse of a matrix; empty if the matrix is singular.
+inline std::optional<Mat3> inverse(const Mat3& m) {
+  Mat3 result;
+  return invert(m, &result) ? std::optional(result) : std::nullopt;
 }
 /// Rotation matrix of a unit quaternion: R*v = q v q* (erratum E14 was the transpose).
 JFPX_HD constexpr Mat3 to_matrix(const Quat& q) {
@@ -272,8 +285,8 @@ JFPX_HD constexpr Real determinant(const Mat4& a) {
   return a.m[0][0] * minor_determinant(a, 0, 0) - a.m[0][1] * minor_determinant(a, 0, 1) +
          a.m[0][2] * minor_determinant(a, 0, 2) - a.m[0][3] * minor_determinant(a, 0, 3);
 }
-/// Writes the inverse of a to *out. If a is singular, returns false and leaves *out unchanged
-/// (erratum E26).
+/// inverse(a) for device code: writes it to *out. If a is singular, returns false and leaves *out
+/// unchanged (erratum E26).
 JFPX_HD inline bool invert(const Mat4& a, Mat4* out) {
   const Real det = determinant(a);
   if (!(absolute(det) > 0) || !is_finite(Real(1) / det)) return false;
@@ -287,6 +300,11 @@ JFPX_HD inline bool invert(const Mat4& a, Mat4* out) {
   }
   *out = r;
   return true;
+}
+/// Inverse of a matrix; empty if the matrix is singular.
+inline std::optional<Mat4> inverse(const Mat4& a) {
+  Mat4 result;
+  return invert(a, &result) ? std::optional(result) : std::nullopt;
 }
 /// Writes the matrix in the column-major order of OpenGL: out[4*column + row].
 JFPX_HD constexpr void fill_column_major(const Mat4& a, Real out[16]) {

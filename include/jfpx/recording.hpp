@@ -1,4 +1,5 @@
-/// Recordings of runs: the scene and the state after every step, for replay and comparison.
+/// Recordings of runs: the scene, the state after every step, and the calls that changed the world
+/// between steps, for replay and comparison.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -21,8 +22,10 @@ struct RecordingHeader {
   friend bool operator==(const RecordingHeader&, const RecordingHeader&) = default;
 };
 
-/// Writes a recording frame by frame. finish() creates the complete file under its name; until then
-/// the data are in NAME.part in the same folder, which the destructor removes. Not thread-safe.
+/// Writes the states of a run frame by frame. Replay steps the scene and nothing else: a run that
+/// adds or removes bodies, or has forces, is recorded by RecordedWorld (recorded_world.hpp).
+/// finish() creates the complete file under its name; until then the data are in NAME.part in the
+/// same folder, which the destructor removes. Not thread-safe.
 class JFPX_API RecordingWriter {
  public:
   /// @throws FileError if the file cannot be created
@@ -38,6 +41,11 @@ class JFPX_API RecordingWriter {
   void finish();
 
  private:
+  friend class RecordedWorld;
+  /// @param with_calls selects the format whose frames have calls and any number of bodies
+  RecordingWriter(const std::string& path, const RecordingHeader& header, bool with_calls);
+  void append(std::span<const BodyState> states, const std::string& calls);
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
@@ -56,6 +64,12 @@ class JFPX_API RecordingReader {
   std::uint64_t steps() const;
   /// States after step `step`, from 1 to steps(). @throws InvalidArgument outside that range
   std::vector<BodyState> states(std::uint64_t step);
+  /// Whether any frame has calls: see repeat_calls() in recorded_world.hpp. If not, all frames have
+  /// the bodies of the scene.
+  bool has_calls() const;
+  /// Calls before step `step`, as JSON; empty if there are none.
+  /// @throws InvalidArgument outside 1 to steps()
+  std::string calls(std::uint64_t step);
 
  private:
   struct Impl;

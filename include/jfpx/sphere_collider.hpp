@@ -40,8 +40,9 @@ JFPX_API std::string_view to_string(ChoiceReason reason) noexcept;
 /// Options of make_sphere_collider(). With `Backend::automatic`, backend and algorithm are selected
 /// for each call from `costs` and from the times of the last calls. If CUDA is unavailable, the CPU
 /// computes. If the device fails or runs out of memory, the CPU replaces it permanently and
-/// produces the same bits. The first call that uses a GPU starts CUDA, which takes some tenths of a
-/// second unless available_backends() was called before.
+/// produces the same bits. The start of CUDA takes some tenths of a second, unless
+/// available_backends() was called before: with `automatic` on another thread while the CPU goes on
+/// (see CostModel::cuda_start_ms), with `cuda` in make_sphere_collider().
 struct SphereColliderOptions {
   Backend backend = Backend::automatic;
   SphereAlgorithm algorithm = SphereAlgorithm::automatic;

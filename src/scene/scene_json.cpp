@@ -390,6 +390,14 @@ Json parse(std::string_view text) {
 
 }  // namespace
 
+Json parse_json(std::string_view text) { return parse(text); }
+
+BodyDef body_from_value(const Json& json) {
+  BodyDef body;
+  read(json, "body", body);
+  return body;
+}
+
 Scene from_json(std::string_view text) { return scene_from(parse(text)); }
 
 Scene load_scene(const std::string& path) {

@@ -1,12 +1,13 @@
 /// JSON values of scenes, and the names of shapes in them.
 #pragma once
 
-#include <jfpx/shape.hpp>
+#include <jfpx/body.hpp>
 
 #include <nlohmann/json.hpp>
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace jfpx {
@@ -33,5 +34,13 @@ template <>
 inline constexpr const char* kTypeName<Compound> = "compound";
 
 }  // namespace detail
+
+/// A body as in the JSON of a scene.
+detail::SceneJson body_to_value(const BodyDef& body);
+/// @throws InvalidScene
+BodyDef body_from_value(const detail::SceneJson& json);
+/// Parses a text of bounded depth whose objects have unique keys. @throws InvalidScene
+detail::SceneJson parse_json(std::string_view text);
+
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -86,6 +86,8 @@ Json to_value(const BodyDef& b) {
 
 }  // namespace
 
+Json body_to_value(const BodyDef& body) { return to_value(body); }
+
 std::string to_json(const Scene& scene) {
   validate(scene);
   const SoftStepSettings& s = scene.soft_step;

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <exception>
+#include <system_error>
 #include <utility>
 
 namespace jfpx {
@@ -38,6 +40,15 @@ ChoiceReason choice_reason(TimeChooser::Reason reason) {
   }
   return ChoiceReason::fixed;
 }
+
+/// Index of the collider with a given algorithm.
+std::size_t index_of(SphereAlgorithm algorithm) {
+  return algorithm == SphereAlgorithm::all_pairs ? 0 : 1;
+}
+
+/// Ways that are predicted to take this many times as long as the fastest are not tried on a device
+/// that starts: all pairs of a million spheres would take minutes.
+constexpr double kMaxSlowdown = 4;
 
 }  // namespace
 
@@ -98,12 +109,14 @@ bool AutomaticSphereCollider::reuse_decision(Calls& calls, std::size_t spheres, 
 }
 
 /// Executes `call` with the selected collider, and with the CPU if the device fails.
-template <class Call, class Measure>
+/// @param keep_input returns a function that repeats the call with a copy of its input
+template <class Call, class Measure, class KeepInput>
 auto AutomaticSphereCollider::compute(Calls& calls, const ColliderWork& expected, const Call& call,
-                                      const Measure& measure) {
+                                      const Measure& measure, const KeepInput& keep_input) {
   device_failure_.clear();
   calls.following = 0;
-  start_device_if_it_pays();
+  take_started_device();
+  start_device_if_it_pays(calls, expected, keep_input);
   std::array<double, TimeChooser::kMaxAlternatives> predicted_us{};
   std::ranges::transform(calls.ways, predicted_us.begin(),
                          [&](const Way& way) { return microseconds(way.terms, expected); });
@@ -153,6 +166,11 @@ ContactSpan AutomaticSphereCollider::find_contacts(std::span<const SphereInstanc
         const auto contacts = static_cast<double>(found.size());
         contacts_per_sphere_ = contacts / std::max(n, 1.0);
         return work(contacts);
+      },
+      [&] {
+        return [kept = std::vector(spheres.begin(), spheres.end())](SphereCollider& collider) {
+          collider.find_contacts(kept);
+        };
       });
 }
 
@@ -166,7 +184,13 @@ std::span<const PairContact> AutomaticSphereCollider::find_touching(
   const auto found = compute(
       given_, work,
       [&](SphereCollider& collider) { return collider.find_touching(spheres, pairs); },
-      [&](std::span<const PairContact>) { return work; });
+      [&](std::span<const PairContact>) { return work; },
+      [&] {
+        return [kept = std::vector(spheres.begin(), spheres.end()),
+                kept_pairs = std::vector(pairs.begin(), pairs.end())](SphereCollider& collider) {
+          collider.find_touching(kept, kept_pairs);
+        };
+      });
   transferred_ = given_.by->transferred();
   return found;
 }
@@ -174,12 +198,11 @@ std::span<const PairContact> AutomaticSphereCollider::find_touching(
 /// Given pairs can be tested by a collider with either algorithm. An existing one is preferred, so
 /// that no second thread pool or CUDA context is made.
 SphereCollider& AutomaticSphereCollider::collider(Backend backend, SphereAlgorithm algorithm) {
-  auto& of_backend = colliders_[backend == Backend::cuda ? 1 : 0];
+  OfBackend& of_backend = colliders_[backend == Backend::cuda ? 1 : 0];
   if (algorithm == SphereAlgorithm::automatic) {
     algorithm = of_backend[0] ? SphereAlgorithm::all_pairs : SphereAlgorithm::sorted_tiles;
   }
-  std::unique_ptr<SphereCollider>& slot =
-      of_backend[algorithm == SphereAlgorithm::all_pairs ? 0 : 1];
+  std::unique_ptr<SphereCollider>& slot = of_backend[index_of(algorithm)];
   if (slot == nullptr) {
     SphereColliderOptions options = options_;
     options.backend = backend;
@@ -191,10 +214,62 @@ SphereCollider& AutomaticSphereCollider::collider(Backend backend, SphereAlgorit
 
 /// The break-even rule of the ski rental problem: costs at most twice as much as the optimal
 /// decision made in hindsight.
-void AutomaticSphereCollider::start_device_if_it_pays() {
+///
+/// The other thread also repeats the current call, because the first one allocates memory of the
+/// device, pins memory of the host and loads the kernels.
+template <class KeepInput>
+void AutomaticSphereCollider::start_device_if_it_pays(const Calls& calls,
+                                                      const ColliderWork& expected,
+                                                      const KeepInput& keep_input) {
   if (!device_asleep_) return;
-  if (search_.chooser.missed_us() + given_.chooser.missed_us() < 1e3 * options_.costs.cuda_start_ms)
+  const double start_us = 1e3 * options_.costs.cuda_start_ms;
+  if (search_.chooser.missed_us() + given_.chooser.missed_us() < start_us) return;
+  if (start_us == 0) {
+    wake_device();
     return;
+  }
+  std::vector<Way> ways = calls.ways;
+  std::erase_if(ways, [](const Way& way) { return way.backend != Backend::cuda; });
+  const auto predicted_us = [&](const Way& way) { return microseconds(way.terms, expected); };
+  const double least_us = predicted_us(*std::ranges::min_element(ways, {}, predicted_us));
+  std::erase_if(ways, [&](const Way& way) { return predicted_us(way) > kMaxSlowdown * least_us; });
+  const auto start = [make = make_, options = options_, ways, repeat = keep_input()]() mutable {
+    OfBackend colliders;
+    options.backend = Backend::cuda;
+    for (const Way& way : ways) {
+      const bool any = way.algorithm == SphereAlgorithm::automatic;
+      options.algorithm = any ? SphereAlgorithm::sorted_tiles : way.algorithm;
+      auto& collider = colliders[index_of(options.algorithm)];
+      collider = make(options);
+      try {
+        repeat(*collider);
+      } catch (const InvalidArgument&) {  // of the caller, who gets the same exception
+      }
+    }
+    return colliders;
+  };
+  device_asleep_ = false;
+  try {
+    starting_ = std::async(std::launch::async, start);
+  } catch (const std::system_error&) {  // no thread could be created
+    give_up_device({});
+  }
+}
+
+void AutomaticSphereCollider::take_started_device() {
+  if (!starting_.valid()) return;
+  if (starting_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  try {
+    colliders_[1] = starting_.get();
+    wake_device();
+  } catch (const BackendUnavailable&) {
+    give_up_device({});
+  } catch (const std::exception& error) {
+    give_up_device(error.what());
+  }
+}
+
+void AutomaticSphereCollider::wake_device() {
   device_asleep_ = false;
   for (Calls* calls : {&search_, &given_}) calls->chooser.wake();
 }

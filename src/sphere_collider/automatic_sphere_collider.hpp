@@ -5,7 +5,10 @@
 
 #include "src/base/time_chooser.hpp"
 
+#include <array>
 #include <functional>
+#include <future>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -17,10 +20,12 @@ using SphereColliderMaker =
     std::function<std::unique_ptr<SphereCollider>(const SphereColliderOptions&)>;
 
 /// Forwards each call to one of up to four colliders (CPU and CUDA, with either algorithm), which
-/// are made when they are first needed. The device is first used when the time that it would have
-/// saved so far reaches the cost of starting it. If there is no device, the CPU computes all calls
-/// and no failure is reported. If the device fails, the CPU computes that call and all later ones,
-/// and device_failure() reports it once.
+/// are made when they are first needed. The device is started when the time that it would have
+/// saved so far reaches the cost of starting it: on another thread, while the CPU computes all
+/// calls, or in the call if that cost is 0. If there is no device, the CPU computes all calls and
+/// no failure is reported. If the device fails, also while it starts, the CPU computes that call
+/// and all later ones, and device_failure() reports it once. The destructor waits for the other
+/// thread.
 class AutomaticSphereCollider final : public SphereCollider {
  public:
   /// `options.backend` is `automatic`; `with_cuda` states whether `make` supports CUDA.
@@ -57,14 +62,21 @@ class AutomaticSphereCollider final : public SphereCollider {
     ChoiceReason reason = ChoiceReason::fixed;
   };
 
+  using OfBackend = std::array<std::unique_ptr<SphereCollider>, 2>;  ///< by algorithm
+
   static std::vector<Way> ways_to_search(const SphereColliderOptions& options, bool with_cuda);
   static std::vector<Way> ways_to_test(const SphereColliderOptions& options, bool with_cuda);
-  template <class Call, class Measure>
-  auto compute(Calls& calls, const ColliderWork& expected, const Call& call,
-               const Measure& measure);
+  template <class Call, class Measure, class KeepInput>
+  auto compute(Calls& calls, const ColliderWork& expected, const Call& call, const Measure& measure,
+               const KeepInput& keep_input);
   bool reuse_decision(Calls& calls, std::size_t spheres, std::size_t pairs);
   SphereCollider& collider(Backend backend, SphereAlgorithm algorithm);
-  void start_device_if_it_pays();
+  template <class KeepInput>
+  void start_device_if_it_pays(const Calls& calls, const ColliderWork& expected,
+                               const KeepInput& keep_input);
+  /// Takes over the device if it has been started.
+  void take_started_device();
+  void wake_device();
   /// Removes CUDA from all later decisions. `failure` is empty if there is no device.
   void give_up_device(std::string_view failure);
 
@@ -72,13 +84,14 @@ class AutomaticSphereCollider final : public SphereCollider {
   SphereColliderMaker make_;
   Calls search_, given_;
   const Calls* last_ = &search_;
-  std::unique_ptr<SphereCollider> colliders_[2][2];  ///< by backend and algorithm
-  double contacts_per_sphere_ = 1;                   ///< in the last search that was measured
+  std::array<OfBackend, 2> colliders_;  ///< by backend
+  double contacts_per_sphere_ = 1;      ///< in the last search that was measured
   bool device_asleep_;
   bool device_lost_ = false;
   std::string device_failure_;
   TransferredBytes transferred_;
   SphereAlgorithm algorithm_ = SphereAlgorithm::automatic;
+  std::future<OfBackend> starting_;  ///< valid while the device starts; its destructor waits
 };
 
 }  // namespace JFPX_ABI

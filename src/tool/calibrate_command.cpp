@@ -1,4 +1,6 @@
 /// jfpx calibrate: measures the costs that the automatic choice of backend and algorithm uses.
+#include <jfpx/backend.hpp>
+
 #include "src/sphere_collider/cost_cache.hpp"
 #include "src/sphere_collider/cost_model.hpp"
 #include "src/tool/calibration.hpp"
@@ -9,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
 namespace jfpx {
@@ -26,7 +29,8 @@ std::string from_how_many(const CostTerms& a, const CostTerms& b) {
   return n == 0 ? "never" : fmt::format("{:.0f}", n);
 }
 
-std::string report(const CostModel& costs) {
+/// Costs as tables, those of CUDA only `with_cuda`.
+std::string report(const CostModel& costs, bool with_cuda) {
   Table terms({"method", "call us", "byte ns", "sphere ns", "pair ns", "contact ns"});
   const auto add = [&](const char* name, const CostTerms& t) {
     const auto number = [](double value) { return fmt::format("{:.4g}", value); };
@@ -36,12 +40,15 @@ std::string report(const CostModel& costs) {
   add("cpu, all pairs", costs.x86_all_pairs);
   add("cpu, sorted tiles", costs.x86_sorted_tiles);
   add("cpu, given pairs", costs.x86_given_pairs);
-  add("cuda, all pairs", costs.cuda_all_pairs);
-  add("cuda, sorted tiles", costs.cuda_sorted_tiles);
-  add("cuda, given pairs", costs.cuda_given_pairs);
+  if (with_cuda) {
+    add("cuda, all pairs", costs.cuda_all_pairs);
+    add("cuda, sorted tiles", costs.cuda_sorted_tiles);
+    add("cuda, given pairs", costs.cuda_given_pairs);
+  }
   Table crossovers({"with 3 contacts per sphere", "faster from spheres"});
   crossovers.add({"cpu: sorted tiles instead of all pairs",
                   from_how_many(costs.x86_all_pairs, costs.x86_sorted_tiles)});
+  if (!with_cuda) return fmt::format("{}\n{}", terms.text(), crossovers.text());
   crossovers.add({"cuda: sorted tiles instead of all pairs",
                   from_how_many(costs.cuda_all_pairs, costs.cuda_sorted_tiles)});
   crossovers.add(
@@ -58,7 +65,7 @@ MeasuredCostModel measure(const CalibrateOptions& options) {
   });
   progress.reset();
   if (!result.no_cuda.empty() && !options.quiet) {
-    fmt::print(stderr, "jfpx: cuda keeps its default costs: {}\n", result.no_cuda);
+    fmt::print(stderr, "jfpx: cuda was not measured: {}\n", result.no_cuda);
   }
   store_costs(result.costs);
   return {result.costs, this_machine()};
@@ -73,13 +80,19 @@ MeasuredCostModel show(const CalibrateOptions& options) {
   return {cached.costs, {.machine = "none: default costs", .driver = ""}};
 }
 
+bool cuda_is_usable() {
+  return std::ranges::any_of(available_backends(), [](const BackendStatus& status) {
+    return status.backend == Backend::cuda && status.usable;
+  });
+}
+
 int run(const CalibrateOptions& options) {
   OutputFile json(options.json);
   const MeasuredCostModel model = options.show ? show(options) : measure(options);
   json.write(to_json(model));
   json.finish();
   if (!options.quiet && options.json != "-") {
-    fmt::print("{}\n{}\n", report(model.costs), cost_model_path());
+    fmt::print("{}\n{}\n", report(model.costs, cuda_is_usable()), cost_model_path());
   }
   return kSuccess;
 }

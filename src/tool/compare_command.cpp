@@ -82,6 +82,7 @@ nlohmann::ordered_json to_json_value(const Scene& scene, const RunOptions& optio
 }
 
 int run(const RunOptions& options) {
+  check_stdout(options);
   const Scene scene = load(options);
   OutputFile json(options.json);
   const Comparison result = compare(scene, options);

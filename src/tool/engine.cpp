@@ -1,22 +1,28 @@
 /// Creation of engines, and their common options.
 #include "src/tool/engine.hpp"
 
+#include "src/sphere_collider/cost_cache.hpp"
 #include "src/tool/bullet_engine.hpp"
 #include "src/tool/native_engine.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <filesystem>
+#include <system_error>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 namespace {
 
-/// Read once, because a command may create several engines and must print the warning once.
+/// Read once, because a command may create several engines and must print the warning once. A
+/// machine that was not measured is the normal case and not a reason for a warning.
 const CostModel& costs_of_this_machine(bool quiet) {
   static const CostModel costs = [quiet] {
     const CalibratedCosts cached = calibrated_costs();
-    if (!quiet && !cached.problem.empty()) {
+    std::error_code ignored;
+    if (!quiet && !cached.problem.empty() && std::filesystem::exists(cost_model_path(), ignored)) {
       fmt::print(stderr, "jfpx: default costs are used (see: jfpx calibrate): {}\n",
                  cached.problem);
     }

@@ -15,6 +15,9 @@
 
 namespace jfpx {
 inline namespace JFPX_ABI {
+
+class World;
+
 namespace tool {
 
 /// Duration of each stage of a step [ms].
@@ -61,6 +64,8 @@ class Engine {
   virtual std::string backend() const = 0;     ///< computed the sphere contacts of the last step
   /// Name of the native resolver; empty for Bullet and for demos without a world.
   virtual std::string resolver() const { return {}; }
+  /// The native world; null for other engines.
+  virtual World* world() { return nullptr; }
   /// The backend, its algorithm and the reason for the choice, as a table entry.
   virtual std::string choice() const { return backend(); }
   /// Reason why the CPU replaced a device at some step; empty if it did not.

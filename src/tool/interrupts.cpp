@@ -1,4 +1,4 @@
-/// Conversion of SIGINT and SIGTERM to an exception.
+/// Conversion of SIGHUP, SIGINT and SIGTERM to an exception.
 #include "src/tool/interrupts.hpp"
 
 namespace jfpx {
@@ -26,8 +26,10 @@ Interrupts::~Interrupts() {
   for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &before_[i], nullptr);
 }
 
+bool Interrupts::requested() { return g_signal != 0; }
+
 void Interrupts::check() {
-  if (g_signal != 0) throw Interrupted{g_signal};
+  if (requested()) throw Interrupted{g_signal};
 }
 
 }  // namespace tool

@@ -1,4 +1,4 @@
-/// Conversion of SIGINT and SIGTERM to an exception, so that a run leaves no partial files.
+/// Conversion of SIGHUP, SIGINT and SIGTERM to an exception, so that a run leaves no partial files.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -15,9 +15,9 @@ struct Interrupted {
   int signal;
 };
 
-/// Defers SIGINT and SIGTERM to the next call of check() during its lifetime; a second signal ends
-/// the process immediately. Signals that were ignored at the start of the process stay ignored.
-/// Only one object may exist at a time, in one thread.
+/// Defers SIGHUP, SIGINT and SIGTERM to the next call of check() during its lifetime; a second
+/// signal ends the process immediately. Signals that were ignored at the start of the process stay
+/// ignored. Only one object may exist at a time, in one thread.
 class Interrupts {
  public:
   Interrupts();
@@ -25,11 +25,13 @@ class Interrupts {
   Interrupts(const Interrupts&) = delete;
   Interrupts& operator=(const Interrupts&) = delete;
 
+  /// Whether a signal has arrived.
+  static bool requested();
   /// @throws Interrupted
   static void check();
 
  private:
-  static constexpr std::array<int, 2> kSignals = {SIGINT, SIGTERM};
+  static constexpr std::array<int, 3> kSignals = {SIGHUP, SIGINT, SIGTERM};
   std::array<struct sigaction, kSignals.size()> before_{};
 };
 

@@ -8,11 +8,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <iterator>
 #include <new>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace {
 
@@ -33,8 +38,27 @@ int finish_output(int status) {
   return status == tool::kSuccess ? tool::kBadUsage : status;
 }
 
+/// Inserts "--" before the program of `preload`, because the options after it are the program's.
+std::vector<std::string> separate_program(const CLI::App& app, std::vector<std::string> arguments) {
+  const CLI::App* command = nullptr;
+  for (auto it = arguments.begin(); it != arguments.end() && *it != "--"; ++it) {
+    if (it->starts_with('-')) {
+      const CLI::Option* option = command ? command->get_option_no_throw(*it) : nullptr;
+      if (option == nullptr) option = app.get_option_no_throw(*it);
+      const bool takes_next = option != nullptr && option->get_items_expected_min() > 0;
+      if (takes_next && std::next(it) != arguments.end()) ++it;
+    } else if (command == nullptr) {
+      if (*it != "preload") break;
+      command = app.get_subcommand(*it);
+    } else {
+      arguments.insert(it, "--");
+      break;
+    }
+  }
+  return arguments;
+}
+
 int run(int argc, char** argv) {
-  tool::switch_precision_if_requested(argc, argv);
   CLI::App app("jfpx " JFPX_VERSION
                ": rigid-body collision with identical bits on the CPU, on CUDA and inside Bullet.",
                "jfpx");
@@ -65,8 +89,11 @@ int run(int argc, char** argv) {
   tool::add_scenes_command(app, status);
   tool::add_devices_command(app, status);
   tool::add_calibrate_command(app, status);
+  auto arguments = separate_program(app, std::vector<std::string>(argv + 1, argv + argc));
+  tool::switch_precision_if_requested(arguments, argv);
+  std::ranges::reverse(arguments);
   try {
-    app.parse(argc, argv);
+    app.parse(std::move(arguments));
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? tool::kSuccess : tool::kBadUsage;
   }

@@ -29,6 +29,7 @@ class NativeEngine final : public Engine {
   std::string resolver() const override {
     return std::string(resolver_name(world_.scene().solver));
   }
+  World* world() override { return &world_; }
   std::string choice() const override {
     return fmt::format("{}, {}, {}", to_string(report_.backend), to_string(report_.algorithm),
                        to_string(report_.choice));

@@ -1,6 +1,8 @@
 /// Command-line options shared by several commands.
 #include "src/tool/options.hpp"
 
+#include "src/base/thread_pool.hpp"
+
 #include <charconv>
 #include <iterator>
 #include <string>
@@ -10,16 +12,29 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
+namespace {
 
-CLI::Validator whole_number() {
-  return {[](std::string& text) {
-            std::uint64_t value = 0;
-            const auto [end, error] =
-                std::from_chars(text.data(), text.data() + text.size(), value);
-            const bool whole = error == std::errc() && end == text.data() + text.size();
-            return whole ? "" : "is " + text + "; it must be a whole number from 0 to 2^64 - 1";
-          },
-          ""};
+constexpr std::uint64_t kMaxCount = std::numeric_limits<std::uint32_t>::max();
+
+}  // namespace
+
+CLI::Validator whole_number(std::uint64_t largest) {
+  return {
+      [largest](std::string& text) {
+        std::uint64_t value = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool whole = error == std::errc() && end == text.data() + text.size();
+        return whole && value <= largest ? ""
+                                         : "is " + text + "; it must be a whole number from 0 to " +
+                                               std::to_string(largest);
+      },
+      ""};
+}
+
+void add_threads_option(CLI::App& app, unsigned& threads) {
+  app.add_option("--threads", threads, "CPU threads, at most 256; 0: one per core")
+      ->check(whole_number(ThreadPool::kMaxThreads))
+      ->capture_default_str();
 }
 
 CLI::Validator engine_name() {
@@ -42,10 +57,10 @@ void add_backend_option(CLI::App& app, Backend& backend, const std::string& help
 void add_scene_options(CLI::App& app, RunOptions& options, const std::string& scene) {
   app.add_option("SCENE", options.scene, scene)->required();
   app.add_option("--spheres", options.spheres, "Number of spheres of a named scene")
-      ->check(whole_number());
+      ->check(whole_number(kMaxCount));
   app.add_option("--boxes", options.boxes,
                  "Number of boxes, for named scenes with boxes (see: jfpx scenes)")
-      ->check(whole_number());
+      ->check(whole_number(kMaxCount));
   app.add_option("--seed", options.seed, "Seed of a named scene")
       ->check(whole_number())
       ->capture_default_str();
@@ -59,7 +74,7 @@ void add_scene_options(CLI::App& app, RunOptions& options, const std::string& sc
           std::vector<std::string>(std::begin(kResolverNames), std::end(kResolverNames))));
   app.add_option("--substeps", options.substeps,
                  "Resolver soft-step: number of substeps per step, 1 to 64 [default: the scene's]")
-      ->check(whole_number());
+      ->check(whole_number(kMaxCount));
 }
 
 void add_run_options(CLI::App& app, RunOptions& options) {
@@ -67,9 +82,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
       ->check(whole_number())
       ->capture_default_str();
   add_backend_option(app, options.backend);
-  app.add_option("--threads", options.threads, "CPU threads; 0: one per core")
-      ->check(whole_number())
-      ->capture_default_str();
+  add_threads_option(app, options.threads);
   app.add_option(
          "--minimum-batch", options.minimum_batch,
          "Bullet: smallest number of pairs in a dispatch, and of manifolds in a group, that "
@@ -86,8 +99,9 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_option("--json", options.json,
                  "Write the results as JSON to this file; - writes to stdout instead of a table");
   app.add_flag("--hash", options.hash,
-               "Print the hash of the final state as the last line (16 hexadecimal digits)");
-  app.add_flag("--quiet", options.quiet, "Print only the output of --hash and --json -");
+               "Print the hash of the final state as the last line (16 hexadecimal digits); the "
+               "output of --json contains it");
+  app.add_flag("--quiet", options.quiet, "Print only the output of --hash, --json - and --csv -");
 }
 
 }  // namespace tool

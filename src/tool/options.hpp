@@ -5,13 +5,18 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cstdint>
+#include <limits>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 
-/// Accepts unsigned 64-bit integers. CLI11 alone parses -1 and values out of range as the largest
-/// integer.
-CLI::Validator whole_number();
+/// Accepts whole numbers up to `largest`. CLI11 alone parses -1 and values out of range as the
+/// largest integer.
+CLI::Validator whole_number(std::uint64_t largest = std::numeric_limits<std::uint64_t>::max());
+/// Adds --threads.
+void add_threads_option(CLI::App& app, unsigned& threads);
 /// Adds SCENE, with `scene` as its help text, and the options that select and modify a scene.
 void add_scene_options(
     CLI::App& app, RunOptions& options,

@@ -24,20 +24,20 @@ std::string sibling_of(const std::string& name) {
 }
 
 /// The precision that the arguments select; empty if they select none.
-std::string selected_precision(int argc, char** argv) {
+std::string selected_precision(const std::vector<std::string>& arguments) {
   constexpr std::string_view kOption = "--precision";
-  for (int i = 1; i < argc; ++i) {
-    const std::string_view argument = argv[i];
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    const std::string_view argument = arguments[i];
     if (argument == "--") break;  // the remaining arguments belong to another program
-    if (argument == kOption && i + 1 < argc) return argv[i + 1];
+    if (argument == kOption && i + 1 < arguments.size()) return arguments[i + 1];
     if (argument.starts_with(kOption) && argument.substr(kOption.size()).starts_with("=")) {
       return std::string(argument.substr(kOption.size() + 1));
     }
   }
-  if (argc < 3 || std::string_view(argv[1]) != "replay") return {};
-  for (int i = 2; i < argc; ++i) {
-    if (argv[i][0] != '-' && std::filesystem::is_regular_file(argv[i])) {
-      return recording_precision(argv[i]);
+  if (arguments.size() < 2 || arguments[0] != "replay") return {};
+  for (std::size_t i = 1; i < arguments.size(); ++i) {
+    if (!arguments[i].starts_with('-') && std::filesystem::is_regular_file(arguments[i])) {
+      return recording_precision(arguments[i]);
     }
   }
   return {};
@@ -55,8 +55,8 @@ void switch_precision(const std::string& precision, char** argv) {
               " precision, can't be started: " + std::strerror(errno));
 }
 
-void switch_precision_if_requested(int argc, char** argv) {
-  switch_precision(selected_precision(argc, argv), argv);
+void switch_precision_if_requested(const std::vector<std::string>& arguments, char** argv) {
+  switch_precision(selected_precision(arguments), argv);
 }
 
 }  // namespace tool

@@ -5,6 +5,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -20,7 +21,8 @@ inline constexpr std::string_view kPrecision = sizeof(Real) == 4 ? "float" : "do
 void switch_precision(const std::string& precision, char** argv);
 /// The same for the precision that the arguments select: by --precision, or by `replay` of a
 /// recording. @throws also FileError for an invalid recording.
-void switch_precision_if_requested(int argc, char** argv);
+/// @param arguments those of `argv` after the name of the program; the ones after "--" are ignored
+void switch_precision_if_requested(const std::vector<std::string>& arguments, char** argv);
 
 }  // namespace tool
 }  // namespace JFPX_ABI

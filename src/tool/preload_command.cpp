@@ -1,7 +1,8 @@
-/// jfpx preload -- PROGRAM [ARGS]: runs an unmodified Bullet program with jfpx's parts.
+/// jfpx preload PROGRAM [ARGS]: runs an unmodified Bullet program with jfpx's parts.
 #include <jfpx/error.hpp>
 #include <jfpx/sphere_collider.hpp>
 
+#include "src/base/thread_pool.hpp"
 #include "src/tool/commands.hpp"
 #include "src/tool/options.hpp"
 
@@ -93,9 +94,11 @@ void add_preload_command(CLI::App& app, int&) {
       ->add_option("--parts", options->parts,
                    "Parts to replace: dispatcher, solver, world (update of AABBs) [default: all]")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->check(CLI::IsMember({"dispatcher", "solver", "world"}));
-  command->add_option("--threads", options->threads, "CPU threads; 0: one per core [1]")
-      ->check(CLI::Range(0u, 256u));
+  command
+      ->add_option("--threads", options->threads, "CPU threads, at most 256; 0: one per core [1]")
+      ->check(whole_number(ThreadPool::kMaxThreads));
   command
       ->add_option(
           "--minimum-batch", options->minimum_batch,
@@ -103,6 +106,7 @@ void add_preload_command(CLI::App& app, int&) {
           "that jfpx computes instead of Bullet")
       ->check(whole_number());
   command->footer(
+      "Usage: jfpx preload [OPTIONS] PROGRAM [ARGS]. All arguments after PROGRAM are its own.\n"
       "Returns the exit status of the program, or 2 if it can't be started. Programs that link\n"
       "Bullet statically, and statically linked programs, run unchanged.");
   command->callback([options] { start(*options); });

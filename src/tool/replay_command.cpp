@@ -1,4 +1,6 @@
 /// jfpx replay: repeats a recorded run and stops at the first step that differs.
+#include <jfpx/error.hpp>
+#include <jfpx/recorded_world.hpp>
 #include <jfpx/recording.hpp>
 
 #include "src/tool/commands.hpp"
@@ -26,8 +28,14 @@ int replay(ReplayOptions options) {
   const RecordingHeader& header = recording.header();
   if (options.engine.empty()) options.engine = header.engine;
   const auto engine = make_engine(parse_engine(options.engine), header.scene, options.run);
+  World* const world = engine->world();
+  if (recording.has_calls() && world == nullptr) {
+    throw InvalidArgument(options.path + ": was recorded with forces or changes of bodies, which " +
+                          "only the native engine repeats; engine is " + options.engine);
+  }
   Progress progress(header.scene.name, recording.steps(), options.run.quiet);
   for (std::uint64_t step = 1; step <= recording.steps(); ++step) {
+    if (world != nullptr) repeat_calls(recording, step, *world);
     engine->step();
     const auto difference = first_difference(recording.states(step), engine->states());
     if (difference) {
@@ -52,16 +60,16 @@ void add_replay_command(CLI::App& app, int& status) {
   auto options = std::make_shared<ReplayOptions>();
   CLI::App* command =
       app.add_subcommand("replay", "Repeat a recorded run; stop at the first step that differs");
-  command->add_option("FILE", options->path, "Recording written by: jfpx run --record FILE")
+  command
+      ->add_option("FILE", options->path,
+                   "Recording written by jfpx run --record FILE or by RecordedWorld")
       ->required();
   command
       ->add_option("--engine", options->engine,
                    "native, bullet or bullet-stock [default: the recorded engine]")
       ->check(engine_name());
   add_backend_option(*command, options->run.backend);
-  command->add_option("--threads", options->run.threads, "CPU threads; 0: one per core")
-      ->check(whole_number())
-      ->capture_default_str();
+  add_threads_option(*command, options->run.threads);
   command->add_flag("--hash", options->run.hash, "Print the hash of the final state");
   command->add_flag("--quiet", options->run.quiet, "Print only a difference");
   command->callback([options, &status] { status = replay(*options); });

@@ -103,6 +103,7 @@ std::unique_ptr<Engine> start(const CommandOptions& options, Scene* scene) {
 }
 
 int run(const CommandOptions& options) {
+  check_stdout(options.run);
   Scene scene;
   const auto engine = start(options, &scene);
   OutputFile csv(options.run.csv), json(options.run.json);
@@ -167,7 +168,8 @@ void add_run_command(CLI::App& app, int& status) {
   command->add_option(
       "--csv", options->run.csv,
       "Write one line per step to this file: step, contacts, awake bodies, milliseconds, "
-      "deepest and mean penetration [m], largest speed [m/s]");
+      "deepest and mean penetration [m], largest speed [m/s]; - writes to stdout instead of a "
+      "table");
   command->add_option("--record", options->run.record,
                       "Write the state after every step to this file (see: jfpx replay)");
   command->callback([command, options, &status] {

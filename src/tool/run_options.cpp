@@ -49,6 +49,17 @@ Solver parse_resolver(std::string_view name) {
   return static_cast<Solver>(find_name("resolver", kResolverNames, name));
 }
 
+void check_stdout(const RunOptions& options) {
+  const char* exclusive = options.csv == "-"    ? "--csv -"
+                          : options.json == "-" ? "--json -"
+                                                : nullptr;
+  const char* other = options.hash ? "--hash" : options.json == "-" ? "--json -" : nullptr;
+  if (exclusive == nullptr || other == nullptr || std::string_view(exclusive) == other) return;
+  throw InvalidArgument(fmt::format("{} can't be combined with {}, the only output on stdout{}",
+                                    other, exclusive,
+                                    options.csv == "-" ? "" : ", which contains the hash"));
+}
+
 const char* option_of_scenes(const RunOptions& options) {
   if (options.no_sleep) return "--no-sleep";
   if (options.resolver) return "--resolver";

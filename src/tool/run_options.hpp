@@ -52,8 +52,12 @@ struct RunOptions {
   bool hash = false, quiet = false;
 };
 
-/// False if stdout receives only JSON, or nothing.
-inline bool wants_table(const RunOptions& options) { return !options.quiet && options.json != "-"; }
+/// False if stdout receives only JSON or CSV, or nothing.
+inline bool wants_table(const RunOptions& options) {
+  return !options.quiet && options.json != "-" && options.csv != "-";
+}
+/// @throws InvalidArgument if stdout would receive JSON or CSV, and something else.
+void check_stdout(const RunOptions& options);
 
 /// The options of a named scene.
 scenes::Options scene_options(const RunOptions& options);

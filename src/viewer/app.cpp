@@ -3,11 +3,14 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/tool/interrupts.hpp"
 #include "src/viewer/timing.hpp"
 #include "src/viewer/ui.hpp"
 #include "src/viewer/viewer.hpp"
 
 #include <fmt/format.h>
+
+#include <csignal>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -22,11 +25,22 @@ std::unique_ptr<Viewer> start(const ViewOptions& options) {
   return viewer;
 }
 
+/// Makes SIGHUP end a run as SIGINT and SIGTERM do, which SDL converts to events.
+void handle_hang_up() {
+  struct sigaction action {};
+  sigaction(SIGHUP, nullptr, &action);
+  if (action.sa_handler != SIG_DFL) return;  // ignored by nohup
+  action.sa_handler = [](int) { std::raise(SIGTERM); };
+  sigaction(SIGHUP, &action, nullptr);
+}
+
 int run_without_rendering(const ViewOptions& options) {
+  const tool::Interrupts interrupts;
   const auto viewer = start(options);
   Timing timing;
   const std::uint64_t frames = options.frames.value_or(kHeadlessFrames);
-  for (std::uint64_t i = 0; i < frames && !viewer->at_end(); ++i) {
+  for (std::uint64_t i = 0; i < frames && !viewer->at_end() && !tool::Interrupts::requested();
+       ++i) {
     viewer->step();
     timing.add_step(viewer->engine_ms());
   }
@@ -40,7 +54,7 @@ int run_headless(const ViewOptions& options) {
   Renderer renderer(options.quality);
   const OffscreenFramebuffer offscreen(options.size.width, options.size.height);
   Ui ui(offscreen);
-  ImageSequenceWriter image_sequence(options.record);
+  ImageSequenceWriter image_sequence(options.pictures);
   Timing timing;
   const auto draw = [&] {
     Stopwatch watch;
@@ -103,6 +117,7 @@ void finish(Viewer& viewer, const Timing& timing, const ViewOptions& options,
 int run_app(const ViewOptions& options) {
   if (!options.screenshot.empty()) require_writable(options.screenshot);
   if (!options.render) return run_without_rendering(options);
+  handle_hang_up();
   if (options.headless) return run_headless(options);
   return run_interactive(options);
 }

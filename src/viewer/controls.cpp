@@ -112,7 +112,7 @@ std::span<const KeyHelp> key_help() {
       {"F", "forces without weight"},
       {"V", "property shown by colours", Feature::colouring},
       {"F9", "save all steps for jfpx replay", Feature::saving},
-      {"F10", "record numbered pictures"},
+      {"F10", "write numbered pictures"},
       {"F12", "screenshot"},
       {"F11 or Alt Return", "full screen"},
       {"Esc", "quit"},

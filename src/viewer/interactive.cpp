@@ -35,7 +35,7 @@ App::App(const ViewOptions& options)
           Window::open("jfpx-view: " + options.run.scene, options.size.width, options.size.height)),
       renderer_(options.quality),
       ui_(window_),
-      image_sequence_(options.record),
+      image_sequence_(options.pictures),
       last_target_{0, options.size.width, options.size.height, 1} {
   if (options.fullscreen) window_.set_fullscreen(true);
   viewer_->paused = options.paused;
@@ -211,12 +211,12 @@ void App::execute(Command command) {
 void App::toggle_image_sequence() {
   if (image_sequence_.on()) {
     image_sequence_ = ImageSequenceWriter("");
-    notify("stopped recording pictures");
+    notify("stopped writing pictures");
     return;
   }
   const std::string folder = free_name("jfpx-view-frames", "");
   image_sequence_ = ImageSequenceWriter(folder);
-  notify("recording pictures to " + folder);
+  notify("writing pictures to " + folder);
 }
 
 void App::save_recording() {
@@ -233,7 +233,7 @@ void App::write_pictures(const Target& target) {
     fail_or_notify(error, picture_by_key);
   }
   if (!image_sequence_.on()) return;
-  const bool film_by_key = image_sequence_.folder() != options_.record;
+  const bool film_by_key = image_sequence_.folder() != options_.pictures;
   try {
     image_sequence_.add(picture(target));
   } catch (const FileError& error) {

@@ -14,7 +14,7 @@ namespace {
 using namespace jfpx;
 
 int run(int argc, char** argv) {
-  tool::switch_precision_if_requested(argc, argv);
+  tool::switch_precision_if_requested({argv + 1, argv + argc}, argv);
   view::ViewOptions options;
   if (const auto status = view::parse_command_line(argc, argv, options)) return *status;
   if (!options.precision_is_given && view::is_recording(options.run.scene)) {

@@ -96,9 +96,7 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
   tool::add_backend_option(
       app, options.choice.backend,
       "Backend of sphere contacts and of jfpx's solver in Bullet: auto, cpu or cuda [auto]");
-  app.add_option("--threads", options.choice.threads, "CPU threads; 0: one per core")
-      ->check(tool::whole_number())
-      ->capture_default_str();
+  tool::add_threads_option(app, options.choice.threads);
   const auto add_part = [&](const char* name, bool* jfpx, const char* help) {
     app.add_option_function<std::string>(
            name, [jfpx](const std::string& value) { *jfpx = value == "jfpx"; }, help)
@@ -117,10 +115,10 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
                  "closed]")
       ->check(tool::whole_number());
   app.add_option("--screenshot", options.screenshot, "Write the last picture to this PNG file");
-  app.add_option("--record", options.record,
+  app.add_option("--pictures", options.pictures,
                  "Write every picture to this folder as frame-000001.png and so on");
-  app.add_option("--recording", options.recording,
-                 "Write the states of all steps to this file (see: jfpx replay)");
+  app.add_option("--record,--recording", options.recording,
+                 "Write the state after every step to this file (see: jfpx replay)");
   app.add_option_function<std::string>(
       "--size", [&options](const std::string& text) { options.size = parse_size(text); },
       "Size of the picture or window [1280x720]");
@@ -146,7 +144,7 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
           std::vector<std::string>(std::begin(kColouringNames), std::end(kColouringNames))));
   app.add_flag("--contacts", options.contacts, "Draw contact points and normals");
   app.add_flag("--forces", options.forces, "Draw the force on each body, without its weight");
-  app.add_flag("--panel", options.panel, "Viewer the panel in headless pictures too");
+  app.add_flag("--panel", options.panel, "Draw the panel in headless pictures too");
   app.add_option("--input", options.input, "Input script of a demo");
   app.add_option_function<std::string>(
       "--eye", [&options](const std::string& text) { options.eye = parse_point("--eye", text); },
@@ -213,8 +211,8 @@ void check(const ViewOptions& options) {
   if (options.paused && (options.headless || !options.render)) {
     throw InvalidArgument("--paused requires a window");
   }
-  if (!options.render && (!options.screenshot.empty() || !options.record.empty())) {
-    throw InvalidArgument("--no-render can't be combined with --screenshot or --record");
+  if (!options.render && (!options.screenshot.empty() || !options.pictures.empty())) {
+    throw InvalidArgument("--no-render can't be combined with --screenshot or --pictures");
   }
 }
 

@@ -23,7 +23,7 @@ struct ViewOptions {
   bool headless = false;
   std::optional<std::uint64_t> frames;  ///< number of steps
   std::string screenshot;               ///< PNG file of the last picture
-  std::string record;                   ///< folder of numbered PNG files
+  std::string pictures;                 ///< folder of numbered PNG files
   std::string recording;                ///< file of the states of all steps
   Size size;
   Quality quality = kMediumQuality;

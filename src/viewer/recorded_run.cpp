@@ -1,4 +1,5 @@
 /// A recording as a run, which returns its states in order.
+#include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
 #include "src/viewer/run.hpp"
@@ -53,6 +54,10 @@ bool is_recording(std::string_view scene) { return scene.ends_with(".rec"); }
 
 Recorded open_recording(const std::string& path) {
   RecordingReader recording(path);
+  if (recording.has_calls()) {
+    throw InvalidArgument(path + ": was recorded with forces or changes of bodies, which only " +
+                          "jfpx replay repeats");
+  }
   Scene scene = recording.header().scene;
   return {std::move(scene), std::make_unique<RecordedRun>(std::move(recording))};
 }

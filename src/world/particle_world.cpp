@@ -165,10 +165,10 @@ ParticleReport ParticleWorld::step() {
       w.undo();
     }
   } catch (const std::bad_alloc&) {
-    const std::size_t needed = (w.contacts.size() + 1) * sizeof(ParticleContact);
+    const std::size_t found = w.contacts.size();
     w.undo();
-    throw OutOfMemory("no memory for the contacts of a step: more than " + std::to_string(needed) +
-                      " bytes are needed");
+    throw OutOfMemory("no memory for a step of " + std::to_string(w.particles.ids().size()) +
+                      " particles with more than " + std::to_string(found) + " contacts");
   } catch (...) {
     w.undo();
     throw;

@@ -16,6 +16,8 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/particle_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/query_tree.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/recorded_calls.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/recorded_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording.cpp
   ${CMAKE_CURRENT_LIST_DIR}/soft_step.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sphere_hierarchy.cpp

@@ -27,6 +27,11 @@ double elapsed_ms(Clock::time_point since, Clock::time_point until) {
 /// undo() restores. Used in an error message only.
 constexpr std::size_t kBytesPerBody = 1280;
 
+std::string no_memory_for(const char* what, std::size_t bodies) {
+  return "no memory for " + std::string(what) + " of " + std::to_string(bodies) +
+         " bodies: about " + std::to_string(bodies * kBytesPerBody) + " bytes are needed";
+}
+
 /// The first body that is_in_world() refuses.
 std::optional<BodyId> find_runaway(const BodyStore& store) {
   for (const BodyId id : store.ids()) {
@@ -203,8 +208,7 @@ StepReport World::step() {
   try {
     w.save_for_undo();
   } catch (const std::bad_alloc&) {
-    throw OutOfMemory("no memory to keep the state of " + std::to_string(w.store.ids().size()) +
-                      " bodies during a step");
+    throw OutOfMemory(no_memory_for("a step", w.store.ids().size()));
   }
   w.contacts_are_new = false;
   w.query_tree.invalidate();
@@ -217,10 +221,9 @@ StepReport World::step() {
       w.undo();
     }
   } catch (const std::bad_alloc&) {
-    const std::size_t needed = (w.contacts.size() + 1) * sizeof(Contact);
     w.undo();
-    throw OutOfMemory("no memory for the contacts of a step: more than " + std::to_string(needed) +
-                      " bytes are needed");
+    throw OutOfMemory(no_memory_for("a step", w.store.ids().size()) +
+                      ", and more for their contacts");
   } catch (...) {
     w.undo();
     throw;
@@ -262,9 +265,7 @@ std::unique_ptr<World::Impl> World::Impl::make(const Scene& scene, std::unique_p
   try {
     return std::make_unique<Impl>(scene, std::move(pool), std::move(collider), broad_phase);
   } catch (const std::bad_alloc&) {
-    throw OutOfMemory("no memory for a world of " + std::to_string(scene.bodies.size()) +
-                      " bodies: about " + std::to_string(scene.bodies.size() * kBytesPerBody) +
-                      " bytes are needed");
+    throw OutOfMemory(no_memory_for("a world", scene.bodies.size()));
   }
 }
 

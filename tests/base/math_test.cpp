@@ -1,9 +1,17 @@
 /// Tests of vectors, quaternions, matrices and transforms against identities and hand-computed
 /// values.
+#include <jfpx/error.hpp>
 #include <jfpx/math.hpp>
 #include <jfpx/random.hpp>
 
+#include "src/base/hash64.hpp"
+
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
 
 namespace jfpx {
 namespace {
@@ -62,11 +70,13 @@ TEST(Erratum, E26_inverting_a_singular_matrix_is_reported) {
   Mat3 out3 = diagonal({7, 7, 7});
   EXPECT_FALSE(invert(Mat3{{{1, 2, 3}, {2, 4, 6}, {0, 0, 1}}}, &out3));
   EXPECT_EQ(out3, diagonal({7, 7, 7}));
+  EXPECT_EQ(inverse(Mat3{{{1, 2, 3}, {2, 4, 6}, {0, 0, 1}}}), std::nullopt);
   Mat4 singular;
   singular.m[2][2] = 0;
   Mat4 out4;
   EXPECT_FALSE(invert(singular, &out4));
   EXPECT_EQ(out4, Mat4{});
+  EXPECT_EQ(inverse(singular), std::nullopt);
 }
 
 TEST(Quat, MatrixAgreesWithTheSandwichProduct) {
@@ -77,6 +87,45 @@ TEST(Quat, MatrixAgreesWithTheSandwichProduct) {
     const Quat sandwich = q * Quat{0, v.x, v.y, v.z} * conjugate(q);
     expect_near(rotate(q, v), {sandwich.x, sandwich.y, sandwich.z});
   }
+}
+
+TEST(Quat, FromAxisAndAngleRotatesCounterclockwise) {
+  expect_near(rotate(from_axis_angle({0, 0, 2}, kPi / 2), {1, 0, 0}), {0, 1, 0});
+  expect_near(rotate(from_axis_angle({0, -1, 0}, kPi / 2), {1, 0, 0}), {0, 0, 1});
+  expect_near(rotate(from_axis_angle({1, 1, 1}, 2 * kPi / 3), {1, 2, 3}), {3, 1, 2});
+  EXPECT_EQ(from_axis_angle({3, 0, 0}, 0), Quat{});
+}
+
+TEST(Quat, FromAxisAndAngleIsAccurate) {
+  Random random(17);
+  Hash64 hash;
+  for (int i = 0; i < 20000; ++i) {
+    const Real range = i % 2 == 0 ? Real(7) : Real(1e6);
+    const Real angle = random.uniform(-range, range);
+    const Quat q = from_axis_angle({0, 1, 0}, angle);
+    const long double half = static_cast<long double>(angle) / 2;
+    ASSERT_NEAR(q.w, static_cast<Real>(std::cos(half)), kEpsilon) << angle;
+    ASSERT_NEAR(q.y, static_cast<Real>(std::sin(half)), kEpsilon) << angle;
+    hash.add_bytes(&q, sizeof q);
+  }
+  // The same with all compilers, optimization levels and C libraries.
+  EXPECT_EQ(hash.value(), sizeof(Real) == 4 ? 0xa8488d7d8e763694u : 0xb5e3b69be452331au);
+}
+
+TEST(Quat, FromAxisAndAngleNamesBadArguments) {
+  const auto message = [](const Vec3& axis, Real angle) {
+    try {
+      from_axis_angle(axis, angle);
+    } catch (const InvalidArgument& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  const Real nan = std::numeric_limits<Real>::quiet_NaN();
+  EXPECT_EQ(message({0, 0, 0}, 1).find("axis is (0, 0, 0); "), 0u) << message({0, 0, 0}, 1);
+  EXPECT_EQ(message({0, nan, 0}, 1).find("axis is (0, nan, 0); "), 0u);
+  EXPECT_EQ(message({0, 1, 0}, nan).find("angle is nan; "), 0u) << message({0, 1, 0}, nan);
+  EXPECT_EQ(message({0, 1, 0}, Real(1.5e6)).find("angle is 1.5e+06; "), 0u);
 }
 
 TEST(Quat, ProductAppliesTheRightFactorFirst) {
@@ -94,6 +143,7 @@ TEST(Mat3, TimesItsInverseIsTheIdentity) {
     const Mat3 m = to_matrix(random_rotation(random)) * diagonal({1, 2, Real(0.5)});
     Mat3 inverse_of_m;
     ASSERT_TRUE(invert(m, &inverse_of_m));
+    ASSERT_EQ(inverse(m), inverse_of_m);
     const Mat3 product = m * inverse_of_m;
     for (int r = 0; r < 3; ++r) expect_near(product.row[r], Mat3{}.row[r]);
   }
@@ -151,6 +201,7 @@ TEST(Erratum, E13_general_inverse_times_matrix_is_the_identity) {
     }
     Mat4 inverse_of_a;
     ASSERT_TRUE(invert(a, &inverse_of_a));
+    ASSERT_EQ(inverse(a), inverse_of_a);
     const Mat4 product = a * inverse_of_a;
     for (int i = 0; i < 4; ++i) {
       for (int j = 0; j < 4; ++j) EXPECT_NEAR(product.m[i][j], i == j ? 1 : 0, kTolerance);

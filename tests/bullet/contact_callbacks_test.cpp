@@ -98,6 +98,49 @@ TEST_F(ContactCallbacks, EachAloneReceivesTheSameCalls) {
   }
 }
 
+btScalar combined_friction(const btCollisionObject* a, const btCollisionObject* b) {
+  return btManifoldResult::calculateCombinedFriction(a, b);
+}
+
+TEST_F(ContactCallbacks, AreTheReasonForBulletsOrderInTheStatistics) {
+  using enum OrderReason;
+  for (const OrderReason reason :
+       {none, contact_callback, combine_callback, processed_callback, added_callback, filter}) {
+    const std::size_t index = static_cast<std::size_t>(reason);
+    for (int which = 0; which < (reason == contact_callback ? 3 : 1); ++which) {
+      const bool contact = reason == contact_callback;
+      gContactStartedCallback = contact && which == 0 ? on_started : nullptr;
+      gContactEndedCallback = contact && which == 1 ? on_ended : nullptr;
+      gContactDestroyedCallback = contact && which == 2 ? on_destroyed : nullptr;
+      gContactProcessedCallback = reason == processed_callback ? on_processed : nullptr;
+      gContactAddedCallback = reason == added_callback ? on_added : nullptr;
+      const auto combine = gCalculateCombinedFrictionCallback;
+      if (reason == combine_callback) gCalculateCombinedFrictionCallback = combined_friction;
+      TwinOptions options;
+      if (reason == filter) {
+        struct Own : CollisionDispatcher {
+          using CollisionDispatcher::CollisionDispatcher;
+        };
+        options.ours = [](btCollisionConfiguration* c) {
+          return std::make_unique<Own>(c, DispatcherOptions{.minimum_batch = 0});
+        };
+      }
+      Twins twins(options);
+      twins.both([&](BulletWorld& w) {
+        add_heap(w, 40, 27);
+        if (reason == added_callback) flag_custom_material(w, 2);
+      });
+      const bool same = twins.step(10);
+      gCalculateCombinedFrictionCallback = combine;
+      ASSERT_TRUE(same) << to_string(reason);
+      EXPECT_EQ(twins.stats().ordered[index], 10u) << to_string(reason);
+      EXPECT_EQ(twins.stats().last_order, reason);
+      const bool by_bullet = reason == contact_callback || reason == combine_callback;
+      EXPECT_EQ(twins.stats().written == 0, by_bullet) << to_string(reason);
+    }
+  }
+}
+
 TEST_F(ContactCallbacks, AddedIsNotCalledWithoutFlaggedBodies) {
   gContactAddedCallback = on_added;
   Twins twins;

@@ -8,6 +8,11 @@
 #include "tests/bullet/stock_bits.hpp"
 #include "tests/contact_solver/host_group_solver.hpp"
 
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <thread>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
@@ -88,6 +93,58 @@ TEST(GpuIslandSolver, ADeviceThatFailsIsReplacedInTheSameGroupAndReportedOnce) {
   solver.reset_stats();
   EXPECT_EQ(solver.stats().groups, 0u);
   EXPECT_EQ(solver.stats().device_failure, "the device is gone");
+}
+
+/// Groups of some thousand contacts and many iterations, for which a GPU is predicted to be faster.
+void add_work_for_a_device(BulletWorld& w) {
+  add_heap(w, 800, 17, btScalar(6.5));
+  w.world.getSolverInfo().m_numIterations = 200;
+}
+
+TEST(GpuIslandSolver, StartsOnAnotherThreadWhileTheCpuGoesOn) {
+  for (const bool fails : {false, true}) {
+    std::promise<void> may_end;
+    std::shared_future<void> end(may_end.get_future());
+    WorldParts parts;
+    parts.solver = [&] {
+      const auto start = [&]() -> std::unique_ptr<GroupSolver> {
+        end.wait();
+        if (fails) throw BackendUnavailable("cuda: no CUDA driver is installed");
+        return std::make_unique<HostGroupSolver>(7);
+      };
+      return ConstraintSolverTestAccess::make(start, 1e-6, {.minimum_batch = 0});
+    };
+    Twins twins({.parts = parts});
+    twins.both(add_work_for_a_device);
+    const auto& stats = dynamic_cast<ConstraintSolver&>(*twins.ours().solver).stats();
+    ASSERT_TRUE(twins.step(4));
+    EXPECT_GT(stats.groups, 0u);
+    EXPECT_EQ(stats.on_device, 0u) << "no step waits";
+    may_end.set_value();
+    for (int i = 0; i < 100 && stats.on_device == 0 && !fails; ++i) ASSERT_TRUE(twins.step());
+    ASSERT_TRUE(twins.step(3));
+    EXPECT_EQ(stats.on_device > 0, !fails);
+    EXPECT_EQ(stats.device_failure, "");
+  }
+}
+
+TEST(GpuIslandSolver, IsDestroyedWhileItStarts) {
+  std::atomic<bool> made = false;
+  WorldParts parts;
+  parts.solver = [&] {
+    const auto start = [&]() -> std::unique_ptr<GroupSolver> {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      made = true;
+      return std::make_unique<HostGroupSolver>(7);
+    };
+    return ConstraintSolverTestAccess::make(start, 1e-6, {.minimum_batch = 0});
+  };
+  {
+    Twins twins({.parts = parts});
+    twins.both(add_work_for_a_device);
+    ASSERT_TRUE(twins.step(5));
+  }
+  EXPECT_TRUE(made);
 }
 
 TEST(GpuIslandSolver, AnUnavailableBackendThrowsAndAutomaticRunsWithoutIt) {

@@ -26,6 +26,7 @@ TEST(NoRtti, BroadphaseAndPairCacheMatchStock) {
   twins.both([](BulletWorld& w) { add_heap(w, 60, 71); });
   ASSERT_TRUE(twins.step(60));
   EXPECT_GT(twins.stats().written, 100u);
+  EXPECT_EQ(twins.stats().last_order, OrderReason::pair_cache);
 }
 
 TEST(NoRtti, DispatcherMatchesStock) {

@@ -58,6 +58,20 @@ TEST_F(Preload, OptionsTakePrecedenceOverTheEnvironment) {
   EXPECT_EQ(run_process(with_variable + shows).output, "cpu\n");
 }
 
+TEST_F(Preload, ArgumentsAfterTheProgramAreItsOwn) {
+  const std::string echo = "preload --threads 2 --backend=cpu --parts solver ";
+  for (const std::string separator : {"", "-- "}) {
+    const ProcessResult result =
+        jfpx_command(echo + separator + "echo --summary run --precision half -- -x 2>&1");
+    EXPECT_EQ(result.output, "--summary run --precision half -- -x\n");
+  }
+  EXPECT_EQ(jfpx_command("preload run --help 2>&1").status, 2) << "no program is called run";
+  EXPECT_THAT(jfpx_command("preload --sumary echo 2>&1").output, HasSubstr("--sumary"));
+  EXPECT_EQ(jfpx_command("preload 2>&1").status, 2);
+  EXPECT_THAT(jfpx_command("preload --help").output,
+              HasSubstr("jfpx preload [OPTIONS] PROGRAM [ARGS]"));
+}
+
 TEST_F(Preload, EnablesOnlyTheRequestedParts) {
   const std::string stock = alone("300").output;
   const auto with = [&](const std::string& options) {

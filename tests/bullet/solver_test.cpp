@@ -208,6 +208,33 @@ TEST(ConstraintSolver, LeavesSmallGroupsToBullet) {
   EXPECT_EQ(solver.stats().groups, 0u);
 }
 
+/// Spheres on one movable platform, which every contact shares.
+void add_loaded_platform(BulletWorld& w) {
+  w.add(w.keep(new btStaticPlaneShape(btVector3(0, 1, 0), 0)), btVector3(0, 0, 0), 0);
+  w.add(w.keep(new btBoxShape(btVector3(10, btScalar(0.5), 10))), btVector3(0, btScalar(0.5), 0),
+        1000);
+  for (int i = 0; i < 50; ++i) {
+    w.add_sphere(btScalar(0.5),
+                 btVector3(btScalar(i % 8) * 2 - 7, btScalar(1.5), btScalar(i / 8) * 2 - 7));
+  }
+}
+
+TEST(ConstraintSolver, LeavesGroupsWithLittleParallelismToTheFasterCodeWithTheSameBits) {
+  for (const std::size_t minimum : {0u, 1u}) {
+    WorldParts parts;
+    parts.solver = [minimum] {
+      return std::make_unique<ConstraintSolver>(ConstraintSolverOptions{.minimum_batch = minimum});
+    };
+    Twins twins({.parts = parts});
+    twins.both(add_loaded_platform);
+    ASSERT_TRUE(twins.step(60));
+    const auto& stats = dynamic_cast<ConstraintSolver&>(*twins.ours().solver).stats();
+    EXPECT_GT(stats.groups, 0u);
+    // Both ways are measured, and so both are used, unless all groups are to be solved by jfpx.
+    EXPECT_EQ(fallbacks(twins.ours(), SolverFallback::measured) > 0, minimum > 0);
+  }
+}
+
 TEST(DynamicsWorld, LeavesSmallWorldsToBulletFromAnyStepOn) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));

@@ -114,6 +114,16 @@ TEST(DispatchStats, EveryFallbackHasItsOwnText) {
   EXPECT_EQ(std::count(texts.begin(), texts.end(), "unknown"), 0);
 }
 
+TEST(DispatchStats, EveryOrderReasonHasItsOwnText) {
+  std::vector<std::string> texts;
+  for (std::size_t i = 0; i < kOrderReasonCount; ++i) {
+    texts.emplace_back(to_string(static_cast<OrderReason>(i)));
+  }
+  std::sort(texts.begin(), texts.end());
+  EXPECT_EQ(std::unique(texts.begin(), texts.end()), texts.end());
+  EXPECT_EQ(std::count(texts.begin(), texts.end(), "unknown"), 0);
+}
+
 TEST(FailingCollider, IsReplacedAndTheBitsStay) {
   int calls = 0;
   Twins twins(with_collider([&](std::vector<PairContact>*) {

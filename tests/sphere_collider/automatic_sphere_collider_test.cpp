@@ -8,7 +8,12 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <cstdlib>
+#include <future>
+#include <span>
 #include <string>
+#include <thread>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -35,6 +40,20 @@ class AutomaticSphereColliderTest : public testing::Test {
 };
 using AutomaticCollider = AutomaticSphereColliderTest;
 
+/// Options whose costs state that the start of the device takes next to no time.
+SphereColliderOptions device_pays_soon() {
+  SphereColliderOptions options = device_wins();
+  options.costs.cuda_start_ms = 1e-6;
+  return options;
+}
+
+void call_until_cuda(SphereCollider& collider, std::span<const SphereInstance> spheres) {
+  while (collider.backend() != Backend::cuda) {
+    EXPECT_TRUE(same_bits(collider.find_contacts(spheres), brute_force(spheres))) << seed_note();
+    EXPECT_EQ(collider.device_failure(), "");
+  }
+}
+
 TEST_F(AutomaticCollider, UsesTheDeviceWhereTheModelExpectsIt) {
   const auto collider = make(device_wins());
   const auto spheres = make_gas(300, 1, 3, random_);
@@ -56,9 +75,110 @@ TEST_F(AutomaticCollider, DoesNotStartTheDeviceBeforeItPays) {
   EXPECT_EQ(device_.made, 0);
   EXPECT_EQ(collider->backend(), Backend::cpu);
   EXPECT_EQ(collider->reason(), ChoiceReason::fixed);
+  call_until_cuda(*collider, spheres);
+  EXPECT_GE(device_.made, 1);
+}
+
+TEST_F(AutomaticCollider, StartsTheDeviceOnAnotherThreadWhileTheCpuGoesOn) {
+  for (const bool given : {false, true}) {
+    device_ = {};
+    std::promise<void> may_end;
+    std::shared_future<void> end(may_end.get_future());
+    std::thread::id thread;
+    device_.when_made = [&] {
+      if (device_.made == 1) thread = std::this_thread::get_id();
+      end.wait();
+    };
+    const auto collider = make(device_pays_soon());
+    const auto spheres = make_gas(300, 1, 3, random_);
+    const auto pairs = some_pairs(300, 1000, random_);
+    const auto call = [&] {
+      if (!given) {
+        EXPECT_TRUE(same_bits(collider->find_contacts(spheres), brute_force(spheres)));
+      } else {
+        collider->find_touching(spheres, pairs);
+      }
+    };
+    for (int i = 0; i < 20; ++i) {
+      call();
+      EXPECT_EQ(collider->backend(), Backend::cpu) << "no call waits";
+    }
+    may_end.set_value();
+    while (collider->backend() == Backend::cpu) call();
+    EXPECT_NE(thread, std::thread::id());
+    EXPECT_NE(thread, std::this_thread::get_id());
+    EXPECT_EQ(device_.made, given ? 1 : 2);
+    EXPECT_GT(device_.calls, device_.made) << "the start repeats a call to allocate memory";
+    EXPECT_EQ(collider->device_failure(), "");
+  }
+}
+
+TEST_F(AutomaticCollider, IsDestroyedWhileTheDeviceStarts) {
+  device_.when_made = [] { std::this_thread::sleep_for(std::chrono::milliseconds(20)); };
+  {
+    const auto collider = make(device_pays_soon());
+    const auto spheres = make_gas(300, 1, 3, random_);
+    for (int i = 0; i < 3; ++i) collider->find_contacts(spheres);
+    EXPECT_EQ(collider->backend(), Backend::cpu);
+  }
+  EXPECT_EQ(device_.alive, 0);
+  EXPECT_GE(device_.made, 1);
+}
+
+/// Starts the GPU, if there is one, and ends the process.
+[[noreturn]] void exit_while_the_device_starts(bool destroy) {
+  SphereColliderOptions options;
+  options.costs.cuda_start_ms = 1e-6;
+  auto collider = make_sphere_collider(options);
+  Random random(1);
+  const auto spheres = make_gas(20000, 1, 3, random);
+  for (int i = 0; i < 3; ++i) collider->find_contacts(spheres);
+  if (!destroy) static_cast<void>(collider.release());
+  collider.reset();
+  std::exit(0);
+}
+
+TEST(AutomaticColliderDeathTest, TheProcessMayExitWhileTheDeviceStarts) {
+  testing::GTEST_FLAG(death_test_style) = "threadsafe";  // CUDA does not survive a fork
+  for (const bool destroy : {false, true}) {
+    EXPECT_EXIT(exit_while_the_device_starts(destroy), testing::ExitedWithCode(0), "");
+  }
+}
+
+TEST_F(AutomaticCollider, AFailureWhileTheDeviceStartsIsReportedOnce) {
+  for (const bool when_made : {false, true}) {
+    for (const std::string failure : {"", "the device is gone"}) {
+      device_ = {};
+      (when_made ? device_.when_made : device_.before_call) = [&failure] {
+        if (failure.empty()) throw BackendUnavailable("cuda: no CUDA driver is installed");
+        throw DeviceError(failure);
+      };
+      SphereColliderOptions options = device_pays_soon();
+      const auto collider = make(options);
+      const auto spheres = make_gas(300, 1, 3, random_);
+      std::string reported;
+      for (int i = 0; i < 300; ++i) {
+        ASSERT_TRUE(same_bits(collider->find_contacts(spheres), brute_force(spheres)));
+        reported += collider->device_failure();
+        EXPECT_EQ(collider->backend(), Backend::cpu);
+        std::this_thread::sleep_for(std::chrono::microseconds(100));
+      }
+      EXPECT_EQ(reported, failure);
+      EXPECT_EQ(collider->reason() == ChoiceReason::device_failed, !failure.empty());
+      EXPECT_EQ(device_.made, 1);
+      EXPECT_EQ(device_.alive, 0);
+    }
+  }
+}
+
+TEST_F(AutomaticCollider, InvalidInputWhileTheDeviceStartsIsNotItsFailure) {
+  const auto collider = make(device_pays_soon());
+  auto spheres = make_gas(300, 1, 3, random_);
   collider->find_contacts(spheres);
-  EXPECT_EQ(device_.made, 1);
-  EXPECT_EQ(collider->backend(), Backend::cuda);
+  spheres[7].radius = -1;
+  EXPECT_THROW(collider->find_contacts(spheres), InvalidArgument) << "and starts the device";
+  spheres[7].radius = 1;
+  call_until_cuda(*collider, spheres);
 }
 
 TEST_F(AutomaticCollider, AMissingDeviceIsProbedOnceAndNotReported) {

@@ -1,4 +1,5 @@
 /// jfpx calibrate, and the use of its file by the other commands.
+#include <jfpx/backend.hpp>
 #include <jfpx/cost_model.hpp>
 
 #include "tests/support/process.hpp"
@@ -74,16 +75,26 @@ TEST_F(Calibrate, StoresCostsThatTheOtherCommandsUse) {
             model.costs.x86_all_pairs.pair_ns);
 }
 
-TEST_F(Calibrate, WithoutAFileTheDefaultsAreUsedAndReportedInOneLine) {
+TEST_F(Calibrate, ReportsCudaOnlyWhereItIsUsable) {
+  bool usable = false;
+  for (const BackendStatus& status : available_backends()) {
+    if (status.backend == Backend::cuda) usable = status.usable;
+  }
+  for (const std::string command : {"calibrate --show", "calibrate"}) {
+    const auto result = jfpx(command, "2>/dev/null");
+    EXPECT_THAT(result.output, HasSubstr("cpu: sorted tiles instead of all pairs"));
+    EXPECT_EQ(result.output.find("cuda") != std::string::npos, usable) << result.output;
+  }
+}
+
+TEST_F(Calibrate, WithoutAFileTheDefaultsAreUsedWithoutAMessage) {
   const auto run = jfpx(kRun);
   EXPECT_EQ(run.status, 0);
-  EXPECT_THAT(run.output, HasSubstr("default costs are used"));
-  EXPECT_THAT(run.output, HasSubstr("this machine was not measured yet"));
-  EXPECT_THAT(jfpx(std::string(kRun) + " --quiet").output, Not(HasSubstr("costs")));
-  EXPECT_THAT(jfpx(std::string(kRun) + " --backend cpu").output, Not(HasSubstr("costs")));
+  EXPECT_THAT(run.output, Not(HasSubstr("costs")));
   const auto shown = jfpx("calibrate --show");
   EXPECT_EQ(shown.status, 0);
-  EXPECT_THAT(shown.output, HasSubstr("showing the default costs"));
+  EXPECT_THAT(shown.output,
+              HasSubstr("this machine was not measured yet: showing the default costs"));
   EXPECT_EQ(folder_.entries(), 0u) << "only calibrate writes";
 }
 
@@ -96,6 +107,8 @@ TEST_F(Calibrate, ABrokenFileIsIgnoredWithOneLineAndTheSameBits) {
     EXPECT_THAT(run.output, HasSubstr("default costs are used")) << content;
     EXPECT_THAT(run.output, HasSubstr(path())) << content;
     EXPECT_THAT(run.output, HasSubstr(hash)) << content;
+    EXPECT_EQ(jfpx(std::string(kRun) + " --quiet").output, hash);
+    EXPECT_THAT(jfpx(std::string(kRun) + " --backend cpu").output, Not(HasSubstr("costs")));
   }
   std::filesystem::remove(path());
   std::filesystem::create_directory(path());
@@ -130,9 +143,10 @@ TEST_F(Calibrate, AFolderThatCannotBeCreatedIsAnErrorOfCalibrateOnly) {
 
 TEST_F(Calibrate, WithoutAHomeNothingIsStored) {
   const std::string command = "env -u HOME -u XDG_CACHE_HOME " + std::string(JFPX_TOOL_PATH) + " ";
-  const auto run = test::run_process(command + kRun + " 2>&1");
-  EXPECT_EQ(run.status, 0);
-  EXPECT_THAT(run.output, HasSubstr("HOME is not set"));
+  EXPECT_EQ(test::run_process(command + kRun + " 2>&1").status, 0);
+  const auto result = test::run_process(command + "calibrate --quiet 2>&1");
+  EXPECT_EQ(result.status, 2);
+  EXPECT_THAT(result.output, HasSubstr("HOME is not set"));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 /// The jfpx command: output, exit statuses, errors and files.
 #include <jfpx/backend.hpp>
+#include <jfpx/recorded_world.hpp>
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
 
@@ -13,11 +14,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <sstream>
+#include <utility>
 
 namespace jfpx {
 namespace {
@@ -144,16 +147,53 @@ TEST(Tool, JsonIsTheOnlyOutputOnStdout) {
   }
 }
 
-TEST(Tool, AnInterruptedRunLeavesNoFiles) {
+TEST(Tool, OnlyOneOptionWritesToStdout) {
+  for (const std::string command : {"run", JFPX_HAS_BULLET ? "compare" : "run"}) {
+    expect_fails(command + " pile --steps 1 --json - --hash", 2,
+                 "--hash can't be combined with --json -");
+  }
+  expect_fails("run pile --steps 1 --csv - --hash", 2, "--hash can't be combined with --csv -");
+  expect_fails("run pile --steps 1 --csv - --json -", 2, "--json - can't be combined with --csv -");
+}
+
+TEST(Tool, CsvIsTheOnlyOutputOnStdout) {
   const test::TemporaryFolder folder;
-  // Without --foreground, timeout also signals the process group; a second signal ends the program
-  // immediately.
-  const ProcessResult result =
-      test::run_process("timeout --foreground --preserve-status -s INT 0.5 " JFPX_TOOL_PATH
-                        " run pile --spheres 50 --steps 100000000 --quiet --record " +
-                        folder.file("run.rec") + " --csv " + folder.file("run.csv"));
-  EXPECT_EQ(result.status, 130) << "ends by the signal";
-  EXPECT_EQ(folder.entries(), 0u);
+  const std::string run = "run pile --spheres 8 --steps 3 --csv ";
+  ASSERT_EQ(jfpx_command(run + folder.file("a.csv")).status, 0);
+  std::ifstream file(folder.file("a.csv"));
+  const std::string content(std::istreambuf_iterator<char>(file), {});
+  const std::string output = jfpx_stdout(run + "-").output;
+  EXPECT_EQ(std::ranges::count(output, '\n'), std::ranges::count(content, '\n'));
+  EXPECT_EQ(output.substr(0, output.find('\n')), content.substr(0, content.find('\n')));
+}
+
+TEST(Tool, NumbersOutOfRangeNameTheRange) {
+  for (const std::string number : {"-1", "257", "1000", "99999999999999999999", "two"}) {
+    expect_fails("run pile --threads " + number, 2,
+                 "is " + number + "; it must be a whole number from 0 to 256");
+  }
+  for (const std::string option : {"--spheres", "--boxes"}) {
+    for (const std::string number : {"-1", "5000000000"}) {
+      expect_fails("run pile " + option + " " + number, 2,
+                   "is " + number + "; it must be a whole number from 0 to 4294967295");
+    }
+  }
+  expect_fails("run pile --steps -1", 2,
+               "is -1; it must be a whole number from 0 to 18446744073709551615");
+}
+
+TEST(Tool, AnInterruptedRunLeavesNoFiles) {
+  for (const auto& [signal, status] : {std::pair("INT", 130), {"TERM", 143}, {"HUP", 129}}) {
+    const test::TemporaryFolder folder;
+    // Without --foreground, timeout also signals the process group; a second signal ends the
+    // program immediately.
+    const ProcessResult result = test::run_process(
+        "timeout --foreground --preserve-status -s " + std::string(signal) +
+        " 0.5 " JFPX_TOOL_PATH " run pile --spheres 50 --steps 100000000 --quiet --record " +
+        folder.file("run.rec") + " --csv " + folder.file("run.csv"));
+    EXPECT_EQ(result.status, status) << "ends by the signal";
+    EXPECT_EQ(folder.entries(), 0u) << signal;
+  }
 }
 
 TEST(Tool, BadInputIsStatusTwoAndNamed) {
@@ -492,6 +532,25 @@ TEST(Tool, ReplayOfVersion01ResolvesWorstFirst) {
   const ProcessResult result = jfpx_command("replay " + path);
   EXPECT_EQ(result.status, 0) << result.output;
   EXPECT_THAT(result.output, HasSubstr("bit for bit"));
+}
+
+TEST(Tool, ReplayRepeatsForcesAndChangesOfBodies) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  RecordedWorld world(path, scenes::make("pile", {.spheres = 20}));
+  world.add_force(Drag{.linear = Real(0.5)});
+  for (int step = 0; step < 20; ++step) {
+    if (step == 5) world.remove(world.world().bodies()[3]);
+    if (step == 7) world.add(BodyDef());
+    if (step == 9) world.apply_force(world.world().bodies()[4], {50, 0, 0});
+    world.step();
+  }
+  world.finish();
+  const ProcessResult result = jfpx_command("replay " + path);
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("bit for bit"));
+  expect_fails("replay --engine " + std::string(JFPX_HAS_BULLET ? "bullet " : "native --x ") + path,
+               2, JFPX_HAS_BULLET ? "only the native engine repeats" : "--x");
 }
 
 TEST(Tool, ReplayStopsAtTheFirstStepThatDiffers) {

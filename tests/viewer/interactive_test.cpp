@@ -266,7 +266,7 @@ TEST_F(Interactive, AFailedScreenshotLeavesTheRecordingComplete) {
 
 TEST_F(Interactive, AFilmFailsTheRunOnlyIfTheCommandLineRequestedIt) {
   ViewOptions film = options(kUnlimited);
-  film.record = "film";
+  film.pictures = "film";
   {
     App app(film);
     EXPECT_TRUE(app.frame(0));

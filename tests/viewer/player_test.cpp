@@ -2,6 +2,7 @@
 #include "src/viewer/player.hpp"
 
 #include <jfpx/error.hpp>
+#include <jfpx/recorded_world.hpp>
 
 #include "src/scenes/scenes.hpp"
 #include "src/sphere_collider/cost_cache.hpp"
@@ -167,6 +168,16 @@ TEST(Player, AnUnusableBackendLeavesTheRunUnchanged) {
     EXPECT_EQ(player.scene(), scene);
     player.save_recording(folder.file("b.rec"));
   }
+}
+
+TEST(RecordedRun, WithCallsIsLeftToReplay) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.rec");
+  RecordedWorld world(path, scenes::make("gas", {.spheres = 2}));
+  world.add_force(Gravity{});
+  world.step();
+  world.finish();
+  EXPECT_THROW(open_recording(path), InvalidArgument);
 }
 
 TEST(RecordedRun, IsPlayedAndContinuesWithASimulation) {

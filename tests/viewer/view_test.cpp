@@ -107,15 +107,18 @@ TEST_F(Pictures, SideBySideFindsNoDifference) {
 }
 
 TEST_F(Pictures, ARunEndsNormallyWhenItIsTerminated) {
-  for (const std::string kind : {"--headless --frames 100000000", ""}) {
-    const std::string film = folder.file(kind.empty() ? "window" : "headless");
-    // Sends SIGTERM when the second picture exists; the last line is the status of the program.
+  for (const auto& [kind, signal] : {std::pair<std::string, std::string>{"", "TERM"},
+                                     {"--headless --frames 100000000", "TERM"},
+                                     {"--headless --frames 100000000", "HUP"}}) {
+    const std::string film = folder.file(kind.empty() ? "window" : "headless" + signal);
+    // Sends the signal when the second picture exists; the last line is the status of the program.
     const auto result = test::run_process(
         "SDL_VIDEODRIVER=offscreen " JFPX_VIEW_PATH
         " pile --spheres 400 --size 160x120 --quality low --screenshot " +
-        film + ".png --record " + film + " " + kind + " 2>&1 & until [ -e " + film +
+        film + ".png --pictures " + film + " " + kind + " 2>&1 & until [ -e " + film +
         "/frame-000002.png ] || ! kill -0 $!; do sleep 0.05; done; "
-        "kill -TERM $!; wait $!; echo status $?");
+        "kill -" +
+        signal + " $!; wait $!; echo status $?");
     EXPECT_THAT(result.output, HasSubstr("status 0"));
     EXPECT_THAT(result.output, HasSubstr("rendering on"));
     EXPECT_THAT(result.output, HasSubstr("engine native"));
@@ -135,7 +138,7 @@ TEST_F(Pictures, ALostContextIsStatusThreeAndLeavesCompletePictures) {
       const std::string folder_name = folder.file("film" + kind + std::to_string(healthy));
       const auto result =
           jfpx_view("pile --spheres 5 --size 64x48 --quality low --frames 100 --screenshot " +
-                        folder.file("last.png") + " --record " + folder_name + " " + kind,
+                        folder.file("last.png") + " --pictures " + folder_name + " " + kind,
                     "SDL_VIDEODRIVER=offscreen JFPX_TEST_HEALTHY=" + std::to_string(healthy) +
                         " LD_PRELOAD=" JFPX_LOST_CONTEXT_PATH);
       EXPECT_EQ(result.status, 3);
@@ -179,10 +182,24 @@ TEST(View, RunsWithoutRenderingForTiming) {
   EXPECT_THAT(result.output, HasSubstr("rendering off"));
 }
 
+TEST(View, ARunWithoutRenderingEndsNormallyBySignals) {
+  for (const char* signal : {"INT", "TERM", "HUP"}) {
+    const test::TemporaryFolder folder;
+    const auto result = test::run_process(
+        "timeout --foreground --preserve-status -s " + std::string(signal) +
+        " 0.5 " JFPX_VIEW_PATH " gas --spheres 9 --frames 1000000000 --no-render --record " +
+        folder.file("a.rec") + " 2>&1");
+    EXPECT_EQ(result.status, 0) << result.output;
+    EXPECT_EQ(folder.entries(), 1u);
+    EXPECT_EQ(test::run_process(JFPX_TOOL_PATH " replay --quiet " + folder.file("a.rec")).status,
+              0);
+  }
+}
+
 TEST(View, StatesAreRecordedAndPlayedBack) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("gas.rec");
-  const auto recorded = jfpx_view("gas --spheres 9 --frames 7 --no-render --recording " + path);
+  const auto recorded = jfpx_view("gas --spheres 9 --frames 7 --no-render --record " + path);
   EXPECT_EQ(recorded.status, 0) << recorded.output;
   const std::string again = folder.file("again.rec");
   const auto played = jfpx_view(path + " --frames 70 --no-render --recording " + again);

@@ -116,6 +116,29 @@ TEST_P(OutOfMemoryInAWorld, AStepIsUndoneWhicheverAllocationFails) {
   }
 }
 
+TEST_P(OutOfMemoryInAWorld, AStepNamesTheBodiesAndAnAmountOfMemory) {
+  const Scene scene = dense_scene(4, GetParam());
+  std::size_t named = 0;
+  with_every_failure([&](std::size_t k, Shortage) {
+    World world = make_world(scene, kSettings[0], 0);
+    std::string message;
+    try {
+      FailingNew failing(k, Shortage::once);
+      world.step();
+    } catch (const OutOfMemory& error) {
+      message = error.what();
+    } catch (const std::bad_alloc&) {
+    }
+    if (message.find("step of 43 bodies") != std::string::npos) {
+      ++named;
+      const std::size_t number = message.find_first_of("0123456789", message.find("about "));
+      EXPECT_GE(std::stoull(message.substr(number)), 43 * sizeof(BodyDef)) << message;
+    }
+    return FailingNew::failed();
+  });
+  EXPECT_GT(named, 5u);
+}
+
 TEST_P(OutOfMemoryInAWorld, AFailedAdditionLeavesNoTrace) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));

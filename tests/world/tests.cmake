@@ -24,6 +24,7 @@ jfpx_add_test(world_test SOURCES
   world/particle_test.cpp
   world/property_test.cpp
   world/query_test.cpp
+  world/recorded_world_test.cpp
   world/recording_test.cpp
   world/rest_test.cpp
   world/sensor_test.cpp

@@ -24,7 +24,8 @@ struct ConstraintSolverOptions {
   int device = 0;                         ///< cuda: ordinal of the GPU
   unsigned threads = 1;                   ///< at most 256; 0: one per core
   SimdLevel simd = SimdLevel::automatic;  ///< vector instructions for rows: AVX2 or none
-  /// Groups with fewer manifolds are solved by Bullet's own code.
+  /// Groups with fewer manifolds are solved by Bullet's own code, and so are groups with little
+  /// parallelism where that has measured faster; with 0, or with Backend::cuda, neither.
   std::size_t minimum_batch = 24;
 };
 
@@ -37,8 +38,10 @@ enum class SolverFallback : std::uint8_t {
   constraints,    ///< a constraint of a class that Bullet does not define
   not_finite,     ///< a value is infinite or NaN; Bullet repeats the group to produce its NaNs
   out_of_memory,  ///< memory for the group could not be allocated
+  measured,       ///< few rows are independent, and Bullet's own code has measured faster, or is
+                  ///< being measured
 };
-inline constexpr std::size_t kSolverFallbacks = 7;
+inline constexpr std::size_t kSolverFallbacks = 8;
 
 /// Returns a short text for a table, for example "small group".
 JFPX_API std::string_view to_string(SolverFallback fallback) noexcept;

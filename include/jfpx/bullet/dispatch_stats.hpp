@@ -28,6 +28,22 @@ inline constexpr std::size_t kFallbackCount = 8;
 /// A short text for a table, for example "small batch".
 JFPX_API std::string_view to_string(Fallback fallback) noexcept;
 
+/// Reason why a batch updated the manifolds in Bullet's order on one thread, which is slower. The
+/// bits are identical either way. The first that applies is counted.
+enum class OrderReason : std::uint8_t {
+  none,                ///< any order, on all threads
+  combine_callback,    ///< the user combines materials; Bullet computes all contacts
+  contact_callback,    ///< contact started, ended or destroyed is set; Bullet computes all contacts
+  processed_callback,  ///< contact processed is set
+  added_callback,      ///< contact added is set, and a body has CF_CUSTOM_MATERIAL_CALLBACK
+  filter,              ///< the class of the dispatcher or of a body may override a filter
+  pair_cache,          ///< the pair cache is not exactly a btHashedOverlappingPairCache
+};
+inline constexpr std::size_t kOrderReasonCount = 7;
+
+/// A short text for a table, for example "contact callback".
+JFPX_API std::string_view to_string(OrderReason reason) noexcept;
+
 /// Counters since construction or reset_stats(). Pairs are counted only in batches.
 struct DispatchStats {
   std::uint64_t dispatches = 0;     ///< calls of dispatchAllCollisionPairs
@@ -43,13 +59,16 @@ struct DispatchStats {
   std::string first_mismatch;       ///< field and both values; empty without a mismatch
   std::array<std::uint64_t, kFallbackCount> fallbacks{};  ///< dispatches by Fallback
   Fallback last_fallback = Fallback::none;                ///< `none` if the last was a batch
-  std::uint64_t to_device = 0;    ///< bytes that the collider sent to a device
-  std::uint64_t from_device = 0;  ///< bytes that the collider received from a device
-  std::string failure;            ///< error of the last dispatch that ran out of memory
-  std::string device_failure;     ///< why the CPU replaced the device; empty if it has not
-  std::string warning;            ///< set if the program fuses products and sums; see fused.hpp
-  double prepare_ms = 0;          ///< wall clock of batches: gather, collider, read manifolds
-  double commit_ms = 0;           ///< wall clock of batches: update of the manifolds
+  std::array<std::uint64_t, kOrderReasonCount>
+      ordered{};  ///< batches by OrderReason; `none` counts the unordered ones
+  OrderReason last_order = OrderReason::none;  ///< of the last batch
+  std::uint64_t to_device = 0;                 ///< bytes that the collider sent to a device
+  std::uint64_t from_device = 0;               ///< bytes that the collider received from a device
+  std::string failure;         ///< error of the last dispatch that ran out of memory
+  std::string device_failure;  ///< why the CPU replaced the device; empty if it has not
+  std::string warning;         ///< set if the program fuses products and sums; see fused.hpp
+  double prepare_ms = 0;       ///< wall clock of batches: gather, collider, read manifolds
+  double commit_ms = 0;        ///< wall clock of batches: update of the manifolds
 };
 
 }  // namespace bullet

@@ -100,10 +100,12 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
       return false;
     }
     find_touching();
+    order_reason_ = reason_for_order(batch_, traits.may_override_filter);
     // A pair cache of a user's class may observe the traversal itself.
-    unordered_ = is_exactly<btHashedOverlappingPairCache>(cache) &&
-                 is_order_unobservable(batch_, traits.may_override_filter);
-    if (unordered_) {
+    if (order_reason_ == OrderReason::none && !is_exactly<btHashedOverlappingPairCache>(cache)) {
+      order_reason_ = OrderReason::pair_cache;
+    }
+    if (order_reason_ == OrderReason::none) {
       unordered_commit_.reserve(pairs_.size());
     } else {
       add(ordered_commit_.plan(batch_, touching_, traits.may_override_filter));
@@ -153,6 +155,8 @@ bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, const DispatcherTr
     return false;
   }
   ++stats_.batches;
+  ++stats_.ordered[static_cast<std::size_t>(order_reason_)];
+  stats_.last_order = order_reason_;
   stats_.pairs += pairs.size();
   const auto prepared = Clock::now();
   commit(dispatcher, cache, info, argument);
@@ -165,7 +169,7 @@ void BatchEngine::commit(btCollisionDispatcher& dispatcher, btOverlappingPairCac
                          const btDispatcherInfo& info, btDispatcher* argument) {
   const Running running(&running_);
   BT_PROFILE("processAllOverlappingPairs");
-  if (unordered_) {
+  if (order_reason_ == OrderReason::none) {
     commit_unordered(dispatcher, cache, info);
     return;
   }

@@ -81,7 +81,7 @@ class JFPX_API BatchEngine {
   // State of the running dispatch:
   std::span<const btBroadphasePair> pairs_;
   std::span<const PairContact> touching_;
-  bool unordered_ = false;
+  OrderReason order_reason_ = OrderReason::none;
 };
 
 }  // namespace bullet

@@ -44,8 +44,11 @@ void combine_materials(const PackedBody& a, const PackedBody& b, btManifoldPoint
 
 bool contacts_are_observed() {
   return gContactStartedCallback != nullptr || gContactEndedCallback != nullptr ||
-         gContactDestroyedCallback != nullptr ||
-         gCalculateCombinedFrictionCallback != &btManifoldResult::calculateCombinedFriction ||
+         gContactDestroyedCallback != nullptr || materials_are_combined_by_user();
+}
+
+bool materials_are_combined_by_user() {
+  return gCalculateCombinedFrictionCallback != &btManifoldResult::calculateCombinedFriction ||
          gCalculateCombinedRestitutionCallback != &btManifoldResult::calculateCombinedRestitution ||
          gCalculateCombinedRollingFrictionCallback !=
              &btManifoldResult::calculateCombinedRollingFriction ||

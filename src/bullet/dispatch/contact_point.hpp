@@ -13,8 +13,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Whether a global callback other than gContactAddedCallback would be called for a contact of two
-/// spheres, or a user's function may combine the materials of a contact.
+/// Whether a user's function may combine the materials of a contact.
+bool materials_are_combined_by_user();
+/// Whether gContactStartedCallback, gContactEndedCallback or gContactDestroyedCallback is set, or
+/// materials_are_combined_by_user().
 bool contacts_are_observed();
 
 /// The collision flags of bodies whose contacts need more than write_contact() even without

@@ -76,6 +76,26 @@ std::string_view to_string(Fallback fallback) noexcept {
   return "unknown";
 }
 
+std::string_view to_string(OrderReason reason) noexcept {
+  switch (reason) {
+    case OrderReason::none:
+      return "none";
+    case OrderReason::contact_callback:
+      return "contact callback";
+    case OrderReason::combine_callback:
+      return "combine callback";
+    case OrderReason::processed_callback:
+      return "contact processed callback";
+    case OrderReason::added_callback:
+      return "contact added callback";
+    case OrderReason::filter:
+      return "filter overridden";
+    case OrderReason::pair_cache:
+      return "pair cache of another class";
+  }
+  return "unknown";
+}
+
 }  // namespace bullet
 }  // namespace JFPX_ABI
 }  // namespace jfpx

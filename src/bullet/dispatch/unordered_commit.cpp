@@ -175,11 +175,16 @@ class Committer {
 
 }  // namespace
 
-bool is_order_unobservable(const SphereBatch& batch, bool may_override_filter) {
-  if (may_override_filter || (batch.any_trait() & kOverridesFilter) != 0) return false;
-  if (contacts_are_observed() || gContactProcessedCallback != nullptr) return false;
-  return gContactAddedCallback == nullptr ||
-         (batch.any_collision_flag() & btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK) == 0;
+OrderReason reason_for_order(const SphereBatch& batch, bool may_override_filter) {
+  if (materials_are_combined_by_user()) return OrderReason::combine_callback;
+  if (contacts_are_observed()) return OrderReason::contact_callback;
+  if (gContactProcessedCallback != nullptr) return OrderReason::processed_callback;
+  if (gContactAddedCallback != nullptr &&
+      (batch.any_collision_flag() & btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK) != 0) {
+    return OrderReason::added_callback;
+  }
+  const bool filtered = may_override_filter || (batch.any_trait() & kOverridesFilter) != 0;
+  return filtered ? OrderReason::filter : OrderReason::none;
 }
 
 void UnorderedCommit::reserve(std::size_t pairs) {

@@ -1,6 +1,8 @@
 /// Commit of pairs in any order and on any thread, for dispatches whose order is unobservable.
 #pragma once
 
+#include <jfpx/bullet/dispatch_stats.hpp>
+
 #include "src/bullet/dispatch/sphere_batch.hpp"
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
@@ -20,10 +22,11 @@ struct CommitCounts {
   std::uint64_t sphere_planes = 0;  ///< sphere-plane pairs updated without Bullet's algorithm
 };
 
-/// True if the order of manifold updates is unobservable: no global callback would be called,
-/// Bullet's functions combine the materials, and no class that may override a filter is involved.
+/// Why the order of manifold updates is observable. OrderReason::none: no global callback would be
+/// called, Bullet's functions combine the materials, and no class that may override a filter is
+/// involved.
 /// `may_override_filter`: the dispatcher's class may override needsCollision().
-bool is_order_unobservable(const SphereBatch& batch, bool may_override_filter);
+OrderReason reason_for_order(const SphereBatch& batch, bool may_override_filter);
 
 /// Updates the manifolds of pairs of spheres, and of spheres with boxes and planes. Each manifold
 /// belongs to one pair, so threads share no data. Bullet creates and releases the manifolds,

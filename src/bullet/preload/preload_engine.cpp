@@ -55,6 +55,7 @@ DispatchStats sum_of_stats(std::string_view* backend) {
     if (sum.mismatches == 0) sum.first_mismatch = stats.first_mismatch;
     sum.mismatches += stats.mismatches;
     for (std::size_t i = 0; i < kFallbackCount; ++i) sum.fallbacks[i] += stats.fallbacks[i];
+    for (std::size_t i = 0; i < kOrderReasonCount; ++i) sum.ordered[i] += stats.ordered[i];
     sum.to_device += stats.to_device;
     sum.from_device += stats.from_device;
     if (!stats.failure.empty()) sum.failure = stats.failure;
@@ -100,6 +101,12 @@ JFPX_API void jfpx_preload_print_summary(const char* prefix) {
     const std::string_view reason = to_string(static_cast<Fallback>(i));
     std::fprintf(stderr, "%sleft to Bullet: %llu (%.*s)\n", prefix, Count{stats.fallbacks[i]},
                  static_cast<int>(reason.size()), reason.data());
+  }
+  for (std::size_t i = 1; i < kOrderReasonCount; ++i) {
+    if (stats.ordered[i] == 0) continue;
+    const std::string_view reason = to_string(static_cast<OrderReason>(i));
+    std::fprintf(stderr, "%sbatches in Bullet's order: %llu (%.*s)\n", prefix,
+                 Count{stats.ordered[i]}, static_cast<int>(reason.size()), reason.data());
   }
   if (stats.verified > 0) {
     std::fprintf(stderr, "%sverified: %llu pairs, %llu mismatches%s%s\n", prefix,

@@ -23,6 +23,7 @@ ConstraintSolver::Impl::Impl(ConstraintSolver& owner, const ConstraintSolverOpti
       own_steps(steps()),
       own_split(owner.m_resolveSplitPenetrationImpulse),
       solver(options.threads, options.simd),
+      may_choose(options.backend != Backend::cuda),
       minimum_batch(options.minimum_batch) {
   device.emplace(options.backend, cuda_group_solver_maker(options.device), solver.pool().threads());
 }
@@ -50,7 +51,12 @@ std::optional<SolverFallback> ConstraintSolver::Impl::solve(
   write_back();
   device->finished(on_device ? 0 : solver.colors());
   ++stats.groups;
-  if (on_device) ++stats.on_device;
+  if (on_device) {
+    ++stats.on_device;
+  } else {
+    choice.note_lanes(manifolds.size(), scan.contacts().size(), solver.blocks(), solver.lanes(),
+                      joints.size());
+  }
   stats.contacts += scan.contacts().size();
   stats.joints += joints.size();
   stats.sweeps += static_cast<std::uint64_t>(report.iterations);
@@ -122,13 +128,18 @@ ConstraintSolver::~ConstraintSolver() = default;
 
 std::unique_ptr<ConstraintSolver> ConstraintSolverTestAccess::make(
     std::unique_ptr<GroupSolver> device, const ConstraintSolverOptions& options) {
+  const auto made = std::make_shared<std::unique_ptr<GroupSolver>>(std::move(device));
+  return make([made] { return std::move(*made); }, GpuIslandSolver::kStartMs, options);
+}
+
+std::unique_ptr<ConstraintSolver> ConstraintSolverTestAccess::make(
+    std::function<std::unique_ptr<GroupSolver>()> make, double start_ms,
+    const ConstraintSolverOptions& options) {
   ConstraintSolverOptions without_gpu = options;
   without_gpu.backend = Backend::cpu;
   auto solver = std::make_unique<ConstraintSolver>(without_gpu);
   ConstraintSolver::Impl& impl = *solver->impl_;
-  const auto made = std::make_shared<std::unique_ptr<GroupSolver>>(std::move(device));
-  impl.device.emplace(
-      options.backend, [made] { return std::move(*made); }, impl.solver.pool().threads());
+  impl.device.emplace(options.backend, std::move(make), impl.solver.pool().threads(), start_ms);
   return solver;
 }
 
@@ -146,12 +157,19 @@ btScalar ConstraintSolver::solveGroup(btCollisionObject** bodies, int body_count
   impl_->bodies = {bodies, static_cast<std::size_t>(body_count)};
   impl_->joints = {constraints, static_cast<std::size_t>(constraint_count)};
   std::optional<SolverFallback> reason = impl_->fallback_reason(manifold_count);
-  if (!reason) reason = impl_->solve({manifolds, static_cast<std::size_t>(manifold_count)});
-  if (!reason) return 0;
-  ++impl_->stats.fallbacks[static_cast<std::size_t>(*reason)];
-  return btSequentialImpulseConstraintSolver::solveGroup(
-      bodies, body_count, manifolds, manifold_count, constraints, constraint_count, info,
-      debug_drawer, dispatcher);
+  const std::span group(manifolds, static_cast<std::size_t>(manifold_count));
+  const bool chooses = !reason && impl_->may_choose && impl_->minimum_batch > 0;
+  if (chooses && impl_->choice.leaves_to_bullet(group.size())) reason = SolverFallback::measured;
+  if (!reason) reason = impl_->solve(group);
+  btScalar result = 0;
+  if (reason) {
+    ++impl_->stats.fallbacks[static_cast<std::size_t>(*reason)];
+    result = btSequentialImpulseConstraintSolver::solveGroup(
+        bodies, body_count, manifolds, manifold_count, constraints, constraint_count, info,
+        debug_drawer, dispatcher);
+  }
+  if (chooses) impl_->choice.finished();
+  return result;
 }
 
 std::size_t ConstraintSolver::minimum_batch() const noexcept { return impl_->minimum_batch; }
@@ -165,8 +183,8 @@ void ConstraintSolver::reset_stats() {
 
 std::string_view to_string(SolverFallback fallback) noexcept {
   constexpr std::string_view kTexts[kSolverFallbacks] = {
-      "small group",           "step overridden", "solver mode",  "row solver replaced",
-      "class of a constraint", "not finite",      "out of memory"};
+      "small group",           "step overridden", "solver mode",   "row solver replaced",
+      "class of a constraint", "not finite",      "out of memory", "measured"};
   const auto i = static_cast<std::size_t>(fallback);
   return i < kSolverFallbacks ? kTexts[i] : "unknown";
 }

@@ -5,6 +5,7 @@
 
 #include "src/bullet/solver/contact_scan.hpp"
 #include "src/bullet/solver/gpu_island_solver.hpp"
+#include "src/bullet/solver/group_choice.hpp"
 #include "src/contact_solver/cpu/row_solver.hpp"
 
 #include <array>
@@ -31,7 +32,9 @@ struct ConstraintSolver::Impl {
   const btSingleConstraintRowSolver own_split;  ///< split impulse row solver of Bullet
   cpu::RowSolver solver;
   std::optional<GpuIslandSolver> device;  ///< always present after construction
+  const bool may_choose;                  ///< false if the user has selected a device
   std::size_t minimum_batch;
+  GroupChoice choice;
   ConstraintSolverStats stats;
   ContactScan scan;
   std::vector<std::uint8_t> flags;  ///< by id: BodyFlag bits

@@ -3,6 +3,7 @@
 
 #include <jfpx/bullet/constraint_solver.hpp>
 
+#include <functional>
 #include <memory>
 
 namespace jfpx {
@@ -15,6 +16,10 @@ namespace bullet {
 struct JFPX_API ConstraintSolverTestAccess {
   /// Makes a solver that uses `device` as its GPU, as options.backend specifies.
   static std::unique_ptr<ConstraintSolver> make(std::unique_ptr<GroupSolver> device,
+                                                const ConstraintSolverOptions& options);
+  /// The same with a GPU that `make` starts as soon as the expected gain exceeds `start_ms`.
+  static std::unique_ptr<ConstraintSolver> make(std::function<std::unique_ptr<GroupSolver>()> make,
+                                                double start_ms,
                                                 const ConstraintSolverOptions& options);
 };
 

@@ -11,7 +11,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <exception>
+#include <system_error>
 #include <utility>
 
 namespace jfpx {
@@ -24,7 +26,6 @@ constexpr std::size_t kContactsPerChunk = 128, kBodiesPerChunk = 256;
 constexpr std::size_t kMinContacts = 400;
 /// Ratio of predicted times at which a trial of the device costs more than it can save.
 constexpr double kMaxSlowdown = 4;
-constexpr double kStartMs = 200;  ///< duration of the first use of the device
 
 /// Length of the longest chain of dependent steps, per color and iteration; 1.4 to 1.6 in piles.
 constexpr double kSequentialRowsPerColor = 1.5;
@@ -51,8 +52,9 @@ bool may_have_split_impulse(const btManifoldPoint& point, const rows::RowSetting
 
 }  // namespace
 
-GpuIslandSolver::GpuIslandSolver(Backend backend, GroupSolverMaker make, unsigned threads)
-    : backend_(backend), make_(std::move(make)), threads_(threads) {
+GpuIslandSolver::GpuIslandSolver(Backend backend, GroupSolverMaker make, unsigned threads,
+                                 double start_ms)
+    : backend_(backend), make_(std::move(make)), threads_(threads), start_ms_(start_ms) {
   if (backend_ == Backend::cuda) {
     if (make_ == nullptr) throw BackendUnavailable("cuda: built without CUDA");
     solver_ = make_();
@@ -78,7 +80,8 @@ bool GpuIslandSolver::choose(const ContactScan& scan, const btContactSolverInfo&
   }
   if (!chooser_) return solver_ != nullptr;
   if (contacts < kMinContacts) return false;
-  if (dormant_ && chooser_->missed_us() >= 1e3 * kStartMs) start();
+  if (dormant_ && chooser_->missed_us() >= 1e3 * start_ms_) start(contacts);
+  take_started();
   if (!chooser_) return false;
   const std::array<double, 2> predicted = predicted_us(contacts, info.m_numIterations);
   const std::size_t choice = chooser_->choose(static_cast<double>(contacts), predicted).alternative;
@@ -89,10 +92,24 @@ bool GpuIslandSolver::choose(const ContactScan& scan, const btContactSolverInfo&
   return choice == kGpu;
 }
 
-void GpuIslandSolver::start() {
+void GpuIslandSolver::start(std::size_t contacts) {
   dormant_ = false;
   try {
-    solver_ = make_();
+    starting_ = std::async(std::launch::async, [make = make_, contacts] {
+      auto solver = make();
+      solver->inputs({.bodies = contacts, .contacts = contacts});  // allocates memory
+      return solver;
+    });
+  } catch (const std::system_error&) {
+    chooser_.reset();  // no thread could be created
+  }
+}
+
+void GpuIslandSolver::take_started() {
+  if (!starting_.valid()) return;
+  if (starting_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  try {
+    solver_ = starting_.get();
     chooser_->wake();
   } catch (const std::exception&) {
     chooser_.reset();  // a machine without a usable device is not a failure

@@ -14,6 +14,7 @@
 #include <array>
 #include <chrono>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <span>
@@ -42,12 +43,18 @@ struct DeviceGroup {
 /// which it is expected to be faster (`automatic`).
 class GpuIslandSolver {
  public:
+  static constexpr double kStartMs = 200;  ///< duration of the first use of the device
+
   /// @param make creates the solver on the device. It is called in the constructor if the backend
-  ///   is cuda, and with `automatic` as soon as the expected gain justifies the start.
+  ///   is cuda. With `automatic` it is called on another thread as soon as the expected gain
+  ///   justifies the start, and the CPU solves all groups until it has returned; the destructor
+  ///   waits for it.
   /// @param threads number of threads of the CPU
+  /// @param start_ms expected duration of that call of `make`
   /// @throws BackendUnavailable if the backend is cuda and `make` is null, and all exceptions of
   ///   that call of `make`
-  GpuIslandSolver(Backend backend, GroupSolverMaker make, unsigned threads);
+  GpuIslandSolver(Backend backend, GroupSolverMaker make, unsigned threads,
+                  double start_ms = kStartMs);
 
   /// Chooses the CPU or the device for a group, and starts the clock that finished() stops.
   /// @return whether the device is to solve the group
@@ -79,12 +86,14 @@ class GpuIslandSolver {
   rows::RowSweepReport solve_packed(const DeviceGroup& group);
   static void write_back(const DeviceGroup& group, const rows::ContactOutcome& from,
                          btManifoldPoint& point);
-  void start();
+  void start(std::size_t contacts);
+  void take_started();
   void disable(const std::string& why);
 
   Backend backend_;
   GroupSolverMaker make_;
   unsigned threads_;
+  double start_ms_;
   std::optional<TimeChooser> chooser_;
   bool dormant_ = false;  ///< the device has not been started
   std::unique_ptr<GroupSolver> solver_;
@@ -99,6 +108,7 @@ class GpuIslandSolver {
   Clock::time_point since_;
   bool timed_ = false;
   std::string failure_;
+  std::future<std::unique_ptr<GroupSolver>> starting_;  ///< its destructor waits
 };
 
 }  // namespace bullet

@@ -1,0 +1,79 @@
+/// A world that records its run with all calls that change it, so that the run can be repeated.
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+class RecordingReader;
+
+/// A force that a recording can contain: one of force.hpp. A user's own force, like a contact
+/// generator, is code that a file can't store.
+using RecordableForce =
+    std::variant<Gravity, Drag, Spring, Bungee, Aero, AeroControl, Buoyancy, Explosion>;
+
+/// A World whose changes are recorded, in the file that RecordingWriter describes. It has the
+/// functions of World that a file can store, with the same results and exceptions; `jfpx replay`
+/// repeats the recorded run. Not thread-safe, except for reading world().
+class JFPX_API RecordedWorld {
+ public:
+  /// @throws as World and RecordingWriter
+  RecordedWorld(const std::string& path, const Scene& scene, const WorldSettings& settings = {});
+  ~RecordedWorld();
+  RecordedWorld(RecordedWorld&&) noexcept;
+  RecordedWorld& operator=(RecordedWorld&&) noexcept;
+
+  /// The world, for reading.
+  const World& world() const;
+  /// Steps the world and appends a frame. @throws also FileError if the disk is full
+  StepReport step();
+  /// Completes the file. @throws FileError
+  void finish();
+
+  BodyId add(const BodyDef& body);
+  void remove(BodyId id);
+  void set_state(BodyId id, const BodyState& state);
+  void wake(BodyId id);
+
+  void set_friction(BodyId id, Real friction);
+  void set_restitution(BodyId id, Real restitution);
+  void set_acceleration(BodyId id, const Vec3& acceleration);
+  void set_damping(BodyId id, Real linear, Real angular);
+  void set_mass(BodyId id, Real mass);
+  void set_inertia(BodyId id, const std::optional<Mat3>& inertia);
+  void set_user_data(BodyId id, std::uint64_t user_data);
+  void set_filter(BodyId id, const CollisionFilter& filter);
+  void set_pair_ignored(BodyId a, BodyId b, bool ignored);
+
+  void apply_force(BodyId id, const Vec3& force);
+  void apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point);
+  void apply_torque(BodyId id, const Vec3& torque);
+
+  ForceId add_force(const RecordableForce& force);
+  /// Replaces the parameters of a force, as an assignment to World::force() does.
+  /// @throws InvalidArgument if the id is unknown or of a force of another type
+  void set_force(ForceId id, const RecordableForce& force);
+  void remove_force(ForceId id);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Makes the calls that a recording contains before a step. Does nothing for a recording of
+/// RecordingWriter, which contains none.
+/// @param step from 1 to reader.steps()
+/// @param world in the state before that step: made from the scene of the recording, and changed by
+///   repeating the calls and steps before
+/// @throws InvalidArgument for another step; FileError if the world refuses a call
+JFPX_API void repeat_calls(RecordingReader& reader, std::uint64_t step, World& world);
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,258 @@
+/// Calls of functions of World as JSON.
+#include "src/world/recorded_calls.hpp"
+
+#include "src/scene/scene_json.hpp"
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <functional>
+#include <string>
+#include <tuple>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace recorded {
+namespace {
+
+[[noreturn]] void refuse(const std::string& what) { throw InvalidScene(what); }
+
+template <class T, class U>
+concept Is = std::same_as<std::remove_const_t<T>, U>;
+template <class T>
+concept Elastic = Is<T, Spring> || Is<T, Bungee>;
+
+// Each calls visit(name, member) for each field.
+void each_field(Is<Attachment> auto& attachment, const auto& visit) {
+  visit("body", attachment.body);
+  visit("point", attachment.point);
+}
+void each_field(Is<HalfSpace> auto& half_space, const auto& visit) {
+  visit("normal", half_space.normal);
+  visit("offset", half_space.offset);
+}
+void each_field(Is<BodyState> auto& state, const auto& visit) {
+  visit("position", state.position);
+  visit("orientation", state.orientation);
+  visit("velocity", state.velocity);
+  visit("angular_velocity", state.angular_velocity);
+}
+void each_field(Is<CollisionFilter> auto& filter, const auto& visit) {
+  visit("category", filter.category);
+  visit("mask", filter.mask);
+}
+void each_field(Is<Gravity> auto& force, const auto& visit) {
+  visit("acceleration", force.acceleration);
+  visit("body", force.body);
+}
+void each_field(Is<Drag> auto& force, const auto& visit) {
+  visit("linear", force.linear);
+  visit("quadratic", force.quadratic);
+  visit("wind", force.wind);
+  visit("body", force.body);
+}
+void each_field(Elastic auto& force, const auto& visit) {
+  visit("a", force.a);
+  visit("b", force.b);
+  visit("stiffness", force.stiffness);
+  visit("damping", force.damping);
+  visit("rest_length", force.rest_length);
+}
+void each_field(Is<Aero> auto& force, const auto& visit) {
+  visit("body", force.body);
+  visit("tensor", force.tensor);
+  visit("point", force.point);
+  visit("wind", force.wind);
+}
+void each_field(Is<AeroControl> auto& force, const auto& visit) {
+  visit("body", force.body);
+  visit("lowest", force.lowest);
+  visit("base", force.base);
+  visit("highest", force.highest);
+  visit("point", force.point);
+  visit("wind", force.wind);
+  visit("control", force.control);
+}
+void each_field(Is<Buoyancy> auto& force, const auto& visit) {
+  visit("liquid", force.liquid);
+  visit("density", force.density);
+  visit("gravity", force.gravity);
+  visit("body", force.body);
+}
+void each_field(Is<Explosion> auto& force, const auto& visit) {
+  visit("centre", force.centre);
+  visit("start", force.start);
+  visit("peak_force", force.peak_force);
+  visit("speed", force.speed);
+  visit("thickness", force.thickness);
+  visit("duration", force.duration);
+}
+
+/// Names of the forces, in the order of RecordableForce.
+constexpr std::array<const char*, std::variant_size_v<RecordableForce>> kForceNames{
+    "gravity", "drag", "spring", "bungee", "aero", "aero_control", "buoyancy", "explosion"};
+
+template <class T>
+Json object_of(const T& value) {
+  Json json = Json::object();
+  each_field(value, [&](const char* name, const auto& field) { json[name] = to_value(field); });
+  return json;
+}
+
+void read(const Json& json, Real& value) { value = json.get<Real>(); }
+void read(const Json& json, bool& value) { value = json.get<bool>(); }
+void read(const Json& json, std::uint32_t& value) {
+  if (!json.is_number_unsigned() || json.get<std::uint64_t>() > 0xffffffffu) {
+    refuse("a call has a number that is not a whole number of 32 bits");
+  }
+  value = json.get<std::uint32_t>();
+}
+void read(const Json& json, std::uint64_t& value) {
+  if (!json.is_number_unsigned()) refuse("a call has a number that is not a whole number");
+  value = json.get<std::uint64_t>();
+}
+void read(const Json& json, Vec3& v) {
+  for (int i = 0; i < 3; ++i) read(json.at(static_cast<std::size_t>(i)), v[i]);
+}
+void read(const Json& json, Quat& q) {
+  read(json.at(0), q.w), read(json.at(1), q.x), read(json.at(2), q.y), read(json.at(3), q.z);
+}
+void read(const Json& json, Mat3& m) {
+  for (std::size_t i = 0; i < 3; ++i) read(json.at(i), m.row[i]);
+}
+void read(const Json& json, BodyId& id) {
+  read(json.at(0), id.index);
+  read(json.at(1), id.generation);
+}
+void read(const Json& json, ForceId& id) { read(json, id.number); }
+void read(const Json& json, BodyDef& body) { body = body_from_value(json); }
+template <class T>
+void read(const Json& json, std::optional<T>& value) {
+  value.reset();
+  if (!json.is_null()) read(json, value.emplace());
+}
+template <class T>
+requires requires(T& value) {
+  each_field(value, [](const char*, auto&) {});
+}
+void read(const Json& json, T& value) {
+  each_field(value, [&](const char* name, auto& field) { read(json.at(name), field); });
+}
+template <std::size_t... I>
+void read_force(const Json& json, RecordableForce& force, std::index_sequence<I...>) {
+  const std::string name = json.at("type").get<std::string>();
+  const auto read_if = [&]<std::size_t i>(std::integral_constant<std::size_t, i>) {
+    if (name == kForceNames[i]) read(json, force.emplace<i>());
+    return name == kForceNames[i];
+  };
+  if (!(read_if(std::integral_constant<std::size_t, I>()) || ...)) {
+    refuse("there is no force \"" + name + "\"");
+  }
+}
+void read(const Json& json, RecordableForce& force) {
+  read_force(json, force, std::make_index_sequence<kForceNames.size()>());
+}
+
+/// A function that a recorded call may name.
+template <class Function>
+struct Named {
+  const char* name;
+  Function function;
+};
+template <class Function>
+Named(const char*, Function) -> Named<Function>;
+
+constexpr std::tuple kFunctions{
+    Named{"add", &World::add},
+    Named{"remove", &World::remove},
+    Named{"set_state", &World::set_state},
+    Named{"wake", &World::wake},
+    Named{"set_friction", &World::set_friction},
+    Named{"set_restitution", &World::set_restitution},
+    Named{"set_acceleration", &World::set_acceleration},
+    Named{"set_damping", &World::set_damping},
+    Named{"set_mass", &World::set_mass},
+    Named{"set_inertia", &World::set_inertia},
+    Named{"set_user_data", &World::set_user_data},
+    Named{"set_filter", &World::set_filter},
+    Named{"set_pair_ignored", &World::set_pair_ignored},
+    Named{"apply_force", &World::apply_force},
+    Named{"apply_force_at_point", &World::apply_force_at_point},
+    Named{"apply_torque", &World::apply_torque},
+    Named{"add_force", &add_force},
+    Named{"set_force", &set_force},
+    Named{"remove_force", &World::remove_force},
+};
+
+/// Reads the arguments and calls the function.
+template <class Function, class... Arguments>
+void call_with(World& world, const Json& call, Function function,
+               std::tuple<Arguments...> arguments) {
+  std::size_t count = 0;
+  std::apply([&](auto&... argument) { (read(call.at(++count), argument), ...); }, arguments);
+  if (call.size() != count + 1) refuse("a call has too many arguments");
+  std::apply([&](const auto&... argument) { std::invoke(function, world, argument...); },
+             arguments);
+}
+template <class Result, class... Parameters>
+void read_and_call(World& world, const Json& call, Result (World::*function)(Parameters...)) {
+  call_with(world, call, function, std::tuple<std::remove_cvref_t<Parameters>...>());
+}
+template <class Result, class... Parameters>
+void read_and_call(World& world, const Json& call, Result (*function)(World&, Parameters...)) {
+  call_with(world, call, function, std::tuple<std::remove_cvref_t<Parameters>...>());
+}
+
+}  // namespace
+
+Json to_value(Real value) {
+  if (!is_finite(value)) throw InvalidArgument("a recorded call has a number that is not finite");
+  return value;
+}
+Json to_value(std::uint32_t value) { return value; }
+Json to_value(const Quat& q) {
+  return Json::array({to_value(q.w), to_value(q.x), to_value(q.y), to_value(q.z)});
+}
+Json to_value(const Mat3& m) {
+  return Json::array({to_value(m.row[0]), to_value(m.row[1]), to_value(m.row[2])});
+}
+Json to_value(const std::optional<BodyId>& id) { return id ? to_value(*id) : Json(); }
+Json to_value(const Attachment& attachment) { return object_of(attachment); }
+Json to_value(const HalfSpace& half_space) { return object_of(half_space); }
+Json to_value(bool value) { return value; }
+Json to_value(std::uint64_t value) { return value; }
+Json to_value(const Vec3& v) { return Json::array({to_value(v.x), to_value(v.y), to_value(v.z)}); }
+Json to_value(const std::optional<Mat3>& m) { return m ? to_value(*m) : Json(); }
+Json to_value(BodyId id) { return Json::array({id.index, id.generation}); }
+Json to_value(ForceId id) { return id.number; }
+Json to_value(const BodyDef& body) { return body_to_value(body); }
+Json to_value(const BodyState& state) { return object_of(state); }
+Json to_value(const CollisionFilter& filter) { return object_of(filter); }
+Json to_value(const RecordableForce& force) {
+  Json json = {{"type", kForceNames[force.index()]}};
+  json.update(std::visit([](const auto& value) { return object_of(value); }, force));
+  return json;
+}
+
+ForceId add_force(World& world, const RecordableForce& force) {
+  return std::visit([&](const auto& value) { return world.add_force(value); }, force);
+}
+
+void set_force(World& world, ForceId id, const RecordableForce& force) {
+  std::visit([&]<class F>(const F& value) { world.force<F>(id) = value; }, force);
+}
+
+void make_call_on(World& world, const Json& call) {
+  const std::string name = call.at(0).get<std::string>();
+  const auto call_if = [&](const auto& named) {
+    if (name == named.name) read_and_call(world, call, named.function);
+    return name == named.name;
+  };
+  if (!std::apply([&](const auto&... named) { return (call_if(named) || ...); }, kFunctions)) {
+    refuse("there is no function \"" + name + "\"");
+  }
+}
+
+}  // namespace recorded
+}  // namespace JFPX_ABI
+}  // namespace jfpx
