@@ -5,6 +5,7 @@
 #include <jfpx/build.hpp>
 #include <jfpx/collide.hpp>
 #include <jfpx/contact_generator.hpp>
+#include <jfpx/contact_list.hpp>
 #include <jfpx/cost_model.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>

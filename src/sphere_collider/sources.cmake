@@ -1,6 +1,7 @@
 list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/automatic_sphere_collider.cpp
   ${CMAKE_CURRENT_LIST_DIR}/backend.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/contact_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cost_cache.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cost_model.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sphere_collider.cpp
