@@ -46,6 +46,7 @@ if(JFPX_HAS_CUDA)
   jfpx_add_test(cuda_test
     SOURCES
       contact_solver/group_solver_test.cpp
+      sphere_collider/cuda/array_collider_test.cpp
       sphere_collider/cuda/cuda_fault_test.cpp
       sphere_collider/cuda/cuda_few_test.cpp
       sphere_collider/cuda/cuda_huge_test.cpp
