@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _arrays, _core
+from . import _arrays, _core, _device
 from ._errors import ConcurrentUse, InvalidArgument
 
 
@@ -77,6 +77,8 @@ class SphereCollider:
                  algorithm: str = "automatic", threads: int = 1, device: int = 0) -> None:
         core = _arrays.precision_of(dtype)
         self._dtype = np.dtype(dtype)
+        self._backend = backend
+        self._on_devices: dict[Any, Any] = {}
         self._collider = core.Collider(backend, algorithm,
                                        _arrays.count(threads, "threads", 0, 256),
                                        _arrays.count(device, "device", 0, 2**31 - 1))
@@ -102,7 +104,8 @@ class SphereCollider:
         return self._collider.reason
 
     def find_contacts(self, positions: Any, radii: Any, *, batch: Any = None, output: str = "coo",
-                      half: bool = True, index_dtype: Any = "int32", out: Any = None) -> Any:
+                      half: bool = True, index_dtype: Any = "int32", out: Any = None,
+                      count: Any = None) -> Any:
         """Finds all touching pairs of spheres. See jfpx.find_contacts().
 
         Parameters
@@ -110,11 +113,16 @@ class SphereCollider:
         out : Contacts, optional
             Arrays to write to, pairs (2, C), normal (C, 3), distance (C,) with C >= E. Requires
             output="coo".
+        count : array (2,) of int64 on the device, optional
+            With `out`, for arrays on a device: receives E, and 1 if the contacts were written.
+            The call neither allocates nor waits, so that it can be captured in a CUDA graph. If E
+            exceeds the capacity of `out`, the first contacts are written; if it exceeds that of
+            reserve(), or a sphere is invalid, none are. Finds each pair once.
 
         Returns
         -------
-        Contacts or ContactRows, or int
-            With `out`, the number E of contacts.
+        Contacts or ContactRows, or int, or None
+            With `out`, the number E of contacts; with `count`, None.
 
         Raises
         ------
@@ -123,40 +131,59 @@ class SphereCollider:
         InvalidArgument
             As jfpx.find_contacts(), or `out` is too small; the message has the number of contacts.
         """
+        if _device.is_on_device(positions):
+            search = _device_search(self._dtype, positions, None, radii, None, None, batch, None)
+            return self._find_on_device(search, output, half, index_dtype, out, count, True)
+        _refuse_count(count)
         search = _Search(self._dtype, positions, radii, batch)
         return self._find(search, output, half, index_dtype, out, contacts=True)
 
     def find_pairs(self, positions: Any, cutoff: Any = None, *, radii: Any = None,
                    query: Any = None, query_radii: Any = None, batch: Any = None,
                    output: str = "coo", half: bool = True, index_dtype: Any = "int32",
-                   out: Any = None) -> Any:
+                   out: Any = None, count: Any = None) -> Any:
         """Finds pairs of points within a distance, as indices alone. See jfpx.find_pairs().
 
         Parameters
         ----------
         out : array, optional
             Array of shape (2, C) to write to, with C >= E. Requires output="coo".
+        count : array (2,) of int64 on the device, optional
+            As for find_contacts().
 
         Returns
         -------
-        array of shape (2, E) or Rows, or int
-            With `out`, the number E of pairs.
+        array of shape (2, E) or Rows, or int, or None
+            With `out`, the number E of pairs; with `count`, None.
         """
+        if _device.is_on_device(positions):
+            search = _device_search(self._dtype, positions, cutoff, radii, query, query_radii,
+                                    batch, None)
+            return self._find_on_device(search, output, half, index_dtype, out, count, False)
+        _refuse_count(count)
         search = _pair_search(self._dtype, positions, cutoff, radii, query, query_radii, batch)
         return self._find(search, output, half, index_dtype, out, contacts=False)
 
+    def reserve(self, like: Any, spheres: int, contacts: int) -> None:
+        """Reserves memory for searches with `count`, on the device and the current stream of
+        `like`. Raises OutOfMemory.
+
+        Parameters
+        ----------
+        like : array (N, 3) on a device
+            Positions.
+        spheres, contacts : int
+            The most of both.
+        """
+        search = _device.DeviceSearch(like, None, self._dtype)
+        search.collider(self._on_devices).reserve(
+            _arrays.count(spheres, "spheres", 0, 2**31), _arrays.count(contacts, "contacts", 0, 2**48))
+
     def _find(self, search: _Search, output: str, half: bool, index_dtype: Any, out: Any,
               contacts: bool) -> Any:
-        if output not in ("coo", "csr"):
-            raise InvalidArgument(f"output is {output!r}; it must be 'coo' or 'csr'")
-        try:
-            index = _INDEX_TYPES[np.dtype(index_dtype).name]
-        except (KeyError, TypeError):
-            raise InvalidArgument(f"index_dtype is {index_dtype!r}; it must be int32 or int64") from None
+        index = _check_form(output, index_dtype, out)
         if index is np.int32 and search.largest() > 2**31:
             raise InvalidArgument("more than 2^31 spheres require index_dtype=\"int64\"")
-        if out is not None and output != "coo":
-            raise InvalidArgument("out requires output='coo'")
         if not self._lock.acquire(blocking=False):
             raise ConcurrentUse("the collider is in use by another call; use one for each thread")
         try:
@@ -175,6 +202,33 @@ class SphereCollider:
         finally:
             self._lock.release()
         result = [search.convert(array) for array in result]
+        if contacts:
+            return Contacts(*result) if output == "coo" else ContactRows(*result)
+        return result[0] if output == "coo" else Rows(*result)
+
+    def _find_on_device(self, search: _device.DeviceSearch, output: str, half: bool,
+                        index_dtype: Any, out: Any, count: Any, contacts: bool) -> Any:
+        index = np.dtype(_check_form(output, index_dtype, out)).name
+        if self._backend == "cpu":
+            raise InvalidArgument(f"positions are on cuda:{search.device}, and backend is cpu")
+        if count is not None and out is None:
+            raise InvalidArgument("count requires out")
+        if not self._lock.acquire(blocking=False):
+            raise ConcurrentUse("the collider is in use by another call; use one for each thread")
+        try:
+            core = search.collider(self._on_devices)
+            if count is not None:
+                search.enqueue(core, contacts)
+                search.write(core, out, contacts, None)
+                search.write_count(core, count)
+                return None
+            size = search.run(core, contacts, bool(half))
+            if out is not None:
+                search.write(core, out, contacts, size)
+                return size
+            result = search.results(core, size, output, index, contacts)
+        finally:
+            self._lock.release()
         if contacts:
             return Contacts(*result) if output == "coo" else ContactRows(*result)
         return result[0] if output == "coo" else Rows(*result)
@@ -213,12 +267,9 @@ class _Search:
 
     def set_cutoff(self, cutoff: Any) -> float:
         """Sets and returns the radius of which the double is exactly the cutoff."""
-        value = self.dtype.type(_arrays.number(cutoff, "cutoff"))
-        radius = value / 2
-        if not (0 < value < np.inf and radius + radius == value):
-            raise InvalidArgument(f"cutoff is {cutoff}; it must be finite and > 0 in {self.dtype}")
-        self._radii = np.full(1, radius)
-        return float(radius)
+        radius = _half(cutoff, self.dtype)
+        self._radii = np.full(1, radius, self.dtype)
+        return radius
 
     def rows(self) -> int:
         return (self._positions if self._query is None else self._query).shape[0]
@@ -235,20 +286,69 @@ class _Search:
 def _pair_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: Any,
                  query_radii: Any, batch: Any) -> _Search:
     """The search of find_pairs(): spheres whose radius is half of the cutoff touch within it."""
-    if (cutoff is None) == (radii is None):
-        raise InvalidArgument("find_pairs() takes either cutoff or radii")
+    _check_radii(cutoff, radii, query, query_radii)
     if cutoff is None:
-        if (query is None) != (query_radii is None):
-            raise InvalidArgument("with radii, query and query_radii are given together")
         search = _Search(dtype, positions, radii, batch)
     else:
-        if query_radii is not None:
-            raise InvalidArgument("query_radii requires radii instead of cutoff")
         search = _Search(dtype, positions, 1, batch)
         query_radii = search.set_cutoff(cutoff)
     if query is not None:
         search.add_query(query, query_radii)
     return search
+
+
+def _device_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: Any,
+                   query_radii: Any, batch: Any, device: Any) -> _device.DeviceSearch:
+    """The same on a device, for find_contacts(), too, without cutoff."""
+    if batch is not None:
+        raise InvalidArgument("batch requires positions in host memory")
+    _check_radii(cutoff, radii, query, query_radii)
+    search = _device.DeviceSearch(positions, device, dtype)
+    if cutoff is not None:
+        radii = query_radii = _half(cutoff, np.dtype(search.dtype))
+    search.set_radii(radii)
+    if query is not None:
+        search.set_query(query, query_radii)
+    return search
+
+
+def _check_radii(cutoff: Any, radii: Any, query: Any, query_radii: Any) -> None:
+    if (cutoff is None) == (radii is None):
+        raise InvalidArgument("find_pairs() takes either cutoff or radii")
+    if cutoff is not None and query_radii is not None:
+        raise InvalidArgument("query_radii requires radii instead of cutoff")
+    if cutoff is None and (query is None) != (query_radii is None):
+        raise InvalidArgument("with radii, query and query_radii are given together")
+
+
+def _half(cutoff: Any, dtype: np.dtype) -> float:
+    """The radius of which the double is exactly the cutoff."""
+    value = dtype.type(_arrays.number(cutoff, "cutoff"))
+    radius = value / 2
+    if not (0 < value < np.inf and radius + radius == value):
+        raise InvalidArgument(f"cutoff is {cutoff}; it must be finite and > 0 in {dtype}")
+    return float(radius)
+
+
+def _check_form(output: Any, index_dtype: Any, out: Any) -> Any:
+    """The type of indices."""
+    if output not in ("coo", "csr"):
+        raise InvalidArgument(f"output is {output!r}; it must be 'coo' or 'csr'")
+    if out is not None and output != "coo":
+        raise InvalidArgument("out requires output='coo'")
+    try:
+        return _INDEX_TYPES[str(index_dtype).removeprefix("torch.")]
+    except KeyError:
+        pass
+    try:
+        return _INDEX_TYPES[np.dtype(index_dtype).name]
+    except (KeyError, TypeError):
+        raise InvalidArgument(f"index_dtype is {index_dtype!r}; it must be int32 or int64") from None
+
+
+def _refuse_count(count: Any) -> None:
+    if count is not None:
+        raise InvalidArgument("count requires positions on a device")
 
 
 def _target(array: Any, name: str, shape: tuple[int | None, ...], size: int,
@@ -285,6 +385,14 @@ def _shared(dtype: np.dtype, threads: Any, device: Any) -> SphereCollider:
     return colliders[key]
 
 
+def _of_devices(dtype: str) -> SphereCollider:
+    """The collider of this thread for arrays on devices."""
+    colliders = _local.__dict__.setdefault("of_devices", {})
+    if dtype not in colliders:
+        colliders[dtype] = SphereCollider(dtype)
+    return colliders[dtype]
+
+
 def find_contacts(positions: Any, radii: Any, *, batch: Any = None, device: Any = None,
                   output: str = "coo", half: bool = True, index_dtype: Any = "int32",
                   threads: int = 1) -> Any:
@@ -295,13 +403,15 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, device: Any 
     Parameters
     ----------
     positions : array (N, 3) of float32 or float64
-        Centres [m], finite. NumPy, any array with DLPack, or nested lists. Any strides.
+        Centres [m], finite. NumPy, any array with DLPack, or nested lists. Any strides. Arrays of
+        PyTorch and CuPy on a CUDA device, and those that share with them, are searched there in
+        the order of the current stream.
     radii : number or array (N,) of the type of `positions`
         [m], finite and > 0.
     batch : array of integers, optional
         Offsets of independent systems, from 0 to N: system i has the spheres batch[i] to
-        batch[i + 1] - 1. Spheres of different systems do not touch.
-    device : "cpu", optional
+        batch[i + 1] - 1. Spheres of different systems do not touch. In host memory only.
+    device : "cpu", "cuda" or "cuda:N", optional
         Must be the device of the arrays, which is the default.
     output : "coo" or "csr"
         Pairs, or compressed rows.
@@ -323,6 +433,10 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, device: Any 
         A wrong shape, type or device; a value that is not finite; a radius that is not > 0.
     OutOfMemory
     """
+    if _device.is_on_device(positions):
+        search = _device_search(None, positions, None, radii, None, None, batch, device)
+        return _of_devices(search.dtype)._find_on_device(search, output, half, index_dtype, None,
+                                                         None, contacts=True)
     search = _Search(None, positions, radii, batch)
     collider = _shared(search.dtype, threads, device)
     return collider._find(search, output, half, index_dtype, None, contacts=True)
@@ -360,6 +474,10 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
     InvalidArgument, OutOfMemory
         As find_contacts().
     """
+    if _device.is_on_device(positions):
+        search = _device_search(None, positions, cutoff, radii, query, query_radii, batch, device)
+        return _of_devices(search.dtype)._find_on_device(search, output, half, index_dtype, None,
+                                                         None, contacts=False)
     search = _pair_search(None, positions, cutoff, radii, query, query_radii, batch)
     collider = _shared(search.dtype, threads, device)
     return collider._find(search, output, half, index_dtype, None, contacts=False)

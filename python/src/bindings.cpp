@@ -59,6 +59,9 @@ void register_exceptions() { nb::register_exception_translator(translate); }
 void JFPX_BIND(nanobind::module_& module) {
   jfpx::python::register_exceptions();
   jfpx::python::bind_collider(module);
+#if JFPX_HAS_CUDA
+  jfpx::python::bind_device_collider(module);
+#endif
   jfpx::python::bind_scene(module);
   jfpx::python::bind_world(module);
   jfpx::python::bind_recording(module);

@@ -12,6 +12,7 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 #include <string>
 #include <utility>
@@ -100,6 +101,8 @@ SphereColliderOptions collider_options(const std::string& backend, const std::st
                                        unsigned threads, int device);
 
 void bind_collider(nb::module_& module);
+/// Only with the CUDA backend.
+void bind_device_collider(nb::module_& module);
 void bind_scene(nb::module_& module);
 void bind_world(nb::module_& module);
 void bind_recording(nb::module_& module);
