@@ -12,6 +12,7 @@
 #include <jfpx/intersect.hpp>
 #include <jfpx/material.hpp>
 #include <jfpx/particle.hpp>
+#include <jfpx/periodic.hpp>
 #include <jfpx/query.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/recording.hpp>

@@ -1,6 +1,7 @@
 /// Contact lists between two sets, of many systems, in both orders and as compressed rows.
 #include <jfpx/contact_list.hpp>
 
+#include "src/sphere_collider/both_orders.hpp"
 #include "src/sphere_collider/sphere_input.hpp"
 
 namespace jfpx {
@@ -63,25 +64,11 @@ std::vector<SphereContact> find_contacts_in_systems(SphereCollider& collider,
 }
 
 std::vector<SphereContact> in_both_orders(ContactSpan contacts, std::size_t spheres) {
-  // Row i has the contacts of sphere i with lower indices, then those with higher ones.
-  std::vector<std::uint64_t> lower(spheres), higher(spheres);
-  for (const SphereContact& contact : contacts) {
-    ++higher[contact.a];
-    ++lower[contact.b];
-  }
-  std::uint64_t begin = 0;
-  for (std::size_t i = 0; i < spheres; ++i) {
-    const std::uint64_t lower_count = lower[i], higher_count = higher[i];
-    lower[i] = begin;
-    higher[i] = begin + lower_count;
-    begin += lower_count + higher_count;
-  }
-  std::vector<SphereContact> result(2 * contacts.size());
-  for (const SphereContact& c : contacts) {
-    result[higher[c.a]++] = c;
-    result[lower[c.b]++] = {.a = c.b, .b = c.a, .normal = -c.normal, .distance = c.distance};
-  }
-  return result;
+  return detail::both_orders(
+      contacts, spheres, [](const SphereContact& c) -> const SphereContact& { return c; },
+      [](const SphereContact& c) {
+        return SphereContact{.a = c.b, .b = c.a, .normal = -c.normal, .distance = c.distance};
+      });
 }
 
 std::vector<std::uint64_t> row_offsets(ContactSpan contacts, std::size_t rows) {

@@ -4,6 +4,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/contact_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cost_cache.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cost_model.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/periodic.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sphere_collider.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/cell_grid.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/cell_sweep.cpp
