@@ -4,8 +4,9 @@ docs/python.md in the repository is the guide. Units are SI; vectors are (x, y, 
 (w, x, y, z).
 """
 
-from ._collider import (ContactRows, Contacts, Rows, SphereCollider, available_backends,
-                        find_contacts, find_pairs)
+from ._collider import (ContactRows, Contacts, PeriodicContactRows, PeriodicContacts, PeriodicPairs,
+                        PeriodicRows, Rows, SphereCollider, available_backends, find_contacts,
+                        find_pairs)
 from ._errors import (BackendUnavailable, Closed, ConcurrentUse, DeviceError, Error, FileError,
                       InvalidArgument, InvalidScene, OutOfMemory)
 from ._forces import (Attachment, BodyId, BodyState, Bungee, Buoyancy, Drag, Explosion,

@@ -44,6 +44,46 @@ class Rows(NamedTuple):
     """(E,): indices b, ascending in each row."""
 
 
+class PeriodicContacts(NamedTuple):
+    """Touching pairs of spheres and images of spheres, sorted by (pairs[0], pairs[1])."""
+
+    pairs: Any
+    """(2, E): indices a and b."""
+    normal: Any
+    """(E, 3) [-]: unit vectors from the image of b to a."""
+    distance: Any
+    """(E,) [m], <= 0: negative penetration depths."""
+    shifts: Any
+    """(E, 3) int32: the image of b is at positions[b] + shifts * lengths."""
+
+
+class PeriodicContactRows(NamedTuple):
+    """The same as compressed rows (CSR)."""
+
+    offsets: Any
+    columns: Any
+    normal: Any
+    distance: Any
+    shifts: Any
+
+
+class PeriodicPairs(NamedTuple):
+    """Pairs of points and images of points."""
+
+    pairs: Any
+    """(2, E): indices a and b."""
+    shifts: Any
+    """(E, 3) int32: the image of b is at positions[b] + shifts * lengths."""
+
+
+class PeriodicRows(NamedTuple):
+    """The same as compressed rows (CSR)."""
+
+    offsets: Any
+    columns: Any
+    shifts: Any
+
+
 _INDEX_TYPES = {"int32": np.int32, "int64": np.int64}
 
 
@@ -103,7 +143,8 @@ class SphereCollider:
         """Reason for the backend and algorithm of the last call."""
         return self._collider.reason
 
-    def find_contacts(self, positions: Any, radii: Any, *, batch: Any = None, output: str = "coo",
+    def find_contacts(self, positions: Any, radii: Any, *, batch: Any = None,
+                      periodic: Any = None, output: str = "coo",
                       half: bool = True, index_dtype: Any = "int32", out: Any = None,
                       count: Any = None) -> Any:
         """Finds all touching pairs of spheres. See jfpx.find_contacts().
@@ -132,15 +173,17 @@ class SphereCollider:
             As jfpx.find_contacts(), or `out` is too small; the message has the number of contacts.
         """
         if _device.is_on_device(positions):
-            search = _device_search(self._dtype, positions, None, radii, None, None, batch, None)
+            search = _device_search(self._dtype, positions, None, radii, None, None, batch,
+                                    periodic, None)
             return self._find_on_device(search, output, half, index_dtype, out, count, True)
         _refuse_count(count)
         search = _Search(self._dtype, positions, radii, batch)
+        search.set_periodic(periodic)
         return self._find(search, output, half, index_dtype, out, contacts=True)
 
     def find_pairs(self, positions: Any, cutoff: Any = None, *, radii: Any = None,
                    query: Any = None, query_radii: Any = None, batch: Any = None,
-                   output: str = "coo", half: bool = True, index_dtype: Any = "int32",
+                   periodic: Any = None, output: str = "coo", half: bool = True, index_dtype: Any = "int32",
                    out: Any = None, count: Any = None) -> Any:
         """Finds pairs of points within a distance, as indices alone. See jfpx.find_pairs().
 
@@ -158,10 +201,11 @@ class SphereCollider:
         """
         if _device.is_on_device(positions):
             search = _device_search(self._dtype, positions, cutoff, radii, query, query_radii,
-                                    batch, None)
+                                    batch, periodic, None)
             return self._find_on_device(search, output, half, index_dtype, out, count, False)
         _refuse_count(count)
-        search = _pair_search(self._dtype, positions, cutoff, radii, query, query_radii, batch)
+        search = _pair_search(self._dtype, positions, cutoff, radii, query, query_radii, batch,
+                              periodic)
         return self._find(search, output, half, index_dtype, out, contacts=False)
 
     def reserve(self, like: Any, spheres: int, contacts: int) -> None:
@@ -182,6 +226,8 @@ class SphereCollider:
     def _find(self, search: _Search, output: str, half: bool, index_dtype: Any, out: Any,
               contacts: bool) -> Any:
         index = _check_form(output, index_dtype, out)
+        if search.periodic and out is not None:
+            raise InvalidArgument("out and periodic exclude each other")
         if index is np.int32 and search.largest() > 2**31:
             raise InvalidArgument("more than 2^31 spheres require index_dtype=\"int64\"")
         if not self._lock.acquire(blocking=False):
@@ -199,12 +245,17 @@ class SphereCollider:
             if contacts:
                 result += [np.empty((size, 3), self._dtype), np.empty(size, self._dtype)]
                 self._collider.write_contacts(*result[-2:])
+            if search.periodic:
+                result.append(np.empty((size, 3), np.int32))
+                self._collider.write_shifts(result[-1])
         finally:
             self._lock.release()
         result = [search.convert(array) for array in result]
+        if not search.periodic:
+            return _result(result, output, contacts)
         if contacts:
-            return Contacts(*result) if output == "coo" else ContactRows(*result)
-        return result[0] if output == "coo" else Rows(*result)
+            return (PeriodicContacts if output == "coo" else PeriodicContactRows)(*result)
+        return (PeriodicPairs if output == "coo" else PeriodicRows)(*result)
 
     def _find_on_device(self, search: _device.DeviceSearch, output: str, half: bool,
                         index_dtype: Any, out: Any, count: Any, contacts: bool) -> Any:
@@ -229,9 +280,7 @@ class SphereCollider:
             result = search.results(core, size, output, index, contacts)
         finally:
             self._lock.release()
-        if contacts:
-            return Contacts(*result) if output == "coo" else ContactRows(*result)
-        return result[0] if output == "coo" else Rows(*result)
+        return _result(result, output, contacts)
 
     def _write(self, size: int, out: Any, contacts: bool) -> int:
         """Writes the result to the arrays of the caller."""
@@ -247,6 +296,12 @@ class SphereCollider:
         return size
 
 
+def _result(arrays: list[Any], output: str, contacts: bool) -> Any:
+    if contacts:
+        return Contacts(*arrays) if output == "coo" else ContactRows(*arrays)
+    return arrays[0] if output == "coo" else Rows(*arrays)
+
+
 class _Search:
     """The validated arguments of a search."""
 
@@ -258,6 +313,23 @@ class _Search:
         self._radii = _arrays.vector(radii, "radii", size, self.dtype)
         self._batch = None if batch is None else _arrays.offsets(batch, "batch")
         self._query: Any = None
+        self.periodic: Any = None
+
+    def set_periodic(self, lengths: Any) -> None:
+        """Three lengths, each None along an axis that does not repeat."""
+        if lengths is None:
+            return
+        if self._batch is not None or self._query is not None:
+            raise InvalidArgument("periodic, query and batch exclude each other")
+        try:
+            lengths = list(lengths)
+        except TypeError:
+            raise InvalidArgument(f"periodic is {lengths!r}; it must be three lengths") from None
+        if len(lengths) != 3:
+            raise InvalidArgument(f"periodic has {len(lengths)} lengths; it must have 3")
+        repeats = [length is not None for length in lengths]
+        self.periodic = ([_arrays.number(length, "periodic") if on else 0.0
+                          for length, on in zip(lengths, repeats)], repeats)
 
     def add_query(self, query: Any, radii: Any) -> None:
         if self._batch is not None:
@@ -278,13 +350,15 @@ class _Search:
         return max(self._positions.shape[0], self.rows())
 
     def run(self, collider: Any, half: bool) -> int:
+        if self.periodic:
+            return collider.search_periodic(self._positions, self._radii, *self.periodic, half)
         if self._query is None:
             return collider.search(self._positions, self._radii, self._batch, half)
         return collider.search_between(self._query, self._query_radii, self._positions, self._radii)
 
 
 def _pair_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: Any,
-                 query_radii: Any, batch: Any) -> _Search:
+                 query_radii: Any, batch: Any, periodic: Any) -> _Search:
     """The search of find_pairs(): spheres whose radius is half of the cutoff touch within it."""
     _check_radii(cutoff, radii, query, query_radii)
     if cutoff is None:
@@ -294,14 +368,18 @@ def _pair_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: Any
         query_radii = search.set_cutoff(cutoff)
     if query is not None:
         search.add_query(query, query_radii)
+    search.set_periodic(periodic)
     return search
 
 
 def _device_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: Any,
-                   query_radii: Any, batch: Any, device: Any) -> _device.DeviceSearch:
+                   query_radii: Any, batch: Any, periodic: Any,
+                   device: Any) -> _device.DeviceSearch:
     """The same on a device, for find_contacts(), too, without cutoff."""
     if batch is not None:
         raise InvalidArgument("batch requires positions in host memory")
+    if periodic is not None:
+        raise InvalidArgument("periodic requires positions in host memory")
     _check_radii(cutoff, radii, query, query_radii)
     search = _device.DeviceSearch(positions, device, dtype)
     if cutoff is not None:
@@ -393,8 +471,8 @@ def _of_devices(dtype: str) -> SphereCollider:
     return colliders[dtype]
 
 
-def find_contacts(positions: Any, radii: Any, *, batch: Any = None, device: Any = None,
-                  output: str = "coo", half: bool = True, index_dtype: Any = "int32",
+def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: Any = None,
+                  device: Any = None, output: str = "coo", half: bool = True, index_dtype: Any = "int32",
                   threads: int = 1) -> Any:
     """Finds all touching pairs of spheres. The number of contacts is limited by memory only.
 
@@ -411,6 +489,10 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, device: Any 
     batch : array of integers, optional
         Offsets of independent systems, from 0 to N: system i has the spheres batch[i] to
         batch[i + 1] - 1. Spheres of different systems do not touch. In host memory only.
+    periodic : three lengths, optional
+        [m], of an orthogonal cell that repeats; None along an axis that does not. Each length is
+        at least twice the largest sum of two radii. The nearest image of a sphere counts, and its
+        shift is returned. Positions may be outside of the cell. In host memory only.
     device : "cpu", "cuda" or "cuda:N", optional
         Must be the device of the arrays, which is the default.
     output : "coo" or "csr"
@@ -424,7 +506,7 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, device: Any 
 
     Returns
     -------
-    Contacts or ContactRows
+    Contacts or ContactRows; PeriodicContacts or PeriodicContactRows with `periodic`
         Arrays of the kind of `positions`, sorted by (a, b).
 
     Raises
@@ -434,17 +516,18 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, device: Any 
     OutOfMemory
     """
     if _device.is_on_device(positions):
-        search = _device_search(None, positions, None, radii, None, None, batch, device)
+        search = _device_search(None, positions, None, radii, None, None, batch, periodic, device)
         return _of_devices(search.dtype)._find_on_device(search, output, half, index_dtype, None,
                                                          None, contacts=True)
     search = _Search(None, positions, radii, batch)
+    search.set_periodic(periodic)
     collider = _shared(search.dtype, threads, device)
     return collider._find(search, output, half, index_dtype, None, contacts=True)
 
 
 def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: Any = None,
-               query_radii: Any = None, batch: Any = None, device: Any = None,
-               output: str = "coo", half: bool = True, index_dtype: Any = "int32",
+               query_radii: Any = None, batch: Any = None, periodic: Any = None,
+               device: Any = None, output: str = "coo", half: bool = True, index_dtype: Any = "int32",
                threads: int = 1) -> Any:
     """Finds all pairs of points within a cutoff, or of spheres that touch, as indices alone.
 
@@ -461,12 +544,12 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
         index into `query`, row b into `positions`. `half` has no effect.
     query_radii : number or array (M,)
         With `radii`: those of `query`.
-    batch, device, output, half, index_dtype, threads
-        As in find_contacts(). `batch` and `query` exclude each other.
+    batch, periodic, device, output, half, index_dtype, threads
+        As in find_contacts(). `batch`, `periodic` and `query` exclude each other.
 
     Returns
     -------
-    array (2, E), or Rows
+    array (2, E), or Rows; PeriodicPairs or PeriodicRows with `periodic`
         Of the kind of `positions`, sorted by (a, b).
 
     Raises
@@ -475,10 +558,11 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
         As find_contacts().
     """
     if _device.is_on_device(positions):
-        search = _device_search(None, positions, cutoff, radii, query, query_radii, batch, device)
+        search = _device_search(None, positions, cutoff, radii, query, query_radii, batch,
+                                periodic, device)
         return _of_devices(search.dtype)._find_on_device(search, output, half, index_dtype, None,
                                                          None, contacts=False)
-    search = _pair_search(None, positions, cutoff, radii, query, query_radii, batch)
+    search = _pair_search(None, positions, cutoff, radii, query, query_radii, batch, periodic)
     collider = _shared(search.dtype, threads, device)
     return collider._find(search, output, half, index_dtype, None, contacts=False)
 

@@ -54,6 +54,23 @@ class Collider {
     return found_.size();
   }
 
+  /// Contacts in a periodic cell.
+  std::size_t search_periodic(const Spheres& spheres, const PeriodicCell& cell, bool half) {
+    found_ = {};
+    pack(spheres, &spheres_);
+    rows_ = spheres_.size();
+    std::vector<PeriodicContact> contacts = find_periodic_contacts(*collider_, spheres_, cell);
+    if (!half) contacts = in_both_orders(contacts, rows_);
+    list_.clear();
+    shifts_.clear();
+    for (const PeriodicContact& c : contacts) {
+      list_.push_back(c.contact);
+      shifts_.push_back(c.shift);
+    }
+    found_ = list_;
+    return found_.size();
+  }
+
   /// Writes the indices of the last search: pairs[0] and pairs[1], which may be longer than the
   /// number of contacts.
   template <class Index>
@@ -76,6 +93,13 @@ class Collider {
     }
   }
 
+  /// Writes the shifts of the last search, which must have been search_periodic().
+  void write_shifts(const Rows<std::int32_t>& shifts) {
+    for (std::size_t i = 0; i < shifts_.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) shifts(i, k) = shifts_[i][k];
+    }
+  }
+
   std::string_view backend() const { return to_string(collider_->backend()); }
   std::string_view algorithm() const { return to_string(collider_->algorithm()); }
   std::string_view reason() const { return to_string(collider_->reason()); }
@@ -94,6 +118,7 @@ class Collider {
   std::unique_ptr<SphereCollider> collider_;
   std::vector<SphereInstance> spheres_, others_;
   std::vector<SphereContact> list_;
+  std::vector<ImageShift> shifts_;
   ContactSpan found_;
   std::size_t rows_ = 0;
 };
@@ -141,6 +166,15 @@ void bind_collider(nb::module_& module) {
           },
           nb::arg("first"), nb::arg("first_radii"), nb::arg("second"), nb::arg("second_radii"),
           Release())
+      .def(
+          "search_periodic",
+          [](Collider& self, Rows<const Real> positions, Vector<const Real> radii, Triple lengths,
+             std::array<bool, 3> repeats, bool half) {
+            return self.search_periodic({positions, radii}, {to_vec3(lengths), repeats}, half);
+          },
+          nb::arg("positions"), nb::arg("radii"), nb::arg("lengths"), nb::arg("repeats"),
+          nb::arg("half"), Release())
+      .def("write_shifts", &Collider::write_shifts, nb::arg("shifts").noconvert(), Release())
       .def("write_pairs", &Collider::write_pairs<std::int32_t>, nb::arg("pairs").noconvert(),
            Release())
       .def("write_pairs", &Collider::write_pairs<std::int64_t>, nb::arg("pairs").noconvert(),

@@ -123,6 +123,34 @@ def test_systems_of_a_batch_are_independent(rng, dtype):
     assert found.pairs.shape[1] > 0
 
 
+def test_periodic_pairs_are_those_of_the_nearest_images(rng, dtype):
+    lengths = np.array([6, 7.5, 5])
+    positions = (rng.random((300, 3)) * 3 * lengths - lengths).astype(dtype)
+    delta = positions[:, None].astype(np.float64) - positions[None]
+    for axes in ((True, True, True), (True, False, False)):
+        cell = [length if on else None for length, on in zip(lengths, axes)]
+        cells = np.where(axes, np.round(delta / lengths), 0)
+        gap = np.linalg.norm(delta - cells * lengths, axis=2) - 1.5
+        upper = np.triu(np.ones((300, 300), bool), 1)
+        decided = np.abs(gap) > 1e-4
+        found = jfpx.find_pairs(positions, 1.5, periodic=cell)
+        check_pairs(found.pairs, pairs_of((gap < 0) & decided & upper), pairs_of(~decided & upper))
+        a, b = found.pairs
+        assert len(a) > 100 and found.shifts.any()
+        np.testing.assert_array_equal(found.shifts, cells[a, b])
+        contacts = jfpx.find_contacts(positions, 0.75, periodic=cell)
+        np.testing.assert_array_equal(contacts.pairs, found.pairs)
+        np.testing.assert_allclose(contacts.distance, gap[a, b], atol=1e-4)
+        moved = positions[b] + contacts.shifts * lengths
+        direction = positions[a] - moved
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        np.testing.assert_allclose(contacts.normal, direction, atol=2e-3)
+        rows = jfpx.find_pairs(positions, 1.5, periodic=cell, half=False, output="csr")
+        assert len(rows.columns) == 2 * len(a) and rows.shifts.sum() == 0
+        row = np.repeat(np.arange(300), np.diff(rows.offsets))
+        np.testing.assert_array_equal(rows.shifts, cells[row, rows.columns])
+
+
 def test_strided_arrays_are_taken(rng, dtype):
     positions, radii = random_spheres(rng, 200, dtype)
     expected = jfpx.find_contacts(positions, radii)
@@ -254,6 +282,15 @@ NAN = np.array([[0, 0, 0], [0, np.nan, 0]], np.float32)
     (lambda: jfpx.find_pairs(POINTS, 1, query=POINTS, query_radii=1), "query_radii requires radii"),
     (lambda: jfpx.find_pairs(POINTS, radii=1, query=POINTS), "query and query_radii"),
     (lambda: jfpx.find_pairs(POINTS, 1, query=POINTS, batch=[0, 3]), "exclude each other"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=1), "periodic is 1; it must be three lengths"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[1, 2]), "periodic has 2 lengths"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, "a", 9]), "periodic is 'a'"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, 0, 9]), "periodic length y is 0"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, 9, 1.5]), "at least twice the cutoff, which is 1"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, 9, 9], query=POINTS), "exclude each other"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, 9, 9], batch=[0, 3]), "exclude each other"),
+    (lambda: jfpx.SphereCollider().find_pairs(POINTS, 1, periodic=[9, 9, 9],
+                                              out=np.zeros((2, 9), np.int32)), "exclude each other"),
     (lambda: jfpx.SphereCollider("float16"), "dtype is 'float16'"),
     (lambda: jfpx.SphereCollider(backend="gpu"), 'backend is "gpu"'),
     (lambda: jfpx.SphereCollider(algorithm="fast"), 'algorithm is "fast"'),

@@ -215,6 +215,7 @@ def test_arrays_of_jax_are_taken(rng):
     (lambda x, r, to: jfpx.find_contacts(x, r, device="cpu"), "positions are on cuda:0"),
     (lambda x, r, to: jfpx.find_contacts(x, r, device="cuda:7"), "positions are on cuda:0"),
     (lambda x, r, to: jfpx.find_contacts(x, r, batch=[0, 3]), "batch requires"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9, 9]), "periodic requires"),
     (lambda x, r, to: jfpx.find_contacts(x, r, output="dense"), "output is 'dense'"),
     (lambda x, r, to: jfpx.find_pairs(x), "either cutoff or radii"),
     (lambda x, r, to: jfpx.find_pairs(x, 1, query=np.zeros((3, 3), np.float32)),
