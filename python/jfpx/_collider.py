@@ -457,7 +457,7 @@ def _shared(dtype: np.dtype, threads: Any, device: Any) -> SphereCollider:
         raise InvalidArgument(f"positions are in host memory, and device is {device!r}; move them "
                               "to the device, or use SphereCollider(backend=\"cuda\")")
     colliders = _local.__dict__.setdefault("colliders", {})
-    key = (dtype, threads)
+    key = dtype, _arrays.count(threads, "threads", 0, 256)
     if key not in colliders:
         colliders[key] = SphereCollider(dtype, backend="cpu", threads=threads)
     return colliders[key]

@@ -152,24 +152,24 @@ void bind_collider(nb::module_& module) {
            nb::arg("algorithm"), nb::arg("threads"), nb::arg("device"))
       .def(
           "search",
-          [](Collider& self, Rows<const Real> positions, Vector<const Real> radii,
-             std::optional<Vector<const std::uint64_t>> batch, bool half) {
+          [](Collider& self, const Rows<const Real>& positions, const Vector<const Real>& radii,
+             const std::optional<Vector<const std::uint64_t>>& batch, bool half) {
             return self.search({positions, radii}, batch, half);
           },
           nb::arg("positions"), nb::arg("radii"), nb::arg("batch").none(), nb::arg("half"),
           Release())
       .def(
           "search_between",
-          [](Collider& self, Rows<const Real> first, Vector<const Real> first_radii,
-             Rows<const Real> second, Vector<const Real> second_radii) {
+          [](Collider& self, const Rows<const Real>& first, const Vector<const Real>& first_radii,
+             const Rows<const Real>& second, const Vector<const Real>& second_radii) {
             return self.search_between({first, first_radii}, {second, second_radii});
           },
           nb::arg("first"), nb::arg("first_radii"), nb::arg("second"), nb::arg("second_radii"),
           Release())
       .def(
           "search_periodic",
-          [](Collider& self, Rows<const Real> positions, Vector<const Real> radii, Triple lengths,
-             std::array<bool, 3> repeats, bool half) {
+          [](Collider& self, const Rows<const Real>& positions, const Vector<const Real>& radii,
+             Triple lengths, std::array<bool, 3> repeats, bool half) {
             return self.search_periodic({positions, radii}, {to_vec3(lengths), repeats}, half);
           },
           nb::arg("positions"), nb::arg("radii"), nb::arg("lengths"), nb::arg("repeats"),

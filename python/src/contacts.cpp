@@ -102,7 +102,7 @@ void bind_contacts(nb::class_<PythonWorld>& world) {
       .def(
           "cast_ray",
           [](const PythonWorld& self, Triple origin, Triple direction, double max_distance,
-             nb::object filter) -> std::optional<nb::tuple> {
+             const nb::object& filter) -> std::optional<nb::tuple> {
             const auto hit =
                 self.get().cast_ray(to_ray(origin, direction, max_distance), to_filter(filter));
             if (!hit) return std::nullopt;
@@ -113,7 +113,7 @@ void bind_contacts(nb::class_<PythonWorld>& world) {
       .def(
           "cast_ray_through",
           [](const PythonWorld& self, Triple origin, Triple direction, double max_distance,
-             nb::object filter) {
+             const nb::object& filter) {
             nb::list hits;
             for (const RayHit& hit : self.get().cast_ray_through(
                      to_ray(origin, direction, max_distance), to_filter(filter))) {

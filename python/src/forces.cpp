@@ -68,8 +68,9 @@ void bind_context(nb::module_& module) {
                                    to_triple(s.velocity), to_triple(s.angular_velocity));
            })
       .def("write_states",
-           [](const FunctionContext& self, Rows<Real> positions, Rows<Real> orientations,
-              Rows<Real> velocities, Rows<Real> angular_velocities) {
+           [](const FunctionContext& self, const Rows<Real>& positions,
+              const Rows<Real>& orientations, const Rows<Real>& velocities,
+              const Rows<Real>& angular_velocities) {
              std::vector<BodyState> states;
              for (const BodyId id : self.get().bodies()) states.push_back(self.get().state(id));
              fill({positions, orientations, velocities, angular_velocities}, states);
@@ -91,7 +92,7 @@ void bind_context(nb::module_& module) {
            [](FunctionContext& self, IdTuple id, Triple force, Triple point) {
              self.get().apply_force_at_point(python::to_id(id), to_vec3(force), to_vec3(point));
            })
-      .def("apply_forces", [](FunctionContext& self, Rows<const Real> forces) {
+      .def("apply_forces", [](FunctionContext& self, const Rows<const Real>& forces) {
         ForceContext& context = self.get();
         for (std::size_t i = 0; i < context.bodies().size(); ++i) {
           context.apply_force(context.bodies()[i], vec3_at(forces, i));

@@ -42,11 +42,11 @@ void bind_recording(nb::module_& module) {
       .def_prop_ro("backend", [](const RecordingReader& self) { return self.header().backend; })
       .def_prop_ro("scene", [](const RecordingReader& self) { return self.header().scene; })
       .def_prop_ro("steps", &RecordingReader::steps)
-      .def("write_states",
-           [](RecordingReader& self, std::uint64_t step, Rows<Real> positions,
-              Rows<Real> orientations, Rows<Real> velocities, Rows<Real> angular_velocities) {
-             fill({positions, orientations, velocities, angular_velocities}, self.states(step));
-           });
+      .def("write_states", [](RecordingReader& self, std::uint64_t step,
+                              const Rows<Real>& positions, const Rows<Real>& orientations,
+                              const Rows<Real>& velocities, const Rows<Real>& angular_velocities) {
+        fill({positions, orientations, velocities, angular_velocities}, self.states(step));
+      });
   module.def("recording_precision",
              [](const std::string& path) { return recording_precision(path); });
 }

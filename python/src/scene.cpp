@@ -20,8 +20,8 @@ void bind_scene(nb::module_& module) {
           },
           nb::arg("name"), nb::arg("spheres").none(), nb::arg("boxes").none(), nb::arg("seed"))
       .def("add_spheres",
-           [](Scene& self, Rows<const Real> positions, Vector<const Real> radii,
-              Vector<const Real> masses, Rows<const Real> velocities) {
+           [](Scene& self, const Rows<const Real>& positions, const Vector<const Real>& radii,
+              const Vector<const Real>& masses, const Rows<const Real>& velocities) {
              const std::size_t n = positions.shape(0);
              const auto at = [](const Vector<const Real>& values, std::size_t i) {
                return values(values.shape(0) == 1 ? 0 : i);

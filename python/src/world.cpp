@@ -78,13 +78,14 @@ void bind_bodies(nb::class_<PythonWorld>& world) {
       .def("body_at", [](const PythonWorld& self,
                          std::uint32_t index) { return to_tuple(self.get().body_at(index)); })
       .def("write_states",
-           [](const PythonWorld& self, Rows<Real> positions, Rows<Real> orientations,
-              Rows<Real> velocities, Rows<Real> angular_velocities) {
+           [](const PythonWorld& self, const Rows<Real>& positions, const Rows<Real>& orientations,
+              const Rows<Real>& velocities, const Rows<Real>& angular_velocities) {
              fill({positions, orientations, velocities, angular_velocities}, self.get().states());
            })
       .def("set_states",
-           [](PythonWorld& self, Rows<const Real> positions, Rows<const Real> orientations,
-              Rows<const Real> velocities, Rows<const Real> angular_velocities) {
+           [](PythonWorld& self, const Rows<const Real>& positions,
+              const Rows<const Real>& orientations, const Rows<const Real>& velocities,
+              const Rows<const Real>& angular_velocities) {
              std::vector<BodyState> states(positions.shape(0));
              for (std::size_t i = 0; i < states.size(); ++i) {
                const auto& q = orientations;

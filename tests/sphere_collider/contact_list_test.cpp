@@ -79,7 +79,7 @@ TEST(ContactList, OfSystemsRefusesBadOffsets) {
 
 TEST(ContactList, InBothOrdersIsTheSortedListOfContactsAndTheirOpposites) {
   Random random(base_seed());
-  for (const std::size_t n : {0, 1, 2, 500}) {
+  for (const std::size_t n : std::initializer_list<std::size_t>{0, 1, 2, 500}) {
     const auto spheres = random_gas(n, random);
     std::vector<SphereContact> expected = brute_force(spheres);
     const std::vector<SphereContact> half = expected;

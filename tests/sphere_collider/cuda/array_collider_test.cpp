@@ -115,7 +115,7 @@ TEST_F(Cuda, FewArraysHaveTheContactsOfTheHost) {
   Random random(base_seed());
   const OwnedStream stream(0);
   ArrayCollider collider;
-  for (const std::size_t n : {0, 1, 2, 300, 6000}) {
+  for (const std::size_t n : std::initializer_list<std::size_t>{0, 1, 2, 300, 6000}) {
     const Spheres spheres = make_gas(n, Real(0.5), 6, random);
     const DeviceSpheres arrays(spheres);
     const auto cpu = make_sphere_collider({.backend = Backend::cpu});
