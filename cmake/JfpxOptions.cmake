@@ -6,6 +6,8 @@ set(JFPX_BULLET AUTO CACHE STRING "Bullet adapter: AUTO (if Bullet is found), ON
 set_property(CACHE JFPX_BULLET PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_VIEWER AUTO CACHE STRING "Viewer: AUTO (if SDL2, epoxy, imgui and libpng are found), ON (required) or OFF")
 set_property(CACHE JFPX_VIEWER PROPERTY STRINGS AUTO ON OFF)
+set(JFPX_PYTHON OFF CACHE STRING "Python package: AUTO (if Python and nanobind are found), ON (required) or OFF")
+set_property(CACHE JFPX_PYTHON PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_PRECISIONS both CACHE STRING "Precisions that are built, tested and installed: float, double or both")
 set_property(CACHE JFPX_PRECISIONS PROPERTY STRINGS float double both)
 option(JFPX_TOOL "Build the programs: jfpx and, where its libraries are found, jfpx-view" ${PROJECT_IS_TOP_LEVEL})
@@ -17,7 +19,7 @@ option(JFPX_COVERAGE "Count which lines of src are run, in float; see scripts/co
 option(JFPX_INSTALL "Install libraries, headers and programs" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_WERROR "Treat warnings as errors, as the presets of developers do" OFF)
 
-foreach(option IN ITEMS JFPX_CUDA JFPX_BULLET JFPX_VIEWER)
+foreach(option IN ITEMS JFPX_CUDA JFPX_BULLET JFPX_VIEWER JFPX_PYTHON)
   if(NOT "${${option}}" MATCHES "^(AUTO|ON|OFF)$")
     message(FATAL_ERROR "${option} is \"${${option}}\"; it takes AUTO, ON or OFF.")
   endif()

@@ -5,12 +5,14 @@
 #include <jfpx/build.hpp>
 #include <jfpx/collide.hpp>
 #include <jfpx/contact_generator.hpp>
+#include <jfpx/contact_list.hpp>
 #include <jfpx/cost_model.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 #include <jfpx/intersect.hpp>
 #include <jfpx/material.hpp>
 #include <jfpx/particle.hpp>
+#include <jfpx/periodic.hpp>
 #include <jfpx/query.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/recorded_world.hpp>

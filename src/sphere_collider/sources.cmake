@@ -1,8 +1,10 @@
 list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/automatic_sphere_collider.cpp
   ${CMAKE_CURRENT_LIST_DIR}/backend.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/contact_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cost_cache.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cost_model.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/periodic.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sphere_collider.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/cell_grid.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/cell_sweep.cpp
@@ -14,6 +16,8 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cpu/sphere_collider_cpu.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/all_pairs.cu
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/array_collider.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/contact_arrays.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/device_sphere_collider.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/fused_search.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/grid.cu

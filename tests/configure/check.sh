@@ -71,7 +71,7 @@ case $step in
   # What a build folder was once configured with does not decide what a preset builds there.
   presets)
     presets=$(sed -n '/"name": "base", "hidden": true, "generator"/,/}},/p' "$root/CMakePresets.json")
-    switches=$(sed -nE 's/^(option\(|set\()(JFPX_[A-Z]+) ("|(AUTO|both) CACHE).*/\2/p' "$root/cmake/JfpxOptions.cmake" | grep -v SUMMARY)
+    switches=$(sed -nE 's/^(option\(|set\()(JFPX_[A-Z]+) ("|(AUTO|OFF|both) CACHE).*/\2/p' "$root/cmake/JfpxOptions.cmake" | grep -v SUMMARY)
     [ "$(wc -w <<<"$switches")" -ge 11 ] || fail "only $switches were found"
     for switch in $switches; do
       grep -qF "\"$switch\": " <<<"$presets" || fail "the preset base does not set $switch"

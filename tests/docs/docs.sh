@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What documents say of the rest of the project is so. Every test that they name exists: as
-# `Suite.Name`, `Suite.Begins*` or `file_test.cpp`. Every link leads somewhere. Every C++ snippet, and
+# `Suite.Name`, `Suite.Begins*`, `file_test.cpp` or, in Python, `test_name`. Every link leads somewhere. Every C++ snippet, and
 # every line that a diff adds, is in the examples, which are compiled and run. docs/scenes.md has every
 # field of a scene. docs/thesis.md leaves out no row of the census (1 to 224) and no erratum (E1 to E58).
 set -u
@@ -25,6 +25,10 @@ done < <(grep -rhoE '`[A-Z][A-Za-z0-9]+\.[A-Z*][A-Za-z0-9_]*\*?`' docs README.md
 while read -r file; do
   [ -n "$(find tests -name "$file")" ] || complain "no such file of tests: $file"
 done < <(grep -rhoE '`[a-z0-9_]+_test\.cpp`' docs README.md | tr -d '`' | sort -u)
+
+while read -r name; do
+  grep -rqE "^def $name\(" tests/python || complain "no such test: $name"
+done < <(grep -rhoE '`test_[a-z0-9_]+`' docs README.md | tr -d '`' | sort -u)
 
 # The targets of links, with "#..." and addresses of the web left out.
 while IFS=: read -r document target; do

@@ -12,5 +12,5 @@ fi
 status=0
 while IFS= read -r file; do
   "$clang_format" "$file" | cmp -s - "$file" || { echo "not formatted: $file"; status=1; }
-done < <(find include src examples tests bench -name '*.hpp' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.inl')
+done < <(find include src python examples tests bench -name '*.hpp' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.inl')
 exit $status

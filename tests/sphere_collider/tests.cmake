@@ -4,6 +4,8 @@ jfpx_add_test(sphere_collider_cpu_test
     sphere_collider/sphere_collider_test.cpp
     sphere_collider/cpu/cpu_cases.cpp
     sphere_collider/backend_test.cpp
+    sphere_collider/contact_list_test.cpp
+    sphere_collider/periodic_test.cpp
     sphere_collider/cpu/sphere_collider_cpu_test.cpp
     support/sphere_fixtures.cpp)
 jfpx_add_test(automatic_contract_test
@@ -45,6 +47,7 @@ if(JFPX_HAS_CUDA)
   jfpx_add_test(cuda_test
     SOURCES
       contact_solver/group_solver_test.cpp
+      sphere_collider/cuda/array_collider_test.cpp
       sphere_collider/cuda/cuda_fault_test.cpp
       sphere_collider/cuda/cuda_few_test.cpp
       sphere_collider/cuda/cuda_huge_test.cpp

@@ -1,0 +1,82 @@
+/// Sphere collider for arrays in device memory, as other libraries have them: separate arrays of
+/// positions and radii go in, separate arrays of indices, normals and distances come out.
+#pragma once
+
+#include <jfpx/cuda/sphere_collider.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// Spheres in device memory. Strides count elements.
+struct SphereArrays {
+  std::size_t count = 0;
+  const Real* positions = nullptr;  ///< [m]: positions[i * row_stride + k * column_stride]
+  std::ptrdiff_t row_stride = 3, column_stride = 1;
+  const Real* radii = nullptr;  ///< [m], > 0: radii[i * radius_stride]; null: all have `radius`
+  std::ptrdiff_t radius_stride = 1;
+  Real radius = 0;  ///< [m], > 0
+};
+
+/// What a search finds.
+enum class ArrayResult : std::uint8_t {
+  pairs,    ///< indices alone
+  contacts  ///< with normals and distances
+};
+
+/// Finds contacts of arrays. Reads and writes arrays in the order of the caller's stream, and keeps
+/// the result of the last search until the next one. Calls on one object must use one stream, or
+/// streams that the caller orders. Not thread-safe; objects are independent of each other.
+class JFPX_API ArrayCollider {
+ public:
+  /// @throws BackendUnavailable with the reason if the device cannot be used, DeviceError
+  explicit ArrayCollider(int device = 0, SphereAlgorithm algorithm = SphereAlgorithm::automatic);
+  ~ArrayCollider();
+  ArrayCollider(ArrayCollider&&) noexcept;
+  ArrayCollider& operator=(ArrayCollider&&) noexcept;
+
+  /// Reserves memory for enqueue(). The other searches reserve what they need.
+  /// @throws InvalidArgument for more than 2^31 spheres, OutOfMemory, DeviceError
+  void reserve(std::size_t spheres, std::size_t contacts);
+
+  /// Finds all touching pairs, sorted by (a, b), and waits for their number, which is returned.
+  /// @param both_orders also lists (b, a), with the opposite normal
+  /// @throws InvalidArgument naming the first invalid sphere and field, OutOfMemory, DeviceError
+  std::uint64_t find(const SphereArrays& spheres, ArrayResult result, bool both_orders,
+                     Stream stream);
+  /// Finds the touching pairs of a sphere of `first` and one of `second`, as
+  /// jfpx::find_contacts_between().
+  std::uint64_t find_between(const SphereArrays& first, const SphereArrays& second,
+                             ArrayResult result, Stream stream);
+  /// Enqueues find() without both_orders. Neither allocates nor waits, so that the call and the
+  /// writes below can be captured in a CUDA graph. If the number of contacts exceeds the
+  /// reservation, or a sphere is invalid, nothing is written but the count.
+  /// Captured work is valid until another call reserves more memory.
+  /// @throws InvalidArgument for more spheres than are reserved, DeviceError
+  void enqueue(const SphereArrays& spheres, ArrayResult result, Stream stream);
+
+  /// Enqueue the output of the last search. Each array has room for `capacity` contacts; if there
+  /// are more, the first are written. @throws DeviceError
+  void write_pairs(std::int32_t* a, std::int32_t* b, std::size_t capacity, Stream stream);
+  void write_pairs(std::int64_t* a, std::int64_t* b, std::size_t capacity, Stream stream);
+  /// @param normals 3 * capacity elements
+  /// @throws InvalidArgument if the search was for pairs
+  void write_contacts(Real* normals, Real* distances, std::size_t capacity, Stream stream);
+  /// Offsets of compressed rows, one more than the spheres of the (first) set. After find() or
+  /// find_between() only.
+  void write_offsets(std::int64_t* offsets, Stream stream);
+  /// Writes {number of contacts, 1 if they are complete or else 0}.
+  void write_count(std::int64_t* count, Stream stream);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

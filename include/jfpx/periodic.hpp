@@ -1,0 +1,49 @@
+/// Contacts among spheres in a periodic cell.
+#pragma once
+
+#include <jfpx/sphere_collider.hpp>
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// An orthogonal cell that repeats along some axes. Positions may lie outside of it.
+struct PeriodicCell {
+  Vec3 lengths;  ///< [m], each > 0 and finite where the cell repeats; otherwise without effect
+  std::array<bool, 3> repeats{true, true, true};
+};
+
+/// Number of cells by which an image of a sphere is displaced along each axis.
+using ImageShift = std::array<std::int32_t, 3>;
+
+/// A touching pair in a periodic cell. The normal and the distance are those of sphere a and the
+/// image of sphere b at centre + shift * lengths.
+struct PeriodicContact {
+  SphereContact contact;
+  ImageShift shift{};
+  friend bool operator==(const PeriodicContact&, const PeriodicContact&) = default;
+};
+
+/// Finds the touching pairs of spheres and images of spheres (minimum image convention), sorted by
+/// (a, b), a < b. A pair that touches through two images, which are then half a length apart, is
+/// listed once, with the lower shift. The bits do not depend on the collider: centres are reduced
+/// to the cell, and the image of b is displaced by at most one length, with one rounding each.
+/// @throws InvalidArgument as SphereCollider::find_contacts(); for a length that is not finite and
+///   > 0 or is less than four times the largest radius, and for a centre that is 2^20 lengths or
+///   more from the origin. std::bad_alloc
+JFPX_API std::vector<PeriodicContact> find_periodic_contacts(
+    SphereCollider& collider, std::span<const SphereInstance> spheres, const PeriodicCell& cell);
+
+/// Adds (b, a) with the opposite normal and shift for each contact. The result is sorted.
+/// @param contacts sorted by (a, b), a < b
+/// @param spheres number of spheres, greater than every index
+/// @throws std::bad_alloc
+JFPX_API std::vector<PeriodicContact> in_both_orders(std::span<const PeriodicContact> contacts,
+                                                     std::size_t spheres);
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,21 @@
+"""jfpx: contacts among spheres and rigid-body worlds, with the same bits on CPU and GPU.
+
+docs/python.md in the repository is the guide. Units are SI; vectors are (x, y, z), and quaternions
+(w, x, y, z).
+"""
+
+from ._collider import (ContactRows, Contacts, PeriodicContactRows, PeriodicContacts, PeriodicPairs,
+                        PeriodicRows, Rows, SphereCollider, available_backends, find_contacts,
+                        find_pairs)
+from ._errors import (BackendUnavailable, Closed, ConcurrentUse, DeviceError, Error, FileError,
+                      InvalidArgument, InvalidScene, OutOfMemory)
+from ._forces import (Attachment, BodyId, BodyState, Bungee, Buoyancy, Drag, Explosion,
+                      ForceContext, Gravity, Spring, States)
+from ._recording import Recording, RecordingWriter
+from ._scene import Scene, scene_names
+from ._world import (BEGIN, END, STAY, ContactEvents, RayHit, RayHits, StepReport, World,
+                     WorldContacts)
+
+__version__ = "0.1.0"
+
+__all__ = [name for name in dir() if not name.startswith("_")]

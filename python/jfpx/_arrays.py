@@ -1,0 +1,132 @@
+"""Conversion between the arrays of other libraries and NumPy, with errors that name the argument."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._errors import InvalidArgument
+
+PRECISIONS = {np.dtype(np.float32): _core.f32, np.dtype(np.float64): _core.f64}
+
+
+def precision_of(dtype: Any) -> Any:
+    """The submodule of a dtype."""
+    try:
+        return PRECISIONS[np.dtype(dtype)]
+    except (KeyError, TypeError):
+        raise InvalidArgument(f"dtype is {dtype!r}; it must be float32 or float64") from None
+
+
+def to_host(array: Any, name: str) -> np.ndarray:
+    """An array in host memory as a NumPy array, without a copy where it has DLPack."""
+    if isinstance(array, np.ndarray):
+        return array
+    if type(array).__module__ == "torch" or hasattr(array, "detach"):
+        array = array.detach()
+    if hasattr(array, "__dlpack__"):
+        try:
+            return np.from_dlpack(array)
+        except (BufferError, RuntimeError, TypeError) as error:
+            raise InvalidArgument(f"{name} cannot be read: {error}") from None
+    try:
+        return np.asarray(array, None if hasattr(array, "dtype") else np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgument(f"{name} is not an array of numbers: {error}") from None
+
+
+def from_host(like: Any) -> Callable[[np.ndarray], Any]:
+    """The function that converts a NumPy array to the kind of `like`."""
+    if isinstance(like, np.ndarray):
+        return lambda array: array
+    module = type(like).__module__.partition(".")[0]
+    if module == "torch":
+        import torch
+        return torch.from_numpy
+    namespace = getattr(like, "__array_namespace__", None)
+    if namespace is not None:
+        return namespace().from_dlpack
+    return lambda array: array
+
+
+def rows(array: Any, name: str, columns: int, dtype: Any = None) -> np.ndarray:
+    """An array of shape (N, columns) of float32 or float64, or of `dtype` if it is given."""
+    array = to_host(array, name)
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise InvalidArgument(f"{name} has shape {array.shape}; it must be (N, {columns})")
+    return floats(array, name, dtype)
+
+
+def vector(array: Any, name: str, size: int, dtype: Any) -> np.ndarray:
+    """A number, as an array of size 1, or an array of shape (size,) and type `dtype`."""
+    if isinstance(array, (int, float, np.integer, np.floating)):
+        return np.full(1, array, dtype)
+    given = hasattr(array, "dtype")
+    array = to_host(array, name)
+    if array.ndim == 0:
+        return np.full(1, array, dtype)
+    if array.shape != (size,):
+        raise InvalidArgument(f"{name} has shape {array.shape}; it must be a number or ({size},)")
+    array = floats(array, name, dtype if given else None).astype(dtype, copy=False)
+    # One value for all and one value for one row are the same.
+    return array if size else np.ones(1, dtype)
+
+
+def floats(array: np.ndarray, name: str, dtype: Any = None) -> np.ndarray:
+    """The array, if its type is allowed; a copy if its strides are not multiples of an element."""
+    if array.dtype not in PRECISIONS:
+        raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be float32 or float64")
+    if dtype is not None and array.dtype != dtype:
+        raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be that of the positions, "
+                              f"{np.dtype(dtype)}")
+    if any(stride % array.itemsize for stride in array.strides):
+        return array.copy()
+    return array
+
+
+def offsets(array: Any, name: str) -> np.ndarray:
+    """Ascending integers as uint64."""
+    array = to_host(array if hasattr(array, "dtype") else np.asarray(array), name)
+    if array.ndim != 1 or array.dtype.kind not in "iu" or array.size == 0:
+        raise InvalidArgument(f"{name} has shape {array.shape} and dtype {array.dtype}; it must be "
+                              "integers in one dimension, beginning with 0")
+    if array.min() < 0:
+        raise InvalidArgument(f"{name} contains {array.min()}; offsets must be >= 0")
+    return np.ascontiguousarray(array, np.uint64)
+
+
+def triple(value: Any, name: str, size: int = 3) -> tuple[float, ...]:
+    """A vector of `size` numbers."""
+    try:
+        numbers = tuple(float(x) for x in value)
+    except (TypeError, ValueError):
+        raise InvalidArgument(f"{name} is {value!r}; it must be {size} numbers") from None
+    if len(numbers) != size:
+        raise InvalidArgument(f"{name} has {len(numbers)} numbers; it must have {size}")
+    return numbers
+
+
+def number(value: Any, name: str) -> float:
+    """A number that is not NaN."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise InvalidArgument(f"{name} is {value!r}; it must be a number") from None
+    if math.isnan(result):
+        raise InvalidArgument(f"{name} is nan; it must be a number")
+    return result
+
+
+def count(value: Any, name: str, low: int, high: int) -> int:
+    """An integer in [low, high]."""
+    try:
+        result = value.__index__()
+    except AttributeError:
+        raise InvalidArgument(f"{name} is {value!r}; it must be an integer") from None
+    if not low <= result <= high:
+        raise InvalidArgument(f"{name} is {result}; it must be in [{low}, {high}]")
+    return result

@@ -1,0 +1,573 @@
+"""Contacts and pairs among spheres."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import _arrays, _core, _device
+from ._errors import ConcurrentUse, InvalidArgument
+
+
+class Contacts(NamedTuple):
+    """Touching pairs of spheres, sorted by (pairs[0], pairs[1])."""
+
+    pairs: Any
+    """(2, E): indices a and b of the two spheres."""
+    normal: Any
+    """(E, 3) [-]: unit vectors from b to a; (1, 0, 0) where the centres coincide."""
+    distance: Any
+    """(E,) [m], <= 0: negative penetration depths."""
+
+
+class ContactRows(NamedTuple):
+    """Touching pairs of spheres as compressed rows (CSR): row i has the contacts with a = i."""
+
+    offsets: Any
+    """(N + 1,) int64: row i is columns[offsets[i]:offsets[i + 1]]."""
+    columns: Any
+    """(E,): indices b, ascending in each row."""
+    normal: Any
+    """(E, 3) [-]: unit vectors from b to a."""
+    distance: Any
+    """(E,) [m], <= 0: negative penetration depths."""
+
+
+class Rows(NamedTuple):
+    """Pairs as compressed rows (CSR)."""
+
+    offsets: Any
+    """(N + 1,) int64: row i is columns[offsets[i]:offsets[i + 1]]."""
+    columns: Any
+    """(E,): indices b, ascending in each row."""
+
+
+class PeriodicContacts(NamedTuple):
+    """Touching pairs of spheres and images of spheres, sorted by (pairs[0], pairs[1])."""
+
+    pairs: Any
+    """(2, E): indices a and b."""
+    normal: Any
+    """(E, 3) [-]: unit vectors from the image of b to a."""
+    distance: Any
+    """(E,) [m], <= 0: negative penetration depths."""
+    shifts: Any
+    """(E, 3) int32: the image of b is at positions[b] + shifts * lengths."""
+
+
+class PeriodicContactRows(NamedTuple):
+    """The same as compressed rows (CSR)."""
+
+    offsets: Any
+    columns: Any
+    normal: Any
+    distance: Any
+    shifts: Any
+
+
+class PeriodicPairs(NamedTuple):
+    """Pairs of points and images of points."""
+
+    pairs: Any
+    """(2, E): indices a and b."""
+    shifts: Any
+    """(E, 3) int32: the image of b is at positions[b] + shifts * lengths."""
+
+
+class PeriodicRows(NamedTuple):
+    """The same as compressed rows (CSR)."""
+
+    offsets: Any
+    columns: Any
+    shifts: Any
+
+
+_INDEX_TYPES = {"int32": np.int32, "int64": np.int64}
+
+
+class SphereCollider:
+    """Finds contacts among spheres, with buffers that are kept from call to call.
+
+    Results do not depend on backend, algorithm or number of threads, to the last bit. One thread
+    may use an object at a time; different objects are independent.
+
+    Parameters
+    ----------
+    dtype : "float32" or "float64"
+        Type of positions, radii, normals and distances.
+    backend : "auto", "cpu" or "cuda"
+        "auto" selects the fastest, by a cost model and by measured times.
+    algorithm : "automatic", "all_pairs" or "sorted_tiles"
+    threads : int in [0, 256]
+        Number of threads of the CPU; 0: one per core.
+    device : int
+        Ordinal of the GPU.
+
+    Raises
+    ------
+    BackendUnavailable
+        The backend was requested by name and cannot be used.
+    InvalidArgument
+        An option is out of its range.
+    """
+
+    def __init__(self, dtype: Any = "float32", *, backend: str = "auto",
+                 algorithm: str = "automatic", threads: int = 1, device: int = 0) -> None:
+        core = _arrays.precision_of(dtype)
+        self._dtype = np.dtype(dtype)
+        self._backend = backend
+        self._on_devices: dict[Any, Any] = {}
+        self._collider = core.Collider(backend, algorithm,
+                                       _arrays.count(threads, "threads", 0, 256),
+                                       _arrays.count(device, "device", 0, 2**31 - 1))
+        self._lock = threading.Lock()
+
+    @property
+    def dtype(self) -> np.dtype:
+        return self._dtype
+
+    @property
+    def backend(self) -> str:
+        """Backend of the last call."""
+        return self._collider.backend
+
+    @property
+    def algorithm(self) -> str:
+        """Algorithm of the last call."""
+        return self._collider.algorithm
+
+    @property
+    def reason(self) -> str:
+        """Reason for the backend and algorithm of the last call."""
+        return self._collider.reason
+
+    def find_contacts(self, positions: Any, radii: Any, *, batch: Any = None,
+                      periodic: Any = None, output: str = "coo",
+                      half: bool = True, index_dtype: Any = "int32", out: Any = None,
+                      count: Any = None) -> Any:
+        """Finds all touching pairs of spheres. See jfpx.find_contacts().
+
+        Parameters
+        ----------
+        out : Contacts, optional
+            Arrays to write to, pairs (2, C), normal (C, 3), distance (C,) with C >= E. Requires
+            output="coo".
+        count : array (2,) of int64 on the device, optional
+            With `out`, for arrays on a device: receives E, and 1 if the contacts were written.
+            The call neither allocates nor waits, so that it can be captured in a CUDA graph. If E
+            exceeds the capacity of `out`, the first contacts are written; if it exceeds that of
+            reserve(), or a sphere is invalid, none are. Finds each pair once.
+
+        Returns
+        -------
+        Contacts or ContactRows, or int, or None
+            With `out`, the number E of contacts; with `count`, None.
+
+        Raises
+        ------
+        ConcurrentUse
+            Another thread uses the collider.
+        InvalidArgument
+            As jfpx.find_contacts(), or `out` is too small; the message has the number of contacts.
+        """
+        if _device.is_on_device(positions):
+            search = _device_search(self._dtype, positions, None, radii, None, None, batch,
+                                    periodic, None)
+            return self._find_on_device(search, output, half, index_dtype, out, count, True)
+        _refuse_count(count)
+        search = _Search(self._dtype, positions, radii, batch)
+        search.set_periodic(periodic)
+        return self._find(search, output, half, index_dtype, out, contacts=True)
+
+    def find_pairs(self, positions: Any, cutoff: Any = None, *, radii: Any = None,
+                   query: Any = None, query_radii: Any = None, batch: Any = None,
+                   periodic: Any = None, output: str = "coo", half: bool = True, index_dtype: Any = "int32",
+                   out: Any = None, count: Any = None) -> Any:
+        """Finds pairs of points within a distance, as indices alone. See jfpx.find_pairs().
+
+        Parameters
+        ----------
+        out : array, optional
+            Array of shape (2, C) to write to, with C >= E. Requires output="coo".
+        count : array (2,) of int64 on the device, optional
+            As for find_contacts().
+
+        Returns
+        -------
+        array of shape (2, E) or Rows, or int, or None
+            With `out`, the number E of pairs; with `count`, None.
+        """
+        if _device.is_on_device(positions):
+            search = _device_search(self._dtype, positions, cutoff, radii, query, query_radii,
+                                    batch, periodic, None)
+            return self._find_on_device(search, output, half, index_dtype, out, count, False)
+        _refuse_count(count)
+        search = _pair_search(self._dtype, positions, cutoff, radii, query, query_radii, batch,
+                              periodic)
+        return self._find(search, output, half, index_dtype, out, contacts=False)
+
+    def reserve(self, like: Any, spheres: int, contacts: int) -> None:
+        """Reserves memory for searches with `count`, on the device and the current stream of
+        `like`. Raises OutOfMemory.
+
+        Parameters
+        ----------
+        like : array (N, 3) on a device
+            Positions.
+        spheres, contacts : int
+            The most of both.
+        """
+        search = _device.DeviceSearch(like, None, self._dtype)
+        search.collider(self._on_devices).reserve(
+            _arrays.count(spheres, "spheres", 0, 2**31), _arrays.count(contacts, "contacts", 0, 2**48))
+
+    def _find(self, search: _Search, output: str, half: bool, index_dtype: Any, out: Any,
+              contacts: bool) -> Any:
+        index = _check_form(output, index_dtype, out)
+        if search.periodic and out is not None:
+            raise InvalidArgument("out and periodic exclude each other")
+        if index is np.int32 and search.largest() > 2**31:
+            raise InvalidArgument("more than 2^31 spheres require index_dtype=\"int64\"")
+        if not self._lock.acquire(blocking=False):
+            raise ConcurrentUse("the collider is in use by another call; use one for each thread")
+        try:
+            size = search.run(self._collider, bool(half))
+            if out is not None:
+                return self._write(size, out, contacts)
+            if output == "coo":
+                result = [np.empty((2, size), index)]
+                self._collider.write_pairs(result[0])
+            else:
+                result = [np.empty(search.rows() + 1, np.int64), np.empty(size, index)]
+                self._collider.write_rows(*result)
+            if contacts:
+                result += [np.empty((size, 3), self._dtype), np.empty(size, self._dtype)]
+                self._collider.write_contacts(*result[-2:])
+            if search.periodic:
+                result.append(np.empty((size, 3), np.int32))
+                self._collider.write_shifts(result[-1])
+        finally:
+            self._lock.release()
+        result = [search.convert(array) for array in result]
+        if not search.periodic:
+            return _result(result, output, contacts)
+        if contacts:
+            return (PeriodicContacts if output == "coo" else PeriodicContactRows)(*result)
+        return (PeriodicPairs if output == "coo" else PeriodicRows)(*result)
+
+    def _find_on_device(self, search: _device.DeviceSearch, output: str, half: bool,
+                        index_dtype: Any, out: Any, count: Any, contacts: bool) -> Any:
+        index = np.dtype(_check_form(output, index_dtype, out)).name
+        if self._backend == "cpu":
+            raise InvalidArgument(f"positions are on cuda:{search.device}, and backend is cpu")
+        if count is not None and out is None:
+            raise InvalidArgument("count requires out")
+        if not self._lock.acquire(blocking=False):
+            raise ConcurrentUse("the collider is in use by another call; use one for each thread")
+        try:
+            core = search.collider(self._on_devices)
+            if count is not None:
+                search.enqueue(core, contacts)
+                search.write(core, out, contacts, None)
+                search.write_count(core, count)
+                return None
+            size = search.run(core, contacts, bool(half))
+            if out is not None:
+                search.write(core, out, contacts, size)
+                return size
+            result = search.results(core, size, output, index, contacts)
+        finally:
+            self._lock.release()
+        return _result(result, output, contacts)
+
+    def _write(self, size: int, out: Any, contacts: bool) -> int:
+        """Writes the result to the arrays of the caller."""
+        indices = (np.int32, np.int64)
+        if not contacts:
+            self._collider.write_pairs(_target(out, "out", (2, None), size, indices))
+            return size
+        pairs = _target(out[0], "out.pairs", (2, None), size, indices)
+        normal = _target(out[1], "out.normal", (None, 3), size, (self._dtype,))
+        distance = _target(out[2], "out.distance", (None,), size, (self._dtype,))
+        self._collider.write_pairs(pairs)
+        self._collider.write_contacts(normal, distance)
+        return size
+
+
+def _result(arrays: list[Any], output: str, contacts: bool) -> Any:
+    if contacts:
+        return Contacts(*arrays) if output == "coo" else ContactRows(*arrays)
+    return arrays[0] if output == "coo" else Rows(*arrays)
+
+
+class _Search:
+    """The validated arguments of a search."""
+
+    def __init__(self, dtype: Any, positions: Any, radii: Any, batch: Any) -> None:
+        self.convert = _arrays.from_host(positions)
+        self._positions = _arrays.rows(positions, "positions", 3, dtype)
+        self.dtype = self._positions.dtype
+        size = self._positions.shape[0]
+        self._radii = _arrays.vector(radii, "radii", size, self.dtype)
+        self._batch = None if batch is None else _arrays.offsets(batch, "batch")
+        self._query: Any = None
+        self.periodic: Any = None
+
+    def set_periodic(self, lengths: Any) -> None:
+        """Three lengths, each None along an axis that does not repeat."""
+        if lengths is None:
+            return
+        if self._batch is not None or self._query is not None:
+            raise InvalidArgument("periodic, query and batch exclude each other")
+        try:
+            lengths = list(lengths)
+        except TypeError:
+            raise InvalidArgument(f"periodic is {lengths!r}; it must be three lengths") from None
+        if len(lengths) != 3:
+            raise InvalidArgument(f"periodic has {len(lengths)} lengths; it must have 3")
+        repeats = [length is not None for length in lengths]
+        self.periodic = ([_arrays.number(length, "periodic") if on else 0.0
+                          for length, on in zip(lengths, repeats)], repeats)
+
+    def add_query(self, query: Any, radii: Any) -> None:
+        if self._batch is not None:
+            raise InvalidArgument("query and batch exclude each other")
+        self._query = _arrays.rows(query, "query", 3, self.dtype)
+        self._query_radii = _arrays.vector(radii, "query_radii", self._query.shape[0], self.dtype)
+
+    def set_cutoff(self, cutoff: Any) -> float:
+        """Sets and returns the radius of which the double is exactly the cutoff."""
+        radius = _half(cutoff, self.dtype)
+        self._radii = np.full(1, radius, self.dtype)
+        return radius
+
+    def rows(self) -> int:
+        return (self._positions if self._query is None else self._query).shape[0]
+
+    def largest(self) -> int:
+        return max(self._positions.shape[0], self.rows())
+
+    def run(self, collider: Any, half: bool) -> int:
+        if self.periodic:
+            return collider.search_periodic(self._positions, self._radii, *self.periodic, half)
+        if self._query is None:
+            return collider.search(self._positions, self._radii, self._batch, half)
+        return collider.search_between(self._query, self._query_radii, self._positions, self._radii)
+
+
+def _pair_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: Any,
+                 query_radii: Any, batch: Any, periodic: Any) -> _Search:
+    """The search of find_pairs(): spheres whose radius is half of the cutoff touch within it."""
+    _check_radii(cutoff, radii, query, query_radii)
+    if cutoff is None:
+        search = _Search(dtype, positions, radii, batch)
+    else:
+        search = _Search(dtype, positions, 1, batch)
+        query_radii = search.set_cutoff(cutoff)
+    if query is not None:
+        search.add_query(query, query_radii)
+    search.set_periodic(periodic)
+    return search
+
+
+def _device_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: Any,
+                   query_radii: Any, batch: Any, periodic: Any,
+                   device: Any) -> _device.DeviceSearch:
+    """The same on a device, for find_contacts(), too, without cutoff."""
+    if batch is not None:
+        raise InvalidArgument("batch requires positions in host memory")
+    if periodic is not None:
+        raise InvalidArgument("periodic requires positions in host memory")
+    _check_radii(cutoff, radii, query, query_radii)
+    search = _device.DeviceSearch(positions, device, dtype)
+    if cutoff is not None:
+        radii = query_radii = _half(cutoff, np.dtype(search.dtype))
+    search.set_radii(radii)
+    if query is not None:
+        search.set_query(query, query_radii)
+    return search
+
+
+def _check_radii(cutoff: Any, radii: Any, query: Any, query_radii: Any) -> None:
+    if (cutoff is None) == (radii is None):
+        raise InvalidArgument("find_pairs() takes either cutoff or radii")
+    if cutoff is not None and query_radii is not None:
+        raise InvalidArgument("query_radii requires radii instead of cutoff")
+    if cutoff is None and (query is None) != (query_radii is None):
+        raise InvalidArgument("with radii, query and query_radii are given together")
+
+
+def _half(cutoff: Any, dtype: np.dtype) -> float:
+    """The radius of which the double is exactly the cutoff."""
+    value = dtype.type(_arrays.number(cutoff, "cutoff"))
+    radius = value / 2
+    if not (0 < value < np.inf and radius + radius == value):
+        raise InvalidArgument(f"cutoff is {cutoff}; it must be finite and > 0 in {dtype}")
+    return float(radius)
+
+
+def _check_form(output: Any, index_dtype: Any, out: Any) -> Any:
+    """The type of indices."""
+    if output not in ("coo", "csr"):
+        raise InvalidArgument(f"output is {output!r}; it must be 'coo' or 'csr'")
+    if out is not None and output != "coo":
+        raise InvalidArgument("out requires output='coo'")
+    try:
+        return _INDEX_TYPES[str(index_dtype).removeprefix("torch.")]
+    except KeyError:
+        pass
+    try:
+        return _INDEX_TYPES[np.dtype(index_dtype).name]
+    except (KeyError, TypeError):
+        raise InvalidArgument(f"index_dtype is {index_dtype!r}; it must be int32 or int64") from None
+
+
+def _refuse_count(count: Any) -> None:
+    if count is not None:
+        raise InvalidArgument("count requires positions on a device")
+
+
+def _target(array: Any, name: str, shape: tuple[int | None, ...], size: int,
+            dtypes: tuple[Any, ...]) -> np.ndarray:
+    """An array of the caller with room for `size` elements along the axis None of `shape`."""
+    if not isinstance(array, np.ndarray):
+        if not hasattr(array, "__dlpack__"):  # would be converted to a copy
+            raise InvalidArgument(f"{name} is {type(array).__name__}; it must be an array")
+        array = _arrays.to_host(array, name)
+    if array.dtype not in dtypes:
+        raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be "
+                              + " or ".join(str(np.dtype(dtype)) for dtype in dtypes))
+    if array.ndim != len(shape) or any(
+            have < size if need is None else have != need for have, need in zip(array.shape, shape)):
+        needed = tuple(size if need is None else need for need in shape)
+        raise InvalidArgument(f"{name} has shape {array.shape}; it must have room for {needed}")
+    if not array.flags.writeable:
+        raise InvalidArgument(f"{name} is read-only")
+    return array
+
+
+_local = threading.local()
+
+
+def _shared(dtype: np.dtype, threads: Any, device: Any) -> SphereCollider:
+    """The collider of this thread for a type and a number of threads."""
+    if device not in (None, "cpu"):
+        raise InvalidArgument(f"positions are in host memory, and device is {device!r}; move them "
+                              "to the device, or use SphereCollider(backend=\"cuda\")")
+    colliders = _local.__dict__.setdefault("colliders", {})
+    key = dtype, _arrays.count(threads, "threads", 0, 256)
+    if key not in colliders:
+        colliders[key] = SphereCollider(dtype, backend="cpu", threads=threads)
+    return colliders[key]
+
+
+def _of_devices(dtype: str) -> SphereCollider:
+    """The collider of this thread for arrays on devices."""
+    colliders = _local.__dict__.setdefault("of_devices", {})
+    if dtype not in colliders:
+        colliders[dtype] = SphereCollider(dtype)
+    return colliders[dtype]
+
+
+def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: Any = None,
+                  device: Any = None, output: str = "coo", half: bool = True, index_dtype: Any = "int32",
+                  threads: int = 1) -> Any:
+    """Finds all touching pairs of spheres. The number of contacts is limited by memory only.
+
+    Two spheres touch if the distance of their centres is at most the sum of their radii.
+
+    Parameters
+    ----------
+    positions : array (N, 3) of float32 or float64
+        Centres [m], finite. NumPy, any array with DLPack, or nested lists. Any strides. Arrays of
+        PyTorch and CuPy on a CUDA device, and those that share with them, are searched there in
+        the order of the current stream.
+    radii : number or array (N,) of the type of `positions`
+        [m], finite and > 0.
+    batch : array of integers, optional
+        Offsets of independent systems, from 0 to N: system i has the spheres batch[i] to
+        batch[i + 1] - 1. Spheres of different systems do not touch. In host memory only.
+    periodic : three lengths, optional
+        [m], of an orthogonal cell that repeats; None along an axis that does not. Each length is
+        at least twice the largest sum of two radii. The nearest image of a sphere counts, and its
+        shift is returned. Positions may be outside of the cell. In host memory only.
+    device : "cpu", "cuda" or "cuda:N", optional
+        Must be the device of the arrays, which is the default.
+    output : "coo" or "csr"
+        Pairs, or compressed rows.
+    half : bool
+        True: each pair once, with a < b. False: also (b, a), with the opposite normal.
+    index_dtype : "int32" or "int64"
+        Type of the indices.
+    threads : int in [0, 256]
+        Number of threads of the CPU; 0: one per core. Has no effect on the result.
+
+    Returns
+    -------
+    Contacts or ContactRows; PeriodicContacts or PeriodicContactRows with `periodic`
+        Arrays of the kind of `positions`, sorted by (a, b).
+
+    Raises
+    ------
+    InvalidArgument
+        A wrong shape, type or device; a value that is not finite; a radius that is not > 0.
+    OutOfMemory
+    """
+    if _device.is_on_device(positions):
+        search = _device_search(None, positions, None, radii, None, None, batch, periodic, device)
+        return _of_devices(search.dtype)._find_on_device(search, output, half, index_dtype, None,
+                                                         None, contacts=True)
+    search = _Search(None, positions, radii, batch)
+    search.set_periodic(periodic)
+    collider = _shared(search.dtype, threads, device)
+    return collider._find(search, output, half, index_dtype, None, contacts=True)
+
+
+def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: Any = None,
+               query_radii: Any = None, batch: Any = None, periodic: Any = None,
+               device: Any = None, output: str = "coo", half: bool = True, index_dtype: Any = "int32",
+               threads: int = 1) -> Any:
+    """Finds all pairs of points within a cutoff, or of spheres that touch, as indices alone.
+
+    Parameters
+    ----------
+    positions : array (N, 3) of float32 or float64
+        Points [m], finite.
+    cutoff : number
+        [m], > 0: pairs at this distance or closer, as the type of `positions` computes it.
+    radii : number or array (N,)
+        Instead of `cutoff`, as in find_contacts().
+    query : array (M, 3), optional
+        Finds pairs of a point of `query` and a point of `positions`, and no others: row a is an
+        index into `query`, row b into `positions`. `half` has no effect.
+    query_radii : number or array (M,)
+        With `radii`: those of `query`.
+    batch, periodic, device, output, half, index_dtype, threads
+        As in find_contacts(). `batch`, `periodic` and `query` exclude each other.
+
+    Returns
+    -------
+    array (2, E), or Rows; PeriodicPairs or PeriodicRows with `periodic`
+        Of the kind of `positions`, sorted by (a, b).
+
+    Raises
+    ------
+    InvalidArgument, OutOfMemory
+        As find_contacts().
+    """
+    if _device.is_on_device(positions):
+        search = _device_search(None, positions, cutoff, radii, query, query_radii, batch,
+                                periodic, device)
+        return _of_devices(search.dtype)._find_on_device(search, output, half, index_dtype, None,
+                                                         None, contacts=False)
+    search = _pair_search(None, positions, cutoff, radii, query, query_radii, batch, periodic)
+    collider = _shared(search.dtype, threads, device)
+    return collider._find(search, output, half, index_dtype, None, contacts=False)
+
+
+def available_backends() -> list[dict[str, Any]]:
+    """Status of "cpu" and "cuda": whether compiled and usable, the device, and the reason if it is
+    unusable. Starts CUDA where there is a GPU."""
+    return _core.f32.available_backends()

@@ -1,0 +1,237 @@
+"""Searches on arrays in device memory, of PyTorch, CuPy, and libraries that share with one of them."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from . import _arrays
+from ._errors import BackendUnavailable, InvalidArgument
+
+_CUDA_DEVICES = (2, 13)  # kDLCUDA and kDLCUDAManaged of DLPack
+
+
+def is_on_device(array: Any) -> bool:
+    """Whether an array is in the memory of a CUDA device."""
+    if isinstance(array, _arrays.np.ndarray):
+        return False
+    is_cuda = getattr(array, "is_cuda", None)
+    if is_cuda is not None:
+        return bool(is_cuda)
+    if hasattr(array, "__dlpack_device__"):
+        return array.__dlpack_device__()[0] in _CUDA_DEVICES
+    return hasattr(array, "__cuda_array_interface__")
+
+
+class View(NamedTuple):
+    """An array in device memory. Strides count elements."""
+
+    address: int
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+    dtype: str
+    device: int
+
+
+class _Torch:
+    """Arrays of PyTorch, in the order of its current stream."""
+
+    def __init__(self, like: Any) -> None:
+        self._torch = importlib.import_module("torch")
+        self._device = like.device
+        self.stream = self._torch.cuda.current_stream(like.device).cuda_stream
+
+    def view(self, array: Any) -> View:
+        return View(array.data_ptr(), tuple(array.shape), array.stride(),
+                    str(array.dtype).removeprefix("torch."), array.device.index)
+
+    def empty(self, shape: tuple[int, ...], dtype: str) -> Any:
+        return self._torch.empty(shape, dtype=getattr(self._torch, dtype), device=self._device)
+
+
+class _Cupy:
+    """Arrays of CuPy, in the order of its current stream."""
+
+    def __init__(self, like: Any) -> None:
+        self._cupy = importlib.import_module("cupy")
+        self._device = like.device
+        with like.device:
+            self.stream = self._cupy.cuda.get_current_stream().ptr
+
+    def view(self, array: Any) -> View:
+        size = array.itemsize
+        return View(array.data.ptr, array.shape, tuple(stride // size for stride in array.strides),
+                    array.dtype.name, array.device.id)
+
+    def empty(self, shape: tuple[int, ...], dtype: str) -> Any:
+        with self._device:
+            return self._cupy.empty(shape, dtype)
+
+
+_LIBRARIES = {"torch": _Torch, "cupy": _Cupy}
+
+
+def _library(array: Any) -> str:
+    return type(array).__module__.partition(".")[0]
+
+
+def _adapted(array: Any, name: str) -> Any:
+    """The array as one of PyTorch or CuPy, without a copy."""
+    if _library(array) in _LIBRARIES:
+        return array
+    for library in ("cupy", "torch"):
+        try:
+            module = importlib.import_module(library)
+        except ImportError:
+            continue
+        if hasattr(array, "__dlpack__"):
+            return module.from_dlpack(array)
+        return module.asarray(array, **({"device": "cuda"} if library == "torch" else {}))
+    raise InvalidArgument(f"{name} is a device array of {_library(array)}, which requires CuPy or "
+                          "PyTorch to be installed")
+
+
+def _converter(like: Any) -> Callable[[Any], Any]:
+    """The function that converts a result to the kind of `like`."""
+    namespace = getattr(like, "__array_namespace__", None)
+    if _library(like) in _LIBRARIES or namespace is None:
+        return lambda array: array
+    return namespace().from_dlpack
+
+
+class DeviceSearch:
+    """The validated arguments of a search on a device."""
+
+    def __init__(self, positions: Any, device: Any, dtype: Any = None) -> None:
+        self.convert = _converter(positions)
+        positions = _adapted(positions, "positions")
+        self.library = _LIBRARIES[_library(positions)](positions)
+        self._kept = [positions]  # views do not own memory
+        self._positions = self._rows(self.library.view(positions), "positions")
+        self.dtype = self._positions.dtype
+        self.device = self._positions.device
+        if self.dtype not in ("float32", "float64"):
+            raise InvalidArgument(f"positions has dtype {self.dtype}; it must be float32 or float64")
+        if dtype is not None and self.dtype != str(dtype):
+            raise InvalidArgument(f"positions has dtype {self.dtype}; it must be {dtype}")
+        if device is not None and str(device) not in ("cuda", f"cuda:{self.device}"):
+            raise InvalidArgument(f"positions are on cuda:{self.device}, and device is {device!r}")
+        self._query: Any = None
+
+    def _rows(self, view: View, name: str) -> View:
+        if len(view.shape) != 2 or view.shape[1] != 3:
+            raise InvalidArgument(f"{name} has shape {view.shape}; it must be (N, 3)")
+        return view
+
+    def _view(self, array: Any, name: str) -> View:
+        """An array of the device and type of the positions."""
+        if not is_on_device(array):
+            raise InvalidArgument(f"{name} is not an array on cuda:{self.device}, where the "
+                                  "positions are")
+        array = _adapted(array, name)
+        view = _LIBRARIES[_library(array)](array).view(array)
+        self._kept.append(array)
+        if view.device != self.device:
+            raise InvalidArgument(f"{name} is on cuda:{view.device}, and positions are on "
+                                  f"cuda:{self.device}")
+        if view.dtype != self.dtype:
+            raise InvalidArgument(f"{name} has dtype {view.dtype}; it must be that of the "
+                                  f"positions, {self.dtype}")
+        return view
+
+    def _arrays(self, rows: View, radii: Any, name: str) -> tuple[Any, ...]:
+        """The arguments of the binding for positions and their radii."""
+        size = rows.shape[0]
+        start = (rows.address, size, *rows.strides)
+        if isinstance(radii, (int, float)) or getattr(radii, "shape", None) == ():
+            return *start, 0, 0, float(radii)  # waits, where it is on the device
+        view = self._view(radii, name)
+        if view.shape != (size,):
+            raise InvalidArgument(f"{name} has shape {view.shape}; it must be a number or ({size},)")
+        return *start, view.address, view.strides[0], 0.0
+
+    def set_radii(self, radii: Any) -> None:
+        self._spheres = self._arrays(self._positions, radii, "radii")
+
+    def set_query(self, query: Any, radii: Any) -> None:
+        rows = self._rows(self._view(query, "query"), "query")
+        self._query = self._arrays(rows, radii, "query_radii")
+
+    def rows(self) -> int:
+        return (self._query or self._spheres)[1]
+
+    def run(self, core: Any, contacts: bool, half: bool) -> int:
+        """Waits for the number of contacts, and returns it."""
+        if self._query is not None:
+            return core.find_between(self._query, self._spheres, contacts, self.library.stream)
+        return core.find(self._spheres, contacts, not half, self.library.stream)
+
+    def enqueue(self, core: Any, contacts: bool) -> None:
+        core.enqueue(self._spheres, contacts, self.library.stream)
+
+    def collider(self, cache: dict[Any, Any]) -> Any:
+        """The collider of the binding for type, device and stream."""
+        key = self.dtype, self.device, self.library.stream
+        if key not in cache:
+            core = _arrays.precision_of(self.dtype)
+            if not hasattr(core, "DeviceCollider"):
+                raise BackendUnavailable("cuda: built without CUDA")
+            cache[key] = core.DeviceCollider(self.device)
+        return cache[key]
+
+    def results(self, core: Any, size: int, output: str, index: str, contacts: bool) -> list[Any]:
+        """New arrays with the result of run()."""
+        stream, empty = self.library.stream, self.library.empty
+        pairs = empty((2, size), index)
+        a = self.library.view(pairs).address
+        core.write_pairs(a, a + size * (4 if index == "int32" else 8), index == "int64", size,
+                         stream)
+        result = [pairs]
+        if output == "csr":
+            offsets = empty((self.rows() + 1,), "int64")
+            core.write_offsets(self.library.view(offsets).address, stream)
+            result = [offsets, pairs[1]]
+        if contacts:
+            result += [empty((size, 3), self.dtype), empty((size,), self.dtype)]
+            core.write_contacts(*(self.library.view(x).address for x in result[-2:]), size, stream)
+        return [self.convert(array) for array in result]
+
+    def write(self, core: Any, out: Any, contacts: bool, size: int | None) -> None:
+        """Writes the result to arrays of the caller, with room for `size` contacts if it is known."""
+        stream = self.library.stream
+        pairs = self._target(out[0] if contacts else out, "out.pairs" if contacts else "out",
+                             (2, None), size, ("int32", "int64"))
+        capacity = pairs.shape[1]
+        if contacts:
+            normal = self._target(out[1], "out.normal", (None, 3), size, (self.dtype,))
+            distance = self._target(out[2], "out.distance", (None,), size, (self.dtype,))
+            capacity = min(capacity, normal.shape[0], distance.shape[0])
+            core.write_contacts(normal.address, distance.address, capacity, stream)
+        step = pairs.strides[0] * (4 if pairs.dtype == "int32" else 8)
+        core.write_pairs(pairs.address, pairs.address + step, pairs.dtype == "int64", capacity,
+                         stream)
+
+    def write_count(self, core: Any, count: Any) -> None:
+        view = self._target(count, "count", (2,), None, ("int64",))
+        core.write_count(view.address, self.library.stream)
+
+    def _target(self, array: Any, name: str, shape: tuple[int | None, ...], size: int | None,
+                dtypes: tuple[str, ...]) -> View:
+        """An array of the caller, on the device, whose rows are contiguous."""
+        if not is_on_device(array) or _library(array) not in _LIBRARIES:
+            raise InvalidArgument(f"{name} must be a tensor of PyTorch or an array of CuPy on "
+                                  f"cuda:{self.device}")
+        view = self.library.view(array)
+        if view.device != self.device or view.dtype not in dtypes:
+            raise InvalidArgument(f"{name} is on cuda:{view.device} with dtype {view.dtype}; it must "
+                                  f"be on cuda:{self.device} with dtype {' or '.join(dtypes)}")
+        fits = len(view.shape) == len(shape) and all(
+            have >= (size or 0) if need is None else have == need
+            for have, need in zip(view.shape, shape))
+        if not fits:
+            needed = tuple((size or "E") if need is None else need for need in shape)
+            raise InvalidArgument(f"{name} has shape {view.shape}; it must have room for {needed}")
+        if view.strides[-1] != 1 or (shape[-1] == 3 and view.strides[0] != 3):
+            raise InvalidArgument(f"{name} is not contiguous")
+        return view

@@ -1,0 +1,216 @@
+"""Forces that act on the bodies of a world in every step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import _arrays
+
+
+class BodyId(NamedTuple):
+    """Identifies a body of one World for the lifetime of the body. Never reused."""
+
+    index: int
+    generation: int
+
+
+class States(NamedTuple):
+    """States of all bodies, in the order of World.bodies."""
+
+    positions: Any
+    """(N, 3) [m]."""
+    orientations: Any
+    """(N, 4) [-]: unit quaternions (w, x, y, z)."""
+    velocities: Any
+    """(N, 3) [m/s]."""
+    angular_velocities: Any
+    """(N, 3) [rad/s], world axes."""
+
+    @classmethod
+    def empty(cls, size: int, dtype: Any) -> States:
+        return cls(np.empty((size, 3), dtype), np.empty((size, 4), dtype),
+                   np.empty((size, 3), dtype), np.empty((size, 3), dtype))
+
+
+class BodyState(NamedTuple):
+    """State of motion of a body."""
+
+    position: tuple[float, ...]
+    """[m]."""
+    orientation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
+    """[-]: unit quaternion (w, x, y, z)."""
+    velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
+    """[m/s]."""
+    angular_velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
+    """[rad/s], world axes."""
+
+
+Vector = Sequence[float]
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Force mass * acceleration [m/s^2] on one body or on all, in addition to their own
+    acceleration, which is gravity by default."""
+
+    acceleration: Vector = (0.0, -9.81, 0.0)
+    body: BodyId | None = None
+
+    def _add(self, core: Any) -> int:
+        return core.add_gravity(_arrays.triple(self.acceleration, "acceleration"), self.body)
+
+
+@dataclass(frozen=True)
+class Drag:
+    """Drag -(linear + quadratic * |u|) * u, where u is the velocity relative to the wind [m/s];
+    linear [kg/s] >= 0, quadratic [kg/m] >= 0."""
+
+    linear: float = 0.0
+    quadratic: float = 0.0
+    wind: Vector = (0.0, 0.0, 0.0)
+    body: BodyId | None = None
+
+    def _add(self, core: Any) -> int:
+        return core.add_drag(float(self.linear), float(self.quadratic),
+                             _arrays.triple(self.wind, "wind"), self.body)
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """Attachment point of a spring: a point [m] in the axes of a body, or of the world."""
+
+    body: BodyId | None = None
+    point: Vector = (0.0, 0.0, 0.0)
+
+    def _pair(self) -> tuple[BodyId | None, tuple[float, ...]]:
+        return self.body, _arrays.triple(self.point, "point")
+
+
+@dataclass(frozen=True)
+class Spring:
+    """Spring between two attachments; stiffness [N/m] >= 0, damping [N s/m] >= 0, rest_length [m]
+    >= 0."""
+
+    a: Attachment
+    b: Attachment
+    stiffness: float
+    damping: float = 0.0
+    rest_length: float = 0.0
+
+    def _add(self, core: Any) -> int:
+        return core.add_spring(self.a._pair(), self.b._pair(), float(self.stiffness),
+                               float(self.damping), float(self.rest_length))
+
+
+@dataclass(frozen=True)
+class Bungee(Spring):
+    """A spring without force while it is shorter than its rest length."""
+
+    def _add(self, core: Any) -> int:
+        return core.add_bungee(self.a._pair(), self.b._pair(), float(self.stiffness),
+                               float(self.damping), float(self.rest_length))
+
+
+@dataclass(frozen=True)
+class Buoyancy:
+    """Buoyancy in the liquid dot(normal, p) <= offset; density [kg/m^3] >= 0, gravity [m/s^2]
+    >= 0."""
+
+    normal: Vector = (0.0, 1.0, 0.0)
+    offset: float = 0.0
+    density: float = 1000.0
+    gravity: float = 9.81
+    body: BodyId | None = None
+
+    def _add(self, core: Any) -> int:
+        return core.add_buoyancy(_arrays.triple(self.normal, "normal"), float(self.offset),
+                                 float(self.density), float(self.gravity), self.body)
+
+
+@dataclass(frozen=True)
+class Explosion:
+    """Pressure wave: a spherical shell that expands from `centre` [m] at `start` [s] of the time
+    of the world with `speed` [m/s] > 0, and fades in `duration` [s] > 0; `peak_force` [N] >= 0 in
+    the middle of its `thickness` [m] > 0."""
+
+    centre: Vector = (0.0, 0.0, 0.0)
+    start: float = 0.0
+    peak_force: float = 0.0
+    speed: float = 340.0
+    thickness: float = 10.0
+    duration: float = 1.0
+
+    def _add(self, core: Any) -> int:
+        return core.add_explosion(_arrays.triple(self.centre, "centre"), float(self.start),
+                                  float(self.peak_force), float(self.speed),
+                                  float(self.thickness), float(self.duration))
+
+
+class ForceContext:
+    """The world at the start of a step, for a force that is a function of Python. Valid during the
+    call. Contributions affect awake bodies only."""
+
+    def __init__(self, core: Any, dtype: Any) -> None:
+        self._core = core
+        self._dtype = dtype
+
+    @property
+    def dt(self) -> float:
+        """[s], length of the step."""
+        return self._core.dt
+
+    @property
+    def time(self) -> float:
+        """[s], start of the step; 0 in the first."""
+        return self._core.time
+
+    @property
+    def bodies(self) -> list[BodyId]:
+        """Living bodies in the order of their indices."""
+        return [BodyId(*body) for body in self._core.bodies()]
+
+    def states(self) -> States:
+        """States of all bodies, in the order of `bodies`."""
+        states = States.empty(self._core.size(), self._dtype)
+        self._core.write_states(*states)
+        return states
+
+    def state(self, body: BodyId) -> BodyState:
+        return BodyState(*self._core.state(body))
+
+    def mass(self, body: BodyId) -> float:
+        """[kg]; 0: immovable or kinematic."""
+        return self._core.mass(body)
+
+    def awake(self, body: BodyId) -> bool:
+        return self._core.awake(body)
+
+    def wake(self, body: BodyId) -> None:
+        """Wakes a movable body."""
+        self._core.wake(body)
+
+    def apply_force(self, body: BodyId, force: Vector) -> None:
+        """Adds a force [N] at the centre of mass, in world axes."""
+        self._core.apply_force(body, _arrays.triple(force, "force"))
+
+    def apply_torque(self, body: BodyId, torque: Vector) -> None:
+        """Adds a torque [N m], in world axes."""
+        self._core.apply_torque(body, _arrays.triple(torque, "torque"))
+
+    def apply_force_at_point(self, body: BodyId, force: Vector, point: Vector) -> None:
+        """Adds a force [N] at a point [m] of the world."""
+        self._core.apply_force_at_point(body, _arrays.triple(force, "force"),
+                                        _arrays.triple(point, "point"))
+
+    def apply_forces(self, forces: Any) -> None:
+        """Adds a force [N] on each body: an array (N, 3) in the order of `bodies`."""
+        forces = _arrays.rows(forces, "forces", 3, self._dtype)
+        size = self._core.size()
+        if forces.shape[0] != size:
+            raise _arrays.InvalidArgument(f"forces has {forces.shape[0]} rows; it must have one "
+                                          f"for each of {size} bodies")
+        self._core.apply_forces(forces)

@@ -1,0 +1,159 @@
+"""Scenes: bodies and settings of a simulation."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any
+
+import numpy as np
+
+from . import _arrays, _core
+from ._errors import InvalidScene
+
+
+class Scene:
+    """Bodies and the settings of their simulation. A scene is validated when it is made.
+
+    Parameters
+    ----------
+    fields : dict, optional
+        The scene as in a JSON file, see docs/scenes.md. "jfpx_scene" and "bodies" may be absent.
+    dtype : "float32" or "float64"
+        Precision of a world that is made from the scene.
+
+    Raises
+    ------
+    InvalidScene
+        A field is unknown or out of range. The message names the body, the field and the range.
+    """
+
+    def __init__(self, fields: dict[str, Any] | None = None, *, dtype: Any = "float32") -> None:
+        self._dtype = np.dtype(dtype) if _arrays.precision_of(dtype) else None
+        fields = {"jfpx_scene": 2, "bodies": [], **(fields or {})}
+        try:
+            text = json.dumps(fields, default=_to_json, allow_nan=False)
+        except (TypeError, ValueError) as error:
+            raise InvalidScene(f"the scene has no JSON form: {error}") from None
+        self._scene = _arrays.precision_of(dtype).Scene.from_json(text)
+
+    @classmethod
+    def from_json(cls, text: str, *, dtype: Any = "float32") -> Scene:
+        """Parses JSON text. Raises InvalidScene."""
+        return cls._of(_arrays.precision_of(dtype).Scene.from_json(text), dtype)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, dtype: Any = "float32") -> Scene:
+        """Reads a JSON file. Raises FileError, InvalidScene."""
+        return cls._of(_arrays.precision_of(dtype).Scene.load(os.fspath(path)), dtype)
+
+    @classmethod
+    def named(cls, name: str, *, spheres: int | None = None, boxes: int | None = None,
+              seed: int = 1, dtype: Any = "float32") -> Scene:
+        """Generates one of scene_names(). Raises InvalidArgument, OutOfMemory.
+
+        Parameters
+        ----------
+        spheres, boxes : int, optional
+            Numbers of movable bodies; the defaults of the scene if absent.
+        seed : int
+            Of the random scenes.
+        """
+        limit = 2**32 - 1
+        scene = _arrays.precision_of(dtype).Scene.named(
+            name, None if spheres is None else _arrays.count(spheres, "spheres", 0, limit),
+            None if boxes is None else _arrays.count(boxes, "boxes", 0, limit),
+            _arrays.count(seed, "seed", 0, 2**64 - 1))
+        return cls._of(scene, dtype)
+
+    @classmethod
+    def _of(cls, scene: Any, dtype: Any) -> Scene:
+        self = cls.__new__(cls)
+        self._scene = scene
+        self._dtype = np.dtype(dtype)
+        return self
+
+    def add_spheres(self, positions: Any, radii: Any, *, masses: Any = 1.0,
+                    velocities: Any = (0.0, 0.0, 0.0)) -> None:
+        """Adds a movable sphere for each row of an array; nothing if one of them is invalid.
+
+        Parameters
+        ----------
+        positions : array (N, 3) of the dtype of the scene
+            [m].
+        radii : number or array (N,)
+            [m], > 0.
+        masses : number or array (N,)
+            [kg], >= 0; 0: immovable.
+        velocities : three numbers or array (N, 3)
+            [m/s].
+        """
+        positions = _arrays.rows(positions, "positions", 3, self._dtype)
+        size = positions.shape[0]
+        speeds = _arrays.to_host(velocities, "velocities").astype(self._dtype, copy=False)
+        if speeds.ndim == 1:
+            speeds = np.array([_arrays.triple(speeds, "velocities")], self._dtype)
+        speeds = _arrays.rows(speeds, "velocities", 3, self._dtype)
+        if speeds.shape[0] not in (1, size):
+            raise _arrays.InvalidArgument(
+                f"velocities has {speeds.shape[0]} rows; it must have 1 or {size}")
+        self._scene.add_spheres(positions, _arrays.vector(radii, "radii", size, self._dtype),
+                                _arrays.vector(masses, "masses", size, self._dtype), speeds)
+
+    @property
+    def dtype(self) -> np.dtype:
+        return self._dtype
+
+    @property
+    def name(self) -> str:
+        return self._scene.name
+
+    @property
+    def dt(self) -> float:
+        """[s], length of a step."""
+        return self._scene.dt
+
+    def __len__(self) -> int:
+        """Number of bodies."""
+        return self._scene.bodies
+
+    def to_json(self) -> str:
+        """JSON text, of which from_json() makes a scene with the same bits."""
+        return self._scene.to_json()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields of the JSON form."""
+        return json.loads(self.to_json())
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes a JSON file. Raises FileError."""
+        self._scene.save(os.fspath(path))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Scene):
+            return NotImplemented
+        return self._dtype == other._dtype and self._scene.equals(other._scene)
+
+    __hash__ = None  # type: ignore[assignment]  # scenes can be changed
+
+    def __reduce__(self) -> Any:
+        return _from_json, (self.to_json(), self._dtype.name)
+
+    def __repr__(self) -> str:
+        return f"<jfpx.Scene {self.name!r}: {len(self)} bodies, {self._dtype}>"
+
+
+def _from_json(text: str, dtype: str) -> Scene:
+    return Scene.from_json(text, dtype=dtype)
+
+
+def _to_json(value: Any) -> Any:
+    """NumPy's numbers and arrays, for json.dumps()."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"{value!r} is neither a number, a text, a list nor a dict")
+
+
+def scene_names() -> dict[str, str]:
+    """Names of the scenes of Scene.named(), each with a line of description."""
+    return dict(_core.f32.scene_names())

@@ -1,0 +1,139 @@
+/// Binding of the contacts, events and queries of worlds. A body in an array is its BodyId::index.
+#include "python/src/world.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace python {
+namespace {
+
+using Flags = Vector<bool>;
+
+void write_contacts(const PythonWorld& self, const Rows<std::int64_t>& pairs,
+                    const Rows<Real>& normals, const Rows<Real>& points,
+                    const Vector<Real>& distances, const Vector<Real>& frictions,
+                    const Vector<Real>& restitutions, const Flags& sensors) {
+  const std::span<const Contact> contacts = self.get().contacts();
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const Contact& c = contacts[i];
+    pairs(0, i) = c.a.index;
+    pairs(1, i) = c.b.index;
+    set_row(normals, i, c.normal);
+    set_row(points, i, c.point);
+    distances(i) = c.distance;
+    frictions(i) = c.friction;
+    restitutions(i) = c.restitution;
+    sensors(i) = c.sensor;
+  }
+}
+
+void write_events(const PythonWorld& self, const Vector<std::int64_t>& phases,
+                  const Rows<std::int64_t>& pairs, const Vector<std::int64_t>& counts,
+                  const Rows<Real>& normals, const Rows<Real>& points,
+                  const Vector<Real>& distances) {
+  const std::span<const ContactEvent> events = self.get().contact_events();
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const ContactEvent& e = events[i];
+    phases(i) = static_cast<std::int64_t>(e.phase);
+    pairs(0, i) = e.a.index;
+    pairs(1, i) = e.b.index;
+    counts(i) = e.contacts;
+    set_row(normals, i, e.normal);
+    set_row(points, i, e.point);
+    distances(i) = e.distance;
+  }
+}
+
+Ray to_ray(const Triple& origin, const Triple& direction, double max_distance) {
+  return {.origin = to_vec3(origin),
+          .direction = to_vec3(direction),
+          .max_distance = static_cast<Real>(max_distance)};
+}
+
+nb::tuple to_python(const RayHit& hit) {
+  return nb::make_tuple(to_tuple(hit.body), static_cast<double>(hit.distance), to_triple(hit.point),
+                        to_triple(hit.normal));
+}
+
+/// The first hit of each ray; -1 for the body of a ray without a hit.
+void cast_rays(const PythonWorld& self, const Rows<const Real>& origins,
+               const Rows<const Real>& directions, const Vector<const Real>& max_distances,
+               const Vector<std::int64_t>& bodies, const Vector<Real>& distances,
+               const Rows<Real>& points, const Rows<Real>& normals) {
+  const World& world = self.get();
+  for (std::size_t i = 0; i < bodies.shape(0); ++i) {
+    const std::size_t limit = max_distances.shape(0) == 1 ? 0 : i;
+    std::optional<RayHit> hit;
+    try {
+      hit = world.cast_ray({.origin = vec3_at(origins, i),
+                            .direction = vec3_at(directions, i),
+                            .max_distance = max_distances(limit)});
+    } catch (const InvalidArgument& e) {
+      throw InvalidArgument("ray " + std::to_string(i) + ": " + e.what());
+    }
+    bodies(i) = hit ? std::int64_t{hit->body.index} : -1;
+    const RayHit values = hit.value_or(RayHit{});
+    distances(i) = hit ? values.distance : std::numeric_limits<Real>::infinity();
+    set_row(points, i, values.point);
+    set_row(normals, i, values.normal);
+  }
+}
+
+/// Calls `filter`, if there is one, for each body that is hit.
+BodyFilter to_filter(const nb::object& filter) {
+  if (filter.is_none()) return {};
+  return [&filter](BodyId id) { return nb::cast<bool>(filter(to_tuple(id))); };
+}
+
+std::vector<IdTuple> to_tuples(const std::vector<BodyId>& ids) {
+  std::vector<IdTuple> tuples;
+  for (const BodyId id : ids) tuples.push_back(to_tuple(id));
+  return tuples;
+}
+
+}  // namespace
+
+void bind_contacts(nb::class_<PythonWorld>& world) {
+  world.def("contact_count", [](const PythonWorld& self) { return self.get().contacts().size(); })
+      .def("write_contacts", &write_contacts)
+      .def("event_count",
+           [](const PythonWorld& self) { return self.get().contact_events().size(); })
+      .def("write_events", &write_events)
+      .def("cast_rays", &cast_rays)
+      .def(
+          "cast_ray",
+          [](const PythonWorld& self, Triple origin, Triple direction, double max_distance,
+             const nb::object& filter) -> std::optional<nb::tuple> {
+            const auto hit =
+                self.get().cast_ray(to_ray(origin, direction, max_distance), to_filter(filter));
+            if (!hit) return std::nullopt;
+            return to_python(*hit);
+          },
+          nb::arg("origin"), nb::arg("direction"), nb::arg("max_distance"),
+          nb::arg("filter").none())
+      .def(
+          "cast_ray_through",
+          [](const PythonWorld& self, Triple origin, Triple direction, double max_distance,
+             const nb::object& filter) {
+            nb::list hits;
+            for (const RayHit& hit : self.get().cast_ray_through(
+                     to_ray(origin, direction, max_distance), to_filter(filter))) {
+              hits.append(to_python(hit));
+            }
+            return hits;
+          },
+          nb::arg("origin"), nb::arg("direction"), nb::arg("max_distance"),
+          nb::arg("filter").none())
+      .def("overlapping_sphere",
+           [](const PythonWorld& self, Real radius, Triple centre) {
+             return to_tuples(self.get().overlapping(Sphere{radius}, to_vec3(centre)));
+           })
+      .def("overlapping_box",
+           [](const PythonWorld& self, Triple half_extents, Triple centre, Quadruple orientation) {
+             return to_tuples(self.get().overlapping(Box{to_vec3(half_extents)}, to_vec3(centre),
+                                                     to_quat(orientation)));
+           });
+}
+
+}  // namespace python
+}  // namespace JFPX_ABI
+}  // namespace jfpx

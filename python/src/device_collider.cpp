@@ -1,0 +1,91 @@
+/// Binding of the sphere collider for arrays in device memory, which come as addresses and strides.
+#include <jfpx/cuda/array_collider.hpp>
+
+#include "python/src/bindings.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace python {
+namespace {
+
+using Address = std::uintptr_t;
+
+template <class T>
+T* pointer(Address address) {
+  return reinterpret_cast<T*>(address);  // NOLINT(performance-no-int-to-ptr)
+}
+cuda::Stream to_stream(Address stream) { return pointer<CUstream_st>(stream); }
+
+/// (positions, count, row stride, column stride, radii or 0, radius stride, radius)
+using ArraysTuple = std::tuple<Address, std::size_t, std::ptrdiff_t, std::ptrdiff_t, Address,
+                               std::ptrdiff_t, double>;
+cuda::SphereArrays to_arrays(const ArraysTuple& t) {
+  return {.count = std::get<1>(t),
+          .positions = pointer<const Real>(std::get<0>(t)),
+          .row_stride = std::get<2>(t),
+          .column_stride = std::get<3>(t),
+          .radii = pointer<const Real>(std::get<4>(t)),
+          .radius_stride = std::get<5>(t),
+          .radius = static_cast<Real>(std::get<6>(t))};
+}
+cuda::ArrayResult to_result(bool contacts) {
+  return contacts ? cuda::ArrayResult::contacts : cuda::ArrayResult::pairs;
+}
+
+}  // namespace
+
+void bind_device_collider(nb::module_& module) {
+  using cuda::ArrayCollider;
+  using Release = nb::call_guard<nb::gil_scoped_release>;
+  nb::class_<ArrayCollider>(module, "DeviceCollider")
+      .def("__init__", [](ArrayCollider* self, int device) { new (self) ArrayCollider(device); })
+      .def("reserve", &ArrayCollider::reserve, Release())
+      .def(
+          "find",
+          [](ArrayCollider& self, const ArraysTuple& spheres, bool contacts, bool both_orders,
+             Address stream) {
+            return self.find(to_arrays(spheres), to_result(contacts), both_orders,
+                             to_stream(stream));
+          },
+          Release())
+      .def(
+          "find_between",
+          [](ArrayCollider& self, const ArraysTuple& first, const ArraysTuple& second,
+             bool contacts, Address stream) {
+            return self.find_between(to_arrays(first), to_arrays(second), to_result(contacts),
+                                     to_stream(stream));
+          },
+          Release())
+      .def("enqueue",
+           [](ArrayCollider& self, const ArraysTuple& spheres, bool contacts, Address stream) {
+             self.enqueue(to_arrays(spheres), to_result(contacts), to_stream(stream));
+           })
+      .def("write_pairs",
+           [](ArrayCollider& self, Address a, Address b, bool wide, std::size_t capacity,
+              Address stream) {
+             if (wide) {
+               self.write_pairs(pointer<std::int64_t>(a), pointer<std::int64_t>(b), capacity,
+                                to_stream(stream));
+             } else {
+               self.write_pairs(pointer<std::int32_t>(a), pointer<std::int32_t>(b), capacity,
+                                to_stream(stream));
+             }
+           })
+      .def("write_contacts",
+           [](ArrayCollider& self, Address normals, Address distances, std::size_t capacity,
+              Address stream) {
+             self.write_contacts(pointer<Real>(normals), pointer<Real>(distances), capacity,
+                                 to_stream(stream));
+           })
+      .def("write_offsets",
+           [](ArrayCollider& self, Address offsets, Address stream) {
+             self.write_offsets(pointer<std::int64_t>(offsets), to_stream(stream));
+           })
+      .def("write_count", [](ArrayCollider& self, Address count, Address stream) {
+        self.write_count(pointer<std::int64_t>(count), to_stream(stream));
+      });
+}
+
+}  // namespace python
+}  // namespace JFPX_ABI
+}  // namespace jfpx

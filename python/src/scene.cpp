@@ -1,0 +1,55 @@
+/// Binding of scenes.
+#include "python/src/bindings.hpp"
+#include "src/scenes/scenes.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace python {
+
+void bind_scene(nb::module_& module) {
+  nb::class_<Scene>(module, "Scene")
+      .def_static("from_json", [](const std::string& text) { return from_json(text); })
+      .def("to_json", [](const Scene& self) { return to_json(self); })
+      .def_static("load", [](const std::string& path) { return load_scene(path); })
+      .def("save", [](const Scene& self, const std::string& path) { save_scene(self, path); })
+      .def_static(
+          "named",
+          [](const std::string& name, std::optional<std::uint32_t> spheres,
+             std::optional<std::uint32_t> boxes, std::uint64_t seed) {
+            return scenes::make(name, {.spheres = spheres, .boxes = boxes, .seed = seed});
+          },
+          nb::arg("name"), nb::arg("spheres").none(), nb::arg("boxes").none(), nb::arg("seed"))
+      .def("add_spheres",
+           [](Scene& self, const Rows<const Real>& positions, const Vector<const Real>& radii,
+              const Vector<const Real>& masses, const Rows<const Real>& velocities) {
+             const std::size_t n = positions.shape(0);
+             const auto at = [](const Vector<const Real>& values, std::size_t i) {
+               return values(values.shape(0) == 1 ? 0 : i);
+             };
+             Scene grown = self;
+             grown.bodies.reserve(grown.bodies.size() + n);
+             for (std::size_t i = 0; i < n; ++i) {
+               BodyDef body;
+               body.shape = Sphere{at(radii, i)};
+               body.mass = at(masses, i);
+               body.position = vec3_at(positions, i);
+               body.velocity = vec3_at(velocities, velocities.shape(0) == 1 ? 0 : i);
+               grown.bodies.push_back(body);
+             }
+             validate(grown);
+             self = std::move(grown);
+           })
+      .def_prop_ro("name", [](const Scene& self) { return self.name; })
+      .def_prop_ro("dt", [](const Scene& self) { return static_cast<double>(self.dt); })
+      .def_prop_ro("bodies", [](const Scene& self) { return self.bodies.size(); })
+      .def("equals", [](const Scene& self, const Scene& other) { return self == other; });
+  module.def("scene_names", [] {
+    std::vector<std::pair<std::string, std::string>> names;
+    for (const scenes::Entry& entry : scenes::all()) names.emplace_back(entry.name, entry.summary);
+    return names;
+  });
+}
+
+}  // namespace python
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,69 @@
+/// A world as an object of Python.
+#pragma once
+
+#include "python/src/bindings.hpp"
+
+#include <memory>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace python {
+
+/// Owns a World and the functions of Python that act in it. Every access fails while a step runs,
+/// and after close().
+class PythonWorld {
+ public:
+  PythonWorld(const Scene& scene, const WorldSettings& settings)
+      : world_(std::make_unique<World>(scene, settings)) {}
+
+  /// @throws Closed, ConcurrentUse
+  const World& get() const {
+    if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
+    return *existing();
+  }
+  World& get() {
+    if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
+    return *existing();
+  }
+
+  /// One step without Python's global lock.
+  StepReport step();
+  /// Up to `steps` steps, and fewer if one is undone. Between steps, handles signals of Python.
+  StepReport run(std::uint64_t steps);
+  /// Frees the world now. Every later access fails.
+  void close();
+
+  ForceId add_function(nb::object function);
+  void remove_force(ForceId id);
+
+  /// Visits the functions, for the garbage collector.
+  int traverse(visitproc visit, void* arg) const;
+
+ private:
+  World* existing() const {
+    if (world_ == nullptr) throw Closed("the world is closed");
+    return world_.get();
+  }
+
+  std::vector<std::pair<ForceId, nb::object>> functions_;  // outlive the world, which calls them
+  std::unique_ptr<World> world_;
+  std::atomic<bool> in_use_ = false;
+};
+
+/// ForceContext of a call of a function, which is invalid afterwards.
+struct FunctionContext {
+  ForceContext* context = nullptr;
+  ForceContext& get() const {
+    if (context == nullptr) {
+      throw InvalidArgument("the context of a force is valid only while the force is called");
+    }
+    return *context;
+  }
+};
+
+void bind_forces(nb::module_& module, nb::class_<PythonWorld>& world);
+void bind_contacts(nb::class_<PythonWorld>& world);
+
+}  // namespace python
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,82 @@
+/// Contact lists between two sets, of many systems, in both orders and as compressed rows.
+#include <jfpx/contact_list.hpp>
+
+#include "src/sphere_collider/both_orders.hpp"
+#include "src/sphere_collider/sphere_input.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+void check_offsets(std::span<const std::uint64_t> offsets, std::size_t spheres) {
+  if (offsets.empty() || offsets.front() != 0) {
+    throw InvalidArgument("offsets must begin with 0");
+  }
+  for (std::size_t i = 1; i < offsets.size(); ++i) {
+    if (offsets[i] < offsets[i - 1]) {
+      throw InvalidArgument("offset " + std::to_string(i) + " is " + std::to_string(offsets[i]) +
+                            "; it must be at least the offset before, " +
+                            std::to_string(offsets[i - 1]));
+    }
+  }
+  if (offsets.back() != spheres) {
+    throw InvalidArgument("the last offset is " + std::to_string(offsets.back()) +
+                          "; it must be the number of spheres, " + std::to_string(spheres));
+  }
+}
+
+}  // namespace
+
+std::vector<SphereContact> find_contacts_between(SphereCollider& collider,
+                                                 std::span<const SphereInstance> first,
+                                                 std::span<const SphereInstance> second) {
+  std::vector<SphereInstance> spheres;
+  spheres.reserve(first.size() + second.size());
+  spheres.insert(spheres.end(), first.begin(), first.end());
+  spheres.insert(spheres.end(), second.begin(), second.end());
+  std::vector<SphereContact> result;
+  // Because a < b, a contact of both sets has its `a` in the first.
+  for (SphereContact contact : collider.find_contacts(spheres)) {
+    if (contact.a >= first.size()) break;
+    if (contact.b < first.size()) continue;
+    contact.b -= static_cast<SphereIndex>(first.size());
+    result.push_back(contact);
+  }
+  return result;
+}
+
+std::vector<SphereContact> find_contacts_in_systems(SphereCollider& collider,
+                                                    std::span<const SphereInstance> spheres,
+                                                    std::span<const std::uint64_t> offsets) {
+  check_offsets(offsets, spheres.size());
+  detail::check_spheres(spheres);  // here, so that messages count all spheres
+  std::vector<SphereContact> result;
+  for (std::size_t i = 1; i < offsets.size(); ++i) {
+    const std::uint64_t begin = offsets[i - 1];
+    for (SphereContact contact :
+         collider.find_contacts(spheres.subspan(begin, offsets[i] - begin))) {
+      contact.a += static_cast<SphereIndex>(begin);
+      contact.b += static_cast<SphereIndex>(begin);
+      result.push_back(contact);
+    }
+  }
+  return result;
+}
+
+std::vector<SphereContact> in_both_orders(ContactSpan contacts, std::size_t spheres) {
+  return detail::both_orders(
+      contacts, spheres, [](const SphereContact& c) -> const SphereContact& { return c; },
+      [](const SphereContact& c) {
+        return SphereContact{.a = c.b, .b = c.a, .normal = -c.normal, .distance = c.distance};
+      });
+}
+
+std::vector<std::uint64_t> row_offsets(ContactSpan contacts, std::size_t rows) {
+  std::vector<std::uint64_t> offsets(rows + 1);
+  for (const SphereContact& contact : contacts) ++offsets[contact.a + std::size_t{1}];
+  for (std::size_t i = 0; i < rows; ++i) offsets[i + 1] += offsets[i];
+  return offsets;
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,316 @@
+/// Searches on arrays in device memory: packs them, searches on a stream of its own, and keeps the
+/// result for the output.
+#include <jfpx/cuda/array_collider.hpp>
+#include <jfpx/error.hpp>
+
+#include "src/base/cuda/device_buffer.hpp"
+#include "src/base/cuda/probe.hpp"
+#include "src/sphere_collider/cuda/contact_arrays.hpp"
+#include "src/sphere_collider/sphere_input.hpp"
+
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+namespace {
+
+/// Owner of an event that only orders streams.
+class OrderingEvent {
+ public:
+  explicit OrderingEvent(int device) {
+    const DeviceGuard guard(device);
+    JFPX_CUDA_TRY(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming));
+  }
+  ~OrderingEvent() { static_cast<void>(cudaEventDestroy(event_)); }
+  OrderingEvent(const OrderingEvent&) = delete;
+  OrderingEvent& operator=(const OrderingEvent&) = delete;
+
+  /// Later work of `second` waits for all earlier work of `first`.
+  void order(cudaStream_t first, cudaStream_t second) {
+    JFPX_CUDA_TRY(cudaEventRecord(event_, first));
+    JFPX_CUDA_TRY(cudaStreamWaitEvent(second, event_, 0));
+  }
+
+ private:
+  cudaEvent_t event_ = nullptr;
+};
+
+/// Results of one kind: as found, and as selected or in both orders.
+template <class Item>
+struct Items {
+  DeviceBuffer<Item> found, derived;
+};
+
+}  // namespace
+
+struct ArrayCollider::Impl {
+  Impl(int device_to_use, SphereAlgorithm algorithm)
+      : device(device_to_use),
+        stream(checked(device)),
+        pool(device),
+        collider(stream.get(), device, algorithm),
+        event(device) {
+    counts.reserve(2, "numbers of contacts");
+    counts.data()[0] = counts.data()[1] = {};
+  }
+
+  /// @throws BackendUnavailable, with the reason, before the first call of CUDA
+  static int checked(int device) {
+    const BackendStatus status = probe(device);
+    if (!status.usable) throw BackendUnavailable("cuda: " + status.reason);
+    return device;
+  }
+
+  template <class Item>
+  Items<Item>& items() {
+    if constexpr (std::is_same_v<Item, SpherePair>) {
+      return pairs;
+    } else {
+      return contacts;
+    }
+  }
+  void reserve(std::size_t n, std::size_t most_contacts);
+  void pack(const SphereArrays& first, const SphereArrays* second, Stream user);
+  template <class Item>
+  void search(std::size_t n);
+  template <class Item>
+  std::uint64_t search_and_wait(std::size_t n);
+  std::uint64_t count_of(int which) const { return counts.data()[which].contacts; }
+  [[noreturn]] void reject(std::uint32_t invalid);
+  template <class Item>
+  std::uint64_t select_between(std::uint64_t found, std::uint32_t boundary);
+  template <class Item>
+  std::uint64_t list_both_orders(std::uint64_t found);
+  template <class Item>
+  FoundItems<Item> result();
+
+  int device;
+  OwnedStream stream;
+  MemoryPool pool;
+  DeviceSphereCollider collider;
+  OrderingEvent event;
+  DeviceBuffer<SphereInstance> spheres;
+  Items<SpherePair> pairs;
+  Items<SphereContact> contacts;
+  PinnedBuffer<ContactCount> counts;  // of `found` and of `derived`
+  DeviceBuffer<unsigned char> scratch;
+  DeviceBuffer<std::uint32_t> keys;
+  DeviceBuffer<unsigned long long> indices;
+
+  // The last search.
+  ArrayResult kind = ArrayResult::pairs;
+  bool is_derived = false;
+  std::size_t rows = 0;
+  std::uint32_t b_offset = 0;
+};
+
+void ArrayCollider::Impl::reserve(std::size_t n, std::size_t most_contacts) {
+  collider.reserve(n, most_contacts);
+  spheres.reserve_geometric(pool, stream.get(), n, "spheres");
+}
+
+void ArrayCollider::Impl::pack(const SphereArrays& first, const SphereArrays* second, Stream user) {
+  event.order(user, stream.get());
+  launch_pack(first, spheres.data(), stream.get());
+  if (second != nullptr) launch_pack(*second, spheres.data() + first.count, stream.get());
+  is_derived = false;
+  rows = first.count;
+  b_offset = second != nullptr ? static_cast<std::uint32_t>(first.count) : 0;
+}
+
+template <class Item>
+void ArrayCollider::Impl::search(std::size_t n) {
+  DeviceBuffer<Item>& found = items<Item>().found;
+  if constexpr (std::is_same_v<Item, SpherePair>) {
+    kind = ArrayResult::pairs;
+    collider.find_pairs(spheres.data(), n, found.data(), found.capacity(), counts.data());
+  } else {
+    kind = ArrayResult::contacts;
+    collider.find_contacts(spheres.data(), n, found.data(), found.capacity(), counts.data());
+  }
+}
+
+template <class Item>
+std::uint64_t ArrayCollider::Impl::search_and_wait(std::size_t n) {
+  for (;;) {
+    search<Item>(n);
+    JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
+    const ContactCount count = counts.data()[0];
+    if (count.first_invalid != kNoSphere) reject(count.first_invalid);
+    if (count.complete != 0) return count.contacts;
+    items<Item>().found.reserve_geometric(pool, stream.get(), count.contacts, "contacts");
+    collider.reserve(n, items<Item>().found.capacity());
+  }
+}
+
+void ArrayCollider::Impl::reject(std::uint32_t invalid) {
+  counts.data()[0] = {};
+  std::vector<SphereInstance> copy(std::size_t{invalid} + 1);
+  JFPX_CUDA_TRY(cudaMemcpyAsync(copy.data(), spheres.data(), copy.size() * sizeof copy[0],
+                                cudaMemcpyDeviceToHost, stream.get()));
+  JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
+  detail::reject_sphere(copy);
+}
+
+template <class Item>
+std::uint64_t ArrayCollider::Impl::select_between(std::uint64_t found, std::uint32_t boundary) {
+  const std::size_t bytes = select_scratch_bytes<Item>(found);
+  scratch.reserve_geometric(pool, stream.get(), bytes, "scratch memory of a selection");
+  Items<Item>& list = items<Item>();
+  list.derived.reserve_geometric(pool, stream.get(), found, "selected contacts");
+  launch_select_between(list.found.data(), found, boundary, list.derived.data(), counts.data() + 1,
+                        scratch.data(), bytes, stream.get());
+  JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
+  is_derived = true;
+  return count_of(1);
+}
+
+template <class Item>
+std::uint64_t ArrayCollider::Impl::list_both_orders(std::uint64_t found) {
+  const std::size_t bytes = sort_scratch_bytes(found);
+  scratch.reserve_geometric(pool, stream.get(), bytes, "scratch memory of a sort");
+  keys.reserve_geometric(pool, stream.get(), 2 * found, "keys of a sort");
+  indices.reserve_geometric(pool, stream.get(), 2 * found, "values of a sort");
+  Items<Item>& list = items<Item>();
+  list.derived.reserve_geometric(pool, stream.get(), 2 * found, "contacts in both orders");
+  launch_both_orders(list.found.data(), found, list.derived.data(), counts.data() + 1,
+                     {.b = keys.data(),
+                      .sorted_b = keys.data() + found,
+                      .index = indices.data(),
+                      .sorted_index = indices.data() + found,
+                      .sort = scratch.data(),
+                      .sort_bytes = bytes},
+                     stream.get());
+  is_derived = true;
+  return 2 * found;
+}
+
+template <class Item>
+FoundItems<Item> ArrayCollider::Impl::result() {
+  const Items<Item>& list = items<Item>();
+  return {.items = is_derived ? list.derived.data() : list.found.data(),
+          .count = counts.data() + (is_derived ? 1 : 0),
+          .b_offset = b_offset};
+}
+
+ArrayCollider::ArrayCollider(int device, SphereAlgorithm algorithm)
+    : impl_(std::make_unique<Impl>(device, algorithm)) {}
+ArrayCollider::~ArrayCollider() {
+  if (impl_ == nullptr) return;
+  static_cast<void>(JFPX_CUDA_RESULT(cudaStreamSynchronize(impl_->stream.get())));
+  try {
+    const DeviceGuard guard(impl_->device);
+    impl_.reset();
+  } catch (const DeviceError&) {
+    impl_.reset();  // the device is lost
+  }
+}
+ArrayCollider::ArrayCollider(ArrayCollider&&) noexcept = default;
+ArrayCollider& ArrayCollider::operator=(ArrayCollider&& other) noexcept {
+  std::swap(impl_, other.impl_);
+  return *this;
+}
+
+void ArrayCollider::reserve(std::size_t spheres, std::size_t contacts) {
+  const DeviceGuard guard(impl_->device);
+  JFPX_CUDA_TRY(cudaDeviceSynchronize());  // a stream of the caller may read what is reallocated
+  impl_->reserve(spheres, contacts);
+  impl_->pairs.found.reserve(impl_->pool, impl_->stream.get(), contacts, "pairs");
+  impl_->contacts.found.reserve(impl_->pool, impl_->stream.get(), contacts, "contacts");
+  JFPX_CUDA_TRY(cudaStreamSynchronize(impl_->stream.get()));
+}
+
+std::uint64_t ArrayCollider::find(const SphereArrays& spheres, ArrayResult result, bool both_orders,
+                                  Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  impl_->reserve(spheres.count, 0);
+  impl_->pack(spheres, nullptr, stream);
+  const auto run = [&]<class Item>(std::type_identity<Item>) {
+    const std::uint64_t found = impl_->search_and_wait<Item>(spheres.count);
+    if (!both_orders || found == 0) return found;
+    const std::uint64_t all = impl_->list_both_orders<Item>(found);
+    impl_->event.order(impl_->stream.get(), stream);
+    return all;
+  };
+  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
+                                      : run(std::type_identity<SphereContact>{});
+}
+
+std::uint64_t ArrayCollider::find_between(const SphereArrays& first, const SphereArrays& second,
+                                          ArrayResult result, Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  const std::size_t n = first.count + second.count;
+  impl_->reserve(n, 0);
+  impl_->pack(first, &second, stream);
+  const auto run = [&]<class Item>(std::type_identity<Item>) {
+    const std::uint64_t found = impl_->search_and_wait<Item>(n);
+    return found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset);
+  };
+  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
+                                      : run(std::type_identity<SphereContact>{});
+}
+
+void ArrayCollider::enqueue(const SphereArrays& spheres, ArrayResult result, Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  if (spheres.count > impl_->spheres.capacity()) {
+    throw InvalidArgument("number of spheres is " + std::to_string(spheres.count) + "; " +
+                          std::to_string(impl_->spheres.capacity()) + " were reserved");
+  }
+  impl_->pack(spheres, nullptr, stream);
+  if (result == ArrayResult::pairs) {
+    impl_->search<SpherePair>(spheres.count);
+  } else {
+    impl_->search<SphereContact>(spheres.count);
+  }
+  impl_->event.order(impl_->stream.get(), stream);
+}
+
+void ArrayCollider::write_pairs(std::int32_t* a, std::int32_t* b, std::size_t capacity,
+                                Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  if (impl_->kind == ArrayResult::pairs) {
+    launch_write_pairs(impl_->result<SpherePair>(), a, b, capacity, stream);
+  } else {
+    launch_write_pairs(impl_->result<SphereContact>(), a, b, capacity, stream);
+  }
+}
+
+void ArrayCollider::write_pairs(std::int64_t* a, std::int64_t* b, std::size_t capacity,
+                                Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  if (impl_->kind == ArrayResult::pairs) {
+    launch_write_pairs(impl_->result<SpherePair>(), a, b, capacity, stream);
+  } else {
+    launch_write_pairs(impl_->result<SphereContact>(), a, b, capacity, stream);
+  }
+}
+
+void ArrayCollider::write_contacts(Real* normals, Real* distances, std::size_t capacity,
+                                   Stream stream) {
+  if (impl_->kind != ArrayResult::contacts) {
+    throw InvalidArgument("the last search was for pairs, which have no normals");
+  }
+  const DeviceGuard guard(impl_->device);
+  launch_write_contacts(impl_->result<SphereContact>(), normals, distances, capacity, stream);
+}
+
+void ArrayCollider::write_offsets(std::int64_t* offsets, Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  if (impl_->kind == ArrayResult::pairs) {
+    launch_write_offsets(impl_->result<SpherePair>(), offsets, impl_->rows, stream);
+  } else {
+    launch_write_offsets(impl_->result<SphereContact>(), offsets, impl_->rows, stream);
+  }
+}
+
+void ArrayCollider::write_count(std::int64_t* count, Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  launch_write_count(impl_->counts.data() + (impl_->is_derived ? 1 : 0), count, stream);
+}
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx

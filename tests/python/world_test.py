@@ -1,0 +1,495 @@
+"""Worlds, scenes and recordings."""
+
+import gc
+import os
+import pathlib
+import pickle
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+import weakref
+
+import numpy as np
+import pytest
+
+import jfpx
+
+BALL = {"shape": {"type": "sphere", "radius": 0.5}, "position": [0, 2, 0]}
+FLOOR = {"shape": {"type": "half_space", "normal": [0, 1, 0], "offset": 0}, "mass": 0}
+FREE = {**BALL, "acceleration": [0, 0, 0]}
+
+
+def test_a_ball_falls_and_comes_to_rest_on_the_floor(dtype):
+    world = jfpx.World({"bodies": [BALL, FLOOR]}, dtype=dtype)
+    report = world.run(300)
+    assert report == world.report and report.step == 300 and not report.non_finite
+    assert world.time == pytest.approx(5)
+    ball, floor = world.bodies
+    assert world.positions[0, 1] == pytest.approx(0.5, abs=0.01)
+    assert world.positions.dtype == dtype
+    assert not world.awake(ball) and report.awake == 0
+    assert world.mass(ball) == 1 and world.mass(floor) == 0
+    contacts = world.contacts()
+    assert contacts.pairs.tolist() == [[ball.index], [floor.index]]
+    np.testing.assert_allclose(contacts.normal, [[0, 1, 0]], atol=1e-6)
+    assert contacts.distance[0] <= 0 and not contacts.sensor[0]
+
+
+def test_a_world_has_the_bits_of_the_command(dtype):
+    command = os.environ.get("JFPX_COMMAND") or shutil.which("jfpx")
+    if command is None:
+        pytest.skip("the command jfpx is not here")
+    precision = {"float32": "float", "float64": "double"}[dtype.name]
+    lines = subprocess.run([command, "run", "mixed", "--steps", "40", "--hash", "--precision",
+                            precision, "--backend", "cpu"], capture_output=True, text=True, check=True)
+    world = jfpx.World("mixed", dtype=dtype, backend="cpu")
+    world.run(40)
+    assert f"{world.state_hash():016x}" == lines.stdout.split()[-1]
+
+
+def test_threads_and_single_steps_have_the_same_bits(dtype):
+    scene = jfpx.Scene.named("pile", spheres=300, dtype=dtype)
+    hashes = set()
+    for threads in (1, 3):
+        world = jfpx.World(scene, threads=threads)
+        for _ in range(30):
+            world.step()
+        hashes.add(world.state_hash())
+    world = jfpx.World(scene)
+    steps = []
+    assert world.run(30, after_step=lambda report: steps.append(report.step)).step == 30
+    hashes.add(world.state_hash())
+    assert len(hashes) == 1 and steps == list(range(1, 31))
+
+
+def test_scenes_keep_every_bit_as_json_dict_file_and_pickle(tmp_path, dtype):
+    scene = jfpx.Scene.named("polydisperse", spheres=50, seed=7, dtype=dtype)
+    scene.save(tmp_path / "scene.json")
+    for same in (jfpx.Scene.from_json(scene.to_json(), dtype=dtype),
+                 jfpx.Scene(scene.to_dict(), dtype=dtype),
+                 jfpx.Scene.load(tmp_path / "scene.json", dtype=dtype),
+                 pickle.loads(pickle.dumps(scene)), jfpx.World(scene).scene):
+        assert same == scene
+    assert scene != jfpx.Scene.named("polydisperse", spheres=50, seed=8, dtype=dtype)
+    assert scene.name == "polydisperse" and scene.dtype == dtype
+    assert len(scene) == len(jfpx.World(scene)) >= 50
+
+
+def test_named_scenes_are_listed():
+    names = jfpx.scene_names()
+    assert {"pile", "gas", "tower"} <= set(names)
+    assert all(names.values())
+
+
+def test_spheres_of_arrays_become_bodies(rng, dtype):
+    positions = (rng.random((20, 3)) * 50).astype(dtype)
+    radii = rng.uniform(0.1, 0.5, 20).astype(dtype)
+    velocities = rng.normal(size=(20, 3)).astype(dtype)
+    scene = jfpx.Scene(dtype=dtype)
+    scene.add_spheres(positions, radii, masses=2, velocities=velocities)
+    world = jfpx.World(scene)
+    np.testing.assert_array_equal(world.positions, positions)
+    np.testing.assert_array_equal(world.velocities, velocities)
+    assert all(world.mass(body) == 2 for body in world.bodies)
+    assert [b["shape"]["radius"] for b in scene.to_dict()["bodies"]] == pytest.approx(radii.tolist())
+
+
+def test_states_that_are_set_are_read_with_every_bit(rng, dtype):
+    world = jfpx.World({"bodies": [FREE] * 5}, dtype=dtype)
+    rotations = rng.normal(size=(5, 4))
+    rotations /= np.linalg.norm(rotations, axis=1, keepdims=True)
+    states = jfpx.States(*(rng.normal(size=(5, 3)).astype(dtype) if columns == 3 else
+                           rotations.astype(dtype) for columns in (3, 4, 3, 3)))
+    world.set_states(states)
+    got = world.states()
+    for a, b in (got[0], states[0]), (got[2], states[2]), (got[3], states[3]):
+        assert a.tobytes() == b.tobytes()
+    # set_state() normalises quaternions.
+    np.testing.assert_allclose(got.orientations, states.orientations, rtol=8 * np.finfo(dtype).eps)
+    body = world.bodies[3]
+    np.testing.assert_array_equal(world.state(body).position, states.positions[3])
+    world.set_state(body, jfpx.BodyState((1, 2, 3), velocity=(4, 5, 6)))
+    assert world.state(body) == ((1, 2, 3), (1, 0, 0, 0), (4, 5, 6), (0, 0, 0))
+    before = world.states()
+    states.velocities[4, 1] = np.nan
+    with pytest.raises(jfpx.InvalidArgument, match="velocity"):
+        world.set_states(states)
+    np.testing.assert_array_equal(world.positions, before.positions)
+
+
+def test_bodies_are_added_changed_and_removed():
+    world = jfpx.World({"bodies": [FLOOR]})
+    ball = world.add(BALL)
+    assert ball in world and len(world) == 2 and world.body_at(ball.index) == ball
+    world.set_mass(ball, 3)
+    world.set_friction(ball, 0.25)
+    world.set_restitution(ball, 0.75)
+    world.set_acceleration(ball, (0, -1, 0))
+    world.set_damping(ball, 0.5, 0.25)
+    world.set_filter(ball, 2, 6)
+    assert world.mass(ball) == 3 and world.friction(ball) == 0.25
+    assert world.restitution(ball) == 0.75 and world.acceleration(ball) == (0, -1, 0)
+    assert world.damping(ball) == (0.5, 0.25) and world.filter(ball) == (2, 6)
+    assert not world.sensor(ball)
+    other = world.add(BALL)
+    world.set_pair_ignored(ball, other, True)
+    assert world.pair_ignored(other, ball)
+    world.remove(ball)
+    assert ball not in world and world.bodies == [world.body_at(0), other]
+    with pytest.raises(jfpx.InvalidArgument):
+        world.state(ball)
+
+
+def test_filters_decide_which_bodies_touch():
+    world = jfpx.World({"bodies": [FREE, {**FREE, "position": [0, 2.9, 0]}]})
+    a, b = world.bodies
+    world.set_filter(a, 1, 2)
+    assert world.step().contacts == 0
+    world.set_filter(a, 1, 1)
+    assert world.step().contacts == 1
+    world.set_pair_ignored(a, b, True)
+    assert world.step().contacts == 0
+
+
+def test_events_begin_stay_and_end():
+    world = jfpx.World({"bodies": [{**FREE, "velocity": [0, 0, 1], "sensor": True,
+                                    "linear_damping": 1},
+                                   {**FREE, "position": [0, 2, 1.5]}],
+                        "dt": 0.1, "sleep": {"enabled": False}})
+    phases = []
+    for _ in range(40):
+        world.step()
+        events = world.contact_events()
+        phases += events.phase.tolist()
+        assert events.pairs[0].tolist() == [0] * len(events.phase)
+    assert phases[0] == jfpx.BEGIN and phases[-1] == jfpx.END
+    assert set(phases[1:-1]) == {jfpx.STAY}
+
+
+def test_rays_agree_with_the_formula_of_a_sphere(rng, dtype):
+    centres = (rng.random((40, 3)) * 10).astype(dtype)
+    scene = jfpx.Scene(dtype=dtype)
+    scene.add_spheres(centres, 0.5)
+    world = jfpx.World(scene)
+    origins = (rng.random((60, 3)) * 10 - [20, 0, 0]).astype(dtype)
+    directions = (centres[rng.integers(0, 40, 60)] - origins + rng.normal(size=(60, 3))).astype(dtype)
+    hits = world.cast_rays(origins, directions)
+    d = directions.astype(np.float64) / np.linalg.norm(directions.astype(np.float64), axis=1)[:, None]
+    to_centre = centres[None].astype(np.float64) - origins[:, None]
+    along = np.einsum("rnk,rk->rn", to_centre, d)
+    square = 0.25 - (np.sum(to_centre**2, axis=2) - along**2)
+    distance = np.where(square > 0, along - np.sqrt(np.maximum(square, 0)), np.inf)
+    decided = (np.abs(square) > 1e-3).all(axis=1)
+    assert decided.sum() > 20 and np.isfinite(distance[decided].min(axis=1)).any()
+    np.testing.assert_allclose(hits.distance[decided], distance[decided].min(axis=1), rtol=1e-3)
+    for ray in range(60):
+        one = world.cast_ray(origins[ray], directions[ray])
+        if one is None:
+            assert hits.bodies[ray] == -1
+            continue
+        assert one.body.index == hits.bodies[ray] and one.distance == hits.distance[ray]
+        through = world.cast_ray_through(origins[ray], directions[ray])
+        assert through[0] == one
+        others = world.cast_ray_through(origins[ray], directions[ray],
+                                        filter=lambda body: body != one.body)
+        assert others == through[1:]
+
+
+def test_overlaps_are_the_bodies_within_reach(rng, dtype):
+    centres = (rng.random((60, 3)) * 5).astype(dtype)
+    scene = jfpx.Scene(dtype=dtype)
+    scene.add_spheres(centres, 0.25)
+    world = jfpx.World(scene)
+    gap = np.linalg.norm(centres.astype(np.float64) - 2.5, axis=1) - 1.25
+    found = {body.index for body in world.overlapping_sphere((2.5, 2.5, 2.5), 1)}
+    assert set(np.flatnonzero(gap < -1e-4)) <= found <= set(np.flatnonzero(gap < 1e-4))
+    assert len(world.overlapping_box((2.5, 2.5, 2.5), (5, 5, 5))) == 60
+    assert world.overlapping_box((100, 2.5, 2.5), (5, 5, 5)) == []
+
+
+def test_a_function_is_a_force(dtype):
+    world = jfpx.World({"bodies": [FREE, {**FREE, "position": [5, 0, 0], "mass": 2}], "dt": 0.01},
+                       dtype=dtype)
+    seen = []
+
+    def spring(context):
+        states = context.states()
+        seen.append((context.time, context.dt, context.bodies, states.positions.dtype))
+        context.apply_forces(-4 * states.positions)
+        context.apply_torque(context.bodies[0], (0, 0, 1))
+        assert context.mass(context.bodies[1]) == 2 and context.awake(context.bodies[1])
+        assert context.state(context.bodies[1]).position[0] == states.positions[1, 0]
+
+    number = world.add_force(spring)
+    assert world.forces == [number]
+    world.step()
+    assert seen == [(0, pytest.approx(0.01), world.bodies, dtype)]
+    assert world.velocities[1, 0] == pytest.approx(-4 * 5 / 2 * 0.01, rel=1e-3)
+    assert world.state(world.bodies[0]).angular_velocity[2] > 0
+    world.remove_force(number)
+    world.step()
+    assert len(seen) == 1 and world.forces == []
+
+
+def test_an_exception_of_a_force_undoes_the_step():
+    world = jfpx.World({"bodies": [BALL]})
+    world.step()
+    before = world.state_hash()
+
+    def force(context):
+        raise LookupError("no data")
+
+    number = world.add_force(force)
+    with pytest.raises(LookupError, match="no data"):
+        world.step()
+    with pytest.raises(LookupError, match="no data"):
+        world.run(5)
+    assert world.state_hash() == before
+    world.remove_force(number)
+    assert world.step().step == 2
+
+
+def test_a_context_is_invalid_after_the_call_of_its_force():
+    world = jfpx.World({"bodies": [BALL]})
+    kept = []
+    world.add_force(kept.append)
+    world.step()
+    with pytest.raises(jfpx.InvalidArgument, match="valid only while"):
+        kept[0].states()
+
+
+def test_a_force_must_not_use_its_world():
+    world = jfpx.World({"bodies": [BALL]})
+    world.add_force(lambda context: world.states())
+    with pytest.raises(jfpx.ConcurrentUse):
+        world.step()
+
+
+@pytest.mark.parametrize("force, velocity", [
+    (jfpx.Gravity((0, 0, 2)), (0, 0, 0.02)),
+    (jfpx.Drag(linear=0.5, wind=(4, 0, 0)), (0.02, 0, 0)),
+    (jfpx.Spring(jfpx.Attachment(jfpx.BodyId(0, 0)), jfpx.Attachment(point=(0, 5, 0)), 2,
+                 rest_length=1), (0, 0.04, 0)),
+    (jfpx.Bungee(jfpx.Attachment(jfpx.BodyId(0, 0)), jfpx.Attachment(point=(0, 5, 0)), 2,
+                 rest_length=4), (0, 0, 0)),
+    (jfpx.Buoyancy(offset=10, density=6 / np.pi, gravity=3), (0, 0.03, 0)),
+    (jfpx.Explosion(centre=(0, -3, 0), start=-1, peak_force=0), (0, 0, 0)),
+])
+def test_forces_of_the_library_act(force, velocity):
+    world = jfpx.World({"bodies": [FREE], "dt": 0.01, "sleep": {"enabled": False}}, dtype="float64")
+    assert world.bodies == [(0, 0)]
+    world.add_force(force)
+    world.step()
+    np.testing.assert_allclose(world.velocities[0], velocity, rtol=1e-2, atol=1e-9)
+
+
+def test_forces_of_one_step_act_once():
+    world = jfpx.World({"bodies": [FREE], "dt": 0.01})
+    ball, = world.bodies
+    world.apply_force(ball, (1, 0, 0))
+    world.apply_force(ball, (0, 1, 0), point=(0, 2, 0.25))
+    world.apply_torque(ball, (0, 0, 1))
+    world.step()
+    first = world.states()
+    assert first.velocities[0] == pytest.approx([0.01, 0.01, 0])
+    assert first.angular_velocities[0, 2] > 0 and first.angular_velocities[0, 0] < 0
+    world.step()
+    np.testing.assert_array_equal(world.velocities, first.velocities)
+
+
+def test_a_recording_has_the_states_of_the_run(tmp_path, dtype):
+    path = tmp_path / "run.rec"
+    world = jfpx.World(jfpx.Scene.named("pile", spheres=60, dtype=dtype))
+    expected = []
+    with jfpx.RecordingWriter(path, world) as writer:
+        for _ in range(5):
+            world.step()
+            writer.append()
+            expected.append(world.states())
+        assert not path.exists()
+    recording = jfpx.Recording(path)
+    assert len(recording) == 5 and recording.dtype == dtype and recording.engine == "native"
+    assert recording.scene == world.scene
+    for step, states in enumerate(expected, 1):
+        for a, b in zip(recording.states(step), states):
+            assert a.tobytes() == b.tobytes()
+    with pytest.raises(jfpx.InvalidArgument, match="step is 6"):
+        recording.states(6)
+
+
+def test_a_recording_of_a_failed_run_leaves_no_file(tmp_path):
+    world = jfpx.World({"bodies": [BALL]})
+    with pytest.raises(LookupError):
+        with jfpx.RecordingWriter(tmp_path / "run.rec", world) as writer:
+            writer.append()
+            raise LookupError
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(jfpx.Closed):
+        writer.append()
+
+
+def test_a_body_that_leaves_the_finite_numbers_ends_a_run():
+    world = jfpx.World({"bodies": [{**FREE, "velocity": [1e38, 0, 0]}], "dt": 1e6,
+                        "solver": "worst_first"})
+    report = world.run(10)
+    assert report.non_finite and report.non_finite_body == (0, 0) and report.step == 0
+
+
+def test_a_closed_world_is_a_named_exception():
+    with jfpx.World({"bodies": [BALL]}) as world:
+        world.step()
+    for call in (world.step, world.states, world.contacts, world.state_hash, lambda: world.run(1),
+                 lambda: world.cast_ray((0, 0, 0), (0, 0, 1)), lambda: world.add(BALL)):
+        with pytest.raises(jfpx.Closed, match="the world is closed"):
+            call()
+    world.close()
+
+
+def test_use_of_a_world_from_two_threads_is_a_named_exception():
+    world = jfpx.World({"bodies": [BALL]})
+    inside, leave = threading.Event(), threading.Event()
+
+    def force(context):
+        inside.set()
+        leave.wait(60)
+
+    world.add_force(force)
+    thread = threading.Thread(target=world.step)
+    thread.start()
+    assert inside.wait(60)
+    for call in (world.step, world.states, world.close):
+        with pytest.raises(jfpx.ConcurrentUse, match="the world is in use"):
+            call()
+    leave.set()
+    thread.join()
+    assert world.step().step == 2
+
+
+def test_other_threads_run_during_a_step():
+    world = jfpx.World(jfpx.Scene.named("pile", spheres=4000))
+    ticks = []
+    stop = threading.Event()
+
+    def tick():
+        while not stop.is_set():
+            ticks.append(time.monotonic())
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    ran = False
+    for _ in range(50):  # the other thread may be late on a busy machine
+        begin = time.monotonic()
+        world.step()
+        end = time.monotonic()
+        ran = ran or any(begin < t < end for t in ticks[-100:])
+    stop.set()
+    thread.join()
+    assert ran
+
+
+def test_ctrl_c_ends_a_run_between_two_steps():
+    world = jfpx.World(jfpx.Scene.named("pile", spheres=200))
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        world.run(10**9)
+    timer.join()
+    step = round(world.time / world.scene.dt)
+    assert world.step().step == step + 1 > 1
+
+
+def test_a_world_and_its_forces_are_collected():
+    world = jfpx.World({"bodies": [BALL]})
+    world.add_force(lambda context: world.positions)
+    reference = weakref.ref(world)
+    del world
+    gc.collect()
+    assert reference() is None
+
+
+@pytest.mark.parametrize("call, error, message", [
+    (lambda w: jfpx.Scene({"bodys": []}), jfpx.InvalidScene, "bodys"),
+    (lambda w: jfpx.Scene({"bodies": [{**BALL, "mass": -1}]}), jfpx.InvalidScene, "mass"),
+    (lambda w: jfpx.Scene({"bodies": [{**BALL, "mass": object()}]}), jfpx.InvalidScene, "JSON"),
+    (lambda w: jfpx.Scene({"dt": float("nan")}), jfpx.InvalidScene, "JSON form"),
+    (lambda w: jfpx.Scene(dtype="int32"), jfpx.InvalidArgument, "dtype is 'int32'"),
+    (lambda w: jfpx.Scene.from_json("{"), jfpx.InvalidScene, "line 1"),
+    (lambda w: jfpx.Scene.load("/nowhere/scene.json"), jfpx.FileError, "/nowhere/scene.json"),
+    (lambda w: jfpx.Scene().save("/nowhere/scene.json"), jfpx.FileError, "/nowhere"),
+    (lambda w: jfpx.Scene.named("heap"), jfpx.InvalidArgument, "heap"),
+    (lambda w: jfpx.Scene.named("pile", spheres=-1), jfpx.InvalidArgument, "spheres is -1"),
+    (lambda w: jfpx.Scene().add_spheres(np.zeros((1, 3), np.float32), -1), jfpx.InvalidScene,
+     "radius"),
+    (lambda w: jfpx.Scene().add_spheres(np.zeros((1, 3)), 1), jfpx.InvalidArgument, "float64"),
+    (lambda w: jfpx.Scene().add_spheres(np.zeros((3, 3), np.float32), 1,
+                                        velocities=np.zeros((2, 3), np.float32)),
+     jfpx.InvalidArgument, "velocities has 2 rows"),
+    (lambda w: jfpx.World(3), jfpx.InvalidArgument, "scene is int"),
+    (lambda w: jfpx.World(w.scene, dtype="float64"), jfpx.InvalidArgument, "dtype is float64"),
+    (lambda w: jfpx.World("pile", backend="gpu"), jfpx.InvalidArgument, 'backend is "gpu"'),
+    (lambda w: jfpx.World("pile", threads=1000), jfpx.InvalidArgument, "threads is 1000"),
+    (lambda w: w.run(0), jfpx.InvalidArgument, "steps is 0"),
+    (lambda w: w.body_at(7), jfpx.InvalidArgument, "7"),
+    (lambda w: w.remove(jfpx.BodyId(7, 0)), jfpx.InvalidArgument, "7"),
+    (lambda w: w.set_mass(w.bodies[0], -1), jfpx.InvalidArgument, "mass"),
+    (lambda w: w.set_friction(w.bodies[0], "high"), jfpx.InvalidArgument, "friction is 'high'"),
+    (lambda w: w.set_filter(w.bodies[0], -1, 0), jfpx.InvalidArgument, "category is -1"),
+    (lambda w: w.apply_force(w.bodies[0], (1, 2)), jfpx.InvalidArgument, "force has 2 numbers"),
+    (lambda w: w.apply_force(w.bodies[0], 1), jfpx.InvalidArgument, "force is 1"),
+    (lambda w: w.apply_force(w.bodies[0], (float("nan"), 0, 0)), jfpx.InvalidArgument, "force"),
+    (lambda w: w.add_force(3), jfpx.InvalidArgument, "force is int"),
+    (lambda w: w.add_force(jfpx.Drag(linear=-1)), jfpx.InvalidArgument, "linear"),
+    (lambda w: w.remove_force(99), jfpx.InvalidArgument, "99"),
+    (lambda w: w.cast_ray((0, 0, 0), (0, 0, 0)), jfpx.InvalidArgument, "direction"),
+    (lambda w: w.cast_ray((0, 0, 0), (0, 0, 1), -1), jfpx.InvalidArgument, "distance"),
+    (lambda w: w.cast_rays(np.zeros((2, 3), np.float32), np.zeros((2, 3), np.float32)),
+     jfpx.InvalidArgument, "ray 0: .*direction"),
+    (lambda w: w.cast_rays(np.zeros((2, 3), np.float32), np.zeros((1, 3), np.float32)),
+     jfpx.InvalidArgument, "directions has 1 rows"),
+    (lambda w: w.overlapping_sphere((0, 0, 0), -1), jfpx.InvalidArgument, "radius"),
+    (lambda w: w.set_states(w.states()._replace(positions=np.zeros((9, 3), np.float32))),
+     jfpx.InvalidArgument, "positions has 9 rows"),
+    (lambda w: w.add({**BALL, "mass": -1}), jfpx.InvalidScene, "mass"),
+    (lambda w: w.add_scene(jfpx.Scene(dtype="float64")), jfpx.InvalidArgument, "float64"),
+    (lambda w: jfpx.Recording("/nowhere/run.rec"), jfpx.FileError, "/nowhere/run.rec"),
+    (lambda w: jfpx.RecordingWriter("/nowhere/run.rec", w), jfpx.FileError, "/nowhere/run.rec"),
+])
+def test_bad_input_is_a_named_exception_and_changes_nothing(call, error, message):
+    world = jfpx.World({"bodies": [BALL, FLOOR]})
+    before = world.state_hash()
+    with pytest.raises(error, match=message):
+        call(world)
+    assert world.state_hash() == before and len(world) == 2 and world.forces == []
+
+
+def test_python_m_jfpx_runs_the_command(tmp_path):
+    def run(path):
+        return subprocess.run([sys.executable, "-m", "jfpx", "devices"], capture_output=True,
+                              text=True, env={**os.environ, "PATH": path})
+
+    folder = os.path.dirname(sys.executable)
+    if os.path.exists(os.path.join(folder, "jfpx")):
+        pytest.skip("the command is beside Python")
+    missing = run("")
+    assert missing.returncode == 3 and "not installed" in missing.stderr
+    command = tmp_path / "jfpx"
+    command.write_text("#!/bin/sh\necho \"got $1\"\n")
+    command.chmod(0o755)
+    assert run(f"{tmp_path}:/bin").stdout == "got devices\n"
+
+
+def test_the_code_of_the_guide_runs(tmp_path, monkeypatch):
+    guide = (pathlib.Path(__file__).parents[2] / "docs/python.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", guide, re.DOTALL)
+    assert len(blocks) >= 5
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for block in blocks:
+        exec(block, names)
+    assert names["pairs"].shape[1] == names["size"] == names["contacts"].pairs.shape[1] > 0
+    assert names["report"].step == 120 and (tmp_path / "run.rec").exists()

@@ -1,0 +1,275 @@
+/// Searches on arrays in device memory against the functions on the host.
+#include <jfpx/contact_list.hpp>
+#include <jfpx/cuda/array_collider.hpp>
+#include <jfpx/error.hpp>
+
+#include "tests/sphere_collider/cuda/cuda_fixture.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+namespace {
+
+/// An array in device memory.
+template <class T>
+class DeviceArray {
+ public:
+  explicit DeviceArray(std::size_t n) : size_(n) {
+    void* data = nullptr;
+    JFPX_CUDA_TRY(cudaMalloc(&data, (n + 1) * sizeof(T)));
+    data_ = static_cast<T*>(data);
+    JFPX_CUDA_TRY(cudaMemset(data, 0xff, (n + 1) * sizeof(T)));
+  }
+  explicit DeviceArray(const std::vector<T>& from) : DeviceArray(from.size()) {
+    JFPX_CUDA_TRY(cudaMemcpy(data_, from.data(), size_ * sizeof(T), cudaMemcpyHostToDevice));
+  }
+  ~DeviceArray() { static_cast<void>(cudaFree(data_)); }
+  DeviceArray(const DeviceArray&) = delete;
+  DeviceArray& operator=(const DeviceArray&) = delete;
+  T* data() const { return data_; }
+  std::vector<T> download() const {
+    std::vector<T> to(size_);
+    JFPX_CUDA_TRY(cudaDeviceSynchronize());
+    JFPX_CUDA_TRY(cudaMemcpy(to.data(), data_, size_ * sizeof(T), cudaMemcpyDeviceToHost));
+    return to;
+  }
+
+ private:
+  T* data_ = nullptr;
+  std::size_t size_;
+};
+
+/// Spheres as arrays with five values between two positions and two between two radii.
+class DeviceSpheres {
+ public:
+  explicit DeviceSpheres(const Spheres& from)
+      : positions_(positions_of(from)), radii_(radii_of(from)), count_(from.size()) {}
+  SphereArrays arrays() const {
+    return {.count = count_,
+            .positions = positions_.data(),
+            .row_stride = 5,
+            .radii = radii_.data(),
+            .radius_stride = 2};
+  }
+
+ private:
+  static std::vector<Real> positions_of(const Spheres& from) {
+    std::vector<Real> to(5 * from.size());
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      for (int k = 0; k < 3; ++k) to[5 * i + static_cast<std::size_t>(k)] = from[i].centre[k];
+    }
+    return to;
+  }
+  static std::vector<Real> radii_of(const Spheres& from) {
+    std::vector<Real> to(2 * from.size());
+    for (std::size_t i = 0; i < from.size(); ++i) to[2 * i] = from[i].radius;
+    return to;
+  }
+
+  DeviceArray<Real> positions_, radii_;
+  std::size_t count_;
+};
+
+/// The result of the last search, of `n` contacts, from its four arrays.
+template <class Index>
+std::vector<SphereContact> contacts_of(ArrayCollider& collider, std::size_t n, Stream stream) {
+  const DeviceArray<Index> a(n), b(n);
+  const DeviceArray<Real> normals(3 * n), distances(n);
+  collider.write_pairs(a.data(), b.data(), n, stream);
+  collider.write_contacts(normals.data(), distances.data(), n, stream);
+  const auto ha = a.download(), hb = b.download();
+  const auto hn = normals.download(), hd = distances.download();
+  std::vector<SphereContact> contacts(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    contacts[i] = {.a = static_cast<SphereIndex>(ha[i]),
+                   .b = static_cast<SphereIndex>(hb[i]),
+                   .normal = {hn[3 * i], hn[3 * i + 1], hn[3 * i + 2]},
+                   .distance = hd[i]};
+  }
+  return contacts;
+}
+
+std::vector<SpherePair> pairs_of(ArrayCollider& collider, std::size_t n, Stream stream) {
+  const DeviceArray<std::int64_t> a(n), b(n);
+  collider.write_pairs(a.data(), b.data(), n, stream);
+  const auto ha = a.download(), hb = b.download();
+  std::vector<SpherePair> pairs(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    pairs[i] = {static_cast<SphereIndex>(ha[i]), static_cast<SphereIndex>(hb[i])};
+  }
+  return pairs;
+}
+
+std::vector<SpherePair> pairs_of(ContactSpan contacts) {
+  std::vector<SpherePair> pairs;
+  for (const SphereContact& c : contacts) pairs.push_back({c.a, c.b});
+  return pairs;
+}
+
+std::vector<std::int64_t> signed_offsets(ContactSpan contacts, std::size_t rows) {
+  const auto offsets = row_offsets(contacts, rows);
+  return {offsets.begin(), offsets.end()};
+}
+
+TEST_F(Cuda, FewArraysHaveTheContactsOfTheHost) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  for (const std::size_t n : std::initializer_list<std::size_t>{0, 1, 2, 300, 6000}) {
+    const Spheres spheres = make_gas(n, Real(0.5), 6, random);
+    const DeviceSpheres arrays(spheres);
+    const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+    const ContactSpan found = cpu->find_contacts(spheres);
+    const std::vector<SphereContact> half(found.begin(), found.end());
+    for (const bool both : {false, true}) {
+      const auto expected = both ? in_both_orders(half, n) : half;
+      ASSERT_EQ(collider.find(arrays.arrays(), ArrayResult::contacts, both, stream.get()),
+                expected.size());
+      EXPECT_TRUE(
+          same_bits(contacts_of<std::int32_t>(collider, expected.size(), stream.get()), expected))
+          << "N = " << n << ", " << seed_note();
+      EXPECT_TRUE(
+          same_bits(contacts_of<std::int64_t>(collider, expected.size(), stream.get()), expected));
+      const DeviceArray<std::int64_t> offsets(n + 1);
+      collider.write_offsets(offsets.data(), stream.get());
+      EXPECT_EQ(offsets.download(), signed_offsets(expected, n));
+
+      ASSERT_EQ(collider.find(arrays.arrays(), ArrayResult::pairs, both, stream.get()),
+                expected.size());
+      EXPECT_EQ(pairs_of(collider, expected.size(), stream.get()), pairs_of(expected));
+      collider.write_offsets(offsets.data(), stream.get());
+      EXPECT_EQ(offsets.download(), signed_offsets(expected, n));
+    }
+  }
+}
+
+TEST_F(Cuda, FewArraysOfTwoSetsHaveTheContactsOfTheHost) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  for (const auto& [queries, points] : {std::pair{0, 7}, {7, 0}, {1, 900}, {2500, 3000}}) {
+    const Spheres all = make_gas(static_cast<std::size_t>(queries + points), Real(0.5), 6, random);
+    const Spheres first(all.begin(), all.begin() + queries),
+        second(all.begin() + queries, all.end());
+    const auto expected = find_contacts_between(*cpu, first, second);
+    const DeviceSpheres d_first(first), d_second(second);
+    for (const ArrayResult result : {ArrayResult::contacts, ArrayResult::pairs}) {
+      ASSERT_EQ(collider.find_between(d_first.arrays(), d_second.arrays(), result, stream.get()),
+                expected.size());
+      EXPECT_EQ(pairs_of(collider, expected.size(), stream.get()), pairs_of(expected))
+          << seed_note();
+      const DeviceArray<std::int64_t> offsets(first.size() + 1);
+      collider.write_offsets(offsets.data(), stream.get());
+      EXPECT_EQ(offsets.download(), signed_offsets(expected, first.size()));
+    }
+    ASSERT_EQ(collider.find_between(d_first.arrays(), d_second.arrays(), ArrayResult::contacts,
+                                    stream.get()),
+              expected.size());
+    EXPECT_TRUE(
+        same_bits(contacts_of<std::int32_t>(collider, expected.size(), stream.get()), expected));
+  }
+}
+
+TEST_F(Cuda, FewArraysOfOneRadiusAndAnyStrides) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  const std::size_t n = 500;
+  const Spheres spheres = make_gas(n, Real(0.5), 6, random);
+  std::vector<Real> columns(3 * n);  // x of all, y of all, z of all
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      columns[k * n + i] = spheres[i].centre[static_cast<int>(k)];
+    }
+  }
+  const DeviceArray<Real> positions(columns);
+  ArrayCollider collider;
+  const auto expected = brute_force(spheres);
+  ASSERT_EQ(collider.find({.count = n,
+                           .positions = positions.data(),
+                           .row_stride = 1,
+                           .column_stride = static_cast<std::ptrdiff_t>(n),
+                           .radius = Real(0.5)},
+                          ArrayResult::contacts, false, stream.get()),
+            expected.size());
+  EXPECT_TRUE(
+      same_bits(contacts_of<std::int32_t>(collider, expected.size(), stream.get()), expected))
+      << seed_note();
+}
+
+TEST_F(Cuda, ArraysWithABadSphereNameItAndTheColliderStaysUsable) {
+  const OwnedStream stream(0);
+  Spheres spheres(50, {{}, 1});
+  spheres[31].radius = -2;
+  spheres[40].centre.y = std::numeric_limits<Real>::quiet_NaN();
+  ArrayCollider collider;
+  const DeviceSpheres bad(spheres);
+  try {
+    collider.find(bad.arrays(), ArrayResult::pairs, false, stream.get());
+    FAIL() << "InvalidArgument was not thrown";
+  } catch (const InvalidArgument& e) {
+    EXPECT_STREQ(e.what(), "sphere 31: radius is -2; it must be finite and > 0");
+  }
+  const DeviceSpheres good(Spheres(50, {{}, 1}));
+  EXPECT_EQ(collider.find(good.arrays(), ArrayResult::pairs, false, stream.get()), 50u * 49 / 2);
+}
+
+TEST_F(Cuda, ArraysCanBeSearchedInAGraph) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  const std::size_t n = 3000;
+  const Spheres spheres = make_gas(n, Real(0.5), 6, random);
+  const auto expected = brute_force(spheres);
+  const DeviceSpheres arrays(spheres);
+  ArrayCollider collider;
+  const std::size_t capacity = expected.size() + 10;
+  collider.reserve(n, capacity);
+  const DeviceArray<std::int32_t> a(capacity), b(capacity);
+  const DeviceArray<std::int64_t> count(2);
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t executable = nullptr;
+  JFPX_CUDA_TRY(cudaStreamBeginCapture(stream.get(), cudaStreamCaptureModeThreadLocal));
+  collider.enqueue(arrays.arrays(), ArrayResult::pairs, stream.get());
+  collider.write_pairs(a.data(), b.data(), capacity, stream.get());
+  collider.write_count(count.data(), stream.get());
+  JFPX_CUDA_TRY(cudaStreamEndCapture(stream.get(), &graph));
+  JFPX_CUDA_TRY(cudaGraphInstantiate(&executable, graph, 0));
+  for (int repeat = 0; repeat < 3; ++repeat) {
+    JFPX_CUDA_TRY(cudaGraphLaunch(executable, stream.get()));
+  }
+  const auto size = static_cast<std::int64_t>(expected.size());
+  EXPECT_EQ(count.download(), (std::vector<std::int64_t>{size, 1}));
+  const auto ha = a.download(), hb = b.download();
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    ASSERT_EQ(static_cast<SphereIndex>(ha[i]), expected[i].a) << i << ", " << seed_note();
+    ASSERT_EQ(static_cast<SphereIndex>(hb[i]), expected[i].b) << i;
+  }
+  EXPECT_EQ(ha[expected.size()], -1);  // nothing is written beyond
+  JFPX_CUDA_TRY(cudaGraphExecDestroy(executable));
+  JFPX_CUDA_TRY(cudaGraphDestroy(graph));
+}
+
+TEST_F(Cuda, ArraysBeyondTheReservationHaveTheCountAlone) {
+  const OwnedStream stream(0);
+  const Spheres spheres(100, {{}, 1});
+  const DeviceSpheres arrays(spheres);
+  ArrayCollider collider;
+  collider.reserve(100, 10);
+  const DeviceArray<std::int32_t> a(10), b(10);
+  const DeviceArray<std::int64_t> count(2);
+  collider.enqueue(arrays.arrays(), ArrayResult::pairs, stream.get());
+  collider.write_pairs(a.data(), b.data(), 10, stream.get());
+  collider.write_count(count.data(), stream.get());
+  EXPECT_EQ(count.download(), (std::vector<std::int64_t>{4950, 0}));
+  EXPECT_EQ(a.download(), std::vector<std::int32_t>(10, -1));
+  ArrayCollider small;
+  small.reserve(100, 10);
+  EXPECT_THROW(small.enqueue(DeviceSpheres(Spheres(1000, {{}, 1})).arrays(), ArrayResult::pairs,
+                             stream.get()),
+               InvalidArgument);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,185 @@
+/// Contacts in a periodic cell against a loop over all pairs and their 27 images.
+#include <jfpx/error.hpp>
+#include <jfpx/periodic.hpp>
+
+#include "src/collide/sphere_pair.hpp"
+#include "tests/support/sphere_fixtures.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+namespace {
+
+using Spheres = std::vector<SphereInstance>;
+
+/// The nearest images in long double.
+struct Expected {
+  std::pair<SphereIndex, SphereIndex> pair;
+  long double gap;  ///< distance of the surfaces
+  std::array<long double, 3> to_a;
+  ImageShift shift;
+};
+
+std::vector<Expected> nearest_images(const Spheres& spheres, const PeriodicCell& cell) {
+  std::vector<Expected> all;
+  for (SphereIndex a = 0; a < spheres.size(); ++a) {
+    for (SphereIndex b = a + 1; b < spheres.size(); ++b) {
+      Expected e{{a, b}, 0, {}, {}};
+      long double square = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const int axis = static_cast<int>(k);
+        const long double length = cell.lengths[axis];
+        long double d = static_cast<long double>(spheres[a].centre[axis]) -
+                        static_cast<long double>(spheres[b].centre[axis]);
+        if (cell.repeats[k]) {
+          const long double cells = std::round(d / length);
+          e.shift[k] = static_cast<std::int32_t>(cells);
+          d -= cells * length;
+        }
+        e.to_a[k] = d;
+        square += d * d;
+      }
+      e.gap = std::sqrt(square) - spheres[a].radius - spheres[b].radius;
+      all.push_back(e);
+    }
+  }
+  return all;
+}
+
+/// Spheres in a cell of about `side`, which some of them have left by up to three lengths.
+Spheres gas_in(const PeriodicCell& cell, std::size_t n, Real largest_radius, Random& random) {
+  Spheres spheres(n);
+  for (SphereInstance& s : spheres) {
+    for (int k = 0; k < 3; ++k) {
+      const Real cells = random.below(4) == 0 ? static_cast<Real>(random.below(7)) - 3 : 0;
+      s.centre[k] = (random.uniform(0, 1) + cells) * cell.lengths[k];
+    }
+    s.radius = random.uniform(largest_radius / 3, largest_radius);
+  }
+  return spheres;
+}
+
+TEST(Periodic, ContactsAreThoseOfTheNearestImages) {
+  Random random(base_seed());
+  const auto collider = make_sphere_collider();
+  for (const std::array<bool, 3> repeats :
+       {std::array{true, true, true}, {true, false, true}, {false, false, true}}) {
+    const PeriodicCell cell{{5, 7, Real(4.5)}, repeats};
+    const Spheres spheres = gas_in(cell, 300, Real(1.1), random);
+    const auto found = find_periodic_contacts(*collider, spheres, cell);
+    std::map<std::pair<SphereIndex, SphereIndex>, PeriodicContact> by_pair;
+    for (const PeriodicContact& c : found) by_pair[{c.contact.a, c.contact.b}] = c;
+    ASSERT_EQ(by_pair.size(), found.size()) << seed_note();
+    ASSERT_TRUE(std::is_sorted(found.begin(), found.end(), [](const auto& p, const auto& q) {
+      return std::pair(p.contact.a, p.contact.b) < std::pair(q.contact.a, q.contact.b);
+    }));
+    const long double error = 64 * static_cast<long double>(kEpsilon) * 7;
+    std::size_t shifted = 0;
+    for (const Expected& e : nearest_images(spheres, cell)) {
+      if (std::abs(e.gap) <= error) continue;  // rounding decides
+      const auto at = by_pair.find(e.pair);
+      ASSERT_EQ(at != by_pair.end(), e.gap < 0)
+          << e.pair.first << ", " << e.pair.second << ", " << seed_note();
+      if (at == by_pair.end()) continue;
+      const PeriodicContact& c = at->second;
+      EXPECT_EQ(c.shift, e.shift) << seed_note();
+      EXPECT_NEAR(static_cast<double>(c.contact.distance), static_cast<double>(e.gap),
+                  static_cast<double>(error));
+      shifted += c.shift != ImageShift{} ? 1 : 0;
+    }
+    EXPECT_GT(shifted, 100u);
+  }
+}
+
+TEST(Periodic, ACellThatDoesNotRepeatHasTheContactsOfTheCollider) {
+  Random random(base_seed());
+  const auto collider = make_sphere_collider();
+  const Spheres spheres = make_gas(500, Real(0.5), 6, random);
+  const auto found = find_periodic_contacts(*collider, spheres, {{}, {false, false, false}});
+  std::vector<SphereContact> plain;
+  for (const PeriodicContact& c : found) {
+    EXPECT_EQ(c.shift, ImageShift{});
+    plain.push_back(c.contact);
+  }
+  EXPECT_TRUE(same_bits(plain, brute_force(spheres))) << seed_note();
+}
+
+TEST(Periodic, AlgorithmsAndThreadsHaveTheSameBits) {
+  Random random(base_seed());
+  const PeriodicCell cell{{9, 9, 9}};
+  const Spheres spheres = gas_in(cell, 2000, Real(0.4), random);
+  const auto expected = find_periodic_contacts(*make_sphere_collider(), spheres, cell);
+  for (const SphereAlgorithm algorithm :
+       {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+    const auto collider =
+        make_sphere_collider({.backend = Backend::cpu, .algorithm = algorithm, .threads = 3});
+    EXPECT_EQ(find_periodic_contacts(*collider, spheres, cell), expected) << seed_note();
+  }
+  for (const BackendStatus& status : available_backends()) {
+    if (!status.usable) continue;
+    const auto collider = make_sphere_collider({.backend = status.backend});
+    EXPECT_EQ(find_periodic_contacts(*collider, spheres, cell), expected) << seed_note();
+  }
+}
+
+TEST(Periodic, APairHalfALengthApartIsListedOnceWithTheLowerShift) {
+  const Spheres spheres{{{0, 0, 0}, 1}, {{2, 0, 0}, 1}};
+  const auto found = find_periodic_contacts(*make_sphere_collider(), spheres, {{4, 100, 100}});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].shift, (ImageShift{-1, 0, 0}));
+  EXPECT_EQ(found[0].contact.distance, 0);
+  EXPECT_EQ(found[0].contact.normal, (Vec3{1, 0, 0}));
+}
+
+TEST(Periodic, InBothOrdersHasTheOppositeShifts) {
+  Random random(base_seed());
+  const PeriodicCell cell{{5, 5, 5}};
+  const Spheres spheres = gas_in(cell, 200, 1, random);
+  const auto half = find_periodic_contacts(*make_sphere_collider(), spheres, cell);
+  const auto both = in_both_orders(half, spheres.size());
+  ASSERT_EQ(both.size(), 2 * half.size());
+  std::map<std::pair<SphereIndex, SphereIndex>, PeriodicContact> by_pair;
+  for (const PeriodicContact& c : both) by_pair[{c.contact.a, c.contact.b}] = c;
+  ASSERT_EQ(by_pair.size(), both.size());
+  for (const PeriodicContact& c : half) {
+    EXPECT_EQ((by_pair[{c.contact.a, c.contact.b}]), c);
+    const PeriodicContact& other = by_pair[{c.contact.b, c.contact.a}];
+    EXPECT_EQ(other.contact.normal, -c.contact.normal);
+    EXPECT_EQ(other.contact.distance, c.contact.distance);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(other.shift[k], -c.shift[k]);
+  }
+}
+
+TEST(Periodic, BadCellsAndCentresAreNamed) {
+  const auto collider = make_sphere_collider();
+  const auto message = [&](const PeriodicCell& cell, const SphereInstance& sphere) {
+    try {
+      find_periodic_contacts(*collider, std::vector{sphere}, cell);
+    } catch (const InvalidArgument& e) {
+      return std::string(e.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  using testing::HasSubstr;
+  const Real inf = std::numeric_limits<Real>::infinity();
+  EXPECT_THAT(message({{0, 9, 9}}, {{}, 1}), HasSubstr("periodic length x is 0"));
+  EXPECT_THAT(message({{9, -1, 9}}, {{}, 1}), HasSubstr("periodic length y is -1"));
+  EXPECT_THAT(message({{9, 9, inf}}, {{}, 1}), HasSubstr("periodic length z is inf"));
+  EXPECT_THAT(
+      message({{9, Real(3.5), 9}}, {{}, 1}),
+      HasSubstr("periodic length y is 3.5; it must be at least twice the cutoff, which is 2"));
+  EXPECT_THAT(message({{9, 9, 9}}, {{Real(1e8), 0, 0}, 1}), HasSubstr("within 2^20"));
+  EXPECT_THAT(message({{9, 9, 9}}, {{inf, 0, 0}, 1}), HasSubstr("centre.x is inf"));
+  EXPECT_THAT(message({{9, 9, 9}}, {{0, 0, 0}, 0}), HasSubstr("radius is 0"));
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx
