@@ -37,8 +37,9 @@ enum class SolverFallback : std::uint8_t {
   constraints,    ///< a constraint of a class that Bullet does not define
   not_finite,     ///< a value is infinite or NaN; Bullet repeats the group to produce its NaNs
   out_of_memory,  ///< memory for the group could not be allocated
+  thread_safe,  ///< Bullet has BT_THREADSAFE, and its solver treats a body of the group differently
 };
-inline constexpr std::size_t kSolverFallbacks = 7;
+inline constexpr std::size_t kSolverFallbacks = 8;
 
 /// Returns a short text for a table, for example "small group".
 JFPX_API std::string_view to_string(SolverFallback fallback) noexcept;

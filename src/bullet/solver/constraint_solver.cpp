@@ -6,6 +6,7 @@
 #include "src/bullet/solver/constraint_solver_test_access.hpp"
 #include "src/bullet/solver/joint_rows.hpp"
 #include "src/bullet/solver/row_inputs.hpp"
+#include "src/bullet/thread_safe_library.hpp"
 
 #include <LinearMath/btQuickprof.h>
 
@@ -22,6 +23,7 @@ ConstraintSolver::Impl::Impl(ConstraintSolver& owner, const ConstraintSolverOpti
     : self(owner),
       own_steps(steps()),
       own_split(owner.m_resolveSplitPenetrationImpulse),
+      thread_safe_library(is_thread_safe_library()),
       solver(options.threads, options.simd),
       minimum_batch(options.minimum_batch) {
   device.emplace(options.backend, cuda_group_solver_maker(options.device), solver.pool().threads());
@@ -145,7 +147,8 @@ btScalar ConstraintSolver::solveGroup(btCollisionObject** bodies, int body_count
   impl_->info = &info;
   impl_->bodies = {bodies, static_cast<std::size_t>(body_count)};
   impl_->joints = {constraints, static_cast<std::size_t>(constraint_count)};
-  std::optional<SolverFallback> reason = impl_->fallback_reason(manifold_count);
+  std::optional<SolverFallback> reason =
+      impl_->fallback_reason({manifolds, static_cast<std::size_t>(manifold_count)});
   if (!reason) reason = impl_->solve({manifolds, static_cast<std::size_t>(manifold_count)});
   if (!reason) return 0;
   ++impl_->stats.fallbacks[static_cast<std::size_t>(*reason)];
@@ -165,8 +168,8 @@ void ConstraintSolver::reset_stats() {
 
 std::string_view to_string(SolverFallback fallback) noexcept {
   constexpr std::string_view kTexts[kSolverFallbacks] = {
-      "small group",           "step overridden", "solver mode",  "row solver replaced",
-      "class of a constraint", "not finite",      "out of memory"};
+      "small group",           "step overridden", "solver mode",   "row solver replaced",
+      "class of a constraint", "not finite",      "out of memory", "body with BT_THREADSAFE"};
   const auto i = static_cast<std::size_t>(fallback);
   return i < kSolverFallbacks ? kTexts[i] : "unknown";
 }
