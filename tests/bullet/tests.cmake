@@ -81,6 +81,11 @@ jfpx_add_test(bullet_out_of_memory_test SOURCES
   support/failing_new.cpp
   LINK jfpx_bullet)
 
+# A separate program, because it replaces Bullet's allocator.
+jfpx_add_test(bullet_aabb_update_test INTERNAL SOURCES
+  bullet/aabb_update_test.cpp
+  bullet/arena.cpp
+  LINK jfpx_bullet)
 # A separate program, because it replaces a constructor of Bullet.
 jfpx_add_test(bullet_thread_safe_library_test SOURCES
   bullet/thread_safe_imitation.cpp

@@ -19,8 +19,8 @@ struct DynamicsWorldOptions {
 };
 
 /// A btDiscreteDynamicsWorld that sorts manifolds by island with compact keys instead of through
-/// pointers, predicts and integrates bodies in parallel, and looks up the overlapping pairs of a
-/// btDbvtBroadphase with software prefetching. Pairs, groups, their order, sleeping, velocities and
+/// pointers, predicts and integrates bodies in parallel, and finds the overlapping pairs of a
+/// btDbvtBroadphase in parallel. Pairs, groups, their order, sleeping, velocities and
 /// transforms are those of btDiscreteDynamicsWorld, bit for bit.
 ///
 /// In steps with continuous collision of any body, bodies are integrated one at a time, because the

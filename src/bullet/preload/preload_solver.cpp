@@ -142,7 +142,8 @@ JFPX_API bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count
 /// Supports every class of world, because the function uses only the public interface.
 JFPX_API bool jfpx_preload_try_update_boxes(void* world) {
   thread_local AabbUpdate update;
-  if (!update.run(*static_cast<btCollisionWorld*>(world))) return false;
+  thread_local ThreadPool threads(preload_options().threads);
+  if (!update.run(*static_cast<btCollisionWorld*>(world), threads)) return false;
   g_aabb_updates.fetch_add(1, std::memory_order_relaxed);
   return true;
 }

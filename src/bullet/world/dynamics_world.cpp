@@ -118,7 +118,7 @@ void DynamicsWorld::integrateTransforms(btScalar dt) {
 }
 
 void DynamicsWorld::updateAabbs() {
-  if (is_small() || !impl_->boxes.run(*this)) btDiscreteDynamicsWorld::updateAabbs();
+  if (is_small() || !impl_->boxes.run(*this, impl_->pool)) btDiscreteDynamicsWorld::updateAabbs();
 }
 
 bool DynamicsWorld::has_stock_island_manager() const noexcept {
