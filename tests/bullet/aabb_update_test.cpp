@@ -1,6 +1,7 @@
 /// The update of AABBs has stock's pairs in stock's order, and stock's tree, after every step.
 #include "src/bullet/world/aabb_update.hpp"
 
+#include "src/bullet/world/pair_cleanup.hpp"
 #include "tests/bullet/arena.hpp"
 #include "tests/bullet/twin_worlds.hpp"
 
@@ -124,6 +125,7 @@ class BoxWorld {
   btCollisionObject& object(int i) { return *world_->getCollisionObjectArray()[i]; }
   int count() { return world_->getNumCollisionObjects(); }
   int updated() const { return updated_; }
+  int cleaned() const { return cleaned_; }
   void select_arena() { arena_.select(); }
 
   void add(std::unique_ptr<btCollisionShape> shape, const btVector3& position, int flags, int group,
@@ -149,7 +151,11 @@ class BoxWorld {
     }
   }
   void find_pairs_and_dispatch() {
-    world_->computeOverlappingPairs();
+    if (!is_ours_ || !cleanup_.run(*world_, pool_)) {
+      world_->computeOverlappingPairs();
+    } else {
+      ++cleaned_;
+    }
     dispatcher_->dispatchAllCollisionPairs(broadphase_->getOverlappingPairCache(),
                                            world_->getDispatchInfo(), dispatcher_.get());
   }
@@ -158,8 +164,9 @@ class BoxWorld {
   test::Arena arena_;
   ThreadPool pool_;
   AabbUpdate update_;
+  PairCleanup cleanup_{0};
   bool is_ours_;
-  int updated_ = 0;
+  int updated_ = 0, cleaned_ = 0;
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;
   std::vector<std::unique_ptr<btCollisionObject>> objects_;
   std::unique_ptr<btDefaultCollisionConfiguration> configuration_;
@@ -253,6 +260,7 @@ class RandomBoxes {
     return difference;
   }
   int updated() { return twins_.ours().updated(); }
+  int cleaned() { return twins_.ours().cleaned(); }
   /// Number of steps in which objects changed between the sets of fixed and moving ones.
   int fixed() const { return fixed_; }
 
@@ -306,7 +314,7 @@ TEST(AabbUpdate, HasStocksTreeAndPairsInRandomWorlds) {
   const std::uint64_t seed = test_seed(), steps = world_steps_to_run(300, 1800);
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   std::uint64_t done = 0;
-  int fixed = 0;
+  int fixed = 0, cleaned = 0;
   for (std::uint64_t world = 0; done < steps; ++world) {
     RandomBoxes boxes(seed + world);
     for (int step = 0; step < 60; ++step, ++done) {
@@ -315,8 +323,10 @@ TEST(AabbUpdate, HasStocksTreeAndPairsInRandomWorlds) {
     }
     EXPECT_EQ(boxes.updated(), 60);
     fixed += boxes.fixed();
+    cleaned += boxes.cleaned();
   }
   EXPECT_GT(fixed, static_cast<int>(steps / 60));
+  EXPECT_GT(cleaned, static_cast<int>(steps / 4));
 }
 
 /// A cloud of small spheres, and a giant that is at first far from it.

@@ -4,6 +4,7 @@
 
 #include "src/bullet/dispatch/point_fields.hpp"
 #include "src/bullet/world/aabb_update.hpp"
+#include "src/bullet/world/pair_cleanup.hpp"
 #include "tests/bullet/live_random_world.hpp"
 #include "tests/bullet/random_world_globals.hpp"
 #include "tests/bullet/solver_world.hpp"
@@ -26,10 +27,14 @@ class SideBySideWorld final : public DynamicsWorld {
   void updateAabbs() override {
     if (!boxes_.run(*this, pool_)) DynamicsWorld::updateAabbs();
   }
+  void computeOverlappingPairs() override {
+    if (!cleanup_.run(*this, pool_)) DynamicsWorld::computeOverlappingPairs();
+  }
 
  private:
   ThreadPool pool_;
   AabbUpdate boxes_{0};
+  PairCleanup cleanup_{0};
 };
 
 btVector3 to_bullet(const Vec3& v) { return {v.x, v.y, v.z}; }

@@ -48,6 +48,7 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
   DynamicsWorld& operator=(const DynamicsWorld&) = delete;
 
   void updateAabbs() override;
+  void computeOverlappingPairs() override;
   void solveConstraints(btContactSolverInfo& info) override;
 
   std::size_t minimum_batch() const noexcept;

@@ -6,6 +6,7 @@
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/world/aabb_update.hpp"
 #include "src/bullet/world/islands.hpp"
+#include "src/bullet/world/pair_cleanup.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
 #include <LinearMath/btQuickprof.h>
@@ -33,6 +34,7 @@ struct DynamicsWorld::Impl {
   ThreadPool pool;
   IslandSolver islands;
   AabbUpdate boxes;
+  PairCleanup cleanup;
   std::size_t minimum_batch;
 
   explicit Impl(const DynamicsWorldOptions& options)
@@ -119,6 +121,12 @@ void DynamicsWorld::integrateTransforms(btScalar dt) {
 
 void DynamicsWorld::updateAabbs() {
   if (is_small() || !impl_->boxes.run(*this, impl_->pool)) btDiscreteDynamicsWorld::updateAabbs();
+}
+
+void DynamicsWorld::computeOverlappingPairs() {
+  if (is_small() || !impl_->cleanup.run(*this, impl_->pool)) {
+    btDiscreteDynamicsWorld::computeOverlappingPairs();
+  }
 }
 
 bool DynamicsWorld::has_stock_island_manager() const noexcept {

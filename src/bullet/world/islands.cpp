@@ -2,12 +2,11 @@
 /// btDiscreteDynamicsWorld.cpp, of Bullet 3.24 step by step.
 #include "src/bullet/world/islands.hpp"
 
-#include <jfpx/bullet/dispatcher.hpp>
 #include <jfpx/error.hpp>
 
 #include "src/base/reserve.hpp"
-#include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
+#include "src/bullet/world/plain_dispatcher.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
@@ -176,13 +175,6 @@ void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& un
       }
     }
   }
-}
-
-/// False for a class of the user, which may override access to the manifolds, and whose overrides
-/// need not be thread-safe.
-bool is_plain(const btDispatcher& dispatcher) {
-  return is_exactly<btCollisionDispatcher>(dispatcher) ||
-         is_exactly<CollisionDispatcher>(dispatcher);
 }
 
 /// Lists the manifolds of the islands to solve, and their islands.
