@@ -10,7 +10,9 @@ jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   bullet/bullet_modules_test.cpp
   bullet/contact_callbacks_test.cpp
   bullet/device_traffic_test.cpp
+  bullet/islands_test.cpp
   bullet/pair_table_test.cpp
+  bullet/parallel_quick_sort_test.cpp
   bullet/replaced_test.cpp
   bullet/situations_test.cpp
   bullet/sphere_box_test.cpp

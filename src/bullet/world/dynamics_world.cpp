@@ -134,16 +134,16 @@ bool DynamicsWorld::has_stock_island_manager() const noexcept {
 }
 
 void DynamicsWorld::calculateSimulationIslands() {
-  if (is_small() || !has_stock_island_manager()) {
+  if (is_small() || !has_stock_island_manager() || !impl_->islands.reserve_for_unions(*this)) {
     btDiscreteDynamicsWorld::calculateSimulationIslands();
     return;
   }
   BT_PROFILE("calculateSimulationIslands");
   btUnionFind& unions = getSimulationIslandManager()->getUnionFind();
+  impl_->islands.number_and_unite(*this, &unions);
   const auto unite = [&](const btCollisionObject& a, const btCollisionObject& b) {
     if (is_movable(a) && is_movable(b)) unions.unite(a.getIslandTag(), b.getIslandTag());
   };
-  number_and_unite(*this, &unions);
   for (int i = 0; i < m_predictiveManifolds.size(); ++i) {
     unite(*m_predictiveManifolds[i]->getBody0(), *m_predictiveManifolds[i]->getBody1());
   }
@@ -151,7 +151,7 @@ void DynamicsWorld::calculateSimulationIslands() {
     if (!m_constraints[i]->isEnabled()) continue;
     unite(m_constraints[i]->getRigidBodyA(), m_constraints[i]->getRigidBodyB());
   }
-  store_islands(*this, &unions);
+  impl_->islands.store_islands(*this, &unions);
 }
 
 void DynamicsWorld::solveConstraints(btContactSolverInfo& info) {
