@@ -5,6 +5,9 @@
 #include "tests/bullet/arena.hpp"
 #include "tests/bullet/twin_worlds.hpp"
 
+#include <BulletCollision/CollisionDispatch/btGhostObject.h>
+#include <LinearMath/btIDebugDraw.h>
+
 #include <cstring>
 #include <optional>
 #include <ostream>
@@ -42,6 +45,16 @@ class TreeDump {
     add("pair capacity", pairs.capacity());
     for (int i = 0; i < pairs.size(); ++i) add("next", (cache.*PairTables::next)[i]);
     for (int i = 0; i < pairs.capacity(); ++i) add("head", (cache.*PairTables::heads)[i]);
+  }
+  void add_ghosts(btCollisionWorld& world) {
+    for (int i = 0; i < world.getNumCollisionObjects(); ++i) {
+      const auto* ghost = btGhostObject::upcast(world.getCollisionObjectArray()[i]);
+      if (ghost == nullptr) continue;
+      add("ghost", i);
+      for (int k = 0; k < ghost->getNumOverlappingObjects(); ++k) {
+        add("overlaps", ghost->getOverlappingObject(k)->getBroadphaseHandle()->m_uniqueId);
+      }
+    }
   }
 
   std::optional<std::string> first_difference(const TreeDump& other) const {
@@ -129,9 +142,8 @@ class BoxWorld {
   void select_arena() { arena_.select(); }
 
   void add(std::unique_ptr<btCollisionShape> shape, const btVector3& position, int flags, int group,
-           int mask) {
-    arena_.select();
-    auto object = std::make_unique<btCollisionObject>();
+           int mask, std::unique_ptr<btCollisionObject> object = nullptr) {
+    if (object == nullptr) object = std::make_unique<btCollisionObject>();
     object->setCollisionShape(shape.get());
     object->getWorldTransform().setIdentity();
     object->getWorldTransform().setOrigin(position);
@@ -199,7 +211,10 @@ class BoxTwins {
 
  private:
   std::optional<std::string> compare() {
-    return TreeDump(stock_.tree()).first_difference(TreeDump(ours_.tree()));
+    TreeDump stock(stock_.tree()), ours(ours_.tree());
+    stock.add_ghosts(stock_.world());
+    ours.add_ghosts(ours_.world());
+    return stock.first_difference(ours);
   }
 
   BoxWorld stock_, ours_;
@@ -237,16 +252,40 @@ struct Plan {
   SideBySideOptions options;
 };
 
+class SilentDrawer : public btIDebugDraw {
+ public:
+  void drawLine(const btVector3&, const btVector3&, const btVector3&) override {}
+  void drawContactPoint(const btVector3&, const btVector3&, btScalar, int,
+                        const btVector3&) override {}
+  void reportErrorWarning(const char*) override {}
+  void draw3dText(const btVector3&, const char*) override {}
+  void setDebugMode(int) override {}
+  int getDebugMode() const override { return DBG_NoDebug; }
+};
+
+/// A ghost of the user, which records that a pair is added.
+class UserGhost : public btGhostObject {
+ public:
+  void addOverlappingObjectInternal(btBroadphaseProxy* other, btBroadphaseProxy* own) override {
+    ++added;
+    btGhostObject::addOverlappingObjectInternal(other, own);
+  }
+  int added = 0;
+};
+
 /// Applies the same random events to both worlds.
 class RandomBoxes {
  public:
   explicit RandomBoxes(std::uint64_t seed) : random_(seed), plan_(random_), twins_(plan_.options) {
     const bool all = random_.below(2) == 0, continuous = random_.below(4) == 0;
+    const bool ghosts = random_.below(2) == 0, drawer = random_.below(3) == 0;
     const Real prediction = random_.below(3) == 0 ? random_.uniform(0, 2) : Real(0);
     twins_.both([&](BoxWorld& w) {
       w.world().setForceUpdateAllAabbs(all);
       w.world().getDispatchInfo().m_useContinuous = continuous;
       w.tree().setVelocityPrediction(prediction);
+      if (ghosts) w.tree().m_paircache->setInternalGhostPairCallback(&ghost_callback_);
+      if (drawer) w.world().setDebugDrawer(&drawer_);
     });
     for (int i = 0; i < plan_.bodies; ++i) add();
   }
@@ -270,10 +309,13 @@ class RandomBoxes {
     const btVector3 place = random_place(random_, plan_.edge);
     const int flags = random_.below(10) == 0 ? int{btCollisionObject::CF_STATIC_OBJECT} : 0;
     const int group = random_.below(4) == 0 ? 2 : 1, mask = random_.below(6) == 0 ? 1 : -1;
-    const std::uint64_t shape_seed = random_.below(1u << 30);
+    const std::uint64_t shape_seed = random_.below(1u << 30), kind = random_.below(40);
     twins_.both([&](BoxWorld& w) {
       Random shape_random(shape_seed);
-      w.add(random_shape(shape_random, size), place, flags, group, mask);
+      std::unique_ptr<btCollisionObject> ghost;
+      if (kind == 0) ghost = std::make_unique<btGhostObject>();
+      if (kind == 1) ghost = std::make_unique<btPairCachingGhostObject>();
+      w.add(random_shape(shape_random, size), place, flags, group, mask, std::move(ghost));
     });
   }
   void change_population() {
@@ -305,6 +347,8 @@ class RandomBoxes {
   }
 
   Random random_;
+  btGhostPairCallback ghost_callback_;
+  SilentDrawer drawer_;
   Plan plan_;
   BoxTwins twins_;
   int fixed_ = 0;
@@ -425,6 +469,26 @@ TEST(AabbUpdate, UpdatesOneByOneWhatItCannotComputeInAdvance) {
   UserSphere::calls = 0;
   ASSERT_EQ(twins.step(), std::nullopt);
   EXPECT_EQ(UserSphere::calls, 2) << "once in each world";
+}
+
+TEST(AabbUpdate, LeavesGhostsOfTheUserToBullet) {
+  btGhostPairCallback callback;
+  BoxTwins twins({2, 0});
+  std::vector<UserGhost*> ghosts;
+  twins.both([&](BoxWorld& w) {
+    w.tree().m_paircache->setInternalGhostPairCallback(&callback);
+    auto ghost = std::make_unique<UserGhost>();
+    ghosts.push_back(ghost.get());
+    w.add(std::make_unique<btSphereShape>(Real(5)), btVector3(10, 10, 10), 0, 1, -1,
+          std::move(ghost));
+    add_cloud_and_giant(w, 300);
+  });
+  for (int step = 0; step < 4; ++step) {
+    ASSERT_EQ(twins.step(), std::nullopt);
+    EXPECT_EQ(ghosts[0]->added, ghosts[1]->added);
+  }
+  EXPECT_EQ(twins.ours().updated(), 0);
+  EXPECT_EQ(twins.ours().cleaned(), 0);
 }
 
 TEST(AabbUpdate, SeesLeavesThatBelongToNoObject) {

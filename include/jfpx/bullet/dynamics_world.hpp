@@ -28,8 +28,8 @@ struct DynamicsWorldOptions {
 /// of the user work as in Bullet, with one exception: while islands are split,
 /// buildAndProcessIslands() of Bullet's own island manager and the world's protected
 /// m_solverIslandCallback are not used. An island manager of another class builds the islands
-/// itself. While a debug drawer or a ghost pair callback is set, Bullet updates the AABBs, because
-/// either may change the world.
+/// itself. Where user code may run during the update of the AABBs, and might change the world,
+/// Bullet updates them.
 ///
 /// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
 /// As in Bullet, only one thread at a time may use a world; different worlds are independent.

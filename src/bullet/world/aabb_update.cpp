@@ -6,6 +6,7 @@
 #include "src/base/reserve.hpp"
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
+#include "src/bullet/world/plain_ghosts.hpp"
 
 #include <LinearMath/btQuickprof.h>
 
@@ -87,17 +88,19 @@ bool AabbUpdate::run(btCollisionWorld& world, ThreadPool& pool) {
   if (!is_exactly<btHashedOverlappingPairCache>(pair_cache)) return false;
   auto& cache = static_cast<btHashedOverlappingPairCache&>(pair_cache);
   if (tree.m_deferedcollide || cache.getOverlapFilterCallback() != nullptr) return false;
-  // Both are called during the update, and may add and remove bodies.
-  if (cache.*PairTables::ghosts != nullptr || world.getDebugDrawer() != nullptr) return false;
+  if (!has_plain_ghosts(world, cache)) return false;
   const int leaves = tree.m_sets[0].m_leaves + tree.m_sets[1].m_leaves;
   if (!reserve_geometric(static_cast<std::size_t>(leaves))) return false;
 
-  BT_PROFILE("updateAabbs");  // Bullet's own name of the profile zone
   // Leaves that belong to no object of the world are not among the updates.
-  const bool is_large = leaves >= side_by_side_ && leaves == world.getNumCollisionObjects();
-  if (!is_large || !compute_updates(world, tree, pool) || !run_side_by_side(tree, cache, pool)) {
-    run_one_by_one(world, tree, cache);
+  if (leaves >= side_by_side_ && leaves == world.getNumCollisionObjects()) {
+    BT_PROFILE("updateAabbs");  // Bullet's own name of the profile zone
+    if (compute_updates(world, tree, pool) && run_side_by_side(tree, cache, pool)) return true;
   }
+  // Called for an AABB that is too large; it may add and remove bodies.
+  if (world.getDebugDrawer() != nullptr) return false;
+  BT_PROFILE("updateAabbs");
+  run_one_by_one(world, tree, cache);
   return true;
 }
 

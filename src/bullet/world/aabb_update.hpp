@@ -28,8 +28,9 @@ class JFPX_API AabbUpdate {
   explicit AabbUpdate(int side_by_side = 256) : side_by_side_(side_by_side) {}
 
   /// Has the effect of btCollisionWorld::updateAabbs(). Returns false and changes nothing if the
-  /// broadphase is not Bullet's default, its own tree with its own hash table, if a pair filter, a
-  /// ghost pair callback or a debug drawer is set, or if there is not enough memory.
+  /// broadphase is not Bullet's default, its own tree with its own hash table, if user code may run
+  /// during the update (a pair filter, ghosts or shapes of a user class, a debug drawer in a small
+  /// world or with an AABB that is too large), or if there is not enough memory.
   bool run(btCollisionWorld& world, ThreadPool& pool);
 
  private:

@@ -4,8 +4,8 @@
 #include "src/base/reserve.hpp"
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
-#include "src/bullet/world/overlap_search.hpp"
 #include "src/bullet/world/plain_dispatcher.hpp"
+#include "src/bullet/world/plain_ghosts.hpp"
 
 #include <LinearMath/btQuickprof.h>
 
@@ -63,7 +63,7 @@ bool PairCleanup::run(btCollisionWorld& world, ThreadPool& pool) {
   auto& tree = static_cast<btDbvtBroadphase&>(broadphase);
   if (!is_exactly<btHashedOverlappingPairCache>(*tree.m_paircache)) return false;
   auto& cache = static_cast<btHashedOverlappingPairCache&>(*tree.m_paircache);
-  if (tree.m_deferedcollide || cache.*PairTables::ghosts != nullptr) return false;
+  if (tree.m_deferedcollide) return false;
   if (!is_plain(*dispatcher) || gContactDestroyedCallback != nullptr ||
       gContactEndedCallback != nullptr) {
     return false;
@@ -72,6 +72,7 @@ bool PairCleanup::run(btCollisionWorld& world, ThreadPool& pool) {
   const bool needed = tree.m_needcleanup || tree.m_stageRoots[next_stage] != nullptr;
   const int size = cache.getOverlappingPairArray().size(), count = pairs_to_test(tree, size);
   if (!needed || count < std::max(1, minimum_pairs_)) return false;
+  if (!has_plain_ghosts(world, cache)) return false;
   try {
     assign_geometric(&states_, static_cast<std::size_t>(size), State::unknown);
   } catch (const std::bad_alloc&) {
