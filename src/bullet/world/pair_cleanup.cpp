@@ -40,6 +40,14 @@ void prefetch_volumes(const btBroadphasePairArray& pairs, int i) {
   }
 }
 
+/// Prefetches what a removal reads: the slot of the pair in the hash table, and the algorithm.
+void prefetch_removal(const btBroadphasePairArray& pairs, const int* heads, int i) {
+  const btBroadphasePair& pair = pairs[i];
+  const unsigned mask = static_cast<unsigned>(pairs.capacity()) - 1;
+  prefetch(heads + (pair_hash(pair.m_pProxy0->m_uniqueId, pair.m_pProxy1->m_uniqueId) & mask));
+  if (pair.m_algorithm != nullptr) prefetch(pair.m_algorithm);
+}
+
 /// Number of pairs that Bullet tests if none is removed.
 int pairs_to_test(const btDbvtBroadphase& tree, int pairs) {
   return std::min(pairs, std::max(tree.m_newpairs, pairs * tree.m_cupdates / 100));
@@ -118,17 +126,26 @@ bool PairCleanup::test_pairs(const btBroadphasePairArray& pairs, int first, int 
 /// @return the number of pairs that were tested and kept
 int PairCleanup::remove_pairs(btDbvtBroadphase& tree, btDispatcher* dispatcher, int count) {
   const btBroadphasePairArray& pairs = tree.m_paircache->getOverlappingPairArray();
+  const auto& cache = static_cast<btHashedOverlappingPairCache&>(*tree.m_paircache);
+  const int* heads = &(cache.*PairTables::heads)[0];
   int i = pairs.size() > 0 ? tree.m_cid % pairs.size() : 0;
   for (int kept = 0; kept < count;) {
     State& state = states_[static_cast<std::size_t>(i)];
     if (state == State::overlaps || (state == State::unknown && !is_apart(pairs[i]))) {
       ++kept;
+      constexpr int kAhead = 128;  // one pair in a hundred is removed
+      if (i + kAhead < pairs.size() &&
+          states_[static_cast<std::size_t>(i + kAhead)] == State::apart) {
+        prefetch_removal(pairs, heads, i + kAhead);
+      }
       if (++i == pairs.size()) i = 0;
       continue;
     }
     tree.m_paircache->removeOverlappingPair(pairs[i].m_pProxy0, pairs[i].m_pProxy1, dispatcher);
     state = states_[static_cast<std::size_t>(pairs.size())];
     --count;
+    constexpr int kLast = 4;
+    if (pairs.size() > kLast) prefetch_removal(pairs, heads, pairs.size() - kLast);
     if (pairs.size() > 0) i = (tree.m_cid + kept) % pairs.size();
   }
   return count;
