@@ -4,6 +4,7 @@ set(JFPX_CUDA AUTO CACHE STRING "CUDA backend: AUTO (if nvcc is found), ON (requ
 set_property(CACHE JFPX_CUDA PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_BULLET AUTO CACHE STRING "Bullet adapter: AUTO (if Bullet is found), ON (required) or OFF")
 set_property(CACHE JFPX_BULLET PROPERTY STRINGS AUTO ON OFF)
+set(JFPX_BULLET_SOURCE "" CACHE PATH "Sources of Bullet from which tests build a library with BT_THREADSAFE; empty: none")
 set(JFPX_VIEWER AUTO CACHE STRING "Viewer: AUTO (if SDL2, epoxy, imgui and libpng are found), ON (required) or OFF")
 set_property(CACHE JFPX_VIEWER PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_PYTHON OFF CACHE STRING "Python package: AUTO (if Python and nanobind are found), ON (required) or OFF")

@@ -3,6 +3,8 @@
 #include <jfpx/bullet/dynamics_world.hpp>
 
 #include "src/bullet/dispatch/point_fields.hpp"
+#include "src/bullet/world/aabb_update.hpp"
+#include "src/bullet/world/pair_cleanup.hpp"
 #include "tests/bullet/live_random_world.hpp"
 #include "tests/bullet/random_world_globals.hpp"
 #include "tests/bullet/solver_world.hpp"
@@ -13,6 +15,27 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
+
+/// Updates AABBs in parallel however small the world is.
+class SideBySideWorld final : public DynamicsWorld {
+ public:
+  SideBySideWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+                  btConstraintSolver* solver, btCollisionConfiguration* configuration,
+                  unsigned threads)
+      : DynamicsWorld(dispatcher, broadphase, solver, configuration, {.threads = threads}),
+        pool_(threads) {}
+  void updateAabbs() override {
+    if (!boxes_.run(*this, pool_)) DynamicsWorld::updateAabbs();
+  }
+  void computeOverlappingPairs() override {
+    if (!cleanup_.run(*this, pool_)) DynamicsWorld::computeOverlappingPairs();
+  }
+
+ private:
+  ThreadPool pool_;
+  AabbUpdate boxes_{0};
+  PairCleanup cleanup_{0};
+};
 
 btVector3 to_bullet(const Vec3& v) { return {v.x, v.y, v.z}; }
 
@@ -204,8 +227,8 @@ WorldParts our_world(const SolverWorld& world) {
   parts.world = [threads = world.threads](
                     btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
                     btConstraintSolver* solver, btCollisionConfiguration* configuration) {
-    return std::make_unique<DynamicsWorld>(dispatcher, broadphase, solver, configuration,
-                                           DynamicsWorldOptions{.threads = threads});
+    return std::make_unique<SideBySideWorld>(dispatcher, broadphase, solver, configuration,
+                                             threads);
   };
   return parts;
 }

@@ -11,7 +11,9 @@ jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   bullet/contact_callbacks_test.cpp
   bullet/device_traffic_test.cpp
   bullet/group_choice_test.cpp
+  bullet/islands_test.cpp
   bullet/pair_table_test.cpp
+  bullet/parallel_quick_sort_test.cpp
   bullet/replaced_test.cpp
   bullet/situations_test.cpp
   bullet/sphere_box_test.cpp
@@ -82,6 +84,17 @@ jfpx_add_test(bullet_out_of_memory_test SOURCES
   support/failing_new.cpp
   LINK jfpx_bullet)
 
+# A separate program, because it replaces Bullet's allocator.
+jfpx_add_test(bullet_aabb_update_test INTERNAL SOURCES
+  bullet/aabb_update_test.cpp
+  bullet/arena.cpp
+  LINK jfpx_bullet)
+# A separate program, because it replaces a constructor of Bullet.
+jfpx_add_test(bullet_thread_safe_library_test SOURCES
+  bullet/thread_safe_imitation.cpp
+  bullet/thread_safe_library_test.cpp
+  LINK jfpx_bullet ${CMAKE_DL_LIBS})
+
 # Unsupported configurations of Bullet are rejected with a helpful message.
 function(jfpx_add_guard_test name text)
   set(source ${CMAKE_CURRENT_BINARY_DIR}/bullet_guard.cpp)
@@ -92,11 +105,16 @@ function(jfpx_add_guard_test name text)
     "\"${CMAKE_CXX_COMPILER}\" -std=c++20 -fsyntax-only ${ARGN} \"$@\" 2>&1 && echo compiles" guard ${includes} ${source})
   set_tests_properties(bullet_guard_${name} PROPERTIES PASS_REGULAR_EXPRESSION "${text}")
 endfunction()
-jfpx_add_guard_test(threads "keeps the bits of Bullet without BT_THREADSAFE" -DBT_THREADSAFE=1)
 jfpx_add_guard_test(vectors "keeps the bits of Bullet's scalar code" -DBT_USE_SSE)
 jfpx_add_guard_test(double "this build mixes the two" -DBT_USE_DOUBLE_PRECISION)
 jfpx_add_guard_test(float "this build mixes the two" -DJFPX_DOUBLE_PRECISION)
-jfpx_add_guard_test(none "^compiles" -DBT_THREADSAFE=0)
+jfpx_add_guard_test(none "^compiles")
+jfpx_add_guard_test(threads "^compiles" -DBT_THREADSAFE=1)
+
+# A library with BT_THREADSAFE from the sources of the installed version, for the same programs.
+if(JFPX_BULLET_SOURCE)
+  include(bullet/thread_safe_build.cmake)
+endif()
 
 if(JFPX_TOOL)
   jfpx_add_executable(bullet_stock_program SOURCES bullet/stock_program.cpp

@@ -7,9 +7,6 @@
 
 #include <type_traits>
 
-#if defined(BT_THREADSAFE) && BT_THREADSAFE
-#error "jfpx keeps the bits of Bullet without BT_THREADSAFE, as distributions ship it: undefine it"
-#endif
 #if defined(BT_USE_SSE) || defined(BT_USE_NEON)
 #error "jfpx keeps the bits of Bullet's scalar code: undefine BT_USE_SSE and BT_USE_NEON"
 #endif

@@ -40,8 +40,9 @@ enum class SolverFallback : std::uint8_t {
   out_of_memory,  ///< memory for the group could not be allocated
   measured,       ///< few rows are independent, and Bullet's own code has measured faster, or is
                   ///< being measured
+  thread_safe,  ///< Bullet has BT_THREADSAFE, and its solver treats a body of the group differently
 };
-inline constexpr std::size_t kSolverFallbacks = 8;
+inline constexpr std::size_t kSolverFallbacks = 9;
 
 /// Returns a short text for a table, for example "small group".
 JFPX_API std::string_view to_string(SolverFallback fallback) noexcept;

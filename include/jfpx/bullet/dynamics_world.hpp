@@ -19,8 +19,8 @@ struct DynamicsWorldOptions {
 };
 
 /// A btDiscreteDynamicsWorld that sorts manifolds by island with compact keys instead of through
-/// pointers, predicts and integrates bodies in parallel, and looks up the overlapping pairs of a
-/// btDbvtBroadphase with software prefetching. Pairs, groups, their order, sleeping, velocities and
+/// pointers, predicts and integrates bodies in parallel, and finds the overlapping pairs of a
+/// btDbvtBroadphase in parallel. Pairs, groups, their order, sleeping, velocities and
 /// transforms are those of btDiscreteDynamicsWorld, bit for bit.
 ///
 /// In steps with continuous collision of any body, bodies are integrated one at a time, because the
@@ -28,8 +28,8 @@ struct DynamicsWorldOptions {
 /// of the user work as in Bullet, with one exception: while islands are split,
 /// buildAndProcessIslands() of Bullet's own island manager and the world's protected
 /// m_solverIslandCallback are not used. An island manager of another class builds the islands
-/// itself. While a debug drawer or a ghost pair callback is set, Bullet updates the AABBs, because
-/// either may change the world.
+/// itself. Where user code may run during the update of the AABBs, and might change the world,
+/// Bullet updates them.
 ///
 /// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
 /// As in Bullet, only one thread at a time may use a world; different worlds are independent.
@@ -48,6 +48,7 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
   DynamicsWorld& operator=(const DynamicsWorld&) = delete;
 
   void updateAabbs() override;
+  void computeOverlappingPairs() override;
   void solveConstraints(btContactSolverInfo& info) override;
 
   std::size_t minimum_batch() const noexcept;

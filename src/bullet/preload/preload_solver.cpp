@@ -50,6 +50,16 @@ ObjectPool<ConstraintSolver>& pool() {
   return made;
 }
 
+/// For the AABBs of one world at a time.
+struct BoxUpdater {
+  ThreadPool threads{preload_options().threads};
+  AabbUpdate update;
+};
+ObjectPool<BoxUpdater>& box_updaters() {
+  static auto& made = *new ObjectPool<BoxUpdater>([] { return std::make_unique<BoxUpdater>(); });
+  return made;
+}
+
 std::atomic<std::uint64_t> g_small{0}, g_aabb_updates{0};
 
 std::size_t minimum_batch() {
@@ -141,8 +151,11 @@ JFPX_API bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count
 
 /// Supports every class of world, because the function uses only the public interface.
 JFPX_API bool jfpx_preload_try_update_boxes(void* world) {
-  thread_local AabbUpdate update;
-  if (!update.run(*static_cast<btCollisionWorld*>(world))) return false;
+  const ObjectPool<BoxUpdater>::Handle ours(box_updaters());
+  if (ours.get() == nullptr) return false;
+  if (!ours.get()->update.run(*static_cast<btCollisionWorld*>(world), ours.get()->threads)) {
+    return false;
+  }
   g_aabb_updates.fetch_add(1, std::memory_order_relaxed);
   return true;
 }

@@ -6,6 +6,7 @@
 #include "src/bullet/solver/constraint_solver_test_access.hpp"
 #include "src/bullet/solver/joint_rows.hpp"
 #include "src/bullet/solver/row_inputs.hpp"
+#include "src/bullet/thread_safe_library.hpp"
 
 #include <LinearMath/btQuickprof.h>
 
@@ -22,6 +23,7 @@ ConstraintSolver::Impl::Impl(ConstraintSolver& owner, const ConstraintSolverOpti
     : self(owner),
       own_steps(steps()),
       own_split(owner.m_resolveSplitPenetrationImpulse),
+      thread_safe_library(is_thread_safe_library()),
       solver(options.threads, options.simd),
       may_choose(options.backend != Backend::cuda),
       minimum_batch(options.minimum_batch) {
@@ -156,8 +158,8 @@ btScalar ConstraintSolver::solveGroup(btCollisionObject** bodies, int body_count
   impl_->info = &info;
   impl_->bodies = {bodies, static_cast<std::size_t>(body_count)};
   impl_->joints = {constraints, static_cast<std::size_t>(constraint_count)};
-  std::optional<SolverFallback> reason = impl_->fallback_reason(manifold_count);
   const std::span group(manifolds, static_cast<std::size_t>(manifold_count));
+  std::optional<SolverFallback> reason = impl_->fallback_reason(group);
   const bool chooses = !reason && impl_->may_choose && impl_->minimum_batch > 0;
   if (chooses && impl_->choice.leaves_to_bullet(group.size())) reason = SolverFallback::measured;
   if (!reason) reason = impl_->solve(group);
@@ -182,9 +184,15 @@ void ConstraintSolver::reset_stats() {
 }
 
 std::string_view to_string(SolverFallback fallback) noexcept {
-  constexpr std::string_view kTexts[kSolverFallbacks] = {
-      "small group",           "step overridden", "solver mode",   "row solver replaced",
-      "class of a constraint", "not finite",      "out of memory", "measured"};
+  constexpr std::string_view kTexts[kSolverFallbacks] = {"small group",
+                                                         "step overridden",
+                                                         "solver mode",
+                                                         "row solver replaced",
+                                                         "class of a constraint",
+                                                         "not finite",
+                                                         "out of memory",
+                                                         "measured",
+                                                         "body with BT_THREADSAFE"};
   const auto i = static_cast<std::size_t>(fallback);
   return i < kSolverFallbacks ? kTexts[i] : "unknown";
 }

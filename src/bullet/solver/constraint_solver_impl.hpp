@@ -30,6 +30,7 @@ struct ConstraintSolver::Impl {
   ConstraintSolver& self;
   const Steps own_steps;                        ///< functions of this class, without overrides
   const btSingleConstraintRowSolver own_split;  ///< split impulse row solver of Bullet
+  const bool thread_safe_library;               ///< see thread_safe_library.hpp
   cpu::RowSolver solver;
   std::optional<GpuIslandSolver> device;  ///< always present after construction
   const bool may_choose;                  ///< false if the user has selected a device
@@ -60,7 +61,9 @@ struct ConstraintSolver::Impl {
   Steps steps() const;
   int max_iterations() const;
   /// The reason why the group is not solved here, if there is one.
-  std::optional<SolverFallback> fallback_reason(int manifold_count) const;
+  std::optional<SolverFallback> fallback_reason(
+      std::span<btPersistentManifold* const> manifolds) const;
+  bool depends_on_thread_safety(std::span<btPersistentManifold* const> manifolds) const;
   SolverFallback restore(SolverFallback reason);
 
   // group_bodies.cpp

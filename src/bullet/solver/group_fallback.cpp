@@ -1,6 +1,7 @@
 /// Rules by which a group falls back to Bullet's own solver.
 #include "src/bullet/solver/constraint_solver_impl.hpp"
 #include "src/bullet/solver/joint_rows.hpp"
+#include "src/bullet/thread_safe_library.hpp"
 #include "src/bullet/virtual_table.hpp"
 
 #include <algorithm>
@@ -45,8 +46,24 @@ int ConstraintSolver::Impl::max_iterations() const {
   return iterations;
 }
 
-std::optional<SolverFallback> ConstraintSolver::Impl::fallback_reason(int manifold_count) const {
-  if (static_cast<std::size_t>(manifold_count) < minimum_batch) return SolverFallback::small;
+bool ConstraintSolver::Impl::depends_on_thread_safety(
+    std::span<btPersistentManifold* const> manifolds) const {
+  const auto depends = [](const btCollisionObject* object) {
+    return bullet::depends_on_thread_safety(*object);
+  };
+  return std::any_of(bodies.begin(), bodies.end(), depends) ||
+         std::any_of(manifolds.begin(), manifolds.end(),
+                     [&](const btPersistentManifold* manifold) {
+                       return depends(manifold->getBody0()) || depends(manifold->getBody1());
+                     }) ||
+         std::any_of(joints.begin(), joints.end(), [&](const btTypedConstraint* joint) {
+           return depends(&joint->getRigidBodyA()) || depends(&joint->getRigidBodyB());
+         });
+}
+
+std::optional<SolverFallback> ConstraintSolver::Impl::fallback_reason(
+    std::span<btPersistentManifold* const> manifolds) const {
+  if (manifolds.size() < minimum_batch) return SolverFallback::small;
   if (steps() != own_steps) return SolverFallback::overridden;
   if ((info->m_solverMode & kUnsupportedModes) != 0 || info->m_numIterations <= 0 ||
       max_iterations() > kMaxIterations) {
@@ -59,6 +76,9 @@ std::optional<SolverFallback> ConstraintSolver::Impl::fallback_reason(int manifo
     return SolverFallback::row_solver;
   }
   if (!are_known_joints(joints)) return SolverFallback::constraints;
+  if (thread_safe_library && depends_on_thread_safety(manifolds)) {
+    return SolverFallback::thread_safe;
+  }
   return std::nullopt;
 }
 

@@ -1,12 +1,17 @@
 /// Reproduces btDbvtBroadphase and btHashedOverlappingPairCache of Bullet 3.24.
 #include "src/bullet/world/aabb_update.hpp"
 
+#include <jfpx/error.hpp>
+
 #include "src/base/reserve.hpp"
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
+#include "src/bullet/world/plain_ghosts.hpp"
 
 #include <LinearMath/btQuickprof.h>
 
+#include <algorithm>
+#include <atomic>
 #include <new>
 
 namespace jfpx {
@@ -14,25 +19,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// Pointers to the protected tables of a pair cache.
-struct PairTables : btHashedOverlappingPairCache {
-  static constexpr auto heads = &PairTables::m_hashTable;
-  static constexpr auto next = &PairTables::m_next;
-  static constexpr auto ghosts = &PairTables::m_ghostPairCallback;
-};
-
-/// Copy of the cache's hash function, which is private. If it differed, the results would be the
-/// same, but Bullet would search for every pair.
-unsigned hash_of(int id0, int id1) {
-  unsigned key = static_cast<unsigned>(id0) | (static_cast<unsigned>(id1) << 16);
-  key += ~(key << 15);
-  key ^= key >> 10;
-  key += key << 3;
-  key ^= key >> 6;
-  key += ~(key << 11);
-  key ^= key >> 16;
-  return key;
-}
+constexpr std::size_t kLeavesPerChunk = 256;
 
 /// Defers the tree's search for overlaps to the caller. The tree requests the search by setting its
 /// cleanup flag.
@@ -76,9 +63,24 @@ void prefetch_body(btCollisionObjectArray& objects, int i) {
   }
 }
 
+/// Prefetches what apply_update() changes.
+void prefetch_leaf(std::span<const LeafUpdate> leaves, std::size_t i) {
+  constexpr std::size_t kAhead = 4;
+  if (i + 3 * kAhead < leaves.size()) {
+    prefetch_bytes(leaves[i + 3 * kAhead].proxy, sizeof(btDbvtProxy));
+  }
+  if (i + 2 * kAhead < leaves.size() && leaves[i + 2 * kAhead].moves) {
+    prefetch_ends(leaves[i + 2 * kAhead].proxy->leaf, sizeof(btDbvtNode));
+  }
+  if (i + kAhead < leaves.size() && leaves[i + kAhead].moves) {
+    const btDbvtNode* parent = leaves[i + kAhead].proxy->leaf->parent;
+    if (parent != nullptr) prefetch_ends(parent, sizeof(btDbvtNode));
+  }
+}
+
 }  // namespace
 
-bool AabbUpdate::run(btCollisionWorld& world) {
+bool AabbUpdate::run(btCollisionWorld& world, ThreadPool& pool) {
   btBroadphaseInterface& broadphase = *world.getBroadphase();
   if (!is_exactly<btDbvtBroadphase>(broadphase)) return false;
   auto& tree = static_cast<btDbvtBroadphase&>(broadphase);
@@ -86,12 +88,88 @@ bool AabbUpdate::run(btCollisionWorld& world) {
   if (!is_exactly<btHashedOverlappingPairCache>(pair_cache)) return false;
   auto& cache = static_cast<btHashedOverlappingPairCache&>(pair_cache);
   if (tree.m_deferedcollide || cache.getOverlapFilterCallback() != nullptr) return false;
-  // Both are called during the update, and may add and remove bodies.
-  if (cache.*PairTables::ghosts != nullptr || world.getDebugDrawer() != nullptr) return false;
+  if (!has_plain_ghosts(world, cache)) return false;
   const int leaves = tree.m_sets[0].m_leaves + tree.m_sets[1].m_leaves;
   if (!reserve_geometric(static_cast<std::size_t>(leaves))) return false;
 
-  BT_PROFILE("updateAabbs");  // Bullet's own name of the profile zone
+  // Leaves that belong to no object of the world are not among the updates.
+  if (leaves >= side_by_side_ && leaves == world.getNumCollisionObjects()) {
+    BT_PROFILE("updateAabbs");  // Bullet's own name of the profile zone
+    if (compute_updates(world, tree, pool) && run_side_by_side(tree, cache, pool)) return true;
+  }
+  // Called for an AABB that is too large; it may add and remove bodies.
+  if (world.getDebugDrawer() != nullptr) return false;
+  BT_PROFILE("updateAabbs");
+  run_one_by_one(world, tree, cache);
+  return true;
+}
+
+/// Returns false if an object must be updated by Bullet's code.
+bool AabbUpdate::compute_updates(btCollisionWorld& world, btDbvtBroadphase& tree,
+                                 ThreadPool& pool) {
+  btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  const auto count = static_cast<std::size_t>(objects.size());
+  leaves_.resize(count);
+  std::atomic<bool> possible{true};
+  pool.run((count + kLeavesPerChunk - 1) / kLeavesPerChunk, [&](std::size_t chunk) {
+    const std::size_t last = std::min(count, (chunk + 1) * kLeavesPerChunk);
+    for (std::size_t i = chunk * kLeavesPerChunk; i < last; ++i) {
+      prefetch_body(objects, static_cast<int>(i));
+      const LeafObstacle obstacle =
+          compute_update(world, tree, *objects[static_cast<int>(i)], &leaves_[i]);
+      if (obstacle != LeafObstacle::none) possible.store(false, std::memory_order_relaxed);
+    }
+  });
+  return possible;
+}
+
+/// Returns false and changes nothing if there is not enough memory.
+bool AabbUpdate::run_side_by_side(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
+                                  ThreadPool& pool) {
+  std::size_t overlaps = 0;
+  try {
+    overlaps = search_.run(pool, leaves_, cache);
+    jfpx::reserve_geometric(&others_, leaves_.size());
+  } catch (const OutOfMemory&) {
+    return false;
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+  tree.m_newpairs += static_cast<int>(overlaps);
+  std::span<const NewOverlap> found = search_.found();
+  for (std::size_t i = 0; i < leaves_.size(); ++i) {
+    prefetch_leaf(leaves_, i);
+    if (!leaves_[i].active) continue;
+    apply_update(tree, leaves_[i]);
+    std::size_t news = 0;
+    while (news < found.size() && found[news].turn == i) ++news;
+    if (news > 0) add_in_order(cache, leaves_[i].proxy, found.first(news));
+    found = found.subspan(news);
+  }
+  return true;
+}
+
+/// Adds the new pairs of a leaf in the order in which Bullet finds them: fixed objects first, then
+/// by position in the tree.
+void AabbUpdate::add_in_order(btHashedOverlappingPairCache& cache, btDbvtProxy* moved,
+                              std::span<const NewOverlap> overlaps) {
+  others_.clear();
+  for (const NewOverlap& overlap : overlaps) others_.push_back(overlap.other);
+  const auto is_fixed = [](const btDbvtProxy* proxy) {
+    return proxy->stage == btDbvtBroadphase::STAGECOUNT;
+  };
+  if (others_.size() > 1) {
+    std::sort(others_.begin(), others_.end(), [&](const btDbvtProxy* a, const btDbvtProxy* b) {
+      if (is_fixed(a) != is_fixed(b)) return is_fixed(a);
+      return is_visited_before(a->leaf, b->leaf);
+    });
+  }
+  for (btDbvtProxy* other : others_) cache.addOverlappingPair(other, moved);
+}
+
+/// Moves a leaf, and adds its new pairs, before the update of the next object is computed.
+void AabbUpdate::run_one_by_one(btCollisionWorld& world, btDbvtBroadphase& tree,
+                                btHashedOverlappingPairCache& cache) {
   DeferredSearch search(tree);
   btCollisionObjectArray& objects = world.getCollisionObjectArray();
   for (int i = 0; i < objects.size(); ++i) {
@@ -106,7 +184,6 @@ bool AabbUpdate::run(btCollisionWorld& world) {
     tree.m_newpairs += static_cast<int>(pairs_.size());
     add_pairs(cache);
   }
-  return true;
 }
 
 /// `leaves` elements suffice: no leaf is found twice, and no node in the stack is an ancestor of
@@ -115,6 +192,7 @@ bool AabbUpdate::reserve_geometric(std::size_t leaves) noexcept {
   try {
     jfpx::reserve_geometric(&stack_, leaves);
     jfpx::reserve_geometric(&pairs_, leaves);
+    jfpx::reserve_geometric(&leaves_, leaves);
     return true;
   } catch (const std::bad_alloc&) {
     return false;
@@ -156,7 +234,7 @@ void AabbUpdate::add_pairs(btHashedOverlappingPairCache& cache) {
   for (Pair& pair : pairs_) {
     pair.swapped = pair.a->m_uniqueId > pair.b->m_uniqueId;
     if (pair.swapped) std::swap(pair.a, pair.b);
-    const unsigned at = hash_of(pair.a->m_uniqueId, pair.b->m_uniqueId) & mask;
+    const unsigned at = pair_hash(pair.a->m_uniqueId, pair.b->m_uniqueId) & mask;
     if (at < static_cast<unsigned>(heads.size()))
       prefetch(pair.slot = &heads[static_cast<int>(at)]);
   }

@@ -1,39 +1,61 @@
-/// Update of the AABBs in Bullet's dynamic tree, with the same results in the same order, and with
-/// software prefetching.
+/// Update of the AABBs in Bullet's dynamic tree, with the same results in the same order.
 #pragma once
 
 #include <jfpx/config.hpp>
 
+#include "src/base/thread_pool.hpp"
+#include "src/bullet/world/leaf_update.hpp"
+#include "src/bullet/world/overlap_search.hpp"
+
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
 
+#include <span>
 #include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// In large worlds, Bullet spends more than half of the update on finding pairs that are already in
-/// the hash table, one after the other; each takes several reads from memory.
+/// In large worlds, most of the update is the search for overlaps, and most of that is looking up
+/// pairs that are already in the hash table. Only the shape of the tree depends on the order of the
+/// objects. New volumes, overlaps and new pairs are therefore computed in parallel; then the leaves
+/// are moved one after the other, and the new pairs of each are added in the order in which Bullet
+/// would find them.
 class JFPX_API AabbUpdate {
  public:
+  /// @param side_by_side with fewer objects, one is updated after the other, which is then faster
+  explicit AabbUpdate(int side_by_side = 256) : side_by_side_(side_by_side) {}
+
   /// Has the effect of btCollisionWorld::updateAabbs(). Returns false and changes nothing if the
-  /// broadphase is not Bullet's default, its own tree with its own hash table, if a pair filter, a
-  /// ghost pair callback or a debug drawer is set, or if there is not enough memory.
-  bool run(btCollisionWorld& world);
+  /// broadphase is not Bullet's default, its own tree with its own hash table, if user code may run
+  /// during the update (a pair filter, ghosts or shapes of a user class, a debug drawer in a small
+  /// world or with an AABB that is too large), or if there is not enough memory.
+  bool run(btCollisionWorld& world, ThreadPool& pool);
 
  private:
   struct Pair {
     btDbvtProxy *a, *b;  ///< by ascending id
     bool swapped;        ///< `a` is the body that has moved
-    int* slot;           ///< the hash table's slot of the pair
+    const int* slot;     ///< the hash table's slot of the pair
     int index;           ///< index of the first pair to compare with
   };
 
   bool reserve_geometric(std::size_t leaves) noexcept;
+  bool compute_updates(btCollisionWorld& world, btDbvtBroadphase& tree, ThreadPool& pool);
+  bool run_side_by_side(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
+                        ThreadPool& pool);
+  void run_one_by_one(btCollisionWorld& world, btDbvtBroadphase& tree,
+                      btHashedOverlappingPairCache& cache);
   void find_overlaps(const btDbvtNode* root, const btDbvtNode* leaf);
   void add_pairs(btHashedOverlappingPairCache& cache);
+  void add_in_order(btHashedOverlappingPairCache& cache, btDbvtProxy* moved,
+                    std::span<const NewOverlap> overlaps);
 
+  int side_by_side_;
+  std::vector<LeafUpdate> leaves_;
+  OverlapSearch search_;
+  std::vector<btDbvtProxy*> others_;
   std::vector<const btDbvtNode*> stack_;
   std::vector<Pair> pairs_;
 };

@@ -6,6 +6,7 @@
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/world/aabb_update.hpp"
 #include "src/bullet/world/islands.hpp"
+#include "src/bullet/world/pair_cleanup.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
 #include <LinearMath/btQuickprof.h>
@@ -33,6 +34,7 @@ struct DynamicsWorld::Impl {
   ThreadPool pool;
   IslandSolver islands;
   AabbUpdate boxes;
+  PairCleanup cleanup;
   std::size_t minimum_batch;
 
   explicit Impl(const DynamicsWorldOptions& options)
@@ -118,7 +120,13 @@ void DynamicsWorld::integrateTransforms(btScalar dt) {
 }
 
 void DynamicsWorld::updateAabbs() {
-  if (is_small() || !impl_->boxes.run(*this)) btDiscreteDynamicsWorld::updateAabbs();
+  if (is_small() || !impl_->boxes.run(*this, impl_->pool)) btDiscreteDynamicsWorld::updateAabbs();
+}
+
+void DynamicsWorld::computeOverlappingPairs() {
+  if (is_small() || !impl_->cleanup.run(*this, impl_->pool)) {
+    btDiscreteDynamicsWorld::computeOverlappingPairs();
+  }
 }
 
 bool DynamicsWorld::has_stock_island_manager() const noexcept {
@@ -126,16 +134,16 @@ bool DynamicsWorld::has_stock_island_manager() const noexcept {
 }
 
 void DynamicsWorld::calculateSimulationIslands() {
-  if (is_small() || !has_stock_island_manager()) {
+  if (is_small() || !has_stock_island_manager() || !impl_->islands.reserve_for_unions(*this)) {
     btDiscreteDynamicsWorld::calculateSimulationIslands();
     return;
   }
   BT_PROFILE("calculateSimulationIslands");
   btUnionFind& unions = getSimulationIslandManager()->getUnionFind();
+  impl_->islands.number_and_unite(*this, &unions);
   const auto unite = [&](const btCollisionObject& a, const btCollisionObject& b) {
     if (is_movable(a) && is_movable(b)) unions.unite(a.getIslandTag(), b.getIslandTag());
   };
-  number_and_unite(*this, &unions);
   for (int i = 0; i < m_predictiveManifolds.size(); ++i) {
     unite(*m_predictiveManifolds[i]->getBody0(), *m_predictiveManifolds[i]->getBody1());
   }
@@ -143,7 +151,7 @@ void DynamicsWorld::calculateSimulationIslands() {
     if (!m_constraints[i]->isEnabled()) continue;
     unite(m_constraints[i]->getRigidBodyA(), m_constraints[i]->getRigidBodyB());
   }
-  store_islands(*this, &unions);
+  impl_->islands.store_islands(*this, &unions);
 }
 
 void DynamicsWorld::solveConstraints(btContactSolverInfo& info) {

@@ -2,12 +2,12 @@
 /// btDiscreteDynamicsWorld.cpp, of Bullet 3.24 step by step.
 #include "src/bullet/world/islands.hpp"
 
-#include <jfpx/bullet/dispatcher.hpp>
 #include <jfpx/error.hpp>
 
 #include "src/base/reserve.hpp"
-#include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
+#include "src/bullet/world/parallel_quick_sort.hpp"
+#include "src/bullet/world/plain_dispatcher.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
@@ -17,13 +17,26 @@
 #include <algorithm>
 #include <atomic>
 #include <new>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr int kManifoldsPerChunk = 4096;
+constexpr int kManifoldsPerChunk = 4096, kObjectsPerChunk = 1024;
+constexpr std::size_t kPairsPerChunk = 4096;
+
+/// As btUnionFind::find(), without compressing paths, so that threads may search concurrently.
+int root_of(const btUnionFind& unions, int x) {
+  while (x != unions.getElement(x).m_id) x = unions.getElement(x).m_id;
+  return x;
+}
+
+/// Shortens the paths of the next searches to one step.
+void point_to_roots(btUnionFind* unions) {
+  for (int i = 0; i < unions->getNumElements(); ++i) unions->getElement(i).m_id = unions->find(i);
+}
 
 void prefetch_island_state_of(const btCollisionObjectArray& objects, int i) {
   if (i < objects.size()) prefetch_island_state(objects[i]);
@@ -72,52 +85,127 @@ void prefetch_manifold(btPersistentManifold* const* manifolds, int i, int count)
 
 }  // namespace
 
-void number_and_unite(btCollisionWorld& world, btUnionFind* unions) {
-  btCollisionObjectArray& objects = world.getCollisionObjectArray();
-  int count = 0;
-  for (int i = 0; i < objects.size(); ++i) {
-    prefetch_island_state_of(objects, i + kObjectsAhead);
-    btCollisionObject* object = objects[i];
-    if (!object->isStaticOrKinematicObject()) object->setIslandTag(count++);
-    object->setCompanionId(-1);
-    object->setHitFraction(1);
+bool IslandSolver::reserve_for_unions(btCollisionWorld& world) noexcept {
+  const auto objects = static_cast<std::size_t>(world.getNumCollisionObjects());
+  const auto pairs = static_cast<std::size_t>(world.getPairCache()->getNumOverlappingPairs());
+  try {
+    resize_geometric(&numbers_, objects / std::size_t{kObjectsPerChunk} + 2);
+    resize_geometric(&chunk_counts_, std::min(pairs, pairs_per_round_) / kPairsPerChunk + 1);
+    edges_.reserve(std::min(pairs, pairs_per_round_), "pairs of islands");
+  } catch (const OutOfMemory&) {
+    return false;
+  } catch (const std::bad_alloc&) {
+    return false;
   }
-  unions->reset(count);
+  return true;
+}
+
+void IslandSolver::number_and_unite(btCollisionWorld& world, btUnionFind* unions) {
+  number_objects(world.getCollisionObjectArray());
+  unions->reset(numbers_.back());
   btOverlappingPairCache* cache = world.getPairCache();
-  const int pairs = cache->getNumOverlappingPairs();
-  if (pairs == 0) return;
-  const btBroadphasePair* pair = cache->getOverlappingPairArrayPtr();
-  for (int i = 0; i < pairs; ++i) {
-    if (i + 2 * kObjectsAhead < pairs) {
-      prefetch(pair[i + 2 * kObjectsAhead].m_pProxy0);
-      prefetch(pair[i + 2 * kObjectsAhead].m_pProxy1);
+  const auto count = static_cast<std::size_t>(cache->getNumOverlappingPairs());
+  if (count == 0) return;
+  const std::span pairs(cache->getOverlappingPairArrayPtr(), count);
+  // Most pairs of later rounds connect objects that earlier rounds have united.
+  for (std::size_t first = 0; first < count; first += pairs_per_round_) {
+    const int edges =
+        find_edges(pairs.subspan(first, std::min(pairs_per_round_, count - first)), *unions);
+    for (int i = 0; i < edges; ++i) {
+      const Edge& edge = edges_[static_cast<std::size_t>(i)];
+      unions->unite(edge.a, edge.b);
     }
-    if (i + kObjectsAhead < pairs) {
-      prefetch_island_state(object_of(pair[i + kObjectsAhead].m_pProxy0));
-      prefetch_island_state(object_of(pair[i + kObjectsAhead].m_pProxy1));
-    }
-    const btCollisionObject* a = object_of(pair[i].m_pProxy0);
-    const btCollisionObject* b = object_of(pair[i].m_pProxy1);
-    if (merges(a) && merges(b)) unions->unite(a->getIslandTag(), b->getIslandTag());
+    point_to_roots(unions);
   }
 }
 
-void store_islands(btCollisionWorld& world, btUnionFind* unions) {
-  btCollisionObjectArray& objects = world.getCollisionObjectArray();
-  int index = 0;
-  for (int i = 0; i < objects.size(); ++i) {
-    prefetch_island_state_of(objects, i + kObjectsAhead);
-    btCollisionObject* object = objects[i];
-    if (object->isStaticOrKinematicObject()) {
-      object->setIslandTag(-1);
-      object->setCompanionId(-2);
-    } else {
-      object->setIslandTag(unions->find(index));
-      unions->getElement(index).m_sz = i;
-      object->setCompanionId(-1);
-      ++index;
+/// Calls run(chunk, first, last) for all chunks of objects in parallel.
+template <class Run>
+void IslandSolver::in_chunks(const btCollisionObjectArray& objects, const Run& run) {
+  pool_.run(numbers_.size() - 1, [&](std::size_t chunk) {
+    const int first = static_cast<int>(chunk) * kObjectsPerChunk;
+    run(chunk, first, std::min(objects.size(), first + kObjectsPerChunk));
+  });
+}
+
+/// Numbers the movable objects; numbers_ receives the first number of each chunk, and the total.
+void IslandSolver::number_objects(btCollisionObjectArray& objects) {
+  in_chunks(objects, [&](std::size_t chunk, int first, int last) {
+    int movable = 0;
+    for (int i = first; i < last; ++i) {
+      prefetch_island_state_of(objects, i + kObjectsAhead);
+      movable += objects[i]->isStaticOrKinematicObject() ? 0 : 1;
     }
+    numbers_[chunk] = movable;
+  });
+  numbers_.back() = 0;
+  int next = 0;
+  for (int& number : numbers_) next += std::exchange(number, next);
+  in_chunks(objects, [&](std::size_t chunk, int first, int last) {
+    int number = numbers_[chunk];
+    for (int i = first; i < last; ++i) {
+      prefetch_island_state_of(objects, i + kObjectsAhead);
+      btCollisionObject& object = *objects[i];
+      if (!object.isStaticOrKinematicObject()) object.setIslandTag(number++);
+      object.setCompanionId(-1);
+      object.setHitFraction(1);
+    }
+  });
+}
+
+/// Lists the pairs of objects in different sets, in order. Reads the sets, and leaves the results
+/// of find() unchanged. @return their number
+int IslandSolver::find_edges(std::span<const btBroadphasePair> pairs, const btUnionFind& unions) {
+  const std::size_t count = pairs.size();
+  const std::size_t chunks = (count + kPairsPerChunk - 1) / kPairsPerChunk;
+  pool_.run(chunks, [&](std::size_t chunk) {
+    const std::size_t first = chunk * kPairsPerChunk;
+    const std::size_t last = std::min(count, first + kPairsPerChunk);
+    std::size_t next = first;
+    for (std::size_t i = first; i < last; ++i) {
+      if (i + 2 * kObjectsAhead < last) {
+        prefetch(pairs[i + 2 * kObjectsAhead].m_pProxy0);
+        prefetch(pairs[i + 2 * kObjectsAhead].m_pProxy1);
+      }
+      if (i + kObjectsAhead < last) {
+        prefetch_island_state(object_of(pairs[i + kObjectsAhead].m_pProxy0));
+        prefetch_island_state(object_of(pairs[i + kObjectsAhead].m_pProxy1));
+      }
+      const btCollisionObject *a = object_of(pairs[i].m_pProxy0),
+                              *b = object_of(pairs[i].m_pProxy1);
+      if (!merges(a) || !merges(b)) continue;
+      const Edge edge{a->getIslandTag(), b->getIslandTag()};
+      if (root_of(unions, edge.a) != root_of(unions, edge.b)) edges_[next++] = edge;
+    }
+    chunk_counts_[chunk] = static_cast<int>(next - first);
+  });
+  int total = 0;
+  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+    const auto found = static_cast<std::size_t>(chunk_counts_[chunk]);
+    std::copy_n(edges_.data() + chunk * kPairsPerChunk, found, edges_.data() + total);
+    total += static_cast<int>(found);
   }
+  return total;
+}
+
+void IslandSolver::store_islands(btCollisionWorld& world, btUnionFind* unions) {
+  btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  in_chunks(objects, [&](std::size_t chunk, int first, int last) {
+    int number = numbers_[chunk];
+    for (int i = first; i < last; ++i) {
+      prefetch_island_state_of(objects, i + kObjectsAhead);
+      btCollisionObject* object = objects[i];
+      if (object->isStaticOrKinematicObject()) {
+        object->setIslandTag(-1);
+        object->setCompanionId(-2);
+      } else {
+        object->setIslandTag(root_of(*unions, number));
+        unions->getElement(number).m_sz = i;
+        object->setCompanionId(-1);
+        ++number;
+      }
+    }
+  });
 }
 
 bool IslandSolver::reserve_geometric(btCollisionWorld& world, int constraint_count) noexcept {
@@ -142,12 +230,22 @@ void IslandSolver::solve(btCollisionWorld& world, btUnionFind& unions, btConstra
                          int constraint_count) {
   {
     BT_PROFILE("islandUnionFindAndQuickSort");
-    unions.sortIslands();
+    sort_islands(unions);
     update_sleep(world.getCollisionObjectArray(), unions);
     collect_manifolds(world);
   }
   BT_PROFILE("processIslands");
   solve_awake(world, unions, solver, info, constraints, constraint_count);
+}
+
+/// btUnionFind::sortIslands()
+void IslandSolver::sort_islands(btUnionFind& unions) {
+  const int count = unions.getNumElements();
+  if (count == 0) return;
+  point_to_roots(&unions);
+  const std::span elements(&unions.getElement(0), static_cast<std::size_t>(count));
+  parallel_quick_sort(pool_, elements,
+                      [](const btElement& l, const btElement& r) { return l.m_id < r.m_id; });
 }
 
 /// An island sleeps if none of its objects is awake; otherwise all of its objects are woken.
@@ -176,13 +274,6 @@ void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& un
       }
     }
   }
-}
-
-/// False for a class of the user, which may override access to the manifolds, and whose overrides
-/// need not be thread-safe.
-bool is_plain(const btDispatcher& dispatcher) {
-  return is_exactly<btCollisionDispatcher>(dispatcher) ||
-         is_exactly<CollisionDispatcher>(dispatcher);
 }
 
 /// Lists the manifolds of the islands to solve, and their islands.
@@ -253,7 +344,10 @@ void IslandSolver::sort_manifolds(bool by_pair) {
     for (int i = 0; i < count_; ++i) {
       keys_[i] = {found_island_[static_cast<std::size_t>(i)], i};
     }
-    keys_.quickSort([](const IslandKey& l, const IslandKey& r) { return l.island < r.island; });
+    if (count_ == 0) return;
+    const std::span keys(&keys_[0], static_cast<std::size_t>(count_));
+    parallel_quick_sort(pool_, keys,
+                        [](const IslandKey& l, const IslandKey& r) { return l.island < r.island; });
     return;
   }
   pair_keys_.resizeNoInitialize(count_);
@@ -267,6 +361,21 @@ void IslandSolver::sort_manifolds(bool by_pair) {
     return l.uid0 != r.uid0 ? l.uid0 < r.uid0 : l.uid1 < r.uid1;
   });
   for (int i = 0; i < count_; ++i) keys_[i] = {pair_keys_[i].island, pair_keys_[i].index};
+}
+
+/// Adds the manifolds of the keys [first, last) to the group.
+void IslandSolver::add_manifolds(int first, int last) {
+  const std::size_t before = manifolds_.size();
+  manifolds_.resize(before + static_cast<std::size_t>(last - first));
+  const int chunks = (last - first + kManifoldsPerChunk - 1) / kManifoldsPerChunk;
+  pool_.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
+    const int begin = first + static_cast<int>(chunk) * kManifoldsPerChunk;
+    const int end = std::min(last, begin + kManifoldsPerChunk);
+    for (int k = begin; k < end; ++k) {
+      manifolds_[before + static_cast<std::size_t>(k - first)] =
+          found_[static_cast<std::size_t>(keys_[k].index)];
+    }
+  });
 }
 
 void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
@@ -303,9 +412,7 @@ void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
       bodies_.resize(bodies_before);
       continue;
     }
-    for (int k = first_key; k < key; ++k) {
-      manifolds_.push_back(found_[static_cast<std::size_t>(keys_[k].index)]);
-    }
+    add_manifolds(first_key, key);
     while (joint < constraint_count && island_of(*constraints[joint]) < island) ++joint;
     for (; joint < constraint_count && island_of(*constraints[joint]) == island; ++joint) {
       constraints_.push_back(constraints[joint]);

@@ -11,6 +11,7 @@
 #include <BulletCollision/CollisionDispatch/btSimulationIslandManager.h>
 #include <BulletDynamics/ConstraintSolver/btConstraintSolver.h>
 
+#include <span>
 #include <vector>
 
 class btTypedConstraint;
@@ -19,16 +20,20 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// btSimulationIslandManager::updateActivationState(): numbers the movable objects, and unites
-/// those whose AABBs overlap.
-void number_and_unite(btCollisionWorld& world, btUnionFind* unions);
-/// btSimulationIslandManager::storeIslandActivationState(): writes island tags to the objects.
-void store_islands(btCollisionWorld& world, btUnionFind* unions);
-
 /// Builds the islands of a world, and solves the awake ones in the same groups as Bullet.
 class IslandSolver {
  public:
-  explicit IslandSolver(ThreadPool& pool) : pool_(pool) {}
+  /// @param pairs_per_round number of pairs that are compared in parallel with the same islands
+  explicit IslandSolver(ThreadPool& pool, std::size_t pairs_per_round = std::size_t{1} << 17)
+      : pool_(pool), pairs_per_round_(pairs_per_round) {}
+
+  /// Reserves all memory that the next two functions need. @returns false if an allocation fails
+  bool reserve_for_unions(btCollisionWorld& world) noexcept;
+  /// btSimulationIslandManager::updateActivationState(): numbers the movable objects, and unites
+  /// those whose AABBs overlap.
+  void number_and_unite(btCollisionWorld& world, btUnionFind* unions);
+  /// btSimulationIslandManager::storeIslandActivationState(): writes island tags to the objects.
+  void store_islands(btCollisionWorld& world, btUnionFind* unions);
 
   /// Reserves all memory that solve() needs. @returns false if an allocation fails
   bool reserve_geometric(btCollisionWorld& world, int constraint_count) noexcept;
@@ -42,19 +47,32 @@ class IslandSolver {
   struct IslandKey {
     int island, index;
   };
+  /// Two objects to unite, by number.
+  struct Edge {
+    int a, b;
+  };
   struct PairKey {
     int island, uid0, uid1, index;
   };
 
+  template <class Run>
+  void in_chunks(const btCollisionObjectArray& objects, const Run& run);
+  void number_objects(btCollisionObjectArray& objects);
+  int find_edges(std::span<const btBroadphasePair> pairs, const btUnionFind& unions);
   static void update_sleep(btCollisionObjectArray& objects, btUnionFind& unions);
   void collect_manifolds(btCollisionWorld& world);
   bool collect_in_parallel(btDispatcher& dispatcher, bool only_touching);
+  void sort_islands(btUnionFind& unions);
   void sort_manifolds(bool by_pair);
+  void add_manifolds(int first, int last);
   void solve_awake(btCollisionWorld& world, btUnionFind& unions, btConstraintSolver& solver,
                    const btContactSolverInfo& info, btTypedConstraint** constraints,
                    int constraint_count);
 
   ThreadPool& pool_;
+  std::size_t pairs_per_round_;
+  std::vector<int> numbers_;  ///< by chunk of objects: number of the first movable one
+  Buffer<Edge> edges_;
   btAlignedObjectArray<IslandKey> keys_;
   btAlignedObjectArray<PairKey> pair_keys_;
   Buffer<btPersistentManifold*> found_;  ///< manifolds to solve, in the dispatcher's order

@@ -1,0 +1,27 @@
+/// Detects the flag by its effect on a constructor of the library.
+#include "src/bullet/thread_safe_library.hpp"
+
+#include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+// btCreateDefaultTaskScheduler() would also tell, but starts threads, and its destruction resets
+// the thread indices that a scheduler of the program uses.
+bool is_thread_safe_library() {
+  // One stack for ray tests per thread that Bullet supports.
+  static const bool result = btDbvtBroadphase().m_rayTestStacks.size() > 1;
+  return result;
+}
+
+bool depends_on_thread_safety(const btCollisionObject& object) {
+  const btRigidBody* body = btRigidBody::upcast(&object);
+  if (body == nullptr) return false;
+  return body->isKinematicObject() || (body->getInvMass() != 0) == body->isStaticObject();
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

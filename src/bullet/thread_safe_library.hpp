@@ -1,0 +1,23 @@
+/// Whether the Bullet library of this process is compiled with BT_THREADSAFE, which neither
+/// Bullet's headers nor its pkg-config file tell.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+class btCollisionObject;
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+/// The first call asks the library; later ones return the same answer. Thread-safe.
+bool is_thread_safe_library();
+
+/// Whether a solver with BT_THREADSAFE may treat the object differently. It keeps the solver bodies
+/// of kinematic bodies in a table instead of in their companion ids, and decides by the collision
+/// flags instead of the mass whether a body moves.
+bool depends_on_thread_safety(const btCollisionObject& object);
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,90 @@
+/// btAlignedObjectArray::quickSort() on several threads, with the same permutation.
+#pragma once
+
+#include "src/base/thread_pool.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <tuple>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+/// Bullet's sort is not stable, so the order of equal items depends on its steps. The two parts of
+/// a partition do not depend on each other: they are sorted in parallel.
+template <class T, class Less>
+class ParallelQuickSort {
+ public:
+  explicit ParallelQuickSort(const Less& less) : less_(less) {}
+
+  /// Allocates no memory.
+  void sort(ThreadPool& pool, std::span<T> items) const {
+    if (items.size() < 2) return;
+    std::array<Part, kMaxParts> parts{Part{0, items.size() - 1}}, halves;
+    std::size_t count = 1;
+    // Each round halves the parts, so its time is that of the largest part.
+    if (pool.threads() > 1 && items.size() >= kSerial) {
+      while (count > 0 && count < 4 * pool.threads() && 2 * count <= kMaxParts) {
+        pool.run(count, [&](std::size_t i) {
+          std::tie(halves[2 * i], halves[2 * i + 1]) = partition(items, parts[i]);
+        });
+        const auto end =
+            std::copy_if(halves.begin(), halves.begin() + static_cast<std::ptrdiff_t>(2 * count),
+                         parts.begin(), [](const Part& part) { return part.steps() > 0; });
+        count = static_cast<std::size_t>(end - parts.begin());
+      }
+    }
+    pool.run(count, [&](std::size_t i) { sort_part(items, parts[i]); });
+  }
+
+ private:
+  static constexpr std::size_t kSerial = 8192;  ///< fewer items are sorted by one thread
+
+  static constexpr std::size_t kMaxParts = 256;
+
+  /// Items [first, last]; nothing to sort unless first < last.
+  struct Part {
+    std::size_t first = 0, last = 0;
+    std::size_t steps() const { return first < last ? last - first : 0; }
+  };
+
+  /// The steps of btAlignedObjectArray::quickSortInternal().
+  std::pair<Part, Part> partition(std::span<T> items, const Part& part) const {
+    auto i = static_cast<std::ptrdiff_t>(part.first), j = static_cast<std::ptrdiff_t>(part.last);
+    const T pivot = items[(part.first + part.last) / 2];
+    const auto at = [&](std::ptrdiff_t k) -> T& { return items[static_cast<std::size_t>(k)]; };
+    do {
+      while (less_(at(i), pivot)) ++i;
+      while (less_(pivot, at(j))) --j;
+      if (i <= j) std::swap(at(i++), at(j--));
+    } while (i <= j);
+    const auto first = static_cast<std::ptrdiff_t>(part.first);
+    const auto last = static_cast<std::ptrdiff_t>(part.last);
+    return {first < j ? Part{part.first, static_cast<std::size_t>(j)} : Part{},
+            i < last ? Part{static_cast<std::size_t>(i), part.last} : Part{}};
+  }
+  void sort_part(std::span<T> items, Part part) const {
+    while (part.steps() > 0) {
+      // Recursion into the smaller part limits the depth.
+      const auto [left, right] = partition(items, part);
+      const bool left_is_smaller = left.steps() < right.steps();
+      sort_part(items, left_is_smaller ? left : right);
+      part = left_is_smaller ? right : left;
+    }
+  }
+
+  Less less_;
+};
+
+template <class T, class Less>
+void parallel_quick_sort(ThreadPool& pool, std::span<T> items, const Less& less) {
+  ParallelQuickSort<T, Less>(less).sort(pool, items);
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,37 @@
+# Builds Bullet with BT_THREADSAFE from JFPX_BULLET_SOURCE, and runs test programs with it. The libraries
+# have the names of the installed ones, so that LD_LIBRARY_PATH replaces these.
+set(folder ${CMAKE_CURRENT_BINARY_DIR}/thread_safe_bullet)
+foreach(suffix IN ITEMS "" "_f64")
+  if(NOT JFPX_HAS_PRECISION${suffix})
+    continue()
+  endif()
+  set(name_suffix "")
+  set(options BT_THREADSAFE=1)
+  if(suffix)
+    set(name_suffix -float64)
+    list(APPEND options BT_USE_DOUBLE_PRECISION)
+  endif()
+  foreach(part IN ITEMS LinearMath BulletCollision BulletDynamics)
+    set(target thread_safe_${part}${suffix})
+    file(GLOB_RECURSE sources ${JFPX_BULLET_SOURCE}/src/${part}/*.cpp)
+    if(NOT sources)
+      message(FATAL_ERROR "JFPX_BULLET_SOURCE is \"${JFPX_BULLET_SOURCE}\"; it has no sources in src/${part}.")
+    endif()
+    add_library(${target} SHARED ${sources})
+    target_include_directories(${target} PRIVATE ${JFPX_BULLET_SOURCE}/src)
+    target_compile_definitions(${target} PRIVATE ${options})
+    target_compile_options(${target} PRIVATE -w)
+    target_link_libraries(${target} PRIVATE Threads::Threads)
+    set_target_properties(${target} PROPERTIES OUTPUT_NAME ${part}${name_suffix}
+      SOVERSION ${JFPX_BULLET_F32_VERSION} LIBRARY_OUTPUT_DIRECTORY ${folder} EXPORT_COMPILE_COMMANDS OFF)
+  endforeach()
+  # Without this, a library that is not loaded would go unnoticed.
+  add_test(NAME ThreadSafeBullet.IsLoaded${suffix} COMMAND ldd $<TARGET_FILE:bullet_solver_test${suffix}>)
+  set_tests_properties(ThreadSafeBullet.IsLoaded${suffix} PROPERTIES
+    PASS_REGULAR_EXPRESSION "${folder}/libBulletDynamics" ENVIRONMENT LD_LIBRARY_PATH=${folder})
+  foreach(program IN ITEMS random_worlds solver trajectory)
+    add_test(NAME ThreadSafeBullet.HasTheBitsOfStock_${program}${suffix} COMMAND bullet_${program}_test${suffix})
+    set_tests_properties(ThreadSafeBullet.HasTheBitsOfStock_${program}${suffix} PROPERTIES
+      ENVIRONMENT LD_LIBRARY_PATH=${folder} TIMEOUT 600)
+  endforeach()
+endforeach()
