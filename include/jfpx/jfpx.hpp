@@ -15,5 +15,6 @@
 #include <jfpx/random.hpp>
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
+#include <jfpx/snapshot.hpp>
 #include <jfpx/sphere_collider.hpp>
 #include <jfpx/world.hpp>
