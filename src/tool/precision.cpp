@@ -36,6 +36,10 @@ std::string selected_precision(int argc, char** argv) {
   }
   if (argc < 3 || std::string_view(argv[1]) != "replay") return {};
   for (int i = 2; i < argc; ++i) {
+    if (std::string_view(argv[i]) == "--from") {
+      ++i;  // a snapshot, not the recording
+      continue;
+    }
     if (argv[i][0] != '-' && std::filesystem::is_regular_file(argv[i])) {
       return recording_precision(argv[i]);
     }
