@@ -278,6 +278,21 @@ TEST_P(Snapshots, KeepSleepersAndWhatTheyLieOn) {
   EXPECT_LT(other.states()[1].position.y, 0.6_r);
 }
 
+TEST_P(Snapshots, HaveTheStatedSize) {
+  const auto size = [](int balls, Real distance) {
+    Scene scene = test::empty_scene();
+    for (int i = 0; i < balls; ++i) scene.bodies.push_back(test::ball({distance * Real(i), 0, 0}));
+    World world(scene);
+    world.step();
+    return world.snapshot().bytes.size();
+  };
+  EXPECT_EQ(size(9, 5) - size(8, 5), sizeof(Real) == 4 ? 206u : 382u);
+  const std::size_t contact = size(2, 1.5_r) - size(2, 5);
+  if (GetParam() == Solver::soft_step) {
+    EXPECT_EQ(contact, sizeof(Real) == 4 ? 98u : 162u);
+  }
+}
+
 TEST_P(Snapshots, OfAWorldWithoutBodies) {
   World world(test::empty_scene());
   const Snapshot empty = world.snapshot();
