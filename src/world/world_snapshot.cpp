@@ -53,7 +53,6 @@ void World::Impl::read(BinaryReader* reader) {
   shows_events = false;
   new_forces.commit(&forces);
   new_generators.commit(&generators);
-  events.invalidate();
   note_change();
 }
 
