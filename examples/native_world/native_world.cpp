@@ -115,4 +115,14 @@ int main() {
   }
   std::printf("the crate is %s, %.0f mm deep in the floor\n",
               world.awake(crate) ? "awake" : "asleep", static_cast<double>(-deepest) * 1000);
+
+  const auto swing = [&world, lamp] {
+    world.apply_force(lamp, {2000, 0, 0});
+    for (int n = 0; n < 60; ++n) world.step();
+    return world.state_hash();
+  };
+  const jfpx::Snapshot snapshot = world.snapshot();
+  const std::uint64_t hash = swing();
+  world.restore(snapshot);
+  if (swing() == hash) std::printf("the lamp has swung twice, with the same bits\n");
 }

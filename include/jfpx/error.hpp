@@ -30,6 +30,14 @@ class JFPX_API InvalidArgument : public Error {
   ~InvalidArgument() override;
 };
 
+/// A snapshot that a world can't restore: truncated, corrupt, of another version or precision, or
+/// of a world with other callbacks. The message gives the reason.
+class JFPX_API InvalidSnapshot : public Error {
+ public:
+  using Error::Error;
+  ~InvalidSnapshot() override;
+};
+
 /// A backend was requested explicitly and can't be used. The message gives the reason.
 class JFPX_API BackendUnavailable : public Error {
  public:

@@ -18,5 +18,6 @@
 #include <jfpx/recorded_world.hpp>
 #include <jfpx/recording.hpp>
 #include <jfpx/scene.hpp>
+#include <jfpx/snapshot.hpp>
 #include <jfpx/sphere_collider.hpp>
 #include <jfpx/world.hpp>

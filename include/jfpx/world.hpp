@@ -6,6 +6,7 @@
 #include <jfpx/force.hpp>
 #include <jfpx/query.hpp>
 #include <jfpx/scene.hpp>
+#include <jfpx/snapshot.hpp>
 #include <jfpx/sphere_collider.hpp>
 
 #include <functional>
@@ -274,7 +275,28 @@ class JFPX_API World {
   std::vector<BodyId> overlapping(const Box& box, const Vec3& centre,
                                   const Quat& orientation = {}) const;
 
-  double time() const;  ///< [s], completed steps times dt
+  /// Everything that the following steps depend on, as a value: bodies, ids, ignored pairs,
+  /// settings, sleep, accumulated forces, contacts with their impulses, and forces of force.hpp. A
+  /// function of the state alone. User-defined forces and contact generators are recorded by id.
+  /// @throws OutOfMemory, DeviceError
+  Snapshot snapshot() const;
+  /// Replaces the state. All following steps have the bits of those after snapshot(), on any
+  /// machine, whatever the WorldSettings and the previous state of this world. Spans and references
+  /// of this world become invalid. Ids are those of the snapshot; later ones are unknown and will
+  /// be given again. contacts() are those of the snapshot; contact_events() is empty until the next
+  /// step, which has the same events as without the restoration.
+  ///
+  /// Forces of force.hpp are restored with their parameters; references from force() remain valid
+  /// if the snapshot has a force of the same id and type. Functions of the program are not in a
+  /// snapshot: this world must have user-defined forces and contact generators with the same ids,
+  /// which remain as they are. A world of another process has them if it has added all forces and
+  /// generators in the same order.
+  /// @throws InvalidSnapshot if the bytes are not of snapshot() in this version and precision, or
+  ///   the user-defined callbacks differ; OutOfMemory. The world is then unchanged.
+  void restore(const Snapshot& snapshot);
+
+  std::uint64_t steps() const;  ///< number of completed steps, without undone ones
+  double time() const;          ///< [s], completed steps times dt
   /// Contacts of the last step, as three consecutive lists:
   ///   - contacts of two spheres (bodies or parts of compounds), sorted by (a.index, b.index);
   ///   - other detected contacts, in the same order;
@@ -296,7 +318,8 @@ class JFPX_API World {
   std::span<const ContactEvent> contact_events() const;
   /// state_hash() of states().
   std::uint64_t state_hash() const;
-  /// The scene that was passed to the constructor; its bodies are those at construction.
+  /// The scene that was passed to the constructor; its bodies are those at construction. restore()
+  /// replaces name and settings, but not the bodies and ignored pairs.
   const Scene& scene() const;
 
  private:

@@ -12,6 +12,7 @@ BackendUnavailable::~BackendUnavailable() = default;
 OutOfMemory::~OutOfMemory() = default;
 DeviceError::~DeviceError() = default;
 FileError::~FileError() = default;
+InvalidSnapshot::~InvalidSnapshot() = default;
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -6,6 +6,7 @@
 #include "src/contact_solver/greedy_coloring.hpp"
 
 #include <span>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -29,6 +30,8 @@ class ContactCache {
   void match(std::span<const Real> inverse_mass, ThreadPool* pool);
   /// Completes the step: the current contacts become the last ones. Does not allocate.
   void commit() noexcept { std::swap(last_, current_); }
+  /// Replaces the contacts of the last completed step.
+  void restore(ContactSet last) noexcept { last_ = std::move(last); }
   /// Removes the contacts of a body.
   void forget(std::uint32_t body) noexcept;
 

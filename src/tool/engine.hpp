@@ -3,6 +3,7 @@
 
 #include <jfpx/body.hpp>
 #include <jfpx/sphere_collider.hpp>
+#include <jfpx/world.hpp>
 
 #include "src/tool/run_options.hpp"
 
@@ -61,11 +62,11 @@ class Engine {
   virtual std::uint32_t awake() const = 0;     ///< number of movable bodies awake
   virtual StepMeasures measures() const = 0;   ///< computed by each call
   virtual StageTimes times() const = 0;        ///< of the last step
-  virtual std::string backend() const = 0;     ///< computed the sphere contacts of the last step
+  /// The world of the native engine; null for others and for demos.
+  virtual World* world() { return nullptr; }
+  virtual std::string backend() const = 0;  ///< computed the sphere contacts of the last step
   /// Name of the native resolver; empty for Bullet and for demos without a world.
   virtual std::string resolver() const { return {}; }
-  /// The native world; null for other engines.
-  virtual World* world() { return nullptr; }
   /// The backend, its algorithm and the reason for the choice, as a table entry.
   virtual std::string choice() const { return backend(); }
   /// Reason why the CPU replaced a device at some step; empty if it did not.

@@ -25,11 +25,11 @@ class NativeEngine final : public Engine {
   std::uint32_t awake() const override { return report_.awake; }
   StepMeasures measures() const override { return measures_of(world_, report_); }
   StageTimes times() const override { return stage_times(report_); }
+  World* world() override { return &world_; }
   std::string backend() const override { return std::string(to_string(report_.backend)); }
   std::string resolver() const override {
     return std::string(resolver_name(world_.scene().solver));
   }
-  World* world() override { return &world_; }
   std::string choice() const override {
     return fmt::format("{}, {}, {}", to_string(report_.backend), to_string(report_.algorithm),
                        to_string(report_.choice));

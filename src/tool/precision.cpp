@@ -36,6 +36,10 @@ std::string selected_precision(const std::vector<std::string>& arguments) {
   }
   if (arguments.size() < 2 || arguments[0] != "replay") return {};
   for (std::size_t i = 1; i < arguments.size(); ++i) {
+    if (arguments[i] == "--from") {
+      ++i;  // a snapshot, not the recording
+      continue;
+    }
     if (!arguments[i].starts_with('-') && std::filesystem::is_regular_file(arguments[i])) {
       return recording_precision(arguments[i]);
     }

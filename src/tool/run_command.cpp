@@ -2,6 +2,7 @@
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
+#include "src/base/atomic_file.hpp"
 #include "src/tool/commands.hpp"
 #include "src/tool/demo_engine.hpp"
 #include "src/tool/engine.hpp"
@@ -16,6 +17,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -25,7 +27,8 @@ namespace {
 struct CommandOptions {
   RunOptions run;
   std::string engine = "native";
-  std::string input;  ///< path of an input script
+  std::string input;     ///< path of an input script
+  std::string snapshot;  ///< path
 };
 
 struct Totals {
@@ -99,6 +102,9 @@ std::unique_ptr<Engine> start(const CommandOptions& options, Scene* scene) {
   if (!options.run.record.empty()) {
     throw InvalidArgument("--record requires a scene; a demo is repeated with --input");
   }
+  if (!options.snapshot.empty()) {
+    throw InvalidArgument("--snapshot requires a scene; the controls of a demo are not in it");
+  }
   return make_demo_engine(options.run, options.input, scene);
 }
 
@@ -114,6 +120,8 @@ int run(const CommandOptions& options) {
                                       .backend = std::string(to_string(options.run.backend)),
                                       .scene = scene});
   }
+  std::optional<AtomicFile> snapshot;
+  if (!options.snapshot.empty()) snapshot.emplace(options.snapshot);
   csv.write(
       "step,contacts,awake,integrate_ms,broad_ms,detect_ms,solve_ms,total_ms,"
       "deepest_penetration,mean_penetration,largest_speed\n");
@@ -131,6 +139,11 @@ int run(const CommandOptions& options) {
     }
   }
   if (recording) recording->finish();
+  if (snapshot) {
+    const std::vector<std::byte> bytes = engine->world()->snapshot().bytes;
+    snapshot->write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    snapshot->finish();
+  }
   csv.finish();
   json.write(to_json_value(options, scene, *engine, totals).dump(2) + "\n");
   json.finish();
@@ -150,7 +163,7 @@ void check_engine(const CLI::App& command, const CommandOptions& options) {
     }
   };
   require(EngineKind::bullet, {"--solver", "--world", "--minimum-batch"});
-  require(EngineKind::native, {"--resolver", "--substeps"});
+  require(EngineKind::native, {"--resolver", "--substeps", "--snapshot"});
 }
 
 }  // namespace
@@ -172,6 +185,9 @@ void add_run_command(CLI::App& app, int& status) {
       "table");
   command->add_option("--record", options->run.record,
                       "Write the state after every step to this file (see: jfpx replay)");
+  command->add_option("--snapshot", options->snapshot,
+                      "Native engine: write the state after the last step to this file (see: jfpx "
+                      "replay --from)");
   command->callback([command, options, &status] {
     check_engine(*command, *options);
     status = run(*options);

@@ -73,11 +73,9 @@ BodyStore::BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps
       sleep_(sleep),
       motion_kept_(kept_per_step(sleep.bias, dt)) {}
 
-/// Adds an unused slot. If an allocation fails, capacity() is unchanged, because generation_ grows
-/// last. Reserves memory for free_ and ids_, so that remove() and the rest of add() do not
-/// allocate.
-void BodyStore::add_slot() {
-  const std::size_t slots = capacity() + 1;
+/// If an allocation fails, capacity() is unchanged, because generation_ grows last. Reserves memory
+/// for free_ and ids_, so that remove() and the rest of add() do not allocate.
+void BodyStore::resize_slots(std::size_t slots) {
   reserve_geometric(&free_, slots);
   reserve_geometric(&ids_, slots);
   const auto all = [slots](auto&... arrays) { (arrays.resize(slots), ...); };
@@ -88,7 +86,25 @@ void BodyStore::add_slot() {
       spinning_friction_, inertia_, body_inverse_inertia_, tensor_, acceleration_, linear_damping_,
       angular_damping_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_, sensor_,
       inertia_given_, user_data_, filter_, generation_);
-  free_.push_back(static_cast<std::uint32_t>(slots - 1));
+}
+
+/// Adds an unused slot.
+void BodyStore::add_slot() {
+  resize_slots(capacity() + 1);
+  free_.push_back(static_cast<std::uint32_t>(capacity() - 1));
+}
+
+void BodyStore::set_shape(std::uint32_t i, Shape shape) noexcept {
+  shape_[i] = std::move(shape);
+  const auto* sphere = std::get_if<Sphere>(&shape_[i]);
+  radius_[i] = sphere != nullptr ? sphere->radius : Real(0);
+  extent_[i] = extent_of(shape_[i]);
+}
+
+void BodyStore::count_body(std::uint32_t i) noexcept {
+  if (movable(i)) ++movable_count_;
+  if (kinematic(i)) ++kinematic_count_;
+  if (sensor(i)) ++sensor_count_;
 }
 
 BodyId BodyStore::add(const BodyDef& def) {
@@ -99,10 +115,7 @@ BodyId BodyStore::add(const BodyDef& def) {
   ids_.insert(std::upper_bound(ids_.begin(), ids_.end(), id, before), id);
   free_.pop_back();
 
-  shape_[i] = std::move(shape);
-  const auto* sphere = std::get_if<Sphere>(&def.shape);
-  radius_[i] = sphere != nullptr ? sphere->radius : Real(0);
-  extent_[i] = extent_of(shape_[i]);
+  set_shape(i, std::move(shape));
   friction_[i] = def.friction;
   rolling_friction_[i] = def.rolling_friction;
   spinning_friction_[i] = def.spinning_friction;
@@ -120,9 +133,7 @@ BodyId BodyStore::add(const BodyDef& def) {
   moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
   moving.motion[i] = moving.rest_time[i] = 0;
   moving.awake[i] = 0;
-  if (movable(i)) ++movable_count_;
-  if (kinematic(i)) ++kinematic_count_;
-  if (sensor(i)) ++sensor_count_;
+  count_body(i);
   set_state(i, {def.position, def.orientation, def.velocity, def.angular_velocity});
   return id;
 }
@@ -144,7 +155,11 @@ void BodyStore::compute_inertia(std::uint32_t i, const std::optional<Mat3>& give
     inertia_[i] = body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
     return;
   }
-  const Mat3 tensor = given ? symmetric_part(*given) : tensor_of(shape_[i], mass_[i]);
+  set_tensor(i, given ? symmetric_part(*given) : tensor_of(shape_[i], mass_[i]));
+}
+
+/// @param tensor inertia of a movable body in body axes, symmetric
+void BodyStore::set_tensor(std::uint32_t i, const Mat3& tensor) {
   inertia_[i] = tensor;
   body_inverse_inertia_[i] = inverse_inertia(tensor);
   // The largest entry of a positive definite matrix is on its diagonal.
@@ -177,6 +192,10 @@ void BodyStore::remove(BodyId id) noexcept {
 bool BodyStore::contains(BodyId id) const noexcept {
   const auto found = std::lower_bound(ids_.begin(), ids_.end(), id, before);
   return found != ids_.end() && *found == id;
+}
+
+bool BodyStore::lives(std::uint32_t body) const noexcept {
+  return body < capacity() && contains(id(body));
 }
 
 std::uint32_t BodyStore::require(BodyId id) const {

@@ -14,6 +14,9 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
+class BinaryReader;
+class BinaryWriter;
+
 /// State that a step changes, indexed by BodyId::index. World::step() copies it before each step,
 /// so that a failed step can be undone.
 struct MotionArrays {
@@ -55,6 +58,14 @@ class BodyStore {
   /// Number of slots; all indices are below it.
   std::size_t capacity() const noexcept { return generation_.size(); }
   std::uint32_t movable_count() const noexcept { return movable_count_; }
+
+  /// Writes all bodies, the ids, and the ignored pairs.
+  void write(BinaryWriter* writer) const;
+  /// Reads what write() has written, into an empty store. The store must not be used if it throws.
+  /// @throws InvalidSnapshot; InvalidScene for a body that add() must not receive; std::bad_alloc
+  void read(BinaryReader* reader);
+  /// Whether a body has the index.
+  bool lives(std::uint32_t body) const noexcept;
 
   BodyState state(std::uint32_t body) const;
   /// Replaces position, orientation and velocities. Wakes a movable body; makes a kinematic body
@@ -133,8 +144,18 @@ class BodyStore {
   MotionArrays moving;
 
  private:
+  void resize_slots(std::size_t slots);
   void add_slot();
+  void set_shape(std::uint32_t body, Shape shape) noexcept;
+  void count_body(std::uint32_t body) noexcept;
   void compute_inertia(std::uint32_t body, const std::optional<Mat3>& given);
+  void set_tensor(std::uint32_t body, const Mat3& tensor);
+  template <class Archive, class Self>
+  static void serialize_body(Archive& archive, Self& self, std::uint32_t body);
+  std::vector<bool> read_slots(BinaryReader* reader);
+  void read_bodies(BinaryReader* reader, const std::vector<bool>& is_free);
+  void read_pairs(BinaryReader* reader);
+  void check_body(std::uint32_t body) const;
   void integrate(std::uint32_t body);
   void move(std::uint32_t body);
   bool falls_asleep(std::uint32_t body);

@@ -40,17 +40,40 @@ class CallbackRegistry {
   }
   /// The address is valid until the callback is removed.
   Function& at(Id id) { return *functions_[position_of(id)]; }
+  /// Null if there is none.
+  Function* find(Id id) const noexcept {
+    const std::size_t position = lower_bound(id);
+    return position < ids_.size() && ids_[position] == id ? functions_[position].get() : nullptr;
+  }
   const std::vector<Id>& ids() const noexcept { return ids_; }
   bool empty() const noexcept { return ids_.empty(); }
+  /// The number of the next id.
+  std::uint64_t next() const noexcept { return next_; }
+  /// Replaces ids and callbacks. Null: the callback that has the id now; its address remains.
+  /// @param ids ascending and below `next`
+  void replace(std::vector<Id> ids, std::vector<std::unique_ptr<Function>> functions,
+               std::uint64_t next) noexcept {
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      if (functions[i] == nullptr) functions[i] = std::move(functions_[lower_bound(ids[i])]);
+    }
+    ids_ = std::move(ids);
+    functions_ = std::move(functions);
+    next_ = next;
+  }
 
   void call(Context& context) const {
     for (const auto& function : functions_) (*function)(context);
   }
 
  private:
+  /// Number of the ids below this one.
+  std::size_t lower_bound(Id id) const noexcept {
+    return static_cast<std::size_t>(std::ranges::lower_bound(ids_, id.number, {}, &Id::number) -
+                                    ids_.begin());
+  }
   std::size_t position_of(Id id) const {
-    const auto found = std::ranges::lower_bound(ids_, id.number, {}, &Id::number);
-    if (found != ids_.end() && *found == id) return static_cast<std::size_t>(found - ids_.begin());
+    const std::size_t position = lower_bound(id);
+    if (position < ids_.size() && ids_[position] == id) return position;
     throw InvalidArgument(kind_ + (' ' + std::to_string(id.number)) +
                           " is unknown; it must be one of this world that was not removed");
   }

@@ -34,6 +34,8 @@ class DeviceWorld {
 
   virtual ~DeviceWorld() = default;
 
+  /// Replaces the settings. upload() must follow.
+  virtual void configure(const Scene& scene) noexcept = 0;
   /// Replaces the state on the device.
   /// @param last contacts of the last step, with their impulses and colors
   virtual void upload(const BodyStore& bodies, SubShapeTable* sub_shapes,

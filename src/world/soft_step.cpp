@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -30,6 +31,14 @@ SoftStep::SoftStep(const SoftStepSettings& settings, const MaterialSettings& mat
       settings_(settings),
       materials_(materials),
       pool_(pool) {}
+
+void SoftStep::restore(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
+                       ContactSet last) noexcept {
+  constants_ = soft_step::make_step_constants(settings, dt);
+  settings_ = settings;
+  materials_ = materials;
+  cache_.restore(std::move(last));
+}
 
 /// Generated contacts of the same bodies are identified by their sequence.
 void SoftStep::add_generated(const BodyStore& bodies, std::span<const Contact> generated) {

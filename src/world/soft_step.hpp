@@ -39,6 +39,11 @@ class SoftStep {
   std::optional<BodyId> solve(BodyStore* bodies);
   /// Moves the bodies, clears forces, and puts islands to sleep.
   void commit(BodyStore* bodies) noexcept;
+  /// Contacts of the last completed step.
+  const soft_step::ContactSet& last_contacts() const { return cache_.last(); }
+  /// Replaces the parameters of the constructor and the contacts of the last completed step.
+  void restore(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
+               soft_step::ContactSet last) noexcept;
   /// Removes the contacts of a removed body.
   void forget(std::uint32_t body) noexcept { cache_.forget(body); }
 

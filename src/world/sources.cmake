@@ -1,12 +1,15 @@
 list(APPEND JFPX_SOURCES
+  ${CMAKE_CURRENT_LIST_DIR}/body_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/body_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/broad_phase_search.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_events.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_finder.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_resolver.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/contact_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/device_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_context.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/force_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces.cpp
   ${CMAKE_CURRENT_LIST_DIR}/ignored_pairs.cpp
   ${CMAKE_CURRENT_LIST_DIR}/indexed_priority_queue.cpp
@@ -19,6 +22,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/recorded_calls.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recorded_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/snapshot_file.cpp
   ${CMAKE_CURRENT_LIST_DIR}/soft_step.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sphere_hierarchy.cpp
   ${CMAKE_CURRENT_LIST_DIR}/state_hash.cpp
@@ -29,6 +33,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/world_access.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_on_device.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_properties.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/world_queries.cpp)
+  ${CMAKE_CURRENT_LIST_DIR}/world_queries.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/world_snapshot.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/world_cuda.cu)

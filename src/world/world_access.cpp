@@ -143,6 +143,8 @@ std::span<const ContactGeneratorId> World::contact_generators() const {
   return impl_->generators.ids();
 }
 
+std::uint64_t World::steps() const { return impl_->steps; }
+
 double World::time() const { return impl_->time(); }
 
 std::span<const Contact> World::contacts() const {

@@ -9,6 +9,7 @@
 #include "src/world/contact_finder.hpp"
 #include "src/world/contact_resolver.hpp"
 #include "src/world/device_world.hpp"
+#include "src/world/force_snapshot.hpp"
 #include "src/world/lazy_query_tree.hpp"
 #include "src/world/soft_step.hpp"
 #include "src/world/wake_propagation.hpp"
@@ -27,8 +28,7 @@ struct World::Impl {
        std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
       : pool(std::move(threads)),
         scene(given),
-        store(given.dt, given.sleep,
-              given.solver == Solver::soft_step ? given.soft_step.substeps : 1),
+        store(empty_store(given)),
         contact_finder(std::move(collider), broad_phase),
         soft_step(given.soft_step, given.materials, given.dt, pool.get()) {
     for (const BodyDef& def : given.bodies) store.add(def);
@@ -52,6 +52,16 @@ struct World::Impl {
   void fetch_contacts();
   /// Fetches everything, so that the host has the state of the world.
   void leave_device();
+  /// As leave_device(), but the device keeps the state, too. Const functions may call it
+  /// concurrently.
+  void fetch_all();
+  void fetch_contact_set();
+
+  /// A store without bodies for a scene.
+  static BodyStore empty_store(const Scene& scene) {
+    return {scene.dt, scene.sleep,
+            scene.solver == Solver::soft_step ? scene.soft_step.substeps : 1};
+  }
 
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
@@ -88,7 +98,9 @@ struct World::Impl {
   bool advance(StepReport* report);
   bool advance_soft_step(StepReport* report);
   bool advance_worst_first(StepReport* report);
-  bool can_step_on_device() const { return device != nullptr && generators.ids().empty(); }
+  bool can_step_on_device() const {
+    return device != nullptr && scene.solver == Solver::soft_step && generators.ids().empty();
+  }
   bool advance_on_device(StepReport* report);
   void step_on_device(StepReport* report);
   void finish_contacts(std::vector<Contact>* list) const;
@@ -96,6 +108,8 @@ struct World::Impl {
   void find_contacts(StepReport* report);
   void save_for_undo();
   void undo() noexcept;
+  void write(BinaryWriter* writer) const;
+  void read(BinaryReader* reader);
 
   std::unique_ptr<ThreadPool> pool;  ///< of the collider, if make_sphere_collider() made it, too
   Scene scene;
@@ -128,6 +142,7 @@ struct World::Impl {
   std::unique_ptr<DeviceWorld> device;  ///< null: the world is not stepped on a device
   bool resident = false;                ///< whether the device has the state of the world
   bool motion_is_current = true, contacts_are_current = true;
+  bool contact_set_is_current = true;
   bool contacts_before_are_current = true;  ///< the flags of what the host has, while resident
   std::mutex fetching;
 };

@@ -32,10 +32,22 @@ void World::Impl::fetch_contacts() {
   }
 }
 
-void World::Impl::leave_device() {
+void World::Impl::fetch_contact_set() {
+  const std::lock_guard lock(fetching);
+  if (contact_set_is_current) return;
+  device->fetch_contact_set(&soft_step.last_contacts());
+  contact_set_is_current = true;
+}
+
+void World::Impl::fetch_all() {
+  if (!resident) return;
   fetch_motion();
   fetch_contacts();
-  device->fetch_contact_set(&soft_step.last_contacts());
+  fetch_contact_set();
+}
+
+void World::Impl::leave_device() {
+  fetch_all();
   resident = false;
 }
 
@@ -75,6 +87,7 @@ void World::Impl::step_on_device(StepReport* report) {
     device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
     resident = true;
     motion_is_current = contacts_are_current = contacts_before_are_current = true;
+    contact_set_is_current = true;
   }
   if (!forces.ids().empty()) {
     fetch_motion();
@@ -95,7 +108,7 @@ void World::Impl::step_on_device(StepReport* report) {
   std::swap(contacts, contacts_before);
   detected_count_before = detected_count;
   contacts_before_are_current = contacts_are_current;
-  motion_is_current = contacts_are_current = false;
+  motion_is_current = contacts_are_current = contact_set_is_current = false;
   report->contacts = result.contacts;
   report->sphere_contacts = result.sphere_contacts;
   report->awake = result.awake;

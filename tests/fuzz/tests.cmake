@@ -26,6 +26,7 @@ endfunction()
 
 jfpx_add_fuzzer(Scene)
 jfpx_add_fuzzer(Recording)
+jfpx_add_fuzzer(Snapshot SOURCES fuzz/world_input.cpp)
 jfpx_add_fuzzer(World SOURCES fuzz/world_input.cpp)
 if(JFPX_HAS_BULLET)
   set(fuzzed_worlds

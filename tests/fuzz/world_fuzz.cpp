@@ -1,5 +1,6 @@
 /// Fuzzer of the interface of World: makes the same calls on two worlds that find contacts with
-/// different algorithms. Results, errors and bits are equal, and calls that throw change nothing.
+/// different algorithms and numbers of threads. Results, errors, bits and snapshots are equal,
+/// calls that throw change nothing, and steps after a restoration repeat those before.
 #include <jfpx/error.hpp>
 
 #include "tests/fuzz/fuzz.hpp"
@@ -50,6 +51,8 @@ auto outcome(Call call) {
     outcome.error = error.what();
   } catch (const InvalidScene& error) {
     outcome.error = error.what();
+  } catch (const InvalidSnapshot& error) {
+    outcome.error = error.what();
   }
   return outcome;
 }
@@ -90,6 +93,22 @@ class Twins {
                         first_.contacts().empty() && first_.contact_events().empty()),
             "a failed step leaves no trace");
     if (!failed) check_contacts(std::get<1>(*done));
+  }
+
+  Snapshot snapshot() const {
+    Snapshot snapshot = first_.snapshot();
+    require(snapshot == second_.snapshot(), "both worlds have the same snapshot");
+    return snapshot;
+  }
+
+  /// @returns whether the snapshot fits; it does not if a function of the program came or went
+  bool restore(const Snapshot& snapshot) {
+    const Snapshot before = first_.snapshot();
+    const auto restored = both([&](World& w) { w.restore(snapshot); });
+    const Snapshot now = this->snapshot();
+    require(now == (restored ? snapshot : before), "the state is that of the snapshot");
+    require(!restored || first_.contact_events().empty(), "events follow with the next step");
+    return restored.has_value();
   }
 
   void move() {
@@ -244,10 +263,55 @@ void change_properties(Bytes& bytes, Twins& twins) {
   }
 }
 
-void call_anything(Bytes& bytes, Twins& twins) {
+/// The observable result of a step.
+struct Moment {
+  Snapshot snapshot;
+  std::vector<ContactEvent> events;
+  friend bool operator==(const Moment&, const Moment&) = default;
+};
+
+std::vector<Moment> follow(Twins& twins, std::uint64_t steps) {
+  std::vector<Moment> moments;
+  for (; steps > 0; --steps) {
+    twins.step();
+    const auto events = twins.world().contact_events();
+    moments.push_back({twins.snapshot(), {events.begin(), events.end()}});
+  }
+  return moments;
+}
+
+/// Takes a snapshot for later, restores one, or repeats steps.
+void travel(Bytes& bytes, Twins& twins, std::optional<Snapshot>* kept) {
+  switch (bytes.below(4)) {
+    case 0:
+      *kept = twins.snapshot();
+      break;
+    case 1:
+      if (*kept) twins.restore(**kept);
+      break;
+    case 2: {  // the snapshot of another program, in which one byte may be damaged
+      Snapshot snapshot = twins.snapshot();
+      const std::size_t at = bytes.below(65536) % snapshot.bytes.size();
+      const auto change = static_cast<std::byte>(bytes.below(256));
+      snapshot.bytes[at] ^= change;
+      require(twins.restore(snapshot) == (change == std::byte{0}), "a damaged snapshot is refused");
+      break;
+    }
+    default: {
+      const Snapshot now = twins.snapshot();
+      const std::uint64_t steps = 1 + bytes.below(4);
+      const std::vector<Moment> expected = follow(twins, steps);
+      require(twins.restore(now), "the callbacks are the same");
+      require(follow(twins, steps) == expected, "steps after a restoration repeat those before");
+    }
+  }
+}
+
+void call_anything(Bytes& bytes, Twins& twins, std::optional<Snapshot>* kept) {
   const std::uint64_t byte = bytes.below(256);
-  // Inputs of the corpus keep their meaning: this byte was a step.
+  // Inputs of the corpus keep their meaning: these bytes were steps.
   if (byte % 20 == 18) return change_properties(bytes, twins);
+  if (byte % 20 == 9) return travel(bytes, twins, kept);
   switch (byte % 10) {
     case 0:
       if (twins.world().bodies().size() >= kMaxBodies) break;
@@ -288,18 +352,21 @@ void call_anything(Bytes& bytes, Twins& twins) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace jfpx;
   test::Bytes bytes({data, size});
-  const WorldSettings settings = fuzz::draw_settings(bytes);
+  WorldSettings settings = fuzz::draw_settings(bytes);
   Scene scene = fuzz::draw_scene(bytes);
   // Drawn from the last byte, so that inputs of the corpus keep their meaning.
-  if (size > 0) scene.solver = data[size - 1] % 2 == 0 ? Solver::soft_step : Solver::worst_first;
+  const unsigned last = size > 0 ? data[size - 1] : 0;
+  if (size > 0) scene.solver = last % 2 == 0 ? Solver::soft_step : Solver::worst_first;
+  if (last / 2 % 4 != 0) settings.collider.threads = 1 + last / 2 % 4;
   std::optional<Twins> twins;
   try {
     twins.emplace(scene, settings);
   } catch (const InvalidScene&) {
     return 0;
   }
+  std::optional<Snapshot> kept;
   for (int calls = 0; calls < kMaxCalls && !bytes.used_up(); ++calls) {
-    call_anything(bytes, *twins);
+    call_anything(bytes, *twins, &kept);
   }
   return 0;
 }

@@ -553,6 +553,48 @@ TEST(Tool, ReplayRepeatsForcesAndChangesOfBodies) {
                2, JFPX_HAS_BULLET ? "only the native engine repeats" : "--x");
 }
 
+TEST(Tool, ReplayContinuesFromASnapshot) {
+  const test::TemporaryFolder folder;
+  const std::string recording = folder.file("run.rec"), snapshot = folder.file("half.snap");
+  for (const std::string resolver : {"soft-step", "worst-first"}) {
+    const std::string run = "run pile --spheres 40 --quiet --resolver " + resolver;
+    ASSERT_EQ(jfpx_command(run + " --steps 50 --record " + recording).status, 0);
+    ASSERT_EQ(jfpx_command(run + " --steps 30 --threads 2 --snapshot " + snapshot).status, 0);
+    for (const std::string threads : {"1", "3"}) {
+      const ProcessResult result =
+          jfpx_command("replay --threads " + threads + " --from " + snapshot + " " + recording);
+      EXPECT_EQ(result.status, 0) << result.output;
+      EXPECT_THAT(result.output, HasSubstr("20 steps after step 30, engine native: all states"));
+    }
+  }
+  expect_fails("replay --engine bullet-stock --from " + snapshot + " " + recording, 2,
+               "--from requires the native engine; engine is bullet-stock");
+}
+
+TEST(Tool, ReplayFindsADifferenceToTheSnapshot) {
+  const test::TemporaryFolder folder;
+  const std::string recording = folder.file("run.rec"), snapshot = folder.file("other.snap");
+  const std::string run = "run pile --spheres 40 --quiet --steps ";
+  ASSERT_EQ(jfpx_command(run + "20 --record " + recording).status, 0);
+  const std::string replay = "replay --from " + snapshot + " " + recording;
+  ASSERT_EQ(jfpx_command(run + "10 --seed 2 --snapshot " + snapshot).status, 0);
+  expect_fails(replay, 1, "step 10, body ");
+  ASSERT_EQ(jfpx_command(run + "21 --snapshot " + snapshot).status, 0);
+  expect_fails(replay, 2, "snapshot is of step 21; it must be of step 0 to 20 of the recording");
+  std::ofstream(snapshot) << "no snapshot at all, only text of some length";
+  expect_fails(replay, 2, "other.snap: this is not a snapshot of jfpx");
+  expect_fails(replay + "x", 2, "run.recx");
+}
+
+TEST(Tool, SnapshotsAreOfNativeScenes) {
+  const test::TemporaryFolder folder;
+  const std::string option = " --steps 1 --snapshot " + folder.file("x.snap");
+  expect_fails("run pile --engine bullet-stock" + option, 2, "--snapshot requires --engine native");
+  expect_fails("run flight" + option, 2, "--snapshot requires a scene");
+  expect_fails("run pile --steps 1 --snapshot " + folder.file("no/x.snap"), 2, "can't be written");
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
 TEST(Tool, ReplayStopsAtTheFirstStepThatDiffers) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("run.rec");

@@ -28,6 +28,7 @@ struct Results {
   std::vector<BodyId> touched;
   std::vector<Contact> contacts;
   std::size_t events = 0, awake = 0;
+  Snapshot snapshot;
   friend bool operator==(const Results&, const Results&) = default;
 };
 Results query(const World& world) {
@@ -38,6 +39,7 @@ Results query(const World& world) {
   results.touched = world.overlapping(Box{{1, 1, 1}}, {0, 0, 0});
   results.contacts.assign(world.contacts().begin(), world.contacts().end());
   results.events = world.contact_events().size();
+  results.snapshot = world.snapshot();
   for (const BodyId id : world.bodies()) results.awake += world.awake(id) ? 1 : 0;
   return results;
 }

@@ -214,6 +214,35 @@ TEST_P(DeviceWorldTest, ForcesAndContactGeneratorsRunOnTheHost) {
   EXPECT_TRUE(WorldAccess::impl(device).resident);
 }
 
+TEST_P(DeviceWorldTest, SnapshotsAreThoseOfTheHostAndRestoreOnTheDevice) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  const Scene scene = random_scene(&random);
+  World host = on_host(scene), device = on_device(scene);
+  for (int n = 0; n < 30; ++n) {
+    host.step();
+    device.step();
+  }
+  const Snapshot snapshot = host.snapshot();
+  EXPECT_TRUE(device.snapshot() == snapshot);
+  EXPECT_TRUE(WorldAccess::impl(device).resident) << "a snapshot does not move the world";
+  Scene other;
+  other.dt = scene.dt / 2;
+  other.soft_step.substeps = 9;
+  other.bodies = {test::ball({0, 0, 0}), test::ground()};
+  World restored = on_device(other);
+  restored.step();
+  restored.restore(snapshot);
+  for (int n = 0; n < 30; ++n) {
+    expect_equal(host.step(), restored.step());
+    expect_equal_contacts(host, restored);
+    ASSERT_EQ(host.state_hash(), restored.state_hash()) << "step " << n;
+  }
+  EXPECT_TRUE(WorldAccess::impl(restored).resident);
+  EXPECT_TRUE(restored.snapshot() == host.snapshot());
+}
+
 TEST_P(DeviceWorldTest, ARunawayBodyUndoesTheStep) {
   Scene scene;
   scene.bodies = {test::ball({0, 0, 0}), test::ball({kMaxCoordinate * 0.9_r, 0, 0})};

@@ -192,6 +192,35 @@ TEST_P(OutOfMemoryInAWorld, AFailedAdditionLeavesNoTrace) {
   }
 }
 
+TEST_P(OutOfMemoryInAWorld, AFailedRestorationLeavesNoTrace) {
+  const std::uint64_t seed = fresh_seed();
+  SCOPED_TRACE(trace(seed));
+  const Scene scene = dense_scene(seed, GetParam());
+  World earlier = make_world(scene, kSettings[0], 2), later = make_world(scene, kSettings[0], 5);
+  const Snapshot snapshot = earlier.snapshot(), unchanged = later.snapshot();
+  const std::vector<Moment> expected = follow(earlier, 2), others = follow(later, 2);
+  const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
+    const std::size_t alive = live_allocations();
+    {
+      World world = make_world(scene, kSettings[0], 5);
+      world.remove_force(world.forces()[0]);  // so that a force is created, too
+      world.restore(unchanged);
+      Snapshot copy;
+      const bool no_copy = runs_out(k, shortage, [&] { copy = world.snapshot(); });
+      EXPECT_TRUE(copy == (no_copy ? Snapshot() : unchanged)) << k;
+      world.remove_force(world.forces()[0]);
+      const Snapshot without = world.snapshot();
+      const bool failed = runs_out(k, shortage, [&] { world.restore(snapshot); });
+      EXPECT_TRUE(world.snapshot() == (failed ? without : snapshot)) << k;
+      if (failed) world.restore(unchanged);
+      EXPECT_TRUE(follow(world, 2) == (failed ? others : expected)) << k;
+    }
+    EXPECT_EQ(live_allocations(), alive) << k;
+    return FailingNew::failed() && !testing::Test::HasFailure();
+  });
+  EXPECT_GT(failures, 20u);
+}
+
 TEST_P(OutOfMemoryInAWorld, AQueryAfterAFailedOneFindsTheSame) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));

@@ -28,6 +28,7 @@ jfpx_add_test(world_test SOURCES
   world/recording_test.cpp
   world/rest_test.cpp
   world/sensor_test.cpp
+  world/snapshot_test.cpp
   world/world_test.cpp)
 jfpx_add_test(quality_test SOURCES
   world/equilibrium_test.cpp

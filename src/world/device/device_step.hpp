@@ -30,6 +30,10 @@ template <class Device>
 class DeviceStep final : public DeviceWorld {
  public:
   DeviceStep(const Scene& scene, std::unique_ptr<Device> device) : device_(std::move(device)) {
+    configure(scene);
+  }
+
+  void configure(const Scene& scene) noexcept override {
     data_.materials = scene.materials;
     data_.constants = soft_step::make_step_constants(scene.soft_step, scene.dt);
     data_.restitution_threshold = scene.soft_step.restitution_threshold;

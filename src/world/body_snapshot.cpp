@@ -1,0 +1,142 @@
+/// The bodies of a world in a snapshot: BodyStore::write() and read().
+///
+/// Values that BodyStore computes from others are computed again, with the same bits. The inertia
+/// in world axes is an exception: that of a sphere does not follow every rotation.
+#include "src/scene/scene_validate.hpp"
+#include "src/world/body_store.hpp"
+#include "src/world/snapshot_fields.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+/// Bytes of the smallest body, a sphere without a given inertia; somewhat less is sufficient.
+constexpr std::size_t kLeastBodySize = 32 * sizeof(Real);
+
+/// Validation tolerates normals that are not quite of unit length, whose offset BodyStore::add()
+/// scales with them: by that much, it may exceed kMaxCoordinate.
+template <class Wall>
+void check_wall(Wall* wall) {
+  constexpr Real kMost = kMaxCoordinate * (1 + kUnitTolerance);
+  BinaryReader::require(absolute(wall->offset) <= kMost, "a wall has no finite offset");
+  wall->offset = std::clamp(wall->offset, -kMaxCoordinate, kMaxCoordinate);
+}
+
+}  // namespace
+
+/// All that a body consists of, in the order of the bytes. `Self` is const for a writer.
+template <class Archive, class Self>
+void BodyStore::serialize_body(Archive& archive, Self& self, std::uint32_t i) {
+  archive(self.shape_[i], self.mass_[i], self.kinematic_[i], self.sensor_[i], self.can_sleep_[i],
+          self.inertia_given_[i]);
+  if (self.inertia_given_[i] != 0) archive(self.inertia_[i]);
+  archive(self.acceleration_[i], self.linear_damping_[i], self.angular_damping_[i],
+          self.friction_[i], self.restitution_[i], self.rolling_friction_[i],
+          self.spinning_friction_[i], self.filter_[i], self.user_data_[i]);
+  auto& [position, orientation, velocity, angular_velocity, force, torque, last_acceleration,
+         inverse_inertia, motion, rest_time, awake] = self.moving;
+  archive(position[i], orientation[i], velocity[i], angular_velocity[i], force[i], torque[i],
+          last_acceleration[i], inverse_inertia[i], motion[i], rest_time[i], awake[i]);
+}
+
+void BodyStore::write(BinaryWriter* writer) const {
+  BinaryWriter& write = *writer;
+  write(generation_, free_, std::uint64_t{ids_.size()});
+  for (const BodyId id : ids_) {
+    write(id.index);
+    serialize_body(write, *this, id.index);
+  }
+  write(std::uint64_t{ignored_.keys().size()});
+  for (const std::uint64_t key : ignored_.keys()) write(key);
+}
+
+void BodyStore::read(BinaryReader* reader) {
+  read_bodies(reader, read_slots(reader));
+  read_pairs(reader);
+}
+
+/// Reads generations and unused slots. @returns by slot: whether it is unused
+std::vector<bool> BodyStore::read_slots(BinaryReader* reader) {
+  const auto generation = reader->get<std::vector<std::uint32_t>>();
+  validate_body_count(generation.size());
+  resize_slots(generation.size());
+  generation_ = generation;
+  const auto free = reader->get<std::vector<std::uint32_t>>();
+  std::vector<bool> is_free(capacity());
+  for (const std::uint32_t slot : free) {
+    BinaryReader::require(slot < capacity() && !is_free[slot], "its list of unused ids is invalid");
+    is_free[slot] = true;
+    free_.push_back(slot);  // keeps the memory that resize_slots() has reserved
+  }
+  return is_free;
+}
+
+void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_free) {
+  for (std::size_t left = reader->count(kLeastBodySize); left > 0; --left) {
+    const auto i = reader->get<std::uint32_t>();
+    BinaryReader::require(i < capacity() && !is_free[i] && (ids_.empty() || ids_.back().index < i),
+                          "its list of bodies is invalid");
+    serialize_body(*reader, *this, i);
+    check_body(i);
+    ids_.push_back(id(i));
+    set_shape(i, std::move(shape_[i]));
+    inverse_mass_[i] = mass_[i] > 0 ? Real(1) / mass_[i] : Real(0);
+    inertia_given(i) ? set_tensor(i, inertia_[i]) : compute_inertia(i, std::nullopt);
+    set_damping(i, linear_damping_[i], angular_damping_[i]);
+    if (filter_[i] != CollisionFilter{}) ++filtered_count_;
+    count_body(i);
+  }
+}
+
+/// Checks a body as add() and set_state() do, and what the engine relies on beyond that.
+void BodyStore::check_body(std::uint32_t i) const {
+  BodyDef def;
+  def.shape = shape_[i];
+  def.mass = mass_[i];
+  def.kinematic = kinematic(i);
+  if (auto* half_space = std::get_if<HalfSpace>(&def.shape)) check_wall(half_space);
+  if (auto* plane = std::get_if<Plane>(&def.shape)) check_wall(plane);
+  if (inertia_given(i)) def.inertia = inertia_[i];
+  def.position = moving.position[i];
+  def.orientation = moving.orientation[i];
+  def.velocity = moving.velocity[i];
+  def.angular_velocity = moving.angular_velocity[i];
+  def.acceleration = acceleration_[i];
+  def.linear_damping = linear_damping_[i];
+  def.angular_damping = angular_damping_[i];
+  def.friction = friction_[i];
+  def.restitution = restitution_[i];
+  def.rolling_friction = rolling_friction_[i];
+  def.spinning_friction = spinning_friction_[i];
+  validate_body(def, i);
+  const auto is_flag = [](std::uint8_t value) { return value <= 1; };
+  BinaryReader::require(is_flag(kinematic_[i]) && is_flag(sensor_[i]) && is_flag(can_sleep_[i]) &&
+                            is_flag(inertia_given_[i]) && is_flag(moving.awake[i]),
+                        "a flag of a body is neither 0 nor 1");
+  BinaryReader::require(inertia_given_[i] == 0 || mass_[i] > 0,
+                        "an immovable body has a given inertia");
+  BinaryReader::require(moving.awake[i] == 0 || mass_[i] > 0 || kinematic(i),
+                        "an immovable body is awake");
+}
+
+void BodyStore::read_pairs(BinaryReader* reader) {
+  const auto keys = reader->get<std::vector<std::uint64_t>>();
+  std::vector<BodyPair> pairs;
+  pairs.reserve(keys.size());
+  for (const std::uint64_t key : keys) {
+    const BodyPair pair{static_cast<std::uint32_t>(key >> 32), static_cast<std::uint32_t>(key)};
+    BinaryReader::require(pair.a < pair.b && lives(pair.a) && lives(pair.b),
+                          "an ignored pair is not of two bodies");
+    pairs.push_back(pair);
+  }
+  BinaryReader::require(std::ranges::is_sorted(keys, std::less_equal<>()),
+                        "its ignored pairs are not sorted");
+  set_ignored_pairs(pairs);
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,18 @@
+/// The contacts of the last step in a snapshot.
+#pragma once
+
+#include "src/base/binary_archive.hpp"
+#include "src/contact_solver/contact_set.hpp"
+#include "src/world/body_store.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Writes what ContactCache::match() reads of the contacts of a completed step.
+void write_contacts(BinaryWriter* writer, const soft_step::ContactSet& contacts);
+/// Reads contacts of the bodies; all other members of the contacts are zero.
+/// @throws InvalidSnapshot, std::bad_alloc
+soft_step::ContactSet read_contacts(BinaryReader* reader, const BodyStore& bodies);
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

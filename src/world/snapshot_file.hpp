@@ -1,0 +1,19 @@
+/// Header and checksum of a snapshot.
+#pragma once
+
+#include <jfpx/snapshot.hpp>
+
+#include "src/base/binary_archive.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Writes the header; the content must follow.
+void start_snapshot(BinaryWriter* writer);
+/// Completes the header and adds the checksum. @param writer has written header and content
+Snapshot finish_snapshot(BinaryWriter* writer);
+/// A reader of the content. @throws InvalidSnapshot if header or checksum are not valid
+BinaryReader open_snapshot(const Snapshot& snapshot);
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

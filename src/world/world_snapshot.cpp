@@ -1,0 +1,84 @@
+/// Snapshots of a World.
+#include <jfpx/error.hpp>
+
+#include "src/world/contact_snapshot.hpp"
+#include "src/world/snapshot_fields.hpp"
+#include "src/world/snapshot_file.hpp"
+#include "src/world/world_impl.hpp"
+
+#include <new>
+#include <string>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+void World::Impl::write(BinaryWriter* writer) const {
+  (*writer)(scene, steps);
+  store.write(writer);
+  write_contacts(writer, soft_step.last_contacts());
+  (*writer)(contacts, std::uint64_t{detected_count}, shows_contacts);
+  write_forces(writer, forces);
+  write_generators(writer, generators);
+}
+
+/// Reads and checks everything before it changes the world.
+void World::Impl::read(BinaryReader* reader) {
+  auto settings = reader->get<Scene>();
+  validate(settings);
+  const auto steps_before = reader->get<std::uint64_t>();
+  BodyStore bodies = empty_store(settings);
+  bodies.read(reader);
+  soft_step::ContactSet last = read_contacts(reader, bodies);
+  auto touching = reader->get<std::vector<Contact>>();
+  const auto detected = reader->get<std::uint64_t>();
+  const bool shown = reader->get<bool>();
+  BinaryReader::require(detected <= touching.size(), "it has fewer contacts than were detected");
+  ForceRestorer new_forces(reader, forces);
+  GeneratorRestorer new_generators(reader, generators);
+  BinaryReader::require(reader->left() == 0, "it is too long");
+
+  // From here on, nothing throws.
+  settings.bodies = std::move(scene.bodies);
+  settings.ignored_pairs = std::move(scene.ignored_pairs);
+  scene = std::move(settings);
+  resident = false;
+  if (device != nullptr) device->configure(scene);
+  steps = steps_before;
+  store = std::move(bodies);
+  soft_step.restore(scene.soft_step, scene.materials, scene.dt, std::move(last));
+  contacts = std::move(touching);
+  detected_count = detected;
+  shows_contacts = shown;
+  shows_events = false;
+  new_forces.commit(&forces);
+  new_generators.commit(&generators);
+  note_change();
+}
+
+Snapshot World::snapshot() const {
+  try {
+    BinaryWriter writer;
+    start_snapshot(&writer);
+    impl_->fetch_all();
+    impl_->write(&writer);
+    return finish_snapshot(&writer);
+  } catch (const std::bad_alloc&) {
+    throw OutOfMemory("no memory for a snapshot of " + std::to_string(bodies().size()) + " bodies");
+  }
+}
+
+void World::restore(const Snapshot& snapshot) {
+  BinaryReader reader = open_snapshot(snapshot);
+  try {
+    impl_->read(&reader);
+  } catch (const InvalidScene& error) {
+    throw InvalidSnapshot(std::string("the snapshot is corrupt: ") + error.what());
+  } catch (const std::bad_alloc&) {
+    throw OutOfMemory("no memory to restore a world from a snapshot of " +
+                      std::to_string(snapshot.bytes.size()) + " bytes");
+  }
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
