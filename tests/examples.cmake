@@ -10,6 +10,10 @@ foreach(suffix IN ITEMS "" "_f64")
   add_test(NAME own_force${suffix} COMMAND own_force${suffix})
   set_tests_properties(own_force${suffix} PROPERTIES
     PASS_REGULAR_EXPRESSION "3.14 s  \\([-+]0.0., \\+1.00\\).*12.56 s  \\(\\+1.00, [-+]0.0.\\)")
+  # Without a GPU it says why it can't be used.
+  add_test(NAME gpu_world${suffix} COMMAND gpu_world${suffix})
+  set_tests_properties(gpu_world${suffix} PROPERTIES
+    PASS_REGULAR_EXPRESSION "120 steps with the same bits, [1-9][0-9]* contacts|^cuda: ")
   add_test(NAME native_world${suffix} COMMAND native_world${suffix})
   set_tests_properties(native_world${suffix} PROPERTIES
     PASS_REGULAR_EXPRESSION "[1-9][0-9]* touches, 5 balls were blown off the floor\nbodies above the floor: 1\nthe crate's top is at (1.99|2.00) m\n(.|\n)*the lamp has swung twice, with the same bits")

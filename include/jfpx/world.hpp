@@ -30,7 +30,9 @@ enum class BroadPhase : std::uint8_t {
 
 struct WorldSettings {
   /// Device and algorithm that find sphere contacts. Its `threads` also run the other parts of a
-  /// step with Solver::soft_step.
+  /// step with Solver::soft_step. With Backend::cuda and Solver::soft_step, the state of the world
+  /// lies on the device, and all parts of a step run there (docs/cuda.md); functions that read or
+  /// change the state may then also throw DeviceError.
   SphereColliderOptions collider;
   BroadPhase broad_phase = BroadPhase::cells;
 };

@@ -49,15 +49,18 @@ class GridTeam {
   /// Barrier of all threads. Writes before it are visible to all threads after it.
   JFPX_HD void sync() const {
 #if defined(__CUDA_ARCH__)
-    namespace cg = cooperative_groups;
     if (gridDim.x == 1) {
       __syncthreads();
-    } else if (is_cluster_) {
-      __threadfence();  // the blocks have different first-level caches
-      cg::this_cluster().sync();
-    } else {
-      cg::this_grid().sync();
+      return;
     }
+#if __CUDA_ARCH__ >= 900
+    if (is_cluster_) {
+      __threadfence();  // the blocks have different first-level caches
+      cooperative_groups::this_cluster().sync();
+      return;
+    }
+#endif
+    cooperative_groups::this_grid().sync();
 #endif
   }
   /// A copy of an array of device::kBins + 1 numbers in fast memory. At most one exists at a time.
