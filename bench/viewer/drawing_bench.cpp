@@ -145,14 +145,14 @@ class Gallery {
 void items(benchmark::State& state, std::uint32_t balls) {
   const Scene scene = scenes::make("gas", {.spheres = balls, .seed = 1});
   const ScenePainter painter(scene);
-  Snapshot snapshot;
+  RunState run_state;
   for (const BodyDef& body : scene.bodies) {
-    snapshot.states.push_back({body.position, body.orientation, {}, {}});
+    run_state.states.push_back({body.position, body.orientation, {}, {}});
   }
-  snapshot.awake.assign(scene.bodies.size(), 1);
+  run_state.awake.assign(scene.bodies.size(), 1);
   for (auto _ : state) {
     Drawing drawing({0, 0, 100});
-    painter.draw(snapshot, snapshot, Real(0.5), Colouring::bodies, &drawing);
+    painter.draw(run_state, run_state, Real(0.5), Colouring::bodies, &drawing);
     benchmark::DoNotOptimize(drawing.spheres().data());
   }
 }

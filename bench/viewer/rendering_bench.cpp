@@ -27,8 +27,8 @@ class Screen {
     camera_.fov_y = kPi / 4;
   }
 
-  void draw(const view::ScenePainter& painter, const view::Snapshot& before,
-            const view::Snapshot& now) {
+  void draw(const view::ScenePainter& painter, const view::RunState& before,
+            const view::RunState& now) {
     const view::Bounds bounds = painter.bounds(now.states);
     const view::View view = camera_.view(bounds.centre, bounds.radius);
     view::Drawing drawing(view.eye);
@@ -54,10 +54,10 @@ void frames(benchmark::State& state, Backend backend, std::uint32_t spheres, Scr
   const auto run = view::make_run(scene, {.backend = backend});
   const view::ScenePainter painter(scene);
   std::vector<double> detect_ms, picture_ms;
-  view::Snapshot before = run->snapshot();
+  view::RunState before = run->run_state();
   const auto frame = [&] {
     run->step();
-    view::Snapshot now = run->snapshot();
+    view::RunState now = run->run_state();
     const double ms = now.times.detect;
     if (screen != nullptr) {
       view::Stopwatch watch;

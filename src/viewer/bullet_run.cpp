@@ -52,7 +52,7 @@ class BulletRun final : public Run {
     ++step_;
   }
 
-  Snapshot snapshot() override { return snapshot_of(world_, step_); }
+  RunState run_state() override { return run_state_of(world_, step_); }
 
   EngineChoice choice() const override { return choice_; }
   bool switch_to(const EngineChoice& choice) override {
@@ -115,34 +115,34 @@ bullet::SceneWorldOptions world_options(const EngineChoice& choice) {
   return options;
 }
 
-Snapshot snapshot_of(bullet::SceneWorld& world, std::uint64_t step) {
-  Snapshot snapshot;
-  snapshot.step = step;
-  snapshot.states = world.states();
+RunState run_state_of(bullet::SceneWorld& world, std::uint64_t step) {
+  RunState run_state;
+  run_state.step = step;
+  run_state.states = world.states();
   for (const btRigidBody* body : world.bodies()) {
-    snapshot.awake.push_back(body->isActive() || body->isStaticObject() ? 1 : 0);
+    run_state.awake.push_back(body->isActive() || body->isStaticObject() ? 1 : 0);
   }
-  snapshot.contacts = contacts_of(world.dispatcher());
+  run_state.contacts = contacts_of(world.dispatcher());
   const bullet::StageTimes& t = world.last_step();
-  snapshot.times = {t.integrate, t.broadphase, t.dispatch, t.islands + t.solve, t.total};
-  snapshot.computed_by = "Bullet";
+  run_state.times = {t.integrate, t.broadphase, t.dispatch, t.islands + t.solve, t.total};
+  run_state.computed_by = "Bullet";
   if (const bullet::CollisionDispatcher* dispatcher = world.jfpx_dispatcher()) {
     const bullet::DispatchStats& stats = dispatcher->stats();
     if (stats.batches > 0 && stats.last_fallback == bullet::Fallback::none) {
-      snapshot.computed_by = to_string(dispatcher->backend());
+      run_state.computed_by = to_string(dispatcher->backend());
     }
-    snapshot.trouble = stats.failure;
+    run_state.trouble = stats.failure;
   }
-  snapshot.solved_by = "Bullet";
+  run_state.solved_by = "Bullet";
   const auto* solver =
       dynamic_cast<const bullet::ConstraintSolver*>(world.world().getConstraintSolver());
   if (solver != nullptr) {
     const bullet::ConstraintSolverStats& stats = solver->stats();
-    if (stats.groups > 0) snapshot.solved_by = to_string(Backend::cpu);
-    if (stats.on_device > 0) snapshot.solved_by = to_string(Backend::cuda);
-    if (snapshot.trouble.empty()) snapshot.trouble = stats.device_failure;
+    if (stats.groups > 0) run_state.solved_by = to_string(Backend::cpu);
+    if (stats.on_device > 0) run_state.solved_by = to_string(Backend::cuda);
+    if (run_state.trouble.empty()) run_state.trouble = stats.device_failure;
   }
-  return snapshot;
+  return run_state;
 }
 
 bool has_engine(EngineKind) { return true; }

@@ -1,10 +1,10 @@
-/// Creation and snapshots of Bullet worlds. Only for builds with Bullet.
+/// Creation and states of runs of Bullet worlds. Only for builds with Bullet.
 #pragma once
 
 #include <jfpx/bullet/scene_world.hpp>
 
 #include "src/viewer/run.hpp"
-#include "src/viewer/snapshot.hpp"
+#include "src/viewer/run_state.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -13,7 +13,7 @@ namespace view {
 /// Options for a world with all of jfpx's parts, and the backend and threads of a choice.
 bullet::SceneWorldOptions world_options(const EngineChoice& choice);
 
-Snapshot snapshot_of(bullet::SceneWorld& world, std::uint64_t step);
+RunState run_state_of(bullet::SceneWorld& world, std::uint64_t step);
 
 }  // namespace view
 }  // namespace JFPX_ABI

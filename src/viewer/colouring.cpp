@@ -48,17 +48,19 @@ std::vector<Paint> island_paints(const Scene& scene, std::span<const Contact> co
   return paints;
 }
 
-std::vector<Real> colour_values(const Scene& scene, const Snapshot& snapshot, Colouring colouring) {
+std::vector<Real> colour_values(const Scene& scene, const RunState& run_state,
+                                Colouring colouring) {
   if (colouring == Colouring::bodies || colouring == Colouring::islands) return {};
   std::vector<Real> values(scene.bodies.size());
   if (colouring == Colouring::speed) {
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = length(snapshot.states[i].velocity);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] = length(run_state.states[i].velocity);
   }
   if (colouring == Colouring::sleep) {
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = snapshot.awake[i];
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = run_state.awake[i];
     return values;
   }
-  for (const Contact& contact : snapshot.contacts) {
+  for (const Contact& contact : run_state.contacts) {
     for (const std::uint32_t body : {contact.a.index, contact.b.index}) {
       Real& value = values[body];
       if (colouring == Colouring::penetration) value = std::max(value, -contact.distance);
@@ -75,10 +77,10 @@ std::vector<Real> colour_values(const Scene& scene, const Snapshot& snapshot, Co
   return values;
 }
 
-std::vector<Paint> body_paints(const Scene& scene, const Snapshot& snapshot, Colouring colouring) {
-  if (colouring == Colouring::islands) return island_paints(scene, snapshot.contacts);
+std::vector<Paint> body_paints(const Scene& scene, const RunState& run_state, Colouring colouring) {
+  if (colouring == Colouring::islands) return island_paints(scene, run_state.contacts);
   std::vector<Paint> paints;
-  for (const Real value : colour_values(scene, snapshot, colouring)) {
+  for (const Real value : colour_values(scene, run_state, colouring)) {
     paints.push_back(scale_paint(value));
   }
   return paints;

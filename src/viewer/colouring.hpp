@@ -4,7 +4,7 @@
 #include <jfpx/world.hpp>
 
 #include "src/viewer/drawing.hpp"
-#include "src/viewer/snapshot.hpp"
+#include "src/viewer/run_state.hpp"
 
 #include <cstdint>
 #include <span>
@@ -19,9 +19,9 @@ enum class Colouring : std::uint8_t { bodies, speed, sleep, penetration, contact
 inline constexpr const char* kColouringNames[] = {"bodies",      "speed",    "sleep",
                                                   "penetration", "contacts", "islands"};
 
-/// One value in [0, 1] per body, scaled by the largest value of the snapshot where the property has
-/// no natural scale; empty for Colouring::bodies and Colouring::islands.
-std::vector<Real> colour_values(const Scene& scene, const Snapshot& snapshot, Colouring colouring);
+/// One value in [0, 1] per body, scaled by the largest value of the state where the property
+/// has no natural scale; empty for Colouring::bodies and Colouring::islands.
+std::vector<Real> colour_values(const Scene& scene, const RunState& run_state, Colouring colouring);
 
 /// The lowest body index in the island of each body. Islands consist of movable bodies connected by
 /// contacts; a body without mass connects nothing, or the ground would merge all islands on it.
@@ -31,7 +31,7 @@ std::vector<std::uint32_t> islands_of(const Scene& scene, std::span<const Contac
 std::vector<Paint> island_paints(const Scene& scene, std::span<const Contact> contacts);
 
 /// One colour per body; empty for Colouring::bodies.
-std::vector<Paint> body_paints(const Scene& scene, const Snapshot& snapshot, Colouring colouring);
+std::vector<Paint> body_paints(const Scene& scene, const RunState& run_state, Colouring colouring);
 
 }  // namespace view
 }  // namespace JFPX_ABI

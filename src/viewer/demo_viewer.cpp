@@ -5,7 +5,7 @@
 
 #include "src/viewer/exchangeable_collider.hpp"
 #include "src/viewer/forces.hpp"
-#include "src/viewer/snapshot.hpp"
+#include "src/viewer/run_state.hpp"
 #include "src/viewer/timing.hpp"
 #include "src/viewer/widgets.hpp"
 

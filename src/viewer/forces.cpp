@@ -39,7 +39,7 @@ void draw_arrow(const Vec3& from, const Vec3& way, Drawing* drawing) {
   drawing->add_line(tip, neck - side, kForce, 3);
 }
 
-std::vector<Vec3> forces_between(const Scene& scene, const Snapshot& before, const Snapshot& now) {
+std::vector<Vec3> forces_between(const Scene& scene, const RunState& before, const RunState& now) {
   std::vector<Vec3> forces(scene.bodies.size());
   if (before.step == now.step) return forces;
   for (std::size_t i = 0; i < forces.size(); ++i) {
@@ -51,7 +51,7 @@ std::vector<Vec3> forces_between(const Scene& scene, const Snapshot& before, con
   return forces;
 }
 
-void draw_forces(const Scene& scene, const Snapshot& before, const Snapshot& now, Real unit,
+void draw_forces(const Scene& scene, const RunState& before, const RunState& now, Real unit,
                  Drawing* drawing) {
   const std::vector<Vec3> forces = forces_between(scene, before, now);
   Real reference = typical_weight(scene);

@@ -16,13 +16,13 @@ constexpr Real kMargin = Real(1.1);
 
 /// Distance of the eye from the focus at which nearly all movable bodies are in the picture.
 Real distance_for(const Camera& camera, const Bounds& bounds, const Scene& scene,
-                  const Snapshot& snapshot, Real aspect) {
+                  const RunState& run_state, Real aspect) {
   const View view = camera.view(bounds.centre, bounds.radius);
   const Real tall = std::tan(camera.fov_y / 2), wide = tall * aspect;
   std::vector<Real> needed;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const BodyDef& body = scene.bodies[i];
-    const Vec3 p = snapshot.states[i].position - bounds.centre;
+    const Vec3 p = run_state.states[i].position - bounds.centre;
     if (body.mass == 0 || length(p) > bounds.radius) continue;
     const Real size = size_of(body.shape);
     needed.push_back(std::max((std::fabs(dot(p, view.right)) + size) / wide,
@@ -35,13 +35,13 @@ Real distance_for(const Camera& camera, const Bounds& bounds, const Scene& scene
 
 }  // namespace
 
-Camera initial_camera(const ViewOptions& options, const Scene& scene, const Snapshot& snapshot) {
+Camera initial_camera(const ViewOptions& options, const Scene& scene, const RunState& run_state) {
   Camera camera;
   if (options.eye) {
     camera.look_at(*options.eye, *options.target);
     return camera;
   }
-  Bounds bounds = bounds_of(scene, snapshot.states);
+  Bounds bounds = bounds_of(scene, run_state.states);
   const Real largest = ScenePainter(scene).large_size() * 60;
   const Vec3& half = bounds.half_extents;
   const bool tall = half.y > 4 * std::max(half.x, half.z);
@@ -53,7 +53,7 @@ Camera initial_camera(const ViewOptions& options, const Scene& scene, const Snap
       static_cast<Real>(options.size.width) / static_cast<Real>(options.size.height);
   const Vec3 from = normalized(Vec3{Real(0.55), Real(0.36), Real(0.95)});
   camera.look_at(bounds.centre + from, bounds.centre);
-  camera.look_at(bounds.centre + from * distance_for(camera, bounds, scene, snapshot, aspect),
+  camera.look_at(bounds.centre + from * distance_for(camera, bounds, scene, run_state, aspect),
                  bounds.centre);
   return camera;
 }

@@ -10,7 +10,7 @@ namespace view {
 
 /// Shows all movable bodies from the front, the right and above. Shows only the lower part of a
 /// tower that is too tall for its bodies to be visible. --eye and --target take precedence.
-Camera initial_camera(const ViewOptions& options, const Scene& scene, const Snapshot& snapshot);
+Camera initial_camera(const ViewOptions& options, const Scene& scene, const RunState& run_state);
 
 }  // namespace view
 }  // namespace JFPX_ABI

@@ -15,23 +15,23 @@ class NativeRun final : public Run {
 
   void step() override { report_ = world_.step(); }
 
-  Snapshot snapshot() override {
-    Snapshot snapshot;
-    snapshot.step = first_step_ + report_.step;
-    snapshot.states = world_.states();
-    for (const BodyId id : world_.bodies()) snapshot.awake.push_back(world_.awake(id) ? 1 : 0);
-    snapshot.contacts.assign(world_.contacts().begin(), world_.contacts().end());
-    snapshot.times = {report_.integrate_ms, 0, report_.detect_ms, report_.resolve_ms,
-                      report_.total_ms};
-    snapshot.iterations = report_.position_iterations + report_.velocity_iterations;
+  RunState run_state() override {
+    RunState run_state;
+    run_state.step = first_step_ + report_.step;
+    run_state.states = world_.states();
+    for (const BodyId id : world_.bodies()) run_state.awake.push_back(world_.awake(id) ? 1 : 0);
+    run_state.contacts.assign(world_.contacts().begin(), world_.contacts().end());
+    run_state.times = {report_.integrate_ms, 0, report_.detect_ms, report_.resolve_ms,
+                       report_.total_ms};
+    run_state.iterations = report_.position_iterations + report_.velocity_iterations;
     const Scene& scene = world_.scene();
-    if (scene.solver == Solver::soft_step) snapshot.substeps = scene.soft_step.substeps;
-    snapshot.computed_by = to_string(report_.backend);
+    if (scene.solver == Solver::soft_step) run_state.substeps = scene.soft_step.substeps;
+    run_state.computed_by = to_string(report_.backend);
     if (report_.non_finite) {
-      snapshot.trouble = "body " + std::to_string(report_.non_finite_body.index) +
-                         " became non-finite; the state is frozen";
+      run_state.trouble = "body " + std::to_string(report_.non_finite_body.index) +
+                          " became non-finite; the state is frozen";
     }
-    return snapshot;
+    return run_state;
   }
 
   EngineChoice choice() const override { return choice_; }

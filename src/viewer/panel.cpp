@@ -204,7 +204,7 @@ bool SceneViewer::show_resolver_settings() {
 }
 
 void SceneViewer::show_counters() {
-  const Snapshot& now = player_.shown();
+  const RunState& now = player_.shown();
   ImGui::Separator();
   const auto awake = std::count(now.awake.begin(), now.awake.end(), std::uint8_t{1});
   widget::text(fmt::format("{} bodies, {} awake, {} contacts", now.states.size(), awake,
@@ -259,7 +259,7 @@ void SceneViewer::show_picked() {
 }
 
 void SceneViewer::show_body(std::uint32_t body) {
-  const Snapshot& now = player_.shown();
+  const RunState& now = player_.shown();
   const BodyState& state = now.states[body];
   widget::text(fmt::format("at ({:.3f}, {:.3f}, {:.3f})", state.position.x, state.position.y,
                            state.position.z));

@@ -8,9 +8,9 @@ inline namespace JFPX_ABI {
 namespace view {
 namespace {
 
-std::size_t bytes_of(const Snapshot& snapshot) {
-  return sizeof snapshot + snapshot.states.size() * (sizeof(BodyState) + 1) +
-         snapshot.contacts.size() * sizeof(Contact);
+std::size_t bytes_of(const RunState& run_state) {
+  return sizeof run_state + run_state.states.size() * (sizeof(BodyState) + 1) +
+         run_state.contacts.size() * sizeof(Contact);
 }
 
 constexpr const char* kNotOneRun =
@@ -24,12 +24,12 @@ constexpr const char* kNotOneRun =
 
 Player::Player(std::unique_ptr<Run> run, Scene scene)
     : scene_(std::move(scene)), run_(std::move(run)) {
-  keep(run_->snapshot());
+  keep(run_->run_state());
 }
 
-void Player::keep(Snapshot snapshot) {
-  bytes_ += bytes_of(snapshot);
-  history_.push_back(std::move(snapshot));
+void Player::keep(RunState run_state) {
+  bytes_ += bytes_of(run_state);
+  history_.push_back(std::move(run_state));
   while (history_.size() > 2 && (bytes_ > kHistoryBytes || history_.size() > kHistoryLength)) {
     bytes_ -= bytes_of(history_.front());
     history_.pop_front();
@@ -44,11 +44,11 @@ void Player::step() {
     return;
   }
   run_->step();
-  Snapshot snapshot = run_->snapshot();
-  snapshot.dt = scene_.dt;
-  snapshot.time = history_.back().time + static_cast<double>(scene_.dt);
-  if (recording_) recording_->append(snapshot.states);
-  keep(std::move(snapshot));
+  RunState run_state = run_->run_state();
+  run_state.dt = scene_.dt;
+  run_state.time = history_.back().time + static_cast<double>(scene_.dt);
+  if (recording_) recording_->append(run_state.states);
+  keep(std::move(run_state));
 }
 
 bool Player::step_back() {
@@ -61,7 +61,7 @@ void Player::restart() {
   if (!run_->rewind()) run_ = make_run(scene_, run_->choice());
   history_.clear();
   bytes_ = 0;
-  keep(run_->snapshot());
+  keep(run_->run_state());
   changed_ = false;
   if (!recording_path_.empty()) record_to(recording_path_);
 }

@@ -57,25 +57,25 @@ class Player {
   RunSettings settings() const {
     return {scene_.dt, scene_.solver, scene_.soft_step, scene_.resolver, scene_.sleep};
   }
-  /// Continues from the newest snapshot with other settings.
+  /// Continues from the newest state with other settings.
   /// @throws InvalidScene, BackendUnavailable; nothing has changed then
   void set_settings(const RunSettings& settings);
 
-  const Snapshot& shown() const { return history_[shown_]; }
-  /// The snapshot before shown(), or shown() itself if it is the oldest.
-  const Snapshot& before() const { return history_[shown_ == 0 ? 0 : shown_ - 1]; }
+  const RunState& shown() const { return history_[shown_]; }
+  /// The state before shown(), or shown() itself if it is the oldest.
+  const RunState& before() const { return history_[shown_ == 0 ? 0 : shown_ - 1]; }
   bool in_the_past() const { return shown_ + 1 < history_.size(); }
-  const std::deque<Snapshot>& history() const { return history_; }
+  const std::deque<RunState>& history() const { return history_; }
   const Scene& scene() const { return scene_; }
 
  private:
-  void keep(Snapshot snapshot);
+  void keep(RunState run_state);
   RecordingHeader header() const;
   void continue_with(Scene scene, const EngineChoice& choice);
 
   Scene scene_;
   std::unique_ptr<Run> run_;
-  std::deque<Snapshot> history_;
+  std::deque<RunState> history_;
   std::size_t shown_ = 0;
   std::size_t bytes_ = 0;
   bool changed_ = false;  ///< the engine or the settings have changed since the start

@@ -20,13 +20,13 @@ class RecordedRun final : public Run {
   void step() override { states_ = recording_.states(++step_); }
   bool at_end() const override { return step_ == recording_.steps(); }
 
-  Snapshot snapshot() override {
-    Snapshot snapshot;
-    snapshot.step = step_;
-    snapshot.states = states_;
-    snapshot.awake.assign(states_.size(), 1);
-    snapshot.computed_by = "the recording";
-    return snapshot;
+  RunState run_state() override {
+    RunState run_state;
+    run_state.step = step_;
+    run_state.states = states_;
+    run_state.awake.assign(states_.size(), 1);
+    run_state.computed_by = "the recording";
+    return run_state;
   }
 
   bool rewind() override {

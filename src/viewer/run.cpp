@@ -20,7 +20,7 @@ std::unique_ptr<Run> make_run(const Scene& scene, const EngineChoice& choice) {
   return make_run_from(scene, choice, 0);
 }
 
-std::unique_ptr<Run> continue_run(const Scene& scene, const Snapshot& from,
+std::unique_ptr<Run> continue_run(const Scene& scene, const RunState& from,
                                   const EngineChoice& choice) {
   return make_run_from(with_states(scene, from.states), choice, from.step);
 }

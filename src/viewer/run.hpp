@@ -4,7 +4,7 @@
 #include <jfpx/backend.hpp>
 
 #include "src/tool/run_options.hpp"
-#include "src/viewer/snapshot.hpp"
+#include "src/viewer/run_state.hpp"
 
 #include <memory>
 #include <string>
@@ -33,7 +33,7 @@ class Run {
   virtual void step() = 0;
   /// True at the end of a recording, after which no step follows.
   virtual bool at_end() const { return false; }
-  virtual Snapshot snapshot() = 0;
+  virtual RunState run_state() = 0;
   /// Returns to the first step. @return false if the caller must create a new run instead.
   virtual bool rewind() { return false; }
   virtual EngineChoice choice() const = 0;
@@ -59,9 +59,9 @@ bool is_recording(std::string_view scene);
 /// True if this build contains the engine.
 bool has_engine(EngineKind engine);
 
-/// Creates a run with the settings of the scene that starts from a snapshot and continues its step
+/// Creates a run with the settings of the scene that starts from a state and continues its step
 /// count.
-std::unique_ptr<Run> continue_run(const Scene& scene, const Snapshot& from,
+std::unique_ptr<Run> continue_run(const Scene& scene, const RunState& from,
                                   const EngineChoice& choice);
 
 /// The scene with its bodies in the given states.

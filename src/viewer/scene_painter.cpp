@@ -162,7 +162,7 @@ void ScenePainter::draw_wall(const Wall& wall, Drawing* drawing) const {
                    wall.thickness > 0 ? kConcrete : kGlass);
 }
 
-void ScenePainter::draw(const Snapshot& from, const Snapshot& to, Real share, Colouring colouring,
+void ScenePainter::draw(const RunState& from, const RunState& to, Real share, Colouring colouring,
                         Drawing* drawing) const {
   const Bounds bounds = bounds_estimator_.bounds(to.states);
   drawing->set_bounds(bounds.centre, bounds.radius * Real(1.25));
@@ -212,12 +212,12 @@ void ScenePainter::draw_contacts(const std::vector<Contact>& contacts, bool red,
   }
 }
 
-void ScenePainter::draw_forces(const Snapshot& before, const Snapshot& now,
+void ScenePainter::draw_forces(const RunState& before, const RunState& now,
                                Drawing* drawing) const {
   view::draw_forces(scene_, before, now, body_size_ * Real(2.2), drawing);
 }
 
-void ScenePainter::draw_mark(const Snapshot& from, const Snapshot& to, Real share,
+void ScenePainter::draw_mark(const RunState& from, const RunState& to, Real share,
                              std::uint32_t body, Drawing* drawing) const {
   const Shape& shape = scene_.bodies[body].shape;
   const Box* box = std::get_if<Box>(&shape);
@@ -237,7 +237,7 @@ void ScenePainter::draw_mark(const Snapshot& from, const Snapshot& to, Real shar
   }
 }
 
-std::optional<std::uint32_t> ScenePainter::pick(const Snapshot& from, const Snapshot& to,
+std::optional<std::uint32_t> ScenePainter::pick(const RunState& from, const RunState& to,
                                                 Real share, const Vec3& eye,
                                                 const Vec3& direction) const {
   std::optional<std::uint32_t> found;

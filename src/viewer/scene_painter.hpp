@@ -6,7 +6,7 @@
 #include "src/viewer/bounds.hpp"
 #include "src/viewer/colouring.hpp"
 #include "src/viewer/drawing.hpp"
-#include "src/viewer/snapshot.hpp"
+#include "src/viewer/run_state.hpp"
 
 #include <optional>
 #include <vector>
@@ -20,22 +20,22 @@ class ScenePainter {
  public:
   explicit ScenePainter(Scene scene);
 
-  /// Adds bodies, grounds and walls, interpolated between two snapshots of the run.
-  /// @param share position of the picture between the snapshots, in [0, 1]
-  void draw(const Snapshot& from, const Snapshot& to, Real share, Colouring colouring,
+  /// Adds bodies, grounds and walls, interpolated between two states of the run.
+  /// @param share position of the picture between the states of a run, in [0, 1]
+  void draw(const RunState& from, const RunState& to, Real share, Colouring colouring,
             Drawing* drawing) const;
   /// Adds the normals and points of contacts as lines. @param red draws them as errors
   void draw_contacts(const std::vector<Contact>& contacts, bool red, Drawing* drawing) const;
 
-  /// Adds arrows for the forces on the bodies in the step between two snapshots.
-  void draw_forces(const Snapshot& before, const Snapshot& now, Drawing* drawing) const;
+  /// Adds arrows for the forces on the bodies in the step between two states of a run.
+  void draw_forces(const RunState& before, const RunState& now, Drawing* drawing) const;
 
   /// Adds a wireframe box around one body at its drawn position.
-  void draw_mark(const Snapshot& from, const Snapshot& to, Real share, std::uint32_t body,
+  void draw_mark(const RunState& from, const RunState& to, Real share, std::uint32_t body,
                  Drawing* drawing) const;
 
   /// The first movable body that a ray hits at its drawn position. The direction is a unit vector.
-  std::optional<std::uint32_t> pick(const Snapshot& from, const Snapshot& to, Real share,
+  std::optional<std::uint32_t> pick(const RunState& from, const RunState& to, Real share,
                                     const Vec3& eye, const Vec3& direction) const;
   /// The colour of a body for Colouring::bodies.
   Paint paint(std::uint32_t body) const;

@@ -72,7 +72,7 @@ void SceneViewer::pick(Real x, Real y, int width, int height) {
 bool SceneViewer::walks() const { return tool::is_demo(options_.run.scene); }
 
 std::string SceneViewer::summary() const {
-  const Snapshot& now = player_.shown();
+  const RunState& now = player_.shown();
   const EngineChoice choice = player_.choice();
   const bool native = choice.engine == EngineKind::native;
   return fmt::format(

@@ -55,7 +55,7 @@ struct Trio {
   std::unique_ptr<Run> native;
   bullet::SceneWorld stock, jfpx;
   bullet::ContactCheck check;
-  std::array<Snapshot, kColumns> before, now;
+  std::array<RunState, kColumns> before, now;
   std::vector<Contact> different;  ///< contacts of the last step that only one Bullet world has
   std::uint64_t differences = 0;   ///< of all steps
   std::string first_difference;
@@ -90,7 +90,7 @@ struct Trio {
 
  private:
   void record(std::uint64_t step) {
-    now = {native->snapshot(), snapshot_of(stock, step), snapshot_of(jfpx, step)};
+    now = {native->run_state(), run_state_of(stock, step), run_state_of(jfpx, step)};
     const Scene& scene = stock.scene();
     for (std::size_t i = 0; i < kColumns; ++i) {
       now[i].dt = scene.dt;
@@ -141,7 +141,7 @@ class SideBySide final : public Viewer {
   std::uint64_t steps() const override { return trio_->now[kNative].step; }
   double engine_ms() const override {
     double sum = 0;
-    for (const Snapshot& snapshot : trio_->now) sum += snapshot.times.total;
+    for (const RunState& run_state : trio_->now) sum += run_state.times.total;
     return sum;
   }
   Real body_size() const override { return painter_.body_size(); }
@@ -197,7 +197,7 @@ void SideBySide::draw(Renderer& renderer, const Target& target) {
   const View view = camera.view(bounds.centre, bounds.radius);
   for (std::size_t column = 0; column < kColumns; ++column) {
     Drawing drawing(view.eye);
-    const Snapshot& now = trio_->now[column];
+    const RunState& now = trio_->now[column];
     painter_.draw(trio_->before[column], now, share(), colouring, &drawing);
     if (contacts) painter_.draw_contacts(now.contacts, false, &drawing);
     if (forces) painter_.draw_forces(trio_->before[column], now, &drawing);

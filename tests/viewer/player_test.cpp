@@ -190,8 +190,8 @@ TEST(RecordedRun, IsPlayedAndContinuesWithASimulation) {
   Recorded recorded = open_recording(path);
   EXPECT_EQ(recorded.scene, scene);
   Player played(std::move(recorded.run), recorded.scene);
-  for (const Snapshot& snapshot : live.history()) {
-    EXPECT_EQ(hash(played), state_hash(snapshot.states)) << snapshot.step;
+  for (const RunState& run_state : live.history()) {
+    EXPECT_EQ(hash(played), state_hash(run_state.states)) << run_state.step;
     played.step();
   }
   EXPECT_EQ(played.shown().step, 15u);  // the end

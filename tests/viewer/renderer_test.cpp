@@ -253,15 +253,15 @@ TEST_F(RendererTest, EqualsItsReference) {
     }
   }
   add(HalfSpace{}, {}, 0);
-  Snapshot snapshot;
+  RunState run_state;
   for (const BodyDef& body : scene.bodies) {
-    snapshot.states.push_back({body.position, body.orientation, {}, {}});
+    run_state.states.push_back({body.position, body.orientation, {}, {}});
   }
-  snapshot.awake.assign(scene.bodies.size(), 1);
-  snapshot.awake[2] = 0;
+  run_state.awake.assign(scene.bodies.size(), 1);
+  run_state.awake[2] = 0;
   const Vec3 eye{5, 4, 9};
   Drawing drawing(eye);
-  ScenePainter(scene).draw(snapshot, snapshot, 1, Colouring::bodies, &drawing);
+  ScenePainter(scene).draw(run_state, run_state, 1, Colouring::bodies, &drawing);
   const Image image = picture(drawing, view_of(eye, {0, 1, 0}, 5), 240, 150, kHighQuality);
   const std::string path = JFPX_REFERENCE_FOLDER "/scene.png";
   if (std::getenv("JFPX_WRITE_REFERENCES") != nullptr) write_png(image, path);

@@ -45,18 +45,18 @@ void add(Scene* scene, const Shape& shape, const Vec3& position, Real mass) {
   body.mass = mass;
 }
 
-Snapshot snapshot_of(const Scene& scene) {
-  Snapshot snapshot;
+RunState run_state_of(const Scene& scene) {
+  RunState run_state;
   for (const BodyDef& body : scene.bodies) {
-    snapshot.states.push_back({body.position, body.orientation, {}, {}});
+    run_state.states.push_back({body.position, body.orientation, {}, {}});
   }
-  snapshot.awake.assign(scene.bodies.size(), 1);
-  return snapshot;
+  run_state.awake.assign(scene.bodies.size(), 1);
+  return run_state;
 }
 
-Drawing draw(const Scene& scene, const Snapshot& snapshot) {
+Drawing draw(const Scene& scene, const RunState& run_state) {
   Drawing drawing({});
-  ScenePainter(scene).draw(snapshot, snapshot, 1, Colouring::bodies, &drawing);
+  ScenePainter(scene).draw(run_state, run_state, 1, Colouring::bodies, &drawing);
   return drawing;
 }
 
@@ -80,7 +80,7 @@ TEST(Islands, AreConnectedByMovableBodiesOnly) {
 
 TEST(BodyForces, ExcludeWeightAndAreDrawnAsArrowsOfBoundedLength) {
   const Scene scene = balls(4);
-  Snapshot before, now;
+  RunState before, now;
   before.states.resize(4);
   now.states = before.states;
   now.step = 1;
@@ -147,16 +147,16 @@ TEST(ScenePainter, DrawsAndPicksThePartsOfACompound) {
       {0, 5, 0}, 1);
   scene.bodies[0].orientation = {Real(0.70710678), 0, 0, Real(0.70710678)};  // x points up
   add(&scene, Plane{{1, 0, 0}, -8}, {}, 0);
-  const Snapshot snapshot = snapshot_of(scene);
+  const RunState run_state = run_state_of(scene);
   const ScenePainter painter(scene);
   const auto pick = [&](const Vec3& eye) {
-    return painter.pick(snapshot, snapshot, 1, eye, {0, 0, -1});
+    return painter.pick(run_state, run_state, 1, eye, {0, 0, -1});
   };
   EXPECT_EQ(pick({0, 8, 20}), 0u);  // the box
   EXPECT_EQ(pick({0, 2, 20}), 0u);  // the ball
   EXPECT_EQ(pick({0, 5, 20}), std::nullopt);
   EXPECT_EQ(pick({3, 5, 20}), std::nullopt);
-  const Drawing drawing = draw(scene, snapshot);
+  const Drawing drawing = draw(scene, run_state);
   ASSERT_EQ(drawing.spheres().size(), 1u);
   ASSERT_EQ(drawing.boxes().size(), 1u);
   EXPECT_NEAR(drawing.spheres()[0].centre[1], 2, 1e-4);
@@ -171,8 +171,8 @@ TEST(ScenePainter, PicksTheNearestMovableBodyAtItsDrawnPosition) {
   add(&scene, Sphere{1}, {0, 0, -3}, 1);
   add(&scene, Box{{1, 1, 1}}, {0, 0, 0}, 1);
   add(&scene, Sphere{1}, {4, 0, 0}, 1);
-  const Snapshot from = snapshot_of(scene);
-  Snapshot to = from;
+  const RunState from = run_state_of(scene);
+  RunState to = from;
   to.states[3].position = {8, 0, 0};
   const ScenePainter painter(scene);
   const auto pick = [&](const Vec3& eye, Real z) {
@@ -191,7 +191,7 @@ TEST(ScenePainter, PicksTheNearestMovableBodyAtItsDrawnPosition) {
 
 TEST(ScenePainter, DrawsBodiesBetweenTwoStepsAndSleepersDarker) {
   const Scene scene = balls(3);
-  Snapshot from, to;
+  RunState from, to;
   from.states.resize(3);
   from.awake.assign(3, 1);
   to = from;
@@ -230,34 +230,34 @@ TEST(ScenePainter, DifferentContactsAreRedAndWiderThanOthers) {
 
 TEST(ScenePainter, DrawsFiniteBodiesAmongNonFiniteOnes) {
   const Scene scene = scenes::make("lattice", {.spheres = 64});
-  Snapshot snapshot = make_run(scene, {})->snapshot();
+  RunState run_state = make_run(scene, {})->run_state();
   const ScenePainter painter(scene);
-  const Bounds before = painter.bounds(snapshot.states);
-  const auto set = [&snapshot](std::size_t i, Real value) {
-    snapshot.states[i].position = snapshot.states[i].velocity = {value, value, value};
+  const Bounds before = painter.bounds(run_state.states);
+  const auto set = [&run_state](std::size_t i, Real value) {
+    run_state.states[i].position = run_state.states[i].velocity = {value, value, value};
   };
   DrawOrder order;
   const auto visible = [&](Colouring colouring) {
-    const Bounds bounds = painter.bounds(snapshot.states);
+    const Bounds bounds = painter.bounds(run_state.states);
     EXPECT_TRUE(std::isfinite(bounds.radius));
     Camera camera;
     camera.look_at(before.centre + Vec3{0, 0, before.radius * 4}, before.centre);
     const View view = camera.view(bounds.centre, bounds.radius);
     Drawing drawing(view.eye);
-    painter.draw(snapshot, snapshot, 1, colouring, &drawing);
+    painter.draw(run_state, run_state, 1, colouring, &drawing);
     EXPECT_EQ(order.sort(drawing.spheres(), view, 1).size(), 64u);
     return order.visible();
   };
   std::size_t body = 0;
   while (!(scene.bodies[body].mass > 0)) ++body;
   set(body, 1e6);
-  EXPECT_LT(painter.bounds(snapshot.states).radius, before.radius * Real(1.1));  // an outlier
+  EXPECT_LT(painter.bounds(run_state.states).radius, before.radius * Real(1.1));  // an outlier
   set(body, std::numeric_limits<Real>::quiet_NaN());
   set(body + 1, std::numeric_limits<Real>::infinity());
   set(body + 2, -std::numeric_limits<Real>::infinity());
   EXPECT_EQ(visible(Colouring::speed), 61u);
   EXPECT_EQ(visible(Colouring::islands), 61u);
-  for (std::size_t i = 0; i < snapshot.states.size(); ++i) {
+  for (std::size_t i = 0; i < run_state.states.size(); ++i) {
     set(i, std::numeric_limits<Real>::quiet_NaN());
   }
   EXPECT_EQ(visible(Colouring::speed), 0u);
@@ -272,7 +272,7 @@ std::vector<float> tops(const std::vector<BoxItem>& boxes) {
 
 TEST(ScenePainter, DrawsTheWallsOfARoomAsGlassAndOtherBoxesUnchanged) {
   const Scene room = scenes::make("gas", {.spheres = 30000});
-  const Drawing drawing = draw(room, snapshot_of(room));
+  const Drawing drawing = draw(room, run_state_of(room));
   EXPECT_EQ(drawing.glass().size(), 5u);
   EXPECT_EQ(drawing.boxes().size(), 1u);  // the floor
 
@@ -281,7 +281,7 @@ TEST(ScenePainter, DrawsTheWallsOfARoomAsGlassAndOtherBoxesUnchanged) {
   for (const Real i : {Real(0), Real(1), Real(2)}) {
     add(&stairs, Box{{1, Real(0.25), 1}}, {2 * i, i * Real(-0.5), 0}, 0);
   }
-  const Drawing steps = draw(stairs, snapshot_of(stairs));
+  const Drawing steps = draw(stairs, run_state_of(stairs));
   EXPECT_THAT(tops(steps.boxes()), UnorderedElementsAre(0.25f, -0.25f, -0.75f));
   EXPECT_THAT(steps.glass(), IsEmpty());
   ASSERT_EQ(steps.grounds().size(), 1u);
@@ -291,7 +291,7 @@ TEST(ScenePainter, DrawsTheWallsOfARoomAsGlassAndOtherBoxesUnchanged) {
   add(&floors, Sphere{Real(0.5)}, {0, 5, 0}, 1);
   add(&floors, Box{{1, Real(0.25), 1}}, {0, 3, 0}, 0);
   add(&floors, Box{{9, Real(0.5), 9}}, {0, 0, 0}, 0);
-  EXPECT_THAT(tops(draw(floors, snapshot_of(floors)).boxes()), UnorderedElementsAre(3.25f, 0.5f));
+  EXPECT_THAT(tops(draw(floors, run_state_of(floors)).boxes()), UnorderedElementsAre(3.25f, 0.5f));
 }
 
 TEST(DrawOrder, PutsVisibleSpheresFirstFrontToBackAndLosesNone) {

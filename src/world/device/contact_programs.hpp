@@ -256,7 +256,10 @@ struct ShapeProgram {
           const NearPair& near = d.tested[d.order[m]];
           d.now.view.manifolds[m] = {near.key, near.normal, first, near.point_count, 0, 0};
           for (std::uint32_t k = 0; k < near.point_count; ++k) {
-            if (first + k < d.capacity.points) d.now.view.points[first + k] = near.points[k];
+            if (first + k >= d.capacity.points) return;
+            // Members, because the padding of a point is not initialized.
+            const soft_step::PointInput& p = near.points[k];
+            d.now.view.points[first + k] = {p.arm_a, p.arm_b, p.distance, p.feature};
           }
         });
     team.once([&] {

@@ -1,4 +1,4 @@
-/// Snapshot of a run: everything that a picture or the panel shows.
+/// State of a run after a step: everything that a picture or the panel shows.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -16,7 +16,7 @@ struct StageTimes {
   double integrate = 0, broad = 0, detect = 0, solve = 0, total = 0;
 };
 
-struct Snapshot {
+struct RunState {
   std::uint64_t step = 0;
   double time = 0;                  ///< [s] since the run began
   Real dt = 0;                      ///< [s], of the last step
