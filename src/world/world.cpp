@@ -153,9 +153,8 @@ bool World::Impl::advance_worst_first(StepReport* report) {
 /// Copies the arrays that a step changes before it can fail. Copying all of them would take longer
 /// than some stages of a step on many threads.
 void World::Impl::save_for_undo() {
-  is_saved = !can_step_on_device() || !forces.ids().empty();
-  if (!is_saved) return;
   const MotionArrays& now = bodies().moving;
+  is_saved = true;
   if (scene.solver == Solver::worst_first) {
     before = now;
     return;
@@ -206,7 +205,9 @@ StepReport World::step() {
   StepReport report;
   const Clock::time_point start = Clock::now();
   try {
-    w.save_for_undo();
+    // A step on the device changes nothing on the host but for the forces.
+    w.is_saved = false;
+    if (!w.can_step_on_device() || !w.forces.ids().empty()) w.save_for_undo();
   } catch (const std::bad_alloc&) {
     throw OutOfMemory(no_memory_for("a step", w.store.ids().size()));
   }

@@ -102,7 +102,7 @@ struct World::Impl {
     return device != nullptr && scene.solver == Solver::soft_step && generators.ids().empty();
   }
   bool advance_on_device(StepReport* report);
-  void step_on_device(StepReport* report);
+  bool step_on_device(StepReport* report);
   void finish_contacts(std::vector<Contact>* list) const;
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   void find_contacts(StepReport* report);

@@ -56,8 +56,7 @@ void World::Impl::leave_device() {
 /// @returns false if the step is to be done on the host
 bool World::Impl::advance_on_device(StepReport* report) {
   try {
-    step_on_device(report);
-    return resident;
+    if (step_on_device(report)) return true;
   } catch (const DeviceError& error) {
     report->device_failure = error.what();
   } catch (const OutOfMemory& error) {
@@ -74,13 +73,13 @@ bool World::Impl::advance_on_device(StepReport* report) {
     }
     leave_device();
   }
-  device.reset();
+  if (!report->device_failure.empty()) device.reset();
   if (!is_saved) save_for_undo();
   return false;
 }
 
-/// Leaves the device without a step if that has to be done on the host.
-void World::Impl::step_on_device(StepReport* report) {
+/// @returns false if the step is to be done on the host, which reports what is wrong
+bool World::Impl::step_on_device(StepReport* report) {
   if (!resident) {
     if (bodies_changed) contact_finder.set_bodies(store);
     bodies_changed = false;
@@ -96,14 +95,11 @@ void World::Impl::step_on_device(StepReport* report) {
     device->upload_forces(store);
   }
   const DeviceWorld::Result result = device->step();
-  if (result.invalid_bounds) {
-    leave_device();
-    return;
-  }
+  if (result.invalid_bounds) return false;
   report->non_finite = result.runaway.has_value();
   if (result.runaway) {
     report->non_finite_body = store.id(*result.runaway);
-    return;
+    return true;
   }
   std::swap(contacts, contacts_before);
   detected_count_before = detected_count;
@@ -112,6 +108,7 @@ void World::Impl::step_on_device(StepReport* report) {
   report->contacts = result.contacts;
   report->sphere_contacts = result.sphere_contacts;
   report->awake = result.awake;
+  return true;
 }
 
 }  // namespace JFPX_ABI

@@ -97,8 +97,8 @@ TEST(GpuIslandSolver, ADeviceThatFailsIsReplacedInTheSameGroupAndReportedOnce) {
 
 /// Groups of some thousand contacts and many iterations, for which a GPU is predicted to be faster.
 void add_work_for_a_device(BulletWorld& w) {
-  add_heap(w, 800, 17, btScalar(6.5));
-  w.world.getSolverInfo().m_numIterations = 200;
+  add_heap(w, 3200, 17, btScalar(13));
+  w.world.getSolverInfo().m_numIterations = 100;
 }
 
 TEST(GpuIslandSolver, StartsOnAnotherThreadWhileTheCpuGoesOn) {

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -49,6 +50,16 @@ def test_a_sweep_on_many_workers_has_the_hashes_of_a_serial_run():
     assert len({line.split()[1] for line in lines}) == 200
 
 
+def processes(client):
+    """Process ids of the workers, once the scheduler has noticed that a worker is lost."""
+    for _ in range(100):
+        try:
+            return list(client.run(os.getpid).values())
+        except OSError:
+            time.sleep(0.1)
+    raise AssertionError("the scheduler does not answer")
+
+
 def test_a_sweep_that_loses_a_worker_has_the_same_hashes(monkeypatch):
     distributed = pytest.importorskip("distributed")
     monkeypatch.syspath_prepend(FOLDER)
@@ -59,10 +70,10 @@ def test_a_sweep_that_loses_a_worker_has_the_same_hashes(monkeypatch):
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         with distributed.Client(cluster) as client:
             victim = next(iter(client.run(os.getpid).values()))
-            killer = threading.Timer(0.3, os.kill, (victim, signal.SIGKILL))
+            killer = threading.Timer(0.2, os.kill, (victim, signal.SIGKILL))
             killer.start()
-            hashes = module.gather(client, 60, 60)
+            hashes = module.gather(client, 60, 200)
             killer.join()
-            alive = client.run(os.getpid).values()
-    assert hashes == module.run_serially(60, 60)
+            alive = processes(client)
+    assert hashes == module.run_serially(60, 200)
     assert victim not in alive
