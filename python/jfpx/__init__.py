@@ -8,7 +8,7 @@ from ._collider import (ContactRows, Contacts, PeriodicContactRows, PeriodicCont
                         PeriodicRows, Rows, SphereCollider, available_backends, find_contacts,
                         find_pairs)
 from ._errors import (BackendUnavailable, Closed, ConcurrentUse, DeviceError, Error, FileError,
-                      InvalidArgument, InvalidScene, OutOfMemory)
+                      InvalidArgument, InvalidScene, InvalidSnapshot, OutOfMemory)
 from ._forces import (Attachment, BodyId, BodyState, Bungee, Buoyancy, Drag, Explosion,
                       ForceContext, Gravity, Spring, States)
 from ._recording import Recording, RecordingWriter

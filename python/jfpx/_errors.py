@@ -13,6 +13,10 @@ class InvalidScene(Error, ValueError):
     """A scene cannot be simulated. The message names the body, the field, its value and the range."""
 
 
+class InvalidSnapshot(Error, ValueError):
+    """A snapshot is damaged, or is of another version, another precision or another program."""
+
+
 class BackendUnavailable(Error):
     """A backend was requested by name and cannot be used. The message gives the reason."""
 
@@ -37,6 +41,6 @@ class Closed(Error):
     """An object is used after its close()."""
 
 
-for _error in (Error, InvalidArgument, InvalidScene, BackendUnavailable, OutOfMemory, DeviceError,
-               FileError, ConcurrentUse, Closed):
+for _error in (Error, InvalidArgument, InvalidScene, InvalidSnapshot, BackendUnavailable, OutOfMemory,
+               DeviceError, FileError, ConcurrentUse, Closed):
     _error.__module__ = "jfpx"

@@ -208,6 +208,20 @@ class World:
         """Hash of all states: equal hashes mean equal states to the last bit."""
         return self._core.state_hash()
 
+    def snapshot(self) -> bytes:
+        """The state as a value: all that the following steps depend on, except for Python functions.
+        Equal states have equal bytes, whatever the backend and the number of threads."""
+        return self._core.snapshot()
+
+    def restore(self, snapshot: bytes) -> None:
+        """Replaces the state by that of a snapshot of this or of another world of the same dtype. The
+        following steps have the bits of those without. A world that is to be restored must have
+        Python functions as forces with the ids of the snapshot. Raises InvalidSnapshot; the world is
+        then unchanged."""
+        if not isinstance(snapshot, bytes):
+            raise InvalidArgument(f"snapshot is of type {type(snapshot).__name__}; it must be bytes")
+        self._core.restore(snapshot)
+
     def close(self) -> None:
         """Frees the world now. Later calls raise Closed. Also at the end of a `with` statement."""
         self._core.close()

@@ -27,6 +27,8 @@ void translate(const std::exception_ptr& exception, void* /*payload*/) {
     std::rethrow_exception(exception);
   } catch (const InvalidScene& e) {
     set_error("InvalidScene", e.what());
+  } catch (const InvalidSnapshot& e) {
+    set_error("InvalidSnapshot", e.what());
   } catch (const InvalidArgument& e) {
     set_error("InvalidArgument", e.what());
   } catch (const BackendUnavailable& e) {

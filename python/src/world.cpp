@@ -242,6 +242,16 @@ void bind_world(nb::module_& module) {
       .def("close", &PythonWorld::close)
       .def("time", [](const PythonWorld& self) { return self.get().time(); })
       .def("state_hash", [](const PythonWorld& self) { return self.get().state_hash(); })
+      .def("snapshot",
+           [](const PythonWorld& self) {
+             const Snapshot snapshot = self.get().snapshot();
+             return nb::bytes(snapshot.bytes.data(), snapshot.bytes.size());
+           })
+      .def("restore",
+           [](PythonWorld& self, const nb::bytes& snapshot) {
+             const auto* first = static_cast<const std::byte*>(snapshot.data());
+             self.get().restore({.bytes = {first, first + snapshot.size()}});
+           })
       .def("scene", [](const PythonWorld& self) { return self.get().scene(); });
   bind_bodies(world);
   bind_properties(world);

@@ -339,10 +339,39 @@ def test_a_body_that_leaves_the_finite_numbers_ends_a_run():
     assert report.non_finite and report.non_finite_body == (0, 0) and report.step == 0
 
 
+def test_steps_after_a_restoration_have_the_same_bits(dtype):
+    world = jfpx.World(jfpx.Scene.named("mixed", spheres=40, dtype=dtype), backend="cpu")
+    world.run(30)
+    snapshot = pickle.loads(pickle.dumps(world.snapshot()))
+    other = jfpx.World({"bodies": [BALL]}, dtype=dtype, backend="cpu", threads=3)
+    other.restore(snapshot)
+    assert other.snapshot() == snapshot
+    for copy in (world, other):
+        copy.run(40)
+    assert world.state_hash() == other.state_hash()
+    world.restore(snapshot)
+    world.run(40)
+    assert world.state_hash() == other.state_hash()
+
+
+def test_a_damaged_snapshot_is_a_named_exception(dtype):
+    world = jfpx.World({"bodies": [BALL]}, dtype=dtype)
+    snapshot, before = world.snapshot(), world.state_hash()
+    damaged = bytearray(snapshot)
+    damaged[-1] ^= 1
+    wrong_dtype = jfpx.World({"bodies": [BALL]}, dtype={"float32": "float64", "float64": "float32"}[dtype.name])
+    for bad in (b"", snapshot[:-1], bytes(damaged), wrong_dtype.snapshot()):
+        with pytest.raises(jfpx.InvalidSnapshot):
+            world.restore(bad)
+    with pytest.raises(jfpx.InvalidArgument, match="it must be bytes"):
+        world.restore("text")
+    assert world.state_hash() == before
+
+
 def test_a_closed_world_is_a_named_exception():
     with jfpx.World({"bodies": [BALL]}) as world:
         world.step()
-    for call in (world.step, world.states, world.contacts, world.state_hash, lambda: world.run(1),
+    for call in (world.step, world.states, world.contacts, world.state_hash, world.snapshot, lambda: world.run(1),
                  lambda: world.cast_ray((0, 0, 0), (0, 0, 1)), lambda: world.add(BALL)):
         with pytest.raises(jfpx.Closed, match="the world is closed"):
             call()
