@@ -11,11 +11,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 #if JFPX_HAS_CUDA
-std::unique_ptr<DeviceWorld> make_device_world(const Scene& scene) {
-  return cuda::make_world(scene);
+std::unique_ptr<DeviceWorld> make_device_world(const Scene& scene, int device) {
+  return cuda::make_world(scene, device);
 }
 #else
-std::unique_ptr<DeviceWorld> make_device_world(const Scene&) {
+std::unique_ptr<DeviceWorld> make_device_world(const Scene&, int) {
   throw BackendUnavailable("cuda: built without CUDA");
 }
 #endif

@@ -54,8 +54,9 @@ class DeviceWorld {
                                        std::vector<Contact>* contacts) = 0;
 };
 
-/// A world on the first CUDA device. @throws BackendUnavailable with the reason, DeviceError
-std::unique_ptr<DeviceWorld> make_device_world(const Scene& scene);
+/// A world on a CUDA device. @param device its number
+/// @throws BackendUnavailable with the reason, DeviceError
+std::unique_ptr<DeviceWorld> make_device_world(const Scene& scene, int device = 0);
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

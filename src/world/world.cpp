@@ -248,7 +248,7 @@ World::World(const Scene& scene, const WorldSettings& settings) {
   auto collider = make_sphere_collider(settings.collider, pool.get());
   impl_ = Impl::make(scene, std::move(pool), std::move(collider), settings.broad_phase);
   if (settings.collider.backend == Backend::cuda && scene.solver == Solver::soft_step) {
-    impl_->device = make_device_world(scene);
+    impl_->device = make_device_world(scene, settings.collider.device);
   }
 }
 

@@ -42,7 +42,7 @@ std::vector<Kind> kinds() {
   std::vector<Kind> kinds{{"Host", test::make_host_device_world}};
   for (const BackendStatus& status : available_backends()) {
     if (status.backend == Backend::cuda && status.usable) {
-      kinds.push_back({"Cuda", make_device_world});
+      kinds.push_back({"Cuda", [](const Scene& scene) { return make_device_world(scene); }});
     }
   }
   return kinds;

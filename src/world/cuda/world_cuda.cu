@@ -150,8 +150,9 @@ class CudaDevice {
 
 }  // namespace
 
-std::unique_ptr<DeviceWorld> make_world(const Scene& scene) {
-  return std::make_unique<device::DeviceStep<CudaDevice>>(scene, std::make_unique<CudaDevice>(0));
+std::unique_ptr<DeviceWorld> make_world(const Scene& scene, int device) {
+  return std::make_unique<device::DeviceStep<CudaDevice>>(scene,
+                                                          std::make_unique<CudaDevice>(device));
 }
 
 }  // namespace cuda

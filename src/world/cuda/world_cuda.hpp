@@ -7,8 +7,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// A world on the first device. @throws BackendUnavailable with the reason, DeviceError
-std::unique_ptr<DeviceWorld> make_world(const Scene& scene);
+/// @throws BackendUnavailable with the reason, DeviceError
+std::unique_ptr<DeviceWorld> make_world(const Scene& scene, int device);
 
 }  // namespace cuda
 }  // namespace JFPX_ABI

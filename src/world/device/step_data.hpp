@@ -38,7 +38,6 @@ struct Counters {
   std::uint32_t any_sensor_pair = 0;     ///< 1: a pair of bounds is of spheres, one a sensor
   std::uint32_t candidates = 0;
   std::uint32_t touches = 0;
-  std::uint32_t uncolored = 0;
   std::uint32_t any_asleep = 0;             ///< 1: a movable body sleeps at the start of the step
   std::uint32_t any_rebound = 0;            ///< 1: a row has a speed of separation
   std::uint32_t any_rests = 0;              ///< 1: a body has been slow for long enough to sleep
@@ -85,7 +84,7 @@ struct Range {
 
 /// The contacts of a step on the device.
 struct DeviceContacts {
-  soft_step::ContactView view;    ///< the counts are set by each program: see now()
+  soft_step::ContactView view;    ///< without the counts: see StepData::contacts()
   Range* spheres_of = nullptr;    ///< by body a: its contacts of two spheres
   Range* manifolds_of = nullptr;  ///< by body a
   std::uint32_t counts[3] = {};   ///< of the last step: spheres, manifolds, points
