@@ -2,6 +2,8 @@
 /// change, factors, gyroscopic forces, heaps. They run with Bullet's components and with others.
 #pragma once
 
+#include <jfpx/bullet/constraint_solver.hpp>
+
 #include "tests/bullet/random_world.hpp"
 
 namespace jfpx {
@@ -50,7 +52,7 @@ std::ostream& operator<<(std::ostream& out, const SolverWorld& world);
 
 struct SolverTotals {
   std::uint64_t steps = 0, groups = 0, on_device = 0, contacts = 0, joints = 0;
-  std::uint64_t fallbacks[8] = {};
+  std::uint64_t fallbacks[kSolverFallbacks] = {};
 };
 
 /// Returns the components under test, except for the dispatcher.
