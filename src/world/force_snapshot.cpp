@@ -37,17 +37,17 @@ constexpr const char* kGenerator = "contact generator";
 /// The value of a force of force.hpp; `Value` is a variant of all of them.
 ForceRestorer::Value ForceRestorer::value_of(const ForceRegistry::Function& force) {
   Value value;
-  const auto look_for = [&]<class F>(std::in_place_type_t<F>) {
-    if (const F* found = force.target<F>()) value = *found;
+  const auto look_for = [&](auto kind) {
+    if (const auto* found = force.target<decltype(kind)>()) value = *found;
   };
-  look_for(std::in_place_type<Gravity>);
-  look_for(std::in_place_type<Drag>);
-  look_for(std::in_place_type<Spring>);
-  look_for(std::in_place_type<Bungee>);
-  look_for(std::in_place_type<Aero>);
-  look_for(std::in_place_type<AeroControl>);
-  look_for(std::in_place_type<Buoyancy>);
-  look_for(std::in_place_type<Explosion>);
+  look_for(Gravity());
+  look_for(Drag());
+  look_for(Spring());
+  look_for(Bungee());
+  look_for(Aero());
+  look_for(AeroControl());
+  look_for(Buoyancy());
+  look_for(Explosion());
   return value;
 }
 

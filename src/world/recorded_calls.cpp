@@ -141,7 +141,8 @@ void read(const Json& json, T& value) {
 template <std::size_t... I>
 void read_force(const Json& json, RecordableForce& force, std::index_sequence<I...>) {
   const std::string name = json.at("type").get<std::string>();
-  const auto read_if = [&]<std::size_t i>(std::integral_constant<std::size_t, i>) {
+  const auto read_if = [&](auto index) {
+    constexpr std::size_t i = decltype(index)::value;
     if (name == kForceNames[i]) read(json, force.emplace<i>());
     return name == kForceNames[i];
   };
