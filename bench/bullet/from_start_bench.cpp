@@ -43,17 +43,7 @@ void compare(benchmark::State& state, const Case& c, unsigned threads) {
                            .world = WorldKind::stock});
   SceneWorld ours(scene, our_options(threads));
   Samples stock_samples, our_samples;
-  {
-    const TimedZones timed;
-    bool swap = false;
-    for (auto _ : state) {
-      alternate(
-          swap, [&] { stock_samples.step(stock); }, [&] { our_samples.step(ours); });
-      swap = !swap;
-      state.SetIterationTime(our_samples.total.back() * 1e-3);
-    }
-  }
-  if (stock.state_hash() != ours.state_hash()) state.SkipWithError("the worlds differ");
+  sample_in_turn(state, stock, ours, &stock_samples, &our_samples);
   const auto steps = static_cast<double>(stock_samples.total.size());
   const double stock_total = sum(stock_samples.total), our_total = sum(our_samples.total);
   state.counters["ratio"] = stock_total / our_total;

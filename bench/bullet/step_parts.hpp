@@ -112,21 +112,24 @@ class TimedZones {
   TimedZones& operator=(const TimedZones&) = delete;
 };
 
-/// Steps both worlds in alternating order, once per iteration of the benchmark, and reports medians
-/// of their parts and of the ratio of whole steps.
-inline void step_in_turn(benchmark::State& state, SceneWorld& stock, SceneWorld& ours) {
-  Samples stock_samples, our_samples;
-  {
-    const TimedZones timed;
-    bool swap = false;
-    for (auto _ : state) {
-      alternate(
-          swap, [&] { stock_samples.step(stock); }, [&] { our_samples.step(ours); });
-      swap = !swap;
-      state.SetIterationTime(our_samples.total.back() * 1e-3);
-    }
+/// Steps both worlds in alternating order, once per iteration of the benchmark.
+inline void sample_in_turn(benchmark::State& state, SceneWorld& stock, SceneWorld& ours,
+                           Samples* stock_samples, Samples* our_samples) {
+  const TimedZones timed;
+  bool swap = false;
+  for (auto _ : state) {
+    alternate(
+        swap, [&] { stock_samples->step(stock); }, [&] { our_samples->step(ours); });
+    swap = !swap;
+    state.SetIterationTime(our_samples->total.back() * 1e-3);
   }
   if (stock.state_hash() != ours.state_hash()) state.SkipWithError("the worlds differ");
+}
+
+/// sample_in_turn(), then reports medians of the parts and of the ratio of whole steps.
+inline void step_in_turn(benchmark::State& state, SceneWorld& stock, SceneWorld& ours) {
+  Samples stock_samples, our_samples;
+  sample_in_turn(state, stock, ours, &stock_samples, &our_samples);
   stock_samples.report(state, "stock");
   our_samples.report(state, "jfpx");
   std::vector<double> ratios;
