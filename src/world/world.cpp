@@ -181,13 +181,10 @@ void World::Impl::save_for_undo() {
   });
 }
 
-/// Restores the state before the step, including the contacts that wake_neighbors() uses, and
-/// empties World::contacts() and World::contact_events().
-void World::Impl::undo() noexcept {
+/// Restores the motion that save_for_undo() has copied.
+void World::Impl::undo_motion() noexcept {
   MotionArrays& now = store.moving;
-  if (!is_saved) {
-    // Nothing has changed on the host.
-  } else if (scene.solver == Solver::worst_first) {
+  if (scene.solver == Solver::worst_first) {
     std::swap(now, before);
   } else {
     std::swap(now.force, before.force);
@@ -197,6 +194,13 @@ void World::Impl::undo() noexcept {
     std::swap(now.rest_time, before.rest_time);
     std::swap(now.awake, before.awake);
   }
+  is_saved = false;
+}
+
+/// Restores the state before the step, including the contacts that wake_neighbors() uses, and
+/// empties World::contacts() and World::contact_events().
+void World::Impl::undo() noexcept {
+  if (is_saved) undo_motion();
   if (contacts_are_new) {
     std::swap(contacts, contacts_before);
     detected_count = detected_count_before;

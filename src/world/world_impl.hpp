@@ -107,6 +107,7 @@ struct World::Impl {
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   void find_contacts(StepReport* report);
   void save_for_undo();
+  void undo_motion() noexcept;
   void undo() noexcept;
   void write(BinaryWriter* writer) const;
   void read(BinaryReader* reader);

@@ -63,14 +63,7 @@ bool World::Impl::advance_on_device(StepReport* report) {
     report->device_failure = error.what();
   }
   if (resident) {
-    if (is_saved) {
-      // Without the forces of this step, which the host applies again.
-      store.moving.force = before.force;
-      store.moving.torque = before.torque;
-      store.moving.motion = before.motion;
-      store.moving.rest_time = before.rest_time;
-      store.moving.awake = before.awake;
-    }
+    if (is_saved) undo_motion();  // the host applies the forces of this step again
     leave_device();
   }
   if (!report->device_failure.empty()) device.reset();
