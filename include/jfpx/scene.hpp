@@ -28,9 +28,11 @@ constexpr const char* to_string(Solver solver) {
   return nullptr;
 }
 
+inline constexpr std::uint32_t kMaxSubsteps = 64;
+
 /// Settings of Solver::soft_step.
 struct SoftStepSettings {
-  /// Number of substeps per step, in [1, 64]. More substeps make contacts stiffer.
+  /// Number of substeps per step, in [1, kMaxSubsteps]. More substeps make contacts stiffer.
   std::uint32_t substeps = 4;
   /// [Hz], >= 0, frequency of the contact springs between movable bodies; twice that against
   /// immovable and kinematic bodies. 0, and values above it, mean a quarter of the substep rate.

@@ -97,7 +97,8 @@ struct StepReport {
   /// Error of a device whose work the CPU took over in this step; empty if there was none.
   std::string device_failure;
   /// With Solver::soft_step, `integrate_ms` is the time of forces, and `resolve_ms` includes the
-  /// integration in substeps. In a step on a GPU, `resolve_ms` is the time of all stages.
+  /// integration in substeps. In a step on a GPU, these two are times of the device: they do not
+  /// include launches and transfers, as `total_ms` does.
   double integrate_ms = 0, detect_ms = 0, resolve_ms = 0, total_ms = 0;
 };
 

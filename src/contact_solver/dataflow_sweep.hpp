@@ -3,6 +3,7 @@
 /// g++ and nvcc.
 #pragma once
 
+#include "src/contact_solver/cell.hpp"
 #include "src/contact_solver/contact_rows.hpp"
 #include "src/contact_solver/scalar_lane.hpp"
 
@@ -26,14 +27,7 @@ namespace rows {
 // first step that is not done, in the order of passes and of the schedule, never waits, and its
 // worker has no earlier step to execute. Hence the sweeps terminate if every worker makes progress.
 
-inline constexpr int kCellNumbers = sizeof(Real) == 4 ? 3 : 1;
 inline constexpr int kBodyCells = 6 / kCellNumbers;
-
-struct alignas(16) Cell {
-  Real numbers[kCellNumbers];
-  std::uint32_t sequence;  ///< number of steps that have moved the body
-};
-static_assert(sizeof(Cell) == 16);
 
 inline constexpr std::uint32_t kNoRollingFriction = UINT32_MAX;
 

@@ -169,7 +169,7 @@ std::string find_fault(const BodyDef& def) {
 }
 
 std::string find_fault(const SoftStepSettings& soft_step) {
-  if (!(soft_step.substeps >= 1 && soft_step.substeps <= 64)) {
+  if (!(soft_step.substeps >= 1 && soft_step.substeps <= kMaxSubsteps)) {
     return fault("soft_step.substeps", static_cast<Real>(soft_step.substeps), "from 1 to 64");
   }
   if (!(soft_step.contact_hertz >= 0 && is_finite(soft_step.contact_hertz))) {

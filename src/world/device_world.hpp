@@ -26,6 +26,7 @@ class DeviceWorld {
     std::uint64_t contacts = 0;            ///< size of the list that fetch_contacts() returns
     std::uint64_t sphere_contacts = 0;     ///< of these, of two spheres
     std::uint32_t awake = 0;               ///< movable bodies awake after the step
+    double detect_ms = 0, resolve_ms = 0;  ///< device times: contact search, all other stages
     std::optional<std::uint32_t> runaway;  ///< first body that is_in_world() refuses
     /// The bounds of a body's motion are not finite: the step had no effect, and SoftStep reports
     /// the error.

@@ -208,10 +208,11 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
                  .start = bodies_.data()},
                 constants_);
   for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
-    for_each_body(*bodies, [&](std::uint32_t i) { step_.accelerate(i, substep == 0); });
+    for_each_body(*bodies,
+                  [&](std::uint32_t i) { step_.accelerate(i, &step_.solver[i], substep == 0); });
     if (substep == 0) solver_.warm_start(bodies_);
     solver_.solve(bodies_, true);
-    for_each_body(*bodies, [this](std::uint32_t i) { step_.move(i); });
+    for_each_body(*bodies, [this](std::uint32_t i) { step_.move(i, &step_.solver[i]); });
     solver_.solve(bodies_, false);
   }
   solver_.restitute(bodies_);

@@ -59,36 +59,33 @@ struct StepBodies {
   /// would contain a part of the acceleration that impulses have cancelled. Forces may depend on
   /// the position, and are constant in a step: they move the body as in the semi-implicit Euler
   /// method for the whole step, because a spring would gain energy otherwise.
-  JFPX_HD void accelerate(std::uint32_t i, bool is_first) const {
+  JFPX_HD void accelerate(std::uint32_t i, SolverBody* body, bool is_first) const {
     if (!bodies.movable(i) || bodies.awake[i] == 0) return;
-    SolverBody body = solver[i];
-    Vec3 velocity = body.velocity, angular_velocity = body.angular_velocity;
+    Vec3 velocity = body->velocity, angular_velocity = body->angular_velocity;
     bodies.accelerate(i, orientation[i], &velocity, &angular_velocity);
     if (near[i] == 0) {
-      body.shift = add_scaled(body.shift, body.velocity - velocity, h * Real(0.5));
+      body->shift = add_scaled(body->shift, body->velocity - velocity, h * Real(0.5));
       if (!(bodies.force[i] == Vec3{})) {
         const Real half_step = h * bodies.dt * Real(0.5);
-        body.shift = add_scaled(body.shift, bodies.last_acceleration[i], half_step);
+        body->shift = add_scaled(body->shift, bodies.last_acceleration[i], half_step);
       }
     }
-    const Vec3 gained = is_first ? Vec3{} : body.velocity - free_velocity[i];
-    const Vec3 spun = is_first ? Vec3{} : body.angular_velocity - free_angular_velocity[i];
+    const Vec3 gained = is_first ? Vec3{} : body->velocity - free_velocity[i];
+    const Vec3 spun = is_first ? Vec3{} : body->angular_velocity - free_angular_velocity[i];
     free_velocity[i] = velocity;
     free_angular_velocity[i] = angular_velocity;
-    body.velocity = velocity + gained;
-    body.angular_velocity = angular_velocity + spun;
-    solver[i] = body;
+    body->velocity = velocity + gained;
+    body->angular_velocity = angular_velocity + spun;
   }
 
   /// Ends a substep: integrates the velocities of a body that moves.
-  JFPX_HD void move(std::uint32_t i) const {
+  JFPX_HD void move(std::uint32_t i, SolverBody* body) const {
     if (bodies.awake[i] == 0) return;
-    SolverBody& body = solver[i];
-    body.shift = add_scaled(body.shift, body.velocity, h);
-    body.rotation = add_scaled(body.rotation, body.angular_velocity, h);
+    body->shift = add_scaled(body->shift, body->velocity, h);
+    body->rotation = add_scaled(body->rotation, body->angular_velocity, h);
     // After an overflow it is zero, and remains so until the step is undone.
     if (orientation[i] == Quat{0, 0, 0, 0}) return;
-    orientation[i] = detail::integrated_orientation(orientation[i], body.angular_velocity, h);
+    orientation[i] = detail::integrated_orientation(orientation[i], body->angular_velocity, h);
   }
 
   /// State of an awake body at the end of the step.

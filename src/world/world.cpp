@@ -97,11 +97,7 @@ void World::Impl::find_contacts(StepReport* report) {
 /// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
 /// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
 bool World::Impl::advance(StepReport* report) {
-  const Clock::time_point start = Clock::now();
-  if (can_step_on_device() && advance_on_device(report)) {
-    report->resolve_ms = elapsed_ms(start, Clock::now());
-    return !report->non_finite;
-  }
+  if (can_step_on_device() && advance_on_device(report)) return !report->non_finite;
   if (resident) leave_device();
   const std::string failure = report->device_failure;
   const bool completed =

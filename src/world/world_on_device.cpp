@@ -98,6 +98,8 @@ bool World::Impl::step_on_device(StepReport* report) {
   detected_count_before = detected_count;
   contacts_before_are_current = contacts_are_current;
   motion_is_current = contacts_are_current = contact_set_is_current = false;
+  report->detect_ms = result.detect_ms;
+  report->resolve_ms = result.resolve_ms;
   report->contacts = result.contacts;
   report->sphere_contacts = result.sphere_contacts;
   report->awake = result.awake;

@@ -58,8 +58,8 @@ class HostGroupSolver final : public GroupSolver {
 
  private:
   struct Cells {
-    static rows::Cell load(const rows::Cell* p) { return *p; }
-    static void store(rows::Cell* p, const rows::Cell& cell) { *p = cell; }
+    static Cell load(const Cell* p) { return *p; }
+    static void store(Cell* p, const Cell& cell) { *p = cell; }
   };
   struct Results {
     double* largest;
@@ -173,7 +173,7 @@ class HostGroupSolver final : public GroupSolver {
   std::vector<std::uint32_t> rolling_frictions_, slot_contacts_, contact_counts_,
       split_impulse_counts_;
   std::vector<rows::ScheduledContact> schedule_, split_impulse_schedule_;
-  std::vector<rows::Cell> cells_;
+  std::vector<Cell> cells_;
   std::vector<rows::ContactOutcome> outcomes_;
   std::vector<double> residuals_;
 };

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <stdexcept>
+#include <type_traits>
 #include <vector>
 
 namespace jfpx {
@@ -17,49 +19,76 @@ namespace test {
 /// Runs the items of a loop in an order that differs from loop to loop, as on a device.
 class HostTeam {
  public:
+  void sync() const {}
+  const std::uint32_t* cached_bins(const std::uint32_t* numbers) const { return numbers; }
+
   template <class F>
-  void for_each(std::uint32_t n, const F& f) const {
+  void spread(std::uint32_t n, const F& f) const {
     if (n == 0) return;
     const std::uint32_t start = static_cast<std::uint32_t>(++loops_ * 2654435761u % n);
     for (std::uint32_t i = start; i < n; ++i) f(i);
     for (std::uint32_t i = start; i-- > 0;) f(i);
   }
-  std::uint32_t first() const { return 0; }
-  std::uint32_t stride() const { return 1; }
-  void sync() const {}
-  const std::uint32_t* cached_bins(const std::uint32_t* numbers) const { return numbers; }
+  template <class F>
+  void for_each(std::uint32_t n, const F& f) const {
+    spread(n, f);
+  }
   template <class F>
   void once(const F& f) const {
     f();
   }
-  template <class Condition>
-  std::uint32_t count(std::uint32_t n, const Condition& condition) const {
-    std::uint32_t result = 0;
-    for (std::uint32_t i = 0; i < n; ++i) result += condition(i) ? 1 : 0;
-    return result;
+  template <class F>
+  void in_one_block(const F& f) const {
+    f(*this);
   }
-  template <class Size, class Place>
-  std::uint32_t scan(std::uint32_t n, const Size& size, const Place& place) const {
-    std::vector<std::uint32_t> before(n);
-    std::uint32_t sum = 0;
+  /// Completes the items in another order than the one in which they depend on each other.
+  template <class Flow>
+  void flow(std::uint32_t n, const Flow& flow) const {
+    std::vector<std::remove_cvref_t<decltype(flow.begin(0))>> items;
+    for (std::uint32_t i = 0; i < n; ++i) items.push_back(flow.begin(i));
+    while (!items.empty()) {
+      const std::size_t before = items.size();
+      std::ranges::reverse(items);
+      std::erase_if(items, [&](auto& item) {
+        if (!flow.is_ready(&item)) return false;
+        flow.complete(&item);
+        return true;
+      });
+      if (items.size() == before) throw std::logic_error("the items of a flow wait for each other");
+    }
+  }
+  template <class Condition>
+  void count(std::uint32_t n, const Condition& condition, std::uint32_t* sum) const {
+    for (std::uint32_t i = 0; i < n; ++i) *sum += condition(i) ? 1 : 0;
+  }
+  template <class Measure, class Size, class Place>
+  auto scan(std::uint32_t n, const Measure& measure, const Size& size, const Place& place) const {
+    std::vector<decltype(size(0))> before(n);
+    decltype(size(0)) sum = 0;
     for (std::uint32_t i = 0; i < n; ++i) {
       before[i] = sum;
-      sum += size(i);
+      sum += measure(i);
     }
-    for (std::uint32_t i = n; i-- > 0;) place(i, before[i]);
+    for (std::uint32_t i = n; i-- > 0;) {
+      if (size(i) != (i + 1 < n ? before[i + 1] : sum) - before[i]) {
+        throw std::logic_error("a scan with two different sizes of an item");
+      }
+      place(i, before[i]);
+    }
     return sum;
   }
   template <class BinOf, class Place>
-  void partition(std::uint32_t n, std::uint32_t bins, std::uint32_t* begin, const BinOf& bin_of,
+  void partition(std::uint32_t n, std::uint8_t* bins, std::uint32_t* begin, const BinOf& bin_of,
                  const Place& place) const {
-    std::vector<std::uint32_t> next(bins + 1);
+    std::vector<std::uint32_t> next(device::kBins + 1);
     for (std::uint32_t i = 0; i < n; ++i) {
-      if (bin_of(i) != device::kNone) ++next[bin_of(i) + 1];
+      bins[i] = bin_of(i);
+      if (bins[i] < device::kBins) ++next[bins[i] + 1u];
     }
-    for (std::uint32_t b = 0; b < bins; ++b) next[b + 1] += next[b];
+    for (std::uint32_t b = 0; b < device::kBins; ++b) next[b + 1] += next[b];
     std::ranges::copy(next, begin);
     for (std::uint32_t i = n; i-- > 0;) {
-      if (bin_of(i) != device::kNone) place(i, next[bin_of(i)]++);
+      if (bins[i] < device::kBins) place(i, next[bins[i]]++, bins[i]);
     }
   }
 
@@ -116,6 +145,8 @@ class HostDevice {
     program(team_);
   }
   void wait() {}
+  void mark(int) {}
+  double elapsed_ms(int from, int to) const { return to - from; }
 
  private:
   std::unique_ptr<SphereCollider> collider_ = make_sphere_collider({.backend = Backend::cpu});

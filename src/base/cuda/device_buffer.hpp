@@ -49,6 +49,22 @@ class OwnedStream {
   cudaStream_t stream_ = nullptr;
 };
 
+/// Owner of an event that measures time.
+class OwnedEvent {
+ public:
+  explicit OwnedEvent(int device) {
+    const DeviceGuard guard(device);
+    JFPX_CUDA_TRY(cudaEventCreate(&event_));
+  }
+  ~OwnedEvent() { static_cast<void>(cudaEventDestroy(event_)); }
+  OwnedEvent(const OwnedEvent&) = delete;
+  OwnedEvent& operator=(const OwnedEvent&) = delete;
+  cudaEvent_t get() const noexcept { return event_; }
+
+ private:
+  cudaEvent_t event_ = nullptr;
+};
+
 /// Pool of device memory. It keeps freed memory for later allocations, and returns all memory to
 /// the device when it is destroyed.
 class MemoryPool {

@@ -130,8 +130,8 @@ RowSweepArgs GroupSolverCuda::make_args(const GroupSweeps& sweeps) {
     group.contact_rows = arena.allocate<Real>(size_.contacts * rows::kContactFields);
     group.friction_rows =
         arena.allocate<Real>(size_.contacts * sweeps.directions * rows::kFrictionFields);
-    group.main.cells = arena.allocate<rows::Cell>(size_.bodies * rows::kBodyCells);
-    group.split_impulse.cells = arena.allocate<rows::Cell>(size_.bodies * rows::kBodyCells);
+    group.main.cells = arena.allocate<Cell>(size_.bodies * rows::kBodyCells);
+    group.split_impulse.cells = arena.allocate<Cell>(size_.bodies * rows::kBodyCells);
     return arena.used();
   };
   const std::size_t row_bytes = allocate_rows(nullptr);

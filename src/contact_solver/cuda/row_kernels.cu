@@ -21,29 +21,9 @@ constexpr unsigned kMaxPolls = 1u << 23;
 /// the lanes of a warp costs more.
 constexpr std::size_t kContactsPerLane = 64;
 
-/// Cells in the L2 cache, which all multiprocessors share. Loads and stores of a cell are atomic.
 struct DeviceCells {
-  static __device__ rows::Cell load(const rows::Cell* p) {
-    union {
-      unsigned long long words[2];
-      rows::Cell cell;
-    } u;
-    asm volatile("{ .reg .b128 t; ld.relaxed.gpu.global.b128 t, [%2]; mov.b128 {%0, %1}, t; }"
-                 : "=l"(u.words[0]), "=l"(u.words[1])
-                 : "l"(p));
-    return u.cell;
-  }
-  static __device__ void store(rows::Cell* p, const rows::Cell& cell) {
-    union {
-      unsigned long long words[2];
-      rows::Cell cell;
-    } u;
-    u.words[1] = 0;
-    u.cell = cell;
-    asm volatile("{ .reg .b128 t; mov.b128 t, {%1, %2}; st.relaxed.gpu.global.b128 [%0], t; }"
-                 :
-                 : "l"(p), "l"(u.words[0]), "l"(u.words[1]));
-  }
+  static __device__ Cell load(const Cell* at) { return load_cell(at); }
+  static __device__ void store(Cell* at, const Cell& cell) { store_cell(at, cell); }
 };
 
 /// The largest residuals of the threads of a block.
@@ -140,8 +120,7 @@ std::size_t shared_bytes(std::uint32_t iterations) {
 }  // namespace
 
 void launch_row_setup(const RowSweepArgs& args, cudaStream_t stream) {
-  const std::size_t bytes =
-      std::size_t{args.group.body_count} * rows::kBodyCells * sizeof(rows::Cell);
+  const std::size_t bytes = std::size_t{args.group.body_count} * rows::kBodyCells * sizeof(Cell);
   JFPX_CUDA_TRY(cudaMemsetAsync(args.group.main.cells, 0, bytes, stream));
   JFPX_CUDA_TRY(cudaMemsetAsync(args.group.split_impulse.cells, 0, bytes, stream));
   JFPX_CUDA_TRY(cudaMemsetAsync(args.results, 0,

@@ -1,6 +1,7 @@
 /// The threads of a cooperative launch, which run the program of a device step together.
 #pragma once
 
+#include "src/base/cuda/warp.cuh"
 #include "src/world/device/step_data.hpp"
 
 #include <cooperative_groups.h>
@@ -10,46 +11,32 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Loops over items, each with a barrier of all threads at its end. All threads must call the same
-/// functions with the same numbers of items. Items of scan() and partition() belong to consecutive
-/// chunks, one for each block.
+/// Loops over items. All threads must call the same functions with the same numbers of items. Items
+/// of scan() and partition() belong to consecutive chunks, one for each block.
 class GridTeam {
  public:
   static constexpr unsigned kThreads = 256;
 
   /// Words of scratch memory for a launch with this number of blocks.
   static std::size_t scratch_words(unsigned blocks) {
-    return std::size_t{blocks} * (1 + device::kBins);
+    return std::size_t{blocks} * (2 + device::kBins);
   }
 
   /// @param scratch device memory of scratch_words()
   /// @param is_cluster whether all blocks are one cluster, whose barrier is faster
   JFPX_HD GridTeam(std::uint32_t* scratch, bool is_cluster)
-      : block_sums_(scratch), is_cluster_(is_cluster) {
+      : block_sums_(reinterpret_cast<std::uint64_t*>(scratch)), is_cluster_(is_cluster) {
 #if defined(__CUDA_ARCH__)
-    block_bins_ = scratch + gridDim.x;
+    blocks_ = gridDim.x;
+    block_ = blockIdx.x;
+    block_bins_ = scratch + 2 * gridDim.x;
 #endif
   }
 
-  /// The items of this thread are first(), first() + stride(), ...; the caller synchronizes.
-  JFPX_HD std::uint32_t first() const {
-#if defined(__CUDA_ARCH__)
-    return blockIdx.x * kThreads + threadIdx.x;
-#else
-    return 0;
-#endif
-  }
-  JFPX_HD std::uint32_t stride() const {
-#if defined(__CUDA_ARCH__)
-    return gridDim.x * kThreads;
-#else
-    return 1;
-#endif
-  }
   /// Barrier of all threads. Writes before it are visible to all threads after it.
   JFPX_HD void sync() const {
 #if defined(__CUDA_ARCH__)
-    if (gridDim.x == 1) {
+    if (blocks_ == 1) {
       __syncthreads();
       return;
     }
@@ -75,95 +62,130 @@ class GridTeam {
 #endif
   }
 
-  /// Calls f(i) for all i < n, in any order.
+  /// Calls f(i) for all i < n, in any order, without a barrier.
   template <class F>
-  JFPX_HD void for_each(std::uint32_t n, const F& f) const {
+  JFPX_HD void spread(std::uint32_t n, const F& f) const {
 #if defined(__CUDA_ARCH__)
-    for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < n; i += gridDim.x * kThreads) {
-      f(i);
-    }
-    sync();
+    for (std::uint32_t i = first(); i < n; i += blocks_ * kThreads) f(i);
 #endif
   }
-
-  /// Calls f in one thread.
+  /// Calls f(i) for all i < n, in any order, then waits for all threads.
+  template <class F>
+  JFPX_HD void for_each(std::uint32_t n, const F& f) const {
+    spread(n, f);
+    sync();
+  }
+  /// Calls f in one thread, without a barrier.
   template <class F>
   JFPX_HD void once(const F& f) const {
 #if defined(__CUDA_ARCH__)
-    if (blockIdx.x == 0 && threadIdx.x == 0) f();
-    sync();
+    if (first() == 0) f();
+#endif
+  }
+  /// Calls f(team) with a team of the threads of one block, whose barriers are faster. Has no
+  /// barrier itself.
+  template <class F>
+  JFPX_HD void in_one_block(const F& f) const {
+#if defined(__CUDA_ARCH__)
+    if (block_ != 0) return;
+    GridTeam team = *this;
+    team.blocks_ = 1;
+    f(team);
 #endif
   }
 
-  /// Number of i < n for which condition(i) holds.
+  /// Dataflow without a barrier: for all i < n, makes an item with begin(i), waits until
+  /// is_ready(item), and calls complete(item). An item may wait for items of lower warps, of 32
+  /// items each, and for those of earlier calls.
+  template <class Flow>
+  JFPX_HD void flow(std::uint32_t n, const Flow& flow) const {
+#if defined(__CUDA_ARCH__)
+    for (std::uint32_t i = first(); i - lane_id() < n; i += blocks_ * kThreads) {
+      auto item = flow.begin(i < n ? i : n - 1);
+      // All lanes at the same time: one after the other, they would take 32 times as long.
+      bool waits = i < n;
+      while (__any_sync(kFullWarp, waits)) {
+        if (waits) waits = !flow.is_ready(&item);
+      }
+      if (i < n) flow.complete(&item);
+    }
+#endif
+  }
+
+  /// Adds the number of i < n for which condition(i) holds, without a barrier.
   template <class Condition>
-  JFPX_HD std::uint32_t count(std::uint32_t n, const Condition& condition) const {
+  JFPX_HD void count(std::uint32_t n, const Condition& condition, std::uint32_t* sum) const {
 #if defined(__CUDA_ARCH__)
     std::uint32_t mine = 0;
-    for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < n; i += gridDim.x * kThreads) {
+    for (std::uint32_t i = first(); i < n; i += blocks_ * kThreads) {
       if (condition(i)) ++mine;
     }
-    publish(block_sum(mine));
-    const std::uint32_t total = sum_of_blocks(gridDim.x);
-    sync();
-    return total;
-#else
-    return 0;
+    mine = warp_sum(mine);
+    if (lane_id() == 0 && mine > 0) atomicAdd(sum, mine);
 #endif
   }
 
-  /// Calls place(i, size(0) + ... + size(i - 1)) for all i < n. Calls size(i) twice; `place` must
-  /// not change it. @returns the sum of all sizes
-  template <class Size, class Place>
-  JFPX_HD std::uint32_t scan(std::uint32_t n, const Size& size, const Place& place) const {
+  /// Calls place(i, size(0) + ... + size(i - 1)) for all i < n. Calls measure(i), which returns the
+  /// size, once, and then size(i). @returns the sum of all sizes
+  template <class Measure, class Size, class Place>
+  JFPX_HD auto scan(std::uint32_t n, const Measure& measure, const Size& size,
+                    const Place& place) const -> decltype(size(0)) {
+    using Number = decltype(size(0));
 #if defined(__CUDA_ARCH__)
     const device::Range chunk = chunk_of(n);
-    std::uint32_t mine = 0;
-    for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) mine += size(i);
-    publish(block_sum(mine));
-    const std::uint32_t total = sum_of_blocks(gridDim.x);
-    std::uint32_t before = sum_of_blocks(blockIdx.x);
+    Number mine = 0;
+    for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
+      mine += measure(i);
+    }
+    const Number block_total = block_sum(mine);
+    if (threadIdx.x == 0) block_sums_[block_] = block_total;
+    sync();
+    const Number total = sum_of_blocks<Number>(blocks_);
+    Number before = sum_of_blocks<Number>(block_);
     for (std::uint32_t tile = chunk.begin; tile < chunk.end; tile += kThreads) {
       const std::uint32_t i = tile + threadIdx.x;
-      const std::uint32_t value = i < chunk.end ? size(i) : 0;
-      std::uint32_t sum = 0;
-      const std::uint32_t first = before + block_scan(value, &sum);
+      const Number value = i < chunk.end ? size(i) : 0;
+      Number sum = 0;
+      const Number first = before + block_scan(value, &sum);
       if (i < chunk.end) place(i, first);
       before += sum;
     }
     sync();
     return total;
 #else
-    return 0;
+    return Number{0};
 #endif
   }
 
-  /// Calls place(i, position) for all i < n with bin_of(i) != device::kNone: positions are
+  /// Calls place(i, position, bin) for all i < n with bin_of(i) < device::kBins: positions are
   /// consecutive, and those of a bin follow those of the bins before, in any order within the bin.
+  /// @param bins  receives bin_of(i), which is called once
   /// @param begin receives the first position of each bin, and the number of all
   template <class BinOf, class Place>
-  JFPX_HD void partition(std::uint32_t n, std::uint32_t bins, std::uint32_t* begin,
+  JFPX_HD void partition(std::uint32_t n, std::uint8_t* bins, std::uint32_t* begin,
                          const BinOf& bin_of, const Place& place) const {
 #if defined(__CUDA_ARCH__)
-    __shared__ std::uint32_t next[device::kBins];
-    __shared__ std::uint32_t totals[device::kBins];
+    constexpr std::uint32_t kBins = device::kBins;
+    __shared__ std::uint32_t next[kBins];
+    __shared__ std::uint32_t totals[kBins];
     const device::Range chunk = chunk_of(n);
-    for (std::uint32_t b = threadIdx.x; b < bins; b += kThreads) next[b] = 0;
+    for (std::uint32_t b = threadIdx.x; b < kBins; b += kThreads) next[b] = 0;
     __syncthreads();
     for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
-      const std::uint32_t bin = bin_of(i);
-      if (bin != device::kNone) atomicAdd(&next[bin], 1u);
+      const std::uint8_t bin = bin_of(i);
+      bins[i] = bin;
+      if (bin < kBins) atomicAdd(&next[bin], 1u);
     }
     __syncthreads();
-    for (std::uint32_t b = threadIdx.x; b < bins; b += kThreads) {
-      block_bins_[blockIdx.x * bins + b] = next[b];
+    for (std::uint32_t b = threadIdx.x; b < kBins; b += kThreads) {
+      block_bins_[block_ * kBins + b] = next[b];
     }
     sync();
-    for (std::uint32_t b = threadIdx.x; b < bins; b += kThreads) {
+    for (std::uint32_t b = threadIdx.x; b < kBins; b += kThreads) {
       std::uint32_t total = 0, before = 0;
-      for (std::uint32_t block = 0; block < gridDim.x; ++block) {
-        if (block == blockIdx.x) before = total;
-        total += block_bins_[block * bins + b];
+      for (std::uint32_t block = 0; block < blocks_; ++block) {
+        if (block == block_) before = total;
+        total += block_bins_[block * kBins + b];
       }
       next[b] = before;
       totals[b] = total;
@@ -171,17 +193,17 @@ class GridTeam {
     __syncthreads();
     if (threadIdx.x == 0) {
       std::uint32_t first = 0;
-      for (std::uint32_t b = 0; b < bins; ++b) {
-        if (blockIdx.x == 0) begin[b] = first;
+      for (std::uint32_t b = 0; b < kBins; ++b) {
+        if (block_ == 0) begin[b] = first;
         next[b] += first;
         first += totals[b];
       }
-      if (blockIdx.x == 0) begin[bins] = first;
+      if (block_ == 0) begin[kBins] = first;
     }
     __syncthreads();
     for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
-      const std::uint32_t bin = bin_of(i);
-      if (bin != device::kNone) place(i, atomicAdd(&next[bin], 1u));
+      const std::uint8_t bin = bins[i];
+      if (bin < kBins) place(i, atomicAdd(&next[bin], 1u), bin);
     }
     sync();
 #endif
@@ -189,27 +211,26 @@ class GridTeam {
 
  private:
 #if defined(__CUDA_ARCH__)
+  __device__ std::uint32_t first() const { return block_ * kThreads + threadIdx.x; }
+
   /// The items of this block.
-  __device__ static device::Range chunk_of(std::uint32_t n) {
+  __device__ device::Range chunk_of(std::uint32_t n) const {
     const std::uint32_t tiles = (n + kThreads - 1) / kThreads;
-    const std::uint32_t size = (tiles + gridDim.x - 1) / gridDim.x * kThreads;
-    const std::uint64_t begin = std::uint64_t{blockIdx.x} * size;
+    const std::uint32_t size = (tiles + blocks_ - 1) / blocks_ * kThreads;
+    const std::uint64_t begin = std::uint64_t{block_} * size;
     return {static_cast<std::uint32_t>(begin < n ? begin : n),
             static_cast<std::uint32_t>(begin + size < n ? begin + size : n)};
   }
 
   /// Sum of `value` before this thread in the block. @param sum receives that of all threads
-  __device__ static std::uint32_t block_scan(std::uint32_t value, std::uint32_t* sum) {
-    __shared__ std::uint32_t warp_sums[kThreads / 32];
-    const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32;
-    std::uint32_t inclusive = value;
-    for (unsigned offset = 1; offset < 32; offset *= 2) {
-      const std::uint32_t other = __shfl_up_sync(0xffffffffu, inclusive, offset);
-      if (lane >= offset) inclusive += other;
-    }
-    if (lane == 31) warp_sums[warp] = inclusive;
+  template <class Number>
+  __device__ static Number block_scan(Number value, Number* sum) {
+    __shared__ Number warp_sums[kThreads / 32];
+    const unsigned warp = threadIdx.x / 32;
+    const Number inclusive = warp_inclusive_sum(value);
+    if (lane_id() == 31) warp_sums[warp] = inclusive;
     __syncthreads();
-    std::uint32_t before = 0, total = 0;
+    Number before = 0, total = 0;
     for (unsigned w = 0; w < kThreads / 32; ++w) {
       if (w == warp) before = total;
       total += warp_sums[w];
@@ -218,27 +239,26 @@ class GridTeam {
     *sum = total;
     return before + inclusive - value;
   }
-  __device__ static std::uint32_t block_sum(std::uint32_t value) {
-    std::uint32_t sum = 0;
+  template <class Number>
+  __device__ static Number block_sum(Number value) {
+    Number sum = 0;
     block_scan(value, &sum);
     return sum;
   }
-
-  /// Makes the sum of this block visible to all.
-  __device__ void publish(std::uint32_t sum) const {
-    if (threadIdx.x == 0) block_sums_[blockIdx.x] = sum;
-    sync();
-  }
   /// Sum of the published sums of the first blocks.
-  __device__ std::uint32_t sum_of_blocks(std::uint32_t blocks) const {
-    std::uint32_t mine = 0;
-    for (std::uint32_t b = threadIdx.x; b < blocks; b += kThreads) mine += block_sums_[b];
+  template <class Number>
+  __device__ Number sum_of_blocks(std::uint32_t blocks) const {
+    Number mine = 0;
+    for (std::uint32_t b = threadIdx.x; b < blocks; b += kThreads) {
+      mine += static_cast<Number>(block_sums_[b]);
+    }
     return block_sum(mine);
   }
 #endif
 
-  std::uint32_t* block_sums_;
-  std::uint32_t* block_bins_ = nullptr;  ///< by block and bin
+  std::uint64_t* block_sums_;
+  std::uint32_t* block_bins_ = nullptr;   ///< by block and bin
+  std::uint32_t blocks_ = 1, block_ = 0;  ///< of the team, and this thread's
   bool is_cluster_;
 };
 

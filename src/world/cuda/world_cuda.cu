@@ -15,7 +15,7 @@ namespace cuda {
 namespace {
 
 template <class Program>
-__global__ void __launch_bounds__(GridTeam::kThreads, 3)
+__global__ void __launch_bounds__(GridTeam::kThreads, Program::kBlocksPerProcessor)
     run_program(const __grid_constant__ Program program, std::uint32_t* scratch, bool is_cluster) {
   program(GridTeam(scratch, is_cluster));
 }
@@ -40,6 +40,7 @@ class CudaDevice {
       : device_(usable_device(device)),
         stream_(device_),
         pool_(device_),
+        marks_{OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_)},
         collider_(stream_.get(), device_) {
     const DeviceGuard guard(device_);
     JFPX_CUDA_TRY(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device_));
@@ -47,6 +48,7 @@ class CudaDevice {
 
   template <class T>
   void reserve(Buffer<T>* buffer, std::size_t count, const char* what) {
+    if (count <= buffer->capacity()) return;
     const DeviceGuard guard(device_);
     buffer->reserve_geometric(pool_, stream_.get(), count, what);
   }
@@ -103,6 +105,17 @@ class CudaDevice {
     JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get()));
   }
 
+  void mark(int i) { JFPX_CUDA_TRY(cudaEventRecord(marks_[i].get(), stream_.get())); }
+  /// 0 if a mark has failed: the step is complete all the same.
+  double elapsed_ms(int from, int to) const noexcept {
+    float result = 0;
+    if (cudaEventElapsedTime(&result, marks_[from].get(), marks_[to].get()) == cudaSuccess) {
+      return static_cast<double>(result);
+    }
+    static_cast<void>(cudaGetLastError());
+    return 0;
+  }
+
  private:
   /// What a launch of a program can use.
   struct Launch {
@@ -122,7 +135,9 @@ class CudaDevice {
       JFPX_CUDA_TRY(cudaFuncSetAttribute(run_program<Program>,
                                          cudaFuncAttributeNonPortableClusterSizeAllowed, 1));
     }
-    limits.most_blocks = static_cast<std::size_t>(resident) * static_cast<unsigned>(processors_);
+    limits.most_blocks =
+        std::min<std::size_t>(static_cast<unsigned>(resident), Program::kBlocksPerProcessor) *
+        static_cast<unsigned>(processors_);
     return limits;
   }
   template <class Program>
@@ -138,6 +153,7 @@ class CudaDevice {
   int device_;
   OwnedStream stream_;
   MemoryPool pool_;
+  OwnedEvent marks_[device::kMarks];
   DeviceSphereCollider collider_;
   DeviceBuffer<std::uint32_t> scratch_;
   int processors_ = 0;

@@ -21,6 +21,14 @@ JFPX_HD inline std::uint32_t atomic_add(std::uint32_t* at, std::uint32_t value) 
 #endif
 }
 
+JFPX_HD inline void atomic_add(std::uint64_t* at, std::uint64_t value) {
+#if defined(__CUDA_ARCH__)
+  atomicAdd(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(value));
+#else
+  *at += value;
+#endif
+}
+
 JFPX_HD inline void atomic_min(std::uint32_t* at, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)
   atomicMin(at, value);
@@ -42,6 +50,17 @@ JFPX_HD inline void atomic_or(std::uint64_t* at, std::uint64_t bits) {
   atomicOr(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(bits));
 #else
   *at |= bits;
+#endif
+}
+
+/// @returns the value before
+JFPX_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t value) {
+#if defined(__CUDA_ARCH__)
+  return atomicExch(at, value);
+#else
+  const std::uint32_t before = *at;
+  *at = value;
+  return before;
 #endif
 }
 

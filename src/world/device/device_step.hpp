@@ -3,9 +3,11 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/world/device/commit_program.hpp"
 #include "src/world/device/contact_programs.hpp"
 #include "src/world/device/match_program.hpp"
-#include "src/world/device/solve_programs.hpp"
+#include "src/world/device/prepare_program.hpp"
+#include "src/world/device/solve_program.hpp"
 #include "src/world/device_world.hpp"
 
 #include <algorithm>
@@ -19,13 +21,17 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
+inline constexpr int kMarks = 3;
+
 /// @tparam Device owns a stream of work, or imitates one on the host:
 ///   - `Buffer<T>`: array in the memory of the device; data(), capacity();
 ///   - `reserve(&buffer, count, what)`: makes the capacity at least `count`, discards the contents;
 ///   - `upload(to, from, count)`, `download(to, from, count)`, `copy(to, from, count)`;
 ///   - `find_pairs(spheres, n, pairs, capacity, count)`: as cuda::DeviceSphereCollider;
 ///   - `run(program, items)`: runs program(team) with about one thread per item;
-///   - `wait()`: until all work is complete.
+///   - `wait()`: until all work is complete;
+///   - `mark(i)`: marks a point of the work, i < kMarks; `elapsed_ms(i, j)`: the time between two
+///     points, once all work is complete.
 template <class Device>
 class DeviceStep final : public DeviceWorld {
  public:
@@ -63,7 +69,6 @@ class DeviceStep final : public DeviceWorld {
 
   Result step() override {
     ++data_.number;
-    save();
     const Counters counters = run_until_complete();
     Result result;
     result.invalid_bounds = counters.invalid_bounds != 0;
@@ -77,6 +82,8 @@ class DeviceStep final : public DeviceWorld {
     done.counts = {counters.spheres, counters.manifolds, counters.points};
     done.touch_count = counters.touches;
     now_ = 1 - now_;
+    result.detect_ms = device_->elapsed_ms(0, 1);
+    result.resolve_ms = device_->elapsed_ms(1, 2);
     result.awake = counters.awake;
     result.contacts = std::uint64_t{counters.touching_spheres} + counters.touches;
     result.sphere_contacts = std::uint64_t{counters.touching_spheres} + counters.sphere_touches;
@@ -156,7 +163,6 @@ class DeviceStep final : public DeviceWorld {
  private:
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
-  static constexpr std::size_t kManyContacts = 65536;
 
   struct Properties {
     Buffer<Real> radius, extent, inverse_mass, friction, restitution, rolling_friction,
@@ -208,13 +214,13 @@ class DeviceStep final : public DeviceWorld {
     Buffer<SphereInstance> swept;
     Buffer<SpherePair> pairs;
     Buffer<cuda::ContactCount> pair_count;
-    Buffer<PairResultKind> pair_kind;
     Buffer<NormalDistance> pair_results;
     Buffer<Candidate> candidates;
     Buffer<NearPair> tested;
-    Buffer<Range> bucket;
-    Buffer<std::uint32_t> order, first_contact, uncolored, still_uncolored, parent, row_contact,
-        fixed_bodies;
+    Buffer<std::uint32_t> first_candidate, next_candidate, first_contact, uncolored,
+        still_uncolored, parent, row_contact, first_fixed, next_fixed, overflow;
+    Buffer<std::uint64_t> manifold_sizes;
+    Buffer<std::uint8_t> pair_found, row_bins;
     Buffer<std::uint64_t> used_colors, first_order;
     Buffer<std::uint8_t> marked, near_flag;
     Buffer<soft_step::SolverBody> solver;
@@ -223,7 +229,8 @@ class DeviceStep final : public DeviceWorld {
     Buffer<soft_step::SphereRow> sphere_rows;
     Buffer<soft_step::ManifoldRow> manifold_rows;
     Buffer<soft_step::PointRow> point_rows;
-    Buffer<FixedRow> fixed;
+    Buffer<BodyCells> cells;
+    Buffer<RowBody> row_bodies;
   };
 
   /// Copies an array to the device. @returns its address there
@@ -354,7 +361,9 @@ class DeviceStep final : public DeviceWorld {
     StepData& d = data_;
     d.motion = room(&s.motion, n);
     d.near.motion = d.motion;
-    d.bucket = room(&s.bucket, n);
+    d.first_candidate = room(&s.first_candidate, n);
+    d.manifold_sizes = room(&s.manifold_sizes, n);
+    d.first_fixed = room(&s.first_fixed, n);
     d.used_colors = room(&s.used_colors, n);
     d.first_order = room(&s.first_order, n);
     d.first_contact = room(&s.first_contact, n);
@@ -366,13 +375,12 @@ class DeviceStep final : public DeviceWorld {
     d.step.orientation = room(&s.orientation, n);
     d.step.free_velocity = room(&s.free_velocity, n);
     d.step.free_angular_velocity = room(&s.free_angular_velocity, n);
-    d.fixed_bodies = room(&s.fixed_bodies, n);
+    d.cells = room(&s.cells, n);
+    d.row_bodies = room(&s.row_bodies, n);
     d.pair_count = room(&s.pair_count, 1);
     d.counters = room(&counters_, 1);
-    room(&saved_.last_acceleration, n);
-    room(&saved_.motion, n);
-    room(&saved_.rest_time, n);
-    room(&saved_.awake, n);
+    d.saved = {room(&saved_.last_acceleration, n), room(&saved_.motion, n),
+               room(&saved_.rest_time, n), room(&saved_.awake, n)};
   }
 
   /// Room for the lists of a step, as `capacity_` says.
@@ -384,18 +392,20 @@ class DeviceStep final : public DeviceWorld {
     const std::size_t impulses = std::size_t{c.spheres} + c.points;
     d.capacity = c;
     d.pairs = room(&s.pairs, c.pairs);
-    d.pair_kind = room(&s.pair_kind, c.pairs);
+    d.pair_found = room(&s.pair_found, c.pairs);
     d.pair_results = room(&s.pair_results, c.pairs);
     d.candidates = room(&s.candidates, c.candidates);
     d.tested = room(&s.tested, c.candidates);
-    d.order = room(&s.order, c.candidates);
+    d.next_candidate = room(&s.next_candidate, c.candidates);
     d.uncolored = room(&s.uncolored, contacts);
     d.still_uncolored = room(&s.still_uncolored, contacts);
+    d.row_bins = room(&s.row_bins, contacts);
     d.row_contact = room(&s.row_contact, contacts);
+    d.next_fixed = room(&s.next_fixed, contacts);
+    d.overflow = room(&s.overflow, contacts);
     d.sphere_rows = room(&s.sphere_rows, contacts);
     d.manifold_rows = room(&s.manifold_rows, contacts);
     d.point_rows = room(&s.point_rows, impulses);
-    d.fixed = room(&s.fixed, contacts);
     Contacts& now = sets_[now_];
     const std::size_t bodies = d.step.bodies.capacity;
     d.now.view = {room(&now.spheres, c.spheres),
@@ -446,16 +456,18 @@ class DeviceStep final : public DeviceWorld {
     const std::size_t sub_shapes = d.near.sub_shapes.bounded_count;
     const std::size_t contacts = std::max<std::size_t>(
         bodies, std::max<std::size_t>(sets_[1 - now_].counts[0], sets_[1 - now_].counts[1]));
+    device_->mark(0);
     device_->run(BoundsProgram{d}, std::max(bodies, sub_shapes));
     device_->find_pairs(d.near.swept, d.near.sub_shapes.fixed_begin, d.pairs, capacity_.pairs,
                         d.pair_count);
     device_->run(SphereProgram{d}, contacts);
     device_->run(ShapeProgram{d}, contacts);
     device_->run(MatchProgram{d}, contacts);
+    device_->mark(1);
     device_->run(PrepareProgram{d}, contacts);
-    // One color at a time. Of many blocks, the barrier takes longer than the rows (measured).
-    device_->run(SolveProgram{d}, contacts / (contacts < kManyContacts ? 4 : 12));
+    device_->run(SolveProgram{d}, contacts);
     device_->run(CommitProgram{d}, contacts);
+    device_->mark(2);
   }
 
   Counters counters() {
@@ -479,28 +491,21 @@ class DeviceStep final : public DeviceWorld {
         device_->wait();
         const Counters result = counters();
         if (result.completed == data_.number) return result;
-        restore();
+        if (result.started == data_.number) restore();
         device_->wait();
         throw;
       }
     }
   }
 
-  void save() {
-    const MotionPointers& m = data_.step.motion;
-    const std::size_t n = data_.step.bodies.capacity;
-    device_->copy(saved_.last_acceleration.data(), m.last_acceleration, n);
-    device_->copy(saved_.motion.data(), m.motion, n);
-    device_->copy(saved_.rest_time.data(), m.rest_time, n);
-    device_->copy(saved_.awake.data(), m.awake, n);
-  }
   void restore() {
     const MotionPointers& m = data_.step.motion;
+    const SavedArrays& saved = data_.saved;
     const std::size_t n = data_.step.bodies.capacity;
-    device_->copy(m.last_acceleration, saved_.last_acceleration.data(), n);
-    device_->copy(m.motion, saved_.motion.data(), n);
-    device_->copy(m.rest_time, saved_.rest_time.data(), n);
-    device_->copy(m.awake, saved_.awake.data(), n);
+    device_->copy(m.last_acceleration, saved.last_acceleration, n);
+    device_->copy(m.motion, saved.motion, n);
+    device_->copy(m.rest_time, saved.rest_time, n);
+    device_->copy(m.awake, saved.awake, n);
   }
 
   std::unique_ptr<Device> device_;

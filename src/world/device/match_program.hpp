@@ -13,29 +13,35 @@ namespace device {
 /// Gives each contact the impulses and the color of the same contact of the last step, and colors
 /// the others: as soft_step::ContactCache.
 struct MatchProgram {
+  static constexpr unsigned kBlocksPerProcessor = 6;
+  /// Up to this number of contacts, one block colors them: its barriers are faster.
+  static constexpr std::uint32_t kFewContacts = 4096;
   StepData data;
 
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
     if (data.has_failed()) return;
     const StepData& d = data;
-    const std::uint32_t bodies = d.step.bodies.capacity;
     const std::uint32_t spheres = d.counters->spheres;
-    team.for_each(bodies, [&](std::uint32_t i) {
-      d.used_colors[i] = 0;
-      d.first_order[i] = kNoOrder;
-      d.first_contact[i] = kNone;
-      d.now.spheres_of[i] = {};
+    team.for_each(spheres + d.counters->manifolds, [&](std::uint32_t i) {
+      const bool is_colored = i < spheres ? match_sphere(i) : match_manifold(i - spheres);
+      const soft_step::ContactView now = d.contacts();
+      const soft_step::ContactKey& key = now.key(i);
+      d.near_flag[key.a] = d.near_flag[key.b] = 1;
+      if (is_colored) return;
+      const BodyView& bodies = d.step.bodies;
+      if (bodies.movable(key.a) && bodies.movable(key.b)) {
+        now.colors[i] = soft_step::kNoColor;
+        d.uncolored[atomic_add(&d.counters->uncolored[0], 1)] = i;
+      } else {
+        now.colors[i] = soft_step::kFixedColor;
+      }
     });
-    team.for_each(spheres, [&](std::uint32_t i) {
-      const soft_step::SphereContactInput* list = d.now.view.spheres;
-      const std::uint32_t a = list[i].key.a;
-      if (i == 0 || list[i - 1].key.a != a) d.now.spheres_of[a].begin = i;
-      if (i + 1 == spheres || list[i + 1].key.a != a) d.now.spheres_of[a].end = i + 1;
-      match_sphere(i);
-    });
-    team.for_each(d.counters->manifolds, [&](std::uint32_t m) { match_manifold(m); });
-    color(team);
+    if (d.counters->uncolored[0] <= kFewContacts) {
+      team.in_one_block([&](const auto& block) { color(block); });
+    } else {
+      color(team);
+    }
   }
 
  private:
@@ -62,44 +68,54 @@ struct MatchProgram {
     return kNone;
   }
 
-  JFPX_HD void match_sphere(std::uint32_t i) const {
-    const soft_step::ContactView now = data.contacts(), last = data.last_contacts();
-    now.impulses[i] = {};
-    now.rolling_impulses[i] = {};
-    now.colors[i] = soft_step::kNoColor;
+  /// @returns whether the contact keeps a color
+  JFPX_HD bool match_sphere(std::uint32_t i) const {
+    const StepData& d = data;
+    const soft_step::ContactView now = d.contacts(), last = d.last_contacts();
     const soft_step::ContactKey& key = now.spheres[i].key;
-    const std::uint32_t before = find(last.spheres, data.last.spheres_of[key.a], key);
-    if (before == kNone) return;
-    keep(now, i, last, before);
+    if (i == 0 || now.spheres[i - 1].key.a != key.a) d.now.spheres_of[key.a].begin = i;
+    if (i + 1 == now.sphere_count || now.spheres[i + 1].key.a != key.a) {
+      d.now.spheres_of[key.a].end = i + 1;
+    }
+    const std::uint32_t before = find(last.spheres, d.last.spheres_of[key.a], key);
+    if (before == kNone) {
+      now.impulses[i] = {};
+      now.rolling_impulses[i] = {};
+      return false;
+    }
     now.impulses[i] = soft_step::turned(last.impulses[before], now.spheres[i].normal);
+    return keep(now, i, last, before);
   }
 
-  JFPX_HD void match_manifold(std::uint32_t m) const {
+  /// @returns whether the contact keeps a color
+  JFPX_HD bool match_manifold(std::uint32_t m) const {
     const soft_step::ContactView now = data.contacts(), last = data.last_contacts();
     const soft_step::ManifoldInput& contact = now.manifolds[m];
     const std::uint32_t i = now.sphere_count + m;
-    now.rolling_impulses[i] = {};
-    now.colors[i] = soft_step::kNoColor;
     for (std::uint32_t p = 0; p < contact.count; ++p) {
       now.impulses[now.sphere_count + contact.first + p] = {};
     }
     const std::uint32_t before =
         find(last.manifolds, data.last.manifolds_of[contact.key.a], contact.key);
-    if (before == kNone) return;
-    keep(now, i, last, last.sphere_count + before);
+    if (before == kNone) {
+      now.rolling_impulses[i] = {};
+      return false;
+    }
     soft_step::match_points(now, m, last, before);
+    return keep(now, i, last, last.sphere_count + before);
   }
 
-  /// Keeps the color and the rolling impulse.
-  JFPX_HD void keep(const soft_step::ContactView& now, std::uint32_t i,
+  /// Keeps the rolling impulse, and the color if there is one. @returns whether there is one
+  JFPX_HD bool keep(const soft_step::ContactView& now, std::uint32_t i,
                     const soft_step::ContactView& last, std::uint32_t before) const {
     now.rolling_impulses[i] = last.rolling_impulses[before];
     const std::uint8_t color = last.colors[before];
-    if (color >= soft_step::kColors) return;
+    if (color >= soft_step::kColors) return false;
     now.colors[i] = color;
     const std::uint64_t bit = std::uint64_t{1} << color;
     atomic_or(&data.used_colors[now.key(i).a], bit);
     atomic_or(&data.used_colors[now.key(i).b], bit);
+    return true;
   }
 
   /// Colors in rounds: a contact gets its color when it is the first of the uncolored ones at both
@@ -108,22 +124,11 @@ struct MatchProgram {
   JFPX_HD void color(const Team& team) const {
     const StepData& d = data;
     const soft_step::ContactView now = d.contacts();
-    const BodyView& bodies = d.step.bodies;
-    const auto is_uncolored = [&](std::uint32_t i) {
-      return now.colors[i] == soft_step::kNoColor ? 1u : 0u;
-    };
-    team.for_each(now.size(), [&](std::uint32_t i) {
-      const soft_step::ContactKey& key = now.key(i);
-      if (is_uncolored(i) != 0 && !(bodies.movable(key.a) && bodies.movable(key.b))) {
-        now.colors[i] = soft_step::kFixedColor;
-      }
-    });
-    std::uint32_t left =
-        team.scan(now.size(), is_uncolored, [&](std::uint32_t i, std::uint32_t place) {
-          if (is_uncolored(i) != 0) d.uncolored[place] = i;
-        });
-    std::uint32_t *list = d.uncolored, *next = d.still_uncolored;
-    while (left > 0) {
+    std::uint32_t *list = d.uncolored, *next_list = d.still_uncolored;
+    for (std::uint32_t round = 0;; ++round) {
+      const std::uint32_t left = load_shared(&d.counters->uncolored[round % 3]);
+      if (left == 0) return;
+      std::uint32_t* const next_count = &d.counters->uncolored[(round + 1) % 3];
       team.for_each(left, [&](std::uint32_t k) {
         const soft_step::ContactKey& key = now.key(list[k]);
         const std::uint64_t order = soft_step::color_order(key);
@@ -137,10 +142,14 @@ struct MatchProgram {
         if (order == d.first_order[key.a]) atomic_min(&d.first_contact[key.a], list[k]);
         if (order == d.first_order[key.b]) atomic_min(&d.first_contact[key.b], list[k]);
       });
+      team.once([&] { d.counters->uncolored[(round + 2) % 3] = 0; });
       team.for_each(left, [&](std::uint32_t k) {
         const std::uint32_t i = list[k];
         const soft_step::ContactKey& key = now.key(i);
-        if (d.first_contact[key.a] != i || d.first_contact[key.b] != i) return;
+        if (d.first_contact[key.a] != i || d.first_contact[key.b] != i) {
+          next_list[atomic_add(next_count, 1)] = i;
+          return;
+        }
         std::uint64_t &a = d.used_colors[key.a], &b = d.used_colors[key.b];
         const std::uint8_t color = soft_step::lowest_free_color(a | b);
         now.colors[i] = color;
@@ -153,14 +162,9 @@ struct MatchProgram {
         d.first_order[key.a] = d.first_order[key.b] = kNoOrder;
         d.first_contact[key.a] = d.first_contact[key.b] = kNone;
       });
-      left = team.scan(
-          left, [&](std::uint32_t k) { return is_uncolored(list[k]); },
-          [&](std::uint32_t k, std::uint32_t place) {
-            if (is_uncolored(list[k]) != 0) next[place] = list[k];
-          });
-      std::uint32_t* other = list;
-      list = next;
-      next = other;
+      std::uint32_t* const other = list;
+      list = next_list;
+      next_list = other;
     }
   }
 };

@@ -4,6 +4,7 @@
 #include <jfpx/cuda/sphere_collider.hpp>
 
 #include "src/contact_solver/row_setup.hpp"
+#include "src/world/device/body_cells.hpp"
 #include "src/world/near_pair_test.hpp"
 #include "src/world/soft_step_stages.hpp"
 
@@ -17,6 +18,8 @@ inline constexpr std::uint32_t kNone = 0xffffffffu;
 
 /// Rows are grouped by kind, then by soft_step::kGroups.
 inline constexpr std::uint32_t kBins = 2 * soft_step::kGroups;
+inline constexpr std::uint8_t kNoBin = 255;
+static_assert(kBins < kNoBin);
 
 /// Lists whose size is known only on the device. A step that needs more room than there is does not
 /// change the state of the world; the host reserves what `needed` says and repeats it.
@@ -30,35 +33,24 @@ struct Capacity {
 
 /// Numbers that the stages of a step give each other and the host.
 struct Counters {
+  std::uint64_t started = 0;         ///< StepData::number once the state before the step is saved
+  std::uint64_t completed = 0;       ///< StepData::number once the step is complete
   std::uint32_t failed = 0;          ///< 1: a list has no room, the step has no effect
   std::uint32_t invalid_bounds = 0;  ///< 1: swept bounds are not finite, the step has no effect
   Capacity needed;
 
-  std::uint32_t any_candidate_pair = 0;  ///< 1: a pair of bounds is a candidate
-  std::uint32_t any_sensor_pair = 0;     ///< 1: a pair of bounds is of spheres, one a sensor
-  std::uint32_t candidates = 0;
-  std::uint32_t touches = 0;
-  std::uint32_t any_asleep = 0;             ///< 1: a movable body sleeps at the start of the step
-  std::uint32_t any_rebound = 0;            ///< 1: a row has a speed of separation
-  std::uint32_t any_rests = 0;              ///< 1: a body has been slow for long enough to sleep
-  std::uint32_t runaway = kNone;            ///< index of the first body that is_in_world() refuses
+  std::uint32_t any_asleep = 0;     ///< 1: a movable body sleeps at the start of the step
+  std::uint32_t any_rebound = 0;    ///< 1: a row has a speed of separation
+  std::uint32_t any_rests = 0;      ///< 1: a body has been slow for long enough to sleep
+  std::uint32_t runaway = kNone;    ///< index of the first body that is_in_world() refuses
+  std::uint32_t uncolored[3] = {};  ///< number of contacts without a color, by round modulo 3
   std::uint32_t bin_begin[kBins + 1] = {};  ///< of rows; those of manifolds follow the others
-  std::uint32_t last_group = 0;             ///< the last color group that has rows
-  std::uint32_t fixed_bodies = 0;           ///< bodies with contacts with fixed bodies
 
+  std::uint32_t candidates = 0, touches = 0;
   std::uint32_t spheres = 0, manifolds = 0, points = 0;  ///< sizes of the contact set
   std::uint32_t touching_spheres = 0;  ///< contacts of two spheres with distance <= 0
   std::uint32_t sphere_touches = 0;    ///< items of the list of touches of two spheres
   std::uint32_t awake = 0;             ///< movable bodies awake after the step
-  std::uint64_t completed = 0;         ///< StepData::number once the step is complete
-};
-
-/// What a pair of swept bounds becomes.
-enum class PairResultKind : std::uint8_t {
-  ignored,
-  spheres,   ///< a contact of two spheres
-  sensor,    ///< two spheres that touch, at least one of a sensor
-  candidate  ///< a pair of other sub-shapes
 };
 
 /// The contact of two spheres.
@@ -90,10 +82,11 @@ struct DeviceContacts {
   std::uint32_t counts[3] = {};   ///< of the last step: spheres, manifolds, points
 };
 
-/// A contact with a fixed body.
-struct FixedRow {
-  std::uint32_t contact = 0;
-  std::uint32_t row = 0;  ///< in the rows of both kinds
+/// The arrays that a step changes before it can fail, as they were at its start, by body.
+struct SavedArrays {
+  Vec3* last_acceleration = nullptr;
+  Real *motion = nullptr, *rest_time = nullptr;
+  std::uint8_t* awake = nullptr;
 };
 
 /// Everything that the programs of a step use, passed to kernels by value.
@@ -113,31 +106,37 @@ struct StepData {
   Vec3* position_before = nullptr;  ///< by body, at the start of the step
   SpherePair* pairs = nullptr;      ///< of swept bounds
   cuda::ContactCount* pair_count = nullptr;
-  PairResultKind* pair_kind = nullptr;     ///< by pair
-  NormalDistance* pair_results = nullptr;  ///< by pair, of spheres and sensors
+  NormalDistance* pair_results = nullptr;  ///< by pair
+  std::uint8_t* pair_found = nullptr;      ///< by pair: 1 if it is a contact of two spheres
   Candidate* candidates = nullptr;
-  NearPair* tested = nullptr;  ///< by candidate
+  NearPair* tested = nullptr;                ///< by candidate
+  std::uint32_t* first_candidate = nullptr;  ///< by body a: list of candidates that have points
+  std::uint32_t* next_candidate = nullptr;   ///< by candidate
+  /// By body a: its number of manifolds, and in the lower half that of their points.
+  std::uint64_t* manifold_sizes = nullptr;
   Touch* touches = nullptr;
-  Range* bucket = nullptr;         ///< by body: a range of `order` or of `fixed`
-  std::uint32_t* order = nullptr;  ///< of manifolds: candidates, sorted by key
 
   std::uint64_t* used_colors = nullptr;  ///< by body
-  std::uint64_t* first_order =
-      nullptr;  ///< by body: lowest color_order() of its uncolored contacts
-  std::uint32_t* first_contact = nullptr;  ///< by body: the lowest of them
+  /// By body: lowest color_order() of its uncolored contacts, and the lowest of those contacts.
+  std::uint64_t* first_order = nullptr;
+  std::uint32_t* first_contact = nullptr;
   std::uint32_t *uncolored = nullptr, *still_uncolored = nullptr;
 
   std::uint32_t* parent = nullptr;    ///< by body, of the islands
   std::uint8_t* marked = nullptr;     ///< by label of an island
   std::uint8_t* near_flag = nullptr;  ///< by body: StepBodies::near
 
+  std::uint8_t* row_bins = nullptr;      ///< by contact
   std::uint32_t* row_contact = nullptr;  ///< by row of either kind
-  std::uint32_t* row_place = nullptr;    ///< by contact: row, or kNone
   soft_step::SphereRow* sphere_rows = nullptr;
   soft_step::ManifoldRow* manifold_rows = nullptr;
   soft_step::PointRow* point_rows = nullptr;
-  FixedRow* fixed = nullptr;
-  std::uint32_t* fixed_bodies = nullptr;
+  std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies
+  std::uint32_t* next_fixed = nullptr;   ///< by row of either kind
+  std::uint32_t* overflow = nullptr;  ///< the rows without a color, in the order of their contacts
+  BodyCells* cells = nullptr;         ///< by body
+  RowBody* row_bodies = nullptr;      ///< by body
+  SavedArrays saved;
 
   JFPX_HD soft_step::ContactView contacts() const {
     soft_step::ContactView view = now.view;

@@ -1,0 +1,151 @@
+/// Motion of a body during a step on a device, which the rows of its contacts change one after the
+/// other.
+#pragma once
+
+#include "src/contact_solver/cell.hpp"
+#include "src/contact_solver/greedy_coloring.hpp"
+#include "src/contact_solver/step_constants.hpp"
+
+#include <bit>
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+/// Order of the changes of a body: in each sweep over the rows first the rows of its contacts by
+/// color, then the body itself. A turn is the number of a change that has been made.
+struct Turns {
+  static constexpr std::uint32_t kPerSweep = soft_step::kColors + 2u;
+
+  std::uint64_t colors = 0;  ///< of the body's rows
+  std::uint32_t first = 0;   ///< the turn before the sweep
+
+  JFPX_HD Turns(std::uint32_t sweep, std::uint64_t row_colors)
+      : colors(row_colors), first(sweep * kPerSweep) {}
+
+  /// The turn after the row of a color.
+  JFPX_HD std::uint32_t after(std::uint32_t color) const { return first + 1 + color; }
+  /// The turn that the row of a color waits for.
+  JFPX_HD std::uint32_t before(std::uint32_t color) const {
+    return after_all(colors & ((std::uint64_t{1} << color) - 1));
+  }
+  /// The turn that the body waits for.
+  JFPX_HD std::uint32_t before_body() const { return after_all(colors); }
+  JFPX_HD std::uint32_t after_body() const { return first + kPerSweep; }
+
+ private:
+  JFPX_HD std::uint32_t after_all(std::uint64_t set) const {
+#if defined(__CUDA_ARCH__)
+    return first + 64 - static_cast<std::uint32_t>(__clzll(static_cast<long long>(set)));
+#else
+    return first + static_cast<std::uint32_t>(std::bit_width(set));
+#endif
+  }
+};
+
+/// The motion of a body as cells. Those of the velocities are written at each turn, the others only
+/// when they change: the words of the velocities say which version of the others belongs to them.
+class BodyCells {
+ public:
+  /// Versions of the shift and the rotation.
+  struct Version {
+    std::uint32_t shift = 0, rotation = 0;
+  };
+
+  /// The motion before the first turn.
+  JFPX_HD void start(const soft_step::SolverBody& body) {
+    Version version;
+    write_shift(body, &version);
+    write_rotation(body, &version);
+    write(0, body, version);
+  }
+
+  /// Reads the motion after a turn.
+  /// @tparam kRotation whether to read the rotation
+  /// @returns whether the turn has been made, and all of it is visible
+  template <bool kRotation>
+  JFPX_HD bool read(std::uint32_t turn, soft_step::SolverBody* body, Version* version) const {
+    Read v, w, s, r;
+    v.load(velocity_);
+    w.load(angular_velocity_);
+    s.load(shift_);
+    if constexpr (kRotation) r.load(rotation_);
+    const std::uint32_t word = v.get(&body->velocity);
+    version->shift = word >> kTurnBits & kVersionMask;
+    version->rotation = word >> (kTurnBits + kVersionBits);
+    bool is_complete = (word & kTurnMask) == turn;
+    is_complete = w.get(&body->angular_velocity) == word && is_complete;
+    is_complete = s.get(&body->shift) == version->shift && is_complete;
+    if constexpr (kRotation) {
+      is_complete = r.get(&body->rotation) == version->rotation && is_complete;
+    }
+    return is_complete;
+  }
+
+  /// Writes the velocities after a turn. @param version of the shift and the rotation
+  JFPX_HD void write(std::uint32_t turn, const soft_step::SolverBody& body,
+                     const Version& version) {
+    const std::uint32_t word =
+        turn | version.shift << kTurnBits | version.rotation << (kTurnBits + kVersionBits);
+    store(velocity_, body.velocity, word);
+    store(angular_velocity_, body.angular_velocity, word);
+  }
+  /// Write a new version, before the velocities.
+  JFPX_HD void write_shift(const soft_step::SolverBody& body, Version* version) {
+    version->shift = (version->shift + 1) & kVersionMask;
+    store(shift_, body.shift, version->shift);
+  }
+  JFPX_HD void write_rotation(const soft_step::SolverBody& body, Version* version) {
+    version->rotation = (version->rotation + 1) & kVersionMask;
+    store(rotation_, body.rotation, version->rotation);
+  }
+
+ private:
+  static constexpr int kCells = 3 / kCellNumbers;  ///< of a vector
+  static constexpr std::uint32_t kTurnBits = 14, kVersionBits = 9;
+  static constexpr std::uint32_t kTurnMask = (1u << kTurnBits) - 1;
+  static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
+  static constexpr std::uint32_t kMixed = ~0u;  ///< its turn is higher than all turns
+  // Versions may start again at 0, because no reader lags by that many.
+  static_assert((2 * kMaxSubsteps + 2) * Turns::kPerSweep < kTurnMask);
+
+  struct Read {
+    Cell cells[kCells];
+    JFPX_HD void load(const Cell* from) {
+      for (int c = 0; c < kCells; ++c) cells[c] = load_cell(from + c);
+    }
+    /// @returns the word of all cells, or kMixed
+    JFPX_HD std::uint32_t get(Vec3* vector) const {
+      *vector = {cells[0].numbers[0], cells[1 / kCellNumbers].numbers[1 % kCellNumbers],
+                 cells[2 / kCellNumbers].numbers[2 % kCellNumbers]};
+      std::uint32_t word = cells[0].sequence;
+      for (int c = 1; c < kCells; ++c) {
+        if (cells[c].sequence != word) word = kMixed;
+      }
+      return word;
+    }
+  };
+  JFPX_HD static void store(Cell* to, const Vec3& vector, std::uint32_t word) {
+    const Real numbers[3] = {vector.x, vector.y, vector.z};
+    for (int c = 0; c < kCells; ++c) {
+      Cell cell;
+      for (int k = 0; k < kCellNumbers; ++k) cell.numbers[k] = numbers[c * kCellNumbers + k];
+      cell.sequence = word;
+      store_cell(to + c, cell);
+    }
+  }
+
+  Cell velocity_[kCells], angular_velocity_[kCells], shift_[kCells], rotation_[kCells];
+};
+
+/// What the rows of a body read, and no row changes.
+struct alignas(16) RowBody {
+  Real inverse_mass = 0;     ///< as SolverBody
+  Real inverse_inertia = 0;  ///< as SolverBody
+  std::uint64_t colors = 0;  ///< of the rows of its contacts
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx

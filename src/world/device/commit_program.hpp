@@ -1,0 +1,61 @@
+/// End of a soft step on a device.
+#pragma once
+
+#include "src/world/device/islands.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+/// Ends the step: moves the bodies, clears forces, and puts islands to sleep. Has no effect if a
+/// body has run away.
+struct CommitProgram {
+  static constexpr unsigned kBlocksPerProcessor = 3;
+  StepData data;
+
+  template <class Team>
+  JFPX_HD void operator()(const Team& team) const {
+    if (data.has_failed() || data.counters->runaway != kNone) return;
+    const StepData& d = data;
+    const BodyView& bodies = d.step.bodies;
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      d.position_before[body] = bodies.position[body];
+      if (d.step.store(body)) d.counters->any_rests = 1;
+    });
+    if (d.counters->any_rests != 0) put_islands_to_sleep(team);
+    team.count(
+        bodies.count,
+        [&](std::uint32_t i) {
+          const std::uint32_t body = bodies.ids[i].index;
+          return bodies.movable(body) && bodies.awake[body] != 0;
+        },
+        &d.counters->awake);
+    team.once([&] { d.counters->completed = d.number; });
+  }
+
+ private:
+  template <class Team>
+  JFPX_HD void put_islands_to_sleep(const Team& team) const {
+    const StepData& d = data;
+    const BodyView& bodies = d.step.bodies;
+    find_islands(team, d, [](const soft_step::ContactView& contacts, std::uint32_t i) {
+      return soft_step::has_touched(contacts, i);
+    });
+    const auto is_awake = [&](std::uint32_t body) {
+      return bodies.movable(body) && bodies.awake[body] != 0;
+    };
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      if (is_awake(body) && !bodies.is_at_rest(body)) d.marked[island_of(d, body)] = 1;
+    });
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      if (is_awake(body) && d.marked[island_of(d, body)] == 0) d.step.motion.put_to_sleep(body);
+    });
+  }
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,423 @@
+/// Substeps and restitution of a soft step on a device.
+#pragma once
+
+#include "src/contact_solver/row_operations.hpp"
+#include "src/world/device/atomic.hpp"
+#include "src/world/device/step_data.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+/// Sweeps over all rows, as soft_step::SoftStepSolver, without barriers: a row waits only for the
+/// earlier rows of its two bodies (see Turns), so that consecutive colors and sweeps
+/// overlap. After the rows of a sweep, each body solves its rows with fixed bodies and completes
+/// its part of the substep. Only the motion of bodies passes from thread to thread: the rows
+/// themselves, and the other arrays by body, are used by one thread.
+///
+/// The items of a thread are in the order of the sweeps, and an item waits only for items before
+/// it in this order. So the first item that is not complete never waits.
+struct SolveProgram {
+  /// Threads that wait read memory again and again: with more of them, all take longer.
+  static constexpr unsigned kBlocksPerProcessor = 1;
+  StepData data;
+
+  template <class Team>
+  JFPX_HD void operator()(const Team& team) const {
+    if (data.has_failed()) return;
+    const StepData& d = data;
+    const bool rebounds = d.counters->any_rebound != 0;
+    Sweep sweep(team.cached_bins(d.counters->bin_begin));
+    run(team, sweep, soft_step::WarmStart{});
+    for (std::uint32_t substep = 0; substep < d.substeps; ++substep) {
+      const bool is_last = substep + 1 == d.substeps;
+      sweep.start(BodyStage::move);
+      run(team, sweep, soft_step::Solve<true>{d.constants});
+      sweep.start(!is_last   ? BodyStage::accelerate
+                  : rebounds ? BodyStage::none
+                             : BodyStage::finish);
+      sweep.stores_impulses = is_last;
+      run(team, sweep, soft_step::Solve<false>{d.constants});
+    }
+    if (!rebounds) return;
+    sweep.start(BodyStage::finish);
+    sweep.stores_impulses = false;
+    run(team, sweep, soft_step::Restitute{});
+  }
+
+ private:
+  using SolverBody = soft_step::SolverBody;
+  static constexpr std::uint32_t kWarpItems = 32;
+
+  /// What a body does after the rows of a sweep.
+  enum class BodyStage : std::uint8_t {
+    none,
+    move,        ///< ends a substep
+    accelerate,  ///< starts the next substep
+    finish       ///< ends the last sweep
+  };
+
+  struct Sweep {
+    const std::uint32_t* begin;       ///< Counters::bin_begin
+    std::uint32_t colored_items = 0;  ///< number of items for all rows that have a color
+    std::uint32_t number = 0;
+    BodyStage stage = BodyStage::none;
+    bool stores_impulses = false;  ///< whether the impulses of rows are those of the step
+
+    JFPX_HD explicit Sweep(const std::uint32_t* bins) : begin(bins) {
+      for (std::uint32_t group = 1; group < soft_step::kFixedGroup; ++group) {
+        colored_items += items(group) + items(soft_step::kGroups + group);
+      }
+    }
+    JFPX_HD void start(BodyStage next) {
+      ++number;
+      stage = next;
+    }
+    JFPX_HD std::uint32_t first_manifold() const { return begin[soft_step::kGroups]; }
+    JFPX_HD std::uint32_t size(std::uint32_t bin) const { return begin[bin + 1] - begin[bin]; }
+    /// Number of items for the rows of a bin: a warp has rows of one bin only, none of which waits
+    /// for another.
+    JFPX_HD std::uint32_t items(std::uint32_t bin) const {
+      return (size(bin) + kWarpItems - 1) / kWarpItems * kWarpItems;
+    }
+    JFPX_HD bool has_overflow() const { return size(0) + size(soft_step::kGroups) > 0; }
+    /// Number of moves that a kinematic body has made when the rows of the sweep are solved.
+    JFPX_HD std::uint32_t moves() const { return number / 2; }
+  };
+
+  /// Finds the rows of the colors, in the order of a sweep: by color, and first those of spheres.
+  class Cursor {
+   public:
+    JFPX_HD explicit Cursor(const Sweep& sweep) : sweep_(sweep) {}
+
+    /// Moves to an item; the search restarts if it precedes that of the last call.
+    /// @returns the row, or kNone
+    JFPX_HD std::uint32_t find(std::uint32_t item) {
+      if (item < before_) {
+        before_ = 0;
+        group_ = 1;
+        of_manifolds_ = false;
+      }
+      while (item - before_ >= sweep_.items(bin())) {
+        before_ += sweep_.items(bin());
+        if (of_manifolds_) ++group_;
+        of_manifolds_ = !of_manifolds_;
+      }
+      const std::uint32_t index = item - before_;
+      return index < sweep_.size(bin()) ? sweep_.begin[bin()] + index : kNone;
+    }
+
+    JFPX_HD std::uint32_t color() const { return group_ - 1; }
+
+   private:
+    JFPX_HD std::uint32_t bin() const {
+      return of_manifolds_ ? soft_step::kGroups + group_ : group_;
+    }
+    const Sweep& sweep_;
+    std::uint32_t before_ = 0, group_ = 1;
+    bool of_manifolds_ = false;
+  };
+
+  /// A body of an item: the turn that the item waits for, and the motion of the body at that turn.
+  struct ItemBody {
+    std::uint32_t index = 0;
+    std::uint32_t before = 0, after = 0;  ///< turns
+    bool is_ready = false;
+    SolverBody motion;
+    BodyCells::Version version;
+
+    template <bool kRotation>
+    JFPX_HD void read(const StepData& data) {
+      is_ready = data.cells[index].template read<kRotation>(before, &motion, &version);
+    }
+    JFPX_HD void start(std::uint32_t body, const RowBody& constants) {
+      index = body;
+      motion.inverse_mass = constants.inverse_mass;
+      motion.inverse_inertia = constants.inverse_inertia;
+    }
+  };
+
+  /// A row that has a color, or that is solved before the colors.
+  struct RowItem {
+    std::uint32_t row = kNone;
+    bool is_manifold = false;
+    ItemBody a, b;
+    soft_step::SphereRow sphere;
+  };
+
+  struct BodyItem : ItemBody {
+    bool is_active = false;             ///< whether the body is movable and awake
+    std::uint32_t first_fixed = kNone;  ///< of its rows with fixed bodies
+  };
+
+  /// The rows of a sweep, for Team::flow().
+  template <class Operation>
+  class RowFlow {
+   public:
+    JFPX_HD RowFlow(const SolveProgram& program, const Sweep& sweep, const Operation& operation)
+        : program_(program), sweep_(sweep), operation_(operation), cursor_(sweep) {}
+
+    JFPX_HD RowItem begin(std::uint32_t i) const {
+      const std::uint32_t row = cursor_.find(i);
+      return row == kNone ? RowItem{} : program_.colored_row(sweep_, row, cursor_.color());
+    }
+    JFPX_HD bool is_ready(RowItem* item) const { return program_.is_ready(item); }
+    JFPX_HD void complete(RowItem* item) const { program_.solve_row(sweep_, operation_, item); }
+
+   private:
+    const SolveProgram& program_;
+    const Sweep& sweep_;
+    const Operation& operation_;
+    mutable Cursor cursor_;
+  };
+
+  /// The bodies after the rows of a sweep, for Team::flow().
+  template <class Operation>
+  class BodyFlow {
+   public:
+    JFPX_HD BodyFlow(const SolveProgram& program, const Sweep& sweep, const Operation& operation)
+        : program_(program), sweep_(sweep), operation_(operation) {}
+
+    JFPX_HD BodyItem begin(std::uint32_t i) const {
+      return program_.begin_body(sweep_, program_.data.step.bodies.ids[i].index);
+    }
+    JFPX_HD bool is_ready(BodyItem* item) const {
+      if (item->is_active && !item->is_ready) item->read<true>(program_.data);
+      return item->is_ready || !item->is_active;
+    }
+    JFPX_HD void complete(BodyItem* item) const {
+      program_.complete_body(sweep_, operation_, item);
+    }
+
+   private:
+    const SolveProgram& program_;
+    const Sweep& sweep_;
+    const Operation& operation_;
+  };
+
+  template <class Team, class Operation>
+  JFPX_HD void run(const Team& team, const Sweep& sweep, const Operation& operation) const {
+    if (sweep.has_overflow()) {
+      team.sync();
+      team.once([&] { run_overflow(sweep, operation); });
+      team.sync();
+    }
+    team.flow(sweep.colored_items, RowFlow<Operation>(*this, sweep, operation));
+    team.flow(data.step.bodies.count, BodyFlow<Operation>(*this, sweep, operation));
+  }
+
+  /// The rows without a color are solved one after the other, in the order of their contacts.
+  template <class Operation>
+  JFPX_HD void run_overflow(const Sweep& sweep, const Operation& operation) const {
+    const std::uint32_t rows = sweep.size(0) + sweep.size(soft_step::kGroups);
+    for (std::uint32_t k = 0; k < rows; ++k) {
+      RowItem item = load_row(sweep, data.overflow[k]);
+      for (ItemBody* body : {&item.a, &item.b}) {
+        body->before = body->after = Turns(sweep.number, 0).first;
+      }
+      is_ready(&item);
+      solve_row(sweep, operation, &item);
+    }
+  }
+
+  /// A row without its turns.
+  JFPX_HD RowItem load_row(const Sweep& sweep, std::uint32_t r) const {
+    const StepData& d = data;
+    RowItem item;
+    item.row = r;
+    item.is_manifold = r >= sweep.first_manifold();
+    std::uint32_t a = 0, b = 0;
+    if (item.is_manifold) {
+      const soft_step::ManifoldRow& row = d.manifold_rows[r - sweep.first_manifold()];
+      a = row.a, b = row.b;
+    } else {
+      item.sphere = d.sphere_rows[r];
+      a = item.sphere.a, b = item.sphere.b;
+    }
+    item.a.start(a, d.row_bodies[a]);
+    item.b.start(b, d.row_bodies[b]);
+    return item;
+  }
+
+  JFPX_HD RowItem colored_row(const Sweep& sweep, std::uint32_t r, std::uint32_t color) const {
+    RowItem item = load_row(sweep, r);
+    for (ItemBody* body : {&item.a, &item.b}) {
+      const Turns turns(sweep.number, data.row_bodies[body->index].colors);
+      body->before = turns.before(color);
+      body->after = turns.after(color);
+    }
+    return item;
+  }
+
+  JFPX_HD bool is_ready(RowItem* item) const {
+    if (item->row == kNone) return true;
+    for (ItemBody* body : {&item->a, &item->b}) {
+      if (body->is_ready) continue;
+      item->is_manifold ? body->read<true>(data) : body->read<false>(data);
+    }
+    return item->a.is_ready && item->b.is_ready;
+  }
+
+  template <class Operation>
+  JFPX_HD void solve_row(const Sweep& sweep, const Operation& operation, RowItem* item) const {
+    if (item->row == kNone) return;
+    if (item->is_manifold) {
+      solve_manifold(sweep, operation, item);
+    } else {
+      solve_spheres(sweep, operation, item);
+    }
+  }
+
+  template <class Operation>
+  JFPX_HD void solve_spheres(const Sweep& sweep, const Operation& operation, RowItem* item) const {
+    soft_step::SphereRow& row = item->sphere;
+    const Real rebound = row.rebound;
+    const Vec3 shift_a = item->a.motion.shift, shift_b = item->b.motion.shift;
+    operation.template run<false>(&row, &item->a.motion, &item->b.motion);
+    const auto write = [&](ItemBody* body, const Vec3& shift) {
+      BodyCells& cells = data.cells[body->index];
+      if constexpr (Operation::kMovesBodies) {
+        if (!(body->motion.shift == shift)) cells.write_shift(body->motion, &body->version);
+      }
+      cells.write(body->after, body->motion, body->version);
+    };
+    write(&item->a, shift_a);
+    write(&item->b, shift_b);
+    store<Operation>(sweep, row, rebound, item->row);
+  }
+
+  template <class Operation>
+  JFPX_HD void solve_manifold(const Sweep& sweep, const Operation& operation, RowItem* item) const {
+    soft_step::ManifoldRow row = data.manifold_rows[item->row - sweep.first_manifold()];
+    const Mat3* inertia = data.step.bodies.inverse_inertia;
+    const Mat3 inertia_a = inertia[item->a.index], inertia_b = inertia[item->b.index];
+    operation.template run<false>(
+        &row, data.point_rows + row.first,
+        soft_step::BodyPair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b});
+    for (ItemBody* body : {&item->a, &item->b}) {
+      BodyCells& cells = data.cells[body->index];
+      if constexpr (Operation::kMovesBodies) {
+        cells.write_shift(body->motion, &body->version);
+        cells.write_rotation(body->motion, &body->version);
+      }
+      cells.write(body->after, body->motion, body->version);
+    }
+    store<Operation>(sweep, row, item->row);
+  }
+
+  JFPX_HD BodyItem begin_body(const Sweep& sweep, std::uint32_t body) const {
+    const StepData& d = data;
+    BodyItem item;
+    const RowBody constants = d.row_bodies[body];
+    item.start(body, constants);
+    item.is_active = constants.inverse_mass > 0 && d.step.bodies.awake[body] != 0;
+    item.first_fixed = d.first_fixed[body];
+    const Turns turns(sweep.number, constants.colors);
+    item.before = turns.before_body();
+    item.after = turns.after_body();
+    return item;
+  }
+
+  template <class Operation>
+  JFPX_HD void complete_body(const Sweep& sweep, const Operation& operation, BodyItem* item) const {
+    const StepData& d = data;
+    const std::uint32_t i = item->index;
+    if (!item->is_active) {
+      const BodyView& bodies = d.step.bodies;
+      if (!bodies.movable(i) && bodies.awake[i] != 0) complete_kinematic(sweep, i);
+      return;
+    }
+    SolverBody& body = item->motion;
+    for (std::uint32_t r = item->first_fixed; r != kNone;) {
+      const std::uint32_t next = d.next_fixed[r];
+      solve_fixed(sweep, operation, r, &body);
+      r = next;
+    }
+    if (sweep.stage == BodyStage::finish) {
+      d.step.solver[i] = body;
+      check_state(i);
+      return;
+    }
+    if (sweep.stage == BodyStage::move) d.step.move(i, &body);
+    if (sweep.stage == BodyStage::accelerate) d.step.accelerate(i, &body, false);
+    d.cells[i].write_shift(body, &item->version);
+    d.cells[i].write_rotation(body, &item->version);
+    d.cells[i].write(item->after, body, item->version);
+  }
+
+  JFPX_HD void complete_kinematic(const Sweep& sweep, std::uint32_t i) const {
+    SolverBody body = fixed_body(i, sweep.moves());
+    if (sweep.stage == BodyStage::move) data.step.move(i, &body);
+    if (sweep.stage == BodyStage::finish) {
+      data.step.solver[i].shift = body.shift;
+      data.step.solver[i].rotation = body.rotation;
+      check_state(i);
+    }
+  }
+
+  /// The step has no effect if a body leaves the world.
+  JFPX_HD void check_state(std::uint32_t i) const {
+    if (!is_in_world(data.step.state(i))) atomic_min(&data.counters->runaway, i);
+  }
+
+  /// An immovable or kinematic body after a number of moves. A kinematic body does not wait for the
+  /// rows that read it: each of them computes its motion.
+  JFPX_HD SolverBody fixed_body(std::uint32_t i, std::uint32_t moves) const {
+    SolverBody body;
+    body.velocity = data.step.solver[i].velocity;
+    body.angular_velocity = data.step.solver[i].angular_velocity;
+    if (data.step.bodies.awake[i] == 0) return body;
+    for (std::uint32_t k = 0; k < moves; ++k) {
+      body.shift = add_scaled(body.shift, body.velocity, data.step.h);
+      body.rotation = add_scaled(body.rotation, body.angular_velocity, data.step.h);
+    }
+    return body;
+  }
+
+  /// Solves a row of a movable body with a fixed one.
+  template <class Operation>
+  JFPX_HD void solve_fixed(const Sweep& sweep, const Operation& operation, std::uint32_t r,
+                           SolverBody* body) const {
+    if (r < sweep.first_manifold()) {
+      soft_step::SphereRow row = data.sphere_rows[r];
+      const Real rebound = row.rebound;
+      SolverBody fixed;  // not read: the body does not move
+      operation.template run<true>(&row, body, &fixed);
+      store<Operation>(sweep, row, rebound, r);
+      return;
+    }
+    soft_step::ManifoldRow row = data.manifold_rows[r - sweep.first_manifold()];
+    SolverBody fixed = fixed_body(row.b, sweep.moves());
+    const Mat3 inertia = data.step.bodies.inverse_inertia[row.a];
+    const Mat3 none;
+    operation.template run<true>(&row, data.point_rows + row.first,
+                                 soft_step::BodyPair{body, &fixed, &inertia, &none});
+    store<Operation>(sweep, row, r);
+  }
+
+  /// Writes what an operation has changed of a row. @param rebound before the operation
+  template <class Operation>
+  JFPX_HD void store(const Sweep& sweep, const soft_step::SphereRow& row, Real rebound,
+                     std::uint32_t r) const {
+    if constexpr (Operation::kChangesRow) {
+      soft_step::SphereRow* to = &data.sphere_rows[r];
+      to->friction_impulse = row.friction_impulse;
+      to->normal_impulse = row.normal_impulse;
+      if (rebound != row.rebound) to->rebound = row.rebound;
+      if (sweep.stores_impulses) data.row_setup().store(row, data.row_contact[r]);
+    }
+  }
+  template <class Operation>
+  JFPX_HD void store(const Sweep& sweep, const soft_step::ManifoldRow& row, std::uint32_t r) const {
+    if constexpr (Operation::kChangesRow) {
+      data.manifold_rows[r - sweep.first_manifold()].rolling_impulse = row.rolling_impulse;
+      if (sweep.stores_impulses) {
+        data.row_setup().store(row, data.point_rows + row.first, data.row_contact[r]);
+      }
+    }
+  }
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx
