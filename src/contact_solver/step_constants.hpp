@@ -38,6 +38,7 @@ struct StepConstants {
   /// velocities, but not all of it in chains of overlapping bodies, which would fly apart at a
   /// higher speed.
   Real soft_speed = 0;
+  Real restitution_threshold = 0;  ///< [m/s], slower contacts do not bounce
 };
 
 /// Frequencies are limited to a quarter of the substep rate, and twice that for fixed bodies: a
@@ -53,7 +54,8 @@ JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& sett
           make_softness(hertz, settings.damping_ratio, h),
           make_softness(2 * hertz, settings.damping_ratio, h),
           settings.push_out_speed,
-          settings.push_out_speed / 6};
+          settings.push_out_speed / 6,
+          settings.restitution_threshold};
 }
 
 /// Motion of a body during a step, for the rows of its contacts.

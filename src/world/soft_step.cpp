@@ -206,7 +206,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
                                 .rules = materials_,
                                 .restitution_threshold = settings_.restitution_threshold},
                  .start = bodies_.data()},
-                constants_);
+                step_.impacts(), constants_);
   for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
     for_each_body(*bodies, [&](std::uint32_t i) { step_.accelerate(i, substep == 0); });
     if (substep == 0) solver_.warm_start(bodies_);

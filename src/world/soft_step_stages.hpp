@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/contact_solver/contact_set.hpp"
-#include "src/contact_solver/step_constants.hpp"
+#include "src/contact_solver/sphere_row.hpp"
 #include "src/world/body_view.hpp"
 
 #include <cstdint>
@@ -17,15 +17,16 @@ JFPX_HD inline bool will_touch(const BodyView& bodies, const ContactView& contac
   const ContactKey& key = contacts.key(contact);
   const Vec3 motion = bodies.predicted_motion(key.a) - bodies.predicted_motion(key.b);
   const Real opening = dot(motion, contacts.normal(contact));
-  return contacts.any_point(contact, [opening](Real distance, Real impulse) {
-    return distance <= 0 || distance + opening <= 0 || impulse > 0;
+  return contacts.any_point(contact, [opening](Real distance, const KeptImpulse& impulse) {
+    return distance <= 0 || distance + opening <= 0 || impulse.normal > 0;
   });
 }
 
 /// Whether the bodies of a contact touched, or pushed each other, during the step.
 JFPX_HD inline bool has_touched(const ContactView& contacts, std::uint32_t contact) {
-  return contacts.any_point(
-      contact, [](Real distance, Real impulse) { return distance <= 0 || impulse > 0; });
+  return contacts.any_point(contact, [](Real distance, const KeptImpulse& impulse) {
+    return distance <= 0 || impulse.has_pushed();
+  });
 }
 
 /// The bodies of a step, as arrays by body.
@@ -34,10 +35,14 @@ struct StepBodies {
   MotionPointers motion;  ///< of the same bodies
   SolverBody* solver = nullptr;
   Quat* orientation = nullptr;    ///< during the step
-  Vec3* free_velocity = nullptr;  ///< after the accelerations of a substep
+  Vec3* free_velocity = nullptr;  ///< after the accelerations of a substep, and rebounds
   Vec3* free_angular_velocity = nullptr;
   const std::uint8_t* near = nullptr;  ///< 1 if the body has a contact
   Real h = 0;                          ///< [s], length of a substep
+
+  JFPX_HD ImpactBodies impacts() const {
+    return {bodies.last_acceleration, free_velocity, free_angular_velocity};
+  }
 
   /// Starts the step.
   JFPX_HD void load(std::uint32_t i) const {

@@ -104,8 +104,10 @@ void SoftStepSolver::place_fixed_contacts() {
   }
 }
 
-void SoftStepSolver::build(const RowSetup& setup, const StepConstants& constants) {
+void SoftStepSolver::build(const RowSetup& setup, const ImpactBodies& impacts,
+                           const StepConstants& constants) {
   setup_ = setup;
+  impacts_ = impacts;
   constants_ = constants;
   sort_contacts();
   const auto fill_all = [this](auto* kind_rows, const auto& fill) {
@@ -185,7 +187,7 @@ void SoftStepSolver::warm_start(std::span<SolverBody> bodies) {
 void SoftStepSolver::solve(std::span<SolverBody> bodies, bool soft) {
   sweep([&]<class Row, bool kFixed>(Row* row, std::bool_constant<kFixed>) {
     if constexpr (std::is_same_v<Row, SphereRow>) {
-      soft_step::solve<kFixed>(row, &bodies[row->a], &bodies[row->b], constants_, soft);
+      soft_step::solve<kFixed>(row, &bodies[row->a], &bodies[row->b], constants_, impacts_, soft);
     } else {
       soft_step::solve<kFixed>(row, &points_[row->first], pair_of(*row, bodies), constants_, soft);
     }
@@ -193,10 +195,9 @@ void SoftStepSolver::solve(std::span<SolverBody> bodies, bool soft) {
 }
 
 void SoftStepSolver::restitute(std::span<SolverBody> bodies) {
+  if (manifolds_.rows.empty()) return;
   sweep([&]<class Row, bool kFixed>(Row* row, std::bool_constant<kFixed>) {
-    if constexpr (std::is_same_v<Row, SphereRow>) {
-      soft_step::restitute<kFixed>(*row, &bodies[row->a], &bodies[row->b]);
-    } else {
+    if constexpr (std::is_same_v<Row, ManifoldRow>) {
       soft_step::restitute<kFixed>(*row, &points_[row->first], pair_of(*row, bodies));
     }
   });

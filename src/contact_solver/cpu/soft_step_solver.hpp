@@ -27,7 +27,7 @@ class SoftStepSolver {
 
   /// Makes rows of the contacts that have an awake movable body.
   /// @param setup     its arrays are valid until store()
-  void build(const RowSetup& setup, const StepConstants& constants);
+  void build(const RowSetup& setup, const ImpactBodies& impacts, const StepConstants& constants);
   /// Applies the impulses of the last step.
   void warm_start(std::span<SolverBody> bodies);
   /// One sweep over all contacts. @param soft whether penetrations are pushed out
@@ -68,6 +68,7 @@ class SoftStepSolver {
 
   ThreadPool* pool_;
   RowSetup setup_;  ///< from build() to store()
+  ImpactBodies impacts_;
   StepConstants constants_;
 
   std::vector<RowKind> kinds_;  ///< by contact

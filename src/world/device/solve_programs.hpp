@@ -5,6 +5,7 @@
 #include "src/world/device/islands.hpp"
 #include "src/world/device/sorted_range.hpp"
 #include "src/world/device/step_data.hpp"
+#include "src/world/met_contacts.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -164,7 +165,6 @@ struct PrepareProgram {
         r < begin[soft_step::kFixedGroup] ? setup.fill<false>(&row, contact)
                                           : setup.fill<true>(&row, contact);
         d.sphere_rows[r] = row;
-        rebounds = row.rebound < 0;
       } else {
         soft_step::ManifoldRow* row = &d.manifold_rows[r - manifolds];
         soft_step::PointRow* points = d.point_rows + row->first;
@@ -198,9 +198,9 @@ struct SolveProgram {
       team.for_each(bodies.count,
                     [&](std::uint32_t i) { d.step.accelerate(bodies.ids[i].index, substep == 0); });
       if (substep == 0) run(team, sweep, WarmStart{});
-      run(team, sweep, Solve<true>{d.constants});
+      run(team, sweep, Solve<true>{d.constants, d.step.impacts()});
       team.for_each(bodies.count, [&](std::uint32_t i) { d.step.move(bodies.ids[i].index); });
-      run(team, sweep, Solve<false>{d.constants});
+      run(team, sweep, Solve<false>{d.constants, d.step.impacts()});
     }
     if (d.counters->any_rebound != 0) run(team, sweep, Restitute{});
     const soft_step::RowSetup setup = d.row_setup();
@@ -231,12 +231,13 @@ struct SolveProgram {
   /// @tparam kSoft whether penetrations are pushed out
   template <bool kSoft>
   struct Solve {
-    static constexpr bool kChangesRow = true, kMoves = kSoft;
+    static constexpr bool kChangesRow = true, kMoves = true;
     const soft_step::StepConstants& constants;
+    soft_step::ImpactBodies bodies;
     template <bool kFixed>
     JFPX_HD void run(soft_step::SphereRow* row, soft_step::SolverBody* a,
                      soft_step::SolverBody* b) const {
-      soft_step::solve<kFixed>(row, a, b, constants, kSoft);
+      soft_step::solve<kFixed>(row, a, b, constants, bodies, kSoft);
     }
     template <bool kFixed>
     JFPX_HD void run(soft_step::ManifoldRow* row, soft_step::PointRow* points,
@@ -246,11 +247,9 @@ struct SolveProgram {
   };
   struct Restitute {
     static constexpr bool kChangesRow = false, kMoves = false;
+    /// Spheres have rebounded in the substeps.
     template <bool kFixed>
-    JFPX_HD void run(soft_step::SphereRow* row, soft_step::SolverBody* a,
-                     soft_step::SolverBody* b) const {
-      soft_step::restitute<kFixed>(*row, a, b);
-    }
+    JFPX_HD void run(soft_step::SphereRow*, soft_step::SolverBody*, soft_step::SolverBody*) const {}
     template <bool kFixed>
     JFPX_HD void run(soft_step::ManifoldRow* row, soft_step::PointRow* points,
                      const soft_step::BodyPair& pair) const {
@@ -296,14 +295,14 @@ struct SolveProgram {
     soft_step::SolverBody* bodies = data.step.solver;
     soft_step::SolverBody a = bodies[row.a], b = bodies[row.b];
     const Vec3 shift_a = a.shift, shift_b = b.shift;
-    const Real rebound = row.rebound;
+    const Real restitution = row.restitution;
     operation.template run<kFixed>(&row, &a, &b);
     store<Operation>(a, shift_a, &bodies[row.a]);
     if constexpr (!kFixed) store<Operation>(b, shift_b, &bodies[row.b]);
     if constexpr (Operation::kChangesRow) {
       at->friction_impulse = row.friction_impulse;
       at->normal_impulse = row.normal_impulse;
-      if (rebound != row.rebound) at->rebound = row.rebound;
+      if (restitution != row.restitution) at->restitution = row.restitution;
     }
   }
 
@@ -408,8 +407,13 @@ struct CommitProgram {
       const std::uint32_t body = bodies.ids[i].index;
       return bodies.movable(body) && bodies.awake[body] != 0;
     });
+    const soft_step::ContactView contacts = d.contacts();
+    team.for_each(contacts.manifold_count, [&](std::uint32_t m) {
+      const std::uint32_t met = soft_step::count_met(contacts, contacts.sphere_count + m);
+      if (met > 0) atomic_add(&d.counters->met_points, met);
+    });
     const std::uint32_t touching = team.count(
-        d.counters->spheres, [&](std::uint32_t i) { return d.now.view.spheres[i].distance <= 0; });
+        d.counters->spheres, [&](std::uint32_t i) { return soft_step::has_touched(contacts, i); });
     team.once([&] {
       d.counters->awake = awake;
       d.counters->touching_spheres = touching;

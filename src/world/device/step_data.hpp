@@ -47,7 +47,8 @@ struct Counters {
   std::uint32_t fixed_bodies = 0;           ///< bodies with contacts with fixed bodies
 
   std::uint32_t spheres = 0, manifolds = 0, points = 0;  ///< sizes of the contact set
-  std::uint32_t touching_spheres = 0;  ///< contacts of two spheres with distance <= 0
+  std::uint32_t touching_spheres = 0;  ///< contacts of two spheres that touched during the step
+  std::uint32_t met_points = 0;        ///< points of manifolds: soft_step::has_met()
   std::uint32_t sphere_touches = 0;    ///< items of the list of touches of two spheres
   std::uint32_t awake = 0;             ///< movable bodies awake after the step
   std::uint64_t completed = 0;         ///< StepData::number once the step is complete
