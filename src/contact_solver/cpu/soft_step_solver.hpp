@@ -32,7 +32,7 @@ class SoftStepSolver {
   void warm_start(std::span<SolverBody> bodies);
   /// One sweep over all contacts. @param soft whether penetrations are pushed out
   void solve(std::span<SolverBody> bodies, bool soft);
-  /// Makes the bodies of impacts rebound.
+  /// Makes the bodies of impacts rebound, but for spheres, which rebound in solve().
   void restitute(std::span<SolverBody> bodies);
   /// Writes the impulses to the contacts that build() received.
   void store();

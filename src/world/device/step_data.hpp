@@ -39,7 +39,7 @@ struct Counters {
   std::uint32_t candidates = 0;
   std::uint32_t touches = 0;
   std::uint32_t any_asleep = 0;             ///< 1: a movable body sleeps at the start of the step
-  std::uint32_t any_rebound = 0;            ///< 1: a row has a speed of separation
+  std::uint32_t any_rebound = 0;            ///< 1: a manifold has a speed of separation
   std::uint32_t any_rests = 0;              ///< 1: a body has been slow for long enough to sleep
   std::uint32_t runaway = kNone;            ///< index of the first body that is_in_world() refuses
   std::uint32_t bin_begin[kBins + 1] = {};  ///< of rows; those of manifolds follow the others
