@@ -63,9 +63,9 @@ struct ResolverSettings {
 /// motion of each body (thesis 4.4.2).
 struct SleepSettings {
   bool enabled = true;
-  /// [m/s], >= 0, limit of the velocity and of the angular velocity times the bounding radius, a
-  /// tenth of which counts for spheres; soft_step. A body on which a force or torque acts must be
-  /// 25 times slower.
+  /// [m/s], >= 0, limit of the velocity and of the angular velocity times the bounding radius, of
+  /// which 4 % count for spheres, because nothing brakes one that spins on the spot; soft_step. A
+  /// body on which a force or torque acts must be 25 times slower.
   Real speed = Real(0.05);
   Real time = Real(0.5);     ///< [s], >= 0; soft_step
   Real epsilon = Real(0.3);  ///< [m^2/s^2], > 0: threshold of the mean motion; worst_first

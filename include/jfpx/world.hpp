@@ -47,9 +47,10 @@ struct WorldSettings {
 /// the generator has given it.
 struct Contact {
   BodyId a, b;
-  Vec3 normal;           ///< [-], unit, from b to a
-  Vec3 point;            ///< [m], world, the middle of the overlap
-  Real distance = 0;     ///< [m], <= 0: the negative penetration depth
+  Vec3 normal;  ///< [-], unit, from b to a
+  /// [m], world: the middle of the overlap, or a point of b if the bodies met during the step
+  Vec3 point;
+  Real distance = 0;     ///< [m], <= 0: the negative penetration depth; 0 if they met in the step
   Real friction = 0;     ///< [-], >= 0, of the pair
   Real restitution = 0;  ///< [-], in [0, 1], of the pair
   /// Whether a or b is a sensor, so that the contact is not resolved; false for a contact of a
@@ -78,9 +79,9 @@ struct ContactEvent {
 
 /// Result of one step. Times are wall-clock times.
 struct StepReport {
-  std::uint64_t step = 0;             ///< number of completed steps, without undone ones
-  std::uint64_t contacts = 0;         ///< contacts found by detection, including those of sensors
-  std::uint64_t sphere_contacts = 0;  ///< of these, contacts between two spheres
+  std::uint64_t step = 0;                 ///< number of completed steps, without undone ones
+  std::uint64_t contacts = 0;             ///< size of World::contacts(), without generated contacts
+  std::uint64_t sphere_contacts = 0;      ///< of these, contacts between two spheres
   std::uint64_t generated_contacts = 0;   ///< contacts of generators, not included in `contacts`
   std::uint64_t position_iterations = 0;  ///< of Solver::worst_first, as the two fields below
   std::uint64_t velocity_iterations = 0;
@@ -300,21 +301,23 @@ class JFPX_API World {
 
   std::uint64_t steps() const;  ///< number of completed steps, without undone ones
   double time() const;          ///< [s], completed steps times dt
-  /// Contacts of the last step, as three consecutive lists:
+  /// Contacts of the last step: those at its start, and with Solver::soft_step also those of bodies
+  /// that met during the step and pushed each other. Three consecutive lists:
   ///   - contacts of two spheres (bodies or parts of compounds), sorted by (a.index, b.index);
   ///   - other detected contacts, in the same order;
   ///   - contacts of contact generators, in the order of the generators.
   /// Detected contacts with the same a and b are sorted by the part of a, then by the part of b,
   /// spheres before boxes; contact points of the same two parts are in the order in which their
-  /// pair test returns them. Empty after a failed step, and after bodies were added or removed.
-  /// Valid until a body is added or removed, or until the next step.
+  /// pair test returns them. Those that came about during the step follow. Empty after a failed
+  /// step, and after bodies were added or removed. Valid until a body is added or removed, or until
+  /// the next step.
   std::span<const Contact> contacts() const;
   /// Pairs of bodies that began to touch, stay in contact or ceased to touch in the last step.
   /// Contacts of contact generators have no events. Sorted by (a.index, b.index); where a new body
   /// has the index of an old one, the end event of the old pair comes first. An event describes the
-  /// contact as detected, before it was resolved; an end event describes it as last detected.
-  /// Sleeping bodies stay in contact. The contacts of a removed body end in the next step. The list
-  /// is empty after a failed step; the next successful step compares with the last successful one.
+  /// contact as contacts() does, an end event as that of the step before did. Sleeping bodies stay
+  /// in contact. The contacts of a removed body end in the next step. The list is empty after a
+  /// failed step; the next successful step compares with the last successful one.
   /// Valid until the next step, even if bodies are added or removed while the list is read. The
   /// first call after a step computes the list.
   /// @throws std::bad_alloc

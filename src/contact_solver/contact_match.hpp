@@ -7,9 +7,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// The impulse with its friction projected into the plane perpendicular to `normal`.
+/// The impulse at the start of the next step: its friction is projected into the plane
+/// perpendicular to `normal`.
 JFPX_HD inline KeptImpulse turned(const KeptImpulse& kept, const Vec3& normal) {
-  return {kept.friction - normal * dot(kept.friction, normal), kept.normal};
+  return {kept.friction - normal * dot(kept.friction, normal),
+          kept.normal > 0 ? kept.normal : Real(0)};
 }
 
 /// Adds the impulses of a manifold of the last step to those of the same manifold of this step.

@@ -46,7 +46,10 @@ struct PointInput {
 /// Impulses of a contact point on body a [N s], in world axes.
 struct KeptImpulse {
   Vec3 friction;
-  Real normal = 0;
+  Real normal = 0;  ///< >= 0, or kReleased
+  /// `normal` of bodies that have pushed each other during the step, but not at its end.
+  static constexpr Real kReleased = -1;
+  JFPX_HD bool has_pushed() const { return normal != 0; }
 };
 
 /// The arrays of a ContactSet, in host memory or on a device. Both lists are sorted by key.
@@ -85,12 +88,12 @@ struct ContactView {
   JFPX_HD std::uint32_t impulse_count(std::uint32_t contact) const {
     return is_sphere(contact) ? 1 : manifold(contact).count;
   }
-  /// Whether condition(distance of a point, its normal impulse) holds for a point of a contact.
+  /// Whether condition(distance of a point, its impulse) holds for a point of a contact.
   template <class Condition>
   JFPX_HD bool any_point(std::uint32_t contact, const Condition& condition) const {
     const std::uint32_t first = first_impulse(contact);
     for (std::uint32_t i = 0; i < impulse_count(contact); ++i) {
-      if (condition(distance(contact, i), impulses[first + i].normal)) return true;
+      if (condition(distance(contact, i), impulses[first + i])) return true;
     }
     return false;
   }

@@ -1,4 +1,5 @@
-/// Operations of the sweeps of a soft step on one row of either kind.
+/// Operations of the sweeps of a soft step on one row of either kind. For spheres, `impacts` is
+/// ImpactBodies, or a type that rebound() can use in its place.
 #pragma once
 
 #include "src/contact_solver/manifold_row.hpp"
@@ -8,33 +9,41 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-// `bodies` are the pointers to the two bodies of a SphereRow, or the points and the BodyPair of a
-// ManifoldRow.
-
 struct WarmStart {
   static constexpr bool kChangesRow = false, kMovesBodies = false;
-  template <bool kFixed, class Row, class... Bodies>
-  JFPX_HD void run(Row* row, const Bodies&... bodies) const {
-    warm_start<kFixed>(*row, bodies...);
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(SphereRow* row, SolverBody* a, SolverBody* b, const Impacts&) const {
+    warm_start<kFixed>(*row, a, b);
+  }
+  template <bool kFixed>
+  JFPX_HD void run(ManifoldRow* row, PointRow* points, const BodyPair& pair) const {
+    warm_start<kFixed>(*row, points, pair);
   }
 };
 
 /// @tparam kSoft whether penetrations are pushed out
 template <bool kSoft>
 struct Solve {
-  static constexpr bool kChangesRow = true, kMovesBodies = kSoft;
+  static constexpr bool kChangesRow = true, kMovesBodies = true;
   const StepConstants& constants;
-  template <bool kFixed, class Row, class... Bodies>
-  JFPX_HD void run(Row* row, const Bodies&... bodies) const {
-    solve<kFixed>(row, bodies..., constants, kSoft);
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(SphereRow* row, SolverBody* a, SolverBody* b, const Impacts& impacts) const {
+    solve<kFixed>(row, a, b, constants, impacts, kSoft);
+  }
+  template <bool kFixed>
+  JFPX_HD void run(ManifoldRow* row, PointRow* points, const BodyPair& pair) const {
+    solve<kFixed>(row, points, pair, constants, kSoft);
   }
 };
 
+/// Spheres have rebounded in the substeps.
 struct Restitute {
   static constexpr bool kChangesRow = false, kMovesBodies = false;
-  template <bool kFixed, class Row, class... Bodies>
-  JFPX_HD void run(Row* row, const Bodies&... bodies) const {
-    restitute<kFixed>(*row, bodies...);
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(SphereRow*, SolverBody*, SolverBody*, const Impacts&) const {}
+  template <bool kFixed>
+  JFPX_HD void run(ManifoldRow* row, PointRow* points, const BodyPair& pair) const {
+    restitute<kFixed>(*row, points, pair);
   }
 };
 

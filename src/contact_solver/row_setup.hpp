@@ -101,10 +101,8 @@ struct RowSetup {
     row->normal_impulse = kept.normal;
     const SolverBody &a = start[row->a], &b = start[row->b];
     set_masses<kFixed>(row, a, b);
-    const Real restitution = combined(properties.rules.restitution, properties.restitution[row->a],
-                                      properties.restitution[row->b]);
-    row->rebound = -rebound_speed(relative_velocity<kFixed>(*row, a, b), row->normal, distance,
-                                  row->a, row->b, restitution);
+    row->restitution = combined(properties.rules.restitution, properties.restitution[row->a],
+                                properties.restitution[row->b]);
   }
 
   template <bool kFixed>
@@ -166,8 +164,9 @@ struct RowSetup {
   /// Writes the impulses of a row to its contact.
   JFPX_HD void store(const SphereRow& row, std::uint32_t contact) const {
     const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
-    contacts.impulses[contacts.first_impulse(contact)] = {row.friction_impulse * side,
-                                                          row.normal_impulse};
+    const bool is_released = !(row.normal_impulse > 0) && rebounds_of(row) > 0;
+    contacts.impulses[contacts.first_impulse(contact)] = {
+        row.friction_impulse * side, is_released ? KeptImpulse::kReleased : row.normal_impulse};
   }
   JFPX_HD void store(const ManifoldRow& row, const PointRow* points, std::uint32_t contact) const {
     const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);

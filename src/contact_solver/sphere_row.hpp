@@ -1,4 +1,4 @@
-/// One contact of two spheres in a soft step: warm start, solution and restitution.
+/// One contact of two spheres in a soft step: warm start and solution, including rebounds.
 ///
 /// The points of application lie on the line of centres, so anchors are multiples of the normal,
 /// the normal impulse exerts no torque, and the effective mass is the same for every tangent.
@@ -19,10 +19,8 @@ struct alignas(4 * sizeof(Real)) SphereRow {
   Real friction = 0;
   Real arm_a = 0, arm_b = 0;               ///< [m], from the centres to the common point
   Real normal_mass = 0, tangent_mass = 0;  ///< [kg]
-  /// [m/s], speed of separation that restitution requires; 0: none. Negative until the contact has
-  /// pushed in this step.
-  Real rebound = 0;
-  std::uint32_t a = 0, b = 0;  ///< bodies; a is movable
+  Real restitution = 0;                    ///< in [0, 1], plus 2 for each rebound in this step
+  std::uint32_t a = 0, b = 0;              ///< bodies; a is movable
 };
 
 /// `kFixed`: body b does not move.
@@ -64,25 +62,108 @@ JFPX_HD constexpr Vec3 relative_velocity(const SphereRow& row, const SolverBody&
   return velocity - cross(spin, row.normal);
 }
 
+/// [m], at this moment of the step.
+template <bool kFixed>
+JFPX_HD constexpr Real separation_of(const SphereRow& row, const SolverBody& a,
+                                     const SolverBody& b) {
+  Vec3 shift = a.shift;
+  if constexpr (!kFixed) shift -= b.shift;
+  return row.distance + dot(shift, row.normal);
+}
+
 template <bool kFixed>
 JFPX_HD constexpr void warm_start(const SphereRow& row, SolverBody* a, SolverBody* b) {
   apply<kFixed>(row, row.normal * row.normal_impulse + row.friction_impulse, row.friction_impulse,
                 a, b);
 }
 
-/// One iteration: friction within Coulomb's cone, and the impulse along the normal.
+/// What an impact needs of the bodies, as arrays by body.
+struct ImpactBodies {
+  const Vec3* acceleration = nullptr;  ///< [m/s^2], of movable bodies in this step
+  FreeMotion* free = nullptr;
+
+  JFPX_HD void add(std::uint32_t body, const Vec3& change, const Vec3& spun) const {
+    free[body].add(change, spun);
+  }
+};
+
+/// Rebounds of a contact in a step. A light body between heavy ones meets them again and again; the
+/// impulses that are kept must carry them.
+inline constexpr int kMostRebounds = 4;
+
+/// Number of rebounds in this step.
+JFPX_HD constexpr int rebounds_of(const SphereRow& row) {
+  return static_cast<int>(row.restitution * Real(0.5));
+}
+
+/// Makes the bodies rebound if they meet faster than the accelerations and the loss of the kept
+/// impulse could make them. They get the velocities after the impact, and the positions as if they
+/// had these since the impact. The impulse acts once: it is neither kept in the row nor repeated by
+/// the next substep, so that a body may meet several others in a step.
+/// @param bodies     ImpactBodies, or a type with the same `acceleration` and add()
+/// @param separation [m], at the start of the motion that is left in the substep
+/// @param left       [s], duration of that motion
+/// @param velocity   of a's point of contact relative to b's, at the end of the substep
+/// @param closing    [m/s], < 0, its part along the normal
+/// @returns whether the bodies rebound
+template <bool kFixed, class Impacts>
+JFPX_HD inline bool rebound(SphereRow* at, const StepConstants& step, const Impacts& bodies,
+                            Real separation, Real left, const Vec3& velocity, Real closing,
+                            SolverBody* a, SolverBody* b) {
+  const SphereRow& row = *at;
+  const int rebounds = rebounds_of(row);
+  if (rebounds == kMostRebounds) return false;
+  Vec3 acceleration = bodies.acceleration[row.a];
+  Real largest = length(acceleration);
+  if constexpr (!kFixed) {
+    acceleration -= bodies.acceleration[row.b];
+    largest += length(bodies.acceleration[row.b]);
+  }
+  if (!(-closing > largest * step.h + row.normal_impulse / row.normal_mass)) return false;
+  // Time until the impact; negative if it is past, and at most a substep ago.
+  Real until = separation / -closing;
+  if (until < -step.h) until = -step.h;
+  const Real gained = dot(acceleration, row.normal) * (until > 0 ? left - until : left);
+  const Real along = (1 + row.restitution - static_cast<Real>(2 * rebounds)) * (gained - closing) *
+                     row.normal_mass;
+  Vec3 friction = (row.normal * closing - velocity) * row.tangent_mass;
+  const Real limit = row.friction * along;
+  const Real size2 = length_squared(friction);
+  if (size2 > limit * limit) friction *= limit / square_root(size2);
+
+  const Vec3 impulse = row.normal * along + friction, twist = cross(friction, row.normal);
+  const auto deflect = [&](std::uint32_t i, SolverBody* body, Real inverse_mass, Real arm) {
+    const Vec3 change = impulse * inverse_mass, spun = twist * (arm * body->inverse_inertia);
+    body->velocity += change;
+    body->angular_velocity += spun;
+    body->shift -= change * until;
+    bodies.add(i, change, spun);
+  };
+  deflect(row.a, a, a->inverse_mass, row.arm_a);
+  if constexpr (!kFixed) deflect(row.b, b, -b->inverse_mass, row.arm_b);
+  at->restitution += 2;
+  return true;
+}
+
+/// One iteration: a rebound, friction within Coulomb's cone, and the impulse along the normal.
 /// @param soft whether penetrations are pushed out
-template <bool kFixed>
+template <bool kFixed, class Impacts>
 JFPX_HD inline void solve(SphereRow* row, SolverBody* a, SolverBody* b, const StepConstants& step,
-                          bool soft) {
+                          const Impacts& bodies, bool soft) {
   const Vec3& n = row->normal;
-  Vec3 shift = a->shift;
-  if constexpr (!kFixed) shift -= b->shift;
-  const Real separation = row->distance + dot(shift, n);
+  Real separation = separation_of<kFixed>(*row, *a, *b);
   if (is_idle(separation, row->normal_impulse, soft)) return;
+  Vec3 velocity = relative_velocity<kFixed>(*row, *a, *b);
+  Real closing = dot(velocity, n);
+  const Real left = soft ? step.h : Real(0);
+  if (closing < -step.restitution_threshold && separation + closing * left <= 0 &&
+      rebound<kFixed>(row, step, bodies, separation, left, velocity, closing, a, b)) {
+    if (separation > 0) return;
+    separation = separation_of<kFixed>(*row, *a, *b);
+    velocity = relative_velocity<kFixed>(*row, *a, *b);
+    closing = dot(velocity, n);
+  }
   const Bias bias = bias_of(separation, kFixed ? step.fixed : step.movable, step, soft);
-  const Vec3 velocity = relative_velocity<kFixed>(*row, *a, *b);
-  const Real closing = dot(velocity, n);
 
   Vec3 friction = row->friction_impulse - (velocity - n * closing) * row->tangent_mass;
   const Real limit = row->friction * row->normal_impulse;
@@ -97,24 +178,12 @@ JFPX_HD inline void solve(SphereRow* row, SolverBody* a, SolverBody* b, const St
   const Real normal_impulse = wanted > 0 ? wanted : Real(0);
   const Real along = normal_impulse - row->normal_impulse;
   row->normal_impulse = normal_impulse;
-  if (normal_impulse > 0 && row->rebound < 0) row->rebound = -row->rebound;
   apply<kFixed>(*row, n * along + tangential, tangential, a, b);
   if (bias.projection > 0) {
     const Vec3 impulse = n * (bias.projection * row->normal_mass);
     a->shift += impulse * a->inverse_mass;
     if constexpr (!kFixed) b->shift -= impulse * b->inverse_mass;
   }
-}
-
-/// Gives the bodies of an impact their speed of separation, after the last substep. The impulse is
-/// not kept for the next step.
-template <bool kFixed>
-JFPX_HD inline void restitute(const SphereRow& row, SolverBody* a, SolverBody* b) {
-  if (!(row.rebound > 0)) return;
-  const Real closing = dot(relative_velocity<kFixed>(row, *a, *b), row.normal);
-  const Real change = row.normal_mass * (row.rebound - closing);
-  const Real along = change > -row.normal_impulse ? change : -row.normal_impulse;
-  apply<kFixed>(row, row.normal * along, {}, a, b);
 }
 
 }  // namespace soft_step

@@ -38,6 +38,7 @@ struct StepConstants {
   /// velocities, but not all of it in chains of overlapping bodies, which would fly apart at a
   /// higher speed.
   Real soft_speed = 0;
+  Real restitution_threshold = 0;  ///< [m/s], slower contacts do not bounce
 };
 
 /// Frequencies are limited to a quarter of the substep rate, and twice that for fixed bodies: a
@@ -53,7 +54,8 @@ JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& sett
           make_softness(hertz, settings.damping_ratio, h),
           make_softness(2 * hertz, settings.damping_ratio, h),
           settings.push_out_speed,
-          settings.push_out_speed / 6};
+          settings.push_out_speed / 6,
+          settings.restitution_threshold};
 }
 
 /// Motion of a body during a step, for the rows of its contacts.
@@ -68,6 +70,17 @@ struct alignas(16 * sizeof(Real)) SolverBody {
   Real unused_too = 0;
 };
 static_assert(sizeof(SolverBody) == 16 * sizeof(Real));
+
+/// Velocities of a body after the accelerations of a substep and the rebounds since: the rest of
+/// its velocities are impulses of contacts, which the next substep applies again.
+struct FreeMotion {
+  Vec3 velocity, angular_velocity;
+
+  JFPX_HD void add(const Vec3& change, const Vec3& spun) {
+    velocity += change;
+    angular_velocity += spun;
+  }
+};
 
 /// Velocity along the normal that a contact must reach, and the weights of its impulse.
 struct Bias {

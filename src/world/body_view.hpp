@@ -146,7 +146,7 @@ struct MotionPointers {
   /// equilibrium. The rotation of a sphere counts less, because it moves the surface within itself,
   /// and no friction ends a rotation about the contact normal.
   JFPX_HD void update_rest_time(const BodyView& bodies, std::uint32_t i, bool is_driven) const {
-    constexpr Real kDriven = Real(0.04), kRotationOfSphere = Real(0.1);
+    constexpr Real kDriven = Real(0.04), kRotationOfSphere = Real(0.04);
     const Real limit = is_driven ? bodies.sleep_speed * kDriven : bodies.sleep_speed;
     const Real weight = bodies.radius[i] > 0 ? kRotationOfSphere : Real(1);
     const Real spin = length(angular_velocity[i]) * bodies.extent[i] * weight;

@@ -70,8 +70,7 @@ void SoftStep::prepare(const BodyStore& bodies) {
   const std::size_t capacity = bodies.capacity();
   bodies_.resize(capacity);
   orientation_.resize(capacity);
-  free_velocity_.resize(capacity);
-  free_angular_velocity_.resize(capacity);
+  free_.resize(capacity);
   marked_.resize(capacity);
   islands_.reserve(capacity);
 }
@@ -188,8 +187,6 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
            .motion = bodies->motion_pointers(),
            .solver = bodies_.data(),
            .orientation = orientation_.data(),
-           .free_velocity = free_velocity_.data(),
-           .free_angular_velocity = free_angular_velocity_.data(),
            .near = near_.data(),
            .h = constants_.h};
   for_each_body(*bodies, [this](std::uint32_t i) { step_.load(i); });
@@ -206,10 +203,11 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
                                 .rules = materials_,
                                 .restitution_threshold = settings_.restitution_threshold},
                  .start = bodies_.data()},
-                constants_);
+                {step_.bodies.last_acceleration, free_.data()}, constants_);
   for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
-    for_each_body(*bodies,
-                  [&](std::uint32_t i) { step_.accelerate(i, &step_.solver[i], substep == 0); });
+    for_each_body(*bodies, [&](std::uint32_t i) {
+      step_.accelerate(i, &step_.solver[i], &free_[i], substep == 0);
+    });
     if (substep == 0) solver_.warm_start(bodies_);
     solver_.solve(bodies_, true);
     for_each_body(*bodies, [this](std::uint32_t i) { step_.move(i, &step_.solver[i]); });

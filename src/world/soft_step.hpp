@@ -70,10 +70,9 @@ class SoftStep {
   soft_step::StepBodies step_;  ///< of the arrays below and the bodies, during a step
   std::vector<soft_step::SolverBody> bodies_;  ///< by body
   std::vector<Quat> orientation_;              ///< by body, during the step
-  std::vector<Vec3> free_velocity_;            ///< by body: after the accelerations of a substep
-  std::vector<Vec3> free_angular_velocity_;
-  std::vector<std::uint8_t> near_;    ///< by body: 1 if it has a contact
-  std::vector<std::uint8_t> marked_;  ///< by label of an island
+  std::vector<soft_step::FreeMotion> free_;    ///< by body
+  std::vector<std::uint8_t> near_;             ///< by body: 1 if it has a contact
+  std::vector<std::uint8_t> marked_;           ///< by label of an island
 };
 
 }  // namespace JFPX_ABI

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/contact_solver/contact_set.hpp"
-#include "src/contact_solver/step_constants.hpp"
+#include "src/contact_solver/sphere_row.hpp"
 #include "src/world/body_view.hpp"
 
 #include <cstdint>
@@ -17,15 +17,16 @@ JFPX_HD inline bool will_touch(const BodyView& bodies, const ContactView& contac
   const ContactKey& key = contacts.key(contact);
   const Vec3 motion = bodies.predicted_motion(key.a) - bodies.predicted_motion(key.b);
   const Real opening = dot(motion, contacts.normal(contact));
-  return contacts.any_point(contact, [opening](Real distance, Real impulse) {
-    return distance <= 0 || distance + opening <= 0 || impulse > 0;
+  return contacts.any_point(contact, [opening](Real distance, const KeptImpulse& impulse) {
+    return distance <= 0 || distance + opening <= 0 || impulse.normal > 0;
   });
 }
 
 /// Whether the bodies of a contact touched, or pushed each other, during the step.
 JFPX_HD inline bool has_touched(const ContactView& contacts, std::uint32_t contact) {
-  return contacts.any_point(
-      contact, [](Real distance, Real impulse) { return distance <= 0 || impulse > 0; });
+  return contacts.any_point(contact, [](Real distance, const KeptImpulse& impulse) {
+    return distance <= 0 || impulse.has_pushed();
+  });
 }
 
 /// The bodies of a step, as arrays by body.
@@ -33,9 +34,7 @@ struct StepBodies {
   BodyView bodies;
   MotionPointers motion;  ///< of the same bodies
   SolverBody* solver = nullptr;
-  Quat* orientation = nullptr;    ///< during the step
-  Vec3* free_velocity = nullptr;  ///< after the accelerations of a substep
-  Vec3* free_angular_velocity = nullptr;
+  Quat* orientation = nullptr;         ///< during the step
   const std::uint8_t* near = nullptr;  ///< 1 if the body has a contact
   Real h = 0;                          ///< [s], length of a substep
 
@@ -59,7 +58,8 @@ struct StepBodies {
   /// would contain a part of the acceleration that impulses have cancelled. Forces may depend on
   /// the position, and are constant in a step: they move the body as in the semi-implicit Euler
   /// method for the whole step, because a spring would gain energy otherwise.
-  JFPX_HD void accelerate(std::uint32_t i, SolverBody* body, bool is_first) const {
+  JFPX_HD void accelerate(std::uint32_t i, SolverBody* body, FreeMotion* free,
+                          bool is_first) const {
     if (!bodies.movable(i) || bodies.awake[i] == 0) return;
     Vec3 velocity = body->velocity, angular_velocity = body->angular_velocity;
     bodies.accelerate(i, orientation[i], &velocity, &angular_velocity);
@@ -70,10 +70,9 @@ struct StepBodies {
         body->shift = add_scaled(body->shift, bodies.last_acceleration[i], half_step);
       }
     }
-    const Vec3 gained = is_first ? Vec3{} : body->velocity - free_velocity[i];
-    const Vec3 spun = is_first ? Vec3{} : body->angular_velocity - free_angular_velocity[i];
-    free_velocity[i] = velocity;
-    free_angular_velocity[i] = angular_velocity;
+    const Vec3 gained = is_first ? Vec3{} : body->velocity - free->velocity;
+    const Vec3 spun = is_first ? Vec3{} : body->angular_velocity - free->angular_velocity;
+    *free = {velocity, angular_velocity};
     body->velocity = velocity + gained;
     body->angular_velocity = angular_velocity + spun;
   }

@@ -2,7 +2,9 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/parallel_for.hpp"
+#include "src/base/reserve.hpp"
 #include "src/sphere_collider/backend_table.hpp"
+#include "src/world/met_contacts.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>
@@ -94,6 +96,44 @@ void World::Impl::find_contacts(StepReport* report) {
   detected_count = report->contacts;
 }
 
+/// Adds the contacts that came about during the step to those of detection, after the contacts of
+/// the same bodies.
+void World::Impl::add_met_contacts(StepReport* report) {
+  met.clear();
+  // Room for more than there usually are, so that warm steps allocate nothing.
+  reserve_geometric(&met, contacts.size() / 8 + 64);
+  std::size_t of_spheres = 0;
+  soft_step::for_each_met(
+      soft_step.contacts().view(),
+      [this](std::uint32_t body) { return store.moving.position[body]; },
+      [this](std::uint32_t body) { return store.radius(body); },
+      [&](const soft_step::ContactKey& key, bool are_spheres, const Vec3& normal,
+          const Vec3& point) {
+        met.push_back({store.id(key.a), store.id(key.b), normal, point, 0});
+        of_spheres += are_spheres ? 1 : 0;
+      });
+  if (met.empty()) return;
+  finish_contacts(&met);
+  // Merges from the back: generated contacts, then others, then those of spheres.
+  const auto pair_of = [](const Contact& c) { return std::pair(c.a.index, c.b.index); };
+  std::size_t from = contacts.size(), next = met.size();
+  resize_geometric(&contacts, from + next);
+  std::size_t to = contacts.size();
+  while (from > detected_count) contacts[--to] = contacts[--from];
+  const std::pair<std::size_t, std::size_t> starts[] = {{report->sphere_contacts, of_spheres},
+                                                        {0, 0}};
+  for (const auto& [begin, first] : starts) {
+    while (next > first || (next > 0 && from > begin)) {
+      const bool is_old =
+          from > begin && (next == first || pair_of(met[next - 1]) < pair_of(contacts[from - 1]));
+      contacts[--to] = is_old ? contacts[--from] : met[--next];
+    }
+  }
+  report->contacts += met.size();
+  report->sphere_contacts += of_spheres;
+  detected_count = report->contacts;
+}
+
 /// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
 /// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
 bool World::Impl::advance(StepReport* report) {
@@ -117,6 +157,7 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   soft_step.add_generated(store, std::span(contacts).subspan(report->contacts));
   const Clock::time_point detected = Clock::now();
   if (!all_finite(soft_step.solve(&store), report)) return false;
+  add_met_contacts(report);
   soft_step.commit(&store);
   report->integrate_ms = elapsed_ms(start, forced);
   report->detect_ms = elapsed_ms(forced, detected);

@@ -355,6 +355,7 @@ TEST_P(Boxes, AllTouchingPairsAreFoundInOrder) {
   }
   std::vector<Contact> found(world.contacts().begin(), world.contacts().end());
   std::erase_if(found, [&](const Contact& c) { return sphere(c.a.index) && sphere(c.b.index); });
+  std::erase_if(found, [](const Contact& c) { return c.distance == 0; });  // met during the step
   for (Contact& c : found) c.friction = c.restitution = 0;  // the pair tests do not set them
   EXPECT_GT(found.size(), 50u);
   EXPECT_EQ(found, expected);

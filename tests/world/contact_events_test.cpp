@@ -52,6 +52,30 @@ TEST_P(ContactEvents, OfAnEmptyWorldAreNone) {
   EXPECT_EQ(step(&world), "");
 }
 
+TEST(ContactEvents, OfABallThatReboundsWithinAStepBeginAndEnd) {
+  Scene scene;
+  BodyDef ball = heavy({0, 2.0_r, 0});
+  ball.restitution = 1;
+  scene.bodies = {ball, test::ground()};
+  scene.bodies[1].restitution = 1;
+  World world(scene);
+  int rebounds = 0, begun = 0, ended = 0;
+  for (int n = 0; n < 600; ++n) {
+    const bool falls = world.states()[0].velocity.y < 0;
+    const std::string events = step(&world);
+    if (falls && world.states()[0].velocity.y > 0) {
+      ++rebounds;
+      EXPECT_EQ(events, "+0-1") << n;
+      EXPECT_EQ(world.contacts().size(), 1u) << n;
+      EXPECT_LE(world.contacts()[0].distance, 0) << n;
+    }
+    begun += events == "+0-1", ended += events == "-0-1";
+  }
+  EXPECT_GT(rebounds, 10);
+  EXPECT_EQ(begun, rebounds);
+  EXPECT_EQ(ended, rebounds);
+}
+
 // Solver::soft_step resolves an impact before the bodies touch.
 TEST(ContactEvents, BeginStayAndEndWithABounce) {
   Scene scene = test::thesis_scene();

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 namespace jfpx {
 namespace {
 
@@ -48,7 +50,7 @@ TEST(Impacts, ABallReboundsToTheSquareOfTheRestitution) {
   }
 }
 
-TEST(Impacts, AGasWithoutFrictionGainsNoEnergy) {
+TEST(Impacts, AGasWithoutFrictionKeepsItsEnergy) {
   Scene scene = scenes::make("gas", {.spheres = 27});
   for (BodyDef& body : scene.bodies) body.restitution = 1;
   scene.soft_step.restitution_threshold = 0;
@@ -64,6 +66,44 @@ TEST(Impacts, AGasWithoutFrictionGainsNoEnergy) {
   for (int n = 0; n < 10000; ++n) {
     world.step();
     ASSERT_LE(energy(), 1.01 * before) << n;
+  }
+  EXPECT_GE(energy(), 0.95 * before);
+}
+
+TEST(Impacts, APushedRowOfBallsPassesTheVelocityOn) {
+  // Solved in different orders, because colors depend on the indices.
+  for (const std::array<int, 5>& places :
+       {std::array{0, 1, 2, 3, 4}, {4, 3, 2, 1, 0}, {2, 0, 4, 1, 3}}) {
+    for (const Real speed : {1.0_r, 4.0_r}) {
+      Scene scene;
+      for (const int place : places) {
+        BodyDef ball = test::ball({place == 0 ? -1 : static_cast<Real>(place), 0, 0}, 0.5_r);
+        ball.restitution = 1;
+        if (place == 0) ball.velocity.x = speed;
+        scene.bodies.push_back(ball);
+      }
+      World world(test::awake(scene));
+      while (world.time() < 2) world.step();
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        const double expected = places[i] == 4 ? static_cast<double>(speed) : 0;
+        EXPECT_NEAR(static_cast<double>(world.states()[i].velocity.x), expected, 1e-3)
+            << "place " << places[i] << " of body " << i << ", speed " << speed;
+      }
+    }
+  }
+}
+
+TEST(Impacts, AHeavyBallThatFallsOnALightOneComesToRestOnIt) {
+  for (const Real mass : {10.0_r, 100.0_r}) {
+    Scene scene;
+    scene.bodies = {test::ground(), test::heavy_ball({0, 0.5_r, 0}, 0.5_r),
+                    test::heavy_ball({0, 2.5_r, 0}, 0.5_r, mass)};
+    for (BodyDef& body : scene.bodies) body.restitution = 0.3_r;
+    World world(test::awake(scene));
+    test::run(&world, 5);
+    EXPECT_NEAR(static_cast<double>(world.states()[1].position.y), 0.5, 0.01) << mass;
+    EXPECT_NEAR(static_cast<double>(world.states()[2].position.y), 1.5, 0.03) << mass;
+    EXPECT_LT(test::speeds(world).largest, 0.05) << mass;
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
+#include "src/contact_solver/row_operations.hpp"
 
 #include <algorithm>
 #include <tuple>
@@ -104,8 +105,10 @@ void SoftStepSolver::place_fixed_contacts() {
   }
 }
 
-void SoftStepSolver::build(const RowSetup& setup, const StepConstants& constants) {
+void SoftStepSolver::build(const RowSetup& setup, const ImpactBodies& impacts,
+                           const StepConstants& constants) {
   setup_ = setup;
+  impacts_ = impacts;
   constants_ = constants;
   sort_contacts();
   const auto fill_all = [this](auto* kind_rows, const auto& fill) {
@@ -172,34 +175,29 @@ void SoftStepSolver::sweep(const Operation& operation) {
   });
 }
 
-void SoftStepSolver::warm_start(std::span<SolverBody> bodies) {
+template <class Operation>
+void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operation) {
   sweep([&]<class Row, bool kFixed>(Row* row, std::bool_constant<kFixed>) {
     if constexpr (std::is_same_v<Row, SphereRow>) {
-      soft_step::warm_start<kFixed>(*row, &bodies[row->a], &bodies[row->b]);
+      operation.template run<kFixed>(row, &bodies[row->a], &bodies[row->b], impacts_);
     } else {
-      soft_step::warm_start<kFixed>(*row, &points_[row->first], pair_of(*row, bodies));
+      operation.template run<kFixed>(row, &points_[row->first], pair_of(*row, bodies));
     }
   });
 }
 
+void SoftStepSolver::warm_start(std::span<SolverBody> bodies) { run(bodies, WarmStart()); }
+
 void SoftStepSolver::solve(std::span<SolverBody> bodies, bool soft) {
-  sweep([&]<class Row, bool kFixed>(Row* row, std::bool_constant<kFixed>) {
-    if constexpr (std::is_same_v<Row, SphereRow>) {
-      soft_step::solve<kFixed>(row, &bodies[row->a], &bodies[row->b], constants_, soft);
-    } else {
-      soft_step::solve<kFixed>(row, &points_[row->first], pair_of(*row, bodies), constants_, soft);
-    }
-  });
+  if (soft) {
+    run(bodies, Solve<true>{constants_});
+  } else {
+    run(bodies, Solve<false>{constants_});
+  }
 }
 
 void SoftStepSolver::restitute(std::span<SolverBody> bodies) {
-  sweep([&]<class Row, bool kFixed>(Row* row, std::bool_constant<kFixed>) {
-    if constexpr (std::is_same_v<Row, SphereRow>) {
-      soft_step::restitute<kFixed>(*row, &bodies[row->a], &bodies[row->b]);
-    } else {
-      soft_step::restitute<kFixed>(*row, &points_[row->first], pair_of(*row, bodies));
-    }
-  });
+  if (!manifolds_.rows.empty()) run(bodies, Restitute());
 }
 
 void SoftStepSolver::store() {

@@ -27,12 +27,12 @@ class SoftStepSolver {
 
   /// Makes rows of the contacts that have an awake movable body.
   /// @param setup     its arrays are valid until store()
-  void build(const RowSetup& setup, const StepConstants& constants);
+  void build(const RowSetup& setup, const ImpactBodies& impacts, const StepConstants& constants);
   /// Applies the impulses of the last step.
   void warm_start(std::span<SolverBody> bodies);
   /// One sweep over all contacts. @param soft whether penetrations are pushed out
   void solve(std::span<SolverBody> bodies, bool soft);
-  /// Makes the bodies of impacts rebound.
+  /// Makes the bodies of impacts rebound, but for spheres, which rebound in solve().
   void restitute(std::span<SolverBody> bodies);
   /// Writes the impulses to the contacts that build() received.
   void store();
@@ -64,10 +64,13 @@ class SoftStepSolver {
   void place_fixed_contacts();
   template <class Operation>
   void sweep(const Operation& operation);
+  template <class Operation>
+  void run(std::span<SolverBody> bodies, const Operation& operation);
   BodyPair pair_of(const ManifoldRow& row, std::span<SolverBody> bodies) const;
 
   ThreadPool* pool_;
   RowSetup setup_;  ///< from build() to store()
+  ImpactBodies impacts_;
   StepConstants constants_;
 
   std::vector<RowKind> kinds_;  ///< by contact

@@ -48,16 +48,17 @@ struct Turns {
 /// when they change: the words of the velocities say which version of the others belongs to them.
 class BodyCells {
  public:
-  /// Versions of the shift and the rotation.
+  /// Versions of the other vectors.
   struct Version {
-    std::uint32_t shift = 0, rotation = 0;
+    std::uint32_t shift = 0, rotation = 0, free = 0;
   };
 
   /// The motion before the first turn.
-  JFPX_HD void start(const soft_step::SolverBody& body) {
+  JFPX_HD void start(const soft_step::SolverBody& body, const soft_step::FreeMotion& free) {
     Version version;
     write_shift(body, &version);
     write_rotation(body, &version);
+    write_free(free, &version);
     write(0, body, version);
   }
 
@@ -73,7 +74,8 @@ class BodyCells {
     if constexpr (kRotation) r.load(rotation_);
     const std::uint32_t word = v.get(&body->velocity);
     version->shift = word >> kTurnBits & kVersionMask;
-    version->rotation = word >> (kTurnBits + kVersionBits);
+    version->rotation = word >> (kTurnBits + kVersionBits) & kVersionMask;
+    version->free = word >> (kTurnBits + 2 * kVersionBits) & kVersionMask;
     bool is_complete = (word & kTurnMask) == turn;
     is_complete = w.get(&body->angular_velocity) == word && is_complete;
     is_complete = s.get(&body->shift) == version->shift && is_complete;
@@ -86,8 +88,9 @@ class BodyCells {
   /// Writes the velocities after a turn. @param version of the shift and the rotation
   JFPX_HD void write(std::uint32_t turn, const soft_step::SolverBody& body,
                      const Version& version) {
-    const std::uint32_t word =
-        turn | version.shift << kTurnBits | version.rotation << (kTurnBits + kVersionBits);
+    const std::uint32_t word = turn | version.shift << kTurnBits |
+                               version.rotation << (kTurnBits + kVersionBits) |
+                               version.free << (kTurnBits + 2 * kVersionBits);
     store(velocity_, body.velocity, word);
     store(angular_velocity_, body.angular_velocity, word);
   }
@@ -100,14 +103,30 @@ class BodyCells {
     version->rotation = (version->rotation + 1) & kVersionMask;
     store(rotation_, body.rotation, version->rotation);
   }
+  JFPX_HD void write_free(const soft_step::FreeMotion& free, Version* version) {
+    version->free = (version->free + 1) & kVersionMask;
+    store(free_velocity_, free.velocity, version->free);
+    store(free_angular_velocity_, free.angular_velocity, version->free);
+  }
+  /// Reads the free motion of a version that read() has returned: it is already on its way.
+  JFPX_HD soft_step::FreeMotion read_free(const Version& version) const {
+    soft_step::FreeMotion free;
+    Read v, w;
+    do {
+      v.load(free_velocity_);
+      w.load(free_angular_velocity_);
+    } while (v.get(&free.velocity) != version.free ||
+             w.get(&free.angular_velocity) != version.free);
+    return free;
+  }
 
  private:
   static constexpr int kCells = 3 / kCellNumbers;  ///< of a vector
-  static constexpr std::uint32_t kTurnBits = 14, kVersionBits = 9;
+  static constexpr std::uint32_t kTurnBits = 14, kVersionBits = 6;
   static constexpr std::uint32_t kTurnMask = (1u << kTurnBits) - 1;
   static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
   static constexpr std::uint32_t kMixed = ~0u;  ///< its turn is higher than all turns
-  // Versions may start again at 0, because no reader lags by that many.
+  // Versions may start again at 0, because no store is delayed for that many turns.
   static_assert((2 * kMaxSubsteps + 2) * Turns::kPerSweep < kTurnMask);
 
   struct Read {
@@ -137,6 +156,7 @@ class BodyCells {
   }
 
   Cell velocity_[kCells], angular_velocity_[kCells], shift_[kCells], rotation_[kCells];
+  Cell free_velocity_[kCells], free_angular_velocity_[kCells];
 };
 
 /// What the rows of a body read, and no row changes.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/world/device/islands.hpp"
+#include "src/world/met_contacts.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -31,6 +32,14 @@ struct CommitProgram {
           return bodies.movable(body) && bodies.awake[body] != 0;
         },
         &d.counters->awake);
+    const soft_step::ContactView contacts = d.contacts();
+    team.count(
+        contacts.sphere_count, [&](std::uint32_t i) { return soft_step::has_touched(contacts, i); },
+        &d.counters->touching_spheres);
+    team.spread(contacts.manifold_count, [&](std::uint32_t m) {
+      const std::uint32_t met = soft_step::count_met(contacts, contacts.sphere_count + m);
+      if (met > 0) atomic_add(&d.counters->met_points, met);
+    });
     team.once([&] { d.counters->completed = d.number; });
   }
 

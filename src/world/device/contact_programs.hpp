@@ -134,7 +134,6 @@ struct SphereProgram {
       return false;
     }
     d.pair_results[i] = {contact.normal, contact.distance};
-    if (contact.distance <= 0) atomic_add(&d.counters->touching_spheres, 1);
     return true;
   }
 };

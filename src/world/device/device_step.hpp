@@ -85,7 +85,8 @@ class DeviceStep final : public DeviceWorld {
     result.detect_ms = device_->elapsed_ms(0, 1);
     result.resolve_ms = device_->elapsed_ms(1, 2);
     result.awake = counters.awake;
-    result.contacts = std::uint64_t{counters.touching_spheres} + counters.touches;
+    result.contacts =
+        std::uint64_t{counters.touching_spheres} + counters.touches + counters.met_points;
     result.sphere_contacts = std::uint64_t{counters.touching_spheres} + counters.sphere_touches;
     return result;
   }
@@ -105,35 +106,18 @@ class DeviceStep final : public DeviceWorld {
     device_->wait();
   }
 
-  void fetch_contact_set(soft_step::ContactSet* last) override {
-    const Contacts& from = sets_[1 - now_];
-    const auto [spheres, manifolds, points] = from.counts;
-    last->spheres.resize(spheres);
-    last->manifolds.resize(manifolds);
-    last->points.resize(points);
-    last->impulses.resize(std::size_t{spheres} + points);
-    last->rolling_impulses.resize(std::size_t{spheres} + manifolds);
-    last->colors.resize(std::size_t{spheres} + manifolds);
-    get(&last->spheres, from.spheres);
-    get(&last->manifolds, from.manifolds);
-    get(&last->points, from.points);
-    get(&last->impulses, from.impulses);
-    get(&last->rolling_impulses, from.rolling_impulses);
-    get(&last->colors, from.colors);
-    device_->wait();
-  }
+  void fetch_contact_set(soft_step::ContactSet* last) override { fetch(sets_[1 - now_], last); }
 
   std::uint64_t fetch_contacts(const BodyStore& bodies, bool of_step_before,
                                std::vector<Contact>* contacts) override {
     const Contacts& from = sets_[of_step_before ? now_ : 1 - now_];
-    std::vector<soft_step::SphereContactInput> spheres(from.counts[0]);
     std::vector<Touch> touches(from.touch_count);
     std::vector<Vec3> position(bodies.capacity());
-    get(&spheres, from.spheres);
+    soft_step::ContactSet set;
     get(&touches, from.touches);
     get(&position, from.position_before);
-    device_->wait();
-    for (const soft_step::SphereContactInput& c : spheres) {
+    fetch(from, &set);
+    for (const soft_step::SphereContactInput& c : set.spheres) {
       if (!(c.distance <= 0)) continue;
       // The sphere of a body that is a sphere is where the body was at the start of the step.
       const SphereInstance sphere_b{position[c.key.b], bodies.radius(c.key.b)};
@@ -144,6 +128,17 @@ class DeviceStep final : public DeviceWorld {
                          middle_point(c.normal, c.distance, sphere_b),
                          c.distance});
     }
+    // After the other contacts of the same bodies.
+    constexpr std::uint32_t kLast = 0xffffffffu;
+    std::uint32_t number = 0;
+    soft_step::for_each_met(
+        set.view(), [&](std::uint32_t body) { return position[body]; },
+        [&](std::uint32_t body) { return bodies.radius(body); },
+        [&](const soft_step::ContactKey& key, bool of_spheres, const Vec3& normal,
+            const Vec3& point) {
+          touches.push_back(
+              {{key.a, key.b, kLast, kLast}, number++, of_spheres ? 1u : 0u, normal, point, 0});
+        });
     const auto order = [](const Touch& t) {
       return std::tuple(1 - t.of_spheres, t.pair, t.number);
     };
@@ -225,7 +220,6 @@ class DeviceStep final : public DeviceWorld {
     Buffer<std::uint8_t> marked, near_flag;
     Buffer<soft_step::SolverBody> solver;
     Buffer<Quat> orientation;
-    Buffer<Vec3> free_velocity, free_angular_velocity;
     Buffer<soft_step::SphereRow> sphere_rows;
     Buffer<soft_step::ManifoldRow> manifold_rows;
     Buffer<soft_step::PointRow> point_rows;
@@ -245,6 +239,23 @@ class DeviceStep final : public DeviceWorld {
     put(to, from.data(), from.size());
     return to->data();
   }
+  void fetch(const Contacts& from, soft_step::ContactSet* to) {
+    const auto [spheres, manifolds, points] = from.counts;
+    to->spheres.resize(spheres);
+    to->manifolds.resize(manifolds);
+    to->points.resize(points);
+    to->impulses.resize(std::size_t{spheres} + points);
+    to->rolling_impulses.resize(std::size_t{spheres} + manifolds);
+    to->colors.resize(std::size_t{spheres} + manifolds);
+    get(&to->spheres, from.spheres);
+    get(&to->manifolds, from.manifolds);
+    get(&to->points, from.points);
+    get(&to->impulses, from.impulses);
+    get(&to->rolling_impulses, from.rolling_impulses);
+    get(&to->colors, from.colors);
+    device_->wait();
+  }
+
   template <class T>
   void get(std::vector<T>* to, const Buffer<T>& from) {
     device_->download(to->data(), from.data(), to->size());
@@ -373,8 +384,6 @@ class DeviceStep final : public DeviceWorld {
     d.step.near = d.near_flag;
     d.step.solver = room(&s.solver, n);
     d.step.orientation = room(&s.orientation, n);
-    d.step.free_velocity = room(&s.free_velocity, n);
-    d.step.free_angular_velocity = room(&s.free_angular_velocity, n);
     d.cells = room(&s.cells, n);
     d.row_bodies = room(&s.row_bodies, n);
     d.pair_count = room(&s.pair_count, 1);

@@ -37,8 +37,9 @@ struct PrepareProgram {
     soft_step::SolverBody body = d.step.solver[i];
     d.row_bodies[i] = {body.inverse_mass, body.inverse_inertia, 0};
     d.first_fixed[i] = kNone;
-    d.step.accelerate(i, &body, true);
-    d.cells[i].start(body);
+    soft_step::FreeMotion free;
+    d.step.accelerate(i, &body, &free, true);
+    d.cells[i].start(body, free);
   }
 
   template <class Team>
@@ -140,7 +141,6 @@ struct PrepareProgram {
       r < begin[soft_step::kFixedGroup] ? setup.fill<false>(&row, contact)
                                         : setup.fill<true>(&row, contact);
       d.sphere_rows[r] = row;
-      rebounds = row.rebound < 0;
     } else {
       soft_step::ManifoldRow* row = &d.manifold_rows[r - first_manifold()];
       soft_step::PointRow* points = d.point_rows + row->first;

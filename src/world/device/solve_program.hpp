@@ -49,6 +49,30 @@ struct SolveProgram {
   using SolverBody = soft_step::SolverBody;
   static constexpr std::uint32_t kWarpItems = 32;
 
+  /// What the impact of a row adds to the free motion of its bodies; see soft_step::ImpactBodies.
+  struct Impact {
+    const Vec3* acceleration = nullptr;
+    std::uint32_t a = 0;  ///< body a of the row
+    mutable bool is_pending = false;
+    mutable soft_step::FreeMotion of_a = {}, of_b = {};
+
+    JFPX_HD void add(std::uint32_t body, const Vec3& change, const Vec3& spun) const {
+      is_pending = true;
+      (body == a ? of_a : of_b) = {change, spun};
+    }
+  };
+
+  /// The free motion of a body after the rows of a sweep.
+  struct BodyFree {
+    bool is_read = false, is_changed = false;
+    soft_step::FreeMotion motion;
+
+    JFPX_HD void read(const BodyCells& cells, const BodyCells::Version& version) {
+      if (!is_read) motion = cells.read_free(version);
+      is_read = true;
+    }
+  };
+
   /// What a body does after the rows of a sweep.
   enum class BodyStage : std::uint8_t {
     none,
@@ -271,19 +295,25 @@ struct SolveProgram {
   template <class Operation>
   JFPX_HD void solve_spheres(const Sweep& sweep, const Operation& operation, RowItem* item) const {
     soft_step::SphereRow& row = item->sphere;
-    const Real rebound = row.rebound;
+    const Real restitution = row.restitution;
     const Vec3 shift_a = item->a.motion.shift, shift_b = item->b.motion.shift;
-    operation.template run<false>(&row, &item->a.motion, &item->b.motion);
-    const auto write = [&](ItemBody* body, const Vec3& shift) {
+    const Impact impact{data.step.bodies.last_acceleration, row.a};
+    operation.template run<false>(&row, &item->a.motion, &item->b.motion, impact);
+    const auto write = [&](ItemBody* body, const Vec3& shift, const soft_step::FreeMotion& change) {
       BodyCells& cells = data.cells[body->index];
       if constexpr (Operation::kMovesBodies) {
         if (!(body->motion.shift == shift)) cells.write_shift(body->motion, &body->version);
+        if (impact.is_pending) {
+          soft_step::FreeMotion free = cells.read_free(body->version);
+          free.add(change.velocity, change.angular_velocity);
+          cells.write_free(free, &body->version);
+        }
       }
       cells.write(body->after, body->motion, body->version);
     };
-    write(&item->a, shift_a);
-    write(&item->b, shift_b);
-    store<Operation>(sweep, row, rebound, item->row);
+    write(&item->a, shift_a, impact.of_a);
+    write(&item->b, shift_b, impact.of_b);
+    store<Operation>(sweep, row, restitution, item->row);
   }
 
   template <class Operation>
@@ -328,9 +358,11 @@ struct SolveProgram {
       return;
     }
     SolverBody& body = item->motion;
+    BodyCells& cells = d.cells[i];
+    BodyFree free;
     for (std::uint32_t r = item->first_fixed; r != kNone;) {
       const std::uint32_t next = d.next_fixed[r];
-      solve_fixed(sweep, operation, r, &body);
+      solve_fixed(sweep, operation, r, item, &free);
       r = next;
     }
     if (sweep.stage == BodyStage::finish) {
@@ -339,10 +371,15 @@ struct SolveProgram {
       return;
     }
     if (sweep.stage == BodyStage::move) d.step.move(i, &body);
-    if (sweep.stage == BodyStage::accelerate) d.step.accelerate(i, &body, false);
-    d.cells[i].write_shift(body, &item->version);
-    d.cells[i].write_rotation(body, &item->version);
-    d.cells[i].write(item->after, body, item->version);
+    if (sweep.stage == BodyStage::accelerate) {
+      free.read(cells, item->version);
+      d.step.accelerate(i, &body, &free.motion, false);
+      free.is_changed = true;
+    }
+    cells.write_shift(body, &item->version);
+    cells.write_rotation(body, &item->version);
+    if (free.is_changed) cells.write_free(free.motion, &item->version);
+    cells.write(item->after, body, item->version);
   }
 
   JFPX_HD void complete_kinematic(const Sweep& sweep, std::uint32_t i) const {
@@ -377,13 +414,20 @@ struct SolveProgram {
   /// Solves a row of a movable body with a fixed one.
   template <class Operation>
   JFPX_HD void solve_fixed(const Sweep& sweep, const Operation& operation, std::uint32_t r,
-                           SolverBody* body) const {
+                           BodyItem* item, BodyFree* free) const {
+    SolverBody* body = &item->motion;
     if (r < sweep.first_manifold()) {
       soft_step::SphereRow row = data.sphere_rows[r];
-      const Real rebound = row.rebound;
+      const Real restitution = row.restitution;
       SolverBody fixed;  // not read: the body does not move
-      operation.template run<true>(&row, body, &fixed);
-      store<Operation>(sweep, row, rebound, r);
+      const Impact impact{data.step.bodies.last_acceleration, row.a};
+      operation.template run<true>(&row, body, &fixed, impact);
+      if (impact.is_pending) {
+        free->read(data.cells[item->index], item->version);
+        free->motion.add(impact.of_a.velocity, impact.of_a.angular_velocity);
+        free->is_changed = true;
+      }
+      store<Operation>(sweep, row, restitution, r);
       return;
     }
     soft_step::ManifoldRow row = data.manifold_rows[r - sweep.first_manifold()];
@@ -395,15 +439,15 @@ struct SolveProgram {
     store<Operation>(sweep, row, r);
   }
 
-  /// Writes what an operation has changed of a row. @param rebound before the operation
+  /// Writes what an operation has changed of a row. @param restitution before the operation
   template <class Operation>
-  JFPX_HD void store(const Sweep& sweep, const soft_step::SphereRow& row, Real rebound,
+  JFPX_HD void store(const Sweep& sweep, const soft_step::SphereRow& row, Real restitution,
                      std::uint32_t r) const {
     if constexpr (Operation::kChangesRow) {
       soft_step::SphereRow* to = &data.sphere_rows[r];
       to->friction_impulse = row.friction_impulse;
       to->normal_impulse = row.normal_impulse;
-      if (rebound != row.rebound) to->rebound = row.rebound;
+      if (restitution != row.restitution) to->restitution = row.restitution;
       if (sweep.stores_impulses) data.row_setup().store(row, data.row_contact[r]);
     }
   }

@@ -40,7 +40,7 @@ struct Counters {
   Capacity needed;
 
   std::uint32_t any_asleep = 0;     ///< 1: a movable body sleeps at the start of the step
-  std::uint32_t any_rebound = 0;    ///< 1: a row has a speed of separation
+  std::uint32_t any_rebound = 0;    ///< 1: a manifold has a speed of separation
   std::uint32_t any_rests = 0;      ///< 1: a body has been slow for long enough to sleep
   std::uint32_t runaway = kNone;    ///< index of the first body that is_in_world() refuses
   std::uint32_t uncolored[3] = {};  ///< number of contacts without a color, by round modulo 3
@@ -48,7 +48,8 @@ struct Counters {
 
   std::uint32_t candidates = 0, touches = 0;
   std::uint32_t spheres = 0, manifolds = 0, points = 0;  ///< sizes of the contact set
-  std::uint32_t touching_spheres = 0;  ///< contacts of two spheres with distance <= 0
+  std::uint32_t touching_spheres = 0;  ///< contacts of two spheres that touched during the step
+  std::uint32_t met_points = 0;        ///< points of manifolds: soft_step::has_met()
   std::uint32_t sphere_touches = 0;    ///< items of the list of touches of two spheres
   std::uint32_t awake = 0;             ///< movable bodies awake after the step
 };

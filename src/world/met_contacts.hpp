@@ -1,0 +1,55 @@
+/// Contacts that came about during a step, after contact detection.
+#pragma once
+
+#include "src/contact_solver/contact_set.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Whether a point that did not touch at the start of the step has pushed the bodies apart.
+/// @param point of the contact; that of two spheres has point 0 only
+JFPX_HD inline bool has_met(const ContactView& contacts, std::uint32_t contact,
+                            std::uint32_t point) {
+  return contacts.distance(contact, point) > 0 &&
+         contacts.impulses[contacts.first_impulse(contact) + point].has_pushed();
+}
+
+/// Number of points of a contact that have met, but for contacts of contact generators.
+JFPX_HD inline std::uint32_t count_met(const ContactView& contacts, std::uint32_t contact) {
+  if (contacts.key(contact).is_generated()) return 0;
+  std::uint32_t count = 0;
+  for (std::uint32_t p = 0; p < contacts.impulse_count(contact); ++p) {
+    if (has_met(contacts, contact, p)) ++count;
+  }
+  return count;
+}
+
+/// Calls add(key, whether both are spheres, normal, point of body b at the start of the step) for
+/// all points that have met, in the order of the contacts.
+/// @param position(body) [m], at the start of the step
+/// @param radius(body)   [m]
+template <class Position, class Radius, class Add>
+void for_each_met(const ContactView& contacts, const Position& position, const Radius& radius,
+                  const Add& add) {
+  for (std::uint32_t i = 0; i < contacts.size(); ++i) {
+    if (count_met(contacts, i) == 0) continue;
+    const ContactKey& key = contacts.key(i);
+    const Vec3& normal = contacts.normal(i);
+    if (contacts.is_sphere(i)) {
+      add(key, true, normal, position(key.b) + normal * radius(key.b));
+      continue;
+    }
+    const ManifoldInput& manifold = contacts.manifold(i);
+    for (std::uint32_t p = 0; p < manifold.count; ++p) {
+      if (!has_met(contacts, i, p)) continue;
+      add(key, false, normal, position(key.b) + contacts.points[manifold.first + p].arm_b);
+    }
+  }
+}
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx
