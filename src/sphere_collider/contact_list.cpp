@@ -25,6 +25,14 @@ void check_offsets(std::span<const std::uint64_t> offsets, std::size_t spheres) 
   }
 }
 
+template <class Item>
+std::vector<std::uint64_t> offsets_of(std::span<const Item> items, std::size_t rows) {
+  std::vector<std::uint64_t> offsets(rows + 1);
+  for (const Item& item : items) ++offsets[item.a + std::size_t{1}];
+  for (std::size_t i = 0; i < rows; ++i) offsets[i + 1] += offsets[i];
+  return offsets;
+}
+
 }  // namespace
 
 std::vector<SphereContact> find_contacts_between(SphereCollider& collider,
@@ -71,11 +79,20 @@ std::vector<SphereContact> in_both_orders(ContactSpan contacts, std::size_t sphe
       });
 }
 
+std::vector<SpherePair> in_both_orders(std::span<const SpherePair> pairs, std::size_t spheres) {
+  return detail::both_orders(
+      pairs, spheres, [](const SpherePair& p) { return p; },
+      [](const SpherePair& p) {
+        return SpherePair{p.b, p.a};
+      });
+}
+
 std::vector<std::uint64_t> row_offsets(ContactSpan contacts, std::size_t rows) {
-  std::vector<std::uint64_t> offsets(rows + 1);
-  for (const SphereContact& contact : contacts) ++offsets[contact.a + std::size_t{1}];
-  for (std::size_t i = 0; i < rows; ++i) offsets[i + 1] += offsets[i];
-  return offsets;
+  return offsets_of(contacts, rows);
+}
+
+std::vector<std::uint64_t> row_offsets(std::span<const SpherePair> pairs, std::size_t rows) {
+  return offsets_of(pairs, rows);
 }
 
 }  // namespace JFPX_ABI
