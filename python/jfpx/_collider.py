@@ -233,7 +233,7 @@ class SphereCollider:
         if not self._lock.acquire(blocking=False):
             raise ConcurrentUse("the collider is in use by another call; use one for each thread")
         try:
-            size = search.run(self._collider, bool(half))
+            size = search.run(self._collider, bool(half), contacts)
             if out is not None:
                 return self._write(size, out, contacts)
             if output == "coo":
@@ -349,9 +349,11 @@ class _Search:
     def largest(self) -> int:
         return max(self._positions.shape[0], self.rows())
 
-    def run(self, collider: Any, half: bool) -> int:
+    def run(self, collider: Any, half: bool, contacts: bool) -> int:
         if self.periodic:
             return collider.search_periodic(self._positions, self._radii, *self.periodic, half)
+        if self._query is None and self._batch is None and not contacts:
+            return collider.search_pairs(self._positions, self._radii, half)
         if self._query is None:
             return collider.search(self._positions, self._radii, self._batch, half)
         return collider.search_between(self._query, self._query_radii, self._positions, self._radii)
