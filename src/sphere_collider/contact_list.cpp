@@ -8,23 +8,6 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-void check_offsets(std::span<const std::uint64_t> offsets, std::size_t spheres) {
-  if (offsets.empty() || offsets.front() != 0) {
-    throw InvalidArgument("offsets must begin with 0");
-  }
-  for (std::size_t i = 1; i < offsets.size(); ++i) {
-    if (offsets[i] < offsets[i - 1]) {
-      throw InvalidArgument("offset " + std::to_string(i) + " is " + std::to_string(offsets[i]) +
-                            "; it must be at least the offset before, " +
-                            std::to_string(offsets[i - 1]));
-    }
-  }
-  if (offsets.back() != spheres) {
-    throw InvalidArgument("the last offset is " + std::to_string(offsets.back()) +
-                          "; it must be the number of spheres, " + std::to_string(spheres));
-  }
-}
-
 template <class Item>
 std::vector<std::uint64_t> offsets_of(std::span<const Item> items, std::size_t rows) {
   std::vector<std::uint64_t> offsets(rows + 1);
@@ -56,7 +39,7 @@ std::vector<SphereContact> find_contacts_between(SphereCollider& collider,
 std::vector<SphereContact> find_contacts_in_systems(SphereCollider& collider,
                                                     std::span<const SphereInstance> spheres,
                                                     std::span<const std::uint64_t> offsets) {
-  check_offsets(offsets, spheres.size());
+  detail::check_offsets(offsets, spheres.size());
   detail::check_spheres(spheres);  // here, so that messages count all spheres
   std::vector<SphereContact> result;
   for (std::size_t i = 1; i < offsets.size(); ++i) {
