@@ -23,8 +23,9 @@ constexpr std::size_t kWidest = 16;
 constexpr std::size_t kNarrowest = 4;
 /// A class is narrowed if the average number of other targets in the cell of a sphere exceeds this.
 constexpr double kDense = 8;
-/// Above this average number of other queries in the cell of a query, the search by cells is faster
-/// (bench/results/python.md).
+/// Above this average number of other queries in the cell of a query, the search by cells is used.
+/// A call takes 14 % less time with it if the number is 2.4, and nearly twice the time if it is
+/// 0.7.
 constexpr double kCrowded = 2;
 constexpr Real kOneBin =
     Real(1.5);  ///< no bins are made up to this ratio of largest to smallest radius
