@@ -79,9 +79,34 @@ void sort_row(const std::uint64_t* row, std::size_t count, SpherePair* sorted, S
 
 }  // namespace
 
+/// Writes make(pair) for pairs that are sorted across all chunks.
+template <class Item, class Make>
+std::span<const Item> ContactWriter::write_chunks(const PairChunks& chunks, ThreadPool& pool,
+                                                  Buffer<Item>* items, const Make& make) {
+  sections_.reserve(chunks.size(), "parts of pairs");
+  std::uint64_t total = 0;
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    sections_[i] = total;
+    total += chunks[i].size();
+  }
+  items->reserve(total, "contacts");
+  pool.run(chunks.size(), [&](std::size_t i) {
+    std::transform(chunks[i].begin(), chunks[i].end(), items->data() + sections_[i], make);
+  });
+  return {items->data(), total};
+}
+
 ContactSpan ContactWriter::write_contacts(std::span<const SphereInstance> spheres,
                                           const PairChunks& chunks, PairOrder order,
                                           ThreadPool& pool) {
+  const auto contact_of = [&](const SpherePair& p) {
+    const PairResult r = detail::test_sphere_pair(spheres[p.a], spheres[p.b]);
+    return SphereContact{p.a, p.b, r.normal, r.distance};
+  };
+  if (order == PairOrder::sorted) {
+    return write_chunks(chunks, pool, &contacts_,
+                        [&](std::uint64_t pair) { return contact_of(unpacked(pair)); });
+  }
   const std::span<const SpherePair> pairs = write_pairs(spheres.size(), chunks, order, pool);
   contacts_.reserve(pairs.size(), "contacts");
   constexpr std::size_t kPart = 8192;
@@ -89,9 +114,7 @@ ContactSpan ContactWriter::write_contacts(std::span<const SphereInstance> sphere
     const std::size_t end = std::min(pairs.size(), (part + 1) * kPart);
     for (std::size_t i = part * kPart; i < end; ++i) {
       if (i + kPairsAhead < end) __builtin_prefetch(&spheres[pairs[i + kPairsAhead].b]);
-      const auto [a, b] = pairs[i];
-      const PairResult r = detail::test_sphere_pair(spheres[a], spheres[b]);
-      contacts_[i] = {a, b, r.normal, r.distance};
+      contacts_[i] = contact_of(pairs[i]);
     }
   });
   return {contacts_.data(), pairs.size()};
@@ -100,26 +123,10 @@ ContactSpan ContactWriter::write_contacts(std::span<const SphereInstance> sphere
 std::span<const SpherePair> ContactWriter::write_pairs(std::size_t spheres,
                                                        const PairChunks& chunks, PairOrder order,
                                                        ThreadPool& pool) {
-  if (order == PairOrder::sorted) return write_chunks(chunks, pool);
+  if (order == PairOrder::sorted) return write_chunks(chunks, pool, &pairs_, unpacked);
   if (order == PairOrder::none) make_rows(chunks, spheres, pool);
   if (order == PairOrder::by_lower_sphere) index_rows(chunks, spheres, pool);
   return write_rows(spheres, pool);
-}
-
-/// Writes pairs that are sorted across all chunks.
-std::span<const SpherePair> ContactWriter::write_chunks(const PairChunks& chunks,
-                                                        ThreadPool& pool) {
-  sections_.reserve(chunks.size(), "parts of pairs");
-  std::uint64_t total = 0;
-  for (std::size_t i = 0; i < chunks.size(); ++i) {
-    sections_[i] = total;
-    total += chunks[i].size();
-  }
-  pairs_.reserve(total, "pairs");
-  pool.run(chunks.size(), [&](std::size_t i) {
-    std::transform(chunks[i].begin(), chunks[i].end(), pairs_.data() + sections_[i], unpacked);
-  });
-  return {pairs_.data(), total};
 }
 
 /// Writes the pairs of rows_.

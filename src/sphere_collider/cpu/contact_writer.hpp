@@ -27,7 +27,9 @@ class ContactWriter {
     std::uint64_t count = 0;
   };
 
-  std::span<const SpherePair> write_chunks(const PairChunks& chunks, ThreadPool& pool);
+  template <class Item, class Make>
+  std::span<const Item> write_chunks(const PairChunks& chunks, ThreadPool& pool,
+                                     Buffer<Item>* items, const Make& make);
   std::span<const SpherePair> write_rows(std::size_t spheres, ThreadPool& pool);
   static void prefetch(const Row& row);
   void index_rows(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool);

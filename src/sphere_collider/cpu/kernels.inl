@@ -133,10 +133,14 @@ template <class S>
     for (; at + 2 * kLanes <= count; at += 2 * kLanes) {
       const typename S::Vec first = squares(q, targets, at);
       const typename S::Vec second = squares(q, targets, at + kLanes);
-      if ((kept<S>(first, q, targets, at) | kept<S>(second, q, targets, at + kLanes)) == 0)
-        continue;
-      pairs.append<S>(q.id, targets.id + at, touching<S>(first, q, targets, at));
-      pairs.append<S>(q.id, targets.id + at + kLanes, touching<S>(second, q, targets, at + kLanes));
+      const std::uint32_t first_kept = kept<S>(first, q, targets, at);
+      const std::uint32_t second_kept = kept<S>(second, q, targets, at + kLanes);
+      if ((first_kept | second_kept) == 0) continue;
+      if (first_kept != 0)
+        pairs.append<S>(q.id, targets.id + at, touching<S>(first, q, targets, at));
+      if (second_kept != 0)
+        pairs.append<S>(q.id, targets.id + at + kLanes,
+                        touching<S>(second, q, targets, at + kLanes));
     }
     for (; at < count; at += kLanes) {
       const std::uint32_t left = count - at;
