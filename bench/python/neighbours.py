@@ -1,12 +1,17 @@
-"""Times of jfpx.find_pairs() against other libraries, as a table in Markdown. What is not installed is
-left out. All libraries search the same points, and their numbers of pairs are compared: libraries that
-round differently may differ by the pairs at the cutoff.
+"""Times of jfpx.find_pairs() against other libraries, and of a world against the command, as tables in
+Markdown. What is not installed is left out. All libraries search the same points, and their numbers of
+pairs are compared: libraries that round differently may differ by the pairs at the cutoff.
 
     python bench/python/neighbours.py [cpu] [cuda] [world]
 """
 
+import csv
+import os
+import shutil
 import statistics
+import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
@@ -136,15 +141,42 @@ def cuda():
           " us")
 
 
+def steps_of_python(spheres, steps):
+    """Times of the steps of a pile [ms], and the hash of its end."""
+    pile = jfpx.World(jfpx.Scene.named("pile", spheres=spheres), backend="cpu", threads=0)
+    times = []
+    for _ in range(steps):
+        begin = time.perf_counter()
+        pile.step()
+        times.append(1e3 * (time.perf_counter() - begin))
+    return times, f"{pile.state_hash():016x}"
+
+
+def steps_of_command(command, spheres, steps):
+    """The same of `jfpx run`."""
+    with tempfile.NamedTemporaryFile() as file:
+        out = subprocess.run(
+            [command, "run", "pile", "--backend", "cpu", "--spheres", str(spheres), "--steps",
+             str(steps), "--threads", "0", "--csv", file.name, "--hash", "--quiet"],
+            check=True, stdout=subprocess.PIPE, text=True).stdout
+        with open(file.name, newline="") as table:
+            return [float(row["total_ms"]) for row in csv.DictReader(table)], out.split()[-1]
+
+
 def world():
-    """Compare with `jfpx run pile --spheres 100000 --steps 100 --threads N --csv FILE`."""
-    world = jfpx.World(jfpx.Scene.named("pile", spheres=100_000), threads=0)
-    world.run(10)
-    begin = time.perf_counter()
-    world.run(100)
-    per_step = 10 * (time.perf_counter() - begin)
-    print(f"\nPile of 100,000, one thread per core: {per_step:.2f} ms a step, hash after 110 steps "
-          f"{world.state_hash():016x}")
+    """A pile from Python against the command, which is on PATH or named by JFPX_COMMAND."""
+    command = os.environ.get("JFPX_COMMAND") or shutil.which("jfpx")
+    if command is None:
+        print("the command jfpx is not on PATH")
+        return
+    print("\n## Pile of 100,000 on the CPU, one thread per core, ms a step\n\nMedian of steps 11 to "
+          "60; the two take turns.\n\n| run | Python | command | ratio | equal hashes |\n"
+          "|---|---|---|---|---|")
+    for run in range(1, 4):
+        own, own_hash = steps_of_python(100_000, 60)
+        other, other_hash = steps_of_command(command, 100_000, 60)
+        own, other = statistics.median(own[10:]), statistics.median(other[10:])
+        row(run, own, other, own / other, own_hash == other_hash)
 
 
 if __name__ == "__main__":

@@ -35,12 +35,19 @@ JFPX_API std::vector<SphereContact> find_contacts_in_systems(
 /// @throws std::bad_alloc
 JFPX_API std::vector<SphereContact> in_both_orders(ContactSpan contacts, std::size_t spheres);
 
+/// The same for pairs.
+JFPX_API std::vector<SpherePair> in_both_orders(std::span<const SpherePair> pairs,
+                                                std::size_t spheres);
+
 /// Offsets of compressed rows (CSR): the contacts of sphere i as `a` are those from offsets[i] to
 /// offsets[i + 1] - 1.
 /// @param contacts sorted by a
 /// @param rows number of rows, greater than every index a
 /// @throws std::bad_alloc
 JFPX_API std::vector<std::uint64_t> row_offsets(ContactSpan contacts, std::size_t rows);
+/// The same for pairs.
+JFPX_API std::vector<std::uint64_t> row_offsets(std::span<const SpherePair> pairs,
+                                                std::size_t rows);
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

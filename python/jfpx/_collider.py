@@ -233,7 +233,7 @@ class SphereCollider:
         if not self._lock.acquire(blocking=False):
             raise ConcurrentUse("the collider is in use by another call; use one for each thread")
         try:
-            size = search.run(self._collider, bool(half))
+            size = search.run(self._collider, bool(half), contacts)
             if out is not None:
                 return self._write(size, out, contacts)
             if output == "coo":
@@ -264,6 +264,8 @@ class SphereCollider:
             raise InvalidArgument(f"positions are on cuda:{search.device}, and backend is cpu")
         if count is not None and out is None:
             raise InvalidArgument("count requires out")
+        if count is not None and search.waits():
+            raise InvalidArgument("count excludes query and batch")
         if not self._lock.acquire(blocking=False):
             raise ConcurrentUse("the collider is in use by another call; use one for each thread")
         try:
@@ -349,9 +351,11 @@ class _Search:
     def largest(self) -> int:
         return max(self._positions.shape[0], self.rows())
 
-    def run(self, collider: Any, half: bool) -> int:
+    def run(self, collider: Any, half: bool, contacts: bool) -> int:
         if self.periodic:
             return collider.search_periodic(self._positions, self._radii, *self.periodic, half)
+        if self._query is None and self._batch is None and not contacts:
+            return collider.search_pairs(self._positions, self._radii, half)
         if self._query is None:
             return collider.search(self._positions, self._radii, self._batch, half)
         return collider.search_between(self._query, self._query_radii, self._positions, self._radii)
@@ -376,8 +380,6 @@ def _device_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: A
                    query_radii: Any, batch: Any, periodic: Any,
                    device: Any) -> _device.DeviceSearch:
     """The same on a device, for find_contacts(), too, without cutoff."""
-    if batch is not None:
-        raise InvalidArgument("batch requires positions in host memory")
     if periodic is not None:
         raise InvalidArgument("periodic requires positions in host memory")
     _check_radii(cutoff, radii, query, query_radii)
@@ -387,6 +389,8 @@ def _device_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: A
     search.set_radii(radii)
     if query is not None:
         search.set_query(query, query_radii)
+    if batch is not None:
+        search.set_batch(batch)
     return search
 
 
@@ -488,7 +492,8 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
         [m], finite and > 0.
     batch : array of integers, optional
         Offsets of independent systems, from 0 to N: system i has the spheres batch[i] to
-        batch[i + 1] - 1. Spheres of different systems do not touch. In host memory only.
+        batch[i + 1] - 1. Spheres of different systems do not touch. On a device, all pairs of each
+        system are tested.
     periodic : three lengths, optional
         [m], of an orthogonal cell that repeats; None along an axis that does not. Each length is
         at least twice the largest sum of two radii. The nearest image of a sphere counts, and its

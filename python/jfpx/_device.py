@@ -46,6 +46,10 @@ class _Torch:
         return View(array.data_ptr(), tuple(array.shape), array.stride(),
                     str(array.dtype).removeprefix("torch."), array.device.index)
 
+    @staticmethod
+    def to_host(array: Any) -> Any:
+        return array.cpu()
+
     def empty(self, shape: tuple[int, ...], dtype: str) -> Any:
         return self._torch.empty(shape, dtype=getattr(self._torch, dtype), device=self._device)
 
@@ -63,6 +67,10 @@ class _Cupy:
         size = array.itemsize
         return View(array.data.ptr, array.shape, tuple(stride // size for stride in array.strides),
                     array.dtype.name, array.device.id)
+
+    @staticmethod
+    def to_host(array: Any) -> Any:
+        return array.get()
 
     def empty(self, shape: tuple[int, ...], dtype: str) -> Any:
         with self._device:
@@ -118,6 +126,7 @@ class DeviceSearch:
         if device is not None and str(device) not in ("cuda", f"cuda:{self.device}"):
             raise InvalidArgument(f"positions are on cuda:{self.device}, and device is {device!r}")
         self._query: Any = None
+        self._batch: Any = None
 
     def _rows(self, view: View, name: str) -> View:
         if len(view.shape) != 2 or view.shape[1] != 3:
@@ -158,13 +167,29 @@ class DeviceSearch:
         rows = self._rows(self._view(query, "query"), "query")
         self._query = self._arrays(rows, radii, "query_radii")
 
+    def set_batch(self, batch: Any) -> None:
+        """Offsets of systems, which are copied to the host if they are on the device."""
+        if self._query is not None:
+            raise InvalidArgument("query and batch exclude each other")
+        if is_on_device(batch):
+            batch = _adapted(batch, "batch")
+            batch = _LIBRARIES[_library(batch)].to_host(batch)
+        self._batch = _arrays.offsets(batch, "batch")
+
     def rows(self) -> int:
         return (self._query or self._spheres)[1]
+
+    def waits(self) -> bool:
+        """Whether the search is one that cannot be enqueued without a wait."""
+        return self._query is not None or self._batch is not None
 
     def run(self, core: Any, contacts: bool, half: bool) -> int:
         """Waits for the number of contacts, and returns it."""
         if self._query is not None:
             return core.find_between(self._query, self._spheres, contacts, self.library.stream)
+        if self._batch is not None:
+            return core.find_in_systems(self._spheres, self._batch, contacts, not half,
+                                        self.library.stream)
         return core.find(self._spheres, contacts, not half, self.library.stream)
 
     def enqueue(self, core: Any, contacts: bool) -> None:

@@ -24,12 +24,21 @@ class Collider {
   Collider(const std::string& backend, const std::string& algorithm, unsigned threads, int device)
       : collider_(make_sphere_collider(collider_options(backend, algorithm, threads, device))) {}
 
+  /// Pairs of spheres that touch, without contacts.
+  std::size_t search_pairs(const Spheres& spheres, bool half) {
+    start(spheres);
+    pairs_ = collider_->find_pairs(spheres_);
+    if (!half) {
+      pair_list_ = in_both_orders(pairs_, rows_);
+      pairs_ = pair_list_;
+    }
+    return pairs_.size();
+  }
+
   /// Contacts among spheres; within each system if there are offsets.
   std::size_t search(const Spheres& spheres,
                      const std::optional<Vector<const std::uint64_t>>& batch, bool half) {
-    found_ = {};
-    pack(spheres, &spheres_);
-    rows_ = spheres_.size();
+    start(spheres);
     if (batch) {
       list_ = find_contacts_in_systems(*collider_, spheres_, {batch->data(), batch->size()});
       found_ = list_;
@@ -45,10 +54,8 @@ class Collider {
 
   /// Contacts of a sphere of `first` with one of `second`.
   std::size_t search_between(const Spheres& first, const Spheres& second) {
-    found_ = {};
-    pack(first, &spheres_);
+    start(first);
     pack(second, &others_);
-    rows_ = spheres_.size();
     list_ = find_contacts_between(*collider_, spheres_, others_);
     found_ = list_;
     return found_.size();
@@ -56,9 +63,7 @@ class Collider {
 
   /// Contacts in a periodic cell.
   std::size_t search_periodic(const Spheres& spheres, const PeriodicCell& cell, bool half) {
-    found_ = {};
-    pack(spheres, &spheres_);
-    rows_ = spheres_.size();
+    start(spheres);
     std::vector<PeriodicContact> contacts = find_periodic_contacts(*collider_, spheres_, cell);
     if (!half) contacts = in_both_orders(contacts, rows_);
     list_.clear();
@@ -75,16 +80,20 @@ class Collider {
   /// number of contacts.
   template <class Index>
   void write_pairs(const Rows<Index>& pairs) {
-    for (std::size_t i = 0; i < found_.size(); ++i) {
-      pairs(0, i) = static_cast<Index>(found_[i].a);
-      pairs(1, i) = static_cast<Index>(found_[i].b);
-    }
+    visit([&](const auto& found) {
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        pairs(0, i) = static_cast<Index>(found[i].a);
+        pairs(1, i) = static_cast<Index>(found[i].b);
+      }
+    });
   }
   template <class Index>
   void write_rows(const Vector<std::int64_t>& offsets, const Vector<Index>& columns) {
-    const std::vector<std::uint64_t> begins = row_offsets(found_, rows_);
-    for (std::size_t i = 0; i <= rows_; ++i) offsets(i) = static_cast<std::int64_t>(begins[i]);
-    for (std::size_t i = 0; i < found_.size(); ++i) columns(i) = static_cast<Index>(found_[i].b);
+    visit([&](const auto& found) {
+      const std::vector<std::uint64_t> begins = row_offsets(found, rows_);
+      for (std::size_t i = 0; i <= rows_; ++i) offsets(i) = static_cast<std::int64_t>(begins[i]);
+      for (std::size_t i = 0; i < found.size(); ++i) columns(i) = static_cast<Index>(found[i].b);
+    });
   }
   void write_contacts(const Rows<Real>& normals, const Vector<Real>& distances) {
     for (std::size_t i = 0; i < found_.size(); ++i) {
@@ -105,6 +114,22 @@ class Collider {
   std::string_view reason() const { return to_string(collider_->reason()); }
 
  private:
+  /// Begins a search among `spheres`, or between them and others.
+  void start(const Spheres& spheres) {
+    found_ = {};
+    pairs_ = {};
+    pack(spheres, &spheres_);
+    rows_ = spheres_.size();
+  }
+  /// Calls `write` with the result of the last search: contacts, or pairs alone.
+  template <class Write>
+  void visit(const Write& write) const {
+    if (pairs_.empty()) {
+      write(found_);
+    } else {
+      write(pairs_);
+    }
+  }
   /// Copies arrays of any strides.
   static void pack(const Spheres& from, std::vector<SphereInstance>* to) {
     const std::size_t n = from.positions.shape(0);
@@ -119,7 +144,9 @@ class Collider {
   std::vector<SphereInstance> spheres_, others_;
   std::vector<SphereContact> list_;
   std::vector<ImageShift> shifts_;
+  std::vector<SpherePair> pair_list_;
   ContactSpan found_;
+  std::span<const SpherePair> pairs_;
   std::size_t rows_ = 0;
 };
 
@@ -150,6 +177,13 @@ void bind_collider(nb::module_& module) {
   nb::class_<Collider>(module, "Collider")
       .def(nb::init<const std::string&, const std::string&, unsigned, int>(), nb::arg("backend"),
            nb::arg("algorithm"), nb::arg("threads"), nb::arg("device"))
+      .def(
+          "search_pairs",
+          [](Collider& self, const Rows<const Real>& positions, const Vector<const Real>& radii,
+             bool half) {
+            return self.search_pairs({positions, radii}, half);
+          },
+          nb::arg("positions"), nb::arg("radii"), nb::arg("half"), Release())
       .def(
           "search",
           [](Collider& self, const Rows<const Real>& positions, const Vector<const Real>& radii,

@@ -56,6 +56,15 @@ void bind_device_collider(nb::module_& module) {
                                      to_stream(stream));
           },
           Release())
+      .def(
+          "find_in_systems",
+          [](ArrayCollider& self, const ArraysTuple& spheres,
+             const Vector<const std::uint64_t>& offsets, bool contacts, bool both_orders,
+             Address stream) {
+            return self.find_in_systems(to_arrays(spheres), {offsets.data(), offsets.size()},
+                                        to_result(contacts), both_orders, to_stream(stream));
+          },
+          Release())
       .def("enqueue",
            [](ArrayCollider& self, const ArraysTuple& spheres, bool contacts, Address stream) {
              self.enqueue(to_arrays(spheres), to_result(contacts), to_stream(stream));

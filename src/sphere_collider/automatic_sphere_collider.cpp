@@ -150,8 +150,11 @@ auto AutomaticSphereCollider::compute(Calls& calls, const ColliderWork& expected
   }
 }
 
-ContactSpan AutomaticSphereCollider::find_contacts(std::span<const SphereInstance> spheres) {
-  if (reuse_decision(search_, spheres.size(), 0)) return search_.by->find_contacts(spheres);
+template <class Item>
+std::span<const Item> AutomaticSphereCollider::search(
+    std::span<const SphereInstance> spheres,
+    std::span<const Item> (SphereCollider::*find)(std::span<const SphereInstance>)) {
+  if (reuse_decision(search_, spheres.size(), 0)) return (search_.by->*find)(spheres);
   const auto n = static_cast<double>(spheres.size());
   const auto work = [&](double contacts) {
     return ColliderWork{.spheres = n,
@@ -161,17 +164,25 @@ ContactSpan AutomaticSphereCollider::find_contacts(std::span<const SphereInstanc
   };
   return compute(
       search_, work(n * contacts_per_sphere_),
-      [&](SphereCollider& collider) { return collider.find_contacts(spheres); },
-      [&](ContactSpan found) {
+      [&](SphereCollider& collider) { return (collider.*find)(spheres); },
+      [&](std::span<const Item> found) {
         const auto contacts = static_cast<double>(found.size());
         contacts_per_sphere_ = contacts / std::max(n, 1.0);
         return work(contacts);
       },
       [&] {
-        return [kept = std::vector(spheres.begin(), spheres.end())](SphereCollider& collider) {
-          collider.find_contacts(kept);
-        };
+        return [find, kept = std::vector(spheres.begin(), spheres.end())](
+                   SphereCollider& collider) { (collider.*find)(kept); };
       });
+}
+
+ContactSpan AutomaticSphereCollider::find_contacts(std::span<const SphereInstance> spheres) {
+  return search(spheres, &SphereCollider::find_contacts);
+}
+
+std::span<const SpherePair> AutomaticSphereCollider::find_pairs(
+    std::span<const SphereInstance> spheres) {
+  return search(spheres, &SphereCollider::find_pairs);
 }
 
 std::span<const PairContact> AutomaticSphereCollider::find_touching(

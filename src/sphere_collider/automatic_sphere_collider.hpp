@@ -33,6 +33,7 @@ class AutomaticSphereCollider final : public SphereCollider {
                           bool with_cuda);
 
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override;
+  std::span<const SpherePair> find_pairs(std::span<const SphereInstance> spheres) override;
   std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
                                              std::span<const SpherePair> pairs) override;
   TransferredBytes transferred() const noexcept override { return transferred_; }
@@ -66,6 +67,10 @@ class AutomaticSphereCollider final : public SphereCollider {
 
   static std::vector<Way> ways_to_search(const SphereColliderOptions& options, bool with_cuda);
   static std::vector<Way> ways_to_test(const SphereColliderOptions& options, bool with_cuda);
+  template <class Item>
+  std::span<const Item> search(
+      std::span<const SphereInstance> spheres,
+      std::span<const Item> (SphereCollider::*find)(std::span<const SphereInstance>));
   template <class Call, class Measure, class KeepInput>
   auto compute(Calls& calls, const ColliderWork& expected, const Call& call, const Measure& measure,
                const KeepInput& keep_input);

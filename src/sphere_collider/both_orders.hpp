@@ -14,7 +14,7 @@ namespace detail {
 /// Sorted list of `items` and their opposites, in linear time.
 /// @param items sorted by (a, b), a < b
 /// @param spheres number of spheres, greater than every index
-/// @param contact_of function from an item to its SphereContact
+/// @param contact_of function from an item to its SphereContact or SpherePair
 /// @param opposite function from an item to the item with exchanged spheres
 template <class Item, class ContactOf, class Opposite>
 std::vector<Item> both_orders(std::span<const Item> items, std::size_t spheres,

@@ -8,21 +8,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-void check_offsets(std::span<const std::uint64_t> offsets, std::size_t spheres) {
-  if (offsets.empty() || offsets.front() != 0) {
-    throw InvalidArgument("offsets must begin with 0");
-  }
-  for (std::size_t i = 1; i < offsets.size(); ++i) {
-    if (offsets[i] < offsets[i - 1]) {
-      throw InvalidArgument("offset " + std::to_string(i) + " is " + std::to_string(offsets[i]) +
-                            "; it must be at least the offset before, " +
-                            std::to_string(offsets[i - 1]));
-    }
-  }
-  if (offsets.back() != spheres) {
-    throw InvalidArgument("the last offset is " + std::to_string(offsets.back()) +
-                          "; it must be the number of spheres, " + std::to_string(spheres));
-  }
+template <class Item>
+std::vector<std::uint64_t> offsets_of(std::span<const Item> items, std::size_t rows) {
+  std::vector<std::uint64_t> offsets(rows + 1);
+  for (const Item& item : items) ++offsets[item.a + std::size_t{1}];
+  for (std::size_t i = 0; i < rows; ++i) offsets[i + 1] += offsets[i];
+  return offsets;
 }
 
 }  // namespace
@@ -48,7 +39,7 @@ std::vector<SphereContact> find_contacts_between(SphereCollider& collider,
 std::vector<SphereContact> find_contacts_in_systems(SphereCollider& collider,
                                                     std::span<const SphereInstance> spheres,
                                                     std::span<const std::uint64_t> offsets) {
-  check_offsets(offsets, spheres.size());
+  detail::check_offsets(offsets, spheres.size());
   detail::check_spheres(spheres);  // here, so that messages count all spheres
   std::vector<SphereContact> result;
   for (std::size_t i = 1; i < offsets.size(); ++i) {
@@ -71,11 +62,20 @@ std::vector<SphereContact> in_both_orders(ContactSpan contacts, std::size_t sphe
       });
 }
 
+std::vector<SpherePair> in_both_orders(std::span<const SpherePair> pairs, std::size_t spheres) {
+  return detail::both_orders(
+      pairs, spheres, [](const SpherePair& p) { return p; },
+      [](const SpherePair& p) {
+        return SpherePair{p.b, p.a};
+      });
+}
+
 std::vector<std::uint64_t> row_offsets(ContactSpan contacts, std::size_t rows) {
-  std::vector<std::uint64_t> offsets(rows + 1);
-  for (const SphereContact& contact : contacts) ++offsets[contact.a + std::size_t{1}];
-  for (std::size_t i = 0; i < rows; ++i) offsets[i + 1] += offsets[i];
-  return offsets;
+  return offsets_of(contacts, rows);
+}
+
+std::vector<std::uint64_t> row_offsets(std::span<const SpherePair> pairs, std::size_t rows) {
+  return offsets_of(pairs, rows);
 }
 
 }  // namespace JFPX_ABI

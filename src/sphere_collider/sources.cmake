@@ -25,7 +25,8 @@ list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/pair_list.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/pair_list_search.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/scan.cu
-  ${CMAKE_CURRENT_LIST_DIR}/cuda/sphere_collider_cuda.cpp)
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/sphere_collider_cuda.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/systems.cu)
 # These sources alone use instruction sets that the baseline does not include; base/cpu.hpp selects among
 # them at run time. cpu/kernels.hpp explains why they must not share inline functions with other sources.
 set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp

@@ -2,10 +2,13 @@
 #include <jfpx/error.hpp>
 #include <jfpx/sphere_collider.hpp>
 
+#include "src/base/reserve.hpp"
 #include "src/base/thread_pool.hpp"
 #include "src/sphere_collider/automatic_sphere_collider.hpp"
 #include "src/sphere_collider/backend_table.hpp"
 #include "src/sphere_collider/cost_model.hpp"
+
+#include <algorithm>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -23,6 +26,15 @@ std::unique_ptr<SphereCollider> make_named(const SphereColliderOptions& options,
 }  // namespace
 
 SphereCollider::~SphereCollider() = default;
+
+std::span<const SpherePair> SphereCollider::find_pairs(std::span<const SphereInstance> spheres) {
+  const ContactSpan contacts = find_contacts(spheres);
+  resize_geometric(&pairs_of_contacts_, contacts.size());
+  std::ranges::transform(contacts, pairs_of_contacts_.begin(), [](const SphereContact& c) {
+    return SpherePair{c.a, c.b};
+  });
+  return pairs_of_contacts_;
+}
 
 std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options) {
   return make_sphere_collider(options, nullptr);

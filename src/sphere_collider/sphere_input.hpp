@@ -5,6 +5,7 @@
 #include <jfpx/error.hpp>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <limits>
 #include <span>
@@ -78,6 +79,24 @@ inline void check_count(std::span<const SpherePair> pairs) {
   if (pairs.size() > kMax) {
     throw InvalidArgument("number of pairs is " + std::to_string(pairs.size()) +
                           "; it must be at most " + std::to_string(kMax));
+  }
+}
+
+/// @throws InvalidArgument unless the offsets of systems ascend from 0 to the number of spheres.
+inline void check_offsets(std::span<const std::uint64_t> offsets, std::size_t spheres) {
+  if (offsets.empty() || offsets.front() != 0) {
+    throw InvalidArgument("offsets must begin with 0");
+  }
+  for (std::size_t i = 1; i < offsets.size(); ++i) {
+    if (offsets[i] < offsets[i - 1]) {
+      throw InvalidArgument("offset " + std::to_string(i) + " is " + std::to_string(offsets[i]) +
+                            "; it must be at least the offset before, " +
+                            std::to_string(offsets[i - 1]));
+    }
+  }
+  if (offsets.back() != spheres) {
+    throw InvalidArgument("the last offset is " + std::to_string(offsets.back()) +
+                          "; it must be the number of spheres, " + std::to_string(spheres));
   }
 }
 

@@ -32,22 +32,19 @@ constexpr const char* kOnlyInWorld = "in the world and not in the snapshot";
 constexpr const char* kUserDefinedForce = "user-defined force";
 constexpr const char* kGenerator = "contact generator";
 
+/// Assigns the force of force.hpp that the function holds, if it holds one.
+template <class... Forces>
+void assign_target(const ForceRegistry::Function& function,
+                   std::variant<std::monostate, Forces...>* value) {
+  ((function.target<Forces>() != nullptr ? void(*value = *function.target<Forces>()) : void()),
+   ...);
+}
+
 }  // namespace
 
-/// The value of a force of force.hpp; `Value` is a variant of all of them.
 ForceRestorer::Value ForceRestorer::value_of(const ForceRegistry::Function& force) {
   Value value;
-  const auto look_for = [&](auto kind) {
-    if (const auto* found = force.target<decltype(kind)>()) value = *found;
-  };
-  look_for(Gravity());
-  look_for(Drag());
-  look_for(Spring());
-  look_for(Bungee());
-  look_for(Aero());
-  look_for(AeroControl());
-  look_for(Buoyancy());
-  look_for(Explosion());
+  assign_target(force, &value);
   return value;
 }
 

@@ -3,11 +3,13 @@
 
 #include <jfpx/contact_generator.hpp>
 #include <jfpx/force.hpp>
+#include <jfpx/recorded_world.hpp>
 
 #include "src/base/binary_archive.hpp"
 #include "src/world/callback_registry.hpp"
 
 #include <memory>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -32,9 +34,10 @@ class ForceRestorer {
   void commit(ForceRegistry* forces) noexcept;
 
  private:
+  template <class... Forces>
+  static std::variant<std::monostate, Forces...> with_none(const std::variant<Forces...>&);
   /// A force of force.hpp; std::monostate for a user-defined one.
-  using Value = std::variant<std::monostate, Gravity, Drag, Spring, Bungee, Aero, AeroControl,
-                             Buoyancy, Explosion>;
+  using Value = decltype(with_none(std::declval<RecordableForce>()));
   static Value value_of(const ForceRegistry::Function& force);
   friend void write_forces(BinaryWriter* writer, const ForceRegistry& forces);
 

@@ -1,6 +1,7 @@
 /// Construction of the tree of the queries: bounds, order and blocks.
 #include "src/world/query_tree.hpp"
 
+#include "src/base/spatial_order.hpp"
 #include "src/world/posed_sub_shapes.hpp"
 
 #include <numeric>
@@ -40,72 +41,8 @@ Aabb bounds_of(const BodyStore& bodies, std::uint32_t body) {
   return bounds;
 }
 
-/// Sorted quantity of a sample of the items.
-template <class Items, class Quantity>
-struct Sample {
-  Sample(const Items& items, const Quantity& quantity)
-      : size(std::min(items.size(), values.size())) {
-    for (std::size_t i = 0; i < size; ++i) {
-      values[i] = quantity(items[items.size() * i / size].bounds);
-    }
-    std::sort(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(size));
-  }
-  Real quantile(std::size_t sixteenths) const { return values[(size - 1) * sixteenths / 16]; }
-
-  std::array<Real, 64> values{};
-  std::size_t size;
-};
-
-Real size_of(const Aabb& bounds) {
-  const Vec3 size = bounds.upper - bounds.lower;
-  return std::max({size.x, size.y, size.z});
-}
-
-/// The lowest ten bits, spread to every third bit.
-std::uint32_t spread(std::uint32_t bits) {
-  bits = (bits | bits << 16) & 0x030000ffu;
-  bits = (bits | bits << 8) & 0x0300f00fu;
-  bits = (bits | bits << 4) & 0x030c30c3u;
-  return (bits | bits << 2) & 0x09249249u;
-}
-
-/// Order of the bodies in the tree: by size class, then along a Morton curve. A large body among
-/// small ones would enlarge their blocks, so the bodies above a multiple of the median size have
-/// blocks of their own. The curve fills a grid of 1024^3 cells around the middle seven eighths of
-/// the bodies; the others are in the outermost cells, so that a body that has left the scene does
-/// not make the cells too large.
-class Order {
- public:
-  template <class Items>
-  explicit Order(const Items& items) {
-    const Real typical = Sample(items, size_of).quantile(8);
-    limit_ = Vec3{4, 16, 64} * typical;
-    for (int i = 0; i < 3; ++i) {
-      const Sample centres(items, [i](const Aabb& b) { return b.lower[i] + b.upper[i]; });
-      const Real low = centres.quantile(1), high = centres.quantile(15);
-      const Real margin = (high - low) / 4;
-      begin_[i] = low - margin;
-      scale_[i] = high > low ? 1024 / (high - low + 2 * margin) : Real(0);
-    }
-  }
-
-  std::uint32_t operator()(const Aabb& bounds) const {
-    const Real size = size_of(bounds);
-    std::uint32_t code = 0;
-    for (int i = 0; i < 3; ++i) code += size > limit_[i] ? 1u << 30 : 0u;
-    for (int i = 0; i < 3; ++i) {
-      const Real cell = (bounds.lower[i] + bounds.upper[i] - begin_[i]) * scale_[i];
-      // Also correct for infinity and NaN, which an overflow of scale_ may cause.
-      const Real inside = !(cell > 0) ? Real(0) : !(cell < 1023) ? Real(1023) : cell;
-      code += spread(static_cast<std::uint32_t>(inside)) << i;
-    }
-    return code;
-  }
-
- private:
-  Vec3 limit_;          ///< [m], of the size classes
-  Vec3 begin_, scale_;  ///< of the sum of lower and upper bound
-};
+/// Boxes from which the order of the tree is derived.
+constexpr std::size_t kSample = 64;
 
 }  // namespace
 
@@ -128,7 +65,7 @@ void QueryTree::sort() {
   keys_.resize(items_.size());
   spare_keys_.resize(items_.size());
   if (items_.empty()) return;
-  const Order order(items_);
+  const SpatialOrder order(items_.size(), kSample, [&](std::size_t i) { return items_[i].bounds; });
   for (std::uint32_t i = 0; i < items_.size(); ++i) keys_[i] = {order(items_[i].bounds), i};
   // A stable radix sort by digits of eight bits.
   constexpr unsigned kDigits = 4;

@@ -2,6 +2,7 @@
 #include "src/world/recorded_calls.hpp"
 
 #include "src/scene/scene_json.hpp"
+#include "src/world/force_fields.hpp"
 
 #include <algorithm>
 #include <array>
@@ -17,75 +18,18 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& what) { throw InvalidScene(what); }
 
-template <class T, class U>
-concept Is = std::same_as<std::remove_const_t<T>, U>;
-template <class T>
-concept Elastic = Is<T, Spring> || Is<T, Bungee>;
-
-// Each calls visit(name, member) for each field.
-void each_field(Is<Attachment> auto& attachment, const auto& visit) {
-  visit("body", attachment.body);
-  visit("point", attachment.point);
-}
-void each_field(Is<HalfSpace> auto& half_space, const auto& visit) {
-  visit("normal", half_space.normal);
-  visit("offset", half_space.offset);
-}
+// Further types: each calls visit(name, member) for each field.
 void each_field(Is<BodyState> auto& state, const auto& visit) {
-  visit("position", state.position);
-  visit("orientation", state.orientation);
-  visit("velocity", state.velocity);
-  visit("angular_velocity", state.angular_velocity);
+  auto& [position, orientation, velocity, angular_velocity] = state;
+  visit("position", position);
+  visit("orientation", orientation);
+  visit("velocity", velocity);
+  visit("angular_velocity", angular_velocity);
 }
 void each_field(Is<CollisionFilter> auto& filter, const auto& visit) {
-  visit("category", filter.category);
-  visit("mask", filter.mask);
-}
-void each_field(Is<Gravity> auto& force, const auto& visit) {
-  visit("acceleration", force.acceleration);
-  visit("body", force.body);
-}
-void each_field(Is<Drag> auto& force, const auto& visit) {
-  visit("linear", force.linear);
-  visit("quadratic", force.quadratic);
-  visit("wind", force.wind);
-  visit("body", force.body);
-}
-void each_field(Elastic auto& force, const auto& visit) {
-  visit("a", force.a);
-  visit("b", force.b);
-  visit("stiffness", force.stiffness);
-  visit("damping", force.damping);
-  visit("rest_length", force.rest_length);
-}
-void each_field(Is<Aero> auto& force, const auto& visit) {
-  visit("body", force.body);
-  visit("tensor", force.tensor);
-  visit("point", force.point);
-  visit("wind", force.wind);
-}
-void each_field(Is<AeroControl> auto& force, const auto& visit) {
-  visit("body", force.body);
-  visit("lowest", force.lowest);
-  visit("base", force.base);
-  visit("highest", force.highest);
-  visit("point", force.point);
-  visit("wind", force.wind);
-  visit("control", force.control);
-}
-void each_field(Is<Buoyancy> auto& force, const auto& visit) {
-  visit("liquid", force.liquid);
-  visit("density", force.density);
-  visit("gravity", force.gravity);
-  visit("body", force.body);
-}
-void each_field(Is<Explosion> auto& force, const auto& visit) {
-  visit("centre", force.centre);
-  visit("start", force.start);
-  visit("peak_force", force.peak_force);
-  visit("speed", force.speed);
-  visit("thickness", force.thickness);
-  visit("duration", force.duration);
+  auto& [category, mask] = filter;
+  visit("category", category);
+  visit("mask", mask);
 }
 
 /// Names of the forces, in the order of RecordableForce.

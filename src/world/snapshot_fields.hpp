@@ -7,6 +7,7 @@
 #include <jfpx/world.hpp>
 
 #include "src/base/binary_archive.hpp"
+#include "src/world/force_fields.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -22,10 +23,6 @@ void serialize(auto& archive, Is<Sphere> auto& sphere) {
 void serialize(auto& archive, Is<Box> auto& box) {
   auto& [half_extents] = box;
   archive(half_extents);
-}
-void serialize(auto& archive, Is<HalfSpace> auto& half_space) {
-  auto& [normal, offset] = half_space;
-  archive(normal, offset);
 }
 void serialize(auto& archive, Is<Plane> auto& plane) {
   auto& [normal, offset] = plane;
@@ -90,41 +87,13 @@ void serialize(auto& archive, Is<ContactGeneratorId> auto& id) {
   auto& [number] = id;
   archive(number);
 }
-void serialize(auto& archive, Is<Attachment> auto& attachment) {
-  auto& [body, point] = attachment;
-  archive(body, point);
+/// Forces, and what they consist of.
+template <class T>
+requires requires(T& value) {
+  each_field(value, [](const char*, auto&) {});
 }
-void serialize(auto& archive, Is<Gravity> auto& gravity) {
-  auto& [acceleration, body] = gravity;
-  archive(acceleration, body);
-}
-void serialize(auto& archive, Is<Drag> auto& drag) {
-  auto& [linear, quadratic, wind, body] = drag;
-  archive(linear, quadratic, wind, body);
-}
-void serialize(auto& archive, Is<Spring> auto& spring) {
-  auto& [a, b, stiffness, damping, rest_length] = spring;
-  archive(a, b, stiffness, damping, rest_length);
-}
-void serialize(auto& archive, Is<Bungee> auto& bungee) {
-  auto& [a, b, stiffness, damping, rest_length] = bungee;
-  archive(a, b, stiffness, damping, rest_length);
-}
-void serialize(auto& archive, Is<Aero> auto& aero) {
-  auto& [body, tensor, point, wind] = aero;
-  archive(body, tensor, point, wind);
-}
-void serialize(auto& archive, Is<AeroControl> auto& aero) {
-  auto& [body, lowest, base, highest, point, wind, control] = aero;
-  archive(body, lowest, base, highest, point, wind, control);
-}
-void serialize(auto& archive, Is<Buoyancy> auto& buoyancy) {
-  auto& [liquid, density, gravity, body] = buoyancy;
-  archive(liquid, density, gravity, body);
-}
-void serialize(auto& archive, Is<Explosion> auto& explosion) {
-  auto& [centre, start, peak_force, speed, thickness, duration] = explosion;
-  archive(centre, start, peak_force, speed, thickness, duration);
+void serialize(auto& archive, T& value) {
+  each_field(value, [&](const char*, auto& field) { archive(field); });
 }
 
 }  // namespace JFPX_ABI

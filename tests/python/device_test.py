@@ -106,6 +106,19 @@ def test_a_query_on_the_device_has_the_bits_of_the_host(library, rng, dtype):
                 [jfpx.find_pairs(positions, 0.5, query=query)])
 
 
+@pytest.mark.parametrize("half", [True, False])
+def test_a_batch_on_the_device_has_the_bits_of_the_host(library, rng, dtype, half):
+    offsets = np.cumsum([0, 0, 1, 2, 40, 300, 0, 1700])
+    positions, radii = random_spheres(rng, offsets[-1], dtype)
+    x, r = library.to_device(positions), library.to_device(radii)
+    for batch in (offsets, library.to_device(offsets)):
+        for output in ("coo", "csr"):
+            check_equal(library, jfpx.find_contacts(x, r, batch=batch, half=half, output=output),
+                        jfpx.find_contacts(positions, radii, batch=offsets, half=half, output=output))
+        check_equal(library, [jfpx.find_pairs(x, 0.9, batch=batch, half=half)],
+                    [jfpx.find_pairs(positions, 0.9, batch=offsets, half=half)])
+
+
 def test_strided_device_arrays_are_taken_without_a_copy(library, rng, dtype):
     positions, radii = random_spheres(rng, 1000, dtype)
     wide = np.zeros((1000, 5), dtype)
@@ -214,7 +227,12 @@ def test_arrays_of_jax_are_taken(rng):
      "sphere 0: centre.x is nan"),
     (lambda x, r, to: jfpx.find_contacts(x, r, device="cpu"), "positions are on cuda:0"),
     (lambda x, r, to: jfpx.find_contacts(x, r, device="cuda:7"), "positions are on cuda:0"),
-    (lambda x, r, to: jfpx.find_contacts(x, r, batch=[0, 3]), "batch requires"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, batch=[0, 2]), "the last offset is 2"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, batch=to(np.array([1, 3]))), "must begin with 0"),
+    (lambda x, r, to: jfpx.find_pairs(x, 1, query=x, batch=[0, 3]), "exclude each other"),
+    (lambda x, r, to: jfpx.SphereCollider().find_pairs(
+        x, 1, batch=[0, 3], out=to(np.zeros((2, 9), np.int32)), count=to(np.zeros(2, np.int64))),
+     "count excludes"),
     (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9, 9]), "periodic requires"),
     (lambda x, r, to: jfpx.find_contacts(x, r, output="dense"), "output is 'dense'"),
     (lambda x, r, to: jfpx.find_pairs(x), "either cutoff or radii"),

@@ -19,6 +19,12 @@ std::vector<SphereInstance> random_gas(std::size_t n, Random& random) {
   return make_gas(n, Real(0.5), 6, random);
 }
 
+std::vector<SpherePair> pairs_of(ContactSpan contacts) {
+  std::vector<SpherePair> pairs;
+  for (const SphereContact& c : contacts) pairs.push_back({c.a, c.b});
+  return pairs;
+}
+
 TEST(ContactList, BetweenTwoSetsEqualsALoopOverAllPairsOfBoth) {
   Random random(base_seed());
   const auto collider = make_sphere_collider();
@@ -90,6 +96,8 @@ TEST(ContactList, InBothOrdersIsTheSortedListOfContactsAndTheirOpposites) {
       return std::pair(p.a, p.b) < std::pair(q.a, q.b);
     });
     EXPECT_TRUE(same_bits(in_both_orders(half, n), expected)) << seed_note();
+    const std::vector<SpherePair> pairs = pairs_of(half), expected_pairs = pairs_of(expected);
+    EXPECT_EQ(in_both_orders(pairs, n), expected_pairs) << seed_note();
   }
 }
 
@@ -105,7 +113,8 @@ TEST(ContactList, RowOffsetsEncloseTheContactsOfEachSphere) {
     ASSERT_LE(offsets[i], offsets[i + 1]);
     for (std::uint64_t k = offsets[i]; k < offsets[i + 1]; ++k) EXPECT_EQ(contacts[k].a, i);
   }
-  EXPECT_EQ(row_offsets({}, 3), std::vector<std::uint64_t>(4));
+  EXPECT_EQ(row_offsets(pairs_of(contacts), n), offsets);
+  EXPECT_EQ(row_offsets(ContactSpan{}, 3), std::vector<std::uint64_t>(4));
 }
 
 }  // namespace

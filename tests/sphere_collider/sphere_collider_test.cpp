@@ -56,6 +56,34 @@ TEST_P(SphereColliderContract, CoincidentSpheresAllTouch) {
   EXPECT_TRUE(same_bits(contacts, brute_force(spheres)));
 }
 
+TEST_P(SphereColliderContract, PairsAreThoseOfTheContacts) {
+  for (const SphereKind& kind : sphere_kinds()) {
+    Random random(base_seed() + static_cast<std::uint64_t>(&kind - sphere_kinds().data()));
+    for (const std::size_t n : {std::size_t{0}, std::size_t{1}, std::size_t{2}, std::size_t{40},
+                                scaled(1000 + random.below(1500))}) {
+      const auto spheres = kind.make(n, random);
+      std::vector<SpherePair> expected;
+      for (const SphereContact& c : brute_force(spheres)) expected.push_back({c.a, c.b});
+      ASSERT_TRUE(std::ranges::equal(collider().find_pairs(spheres), expected))
+          << kind.name << ", N = " << n << ", " << seed_note();
+    }
+  }
+}
+
+// Rows of any length, and cells with few and with many spheres.
+TEST_P(SphereColliderContract, AnyNumberOfNeighboursIsFound) {
+  Random random(base_seed());
+  const std::size_t n = scaled(1500);
+  for (const Real radius : {Real(0.04), Real(0.08), Real(0.2)}) {
+    std::vector<SphereInstance> spheres(n);
+    for (SphereInstance& s : spheres) {
+      s = {{random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)}, radius};
+    }
+    ASSERT_TRUE(same_bits(collider().find_contacts(spheres), brute_force(spheres)))
+        << "radius " << radius << ", " << seed_note();
+  }
+}
+
 // Each of the three directions has n^2 rows with n-1 touching neighbours; diagonals are
 // 1.99*sqrt(2) > 2 apart.
 TEST_P(SphereColliderContract, LatticeHasThreeNSquaredTimesNMinusOneContacts) {

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -52,6 +53,11 @@ class JFPX_API ArrayCollider {
   /// jfpx::find_contacts_between().
   std::uint64_t find_between(const SphereArrays& first, const SphereArrays& second,
                              ArrayResult result, Stream stream);
+  /// Finds the contacts within each of many systems, as jfpx::find_contacts_in_systems(). Tests all
+  /// pairs of each system.
+  /// @param offsets in host memory
+  std::uint64_t find_in_systems(const SphereArrays& spheres, std::span<const std::uint64_t> offsets,
+                                ArrayResult result, bool both_orders, Stream stream);
   /// Enqueues find() without both_orders. Neither allocates nor waits, so that the call and the
   /// writes below can be captured in a CUDA graph. If the number of contacts exceeds the
   /// reservation, or a sphere is invalid, nothing is written but the count.

@@ -3,6 +3,7 @@
 
 #include "src/base/prefetch.hpp"
 #include "src/base/reserve.hpp"
+#include "src/base/spatial_order.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -18,73 +19,17 @@ namespace {
 constexpr std::size_t kLeavesPerChunk = 2048;
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
-/// Quantile of a quantity in a sample of the leaves.
-template <class Quantity>
-class Sample {
- public:
-  Sample(std::span<const LeafUpdate> leaves, const Quantity& quantity)
-      : size_(std::min(leaves.size(), values_.size())) {
-    for (std::size_t i = 0; i < size_; ++i) {
-      const Real value = quantity(leaves[leaves.size() * i / size_].after);
-      values_[i] = value == value ? value : Real(0);  // NaN is the sum of opposite infinities
-    }
-    std::sort(values_.begin(), values_.begin() + static_cast<std::ptrdiff_t>(size_));
+/// Leaves from which the order of the tree, which affects only the speed, is derived.
+constexpr std::size_t kSample = 256;
+
+Aabb aabb_of(const btDbvtVolume& volume) {
+  Aabb bounds;
+  for (int i = 0; i < 3; ++i) {
+    bounds.lower[i] = volume.Mins()[i];
+    bounds.upper[i] = volume.Maxs()[i];
   }
-  Real quantile(std::size_t sixteenths) const { return values_[(size_ - 1) * sixteenths / 16]; }
-
- private:
-  std::array<Real, 256> values_{};
-  std::size_t size_;
-};
-
-Real size_of(const btDbvtVolume& volume) {
-  const btVector3 size = volume.Maxs() - volume.Mins();
-  return std::max({size[0], size[1], size[2]});
+  return bounds;
 }
-
-/// The lowest ten bits, spread to every third bit.
-std::uint32_t spread(std::uint32_t bits) {
-  bits = (bits | bits << 16) & 0x030000ffu;
-  bits = (bits | bits << 8) & 0x0300f00fu;
-  bits = (bits | bits << 4) & 0x030c30c3u;
-  return (bits | bits << 2) & 0x09249249u;
-}
-
-/// Position of a leaf in the order, which affects only the speed: the size class, then a Morton
-/// code. A large leaf among small ones would enlarge their block. The curve fills a grid around the
-/// middle seven eighths of the leaves; the others are in the outermost cells.
-class Order {
- public:
-  explicit Order(std::span<const LeafUpdate> leaves) {
-    const Real typical = Sample(leaves, size_of).quantile(8);
-    limits_ = {4 * typical, 16 * typical, 64 * typical};
-    for (int i = 0; i < 3; ++i) {
-      const Sample centres(leaves,
-                           [i](const btDbvtVolume& v) { return v.Mins()[i] + v.Maxs()[i]; });
-      const Real low = centres.quantile(1), high = centres.quantile(15);
-      const Real margin = (high - low) / 4;
-      begin_[i] = low - margin;
-      scale_[i] = high > low ? 1024 / (high - low + 2 * margin) : Real(0);
-    }
-  }
-
-  std::uint32_t operator()(const btDbvtVolume& volume) const {
-    const Real size = size_of(volume);
-    std::uint32_t code = 0;
-    for (const Real limit : limits_) code += size > limit ? 1u << 30 : 0u;
-    for (int i = 0; i < 3; ++i) {
-      const Real cell = (volume.Mins()[i] + volume.Maxs()[i] - begin_[i]) * scale_[i];
-      // Also correct for infinity and NaN, which an overflow may cause.
-      const Real inside = !(cell > 0) ? Real(0) : !(cell < 1023) ? Real(1023) : cell;
-      code += spread(static_cast<std::uint32_t>(inside)) << i;
-    }
-    return code;
-  }
-
- private:
-  std::array<Real, 3> limits_;
-  Real begin_[3], scale_[3];  ///< of the sum of lower and upper bound
-};
 
 std::size_t first_lane(unsigned lanes) { return static_cast<std::size_t>(std::countr_zero(lanes)); }
 
@@ -203,12 +148,13 @@ std::size_t OverlapSearch::run(ThreadPool& pool, std::span<const LeafUpdate> lea
 }
 
 void OverlapSearch::sort(ThreadPool& pool, std::span<const LeafUpdate> leaves) {
-  const Order order(leaves);
+  const SpatialOrder order(leaves.size(), kSample,
+                           [&](std::size_t i) { return aabb_of(leaves[i].after); });
   keys_.reserve(count_, "leaves of a tree");
   spare_keys_.reserve(count_, "leaves of a tree");
   in_chunks(pool, count_, kLeavesPerChunk, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
-      keys_[i] = {order(leaves[i].after), static_cast<std::uint32_t>(i)};
+      keys_[i] = {order(aabb_of(leaves[i].after)), static_cast<std::uint32_t>(i)};
     }
   });
   sorted_ = sorter_.sort(pool, keys_.data(), spare_keys_.data(), count_, 0, 32,

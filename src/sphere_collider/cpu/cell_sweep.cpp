@@ -23,6 +23,10 @@ constexpr std::size_t kWidest = 16;
 constexpr std::size_t kNarrowest = 4;
 /// A class is narrowed if the average number of other targets in the cell of a sphere exceeds this.
 constexpr double kDense = 8;
+/// Above this average number of other queries in the cell of a query, the search by cells is used.
+/// A call takes 14 % less time with it if the number is 2.4, and nearly twice the time if it is
+/// 0.7.
+constexpr double kCrowded = 2;
 constexpr Real kOneBin =
     Real(1.5);  ///< no bins are made up to this ratio of largest to smallest radius
 
@@ -41,14 +45,14 @@ std::size_t queries_per_chunk(std::size_t queries) {
   return std::max<std::size_t>(2048, (queries + 1023) / 1024);
 }
 
-/// Makes the rows around the cell of a query: all nine, or, if `self`, only its own row and the
+/// Makes the rows around the cell of a query: all nine, or, if `half`, only its own row and the
 /// four rows with higher numbers, so that each pair is found once.
-int make_rows(const CellGrid& grid, bool self, std::array<CellRow, 9>* rows) {
+int make_rows(const CellGrid& grid, bool half, std::array<CellRow, kRows>* rows) {
   int count = 0;
-  if (self) (*rows)[static_cast<std::size_t>(count++)] = {0, 0};
+  if (half) (*rows)[static_cast<std::size_t>(count++)] = {0, 0};
   for (std::int64_t dz = -1; dz <= 1; ++dz) {
     for (std::int64_t dy = -1; dy <= 1; ++dy) {
-      if (self && (dz < 0 || (dz == 0 && dy <= 0))) continue;
+      if (half && (dz < 0 || (dz == 0 && dy <= 0))) continue;
       (*rows)[static_cast<std::size_t>(count++)] = {dz * grid.slab() + dy * grid.row() - 1, 0};
     }
   }
@@ -57,8 +61,8 @@ int make_rows(const CellGrid& grid, bool self, std::array<CellRow, 9>* rows) {
 
 }  // namespace
 
-void CellSweep::find_pairs(std::span<const SphereInstance> spheres, const Kernels& kernels,
-                           ThreadPool& pool, PairChunks* pairs) {
+PairOrder CellSweep::find_pairs(std::span<const SphereInstance> spheres, const Kernels& kernels,
+                                ThreadPool& pool, PairChunks* pairs) {
   sort_by_radius(spheres);
   const std::uint32_t* order = bins_.size() > 1 ? order_.data() : nullptr;
   const auto part = [&](std::size_t from, std::size_t to) {
@@ -78,9 +82,12 @@ void CellSweep::find_pairs(std::span<const SphereInstance> spheres, const Kernel
       by_cell = targets.count > kFewTargets && largest < kLargest / 8;
       if (by_cell) grid_.fit(targets, 2 * extended);
       fill_table(targets, by_cell, pool, &targets_);
-      if (!by_cell || width == kNarrowest || next == first + 1 || !is_dense(targets_)) break;
+      if (!by_cell || width == kNarrowest || next == first + 1 ||
+          others_per_cell(targets_) <= kDense)
+        break;
     }
-    search(kernels, targets_, by_cell, pool, pairs);
+    const PairOrder found = search(kernels, targets_, by_cell, pool, pairs);
+    if (targets.count == spheres.size()) return found;
     begin += targets.count;
     if (next < bins_.size()) {
       if (by_cell) {  // smaller spheres allow smaller cells with fewer targets
@@ -92,6 +99,7 @@ void CellSweep::find_pairs(std::span<const SphereInstance> spheres, const Kernel
     }
     first = next;
   }
+  return PairOrder::none;
 }
 
 /// Fills bins_ from the largest radii to the smallest, and order_.
@@ -126,15 +134,16 @@ void CellSweep::sort_by_radius(std::span<const SphereInstance> spheres) {
   }
 }
 
-bool CellSweep::is_dense(const SphereTable& table) const {
+/// Average number of other spheres in the cell of a sphere.
+double CellSweep::others_per_cell(const SphereTable& table) const {
   const std::int64_t* cell = table.columns().cell;
-  double others = 0;  // twice the pairs: each sphere counts the previous ones in its cell
-  std::uint32_t cell_begin = 0;
-  for (std::uint32_t i = 0; i < table.count(); ++i) {
-    if (cell[i] != cell[cell_begin]) cell_begin = i;
-    others += 2.0 * (i - cell_begin);
+  std::uint64_t pairs = 0;
+  std::uint64_t in_cell = 0;  // previous spheres in the cell
+  for (std::uint32_t i = 1; i < table.count(); ++i) {
+    in_cell = cell[i] == cell[i - 1] ? in_cell + 1 : 0;
+    pairs += in_cell;
   }
-  return others > kDense * table.count();
+  return 2.0 * static_cast<double>(pairs) / std::max(table.count(), 1u);
 }
 
 /// Fills a table with a subset. If `by_cell`, the table is sorted by cell and omits spheres that
@@ -193,9 +202,10 @@ void CellSweep::fill_by_cell(const SphereSubset& subset, unsigned cell_bits, uns
       [&](std::size_t i) { return static_cast<std::int64_t>(cell_of(items[i])); });
 }
 
-void CellSweep::search(const Kernels& kernels, const SphereTable& queries, bool by_cell,
-                       ThreadPool& pool, PairChunks* pairs) {
+PairOrder CellSweep::search(const Kernels& kernels, const SphereTable& queries, bool by_cell,
+                            ThreadPool& pool, PairChunks* pairs) {
   const bool self = &queries == &targets_;
+  const bool crowded = by_cell && others_per_cell(queries) > kCrowded;
   const std::size_t step = queries_per_chunk(queries.count());
   const std::size_t chunks = (queries.count() + step - 1) / step;
   const std::size_t first_chunk = pairs->add(chunks);
@@ -203,10 +213,10 @@ void CellSweep::search(const Kernels& kernels, const SphereTable& queries, bool 
     PairSearch s{queries.columns(), targets_.columns(), self, 0, 0, nullptr};
     s.first = static_cast<std::uint32_t>(chunk * step);
     s.last = static_cast<std::uint32_t>(std::min<std::size_t>(s.first + step, queries.count()));
-    std::array<CellRow, 9> rows{};
+    std::array<CellRow, kRows> rows{};
     int row_count = 0;
     if (by_cell) {
-      row_count = make_rows(grid_, self, &rows);
+      row_count = make_rows(grid_, self && !crowded, &rows);
       const std::int64_t* const cells = s.targets.cell;
       for (CellRow& row : rows) {
         const std::int64_t low = s.queries.cell[s.first] + row.offset;
@@ -216,13 +226,16 @@ void CellSweep::search(const Kernels& kernels, const SphereTable& queries, bool 
     }
     pairs->fill(first_chunk + chunk, [&](PairSink* sink) {
       s.sink = sink;
-      if (by_cell) {
+      if (crowded) {
+        kernels.search_cells(s, rows.data());
+      } else if (by_cell) {
         kernels.search_rows(s, rows.data(), row_count);
       } else {
         kernels.search_all(s);
       }
     });
   });
+  return self && crowded ? PairOrder::by_lower_sphere : PairOrder::none;
 }
 
 }  // namespace cpu

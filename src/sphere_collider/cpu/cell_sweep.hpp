@@ -23,9 +23,9 @@ namespace cpu {
 /// log N + contacts) for each class that occurs.
 class CellSweep {
  public:
-  /// Adds every pair that touches to `pairs` in new chunks, and some pairs that are slightly apart.
-  void find_pairs(std::span<const SphereInstance> spheres, const Kernels& kernels, ThreadPool& pool,
-                  PairChunks* pairs);
+  /// Adds every pair that touches to `pairs` in new chunks, once. Returns the order of these pairs.
+  PairOrder find_pairs(std::span<const SphereInstance> spheres, const Kernels& kernels,
+                       ThreadPool& pool, PairChunks* pairs);
 
  private:
   struct RadiusBin {
@@ -43,15 +43,15 @@ class CellSweep {
   };
 
   void sort_by_radius(std::span<const SphereInstance> spheres);
-  bool is_dense(const SphereTable& table) const;
+  double others_per_cell(const SphereTable& table) const;
   void fill_table(const SphereSubset& subset, bool by_cell, ThreadPool& pool, SphereTable* table);
   template <class Item, class Pack, class Key, class Index>
   void fill_by_cell(const SphereSubset& subset, unsigned cell_bits, unsigned low_bit,
                     ThreadPool& pool, ItemBuffers<Item>* buffers, SphereTable* table,
                     const Pack& pack, const Key& key, const Index& index);
   /// Tests `queries` against targets_, or among themselves if they are targets_.
-  void search(const Kernels& kernels, const SphereTable& queries, bool by_cell, ThreadPool& pool,
-              PairChunks* pairs);
+  PairOrder search(const Kernels& kernels, const SphereTable& queries, bool by_cell,
+                   ThreadPool& pool, PairChunks* pairs);
 
   std::vector<RadiusBin> bins_;  ///< the bins that are not empty, in descending order of radii
   Buffer<std::uint32_t> bin_ends_;

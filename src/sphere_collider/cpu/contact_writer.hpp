@@ -1,4 +1,4 @@
-/// Conversion of candidate pairs into contacts in canonical order.
+/// Lists of touching pairs, with or without contacts, in canonical order.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -10,37 +10,40 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
-/// Applies the exact test to candidate pairs and writes the contacts sorted by (a, b). Owns its
-/// buffers, which only grow.
+/// Writes pairs or contacts sorted by (a, b). Owns its buffers, which only grow. A result is valid
+/// until the next call.
 class ContactWriter {
  public:
-  /// Requires pairs that are sorted across all chunks.
-  ContactSpan write_sorted(std::span<const SphereInstance> spheres, const PairChunks& pairs,
-                           ThreadPool& pool);
-  /// Accepts pairs in any order.
-  ContactSpan write_unsorted(std::span<const SphereInstance> spheres, const PairChunks& pairs,
-                             ThreadPool& pool);
+  /// @param chunks touching pairs, each once
+  ContactSpan write_contacts(std::span<const SphereInstance> spheres, const PairChunks& chunks,
+                             PairOrder order, ThreadPool& pool);
+  std::span<const SpherePair> write_pairs(std::size_t spheres, const PairChunks& chunks,
+                                          PairOrder order, ThreadPool& pool);
 
  private:
-  /// A run of candidates, and the number of them that touch.
-  struct Section {
-    std::uint64_t begin;
-    std::uint64_t touching;
+  /// The pairs of one lower sphere, in any order.
+  struct Row {
+    const std::uint64_t* pairs = nullptr;
+    std::uint64_t count = 0;
   };
 
-  void divide(const PairChunks& pairs, ThreadPool& pool);
-  void make_rows(std::size_t bucket, std::size_t spheres);
-  std::uint64_t write_rows(std::span<const SphereInstance> spheres, std::size_t bucket);
-  ContactSpan close_gaps(std::size_t sections);
+  template <class Item, class Make>
+  std::span<const Item> write_chunks(const PairChunks& chunks, ThreadPool& pool,
+                                     Buffer<Item>* items, const Make& make);
+  std::span<const SpherePair> write_rows(std::size_t spheres, ThreadPool& pool);
+  static void prefetch(const Row& row);
+  void index_rows(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool);
+  void make_rows(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool);
+  void divide(const PairChunks& chunks, unsigned bucket_bits, std::size_t buckets,
+              ThreadPool& pool);
 
   Buffer<SphereContact> contacts_;
-  Buffer<Section> sections_;
-  unsigned bucket_bits_ = 0;  ///< a bucket holds the pairs of 2^bucket_bits_ lower spheres
-  std::size_t buckets_ = 0;
-  Buffer<std::uint64_t> offsets_;  ///< per chunk and bucket
-  Buffer<std::uint64_t> divided_;  ///< pairs by bucket
-  Buffer<std::uint64_t> rows_;     ///< pairs by lower sphere; the pairs of one are its row
-  Buffer<std::uint64_t> row_end_;  ///< per sphere: end of its row
+  Buffer<SpherePair> pairs_, spare_;
+  Buffer<std::uint64_t> sections_;  ///< begins of parts of the result
+  Buffer<Row> rows_;                ///< by lower sphere
+  Buffer<std::uint64_t> offsets_;   ///< per chunk and bucket
+  Buffer<std::uint64_t> divided_;   ///< pairs by bucket of neighbouring lower spheres
+  Buffer<std::uint64_t> grouped_;   ///< pairs by lower sphere
 };
 
 }  // namespace cpu

@@ -22,6 +22,7 @@ struct SphereColumns {
   const Real* x;
   const Real* y;
   const Real* z;
+  const Real* radius;
   const Real* reach;
   const std::uint32_t* id;   ///< index in the caller's order
   const std::int64_t* cell;  ///< ascending; kNoCell in the elements after the last
@@ -36,8 +37,8 @@ struct PairSink {
   void (*grow)(PairSink* sink);  ///< reserves kMaxLanes more elements; may throw
 };
 
-/// Tests queries [first, last) against targets. If `self`, both are the same columns and a sphere
-/// is tested only against later ones.
+/// Tests queries [first, last) against targets. If `self`, both are the same columns, and each pair
+/// is found once.
 struct PairSearch {
   SphereColumns queries;
   SphereColumns targets;
@@ -53,15 +54,19 @@ struct CellRow {
   std::int64_t offset;
   std::uint32_t cursor;
 };
+inline constexpr std::uint32_t kRows = 9;
 
-/// Conservative filters. Both functions append every pair that touches and a few pairs that are
-/// slightly apart; the exact test follows.
+/// All functions append every pair that touches, and no others.
 struct Kernels {
-  /// Tests every query against every target.
+  /// Tests every query against every target. If `self`, pairs are ordered by the position of the
+  /// first sphere, then of the second.
   void (*search_all)(const PairSearch& search);
   /// Tests every query against the targets in its rows. If `self`, rows[0] is the row of the query
   /// itself, starting at its own cell.
   void (*search_rows)(const PairSearch& search, CellRow* rows, int row_count);
+  /// The same with all kRows rows, which takes less time if there are several queries in a cell. If
+  /// `self`, the pairs of a lower sphere are consecutive.
+  void (*search_cells)(const PairSearch& search, CellRow* rows);
 };
 
 extern const Kernels kScalarKernels;

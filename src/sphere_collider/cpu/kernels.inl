@@ -7,13 +7,22 @@
 //   kLanes                    number of lanes, at most kMaxLanes
 //   Vec                       vector of kLanes Reals, with the operators + - *
 //   load(p), set(v)           read kLanes Reals from p; set all lanes to v
+//   store(p, v)               write kLanes Reals to p
+//   square_root(v)            of each lane
 //   not_greater(a, b)         mask of the lanes for which a > b is false
 //   cells_below(cell, bound)  mask of the cells, out of kLanes, that are less than bound
+//   ids_above(ids, bound)     mask of the ids, out of kLanes, that are greater than bound
+//   copy_ids(from, to)        copies kLanes ids
 //   count(mask)               number of set bits
 //   append(out, id, others, mask)  see append_bits(); may write kLanes elements
 
-// The filter. Let u = epsilon/2, R = r_a + r_b (exact), t = 2^-63 (float) or 2^-511 (double), the
-// square root of the smallest normal number; reach >= r*(1 + 6u) + t. A pair is dropped iff D > W,
+// The test. It compares the values of detail::test_sphere_pair(): differences have the opposite
+// sign if the spheres are exchanged, which their squares do not depend on, and a sum of two radii
+// does not depend on the order.
+
+// The filter, which takes no root. Let u = epsilon/2, R = r_a + r_b (exact), t = 2^-63 (float) or
+// 2^-511 (double), the square root of the smallest normal number; reach >= r*(1 + 6u) + t. A pair
+// is dropped iff D > W,
 //     D = fl(fl(dx*dx + dy*dy) + dz*dz),   W = fl(w*w),   w = fl(reach_a + reach_b),
 // where D is the same value of which the exact test takes the root. Claim: the exact test then
 // finds len > s, so no contact is dropped. w > R*(1 + 6u)*(1 - u) and w*w >= (2t)^2 is normal, so
@@ -29,24 +38,42 @@ namespace {
 
 template <class S>
 struct Query {
-  typename S::Vec x, y, z, reach;
+  typename S::Vec x, y, z, radius, reach;
   std::uint32_t id;
 };
 
 template <class S>
 inline Query<S> load_query(const SphereColumns& q, std::uint32_t i) {
-  return {S::set(q.x[i]), S::set(q.y[i]), S::set(q.z[i]), S::set(q.reach[i]), q.id[i]};
+  return {S::set(q.x[i]),      S::set(q.y[i]),     S::set(q.z[i]),
+          S::set(q.radius[i]), S::set(q.reach[i]), q.id[i]};
 }
 
-/// Returns one bit per target, starting at `at`: set if the filter keeps the target.
+/// Squares of the distances of the centres of the targets, starting at `at`.
 template <class S>
-inline std::uint32_t kept(const Query<S>& q, const SphereColumns& t, std::uint32_t at) {
+inline typename S::Vec squares(const Query<S>& q, const SphereColumns& t, std::uint32_t at) {
   const typename S::Vec dx = q.x - S::load(t.x + at);
   const typename S::Vec dy = q.y - S::load(t.y + at);
   const typename S::Vec dz = q.z - S::load(t.z + at);
+  return dx * dx + dy * dy + dz * dz;
+}
+
+/// Returns one bit per target: set if the filter keeps the target with this square.
+template <class S>
+inline std::uint32_t kept(typename S::Vec square, const Query<S>& q, const SphereColumns& t,
+                          std::uint32_t at) {
   const typename S::Vec w = q.reach + S::load(t.reach + at);
-  const typename S::Vec square = dx * dx + dy * dy + dz * dz;
   return S::not_greater(square, w * w);
+}
+
+/// Returns one bit per target: set if the target with this square touches.
+template <class S>
+inline std::uint32_t touching(typename S::Vec square, const Query<S>& q, const SphereColumns& t,
+                              std::uint32_t at) {
+  return S::not_greater(S::square_root(square), q.radius + S::load(t.radius + at));
+}
+template <class S>
+inline std::uint32_t touching(const Query<S>& q, const SphereColumns& t, std::uint32_t at) {
+  return touching<S>(squares(q, t, at), q, t, at);
 }
 
 /// Appends pairs. Copies the pointers of the sink, so that they stay in registers.
@@ -104,16 +131,21 @@ template <class S>
     std::uint32_t at = self ? i + 1 : 0;
     // Two vectors per iteration halve the number of branches on masks that are mostly zero.
     for (; at + 2 * kLanes <= count; at += 2 * kLanes) {
-      const std::uint32_t first = kept(q, targets, at);
-      const std::uint32_t second = kept(q, targets, at + kLanes);
-      if ((first | second) == 0) continue;
-      pairs.append<S>(q.id, targets.id + at, first);
-      pairs.append<S>(q.id, targets.id + at + kLanes, second);
+      const typename S::Vec first = squares(q, targets, at);
+      const typename S::Vec second = squares(q, targets, at + kLanes);
+      const std::uint32_t first_kept = kept<S>(first, q, targets, at);
+      const std::uint32_t second_kept = kept<S>(second, q, targets, at + kLanes);
+      if ((first_kept | second_kept) == 0) continue;
+      if (first_kept != 0)
+        pairs.append<S>(q.id, targets.id + at, touching<S>(first, q, targets, at));
+      if (second_kept != 0)
+        pairs.append<S>(q.id, targets.id + at + kLanes,
+                        touching<S>(second, q, targets, at + kLanes));
     }
     for (; at < count; at += kLanes) {
       const std::uint32_t left = count - at;
       const std::uint32_t valid = left < kLanes ? (1u << left) - 1 : ~0u;
-      const std::uint32_t mask = kept(q, targets, at) & valid;
+      const std::uint32_t mask = touching(q, targets, at) & valid;
       if (mask != 0) pairs.append<S>(q.id, targets.id + at, mask);
     }
   }
@@ -132,7 +164,7 @@ inline void search_row(const Query<S>& q, const SphereColumns& t, std::int64_t l
     const std::uint32_t below = S::cells_below(t.cell + at, low);
     const std::uint32_t inside = S::cells_below(t.cell + at, high);
     passed += S::count(below);
-    pairs->append<S>(q.id, t.id + at, kept(q, t, at) & inside & ~below);
+    pairs->append<S>(q.id, t.id + at, touching(q, t, at) & inside & ~below);
     if (inside != kAll) [[likely]]
       break;
     at += S::kLanes;
@@ -159,6 +191,113 @@ void search_rows(const PairSearch& search, CellRow* rows, int row_count) {
     for (; row < row_count; ++row) {
       const std::int64_t low = cell + rows[row].offset;
       search_row(q, targets, low, low + 3, &rows[row].cursor, &pairs);
+    }
+  }
+}
+
+/// Consecutive targets.
+struct TargetRun {
+  std::uint32_t begin, end;
+};
+
+/// Returns the targets in cells [low, high), starting at the cursor, which moves to the first.
+/// Cells ascend, so each bound selects a prefix of each vector. This needs neither a table of cells
+/// nor an unpredictable branch.
+template <class S>
+inline TargetRun find_run(const SphereColumns& t, std::int64_t low, std::int64_t high,
+                          std::uint32_t* cursor) {
+  const auto first_at_least = [&](std::int64_t bound, std::uint32_t at) {
+    for (;;) {
+      const std::uint32_t below = S::count(S::cells_below(t.cell + at, bound));
+      at += below;
+      if (below < S::kLanes) [[likely]]
+        return at;
+    }
+  };
+  *cursor = first_at_least(low, *cursor);
+  return {*cursor, first_at_least(high, *cursor)};
+}
+
+/// Appends the targets of a run that touch; if `self`, only those with higher ids.
+template <class S>
+inline void search_run(const Query<S>& q, const SphereColumns& t, TargetRun run, bool self,
+                       Appender* pairs) {
+  for (std::uint32_t at = run.begin; at < run.end; at += S::kLanes) {
+    const std::uint32_t left = run.end - at;
+    std::uint32_t mask = touching(q, t, at);
+    if (self) mask &= S::ids_above(t.id + at, q.id);
+    if (left < S::kLanes) mask &= (1u << left) - 1;
+    pairs->append<S>(q.id, t.id + at, mask);
+  }
+}
+
+/// Copies of the targets around a cell, without gaps.
+struct NearTargets {
+  static constexpr std::uint32_t kCapacity = 1024;
+  static constexpr std::uint32_t kSize = kCapacity + kMaxLanes;
+
+  SphereColumns columns() const { return {x, y, z, radius, nullptr, id, nullptr, kCapacity}; }
+
+  template <class S>
+  void copy(const SphereColumns& t, const TargetRun* runs) {
+    std::uint32_t end = 0;
+    for (std::uint32_t row = 0; row < kRows; ++row) {
+      const TargetRun run = runs[row];
+      for (std::uint32_t at = run.begin, to = end; at < run.end; at += S::kLanes, to += S::kLanes) {
+        S::store(x + to, S::load(t.x + at));
+        S::store(y + to, S::load(t.y + at));
+        S::store(z + to, S::load(t.z + at));
+        S::store(radius + to, S::load(t.radius + at));
+        S::copy_ids(t.id + at, id + to);
+      }
+      end += run.end - run.begin;
+    }
+    // A vector after the last target is read.
+    S::store(x + end, S::set(0));
+    S::store(y + end, S::set(0));
+    S::store(z + end, S::set(0));
+    S::store(radius + end, S::set(0));
+  }
+
+  alignas(64) Real x[kSize];
+  alignas(64) Real y[kSize];
+  alignas(64) Real z[kSize];
+  alignas(64) Real radius[kSize];
+  alignas(64) std::uint32_t id[kSize];
+};
+
+/// The queries of a cell have the same targets, which are copied together unless there are many, so
+/// that vectors are full.
+template <class S>
+void search_cells(const PairSearch& search, CellRow* rows) {
+  Appender pairs(search.sink);
+  const SphereColumns queries = search.queries;  // copies: vector stores may alias all other memory
+  const SphereColumns targets = search.targets;
+  const bool self = search.self;
+  const std::uint32_t last = search.last;
+  NearTargets near;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
+  for (std::uint32_t i = search.first; i < last;) {
+    const std::int64_t cell = queries.cell[i];
+    std::uint32_t end = i + 1;
+    while (end < last && queries.cell[end] == cell) ++end;
+    TargetRun runs[kRows];
+    std::uint64_t total = 0;
+    for (std::uint32_t row = 0; row < kRows; ++row) {
+      const std::int64_t low = cell + rows[row].offset;
+      runs[row] = find_run<S>(targets, low, low + 3, &rows[row].cursor);
+      total += runs[row].end - runs[row].begin;
+    }
+    const bool copied = total <= NearTargets::kCapacity;
+    if (copied) near.template copy<S>(targets, runs);
+    for (; i < end; ++i) {
+      const Query<S> q = load_query<S>(queries, i);
+      if (copied) {
+        search_run<S>(q, near.columns(), {0, static_cast<std::uint32_t>(total)}, self, &pairs);
+      } else {
+        for (std::uint32_t row = 0; row < kRows; ++row) {
+          search_run<S>(q, targets, runs[row], self, &pairs);
+        }
+      }
     }
   }
 }

@@ -33,6 +33,8 @@ struct Reals {
   using Vec = __m512d;
   static Vec load(const Real* p) { return _mm512_loadu_pd(p); }
   static Vec set(Real v) { return _mm512_set1_pd(v); }
+  static void store(Real* p, Vec v) { _mm512_storeu_pd(p, v); }
+  static Vec square_root(Vec v) { return _mm512_sqrt_pd(v); }
   static std::uint32_t not_greater(Vec a, Vec b) {
     return widened(_mm512_cmp_pd_mask(a, b, _CMP_NGT_UQ));
   }
@@ -43,6 +45,8 @@ struct Reals {
   using Vec = __m512;
   static Vec load(const Real* p) { return _mm512_loadu_ps(p); }
   static Vec set(Real v) { return _mm512_set1_ps(v); }
+  static void store(Real* p, Vec v) { _mm512_storeu_ps(p, v); }
+  static Vec square_root(Vec v) { return _mm512_sqrt_ps(v); }
   static std::uint32_t not_greater(Vec a, Vec b) {
     return widened(_mm512_cmp_ps_mask(a, b, _CMP_NGT_UQ));
   }
@@ -53,6 +57,7 @@ struct RowReals {
   using Vec = __m256;
   static Vec load(const Real* p) { return _mm256_loadu_ps(p); }
   static Vec set(Real v) { return _mm256_set1_ps(v); }
+  static Vec square_root(Vec v) { return _mm256_sqrt_ps(v); }
   static std::uint32_t not_greater(Vec a, Vec b) {
     return widened(_mm256_cmp_ps_mask(a, b, _CMP_NGT_UQ));
   }
@@ -66,6 +71,19 @@ struct Simd : R {
     std::uint32_t below = eight_below(cell, bound);
     if constexpr (kLanes == 16) below |= eight_below(cell + 8, bound) << 8;
     return below;
+  }
+  static std::uint32_t ids_above(const std::uint32_t* ids, std::uint32_t bound) {
+    if constexpr (kLanes == 16) {
+      return widened(_mm512_cmpgt_epu32_mask(_mm512_loadu_si512(ids),
+                                             _mm512_set1_epi32(static_cast<int>(bound))));
+    } else {
+      return widened(
+          _mm256_cmpgt_epu32_mask(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(ids)),
+                                  _mm256_set1_epi32(static_cast<int>(bound))));
+    }
+  }
+  static void copy_ids(const std::uint32_t* from, std::uint32_t* to) {
+    __builtin_memcpy(to, from, kLanes * sizeof *to);
   }
   static std::uint32_t count(std::uint32_t mask) {
     return static_cast<std::uint32_t>(__builtin_popcount(mask));
@@ -92,7 +110,8 @@ struct Simd : R {
 
 }  // namespace
 
-constinit const Kernels kAvx512Kernels = {search_all<Simd<Reals>>, search_rows<Simd<RowReals>>};
+constinit const Kernels kAvx512Kernels = {search_all<Simd<Reals>>, search_rows<Simd<RowReals>>,
+                                          search_cells<Simd<Reals>>};
 
 }  // namespace cpu
 }  // namespace JFPX_ABI

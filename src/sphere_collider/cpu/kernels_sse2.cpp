@@ -13,6 +13,8 @@ struct Reals {
   using Vec = __m128d;
   static Vec load(const Real* p) { return _mm_loadu_pd(p); }
   static Vec set(Real v) { return _mm_set1_pd(v); }
+  static void store(Real* p, Vec v) { _mm_storeu_pd(p, v); }
+  static Vec square_root(Vec v) { return _mm_sqrt_pd(v); }
   static std::uint32_t not_greater(Vec a, Vec b) {
     return static_cast<std::uint32_t>(_mm_movemask_pd(_mm_cmpngt_pd(a, b)));
   }
@@ -22,6 +24,8 @@ struct Reals {
   using Vec = __m128;
   static Vec load(const Real* p) { return _mm_loadu_ps(p); }
   static Vec set(Real v) { return _mm_set1_ps(v); }
+  static void store(Real* p, Vec v) { _mm_storeu_ps(p, v); }
+  static Vec square_root(Vec v) { return _mm_sqrt_ps(v); }
   static std::uint32_t not_greater(Vec a, Vec b) {
     return static_cast<std::uint32_t>(_mm_movemask_ps(_mm_cmpngt_ps(a, b)));
   }
@@ -35,6 +39,14 @@ struct Simd : Reals {
     for (std::uint32_t k = 0; k < kLanes; ++k) below |= (cell[k] < bound ? 1u : 0u) << k;
     return below;
   }
+  static std::uint32_t ids_above(const std::uint32_t* ids, std::uint32_t bound) {
+    std::uint32_t above = 0;
+    for (std::uint32_t k = 0; k < kLanes; ++k) above |= (ids[k] > bound ? 1u : 0u) << k;
+    return above;
+  }
+  static void copy_ids(const std::uint32_t* from, std::uint32_t* to) {
+    __builtin_memcpy(to, from, kLanes * sizeof *to);
+  }
   /// Looks the number of set bits up in a table of nibbles, because SSE2 has no POPCNT.
   static std::uint32_t count(std::uint32_t mask) {
     return static_cast<std::uint32_t>(0x4332322132212110ull >> (4 * mask)) & 7;
@@ -47,7 +59,7 @@ struct Simd : Reals {
 
 }  // namespace
 
-constinit const Kernels kSse2Kernels = {search_all<Simd>, search_rows<Simd>};
+constinit const Kernels kSse2Kernels = {search_all<Simd>, search_rows<Simd>, search_cells<Simd>};
 
 }  // namespace cpu
 }  // namespace JFPX_ABI

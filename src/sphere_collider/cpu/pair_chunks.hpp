@@ -11,6 +11,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
+/// Order of the pairs of all chunks.
+enum class PairOrder : std::uint8_t {
+  none,
+  by_lower_sphere,  ///< pairs with the same lower sphere are consecutive, in any order
+  sorted            ///< by lower, then by higher sphere
+};
+
 /// Each chunk has its own buffer, so that threads share no data and the result does not depend on
 /// their timing. Buffers are kept for the next search.
 class PairChunks {

@@ -1,4 +1,4 @@
-/// Sphere contacts on the CPU: vector filter, then the exact test, in canonical order.
+/// Sphere contacts on the CPU: a search with vectors, then the list in canonical order.
 #include "src/sphere_collider/cpu/sphere_collider_cpu.hpp"
 
 #include <jfpx/error.hpp>
@@ -44,19 +44,13 @@ class SphereColliderCpu final : public SphereCollider {
         pool_(pool == nullptr ? *own_pool_ : *pool) {}
 
   ContactSpan find_contacts(std::span<const SphereInstance> spheres) override {
-    detail::check_spheres(spheres);
-    used_ = requested_;
-    if (used_ == SphereAlgorithm::automatic) {
-      used_ = spheres.size() < kAllPairsBelow ? SphereAlgorithm::all_pairs
-                                              : SphereAlgorithm::sorted_tiles;
-    }
-    pairs_.clear();
-    if (used_ == SphereAlgorithm::all_pairs) {
-      find_all_pairs(spheres);
-      return writer_.write_sorted(spheres, pairs_, pool_);
-    }
-    sweep_.find_pairs(spheres, kernels_, pool_, &pairs_);
-    return writer_.write_unsorted(spheres, pairs_, pool_);
+    const PairOrder order = search(spheres);
+    return writer_.write_contacts(spheres, pairs_, order, pool_);
+  }
+
+  std::span<const SpherePair> find_pairs(std::span<const SphereInstance> spheres) override {
+    const PairOrder order = search(spheres);
+    return writer_.write_pairs(spheres.size(), pairs_, order, pool_);
   }
 
   std::span<const PairContact> find_touching(std::span<const SphereInstance> spheres,
@@ -109,6 +103,22 @@ class SphereColliderCpu final : public SphereCollider {
     for (std::size_t i = begin; i < end; ++i) largest = std::max({largest, pairs[i].a, pairs[i].b});
     if (largest >= spheres.size()) detail::reject_pair(pairs, spheres.size());
     return pairs.subspan(begin, end - begin);
+  }
+
+  /// Fills pairs_, and returns its order.
+  PairOrder search(std::span<const SphereInstance> spheres) {
+    detail::check_spheres(spheres);
+    used_ = requested_;
+    if (used_ == SphereAlgorithm::automatic) {
+      used_ = spheres.size() < kAllPairsBelow ? SphereAlgorithm::all_pairs
+                                              : SphereAlgorithm::sorted_tiles;
+    }
+    pairs_.clear();
+    if (used_ == SphereAlgorithm::sorted_tiles) {
+      return sweep_.find_pairs(spheres, kernels_, pool_, &pairs_);
+    }
+    find_all_pairs(spheres);
+    return PairOrder::sorted;
   }
 
   void find_all_pairs(std::span<const SphereInstance> spheres) {

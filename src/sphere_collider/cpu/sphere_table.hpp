@@ -45,12 +45,13 @@ class SphereTable {
 
   std::uint32_t count() const noexcept { return count_; }
   SphereColumns columns() const noexcept {
-    return {x_.data(), y_.data(), z_.data(), reach_.data(), id_.data(), cell_.data(), count_};
+    return {x_.data(),     y_.data(),  z_.data(),    radius_.data(),
+            reach_.data(), id_.data(), cell_.data(), count_};
   }
 
  private:
   void reserve(std::size_t count) {
-    for (Buffer<Real>* column : {&x_, &y_, &z_, &reach_}) {
+    for (Buffer<Real>* column : {&x_, &y_, &z_, &radius_, &reach_}) {
       column->reserve(count, "coordinates of spheres");
     }
     id_.reserve(count, "indices of spheres");
@@ -60,12 +61,13 @@ class SphereTable {
     x_[i] = s.centre.x;
     y_[i] = s.centre.y;
     z_[i] = s.centre.z;
+    radius_[i] = s.radius;
     reach_[i] = extended_radius(s.radius);
     id_[i] = id;
     cell_[i] = cell;
   }
 
-  Buffer<Real> x_, y_, z_, reach_;
+  Buffer<Real> x_, y_, z_, radius_, reach_;
   Buffer<std::uint32_t> id_;
   Buffer<std::int64_t> cell_;
   std::uint32_t count_ = 0;

@@ -6,6 +6,8 @@
 #include "src/base/cuda/device_buffer.hpp"
 #include "src/base/cuda/probe.hpp"
 #include "src/sphere_collider/cuda/contact_arrays.hpp"
+#include "src/sphere_collider/cuda/scan.hpp"
+#include "src/sphere_collider/cuda/systems.hpp"
 #include "src/sphere_collider/sphere_input.hpp"
 
 #include <type_traits>
@@ -77,13 +79,23 @@ struct ArrayCollider::Impl {
   template <class Item>
   void search(std::size_t n);
   template <class Item>
-  std::uint64_t search_and_wait(std::size_t n);
+  void search_systems(std::size_t n);
+  template <class Item, class Search>
+  std::uint64_t repeat_until_complete(const Search& enqueue);
+  template <class Item>
+  std::uint64_t search_and_wait(std::size_t n) {
+    return repeat_until_complete<Item>([&](bool again) {
+      if (again) collider.reserve(n, items<Item>().found.capacity());
+      search<Item>(n);
+    });
+  }
   std::uint64_t count_of(int which) const { return counts.data()[which].contacts; }
   [[noreturn]] void reject(std::uint32_t invalid);
   template <class Item>
   std::uint64_t select_between(std::uint64_t found, std::uint32_t boundary);
   template <class Item>
-  std::uint64_t list_both_orders(std::uint64_t found);
+  std::uint64_t list_both_orders(std::uint64_t found, Stream user);
+  void reserve_systems(std::size_t n, std::span<const std::uint64_t> from);
   template <class Item>
   FoundItems<Item> result();
 
@@ -98,6 +110,12 @@ struct ArrayCollider::Impl {
   PinnedBuffer<ContactCount> counts;  // of `found` and of `derived`
   DeviceBuffer<unsigned char> scratch;
   DeviceBuffer<std::uint32_t> keys;
+  // Of searches in systems.
+  DeviceBuffer<std::uint64_t> offsets;
+  std::uint32_t systems = 0;
+  DeviceBuffer<std::uint32_t> row_counts;
+  DeviceBuffer<unsigned long long> row_sums;
+  DeviceBuffer<SearchState> state;
   DeviceBuffer<unsigned long long> indices;
 
   // The last search.
@@ -133,16 +151,54 @@ void ArrayCollider::Impl::search(std::size_t n) {
   }
 }
 
+/// Reserves what search_systems() needs, and copies the offsets.
+void ArrayCollider::Impl::reserve_systems(std::size_t n, std::span<const std::uint64_t> from) {
+  spheres.reserve_geometric(pool, stream.get(), n, "spheres");
+  row_counts.reserve_geometric(pool, stream.get(), n + 1, "numbers of contacts");
+  row_sums.reserve_geometric(pool, stream.get(), n + 1, "sums of numbers of contacts");
+  scratch.reserve_geometric(pool, stream.get(), scan_scratch_bytes(n + 1), "scratch of a scan");
+  state.reserve_geometric(pool, stream.get(), 1, "states of searches");
+  offsets.reserve_geometric(pool, stream.get(), from.size(), "offsets of systems");
+  systems = static_cast<std::uint32_t>(from.size() - 1);
+  JFPX_CUDA_TRY(cudaMemcpyAsync(offsets.data(), from.data(), from.size_bytes(),
+                                cudaMemcpyHostToDevice, stream.get()));
+}
+
 template <class Item>
-std::uint64_t ArrayCollider::Impl::search_and_wait(std::size_t n) {
-  for (;;) {
-    search<Item>(n);
+void ArrayCollider::Impl::search_systems(std::size_t n) {
+  JFPX_CUDA_TRY(cudaMemsetAsync(state.data(), 0, sizeof(SearchState), stream.get()));
+  const SystemsArgs args{.spheres = spheres.data(),
+                         .n = static_cast<std::uint32_t>(n),
+                         .offsets = offsets.data(),
+                         .systems = systems,
+                         .counts = row_counts.data(),
+                         .sums = row_sums.data(),
+                         .state = state.data()};
+  launch_count_in_systems(args, stream.get());
+  exclusive_scan(row_counts.data(), row_sums.data(), n + 1, scratch.data(),
+                 scan_scratch_bytes(n + 1), stream.get());
+  DeviceBuffer<Item>& found = items<Item>().found;
+  SearchOutput output{nullptr, nullptr, found.capacity(), counts.data()};
+  if constexpr (std::is_same_v<Item, SpherePair>) {
+    kind = ArrayResult::pairs;
+    output.pairs = found.data();
+  } else {
+    kind = ArrayResult::contacts;
+    output.contacts = found.data();
+  }
+  launch_emit_in_systems(args, output, stream.get());
+}
+
+/// Calls enqueue(again) until there is memory for all contacts. Returns their number.
+template <class Item, class Search>
+std::uint64_t ArrayCollider::Impl::repeat_until_complete(const Search& enqueue) {
+  for (bool again = false;; again = true) {
+    enqueue(again);
     JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
     const ContactCount count = counts.data()[0];
     if (count.first_invalid != kNoSphere) reject(count.first_invalid);
     if (count.complete != 0) return count.contacts;
     items<Item>().found.reserve_geometric(pool, stream.get(), count.contacts, "contacts");
-    collider.reserve(n, items<Item>().found.capacity());
   }
 }
 
@@ -169,7 +225,7 @@ std::uint64_t ArrayCollider::Impl::select_between(std::uint64_t found, std::uint
 }
 
 template <class Item>
-std::uint64_t ArrayCollider::Impl::list_both_orders(std::uint64_t found) {
+std::uint64_t ArrayCollider::Impl::list_both_orders(std::uint64_t found, Stream user) {
   const std::size_t bytes = sort_scratch_bytes(found);
   scratch.reserve_geometric(pool, stream.get(), bytes, "scratch memory of a sort");
   keys.reserve_geometric(pool, stream.get(), 2 * found, "keys of a sort");
@@ -185,6 +241,7 @@ std::uint64_t ArrayCollider::Impl::list_both_orders(std::uint64_t found) {
                       .sort_bytes = bytes},
                      stream.get());
   is_derived = true;
+  event.order(stream.get(), user);
   return 2 * found;
 }
 
@@ -230,10 +287,7 @@ std::uint64_t ArrayCollider::find(const SphereArrays& spheres, ArrayResult resul
   impl_->pack(spheres, nullptr, stream);
   const auto run = [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_and_wait<Item>(spheres.count);
-    if (!both_orders || found == 0) return found;
-    const std::uint64_t all = impl_->list_both_orders<Item>(found);
-    impl_->event.order(impl_->stream.get(), stream);
-    return all;
+    return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
   };
   return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
                                       : run(std::type_identity<SphereContact>{});
@@ -248,6 +302,26 @@ std::uint64_t ArrayCollider::find_between(const SphereArrays& first, const Spher
   const auto run = [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_and_wait<Item>(n);
     return found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset);
+  };
+  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
+                                      : run(std::type_identity<SphereContact>{});
+}
+
+std::uint64_t ArrayCollider::find_in_systems(const SphereArrays& spheres,
+                                             std::span<const std::uint64_t> offsets,
+                                             ArrayResult result, bool both_orders, Stream stream) {
+  detail::check_offsets(offsets, spheres.count);
+  if (spheres.count > kMaxSpheres) {
+    throw InvalidArgument("number of spheres is " + std::to_string(spheres.count) +
+                          "; it must be at most " + std::to_string(kMaxSpheres));
+  }
+  const DeviceGuard guard(impl_->device);
+  impl_->reserve_systems(spheres.count, offsets);
+  impl_->pack(spheres, nullptr, stream);
+  const auto run = [&]<class Item>(std::type_identity<Item>) {
+    const std::uint64_t found = impl_->repeat_until_complete<Item>(
+        [&](bool) { impl_->search_systems<Item>(spheres.count); });
+    return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
   };
   return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
                                       : run(std::type_identity<SphereContact>{});

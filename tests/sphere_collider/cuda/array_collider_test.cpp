@@ -171,6 +171,55 @@ TEST_F(Cuda, FewArraysOfTwoSetsHaveTheContactsOfTheHost) {
   }
 }
 
+TEST_F(Cuda, FewArraysOfSystemsHaveTheContactsOfTheHost) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const std::vector<std::uint64_t> several{0, 0, 1, 33, 34, 67, 131, 131, 600, 600};
+  const std::vector<std::vector<std::uint64_t>> all_offsets{{0}, {0, 0}, {0, 600}, several};
+  for (const std::vector<std::uint64_t>& offsets : all_offsets) {
+    const std::size_t n = offsets.back();
+    const Spheres spheres = make_gas(n, Real(0.5), 6, random);
+    const DeviceSpheres arrays(spheres);
+    const auto half = find_contacts_in_systems(*cpu, spheres, offsets);
+    for (const bool both : {false, true}) {
+      const auto expected = both ? in_both_orders(half, n) : half;
+      ASSERT_EQ(collider.find_in_systems(arrays.arrays(), offsets, ArrayResult::contacts, both,
+                                         stream.get()),
+                expected.size())
+          << seed_note();
+      EXPECT_TRUE(
+          same_bits(contacts_of<std::int64_t>(collider, expected.size(), stream.get()), expected))
+          << seed_note();
+      ASSERT_EQ(collider.find_in_systems(arrays.arrays(), offsets, ArrayResult::pairs, both,
+                                         stream.get()),
+                expected.size());
+      EXPECT_EQ(pairs_of(collider, expected.size(), stream.get()), pairs_of(expected));
+    }
+  }
+}
+
+TEST_F(Cuda, ArraysOfSystemsAreCheckedAsOnTheHost) {
+  Random random(base_seed());
+  Spheres spheres = make_gas(50, Real(0.5), 2, random);
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  const auto message_of = [&](const std::vector<std::uint64_t>& offsets) -> std::string {
+    const DeviceSpheres arrays(spheres);
+    try {
+      collider.find_in_systems(arrays.arrays(), offsets, ArrayResult::pairs, false, stream.get());
+    } catch (const InvalidArgument& e) {
+      return e.what();
+    }
+    return "no exception";
+  };
+  EXPECT_EQ(message_of({1, 50}), "offsets must begin with 0");
+  EXPECT_EQ(message_of({0, 49}), "the last offset is 49; it must be the number of spheres, 50");
+  spheres[41].radius = -1;
+  EXPECT_EQ(message_of({0, 20, 50}), "sphere 41: radius is -1; it must be finite and > 0");
+}
+
 TEST_F(Cuda, FewArraysOfOneRadiusAndAnyStrides) {
   Random random(base_seed());
   const OwnedStream stream(0);
