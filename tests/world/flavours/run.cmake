@@ -84,7 +84,7 @@ foreach(compiler IN ITEMS ${gcc_prefix}g++ clang++)
       set(build ${BINARY_DIR}/${PROCESSOR}/${compiler}${folder})
     endif()
     execute_process(
-      COMMAND ${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${build} -G Ninja
+      COMMAND ${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${build} -G Ninja --no-warn-unused-cli
         -DCMAKE_TOOLCHAIN_FILE=${toolchain}
         -DCMAKE_CXX_COMPILER=${path_of_${compiler}} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
         -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS=${flavour} -DCONFIG_DIR=${CONFIG_DIR}
