@@ -7,6 +7,15 @@ endif()
 
 include(JfpxFindBullet)
 jfpx_find_bullet(JFPX_HAS_BULLET reason >= 3.24)
+# Debian's packages for ARM64 are compiled with fused multiply-add, the default of g++ there.
+if(JFPX_HAS_BULLET AND (NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR))
+  try_run(JFPX_BULLET_ROUNDING JFPX_BULLET_ROUNDING_COMPILED ${PROJECT_BINARY_DIR}/bullet_rounding
+    ${PROJECT_SOURCE_DIR}/cmake/bullet_rounding.cpp LINK_LIBRARIES PkgConfig::JFPX_BULLET_F32)
+  if(JFPX_BULLET_ROUNDING_COMPILED AND JFPX_BULLET_ROUNDING EQUAL 1)
+    set(JFPX_HAS_BULLET OFF)
+    set(reason "Bullet's library has fused multiply-add, whose bits jfpx does not have: it must be compiled with -ffp-contract=off")
+  endif()
+endif()
 if(NOT JFPX_HAS_BULLET)
   if(JFPX_BULLET STREQUAL "ON")
     message(FATAL_ERROR "JFPX_BULLET=ON, but ${reason}")

@@ -39,8 +39,8 @@ class Jfpx(ConanFile):
 
     def validate(self):
         check_min_cppstd(self, 20)
-        if self.settings.os != "Linux" or self.settings.arch != "x86_64":
-            raise ConanInvalidConfiguration("jfpx supports x86-64 Linux only")
+        if self.settings.os != "Linux" or self.settings.arch not in ("x86_64", "armv8"):
+            raise ConanInvalidConfiguration("jfpx supports Linux on x86-64 and ARM64 (armv8)")
 
     def generate(self):
         CMakeDeps(self).generate()

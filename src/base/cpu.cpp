@@ -1,14 +1,20 @@
-/// Processor detection through the cpuid instruction.
+/// Detection of the processor: cpuid on x86-64, the main ID register on ARM64.
 #include "src/base/cpu.hpp"
 
 #include <algorithm>
-#include <cpuid.h>
 #include <cstring>
+
+#if defined(__x86_64__)
+#include <cpuid.h>
+#else
+#include <fstream>
+#endif
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
+#if defined(__x86_64__)
 /// The brand string (AMD64 manual vol. 3, E.4.3: leaves 0x80000002 to 0x80000004).
 std::string brand() {
   unsigned words[12] = {};
@@ -24,6 +30,14 @@ std::string brand() {
   if (first == std::string::npos) return "x86-64";
   return name.substr(first, name.find_last_not_of(' ') + 1 - first);
 }
+#else
+/// Implementer, variant, part and revision (Arm ARM, MIDR_EL1), which Linux shows in sysfs.
+std::string brand() {
+  std::ifstream file("/sys/devices/system/cpu/cpu0/regs/identification/midr_el1");
+  std::string midr;
+  return file >> midr ? "ARM64 " + midr : "ARM64";
+}
+#endif
 
 const char* name_of(SimdLevel level) {
   switch (level) {
@@ -31,8 +45,13 @@ const char* name_of(SimdLevel level) {
       return "AVX-512";
     case SimdLevel::avx2:
       return "AVX2";
+#if defined(__x86_64__)
     case SimdLevel::sse2:
       return "SSE2";
+#else
+    case SimdLevel::neon:
+      return "NEON";
+#endif
     default:
       return "scalar";
   }
@@ -40,8 +59,9 @@ const char* name_of(SimdLevel level) {
 
 }  // namespace
 
-// __builtin_cpu_supports() also checks that the operating system saves the wide registers.
 SimdLevel widest_simd_level() noexcept {
+#if defined(__x86_64__)
+  // __builtin_cpu_supports() also checks that the operating system saves the wide registers.
   __builtin_cpu_init();
   if (__builtin_cpu_supports("popcnt") && __builtin_cpu_supports("avx2")) {
     const bool wide = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
@@ -49,6 +69,9 @@ SimdLevel widest_simd_level() noexcept {
     return wide ? SimdLevel::avx512 : SimdLevel::avx2;
   }
   return SimdLevel::sse2;
+#else
+  return SimdLevel::neon;
+#endif
 }
 
 SimdLevel usable_simd_level(SimdLevel wanted) noexcept {

@@ -12,7 +12,13 @@ inline namespace JFPX_ABI {
 ///
 /// Uses inline assembly instead of __builtin_prefetch: GCC treats a function that contains only
 /// __builtin_prefetch as free of side effects and silently removes calls that were not inlined.
-inline void prefetch(const void* address) { asm volatile("prefetcht1 (%0)" : : "r"(address)); }
+inline void prefetch(const void* address) {
+#if defined(__x86_64__)
+  asm volatile("prefetcht1 (%0)" : : "r"(address));
+#else
+  asm volatile("prfm pldl2keep, [%0]" : : "r"(address));
+#endif
+}
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

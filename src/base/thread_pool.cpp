@@ -3,6 +3,8 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/pause.hpp"
+
 #include <algorithm>
 #include <string>
 #include <system_error>
@@ -16,15 +18,6 @@ namespace {
 /// Some tens of microseconds, more than most serial parts between two loops of a step.
 constexpr unsigned kPolls = 2000;
 constexpr std::uint64_t kChunksLeft = 0xffffffffu;
-
-/// Leaves the core to its other hardware thread for some cycles.
-void pause() {
-#if defined(__x86_64__) || defined(__i386__)
-  __builtin_ia32_pause();
-#else
-  std::this_thread::yield();
-#endif
-}
 
 }  // namespace
 

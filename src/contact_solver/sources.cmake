@@ -4,7 +4,6 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/greedy_coloring.cpp
   ${CMAKE_CURRENT_LIST_DIR}/group_solver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/row_order.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_avx2.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_scalar.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/row_solver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/soft_step_solver.cpp)
@@ -12,5 +11,8 @@ list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/group_solver_cuda.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/row_kernels.cu)
 # Chosen at run time, like the kernels of sphere_collider.
-set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_avx2.cpp
-  PROPERTIES COMPILE_OPTIONS "-mavx2;-mpopcnt")
+if(JFPX_PROCESSOR STREQUAL "x86_64")
+  list(APPEND JFPX_SOURCES ${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_avx2.cpp)
+  set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_avx2.cpp
+    PROPERTIES COMPILE_OPTIONS "-mavx2;-mpopcnt")
+endif()

@@ -9,10 +9,8 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cpu/cell_grid.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/cell_sweep.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/contact_writer.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx512.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_baseline.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_scalar.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_sse2.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/sphere_collider_cpu.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/all_pairs.cu
@@ -29,8 +27,13 @@ list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/systems.cu)
 # These sources alone use instruction sets that the baseline does not include; base/cpu.hpp selects among
 # them at run time. cpu/kernels.hpp explains why they must not share inline functions with other sources.
-set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp
-  PROPERTIES COMPILE_OPTIONS "-mavx2;-mpopcnt")
-# g++ 12 reports an uninitialized value in its own _mm512_undefined_epi32() (GCC bug 105593).
-set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx512.cpp
-  PROPERTIES COMPILE_OPTIONS "-mavx512f;-mavx512bw;-mavx512dq;-mavx512vl;-mpopcnt;$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
+if(JFPX_PROCESSOR STREQUAL "x86_64")
+  list(APPEND JFPX_SOURCES
+    ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp
+    ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx512.cpp)
+  set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp
+    PROPERTIES COMPILE_OPTIONS "-mavx2;-mpopcnt")
+  # g++ 12 reports an uninitialized value in its own _mm512_undefined_epi32() (GCC bug 105593).
+  set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx512.cpp
+    PROPERTIES COMPILE_OPTIONS "-mavx512f;-mavx512bw;-mavx512dq;-mavx512vl;-mpopcnt;$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
+endif()

@@ -5,11 +5,17 @@
 
 #include <cfenv>
 #include <chrono>
+#include <cstdint>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
+
+#if defined(__x86_64__)
+#include <xmmintrin.h>
+#endif
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -65,6 +71,31 @@ TEST(ThreadPool, ComputesInTheFloatingPointEnvironmentOfTheCaller) {
     });
     std::fesetround(FE_TONEAREST);
     EXPECT_EQ(modes, std::vector<int>(kChunks, mode));
+  }
+}
+
+/// Sets flush-to-zero of the calling thread.
+void flush_denormals(bool flush) {
+#if defined(__x86_64__)
+  _MM_SET_FLUSH_ZERO_MODE(flush ? _MM_FLUSH_ZERO_ON : _MM_FLUSH_ZERO_OFF);
+#else
+  asm volatile("msr fpcr, %0" : : "r"(std::uint64_t{flush} << 24));
+#endif
+}
+
+TEST(ThreadPool, FlushesDenormalsWhereTheCallerDoes) {
+  ThreadPool pool(4);
+  constexpr std::size_t kChunks = 64;
+  for (const bool flush : {false, true, false}) {
+    std::vector<int> flushed(kChunks, -1);
+    flush_denormals(flush);
+    pool.run(kChunks, [&](std::size_t i) {
+      volatile float smallest = std::numeric_limits<float>::min();
+      flushed[i] = smallest / 2 == 0;
+      std::this_thread::sleep_for(std::chrono::microseconds(50));  // so that workers take part
+    });
+    flush_denormals(false);
+    EXPECT_EQ(flushed, std::vector<int>(kChunks, flush));
   }
 }
 

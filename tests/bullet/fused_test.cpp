@@ -18,7 +18,9 @@ TEST(FusedProducts, AreAbsentFromAProgramForTheBaseline) {
 }
 
 TEST(FusedProducts, AreDetectedAndReported) {
+#if defined(__x86_64__)
   if (!__builtin_cpu_supports("fma")) GTEST_SKIP() << "this processor has no FMA";
+#endif
   btDefaultCollisionConfiguration configuration;
   const auto dispatcher = FusedUnit::dispatcher(&configuration, {});
   EXPECT_NE(dispatcher->stats().warning.find("-ffp-contract=off"), std::string::npos);

@@ -27,9 +27,13 @@ jfpx_add_test(bullet_verify_test INTERNAL SOURCES
   bullet/scene_world_test.cpp
   bullet/verify_test.cpp
   LINK jfpx_bullet)
-# After the options that linking jfpx::bullet adds.
+# After the options that linking jfpx::bullet adds. Every ARM64 processor has FMA.
+set(fused -O3 -ffp-contract=fast)
+if(JFPX_PROCESSOR STREQUAL "x86_64")
+  list(APPEND fused -mfma)
+endif()
 set_source_files_properties(bullet/fused_unit.cpp PROPERTIES
-  COMPILE_OPTIONS "-O3;-mfma;-ffp-contract=fast" SKIP_PRECOMPILE_HEADERS ON)
+  COMPILE_OPTIONS "${fused}" SKIP_PRECOMPILE_HEADERS ON)
 jfpx_add_test(bullet_trajectory_test SOURCES
   bullet/trajectory_test.cpp
   LINK jfpx_bullet)

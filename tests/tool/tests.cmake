@@ -21,3 +21,9 @@ endif()
 add_test(NAME identity_counts_killed_comparisons COMMAND ${PROJECT_SOURCE_DIR}/scripts/identity
   --jfpx ${CMAKE_CURRENT_SOURCE_DIR}/tool/killer.sh --only "overlap" --precision float --threads 1)
 set_tests_properties(identity_counts_killed_comparisons PROPERTIES PASS_REGULAR_EXPRESSION "2 of 2 comparisons FAILED")
+
+# The list of docs/conformance.md. Programs that are cross-compiled: scripts/check arm.
+if(JFPX_PRECISIONS STREQUAL "both" AND NOT CMAKE_CROSSCOMPILING)
+  add_test(NAME Conformance COMMAND ${PROJECT_SOURCE_DIR}/scripts/conformance --build ${PROJECT_BINARY_DIR})
+  set_tests_properties(Conformance PROPERTIES TIMEOUT 300)
+endif()

@@ -30,6 +30,9 @@ jfpx_add_test(world_test SOURCES
   world/sensor_test.cpp
   world/snapshot_test.cpp
   world/world_test.cpp)
+jfpx_add_test(portable_files_test SOURCES world/portable_files_test.cpp)
+set_source_files_properties(world/portable_files_test.cpp PROPERTIES
+  COMPILE_DEFINITIONS "JFPX_FILES=\"${CMAKE_CURRENT_SOURCE_DIR}/world/files/\"")
 jfpx_add_test(quality_test SOURCES
   world/equilibrium_test.cpp
   world/friction_test.cpp

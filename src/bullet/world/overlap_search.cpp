@@ -2,12 +2,12 @@
 #include "src/bullet/world/overlap_search.hpp"
 
 #include "src/base/prefetch.hpp"
+#include "src/base/real_lanes.hpp"
 #include "src/base/reserve.hpp"
 #include "src/base/spatial_order.hpp"
 
 #include <algorithm>
 #include <bit>
-#include <emmintrin.h>
 #include <limits>
 #include <utility>
 
@@ -93,28 +93,15 @@ bool OverlapSearch::overlap(const Box& a, const Box& b) {
 
 // With intrinsics, because compilers do not vectorize a loop that makes a bit mask.
 unsigned OverlapSearch::test(const Block& block, const Box& box) {
+  using namespace cpu;
   unsigned mask = 0;
-  constexpr unsigned kLanes = 16 / sizeof(Real);
-  for (unsigned lane = 0; lane < kWidth; lane += kLanes) {
-#if defined(JFPX_DOUBLE_PRECISION)
-    __m128d hit = _mm_cmpeq_pd(_mm_setzero_pd(), _mm_setzero_pd());
-    for (int i = 0; i < 3; ++i) {
-      hit = _mm_and_pd(hit,
-                       _mm_cmple_pd(_mm_load_pd(&block.lower[i][lane]), _mm_set1_pd(box.upper[i])));
-      hit = _mm_and_pd(hit,
-                       _mm_cmpge_pd(_mm_load_pd(&block.upper[i][lane]), _mm_set1_pd(box.lower[i])));
-    }
-    mask |= static_cast<unsigned>(_mm_movemask_pd(hit)) << lane;
-#else
-    __m128 hit = _mm_cmpeq_ps(_mm_setzero_ps(), _mm_setzero_ps());
-    for (int i = 0; i < 3; ++i) {
-      hit = _mm_and_ps(hit,
-                       _mm_cmple_ps(_mm_load_ps(&block.lower[i][lane]), _mm_set1_ps(box.upper[i])));
-      hit = _mm_and_ps(hit,
-                       _mm_cmpge_ps(_mm_load_ps(&block.upper[i][lane]), _mm_set1_ps(box.lower[i])));
-    }
-    mask |= static_cast<unsigned>(_mm_movemask_ps(hit)) << lane;
-#endif
+  for (std::size_t lane = 0; lane < kWidth; lane += kRealLanes) {
+    const auto overlap_along = [&](std::size_t i) {
+      return both(less_equal(load_lanes(&block.lower[i][lane]), set_lanes(box.upper[i])),
+                  less_equal(set_lanes(box.lower[i]), load_lanes(&block.upper[i][lane])));
+    };
+    const LaneMask hit = both(both(overlap_along(0), overlap_along(1)), overlap_along(2));
+    mask |= bits(hit) << lane;
   }
   return mask;
 }

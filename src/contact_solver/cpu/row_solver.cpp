@@ -2,6 +2,7 @@
 #include "src/contact_solver/cpu/row_solver.hpp"
 
 #include "src/base/cpu.hpp"
+#include "src/base/pause.hpp"
 
 #include <algorithm>
 #include <array>
@@ -26,8 +27,11 @@ constexpr std::size_t kSeveralThreads = 0;
 /// [us] Shorter than any sweep over a block, so that the chooser measures both alternatives.
 constexpr double kLowerBoundBlockUs = 1e-4;
 
-const RowKernels& row_kernels(SimdLevel simd) {
-  return usable_simd_level(simd) >= SimdLevel::avx2 ? kAvx2RowKernels : kScalarRowKernels;
+const RowKernels& row_kernels([[maybe_unused]] SimdLevel simd) {
+#if defined(__x86_64__)
+  if (usable_simd_level(simd) >= SimdLevel::avx2) return kAvx2RowKernels;
+#endif
+  return kScalarRowKernels;
 }
 
 bool all_finite(const Real* values, std::size_t count) {
@@ -49,7 +53,7 @@ class Backoff {
   /// Waits a moment. @return false when the limit is reached
   bool wait() {
     if (waits_ < kSpins) {
-      __builtin_ia32_pause();
+      pause();
     } else {
       if (!endless_ && waits_ >= kSpins + kYields) return false;
       std::this_thread::yield();

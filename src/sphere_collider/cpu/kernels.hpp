@@ -70,7 +70,7 @@ struct Kernels {
 };
 
 extern const Kernels kScalarKernels;
-extern const Kernels kSse2Kernels;
+extern const Kernels kBaselineKernels;
 extern const Kernels kAvx2Kernels;
 extern const Kernels kAvx512Kernels;
 

@@ -20,12 +20,14 @@ namespace {
 
 const Kernels& kernels_for(SimdLevel usable) noexcept {
   switch (usable) {
+#if defined(__x86_64__)
     case SimdLevel::avx512:
       return kAvx512Kernels;
     case SimdLevel::avx2:
       return kAvx2Kernels;
-    case SimdLevel::sse2:
-      return kSse2Kernels;
+#endif
+    case SimdLevel::sse2:  // or neon
+      return kBaselineKernels;
     default:
       return kScalarKernels;
   }

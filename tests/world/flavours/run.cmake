@@ -1,31 +1,56 @@
-# Builds and runs the pinned hashes with each compiler, optimisation level and kind of processor:
-#   cmake -DBINARY_DIR=... -DCONFIG_DIR=<where jfpx/config.hpp is> [-DLAUNCHER=ccache] [-DALL=ON] -P run.cmake
-# Without ALL the two ends: not optimised for any x86-64, and most of all for this processor. With it, all of
-# them and as many threads as 1 to 8. What this processor or machine can't do is said and left out.
-file(STRINGS /proc/cpuinfo flags REGEX "^flags" LIMIT_COUNT 1)
-# What each level has that the one below has not, and the compilers use.
-set(needs_v2 sse4_2 ssse3 popcnt)
-set(needs_v3 avx2 fma bmi2)
-set(needs_v4 avx512f avx512dq avx512vl)
-set(kinds "")
-foreach(level IN ITEMS v2 v3 v4)
-  set(missing "")
-  foreach(need IN LISTS needs_${level})
-    if(NOT flags MATCHES " ${need}( |$)")
-      list(APPEND missing ${need})
-    endif()
-  endforeach()
-  if(missing)
-    message("skipped: x86-64-${level}, for this processor lacks ${missing}")
-  else()
-    list(APPEND kinds " -march=x86-64-${level}")
-  endif()
-endforeach()
+# Builds and runs the pinned hashes with each compiler, optimisation level and kind of processor, and searches the
+# programs for fused products:
+#   cmake -DBINARY_DIR=... -DCONFIG_DIR=<where jfpx/config.hpp is> [-DLAUNCHER=ccache] [-DPROCESSOR=aarch64]
+#         [-DALL=ON] [-DTHREADS="1;3"] -P run.cmake
+# Without ALL the two ends: not optimised for any processor of the architecture, and most of all for the best that can
+# run. With it, all of them and as many threads as 1 to 8. PROCESSOR is x86_64 or aarch64; the other than this machine's
+# is compiled with cmake/aarch64-linux-gnu.cmake and runs under qemu. What can't run here is said and left out.
+cmake_host_system_information(RESULT host QUERY OS_PLATFORM)
+if(NOT PROCESSOR)
+  set(PROCESSOR ${host})
+endif()
+set(toolchain "")
+set(emulator "")
+set(gcc_prefix "")
+if(NOT PROCESSOR STREQUAL host)
+  set(toolchain ${CMAKE_CURRENT_LIST_DIR}/../../../cmake/${PROCESSOR}-linux-gnu.cmake)
+  include(${toolchain})
+  set(emulator ${CMAKE_CROSSCOMPILING_EMULATOR})
+  set(gcc_prefix ${PROCESSOR}-linux-gnu-)
+endif()
 
-set(flavours "")
-set(threads 1)
+# Kinds of processors, the best last, and what each has that those before it have not and the compilers use.
+if(PROCESSOR STREQUAL "x86_64")
+  set(kinds x86-64-v2 x86-64-v3 x86-64-v4)
+  set(needs_x86-64-v2 sse4_2 ssse3 popcnt)
+  set(needs_x86-64-v3 avx2 fma bmi2)
+  set(needs_x86-64-v4 avx512f avx512dq avx512vl)
+  set(fused "vfn?m(add|sub)")
+elseif(PROCESSOR STREQUAL "aarch64")
+  set(kinds armv8.2-a armv9-a)
+  set(needs_armv8.2-a asimdrdm dcpop)
+  set(needs_armv9-a sve2)
+  set(fused "[[:space:]](fn?m(add|sub)|fn?ml[as]|fn?m(ad|sb)|fcmla|fmlal|fmlsl)2?[[:space:]]") # scalar, NEON, SVE
+else()
+  message(FATAL_ERROR "jfpx does not support ${PROCESSOR}")
+endif()
+if(NOT emulator) # qemu emulates all of them
+  file(STRINGS /proc/cpuinfo flags REGEX "^(flags|Features)" LIMIT_COUNT 1)
+  foreach(kind IN LISTS kinds)
+    foreach(need IN LISTS needs_${kind})
+      if(NOT flags MATCHES " ${need}( |$)")
+        message("skipped: ${kind}, for this processor lacks ${need}")
+        list(REMOVE_ITEM kinds ${kind})
+        break()
+      endif()
+    endforeach()
+  endforeach()
+endif()
+list(TRANSFORM kinds PREPEND " -march=")
+
 if(ALL)
-  set(threads 1 2 3 4 5 6 7 8)
+  set(THREADS 1 2 3 4 5 6 7 8)
+  set(flavours "")
   foreach(level IN ITEMS -O0 -O2 -O3)
     list(APPEND flavours "${level}")
     foreach(kind IN LISTS kinds)
@@ -39,11 +64,14 @@ else()
   endforeach()
   set(flavours "-O0" "-O3${best}")
 endif()
+if(NOT THREADS)
+  set(THREADS 1)
+endif()
 
-find_program(objdump objdump REQUIRED)
+find_program(objdump ${gcc_prefix}objdump REQUIRED)
 cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
 set(others "")
-foreach(compiler IN ITEMS g++ clang++)
+foreach(compiler IN ITEMS ${gcc_prefix}g++ clang++)
   find_program(path_of_${compiler} ${compiler})
   if(NOT path_of_${compiler})
     message("skipped: ${compiler} is not installed")
@@ -52,8 +80,12 @@ foreach(compiler IN ITEMS g++ clang++)
   foreach(flavour IN LISTS flavours)
     string(REPLACE " -march=" "-" folder "${flavour}")
     set(build ${BINARY_DIR}/${compiler}${folder})
+    if(toolchain)
+      set(build ${BINARY_DIR}/${PROCESSOR}/${compiler}${folder})
+    endif()
     execute_process(
-      COMMAND ${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${build} -G Ninja
+      COMMAND ${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${build} -G Ninja --no-warn-unused-cli
+        -DCMAKE_TOOLCHAIN_FILE=${toolchain}
         -DCMAKE_CXX_COMPILER=${path_of_${compiler}} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
         -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS=${flavour} -DCONFIG_DIR=${CONFIG_DIR}
       OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
@@ -64,18 +96,18 @@ foreach(compiler IN ITEMS g++ clang++)
     endif()
     foreach(suffix IN ITEMS "" "_f64")
       set(program ${build}/pinned_hashes${suffix})
-      execute_process(COMMAND ${program} ${threads} OUTPUT_VARIABLE output RESULT_VARIABLE result)
+      execute_process(COMMAND ${emulator} ${program} ${THREADS} OUTPUT_VARIABLE output RESULT_VARIABLE result)
       # Also where no scene comes by.
-      execute_process(COMMAND ${objdump} -d ${program} COMMAND grep -cE "vfn?m(add|sub)"
-        OUTPUT_VARIABLE fused OUTPUT_STRIP_TRAILING_WHITESPACE RESULTS_VARIABLE results)
+      execute_process(COMMAND ${objdump} -d ${program} COMMAND grep -cE "${fused}"
+        OUTPUT_VARIABLE found OUTPUT_STRIP_TRAILING_WHITESPACE RESULTS_VARIABLE results)
       if(NOT results MATCHES "^0;")
         message(FATAL_ERROR "${objdump} can't read ${program}")
       endif()
       if(NOT result EQUAL 0)
         message("${compiler} ${flavour}${suffix}: OTHER HASHES\n${output}")
         list(APPEND others "${compiler} ${flavour}${suffix}")
-      elseif(NOT fused EQUAL 0)
-        message("${compiler} ${flavour}${suffix}: same hashes, but ${fused} FUSED PRODUCTS")
+      elseif(NOT found EQUAL 0)
+        message("${compiler} ${flavour}${suffix}: same hashes, but ${found} FUSED PRODUCTS")
         list(APPEND others "${compiler} ${flavour}${suffix}")
       else()
         message("${compiler} ${flavour}${suffix}: same hashes")
