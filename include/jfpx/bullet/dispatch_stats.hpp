@@ -44,7 +44,8 @@ inline constexpr std::size_t kOrderReasonCount = 7;
 /// A short text for a table, for example "contact callback".
 JFPX_API std::string_view to_string(OrderReason reason) noexcept;
 
-/// Counters since construction or reset_stats(). Pairs are counted only in batches.
+/// Counters since construction or reset_stats(). Pairs are counted only in batches; a batch without
+/// active bodies changes no manifold and counts only `pairs`.
 struct DispatchStats {
   std::uint64_t dispatches = 0;     ///< calls of dispatchAllCollisionPairs
   std::uint64_t batches = 0;        ///< dispatches that were computed by the collider

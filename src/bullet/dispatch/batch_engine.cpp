@@ -102,13 +102,15 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
       *fallback = Fallback::no_spheres;
       return false;
     }
-    touching_ = {};
-    if (spheres >= 2) find_touching();
     order_reason_ = reason_for_order(batch_, traits.may_override_filter);
     // A pair cache of a user's class may observe the traversal itself.
     if (order_reason_ == OrderReason::none && !is_exactly<btHashedOverlappingPairCache>(cache)) {
       order_reason_ = OrderReason::pair_cache;
     }
+    touching_ = {};
+    is_asleep_ = order_reason_ == OrderReason::none && (batch_.any_trait() & kActive) == 0;
+    if (is_asleep_) return true;
+    if (spheres >= 2) find_touching();
     if (order_reason_ == OrderReason::none) {
       unordered_commit_.reserve(pairs_.size());
     } else {
@@ -163,7 +165,7 @@ bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, const DispatcherTr
   stats_.last_order = order_reason_;
   stats_.pairs += pairs.size();
   const auto prepared = Clock::now();
-  commit(dispatcher, cache, info, argument);
+  if (!is_asleep_) commit(dispatcher, cache, info, argument);
   stats_.prepare_ms += milliseconds(start, prepared);
   stats_.commit_ms += milliseconds(prepared, Clock::now());
   return true;

@@ -54,6 +54,7 @@ class Committer {
     for (std::size_t k = 0; k < visits.size(); ++k) {
       if (k + kVisitsAhead < visits.size()) prefetch_commit(visits[k + kVisitsAhead]);
       const std::uint32_t i = visits[k];
+      while (next_ != last_ && next_->pair < i) ++next_;  // pairs that are not active
       const bool touches = next_ != last_ && next_->pair == i;
       if (!commit(i, touches ? next_++ : nullptr)) remaining[count++] = i;
     }
@@ -68,9 +69,9 @@ class Committer {
   static constexpr std::size_t kVisitsAhead = 10;
 
   /// The pairs that need a visit: those that touch or have points, and all that are not of two
-  /// spheres. The number of points must be read for every sphere pair, because Bullet also clears
-  /// points that a user has added. The loop does nothing else, so that it is limited only by
-  /// memory.
+  /// spheres. The number of points must be read for every sphere pair of an active body, because
+  /// Bullet also clears points that a user has added. The loop does nothing else, so that it is
+  /// limited only by memory.
   std::span<const std::uint32_t> find_visits() {
     std::size_t count = 0;
     for (std::size_t i = begin_; i < std::min(end_, begin_ + kCountsAhead); ++i)
@@ -78,27 +79,38 @@ class Committer {
     for (std::size_t i = begin_; i < end_; ++i) {
       if (i + kCountsAhead < end_) prefetch_point_count(i + kCountsAhead);
       found_[count] = static_cast<std::uint32_t>(i);
-      const bool is_empty =
-          batch_.kind(i) == PairKind::spheres && batch_.manifold(i)->getNumContacts() == 0;
+      const bool is_empty = batch_.kind(i) == PairKind::spheres &&
+                            (!is_active(i) || batch_.manifold(i)->getNumContacts() == 0);
       count += is_empty ? 0 : 1;
     }
     return with_touching({found_.data(), count});
   }
-  /// The union of two ascending lists: `found`, and the touching pairs of this range.
+  /// The union of two ascending lists: `found`, and the touching pairs of this range, except those
+  /// that are not active.
   std::span<const std::uint32_t> with_touching(std::span<const std::uint32_t> found) {
     auto out = visits_.begin();
     const PairContact* touching = next_;
     const PairContact* const end = first_contact({next_, last_}, end_);
+    const auto add_touching = [&] {
+      const std::uint32_t i = touching++->pair;
+      if (is_active(i)) {
+        *out++ = i;
+      } else if (batch_.both_are_spheres(i)) {
+        ++counts_.touching;
+      }
+    };
     for (const std::uint32_t i : found) {
-      while (touching != end && touching->pair < i) *out++ = touching++->pair;
+      while (touching != end && touching->pair < i) add_touching();
       if (touching != end && touching->pair == i) ++touching;
       *out++ = i;
     }
-    while (touching != end) *out++ = touching++->pair;
+    while (touching != end) add_touching();
     return {visits_.begin(), out};
   }
+  /// Bullet does not process a pair of two inactive bodies.
+  bool is_active(std::size_t i) const { return (batch_.either_trait(i) & kActive) != 0; }
   void prefetch_point_count(std::size_t i) const {
-    if (batch_.kind(i) == PairKind::spheres) prefetch_count(batch_.manifold(i));
+    if (batch_.kind(i) == PairKind::spheres && is_active(i)) prefetch_count(batch_.manifold(i));
   }
   void prefetch_commit(std::size_t i) const {
     if (batch_.kind(i) != PairKind::spheres) return;
@@ -119,7 +131,6 @@ class Committer {
     if (!batch_.both_are_spheres(i)) return false;  // the user has replaced a shape
     count_pair(contact);
     const unsigned traits = batch_.either_trait(i);
-    if ((traits & kActive) == 0) return true;
     if ((traits & kCustomMaterial) != 0 || manifold->getBody0() != batch_.body_a(i)) return false;
     if (contact != nullptr && !has_finite_values(*contact)) return false;
     if ((traits & kHasIgnoreList) != 0 && !needs_collision(i)) return true;
