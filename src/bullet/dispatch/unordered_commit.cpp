@@ -22,6 +22,8 @@ namespace {
 /// microsecond.
 constexpr std::size_t kConvexChunk = 64;
 constexpr std::size_t kConvexAhead = 4;
+/// Number of pairs from which several threads update them; waking threads takes longer than fewer.
+constexpr std::size_t kSharedConvexPairs = 512;
 
 void prefetch_convex(const SphereBatch& batch, std::size_t i) {
   if (batch.manifold(i) == nullptr) return;
@@ -203,9 +205,11 @@ CommitCounts UnorderedCommit::commit_spheres(const ConvexDispatch& dispatch,
 CommitCounts UnorderedCommit::commit_convex_pairs(const ConvexDispatch& dispatch,
                                                   ThreadPool& pool) {
   const std::size_t n = remaining_count_;
-  const std::size_t chunks = (n + kConvexChunk - 1) / kConvexChunk;
+  if (n == 0) return {};
+  const std::size_t size = n < kSharedConvexPairs ? n : kConvexChunk;
+  const std::size_t chunks = (n + size - 1) / size;
   pool.run(chunks, [&](std::size_t chunk) {
-    const std::size_t begin = chunk * kConvexChunk, end = std::min(n, begin + kConvexChunk);
+    const std::size_t begin = chunk * size, end = std::min(n, begin + size);
     Chunk part;
     for (std::size_t k = begin; k < end; ++k) {
       if (k + kConvexAhead < end) prefetch_convex(dispatch.batch, remaining_[k + kConvexAhead]);
@@ -214,7 +218,7 @@ CommitCounts UnorderedCommit::commit_convex_pairs(const ConvexDispatch& dispatch
     }
     chunks_[chunk] = part;
   });
-  return collect(chunks, kConvexChunk);
+  return collect(chunks, size);
 }
 
 /// Joins the lists of the chunks, and returns the sum of their counts.

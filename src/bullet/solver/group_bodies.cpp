@@ -23,7 +23,7 @@ void ConstraintSolver::Impl::set_up_bodies() {
   flags.assign(count + 1, kInfiniteMass | kImmovable);
   factors = false;
   warm = false;
-  in_chunks(solver.pool(), count, kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+  in_chunks(pool(), count, kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       if (i + 8 < last) prefetch_bytes(bodies[i + 8], sizeof(btRigidBody));
       set_up_body(i, bodies[i]);
