@@ -17,6 +17,7 @@ void ConstraintSolver::Impl::set_up_bodies() {
   BT_PROFILE("convertBodies");
   const std::size_t count = bodies.size();
   self.m_tmpSolverBodyPool.resizeNoInitialize(0);
+  self.m_kinematicBodyUniqueIdToSolverBodyTable.resizeNoInitialize(0);  // used with BT_THREADSAFE
   self.m_tmpSolverBodyPool.reserve(static_cast<int>(count) + 1);
   self.m_tmpSolverBodyPool.resizeNoInitialize(static_cast<int>(count));
   solver.resize_bodies(count + 1);
