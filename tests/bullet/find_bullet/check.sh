@@ -19,7 +19,7 @@ module old bullet 3.08 ""
 expect() { # FOLDER PRECISIONS RESULT
   rm -rf "$work/build"
   local output
-  output=$(PKG_CONFIG_LIBDIR=$work/$1 PKG_CONFIG_PATH= cmake -S "$here" -B "$work/build" -DPRECISIONS="$2" 2>&1)
+  output=$(PKG_CONFIG_LIBDIR=$work/$1 PKG_CONFIG_PATH='' cmake -S "$here" -B "$work/build" -DPRECISIONS="$2" 2>&1)
   grep -qF -- "-- found: $3" <<<"$output" || {
     echo "find_bullet: $1 for $2: no \"$3\" in: $output" >&2
     exit 1
