@@ -1,7 +1,9 @@
-/// Steps of scenes from the start: a stock Bullet world against one with all parts of jfpx, on all
-/// threads and with a GPU if there is one. Wall clock; sums over all steps, by part of the step.
+/// Steps of scenes from the start, and of one that has settled: a stock Bullet world against one
+/// with all parts of jfpx, on all threads and with a GPU if there is one. Wall clock; means over
+/// all steps, by part of the step.
 ///
 /// Both worlds step alternately and end with the same state hash.
+#include "bench/bullet/ragdolls.hpp"
 #include "bench/bullet/step_parts.hpp"
 #include "src/scenes/scenes.hpp"
 
@@ -20,10 +22,13 @@ struct Case {
   std::optional<std::uint32_t> boxes;
   std::uint32_t seed;
   int steps;
+  int settle = 0;  ///< steps before the first
 };
 constexpr Case kCases[] = {{"pile", 200, {}, 7, 200},      {"pile", 1024, {}, 7, 200},
                            {"mixed", 1500, 1500, 77, 240}, {"pile", 16384, {}, 991, 200},
-                           {"pile", 65536, {}, 3, 90},     {"gas", 65536, {}, 5, 60}};
+                           {"pile", 65536, {}, 3, 90},     {"gas", 65536, {}, 5, 60},
+                           {"pile", 65536, {}, 3, 30, 600}};
+constexpr int kRagdolls = 500, kRagdollSteps = 240;
 
 SceneWorldOptions our_options(unsigned threads) {
   SceneWorldOptions options;
@@ -35,13 +40,9 @@ double sum(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
-void compare(benchmark::State& state, const Case& c, unsigned threads) {
-  Scene scene = scenes::make(c.scene, {.spheres = c.spheres, .boxes = c.boxes, .seed = c.seed});
-  scene.sleep.enabled = false;
-  SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock,
-                           .solver = SolverKind::stock,
-                           .world = WorldKind::stock});
-  SceneWorld ours(scene, our_options(threads));
+/// Steps both worlds, and reports means and the ratio of the sums.
+template <class World>
+void compare(benchmark::State& state, World& stock, World& ours) {
   Samples stock_samples, our_samples;
   sample_in_turn(state, stock, ours, &stock_samples, &our_samples);
   const auto steps = static_cast<double>(stock_samples.total.size());
@@ -56,20 +57,63 @@ void compare(benchmark::State& state, const Case& c, unsigned threads) {
   }
 }
 
-void register_all() {
-  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
-  for (const Case& c : kCases) {
-    for (const unsigned threads : {1u, cores}) {
-      const std::string name = std::string("from_start/") + c.scene + "/" +
-                               std::to_string(c.spheres) + "/threads:" + std::to_string(threads);
-      benchmark::RegisterBenchmark(
-          name.c_str(), [&c, threads](benchmark::State& state) { compare(state, c, threads); })
-          ->UseManualTime()
-          ->Iterations(c.steps)
-          ->Unit(benchmark::kMillisecond);
-      if (cores == 1) break;
-    }
+/// The scene with the bodies as they are after some steps.
+Scene settled(Scene scene, int steps, unsigned threads) {
+  SceneWorld world(scene, our_options(threads));
+  for (int i = 0; i < steps; ++i) world.step();
+  const std::vector<BodyState> states = world.states();
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    BodyDef& body = scene.bodies[i];
+    body.position = states[i].position;
+    body.orientation = states[i].orientation;
+    body.velocity = states[i].velocity;
+    body.angular_velocity = states[i].angular_velocity;
   }
+  return scene;
+}
+
+void compare_scene(benchmark::State& state, const Case& c, unsigned threads) {
+  Scene scene = scenes::make(c.scene, {.spheres = c.spheres, .boxes = c.boxes, .seed = c.seed});
+  scene.sleep.enabled = false;
+  if (c.settle > 0) scene = settled(std::move(scene), c.settle, threads);
+  SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock,
+                           .solver = SolverKind::stock,
+                           .world = WorldKind::stock});
+  SceneWorld ours(scene, our_options(threads));
+  for (int i = 0; c.settle > 0 && i < 10; ++i) {  // the first step of a world is longer
+    stock.step();
+    ours.step();
+  }
+  compare(state, stock, ours);
+}
+
+void compare_ragdolls(benchmark::State& state, unsigned threads) {
+  RagdollWorld stock(kRagdolls, 0), ours(kRagdolls, threads);
+  compare(state, stock, ours);
+  state.counters["manifolds"] = ours.world().getDispatcher()->getNumManifolds();
+}
+
+template <class Run>
+void add(const std::string& name, int steps, const Run& run) {
+  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+  for (const unsigned threads : {1u, cores}) {
+    benchmark::RegisterBenchmark(
+        ("from_start/" + name + "/threads:" + std::to_string(threads)).c_str(),
+        [run, threads](benchmark::State& state) { run(state, threads); })
+        ->UseManualTime()
+        ->Iterations(steps)
+        ->Unit(benchmark::kMillisecond);
+    if (cores == 1) break;
+  }
+}
+
+void register_all() {
+  for (const Case& c : kCases) {
+    add(std::string(c.scene) + (c.settle > 0 ? "_settled/" : "/") + std::to_string(c.spheres),
+        c.steps,
+        [&c](benchmark::State& state, unsigned threads) { compare_scene(state, c, threads); });
+  }
+  add("ragdolls/" + std::to_string(kRagdolls), kRagdollSteps, compare_ragdolls);
 }
 
 }  // namespace

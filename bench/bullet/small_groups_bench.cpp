@@ -1,6 +1,6 @@
-/// Compares whole steps of a stock Bullet world with a world that has jfpx's parts, for groups in
-/// which little or nothing can be solved in parallel: few boxes, and bodies that all touch one
-/// movable platform.
+/// Compares whole steps of a stock Bullet world with a world that has jfpx's parts, where jfpx can
+/// gain little or nothing: groups in which little can be solved in parallel (few boxes, and bodies
+/// that all touch one movable platform), and worlds that sleep.
 ///
 /// Each benchmark owns two worlds with identical motion and steps both in alternating order, on one
 /// thread, in CPU time. `ratio` is the median time of stock divided by that of jfpx, and
@@ -72,6 +72,15 @@ void compare_steps(benchmark::State& state, const Scene& scene, SimdLevel simd) 
     stock.step();
     ours.step();
   }
+  if (scene.sleep.enabled) {
+    for (SceneWorld* world : {&stock, &ours}) {
+      for (btRigidBody* body : world->bodies()) {
+        if (body->getActivationState() != DISABLE_DEACTIVATION) {
+          body->setActivationState(ISLAND_SLEEPING);
+        }
+      }
+    }
+  }
   std::vector<double> stock_us, our_us;
   const auto time = [](SceneWorld& world, std::vector<double>* us) {
     const double start = now_ms();
@@ -92,6 +101,7 @@ void compare_steps(benchmark::State& state, const Scene& scene, SimdLevel simd) 
   state.counters["ratio"] = median(stock_us) / median(our_us);
   state.counters["mean_ratio"] = std::accumulate(stock_us.begin(), stock_us.end(), 0.0) /
                                  std::accumulate(our_us.begin(), our_us.end(), 0.0);
+  state.counters["pairs"] = ours.world().getPairCache()->getNumOverlappingPairs();
   const ConstraintSolverStats& stats = ours.jfpx_solver()->stats();
   state.counters["groups"] = static_cast<double>(stats.groups);
   for (std::size_t i = 0; i < kSolverFallbacks; ++i) {
@@ -123,6 +133,14 @@ void register_all() {
     pile.sleep.enabled = false;
     add("pile_scalar/" + std::to_string(n), pile, SimdLevel::scalar);
     add("pile/" + std::to_string(n), pile);
+  }
+  for (const std::uint32_t n : {64u, 512u, 4096u}) {
+    Scene pile = scenes::make("pile", {.spheres = n});
+    add("asleep/" + std::to_string(n), pile);
+    BodyDef awake = body_at(Sphere{Real(0.5)}, {1000, 0, 0}, 1);
+    awake.can_sleep = false;
+    pile.bodies.push_back(awake);
+    add("asleep_but_one/" + std::to_string(n), pile);
   }
 }
 

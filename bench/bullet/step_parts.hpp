@@ -82,7 +82,8 @@ struct Samples {
   std::vector<double> total;
   std::array<std::vector<double>, kParts> parts;
 
-  void step(SceneWorld& world) {
+  template <class World>
+  void step(World& world) {
     g_parts = {};
     const double start = now_ms();
     world.step();
@@ -113,8 +114,9 @@ class TimedZones {
 };
 
 /// Steps both worlds in alternating order, once per iteration of the benchmark.
-inline void sample_in_turn(benchmark::State& state, SceneWorld& stock, SceneWorld& ours,
-                           Samples* stock_samples, Samples* our_samples) {
+template <class World>
+void sample_in_turn(benchmark::State& state, World& stock, World& ours, Samples* stock_samples,
+                    Samples* our_samples) {
   const TimedZones timed;
   bool swap = false;
   for (auto _ : state) {

@@ -19,7 +19,11 @@ bool is_thread_safe_library() {
 bool depends_on_thread_safety(const btCollisionObject& object) {
   const btRigidBody* body = btRigidBody::upcast(&object);
   if (body == nullptr) return false;
-  return body->isKinematicObject() || (body->getInvMass() != 0) == body->isStaticObject();
+  if (!body->isKinematicObject()) return (body->getInvMass() != 0) == body->isStaticObject();
+  const btMatrix3x3& inertia = body->getInvInertiaTensorWorld();
+  const bool moves = body->getInvMass() != 0 || !inertia[0].isZero() || !inertia[1].isZero() ||
+                     !inertia[2].isZero();
+  return moves || body->getWorldArrayIndex() < 0;
 }
 
 }  // namespace bullet

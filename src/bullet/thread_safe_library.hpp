@@ -13,9 +13,10 @@ namespace bullet {
 /// The first call asks the library; later ones return the same answer. Thread-safe.
 bool is_thread_safe_library();
 
-/// Whether a solver with BT_THREADSAFE may treat the object differently. It keeps the solver bodies
-/// of kinematic bodies in a table instead of in their companion ids, and decides by the collision
-/// flags instead of the mass whether a body moves.
+/// Whether a solver with BT_THREADSAFE may treat the object differently. It decides by the
+/// collision flags instead of the mass whether a body moves. It also keeps the solver bodies of
+/// kinematic bodies in a table instead of in their companion ids: they may exist twice, which makes
+/// no difference unless impulses change them.
 bool depends_on_thread_safety(const btCollisionObject& object);
 
 }  // namespace bullet

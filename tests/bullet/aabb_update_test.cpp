@@ -382,16 +382,22 @@ void add_cloud_and_giant(BoxWorld& w, int count) {
   }
 }
 
+/// If only the giant moves, Bullet's tree is searched; if all move, all leaves are sorted.
 TEST(AabbUpdate, OrdersThousandsOfNewPairsOfOneLeaf) {
-  for (const unsigned threads : {1u, 3u}) {
-    BoxTwins twins({threads, 0});
+  for (const bool all_move : {false, true}) {
+    BoxTwins twins({3, 0});
     twins.both([](BoxWorld& w) { add_cloud_and_giant(w, 3000); });
     ASSERT_EQ(twins.step(), std::nullopt);
     const int before = twins.ours().tree().getOverlappingPairCache()->getNumOverlappingPairs();
-    twins.both([](BoxWorld& w) { w.object(0).getWorldTransform().setOrigin({10, 10, 10}); });
+    twins.both([&](BoxWorld& w) {
+      for (int i = 0; all_move && i < w.count(); ++i) {
+        w.object(i).getWorldTransform().getOrigin() += btVector3(Real(0.2), 0, 0);
+      }
+      w.object(0).getWorldTransform().setOrigin({10, 10, 10});
+    });
     ASSERT_EQ(twins.step(), std::nullopt);
     const int after = twins.ours().tree().getOverlappingPairCache()->getNumOverlappingPairs();
-    EXPECT_EQ(after - before, 3000);
+    EXPECT_GE(after - before, 3000);
   }
 }
 

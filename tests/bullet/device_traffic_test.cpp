@@ -108,8 +108,9 @@ TEST(DeviceTraffic, ListsOfARestingWorldDoNotChange) {
   EXPECT_EQ(all, (kSide * kSide * sizeof(SphereInstance) + sizeof(SphereInstance) - 1) / kBlock +
                      1 + (pairs * sizeof(SpherePair) - 1) / kBlock + 1);
   ASSERT_TRUE(come_to_rest(&world));
-  for (int step = 0; step < 3; ++step) {
-    world.step();
+  world.bodies()[7]->activate();  // the lists of a world without active bodies are not passed on
+  for (int i = 0; i < 3; ++i) {
+    dispatch(&world);
     EXPECT_EQ(blocks, 0u);
   }
   nudge(&world, 7);
@@ -138,6 +139,8 @@ TEST(DeviceTraffic, NothingIsSentForARestingWorld) {
   ASSERT_TRUE(come_to_rest(&world));
   std::uint64_t before = sent();
   for (int step = 0; step < 3; ++step) world.step();
+  world.bodies()[7]->activate();
+  for (int i = 0; i < 3; ++i) dispatch(&world);
   EXPECT_EQ(sent() - before, 0u);
   nudge(&world, 7);
   before = sent();

@@ -135,6 +135,7 @@ RandomWorld draw_world(auto& random) {
   }
   std::stable_sort(world.events.begin(), world.events.end(),
                    [](const RandomEvent& p, const RandomEvent& q) { return p.step < q.step; });
+  if (chance(random, Real(0.2))) world.threads = 2;
   return world;
 }
 
@@ -215,6 +216,7 @@ class Shrinker {
     set(&RandomWorld::split_islands, true);
     set(&RandomWorld::verify, false);
     set(&RandomWorld::sub_steps, 0);
+    set(&RandomWorld::threads, plain.threads);
     set(&RandomWorld::pool, plain.pool);
     for (unsigned bit = 1; bit < kAllCallbacks; bit <<= 1) {
       set(&RandomWorld::callbacks, world_.callbacks & ~bit);
@@ -261,9 +263,9 @@ std::ostream& operator<<(std::ostream& out, const RandomWorld& world) {
       << world.dt << ", sub steps " << world.sub_steps << ", gravity " << world.gravity
       << ", broadphase " << static_cast<int>(world.broadphase) << ", deterministic "
       << world.deterministic << ", split islands " << world.split_islands << ", verify "
-      << world.verify << ", minimum batch " << world.minimum_batch << ", pool " << world.pool
-      << ", breaking threshold " << world.breaking_threshold << ", callbacks " << world.callbacks
-      << '\n';
+      << world.verify << ", minimum batch " << world.minimum_batch << ", threads " << world.threads
+      << ", pool " << world.pool << ", breaking threshold " << world.breaking_threshold
+      << ", callbacks " << world.callbacks << '\n';
   for (std::size_t i = 0; i < world.bodies.size(); ++i) {
     const RandomBody& body = world.bodies[i];
     if (!body.used) continue;

@@ -106,7 +106,8 @@ struct RandomWorld {
   BroadphaseKind broadphase = BroadphaseKind::tree;
   bool deterministic = false, split_islands = true, verify = false;
   std::size_t minimum_batch = 0;
-  int pool = 64;  ///< manifolds and algorithms before Bullet allocates
+  unsigned threads = 1;  ///< of our dispatcher
+  int pool = 64;         ///< manifolds and algorithms before Bullet allocates
   Real breaking_threshold = Real(0.02);
   unsigned callbacks = 0;
   std::vector<RandomBody> bodies;
@@ -133,7 +134,8 @@ struct Failure {
   std::string what;
 };
 struct RunTotals {
-  std::uint64_t steps = 0, batches = 0, written = 0, touching = 0, verified = 0, events = 0;
+  std::uint64_t steps = 0, batches = 0, written = 0, touching = 0, convex_pairs = 0, verified = 0,
+                events = 0;
 };
 
 /// Steps two worlds side by side, one of them with `ours`; compares all that first_difference()

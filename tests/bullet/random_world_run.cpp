@@ -46,6 +46,7 @@ void add_totals(const RandomWorld& world, LiveWorld& ours, RunTotals* totals) {
   totals->batches += dispatcher->stats().batches;
   totals->touching += dispatcher->stats().touching;
   totals->written += dispatcher->stats().written;
+  totals->convex_pairs += dispatcher->stats().convex_pairs;
   totals->verified += dispatcher->stats().verified;
 }
 
@@ -60,7 +61,9 @@ std::unique_ptr<btCollisionDispatcher> make_ours(btCollisionConfiguration* confi
                                                  const RandomWorld& world) {
   return std::make_unique<CollisionDispatcher>(
       configuration,
-      DispatcherOptions{.minimum_batch = world.minimum_batch, .verify = world.verify});
+      DispatcherOptions{.collider = {.backend = Backend::cpu, .threads = world.threads},
+                        .minimum_batch = world.minimum_batch,
+                        .verify = world.verify});
 }
 
 std::optional<Failure> run(const RandomWorld& world, RunTotals* totals, MakeDispatcher make) {

@@ -39,6 +39,7 @@ TEST(RandomWorlds, MatchStockWorlds) {
   EXPECT_GT(totals.batches, totals.steps / 4) << "enough worlds must run batches";
   EXPECT_GT(totals.touching, totals.steps / 2);
   EXPECT_GT(totals.written, totals.steps / 4);
+  EXPECT_GT(totals.convex_pairs, totals.steps / 20);
   EXPECT_GT(totals.verified, 0u);
   RecordProperty("steps", std::to_string(totals.steps));
   RecordProperty("accidents_of_stock", accidents);

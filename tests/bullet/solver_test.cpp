@@ -235,6 +235,57 @@ TEST(ConstraintSolver, LeavesGroupsWithLittleParallelismToTheFasterCodeWithTheSa
   }
 }
 
+/// All parts of jfpx with three threads, and enough bodies for all of them.
+class ThousandsOfBodies : public ::testing::Test {
+ protected:
+  ThousandsOfBodies() : twins_(options()) {
+    twins_.both([](BulletWorld& w) {
+      Random random(3);
+      btCollisionShape* shape = w.keep(new btSphereShape(btScalar(0.5)));
+      for (int i = 0; i < 2500; ++i) {
+        const Vec3 p = random.uniform_in_box({0, 0, 0}, {15, 15, 15});
+        btRigidBody* body = w.add(shape, btVector3(p.x, p.y, p.z), i % 50 == 0 ? 0 : 1);
+        body->setDamping(btScalar(0.1), btScalar(0.2));
+        body->setAngularVelocity(btVector3(p.x, 1, p.z));
+      }
+    });
+  }
+  static TwinOptions options() {
+    TwinOptions options;
+    options.ours = [](btCollisionConfiguration* c) {
+      return std::make_unique<CollisionDispatcher>(
+          c, DispatcherOptions{.collider = {.backend = Backend::cpu, .threads = 3}});
+    };
+    options.parts.solver = [] {
+      return std::make_unique<ConstraintSolver>(
+          ConstraintSolverOptions{.backend = Backend::cpu, .threads = 3});
+    };
+    options.parts.world = [](btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+                             btConstraintSolver* solver, btCollisionConfiguration* configuration) {
+      return std::make_unique<DynamicsWorld>(dispatcher, broadphase, solver, configuration,
+                                             DynamicsWorldOptions{.threads = 3});
+    };
+    return options;
+  }
+  Twins twins_;
+};
+
+TEST_F(ThousandsOfBodies, MoveAsInStockBullet) { ASSERT_TRUE(twins_.step(4)); }
+
+TEST_F(ThousandsOfBodies, MayBeRemovedAndAddedInOneStep) {
+  for (std::size_t step = 0; step < 4; ++step) {
+    ASSERT_TRUE(twins_.step());
+    twins_.both([&](BulletWorld& w) {
+      for (std::size_t i = 0; i < 1000; ++i) {
+        w.world.removeRigidBody(w.bodies[(7 * i + step) % 2500].get());
+      }
+      for (std::size_t i = 0; i < 1000; ++i) {
+        w.world.addRigidBody(w.bodies[(7 * (999 - i) + step) % 2500].get());
+      }
+    });
+  }
+}
+
 TEST(DynamicsWorld, LeavesSmallWorldsToBulletFromAnyStepOn) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));

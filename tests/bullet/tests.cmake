@@ -103,7 +103,7 @@ jfpx_add_test(bullet_thread_safe_library_test SOURCES
 function(jfpx_add_guard_test name text)
   set(source ${CMAKE_CURRENT_BINARY_DIR}/bullet_guard.cpp)
   file(WRITE ${source} "#include <jfpx/bullet/constraint_solver.hpp>\n")
-  set(includes ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include ${JFPX_BULLET_F32_INCLUDE_DIRS})
+  set(includes ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include ${JFPX_BULLET_F32_INCLUDE_DIRS} ${JFPX_BULLET_F64_INCLUDE_DIRS})
   list(TRANSFORM includes PREPEND -I)
   add_test(NAME bullet_guard_${name} COMMAND sh -c
     "\"${CMAKE_CXX_COMPILER}\" -std=c++20 -fsyntax-only ${ARGN} \"$@\" 2>&1 && echo compiles" guard ${includes} ${source})
@@ -115,12 +115,15 @@ jfpx_add_guard_test(float "this build mixes the two" -DJFPX_DOUBLE_PRECISION)
 jfpx_add_guard_test(none "^compiles")
 jfpx_add_guard_test(threads "^compiles" -DBT_THREADSAFE=1)
 
+add_test(NAME Bullet.OnePrecisionIsEnough COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/bullet/find_bullet/check.sh)
+
 # A library with BT_THREADSAFE from the sources of the installed version, for the same programs.
 if(JFPX_BULLET_SOURCE)
   include(bullet/thread_safe_build.cmake)
 endif()
 
-if(JFPX_TOOL)
+# The library serves programs of both precisions.
+if(JFPX_TOOL AND JFPX_BULLET_F32_FOUND AND JFPX_BULLET_F64_FOUND)
   jfpx_add_executable(bullet_stock_program SOURCES bullet/stock_program.cpp
     LINK jfpx_bullet3rd Threads::Threads)
   jfpx_add_test(bullet_preload_test SOURCES bullet/preload_test.cpp)

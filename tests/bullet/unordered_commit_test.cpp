@@ -1,6 +1,8 @@
 /// Commits in any order match Bullet for spheres, boxes and planes.
 #include "tests/bullet/twin_worlds.hpp"
 
+#include <thread>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
@@ -75,6 +77,134 @@ TEST(UnorderedCommit, HandlesSpheresBetweenPlanes) {
   });
   ASSERT_TRUE(twins.step(200));
   EXPECT_GT(twins.stats().sphere_planes, 1000u);
+}
+
+/// Boxes, capsules, cylinders, cones and spheres on a plane and on a static box, some asleep.
+void add_convex_heap(BulletWorld& w, int count, std::uint64_t seed) {
+  Random random(seed);
+  w.add(w.keep(new btStaticPlaneShape(btVector3(0, 1, 0), 0)), btVector3(0, 0, 0), 0);
+  w.add(w.keep(new btBoxShape(btVector3(4, 1, 4))), btVector3(0, 0, 0), 0);
+  const auto size = [&] { return random.uniform(Real(0.2), Real(0.5)); };
+  const std::function<btCollisionShape*()> makers[] = {
+      [&] { return new btBoxShape(btVector3(size(), size(), size())); },
+      [&] { return new btCapsuleShape(size(), size()); },
+      [&] { return new btCapsuleShapeX(size(), size()); },
+      [&] { return new btCylinderShapeZ(btVector3(size(), size(), size())); },
+      [&] { return new btConeShape(size(), size()); },
+      [&] { return new btSphereShape(size()); }};
+  for (int i = 0; i < count; ++i) {
+    // Half of them are boxes.
+    const std::size_t kind = random.below(2) == 0 ? 0 : random.below(std::size(makers));
+    const Vec3 p = random.uniform_in_box({-3, 1, -3}, {3, 5, 3});
+    btRigidBody* body = w.add(w.keep(makers[kind]()), btVector3(p.x, p.y, p.z));
+    body->setWorldTransform(
+        btTransform(btQuaternion(size(), size(), size()), btVector3(p.x, p.y, p.z)));
+    body->setAngularVelocity(btVector3(size(), size(), size()));
+    if (i % 11 == 0) body->setActivationState(ISLAND_SLEEPING);
+    if (i % 13 == 0) body->setContactStiffnessAndDamping(1000, btScalar(0.1));
+    if (i % 17 == 0) body->setIgnoreCollisionCheck(w.bodies[w.bodies.size() - 2].get(), true);
+  }
+}
+
+TEST(UnorderedCommit, HasBulletsConvexContactsForAnyNumberOfThreads) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  for (const unsigned threads : {1u, 2u, 5u}) {
+    Twins twins(with_threads(threads));
+    twins.both([&](BulletWorld& w) { add_convex_heap(w, 250, seed); });
+    Random random(seed);
+    for (int step = 0; step < 40; ++step) {
+      const std::size_t i = 2 + random.below(250);
+      const Vec3 p = random.uniform_in_box({-3, 1, -3}, {3, 5, 3});
+      twins.both([&](BulletWorld& w) {
+        w.bodies[i]->getWorldTransform().setOrigin(btVector3(p.x, p.y, p.z));
+        if (step % 4 == 0) w.world.removeRigidBody(w.bodies[i].get());
+        if (step % 4 == 0) w.world.addRigidBody(w.bodies[i].get());
+      });
+      ASSERT_TRUE(twins.step()) << threads;
+    }
+    EXPECT_GT(twins.stats().convex_pairs, 40u * 600u) << "several threads must have work";
+  }
+}
+
+TEST(UnorderedCommit, RunsWorldsWithoutSpheresOnSeveralThreadsOnly) {
+  for (const unsigned threads : {1u, 2u}) {
+    Twins twins(with_threads(threads));
+    twins.both([](BulletWorld& w) {
+      for (int i = 0; i < 9; ++i) {
+        w.add(w.keep(new btBoxShape(btVector3(1, 1, 1))), btVector3(0, 2 * btScalar(i), 0),
+              i == 0 ? btScalar(0) : btScalar(1));
+      }
+    });
+    ASSERT_TRUE(twins.step(20));
+    const bool batched = threads > 1;
+    EXPECT_EQ(twins.stats().batches, batched ? 20u : 0u);
+    EXPECT_EQ(twins.stats().convex_pairs > 0, batched);
+  }
+}
+
+/// Remembers the threads that use it.
+class UserCapsule final : public btCapsuleShape {
+ public:
+  using btCapsuleShape::btCapsuleShape;
+  btVector3 localGetSupportingVertex(const btVector3& direction) const override {
+    only_one_thread_ = only_one_thread_ && std::this_thread::get_id() == thread_;
+    return btCapsuleShape::localGetSupportingVertex(direction);
+  }
+  bool only_one_thread() const { return only_one_thread_; }
+
+ private:
+  std::thread::id thread_ = std::this_thread::get_id();
+  mutable bool only_one_thread_ = true;
+};
+
+TEST(UnorderedCommit, LeavesShapesOfTheUserToTheCallingThread) {
+  Twins twins(with_threads(2));
+  std::vector<const UserCapsule*> capsules;
+  twins.both([&](BulletWorld& w) {
+    w.add(w.keep(new btStaticPlaneShape(btVector3(0, 1, 0), 0)), btVector3(0, 0, 0), 0);
+    for (int i = 0; i < 600; ++i) {
+      const btVector3 at(3 * btScalar(i), btScalar(0.8), 0);
+      w.add(w.keep(new btCapsuleShape(btScalar(0.4), btScalar(0.8))), at);
+    }
+  });
+  ASSERT_TRUE(twins.step(3));
+  // The pairs keep their algorithms, which are of Bullet's classes.
+  twins.both([&](BulletWorld& w) {
+    for (std::size_t i = 1; i < w.bodies.size(); ++i) {
+      capsules.push_back(new UserCapsule(btScalar(0.4), btScalar(0.8)));
+      w.bodies[i]->setCollisionShape(w.keep(const_cast<UserCapsule*>(capsules.back())));
+    }
+  });
+  const std::uint64_t before = twins.stats().convex_pairs;
+  EXPECT_GT(before, 0u);
+  ASSERT_TRUE(twins.step(20));
+  EXPECT_EQ(twins.stats().convex_pairs, before);
+  for (const UserCapsule* capsule : capsules) EXPECT_TRUE(capsule->only_one_thread());
+}
+
+/// It stores directions in an array that all threads would share.
+TEST(UnorderedCommit, LeavesTheMinkowskiDepthSolverToBullet) {
+  TwinOptions options = with_threads(2);
+  options.configuration.m_useEpaPenetrationAlgorithm = 0;
+  Twins twins(options);
+  twins.both([](BulletWorld& w) {
+    for (int i = 0; i < 100; ++i) {
+      const btScalar x = btScalar(0.95) * btScalar(i);
+      w.add(w.keep(new btCapsuleShape(btScalar(0.5), 1)), btVector3(x, 0, 0));
+      w.add(w.keep(new btBoxShape(btVector3(1, 1, 1))), btVector3(x, 0, 5));
+    }
+  });
+  ASSERT_TRUE(twins.step(5));
+  EXPECT_GT(twins.stats().convex_pairs, 0u) << "pairs of boxes do not need it";
+  twins.both([](BulletWorld& w) {
+    for (std::size_t i = 1; i < w.bodies.size(); i += 2) {
+      w.world.removeRigidBody(w.bodies[i].get());
+    }
+  });
+  const std::uint64_t before = twins.stats().convex_pairs;
+  ASSERT_TRUE(twins.step(5));
+  EXPECT_EQ(twins.stats().convex_pairs, before);
 }
 
 TEST(UnorderedCommit, LeavesPerturbationToBullet) {

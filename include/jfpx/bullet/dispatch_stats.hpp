@@ -16,7 +16,7 @@ namespace bullet {
 enum class Fallback : std::uint8_t {
   none,
   small_batch,      ///< fewer pairs than minimum_batch
-  no_spheres,       ///< fewer than two spheres among the bodies of the pairs
+  no_spheres,       ///< fewer than two spheres among the bodies of the pairs, and one thread
   near_callback,    ///< the user has set a near callback
   create_function,  ///< the user has registered another SPHERE/SPHERE create function
   continuous,       ///< m_dispatchFunc is not DISPATCH_DISCRETE
@@ -44,7 +44,8 @@ inline constexpr std::size_t kOrderReasonCount = 7;
 /// A short text for a table, for example "contact callback".
 JFPX_API std::string_view to_string(OrderReason reason) noexcept;
 
-/// Counters since construction or reset_stats(). Pairs are counted only in batches.
+/// Counters since construction or reset_stats(). Pairs are counted only in batches; a batch without
+/// active bodies changes no manifold and counts only `pairs`.
 struct DispatchStats {
   std::uint64_t dispatches = 0;     ///< calls of dispatchAllCollisionPairs
   std::uint64_t batches = 0;        ///< dispatches that were computed by the collider
@@ -54,6 +55,7 @@ struct DispatchStats {
   std::uint64_t written = 0;        ///< sphere pairs updated without Bullet's algorithm
   std::uint64_t sphere_boxes = 0;   ///< sphere-box pairs updated without Bullet's algorithm
   std::uint64_t sphere_planes = 0;  ///< sphere-plane pairs updated without Bullet's algorithm
+  std::uint64_t convex_pairs = 0;   ///< other pairs updated by Bullet's algorithms on any thread
   std::uint64_t verified = 0;       ///< pairs recomputed because of set_verify(true)
   std::uint64_t mismatches = 0;     ///< verified pairs that differ in any field
   std::string first_mismatch;       ///< field and both values; empty without a mismatch

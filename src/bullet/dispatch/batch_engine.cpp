@@ -90,21 +90,27 @@ Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatche
 }
 
 /// Runs all stages before the commit, and all operations that may throw. Returns false and sets
-/// `*fallback` if there are fewer than two spheres, or if an operation failed (failures of a device
-/// are handled in find_touching()).
+/// `*fallback` if a batch gains nothing without spheres, or if an operation failed (failures of a
+/// device are handled in find_touching()).
 bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                           btOverlappingPairCache& cache, Fallback* fallback) {
   try {
-    if (!batch_.gather(pairs_, {&dispatcher, traits.reports_releases}, pool_)) {
+    const std::size_t spheres =
+        batch_.gather(pairs_, {&dispatcher, traits.reports_releases}, pool_);
+    // Other pairs gain only from several threads.
+    if (spheres < 2 && pool_.threads() == 1) {
       *fallback = Fallback::no_spheres;
       return false;
     }
-    find_touching();
     order_reason_ = reason_for_order(batch_, traits.may_override_filter);
     // A pair cache of a user's class may observe the traversal itself.
     if (order_reason_ == OrderReason::none && !is_exactly<btHashedOverlappingPairCache>(cache)) {
       order_reason_ = OrderReason::pair_cache;
     }
+    touching_ = {};
+    is_asleep_ = order_reason_ == OrderReason::none && (batch_.any_trait() & kActive) == 0;
+    if (is_asleep_) return true;
+    if (spheres >= 2) find_touching();
     if (order_reason_ == OrderReason::none) {
       unordered_commit_.reserve(pairs_.size());
     } else {
@@ -159,7 +165,7 @@ bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, const DispatcherTr
   stats_.last_order = order_reason_;
   stats_.pairs += pairs.size();
   const auto prepared = Clock::now();
-  commit(dispatcher, cache, info, argument);
+  if (!is_asleep_) commit(dispatcher, cache, info, argument);
   stats_.prepare_ms += milliseconds(start, prepared);
   stats_.commit_ms += milliseconds(prepared, Clock::now());
   return true;
@@ -184,7 +190,9 @@ void BatchEngine::commit_unordered(btCollisionDispatcher& dispatcher, btOverlapp
                                    const btDispatcherInfo& info) {
   const std::size_t n = pairs_.size();
   if (verify_) convex_check_.remember(batch_);
-  add(unordered_commit_.run(dispatcher, batch_, touching_, pool_));
+  // set_verify() runs Bullet's algorithms itself, to compare the results with those of jfpx.
+  const ConvexDispatch dispatch{dispatcher, info, batch_, pairs_, !verify_};
+  add(unordered_commit_.run(dispatch, touching_, pool_));
   if (verify_) check_convex(dispatcher, info);
   unordered_commit_.sort_remaining(pairs_, info.m_deterministicOverlappingPairs);
   visit_remaining(dispatcher, cache, info);
@@ -226,6 +234,7 @@ void BatchEngine::add(const CommitCounts& counts) {
   stats_.written += counts.written;
   stats_.sphere_boxes += counts.sphere_boxes;
   stats_.sphere_planes += counts.sphere_planes;
+  stats_.convex_pairs += counts.convex_pairs;
 }
 
 void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info,

@@ -82,6 +82,7 @@ class JFPX_API BatchEngine {
   std::span<const btBroadphasePair> pairs_;
   std::span<const PairContact> touching_;
   OrderReason order_reason_ = OrderReason::none;
+  bool is_asleep_ = false;  ///< no body is active, so that nothing changes
 };
 
 }  // namespace bullet

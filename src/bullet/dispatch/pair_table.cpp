@@ -4,9 +4,11 @@
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
 
+#include <BulletCollision/CollisionDispatch/btBoxBoxCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btConvexPlaneCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
+#include <BulletCollision/NarrowPhaseCollision/btGjkEpaPenetrationDepthSolver.h>
 
 #include <algorithm>
 #include <bit>
@@ -24,12 +26,15 @@ struct AlgorithmFields : btCollisionAlgorithm {
   static constexpr auto dispatcher = &AlgorithmFields::m_dispatcher;
 };
 
-/// Access to two private members through explicit instantiation, which the language exempts from
-/// access checks: the number of perturbations, which a btConvexConvexAlgorithm copies from its
-/// configuration when it is created, and whether the plane is the first body of a
-/// btConvexPlaneCollisionAlgorithm.
+/// Access to private members through explicit instantiation, which the language exempts from access
+/// checks: the number of perturbations and the penetration depth solver, which a
+/// btConvexConvexAlgorithm copies from its configuration when it is created, and whether the plane
+/// is the first body of a btConvexPlaneCollisionAlgorithm.
 struct PerturbationTag {
   friend int btConvexConvexAlgorithm::*member_of(PerturbationTag);
+};
+struct DepthSolverTag {
+  friend btConvexPenetrationDepthSolver* btConvexConvexAlgorithm::*member_of(DepthSolverTag);
 };
 struct PlaneFirstTag {
   friend bool btConvexPlaneCollisionAlgorithm::*member_of(PlaneFirstTag);
@@ -39,7 +44,15 @@ struct Reveal {
   friend auto member_of(Tag) -> decltype(Member) { return Member; }
 };
 template struct Reveal<PerturbationTag, &btConvexConvexAlgorithm::m_numPerturbationIterations>;
+template struct Reveal<DepthSolverTag, &btConvexConvexAlgorithm::m_pdSolver>;
 template struct Reveal<PlaneFirstTag, &btConvexPlaneCollisionAlgorithm::m_isSwapped>;
+
+/// Whether Bullet's EPA computes the penetration of deep contacts. Unlike
+/// btMinkowskiPenetrationDepthSolver, it has no state that threads would share.
+bool uses_epa(const btConvexConvexAlgorithm& algorithm) {
+  const btConvexPenetrationDepthSolver* solver = algorithm.*member_of(DepthSolverTag());
+  return solver != nullptr && is_exactly<btGjkEpaPenetrationDepthSolver>(*solver);
+}
 
 /// The manifold of an algorithm of exactly this class; null if it has none of its own. The call is
 /// qualified, so that it can be inlined.
@@ -142,7 +155,7 @@ PairTable::Link PairTable::read_link(btCollisionAlgorithm* algorithm, const Pair
     kind = PairKind::spheres;
   } else if (type == &typeid(btConvexConvexAlgorithm)) {
     auto* convex = static_cast<btConvexConvexAlgorithm*>(algorithm);
-    if (convex->*member_of(PerturbationTag()) != 0) return {};
+    if (convex->*member_of(PerturbationTag()) != 0 || !uses_epa(*convex)) return {};
     manifold = manifold_of<btConvexConvexAlgorithm>(algorithm);
     kind = PairKind::convex;
   } else if (type == &typeid(btConvexPlaneCollisionAlgorithm)) {
@@ -150,6 +163,9 @@ PairTable::Link PairTable::read_link(btCollisionAlgorithm* algorithm, const Pair
     auto* plane = static_cast<btConvexPlaneCollisionAlgorithm*>(algorithm);
     manifold = manifold_of<btConvexPlaneCollisionAlgorithm>(algorithm);
     kind = plane->*member_of(PlaneFirstTag()) ? PairKind::plane_convex : PairKind::convex_plane;
+  } else if (type == &typeid(btBoxBoxCollisionAlgorithm)) {
+    manifold = manifold_of<btBoxBoxCollisionAlgorithm>(algorithm);
+    kind = PairKind::boxes;
   }
   if (!Link::can_hold(manifold)) return {};
   return {manifold, kind, algorithm->*AlgorithmFields::dispatcher == owner.dispatcher};

@@ -27,9 +27,10 @@ inline constexpr std::size_t kPairChunk = 4096;
 enum class PairKind : std::uint8_t {
   other,         ///< no algorithm yet, or one that only Bullet can run
   spheres,       ///< btSphereSphereCollisionAlgorithm with a manifold
-  convex,        ///< btConvexConvexAlgorithm with a manifold, without perturbation
+  convex,        ///< btConvexConvexAlgorithm with a manifold, Bullet's EPA, without perturbation
   convex_plane,  ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane second
   plane_convex,  ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane first
+  boxes,         ///< btBoxBoxCollisionAlgorithm with a manifold
 };
 
 /// The dispatcher that runs the dispatch. Its own algorithms may be cached; an algorithm that

@@ -7,6 +7,9 @@
 
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
+#include <BulletCollision/CollisionShapes/btCapsuleShape.h>
+#include <BulletCollision/CollisionShapes/btConeShape.h>
+#include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
@@ -29,6 +32,29 @@ bool has_stock_filter(const btCollisionObject& body) {
          type == &typeid(btGhostObject) || type == &typeid(btPairCachingGhostObject);
 }
 
+template <class... Exact>
+bool is_one_of(const btCollisionShape& shape) {
+  return (is_exactly<Exact>(shape) || ...);
+}
+
+/// The traits of a shape that is not a sphere.
+unsigned traits_of(const btCollisionShape& shape) {
+  switch (shape.getShapeType()) {
+    case BOX_SHAPE_PROXYTYPE:
+      return is_exactly<btBoxShape>(shape) ? kBox | kConvex : 0;
+    case STATIC_PLANE_PROXYTYPE:
+      return is_exactly<btStaticPlaneShape>(shape) ? kPlane : 0;
+    case CAPSULE_SHAPE_PROXYTYPE:
+      return is_one_of<btCapsuleShape, btCapsuleShapeX, btCapsuleShapeZ>(shape) ? kConvex : 0;
+    case CYLINDER_SHAPE_PROXYTYPE:
+      return is_one_of<btCylinderShape, btCylinderShapeX, btCylinderShapeZ>(shape) ? kConvex : 0;
+    case CONE_SHAPE_PROXYTYPE:
+      return is_one_of<btConeShape, btConeShapeX, btConeShapeZ>(shape) ? kConvex : 0;
+    default:
+      return 0;
+  }
+}
+
 }  // namespace
 
 std::uint8_t SphereBatch::read_body(std::size_t number) {
@@ -47,9 +73,7 @@ std::uint8_t SphereBatch::read_body(std::size_t number) {
     spheres_[number] = {{centre.x(), centre.y(), centre.z()},
                         static_cast<const btSphereShape*>(shape)->getRadius()};
   } else {
-    const std::type_info* type = type_info_of(*shape);
-    if (type == &typeid(btBoxShape)) traits |= kBox;
-    if (type == &typeid(btStaticPlaneShape)) traits |= kPlane;
+    traits |= traits_of(*shape);
     spheres_[number] = {{}, kNaN};
   }
   return static_cast<std::uint8_t>(traits);
@@ -97,8 +121,8 @@ SphereBatch::Summary SphereBatch::read_bodies(std::size_t begin, std::size_t end
   return summary;
 }
 
-bool SphereBatch::gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner,
-                         ThreadPool& pool) {
+std::size_t SphereBatch::gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner,
+                                ThreadPool& pool) {
   table_.refresh(pairs, owner, pool);
   const std::size_t n = table_.proxies().size();
   bodies_.resize(n);
@@ -120,7 +144,7 @@ bool SphereBatch::gather(std::span<const btBroadphasePair> pairs, const PairOwne
   }
   any_trait_ = all.traits;
   any_collision_flag_ = all.collision_flags;
-  return all.spheres >= 2;
+  return all.spheres;
 }
 
 }  // namespace bullet

@@ -25,6 +25,7 @@ enum BodyTrait : std::uint8_t {
   kPlane = 16,           ///< exactly a btStaticPlaneShape
   kHasIgnoreList = 32,   ///< has an ignore list or a filter, which must be evaluated
   kCustomMaterial = 64,  ///< write_contact() is insufficient for its contacts
+  kConvex = 128,         ///< exactly one of Bullet's boxes, capsules, cylinders or cones
 };
 
 /// The first contact of pair `pair` or of a later pair.
@@ -40,8 +41,9 @@ class SphereBatch {
   /// Sets the expected number of contacts. If it is larger than the number of bodies, gather()
   /// copies the body fields that contacts need; otherwise they are read on demand.
   void expect_contacts(std::size_t contacts) { expected_contacts_ = contacts; }
-  /// Reads the bodies of `pairs`. Returns false if there are fewer than two spheres among them.
-  bool gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner, ThreadPool& pool);
+  /// Reads the bodies of `pairs`, and returns the number of spheres among them.
+  std::size_t gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner,
+                     ThreadPool& pool);
   void note_release(const btPersistentManifold* manifold) noexcept {
     table_.note_release(manifold);
   }

@@ -1,18 +1,16 @@
-/// Two passes per chunk: a scan of the numbers of contact points, which completes most pairs, and a
-/// visit of each other pair.
+/// First the pairs of spheres, in two passes per chunk: a scan of the numbers of contact points,
+/// which completes most pairs, and a visit of each other pair. Then the convex pairs among those
+/// that remain, which take a hundred times as long, in small chunks.
 #include "src/bullet/dispatch/unordered_commit.hpp"
 
 #include "src/bullet/dispatch/contact_point.hpp"
-#include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
 
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
-#include <BulletCollision/CollisionShapes/btSphereShape.h>
 
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <typeinfo>
 #include <utility>
 
 namespace jfpx {
@@ -20,7 +18,22 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// Commits the pairs [begin, end).
+/// Number of pairs per chunk of the loop over convex pairs, each of which takes about a
+/// microsecond.
+constexpr std::size_t kConvexChunk = 64;
+constexpr std::size_t kConvexAhead = 4;
+/// Number of pairs from which several threads update them; waking threads takes longer than fewer.
+constexpr std::size_t kSharedConvexPairs = 512;
+
+void prefetch_convex(const SphereBatch& batch, std::size_t i) {
+  if (batch.manifold(i) == nullptr) return;
+  prefetch_header(batch.manifold(i));
+  prefetch_first_point(batch.manifold(i));
+  prefetch_for_contact(*batch.body_a(i));
+  prefetch_for_contact(*batch.body_b(i));
+}
+
+/// Commits the pairs of spheres among the pairs [begin, end).
 class Committer {
  public:
   /// @param touching contacts of all pairs, not only of this range
@@ -43,6 +56,7 @@ class Committer {
     for (std::size_t k = 0; k < visits.size(); ++k) {
       if (k + kVisitsAhead < visits.size()) prefetch_commit(visits[k + kVisitsAhead]);
       const std::uint32_t i = visits[k];
+      while (next_ != last_ && next_->pair < i) ++next_;  // pairs that are not active
       const bool touches = next_ != last_ && next_->pair == i;
       if (!commit(i, touches ? next_++ : nullptr)) remaining[count++] = i;
     }
@@ -57,9 +71,9 @@ class Committer {
   static constexpr std::size_t kVisitsAhead = 10;
 
   /// The pairs that need a visit: those that touch or have points, and all that are not of two
-  /// spheres. The number of points must be read for every sphere pair, because Bullet also clears
-  /// points that a user has added. The loop does nothing else, so that it is limited only by
-  /// memory.
+  /// spheres. The number of points must be read for every sphere pair of an active body, because
+  /// Bullet also clears points that a user has added. The loop does nothing else, so that it is
+  /// limited only by memory.
   std::span<const std::uint32_t> find_visits() {
     std::size_t count = 0;
     for (std::size_t i = begin_; i < std::min(end_, begin_ + kCountsAhead); ++i)
@@ -67,56 +81,50 @@ class Committer {
     for (std::size_t i = begin_; i < end_; ++i) {
       if (i + kCountsAhead < end_) prefetch_point_count(i + kCountsAhead);
       found_[count] = static_cast<std::uint32_t>(i);
-      const bool is_empty =
-          batch_.kind(i) == PairKind::spheres && batch_.manifold(i)->getNumContacts() == 0;
+      const bool is_empty = batch_.kind(i) == PairKind::spheres &&
+                            (!is_active(i) || batch_.manifold(i)->getNumContacts() == 0);
       count += is_empty ? 0 : 1;
     }
     return with_touching({found_.data(), count});
   }
-  /// The union of two ascending lists: `found`, and the touching pairs of this range.
+  /// The union of two ascending lists: `found`, and the touching pairs of this range, except those
+  /// that are not active.
   std::span<const std::uint32_t> with_touching(std::span<const std::uint32_t> found) {
     auto out = visits_.begin();
     const PairContact* touching = next_;
     const PairContact* const end = first_contact({next_, last_}, end_);
+    const auto add_touching = [&] {
+      const std::uint32_t i = touching++->pair;
+      if (is_active(i)) {
+        *out++ = i;
+      } else if (batch_.both_are_spheres(i)) {
+        ++counts_.touching;
+      }
+    };
     for (const std::uint32_t i : found) {
-      while (touching != end && touching->pair < i) *out++ = touching++->pair;
+      while (touching != end && touching->pair < i) add_touching();
       if (touching != end && touching->pair == i) ++touching;
       *out++ = i;
     }
-    while (touching != end) *out++ = touching++->pair;
+    while (touching != end) add_touching();
     return {visits_.begin(), out};
   }
+  /// Bullet does not process a pair of two inactive bodies.
+  bool is_active(std::size_t i) const { return (batch_.either_trait(i) & kActive) != 0; }
   void prefetch_point_count(std::size_t i) const {
-    if (batch_.kind(i) == PairKind::spheres) prefetch_count(batch_.manifold(i));
+    if (batch_.kind(i) == PairKind::spheres && is_active(i)) prefetch_count(batch_.manifold(i));
   }
   void prefetch_commit(std::size_t i) const {
-    if (batch_.kind(i) == PairKind::other) return;
+    if (batch_.kind(i) != PairKind::spheres) return;
     prefetch_header(batch_.manifold(i));
     prefetch_first_point(batch_.manifold(i));
-    if (batch_.kind(i) == PairKind::spheres) {
-      batch_.prefetch_states(i);
-    } else {
-      prefetch_for_contact(*batch_.body_a(i));
-      prefetch_for_contact(*batch_.body_b(i));
-    }
+    batch_.prefetch_states(i);
   }
 
-  /// `contact` is null if the spheres do not touch. Returns false if Bullet must process the pair.
+  /// `contact` is null if the spheres do not touch. Returns false if the pair remains.
   bool commit(std::size_t i, const PairContact* contact) {
-    switch (batch_.kind(i)) {
-      case PairKind::other:
-        if (batch_.both_are_spheres(i)) count_pair(contact);
-        return false;
-      case PairKind::spheres:
-        return commit_spheres(i, contact);
-      case PairKind::convex:
-        return commit_with(kBox, (batch_.trait_a(i) & kSphere) != 0, i, update_sphere_box,
-                           &counts_.sphere_boxes);
-      case PairKind::convex_plane:
-        return commit_with(kPlane, true, i, update_sphere_plane, &counts_.sphere_planes);
-      case PairKind::plane_convex:
-        return commit_with(kPlane, false, i, update_sphere_plane, &counts_.sphere_planes);
-    }
+    if (batch_.kind(i) == PairKind::spheres) return commit_spheres(i, contact);
+    if (batch_.kind(i) == PairKind::other && batch_.both_are_spheres(i)) count_pair(contact);
     return false;
   }
 
@@ -125,7 +133,6 @@ class Committer {
     if (!batch_.both_are_spheres(i)) return false;  // the user has replaced a shape
     count_pair(contact);
     const unsigned traits = batch_.either_trait(i);
-    if ((traits & kActive) == 0) return true;
     if ((traits & kCustomMaterial) != 0 || manifold->getBody0() != batch_.body_a(i)) return false;
     if (contact != nullptr && !has_finite_values(*contact)) return false;
     if ((traits & kHasIgnoreList) != 0 && !needs_collision(i)) return true;
@@ -139,25 +146,6 @@ class Committer {
   /// Calls the qualified function, because no class overrides it here.
   bool needs_collision(std::size_t i) const {
     return dispatcher_.btCollisionDispatcher::needsCollision(batch_.body_a(i), batch_.body_b(i));
-  }
-
-  /// Updates the pair of a sphere and a body with the trait `other`. Returns false if Bullet must
-  /// process the pair.
-  template <class Update>
-  bool commit_with(BodyTrait other, bool sphere_first, std::size_t i, Update update,
-                   std::uint64_t* count) {
-    const unsigned a_is = batch_.trait_a(i), b_is = batch_.trait_b(i);
-    // The user may have replaced a shape since the algorithm was created.
-    if (((sphere_first ? a_is : b_is) & kSphere) == 0) return false;
-    if (((sphere_first ? b_is : a_is) & other) == 0) return false;
-    if ((batch_.either_trait(i) & kActive) == 0) return true;
-    const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
-    const btCollisionShape* sphere = (sphere_first ? a : b)->getCollisionShape();
-    if (type_info_of(*sphere) != &typeid(btSphereShape)) return false;
-    if ((batch_.either_trait(i) & kHasIgnoreList) != 0 && !needs_collision(i)) return true;
-    if (!update(batch_.manifold(i), *a, *b, sphere_first)) return false;
-    ++*count;
-    return true;
   }
 
   void count_pair(const PairContact* contact) {
@@ -189,30 +177,60 @@ OrderReason reason_for_order(const SphereBatch& batch, bool may_override_filter)
 
 void UnorderedCommit::reserve(std::size_t pairs) {
   remaining_.resize(pairs);
-  chunks_.resize((pairs + kPairChunk - 1) / kPairChunk);
+  chunks_.resize((pairs + kConvexChunk - 1) / kConvexChunk);
 }
 
-CommitCounts UnorderedCommit::run(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
+CommitCounts UnorderedCommit::run(const ConvexDispatch& dispatch,
                                   std::span<const PairContact> touching, ThreadPool& pool) {
-  const std::size_t n = batch.pairs().size();
-  pool.run(chunks_.size(), [&](std::size_t chunk) {
+  CommitCounts counts = commit_spheres(dispatch, touching, pool);
+  counts += commit_convex_pairs(dispatch, pool);
+  return counts;
+}
+
+CommitCounts UnorderedCommit::commit_spheres(const ConvexDispatch& dispatch,
+                                             std::span<const PairContact> touching,
+                                             ThreadPool& pool) {
+  const std::size_t n = dispatch.pairs.size();
+  const std::size_t chunks = (n + kPairChunk - 1) / kPairChunk;
+  pool.run(chunks, [&](std::size_t chunk) {
     const std::size_t begin = chunk * kPairChunk;
-    Committer committer(dispatcher, batch, touching, begin, std::min(n, begin + kPairChunk));
+    Committer committer(dispatch.dispatcher, dispatch.batch, touching, begin,
+                        std::min(n, begin + kPairChunk));
     chunks_[chunk].remaining = committer.run(&remaining_[begin]);
     chunks_[chunk].counts = committer.counts();
   });
+  return collect(chunks, kPairChunk);
+}
+
+CommitCounts UnorderedCommit::commit_convex_pairs(const ConvexDispatch& dispatch,
+                                                  ThreadPool& pool) {
+  const std::size_t n = remaining_count_;
+  if (n == 0) return {};
+  const std::size_t size = n < kSharedConvexPairs ? n : kConvexChunk;
+  const std::size_t chunks = (n + size - 1) / size;
+  pool.run(chunks, [&](std::size_t chunk) {
+    const std::size_t begin = chunk * size, end = std::min(n, begin + size);
+    Chunk part;
+    for (std::size_t k = begin; k < end; ++k) {
+      if (k + kConvexAhead < end) prefetch_convex(dispatch.batch, remaining_[k + kConvexAhead]);
+      const std::uint32_t i = remaining_[k];
+      if (!commit_convex(dispatch, i, &part.counts)) remaining_[begin + part.remaining++] = i;
+    }
+    chunks_[chunk] = part;
+  });
+  return collect(chunks, size);
+}
+
+/// Joins the lists of the chunks, and returns the sum of their counts.
+CommitCounts UnorderedCommit::collect(std::size_t chunks, std::size_t chunk_size) {
   CommitCounts sum;
   remaining_count_ = 0;
-  for (std::size_t chunk = 0; chunk < chunks_.size(); ++chunk) {
+  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
     const Chunk& part = chunks_[chunk];
-    std::memmove(&remaining_[remaining_count_], &remaining_[chunk * kPairChunk],
+    std::memmove(&remaining_[remaining_count_], &remaining_[chunk * chunk_size],
                  part.remaining * sizeof(std::uint32_t));
     remaining_count_ += part.remaining;
-    sum.sphere_pairs += part.counts.sphere_pairs;
-    sum.touching += part.counts.touching;
-    sum.written += part.counts.written;
-    sum.sphere_boxes += part.counts.sphere_boxes;
-    sum.sphere_planes += part.counts.sphere_planes;
+    sum += part.counts;
   }
   return sum;
 }

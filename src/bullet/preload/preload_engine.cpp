@@ -51,6 +51,7 @@ DispatchStats sum_of_stats(std::string_view* backend) {
     sum.written += stats.written;
     sum.sphere_boxes += stats.sphere_boxes;
     sum.sphere_planes += stats.sphere_planes;
+    sum.convex_pairs += stats.convex_pairs;
     sum.verified += stats.verified;
     if (sum.mismatches == 0) sum.first_mismatch = stats.first_mismatch;
     sum.mismatches += stats.mismatches;

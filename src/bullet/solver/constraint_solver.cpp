@@ -34,6 +34,7 @@ std::optional<SolverFallback> ConstraintSolver::Impl::solve(
     std::span<btPersistentManifold* const> manifolds) {
   // Profile zones have the names that Bullet's solver gives them.
   BT_PROFILE("solveGroup");
+  is_small = manifolds.size() < kSharedManifolds;
   joint_unlisted.clear();
   scan.clear_unlisted();
   rows::RowSweepReport report;
@@ -72,7 +73,7 @@ void ConstraintSolver::Impl::set_up(std::span<btPersistentManifold* const> manif
   if (!joints.empty()) set_up_joints();
   {
     BT_PROFILE("find contacts");
-    scan.run(solver.pool(), manifolds, flags);
+    scan.run(pool(), manifolds, flags);
     set_up_unlisted_bodies(manifolds);
   }
   if (!scan.any_rolling()) return;

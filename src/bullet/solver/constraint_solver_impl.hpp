@@ -22,6 +22,8 @@ namespace bullet {
 
 inline constexpr std::size_t kBodiesPerChunk = 256;
 inline constexpr std::size_t kBlocksPerChunk = 16;
+/// Number of manifolds from which several threads set up a group.
+inline constexpr std::size_t kSharedManifolds = 2048;
 
 /// Each stage is defined in the file that is named above its declarations.
 struct ConstraintSolver::Impl {
@@ -32,6 +34,7 @@ struct ConstraintSolver::Impl {
   const btSingleConstraintRowSolver own_split;  ///< split impulse row solver of Bullet
   const bool thread_safe_library;               ///< see thread_safe_library.hpp
   cpu::RowSolver solver;
+  ThreadPool calling_thread{1};
   std::optional<GpuIslandSolver> device;  ///< always present after construction
   const bool may_choose;                  ///< false if the user has selected a device
   std::size_t minimum_batch;
@@ -50,6 +53,7 @@ struct ConstraintSolver::Impl {
   const btContactSolverInfo* info = nullptr;
   rows::RowSettings settings{};
   bool on_device = false;
+  bool is_small = false;  ///< waking other threads takes longer than the loops over the group
 
   Impl(ConstraintSolver& owner, const ConstraintSolverOptions& options);
 
@@ -87,6 +91,8 @@ struct ConstraintSolver::Impl {
   rows::RowSweepReport solve_rows();
   rows::RowSweepReport sweep();
   DeviceGroup device_group();
+  /// The threads of the loops that set up the group and write its results.
+  ThreadPool& pool() { return is_small ? calling_thread : solver.pool(); }
   std::uint32_t directions() const {
     return (info->m_solverMode & SOLVER_USE_2_FRICTION_DIRECTIONS) != 0 ? 2 : 1;
   }

@@ -17,13 +17,14 @@ void ConstraintSolver::Impl::set_up_bodies() {
   BT_PROFILE("convertBodies");
   const std::size_t count = bodies.size();
   self.m_tmpSolverBodyPool.resizeNoInitialize(0);
+  self.m_kinematicBodyUniqueIdToSolverBodyTable.resizeNoInitialize(0);  // used with BT_THREADSAFE
   self.m_tmpSolverBodyPool.reserve(static_cast<int>(count) + 1);
   self.m_tmpSolverBodyPool.resizeNoInitialize(static_cast<int>(count));
   solver.resize_bodies(count + 1);
   flags.assign(count + 1, kInfiniteMass | kImmovable);
   factors = false;
   warm = false;
-  in_chunks(solver.pool(), count, kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+  in_chunks(pool(), count, kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       if (i + 8 < last) prefetch_bytes(bodies[i + 8], sizeof(btRigidBody));
       set_up_body(i, bodies[i]);

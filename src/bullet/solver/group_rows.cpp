@@ -26,13 +26,12 @@ void ConstraintSolver::Impl::set_up_rows() {
 
 void ConstraintSolver::Impl::set_up_contacts() {
   BT_PROFILE("set up contacts");
-  in_chunks(solver.pool(), solver.blocks(), kBlocksPerChunk,
-            [&](std::size_t first, std::size_t last) {
-              for (auto block = static_cast<std::uint32_t>(first); block < last; ++block) {
-                if (block + 1 < last) prefetch_block(block + 1);
-                set_up_block(block);
-              }
-            });
+  in_chunks(pool(), solver.blocks(), kBlocksPerChunk, [&](std::size_t first, std::size_t last) {
+    for (auto block = static_cast<std::uint32_t>(first); block < last; ++block) {
+      if (block + 1 < last) prefetch_block(block + 1);
+      set_up_block(block);
+    }
+  });
 }
 
 void ConstraintSolver::Impl::prefetch_block(std::uint32_t block) const {
@@ -80,7 +79,7 @@ void ConstraintSolver::Impl::set_up_rolling_frictions() {
     }
     return false;
   });
-  solver.pool().run(solver.rolling_friction_blocks().size(), [&](std::size_t k) {
+  pool().run(solver.rolling_friction_blocks().size(), [&](std::size_t k) {
     const std::uint32_t block = solver.rolling_friction_blocks()[k];
     for (std::uint32_t t = 0; t < cpu::kRollingFrictionRows; ++t) {
       std::fill_n(solver.rolling_friction_rows(k, t), solver.lanes() * rows::kFrictionFields,

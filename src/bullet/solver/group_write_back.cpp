@@ -13,12 +13,11 @@ void ConstraintSolver::Impl::write_back() {
   if (on_device) {
     device->write_back(device_group());
   } else if (settings.warm_start) {
-    in_chunks(solver.pool(), solver.blocks(), kBlocksPerChunk,
-              [&](std::size_t first, std::size_t last) {
-                for (std::size_t i = first; i < last; ++i) {
-                  write_back_impulses(static_cast<std::uint32_t>(i));
-                }
-              });
+    in_chunks(pool(), solver.blocks(), kBlocksPerChunk, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) {
+        write_back_impulses(static_cast<std::uint32_t>(i));
+      }
+    });
   }
   if (!joints.empty()) {
     self.writeBackJoints(0, self.m_tmpSolverNonContactConstraintPool.size(), *info);
@@ -46,7 +45,7 @@ void ConstraintSolver::Impl::write_back_impulses(std::uint32_t block) {
 
 void ConstraintSolver::Impl::write_back_bodies() {
   const auto count = static_cast<std::size_t>(self.m_tmpSolverBodyPool.size());
-  in_chunks(solver.pool(), count, kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+  in_chunks(pool(), count, kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       btSolverBody& body = self.m_tmpSolverBodyPool[static_cast<int>(i)];
       const Real *v = solver.velocity(i + 1), *p = solver.push_velocity(i + 1);

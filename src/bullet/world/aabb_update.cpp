@@ -95,7 +95,13 @@ bool AabbUpdate::run(btCollisionWorld& world, ThreadPool& pool) {
   // Leaves that belong to no object of the world are not among the updates.
   if (leaves >= side_by_side_ && leaves == world.getNumCollisionObjects()) {
     BT_PROFILE("updateAabbs");  // Bullet's own name of the profile zone
-    if (compute_updates(world, tree, pool) && run_side_by_side(tree, cache, pool)) return true;
+    if (compute_updates(world, tree, pool)) {
+      if (few_leaves_move(pool)) {
+        run_in_tree(tree, cache);
+        return true;
+      }
+      if (run_side_by_side(tree, cache, pool)) return true;
+    }
   }
   // Called for an AABB that is too large; it may add and remove bodies.
   if (world.getDebugDrawer() != nullptr) return false;
@@ -121,6 +127,25 @@ bool AabbUpdate::compute_updates(btCollisionWorld& world, btDbvtBroadphase& tree
     }
   });
   return possible;
+}
+
+/// Whether the search of each moving leaf in Bullet's tree takes less time than a search for all
+/// leaves, which sorts them.
+bool AabbUpdate::few_leaves_move(const ThreadPool& pool) const {
+  constexpr std::size_t kTimeOfSearch = 16;  // in units of the time to sort a leaf
+  const auto moving = std::count_if(leaves_.begin(), leaves_.end(),
+                                    [](const LeafUpdate& leaf) { return leaf.moves; });
+  return static_cast<std::size_t>(moving) * kTimeOfSearch * pool.threads() < leaves_.size();
+}
+
+/// Moves the leaves, and searches Bullet's tree for the overlaps of each.
+void AabbUpdate::run_in_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache) {
+  for (std::size_t i = 0; i < leaves_.size(); ++i) {
+    prefetch_leaf(leaves_, i);
+    if (!leaves_[i].active) continue;
+    apply_update(tree, leaves_[i]);
+    if (leaves_[i].moves) search_tree(tree, cache, *leaves_[i].proxy);
+  }
 }
 
 /// Returns false and changes nothing if there is not enough memory.
@@ -177,13 +202,18 @@ void AabbUpdate::run_one_by_one(btCollisionWorld& world, btDbvtBroadphase& tree,
     btCollisionObject* object = objects[i];
     if (!world.getForceUpdateAllAabbs() && !object->isActive()) continue;
     if (!search.needed_after([&] { world.updateSingleAabb(object); })) continue;
-    const auto* proxy = static_cast<const btDbvtProxy*>(object->getBroadphaseHandle());
-    pairs_.clear();
-    find_overlaps(tree.m_sets[btDbvtBroadphase::FIXED_SET].m_root, proxy->leaf);
-    find_overlaps(tree.m_sets[btDbvtBroadphase::DYNAMIC_SET].m_root, proxy->leaf);
-    tree.m_newpairs += static_cast<int>(pairs_.size());
-    add_pairs(cache);
+    search_tree(tree, cache, *static_cast<const btDbvtProxy*>(object->getBroadphaseHandle()));
   }
+}
+
+/// Adds the new pairs of a leaf that has moved.
+void AabbUpdate::search_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
+                             const btDbvtProxy& moved) {
+  pairs_.clear();
+  find_overlaps(tree.m_sets[btDbvtBroadphase::FIXED_SET].m_root, moved.leaf);
+  find_overlaps(tree.m_sets[btDbvtBroadphase::DYNAMIC_SET].m_root, moved.leaf);
+  tree.m_newpairs += static_cast<int>(pairs_.size());
+  add_pairs(cache);
 }
 
 /// `leaves` elements suffice: no leaf is found twice, and no node in the stack is an ancestor of

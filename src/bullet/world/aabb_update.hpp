@@ -43,10 +43,14 @@ class JFPX_API AabbUpdate {
 
   bool reserve_geometric(std::size_t leaves) noexcept;
   bool compute_updates(btCollisionWorld& world, btDbvtBroadphase& tree, ThreadPool& pool);
+  bool few_leaves_move(const ThreadPool& pool) const;
+  void run_in_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache);
   bool run_side_by_side(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
                         ThreadPool& pool);
   void run_one_by_one(btCollisionWorld& world, btDbvtBroadphase& tree,
                       btHashedOverlappingPairCache& cache);
+  void search_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
+                   const btDbvtProxy& moved);
   void find_overlaps(const btDbvtNode* root, const btDbvtNode* leaf);
   void add_pairs(btHashedOverlappingPairCache& cache);
   void add_in_order(btHashedOverlappingPairCache& cache, btDbvtProxy* moved,

@@ -21,6 +21,8 @@ namespace bullet {
 namespace {
 
 constexpr int kBodiesPerChunk = 256;
+/// Number of bodies from which several threads move them; waking threads takes longer than fewer.
+constexpr int kSharedBodies = 2048;
 
 int island_of(const btTypedConstraint* constraint) {
   const int tag = constraint->getRigidBodyA().getIslandTag();
@@ -40,10 +42,14 @@ struct DynamicsWorld::Impl {
   explicit Impl(const DynamicsWorldOptions& options)
       : pool(options.threads), islands(pool), minimum_batch(options.minimum_batch) {}
 
-  /// Calls run(bodies, count) for all chunks of the array in parallel.
+  /// Calls run(bodies, count) for all chunks of the array, of many bodies in parallel.
   template <class Run>
   void in_chunks(btAlignedObjectArray<btRigidBody*>& bodies, const Run& run) {
     const int count = bodies.size();
+    if (count < kSharedBodies) {
+      if (count > 0) run(&bodies[0], count);
+      return;
+    }
     const int chunks = (count + kBodiesPerChunk - 1) / kBodiesPerChunk;
     pool.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
       const int first = static_cast<int>(chunk) * kBodiesPerChunk;

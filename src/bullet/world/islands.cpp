@@ -68,11 +68,40 @@ bool needs_solving(btDispatcher& dispatcher, const btPersistentManifold& manifol
                    bool only_touching, bool* kinematic) {
   if (only_touching && manifold.getNumContacts() == 0) return false;
   const btCollisionObject &a = *manifold.getBody0(), &b = *manifold.getBody1();
-  if (a.isKinematicObject() || b.isKinematicObject()) *kinematic = true;
   if (a.getActivationState() == ISLAND_SLEEPING && b.getActivationState() == ISLAND_SLEEPING) {
     return false;
   }
+  if (a.isKinematicObject() || b.isKinematicObject()) *kinematic = true;
   return dispatcher.needsResponse(&a, &b);
+}
+
+/// Calls unite(a, b) with the numbers of the objects of each pair that belongs to one island.
+template <class Unite>
+void for_each_union(std::span<const btBroadphasePair> pairs, const Unite& unite) {
+  const std::size_t count = pairs.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i + 2 * kObjectsAhead < count) {
+      prefetch(pairs[i + 2 * kObjectsAhead].m_pProxy0);
+      prefetch(pairs[i + 2 * kObjectsAhead].m_pProxy1);
+    }
+    if (i + kObjectsAhead < count) {
+      prefetch_island_state(object_of(pairs[i + kObjectsAhead].m_pProxy0));
+      prefetch_island_state(object_of(pairs[i + kObjectsAhead].m_pProxy1));
+    }
+    const btCollisionObject *a = object_of(pairs[i].m_pProxy0), *b = object_of(pairs[i].m_pProxy1);
+    if (merges(a) && merges(b)) unite(a->getIslandTag(), b->getIslandTag());
+  }
+}
+
+/// Whether a kinematic object, or a dispatcher of the user, may wake objects of sleeping islands.
+bool may_be_woken(btCollisionWorld& world) {
+  if (!is_plain(*world.getDispatcher())) return true;
+  const btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  for (int i = 0; i < objects.size(); ++i) {
+    prefetch_island_state_of(objects, i + kObjectsAhead);
+    if (objects[i]->isKinematicObject()) return true;
+  }
+  return false;
 }
 
 void prefetch_manifold(btPersistentManifold* const* manifolds, int i, int count) {
@@ -107,6 +136,10 @@ void IslandSolver::number_and_unite(btCollisionWorld& world, btUnionFind* unions
   const auto count = static_cast<std::size_t>(cache->getNumOverlappingPairs());
   if (count == 0) return;
   const std::span pairs(cache->getOverlappingPairArrayPtr(), count);
+  if (pool_.threads() == 1 || count <= kPairsPerChunk) {
+    for_each_union(pairs, [&](int a, int b) { unions->unite(a, b); });
+    return;
+  }
   // Most pairs of later rounds connect objects that earlier rounds have united.
   for (std::size_t first = 0; first < count; first += pairs_per_round_) {
     const int edges =
@@ -162,21 +195,9 @@ int IslandSolver::find_edges(std::span<const btBroadphasePair> pairs, const btUn
     const std::size_t first = chunk * kPairsPerChunk;
     const std::size_t last = std::min(count, first + kPairsPerChunk);
     std::size_t next = first;
-    for (std::size_t i = first; i < last; ++i) {
-      if (i + 2 * kObjectsAhead < last) {
-        prefetch(pairs[i + 2 * kObjectsAhead].m_pProxy0);
-        prefetch(pairs[i + 2 * kObjectsAhead].m_pProxy1);
-      }
-      if (i + kObjectsAhead < last) {
-        prefetch_island_state(object_of(pairs[i + kObjectsAhead].m_pProxy0));
-        prefetch_island_state(object_of(pairs[i + kObjectsAhead].m_pProxy1));
-      }
-      const btCollisionObject *a = object_of(pairs[i].m_pProxy0),
-                              *b = object_of(pairs[i].m_pProxy1);
-      if (!merges(a) || !merges(b)) continue;
-      const Edge edge{a->getIslandTag(), b->getIslandTag()};
-      if (root_of(unions, edge.a) != root_of(unions, edge.b)) edges_[next++] = edge;
-    }
+    for_each_union(pairs.subspan(first, last - first), [&](int a, int b) {
+      if (root_of(unions, a) != root_of(unions, b)) edges_[next++] = {a, b};
+    });
     chunk_counts_[chunk] = static_cast<int>(next - first);
   });
   int total = 0;
@@ -231,8 +252,9 @@ void IslandSolver::solve(btCollisionWorld& world, btUnionFind& unions, btConstra
   {
     BT_PROFILE("islandUnionFindAndQuickSort");
     sort_islands(unions);
-    update_sleep(world.getCollisionObjectArray(), unions);
-    collect_manifolds(world);
+    const bool awake = update_sleep(world.getCollisionObjectArray(), unions);
+    count_ = 0;
+    if (awake || may_be_woken(world)) collect_manifolds(world);
   }
   BT_PROFILE("processIslands");
   solve_awake(world, unions, solver, info, constraints, constraint_count);
@@ -249,8 +271,10 @@ void IslandSolver::sort_islands(btUnionFind& unions) {
 }
 
 /// An island sleeps if none of its objects is awake; otherwise all of its objects are woken.
-void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& unions) {
+/// @return whether any island is awake
+bool IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& unions) {
   const int count = unions.getNumElements();
+  bool any_awake = false;
   const auto object = [&](int k) { return objects[unions.getElement(k).m_sz]; };
   for (int first = 0, last = 0; first < count; first = last) {
     const int island = unions.getElement(first).m_id;
@@ -263,6 +287,7 @@ void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& un
         asleep = false;
       }
     }
+    any_awake |= !asleep;
     for (int k = first; k < last; ++k) {
       btCollisionObject& o = *object(k);
       if (o.getIslandTag() != island) continue;
@@ -274,6 +299,7 @@ void IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& un
       }
     }
   }
+  return any_awake;
 }
 
 /// Lists the manifolds of the islands to solve, and their islands.
@@ -316,7 +342,7 @@ bool IslandSolver::collect_in_parallel(btDispatcher& dispatcher, bool only_touch
     bool seen = false;
     int next = first;
     for (int i = first; i < last; ++i) {
-      prefetch_manifold(manifolds, i, last);
+      if (chunks > 1) prefetch_manifold(manifolds, i, last);  // fewer fit into the cache
       if (!needs_solving(dispatcher, *manifolds[i], only_touching, &seen)) continue;
       const auto at = static_cast<std::size_t>(next++);
       found_[at] = manifolds[i];

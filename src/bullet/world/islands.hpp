@@ -59,7 +59,7 @@ class IslandSolver {
   void in_chunks(const btCollisionObjectArray& objects, const Run& run);
   void number_objects(btCollisionObjectArray& objects);
   int find_edges(std::span<const btBroadphasePair> pairs, const btUnionFind& unions);
-  static void update_sleep(btCollisionObjectArray& objects, btUnionFind& unions);
+  static bool update_sleep(btCollisionObjectArray& objects, btUnionFind& unions);
   void collect_manifolds(btCollisionWorld& world);
   bool collect_in_parallel(btDispatcher& dispatcher, bool only_touching);
   void sort_islands(btUnionFind& unions);

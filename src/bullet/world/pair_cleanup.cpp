@@ -19,6 +19,8 @@ namespace bullet {
 namespace {
 
 constexpr int kPairsPerChunk = 2048;
+/// Number of pairs from which several threads test them; waking threads takes longer than fewer.
+constexpr int kSharedPairs = 8192;
 
 bool is_apart(const btBroadphasePair& pair) {
   const auto* a = static_cast<const btDbvtProxy*>(pair.m_pProxy0);
@@ -104,10 +106,11 @@ bool PairCleanup::test_pairs(const btBroadphasePairArray& pairs, int first, int 
                              ThreadPool& pool) {
   const int size = pairs.size();
   std::atomic<bool> any{false};
-  const int chunks = (count + kPairsPerChunk - 1) / kPairsPerChunk;
+  const int chunk_size = count < kSharedPairs ? count : kPairsPerChunk;
+  const int chunks = count == 0 ? 0 : (count + chunk_size - 1) / chunk_size;
   pool.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
-    const int begin = static_cast<int>(chunk) * kPairsPerChunk;
-    const int end = std::min(count, begin + kPairsPerChunk);
+    const int begin = static_cast<int>(chunk) * chunk_size;
+    const int end = std::min(count, begin + chunk_size);
     bool found = false;
     for (int k = begin; k < end; ++k) {
       const int i = first + k < size ? first + k : first + k - size;

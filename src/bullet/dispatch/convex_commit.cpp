@@ -1,0 +1,106 @@
+/// Update of one convex pair on any thread.
+///
+/// In Bullet 3.24, processCollision() of the algorithms of PairTable has no global state and no
+/// profile zone, calls no dispatcher once the manifold exists, and ignores the debug drawer.
+/// Polyhedra are the exception, because btPolyhedralContactClipping counts its tests in global
+/// variables; two boxes may have polyhedral features only in a btConvexConvexAlgorithm.
+#include "src/bullet/dispatch/convex_commit.hpp"
+
+#include "src/bullet/dispatch/body_wrapper.hpp"
+#include "src/bullet/dispatch/contact_point.hpp"
+#include "src/bullet/exact_class.hpp"
+
+#include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
+
+#include <typeinfo>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+bool is_convex(const btCollisionObject& body, unsigned traits) {
+  if ((traits & kSphere) == 0) return (traits & kConvex) != 0;
+  return type_info_of(*body.getCollisionShape()) == &typeid(btSphereShape);
+}
+
+/// Whether the shapes of pair i are those for which its algorithm was created: the user may have
+/// replaced one since.
+bool has_expected_shapes(const SphereBatch& batch, std::size_t i) {
+  const unsigned a = batch.trait_a(i), b = batch.trait_b(i);
+  switch (batch.kind(i)) {
+    case PairKind::other:
+    case PairKind::spheres:
+      return false;
+    case PairKind::boxes:
+      return (a & b & kBox) != 0;
+    case PairKind::convex:
+      return (a & b & kBox) == 0 && is_convex(*batch.body_a(i), a) &&
+             is_convex(*batch.body_b(i), b);
+    case PairKind::convex_plane:
+      return (b & kPlane) != 0 && is_convex(*batch.body_a(i), a);
+    case PairKind::plane_convex:
+      return (a & kPlane) != 0 && is_convex(*batch.body_b(i), b);
+  }
+  return false;
+}
+
+/// Updates a sphere and a box or plane without Bullet's algorithm. Returns false for other shapes,
+/// and if nothing has been changed because the contact needs Bullet's algorithm.
+bool update_sphere(const SphereBatch& batch, std::size_t i, CommitCounts* counts) {
+  const bool sphere_first = (batch.trait_a(i) & kSphere) != 0;
+  const unsigned other = sphere_first ? batch.trait_b(i) : batch.trait_a(i);
+  if ((batch.either_trait(i) & kSphere) == 0) return false;
+  btPersistentManifold* manifold = batch.manifold(i);
+  const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
+  if ((other & kBox) != 0 && update_sphere_box(manifold, a, b, sphere_first)) {
+    ++counts->sphere_boxes;
+    return true;
+  }
+  if ((other & kPlane) != 0 && update_sphere_plane(manifold, a, b, sphere_first)) {
+    ++counts->sphere_planes;
+    return true;
+  }
+  return false;
+}
+
+void run_algorithm(const ConvexDispatch& dispatch, std::size_t i) {
+  const btCollisionObjectWrapper a = wrapper_of(*dispatch.batch.body_a(i));
+  const btCollisionObjectWrapper b = wrapper_of(*dispatch.batch.body_b(i));
+  btManifoldResult result(&a, &b);
+  dispatch.pairs[i].m_algorithm->processCollision(&a, &b, dispatch.info, &result);
+}
+
+}  // namespace
+
+CommitCounts& CommitCounts::operator+=(const CommitCounts& other) {
+  sphere_pairs += other.sphere_pairs;
+  touching += other.touching;
+  written += other.written;
+  sphere_boxes += other.sphere_boxes;
+  sphere_planes += other.sphere_planes;
+  convex_pairs += other.convex_pairs;
+  return *this;
+}
+
+bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
+  const SphereBatch& batch = dispatch.batch;
+  if (!has_expected_shapes(batch, i)) return false;
+  const unsigned traits = batch.either_trait(i);
+  if ((traits & kActive) == 0) return true;
+  // The qualified function, because no class overrides it here.
+  if ((traits & kHasIgnoreList) != 0 && !dispatch.dispatcher.btCollisionDispatcher::needsCollision(
+                                            batch.body_a(i), batch.body_b(i))) {
+    return true;
+  }
+  if (update_sphere(batch, i, counts)) return true;
+  if (!dispatch.runs_algorithms) return false;
+  run_algorithm(dispatch, i);
+  ++counts->convex_pairs;
+  return true;
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,47 @@
+/// Update of the manifolds of pairs of convex shapes, and of convex shapes and planes.
+#pragma once
+
+#include <jfpx/bullet/dispatch_stats.hpp>
+
+#include "src/bullet/dispatch/sphere_batch.hpp"
+
+#include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
+
+#include <span>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+
+/// Contribution of a commit to the statistics.
+struct CommitCounts {
+  std::uint64_t sphere_pairs = 0;   ///< pairs of two spheres
+  std::uint64_t touching = 0;       ///< sphere pairs that the collider reported as touching
+  std::uint64_t written = 0;        ///< sphere pairs updated without Bullet's algorithm
+  std::uint64_t sphere_boxes = 0;   ///< sphere-box pairs updated without Bullet's algorithm
+  std::uint64_t sphere_planes = 0;  ///< sphere-plane pairs updated without Bullet's algorithm
+  std::uint64_t convex_pairs = 0;   ///< other convex pairs updated by Bullet's algorithms
+
+  CommitCounts& operator+=(const CommitCounts& other);
+};
+
+/// What the pairs of a dispatch have in common.
+struct ConvexDispatch {
+  btCollisionDispatcher& dispatcher;
+  const btDispatcherInfo& info;
+  const SphereBatch& batch;
+  std::span<const btBroadphasePair> pairs;
+  /// Whether Bullet's own algorithms may run on the calling thread.
+  bool runs_algorithms;
+};
+
+/// Updates the manifold of pair i on the calling thread, if no other pair and no user code can
+/// observe this: the algorithm and both shapes are exactly classes of Bullet whose functions only
+/// read the bodies and write the manifold of the pair. Spheres with boxes and planes are computed
+/// without Bullet's algorithm.
+/// @return false if Bullet must process the pair.
+bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts);
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx
