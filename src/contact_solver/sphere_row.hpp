@@ -89,7 +89,7 @@ struct ImpactBodies {
 
 /// Rebounds of a contact in a step. A light body between heavy ones meets them again and again; the
 /// impulses that are kept must carry them.
-inline constexpr int kMostRebounds = 4;
+inline constexpr int kMaxRebounds = 4;
 
 /// Number of rebounds in this step.
 JFPX_HD constexpr int rebounds_of(const SphereRow& row) {
@@ -112,7 +112,7 @@ JFPX_HD inline bool rebound(SphereRow* at, const StepConstants& step, const Impa
                             SolverBody* a, SolverBody* b) {
   const SphereRow& row = *at;
   const int rebounds = rebounds_of(row);
-  if (rebounds == kMostRebounds) return false;
+  if (rebounds == kMaxRebounds) return false;
   Vec3 acceleration = bodies.acceleration[row.a];
   Real largest = length(acceleration);
   if constexpr (!kFixed) {
