@@ -67,7 +67,8 @@ void expect_equal_contacts(const World& host, const World& device) {
 /// A scene of bodies of all kinds in a small room.
 Scene random_scene(Random* random) {
   Scene scene;
-  scene.soft_step.substeps = 1 + static_cast<std::uint32_t>(random->below(6));
+  scene.soft_step.substeps =
+      random->below(12) == 0 ? kMaxSubsteps : 1 + static_cast<std::uint32_t>(random->below(6));
   const std::uint64_t count = 2 + random->below(60);
   for (std::uint64_t i = 0; i < count; ++i) {
     BodyDef def = test::random_body(random, 3);
@@ -122,6 +123,17 @@ TEST_P(DeviceWorldTest, NamedScenesHaveTheBitsOfTheProcessor) {
       device.step();
     }
     EXPECT_EQ(host.state_hash(), device.state_hash()) << name;
+  }
+}
+
+/// So many contacts that a GPU uses all of its multiprocessors.
+TEST_P(DeviceWorldTest, ManyBodiesHaveTheBitsOfTheProcessor) {
+  const Scene scene = scenes::make("lattice", {.spheres = 4096});
+  World host = on_host(scene), device = on_device(scene);
+  for (int n = 0; n < 6; ++n) {
+    host.step();
+    EXPECT_GT(device.step().contacts, 8192u);
+    ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
   }
 }
 
