@@ -62,13 +62,32 @@ void sort_by_rank(const std::uint64_t* row, std::size_t count, SpherePair* sorte
   for (std::size_t i = 0; i < count; ++i) sorted[ranks[i]] = unpacked(row[i]);
 }
 
+/// The same for `Count` pairs in registers.
+template <std::size_t Count>
+void sort_few(const std::uint64_t* row, SpherePair* sorted) {
+  std::size_t ranks[Count] = {};
+#pragma GCC unroll 4
+  for (std::size_t i = 1; i < Count; ++i) {
+#pragma GCC unroll 4
+    for (std::size_t k = 0; k < i; ++k) {
+      const std::size_t above = row[i] > row[k] ? 1 : 0;
+      ranks[i] += above;
+      ranks[k] += 1 - above;
+    }
+  }
+#pragma GCC unroll 4
+  for (std::size_t i = 0; i < Count; ++i) sorted[ranks[i]] = unpacked(row[i]);
+}
+
 /// Writes a row sorted.
 void sort_row(const std::uint64_t* row, std::size_t count, SpherePair* sorted, SpherePair* spare) {
   if (count <= 1) {
     if (count == 1) *sorted = unpacked(*row);
     return;
   }
-  if (count <= 4) return sort_by_rank<4>(row, count, sorted);
+  if (count == 2) return sort_few<2>(row, sorted);
+  if (count == 3) return sort_few<3>(row, sorted);
+  if (count == 4) return sort_few<4>(row, sorted);
   if (count <= 8) return sort_by_rank<8>(row, count, sorted);
   if (count <= 16) return sort_by_rank<16>(row, count, sorted);
   if (count <= 32) return sort_by_rank<32>(row, count, sorted);
