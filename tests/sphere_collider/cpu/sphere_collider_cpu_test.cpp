@@ -34,14 +34,14 @@ TEST(SphereColliderCpu, TwentyThousandSpheresEqualBruteForce) {
 }
 
 // The search takes roots only for spheres that nearly touch. At the ends of the exponents, squares
-// underflow or overflow.
+// underflow or overflow, or only the squares of the filter overflow.
 TEST(SphereColliderCpu, SpheresThatNearlyTouchEqualBruteForce) {
   constexpr int kLow = std::numeric_limits<Real>::min_exponent / 2;
   constexpr int kHigh = std::numeric_limits<Real>::max_exponent / 2;
   Random random(base_seed());
   for (const int exponent : {kLow - 4, kLow, kLow + 8, kLow / 2, 0, kHigh - 2, kHigh - 1, kHigh}) {
     const Real scale = std::ldexp(Real(1), exponent);
-    auto spheres = make_lattice(8, 2);
+    auto spheres = make_lattice(8, 2 - 4 * kEpsilon);
     for (SphereInstance& s : spheres) {
       s.radius += (random.uniform() - Real(0.5)) * 100 * kEpsilon;
       s = {s.centre * scale, s.radius * scale};
