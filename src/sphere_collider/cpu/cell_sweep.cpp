@@ -140,7 +140,8 @@ double CellSweep::others_per_cell(const SphereTable& table) const {
   std::uint64_t pairs = 0;
   std::uint64_t in_cell = 0;  // previous spheres in the cell
   for (std::uint32_t i = 1; i < table.count(); ++i) {
-    in_cell = cell[i] == cell[i - 1] ? in_cell + 1 : 0;
+    const std::uint64_t same = cell[i] == cell[i - 1] ? 1 : 0;
+    in_cell = (in_cell + 1) & (0 - same);  // no branch, which would be unpredictable
     pairs += in_cell;
   }
   return 2.0 * static_cast<double>(pairs) / std::max(table.count(), 1u);

@@ -3,6 +3,7 @@
 #include "src/sphere_collider/cpu/contact_writer.hpp"
 
 #include "src/collide/sphere_pair.hpp"
+#include "src/sphere_collider/cpu/pair_filter.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -18,7 +19,7 @@ std::uint32_t lower(std::uint64_t pair) { return static_cast<std::uint32_t>(pair
 std::uint32_t higher(std::uint64_t pair) { return static_cast<std::uint32_t>(pair); }
 SpherePair unpacked(std::uint64_t pair) { return {lower(pair), higher(pair)}; }
 
-constexpr std::size_t kBlock = 1024;     ///< rows per part of the result
+constexpr unsigned kPartBits = 10;       ///< bits of the rows per part of the result, at least
 constexpr std::size_t kRowsAhead = 8;    ///< prefetch distance: rows are read in random order
 constexpr std::size_t kPairsAhead = 16;  ///< prefetch distance: so are spheres
 
@@ -61,13 +62,32 @@ void sort_by_rank(const std::uint64_t* row, std::size_t count, SpherePair* sorte
   for (std::size_t i = 0; i < count; ++i) sorted[ranks[i]] = unpacked(row[i]);
 }
 
+/// The same for `Count` pairs in registers.
+template <std::size_t Count>
+void sort_few(const std::uint64_t* row, SpherePair* sorted) {
+  std::size_t ranks[Count] = {};
+#pragma GCC unroll 4
+  for (std::size_t i = 1; i < Count; ++i) {
+#pragma GCC unroll 4
+    for (std::size_t k = 0; k < i; ++k) {
+      const std::size_t above = row[i] > row[k] ? 1 : 0;
+      ranks[i] += above;
+      ranks[k] += 1 - above;
+    }
+  }
+#pragma GCC unroll 4
+  for (std::size_t i = 0; i < Count; ++i) sorted[ranks[i]] = unpacked(row[i]);
+}
+
 /// Writes a row sorted.
 void sort_row(const std::uint64_t* row, std::size_t count, SpherePair* sorted, SpherePair* spare) {
   if (count <= 1) {
     if (count == 1) *sorted = unpacked(*row);
     return;
   }
-  if (count <= 4) return sort_by_rank<4>(row, count, sorted);
+  if (count == 2) return sort_few<2>(row, sorted);
+  if (count == 3) return sort_few<3>(row, sorted);
+  if (count == 4) return sort_few<4>(row, sorted);
   if (count <= 8) return sort_by_rank<8>(row, count, sorted);
   if (count <= 16) return sort_by_rank<16>(row, count, sorted);
   if (count <= 32) return sort_by_rank<32>(row, count, sorted);
@@ -75,6 +95,32 @@ void sort_row(const std::uint64_t* row, std::size_t count, SpherePair* sorted, S
   std::transform(row, row + count, sorted, unpacked);
   if (count > 512) return sort_long_row(sorted, spare, count);
   std::sort(sorted, sorted + count, less_in_row);
+}
+
+/// The contact of a pair that touches.
+SphereContact contact_of(const SphereInstance* spheres, const SpherePair& p) {
+  const PairResult r = detail::test_sphere_pair(spheres[p.a], spheres[p.b]);
+  return {p.a, p.b, r.normal, r.distance};
+}
+
+/// The contacts of kRealLanes pairs that touch.
+void write_contact_lanes(const SphereInstance* spheres, const SpherePair* pairs,
+                         SphereContact* contacts) {
+  const SphereLanes a = gather_spheres(spheres, pairs, &SpherePair::a);
+  const SphereLanes b = gather_spheres(spheres, pairs, &SpherePair::b);
+  const RealLanes x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
+  const RealLanes len = square_root((x * x + y * y) + z * z);
+  if (bits(less_equal(len, set_lanes(kEpsilon))) != 0) [[unlikely]] {
+    std::transform(pairs, pairs + kRealLanes, contacts,
+                   [&](const SpherePair& p) { return contact_of(spheres, p); });
+    return;
+  }
+  const RealLanes scale = set_lanes(1) / len;
+  for (std::size_t k = 0; k < kRealLanes; ++k) {
+    contacts[k].a = pairs[k].a;
+    contacts[k].b = pairs[k].b;
+  }
+  scatter_contacts(x * scale, y * scale, z * scale, len - (a.radius + b.radius), contacts);
 }
 
 }  // namespace
@@ -96,68 +142,70 @@ std::span<const Item> ContactWriter::write_chunks(const PairChunks& chunks, Thre
   return {items->data(), total};
 }
 
+/// Writes pairs in parts of consecutive rows. Calls reserve(total) before the first part, and
+/// done(pairs) after each, while it is in the cache.
+template <class Reserve, class Done>
+std::span<const SpherePair> ContactWriter::write_rows(std::size_t spheres, const PairChunks& chunks,
+                                                      PairOrder order, ThreadPool& pool,
+                                                      const Reserve& reserve, const Done& done) {
+  rows_.reserve(spheres, "rows of pairs");
+  const bool grouped = order == PairOrder::by_lower_sphere;
+  const unsigned part_bits =
+      grouped ? index_rows(chunks, spheres, pool) : divide(chunks, spheres, pool);
+  const std::size_t parts = (spheres >> part_bits) + 1;
+  const std::uint64_t total = sections_[parts];
+  pairs_.reserve(total, "pairs");
+  spare_.reserve(total, "pairs");
+  reserve(total);
+  pool.run(parts, [&](std::size_t part) {
+    const std::size_t first = part << part_bits;
+    const std::size_t last = std::min(spheres, first + (std::size_t{1} << part_bits));
+    if (first >= last) return;
+    if (!grouped) make_rows(part, first, last);
+    SpherePair* const begin = pairs_.data() + sections_[part];
+    SpherePair* end = begin;
+    for (std::size_t a = first; a < last; ++a) {
+      prefetch(rows_[std::min(a + kRowsAhead, last - 1)]);
+      sort_row(rows_[a].pairs, rows_[a].count, end, spare_.data() + (end - pairs_.data()));
+      end += rows_[a].count;
+    }
+    done(std::span<const SpherePair>(begin, end));
+  });
+  return {pairs_.data(), total};
+}
+
 ContactSpan ContactWriter::write_contacts(std::span<const SphereInstance> spheres,
                                           const PairChunks& chunks, PairOrder order,
                                           ThreadPool& pool) {
-  const auto contact_of = [&](const SpherePair& p) {
-    const PairResult r = detail::test_sphere_pair(spheres[p.a], spheres[p.b]);
-    return SphereContact{p.a, p.b, r.normal, r.distance};
-  };
   if (order == PairOrder::sorted) {
-    return write_chunks(chunks, pool, &contacts_,
-                        [&](std::uint64_t pair) { return contact_of(unpacked(pair)); });
+    return write_chunks(chunks, pool, &contacts_, [&](std::uint64_t pair) {
+      return contact_of(spheres.data(), unpacked(pair));
+    });
   }
-  const std::span<const SpherePair> pairs = write_pairs(spheres.size(), chunks, order, pool);
-  contacts_.reserve(pairs.size(), "contacts");
-  constexpr std::size_t kPart = 8192;
-  pool.run((pairs.size() + kPart - 1) / kPart, [&](std::size_t part) {
-    const std::size_t end = std::min(pairs.size(), (part + 1) * kPart);
-    for (std::size_t i = part * kPart; i < end; ++i) {
-      if (i + kPairsAhead < end) __builtin_prefetch(&spheres[pairs[i + kPairsAhead].b]);
-      contacts_[i] = contact_of(pairs[i]);
-    }
-  });
-  return {contacts_.data(), pairs.size()};
+  const auto reserve = [&](std::uint64_t total) { contacts_.reserve(total, "contacts"); };
+  const std::span<const SpherePair> all = write_rows(
+      spheres.size(), chunks, order, pool, reserve, [&](std::span<const SpherePair> pairs) {
+        SphereContact* const contacts = contacts_.data() + (pairs.data() - pairs_.data());
+        const std::size_t count = pairs.size();
+        std::size_t i = 0;
+        for (; i + kRealLanes <= count; i += kRealLanes) {
+          const std::size_t ahead = i + kPairsAhead;
+          for (std::size_t k = ahead; k < std::min(ahead + kRealLanes, count); ++k) {
+            __builtin_prefetch(&spheres[pairs[k].b]);
+          }
+          write_contact_lanes(spheres.data(), &pairs[i], contacts + i);
+        }
+        for (; i < count; ++i) contacts[i] = contact_of(spheres.data(), pairs[i]);
+      });
+  return {contacts_.data(), all.size()};
 }
 
 std::span<const SpherePair> ContactWriter::write_pairs(std::size_t spheres,
                                                        const PairChunks& chunks, PairOrder order,
                                                        ThreadPool& pool) {
   if (order == PairOrder::sorted) return write_chunks(chunks, pool, &pairs_, unpacked);
-  if (order == PairOrder::none) make_rows(chunks, spheres, pool);
-  if (order == PairOrder::by_lower_sphere) index_rows(chunks, spheres, pool);
-  return write_rows(spheres, pool);
-}
-
-/// Writes the pairs of rows_.
-std::span<const SpherePair> ContactWriter::write_rows(std::size_t spheres, ThreadPool& pool) {
-  const std::size_t blocks = (spheres + kBlock - 1) / kBlock;
-  const auto rows = [&](std::size_t block) {
-    return std::span<const Row>(rows_.data(), spheres)
-        .subspan(block * kBlock, std::min(kBlock, spheres - block * kBlock));
-  };
-  sections_.reserve(blocks, "parts of pairs");
-  pool.run(blocks, [&](std::size_t block) {
-    std::uint64_t count = 0;
-    for (const Row& row : rows(block)) count += row.count;
-    sections_[block] = count;
-  });
-  std::uint64_t total = 0;
-  for (std::size_t block = 0; block < blocks; ++block) {
-    total += std::exchange(sections_[block], total);
-  }
-  pairs_.reserve(total, "pairs");
-  spare_.reserve(total, "pairs");
-  pool.run(blocks, [&](std::size_t block) {
-    std::uint64_t at = sections_[block];
-    const std::span<const Row> own = rows(block);
-    for (std::size_t i = 0; i < own.size(); ++i) {
-      prefetch(own[std::min(i + kRowsAhead, own.size() - 1)]);
-      sort_row(own[i].pairs, own[i].count, pairs_.data() + at, spare_.data() + at);
-      at += own[i].count;
-    }
-  });
-  return {pairs_.data(), total};
+  return write_rows(
+      spheres, chunks, order, pool, [](std::uint64_t) {}, [](std::span<const SpherePair>) {});
 }
 
 void ContactWriter::prefetch(const Row& row) {
@@ -168,9 +216,10 @@ void ContactWriter::prefetch(const Row& row) {
   }
 }
 
-/// Fills rows_ from chunks in which the pairs of a lower sphere are consecutive.
-void ContactWriter::index_rows(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool) {
-  rows_.reserve(spheres, "rows of pairs");
+/// Fills rows_ from chunks in which the pairs of a lower sphere are consecutive, and sections_ with
+/// the begins of parts of rows. Returns the bits of the size of a part.
+unsigned ContactWriter::index_rows(const PairChunks& chunks, std::size_t spheres,
+                                   ThreadPool& pool) {
   std::fill_n(rows_.data(), spheres, Row{});
   pool.run(chunks.size(), [&](std::size_t chunk) {
     const std::span<const std::uint64_t> all = chunks[chunk];
@@ -181,40 +230,45 @@ void ContactWriter::index_rows(const PairChunks& chunks, std::size_t spheres, Th
       rows_[a] = {&all[begin], i - begin};
     }
   });
+  const std::size_t parts = (spheres >> kPartBits) + 1;
+  sections_.reserve(parts + 1, "parts of pairs");
+  pool.run(parts, [&](std::size_t part) {
+    const std::size_t first = part << kPartBits;
+    const std::size_t last = std::min(spheres, first + (std::size_t{1} << kPartBits));
+    std::uint64_t count = 0;
+    for (std::size_t a = first; a < last; ++a) count += rows_[a].count;
+    sections_[part] = count;
+  });
+  sections_[parts] = 0;
+  std::exclusive_scan(sections_.data(), sections_.data() + parts + 1, sections_.data(),
+                      std::uint64_t{0});
+  return kPartBits;
 }
 
-/// Fills rows_ from chunks in any order. Pairs are first divided into buckets of neighbouring lower
-/// spheres, so that the rest stays in the cache of one core.
-void ContactWriter::make_rows(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool) {
+/// Fills the rows of a bucket of neighbouring lower spheres [first, last).
+void ContactWriter::make_rows(std::size_t bucket, std::size_t first, std::size_t last) {
+  const std::span<const std::uint64_t> own(divided_.data() + sections_[bucket],
+                                           divided_.data() + sections_[bucket + 1]);
+  std::fill(rows_.data() + first, rows_.data() + last, Row{});
+  for (const std::uint64_t p : own) ++rows_[lower(p)].count;
+  const std::uint64_t* begin = grouped_.data() + sections_[bucket];
+  for (std::size_t a = first; a < last; ++a) {
+    rows_[a].pairs = begin;
+    begin += std::exchange(rows_[a].count, 0);
+  }
+  for (const std::uint64_t p : own) {
+    Row& row = rows_[lower(p)];
+    grouped_[static_cast<std::size_t>(row.pairs - grouped_.data()) + row.count++] = p;
+  }
+}
+
+/// Divides pairs into buckets of neighbouring lower spheres, so that the rest stays in the cache of
+/// one core. Fills divided_ and sections_. Returns the bits of the size of a bucket.
+unsigned ContactWriter::divide(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool) {
   const auto bits = static_cast<unsigned>(std::bit_width(spheres));
   // At most 256 buckets: streams that fit in the TLB.
-  const unsigned bucket_bits = bits > 18 ? bits - 8 : 10;
+  const unsigned bucket_bits = bits > 18 ? bits - 8 : kPartBits;
   const std::size_t buckets = (spheres >> bucket_bits) + 1;
-  divide(chunks, bucket_bits, buckets, pool);
-  rows_.reserve(spheres, "rows of pairs");
-  grouped_.reserve(sections_[buckets], "pairs in rows");
-  pool.run(buckets, [&](std::size_t bucket) {
-    const std::span<const std::uint64_t> own(divided_.data() + sections_[bucket],
-                                             divided_.data() + sections_[bucket + 1]);
-    const std::size_t first = bucket << bucket_bits;
-    const std::size_t last = std::min(spheres, first + (std::size_t{1} << bucket_bits));
-    if (first >= last) return;
-    std::fill(rows_.data() + first, rows_.data() + last, Row{});
-    for (const std::uint64_t p : own) ++rows_[lower(p)].count;
-    const std::uint64_t* begin = grouped_.data() + sections_[bucket];
-    for (std::size_t a = first; a < last; ++a) {
-      rows_[a].pairs = begin;
-      begin += std::exchange(rows_[a].count, 0);
-    }
-    for (const std::uint64_t p : own) {
-      Row& row = rows_[lower(p)];
-      grouped_[static_cast<std::size_t>(row.pairs - grouped_.data()) + row.count++] = p;
-    }
-  });
-}
-
-void ContactWriter::divide(const PairChunks& chunks, unsigned bucket_bits, std::size_t buckets,
-                           ThreadPool& pool) {
   offsets_.reserve(chunks.size() * buckets, "counts of pairs");
   pool.run(chunks.size(), [&](std::size_t chunk) {
     std::uint64_t* counts = offsets_.data() + chunk * buckets;
@@ -232,10 +286,12 @@ void ContactWriter::divide(const PairChunks& chunks, unsigned bucket_bits, std::
   }
   sections_[buckets] = sum;
   divided_.reserve(sum, "pairs in buckets");
+  grouped_.reserve(sum, "pairs in rows");
   pool.run(chunks.size(), [&](std::size_t chunk) {
     std::uint64_t* next = offsets_.data() + chunk * buckets;
     for (const std::uint64_t p : chunks[chunk]) divided_[next[lower(p) >> bucket_bits]++] = p;
   });
+  return bucket_bits;
 }
 
 }  // namespace cpu

@@ -30,16 +30,18 @@ class ContactWriter {
   template <class Item, class Make>
   std::span<const Item> write_chunks(const PairChunks& chunks, ThreadPool& pool,
                                      Buffer<Item>* items, const Make& make);
-  std::span<const SpherePair> write_rows(std::size_t spheres, ThreadPool& pool);
+  template <class Reserve, class Done>
+  std::span<const SpherePair> write_rows(std::size_t spheres, const PairChunks& chunks,
+                                         PairOrder order, ThreadPool& pool, const Reserve& reserve,
+                                         const Done& done);
   static void prefetch(const Row& row);
-  void index_rows(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool);
-  void make_rows(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool);
-  void divide(const PairChunks& chunks, unsigned bucket_bits, std::size_t buckets,
-              ThreadPool& pool);
+  unsigned index_rows(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool);
+  unsigned divide(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool);
+  void make_rows(std::size_t bucket, std::size_t first, std::size_t last);
 
   Buffer<SphereContact> contacts_;
   Buffer<SpherePair> pairs_, spare_;
-  Buffer<std::uint64_t> sections_;  ///< begins of parts of the result
+  Buffer<std::uint64_t> sections_;  ///< begins of parts of the result, and its end
   Buffer<Row> rows_;                ///< by lower sphere
   Buffer<std::uint64_t> offsets_;   ///< per chunk and bucket
   Buffer<std::uint64_t> divided_;   ///< pairs by bucket of neighbouring lower spheres

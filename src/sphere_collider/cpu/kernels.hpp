@@ -30,11 +30,14 @@ struct SphereColumns {
 };
 inline constexpr std::int64_t kNoCell = INT64_MAX;
 
+inline constexpr std::uint32_t kRows = 9;                  ///< rows of cells around a cell
+inline constexpr std::uint32_t kRoom = kRows * kMaxLanes;  ///< a vector of pairs for each row
+
 /// Output of the kernels: pairs, as (lower index << 32) | higher index.
 struct PairSink {
   std::uint64_t* next;
   std::uint64_t* end;
-  void (*grow)(PairSink* sink);  ///< reserves kMaxLanes more elements; may throw
+  void (*grow)(PairSink* sink);  ///< reserves kRoom more elements; may throw
 };
 
 /// Tests queries [first, last) against targets. If `self`, both are the same columns, and each pair
@@ -54,7 +57,6 @@ struct CellRow {
   std::int64_t offset;
   std::uint32_t cursor;
 };
-inline constexpr std::uint32_t kRows = 9;
 
 /// All functions append every pair that touches, and no others.
 struct Kernels {

@@ -31,10 +31,26 @@
 // not, len = inf > w >= s. Centres and radii are finite: differences may be infinite, their squares
 // are never negative, so no NaN arises.
 
+// Most pairs that are kept touch, which the squares can tell as well: a pair touches if I > D, with
+//     I = fl(W - fl(fl(W*64u) + m)),   m = 128 t^2/u.
+// Since reach <= r*(1 + 15u) + 3t,
+//     W <= R^2 * (1 + 37u) + 16tR + 50t^2 <= R^2 * (1 + 41u) + 65t^2/u,
+// so D < I < R^2 * (1 - 20u) < s^2 and len <= s. If W overflows, I is NaN and decides nothing.
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 namespace {
+
+#if defined(JFPX_DOUBLE_PRECISION)
+constexpr Real kEps = __DBL_EPSILON__;
+constexpr Real kMin = __DBL_MIN__;
+#else
+constexpr Real kEps = __FLT_EPSILON__;
+constexpr Real kMin = __FLT_MIN__;
+#endif
+constexpr Real kBand = 32 * kEps;            ///< 64u
+constexpr Real kMargin = 256 * kMin / kEps;  ///< m
 
 template <class S>
 struct Query {
@@ -76,6 +92,20 @@ inline std::uint32_t touching(const Query<S>& q, const SphereColumns& t, std::ui
   return touching<S>(squares(q, t, at), q, t, at);
 }
 
+/// Returns the bits of `targets` that touch. Takes roots only if the squares do not decide.
+template <class S>
+inline std::uint32_t touching_among(std::uint32_t targets, const Query<S>& q,
+                                    const SphereColumns& t, std::uint32_t at) {
+  const typename S::Vec square = squares(q, t, at);
+  const typename S::Vec w = q.reach + S::load(t.reach + at);
+  const typename S::Vec outer = w * w;
+  const typename S::Vec inner = outer - (outer * S::set(kBand) + S::set(kMargin));
+  targets &= S::not_greater(square, outer);
+  if ((targets & S::not_greater(inner, square)) != 0) [[unlikely]]
+    targets &= touching<S>(square, q, t, at);
+  return targets;
+}
+
 /// Appends pairs. Copies the pointers of the sink, so that they stay in registers.
 class Appender {
  public:
@@ -84,15 +114,26 @@ class Appender {
   Appender(const Appender&) = delete;
   Appender& operator=(const Appender&) = delete;
 
-  template <class S>
-  void append(std::uint32_t id, const std::uint32_t* others, std::uint32_t mask) {
-    if (end_ - next_ < kMaxLanes) [[unlikely]] {
+  /// Makes room for kRoom pairs.
+  void reserve() {
+    if (end_ - next_ < kRoom) [[unlikely]] {
       sink_->next = next_;
       sink_->grow(sink_);
       next_ = sink_->next;
       end_ = sink_->end;
     }
+  }
+
+  /// Requires room for kMaxLanes pairs.
+  template <class S>
+  void put(std::uint32_t id, const std::uint32_t* others, std::uint32_t mask) {
     next_ = S::append(next_, id, others, mask);
+  }
+
+  template <class S>
+  void append(std::uint32_t id, const std::uint32_t* others, std::uint32_t mask) {
+    reserve();
+    put<S>(id, others, mask);
   }
 
  private:
@@ -153,7 +194,7 @@ template <class S>
 
 /// Tests the targets in cells [low, high), starting at the cursor. Cells ascend, so each bound
 /// selects a prefix of each vector. This needs neither a table of cells nor an unpredictable
-/// branch.
+/// branch. Requires room for one vector of pairs, and leaves the room for the rows that follow.
 template <class S>
 inline void search_row(const Query<S>& q, const SphereColumns& t, std::int64_t low,
                        std::int64_t high, std::uint32_t* cursor, Appender* pairs) {
@@ -164,10 +205,11 @@ inline void search_row(const Query<S>& q, const SphereColumns& t, std::int64_t l
     const std::uint32_t below = S::cells_below(t.cell + at, low);
     const std::uint32_t inside = S::cells_below(t.cell + at, high);
     passed += S::count(below);
-    pairs->append<S>(q.id, t.id + at, touching(q, t, at) & inside & ~below);
+    pairs->put<S>(q.id, t.id + at, touching_among(inside ^ below, q, t, at));
     if (inside != kAll) [[likely]]
       break;
     at += S::kLanes;
+    pairs->reserve();
   }
   *cursor += passed;
 }
@@ -183,6 +225,7 @@ void search_rows(const PairSearch& search, CellRow* rows, int row_count) {
     const Query<S> q = load_query<S>(queries, i);
     const std::int64_t cell = queries.cell[i];
     int row = 0;
+    pairs.reserve();  // once for all rows, unless one has several vectors
     if (self) {
       std::uint32_t behind = i + 1;
       search_row(q, targets, cell, cell + 2, &behind, &pairs);

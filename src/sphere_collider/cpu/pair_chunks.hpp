@@ -70,7 +70,9 @@ class PairChunks {
       auto* self = static_cast<Filler*>(sink);
       Buffer<std::uint64_t>& pairs = self->chunk->pairs;
       const auto used = static_cast<std::size_t>(self->next - pairs.data());
-      pairs.reserve(std::max<std::size_t>(1024, 2 * pairs.capacity()), "pairs of spheres", used);
+      constexpr std::size_t kSmallest = 1024;
+      static_assert(kSmallest >= kRoom);
+      pairs.reserve(std::max(kSmallest, 2 * pairs.capacity()), "pairs of spheres", used);
       self->next = pairs.data() + used;
       self->end = pairs.data() + pairs.capacity();
     }

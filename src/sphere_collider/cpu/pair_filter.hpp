@@ -1,4 +1,5 @@
-/// Vector filter for lists of sphere pairs, with instructions that every processor supports.
+/// Sphere pairs in vectors, with instructions that every processor supports: a filter for lists,
+/// and the transposition of spheres and contacts.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -36,6 +37,29 @@ inline SphereLanes gather_spheres(const SphereInstance* spheres, const SpherePai
           __builtin_shufflevector(xy01, xy23, 2, 3, 6, 7),
           __builtin_shufflevector(zr01, zr23, 0, 1, 4, 5),
           __builtin_shufflevector(zr01, zr23, 2, 3, 6, 7)};
+#endif
+}
+
+/// Writes a normal and a distance to each of kRealLanes contacts.
+inline void scatter_contacts(RealLanes x, RealLanes y, RealLanes z, RealLanes distance,
+                             SphereContact* contacts) {
+  const auto store = [&](std::size_t i, std::size_t field, RealLanes v) {
+    store_lanes(&contacts[i].normal.x + field, v);
+  };
+#if defined(JFPX_DOUBLE_PRECISION)
+  store(0, 0, __builtin_shufflevector(x, y, 0, 2));
+  store(0, 2, __builtin_shufflevector(z, distance, 0, 2));
+  store(1, 0, __builtin_shufflevector(x, y, 1, 3));
+  store(1, 2, __builtin_shufflevector(z, distance, 1, 3));
+#else
+  const RealLanes xy01 = __builtin_shufflevector(x, y, 0, 4, 1, 5);
+  const RealLanes xy23 = __builtin_shufflevector(x, y, 2, 6, 3, 7);
+  const RealLanes zd01 = __builtin_shufflevector(z, distance, 0, 4, 1, 5);
+  const RealLanes zd23 = __builtin_shufflevector(z, distance, 2, 6, 3, 7);
+  store(0, 0, __builtin_shufflevector(xy01, zd01, 0, 1, 4, 5));
+  store(1, 0, __builtin_shufflevector(xy01, zd01, 2, 3, 6, 7));
+  store(2, 0, __builtin_shufflevector(xy23, zd23, 0, 1, 4, 5));
+  store(3, 0, __builtin_shufflevector(xy23, zd23, 2, 3, 6, 7));
 #endif
 }
 

@@ -15,9 +15,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
-/// Returns the extended radius of the filter (kernels.inl): at least r*(1 + 6u) + t with
-/// u = epsilon/2 and t = the root of the smallest normal number. Uses twice that slack, to cover
-/// its own rounding.
+/// Returns the extended radius of the filter (kernels.inl): at least r*(1 + 6u) + t and at most
+/// r*(1 + 15u) + 3t, with u = epsilon/2 and t = the root of the smallest normal number. Uses twice
+/// the least slack, to cover its own rounding.
 inline Real extended_radius(Real r) {
   static const Real slack = 2 * std::sqrt(std::numeric_limits<Real>::min());
   return r * (1 + 6 * kEpsilon) + slack;

@@ -1,6 +1,8 @@
 /// Tests of the CPU collider only: large inputs, the automatic choice of the algorithm, options.
 #include "tests/support/sphere_collider_contract.hpp"
 
+#include <cmath>
+#include <limits>
 #include <set>
 
 namespace jfpx {
@@ -28,6 +30,32 @@ TEST(SphereColliderCpu, TwentyThousandSpheresEqualBruteForce) {
     EXPECT_TRUE(same_bits(make(SphereAlgorithm::sorted_tiles)->find_contacts(spheres),
                           brute_force(spheres)))
         << name << ", " << seed_note();
+  }
+}
+
+// The search takes roots only for spheres that nearly touch. At the ends of the exponents, squares
+// underflow or overflow, or only the squares of the filter overflow.
+TEST(SphereColliderCpu, SpheresThatNearlyTouchEqualBruteForce) {
+  constexpr int kLow = std::numeric_limits<Real>::min_exponent / 2;
+  constexpr int kHigh = std::numeric_limits<Real>::max_exponent / 2;
+  Random random(base_seed());
+  for (const int exponent : {kLow - 4, kLow, kLow + 8, kLow / 2, 0, kHigh - 2, kHigh - 1, kHigh}) {
+    const Real scale = std::ldexp(Real(1), exponent);
+    auto spheres = make_lattice(8, 2 - 4 * kEpsilon);
+    for (SphereInstance& s : spheres) {
+      s.radius += (random.uniform() - Real(0.5)) * 100 * kEpsilon;
+      s = {s.centre * scale, s.radius * scale};
+    }
+    const auto expected = brute_force(spheres);
+    for (const SimdLevel level :
+         {SimdLevel::scalar, SimdLevel::sse2, SimdLevel::avx2, SimdLevel::avx512}) {
+      const auto collider = make_sphere_collider({.backend = Backend::cpu,
+                                                  .algorithm = SphereAlgorithm::sorted_tiles,
+                                                  .threads = 1,
+                                                  .simd = level});
+      EXPECT_TRUE(same_bits(collider->find_contacts(spheres), expected))
+          << "2^" << exponent << ", " << seed_note();
+    }
   }
 }
 
