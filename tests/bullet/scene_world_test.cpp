@@ -328,7 +328,10 @@ TEST(SceneWorld, FiltersTouchTheSamePairsAsTheNativeWorld) {
     World native(scene);
     native.step();
     Pairs expected;
-    for (const Contact& c : native.contacts()) expected.insert(std::minmax(c.a.index, c.b.index));
+    for (const Contact& c : native.contacts()) {
+      if (!(c.distance < 0)) continue;  // the bodies met during the step
+      expected.insert(std::minmax(c.a.index, c.b.index));
+    }
     for (const DispatcherKind kind : {DispatcherKind::stock, DispatcherKind::jfpx}) {
       SceneWorld world(scene, {.dispatcher = kind, .dispatch = {.minimum_batch = 0}});
       world.step();
