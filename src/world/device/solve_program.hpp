@@ -151,8 +151,8 @@ struct SolveProgram {
     BodyCells::Version version;
 
     template <bool kRotation>
-    JFPX_HD void read(const StepData& data) {
-      is_ready = data.cells[index].template read<kRotation>(before, &motion, &version);
+    JFPX_HD void read(const BodyCells* cells) {
+      is_ready = cells[index].template read<kRotation>(before, &motion, &version);
     }
     JFPX_HD void start(std::uint32_t body, const RowBody& constants) {
       index = body;
@@ -206,7 +206,7 @@ struct SolveProgram {
       return program_.begin_body(sweep_, program_.data.step.bodies.ids[i].index);
     }
     JFPX_HD bool is_ready(BodyItem* item) const {
-      if (item->is_active && !item->is_ready) item->read<true>(program_.data);
+      if (item->is_active && !item->is_ready) item->read<true>(program_.data.cells);
       return item->is_ready || !item->is_active;
     }
     JFPX_HD void complete(BodyItem* item) const {
@@ -277,7 +277,7 @@ struct SolveProgram {
     if (item->row == kNone) return true;
     for (ItemBody* body : {&item->a, &item->b}) {
       if (body->is_ready) continue;
-      item->is_manifold ? body->read<true>(data) : body->read<false>(data);
+      item->is_manifold ? body->read<true>(data.cells) : body->read<false>(data.cells);
     }
     return item->a.is_ready && item->b.is_ready;
   }
