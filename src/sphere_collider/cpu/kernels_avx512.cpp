@@ -1,6 +1,9 @@
 /// The kernels for AVX-512 (F, BW, DQ, VL).
 #include "src/sphere_collider/cpu/kernels.inl"
 
+// g++ 12 with sanitizers reports operands of its own intrinsics, which are undefined on purpose
+// (GCC bug 105593).
+#pragma GCC diagnostic ignored "-Wuninitialized"
 #include <immintrin.h>
 
 namespace jfpx {
