@@ -76,7 +76,12 @@ class CudaDevice {
     const DeviceGuard guard(device_);
     const Launch& limits = limits_of<Program>();
     const std::size_t wanted = (items + GridTeam::kThreads - 1) / GridTeam::kThreads;
-    auto blocks = static_cast<unsigned>(std::clamp<std::size_t>(wanted, 1, limits.most_blocks));
+    std::size_t most = limits.most_blocks;
+    if constexpr (requires { Program::kItemsPerThread; }) {
+      most = std::clamp(items / (GridTeam::kThreads * Program::kItemsPerThread),
+                        static_cast<std::size_t>(processors_), most);
+    }
+    auto blocks = static_cast<unsigned>(std::clamp<std::size_t>(wanted, 1, most));
     if (limits.has_clusters && blocks <= 2 * kClusterBlocks) {
       blocks = std::min(blocks, kClusterBlocks);
     }

@@ -44,8 +44,23 @@ struct Turns {
   }
 };
 
-/// The motion of a body as cells. Those of the velocities are written at each turn, the others only
-/// when they change: the words of the velocities say which version of the others belongs to them.
+/// Number of cells of a vector.
+inline constexpr int kVectorCells = 3 / kCellNumbers;
+
+/// What the rows of a body read: in float, one access of memory.
+struct alignas(64) MotionCells {
+  Cell velocity[kVectorCells], angular_velocity[kVectorCells], shift[kVectorCells],
+      rotation[kVectorCells];
+};
+
+/// What a row reads if it rebounds.
+struct FreeCells {
+  Cell velocity[kVectorCells], angular_velocity[kVectorCells];
+};
+
+/// Access to the motion of a body as cells. Those of the velocities are written at each turn, the
+/// others only when they change: the words of the velocities say which version of the others
+/// belongs to them.
 class BodyCells {
  public:
   /// Versions of the other vectors.
@@ -53,8 +68,10 @@ class BodyCells {
     std::uint32_t shift = 0, rotation = 0, free = 0;
   };
 
+  JFPX_HD BodyCells(MotionCells* motion, FreeCells* free) : motion_(motion), free_(free) {}
+
   /// The motion before the first turn.
-  JFPX_HD void start(const soft_step::SolverBody& body, const soft_step::FreeMotion& free) {
+  JFPX_HD void start(const soft_step::SolverBody& body, const soft_step::FreeMotion& free) const {
     Version version;
     write_shift(body, &version);
     write_rotation(body, &version);
@@ -68,10 +85,10 @@ class BodyCells {
   template <bool kRotation>
   JFPX_HD bool read(std::uint32_t turn, soft_step::SolverBody* body, Version* version) const {
     Read v, w, s, r;
-    v.load(velocity_);
-    w.load(angular_velocity_);
-    s.load(shift_);
-    if constexpr (kRotation) r.load(rotation_);
+    v.load(motion_->velocity);
+    w.load(motion_->angular_velocity);
+    s.load(motion_->shift);
+    if constexpr (kRotation) r.load(motion_->rotation);
     const std::uint32_t word = v.get(&body->velocity);
     version->shift = word >> kTurnBits & kVersionMask;
     version->rotation = word >> (kTurnBits + kVersionBits) & kVersionMask;
@@ -87,41 +104,40 @@ class BodyCells {
 
   /// Writes the velocities after a turn. @param version of the shift and the rotation
   JFPX_HD void write(std::uint32_t turn, const soft_step::SolverBody& body,
-                     const Version& version) {
+                     const Version& version) const {
     const std::uint32_t word = turn | version.shift << kTurnBits |
                                version.rotation << (kTurnBits + kVersionBits) |
                                version.free << (kTurnBits + 2 * kVersionBits);
-    store(velocity_, body.velocity, word);
-    store(angular_velocity_, body.angular_velocity, word);
+    store(motion_->velocity, body.velocity, word);
+    store(motion_->angular_velocity, body.angular_velocity, word);
   }
   /// Write a new version, before the velocities.
-  JFPX_HD void write_shift(const soft_step::SolverBody& body, Version* version) {
+  JFPX_HD void write_shift(const soft_step::SolverBody& body, Version* version) const {
     version->shift = (version->shift + 1) & kVersionMask;
-    store(shift_, body.shift, version->shift);
+    store(motion_->shift, body.shift, version->shift);
   }
-  JFPX_HD void write_rotation(const soft_step::SolverBody& body, Version* version) {
+  JFPX_HD void write_rotation(const soft_step::SolverBody& body, Version* version) const {
     version->rotation = (version->rotation + 1) & kVersionMask;
-    store(rotation_, body.rotation, version->rotation);
+    store(motion_->rotation, body.rotation, version->rotation);
   }
-  JFPX_HD void write_free(const soft_step::FreeMotion& free, Version* version) {
+  JFPX_HD void write_free(const soft_step::FreeMotion& free, Version* version) const {
     version->free = (version->free + 1) & kVersionMask;
-    store(free_velocity_, free.velocity, version->free);
-    store(free_angular_velocity_, free.angular_velocity, version->free);
+    store(free_->velocity, free.velocity, version->free);
+    store(free_->angular_velocity, free.angular_velocity, version->free);
   }
   /// Reads the free motion of a version that read() has returned: it is already on its way.
   JFPX_HD soft_step::FreeMotion read_free(const Version& version) const {
     soft_step::FreeMotion free;
     Read v, w;
     do {
-      v.load(free_velocity_);
-      w.load(free_angular_velocity_);
+      v.load(free_->velocity);
+      w.load(free_->angular_velocity);
     } while (v.get(&free.velocity) != version.free ||
              w.get(&free.angular_velocity) != version.free);
     return free;
   }
 
  private:
-  static constexpr int kCells = 3 / kCellNumbers;  ///< of a vector
   static constexpr std::uint32_t kTurnBits = 14, kVersionBits = 6;
   static constexpr std::uint32_t kTurnMask = (1u << kTurnBits) - 1;
   static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
@@ -130,16 +146,16 @@ class BodyCells {
   static_assert((2 * kMaxSubsteps + 2) * Turns::kPerSweep < kTurnMask);
 
   struct Read {
-    Cell cells[kCells];
+    Cell cells[kVectorCells];
     JFPX_HD void load(const Cell* from) {
-      for (int c = 0; c < kCells; ++c) cells[c] = load_cell(from + c);
+      for (int c = 0; c < kVectorCells; ++c) cells[c] = load_cell(from + c);
     }
     /// @returns the word of all cells, or kMixed
     JFPX_HD std::uint32_t get(Vec3* vector) const {
       *vector = {cells[0].numbers[0], cells[1 / kCellNumbers].numbers[1 % kCellNumbers],
                  cells[2 / kCellNumbers].numbers[2 % kCellNumbers]};
       std::uint32_t word = cells[0].sequence;
-      for (int c = 1; c < kCells; ++c) {
+      for (int c = 1; c < kVectorCells; ++c) {
         if (cells[c].sequence != word) word = kMixed;
       }
       return word;
@@ -147,7 +163,7 @@ class BodyCells {
   };
   JFPX_HD static void store(Cell* to, const Vec3& vector, std::uint32_t word) {
     const Real numbers[3] = {vector.x, vector.y, vector.z};
-    for (int c = 0; c < kCells; ++c) {
+    for (int c = 0; c < kVectorCells; ++c) {
       Cell cell;
       for (int k = 0; k < kCellNumbers; ++k) cell.numbers[k] = numbers[c * kCellNumbers + k];
       cell.sequence = word;
@@ -155,8 +171,8 @@ class BodyCells {
     }
   }
 
-  Cell velocity_[kCells], angular_velocity_[kCells], shift_[kCells], rotation_[kCells];
-  Cell free_velocity_[kCells], free_angular_velocity_[kCells];
+  MotionCells* motion_;
+  FreeCells* free_;
 };
 
 /// What the rows of a body read, and no row changes.

@@ -223,7 +223,8 @@ class DeviceStep final : public DeviceWorld {
     Buffer<soft_step::SphereRow> sphere_rows;
     Buffer<soft_step::ManifoldRow> manifold_rows;
     Buffer<soft_step::PointRow> point_rows;
-    Buffer<BodyCells> cells;
+    Buffer<MotionCells> motion_cells;
+    Buffer<FreeCells> free_cells;
     Buffer<RowBody> row_bodies;
   };
 
@@ -384,7 +385,8 @@ class DeviceStep final : public DeviceWorld {
     d.step.near = d.near_flag;
     d.step.solver = room(&s.solver, n);
     d.step.orientation = room(&s.orientation, n);
-    d.cells = room(&s.cells, n);
+    d.motion_cells = room(&s.motion_cells, n);
+    d.free_cells = room(&s.free_cells, n);
     d.row_bodies = room(&s.row_bodies, n);
     d.pair_count = room(&s.pair_count, 1);
     d.counters = room(&counters_, 1);

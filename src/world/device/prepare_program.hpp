@@ -39,7 +39,7 @@ struct PrepareProgram {
     d.first_fixed[i] = kNone;
     soft_step::FreeMotion free;
     d.step.accelerate(i, &body, &free, true);
-    d.cells[i].start(body, free);
+    d.cells(i).start(body, free);
   }
 
   template <class Team>

@@ -18,8 +18,10 @@ namespace device {
 /// The items of a thread are in the order of the sweeps, and an item waits only for items before
 /// it in this order. So the first item that is not complete never waits.
 struct SolveProgram {
-  /// Threads that wait read memory again and again: with more of them, all take longer.
-  static constexpr unsigned kBlocksPerProcessor = 1;
+  static constexpr unsigned kBlocksPerProcessor = 2;
+  /// Threads that wait read memory again and again. So more than one block on a processor pays only
+  /// where rows rarely wait, because each thread has at least this number of them.
+  static constexpr std::size_t kItemsPerThread = 32;
   StepData data;
 
   template <class Team>
@@ -151,8 +153,8 @@ struct SolveProgram {
     BodyCells::Version version;
 
     template <bool kRotation>
-    JFPX_HD void read(const BodyCells* cells) {
-      is_ready = cells[index].template read<kRotation>(before, &motion, &version);
+    JFPX_HD void read(const StepData& data) {
+      is_ready = data.cells(index).template read<kRotation>(before, &motion, &version);
     }
     JFPX_HD void start(std::uint32_t body, const RowBody& constants) {
       index = body;
@@ -206,7 +208,7 @@ struct SolveProgram {
       return program_.begin_body(sweep_, program_.data.step.bodies.ids[i].index);
     }
     JFPX_HD bool is_ready(BodyItem* item) const {
-      if (item->is_active && !item->is_ready) item->read<true>(program_.data.cells);
+      if (item->is_active && !item->is_ready) item->read<true>(program_.data);
       return item->is_ready || !item->is_active;
     }
     JFPX_HD void complete(BodyItem* item) const {
@@ -277,7 +279,7 @@ struct SolveProgram {
     if (item->row == kNone) return true;
     for (ItemBody* body : {&item->a, &item->b}) {
       if (body->is_ready) continue;
-      item->is_manifold ? body->read<true>(data.cells) : body->read<false>(data.cells);
+      item->is_manifold ? body->read<true>(data) : body->read<false>(data);
     }
     return item->a.is_ready && item->b.is_ready;
   }
@@ -300,7 +302,7 @@ struct SolveProgram {
     const Impact impact{data.step.bodies.last_acceleration, row.a};
     operation.template run<false>(&row, &item->a.motion, &item->b.motion, impact);
     const auto write = [&](ItemBody* body, const Vec3& shift, const soft_step::FreeMotion& change) {
-      BodyCells& cells = data.cells[body->index];
+      const BodyCells cells = data.cells(body->index);
       if constexpr (Operation::kMovesBodies) {
         if (!(body->motion.shift == shift)) cells.write_shift(body->motion, &body->version);
         if (impact.is_pending) {
@@ -325,7 +327,7 @@ struct SolveProgram {
         &row, data.point_rows + row.first,
         soft_step::BodyPair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b});
     for (ItemBody* body : {&item->a, &item->b}) {
-      BodyCells& cells = data.cells[body->index];
+      const BodyCells cells = data.cells(body->index);
       if constexpr (Operation::kMovesBodies) {
         cells.write_shift(body->motion, &body->version);
         cells.write_rotation(body->motion, &body->version);
@@ -358,7 +360,7 @@ struct SolveProgram {
       return;
     }
     SolverBody& body = item->motion;
-    BodyCells& cells = d.cells[i];
+    const BodyCells cells = d.cells(i);
     BodyFree free;
     for (std::uint32_t r = item->first_fixed; r != kNone;) {
       const std::uint32_t next = d.next_fixed[r];
@@ -423,7 +425,7 @@ struct SolveProgram {
       const Impact impact{data.step.bodies.last_acceleration, row.a};
       operation.template run<true>(&row, body, &fixed, impact);
       if (impact.is_pending) {
-        free->read(data.cells[item->index], item->version);
+        free->read(data.cells(item->index), item->version);
         free->motion.add(impact.of_a.velocity, impact.of_a.angular_velocity);
         free->is_changed = true;
       }

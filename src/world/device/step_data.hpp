@@ -135,10 +135,14 @@ struct StepData {
   std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies
   std::uint32_t* next_fixed = nullptr;   ///< by row of either kind
   std::uint32_t* overflow = nullptr;  ///< the rows without a color, in the order of their contacts
-  BodyCells* cells = nullptr;         ///< by body
-  RowBody* row_bodies = nullptr;      ///< by body
+  MotionCells* motion_cells = nullptr;  ///< by body
+  FreeCells* free_cells = nullptr;      ///< by body
+  RowBody* row_bodies = nullptr;        ///< by body
   SavedArrays saved;
 
+  JFPX_HD BodyCells cells(std::uint32_t body) const {
+    return {&motion_cells[body], &free_cells[body]};
+  }
   JFPX_HD soft_step::ContactView contacts() const {
     soft_step::ContactView view = now.view;
     view.sphere_count = counters->spheres;
