@@ -1,4 +1,5 @@
-/// Cost model of sphere collision on a machine, used by Backend::automatic (thesis 5.4).
+/// Cost model of sphere collision and of steps on a machine, used by Backend::automatic (thesis
+/// 5.4).
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -8,7 +9,9 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Amount of work of one SphereCollider call. The counts are doubles, so that none overflows.
+/// Amount of work of one SphereCollider call, or of one step of a world with Solver::soft_step, for
+/// which only `spheres` counts: the number of its bodies. The counts are doubles, so that none
+/// overflows.
 struct ColliderWork {
   double spheres = 0;   ///< [-]
   double pairs = 0;     ///< [-], N*(N-1)/2 for find_contacts(), the list for find_touching()
@@ -38,6 +41,7 @@ constexpr double microseconds(const CostTerms& t, const ColliderWork& work) {
 struct CostModel {
   CostTerms x86_all_pairs, x86_sorted_tiles, x86_given_pairs;
   CostTerms cuda_all_pairs, cuda_sorted_tiles, cuda_given_pairs;
+  CostTerms x86_world, cuda_world;  ///< steps of a world of touching bodies
   /// [ms] First use of the device, >= 0. When the predicted gain exceeds it, another thread starts
   /// the device while the CPU goes on; 0 states that it is started already, and uses it at once.
   double cuda_start_ms = 200;

@@ -32,7 +32,8 @@ struct WorldSettings {
   /// Device and algorithm that find sphere contacts. Its `threads` also run the other parts of a
   /// step with Solver::soft_step. With Backend::cuda and Solver::soft_step, the state of the world
   /// lies on the device, and all parts of a step run there (docs/cuda.md); functions that read or
-  /// change the state may then also throw DeviceError.
+  /// change the state may then also throw DeviceError. With Backend::automatic and
+  /// Solver::soft_step, the world moves to the device and back, whichever takes less time.
   SphereColliderOptions collider;
   BroadPhase broad_phase = BroadPhase::cells;
 };
@@ -90,11 +91,13 @@ struct StepReport {
   /// undone. Check this field: further steps are also undone until the body is removed or gets
   /// another state.
   bool non_finite = false;
-  BodyId non_finite_body;                                  ///< the first such body
-  std::uint32_t awake = 0;                                 ///< movable bodies awake after the step
-  Backend backend = Backend::cpu;                          ///< device that found sphere contacts
-  SphereAlgorithm algorithm = SphereAlgorithm::automatic;  ///< algorithm that found them
-  ChoiceReason choice = ChoiceReason::fixed;               ///< reason for backend and algorithm
+  BodyId non_finite_body;   ///< the first such body
+  std::uint32_t awake = 0;  ///< movable bodies awake after the step
+  /// cuda: the GPU made the whole step, or found the sphere contacts of a step on the CPU.
+  Backend backend = Backend::cpu;
+  /// Algorithm that found the sphere contacts; `automatic` in a step on a GPU.
+  SphereAlgorithm algorithm = SphereAlgorithm::automatic;
+  ChoiceReason choice = ChoiceReason::fixed;  ///< reason for backend and algorithm
   /// Error of a device whose work the CPU took over in this step; empty if there was none.
   std::string device_failure;
   /// With Solver::soft_step, `integrate_ms` is the time of forces, and `resolve_ms` includes the

@@ -37,7 +37,7 @@ class StepReport(NamedTuple):
     awake: int
     """Movable bodies awake after the step."""
     backend: str
-    """Device that found the sphere contacts."""
+    """Device of the step, or that found the sphere contacts of a step on the CPU."""
     algorithm: str
     choice: str
     """Reason for backend and algorithm."""

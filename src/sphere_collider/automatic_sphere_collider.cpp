@@ -3,6 +3,8 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/sphere_collider/choice_reason.hpp"
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -23,22 +25,6 @@ ColliderWork work_of(std::span<const SphereInstance> spheres, std::span<const Sp
   return {.spheres = n,
           .pairs = m,
           .bytes = n * sizeof(SphereInstance) + m * (sizeof(SpherePair) + sizeof(PairContact))};
-}
-
-ChoiceReason choice_reason(TimeChooser::Reason reason) {
-  switch (reason) {
-    case TimeChooser::Reason::fixed:
-      return ChoiceReason::fixed;
-    case TimeChooser::Reason::predicted:
-      return ChoiceReason::predicted;
-    case TimeChooser::Reason::measured:
-      return ChoiceReason::measured;
-    case TimeChooser::Reason::kept:
-      return ChoiceReason::kept;
-    case TimeChooser::Reason::trial:
-      return ChoiceReason::trial;
-  }
-  return ChoiceReason::fixed;
 }
 
 /// Index of the collider with a given algorithm.
@@ -132,7 +118,7 @@ auto AutomaticSphereCollider::compute(Calls& calls, const ColliderWork& expected
       calls.chooser.record(us.count(), microseconds(terms, measure(result)));
       if (device_failure_.empty()) calls.following = decision.following;
       calls.reason =
-          device_lost_ ? ChoiceReason::device_failed : choice_reason(calls.chooser.reason());
+          device_lost_ ? ChoiceReason::device_failed : to_choice_reason(calls.chooser.reason());
       calls.backend = backend;
       last_ = &calls;
       if (algorithm != SphereAlgorithm::automatic) algorithm_ = algorithm;

@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kFormat = 1;
+constexpr int kFormat = 2;
 constexpr const char* kFormatName = "jfpx_cost_model";
 constexpr const char* kPrecision = sizeof(Real) == 4 ? "float" : "double";
 
@@ -30,6 +30,8 @@ constexpr Way kWays[] = {
     {"cuda_all_pairs", &CostModel::cuda_all_pairs},
     {"cuda_sorted_tiles", &CostModel::cuda_sorted_tiles},
     {"cuda_given_pairs", &CostModel::cuda_given_pairs},
+    {"x86_world", &CostModel::x86_world},
+    {"cuda_world", &CostModel::cuda_world},
 };
 
 struct Term {
@@ -85,6 +87,8 @@ CostModel::CostModel() {
   cuda_all_pairs = {.call_us = 13, .byte_ns = 0.05, .sphere_ns = 2.5, .pair_ns = 0.0006 * kWide};
   cuda_sorted_tiles = {.call_us = 41, .byte_ns = 0.05};
   cuda_given_pairs = {.call_us = 15, .byte_ns = 0.05};
+  x86_world = {.call_us = 5, .sphere_ns = 1250};
+  cuda_world = {.call_us = 270, .sphere_ns = 5 * kWide};
 }
 
 std::string find_fault(const CostModel& model) {

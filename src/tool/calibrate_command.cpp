@@ -40,10 +40,12 @@ std::string report(const CostModel& costs, bool with_cuda) {
   add("cpu, all pairs", costs.x86_all_pairs);
   add("cpu, sorted tiles", costs.x86_sorted_tiles);
   add("cpu, given pairs", costs.x86_given_pairs);
+  add("cpu, step of a world", costs.x86_world);
   if (with_cuda) {
     add("cuda, all pairs", costs.cuda_all_pairs);
     add("cuda, sorted tiles", costs.cuda_sorted_tiles);
     add("cuda, given pairs", costs.cuda_given_pairs);
+    add("cuda, step of a world", costs.cuda_world);
   }
   Table crossovers({"with 3 contacts per sphere", "faster from spheres"});
   crossovers.add({"cpu: sorted tiles instead of all pairs",
@@ -53,6 +55,8 @@ std::string report(const CostModel& costs, bool with_cuda) {
                   from_how_many(costs.cuda_all_pairs, costs.cuda_sorted_tiles)});
   crossovers.add(
       {"all pairs: cuda instead of cpu", from_how_many(costs.x86_all_pairs, costs.cuda_all_pairs)});
+  crossovers.add(
+      {"step of a world: cuda instead of cpu", from_how_many(costs.x86_world, costs.cuda_world)});
   return fmt::format("{}\nstart of cuda: {:.0f} ms\n\n{}", terms.text(), costs.cuda_start_ms,
                      crossovers.text());
 }

@@ -1,9 +1,10 @@
-/// Measurement of the costs of sphere collision on this machine.
+/// Measurement of the costs of sphere collision and of steps on this machine.
 #include "src/tool/calibration.hpp"
 
 #include <jfpx/error.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/sphere_collider.hpp>
+#include <jfpx/world.hpp>
 
 #include "src/scenes/scenes.hpp"
 #include "src/tool/cost_fit.hpp"
@@ -30,6 +31,8 @@ constexpr std::uint32_t kFewForDevice[] = {128, 512, 2048, 8192};
 constexpr std::uint32_t kManyForDevice[] = {512, 2048, 8192, 32768, 131072};
 constexpr std::uint32_t kPairs[] = {256, 2048, 16384, 131072};
 constexpr std::uint32_t kCopied[] = {16384, 131072, 524288};
+constexpr std::uint32_t kBodies[] = {64, 512, 4096};
+constexpr std::uint32_t kBodiesForDevice[] = {512, 8000, 64000};
 
 std::vector<SphereInstance> make_spheres(std::uint32_t count, Real density) {
   if (density > 0) return scenes::random_spheres(count, density, 1);
@@ -115,6 +118,22 @@ class Bench {
     return samples;
   }
 
+  /// Samples of steps of a world of balls that touch six others.
+  std::vector<CostSample> world(Backend backend, std::span<const std::uint32_t> sizes) {
+    std::vector<CostSample> samples;
+    for (const std::uint32_t n : sizes) {
+      Scene scene = scenes::make("lattice", {.spheres = n});
+      // Half of the distance of neighbours: the balls touch, and nothing moves them apart.
+      for (BodyDef& body : scene.bodies) body.shape = Sphere{Real(0.485)};
+      scene.sleep.enabled = false;
+      World world(scene, {.collider = {.backend = backend}});
+      const double us = least_us([&] { world.step(); });
+      samples.push_back({{.spheres = static_cast<double>(scene.bodies.size())}, us});
+      progress_(++done_, total_);
+    }
+    return samples;
+  }
+
  private:
   static std::vector<SpherePair> some_pairs(std::span<const SphereInstance> spheres,
                                             std::uint32_t count) {
@@ -144,6 +163,7 @@ constexpr Term kAllPairsTerms[] = {&CostTerms::call_us, &CostTerms::sphere_ns, &
 constexpr Term kSortedTerms[] = {&CostTerms::call_us, &CostTerms::sphere_ns,
                                  &CostTerms::contact_ns};
 constexpr Term kGivenTerms[] = {&CostTerms::call_us, &CostTerms::pair_ns};
+constexpr Term kWorldTerms[] = {&CostTerms::call_us, &CostTerms::sphere_ns};
 constexpr Term kCopiedTerms[] = {&CostTerms::call_us, &CostTerms::byte_ns, &CostTerms::pair_ns};
 
 void measure_cpu(Bench& bench, CostModel* costs) {
@@ -152,6 +172,7 @@ void measure_cpu(Bench& bench, CostModel* costs) {
   costs->x86_sorted_tiles =
       fit_costs(bench.search(Backend::cpu, sorted_tiles, kMany), kSortedTerms);
   costs->x86_given_pairs = fit_costs(bench.given(Backend::cpu, {}), kGivenTerms);
+  costs->x86_world = fit_costs(bench.world(Backend::cpu, kBodies), kWorldTerms);
 }
 
 /// @throws BackendUnavailable, DeviceError
@@ -170,6 +191,7 @@ void measure_cuda(Bench& bench, CostModel* costs) {
       fit_costs(bench.search(Backend::cuda, all_pairs, kFewForDevice), kAllPairsTerms, copies);
   costs->cuda_sorted_tiles =
       fit_costs(bench.search(Backend::cuda, sorted_tiles, kManyForDevice), kSortedTerms, copies);
+  costs->cuda_world = fit_costs(bench.world(Backend::cuda, kBodiesForDevice), kWorldTerms);
 }
 
 /// Measures a device, which may be missing or fail at any time, without losing the CPU's costs.
@@ -190,13 +212,13 @@ Calibration calibrate(const std::function<void(std::uint64_t, std::uint64_t)>& p
   Calibration result;
   Bench bench(progress);
   constexpr std::size_t kD = std::size(kDensities);
-  bench.expect(kD * (std::size(kFew) + std::size(kMany)) + std::size(kPairs));
+  bench.expect(kD * (std::size(kFew) + std::size(kMany)) + std::size(kPairs) + std::size(kBodies));
   double start_ms = 0;
   // Measured first, because any other use would start the device.
   result.no_cuda = try_device([&] { start_ms = measure_start(); });
   if (result.no_cuda.empty()) {
     bench.expect(kD * (std::size(kFewForDevice) + std::size(kManyForDevice)) + std::size(kPairs) +
-                 std::size(kCopied));
+                 std::size(kCopied) + std::size(kBodiesForDevice));
   }
   measure_cpu(bench, &result.costs);
   if (!result.no_cuda.empty()) return result;

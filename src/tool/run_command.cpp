@@ -180,9 +180,9 @@ void add_run_command(CLI::App& app, int& status) {
                       "Run as a demo with the inputs in this file (see: jfpx scenes DEMO)");
   command->add_option(
       "--csv", options->run.csv,
-      "Write one line per step to this file: step, contacts, awake bodies, milliseconds, "
-      "deepest and mean penetration [m], largest speed [m/s]; - writes to stdout instead of a "
-      "table");
+      "Write one line per step to this file: step, contacts, awake bodies, milliseconds (detect "
+      "and solve of a step on a GPU: of the device, by CUDA events), deepest and mean penetration "
+      "[m], largest speed [m/s]; - writes to stdout instead of a table");
   command->add_option("--record", options->run.record,
                       "Write the state after every step to this file (see: jfpx replay)");
   command->add_option("--snapshot", options->snapshot,

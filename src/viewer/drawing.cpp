@@ -42,11 +42,7 @@ float Drawing::nearest_box() const {
 }
 
 void Drawing::add_sphere(const Vec3& centre, Real radius, const Quat& turn, Paint paint) {
-  SphereItem& item = spheres_.emplace_back();
-  put(item.centre, centre - eye_);
-  item.radius = static_cast<float>(radius);
-  put(item.turn, turn);
-  item.paint = paint;
+  spheres_.push_back(make_sphere_item(centre - eye_, radius, turn, paint));
 }
 
 void Drawing::add_box(const Vec3& centre, const Vec3& half_extents, const Quat& turn, Paint paint) {

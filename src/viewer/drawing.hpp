@@ -34,6 +34,17 @@ struct SphereItem {
   float turn[4];  ///< x, y, z, w
   Paint paint;
 };
+/// @param centre relative to the eye
+JFPX_HD inline SphereItem make_sphere_item(const Vec3& centre, Real radius, const Quat& turn,
+                                           Paint paint) {
+  return {
+      {static_cast<float>(centre.x), static_cast<float>(centre.y), static_cast<float>(centre.z)},
+      static_cast<float>(radius),
+      {static_cast<float>(turn.x), static_cast<float>(turn.y), static_cast<float>(turn.z),
+       static_cast<float>(turn.w)},
+      paint};
+}
+
 struct BoxItem {
   float centre[3], half_extents[3];
   float turn[4];
@@ -52,6 +63,8 @@ struct GroundItem {
   float cell;  ///< [m]
 };
 
+class ResidentSpheres;
+
 /// Content of one picture. Positions are given in world coordinates and stored relative to the eye,
 /// which preserves precision far from the origin.
 class Drawing {
@@ -66,6 +79,8 @@ class Drawing {
                 std::uint8_t alpha = 255);
   /// Adds the plane dot(normal, p) = offset with a grid; it is invisible from below.
   void add_ground(const Vec3& normal, Real offset, Real cell, Paint paint);
+  /// Draws these spheres, too; null for none. They are neither sorted nor clipped by distance.
+  void set_resident(ResidentSpheres* spheres) { resident_ = spheres; }
   /// Sets a bounding sphere of everything that casts shadows.
   void set_bounds(const Vec3& centre, Real radius);
   /// Sets the typical size of a body, which is the radius of ambient occlusion [m].
@@ -79,6 +94,7 @@ class Drawing {
   float nearest_box() const;
   const std::vector<LineItem>& lines() const { return lines_; }
   const std::vector<GroundItem>& grounds() const { return grounds_; }
+  ResidentSpheres* resident() const { return resident_; }
   const Vec3& bounds_centre() const { return bounds_centre_; }
   Real bounds_radius() const { return bounds_radius_; }
   float detail() const { return detail_; }
@@ -89,6 +105,7 @@ class Drawing {
   std::vector<BoxItem> boxes_, glass_;
   std::vector<LineItem> lines_;
   std::vector<GroundItem> grounds_;
+  ResidentSpheres* resident_ = nullptr;
   Vec3 bounds_centre_;
   Real bounds_radius_ = 1;
   float detail_ = 1;

@@ -23,7 +23,8 @@ class Instances {
   void upload_bytes(const void* data, std::size_t items);
   /// Allocates memory for items that the caller writes. @return the buffer
   GLuint reserve(std::size_t items);
-  void draw() const { draw(static_cast<std::size_t>(count_)); }
+  std::size_t count() const { return static_cast<std::size_t>(count_); }
+  void draw() const { draw(count()); }
   /// Draws the first `items` items.
   void draw(std::size_t items) const;
 

@@ -1,6 +1,8 @@
 /// The native engine as a run.
 #include "src/viewer/exchangeable_collider.hpp"
 
+#include <utility>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
@@ -9,9 +11,9 @@ namespace {
 class NativeRun final : public Run {
  public:
   NativeRun(const Scene& scene, const EngineChoice& choice, std::uint64_t first_step)
-      : NativeRun(scene, choice, first_step,
-                  std::make_unique<ExchangeableCollider>(
-                      make_sphere_collider(collider_options(choice)))) {}
+      : choice_(choice),
+        first_step_(first_step),
+        world_(scene, {.collider = collider_options(choice)}) {}
 
   void step() override { report_ = world_.step(); }
 
@@ -37,22 +39,17 @@ class NativeRun final : public Run {
   EngineChoice choice() const override { return choice_; }
   bool switch_to(const EngineChoice& choice) override {
     if (choice.engine != EngineKind::native || choice.threads != choice_.threads) return false;
-    collider_->exchange(make_sphere_collider(collider_options(choice)));
+    // A world on another device continues with the same bits.
+    World next(world_.scene(), {.collider = collider_options(choice)});
+    next.restore(world_.snapshot());
+    world_ = std::move(next);
     choice_ = choice;
     return true;
   }
 
  private:
-  NativeRun(const Scene& scene, const EngineChoice& choice, std::uint64_t first_step,
-            std::unique_ptr<ExchangeableCollider> collider)
-      : choice_(choice),
-        first_step_(first_step),
-        collider_(collider.get()),
-        world_(scene, std::move(collider), BroadPhase::cells, choice.threads) {}
-
   EngineChoice choice_;
   std::uint64_t first_step_;
-  ExchangeableCollider* collider_;  // owned by the world
   World world_;
   StepReport report_;
 };

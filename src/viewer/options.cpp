@@ -95,7 +95,8 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
       ->check(tool::engine_name());
   tool::add_backend_option(
       app, options.choice.backend,
-      "Backend of sphere contacts and of jfpx's solver in Bullet: auto, cpu or cuda [auto]");
+      "Backend of native steps; in Bullet, of sphere contacts and of jfpx's solver: auto, cpu or "
+      "cuda [auto]");
   tool::add_threads_option(app, options.choice.threads);
   const auto add_part = [&](const char* name, bool* jfpx, const char* help) {
     app.add_option_function<std::string>(

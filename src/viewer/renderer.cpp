@@ -7,6 +7,7 @@
 #include "src/viewer/draw_order.hpp"
 #include "src/viewer/frame_block.hpp"
 #include "src/viewer/instances.hpp"
+#include "src/viewer/resident_spheres.hpp"
 #include "src/viewer/shaders.hpp"
 
 #include <algorithm>
@@ -115,6 +116,7 @@ struct Renderer::Impl {
   GlVertexArray empty = make_vertex_array();
   DrawOrder order;
   SphereInstances spheres, resident_spheres;
+  std::unique_ptr<SharedBuffer> resident_buffer;  ///< that of resident_spheres
   BoxInstances boxes, glass;
   LineInstances lines;
   std::optional<Targets> targets;
@@ -151,6 +153,17 @@ struct Renderer::Impl {
     boxes.upload(drawing.boxes());
     glass.upload(drawing.glass());
     lines.upload(drawing.lines());
+    write_resident(drawing.resident(), drawing.eye());
+  }
+
+  void write_resident(ResidentSpheres* source, const Vec3& eye) {
+    const std::size_t count = source == nullptr ? 0 : source->count();
+    if (count != resident_spheres.count() || (count > 0 && resident_buffer == nullptr)) {
+      resident_buffer.reset();
+      const GLuint buffer = resident_spheres.reserve(count);
+      if (count > 0) resident_buffer = source->share(buffer);
+    }
+    if (count > 0) source->write(resident_buffer.get(), eye);
   }
 
   void draw_bodies(Pass pass) {
@@ -269,10 +282,6 @@ void Renderer::set_quality(const Quality& quality) {
   if (quality == impl_->quality) return;
   impl_->quality = quality;
   impl_->targets.reset();
-}
-
-GLuint Renderer::resident_spheres(std::size_t count) {
-  return impl_->resident_spheres.reserve(count);
 }
 
 void Renderer::draw(const Drawing& drawing, const View& view, const Viewport& viewport,

@@ -43,10 +43,6 @@ class Renderer {
   void set_quality(const Quality& quality);
   const Quality& quality() const;
 
-  /// Allocates `count` SphereItems that the caller writes, for example with CUDA. They are part of
-  /// every picture, in addition to the drawing. @return the buffer, which the renderer owns
-  GLuint resident_spheres(std::size_t count);
-
   /// Draws into the viewport of a framebuffer; 0 is the window.
   void draw(const Drawing& drawing, const View& view, const Viewport& viewport,
             GLuint framebuffer = 0);

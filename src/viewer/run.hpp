@@ -20,8 +20,9 @@ using tool::EngineKind;
 /// number of threads keeps the bits.
 struct EngineChoice {
   EngineKind engine = EngineKind::native;
-  Backend backend = Backend::automatic;  ///< of sphere contacts, and of jfpx's solver in Bullet
-  unsigned threads = 1;                  ///< on the CPU, fixed for a run; 0: one per core
+  /// Of native steps; in Bullet, of sphere contacts and of jfpx's solver.
+  Backend backend = Backend::automatic;
+  unsigned threads = 1;                        ///< on the CPU, fixed for a run; 0: one per core
   bool jfpx_solver = true, jfpx_world = true;  ///< parts of EngineKind::bullet; false: Bullet's
   std::size_t minimum_batch = 0;               ///< smaller work is left to Bullet's own code
   friend bool operator==(const EngineChoice&, const EngineChoice&) = default;

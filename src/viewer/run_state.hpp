@@ -26,7 +26,7 @@ struct RunState {
   StageTimes times;
   std::uint32_t substeps = 0;    ///< of the native resolver soft-step; 0: another one
   std::uint64_t iterations = 0;  ///< of the native resolver worst-first, both loops
-  std::string computed_by;       ///< backend of the sphere contacts
+  std::string computed_by;       ///< backend of a native step, or of the sphere contacts
   std::string solved_by;         ///< backend of Bullet's solver; empty for a native run
   std::string trouble;           ///< reason why the run can't continue meaningfully
 };

@@ -127,6 +127,8 @@ ScenePainter::Appearance ScenePainter::appearance_of(std::uint32_t body) const {
 }
 
 void ScenePainter::draw_still(const Bounds& bounds, Drawing* drawing) const {
+  drawing->set_bounds(bounds.centre, bounds.radius * Real(1.25));
+  drawing->set_detail(body_size_ * Real(1.6));
   const Real cell = cell_for(body_size_);
   for (const std::uint32_t i : obstacles_) {
     const BodyDef& body = scene_.bodies[i];
@@ -164,10 +166,7 @@ void ScenePainter::draw_wall(const Wall& wall, Drawing* drawing) const {
 
 void ScenePainter::draw(const RunState& from, const RunState& to, Real share, Colouring colouring,
                         Drawing* drawing) const {
-  const Bounds bounds = bounds_estimator_.bounds(to.states);
-  drawing->set_bounds(bounds.centre, bounds.radius * Real(1.25));
-  drawing->set_detail(body_size_ * Real(1.6));
-  draw_still(bounds, drawing);
+  draw_still(bounds_estimator_.bounds(to.states), drawing);
   const std::vector<Paint> property_paints = body_paints(scene_, to, colouring);
   drawing->reserve_spheres(scene_.bodies.size());
   for (std::uint32_t i = 0; i < appearances_.size(); ++i) {
@@ -184,6 +183,15 @@ void ScenePainter::draw(const RunState& from, const RunState& to, Real share, Co
     } else {
       draw_shape(scene_.bodies[i].shape, shown, paint, drawing);
     }
+  }
+}
+
+void ScenePainter::draw_immovable(const Bounds& bounds, Drawing* drawing) const {
+  draw_still(bounds, drawing);
+  for (const std::uint32_t i : obstacles_) {
+    const BodyDef& body = scene_.bodies[i];
+    draw_shape(body.shape, {body.position, body.orientation, {}, {}}, appearances_[i].paint,
+               drawing);
   }
 }
 

@@ -24,6 +24,8 @@ class ScenePainter {
   /// @param share position of the picture between the states of a run, in [0, 1]
   void draw(const RunState& from, const RunState& to, Real share, Colouring colouring,
             Drawing* drawing) const;
+  /// Adds grounds, walls and immovable bodies alone. @param bounds of the movable bodies
+  void draw_immovable(const Bounds& bounds, Drawing* drawing) const;
   /// Adds the normals and points of contacts as lines. @param red draws them as errors
   void draw_contacts(const std::vector<Contact>& contacts, bool red, Drawing* drawing) const;
 

@@ -41,7 +41,9 @@ bool selects_demo(const ViewOptions& options) {
 
 std::unique_ptr<Viewer> make_viewer(const ViewOptions& options) {
   if (options.side_by_side) return make_side_by_side(options);
-  return selects_demo(options) ? make_demo_viewer(options) : make_scene_viewer(options);
+  if (selects_demo(options)) return make_demo_viewer(options);
+  if (auto viewer = make_device_viewer(options)) return viewer;
+  return make_scene_viewer(options);
 }
 
 std::optional<std::string> choose_scene(const std::string& current) {

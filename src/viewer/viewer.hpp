@@ -94,6 +94,8 @@ bool selects_demo(const ViewOptions& options);
 /// Creates the viewer that the options select.
 std::unique_ptr<Viewer> make_viewer(const ViewOptions& options);
 std::unique_ptr<Viewer> make_scene_viewer(const ViewOptions& options);
+/// Null if the options or the scene need states on the host, or the scene has few bodies.
+std::unique_ptr<Viewer> make_device_viewer(const ViewOptions& options);
 std::unique_ptr<Viewer> make_demo_viewer(const ViewOptions& options);
 /// @throws BackendUnavailable in a build without Bullet.
 std::unique_ptr<Viewer> make_side_by_side(const ViewOptions& options);

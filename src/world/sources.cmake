@@ -1,4 +1,5 @@
 list(APPEND JFPX_SOURCES
+  ${CMAKE_CURRENT_LIST_DIR}/automatic_device.cpp
   ${CMAKE_CURRENT_LIST_DIR}/body_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/body_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/broad_phase_search.cpp

@@ -137,7 +137,7 @@ void World::Impl::add_met_contacts(StepReport* report) {
 /// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
 /// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
 bool World::Impl::advance(StepReport* report) {
-  if (can_step_on_device() && advance_on_device(report)) return !report->non_finite;
+  if (steps_on_device && advance_on_device(report)) return !report->non_finite;
   if (resident) leave_device();
   const std::string failure = report->device_failure;
   const bool completed =
@@ -243,6 +243,7 @@ void World::Impl::undo() noexcept {
     detected_count = detected_count_before;
   }
   shows_contacts = shows_events = false;
+  spent_us = 0;
 }
 
 StepReport World::step() {
@@ -250,9 +251,10 @@ StepReport World::step() {
   StepReport report;
   const Clock::time_point start = Clock::now();
   try {
+    w.choose_device(&report);
     // A step on the device changes nothing on the host but for the forces.
     w.is_saved = false;
-    if (!w.can_step_on_device() || !w.forces.ids().empty()) w.save_for_undo();
+    if (!w.steps_on_device || !w.forces.ids().empty()) w.save_for_undo();
   } catch (const std::bad_alloc&) {
     throw OutOfMemory(no_memory_for("a step", w.store.ids().size()));
   }
@@ -275,16 +277,20 @@ StepReport World::step() {
     throw;
   }
   report.step = w.steps;
-  const SphereCollider& collider = w.contact_finder.collider();
-  report.backend = collider.backend();
-  report.algorithm = collider.algorithm();
-  report.choice = collider.reason();
-  if (!w.resident) {
+  if (w.resident) {
+    report.backend = Backend::cuda;
+    if (w.automatic != nullptr) report.choice = w.automatic->reason();
+  } else {
+    const SphereCollider& collider = w.contact_finder.collider();
+    report.backend = collider.backend();
+    report.algorithm = collider.algorithm();
+    report.choice = w.device_failure.empty() ? collider.reason() : ChoiceReason::device_failed;
     for (const BodyId id : w.store.ids()) {
       if (w.store.movable(id.index)) report.awake += w.store.moving.awake[id.index];
     }
   }
   report.total_ms = elapsed_ms(start, Clock::now());
+  w.spent_us = 1e3 * report.total_ms;
   return report;
 }
 
@@ -294,6 +300,11 @@ World::World(const Scene& scene, const WorldSettings& settings) {
   impl_ = Impl::make(scene, std::move(pool), std::move(collider), settings.broad_phase);
   if (settings.collider.backend == Backend::cuda && scene.solver == Solver::soft_step) {
     impl_->device = make_device_world(scene, settings.collider.device);
+  }
+  if (settings.collider.backend == Backend::automatic && backend_row(Backend::cuda).compiled) {
+    impl_->automatic = std::make_unique<AutomaticDevice>(
+        settings.collider.costs,
+        [number = settings.collider.device] { return Impl::make_warm_device(number); });
   }
 }
 

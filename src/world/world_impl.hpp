@@ -3,6 +3,7 @@
 
 #include <jfpx/world.hpp>
 
+#include "src/world/automatic_device.hpp"
 #include "src/world/body_store.hpp"
 #include "src/world/callback_registry.hpp"
 #include "src/world/contact_events.hpp"
@@ -47,6 +48,11 @@ struct World::Impl {
     if (resident) leave_device();
     return store;
   }
+  /// Makes a device that has made a step, so that its kernels are loaded.
+  /// @throws BackendUnavailable, DeviceError, OutOfMemory
+  static std::unique_ptr<DeviceWorld> make_warm_device(int number);
+  /// Uploads the world, unless the device has its state.
+  void enter_device();
   void fetch_motion();
   /// Makes `contacts` and `contacts_before` those of the last two steps.
   void fetch_contacts();
@@ -98,9 +104,7 @@ struct World::Impl {
   bool advance(StepReport* report);
   bool advance_soft_step(StepReport* report);
   bool advance_worst_first(StepReport* report);
-  bool can_step_on_device() const {
-    return device != nullptr && scene.solver == Solver::soft_step && generators.ids().empty();
-  }
+  void choose_device(StepReport* report);
   bool advance_on_device(StepReport* report);
   bool step_on_device(StepReport* report);
   void finish_contacts(std::vector<Contact>* list) const;
@@ -143,14 +147,20 @@ struct World::Impl {
   std::uint64_t steps = 0;
 
   std::unique_ptr<DeviceWorld> device;  ///< null: the world is not stepped on a device
+  std::string device_failure;           ///< why there is no `device` any more; empty: no failure
   bool resident = false;                ///< whether the device has the state of the world
+  bool steps_on_device = false;         ///< whether the device makes the step in progress
+  std::unique_ptr<AutomaticDevice> automatic;  ///< of Backend::automatic; null: a fixed backend
+  /// [us] Duration of the last step and of the copies between host and device since, for
+  /// `automatic`; 0: unknown.
+  double spent_us = 0;
   bool motion_is_current = true, contacts_are_current = true;
   bool contact_set_is_current = true;
   bool contacts_before_are_current = true;  ///< the flags of what the host has, while resident
   std::mutex fetching;
 };
 
-/// Access to the members of a World, for tests.
+/// Access to the members of a World, for tests and for cuda::device_states().
 struct WorldAccess {
   static World::Impl& impl(World& world) { return *world.impl_; }
 };

@@ -1,16 +1,78 @@
 /// Steps of a World on a device, and what the host fetches of them.
+#include <jfpx/cuda/world.hpp>
 #include <jfpx/error.hpp>
 
 #include "src/world/world_impl.hpp"
 
+#include <chrono>
 #include <mutex>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
+namespace {
+
+/// Adds its lifetime to a duration.
+class Timer {
+ public:
+  explicit Timer(double* us) : us_(us), start_(Clock::now()) {}
+  ~Timer() { *us_ += std::chrono::duration<double, std::micro>(Clock::now() - start_).count(); }
+  Timer(const Timer&) = delete;
+  Timer& operator=(const Timer&) = delete;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double* us_;
+  Clock::time_point start_;
+};
+
+}  // namespace
+
+std::unique_ptr<DeviceWorld> World::Impl::make_warm_device(int number) {
+  Scene scene;
+  scene.bodies.resize(2);
+  scene.bodies[1].shape = Box{};
+  World world(scene, {.collider = {.backend = Backend::cpu}});
+  world.impl_->device = make_device_world(scene, number);
+  const StepReport report = world.step();
+  if (!report.device_failure.empty()) throw DeviceError(report.device_failure);
+  return std::move(world.impl_->device);
+}
+
+/// Selects what makes the next step: Backend::automatic decides for each one.
+void World::Impl::choose_device(StepReport* report) {
+  steps_on_device = false;
+  const double last_us = std::exchange(spent_us, 0);
+  if (scene.solver != Solver::soft_step || !generators.ids().empty()) return;
+  if (automatic != nullptr) {
+    if (last_us > 0) automatic->record(last_us);
+    if (device == nullptr) {
+      std::string failure;
+      device = automatic->take_started(&failure);
+      if (device != nullptr) device->configure(scene);
+      if (!failure.empty()) report->device_failure = device_failure = failure;
+    }
+    if (!automatic->choose(store.ids().size())) return;
+  }
+  steps_on_device = device != nullptr;
+}
+
+void World::Impl::enter_device() {
+  if (resident) return;
+  const Timer timer(&spent_us);
+  if (bodies_changed) contact_finder.set_bodies(store);
+  bodies_changed = false;
+  device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
+  resident = true;
+  motion_is_current = contacts_are_current = contacts_before_are_current = true;
+  contact_set_is_current = true;
+}
+
 void World::Impl::fetch_motion() {
   const std::lock_guard lock(fetching);
   if (motion_is_current) return;
+  const Timer timer(&spent_us);
   device->fetch_motion(&store.moving);
   motion_is_current = true;
 }
@@ -18,6 +80,7 @@ void World::Impl::fetch_motion() {
 void World::Impl::fetch_contacts() {
   if (!resident) return;
   const std::lock_guard lock(fetching);
+  const Timer timer(&spent_us);
   if (!contacts_are_current) {
     device->fetch_contacts(store, false, &contacts);
     finish_contacts(&contacts);
@@ -35,6 +98,7 @@ void World::Impl::fetch_contacts() {
 void World::Impl::fetch_contact_set() {
   const std::lock_guard lock(fetching);
   if (contact_set_is_current) return;
+  const Timer timer(&spent_us);
   device->fetch_contact_set(&soft_step.last_contacts());
   contact_set_is_current = true;
 }
@@ -66,21 +130,18 @@ bool World::Impl::advance_on_device(StepReport* report) {
     if (is_saved) undo_motion();  // the host applies the forces of this step again
     leave_device();
   }
-  if (!report->device_failure.empty()) device.reset();
+  if (!report->device_failure.empty()) {
+    device_failure = report->device_failure;
+    device.reset();
+    if (automatic != nullptr) automatic->give_up();
+  }
   if (!is_saved) save_for_undo();
   return false;
 }
 
 /// @returns false if the step is to be done on the host, which reports what is wrong
 bool World::Impl::step_on_device(StepReport* report) {
-  if (!resident) {
-    if (bodies_changed) contact_finder.set_bodies(store);
-    bodies_changed = false;
-    device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
-    resident = true;
-    motion_is_current = contacts_are_current = contacts_before_are_current = true;
-    contact_set_is_current = true;
-  }
+  enter_device();
   if (!forces.ids().empty()) {
     fetch_motion();
     ForceContext context(store, time());
@@ -106,5 +167,23 @@ bool World::Impl::step_on_device(StepReport* report) {
   return true;
 }
 
+namespace cuda {
+
+DeviceStates device_states(World& world) {
+  auto& w = WorldAccess::impl(world);
+  if (w.device == nullptr) {
+    if (!w.device_failure.empty()) {
+      throw BackendUnavailable("cuda: the device of this world has failed: " + w.device_failure);
+    }
+    throw BackendUnavailable(
+        w.automatic != nullptr
+            ? "cuda: Backend::automatic has not started a device for this world"
+            : "cuda: this world has no device; it needs Backend::cuda and Solver::soft_step");
+  }
+  w.enter_device();
+  return w.device->states();
+}
+
+}  // namespace cuda
 }  // namespace JFPX_ABI
 }  // namespace jfpx

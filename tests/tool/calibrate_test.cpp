@@ -65,6 +65,7 @@ TEST_F(Calibrate, StoresCostsThatTheOtherCommandsUse) {
   EXPECT_GT(model.costs.x86_all_pairs.pair_ns, 0.0);
   EXPECT_GT(model.costs.x86_sorted_tiles.sphere_ns, 0.0);
   EXPECT_GT(model.costs.x86_given_pairs.pair_ns, 0.0);
+  EXPECT_GT(model.costs.x86_world.sphere_ns, 0.0);
   EXPECT_FALSE(model.origin.machine.empty());
   EXPECT_EQ(model.origin.version, JFPX_VERSION);
   EXPECT_EQ(folder_.entries(), 1u);

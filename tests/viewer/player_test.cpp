@@ -13,6 +13,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <random>
 
@@ -49,9 +50,16 @@ TEST(Player, SteppingBackAndAheadShowsTheSameBits) {
 TEST(Player, SwitchingTheBackendKeepsTheBits) {
   const Scene scene = scenes::make("pile", {.spheres = 60});
   Player straight = player_of(scene), switched = player_of(scene, {.threads = 3});
+  const auto backends = available_backends();
+  const bool has_gpu = std::ranges::any_of(backends, [](const BackendStatus& row) {
+    return row.backend == Backend::cuda && row.usable;
+  });
   for (int i = 0; i < 60; ++i) {
     if (i == 10) {
       EXPECT_TRUE(switched.switch_to({.backend = Backend::cpu, .threads = 3}));
+    }
+    if (i == 25 && has_gpu) {
+      EXPECT_TRUE(switched.switch_to({.backend = Backend::cuda, .threads = 3}));
     }
     if (i == 40) {
       EXPECT_TRUE(switched.switch_to({.threads = 3}));
@@ -59,6 +67,8 @@ TEST(Player, SwitchingTheBackendKeepsTheBits) {
     straight.step();
     switched.step();
     ASSERT_EQ(hash(straight), hash(switched)) << i;
+    ASSERT_EQ(straight.shown().contacts, switched.shown().contacts) << i;
+    ASSERT_EQ(switched.shown().step, static_cast<std::uint64_t>(i) + 1);
   }
 }
 

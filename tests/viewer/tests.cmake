@@ -4,6 +4,7 @@ jfpx_add_test(controls_test SINGLE SOURCES
   viewer/scene_painter_test.cpp
   LINK jfpx_viewer)
 jfpx_add_test(demo_viewer_test SINGLE SOURCES viewer/demo_viewer_test.cpp LINK jfpx_viewer)
+jfpx_add_test(device_viewer_test INTERNAL SINGLE SOURCES viewer/device_viewer_test.cpp LINK jfpx_viewer)
 jfpx_add_test(interactive_test SINGLE SOURCES viewer/interactive_test.cpp LINK jfpx_viewer)
 jfpx_add_test(panel_test SINGLE SOURCES
   viewer/panel_test.cpp

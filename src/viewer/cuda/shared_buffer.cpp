@@ -1,5 +1,5 @@
 /// An OpenGL buffer that CUDA writes.
-#include "examples/cuda_view/shared_buffer.hpp"
+#include "src/viewer/cuda/shared_buffer.hpp"
 
 #include "src/base/cuda/cuda_try.hpp"
 
@@ -9,7 +9,7 @@
 
 namespace jfpx {
 inline namespace JFPX_ABI {
-namespace cuda_view {
+namespace view {
 namespace {
 
 /// Reason why CUDA can't access the device of OpenGL; empty if it can.
@@ -27,7 +27,7 @@ std::string find_obstacle() {
 
 }  // namespace
 
-struct SharedBuffer::Impl {
+struct CudaSharedBuffer::Impl {
   GLuint buffer;
   std::size_t bytes;
   cudaGraphicsResource_t resource = nullptr;
@@ -41,9 +41,8 @@ struct SharedBuffer::Impl {
   }
 };
 
-SharedBuffer::SharedBuffer(unsigned buffer, std::size_t bytes, bool by_host)
-    : impl_(std::make_unique<Impl>(buffer, bytes)),
-      host_copy_reason_(by_host ? "requested" : find_obstacle()) {
+CudaSharedBuffer::CudaSharedBuffer(GLuint buffer, std::size_t bytes)
+    : impl_(std::make_unique<Impl>(buffer, bytes)), host_copy_reason_(find_obstacle()) {
   if (host_copy_reason_.empty()) {
     JFPX_CUDA_TRY(cudaGraphicsGLRegisterBuffer(&impl_->resource, buffer,
                                                cudaGraphicsRegisterFlagsWriteDiscard));
@@ -52,9 +51,9 @@ SharedBuffer::SharedBuffer(unsigned buffer, std::size_t bytes, bool by_host)
   JFPX_CUDA_TRY_ALLOC(cudaMalloc(&impl_->device, bytes), bytes, "pictures");
   JFPX_CUDA_TRY_ALLOC(cudaMallocHost(&impl_->host, bytes), bytes, "pictures");
 }
-SharedBuffer::~SharedBuffer() = default;
+CudaSharedBuffer::~CudaSharedBuffer() = default;
 
-void* SharedBuffer::map(cuda::Stream stream) {
+void* CudaSharedBuffer::map(cuda::Stream stream) {
   if (impl_->resource == nullptr) return impl_->device;
   void* memory = nullptr;
   std::size_t size = 0;
@@ -63,7 +62,7 @@ void* SharedBuffer::map(cuda::Stream stream) {
   return memory;
 }
 
-void SharedBuffer::unmap(cuda::Stream stream) {
+void CudaSharedBuffer::unmap(cuda::Stream stream) {
   if (impl_->resource != nullptr) {
     JFPX_CUDA_TRY(cudaGraphicsUnmapResources(1, &impl_->resource, stream));
     return;
@@ -75,6 +74,6 @@ void SharedBuffer::unmap(cuda::Stream stream) {
   glBufferSubData(GL_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(impl_->bytes), impl_->host);
 }
 
-}  // namespace cuda_view
+}  // namespace view
 }  // namespace JFPX_ABI
 }  // namespace jfpx
