@@ -38,6 +38,15 @@ struct PeriodicContact {
 JFPX_API std::vector<PeriodicContact> find_periodic_contacts(
     SphereCollider& collider, std::span<const SphereInstance> spheres, const PeriodicCell& cell);
 
+/// Finds the touching pairs of a sphere `a` of `first` and a sphere `b` or its image of `second`,
+/// sorted by (a, b). Both indices count from 0 in their own set. Takes the time of a search among
+/// the spheres of both sets.
+/// @throws as find_periodic_contacts(), for the radii of both sets; messages count the spheres of
+///   `second` after those of `first`
+JFPX_API std::vector<PeriodicContact> find_periodic_contacts_between(
+    SphereCollider& collider, std::span<const SphereInstance> first,
+    std::span<const SphereInstance> second, const PeriodicCell& cell);
+
 /// Adds (b, a) with the opposite normal and shift for each contact. The result is sorted.
 /// @param contacts sorted by (a, b), a < b
 /// @param spheres number of spheres, greater than every index

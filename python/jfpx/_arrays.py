@@ -130,3 +130,19 @@ def count(value: Any, name: str, low: int, high: int) -> int:
     if not low <= result <= high:
         raise InvalidArgument(f"{name} is {result}; it must be in [{low}, {high}]")
     return result
+
+
+def cell(lengths: Any) -> tuple[list[float], list[bool]] | None:
+    """The lengths of a periodic cell and whether each axis repeats, from three lengths of which those
+    along other axes are None; None for None."""
+    if lengths is None:
+        return None
+    try:
+        lengths = list(lengths)
+    except TypeError:
+        raise InvalidArgument(f"periodic is {lengths!r}; it must be three lengths") from None
+    if len(lengths) != 3:
+        raise InvalidArgument(f"periodic has {len(lengths)} lengths; it must have 3")
+    repeats = [length is not None for length in lengths]
+    return [number(length, "periodic") if on else 0.0
+            for length, on in zip(lengths, repeats)], repeats

@@ -66,14 +66,15 @@ class Collider {
     start(spheres);
     std::vector<PeriodicContact> contacts = find_periodic_contacts(*collider_, spheres_, cell);
     if (!half) contacts = in_both_orders(contacts, rows_);
-    list_.clear();
-    shifts_.clear();
-    for (const PeriodicContact& c : contacts) {
-      list_.push_back(c.contact);
-      shifts_.push_back(c.shift);
-    }
-    found_ = list_;
-    return found_.size();
+    return keep(contacts);
+  }
+
+  /// The same of a sphere of `first` with one of `second`.
+  std::size_t search_periodic_between(const Spheres& first, const Spheres& second,
+                                      const PeriodicCell& cell) {
+    start(first);
+    pack(second, &others_);
+    return keep(find_periodic_contacts_between(*collider_, spheres_, others_, cell));
   }
 
   /// Writes the indices of the last search: pairs[0] and pairs[1], which may be longer than the
@@ -102,7 +103,7 @@ class Collider {
     }
   }
 
-  /// Writes the shifts of the last search, which must have been search_periodic().
+  /// Writes the shifts of the last search, which must have been in a periodic cell.
   void write_shifts(const Rows<std::int32_t>& shifts) {
     for (std::size_t i = 0; i < shifts_.size(); ++i) {
       for (std::size_t k = 0; k < 3; ++k) shifts(i, k) = shifts_[i][k];
@@ -120,6 +121,16 @@ class Collider {
     pairs_ = {};
     pack(spheres, &spheres_);
     rows_ = spheres_.size();
+  }
+  std::size_t keep(const std::vector<PeriodicContact>& contacts) {
+    list_.clear();
+    shifts_.clear();
+    for (const PeriodicContact& c : contacts) {
+      list_.push_back(c.contact);
+      shifts_.push_back(c.shift);
+    }
+    found_ = list_;
+    return found_.size();
   }
   /// Calls `write` with the result of the last search: contacts, or pairs alone.
   template <class Write>
@@ -208,6 +219,16 @@ void bind_collider(nb::module_& module) {
           },
           nb::arg("positions"), nb::arg("radii"), nb::arg("lengths"), nb::arg("repeats"),
           nb::arg("half"), Release())
+      .def(
+          "search_periodic_between",
+          [](Collider& self, const Rows<const Real>& first, const Vector<const Real>& first_radii,
+             const Rows<const Real>& second, const Vector<const Real>& second_radii, Triple lengths,
+             std::array<bool, 3> repeats) {
+            return self.search_periodic_between({first, first_radii}, {second, second_radii},
+                                                {to_vec3(lengths), repeats});
+          },
+          nb::arg("first"), nb::arg("first_radii"), nb::arg("second"), nb::arg("second_radii"),
+          nb::arg("lengths"), nb::arg("repeats"), Release())
       .def("write_shifts", &Collider::write_shifts, nb::arg("shifts").noconvert(), Release())
       .def("write_pairs", &Collider::write_pairs<std::int32_t>, nb::arg("pairs").noconvert(),
            Release())

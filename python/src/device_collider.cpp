@@ -28,6 +28,9 @@ cuda::SphereArrays to_arrays(const ArraysTuple& t) {
           .radius_stride = std::get<5>(t),
           .radius = static_cast<Real>(std::get<6>(t))};
 }
+/// (lengths, whether each axis repeats)
+using CellTuple = std::tuple<Triple, std::array<bool, 3>>;
+PeriodicCell to_cell(const CellTuple& t) { return {to_vec3(std::get<0>(t)), std::get<1>(t)}; }
 cuda::ArrayResult to_result(bool contacts) {
   return contacts ? cuda::ArrayResult::contacts : cuda::ArrayResult::pairs;
 }
@@ -65,6 +68,22 @@ void bind_device_collider(nb::module_& module) {
                                         to_result(contacts), both_orders, to_stream(stream));
           },
           Release())
+      .def(
+          "find_periodic",
+          [](ArrayCollider& self, const ArraysTuple& spheres, const CellTuple& cell, bool contacts,
+             bool both_orders, Address stream) {
+            return self.find_periodic(to_arrays(spheres), to_cell(cell), to_result(contacts),
+                                      both_orders, to_stream(stream));
+          },
+          Release())
+      .def(
+          "find_periodic_between",
+          [](ArrayCollider& self, const ArraysTuple& first, const ArraysTuple& second,
+             const CellTuple& cell, bool contacts, Address stream) {
+            return self.find_periodic_between(to_arrays(first), to_arrays(second), to_cell(cell),
+                                              to_result(contacts), to_stream(stream));
+          },
+          Release())
       .def("enqueue",
            [](ArrayCollider& self, const ArraysTuple& spheres, bool contacts, Address stream) {
              self.enqueue(to_arrays(spheres), to_result(contacts), to_stream(stream));
@@ -85,6 +104,10 @@ void bind_device_collider(nb::module_& module) {
               Address stream) {
              self.write_contacts(pointer<Real>(normals), pointer<Real>(distances), capacity,
                                  to_stream(stream));
+           })
+      .def("write_shifts",
+           [](ArrayCollider& self, Address shifts, std::size_t capacity, Address stream) {
+             self.write_shifts(pointer<std::int32_t>(shifts), capacity, to_stream(stream));
            })
       .def("write_offsets",
            [](ArrayCollider& self, Address offsets, Address stream) {

@@ -119,6 +119,24 @@ def test_a_batch_on_the_device_has_the_bits_of_the_host(library, rng, dtype, hal
                     [jfpx.find_pairs(positions, 0.9, batch=offsets, half=half)])
 
 
+@pytest.mark.parametrize("cell", [(12, 13, 11), (None, 13, None), (None, None, None)])
+@pytest.mark.parametrize("half", [True, False])
+def test_a_periodic_cell_on_the_device_has_the_bits_of_the_host(library, rng, dtype, cell, half):
+    positions = (rng.random((4000, 3)) * 60 - 20).astype(dtype)
+    radii = rng.uniform(0.2, 0.9, 4000).astype(dtype)
+    x, r = library.to_device(positions), library.to_device(radii)
+    for output in ("coo", "csr"):
+        options = {"periodic": cell, "output": output, "half": half}
+        check_equal(library, jfpx.find_contacts(x, r, **options),
+                    jfpx.find_contacts(positions, radii, **options))
+        check_equal(library, jfpx.find_pairs(x, 1.5, **options),
+                    jfpx.find_pairs(positions, 1.5, **options))
+        query = {"query": x[:300], "query_radii": r[:300]}
+        host_query = {"query": positions[:300], "query_radii": radii[:300]}
+        check_equal(library, jfpx.find_pairs(x[300:], radii=r[300:], **query, **options),
+                    jfpx.find_pairs(positions[300:], radii=radii[300:], **host_query, **options))
+
+
 def test_strided_device_arrays_are_taken_without_a_copy(library, rng, dtype):
     positions, radii = random_spheres(rng, 1000, dtype)
     wide = np.zeros((1000, 5), dtype)
@@ -233,7 +251,11 @@ def test_arrays_of_jax_are_taken(rng):
     (lambda x, r, to: jfpx.SphereCollider().find_pairs(
         x, 1, batch=[0, 3], out=to(np.zeros((2, 9), np.int32)), count=to(np.zeros(2, np.int64))),
      "count excludes"),
-    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9, 9]), "periodic requires"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9, 9], batch=[0, 3]), "exclude each other"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9]), "periodic has 2 lengths"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 3, 9]), "at least twice the cutoff"),
+    (lambda x, r, to: jfpx.SphereCollider().find_pairs(
+        x, 1, periodic=[9, 9, 9], out=to(np.zeros((2, 9), np.int32))), "exclude each other"),
     (lambda x, r, to: jfpx.find_contacts(x, r, output="dense"), "output is 'dense'"),
     (lambda x, r, to: jfpx.find_pairs(x), "either cutoff or radii"),
     (lambda x, r, to: jfpx.find_pairs(x, 1, query=np.zeros((3, 3), np.float32)),

@@ -97,6 +97,24 @@ TEST(Periodic, ContactsAreThoseOfTheNearestImages) {
   }
 }
 
+TEST(Periodic, BetweenTwoSetsAreTheContactsOfBothAmongThoseOfAll) {
+  Random random(base_seed());
+  const auto collider = make_sphere_collider();
+  const PeriodicCell cell{{9, 9, 9}, {true, false, true}};
+  const Spheres all = gas_in(cell, 600, 1, random);
+  constexpr SphereIndex kFirst = 250;
+  const std::span first = std::span(all).first(kFirst), second = std::span(all).subspan(kFirst);
+  std::vector<PeriodicContact> expected;
+  for (PeriodicContact c : find_periodic_contacts(*collider, all, cell)) {
+    if (c.contact.a >= kFirst || c.contact.b < kFirst) continue;
+    c.contact.b -= kFirst;
+    expected.push_back(c);
+  }
+  EXPECT_GT(expected.size(), 100u);
+  EXPECT_EQ(find_periodic_contacts_between(*collider, first, second, cell), expected)
+      << seed_note();
+}
+
 TEST(Periodic, ACellThatDoesNotRepeatHasTheContactsOfTheCollider) {
   Random random(base_seed());
   const auto collider = make_sphere_collider();
