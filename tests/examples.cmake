@@ -14,6 +14,11 @@ foreach(suffix IN ITEMS "" "_f64")
   add_test(NAME gpu_world${suffix} COMMAND gpu_world${suffix})
   set_tests_properties(gpu_world${suffix} PROPERTIES
     PASS_REGULAR_EXPRESSION "120 steps with the same bits, [1-9][0-9]* contacts|^cuda: ")
+  if(JFPX_HAS_CUDA)
+    add_test(NAME cuda_world${suffix} COMMAND cuda_world${suffix})
+    set_tests_properties(cuda_world${suffix} PROPERTIES
+      PASS_REGULAR_EXPRESSION "step 120, bodies by height: [1-9][0-9]* [1-9]|cuda_world: cuda: ")
+  endif()
   add_test(NAME native_world${suffix} COMMAND native_world${suffix})
   set_tests_properties(native_world${suffix} PROPERTIES
     PASS_REGULAR_EXPRESSION "[1-9][0-9]* touches, 5 balls were blown off the floor\nbodies above the floor: 1\nthe crate's top is at (1.99|2.00) m\n(.|\n)*the lamp has swung twice, with the same bits")

@@ -1,7 +1,7 @@
 /// The state of a world that lies on a device between steps.
 #pragma once
 
-#include <jfpx/world.hpp>
+#include <jfpx/cuda/world.hpp>
 
 #include "src/contact_solver/contact_set.hpp"
 #include "src/world/body_store.hpp"
@@ -45,6 +45,8 @@ class DeviceWorld {
   virtual void upload_forces(const BodyStore& bodies) = 0;
   /// One step. If a body runs away, the state does not change.
   virtual Result step() = 0;
+  /// The states on the device, with the lifetimes of cuda::device_states().
+  virtual cuda::DeviceStates states() const noexcept = 0;
   /// Copies the motion of all bodies to the host.
   virtual void fetch_motion(MotionArrays* moving) = 0;
   /// Copies the contacts of the last step, with their impulses and colors.

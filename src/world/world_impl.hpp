@@ -47,6 +47,8 @@ struct World::Impl {
     if (resident) leave_device();
     return store;
   }
+  /// Uploads the world, unless the device has its state.
+  void enter_device();
   void fetch_motion();
   /// Makes `contacts` and `contacts_before` those of the last two steps.
   void fetch_contacts();
@@ -143,6 +145,7 @@ struct World::Impl {
   std::uint64_t steps = 0;
 
   std::unique_ptr<DeviceWorld> device;  ///< null: the world is not stepped on a device
+  std::string device_failure;           ///< why there is no `device` any more; empty: no failure
   bool resident = false;                ///< whether the device has the state of the world
   bool motion_is_current = true, contacts_are_current = true;
   bool contact_set_is_current = true;
@@ -150,7 +153,7 @@ struct World::Impl {
   std::mutex fetching;
 };
 
-/// Access to the members of a World, for tests.
+/// Access to the members of a World, for tests and for cuda::device_states().
 struct WorldAccess {
   static World::Impl& impl(World& world) { return *world.impl_; }
 };

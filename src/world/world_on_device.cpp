@@ -1,4 +1,5 @@
 /// Steps of a World on a device, and what the host fetches of them.
+#include <jfpx/cuda/world.hpp>
 #include <jfpx/error.hpp>
 
 #include "src/world/world_impl.hpp"
@@ -7,6 +8,16 @@
 
 namespace jfpx {
 inline namespace JFPX_ABI {
+
+void World::Impl::enter_device() {
+  if (resident) return;
+  if (bodies_changed) contact_finder.set_bodies(store);
+  bodies_changed = false;
+  device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
+  resident = true;
+  motion_is_current = contacts_are_current = contacts_before_are_current = true;
+  contact_set_is_current = true;
+}
 
 void World::Impl::fetch_motion() {
   const std::lock_guard lock(fetching);
@@ -66,21 +77,17 @@ bool World::Impl::advance_on_device(StepReport* report) {
     if (is_saved) undo_motion();  // the host applies the forces of this step again
     leave_device();
   }
-  if (!report->device_failure.empty()) device.reset();
+  if (!report->device_failure.empty()) {
+    device_failure = report->device_failure;
+    device.reset();
+  }
   if (!is_saved) save_for_undo();
   return false;
 }
 
 /// @returns false if the step is to be done on the host, which reports what is wrong
 bool World::Impl::step_on_device(StepReport* report) {
-  if (!resident) {
-    if (bodies_changed) contact_finder.set_bodies(store);
-    bodies_changed = false;
-    device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
-    resident = true;
-    motion_is_current = contacts_are_current = contacts_before_are_current = true;
-    contact_set_is_current = true;
-  }
+  enter_device();
   if (!forces.ids().empty()) {
     fetch_motion();
     ForceContext context(store, time());
@@ -106,5 +113,21 @@ bool World::Impl::step_on_device(StepReport* report) {
   return true;
 }
 
+namespace cuda {
+
+DeviceStates device_states(World& world) {
+  auto& w = WorldAccess::impl(world);
+  if (w.device == nullptr) {
+    throw BackendUnavailable(w.device_failure.empty()
+                                 ? "cuda: this world has no device; it needs Backend::cuda and "
+                                   "Solver::soft_step"
+                                 : "cuda: the device of this world has failed: " +
+                                       w.device_failure);
+  }
+  w.enter_device();
+  return w.device->states();
+}
+
+}  // namespace cuda
 }  // namespace JFPX_ABI
 }  // namespace jfpx

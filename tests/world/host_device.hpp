@@ -115,6 +115,9 @@ class HostDevice {
     std::vector<T> items_;
   };
 
+  int number() const { return 0; }
+  cuda::Stream stream() const { return nullptr; }
+
   template <class T>
   void reserve(Buffer<T>* buffer, std::size_t count, const char*) {
     buffer->reserve(count);

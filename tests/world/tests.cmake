@@ -7,6 +7,13 @@ jfpx_add_test(world_parts_test INTERNAL SOURCES
   world/query_tree_test.cpp)
 jfpx_add_test(device_world_test INTERNAL SOURCES world/device_world_test.cpp)
 if(JFPX_HAS_CUDA)
+  set(cuda_runtime CUDA::cudart_static)
+endif()
+jfpx_add_test(device_states_test INTERNAL SOURCES world/device_states_test.cpp LINK ${cuda_runtime})
+foreach(target IN ITEMS device_states_test device_states_test_f64)
+  target_compile_definitions(${target} PRIVATE JFPX_HAS_CUDA=$<BOOL:${JFPX_HAS_CUDA}>)
+endforeach()
+if(JFPX_HAS_CUDA)
   jfpx_add_test(device_fault_test INTERNAL SOURCES world/device_fault_test.cpp LINK jfpx_cuda CUDA::cudart_static)
 endif()
 jfpx_add_test(world_test SOURCES

@@ -46,6 +46,9 @@ class CudaDevice {
     JFPX_CUDA_TRY(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device_));
   }
 
+  int number() const noexcept { return device_; }
+  Stream stream() const noexcept { return stream_.get(); }
+
   template <class T>
   void reserve(Buffer<T>* buffer, std::size_t count, const char* what) {
     if (count <= buffer->capacity()) return;

@@ -24,6 +24,7 @@ namespace device {
 inline constexpr int kMarks = 3;
 
 /// @tparam Device owns a stream of work, or imitates one on the host:
+///   - `number()`, `stream()`: as cuda::DeviceStates;
 ///   - `Buffer<T>`: array in the memory of the device; data(), capacity();
 ///   - `reserve(&buffer, count, what)`: makes the capacity at least `count`, discards the contents;
 ///   - `upload(to, from, count)`, `download(to, from, count)`, `copy(to, from, count)`;
@@ -89,6 +90,13 @@ class DeviceStep final : public DeviceWorld {
         std::uint64_t{counters.touching_spheres} + counters.touches + counters.met_points;
     result.sphere_contacts = std::uint64_t{counters.touching_spheres} + counters.sphere_touches;
     return result;
+  }
+
+  cuda::DeviceStates states() const noexcept override {
+    const BodyView& bodies = data_.step.bodies;
+    return {device_->number(),  device_->stream(), bodies.capacity,
+            bodies.count,       bodies.ids,        bodies.position,
+            bodies.orientation, bodies.velocity,   bodies.angular_velocity};
   }
 
   void fetch_motion(MotionArrays* moving) override {
