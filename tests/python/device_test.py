@@ -310,3 +310,54 @@ def test_calls_on_the_device_do_not_leak(library):
 
     before = free_bytes(500)
     assert before - free_bytes(20_000) < 8 << 20
+
+
+def grid_scene(dtype):
+    scene = jfpx.Scene({"dt": 1 / 60, "bodies": []}, dtype=dtype)
+    scene.add_spheres((np.mgrid[0:8, 0:8, 0:8].reshape(3, -1).T * 0.7).astype(dtype), 0.4, masses=1.0)
+    return scene
+
+
+def test_states_on_the_device_are_those_of_the_world(library, dtype):
+    world = jfpx.World(grid_scene(dtype), backend="cuda")
+    for body in (None, world.body_at(5)):
+        if body is not None:
+            world.remove(body)
+        indices = [body.index for body in world.bodies]
+        for _ in range(3):
+            for shared, expected in zip(world.device_states(), world.states()):
+                array = library.module.from_dlpack(shared)
+                assert library.to_host(array)[indices].tobytes() == expected.tobytes()
+            world.step()
+
+
+def test_states_on_the_device_can_be_searched(library, dtype):
+    world = jfpx.World(grid_scene(dtype), backend="cuda")
+    world.step()
+    pairs = jfpx.find_pairs(world.device_states().positions, 0.75)
+    np.testing.assert_array_equal(library.to_host(library.module.from_dlpack(pairs)),
+                                  jfpx.find_pairs(world.positions, 0.75))
+
+
+def test_states_on_the_device_are_not_copied():
+    torch = Torch().module
+    world = jfpx.World(grid_scene("float32"), backend="cuda")
+    world.step()
+    first, second = (torch.from_dlpack(world.device_states().positions) for _ in range(2))
+    assert first.data_ptr() == second.data_ptr()
+
+
+def test_a_step_waits_for_readers_of_the_states():
+    torch = Torch().module
+    world = jfpx.World(grid_scene("float32"), backend="cuda")
+    world.step()
+    matrix = torch.rand((4096, 4096), device="cuda")
+    for _ in range(5):
+        expected = world.positions
+        x = torch.from_dlpack(world.device_states().positions)
+        for _ in range(20):
+            matrix = (matrix @ matrix).sigmoid()
+        copy = x.clone()  # after milliseconds of other work
+        world.step()
+        np.testing.assert_array_equal(copy.cpu().numpy(), expected)
+        assert (world.positions != expected).any()
