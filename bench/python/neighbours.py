@@ -2,7 +2,7 @@
 Markdown. What is not installed is left out. All libraries search the same points, and must find the same
 number of pairs.
 
-    python bench/python/neighbours.py [cpu] [cuda] [world]
+    python bench/python/neighbours.py [cpu] [cuda] [world] [world-cuda]
 """
 
 import csv
@@ -176,9 +176,9 @@ def cuda():
           " us")
 
 
-def steps_of_python(spheres, steps):
+def steps_of_python(backend, spheres, steps):
     """Times of the steps of a pile [ms], and the hash of its end."""
-    pile = jfpx.World(jfpx.Scene.named("pile", spheres=spheres), backend="cpu", threads=0)
+    pile = jfpx.World(jfpx.Scene.named("pile", spheres=spheres), backend=backend, threads=0)
     times = []
     for _ in range(steps):
         begin = time.perf_counter()
@@ -187,33 +187,33 @@ def steps_of_python(spheres, steps):
     return times, f"{pile.state_hash():016x}"
 
 
-def steps_of_command(command, spheres, steps):
+def steps_of_command(command, backend, spheres, steps):
     """The same of `jfpx run`."""
     with tempfile.NamedTemporaryFile() as file:
         out = subprocess.run(
-            [command, "run", "pile", "--backend", "cpu", "--spheres", str(spheres), "--steps",
+            [command, "run", "pile", "--backend", backend, "--spheres", str(spheres), "--steps",
              str(steps), "--threads", "0", "--csv", file.name, "--hash", "--quiet"],
             check=True, stdout=subprocess.PIPE, text=True).stdout
         with open(file.name, newline="") as table:
             return [float(row["total_ms"]) for row in csv.DictReader(table)], out.split()[-1]
 
 
-def world():
+def world(backend="cpu"):
     """A pile from Python against the command, which is on PATH or named by JFPX_COMMAND."""
     command = os.environ.get("JFPX_COMMAND") or shutil.which("jfpx")
     if command is None:
         print("the command jfpx is not on PATH")
         return
-    print("\n## Pile of 100,000 on the CPU, one thread per core, ms a step\n\nMedian of steps 11 to "
-          "60; the two take turns.\n\n| run | Python | command | ratio | equal hashes |\n"
+    print(f"\n## Pile of 100,000, backend {backend}, one thread per core, ms a step\n\nMedian of steps 11 "
+          "to 60; the two take turns.\n\n| run | Python | command | ratio | equal hashes |\n"
           "|---|---|---|---|---|")
     for run in range(1, 4):
-        own, own_hash = steps_of_python(100_000, 60)
-        other, other_hash = steps_of_command(command, 100_000, 60)
+        own, own_hash = steps_of_python(backend, 100_000, 60)
+        other, other_hash = steps_of_command(command, backend, 100_000, 60)
         own, other = statistics.median(own[10:]), statistics.median(other[10:])
         row(run, own, other, own / other, own_hash == other_hash)
 
 
 if __name__ == "__main__":
     for part in sys.argv[1:] or ["cpu"]:
-        {"cpu": cpu, "cuda": cuda, "world": world}[part]()
+        {"cpu": cpu, "cuda": cuda, "world": world, "world-cuda": lambda: world("cuda")}[part]()
