@@ -12,7 +12,7 @@ inline namespace JFPX_ABI {
 namespace python {
 namespace {
 
-using DeviceRows = nb::ndarray<Real, nb::ndim<2>, nb::device::cuda>;
+using DeviceRows = nb::ndarray<nb::array_api, Real, nb::ndim<2>, nb::device::cuda>;
 
 /// Rows of the world `owner`, which lives at least as long as the result. They are not marked as
 /// read-only, because not every library imports such arrays.
