@@ -132,17 +132,25 @@ def count(value: Any, name: str, low: int, high: int) -> int:
     return result
 
 
-def cell(lengths: Any) -> tuple[list[float], list[bool]] | None:
-    """The lengths of a periodic cell and whether each axis repeats, from three lengths of which those
-    along other axes are None; None for None."""
+def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
+    """The lengths of periodic cells (1 or `systems`, 3), NaN along axes that do not repeat; None for
+    None. Takes three lengths, each None along such an axis, or with systems also one such row for
+    each."""
     if lengths is None:
         return None
     try:
         lengths = list(lengths)
     except TypeError:
         raise InvalidArgument(f"periodic is {lengths!r}; it must be three lengths") from None
+    if systems is None or not any(hasattr(row, "__len__") for row in lengths):
+        return np.array([_cell(lengths)] * (1 if systems is None else systems)).reshape(-1, 3)
+    if len(lengths) != systems:
+        raise InvalidArgument(f"periodic has {len(lengths)} cells; it must have one for each of "
+                              f"{systems} systems")
+    return np.array([_cell(row) for row in lengths])
+
+
+def _cell(lengths: Any) -> list[float]:
     if len(lengths) != 3:
         raise InvalidArgument(f"periodic has {len(lengths)} lengths; it must have 3")
-    repeats = [length is not None for length in lengths]
-    return [number(length, "periodic") if on else 0.0
-            for length, on in zip(lengths, repeats)], repeats
+    return [math.nan if length is None else number(length, "periodic") for length in lengths]

@@ -294,7 +294,7 @@ class SphereCollider:
         return size
 
 
-def _result(arrays: list[Any], output: str, contacts: bool, periodic: Any) -> Any:
+def _result(arrays: list[Any], output: str, contacts: bool, periodic: bool) -> Any:
     if periodic:
         if contacts:
             return (PeriodicContacts if output == "coo" else PeriodicContactRows)(*arrays)
@@ -315,12 +315,11 @@ class _Search:
         self._radii = _arrays.vector(radii, "radii", size, self.dtype)
         self._batch = None if batch is None else _arrays.offsets(batch, "batch")
         self._query: Any = None
-        self.periodic: Any = None
+        self.periodic = False
 
     def set_periodic(self, lengths: Any) -> None:
-        if lengths is not None and self._batch is not None:
-            raise InvalidArgument("periodic and batch exclude each other")
-        self.periodic = _arrays.cell(lengths)
+        self._cells = _arrays.cells(lengths, None if self._batch is None else len(self._batch) - 1)
+        self.periodic = self._cells is not None
 
     def add_query(self, query: Any, radii: Any) -> None:
         if self._batch is not None:
@@ -343,9 +342,12 @@ class _Search:
     def run(self, collider: Any, half: bool, contacts: bool) -> int:
         if self.periodic and self._query is not None:
             return collider.search_periodic_between(self._query, self._query_radii,
-                                                    self._positions, self._radii, *self.periodic)
+                                                    self._positions, self._radii, self._cells)
+        if self.periodic and self._batch is not None:
+            return collider.search_periodic_systems(self._positions, self._radii, self._batch,
+                                                    self._cells, half)
         if self.periodic:
-            return collider.search_periodic(self._positions, self._radii, *self.periodic, half)
+            return collider.search_periodic(self._positions, self._radii, self._cells, half)
         if self._query is None and self._batch is None and not contacts:
             return collider.search_pairs(self._positions, self._radii, half)
         if self._query is None:
@@ -493,7 +495,8 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
     periodic : three lengths, optional
         [m], of an orthogonal cell that repeats; None along an axis that does not. Each length is
         at least twice the largest sum of two radii. The nearest image of a sphere counts, and its
-        shift is returned. Positions may be outside of the cell.
+        shift is returned. Positions may be outside of the cell. With `batch`, the cell is that of each
+        system, or there is a row of three lengths for each.
     device : "cpu", "cuda" or "cuda:N", optional
         Must be the device of the arrays, which is the default.
     output : "coo" or "csr"
@@ -546,7 +549,7 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
     query_radii : number or array (M,)
         With `radii`: those of `query`.
     batch, periodic, device, output, half, index_dtype, threads
-        As in find_contacts(). `batch` excludes `query` and `periodic`.
+        As in find_contacts(). `batch` and `query` exclude each other.
 
     Returns
     -------

@@ -127,7 +127,7 @@ class DeviceSearch:
             raise InvalidArgument(f"positions are on cuda:{self.device}, and device is {device!r}")
         self._query: Any = None
         self._batch: Any = None
-        self.periodic: Any = None
+        self.periodic = False
 
     def _rows(self, view: View, name: str) -> View:
         if len(view.shape) != 2 or view.shape[1] != 3:
@@ -178,9 +178,8 @@ class DeviceSearch:
         self._batch = _arrays.offsets(batch, "batch")
 
     def set_periodic(self, lengths: Any) -> None:
-        if lengths is not None and self._batch is not None:
-            raise InvalidArgument("periodic and batch exclude each other")
-        self.periodic = _arrays.cell(lengths)
+        self._cells = _arrays.cells(lengths, None if self._batch is None else len(self._batch) - 1)
+        self.periodic = self._cells is not None
 
     def rows(self) -> int:
         return (self._query or self._spheres)[1]
@@ -192,10 +191,13 @@ class DeviceSearch:
     def run(self, core: Any, contacts: bool, half: bool) -> int:
         """Waits for the number of contacts, and returns it."""
         if self.periodic and self._query is not None:
-            return core.find_periodic_between(self._query, self._spheres, self.periodic, contacts,
+            return core.find_periodic_between(self._query, self._spheres, self._cells, contacts,
                                               self.library.stream)
+        if self.periodic and self._batch is not None:
+            return core.find_periodic_in_systems(self._spheres, self._batch, self._cells, contacts,
+                                                 not half, self.library.stream)
         if self.periodic:
-            return core.find_periodic(self._spheres, self.periodic, contacts, not half,
+            return core.find_periodic(self._spheres, self._cells, contacts, not half,
                                       self.library.stream)
         if self._query is not None:
             return core.find_between(self._query, self._spheres, contacts, self.library.stream)

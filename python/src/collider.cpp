@@ -69,6 +69,17 @@ class Collider {
     return keep(contacts);
   }
 
+  /// The same within each system of `batch`.
+  std::size_t search_periodic_systems(const Spheres& spheres,
+                                      const Vector<const std::uint64_t>& batch,
+                                      const std::vector<PeriodicCell>& cells, bool half) {
+    start(spheres);
+    std::vector<PeriodicContact> contacts = find_periodic_contacts_in_systems(
+        *collider_, spheres_, {batch.data(), batch.size()}, cells);
+    if (!half) contacts = in_both_orders(contacts, rows_);
+    return keep(contacts);
+  }
+
   /// The same of a sphere of `first` with one of `second`.
   std::size_t search_periodic_between(const Spheres& first, const Spheres& second,
                                       const PeriodicCell& cell) {
@@ -214,21 +225,28 @@ void bind_collider(nb::module_& module) {
       .def(
           "search_periodic",
           [](Collider& self, const Rows<const Real>& positions, const Vector<const Real>& radii,
-             Triple lengths, std::array<bool, 3> repeats, bool half) {
-            return self.search_periodic({positions, radii}, {to_vec3(lengths), repeats}, half);
+             const Rows<const double>& cell, bool half) {
+            return self.search_periodic({positions, radii}, to_cells(cell).at(0), half);
           },
-          nb::arg("positions"), nb::arg("radii"), nb::arg("lengths"), nb::arg("repeats"),
+          nb::arg("positions"), nb::arg("radii"), nb::arg("cell"), nb::arg("half"), Release())
+      .def(
+          "search_periodic_systems",
+          [](Collider& self, const Rows<const Real>& positions, const Vector<const Real>& radii,
+             const Vector<const std::uint64_t>& batch, const Rows<const double>& cells, bool half) {
+            return self.search_periodic_systems({positions, radii}, batch, to_cells(cells), half);
+          },
+          nb::arg("positions"), nb::arg("radii"), nb::arg("batch"), nb::arg("cells"),
           nb::arg("half"), Release())
       .def(
           "search_periodic_between",
           [](Collider& self, const Rows<const Real>& first, const Vector<const Real>& first_radii,
-             const Rows<const Real>& second, const Vector<const Real>& second_radii, Triple lengths,
-             std::array<bool, 3> repeats) {
+             const Rows<const Real>& second, const Vector<const Real>& second_radii,
+             const Rows<const double>& cell) {
             return self.search_periodic_between({first, first_radii}, {second, second_radii},
-                                                {to_vec3(lengths), repeats});
+                                                to_cells(cell).at(0));
           },
           nb::arg("first"), nb::arg("first_radii"), nb::arg("second"), nb::arg("second_radii"),
-          nb::arg("lengths"), nb::arg("repeats"), Release())
+          nb::arg("cell"), Release())
       .def("write_shifts", &Collider::write_shifts, nb::arg("shifts").noconvert(), Release())
       .def("write_pairs", &Collider::write_pairs<std::int32_t>, nb::arg("pairs").noconvert(),
            Release())

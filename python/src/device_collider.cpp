@@ -28,9 +28,6 @@ cuda::SphereArrays to_arrays(const ArraysTuple& t) {
           .radius_stride = std::get<5>(t),
           .radius = static_cast<Real>(std::get<6>(t))};
 }
-/// (lengths, whether each axis repeats)
-using CellTuple = std::tuple<Triple, std::array<bool, 3>>;
-PeriodicCell to_cell(const CellTuple& t) { return {to_vec3(std::get<0>(t)), std::get<1>(t)}; }
 cuda::ArrayResult to_result(bool contacts) {
   return contacts ? cuda::ArrayResult::contacts : cuda::ArrayResult::pairs;
 }
@@ -70,18 +67,29 @@ void bind_device_collider(nb::module_& module) {
           Release())
       .def(
           "find_periodic",
-          [](ArrayCollider& self, const ArraysTuple& spheres, const CellTuple& cell, bool contacts,
-             bool both_orders, Address stream) {
-            return self.find_periodic(to_arrays(spheres), to_cell(cell), to_result(contacts),
+          [](ArrayCollider& self, const ArraysTuple& spheres, const Rows<const double>& cell,
+             bool contacts, bool both_orders, Address stream) {
+            return self.find_periodic(to_arrays(spheres), to_cells(cell).at(0), to_result(contacts),
                                       both_orders, to_stream(stream));
+          },
+          Release())
+      .def(
+          "find_periodic_in_systems",
+          [](ArrayCollider& self, const ArraysTuple& spheres,
+             const Vector<const std::uint64_t>& offsets, const Rows<const double>& cells,
+             bool contacts, bool both_orders, Address stream) {
+            return self.find_periodic_in_systems(
+                to_arrays(spheres), {offsets.data(), offsets.size()}, to_cells(cells),
+                to_result(contacts), both_orders, to_stream(stream));
           },
           Release())
       .def(
           "find_periodic_between",
           [](ArrayCollider& self, const ArraysTuple& first, const ArraysTuple& second,
-             const CellTuple& cell, bool contacts, Address stream) {
-            return self.find_periodic_between(to_arrays(first), to_arrays(second), to_cell(cell),
-                                              to_result(contacts), to_stream(stream));
+             const Rows<const double>& cell, bool contacts, Address stream) {
+            return self.find_periodic_between(to_arrays(first), to_arrays(second),
+                                              to_cells(cell).at(0), to_result(contacts),
+                                              to_stream(stream));
           },
           Release())
       .def("enqueue",

@@ -13,12 +13,6 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-Real largest_radius(std::span<const SphereInstance> spheres) {
-  Real radius = 0;
-  for (const SphereInstance& s : spheres) radius = std::max(radius, s.radius);
-  return radius;
-}
-
 /// The spheres in the cell, and the cells that they came from.
 struct Reduced {
   std::vector<SphereInstance> spheres;
@@ -29,7 +23,6 @@ Reduced reduce_all(std::span<const SphereInstance> spheres, const PeriodicCell& 
   Reduced reduced{{spheres.begin(), spheres.end()}, std::vector<ImageShift>(spheres.size())};
   for (std::size_t i = 0; i < spheres.size(); ++i) {
     Vec3& centre = reduced.spheres[i].centre;
-    if (!detail::is_reducible(centre, cell)) detail::reject_far(i, centre, cell);
     reduced.cells[i] = detail::reduce(&centre, cell);
   }
   return reduced;
@@ -53,18 +46,14 @@ std::vector<detail::PeriodicImage> append_images(std::vector<SphereInstance>* sp
   return images;
 }
 
-}  // namespace
-
-std::vector<PeriodicContact> find_periodic_contacts(SphereCollider& collider,
-                                                    std::span<const SphereInstance> spheres,
-                                                    const PeriodicCell& cell) {
-  detail::check_spheres(spheres);
-  const Real radius = largest_radius(spheres);
-  detail::check_cell(cell, radius);
+/// The contacts of valid spheres in a valid cell.
+std::vector<PeriodicContact> find_in_cell(SphereCollider& collider,
+                                          std::span<const SphereInstance> spheres,
+                                          const PeriodicCell& cell) {
   Reduced reduced = reduce_all(spheres, cell);
   // Touching spheres are at most two radii apart.
   const std::vector<detail::PeriodicImage> images =
-      append_images(&reduced.spheres, cell, 2 * radius);
+      append_images(&reduced.spheres, cell, 2 * detail::largest_radius(spheres));
   const std::size_t n = spheres.size();
   std::vector<PeriodicContact> result;
   for (SphereContact c : collider.find_contacts(reduced.spheres)) {
@@ -93,6 +82,16 @@ std::vector<PeriodicContact> find_periodic_contacts(SphereCollider& collider,
   return result;
 }
 
+}  // namespace
+
+std::vector<PeriodicContact> find_periodic_contacts(SphereCollider& collider,
+                                                    std::span<const SphereInstance> spheres,
+                                                    const PeriodicCell& cell) {
+  detail::check_spheres(spheres);
+  detail::check_in_cell(cell, spheres);
+  return find_in_cell(collider, spheres, cell);
+}
+
 std::vector<PeriodicContact> find_periodic_contacts_between(SphereCollider& collider,
                                                             std::span<const SphereInstance> first,
                                                             std::span<const SphereInstance> second,
@@ -106,6 +105,26 @@ std::vector<PeriodicContact> find_periodic_contacts_between(SphereCollider& coll
     if (c.contact.b < first.size()) continue;
     c.contact.b -= static_cast<SphereIndex>(first.size());
     result.push_back(c);
+  }
+  return result;
+}
+
+std::vector<PeriodicContact> find_periodic_contacts_in_systems(
+    SphereCollider& collider, std::span<const SphereInstance> spheres,
+    std::span<const std::uint64_t> offsets, std::span<const PeriodicCell> cells) {
+  detail::check_offsets(offsets, spheres.size());
+  detail::check_number_of_cells(cells, offsets);
+  detail::check_spheres(spheres);
+  detail::check_in_cells(cells, spheres, offsets);
+  std::vector<PeriodicContact> result;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const auto first = static_cast<SphereIndex>(offsets[i]);
+    const auto system = spheres.subspan(first, offsets[i + 1] - first);
+    for (PeriodicContact& c : find_in_cell(collider, system, cells[i])) {
+      c.contact.a += first;
+      c.contact.b += first;
+      result.push_back(c);
+    }
   }
   return result;
 }

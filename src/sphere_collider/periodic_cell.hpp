@@ -4,6 +4,7 @@
 #include <jfpx/periodic.hpp>
 
 #include <cmath>
+#include <limits>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -20,6 +21,21 @@ inline constexpr std::uint32_t kShifts = 27, kNoShift = 13;
 JFPX_HD inline ImageShift shift_of(std::uint32_t code) {
   const auto c = static_cast<std::int32_t>(code);
   return {c / 9 - 1, c / 3 % 3 - 1, c % 3 - 1};
+}
+
+/// Whether the length is in the range in which images are finite.
+JFPX_HD inline bool is_length(Real length) {
+  return length > 0 && length <= std::numeric_limits<Real>::max() / 2;
+}
+/// Whether spheres of this radius may be in the cell.
+JFPX_HD inline bool fits(const PeriodicCell& cell, Real radius) {
+  bool result = true;
+  for (int k = 0; k < 3; ++k) {
+    const Real length = cell.lengths[k];
+    const bool repeats = cell.repeats[static_cast<std::size_t>(k)];
+    result = result && (!repeats || (is_length(length) && radius <= length / 4));
+  }
+  return result;
 }
 
 /// Up to this number of cells, the reduction is off by less than a length in either precision.

@@ -135,6 +135,9 @@ def test_a_periodic_cell_on_the_device_has_the_bits_of_the_host(library, rng, dt
         host_query = {"query": positions[:300], "query_radii": radii[:300]}
         check_equal(library, jfpx.find_pairs(x[300:], radii=r[300:], **query, **options),
                     jfpx.find_pairs(positions[300:], radii=radii[300:], **host_query, **options))
+        batch = {"batch": [0, 100, 100, 900, 1300], **options, "periodic": [cell, (9, 9, 9)] * 2}
+        check_equal(library, jfpx.find_contacts(x[:1300], r[:1300], **batch),
+                    jfpx.find_contacts(positions[:1300], radii[:1300], **batch))
 
 
 def test_strided_device_arrays_are_taken_without_a_copy(library, rng, dtype):
@@ -251,7 +254,8 @@ def test_arrays_of_jax_are_taken(rng):
     (lambda x, r, to: jfpx.SphereCollider().find_pairs(
         x, 1, batch=[0, 3], out=to(np.zeros((2, 9), np.int32)), count=to(np.zeros(2, np.int64))),
      "count excludes"),
-    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9, 9], batch=[0, 3]), "exclude each other"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[[9, 9, 9]], batch=[0, 1, 3]), "periodic has 1 cells"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9, 3], batch=[0, 3]), "system 0: .* twice the cutoff"),
     (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9]), "periodic has 2 lengths"),
     (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 3, 9]), "at least twice the cutoff"),
     (lambda x, r, to: jfpx.SphereCollider().find_pairs(

@@ -63,6 +63,13 @@ class JFPX_API ArrayCollider {
   /// @throws InvalidArgument as that function
   std::uint64_t find_periodic(const SphereArrays& spheres, const PeriodicCell& cell,
                               ArrayResult result, bool both_orders, Stream stream);
+  /// The same within each of many systems, as jfpx::find_periodic_contacts_in_systems(). Tests all
+  /// pairs of each system.
+  /// @param offsets, cells in host memory
+  std::uint64_t find_periodic_in_systems(const SphereArrays& spheres,
+                                         std::span<const std::uint64_t> offsets,
+                                         std::span<const PeriodicCell> cells, ArrayResult result,
+                                         bool both_orders, Stream stream);
   /// The same between two sets, as jfpx::find_periodic_contacts_between().
   std::uint64_t find_periodic_between(const SphereArrays& first, const SphereArrays& second,
                                       const PeriodicCell& cell, ArrayResult result, Stream stream);

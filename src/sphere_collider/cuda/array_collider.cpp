@@ -9,7 +9,7 @@
 #include "src/sphere_collider/cuda/periodic_search.hpp"
 #include "src/sphere_collider/cuda/scan.hpp"
 #include "src/sphere_collider/cuda/systems.hpp"
-#include "src/sphere_collider/sphere_input.hpp"
+#include "src/sphere_collider/periodic_input.hpp"
 
 #include <type_traits>
 #include <utility>
@@ -48,6 +48,13 @@ struct Items {
   DeviceBuffer<Item> found, derived;
 };
 
+/// Calls run(std::type_identity<Item>) for the items of a kind of result.
+template <class Run>
+auto with_item(ArrayResult kind, const Run& run) {
+  return kind == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
+                                    : run(std::type_identity<SphereContact>{});
+}
+
 }  // namespace
 
 struct ArrayCollider::Impl {
@@ -78,11 +85,13 @@ struct ArrayCollider::Impl {
     }
   }
   void reserve(std::size_t n, std::size_t most_contacts);
+  void reserve_spheres(std::size_t n);
   void pack(const SphereArrays& first, const SphereArrays* second, Stream user);
   template <class Item>
   void search(std::size_t n, const DeviceBuffer<Item>& out, ContactCount* count);
   template <class Item>
-  void search_systems(std::size_t n);
+  void search_systems(std::size_t n, const DeviceBuffer<Item>& out, ContactCount* count,
+                      const unsigned long long* image_begins = nullptr);
   template <class Item, class Search>
   std::uint64_t repeat_until_complete(const Search& enqueue, DeviceBuffer<Item>* out,
                                       const ContactCount* count);
@@ -100,6 +109,11 @@ struct ArrayCollider::Impl {
   }
   template <class Item>
   std::uint64_t search_periodic(std::size_t n, const PeriodicCell& cell);
+  template <class Item>
+  std::uint64_t search_periodic_systems(std::span<const std::uint64_t> from,
+                                        std::span<const PeriodicCell> cells);
+  template <class Item>
+  std::uint64_t keep_nearest(std::uint64_t found);
   std::uint64_t count_of(int which) const { return counts.data()[which].contacts; }
   [[noreturn]] void reject(std::uint32_t invalid);
   template <class Item>
@@ -147,6 +161,14 @@ struct ArrayCollider::Impl {
 
 void ArrayCollider::Impl::reserve(std::size_t n, std::size_t most_contacts) {
   collider.reserve(n, most_contacts);
+  reserve_spheres(n);
+}
+
+void ArrayCollider::Impl::reserve_spheres(std::size_t n) {
+  if (n > kMaxSpheres) {
+    throw InvalidArgument("number of spheres is " + std::to_string(n) + "; it must be at most " +
+                          std::to_string(kMaxSpheres));
+  }
   spheres.reserve_geometric(pool, stream.get(), n, "spheres");
 }
 
@@ -176,12 +198,8 @@ std::uint64_t ArrayCollider::Impl::search_periodic(std::size_t n, const Periodic
   const std::size_t all = n + periodic.count_images(spheres.data(), n, cell);
   reserve(all, 0);
   periodic.append_images(spheres.data());
-  Items<Item>& list = items<Item>();
-  const std::uint64_t found = search_and_wait(all, &list.derived, counts.data() + 1);
-  periodic.keep_nearest(list.derived.data(), found, &list.found, counts.data());
-  JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
-  is_periodic = true;
-  return count_of(0);
+  const std::uint64_t found = search_and_wait(all, &items<Item>().derived, counts.data() + 1);
+  return keep_nearest<Item>(found);
 }
 
 /// Reserves what search_systems() needs, and copies the offsets.
@@ -198,28 +216,53 @@ void ArrayCollider::Impl::reserve_systems(std::size_t n, std::span<const std::ui
 }
 
 template <class Item>
-void ArrayCollider::Impl::search_systems(std::size_t n) {
+void ArrayCollider::Impl::search_systems(std::size_t n, const DeviceBuffer<Item>& out,
+                                         ContactCount* count,
+                                         const unsigned long long* image_begins) {
   JFPX_CUDA_TRY(cudaMemsetAsync(state.data(), 0, sizeof(SearchState), stream.get()));
   const SystemsArgs args{.spheres = spheres.data(),
                          .n = static_cast<std::uint32_t>(n),
                          .offsets = offsets.data(),
                          .systems = systems,
+                         .image_begins = image_begins,
                          .counts = row_counts.data(),
                          .sums = row_sums.data(),
                          .state = state.data()};
   launch_count_in_systems(args, stream.get());
   exclusive_scan(row_counts.data(), row_sums.data(), n + 1, scratch.data(),
                  scan_scratch_bytes(n + 1), stream.get());
-  DeviceBuffer<Item>& found = items<Item>().found;
-  SearchOutput output{nullptr, nullptr, found.capacity(), counts.data()};
+  SearchOutput output{nullptr, nullptr, out.capacity(), count};
   if constexpr (std::is_same_v<Item, SpherePair>) {
     kind = ArrayResult::pairs;
-    output.pairs = found.data();
+    output.pairs = out.data();
   } else {
     kind = ArrayResult::contacts;
-    output.contacts = found.data();
+    output.contacts = out.data();
   }
   launch_emit_in_systems(args, output, stream.get());
+}
+
+template <class Item>
+std::uint64_t ArrayCollider::Impl::search_periodic_systems(std::span<const std::uint64_t> from,
+                                                           std::span<const PeriodicCell> cells) {
+  const std::size_t n = from.back();
+  const std::size_t images = periodic.count_images(spheres.data(), cells, from, offsets.data());
+  reserve_spheres(n + images);
+  periodic.append_images(spheres.data());
+  DeviceBuffer<Item>& out = items<Item>().derived;
+  ContactCount* const count = counts.data() + 1;
+  return keep_nearest<Item>(repeat_until_complete(
+      [&](bool) { search_systems(n, out, count, periodic.image_begins()); }, &out, count));
+}
+
+/// Makes the pairs of nearest images of those among spheres and images in `derived`.
+template <class Item>
+std::uint64_t ArrayCollider::Impl::keep_nearest(std::uint64_t found) {
+  Items<Item>& list = items<Item>();
+  periodic.keep_nearest(list.derived.data(), found, &list.found, counts.data());
+  JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
+  is_periodic = true;
+  return count_of(0);
 }
 
 /// Calls enqueue(again) until there is memory for all contacts. Returns their number.
@@ -311,12 +354,10 @@ std::uint64_t ArrayCollider::find(const SphereArrays& spheres, ArrayResult resul
   const DeviceGuard guard(impl_->device);
   impl_->reserve(spheres.count, 0);
   impl_->pack(spheres, nullptr, stream);
-  const auto run = [&]<class Item>(std::type_identity<Item>) {
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_and_wait<Item>(spheres.count);
     return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
-  };
-  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
-                                      : run(std::type_identity<SphereContact>{});
+  });
 }
 
 std::uint64_t ArrayCollider::find_between(const SphereArrays& first, const SphereArrays& second,
@@ -325,33 +366,26 @@ std::uint64_t ArrayCollider::find_between(const SphereArrays& first, const Spher
   const std::size_t n = first.count + second.count;
   impl_->reserve(n, 0);
   impl_->pack(first, &second, stream);
-  const auto run = [&]<class Item>(std::type_identity<Item>) {
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_and_wait<Item>(n);
     return found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset);
-  };
-  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
-                                      : run(std::type_identity<SphereContact>{});
+  });
 }
 
 std::uint64_t ArrayCollider::find_in_systems(const SphereArrays& spheres,
                                              std::span<const std::uint64_t> offsets,
                                              ArrayResult result, bool both_orders, Stream stream) {
   detail::check_offsets(offsets, spheres.count);
-  if (spheres.count > kMaxSpheres) {
-    throw InvalidArgument("number of spheres is " + std::to_string(spheres.count) +
-                          "; it must be at most " + std::to_string(kMaxSpheres));
-  }
   const DeviceGuard guard(impl_->device);
   impl_->reserve_systems(spheres.count, offsets);
   impl_->pack(spheres, nullptr, stream);
-  const auto run = [&]<class Item>(std::type_identity<Item>) {
-    const std::uint64_t found =
-        impl_->repeat_until_complete([&](bool) { impl_->search_systems<Item>(spheres.count); },
-                                     &impl_->items<Item>().found, impl_->counts.data());
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
+    DeviceBuffer<Item>& out = impl_->items<Item>().found;
+    ContactCount* const count = impl_->counts.data();
+    const std::uint64_t found = impl_->repeat_until_complete(
+        [&](bool) { impl_->search_systems(spheres.count, out, count); }, &out, count);
     return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
-  };
-  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
-                                      : run(std::type_identity<SphereContact>{});
+  });
 }
 
 std::uint64_t ArrayCollider::find_periodic(const SphereArrays& spheres, const PeriodicCell& cell,
@@ -359,12 +393,26 @@ std::uint64_t ArrayCollider::find_periodic(const SphereArrays& spheres, const Pe
   const DeviceGuard guard(impl_->device);
   impl_->reserve(spheres.count, 0);
   impl_->pack(spheres, nullptr, stream);
-  const auto run = [&]<class Item>(std::type_identity<Item>) {
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_periodic<Item>(spheres.count, cell);
     return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
-  };
-  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
-                                      : run(std::type_identity<SphereContact>{});
+  });
+}
+
+std::uint64_t ArrayCollider::find_periodic_in_systems(const SphereArrays& spheres,
+                                                      std::span<const std::uint64_t> offsets,
+                                                      std::span<const PeriodicCell> cells,
+                                                      ArrayResult result, bool both_orders,
+                                                      Stream stream) {
+  detail::check_offsets(offsets, spheres.count);
+  detail::check_number_of_cells(cells, offsets);
+  const DeviceGuard guard(impl_->device);
+  impl_->reserve_systems(spheres.count, offsets);
+  impl_->pack(spheres, nullptr, stream);
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
+    const std::uint64_t found = impl_->search_periodic_systems<Item>(offsets, cells);
+    return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
+  });
 }
 
 std::uint64_t ArrayCollider::find_periodic_between(const SphereArrays& first,
@@ -375,12 +423,10 @@ std::uint64_t ArrayCollider::find_periodic_between(const SphereArrays& first,
   const std::size_t n = first.count + second.count;
   impl_->reserve(n, 0);
   impl_->pack(first, &second, stream);
-  const auto run = [&]<class Item>(std::type_identity<Item>) {
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_periodic<Item>(n, cell);
     return found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset);
-  };
-  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
-                                      : run(std::type_identity<SphereContact>{});
+  });
 }
 
 void ArrayCollider::enqueue(const SphereArrays& spheres, ArrayResult result, Stream stream) {
@@ -401,21 +447,17 @@ void ArrayCollider::enqueue(const SphereArrays& spheres, ArrayResult result, Str
 void ArrayCollider::write_pairs(std::int32_t* a, std::int32_t* b, std::size_t capacity,
                                 Stream stream) {
   const DeviceGuard guard(impl_->device);
-  if (impl_->kind == ArrayResult::pairs) {
-    launch_write_pairs(impl_->result<SpherePair>(), a, b, capacity, stream);
-  } else {
-    launch_write_pairs(impl_->result<SphereContact>(), a, b, capacity, stream);
-  }
+  with_item(impl_->kind, [&]<class Item>(std::type_identity<Item>) {
+    launch_write_pairs(impl_->result<Item>(), a, b, capacity, stream);
+  });
 }
 
 void ArrayCollider::write_pairs(std::int64_t* a, std::int64_t* b, std::size_t capacity,
                                 Stream stream) {
   const DeviceGuard guard(impl_->device);
-  if (impl_->kind == ArrayResult::pairs) {
-    launch_write_pairs(impl_->result<SpherePair>(), a, b, capacity, stream);
-  } else {
-    launch_write_pairs(impl_->result<SphereContact>(), a, b, capacity, stream);
-  }
+  with_item(impl_->kind, [&]<class Item>(std::type_identity<Item>) {
+    launch_write_pairs(impl_->result<Item>(), a, b, capacity, stream);
+  });
 }
 
 void ArrayCollider::write_contacts(Real* normals, Real* distances, std::size_t capacity,
@@ -432,24 +474,17 @@ void ArrayCollider::write_shifts(std::int32_t* shifts, std::size_t capacity, Str
     throw InvalidArgument("the last search was not in a periodic cell, so it has no shifts");
   }
   const DeviceGuard guard(impl_->device);
-  const auto write = [&]<class Item>(std::type_identity<Item>) {
+  with_item(impl_->kind, [&]<class Item>(std::type_identity<Item>) {
     launch_write_shifts(impl_->result<Item>(), impl_->found<Item>(), impl_->periodic.shifts(),
                         shifts, capacity, stream);
-  };
-  if (impl_->kind == ArrayResult::pairs) {
-    write(std::type_identity<SpherePair>{});
-  } else {
-    write(std::type_identity<SphereContact>{});
-  }
+  });
 }
 
 void ArrayCollider::write_offsets(std::int64_t* offsets, Stream stream) {
   const DeviceGuard guard(impl_->device);
-  if (impl_->kind == ArrayResult::pairs) {
-    launch_write_offsets(impl_->result<SpherePair>(), offsets, impl_->rows, stream);
-  } else {
-    launch_write_offsets(impl_->result<SphereContact>(), offsets, impl_->rows, stream);
-  }
+  with_item(impl_->kind, [&]<class Item>(std::type_identity<Item>) {
+    launch_write_offsets(impl_->result<Item>(), offsets, impl_->rows, stream);
+  });
 }
 
 void ArrayCollider::write_count(std::int64_t* count, Stream stream) {

@@ -3,6 +3,7 @@
 #include "src/sphere_collider/cuda/item_list.cuh"
 #include "src/sphere_collider/cuda/periodic_images.hpp"
 #include "src/sphere_collider/cuda/search.cuh"
+#include "src/sphere_collider/cuda/systems.hpp"
 
 #include <bit>
 #include <type_traits>
@@ -15,44 +16,46 @@ namespace {
 /// Positive numbers are ordered as their bits.
 using Bits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, unsigned long long>;
 
+__device__ const PeriodicCell& cell_of(const PeriodicArgs& args, std::size_t i) {
+  if (args.systems == 0) return args.cell;
+  return args.cells[system_of(args.offsets, args.systems, static_cast<std::uint32_t>(i))];
+}
+
 __global__ void __launch_bounds__(kListThreads)
     reduce(PeriodicArgs args, const SphereInstance* spheres) {
   wait_for_previous_kernel();
   Real largest = 0;
-  std::uint32_t valid_before = 0, near_before = 0;
+  std::uint32_t has_bad = 0;
   for (std::size_t i = first_element(); i < args.n; i += element_stride()) {
     SphereInstance sphere = load_sphere(spheres + i);
-    const std::uint32_t index = ~static_cast<std::uint32_t>(i);
-    if (!is_valid(sphere)) {
-      valid_before = max(valid_before, index);
-    } else if (!detail::is_reducible(sphere.centre, args.cell)) {
-      near_before = max(near_before, index);
+    const PeriodicCell& cell = cell_of(args, i);
+    if (is_valid(sphere) && detail::fits(cell, sphere.radius) &&
+        detail::is_reducible(sphere.centre, cell)) {
+      args.displacements[i] = detail::reduce(&sphere.centre, cell);
       largest = max(largest, sphere.radius);
     } else {
-      args.cells[i] = detail::reduce(&sphere.centre, args.cell);
-      largest = max(largest, sphere.radius);
+      has_bad = 1;
     }
     args.reduced[i] = sphere;
   }
   largest = warp_max(largest);
-  valid_before = warp_max(valid_before);
-  near_before = warp_max(near_before);
+  has_bad = warp_max(has_bad);
   if (lane_id() != 0) return;
   atomicMax(&args.state->largest_radius, std::bit_cast<Bits>(largest));
-  if (valid_before != 0) atomicMax(&args.state->valid_before, valid_before);
-  if (near_before != 0) atomicMax(&args.state->near_before, near_before);
+  if (has_bad != 0) args.state->has_bad = 1;
 }
 
-/// The images of a reduced sphere that may touch a sphere in the cell.
-__device__ std::uint32_t near_images(const PeriodicArgs& args, const SphereInstance& sphere) {
+/// The images of reduced sphere i that may touch a sphere in the cell.
+__device__ std::uint32_t near_images(const PeriodicArgs& args, std::size_t i,
+                                     const SphereInstance& sphere) {
   const auto radius = std::bit_cast<Real>(static_cast<Bits>(args.state->largest_radius));
-  return detail::near_images(sphere.centre, args.cell, 2 * radius);
+  return detail::near_images(sphere.centre, cell_of(args, i), 2 * radius);
 }
 
 __global__ void __launch_bounds__(kListThreads) count_images(PeriodicArgs args) {
   wait_for_previous_kernel();
   for (std::size_t i = first_element(); i < args.n; i += element_stride()) {
-    const std::uint32_t codes = near_images(args, load_sphere(args.reduced + i));
+    const std::uint32_t codes = near_images(args, i, load_sphere(args.reduced + i));
     args.counts[i] = static_cast<std::uint32_t>(__popc(codes));
   }
   if (blockIdx.x == 0 && threadIdx.x == 0) args.counts[args.n] = 0;
@@ -65,10 +68,10 @@ __global__ void __launch_bounds__(kListThreads)
     const SphereInstance sphere = load_sphere(args.reduced + i);
     spheres[i] = sphere;
     unsigned long long at = args.begins[i];
-    for (std::uint32_t codes = near_images(args, sphere); codes != 0; codes &= codes - 1, ++at) {
+    for (std::uint32_t codes = near_images(args, i, sphere); codes != 0; codes &= codes - 1, ++at) {
       const auto code = static_cast<std::uint32_t>(__ffs(static_cast<int>(codes)) - 1);
       args.images[at] = {static_cast<std::uint32_t>(i), code};
-      spheres[args.n + at] = detail::image_of(sphere, detail::shift_of(code), args.cell);
+      spheres[args.n + at] = detail::image_of(sphere, detail::shift_of(code), cell_of(args, i));
     }
   }
 }
@@ -144,7 +147,8 @@ __global__ void __launch_bounds__(kListThreads)
     }
     const unsigned long long at = places[i] + places[other] - places[images];
     out[at] = item;
-    const ImageShift shift = detail::shift_of(code), a = args.cells[item.a], b = args.cells[item.b];
+    const ImageShift shift = detail::shift_of(code), a = args.displacements[item.a],
+                     b = args.displacements[item.b];
     for (std::size_t k = 0; k < 3; ++k) shifts[at][k] = shift[k] + a[k] - b[k];
   }
 }

@@ -17,22 +17,24 @@ using detail::PeriodicImage;
 /// Properties of all spheres. All bytes are zero before launch_reduce().
 struct PeriodicState {
   unsigned long long largest_radius;  ///< bits of the largest valid radius
-  std::uint32_t valid_before;         ///< ~(lowest index of an invalid sphere), 0 if there is none
-  std::uint32_t near_before;          ///< the same of spheres that are too far from the origin
+  unsigned long long has_bad;  ///< 1: a sphere is invalid, too large for its cell or too far away
 };
 
 /// Arrays in device memory.
 struct PeriodicArgs {
-  PeriodicCell cell;
+  PeriodicCell cell;             ///< of all spheres, if there are no systems
+  const PeriodicCell* cells;     ///< [systems]
+  const std::uint64_t* offsets;  ///< [systems + 1] first spheres of the systems
+  std::uint32_t systems;
   std::uint32_t n;
   SphereInstance* reduced;           ///< [n]
-  ImageShift* cells;                 ///< [n] cells that the spheres were displaced by
+  ImageShift* displacements;         ///< [n] cells that the spheres were displaced by
   std::uint32_t* counts;             ///< [n + 1] numbers of images, and a 0
   const unsigned long long* begins;  ///< [n + 1] exclusive scan of `counts`
   PeriodicImage* images;             ///< [begins[n]]
   PeriodicState* state;
 };
-/// Enqueues `reduced`, `cells` and `state`.
+/// Enqueues `reduced`, `displacements` and `state`.
 void launch_reduce(const PeriodicArgs& args, const SphereInstance* spheres, cudaStream_t stream);
 /// Enqueues `counts`.
 void launch_count_images(const PeriodicArgs& args, cudaStream_t stream);

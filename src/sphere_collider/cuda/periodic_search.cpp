@@ -4,9 +4,7 @@
 #include "src/sphere_collider/cuda/scan.hpp"
 #include "src/sphere_collider/periodic_input.hpp"
 
-#include <bit>
-#include <type_traits>
-#include <vector>
+#include <algorithm>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -19,22 +17,19 @@ void PeriodicSearch::enqueue_scan(const std::uint32_t* values, unsigned long lon
   exclusive_scan(values, sums, n, scratch_.data(), bytes, stream_);
 }
 
-std::size_t PeriodicSearch::count_images(const SphereInstance* spheres, std::size_t n,
-                                         const PeriodicCell& cell) {
+bool PeriodicSearch::count(const SphereInstance* spheres, std::size_t n) {
   reduced_.reserve_geometric(pool_, stream_, n, "reduced spheres");
-  cells_.reserve_geometric(pool_, stream_, n, "periodic cells of spheres");
+  displacements_.reserve_geometric(pool_, stream_, n, "periodic cells of spheres");
   counts_.reserve_geometric(pool_, stream_, n + 1, "numbers of images");
   begins_.reserve_geometric(pool_, stream_, n + 1, "sums of numbers of images");
   state_.reserve(pool_, stream_, 1, "states of searches");
   totals_.reserve(1, "numbers of images");
-  args_ = {.cell = cell,
-           .n = static_cast<std::uint32_t>(n),
-           .reduced = reduced_.data(),
-           .cells = cells_.data(),
-           .counts = counts_.data(),
-           .begins = begins_.data(),
-           .images = nullptr,
-           .state = state_.data()};
+  args_.n = static_cast<std::uint32_t>(n);
+  args_.reduced = reduced_.data();
+  args_.displacements = displacements_.data();
+  args_.counts = counts_.data();
+  args_.begins = begins_.data();
+  args_.state = state_.data();
   JFPX_CUDA_TRY(cudaMemsetAsync(state_.data(), 0, sizeof(PeriodicState), stream_));
   launch_reduce(args_, spheres, stream_);
   launch_count_images(args_, stream_);
@@ -45,27 +40,59 @@ std::size_t PeriodicSearch::count_images(const SphereInstance* spheres, std::siz
   JFPX_CUDA_TRY(cudaMemcpyAsync(&totals.images, begins_.data() + n, sizeof totals.images,
                                 cudaMemcpyDeviceToHost, stream_));
   JFPX_CUDA_TRY(cudaStreamSynchronize(stream_));
-  check(spheres);
-  images_.reserve_geometric(pool_, stream_, totals.images, "images");
-  args_.images = images_.data();
-  return totals.images;
+  return totals.state.has_bad != 0;
 }
 
-void PeriodicSearch::check(const SphereInstance* spheres) const {
-  const PeriodicState& state = totals_.data()->state;
-  const auto download = [&](std::size_t first, std::size_t n) {
-    std::vector<SphereInstance> copy(n);
-    JFPX_CUDA_TRY(cudaMemcpyAsync(copy.data(), spheres + first, n * sizeof copy[0],
-                                  cudaMemcpyDeviceToHost, stream_));
-    JFPX_CUDA_TRY(cudaStreamSynchronize(stream_));
-    return copy;
-  };
-  if (state.valid_before != 0) detail::reject_sphere(download(0, ~state.valid_before + 1));
-  using Bits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
-  detail::check_cell(args_.cell, std::bit_cast<Real>(static_cast<Bits>(state.largest_radius)));
-  if (state.near_before == 0) return;
-  const std::uint32_t far = ~state.near_before;
-  detail::reject_far(far, download(far, 1)[0].centre, args_.cell);
+std::size_t PeriodicSearch::reserve_images() {
+  images_.reserve_geometric(pool_, stream_, totals_.data()->images, "images");
+  args_.images = images_.data();
+  return totals_.data()->images;
+}
+
+std::vector<SphereInstance> PeriodicSearch::download(const SphereInstance* spheres,
+                                                     std::size_t n) const {
+  std::vector<SphereInstance> copy(n);
+  JFPX_CUDA_TRY(
+      cudaMemcpyAsync(copy.data(), spheres, n * sizeof copy[0], cudaMemcpyDeviceToHost, stream_));
+  JFPX_CUDA_TRY(cudaStreamSynchronize(stream_));
+  return copy;
+}
+
+std::size_t PeriodicSearch::count_images(const SphereInstance* spheres, std::size_t n,
+                                         const PeriodicCell& cell) {
+  args_ = {};
+  args_.cell = cell;
+  if (count(spheres, n)) {
+    const std::vector<SphereInstance> copy = download(spheres, n);
+    detail::check_spheres(copy);
+    detail::check_in_cell(cell, copy);
+  }
+  detail::check_in_cell(cell, {});  // if there are no spheres
+  return reserve_images();
+}
+
+std::size_t PeriodicSearch::count_images(const SphereInstance* spheres,
+                                         std::span<const PeriodicCell> cells,
+                                         std::span<const std::uint64_t> offsets,
+                                         const std::uint64_t* device_offsets) {
+  cells_.reserve_geometric(pool_, stream_, cells.size(), "periodic cells");
+  JFPX_CUDA_TRY(cudaMemcpyAsync(cells_.data(), cells.data(), cells.size_bytes(),
+                                cudaMemcpyHostToDevice, stream_));
+  args_ = {};
+  args_.cells = cells_.data();
+  args_.offsets = device_offsets;
+  args_.systems = static_cast<std::uint32_t>(cells.size());
+  const std::size_t n = offsets.back();
+  const bool has_bad =
+      count(spheres, n) || !std::all_of(cells.begin(), cells.end(), [](auto& cell) {
+        return detail::fits(cell, 0);  // also those of empty systems
+      });
+  if (has_bad) {
+    const std::vector<SphereInstance> copy = download(spheres, n);
+    detail::check_spheres(copy);
+    detail::check_in_cells(cells, copy, offsets);
+  }
+  return reserve_images();
 }
 
 void PeriodicSearch::append_images(SphereInstance* spheres) {

@@ -4,6 +4,9 @@
 #include "src/base/cuda/device_buffer.hpp"
 #include "src/sphere_collider/cuda/periodic_images.hpp"
 
+#include <span>
+#include <vector>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
@@ -18,6 +21,12 @@ class PeriodicSearch {
   /// which is returned.
   /// @throws InvalidArgument as find_periodic_contacts(), OutOfMemory, DeviceError
   std::size_t count_images(const SphereInstance* spheres, std::size_t n, const PeriodicCell& cell);
+  /// The same within systems, each of which has a cell.
+  /// @param offsets in host memory
+  /// @param device_offsets the same in device memory
+  std::size_t count_images(const SphereInstance* spheres, std::span<const PeriodicCell> cells,
+                           std::span<const std::uint64_t> offsets,
+                           const std::uint64_t* device_offsets);
   /// Enqueues the n reduced spheres and the images that were counted.
   void append_images(SphereInstance* spheres);
   /// Enqueues the pairs of nearest images, and their number.
@@ -26,6 +35,8 @@ class PeriodicSearch {
   void keep_nearest(const Item* items, std::size_t found, DeviceBuffer<Item>* out,
                     ContactCount* count);
 
+  /// [n + 1]: the images of sphere i are from n + image_begins[i] to n + image_begins[i + 1].
+  const unsigned long long* image_begins() const noexcept { return begins_.data(); }
   /// Shifts of the items that keep_nearest() has written.
   const ImageShift* shifts() const noexcept { return shifts_.data(); }
 
@@ -36,13 +47,18 @@ class PeriodicSearch {
   };
 
   void enqueue_scan(const std::uint32_t* values, unsigned long long* sums, std::size_t n);
-  void check(const SphereInstance* spheres) const;
+  /// Counts the images, and waits.
+  /// @returns whether a sphere is bad
+  bool count(const SphereInstance* spheres, std::size_t n);
+  std::size_t reserve_images();
+  std::vector<SphereInstance> download(const SphereInstance* spheres, std::size_t n) const;
 
   const MemoryPool& pool_;
   cudaStream_t stream_;
   PeriodicArgs args_{};
   DeviceBuffer<SphereInstance> reduced_;
-  DeviceBuffer<ImageShift> cells_, shifts_;
+  DeviceBuffer<PeriodicCell> cells_;
+  DeviceBuffer<ImageShift> displacements_, shifts_;
   DeviceBuffer<std::uint32_t> counts_, kept_;
   DeviceBuffer<unsigned long long> begins_, places_;
   DeviceBuffer<PeriodicImage> images_;
