@@ -275,9 +275,9 @@ class World:
         reads them with its `from_dlpack()`, and jfpx takes them as they are.
 
         Row i is that of the body with BodyId.index i; rows of removed bodies have no meaning. The
-        arrays are valid until the next step or change of the world, and must not be written. Both
-        wait for all work of the GPU, which may still read them. The first call after a change by the
-        host uploads the world.
+        arrays are valid until the next step or change of the world, and must not be written. The
+        step or change waits for all work of the GPU, which may still read them. The first call after
+        a change by the host uploads the world.
 
         Raises
         ------

@@ -12,19 +12,37 @@ inline namespace JFPX_ABI {
 namespace python {
 namespace {
 
-using DeviceRows = nb::ndarray<nb::array_api, Real, nb::ndim<2>, nb::device::cuda>;
+/// Rows of Reals in the memory of a GPU, which belong to a world.
+struct DeviceRows {
+  nb::object owner;
+  std::uint64_t changes;  ///< of the world, for which the rows are valid
+  void* data;
+  std::size_t rows, columns;
+  int device;
+};
 
-/// Rows of the world `owner`, which lives at least as long as the result. They are not marked as
-/// read-only, because not every library imports such arrays.
 template <class Row>
 DeviceRows rows_of(const Row* data, const cuda::DeviceStates& states, nb::handle owner) {
-  return {const_cast<Row*>(data),
-          {states.slots, sizeof(Row) / sizeof(Real)},
-          owner,
-          {},
-          nb::dtype<Real>(),
-          nb::device::cuda::value,
-          states.device};
+  return {.owner = nb::borrow(owner),
+          .changes = nb::cast<PythonWorld&>(owner).changes(),
+          .data = const_cast<Row*>(data),
+          .rows = states.slots,
+          .columns = sizeof(Row) / sizeof(Real),
+          .device = states.device};
+}
+
+/// A capsule of DLPack. It is not marked as read-only, because not every library imports such
+/// arrays.
+nb::ndarray<Real, nb::ndim<2>, nb::device::cuda> to_dlpack(const DeviceRows& self,
+                                                           const nb::kwargs& options) {
+  if (self.changes != nb::cast<PythonWorld&>(self.owner).changes()) {
+    throw InvalidArgument("the world has changed since device_states()");
+  }
+  if (options.contains("copy") && nb::bool_(nb::object(options["copy"]))) {
+    throw nb::buffer_error("states in device memory are shared, not copied");
+  }
+  return {self.data,         {self.rows, self.columns}, self.owner, {},
+          nb::dtype<Real>(), nb::device::cuda::value,   self.device};
 }
 
 }  // namespace
@@ -39,12 +57,21 @@ void PythonWorld::wait_for_readers() {
 }
 
 cuda::DeviceStates PythonWorld::device_states() {
-  const cuda::DeviceStates states = cuda::device_states(get());
+  if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
+  const cuda::DeviceStates states = cuda::device_states(*existing());
   reading_device_ = states.device;
   return states;
 }
 
-void bind_device_states(nb::class_<PythonWorld>& world) {
+void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world) {
+  nb::class_<DeviceRows>(module, "DeviceRows")
+      .def("__dlpack__", &to_dlpack)
+      .def("__dlpack_device__",
+           [](const DeviceRows& self) {
+             return std::pair<int, int>(nb::device::cuda::value, self.device);
+           })
+      .def_prop_ro("shape",
+                   [](const DeviceRows& self) { return std::pair(self.rows, self.columns); });
   world.def("device_states", [](nb::handle_t<PythonWorld> self) {
     const cuda::DeviceStates s = nb::cast<PythonWorld&>(self).device_states();
     return nb::make_tuple(rows_of(s.positions, s, self), rows_of(s.orientations, s, self),

@@ -30,6 +30,7 @@ class PythonWorld {
     if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
     World& world = *existing();
     wait_for_readers();
+    ++changes_;
     return world;
   }
 
@@ -39,6 +40,8 @@ class PythonWorld {
   StepReport run(std::uint64_t steps);
   /// States in device memory, valid until the next step or change.
   cuda::DeviceStates device_states();
+  /// Changes when device_states() of before become invalid.
+  std::uint64_t changes() const { return changes_; }
   /// Frees the world now. Every later access fails.
   void close();
 
@@ -58,6 +61,7 @@ class PythonWorld {
   std::vector<std::pair<ForceId, nb::object>> functions_;  // outlive the world, which calls them
   std::unique_ptr<World> world_;
   std::atomic<bool> in_use_ = false;
+  std::uint64_t changes_ = 0;
   std::optional<int> reading_device_;  ///< has work that may read device_states()
 };
 
@@ -74,7 +78,7 @@ struct FunctionContext {
 
 void bind_forces(nb::module_& module, nb::class_<PythonWorld>& world);
 void bind_contacts(nb::class_<PythonWorld>& world);
-void bind_device_states(nb::class_<PythonWorld>& world);
+void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world);
 
 }  // namespace python
 }  // namespace JFPX_ABI

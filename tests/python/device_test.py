@@ -351,6 +351,15 @@ def test_states_on_the_device_are_not_copied():
     assert first.data_ptr() == second.data_ptr()
 
 
+def test_states_on_the_device_are_refused_after_a_change(library):
+    world = jfpx.World(grid_scene("float32"), backend="cuda")
+    for change in (world.step, lambda: world.wake(world.body_at(0)), world.close):
+        states = world.device_states()
+        change()
+        with pytest.raises(jfpx.InvalidArgument, match="the world has changed"):
+            library.module.from_dlpack(states.positions)
+
+
 def test_a_step_waits_for_readers_of_the_states():
     torch = Torch().module
     world = jfpx.World(grid_scene("float32"), backend="cuda")
