@@ -1,8 +1,8 @@
 """Times of jfpx.find_pairs() against other libraries, and of a world against the command, as tables in
-Markdown. What is not installed is left out. All libraries search the same points, and their numbers of
-pairs are compared: libraries that round differently may differ by the pairs at the cutoff.
+Markdown. What is not installed is left out. All libraries search the same points, and must find the same
+number of pairs.
 
-    python bench/python/neighbours.py [cpu] [cuda] [world]
+    python bench/python/neighbours.py [cpu] [cuda] [world] [world-cuda]
 """
 
 import csv
@@ -20,9 +20,16 @@ import jfpx
 
 
 def points_of(n, neighbours, seed=1):
-    """Uniform points in the unit cube, and the cutoff with that many neighbours on average."""
-    cutoff = float(np.float32((3 * neighbours / (4 * np.pi * n)) ** (1 / 3)))
-    return np.random.default_rng(seed).random((n, 3), dtype=np.float32), cutoff
+    """Uniform points in the unit cube, and the cutoff with that many neighbours on average.
+
+    Coordinates are multiples of a unit, and the cutoff is 400 to 800 units: squares of distances are
+    integers that float32 represents, and none is the square of the cutoff, so that rounding decides
+    no pair."""
+    cutoff = (3 * neighbours / (4 * np.pi * n)) ** (1 / 3)
+    unit = 2.0 ** np.ceil(np.log2(cutoff / 800))
+    x = np.floor(np.random.default_rng(seed).random((n, 3)) / unit) * unit
+    cutoff = unit * np.sqrt(np.floor((cutoff / unit) ** 2) + 0.5)
+    return x.astype(np.float32), float(np.float32(cutoff))
 
 
 def median_ms(call, synchronize=lambda: None, repeats=15):
@@ -89,44 +96,72 @@ def warp_search(x, cutoff):
     return search
 
 
+def radius_graph_search(x, cutoff, neighbours):
+    """Function that lists the neighbours of each point, both orders in int64, with PyTorch Geometric."""
+    import torch_cluster  # noqa: F401 (PyTorch Geometric calls it)
+    from torch_geometric.nn import radius_graph
+
+    return lambda: radius_graph(x, cutoff, max_num_neighbors=16 * neighbours + 64)
+
+
+def brute_force(x, cutoff):
+    """The number of pairs in float64, from bands of the matrix of distances."""
+    import torch
+
+    x = x.double()
+    total = 0
+    for begin in range(0, len(x), 2000):
+        near = torch.cdist(x[begin:begin + 2000], x,
+                           compute_mode="donot_use_mm_for_euclid_dist") <= cutoff
+        total += int(near.sum())
+    return (total - len(x)) // 2
+
+
+def pairs_of_tree(x, cutoff):
+    """The number of pairs in float64, from SciPy, or "-"."""
+    try:
+        from scipy.spatial import cKDTree
+    except ImportError:
+        return "-"
+    tree = cKDTree(x)
+    return (int(tree.count_neighbors(tree, cutoff)) - len(x)) // 2
+
+
+def compared(own, make_search, count, wait, repeats=15):
+    """Cells of a table: median time and number of pairs of another library, and the ratio to `own`."""
+    try:
+        search = make_search()
+    except ImportError:
+        return ["-"] * 3
+    other = median_ms(search, wait, repeats)
+    return [other, count(search()), other / own]
+
+
 def cuda():
     import torch
 
     wait = torch.cuda.synchronize
     print(f"\n## {torch.cuda.get_device_name()}, tensors of PyTorch, ms\n\n`Warp` builds its grid and "
-          "counts, without a list of pairs.\n\n| points | neighbours | pairs | jfpx | Warp | its pairs | "
-          "ratio | torch_cluster | its pairs | ratio | brute force | its pairs |\n"
-          "|---|---|---|---|---|---|---|---|---|---|---|---|")
+          "counts, without a list of pairs. SciPy's pairs are those of float64.\n\n"
+          "| points | neighbours | pairs | SciPy's pairs | jfpx | both orders, int64 | periodic | Warp | its pairs "
+          "| ratio | radius_graph | its pairs | ratio | brute force | its pairs |\n"
+          "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     for n in (10_000, 100_000, 1_000_000):
         for neighbours in (3, 30):
             host, cutoff = points_of(n, neighbours)
             x = torch.from_numpy(host).cuda()
             own = median_ms(lambda: jfpx.find_pairs(x, cutoff), wait)
-            cells = [n, neighbours, jfpx.find_pairs(x, cutoff).shape[1], own]
-            try:
-                search = warp_search(x, cutoff)
-                other = median_ms(search, wait)
-                cells += [other, int(search().numpy().sum()), other / own]
-            except ImportError:
-                cells += ["-"] * 3
-            try:
-                from torch_cluster import radius_graph
-                most = 16 * neighbours + 64
-                other = median_ms(lambda: radius_graph(x, cutoff, max_num_neighbors=most), wait)
-                cells += [other, radius_graph(x, cutoff, max_num_neighbors=most).shape[1] // 2,
-                          other / own]
-            except ImportError:
-                cells += ["-"] * 3
-            if n <= 100_000:  # float64, in bands of rows
-                def brute_force():
-                    y = x.double()
-                    total = 0
-                    for begin in range(0, n, 2000):
-                        near = torch.cdist(y[begin:begin + 2000], y,
-                                           compute_mode="donot_use_mm_for_euclid_dist") <= cutoff
-                        total += int(near.sum())
-                    return (total - n) // 2
-                cells += [median_ms(brute_force, wait, 1), brute_force()]
+            both = median_ms(lambda: jfpx.find_pairs(x, cutoff, half=False, index_dtype="int64"), wait)
+            periodic = median_ms(lambda: jfpx.find_pairs(x, cutoff, periodic=(1, 1, 1)), wait)
+            cells = [n, neighbours, jfpx.find_pairs(x, cutoff).shape[1], pairs_of_tree(host, cutoff),
+                     own, both, periodic]
+            cells += compared(own, lambda: warp_search(x, cutoff),
+                              lambda counts: int(counts.numpy().sum()), wait)
+            cells += compared(both, lambda: radius_graph_search(x, cutoff, neighbours),
+                              lambda edges: edges.shape[1] // 2, wait,
+                              repeats=1 if n == 1_000_000 else 15)  # tests all pairs
+            if n <= 100_000:
+                cells += [median_ms(lambda: brute_force(x, cutoff), wait, 1), brute_force(x, cutoff)]
             else:
                 cells += ["-"] * 2
             row(*cells)
@@ -141,9 +176,9 @@ def cuda():
           " us")
 
 
-def steps_of_python(spheres, steps):
+def steps_of_python(backend, spheres, steps):
     """Times of the steps of a pile [ms], and the hash of its end."""
-    pile = jfpx.World(jfpx.Scene.named("pile", spheres=spheres), backend="cpu", threads=0)
+    pile = jfpx.World(jfpx.Scene.named("pile", spheres=spheres), backend=backend, threads=0)
     times = []
     for _ in range(steps):
         begin = time.perf_counter()
@@ -152,33 +187,33 @@ def steps_of_python(spheres, steps):
     return times, f"{pile.state_hash():016x}"
 
 
-def steps_of_command(command, spheres, steps):
+def steps_of_command(command, backend, spheres, steps):
     """The same of `jfpx run`."""
     with tempfile.NamedTemporaryFile() as file:
         out = subprocess.run(
-            [command, "run", "pile", "--backend", "cpu", "--spheres", str(spheres), "--steps",
+            [command, "run", "pile", "--backend", backend, "--spheres", str(spheres), "--steps",
              str(steps), "--threads", "0", "--csv", file.name, "--hash", "--quiet"],
             check=True, stdout=subprocess.PIPE, text=True).stdout
         with open(file.name, newline="") as table:
             return [float(row["total_ms"]) for row in csv.DictReader(table)], out.split()[-1]
 
 
-def world():
+def world(backend="cpu"):
     """A pile from Python against the command, which is on PATH or named by JFPX_COMMAND."""
     command = os.environ.get("JFPX_COMMAND") or shutil.which("jfpx")
     if command is None:
         print("the command jfpx is not on PATH")
         return
-    print("\n## Pile of 100,000 on the CPU, one thread per core, ms a step\n\nMedian of steps 11 to "
-          "60; the two take turns.\n\n| run | Python | command | ratio | equal hashes |\n"
+    print(f"\n## Pile of 100,000, backend {backend}, one thread per core, ms a step\n\nMedian of steps 11 "
+          "to 60; the two take turns.\n\n| run | Python | command | ratio | equal hashes |\n"
           "|---|---|---|---|---|")
     for run in range(1, 4):
-        own, own_hash = steps_of_python(100_000, 60)
-        other, other_hash = steps_of_command(command, 100_000, 60)
+        own, own_hash = steps_of_python(backend, 100_000, 60)
+        other, other_hash = steps_of_command(command, backend, 100_000, 60)
         own, other = statistics.median(own[10:]), statistics.median(other[10:])
         row(run, own, other, own / other, own_hash == other_hash)
 
 
 if __name__ == "__main__":
     for part in sys.argv[1:] or ["cpu"]:
-        {"cpu": cpu, "cuda": cuda, "world": world}[part]()
+        {"cpu": cpu, "cuda": cuda, "world": world, "world-cuda": lambda: world("cuda")}[part]()

@@ -13,7 +13,7 @@ inline namespace JFPX_ABI {
 
 /// An orthogonal cell that repeats along some axes. Positions may lie outside of it.
 struct PeriodicCell {
-  Vec3 lengths;  ///< [m], each > 0 and finite where the cell repeats; otherwise without effect
+  Vec3 lengths;  ///< [m], each > 0 where the cell repeats; otherwise without effect
   std::array<bool, 3> repeats{true, true, true};
 };
 
@@ -32,11 +32,30 @@ struct PeriodicContact {
 /// (a, b), a < b. A pair that touches through two images, which are then half a length apart, is
 /// listed once, with the lower shift. The bits do not depend on the collider: centres are reduced
 /// to the cell, and the image of b is displaced by at most one length, with one rounding each.
-/// @throws InvalidArgument as SphereCollider::find_contacts(); for a length that is not finite and
-///   > 0 or is less than four times the largest radius, and for a centre that is 2^20 lengths or
-///   more from the origin. std::bad_alloc
+/// @throws InvalidArgument as SphereCollider::find_contacts(); for a length that is not > 0, is
+///   more than half of the largest number or is less than four times the largest radius, and for a
+///   centre that is 2^20 lengths or more from the origin. std::bad_alloc
 JFPX_API std::vector<PeriodicContact> find_periodic_contacts(
     SphereCollider& collider, std::span<const SphereInstance> spheres, const PeriodicCell& cell);
+
+/// Finds the touching pairs of a sphere `a` of `first` and a sphere `b` or its image of `second`,
+/// sorted by (a, b). Both indices count from 0 in their own set. Takes the time of a search among
+/// the spheres of both sets.
+/// @throws as find_periodic_contacts(), for the radii of both sets; messages count the spheres of
+///   `second` after those of `first`
+JFPX_API std::vector<PeriodicContact> find_periodic_contacts_between(
+    SphereCollider& collider, std::span<const SphereInstance> first,
+    std::span<const SphereInstance> second, const PeriodicCell& cell);
+
+/// Finds the contacts within each of many independent systems, as find_contacts_in_systems(), where
+/// each system has a cell of its own.
+/// @param offsets ascending, from 0 to the number of spheres
+/// @param cells one for each system
+/// @throws InvalidArgument for bad offsets, for another number of cells, and as
+///   find_periodic_contacts(). std::bad_alloc
+JFPX_API std::vector<PeriodicContact> find_periodic_contacts_in_systems(
+    SphereCollider& collider, std::span<const SphereInstance> spheres,
+    std::span<const std::uint64_t> offsets, std::span<const PeriodicCell> cells);
 
 /// Adds (b, a) with the opposite normal and shift for each contact. The result is sorted.
 /// @param contacts sorted by (a, b), a < b

@@ -130,3 +130,27 @@ def count(value: Any, name: str, low: int, high: int) -> int:
     if not low <= result <= high:
         raise InvalidArgument(f"{name} is {result}; it must be in [{low}, {high}]")
     return result
+
+
+def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
+    """The lengths of periodic cells (1 or `systems`, 3), NaN along axes that do not repeat; None for
+    None. Takes three lengths, each None along such an axis, or with systems also one such row for
+    each."""
+    if lengths is None:
+        return None
+    try:
+        lengths = list(lengths)
+    except TypeError:
+        raise InvalidArgument(f"periodic is {lengths!r}; it must be three lengths") from None
+    if systems is None or not any(hasattr(row, "__len__") for row in lengths):
+        return np.array([_cell(lengths)] * (1 if systems is None else systems)).reshape(-1, 3)
+    if len(lengths) != systems:
+        raise InvalidArgument(f"periodic has {len(lengths)} cells; it must have one for each of "
+                              f"{systems} systems")
+    return np.array([_cell(row) for row in lengths])
+
+
+def _cell(lengths: Any) -> list[float]:
+    if len(lengths) != 3:
+        raise InvalidArgument(f"periodic has {len(lengths)} lengths; it must have 3")
+    return [math.nan if length is None else number(length, "periodic") for length in lengths]

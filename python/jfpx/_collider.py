@@ -226,8 +226,7 @@ class SphereCollider:
     def _find(self, search: _Search, output: str, half: bool, index_dtype: Any, out: Any,
               contacts: bool) -> Any:
         index = _check_form(output, index_dtype, out)
-        if search.periodic and out is not None:
-            raise InvalidArgument("out and periodic exclude each other")
+        _refuse_out(search, out)
         if index is np.int32 and search.largest() > 2**31:
             raise InvalidArgument("more than 2^31 spheres require index_dtype=\"int64\"")
         if not self._lock.acquire(blocking=False):
@@ -250,18 +249,15 @@ class SphereCollider:
                 self._collider.write_shifts(result[-1])
         finally:
             self._lock.release()
-        result = [search.convert(array) for array in result]
-        if not search.periodic:
-            return _result(result, output, contacts)
-        if contacts:
-            return (PeriodicContacts if output == "coo" else PeriodicContactRows)(*result)
-        return (PeriodicPairs if output == "coo" else PeriodicRows)(*result)
+        return _result([search.convert(array) for array in result], output, contacts,
+                       search.periodic)
 
     def _find_on_device(self, search: _device.DeviceSearch, output: str, half: bool,
                         index_dtype: Any, out: Any, count: Any, contacts: bool) -> Any:
         index = np.dtype(_check_form(output, index_dtype, out)).name
         if self._backend == "cpu":
             raise InvalidArgument(f"positions are on cuda:{search.device}, and backend is cpu")
+        _refuse_out(search, out)
         if count is not None and out is None:
             raise InvalidArgument("count requires out")
         if count is not None and search.waits():
@@ -282,7 +278,7 @@ class SphereCollider:
             result = search.results(core, size, output, index, contacts)
         finally:
             self._lock.release()
-        return _result(result, output, contacts)
+        return _result(result, output, contacts, search.periodic)
 
     def _write(self, size: int, out: Any, contacts: bool) -> int:
         """Writes the result to the arrays of the caller."""
@@ -298,7 +294,11 @@ class SphereCollider:
         return size
 
 
-def _result(arrays: list[Any], output: str, contacts: bool) -> Any:
+def _result(arrays: list[Any], output: str, contacts: bool, periodic: bool) -> Any:
+    if periodic:
+        if contacts:
+            return (PeriodicContacts if output == "coo" else PeriodicContactRows)(*arrays)
+        return (PeriodicPairs if output == "coo" else PeriodicRows)(*arrays)
     if contacts:
         return Contacts(*arrays) if output == "coo" else ContactRows(*arrays)
     return arrays[0] if output == "coo" else Rows(*arrays)
@@ -315,23 +315,11 @@ class _Search:
         self._radii = _arrays.vector(radii, "radii", size, self.dtype)
         self._batch = None if batch is None else _arrays.offsets(batch, "batch")
         self._query: Any = None
-        self.periodic: Any = None
+        self.periodic = False
 
     def set_periodic(self, lengths: Any) -> None:
-        """Three lengths, each None along an axis that does not repeat."""
-        if lengths is None:
-            return
-        if self._batch is not None or self._query is not None:
-            raise InvalidArgument("periodic, query and batch exclude each other")
-        try:
-            lengths = list(lengths)
-        except TypeError:
-            raise InvalidArgument(f"periodic is {lengths!r}; it must be three lengths") from None
-        if len(lengths) != 3:
-            raise InvalidArgument(f"periodic has {len(lengths)} lengths; it must have 3")
-        repeats = [length is not None for length in lengths]
-        self.periodic = ([_arrays.number(length, "periodic") if on else 0.0
-                          for length, on in zip(lengths, repeats)], repeats)
+        self._cells = _arrays.cells(lengths, None if self._batch is None else len(self._batch) - 1)
+        self.periodic = self._cells is not None
 
     def add_query(self, query: Any, radii: Any) -> None:
         if self._batch is not None:
@@ -352,8 +340,14 @@ class _Search:
         return max(self._positions.shape[0], self.rows())
 
     def run(self, collider: Any, half: bool, contacts: bool) -> int:
+        if self.periodic and self._query is not None:
+            return collider.search_periodic_between(self._query, self._query_radii,
+                                                    self._positions, self._radii, self._cells)
+        if self.periodic and self._batch is not None:
+            return collider.search_periodic_systems(self._positions, self._radii, self._batch,
+                                                    self._cells, half)
         if self.periodic:
-            return collider.search_periodic(self._positions, self._radii, *self.periodic, half)
+            return collider.search_periodic(self._positions, self._radii, self._cells, half)
         if self._query is None and self._batch is None and not contacts:
             return collider.search_pairs(self._positions, self._radii, half)
         if self._query is None:
@@ -380,8 +374,6 @@ def _device_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: A
                    query_radii: Any, batch: Any, periodic: Any,
                    device: Any) -> _device.DeviceSearch:
     """The same on a device, for find_contacts(), too, without cutoff."""
-    if periodic is not None:
-        raise InvalidArgument("periodic requires positions in host memory")
     _check_radii(cutoff, radii, query, query_radii)
     search = _device.DeviceSearch(positions, device, dtype)
     if cutoff is not None:
@@ -391,6 +383,7 @@ def _device_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: A
         search.set_query(query, query_radii)
     if batch is not None:
         search.set_batch(batch)
+    search.set_periodic(periodic)
     return search
 
 
@@ -426,6 +419,11 @@ def _check_form(output: Any, index_dtype: Any, out: Any) -> Any:
         return _INDEX_TYPES[np.dtype(index_dtype).name]
     except (KeyError, TypeError):
         raise InvalidArgument(f"index_dtype is {index_dtype!r}; it must be int32 or int64") from None
+
+
+def _refuse_out(search: Any, out: Any) -> None:
+    if search.periodic and out is not None:
+        raise InvalidArgument("out and periodic exclude each other")
 
 
 def _refuse_count(count: Any) -> None:
@@ -497,7 +495,8 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
     periodic : three lengths, optional
         [m], of an orthogonal cell that repeats; None along an axis that does not. Each length is
         at least twice the largest sum of two radii. The nearest image of a sphere counts, and its
-        shift is returned. Positions may be outside of the cell. In host memory only.
+        shift is returned. Positions may be outside of the cell. With `batch`, the cell is that of each
+        system, or there is a row of three lengths for each.
     device : "cpu", "cuda" or "cuda:N", optional
         Must be the device of the arrays, which is the default.
     output : "coo" or "csr"
@@ -550,7 +549,7 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
     query_radii : number or array (M,)
         With `radii`: those of `query`.
     batch, periodic, device, output, half, index_dtype, threads
-        As in find_contacts(). `batch`, `periodic` and `query` exclude each other.
+        As in find_contacts(). `batch` and `query` exclude each other.
 
     Returns
     -------

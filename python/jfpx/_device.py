@@ -127,6 +127,7 @@ class DeviceSearch:
             raise InvalidArgument(f"positions are on cuda:{self.device}, and device is {device!r}")
         self._query: Any = None
         self._batch: Any = None
+        self.periodic = False
 
     def _rows(self, view: View, name: str) -> View:
         if len(view.shape) != 2 or view.shape[1] != 3:
@@ -176,6 +177,10 @@ class DeviceSearch:
             batch = _LIBRARIES[_library(batch)].to_host(batch)
         self._batch = _arrays.offsets(batch, "batch")
 
+    def set_periodic(self, lengths: Any) -> None:
+        self._cells = _arrays.cells(lengths, None if self._batch is None else len(self._batch) - 1)
+        self.periodic = self._cells is not None
+
     def rows(self) -> int:
         return (self._query or self._spheres)[1]
 
@@ -185,6 +190,15 @@ class DeviceSearch:
 
     def run(self, core: Any, contacts: bool, half: bool) -> int:
         """Waits for the number of contacts, and returns it."""
+        if self.periodic and self._query is not None:
+            return core.find_periodic_between(self._query, self._spheres, self._cells, contacts,
+                                              self.library.stream)
+        if self.periodic and self._batch is not None:
+            return core.find_periodic_in_systems(self._spheres, self._batch, self._cells, contacts,
+                                                 not half, self.library.stream)
+        if self.periodic:
+            return core.find_periodic(self._spheres, self._cells, contacts, not half,
+                                      self.library.stream)
         if self._query is not None:
             return core.find_between(self._query, self._spheres, contacts, self.library.stream)
         if self._batch is not None:
@@ -220,6 +234,9 @@ class DeviceSearch:
         if contacts:
             result += [empty((size, 3), self.dtype), empty((size,), self.dtype)]
             core.write_contacts(*(self.library.view(x).address for x in result[-2:]), size, stream)
+        if self.periodic:
+            result.append(empty((size, 3), "int32"))
+            core.write_shifts(self.library.view(result[-1]).address, size, stream)
         return [self.convert(array) for array in result]
 
     def write(self, core: Any, out: Any, contacts: bool, size: int | None) -> None:

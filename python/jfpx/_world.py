@@ -270,6 +270,23 @@ class World:
         self._core.write_states(*states)
         return states
 
+    def device_states(self) -> States:
+        """States in the memory of the GPU that steps the world, as arrays that share it: a library
+        reads them with its `from_dlpack()`, and jfpx takes them as they are.
+
+        Row i is that of the body with BodyId.index i; rows of removed bodies have no meaning. The
+        arrays are valid until the next step or change of the world, and must not be written. The
+        step or change waits for all work of the GPU, which may still read them. The first call after
+        a change by the host uploads the world.
+
+        Raises
+        ------
+        BackendUnavailable
+            No GPU steps the world; it needs backend="cuda" and the solver soft_step.
+        OutOfMemory, DeviceError
+        """
+        return States(*self._core.device_states())
+
     def set_states(self, states: States) -> None:
         """Replaces the states of all bodies, or of none if one is invalid."""
         size = len(self)

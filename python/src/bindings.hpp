@@ -6,6 +6,7 @@
 
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
@@ -81,6 +82,18 @@ inline nb::tuple to_quadruple(const Quat& q) { return nb::make_tuple(q.w, q.x, q
 template <class T>
 Vec3 vec3_at(const Rows<T>& rows, std::size_t i) {
   return {rows(i, 0), rows(i, 1), rows(i, 2)};
+}
+/// Cells from rows of three lengths, each NaN along an axis that does not repeat.
+inline std::vector<PeriodicCell> to_cells(const Rows<const double>& lengths) {
+  std::vector<PeriodicCell> cells(lengths.shape(0));
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double length = lengths(i, k);
+      cells[i].repeats[k] = !std::isnan(length);
+      cells[i].lengths[static_cast<int>(k)] = static_cast<Real>(length);
+    }
+  }
+  return cells;
 }
 inline void set_row(const Rows<Real>& rows, std::size_t i, const Vec3& v) {
   rows(i, 0) = v.x;

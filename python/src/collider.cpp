@@ -66,14 +66,26 @@ class Collider {
     start(spheres);
     std::vector<PeriodicContact> contacts = find_periodic_contacts(*collider_, spheres_, cell);
     if (!half) contacts = in_both_orders(contacts, rows_);
-    list_.clear();
-    shifts_.clear();
-    for (const PeriodicContact& c : contacts) {
-      list_.push_back(c.contact);
-      shifts_.push_back(c.shift);
-    }
-    found_ = list_;
-    return found_.size();
+    return keep(contacts);
+  }
+
+  /// The same within each system of `batch`.
+  std::size_t search_periodic_systems(const Spheres& spheres,
+                                      const Vector<const std::uint64_t>& batch,
+                                      const std::vector<PeriodicCell>& cells, bool half) {
+    start(spheres);
+    std::vector<PeriodicContact> contacts = find_periodic_contacts_in_systems(
+        *collider_, spheres_, {batch.data(), batch.size()}, cells);
+    if (!half) contacts = in_both_orders(contacts, rows_);
+    return keep(contacts);
+  }
+
+  /// The same of a sphere of `first` with one of `second`.
+  std::size_t search_periodic_between(const Spheres& first, const Spheres& second,
+                                      const PeriodicCell& cell) {
+    start(first);
+    pack(second, &others_);
+    return keep(find_periodic_contacts_between(*collider_, spheres_, others_, cell));
   }
 
   /// Writes the indices of the last search: pairs[0] and pairs[1], which may be longer than the
@@ -102,7 +114,7 @@ class Collider {
     }
   }
 
-  /// Writes the shifts of the last search, which must have been search_periodic().
+  /// Writes the shifts of the last search, which must have been in a periodic cell.
   void write_shifts(const Rows<std::int32_t>& shifts) {
     for (std::size_t i = 0; i < shifts_.size(); ++i) {
       for (std::size_t k = 0; k < 3; ++k) shifts(i, k) = shifts_[i][k];
@@ -120,6 +132,16 @@ class Collider {
     pairs_ = {};
     pack(spheres, &spheres_);
     rows_ = spheres_.size();
+  }
+  std::size_t keep(const std::vector<PeriodicContact>& contacts) {
+    list_.clear();
+    shifts_.clear();
+    for (const PeriodicContact& c : contacts) {
+      list_.push_back(c.contact);
+      shifts_.push_back(c.shift);
+    }
+    found_ = list_;
+    return found_.size();
   }
   /// Calls `write` with the result of the last search: contacts, or pairs alone.
   template <class Write>
@@ -203,11 +225,28 @@ void bind_collider(nb::module_& module) {
       .def(
           "search_periodic",
           [](Collider& self, const Rows<const Real>& positions, const Vector<const Real>& radii,
-             Triple lengths, std::array<bool, 3> repeats, bool half) {
-            return self.search_periodic({positions, radii}, {to_vec3(lengths), repeats}, half);
+             const Rows<const double>& cell, bool half) {
+            return self.search_periodic({positions, radii}, to_cells(cell).at(0), half);
           },
-          nb::arg("positions"), nb::arg("radii"), nb::arg("lengths"), nb::arg("repeats"),
+          nb::arg("positions"), nb::arg("radii"), nb::arg("cell"), nb::arg("half"), Release())
+      .def(
+          "search_periodic_systems",
+          [](Collider& self, const Rows<const Real>& positions, const Vector<const Real>& radii,
+             const Vector<const std::uint64_t>& batch, const Rows<const double>& cells, bool half) {
+            return self.search_periodic_systems({positions, radii}, batch, to_cells(cells), half);
+          },
+          nb::arg("positions"), nb::arg("radii"), nb::arg("batch"), nb::arg("cells"),
           nb::arg("half"), Release())
+      .def(
+          "search_periodic_between",
+          [](Collider& self, const Rows<const Real>& first, const Vector<const Real>& first_radii,
+             const Rows<const Real>& second, const Vector<const Real>& second_radii,
+             const Rows<const double>& cell) {
+            return self.search_periodic_between({first, first_radii}, {second, second_radii},
+                                                to_cells(cell).at(0));
+          },
+          nb::arg("first"), nb::arg("first_radii"), nb::arg("second"), nb::arg("second_radii"),
+          nb::arg("cell"), Release())
       .def("write_shifts", &Collider::write_shifts, nb::arg("shifts").noconvert(), Release())
       .def("write_pairs", &Collider::write_pairs<std::int32_t>, nb::arg("pairs").noconvert(),
            Release())

@@ -65,6 +65,33 @@ void bind_device_collider(nb::module_& module) {
                                         to_result(contacts), both_orders, to_stream(stream));
           },
           Release())
+      .def(
+          "find_periodic",
+          [](ArrayCollider& self, const ArraysTuple& spheres, const Rows<const double>& cell,
+             bool contacts, bool both_orders, Address stream) {
+            return self.find_periodic(to_arrays(spheres), to_cells(cell).at(0), to_result(contacts),
+                                      both_orders, to_stream(stream));
+          },
+          Release())
+      .def(
+          "find_periodic_in_systems",
+          [](ArrayCollider& self, const ArraysTuple& spheres,
+             const Vector<const std::uint64_t>& offsets, const Rows<const double>& cells,
+             bool contacts, bool both_orders, Address stream) {
+            return self.find_periodic_in_systems(
+                to_arrays(spheres), {offsets.data(), offsets.size()}, to_cells(cells),
+                to_result(contacts), both_orders, to_stream(stream));
+          },
+          Release())
+      .def(
+          "find_periodic_between",
+          [](ArrayCollider& self, const ArraysTuple& first, const ArraysTuple& second,
+             const Rows<const double>& cell, bool contacts, Address stream) {
+            return self.find_periodic_between(to_arrays(first), to_arrays(second),
+                                              to_cells(cell).at(0), to_result(contacts),
+                                              to_stream(stream));
+          },
+          Release())
       .def("enqueue",
            [](ArrayCollider& self, const ArraysTuple& spheres, bool contacts, Address stream) {
              self.enqueue(to_arrays(spheres), to_result(contacts), to_stream(stream));
@@ -85,6 +112,10 @@ void bind_device_collider(nb::module_& module) {
               Address stream) {
              self.write_contacts(pointer<Real>(normals), pointer<Real>(distances), capacity,
                                  to_stream(stream));
+           })
+      .def("write_shifts",
+           [](ArrayCollider& self, Address shifts, std::size_t capacity, Address stream) {
+             self.write_shifts(pointer<std::int32_t>(shifts), capacity, to_stream(stream));
            })
       .def("write_offsets",
            [](ArrayCollider& self, Address offsets, Address stream) {

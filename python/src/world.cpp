@@ -217,6 +217,8 @@ StepReport PythonWorld::run(std::uint64_t steps) {
 
 void PythonWorld::close() {
   if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
+  if (world_ != nullptr) wait_for_readers();
+  ++changes_;
   world_.reset();
   functions_.clear();
 }
@@ -257,6 +259,7 @@ void bind_world(nb::module_& module) {
   bind_properties(world);
   bind_forces(module, world);
   bind_contacts(world);
+  bind_device_states(module, world);
 }
 
 }  // namespace python

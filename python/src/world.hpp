@@ -1,9 +1,12 @@
 /// A world as an object of Python.
 #pragma once
 
+#include <jfpx/cuda/world.hpp>
+
 #include "python/src/bindings.hpp"
 
 #include <memory>
+#include <optional>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -21,15 +24,24 @@ class PythonWorld {
     if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
     return *existing();
   }
+  /// For changes: waits for the work of a GPU that may read device_states().
+  /// @throws Closed, ConcurrentUse, DeviceError
   World& get() {
     if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
-    return *existing();
+    World& world = *existing();
+    wait_for_readers();
+    ++changes_;
+    return world;
   }
 
   /// One step without Python's global lock.
   StepReport step();
   /// Up to `steps` steps, and fewer if one is undone. Between steps, handles signals of Python.
   StepReport run(std::uint64_t steps);
+  /// States in device memory, valid until the next step or change.
+  cuda::DeviceStates device_states();
+  /// Changes when device_states() of before become invalid.
+  std::uint64_t changes() const { return changes_; }
   /// Frees the world now. Every later access fails.
   void close();
 
@@ -40,6 +52,7 @@ class PythonWorld {
   int traverse(visitproc visit, void* arg) const;
 
  private:
+  void wait_for_readers();
   World* existing() const {
     if (world_ == nullptr) throw Closed("the world is closed");
     return world_.get();
@@ -48,6 +61,8 @@ class PythonWorld {
   std::vector<std::pair<ForceId, nb::object>> functions_;  // outlive the world, which calls them
   std::unique_ptr<World> world_;
   std::atomic<bool> in_use_ = false;
+  std::uint64_t changes_ = 0;
+  std::optional<int> reading_device_;  ///< has work that may read device_states()
 };
 
 /// ForceContext of a call of a function, which is invalid afterwards.
@@ -63,6 +78,7 @@ struct FunctionContext {
 
 void bind_forces(nb::module_& module, nb::class_<PythonWorld>& world);
 void bind_contacts(nb::class_<PythonWorld>& world);
+void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world);
 
 }  // namespace python
 }  // namespace JFPX_ABI

@@ -2,57 +2,16 @@
 #include <jfpx/periodic.hpp>
 
 #include "src/sphere_collider/both_orders.hpp"
+#include "src/sphere_collider/periodic_input.hpp"
 #include "src/sphere_collider/sphere_input.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <bit>
 #include <tuple>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
-
-/// Up to this number, the reduction to the cell is off by less than a length in either precision.
-constexpr Real kMaxCells = Real(1 << 20);
-
-Real largest_radius(std::span<const SphereInstance> spheres) {
-  Real radius = 0;
-  for (const SphereInstance& s : spheres) radius = std::max(radius, s.radius);
-  return radius;
-}
-
-void check_cell(const PeriodicCell& cell, Real radius) {
-  for (int k = 0; k < 3; ++k) {
-    const Real length = cell.lengths[k];
-    const std::string name = std::string("periodic length ") + "xyz"[k] + " is ";
-    if (!cell.repeats[static_cast<std::size_t>(k)]) continue;
-    if (!is_finite(length) || !(length > 0)) {
-      throw InvalidArgument(name + detail::to_text(length) + "; it must be finite and > 0");
-    }
-    if (!(radius <= length / 4)) {
-      throw InvalidArgument(name + detail::to_text(length) +
-                            "; it must be at least twice the cutoff, which is " +
-                            detail::to_text(2 * radius));
-    }
-  }
-}
-
-/// Reduces one coordinate to [0, length), and returns the number of cells that it was displaced by.
-std::int32_t reduce(Real* x, Real length) {
-  const Real cells = std::floor(*x / length);
-  *x -= cells * length;
-  auto count = static_cast<std::int32_t>(cells);
-  // The quotient and the difference are rounded.
-  if (*x < 0) {
-    *x += length;
-    --count;
-  }
-  if (*x >= length) {
-    *x -= length;
-    ++count;
-  }
-  return count;
-}
 
 /// The spheres in the cell, and the cells that they came from.
 struct Reduced {
@@ -60,88 +19,51 @@ struct Reduced {
   std::vector<ImageShift> cells;
 };
 
-Reduced reduce(std::span<const SphereInstance> spheres, const PeriodicCell& cell) {
+Reduced reduce_all(std::span<const SphereInstance> spheres, const PeriodicCell& cell) {
   Reduced reduced{{spheres.begin(), spheres.end()}, std::vector<ImageShift>(spheres.size())};
   for (std::size_t i = 0; i < spheres.size(); ++i) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (!cell.repeats[k]) continue;
-      const int axis = static_cast<int>(k);
-      const Real length = cell.lengths[axis];
-      Real& x = reduced.spheres[i].centre[axis];
-      if (!(absolute(x / length) < kMaxCells)) {
-        throw InvalidArgument("sphere " + std::to_string(i) + ": centre." + "xyz"[k] + " is " +
-                              detail::to_text(x) + "; it must be within 2^20 periodic lengths");
-      }
-      reduced.cells[i][k] = reduce(&x, length);
-    }
+    Vec3& centre = reduced.spheres[i].centre;
+    reduced.cells[i] = detail::reduce(&centre, cell);
   }
   return reduced;
 }
 
-/// An image that may touch a sphere in the cell.
-struct Image {
-  SphereIndex sphere;
-  ImageShift shift;
-};
-
-/// Appends the images whose centres are at most `reach` outside the cell, which is at most half a
-/// length. The margin is wider by 8 epsilon lengths. Touching centres are at most reach * (1 + 5
-/// epsilon) apart, because the sum of two radii and the distance are rounded; that is 2.5 epsilon
-/// lengths more than `reach`, and the margin and its sum with a length lose less than 2 by
-/// rounding.
-std::vector<Image> append_images(std::vector<SphereInstance>* spheres, const PeriodicCell& cell,
-                                 Real reach) {
-  std::vector<Image> images;
+/// Appends the images that may touch a sphere in the cell, in the order of the spheres and then of
+/// their shifts.
+std::vector<detail::PeriodicImage> append_images(std::vector<SphereInstance>* spheres,
+                                                 const PeriodicCell& cell, Real reach) {
+  std::vector<detail::PeriodicImage> images;
   const std::size_t n = spheres->size();
-  const auto limit = [&](std::size_t k) { return cell.repeats[k] ? 1 : 0; };
   for (std::size_t i = 0; i < n; ++i) {
-    ImageShift s{};
-    for (s[0] = -limit(0); s[0] <= limit(0); ++s[0]) {
-      for (s[1] = -limit(1); s[1] <= limit(1); ++s[1]) {
-        for (s[2] = -limit(2); s[2] <= limit(2); ++s[2]) {
-          if (s == ImageShift{}) continue;
-          SphereInstance image = (*spheres)[i];
-          bool near = true;
-          for (std::size_t k = 0; k < 3; ++k) {
-            if (s[k] == 0) continue;
-            const int axis = static_cast<int>(k);
-            const Real length = cell.lengths[axis];
-            const Real margin = reach + length * (8 * kEpsilon);
-            Real& x = image.centre[axis];
-            x += static_cast<Real>(s[k]) * length;
-            near = near && x >= -margin && x <= length + margin;
-          }
-          if (!near) continue;
-          images.push_back({static_cast<SphereIndex>(i), s});
-          spheres->push_back(image);
-        }
-      }
+    const SphereInstance sphere = (*spheres)[i];
+    std::uint32_t codes = detail::near_images(sphere.centre, cell, reach);
+    for (; codes != 0; codes &= codes - 1) {
+      const auto code = static_cast<std::uint32_t>(std::countr_zero(codes));
+      images.push_back({static_cast<SphereIndex>(i), code});
+      spheres->push_back(detail::image_of(sphere, detail::shift_of(code), cell));
     }
   }
   return images;
 }
 
-}  // namespace
-
-std::vector<PeriodicContact> find_periodic_contacts(SphereCollider& collider,
-                                                    std::span<const SphereInstance> spheres,
-                                                    const PeriodicCell& cell) {
-  detail::check_spheres(spheres);
-  const Real radius = largest_radius(spheres);
-  check_cell(cell, radius);
-  Reduced reduced = reduce(spheres, cell);
+/// The contacts of valid spheres in a valid cell.
+std::vector<PeriodicContact> find_in_cell(SphereCollider& collider,
+                                          std::span<const SphereInstance> spheres,
+                                          const PeriodicCell& cell) {
+  Reduced reduced = reduce_all(spheres, cell);
   // Touching spheres are at most two radii apart.
-  const std::vector<Image> images = append_images(&reduced.spheres, cell, 2 * radius);
+  const std::vector<detail::PeriodicImage> images =
+      append_images(&reduced.spheres, cell, 2 * detail::largest_radius(spheres));
   const std::size_t n = spheres.size();
   std::vector<PeriodicContact> result;
   for (SphereContact c : collider.find_contacts(reduced.spheres)) {
     if (c.a >= n) break;
     ImageShift shift{};
     if (c.b >= n) {
-      const Image& image = images[c.b - n];
+      const detail::PeriodicImage& image = images[c.b - n];
       if (image.sphere <= c.a) continue;  // listed as an image of the sphere with the higher index
       c.b = image.sphere;
-      shift = image.shift;
+      shift = detail::shift_of(image.code);
     }
     for (std::size_t k = 0; k < 3; ++k) {
       shift[k] += reduced.cells[c.a][k] - reduced.cells[c.b][k];
@@ -157,6 +79,53 @@ std::vector<PeriodicContact> find_periodic_contacts(SphereCollider& collider,
     return p.contact.a == q.contact.a && p.contact.b == q.contact.b;
   };
   result.erase(std::unique(result.begin(), result.end(), same_pair), result.end());
+  return result;
+}
+
+}  // namespace
+
+std::vector<PeriodicContact> find_periodic_contacts(SphereCollider& collider,
+                                                    std::span<const SphereInstance> spheres,
+                                                    const PeriodicCell& cell) {
+  detail::check_spheres(spheres);
+  detail::check_in_cell(cell, spheres);
+  return find_in_cell(collider, spheres, cell);
+}
+
+std::vector<PeriodicContact> find_periodic_contacts_between(SphereCollider& collider,
+                                                            std::span<const SphereInstance> first,
+                                                            std::span<const SphereInstance> second,
+                                                            const PeriodicCell& cell) {
+  std::vector<SphereInstance> spheres(first.begin(), first.end());
+  spheres.insert(spheres.end(), second.begin(), second.end());
+  std::vector<PeriodicContact> result;
+  // Because a < b, a contact of both sets has its `a` in the first.
+  for (PeriodicContact& c : find_periodic_contacts(collider, spheres, cell)) {
+    if (c.contact.a >= first.size()) break;
+    if (c.contact.b < first.size()) continue;
+    c.contact.b -= static_cast<SphereIndex>(first.size());
+    result.push_back(c);
+  }
+  return result;
+}
+
+std::vector<PeriodicContact> find_periodic_contacts_in_systems(
+    SphereCollider& collider, std::span<const SphereInstance> spheres,
+    std::span<const std::uint64_t> offsets, std::span<const PeriodicCell> cells) {
+  detail::check_offsets(offsets, spheres.size());
+  detail::check_number_of_cells(cells, offsets);
+  detail::check_spheres(spheres);
+  detail::check_in_cells(cells, spheres, offsets);
+  std::vector<PeriodicContact> result;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const auto first = static_cast<SphereIndex>(offsets[i]);
+    const auto system = spheres.subspan(first, offsets[i + 1] - first);
+    for (PeriodicContact& c : find_in_cell(collider, system, cells[i])) {
+      c.contact.a += first;
+      c.contact.b += first;
+      result.push_back(c);
+    }
+  }
   return result;
 }
 

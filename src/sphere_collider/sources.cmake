@@ -22,6 +22,8 @@ list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/grid_one_launch.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/pair_list.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/pair_list_search.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/periodic_images.cu
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/periodic_search.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/scan.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/sphere_collider_cuda.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/systems.cu)

@@ -151,6 +151,34 @@ def test_periodic_pairs_are_those_of_the_nearest_images(rng, dtype):
         np.testing.assert_array_equal(rows.shifts, cells[row, rows.columns])
 
 
+def test_periodic_pairs_of_a_query_are_those_of_both_sets(rng, dtype):
+    cell = (6, None, 5)
+    positions = (rng.random((300, 3)) * 15 - 5).astype(dtype)
+    all_pairs = jfpx.find_pairs(positions, 1.5, periodic=cell)
+    between = (all_pairs.pairs[0] < 80) & (all_pairs.pairs[1] >= 80)
+    found = jfpx.find_pairs(positions[80:], 1.5, query=positions[:80], periodic=cell)
+    np.testing.assert_array_equal(found.pairs, all_pairs.pairs[:, between] - [[0], [80]])
+    np.testing.assert_array_equal(found.shifts, all_pairs.shifts[between])
+    assert len(found.shifts) > 50
+    rows = jfpx.find_pairs(positions[80:], 1.5, query=positions[:80], periodic=cell, output="csr")
+    np.testing.assert_array_equal(rows.columns, found.pairs[1])
+    np.testing.assert_array_equal(np.repeat(np.arange(80), np.diff(rows.offsets)), found.pairs[0])
+
+
+@pytest.mark.parametrize("cells", [[[6, None, 5], [4, 5, 6], [9, 9, 9]], [6, 7, None]])
+def test_periodic_systems_have_the_pairs_of_their_cells(rng, dtype, cells):
+    offsets = [0, 100, 100, 300]
+    positions = (rng.random((300, 3)) * 15 - 5).astype(dtype)
+    found = jfpx.find_pairs(positions, 1.5, batch=offsets, periodic=cells)
+    expected = [jfpx.find_pairs(positions[begin:end], 1.5, periodic=cell) for begin, end, cell in zip(
+        offsets, offsets[1:], cells if isinstance(cells[0], list) else [cells] * 3)]
+    np.testing.assert_array_equal(found.pairs, np.concatenate(
+        [system.pairs + begin for system, begin in zip(expected, offsets)], axis=1))
+    np.testing.assert_array_equal(found.shifts, np.concatenate([s.shifts for s in expected]))
+    rows = jfpx.find_contacts(positions, 0.75, batch=offsets, periodic=cells, half=False, output="csr")
+    assert len(rows.columns) == 2 * len(found.shifts) > 200
+
+
 def test_strided_arrays_are_taken(rng, dtype):
     positions, radii = random_spheres(rng, 200, dtype)
     expected = jfpx.find_contacts(positions, radii)
@@ -287,8 +315,9 @@ NAN = np.array([[0, 0, 0], [0, np.nan, 0]], np.float32)
     (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, "a", 9]), "periodic is 'a'"),
     (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, 0, 9]), "periodic length y is 0"),
     (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, 9, 1.5]), "at least twice the cutoff, which is 1"),
-    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, 9, 9], query=POINTS), "exclude each other"),
-    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, 9, 9], batch=[0, 3]), "exclude each other"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[[9, 9, 9]] * 3, batch=[0, 3]), "periodic has 3 cells"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[[9, 9]], batch=[0, 3]), "periodic has 2 lengths"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, 9, 1.5], batch=[0, 1, 3]), "system 0: .* twice the cutoff"),
     (lambda: jfpx.SphereCollider().find_pairs(POINTS, 1, periodic=[9, 9, 9],
                                               out=np.zeros((2, 9), np.int32)), "exclude each other"),
     (lambda: jfpx.SphereCollider("float16"), "dtype is 'float16'"),

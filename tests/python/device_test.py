@@ -119,6 +119,27 @@ def test_a_batch_on_the_device_has_the_bits_of_the_host(library, rng, dtype, hal
                     [jfpx.find_pairs(positions, 0.9, batch=offsets, half=half)])
 
 
+@pytest.mark.parametrize("cell", [(12, 13, 11), (None, 13, None), (None, None, None)])
+@pytest.mark.parametrize("half", [True, False])
+def test_a_periodic_cell_on_the_device_has_the_bits_of_the_host(library, rng, dtype, cell, half):
+    positions = (rng.random((4000, 3)) * 60 - 20).astype(dtype)
+    radii = rng.uniform(0.2, 0.9, 4000).astype(dtype)
+    x, r = library.to_device(positions), library.to_device(radii)
+    for output in ("coo", "csr"):
+        options = {"periodic": cell, "output": output, "half": half}
+        check_equal(library, jfpx.find_contacts(x, r, **options),
+                    jfpx.find_contacts(positions, radii, **options))
+        check_equal(library, jfpx.find_pairs(x, 1.5, **options),
+                    jfpx.find_pairs(positions, 1.5, **options))
+        query = {"query": x[:300], "query_radii": r[:300]}
+        host_query = {"query": positions[:300], "query_radii": radii[:300]}
+        check_equal(library, jfpx.find_pairs(x[300:], radii=r[300:], **query, **options),
+                    jfpx.find_pairs(positions[300:], radii=radii[300:], **host_query, **options))
+        batch = {"batch": [0, 100, 100, 900, 1300], **options, "periodic": [cell, (9, 9, 9)] * 2}
+        check_equal(library, jfpx.find_contacts(x[:1300], r[:1300], **batch),
+                    jfpx.find_contacts(positions[:1300], radii[:1300], **batch))
+
+
 def test_strided_device_arrays_are_taken_without_a_copy(library, rng, dtype):
     positions, radii = random_spheres(rng, 1000, dtype)
     wide = np.zeros((1000, 5), dtype)
@@ -233,7 +254,12 @@ def test_arrays_of_jax_are_taken(rng):
     (lambda x, r, to: jfpx.SphereCollider().find_pairs(
         x, 1, batch=[0, 3], out=to(np.zeros((2, 9), np.int32)), count=to(np.zeros(2, np.int64))),
      "count excludes"),
-    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9, 9]), "periodic requires"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[[9, 9, 9]], batch=[0, 1, 3]), "periodic has 1 cells"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9, 3], batch=[0, 3]), "system 0: .* twice the cutoff"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9]), "periodic has 2 lengths"),
+    (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 3, 9]), "at least twice the cutoff"),
+    (lambda x, r, to: jfpx.SphereCollider().find_pairs(
+        x, 1, periodic=[9, 9, 9], out=to(np.zeros((2, 9), np.int32))), "exclude each other"),
     (lambda x, r, to: jfpx.find_contacts(x, r, output="dense"), "output is 'dense'"),
     (lambda x, r, to: jfpx.find_pairs(x), "either cutoff or radii"),
     (lambda x, r, to: jfpx.find_pairs(x, 1, query=np.zeros((3, 3), np.float32)),
@@ -288,3 +314,63 @@ def test_calls_on_the_device_do_not_leak(library):
 
     before = free_bytes(500)
     assert before - free_bytes(20_000) < 8 << 20
+
+
+def grid_scene(dtype):
+    scene = jfpx.Scene({"dt": 1 / 60, "bodies": []}, dtype=dtype)
+    scene.add_spheres((np.mgrid[0:8, 0:8, 0:8].reshape(3, -1).T * 0.7).astype(dtype), 0.4, masses=1.0)
+    return scene
+
+
+def test_states_on_the_device_are_those_of_the_world(library, dtype):
+    world = jfpx.World(grid_scene(dtype), backend="cuda")
+    for body in (None, world.body_at(5)):
+        if body is not None:
+            world.remove(body)
+        indices = [body.index for body in world.bodies]
+        for _ in range(3):
+            for shared, expected in zip(world.device_states(), world.states()):
+                array = library.module.from_dlpack(shared)
+                assert library.to_host(array)[indices].tobytes() == expected.tobytes()
+            world.step()
+
+
+def test_states_on_the_device_can_be_searched(library, dtype):
+    world = jfpx.World(grid_scene(dtype), backend="cuda")
+    world.step()
+    pairs = jfpx.find_pairs(world.device_states().positions, 0.75)
+    np.testing.assert_array_equal(library.to_host(library.module.from_dlpack(pairs)),
+                                  jfpx.find_pairs(world.positions, 0.75))
+
+
+def test_states_on_the_device_are_not_copied():
+    torch = Torch().module
+    world = jfpx.World(grid_scene("float32"), backend="cuda")
+    world.step()
+    first, second = (torch.from_dlpack(world.device_states().positions) for _ in range(2))
+    assert first.data_ptr() == second.data_ptr()
+
+
+def test_states_on_the_device_are_refused_after_a_change(library):
+    world = jfpx.World(grid_scene("float32"), backend="cuda")
+    for change in (world.step, lambda: world.wake(world.body_at(0)), world.close):
+        states = world.device_states()
+        change()
+        with pytest.raises(jfpx.InvalidArgument, match="the world has changed"):
+            library.module.from_dlpack(states.positions)
+
+
+def test_a_step_waits_for_readers_of_the_states():
+    torch = Torch().module
+    world = jfpx.World(grid_scene("float32"), backend="cuda")
+    world.step()
+    matrix = torch.rand((4096, 4096), device="cuda")
+    for _ in range(5):
+        expected = world.positions
+        x = torch.from_dlpack(world.device_states().positions)
+        for _ in range(20):
+            matrix = (matrix @ matrix).sigmoid()
+        copy = x.clone()  # after milliseconds of other work
+        world.step()
+        np.testing.assert_array_equal(copy.cpu().numpy(), expected)
+        assert (world.positions != expected).any()

@@ -12,6 +12,8 @@ import time
 
 import pytest
 
+import jfpx
+
 FOLDER = pathlib.Path(__file__).parents[2] / "examples/python"
 
 
@@ -33,6 +35,13 @@ def test_an_example_runs_and_draws_its_picture(tmp_path, name, arguments, text):
     assert text in run(name, *arguments)
     if "--picture" in arguments:
         assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_pile_has_the_same_bits_on_a_gpu():
+    cuda = next(row for row in jfpx.available_backends() if row["backend"] == "cuda")
+    if not cuda["usable"]:
+        (pytest.fail if os.environ.get("JFPX_REQUIRE_CUDA") else pytest.skip)(cuda["reason"])
+    assert "one thread of the CPU gives the same bits" in run("pile.py", "--backend", "cuda")
 
 
 def sweep():

@@ -23,6 +23,15 @@ FLOOR = {"shape": {"type": "half_space", "normal": [0, 1, 0], "offset": 0}, "mas
 FREE = {**BALL, "acceleration": [0, 0, 0]}
 
 
+def test_a_world_on_the_host_has_no_device_states():
+    world = jfpx.World("pile", backend="cpu")
+    with pytest.raises(jfpx.BackendUnavailable, match="has no device"):
+        world.device_states()
+    world.close()
+    with pytest.raises(jfpx.Closed):
+        world.device_states()
+
+
 def test_a_ball_falls_and_comes_to_rest_on_the_floor(dtype):
     world = jfpx.World({"bodies": [BALL, FLOOR]}, dtype=dtype)
     report = world.run(300)

@@ -97,6 +97,70 @@ TEST(Periodic, ContactsAreThoseOfTheNearestImages) {
   }
 }
 
+TEST(Periodic, BetweenTwoSetsAreTheContactsOfBothAmongThoseOfAll) {
+  Random random(base_seed());
+  const auto collider = make_sphere_collider();
+  const PeriodicCell cell{{9, 9, 9}, {true, false, true}};
+  const Spheres all = gas_in(cell, 600, 1, random);
+  constexpr SphereIndex kFirst = 250;
+  const std::span first = std::span(all).first(kFirst), second = std::span(all).subspan(kFirst);
+  std::vector<PeriodicContact> expected;
+  for (PeriodicContact c : find_periodic_contacts(*collider, all, cell)) {
+    if (c.contact.a >= kFirst || c.contact.b < kFirst) continue;
+    c.contact.b -= kFirst;
+    expected.push_back(c);
+  }
+  EXPECT_GT(expected.size(), 100u);
+  EXPECT_EQ(find_periodic_contacts_between(*collider, first, second, cell), expected)
+      << seed_note();
+}
+
+TEST(Periodic, SystemsHaveTheContactsOfTheirCells) {
+  Random random(base_seed());
+  const auto collider = make_sphere_collider();
+  const std::vector<PeriodicCell> cells{
+      {{5, 6, 7}}, {{4, 4, 4}}, {{9, 9, 9}, {true, false, true}}, {{}, {false, false, false}}};
+  const std::vector<std::uint64_t> offsets{0, 150, 150, 400, 500};
+  Spheres all;
+  std::vector<PeriodicContact> expected;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const Spheres system =
+        gas_in(i == 3 ? cells[1] : cells[i], offsets[i + 1] - offsets[i], 1, random);
+    for (PeriodicContact c : find_periodic_contacts(*collider, system, cells[i])) {
+      c.contact.a += static_cast<SphereIndex>(offsets[i]);
+      c.contact.b += static_cast<SphereIndex>(offsets[i]);
+      expected.push_back(c);
+    }
+    all.insert(all.end(), system.begin(), system.end());
+  }
+  EXPECT_GT(expected.size(), 500u);
+  EXPECT_EQ(find_periodic_contacts_in_systems(*collider, all, offsets, cells), expected)
+      << seed_note();
+}
+
+TEST(Periodic, BadSystemsAreNamed) {
+  const auto collider = make_sphere_collider();
+  Spheres spheres(5, {{}, 1});
+  const auto message = [&](const std::vector<std::uint64_t>& offsets,
+                           const std::vector<PeriodicCell>& cells) -> std::string {
+    try {
+      find_periodic_contacts_in_systems(*collider, spheres, offsets, cells);
+    } catch (const InvalidArgument& e) {
+      return e.what();
+    }
+    return "nothing was thrown";
+  };
+  const PeriodicCell good{{9, 9, 9}};
+  EXPECT_EQ(message({0, 4}, {good}), "the last offset is 4; it must be the number of spheres, 5");
+  EXPECT_EQ(message({0, 2, 5}, {good}),
+            "there are 1 periodic cells; there must be one for each of 2 systems");
+  EXPECT_EQ(message({0, 2, 5}, {good, {{9, 3, 9}}}),
+            "system 1: periodic length y is 3; it must be at least twice the cutoff, which is 2");
+  spheres[3].centre.z = Real(1e8);
+  EXPECT_EQ(message({0, 2, 5}, {good, good}),
+            "sphere 3: centre.z is 100000000; it must be within 2^20 periodic lengths");
+}
+
 TEST(Periodic, ACellThatDoesNotRepeatHasTheContactsOfTheCollider) {
   Random random(base_seed());
   const auto collider = make_sphere_collider();

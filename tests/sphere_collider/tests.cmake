@@ -52,6 +52,7 @@ if(JFPX_HAS_CUDA)
       sphere_collider/cuda/cuda_few_test.cpp
       sphere_collider/cuda/cuda_huge_test.cpp
       sphere_collider/cuda/cuda_test.cpp
+      sphere_collider/cuda/periodic_arrays_test.cpp
       support/sphere_fixtures.cpp
     LINK jfpx_cuda CUDA::cudart_static)
 endif()

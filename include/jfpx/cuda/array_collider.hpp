@@ -3,6 +3,7 @@
 #pragma once
 
 #include <jfpx/cuda/sphere_collider.hpp>
+#include <jfpx/periodic.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -58,6 +59,20 @@ class JFPX_API ArrayCollider {
   /// @param offsets in host memory
   std::uint64_t find_in_systems(const SphereArrays& spheres, std::span<const std::uint64_t> offsets,
                                 ArrayResult result, bool both_orders, Stream stream);
+  /// Finds the touching pairs in a periodic cell, as jfpx::find_periodic_contacts().
+  /// @throws InvalidArgument as that function
+  std::uint64_t find_periodic(const SphereArrays& spheres, const PeriodicCell& cell,
+                              ArrayResult result, bool both_orders, Stream stream);
+  /// The same within each of many systems, as jfpx::find_periodic_contacts_in_systems(). Tests all
+  /// pairs of each system.
+  /// @param offsets, cells in host memory
+  std::uint64_t find_periodic_in_systems(const SphereArrays& spheres,
+                                         std::span<const std::uint64_t> offsets,
+                                         std::span<const PeriodicCell> cells, ArrayResult result,
+                                         bool both_orders, Stream stream);
+  /// The same between two sets, as jfpx::find_periodic_contacts_between().
+  std::uint64_t find_periodic_between(const SphereArrays& first, const SphereArrays& second,
+                                      const PeriodicCell& cell, ArrayResult result, Stream stream);
   /// Enqueues find() without both_orders. Neither allocates nor waits, so that the call and the
   /// writes below can be captured in a CUDA graph. If the number of contacts exceeds the
   /// reservation, or a sphere is invalid, nothing is written but the count.
@@ -72,8 +87,11 @@ class JFPX_API ArrayCollider {
   /// @param normals 3 * capacity elements
   /// @throws InvalidArgument if the search was for pairs
   void write_contacts(Real* normals, Real* distances, std::size_t capacity, Stream stream);
-  /// Offsets of compressed rows, one more than the spheres of the (first) set. After find() or
-  /// find_between() only.
+  /// @param shifts 3 * capacity elements: the image of b is displaced by shift * lengths
+  /// @throws InvalidArgument if the search was not in a periodic cell
+  void write_shifts(std::int32_t* shifts, std::size_t capacity, Stream stream);
+  /// Offsets of compressed rows, one more than the spheres of the (first) set. Not after
+  /// enqueue().
   void write_offsets(std::int64_t* offsets, Stream stream);
   /// Writes {number of contacts, 1 if they are complete or else 0}.
   void write_count(std::int64_t* count, Stream stream);

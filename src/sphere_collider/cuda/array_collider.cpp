@@ -6,9 +6,10 @@
 #include "src/base/cuda/device_buffer.hpp"
 #include "src/base/cuda/probe.hpp"
 #include "src/sphere_collider/cuda/contact_arrays.hpp"
+#include "src/sphere_collider/cuda/periodic_search.hpp"
 #include "src/sphere_collider/cuda/scan.hpp"
 #include "src/sphere_collider/cuda/systems.hpp"
-#include "src/sphere_collider/sphere_input.hpp"
+#include "src/sphere_collider/periodic_input.hpp"
 
 #include <type_traits>
 #include <utility>
@@ -40,11 +41,19 @@ class OrderingEvent {
   cudaEvent_t event_ = nullptr;
 };
 
-/// Results of one kind: as found, and as selected or in both orders.
+/// Results of one kind: as found, and as selected or in both orders. A search in a periodic cell
+/// begins with the pairs among spheres and images in `derived`.
 template <class Item>
 struct Items {
   DeviceBuffer<Item> found, derived;
 };
+
+/// Calls run(std::type_identity<Item>) for the items of a kind of result.
+template <class Run>
+auto with_item(ArrayResult kind, const Run& run) {
+  return kind == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
+                                    : run(std::type_identity<SphereContact>{});
+}
 
 }  // namespace
 
@@ -54,7 +63,8 @@ struct ArrayCollider::Impl {
         stream(checked(device)),
         pool(device),
         collider(stream.get(), device, algorithm),
-        event(device) {
+        event(device),
+        periodic(pool, stream.get()) {
     counts.reserve(2, "numbers of contacts");
     counts.data()[0] = counts.data()[1] = {};
   }
@@ -75,20 +85,35 @@ struct ArrayCollider::Impl {
     }
   }
   void reserve(std::size_t n, std::size_t most_contacts);
+  void reserve_spheres(std::size_t n);
   void pack(const SphereArrays& first, const SphereArrays* second, Stream user);
   template <class Item>
-  void search(std::size_t n);
+  void search(std::size_t n, const DeviceBuffer<Item>& out, ContactCount* count);
   template <class Item>
-  void search_systems(std::size_t n);
+  void search_systems(std::size_t n, const DeviceBuffer<Item>& out, ContactCount* count,
+                      const unsigned long long* image_begins = nullptr);
   template <class Item, class Search>
-  std::uint64_t repeat_until_complete(const Search& enqueue);
+  std::uint64_t repeat_until_complete(const Search& enqueue, DeviceBuffer<Item>* out,
+                                      const ContactCount* count);
+  template <class Item>
+  std::uint64_t search_and_wait(std::size_t n, DeviceBuffer<Item>* out, ContactCount* count) {
+    const auto enqueue = [&](bool again) {
+      if (again) collider.reserve(n, out->capacity());
+      search(n, *out, count);
+    };
+    return repeat_until_complete(enqueue, out, count);
+  }
   template <class Item>
   std::uint64_t search_and_wait(std::size_t n) {
-    return repeat_until_complete<Item>([&](bool again) {
-      if (again) collider.reserve(n, items<Item>().found.capacity());
-      search<Item>(n);
-    });
+    return search_and_wait(n, &items<Item>().found, counts.data());
   }
+  template <class Item>
+  std::uint64_t search_periodic(std::size_t n, const PeriodicCell& cell);
+  template <class Item>
+  std::uint64_t search_periodic_systems(std::span<const std::uint64_t> from,
+                                        std::span<const PeriodicCell> cells);
+  template <class Item>
+  std::uint64_t keep_nearest(std::uint64_t found);
   std::uint64_t count_of(int which) const { return counts.data()[which].contacts; }
   [[noreturn]] void reject(std::uint32_t invalid);
   template <class Item>
@@ -97,7 +122,15 @@ struct ArrayCollider::Impl {
   std::uint64_t list_both_orders(std::uint64_t found, Stream user);
   void reserve_systems(std::size_t n, std::span<const std::uint64_t> from);
   template <class Item>
-  FoundItems<Item> result();
+  FoundItems<Item> found() {
+    return {.items = items<Item>().found.data(), .count = counts.data(), .b_offset = b_offset};
+  }
+  template <class Item>
+  FoundItems<Item> result() {
+    if (!is_derived) return found<Item>();
+    return {
+        .items = items<Item>().derived.data(), .count = counts.data() + 1, .b_offset = b_offset};
+  }
 
   int device;
   OwnedStream stream;
@@ -117,16 +150,25 @@ struct ArrayCollider::Impl {
   DeviceBuffer<unsigned long long> row_sums;
   DeviceBuffer<SearchState> state;
   DeviceBuffer<unsigned long long> indices;
+  PeriodicSearch periodic;
 
   // The last search.
   ArrayResult kind = ArrayResult::pairs;
-  bool is_derived = false;
+  bool is_derived = false, is_periodic = false;
   std::size_t rows = 0;
   std::uint32_t b_offset = 0;
 };
 
 void ArrayCollider::Impl::reserve(std::size_t n, std::size_t most_contacts) {
   collider.reserve(n, most_contacts);
+  reserve_spheres(n);
+}
+
+void ArrayCollider::Impl::reserve_spheres(std::size_t n) {
+  if (n > kMaxSpheres) {
+    throw InvalidArgument("number of spheres is " + std::to_string(n) + "; it must be at most " +
+                          std::to_string(kMaxSpheres));
+  }
   spheres.reserve_geometric(pool, stream.get(), n, "spheres");
 }
 
@@ -134,21 +176,30 @@ void ArrayCollider::Impl::pack(const SphereArrays& first, const SphereArrays* se
   event.order(user, stream.get());
   launch_pack(first, spheres.data(), stream.get());
   if (second != nullptr) launch_pack(*second, spheres.data() + first.count, stream.get());
-  is_derived = false;
+  is_derived = is_periodic = false;
   rows = first.count;
   b_offset = second != nullptr ? static_cast<std::uint32_t>(first.count) : 0;
 }
 
 template <class Item>
-void ArrayCollider::Impl::search(std::size_t n) {
-  DeviceBuffer<Item>& found = items<Item>().found;
+void ArrayCollider::Impl::search(std::size_t n, const DeviceBuffer<Item>& out,
+                                 ContactCount* count) {
   if constexpr (std::is_same_v<Item, SpherePair>) {
     kind = ArrayResult::pairs;
-    collider.find_pairs(spheres.data(), n, found.data(), found.capacity(), counts.data());
+    collider.find_pairs(spheres.data(), n, out.data(), out.capacity(), count);
   } else {
     kind = ArrayResult::contacts;
-    collider.find_contacts(spheres.data(), n, found.data(), found.capacity(), counts.data());
+    collider.find_contacts(spheres.data(), n, out.data(), out.capacity(), count);
   }
+}
+
+template <class Item>
+std::uint64_t ArrayCollider::Impl::search_periodic(std::size_t n, const PeriodicCell& cell) {
+  const std::size_t all = n + periodic.count_images(spheres.data(), n, cell);
+  reserve(all, 0);
+  periodic.append_images(spheres.data());
+  const std::uint64_t found = search_and_wait(all, &items<Item>().derived, counts.data() + 1);
+  return keep_nearest<Item>(found);
 }
 
 /// Reserves what search_systems() needs, and copies the offsets.
@@ -165,40 +216,66 @@ void ArrayCollider::Impl::reserve_systems(std::size_t n, std::span<const std::ui
 }
 
 template <class Item>
-void ArrayCollider::Impl::search_systems(std::size_t n) {
+void ArrayCollider::Impl::search_systems(std::size_t n, const DeviceBuffer<Item>& out,
+                                         ContactCount* count,
+                                         const unsigned long long* image_begins) {
   JFPX_CUDA_TRY(cudaMemsetAsync(state.data(), 0, sizeof(SearchState), stream.get()));
   const SystemsArgs args{.spheres = spheres.data(),
                          .n = static_cast<std::uint32_t>(n),
                          .offsets = offsets.data(),
                          .systems = systems,
+                         .image_begins = image_begins,
                          .counts = row_counts.data(),
                          .sums = row_sums.data(),
                          .state = state.data()};
   launch_count_in_systems(args, stream.get());
   exclusive_scan(row_counts.data(), row_sums.data(), n + 1, scratch.data(),
                  scan_scratch_bytes(n + 1), stream.get());
-  DeviceBuffer<Item>& found = items<Item>().found;
-  SearchOutput output{nullptr, nullptr, found.capacity(), counts.data()};
+  SearchOutput output{nullptr, nullptr, out.capacity(), count};
   if constexpr (std::is_same_v<Item, SpherePair>) {
     kind = ArrayResult::pairs;
-    output.pairs = found.data();
+    output.pairs = out.data();
   } else {
     kind = ArrayResult::contacts;
-    output.contacts = found.data();
+    output.contacts = out.data();
   }
   launch_emit_in_systems(args, output, stream.get());
 }
 
+template <class Item>
+std::uint64_t ArrayCollider::Impl::search_periodic_systems(std::span<const std::uint64_t> from,
+                                                           std::span<const PeriodicCell> cells) {
+  const std::size_t n = from.back();
+  const std::size_t images = periodic.count_images(spheres.data(), cells, from, offsets.data());
+  reserve_spheres(n + images);
+  periodic.append_images(spheres.data());
+  DeviceBuffer<Item>& out = items<Item>().derived;
+  ContactCount* const count = counts.data() + 1;
+  return keep_nearest<Item>(repeat_until_complete(
+      [&](bool) { search_systems(n, out, count, periodic.image_begins()); }, &out, count));
+}
+
+/// Makes the pairs of nearest images of those among spheres and images in `derived`.
+template <class Item>
+std::uint64_t ArrayCollider::Impl::keep_nearest(std::uint64_t found) {
+  Items<Item>& list = items<Item>();
+  periodic.keep_nearest(list.derived.data(), found, &list.found, counts.data());
+  JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
+  is_periodic = true;
+  return count_of(0);
+}
+
 /// Calls enqueue(again) until there is memory for all contacts. Returns their number.
 template <class Item, class Search>
-std::uint64_t ArrayCollider::Impl::repeat_until_complete(const Search& enqueue) {
+std::uint64_t ArrayCollider::Impl::repeat_until_complete(const Search& enqueue,
+                                                         DeviceBuffer<Item>* out,
+                                                         const ContactCount* count) {
   for (bool again = false;; again = true) {
     enqueue(again);
     JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
-    const ContactCount count = counts.data()[0];
-    if (count.first_invalid != kNoSphere) reject(count.first_invalid);
-    if (count.complete != 0) return count.contacts;
-    items<Item>().found.reserve_geometric(pool, stream.get(), count.contacts, "contacts");
+    if (count->first_invalid != kNoSphere) reject(count->first_invalid);
+    if (count->complete != 0) return count->contacts;
+    out->reserve_geometric(pool, stream.get(), count->contacts, "contacts");
   }
 }
 
@@ -245,14 +322,6 @@ std::uint64_t ArrayCollider::Impl::list_both_orders(std::uint64_t found, Stream 
   return 2 * found;
 }
 
-template <class Item>
-FoundItems<Item> ArrayCollider::Impl::result() {
-  const Items<Item>& list = items<Item>();
-  return {.items = is_derived ? list.derived.data() : list.found.data(),
-          .count = counts.data() + (is_derived ? 1 : 0),
-          .b_offset = b_offset};
-}
-
 ArrayCollider::ArrayCollider(int device, SphereAlgorithm algorithm)
     : impl_(std::make_unique<Impl>(device, algorithm)) {}
 ArrayCollider::~ArrayCollider() {
@@ -285,12 +354,10 @@ std::uint64_t ArrayCollider::find(const SphereArrays& spheres, ArrayResult resul
   const DeviceGuard guard(impl_->device);
   impl_->reserve(spheres.count, 0);
   impl_->pack(spheres, nullptr, stream);
-  const auto run = [&]<class Item>(std::type_identity<Item>) {
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_and_wait<Item>(spheres.count);
     return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
-  };
-  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
-                                      : run(std::type_identity<SphereContact>{});
+  });
 }
 
 std::uint64_t ArrayCollider::find_between(const SphereArrays& first, const SphereArrays& second,
@@ -299,32 +366,67 @@ std::uint64_t ArrayCollider::find_between(const SphereArrays& first, const Spher
   const std::size_t n = first.count + second.count;
   impl_->reserve(n, 0);
   impl_->pack(first, &second, stream);
-  const auto run = [&]<class Item>(std::type_identity<Item>) {
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_and_wait<Item>(n);
     return found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset);
-  };
-  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
-                                      : run(std::type_identity<SphereContact>{});
+  });
 }
 
 std::uint64_t ArrayCollider::find_in_systems(const SphereArrays& spheres,
                                              std::span<const std::uint64_t> offsets,
                                              ArrayResult result, bool both_orders, Stream stream) {
   detail::check_offsets(offsets, spheres.count);
-  if (spheres.count > kMaxSpheres) {
-    throw InvalidArgument("number of spheres is " + std::to_string(spheres.count) +
-                          "; it must be at most " + std::to_string(kMaxSpheres));
-  }
   const DeviceGuard guard(impl_->device);
   impl_->reserve_systems(spheres.count, offsets);
   impl_->pack(spheres, nullptr, stream);
-  const auto run = [&]<class Item>(std::type_identity<Item>) {
-    const std::uint64_t found = impl_->repeat_until_complete<Item>(
-        [&](bool) { impl_->search_systems<Item>(spheres.count); });
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
+    DeviceBuffer<Item>& out = impl_->items<Item>().found;
+    ContactCount* const count = impl_->counts.data();
+    const std::uint64_t found = impl_->repeat_until_complete(
+        [&](bool) { impl_->search_systems(spheres.count, out, count); }, &out, count);
     return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
-  };
-  return result == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
-                                      : run(std::type_identity<SphereContact>{});
+  });
+}
+
+std::uint64_t ArrayCollider::find_periodic(const SphereArrays& spheres, const PeriodicCell& cell,
+                                           ArrayResult result, bool both_orders, Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  impl_->reserve(spheres.count, 0);
+  impl_->pack(spheres, nullptr, stream);
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
+    const std::uint64_t found = impl_->search_periodic<Item>(spheres.count, cell);
+    return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
+  });
+}
+
+std::uint64_t ArrayCollider::find_periodic_in_systems(const SphereArrays& spheres,
+                                                      std::span<const std::uint64_t> offsets,
+                                                      std::span<const PeriodicCell> cells,
+                                                      ArrayResult result, bool both_orders,
+                                                      Stream stream) {
+  detail::check_offsets(offsets, spheres.count);
+  detail::check_number_of_cells(cells, offsets);
+  const DeviceGuard guard(impl_->device);
+  impl_->reserve_systems(spheres.count, offsets);
+  impl_->pack(spheres, nullptr, stream);
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
+    const std::uint64_t found = impl_->search_periodic_systems<Item>(offsets, cells);
+    return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
+  });
+}
+
+std::uint64_t ArrayCollider::find_periodic_between(const SphereArrays& first,
+                                                   const SphereArrays& second,
+                                                   const PeriodicCell& cell, ArrayResult result,
+                                                   Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  const std::size_t n = first.count + second.count;
+  impl_->reserve(n, 0);
+  impl_->pack(first, &second, stream);
+  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
+    const std::uint64_t found = impl_->search_periodic<Item>(n, cell);
+    return found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset);
+  });
 }
 
 void ArrayCollider::enqueue(const SphereArrays& spheres, ArrayResult result, Stream stream) {
@@ -335,9 +437,9 @@ void ArrayCollider::enqueue(const SphereArrays& spheres, ArrayResult result, Str
   }
   impl_->pack(spheres, nullptr, stream);
   if (result == ArrayResult::pairs) {
-    impl_->search<SpherePair>(spheres.count);
+    impl_->search(spheres.count, impl_->pairs.found, impl_->counts.data());
   } else {
-    impl_->search<SphereContact>(spheres.count);
+    impl_->search(spheres.count, impl_->contacts.found, impl_->counts.data());
   }
   impl_->event.order(impl_->stream.get(), stream);
 }
@@ -345,21 +447,17 @@ void ArrayCollider::enqueue(const SphereArrays& spheres, ArrayResult result, Str
 void ArrayCollider::write_pairs(std::int32_t* a, std::int32_t* b, std::size_t capacity,
                                 Stream stream) {
   const DeviceGuard guard(impl_->device);
-  if (impl_->kind == ArrayResult::pairs) {
-    launch_write_pairs(impl_->result<SpherePair>(), a, b, capacity, stream);
-  } else {
-    launch_write_pairs(impl_->result<SphereContact>(), a, b, capacity, stream);
-  }
+  with_item(impl_->kind, [&]<class Item>(std::type_identity<Item>) {
+    launch_write_pairs(impl_->result<Item>(), a, b, capacity, stream);
+  });
 }
 
 void ArrayCollider::write_pairs(std::int64_t* a, std::int64_t* b, std::size_t capacity,
                                 Stream stream) {
   const DeviceGuard guard(impl_->device);
-  if (impl_->kind == ArrayResult::pairs) {
-    launch_write_pairs(impl_->result<SpherePair>(), a, b, capacity, stream);
-  } else {
-    launch_write_pairs(impl_->result<SphereContact>(), a, b, capacity, stream);
-  }
+  with_item(impl_->kind, [&]<class Item>(std::type_identity<Item>) {
+    launch_write_pairs(impl_->result<Item>(), a, b, capacity, stream);
+  });
 }
 
 void ArrayCollider::write_contacts(Real* normals, Real* distances, std::size_t capacity,
@@ -371,13 +469,22 @@ void ArrayCollider::write_contacts(Real* normals, Real* distances, std::size_t c
   launch_write_contacts(impl_->result<SphereContact>(), normals, distances, capacity, stream);
 }
 
+void ArrayCollider::write_shifts(std::int32_t* shifts, std::size_t capacity, Stream stream) {
+  if (!impl_->is_periodic) {
+    throw InvalidArgument("the last search was not in a periodic cell, so it has no shifts");
+  }
+  const DeviceGuard guard(impl_->device);
+  with_item(impl_->kind, [&]<class Item>(std::type_identity<Item>) {
+    launch_write_shifts(impl_->result<Item>(), impl_->found<Item>(), impl_->periodic.shifts(),
+                        shifts, capacity, stream);
+  });
+}
+
 void ArrayCollider::write_offsets(std::int64_t* offsets, Stream stream) {
   const DeviceGuard guard(impl_->device);
-  if (impl_->kind == ArrayResult::pairs) {
-    launch_write_offsets(impl_->result<SpherePair>(), offsets, impl_->rows, stream);
-  } else {
-    launch_write_offsets(impl_->result<SphereContact>(), offsets, impl_->rows, stream);
-  }
+  with_item(impl_->kind, [&]<class Item>(std::type_identity<Item>) {
+    launch_write_offsets(impl_->result<Item>(), offsets, impl_->rows, stream);
+  });
 }
 
 void ArrayCollider::write_count(std::int64_t* count, Stream stream) {

@@ -1,28 +1,15 @@
 /// Conversions between the arrays of other libraries and those of the searches.
 #include "src/base/cuda/launch.cuh"
 #include "src/sphere_collider/cuda/contact_arrays.hpp"
+#include "src/sphere_collider/cuda/item_list.cuh"
 
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_select.cuh>
-
-#include <algorithm>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 namespace {
-
-constexpr unsigned kThreads = 256;
-/// Kernels whose number of elements is on the device loop over it with at most this many blocks.
-constexpr std::size_t kMaxBlocks = 4096;
-
-unsigned blocks_for(std::size_t n) {
-  return static_cast<unsigned>(std::min((n + kThreads - 1) / kThreads, kMaxBlocks));
-}
-
-/// Index of this thread, and the distance to its next element.
-__device__ std::size_t first_element() { return std::size_t{blockIdx.x} * kThreads + threadIdx.x; }
-__device__ std::size_t element_stride() { return std::size_t{gridDim.x} * kThreads; }
 
 /// The number of items that may be read: none unless the search was complete.
 __device__ std::size_t items_of(const ContactCount* count, std::size_t capacity) {
@@ -30,7 +17,7 @@ __device__ std::size_t items_of(const ContactCount* count, std::size_t capacity)
   return n < capacity ? n : capacity;
 }
 
-__global__ void __launch_bounds__(kThreads) pack(SphereArrays arrays, SphereInstance* spheres) {
+__global__ void __launch_bounds__(kListThreads) pack(SphereArrays arrays, SphereInstance* spheres) {
   wait_for_previous_kernel();
   for (std::size_t i = first_element(); i < arrays.count; i += element_stride()) {
     const auto row = static_cast<std::ptrdiff_t>(i);
@@ -42,7 +29,7 @@ __global__ void __launch_bounds__(kThreads) pack(SphereArrays arrays, SphereInst
 }
 
 template <class Item, class Index>
-__global__ void __launch_bounds__(kThreads)
+__global__ void __launch_bounds__(kListThreads)
     write_pairs(FoundItems<Item> found, Index* a, Index* b, std::size_t capacity) {
   wait_for_previous_kernel();
   const std::size_t n = items_of(found.count, capacity);
@@ -52,7 +39,7 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-__global__ void __launch_bounds__(kThreads)
+__global__ void __launch_bounds__(kListThreads)
     write_contacts(FoundItems<SphereContact> found, Real* normals, Real* distances,
                    std::size_t capacity) {
   wait_for_previous_kernel();
@@ -66,28 +53,13 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-/// The number of the first n items with a < row.
 template <class Item>
-__device__ std::size_t items_before_row(const Item* items, std::size_t n, std::uint64_t row) {
-  std::size_t low = 0, high = n;
-  while (low < high) {
-    const std::size_t middle = low + (high - low) / 2;
-    if (items[middle].a < row) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return low;
-}
-
-template <class Item>
-__global__ void __launch_bounds__(kThreads)
+__global__ void __launch_bounds__(kListThreads)
     write_offsets(FoundItems<Item> found, std::int64_t* offsets, std::size_t rows) {
   wait_for_previous_kernel();
   const std::size_t n = items_of(found.count, ~std::size_t{0});
   for (std::size_t i = first_element(); i <= rows; i += element_stride()) {
-    offsets[i] = static_cast<std::int64_t>(items_before_row(found.items, n, i));
+    offsets[i] = static_cast<std::int64_t>(items_before(found.items, n, i));
   }
 }
 
@@ -130,7 +102,7 @@ cudaError_t sort(void* scratch, std::size_t& bytes, const std::uint32_t* keys,
 }
 
 template <class Item>
-__global__ void __launch_bounds__(kThreads)
+__global__ void __launch_bounds__(kListThreads)
     copy_keys(const Item* items, std::size_t n, BothOrdersScratch scratch) {
   wait_for_previous_kernel();
   for (std::size_t i = first_element(); i < n; i += element_stride()) {
@@ -146,14 +118,14 @@ __device__ SphereContact opposite(const SphereContact& c) {
 
 /// Row r has the opposites of the items (a, r), sorted by a, then the items (r, b).
 template <class Item>
-__global__ void __launch_bounds__(kThreads)
+__global__ void __launch_bounds__(kListThreads)
     merge_orders(const Item* items, std::size_t n, Item* both, ContactCount* count,
                  BothOrdersScratch scratch) {
   wait_for_previous_kernel();
   for (std::size_t i = first_element(); i < n; i += element_stride()) {
     // The opposite number i comes after all items of lower rows.
     const std::uint32_t b = scratch.sorted_b[i];
-    both[i + items_before_row(items, n, b)] = opposite(items[scratch.sorted_index[i]]);
+    both[i + items_before(items, n, b)] = opposite(items[scratch.sorted_index[i]]);
     // Item i comes after all opposites of its own and of lower rows.
     const Item item = items[i];
     std::size_t low = 0, high = n;
@@ -174,28 +146,28 @@ __global__ void __launch_bounds__(kThreads)
 
 void launch_pack(const SphereArrays& arrays, SphereInstance* spheres, cudaStream_t stream) {
   if (arrays.count == 0) return;
-  launch(pack, blocks_for(arrays.count), 1, kThreads, stream, arrays, spheres);
+  launch(pack, list_blocks(arrays.count), 1, kListThreads, stream, arrays, spheres);
 }
 
 template <class Item, class Index>
 void launch_write_pairs(const FoundItems<Item>& found, Index* a, Index* b, std::size_t capacity,
                         cudaStream_t stream) {
   if (capacity == 0) return;
-  launch(write_pairs<Item, Index>, blocks_for(capacity), 1, kThreads, stream, found, a, b,
+  launch(write_pairs<Item, Index>, list_blocks(capacity), 1, kListThreads, stream, found, a, b,
          capacity);
 }
 
 void launch_write_contacts(const FoundItems<SphereContact>& found, Real* normals, Real* distances,
                            std::size_t capacity, cudaStream_t stream) {
   if (capacity == 0) return;
-  launch(write_contacts, blocks_for(capacity), 1, kThreads, stream, found, normals, distances,
+  launch(write_contacts, list_blocks(capacity), 1, kListThreads, stream, found, normals, distances,
          capacity);
 }
 
 template <class Item>
 void launch_write_offsets(const FoundItems<Item>& found, std::int64_t* offsets, std::size_t rows,
                           cudaStream_t stream) {
-  launch(write_offsets<Item>, blocks_for(rows + 1), 1, kThreads, stream, found, offsets, rows);
+  launch(write_offsets<Item>, list_blocks(rows + 1), 1, kListThreads, stream, found, offsets, rows);
 }
 
 void launch_write_count(const ContactCount* count, std::int64_t* out, cudaStream_t stream) {
@@ -227,12 +199,12 @@ void launch_select_between(const Item* items, std::size_t n, std::uint32_t bound
 template <class Item>
 void launch_both_orders(const Item* items, std::size_t n, Item* both, ContactCount* count,
                         const BothOrdersScratch& scratch, cudaStream_t stream) {
-  const unsigned blocks = std::max(1u, blocks_for(n));
-  launch(copy_keys<Item>, blocks, 1, kThreads, stream, items, n, scratch);
+  const unsigned blocks = list_blocks(n);
+  launch(copy_keys<Item>, blocks, 1, kListThreads, stream, items, n, scratch);
   std::size_t bytes = scratch.sort_bytes;
   JFPX_CUDA_TRY(sort(scratch.sort, bytes, scratch.b, scratch.sorted_b, scratch.index,
                      scratch.sorted_index, n, stream));
-  launch(merge_orders<Item>, blocks, 1, kThreads, stream, items, n, both, count, scratch);
+  launch(merge_orders<Item>, blocks, 1, kListThreads, stream, items, n, both, count, scratch);
 }
 
 #define JFPX_INSTANTIATE(Item)                                                            \

@@ -21,27 +21,12 @@ unsigned blocks_for(std::uint32_t n) {
 __device__ std::uint32_t first_sphere() { return (blockIdx.x * kThreads + threadIdx.x) / 32; }
 __device__ std::uint32_t sphere_stride() { return gridDim.x * (kThreads / 32); }
 
-/// The first offset that is greater than `a`: the end of its system.
-__device__ std::uint32_t system_end(const SystemsArgs& args, std::uint32_t a) {
-  std::uint32_t low = 1, high = args.systems;
-  while (low < high) {
-    const std::uint32_t middle = low + (high - low) / 2;
-    if (args.offsets[middle] <= a) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return static_cast<std::uint32_t>(args.offsets[low]);
-}
-
-/// Calls visit(touching lanes, b, sphere b) for each vector of later spheres of the system, whether
-/// or not this lane has one.
+/// Calls visit(touching lanes, b, sphere b) for each vector of the spheres from `begin` to `end`,
+/// whether or not this lane has one.
 template <typename Visit>
-__device__ void visit_later(const SystemsArgs& args, std::uint32_t a, const SphereInstance& sa,
-                            Visit visit) {
-  const std::uint32_t end = system_end(args, a);
-  for (std::uint32_t first = a + 1; first < end; first += 32) {
+__device__ void visit_range(const SystemsArgs& args, const SphereInstance& sa, std::uint32_t begin,
+                            std::uint32_t end, Visit visit) {
+  for (std::uint32_t first = begin; first < end; first += 32) {
     const std::uint32_t b = first + lane_id();
     SphereInstance sb{};
     bool touch = false;
@@ -51,6 +36,18 @@ __device__ void visit_later(const SystemsArgs& args, std::uint32_t a, const Sphe
     }
     visit(__ballot_sync(kFullWarp, touch), b, sb);
   }
+}
+
+/// The same for the later spheres of the system of `a`, and for their images.
+template <typename Visit>
+__device__ void visit_later(const SystemsArgs& args, std::uint32_t a, const SphereInstance& sa,
+                            Visit visit) {
+  const std::uint32_t system = system_of(args.offsets, args.systems, a);
+  const auto end = static_cast<std::uint32_t>(args.offsets[system + 1]);
+  visit_range(args, sa, a + 1, end, visit);
+  if (args.image_begins == nullptr) return;
+  visit_range(args, sa, args.n + static_cast<std::uint32_t>(args.image_begins[a + 1]),
+              args.n + static_cast<std::uint32_t>(args.image_begins[end]), visit);
 }
 
 __global__ void __launch_bounds__(kThreads) count_in_systems(SystemsArgs args) {

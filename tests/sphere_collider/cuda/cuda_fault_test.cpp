@@ -1,7 +1,8 @@
 /// Behaviour of the CUDA collider when the device or memory is missing or lost.
 #include <jfpx/error.hpp>
+#include <jfpx/periodic.hpp>
 
-#include "tests/sphere_collider/cuda/cuda_fixture.hpp"
+#include "tests/sphere_collider/cuda/device_arrays.hpp"
 
 #include <cstdio>
 
@@ -86,6 +87,31 @@ TEST_F(Cuda, AnyFailingCallIsAnErrorAndTheColliderGoesOn) {
       EXPECT_EQ(survivor->find_touching(spheres, pairs).size(), touching);
       EXPECT_TRUE(same_bits(survivor->find_contacts(spheres), expected)) << seed_note();
     }
+  }
+}
+
+TEST_F(Cuda, AnyFailingCallOfASearchOnArraysIsAnErrorAndTheColliderGoesOn) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  const Spheres spheres = make_gas(3000, Real(0.5), 6, random);
+  const DeviceSpheres arrays(spheres);
+  const PeriodicCell cell{{9, 9, 9}};
+  const std::vector<std::uint64_t> offsets{0, 1000, 3000};
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const auto search = [&](ArrayCollider& collider) {
+    collider.find_periodic_in_systems(arrays.arrays(), offsets, std::vector{cell, cell},
+                                      ArrayResult::pairs, false, stream.get());
+    return collider.find_periodic(arrays.arrays(), cell, ArrayResult::contacts, true, stream.get());
+  };
+  const std::size_t expected = 2 * find_periodic_contacts(*cpu, spheres, cell).size();
+  for (const cudaError_t error : {cudaErrorMemoryAllocation, cudaErrorLaunchOutOfResources}) {
+    with_every_call_failing(error, [&] {
+      ArrayCollider collider;  // a new one, so that buffers grow while a call fails
+      search(collider);
+    });
+    ArrayCollider survivor;
+    with_every_call_failing(error, [&] { search(survivor); });
+    EXPECT_EQ(search(survivor), expected) << seed_note();
   }
 }
 

@@ -1,0 +1,84 @@
+/// Binding of the states of a world in device memory, as arrays that share it through DLPack.
+#include <jfpx/cuda/world.hpp>
+
+#include "python/src/world.hpp"
+
+#if JFPX_HAS_CUDA
+#include "src/base/cuda/device_buffer.hpp"
+#endif
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace python {
+namespace {
+
+/// Rows of Reals in the memory of a GPU, which belong to a world.
+struct DeviceRows {
+  nb::object owner;
+  std::uint64_t changes;  ///< of the world, for which the rows are valid
+  void* data;
+  std::size_t rows, columns;
+  int device;
+};
+
+template <class Row>
+DeviceRows rows_of(const Row* data, const cuda::DeviceStates& states, nb::handle owner) {
+  return {.owner = nb::borrow(owner),
+          .changes = nb::cast<PythonWorld&>(owner).changes(),
+          .data = const_cast<Row*>(data),
+          .rows = states.slots,
+          .columns = sizeof(Row) / sizeof(Real),
+          .device = states.device};
+}
+
+/// A capsule of DLPack. It is not marked as read-only, because not every library imports such
+/// arrays.
+nb::ndarray<Real, nb::ndim<2>, nb::device::cuda> to_dlpack(const DeviceRows& self,
+                                                           const nb::kwargs& options) {
+  if (self.changes != nb::cast<PythonWorld&>(self.owner).changes()) {
+    throw InvalidArgument("the world has changed since device_states()");
+  }
+  if (options.contains("copy") && nb::bool_(nb::object(options["copy"]))) {
+    throw nb::buffer_error("states in device memory are shared, not copied");
+  }
+  return {self.data,         {self.rows, self.columns}, self.owner, {},
+          nb::dtype<Real>(), nb::device::cuda::value,   self.device};
+}
+
+}  // namespace
+
+void PythonWorld::wait_for_readers() {
+#if JFPX_HAS_CUDA
+  if (!reading_device_) return;
+  const cuda::DeviceGuard guard(*reading_device_);
+  reading_device_.reset();
+  JFPX_CUDA_TRY(cudaDeviceSynchronize());
+#endif
+}
+
+cuda::DeviceStates PythonWorld::device_states() {
+  if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
+  const cuda::DeviceStates states = cuda::device_states(*existing());
+  reading_device_ = states.device;
+  return states;
+}
+
+void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world) {
+  nb::class_<DeviceRows>(module, "DeviceRows")
+      .def("__dlpack__", &to_dlpack)
+      .def("__dlpack_device__",
+           [](const DeviceRows& self) {
+             return std::pair<int, int>(nb::device::cuda::value, self.device);
+           })
+      .def_prop_ro("shape",
+                   [](const DeviceRows& self) { return std::pair(self.rows, self.columns); });
+  world.def("device_states", [](nb::handle_t<PythonWorld> self) {
+    const cuda::DeviceStates s = nb::cast<PythonWorld&>(self).device_states();
+    return nb::make_tuple(rows_of(s.positions, s, self), rows_of(s.orientations, s, self),
+                          rows_of(s.velocities, s, self), rows_of(s.angular_velocities, s, self));
+  });
+}
+
+}  // namespace python
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,244 @@
+/// Searches in periodic cells on arrays in device memory against the functions on the host.
+#include <jfpx/error.hpp>
+#include <jfpx/periodic.hpp>
+
+#include "tests/sphere_collider/cuda/device_arrays.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+namespace {
+
+/// The result of the last search in a periodic cell, of `n` contacts.
+std::vector<PeriodicContact> periodic_of(ArrayCollider& collider, std::size_t n, Stream stream) {
+  const auto contacts = contacts_of<std::int32_t>(collider, n, stream);
+  const DeviceArray<std::int32_t> shifts(3 * n);
+  collider.write_shifts(shifts.data(), n, stream);
+  const auto host = shifts.download();
+  std::vector<PeriodicContact> result;
+  for (std::size_t i = 0; i < n; ++i) {
+    result.push_back({contacts[i], {host[3 * i], host[3 * i + 1], host[3 * i + 2]}});
+  }
+  return result;
+}
+
+/// The same of a search for pairs.
+std::vector<std::pair<SpherePair, ImageShift>> periodic_pairs_of(ArrayCollider& collider,
+                                                                 std::size_t n, Stream stream) {
+  const auto pairs = pairs_of(collider, n, stream);
+  const DeviceArray<std::int32_t> shifts(3 * n);
+  collider.write_shifts(shifts.data(), n, stream);
+  const auto host = shifts.download();
+  std::vector<std::pair<SpherePair, ImageShift>> result;
+  for (std::size_t i = 0; i < n; ++i) {
+    result.push_back({pairs[i], {host[3 * i], host[3 * i + 1], host[3 * i + 2]}});
+  }
+  return result;
+}
+std::vector<std::pair<SpherePair, ImageShift>> pairs_of(
+    const std::vector<PeriodicContact>& contacts) {
+  std::vector<std::pair<SpherePair, ImageShift>> result;
+  for (const PeriodicContact& c : contacts) {
+    result.push_back({{c.contact.a, c.contact.b}, c.shift});
+  }
+  return result;
+}
+
+/// Spheres of a cell, some of which have left it by up to three lengths; a quarter is on a lattice
+/// of half lengths, where pairs touch through two images.
+Spheres gas_in(const PeriodicCell& cell, std::size_t n, Real largest_radius, Random& random) {
+  Spheres spheres(n);
+  for (SphereInstance& s : spheres) {
+    const bool on_lattice = random.below(4) == 0;
+    for (int k = 0; k < 3; ++k) {
+      const Real cells = static_cast<Real>(random.below(7)) - 3;
+      const Real x = on_lattice ? static_cast<Real>(random.below(2)) / 2 : random.uniform(0, 1);
+      s.centre[k] = (x + cells) * cell.lengths[k];
+    }
+    s.radius = on_lattice ? largest_radius : random.uniform(largest_radius / 3, largest_radius);
+  }
+  return spheres;
+}
+
+TEST_F(Cuda, FewArraysInAPeriodicCellHaveTheContactsOfTheHost) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  for (unsigned axes = 0; axes < 8; ++axes) {
+    const PeriodicCell cell{{8, 9, Real(7.5)}, {(axes & 1) != 0, (axes & 2) != 0, (axes & 4) != 0}};
+    for (const auto& [n, radius] : {std::pair<std::size_t, Real>{0, 1},
+                                    {1, 1},
+                                    {2, 1},
+                                    {200, Real(7.5) / 4},
+                                    {1500, Real(0.5)}}) {
+      const Spheres spheres = gas_in(cell, n, radius, random);
+      const DeviceSpheres arrays(spheres);
+      const auto half = find_periodic_contacts(*cpu, spheres, cell);
+      for (const bool both : {false, true}) {
+        const auto expected = both ? in_both_orders(half, n) : half;
+        ASSERT_EQ(collider.find_periodic(arrays.arrays(), cell, ArrayResult::contacts, both,
+                                         stream.get()),
+                  expected.size())
+            << "axes " << axes << ", N = " << n << ", " << seed_note();
+        EXPECT_EQ(periodic_of(collider, expected.size(), stream.get()), expected) << seed_note();
+        ASSERT_EQ(
+            collider.find_periodic(arrays.arrays(), cell, ArrayResult::pairs, both, stream.get()),
+            expected.size());
+        EXPECT_EQ(periodic_pairs_of(collider, expected.size(), stream.get()), pairs_of(expected));
+      }
+    }
+  }
+}
+
+TEST_F(Cuda, ArraysInAPeriodicCellUseTheGridWithTheSameBits) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  for (const Real length : {Real(60), Real(300)}) {  // many and few contacts
+    const PeriodicCell cell{{length, length, length}};
+    Spheres spheres = gas_in(cell, 60'000, 1, random);
+    for (SphereInstance& s : spheres) {
+      for (int k = 0; k < 3; ++k) s.centre[k] += random.uniform(0, 40);  // off the lattice
+    }
+    const DeviceSpheres arrays(spheres);
+    const auto expected = find_periodic_contacts(*cpu, spheres, cell);
+    ASSERT_EQ(
+        collider.find_periodic(arrays.arrays(), cell, ArrayResult::contacts, false, stream.get()),
+        expected.size())
+        << seed_note();
+    EXPECT_TRUE(periodic_of(collider, expected.size(), stream.get()) == expected) << seed_note();
+  }
+}
+
+TEST_F(Cuda, FewArraysOfTwoSetsInAPeriodicCellHaveTheContactsOfTheHost) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const PeriodicCell cell{{8, 9, 7}, {true, true, false}};
+  for (const auto& [queries, points] : {std::pair{0, 7}, {7, 0}, {1, 900}, {700, 800}}) {
+    const Spheres first = gas_in(cell, static_cast<std::size_t>(queries), 1, random);
+    const Spheres second = gas_in(cell, static_cast<std::size_t>(points), Real(0.5), random);
+    const auto expected = find_periodic_contacts_between(*cpu, first, second, cell);
+    const DeviceSpheres d_first(first), d_second(second);
+    ASSERT_EQ(collider.find_periodic_between(d_first.arrays(), d_second.arrays(), cell,
+                                             ArrayResult::contacts, stream.get()),
+              expected.size())
+        << seed_note();
+    EXPECT_EQ(periodic_of(collider, expected.size(), stream.get()), expected) << seed_note();
+    ASSERT_EQ(collider.find_periodic_between(d_first.arrays(), d_second.arrays(), cell,
+                                             ArrayResult::pairs, stream.get()),
+              expected.size());
+    EXPECT_EQ(periodic_pairs_of(collider, expected.size(), stream.get()), pairs_of(expected));
+  }
+}
+
+TEST_F(Cuda, FewArraysOfSystemsInPeriodicCellsHaveTheContactsOfTheHost) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const std::vector<PeriodicCell> cells{{{8, 9, Real(7.5)}},
+                                        {{6, 6, 6}, {false, true, true}},
+                                        {{30, 30, 30}},
+                                        {{4, 4, 4}, {false, false, false}},
+                                        {{5, 5, 5}}};
+  const std::vector<std::uint64_t> offsets{0, 300, 301, 301, 500, 1200};
+  Spheres spheres;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const Spheres system =
+        gas_in(cells[i], offsets[i + 1] - offsets[i], i == 0 ? Real(7.5) / 4 : Real(0.5), random);
+    spheres.insert(spheres.end(), system.begin(), system.end());
+  }
+  const DeviceSpheres arrays(spheres);
+  const auto half = find_periodic_contacts_in_systems(*cpu, spheres, offsets, cells);
+  for (const bool both : {false, true}) {
+    const auto expected = both ? in_both_orders(half, spheres.size()) : half;
+    ASSERT_EQ(collider.find_periodic_in_systems(arrays.arrays(), offsets, cells,
+                                                ArrayResult::contacts, both, stream.get()),
+              expected.size())
+        << seed_note();
+    EXPECT_EQ(periodic_of(collider, expected.size(), stream.get()), expected) << seed_note();
+    ASSERT_EQ(collider.find_periodic_in_systems(arrays.arrays(), offsets, cells, ArrayResult::pairs,
+                                                both, stream.get()),
+              expected.size());
+    EXPECT_EQ(periodic_pairs_of(collider, expected.size(), stream.get()), pairs_of(expected));
+  }
+  const DeviceSpheres none((Spheres()));
+  EXPECT_EQ(collider.find_periodic_in_systems(none.arrays(), std::vector<std::uint64_t>{0}, {},
+                                              ArrayResult::pairs, false, stream.get()),
+            0u);
+}
+
+TEST_F(Cuda, ArraysInAPeriodicCellAreCheckedAsOnTheHost) {
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const auto message_of = [](const auto& search) -> std::string {
+    try {
+      search();
+    } catch (const InvalidArgument& e) {
+      return e.what();
+    }
+    return "no exception";
+  };
+  const auto check = [&](const PeriodicCell& cell, const Spheres& spheres) {
+    const std::string expected = message_of([&] { find_periodic_contacts(*cpu, spheres, cell); });
+    EXPECT_NE(expected, "no exception");
+    const DeviceSpheres arrays(spheres);
+    EXPECT_EQ(message_of([&] {
+                collider.find_periodic(arrays.arrays(), cell, ArrayResult::pairs, false,
+                                       stream.get());
+              }),
+              expected);
+  };
+  const Real inf = std::numeric_limits<Real>::infinity();
+  const Spheres good(40, {{}, 1});
+  Spheres invalid = good, far = good, both = good, large = good;
+  invalid[31].radius = -2;
+  far[17].centre.y = Real(1e8);
+  both[12].centre.x = Real(-1e8);
+  both[20].centre.z = inf;
+  large[39].radius = 3;
+  check({{9, 0, 9}}, good);
+  check({{9, 9, inf}}, good);
+  check({{9, 9, 9}}, invalid);
+  check({{9, 9, 9}}, far);
+  check({{9, 9, 9}}, both);
+  check({{9, Real(3.9), 9}}, good);
+  check({{9, 9, 9}}, large);
+  const Real max = std::numeric_limits<Real>::max();
+  check({{max, 9, 9}}, good);  // images would not be finite
+  const auto check_systems = [&](const std::vector<std::uint64_t>& offsets,
+                                 const std::vector<PeriodicCell>& cells, const Spheres& spheres) {
+    const std::string expected =
+        message_of([&] { find_periodic_contacts_in_systems(*cpu, spheres, offsets, cells); });
+    EXPECT_NE(expected, "no exception");
+    const DeviceSpheres arrays(spheres);
+    EXPECT_EQ(message_of([&] {
+                collider.find_periodic_in_systems(arrays.arrays(), offsets, cells,
+                                                  ArrayResult::pairs, false, stream.get());
+              }),
+              expected);
+  };
+  const PeriodicCell cell{{9, 9, 9}};
+  check_systems({0, 41}, {cell}, good);
+  check_systems({0, 20, 40}, {cell}, good);
+  check_systems({0, 20, 40}, {cell, cell}, invalid);
+  check_systems({0, 20, 40}, {cell, cell}, large);
+  check_systems({0, 20, 40}, {cell, {{9, 9, -9}}}, far);
+  check_systems({0, 20, 20, 40}, {cell, {{9, 9, -9}}, cell}, good);  // of an empty system
+  const DeviceSpheres arrays(far);
+  EXPECT_EQ(collider.find_periodic(arrays.arrays(), {{9, 9, 9}, {true, false, true}},
+                                   ArrayResult::pairs, false, stream.get()),
+            39u * 38 / 2);
+  collider.find(arrays.arrays(), ArrayResult::pairs, false, stream.get());
+  EXPECT_THROW(collider.write_shifts(nullptr, 0, stream.get()), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx
