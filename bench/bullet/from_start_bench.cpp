@@ -1,6 +1,6 @@
-/// Steps of scenes from the start, and of one that has settled: a stock Bullet world against one
-/// with all parts of jfpx, on all threads and with a GPU if there is one. Wall clock; means over
-/// all steps, by part of the step.
+/// Steps of scenes from the start, and of one that has settled, and removals of bodies: a stock
+/// Bullet world against one with all parts of jfpx, on all threads and with a GPU if there is one.
+/// Wall clock; means over all steps, by part of the step.
 ///
 /// Both worlds step alternately and end with the same state hash.
 #include "bench/bullet/ragdolls.hpp"
@@ -29,6 +29,8 @@ constexpr Case kCases[] = {{"pile", 200, {}, 7, 200},      {"pile", 1024, {}, 7,
                            {"pile", 65536, {}, 3, 90},     {"gas", 65536, {}, 5, 60},
                            {"pile", 65536, {}, 3, 30, 600}};
 constexpr int kRagdolls = 500, kRagdollSteps = 240;
+constexpr std::uint32_t kRemovalSpheres = 16384;
+constexpr int kRemovals = 1000;
 
 SceneWorldOptions our_options(unsigned threads) {
   SceneWorldOptions options;
@@ -93,6 +95,40 @@ void compare_ragdolls(benchmark::State& state, unsigned threads) {
   state.counters["manifolds"] = ours.world().getDispatcher()->getNumManifolds();
 }
 
+/// Removes one body of a falling pile after the other.
+void compare_removals(benchmark::State& state, unsigned threads) {
+  Scene scene = scenes::make("pile", {.spheres = kRemovalSpheres, .seed = 991});
+  scene.sleep.enabled = false;
+  SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock,
+                           .solver = SolverKind::stock,
+                           .world = WorldKind::stock});
+  SceneWorld ours(scene, our_options(threads));
+  const auto step_both = [&] {
+    stock.step();
+    ours.step();
+  };
+  for (int i = 0; i < 30; ++i) step_both();
+  state.counters["pairs"] = ours.world().getPairCache()->getNumOverlappingPairs();
+  const auto remove_last = [](btDiscreteDynamicsWorld& world) {
+    const double start = now_ms();
+    world.removeRigidBody(
+        btRigidBody::upcast(world.getCollisionObjectArray()[world.getNumCollisionObjects() - 1]));
+    return now_ms() - start;
+  };
+  double stock_ms = 0, our_ms = 0;
+  for (auto _ : state) {
+    stock_ms += remove_last(stock.world());
+    const double taken = remove_last(ours.world());
+    our_ms += taken;
+    state.SetIterationTime(taken * 1e-3);
+  }
+  state.counters["ratio"] = stock_ms / our_ms;
+  state.counters["removal_stock_us"] = 1e3 * stock_ms / kRemovals;
+  state.counters["removal_jfpx_us"] = 1e3 * our_ms / kRemovals;
+  step_both();
+  if (stock.state_hash() != ours.state_hash()) state.SkipWithError("the worlds differ");
+}
+
 template <class Run>
 void add(const std::string& name, int steps, const Run& run) {
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
@@ -114,6 +150,7 @@ void register_all() {
         [&c](benchmark::State& state, unsigned threads) { compare_scene(state, c, threads); });
   }
   add("ragdolls/" + std::to_string(kRagdolls), kRagdollSteps, compare_ragdolls);
+  add("removal/" + std::to_string(kRemovalSpheres), kRemovals, compare_removals);
 }
 
 }  // namespace

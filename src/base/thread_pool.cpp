@@ -1,4 +1,4 @@
-/// Implementation of ThreadPool: threads take chunks from a shared counter.
+/// Implementation of ThreadPool: threads take chunks from shared counters.
 #include "src/base/thread_pool.hpp"
 
 #include <jfpx/error.hpp>
@@ -6,9 +6,17 @@
 #include "src/base/pause.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <cfenv>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <new>
 #include <string>
 #include <system_error>
+#include <thread>
 #include <utility>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -21,6 +29,195 @@ constexpr std::uint64_t kChunksLeft = 0xffffffffu;
 
 }  // namespace
 
+/// Threads that run the loops of one or several pools, one loop at a time.
+class ThreadPool::Workers {
+ public:
+  /// Those of an existing pool that the calling thread has created with as many threads, or new
+  /// ones. @throws std::bad_alloc
+  static std::shared_ptr<Workers> shared(unsigned threads);
+
+  /// @param threads including the thread that calls run()
+  explicit Workers(unsigned threads);
+  ~Workers();
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  /// Including the thread that calls run().
+  unsigned threads() const noexcept { return thread_count_; }
+  /// Number of threads that were requested.
+  unsigned requested() const noexcept { return requested_; }
+
+  /// Returns false if a loop is running.
+  bool acquire() noexcept { return !busy_.exchange(true, std::memory_order_acquire); }
+  void release() noexcept { busy_.store(false, std::memory_order_release); }
+  /// Requires acquire(). @return the exception of the lowest chunk that threw one
+  std::exception_ptr run(const Loop& loop);
+
+ private:
+  /// Part of a loop, with at most as many chunks as a ticket can count.
+  struct Job {
+    Loop loop;
+    std::size_t first = 0;      ///< number of the first chunk
+    std::fenv_t environment{};  ///< of the calling thread
+  };
+  /// Chunks of a thread.
+  struct alignas(64) Ticket {
+    /// Number of the job in the upper half, number of chunks that are not taken in the lower half.
+    std::atomic<std::uint64_t> value{0};
+  };
+
+  void run_job(const Job& job);
+  void work(unsigned self);
+  void wait_for_job(std::uint32_t* seen) const;
+  void take_chunks(unsigned self);
+  void take_chunks_of(unsigned owner, bool is_worker, std::uint32_t* prepared);
+  void run_chunk(std::size_t chunk);
+  std::size_t first_chunk(unsigned owner) const;
+
+  /// The job that runs. A thread may read it only after it has taken a chunk, and until that chunk
+  /// is done, because the next job overwrites it.
+  Job job_;
+  unsigned requested_, thread_count_ = 1;
+  unsigned polls_ = 0;                 ///< number of times that a worker polls before it sleeps
+  std::unique_ptr<Ticket[]> tickets_;  ///< by thread; 0 is the caller
+  std::atomic<bool> busy_{false};
+  alignas(64) std::atomic<std::uint32_t> number_{0};  ///< of the last job
+  alignas(64) std::atomic<std::uint32_t> done_{0};    ///< chunks of the job that are complete
+  std::atomic<bool> stopped_{false};
+
+  std::mutex error_mutex_;
+  std::exception_ptr error_;
+  std::size_t error_chunk_ = 0;
+  std::vector<std::thread> workers_;
+};
+
+std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::shared(unsigned threads) {
+  thread_local std::vector<std::weak_ptr<Workers>> known;
+  std::erase_if(known, [](const auto& workers) { return workers.expired(); });
+  for (const auto& candidate : known) {
+    std::shared_ptr<Workers> workers = candidate.lock();
+    if (workers != nullptr && workers->requested() == threads) return workers;
+  }
+  auto workers = std::make_shared<Workers>(threads);
+  known.push_back(workers);
+  return workers;
+}
+
+ThreadPool::Workers::Workers(unsigned threads) : requested_(threads) {
+  // A worker that polls must not take the core of another thread.
+  if (threads <= std::thread::hardware_concurrency()) polls_ = kPolls;
+  tickets_ = std::make_unique<Ticket[]>(threads);
+  workers_.reserve(threads - 1);
+  try {
+    for (unsigned self = 1; self < threads; ++self) {
+      workers_.emplace_back([this, self] { work(self); });
+      ++thread_count_;
+    }
+  } catch (const std::exception&) {
+    // Results do not depend on the number of threads, so the pool works with those that started.
+  }
+}
+
+ThreadPool::Workers::~Workers() {
+  stopped_ = true;
+  ++number_;
+  number_.notify_all();
+  for (std::thread& worker : workers_) worker.join();
+}
+
+std::exception_ptr ThreadPool::Workers::run(const Loop& loop) {
+  Job job;
+  std::fegetenv(&job.environment);
+  // Loops over more chunks than a ticket can count run in parts.
+  constexpr std::size_t kMaxChunks = 0xffffffffu;
+  for (job.first = 0; job.first < loop.chunks; job.first += kMaxChunks) {
+    job.loop = loop;
+    job.loop.chunks = std::min(loop.chunks - job.first, kMaxChunks);
+    run_job(job);
+  }
+  return std::exchange(error_, nullptr);
+}
+
+void ThreadPool::Workers::run_job(const Job& job) {
+  job_ = job;
+  done_.store(0, std::memory_order_relaxed);
+  const std::uint32_t number = number_.load(std::memory_order_relaxed) + 1;
+  for (unsigned owner = 0; owner < thread_count_; ++owner) {
+    const std::uint64_t chunks = first_chunk(owner + 1) - first_chunk(owner);
+    tickets_[owner].value.store(std::uint64_t{number} << 32 | chunks, std::memory_order_release);
+  }
+  number_.store(number);
+  number_.notify_all();
+  take_chunks(0);
+  // Workers that have taken no chunk are not waited for: on a loaded machine that would take longer
+  // than the loop.
+  const auto chunks = static_cast<std::uint32_t>(job.loop.chunks);
+  for (unsigned i = 0;; ++i) {
+    const std::uint32_t done = done_.load(std::memory_order_acquire);
+    if (done == chunks) break;
+    if (i < polls_) {
+      pause();
+    } else {
+      done_.wait(done, std::memory_order_acquire);
+    }
+  }
+}
+
+void ThreadPool::Workers::work(unsigned self) {
+  std::uint32_t seen = 0;
+  for (wait_for_job(&seen); !stopped_; wait_for_job(&seen)) take_chunks(self);
+}
+
+/// @param seen number of the last job
+void ThreadPool::Workers::wait_for_job(std::uint32_t* seen) const {
+  const std::uint32_t last = *seen;
+  for (unsigned i = 0; i < polls_ && number_.load() == last; ++i) pause();
+  number_.wait(last);
+  *seen = number_.load();
+}
+
+/// The first chunk of a thread, among those of the job; for `owner` = thread_count_, their end.
+std::size_t ThreadPool::Workers::first_chunk(unsigned owner) const {
+  return job_.loop.chunks * owner / thread_count_;
+}
+
+/// Takes the chunks of thread `self`, then those that other threads have left.
+void ThreadPool::Workers::take_chunks(unsigned self) {
+  std::uint32_t prepared = 0;  // number of the job whose environment the thread has
+  for (unsigned i = 0; i < thread_count_; ++i) {
+    take_chunks_of((self + i) % thread_count_, self > 0, &prepared);
+  }
+}
+
+/// @param is_worker whether the thread must take over the floating-point environment of the caller
+void ThreadPool::Workers::take_chunks_of(unsigned owner, bool is_worker, std::uint32_t* prepared) {
+  std::atomic<std::uint64_t>& value = tickets_[owner].value;
+  std::uint64_t ticket = value.load();
+  while ((ticket & kChunksLeft) != 0) {
+    if (!value.compare_exchange_weak(ticket, ticket - 1)) continue;
+    const auto number = static_cast<std::uint32_t>(ticket >> 32);
+    if (is_worker && *prepared != number) std::fesetenv(&job_.environment);
+    *prepared = number;
+    run_chunk(job_.first + first_chunk(owner + 1) - (ticket & kChunksLeft));
+    ticket = value.load();
+  }
+}
+
+void ThreadPool::Workers::run_chunk(std::size_t chunk) {
+  const auto chunks = static_cast<std::uint32_t>(job_.loop.chunks);
+  try {
+    job_.loop.call(job_.loop.body, chunk);
+  } catch (...) {
+    const std::lock_guard lock(error_mutex_);
+    if (!error_ || chunk < error_chunk_) {
+      error_ = std::current_exception();
+      error_chunk_ = chunk;
+    }
+  }
+  // After the last chunk, the next job may begin at once and overwrite this one.
+  if (done_.fetch_add(1, std::memory_order_acq_rel) + 1 == chunks) done_.notify_one();
+}
+
 void ThreadPool::check(unsigned threads) {
   if (threads <= kMaxThreads) return;
   throw InvalidArgument("threads is " + std::to_string(threads) +
@@ -30,131 +227,27 @@ void ThreadPool::check(unsigned threads) {
 ThreadPool::ThreadPool(unsigned threads) {
   check(threads);
   if (threads == 0) threads = std::clamp(std::thread::hardware_concurrency(), 1u, kMaxThreads);
-  // A worker that polls must not take the core of another thread.
-  if (threads <= std::thread::hardware_concurrency()) polls_ = kPolls;
-  tickets_ = std::make_unique<Ticket[]>(threads);
-  workers_.reserve(threads - 1);
-  try {
-    for (unsigned self = 1; self < threads; ++self) {
-      workers_.emplace_back([this, self](const std::stop_token& stop) { work(stop, self); });
-      ++thread_count_;
+  if (threads > 1) workers_ = Workers::shared(threads);
+}
+ThreadPool::~ThreadPool() = default;
+
+unsigned ThreadPool::threads() const noexcept {
+  return workers_ == nullptr ? 1 : workers_->threads();
+}
+
+void ThreadPool::run_shared(const Loop& loop) {
+  if (!workers_->acquire()) {
+    try {
+      workers_ = std::make_shared<Workers>(workers_->requested());
+    } catch (const std::bad_alloc&) {
+      for (std::size_t i = 0; i < loop.chunks; ++i) loop.call(loop.body, i);
+      return;
     }
-  } catch (const std::system_error&) {
-    // Results do not depend on the number of threads, so the pool works with those that started.
+    workers_->acquire();
   }
-}
-
-ThreadPool::~ThreadPool() {
-  for (std::jthread& worker : workers_) worker.request_stop();
-}
-
-void ThreadPool::run_shared(Job job) {
-  std::fegetenv(&job.environment);
-  constexpr std::size_t kMaxChunks = 0xffffffffu;
-  // Loops over more chunks than a ticket can count run in parts.
-  const Job whole = job;
-  for (std::size_t first = 0; first < whole.chunks; first += kMaxChunks) {
-    job.first = first;
-    job.chunks = std::min(whole.chunks - first, kMaxChunks);
-    run_part(job);
-  }
-  if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
-}
-
-void ThreadPool::run_part(const Job& job) {
-  job_ = job;
-  done_.store(0, std::memory_order_relaxed);
-  const std::uint32_t loop = loop_.load(std::memory_order_relaxed) + 1;
-  for (unsigned owner = 0; owner < thread_count_; ++owner) {
-    const std::uint64_t chunks = first_chunk(owner + 1) - first_chunk(owner);
-    tickets_[owner].value.store(std::uint64_t{loop} << 32 | chunks, std::memory_order_release);
-  }
-  loop_.store(loop);
-  if (sleepers_.load() > 0) {
-    // A worker between its last look at the loop and its wait holds the mutex.
-    { const std::lock_guard lock(mutex_); }
-    started_.notify_all();
-  }
-  take_chunks(0);
-  // Workers that have taken no chunk are not waited for: on a loaded machine that would take longer
-  // than the loop.
-  const auto chunks = static_cast<std::uint32_t>(job.chunks);
-  for (unsigned i = 0;; ++i) {
-    const std::uint32_t done = done_.load(std::memory_order_acquire);
-    if (done == chunks) return;
-    if (i < polls_) {
-      pause();
-    } else {
-      done_.wait(done, std::memory_order_acquire);
-    }
-  }
-}
-
-void ThreadPool::work(const std::stop_token& stop, unsigned self) {
-  std::uint32_t seen = 0;
-  while (wait_for_loop(stop, &seen)) take_chunks(self);
-}
-
-/// Returns false if the pool is being destroyed. @param seen number of the last loop
-bool ThreadPool::wait_for_loop(const std::stop_token& stop, std::uint32_t* seen) {
-  const auto is_new = [&] {
-    const std::uint32_t loop = loop_.load();
-    if (loop == *seen) return false;
-    *seen = loop;
-    return true;
-  };
-  for (unsigned i = 0; i < polls_; ++i) {
-    if (is_new()) return true;
-    if (stop.stop_requested()) return false;
-    pause();
-  }
-  std::unique_lock lock(mutex_);
-  ++sleepers_;
-  const bool started = started_.wait(lock, stop, is_new);
-  --sleepers_;
-  return started;
-}
-
-/// The first chunk of a thread, among those of the loop; for `owner` = thread_count_, their end.
-std::size_t ThreadPool::first_chunk(unsigned owner) const {
-  return job_.chunks * owner / thread_count_;
-}
-
-/// Takes the chunks of thread `self`, then those that other threads have left.
-void ThreadPool::take_chunks(unsigned self) {
-  std::uint32_t prepared = 0;  // number of the loop whose environment the thread has
-  for (unsigned i = 0; i < thread_count_; ++i) {
-    take_chunks_of((self + i) % thread_count_, self > 0, &prepared);
-  }
-}
-
-/// @param is_worker whether the thread must take over the floating-point environment of the caller
-void ThreadPool::take_chunks_of(unsigned owner, bool is_worker, std::uint32_t* prepared) {
-  std::atomic<std::uint64_t>& value = tickets_[owner].value;
-  std::uint64_t ticket = value.load();
-  while ((ticket & kChunksLeft) != 0) {
-    if (!value.compare_exchange_weak(ticket, ticket - 1)) continue;
-    const auto loop = static_cast<std::uint32_t>(ticket >> 32);
-    if (is_worker && *prepared != loop) std::fesetenv(&job_.environment);
-    *prepared = loop;
-    run_chunk(job_.first + first_chunk(owner + 1) - (ticket & kChunksLeft));
-    ticket = value.load();
-  }
-}
-
-void ThreadPool::run_chunk(std::size_t chunk) {
-  const auto chunks = static_cast<std::uint32_t>(job_.chunks);
-  try {
-    job_.call(job_.body, chunk);
-  } catch (...) {
-    const std::lock_guard lock(mutex_);
-    if (!error_ || chunk < error_chunk_) {
-      error_ = std::current_exception();
-      error_chunk_ = chunk;
-    }
-  }
-  // After the last chunk, the next loop may begin at once and overwrite the job.
-  if (done_.fetch_add(1, std::memory_order_acq_rel) + 1 == chunks) done_.notify_one();
+  const std::exception_ptr error = workers_->run(loop);
+  workers_->release();
+  if (error) std::rethrow_exception(error);
 }
 
 }  // namespace JFPX_ABI

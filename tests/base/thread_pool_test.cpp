@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cfenv>
 #include <chrono>
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -72,6 +75,69 @@ TEST(ThreadPool, ComputesInTheFloatingPointEnvironmentOfTheCaller) {
     std::fesetround(FE_TONEAREST);
     EXPECT_EQ(modes, std::vector<int>(kChunks, mode));
   }
+}
+
+/// The threads that take part in a loop.
+std::set<std::thread::id> threads_of(ThreadPool& pool) {
+  std::vector<std::thread::id> ids(4 * pool.threads());
+  std::atomic<unsigned> started{0};
+  pool.run(ids.size(), [&](std::size_t i) {
+    ids[i] = std::this_thread::get_id();
+    // The first chunk of each thread takes until all threads have begun.
+    for (++started; started < pool.threads();) std::this_thread::yield();
+  });
+  return {ids.begin(), ids.end()};
+}
+
+TEST(ThreadPool, SharesTheThreadsOfPoolsOfEqualSize) {
+  ThreadPool first(3), second(3), larger(4);
+  const auto threads = threads_of(first);
+  EXPECT_EQ(threads.size(), 3u);
+  EXPECT_EQ(threads_of(second), threads);
+  EXPECT_EQ(threads_of(larger).size(), 4u);
+  EXPECT_EQ(threads_of(first), threads);
+  std::set<std::thread::id> others;
+  std::thread([&] {
+    ThreadPool pool(3);
+    others = threads_of(pool);
+  }).join();
+  for (const std::thread::id id : others) EXPECT_FALSE(threads.contains(id));
+}
+
+TEST(ThreadPool, RunsALoopWithinALoopOfAnotherPool) {
+  ThreadPool outer(3);
+  std::vector<int> runs(20 * 30);
+  outer.run(20, [&](std::size_t i) {
+    ThreadPool inner(3);
+    inner.run(30, [&](std::size_t k) { ++runs[30 * i + k]; });
+  });
+  EXPECT_EQ(runs, std::vector<int>(runs.size(), 1));
+  ThreadPool inner(3);  // shares the workers of `outer`, and is used by its first chunk
+  std::vector<int> nested(30);
+  outer.run(20, [&](std::size_t i) {
+    if (i == 0) inner.run(30, [&](std::size_t k) { ++nested[k]; });
+  });
+  EXPECT_EQ(nested, std::vector<int>(30, 1));
+  EXPECT_EQ(threads_of(inner).size(), 3u);
+}
+
+TEST(ThreadPool, SeparatesPoolsWhoseLoopsRunAtTheSameTime) {
+  ThreadPool first(2), second(2);
+  std::atomic<int> inside{0};
+  // Each loop ends only after the other one has begun.
+  const auto meet = [&](ThreadPool& pool) {
+    pool.run(2, [&](std::size_t i) {
+      if (i != 0) return;
+      for (++inside; inside < 2;) std::this_thread::yield();
+    });
+  };
+  std::thread other([&] { meet(second); });
+  meet(first);
+  other.join();
+  EXPECT_EQ(inside, 2);
+  const auto a = threads_of(first), b = threads_of(second);
+  EXPECT_EQ(std::count_if(a.begin(), a.end(), [&](auto id) { return b.contains(id); }), 1)
+      << "only the calling thread belongs to both";
 }
 
 /// Sets flush-to-zero of the calling thread.

@@ -2,6 +2,7 @@
 #include "src/bullet/world/aabb_update.hpp"
 
 #include "src/bullet/world/pair_cleanup.hpp"
+#include "src/bullet/world/proxy_removal.hpp"
 #include "tests/bullet/arena.hpp"
 #include "tests/bullet/twin_worlds.hpp"
 
@@ -45,6 +46,13 @@ class TreeDump {
     add("pair capacity", pairs.capacity());
     for (int i = 0; i < pairs.size(); ++i) add("next", (cache.*PairTables::next)[i]);
     for (int i = 0; i < pairs.capacity(); ++i) add("head", (cache.*PairTables::heads)[i]);
+  }
+  void add_manifolds(btDispatcher& dispatcher) {
+    for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
+      const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
+      add("manifold", manifold.getBody0()->getWorldArrayIndex());
+      add("manifold with", manifold.getBody1()->getWorldArrayIndex());
+    }
   }
   void add_ghosts(btCollisionWorld& world) {
     for (int i = 0; i < world.getNumCollisionObjects(); ++i) {
@@ -139,6 +147,7 @@ class BoxWorld {
   int count() { return world_->getNumCollisionObjects(); }
   int updated() const { return updated_; }
   int cleaned() const { return cleaned_; }
+  int removed() const { return removed_; }
   void select_arena() { arena_.select(); }
 
   void add(std::unique_ptr<btCollisionShape> shape, const btVector3& position, int flags, int group,
@@ -152,7 +161,10 @@ class BoxWorld {
     shapes_.push_back(std::move(shape));
     objects_.push_back(std::move(object));
   }
-  void remove(int i) { world_->removeCollisionObject(&object(i)); }
+  void remove(int i) {
+    if (is_ours_ && removal_.run(*world_, object(i), pool_)) ++removed_;
+    world_->removeCollisionObject(&object(i));
+  }
   void update_aabbs() {
     if (!is_ours_) {
       world_->updateAabbs();
@@ -177,8 +189,9 @@ class BoxWorld {
   ThreadPool pool_;
   AabbUpdate update_;
   PairCleanup cleanup_{0};
+  ProxyRemoval removal_;
   bool is_ours_;
-  int updated_ = 0, cleaned_ = 0;
+  int updated_ = 0, cleaned_ = 0, removed_ = 0;
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;
   std::vector<std::unique_ptr<btCollisionObject>> objects_;
   std::unique_ptr<btDefaultCollisionConfiguration> configuration_;
@@ -209,14 +222,16 @@ class BoxTwins {
     return compare();
   }
 
- private:
   std::optional<std::string> compare() {
     TreeDump stock(stock_.tree()), ours(ours_.tree());
     stock.add_ghosts(stock_.world());
     ours.add_ghosts(ours_.world());
+    stock.add_manifolds(*stock_.world().getDispatcher());
+    ours.add_manifolds(*ours_.world().getDispatcher());
     return stock.first_difference(ours);
   }
 
+ private:
   BoxWorld stock_, ours_;
 };
 
@@ -451,6 +466,31 @@ class UserSphere : public btSphereShape {
   }
   static inline int calls = 0;
 };
+
+TEST(ProxyRemoval, HasStocksPairsWhenHundredsOfBodiesAreRemoved) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Random random(seed);
+  for (const int bodies : {60, 400}) {  // 400 bodies have more pairs than one thread searches
+    BoxTwins twins({.threads = 3});
+    twins.both([&](BoxWorld& w) {
+      Random places(seed);
+      for (int i = 0; i < bodies; ++i) {
+        w.add(std::make_unique<btSphereShape>(Real(0.5)), random_place(places, Real(0.5)), 0, 1,
+              -1);
+      }
+    });
+    ASSERT_FALSE(twins.step());
+    for (int left = bodies; left > 0; --left) {
+      const auto i = static_cast<int>(random.below(static_cast<std::uint64_t>(left)));
+      twins.both([&](BoxWorld& w) { w.remove(i); });
+      if (left % 20 != 0) continue;
+      const auto difference = twins.compare();
+      ASSERT_FALSE(difference) << left << " of " << bodies << " bodies: " << *difference;
+    }
+    EXPECT_EQ(twins.ours().removed(), bodies);
+  }
+}
 
 TEST(AabbUpdate, UpdatesOneByOneWhatItCannotComputeInAdvance) {
   const Real nan = std::numeric_limits<Real>::quiet_NaN();

@@ -20,8 +20,8 @@ struct DynamicsWorldOptions {
 
 /// A btDiscreteDynamicsWorld that sorts manifolds by island with compact keys instead of through
 /// pointers, predicts and integrates bodies in parallel, and finds the overlapping pairs of a
-/// btDbvtBroadphase in parallel. Pairs, groups, their order, sleeping, velocities and
-/// transforms are those of btDiscreteDynamicsWorld, bit for bit.
+/// btDbvtBroadphase, and those of an object to remove, in parallel. Pairs, groups, their order,
+/// sleeping, velocities and transforms are those of btDiscreteDynamicsWorld, bit for bit.
 ///
 /// In steps with continuous collision of any body, bodies are integrated one at a time, because the
 /// sweep of each body depends on the new positions of the bodies before it. All overrides and calls
@@ -50,6 +50,8 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
   void updateAabbs() override;
   void computeOverlappingPairs() override;
   void solveConstraints(btContactSolverInfo& info) override;
+  void removeCollisionObject(btCollisionObject* object) override;
+  void removeRigidBody(btRigidBody* body) override;
 
   std::size_t minimum_batch() const noexcept;
   /// Must not be called during a step.

@@ -7,6 +7,7 @@
 #include "src/bullet/world/aabb_update.hpp"
 #include "src/bullet/world/islands.hpp"
 #include "src/bullet/world/pair_cleanup.hpp"
+#include "src/bullet/world/proxy_removal.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
 #include <LinearMath/btQuickprof.h>
@@ -37,6 +38,7 @@ struct DynamicsWorld::Impl {
   IslandSolver islands;
   AabbUpdate boxes;
   PairCleanup cleanup;
+  ProxyRemoval removal;
   std::size_t minimum_batch;
 
   explicit Impl(const DynamicsWorldOptions& options)
@@ -133,6 +135,17 @@ void DynamicsWorld::computeOverlappingPairs() {
   if (is_small() || !impl_->cleanup.run(*this, impl_->pool)) {
     btDiscreteDynamicsWorld::computeOverlappingPairs();
   }
+}
+
+// Bullet's functions do nothing to the broadphase for an object without a proxy.
+void DynamicsWorld::removeCollisionObject(btCollisionObject* object) {
+  if (!is_small()) impl_->removal.run(*this, *object, impl_->pool);
+  btDiscreteDynamicsWorld::removeCollisionObject(object);
+}
+
+void DynamicsWorld::removeRigidBody(btRigidBody* body) {
+  if (!is_small()) impl_->removal.run(*this, *body, impl_->pool);
+  btDiscreteDynamicsWorld::removeRigidBody(body);
 }
 
 bool DynamicsWorld::has_stock_island_manager() const noexcept {

@@ -24,8 +24,14 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr int kManifoldsPerChunk = 4096, kObjectsPerChunk = 1024;
-constexpr std::size_t kPairsPerChunk = 4096;
+constexpr int kManifoldsPerChunk = 1024, kObjectsPerChunk = 1024;
+constexpr std::size_t kPairsPerChunk = 1024;
+/// Numbers from which several threads process them; waking threads takes longer than fewer.
+constexpr int kSharedManifolds = 4096;
+constexpr std::size_t kSharedPairs = 4096;
+
+int manifold_chunk(int count) { return count < kSharedManifolds ? count : kManifoldsPerChunk; }
+int chunks_of(int count, int chunk) { return count == 0 ? 0 : (count + chunk - 1) / chunk; }
 
 /// As btUnionFind::find(), without compressing paths, so that threads may search concurrently.
 int root_of(const btUnionFind& unions, int x) {
@@ -136,19 +142,20 @@ void IslandSolver::number_and_unite(btCollisionWorld& world, btUnionFind* unions
   const auto count = static_cast<std::size_t>(cache->getNumOverlappingPairs());
   if (count == 0) return;
   const std::span pairs(cache->getOverlappingPairArrayPtr(), count);
-  if (pool_.threads() == 1 || count <= kPairsPerChunk) {
-    for_each_union(pairs, [&](int a, int b) { unions->unite(a, b); });
-    return;
-  }
-  // Most pairs of later rounds connect objects that earlier rounds have united.
-  for (std::size_t first = 0; first < count; first += pairs_per_round_) {
+  // The first pairs unite most objects, so most of the others connect objects of one set. Threads
+  // discard those.
+  const auto objects = static_cast<std::size_t>(numbers_.back());
+  std::size_t first = std::min(count, 2 * objects);
+  if (pool_.threads() == 1 || count - first < kSharedPairs) first = count;
+  for_each_union(pairs.first(first), [&](int a, int b) { unions->unite(a, b); });
+  for (; first < count; first += pairs_per_round_) {
+    point_to_roots(unions);
     const int edges =
         find_edges(pairs.subspan(first, std::min(pairs_per_round_, count - first)), *unions);
     for (int i = 0; i < edges; ++i) {
       const Edge& edge = edges_[static_cast<std::size_t>(i)];
       unions->unite(edge.a, edge.b);
     }
-    point_to_roots(unions);
   }
 }
 
@@ -331,14 +338,13 @@ void IslandSolver::collect_manifolds(btCollisionWorld& world) {
 
 /// Parallel version for a plain dispatcher. Returns false if kinematic objects may wake others.
 bool IslandSolver::collect_in_parallel(btDispatcher& dispatcher, bool only_touching) {
-  constexpr int kChunk = kManifoldsPerChunk;
   const int count = dispatcher.getNumManifolds();
-  const int chunks = (count + kChunk - 1) / kChunk;
+  const int size = manifold_chunk(count), chunks = chunks_of(count, size);
   btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();
   chunk_counts_.assign(static_cast<std::size_t>(chunks), 0);
   std::atomic<bool> kinematic{false};
   pool_.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
-    const int first = static_cast<int>(chunk) * kChunk, last = std::min(count, first + kChunk);
+    const int first = static_cast<int>(chunk) * size, last = std::min(count, first + size);
     bool seen = false;
     int next = first;
     for (int i = first; i < last; ++i) {
@@ -354,10 +360,10 @@ bool IslandSolver::collect_in_parallel(btDispatcher& dispatcher, bool only_touch
   if (kinematic) return false;
   count_ = 0;
   for (int chunk = 0; chunk < chunks; ++chunk) {
-    const int size = chunk_counts_[static_cast<std::size_t>(chunk)];
-    std::copy_n(found_.data() + chunk * kChunk, size, found_.data() + count_);
-    std::copy_n(found_island_.data() + chunk * kChunk, size, found_island_.data() + count_);
-    count_ += size;
+    const int found = chunk_counts_[static_cast<std::size_t>(chunk)];
+    std::copy_n(found_.data() + chunk * size, found, found_.data() + count_);
+    std::copy_n(found_island_.data() + chunk * size, found, found_island_.data() + count_);
+    count_ += found;
   }
   return true;
 }
@@ -393,10 +399,10 @@ void IslandSolver::sort_manifolds(bool by_pair) {
 void IslandSolver::add_manifolds(int first, int last) {
   const std::size_t before = manifolds_.size();
   manifolds_.resize(before + static_cast<std::size_t>(last - first));
-  const int chunks = (last - first + kManifoldsPerChunk - 1) / kManifoldsPerChunk;
+  const int size = manifold_chunk(last - first), chunks = chunks_of(last - first, size);
   pool_.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
-    const int begin = first + static_cast<int>(chunk) * kManifoldsPerChunk;
-    const int end = std::min(last, begin + kManifoldsPerChunk);
+    const int begin = first + static_cast<int>(chunk) * size;
+    const int end = std::min(last, begin + size);
     for (int k = begin; k < end; ++k) {
       manifolds_[before + static_cast<std::size_t>(k - first)] =
           found_[static_cast<std::size_t>(keys_[k].index)];

@@ -160,6 +160,13 @@ void apply_update(btDbvtBroadphase& tree, const LeafUpdate& leaf) {
   prepend_to_list(proxy, tree.m_stageRoots[tree.m_stageCurrent]);
 }
 
+void remove_leaf(btDbvtBroadphase& tree, btDbvtProxy* proxy) {
+  const bool fixed = proxy->stage == btDbvtBroadphase::STAGECOUNT;
+  tree.m_sets[fixed ? btDbvtBroadphase::FIXED_SET : btDbvtBroadphase::DYNAMIC_SET].remove(
+      proxy->leaf);
+  remove_from_list(proxy, tree.m_stageRoots[proxy->stage]);
+}
+
 bool is_visited_before(const btDbvtNode* a, const btDbvtNode* b) {
   int depth_a = depth_of(a), depth_b = depth_of(b);
   for (; depth_a > depth_b; --depth_a) a = a->parent;

@@ -39,6 +39,9 @@ LeafObstacle compute_update(btCollisionWorld& world, const btDbvtBroadphase& tre
 /// overlaps.
 void apply_update(btDbvtBroadphase& tree, const LeafUpdate& leaf);
 
+/// Removes the leaf of a proxy, as btDbvtBroadphase::destroyProxy() does.
+void remove_leaf(btDbvtBroadphase& tree, btDbvtProxy* proxy);
+
 /// Whether a search of the tree visits leaf `a` before leaf `b` of the same tree: Bullet descends
 /// into the second child of a node first.
 bool is_visited_before(const btDbvtNode* a, const btDbvtNode* b);

@@ -1,0 +1,103 @@
+/// Follows btCollisionWorld::removeCollisionObject(), btDbvtBroadphase::destroyProxy() and
+/// btHashedOverlappingPairCache of Bullet 3.24.
+#include "src/bullet/world/proxy_removal.hpp"
+
+#include "src/base/reserve.hpp"
+#include "src/bullet/exact_class.hpp"
+#include "src/bullet/world/leaf_update.hpp"
+#include "src/bullet/world/plain_dispatcher.hpp"
+#include "src/bullet/world/plain_ghosts.hpp"
+
+#include <LinearMath/btAlignedAllocator.h>
+
+#include <algorithm>
+#include <new>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+constexpr int kPairsPerChunk = 8192;
+/// Number of pairs from which several threads search them; waking threads takes longer than fewer.
+constexpr int kSharedPairs = 65536;
+
+}  // namespace
+
+bool ProxyRemoval::run(btCollisionWorld& world, btCollisionObject& object, ThreadPool& pool) {
+  auto* proxy = static_cast<btDbvtProxy*>(object.getBroadphaseHandle());
+  btDispatcher* dispatcher = world.getDispatcher();
+  btBroadphaseInterface* broadphase = world.getBroadphase();
+  if (proxy == nullptr || dispatcher == nullptr || broadphase == nullptr) return false;
+  if (!is_exactly<btDbvtBroadphase>(*broadphase)) return false;
+  auto& tree = static_cast<btDbvtBroadphase&>(*broadphase);
+  if (!is_exactly<btHashedOverlappingPairCache>(*tree.m_paircache)) return false;
+  auto& cache = static_cast<btHashedOverlappingPairCache&>(*tree.m_paircache);
+  if (!is_plain(*dispatcher) || gContactDestroyedCallback != nullptr ||
+      gContactEndedCallback != nullptr || !has_plain_ghosts(world, cache)) {
+    return false;
+  }
+  btBroadphasePairArray& pairs = cache.getOverlappingPairArray();
+  if (!find_pairs(pairs, proxy, pool)) return false;
+
+  for (const int i : found_) cache.cleanOverlappingPair(pairs[i], dispatcher);
+  remove_leaf(tree, proxy);
+  remove_pairs(cache, dispatcher);
+  btAlignedFree(proxy);
+  tree.m_needcleanup = true;
+  object.setBroadphaseHandle(nullptr);
+  return true;
+}
+
+/// Returns false if there is not enough memory.
+bool ProxyRemoval::find_pairs(const btBroadphasePairArray& pairs, const btBroadphaseProxy* proxy,
+                              ThreadPool& pool) {
+  const int count = pairs.size(), size = count < kSharedPairs ? count : kPairsPerChunk;
+  const int chunks = count == 0 ? 0 : (count + size - 1) / size;
+  found_.clear();
+  try {
+    resize_geometric(&parts_, static_cast<std::size_t>(chunks));
+    pool.run(parts_.size(), [&](std::size_t chunk) {
+      const int first = static_cast<int>(chunk) * size;
+      find_pairs(pairs, first, std::min(count, first + size), proxy, &parts_[chunk]);
+    });
+    for (const std::vector<int>& part : parts_)
+      found_.insert(found_.end(), part.begin(), part.end());
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+  return true;
+}
+
+void ProxyRemoval::find_pairs(const btBroadphasePairArray& pairs, int first, int last,
+                              const btBroadphaseProxy* proxy, std::vector<int>* found) {
+  found->clear();
+  const auto refers = [&](int i) {
+    return (pairs[i].m_pProxy0 == proxy) | (pairs[i].m_pProxy1 == proxy);
+  };
+  constexpr int kGroup = 8;  // one branch for several pairs, which rarely refer to the proxy
+  for (int i = first; i < last; i += kGroup) {
+    const int end = std::min(i + kGroup, last);
+    bool any = false;
+    for (int k = i; k < end; ++k) any |= refers(k);
+    for (int k = i; any && k < end; ++k) {
+      if (refers(k)) found->push_back(k);
+    }
+  }
+}
+
+/// Removes the pairs that were found. In Bullet's order, the last pair takes the place of a removed
+/// one, and is the next to be tested.
+void ProxyRemoval::remove_pairs(btHashedOverlappingPairCache& cache, btDispatcher* dispatcher) {
+  btBroadphasePairArray& pairs = cache.getOverlappingPairArray();
+  std::span<const int> left = found_;
+  while (!left.empty()) {
+    const int i = left.front(), last = pairs.size() - 1;
+    cache.removeOverlappingPair(pairs[i].m_pProxy0, pairs[i].m_pProxy1, dispatcher);
+    left = left.back() == last ? left.first(left.size() - 1) : left.subspan(1);
+  }
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx
