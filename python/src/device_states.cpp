@@ -21,6 +21,14 @@ struct DeviceRows {
   int device;
 };
 
+/// For the garbage collector; the world clears a cycle through its functions.
+int traverse_rows(PyObject* self, visitproc visit, void* arg) {
+  Py_VISIT(Py_TYPE(self));
+  if (nb::inst_ready(self)) Py_VISIT(nb::inst_ptr<DeviceRows>(self)->owner.ptr());
+  return 0;
+}
+PyType_Slot kRowsSlots[] = {{Py_tp_traverse, reinterpret_cast<void*>(traverse_rows)}, {0, nullptr}};
+
 template <class Row>
 DeviceRows rows_of(const Row* data, const cuda::DeviceStates& states, nb::handle owner) {
   return {.owner = nb::borrow(owner),
@@ -64,7 +72,7 @@ cuda::DeviceStates PythonWorld::device_states() {
 }
 
 void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world) {
-  nb::class_<DeviceRows>(module, "DeviceRows")
+  nb::class_<DeviceRows>(module, "DeviceRows", nb::type_slots(kRowsSlots))
       .def("__dlpack__", &to_dlpack)
       .def("__dlpack_device__",
            [](const DeviceRows& self) {

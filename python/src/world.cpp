@@ -217,7 +217,15 @@ StepReport PythonWorld::run(std::uint64_t steps) {
 
 void PythonWorld::close() {
   if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
-  if (world_ != nullptr) wait_for_readers();
+  free();
+}
+
+void PythonWorld::free() noexcept {
+  try {
+    wait_for_readers();
+  } catch (const Error&) {
+    // The device is lost.
+  }
   ++changes_;
   world_.reset();
   functions_.clear();

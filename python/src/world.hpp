@@ -18,6 +18,9 @@ class PythonWorld {
  public:
   PythonWorld(const Scene& scene, const WorldSettings& settings)
       : world_(std::make_unique<World>(scene, settings)) {}
+  ~PythonWorld() { free(); }
+  PythonWorld(const PythonWorld&) = delete;
+  PythonWorld& operator=(const PythonWorld&) = delete;
 
   /// @throws Closed, ConcurrentUse
   const World& get() const {
@@ -52,7 +55,9 @@ class PythonWorld {
   int traverse(visitproc visit, void* arg) const;
 
  private:
+  /// @throws DeviceError
   void wait_for_readers();
+  void free() noexcept;
   World* existing() const {
     if (world_ == nullptr) throw Closed("the world is closed");
     return world_.get();

@@ -1,8 +1,10 @@
 """Searches on arrays in device memory. Without a GPU, or without PyTorch and CuPy, these tests are
 skipped; with JFPX_REQUIRE_CUDA=1 they fail instead."""
 
+import gc
 import os
 import threading
+import weakref
 
 import numpy as np
 import pytest
@@ -358,6 +360,17 @@ def test_states_on_the_device_are_refused_after_a_change(library):
         change()
         with pytest.raises(jfpx.InvalidArgument, match="the world has changed"):
             library.module.from_dlpack(states.positions)
+
+
+def test_a_world_whose_force_has_its_states_is_collected(library):
+    world = jfpx.World(grid_scene("float32"), backend="cuda")
+    states = world.device_states()
+    force = lambda context: states  # noqa: E731
+    world.add_force(force)
+    collected = weakref.ref(force)
+    del world, states, force
+    gc.collect()
+    assert collected() is None
 
 
 def test_a_step_waits_for_readers_of_the_states():
