@@ -131,7 +131,7 @@ StepReport Fountain::advance() {
 void Fountain::draw(View* view) const {
   *view = {};
   const Real distance = side_ * kSpacing + 11;
-  view->camera.eye = {distance * Real(0.35), 6, distance};
+  view->camera.eye = {distance * Real(0.35), distance * Real(0.6), distance * Real(0.8)};
   view->camera.target = {0, Real(1.5), 0};
   for (const BodyDef& wall : world_.scene().bodies) {
     view->items.push_back({.shape = wall.shape, .position = wall.position, .colour = kGrey});
