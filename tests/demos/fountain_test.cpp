@@ -19,7 +19,7 @@ std::size_t balls(const Demo& demo) { return demo.world()->bodies().size() - kWa
 
 TEST(Fountain, BallsComeAndGoByTheHundredPerStep) {
   const auto demo = demos::make("fountain");
-  for (const std::size_t expected : {100, 200, 300}) {
+  for (const std::size_t expected : {100u, 200u, 300u}) {
     demo->step();
     EXPECT_EQ(balls(*demo), expected);
   }
