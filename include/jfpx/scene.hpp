@@ -37,7 +37,9 @@ struct SoftStepSettings {
   /// [Hz], >= 0, frequency of the contact springs between movable bodies; twice that against
   /// immovable and kinematic bodies. 0, and values above it, mean a quarter of the substep rate.
   Real contact_hertz = 0;
-  Real damping_ratio = 1;   ///< [-], in [0.01, 1000], of the contact springs
+  /// [-], in [0.01, 1000], of the contact springs; twice that between two movable spheres without
+  /// rolling friction.
+  Real damping_ratio = 1;
   Real push_out_speed = 3;  ///< [m/s], > 0: maximum speed that removes a penetration
   Real restitution_threshold = Real(0.25);  ///< [m/s], >= 0: slower contacts do not bounce
   /// [m], >= 0: pairs closer than this are in the solver before they touch; for small bodies, pairs

@@ -50,11 +50,11 @@ JFPX_HD inline bool try_axis(const BoxPair& pair, int index, const Vec3& axis, R
   return true;
 }
 
-/// `later` if its overlap is smaller by more than its rounding error and two per cent, else
-/// `first`. A box that lies flat thus keeps the same face, and its points, from step to step.
-JFPX_HD constexpr const LeastOverlap& preferred(const LeastOverlap& first,
-                                                const LeastOverlap& later) {
-  const Real tolerance = later.error - first.distance * Real(0.02);
+/// `later` if its overlap is smaller, or its separation larger, by more than its rounding error and
+/// two per cent, else `first`. A box that lies flat thus keeps the same face, and its points, from
+/// step to step.
+JFPX_HD inline const LeastOverlap& preferred(const LeastOverlap& first, const LeastOverlap& later) {
+  const Real tolerance = later.error + absolute(first.distance) * Real(0.02);
   return later.axis >= 0 && later.distance > first.distance + tolerance ? later : first;
 }
 

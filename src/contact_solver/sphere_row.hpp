@@ -163,7 +163,7 @@ JFPX_HD inline void solve(SphereRow* row, SolverBody* a, SolverBody* b, const St
     velocity = relative_velocity<kFixed>(*row, *a, *b);
     closing = dot(velocity, n);
   }
-  const Bias bias = bias_of(separation, kFixed ? step.fixed : step.movable, step, soft);
+  const Bias bias = bias_of(separation, kFixed ? step.fixed : step.balls, step, soft);
 
   Vec3 friction = row->friction_impulse - (velocity - n * closing) * row->tangent_mass;
   const Real limit = row->friction * row->normal_impulse;

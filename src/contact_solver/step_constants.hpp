@@ -32,6 +32,7 @@ struct StepConstants {
   Real h = 0;               ///< [s], length of a substep
   Real inverse_h = 0;       ///< [1/s]
   Softness movable;         ///< between two movable bodies
+  Softness balls;           ///< between two movable spheres, in a SphereRow
   Softness fixed;           ///< between a movable and an immovable or kinematic body
   Real push_out_speed = 0;  ///< [m/s]
   /// [m/s], maximum velocity of a push-out. The sweep without push-out removes most of it from the
@@ -42,7 +43,8 @@ struct StepConstants {
 };
 
 /// Frequencies are limited to a quarter of the substep rate, and twice that for fixed bodies: a
-/// faster spring would not be resolved by the substeps.
+/// faster spring would not be resolved by the substeps. Spheres have twice the damping ratio: heaps
+/// of them come to rest sooner, while pyramids of boxes would keep oscillating.
 JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& settings, Real dt) {
   const Real h = dt / static_cast<Real>(settings.substeps);
   const Real inverse_h = static_cast<Real>(settings.substeps) / dt;
@@ -52,6 +54,7 @@ JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& sett
   return {h,
           inverse_h,
           make_softness(hertz, settings.damping_ratio, h),
+          make_softness(hertz, 2 * settings.damping_ratio, h),
           make_softness(2 * hertz, settings.damping_ratio, h),
           settings.push_out_speed,
           settings.push_out_speed / 6,

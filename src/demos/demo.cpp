@@ -18,6 +18,7 @@ constexpr Entry kDemos[] = {
     {"ballistic", "four weapons fire particles along a range", make_ballistic},
     {"big-ballistic", "four weapons fire rigid balls at two crates", make_big_ballistic},
     {"flight", "an aircraft with wings, rudder and tail takes off", make_flight},
+    {"fountain", "a jet of --spheres balls; a hundred come and go in every step", make_fountain},
 };
 
 }  // namespace

@@ -86,7 +86,7 @@ struct Entry {
   std::unique_ptr<Demo> (*make)(const Options&);
 };
 
-/// The demos of the thesis, in a fixed order.
+/// The demos of the thesis, and fountain, in a fixed order.
 std::span<const Entry> all();
 
 /// Creates the demo called `name`. The name of a scene is also valid.

@@ -11,6 +11,7 @@ std::unique_ptr<Demo> make_ballistic(const Options& options);
 std::unique_ptr<Demo> make_big_ballistic(const Options& options);
 std::unique_ptr<Demo> make_boxes_and_balls(const Options& options);
 std::unique_ptr<Demo> make_flight(const Options& options);
+std::unique_ptr<Demo> make_fountain(const Options& options);
 
 inline constexpr Colour kBlack{0, 0, 0}, kGrey{0.6F, 0.6F, 0.6F}, kShadow{0.2F, 0.2F, 0.2F};
 

@@ -11,7 +11,7 @@ namespace tool {
 
 bool is_scene(const std::string& name);
 bool is_demo(const std::string& name);
-/// True for a demo that contains more than rigid bodies and therefore is not a scene.
+/// True for a demo that is not also a scene.
 bool is_only_a_demo(const std::string& name);
 
 }  // namespace tool

@@ -59,7 +59,7 @@ std::string summary(const CommandOptions& options, const Scene& scene, const Eng
       "{}: {} bodies, {} steps of {} s, engine {}{}{}, backend {}\n"
       "contacts at the end {}, awake {}\n"
       "penetration at the end {:.3g} m deepest, {:.3g} m mean; largest speed {:.3g} m/s\n\n{}\n{}",
-      scene.name, scene.bodies.size(), options.run.steps, text(scene.dt), options.engine,
+      scene.name, engine.states().size(), options.run.steps, text(scene.dt), options.engine,
       engine.resolver().empty() ? "" : ", resolver ", engine.resolver(), engine.backend(),
       engine.contacts(), engine.awake(), m.deepest_penetration, m.mean_penetration, m.largest_speed,
       table.text(), choices.text());
@@ -71,7 +71,7 @@ nlohmann::ordered_json to_json_value(const CommandOptions& options, const Scene&
   nlohmann::ordered_json resolver;  // null for an engine without one
   if (!engine.resolver().empty()) resolver = engine.resolver();
   return {{"scene", scene.name},
-          {"bodies", scene.bodies.size()},
+          {"bodies", engine.states().size()},
           {"steps", options.run.steps},
           {"engine", options.engine},
           {"resolver", resolver},

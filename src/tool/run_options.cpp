@@ -80,10 +80,11 @@ Scene load(const RunOptions& options) {
     scene = load_scene(options.scene);
   } else {
     if (is_only_a_demo(options.scene)) {
-      throw InvalidArgument("\"" + options.scene +
-                            "\" is a demo, which contains more than rigid bodies; only the native "
-                            "engine runs it; try: jfpx run " +
-                            options.scene);
+      throw InvalidArgument(
+          "\"" + options.scene +
+          "\" is a demo, which is more than a scene; only the native engine runs it; "
+          "try: jfpx run " +
+          options.scene);
     }
     scene = scenes::make(options.scene, scene_options(options));
   }

@@ -1,6 +1,7 @@
 jfpx_add_test(demos_test SOURCES 
   demos/demo_test.cpp
   demos/flight_test.cpp
+  demos/fountain_test.cpp
   demos/gunnery_test.cpp
   demos/input_script_test.cpp
   LINK jfpx_demos)

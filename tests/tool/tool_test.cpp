@@ -278,6 +278,7 @@ TEST(Tool, DemosRunWithTheirInputsAndRepeatExactly) {
       jfpx_stdout("run ballistic --steps 30 --quiet --json - --input " + script).output);
   EXPECT_EQ(json["scene"], "ballistic");
   EXPECT_EQ(json["awake"], 2);
+  EXPECT_EQ(json["bodies"], 2);
 }
 
 TEST(Tool, ASceneWithoutInputsIsTheSameAsADemo) {

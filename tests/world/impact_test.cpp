@@ -107,6 +107,22 @@ TEST(Impacts, AHeavyBallThatFallsOnALightOneComesToRestOnIt) {
   }
 }
 
+TEST(Impacts, ABoxThatFallsFlatOnABoxDoesNotTip) {
+  // Detected at any distance up to that of a step, some of them within the speculative margin.
+  for (int k = 0; k < 40; ++k) {
+    Scene scene;
+    const Real height = 1 + 0.004_r * static_cast<Real>(k);
+    scene.bodies = {test::ground(), test::crate({0, 0.5_r, 0}, {0.5_r, 0.5_r, 0.5_r}),
+                    test::crate({0.1_r, 1.5_r + height, 0}, {0.5_r, 0.5_r, 0.5_r})};
+    World world(test::awake(scene));
+    while (world.time() < 1) {
+      world.step();
+      ASSERT_LE(test::penetration(world).largest, 0.02) << height;
+      ASSERT_LE(length(world.states()[2].angular_velocity), 1) << height;
+    }
+  }
+}
+
 TEST(Impacts, CollisionsConserveTheMomentum) {
   for (const bool is_box : {false, true}) {
     const std::uint64_t seed = test::fresh_seed();

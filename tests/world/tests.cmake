@@ -46,6 +46,7 @@ jfpx_add_test(quality_test SOURCES
   world/friction_test.cpp
   world/heap_test.cpp
   world/impact_test.cpp
+  world/oracle_test.cpp
   world/stack_test.cpp)
 jfpx_add_test(concurrency_test SOURCES world/concurrency_test.cpp)
 jfpx_add_test(soak_test SOURCES world/soak_test.cpp)
