@@ -71,6 +71,7 @@ def cpu():
 def warp_search(x, cutoff):
     """Function that counts the pairs a < b with the HashGrid of Warp."""
     import warp as wp
+    wp.init()
 
     @wp.kernel
     def count(grid: wp.uint64, points: wp.array(dtype=wp.vec3), radius: float,

@@ -9,6 +9,7 @@
 #include "src/world/soft_step_stages.hpp"
 
 #include <cstdint>
+#include <type_traits>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -52,7 +53,9 @@ struct Counters {
   std::uint32_t met_points = 0;        ///< points of manifolds: soft_step::has_met()
   std::uint32_t sphere_touches = 0;    ///< items of the list of touches of two spheres
   std::uint32_t awake = 0;             ///< movable bodies awake after the step
+  std::uint32_t unused = 0;            ///< instead of padding, which initcheck would report
 };
+static_assert(std::has_unique_object_representations_v<Counters>);
 
 /// The contact of two spheres.
 struct NormalDistance {
