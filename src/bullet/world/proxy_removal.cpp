@@ -73,7 +73,9 @@ void ProxyRemoval::find_pairs(const btBroadphasePairArray& pairs, int first, int
                               const btBroadphaseProxy* proxy, std::vector<int>* found) {
   found->clear();
   const auto refers = [&](int i) {
-    return (pairs[i].m_pProxy0 == proxy) | (pairs[i].m_pProxy1 == proxy);
+    bool result = pairs[i].m_pProxy0 == proxy;
+    result |= pairs[i].m_pProxy1 == proxy;
+    return result;
   };
   constexpr int kGroup = 8;  // one branch for several pairs, which rarely refer to the proxy
   for (int i = first; i < last; i += kGroup) {
