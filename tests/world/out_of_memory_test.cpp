@@ -276,7 +276,8 @@ TEST_P(OutOfMemoryInAWorld, AFailedConstructionLeaksNothing) {
     const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
       const std::size_t alive = live_allocations();
       runs_out(k, shortage, [&] { const World world(scene, settings); });
-      EXPECT_EQ(live_allocations(), alive) << k;
+      // Fewer if the pool of the world frees what remains of an earlier one.
+      EXPECT_LE(live_allocations(), alive) << k;
       return FailingNew::failed() && !testing::Test::HasFailure();
     });
     EXPECT_GT(failures, 20u);
