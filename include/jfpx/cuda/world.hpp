@@ -33,10 +33,9 @@ static_assert(sizeof(Vec3) == 3 * sizeof(Real) && sizeof(Quat) == 4 * sizeof(Rea
 /// Returns the states after the last step and all changes since. Copies nothing if the device has
 /// them, as after a step there; otherwise uploads the world. Must not run concurrently with any
 /// call on the same world.
-/// @throws BackendUnavailable with the reason if the world has no device: it needs
-/// Solver::soft_step
-///   and Backend::cuda, or Backend::automatic after that has started the device, and a device that
-///   has not failed. DeviceError, OutOfMemory; the world is then unchanged.
+/// @throws BackendUnavailable with the reason if the world has no device. A world has one with
+///   Solver::soft_step and Backend::cuda, or Backend::automatic after that has started the device,
+///   until it fails. DeviceError, OutOfMemory; the world is then unchanged.
 JFPX_API DeviceStates device_states(World& world);
 
 }  // namespace cuda
