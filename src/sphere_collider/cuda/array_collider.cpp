@@ -165,10 +165,7 @@ void ArrayCollider::Impl::reserve(std::size_t n, std::size_t most_contacts) {
 }
 
 void ArrayCollider::Impl::reserve_spheres(std::size_t n) {
-  if (n > kMaxSpheres) {
-    throw InvalidArgument("number of spheres is " + std::to_string(n) + "; it must be at most " +
-                          std::to_string(kMaxSpheres));
-  }
+  check_number_of_spheres(n);
   spheres.reserve_geometric(pool, stream.get(), n, "spheres");
 }
 
@@ -204,7 +201,7 @@ std::uint64_t ArrayCollider::Impl::search_periodic(std::size_t n, const Periodic
 
 /// Reserves what search_systems() needs, and copies the offsets.
 void ArrayCollider::Impl::reserve_systems(std::size_t n, std::span<const std::uint64_t> from) {
-  spheres.reserve_geometric(pool, stream.get(), n, "spheres");
+  reserve_spheres(n);
   row_counts.reserve_geometric(pool, stream.get(), n + 1, "numbers of contacts");
   row_sums.reserve_geometric(pool, stream.get(), n + 1, "sums of numbers of contacts");
   scratch.reserve_geometric(pool, stream.get(), scan_scratch_bytes(n + 1), "scratch of a scan");

@@ -116,10 +116,7 @@ struct DeviceSphereCollider::Impl {
 };
 
 void DeviceSphereCollider::Impl::reserve(std::size_t n, std::size_t contacts) {
-  if (n > kMaxSpheres) {
-    throw InvalidArgument("number of spheres is " + std::to_string(n) + "; it must be at most " +
-                          std::to_string(kMaxSpheres));
-  }
+  check_number_of_spheres(n);
   const DeviceGuard guard(device);
   const std::size_t max_spheres = std::max(n, spheres_reserved);
   // A search of all pairs needs no memory for contacts, but a later reserve() of more spheres may

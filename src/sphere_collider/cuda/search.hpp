@@ -3,9 +3,11 @@
 
 #include <jfpx/contact.hpp>
 #include <jfpx/cuda/sphere_collider.hpp>
+#include <jfpx/error.hpp>
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -13,6 +15,13 @@ namespace cuda {
 
 /// Largest number of spheres of a search: the grid computes with twice that number in 32 bits.
 inline constexpr std::size_t kMaxSpheres = std::size_t{1} << 31;
+
+/// @throws InvalidArgument for more than kMaxSpheres
+inline void check_number_of_spheres(std::size_t n) {
+  if (n <= kMaxSpheres) return;
+  throw InvalidArgument("number of spheres is " + std::to_string(n) + "; it must be at most " +
+                        std::to_string(kMaxSpheres));
+}
 
 /// Counters that the kernels of one search share. All bytes are zero at the start of a search.
 struct alignas(16) SearchState {

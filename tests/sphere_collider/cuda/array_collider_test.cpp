@@ -121,6 +121,11 @@ TEST_F(Cuda, ArraysOfSystemsAreCheckedAsOnTheHost) {
   EXPECT_EQ(message_of({0, 49}), "the last offset is 49; it must be the number of spheres, 50");
   spheres[41].radius = -1;
   EXPECT_EQ(message_of({0, 20, 50}), "sphere 41: radius is -1; it must be finite and > 0");
+  SphereArrays many = DeviceSpheres(spheres).arrays();  // not read
+  many.count = (std::size_t{1} << 31) + 1;
+  const std::vector<std::uint64_t> all{0, many.count};
+  EXPECT_THROW(collider.find_in_systems(many, all, ArrayResult::pairs, false, stream.get()),
+               InvalidArgument);
 }
 
 TEST_F(Cuda, FewArraysOfOneRadiusAndAnyStrides) {
