@@ -422,7 +422,7 @@ class DeviceStep final : public DeviceWorld {
     d.row_contact = room(&s.row_contact, contacts);
     d.next_fixed = room(&s.next_fixed, contacts);
     d.overflow = room(&s.overflow, contacts);
-    d.sphere_rows = room(&s.sphere_rows, contacts);
+    d.sphere_rows = {room(&s.sphere_rows, contacts), contacts};
     d.manifold_rows = room(&s.manifold_rows, contacts);
     d.point_rows = room(&s.point_rows, impulses);
     Contacts& now = sets_[now_];

@@ -140,7 +140,7 @@ struct PrepareProgram {
       soft_step::SphereRow row;
       r < begin[soft_step::kFixedGroup] ? setup.fill<false>(&row, contact)
                                         : setup.fill<true>(&row, contact);
-      d.sphere_rows[r] = row;
+      d.sphere_rows.store(r, row);
     } else {
       soft_step::ManifoldRow* row = &d.manifold_rows[r - first_manifold()];
       soft_step::PointRow* points = d.point_rows + row->first;

@@ -5,6 +5,8 @@
 #include "src/world/device/atomic.hpp"
 #include "src/world/device/step_data.hpp"
 
+#include <cstddef>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
@@ -257,7 +259,7 @@ struct SolveProgram {
       const soft_step::ManifoldRow& row = d.manifold_rows[r - sweep.first_manifold()];
       a = row.a, b = row.b;
     } else {
-      item.sphere = d.sphere_rows[r];
+      item.sphere = d.sphere_rows.load(r);
       a = item.sphere.a, b = item.sphere.b;
     }
     item.a.start(a, d.row_bodies[a]);
@@ -419,7 +421,7 @@ struct SolveProgram {
                            BodyItem* item, BodyFree* free) const {
     SolverBody* body = &item->motion;
     if (r < sweep.first_manifold()) {
-      soft_step::SphereRow row = data.sphere_rows[r];
+      soft_step::SphereRow row = data.sphere_rows.load(r);
       const Real restitution = row.restitution;
       SolverBody fixed;  // not read: the body does not move
       const Impact impact{data.step.bodies.last_acceleration, row.a};
@@ -446,10 +448,11 @@ struct SolveProgram {
   JFPX_HD void store(const Sweep& sweep, const soft_step::SphereRow& row, Real restitution,
                      std::uint32_t r) const {
     if constexpr (Operation::kChangesRow) {
-      soft_step::SphereRow* to = &data.sphere_rows[r];
-      to->friction_impulse = row.friction_impulse;
-      to->normal_impulse = row.normal_impulse;
-      if (restitution != row.restitution) to->restitution = row.restitution;
+      using Row = soft_step::SphereRow;
+      data.sphere_rows.store_bytes<0, offsetof(Row, normal)>(r, row);
+      if (restitution != row.restitution) {
+        data.sphere_rows.store_bytes<offsetof(Row, restitution), offsetof(Row, a)>(r, row);
+      }
       if (sweep.stores_impulses) data.row_setup().store(row, data.row_contact[r]);
     }
   }

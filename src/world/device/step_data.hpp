@@ -5,6 +5,7 @@
 
 #include "src/contact_solver/row_setup.hpp"
 #include "src/world/device/body_cells.hpp"
+#include "src/world/device/striped_array.hpp"
 #include "src/world/near_pair_test.hpp"
 #include "src/world/soft_step_stages.hpp"
 
@@ -132,7 +133,7 @@ struct StepData {
 
   std::uint8_t* row_bins = nullptr;      ///< by contact
   std::uint32_t* row_contact = nullptr;  ///< by row of either kind
-  soft_step::SphereRow* sphere_rows = nullptr;
+  StripedArray<soft_step::SphereRow> sphere_rows;
   soft_step::ManifoldRow* manifold_rows = nullptr;
   soft_step::PointRow* point_rows = nullptr;
   std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies

@@ -1,0 +1,59 @@
+/// Array of structures on a device, with a memory layout for warps.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+/// The items are stored by their pieces of 16 bytes: first the first pieces of all items, then the
+/// second ones. So consecutive threads that read consecutive items access consecutive addresses.
+/// @tparam T trivially copyable, a multiple of 16 bytes
+template <class T>
+class StripedArray {
+ public:
+  StripedArray() = default;
+  /// @param memory of `capacity` items, aligned to 16 bytes
+  StripedArray(T* memory, std::size_t capacity)
+      : pieces_(reinterpret_cast<Piece*>(memory)), capacity_(capacity) {}
+
+  JFPX_HD T load(std::size_t i) const {
+    Item item;
+    for (std::size_t k = 0; k < kPieces; ++k) item.pieces[k] = pieces_[k * capacity_ + i];
+    return std::bit_cast<T>(item);
+  }
+  JFPX_HD void store(std::size_t i, const T& value) const { store_bytes<0, sizeof(T)>(i, value); }
+
+  /// Stores the pieces of an item that have bytes in [kBegin, kEnd).
+  template <std::size_t kBegin, std::size_t kEnd>
+  JFPX_HD void store_bytes(std::size_t i, const T& value) const {
+    const Item item = std::bit_cast<Item>(value);
+    constexpr std::size_t kLast = (kEnd + sizeof(Piece) - 1) / sizeof(Piece);
+    for (std::size_t k = kBegin / sizeof(Piece); k < kLast; ++k) {
+      pieces_[k * capacity_ + i] = item.pieces[k];
+    }
+  }
+
+ private:
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 16 == 0);
+  struct alignas(16) Piece {
+    std::uint32_t words[4];
+  };
+  static constexpr std::size_t kPieces = sizeof(T) / sizeof(Piece);
+  struct Item {
+    Piece pieces[kPieces];
+  };
+
+  Piece* pieces_ = nullptr;
+  std::size_t capacity_ = 0;
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx
