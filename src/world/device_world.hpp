@@ -10,10 +10,21 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
+
+/// A change of a movable body between two steps. The forces, acceleration and damping of the body
+/// are always those of the host.
+struct BodyEdit {
+  bool sets_state = false;       ///< position, orientation and velocities are those of the host
+  bool wakes = false;            ///< wakes the body
+  bool wakes_neighbors = false;  ///< wakes the bodies in contact with it in the last step
+};
+/// By BodyId::index.
+using BodyEdits = std::unordered_map<std::uint32_t, BodyEdit>;
 
 /// Steps of Solver::soft_step on a device, with the bits of SoftStep. The caller uploads a world,
 /// then calls step() as often as it likes, and fetches what it needs. Not thread-safe.
@@ -43,10 +54,13 @@ class DeviceWorld {
                       soft_step::ContactSet* last) = 0;
   /// Replaces forces and torques, and which bodies are awake.
   virtual void upload_forces(const BodyStore& bodies) = 0;
+  /// Edits bodies of the state on the device. The same edits may be repeated after a failure.
+  virtual void edit(const BodyStore& bodies, const BodyEdits& edits) = 0;
   /// One step. If a body runs away, the state does not change.
   virtual Result step() = 0;
   /// The states on the device, with the lifetimes of cuda::device_states().
   virtual cuda::DeviceStates states() const noexcept = 0;
+  virtual Vec3 fetch_position(std::uint32_t body) = 0;
   /// Copies the motion of all bodies to the host.
   virtual void fetch_motion(MotionArrays* moving) = 0;
   /// Copies the contacts of the last step, with their impulses and colors.

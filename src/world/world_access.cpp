@@ -30,8 +30,9 @@ BodyId World::add(const BodyDef& body) {
 
 void World::remove(BodyId id) {
   impl_->store.require(id);
+  BodyStore& bodies = impl_->changed_bodies();
   impl_->wake_neighbors(id);
-  impl_->store.remove(id);
+  bodies.remove(id);
   impl_->soft_step.forget(id.index);
   impl_->shows_contacts = false;
   impl_->note_change();
@@ -66,7 +67,7 @@ void World::set_state(BodyId id, const BodyState& state) {
   const std::string found = find_fault(state);
   if (!found.empty()) throw InvalidArgument("state: " + found);
   impl_->wake_neighbors(id);
-  impl_->store.set_state(body, state);
+  impl_->edited_body(body, {.sets_state = true, .wakes = true}).set_state(body, state);
   impl_->note_change();
 }
 
@@ -74,7 +75,7 @@ bool World::awake(BodyId id) const {
   return impl_->bodies().moving.awake[impl_->store.require(id)] != 0;
 }
 
-void World::wake(BodyId id) { impl_->changed_bodies().wake(impl_->store.require(id)); }
+void World::wake(BodyId id) { impl_->wake(impl_->store.require(id)); }
 
 Real World::mass(BodyId id) const { return impl_->store.mass(impl_->store.require(id)); }
 
@@ -85,22 +86,23 @@ Mat3 World::inverse_inertia(BodyId id) const {
 void World::apply_force(BodyId id, const Vec3& force) {
   const std::uint32_t body = impl_->store.require(id);
   require_finite("force", force);
-  impl_->changed_bodies().apply_force(body, force);
+  impl_->edited_body(body, {.wakes = true}).apply_force(body, force);
 }
 
 void World::apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point) {
   const std::uint32_t body = impl_->store.require(id);
   require_finite("force", force);
   require_finite("point", point);
-  BodyStore& store = impl_->changed_bodies();
+  const Vec3 arm = point - impl_->position(body);
+  BodyStore& store = impl_->edited_body(body, {.wakes = true});
   store.apply_force(body, force);
-  store.apply_torque(body, cross(point - store.moving.position[body], force));
+  store.apply_torque(body, cross(arm, force));
 }
 
 void World::apply_torque(BodyId id, const Vec3& torque) {
   const std::uint32_t body = impl_->store.require(id);
   require_finite("torque", torque);
-  impl_->changed_bodies().apply_torque(body, torque);
+  impl_->edited_body(body, {.wakes = true}).apply_torque(body, torque);
 }
 
 Vec3 World::last_acceleration(BodyId id) const {

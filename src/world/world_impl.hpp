@@ -48,11 +48,18 @@ struct World::Impl {
     if (resident) leave_device();
     return store;
   }
+  /// The bodies for an edit of one of them. While the world is on a device, the motion of the
+  /// others may be older than that on the device, and the next step edits the body there, too.
+  BodyStore& edited_body(std::uint32_t body, const BodyEdit& edit);
+  /// [m], of the centre of mass
+  Vec3 position(std::uint32_t body);
   /// Makes a device that has made a step, so that its kernels are loaded.
   /// @throws BackendUnavailable, DeviceError, OutOfMemory
   static std::unique_ptr<DeviceWorld> make_warm_device(int number);
   /// Uploads the world, unless the device has its state.
   void enter_device();
+  /// Makes the recorded edits on the device.
+  void flush_edits();
   void fetch_motion();
   /// Makes `contacts` and `contacts_before` those of the last two steps.
   void fetch_contacts();
@@ -71,17 +78,23 @@ struct World::Impl {
 
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
-    BodyStore& bodies = changed_bodies();
+    if (!store.movable(body.index)) changed_bodies();
+    if (resident && !contacts_are_current) {
+      edited_body(body.index, {.wakes_neighbors = true});
+      return;
+    }
     for (const Contact& c : contacts) {
       if (c.sensor || (c.a != body && c.b != body)) continue;
       const BodyId other = c.a == body ? c.b : c.a;
-      if (bodies.contains(other)) bodies.wake(other.index);
+      if (store.contains(other)) wake(other.index);
     }
   }
 
+  void wake(std::uint32_t body) { edited_body(body, {.wakes = true}).wake(body); }
+
   /// Wakes a body and the bodies in contact with it.
   void wake_with_neighbors(BodyId body) {
-    changed_bodies().wake(body.index);
+    wake(body.index);
     wake_neighbors(body);
   }
 
@@ -154,6 +167,10 @@ struct World::Impl {
   /// [us] Duration of the last step and of the copies between host and device since, for
   /// `automatic`; 0: unknown.
   double spent_us = 0;
+  /// While resident: edits that the device does not have yet, and the bodies whose forces on the
+  /// host are those of the next step. The forces of all others are 0 on the host.
+  BodyEdits edits;
+  std::vector<std::uint32_t> forced_bodies;
   bool motion_is_current = true, contacts_are_current = true;
   bool contact_set_is_current = true;
   bool contacts_before_are_current = true;  ///< the flags of what the host has, while resident

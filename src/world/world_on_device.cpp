@@ -65,13 +65,48 @@ void World::Impl::enter_device() {
   bodies_changed = false;
   device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
   resident = true;
+  edits.clear();
+  forced_bodies.clear();
+  for (const BodyId id : store.ids()) forced_bodies.push_back(id.index);
   motion_is_current = contacts_are_current = contacts_before_are_current = true;
   contact_set_is_current = true;
+}
+
+BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
+  if (!resident) return store;
+  // Immovable and kinematic bodies have shapes that the contact search prepares.
+  if (!store.movable(body)) {
+    if (edit.sets_state) leave_device();
+    return store;
+  }
+  BodyEdit& all = edits[body];
+  all.sets_state |= edit.sets_state;
+  all.wakes |= edit.wakes;
+  all.wakes_neighbors |= edit.wakes_neighbors;
+  if (edit.wakes_neighbors) motion_is_current = false;
+  return store;
+}
+
+void World::Impl::flush_edits() {
+  if (edits.empty()) return;
+  const Timer timer(&spent_us);
+  forced_bodies.reserve(forced_bodies.size() + edits.size());
+  device->edit(store, edits);
+  for (const auto& [body, edit] : edits) forced_bodies.push_back(body);
+  edits.clear();
+}
+
+Vec3 World::Impl::position(std::uint32_t body) {
+  if (!resident || motion_is_current) return store.moving.position[body];
+  const auto edit = edits.find(body);
+  if (edit != edits.end() && edit->second.sets_state) return store.moving.position[body];
+  return device->fetch_position(body);
 }
 
 void World::Impl::fetch_motion() {
   const std::lock_guard lock(fetching);
   if (motion_is_current) return;
+  flush_edits();
   const Timer timer(&spent_us);
   device->fetch_motion(&store.moving);
   motion_is_current = true;
@@ -112,6 +147,7 @@ void World::Impl::fetch_all() {
 
 void World::Impl::leave_device() {
   fetch_all();
+  edits.clear();
   resident = false;
 }
 
@@ -147,6 +183,10 @@ bool World::Impl::step_on_device(StepReport* report) {
     ForceContext context(store, time());
     forces.call(context);
     device->upload_forces(store);
+    forced_bodies.clear();
+    for (const BodyId id : store.ids()) forced_bodies.push_back(id.index);
+  } else {
+    flush_edits();
   }
   const DeviceWorld::Result result = device->step();
   if (result.invalid_bounds) return false;
@@ -155,6 +195,9 @@ bool World::Impl::step_on_device(StepReport* report) {
     report->non_finite_body = store.id(*result.runaway);
     return true;
   }
+  for (const std::uint32_t body : forced_bodies)
+    store.moving.force[body] = store.moving.torque[body] = {};
+  forced_bodies.clear();
   std::swap(contacts, contacts_before);
   detected_count_before = detected_count;
   contacts_before_are_current = contacts_are_current;
@@ -181,6 +224,7 @@ DeviceStates device_states(World& world) {
             : "cuda: this world has no device; it needs Backend::cuda and Solver::soft_step");
   }
   w.enter_device();
+  w.flush_edits();
   return w.device->states();
 }
 

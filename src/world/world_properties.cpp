@@ -73,8 +73,8 @@ void World::set_acceleration(BodyId id, const Vec3& acceleration) {
   const std::uint32_t body = impl_->store.require(id);
   require_valid(find_acceleration_fault(acceleration));
   if (impl_->store.acceleration(body) == acceleration) return;
-  impl_->changed_bodies().set_acceleration(body, acceleration);
-  impl_->changed_bodies().wake(body);
+  impl_->edited_body(body, {.wakes = true}).set_acceleration(body, acceleration);
+  impl_->store.wake(body);
 }
 
 Real World::linear_damping(BodyId id) const {
@@ -88,7 +88,7 @@ Real World::angular_damping(BodyId id) const {
 void World::set_damping(BodyId id, Real linear, Real angular) {
   const std::uint32_t body = impl_->store.require(id);
   require_valid(find_damping_fault(linear, angular));
-  impl_->changed_bodies().set_damping(body, linear, angular);
+  impl_->edited_body(body, {}).set_damping(body, linear, angular);
 }
 
 std::uint64_t World::user_data(BodyId id) const {

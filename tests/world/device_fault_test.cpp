@@ -28,15 +28,22 @@ TEST(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
   }
   constexpr int kSteps = 4;
   const Scene scene = scenes::make("mixed", {.spheres = 40});
+  const auto run = [](World* world) {
+    for (int n = 0; n < kSteps; ++n) {
+      world->apply_force(world->bodies()[1], {3, 4, 5});
+      world->set_state(world->bodies()[2], {{0, static_cast<Real>(n), 0}, {}, {1, 0, 0}, {}});
+      world->step();
+    }
+  };
   World host(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
-  for (int n = 0; n < kSteps; ++n) host.step();
+  run(&host);
   long failing = 0;
   for (bool was_reached = true; was_reached; ++failing) {
     ASSERT_LT(failing, 2000);
     World world(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
     WorldAccess::impl(world).device = make_device_world(scene);
     cuda::inject_fault(failing, cudaErrorLaunchOutOfResources);
-    for (int n = 0; n < kSteps; ++n) world.step();
+    run(&world);
     for (long n = 0; n <= failing; ++n) {
       if (cuda::take_injected_fault() != cudaSuccess) was_reached = false;
     }

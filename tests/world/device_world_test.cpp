@@ -167,7 +167,7 @@ TEST_P(DeviceWorldTest, ChangesBetweenStepsReachTheDevice) {
     const Scene scene = random_scene(&random);
     World host = on_host(scene), device = on_device(scene);
     for (int n = 0; n < 60; ++n) {
-      const std::uint64_t action = random.below(9);
+      const std::uint64_t action = random.below(13);
       const auto at = [&](const World& world, std::uint64_t i) {
         return world.bodies()[i % world.bodies().size()];
       };
@@ -186,6 +186,16 @@ TEST_P(DeviceWorldTest, ChangesBetweenStepsReachTheDevice) {
           world->set_state(id, state);
         }
         if (action == 5) world->wake(id);
+        if (action == 6) {
+          for (const BodyId other : world->bodies()) world->apply_force_at_point(other, force, {});
+        }
+        if (action == 7) world->set_state(id, {def.position, def.orientation, force, {}});
+        if (action == 8) {
+          world->set_acceleration(id, force);
+          world->set_damping(id, 0.5_r, 0.9_r);
+          world->apply_torque(id, force);
+          world->apply_torque(at(*world, i + 1), force);
+        }
       }
       host.step();
       device.step();
@@ -193,6 +203,55 @@ TEST_P(DeviceWorldTest, ChangesBetweenStepsReachTheDevice) {
       ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device)) << "action " << action;
     }
   }
+}
+
+/// Edits of the motion of single bodies: what the processor does at once happens on the device
+/// before the next step, and queries in between see it.
+TEST_P(DeviceWorldTest, EditsOfBodiesDoNotMoveTheWorld) {
+  Scene scene = scenes::make("tower", {});
+  scene.bodies.push_back(test::ball({20, 1, 0}));
+  World host = on_host(scene), device = on_device(scene);
+  const auto step = [&](int count) {
+    for (int n = 0; n < count; ++n) {
+      host.step();
+      device.step();
+      ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
+      ASSERT_TRUE(WorldAccess::impl(device).resident);
+    }
+  };
+  const BodyId ball = host.bodies().back(), box = host.body_at(5);
+  const auto expect_equal_awake = [&] {
+    for (const BodyId id : host.bodies()) EXPECT_EQ(host.awake(id), device.awake(id)) << id.index;
+  };
+  ASSERT_NO_FATAL_FAILURE(step(400));
+  ASSERT_FALSE(host.awake(box)) << "the tower sleeps";
+  host.step();
+  device.step();
+  for (World* world : {&host, &device}) {
+    world->apply_force(ball, {1, 0, 0});
+    world->apply_force(ball, {0, 30, 2});
+    world->apply_force_at_point(ball, {0, 0, 3}, {20, 2, 0});
+  }
+  expect_equal_awake();
+  ASSERT_NO_FATAL_FAILURE(step(1));
+  ASSERT_TRUE(host.awake(ball));
+  // The neighbours of the box wake with it.
+  for (World* world : {&host, &device}) {
+    BodyState state = world->state(box);
+    state.velocity = {0, 0, 0.1_r};
+    world->step();
+    world->set_state(box, state);
+  }
+  expect_equal_awake();
+  EXPECT_TRUE(device.awake(host.body_at(box.index + 1)));
+  ASSERT_NO_FATAL_FAILURE(step(5));
+  for (World* world : {&host, &device}) {
+    world->set_acceleration(ball, {0, 3, 0});
+    world->set_damping(ball, 0.5_r, 0.5_r);
+    world->apply_torque(ball, {0, 0, 1});
+  }
+  ASSERT_NO_FATAL_FAILURE(step(5));
+  EXPECT_TRUE(host.snapshot() == device.snapshot());
 }
 
 TEST_P(DeviceWorldTest, ForcesAndContactGeneratorsRunOnTheHost) {

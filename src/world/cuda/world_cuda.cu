@@ -168,7 +168,7 @@ class CudaDevice {
   std::tuple<Limits<device::BoundsProgram>, Limits<device::SphereProgram>,
              Limits<device::ShapeProgram>, Limits<device::MatchProgram>,
              Limits<device::PrepareProgram>, Limits<device::SolveProgram>,
-             Limits<device::CommitProgram>>
+             Limits<device::CommitProgram>, Limits<device::EditProgram>>
       limits_;
 };
 

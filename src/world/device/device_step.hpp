@@ -5,6 +5,7 @@
 
 #include "src/world/device/commit_program.hpp"
 #include "src/world/device/contact_programs.hpp"
+#include "src/world/device/edit_program.hpp"
 #include "src/world/device/match_program.hpp"
 #include "src/world/device/prepare_program.hpp"
 #include "src/world/device/solve_program.hpp"
@@ -68,6 +69,27 @@ class DeviceStep final : public DeviceWorld {
     device_->wait();
   }
 
+  void edit(const BodyStore& bodies, const BodyEdits& edits) override {
+    const BodyView& from = bodies.view();
+    std::vector<EditedBody> edited;
+    bool any_wakes_neighbors = false;
+    for (const auto& [i, edit] : edits) {
+      any_wakes_neighbors |= edit.wakes_neighbors;
+      edited.push_back({i, edit.sets_state, edit.wakes, edit.wakes_neighbors, bodies.state(i),
+                        from.inverse_inertia[i], from.force[i], from.torque[i],
+                        from.acceleration[i], from.velocity_kept[i],
+                        from.angular_velocity_kept[i]});
+    }
+    const Contacts& last = sets_[1 - now_];
+    set_last(last);
+    device_->run(
+        EditProgram{data_, put(&scratch_.edits, edited), static_cast<std::uint32_t>(edited.size()),
+                    any_wakes_neighbors, last.touches.data(), last.touch_count,
+                    properties_.acceleration.data(), properties_.velocity_kept.data(),
+                    properties_.angular_velocity_kept.data()},
+        any_wakes_neighbors ? std::max<std::size_t>(last.counts[0], edited.size()) : edited.size());
+  }
+
   Result step() override {
     ++data_.number;
     const Counters counters = run_until_complete();
@@ -97,6 +119,13 @@ class DeviceStep final : public DeviceWorld {
     return {device_->number(),  device_->stream(), bodies.capacity,
             bodies.count,       bodies.ids,        bodies.position,
             bodies.orientation, bodies.velocity,   bodies.angular_velocity};
+  }
+
+  Vec3 fetch_position(std::uint32_t body) override {
+    Vec3 position;
+    device_->download(&position, data_.step.motion.position + body, 1);
+    device_->wait();
+    return position;
   }
 
   void fetch_motion(MotionArrays* moving) override {
@@ -212,6 +241,7 @@ class DeviceStep final : public DeviceWorld {
     Buffer<Vec3> position_before;
   };
   struct Scratch {
+    Buffer<EditedBody> edits;
     Buffer<Vec3> motion;
     Buffer<Real> margins;
     Buffer<SphereInstance> swept;
@@ -440,19 +470,22 @@ class DeviceStep final : public DeviceWorld {
     d.now.manifolds_of = room(&now.manifolds_of, bodies);
     d.touches = room(&now.touches, c.touches);
     d.position_before = room(&now.position_before, bodies);
-    const Contacts& last = sets_[1 - now_];
-    d.last.view = {last.spheres.data(),
-                   last.manifolds.data(),
-                   last.points.data(),
-                   last.impulses.data(),
-                   last.rolling_impulses.data(),
-                   last.colors.data(),
-                   0,
-                   0,
-                   0};
-    d.last.spheres_of = last.spheres_of.data();
-    d.last.manifolds_of = last.manifolds_of.data();
-    std::ranges::copy(last.counts, d.last.counts);
+    set_last(sets_[1 - now_]);
+  }
+
+  void set_last(const Contacts& last) {
+    data_.last.view = {last.spheres.data(),
+                       last.manifolds.data(),
+                       last.points.data(),
+                       last.impulses.data(),
+                       last.rolling_impulses.data(),
+                       last.colors.data(),
+                       0,
+                       0,
+                       0};
+    data_.last.spheres_of = last.spheres_of.data();
+    data_.last.manifolds_of = last.manifolds_of.data();
+    std::ranges::copy(last.counts, data_.last.counts);
   }
 
   /// Grows the lists that were too short, and some more.
