@@ -43,7 +43,6 @@ class DeviceStep final : public DeviceWorld {
   void configure(const Scene& scene) noexcept override {
     data_.materials = scene.materials;
     data_.constants = soft_step::make_step_constants(scene.soft_step, scene.dt);
-    data_.restitution_threshold = scene.soft_step.restitution_threshold;
     data_.substeps = scene.soft_step.substeps;
     data_.step.h = data_.constants.h;
     data_.near.largest_margin = scene.soft_step.speculative_margin * Real(0.5);
