@@ -8,6 +8,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/contact_finder.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_resolver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_snapshot.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/contacts_by_body.cpp
   ${CMAKE_CURRENT_LIST_DIR}/device_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_snapshot.cpp

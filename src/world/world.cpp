@@ -261,6 +261,7 @@ StepReport World::step() {
   w.contacts_are_new = false;
   w.query_tree.invalidate();
   w.events.invalidate();
+  w.contacts_by_body.invalidate();
   try {
     if (w.advance(&report)) {
       ++w.steps;

@@ -9,6 +9,7 @@
 #include "src/world/contact_events.hpp"
 #include "src/world/contact_finder.hpp"
 #include "src/world/contact_resolver.hpp"
+#include "src/world/contacts_by_body.hpp"
 #include "src/world/device_world.hpp"
 #include "src/world/force_snapshot.hpp"
 #include "src/world/lazy_query_tree.hpp"
@@ -72,11 +73,10 @@ struct World::Impl {
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
     BodyStore& bodies = changed_bodies();
-    for (const Contact& c : contacts) {
-      if (c.sensor || (c.a != body && c.b != body)) continue;
+    contacts_by_body.for_each(contacts, body, [&](const Contact& c) {
       const BodyId other = c.a == body ? c.b : c.a;
-      if (bodies.contains(other)) bodies.wake(other.index);
-    }
+      if (!c.sensor && bodies.contains(other)) bodies.wake(other.index);
+    });
   }
 
   /// Wakes a body and the bodies in contact with it.
@@ -131,6 +131,7 @@ struct World::Impl {
   LazyQueryTree query_tree;
   /// Contacts of the last step that was not undone. Bodies may have been removed since.
   std::vector<Contact> contacts;
+  ContactsByBody contacts_by_body;  ///< of `contacts`
   std::vector<Contact> resolved;  ///< during a step with sensors: the contacts of other bodies
   std::vector<Contact> met;       ///< contacts that came about during the step
   std::vector<Contact> contacts_before;  ///< those of the step before, for events and undo()
