@@ -33,6 +33,7 @@ struct World::Impl {
         store(empty_store(given)),
         contact_finder(std::move(collider), broad_phase),
         soft_step(given.soft_step, given.materials, given.dt, pool.get()) {
+    store.reserve(given.bodies.size());
     for (const BodyDef& def : given.bodies) store.add(def);
     store.set_ignored_pairs(given.ignored_pairs);  // a body of the scene has the index of its slot
   }
