@@ -111,6 +111,7 @@ struct World::Impl {
   void finish_contacts(std::vector<Contact>* list) const;
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   void find_contacts(StepReport* report);
+  std::size_t find_met_contacts();
   void add_met_contacts(StepReport* report);
   void save_for_undo();
   void undo_motion() noexcept;
@@ -132,9 +133,10 @@ struct World::Impl {
   LazyQueryTree query_tree;
   /// Contacts of the last step that was not undone. Bodies may have been removed since.
   std::vector<Contact> contacts;
-  ContactsByBody contacts_by_body;  ///< of `contacts`
-  std::vector<Contact> resolved;  ///< during a step with sensors: the contacts of other bodies
-  std::vector<Contact> met;       ///< contacts that came about during the step
+  ContactsByBody contacts_by_body;     ///< of `contacts`
+  std::vector<Contact> resolved;       ///< during a step with sensors: the contacts of other bodies
+  std::vector<Contact> met;            ///< contacts that came about during the step
+  std::vector<std::size_t> met_begin;  ///< by chunk of contacts: its first entry in `met`
   std::vector<Contact> contacts_before;  ///< those of the step before, for events and undo()
   /// Numbers of detected contacts in both lists; the others are those of contact generators.
   std::size_t detected_count = 0, detected_count_before = 0;

@@ -139,7 +139,7 @@ class DeviceStep final : public DeviceWorld {
     constexpr std::uint32_t kLast = 0xffffffffu;
     std::uint32_t number = 0;
     soft_step::for_each_met(
-        set.view(), [&](std::uint32_t body) { return position[body]; },
+        set.view(), 0, set.size(), [&](std::uint32_t body) { return position[body]; },
         [&](std::uint32_t body) { return bodies.radius(body); },
         [&](const soft_step::ContactKey& key, bool of_spheres, const Vec3& normal,
             const Vec3& point) {
