@@ -1,6 +1,7 @@
 jfpx_add_bench(world_bench SOURCES world/world_bench.cpp)
 jfpx_add_bench(automatic_bench SOURCES sphere_collider/inputs.cpp world/automatic_bench.cpp)
 jfpx_add_bench(query_bench SOURCES world/query_bench.cpp)
+jfpx_add_bench(moving_bench SOURCES sphere_collider/inputs.cpp world/moving_bench.cpp)
 jfpx_add_bench(stages_bench SOURCES world/stages_bench.cpp)
 jfpx_add_executable(first_call SOURCES world/first_call.cpp LINK jfpx)
 jfpx_add_bench(thesis_bench SOURCES world/thesis_bench.cpp)

@@ -39,6 +39,8 @@ class Finder {
 }  // namespace
 
 void ContactCache::match(std::span<const Real> inverse_mass, ThreadPool* pool) {
+  reserve(inverse_mass.size());
+  drop_forgotten();
   ContactSet& now = current_;
   const auto spheres = static_cast<std::uint32_t>(now.spheres.size());
   resize_geometric(&now.impulses, spheres + now.points.size());
@@ -107,10 +109,29 @@ void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last) {
   }
 }
 
-/// The impulses of removed manifolds stay unused until the next step.
+void ContactCache::reserve(std::size_t bodies) {
+  if (forgotten_.size() < bodies) forgotten_.resize(bodies);
+}
+
+void ContactCache::restore(ContactSet last) noexcept {
+  std::ranges::fill(forgotten_, std::uint8_t{0});
+  any_forgotten_ = false;
+  last_ = std::move(last);
+}
+
 void ContactCache::forget(std::uint32_t body) noexcept {
+  if (body >= forgotten_.size()) return;
+  forgotten_[body] = 1;
+  any_forgotten_ = true;
+}
+
+/// The impulses of removed manifolds stay unused until the next step.
+void ContactCache::drop_forgotten() noexcept {
+  if (!any_forgotten_) return;
   ContactSet& set = last_;
-  const auto involved = [body](const ContactKey& key) { return key.a == body || key.b == body; };
+  const auto involved = [this](const ContactKey& key) {
+    return forgotten_[key.a] != 0 || forgotten_[key.b] != 0;
+  };
   // Points keep their indices, so their impulses must keep their distance from the first one.
   const auto spheres = static_cast<std::uint32_t>(set.spheres.size());
   std::uint32_t kept = 0, kept_spheres = 0;
@@ -134,6 +155,8 @@ void ContactCache::forget(std::uint32_t body) noexcept {
   set.manifolds.resize(kept_manifolds);
   set.rolling_impulses.resize(kept);
   set.colors.resize(kept);
+  std::ranges::fill(forgotten_, std::uint8_t{0});
+  any_forgotten_ = false;
 }
 
 }  // namespace soft_step

@@ -7,6 +7,7 @@
 
 #include <span>
 #include <utility>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -19,8 +20,12 @@ class ContactCache {
   /// match().
   ContactSet& current() { return current_; }
   const ContactSet& current() const { return current_; }
-  /// Contacts of the last completed step.
-  ContactSet& last() { return last_; }
+  /// Contacts of the last completed step, without those of forgotten bodies.
+  ContactSet& last() {
+    drop_forgotten();
+    return last_;
+  }
+  /// drop_forgotten() must have been called since the last forget().
   const ContactSet& last() const { return last_; }
 
   /// Gives each contact the impulses and the color that the same contact had in the last step, and
@@ -30,10 +35,14 @@ class ContactCache {
   void match(std::span<const Real> inverse_mass, ThreadPool* pool);
   /// Completes the step: the current contacts become the last ones. Does not allocate.
   void commit() noexcept { std::swap(last_, current_); }
+  /// Makes room for forget() of bodies with indices below `bodies`. @throws std::bad_alloc
+  void reserve(std::size_t bodies);
   /// Replaces the contacts of the last completed step.
-  void restore(ContactSet last) noexcept { last_ = std::move(last); }
-  /// Removes the contacts of a body.
+  void restore(ContactSet last) noexcept;
+  /// Removes the contacts of a body: takes constant time, and drop_forgotten() does the work for
+  /// all removed bodies together. Bodies that match() and reserve() did not include have none.
   void forget(std::uint32_t body) noexcept;
+  void drop_forgotten() noexcept;
 
  private:
   void match_spheres(std::uint32_t first, std::uint32_t last);
@@ -41,6 +50,8 @@ class ContactCache {
   void keep(std::uint32_t i, std::uint32_t before);
 
   ContactSet current_, last_;
+  std::vector<std::uint8_t> forgotten_;  ///< by body: 1 if last_ must lose its contacts
+  bool any_forgotten_ = false;
   GreedyColoring coloring_;
 };
 

@@ -24,7 +24,6 @@ struct BodyProperties {
   const Real *friction = nullptr, *restitution = nullptr;
   const Real *rolling_friction = nullptr, *spinning_friction = nullptr;  ///< [m]
   MaterialSettings rules;
-  Real restitution_threshold = 0;  ///< [m/s]
 };
 
 enum class RowKind : std::uint8_t { none, sphere, manifold };
@@ -37,6 +36,7 @@ struct RowSetup {
   ContactView contacts;
   BodyProperties properties;
   const SolverBody* start = nullptr;  ///< by body, before the accelerations of the step
+  Real restitution_threshold = 0;     ///< StepConstants::restitution_threshold
 
   /// Whether body b of a contact becomes body a of its row, which must be movable.
   JFPX_HD bool is_flipped(const ContactKey& key) const { return !is_movable(key.a); }
@@ -77,7 +77,7 @@ struct RowSetup {
     const Real gained = -2 * gap * dot(acceleration(a) - acceleration(b), normal);
     const Real square = closing * closing + gained;
     const Real speed = square > 0 ? square_root(square) : Real(0);
-    return speed > properties.restitution_threshold ? restitution * speed : Real(0);
+    return speed > restitution_threshold ? restitution * speed : Real(0);
   }
 
   template <bool kFixed>

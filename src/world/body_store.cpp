@@ -73,12 +73,11 @@ BodyStore::BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps
       sleep_(sleep),
       motion_kept_(kept_per_step(sleep.bias, dt)) {}
 
-/// If an allocation fails, capacity() is unchanged, because generation_ grows last. Reserves memory
-/// for free_ and ids_, so that remove() and the rest of add() do not allocate.
-void BodyStore::resize_slots(std::size_t slots) {
-  reserve_geometric(&free_, slots);
-  reserve_geometric(&ids_, slots);
-  const auto all = [slots](auto&... arrays) { (arrays.resize(slots), ...); };
+/// Calls visit(array) for the arrays that have an item per slot. generation_, whose size is
+/// capacity(), is the last.
+template <class Visit>
+void BodyStore::for_each_array(const Visit& visit) {
+  const auto all = [&visit](auto&... arrays) { (visit(arrays), ...); };
   all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
       moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion,
       moving.rest_time, moving.awake);
@@ -86,6 +85,20 @@ void BodyStore::resize_slots(std::size_t slots) {
       spinning_friction_, inertia_, body_inverse_inertia_, tensor_, acceleration_, linear_damping_,
       angular_damping_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_, sensor_,
       inertia_given_, user_data_, filter_, generation_);
+}
+
+void BodyStore::reserve(std::size_t bodies) {
+  free_.reserve(bodies);
+  ids_.reserve(bodies);
+  for_each_array([bodies](auto& array) { array.reserve(bodies); });
+}
+
+/// If an allocation fails, capacity() is unchanged, because generation_ grows last. Reserves memory
+/// for free_ and ids_, so that remove() and the rest of add() do not allocate.
+void BodyStore::resize_slots(std::size_t slots) {
+  reserve_geometric(&free_, slots);
+  reserve_geometric(&ids_, slots);
+  for_each_array([slots](auto& array) { array.resize(slots); });
 }
 
 /// Adds an unused slot.

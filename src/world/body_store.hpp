@@ -44,6 +44,8 @@ class BodyStore {
   /// @param substeps number of substeps of a step
   BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps = 1);
 
+  /// Reserves memory for `bodies` bodies in all, exactly. @throws std::bad_alloc
+  void reserve(std::size_t bodies);
   /// @param def must have passed validation
   /// @throws std::bad_alloc; the store is then unchanged
   BodyId add(const BodyDef& def);
@@ -144,6 +146,8 @@ class BodyStore {
   MotionArrays moving;
 
  private:
+  template <class Visit>
+  void for_each_array(const Visit& visit);
   void resize_slots(std::size_t slots);
   void add_slot();
   void set_shape(std::uint32_t body, Shape shape) noexcept;

@@ -44,6 +44,11 @@ struct BodyView {
   Real woken_motion = 0;        ///< [m^2/s^2], mean motion of a body that wakes
 
   JFPX_HD bool movable(std::uint32_t i) const { return inverse_mass[i] > 0; }
+  /// Whether the body is movable and awake.
+  JFPX_HD bool is_active(std::uint32_t i) const { return movable(i) && awake[i] != 0; }
+  JFPX_HD bool is_asleep(std::uint32_t i) const { return movable(i) && awake[i] == 0; }
+  /// Whether the body is kinematic and in motion.
+  JFPX_HD bool is_carrier(std::uint32_t i) const { return !movable(i) && awake[i] != 0; }
   /// Whether the body is a movable sphere whose inertia is the same about every axis.
   JFPX_HD bool is_round(std::uint32_t i) const {
     return movable(i) && radius[i] > 0 && !(tensor[i](0, 0) > 0);

@@ -21,6 +21,7 @@ void BroadPhaseSearch::set_spheres(std::span<const SphereInstance> spheres) {
 }
 
 ContactSpan BroadPhaseSearch::find(std::span<const SphereInstance> spheres) {
+  neighbors_.clear();
   if (broad_phase_ == BroadPhase::cells) return collider_->find_contacts(spheres);
   contacts_.clear();
   if (broad_phase_ == BroadPhase::brute_force) {
@@ -33,6 +34,15 @@ ContactSpan BroadPhaseSearch::find(std::span<const SphereInstance> spheres) {
     add_touching(spheres);
   }
   return contacts_;
+}
+
+std::span<const SpherePair> BroadPhaseSearch::find_pairs(std::span<const SphereInstance> spheres,
+                                                         ThreadPool* pool) {
+  if (broad_phase_ == BroadPhase::cells) return neighbors_.find(spheres, collider_.get(), pool);
+  const ContactSpan found = find(spheres);
+  pairs_.clear();
+  for (const SphereContact& c : found) pairs_.push_back({c.a, c.b});
+  return pairs_;
 }
 
 /// Works in batches, because all pairs of many spheres would exhaust the memory.

@@ -3,6 +3,7 @@
 
 #include <jfpx/world.hpp>
 
+#include "src/world/neighbor_list.hpp"
 #include "src/world/sphere_hierarchy.hpp"
 
 namespace jfpx {
@@ -21,6 +22,10 @@ class BroadPhaseSearch {
   /// All touching pairs, sorted. Valid until the next call.
   /// @throws the exceptions of SphereCollider::find_contacts() and find_touching()
   ContactSpan find(std::span<const SphereInstance> spheres);
+  /// The pairs of find() as indices alone. Takes less time if the spheres have moved little since
+  /// the last call. Valid until the next call of either function.
+  /// @throws as find()
+  std::span<const SpherePair> find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool);
 
   const SphereCollider& collider() const noexcept { return *collider_; }
 
@@ -31,6 +36,7 @@ class BroadPhaseSearch {
   std::unique_ptr<SphereCollider> collider_;
   BroadPhase broad_phase_;
   SphereHierarchy hierarchy_;
+  NeighborList neighbors_;
   std::vector<SpherePair> pairs_;
   std::vector<SphereContact> contacts_;
 };

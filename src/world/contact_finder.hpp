@@ -42,7 +42,7 @@ class ContactFinder {
   /// @param near     receives all pairs, each list sorted by key
   /// @param touching receives the contacts with distance <= 0
   /// @returns the number of contacts of two spheres in `touching`
-  /// @throws the exceptions of SphereCollider::find_contacts()
+  /// @throws the exceptions of SphereCollider::find_pairs()
   std::uint64_t find_near_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
                                    soft_step::ContactSet* near, std::vector<Contact>* touching);
 
@@ -80,12 +80,15 @@ class ContactFinder {
     }
   };
   void sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool);
-  void test_sphere_pairs(const BodyStore& bodies, ContactSpan pairs, Part* part) const;
+  void test_sphere_pairs(const BodyStore& bodies, std::span<const SpherePair> pairs,
+                         Part* part) const;
   void find_fixed_pairs(SubShape first, SubShape last, Part* part) const;
   struct Results;
   void test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
                        Results* results, ThreadPool* pool);
-  std::span<Part> start_parts(std::size_t count);
+  template <class Find, class AppendAll>
+  void for_each_batch(ThreadPool* pool, std::size_t count, const Find& find,
+                      const AppendAll& append_all);
   void merge_by_bodies(std::size_t middle, std::span<Contact> contacts);
 
   BroadPhaseSearch broad_phase_;

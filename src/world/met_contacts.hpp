@@ -28,13 +28,13 @@ JFPX_HD inline std::uint32_t count_met(const ContactView& contacts, std::uint32_
 }
 
 /// Calls add(key, whether both are spheres, normal, point of body b at the start of the step) for
-/// all points that have met, in the order of the contacts.
+/// all points of the contacts [first, last) that have met, in the order of the contacts.
 /// @param position(body) [m], at the start of the step
 /// @param radius(body)   [m]
 template <class Position, class Radius, class Add>
-void for_each_met(const ContactView& contacts, const Position& position, const Radius& radius,
-                  const Add& add) {
-  for (std::uint32_t i = 0; i < contacts.size(); ++i) {
+void for_each_met(const ContactView& contacts, std::uint32_t first, std::uint32_t last,
+                  const Position& position, const Radius& radius, const Add& add) {
+  for (std::uint32_t i = first; i < last; ++i) {
     if (count_met(contacts, i) == 0) continue;
     const ContactKey& key = contacts.key(i);
     const Vec3& normal = contacts.normal(i);

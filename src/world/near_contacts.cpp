@@ -13,6 +13,8 @@ namespace {
 using soft_step::ContactSet;
 
 constexpr std::size_t kSubShapesPerChunk = 1024, kPairsPerChunk = 1024;
+/// Chunks of a batch for each thread: enough to balance their loads.
+constexpr std::size_t kChunksPerThread = 4;
 
 /// A list that is filled again in every step. Its vector keeps the items of the last step until
 /// they are overwritten, because constructing them again would take as long as filling them.
@@ -73,11 +75,11 @@ void ContactFinder::sweep_bounds(const BodyStore& bodies, Real margin, ThreadPoo
 /// Tests pairs of swept bounds: contacts of two spheres go to *part, pairs with a box or a part of
 /// a compound to its candidates. Spheres of compounds become manifolds, because their arms are not
 /// multiples of the normal.
-void ContactFinder::test_sphere_pairs(const BodyStore& bodies, ContactSpan pairs,
+void ContactFinder::test_sphere_pairs(const BodyStore& bodies, std::span<const SpherePair> pairs,
                                       Part* part) const {
   const BodyView& view = near_.bodies;
   const SubShapeView& sub_shapes = near_.sub_shapes;
-  for (const SphereContact& pair : pairs) {
+  for (const SpherePair& pair : pairs) {
     const PairKind kind = near_.kind_of(pair.a, pair.b);
     if (kind == PairKind::none) continue;
     if (kind != PairKind::spheres) {
@@ -133,30 +135,53 @@ void ContactFinder::Part::add(const BodyStore& bodies, const NearPair& near) {
   manifolds.push_back({near.key, near.normal, first, near.point_count});
 }
 
+/// Calls find(first, last, part) for the chunks of [0, count), from any thread, and then
+/// append_all(parts) in this thread; batch by batch, so that the parts take little memory, and are
+/// still in the cache when they are appended.
+template <class Find, class AppendAll>
+void ContactFinder::for_each_batch(ThreadPool* pool, std::size_t count, const Find& find,
+                                   const AppendAll& append_all) {
+  const std::size_t chunks = (count + kPairsPerChunk - 1) / kPairsPerChunk;
+  const std::size_t threads = pool == nullptr ? 1 : pool->threads();
+  const std::size_t most = std::min(chunks, kChunksPerThread * threads);
+  if (parts_.size() < most) parts_.resize(most);
+  for (std::size_t batch = 0; batch < chunks; batch += most) {
+    const std::span<Part> parts = std::span(parts_).first(std::min(most, chunks - batch));
+    const std::size_t begin = batch * kPairsPerChunk;
+    const std::size_t size = std::min(count - begin, parts.size() * kPairsPerChunk);
+    parallel_for(pool, size, kPairsPerChunk, [&](std::size_t first, std::size_t last) {
+      Part& part = parts[first / kPairsPerChunk];
+      part.clear();
+      find(begin + first, begin + last, &part);
+    });
+    append_all(parts);
+  }
+}
+
 /// Runs the pair tests of a sorted list of candidates and appends the results.
 void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
                                     Results* results, ThreadPool* pool) {
-  const std::span<Part> parts = start_parts(candidates.size());
-  parallel_for(pool, candidates.size(), kPairsPerChunk, [&](std::size_t first, std::size_t last) {
-    Part& part = parts[first / kPairsPerChunk];
+  const auto test_chunk = [&](std::size_t first, std::size_t last, Part* part) {
     NearPair near;
     NearPairTest test(near_, &near);
     for (const Candidate& pair : candidates.subspan(first, last - first)) {
       test(pair);
-      part.add(bodies, near);
+      part->add(bodies, near);
     }
+  };
+  for_each_batch(pool, candidates.size(), test_chunk, [&](std::span<Part> parts) {
+    auto first_point = static_cast<std::uint32_t>(results->points.size);
+    for (Part& part : parts) {
+      for (soft_step::ManifoldInput& manifold : part.manifolds) manifold.first += first_point;
+      first_point += static_cast<std::uint32_t>(part.points.size());
+    }
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.manifolds; }, &results->manifolds);
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.points; }, &results->points);
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.touching; }, &results->touching);
   });
-  auto first_point = static_cast<std::uint32_t>(results->points.size);
-  for (Part& part : parts) {
-    for (soft_step::ManifoldInput& manifold : part.manifolds) manifold.first += first_point;
-    first_point += static_cast<std::uint32_t>(part.points.size());
-  }
-  append(
-      pool, parts, [](Part & p) -> auto& { return p.manifolds; }, &results->manifolds);
-  append(
-      pool, parts, [](Part & p) -> auto& { return p.points; }, &results->points);
-  append(
-      pool, parts, [](Part & p) -> auto& { return p.touching; }, &results->touching);
 }
 
 /// Merges the sorted ranges [0, middle) and [middle, size) of a list. Unlike std::inplace_merge(),
@@ -173,14 +198,6 @@ void ContactFinder::merge_by_bodies(std::size_t middle, std::span<Contact> conta
   }
 }
 
-/// Empty parts for a loop over `count` items in chunks of kPairsPerChunk.
-std::span<ContactFinder::Part> ContactFinder::start_parts(std::size_t count) {
-  const std::size_t chunks = (count + kPairsPerChunk - 1) / kPairsPerChunk;
-  if (parts_.size() < chunks) parts_.resize(chunks);
-  for (std::size_t i = 0; i < chunks; ++i) parts_[i].clear();
-  return std::span(parts_).first(chunks);
-}
-
 std::uint64_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real margin,
                                                 ThreadPool* pool, ContactSet* near,
                                                 std::vector<Contact>* touching) {
@@ -189,19 +206,21 @@ std::uint64_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real ma
   Results results{{&near->spheres}, {&near->manifolds}, {&near->points}, {touching}};
   Refilled<Candidate> candidates{&candidates_}, compounds{&compounds_};
 
-  const ContactSpan found = broad_phase_.find(std::span(swept_).first(sub_shapes_.fixed_begin()));
-  std::span<Part> parts = start_parts(found.size());
-  parallel_for(pool, found.size(), kPairsPerChunk, [&](std::size_t first, std::size_t last) {
-    test_sphere_pairs(bodies, found.subspan(first, last - first), &parts[first / kPairsPerChunk]);
+  const std::span<const SpherePair> found =
+      broad_phase_.find_pairs(std::span(swept_).first(sub_shapes_.fixed_begin()), pool);
+  const auto test_pairs = [&](std::size_t first, std::size_t last, Part* part) {
+    test_sphere_pairs(bodies, found.subspan(first, last - first), part);
+  };
+  for_each_batch(pool, found.size(), test_pairs, [&](std::span<Part> parts) {
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.spheres; }, &results.spheres);
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.touching; }, &results.touching);
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.compounds; }, &compounds);
   });
-  append(
-      pool, parts, [](Part & p) -> auto& { return p.spheres; }, &results.spheres);
-  append(
-      pool, parts, [](Part & p) -> auto& { return p.touching; }, &results.touching);
-  append(
-      pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
-  append(
-      pool, parts, [](Part & p) -> auto& { return p.compounds; }, &compounds);
 
   compounds.finish();
   if (!compounds_.empty()) {
@@ -212,14 +231,13 @@ std::uint64_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real ma
   }
   const std::uint64_t sphere_contacts = results.touching.size;
 
-  parts = start_parts(sub_shapes_.fixed_begin());
-  parallel_for(pool, sub_shapes_.fixed_begin(), kPairsPerChunk,
-               [&](std::size_t first, std::size_t last) {
-                 find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last),
-                                  &parts[first / kPairsPerChunk]);
-               });
-  append(
-      pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
+  const auto find_fixed = [&](std::size_t first, std::size_t last, Part* part) {
+    find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last), part);
+  };
+  for_each_batch(pool, sub_shapes_.fixed_begin(), find_fixed, [&](std::span<Part> parts) {
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
+  });
   candidates.finish();
   if (!std::ranges::is_sorted(candidates_)) std::ranges::sort(candidates_);
   test_candidates(bodies, candidates_, &results, pool);

@@ -91,13 +91,11 @@ void SoftStep::find_islands(const BodyView& bodies, const Touches& touches) {
       }
     }
   });
-  const auto carries = [&](std::uint32_t body) {
-    return !bodies.movable(body) && bodies.awake[body] != 0;
-  };
   for (std::uint32_t i = 0; i < contacts.size(); ++i) {
     const ContactKey& key = contacts.key(i);
-    if ((carries(key.a) || carries(key.b)) && touches(contacts, i)) {
-      marked_[islands_.find(carries(key.a) ? key.b : key.a)] = 1;
+    const bool a_carries = bodies.is_carrier(key.a);
+    if ((a_carries || bodies.is_carrier(key.b)) && touches(contacts, i)) {
+      marked_[islands_.find(a_carries ? key.b : key.a)] = 1;
     }
   }
 }
@@ -105,18 +103,16 @@ void SoftStep::find_islands(const BodyView& bodies, const Touches& touches) {
 /// Wakes the islands that touch an awake body or a kinematic body in motion.
 void SoftStep::wake_touched(BodyStore* store) {
   const BodyView bodies = store->view();
-  const auto rests = [&](BodyId id) {
-    return bodies.movable(id.index) && bodies.awake[id.index] == 0;
-  };
-  if (std::ranges::none_of(store->ids(), rests)) return;
+  const auto is_asleep = [&](BodyId id) { return bodies.is_asleep(id.index); };
+  if (std::ranges::none_of(store->ids(), is_asleep)) return;
   find_islands(bodies, [&](const ContactView& contacts, std::uint32_t contact) {
     return soft_step::will_touch(bodies, contacts, contact);
   });
   for (const BodyId id : store->ids()) {
-    if (bodies.movable(id.index) && !rests(id)) marked_[islands_.find(id.index)] = 1;
+    if (bodies.is_active(id.index)) marked_[islands_.find(id.index)] = 1;
   }
   for (const BodyId id : store->ids()) {
-    if (rests(id) && marked_[islands_.find(id.index)] != 0) store->wake(id.index);
+    if (is_asleep(id) && marked_[islands_.find(id.index)] != 0) store->wake(id.index);
   }
 }
 
@@ -166,15 +162,14 @@ bool SoftStep::store_bodies(const BodyStore& bodies) {
 /// Islands whose bodies have all been slow for long enough fall asleep.
 void SoftStep::put_islands_to_sleep(const BodyStore& store) {
   const BodyView bodies = store.view();
-  const auto is_awake = [&](BodyId id) {
-    return bodies.movable(id.index) && bodies.awake[id.index] != 0;
-  };
   find_islands(bodies, soft_step::has_touched);
   for (const BodyId id : store.ids()) {
-    if (is_awake(id) && !bodies.is_at_rest(id.index)) marked_[islands_.find(id.index)] = 1;
+    const std::uint32_t i = id.index;
+    if (bodies.is_active(i) && !bodies.is_at_rest(i)) marked_[islands_.find(i)] = 1;
   }
   for (const BodyId id : store.ids()) {
-    if (is_awake(id) && marked_[islands_.find(id.index)] == 0) step_.motion.put_to_sleep(id.index);
+    const std::uint32_t i = id.index;
+    if (bodies.is_active(i) && marked_[islands_.find(i)] == 0) step_.motion.put_to_sleep(i);
   }
 }
 
@@ -200,9 +195,9 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
                                 .restitution = view.restitution,
                                 .rolling_friction = view.rolling_friction,
                                 .spinning_friction = view.spinning_friction,
-                                .rules = materials_,
-                                .restitution_threshold = settings_.restitution_threshold},
-                 .start = bodies_.data()},
+                                .rules = materials_},
+                 .start = bodies_.data(),
+                 .restitution_threshold = constants_.restitution_threshold},
                 {step_.bodies.last_acceleration, free_.data()}, constants_);
   for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
     for_each_body(*bodies, [&](std::uint32_t i) {

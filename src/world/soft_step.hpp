@@ -39,13 +39,16 @@ class SoftStep {
   std::optional<BodyId> solve(BodyStore* bodies);
   /// Moves the bodies, clears forces, and puts islands to sleep.
   void commit(BodyStore* bodies) noexcept;
-  /// Contacts of the last completed step.
+  /// As above, after drop_removed().
   const soft_step::ContactSet& last_contacts() const { return cache_.last(); }
+  /// Makes room for bodies with indices below `bodies`. @throws std::bad_alloc
+  void reserve(std::size_t bodies) { cache_.reserve(bodies); }
   /// Replaces the parameters of the constructor and the contacts of the last completed step.
   void restore(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
                soft_step::ContactSet last) noexcept;
-  /// Removes the contacts of a removed body.
+  /// Removes the contacts of a removed body, in constant time; drop_removed() completes the work.
   void forget(std::uint32_t body) noexcept { cache_.forget(body); }
+  void drop_removed() noexcept { cache_.drop_forgotten(); }
 
  private:
   void prepare(const BodyStore& bodies);

@@ -40,7 +40,7 @@ struct StepBodies {
 
   /// Starts the step.
   JFPX_HD void load(std::uint32_t i) const {
-    if (bodies.movable(i) && bodies.awake[i] != 0) {
+    if (bodies.is_active(i)) {
       motion.last_acceleration[i] = bodies.acceleration_of_step(i);
     }
     SolverBody body;
@@ -60,7 +60,7 @@ struct StepBodies {
   /// method for the whole step, because a spring would gain energy otherwise.
   JFPX_HD void accelerate(std::uint32_t i, SolverBody* body, FreeMotion* free,
                           bool is_first) const {
-    if (!bodies.movable(i) || bodies.awake[i] == 0) return;
+    if (!bodies.is_active(i)) return;
     Vec3 velocity = body->velocity, angular_velocity = body->angular_velocity;
     bodies.accelerate(i, orientation[i], &velocity, &angular_velocity);
     if (near[i] == 0) {

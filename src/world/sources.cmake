@@ -8,6 +8,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/contact_finder.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_resolver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_snapshot.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/contacts_by_body.cpp
   ${CMAKE_CURRENT_LIST_DIR}/device_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_snapshot.cpp
@@ -16,6 +17,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/indexed_priority_queue.cpp
   ${CMAKE_CURRENT_LIST_DIR}/islands.cpp
   ${CMAKE_CURRENT_LIST_DIR}/near_contacts.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/neighbor_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_resolver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_world.cpp

@@ -44,6 +44,11 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
   part_.clear();
   local_.clear();
   kinematic_.clear();
+  const std::size_t least = bodies.ids().size();  // exact without compounds
+  body_.reserve(least);
+  number_.reserve(least);
+  bounds_.reserve(least);
+  part_.reserve(least);
   const auto add = [&](std::uint32_t body, Real radius, const CompoundPart* part,
                        std::uint32_t number) {
     body_.push_back(body);

@@ -8,10 +8,12 @@
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <iterator>
 #include <new>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -96,22 +98,47 @@ void World::Impl::find_contacts(StepReport* report) {
   detected_count = report->contacts;
 }
 
+/// Fills `met` with the contacts that came about during the step: counts them first, so that
+/// threads know where to write. @returns how many are of two spheres
+std::size_t World::Impl::find_met_contacts() {
+  constexpr std::size_t kChunk = 4096;
+  const soft_step::ContactView view = soft_step.contacts().view();
+  const std::size_t chunks = (view.size() + kChunk - 1) / kChunk;
+  resize_geometric(&met_begin, chunks + 1);
+  std::atomic<std::size_t> of_spheres{0};
+  parallel_for(pool.get(), view.size(), kChunk, [&](std::size_t first, std::size_t last) {
+    std::size_t count = 0, spheres = 0;
+    for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
+      const std::uint32_t points = soft_step::count_met(view, i);
+      count += points;
+      if (view.is_sphere(i)) spheres += points;
+    }
+    met_begin[first / kChunk] = count;
+    of_spheres.fetch_add(spheres, std::memory_order_relaxed);
+  });
+  met_begin[chunks] = 0;
+  std::exclusive_scan(met_begin.begin(), met_begin.end(), met_begin.begin(), std::size_t{0});
+  // Room for more than there usually are, so that warm steps allocate nothing.
+  reserve_geometric(&met, std::max(met_begin[chunks], std::size_t{64}));
+  met.resize(met_begin[chunks]);
+  parallel_for(pool.get(), view.size(), kChunk, [&](std::size_t first, std::size_t last) {
+    std::size_t next = met_begin[first / kChunk];
+    if (next == met_begin[first / kChunk + 1]) return;
+    soft_step::for_each_met(
+        view, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
+        [this](std::uint32_t body) { return store.moving.position[body]; },
+        [this](std::uint32_t body) { return store.radius(body); },
+        [&](const soft_step::ContactKey& key, bool, const Vec3& normal, const Vec3& point) {
+          met[next++] = {store.id(key.a), store.id(key.b), normal, point, 0};
+        });
+  });
+  return of_spheres;
+}
+
 /// Adds the contacts that came about during the step to those of detection, after the contacts of
 /// the same bodies.
 void World::Impl::add_met_contacts(StepReport* report) {
-  met.clear();
-  // Room for more than there usually are, so that warm steps allocate nothing.
-  reserve_geometric(&met, contacts.size() / 8 + 64);
-  std::size_t of_spheres = 0;
-  soft_step::for_each_met(
-      soft_step.contacts().view(),
-      [this](std::uint32_t body) { return store.moving.position[body]; },
-      [this](std::uint32_t body) { return store.radius(body); },
-      [&](const soft_step::ContactKey& key, bool are_spheres, const Vec3& normal,
-          const Vec3& point) {
-        met.push_back({store.id(key.a), store.id(key.b), normal, point, 0});
-        of_spheres += are_spheres ? 1 : 0;
-      });
+  const std::size_t of_spheres = find_met_contacts();
   if (met.empty()) return;
   finish_contacts(&met);
   // Merges from the back: generated contacts, then others, then those of spheres.
@@ -261,6 +288,7 @@ StepReport World::step() {
   w.contacts_are_new = false;
   w.query_tree.invalidate();
   w.events.invalidate();
+  w.contacts_by_body.invalidate();
   try {
     if (w.advance(&report)) {
       ++w.steps;

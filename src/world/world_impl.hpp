@@ -9,6 +9,7 @@
 #include "src/world/contact_events.hpp"
 #include "src/world/contact_finder.hpp"
 #include "src/world/contact_resolver.hpp"
+#include "src/world/contacts_by_body.hpp"
 #include "src/world/device_world.hpp"
 #include "src/world/force_snapshot.hpp"
 #include "src/world/lazy_query_tree.hpp"
@@ -32,6 +33,7 @@ struct World::Impl {
         store(empty_store(given)),
         contact_finder(std::move(collider), broad_phase),
         soft_step(given.soft_step, given.materials, given.dt, pool.get()) {
+    store.reserve(given.bodies.size());
     for (const BodyDef& def : given.bodies) store.add(def);
     store.set_ignored_pairs(given.ignored_pairs);  // a body of the scene has the index of its slot
   }
@@ -83,11 +85,10 @@ struct World::Impl {
       edited_body(body.index, {.wakes_neighbors = true});
       return;
     }
-    for (const Contact& c : contacts) {
-      if (c.sensor || (c.a != body && c.b != body)) continue;
+    contacts_by_body.for_each(contacts, body, [&](const Contact& c) {
       const BodyId other = c.a == body ? c.b : c.a;
-      if (store.contains(other)) wake(other.index);
-    }
+      if (!c.sensor && store.contains(other)) wake(other.index);
+    });
   }
 
   void wake(std::uint32_t body) { edited_body(body, {.wakes = true}).wake(body); }
@@ -123,6 +124,7 @@ struct World::Impl {
   void finish_contacts(std::vector<Contact>* list) const;
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   void find_contacts(StepReport* report);
+  std::size_t find_met_contacts();
   void add_met_contacts(StepReport* report);
   void save_for_undo();
   void undo_motion() noexcept;
@@ -144,8 +146,10 @@ struct World::Impl {
   LazyQueryTree query_tree;
   /// Contacts of the last step that was not undone. Bodies may have been removed since.
   std::vector<Contact> contacts;
-  std::vector<Contact> resolved;  ///< during a step with sensors: the contacts of other bodies
-  std::vector<Contact> met;       ///< contacts that came about during the step
+  ContactsByBody contacts_by_body;     ///< of `contacts`
+  std::vector<Contact> resolved;       ///< during a step with sensors: the contacts of other bodies
+  std::vector<Contact> met;            ///< contacts that came about during the step
+  std::vector<std::size_t> met_begin;  ///< by chunk of contacts: its first entry in `met`
   std::vector<Contact> contacts_before;  ///< those of the step before, for events and undo()
   /// Numbers of detected contacts in both lists; the others are those of contact generators.
   std::size_t detected_count = 0, detected_count_before = 0;

@@ -133,12 +133,17 @@ void World::Impl::fetch_contacts() {
 void World::Impl::fetch_contact_set() {
   const std::lock_guard lock(fetching);
   if (contact_set_is_current) return;
+  soft_step.reserve(store.capacity());
   const Timer timer(&spent_us);
   device->fetch_contact_set(&soft_step.last_contacts());
   contact_set_is_current = true;
 }
 
 void World::Impl::fetch_all() {
+  {
+    const std::lock_guard lock(fetching);
+    soft_step.drop_removed();
+  }
   if (!resident) return;
   fetch_motion();
   fetch_contacts();

@@ -38,6 +38,8 @@ void World::Impl::read(BinaryReader* reader) {
   GeneratorRestorer new_generators(reader, generators);
   BinaryReader::require(reader->left() == 0, "it is too long");
 
+  soft_step.reserve(bodies.capacity());
+
   // From here on, nothing throws.
   settings.bodies = std::move(scene.bodies);
   settings.ignored_pairs = std::move(scene.ignored_pairs);
@@ -48,6 +50,7 @@ void World::Impl::read(BinaryReader* reader) {
   store = std::move(bodies);
   soft_step.restore(scene.soft_step, scene.materials, scene.dt, std::move(last));
   contacts = std::move(touching);
+  contacts_by_body.invalidate();
   detected_count = detected;
   shows_contacts = shown;
   shows_events = false;

@@ -1,4 +1,4 @@
-/// Tests that warm steps allocate nothing. A separate program, because it replaces operator new.
+/// Tests that warm steps allocate nothing, and of the memory of a world. A separate program, because it replaces operator new.
 #include <jfpx/particle.hpp>
 
 #include "src/scenes/scenes.hpp"
@@ -8,19 +8,22 @@
 
 #include <atomic>
 #include <cstdlib>
+#include <malloc.h>
 #include <new>
 
 namespace {
-std::atomic<long> allocations{0}, alive{0};
+std::atomic<long> allocations{0}, alive{0}, bytes{0};
 
 void* counted(void* memory) {
   if (memory == nullptr) throw std::bad_alloc();
   ++allocations;
   ++alive;
+  bytes += static_cast<long>(malloc_usable_size(memory));
   return memory;
 }
 void release(void* memory) noexcept {
   if (memory != nullptr) --alive;
+  bytes -= static_cast<long>(malloc_usable_size(memory));
   std::free(memory);
 }
 }  // namespace
@@ -182,6 +185,17 @@ TEST_P(Allocation, WarmStepsOfCompoundsAllocateNothingWithAnyBroadPhase) {
     EXPECT_GE(contacts, 50u * 20u);
     EXPECT_EQ(allocations, before) << static_cast<int>(way);
   }
+}
+
+// bench/results/soft_step.md says where the bytes go.
+TEST(Allocation, AWorldTakesTheStatedMemory) {
+  constexpr long kSpheres = 4096;
+  const long before = bytes;
+  World world(scenes::make("pile", {.spheres = kSpheres}), kFixed);
+  StepReport report;
+  for (int n = 0; n < 150; ++n) report = world.step();
+  ASSERT_GT(report.contacts, 2u * kSpheres);
+  EXPECT_LE((bytes - before) / kSpheres, static_cast<long>(525 * sizeof(Real)));
 }
 
 TEST(Allocation, TheCounterCounts) {

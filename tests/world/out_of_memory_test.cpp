@@ -246,28 +246,32 @@ TEST_P(OutOfMemoryInAWorld, AQueryAfterAFailedOneFindsTheSame) {
   EXPECT_GT(failures, 5u);
 }
 
+// An index of contacts that makes it faster is left out.
 TEST_P(OutOfMemoryInAWorld, BodiesAreRemovedAndMovedWithoutMemory) {
   Scene scene = dense_scene(1, GetParam());
   scene.ignored_pairs = {{0, 1}, {3, 0}, {3, 4}};
+  World undisturbed = make_world(scene, kSettings[0], 2);
   World world = make_world(scene, kSettings[0], 2);
-  BodyState state = world.state(world.bodies()[1]);
-  state.position.y += 1;
-  const BodyId gone = world.bodies()[0], moved = world.bodies()[1], pushed = world.bodies()[2];
-  const ForceId force = world.forces()[0];
+  const auto change = [](World& w) {
+    const BodyId moved = w.bodies()[1], pushed = w.bodies()[2], gone = w.bodies()[3];
+    BodyState state = w.state(moved);
+    state.position.y += 1;
+    w.set_filter(gone, {.category = 2});
+    w.set_mass(pushed, 2);
+    w.set_friction(moved, 1);
+    w.set_damping(moved, 1, 1);
+    w.remove(gone);
+    w.set_pair_ignored(w.bodies()[0], w.bodies()[1], false);
+    w.set_state(moved, state);
+    w.apply_force(pushed, {1, 2, 3});
+    w.remove_force(w.forces()[0]);
+  };
+  change(undisturbed);
   {
     const FailingNew failing(0, Shortage::permanent);
-    world.set_filter(gone, {.category = 2});
-    world.set_mass(pushed, 2);
-    world.set_friction(moved, 1);
-    world.set_damping(moved, 1, 1);
-    world.remove(gone);
-    world.set_pair_ignored(world.bodies()[2], world.bodies()[3], false);
-    world.set_state(moved, state);
-    world.apply_force(pushed, {1, 2, 3});
-    world.remove_force(force);
+    change(world);
   }
-  EXPECT_FALSE(FailingNew::failed());
-  EXPECT_EQ(world.state(moved).position, state.position);
+  EXPECT_TRUE(follow(world, 2) == follow(undisturbed, 2));
 }
 
 /// The threads of a pool are freed when the next pool is made, so that pools can share them.

@@ -4,6 +4,7 @@ jfpx_add_test(world_parts_test INTERNAL SOURCES
   world/compound_test.cpp
   world/contact_resolver_test.cpp
   world/indexed_priority_queue_test.cpp
+  world/neighbor_list_test.cpp
   world/query_tree_test.cpp)
 jfpx_add_test(automatic_device_test INTERNAL SOURCES world/automatic_device_test.cpp)
 jfpx_add_test(device_world_test INTERNAL SOURCES world/device_world_test.cpp)

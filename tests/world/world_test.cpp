@@ -120,6 +120,36 @@ TEST(World, BodiesAreAddedAndRemovedAtAnyTime) {
   world.step();
 }
 
+TEST(World, TheRemovalOfManyBodiesWakesTheNeighborsOfEachAndNoOthers) {
+  constexpr std::uint32_t kStacks = 8, kRemoved = 5;
+  Scene scene;
+  scene.bodies = {test::ground()};
+  for (std::uint32_t i = 0; i < 2 * kStacks; ++i) {
+    BodyDef crate;
+    crate.shape = Box{};
+    crate.position = {4 * static_cast<Real>(i / 2), i % 2 == 0 ? 0.5_r : 1.5_r, 0};
+    scene.bodies.push_back(crate);
+  }
+  World world(scene);
+  StepReport report;
+  for (int n = 0; n < 200; ++n) report = world.step();
+  ASSERT_EQ(report.awake, 0u);
+  const std::span<const BodyId> now = world.bodies();
+  const std::vector<BodyId> ids(now.begin(), now.end());
+  for (std::uint32_t stack = 0; stack < kRemoved; ++stack) world.remove(ids[1 + 2 * stack]);
+  for (std::uint32_t stack = 0; stack < kStacks; ++stack) {
+    EXPECT_EQ(world.awake(ids[2 + 2 * stack]), stack < kRemoved) << stack;
+  }
+  // The new body has the index, and not the contacts, of a removed one.
+  world.add(scene.bodies[1]);
+  World other(scene);
+  other.restore(world.snapshot());
+  for (int n = 0; n < 50; ++n) {
+    ASSERT_EQ(world.step().awake, other.step().awake);
+    ASSERT_EQ(world.state_hash(), other.state_hash()) << n;
+  }
+}
+
 TEST(World, AnUnknownIdIsAnError) {
   World world(two_balls());
   const BodyId gone = world.bodies()[0];

@@ -80,7 +80,8 @@ void sort_few(const std::uint64_t* row, SpherePair* sorted) {
 }
 
 /// Writes a row sorted.
-void sort_row(const std::uint64_t* row, std::size_t count, SpherePair* sorted, SpherePair* spare) {
+void sort_row(const std::uint64_t* row, std::size_t count, SpherePair* sorted,
+              Buffer<SpherePair>* spare) {
   if (count <= 1) {
     if (count == 1) *sorted = unpacked(*row);
     return;
@@ -93,7 +94,7 @@ void sort_row(const std::uint64_t* row, std::size_t count, SpherePair* sorted, S
   if (count <= 32) return sort_by_rank<32>(row, count, sorted);
   if (count <= 64) return sort_by_rank<64>(row, count, sorted);
   std::transform(row, row + count, sorted, unpacked);
-  if (count > 512) return sort_long_row(sorted, spare, count);
+  if (count > 512) return sort_long_row(sorted, spare->reserve(count, "pairs"), count);
   std::sort(sorted, sorted + count, less_in_row);
 }
 
@@ -155,8 +156,8 @@ std::span<const SpherePair> ContactWriter::write_rows(std::size_t spheres, const
   const std::size_t parts = (spheres >> part_bits) + 1;
   const std::uint64_t total = sections_[parts];
   pairs_.reserve(total, "pairs");
-  spare_.reserve(total, "pairs");
   reserve(total);
+  if (spares_.size() < parts) spares_.resize(parts);
   pool.run(parts, [&](std::size_t part) {
     const std::size_t first = part << part_bits;
     const std::size_t last = std::min(spheres, first + (std::size_t{1} << part_bits));
@@ -166,7 +167,7 @@ std::span<const SpherePair> ContactWriter::write_rows(std::size_t spheres, const
     SpherePair* end = begin;
     for (std::size_t a = first; a < last; ++a) {
       prefetch(rows_[std::min(a + kRowsAhead, last - 1)]);
-      sort_row(rows_[a].pairs, rows_[a].count, end, spare_.data() + (end - pairs_.data()));
+      sort_row(rows_[a].pairs, rows_[a].count, end, &spares_[part]);
       end += rows_[a].count;
     }
     done(std::span<const SpherePair>(begin, end));

@@ -6,6 +6,8 @@
 #include "src/base/thread_pool.hpp"
 #include "src/sphere_collider/cpu/pair_chunks.hpp"
 
+#include <vector>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
@@ -40,12 +42,13 @@ class ContactWriter {
   void make_rows(std::size_t bucket, std::size_t first, std::size_t last);
 
   Buffer<SphereContact> contacts_;
-  Buffer<SpherePair> pairs_, spare_;
-  Buffer<std::uint64_t> sections_;  ///< begins of parts of the result, and its end
-  Buffer<Row> rows_;                ///< by lower sphere
-  Buffer<std::uint64_t> offsets_;   ///< per chunk and bucket
-  Buffer<std::uint64_t> divided_;   ///< pairs by bucket of neighbouring lower spheres
-  Buffer<std::uint64_t> grouped_;   ///< pairs by lower sphere
+  Buffer<SpherePair> pairs_;
+  std::vector<Buffer<SpherePair>> spares_;  ///< by part of the result, for sorting long rows
+  Buffer<std::uint64_t> sections_;          ///< begins of parts of the result, and its end
+  Buffer<Row> rows_;                        ///< by lower sphere
+  Buffer<std::uint64_t> offsets_;           ///< per chunk and bucket
+  Buffer<std::uint64_t> divided_;           ///< pairs by bucket of neighbouring lower spheres
+  Buffer<std::uint64_t> grouped_;           ///< pairs by lower sphere
 };
 
 }  // namespace cpu

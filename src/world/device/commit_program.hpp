@@ -26,11 +26,7 @@ struct CommitProgram {
     });
     if (d.counters->any_rests != 0) put_islands_to_sleep(team);
     team.count(
-        bodies.count,
-        [&](std::uint32_t i) {
-          const std::uint32_t body = bodies.ids[i].index;
-          return bodies.movable(body) && bodies.awake[body] != 0;
-        },
+        bodies.count, [&](std::uint32_t i) { return bodies.is_active(bodies.ids[i].index); },
         &d.counters->awake);
     const soft_step::ContactView contacts = d.contacts();
     team.count(
@@ -51,16 +47,15 @@ struct CommitProgram {
     find_islands(team, d, [](const soft_step::ContactView& contacts, std::uint32_t i) {
       return soft_step::has_touched(contacts, i);
     });
-    const auto is_awake = [&](std::uint32_t body) {
-      return bodies.movable(body) && bodies.awake[body] != 0;
-    };
     team.for_each(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
-      if (is_awake(body) && !bodies.is_at_rest(body)) d.marked[island_of(d, body)] = 1;
+      if (bodies.is_active(body) && !bodies.is_at_rest(body)) d.marked[island_of(d, body)] = 1;
     });
     team.for_each(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
-      if (is_awake(body) && d.marked[island_of(d, body)] == 0) d.step.motion.put_to_sleep(body);
+      if (bodies.is_active(body) && d.marked[island_of(d, body)] == 0) {
+        d.step.motion.put_to_sleep(body);
+      }
     });
   }
 };

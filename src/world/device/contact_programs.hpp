@@ -25,7 +25,7 @@ struct BoundsProgram {
     team.for_each(bodies.capacity, [&](std::uint32_t i) { start(i); });
     team.spread(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
-      if (bodies.movable(body) && bodies.awake[body] == 0) d.counters->any_asleep = 1;
+      if (bodies.is_asleep(body)) d.counters->any_asleep = 1;
     });
     team.spread(d.near.sub_shapes.bounded_count, [&](std::uint32_t i) {
       d.near.sub_shapes.update_pose(bodies, i);

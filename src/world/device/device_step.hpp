@@ -44,7 +44,6 @@ class DeviceStep final : public DeviceWorld {
   void configure(const Scene& scene) noexcept override {
     data_.materials = scene.materials;
     data_.constants = soft_step::make_step_constants(scene.soft_step, scene.dt);
-    data_.restitution_threshold = scene.soft_step.restitution_threshold;
     data_.substeps = scene.soft_step.substeps;
     data_.step.h = data_.constants.h;
     data_.near.largest_margin = scene.soft_step.speculative_margin * Real(0.5);
@@ -169,7 +168,7 @@ class DeviceStep final : public DeviceWorld {
     constexpr std::uint32_t kLast = 0xffffffffu;
     std::uint32_t number = 0;
     soft_step::for_each_met(
-        set.view(), [&](std::uint32_t body) { return position[body]; },
+        set.view(), 0, set.size(), [&](std::uint32_t body) { return position[body]; },
         [&](std::uint32_t body) { return bodies.radius(body); },
         [&](const soft_step::ContactKey& key, bool of_spheres, const Vec3& normal,
             const Vec3& point) {

@@ -45,13 +45,11 @@ JFPX_HD void find_islands(const Team& team, const StepData& d, const Touches& to
       unite(d, key.a, key.b);
     }
   });
-  const auto carries = [&](std::uint32_t body) {
-    return !bodies.movable(body) && bodies.awake[body] != 0;
-  };
   team.for_each(contacts.size(), [&](std::uint32_t i) {
     const soft_step::ContactKey& key = contacts.key(i);
-    if ((carries(key.a) || carries(key.b)) && touches(contacts, i)) {
-      d.marked[island_of(d, carries(key.a) ? key.b : key.a)] = 1;
+    const bool a_carries = bodies.is_carrier(key.a);
+    if ((a_carries || bodies.is_carrier(key.b)) && touches(contacts, i)) {
+      d.marked[island_of(d, a_carries ? key.b : key.a)] = 1;
     }
   });
 }

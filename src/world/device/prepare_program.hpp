@@ -51,11 +51,11 @@ struct PrepareProgram {
     });
     team.for_each(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
-      if (bodies.movable(body) && bodies.awake[body] != 0) d.marked[island_of(d, body)] = 1;
+      if (bodies.is_active(body)) d.marked[island_of(d, body)] = 1;
     });
     team.for_each(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
-      if (bodies.movable(body) && bodies.awake[body] == 0 && d.marked[island_of(d, body)] != 0) {
+      if (bodies.is_asleep(body) && d.marked[island_of(d, body)] != 0) {
         d.step.motion.wake(bodies, body);
       }
     });

@@ -358,7 +358,7 @@ struct SolveProgram {
     const std::uint32_t i = item->index;
     if (!item->is_active) {
       const BodyView& bodies = d.step.bodies;
-      if (!bodies.movable(i) && bodies.awake[i] != 0) complete_kinematic(sweep, i);
+      if (bodies.is_carrier(i)) complete_kinematic(sweep, i);
       return;
     }
     SolverBody& body = item->motion;

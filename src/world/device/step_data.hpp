@@ -101,7 +101,6 @@ struct StepData {
   DeviceContacts now, last;
   MaterialSettings materials;
   soft_step::StepConstants constants;
-  Real restitution_threshold = 0;
   std::uint32_t substeps = 0;
   std::uint64_t number = 0;  ///< of the step, > 0
   Capacity capacity;
@@ -166,8 +165,9 @@ struct StepData {
     return {contacts(),
             {bodies.inverse_inertia, bodies.last_acceleration, bodies.radius, bodies.awake,
              bodies.friction, bodies.restitution, bodies.rolling_friction, bodies.spinning_friction,
-             materials, restitution_threshold},
-            step.solver};
+             materials},
+            step.solver,
+            constants.restitution_threshold};
   }
   /// Whether an earlier stage has found that the step can't be completed.
   JFPX_HD bool has_failed() const { return counters->failed != 0 || counters->invalid_bounds != 0; }

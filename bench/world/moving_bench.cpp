@@ -1,0 +1,98 @@
+/// Benchmarks of worlds in motion: the search for touching pairs of moving spheres, and the removal
+/// of bodies.
+#include <jfpx/random.hpp>
+#include <jfpx/world.hpp>
+
+#include "bench/sphere_collider/inputs.hpp"
+#include "src/scenes/scenes.hpp"
+#include "src/world/neighbor_list.hpp"
+
+#include <benchmark/benchmark.h>
+
+#include <string>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bench {
+namespace {
+
+/// 100,000 spheres with three contacts each. Every search follows a motion along straight lines.
+class MovingGas {
+ public:
+  /// @param speed largest motion per search along each axis, as part of the radius
+  explicit MovingGas(Real speed) : spheres_(input("gas").make(100'000)) {
+    Random random(1);
+    for (const SphereInstance& s : spheres_) {
+      velocities_.push_back(random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * (speed * s.radius));
+    }
+  }
+  void move() {
+    for (std::size_t i = 0; i < spheres_.size(); ++i) spheres_[i].centre += velocities_[i];
+  }
+  std::span<const SphereInstance> spheres() const { return spheres_; }
+
+ private:
+  std::vector<SphereInstance> spheres_;
+  std::vector<Vec3> velocities_;
+};
+
+/// `keeps`: with the neighbor list that steps of a world use; otherwise, every search is new.
+void search(benchmark::State& state, Real speed, bool keeps) {
+  MovingGas gas(speed);
+  const auto collider = make_sphere_collider({.backend = Backend::cpu});
+  NeighborList list;
+  std::size_t pairs = 0;
+  for (auto _ : state) {
+    gas.move();
+    pairs = keeps ? list.find(gas.spheres(), collider.get(), nullptr).size()
+                  : collider->find_pairs(gas.spheres()).size();
+  }
+  state.counters["pairs"] = static_cast<double>(pairs);
+}
+
+/// Removes bodies of a heap between two steps.
+void remove_bodies(benchmark::State& state, std::uint32_t spheres) {
+  constexpr std::size_t kRemoved = 100;
+  Scene scene = scenes::make("pile", {.spheres = spheres});
+  World world(scene);
+  for (int n = 0; n < 100; ++n) world.step();
+  for (auto _ : state) {
+    state.PauseTiming();
+    World other(scene);
+    other.restore(world.snapshot());
+    const std::vector<BodyId> ids(other.bodies().begin(), other.bodies().begin() + kRemoved);
+    state.ResumeTiming();
+    for (const BodyId id : ids) other.remove(id);
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * kRemoved));
+}
+
+void register_all() {
+  for (const double speed : {0.001, 0.01, 0.03, 0.1}) {
+    for (const bool keeps : {false, true}) {
+      const std::string name = std::string(keeps ? "neighbor_list" : "new_search") +
+                               "/speed:" + std::to_string(speed).substr(0, 5);
+      benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
+        search(state, static_cast<Real>(speed), keeps);
+      })->Iterations(40);
+    }
+  }
+  for (const std::uint32_t spheres : {1000u, 10'000u, 100'000u}) {
+    benchmark::RegisterBenchmark(("remove_100/pile:" + std::to_string(spheres)).c_str(),
+                                 [=](benchmark::State& state) { remove_bodies(state, spheres); })
+        ->Iterations(5);
+  }
+}
+
+}  // namespace
+}  // namespace bench
+}  // namespace JFPX_ABI
+}  // namespace jfpx
+
+int main(int argc, char** argv) {
+  jfpx::bench::register_all();
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

@@ -1,0 +1,54 @@
+/// Pairs of spheres that are near each other, kept from search to search (Verlet 1967).
+#pragma once
+
+#include <jfpx/sphere_collider.hpp>
+
+#include "src/base/buffer.hpp"
+#include "src/base/thread_pool.hpp"
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Finds the touching pairs of spheres that move little between two searches. Each sphere has a
+/// larger bound. While all spheres are within their bounds, only pairs of touching bounds are
+/// tested. The pairs and their order are those of a search among the spheres, whatever happened
+/// before. Owns its buffers, which only grow.
+///
+/// Claim: if two spheres that are within their bounds touch, the bounds touch. A sphere counts as
+/// within its bound if (distance of the centres + radius) * (1 + 16 eps) <= radius of the bound.
+/// The exact test rounds the distance and the sum of the radii with a relative error of at most 4
+/// eps, so the centres of the bounds are at most (R_a + R_b)(1 - 7 eps) apart, and the test of the
+/// bounds finds that they touch. Radii are at least kLeastRadius, so that no error of underflow
+/// counts.
+class NeighborList {
+ public:
+  /// All touching pairs, sorted. Valid until the next call, or another call of the collider.
+  /// @throws the exceptions of SphereCollider::find_pairs()
+  std::span<const SpherePair> find(std::span<const SphereInstance> spheres,
+                                   SphereCollider* collider, ThreadPool* pool);
+  /// Must be called after every other call of the collider.
+  void clear() noexcept { count_ = 0; }
+
+ private:
+  static constexpr Real kLeastRadius = Real(1e-9);
+
+  Real largest_motion(std::span<const SphereInstance> spheres, ThreadPool* pool);
+  Real choose_slack(std::span<const SphereInstance> spheres, Real motion) const;
+  std::span<const SpherePair> select(std::span<const SphereInstance> spheres, ThreadPool* pool);
+
+  std::size_t count_ = 0;              ///< number of bounds; 0: there are none
+  Buffer<SphereInstance> bounds_;      ///< by sphere
+  Real slack_ = 0;                     ///< [m], radius of a bound, minus that of its sphere
+  std::size_t searches_ = 0;           ///< since the bounds were made
+  std::span<const SpherePair> pairs_;  ///< of bounds that touch; in the collider
+  Buffer<SpherePair> selected_;
+  std::vector<Real> largest_;                 ///< by chunk of spheres
+  std::vector<std::size_t> selected_counts_;  ///< by chunk of pairs
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
