@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 from typing import Any, NamedTuple
 
@@ -84,7 +85,7 @@ class PeriodicRows(NamedTuple):
     shifts: Any
 
 
-_INDEX_TYPES = {"int32": np.int32, "int64": np.int64}
+_INDEX_TYPES = ("int32", "int64")
 
 
 class SphereCollider:
@@ -227,7 +228,7 @@ class SphereCollider:
               contacts: bool) -> Any:
         index = _check_form(output, index_dtype, out)
         _refuse_out(search, out)
-        if index is np.int32 and search.largest() > 2**31:
+        if index == "int32" and search.largest() > 2**31:
             raise InvalidArgument("more than 2^31 spheres require index_dtype=\"int64\"")
         if not self._lock.acquire(blocking=False):
             raise ConcurrentUse("the collider is in use by another call; use one for each thread")
@@ -254,7 +255,7 @@ class SphereCollider:
 
     def _find_on_device(self, search: _device.DeviceSearch, output: str, half: bool,
                         index_dtype: Any, out: Any, count: Any, contacts: bool) -> Any:
-        index = np.dtype(_check_form(output, index_dtype, out)).name
+        index = _check_form(output, index_dtype, out)
         if self._backend == "cpu":
             raise InvalidArgument(f"positions are on cuda:{search.device}, and backend is cpu")
         _refuse_out(search, out)
@@ -271,6 +272,8 @@ class SphereCollider:
                 search.write(core, out, contacts, None)
                 search.write_count(core, count)
                 return None
+            if out is None and not contacts and search.finds_new_pairs(output, half):
+                return search.new_pairs(core, index)
             size = search.run(core, contacts, bool(half))
             if out is not None:
                 search.write(core, out, contacts, size)
@@ -329,7 +332,7 @@ class _Search:
 
     def set_cutoff(self, cutoff: Any) -> float:
         """Sets and returns the radius of which the double is exactly the cutoff."""
-        radius = _half(cutoff, self.dtype)
+        radius = _half(cutoff, self.dtype.name)
         self._radii = np.full(1, radius, self.dtype)
         return radius
 
@@ -377,7 +380,7 @@ def _device_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: A
     _check_radii(cutoff, radii, query, query_radii)
     search = _device.DeviceSearch(positions, device, dtype)
     if cutoff is not None:
-        radii = query_radii = _half(cutoff, np.dtype(search.dtype))
+        radii = query_radii = _half(cutoff, search.dtype)
     search.set_radii(radii)
     if query is not None:
         search.set_query(query, query_radii)
@@ -396,29 +399,36 @@ def _check_radii(cutoff: Any, radii: Any, query: Any, query_radii: Any) -> None:
         raise InvalidArgument("with radii, query and query_radii are given together")
 
 
-def _half(cutoff: Any, dtype: np.dtype) -> float:
+def _half(cutoff: Any, dtype: str) -> float:
     """The radius of which the double is exactly the cutoff."""
-    value = dtype.type(_arrays.number(cutoff, "cutoff"))
-    radius = value / 2
-    if not (0 < value < np.inf and radius + radius == value):
+    radius = _exact_half(_arrays.number(cutoff, "cutoff"), dtype)
+    if radius is None:
         raise InvalidArgument(f"cutoff is {cutoff}; it must be finite and > 0 in {dtype}")
-    return float(radius)
+    return radius
 
 
-def _check_form(output: Any, index_dtype: Any, out: Any) -> Any:
-    """The type of indices."""
+@functools.lru_cache(maxsize=256)
+def _exact_half(cutoff: float, dtype: str) -> float | None:
+    value = np.dtype(dtype).type(cutoff)
+    radius = value / 2
+    return float(radius) if 0 < value < np.inf and radius + radius == value else None
+
+
+def _check_form(output: Any, index_dtype: Any, out: Any) -> str:
+    """The name of the type of indices."""
     if output not in ("coo", "csr"):
         raise InvalidArgument(f"output is {output!r}; it must be 'coo' or 'csr'")
     if out is not None and output != "coo":
         raise InvalidArgument("out requires output='coo'")
-    try:
-        return _INDEX_TYPES[str(index_dtype).removeprefix("torch.")]
-    except KeyError:
-        pass
-    try:
-        return _INDEX_TYPES[np.dtype(index_dtype).name]
-    except (KeyError, TypeError):
-        raise InvalidArgument(f"index_dtype is {index_dtype!r}; it must be int32 or int64") from None
+    name = str(index_dtype).removeprefix("torch.")
+    if name not in _INDEX_TYPES:
+        try:
+            name = np.dtype(index_dtype).name
+        except TypeError:
+            pass
+    if name not in _INDEX_TYPES:
+        raise InvalidArgument(f"index_dtype is {index_dtype!r}; it must be int32 or int64")
+    return name
 
 
 def _refuse_out(search: Any, out: Any) -> None:

@@ -94,6 +94,19 @@ def test_device_arrays_have_the_bits_of_the_host(library, rng, dtype, n, half, i
                 jfpx.find_pairs(positions, radii=radii, output="csr", **options))
 
 
+def test_numbers_of_pairs_may_change_from_call_to_call(library, rng, dtype):
+    positions, _ = random_spheres(rng, 6000, dtype)
+    x = library.to_device(positions)
+    collider = jfpx.SphereCollider(dtype)
+    for cutoff in (0.3, 2.5, 1e-6, 2.5, 2.4, 2.3, 0.3):
+        for index in ("int32", "int64"):
+            pairs = collider.find_pairs(x, cutoff, index_dtype=index)
+            check_equal(library, [pairs], [jfpx.find_pairs(positions, cutoff, index_dtype=index)])
+            is_contiguous = (pairs.is_contiguous() if isinstance(library, Torch)
+                             else pairs.flags.c_contiguous)
+            assert is_contiguous
+
+
 def test_a_query_on_the_device_has_the_bits_of_the_host(library, rng, dtype):
     positions, radii = random_spheres(rng, 3000, dtype)
     query, query_radii = random_spheres(rng, 500, dtype)

@@ -294,9 +294,11 @@ GridLimits grid_limits(int device) {
   return limits;
 }
 
+bool is_in_one_launch(std::size_t n) { return n <= kMaxInOneLaunch; }
+
 void launch_grid_search(const GridArgs& args, const SearchOutput& output, const GridLimits& limits,
                         cudaStream_t stream) {
-  if (args.input.n <= kMaxInOneLaunch) {
+  if (is_in_one_launch(args.input.n)) {
     launch_in_one(args, output, limits.resident_blocks, stream);
   } else {
     GridArgs phased = args;

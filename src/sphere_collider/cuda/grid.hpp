@@ -89,10 +89,6 @@ std::size_t grid_plan_bytes();
 
 /// Arguments of a grid search. Arrays are 16-byte aligned and have 15 spare bytes at the end.
 struct GridArgs {
-  struct Input {
-    const SphereInstance* spheres;
-    std::uint32_t n;  ///< at least 1
-  };
   /// The spheres sorted by bucket. The position of a sphere is its index in that order.
   struct Table {
     std::uint32_t size;        ///< largest number of buckets: a power of two
@@ -127,7 +123,7 @@ struct GridArgs {
     std::uint32_t* neighbors;        ///< [n][kSlots] the first b's of a row, by position
     SphereContact* staging;          ///< [capacity] contacts, or pairs, of short rows by position
   };
-  Input input;
+  SphereInput input;  ///< at least one sphere; packed, but for a search in one launch
   Table table;
   Rows rows;
   Scratch scratch;
@@ -142,6 +138,8 @@ std::size_t grid_scratch_bytes(std::size_t n, std::size_t capacity);
 /// The arrays of a search among n spheres, in `memory` of grid_scratch_bytes().
 GridArgs::Scratch grid_scratch(std::uint32_t n, unsigned char* memory);
 
+/// Whether a search among n spheres is one launch.
+bool is_in_one_launch(std::size_t n);
 /// Enqueues the whole search. Does not allocate or wait.
 void launch_grid_search(const GridArgs& args, const SearchOutput& output, const GridLimits& limits,
                         cudaStream_t stream);

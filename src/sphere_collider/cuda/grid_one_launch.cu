@@ -99,14 +99,16 @@ __global__ void __launch_bounds__(kGridThreads, kBlocksPerMultiprocessor)
   const bool complete = is_complete(args, output);
   if (one) write_count(output, args.state->contacts, kNoSphere, complete);
   if (!complete) return;
+  SearchOutput rows_known = output;
+  rows_known.rows.length = args.state->contacts;
   sum_counts(args, storage.emit);
   grid.sync();
-  emit(args, output, storage.emit);
+  emit(args, rows_known, storage.emit);
   if (args.state->overflow == 0) return;
   grid.sync();
   place_overflow(args);
   grid.sync();
-  emit_long_rows(args, output, storage.long_rows);
+  emit_long_rows(args, rows_known, storage.long_rows);
 }
 
 }  // namespace
