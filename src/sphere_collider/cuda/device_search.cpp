@@ -46,13 +46,13 @@ void require_words(const void* output, const char* name) {
   throw InvalidArgument(std::string("the address of the ") + name + " is not a multiple of 8");
 }
 
+}  // namespace
+
 int usable_device(int device) {
   const BackendStatus status = probe(device);
   if (!status.usable) throw BackendUnavailable("cuda: " + status.reason);
   return device;
 }
-
-}  // namespace
 
 DeviceSearch::DeviceSearch(cudaStream_t stream, int device, SphereAlgorithm algorithm)
     : device_(usable_device(device)), stream_(stream), algorithm_(algorithm), pool_(device) {

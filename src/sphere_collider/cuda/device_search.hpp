@@ -12,6 +12,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
+/// The device. @throws BackendUnavailable, with the reason, before the first call of CUDA
+int usable_device(int device);
+
 /// Searches among spheres in device memory. Memory is allocated and freed in the order of the
 /// stream of the constructor; the caller orders that stream and those of the searches.
 class DeviceSearch {
