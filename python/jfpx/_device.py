@@ -122,8 +122,13 @@ def _functions(library: str) -> Any:
     return _LIBRARIES[library]()
 
 
+@functools.cache
+def _library_of(kind: type) -> str:
+    return kind.__module__.partition(".")[0]
+
+
 def _library(array: Any) -> str:
-    return type(array).__module__.partition(".")[0]
+    return _library_of(type(array))
 
 
 def _adapted(array: Any, name: str) -> Any:
@@ -144,10 +149,13 @@ def _adapted(array: Any, name: str) -> Any:
 
 def _converter(like: Any) -> Callable[[Any], Any]:
     """The function that converts a result to the kind of `like`."""
-    namespace = getattr(like, "__array_namespace__", None)
-    if _library(like) in _LIBRARIES or namespace is None:
-        return lambda array: array
-    return namespace().from_dlpack
+    if _library(like) in _LIBRARIES or not hasattr(like, "__array_namespace__"):
+        return _unchanged
+    return like.__array_namespace__().from_dlpack
+
+
+def _unchanged(array: Any) -> Any:
+    return array
 
 
 class DeviceSearch:
@@ -307,28 +315,28 @@ class DeviceSearch:
             core.write_shifts(address(result[-1]), size, stream)
         return [self.convert(array) for array in result]
 
-    def write(self, core: Any, out: Any, contacts: bool, size: int | None) -> None:
+    def write(self, core: Any, outputs: list[_arrays.Output], size: int | None) -> None:
         """Writes the result to arrays of the caller, with room for `size` contacts if it is known."""
-        stream = self.stream
-        pairs = self._target(out[0] if contacts else out, "out.pairs" if contacts else "out",
-                             (2, None), size, ("int32", "int64"))
-        capacity = pairs.shape[1]
-        if contacts:
-            normal = self._target(out[1], "out.normal", (None, 3), size, (self.dtype,))
-            distance = self._target(out[2], "out.distance", (None,), size, (self.dtype,))
-            capacity = min(capacity, normal.shape[0], distance.shape[0])
-            core.write_contacts(normal.address, distance.address, capacity, stream)
+        views = {output.field: self._target(output, size) for output in outputs}
+        capacity = min(view.shape[output.shape.index(None)]
+                       for view, output in zip(views.values(), outputs))
+        pairs = views["pairs"]
         step = pairs.strides[0] * (4 if pairs.dtype == "int32" else 8)
         core.write_pairs(pairs.address, pairs.address + step, pairs.dtype == "int64", capacity,
-                         stream)
+                         self.stream)
+        if "normal" in views:
+            core.write_contacts(views["normal"].address, views["distance"].address, capacity,
+                                self.stream)
+        if "shifts" in views:
+            core.write_shifts(views["shifts"].address, capacity, self.stream)
 
     def write_count(self, core: Any, count: Any) -> None:
-        view = self._target(count, "count", (2,), None, ("int64",))
+        view = self._target(_arrays.Output("count", "count", count, (2,), ("int64",)), None)
         core.write_count(view.address, self.stream)
 
-    def _target(self, array: Any, name: str, shape: tuple[int | None, ...], size: int | None,
-                dtypes: tuple[str, ...]) -> View:
+    def _target(self, output: _arrays.Output, size: int | None) -> View:
         """An array of the caller, on the device, whose rows are contiguous."""
+        array, name, shape, dtypes = output.array, output.name, output.shape, output.dtypes
         if not is_on_device(array) or _library(array) not in _LIBRARIES:
             raise InvalidArgument(f"{name} must be a tensor of PyTorch or an array of CuPy on "
                                   f"cuda:{self.device}")
