@@ -114,13 +114,6 @@ std::uint64_t ArraySearch::find(const SphereArrays& from, Stream user) {
 template <class Index>
 std::uint64_t ArraySearch::find_pairs(const SphereArrays& from, Index* to, std::size_t capacity,
                                       Stream user) {
-  if (!collider.is_one_launch(from.count)) {
-    const std::uint64_t found = find<SpherePair>(from, user);
-    if (found <= capacity) {
-      launch_write_pairs(result<SpherePair>(), to, to + found, found, user);
-    }
-    return found;
-  }
   const SphereInput input = prepare(from, user);
   kind = ArrayResult::pairs;
   const SearchOutput output{.capacity = capacity,

@@ -28,8 +28,7 @@ class DeviceSearch {
   bool fits(std::size_t n) const { return n <= spheres_reserved_; }
   /// @throws InvalidArgument if it is not
   void require_reserved(std::size_t n) const;
-  /// Whether a search among n spheres is one launch. Only such a search takes an input of arrays
-  /// and writes rows of indices.
+  /// Whether a search among n spheres is one launch. Only such a search takes an input of arrays.
   bool is_one_launch(std::size_t n) const;
   bool uses_grid(std::size_t n) const;
 

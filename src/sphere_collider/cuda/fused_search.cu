@@ -140,13 +140,13 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
   const std::uint32_t invalid = first_invalid(warp_max(s.valid_before[lane_id() % kWarps]));
   if (one) write_count(args.output, total, invalid, complete);
   if (!complete || invalid != kNoSphere) return;
-  SearchOutput rows_known = args.output;
-  rows_known.rows.length = total;
+  SearchOutput known = args.output;
+  known.rows.length = total;
 #pragma unroll
   for (unsigned k = 0; k < kRowsOfWarp; ++k) {
     const std::uint32_t a = row(k);
     if (a >= n) continue;
-    emit_row(rows_known, s.offsets[a], a, s.spheres[a], 0, words[k],
+    emit_row(known, s.offsets[a], a, s.spheres[a], 0, words[k],
              [&](std::uint32_t b) { return s.spheres[b]; });
   }
 #else

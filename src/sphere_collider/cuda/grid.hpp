@@ -5,6 +5,7 @@
 ///  - in one cooperative launch (grid_one_launch.cu): up to kMaxInOneLaunch spheres (grid.cu), if
 ///    the direct search, which the same kernel tries first, does not apply;
 ///  - single-level (grid_single_level.cuh): more spheres, of similar radius, in several launches;
+///    if they are crowded, a warp searches for several of them together (grid_crowded.cuh);
 ///  - multi-level (grid_search.cuh): more spheres, of any radii, in several launches.
 ///
 /// The word row has two meanings. A row of cells consists of the cells of one level with the same y
@@ -24,7 +25,7 @@ namespace cuda {
 /// Neighbors that a sphere keeps in its own slots; further ones go to a list for all spheres.
 inline constexpr std::uint32_t kSlots = 16;
 /// Largest number of contacts of a row in the staging buffer. No contact of a longer row is staged.
-inline constexpr std::uint32_t kMaxStaged = 18;
+inline constexpr std::uint32_t kMaxStaged = 48;
 /// Number of elements after the last sphere that a search reads, but does not use.
 inline constexpr std::uint32_t kReadBeyond = 2;
 /// Longest row that one warp sorts. Longer rows are sorted by many blocks.
@@ -121,7 +122,7 @@ struct GridArgs {
     SphereInstance* partitioned;     ///< [n] spheres by coarse bucket
     std::uint32_t* partitioned_ids;  ///< [n] their indices
     std::uint32_t* neighbors;        ///< [n][kSlots] the first b's of a row, by position
-    SphereContact* staging;          ///< [capacity] contacts, or pairs, of short rows by position
+    SphereContact* staging;  ///< [capacity] contacts, or neighbors, of short rows by position
   };
   SphereInput input;  ///< at least one sphere; packed, but for a search in one launch
   Table table;

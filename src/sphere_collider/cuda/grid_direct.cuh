@@ -199,15 +199,15 @@ __device__ inline void emit_directly(const GridArgs& args, const SearchOutput& o
   const bool complete = all <= output.capacity;
   if (blockIdx.x == 0 && threadIdx.x == 0) write_count(output, all, kNoSphere, complete);
   if (!complete) return;
-  SearchOutput rows_known = output;
-  rows_known.rows.length = all;
+  SearchOutput known = output;
+  known.rows.length = all;
   const auto total = static_cast<std::uint32_t>(args.table.sums[blockIdx.x]);
   const auto first_a = static_cast<std::uint32_t>(span_of_block(args.input.n, 1).first);
   for (std::uint32_t first = threadIdx.x & ~31u; first < total; first += kGridThreads) {
     const std::uint32_t c = first + lane_id();
     if (c < total) {
       const std::uint32_t a = first_a + s.owners[c], b = s.sorted[c];
-      write_or_stage(rows_known, before + c, a, b, load_sphere(args.input, a),
+      write_or_stage(known, before + c, a, b, load_sphere(args.input, a),
                      load_sphere(args.input, b), s.staged[threadIdx.x / 32]);
     }
     if (output.contacts != nullptr) {

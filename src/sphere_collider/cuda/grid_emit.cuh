@@ -34,6 +34,13 @@ __device__ inline bool is_complete(const GridArgs& args, const SearchOutput& out
   return total <= args.rows.capacity && total <= output.capacity;
 }
 
+/// The output of a search whose number of contacts is known.
+__device__ inline SearchOutput with_row_length(const GridArgs& args, const SearchOutput& output) {
+  SearchOutput known = output;
+  known.rows.length = contacts_found(*args.state);
+  return known;
+}
+
 /// Lists a row that is too long for this phase, for a later phase.
 __device__ inline void defer_row(const GridArgs& args, std::uint32_t a, std::uint32_t count,
                                  unsigned long long offset) {

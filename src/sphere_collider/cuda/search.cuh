@@ -57,6 +57,8 @@ __device__ inline void write_pair(const SearchOutput& output, unsigned long long
   const IndexRows& rows = output.rows;
   if (output.pairs != nullptr) {
     output.pairs[at] = {a, b};
+  } else if (output.neighbors != nullptr) {
+    output.neighbors[at] = b;
   } else if (rows.is_wide) {
     auto* const indices = static_cast<std::int64_t*>(rows.indices);
     indices[at] = a;

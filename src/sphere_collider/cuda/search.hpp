@@ -59,7 +59,8 @@ struct IndexRows {
   unsigned long long length = 0;  ///< of a row: the number of pairs, which the kernels set
 };
 
-/// Destination of the result of a search: `contacts`, `pairs` or `rows`; the others are null.
+/// Destination of the result of a search: `contacts`, `pairs`, `rows`, or within a search
+/// `neighbors`; the others are null.
 struct SearchOutput {
   SphereContact* contacts = nullptr;
   SpherePair* pairs = nullptr;
@@ -69,6 +70,7 @@ struct SearchOutput {
   /// can poll it, before all contacts are written.
   unsigned long long* signal = nullptr;
   IndexRows rows = {};
+  std::uint32_t* neighbors = nullptr;  ///< the b's of the pairs alone
 };
 
 /// A ContactCount, without the index of an invalid sphere, in one word.

@@ -226,18 +226,25 @@ std::vector<Index> rows_of(const std::vector<SpherePair>& pairs) {
   return rows;
 }
 
-/// Spheres for each of the searches: fused, all pairs, direct, sorted, sorted with rows of any
-/// length, in several launches.
+/// Spheres for each of the searches: fused, all pairs, direct, sorted, in several launches; the
+/// last three with rows of any length, too.
 std::vector<Spheres> spheres_of_all_searches(Random& random) {
   std::vector<Spheres> all;
   for (const std::size_t n : {0, 1, 300, 3000, 6000, 30000, 300000}) {
     all.push_back(make_gas(n, Real(0.5), 6, random));
   }
-  Spheres crowded = all[5];
-  for (std::size_t i = 0; i < 1500; ++i) crowded[17 * i].centre = {1, 2, 3};
-  for (std::size_t i = 0; i < 900; ++i)
-    crowded[20 * i + 5].centre = {Real(0.01) * Real(i % 30), 9, 9};
-  all.push_back(crowded);
+  for (const auto& [n, contacts] : {std::pair{10000, 40}, {30000, 40}, {300000, 12}}) {
+    all.push_back(
+        make_gas(static_cast<std::size_t>(n), Real(0.5), static_cast<Real>(contacts), random));
+  }
+  for (const std::size_t k : {5, 8, 9}) {
+    Spheres clusters = all[k];
+    for (std::size_t i = 0; i < 1500; ++i) clusters[17 * i].centre = {1, 2, 3};
+    for (std::size_t i = 0; i < 900; ++i) {
+      clusters[20 * i + 5].centre = {Real(0.01) * static_cast<Real>(i % 30), 9, 9};
+    }
+    all.push_back(clusters);
+  }
   return all;
 }
 
@@ -248,9 +255,14 @@ TEST_F(Cuda, ArraysOfPairsAreWrittenAsRowsOfIndices) {
   const auto cpu = make_sphere_collider({.backend = Backend::cpu});
   for (const Spheres& spheres : spheres_of_all_searches(random)) {
     const DeviceSpheres arrays(spheres);
-    const std::vector<SpherePair> pairs = pairs_of(cpu->find_contacts(spheres));
+    const ContactSpan contacts = cpu->find_contacts(spheres);
+    const std::vector<SpherePair> pairs = pairs_of(contacts);
     const std::size_t size = pairs.size();
-    const auto note = "N = " + std::to_string(spheres.size()) + ", " + seed_note();
+    const auto note = "N = " + std::to_string(spheres.size()) + ", " + std::to_string(size) +
+                      " pairs, " + seed_note();
+    ASSERT_EQ(collider.find(arrays.arrays(), ArrayResult::contacts, false, stream.get()), size);
+    EXPECT_TRUE(same_bits(contacts_of<std::int32_t>(collider, size, stream.get()), contacts))
+        << note;
     for (int repeat = 0; repeat < 2; ++repeat) {  // memory grows in the first search
       EXPECT_TRUE(rows_of<std::int32_t>(collider, arrays.arrays(), size, size, stream.get()) ==
                   rows_of<std::int32_t>(pairs))
