@@ -376,6 +376,7 @@ def test_calls_on_the_device_do_not_leak(library):
     def free_bytes(calls):
         for _ in range(calls):
             jfpx.find_contacts(points, 0.05, half=False, output="csr")
+            jfpx.find_pairs(points, 0.1)
         if isinstance(library, Cupy):
             library.module.cuda.Device().synchronize()
             return library.module.cuda.runtime.memGetInfo()[0]
