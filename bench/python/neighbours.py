@@ -2,9 +2,13 @@
 Markdown. What is not installed is left out. All libraries search the same points, and must find the same
 number of pairs.
 
-    python bench/python/neighbours.py [cpu] [cuda] [world] [world-cuda]
+    python bench/python/neighbours.py [cpu] [cuda] [stages] [world] [world-cuda]
+
+`cuda` compares with Warp, with PyTorch Geometric if --geometric is given, and with brute force, all on
+the device. `stages` divides the time of a call on the device.
 """
 
+import argparse
 import csv
 import os
 import shutil
@@ -32,14 +36,15 @@ def points_of(n, neighbours, seed=1):
     return x.astype(np.float32), float(np.float32(cutoff))
 
 
-def median_ms(call, synchronize=lambda: None, repeats=15):
+def median_ms(call, synchronize=lambda: None, repeats=15, waits_after=True):
     """Median time of a call after three others."""
     times = []
     for i in range(repeats + 3):
         synchronize()
         begin = time.perf_counter()
         call()
-        synchronize()
+        if waits_after:
+            synchronize()
         if i >= 3:
             times.append(1e3 * (time.perf_counter() - begin))
     return statistics.median(times)
@@ -47,7 +52,7 @@ def median_ms(call, synchronize=lambda: None, repeats=15):
 
 def row(*cells):
     print("| " + " | ".join(f"{cell:.3g}" if isinstance(cell, float) else str(cell)
-                            for cell in cells) + " |")
+                            for cell in cells) + " |", flush=True)
 
 
 def cpu():
@@ -68,8 +73,10 @@ def cpu():
     print(f"\n10 points: {1e3 * median_ms(lambda: jfpx.find_pairs(x, cutoff), repeats=2000):.1f} us")
 
 
-def warp_search(x, cutoff):
-    """Function that counts the pairs a < b with the HashGrid of Warp."""
+def warp_search(x, cutoff, lists):
+    """Function that counts the pairs a < b of each point with the HashGrid of Warp, and with `lists`
+    also lists them: a scan of the numbers, and a second search that writes."""
+    import torch
     import warp as wp
     wp.init()
 
@@ -84,15 +91,35 @@ def warp_search(x, cutoff):
                 n += 1
         counts[i] = n
 
+    @wp.kernel
+    def fill(grid: wp.uint64, points: wp.array(dtype=wp.vec3), radius: float,
+             ends: wp.array(dtype=int), size: int, pairs: wp.array(dtype=int)):
+        i = wp.hash_grid_point_id(grid, wp.tid())
+        p = points[i]
+        at = int(0)
+        if i > 0:
+            at = ends[i - 1]
+        for j in wp.hash_grid_query(grid, p, radius):
+            if j > i and wp.length(p - points[j]) <= radius:
+                pairs[at] = i
+                pairs[size + at] = j
+                at += 1
+
     points = wp.from_torch(x, dtype=wp.vec3)
     side = max(1, min(256, int(1 / cutoff)))
     grid = wp.HashGrid(side, side, side)
-    counts = wp.zeros(len(x), dtype=int)
+    counts, ends = wp.zeros(len(x), dtype=int), wp.zeros(len(x), dtype=int)
 
     def search():
         grid.build(points, cutoff)
         wp.launch(count, len(x), [grid.id, points, cutoff, counts])
-        return counts
+        if not lists:
+            return counts
+        wp.utils.array_scan(counts, ends, inclusive=True)
+        size = int(ends[-1:].numpy()[0])
+        pairs = torch.empty((2, size), dtype=torch.int32, device=x.device)
+        wp.launch(fill, len(x), [grid.id, points, cutoff, ends, size, wp.from_torch(pairs.view(-1))])
+        return pairs
 
     return search
 
@@ -118,6 +145,17 @@ def brute_force(x, cutoff):
     return (total - len(x)) // 2
 
 
+def has_pairs_of_sample(x, cutoff, pairs, sample=128):
+    """Whether points of a sample have as many neighbours as by brute force in float64."""
+    import torch
+
+    points = torch.linspace(0, len(x) - 1, sample, dtype=torch.int64, device=x.device)
+    near = torch.cdist(x[points].double(), x.double(),
+                       compute_mode="donot_use_mm_for_euclid_dist") <= cutoff
+    counts = torch.bincount(pairs.flatten(), minlength=len(x))
+    return bool((counts[points] == near.sum(1) - 1).all())
+
+
 def pairs_of_tree(x, cutoff):
     """The number of pairs in float64, from SciPy, or "-"."""
     try:
@@ -138,30 +176,35 @@ def compared(own, make_search, count, wait, repeats=15):
     return [other, count(search()), other / own]
 
 
-def cuda():
+def cuda(geometric):
     import torch
 
     wait = torch.cuda.synchronize
-    print(f"\n## {torch.cuda.get_device_name()}, tensors of PyTorch, ms\n\n`Warp` builds its grid and "
-          "counts, without a list of pairs. SciPy's pairs are those of float64.\n\n"
-          "| points | neighbours | pairs | SciPy's pairs | jfpx | both orders, int64 | periodic | Warp | its pairs "
-          "| ratio | radius_graph | its pairs | ratio | brute force | its pairs |\n"
-          "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print(f"\n## {torch.cuda.get_device_name()}, tensors of PyTorch, ms\n\n`Warp` builds its grid, counts "
+          "the pairs of each point, scans, and lists them in no order; `its count` ends after counting. "
+          "SciPy's pairs are those of float64; `sample`: 128 points have as many neighbours as by brute "
+          "force in float64.\n\n"
+          "| points | neighbours | pairs | SciPy's pairs | sample | jfpx | Warp | its pairs | Warp / jfpx "
+          "| its count | both orders, int64 | periodic | radius_graph | its pairs | ratio | brute force | its pairs |\n"
+          "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|", flush=True)
     for n in (10_000, 100_000, 1_000_000):
         for neighbours in (3, 30):
             host, cutoff = points_of(n, neighbours)
             x = torch.from_numpy(host).cuda()
-            own = median_ms(lambda: jfpx.find_pairs(x, cutoff), wait)
+            own = median_ms(lambda: jfpx.find_pairs(x, cutoff), wait, repeats=60)
             both = median_ms(lambda: jfpx.find_pairs(x, cutoff, half=False, index_dtype="int64"), wait)
             periodic = median_ms(lambda: jfpx.find_pairs(x, cutoff, periodic=(1, 1, 1)), wait)
-            cells = [n, neighbours, jfpx.find_pairs(x, cutoff).shape[1], pairs_of_tree(host, cutoff),
-                     own, both, periodic]
-            cells += compared(own, lambda: warp_search(x, cutoff),
-                              lambda counts: int(counts.numpy().sum()), wait)
+            pairs = jfpx.find_pairs(x, cutoff)
+            cells = [n, neighbours, pairs.shape[1], pairs_of_tree(host, cutoff),
+                     has_pairs_of_sample(x, cutoff, pairs), own]
+            cells += compared(own, lambda: warp_search(x, cutoff, lists=True),
+                              lambda pairs: pairs.shape[1], wait, repeats=60)
+            cells += compared(own, lambda: warp_search(x, cutoff, lists=False), lambda _: "", wait)[:1]
+            cells += [both, periodic]
             cells += compared(both, lambda: radius_graph_search(x, cutoff, neighbours),
                               lambda edges: edges.shape[1] // 2, wait,
-                              repeats=1 if n == 1_000_000 else 15)  # tests all pairs
-            if n <= 100_000:
+                              repeats=1 if n == 1_000_000 else 15) if geometric else ["-"] * 3
+            if n <= 10_000:  # 100 times as long with 10 times as many points
                 cells += [median_ms(lambda: brute_force(x, cutoff), wait, 1), brute_force(x, cutoff)]
             else:
                 cells += ["-"] * 2
@@ -175,6 +218,61 @@ def cuda():
           " us; with out and count "
           f"{1e3 * median_ms(lambda: collider.find_pairs(x, 0.1, out=out, count=count), wait, 2000):.1f}"
           " us")
+
+
+def kernels_of(call, calls=20):
+    """Kernels, copies and memsets of a call, and their time on the device [us], by the profiler of
+    PyTorch."""
+    import torch
+    from torch.profiler import ProfilerActivity, profile
+
+    with profile(activities=[ProfilerActivity.CUDA]) as profiled:
+        for _ in range(calls):
+            call()
+        torch.cuda.synchronize()
+    events = [event for event in profiled.events()
+              if event.device_type == torch.autograd.DeviceType.CUDA]
+    times = {}
+    for event in events:
+        name = event.name.replace("(anonymous namespace)::", "").split("(")[0].split("::")[-1]
+        times[name] = times.get(name, 0) + event.device_time_total / calls
+    listed = ", ".join(f"{name} {time:.1f}" for name, time in
+                       sorted(times.items(), key=lambda item: -item[1]))
+    return len(events) / calls, sum(times.values()), listed
+
+
+def stages():
+    """Where the time of a call goes. The function of the binding takes the same addresses as the call,
+    and writes to the same arrays, so that the difference is the overhead of Python."""
+    import torch
+
+    from jfpx import _device
+
+    wait = torch.cuda.synchronize
+    print("\n## Stages of a call, us\n\n`call` includes the end of all kernels; `return` does not. "
+          "`overhead` is the time of a call without that of the function of the C++ library.\n\n"
+          "| points | neighbours | call | return | C++ | its return | overhead | launches | device | kernels |\n"
+          "|---|---|---|---|---|---|---|---|---|---|", flush=True)
+    for n in (448, 10_000, 100_000, 1_000_000):
+        for neighbours in (3, 30):
+            host, cutoff = points_of(n, neighbours)
+            x = torch.from_numpy(host).cuda()
+            call = lambda: jfpx.find_pairs(x, cutoff)
+            search = _device.DeviceSearch(x, None)
+            search.set_radii(cutoff / 2)
+            core = search.collider({})
+            size = call().shape[1]
+            out = torch.empty(2 * size, dtype=torch.int32, device="cuda")
+            direct = lambda: core.find_pairs(search._spheres, out.data_ptr(), False, size, search.stream)
+            times = [1e3 * median_ms(function, wait, 300) for function in (call, direct)]
+            returns = [1e3 * median_ms(function, wait, 300, waits_after=False)
+                       for function in (call, direct)]
+            try:
+                launches, device, listed = kernels_of(call)
+            except (AttributeError, RuntimeError) as error:
+                launches, device, listed = "-", "-", str(error)
+            row(n, neighbours, times[0], returns[0], times[1], returns[1], times[0] - times[1], launches,
+                device, listed)
 
 
 def steps_of_python(backend, spheres, steps):
@@ -215,6 +313,17 @@ def world(backend="cpu"):
         row(run, own, other, own / other, own_hash == other_hash)
 
 
+def main():
+    parts = {"cpu": cpu, "cuda": None, "stages": stages, "world": world,
+             "world-cuda": lambda: world("cuda")}
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", choices=[*parts, []], default=[], metavar="part")
+    parser.add_argument("--geometric", action="store_true", help="also PyTorch Geometric")
+    options = parser.parse_args()
+    parts["cuda"] = lambda: cuda(options.geometric)
+    for part in options.parts or ["cpu"]:
+        parts[part]()
+
+
 if __name__ == "__main__":
-    for part in sys.argv[1:] or ["cpu"]:
-        {"cpu": cpu, "cuda": cuda, "world": world, "world-cuda": lambda: world("cuda")}[part]()
+    main()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -154,3 +154,29 @@ def _cell(lengths: Any) -> list[float]:
     if len(lengths) != 3:
         raise InvalidArgument(f"periodic has {len(lengths)} lengths; it must have 3")
     return [math.nan if length is None else number(length, "periodic") for length in lengths]
+
+
+class Output(NamedTuple):
+    """An array of the caller for a result. The axis None of `shape` has an element for each contact."""
+
+    field: str
+    name: str
+    array: Any
+    shape: tuple[int | None, ...]
+    dtypes: tuple[str, ...]
+
+
+def outputs(out: Any, dtype: str, contacts: bool, periodic: bool) -> list[Output]:
+    """The arrays of `out`, which is one array or a tuple."""
+    fields = [("pairs", (2, None), ("int32", "int64"))]
+    if contacts:
+        fields += [("normal", (None, 3), (dtype,)), ("distance", (None,), (dtype,))]
+    if periodic:
+        fields += [("shifts", (None, 3), ("int32",))]
+    if len(fields) == 1:
+        return [Output("pairs", "out", out, *fields[0][1:])]
+    if not isinstance(out, (tuple, list)) or len(out) != len(fields):
+        raise InvalidArgument(f"out is {type(out).__name__}; it must be a tuple of {len(fields)} arrays: "
+                              + ", ".join(field for field, _, _ in fields))
+    return [Output(field, f"out.{field}", array, shape, dtypes)
+            for (field, shape, dtypes), array in zip(fields, out)]

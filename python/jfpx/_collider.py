@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 from typing import Any, NamedTuple
 
@@ -84,7 +85,7 @@ class PeriodicRows(NamedTuple):
     shifts: Any
 
 
-_INDEX_TYPES = {"int32": np.int32, "int64": np.int64}
+_INDEX_TYPES = ("int32", "int64")
 
 
 class SphereCollider:
@@ -151,14 +152,15 @@ class SphereCollider:
 
         Parameters
         ----------
-        out : Contacts, optional
-            Arrays to write to, pairs (2, C), normal (C, 3), distance (C,) with C >= E. Requires
-            output="coo".
+        out : Contacts, or PeriodicContacts with `periodic`, optional
+            Arrays to write to, pairs (2, C), normal (C, 3), distance (C,), shifts (C, 3) with
+            C >= E. Requires output="coo".
         count : array (2,) of int64 on the device, optional
             With `out`, for arrays on a device: receives E, and 1 if the contacts were written.
             The call neither allocates nor waits, so that it can be captured in a CUDA graph. If E
             exceeds the capacity of `out`, the first contacts are written; if it exceeds that of
-            reserve(), or a sphere is invalid, none are. Finds each pair once.
+            reserve(), or a sphere is invalid, none are. Finds each pair once. Excludes query, batch
+            and periodic.
 
         Returns
         -------
@@ -189,8 +191,9 @@ class SphereCollider:
 
         Parameters
         ----------
-        out : array, optional
-            Array of shape (2, C) to write to, with C >= E. Requires output="coo".
+        out : array, or PeriodicPairs with `periodic`, optional
+            Array of shape (2, C) to write to, with C >= E, and shifts (C, 3). Requires
+            output="coo".
         count : array (2,) of int64 on the device, optional
             As for find_contacts().
 
@@ -226,15 +229,16 @@ class SphereCollider:
     def _find(self, search: _Search, output: str, half: bool, index_dtype: Any, out: Any,
               contacts: bool) -> Any:
         index = _check_form(output, index_dtype, out)
-        _refuse_out(search, out)
-        if index is np.int32 and search.largest() > 2**31:
+        outputs = None if out is None else _arrays.outputs(out, self._dtype.name, contacts,
+                                                           search.periodic)
+        if index == "int32" and search.largest() > 2**31:
             raise InvalidArgument("more than 2^31 spheres require index_dtype=\"int64\"")
         if not self._lock.acquire(blocking=False):
             raise ConcurrentUse("the collider is in use by another call; use one for each thread")
         try:
             size = search.run(self._collider, bool(half), contacts)
-            if out is not None:
-                return self._write(size, out, contacts)
+            if outputs is not None:
+                return self._write(size, outputs)
             if output == "coo":
                 result = [np.empty((2, size), index)]
                 self._collider.write_pairs(result[0])
@@ -254,43 +258,42 @@ class SphereCollider:
 
     def _find_on_device(self, search: _device.DeviceSearch, output: str, half: bool,
                         index_dtype: Any, out: Any, count: Any, contacts: bool) -> Any:
-        index = np.dtype(_check_form(output, index_dtype, out)).name
+        index = _check_form(output, index_dtype, out)
         if self._backend == "cpu":
             raise InvalidArgument(f"positions are on cuda:{search.device}, and backend is cpu")
-        _refuse_out(search, out)
         if count is not None and out is None:
             raise InvalidArgument("count requires out")
-        if count is not None and search.waits():
-            raise InvalidArgument("count excludes query and batch")
+        if count is not None and (search.waits() or search.periodic):
+            raise InvalidArgument("count excludes query, batch and periodic")
+        outputs = None if out is None else _arrays.outputs(out, search.dtype, contacts, search.periodic)
         if not self._lock.acquire(blocking=False):
             raise ConcurrentUse("the collider is in use by another call; use one for each thread")
         try:
             core = search.collider(self._on_devices)
             if count is not None:
                 search.enqueue(core, contacts)
-                search.write(core, out, contacts, None)
+                search.write(core, outputs, None)
                 search.write_count(core, count)
                 return None
+            if out is None and not contacts and search.finds_new_pairs(output, half):
+                return search.new_pairs(core, index)
             size = search.run(core, contacts, bool(half))
             if out is not None:
-                search.write(core, out, contacts, size)
+                search.write(core, outputs, size)
                 return size
             result = search.results(core, size, output, index, contacts)
         finally:
             self._lock.release()
         return _result(result, output, contacts, search.periodic)
 
-    def _write(self, size: int, out: Any, contacts: bool) -> int:
+    def _write(self, size: int, outputs: list[_arrays.Output]) -> int:
         """Writes the result to the arrays of the caller."""
-        indices = (np.int32, np.int64)
-        if not contacts:
-            self._collider.write_pairs(_target(out, "out", (2, None), size, indices))
-            return size
-        pairs = _target(out[0], "out.pairs", (2, None), size, indices)
-        normal = _target(out[1], "out.normal", (None, 3), size, (self._dtype,))
-        distance = _target(out[2], "out.distance", (None,), size, (self._dtype,))
-        self._collider.write_pairs(pairs)
-        self._collider.write_contacts(normal, distance)
+        targets = {output.field: _target(output, size) for output in outputs}
+        self._collider.write_pairs(targets["pairs"])
+        if "normal" in targets:
+            self._collider.write_contacts(targets["normal"], targets["distance"])
+        if "shifts" in targets:
+            self._collider.write_shifts(targets["shifts"])
         return size
 
 
@@ -329,7 +332,7 @@ class _Search:
 
     def set_cutoff(self, cutoff: Any) -> float:
         """Sets and returns the radius of which the double is exactly the cutoff."""
-        radius = _half(cutoff, self.dtype)
+        radius = _half(cutoff, self.dtype.name)
         self._radii = np.full(1, radius, self.dtype)
         return radius
 
@@ -377,7 +380,7 @@ def _device_search(dtype: Any, positions: Any, cutoff: Any, radii: Any, query: A
     _check_radii(cutoff, radii, query, query_radii)
     search = _device.DeviceSearch(positions, device, dtype)
     if cutoff is not None:
-        radii = query_radii = _half(cutoff, np.dtype(search.dtype))
+        radii = query_radii = _half(cutoff, search.dtype)
     search.set_radii(radii)
     if query is not None:
         search.set_query(query, query_radii)
@@ -396,34 +399,38 @@ def _check_radii(cutoff: Any, radii: Any, query: Any, query_radii: Any) -> None:
         raise InvalidArgument("with radii, query and query_radii are given together")
 
 
-def _half(cutoff: Any, dtype: np.dtype) -> float:
+def _half(cutoff: Any, dtype: str) -> float:
     """The radius of which the double is exactly the cutoff."""
-    value = dtype.type(_arrays.number(cutoff, "cutoff"))
-    radius = value / 2
-    if not (0 < value < np.inf and radius + radius == value):
+    radius = _exact_half(_arrays.number(cutoff, "cutoff"), dtype)
+    if radius is None:
         raise InvalidArgument(f"cutoff is {cutoff}; it must be finite and > 0 in {dtype}")
-    return float(radius)
+    return radius
 
 
-def _check_form(output: Any, index_dtype: Any, out: Any) -> Any:
-    """The type of indices."""
+@functools.lru_cache(maxsize=256)
+def _exact_half(cutoff: float, dtype: str) -> float | None:
+    value = np.dtype(dtype).type(cutoff)
+    radius = value / 2
+    return float(radius) if 0 < value < np.inf and radius + radius == value else None
+
+
+def _check_form(output: Any, index_dtype: Any, out: Any) -> str:
+    """The name of the type of indices."""
     if output not in ("coo", "csr"):
         raise InvalidArgument(f"output is {output!r}; it must be 'coo' or 'csr'")
     if out is not None and output != "coo":
         raise InvalidArgument("out requires output='coo'")
-    try:
-        return _INDEX_TYPES[str(index_dtype).removeprefix("torch.")]
-    except KeyError:
-        pass
-    try:
-        return _INDEX_TYPES[np.dtype(index_dtype).name]
-    except (KeyError, TypeError):
-        raise InvalidArgument(f"index_dtype is {index_dtype!r}; it must be int32 or int64") from None
-
-
-def _refuse_out(search: Any, out: Any) -> None:
-    if search.periodic and out is not None:
-        raise InvalidArgument("out and periodic exclude each other")
+    if index_dtype == "int32" or index_dtype == "int64":  # also a dtype of NumPy
+        return str(index_dtype)
+    name = str(index_dtype).removeprefix("torch.")
+    if name not in _INDEX_TYPES:
+        try:
+            name = np.dtype(index_dtype).name
+        except TypeError:
+            pass
+    if name not in _INDEX_TYPES:
+        raise InvalidArgument(f"index_dtype is {index_dtype!r}; it must be int32 or int64")
+    return name
 
 
 def _refuse_count(count: Any) -> None:
@@ -431,19 +438,20 @@ def _refuse_count(count: Any) -> None:
         raise InvalidArgument("count requires positions on a device")
 
 
-def _target(array: Any, name: str, shape: tuple[int | None, ...], size: int,
-            dtypes: tuple[Any, ...]) -> np.ndarray:
-    """An array of the caller with room for `size` elements along the axis None of `shape`."""
+def _target(output: _arrays.Output, size: int) -> np.ndarray:
+    """An array of the caller with room for `size` contacts."""
+    array, name = output.array, output.name
     if not isinstance(array, np.ndarray):
         if not hasattr(array, "__dlpack__"):  # would be converted to a copy
             raise InvalidArgument(f"{name} is {type(array).__name__}; it must be an array")
         array = _arrays.to_host(array, name)
-    if array.dtype not in dtypes:
+    if array.dtype.name not in output.dtypes:
         raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be "
-                              + " or ".join(str(np.dtype(dtype)) for dtype in dtypes))
-    if array.ndim != len(shape) or any(
-            have < size if need is None else have != need for have, need in zip(array.shape, shape)):
-        needed = tuple(size if need is None else need for need in shape)
+                              + " or ".join(output.dtypes))
+    if array.ndim != len(output.shape) or any(
+            have < size if need is None else have != need
+            for have, need in zip(array.shape, output.shape)):
+        needed = tuple(size if need is None else need for need in output.shape)
         raise InvalidArgument(f"{name} has shape {array.shape}; it must have room for {needed}")
     if not array.flags.writeable:
         raise InvalidArgument(f"{name} is read-only")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -37,31 +38,53 @@ class View(NamedTuple):
 class _Torch:
     """Arrays of PyTorch, in the order of its current stream."""
 
-    def __init__(self, like: Any) -> None:
-        self._torch = importlib.import_module("torch")
-        self._device = like.device
-        self.stream = self._torch.cuda.current_stream(like.device).cuda_stream
+    def __init__(self) -> None:
+        torch = importlib.import_module("torch")
+        self._torch = torch
+        self._names = {getattr(torch, name): name for name in _TYPES}
+        self._types = {name: dtype for dtype, name in self._names.items()}
+        # The stream of PyTorch without an object of PyTorch, as its own compiler uses it.
+        self._raw_stream = getattr(getattr(torch, "_C", None), "_cuda_getCurrentRawStream", None)
+
+    def stream(self, array: Any) -> int:
+        if self._raw_stream is not None:
+            return self._raw_stream(array.get_device())
+        return self._torch.cuda.current_stream(array.device).cuda_stream
 
     def view(self, array: Any) -> View:
+        dtype = array.dtype
         return View(array.data_ptr(), tuple(array.shape), array.stride(),
-                    str(array.dtype).removeprefix("torch."), array.device.index)
+                    self._names.get(dtype) or str(dtype).removeprefix("torch."), array.get_device())
+
+    @staticmethod
+    def address(array: Any) -> int:
+        return array.data_ptr()
 
     @staticmethod
     def to_host(array: Any) -> Any:
         return array.cpu()
 
-    def empty(self, shape: tuple[int, ...], dtype: str) -> Any:
-        return self._torch.empty(shape, dtype=getattr(self._torch, dtype), device=self._device)
+    def empty(self, shape: tuple[int, ...], dtype: str, like: Any) -> Any:
+        return self._torch.empty(shape, dtype=self._types[dtype], device=like.device)
+
+    @staticmethod
+    def head(array: Any, shape: tuple[int, int]) -> Any:
+        return array.as_strided(shape, (shape[1], 1))
+
+    @staticmethod
+    def copy(array: Any) -> Any:
+        return array.clone()
 
 
 class _Cupy:
     """Arrays of CuPy, in the order of its current stream."""
 
-    def __init__(self, like: Any) -> None:
+    def __init__(self) -> None:
         self._cupy = importlib.import_module("cupy")
-        self._device = like.device
-        with like.device:
-            self.stream = self._cupy.cuda.get_current_stream().ptr
+
+    def stream(self, array: Any) -> int:
+        with array.device:
+            return self._cupy.cuda.get_current_stream().ptr
 
     def view(self, array: Any) -> View:
         size = array.itemsize
@@ -69,19 +92,43 @@ class _Cupy:
                     array.dtype.name, array.device.id)
 
     @staticmethod
+    def address(array: Any) -> int:
+        return array.data.ptr
+
+    @staticmethod
     def to_host(array: Any) -> Any:
         return array.get()
 
-    def empty(self, shape: tuple[int, ...], dtype: str) -> Any:
-        with self._device:
+    def empty(self, shape: tuple[int, ...], dtype: str, like: Any) -> Any:
+        with like.device:
             return self._cupy.empty(shape, dtype)
 
+    @staticmethod
+    def head(array: Any, shape: tuple[int, int]) -> Any:
+        return array[:shape[0] * shape[1]].reshape(shape)
 
+    @staticmethod
+    def copy(array: Any) -> Any:
+        return array.copy()
+
+
+_TYPES = ("float32", "float64", "int32", "int64")
 _LIBRARIES = {"torch": _Torch, "cupy": _Cupy}
 
 
+@functools.cache
+def _functions(library: str) -> Any:
+    """The functions of a library, which is imported already."""
+    return _LIBRARIES[library]()
+
+
+@functools.cache
+def _library_of(kind: type) -> str:
+    return kind.__module__.partition(".")[0]
+
+
 def _library(array: Any) -> str:
-    return type(array).__module__.partition(".")[0]
+    return _library_of(type(array))
 
 
 def _adapted(array: Any, name: str) -> Any:
@@ -102,10 +149,13 @@ def _adapted(array: Any, name: str) -> Any:
 
 def _converter(like: Any) -> Callable[[Any], Any]:
     """The function that converts a result to the kind of `like`."""
-    namespace = getattr(like, "__array_namespace__", None)
-    if _library(like) in _LIBRARIES or namespace is None:
-        return lambda array: array
-    return namespace().from_dlpack
+    if _library(like) in _LIBRARIES or not hasattr(like, "__array_namespace__"):
+        return _unchanged
+    return like.__array_namespace__().from_dlpack
+
+
+def _unchanged(array: Any) -> Any:
+    return array
 
 
 class DeviceSearch:
@@ -114,9 +164,10 @@ class DeviceSearch:
     def __init__(self, positions: Any, device: Any, dtype: Any = None) -> None:
         self.convert = _converter(positions)
         positions = _adapted(positions, "positions")
-        self.library = _LIBRARIES[_library(positions)](positions)
+        self._functions = _functions(_library(positions))
         self._kept = [positions]  # views do not own memory
-        self._positions = self._rows(self.library.view(positions), "positions")
+        self.stream = self._functions.stream(positions)
+        self._positions = self._rows(self._functions.view(positions), "positions")
         self.dtype = self._positions.dtype
         self.device = self._positions.device
         if self.dtype not in ("float32", "float64"):
@@ -140,7 +191,7 @@ class DeviceSearch:
             raise InvalidArgument(f"{name} is not an array on cuda:{self.device}, where the "
                                   "positions are")
         array = _adapted(array, name)
-        view = _LIBRARIES[_library(array)](array).view(array)
+        view = _functions(_library(array)).view(array)
         self._kept.append(array)
         if view.device != self.device:
             raise InvalidArgument(f"{name} is on cuda:{view.device}, and positions are on "
@@ -174,7 +225,7 @@ class DeviceSearch:
             raise InvalidArgument("query and batch exclude each other")
         if is_on_device(batch):
             batch = _adapted(batch, "batch")
-            batch = _LIBRARIES[_library(batch)].to_host(batch)
+            batch = _functions(_library(batch)).to_host(batch)
         self._batch = _arrays.offsets(batch, "batch")
 
     def set_periodic(self, lengths: Any) -> None:
@@ -192,79 +243,104 @@ class DeviceSearch:
         """Waits for the number of contacts, and returns it."""
         if self.periodic and self._query is not None:
             return core.find_periodic_between(self._query, self._spheres, self._cells, contacts,
-                                              self.library.stream)
+                                              self.stream)
         if self.periodic and self._batch is not None:
             return core.find_periodic_in_systems(self._spheres, self._batch, self._cells, contacts,
-                                                 not half, self.library.stream)
+                                                 not half, self.stream)
         if self.periodic:
             return core.find_periodic(self._spheres, self._cells, contacts, not half,
-                                      self.library.stream)
+                                      self.stream)
         if self._query is not None:
-            return core.find_between(self._query, self._spheres, contacts, self.library.stream)
+            return core.find_between(self._query, self._spheres, contacts, self.stream)
         if self._batch is not None:
             return core.find_in_systems(self._spheres, self._batch, contacts, not half,
-                                        self.library.stream)
-        return core.find(self._spheres, contacts, not half, self.library.stream)
+                                        self.stream)
+        return core.find(self._spheres, contacts, not half, self.stream)
 
     def enqueue(self, core: Any, contacts: bool) -> None:
-        core.enqueue(self._spheres, contacts, self.library.stream)
+        core.enqueue(self._spheres, contacts, self.stream)
 
     def collider(self, cache: dict[Any, Any]) -> Any:
         """The collider of the binding for type, device and stream."""
-        key = self.dtype, self.device, self.library.stream
-        if key not in cache:
-            core = _arrays.precision_of(self.dtype)
-            if not hasattr(core, "DeviceCollider"):
+        key = self.dtype, self.device, self.stream
+        core = cache.get(key)
+        if core is None:
+            module = _arrays.precision_of(self.dtype)
+            if not hasattr(module, "DeviceCollider"):
                 raise BackendUnavailable("cuda: built without CUDA")
-            cache[key] = core.DeviceCollider(self.device)
-        return cache[key]
+            core = cache[key] = module.DeviceCollider(self.device)
+        return core
+
+    def _empty(self, shape: tuple[int, ...], dtype: str) -> Any:
+        return self._functions.empty(shape, dtype, self._kept[0])
+
+    def finds_new_pairs(self, output: str, half: bool) -> bool:
+        """Whether the search is one for new_pairs()."""
+        return half and output == "coo" and not self.waits() and not self.periodic
+
+    def new_pairs(self, core: Any, index: str) -> Any:
+        """Searches, and returns the pairs in a new array. A search writes to it directly, without a
+        wait for the number of pairs, if they are about as many as in the last search."""
+        expected = core.expected_pairs
+        capacity = expected + expected // 8 + 64
+        while True:
+            array = self._empty((2 * capacity,), index)
+            size = core.find_pairs(self._spheres, self._functions.address(array), index == "int64",
+                                   capacity, self.stream)
+            if size <= capacity:
+                break
+            capacity = size
+        pairs = self._functions.head(array, (2, size))
+        if capacity > 2 * size + 4096:  # do not keep the unused memory
+            pairs = self._functions.copy(pairs)
+        return self.convert(pairs)
 
     def results(self, core: Any, size: int, output: str, index: str, contacts: bool) -> list[Any]:
         """New arrays with the result of run()."""
-        stream, empty = self.library.stream, self.library.empty
+        stream, empty, address = self.stream, self._empty, self._functions.address
         pairs = empty((2, size), index)
-        a = self.library.view(pairs).address
+        a = address(pairs)
         core.write_pairs(a, a + size * (4 if index == "int32" else 8), index == "int64", size,
                          stream)
         result = [pairs]
         if output == "csr":
             offsets = empty((self.rows() + 1,), "int64")
-            core.write_offsets(self.library.view(offsets).address, stream)
+            core.write_offsets(address(offsets), stream)
             result = [offsets, pairs[1]]
         if contacts:
             result += [empty((size, 3), self.dtype), empty((size,), self.dtype)]
-            core.write_contacts(*(self.library.view(x).address for x in result[-2:]), size, stream)
+            core.write_contacts(*map(address, result[-2:]), size, stream)
         if self.periodic:
             result.append(empty((size, 3), "int32"))
-            core.write_shifts(self.library.view(result[-1]).address, size, stream)
+            core.write_shifts(address(result[-1]), size, stream)
         return [self.convert(array) for array in result]
 
-    def write(self, core: Any, out: Any, contacts: bool, size: int | None) -> None:
+    def write(self, core: Any, outputs: list[_arrays.Output], size: int | None) -> None:
         """Writes the result to arrays of the caller, with room for `size` contacts if it is known."""
-        stream = self.library.stream
-        pairs = self._target(out[0] if contacts else out, "out.pairs" if contacts else "out",
-                             (2, None), size, ("int32", "int64"))
-        capacity = pairs.shape[1]
-        if contacts:
-            normal = self._target(out[1], "out.normal", (None, 3), size, (self.dtype,))
-            distance = self._target(out[2], "out.distance", (None,), size, (self.dtype,))
-            capacity = min(capacity, normal.shape[0], distance.shape[0])
-            core.write_contacts(normal.address, distance.address, capacity, stream)
+        views = {output.field: self._target(output, size) for output in outputs}
+        capacity = min(view.shape[output.shape.index(None)]
+                       for view, output in zip(views.values(), outputs))
+        pairs = views["pairs"]
         step = pairs.strides[0] * (4 if pairs.dtype == "int32" else 8)
         core.write_pairs(pairs.address, pairs.address + step, pairs.dtype == "int64", capacity,
-                         stream)
+                         self.stream)
+        if "normal" in views:
+            core.write_contacts(views["normal"].address, views["distance"].address, capacity,
+                                self.stream)
+        if "shifts" in views:
+            core.write_shifts(views["shifts"].address, capacity, self.stream)
 
     def write_count(self, core: Any, count: Any) -> None:
-        view = self._target(count, "count", (2,), None, ("int64",))
-        core.write_count(view.address, self.library.stream)
+        view = self._target(_arrays.Output("count", "count", count, (2,), ("int64",)), None)
+        core.write_count(view.address, self.stream)
 
-    def _target(self, array: Any, name: str, shape: tuple[int | None, ...], size: int | None,
-                dtypes: tuple[str, ...]) -> View:
+    def _target(self, output: _arrays.Output, size: int | None) -> View:
         """An array of the caller, on the device, whose rows are contiguous."""
+        array, name, shape, dtypes = output.array, output.name, output.shape, output.dtypes
         if not is_on_device(array) or _library(array) not in _LIBRARIES:
             raise InvalidArgument(f"{name} must be a tensor of PyTorch or an array of CuPy on "
                                   f"cuda:{self.device}")
-        view = self.library.view(array)
+        view = self._functions.view(array)
         if view.device != self.device or view.dtype not in dtypes:
             raise InvalidArgument(f"{name} is on cuda:{view.device} with dtype {view.dtype}; it must "
                                   f"be on cuda:{self.device} with dtype {' or '.join(dtypes)}")

@@ -28,6 +28,11 @@ cuda::SphereArrays to_arrays(const ArraysTuple& t) {
           .radius_stride = std::get<5>(t),
           .radius = static_cast<Real>(std::get<6>(t))};
 }
+/// A collider, and the number of pairs that the next find_pairs() is likely to find.
+struct DeviceCollider : cuda::ArrayCollider {
+  using ArrayCollider::ArrayCollider;
+  std::uint64_t expected_pairs = 0;
+};
 cuda::ArrayResult to_result(bool contacts) {
   return contacts ? cuda::ArrayResult::contacts : cuda::ArrayResult::pairs;
 }
@@ -35,22 +40,39 @@ cuda::ArrayResult to_result(bool contacts) {
 }  // namespace
 
 void bind_device_collider(nb::module_& module) {
-  using cuda::ArrayCollider;
   using Release = nb::call_guard<nb::gil_scoped_release>;
-  nb::class_<ArrayCollider>(module, "DeviceCollider")
-      .def("__init__", [](ArrayCollider* self, int device) { new (self) ArrayCollider(device); })
-      .def("reserve", &ArrayCollider::reserve, Release())
+  nb::class_<DeviceCollider>(module, "DeviceCollider")
+      .def("__init__", [](DeviceCollider* self, int device) { new (self) DeviceCollider(device); })
+      .def_ro("expected_pairs", &DeviceCollider::expected_pairs)
+      .def(
+          "reserve",
+          [](DeviceCollider& self, std::size_t spheres, std::size_t contacts) {
+            self.reserve(spheres, contacts);
+          },
+          Release())
       .def(
           "find",
-          [](ArrayCollider& self, const ArraysTuple& spheres, bool contacts, bool both_orders,
+          [](DeviceCollider& self, const ArraysTuple& spheres, bool contacts, bool both_orders,
              Address stream) {
             return self.find(to_arrays(spheres), to_result(contacts), both_orders,
                              to_stream(stream));
           },
           Release())
       .def(
+          "find_pairs",
+          [](DeviceCollider& self, const ArraysTuple& spheres, Address indices, bool wide,
+             std::size_t capacity, Address stream) {
+            const cuda::SphereArrays arrays = to_arrays(spheres);
+            self.expected_pairs = wide ? self.find_pairs(arrays, pointer<std::int64_t>(indices),
+                                                         capacity, to_stream(stream))
+                                       : self.find_pairs(arrays, pointer<std::int32_t>(indices),
+                                                         capacity, to_stream(stream));
+            return self.expected_pairs;
+          },
+          Release())
+      .def(
           "find_between",
-          [](ArrayCollider& self, const ArraysTuple& first, const ArraysTuple& second,
+          [](DeviceCollider& self, const ArraysTuple& first, const ArraysTuple& second,
              bool contacts, Address stream) {
             return self.find_between(to_arrays(first), to_arrays(second), to_result(contacts),
                                      to_stream(stream));
@@ -58,7 +80,7 @@ void bind_device_collider(nb::module_& module) {
           Release())
       .def(
           "find_in_systems",
-          [](ArrayCollider& self, const ArraysTuple& spheres,
+          [](DeviceCollider& self, const ArraysTuple& spheres,
              const Vector<const std::uint64_t>& offsets, bool contacts, bool both_orders,
              Address stream) {
             return self.find_in_systems(to_arrays(spheres), {offsets.data(), offsets.size()},
@@ -67,7 +89,7 @@ void bind_device_collider(nb::module_& module) {
           Release())
       .def(
           "find_periodic",
-          [](ArrayCollider& self, const ArraysTuple& spheres, const Rows<const double>& cell,
+          [](DeviceCollider& self, const ArraysTuple& spheres, const Rows<const double>& cell,
              bool contacts, bool both_orders, Address stream) {
             return self.find_periodic(to_arrays(spheres), to_cells(cell).at(0), to_result(contacts),
                                       both_orders, to_stream(stream));
@@ -75,7 +97,7 @@ void bind_device_collider(nb::module_& module) {
           Release())
       .def(
           "find_periodic_in_systems",
-          [](ArrayCollider& self, const ArraysTuple& spheres,
+          [](DeviceCollider& self, const ArraysTuple& spheres,
              const Vector<const std::uint64_t>& offsets, const Rows<const double>& cells,
              bool contacts, bool both_orders, Address stream) {
             return self.find_periodic_in_systems(
@@ -85,7 +107,7 @@ void bind_device_collider(nb::module_& module) {
           Release())
       .def(
           "find_periodic_between",
-          [](ArrayCollider& self, const ArraysTuple& first, const ArraysTuple& second,
+          [](DeviceCollider& self, const ArraysTuple& first, const ArraysTuple& second,
              const Rows<const double>& cell, bool contacts, Address stream) {
             return self.find_periodic_between(to_arrays(first), to_arrays(second),
                                               to_cells(cell).at(0), to_result(contacts),
@@ -93,11 +115,11 @@ void bind_device_collider(nb::module_& module) {
           },
           Release())
       .def("enqueue",
-           [](ArrayCollider& self, const ArraysTuple& spheres, bool contacts, Address stream) {
+           [](DeviceCollider& self, const ArraysTuple& spheres, bool contacts, Address stream) {
              self.enqueue(to_arrays(spheres), to_result(contacts), to_stream(stream));
            })
       .def("write_pairs",
-           [](ArrayCollider& self, Address a, Address b, bool wide, std::size_t capacity,
+           [](DeviceCollider& self, Address a, Address b, bool wide, std::size_t capacity,
               Address stream) {
              if (wide) {
                self.write_pairs(pointer<std::int64_t>(a), pointer<std::int64_t>(b), capacity,
@@ -108,20 +130,20 @@ void bind_device_collider(nb::module_& module) {
              }
            })
       .def("write_contacts",
-           [](ArrayCollider& self, Address normals, Address distances, std::size_t capacity,
+           [](DeviceCollider& self, Address normals, Address distances, std::size_t capacity,
               Address stream) {
              self.write_contacts(pointer<Real>(normals), pointer<Real>(distances), capacity,
                                  to_stream(stream));
            })
       .def("write_shifts",
-           [](ArrayCollider& self, Address shifts, std::size_t capacity, Address stream) {
+           [](DeviceCollider& self, Address shifts, std::size_t capacity, Address stream) {
              self.write_shifts(pointer<std::int32_t>(shifts), capacity, to_stream(stream));
            })
       .def("write_offsets",
-           [](ArrayCollider& self, Address offsets, Address stream) {
+           [](DeviceCollider& self, Address offsets, Address stream) {
              self.write_offsets(pointer<std::int64_t>(offsets), to_stream(stream));
            })
-      .def("write_count", [](ArrayCollider& self, Address count, Address stream) {
+      .def("write_count", [](DeviceCollider& self, Address count, Address stream) {
         self.write_count(pointer<std::int64_t>(count), to_stream(stream));
       });
 }

@@ -15,7 +15,10 @@ list(APPEND JFPX_SOURCES
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/all_pairs.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/array_collider.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/array_search.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/array_search_parts.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/contact_arrays.cu
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/device_search.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/device_sphere_collider.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/fused_search.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/grid.cu

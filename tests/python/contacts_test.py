@@ -253,6 +253,27 @@ def test_out_receives_the_contacts(rng, dtype):
         np.testing.assert_array_equal(pairs, expected.pairs)
 
 
+def test_out_receives_the_contacts_of_a_periodic_cell(rng, dtype):
+    positions = (rng.random((400, 3)) * 20).astype(dtype)
+    collider = jfpx.SphereCollider(dtype)
+    for options in ({}, {"half": False}, {"batch": [0, 150, 400]}):
+        options["periodic"] = (9, None, 7)
+        expected = jfpx.find_contacts(positions, 0.7, **options)
+        size = len(expected.distance)
+        out = jfpx.PeriodicContacts(np.full((2, size + 3), -1, np.int64), np.zeros((size + 3, 3), dtype),
+                                    np.zeros(size + 4, dtype), np.full((size + 3, 3), -9, np.int32))
+        assert collider.find_contacts(positions, 0.7, out=out, **options) == size > 0
+        for got, wanted in zip((out.pairs.T, *out[1:]), (expected.pairs.T, *expected[1:])):
+            np.testing.assert_array_equal(got[:size], wanted)
+        assert (out.pairs[:, size:] == -1).all() and (out.shifts[size:] == -9).all()
+        pairs = jfpx.PeriodicPairs(np.zeros((2, size), np.int32), np.zeros((size, 3), np.int32))
+        assert collider.find_pairs(positions, 1.4, out=pairs, **options) == size
+        np.testing.assert_array_equal(pairs.pairs, expected.pairs)
+        np.testing.assert_array_equal(pairs.shifts, expected.shifts)
+        with pytest.raises(jfpx.InvalidArgument, match=r"out.shifts has shape \(0, 3\).*room for"):
+            collider.find_pairs(positions, 1.4, out=(pairs.pairs, pairs.shifts[:0]), **options)
+
+
 def test_an_out_that_is_too_small_is_an_error_with_the_size(dtype):
     collider = jfpx.SphereCollider(dtype)
     points = np.zeros((4, 3), dtype)
@@ -319,7 +340,8 @@ NAN = np.array([[0, 0, 0], [0, np.nan, 0]], np.float32)
     (lambda: jfpx.find_pairs(POINTS, 1, periodic=[[9, 9]], batch=[0, 3]), "periodic has 2 lengths"),
     (lambda: jfpx.find_pairs(POINTS, 1, periodic=[9, 9, 1.5], batch=[0, 1, 3]), "system 0: .* twice the cutoff"),
     (lambda: jfpx.SphereCollider().find_pairs(POINTS, 1, periodic=[9, 9, 9],
-                                              out=np.zeros((2, 9), np.int32)), "exclude each other"),
+                                              out=np.zeros((2, 9), np.int32)),
+     "out is ndarray; it must be a tuple of 2 arrays: pairs, shifts"),
     (lambda: jfpx.SphereCollider("float16"), "dtype is 'float16'"),
     (lambda: jfpx.SphereCollider(backend="gpu"), 'backend is "gpu"'),
     (lambda: jfpx.SphereCollider(algorithm="fast"), 'algorithm is "fast"'),

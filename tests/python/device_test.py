@@ -94,6 +94,19 @@ def test_device_arrays_have_the_bits_of_the_host(library, rng, dtype, n, half, i
                 jfpx.find_pairs(positions, radii=radii, output="csr", **options))
 
 
+def test_numbers_of_pairs_may_change_from_call_to_call(library, rng, dtype):
+    positions, _ = random_spheres(rng, 6000, dtype)
+    x = library.to_device(positions)
+    collider = jfpx.SphereCollider(dtype)
+    for cutoff in (0.3, 2.5, 1e-6, 2.5, 2.4, 2.3, 0.3):
+        for index in ("int32", "int64"):
+            pairs = collider.find_pairs(x, cutoff, index_dtype=index)
+            check_equal(library, [pairs], [jfpx.find_pairs(positions, cutoff, index_dtype=index)])
+            is_contiguous = (pairs.is_contiguous() if isinstance(library, Torch)
+                             else pairs.flags.c_contiguous)
+            assert is_contiguous
+
+
 def test_a_query_on_the_device_has_the_bits_of_the_host(library, rng, dtype):
     positions, radii = random_spheres(rng, 3000, dtype)
     query, query_radii = random_spheres(rng, 500, dtype)
@@ -172,6 +185,29 @@ def test_out_on_the_device_receives_the_contacts(library, rng, dtype):
         collider.find_pairs(x, radii=r, out=library.full((2, 5), 0, "int64"))
 
 
+def test_out_on_the_device_receives_the_contacts_of_a_periodic_cell(library, rng, dtype):
+    positions, radii = random_spheres(rng, 2000, dtype)
+    x, r = library.to_device(positions), library.to_device(radii)
+    collider = jfpx.SphereCollider(dtype)
+    for options in ({}, {"half": False}, {"batch": [0, 900, 2000]}):
+        options["periodic"] = (11, None, 12)
+        expected = jfpx.find_contacts(positions, radii, **options)
+        size = len(expected.distance)
+        out = jfpx.PeriodicContacts(library.full((2, size + 7), -1, "int32"),
+                                    library.full((size + 7, 3), 0, dtype.name),
+                                    library.full((size + 7,), 0, dtype.name),
+                                    library.full((size + 7, 3), -9, "int32"))
+        assert collider.find_contacts(x, r, out=out, **options) == size > 0
+        got = [library.to_host(array) for array in out]
+        for a, b in zip((got[0].T, *got[1:]), (expected.pairs.T, *expected[1:])):
+            np.testing.assert_array_equal(a[:size], b)
+        assert (got[0][:, size:] == -1).all() and (got[3][size:] == -9).all()
+        pairs = jfpx.PeriodicPairs(library.full((2, size), 0, "int64"),
+                                   library.full((size, 3), 0, "int32"))
+        assert collider.find_pairs(x, radii=r, out=pairs, **options) == size
+        check_equal(library, [pairs.shifts], [expected.shifts])
+
+
 def test_count_on_the_device_needs_no_wait(library, rng, dtype):
     positions, radii = random_spheres(rng, 2000, dtype)
     expected = jfpx.find_pairs(positions, radii=radii)
@@ -207,6 +243,35 @@ def test_a_search_is_captured_in_a_graph_of_torch(rng, dtype):
         expected = jfpx.find_pairs(moved, radii=radii)
         assert count.tolist() == [expected.shape[1], 1]
         np.testing.assert_array_equal(out[:, :expected.shape[1]].cpu().numpy(), expected)
+
+
+def test_a_search_for_contacts_is_captured_in_a_graph_of_torch(rng, dtype):
+    torch = Torch().module
+    positions, radii = random_spheres(rng, 5000, dtype)
+    collider = jfpx.SphereCollider(dtype)
+    x, r = torch.from_numpy(positions).cuda(), torch.from_numpy(radii).cuda()
+    size = 60_000
+    out = jfpx.Contacts(torch.empty((2, size), dtype=torch.int64, device="cuda"),
+                        torch.empty((size, 3), dtype=x.dtype, device="cuda"),
+                        torch.empty(size, dtype=x.dtype, device="cuda"))
+    count = torch.empty(2, dtype=torch.int64, device="cuda")
+    stream = torch.cuda.Stream()
+    stream.wait_stream(torch.cuda.current_stream())
+    graph = torch.cuda.CUDAGraph()
+    with torch.cuda.stream(stream):
+        collider.reserve(x, 5000, size)
+        collider.find_contacts(x, r, out=out, count=count)  # loads the kernels
+    with torch.cuda.graph(graph, stream=stream):
+        collider.find_contacts(x, r, out=out, count=count)
+    for factor in (1, 0.9):
+        x.copy_(torch.from_numpy(positions * dtype.type(factor)))
+        graph.replay()
+        expected = jfpx.find_contacts(positions * dtype.type(factor), radii)
+        found = len(expected.distance)
+        assert count.tolist() == [found, 1]
+        np.testing.assert_array_equal(out.pairs[:, :found].cpu().numpy(), expected.pairs)
+        np.testing.assert_array_equal(out.normal[:found].cpu().numpy(), expected.normal)
+        np.testing.assert_array_equal(out.distance[:found].cpu().numpy(), expected.distance)
 
 
 def test_the_current_stream_of_torch_is_respected(rng):
@@ -261,7 +326,10 @@ def test_arrays_of_jax_are_taken(rng):
     (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 9]), "periodic has 2 lengths"),
     (lambda x, r, to: jfpx.find_contacts(x, r, periodic=[9, 3, 9]), "at least twice the cutoff"),
     (lambda x, r, to: jfpx.SphereCollider().find_pairs(
-        x, 1, periodic=[9, 9, 9], out=to(np.zeros((2, 9), np.int32))), "exclude each other"),
+        x, 1, periodic=[9, 9, 9], out=to(np.zeros((2, 9), np.int32))), "must be a tuple of 2 arrays"),
+    (lambda x, r, to: jfpx.SphereCollider().find_pairs(
+        x, 1, periodic=[9, 9, 9], out=(to(np.zeros((2, 9), np.int32)), to(np.zeros((9, 3), np.int32))),
+        count=to(np.zeros(2, np.int64))), "count excludes"),
     (lambda x, r, to: jfpx.find_contacts(x, r, output="dense"), "output is 'dense'"),
     (lambda x, r, to: jfpx.find_pairs(x), "either cutoff or radii"),
     (lambda x, r, to: jfpx.find_pairs(x, 1, query=np.zeros((3, 3), np.float32)),
@@ -308,6 +376,7 @@ def test_calls_on_the_device_do_not_leak(library):
     def free_bytes(calls):
         for _ in range(calls):
             jfpx.find_contacts(points, 0.05, half=False, output="csr")
+            jfpx.find_pairs(points, 0.1)
         if isinstance(library, Cupy):
             library.module.cuda.Device().synchronize()
             return library.module.cuda.runtime.memGetInfo()[0]

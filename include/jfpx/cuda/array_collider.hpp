@@ -50,6 +50,15 @@ class JFPX_API ArrayCollider {
   /// @throws InvalidArgument naming the first invalid sphere and field, OutOfMemory, DeviceError
   std::uint64_t find(const SphereArrays& spheres, ArrayResult result, bool both_orders,
                      Stream stream);
+  /// Finds the pairs of find(), without both orders, and writes the indices a to indices[0 .. E)
+  /// and the indices b to indices[E .. 2 * E), if their number E, which is returned, is at most
+  /// `capacity`. Waits for the number alone: the indices are written in the order of the stream.
+  /// Saves the memory of the result, which is not kept, and the time of write_pairs().
+  /// @param indices room for 2 * capacity elements
+  std::uint64_t find_pairs(const SphereArrays& spheres, std::int32_t* indices, std::size_t capacity,
+                           Stream stream);
+  std::uint64_t find_pairs(const SphereArrays& spheres, std::int64_t* indices, std::size_t capacity,
+                           Stream stream);
   /// Finds the touching pairs of a sphere of `first` and one of `second`, as
   /// jfpx::find_contacts_between().
   std::uint64_t find_between(const SphereArrays& first, const SphereArrays& second,

@@ -62,6 +62,16 @@ __device__ inline T warp_inclusive_sum(T value) {
   return value;
 }
 
+/// Minimum and maximum over the lanes of a warp, returned in every lane.
+__device__ inline std::int32_t lowest_of_warp(std::int32_t x) {
+#if __CUDA_ARCH__ >= 800
+  return __reduce_min_sync(kFullWarp, x);
+#else
+  return warp_reduce(x, [](std::int32_t p, std::int32_t q) { return p < q ? p : q; });
+#endif
+}
+__device__ inline std::int32_t highest_of_warp(std::int32_t x) { return ~lowest_of_warp(~x); }
+
 /// Binary search in the inclusive sums of all lanes. Call from all lanes of the warp; `i` may
 /// differ between them.
 /// @return the first lane with sum > i, or the last lane if there is none.

@@ -102,6 +102,8 @@ __global__ void __launch_bounds__(kEmitThreads) mask_emit(MaskEmitArgs args) {
     write_count(args.output, total, invalid, complete);
   }
   if (row >= args.rows || !complete || invalid != kNoSphere) return;
+  SearchOutput known = args.output;
+  known.rows.length = total;
   const std::uint32_t a = args.first_row + row;
   unsigned long long at = args.offsets[a];
   const unsigned long long end = args.offsets[a + 1];
@@ -110,7 +112,7 @@ __global__ void __launch_bounds__(kEmitThreads) mask_emit(MaskEmitArgs args) {
   const SphereInstance sphere = load_sphere(args.spheres + a);
   for (std::uint32_t w = a / kTile * kWordsPerTile; at != end; w += 32) {
     const std::uint32_t word = w + lane_id() < stride ? words[w + lane_id()] : 0;
-    at = emit_row(args.output, at, a, sphere, w, word,
+    at = emit_row(known, at, a, sphere, w, word,
                   [&](std::uint32_t b) { return load_sphere(args.spheres + b); });
   }
 }

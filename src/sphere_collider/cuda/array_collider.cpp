@@ -1,331 +1,28 @@
-/// Searches on arrays in device memory: packs them, searches on a stream of its own, and keeps the
-/// result for the output.
+/// Searches on arrays in device memory.
 #include <jfpx/cuda/array_collider.hpp>
 #include <jfpx/error.hpp>
 
-#include "src/base/cuda/device_buffer.hpp"
-#include "src/base/cuda/probe.hpp"
-#include "src/sphere_collider/cuda/contact_arrays.hpp"
-#include "src/sphere_collider/cuda/periodic_search.hpp"
-#include "src/sphere_collider/cuda/scan.hpp"
-#include "src/sphere_collider/cuda/systems.hpp"
+#include "src/sphere_collider/cuda/array_search.hpp"
 #include "src/sphere_collider/periodic_input.hpp"
 
-#include <type_traits>
 #include <utility>
-#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
-namespace {
 
-/// Owner of an event that only orders streams.
-class OrderingEvent {
- public:
-  explicit OrderingEvent(int device) {
-    const DeviceGuard guard(device);
-    JFPX_CUDA_TRY(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming));
-  }
-  ~OrderingEvent() { static_cast<void>(cudaEventDestroy(event_)); }
-  OrderingEvent(const OrderingEvent&) = delete;
-  OrderingEvent& operator=(const OrderingEvent&) = delete;
-
-  /// Later work of `second` waits for all earlier work of `first`.
-  void order(cudaStream_t first, cudaStream_t second) {
-    JFPX_CUDA_TRY(cudaEventRecord(event_, first));
-    JFPX_CUDA_TRY(cudaStreamWaitEvent(second, event_, 0));
-  }
-
- private:
-  cudaEvent_t event_ = nullptr;
+struct ArrayCollider::Impl : ArraySearch {
+  using ArraySearch::ArraySearch;
 };
-
-/// Results of one kind: as found, and as selected or in both orders. A search in a periodic cell
-/// begins with the pairs among spheres and images in `derived`.
-template <class Item>
-struct Items {
-  DeviceBuffer<Item> found, derived;
-};
-
-/// Calls run(std::type_identity<Item>) for the items of a kind of result.
-template <class Run>
-auto with_item(ArrayResult kind, const Run& run) {
-  return kind == ArrayResult::pairs ? run(std::type_identity<SpherePair>{})
-                                    : run(std::type_identity<SphereContact>{});
-}
-
-}  // namespace
-
-struct ArrayCollider::Impl {
-  Impl(int device_to_use, SphereAlgorithm algorithm)
-      : device(device_to_use),
-        stream(checked(device)),
-        pool(device),
-        collider(stream.get(), device, algorithm),
-        event(device),
-        periodic(pool, stream.get()) {
-    counts.reserve(2, "numbers of contacts");
-    counts.data()[0] = counts.data()[1] = {};
-  }
-
-  /// @throws BackendUnavailable, with the reason, before the first call of CUDA
-  static int checked(int device) {
-    const BackendStatus status = probe(device);
-    if (!status.usable) throw BackendUnavailable("cuda: " + status.reason);
-    return device;
-  }
-
-  template <class Item>
-  Items<Item>& items() {
-    if constexpr (std::is_same_v<Item, SpherePair>) {
-      return pairs;
-    } else {
-      return contacts;
-    }
-  }
-  void reserve(std::size_t n, std::size_t most_contacts);
-  void reserve_spheres(std::size_t n);
-  void pack(const SphereArrays& first, const SphereArrays* second, Stream user);
-  template <class Item>
-  void search(std::size_t n, const DeviceBuffer<Item>& out, ContactCount* count);
-  template <class Item>
-  void search_systems(std::size_t n, const DeviceBuffer<Item>& out, ContactCount* count,
-                      const unsigned long long* image_begins = nullptr);
-  template <class Item, class Search>
-  std::uint64_t repeat_until_complete(const Search& enqueue, DeviceBuffer<Item>* out,
-                                      const ContactCount* count);
-  template <class Item>
-  std::uint64_t search_and_wait(std::size_t n, DeviceBuffer<Item>* out, ContactCount* count) {
-    const auto enqueue = [&](bool again) {
-      if (again) collider.reserve(n, out->capacity());
-      search(n, *out, count);
-    };
-    return repeat_until_complete(enqueue, out, count);
-  }
-  template <class Item>
-  std::uint64_t search_and_wait(std::size_t n) {
-    return search_and_wait(n, &items<Item>().found, counts.data());
-  }
-  template <class Item>
-  std::uint64_t search_periodic(std::size_t n, const PeriodicCell& cell);
-  template <class Item>
-  std::uint64_t search_periodic_systems(std::span<const std::uint64_t> from,
-                                        std::span<const PeriodicCell> cells);
-  template <class Item>
-  std::uint64_t keep_nearest(std::uint64_t found);
-  std::uint64_t count_of(int which) const { return counts.data()[which].contacts; }
-  [[noreturn]] void reject(std::uint32_t invalid);
-  template <class Item>
-  std::uint64_t select_between(std::uint64_t found, std::uint32_t boundary);
-  template <class Item>
-  std::uint64_t list_both_orders(std::uint64_t found, Stream user);
-  void reserve_systems(std::size_t n, std::span<const std::uint64_t> from);
-  template <class Item>
-  FoundItems<Item> found() {
-    return {.items = items<Item>().found.data(), .count = counts.data(), .b_offset = b_offset};
-  }
-  template <class Item>
-  FoundItems<Item> result() {
-    if (!is_derived) return found<Item>();
-    return {
-        .items = items<Item>().derived.data(), .count = counts.data() + 1, .b_offset = b_offset};
-  }
-
-  int device;
-  OwnedStream stream;
-  MemoryPool pool;
-  DeviceSphereCollider collider;
-  OrderingEvent event;
-  DeviceBuffer<SphereInstance> spheres;
-  Items<SpherePair> pairs;
-  Items<SphereContact> contacts;
-  PinnedBuffer<ContactCount> counts;  // of `found` and of `derived`
-  DeviceBuffer<unsigned char> scratch;
-  DeviceBuffer<std::uint32_t> keys;
-  // Of searches in systems.
-  DeviceBuffer<std::uint64_t> offsets;
-  std::uint32_t systems = 0;
-  DeviceBuffer<std::uint32_t> row_counts;
-  DeviceBuffer<unsigned long long> row_sums;
-  DeviceBuffer<SearchState> state;
-  DeviceBuffer<unsigned long long> indices;
-  PeriodicSearch periodic;
-
-  // The last search.
-  ArrayResult kind = ArrayResult::pairs;
-  bool is_derived = false, is_periodic = false;
-  std::size_t rows = 0;
-  std::uint32_t b_offset = 0;
-};
-
-void ArrayCollider::Impl::reserve(std::size_t n, std::size_t most_contacts) {
-  collider.reserve(n, most_contacts);
-  reserve_spheres(n);
-}
-
-void ArrayCollider::Impl::reserve_spheres(std::size_t n) {
-  check_number_of_spheres(n);
-  spheres.reserve_geometric(pool, stream.get(), n, "spheres");
-}
-
-void ArrayCollider::Impl::pack(const SphereArrays& first, const SphereArrays* second, Stream user) {
-  event.order(user, stream.get());
-  launch_pack(first, spheres.data(), stream.get());
-  if (second != nullptr) launch_pack(*second, spheres.data() + first.count, stream.get());
-  is_derived = is_periodic = false;
-  rows = first.count;
-  b_offset = second != nullptr ? static_cast<std::uint32_t>(first.count) : 0;
-}
-
-template <class Item>
-void ArrayCollider::Impl::search(std::size_t n, const DeviceBuffer<Item>& out,
-                                 ContactCount* count) {
-  if constexpr (std::is_same_v<Item, SpherePair>) {
-    kind = ArrayResult::pairs;
-    collider.find_pairs(spheres.data(), n, out.data(), out.capacity(), count);
-  } else {
-    kind = ArrayResult::contacts;
-    collider.find_contacts(spheres.data(), n, out.data(), out.capacity(), count);
-  }
-}
-
-template <class Item>
-std::uint64_t ArrayCollider::Impl::search_periodic(std::size_t n, const PeriodicCell& cell) {
-  const std::size_t all = n + periodic.count_images(spheres.data(), n, cell);
-  reserve(all, 0);
-  periodic.append_images(spheres.data());
-  const std::uint64_t found = search_and_wait(all, &items<Item>().derived, counts.data() + 1);
-  return keep_nearest<Item>(found);
-}
-
-/// Reserves what search_systems() needs, and copies the offsets.
-void ArrayCollider::Impl::reserve_systems(std::size_t n, std::span<const std::uint64_t> from) {
-  reserve_spheres(n);
-  row_counts.reserve_geometric(pool, stream.get(), n + 1, "numbers of contacts");
-  row_sums.reserve_geometric(pool, stream.get(), n + 1, "sums of numbers of contacts");
-  scratch.reserve_geometric(pool, stream.get(), scan_scratch_bytes(n + 1), "scratch of a scan");
-  state.reserve_geometric(pool, stream.get(), 1, "states of searches");
-  offsets.reserve_geometric(pool, stream.get(), from.size(), "offsets of systems");
-  systems = static_cast<std::uint32_t>(from.size() - 1);
-  JFPX_CUDA_TRY(cudaMemcpyAsync(offsets.data(), from.data(), from.size_bytes(),
-                                cudaMemcpyHostToDevice, stream.get()));
-}
-
-template <class Item>
-void ArrayCollider::Impl::search_systems(std::size_t n, const DeviceBuffer<Item>& out,
-                                         ContactCount* count,
-                                         const unsigned long long* image_begins) {
-  JFPX_CUDA_TRY(cudaMemsetAsync(state.data(), 0, sizeof(SearchState), stream.get()));
-  const SystemsArgs args{.spheres = spheres.data(),
-                         .n = static_cast<std::uint32_t>(n),
-                         .offsets = offsets.data(),
-                         .systems = systems,
-                         .image_begins = image_begins,
-                         .counts = row_counts.data(),
-                         .sums = row_sums.data(),
-                         .state = state.data()};
-  launch_count_in_systems(args, stream.get());
-  exclusive_scan(row_counts.data(), row_sums.data(), n + 1, scratch.data(),
-                 scan_scratch_bytes(n + 1), stream.get());
-  SearchOutput output{nullptr, nullptr, out.capacity(), count};
-  if constexpr (std::is_same_v<Item, SpherePair>) {
-    kind = ArrayResult::pairs;
-    output.pairs = out.data();
-  } else {
-    kind = ArrayResult::contacts;
-    output.contacts = out.data();
-  }
-  launch_emit_in_systems(args, output, stream.get());
-}
-
-template <class Item>
-std::uint64_t ArrayCollider::Impl::search_periodic_systems(std::span<const std::uint64_t> from,
-                                                           std::span<const PeriodicCell> cells) {
-  const std::size_t n = from.back();
-  const std::size_t images = periodic.count_images(spheres.data(), cells, from, offsets.data());
-  reserve_spheres(n + images);
-  periodic.append_images(spheres.data());
-  DeviceBuffer<Item>& out = items<Item>().derived;
-  ContactCount* const count = counts.data() + 1;
-  return keep_nearest<Item>(repeat_until_complete(
-      [&](bool) { search_systems(n, out, count, periodic.image_begins()); }, &out, count));
-}
-
-/// Makes the pairs of nearest images of those among spheres and images in `derived`.
-template <class Item>
-std::uint64_t ArrayCollider::Impl::keep_nearest(std::uint64_t found) {
-  Items<Item>& list = items<Item>();
-  periodic.keep_nearest(list.derived.data(), found, &list.found, counts.data());
-  JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
-  is_periodic = true;
-  return count_of(0);
-}
-
-/// Calls enqueue(again) until there is memory for all contacts. Returns their number.
-template <class Item, class Search>
-std::uint64_t ArrayCollider::Impl::repeat_until_complete(const Search& enqueue,
-                                                         DeviceBuffer<Item>* out,
-                                                         const ContactCount* count) {
-  for (bool again = false;; again = true) {
-    enqueue(again);
-    JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
-    if (count->first_invalid != kNoSphere) reject(count->first_invalid);
-    if (count->complete != 0) return count->contacts;
-    out->reserve_geometric(pool, stream.get(), count->contacts, "contacts");
-  }
-}
-
-void ArrayCollider::Impl::reject(std::uint32_t invalid) {
-  counts.data()[0] = {};
-  std::vector<SphereInstance> copy(std::size_t{invalid} + 1);
-  JFPX_CUDA_TRY(cudaMemcpyAsync(copy.data(), spheres.data(), copy.size() * sizeof copy[0],
-                                cudaMemcpyDeviceToHost, stream.get()));
-  JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
-  detail::reject_sphere(copy);
-}
-
-template <class Item>
-std::uint64_t ArrayCollider::Impl::select_between(std::uint64_t found, std::uint32_t boundary) {
-  const std::size_t bytes = select_scratch_bytes<Item>(found);
-  scratch.reserve_geometric(pool, stream.get(), bytes, "scratch memory of a selection");
-  Items<Item>& list = items<Item>();
-  list.derived.reserve_geometric(pool, stream.get(), found, "selected contacts");
-  launch_select_between(list.found.data(), found, boundary, list.derived.data(), counts.data() + 1,
-                        scratch.data(), bytes, stream.get());
-  JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
-  is_derived = true;
-  return count_of(1);
-}
-
-template <class Item>
-std::uint64_t ArrayCollider::Impl::list_both_orders(std::uint64_t found, Stream user) {
-  const std::size_t bytes = sort_scratch_bytes(found);
-  scratch.reserve_geometric(pool, stream.get(), bytes, "scratch memory of a sort");
-  keys.reserve_geometric(pool, stream.get(), 2 * found, "keys of a sort");
-  indices.reserve_geometric(pool, stream.get(), 2 * found, "values of a sort");
-  Items<Item>& list = items<Item>();
-  list.derived.reserve_geometric(pool, stream.get(), 2 * found, "contacts in both orders");
-  launch_both_orders(list.found.data(), found, list.derived.data(), counts.data() + 1,
-                     {.b = keys.data(),
-                      .sorted_b = keys.data() + found,
-                      .index = indices.data(),
-                      .sorted_index = indices.data() + found,
-                      .sort = scratch.data(),
-                      .sort_bytes = bytes},
-                     stream.get());
-  is_derived = true;
-  event.order(stream.get(), user);
-  return 2 * found;
-}
 
 ArrayCollider::ArrayCollider(int device, SphereAlgorithm algorithm)
     : impl_(std::make_unique<Impl>(device, algorithm)) {}
 ArrayCollider::~ArrayCollider() {
   if (impl_ == nullptr) return;
-  static_cast<void>(JFPX_CUDA_RESULT(cudaStreamSynchronize(impl_->stream.get())));
   try {
     const DeviceGuard guard(impl_->device);
+    // Streams of the caller may use the memory.
+    static_cast<void>(JFPX_CUDA_RESULT(cudaDeviceSynchronize()));
     impl_.reset();
   } catch (const DeviceError&) {
     impl_.reset();  // the device is lost
@@ -343,29 +40,40 @@ void ArrayCollider::reserve(std::size_t spheres, std::size_t contacts) {
   impl_->reserve(spheres, contacts);
   impl_->pairs.found.reserve(impl_->pool, impl_->stream.get(), contacts, "pairs");
   impl_->contacts.found.reserve(impl_->pool, impl_->stream.get(), contacts, "contacts");
-  JFPX_CUDA_TRY(cudaStreamSynchronize(impl_->stream.get()));
+  impl_->wait();
 }
 
 std::uint64_t ArrayCollider::find(const SphereArrays& spheres, ArrayResult result, bool both_orders,
                                   Stream stream) {
   const DeviceGuard guard(impl_->device);
-  impl_->reserve(spheres.count, 0);
-  impl_->pack(spheres, nullptr, stream);
   return with_item(result, [&]<class Item>(std::type_identity<Item>) {
-    const std::uint64_t found = impl_->search_and_wait<Item>(spheres.count);
+    const std::uint64_t found = impl_->find<Item>(spheres, stream);
     return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
   });
+}
+
+std::uint64_t ArrayCollider::find_pairs(const SphereArrays& spheres, std::int32_t* indices,
+                                        std::size_t capacity, Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  return impl_->find_pairs(spheres, indices, capacity, stream);
+}
+
+std::uint64_t ArrayCollider::find_pairs(const SphereArrays& spheres, std::int64_t* indices,
+                                        std::size_t capacity, Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  return impl_->find_pairs(spheres, indices, capacity, stream);
 }
 
 std::uint64_t ArrayCollider::find_between(const SphereArrays& first, const SphereArrays& second,
                                           ArrayResult result, Stream stream) {
   const DeviceGuard guard(impl_->device);
   const std::size_t n = first.count + second.count;
+  impl_->follow(stream);
   impl_->reserve(n, 0);
-  impl_->pack(first, &second, stream);
+  impl_->pack(first, &second);
   return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_and_wait<Item>(n);
-    return found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset);
+    return impl_->keep(found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset));
   });
 }
 
@@ -374,13 +82,15 @@ std::uint64_t ArrayCollider::find_in_systems(const SphereArrays& spheres,
                                              ArrayResult result, bool both_orders, Stream stream) {
   detail::check_offsets(offsets, spheres.count);
   const DeviceGuard guard(impl_->device);
+  impl_->follow(stream);
   impl_->reserve_systems(spheres.count, offsets);
-  impl_->pack(spheres, nullptr, stream);
+  impl_->pack(spheres);
   return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     DeviceBuffer<Item>& out = impl_->items<Item>().found;
     ContactCount* const count = impl_->counts.data();
     const std::uint64_t found = impl_->repeat_until_complete(
         [&](bool) { impl_->search_systems(spheres.count, out, count); }, &out, count);
+    impl_->keep(found);
     return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
   });
 }
@@ -388,10 +98,12 @@ std::uint64_t ArrayCollider::find_in_systems(const SphereArrays& spheres,
 std::uint64_t ArrayCollider::find_periodic(const SphereArrays& spheres, const PeriodicCell& cell,
                                            ArrayResult result, bool both_orders, Stream stream) {
   const DeviceGuard guard(impl_->device);
+  impl_->follow(stream);
   impl_->reserve(spheres.count, 0);
-  impl_->pack(spheres, nullptr, stream);
+  impl_->pack(spheres);
   return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_periodic<Item>(spheres.count, cell);
+    impl_->keep(found);
     return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
   });
 }
@@ -404,10 +116,12 @@ std::uint64_t ArrayCollider::find_periodic_in_systems(const SphereArrays& sphere
   detail::check_offsets(offsets, spheres.count);
   detail::check_number_of_cells(cells, offsets);
   const DeviceGuard guard(impl_->device);
+  impl_->follow(stream);
   impl_->reserve_systems(spheres.count, offsets);
-  impl_->pack(spheres, nullptr, stream);
+  impl_->pack(spheres);
   return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_periodic_systems<Item>(offsets, cells);
+    impl_->keep(found);
     return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
   });
 }
@@ -418,27 +132,24 @@ std::uint64_t ArrayCollider::find_periodic_between(const SphereArrays& first,
                                                    Stream stream) {
   const DeviceGuard guard(impl_->device);
   const std::size_t n = first.count + second.count;
+  impl_->follow(stream);
   impl_->reserve(n, 0);
-  impl_->pack(first, &second, stream);
+  impl_->pack(first, &second);
   return with_item(result, [&]<class Item>(std::type_identity<Item>) {
     const std::uint64_t found = impl_->search_periodic<Item>(n, cell);
-    return found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset);
+    return impl_->keep(found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset));
   });
 }
 
 void ArrayCollider::enqueue(const SphereArrays& spheres, ArrayResult result, Stream stream) {
   const DeviceGuard guard(impl_->device);
-  if (spheres.count > impl_->spheres.capacity()) {
-    throw InvalidArgument("number of spheres is " + std::to_string(spheres.count) + "; " +
-                          std::to_string(impl_->spheres.capacity()) + " were reserved");
-  }
-  impl_->pack(spheres, nullptr, stream);
-  if (result == ArrayResult::pairs) {
-    impl_->search(spheres.count, impl_->pairs.found, impl_->counts.data());
-  } else {
-    impl_->search(spheres.count, impl_->contacts.found, impl_->counts.data());
-  }
-  impl_->event.order(impl_->stream.get(), stream);
+  impl_->collider.require_reserved(spheres.count);
+  const SphereInput input = impl_->prepare(spheres, stream);
+  with_item(result, [&]<class Item>(std::type_identity<Item>) {
+    const DeviceBuffer<Item>& out = impl_->items<Item>().found;
+    impl_->collider.find(input, impl_->to_output(out, impl_->counts.data()), stream);
+  });
+  impl_->number.reset();
 }
 
 void ArrayCollider::write_pairs(std::int32_t* a, std::int32_t* b, std::size_t capacity,
@@ -472,8 +183,10 @@ void ArrayCollider::write_shifts(std::int32_t* shifts, std::size_t capacity, Str
   }
   const DeviceGuard guard(impl_->device);
   with_item(impl_->kind, [&]<class Item>(std::type_identity<Item>) {
-    launch_write_shifts(impl_->result<Item>(), impl_->found<Item>(), impl_->periodic.shifts(),
-                        shifts, capacity, stream);
+    const FoundItems<Item> half{.items = impl_->items<Item>().found.data(),
+                                .n = impl_->count_of(0)};
+    launch_write_shifts(impl_->result<Item>(), half, impl_->periodic.shifts(), shifts, capacity,
+                        stream);
   });
 }
 

@@ -12,8 +12,10 @@ namespace cuda {
 namespace {
 
 /// The number of items that may be read: none unless the search was complete.
-__device__ std::size_t items_of(const ContactCount* count, std::size_t capacity) {
-  const std::size_t n = count->complete != 0 ? count->contacts : 0;
+template <class Item>
+__device__ std::size_t items_of(const FoundItems<Item>& found, std::size_t capacity) {
+  std::size_t n = found.n;
+  if (found.count != nullptr) n = found.count->complete != 0 ? found.count->contacts : 0;
   return n < capacity ? n : capacity;
 }
 
@@ -32,7 +34,7 @@ template <class Item, class Index>
 __global__ void __launch_bounds__(kListThreads)
     write_pairs(FoundItems<Item> found, Index* a, Index* b, std::size_t capacity) {
   wait_for_previous_kernel();
-  const std::size_t n = items_of(found.count, capacity);
+  const std::size_t n = items_of(found, capacity);
   for (std::size_t i = first_element(); i < n; i += element_stride()) {
     a[i] = static_cast<Index>(found.items[i].a);
     b[i] = static_cast<Index>(found.items[i].b - found.b_offset);
@@ -43,7 +45,7 @@ __global__ void __launch_bounds__(kListThreads)
     write_contacts(FoundItems<SphereContact> found, Real* normals, Real* distances,
                    std::size_t capacity) {
   wait_for_previous_kernel();
-  const std::size_t n = items_of(found.count, capacity);
+  const std::size_t n = items_of(found, capacity);
   for (std::size_t i = first_element(); i < n; i += element_stride()) {
     const SphereContact contact = found.items[i];
     normals[3 * i] = contact.normal.x;
@@ -57,7 +59,7 @@ template <class Item>
 __global__ void __launch_bounds__(kListThreads)
     write_offsets(FoundItems<Item> found, std::int64_t* offsets, std::size_t rows) {
   wait_for_previous_kernel();
-  const std::size_t n = items_of(found.count, ~std::size_t{0});
+  const std::size_t n = items_of(found, ~std::size_t{0});
   for (std::size_t i = first_element(); i <= rows; i += element_stride()) {
     offsets[i] = static_cast<std::int64_t>(items_before(found.items, n, i));
   }

@@ -12,9 +12,10 @@ namespace cuda {
 /// Contacts or pairs of a search in device memory.
 template <class Item>
 struct FoundItems {
-  const Item* items;
-  const ContactCount* count;  ///< of the items
-  std::uint32_t b_offset;     ///< subtracted from each index b
+  const Item* items = nullptr;
+  std::uint64_t n = 0;                  ///< number of items, if `count` is null
+  const ContactCount* count = nullptr;  ///< the same, if the host does not know it
+  std::uint32_t b_offset = 0;           ///< subtracted from each index b
 };
 
 /// Enqueues spheres[i] = {positions of row i, radius of i}.

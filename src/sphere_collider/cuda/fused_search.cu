@@ -67,8 +67,8 @@ struct TilesOfBlock {
   SphereInstance mine[2];
   unsigned valid_before = 0;
   for (unsigned k = 0; k < 2; ++k) {
-    const std::uint32_t i = min(k * kThreads + threadIdx.x, args.n - 1);
-    mine[k] = load_sphere(args.spheres + i);
+    const std::uint32_t i = min(k * kThreads + threadIdx.x, args.input.n - 1);
+    mine[k] = load_sphere(args.input, i);
     if (!is_valid(mine[k])) valid_before = max(valid_before, ~i);
   }
   valid_before = warp_max(valid_before);
@@ -102,7 +102,7 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
   extern __shared__ __align__(alignof(FusedStorage)) unsigned char raw[];
   FusedStorage& s = *reinterpret_cast<FusedStorage*>(raw);
   const cg::cluster_group cluster = cg::this_cluster();
-  const std::uint32_t n = args.n;
+  const std::uint32_t n = args.input.n;
   const unsigned warp = threadIdx.x / 32;
   const bool one = cluster.block_rank() == 0 && threadIdx.x == 0;
   if (n == 0) {
@@ -140,11 +140,13 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
   const std::uint32_t invalid = first_invalid(warp_max(s.valid_before[lane_id() % kWarps]));
   if (one) write_count(args.output, total, invalid, complete);
   if (!complete || invalid != kNoSphere) return;
+  SearchOutput known = args.output;
+  known.rows.length = total;
 #pragma unroll
   for (unsigned k = 0; k < kRowsOfWarp; ++k) {
     const std::uint32_t a = row(k);
     if (a >= n) continue;
-    emit_row(args.output, s.offsets[a], a, s.spheres[a], 0, words[k],
+    emit_row(known, s.offsets[a], a, s.spheres[a], 0, words[k],
              [&](std::uint32_t b) { return s.spheres[b]; });
   }
 #else

@@ -12,8 +12,7 @@ namespace cuda {
 inline constexpr std::uint32_t kFusedSpheres = 1024;
 
 struct FusedArgs {
-  const SphereInstance* spheres;
-  std::uint32_t n;  ///< at most kFusedSpheres
+  SphereInput input;  ///< at most kFusedSpheres
   SearchOutput output;
 };
 /// Whether the current device can run the search: it requires clusters of 16 thread blocks, which

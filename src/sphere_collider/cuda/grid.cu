@@ -3,6 +3,7 @@
 /// bounds and no cell size to choose, and radii may differ by any factor. Each phase is a launch
 /// with its own number of threads.
 #include "src/sphere_collider/cuda/grid_build.cuh"
+#include "src/sphere_collider/cuda/grid_crowded.cuh"
 #include "src/sphere_collider/cuda/grid_emit.cuh"
 #include "src/sphere_collider/cuda/grid_one_launch.hpp"
 #include "src/sphere_collider/cuda/grid_search.cuh"
@@ -95,10 +96,21 @@ constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 5 : 3;
 __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
     single_level_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
-  __shared__ SingleLevelStorage storage[kGridWarps];
+  union Storage {
+    SingleLevelStorage single;
+    CrowdedStorage crowded;
+  };
+  __shared__ Storage storage[kGridWarps];
   if (!is_valid_input(args) || !args.plan->single) return;
-  SingleLevelSearcher(args, output, storage[threadIdx.x / 32])
-      .run(blockIdx.x * kGridThreads + threadIdx.x);
+  const std::uint32_t position = blockIdx.x * kGridThreads + threadIdx.x;
+  if (!args.plan->crowded) {
+    SingleLevelSearcher(args, output, storage[threadIdx.x / 32].single).run(position);
+    return;
+  }
+  CrowdedSearcher searcher(args, output, *args.plan, storage[threadIdx.x / 32].crowded);
+  for (std::uint32_t first = position - lane_id(), k = 0; k < 32; k += kHomes) {
+    if (first + k < args.input.n) searcher.run(first + k);
+  }
 }
 
 /// Resident blocks per multiprocessor of search_phase. Fewer blocks search hashed cells, because
@@ -143,14 +155,15 @@ __global__ void __launch_bounds__(kGridThreads, kCopyBlocks)
   wait_for_previous_kernel();
   __shared__ CopyStorage storage;
   if (!is_valid_input(args) || !args.plan->single || !is_complete(args, output)) return;
-  copy_bin(args, output, storage);
+  copy_bin(args, with_row_length(args, output), blockIdx.x,
+           contacts_before(args, blockIdx.x, storage), storage);
 }
 
 __global__ void __launch_bounds__(kGridThreads) emit_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ EmitStorage storage;
   if (!is_valid_input(args) || args.plan->single || !is_complete(args, output)) return;
-  emit(args, output, storage);
+  emit(args, with_row_length(args, output), storage);
 }
 
 __device__ bool has_long_rows(const GridArgs& args, const SearchOutput& output) {
@@ -160,7 +173,7 @@ __global__ void __launch_bounds__(kGridThreads) list_phase(GridArgs args, Search
   wait_for_previous_kernel();
   if (!has_long_rows(args, output)) return;
   if (args.plan->single) {
-    list_long_rows(args);
+    list_long_rows(args, *args.plan);
   } else {
     place_overflow(args);
   }
@@ -168,7 +181,9 @@ __global__ void __launch_bounds__(kGridThreads) list_phase(GridArgs args, Search
 __global__ void __launch_bounds__(kGridThreads) long_row_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ LongRowStorage storage;
-  if (has_long_rows(args, output)) emit_long_rows(args, output, storage);
+  if (has_long_rows(args, output)) {
+    emit_long_rows(args, with_row_length(args, output), storage);
+  }
 }
 
 /// Launches a kernel with more shared memory than the default limit of a block. `max_bytes` must be
@@ -294,9 +309,11 @@ GridLimits grid_limits(int device) {
   return limits;
 }
 
+bool is_in_one_launch(std::size_t n) { return n <= kMaxInOneLaunch; }
+
 void launch_grid_search(const GridArgs& args, const SearchOutput& output, const GridLimits& limits,
                         cudaStream_t stream) {
-  if (args.input.n <= kMaxInOneLaunch) {
+  if (is_in_one_launch(args.input.n)) {
     launch_in_one(args, output, limits.resident_blocks, stream);
   } else {
     GridArgs phased = args;

@@ -69,6 +69,9 @@ __device__ inline std::uint32_t row_of_box(const LevelBox& box, std::int32_t y, 
   return box.base + yz * static_cast<std::uint32_t>(box.nx) - static_cast<std::uint32_t>(box.x0);
 }
 
+/// Number of spheres a cell from which on a warp searches for several spheres together.
+inline constexpr Real kCrowded = 3;
+
 /// Layout of the cell table. It is dense if the cells of all levels between the lowest and the
 /// highest coordinates fit into the table and no sphere is far: then each cell has its own bucket,
 /// and rows follow rows, so that cells that are close in y and z are close in memory. Otherwise the
@@ -77,6 +80,7 @@ struct GridPlan {
   GridScale scale;
   bool dense;
   bool single;      ///< dense, and all spheres are on level 0
+  bool crowded;     ///< single, with more than kCrowded spheres a cube of the cell width on average
   Real inverse_yz;  ///< inverse cell width of level 0, in y and z
   std::uint32_t buckets;
   std::uint32_t coarse_shift;  ///< 2^coarse_shift consecutive buckets are a coarse bucket
@@ -172,6 +176,8 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
       plan.scale = scale;
       plan.dense = dense;
       plan.single = dense && scale.last_level == 0;
+      plan.crowded = plan.single && x_cells * static_cast<Real>(args.input.n) >
+                                        kCrowded * static_cast<Real>(all_cells);
       plan.inverse_yz = inverse_width(half_cell_of(scale.half_0, 0));
       plan.buckets = dense ? static_cast<std::uint32_t>(all_cells) : args.table.size;
       plan.coarse_shift = 0;

@@ -5,6 +5,7 @@
 ///  - in one cooperative launch (grid_one_launch.cu): up to kMaxInOneLaunch spheres (grid.cu), if
 ///    the direct search, which the same kernel tries first, does not apply;
 ///  - single-level (grid_single_level.cuh): more spheres, of similar radius, in several launches;
+///    if they are crowded, a warp searches for several of them together (grid_crowded.cuh);
 ///  - multi-level (grid_search.cuh): more spheres, of any radii, in several launches.
 ///
 /// The word row has two meanings. A row of cells consists of the cells of one level with the same y
@@ -24,7 +25,7 @@ namespace cuda {
 /// Neighbors that a sphere keeps in its own slots; further ones go to a list for all spheres.
 inline constexpr std::uint32_t kSlots = 16;
 /// Largest number of contacts of a row in the staging buffer. No contact of a longer row is staged.
-inline constexpr std::uint32_t kMaxStaged = 18;
+inline constexpr std::uint32_t kMaxStaged = 48;
 /// Number of elements after the last sphere that a search reads, but does not use.
 inline constexpr std::uint32_t kReadBeyond = 2;
 /// Longest row that one warp sorts. Longer rows are sorted by many blocks.
@@ -89,10 +90,6 @@ std::size_t grid_plan_bytes();
 
 /// Arguments of a grid search. Arrays are 16-byte aligned and have 15 spare bytes at the end.
 struct GridArgs {
-  struct Input {
-    const SphereInstance* spheres;
-    std::uint32_t n;  ///< at least 1
-  };
   /// The spheres sorted by bucket. The position of a sphere is its index in that order.
   struct Table {
     std::uint32_t size;        ///< largest number of buckets: a power of two
@@ -125,9 +122,9 @@ struct GridArgs {
     SphereInstance* partitioned;     ///< [n] spheres by coarse bucket
     std::uint32_t* partitioned_ids;  ///< [n] their indices
     std::uint32_t* neighbors;        ///< [n][kSlots] the first b's of a row, by position
-    SphereContact* staging;          ///< [capacity] contacts, or pairs, of short rows by position
+    SphereContact* staging;  ///< [capacity] contacts, or neighbors, of short rows by position
   };
-  Input input;
+  SphereInput input;  ///< at least one sphere; packed, but for a search in one launch
   Table table;
   Rows rows;
   Scratch scratch;
@@ -142,6 +139,8 @@ std::size_t grid_scratch_bytes(std::size_t n, std::size_t capacity);
 /// The arrays of a search among n spheres, in `memory` of grid_scratch_bytes().
 GridArgs::Scratch grid_scratch(std::uint32_t n, unsigned char* memory);
 
+/// Whether a search among n spheres is one launch.
+bool is_in_one_launch(std::size_t n);
 /// Enqueues the whole search. Does not allocate or wait.
 void launch_grid_search(const GridArgs& args, const SearchOutput& output, const GridLimits& limits,
                         cudaStream_t stream);

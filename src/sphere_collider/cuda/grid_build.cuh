@@ -62,7 +62,7 @@ __device__ inline void measure(const GridArgs& args, BuildStorage& s) {
 #pragma unroll
     for (unsigned k = 0; k < kBatch; ++k) {
       const std::uint64_t i = first + k * all_threads();
-      spheres[k] = load_sphere(args.input.spheres + (i < args.input.n ? i : first));
+      spheres[k] = load_sphere(args.input, i < args.input.n ? i : first);
     }
 #pragma unroll
     for (unsigned k = 0; k < kBatch; ++k) {
@@ -134,7 +134,7 @@ __device__ inline void sample_cells(const GridArgs& args, BuildStorage& s) {
       // spheres.
       const std::uint32_t sample = k * 0x9e3779b9u;
       const std::uint32_t i = args.input.n > samples ? __umulhi(sample, args.input.n) : k;
-      const SphereInstance sphere = load_sphere(args.input.spheres + i);
+      const SphereInstance sphere = load_sphere(args.input, i);
       if (level_of(sphere, all_levels) < level) continue;
       const std::uint32_t hash =
           row_of(cell_of(sphere.centre.y, inverse), cell_of(sphere.centre.z, inverse),
@@ -161,8 +161,7 @@ __device__ inline void assign(const GridArgs& args, const GridPlan& plan) {
 #pragma unroll
     for (unsigned k = 0; k < kBatch; ++k) {
       const std::uint64_t i = first + k * all_threads();
-      const SphereInstance sphere =
-          load_sphere(args.input.spheres + (i < args.input.n ? i : first));
+      const SphereInstance sphere = load_sphere(args.input, i < args.input.n ? i : first);
       buckets[k] = plan.bucket_of(sphere);
       if (!plan.single && !is_far(sphere)) level_bits |= 1u << level_of(sphere, plan.scale);
     }
@@ -234,7 +233,7 @@ __device__ inline void scatter(const GridArgs& args) {
       if (i >= args.input.n) break;
       args.table.positions[i] = to[k];
       args.table.ids[to[k]] = static_cast<std::uint32_t>(i);
-      args.table.sorted[to[k]] = load_sphere(args.input.spheres + i);
+      args.table.sorted[to[k]] = load_sphere(args.input, i);
     }
   }
 }

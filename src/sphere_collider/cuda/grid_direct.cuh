@@ -12,7 +12,7 @@ namespace cuda {
 
 inline constexpr unsigned kLanesOfSphere = 9;  // one per row of cells around a sphere
 inline constexpr unsigned kSpheresOfWarp = 32 / kLanesOfSphere;
-inline constexpr std::uint32_t kMinCellSlots = 6, kMaxCellSlots = 16;  // slots of a cell
+inline constexpr std::uint32_t kMinCellSlots = 6, kMaxCellSlots = 32;  // slots of a cell
 inline constexpr std::uint32_t kDirectPairs = 1024;  // largest number of pairs of a block
 
 /// Grid of the cells between the lowest and the highest coordinates.
@@ -67,7 +67,7 @@ __device__ inline DirectPlan make_direct_plan(const GridArgs& args) {
 /// Inserts spheres into the slots of their cells.
 __device__ inline void insert(const GridArgs& args, const DirectPlan& plan) {
   for (std::uint64_t i = grid_thread(); i < args.input.n; i += all_threads()) {
-    const SphereInstance sphere = load_sphere(args.input.spheres + i);
+    const SphereInstance sphere = load_sphere(args.input, i);
     const std::int32_t x = cell_of(sphere.centre.x, plan.inverse) - plan.x0;
     const std::int32_t y = cell_of(sphere.centre.y, plan.inverse) - plan.y0;
     const std::int32_t z = cell_of(sphere.centre.z, plan.inverse) - plan.z0;
@@ -90,7 +90,7 @@ __device__ inline void search_directly(const GridArgs& args, const DirectPlan& p
                                        DirectStorage& s) {
   constexpr std::int32_t kCellsAtOnce = 3;
   constexpr unsigned kAtOnce = 4;
-  const SphereInstance self = load_sphere(args.input.spheres + a);
+  const SphereInstance self = load_sphere(args.input, a);
   const Real search_radius = search_radius_of(self.radius, plan.half);
   const auto low = [&](Real x, std::int32_t first) {
     return max(cell_of(moved(x, -search_radius), plan.inverse) - first, 0);
@@ -199,14 +199,16 @@ __device__ inline void emit_directly(const GridArgs& args, const SearchOutput& o
   const bool complete = all <= output.capacity;
   if (blockIdx.x == 0 && threadIdx.x == 0) write_count(output, all, kNoSphere, complete);
   if (!complete) return;
+  SearchOutput known = output;
+  known.rows.length = all;
   const auto total = static_cast<std::uint32_t>(args.table.sums[blockIdx.x]);
   const auto first_a = static_cast<std::uint32_t>(span_of_block(args.input.n, 1).first);
   for (std::uint32_t first = threadIdx.x & ~31u; first < total; first += kGridThreads) {
     const std::uint32_t c = first + lane_id();
     if (c < total) {
       const std::uint32_t a = first_a + s.owners[c], b = s.sorted[c];
-      write_or_stage(output, before + c, a, b, load_sphere(args.input.spheres + a),
-                     load_sphere(args.input.spheres + b), s.staged[threadIdx.x / 32]);
+      write_or_stage(known, before + c, a, b, load_sphere(args.input, a),
+                     load_sphere(args.input, b), s.staged[threadIdx.x / 32]);
     }
     if (output.contacts != nullptr) {
       write_staged(s.staged[threadIdx.x / 32], min(32u, total - first),

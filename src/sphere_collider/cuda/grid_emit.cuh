@@ -34,6 +34,13 @@ __device__ inline bool is_complete(const GridArgs& args, const SearchOutput& out
   return total <= args.rows.capacity && total <= output.capacity;
 }
 
+/// The output of a search whose number of contacts is known.
+__device__ inline SearchOutput with_row_length(const GridArgs& args, const SearchOutput& output) {
+  SearchOutput known = output;
+  known.rows.length = contacts_found(*args.state);
+  return known;
+}
+
 /// Lists a row that is too long for this phase, for a later phase.
 __device__ inline void defer_row(const GridArgs& args, std::uint32_t a, std::uint32_t count,
                                  unsigned long long offset) {
@@ -92,7 +99,7 @@ __device__ inline void write_or_stage(const SearchOutput& output, unsigned long 
                                       std::uint32_t a, std::uint32_t b, const SphereInstance& sa,
                                       const SphereInstance& sb, unsigned char* staged) {
   if (output.contacts == nullptr) {
-    output.pairs[at] = {a, b};
+    write_pair(output, at, a, b);
     return;
   }
   const PairResult r = detail::test_sphere_pair(sa, sb);
@@ -163,12 +170,12 @@ __device__ inline unsigned long long emit_tile(const GridArgs& args, const Searc
       const unsigned owner = s.owners[c];
       const std::uint32_t of = static_cast<std::uint32_t>(first_a) + owner, b = s.neighbors[c];
       if (stages) {
-        const PairResult r = detail::test_sphere_pair(load_sphere(args.input.spheres + of),
-                                                      load_sphere(args.input.spheres + b));
+        const PairResult r =
+            detail::test_sphere_pair(load_sphere(args.input, of), load_sphere(args.input, b));
         reinterpret_cast<SphereContact*>(staged)[lane_id()] = {of, b, r.normal, r.distance};
       } else {
-        write_contact(output, s.shift[owner] + c, of, b, load_sphere(args.input.spheres + of),
-                      load_sphere(args.input.spheres + b));
+        write_contact(output, s.shift[owner] + c, of, b, load_sphere(args.input, of),
+                      load_sphere(args.input, b));
       }
     }
     if (stages) write_staged(staged, min(32u, fews - first), output.contacts + before + first);
@@ -227,7 +234,7 @@ __device__ inline void emit_long_row(const GridArgs& args, const SearchOutput& o
   const bool few = length <= kFew;
   if (!few) sort_ids(ids, length);
   __syncwarp();
-  const SphereInstance sphere = load_sphere(args.input.spheres + a);
+  const SphereInstance sphere = load_sphere(args.input, a);
   for (unsigned i = lane_id(); i < length; i += 32) {
     const std::uint32_t b = ids[i];
     std::uint32_t rank = i;
@@ -235,7 +242,7 @@ __device__ inline void emit_long_row(const GridArgs& args, const SearchOutput& o
       rank = 0;
       for (unsigned k = 0; k < length; ++k) rank += ids[k] < b ? 1 : 0;
     }
-    write_contact(output, offset + rank, a, b, sphere, load_sphere(args.input.spheres + b));
+    write_contact(output, offset + rank, a, b, sphere, load_sphere(args.input, b));
   }
   __syncwarp();
 }
@@ -272,12 +279,12 @@ __device__ inline void emit_window(const GridArgs& args, const SearchOutput& out
     s.group_counts[g] = warp_sum(count);
   }
   __syncthreads();
-  const SphereInstance sphere = load_sphere(args.input.spheres + a);
+  const SphereInstance sphere = load_sphere(args.input, a);
   for (unsigned g = threadIdx.x / 32; g < kWindowWords / 32; g += kGridWarps) {
     unsigned long long at = offset + s.before;
     for (unsigned k = 0; k < g; ++k) at += s.group_counts[k];
     emit_row(output, at, a, sphere, window / 32 + 32 * g, s.words[32 * g + lane_id()],
-             [&](std::uint32_t b) { return load_sphere(args.input.spheres + b); });
+             [&](std::uint32_t b) { return load_sphere(args.input, b); });
   }
 }
 

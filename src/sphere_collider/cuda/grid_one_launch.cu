@@ -1,6 +1,7 @@
 /// Grid search in one cooperative launch, for up to some 10^5 spheres, where the overhead of
 /// several launches would dominate the time.
 #include "src/sphere_collider/cuda/grid_build.cuh"
+#include "src/sphere_collider/cuda/grid_crowded.cuh"
 #include "src/sphere_collider/cuda/grid_direct.cuh"
 #include "src/sphere_collider/cuda/grid_emit.cuh"
 #include "src/sphere_collider/cuda/grid_one_launch.hpp"
@@ -25,6 +26,8 @@ union PhaseStorage {
   SearchStorage<false> search;
   EmitStorage emit;
   LongRowStorage long_rows;
+  CrowdedStorage crowded[kGridWarps];
+  CopyStorage copy;
 };
 
 /// The state of this search. Call before the first grid barrier.
@@ -57,6 +60,32 @@ __device__ bool search_without_sorting(const GridArgs& args, const SearchOutput&
   return false;
 }
 
+/// The phases after the sort, for crowded spheres.
+__device__ void search_crowded(const GridArgs& args, const SearchOutput& output,
+                               const GridPlan& plan, PhaseStorage& storage,
+                               const cg::grid_group& grid) {
+  const unsigned warp = threadIdx.x / 32;
+  CrowdedSearcher searcher(args, output, plan, storage.crowded[warp]);
+  const std::uint64_t stride = std::uint64_t{kHomes} * kGridWarps * gridDim.x;
+  for (std::uint64_t first = std::uint64_t{kHomes} * (kGridWarps * blockIdx.x + warp);
+       first < args.input.n; first += stride) {
+    searcher.run(static_cast<std::uint32_t>(first));
+  }
+  grid.sync();
+  const bool complete = is_complete(args, output);
+  if (blockIdx.x == 0 && threadIdx.x == 0) {
+    write_count(output, contacts_found(*args.state), kNoSphere, complete);
+  }
+  if (!complete) return;
+  const SearchOutput known = with_row_length(args, output);
+  copy_bins(args, known, storage.copy);
+  if (args.state->overflow == 0) return;
+  grid.sync();
+  list_long_rows(args, plan);
+  grid.sync();
+  emit_long_rows(args, known, storage.long_rows);
+}
+
 __global__ void __launch_bounds__(kGridThreads, kBlocksPerMultiprocessor)
     grid_search(const __grid_constant__ GridArgs arguments,
                 const __grid_constant__ SearchOutput output) {
@@ -69,6 +98,7 @@ __global__ void __launch_bounds__(kGridThreads, kBlocksPerMultiprocessor)
 
   clear_table(args);
   clear_counts(args);
+  clear(args.rows.bin_sums, bins_of(args.input.n) * sizeof(*args.rows.bin_sums));
   measure(args, storage.build);
   grid.sync();
   if (one) clear_next_state(*args.states);
@@ -90,6 +120,10 @@ __global__ void __launch_bounds__(kGridThreads, kBlocksPerMultiprocessor)
   grid.sync();
   scatter(args);
   grid.sync();
+  if (plan.crowded) {
+    search_crowded(args, output, plan, storage, grid);
+    return;
+  }
   if (plan.dense) {
     Searcher<true>(args, plan, storage.dense_search).run();
   } else {
@@ -99,14 +133,15 @@ __global__ void __launch_bounds__(kGridThreads, kBlocksPerMultiprocessor)
   const bool complete = is_complete(args, output);
   if (one) write_count(output, args.state->contacts, kNoSphere, complete);
   if (!complete) return;
+  const SearchOutput known = with_row_length(args, output);
   sum_counts(args, storage.emit);
   grid.sync();
-  emit(args, output, storage.emit);
+  emit(args, known, storage.emit);
   if (args.state->overflow == 0) return;
   grid.sync();
   place_overflow(args);
   grid.sync();
-  emit_long_rows(args, output, storage.long_rows);
+  emit_long_rows(args, known, storage.long_rows);
 }
 
 }  // namespace

@@ -13,7 +13,9 @@ namespace cuda {
 
 inline constexpr unsigned kAtOnce = 2;  // candidates that a thread tests in a step
 static_assert(kAtOnce <= kReadBeyond);
-inline constexpr unsigned kColumn = kMaxStaged + kAtOnce;  // candidates that a thread holds
+inline constexpr std::uint32_t kMaxKept = 18;  // neighbors that a thread keeps
+static_assert(kMaxKept <= kMaxStaged);
+inline constexpr unsigned kColumn = kMaxKept + kAtOnce;  // candidates that a thread holds
 inline constexpr unsigned kRowsHeld = 5;  // rows whose candidates a thread tests together
 inline constexpr unsigned kRanked = 8;    // neighbors that are sorted in registers
 
@@ -136,7 +138,7 @@ class SingleLevelSearcher {
   /// those that may touch.
   __device__ void test_candidates(const uint2* past_ranges, unsigned steps) {
     const uint2* next = &s_.ranges[lane_id()];
-    std::uint32_t* const full = &held(kMaxStaged);
+    std::uint32_t* const full = &held(kMaxKept);
     std::uint32_t at = 0, past = 0;
     for (; steps != 0; --steps) {
       if (at >= past && next < past_ranges) {
@@ -162,7 +164,7 @@ class SingleLevelSearcher {
   }
 
   /// Keeps those held spheres that touch and have a larger index. If there are more than
-  /// kMaxStaged, only counts them.
+  /// kMaxKept, only counts them.
   __device__ void keep_neighbors() {
     const bool uncertain = __any_sync(kFullWarp, !(largest_excess_ < -error_bound_));
     std::uint32_t* to = &held(kept_);
@@ -174,7 +176,7 @@ class SingleLevelSearcher {
       to += 32;
       ++kept_;
     }
-    if (kept_ > kMaxStaged) not_kept_ += kept_, kept_ = 0;
+    if (kept_ > kMaxKept) not_kept_ += kept_, kept_ = 0;
     top_ = &held(kept_);
     largest_excess_ = -std::numeric_limits<Real>::infinity();
     __syncwarp();
@@ -306,8 +308,8 @@ __device__ inline void list_neighbors(const GridArgs& args, const SingleLevel& l
 }
 
 /// Writes the neighbors of all rows that were not staged to Rows::long_row_neighbors.
-__device__ inline void list_long_rows(const GridArgs& args) {
-  const SingleLevel level(*args.plan);
+__device__ inline void list_long_rows(const GridArgs& args, const GridPlan& plan) {
+  const SingleLevel level(plan);
   const std::uint32_t long_rows = args.state->long_rows,
                       all = long_rows + args.state->very_long_rows;
   for (std::uint32_t k = blockIdx.x * kGridWarps + threadIdx.x / 32; k < all;

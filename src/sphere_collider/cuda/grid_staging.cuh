@@ -8,10 +8,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Location of a row in the staging buffer: index (59 bits) and length (5 bits). For a long row,
+/// Location of a row in the staging buffer: index (58 bits) and length (6 bits). For a long row,
 /// which is not staged, the second field is kNotStaged and the first one is the length.
 struct StagedList {
-  static constexpr unsigned kCountBits = 5, kNotStaged = 31;
+  static constexpr unsigned kCountBits = 6, kNotStaged = 63;
   unsigned long long bits;
   __device__ bool is_long() const { return (bits & kNotStaged) == kNotStaged; }
   __device__ unsigned long long index() const { return bits >> kCountBits; }
@@ -27,12 +27,15 @@ __device__ inline StagedList staged_list(unsigned long long index, unsigned coun
   return {index << StagedList::kCountBits | count};
 }
 
-/// The staging buffer as an output of the same kind as `output`.
+/// The staging buffer as an output: of contacts, or of the neighbors b alone.
 __device__ inline SearchOutput staging_output(const GridArgs& args, const SearchOutput& output) {
-  if (output.contacts != nullptr)
-    return {args.scratch.staging, nullptr, args.rows.capacity, nullptr};
-  return {nullptr, reinterpret_cast<SpherePair*>(args.scratch.staging), args.rows.capacity,
-          nullptr};
+  SearchOutput staging{};
+  if (output.contacts != nullptr) {
+    staging.contacts = args.scratch.staging;
+  } else {
+    staging.neighbors = reinterpret_cast<std::uint32_t*>(args.scratch.staging);
+  }
+  return staging;
 }
 
 static_assert(kBin == kGridThreads);
@@ -45,13 +48,13 @@ struct CopyStorage {
   std::uint8_t owners[kMaxStaged * kGridThreads];  // row of each staged contact of the bin
 };
 
-/// A block copies the `count` staged records of a bin, of kWords 8-byte words each, to the output.
-template <unsigned kWords>
-__device__ inline void copy_words(const void* staging, void* output, std::uint32_t count,
-                                  const CopyStorage& s) {
-  constexpr unsigned kAtOnce = 4;
-  const auto* const from = static_cast<const unsigned long long*>(staging);
-  auto* const to = static_cast<unsigned long long*>(output);
+/// A block copies the `count` staged contacts of a bin to the output.
+__device__ inline void copy_contacts(const SphereContact* staging, SphereContact* output,
+                                     std::uint32_t count, const CopyStorage& s) {
+  constexpr unsigned kAtOnce = 4, kWords = sizeof(SphereContact) / 8;
+  static_assert(sizeof(SphereContact) % 8 == 0);
+  const auto* const from = reinterpret_cast<const unsigned long long*>(staging);
+  auto* const to = reinterpret_cast<unsigned long long*>(output);
   const std::uint32_t words = count * kWords;
   for (std::uint32_t first = threadIdx.x; first < words; first += kAtOnce * kGridThreads) {
     unsigned long long values[kAtOnce], indices[kAtOnce];
@@ -65,6 +68,27 @@ __device__ inline void copy_words(const void* staging, void* output, std::uint32
 #pragma unroll
     for (unsigned k = 0; k < kAtOnce; ++k) {
       if (first + k * kGridThreads < words) to[indices[k]] = values[k];
+    }
+  }
+}
+
+/// A block writes the pairs of the `count` staged neighbors of a bin, whose first row is first_a.
+__device__ inline void copy_pairs(const std::uint32_t* staging, const SearchOutput& output,
+                                  std::uint32_t first_a, std::uint32_t count,
+                                  const CopyStorage& s) {
+  constexpr unsigned kAtOnce = 4;
+  for (std::uint32_t first = threadIdx.x; first < count; first += kAtOnce * kGridThreads) {
+    std::uint32_t neighbors[kAtOnce], owners[kAtOnce];
+#pragma unroll
+    for (unsigned k = 0; k < kAtOnce; ++k) {
+      const std::uint32_t i = min(first + k * kGridThreads, count - 1);
+      owners[k] = s.owners[i];
+      neighbors[k] = staging[s.from[owners[k]] + i];
+    }
+#pragma unroll
+    for (unsigned k = 0; k < kAtOnce; ++k) {
+      const std::uint32_t i = first + k * kGridThreads;
+      if (i < count) write_pair(output, s.to[owners[k]] + i, first_a + owners[k], neighbors[k]);
     }
   }
 }
@@ -84,18 +108,26 @@ __device__ inline void sum_bins(const GridArgs& args) {
   }
 }
 
-/// A block copies the rows of a bin from the staging buffer to the output, and lists its long rows
-/// for a later phase.
-__device__ inline void copy_bin(const GridArgs& args, const SearchOutput& output, CopyStorage& s) {
-  const std::uint32_t bin = blockIdx.x, first_bin = bin / kBinsOfSum * kBinsOfSum;
-  const std::uint32_t a = bin * kBin + threadIdx.x;
-  const StagedList list{a < args.input.n ? args.rows.offsets[a] : 0};
+/// The number of contacts in all bins before `bin`, from sum_bins().
+__device__ inline unsigned long long contacts_before(const GridArgs& args, std::uint32_t bin,
+                                                     CopyStorage& s) {
+  const std::uint32_t first_bin = bin / kBinsOfSum * kBinsOfSum;
   unsigned long long mine =
       threadIdx.x < bin - first_bin ? args.rows.bin_sums[first_bin + threadIdx.x] : 0;
   for (std::uint32_t k = threadIdx.x; k < bin / kBinsOfSum; k += kGridThreads) {
     mine += args.rows.sums[k];
   }
-  const unsigned long long before = block_sum(mine, s.sums);
+  return block_sum(mine, s.sums);
+}
+
+/// A block copies the rows of a bin from the staging buffer to the output, where there are `before`
+/// contacts before them, and lists its long rows for a later phase.
+/// @return the number of contacts of the bin
+__device__ inline unsigned long long copy_bin(const GridArgs& args, const SearchOutput& output,
+                                              std::uint32_t bin, unsigned long long before,
+                                              CopyStorage& s) {
+  const std::uint32_t a = bin * kBin + threadIdx.x;
+  const StagedList list{a < args.input.n ? args.rows.offsets[a] : 0};
   const std::uint32_t count = list.count(), staged = list.staged();
   // One scan computes two sums: of staged contacts (low bits, at most kMaxStaged * kGridThreads),
   // and of all contacts.
@@ -115,11 +147,27 @@ __device__ inline void copy_bin(const GridArgs& args, const SearchOutput& output
     defer_row(args, a, count, before + (sums >> kStagedBits));
   }
   __syncthreads();
-  static_assert(sizeof(SpherePair) == 8 && sizeof(SphereContact) % 8 == 0);
   if (output.contacts != nullptr) {
-    copy_words<sizeof(SphereContact) / 8>(args.scratch.staging, output.contacts, all, s);
+    copy_contacts(args.scratch.staging, output.contacts, all, s);
   } else {
-    copy_words<1>(args.scratch.staging, output.pairs, all, s);
+    copy_pairs(reinterpret_cast<const std::uint32_t*>(args.scratch.staging), output, bin * kBin,
+               all, s);
+  }
+  return total >> kStagedBits;
+}
+
+/// All blocks of the kernel copy all bins.
+__device__ inline void copy_bins(const GridArgs& args, const SearchOutput& output, CopyStorage& s) {
+  const std::uint32_t bins = bins_of(args.input.n);
+  const std::uint32_t first = std::uint64_t{bins} * blockIdx.x / gridDim.x,
+                      past = std::uint64_t{bins} * (blockIdx.x + 1) / gridDim.x;
+  if (first == past) return;
+  unsigned long long mine = 0;
+  for (std::uint32_t k = threadIdx.x; k < first; k += kGridThreads) mine += args.rows.bin_sums[k];
+  unsigned long long before = block_sum(mine, s.sums);
+  for (std::uint32_t bin = first; bin < past; ++bin) {
+    before += copy_bin(args, output, bin, before, s);
+    __syncthreads();
   }
 }
 

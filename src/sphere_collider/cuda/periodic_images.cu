@@ -158,10 +158,10 @@ __global__ void __launch_bounds__(kListThreads)
     write_shifts(FoundItems<Item> found, FoundItems<Item> half, const ImageShift* half_shifts,
                  std::int32_t* shifts, std::size_t capacity) {
   wait_for_previous_kernel();
-  const std::size_t n = found.count->contacts < capacity ? found.count->contacts : capacity;
+  const std::size_t n = found.n < capacity ? found.n : capacity;
   for (std::size_t i = first_element(); i < n; i += element_stride()) {
     const std::uint32_t a = found.items[i].a, b = found.items[i].b;
-    const std::size_t j = items_before(half.items, half.count->contacts, min(a, b), max(a, b));
+    const std::size_t j = items_before(half.items, half.n, min(a, b), max(a, b));
     const std::int32_t sign = a < b ? 1 : -1;
     for (std::size_t k = 0; k < 3; ++k) shifts[3 * i + k] = sign * half_shifts[j][k];
   }

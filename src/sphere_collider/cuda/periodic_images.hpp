@@ -56,8 +56,8 @@ void launch_place_kept(const PeriodicArgs& args, const Item* items, std::size_t 
                        ImageShift* shifts, ContactCount* count, cudaStream_t stream);
 
 /// Enqueues the output of the shifts of up to `capacity` items.
-/// @param found items of `half`, or their opposites
-/// @param half sorted pairs a < b
+/// @param found items of `half`, or their opposites, of known number
+/// @param half sorted pairs a < b, of known number
 /// @param half_shifts the shifts of `half`
 template <class Item>
 void launch_write_shifts(const FoundItems<Item>& found, const FoundItems<Item>& half,

@@ -25,6 +25,17 @@ __device__ inline SphereInstance load_sphere(const SphereInstance* p) {
   return s;
 }
 
+/// Loads sphere `i` of the input in the same way.
+__device__ inline SphereInstance load_sphere(const SphereInput& input, std::uint64_t i) {
+  if (input.spheres != nullptr) return load_sphere(input.spheres + i);
+  const SphereArrays& arrays = input.arrays;
+  const auto row = static_cast<std::ptrdiff_t>(i);
+  const Real* const p = arrays.positions + row * arrays.row_stride;
+  const Real radius =
+      arrays.radii == nullptr ? arrays.radius : __ldg(arrays.radii + row * arrays.radius_stride);
+  return {{__ldg(p), __ldg(p + arrays.column_stride), __ldg(p + 2 * arrays.column_stride)}, radius};
+}
+
 __device__ inline bool is_valid(const SphereInstance& s) {
   return is_finite(s.centre) && is_finite(s.radius) && s.radius > 0;
 }
@@ -40,12 +51,31 @@ __device__ inline std::uint32_t first_invalid(const SearchState* state) {
   return first_invalid(state->valid_before);
 }
 
+/// Writes the pair a < b to index `at` of the output.
+__device__ inline void write_pair(const SearchOutput& output, unsigned long long at,
+                                  std::uint32_t a, std::uint32_t b) {
+  const IndexRows& rows = output.rows;
+  if (output.pairs != nullptr) {
+    output.pairs[at] = {a, b};
+  } else if (output.neighbors != nullptr) {
+    output.neighbors[at] = b;
+  } else if (rows.is_wide) {
+    auto* const indices = static_cast<std::int64_t*>(rows.indices);
+    indices[at] = a;
+    indices[rows.length + at] = b;
+  } else {
+    auto* const indices = static_cast<std::int32_t*>(rows.indices);
+    indices[at] = static_cast<std::int32_t>(a);
+    indices[rows.length + at] = static_cast<std::int32_t>(b);
+  }
+}
+
 /// Writes the contact of the touching pair a < b to index `at` of the output.
 __device__ inline void write_contact(const SearchOutput& output, unsigned long long at,
                                      std::uint32_t a, std::uint32_t b, const SphereInstance& sa,
                                      const SphereInstance& sb) {
   if (output.contacts == nullptr) {
-    output.pairs[at] = {a, b};
+    write_pair(output, at, a, b);
     return;
   }
   const PairResult r = detail::test_sphere_pair(sa, sb);
@@ -58,6 +88,11 @@ __device__ inline void write_count(const SearchOutput& output, unsigned long lon
                                    std::uint32_t invalid, bool complete) {
   const bool valid = invalid == kNoSphere;
   *output.count = {valid ? contacts : 0, invalid, valid && complete ? 1u : 0u};
+  if (output.signal == nullptr) return;
+  const unsigned long long signal = (valid ? contacts : 0) << kSignalBits |
+                                    (valid ? kSignalIsValid : 0) |
+                                    (valid && complete ? kSignalIsComplete : 0);
+  asm volatile("st.relaxed.sys.global.u64 [%0], %1;" ::"l"(output.signal), "l"(signal) : "memory");
 }
 
 /// A warp writes the contacts of row `a`, given as 32 words of a bit mask, one word per lane: lane

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <jfpx/contact.hpp>
-#include <jfpx/cuda/sphere_collider.hpp>
+#include <jfpx/cuda/array_collider.hpp>
 #include <jfpx/error.hpp>
 
 #include <cstddef>
@@ -45,13 +45,38 @@ struct alignas(16) SearchState {
   std::uint32_t same_cell[32];           ///< pairs of sampled spheres in one cell, by level
 };
 
-/// Destination of the result of a search. Either `contacts` or `pairs` is null.
-struct SearchOutput {
-  SphereContact* contacts;
-  SpherePair* pairs;
-  unsigned long long capacity;
-  ContactCount* count;
+/// Spheres of a search, in device memory.
+struct SphereInput {
+  const SphereInstance* spheres = nullptr;  ///< null: the spheres are in `arrays`
+  std::uint32_t n = 0;
+  SphereArrays arrays = {};
 };
+
+/// Pairs as two rows of indices: all a's, then all b's.
+struct IndexRows {
+  void* indices = nullptr;  ///< std::int32_t, or std::int64_t if `is_wide`
+  bool is_wide = false;
+  unsigned long long length = 0;  ///< of a row: the number of pairs, which the kernels set
+};
+
+/// Destination of the result of a search: `contacts`, `pairs`, `rows`, or within a search
+/// `neighbors`; the others are null.
+struct SearchOutput {
+  SphereContact* contacts = nullptr;
+  SpherePair* pairs = nullptr;
+  unsigned long long capacity = 0;
+  ContactCount* count = nullptr;
+  /// In host memory, or null: receives signal_of() the count with a single store, so that the host
+  /// can poll it, before all contacts are written.
+  unsigned long long* signal = nullptr;
+  IndexRows rows = {};
+  std::uint32_t* neighbors = nullptr;  ///< the b's of the pairs alone
+};
+
+/// A ContactCount, without the index of an invalid sphere, in one word.
+inline constexpr unsigned long long kSignalIsValid = 1, kSignalIsComplete = 2;
+inline constexpr unsigned kSignalBits = 2;
+inline constexpr unsigned long long kNoSignal = ~0ull;
 
 }  // namespace cuda
 }  // namespace JFPX_ABI

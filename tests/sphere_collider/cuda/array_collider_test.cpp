@@ -4,6 +4,9 @@
 
 #include "tests/sphere_collider/cuda/device_arrays.hpp"
 
+#include <chrono>
+#include <thread>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
@@ -204,6 +207,112 @@ TEST_F(Cuda, ArraysCanBeSearchedInAGraph) {
   EXPECT_EQ(ha[expected.size()], -1);  // nothing is written beyond
   JFPX_CUDA_TRY(cudaGraphExecDestroy(executable));
   JFPX_CUDA_TRY(cudaGraphDestroy(graph));
+}
+
+/// The indices that find_pairs() writes to an array with room for `capacity` pairs, and -1 beyond.
+template <class Index>
+std::vector<Index> rows_of(ArrayCollider& collider, const SphereArrays& spheres,
+                           std::size_t capacity, std::size_t expected, Stream stream) {
+  const DeviceArray<Index> indices(2 * capacity);
+  EXPECT_EQ(collider.find_pairs(spheres, indices.data(), capacity, stream), expected);
+  return indices.download();
+}
+
+template <class Index>
+std::vector<Index> rows_of(const std::vector<SpherePair>& pairs) {
+  std::vector<Index> rows;
+  for (const SpherePair& pair : pairs) rows.push_back(static_cast<Index>(pair.a));
+  for (const SpherePair& pair : pairs) rows.push_back(static_cast<Index>(pair.b));
+  return rows;
+}
+
+/// Spheres for each of the searches: fused, all pairs, direct, sorted, in several launches; the
+/// last three with rows of any length, too.
+std::vector<Spheres> spheres_of_all_searches(Random& random) {
+  std::vector<Spheres> all;
+  for (const std::size_t n : {0, 1, 300, 3000, 6000, 30000, 300000}) {
+    all.push_back(make_gas(n, Real(0.5), 6, random));
+  }
+  for (const auto& [n, contacts] : {std::pair{10000, 40}, {30000, 40}, {300000, 12}}) {
+    all.push_back(
+        make_gas(static_cast<std::size_t>(n), Real(0.5), static_cast<Real>(contacts), random));
+  }
+  for (const std::size_t k : {5, 8, 9}) {
+    Spheres clusters = all[k];
+    for (std::size_t i = 0; i < 1500; ++i) clusters[17 * i].centre = {1, 2, 3};
+    for (std::size_t i = 0; i < 900; ++i) {
+      clusters[20 * i + 5].centre = {Real(0.01) * static_cast<Real>(i % 30), 9, 9};
+    }
+    all.push_back(clusters);
+  }
+  return all;
+}
+
+TEST_F(Cuda, ArraysOfPairsAreWrittenAsRowsOfIndices) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  for (const Spheres& spheres : spheres_of_all_searches(random)) {
+    const DeviceSpheres arrays(spheres);
+    const ContactSpan contacts = cpu->find_contacts(spheres);
+    const std::vector<SpherePair> pairs = pairs_of(contacts);
+    const std::size_t size = pairs.size();
+    const auto note = "N = " + std::to_string(spheres.size()) + ", " + std::to_string(size) +
+                      " pairs, " + seed_note();
+    ASSERT_EQ(collider.find(arrays.arrays(), ArrayResult::contacts, false, stream.get()), size);
+    EXPECT_TRUE(same_bits(contacts_of<std::int32_t>(collider, size, stream.get()), contacts))
+        << note;
+    for (int repeat = 0; repeat < 2; ++repeat) {  // memory grows in the first search
+      EXPECT_TRUE(rows_of<std::int32_t>(collider, arrays.arrays(), size, size, stream.get()) ==
+                  rows_of<std::int32_t>(pairs))
+          << note;
+    }
+    EXPECT_TRUE(rows_of<std::int64_t>(collider, arrays.arrays(), size, size, stream.get()) ==
+                rows_of<std::int64_t>(pairs))
+        << note;
+    auto expected = rows_of<std::int32_t>(pairs);
+    expected.resize(2 * (size + 10), -1);  // nothing is written beyond
+    EXPECT_TRUE(rows_of<std::int32_t>(collider, arrays.arrays(), size + 10, size, stream.get()) ==
+                expected)
+        << note;
+    if (size == 0) continue;
+    const auto few = rows_of<std::int32_t>(collider, arrays.arrays(), size - 1, size, stream.get());
+    EXPECT_TRUE(few == std::vector<std::int32_t>(2 * (size - 1), -1)) << note;
+  }
+}
+
+TEST_F(Cuda, FewArraysOfPairsWaitForEarlierWorkOfTheStream) {
+  const OwnedStream stream(0);
+  const Spheres spheres(60, {{}, 1});
+  const DeviceSpheres arrays(spheres);
+  ArrayCollider collider;
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    JFPX_CUDA_TRY(cudaLaunchHostFunc(
+        stream.get(), [](void*) { std::this_thread::sleep_for(std::chrono::milliseconds(20)); },
+        nullptr));
+    rows_of<std::int32_t>(collider, arrays.arrays(), 60 * 59 / 2, 60 * 59 / 2, stream.get());
+  }
+}
+
+TEST_F(Cuda, ArraysOfPairsWithABadSphereNameIt) {
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  for (const std::size_t n : {100, 3000, 6000, 300000}) {
+    Random random(base_seed());
+    Spheres spheres = make_gas(n, Real(0.5), 6, random);
+    spheres[n - 3].centre.y = std::numeric_limits<Real>::quiet_NaN();
+    const DeviceSpheres arrays(spheres);
+    const DeviceArray<std::int32_t> indices(20);
+    try {
+      collider.find_pairs(arrays.arrays(), indices.data(), 10, stream.get());
+      ADD_FAILURE() << "InvalidArgument was not thrown";
+    } catch (const InvalidArgument& e) {
+      EXPECT_EQ(std::string(e.what()),
+                "sphere " + std::to_string(n - 3) + ": centre.y is nan; it must be finite");
+    }
+    EXPECT_EQ(indices.download(), std::vector<std::int32_t>(20, -1));
+  }
 }
 
 TEST_F(Cuda, ArraysBeyondTheReservationHaveTheCountAlone) {

@@ -99,6 +99,9 @@ TEST_F(Cuda, AnyFailingCallOfASearchOnArraysIsAnErrorAndTheColliderGoesOn) {
   const std::vector<std::uint64_t> offsets{0, 1000, 3000};
   const auto cpu = make_sphere_collider({.backend = Backend::cpu});
   const auto search = [&](ArrayCollider& collider) {
+    const DeviceArray<std::int64_t> indices(2 * 100'000);
+    EXPECT_LT(collider.find_pairs(arrays.arrays(), indices.data(), 100'000, stream.get()),
+              100'000u);
     collider.find_periodic_in_systems(arrays.arrays(), offsets, std::vector{cell, cell},
                                       ArrayResult::pairs, false, stream.get());
     return collider.find_periodic(arrays.arrays(), cell, ArrayResult::contacts, true, stream.get());

@@ -54,6 +54,15 @@ TEST_F(Cuda, FewSpheresInManyLaunches) {
   expect_cpu_contacts(mixed, SphereAlgorithm::automatic, "the same with outliers");
 }
 
+TEST_F(Cuda, FewCrowdedSpheres) {
+  Random random(base_seed());
+  // Rows in one launch are longer than the staging buffer holds, and the cells have no room.
+  expect_cpu_contacts(make_gas(1500, Real(0.5), 60, random), SphereAlgorithm::sorted_tiles, "gas");
+  auto gas = make_gas((1 << 18) + 1, Real(0.5), 14, random);
+  for (std::size_t i = 0; i < 50; ++i) gas[999 * i].centre = gas[7].centre;  // a long row
+  expect_cpu_contacts(gas, SphereAlgorithm::automatic, "gas with coincident spheres");
+}
+
 TEST_F(Cuda, FewPairsOfAList) {
   Random random(base_seed());
   const auto spheres = make_gas(200, Real(0.5), 3, random);

@@ -1,0 +1,161 @@
+/// Searches on arrays in device memory: the streams, the memory, and a search among all spheres.
+#include "src/sphere_collider/cuda/array_search.hpp"
+
+#include <jfpx/error.hpp>
+
+#include "src/base/cuda/probe.hpp"
+#include "src/sphere_collider/sphere_input.hpp"
+
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+void ArraySearch::reserve(std::size_t n, std::size_t most_contacts) {
+  collider.reserve(n, most_contacts);
+  reserve_spheres(n);
+}
+
+void ArraySearch::reserve_spheres(std::size_t n) {
+  check_number_of_spheres(n);
+  spheres.reserve_geometric(pool, stream.get(), n, "spheres");
+}
+
+/// Orders later work of `stream`, where memory is allocated and freed, after that of the user.
+void ArraySearch::follow(Stream user) {
+  event.order(user, stream.get());
+  is_unordered = true;
+}
+
+/// Orders later work of the user after that of `stream`.
+void ArraySearch::precede(Stream user) {
+  if (!is_unordered) return;
+  event.order(stream.get(), user);
+  is_unordered = false;
+}
+
+void ArraySearch::wait() {
+  JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
+  is_unordered = false;
+}
+
+/// Discards the result of the last search.
+void ArraySearch::begin(const SphereArrays& first, const SphereArrays* second) {
+  is_derived = is_periodic = false;
+  number = 0;
+  rows = first.count;
+  b_offset = second != nullptr ? static_cast<std::uint32_t>(first.count) : 0;
+}
+
+/// Begins a search on `stream`.
+void ArraySearch::pack(const SphereArrays& first, const SphereArrays* second) {
+  begin(first, second);
+  launch_pack(first, spheres.data(), stream.get());
+  if (second != nullptr) launch_pack(*second, spheres.data() + first.count, stream.get());
+}
+
+/// Begins a search on the stream of the user, which saves two events and the wait between streams.
+SphereInput ArraySearch::prepare(const SphereArrays& from, Stream user) {
+  begin(from);
+  if (!collider.fits(from.count) || from.count > spheres.capacity()) {
+    follow(user);
+    reserve(from.count, 0);
+  }
+  precede(user);
+  const auto n = static_cast<std::uint32_t>(from.count);
+  if (collider.is_one_launch(n)) return {.n = n, .arrays = from};
+  launch_pack(from, spheres.data(), user);
+  return {.spheres = spheres.data(), .n = n};
+}
+
+template <class Item>
+SearchOutput ArraySearch::to_output(const DeviceBuffer<Item>& out, ContactCount* count) {
+  SearchOutput output{.capacity = out.capacity(), .count = count};
+  if constexpr (std::is_same_v<Item, SpherePair>) {
+    kind = ArrayResult::pairs;
+    output.pairs = out.data();
+  } else {
+    kind = ArrayResult::contacts;
+    output.contacts = out.data();
+  }
+  return output;
+}
+
+/// Searches on the stream of the user, and waits for the number of contacts, but not for them.
+ArraySearch::Answer ArraySearch::search_and_poll(const SphereInput& input, SearchOutput output,
+                                                 Stream user) {
+  signal.clear();
+  output.signal = signal.word();
+  collider.find(input, output, user);
+  const unsigned long long answer = signal.wait(user);
+  if ((answer & kSignalIsValid) == 0) {
+    JFPX_CUDA_TRY(cudaStreamSynchronize(user));
+    if (input.spheres == nullptr) launch_pack(input.arrays, spheres.data(), user);
+    reject(counts.data()->first_invalid, user);
+  }
+  return {answer >> kSignalBits, (answer & kSignalIsComplete) != 0};
+}
+
+template <class Item>
+std::uint64_t ArraySearch::find(const SphereArrays& from, Stream user) {
+  const SphereInput input = prepare(from, user);
+  DeviceBuffer<Item>& out = items<Item>().found;
+  while (true) {
+    const Answer answer = search_and_poll(input, to_output(out, counts.data()), user);
+    if (answer.is_complete) return keep(answer.contacts);
+    follow(user);
+    out.reserve_geometric(pool, stream.get(), answer.contacts, "contacts");
+    collider.reserve(from.count, out.capacity());
+    precede(user);
+  }
+}
+
+template <class Index>
+std::uint64_t ArraySearch::find_pairs(const SphereArrays& from, Index* to, std::size_t capacity,
+                                      Stream user) {
+  const SphereInput input = prepare(from, user);
+  kind = ArrayResult::pairs;
+  const SearchOutput output{.capacity = capacity,
+                            .count = counts.data(),
+                            .rows = {.indices = to, .is_wide = sizeof(Index) == 8}};
+  while (true) {
+    const Answer answer = search_and_poll(input, output, user);
+    if (answer.is_complete || answer.contacts > capacity) return answer.contacts;
+    follow(user);
+    collider.reserve(from.count, answer.contacts);
+    precede(user);
+  }
+}
+
+template <class Item>
+void ArraySearch::search(std::size_t n, const DeviceBuffer<Item>& out, ContactCount* count) {
+  collider.find({.spheres = spheres.data(), .n = static_cast<std::uint32_t>(n)},
+                to_output(out, count), stream.get());
+}
+
+/// Throws InvalidArgument that names the packed sphere.
+void ArraySearch::reject(std::uint32_t invalid, cudaStream_t after) {
+  counts.data()[0] = {};
+  std::vector<SphereInstance> copy(std::size_t{invalid} + 1);
+  JFPX_CUDA_TRY(cudaMemcpyAsync(copy.data(), spheres.data(), copy.size() * sizeof copy[0],
+                                cudaMemcpyDeviceToHost, after));
+  JFPX_CUDA_TRY(cudaStreamSynchronize(after));
+  detail::reject_sphere(copy);
+}
+
+#define JFPX_INSTANTIATE(Item)                                                            \
+  template SearchOutput ArraySearch::to_output(const DeviceBuffer<Item>&, ContactCount*); \
+  template std::uint64_t ArraySearch::find<Item>(const SphereArrays&, Stream);            \
+  template void ArraySearch::search(std::size_t, const DeviceBuffer<Item>&, ContactCount*);
+JFPX_INSTANTIATE(SpherePair)
+JFPX_INSTANTIATE(SphereContact)
+#undef JFPX_INSTANTIATE
+template std::uint64_t ArraySearch::find_pairs(const SphereArrays&, std::int32_t*, std::size_t,
+                                               Stream);
+template std::uint64_t ArraySearch::find_pairs(const SphereArrays&, std::int64_t*, std::size_t,
+                                               Stream);
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx
