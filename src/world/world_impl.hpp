@@ -107,6 +107,7 @@ struct World::Impl {
   void choose_device(StepReport* report);
   bool advance_on_device(StepReport* report);
   bool step_on_device(StepReport* report);
+  void apply_forces_on_host();
   void finish_contacts(std::vector<Contact>* list) const;
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   void find_contacts(StepReport* report);
@@ -148,6 +149,7 @@ struct World::Impl {
 
   std::unique_ptr<DeviceWorld> device;  ///< null: the world is not stepped on a device
   std::string device_failure;           ///< why there is no `device` any more; empty: no failure
+  ForceTable force_table;               ///< of `forces`, for the device
   bool resident = false;                ///< whether the device has the state of the world
   bool steps_on_device = false;         ///< whether the device makes the step in progress
   std::unique_ptr<AutomaticDevice> automatic;  ///< of Backend::automatic; null: a fixed backend
