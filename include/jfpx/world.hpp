@@ -101,8 +101,8 @@ struct StepReport {
   /// Error of a device whose work the CPU took over in this step; empty if there was none.
   std::string device_failure;
   /// With Solver::soft_step, `integrate_ms` is the time of forces, and `resolve_ms` includes the
-  /// integration in substeps. In a step on a GPU, these two are times of the device: they do not
-  /// include launches and transfers, as `total_ms` does.
+  /// integration in substeps. In a step on a GPU, the first three are times of the device: they do
+  /// not include launches and transfers, as `total_ms` does, nor forces that the host applies.
   double integrate_ms = 0, detect_ms = 0, resolve_ms = 0, total_ms = 0;
 };
 
@@ -222,7 +222,8 @@ class JFPX_API World {
 
   /// Adds a force that acts in every step, either one of force.hpp or a user's own; wakes all
   /// bodies. Forces act in the order of their addition. A force of force.hpp has no effect after
-  /// its body is removed. A force must not call its World.
+  /// its body is removed. A force must not call its World. In a world on a GPU, forces of force.hpp
+  /// act there; with a user's own, each step copies the motion of all bodies to the host.
   /// @throws InvalidArgument if a force of force.hpp has a bad field or an unknown body
   template <Force F>
   ForceId add_force(F force) {

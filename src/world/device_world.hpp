@@ -5,6 +5,7 @@
 
 #include "src/contact_solver/contact_set.hpp"
 #include "src/world/body_store.hpp"
+#include "src/world/force_table.hpp"
 #include "src/world/sub_shape_table.hpp"
 
 #include <cstdint>
@@ -34,14 +35,17 @@ using BodyEdits = std::unordered_map<std::uint32_t, BodyEdit>;
 class DeviceWorld {
  public:
   struct Result {
-    std::uint64_t contacts = 0;            ///< size of the list that fetch_contacts() returns
-    std::uint64_t sphere_contacts = 0;     ///< of these, of two spheres
-    std::uint32_t awake = 0;               ///< movable bodies awake after the step
-    double detect_ms = 0, resolve_ms = 0;  ///< device times: contact search, all other stages
+    std::uint64_t contacts = 0;         ///< size of the list that fetch_contacts() returns
+    std::uint64_t sphere_contacts = 0;  ///< of these, of two spheres
+    std::uint32_t awake = 0;            ///< movable bodies awake after the step
+    /// Device times: forces, contact search, all other stages.
+    double forces_ms = 0, detect_ms = 0, resolve_ms = 0;
     std::optional<std::uint32_t> runaway;  ///< first body that is_in_world() refuses
     /// The bounds of a body's motion are not finite: the step had no effect, and SoftStep reports
     /// the error.
     bool invalid_bounds = false;
+    /// A force must wake a body: the step had no effect, and the host is to apply the forces.
+    bool must_wake = false;
   };
 
   virtual ~DeviceWorld() = default;
@@ -57,7 +61,9 @@ class DeviceWorld {
   /// Edits bodies of the state on the device. The same edits may be repeated after a failure.
   virtual void edit(const BodyStore& bodies, const BodyEdits& edits) = 0;
   /// One step. If a body runs away, the state does not change.
-  virtual Result step() = 0;
+  /// @param forces act in this step, as far as they wake no body; null: none
+  /// @param time   [s], start of the step
+  virtual Result step(const ForceTable* forces, double time) = 0;
   /// The states on the device, with the lifetimes of cuda::device_states().
   virtual cuda::DeviceStates states() const noexcept = 0;
   virtual Vec3 fetch_position(std::uint32_t body) = 0;

@@ -3,11 +3,7 @@
 #include <jfpx/force.hpp>
 
 #include "src/scene/scene_validate.hpp"
-#include "src/world/force_laws.hpp"
-#include "src/world/integrate.hpp"
-#include "src/world/submerged.hpp"
-
-#include <algorithm>
+#include "src/world/force_on_body.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -64,71 +60,59 @@ class Check {
   const ForceContext& context_;
 };
 
-/// Calls act(id) for the given body if it lives and is awake, or for all awake bodies.
-template <class Act>
-void for_awake(const ForceContext& context, const std::optional<BodyId>& body, Act act) {
+/// A body of a ForceContext, for act_on().
+class ContextBody {
+ public:
+  ContextBody(ForceContext* context, BodyId id) : context_(context), id_(id) {}
+  BodyState state() const { return context_->state(id_); }
+  Real mass() const { return context_->mass(id_); }
+  void apply(const Vec3& force) const { context_->apply_force(id_, force); }
+  void apply_at(const Vec3& force, const Vec3& point) const {
+    context_->apply_force_at_point(id_, force, point);
+  }
+  void wake() const { context_->wake(id_); }
+  template <class Visit>
+  void for_each_part(const Visit& visit) const {
+    for_each_solid_part(context_->shape(id_), visit);
+  }
+
+ private:
+  ForceContext* context_;
+  BodyId id_;
+};
+
+/// Applies a force to its body if that lives and is awake, or to all awake bodies.
+template <class F>
+void act_on_awake(const F& force, const std::optional<BodyId>& body, ForceContext* context) {
+  const auto act = [&](BodyId id) {
+    if (!context->awake(id)) return;
+    ContextBody target(context, id);
+    detail::act_on(force, &target);
+  };
   if (body) {
-    if (context.contains(*body) && context.awake(*body)) act(*body);
+    if (context->contains(*body)) act(*body);
     return;
   }
-  for (const BodyId id : context.bodies()) {
-    if (context.awake(id)) act(id);
-  }
+  for (const BodyId id : context->bodies()) act(id);
 }
 
-/// Position and velocity of a point of a body or of the world.
-struct MovingPoint {
-  Vec3 position, velocity;
-};
-MovingPoint moving_point(const BodyState& body, const Vec3& point) {
-  const Vec3 arm = rotate(body.orientation, point);
-  return {body.position + arm, body.velocity + cross(body.angular_velocity, arm)};
-}
-MovingPoint moving_point(const ForceContext& context, const Attachment& end) {
-  return end.body ? moving_point(context.state(*end.body), end.point) : MovingPoint{end.point, {}};
+detail::MovingPoint moving_point(const ForceContext& context, const Attachment& end) {
+  if (!end.body) return {end.point, {}};
+  return detail::moving_point(context.state(*end.body), end.point);
 }
 
 /// Applies the force of a Spring or a Bungee.
 template <class S>
-void apply_spring(ForceContext& context, const S& spring, bool slack) {
+void apply_spring(ForceContext& context, const S& spring) {
   for (const Attachment& end : {spring.a, spring.b}) {
     if (end.body && !context.contains(*end.body)) return;
   }
   if (spring.a.body && spring.b.body) context.link(*spring.a.body, *spring.b.body);
-  const MovingPoint a = moving_point(context, spring.a), b = moving_point(context, spring.b);
-  const Vec3 force =
-      detail::spring_force(a.position - b.position, a.velocity - b.velocity, spring.stiffness,
-                           spring.damping, spring.rest_length, slack);
+  const detail::MovingPoint a = moving_point(context, spring.a),
+                            b = moving_point(context, spring.b);
+  const Vec3 force = detail::force_on_end_a(spring, a, b);
   if (spring.a.body) context.apply_force_at_point(*spring.a.body, force, a.position);
   if (spring.b.body) context.apply_force_at_point(*spring.b.body, -force, b.position);
-}
-
-/// Applies the force of an Aero or an AeroControl.
-void apply_aero(ForceContext& context, BodyId body, const Mat3& tensor, const Vec3& point,
-                const Vec3& wind) {
-  if (!context.contains(body) || !context.awake(body)) return;
-  const BodyState state = context.state(body);
-  const Mat3 axes = to_matrix(state.orientation);
-  const MovingPoint surface = moving_point(state, point);
-  const Vec3 airspeed = transform_transpose(axes, surface.velocity - wind);
-  context.apply_force_at_point(body, axes * (tensor * airspeed), surface.position);
-}
-
-Real submerged_volume(const Sphere& sphere, const Vec3& centre, const HalfSpace& liquid) {
-  return detail::submerged_volume(sphere.radius, liquid.offset - dot(liquid.normal, centre));
-}
-
-/// Applies the buoyancy of a box at the centroid of the displaced volume.
-void apply_box_buoyancy(ForceContext& context, BodyId body, const Box& box, const Transform& pose,
-                        const HalfSpace& liquid, const Vec3& weight) {
-  // Computed relative to the centre of the box, so that the centroid keeps its precision far from
-  // the origin.
-  const HalfSpace below{liquid.normal, liquid.offset - dot(liquid.normal, pose.origin)};
-  detail::Submerged part;
-  detail::add_submerged(box, {pose.basis, {}}, below, &part);
-  if (!(part.volume > 0)) return;
-  context.apply_force_at_point(body, weight * part.volume,
-                               pose.origin + part.moment * (1 / part.volume));
 }
 
 }  // namespace
@@ -138,10 +122,7 @@ void Gravity::validate(const ForceContext& context) const {
   check.finite("acceleration", acceleration);
   check.alive("body", body);
 }
-void Gravity::operator()(ForceContext& context) const {
-  for_awake(context, body,
-            [&](BodyId id) { context.apply_force(id, acceleration * context.mass(id)); });
-}
+void Gravity::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
 
 void Drag::validate(const ForceContext& context) const {
   const Check check("drag", context);
@@ -150,22 +131,17 @@ void Drag::validate(const ForceContext& context) const {
   check.finite("wind", wind);
   check.alive("body", body);
 }
-void Drag::operator()(ForceContext& context) const {
-  for_awake(context, body, [&](BodyId id) {
-    const Vec3 velocity = context.state(id).velocity - wind;
-    context.apply_force(id, detail::drag_force(velocity, linear, quadratic));
-  });
-}
+void Drag::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
 
 void Spring::validate(const ForceContext& context) const {
   Check("spring", context).spring(a, b, stiffness, damping, rest_length);
 }
-void Spring::operator()(ForceContext& context) const { apply_spring(context, *this, false); }
+void Spring::operator()(ForceContext& context) const { apply_spring(context, *this); }
 
 void Bungee::validate(const ForceContext& context) const {
   Check("bungee", context).spring(a, b, stiffness, damping, rest_length);
 }
-void Bungee::operator()(ForceContext& context) const { apply_spring(context, *this, true); }
+void Bungee::operator()(ForceContext& context) const { apply_spring(context, *this); }
 
 void Aero::validate(const ForceContext& context) const {
   const Check check("aero", context);
@@ -174,9 +150,7 @@ void Aero::validate(const ForceContext& context) const {
   check.finite("point", point);
   check.finite("wind", wind);
 }
-void Aero::operator()(ForceContext& context) const {
-  apply_aero(context, body, tensor, point, wind);
-}
+void Aero::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
 
 void AeroControl::validate(const ForceContext& context) const {
   const Check check("aero control", context);
@@ -188,13 +162,8 @@ void AeroControl::validate(const ForceContext& context) const {
   check.finite("wind", wind);
   check.require(is_finite(control), "control", control, "finite");
 }
-void AeroControl::operator()(ForceContext& context) const {
-  apply_aero(context, body, tensor(), point, wind);
-}
-Mat3 AeroControl::tensor() const {
-  const Real share = std::min(absolute(control), Real(1));
-  return interpolate(base, control < 0 ? lowest : highest, share);
-}
+void AeroControl::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
+Mat3 AeroControl::tensor() const { return detail::tensor_at_control(*this); }
 
 void Buoyancy::validate(const ForceContext& context) const {
   const Check check("buoyancy", context);
@@ -205,28 +174,7 @@ void Buoyancy::validate(const ForceContext& context) const {
   check.not_negative("gravity", gravity);
   check.alive("body", body);
 }
-void Buoyancy::operator()(ForceContext& context) const {
-  const Vec3 weight = normalized(liquid.normal) * (density * gravity);  // [N/m^3]
-  for_awake(context, body, [&](BodyId id) {
-    const BodyState state = context.state(id);
-    const Transform pose = make_transform(state.orientation, state.position);
-    if (const auto* sphere = std::get_if<Sphere>(&context.shape(id))) {
-      context.apply_force(id, weight * submerged_volume(*sphere, state.position, liquid));
-    } else if (const auto* box = std::get_if<Box>(&context.shape(id))) {
-      apply_box_buoyancy(context, id, *box, pose, liquid, weight);
-    } else if (const auto* compound = std::get_if<Compound>(&context.shape(id))) {
-      for (const CompoundPart& part : compound->parts) {
-        const Transform part_pose = pose * make_transform(part.orientation, part.position);
-        if (const auto* ball = std::get_if<Sphere>(&part.shape)) {
-          const Vec3 force = weight * submerged_volume(*ball, part_pose.origin, liquid);
-          context.apply_force_at_point(id, force, part_pose.origin);
-        } else {
-          apply_box_buoyancy(context, id, std::get<Box>(part.shape), part_pose, liquid, weight);
-        }
-      }
-    }
-  });
-}
+void Buoyancy::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
 
 void Explosion::validate(const ForceContext& context) const {
   const Check check("explosion", context);
@@ -238,14 +186,9 @@ void Explosion::validate(const ForceContext& context) const {
   check.positive("duration", duration);
 }
 void Explosion::operator()(ForceContext& context) const {
-  const auto age = static_cast<Real>(context.time() - static_cast<double>(start));
   for (const BodyId id : context.bodies()) {
-    const Vec3 away = context.state(id).position - centre;
-    const Real distance = length(away);
-    const Real share = detail::blast(distance, age, speed, thickness, duration);
-    if (!(share > 0 && distance > kEpsilon)) continue;
-    context.wake(id);
-    context.apply_force(id, away * (peak_force * share / distance));
+    ContextBody target(&context, id);
+    detail::act_on(*this, context.time(), &target);
   }
 }
 

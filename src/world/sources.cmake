@@ -12,6 +12,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/device_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_snapshot.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/force_table.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces.cpp
   ${CMAKE_CURRENT_LIST_DIR}/ignored_pairs.cpp
   ${CMAKE_CURRENT_LIST_DIR}/indexed_priority_queue.cpp

@@ -279,9 +279,9 @@ StepReport World::step() {
   const Clock::time_point start = Clock::now();
   try {
     w.choose_device(&report);
-    // A step on the device changes nothing on the host but for the forces.
+    // A step on the device changes nothing on the host, unless the host applies the forces.
     w.is_saved = false;
-    if (!w.steps_on_device || !w.forces.ids().empty()) w.save_for_undo();
+    if (!w.steps_on_device) w.save_for_undo();
   } catch (const std::bad_alloc&) {
     throw OutOfMemory(no_memory_for("a step", w.store.ids().size()));
   }

@@ -62,6 +62,8 @@ struct World::Impl {
   void enter_device();
   /// Makes the recorded edits on the device.
   void flush_edits();
+  /// Records that all bodies may have forces for the next step on the host.
+  void note_forces();
   void fetch_motion();
   /// Makes `contacts` and `contacts_before` those of the last two steps.
   void fetch_contacts();
@@ -121,6 +123,7 @@ struct World::Impl {
   void choose_device(StepReport* report);
   bool advance_on_device(StepReport* report);
   bool step_on_device(StepReport* report);
+  void apply_forces_on_host();
   void finish_contacts(std::vector<Contact>* list) const;
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   void find_contacts(StepReport* report);
@@ -165,6 +168,7 @@ struct World::Impl {
 
   std::unique_ptr<DeviceWorld> device;  ///< null: the world is not stepped on a device
   std::string device_failure;           ///< why there is no `device` any more; empty: no failure
+  ForceTable force_table;               ///< of `forces`, for the device
   bool resident = false;                ///< whether the device has the state of the world
   bool steps_on_device = false;         ///< whether the device makes the step in progress
   std::unique_ptr<AutomaticDevice> automatic;  ///< of Backend::automatic; null: a fixed backend

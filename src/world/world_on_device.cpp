@@ -63,11 +63,11 @@ void World::Impl::enter_device() {
   const Timer timer(&spent_us);
   if (bodies_changed) contact_finder.set_bodies(store);
   bodies_changed = false;
+  force_table.invalidate();
   device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
   resident = true;
   edits.clear();
-  forced_bodies.clear();
-  for (const BodyId id : store.ids()) forced_bodies.push_back(id.index);
+  note_forces();
   motion_is_current = contacts_are_current = contacts_before_are_current = true;
   contact_set_is_current = true;
 }
@@ -85,6 +85,11 @@ BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
   all.wakes_neighbors |= edit.wakes_neighbors;
   if (edit.wakes_neighbors) motion_is_current = false;
   return store;
+}
+
+void World::Impl::note_forces() {
+  forced_bodies.clear();
+  for (const BodyId id : store.ids()) forced_bodies.push_back(id.index);
 }
 
 void World::Impl::flush_edits() {
@@ -180,33 +185,47 @@ bool World::Impl::advance_on_device(StepReport* report) {
   return false;
 }
 
+/// The host calls the forces, and the device gets their sums.
+void World::Impl::apply_forces_on_host() {
+  fetch_motion();
+  save_for_undo();
+  ForceContext context(store, time());
+  forces.call(context);
+  device->upload_forces(store);
+  note_forces();
+}
+
 /// @returns false if the step is to be done on the host, which reports what is wrong
 bool World::Impl::step_on_device(StepReport* report) {
   enter_device();
-  if (!forces.ids().empty()) {
-    fetch_motion();
-    ForceContext context(store, time());
-    forces.call(context);
-    device->upload_forces(store);
-    forced_bodies.clear();
-    for (const BodyId id : store.ids()) forced_bodies.push_back(id.index);
-  } else {
-    flush_edits();
+  flush_edits();
+  const bool are_known = force_table.update(forces, store);
+  if (!are_known) apply_forces_on_host();
+  const bool act_there = are_known && !forces.empty();
+  DeviceWorld::Result result = device->step(act_there ? &force_table : nullptr, time());
+  if (result.must_wake) {
+    apply_forces_on_host();
+    result = device->step(nullptr, time());
   }
-  const DeviceWorld::Result result = device->step();
   if (result.invalid_bounds) return false;
   report->non_finite = result.runaway.has_value();
   if (result.runaway) {
     report->non_finite_body = store.id(*result.runaway);
+    if (is_saved) {
+      undo_motion();
+      device->upload_forces(store);
+    }
     return true;
   }
-  for (const std::uint32_t body : forced_bodies)
+  for (const std::uint32_t body : forced_bodies) {
     store.moving.force[body] = store.moving.torque[body] = {};
+  }
   forced_bodies.clear();
   std::swap(contacts, contacts_before);
   detected_count_before = detected_count;
   contacts_before_are_current = contacts_are_current;
   motion_is_current = contacts_are_current = contact_set_is_current = false;
+  report->integrate_ms = result.forces_ms;
   report->detect_ms = result.detect_ms;
   report->resolve_ms = result.resolve_ms;
   report->contacts = result.contacts;

@@ -1,6 +1,7 @@
 /// Steps on a CUDA device while CUDA calls fail.
 #include <jfpx/backend.hpp>
 #include <jfpx/error.hpp>
+#include <jfpx/force.hpp>
 
 #include "src/base/cuda/cuda_try.hpp"
 #include "src/scenes/scenes.hpp"
@@ -20,6 +21,12 @@ bool has_device() {
   return false;
 }
 
+void add_forces(World* world) {
+  world->add_force(Gravity{});
+  world->add_force(Spring{.a = {world->bodies()[0]}, .b = {world->bodies()[1]}, .stiffness = 1});
+  world->add_force(Buoyancy{.density = 1});
+}
+
 /// If a call of a step fails, the processor completes this step and the later ones.
 TEST(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
   if (!has_device()) {
@@ -36,11 +43,13 @@ TEST(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
     }
   };
   World host(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+  add_forces(&host);
   run(&host);
   long failing = 0;
   for (bool was_reached = true; was_reached; ++failing) {
     ASSERT_LT(failing, 2000);
     World world(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    add_forces(&world);
     WorldAccess::impl(world).device = make_device_world(scene);
     cuda::inject_fault(failing, cudaErrorLaunchOutOfResources);
     run(&world);

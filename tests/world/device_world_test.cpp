@@ -2,6 +2,7 @@
 /// programs of the device run on the host; with one, on the GPU too.
 #include <jfpx/backend.hpp>
 #include <jfpx/force.hpp>
+#include <jfpx/recorded_world.hpp>
 
 #include "src/scenes/scenes.hpp"
 #include "src/world/world_impl.hpp"
@@ -13,7 +14,12 @@
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
 
 namespace jfpx {
 namespace {
@@ -254,20 +260,250 @@ TEST_P(DeviceWorldTest, EditsOfBodiesDoNotMoveTheWorld) {
   EXPECT_TRUE(host.snapshot() == device.snapshot());
 }
 
-TEST_P(DeviceWorldTest, ForcesAndContactGeneratorsRunOnTheHost) {
+/// Whether the host has applied the forces of the last step.
+bool used_host_forces(World& world) { return WorldAccess::impl(world).is_saved; }
+
+/// A force of any kind on bodies of the world.
+RecordableForce random_force(Random* random, const World& world) {
+  const auto body = [&] { return world.bodies()[random->below(world.bodies().size())]; };
+  const auto body_or_all = [&]() -> std::optional<BodyId> {
+    return random->below(2) == 0 ? std::optional(body()) : std::nullopt;
+  };
+  const auto vector = [&](Real size) {
+    return random->uniform_in_box({-size, -size, -size}, {size, size, size});
+  };
+  const auto tensor = [&] {
+    return diagonal({-random->uniform(0, 1), -random->uniform(0, 1), -random->uniform(0, 1)});
+  };
+  const auto spring = [&]<class S>(S made) {
+    const BodyId a = body(), b = body();
+    made.a = {a, vector(0.5_r)};
+    made.b = a == b ? Attachment{{}, vector(3)} : Attachment{b, vector(0.5_r)};
+    if (random->below(2) == 0) std::swap(made.a, made.b);
+    made.stiffness = random->uniform(0, 20);
+    made.damping = random->uniform(0, 1);
+    made.rest_length = random->uniform(0, 3);
+    return made;
+  };
+  switch (random->below(8)) {
+    case 0:
+      return Gravity{vector(5), body_or_all()};
+    case 1:
+      return Drag{random->uniform(0, 1), random->uniform(0, 1), vector(3), body_or_all()};
+    case 2:
+      return spring(Spring{});
+    case 3:
+      return spring(Bungee{});
+    case 4:
+      return Aero{body(), tensor(), vector(1), vector(3)};
+    case 5:
+      return AeroControl{
+          body(), tensor(), tensor(), tensor(), vector(1), vector(3), random->uniform(-2, 2)};
+    case 6:
+      return Buoyancy{
+          {{0, 1, 0}, random->uniform(-3, 3)}, random->uniform(0, 2), 9.81_r, body_or_all()};
+    default:
+      return Explosion{.centre = vector(3),
+                       .start = static_cast<Real>(world.time()),
+                       .peak_force = random->uniform(0, 50),
+                       .speed = random->uniform(1, 30),
+                       .thickness = random->uniform(1, 3),
+                       .duration = random->uniform(0.05_r, 0.3_r)};
+  }
+}
+
+/// Random worlds with forces that come, go and change, while bodies do.
+TEST_P(DeviceWorldTest, RandomForcesHaveTheBitsOfTheProcessor) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int on_host_steps = 0, on_device_steps = 0;
+  for (int k = 0; k < 12; ++k) {
+    const Scene scene = random_scene(&random);
+    World host = on_host(scene), device = on_device(scene);
+    for (int n = 0; n < 60; ++n) {
+      const std::uint64_t action = random.below(8);
+      const std::uint64_t i = random.below(1000);
+      const Vec3 vector = random.uniform_in_box({-9, -9, -9}, {9, 9, 9});
+      const BodyDef def = test::random_body(&random, 3);
+      const RecordableForce force = random_force(&random, host);
+      for (World* world : {&host, &device}) {
+        const BodyId id = world->bodies()[i % world->bodies().size()];
+        const auto forces = world->forces();
+        if (action < 2 && forces.size() < 12) {
+          std::visit([&](const auto& f) { world->add_force(f); }, force);
+        }
+        if (action == 2 && !forces.empty() && i % 4 == 0) {
+          world->remove_force(forces[i % forces.size()]);
+        }
+        if (action == 3 && world->bodies().size() > 2) world->remove(id);
+        if (action == 4) world->add(def);
+        if (action == 5) world->apply_force_at_point(id, vector, {});
+        if (action == 6 && world->mass(id) > 0) world->set_mass(id, 1 + absolute(vector.x));
+        if (action == 7 && !forces.empty()) {  // without a call that the world can notice
+          const ForceId changed = forces[i % forces.size()];
+          std::visit(
+              [&](const auto& f) {
+                auto& function = *WorldAccess::impl(*world).forces.find(changed);
+                auto* target = function.template target<std::remove_cvref_t<decltype(f)>>();
+                if (target != nullptr) *target = f;
+              },
+              force);
+        }
+      }
+      const StepReport a = host.step(), b = device.step();
+      if (!host.forces().empty()) ++(used_host_forces(device) ? on_host_steps : on_device_steps);
+      ASSERT_EQ(a.non_finite, b.non_finite) << "scene " << k << ", step " << n;
+      if (a.non_finite) {  // strong drag reverses velocities
+        ASSERT_EQ(a.non_finite_body, b.non_finite_body);
+        ASSERT_TRUE(host.snapshot() == device.snapshot()) << "scene " << k << ", step " << n;
+        for (World* world : {&host, &device}) world->remove(a.non_finite_body);
+        if (host.bodies().empty()) break;
+        continue;
+      }
+      ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "scene " << k << ", step " << n;
+      ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k << ", step " << n;
+      if (n % 8 == 0) {
+        ASSERT_TRUE(host.snapshot() == device.snapshot()) << "scene " << k << ", step " << n;
+      }
+    }
+  }
+  EXPECT_GT(on_device_steps, on_host_steps);
+}
+
+/// Balls that do not touch each other.
+Scene rows_of_balls(int count) {
   Scene scene;
-  scene.bodies = {test::ball({0, 2, 0}), test::ball({0.5_r, 4.2_r, 0}), test::ground()};
+  for (int i = 0; i < count; ++i) {
+    BodyDef def = test::ball({Real(i) * 3, 0, 0});
+    def.acceleration = {};
+    scene.bodies.push_back(def);
+  }
+  return scene;
+}
+
+/// Steps both worlds. @returns the number of steps in which the host has applied forces
+int steps_with_host_forces(World* host, World* device, int count) {
+  int found = 0;
+  for (int n = 0; n < count; ++n) {
+    host->step();
+    device->step();
+    EXPECT_EQ(host->state_hash(), device->state_hash()) << "step " << n;
+    found += used_host_forces(*device) ? 1 : 0;
+  }
+  EXPECT_TRUE(host->snapshot() == device->snapshot());
+  return found;
+}
+
+TEST_P(DeviceWorldTest, ForcesThatWakeABodyRunOnTheHostInThatStep) {
+  Scene scene = rows_of_balls(4);
+  scene.dt = 0.01_r;
+  for (int i = 0; i < 3; ++i) scene.bodies[i].can_sleep = true;
   World host = on_host(scene), device = on_device(scene);
   for (World* world : {&host, &device}) {
     world->add_force(Drag{.linear = 0.1_r});
+    world->add_force(Spring{.a = {world->bodies()[0]},
+                            .b = {world->bodies()[1]},
+                            .stiffness = 1,
+                            .damping = 2,
+                            .rest_length = 3});
+    world->add_force(Explosion{.centre = {-2, 0, 0},
+                               .start = 2,
+                               .peak_force = 9,
+                               .speed = 5,
+                               .thickness = 1,
+                               .duration = 2});
+  }
+  EXPECT_EQ(steps_with_host_forces(&host, &device, 200), 0);
+  EXPECT_FALSE(host.awake(host.bodies()[0]));
+  // The blast wakes the first ball, this wakes the second by the spring, and the blast the third.
+  EXPECT_EQ(steps_with_host_forces(&host, &device, 200), 3);
+  EXPECT_TRUE(WorldAccess::impl(device).resident);
+}
+
+TEST_P(DeviceWorldTest, UserDefinedForcesRunOnTheHost) {
+  const Scene scene = rows_of_balls(3);
+  World host = on_host(scene), device = on_device(scene);
+  std::vector<ForceId> ids;
+  for (World* world : {&host, &device}) {
+    world->add_force(Drag{.linear = 0.1_r});
+    ids.push_back(world->add_force([](ForceContext& context) {
+      for (const BodyId id : context.bodies()) context.apply_force(id, {1, 0, 0});
+    }));
     world->add_force(Gravity{});
   }
-  for (int n = 0; n < 50; ++n) {
-    host.step();
-    device.step();
-    ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
-  }
+  EXPECT_EQ(steps_with_host_forces(&host, &device, 20), 20);
+  host.remove_force(ids[0]);
+  device.remove_force(ids[1]);
+  EXPECT_EQ(steps_with_host_forces(&host, &device, 20), 0);
   EXPECT_TRUE(WorldAccess::impl(device).resident);
+}
+
+TEST_P(DeviceWorldTest, ChangedParametersOfForcesReachTheDevice) {
+  const Scene scene = rows_of_balls(3);
+  World host = on_host(scene), device = on_device(scene);
+  std::vector<ForceId> surface, spring;
+  for (World* world : {&host, &device}) {
+    surface.push_back(world->add_force(AeroControl{.body = world->bodies()[0],
+                                                   .lowest = diagonal({-2, -1, -1}),
+                                                   .base = diagonal({-1, -1, -1}),
+                                                   .highest = diagonal({-1, -3, -1}),
+                                                   .point = {0.1_r, 0.2_r, 0.3_r},
+                                                   .wind = {1, 2, 3}}));
+    spring.push_back(
+        world->add_force(Spring{.a = {world->bodies()[0]}, .stiffness = 3, .rest_length = 1}));
+  }
+  EXPECT_EQ(steps_with_host_forces(&host, &device, 5), 0);
+  host.force<AeroControl>(surface[0]).control = 0.5_r;
+  device.force<AeroControl>(surface[1]).control = 0.5_r;
+  EXPECT_EQ(steps_with_host_forces(&host, &device, 5), 0);
+  host.force<Spring>(spring[0]).b.body = host.bodies()[2];
+  device.force<Spring>(spring[1]).b.body = device.bodies()[2];
+  EXPECT_EQ(steps_with_host_forces(&host, &device, 5), 0);
+  for (World* world : {&host, &device}) {
+    EXPECT_NE(world->state(world->bodies()[2]).velocity, Vec3{});
+    world->remove(world->bodies()[2]);
+  }
+  EXPECT_EQ(steps_with_host_forces(&host, &device, 5), 0);
+  EXPECT_TRUE(WorldAccess::impl(device).resident);
+}
+
+/// The step in which a body runs away is undone: no force acts twice, and the blast, which keeps
+/// the first ball awake, has no effect on its time of rest.
+TEST_P(DeviceWorldTest, ForcesOfAnUndoneStepHaveNoEffect) {
+  for (const bool by_user : {false, true}) {
+    Scene scene = rows_of_balls(2);
+    scene.dt = 0.01_r;
+    scene.bodies[0].can_sleep = true;
+    scene.bodies[1].position = {0.955_r * kMaxCoordinate, 0, 0};
+    scene.bodies[1].velocity = {kMaxCoordinate, 0, 0};
+    World host = on_host(scene), device = on_device(scene);
+    for (World* world : {&host, &device}) {
+      world->add_force(Explosion{.centre = {-1, 0, 0},
+                                 .start = 0.025_r,
+                                 .peak_force = 0.1_r,
+                                 .speed = 1,
+                                 .thickness = 8,
+                                 .duration = 10});
+      if (by_user) world->add_force([](ForceContext&) {});
+    }
+    EXPECT_EQ(steps_with_host_forces(&host, &device, 4), by_user ? 4 : 0);
+    for (World* world : {&host, &device}) world->apply_force(world->bodies()[0], {0, 0.01_r, 0});
+    for (int n = 0; n < 3; ++n) {
+      EXPECT_TRUE(host.step().non_finite);
+      EXPECT_TRUE(device.step().non_finite);
+      ASSERT_TRUE(host.snapshot() == device.snapshot());
+    }
+    for (World* world : {&host, &device}) world->remove(world->bodies()[1]);
+    EXPECT_EQ(steps_with_host_forces(&host, &device, 3), by_user ? 3 : 0);
+    EXPECT_GT(host.state(host.bodies()[0]).velocity.y, 0);
+  }
+}
+
+TEST_P(DeviceWorldTest, ContactGeneratorsRunOnTheHost) {
+  Scene scene;
+  scene.bodies = {test::ball({0, 2, 0}), test::ball({0.5_r, 4.2_r, 0}), test::ground()};
+  World host = on_host(scene), device = on_device(scene);
   std::vector<ContactGeneratorId> ids;
   for (World* world : {&host, &device}) {
     ids.push_back(world->add_contact_generator([](ContactContext&) {}));

@@ -40,7 +40,7 @@ class CudaDevice {
       : device_(usable_device(device)),
         stream_(device_),
         pool_(device_),
-        marks_{OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_)},
+        marks_{OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_)},
         collider_(stream_.get(), device_) {
     const DeviceGuard guard(device_);
     JFPX_CUDA_TRY(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device_));
@@ -165,10 +165,10 @@ class CudaDevice {
   DeviceSphereCollider collider_;
   DeviceBuffer<std::uint32_t> scratch_;
   int processors_ = 0;
-  std::tuple<Limits<device::BoundsProgram>, Limits<device::SphereProgram>,
-             Limits<device::ShapeProgram>, Limits<device::MatchProgram>,
-             Limits<device::PrepareProgram>, Limits<device::SolveProgram>,
-             Limits<device::CommitProgram>, Limits<device::EditProgram>>
+  std::tuple<
+      Limits<device::ForceProgram>, Limits<device::BoundsProgram>, Limits<device::SphereProgram>,
+      Limits<device::ShapeProgram>, Limits<device::MatchProgram>, Limits<device::PrepareProgram>,
+      Limits<device::SolveProgram>, Limits<device::CommitProgram>, Limits<device::EditProgram>>
       limits_;
 };
 

@@ -3,25 +3,25 @@
 
 #include "src/world/device/atomic.hpp"
 #include "src/world/device/list.hpp"
+#include "src/world/device/start_step.hpp"
 #include "src/world/device/step_data.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Starts the step: saves what it changes, and makes the bounds of the motion of all sub-shapes.
+/// Starts the step, unless a ForceProgram has, and makes the bounds of the motion of all
+/// sub-shapes.
 struct BoundsProgram {
   static constexpr unsigned kBlocksPerProcessor = 3;
   StepData data;
+  bool is_started = false;
 
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
     const StepData& d = data;
     const BodyView& bodies = d.step.bodies;
-    team.once([&] {
-      *d.counters = Counters{};
-      d.counters->started = d.number;
-    });
+    if (!is_started) start_counters(team, d);
     team.for_each(bodies.capacity, [&](std::uint32_t i) { start(i); });
     team.spread(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
@@ -36,10 +36,7 @@ struct BoundsProgram {
  private:
   JFPX_HD void start(std::uint32_t body) const {
     const StepData& d = data;
-    d.saved.last_acceleration[body] = d.step.motion.last_acceleration[body];
-    d.saved.motion[body] = d.step.motion.motion[body];
-    d.saved.rest_time[body] = d.step.motion.rest_time[body];
-    d.saved.awake[body] = d.step.motion.awake[body];
+    if (!is_started) save(d, body);
     d.motion[body] = d.step.bodies.predicted_motion(body);
     d.first_candidate[body] = kNone;
     d.manifold_sizes[body] = 0;

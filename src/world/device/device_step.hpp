@@ -6,6 +6,7 @@
 #include "src/world/device/commit_program.hpp"
 #include "src/world/device/contact_programs.hpp"
 #include "src/world/device/edit_program.hpp"
+#include "src/world/device/force_program.hpp"
 #include "src/world/device/match_program.hpp"
 #include "src/world/device/prepare_program.hpp"
 #include "src/world/device/solve_program.hpp"
@@ -16,13 +17,14 @@
 #include <memory>
 #include <tuple>
 #include <utility>
+#include <variant>
 #include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-inline constexpr int kMarks = 3;
+inline constexpr int kMarks = 4;
 
 /// @tparam Device owns a stream of work, or imitates one on the host:
 ///   - `number()`, `stream()`: as cuda::DeviceStates;
@@ -55,6 +57,7 @@ class DeviceStep final : public DeviceWorld {
     upload_motion(bodies);
     upload_sub_shapes(sub_shapes->view(), sub_shapes->part_count());
     upload_contacts(last->view());
+    forces_.parameters_version = forces_.lists_version = 0;
     device_->wait();
   }
 
@@ -89,10 +92,13 @@ class DeviceStep final : public DeviceWorld {
         any_wakes_neighbors ? std::max<std::size_t>(last.counts[0], edited.size()) : edited.size());
   }
 
-  Result step() override {
+  Result step(const ForceTable* forces, double time) override {
+    select_forces(forces, time);
     ++data_.number;
     const Counters counters = run_until_complete();
     Result result;
+    result.must_wake = counters.must_wake != 0;
+    if (result.must_wake) return result;
     result.invalid_bounds = counters.invalid_bounds != 0;
     if (counters.runaway != kNone) result.runaway = counters.runaway;
     if (result.invalid_bounds || result.runaway) {
@@ -104,8 +110,9 @@ class DeviceStep final : public DeviceWorld {
     done.counts = {counters.spheres, counters.manifolds, counters.points};
     done.touch_count = counters.touches;
     now_ = 1 - now_;
-    result.detect_ms = device_->elapsed_ms(0, 1);
-    result.resolve_ms = device_->elapsed_ms(1, 2);
+    if (forces != nullptr) result.forces_ms = device_->elapsed_ms(0, 1);
+    result.detect_ms = device_->elapsed_ms(1, 2);
+    result.resolve_ms = device_->elapsed_ms(2, 3);
     result.awake = counters.awake;
     result.contacts =
         std::uint64_t{counters.touching_spheres} + counters.touches + counters.met_points;
@@ -224,6 +231,20 @@ class DeviceStep final : public DeviceWorld {
     Buffer<PosedBox> boxes;
     Buffer<Wall> walls;
     Buffer<Transform> local;
+  };
+  template <class... F>
+  static std::tuple<Buffer<F>...> buffers_of(const std::variant<F...>&);
+  struct Forces {
+    decltype(buffers_of(std::declval<RecordableForce>())) parameters;
+    Buffer<ForceItem> on_all, on_body;
+    Buffer<std::uint32_t> first_item, first_part;
+    Buffer<Real> mass;
+    Buffer<SolidPart> parts;
+    Buffer<Vec3> force_sum, torque_sum;
+    ForceView view;
+    double time = 0;
+    bool act = false;                                         ///< in the step in progress
+    std::uint64_t parameters_version = 0, lists_version = 0;  ///< of the table; 0: none
   };
   /// Contacts of a step, and what World::contacts() needs.
   struct Contacts {
@@ -356,6 +377,43 @@ class DeviceStep final : public DeviceWorld {
     bodies.inverse_inertia = to.inverse_inertia;
     bodies.rest_time = to.rest_time;
     bodies.awake = to.awake;
+  }
+
+  /// Selects what acts in a step, apart from accumulated forces, and uploads it if it has changed.
+  /// @param table null: nothing
+  void select_forces(const ForceTable* table, double time) {
+    BodyView& bodies = data_.step.bodies;
+    bodies.force = motion_.force.data();
+    bodies.torque = motion_.torque.data();
+    forces_.act = table != nullptr;
+    if (table == nullptr) return;
+    const ForceView from = table->view();
+    if (forces_.parameters_version != table->parameters_version()) put_parameters(from);
+    if (forces_.lists_version != table->lists_version()) put_lists(from);
+    forces_.parameters_version = table->parameters_version();
+    forces_.lists_version = table->lists_version();
+    forces_.time = time;
+    bodies.force = room(&forces_.force_sum, bodies.capacity);
+    bodies.torque = room(&forces_.torque_sum, bodies.capacity);
+  }
+  template <class... F>
+  void put_parameters(const ForceArrays<std::variant<F...>>& from) {
+    ((static_cast<ForceArray<F>&>(forces_.view) = {put(&std::get<Buffer<F>>(forces_.parameters),
+                                                       from.template array<F>().forces,
+                                                       from.template array<F>().count),
+                                                   from.template array<F>().count}),
+     ...);
+  }
+  void put_lists(const ForceView& from) {
+    Forces& f = forces_;
+    ForceView& to = f.view;
+    to.on_all_count = from.on_all_count;
+    to.on_all = put(&f.on_all, from.on_all, from.on_all_count);
+    to.on_body = put(&f.on_body, from.on_body, from.on_body_count);
+    to.first_item = put(&f.first_item, from.first_item, from.first_item_count);
+    to.mass = put(&f.mass, from.mass, from.mass_count);
+    to.parts = put(&f.parts, from.parts, from.part_count);
+    to.first_part = put(&f.first_part, from.first_part, from.first_part_count);
   }
 
   void upload_sub_shapes(const SubShapeView& from, std::size_t part_count) {
@@ -507,18 +565,24 @@ class DeviceStep final : public DeviceWorld {
     const std::size_t sub_shapes = d.near.sub_shapes.bounded_count;
     const std::size_t contacts = std::max<std::size_t>(
         bodies, std::max<std::size_t>(sets_[1 - now_].counts[0], sets_[1 - now_].counts[1]));
-    device_->mark(0);
-    device_->run(BoundsProgram{d}, std::max(bodies, sub_shapes));
+    if (forces_.act) {
+      device_->mark(0);
+      device_->run(ForceProgram{d, forces_.view, forces_.time, forces_.force_sum.data(),
+                                forces_.torque_sum.data()},
+                   bodies);
+    }
+    device_->mark(1);
+    device_->run(BoundsProgram{d, forces_.act}, std::max(bodies, sub_shapes));
     device_->find_pairs(d.near.swept, d.near.sub_shapes.fixed_begin, d.pairs, capacity_.pairs,
                         d.pair_count);
     device_->run(SphereProgram{d}, contacts);
     device_->run(ShapeProgram{d}, contacts);
     device_->run(MatchProgram{d}, contacts);
-    device_->mark(1);
+    device_->mark(2);
     device_->run(PrepareProgram{d}, contacts);
     device_->run(SolveProgram{d}, contacts);
     device_->run(CommitProgram{d}, contacts);
-    device_->mark(2);
+    device_->mark(3);
   }
 
   Counters counters() {
@@ -537,6 +601,7 @@ class DeviceStep final : public DeviceWorld {
         const Counters result = counters();
         if (result.failed == 0) return result;
         restore();
+        if (result.must_wake != 0) return result;
         make_room(result.needed);
       } catch (...) {
         device_->wait();
@@ -566,6 +631,7 @@ class DeviceStep final : public DeviceWorld {
   Motion motion_;
   Saved saved_;
   SubShapes sub_shapes_;
+  Forces forces_;
   Contacts sets_[2];
   int now_ = 0;  ///< the set of the step in progress; the other one is that of the last step
   Scratch scratch_;

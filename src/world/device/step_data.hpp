@@ -35,9 +35,9 @@ struct Capacity {
 
 /// Numbers that the stages of a step give each other and the host.
 struct Counters {
-  std::uint64_t started = 0;         ///< StepData::number once the state before the step is saved
-  std::uint64_t completed = 0;       ///< StepData::number once the step is complete
-  std::uint32_t failed = 0;          ///< 1: a list has no room, the step has no effect
+  std::uint64_t started = 0;    ///< StepData::number once the state before the step is saved
+  std::uint64_t completed = 0;  ///< StepData::number once the step is complete
+  std::uint32_t failed = 0;     ///< 1: a list has no room, or must_wake: the step has no effect
   std::uint32_t invalid_bounds = 0;  ///< 1: swept bounds are not finite, the step has no effect
   Capacity needed;
 
@@ -54,7 +54,9 @@ struct Counters {
   std::uint32_t met_points = 0;        ///< points of manifolds: soft_step::has_met()
   std::uint32_t sphere_touches = 0;    ///< items of the list of touches of two spheres
   std::uint32_t awake = 0;             ///< movable bodies awake after the step
-  std::uint32_t unused = 0;            ///< instead of padding, which initcheck would report
+  /// 1: a force must wake a body, the step has no effect. Without this number there would be
+  /// padding, which initcheck would report.
+  std::uint32_t must_wake = 0;
 };
 static_assert(std::has_unique_object_representations_v<Counters>);
 
