@@ -115,6 +115,7 @@ class JFPX_API World {
   /// @throws InvalidScene, BackendUnavailable, OutOfMemory; InvalidArgument for a bad setting
   explicit World(const Scene& scene, const WorldSettings& settings = {});
   /// As above, with the given collider, which may be a user's implementation.
+  /// Steps of Solver::soft_step call its find_pairs(), and only if spheres have moved enough.
   /// @param threads of the other parts of a step, as SphereColliderOptions::threads
   /// @throws InvalidArgument if the collider is null, `broad_phase` is not a value of the
   ///   enumeration or `threads` is too large; InvalidScene, OutOfMemory

@@ -1,4 +1,5 @@
-/// Tests that warm steps allocate nothing, and of the memory of a world. A separate program, because it replaces operator new.
+/// Tests that warm steps allocate nothing, and of the memory of a world. A separate program,
+/// because it replaces operator new.
 #include <jfpx/particle.hpp>
 
 #include "src/scenes/scenes.hpp"
