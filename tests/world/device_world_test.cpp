@@ -339,7 +339,7 @@ int steps_with_host_forces(World* host, World* device, int count) {
 TEST_P(DeviceWorldTest, ForcesThatWakeABodyRunOnTheHostInThatStep) {
   Scene scene = rows_of_balls(4);
   scene.dt = 0.01_r;
-  for (int i = 0; i < 3; ++i) scene.bodies[i].can_sleep = true;
+  for (std::size_t i = 0; i < 3; ++i) scene.bodies[i].can_sleep = true;
   World host = on_host(scene), device = on_device(scene);
   for (World* world : {&host, &device}) {
     world->add_force(Drag{.linear = 0.1_r});
