@@ -16,14 +16,13 @@ using Ends = std::array<std::optional<BodyId>, 2>;
 /// The bodies that a force names.
 template <class F>
 Ends ends_of(const F& force) {
-  if constexpr (requires { force.a.body; }) {
-    return {force.a.body, force.b.body};
-  } else if constexpr (requires { force.body; }) {
-    return {force.body, std::nullopt};
-  } else {
-    return {};
-  }
+  return {force.body, std::nullopt};
 }
+template <Elastic F>
+Ends ends_of(const F& spring) {
+  return {spring.a.body, spring.b.body};
+}
+Ends ends_of(const Explosion&) { return {}; }
 
 /// Whether two forces have the same bytes. Padding may differ; then they only seem to differ.
 template <class F>

@@ -398,7 +398,7 @@ int steps_with_host_forces(World* host, World* device, int count) {
 TEST_P(DeviceWorldTest, ForcesThatWakeABodyRunOnTheHostInThatStep) {
   Scene scene = rows_of_balls(4);
   scene.dt = 0.01_r;
-  for (int i = 0; i < 3; ++i) scene.bodies[i].can_sleep = true;
+  for (std::size_t i = 0; i < 3; ++i) scene.bodies[i].can_sleep = true;
   World host = on_host(scene), device = on_device(scene);
   for (World* world : {&host, &device}) {
     world->add_force(Drag{.linear = 0.1_r});
@@ -487,9 +487,13 @@ TEST_P(DeviceWorldTest, ForcesOfAnUndoneStepHaveNoEffect) {
                                  .duration = 10});
       if (by_user) world->add_force([](ForceContext&) {});
     }
-    EXPECT_EQ(steps_with_host_forces(&host, &device, 4), by_user ? 4 : 0);
-    for (World* world : {&host, &device}) world->apply_force(world->bodies()[0], {0, 0.01_r, 0});
+    for (World* world : {&host, &device}) {  // without a look at the states between the steps
+      for (int n = 0; n < 4; ++n) EXPECT_FALSE(world->step().non_finite);
+    }
     for (int n = 0; n < 3; ++n) {
+      for (World* world : {&host, &device}) {
+        if (n == 1) world->apply_force(world->bodies()[0], {0, 0.01_r, 0});
+      }
       EXPECT_TRUE(host.step().non_finite);
       EXPECT_TRUE(device.step().non_finite);
       ASSERT_TRUE(host.snapshot() == device.snapshot());
