@@ -22,7 +22,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kBodiesPerChunk = 256;
+constexpr std::size_t kBodiesPerChunk = 64;
 /// Number of bodies from which several threads move them; waking threads takes longer than fewer.
 constexpr std::size_t kSharedBodies = 2048;
 

@@ -25,7 +25,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kManifoldsPerChunk = 1024, kPairsPerChunk = 1024;
+constexpr std::size_t kManifoldsPerChunk = 512, kPairsPerChunk = 512;
 constexpr std::size_t kObjectsPerChunk = 1024;
 /// Numbers from which several threads process them; waking threads takes longer than fewer.
 constexpr std::size_t kSharedManifolds = 4096, kSharedPairs = 4096;

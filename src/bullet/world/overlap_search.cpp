@@ -17,7 +17,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kLeavesPerChunk = 2048;
+constexpr std::size_t kLeavesPerChunk = 512;
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
 /// Leaves from which the order of the tree, which affects only the speed, is derived.
