@@ -7,6 +7,7 @@ from conan.errors import ConanInvalidConfiguration
 from conan.tools.build import check_min_cppstd
 from conan.tools.cmake import CMake, CMakeDeps, CMakeToolchain, cmake_layout
 from conan.tools.files import copy, load
+from conan.tools.gnu import PkgConfigDeps
 
 
 class Jfpx(ConanFile):
@@ -16,8 +17,9 @@ class Jfpx(ConanFile):
     topics = ("physics", "collision-detection", "deterministic", "cuda")
     package_type = "library"
     settings = "os", "arch", "compiler", "build_type"
-    options = {"shared": [True, False], "cuda": [True, False]}
-    default_options = {"shared": False, "cuda": False}
+    # bullet: the precision of Bullet for which the adapter is built; the package then has this precision only
+    options = {"shared": [True, False], "cuda": [True, False], "bullet": [False, "float", "double"]}
+    default_options = {"shared": False, "cuda": False, "bullet": False}
 
     @property
     def _root(self):  # the recipe is inside the sources that it builds
@@ -36,6 +38,9 @@ class Jfpx(ConanFile):
 
     def requirements(self):
         self.requires("nlohmann_json/3.11.3", visible=False)
+        if self.options.bullet:
+            self.requires("bullet3/3.25", transitive_headers=True, transitive_libs=True,
+                          options={"double_precision": self.options.bullet == "double"})
 
     def validate(self):
         check_min_cppstd(self, 20)
@@ -44,9 +49,12 @@ class Jfpx(ConanFile):
 
     def generate(self):
         CMakeDeps(self).generate()
+        PkgConfigDeps(self).generate()  # jfpx finds Bullet by pkg-config
         toolchain = CMakeToolchain(self)
         toolchain.cache_variables["JFPX_CUDA"] = "ON" if self.options.cuda else "OFF"
-        for switch in ("JFPX_BULLET", "JFPX_VIEWER", "JFPX_TOOL", "JFPX_EXAMPLES", "JFPX_TESTS"):
+        toolchain.cache_variables["JFPX_BULLET"] = "ON" if self.options.bullet else "OFF"
+        toolchain.cache_variables["JFPX_PRECISIONS"] = str(self.options.bullet) if self.options.bullet else "both"
+        for switch in ("JFPX_VIEWER", "JFPX_TOOL", "JFPX_EXAMPLES", "JFPX_TESTS"):
             toolchain.cache_variables[switch] = "OFF"
         toolchain.generate()
 

@@ -30,7 +30,7 @@ constexpr std::uint64_t kChunksLeft = 0xffffffffu;
 }  // namespace
 
 /// Threads that run the loops of one or several pools, one loop at a time.
-class ThreadPool::Workers {
+class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
  public:
   /// Those of an existing pool that the calling thread has created with as many threads, or new
   /// ones. @throws std::bad_alloc
@@ -74,6 +74,12 @@ class ThreadPool::Workers {
   void run_chunk(std::size_t chunk);
   std::size_t first_chunk(unsigned owner) const;
 
+  /// Workers that pools may share. Both are trivially destructible, because pools may be static.
+  static constinit std::mutex list_mutex_;
+  static constinit Workers* list_;
+  Workers* next_ = nullptr;
+  std::thread::id creator_ = std::this_thread::get_id();
+
   /// The job that runs. A thread may read it only after it has taken a chunk, and until that chunk
   /// is done, because the next job overwrites it.
   Job job_;
@@ -91,15 +97,18 @@ class ThreadPool::Workers {
   std::vector<std::thread> workers_;
 };
 
+constinit std::mutex ThreadPool::Workers::list_mutex_;
+constinit ThreadPool::Workers* ThreadPool::Workers::list_ = nullptr;
+
 std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::shared(unsigned threads) {
-  thread_local std::vector<std::weak_ptr<Workers>> known;
-  std::erase_if(known, [](const auto& workers) { return workers.expired(); });
-  for (const auto& candidate : known) {
-    std::shared_ptr<Workers> workers = candidate.lock();
-    if (workers != nullptr && workers->requested() == threads) return workers;
+  const std::lock_guard lock(list_mutex_);
+  for (Workers* known = list_; known != nullptr; known = known->next_) {
+    if (known->creator_ != std::this_thread::get_id() || known->requested_ != threads) continue;
+    // Null if another thread destroys the last pool.
+    if (auto workers = known->weak_from_this().lock()) return workers;
   }
   auto workers = std::make_shared<Workers>(threads);
-  known.push_back(workers);
+  workers->next_ = std::exchange(list_, workers.get());
   return workers;
 }
 
@@ -119,6 +128,14 @@ ThreadPool::Workers::Workers(unsigned threads) : requested_(threads) {
 }
 
 ThreadPool::Workers::~Workers() {
+  {
+    const std::lock_guard lock(list_mutex_);
+    for (Workers** known = &list_; *known != nullptr; known = &(*known)->next_) {
+      if (*known != this) continue;
+      *known = next_;
+      break;
+    }
+  }
   stopped_ = true;
   ++number_;
   number_.notify_all();

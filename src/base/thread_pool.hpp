@@ -18,7 +18,7 @@ inline namespace JFPX_ABI {
 ///
 /// Pools of equal size that one thread creates share their workers, so that the parts of a step
 /// that follow each other keep the same threads awake. A pool whose loop begins while another pool
-/// uses these workers receives workers of its own.
+/// uses these workers receives workers of its own. Workers end with the last of their pools.
 class JFPX_API ThreadPool {
  public:
   static constexpr unsigned kMaxThreads = 256;

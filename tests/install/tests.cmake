@@ -24,4 +24,5 @@ jfpx_add_install_test(debian Install.DebianPackagesServeToo)
 
 # What package managers build from.
 add_test(NAME Install.RecipesFitTheProject COMMAND ${CMAKE_COMMAND}
-  -DSOURCE_DIR=${PROJECT_SOURCE_DIR} -DWORK_DIR=${PROJECT_BINARY_DIR}/recipes-test -P ${CMAKE_CURRENT_SOURCE_DIR}/install/recipes.cmake)
+  -DSOURCE_DIR=${PROJECT_SOURCE_DIR} -DWORK_DIR=${PROJECT_BINARY_DIR}/recipes-test
+  "-DHAS_BULLET=$<AND:$<BOOL:${JFPX_HAS_BULLET}>,$<BOOL:${JFPX_HAS_PRECISION}>>" -P ${CMAKE_CURRENT_SOURCE_DIR}/install/recipes.cmake)

@@ -4,7 +4,6 @@
 #include <jfpx/particle.hpp>
 #include <jfpx/recording.hpp>
 
-#include "src/base/thread_pool.hpp"
 #include "tests/support/failing_new.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/world/random_bodies.hpp"
@@ -274,20 +273,14 @@ TEST_P(OutOfMemoryInAWorld, BodiesAreRemovedAndMovedWithoutMemory) {
   EXPECT_TRUE(follow(world, 2) == follow(undisturbed, 2));
 }
 
-/// The threads of a pool are freed when the next pool is made, so that pools can share them.
-std::size_t allocations_left() {
-  { const ThreadPool pool(2); }
-  return live_allocations();
-}
-
 TEST_P(OutOfMemoryInAWorld, AFailedConstructionLeaksNothing) {
   const Scene scene = dense_scene(2, GetParam());
   for (const WorldSettings& settings : kSettings) {
     { const World first(scene, settings); }  // allocates objects that are made once and kept
     const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
-      const std::size_t alive = allocations_left();
+      const std::size_t alive = live_allocations();
       runs_out(k, shortage, [&] { const World world(scene, settings); });
-      EXPECT_EQ(allocations_left(), alive) << k;
+      EXPECT_EQ(live_allocations(), alive) << k;
       return FailingNew::failed() && !testing::Test::HasFailure();
     });
     EXPECT_GT(failures, 20u);

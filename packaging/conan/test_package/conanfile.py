@@ -1,6 +1,4 @@
-"""Builds and runs a program that uses the package, in both precisions, with its CMake and pkg-config files."""
-import os
-
+"""Builds and runs programs that use the package, in all its precisions, with its CMake and pkg-config files."""
 from conan import ConanFile
 from conan.tools.build import can_run
 from conan.tools.cmake import CMake, CMakeToolchain, cmake_layout
@@ -19,6 +17,8 @@ class JfpxTest(ConanFile):
     def generate(self):
         toolchain = CMakeToolchain(self)
         toolchain.user_presets_path = False  # creates no CMakeUserPresets.json
+        bullet = self.dependencies[self.tested_reference_str].options.bullet
+        toolchain.cache_variables["BULLET"] = str(bullet)
         toolchain.generate()
 
     def build(self):
@@ -28,5 +28,4 @@ class JfpxTest(ConanFile):
 
     def test(self):
         if can_run(self):
-            for program in ("collider", "collider_f64", "collider_pc", "collider_pc_f64"):
-                self.run(os.path.join(self.cpp.build.bindir, program), env="conanrun")
+            self.run("ctest --output-on-failure", cwd=self.build_folder, env="conanrun")

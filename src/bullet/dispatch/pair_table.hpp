@@ -21,7 +21,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 /// Number of pairs per chunk of a parallel loop.
-inline constexpr std::size_t kPairChunk = 4096;
+inline constexpr std::size_t kPairChunk = 2048;
 
 /// Class of Bullet's algorithm of a pair.
 enum class PairKind : std::uint8_t {

@@ -23,7 +23,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kBodyChunk = 1024;
+constexpr std::size_t kBodyChunk = 512;
 
 /// True for exactly the classes whose checkCollideWithOverride is known to be free of side effects.
 bool has_stock_filter(const btCollisionObject& body) {

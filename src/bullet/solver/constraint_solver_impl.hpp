@@ -20,7 +20,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-inline constexpr std::size_t kBodiesPerChunk = 256;
+inline constexpr std::size_t kBodiesPerChunk = 64;
 inline constexpr std::size_t kBlocksPerChunk = 16;
 /// Number of manifolds from which several threads set up a group.
 inline constexpr std::size_t kSharedManifolds = 2048;

@@ -10,7 +10,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kChunk = 512;            ///< manifolds
+constexpr std::size_t kChunk = 256;            ///< manifolds
 constexpr std::int32_t kUnlisted = INT32_MIN;  ///< replaces the id of an unlisted body
 
 bool has_infinite_mass(const btRigidBody& body) {

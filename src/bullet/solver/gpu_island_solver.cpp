@@ -3,8 +3,8 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/bullet/chunks.hpp"
 #include "src/bullet/prefetch.hpp"
-#include "src/bullet/solver/chunks.hpp"
 #include "src/bullet/solver/row_inputs.hpp"
 
 #include <LinearMath/btQuickprof.h>

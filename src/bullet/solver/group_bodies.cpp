@@ -1,6 +1,6 @@
 /// Setup of the bodies of a group, including those that only joints or manifolds refer to.
+#include "src/bullet/chunks.hpp"
 #include "src/bullet/prefetch.hpp"
-#include "src/bullet/solver/chunks.hpp"
 #include "src/bullet/solver/constraint_solver_impl.hpp"
 #include "src/bullet/solver/row_inputs.hpp"
 

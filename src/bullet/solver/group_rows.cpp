@@ -1,6 +1,6 @@
 /// Setup of the rows of a group for the sweeps on the CPU.
+#include "src/bullet/chunks.hpp"
 #include "src/bullet/prefetch.hpp"
-#include "src/bullet/solver/chunks.hpp"
 #include "src/bullet/solver/constraint_solver_impl.hpp"
 #include "src/bullet/solver/friction_directions.hpp"
 #include "src/bullet/solver/rolling_friction_rows.hpp"

@@ -1,5 +1,5 @@
 /// Transfer of the results of a group to Bullet's manifolds, joints, bodies and analytics.
-#include "src/bullet/solver/chunks.hpp"
+#include "src/bullet/chunks.hpp"
 #include "src/bullet/solver/constraint_solver_impl.hpp"
 
 #include <LinearMath/btQuickprof.h>

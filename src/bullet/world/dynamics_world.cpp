@@ -3,6 +3,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/thread_pool.hpp"
+#include "src/bullet/chunks.hpp"
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/world/aabb_update.hpp"
 #include "src/bullet/world/islands.hpp"
@@ -21,9 +22,9 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr int kBodiesPerChunk = 256;
+constexpr std::size_t kBodiesPerChunk = 64;
 /// Number of bodies from which several threads move them; waking threads takes longer than fewer.
-constexpr int kSharedBodies = 2048;
+constexpr std::size_t kSharedBodies = 2048;
 
 int island_of(const btTypedConstraint* constraint) {
   const int tag = constraint->getRigidBodyA().getIslandTag();
@@ -46,23 +47,18 @@ struct DynamicsWorld::Impl {
 
   /// Calls run(bodies, count) for all chunks of the array, of many bodies in parallel.
   template <class Run>
-  void in_chunks(btAlignedObjectArray<btRigidBody*>& bodies, const Run& run) {
-    const int count = bodies.size();
-    if (count < kSharedBodies) {
-      if (count > 0) run(&bodies[0], count);
-      return;
-    }
-    const int chunks = (count + kBodiesPerChunk - 1) / kBodiesPerChunk;
-    pool.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
-      const int first = static_cast<int>(chunk) * kBodiesPerChunk;
-      run(&bodies[first], std::min(kBodiesPerChunk, count - first));
-    });
+  void in_body_chunks(btAlignedObjectArray<btRigidBody*>& bodies, const Run& run) {
+    const auto count = static_cast<std::size_t>(bodies.size());
+    in_chunks(pool, count, chunk_size(count, kBodiesPerChunk, kSharedBodies),
+              [&](std::size_t first, std::size_t last) {
+                run(&bodies[static_cast<int>(first)], static_cast<int>(last - first));
+              });
   }
   /// Whether continuous collision may shorten the path of any body.
   bool has_swept_bodies(btAlignedObjectArray<btRigidBody*>& bodies, const btDispatcherInfo& info) {
     if (!info.m_useContinuous) return false;
     std::atomic<bool> found{false};
-    in_chunks(bodies, [&](btRigidBody** part, int count) {
+    in_body_chunks(bodies, [&](btRigidBody** part, int count) {
       if (std::any_of(part, part + count, [](const btRigidBody* body) {
             return body->getCcdSquareMotionThreshold() != 0;
           })) {
@@ -94,7 +90,7 @@ void DynamicsWorld::predictUnconstraintMotion(btScalar dt) {
     return;
   }
   BT_PROFILE("predictUnconstraintMotion");
-  impl_->in_chunks(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+  impl_->in_body_chunks(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
     for (int i = 0; i < count; ++i) {
       if (!is_movable(*bodies[i])) continue;
       bodies[i]->applyDamping(dt);
@@ -110,7 +106,7 @@ void DynamicsWorld::createPredictiveContacts(btScalar dt) {
   }
   BT_PROFILE("createPredictiveContacts");
   releasePredictiveContacts();
-  impl_->in_chunks(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+  impl_->in_body_chunks(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
     for (int i = 0; i < count; ++i) bodies[i]->setHitFraction(1);
   });
 }
@@ -122,7 +118,7 @@ void DynamicsWorld::integrateTransforms(btScalar dt) {
     return;
   }
   BT_PROFILE("integrateTransforms");
-  impl_->in_chunks(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+  impl_->in_body_chunks(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
     integrateTransformsInternal(bodies, count, dt);
   });
 }

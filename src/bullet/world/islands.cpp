@@ -5,6 +5,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/reserve.hpp"
+#include "src/bullet/chunks.hpp"
 #include "src/bullet/prefetch.hpp"
 #include "src/bullet/world/parallel_quick_sort.hpp"
 #include "src/bullet/world/plain_dispatcher.hpp"
@@ -24,14 +25,10 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr int kManifoldsPerChunk = 1024, kObjectsPerChunk = 1024;
-constexpr std::size_t kPairsPerChunk = 1024;
+constexpr std::size_t kManifoldsPerChunk = 512, kPairsPerChunk = 512;
+constexpr std::size_t kObjectsPerChunk = 1024;
 /// Numbers from which several threads process them; waking threads takes longer than fewer.
-constexpr int kSharedManifolds = 4096;
-constexpr std::size_t kSharedPairs = 4096;
-
-int manifold_chunk(int count) { return count < kSharedManifolds ? count : kManifoldsPerChunk; }
-int chunks_of(int count, int chunk) { return count == 0 ? 0 : (count + chunk - 1) / chunk; }
+constexpr std::size_t kSharedManifolds = 4096, kSharedPairs = 4096;
 
 /// As btUnionFind::find(), without compressing paths, so that threads may search concurrently.
 int root_of(const btUnionFind& unions, int x) {
@@ -110,7 +107,7 @@ bool may_be_woken(btCollisionWorld& world) {
   return false;
 }
 
-void prefetch_manifold(btPersistentManifold* const* manifolds, int i, int count) {
+void prefetch_manifold(btPersistentManifold* const* manifolds, std::size_t i, std::size_t count) {
   if (i + 2 * kManifoldsAhead < count) prefetch_header(manifolds[i + 2 * kManifoldsAhead]);
   if (i + kManifoldsAhead < count) {
     prefetch_island_state(manifolds[i + kManifoldsAhead]->getBody0());
@@ -124,7 +121,7 @@ bool IslandSolver::reserve_for_unions(btCollisionWorld& world) noexcept {
   const auto objects = static_cast<std::size_t>(world.getNumCollisionObjects());
   const auto pairs = static_cast<std::size_t>(world.getPairCache()->getNumOverlappingPairs());
   try {
-    resize_geometric(&numbers_, objects / std::size_t{kObjectsPerChunk} + 2);
+    resize_geometric(&numbers_, chunks_of(objects, kObjectsPerChunk) + 1);
     resize_geometric(&chunk_counts_, std::min(pairs, pairs_per_round_) / kPairsPerChunk + 1);
     edges_.reserve(std::min(pairs, pairs_per_round_), "pairs of islands");
   } catch (const OutOfMemory&) {
@@ -161,16 +158,16 @@ void IslandSolver::number_and_unite(btCollisionWorld& world, btUnionFind* unions
 
 /// Calls run(chunk, first, last) for all chunks of objects in parallel.
 template <class Run>
-void IslandSolver::in_chunks(const btCollisionObjectArray& objects, const Run& run) {
-  pool_.run(numbers_.size() - 1, [&](std::size_t chunk) {
-    const int first = static_cast<int>(chunk) * kObjectsPerChunk;
-    run(chunk, first, std::min(objects.size(), first + kObjectsPerChunk));
-  });
+void IslandSolver::in_object_chunks(const btCollisionObjectArray& objects, const Run& run) {
+  in_chunks(pool_, static_cast<std::size_t>(objects.size()), kObjectsPerChunk,
+            [&](std::size_t first, std::size_t last) {
+              run(first / kObjectsPerChunk, static_cast<int>(first), static_cast<int>(last));
+            });
 }
 
 /// Numbers the movable objects; numbers_ receives the first number of each chunk, and the total.
 void IslandSolver::number_objects(btCollisionObjectArray& objects) {
-  in_chunks(objects, [&](std::size_t chunk, int first, int last) {
+  in_object_chunks(objects, [&](std::size_t chunk, int first, int last) {
     int movable = 0;
     for (int i = first; i < last; ++i) {
       prefetch_island_state_of(objects, i + kObjectsAhead);
@@ -181,7 +178,7 @@ void IslandSolver::number_objects(btCollisionObjectArray& objects) {
   numbers_.back() = 0;
   int next = 0;
   for (int& number : numbers_) next += std::exchange(number, next);
-  in_chunks(objects, [&](std::size_t chunk, int first, int last) {
+  in_object_chunks(objects, [&](std::size_t chunk, int first, int last) {
     int number = numbers_[chunk];
     for (int i = first; i < last; ++i) {
       prefetch_island_state_of(objects, i + kObjectsAhead);
@@ -196,16 +193,13 @@ void IslandSolver::number_objects(btCollisionObjectArray& objects) {
 /// Lists the pairs of objects in different sets, in order. Reads the sets, and leaves the results
 /// of find() unchanged. @return their number
 int IslandSolver::find_edges(std::span<const btBroadphasePair> pairs, const btUnionFind& unions) {
-  const std::size_t count = pairs.size();
-  const std::size_t chunks = (count + kPairsPerChunk - 1) / kPairsPerChunk;
-  pool_.run(chunks, [&](std::size_t chunk) {
-    const std::size_t first = chunk * kPairsPerChunk;
-    const std::size_t last = std::min(count, first + kPairsPerChunk);
+  const std::size_t count = pairs.size(), chunks = chunks_of(count, kPairsPerChunk);
+  in_chunks(pool_, count, kPairsPerChunk, [&](std::size_t first, std::size_t last) {
     std::size_t next = first;
     for_each_union(pairs.subspan(first, last - first), [&](int a, int b) {
       if (root_of(unions, a) != root_of(unions, b)) edges_[next++] = {a, b};
     });
-    chunk_counts_[chunk] = static_cast<int>(next - first);
+    chunk_counts_[first / kPairsPerChunk] = static_cast<int>(next - first);
   });
   int total = 0;
   for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
@@ -218,7 +212,7 @@ int IslandSolver::find_edges(std::span<const btBroadphasePair> pairs, const btUn
 
 void IslandSolver::store_islands(btCollisionWorld& world, btUnionFind* unions) {
   btCollisionObjectArray& objects = world.getCollisionObjectArray();
-  in_chunks(objects, [&](std::size_t chunk, int first, int last) {
+  in_object_chunks(objects, [&](std::size_t chunk, int first, int last) {
     int number = numbers_[chunk];
     for (int i = first; i < last; ++i) {
       prefetch_island_state_of(objects, i + kObjectsAhead);
@@ -241,7 +235,7 @@ bool IslandSolver::reserve_geometric(btCollisionWorld& world, int constraint_cou
   try {
     found_.reserve(manifolds, "manifolds of islands");
     found_island_.reserve(manifolds, "manifolds of islands");
-    jfpx::reserve_geometric(&chunk_counts_, manifolds / std::size_t{kManifoldsPerChunk} + 1);
+    jfpx::reserve_geometric(&chunk_counts_, manifolds / kManifoldsPerChunk + 1);
     jfpx::reserve_geometric(&manifolds_, manifolds);
     jfpx::reserve_geometric(&bodies_, static_cast<std::size_t>(world.getNumCollisionObjects()));
     jfpx::reserve_geometric(&constraints_, static_cast<std::size_t>(constraint_count));
@@ -319,7 +313,9 @@ void IslandSolver::collect_manifolds(btCollisionWorld& world) {
   btPersistentManifold** manifolds = plain ? dispatcher.getInternalManifoldPointer() : nullptr;
   count_ = 0;
   for (int i = 0; i < count; ++i) {
-    if (plain) prefetch_manifold(manifolds, i, count);
+    if (plain) {
+      prefetch_manifold(manifolds, static_cast<std::size_t>(i), static_cast<std::size_t>(count));
+    }
     btPersistentManifold* manifold =
         plain ? manifolds[i] : dispatcher.getManifoldByIndexInternal(i);
     if (only_touching && manifold->getNumContacts() == 0) continue;
@@ -338,29 +334,28 @@ void IslandSolver::collect_manifolds(btCollisionWorld& world) {
 
 /// Parallel version for a plain dispatcher. Returns false if kinematic objects may wake others.
 bool IslandSolver::collect_in_parallel(btDispatcher& dispatcher, bool only_touching) {
-  const int count = dispatcher.getNumManifolds();
-  const int size = manifold_chunk(count), chunks = chunks_of(count, size);
+  const auto count = static_cast<std::size_t>(dispatcher.getNumManifolds());
+  const std::size_t size = chunk_size(count, kManifoldsPerChunk, kSharedManifolds);
+  const std::size_t chunks = chunks_of(count, size);
   btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();
-  chunk_counts_.assign(static_cast<std::size_t>(chunks), 0);
+  chunk_counts_.assign(chunks, 0);
   std::atomic<bool> kinematic{false};
-  pool_.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
-    const int first = static_cast<int>(chunk) * size, last = std::min(count, first + size);
+  in_chunks(pool_, count, size, [&](std::size_t first, std::size_t last) {
     bool seen = false;
-    int next = first;
-    for (int i = first; i < last; ++i) {
+    std::size_t next = first;
+    for (std::size_t i = first; i < last; ++i) {
       if (chunks > 1) prefetch_manifold(manifolds, i, last);  // fewer fit into the cache
       if (!needs_solving(dispatcher, *manifolds[i], only_touching, &seen)) continue;
-      const auto at = static_cast<std::size_t>(next++);
-      found_[at] = manifolds[i];
-      found_island_[at] = island_of(*manifolds[i]->getBody0(), *manifolds[i]->getBody1());
+      found_[next] = manifolds[i];
+      found_island_[next++] = island_of(*manifolds[i]->getBody0(), *manifolds[i]->getBody1());
     }
-    chunk_counts_[chunk] = next - first;
+    chunk_counts_[first / size] = static_cast<int>(next - first);
     if (seen) kinematic.store(true, std::memory_order_relaxed);
   });
   if (kinematic) return false;
   count_ = 0;
-  for (int chunk = 0; chunk < chunks; ++chunk) {
-    const int found = chunk_counts_[static_cast<std::size_t>(chunk)];
+  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+    const int found = chunk_counts_[chunk];
     std::copy_n(found_.data() + chunk * size, found, found_.data() + count_);
     std::copy_n(found_island_.data() + chunk * size, found, found_island_.data() + count_);
     count_ += found;
@@ -398,14 +393,13 @@ void IslandSolver::sort_manifolds(bool by_pair) {
 /// Adds the manifolds of the keys [first, last) to the group.
 void IslandSolver::add_manifolds(int first, int last) {
   const std::size_t before = manifolds_.size();
-  manifolds_.resize(before + static_cast<std::size_t>(last - first));
-  const int size = manifold_chunk(last - first), chunks = chunks_of(last - first, size);
-  pool_.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
-    const int begin = first + static_cast<int>(chunk) * size;
-    const int end = std::min(last, begin + size);
-    for (int k = begin; k < end; ++k) {
-      manifolds_[before + static_cast<std::size_t>(k - first)] =
-          found_[static_cast<std::size_t>(keys_[k].index)];
+  const auto count = static_cast<std::size_t>(last - first);
+  manifolds_.resize(before + count);
+  const std::size_t size = chunk_size(count, kManifoldsPerChunk, kSharedManifolds);
+  in_chunks(pool_, count, size, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const int key = keys_[first + static_cast<int>(k)].index;
+      manifolds_[before + k] = found_[static_cast<std::size_t>(key)];
     }
   });
 }

@@ -56,7 +56,7 @@ class IslandSolver {
   };
 
   template <class Run>
-  void in_chunks(const btCollisionObjectArray& objects, const Run& run);
+  void in_object_chunks(const btCollisionObjectArray& objects, const Run& run);
   void number_objects(btCollisionObjectArray& objects);
   int find_edges(std::span<const btBroadphasePair> pairs, const btUnionFind& unions);
   static bool update_sleep(btCollisionObjectArray& objects, btUnionFind& unions);

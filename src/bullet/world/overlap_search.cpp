@@ -5,6 +5,7 @@
 #include "src/base/real_lanes.hpp"
 #include "src/base/reserve.hpp"
 #include "src/base/spatial_order.hpp"
+#include "src/bullet/chunks.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -16,7 +17,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kLeavesPerChunk = 2048;
+constexpr std::size_t kLeavesPerChunk = 512;
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
 /// Leaves from which the order of the tree, which affects only the speed, is derived.
@@ -32,13 +33,6 @@ Aabb aabb_of(const btDbvtVolume& volume) {
 }
 
 std::size_t first_lane(unsigned lanes) { return static_cast<std::size_t>(std::countr_zero(lanes)); }
-
-/// Calls run(first, last) for all chunks of [0, count) in parallel.
-template <class Run>
-void in_chunks(ThreadPool& pool, std::size_t count, std::size_t size, const Run& run) {
-  pool.run((count + size - 1) / size,
-           [&](std::size_t chunk) { run(chunk * size, std::min(count, (chunk + 1) * size)); });
-}
 
 }  // namespace
 
@@ -123,7 +117,7 @@ std::size_t OverlapSearch::run(ThreadPool& pool, std::span<const LeafUpdate> lea
                         static_cast<unsigned>(pairs.capacity()) - 1,
                         static_cast<unsigned>(heads.size())};
   const std::size_t leaf_blocks = levels_[1];
-  const std::size_t chunks = (leaf_blocks + kBlocksPerChunk - 1) / kBlocksPerChunk;
+  const std::size_t chunks = chunks_of(leaf_blocks, kBlocksPerChunk);
   if (chunks_.size() < chunks) chunks_.resize(chunks);
   in_chunks(pool, leaf_blocks, kBlocksPerChunk, [&](std::size_t first, std::size_t last) {
     search(first, last, table, &chunks_[first / kBlocksPerChunk]);

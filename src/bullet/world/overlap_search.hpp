@@ -39,7 +39,7 @@ class OverlapSearch {
   std::span<const NewOverlap> found() const { return found_; }
 
  private:
-  static constexpr std::size_t kWidth = 8, kBlocksPerChunk = 32;
+  static constexpr std::size_t kWidth = 8, kBlocksPerChunk = 8;
   using Lanes = std::array<Real, kWidth>;
 
   /// Volumes of eight leaves or blocks. Unused lanes overlap nothing.

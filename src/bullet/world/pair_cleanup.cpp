@@ -2,6 +2,7 @@
 #include "src/bullet/world/pair_cleanup.hpp"
 
 #include "src/base/reserve.hpp"
+#include "src/bullet/chunks.hpp"
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
 #include "src/bullet/world/plain_dispatcher.hpp"
@@ -18,9 +19,9 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr int kPairsPerChunk = 2048;
+constexpr std::size_t kPairsPerChunk = 2048;
 /// Number of pairs from which several threads test them; waking threads takes longer than fewer.
-constexpr int kSharedPairs = 8192;
+constexpr std::size_t kSharedPairs = 8192;
 
 bool is_apart(const btBroadphasePair& pair) {
   const auto* a = static_cast<const btDbvtProxy*>(pair.m_pProxy0);
@@ -106,13 +107,11 @@ bool PairCleanup::test_pairs(const btBroadphasePairArray& pairs, int first, int 
                              ThreadPool& pool) {
   const int size = pairs.size();
   std::atomic<bool> any{false};
-  const int chunk_size = count < kSharedPairs ? count : kPairsPerChunk;
-  const int chunks = count == 0 ? 0 : (count + chunk_size - 1) / chunk_size;
-  pool.run(static_cast<std::size_t>(chunks), [&](std::size_t chunk) {
-    const int begin = static_cast<int>(chunk) * chunk_size;
-    const int end = std::min(count, begin + chunk_size);
+  const auto tested = static_cast<std::size_t>(count);
+  const std::size_t chunk = chunk_size(tested, kPairsPerChunk, kSharedPairs);
+  in_chunks(pool, tested, chunk, [&](std::size_t begin, std::size_t end) {
     bool found = false;
-    for (int k = begin; k < end; ++k) {
+    for (auto k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
       const int i = first + k < size ? first + k : first + k - size;
       prefetch_volumes(pairs, i);
       const bool apart = is_apart(pairs[i]);

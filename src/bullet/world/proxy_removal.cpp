@@ -3,6 +3,7 @@
 #include "src/bullet/world/proxy_removal.hpp"
 
 #include "src/base/reserve.hpp"
+#include "src/bullet/chunks.hpp"
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/world/leaf_update.hpp"
 #include "src/bullet/world/plain_dispatcher.hpp"
@@ -18,9 +19,9 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr int kPairsPerChunk = 8192;
+constexpr std::size_t kPairsPerChunk = 8192;
 /// Number of pairs from which several threads search them; waking threads takes longer than fewer.
-constexpr int kSharedPairs = 65536;
+constexpr std::size_t kSharedPairs = 65536;
 
 }  // namespace
 
@@ -52,14 +53,14 @@ bool ProxyRemoval::run(btCollisionWorld& world, btCollisionObject& object, Threa
 /// Returns false if there is not enough memory.
 bool ProxyRemoval::find_pairs(const btBroadphasePairArray& pairs, const btBroadphaseProxy* proxy,
                               ThreadPool& pool) {
-  const int count = pairs.size(), size = count < kSharedPairs ? count : kPairsPerChunk;
-  const int chunks = count == 0 ? 0 : (count + size - 1) / size;
+  const auto count = static_cast<std::size_t>(pairs.size());
+  const std::size_t size = chunk_size(count, kPairsPerChunk, kSharedPairs);
   found_.clear();
   try {
-    resize_geometric(&parts_, static_cast<std::size_t>(chunks));
-    pool.run(parts_.size(), [&](std::size_t chunk) {
-      const int first = static_cast<int>(chunk) * size;
-      find_pairs(pairs, first, std::min(count, first + size), proxy, &parts_[chunk]);
+    resize_geometric(&parts_, chunks_of(count, size));
+    in_chunks(pool, count, size, [&](std::size_t first, std::size_t last) {
+      find_pairs(pairs, static_cast<int>(first), static_cast<int>(last), proxy,
+                 &parts_[first / size]);
     });
     for (const std::vector<int>& part : parts_)
       found_.insert(found_.end(), part.begin(), part.end());

@@ -92,7 +92,7 @@ class SphereColliderCpu final : public SphereCollider {
   SphereAlgorithm algorithm() const noexcept override { return used_; }
 
  private:
-  static constexpr std::size_t kPairChunk = 4096;
+  static constexpr std::size_t kPairChunk = 2048;
   static std::size_t chunks_of(std::span<const SpherePair> pairs) {
     return (pairs.size() + kPairChunk - 1) / kPairChunk;
   }
