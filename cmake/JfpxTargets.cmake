@@ -10,6 +10,8 @@ configure_file(${PROJECT_SOURCE_DIR}/include/jfpx/config.hpp.in
 add_library(jfpx_warnings INTERFACE)
 target_compile_options(jfpx_warnings INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wconversion;-Wshadow>
+  # g++ reports members of private types in a source that another source includes.
+  $<$<AND:$<COMPILE_LANG_AND_ID:CXX,GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-subobject-linkage>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${JFPX_WERROR}>>:-Werror>)
 add_library(jfpx_build_flags INTERFACE)
 target_compile_features(jfpx_build_flags INTERFACE cxx_std_20)

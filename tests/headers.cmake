@@ -20,9 +20,11 @@ file(GENERATE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/headers/after_system_macros.cpp
 list(APPEND plain ${CMAKE_CURRENT_BINARY_DIR}/headers/after_system_macros.cpp)
 add_library(headers_alone OBJECT ${plain})
 target_link_libraries(headers_alone PRIVATE jfpx jfpx_warnings)
+set_target_properties(headers_alone PROPERTIES UNITY_BUILD OFF)
 if(JFPX_HAS_BULLET AND with_bullet)
   add_library(bullet_headers_alone OBJECT ${with_bullet})
   target_link_libraries(bullet_headers_alone PRIVATE jfpx_bullet jfpx_warnings)
+  set_target_properties(bullet_headers_alone PROPERTIES UNITY_BUILD OFF)
 endif()
 
 # An older standard is refused by name, before the errors that follow from it.

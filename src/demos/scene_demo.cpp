@@ -10,7 +10,7 @@ inline namespace JFPX_ABI {
 namespace demos {
 namespace {
 
-constexpr Control kControls[] = {{"reset", "restart", "r"}};
+constexpr Control kSceneControls[] = {{"reset", "restart", "r"}};
 
 constexpr std::array<Colour, 4> kColours{
     {{0.80F, 0.35F, 0.25F}, {0.30F, 0.55F, 0.80F}, {0.45F, 0.70F, 0.35F}, {0.85F, 0.70F, 0.30F}}};
@@ -30,7 +30,7 @@ Camera camera_for(const Scene& scene) {
 class SceneDemo final : public Demo {
  public:
   SceneDemo(Scene scene, const WorldSettings& settings, const Camera& camera, int ground_lines)
-      : Demo(kControls),
+      : Demo(kSceneControls),
         scene_(std::move(scene)),
         settings_(settings),
         camera_(camera),

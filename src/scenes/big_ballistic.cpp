@@ -9,7 +9,7 @@ namespace {
 
 // Material of Millington's demo, on which the original is based. The original's friction of 0.01
 // was an error (E44).
-void set_material(BodyDef* body) {
+void set_demo_material(BodyDef* body) {
   body->friction = Real(0.9);
   body->restitution = Real(0.1);
 }
@@ -23,7 +23,7 @@ BodyDef crate(Real z) {
   def.position = {0, 2, z};
   def.linear_damping = Real(0.95);
   def.angular_damping = Real(0.99);
-  set_material(&def);
+  set_demo_material(&def);
   return def;
 }
 
@@ -47,7 +47,7 @@ BodyDef big_round(Weapon weapon) {
   round.linear_damping = numbers.damping;
   round.angular_damping = Real(0.8);
   round.can_sleep = false;
-  set_material(&round);
+  set_demo_material(&round);
   return round;
 }
 
@@ -60,7 +60,7 @@ Scene make_big_ballistic(const Counts& counts) {
   BodyDef ground;
   ground.shape = HalfSpace{{0, 1, 0}, 0};
   ground.mass = 0;
-  set_material(&ground);
+  set_demo_material(&ground);
   scene.bodies.push_back(ground);
   for (std::uint32_t i = 0; i < counts.spheres; ++i) {
     const std::uint32_t column = i % 4, storey = i / 4;

@@ -32,6 +32,9 @@ list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/systems.cu)
 # These sources alone use instruction sets that the baseline does not include; base/cpu.hpp selects among
 # them at run time. cpu/kernels.hpp explains why they must not share inline functions with other sources.
+set_source_files_properties(
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_baseline.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_scalar.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 if(JFPX_PROCESSOR STREQUAL "x86_64")
   list(APPEND JFPX_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp

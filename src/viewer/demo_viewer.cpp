@@ -21,7 +21,6 @@ namespace view {
 namespace {
 
 constexpr Real kFlat = Real(0.5);  // items with a smaller scale are shadows
-constexpr float kTextWidth = 320;  // [units]
 
 std::unique_ptr<demos::Demo> make_demo(const ViewOptions& options) {
   WorldSettings world;
@@ -212,7 +211,7 @@ void DemoViewer::panel() {
   const std::string title(demo_->name());
   if (ImGui::Begin(title.c_str(), nullptr, ImGuiWindowFlags_AlwaysAutoResize)) {
     show_run_buttons(false);
-    if (!message.empty()) widget::warning(message, kTextWidth);
+    if (!message.empty()) widget::warning(message);
     if (const auto chosen = choose_scene(options_.run.scene)) {
       next = options_;
       next->run.scene = *chosen;

@@ -18,7 +18,6 @@ namespace {
 
 /// Scenes with fewer bodies are drawn from the host, where a picture can show more of them.
 constexpr std::size_t kFewestBodies = 100000;
-constexpr float kTextWidth = 320;
 
 bool is_movable(const BodyDef& body) { return body.mass > 0; }
 
@@ -83,7 +82,7 @@ void DeviceViewer::panel() {
   ImGui::SetNextWindowPos({12, 12}, ImGuiCond_FirstUseEver);
   if (ImGui::Begin("jfpx", nullptr, ImGuiWindowFlags_AlwaysAutoResize)) {
     show_run_buttons(false);
-    if (!message.empty()) widget::warning(message, kTextWidth);
+    if (!message.empty()) widget::warning(message);
     if (const auto chosen = choose_scene(options_.run.scene)) {
       next = options_;
       next->run.scene = *chosen;

@@ -18,7 +18,6 @@ namespace {
 
 constexpr float kWidth = 330;      // [units]
 constexpr float kItemWidth = 170;  // of a slider or a field without its label
-constexpr float kTextWidth = 320;
 constexpr float kTableWidth = 300;
 constexpr float kMargin = 12;          // between a panel and the edge of the window
 constexpr double kAsRequested = 0.95;  // fraction of the requested speed
@@ -59,7 +58,7 @@ void SceneViewer::panel() {
       message = error.what();  // the request failed; the run is unchanged
       fill_fields();
     }
-    if (!message.empty()) widget::warning(message, kTextWidth);
+    if (!message.empty()) widget::warning(message);
     show_counters();
     ImGui::PopItemWidth();
   }
@@ -213,7 +212,7 @@ void SceneViewer::show_counters() {
                              : now.substeps > 0     ? fmt::format("{} substeps", now.substeps)
                                                     : fmt::format("{} corrections", now.iterations);
   widget::text(fmt::format("spheres by {}, {}", now.computed_by, solved));
-  if (!now.trouble.empty()) widget::warning(now.trouble, kTextWidth);
+  if (!now.trouble.empty()) widget::warning(now.trouble);
   const std::array<std::pair<const char*, double StageTimes::*>, 5> stages = {
       {{"integrate", &StageTimes::integrate},
        {"broad", &StageTimes::broad},

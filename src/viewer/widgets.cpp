@@ -12,6 +12,8 @@ inline namespace JFPX_ABI {
 namespace view::widget {
 namespace {
 
+constexpr float kTextWidth = 320;  // [units]
+
 const ImVec4 kWarning{1.0f, 0.55f, 0.35f, 1.0f};
 
 PanelLog* log() { return static_cast<PanelLog*>(ImGui::GetIO().UserData); }
@@ -46,8 +48,8 @@ void text(const std::string& text) {
   log_text(text);
 }
 
-void warning(const std::string& text, float width) {
-  ImGui::PushTextWrapPos(width);
+void warning(const std::string& text) {
+  ImGui::PushTextWrapPos(kTextWidth);
   ImGui::TextColored(kWarning, "%s", text.c_str());
   ImGui::PopTextWrapPos();
   log_text(text);

@@ -29,8 +29,8 @@ namespace widget {
 void set_log(PanelLog* log);
 
 void text(const std::string& text);
-/// Text in a conspicuous colour, wrapped at `width` [units].
-void warning(const std::string& text, float width);
+/// Text in a conspicuous colour, wrapped.
+void warning(const std::string& text);
 
 // The following functions return true if the user has just operated the widget.
 bool button(const char* label);

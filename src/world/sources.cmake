@@ -41,3 +41,5 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/world_snapshot.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/world_cuda.cu)
+# Has private names of recording.cpp.
+set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/snapshot_file.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)

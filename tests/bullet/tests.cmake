@@ -21,6 +21,8 @@ jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   bullet/stats_test.cpp
   bullet/unordered_commit_test.cpp
   LINK jfpx_bullet jfpx_scenes)
+# Has private names of other tests.
+set_source_files_properties(bullet/sphere_box_test.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 jfpx_add_test(bullet_verify_test INTERNAL SOURCES
   bullet/fused_test.cpp
   bullet/fused_unit.cpp
@@ -37,47 +39,32 @@ set_source_files_properties(bullet/fused_unit.cpp PROPERTIES
 jfpx_add_test(bullet_trajectory_test SOURCES
   bullet/trajectory_test.cpp
   LINK jfpx_bullet)
-set(random_worlds
-  bullet/live_random_world.cpp
-  bullet/random_world.cpp
-  bullet/random_world_globals.cpp
-  bullet/random_world_run.cpp)
-set(solver_worlds
-  bullet/solver_world.cpp
-  bullet/solver_world_run.cpp
-  bullet/stock_bits.cpp)
 jfpx_add_test(bullet_random_worlds_test SOURCES
-  ${random_worlds}
   bullet/random_worlds_test.cpp
-  LINK jfpx_bullet)
+  LINK bullet_test_worlds)
 set_source_files_properties(bullet/random_worlds_test.cpp PROPERTIES
   COMPILE_DEFINITIONS "JFPX_DISPATCHER_CORPUS=\"${CMAKE_CURRENT_SOURCE_DIR}/fuzz/corpus/dispatcher/\"")
 jfpx_add_test(bullet_solver_test SOURCES
-  ${random_worlds}
   bullet/joint_without_rtti.cpp
   bullet/soft_body_test.cpp
   bullet/solver_test.cpp
-  ${solver_worlds}
-  LINK jfpx_bullet)
+  LINK bullet_test_worlds)
 set_source_files_properties(bullet/joint_without_rtti.cpp PROPERTIES
   COMPILE_OPTIONS "-fno-rtti" SKIP_PRECOMPILE_HEADERS ON)
+# Bullet's headers of soft bodies have a variable `seed`.
+set_source_files_properties(bullet/soft_body_test.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 jfpx_add_test(bullet_gpu_island_solver_test SOURCES
-  ${random_worlds}
-  ${solver_worlds}
   bullet/gpu_island_solver_test.cpp
-  LINK jfpx_bullet)
+  LINK bullet_test_worlds)
 if(JFPX_HAS_CUDA)
   jfpx_add_test(bullet_solver_cuda_test SOURCES
-    ${random_worlds}
-    ${solver_worlds}
     bullet/solver_cuda_test.cpp
     support/sphere_fixtures.cpp
-    LINK jfpx_bullet jfpx_cuda CUDA::cudart_static)
+    LINK bullet_test_worlds jfpx_cuda CUDA::cudart_static)
 endif()
 jfpx_add_test(bullet_algorithm_test SOURCES
-  ${random_worlds}
   bullet/algorithm_test.cpp
-  LINK jfpx_bullet)
+  LINK bullet_test_worlds)
 jfpx_add_test(bullet_soak_test SOURCES bullet/soak_test.cpp LINK jfpx_bullet)
 # Too few worlds would fail by chance.
 add_test(NAME soak_refuses_few_steps COMMAND ${PROJECT_SOURCE_DIR}/scripts/soak --steps 19999)

@@ -23,7 +23,7 @@ foreach(suffix IN ITEMS "" "_f64")
     target_compile_options(${target} PRIVATE -w)
     target_link_libraries(${target} PRIVATE Threads::Threads)
     set_target_properties(${target} PROPERTIES OUTPUT_NAME ${part}${name_suffix}
-      SOVERSION ${JFPX_BULLET_VERSION} LIBRARY_OUTPUT_DIRECTORY ${folder} EXPORT_COMPILE_COMMANDS OFF)
+      SOVERSION ${JFPX_BULLET_VERSION} LIBRARY_OUTPUT_DIRECTORY ${folder} EXPORT_COMPILE_COMMANDS OFF UNITY_BUILD OFF)
   endforeach()
   # Without this, a library that is not loaded would go unnoticed.
   add_test(NAME ThreadSafeBullet.IsLoaded${suffix} COMMAND ldd $<TARGET_FILE:bullet_solver_test${suffix}>)

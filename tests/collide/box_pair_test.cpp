@@ -14,8 +14,7 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
-
-constexpr double kEps = static_cast<double>(kEpsilon);
+using test::kEps;
 
 void expect_near(const Vec3& actual, const Vec3& expected, double tolerance = 16 * kEps) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(actual[i], expected[i], tolerance) << "xyz"[i];

@@ -11,9 +11,8 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::kEps;
 using test::Point;
-
-constexpr double kEps = static_cast<double>(kEpsilon);
 
 Point to_double(const Vec3& v) {
   return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};

@@ -9,8 +9,10 @@ if [ -z "$clang_format" ] || ! "$clang_format" --version | grep -q 'version 14\.
   echo "skipped: clang-format 14 is not installed"
   exit 0
 fi
-status=0
-while IFS= read -r file; do
-  "$clang_format" "$file" | cmp -s - "$file" || { echo "not formatted: $file"; status=1; }
-done < <(find include src python examples tests bench -name '*.hpp' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.inl')
-exit $status
+mapfile -t files < <(find include src python examples tests bench -name '*.hpp' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.inl')
+# One process for all files takes half the time of one for each; these say which file it is.
+"$clang_format" "${files[@]}" | cmp -s - <(cat "${files[@]}") && exit 0
+for file in "${files[@]}"; do
+  "$clang_format" "$file" | cmp -s - "$file" || echo "not formatted: $file"
+done
+exit 1

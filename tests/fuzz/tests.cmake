@@ -29,15 +29,8 @@ jfpx_add_fuzzer(Recording)
 jfpx_add_fuzzer(Snapshot SOURCES fuzz/world_input.cpp)
 jfpx_add_fuzzer(World SOURCES fuzz/world_input.cpp)
 if(JFPX_HAS_BULLET)
-  set(fuzzed_worlds
-    bullet/live_random_world.cpp
-    bullet/random_world.cpp
-    bullet/random_world_globals.cpp
-    bullet/random_world_run.cpp
-    bullet/solver_world.cpp
-    bullet/solver_world_run.cpp)
-  jfpx_add_fuzzer(Dispatcher SOURCES ${fuzzed_worlds} LINK jfpx_bullet GTest::gtest)
-  jfpx_add_fuzzer(Solver SOURCES ${fuzzed_worlds} LINK jfpx_bullet GTest::gtest)
+  jfpx_add_fuzzer(Dispatcher LINK bullet_test_worlds)
+  jfpx_add_fuzzer(Solver LINK bullet_test_worlds)
 endif()
 add_test(NAME fuzz_script COMMAND
   ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/script.sh ${PROJECT_SOURCE_DIR}/scripts/fuzz)

@@ -150,7 +150,8 @@ refused" ] || fail "$("$work/cmake/both")"
     ;;
   # jfpx inside another project, by FetchContent.
   subproject)
-    configure "$here/subproject" "$work/subproject" -DJFPX_CUDA=OFF >/dev/null
+    # The other project may compile sources together, which is also faster.
+    configure "$here/subproject" "$work/subproject" -DJFPX_CUDA=OFF -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=16 >/dev/null
     cmake --build "$work/subproject" >/dev/null 2>&1
     "$work/subproject/careless" || fail "careless"
     unasked=$(find "$work/subproject" -name 'libjfpx-*') # double, Bullet, the module to preload

@@ -12,9 +12,9 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
-
-constexpr double kG = 9.81;
-constexpr double kPiD = 3.14159265358979323846;
+using test::kG;
+using test::kPiD;
+using test::on_the_ground;
 
 JFPX_SOLVER_SUITE(Boxes);
 JFPX_SOLVER_SUITE(FreeSpin);
@@ -31,12 +31,6 @@ BodyDef cube_at(const Vec3& position) { return box_at(position, {0.5_r, 0.5_r, 0
 BodyDef floating(BodyDef def) {
   def.acceleration = {};
   return def;
-}
-Scene on_the_ground(std::vector<BodyDef> bodies) {
-  Scene scene = test::empty_scene();
-  scene.bodies = std::move(bodies);
-  scene.bodies.push_back(test::ground());
-  return scene;
 }
 
 /// Kinetic energy and momenta of boxes and balls, in double.

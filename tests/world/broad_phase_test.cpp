@@ -18,9 +18,8 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
-
-constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
+using test::kInfinity;
+using test::kNan;
 
 using Spheres = std::map<SphereHierarchy::Leaf, SphereInstance>;
 

@@ -18,8 +18,7 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
-
-constexpr double kEps = static_cast<double>(kEpsilon);
+using test::kEps;
 
 CompoundPart sphere_part(const Vec3& position, Real radius) {
   return {.shape = Sphere{radius}, .position = position};

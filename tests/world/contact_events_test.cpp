@@ -13,6 +13,7 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::heavy;
 
 JFPX_SOLVER_SUITE(ContactEvents);
 
@@ -29,13 +30,6 @@ std::string to_string_of_events(const World& world) {
 std::string step(World* world) {
   world->step();
   return to_string_of_events(*world);
-}
-
-BodyDef heavy(const Vec3& position) {
-  BodyDef def = test::ball(position);
-  def.acceleration = {0, -9.81_r, 0};
-  def.can_sleep = true;
-  return def;
 }
 
 /// The overlap is nearly that of the balls at rest: a larger one would be pushed out, and the

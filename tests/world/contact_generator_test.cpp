@@ -63,7 +63,7 @@ BodyDef weight(const Vec3& position) {
 BodyDef nail() { return test::ball({0, 0, 0}, 0.1_r, 0); }
 
 /// An immovable body at the origin, and the given bodies.
-World world_of(std::vector<BodyDef> bodies, Real dt = 0.002_r) {
+World world_with_nail(std::vector<BodyDef> bodies, Real dt = 0.002_r) {
   Scene scene = test::empty_scene();
   scene.dt = dt;
   scene.bodies = std::move(bodies);
@@ -75,7 +75,7 @@ World world_of(std::vector<BodyDef> bodies, Real dt = 0.002_r) {
 
 TEST_P(ContactGenerator, ABallOnARopeSwingsAsAPendulum) {
   const Real start = 0.1_r;  // rad
-  World world = world_of({weight({2 * start, -2 * std::sqrt(1 - start * start), 0})});
+  World world = world_with_nail({weight({2 * start, -2 * std::sqrt(1 - start * start), 0})});
   world.add_contact_generator(Rope{world.bodies()[0], world.bodies()[1], 2});
   const double period = 2 * 3.14159265358979 * std::sqrt(2 / 9.81);
   double crossing = 0;
@@ -91,8 +91,8 @@ TEST_P(ContactGenerator, ABallOnARopeSwingsAsAPendulum) {
 }
 
 TEST_P(ContactGenerator, ASlackRopeHasNoEffect) {
-  World world = world_of({weight({0, -1, 0})});
-  World free = world_of({weight({0, -1, 0})});
+  World world = world_with_nail({weight({0, -1, 0})});
+  World free = world_with_nail({weight({0, -1, 0})});
   world.add_contact_generator(Rope{world.bodies()[0], world.bodies()[1], 2});
   // A fall of 1 m takes 0.45 s.
   for (int n = 0; n < 220; ++n) {
@@ -114,7 +114,7 @@ TEST_P(ContactGenerator, ARopeBetweenPointsOfBodiesKeepsTheMomenta) {
   a.velocity = {-1, 0.5_r, 0.2_r};
   b.velocity = {2, -0.3_r, 0.1_r};
   b.angular_velocity = {1, 2, 3};
-  World world = world_of({a, b});
+  World world = world_with_nail({a, b});
   world.remove(world.bodies()[0]);  // the immovable body
   const BodyId first = world.bodies()[0], second = world.bodies()[1];
   // Attached to the surfaces, off the line of centres, so that the rope rotates both bodies.
@@ -142,7 +142,7 @@ TEST_P(ContactGenerator, ARodPullsAndPushes) {
   BodyDef b = test::ball({1, 0, 0}, 0.1_r), c = test::ball({0, 2, 0}, 0.1_r);
   b.velocity = {-1, 3, 0};  // inwards: the rod must push
   c.velocity = {1, 4, 0};   // outwards: the rod must pull
-  World world = world_of({b, c});
+  World world = world_with_nail({b, c});
   const bool both = GetParam() == Solver::soft_step;
   world.add_contact_generator(Rod{world.bodies()[0], world.bodies()[1], 1, both});
   world.add_contact_generator(Rod{world.bodies()[0], world.bodies()[2], 2, both});
@@ -157,7 +157,7 @@ TEST_P(ContactGenerator, ARodPullsAndPushes) {
 }
 
 TEST_P(ContactGenerator, ActInTheOrderOfTheirAddition) {
-  World world = world_of({weight({0, -1, 0})});
+  World world = world_with_nail({weight({0, -1, 0})});
   const BodyId a = world.bodies()[0], b = world.bodies()[1];
   const auto mark = [a, b](Real depth) {
     return [a, b, depth](ContactContext& context) {
@@ -181,7 +181,7 @@ TEST_P(ContactGenerator, ActInTheOrderOfTheirAddition) {
 }
 
 TEST_P(ContactGenerator, AreRemovedOnceAndTheirIdsAreNeverReused) {
-  World world = world_of({weight({0, -2, 0})});
+  World world = world_with_nail({weight({0, -2, 0})});
   const Rope rope{world.bodies()[0], world.bodies()[1], 2};
   const ContactGeneratorId first = world.add_contact_generator(rope);
   world.contact_generator<Rope>(first).length = 3;
@@ -203,7 +203,7 @@ TEST_P(ContactGenerator, AreRemovedOnceAndTheirIdsAreNeverReused) {
 TEST_P(ContactGenerator, ABodyHangingAtRestSleepsAndWakesWithTheOtherEnd) {
   BodyDef lower = weight({0, -2, 0}), upper = weight({0, -1, 0});
   lower.can_sleep = upper.can_sleep = true;
-  World world = world_of({upper, lower}, 0.01_r);
+  World world = world_with_nail({upper, lower}, 0.01_r);
   const BodyId a = world.bodies()[0], b = world.bodies()[1], c = world.bodies()[2];
   world.add_contact_generator(Rope{a, b, 1});
   const ContactGeneratorId second = world.add_contact_generator(Rope{b, c, 1});
@@ -223,7 +223,7 @@ TEST_P(ContactGenerator, ABodyHangingAtRestSleepsAndWakesWithTheOtherEnd) {
 }
 
 TEST_P(ContactGenerator, ABadContactUndoesTheStepAndIsNamed) {
-  World world = world_of({weight({0, -2, 0})});
+  World world = world_with_nail({weight({0, -2, 0})});
   const BodyId a = world.bodies()[0], b = world.bodies()[1];
   const GeneratedContact good{.a = a, .b = b, .normal = {0, 1, 0}};
   const auto said = [&](const GeneratedContact& contact) {
@@ -273,7 +273,7 @@ TEST_P(ContactGenerator, ABadContactUndoesTheStepAndIsNamed) {
 }
 
 TEST_P(ContactGenerator, BetweenBodiesOfMassZeroHasNoEffect) {
-  World world = world_of({test::ground()});
+  World world = world_with_nail({test::ground()});
   world.add_contact_generator([](ContactContext& context) {
     context.add({.a = context.bodies()[0], .b = context.bodies()[1], .normal = {0, 1, 0}});
   });

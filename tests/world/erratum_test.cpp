@@ -17,9 +17,8 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::kNan;
 using ::testing::HasSubstr;
-
-constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
 
 // The original clamps the depth of every contact to the epsilon and then picks any of them.
 TEST(Erratum, E06_the_deepest_contact_is_resolved_first) {

@@ -17,6 +17,7 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::heavy;
 
 using Pair = std::pair<std::uint32_t, std::uint32_t>;
 
@@ -31,13 +32,6 @@ Scene three_balls() {
   Scene scene;
   scene.bodies = {test::ball({0, 0, 0}), test::ball({1.9_r, 0, 0}), test::ball({3.8_r, 0, 0})};
   return scene;
-}
-
-BodyDef heavy(const Vec3& position) {
-  BodyDef def = test::ball(position);
-  def.acceleration = {0, -9.81_r, 0};
-  def.can_sleep = true;
-  return def;
 }
 
 constexpr std::uint32_t kLower = 8;  ///< category of the lower ball

@@ -15,10 +15,9 @@ using test::ball_at;
 using test::BuoyancyForce;
 using test::Erratum;
 using test::expect_near;
+using test::kEps;
+using test::kPiD;
 using test::world_of;
-
-constexpr double kEps = static_cast<double>(kEpsilon);
-constexpr double kPiD = 3.14159265358979323846;
 
 JFPX_INSTANTIATE_SOLVERS(Erratum);
 JFPX_INSTANTIATE_SOLVERS(BuoyancyForce);

@@ -10,6 +10,7 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::world_with;
 
 JFPX_SOLVER_SUITE(Kinematic);
 
@@ -31,18 +32,13 @@ BodyDef cube(const Vec3& position) {
   def.can_sleep = false;
   return def;
 }
-World world_of(std::vector<BodyDef> bodies) {
-  Scene scene = test::empty_scene();
-  scene.bodies = std::move(bodies);
-  return World(scene);
-}
 
 TEST_P(Kinematic, MovesByItsVelocitiesAlone) {
   BodyDef def = kinematic(Sphere{1}, {1, 2, 3}, {0.5_r, 0, -1});
   def.angular_velocity = {0, 0, 1};
   def.acceleration = {9, 9, 9};
   def.linear_damping = def.angular_damping = 0.1_r;
-  World world = world_of({def});
+  World world = world_with({def});
   const BodyId id = world.bodies()[0];
   world.apply_force(id, {9, 9, 9});
   world.apply_torque(id, {9, 9, 9});
@@ -62,7 +58,7 @@ TEST_P(Kinematic, IsNeverPushedHoweverHeavyTheOther) {
   const BodyDef pusher = kinematic(Sphere{1}, {0, 0, 0}, {1, 0, 0});
   BodyDef truck = test::ball({3, 0, 0}, 1, 1e6_r);
   truck.velocity = {-5, 0, 0};
-  World alone = world_of({pusher}), hit = world_of({pusher, truck});
+  World alone = world_with({pusher}), hit = world_with({pusher, truck});
   bool touched = false;
   for (int n = 0; n < 60; ++n) {
     alone.step();
@@ -80,7 +76,7 @@ TEST_P(Kinematic, PushesToItsOwnSpeedAndThrowsWithRestitution) {
       BodyDef pusher = kinematic(shape, {0, 0, 0}, {2, 0, 0});
       BodyDef ball = test::ball({2.01_r, 0, 0});
       pusher.restitution = ball.restitution = e;
-      World world = world_of({pusher, ball});
+      World world = world_with({pusher, ball});
       for (int n = 0; n < 30; ++n) world.step();
       EXPECT_NEAR(world.states()[1].velocity.x, 2 * (1 + e), 0.011) << e;
     }
@@ -88,7 +84,7 @@ TEST_P(Kinematic, PushesToItsOwnSpeedAndThrowsWithRestitution) {
 }
 
 TEST_P(Kinematic, AnElevatorLiftsABodyOnIt) {
-  World world = world_of({platform({0, 0.5_r, 0}), cube({0, 0.5_r, 0}), cube({0, 1.5_r, 0})});
+  World world = world_with({platform({0, 0.5_r, 0}), cube({0, 0.5_r, 0}), cube({0, 1.5_r, 0})});
   for (int n = 0; n < 240; ++n) world.step();
   const auto states = world.states();
   EXPECT_NEAR(states[0].position.y, -1 + 2, 1e-3);
@@ -98,7 +94,7 @@ TEST_P(Kinematic, AnElevatorLiftsABodyOnIt) {
 }
 
 TEST_P(Kinematic, AConveyorDragsByFriction) {
-  World world = world_of({platform({2, 0, 0}), cube({0, 0.5_r, 0})});
+  World world = world_with({platform({2, 0, 0}), cube({0, 0.5_r, 0})});
   // Friction 0.5 accelerates with g/2: at speed 2 after 0.41 s.
   for (int n = 0; n < 12; ++n) world.step();
   EXPECT_NEAR(world.states()[1].velocity.x, 0.5 * 9.81 * 0.2, 0.1);
@@ -112,7 +108,7 @@ TEST_P(Kinematic, ATurntableCarriesABoxAround) {
   BodyDef passenger = cube({1, 0.5_r, 0});
   passenger.velocity = {0, 0, -1};
   passenger.angular_velocity = {0, 1, 0};
-  World world = world_of({table, passenger});
+  World world = world_with({table, passenger});
   for (int n = 0; n < 60; ++n) world.step();  // 1 rad from x towards -z
   const Vec3 at = world.states()[1].position;
   EXPECT_NEAR(std::atan2(-at.z, at.x), 1, 0.05);
@@ -126,7 +122,7 @@ TEST_P(Kinematic, ABodyThatItCarriesSlowlyStaysAwakeUntilItStops) {
     bodies.push_back(cube({0, 0.5_r + static_cast<Real>(i), 0}));
     bodies.back().can_sleep = true;
   }
-  World world = world_of(bodies);
+  World world = world_with(bodies);
   for (int n = 0; n < 60; ++n) world.step();
   for (int n = 0; n < 240; ++n) {
     ASSERT_EQ(world.step().awake, 3u) << n;
@@ -153,7 +149,7 @@ TEST_P(Kinematic, ABodyThatItCarriesSlowlyStaysAwakeUntilItStops) {
 TEST_P(Kinematic, WakesASleepingBodyThatItHits) {
   BodyDef sleeper = test::ball({5, 0, 0});
   sleeper.can_sleep = true;
-  World world = world_of({kinematic(Box{{1, 1, 1}}, {0, 0, 0}, {2, 0, 0}), sleeper});
+  World world = world_with({kinematic(Box{{1, 1, 1}}, {0, 0, 0}, {2, 0, 0}), sleeper});
   const BodyId id = world.bodies()[1];
   for (int n = 0; n < 85; ++n) world.step();
   ASSERT_FALSE(world.awake(id));
@@ -165,7 +161,7 @@ TEST_P(Kinematic, WakesASleepingBodyThatItHits) {
 TEST_P(Kinematic, ASpringFromItWakesTheBodyAtItsOtherEnd) {
   BodyDef sleeper = test::ball({5, 0, 0});
   sleeper.can_sleep = true;
-  World world = world_of({kinematic(Sphere{1}, {0, 0, 0}, {}), sleeper});
+  World world = world_with({kinematic(Sphere{1}, {0, 0, 0}, {}), sleeper});
   const BodyId puller = world.bodies()[0], pulled = world.bodies()[1];
   world.add_force(Spring{.a = {puller}, .b = {pulled}, .stiffness = 5, .rest_length = 5});
   for (int n = 0; n < 120; ++n) world.step();
@@ -176,14 +172,14 @@ TEST_P(Kinematic, ASpringFromItWakesTheBodyAtItsOtherEnd) {
 }
 
 TEST_P(Kinematic, PassesThroughImmovableBodies) {
-  World world = world_of({kinematic(Sphere{1}, {0, 3, 0}, {0, -2, 0}),
-                          kinematic(Box{{1, 1, 1}}, {0, -3, 0}, {0, 2, 0}), test::ground()});
+  World world = world_with({kinematic(Sphere{1}, {0, 3, 0}, {0, -2, 0}),
+                            kinematic(Box{{1, 1, 1}}, {0, -3, 0}, {0, 2, 0}), test::ground()});
   for (int n = 0; n < 120; ++n) EXPECT_EQ(world.step().contacts, 0u);
   EXPECT_NEAR(world.states()[0].position.y, -1, 1e-3);
 }
 
 TEST_P(Kinematic, AFailedStepRestoresItsState) {
-  World world = world_of({kinematic(Sphere{1}, {0.99e9_r, 0, 0}, {9e7_r, 0, 0})});
+  World world = world_with({kinematic(Sphere{1}, {0.99e9_r, 0, 0}, {9e7_r, 0, 0})});
   const auto before = world.states();
   StepReport report;
   for (int n = 0; n < 60 && !report.non_finite; ++n) report = world.step();

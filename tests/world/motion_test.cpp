@@ -9,8 +9,7 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
-
-constexpr double kG = 9.81;
+using test::kG;
 
 JFPX_SOLVER_SUITE(Motion);
 

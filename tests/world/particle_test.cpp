@@ -13,9 +13,10 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::kEps;
+using test::kNan;
 using ::testing::HasSubstr;
 
-constexpr double kEps = std::numeric_limits<Real>::epsilon();
 constexpr HalfSpace kGround{{0, 1, 0}, 0};
 
 /// A particle without gravity.
@@ -316,7 +317,6 @@ TEST(Particle, BadFieldsAreNamedWithValueAndRange) {
     }
     return "nothing";
   };
-  constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
   constexpr Real kInf = std::numeric_limits<Real>::infinity();
   const auto mass = [&](Real m) { return complaint([m](ParticleDef* d) { d->mass = m; }); };
   EXPECT_THAT(mass(-1), HasSubstr("mass is -1; it must be finite and >= 0"));

@@ -16,17 +16,12 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
-
-constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
+using test::kInfinity;
+using test::kNan;
+using test::world_with;
 
 JFPX_SOLVER_SUITE(Property);
 
-World world_of(std::vector<BodyDef> bodies) {
-  Scene scene = test::empty_scene();
-  scene.bodies = std::move(bodies);
-  return World(scene);
-}
 BodyDef resting_box(const Vec3& position) {
   BodyDef def;
   def.shape = Box{{0.5_r, 0.5_r, 0.5_r}};
@@ -53,7 +48,7 @@ TEST_P(Property, IsThatOfTheDefinition) {
   def.angular_damping = 0.125_r;
   def.user_data = 0xfedcba9876543210u;
   def.inertia = Mat3{{{3, 0.5_r, 0}, {0.5_r, 3, 0}, {0, 0, 4}}};
-  World world = world_of({def, test::ball({9, 0, 0}, 1, 5), test::ground()});
+  World world = world_with({def, test::ball({9, 0, 0}, 1, 5), test::ground()});
   const BodyId id = world.bodies()[0], ball = world.bodies()[1], ground = world.bodies()[2];
   EXPECT_EQ(world.friction(id), 0.75_r);
   EXPECT_EQ(world.restitution(id), 0.25_r);
@@ -114,7 +109,7 @@ TEST_P(Property, ThatIsSetGivesTheBitsOfABodyDefinedWithIt) {
 }
 
 TEST_P(Property, MassAndInertiaDivideForceAndTorque) {
-  World world = world_of({test::ball({0, 0, 0}, 1, 2)});
+  World world = world_with({test::ball({0, 0, 0}, 1, 2)});
   const BodyId id = world.bodies()[0];
   const Real dt = world.scene().dt;
   world.set_mass(id, 8);
@@ -145,7 +140,7 @@ TEST_P(Property, MassesDecideACollision) {
   BodyDef left = test::ball({-1.01_r, 0, 0}), right = test::ball({1.01_r, 0, 0});
   left.velocity = {3, 0, 0};
   left.restitution = right.restitution = 1;
-  World world = world_of({left, right});
+  World world = world_with({left, right});
   world.set_mass(world.bodies()[0], 2);
   world.set_mass(world.bodies()[1], 4);
   for (int n = 0; n < 10; ++n) world.step();
@@ -176,7 +171,7 @@ TEST_P(Property, DampingKeepsAFractionPerSecond) {
 TEST_P(Property, RestitutionDecidesTheBounce) {
   BodyDef ball = test::ball({0, 1.01_r, 0});
   ball.velocity = {0, -4, 0};
-  World world = world_of({ball, test::ground()});
+  World world = world_with({ball, test::ground()});
   for (const BodyId id : world.bodies()) world.set_restitution(id, 0.5_r);
   for (int n = 0; n < 10; ++n) world.step();
   EXPECT_NEAR(world.states()[0].velocity.y, 2, 1e-4);
@@ -188,7 +183,7 @@ TEST_P(Property, FrictionOfTheGroundLetsASleepingBoxSlide) {
   const Vec3 normal{std::sin(slope), std::cos(slope), 0};
   box.position = normal * 0.499_r;
   box.orientation = normalized(Quat{std::cos(slope / 2), 0, 0, -std::sin(slope / 2)});
-  World world = world_of({box, test::half_space(normal, 0)});
+  World world = world_with({box, test::half_space(normal, 0)});
   const BodyId id = world.bodies()[0], ground = world.bodies()[1];
   for (int n = 0; n < 400; ++n) world.step();
   ASSERT_FALSE(world.awake(id));
@@ -205,7 +200,7 @@ TEST_P(Property, FrictionOfTheGroundLetsASleepingBoxSlide) {
 TEST_P(Property, AccelerationWakesTheBody) {
   BodyDef def = test::ball({0, 0, 0});
   def.can_sleep = true;
-  World world = world_of({def});
+  World world = world_with({def});
   const BodyId id = world.bodies()[0];
   for (int n = 0; n < 120; ++n) world.step();
   ASSERT_FALSE(world.awake(id));
@@ -239,7 +234,7 @@ TEST_P(Property, OfAnImmovableBodyStaysThatOfAnImmovableBody) {
   BodyDef lift = test::ball({0, 0, 0}, 1, 0);
   lift.kinematic = true;
   lift.velocity = {0, 1, 0};
-  World world = world_of({lift, test::ground()});
+  World world = world_with({lift, test::ground()});
   for (const BodyId id : world.bodies()) {
     world.set_mass(id, 0);
     world.set_inertia(id, diagonal({1, 1, 1}));
@@ -256,7 +251,7 @@ TEST_P(Property, OfAnImmovableBodyStaysThatOfAnImmovableBody) {
 }
 
 TEST_P(Property, OutOfRangeIsAnErrorThatNamesValueAndRangeAndChangesNothing) {
-  World world = world_of({resting_box({0, 0, 0})});
+  World world = world_with({resting_box({0, 0, 0})});
   const BodyId id = world.bodies()[0];
   const Mat3 inertia = world.inertia(id);
   EXPECT_EQ(complaint([&] { world.set_mass(id, 0); }),
@@ -298,7 +293,7 @@ TEST_P(Property, AMassWhoseSolidHasNoFiniteInertiaNeedsAGivenInertia) {
   const Real tiny = square_root(std::numeric_limits<Real>::min());
   BodyDef def = test::ball({0, 0, 0}, tiny, 1e6_r);
   def.inertia = Mat3{};
-  World world = world_of({def});
+  World world = world_with({def});
   const BodyId id = world.bodies()[0];
   world.set_mass(id, std::numeric_limits<Real>::min());
   EXPECT_EQ(complaint([&] { world.set_inertia(id, std::nullopt); }).find("moment of inertia is "),
@@ -310,7 +305,7 @@ TEST_P(Property, OfARemovedBodyIsAnErrorAndNotInherited) {
   BodyDef def = test::ball({0, 0, 0});
   def.user_data = 5;
   def.inertia = diagonal({2, 2, 2});
-  World world = world_of({def});
+  World world = world_with({def});
   const BodyId gone = world.bodies()[0];
   world.remove(gone);
   const BodyId fresh = world.add(test::ball({0, 0, 0}));

@@ -14,10 +14,9 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::kInfinity;
+using test::kNan;
 using ::testing::ElementsAre;
-
-constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
 using Point = std::array<double, 3>;
 Point to_double(const Vec3& v) {

@@ -11,8 +11,6 @@ inline namespace JFPX_ABI {
 namespace test {
 namespace {
 
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
-
 Real random_sign(Random* random) { return random->below(2) == 0 ? Real(1) : Real(-1); }
 
 /// 10 to a random power.

@@ -12,6 +12,7 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::on_the_ground;
 
 JFPX_SOLVER_SUITE(Rest);
 JFPX_SOLVER_SUITE(Sleep);
@@ -22,13 +23,6 @@ BodyDef heavy(const Vec3& position, bool can_sleep, Real radius = 1) {
   def.friction = 0.4_r;
   def.can_sleep = can_sleep;
   return def;
-}
-
-Scene on_the_ground(std::vector<BodyDef> bodies) {
-  Scene scene = test::empty_scene();
-  scene.bodies = std::move(bodies);
-  scene.bodies.push_back(test::ground());
-  return scene;
 }
 
 TEST_P(Rest, ABallOnTheGroundNeitherSinksNorJitters) {

@@ -11,17 +11,12 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::heavy;
 
 JFPX_SOLVER_SUITE(Sensor);
 
 BodyDef sensor(BodyDef def) {
   def.sensor = true;
-  return def;
-}
-BodyDef heavy(const Vec3& position) {
-  BodyDef def = test::ball(position);
-  def.acceleration = {0, -9.81_r, 0};
-  def.can_sleep = true;
   return def;
 }
 /// A sensor box with half extents of 1 m that moves with constant velocity.

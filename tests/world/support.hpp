@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <limits>
 #include <random>
 #include <string>
 
@@ -19,6 +20,12 @@ namespace test {
 
 /// A Real from a decimal literal.
 constexpr Real operator""_r(long double value) { return static_cast<Real>(value); }
+
+inline constexpr Real kNan = std::numeric_limits<Real>::quiet_NaN();
+inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
+inline constexpr double kEps = static_cast<double>(kEpsilon);
+inline constexpr double kPiD = 3.14159265358979323846;
+inline constexpr double kG = 9.81;  ///< [m/s^2]
 
 /// A seed that differs in every run, or that of JFPX_TEST_SEED. Report it with SCOPED_TRACE.
 inline std::uint64_t fresh_seed() {
@@ -72,6 +79,13 @@ inline BodyDef ball(const Vec3& position, Real radius = 1, Real mass = 1) {
   def.can_sleep = false;
   return def;
 }
+/// A ball that falls and can sleep.
+inline BodyDef heavy(const Vec3& position) {
+  BodyDef def = ball(position);
+  def.acceleration = {0, Real(-9.81), 0};
+  def.can_sleep = true;
+  return def;
+}
 inline BodyDef half_space(const Vec3& normal, Real offset) {
   BodyDef def;
   def.shape = HalfSpace{normal, offset};
@@ -79,6 +93,16 @@ inline BodyDef half_space(const Vec3& normal, Real offset) {
   return def;
 }
 inline BodyDef ground() { return half_space({0, 1, 0}, 0); }
+inline Scene scene_of(std::vector<BodyDef> bodies) {
+  Scene scene = empty_scene();
+  scene.bodies = std::move(bodies);
+  return scene;
+}
+inline World world_with(std::vector<BodyDef> bodies) { return World(scene_of(std::move(bodies))); }
+inline Scene on_the_ground(std::vector<BodyDef> bodies) {
+  bodies.push_back(ground());
+  return scene_of(std::move(bodies));
+}
 
 /// Expects that a stack of ten bodies like the lowest moves less than a millimetre in ten seconds.
 /// With soft contacts it first sinks until the overlaps carry the weight, by three centimetres at

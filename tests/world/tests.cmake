@@ -6,12 +6,16 @@ jfpx_add_test(world_parts_test INTERNAL SOURCES
   world/indexed_priority_queue_test.cpp
   world/neighbor_list_test.cpp
   world/query_tree_test.cpp)
-jfpx_add_test(automatic_device_test INTERNAL SOURCES world/automatic_device_test.cpp)
 jfpx_add_test(device_world_test INTERNAL SOURCES world/device_world_test.cpp)
 if(JFPX_HAS_CUDA)
   set(cuda_runtime CUDA::cudart_static)
 endif()
-jfpx_add_test(device_states_test INTERNAL SOURCES world/device_states_test.cpp LINK ${cuda_runtime})
+# Compiling the programs of the device for the host takes most of the time, so these two share them.
+jfpx_add_test(device_states_test INTERNAL
+  SOURCES
+    world/automatic_device_test.cpp
+    world/device_states_test.cpp
+  LINK ${cuda_runtime})
 foreach(target IN ITEMS device_states_test device_states_test_f64)
   if(TARGET ${target}) # not in shared libraries, nor in one precision
     target_compile_definitions(${target} PRIVATE JFPX_HAS_CUDA=$<BOOL:${JFPX_HAS_CUDA}>)

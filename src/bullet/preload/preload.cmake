@@ -25,6 +25,7 @@ foreach(suffix IN ITEMS "" "_f64")
   add_library(${engine} MODULE
     preload/preload_engine.cpp preload/preload_options.cpp preload/preload_solver.cpp)
   _jfpx_configure(${engine} "${suffix}" "" "jfpx_bullet")
+  set_target_properties(${engine} PROPERTIES UNITY_BUILD OFF) # its sources have the same private names
   target_link_options(${engine} PRIVATE LINKER:--exclude-libs,ALL)
   # Reports a symbol that no shared library exports here instead of in the user's program.
   if(NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
