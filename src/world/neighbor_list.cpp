@@ -15,7 +15,7 @@ namespace {
 
 /// Fewer spheres are tested pair by pair in about the same time.
 constexpr std::size_t kFewest = 512;
-constexpr std::size_t kSpheresPerChunk = 4096, kPairsPerChunk = 4096;
+constexpr std::size_t kSpheresPerChunk = 4096, kNearPairsPerChunk = 4096;
 /// The slack is the motion of about this number of searches, within these parts of the smallest
 /// radius. More slack means more pairs to test in every search (bench/results/soft_step.md).
 constexpr Real kSearches = 10, kLeast = Real(0.02), kMost = Real(0.15);
@@ -88,9 +88,9 @@ std::span<const SpherePair> NeighborList::select(std::span<const SphereInstance>
                                                  ThreadPool* pool) {
   selected_.reserve(pairs_.size(), "pairs of spheres");
   const auto for_each_selected = [&](std::size_t chunk, const auto& visit) {
-    const std::size_t begin = chunk * kPairsPerChunk;
-    const auto part = pairs_.subspan(begin, std::min(kPairsPerChunk, pairs_.size() - begin));
-    std::array<std::uint32_t, kPairsPerChunk> found;
+    const std::size_t begin = chunk * kNearPairsPerChunk;
+    const auto part = pairs_.subspan(begin, std::min(kNearPairsPerChunk, pairs_.size() - begin));
+    std::array<std::uint32_t, kNearPairsPerChunk> found;
     const std::size_t count =
         cpu::find_candidates(spheres.data(), part.data(), part.size(), found.data());
     for (std::size_t k = 0; k < count; ++k) {
@@ -98,7 +98,7 @@ std::span<const SpherePair> NeighborList::select(std::span<const SphereInstance>
       if (detail::test_sphere_pair(spheres[pair.a], spheres[pair.b]).touching != 0) visit(pair);
     }
   };
-  const std::size_t chunks = (pairs_.size() + kPairsPerChunk - 1) / kPairsPerChunk;
+  const std::size_t chunks = (pairs_.size() + kNearPairsPerChunk - 1) / kNearPairsPerChunk;
   if (pool == nullptr || pool->threads() == 1) {
     SpherePair* next = selected_.data();
     for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
