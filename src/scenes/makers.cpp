@@ -41,10 +41,10 @@ void add_ground(Scene& scene) {
 }
 
 void add_balls(Scene& scene, std::uint32_t count, const Vec3& target) {
-  constexpr Real kRadius = Real(0.3), kSpeed = 20;
+  constexpr Real kBallRadius = Real(0.3), kSpeed = 20;
   for (std::uint32_t i = 0; i < count; ++i) {
     const Real time = static_cast<Real>(i + 1);
-    BodyDef ball = sphere_at(target - Vec3{0, 0, kSpeed * time + kRadius}, kRadius, 50);
+    BodyDef ball = sphere_at(target - Vec3{0, 0, kSpeed * time + kBallRadius}, kBallRadius, 50);
     ball.velocity = {0, ball.acceleration.y * time * Real(-0.5), kSpeed};
     scene.bodies.push_back(ball);
   }

@@ -45,8 +45,8 @@ void BodyStore::serialize_body(Archive& archive, Self& self, std::uint32_t i) {
 
 void BodyStore::write(BinaryWriter* writer) const {
   BinaryWriter& write = *writer;
-  write(generation_, free_, std::uint64_t{ids_.size()});
-  for (const BodyId id : ids_) {
+  write(pool_.generations(), pool_.unused(), std::uint64_t{size()});
+  for (const BodyId id : ids()) {
     write(id.index);
     serialize_body(write, *this, id.index);
   }
@@ -64,25 +64,26 @@ std::vector<bool> BodyStore::read_slots(BinaryReader* reader) {
   const auto generation = reader->get<std::vector<std::uint32_t>>();
   validate_body_count(generation.size());
   resize_slots(generation.size());
-  generation_ = generation;
-  const auto free = reader->get<std::vector<std::uint32_t>>();
-  std::vector<bool> is_free(capacity());
-  for (const std::uint32_t slot : free) {
-    BinaryReader::require(slot < capacity() && !is_free[slot], "its list of unused ids is invalid");
+  const auto unused = reader->get<std::vector<std::uint32_t>>();
+  std::vector<bool> is_free(generation.size());
+  for (const std::uint32_t slot : unused) {
+    BinaryReader::require(slot < is_free.size() && !is_free[slot],
+                          "its list of unused ids is invalid");
     is_free[slot] = true;
-    free_.push_back(slot);  // keeps the memory that resize_slots() has reserved
   }
+  pool_.assign(generation, unused);
   return is_free;
 }
 
 void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_free) {
   for (std::size_t left = reader->count(kLeastBodySize); left > 0; --left) {
     const auto i = reader->get<std::uint32_t>();
-    BinaryReader::require(i < capacity() && !is_free[i] && (ids_.empty() || ids_.back().index < i),
-                          "its list of bodies is invalid");
+    BinaryReader::require(
+        i < capacity() && !is_free[i] && (ids().empty() || ids().back().index < i),
+        "its list of bodies is invalid");
     serialize_body(*reader, *this, i);
     check_body(i);
-    ids_.push_back(id(i));
+    pool_.use(i);
     set_shape(i, std::move(shape_[i]));
     inverse_mass_[i] = mass_[i] > 0 ? Real(1) / mass_[i] : Real(0);
     inertia_given(i) ? set_tensor(i, inertia_[i]) : compute_inertia(i, std::nullopt);

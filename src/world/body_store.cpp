@@ -63,8 +63,6 @@ Real extent_of(const Shape& shape) {
   return extent;
 }
 
-bool before(BodyId a, BodyId b) { return a.index < b.index; }
-
 }  // namespace
 
 BodyStore::BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps)
@@ -73,8 +71,7 @@ BodyStore::BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps
       sleep_(sleep),
       motion_kept_(kept_per_step(sleep.bias, dt)) {}
 
-/// Calls visit(array) for the arrays that have an item per slot. generation_, whose size is
-/// capacity(), is the last.
+/// Calls visit(array) for the arrays that have an item per slot.
 template <class Visit>
 void BodyStore::for_each_array(const Visit& visit) {
   const auto all = [&visit](auto&... arrays) { (visit(arrays), ...); };
@@ -84,27 +81,22 @@ void BodyStore::for_each_array(const Visit& visit) {
   all(shape_, radius_, extent_, mass_, inverse_mass_, friction_, restitution_, rolling_friction_,
       spinning_friction_, inertia_, body_inverse_inertia_, tensor_, acceleration_, linear_damping_,
       angular_damping_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_, sensor_,
-      inertia_given_, user_data_, filter_, generation_);
+      inertia_given_, user_data_, filter_);
 }
 
 void BodyStore::reserve(std::size_t bodies) {
-  free_.reserve(bodies);
-  ids_.reserve(bodies);
+  pool_.reserve(bodies);
   for_each_array([bodies](auto& array) { array.reserve(bodies); });
 }
 
-/// If an allocation fails, capacity() is unchanged, because generation_ grows last. Reserves memory
-/// for free_ and ids_, so that remove() and the rest of add() do not allocate.
 void BodyStore::resize_slots(std::size_t slots) {
-  reserve_geometric(&free_, slots);
-  reserve_geometric(&ids_, slots);
   for_each_array([slots](auto& array) { array.resize(slots); });
 }
 
-/// Adds an unused slot.
+/// Adds an unused slot. If an allocation fails, capacity() is unchanged, because the pool is last.
 void BodyStore::add_slot() {
   resize_slots(capacity() + 1);
-  free_.push_back(static_cast<std::uint32_t>(capacity() - 1));
+  pool_.add_slot();
 }
 
 void BodyStore::set_shape(std::uint32_t i, Shape shape) noexcept {
@@ -122,11 +114,9 @@ void BodyStore::count_body(std::uint32_t i) noexcept {
 
 BodyId BodyStore::add(const BodyDef& def) {
   Shape shape = normalized(def.shape);  // may throw, hence before any change
-  if (free_.empty()) add_slot();
-  const std::uint32_t i = free_.back();
-  const BodyId id{i, generation_[i]};
-  ids_.insert(std::upper_bound(ids_.begin(), ids_.end(), id, before), id);
-  free_.pop_back();
+  if (pool_.is_full()) add_slot();
+  const BodyId id = pool_.add();
+  const std::uint32_t i = id.index;
 
   set_shape(i, std::move(shape));
   friction_[i] = def.friction;
@@ -190,25 +180,13 @@ void BodyStore::set_damping(std::uint32_t i, Real linear, Real angular) {
 }
 
 void BodyStore::remove(BodyId id) noexcept {
-  // Ids are never reused, so the slot is not reused after its last generation.
-  if (generation_[id.index] + 1 != 0) free_.push_back(id.index);
-  ++generation_[id.index];
-  ids_.erase(std::lower_bound(ids_.begin(), ids_.end(), id, before));
+  pool_.remove(id);
   if (movable(id.index)) --movable_count_;
   if (kinematic(id.index)) --kinematic_count_;
   if (sensor(id.index)) --sensor_count_;
   moving.awake[id.index] = 0;
   ignored_.erase_body(id.index);
   set_filter(id.index, {});
-}
-
-bool BodyStore::contains(BodyId id) const noexcept {
-  const auto found = std::lower_bound(ids_.begin(), ids_.end(), id, before);
-  return found != ids_.end() && *found == id;
-}
-
-bool BodyStore::lives(std::uint32_t body) const noexcept {
-  return body < capacity() && contains(id(body));
 }
 
 std::uint32_t BodyStore::require(BodyId id) const {
@@ -296,13 +274,13 @@ void BodyStore::keep_awake(std::uint32_t i) {
 }
 
 bool BodyStore::has_moving_kinematic_body() const {
-  return kinematic_count_ > 0 && std::ranges::any_of(ids_, [this](BodyId id) {
+  return kinematic_count_ > 0 && std::ranges::any_of(ids(), [this](BodyId id) {
            return kinematic(id.index) && moving.awake[id.index] != 0;
          });
 }
 
 void BodyStore::integrate() {
-  for (const BodyId id : ids_) {
+  for (const BodyId id : ids()) {
     if (moving.awake[id.index] != 0) {
       kinematic(id.index) ? move(id.index) : integrate(id.index);
     }
@@ -375,8 +353,8 @@ BodyView BodyStore::view() const {
           .ignored = ignored_.keys().data(),
           .ignored_count = static_cast<std::uint32_t>(ignored_.keys().size()),
           .filters_in_use = filters_in_use_,
-          .ids = ids_.data(),
-          .count = static_cast<std::uint32_t>(ids_.size()),
+          .ids = ids().data(),
+          .count = static_cast<std::uint32_t>(size()),
           .capacity = static_cast<std::uint32_t>(capacity()),
           .dt = dt_,
           .substep = substep_,

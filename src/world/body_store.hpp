@@ -4,6 +4,7 @@
 #include <jfpx/scene.hpp>
 
 #include "src/world/body_view.hpp"
+#include "src/world/id_pool.hpp"
 #include "src/world/ignored_pairs.hpp"
 
 #include <cstdint>
@@ -36,8 +37,7 @@ struct MotionArrays {
 };
 
 /// Owns the bodies and their ids, and integrates their free motion. The arrays have unused slots,
-/// so loops over the bodies iterate over ids(), which is sorted by index. The slot of a removed
-/// body is reused with a new generation.
+/// so loops over the bodies iterate over ids(), which is sorted by index.
 class BodyStore {
  public:
   /// @param dt       [s], length of a step
@@ -51,14 +51,16 @@ class BodyStore {
   BodyId add(const BodyDef& def);
   /// @param id of a body in the store
   void remove(BodyId id) noexcept;
-  bool contains(BodyId id) const noexcept;
+  bool contains(BodyId id) const noexcept { return pool_.contains(id); }
   /// Returns the index of a body in the store. @throws InvalidArgument for an unknown id
   std::uint32_t require(BodyId id) const;
-  std::span<const BodyId> ids() const noexcept { return ids_; }
+  std::span<const BodyId> ids() const noexcept { return pool_.ids(); }
+  /// Number of bodies.
+  std::size_t size() const noexcept { return pool_.size(); }
   /// The id of the body that currently has the index.
-  BodyId id(std::uint32_t body) const { return {body, generation_[body]}; }
+  BodyId id(std::uint32_t body) const { return pool_.id(body); }
   /// Number of slots; all indices are below it.
-  std::size_t capacity() const noexcept { return generation_.size(); }
+  std::size_t capacity() const noexcept { return pool_.capacity(); }
   std::uint32_t movable_count() const noexcept { return movable_count_; }
 
   /// Writes all bodies, the ids, and the ignored pairs.
@@ -67,7 +69,7 @@ class BodyStore {
   /// @throws InvalidSnapshot; InvalidScene for a body that add() must not receive; std::bad_alloc
   void read(BinaryReader* reader);
   /// Whether a body has the index.
-  bool lives(std::uint32_t body) const noexcept;
+  bool lives(std::uint32_t body) const noexcept { return pool_.is_used(body); }
 
   BodyState state(std::uint32_t body) const;
   /// Replaces position, orientation and velocities. Wakes a movable body; makes a kinematic body
@@ -183,14 +185,12 @@ class BodyStore {
   std::vector<std::uint8_t> can_sleep_, kinematic_, sensor_, inertia_given_;
   std::vector<std::uint64_t> user_data_;
   std::vector<CollisionFilter> filter_;  ///< the default in unused slots
-  std::vector<std::uint32_t> generation_;
 
   IgnoredPairs ignored_;
   std::uint32_t filtered_count_ = 0;  ///< number of bodies whose filter is not the default
   bool filters_in_use_ = false;       ///< whether may_collide() may return false
 
-  std::vector<BodyId> ids_;          ///< sorted by index
-  std::vector<std::uint32_t> free_;  ///< indices of unused slots
+  IdPool<BodyId> pool_;
   std::uint32_t movable_count_ = 0, kinematic_count_ = 0, sensor_count_ = 0;
 };
 

@@ -61,12 +61,11 @@ void ContactFinder::sweep_bounds(const BodyStore& bodies, Real margin, ThreadPoo
            .margins = margins_.data(),
            .swept = swept_.data(),
            .largest_margin = margin * Real(0.5)};
-  parallel_for(pool, bodies.ids().size(), kSubShapesPerChunk,
-               [&](std::size_t first, std::size_t last) {
-                 for (const BodyId id : bodies.ids().subspan(first, last - first)) {
-                   motion_[id.index] = near_.bodies.predicted_motion(id.index);
-                 }
-               });
+  parallel_for(pool, bodies.size(), kSubShapesPerChunk, [&](std::size_t first, std::size_t last) {
+    for (const BodyId id : bodies.ids().subspan(first, last - first)) {
+      motion_[id.index] = near_.bodies.predicted_motion(id.index);
+    }
+  });
   parallel_for(pool, swept_.size(), kSubShapesPerChunk, [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<SubShape>(first); i < last; ++i) near_.sweep(i);
   });

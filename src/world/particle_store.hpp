@@ -3,6 +3,8 @@
 
 #include <jfpx/particle.hpp>
 
+#include "src/world/id_pool.hpp"
+
 #include <span>
 #include <vector>
 
@@ -16,8 +18,7 @@ struct ParticleMotion {
   std::vector<Vec3> force;     ///< [N], for the next step
 };
 
-/// Owns the particles, their ids and their free motion. The slot of a removed particle is reused
-/// with a new generation. Loops visit ids(), in the order of indices.
+/// Owns the particles, their ids and their free motion. Loops visit ids(), in the order of indices.
 class ParticleStore {
  public:
   explicit ParticleStore(Real dt) : dt_(dt) {}
@@ -26,11 +27,11 @@ class ParticleStore {
   /// @throws std::bad_alloc without a change
   ParticleId add(const ParticleDef& def);
   /// @param id must be contained
-  void remove(ParticleId id) noexcept;
-  bool contains(ParticleId id) const noexcept;
-  std::span<const ParticleId> ids() const noexcept { return ids_; }
+  void remove(ParticleId id) noexcept { pool_.remove(id); }
+  bool contains(ParticleId id) const noexcept { return pool_.contains(id); }
+  std::span<const ParticleId> ids() const noexcept { return pool_.ids(); }
   /// Number of slots ever used; upper bound of all indices.
-  std::size_t capacity() const noexcept { return generation_.size(); }
+  std::size_t capacity() const noexcept { return pool_.capacity(); }
 
   /// Replaces position and velocity; an immovable particle stays at rest.
   void set_state(std::uint32_t particle, const ParticleState& state);
@@ -53,9 +54,7 @@ class ParticleStore {
   std::vector<Vec3> acceleration_, velocity_gain_;
   std::vector<Real> inverse_mass_, radius_, restitution_;
   std::vector<Real> kept_;  ///< damping^dt
-  std::vector<std::uint32_t> generation_;
-  std::vector<ParticleId> ids_;
-  std::vector<std::uint32_t> free_;
+  IdPool<ParticleId> pool_;
 };
 
 }  // namespace JFPX_ABI

@@ -10,14 +10,14 @@ inline namespace JFPX_ABI {
 namespace {
 
 /// Exceeds the rounding errors of the pair tests, so that bounds never exclude a contact.
-constexpr Real kMargin = 1 + 64 * kEpsilon;
+constexpr Real kBoundsMargin = 1 + 64 * kEpsilon;
 
 Real bounding_radius(const Sphere& sphere) { return sphere.radius; }
 Real bounding_radius(const Box& box) {
   constexpr Real kUnderflowLimit = Real(1e-15);  // below it, squares of floats are inexact or 0
   const Vec3& h = box.half_extents;
   const Real largest = std::max({h.x, h.y, h.z});
-  return largest < kUnderflowLimit ? 2 * largest : length(h) * kMargin;
+  return largest < kUnderflowLimit ? 2 * largest : length(h) * kBoundsMargin;
 }
 
 /// Calls visit(sub_shape, part or null, index of the part) for each sub-shape of type T in the
@@ -44,7 +44,7 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
   part_.clear();
   local_.clear();
   kinematic_.clear();
-  const std::size_t least = bodies.ids().size();  // exact without compounds
+  const std::size_t least = bodies.size();  // exact without compounds
   body_.reserve(least);
   number_.reserve(least);
   bounds_.reserve(least);

@@ -283,7 +283,7 @@ StepReport World::step() {
     w.is_saved = false;
     if (!w.steps_on_device) w.save_for_undo();
   } catch (const std::bad_alloc&) {
-    throw OutOfMemory(no_memory_for("a step", w.store.ids().size()));
+    throw OutOfMemory(no_memory_for("a step", w.store.size()));
   }
   w.contacts_are_new = false;
   w.query_tree.invalidate();
@@ -298,8 +298,7 @@ StepReport World::step() {
     }
   } catch (const std::bad_alloc&) {
     w.undo();
-    throw OutOfMemory(no_memory_for("a step", w.store.ids().size()) +
-                      ", and more for their contacts");
+    throw OutOfMemory(no_memory_for("a step", w.store.size()) + ", and more for their contacts");
   } catch (...) {
     w.undo();
     throw;

@@ -19,7 +19,7 @@ void require_finite(const char* name, const Vec3& value) {
 }  // namespace
 
 BodyId World::add(const BodyDef& body) {
-  const std::uint64_t number = impl_->store.ids().size();
+  const std::uint64_t number = impl_->store.size();
   validate_body_count(number + 1);
   validate_body(body, number);
   const BodyId id = impl_->changed_bodies().add(body);

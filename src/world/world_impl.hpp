@@ -12,7 +12,7 @@
 #include "src/world/contacts_by_body.hpp"
 #include "src/world/device_world.hpp"
 #include "src/world/force_snapshot.hpp"
-#include "src/world/lazy_query_tree.hpp"
+#include "src/world/query_tree.hpp"
 #include "src/world/soft_step.hpp"
 #include "src/world/wake_propagation.hpp"
 
@@ -115,6 +115,11 @@ struct World::Impl {
 
   std::span<const Contact> contacts_to_resolve();
 
+  /// The tree of the bodies for queries. @throws as QueryTree::build()
+  const QueryTree& tree_of(const BodyStore& bodies) const {
+    return query_tree.get([&bodies](QueryTree* tree) { tree->build(bodies); });
+  }
+
   double time() const { return static_cast<double>(steps) * static_cast<double>(scene.dt); }
 
   bool advance(StepReport* report);
@@ -146,7 +151,7 @@ struct World::Impl {
   CallbackRegistry<ForceContext, ForceId> forces{"force"};
   CallbackRegistry<ContactContext, ContactGeneratorId> generators{"contact generator"};
   bool bodies_changed = true;  ///< whether contact_finder.set_bodies() must be called
-  LazyQueryTree query_tree;
+  Lazy<QueryTree> query_tree;  ///< of the bodies, built by the first query after a change
   /// Contacts of the last step that was not undone. Bodies may have been removed since.
   std::vector<Contact> contacts;
   ContactsByBody contacts_by_body;     ///< of `contacts`

@@ -53,7 +53,7 @@ void World::Impl::choose_device(StepReport* report) {
       if (device != nullptr) device->configure(scene);
       if (!failure.empty()) report->device_failure = device_failure = failure;
     }
-    if (!automatic->choose(store.ids().size())) return;
+    if (!automatic->choose(store.size())) return;
   }
   steps_on_device = device != nullptr;
 }

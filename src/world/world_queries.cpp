@@ -130,7 +130,7 @@ std::optional<RayHit> World::cast_ray(const Ray& given, const BodyFilter& filter
   const Ray ray = checked(given);
   const BodyStore& bodies = impl_->bodies();
   std::optional<RayHit> closest;
-  impl_->query_tree.get(bodies).visit_along(ray, [&](std::uint32_t body) {
+  impl_->tree_of(bodies).visit_along(ray, [&](std::uint32_t body) {
     const std::optional<RayHit> hit = hit_of(ray, bodies, body);
     if (hit && (!closest || before(*hit, *closest)) && accepts(filter, hit->body)) closest = hit;
     return closest ? closest->distance : ray.max_distance;
@@ -142,7 +142,7 @@ std::vector<RayHit> World::cast_ray_through(const Ray& given, const BodyFilter& 
   const Ray ray = checked(given);
   const BodyStore& bodies = impl_->bodies();
   std::vector<RayHit> hits;
-  impl_->query_tree.get(bodies).visit_along(ray, [&](std::uint32_t body) {
+  impl_->tree_of(bodies).visit_along(ray, [&](std::uint32_t body) {
     const std::optional<RayHit> hit = hit_of(ray, bodies, body);
     if (hit && accepts(filter, hit->body)) hits.push_back(*hit);
     return ray.max_distance;
@@ -158,7 +158,7 @@ std::vector<BodyId> World::overlapping(const Sphere& sphere, const Vec3& centre)
   }
   const BodyStore& bodies = impl_->bodies();
   return bodies_touching(SphereInstance{centre, sphere.radius}, centre,
-                         half_extents(sphere, Transform{}), impl_->query_tree.get(bodies), bodies);
+                         half_extents(sphere, Transform{}), impl_->tree_of(bodies), bodies);
 }
 
 std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
@@ -174,7 +174,7 @@ std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
   const Transform pose = make_transform(normalized(orientation), centre);
   const BodyStore& bodies = impl_->bodies();
   return bodies_touching(PosedBox{box, pose}, centre, half_extents(box, pose),
-                         impl_->query_tree.get(bodies), bodies);
+                         impl_->tree_of(bodies), bodies);
 }
 
 }  // namespace JFPX_ABI

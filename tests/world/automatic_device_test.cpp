@@ -40,11 +40,16 @@ class FailingDevice final : public DeviceWorld {
     count_call();
     device_->upload_forces(bodies);
   }
+  void edit(const BodyStore& bodies, const BodyEdits& edits) override {
+    count_call();
+    device_->edit(bodies, edits);
+  }
   Result step(const ForceTable* forces, double time) override {
     count_call();
     return device_->step(forces, time);
   }
   cuda::DeviceStates states() const noexcept override { return device_->states(); }
+  Vec3 fetch_position(std::uint32_t body) override { return device_->fetch_position(body); }
   void fetch_motion(MotionArrays* moving) override { device_->fetch_motion(moving); }
   void fetch_contact_set(soft_step::ContactSet* last) override { device_->fetch_contact_set(last); }
   std::uint64_t fetch_contacts(const BodyStore& bodies, bool of_step_before,

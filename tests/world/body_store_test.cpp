@@ -50,6 +50,9 @@ TEST(BodyStore, KeepsIdsInOrderThroughRandomAddsAndRemoves) {
       EXPECT_FALSE(store.contains(living[k].first));
       living.erase(living.begin() + static_cast<std::ptrdiff_t>(k));
     }
+    if (random.below(8) == 0) {
+      ASSERT_EQ(store.ids().size(), living.size());
+    }
   }
   ASSERT_EQ(store.ids().size(), living.size());
   ASSERT_EQ(store.movable_count(), living.size());

@@ -25,10 +25,10 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kManifoldsPerChunk = 512, kPairsPerChunk = 512;
+constexpr std::size_t kIslandManifoldsPerChunk = 512, kIslandPairsPerChunk = 512;
 constexpr std::size_t kObjectsPerChunk = 1024;
 /// Numbers from which several threads process them; waking threads takes longer than fewer.
-constexpr std::size_t kSharedManifolds = 4096, kSharedPairs = 4096;
+constexpr std::size_t kSharedIslandManifolds = 4096, kSharedIslandPairs = 4096;
 
 /// As btUnionFind::find(), without compressing paths, so that threads may search concurrently.
 int root_of(const btUnionFind& unions, int x) {
@@ -122,7 +122,7 @@ bool IslandSolver::reserve_for_unions(btCollisionWorld& world) noexcept {
   const auto pairs = static_cast<std::size_t>(world.getPairCache()->getNumOverlappingPairs());
   try {
     resize_geometric(&numbers_, chunks_of(objects, kObjectsPerChunk) + 1);
-    resize_geometric(&chunk_counts_, std::min(pairs, pairs_per_round_) / kPairsPerChunk + 1);
+    resize_geometric(&chunk_counts_, std::min(pairs, pairs_per_round_) / kIslandPairsPerChunk + 1);
     edges_.reserve(std::min(pairs, pairs_per_round_), "pairs of islands");
   } catch (const OutOfMemory&) {
     return false;
@@ -143,7 +143,7 @@ void IslandSolver::number_and_unite(btCollisionWorld& world, btUnionFind* unions
   // discard those.
   const auto objects = static_cast<std::size_t>(numbers_.back());
   std::size_t first = std::min(count, 2 * objects);
-  if (pool_.threads() == 1 || count - first < kSharedPairs) first = count;
+  if (pool_.threads() == 1 || count - first < kSharedIslandPairs) first = count;
   for_each_union(pairs.first(first), [&](int a, int b) { unions->unite(a, b); });
   for (; first < count; first += pairs_per_round_) {
     point_to_roots(unions);
@@ -193,18 +193,18 @@ void IslandSolver::number_objects(btCollisionObjectArray& objects) {
 /// Lists the pairs of objects in different sets, in order. Reads the sets, and leaves the results
 /// of find() unchanged. @return their number
 int IslandSolver::find_edges(std::span<const btBroadphasePair> pairs, const btUnionFind& unions) {
-  const std::size_t count = pairs.size(), chunks = chunks_of(count, kPairsPerChunk);
-  in_chunks(pool_, count, kPairsPerChunk, [&](std::size_t first, std::size_t last) {
+  const std::size_t count = pairs.size(), chunks = chunks_of(count, kIslandPairsPerChunk);
+  in_chunks(pool_, count, kIslandPairsPerChunk, [&](std::size_t first, std::size_t last) {
     std::size_t next = first;
     for_each_union(pairs.subspan(first, last - first), [&](int a, int b) {
       if (root_of(unions, a) != root_of(unions, b)) edges_[next++] = {a, b};
     });
-    chunk_counts_[first / kPairsPerChunk] = static_cast<int>(next - first);
+    chunk_counts_[first / kIslandPairsPerChunk] = static_cast<int>(next - first);
   });
   int total = 0;
   for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
     const auto found = static_cast<std::size_t>(chunk_counts_[chunk]);
-    std::copy_n(edges_.data() + chunk * kPairsPerChunk, found, edges_.data() + total);
+    std::copy_n(edges_.data() + chunk * kIslandPairsPerChunk, found, edges_.data() + total);
     total += static_cast<int>(found);
   }
   return total;
@@ -235,7 +235,7 @@ bool IslandSolver::reserve_geometric(btCollisionWorld& world, int constraint_cou
   try {
     found_.reserve(manifolds, "manifolds of islands");
     found_island_.reserve(manifolds, "manifolds of islands");
-    jfpx::reserve_geometric(&chunk_counts_, manifolds / kManifoldsPerChunk + 1);
+    jfpx::reserve_geometric(&chunk_counts_, manifolds / kIslandManifoldsPerChunk + 1);
     jfpx::reserve_geometric(&manifolds_, manifolds);
     jfpx::reserve_geometric(&bodies_, static_cast<std::size_t>(world.getNumCollisionObjects()));
     jfpx::reserve_geometric(&constraints_, static_cast<std::size_t>(constraint_count));
@@ -335,7 +335,7 @@ void IslandSolver::collect_manifolds(btCollisionWorld& world) {
 /// Parallel version for a plain dispatcher. Returns false if kinematic objects may wake others.
 bool IslandSolver::collect_in_parallel(btDispatcher& dispatcher, bool only_touching) {
   const auto count = static_cast<std::size_t>(dispatcher.getNumManifolds());
-  const std::size_t size = chunk_size(count, kManifoldsPerChunk, kSharedManifolds);
+  const std::size_t size = chunk_size(count, kIslandManifoldsPerChunk, kSharedIslandManifolds);
   const std::size_t chunks = chunks_of(count, size);
   btPersistentManifold** manifolds = dispatcher.getInternalManifoldPointer();
   chunk_counts_.assign(chunks, 0);
@@ -395,7 +395,7 @@ void IslandSolver::add_manifolds(int first, int last) {
   const std::size_t before = manifolds_.size();
   const auto count = static_cast<std::size_t>(last - first);
   manifolds_.resize(before + count);
-  const std::size_t size = chunk_size(count, kManifoldsPerChunk, kSharedManifolds);
+  const std::size_t size = chunk_size(count, kIslandManifoldsPerChunk, kSharedIslandManifolds);
   in_chunks(pool_, count, size, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const int key = keys_[first + static_cast<int>(k)].index;

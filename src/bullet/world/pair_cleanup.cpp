@@ -19,9 +19,9 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kPairsPerChunk = 2048;
+constexpr std::size_t kCleanupPairsPerChunk = 2048;
 /// Number of pairs from which several threads test them; waking threads takes longer than fewer.
-constexpr std::size_t kSharedPairs = 8192;
+constexpr std::size_t kSharedCleanupPairs = 8192;
 
 bool is_apart(const btBroadphasePair& pair) {
   const auto* a = static_cast<const btDbvtProxy*>(pair.m_pProxy0);
@@ -108,7 +108,7 @@ bool PairCleanup::test_pairs(const btBroadphasePairArray& pairs, int first, int 
   const int size = pairs.size();
   std::atomic<bool> any{false};
   const auto tested = static_cast<std::size_t>(count);
-  const std::size_t chunk = chunk_size(tested, kPairsPerChunk, kSharedPairs);
+  const std::size_t chunk = chunk_size(tested, kCleanupPairsPerChunk, kSharedCleanupPairs);
   in_chunks(pool, tested, chunk, [&](std::size_t begin, std::size_t end) {
     bool found = false;
     for (auto k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {

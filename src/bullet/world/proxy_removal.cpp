@@ -19,9 +19,9 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-constexpr std::size_t kPairsPerChunk = 8192;
+constexpr std::size_t kRemovedPairsPerChunk = 8192;
 /// Number of pairs from which several threads search them; waking threads takes longer than fewer.
-constexpr std::size_t kSharedPairs = 65536;
+constexpr std::size_t kSharedRemovedPairs = 65536;
 
 }  // namespace
 
@@ -54,7 +54,7 @@ bool ProxyRemoval::run(btCollisionWorld& world, btCollisionObject& object, Threa
 bool ProxyRemoval::find_pairs(const btBroadphasePairArray& pairs, const btBroadphaseProxy* proxy,
                               ThreadPool& pool) {
   const auto count = static_cast<std::size_t>(pairs.size());
-  const std::size_t size = chunk_size(count, kPairsPerChunk, kSharedPairs);
+  const std::size_t size = chunk_size(count, kRemovedPairsPerChunk, kSharedRemovedPairs);
   found_.clear();
   try {
     resize_geometric(&parts_, chunks_of(count, size));

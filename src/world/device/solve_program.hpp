@@ -155,8 +155,8 @@ struct SolveProgram {
     BodyCells::Version version;
 
     template <bool kRotation>
-    JFPX_HD void read(const StepData& data) {
-      is_ready = data.cells(index).template read<kRotation>(before, &motion, &version);
+    JFPX_HD void read(const StepData& step) {
+      is_ready = step.cells(index).template read<kRotation>(before, &motion, &version);
     }
     JFPX_HD void start(std::uint32_t body, const RowBody& constants) {
       index = body;
