@@ -36,8 +36,8 @@ struct Rival {
   unsigned threads;  ///< at most; 0: one per core
 };
 /// If there is a GPU, the dispatcher may choose it, too; the solver of "cuda" must use it.
-constexpr Rival kRivals[] = {{"x86_1", Backend::cpu, 1}, {"auto_1", Backend::automatic, 1},
-                             {"x86", Backend::cpu, 0},   {"cuda_8", Backend::cuda, 8},
+constexpr Rival kRivals[] = {{"cpu_1", Backend::cpu, 1}, {"auto_1", Backend::automatic, 1},
+                             {"cpu", Backend::cpu, 0},   {"cuda_8", Backend::cuda, 8},
                              {"cuda", Backend::cuda, 0}, {"auto", Backend::automatic, 0}};
 
 SceneWorldOptions options_of(const Rival& rival) {

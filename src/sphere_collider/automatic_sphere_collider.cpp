@@ -54,8 +54,8 @@ auto AutomaticSphereCollider::ways_to_search(const SphereColliderOptions& option
   using enum SphereAlgorithm;
   const CostModel& costs = options.costs;
   std::vector<Way> ways = {
-      {Backend::cpu, all_pairs, costs.x86_all_pairs},
-      {Backend::cpu, sorted_tiles, costs.x86_sorted_tiles},
+      {Backend::cpu, all_pairs, costs.cpu_all_pairs},
+      {Backend::cpu, sorted_tiles, costs.cpu_sorted_tiles},
       {Backend::cuda, all_pairs, costs.cuda_all_pairs},
       {Backend::cuda, sorted_tiles, costs.cuda_sorted_tiles},
   };
@@ -69,7 +69,7 @@ auto AutomaticSphereCollider::ways_to_search(const SphereColliderOptions& option
 auto AutomaticSphereCollider::ways_to_test(const SphereColliderOptions& options, bool with_cuda)
     -> std::vector<Way> {
   using enum SphereAlgorithm;
-  std::vector<Way> ways = {{Backend::cpu, automatic, options.costs.x86_given_pairs}};
+  std::vector<Way> ways = {{Backend::cpu, automatic, options.costs.cpu_given_pairs}};
   if (with_cuda) ways.push_back({Backend::cuda, automatic, options.costs.cuda_given_pairs});
   return ways;
 }

@@ -22,15 +22,16 @@ constexpr const char* kPrecision = sizeof(Real) == 4 ? "float" : "double";
 struct Way {
   const char* name;
   CostTerms CostModel::*terms;
+  const char* old_name = nullptr;  ///< still read: once, the CPU backend was named x86
 };
 constexpr Way kWays[] = {
-    {"x86_all_pairs", &CostModel::x86_all_pairs},
-    {"x86_sorted_tiles", &CostModel::x86_sorted_tiles},
-    {"x86_given_pairs", &CostModel::x86_given_pairs},
+    {"cpu_all_pairs", &CostModel::cpu_all_pairs, "x86_all_pairs"},
+    {"cpu_sorted_tiles", &CostModel::cpu_sorted_tiles, "x86_sorted_tiles"},
+    {"cpu_given_pairs", &CostModel::cpu_given_pairs, "x86_given_pairs"},
     {"cuda_all_pairs", &CostModel::cuda_all_pairs},
     {"cuda_sorted_tiles", &CostModel::cuda_sorted_tiles},
     {"cuda_given_pairs", &CostModel::cuda_given_pairs},
-    {"x86_world", &CostModel::x86_world},
+    {"cpu_world", &CostModel::cpu_world, "x86_world"},
     {"cuda_world", &CostModel::cuda_world},
 };
 
@@ -59,8 +60,10 @@ MeasuredCostModel from_json_value(const Json& json) {
   json.at("driver").get_to(model.origin.driver);
   json.at("version").get_to(model.origin.version);
   for (const Way& way : kWays) {
+    const bool old = way.old_name != nullptr && json.contains(way.old_name);
+    const Json& terms = json.at(old ? way.old_name : way.name);
     for (const Term& term : kTerms) {
-      model.costs.*way.terms.*term.value = read_cost(json.at(way.name), term.name);
+      model.costs.*way.terms.*term.value = read_cost(terms, term.name);
     }
   }
   model.costs.cuda_start_ms = read_cost(json, "cuda_start_ms");
@@ -81,13 +84,13 @@ std::string fault_of(const std::string& name, double value) {
 // data of twice the width.
 CostModel::CostModel() {
   constexpr double kWide = sizeof(Real) / 4.0;
-  x86_all_pairs = {.call_us = 0.05, .sphere_ns = 6, .pair_ns = 0.175 * kWide, .contact_ns = 5};
-  x86_sorted_tiles = {.call_us = 0.2, .sphere_ns = 52 * kWide, .contact_ns = 11};
-  x86_given_pairs = {.call_us = 0.05, .pair_ns = 5};
+  cpu_all_pairs = {.call_us = 0.05, .sphere_ns = 6, .pair_ns = 0.175 * kWide, .contact_ns = 5};
+  cpu_sorted_tiles = {.call_us = 0.2, .sphere_ns = 52 * kWide, .contact_ns = 11};
+  cpu_given_pairs = {.call_us = 0.05, .pair_ns = 5};
   cuda_all_pairs = {.call_us = 13, .byte_ns = 0.05, .sphere_ns = 2.5, .pair_ns = 0.0006 * kWide};
   cuda_sorted_tiles = {.call_us = 41, .byte_ns = 0.05};
   cuda_given_pairs = {.call_us = 15, .byte_ns = 0.05};
-  x86_world = {.call_us = 5, .sphere_ns = 1250};
+  cpu_world = {.call_us = 5, .sphere_ns = 1250};
   cuda_world = {.call_us = 270, .sphere_ns = 5 * kWide};
 }
 

@@ -37,10 +37,10 @@ std::string report(const CostModel& costs, bool with_cuda) {
     terms.add({name, number(t.call_us), number(t.byte_ns), number(t.sphere_ns), number(t.pair_ns),
                number(t.contact_ns)});
   };
-  add("cpu, all pairs", costs.x86_all_pairs);
-  add("cpu, sorted tiles", costs.x86_sorted_tiles);
-  add("cpu, given pairs", costs.x86_given_pairs);
-  add("cpu, step of a world", costs.x86_world);
+  add("cpu, all pairs", costs.cpu_all_pairs);
+  add("cpu, sorted tiles", costs.cpu_sorted_tiles);
+  add("cpu, given pairs", costs.cpu_given_pairs);
+  add("cpu, step of a world", costs.cpu_world);
   if (with_cuda) {
     add("cuda, all pairs", costs.cuda_all_pairs);
     add("cuda, sorted tiles", costs.cuda_sorted_tiles);
@@ -49,14 +49,14 @@ std::string report(const CostModel& costs, bool with_cuda) {
   }
   Table crossovers({"with 3 contacts per sphere", "faster from spheres"});
   crossovers.add({"cpu: sorted tiles instead of all pairs",
-                  from_how_many(costs.x86_all_pairs, costs.x86_sorted_tiles)});
+                  from_how_many(costs.cpu_all_pairs, costs.cpu_sorted_tiles)});
   if (!with_cuda) return fmt::format("{}\n{}", terms.text(), crossovers.text());
   crossovers.add({"cuda: sorted tiles instead of all pairs",
                   from_how_many(costs.cuda_all_pairs, costs.cuda_sorted_tiles)});
   crossovers.add(
-      {"all pairs: cuda instead of cpu", from_how_many(costs.x86_all_pairs, costs.cuda_all_pairs)});
+      {"all pairs: cuda instead of cpu", from_how_many(costs.cpu_all_pairs, costs.cuda_all_pairs)});
   crossovers.add(
-      {"step of a world: cuda instead of cpu", from_how_many(costs.x86_world, costs.cuda_world)});
+      {"step of a world: cuda instead of cpu", from_how_many(costs.cpu_world, costs.cuda_world)});
   return fmt::format("{}\nstart of cuda: {:.0f} ms\n\n{}", terms.text(), costs.cuda_start_ms,
                      crossovers.text());
 }

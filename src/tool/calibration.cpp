@@ -168,11 +168,11 @@ constexpr Term kCopiedTerms[] = {&CostTerms::call_us, &CostTerms::byte_ns, &Cost
 
 void measure_cpu(Bench& bench, CostModel* costs) {
   using enum SphereAlgorithm;
-  costs->x86_all_pairs = fit_costs(bench.search(Backend::cpu, all_pairs, kFew), kAllPairsTerms);
-  costs->x86_sorted_tiles =
+  costs->cpu_all_pairs = fit_costs(bench.search(Backend::cpu, all_pairs, kFew), kAllPairsTerms);
+  costs->cpu_sorted_tiles =
       fit_costs(bench.search(Backend::cpu, sorted_tiles, kMany), kSortedTerms);
-  costs->x86_given_pairs = fit_costs(bench.given(Backend::cpu, {}), kGivenTerms);
-  costs->x86_world = fit_costs(bench.world(Backend::cpu, kBodies), kWorldTerms);
+  costs->cpu_given_pairs = fit_costs(bench.given(Backend::cpu, {}), kGivenTerms);
+  costs->cpu_world = fit_costs(bench.world(Backend::cpu, kBodies), kWorldTerms);
 }
 
 /// @throws BackendUnavailable, DeviceError

@@ -18,7 +18,7 @@ constexpr TimeChooser::Alternative kAlternatives[] = {{}, {.dormant = true}};
 }  // namespace
 
 AutomaticDevice::AutomaticDevice(const CostModel& costs, Maker make)
-    : terms_{costs.x86_world, costs.cuda_world},
+    : terms_{costs.cpu_world, costs.cuda_world},
       start_us_(1e3 * costs.cuda_start_ms),
       make_(std::move(make)),
       chooser_(kAlternatives) {}

@@ -68,7 +68,7 @@ TEST_F(AutomaticCollider, DoesNotStartTheDeviceBeforeItPays) {
   options.costs.cuda_start_ms = 10;
   // The model predicts 20 ns for each of the 500500 pairs of 1001 spheres: 10.01 ms.
   options.algorithm = SphereAlgorithm::all_pairs;
-  options.costs.x86_all_pairs = {.pair_ns = 20};
+  options.costs.cpu_all_pairs = {.pair_ns = 20};
   const auto collider = make(options);
   const auto spheres = make_gas(1001, 1, 3, random_);
   collider->find_contacts(spheres);
@@ -283,7 +283,7 @@ TEST_F(AutomaticCollider, AdaptsToANewSizeInTheSameCall) {
 
 TEST_F(AutomaticCollider, AFailureInOneKindOfCallIsNotReportedByTheNextOfTheOther) {
   SphereColliderOptions options = device_wins();
-  options.costs.x86_all_pairs = {};  // searches use the CPU; one decision covers many of them
+  options.costs.cpu_all_pairs = {};  // searches use the CPU; one decision covers many of them
   const auto collider = make(options);
   const auto spheres = make_gas(20, 1, 3, random_);
   const auto pairs = some_pairs(20, 50, random_);
@@ -300,12 +300,12 @@ TEST_F(AutomaticCollider, RejectsInvalidCosts) {
   for (const double bad :
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     SphereColliderOptions options;
-    options.costs.x86_given_pairs.pair_ns = bad;
+    options.costs.cpu_given_pairs.pair_ns = bad;
     try {
       make_sphere_collider(options);
       FAIL();
     } catch (const InvalidArgument& error) {
-      EXPECT_NE(std::string(error.what()).find("x86_given_pairs.pair_ns"), std::string::npos)
+      EXPECT_NE(std::string(error.what()).find("cpu_given_pairs.pair_ns"), std::string::npos)
           << error.what();
     }
   }

@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 
 MeasuredCostModel example() {
   MeasuredCostModel model;
-  model.costs.x86_all_pairs = {.call_us = 1.0 / 3, .sphere_ns = 1e-30, .pair_ns = 0.125};
+  model.costs.cpu_all_pairs = {.call_us = 1.0 / 3, .sphere_ns = 1e-30, .pair_ns = 0.125};
   model.costs.cuda_given_pairs = {.call_us = 12, .byte_ns = 0.02, .contact_ns = 7};
   model.costs.cuda_start_ms = 1e6;
   model.origin = {.machine = "a \"processor\", 2 cores", .driver = "", .version = "9.9.9"};
@@ -47,9 +47,9 @@ TEST(CostModel, DefaultsPreferAllPairsForFewAndSortingForMany) {
   for (const double n : {2.0, 100.0, 20000.0, 1e6}) {
     const ColliderWork work{.spheres = n, .pairs = n * (n - 1) / 2, .contacts = 3 * n};
     const bool few = n < 1000;
-    EXPECT_EQ(microseconds(costs.x86_all_pairs, work) < microseconds(costs.x86_sorted_tiles, work),
+    EXPECT_EQ(microseconds(costs.cpu_all_pairs, work) < microseconds(costs.cpu_sorted_tiles, work),
               few);
-    EXPECT_EQ(microseconds(costs.x86_all_pairs, work) < microseconds(costs.cuda_all_pairs, work),
+    EXPECT_EQ(microseconds(costs.cpu_all_pairs, work) < microseconds(costs.cuda_all_pairs, work),
               few);
   }
 }
@@ -63,6 +63,20 @@ TEST(CostModel, SurvivesItsFileToTheLastBit) {
   EXPECT_EQ(loaded.costs, model.costs);
   EXPECT_EQ(loaded.origin, model.origin);
   EXPECT_EQ(folder.entries(), 1u);
+}
+
+TEST(CostModel, TheOldNamesOfTheCpuAreRead) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("costs.json");
+  save_cost_model(example(), path);
+  nlohmann::ordered_json json, old;
+  std::ifstream(path) >> json;
+  for (const auto& item : json.items()) {
+    const std::string& key = item.key();
+    old[key.rfind("cpu_", 0) == 0 ? "x86_" + key.substr(4) : key] = item.value();
+  }
+  std::ofstream(path) << old.dump();
+  EXPECT_EQ(load_cost_model(path).costs, example().costs);
 }
 
 TEST(CostModel, AnInvalidFileIsRejectedWithItsName) {

@@ -78,7 +78,7 @@ TEST(Switching, ByAnyCostModelGivesTheSameHash) {
     WorldSettings settings;
     CostModel& costs = settings.collider.costs;
     costs.cuda_start_ms = 0;
-    for (CostTerms* terms : {&costs.x86_all_pairs, &costs.x86_sorted_tiles, &costs.cuda_all_pairs,
+    for (CostTerms* terms : {&costs.cpu_all_pairs, &costs.cpu_sorted_tiles, &costs.cuda_all_pairs,
                              &costs.cuda_sorted_tiles}) {
       terms->sphere_ns = static_cast<double>(random.uniform(0, 1000));
       terms->pair_ns = static_cast<double>(random.uniform(0, 10));

@@ -62,18 +62,18 @@ TEST_F(Calibrate, StoresCostsThatTheOtherCommandsUse) {
   EXPECT_THAT(result.output, HasSubstr(path()));
   EXPECT_THAT(result.output, Not(HasSubstr("measuring"))) << "progress is shown on terminals only";
   const MeasuredCostModel model = load_cost_model(path());
-  EXPECT_GT(model.costs.x86_all_pairs.pair_ns, 0.0);
-  EXPECT_GT(model.costs.x86_sorted_tiles.sphere_ns, 0.0);
-  EXPECT_GT(model.costs.x86_given_pairs.pair_ns, 0.0);
-  EXPECT_GT(model.costs.x86_world.sphere_ns, 0.0);
+  EXPECT_GT(model.costs.cpu_all_pairs.pair_ns, 0.0);
+  EXPECT_GT(model.costs.cpu_sorted_tiles.sphere_ns, 0.0);
+  EXPECT_GT(model.costs.cpu_given_pairs.pair_ns, 0.0);
+  EXPECT_GT(model.costs.cpu_world.sphere_ns, 0.0);
   EXPECT_FALSE(model.origin.machine.empty());
   EXPECT_EQ(model.origin.version, JFPX_VERSION);
   EXPECT_EQ(folder_.entries(), 1u);
 
   EXPECT_THAT(jfpx(kRun).output, Not(HasSubstr("default costs")));
   const auto shown = jfpx("calibrate --show --json -", "2>/dev/null");
-  EXPECT_EQ(nlohmann::json::parse(shown.output)["x86_all_pairs"]["pair_ns"],
-            model.costs.x86_all_pairs.pair_ns);
+  EXPECT_EQ(nlohmann::json::parse(shown.output)["cpu_all_pairs"]["pair_ns"],
+            model.costs.cpu_all_pairs.pair_ns);
 }
 
 TEST_F(Calibrate, ReportsCudaOnlyWhereItIsUsable) {

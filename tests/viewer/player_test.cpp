@@ -144,7 +144,7 @@ TEST(Player, UsesTheCostsThatWereMeasuredOnThisMachine) {
   setenv("XDG_CACHE_HOME", folder.file("").c_str(), 1);
   EXPECT_EQ(collider_options({}).costs, CostModel());  // not measured yet
   CostModel costs;
-  costs.x86_all_pairs.call_us = 123;
+  costs.cpu_all_pairs.call_us = 123;
   store_costs(costs);
   EXPECT_EQ(collider_options({}).costs, costs);
   before != nullptr ? setenv("XDG_CACHE_HOME", kept.c_str(), 1) : unsetenv("XDG_CACHE_HOME");

@@ -106,7 +106,7 @@ TEST(AutomaticWorld, HasTheSameBitsWhereverItMoves) {
   scene.bodies.push_back(test::ground());
   scene.sleep.enabled = false;
   CostModel costs = device_wins();
-  costs.x86_world = {};
+  costs.cpu_world = {};
   World host = on_host(scene), world = automatic(scene, costs);
   int moves = 0;
   bool was_on_device = false;
@@ -186,7 +186,7 @@ TEST(AutomaticWorld, DoesNotStartTheDeviceBeforeItPays) {
   const Scene scene = scenes::make("pile", {.spheres = 10});
   CostModel costs = device_wins();
   costs.cuda_start_ms = 10;
-  costs.x86_world = {.call_us = 1000};
+  costs.cpu_world = {.call_us = 1000};
   int made = 0;
   World world = automatic(scene, costs, [&made] {
     ++made;
