@@ -44,8 +44,8 @@ struct BodyDef {
   /// Symmetric and positive definite, with no principal moment larger than the sum of the others.
   /// Absent for mass 0.
   std::optional<Mat3> inertia;
-  Vec3 position;  ///< [m], centre of mass
-  Quat orientation;
+  Vec3 position;          ///< [m], centre of mass
+  Quat orientation;       ///< [-], unit, from body to world axes
   Vec3 velocity;          ///< [m/s]; ignored if the body is immovable and not kinematic
   Vec3 angular_velocity;  ///< [rad/s], world frame; ignored in the same case
   /// [m/s^2], constant; gravity by default. Ignored for an immovable body.
@@ -57,8 +57,8 @@ struct BodyDef {
   /// [m], >= 0: torques that oppose rolling and spinning are limited to this length times the
   /// normal force. The larger value of two bodies counts. Solver::soft_step only.
   Real rolling_friction = 0, spinning_friction = 0;
-  bool can_sleep = true;
-  CollisionFilter filter;
+  bool can_sleep = true;   ///< the body may fall asleep; see SleepSettings
+  CollisionFilter filter;  ///< bodies with which it collides
   /// A sensor has contacts and contact events, but they are not resolved and wake no body: it
   /// neither pushes other bodies nor is pushed. Contacts of contact generators are resolved.
   bool sensor = false;
@@ -68,8 +68,8 @@ struct BodyDef {
 
 /// State of motion of a body.
 struct BodyState {
-  Vec3 position;  ///< [m]
-  Quat orientation;
+  Vec3 position;          ///< [m], centre of mass
+  Quat orientation;       ///< [-], unit, from body to world axes
   Vec3 velocity;          ///< [m/s]
   Vec3 angular_velocity;  ///< [rad/s], world frame
   friend bool operator==(const BodyState&, const BodyState&) = default;

@@ -113,7 +113,8 @@ JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose, const 
                 : collide(box, pose, HalfSpace{plane.normal, plane.offset});
 }
 
-/// Box against box, by the separating-axis test and clipping. Of equally good normals, that of a
+/// Box against box, by the separating-axis test over 15 axes (Gottschalk, Lin and Manocha 1996) and
+/// clipping of faces (Sutherland and Hodgman 1974). Thread-safe. Of equally good normals, that of a
 /// face of a is preferred, then a face of b, then a pair of edges; near ties count as ties.
 /// Separated boxes may be reported as touching if the gap is smaller than the rounding errors, or
 /// if edges deviate from parallel by less than 2 sqrt(epsilon) and the gap is smaller than that

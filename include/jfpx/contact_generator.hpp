@@ -18,28 +18,30 @@ struct ContactGeneratorId {
   friend bool operator==(const ContactGeneratorId&, const ContactGeneratorId&) = default;
 };
 
-/// A contact made by a contact generator. The resolver stops the approach of the bodies along the
-/// normal, and moves them apart by `-distance`, up to its position epsilon. Normal and bodies may
-/// be chosen so that "apart" means closer together, as at the end of a rope.
+/// A contact made by a contact generator. The solver stops the approach of the bodies along the
+/// normal, and moves them apart by `-distance`: as a soft contact with Solver::soft_step, to within
+/// ResolverSettings::position_epsilon with Solver::worst_first. If the normal points from a to b,
+/// the contact pulls the bodies together, as the end of a rope does.
 struct GeneratedContact {
   BodyId a = {}, b = {};  ///< two different bodies; one may have mass 0 and represent the world
   Vec3 normal = {};       ///< [-], unit, direction of the impulse on a; b receives the opposite
   Vec3 point = {};        ///< [m], world, point of application: any point on the line of action
-  Real distance = 0;      ///< [m], <= 0
+  Real distance = 0;      ///< [m], <= 0: the negative of the distance to correct
   Real friction = 0;      ///< [-], >= 0, perpendicular to the normal
   Real restitution = 0;   ///< [-], in [0, 1]
 };
 
-/// View of the world that a contact generator receives after integration and detection, and
-/// recipient of its contacts.
+/// View of the world that a contact generator receives after contact detection, which
+/// Solver::worst_first runs after integration, and recipient of its contacts. Valid during the
+/// call, in the thread that makes it.
 class JFPX_API ContactContext : public StepView {
  public:
   ContactContext(const BodyStore& bodies, double time, std::vector<Contact>* contacts)
       : StepView(bodies, time), contacts_(contacts) {}
 
   /// Adds a contact. A contact of two bodies of mass 0 is ignored. An awake body wakes the other.
-  /// @throws InvalidArgument for a body that does not live or a field out of its range; the step is
-  ///   then undone
+  /// @throws InvalidArgument for an id that is not of a living body, or a field out of its range;
+  ///   the step is then undone
   void add(const GeneratedContact& contact);
 
  private:

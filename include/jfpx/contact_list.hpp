@@ -1,5 +1,7 @@
 /// Contact lists in the forms that programs with arrays need: between two sets of spheres, of many
-/// systems in one call, with every contact in both orders, and as compressed rows.
+/// systems in one call, with every contact in both orders, and as compressed rows. Functions that
+/// take a SphereCollider must not run concurrently with other calls on it; all others are
+/// thread-safe.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>

@@ -1,5 +1,5 @@
-/// Cost model of sphere collision and of steps on a machine, used by Backend::automatic (thesis
-/// 5.4).
+/// Cost model of sphere collision and of the steps of a world on a machine, for Backend::automatic
+/// (thesis 5.4).
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -16,14 +16,14 @@ struct ColliderWork {
   double spheres = 0;   ///< [-]
   double pairs = 0;     ///< [-], N*(N-1)/2 for find_contacts(), the list for find_touching()
   double contacts = 0;  ///< [-], found; not counted for find_touching()
-  double bytes = 0;     ///< [-], input and output; for find_touching() as if every pair touched
+  double bytes = 0;     ///< [B], input and output; for find_touching() as if every pair touched
 };
 
 /// Cost of one backend and algorithm: coefficients of a linear model, each finite and >= 0.
 struct CostTerms {
   double call_us = 0;     ///< [us] per call: launches, synchronization, waking threads
   double byte_ns = 0;     ///< [ns] per byte copied to and from the device
-  double sphere_ns = 0;   ///< [ns] per sphere
+  double sphere_ns = 0;   ///< [ns] per sphere, or per body of a world
   double pair_ns = 0;     ///< [ns] per tested pair
   double contact_ns = 0;  ///< [ns] per contact
   friend bool operator==(const CostTerms&, const CostTerms&) = default;
@@ -64,10 +64,10 @@ struct MeasuredCostModel {
   CostModelOrigin origin;
 };
 
-/// Writes a cost model as JSON.
+/// Writes a cost model as JSON, atomically. Thread-safe for different paths.
 /// @throws FileError; InvalidArgument if a term is not finite or < 0.
 JFPX_API void save_cost_model(const MeasuredCostModel& model, const std::string& path);
-/// Reads a cost model from JSON.
+/// Reads a cost model from JSON. Thread-safe.
 /// @throws FileError if the file cannot be read, is not a cost model, has another precision or
 ///   format, or contains a term that is not finite or < 0.
 JFPX_API MeasuredCostModel load_cost_model(const std::string& path);

@@ -20,8 +20,9 @@ struct ForceId {
 /// View of the world that a force receives at the start of a step, and recipient of its
 /// contributions. Contributions affect awake bodies only: a body that has come to rest under its
 /// forces stays asleep, and gravity wakes no body. A force that must affect sleeping bodies calls
-/// wake() or link(). Functions throw InvalidArgument for an id that is not of a living body; the
-/// step is then undone.
+/// wake() or link(). Valid during the call, in the thread that makes it.
+/// @throws InvalidArgument, in all functions, for an id that is not of a living body; the step is
+///   then undone
 class JFPX_API ForceContext : public StepView {
  public:
   ForceContext(BodyStore& bodies, double time) : StepView(bodies, time), bodies_(&bodies) {}
@@ -69,10 +70,10 @@ struct JFPX_API Gravity {
 /// medium. Steps must be short compared with mass / (linear + quadratic * |u|); in longer steps the
 /// drag reverses the velocity.
 struct JFPX_API Drag {
-  Real linear = 0;     ///< [kg/s], >= 0
-  Real quadratic = 0;  ///< [kg/m], >= 0
-  Vec3 wind = {};      ///< [m/s], velocity of the medium
-  std::optional<BodyId> body = {};
+  Real linear = 0;                  ///< [kg/s], >= 0
+  Real quadratic = 0;               ///< [kg/m], >= 0
+  Vec3 wind = {};                   ///< [m/s], velocity of the medium
+  std::optional<BodyId> body = {};  ///< all bodies if absent
   void validate(const ForceContext& context) const;
   void operator()(ForceContext& context) const;
 };
@@ -130,10 +131,10 @@ struct JFPX_API AeroControl {
 /// Exact buoyancy of spheres, boxes and compounds: the weight of the displaced liquid, against
 /// gravity, at the centroid of the displaced volume. Overlapping parts of a compound count twice.
 struct JFPX_API Buoyancy {
-  HalfSpace liquid = {};      ///< its solid side is the liquid; the normal points up
-  Real density = 1000;        ///< [kg/m^3], >= 0
-  Real gravity = Real(9.81);  ///< [m/s^2], >= 0
-  std::optional<BodyId> body = {};
+  HalfSpace liquid = {};            ///< its solid side is the liquid; the normal points up
+  Real density = 1000;              ///< [kg/m^3], >= 0
+  Real gravity = Real(9.81);        ///< [m/s^2], >= 0
+  std::optional<BodyId> body = {};  ///< all bodies if absent
   void validate(const ForceContext& context) const;
   void operator()(ForceContext& context) const;
 };

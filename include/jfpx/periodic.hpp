@@ -1,4 +1,5 @@
-/// Contacts among spheres in a periodic cell.
+/// Contacts among spheres in a periodic cell. Functions that take a SphereCollider must not run
+/// concurrently with other calls on it.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>

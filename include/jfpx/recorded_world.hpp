@@ -72,7 +72,7 @@ class JFPX_API RecordedWorld {
 /// @param step from 1 to reader.steps()
 /// @param world in the state before that step: made from the scene of the recording, and changed by
 ///   repeating the calls and steps before
-/// @throws InvalidArgument for another step; FileError if the world refuses a call
+/// @throws InvalidArgument for another step; FileError if a call is invalid for the world
 JFPX_API void repeat_calls(RecordingReader& reader, std::uint64_t step, World& world);
 
 }  // namespace JFPX_ABI

@@ -61,7 +61,7 @@ class JFPX_API RecordingReader {
   RecordingReader& operator=(RecordingReader&&) noexcept;
 
   const RecordingHeader& header() const;
-  std::uint64_t steps() const;
+  std::uint64_t steps() const;  ///< number of recorded steps
   /// States after step `step`, from 1 to steps(). @throws InvalidArgument outside that range
   std::vector<BodyState> states(std::uint64_t step);
   /// Whether any frame has calls: see repeat_calls() in recorded_world.hpp. If not, all frames have

@@ -10,21 +10,22 @@ inline namespace JFPX_ABI {
 
 class BodyStore;
 
-/// Valid during the call that receives it.
+/// Bodies of a world during a step. Valid during the call that receives it.
 class JFPX_API StepView {
  public:
   StepView(const BodyStore& bodies, double time) : bodies_(&bodies), time_(time) {}
 
-  Real dt() const;                         ///< [s], length of the step
-  double time() const { return time_; }    ///< [s], start of the step; 0 in the first
-  std::span<const BodyId> bodies() const;  ///< living bodies in the order of their indices
-  bool contains(BodyId id) const noexcept;
+  Real dt() const;                          ///< [s], length of the step
+  double time() const { return time_; }     ///< [s], start of the step; 0 in the first
+  std::span<const BodyId> bodies() const;   ///< living bodies in the order of their indices
+  bool contains(BodyId id) const noexcept;  ///< whether the id is of a living body
 
-  /// @throws InvalidArgument, in all four, for a body that does not live; the step is then undone
+  /// @throws InvalidArgument, in all four, for an id that is not of a living body; the step is then
+  ///   undone
   BodyState state(BodyId id) const;
   const Shape& shape(BodyId id) const;
   Real mass(BodyId id) const;   ///< [kg]; 0: immovable or kinematic
-  bool awake(BodyId id) const;  ///< of the bodies of mass 0: only kinematic ones, while they move
+  bool awake(BodyId id) const;  ///< a body of mass 0 is awake only if it is kinematic and moves
 
  protected:
   std::uint32_t require(BodyId id) const;

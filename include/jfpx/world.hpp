@@ -31,7 +31,7 @@ enum class BroadPhase : std::uint8_t {
 struct WorldSettings {
   /// Device and algorithm that find sphere contacts. Its `threads` also run the other parts of a
   /// step with Solver::soft_step. With Backend::cuda and Solver::soft_step, the state of the world
-  /// lies on the device, and all parts of a step run there (docs/cuda.md); functions that read or
+  /// is on the device, and all parts of a step run there (docs/cuda.md); functions that read or
   /// change the state may then also throw DeviceError. With Backend::automatic and
   /// Solver::soft_step, the world moves to the device and back, whichever takes less time.
   SphereColliderOptions collider;
@@ -144,7 +144,7 @@ class JFPX_API World {
 
   /// Living bodies in the order of their indices. Valid until a body is added or removed.
   std::span<const BodyId> bodies() const;
-  /// Whether the body lives in this world.
+  /// Whether the id is of a living body of this world.
   bool contains(BodyId id) const noexcept;
   /// The living body with a given BodyId::index.
   /// @throws InvalidArgument if there is none
@@ -265,12 +265,11 @@ class JFPX_API World {
   std::span<const ContactGeneratorId> contact_generators() const;
 
   /// The first hit of a ray; of bodies at the same distance, the one with the lowest index. Queries
-  /// find all bodies, including sleeping and immovable ones and sensors, whatever
-  /// their collision filters. They use a bounding-volume tree and
-  /// take O(log bodies) time for usual scenes, plus the time of the results. The first query after
-  /// a step, and after a body was added, removed or moved by set_state(), builds the tree in
-  /// O(bodies) time, about 20 nanoseconds per body; concurrent queries wait for it. Half-spaces and
-  /// planes are not in the tree and are always tested.
+  /// find all bodies, including sleeping and immovable ones and sensors, whatever their collision
+  /// filters. They use a bounding-volume tree and take O(log bodies) time for usual scenes, plus
+  /// the time of the results. The first query after a step, and after a body was added, removed or
+  /// moved by set_state(), builds the tree in O(bodies) time, about 20 ns per body; concurrent
+  /// queries wait for it. Half-spaces and planes are not in the tree and are always tested.
   /// @throws InvalidArgument for a field of the ray that is out of its range; std::bad_alloc
   std::optional<RayHit> cast_ray(const Ray& ray, const BodyFilter& filter = {}) const;
   /// All hits of a ray, sorted by distance, then by index; one hit per body.

@@ -54,32 +54,37 @@ class JFPX_API ArrayCollider {
   /// and the indices b to indices[E .. 2 * E), if their number E, which is returned, is at most
   /// `capacity`. Waits for the number alone: the indices are written in the order of the stream.
   /// Saves the memory of the result, which is not kept, and the time of write_pairs().
-  /// @param indices room for 2 * capacity elements
+  /// @param indices room for 2 * capacity elements, in device memory
+  /// @throws as find()
   std::uint64_t find_pairs(const SphereArrays& spheres, std::int32_t* indices, std::size_t capacity,
                            Stream stream);
   std::uint64_t find_pairs(const SphereArrays& spheres, std::int64_t* indices, std::size_t capacity,
                            Stream stream);
   /// Finds the touching pairs of a sphere of `first` and one of `second`, as
   /// jfpx::find_contacts_between().
+  /// @throws as find()
   std::uint64_t find_between(const SphereArrays& first, const SphereArrays& second,
                              ArrayResult result, Stream stream);
   /// Finds the contacts within each of many systems, as jfpx::find_contacts_in_systems(). Tests all
   /// pairs of each system.
   /// @param offsets in host memory
+  /// @throws as find(); InvalidArgument also for bad offsets
   std::uint64_t find_in_systems(const SphereArrays& spheres, std::span<const std::uint64_t> offsets,
                                 ArrayResult result, bool both_orders, Stream stream);
   /// Finds the touching pairs in a periodic cell, as jfpx::find_periodic_contacts().
-  /// @throws InvalidArgument as that function
+  /// @throws InvalidArgument as that function; OutOfMemory, DeviceError
   std::uint64_t find_periodic(const SphereArrays& spheres, const PeriodicCell& cell,
                               ArrayResult result, bool both_orders, Stream stream);
   /// The same within each of many systems, as jfpx::find_periodic_contacts_in_systems(). Tests all
   /// pairs of each system.
   /// @param offsets, cells in host memory
+  /// @throws as find_periodic(); InvalidArgument also for bad offsets or another number of cells
   std::uint64_t find_periodic_in_systems(const SphereArrays& spheres,
                                          std::span<const std::uint64_t> offsets,
                                          std::span<const PeriodicCell> cells, ArrayResult result,
                                          bool both_orders, Stream stream);
   /// The same between two sets, as jfpx::find_periodic_contacts_between().
+  /// @throws as find_periodic()
   std::uint64_t find_periodic_between(const SphereArrays& first, const SphereArrays& second,
                                       const PeriodicCell& cell, ArrayResult result, Stream stream);
   /// Enqueues find() without both_orders. Neither allocates nor waits, so that the call and the
@@ -89,8 +94,8 @@ class JFPX_API ArrayCollider {
   /// @throws InvalidArgument for more spheres than are reserved, DeviceError
   void enqueue(const SphereArrays& spheres, ArrayResult result, Stream stream);
 
-  /// Enqueue the output of the last search. Each array has room for `capacity` contacts; if there
-  /// are more, the first are written. @throws DeviceError
+  /// Enqueue the output of the last search to device memory. Each array has room for `capacity`
+  /// contacts; if there are more, the first are written. @throws DeviceError, here and below
   void write_pairs(std::int32_t* a, std::int32_t* b, std::size_t capacity, Stream stream);
   void write_pairs(std::int64_t* a, std::int64_t* b, std::size_t capacity, Stream stream);
   /// @param normals 3 * capacity elements
@@ -99,8 +104,8 @@ class JFPX_API ArrayCollider {
   /// @param shifts 3 * capacity elements: the image of b is displaced by shift * lengths
   /// @throws InvalidArgument if the search was not in a periodic cell
   void write_shifts(std::int32_t* shifts, std::size_t capacity, Stream stream);
-  /// Offsets of compressed rows, one more than the spheres of the (first) set. Not after
-  /// enqueue().
+  /// Writes the offsets of compressed rows, one more than the spheres of the (first) set. Must not
+  /// follow enqueue().
   void write_offsets(std::int64_t* offsets, Stream stream);
   /// Writes {number of contacts, 1 if they are complete or else 0}.
   void write_count(std::int64_t* count, Stream stream);

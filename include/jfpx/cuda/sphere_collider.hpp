@@ -15,6 +15,7 @@ namespace cuda {
 /// Equals cudaStream_t, without the CUDA headers.
 using Stream = CUstream_st*;
 
+/// ContactCount::first_invalid if all spheres are valid.
 inline constexpr std::uint32_t kNoSphere = 0xffffffffu;
 
 /// Result of a search, in memory that the device can write: device or mapped host memory.
@@ -51,8 +52,9 @@ class JFPX_API DeviceSphereCollider {
   /// result is complete if the number of contacts exceeds neither `capacity` nor the reservation,
   /// and every sphere is valid (all values finite, radius > 0). Otherwise, no contact is
   /// written; *d_count then contains the number to reserve, or the index of an invalid sphere.
-  /// @param d_spheres device memory, 4*sizeof(Real)-aligned, unchanged until completion
-  /// @param d_contacts device memory, 8-aligned (as d_pairs below); may be null if `capacity` is 0
+  /// @param d_spheres device memory, aligned to 4 * sizeof(Real) bytes, unchanged until completion
+  /// @param d_contacts device memory, aligned to 8 bytes (as d_pairs below); may be null if
+  ///   `capacity` is 0
   /// @throws InvalidArgument if `n` exceeds the reservation or d_contacts is not aligned,
   /// DeviceError.
   void find_contacts(const SphereInstance* d_spheres, std::size_t n, SphereContact* d_contacts,
@@ -62,7 +64,7 @@ class JFPX_API DeviceSphereCollider {
                   std::size_t capacity, ContactCount* d_count);
 
   /// Enqueues the test of `m` given pairs: d_results[i] is the result of d_pairs[i], with Bullet's
-  /// rules for NaN. Indices are not checked.
+  /// rules for NaN. Indices are not checked. @throws DeviceError
   void test_pairs(const SphereInstance* d_spheres, const SpherePair* d_pairs, std::size_t m,
                   PairResult* d_results);
 
