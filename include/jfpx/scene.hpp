@@ -66,7 +66,7 @@ struct ResolverSettings {
 struct SleepSettings {
   bool enabled = true;
   /// [m/s], >= 0, limit of the velocity and of the angular velocity times the bounding radius, of
-  /// which 4 % count for spheres, because nothing brakes one that spins on the spot; soft_step. A
+  /// which 4 % count for spheres, because nothing brakes a sphere that spins in place; soft_step. A
   /// body on which a force or torque acts must be 25 times slower.
   Real speed = Real(0.05);
   Real time = Real(0.5);     ///< [s], >= 0; soft_step

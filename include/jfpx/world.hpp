@@ -312,7 +312,7 @@ class JFPX_API World {
   ///   - contacts of contact generators, in the order of the generators.
   /// Detected contacts with the same a and b are sorted by the part of a, then by the part of b,
   /// spheres before boxes; contact points of the same two parts are in the order in which their
-  /// pair test returns them. Those that came about during the step follow. Empty after a failed
+  /// pair test returns them. Those that began during the step follow. Empty after a failed
   /// step, and after bodies were added or removed. Valid until a body is added or removed, or until
   /// the next step.
   std::span<const Contact> contacts() const;

@@ -1,5 +1,5 @@
-/// Whether the Bullet library of this process is compiled with BT_THREADSAFE, which neither
-/// Bullet's headers nor its pkg-config file tell.
+/// Whether the Bullet library of this process is compiled with BT_THREADSAFE. Neither Bullet's
+/// headers nor its pkg-config file contain this flag.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,7 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// The first call asks the library; later ones return the same answer. Thread-safe.
+/// The first call tests the library; later calls return the same result. Thread-safe.
 bool is_thread_safe_library();
 
 /// Whether a solver with BT_THREADSAFE may treat the object differently. It decides by the

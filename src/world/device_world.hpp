@@ -28,7 +28,7 @@ struct BodyEdit {
 using BodyEdits = std::unordered_map<std::uint32_t, BodyEdit>;
 
 /// Steps of Solver::soft_step on a device, with the bits of SoftStep. The caller uploads a world,
-/// then calls step() as often as it likes, and fetches what it needs. Not thread-safe.
+/// then calls step() any number of times, and fetches the results that it needs. Not thread-safe.
 ///
 /// All functions but the destructor throw DeviceError if the device fails, and OutOfMemory. After a
 /// failed step(), the state on the device is that before the step.

@@ -1,4 +1,4 @@
-/// Contacts that came about during a step, after contact detection.
+/// Contacts that began during a step, after contact detection.
 #pragma once
 
 #include "src/contact_solver/contact_set.hpp"

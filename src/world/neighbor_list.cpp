@@ -82,8 +82,8 @@ std::span<const SpherePair> NeighborList::find(std::span<const SphereInstance> s
   return slack > 0 ? select(spheres, pool) : pairs_;
 }
 
-/// The pairs of pairs_ whose spheres touch. Several threads count them first, so that each knows
-/// where to write.
+/// The pairs of pairs_ whose spheres touch. Several threads count them first, so that each has its
+/// range of the list.
 std::span<const SpherePair> NeighborList::select(std::span<const SphereInstance> spheres,
                                                  ThreadPool* pool) {
   selected_.reserve(pairs_.size(), "pairs of spheres");

@@ -31,6 +31,8 @@ class SoftStep {
   soft_step::ContactSet& contacts() { return cache_.current(); }
   /// Contacts of the last completed step, with their impulses and colors.
   soft_step::ContactSet& last_contacts() { return cache_.last(); }
+  /// The same. drop_removed() must have been called since the last forget().
+  const soft_step::ContactSet& last_contacts() const { return cache_.last(); }
   /// Adds the contacts of contact generators.
   void add_generated(const BodyStore& bodies, std::span<const Contact> generated);
   /// Computes the motion of the step. Wakes bodies and updates accelerations. Forces must have been
@@ -39,14 +41,13 @@ class SoftStep {
   std::optional<BodyId> solve(BodyStore* bodies);
   /// Moves the bodies, clears forces, and puts islands to sleep.
   void commit(BodyStore* bodies) noexcept;
-  /// As above, after drop_removed().
-  const soft_step::ContactSet& last_contacts() const { return cache_.last(); }
   /// Makes room for bodies with indices below `bodies`. @throws std::bad_alloc
   void reserve(std::size_t bodies) { cache_.reserve(bodies); }
   /// Replaces the parameters of the constructor and the contacts of the last completed step.
   void restore(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
                soft_step::ContactSet last) noexcept;
-  /// Removes the contacts of a removed body, in constant time; drop_removed() completes the work.
+  /// Removes the contacts of a removed body, in constant time; drop_removed() completes the
+  /// removal.
   void forget(std::uint32_t body) noexcept { cache_.forget(body); }
   void drop_removed() noexcept { cache_.drop_forgotten(); }
 

@@ -98,8 +98,8 @@ void World::Impl::find_contacts(StepReport* report) {
   detected_count = report->contacts;
 }
 
-/// Fills `met` with the contacts that came about during the step: counts them first, so that
-/// threads know where to write. @returns how many are of two spheres
+/// Fills `met` with the contacts that began during the step. Counts them first, so that each thread
+/// has its range of the list. @returns the number of contacts of two spheres
 std::size_t World::Impl::find_met_contacts() {
   constexpr std::size_t kChunk = 4096;
   const soft_step::ContactView view = soft_step.contacts().view();
@@ -135,7 +135,7 @@ std::size_t World::Impl::find_met_contacts() {
   return of_spheres;
 }
 
-/// Adds the contacts that came about during the step to those of detection, after the contacts of
+/// Adds the contacts that began during the step to those of detection, after the contacts of
 /// the same bodies.
 void World::Impl::add_met_contacts(StepReport* report) {
   const std::size_t of_spheres = find_met_contacts();

@@ -156,7 +156,7 @@ struct World::Impl {
   std::vector<Contact> contacts;
   ContactsByBody contacts_by_body;     ///< of `contacts`
   std::vector<Contact> resolved;       ///< during a step with sensors: the contacts of other bodies
-  std::vector<Contact> met;            ///< contacts that came about during the step
+  std::vector<Contact> met;            ///< contacts that began during the step
   std::vector<std::size_t> met_begin;  ///< by chunk of contacts: its first entry in `met`
   std::vector<Contact> contacts_before;  ///< those of the step before, for events and undo()
   /// Numbers of detected contacts in both lists; the others are those of contact generators.
@@ -184,10 +184,10 @@ struct World::Impl {
   /// host are those of the next step. The forces of all others are 0 on the host.
   BodyEdits edits;
   std::vector<std::uint32_t> forced_bodies;
+  /// While resident: whether the arrays of the host are those of the device.
   bool motion_is_current = true, contacts_are_current = true;
-  bool contact_set_is_current = true;
-  bool contacts_before_are_current = true;  ///< the flags of what the host has, while resident
-  std::mutex fetching;
+  bool contact_set_is_current = true, contacts_before_are_current = true;
+  std::mutex fetching;  ///< held by functions that fetch, because const functions may call them
 };
 
 /// Access to the members of a World, for tests and for cuda::device_states().

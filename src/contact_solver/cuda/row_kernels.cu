@@ -130,8 +130,8 @@ void launch_row_setup(const RowSweepArgs& args, cudaStream_t stream) {
 }
 
 unsigned max_row_blocks(int device) {
-  int processors = 0, min_blocks = 0;
-  JFPX_CUDA_TRY(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device));
+  int multiprocessors = 0, min_blocks = 0;
+  JFPX_CUDA_TRY(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
   for (const auto kernel : {sweep_rows<false>, sweep_rows<true>}) {
     int blocks = 0;
     // With the shared memory of the maximum number of iterations.
@@ -139,7 +139,7 @@ unsigned max_row_blocks(int device) {
                                                                 shared_bytes(1024)));
     min_blocks = min_blocks == 0 ? blocks : std::min(min_blocks, blocks);
   }
-  return static_cast<unsigned>(processors * min_blocks);
+  return static_cast<unsigned>(multiprocessors * min_blocks);
 }
 
 // If there are more contacts than threads, both programs get a proportional share of the threads.

@@ -14,7 +14,7 @@ template <class Item>
 struct FoundItems {
   const Item* items = nullptr;
   std::uint64_t n = 0;                  ///< number of items, if `count` is null
-  const ContactCount* count = nullptr;  ///< the same, if the host does not know it
+  const ContactCount* count = nullptr;  ///< the same, if it is only on the device
   std::uint32_t b_offset = 0;           ///< subtracted from each index b
 };
 

@@ -80,7 +80,7 @@ void DeviceSearch::reserve(std::size_t n, std::size_t contacts) {
   const std::size_t max_spheres = std::max(n, spheres_reserved_);
   // A search of all pairs needs no memory for contacts, but a later reserve() of more spheres may
   // select the grid, which must then have memory for all contacts requested so far.
-  contacts = std::max(contacts, contacts_asked_);
+  contacts = std::max(contacts, contacts_requested_);
   if (uses_grid(max_spheres)) {
     const std::size_t bytes = grid_scratch_bytes(max_spheres, contacts);
     scratch_.reserve(pool_, stream_, bytes, "scratch memory");
@@ -96,7 +96,7 @@ void DeviceSearch::reserve(std::size_t n, std::size_t contacts) {
     long_row_neighbors_.reserve(pool_, stream_, contacts, "neighbors of long rows");
     contacts_reserved_ = contacts;
   }
-  contacts_asked_ = contacts;
+  contacts_requested_ = contacts;
 }
 
 void DeviceSearch::reserve_spheres(std::size_t n) {

@@ -52,7 +52,7 @@ class DeviceSearch {
   MemoryPool pool_;
   bool has_fused_ = false;
   GridLimits limits_{};
-  std::size_t spheres_reserved_ = 0, contacts_asked_ = 0, contacts_reserved_ = 0;
+  std::size_t spheres_reserved_ = 0, contacts_requested_ = 0, contacts_reserved_ = 0;
 
   DeviceBuffer<std::uint32_t> counters_;  // SearchState, then the number of contacts of each sphere
   DeviceBuffer<unsigned long long> offsets_;

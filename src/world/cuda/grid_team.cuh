@@ -50,7 +50,8 @@ class GridTeam {
     cooperative_groups::this_grid().sync();
 #endif
   }
-  /// A copy of an array of device::kBins + 1 numbers in fast memory. At most one exists at a time.
+  /// A copy of an array of device::kBins + 1 numbers in shared memory. At most one exists at a
+  /// time.
   JFPX_HD const std::uint32_t* cached_bins(const std::uint32_t* numbers) const {
 #if defined(__CUDA_ARCH__)
     __shared__ std::uint32_t copy[device::kBins + 1];

@@ -15,7 +15,7 @@ namespace cuda {
 namespace {
 
 template <class Program>
-__global__ void __launch_bounds__(GridTeam::kThreads, Program::kBlocksPerProcessor)
+__global__ void __launch_bounds__(GridTeam::kThreads, Program::kBlocksPerMultiprocessor)
     run_program(const __grid_constant__ Program program, std::uint32_t* scratch, bool is_cluster) {
   program(GridTeam(scratch, is_cluster));
 }
@@ -43,7 +43,8 @@ class CudaDevice {
         marks_{OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_)},
         collider_(stream_.get(), device_) {
     const DeviceGuard guard(device_);
-    JFPX_CUDA_TRY(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device_));
+    JFPX_CUDA_TRY(
+        cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device_));
   }
 
   int number() const noexcept { return device_; }
@@ -82,7 +83,7 @@ class CudaDevice {
     std::size_t most = limits.most_blocks;
     if constexpr (requires { Program::kItemsPerThread; }) {
       most = std::clamp(items / (GridTeam::kThreads * Program::kItemsPerThread),
-                        static_cast<std::size_t>(processors_), most);
+                        static_cast<std::size_t>(multiprocessors_), most);
     }
     auto blocks = static_cast<unsigned>(std::clamp<std::size_t>(wanted, 1, most));
     if (limits.has_clusters && blocks <= 2 * kClusterBlocks) {
@@ -114,7 +115,7 @@ class CudaDevice {
   }
 
   void mark(int i) { JFPX_CUDA_TRY(cudaEventRecord(marks_[i].get(), stream_.get())); }
-  /// 0 if a mark has failed: the step is complete all the same.
+  /// 0 if a mark has failed, which does not affect the step.
   double elapsed_ms(int from, int to) const noexcept {
     float result = 0;
     if (cudaEventElapsedTime(&result, marks_[from].get(), marks_[to].get()) == cudaSuccess) {
@@ -125,7 +126,7 @@ class CudaDevice {
   }
 
  private:
-  /// What a launch of a program can use.
+  /// Limits of the launches of a program.
   struct Launch {
     std::size_t most_blocks = 0;  ///< that are resident at the same time; 0: not yet known
     bool has_clusters = false;
@@ -144,8 +145,8 @@ class CudaDevice {
                                          cudaFuncAttributeNonPortableClusterSizeAllowed, 1));
     }
     limits.most_blocks =
-        std::min<std::size_t>(static_cast<unsigned>(resident), Program::kBlocksPerProcessor) *
-        static_cast<unsigned>(processors_);
+        std::min<std::size_t>(static_cast<unsigned>(resident), Program::kBlocksPerMultiprocessor) *
+        static_cast<unsigned>(multiprocessors_);
     return limits;
   }
   template <class Program>
@@ -164,7 +165,7 @@ class CudaDevice {
   OwnedEvent marks_[device::kMarks];
   DeviceSphereCollider collider_;
   DeviceBuffer<std::uint32_t> scratch_;
-  int processors_ = 0;
+  int multiprocessors_ = 0;
   std::tuple<
       Limits<device::ForceProgram>, Limits<device::BoundsProgram>, Limits<device::SphereProgram>,
       Limits<device::ShapeProgram>, Limits<device::MatchProgram>, Limits<device::PrepareProgram>,

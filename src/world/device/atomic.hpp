@@ -76,7 +76,7 @@ JFPX_HD inline std::uint32_t atomic_exchange_if(std::uint32_t* at, std::uint32_t
 #endif
 }
 
-/// A load that sees the writes of other threads during the same loop.
+/// A load that observes the writes of other threads during the same loop.
 JFPX_HD inline std::uint32_t load_shared(const std::uint32_t* at) {
   return *static_cast<const volatile std::uint32_t*>(at);
 }

@@ -13,8 +13,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Order of the changes of a body: in each sweep over the rows first the rows of its contacts by
-/// color, then the body itself. A turn is the number of a change that has been made.
+/// Order of the changes of a body: in each sweep over the rows, first the rows of its contacts by
+/// color, then the body itself. A turn is the sequence number of the last change that was made.
 struct Turns {
   static constexpr std::uint32_t kPerSweep = soft_step::kColors + 2u;
 
@@ -47,20 +47,20 @@ struct Turns {
 /// Number of cells of a vector.
 inline constexpr int kVectorCells = 3 / kCellNumbers;
 
-/// What the rows of a body read: in float, one access of memory.
+/// Motion that the rows of a body read: in float, with one access of memory.
 struct alignas(64) MotionCells {
   Cell velocity[kVectorCells], angular_velocity[kVectorCells], shift[kVectorCells],
       rotation[kVectorCells];
 };
 
-/// What a row reads if it rebounds.
+/// Free motion, which a row reads only if it rebounds.
 struct FreeCells {
   Cell velocity[kVectorCells], angular_velocity[kVectorCells];
 };
 
-/// Access to the motion of a body as cells. Those of the velocities are written at each turn, the
-/// others only when they change: the words of the velocities say which version of the others
-/// belongs to them.
+/// Access to the motion of a body as cells. The cells of the velocities are written at each turn,
+/// all others only when they change: the words of the velocities contain the versions of the other
+/// cells that belong to them.
 class BodyCells {
  public:
   /// Versions of the other vectors.
@@ -125,7 +125,8 @@ class BodyCells {
     store(free_->velocity, free.velocity, version->free);
     store(free_->angular_velocity, free.angular_velocity, version->free);
   }
-  /// Reads the free motion of a version that read() has returned: it is already on its way.
+  /// Reads the free motion of a version that read() has returned. Its stores precede those of the
+  /// velocities, so the wait is short.
   JFPX_HD soft_step::FreeMotion read_free(const Version& version) const {
     soft_step::FreeMotion free;
     Read v, w;
@@ -175,7 +176,7 @@ class BodyCells {
   FreeCells* free_;
 };
 
-/// What the rows of a body read, and no row changes.
+/// Constants of a body during a step, which its rows read.
 struct alignas(16) RowBody {
   Real inverse_mass = 0;     ///< as SolverBody
   Real inverse_inertia = 0;  ///< as SolverBody

@@ -11,7 +11,7 @@ namespace device {
 /// Ends the step: moves the bodies, clears forces, and puts islands to sleep. Has no effect if a
 /// body has run away.
 struct CommitProgram {
-  static constexpr unsigned kBlocksPerProcessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = 3;
   StepData data;
 
   template <class Team>

@@ -13,7 +13,7 @@ namespace device {
 /// Starts the step, unless a ForceProgram has, and makes the bounds of the motion of all
 /// sub-shapes.
 struct BoundsProgram {
-  static constexpr unsigned kBlocksPerProcessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = 3;
   StepData data;
   bool is_started = false;
 
@@ -50,7 +50,7 @@ struct BoundsProgram {
 
 /// Makes the contacts of two spheres from the pairs of swept bounds, and lists all other pairs.
 struct SphereProgram {
-  static constexpr unsigned kBlocksPerProcessor = 6;
+  static constexpr unsigned kBlocksPerMultiprocessor = 6;
   StepData data;
 
   template <class Team>
@@ -137,7 +137,7 @@ struct SphereProgram {
 
 /// Makes the contacts of all other sub-shapes.
 struct ShapeProgram {
-  static constexpr unsigned kBlocksPerProcessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = 3;
   StepData data;
 
   template <class Team>

@@ -489,7 +489,7 @@ class DeviceStep final : public DeviceWorld {
                room(&saved_.rest_time, n), room(&saved_.awake, n)};
   }
 
-  /// Room for the lists of a step, as `capacity_` says.
+  /// Reserves the lists of a step for `capacity_`.
   void size_lists() {
     Scratch& s = scratch_;
     StepData& d = data_;

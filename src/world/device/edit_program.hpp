@@ -21,7 +21,7 @@ struct EditedBody {
 
 /// Wakes the bodies in contact with some of the edited bodies, then edits these.
 struct EditProgram {
-  static constexpr unsigned kBlocksPerProcessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = 3;
   StepData data;
   const EditedBody* edits = nullptr;
   std::uint32_t count = 0;

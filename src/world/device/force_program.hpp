@@ -78,7 +78,7 @@ class ForcedBody {
 /// Starts the step, and adds all forces to those that the bodies have accumulated. A body depends
 /// on no other one, because forces that would wake a body are left to the host.
 struct ForceProgram {
-  static constexpr unsigned kBlocksPerProcessor = 2;
+  static constexpr unsigned kBlocksPerMultiprocessor = 2;
   StepData data;
   ForceView forces;
   double time = 0;                                   ///< [s], start of the step

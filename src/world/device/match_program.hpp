@@ -13,7 +13,7 @@ namespace device {
 /// Gives each contact the impulses and the color of the same contact of the last step, and colors
 /// the others: as soft_step::ContactCache.
 struct MatchProgram {
-  static constexpr unsigned kBlocksPerProcessor = 6;
+  static constexpr unsigned kBlocksPerMultiprocessor = 6;
   /// Up to this number of contacts, one block colors them: its barriers are faster.
   static constexpr std::uint32_t kFewContacts = 4096;
   StepData data;

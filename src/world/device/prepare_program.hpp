@@ -12,7 +12,7 @@ namespace device {
 
 /// Wakes the islands that touch an awake body, starts the bodies, and assigns rows to contacts.
 struct PrepareProgram {
-  static constexpr unsigned kBlocksPerProcessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = 3;
   StepData data;
 
   template <class Team>

@@ -12,17 +12,17 @@ inline namespace JFPX_ABI {
 namespace device {
 
 /// Sweeps over all rows, as soft_step::SoftStepSolver, without barriers: a row waits only for the
-/// earlier rows of its two bodies (see Turns), so that consecutive colors and sweeps
-/// overlap. After the rows of a sweep, each body solves its rows with fixed bodies and completes
-/// its part of the substep. Only the motion of bodies passes from thread to thread: the rows
-/// themselves, and the other arrays by body, are used by one thread.
+/// earlier rows of its two bodies (see Turns), so that consecutive colors and sweeps overlap. After
+/// the rows of a sweep, each body solves its rows with fixed bodies and completes its part of the
+/// substep. Only the motion of bodies passes from thread to thread: the rows themselves, and the
+/// other arrays by body, are used by one thread.
 ///
 /// The items of a thread are in the order of the sweeps, and an item waits only for items before
 /// it in this order. So the first item that is not complete never waits.
 struct SolveProgram {
-  static constexpr unsigned kBlocksPerProcessor = 2;
-  /// Threads that wait read memory again and again. So more than one block on a processor pays only
-  /// where rows rarely wait, because each thread has at least this number of them.
+  static constexpr unsigned kBlocksPerMultiprocessor = 2;
+  /// Least number of items per thread from which a multiprocessor gets a second block. Waiting
+  /// threads poll memory, so a second block pays only where rows rarely wait.
   static constexpr std::size_t kItemsPerThread = 32;
   StepData data;
 
@@ -53,7 +53,8 @@ struct SolveProgram {
   using SolverBody = soft_step::SolverBody;
   static constexpr std::uint32_t kWarpItems = 32;
 
-  /// What the impact of a row adds to the free motion of its bodies; see soft_step::ImpactBodies.
+  /// Change that the impact of a row adds to the free motion of its bodies; see
+  /// soft_step::ImpactBodies.
   struct Impact {
     const Vec3* acceleration = nullptr;
     std::uint32_t a = 0;  ///< body a of the row
@@ -77,7 +78,7 @@ struct SolveProgram {
     }
   };
 
-  /// What a body does after the rows of a sweep.
+  /// Work on a body after the rows of a sweep.
   enum class BodyStage : std::uint8_t {
     none,
     move,        ///< ends a substep

@@ -24,7 +24,7 @@ inline constexpr std::uint8_t kNoBin = 255;
 static_assert(kBins < kNoBin);
 
 /// Lists whose size is known only on the device. A step that needs more room than there is does not
-/// change the state of the world; the host reserves what `needed` says and repeats it.
+/// change the state of the world; the host reserves Counters::needed and repeats it.
 struct Capacity {
   std::uint64_t pairs = 0;       ///< of swept bounds
   std::uint32_t spheres = 0;     ///< contacts of two spheres
@@ -33,7 +33,7 @@ struct Capacity {
   std::uint32_t touches = 0;     ///< points of World::contacts(), except contacts of two spheres
 };
 
-/// Numbers that the stages of a step give each other and the host.
+/// Numbers that the stages of a step pass to each other and to the host.
 struct Counters {
   std::uint64_t started = 0;    ///< StepData::number once the state before the step is saved
   std::uint64_t completed = 0;  ///< StepData::number once the step is complete
