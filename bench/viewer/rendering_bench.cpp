@@ -2,11 +2,11 @@
 /// without rendering.
 #include "bench/viewer/screen.hpp"
 #include "bench/world/samples.hpp"
+#include "src/base/stopwatch.hpp"
 #include "src/scenes/scenes.hpp"
 #include "src/viewer/renderer.hpp"
 #include "src/viewer/run.hpp"
 #include "src/viewer/scene_painter.hpp"
-#include "src/viewer/timing.hpp"
 
 #include <fmt/format.h>
 
@@ -60,9 +60,9 @@ void frames(benchmark::State& state, Backend backend, std::uint32_t spheres, Scr
     view::RunState now = run->run_state();
     const double ms = now.times.detect;
     if (screen != nullptr) {
-      view::Stopwatch watch;
+      Stopwatch watch;
       screen->draw(painter, before, now);
-      picture_ms.push_back(watch.lap() * 1e3);
+      picture_ms.push_back(watch.lap_ms());
     }
     before = std::move(now);
     return ms;

@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/stopwatch.hpp"
 #include "src/sphere_collider/choice_reason.hpp"
 
 #include <algorithm>
@@ -15,8 +16,6 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// Work of find_touching(). The bytes are those of the first call with a list whose pairs all
 /// touch, because the changes and the touching pairs are unknown before the call.
@@ -112,10 +111,10 @@ auto AutomaticSphereCollider::compute(Calls& calls, const ColliderWork& expected
     const auto& [backend, algorithm, terms] = calls.ways[decision.alternative];
     try {
       calls.by = &collider(backend, algorithm);
-      const Clock::time_point start = Clock::now();
+      Stopwatch watch;
       const auto result = call(*calls.by);
-      const std::chrono::duration<double, std::micro> us = Clock::now() - start;
-      calls.chooser.record(us.count(), microseconds(terms, measure(result)));
+      const double us = watch.lap_us();
+      calls.chooser.record(us, microseconds(terms, measure(result)));
       if (device_failure_.empty()) calls.following = decision.following;
       calls.reason =
           device_lost_ ? ChoiceReason::device_failed : to_choice_reason(calls.chooser.reason());

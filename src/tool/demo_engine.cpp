@@ -3,13 +3,13 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/stopwatch.hpp"
 #include "src/demos/input_script.hpp"
 #include "src/tool/native_engine.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -33,11 +33,9 @@ class DemoEngine final : public Engine {
       : demo_(std::move(demo)), player_(script, *demo_) {}
 
   void step() override {
-    const auto start = std::chrono::steady_clock::now();
+    Stopwatch watch;
     report_ = demo_->step(player_.next());
-    const std::chrono::duration<double, std::milli> passed =
-        std::chrono::steady_clock::now() - start;
-    report_.total_ms = passed.count();  // includes the controls
+    report_.total_ms = watch.lap_ms();  // includes the controls
     if (!report_.device_failure.empty()) device_failure_ = report_.device_failure;
   }
   std::vector<BodyState> states() const override { return demo_->states(); }

@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/stopwatch.hpp"
 #include "src/tool/interrupts.hpp"
 #include "src/viewer/timing.hpp"
 #include "src/viewer/ui.hpp"
@@ -64,7 +65,7 @@ int run_headless(const ViewOptions& options) {
     ui.end(offscreen.framebuffer(), offscreen.width(), offscreen.height());
     glFinish();
     window.check_context();
-    timing.add_picture(watch.lap() * 1e3);
+    timing.add_picture(watch.lap_ms());
   };
   const auto picture = [&] {
     Image image = offscreen.read();

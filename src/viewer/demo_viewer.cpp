@@ -3,10 +3,10 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/stopwatch.hpp"
 #include "src/viewer/exchangeable_collider.hpp"
 #include "src/viewer/forces.hpp"
 #include "src/viewer/run_state.hpp"
-#include "src/viewer/timing.hpp"
 #include "src/viewer/widgets.hpp"
 
 #include <fmt/format.h>
@@ -129,7 +129,7 @@ void DemoViewer::step() {
   Stopwatch watch;
   report_ = demo_->step(inputs);
   check(!report_.non_finite);
-  report_.total_ms = watch.lap() * 1e3;  // includes the controls
+  report_.total_ms = watch.lap_ms();  // includes the controls
   before_ = std::move(now_);
   demo_->draw(&now_);
 }

@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/stopwatch.hpp"
 #include "src/viewer/widgets.hpp"
 
 #include <algorithm>
@@ -296,7 +297,7 @@ void App::draw_to(const Target& target, double seconds) {
   if (help_) show_help();
   show_notice(seconds);
   ui_.end(target.framebuffer, target.width, target.height);
-  timing_.add_picture(watch.lap() * 1e3);
+  timing_.add_picture(watch.lap_ms());
   write_pictures(target);
 }
 

@@ -1,7 +1,7 @@
 /// Conversion of wall time to fixed steps.
 #include "src/viewer/step_clock.hpp"
 
-#include "src/viewer/timing.hpp"
+#include "src/base/stopwatch.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,6 @@
 
 #include <jfpx/config.hpp>
 
-#include <chrono>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -12,21 +11,6 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
-
-/// Measures wall time since its creation or the last lap().
-class Stopwatch {
- public:
-  /// [s]
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - start_).count();
-    start_ = now;
-    return seconds;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 class Timing {
  public:

@@ -3,13 +3,13 @@
 
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
+#include "src/base/stopwatch.hpp"
 #include "src/sphere_collider/backend_table.hpp"
 #include "src/world/met_contacts.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <functional>
 #include <iterator>
 #include <new>
@@ -20,12 +20,6 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double elapsed_ms(Clock::time_point since, Clock::time_point until) {
-  return std::chrono::duration<double, std::milli>(until - since).count();
-}
 
 /// Upper estimate of the memory per body: in the scene, in the body store and in the copy that
 /// undo() restores. Used in an error message only.
@@ -176,34 +170,34 @@ bool World::Impl::advance(StepReport* report) {
 /// Detection, then integration and contacts in substeps. Until commit(), only arrays that
 /// save_for_undo() copies change.
 bool World::Impl::advance_soft_step(StepReport* report) {
-  const Clock::time_point start = Clock::now();
+  Stopwatch watch;
   ForceContext context(store, time());
   forces.call(context);
-  const Clock::time_point forced = Clock::now();
+  const double forces_ms = watch.lap_ms();
   find_contacts(report);
   soft_step.add_generated(store, std::span(contacts).subspan(report->contacts));
-  const Clock::time_point detected = Clock::now();
+  const double detect_ms = watch.lap_ms();
   if (!all_finite(soft_step.solve(&store), report)) return false;
   add_met_contacts(report);
   soft_step.commit(&store);
-  report->integrate_ms = elapsed_ms(start, forced);
-  report->detect_ms = elapsed_ms(forced, detected);
-  report->resolve_ms = elapsed_ms(detected, Clock::now());
+  report->integrate_ms = forces_ms;
+  report->detect_ms = detect_ms;
+  report->resolve_ms = watch.lap_ms();
   return true;
 }
 
 /// Integration, then detection, then resolution (thesis 4.3).
 bool World::Impl::advance_worst_first(StepReport* report) {
-  const Clock::time_point start = Clock::now();
+  Stopwatch watch;
   ForceContext context(store, time());
   forces.call(context);
   store.integrate();
   if (!all_finite(find_runaway(store), report)) return false;
 
-  const Clock::time_point integrated = Clock::now();
+  const double integrate_ms = watch.lap_ms();
   find_contacts(report);
 
-  const Clock::time_point detected = Clock::now();
+  const double detect_ms = watch.lap_ms();
   const std::span<const Contact> active = contacts_to_resolve();
   propagate_waking(active, &store);
   const ResolverReport resolution =
@@ -212,9 +206,9 @@ bool World::Impl::advance_worst_first(StepReport* report) {
   report->velocity_iterations = resolution.velocity_iterations;
   report->iterations_exhausted = resolution.exhausted;
   if (!all_finite(find_runaway(store), report)) return false;
-  report->integrate_ms = elapsed_ms(start, integrated);
-  report->detect_ms = elapsed_ms(integrated, detected);
-  report->resolve_ms = elapsed_ms(detected, Clock::now());
+  report->integrate_ms = integrate_ms;
+  report->detect_ms = detect_ms;
+  report->resolve_ms = watch.lap_ms();
   return true;
 }
 
@@ -276,7 +270,7 @@ void World::Impl::undo() noexcept {
 StepReport World::step() {
   Impl& w = *impl_;
   StepReport report;
-  const Clock::time_point start = Clock::now();
+  Stopwatch watch;
   try {
     w.choose_device(&report);
     // A step on the device changes nothing on the host, unless the host applies the forces.
@@ -316,7 +310,7 @@ StepReport World::step() {
       if (w.store.movable(id.index)) report.awake += w.store.moving.awake[id.index];
     }
   }
-  report.total_ms = elapsed_ms(start, Clock::now());
+  report.total_ms = watch.lap_ms();
   w.spent_us = 1e3 * report.total_ms;
   return report;
 }

@@ -2,9 +2,9 @@
 #include <jfpx/cuda/world.hpp>
 #include <jfpx/error.hpp>
 
+#include "src/base/stopwatch.hpp"
 #include "src/world/world_impl.hpp"
 
-#include <chrono>
 #include <mutex>
 #include <utility>
 
@@ -13,18 +13,17 @@ inline namespace JFPX_ABI {
 
 namespace {
 
-/// Adds its lifetime to a duration.
-class Timer {
+/// Adds the duration of a scope to `us`, also if an exception leaves the scope.
+class ScopedTimer {
  public:
-  explicit Timer(double* us) : us_(us), start_(Clock::now()) {}
-  ~Timer() { *us_ += std::chrono::duration<double, std::micro>(Clock::now() - start_).count(); }
-  Timer(const Timer&) = delete;
-  Timer& operator=(const Timer&) = delete;
+  explicit ScopedTimer(double* us) : us_(us) {}
+  ~ScopedTimer() { *us_ += watch_.lap_us(); }
+  ScopedTimer(const ScopedTimer&) = delete;
+  ScopedTimer& operator=(const ScopedTimer&) = delete;
 
  private:
-  using Clock = std::chrono::steady_clock;
   double* us_;
-  Clock::time_point start_;
+  Stopwatch watch_;
 };
 
 }  // namespace
@@ -60,7 +59,7 @@ void World::Impl::choose_device(StepReport* report) {
 
 void World::Impl::enter_device() {
   if (resident) return;
-  const Timer timer(&spent_us);
+  const ScopedTimer timer(&spent_us);
   if (bodies_changed) contact_finder.set_bodies(store);
   bodies_changed = false;
   force_table.invalidate();
@@ -94,7 +93,7 @@ void World::Impl::note_forces() {
 
 void World::Impl::flush_edits() {
   if (edits.empty()) return;
-  const Timer timer(&spent_us);
+  const ScopedTimer timer(&spent_us);
   forced_bodies.reserve(forced_bodies.size() + edits.size());
   device->edit(store, edits);
   for (const auto& [body, edit] : edits) forced_bodies.push_back(body);
@@ -112,7 +111,7 @@ void World::Impl::fetch_motion() {
   const std::lock_guard lock(fetching);
   if (motion_is_current) return;
   flush_edits();
-  const Timer timer(&spent_us);
+  const ScopedTimer timer(&spent_us);
   device->fetch_motion(&store.moving);
   motion_is_current = true;
 }
@@ -120,7 +119,7 @@ void World::Impl::fetch_motion() {
 void World::Impl::fetch_contacts() {
   if (!resident) return;
   const std::lock_guard lock(fetching);
-  const Timer timer(&spent_us);
+  const ScopedTimer timer(&spent_us);
   if (!contacts_are_current) {
     device->fetch_contacts(store, false, &contacts);
     finish_contacts(&contacts);
@@ -139,7 +138,7 @@ void World::Impl::fetch_contact_set() {
   const std::lock_guard lock(fetching);
   if (contact_set_is_current) return;
   soft_step.reserve(store.capacity());
-  const Timer timer(&spent_us);
+  const ScopedTimer timer(&spent_us);
   device->fetch_contact_set(&soft_step.last_contacts());
   contact_set_is_current = true;
 }

@@ -3,7 +3,7 @@
 
 #include <jfpx/bullet/scene_world.hpp>
 
-#include <chrono>
+#include "src/base/stopwatch.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -57,11 +57,9 @@ class TimedWorld final : public World {
  private:
   template <class Stage>
   static void time(double* milliseconds, Stage stage) {
-    const auto start = std::chrono::steady_clock::now();
+    Stopwatch watch;
     stage();
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - start;
-    *milliseconds += taken.count();
+    *milliseconds += watch.lap_ms();
   }
 
   StageTimes& times_;
