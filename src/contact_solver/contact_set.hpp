@@ -1,4 +1,5 @@
-/// Contacts of a step for the soft-step solver, with what they keep for the next step.
+/// Contacts of a step for the soft-step solver, with the impulses and colors that they keep for the
+/// next step.
 #pragma once
 
 #include <jfpx/math.hpp>

@@ -1,4 +1,4 @@
-/// Rows of a soft step: what the contacts of a step become, and what they keep of it.
+/// Setup of the rows of a soft step from its contacts, and the impulses that contacts keep.
 #pragma once
 
 #include <jfpx/material.hpp>

@@ -1,4 +1,4 @@
-/// Selection of the processor or the device for each step of a world.
+/// Selection of the CPU or the device for each step of a world.
 #include "src/world/automatic_device.hpp"
 
 #include <jfpx/error.hpp>

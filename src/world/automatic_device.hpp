@@ -1,4 +1,4 @@
-/// Backend::automatic of a world: selects the processor or the device for each step.
+/// Backend::automatic of a world: selects the CPU or the device for each step.
 #pragma once
 
 #include <jfpx/cost_model.hpp>
@@ -17,7 +17,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Starts the device when the time that it would have saved so far reaches the cost of starting it:
-/// on another thread, while the processor makes all steps, or in the call if that cost is 0. The
+/// on another thread, while the CPU makes all steps, or in the call if that cost is 0. The
 /// destructor waits for the other thread. Not thread-safe.
 class AutomaticDevice {
  public:
@@ -33,13 +33,13 @@ class AutomaticDevice {
   bool choose(std::size_t bodies);
   /// Records the time of the step for which choose() was last called.
   void record(double us);
-  /// The processor makes all later steps.
+  /// The CPU makes all later steps.
   void give_up();
   /// Reason for the last choice.
   ChoiceReason reason() const noexcept { return to_choice_reason(chooser_.reason()); }
 
  private:
-  enum Way : std::size_t { kProcessor, kDevice, kWays };
+  enum Way : std::size_t { kCpu, kDevice, kWays };
 
   void start();
 
@@ -48,7 +48,7 @@ class AutomaticDevice {
   Maker make_;
   TimeChooser chooser_;
   std::array<double, kWays> predicted_us_{};
-  std::size_t chosen_ = kProcessor;
+  std::size_t chosen_ = kCpu;
   bool is_asleep_ = true;                               ///< the device has not been started
   std::future<std::unique_ptr<DeviceWorld>> starting_;  ///< valid while the device starts
 };

@@ -93,7 +93,7 @@ void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_fr
   }
 }
 
-/// Checks a body as add() and set_state() do, and what the engine relies on beyond that.
+/// Checks a body as add() and set_state() do, and the further conditions that the engine relies on.
 void BodyStore::check_body(std::uint32_t i) const {
   BodyDef def;
   def.shape = shape_[i];

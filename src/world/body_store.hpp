@@ -18,11 +18,11 @@ inline namespace JFPX_ABI {
 class BinaryReader;
 class BinaryWriter;
 
-/// State that a step changes, indexed by BodyId::index. World::step() copies it before each step,
-/// so that a failed step can be undone.
+/// State that a step changes, indexed by BodyId::index. World::step() copies the arrays that a step
+/// may change before it can fail, so that a failed step can be undone.
 struct MotionArrays {
-  std::vector<Vec3> position;  ///< [m]
-  std::vector<Quat> orientation;
+  std::vector<Vec3> position;           ///< [m]
+  std::vector<Quat> orientation;        ///< unit quaternions
   std::vector<Vec3> velocity;           ///< [m/s]
   std::vector<Vec3> angular_velocity;   ///< [rad/s], world axes
   std::vector<Vec3> force;              ///< [N], for the next step
@@ -32,7 +32,7 @@ struct MotionArrays {
   /// [m^2/s^2], recency-weighted mean of v^2 + w^2, compared with SleepSettings::epsilon (thesis
   /// 4.4.2)
   std::vector<Real> motion;
-  std::vector<Real> rest_time;      ///< [s], since when the body is slow; soft_step
+  std::vector<Real> rest_time;      ///< [s], for which the body has been slow; soft_step
   std::vector<std::uint8_t> awake;  ///< 1 or 0; a body of mass 0: 1 if kinematic and moving
 };
 

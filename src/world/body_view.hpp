@@ -12,8 +12,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// What the steps of a world read of its bodies. All arrays are indexed by BodyId::index. See
-/// MotionArrays and BodyStore for the meaning and the units of the fields.
+/// Properties and state of bodies that the steps of a world read. All arrays are indexed by
+/// BodyId::index. See MotionArrays and BodyStore for the meaning and the units of the fields.
 struct BodyView {
   const Vec3* position = nullptr;
   const Quat* orientation = nullptr;

@@ -62,7 +62,7 @@ class ContactFinder {
   void find_fixed_candidates(const BodyStore& bodies);
   static bool may_touch(const SubShapeView& sub_shapes, SubShape sub_shape, SubShape fixed,
                         const Vec3& centre);
-  /// What a chunk of a parallel loop finds.
+  /// Results of a chunk of a parallel loop.
   struct Part {
     std::vector<soft_step::SphereContactInput> spheres;
     std::vector<soft_step::ManifoldInput> manifolds;

@@ -1,6 +1,6 @@
-/// Names and members of the forces of force.hpp and of what they consist of, for recordings and
-/// snapshots. Each function names all members of its type, so that a new member does not compile
-/// until it is here.
+/// Names and members of the forces of force.hpp and of their parts, for recordings and snapshots.
+/// Each function names all members of its type, so that a new member does not compile until it is
+/// here.
 #pragma once
 
 #include <jfpx/force.hpp>

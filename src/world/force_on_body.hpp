@@ -1,4 +1,4 @@
-/// The forces of force.hpp on one body, for the processor and for devices.
+/// The forces of force.hpp on one body, for the CPU and for devices.
 ///
 /// A Body has `state()`; `mass()`; `apply(force)`, at the centre of mass; `apply_at(force, point)`;
 /// `wake()`; and `for_each_part(visit)`, which calls visit(SolidPart) for its solids in order.

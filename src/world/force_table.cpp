@@ -126,7 +126,7 @@ void ForceTable::make_lists(const BodyStore& bodies) {
   first_item_.resize(bodies.capacity() + 1, static_cast<std::uint32_t>(on_body_.size()));
 }
 
-/// Copies what only some kinds of forces need of the bodies.
+/// Copies the properties of bodies that only some kinds of forces need.
 void ForceTable::copy_bodies(const BodyStore& bodies) {
   const std::size_t capacity = bodies.capacity();
   mass_.assign(std::get<Kind<Gravity>>(kinds_).values.empty() ? 0 : capacity, 0);

@@ -73,7 +73,7 @@ void serialize(auto& archive, Is<MaterialSettings> auto& settings) {
   auto& [friction, restitution] = settings;
   archive(friction, restitution);
 }
-/// Name and settings, without the bodies and pairs, which are those of the beginning.
+/// Name and settings, without the bodies and pairs, which are those at construction.
 void serialize(auto& archive, Is<Scene> auto& scene) {
   auto& [name, dt, bodies, solver, soft_step, resolver, sleep, materials, ignored_pairs] = scene;
   archive(name, dt, solver, soft_step, resolver, sleep, materials);
@@ -87,7 +87,7 @@ void serialize(auto& archive, Is<ContactGeneratorId> auto& id) {
   auto& [number] = id;
   archive(number);
 }
-/// Forces, and what they consist of.
+/// Forces and their parts.
 template <class T>
 requires requires(T& value) {
   each_field(value, [](const char*, auto&) {});

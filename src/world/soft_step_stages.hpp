@@ -1,4 +1,4 @@
-/// The stages of a soft step for one body or one contact, for the processor and for devices.
+/// The stages of a soft step for one body or one contact, for the CPU and for devices.
 #pragma once
 
 #include "src/contact_solver/contact_set.hpp"

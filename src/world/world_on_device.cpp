@@ -1,4 +1,4 @@
-/// Steps of a World on a device, and what the host fetches of them.
+/// Steps of a World on a device, and copies of their results to the host.
 #include <jfpx/cuda/world.hpp>
 #include <jfpx/error.hpp>
 
@@ -39,7 +39,7 @@ std::unique_ptr<DeviceWorld> World::Impl::make_warm_device(int number) {
   return std::move(world.impl_->device);
 }
 
-/// Selects what makes the next step: Backend::automatic decides for each one.
+/// Selects the backend of the next step, with Backend::automatic for each step anew.
 void World::Impl::choose_device(StepReport* report) {
   steps_on_device = false;
   const double last_us = std::exchange(spent_us, 0);
@@ -160,8 +160,8 @@ void World::Impl::leave_device() {
   resident = false;
 }
 
-/// One step on the device. If it fails, the processor takes over: the state is fetched, and later
-/// steps do not use the device.
+/// One step on the device. If it fails, the CPU continues: the state is fetched, and later steps do
+/// not use the device.
 /// @returns false if the step is to be done on the host
 bool World::Impl::advance_on_device(StepReport* report) {
   try {

@@ -125,10 +125,10 @@ __global__ void __launch_bounds__(kListThreads)
                  BothOrdersScratch scratch) {
   wait_for_previous_kernel();
   for (std::size_t i = first_element(); i < n; i += element_stride()) {
-    // The opposite number i comes after all items of lower rows.
+    // The opposite number i follows all items of lower rows.
     const std::uint32_t b = scratch.sorted_b[i];
     both[i + items_before(items, n, b)] = opposite(items[scratch.sorted_index[i]]);
-    // Item i comes after all opposites of its own and of lower rows.
+    // Item i follows the opposites of its own row and of all lower rows.
     const Item item = items[i];
     std::size_t low = 0, high = n;
     while (low < high) {
