@@ -486,7 +486,8 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
                   threads: int = 1) -> Any:
     """Finds all touching pairs of spheres. The number of contacts is limited by memory only.
 
-    Two spheres touch if the distance of their centres is at most the sum of their radii.
+    Two spheres touch if the distance of their centres is at most the sum of their radii. May be
+    called from any number of threads.
 
     Parameters
     ----------
@@ -541,7 +542,8 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
                query_radii: Any = None, batch: Any = None, periodic: Any = None,
                device: Any = None, output: str = "coo", half: bool = True, index_dtype: Any = "int32",
                threads: int = 1) -> Any:
-    """Finds all pairs of points within a cutoff, or of spheres that touch, as indices alone.
+    """Finds all pairs of points within a cutoff, or of spheres that touch, as indices alone. May be
+    called from any number of threads.
 
     Parameters
     ----------
@@ -552,8 +554,8 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
     radii : number or array (N,)
         Instead of `cutoff`, as in find_contacts().
     query : array (M, 3), optional
-        Finds pairs of a point of `query` and a point of `positions`, and no others: row a is an
-        index into `query`, row b into `positions`. `half` has no effect.
+        Finds pairs of a point of `query` and a point of `positions`, and no others: pairs[0] are
+        indices of `query`, pairs[1] of `positions`. `half` has no effect.
     query_radii : number or array (M,)
         With `radii`: those of `query`.
     batch, periodic, device, output, half, index_dtype, threads

@@ -25,9 +25,11 @@ class StepReport(NamedTuple):
     sphere_contacts: int
     """Of these, contacts between two spheres."""
     generated_contacts: int
+    """Contacts of contact generators, not included in `contacts`."""
     position_iterations: int
-    """Of the solver worst_first, as velocity_iterations."""
+    """Corrections of positions by the solver worst_first."""
     velocity_iterations: int
+    """Corrections of velocities by the solver worst_first."""
     iterations_exhausted: bool
     """A loop of the solver stopped at its limit with work left."""
     non_finite: bool
@@ -44,9 +46,13 @@ class StepReport(NamedTuple):
     device_failure: str
     """Error of a device whose work the CPU took over; empty if there was none."""
     integrate_ms: float
+    """[ms], forces and, with the solver worst_first, integration."""
     detect_ms: float
+    """[ms], contact detection."""
     resolve_ms: float
+    """[ms], all other stages. In a step on a GPU, these three are times of the device."""
     total_ms: float
+    """[ms], the whole step."""
 
 
 class WorldContacts(NamedTuple):
@@ -57,9 +63,9 @@ class WorldContacts(NamedTuple):
     normal: Any
     """(E, 3) [-]: unit vectors from b to a."""
     point: Any
-    """(E, 3) [m], world: middle of the overlap."""
+    """(E, 3) [m], world: middle of the overlap, or a point of b if the bodies met in the step."""
     distance: Any
-    """(E,) [m], <= 0: negative penetration depths."""
+    """(E,) [m], <= 0: negative penetration depths; 0 if the bodies met in the step."""
     friction: Any
     """(E,) [-]."""
     restitution: Any

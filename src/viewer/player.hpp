@@ -44,9 +44,8 @@ class Player {
   bool switch_to(const EngineChoice& choice);
   EngineChoice choice() const { return run_->choice(); }
   /// Writes the states of all steps, for `jfpx replay`.
-  /// @throws InvalidArgument if the steps are not those of one run, or the history no longer has
-  /// the
-  ///   first step; FileError
+  /// @throws InvalidArgument if the steps are not those of one run, or the first step is no longer
+  ///   in the history; FileError
   void save_recording(const std::string& path) const;
   /// Writes each following step to a file; a restart restarts the file. Call before the first step.
   /// @throws FileError; step() and restart() then also throw it
