@@ -82,19 +82,20 @@ SearchOutput ArraySearch::to_output(const DeviceBuffer<Item>& out, ContactCount*
   return output;
 }
 
-/// Searches on the stream of the user, and waits for the number of contacts, but not for them.
-ArraySearch::Answer ArraySearch::search_and_poll(const SphereInput& input, SearchOutput output,
-                                                 Stream user) {
+/// Searches on the stream of the user, and waits for the number of contacts, but not for the
+/// contacts.
+ArraySearch::PolledCount ArraySearch::search_and_poll(const SphereInput& input, SearchOutput output,
+                                                      Stream user) {
   signal.clear();
   output.signal = signal.word();
   collider.find(input, output, user);
-  const unsigned long long answer = signal.wait(user);
-  if ((answer & kSignalIsValid) == 0) {
+  const unsigned long long word = signal.wait(user);
+  if ((word & kSignalIsValid) == 0) {
     JFPX_CUDA_TRY(cudaStreamSynchronize(user));
     if (input.spheres == nullptr) launch_pack(input.arrays, spheres.data(), user);
     reject(counts.data()->first_invalid, user);
   }
-  return {answer >> kSignalBits, (answer & kSignalIsComplete) != 0};
+  return {word >> kSignalBits, (word & kSignalIsComplete) != 0};
 }
 
 template <class Item>
@@ -102,10 +103,10 @@ std::uint64_t ArraySearch::find(const SphereArrays& from, Stream user) {
   const SphereInput input = prepare(from, user);
   DeviceBuffer<Item>& out = items<Item>().found;
   while (true) {
-    const Answer answer = search_and_poll(input, to_output(out, counts.data()), user);
-    if (answer.is_complete) return keep(answer.contacts);
+    const PolledCount found = search_and_poll(input, to_output(out, counts.data()), user);
+    if (found.is_complete) return keep(found.contacts);
     follow(user);
-    out.reserve_geometric(pool, stream.get(), answer.contacts, "contacts");
+    out.reserve_geometric(pool, stream.get(), found.contacts, "contacts");
     collider.reserve(from.count, out.capacity());
     precede(user);
   }
@@ -120,10 +121,10 @@ std::uint64_t ArraySearch::find_pairs(const SphereArrays& from, Index* to, std::
                             .count = counts.data(),
                             .rows = {.indices = to, .is_wide = sizeof(Index) == 8}};
   while (true) {
-    const Answer answer = search_and_poll(input, output, user);
-    if (answer.is_complete || answer.contacts > capacity) return answer.contacts;
+    const PolledCount found = search_and_poll(input, output, user);
+    if (found.is_complete || found.contacts > capacity) return found.contacts;
     follow(user);
-    collider.reserve(from.count, answer.contacts);
+    collider.reserve(from.count, found.contacts);
     precede(user);
   }
 }

@@ -63,11 +63,12 @@ struct ArraySearch {
   SphereInput prepare(const SphereArrays& from, Stream user);
   template <class Item>
   SearchOutput to_output(const DeviceBuffer<Item>& out, ContactCount* count);
-  struct Answer {
+  /// Number of contacts of a search, and whether they fit into the output.
+  struct PolledCount {
     std::uint64_t contacts;
     bool is_complete;
   };
-  Answer search_and_poll(const SphereInput& input, SearchOutput output, Stream user);
+  PolledCount search_and_poll(const SphereInput& input, SearchOutput output, Stream user);
   template <class Item>
   std::uint64_t find(const SphereArrays& from, Stream user);
   template <class Index>

@@ -108,7 +108,7 @@ __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
     return;
   }
   CrowdedSearcher searcher(args, output, *args.plan, storage[threadIdx.x / 32].crowded);
-  for (std::uint32_t first = position - lane_id(), k = 0; k < 32; k += kHomes) {
+  for (std::uint32_t first = position - lane_id(), k = 0; k < 32; k += kQueries) {
     if (first + k < args.input.n) searcher.run(first + k);
   }
 }

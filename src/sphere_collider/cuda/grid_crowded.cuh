@@ -8,14 +8,15 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-inline constexpr unsigned kHomes = 8;  // spheres that a warp searches for together
+/// Number of spheres, the queries, whose neighbors a warp finds together.
+inline constexpr unsigned kQueries = 8;
 
 /// Shared memory of a warp.
 struct CrowdedStorage {
-  alignas(32) unsigned char spheres[kHomes * sizeof(SphereInstance)];
-  std::uint32_t ids[kHomes];
-  std::uint32_t found[kHomes];                              // number of neighbors
-  alignas(16) std::uint32_t neighbors[kHomes][kMaxStaged];  // in the order of discovery
+  alignas(32) unsigned char spheres[kQueries * sizeof(SphereInstance)];
+  std::uint32_t ids[kQueries];
+  std::uint32_t found[kQueries];                              // number of neighbors
+  alignas(16) std::uint32_t neighbors[kQueries][kMaxStaged];  // in the order of discovery
 };
 static_assert(kMaxStaged % 4 == 0);
 
@@ -30,43 +31,43 @@ class CrowdedSearcher {
         error_bound_(error_bound_of(2 * level_.half)),
         s_(storage) {}
 
-  /// Searches for the spheres at kHomes consecutive positions, or the last ones. Call from all
-  /// lanes of a warp.
+  /// Finds the neighbors of the spheres at kQueries consecutive positions, or at the last ones.
+  /// Call from all lanes of a warp.
   __device__ void run(std::uint32_t position) {
-    const unsigned homes = min(kHomes, args_.input.n - position);
-    const bool is_home = lane_id() < homes;
+    const unsigned queries = min(kQueries, args_.input.n - position);
+    const bool is_query = lane_id() < queries;
     CellRange near{};
     std::int32_t y = 0, z = 0;
     __syncwarp();
-    if (lane_id() < kHomes) {
-      // Elements after the last home have no neighbor, because no index is larger than theirs.
-      const std::uint32_t at = position + min(lane_id(), homes - 1);
+    if (lane_id() < kQueries) {
+      // Elements after the last query get no neighbor, because no index is larger than theirs.
+      const std::uint32_t at = position + min(lane_id(), queries - 1);
       const SphereInstance self = load_sorted(args_.table.sorted + at);
       near = neighbor_cells(level_, self);
       y = cell_of(self.centre.y, level_.inverse_yz);
       z = cell_of(self.centre.z, level_.inverse_yz);
       sphere(lane_id()) = self;
-      s_.ids[lane_id()] = is_home ? args_.table.ids[at] : ~0u;
+      s_.ids[lane_id()] = is_query ? args_.table.ids[at] : ~0u;
       s_.found[lane_id()] = 0;
     }
     __syncwarp();
-    for (unsigned left = (1u << homes) - 1; left != 0;) {
-      // Spheres of one row of cells are searched for together: the cells around them overlap.
+    for (unsigned left = (1u << queries) - 1; left != 0;) {
+      // Queries in one row of cells are searched together, because the cells around them overlap.
       const int first = __ffs(static_cast<int>(left)) - 1;
       const std::int32_t first_y = __shfl_sync(kFullWarp, y, first),
                          first_z = __shfl_sync(kFullWarp, z, first);
-      const bool is_in = is_home && y == first_y && z == first_z;
+      const bool is_in = is_query && y == first_y && z == first_z;
       const unsigned together = __ballot_sync(kFullWarp, is_in);
       search(together, united(near, is_in));
       left &= ~together;
     }
     __syncwarp();
-    stage(position, homes);
+    stage(position, queries);
   }
 
  private:
-  __device__ SphereInstance& sphere(unsigned home) {
-    return reinterpret_cast<SphereInstance*>(s_.spheres)[home];
+  __device__ SphereInstance& sphere(unsigned query) {
+    return reinterpret_cast<SphereInstance*>(s_.spheres)[query];
   }
 
   /// The smallest range that contains those of the lanes with `is_in`.
@@ -78,9 +79,9 @@ class CrowdedSearcher {
             highest(range.y1), lowest(range.z0),  highest(range.z1)};
   }
 
-  /// Tests all spheres in a range of cells against the homes whose bits are set. A lane tests one
+  /// Tests all spheres in a range of cells against the queries whose bits are set. A lane tests one
   /// sphere at a time.
-  __device__ void search(unsigned homes, const CellRange& near) {
+  __device__ void search(unsigned queries, const CellRange& near) {
     const std::int32_t rows_y = near.y1 - near.y0 + 1, rows = rows_y * (near.z1 - near.z0 + 1);
     for (std::int32_t first_row = 0; first_row < rows; first_row += 32) {
       const auto row = first_row + static_cast<std::int32_t>(lane_id());
@@ -100,35 +101,35 @@ class CrowdedSearcher {
         const std::uint32_t before_past = __shfl_sync(kFullWarp, sum, owner) - i;
         const std::uint32_t position = i < candidates ? past - before_past : 0;
         const SphereInstance other = load_sorted(args_.table.sorted + position);
-        // No index is larger than that of a home if it is 0.
-        test(homes, other, i < candidates ? args_.table.ids[position] : 0);
+        // Index 0 is a neighbor of no query, because it is not larger than any index.
+        test(queries, other, i < candidates ? args_.table.ids[position] : 0);
       }
     }
   }
 
-  /// Adds a sphere to the neighbors of those of the homes that it touches.
-  __device__ void test(unsigned homes, const SphereInstance& other, std::uint32_t id) {
+  /// Adds a sphere to the neighbors of the queries that it touches.
+  __device__ void test(unsigned queries, const SphereInstance& other, std::uint32_t id) {
     unsigned touching = 0;
     bool is_uncertain = false;
 #pragma unroll
-    for (unsigned home = 0; home < kHomes; ++home) {
-      const Real e = excess(load_sorted(&sphere(home)), other);
-      const bool may_touch = !(e > error_bound_) && id > s_.ids[home];
+    for (unsigned query = 0; query < kQueries; ++query) {
+      const Real e = excess(load_sorted(&sphere(query)), other);
+      const bool may_touch = !(e > error_bound_) && id > s_.ids[query];
       is_uncertain = is_uncertain || !(absolute(e) > error_bound_);
-      touching |= may_touch ? 1u << home : 0;
+      touching |= may_touch ? 1u << query : 0;
     }
-    for (touching &= homes; touching != 0; touching &= touching - 1) {
-      const auto home = static_cast<unsigned>(__ffs(static_cast<int>(touching)) - 1);
-      if (is_uncertain && !touch(load_sorted(&sphere(home)), other)) continue;
-      const std::uint32_t at = atomicAdd(&s_.found[home], 1u);
-      if (at < kMaxStaged) s_.neighbors[home][at] = id;
+    for (touching &= queries; touching != 0; touching &= touching - 1) {
+      const auto query = static_cast<unsigned>(__ffs(static_cast<int>(touching)) - 1);
+      if (is_uncertain && !touch(load_sorted(&sphere(query)), other)) continue;
+      const std::uint32_t at = atomicAdd(&s_.found[query], 1u);
+      if (at < kMaxStaged) s_.neighbors[query][at] = id;
     }
   }
 
-  /// Sorts the neighbors of each home by rank, that is, by the number of smaller ones, and writes
+  /// Sorts the neighbors of each query by rank, that is, by the number of smaller ones, and writes
   /// them to the staging buffer.
-  __device__ void stage(std::uint32_t position, unsigned homes) {
-    const std::uint32_t found = lane_id() < homes ? s_.found[lane_id()] : 0,
+  __device__ void stage(std::uint32_t position, unsigned queries) {
+    const std::uint32_t found = lane_id() < queries ? s_.found[lane_id()] : 0,
                         kept = found > kMaxStaged ? 0 : found;
     const std::uint32_t sum = warp_inclusive_sum(kept);
     const std::uint32_t all = __shfl_sync(kFullWarp, sum, 31);
@@ -137,7 +138,7 @@ class CrowdedSearcher {
       index = atomicAdd(&args_.state->contacts, static_cast<unsigned long long>(all));
     }
     index = __shfl_sync(kFullWarp, index, 0);
-    if (lane_id() < homes) {
+    if (lane_id() < queries) {
       const std::uint32_t id = s_.ids[lane_id()];
       atomicAdd(&args_.rows.bin_sums[id / kBin], static_cast<unsigned long long>(found));
       if (found <= kMaxStaged) {
@@ -153,19 +154,19 @@ class CrowdedSearcher {
     }
     __syncwarp();
     if (index + all > args_.rows.capacity) return;
-    for (unsigned home = 0; home < homes; ++home) {
-      const std::uint32_t length = __shfl_sync(kFullWarp, kept, home);
-      const unsigned long long to = index + __shfl_sync(kFullWarp, sum, home) - length;
-      const auto* const neighbors = reinterpret_cast<const uint4*>(s_.neighbors[home]);
+    for (unsigned query = 0; query < queries; ++query) {
+      const std::uint32_t length = __shfl_sync(kFullWarp, kept, query);
+      const unsigned long long to = index + __shfl_sync(kFullWarp, sum, query) - length;
+      const auto* const neighbors = reinterpret_cast<const uint4*>(s_.neighbors[query]);
       for (std::uint32_t i = lane_id(); i < length; i += 32) {
-        const std::uint32_t b = s_.neighbors[home][i];
+        const std::uint32_t b = s_.neighbors[query][i];
         std::uint32_t rank = 0;
         for (std::uint32_t k = 0; 4 * k < length; ++k) {
           const uint4 four = neighbors[k];
           rank += (four.x < b ? 1 : 0) + (four.y < b ? 1 : 0) + (four.z < b ? 1 : 0) +
                   (four.w < b ? 1 : 0);
         }
-        write_contact(staging_, to + rank, s_.ids[home], b, load_sorted(&sphere(home)),
+        write_contact(staging_, to + rank, s_.ids[query], b, load_sorted(&sphere(query)),
                       load_sphere(args_.input, b));
       }
     }

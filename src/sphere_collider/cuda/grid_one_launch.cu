@@ -66,8 +66,8 @@ __device__ void search_crowded(const GridArgs& args, const SearchOutput& output,
                                const cg::grid_group& grid) {
   const unsigned warp = threadIdx.x / 32;
   CrowdedSearcher searcher(args, output, plan, storage.crowded[warp]);
-  const std::uint64_t stride = std::uint64_t{kHomes} * kGridWarps * gridDim.x;
-  for (std::uint64_t first = std::uint64_t{kHomes} * (kGridWarps * blockIdx.x + warp);
+  const std::uint64_t stride = std::uint64_t{kQueries} * kGridWarps * gridDim.x;
+  for (std::uint64_t first = std::uint64_t{kQueries} * (kGridWarps * blockIdx.x + warp);
        first < args.input.n; first += stride) {
     searcher.run(static_cast<std::uint32_t>(first));
   }
