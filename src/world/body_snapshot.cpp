@@ -38,9 +38,9 @@ void BodyStore::serialize_body(Archive& archive, Self& self, std::uint32_t i) {
           self.friction_[i], self.restitution_[i], self.rolling_friction_[i],
           self.spinning_friction_[i], self.filter_[i], self.user_data_[i]);
   auto& [position, orientation, velocity, angular_velocity, force, torque, last_acceleration,
-         inverse_inertia, motion, rest_time, awake] = self.moving;
+         inverse_inertia, mean_motion, rest_time, awake] = self.moving;
   archive(position[i], orientation[i], velocity[i], angular_velocity[i], force[i], torque[i],
-          last_acceleration[i], inverse_inertia[i], motion[i], rest_time[i], awake[i]);
+          last_acceleration[i], inverse_inertia[i], mean_motion[i], rest_time[i], awake[i]);
 }
 
 void BodyStore::write(BinaryWriter* writer) const {

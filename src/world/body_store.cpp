@@ -76,7 +76,7 @@ template <class Visit>
 void BodyStore::for_each_array(const Visit& visit) {
   const auto all = [&visit](auto&... arrays) { (visit(arrays), ...); };
   all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
-      moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.motion,
+      moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.mean_motion,
       moving.rest_time, moving.awake);
   all(shape_, radius_, extent_, mass_, inverse_mass_, friction_, restitution_, rolling_friction_,
       spinning_friction_, inertia_, body_inverse_inertia_, tensor_, acceleration_, linear_damping_,
@@ -134,7 +134,7 @@ BodyId BodyStore::add(const BodyDef& def) {
   sensor_[i] = def.sensor ? 1 : 0;
   set_filter(i, def.filter);
   moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
-  moving.motion[i] = moving.rest_time[i] = 0;
+  moving.mean_motion[i] = moving.rest_time[i] = 0;
   moving.awake[i] = 0;
   count_body(i);
   set_state(i, {def.position, def.orientation, def.velocity, def.angular_velocity});
@@ -211,7 +211,7 @@ void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
   wake(i);
   if (!kinematic(i)) return;
   moving.awake[i] = moving.velocity[i] == Vec3{} && moving.angular_velocity[i] == Vec3{} ? 0 : 1;
-  moving.motion[i] = 2 * sleep_.epsilon;  // wake_by_contact() copies it to bodies in contact
+  moving.mean_motion[i] = 2 * sleep_.epsilon;  // wake_by_contact() copies it to bodies in contact
 }
 
 void BodyStore::set_filter(std::uint32_t i, const CollisionFilter& filter) noexcept {
@@ -257,7 +257,7 @@ void BodyStore::apply_torque(std::uint32_t i, const Vec3& torque) {
 void BodyStore::wake(std::uint32_t i) {
   if (!movable(i)) return;
   moving.awake[i] = 1;
-  moving.motion[i] = 2 * sleep_.epsilon;
+  moving.mean_motion[i] = 2 * sleep_.epsilon;
   moving.rest_time[i] = 0;
 }
 
@@ -265,12 +265,12 @@ void BodyStore::wake_by_contact(std::uint32_t sleeper, std::uint32_t awake) {
   // Copying the motion, instead of raising it to a minimum, lets touching bodies fall asleep
   // together; with a minimum, they would wake each other alternately without end.
   moving.awake[sleeper] = 1;
-  moving.motion[sleeper] = moving.motion[awake];
+  moving.mean_motion[sleeper] = moving.mean_motion[awake];
   moving.rest_time[sleeper] = 0;
 }
 
 void BodyStore::keep_awake(std::uint32_t i) {
-  moving.motion[i] = std::max(moving.motion[i], 2 * sleep_.epsilon);
+  moving.mean_motion[i] = std::max(moving.mean_motion[i], 2 * sleep_.epsilon);
 }
 
 bool BodyStore::has_moving_kinematic_body() const {
@@ -314,10 +314,10 @@ void BodyStore::move(std::uint32_t i) {
 /// the velocity already contains the gravity of this step, and a body at rest that moved by it
 /// before falling asleep would remain deeper in the ground.
 bool BodyStore::falls_asleep(std::uint32_t i) {
-  moving.motion[i] =
-      detail::mean_motion(moving.motion[i], moving.velocity[i], moving.angular_velocity[i],
+  moving.mean_motion[i] =
+      detail::mean_motion(moving.mean_motion[i], moving.velocity[i], moving.angular_velocity[i],
                           motion_kept_, 10 * sleep_.epsilon);
-  if (!(moving.motion[i] < sleep_.epsilon)) return false;
+  if (!(moving.mean_motion[i] < sleep_.epsilon)) return false;
   moving.awake[i] = 0;
   moving.velocity[i] = moving.angular_velocity[i] = {};
   return true;
@@ -372,7 +372,7 @@ MotionPointers BodyStore::motion_pointers() {
           .torque = moving.torque.data(),
           .last_acceleration = moving.last_acceleration.data(),
           .inverse_inertia = moving.inverse_inertia.data(),
-          .motion = moving.motion.data(),
+          .mean_motion = moving.mean_motion.data(),
           .rest_time = moving.rest_time.data(),
           .awake = moving.awake.data()};
 }

@@ -31,7 +31,7 @@ struct MotionArrays {
   std::vector<Mat3> inverse_inertia;    ///< [1/(kg m^2)], world axes
   /// [m^2/s^2], recency-weighted mean of v^2 + w^2, compared with SleepSettings::epsilon (thesis
   /// 4.4.2)
-  std::vector<Real> motion;
+  std::vector<Real> mean_motion;
   std::vector<Real> rest_time;      ///< [s], for which the body has been slow; soft_step
   std::vector<std::uint8_t> awake;  ///< 1 or 0; a body of mass 0: 1 if kinematic and moving
 };

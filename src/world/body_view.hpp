@@ -117,7 +117,7 @@ struct MotionPointers {
   Vec3 *velocity = nullptr, *angular_velocity = nullptr;
   Vec3 *force = nullptr, *torque = nullptr, *last_acceleration = nullptr;
   Mat3* inverse_inertia = nullptr;
-  Real *motion = nullptr, *rest_time = nullptr;
+  Real *mean_motion = nullptr, *rest_time = nullptr;
   std::uint8_t* awake = nullptr;
 
   JFPX_HD void refresh_inertia(const BodyView& bodies, std::uint32_t i) const {
@@ -128,7 +128,7 @@ struct MotionPointers {
   /// Wakes a movable body.
   JFPX_HD void wake(const BodyView& bodies, std::uint32_t i) const {
     awake[i] = 1;
-    motion[i] = bodies.woken_motion;
+    mean_motion[i] = bodies.woken_motion;
     rest_time[i] = 0;
   }
 

@@ -230,7 +230,7 @@ void World::Impl::save_for_undo() {
       case 2:
         return void(before.last_acceleration = now.last_acceleration);
       case 3:
-        return void(before.motion = now.motion);
+        return void(before.mean_motion = now.mean_motion);
       case 4:
         return void(before.rest_time = now.rest_time);
       default:
@@ -248,7 +248,7 @@ void World::Impl::undo_motion() noexcept {
     std::swap(now.force, before.force);
     std::swap(now.torque, before.torque);
     std::swap(now.last_acceleration, before.last_acceleration);
-    std::swap(now.motion, before.motion);
+    std::swap(now.mean_motion, before.mean_motion);
     std::swap(now.rest_time, before.rest_time);
     std::swap(now.awake, before.awake);
   }

@@ -153,7 +153,7 @@ TEST(Erratum, E30_a_default_body_moves_and_is_awake) {
   def.velocity = {1, 0, 0};
   const std::uint32_t i = store.add(def).index;
   EXPECT_EQ(store.moving.awake[i], 1);
-  EXPECT_EQ(store.moving.motion[i], 2 * SleepSettings{}.epsilon);
+  EXPECT_EQ(store.moving.mean_motion[i], 2 * SleepSettings{}.epsilon);
   store.integrate();
   EXPECT_EQ(store.moving.velocity[i].x, 1);
   EXPECT_EQ(store.moving.position[i].x, kDt);
@@ -188,7 +188,7 @@ TEST(Sleep, AFastPastIsForgottenInBoundedTime) {
   def.velocity = {1000, 0, 0};
   const std::uint32_t i = store.add(def).index;
   for (int step = 0; step < 10; ++step) store.integrate();
-  EXPECT_EQ(store.moving.motion[i], 10 * SleepSettings{}.epsilon);
+  EXPECT_EQ(store.moving.mean_motion[i], 10 * SleepSettings{}.epsilon);
   store.moving.velocity[i] = {};
   // 3.0 * 0.05^t < 0.3 from t = ln 10 / ln 20 = 0.769.
   int steps = 0;

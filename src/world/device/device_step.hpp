@@ -66,7 +66,7 @@ class DeviceStep final : public DeviceWorld {
     put(&motion_.force, moving.force);
     put(&motion_.torque, moving.torque);
     put(&motion_.awake, moving.awake);
-    put(&motion_.motion, moving.motion);
+    put(&motion_.mean_motion, moving.mean_motion);
     put(&motion_.rest_time, moving.rest_time);
     device_->wait();
   }
@@ -143,7 +143,7 @@ class DeviceStep final : public DeviceWorld {
     get(&moving->torque, motion_.torque);
     get(&moving->last_acceleration, motion_.last_acceleration);
     get(&moving->inverse_inertia, motion_.inverse_inertia);
-    get(&moving->motion, motion_.motion);
+    get(&moving->mean_motion, motion_.mean_motion);
     get(&moving->rest_time, motion_.rest_time);
     get(&moving->awake, motion_.awake);
     device_->wait();
@@ -216,13 +216,13 @@ class DeviceStep final : public DeviceWorld {
     Buffer<Vec3> position, velocity, angular_velocity, force, torque, last_acceleration;
     Buffer<Quat> orientation;
     Buffer<Mat3> inverse_inertia;
-    Buffer<Real> motion, rest_time;
+    Buffer<Real> mean_motion, rest_time;
     Buffer<std::uint8_t> awake;
   };
   /// What a step changes before it can fail.
   struct Saved {
     Buffer<Vec3> last_acceleration;
-    Buffer<Real> motion, rest_time;
+    Buffer<Real> mean_motion, rest_time;
     Buffer<std::uint8_t> awake;
   };
   struct SubShapes {
@@ -363,7 +363,7 @@ class DeviceStep final : public DeviceWorld {
     to.torque = put(&motion_.torque, from.torque);
     to.last_acceleration = put(&motion_.last_acceleration, from.last_acceleration);
     to.inverse_inertia = put(&motion_.inverse_inertia, from.inverse_inertia);
-    to.motion = put(&motion_.motion, from.motion);
+    to.mean_motion = put(&motion_.mean_motion, from.mean_motion);
     to.rest_time = put(&motion_.rest_time, from.rest_time);
     to.awake = put(&motion_.awake, from.awake);
     BodyView& bodies = data_.step.bodies;
@@ -485,7 +485,7 @@ class DeviceStep final : public DeviceWorld {
     d.row_bodies = room(&s.row_bodies, n);
     d.pair_count = room(&s.pair_count, 1);
     d.counters = room(&counters_, 1);
-    d.saved = {room(&saved_.last_acceleration, n), room(&saved_.motion, n),
+    d.saved = {room(&saved_.last_acceleration, n), room(&saved_.mean_motion, n),
                room(&saved_.rest_time, n), room(&saved_.awake, n)};
   }
 
@@ -619,7 +619,7 @@ class DeviceStep final : public DeviceWorld {
     const SavedArrays& saved = data_.saved;
     const std::size_t n = data_.step.bodies.capacity;
     device_->copy(m.last_acceleration, saved.last_acceleration, n);
-    device_->copy(m.motion, saved.motion, n);
+    device_->copy(m.mean_motion, saved.mean_motion, n);
     device_->copy(m.rest_time, saved.rest_time, n);
     device_->copy(m.awake, saved.awake, n);
   }

@@ -20,7 +20,7 @@ JFPX_HD void start_counters(const Team& team, const StepData& data) {
 JFPX_HD inline void save(const StepData& data, std::uint32_t body) {
   const MotionPointers& motion = data.step.motion;
   data.saved.last_acceleration[body] = motion.last_acceleration[body];
-  data.saved.motion[body] = motion.motion[body];
+  data.saved.mean_motion[body] = motion.mean_motion[body];
   data.saved.rest_time[body] = motion.rest_time[body];
   data.saved.awake[body] = motion.awake[body];
 }

@@ -92,7 +92,7 @@ struct DeviceContacts {
 /// The arrays that a step changes before it can fail, as they were at its start, by body.
 struct SavedArrays {
   Vec3* last_acceleration = nullptr;
-  Real *motion = nullptr, *rest_time = nullptr;
+  Real *mean_motion = nullptr, *rest_time = nullptr;
   std::uint8_t* awake = nullptr;
 };
 
