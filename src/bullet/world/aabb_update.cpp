@@ -93,14 +93,14 @@ bool AabbUpdate::run(btCollisionWorld& world, ThreadPool& pool) {
   if (!reserve_geometric(static_cast<std::size_t>(leaves))) return false;
 
   // Leaves that belong to no object of the world are not among the updates.
-  if (leaves >= side_by_side_ && leaves == world.getNumCollisionObjects()) {
+  if (leaves >= minimum_objects_ && leaves == world.getNumCollisionObjects()) {
     BT_PROFILE("updateAabbs");  // Bullet's own name of the profile zone
     if (compute_updates(world, tree, pool)) {
       if (few_leaves_move(pool)) {
         run_in_tree(tree, cache);
         return true;
       }
-      if (run_side_by_side(tree, cache, pool)) return true;
+      if (run_in_parallel(tree, cache, pool)) return true;
     }
   }
   // Called for an AABB that is too large; it may add and remove bodies.
@@ -149,8 +149,8 @@ void AabbUpdate::run_in_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCach
 }
 
 /// Returns false and changes nothing if there is not enough memory.
-bool AabbUpdate::run_side_by_side(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
-                                  ThreadPool& pool) {
+bool AabbUpdate::run_in_parallel(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
+                                 ThreadPool& pool) {
   std::size_t overlaps = 0;
   try {
     overlaps = search_.run(pool, leaves_, cache);

@@ -24,8 +24,8 @@ namespace bullet {
 /// would find them.
 class JFPX_API AabbUpdate {
  public:
-  /// @param side_by_side with fewer objects, one is updated after the other, which is then faster
-  explicit AabbUpdate(int side_by_side = 256) : side_by_side_(side_by_side) {}
+  /// @param minimum_objects fewer objects are updated one after the other, which is then faster
+  explicit AabbUpdate(int minimum_objects = 256) : minimum_objects_(minimum_objects) {}
 
   /// Has the effect of btCollisionWorld::updateAabbs(). Returns false and changes nothing if the
   /// broadphase is not Bullet's default, its own tree with its own hash table, if user code may run
@@ -45,8 +45,8 @@ class JFPX_API AabbUpdate {
   bool compute_updates(btCollisionWorld& world, btDbvtBroadphase& tree, ThreadPool& pool);
   bool few_leaves_move(const ThreadPool& pool) const;
   void run_in_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache);
-  bool run_side_by_side(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
-                        ThreadPool& pool);
+  bool run_in_parallel(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
+                       ThreadPool& pool);
   void run_one_by_one(btCollisionWorld& world, btDbvtBroadphase& tree,
                       btHashedOverlappingPairCache& cache);
   void search_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
@@ -56,7 +56,7 @@ class JFPX_API AabbUpdate {
   void add_in_order(btHashedOverlappingPairCache& cache, btDbvtProxy* moved,
                     std::span<const NewOverlap> overlaps);
 
-  int side_by_side_;
+  int minimum_objects_;
   std::vector<LeafUpdate> leaves_;
   OverlapSearch search_;
   std::vector<btDbvtProxy*> others_;
