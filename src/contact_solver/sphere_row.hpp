@@ -145,6 +145,17 @@ JFPX_HD inline bool rebound(SphereRow* at, const StepConstants& step, const Impa
   return true;
 }
 
+/// [-], penetration in parts of the smaller radius from which StepConstants::deep_balls holds.
+inline constexpr Real kDeepPenetration = Real(0.03);
+
+template <bool kFixed>
+JFPX_HD constexpr const Softness& softness_of(const SphereRow& row, const StepConstants& step,
+                                              Real separation) {
+  if constexpr (kFixed) return step.fixed;
+  const Real radius = row.arm_a < row.arm_b ? row.arm_a : row.arm_b;
+  return -separation > kDeepPenetration * radius ? step.deep_balls : step.balls;
+}
+
 /// One iteration: a rebound, friction within Coulomb's cone, and the impulse along the normal.
 /// @param soft whether penetrations are pushed out
 template <bool kFixed, class Impacts>
@@ -163,7 +174,7 @@ JFPX_HD inline void solve(SphereRow* row, SolverBody* a, SolverBody* b, const St
     velocity = relative_velocity<kFixed>(*row, *a, *b);
     closing = dot(velocity, n);
   }
-  const Bias bias = bias_of(separation, kFixed ? step.fixed : step.balls, step, soft);
+  const Bias bias = bias_of(separation, softness_of<kFixed>(*row, step, separation), step, soft);
 
   Vec3 friction = row->friction_impulse - (velocity - n * closing) * row->tangent_mass;
   const Real limit = row->friction * row->normal_impulse;

@@ -33,6 +33,7 @@ struct StepConstants {
   Real inverse_h = 0;       ///< [1/s]
   Softness movable;         ///< between two movable bodies
   Softness balls;           ///< between two movable spheres, in a SphereRow
+  Softness deep_balls;      ///< the same, for penetrations that heaps at rest do not have
   Softness fixed;           ///< between a movable and an immovable or kinematic body
   Real push_out_speed = 0;  ///< [m/s]
   /// [m/s], maximum velocity of a push-out. The sweep without push-out removes most of it from the
@@ -43,8 +44,10 @@ struct StepConstants {
 };
 
 /// Frequencies are limited to a quarter of the substep rate, and twice that for fixed bodies: a
-/// faster spring would not be resolved by the substeps. Spheres have twice the damping ratio: heaps
-/// of them come to rest sooner, while pyramids of boxes would keep oscillating.
+/// faster spring would not be resolved by the substeps. Spheres have six times the damping ratio:
+/// with less, layers at the bottom of deep heaps keep creeping, while pyramids of boxes would keep
+/// oscillating with more. Deep penetrations, as of bodies that overlap at the start, are pushed out
+/// faster with twice the damping ratio.
 JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& settings, Real dt) {
   const Real h = dt / static_cast<Real>(settings.substeps);
   const Real inverse_h = static_cast<Real>(settings.substeps) / dt;
@@ -54,6 +57,7 @@ JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& sett
   return {h,
           inverse_h,
           make_softness(hertz, settings.damping_ratio, h),
+          make_softness(hertz, 6 * settings.damping_ratio, h),
           make_softness(hertz, 2 * settings.damping_ratio, h),
           make_softness(2 * hertz, settings.damping_ratio, h),
           settings.push_out_speed,

@@ -1,4 +1,4 @@
-/// Scenes of spheres: pile, gas, columns, overlap, lattice and polydisperse.
+/// Scenes of spheres: pile, heap, gas, columns, overlap, lattice and polydisperse.
 #include "src/scenes/makers.hpp"
 
 namespace jfpx {
@@ -12,22 +12,41 @@ Vec3 jitter(Random& random, Real amount) {
   return random.uniform_in_box({-amount, -amount, -amount}, {amount, amount, amount});
 }
 
+/// A lattice of spheres above the floor of an open box.
+/// @param sphere(site) the sphere at a site of the lattice
+template <class Sphere>
+Scene in_open_box(const char* name, std::uint32_t count, const Sphere& sphere) {
+  constexpr Real kSpacing = Real(1.1), kGap = Real(0.6);
+  Scene scene;
+  scene.name = name;
+  const std::uint32_t side = cube_side(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    scene.bodies.push_back(sphere(lattice_site(i, side) * kSpacing + Vec3{0, Real(0.6), 0}));
+  }
+  const Real width = static_cast<Real>(side - 1) * kSpacing;
+  add_container(scene, {-kGap, 0, -kGap}, {width + kGap, 2 * width + 2, width + kGap}, false, {});
+  return scene;
+}
+
 }  // namespace
 
 Scene make_pile(const Counts& counts) {
-  constexpr Real kSpacing = Real(1.1);
-  Scene scene;
-  scene.name = "pile";
   Random random(counts.seed);
-  const std::uint32_t side = cube_side(counts.spheres);
-  for (std::uint32_t i = 0; i < counts.spheres; ++i) {
-    const Vec3 site = lattice_site(i, side) * kSpacing + Vec3{0, Real(0.6), 0};
-    scene.bodies.push_back(sphere_at(site + jitter(random, Real(0.04)), kRadius, 1));
-  }
-  const Real width = static_cast<Real>(side - 1) * kSpacing;
-  const Real gap = Real(0.6);
-  add_container(scene, {-gap, 0, -gap}, {width + gap, 2 * width + 2, width + gap}, false, {});
-  return scene;
+  return in_open_box("pile", counts.spheres, [&random](const Vec3& site) {
+    return sphere_at(site + jitter(random, Real(0.04)), kRadius, 1);
+  });
+}
+
+Scene make_heap(const Counts& counts) {
+  Random random(counts.seed);
+  return in_open_box("heap", counts.spheres, [&random](const Vec3& site) {
+    const Real scale = random.uniform(Real(0.9), 1);
+    BodyDef body =
+        sphere_at(site + jitter(random, Real(0.04)), kRadius * scale, scale * scale * scale);
+    // For the resistance to rolling: without any, some spheres roll in their hollows without end.
+    body.angular_damping = Real(0.5);
+    return body;
+  });
 }
 
 Scene make_gas(const Counts& counts) {

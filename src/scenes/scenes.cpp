@@ -22,6 +22,8 @@ constexpr Entry kScenes[] = {
      Boxes::as_many_as_spheres, make_mixed},
     {"pile", "a jittered lattice of spheres falls into an open box and comes to rest", 2048,
      Boxes::none, make_pile},
+    {"heap", "spheres of radius 0.45 to 0.5 m fall into an open box, come to rest and sleep", 4096,
+     Boxes::none, make_heap},
     {"gas", "fast spheres without gravity in a closed box, volume fraction 0.30", 4096, Boxes::none,
      make_gas},
     {"columns", "stacks of 32 spheres that initially overlap by a quarter of a diameter", 1024,

@@ -131,6 +131,12 @@ struct MotionPointers {
     mean_motion[i] = bodies.woken_motion;
     rest_time[i] = 0;
   }
+  /// Wakes a sleeping body that touches an awake one, directly or by others. It keeps its rest
+  /// time: if a slow body began it anew at each touch, it would keep a heap awake for ever.
+  JFPX_HD void wake_by_neighbor(const BodyView& bodies, std::uint32_t i) const {
+    awake[i] = 1;
+    mean_motion[i] = bodies.woken_motion;
+  }
 
   JFPX_HD void put_to_sleep(std::uint32_t i) const {
     awake[i] = 0;

@@ -111,8 +111,11 @@ void SoftStep::wake_touched(BodyStore* store) {
   for (const BodyId id : store->ids()) {
     if (bodies.is_active(id.index)) marked_[islands_.find(id.index)] = 1;
   }
+  const MotionPointers motion = store->motion_pointers();
   for (const BodyId id : store->ids()) {
-    if (is_asleep(id) && marked_[islands_.find(id.index)] != 0) store->wake(id.index);
+    if (is_asleep(id) && marked_[islands_.find(id.index)] != 0) {
+      motion.wake_by_neighbor(bodies, id.index);
+    }
   }
 }
 

@@ -42,15 +42,16 @@ constexpr Pin kPins[] = {
 
 /// With Solver::soft_step.
 constexpr Pin kSoftStepPins[] = {
-    {"pile", 100, 100, 0x2ac2c505e502b947u, 0xa3365f71545d45bfu},
-    {"gas", 200, 100, 0xa00631c45365a2d7u, 0x9ae730d5b1860ac4u},
-    {"columns", 64, 60, 0x3746ac58e471414au, 0x689a4f77d82ffd19u},
-    {"overlap", 32, 60, 0x4caacd5a8f876824u, 0x91bef13c07ed6bcbu},
-    {"lattice", 125, 30, 0x77e78eebecf6e18bu, 0x2791f978fd52c3b3u},
-    {"polydisperse", 100, 60, 0xb958e5206e05cd8eu, 0xb871b98d66e66601u},
-    {"mixed", 40, 150, 0xa968cc2a6dd463bfu, 0xba8dc1057a54b3adu},
+    {"pile", 100, 100, 0xe20119f80b9573f7u, 0xb7927b6441f83c2fu},
+    {"heap", 100, 400, 0x2909de48880fa461u, 0xc12f37a3b5b517b8u},
+    {"gas", 200, 100, 0xa8788d5639ea9d11u, 0xc2e937f96631d72bu},
+    {"columns", 64, 60, 0x9678de459fd6c2dbu, 0x0f973ef94576d375u},
+    {"overlap", 32, 60, 0x1aa5330e3d17bbf6u, 0xe54219b9024930d0u},
+    {"lattice", 125, 30, 0xc1b4bc0d5892cdceu, 0xfdde9b1863a93df8u},
+    {"polydisperse", 100, 60, 0x347dbd6648aa912du, 0x6334b248a85c88dfu},
+    {"mixed", 40, 150, 0xd94926054c13099au, 0xd9f4938de668a4adu},
     // Enough for several threads to solve the contacts of a color.
-    {"polydisperse", 20000, 3, 0xbec6a32b83712268u, 0x45c0bb7004f553f3u},
+    {"polydisperse", 20000, 3, 0x1fc1c4e3ef568f9au, 0xd2fc64b8df212ecbu},
     {"columns", 20000, 3, 0xf1dc6c610329eee1u, 0x8cfcea0c434ee1fdu},
 };
 

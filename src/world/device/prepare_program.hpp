@@ -56,7 +56,7 @@ struct PrepareProgram {
     team.for_each(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
       if (bodies.is_asleep(body) && d.marked[island_of(d, body)] != 0) {
-        d.step.motion.wake(bodies, body);
+        d.step.motion.wake_by_neighbor(bodies, body);
       }
     });
   }
