@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <type_traits>
 #include <utility>
 
 namespace jfpx {
@@ -33,7 +34,13 @@ template <class Archive, class Self>
 void BodyStore::serialize_body(Archive& archive, Self& self, std::uint32_t i) {
   archive(self.shape_[i], self.mass_[i], self.kinematic_[i], self.sensor_[i], self.can_sleep_[i],
           self.inertia_given_[i]);
-  if (self.inertia_given_[i] != 0) archive(self.inertia_[i]);
+  if (self.inertia_given_[i] != 0) {
+    if constexpr (std::is_const_v<Self>) {
+      archive(self.given_inertia_.at(i));
+    } else {
+      archive(self.given_inertia_[i]);
+    }
+  }
   archive(self.acceleration_[i], self.linear_damping_[i], self.angular_damping_[i],
           self.friction_[i], self.restitution_[i], self.rolling_friction_[i],
           self.spinning_friction_[i], self.filter_[i], self.user_data_[i]);
@@ -86,7 +93,7 @@ void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_fr
     pool_.use(i);
     set_shape(i, std::move(shape_[i]));
     inverse_mass_[i] = mass_[i] > 0 ? Real(1) / mass_[i] : Real(0);
-    inertia_given(i) ? set_tensor(i, inertia_[i]) : compute_inertia(i, std::nullopt);
+    inertia_given(i) ? set_tensor(i, given_inertia_.at(i)) : compute_inertia(i, std::nullopt);
     set_damping(i, linear_damping_[i], angular_damping_[i]);
     if (filter_[i] != CollisionFilter{}) ++filtered_count_;
     count_body(i);
@@ -101,7 +108,7 @@ void BodyStore::check_body(std::uint32_t i) const {
   def.kinematic = kinematic(i);
   if (auto* half_space = std::get_if<HalfSpace>(&def.shape)) check_wall(half_space);
   if (auto* plane = std::get_if<Plane>(&def.shape)) check_wall(plane);
-  if (inertia_given(i)) def.inertia = inertia_[i];
+  if (inertia_given(i)) def.inertia = given_inertia_.at(i);
   def.position = moving.position[i];
   def.orientation = moving.orientation[i];
   def.velocity = moving.velocity[i];

@@ -79,7 +79,7 @@ void BodyStore::for_each_array(const Visit& visit) {
       moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.mean_motion,
       moving.rest_time, moving.awake);
   all(shape_, radius_, extent_, mass_, inverse_mass_, friction_, restitution_, rolling_friction_,
-      spinning_friction_, inertia_, body_inverse_inertia_, tensor_, acceleration_, linear_damping_,
+      spinning_friction_, body_inverse_inertia_, tensor_, acceleration_, linear_damping_,
       angular_damping_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_, sensor_,
       inertia_given_, user_data_, filter_);
 }
@@ -115,6 +115,7 @@ void BodyStore::count_body(std::uint32_t i) noexcept {
 BodyId BodyStore::add(const BodyDef& def) {
   Shape shape = normalized(def.shape);  // may throw, hence before any change
   if (pool_.is_full()) add_slot();
+  if (def.inertia && def.mass > 0) given_inertia_[pool_.unused().back()] = {};
   const BodyId id = pool_.add();
   const std::uint32_t i = id.index;
 
@@ -147,23 +148,33 @@ void BodyStore::set_mass(std::uint32_t i, Real mass) {
   if (!inertia_given(i)) set_inertia(i, std::nullopt);
 }
 
+Mat3 BodyStore::inertia(std::uint32_t i) const {
+  if (!movable(i)) return diagonal({0, 0, 0});
+  return inertia_given(i) ? given_inertia_.at(i) : tensor_of(shape_[i], mass_[i]);
+}
+
 void BodyStore::set_inertia(std::uint32_t i, const std::optional<Mat3>& given) {
   compute_inertia(i, given);
   refresh_inertia(i);
 }
 
 void BodyStore::compute_inertia(std::uint32_t i, const std::optional<Mat3>& given) {
-  inertia_given_[i] = given && movable(i) ? 1 : 0;
-  if (!movable(i)) {  // infinite inertia: the inverse is zero (erratum E26)
-    inertia_[i] = body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
-    return;
+  const bool is_given = given && movable(i);
+  if (is_given) {
+    given_inertia_[i] = symmetric_part(*given);
+  } else {
+    given_inertia_.erase(i);
   }
-  set_tensor(i, given ? symmetric_part(*given) : tensor_of(shape_[i], mass_[i]));
+  inertia_given_[i] = is_given ? 1 : 0;
+  if (movable(i)) {
+    set_tensor(i, inertia(i));
+  } else {  // infinite inertia: the inverse is zero (erratum E26)
+    body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
+  }
 }
 
 /// @param tensor inertia of a movable body in body axes, symmetric
 void BodyStore::set_tensor(std::uint32_t i, const Mat3& tensor) {
-  inertia_[i] = tensor;
   body_inverse_inertia_[i] = inverse_inertia(tensor);
   // The largest entry of a positive definite matrix is on its diagonal.
   const Vec3 moments{tensor(0, 0), tensor(1, 1), tensor(2, 2)};
@@ -185,6 +196,7 @@ void BodyStore::remove(BodyId id) noexcept {
   if (kinematic(id.index)) --kinematic_count_;
   if (sensor(id.index)) --sensor_count_;
   moving.awake[id.index] = 0;
+  given_inertia_.erase(id.index);
   ignored_.erase_body(id.index);
   set_filter(id.index, {});
 }

@@ -8,6 +8,7 @@
 #include "src/world/ignored_pairs.hpp"
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -98,9 +99,10 @@ class BodyStore {
   /// Replaces the mass of a movable body, and its inertia unless that was given. @param mass > 0
   void set_mass(std::uint32_t body, Real mass);
   /// [kg m^2], body axes; zero for mass 0
-  const Mat3& inertia(std::uint32_t body) const { return inertia_[body]; }
+  Mat3 inertia(std::uint32_t body) const;
   bool inertia_given(std::uint32_t body) const { return inertia_given_[body] != 0; }
   /// Has no effect on a body of mass 0. @param given absent: the inertia of the solid shape
+  /// @throws std::bad_alloc; the store is then unchanged
   void set_inertia(std::uint32_t body, const std::optional<Mat3>& given);
   void set_friction(std::uint32_t body, Real friction) { friction_[body] = friction; }
   void set_restitution(std::uint32_t body, Real value) { restitution_[body] = value; }
@@ -175,7 +177,8 @@ class BodyStore {
   std::vector<Shape> shape_;
   std::vector<Real> radius_, extent_, mass_, inverse_mass_, friction_, restitution_;
   std::vector<Real> rolling_friction_, spinning_friction_;
-  std::vector<Mat3> inertia_, body_inverse_inertia_;  ///< body axes
+  std::vector<Mat3> body_inverse_inertia_;       ///< body axes
+  std::map<std::uint32_t, Mat3> given_inertia_;  ///< by body, of those that inertia_given_ marks
   /// Inertia in body axes, divided by its largest diagonal entry, for the gyroscopic term; zero if
   /// that term is zero (isotropic inertia or mass 0).
   std::vector<Mat3> tensor_;

@@ -47,39 +47,28 @@ ContactEvent ContactEvents::PairList::take() {
   return event;
 }
 
-void ContactEvents::compute(std::span<const Contact> before, std::span<const Contact> after) const {
-  before_.start(before);
-  after_.start(after);
-  events_.clear();
+void ContactEvents::Comparison::compute(std::span<const Contact> contacts_before,
+                                        std::span<const Contact> contacts_after) {
+  before.start(contacts_before);
+  after.start(contacts_after);
+  events.clear();
   const auto add = [this](ContactEvent event, ContactPhase phase) {
     event.phase = phase;
-    events_.push_back(event);
+    events.push_back(event);
   };
-  while (!before_.at_end() || !after_.at_end()) {
-    if (before_.at_end() || (!after_.at_end() && after_.pair() < before_.pair())) {
-      add(after_.take(), ContactPhase::begin);
-    } else if (after_.at_end() || before_.pair() < after_.pair()) {
-      add(before_.take(), ContactPhase::end);
+  while (!before.at_end() || !after.at_end()) {
+    if (before.at_end() || (!after.at_end() && after.pair() < before.pair())) {
+      add(after.take(), ContactPhase::begin);
+    } else if (after.at_end() || before.pair() < after.pair()) {
+      add(before.take(), ContactPhase::end);
     } else {
-      const ContactEvent old = before_.take(), now = after_.take();
+      const ContactEvent old = before.take(), now = after.take();
       const bool stays = now.a == old.a && now.b == old.b;
       // A new body may have the index of an old one.
       if (!stays) add(old, ContactPhase::end);
       add(now, stays ? ContactPhase::stay : ContactPhase::begin);
     }
   }
-}
-
-std::span<const ContactEvent> ContactEvents::between(std::span<const Contact> before,
-                                                     std::span<const Contact> after) const {
-  if (!current_.load(std::memory_order_acquire)) {
-    const std::lock_guard lock(computing_);
-    if (!current_.load(std::memory_order_relaxed)) {
-      compute(before, after);
-      current_.store(true, std::memory_order_release);
-    }
-  }
-  return events_;
 }
 
 }  // namespace JFPX_ABI

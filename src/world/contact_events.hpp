@@ -3,27 +3,29 @@
 
 #include <jfpx/world.hpp>
 
-#include <atomic>
+#include "src/base/lazy.hpp"
+
 #include <cstddef>
-#include <mutex>
 #include <span>
 #include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Compares the contacts of two steps on demand. Buffers grow and never
-/// shrink.
+/// Compares the contacts of two steps on demand. Buffers grow and never shrink.
 class ContactEvents {
  public:
   /// Must be called when one of the lists of contacts changes.
-  void invalidate() noexcept { current_.store(false, std::memory_order_relaxed); }
+  void invalidate() noexcept { comparison_.invalidate(); }
   /// Events between two lists of detected contacts, sorted by (a.index, b.index); an end event
   /// precedes a begin event with the same indices. Valid until invalidate(). Several threads may
   /// call it with the same lists.
   /// @throws std::bad_alloc; the next call tries again
   std::span<const ContactEvent> between(std::span<const Contact> before,
-                                        std::span<const Contact> after) const;
+                                        std::span<const Contact> after) const {
+    return comparison_.get([&](Comparison* comparison) { comparison->compute(before, after); })
+        .events;
+  }
 
  private:
   /// A contact and the pair of its bodies.
@@ -46,13 +48,14 @@ class ContactEvents {
     std::vector<Entry> found_, sorted_;
     std::size_t next_ = 0;
   };
+  struct Comparison {
+    PairList before, after;
+    std::vector<ContactEvent> events;
 
-  void compute(std::span<const Contact> before, std::span<const Contact> after) const;
+    void compute(std::span<const Contact> contacts_before, std::span<const Contact> contacts_after);
+  };
 
-  mutable std::atomic<bool> current_{false};
-  mutable std::mutex computing_;
-  mutable PairList before_, after_;
-  mutable std::vector<ContactEvent> events_;
+  Lazy<Comparison> comparison_;
 };
 
 }  // namespace JFPX_ABI

@@ -459,7 +459,7 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: jfpx.Scene.from_json("{"), jfpx.InvalidScene, "line 1"),
     (lambda w: jfpx.Scene.load("/nowhere/scene.json"), jfpx.FileError, "/nowhere/scene.json"),
     (lambda w: jfpx.Scene().save("/nowhere/scene.json"), jfpx.FileError, "/nowhere"),
-    (lambda w: jfpx.Scene.named("heap"), jfpx.InvalidArgument, "heap"),
+    (lambda w: jfpx.Scene.named("ditch"), jfpx.InvalidArgument, "ditch"),
     (lambda w: jfpx.Scene.named("pile", spheres=-1), jfpx.InvalidArgument, "spheres is -1"),
     (lambda w: jfpx.Scene().add_spheres(np.zeros((1, 3), np.float32), -1), jfpx.InvalidScene,
      "radius"),
