@@ -54,6 +54,8 @@ struct BodyView {
     return movable(i) && radius[i] > 0 && !(tensor[i](0, 0) > 0);
   }
   JFPX_HD bool is_at_rest(std::uint32_t i) const { return rest_time[i] >= sleep_time; }
+  /// Whether a body was slow in the last step, and nothing has woken it since.
+  JFPX_HD bool is_slow(std::uint32_t i) const { return rest_time[i] > 0; }
 
   JFPX_HD bool may_collide(std::uint32_t a, std::uint32_t b) const {
     return !filters_in_use || (jfpx::may_collide(filter[a], filter[b]) && !is_ignored(a, b));
@@ -131,9 +133,9 @@ struct MotionPointers {
     mean_motion[i] = bodies.woken_motion;
     rest_time[i] = 0;
   }
-  /// Wakes a sleeping body that touches an awake one, directly or by others. It keeps its rest
-  /// time: if a slow body began it anew at each touch, it would keep a heap awake for ever.
-  JFPX_HD void wake_by_neighbor(const BodyView& bodies, std::uint32_t i) const {
+  /// Wakes a sleeping body whose island touches slow bodies only. It keeps its rest time: if each
+  /// touch began it anew, two islands could wake each other alternately without end.
+  JFPX_HD void wake_by_slow_body(const BodyView& bodies, std::uint32_t i) const {
     awake[i] = 1;
     mean_motion[i] = bodies.woken_motion;
   }

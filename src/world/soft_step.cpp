@@ -95,7 +95,7 @@ void SoftStep::find_islands(const BodyView& bodies, const Touches& touches) {
     const ContactKey& key = contacts.key(i);
     const bool a_carries = bodies.is_carrier(key.a);
     if ((a_carries || bodies.is_carrier(key.b)) && touches(contacts, i)) {
-      marked_[islands_.find(a_carries ? key.b : key.a)] = 1;
+      marked_[islands_.find(a_carries ? key.b : key.a)] = soft_step::kTouchesFastBody;
     }
   }
 }
@@ -109,13 +109,15 @@ void SoftStep::wake_touched(BodyStore* store) {
     return soft_step::will_touch(bodies, contacts, contact);
   });
   for (const BodyId id : store->ids()) {
-    if (bodies.is_active(id.index)) marked_[islands_.find(id.index)] = 1;
+    if (!bodies.is_active(id.index)) continue;
+    std::uint8_t& mark = marked_[islands_.find(id.index)];
+    if (!bodies.is_slow(id.index)) mark = soft_step::kTouchesFastBody;
+    if (mark == 0) mark = soft_step::kTouchesSlowBody;
   }
   const MotionPointers motion = store->motion_pointers();
   for (const BodyId id : store->ids()) {
-    if (is_asleep(id) && marked_[islands_.find(id.index)] != 0) {
-      motion.wake_by_neighbor(bodies, id.index);
-    }
+    if (!is_asleep(id)) continue;
+    soft_step::wake_touched(bodies, motion, id.index, marked_[islands_.find(id.index)]);
   }
 }
 

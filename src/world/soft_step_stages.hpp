@@ -29,6 +29,17 @@ JFPX_HD inline bool has_touched(const ContactView& contacts, std::uint32_t conta
   });
 }
 
+/// Why a sleeping island wakes: it touches a kinematic body in motion or a body that is not slow,
+/// or it touches slow bodies only.
+inline constexpr std::uint8_t kTouchesFastBody = 1, kTouchesSlowBody = 2;
+
+/// Wakes a body of an island. @param mark of the island; 0: it does not wake
+JFPX_HD inline void wake_touched(const BodyView& bodies, const MotionPointers& motion,
+                                 std::uint32_t i, std::uint8_t mark) {
+  if (mark == kTouchesFastBody) motion.wake(bodies, i);
+  if (mark == kTouchesSlowBody) motion.wake_by_slow_body(bodies, i);
+}
+
 /// The bodies of a step, as arrays by body.
 struct StepBodies {
   BodyView bodies;

@@ -31,6 +31,30 @@ TEST(Heaps, ABodyThatASlowOneTouchesKeepsItsRestTime) {
   EXPECT_GT(world.state(resting).position.x, 0.0001);  // it was pushed
 }
 
+// Each hit alone leaves the heavy ball slower than SleepSettings::speed.
+TEST(Heaps, ASleepingBodyGainsTheVelocityOfManySmallHits) {
+  Scene scene;
+  BodyDef heavy = test::heavy_ball({0, 1, 0}, 1, 100);
+  heavy.friction = 0;
+  heavy.restitution = 1;
+  scene.bodies = {heavy, test::ground()};
+  World world(scene);
+  EXPECT_LT(test::time_to_sleep(&world, 3), 3);
+  const BodyId target = world.bodies()[0];
+  for (int hit = 0; hit < 5; ++hit) {
+    BodyDef light = test::heavy_ball({Real(-1.6), 1, 0}, Real(0.5));
+    light.acceleration = {};
+    light.velocity.x = 2;
+    light.friction = 0;
+    light.restitution = 1;
+    const BodyId added = world.add(light);
+    for (int n = 0; n < 6; ++n) world.step();
+    EXPECT_LT(world.state(added).velocity.x, -1);  // it rebounds: its removal wakes no other body
+    world.remove(added);
+  }
+  EXPECT_GT(world.state(target).velocity.x, 0.1);
+}
+
 TEST(Heaps, BodiesThatOverlapAtTheStartArePushedApartAndDoNotExplode) {
   World world(test::awake(scenes::make("columns", {.spheres = 256})));
   const auto push_out = static_cast<double>(world.scene().soft_step.push_out_speed);

@@ -43,13 +43,13 @@ constexpr Pin kPins[] = {
 /// With Solver::soft_step.
 constexpr Pin kSoftStepPins[] = {
     {"pile", 100, 100, 0xe20119f80b9573f7u, 0xb7927b6441f83c2fu},
-    {"heap", 100, 400, 0x2909de48880fa461u, 0xc12f37a3b5b517b8u},
+    {"heap", 100, 400, 0xab25ee1fae624ff9u, 0x11378a4d2f5eab31u},
     {"gas", 200, 100, 0xa8788d5639ea9d11u, 0xc2e937f96631d72bu},
     {"columns", 64, 60, 0x9678de459fd6c2dbu, 0x0f973ef94576d375u},
     {"overlap", 32, 60, 0x1aa5330e3d17bbf6u, 0xe54219b9024930d0u},
     {"lattice", 125, 30, 0xc1b4bc0d5892cdceu, 0xfdde9b1863a93df8u},
     {"polydisperse", 100, 60, 0x347dbd6648aa912du, 0x6334b248a85c88dfu},
-    {"mixed", 40, 150, 0xd94926054c13099au, 0xd9f4938de668a4adu},
+    {"mixed", 40, 150, 0x90b9b1b4b8265593u, 0x9b0132a9be32e248u},
     // Enough for several threads to solve the contacts of a color.
     {"polydisperse", 20000, 3, 0x1fc1c4e3ef568f9au, 0xd2fc64b8df212ecbu},
     {"columns", 20000, 3, 0xf1dc6c610329eee1u, 0x8cfcea0c434ee1fdu},

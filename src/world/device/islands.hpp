@@ -49,7 +49,7 @@ JFPX_HD void find_islands(const Team& team, const StepData& d, const Touches& to
     const soft_step::ContactKey& key = contacts.key(i);
     const bool a_carries = bodies.is_carrier(key.a);
     if ((a_carries || bodies.is_carrier(key.b)) && touches(contacts, i)) {
-      d.marked[island_of(d, a_carries ? key.b : key.a)] = 1;
+      d.marked[island_of(d, a_carries ? key.b : key.a)] = soft_step::kTouchesFastBody;
     }
   });
 }

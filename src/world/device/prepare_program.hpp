@@ -51,13 +51,20 @@ struct PrepareProgram {
     });
     team.for_each(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
-      if (bodies.is_active(body)) d.marked[island_of(d, body)] = 1;
+      if (!bodies.is_active(body)) return;
+      std::uint8_t& mark = d.marked[island_of(d, body)];
+      if (mark == 0) mark = soft_step::kTouchesSlowBody;
     });
     team.for_each(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
-      if (bodies.is_asleep(body) && d.marked[island_of(d, body)] != 0) {
-        d.step.motion.wake_by_neighbor(bodies, body);
+      if (bodies.is_active(body) && !bodies.is_slow(body)) {
+        d.marked[island_of(d, body)] = soft_step::kTouchesFastBody;
       }
+    });
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      if (!bodies.is_asleep(body)) return;
+      soft_step::wake_touched(bodies, d.step.motion, body, d.marked[island_of(d, body)]);
     });
   }
 
