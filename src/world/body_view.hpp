@@ -129,8 +129,7 @@ struct MotionPointers {
 
   /// Wakes a movable body.
   JFPX_HD void wake(const BodyView& bodies, std::uint32_t i) const {
-    awake[i] = 1;
-    mean_motion[i] = bodies.woken_motion;
+    wake_by_slow_body(bodies, i);
     rest_time[i] = 0;
   }
   /// Wakes a sleeping body whose island touches slow bodies only. It keeps its rest time: if each

@@ -11,7 +11,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Hands out ids, which are the index of a slot and its generation. The slot of an id that was
+/// Allocates ids, which are the index of a slot and its generation. The slot of an id that was
 /// removed is reused with a new generation, the last one first. Additions and removals take
 /// constant time; the sorted list of ids is made by the first ids() after them.
 ///
