@@ -15,7 +15,7 @@ option(JFPX_TOOL "Build the programs: jfpx and, where its libraries are found, j
 option(JFPX_EXAMPLES "Build the examples" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_BENCH "Build the benchmarks" OFF)
-option(JFPX_FUZZ "Drive the fuzz targets by libFuzzer; needs clang and -fsanitize=fuzzer-no-link, as preset fuzz has" OFF)
+option(JFPX_FUZZ "Drive the fuzz targets by libFuzzer; needs clang and -fsanitize=fuzzer-no-link, as preset asan-ubsan has" OFF)
 option(JFPX_COVERAGE "Count which lines of src are run, in float; see scripts/coverage" OFF)
 option(JFPX_INSTALL "Install libraries, headers and programs" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_WERROR "Treat warnings as errors, as the presets of developers do" OFF)
@@ -40,7 +40,7 @@ endif()
 
 if(JFPX_FUZZ AND NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   message(FATAL_ERROR "JFPX_FUZZ=ON, but the compiler is ${CMAKE_CXX_COMPILER_ID}, which has no "
-    "libFuzzer. Use scripts/fuzz or cmake --preset fuzz; both take clang++.")
+    "libFuzzer. Use scripts/fuzz or cmake --preset asan-ubsan; both take clang++.")
 endif()
 
 if(PROJECT_IS_TOP_LEVEL)

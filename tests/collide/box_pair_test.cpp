@@ -30,6 +30,13 @@ Transform rotated_pose(const Vec3& axis_times_tangent, const Vec3& origin) {
 // corner of the intersection is a corner of one inside the other, or an intersection of an edge of
 // one with a face of the other.
 
+/// Three coordinates in double precision, with the index type of Vec3.
+struct Double3 {
+  double values[3];
+  double& operator[](int i) { return values[i]; }
+  double operator[](int i) const { return values[i]; }
+};
+
 struct PosedBox {
   double half[3], axis[3][3], centre[3];  // axis[k] is the k-th axis, in world coordinates
 
@@ -42,15 +49,15 @@ struct PosedBox {
     }
   }
   bool empty() const { return half[0] < 0 || half[1] < 0 || half[2] < 0; }
-  std::array<double, 3> to_local(const std::array<double, 3>& p) const {
-    std::array<double, 3> r{};
+  Double3 to_local(const Double3& p) const {
+    Double3 r{};
     for (int k = 0; k < 3; ++k) {
       for (int i = 0; i < 3; ++i) r[k] += axis[k][i] * (p[i] - centre[i]);
     }
     return r;
   }
-  std::array<double, 3> corner(int n) const {
-    std::array<double, 3> r{centre[0], centre[1], centre[2]};
+  Double3 corner(int n) const {
+    Double3 r{centre[0], centre[1], centre[2]};
     for (int k = 0; k < 3; ++k) {
       const double h = (n >> k & 1) != 0 ? half[k] : -half[k];
       for (int i = 0; i < 3; ++i) r[i] += h * axis[k][i];
@@ -59,8 +66,7 @@ struct PosedBox {
   }
 };
 
-bool segment_meets(const PosedBox& box, const std::array<double, 3>& p,
-                   const std::array<double, 3>& q) {
+bool segment_meets(const PosedBox& box, const Double3& p, const Double3& q) {
   const auto a = box.to_local(p), b = box.to_local(q);
   double first = 0, last = 1;
   for (int k = 0; k < 3; ++k) {
@@ -96,7 +102,7 @@ bool overlap(const Box& a, const Transform& pose_a, const Box& b, const Transfor
 }
 
 /// The overlap of two boxes along a direction; negative: a gap.
-double overlap_along(const PosedBox& a, const PosedBox& b, const std::array<double, 3>& d) {
+double overlap_along(const PosedBox& a, const PosedBox& b, const Double3& d) {
   double sum = 0, between = 0;
   for (int k = 0; k < 3; ++k) {
     double on_a = 0, on_b = 0;
@@ -201,10 +207,10 @@ TEST(BoxBox, AgreesWithTheOracleInContactDepthAndDirection) {
     // In no direction is the depth smaller by more than the preference for faces.
     const PosedBox a(c.a, c.pose_a, 0), b(c.b, c.pose_b, 0);
     for (int k = 0; k < 20; ++k) {
-      std::array<double, 3> d;
+      Double3 d;
       double norm = 0;
-      for (double& x : d) x = random.uniform(-1, 1), norm += x * x;
-      for (double& x : d) x /= std::sqrt(norm);
+      for (double& x : d.values) x = random.uniform(-1, 1), norm += x * x;
+      for (double& x : d.values) x /= std::sqrt(norm);
       ASSERT_GE(overlap_along(a, b, d), depth / 1.03 - noise) << n;
     }
     // The points lie in the overlap of the boxes, and none is deeper than the manifold.

@@ -20,7 +20,7 @@ double cut_volume(const std::array<double, 3>& size, const std::array<double, 3>
   double sum = 0;
   for (int corner = 0; corner < 8; ++corner) {
     double left = d, sign = 1;
-    for (int i = 0; i < 3; ++i) {
+    for (std::size_t i = 0; i < 3; ++i) {
       if ((corner >> i & 1) == 0) continue;
       left -= n[i] * size[i];
       sign = -sign;
@@ -42,13 +42,10 @@ TEST(Submerged, PartsOfBoxesHaveTheVolumeOfTheFormula) {
     const Real offset = random.uniform(-1.2_r, 1.2_r) * half_extent;
     detail::Submerged below;
     detail::add_submerged(box, {}, {normal, offset}, &below);
-    std::array<double, 3> size{}, n{};
-    double total = 1;
-    for (int k = 0; k < 3; ++k) {
-      size[k] = 2 * static_cast<double>(box.half_extents[k]);
-      n[k] = normal[k];
-      total *= size[k];
-    }
+    const Vec3 extents = 2 * box.half_extents;  // exact
+    const std::array<double, 3> size{extents.x, extents.y, extents.z};
+    const std::array<double, 3> n{normal.x, normal.y, normal.z};
+    const double total = size[0] * size[1] * size[2];
     const double expected = cut_volume(size, n, static_cast<double>(offset + half_extent));
     // The formula divides small differences by the product of the normal's components.
     const double noise = 50 * static_cast<double>(kEpsilon) + 1e-11;

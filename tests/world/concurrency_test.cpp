@@ -86,6 +86,36 @@ TEST_P(Concurrency, WorldsInSeveralThreadsAreIndependent) {
   for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, expected);
 }
 
+/// A heap with more balls, rows and pairs of boxes than a chunk of any parallel loop.
+TEST(SoftStepConcurrency, AHeapOfThousandsStepsOnSeveralThreads) {
+  const std::uint64_t seed = fresh_seed();
+  SCOPED_TRACE(trace(seed));
+  Random random(seed);
+  Scene scene;
+  scene.bodies.push_back(ground());
+  const auto place = [&random](int i, int width) {
+    const auto at = [](int n) { return static_cast<Real>(n) * 0.99_r; };
+    const Vec3 noise = random.uniform_in_box({-0.02_r, -0.02_r, -0.02_r}, {0.02_r, 0.02_r, 0.02_r});
+    return Vec3{at(i % width), 0.5_r + at(i / (width * width)), at(i / width % width)} + noise;
+  };
+  for (int i = 0; i < 9000; ++i) {
+    scene.bodies.push_back(ball(place(i, 30), 0.5_r));
+  }
+  for (int i = 0; i < 1500; ++i) {
+    BodyDef& box = scene.bodies.emplace_back();
+    box.shape = Box{{0.5_r, 0.5_r, 0.5_r}};
+    box.position = place(i, 20) + Vec3{-30, 0, 0};
+  }
+  std::uint64_t expected = 0;
+  for (const unsigned threads : {1u, 3u}) {
+    World world(scene, {.collider = {.threads = threads}});
+    for (int n = 0; n < 4; ++n) world.step();
+    EXPECT_GT(world.contacts().size(), 20000u);
+    if (threads == 1) expected = world.state_hash();
+    EXPECT_EQ(world.state_hash(), expected);
+  }
+}
+
 }  // namespace
 }  // namespace test
 }  // namespace JFPX_ABI

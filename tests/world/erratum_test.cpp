@@ -34,7 +34,7 @@ TEST(Erratum, E06_the_deepest_contact_is_resolved_first) {
   EXPECT_EQ(report.position_iterations, 2u);
   EXPECT_TRUE(report.iterations_exhausted);
   const std::vector<BodyState> s = world.states();
-  const auto gap = [&](int i) { return s[2 * i + 1].position.x - s[2 * i].position.x; };
+  const auto gap = [&](std::size_t i) { return s[2 * i + 1].position.x - s[2 * i].position.x; };
   EXPECT_EQ(gap(0), 2 - 0.2_r);  // the two deeper contacts have used the limit
   EXPECT_NEAR(gap(1), 2, 0.011);
   EXPECT_NEAR(gap(2), 2, 0.011);

@@ -130,7 +130,7 @@ TEST(Particle, AnImpulsePropagatesThroughARow) {
     row.push_back(world.add(def));
   }
   step(&world, 60);
-  for (int i = 0; i < 5; ++i) EXPECT_NEAR(world.state(row[i]).velocity.x, 0, 1e-4) << i;
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(world.state(row[i]).velocity.x, 0, 1e-4) << i;
   EXPECT_NEAR(world.state(row[5]).velocity.x, 5, 1e-4);
 }
 
@@ -162,7 +162,9 @@ TEST(Particle, AStackStands) {
     stack.push_back(world.add(def));
   }
   step(&world, 2000);
-  for (int i = 0; i < 5; ++i) EXPECT_NEAR(world.state(stack[i]).position.y, 0.5 + i, 2e-3) << i;
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_NEAR(world.state(stack[i]).position.y, 0.5 + static_cast<double>(i), 2e-3) << i;
+  }
 }
 
 TEST(Particle, PointsMeetGroundsButNotEachOther) {
