@@ -1,0 +1,147 @@
+/// The bodies of a world in the memory of a device.
+#pragma once
+
+#include "src/world/body_store.hpp"
+#include "src/world/device/step_data.hpp"
+#include "src/world/device/transfer.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+template <class Device>
+class BodyBuffers {
+ public:
+  /// Copies all bodies to the device. @param data gets their addresses
+  void upload(const Transfer<Device>& transfer, const BodyStore& store, StepData* data) {
+    upload_properties(transfer, store.view(), &data->step.bodies);
+    upload_motion(transfer, store.moving, &data->step);
+    const std::size_t n = store.capacity();
+    data->saved = {transfer.room(&saved_last_acceleration_, n),
+                   transfer.room(&saved_mean_motion_, n), transfer.room(&saved_rest_time_, n),
+                   transfer.room(&saved_awake_, n)};
+  }
+
+  /// Copies forces, and what waking a body changes.
+  void upload_forces(const Transfer<Device>& transfer, const MotionArrays& from) {
+    transfer.put(&force_, from.force);
+    transfer.put(&torque_, from.torque);
+    transfer.put(&awake_, from.awake);
+    transfer.put(&mean_motion_, from.mean_motion);
+    transfer.put(&rest_time_, from.rest_time);
+  }
+
+  /// @param to as large as the arrays that were uploaded
+  void fetch_motion(const Transfer<Device>& transfer, MotionArrays* to) const {
+    transfer.get(&to->position, position_);
+    transfer.get(&to->orientation, orientation_);
+    transfer.get(&to->velocity, velocity_);
+    transfer.get(&to->angular_velocity, angular_velocity_);
+    transfer.get(&to->force, force_);
+    transfer.get(&to->torque, torque_);
+    transfer.get(&to->last_acceleration, last_acceleration_);
+    transfer.get(&to->inverse_inertia, inverse_inertia_);
+    transfer.get(&to->mean_motion, mean_motion_);
+    transfer.get(&to->rest_time, rest_time_);
+    transfer.get(&to->awake, awake_);
+  }
+
+  /// Undoes what a step changes before it can fail.
+  void restore(const Transfer<Device>& transfer, const StepData& data) const {
+    const MotionPointers& to = data.step.motion;
+    const std::size_t n = data.step.bodies.capacity;
+    transfer.copy(to.last_acceleration, data.saved.last_acceleration, n);
+    transfer.copy(to.mean_motion, data.saved.mean_motion, n);
+    transfer.copy(to.rest_time, data.saved.rest_time, n);
+    transfer.copy(to.awake, data.saved.awake, n);
+  }
+
+  // What an edit of a body changes.
+  Vec3* acceleration() const { return acceleration_.data(); }
+  Real* velocity_kept() const { return velocity_kept_.data(); }
+  Real* angular_velocity_kept() const { return angular_velocity_kept_.data(); }
+  // What accumulates until the next step.
+  const Vec3* force() const { return force_.data(); }
+  const Vec3* torque() const { return torque_.data(); }
+
+ private:
+  template <class T>
+  using Buffer = typename Device::template Buffer<T>;
+
+  void upload_properties(const Transfer<Device>& transfer, const BodyView& from, BodyView* to) {
+    const std::size_t n = from.capacity;
+    *to = from;  // the numbers; the pointers follow
+    to->radius = transfer.put(&radius_, from.radius, n);
+    to->extent = transfer.put(&extent_, from.extent, n);
+    to->inverse_mass = transfer.put(&inverse_mass_, from.inverse_mass, n);
+    to->friction = transfer.put(&friction_, from.friction, n);
+    to->restitution = transfer.put(&restitution_, from.restitution, n);
+    to->rolling_friction = transfer.put(&rolling_friction_, from.rolling_friction, n);
+    to->spinning_friction = transfer.put(&spinning_friction_, from.spinning_friction, n);
+    to->velocity_kept = transfer.put(&velocity_kept_, from.velocity_kept, n);
+    to->angular_velocity_kept =
+        transfer.put(&angular_velocity_kept_, from.angular_velocity_kept, n);
+    to->body_inverse_inertia = transfer.put(&body_inverse_inertia_, from.body_inverse_inertia, n);
+    to->tensor = transfer.put(&tensor_, from.tensor, n);
+    to->acceleration = transfer.put(&acceleration_, from.acceleration, n);
+    to->can_sleep = transfer.put(&can_sleep_, from.can_sleep, n);
+    to->kinematic = transfer.put(&kinematic_, from.kinematic, n);
+    to->sensor = transfer.put(&sensor_, from.sensor, n);
+    to->filter = transfer.put(&filter_, from.filter, n);
+    to->ignored = transfer.put(&ignored_, from.ignored, from.ignored_count);
+    to->ids = transfer.put(&ids_, from.ids, from.count);
+  }
+
+  void upload_motion(const Transfer<Device>& transfer, const MotionArrays& from,
+                     soft_step::StepBodies* step) {
+    MotionPointers& to = step->motion;
+    to.position = transfer.put(&position_, from.position);
+    to.orientation = transfer.put(&orientation_, from.orientation);
+    to.velocity = transfer.put(&velocity_, from.velocity);
+    to.angular_velocity = transfer.put(&angular_velocity_, from.angular_velocity);
+    to.force = transfer.put(&force_, from.force);
+    to.torque = transfer.put(&torque_, from.torque);
+    to.last_acceleration = transfer.put(&last_acceleration_, from.last_acceleration);
+    to.inverse_inertia = transfer.put(&inverse_inertia_, from.inverse_inertia);
+    to.mean_motion = transfer.put(&mean_motion_, from.mean_motion);
+    to.rest_time = transfer.put(&rest_time_, from.rest_time);
+    to.awake = transfer.put(&awake_, from.awake);
+    BodyView& bodies = step->bodies;
+    bodies.position = to.position;
+    bodies.orientation = to.orientation;
+    bodies.velocity = to.velocity;
+    bodies.angular_velocity = to.angular_velocity;
+    bodies.force = to.force;
+    bodies.torque = to.torque;
+    bodies.last_acceleration = to.last_acceleration;
+    bodies.inverse_inertia = to.inverse_inertia;
+    bodies.rest_time = to.rest_time;
+    bodies.awake = to.awake;
+  }
+
+  // Properties.
+  Buffer<Real> radius_, extent_, inverse_mass_, friction_, restitution_, rolling_friction_,
+      spinning_friction_, velocity_kept_, angular_velocity_kept_;
+  Buffer<Mat3> body_inverse_inertia_, tensor_;
+  Buffer<Vec3> acceleration_;
+  Buffer<std::uint8_t> can_sleep_, kinematic_, sensor_;
+  Buffer<CollisionFilter> filter_;
+  Buffer<std::uint64_t> ignored_;
+  Buffer<BodyId> ids_;
+  // Motion.
+  Buffer<Vec3> position_, velocity_, angular_velocity_, force_, torque_, last_acceleration_;
+  Buffer<Quat> orientation_;
+  Buffer<Mat3> inverse_inertia_;
+  Buffer<Real> mean_motion_, rest_time_;
+  Buffer<std::uint8_t> awake_;
+  // SavedArrays.
+  Buffer<Vec3> saved_last_acceleration_;
+  Buffer<Real> saved_mean_motion_, saved_rest_time_;
+  Buffer<std::uint8_t> saved_awake_;
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,169 @@
+/// The contacts of a step in the memory of a device.
+#pragma once
+
+#include "src/world/body_store.hpp"
+#include "src/world/device/step_data.hpp"
+#include "src/world/device/transfer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <tuple>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+/// The contact set of a step, and what World::contacts() needs.
+template <class Device>
+class ContactBuffers {
+ public:
+  /// The contacts become those of another set. Waits for the copies.
+  void upload(const Transfer<Device>& transfer, const soft_step::ContactView& from,
+              std::size_t bodies) {
+    counts_ = {from.sphere_count, from.manifold_count, from.point_count};
+    touch_count_ = 0;
+    transfer.put(&spheres_, from.spheres, from.sphere_count);
+    transfer.put(&manifolds_, from.manifolds, from.manifold_count);
+    transfer.put(&points_, from.points, from.point_count);
+    transfer.put(&impulses_, from.impulses, std::size_t{from.sphere_count} + from.point_count);
+    transfer.put(&rolling_impulses_, from.rolling_impulses, from.size());
+    transfer.put(&colors_, from.colors, from.size());
+    put_ranges(transfer, &spheres_of_, from.spheres, from.sphere_count, bodies);
+    put_ranges(transfer, &manifolds_of_, from.manifolds, from.manifold_count, bodies);
+  }
+
+  /// Makes room for the contacts that a step finds.
+  void reserve(const Transfer<Device>& transfer, const Capacity& capacity, StepData* data) {
+    const std::size_t contacts = std::size_t{capacity.spheres} + capacity.candidates;
+    const std::size_t bodies = data->step.bodies.capacity;
+    transfer.room(&spheres_, capacity.spheres);
+    transfer.room(&manifolds_, capacity.candidates);
+    transfer.room(&points_, capacity.points);
+    transfer.room(&impulses_, std::size_t{capacity.spheres} + capacity.points);
+    transfer.room(&rolling_impulses_, contacts);
+    transfer.room(&colors_, contacts);
+    transfer.room(&spheres_of_, bodies);
+    transfer.room(&manifolds_of_, bodies);
+    data->now = view();
+    data->touches = transfer.room(&touches_, capacity.touches);
+    data->position_before = transfer.room(&position_before_, bodies);
+  }
+
+  /// A complete step has found these numbers of contacts.
+  void complete(const Counters& counters) {
+    counts_ = {counters.spheres, counters.manifolds, counters.points};
+    touch_count_ = counters.touches;
+  }
+
+  DeviceContacts view() const {
+    DeviceContacts result{{spheres_.data(), manifolds_.data(), points_.data(), impulses_.data(),
+                           rolling_impulses_.data(), colors_.data(), 0, 0, 0},
+                          spheres_of_.data(),
+                          manifolds_of_.data(),
+                          {}};
+    std::ranges::copy(counts_, result.counts);
+    return result;
+  }
+  std::size_t sphere_count() const { return counts_[0]; }
+  std::size_t manifold_count() const { return counts_[1]; }
+  const Touch* touches() const { return touches_.data(); }
+  std::uint32_t touch_count() const { return touch_count_; }
+
+  void fetch(const Transfer<Device>& transfer, soft_step::ContactSet* to) const {
+    const auto [spheres, manifolds, points] = counts_;
+    to->spheres.resize(spheres);
+    to->manifolds.resize(manifolds);
+    to->points.resize(points);
+    to->impulses.resize(std::size_t{spheres} + points);
+    to->rolling_impulses.resize(std::size_t{spheres} + manifolds);
+    to->colors.resize(std::size_t{spheres} + manifolds);
+    transfer.get(&to->spheres, spheres_);
+    transfer.get(&to->manifolds, manifolds_);
+    transfer.get(&to->points, points_);
+    transfer.get(&to->impulses, impulses_);
+    transfer.get(&to->rolling_impulses, rolling_impulses_);
+    transfer.get(&to->colors, colors_);
+    transfer.wait();
+  }
+
+  /// World::contacts() after the step. @returns the number of contacts of two spheres
+  std::uint64_t fetch_touching(const Transfer<Device>& transfer, const BodyStore& bodies,
+                               std::vector<Contact>* contacts) const {
+    std::vector<Touch> touches(touch_count_);
+    std::vector<Vec3> position(bodies.capacity());
+    soft_step::ContactSet set;
+    transfer.get(&touches, touches_);
+    transfer.get(&position, position_before_);
+    fetch(transfer, &set);
+    for (const soft_step::SphereContactInput& c : set.spheres) {
+      if (!(c.distance <= 0)) continue;
+      // The sphere of a body that is a sphere is where the body was at the start of the step.
+      const SphereInstance sphere_b{position[c.key.b], bodies.radius(c.key.b)};
+      touches.push_back({{c.key.a, c.key.b, 0, 0},
+                         0,
+                         1,
+                         c.normal,
+                         middle_point(c.normal, c.distance, sphere_b),
+                         c.distance});
+    }
+    // After the other contacts of the same bodies.
+    constexpr std::uint32_t kLast = 0xffffffffu;
+    std::uint32_t number = 0;
+    soft_step::for_each_met(
+        set.view(), 0, set.size(), [&](std::uint32_t body) { return position[body]; },
+        [&](std::uint32_t body) { return bodies.radius(body); },
+        [&](const soft_step::ContactKey& key, bool of_spheres, const Vec3& normal,
+            const Vec3& point) {
+          touches.push_back(
+              {{key.a, key.b, kLast, kLast}, number++, of_spheres ? 1u : 0u, normal, point, 0});
+        });
+    const auto order = [](const Touch& t) {
+      return std::tuple(1 - t.of_spheres, t.pair, t.number);
+    };
+    std::ranges::sort(touches, {}, order);
+    contacts->clear();
+    std::uint64_t of_spheres = 0;
+    for (const Touch& t : touches) {
+      contacts->push_back(
+          {bodies.id(t.pair.a), bodies.id(t.pair.b), t.normal, t.point, t.distance});
+      of_spheres += t.of_spheres;
+    }
+    return of_spheres;
+  }
+
+ private:
+  template <class T>
+  using Buffer = typename Device::template Buffer<T>;
+
+  /// By body a: its range of a list that is sorted by it.
+  template <class C>
+  static void put_ranges(const Transfer<Device>& transfer, Buffer<Range>* to, const C* contacts,
+                         std::uint32_t count, std::size_t bodies) {
+    std::vector<Range> ranges(bodies);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      Range& range = ranges[contacts[i].key.a];
+      if (range.end == 0) range.begin = i;
+      range.end = i + 1;
+    }
+    transfer.put(to, ranges);
+    transfer.wait();
+  }
+
+  Buffer<soft_step::SphereContactInput> spheres_;
+  Buffer<soft_step::ManifoldInput> manifolds_;
+  Buffer<soft_step::PointInput> points_;
+  Buffer<soft_step::KeptImpulse> impulses_;
+  Buffer<Vec3> rolling_impulses_;
+  Buffer<std::uint8_t> colors_;
+  Buffer<Range> spheres_of_, manifolds_of_;
+  std::array<std::uint32_t, 3> counts_{};  ///< of spheres, manifolds and points
+  Buffer<Touch> touches_;
+  std::uint32_t touch_count_ = 0;
+  Buffer<Vec3> position_before_;
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,76 @@
+/// The forces of a world in the memory of a device.
+#pragma once
+
+#include "src/world/device/force_program.hpp"
+#include "src/world/device/transfer.hpp"
+
+#include <cstdint>
+#include <tuple>
+#include <utility>
+#include <variant>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+template <class Device>
+class ForceBuffers {
+ public:
+  /// Uploads what has changed since the last call.
+  void upload(const Transfer<Device>& transfer, const ForceTable& table) {
+    const ForceView from = table.view();
+    if (parameters_version_ != table.parameters_version()) put_parameters(transfer, from);
+    if (lists_version_ != table.lists_version()) put_lists(transfer, from);
+    parameters_version_ = table.parameters_version();
+    lists_version_ = table.lists_version();
+  }
+  /// The next upload() copies everything.
+  void clear() { parameters_version_ = lists_version_ = 0; }
+
+  const ForceView& view() const { return view_; }
+  /// Sums of what acts on each body in a step.
+  Vec3* force_sums(const Transfer<Device>& transfer, std::size_t bodies) {
+    return transfer.room(&force_sum_, bodies);
+  }
+  Vec3* torque_sums(const Transfer<Device>& transfer, std::size_t bodies) {
+    return transfer.room(&torque_sum_, bodies);
+  }
+
+ private:
+  template <class T>
+  using Buffer = typename Device::template Buffer<T>;
+  template <class... F>
+  static std::tuple<Buffer<F>...> buffers_of(const std::variant<F...>&);
+
+  template <class... F>
+  void put_parameters(const Transfer<Device>& transfer,
+                      const ForceArrays<std::variant<F...>>& from) {
+    ((static_cast<ForceArray<F>&>(view_) = {transfer.put(&std::get<Buffer<F>>(parameters_),
+                                                         from.template array<F>().forces,
+                                                         from.template array<F>().count),
+                                            from.template array<F>().count}),
+     ...);
+  }
+  void put_lists(const Transfer<Device>& transfer, const ForceView& from) {
+    view_.on_all_count = from.on_all_count;
+    view_.on_all = transfer.put(&on_all_, from.on_all, from.on_all_count);
+    view_.on_body = transfer.put(&on_body_, from.on_body, from.on_body_count);
+    view_.first_item = transfer.put(&first_item_, from.first_item, from.first_item_count);
+    view_.mass = transfer.put(&mass_, from.mass, from.mass_count);
+    view_.parts = transfer.put(&parts_, from.parts, from.part_count);
+    view_.first_part = transfer.put(&first_part_, from.first_part, from.first_part_count);
+  }
+
+  decltype(buffers_of(std::declval<RecordableForce>())) parameters_;
+  Buffer<ForceItem> on_all_, on_body_;
+  Buffer<std::uint32_t> first_item_, first_part_;
+  Buffer<Real> mass_;
+  Buffer<SolidPart> parts_;
+  Buffer<Vec3> force_sum_, torque_sum_;
+  ForceView view_;
+  std::uint64_t parameters_version_ = 0, lists_version_ = 0;  ///< of the table; 0: none
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx

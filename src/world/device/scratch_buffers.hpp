@@ -1,0 +1,88 @@
+/// What only one step uses, in the memory of a device.
+#pragma once
+
+#include "src/world/device/step_data.hpp"
+#include "src/world/device/transfer.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+template <class Device>
+class ScratchBuffers {
+ public:
+  /// Makes room for what is indexed by body.
+  void reserve_bodies(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
+    StepData& d = *data;
+    d.motion = transfer.room(&motion_, n);
+    d.near.motion = d.motion;
+    d.first_candidate = transfer.room(&first_candidate_, n);
+    d.manifold_sizes = transfer.room(&manifold_sizes_, n);
+    d.first_fixed = transfer.room(&first_fixed_, n);
+    d.used_colors = transfer.room(&used_colors_, n);
+    d.first_order = transfer.room(&first_order_, n);
+    d.first_contact = transfer.room(&first_contact_, n);
+    d.parent = transfer.room(&parent_, n);
+    d.marked = transfer.room(&marked_, n);
+    d.near_flag = transfer.room(&near_flag_, n);
+    d.step.near = d.near_flag;
+    d.step.solver = transfer.room(&solver_, n);
+    d.step.orientation = transfer.room(&orientation_, n);
+    d.motion_cells = transfer.room(&motion_cells_, n);
+    d.free_cells = transfer.room(&free_cells_, n);
+    d.row_bodies = transfer.room(&row_bodies_, n);
+    d.pair_count = transfer.room(&pair_count_, 1);
+    d.counters = transfer.room(&counters_, 1);
+  }
+
+  /// Makes room for lists.
+  void reserve_lists(const Transfer<Device>& transfer, const Capacity& c, StepData* data) {
+    StepData& d = *data;
+    const std::size_t contacts = std::size_t{c.spheres} + c.candidates;
+    d.pairs = transfer.room(&pairs_, c.pairs);
+    d.pair_found = transfer.room(&pair_found_, c.pairs);
+    d.pair_results = transfer.room(&pair_results_, c.pairs);
+    d.candidates = transfer.room(&candidates_, c.candidates);
+    d.tested = transfer.room(&tested_, c.candidates);
+    d.next_candidate = transfer.room(&next_candidate_, c.candidates);
+    d.uncolored = transfer.room(&uncolored_, contacts);
+    d.still_uncolored = transfer.room(&still_uncolored_, contacts);
+    d.row_bins = transfer.room(&row_bins_, contacts);
+    d.row_contact = transfer.room(&row_contact_, contacts);
+    d.next_fixed = transfer.room(&next_fixed_, contacts);
+    d.overflow = transfer.room(&overflow_, contacts);
+    d.sphere_rows = {transfer.room(&sphere_rows_, contacts), contacts};
+    d.manifold_rows = transfer.room(&manifold_rows_, contacts);
+    d.point_rows = transfer.room(&point_rows_, std::size_t{c.spheres} + c.points);
+  }
+
+ private:
+  template <class T>
+  using Buffer = typename Device::template Buffer<T>;
+
+  Buffer<Vec3> motion_;
+  Buffer<SpherePair> pairs_;
+  Buffer<cuda::ContactCount> pair_count_;
+  Buffer<NormalDistance> pair_results_;
+  Buffer<Candidate> candidates_;
+  Buffer<NearPair> tested_;
+  Buffer<std::uint32_t> first_candidate_, next_candidate_, first_contact_, uncolored_,
+      still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_;
+  Buffer<std::uint64_t> manifold_sizes_, used_colors_, first_order_;
+  Buffer<std::uint8_t> pair_found_, row_bins_, marked_, near_flag_;
+  Buffer<soft_step::SolverBody> solver_;
+  Buffer<Quat> orientation_;
+  Buffer<soft_step::SphereRow> sphere_rows_;
+  Buffer<soft_step::ManifoldRow> manifold_rows_;
+  Buffer<soft_step::PointRow> point_rows_;
+  Buffer<MotionCells> motion_cells_;
+  Buffer<FreeCells> free_cells_;
+  Buffer<RowBody> row_bodies_;
+  Buffer<Counters> counters_;
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx

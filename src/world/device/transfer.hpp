@@ -1,0 +1,57 @@
+/// Copies between the host and the buffers of a device.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+/// Copies between the host and the buffers of a device. The functions only enqueue work: what they
+/// read or write on the host must stay until wait() returns.
+/// @tparam Device as for DeviceStep
+template <class Device>
+class Transfer {
+ public:
+  template <class T>
+  using Buffer = typename Device::template Buffer<T>;
+
+  explicit Transfer(Device* device) : device_(device) {}
+
+  /// Copies an array to the device. @returns its address there
+  template <class T>
+  const T* put(Buffer<T>* to, const T* from, std::size_t count) const {
+    device_->reserve(to, std::max<std::size_t>(count, 1), "the bodies of a world");
+    device_->upload(to->data(), from, count);
+    return to->data();
+  }
+  template <class T>
+  T* put(Buffer<T>* to, const std::vector<T>& from) const {
+    put(to, from.data(), from.size());
+    return to->data();
+  }
+  /// Copies as many items as `to` has.
+  template <class T>
+  void get(std::vector<T>* to, const Buffer<T>& from) const {
+    device_->download(to->data(), from.data(), to->size());
+  }
+  /// Makes room for `count` items, which discards the contents. @returns the address
+  template <class T>
+  T* room(Buffer<T>* buffer, std::size_t count) const {
+    device_->reserve(buffer, std::max<std::size_t>(count, 1), "a step of a world");
+    return buffer->data();
+  }
+  template <class T>
+  void copy(T* to, const T* from, std::size_t count) const {
+    device_->copy(to, from, count);
+  }
+  void wait() const { device_->wait(); }
+
+ private:
+  Device* device_;
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx
