@@ -32,9 +32,11 @@ void check_wall(Wall* wall) {
 /// All that a body consists of, in the order of the bytes. `Self` is const for a writer.
 template <class Archive, class Self>
 void BodyStore::serialize_body(Archive& archive, Self& self, std::uint32_t i) {
+  std::uint8_t inertia_given = self.inertia_given(i) ? 1 : 0;
   archive(self.shape_[i], self.mass_[i], self.kinematic_[i], self.sensor_[i], self.can_sleep_[i],
-          self.inertia_given_[i]);
-  if (self.inertia_given_[i] != 0) {
+          inertia_given);
+  BinaryReader::require(inertia_given <= 1, "a flag of a body is neither 0 nor 1");
+  if (inertia_given != 0) {
     if constexpr (std::is_const_v<Self>) {
       archive(self.given_inertia_.at(i));
     } else {
@@ -123,10 +125,9 @@ void BodyStore::check_body(std::uint32_t i) const {
   validate_body(def, i);
   const auto is_flag = [](std::uint8_t value) { return value <= 1; };
   BinaryReader::require(is_flag(kinematic_[i]) && is_flag(sensor_[i]) && is_flag(can_sleep_[i]) &&
-                            is_flag(inertia_given_[i]) && is_flag(moving.awake[i]),
+                            is_flag(moving.awake[i]),
                         "a flag of a body is neither 0 nor 1");
-  BinaryReader::require(inertia_given_[i] == 0 || mass_[i] > 0,
-                        "an immovable body has a given inertia");
+  BinaryReader::require(!inertia_given(i) || mass_[i] > 0, "an immovable body has a given inertia");
   BinaryReader::require(moving.awake[i] == 0 || mass_[i] > 0 || kinematic(i),
                         "an immovable body is awake");
 }

@@ -81,7 +81,7 @@ void BodyStore::for_each_array(const Visit& visit) {
   all(shape_, radius_, extent_, mass_, inverse_mass_, friction_, restitution_, rolling_friction_,
       spinning_friction_, body_inverse_inertia_, tensor_, acceleration_, linear_damping_,
       angular_damping_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_, sensor_,
-      inertia_given_, user_data_, filter_);
+      user_data_, filter_);
 }
 
 void BodyStore::reserve(std::size_t bodies) {
@@ -114,10 +114,16 @@ void BodyStore::count_body(std::uint32_t i) noexcept {
 
 BodyId BodyStore::add(const BodyDef& def) {
   Shape shape = normalized(def.shape);  // may throw, hence before any change
+  std::map<std::uint32_t, Mat3> given;
+  if (def.inertia && def.mass > 0) given[0] = {};
   if (pool_.is_full()) add_slot();
-  if (def.inertia && def.mass > 0) given_inertia_[pool_.unused().back()] = {};
-  const BodyId id = pool_.add();
+  const BodyId id = pool_.add();  // from here on nothing allocates
   const std::uint32_t i = id.index;
+  if (!given.empty()) {
+    auto node = given.extract(given.begin());
+    node.key() = i;
+    given_inertia_.insert(std::move(node));
+  }
 
   set_shape(i, std::move(shape));
   friction_[i] = def.friction;
@@ -159,13 +165,11 @@ void BodyStore::set_inertia(std::uint32_t i, const std::optional<Mat3>& given) {
 }
 
 void BodyStore::compute_inertia(std::uint32_t i, const std::optional<Mat3>& given) {
-  const bool is_given = given && movable(i);
-  if (is_given) {
+  if (given && movable(i)) {
     given_inertia_[i] = symmetric_part(*given);
   } else {
     given_inertia_.erase(i);
   }
-  inertia_given_[i] = is_given ? 1 : 0;
   if (movable(i)) {
     set_tensor(i, inertia(i));
   } else {  // infinite inertia: the inverse is zero (erratum E26)

@@ -100,7 +100,7 @@ class BodyStore {
   void set_mass(std::uint32_t body, Real mass);
   /// [kg m^2], body axes; zero for mass 0
   Mat3 inertia(std::uint32_t body) const;
-  bool inertia_given(std::uint32_t body) const { return inertia_given_[body] != 0; }
+  bool inertia_given(std::uint32_t body) const { return given_inertia_.contains(body); }
   /// Has no effect on a body of mass 0. @param given absent: the inertia of the solid shape
   /// @throws std::bad_alloc; the store is then unchanged
   void set_inertia(std::uint32_t body, const std::optional<Mat3>& given);
@@ -178,14 +178,14 @@ class BodyStore {
   std::vector<Real> radius_, extent_, mass_, inverse_mass_, friction_, restitution_;
   std::vector<Real> rolling_friction_, spinning_friction_;
   std::vector<Mat3> body_inverse_inertia_;       ///< body axes
-  std::map<std::uint32_t, Mat3> given_inertia_;  ///< by body, of those that inertia_given_ marks
+  std::map<std::uint32_t, Mat3> given_inertia_;  ///< by body
   /// Inertia in body axes, divided by its largest diagonal entry, for the gyroscopic term; zero if
   /// that term is zero (isotropic inertia or mass 0).
   std::vector<Mat3> tensor_;
   std::vector<Vec3> acceleration_;                           ///< BodyDef::acceleration
   std::vector<Real> linear_damping_, angular_damping_;       ///< those of BodyDef
   std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^substep
-  std::vector<std::uint8_t> can_sleep_, kinematic_, sensor_, inertia_given_;
+  std::vector<std::uint8_t> can_sleep_, kinematic_, sensor_;
   std::vector<std::uint64_t> user_data_;
   std::vector<CollisionFilter> filter_;  ///< the default in unused slots
 

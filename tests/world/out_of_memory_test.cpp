@@ -192,6 +192,23 @@ TEST_P(OutOfMemoryInAWorld, AFailedAdditionLeavesNoTrace) {
   }
 }
 
+TEST_P(OutOfMemoryInAWorld, AFailedAdditionOfABodyWithGivenInertiaLeavesTheSnapshot) {
+  const std::uint64_t seed = fresh_seed();
+  SCOPED_TRACE(trace(seed));
+  const Scene scene = dense_scene(seed, GetParam());
+  BodyDef def;
+  def.mass = 1;
+  def.inertia = diagonal({1, 2, 2});
+  EXPECT_GT(with_every_failure([&](std::size_t k, Shortage shortage) {
+              World world = make_world(scene, kSettings[0], 3);
+              const Snapshot before = world.snapshot();
+              const bool failed = runs_out(k, shortage, [&] { world.add(def); });
+              EXPECT_EQ(world.snapshot() == before, failed) << k;
+              return FailingNew::failed() && !testing::Test::HasFailure();
+            }),
+            0u);
+}
+
 TEST_P(OutOfMemoryInAWorld, AFailedRestorationLeavesNoTrace) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
