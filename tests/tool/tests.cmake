@@ -12,8 +12,10 @@ foreach(suffix IN ITEMS "" "_f64")
     JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
 endforeach()
 
-# A reduced matrix of scripts/identity.
 if(JFPX_HAS_BULLET)
+  add_test(NAME ReadmeSample COMMAND
+    ${PROJECT_SOURCE_DIR}/tests/docs/readme_sample.sh $<TARGET_FILE:jfpx_tool>)
+  # A reduced matrix of scripts/identity.
   add_test(NAME identity COMMAND ${PROJECT_SOURCE_DIR}/scripts/identity
     --jfpx $<TARGET_FILE:jfpx_tool> --spheres 6 --steps 10 --threads "1 3")
   set_tests_properties(identity PROPERTIES PASS_REGULAR_EXPRESSION "all 36 comparisons are identical")
