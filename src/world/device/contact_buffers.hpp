@@ -1,9 +1,12 @@
 /// The contacts of a step in the memory of a device.
 #pragma once
 
+#include <jfpx/world.hpp>
+
 #include "src/world/body_store.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
+#include "src/world/met_contacts.hpp"
 
 #include <algorithm>
 #include <array>
