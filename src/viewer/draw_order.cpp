@@ -21,13 +21,13 @@ class Frustum {
         slopes_{std::tan(view.fov_y / 2) * aspect, std::tan(view.fov_y / 2)} {
     // Anti-aliasing smooths edges over a pixel, so the frustum is widened by more than a pixel.
     for (Real& slope : slopes_) slope += Real(0.01);
-    for (int i = 0; i < 2; ++i) lengths_[i] = std::sqrt(1 + slopes_[i] * slopes_[i]);
+    for (std::size_t i = 0; i < 2; ++i) lengths_[i] = std::sqrt(1 + slopes_[i] * slopes_[i]);
   }
 
   bool meets(const Vec3& centre, Real radius) const {
     const Real ahead = dot(centre, axes_[2]);
     if (ahead < -radius) return false;
-    for (int i = 0; i < 2; ++i) {
+    for (std::size_t i = 0; i < 2; ++i) {
       const Real aside = std::fabs(dot(centre, axes_[i]));
       if (aside - ahead * slopes_[i] > radius * lengths_[i]) return false;
     }

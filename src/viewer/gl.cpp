@@ -61,10 +61,10 @@ GlTexture make_texture(GLenum format, int width, int height) {
   const bool depth = format == GL_DEPTH_COMPONENT32F;
   glTexImage2D(GL_TEXTURE_2D, 0, static_cast<GLint>(format), width, height, 0,
                depth ? GL_DEPTH_COMPONENT : GL_RGBA, GL_FLOAT, nullptr);
-  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER}) {
+  for (const GLenum filter : {GLenum{GL_TEXTURE_MIN_FILTER}, GLenum{GL_TEXTURE_MAG_FILTER}}) {
     glTexParameteri(GL_TEXTURE_2D, filter, GL_NEAREST);
   }
-  for (const GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T}) {
+  for (const GLenum wrap : {GLenum{GL_TEXTURE_WRAP_S}, GLenum{GL_TEXTURE_WRAP_T}}) {
     glTexParameteri(GL_TEXTURE_2D, wrap, GL_CLAMP_TO_EDGE);
   }
   return GlTexture(name);

@@ -3,13 +3,13 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/sanitizers.hpp"
+
 #include <epoxy/gl.h>
 
-#if defined(__SANITIZE_ADDRESS__)
 #include <cstring>
 #include <dlfcn.h>
 #include <link.h>
-#endif
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -35,7 +35,7 @@ Extent size_by(void (*query)(SDL_Window*, int*, int*), SDL_Window* window) {
 /// Keeps the driver loaded, so that the leak sanitizer finds Mesa's memory in use and reports only
 /// leaks of this project. Mesa frees its memory when the driver is unloaded, or never.
 void keep_driver_for_leak_sanitizer() {
-#if defined(__SANITIZE_ADDRESS__)
+  if (!kAddressSanitizer) return;
   const auto keep = [](dl_phdr_info* library, std::size_t, void*) {
     for (const char* driver : {"_dri.so", "libEGL_mesa.so"}) {
       if (std::strstr(library->dlpi_name, driver) == nullptr) continue;
@@ -44,7 +44,6 @@ void keep_driver_for_leak_sanitizer() {
     return 0;
   };
   dl_iterate_phdr(keep, nullptr);
-#endif
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <jfpx/bullet/verify.hpp>
 #include <jfpx/random.hpp>
 
+#include "src/base/sanitizers.hpp"
+
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
 #include <btBulletDynamicsCommon.h>
 #include <gtest/gtest.h>
@@ -43,10 +45,10 @@ inline Real random_extreme(Random& random) {
 inline std::uint64_t world_steps_to_run(std::uint64_t in_slow_builds, std::uint64_t otherwise) {
   const char* setting = std::getenv("JFPX_TEST_WORLD_STEPS");
   if (setting != nullptr) return std::strtoull(setting, nullptr, 0);
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
-  constexpr bool kSlow = true;
+#if defined(NDEBUG)
+  constexpr bool kSlow = kAddressSanitizer || kThreadSanitizer;
 #else
-  constexpr bool kSlow = false;
+  constexpr bool kSlow = true;
 #endif
   return kSlow ? in_slow_builds : otherwise;
 }

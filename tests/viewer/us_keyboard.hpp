@@ -13,8 +13,11 @@ inline SDL_Scancode us_scancode(SDL_Keycode code) {
   if (code >= SDLK_a && code <= SDLK_z) {
     return static_cast<SDL_Scancode>(SDL_SCANCODE_A + (code - SDLK_a));
   }
-  if ((code & SDLK_SCANCODE_MASK) != 0)
-    return static_cast<SDL_Scancode>(code & ~SDLK_SCANCODE_MASK);
+  if ((code & SDLK_SCANCODE_MASK) != 0) {
+    const int scancode = code & ~SDLK_SCANCODE_MASK;
+    const bool valid = scancode >= 0 && scancode < SDL_NUM_SCANCODES;
+    return valid ? static_cast<SDL_Scancode>(scancode) : SDL_SCANCODE_UNKNOWN;
+  }
   return SDL_GetScancodeFromKey(code);
 }
 

@@ -160,8 +160,8 @@ TEST(Oracle, TheSoftStepTendsToRigidContactsAsSubstepsGrow) {
       error = std::max(error, length(position - oracle.position(i)));
       moved = std::max(moved, length(position - to_double(scene.bodies[i].position)));
     }
-    EXPECT_GT(moved, 0.2);
-    EXPECT_LT(error, 0.16 / substeps) << substeps << " substeps";
+    EXPECT_GT(moved, 0.2);  // or the balls stay where they are
+    EXPECT_LT(error, 0.004 + 0.04 / substeps) << substeps << " substeps";
   }
 }
 

@@ -159,8 +159,8 @@ class DeviceStep final : public DeviceWorld {
     BodyView& bodies = data_.step.bodies;
     bodies.force = bodies_.force();
     bodies.torque = bodies_.torque();
-    forces_act_ = table != nullptr;
-    if (!forces_act_) return;
+    force_sum_ = torque_sum_ = nullptr;
+    if (table == nullptr) return;
     forces_.upload(transfer_, *table);
     time_ = time;
     force_sum_ = forces_.force_sums(transfer_, bodies.capacity);
@@ -192,12 +192,13 @@ class DeviceStep final : public DeviceWorld {
     const std::size_t bodies = d.step.bodies.count;
     const std::size_t sub_shapes = d.near.sub_shapes.bounded_count;
     const std::size_t contacts = std::max({bodies, last.sphere_count(), last.manifold_count()});
-    if (forces_act_) {
+    const bool forces_act = force_sum_ != nullptr;
+    if (forces_act) {
       device_->mark(0);
       device_->run(ForceProgram{d, forces_.view(), time_, force_sum_, torque_sum_}, bodies);
     }
     device_->mark(1);
-    device_->run(BoundsProgram{d, forces_act_}, std::max(bodies, sub_shapes));
+    device_->run(BoundsProgram{d, forces_act}, std::max(bodies, sub_shapes));
     device_->find_pairs(d.near.swept, d.near.sub_shapes.fixed_begin, d.pairs, capacity_.pairs,
                         d.pair_count);
     device_->run(SphereProgram{d}, contacts);
@@ -251,9 +252,8 @@ class DeviceStep final : public DeviceWorld {
   ScratchBuffers<Device> scratch_;
   Buffer<EditedBody> edits_;
   // Of the step in progress.
-  bool forces_act_ = false;
   double time_ = 0;
-  Vec3 *force_sum_ = nullptr, *torque_sum_ = nullptr;
+  Vec3 *force_sum_ = nullptr, *torque_sum_ = nullptr;  ///< null if no force of the table acts
 };
 
 }  // namespace device
