@@ -370,7 +370,7 @@ class RandomBoxes {
 };
 
 TEST(AabbUpdate, HasStocksTreeAndPairsInRandomWorlds) {
-  const std::uint64_t seed = test_seed(), steps = world_steps_to_run(300, 1800);
+  const std::uint64_t seed = test_seed(), steps = world_steps_to_run(300, 900);
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
   std::uint64_t done = 0;
   int fixed = 0, cleaned = 0;

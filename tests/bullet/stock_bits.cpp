@@ -21,7 +21,7 @@ std::string report(const SolverWorld& world, const Failure& failure, MakeParts p
 
 }  // namespace
 
-std::uint64_t wanted_solver_steps() { return world_steps_to_run(5'000, 100'000); }
+std::uint64_t wanted_solver_steps() { return world_steps_to_run(5'000, 50'000); }
 
 SolverTotals expect_stocks_bits(std::uint64_t steps, MakeParts parts, MakeDispatcher dispatcher) {
   const std::uint64_t seed = test_seed();

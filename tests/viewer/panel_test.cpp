@@ -389,7 +389,7 @@ TEST_F(Panel, ARecordingPausesAtItsEndRestartsAndContinuesWithASimulation) {
 }
 
 TEST_F(Panel, ButtonsWritePicturesAndSwitchesChangeThem) {
-  test::User user(options_for("pile"));
+  test::User user(options_for("pile"), 1);
   user.click("Picture");
   user.frame();
   EXPECT_EQ(read_png("jfpx-view-1.png").height, 760);

@@ -15,9 +15,10 @@ namespace test {
 /// Reads the log of the panel and operates its widgets by SDL events at their positions.
 class User {
  public:
-  /// @param density pixels per unit of the window; the size in the options is in units
+  /// @param density pixels per unit of the window; the size in the options is in units. Few pixels
+  ///     by default, because a driver without a GPU takes most of a test's time for them.
   /// @throws as view::App
-  explicit User(view::ViewOptions options, double density = 1);
+  explicit User(view::ViewOptions options, double density = 0.25);
   ~User();
   User(const User&) = delete;
   User& operator=(const User&) = delete;
