@@ -125,8 +125,9 @@ class JFPX_API World {
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
 
-  /// Adds a body. If memory runs out, this and all other functions that add something throw
-  /// std::bad_alloc and leave the world unchanged. Removal needs no memory.
+  /// Adds a body. If memory runs out, this and all other functions that change bodies throw
+  /// std::bad_alloc and leave the world unchanged. Those that wake or describe neighbors may need
+  /// memory once after each step, for contacts().
   /// @throws InvalidScene if the definition is invalid
   BodyId add(const BodyDef& body);
   /// Removes a body and wakes the bodies in contact with it.
@@ -314,7 +315,8 @@ class JFPX_API World {
   /// spheres before boxes; contact points of the same two parts are in the order in which their
   /// pair test returns them. Those that began during the step follow. Empty after a failed
   /// step, and after bodies were added or removed. Valid until a body is added or removed, or until
-  /// the next step.
+  /// the next step. The first call after a step makes the list.
+  /// @throws std::bad_alloc
   std::span<const Contact> contacts() const;
   /// Pairs of bodies that began to touch, stay in contact or ceased to touch in the last step.
   /// Contacts of contact generators have no events. Sorted by (a.index, b.index); where a new body

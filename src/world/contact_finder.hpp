@@ -8,6 +8,7 @@
 #include "src/contact_solver/contact_set.hpp"
 #include "src/world/body_store.hpp"
 #include "src/world/broad_phase_search.hpp"
+#include "src/world/detected_contacts.hpp"
 #include "src/world/near_pair_test.hpp"
 #include "src/world/sub_shape_table.hpp"
 
@@ -40,11 +41,11 @@ class ContactFinder {
   /// Forces of the step must have been added up.
   /// @param margin   [m], >= 0: SoftStepSettings::speculative_margin
   /// @param near     receives all pairs, each list sorted by key
-  /// @param touching receives the contacts with distance <= 0
-  /// @returns the number of contacts of two spheres in `touching`
+  /// @param detected receives the contacts with distance <= 0 that are not in near->spheres
+  /// @returns the number of contacts in near->spheres with distance <= 0
   /// @throws the exceptions of SphereCollider::find_pairs()
-  std::uint64_t find_near_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
-                                   soft_step::ContactSet* near, std::vector<Contact>* touching);
+  std::size_t find_near_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
+                                 soft_step::ContactSet* near, DetectedContacts* detected);
 
   SubShapeTable& sub_shapes() noexcept { return sub_shapes_; }
   const SphereCollider& collider() const noexcept { return broad_phase_.collider(); }
@@ -67,14 +68,16 @@ class ContactFinder {
     std::vector<soft_step::SphereContactInput> spheres;
     std::vector<soft_step::ManifoldInput> manifolds;
     std::vector<soft_step::PointInput> points;
-    std::vector<Contact> touching;  ///< those with distance <= 0, also of sensors
+    std::size_t touching_spheres = 0;  ///< contacts in `spheres` with distance <= 0
+    std::vector<Contact> others;       ///< other contacts with distance <= 0
     std::vector<Candidate> candidates, compounds;
     void add(const BodyStore& bodies, const NearPair& near);
     void clear() {
       spheres.clear();
       manifolds.clear();
       points.clear();
-      touching.clear();
+      touching_spheres = 0;
+      others.clear();
       candidates.clear();
       compounds.clear();
     }
@@ -89,7 +92,6 @@ class ContactFinder {
   template <class Find, class AppendAll>
   void for_each_batch(ThreadPool* pool, std::size_t count, const Find& find,
                       const AppendAll& append_all);
-  void merge_by_bodies(std::size_t middle, std::span<Contact> contacts);
 
   BroadPhaseSearch broad_phase_;
   SubShapeTable sub_shapes_;

@@ -2,6 +2,7 @@
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
 #include "src/world/contact_finder.hpp"
+#include "src/world/merge_contacts.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -89,12 +90,14 @@ void ContactFinder::test_sphere_pairs(const BodyStore& bodies, std::span<const S
     const detail::SpeculativeContact c = near_.test_spheres(pair.a, pair.b);
     if (!c.found) continue;
     const std::uint32_t a = sub_shapes.body(pair.a), b = sub_shapes.body(pair.b);
+    const bool touch = c.distance <= 0;
     if (view.sensor[a] == 0 && view.sensor[b] == 0) {
       part->spheres.push_back({{a, b}, c.normal, c.distance});
+      if (touch) ++part->touching_spheres;
+    } else if (touch) {
+      const Vec3 point = middle_point(c.normal, c.distance, sub_shapes.bounds(pair.b));
+      part->others.push_back({bodies.id(a), bodies.id(b), c.normal, point, c.distance});
     }
-    if (!(c.distance <= 0)) continue;
-    const Vec3 point = middle_point(c.normal, c.distance, sub_shapes.bounds(pair.b));
-    part->touching.push_back({bodies.id(a), bodies.id(b), c.normal, point, c.distance});
   }
 }
 
@@ -119,13 +122,13 @@ struct ContactFinder::Results {
   Refilled<soft_step::SphereContactInput> spheres;
   Refilled<soft_step::ManifoldInput> manifolds;
   Refilled<soft_step::PointInput> points;
-  Refilled<Contact> touching;
+  Refilled<Contact> others;
 };
 
 /// Appends the contact of two sub-shapes.
 void ContactFinder::Part::add(const BodyStore& bodies, const NearPair& near) {
   for (const NearPair::Touch& touch : std::span(near.touches, near.touch_count)) {
-    touching.push_back(
+    others.push_back(
         {bodies.id(near.key.a), bodies.id(near.key.b), near.normal, touch.point, touch.distance});
   }
   if (near.point_count == 0) return;
@@ -179,30 +182,17 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
     append(
         pool, parts, [](Part & p) -> auto& { return p.points; }, &results->points);
     append(
-        pool, parts, [](Part & p) -> auto& { return p.touching; }, &results->touching);
+        pool, parts, [](Part & p) -> auto& { return p.others; }, &results->others);
   });
 }
 
-/// Merges the sorted ranges [0, middle) and [middle, size) of a list. Unlike std::inplace_merge(),
-/// it allocates nothing but the buffer that it keeps.
-void ContactFinder::merge_by_bodies(std::size_t middle, std::span<Contact> contacts) {
-  const auto pair_of = [](const Contact& c) { return std::pair(c.a.index, c.b.index); };
-  reserve_geometric(&merged_, contacts.size() - middle);
-  merged_.assign(contacts.begin() + static_cast<std::ptrdiff_t>(middle), contacts.end());
-  std::size_t first = middle, second = merged_.size();
-  while (second > 0) {
-    const bool is_first = first > 0 && pair_of(merged_[second - 1]) < pair_of(contacts[first - 1]);
-    Contact& last = contacts[first + second - 1];
-    last = is_first ? contacts[--first] : merged_[--second];
-  }
-}
-
-std::uint64_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real margin,
-                                                ThreadPool* pool, ContactSet* near,
-                                                std::vector<Contact>* touching) {
+std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real margin,
+                                              ThreadPool* pool, ContactSet* near,
+                                              DetectedContacts* detected) {
   sub_shapes_.update_poses(bodies, pool);
   sweep_bounds(bodies, margin, pool);
-  Results results{{&near->spheres}, {&near->manifolds}, {&near->points}, {touching}};
+  Results results{{&near->spheres}, {&near->manifolds}, {&near->points}, {&detected->others}};
+  std::size_t touching_spheres = 0;
   Refilled<Candidate> candidates{&candidates_}, compounds{&compounds_};
 
   const std::span<const SpherePair> found =
@@ -211,10 +201,11 @@ std::uint64_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real ma
     test_sphere_pairs(bodies, found.subspan(first, last - first), part);
   };
   for_each_batch(pool, found.size(), test_pairs, [&](std::span<Part> parts) {
+    for (const Part& part : parts) touching_spheres += part.touching_spheres;
     append(
         pool, parts, [](Part & p) -> auto& { return p.spheres; }, &results.spheres);
     append(
-        pool, parts, [](Part & p) -> auto& { return p.touching; }, &results.touching);
+        pool, parts, [](Part & p) -> auto& { return p.others; }, &results.others);
     append(
         pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
     append(
@@ -223,12 +214,12 @@ std::uint64_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real ma
 
   compounds.finish();
   if (!compounds_.empty()) {
-    const std::size_t middle = results.touching.size;
+    const std::size_t middle = results.others.size;
     std::ranges::sort(compounds_);
     test_candidates(bodies, compounds_, &results, pool);
-    merge_by_bodies(middle, std::span(*touching).first(results.touching.size));
+    merge_by_bodies(middle, std::span(detected->others).first(results.others.size), &merged_);
   }
-  const std::uint64_t sphere_contacts = results.touching.size;
+  detected->other_spheres = results.others.size;
 
   const auto find_fixed = [&](std::size_t first, std::size_t last, Part* part) {
     find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last), part);
@@ -243,10 +234,10 @@ std::uint64_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real ma
   results.spheres.finish();
   results.manifolds.finish();
   results.points.finish();
-  results.touching.finish();
+  results.others.finish();
   const auto by_key = [](const auto& x, const auto& y) { return x.key < y.key; };
   if (!std::ranges::is_sorted(near->manifolds, by_key)) std::ranges::sort(near->manifolds, by_key);
-  return sphere_contacts;
+  return touching_spheres;
 }
 
 }  // namespace JFPX_ABI

@@ -29,6 +29,8 @@ class SoftStep {
 
   /// Contacts of the current step, for ContactFinder::find_near_contacts().
   soft_step::ContactSet& contacts() { return cache_.current(); }
+  /// After commit(): contacts of the step before the last one, until the next detection.
+  soft_step::ContactView contacts_before() { return cache_.current().view(); }
   /// Contacts of the last completed step, with their impulses and colors.
   soft_step::ContactSet& last_contacts() { return cache_.last(); }
   /// The same. drop_removed() must have been called since the last forget().

@@ -6,6 +6,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/contact_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_events.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_finder.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/contact_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_resolver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts_by_body.cpp

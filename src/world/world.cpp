@@ -2,18 +2,14 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/parallel_for.hpp"
-#include "src/base/reserve.hpp"
 #include "src/base/stopwatch.hpp"
 #include "src/sphere_collider/backend_table.hpp"
-#include "src/world/met_contacts.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <functional>
 #include <iterator>
 #include <new>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -42,10 +38,10 @@ std::optional<BodyId> find_runaway(const BodyStore& store) {
 
 /// The contacts that wake bodies and are resolved: all but those of sensors, in the same order.
 std::span<const Contact> World::Impl::contacts_to_resolve() {
-  if (!store.has_sensors()) return contacts;
+  const std::vector<Contact>& all = contact_list().contacts;
+  if (!store.has_sensors()) return all;
   resolved.clear();
-  std::ranges::copy_if(contacts, std::back_inserter(resolved), std::logical_not(),
-                       &Contact::sensor);
+  std::ranges::copy_if(all, std::back_inserter(resolved), std::logical_not(), &Contact::sensor);
   return resolved;
 }
 
@@ -56,103 +52,59 @@ bool World::Impl::all_finite(const std::optional<BodyId>& runaway, StepReport* r
   return !runaway;
 }
 
-/// Sets the fields of detected contacts that follow from the properties of their bodies.
-void World::Impl::finish_contacts(std::vector<Contact>* list) const {
-  const MaterialSettings& rules = scene.materials;
-  parallel_for(pool.get(), list->size(), 1024, [&](std::size_t first, std::size_t last) {
-    for (Contact& c : std::span(*list).subspan(first, last - first)) {
-      const std::uint32_t a = c.a.index, b = c.b.index;
-      c.friction = combined(rules.friction, store.friction(a), store.friction(b));
-      c.restitution = combined(rules.restitution, store.restitution(a), store.restitution(b));
-      c.sensor = store.sensor(a) || store.sensor(b);
-    }
-  });
-}
-
 /// Detects the contacts of the current poses and calls the contact generators.
 void World::Impl::find_contacts(StepReport* report) {
   if (bodies_changed) contact_finder.set_bodies(store);
   bodies_changed = false;
   std::swap(contacts, contacts_before);
-  detected_count_before = detected_count;
+  std::swap(detected, detected_before);
+  contacts.invalidate();
   contacts_are_new = true;
-  if (scene.solver == Solver::worst_first) contacts.clear();
-  report->sphere_contacts =
-      scene.solver == Solver::soft_step
-          ? contact_finder.find_near_contacts(store, scene.soft_step.speculative_margin, pool.get(),
-                                              &soft_step.contacts(), &contacts)
-          : contact_finder.find_contacts(store, &contacts);
+  if (scene.solver == Solver::soft_step) {
+    find_soft_step_contacts(report);
+  } else {
+    contacts.get([&](ContactList* list) {
+      list->contacts.clear();
+      report->sphere_contacts = contact_finder.find_contacts(store, &list->contacts);
+      report->contacts = list->detected = list->contacts.size();
+      set_materials(store, scene.materials, pool.get(), &list->contacts);
+      call_generators(&list->contacts, report);
+    });
+  }
   // Copying the string may throw; at this point the step can still be undone.
   report->device_failure = contact_finder.collider().device_failure();
-  report->contacts = contacts.size();
-  finish_contacts(&contacts);
-  ContactContext contact_context(store, time(), &contacts);
-  generators.call(contact_context);
-  report->generated_contacts = contacts.size() - report->contacts;
-  detected_count = report->contacts;
 }
 
-/// Fills `met` with the contacts that began during the step. Counts them first, so that each thread
-/// has its range of the list. @returns the number of contacts of two spheres
-std::size_t World::Impl::find_met_contacts() {
-  constexpr std::size_t kChunk = 4096;
-  const soft_step::ContactView view = soft_step.contacts().view();
-  const std::size_t chunks = (view.size() + kChunk - 1) / kChunk;
-  resize_geometric(&met_begin, chunks + 1);
-  std::atomic<std::size_t> of_spheres{0};
-  parallel_for(pool.get(), view.size(), kChunk, [&](std::size_t first, std::size_t last) {
-    std::size_t count = 0, spheres = 0;
-    for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
-      const std::uint32_t points = soft_step::count_met(view, i);
-      count += points;
-      if (view.is_sphere(i)) spheres += points;
-    }
-    met_begin[first / kChunk] = count;
-    of_spheres.fetch_add(spheres, std::memory_order_relaxed);
-  });
-  met_begin[chunks] = 0;
-  std::exclusive_scan(met_begin.begin(), met_begin.end(), met_begin.begin(), std::size_t{0});
-  // Room for more than there usually are, so that warm steps allocate nothing.
-  reserve_geometric(&met, std::max(met_begin[chunks], std::size_t{64}));
-  met.resize(met_begin[chunks]);
-  parallel_for(pool.get(), view.size(), kChunk, [&](std::size_t first, std::size_t last) {
-    std::size_t next = met_begin[first / kChunk];
-    if (next == met_begin[first / kChunk + 1]) return;
-    soft_step::for_each_met(
-        view, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
-        [this](std::uint32_t body) { return store.moving.position[body]; },
-        [this](std::uint32_t body) { return store.radius(body); },
-        [&](const soft_step::ContactKey& key, bool, const Vec3& normal, const Vec3& point) {
-          met[next++] = {store.id(key.a), store.id(key.b), normal, point, 0};
-        });
-  });
-  return of_spheres;
+/// Detection of Solver::soft_step. The list of contacts is made only if generators may read it.
+void World::Impl::find_soft_step_contacts(StepReport* report) {
+  soft_step::ContactSet& near = soft_step.contacts();
+  const std::size_t spheres = contact_finder.find_near_contacts(
+      store, scene.soft_step.speculative_margin, pool.get(), &near, &detected);
+  report->sphere_contacts = spheres + detected.other_spheres;
+  report->contacts = spheres + detected.others.size();
+  detected.position = store.moving.position;
+  detected.generated.clear();
+  if (generators.ids().empty()) return;
+  ContactList& list = *contacts.storage();
+  list_maker.make(detected, near.view(), false, store, scene.materials, &list);
+  call_generators(&list.contacts, report);
+  const auto generated = std::span(list.contacts).subspan(list.detected);
+  detected.generated.assign(generated.begin(), generated.end());
 }
 
-/// Adds the contacts that began during the step to those of detection, after the contacts of
-/// the same bodies.
-void World::Impl::add_met_contacts(StepReport* report) {
-  const std::size_t of_spheres = find_met_contacts();
-  if (met.empty()) return;
-  finish_contacts(&met);
-  // Merges from the back: generated contacts, then others, then those of spheres.
-  const auto pair_of = [](const Contact& c) { return std::pair(c.a.index, c.b.index); };
-  std::size_t from = contacts.size(), next = met.size();
-  resize_geometric(&contacts, from + next);
-  std::size_t to = contacts.size();
-  while (from > detected_count) contacts[--to] = contacts[--from];
-  const std::pair<std::size_t, std::size_t> starts[] = {{report->sphere_contacts, of_spheres},
-                                                        {0, 0}};
-  for (const auto& [begin, first] : starts) {
-    while (next > first || (next > 0 && from > begin)) {
-      const bool is_old =
-          from > begin && (next == first || pair_of(met[next - 1]) < pair_of(contacts[from - 1]));
-      contacts[--to] = is_old ? contacts[--from] : met[--next];
-    }
-  }
-  report->contacts += met.size();
-  report->sphere_contacts += of_spheres;
-  detected_count = report->contacts;
+/// The contact generators append to the list of contacts.
+void World::Impl::call_generators(std::vector<Contact>* list, StepReport* report) {
+  const std::size_t count = list->size();
+  ContactContext context(store, time(), list);
+  generators.call(context);
+  report->generated_contacts = list->size() - count;
+}
+
+/// Adds the contacts that began during the step to the report.
+void World::Impl::count_met_contacts(StepReport* report) {
+  const MetCounts met = jfpx::count_met_contacts(soft_step.contacts().view(), pool.get());
+  report->contacts += met.spheres + met.others;
+  report->sphere_contacts += met.spheres;
 }
 
 /// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
@@ -175,10 +127,10 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   forces.call(context);
   const double forces_ms = watch.lap_ms();
   find_contacts(report);
-  soft_step.add_generated(store, std::span(contacts).subspan(report->contacts));
+  soft_step.add_generated(store, detected.generated);
   const double detect_ms = watch.lap_ms();
   if (!all_finite(soft_step.solve(&store), report)) return false;
-  add_met_contacts(report);
+  count_met_contacts(report);
   soft_step.commit(&store);
   report->integrate_ms = forces_ms;
   report->detect_ms = detect_ms;
@@ -261,7 +213,7 @@ void World::Impl::undo() noexcept {
   if (is_saved) undo_motion();
   if (contacts_are_new) {
     std::swap(contacts, contacts_before);
-    detected_count = detected_count_before;
+    std::swap(detected, detected_before);
   }
   shows_contacts = shows_events = false;
   spent_us = 0;

@@ -31,6 +31,7 @@ BodyId World::add(const BodyDef& body) {
 void World::remove(BodyId id) {
   impl_->store.require(id);
   BodyStore& bodies = impl_->changed_bodies();
+  impl_->make_contact_lists();  // they have the ids of now
   impl_->wake_neighbors(id);
   bodies.remove(id);
   impl_->soft_step.forget(id.index);
@@ -151,16 +152,14 @@ double World::time() const { return impl_->time(); }
 
 std::span<const Contact> World::contacts() const {
   if (!impl_->shows_contacts) return {};
-  impl_->fetch_contacts();
-  return impl_->contacts;
+  return impl_->contact_list().contacts;
 }
 
 std::span<const ContactEvent> World::contact_events() const {
   if (!impl_->shows_events) return {};
-  impl_->fetch_contacts();
-  return impl_->events.between(
-      std::span(impl_->contacts_before).first(impl_->detected_count_before),
-      std::span(impl_->contacts).first(impl_->detected_count));
+  const ContactList &before = impl_->contact_list_before(), &now = impl_->contact_list();
+  return impl_->events.between(std::span(before.contacts).first(before.detected),
+                               std::span(now.contacts).first(now.detected));
 }
 
 std::uint64_t World::state_hash() const { return jfpx::state_hash(states()); }

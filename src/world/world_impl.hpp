@@ -8,6 +8,7 @@
 #include "src/world/callback_registry.hpp"
 #include "src/world/contact_events.hpp"
 #include "src/world/contact_finder.hpp"
+#include "src/world/contact_list.hpp"
 #include "src/world/contact_resolver.hpp"
 #include "src/world/contacts_by_body.hpp"
 #include "src/world/device_world.hpp"
@@ -65,8 +66,15 @@ struct World::Impl {
   /// Records that all bodies may have forces for the next step on the host.
   void note_forces();
   void fetch_motion();
-  /// Makes `contacts` and `contacts_before` those of the last two steps.
-  void fetch_contacts();
+  /// The contacts of the last step that was not undone, and those of the step before. They are made
+  /// on demand: on the host, from what detection has left; while the world is on a device, there.
+  /// Const functions may call them concurrently. @throws std::bad_alloc, DeviceError
+  const ContactList& contact_list();
+  const ContactList& contact_list_before();
+  /// Makes the lists that later calls may ask for, before a change of the bodies or of the place of
+  /// the world.
+  void make_contact_lists();
+  void make_list(bool of_step_before, ContactList* list);
   /// Fetches everything, so that the host has the state of the world.
   void leave_device();
   /// As leave_device(), but the device keeps the state, too. Const functions may call it
@@ -83,11 +91,11 @@ struct World::Impl {
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
     if (!store.movable(body.index)) changed_bodies();
-    if (resident && !contacts_are_current) {
+    if (resident && contacts.current() == nullptr) {
       edited_body(body.index, {.wakes_neighbors = true});
       return;
     }
-    contacts_by_body.for_each(contacts, body, [&](const Contact& c) {
+    contacts_by_body.for_each(contact_list().contacts, body, [&](const Contact& c) {
       const BodyId other = c.a == body ? c.b : c.a;
       if (!c.sensor && store.contains(other)) wake(other.index);
     });
@@ -129,15 +137,15 @@ struct World::Impl {
   bool advance_on_device(StepReport* report);
   bool step_on_device(StepReport* report);
   void apply_forces_on_host();
-  void finish_contacts(std::vector<Contact>* list) const;
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   void find_contacts(StepReport* report);
-  std::size_t find_met_contacts();
-  void add_met_contacts(StepReport* report);
+  void find_soft_step_contacts(StepReport* report);
+  void call_generators(std::vector<Contact>* list, StepReport* report);
+  void count_met_contacts(StepReport* report);
   void save_for_undo();
   void undo_motion() noexcept;
   void undo() noexcept;
-  void write(BinaryWriter* writer) const;
+  void write(BinaryWriter* writer);
   void read(BinaryReader* reader);
 
   std::unique_ptr<ThreadPool> pool;  ///< of the collider, if make_sphere_collider() made it, too
@@ -152,16 +160,13 @@ struct World::Impl {
   CallbackRegistry<ContactContext, ContactGeneratorId> generators{"contact generator"};
   bool bodies_changed = true;  ///< whether contact_finder.set_bodies() must be called
   Lazy<QueryTree> query_tree;  ///< of the bodies, built by the first query after a change
-  /// Contacts of the last step that was not undone. Bodies may have been removed since.
-  std::vector<Contact> contacts;
-  ContactsByBody contacts_by_body;     ///< of `contacts`
-  std::vector<Contact> resolved;       ///< during a step with sensors: the contacts of other bodies
-  std::vector<Contact> met;            ///< contacts that began during the step
-  std::vector<std::size_t> met_begin;  ///< by chunk of contacts: its first entry in `met`
-  std::vector<Contact> contacts_before;  ///< those of the step before, for events and undo()
-  /// Numbers of detected contacts in both lists; the others are those of contact generators.
-  std::size_t detected_count = 0, detected_count_before = 0;
-  bool contacts_are_new = false;  ///< whether `contacts` and `contacts_before` have been swapped
+  /// Of contact_list() and contact_list_before(). Bodies may have been removed since.
+  Lazy<ContactList> contacts, contacts_before;
+  DetectedContacts detected, detected_before;  ///< of the same steps, unless on a device
+  ContactListMaker list_maker{pool.get()};
+  ContactsByBody contacts_by_body;  ///< of `contacts`
+  std::vector<Contact> resolved;    ///< during a step with sensors: the contacts of other bodies
+  bool contacts_are_new = false;    ///< whether the contacts of both steps have been swapped
   /// Whether World::contacts() returns `contacts`; false after a body was added or removed, or a
   /// step undone.
   bool shows_contacts = false;
@@ -185,8 +190,7 @@ struct World::Impl {
   BodyEdits edits;
   std::vector<std::uint32_t> forced_bodies;
   /// While resident: whether the arrays of the host are those of the device.
-  bool motion_is_current = true, contacts_are_current = true;
-  bool contact_set_is_current = true, contacts_before_are_current = true;
+  bool motion_is_current = true, contact_set_is_current = true;
   std::mutex fetching;  ///< held by functions that fetch, because const functions may call them
 };
 

@@ -59,6 +59,7 @@ void World::Impl::choose_device(StepReport* report) {
 
 void World::Impl::enter_device() {
   if (resident) return;
+  make_contact_lists();
   const ScopedTimer timer(&spent_us);
   if (bodies_changed) contact_finder.set_bodies(store);
   bodies_changed = false;
@@ -67,8 +68,7 @@ void World::Impl::enter_device() {
   resident = true;
   edits.clear();
   note_forces();
-  motion_is_current = contacts_are_current = contacts_before_are_current = true;
-  contact_set_is_current = true;
+  motion_is_current = contact_set_is_current = true;
 }
 
 BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
@@ -116,22 +116,31 @@ void World::Impl::fetch_motion() {
   motion_is_current = true;
 }
 
-void World::Impl::fetch_contacts() {
-  if (!resident) return;
+void World::Impl::make_list(bool of_step_before, ContactList* list) {
   const std::lock_guard lock(fetching);
+  if (!resident) {
+    list_maker.make(of_step_before ? detected_before : detected,
+                    of_step_before ? soft_step.contacts_before() : soft_step.last_contacts().view(),
+                    true, store, scene.materials, list);
+    return;
+  }
   const ScopedTimer timer(&spent_us);
-  if (!contacts_are_current) {
-    device->fetch_contacts(store, false, &contacts);
-    finish_contacts(&contacts);
-    detected_count = contacts.size();
-    contacts_are_current = true;
-  }
-  if (!contacts_before_are_current) {
-    device->fetch_contacts(store, true, &contacts_before);
-    finish_contacts(&contacts_before);
-    detected_count_before = contacts_before.size();
-    contacts_before_are_current = true;
-  }
+  device->fetch_contacts(store, of_step_before, &list->contacts);
+  set_materials(store, scene.materials, pool.get(), &list->contacts);
+  list->detected = list->contacts.size();
+}
+
+const ContactList& World::Impl::contact_list() {
+  return contacts.get([this](ContactList* list) { make_list(false, list); });
+}
+
+const ContactList& World::Impl::contact_list_before() {
+  return contacts_before.get([this](ContactList* list) { make_list(true, list); });
+}
+
+void World::Impl::make_contact_lists() {
+  contact_list();
+  if (shows_events) contact_list_before();
 }
 
 void World::Impl::fetch_contact_set() {
@@ -144,13 +153,13 @@ void World::Impl::fetch_contact_set() {
 }
 
 void World::Impl::fetch_all() {
+  make_contact_lists();
   {
     const std::lock_guard lock(fetching);
     soft_step.drop_removed();
   }
   if (!resident) return;
   fetch_motion();
-  fetch_contacts();
   fetch_contact_set();
 }
 
@@ -221,9 +230,8 @@ bool World::Impl::step_on_device(StepReport* report) {
   }
   forced_bodies.clear();
   std::swap(contacts, contacts_before);
-  detected_count_before = detected_count;
-  contacts_before_are_current = contacts_are_current;
-  motion_is_current = contacts_are_current = contact_set_is_current = false;
+  contacts.invalidate();
+  motion_is_current = contact_set_is_current = false;
   report->integrate_ms = result.forces_ms;
   report->detect_ms = result.detect_ms;
   report->resolve_ms = result.resolve_ms;

@@ -13,11 +13,12 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-void World::Impl::write(BinaryWriter* writer) const {
+void World::Impl::write(BinaryWriter* writer) {
   (*writer)(scene, steps);
   store.write(writer);
   write_contacts(writer, soft_step.last_contacts());
-  (*writer)(contacts, std::uint64_t{detected_count}, shows_contacts);
+  const ContactList& list = contact_list();
+  (*writer)(list.contacts, std::uint64_t{list.detected}, shows_contacts);
   write_forces(writer, forces);
   write_generators(writer, generators);
 }
@@ -30,10 +31,12 @@ void World::Impl::read(BinaryReader* reader) {
   BodyStore bodies = empty_store(settings);
   bodies.read(reader);
   soft_step::ContactSet last = read_contacts(reader, bodies);
-  auto touching = reader->get<std::vector<Contact>>();
-  const auto detected = reader->get<std::uint64_t>();
+  ContactList list;
+  list.contacts = reader->get<std::vector<Contact>>();
+  list.detected = reader->get<std::uint64_t>();
   const bool shown = reader->get<bool>();
-  BinaryReader::require(detected <= touching.size(), "it has fewer contacts than were detected");
+  BinaryReader::require(list.detected <= list.contacts.size(),
+                        "it has fewer contacts than were detected");
   ForceRestorer new_forces(reader, forces);
   GeneratorRestorer new_generators(reader, generators);
   BinaryReader::require(reader->left() == 0, "it is too long");
@@ -49,9 +52,9 @@ void World::Impl::read(BinaryReader* reader) {
   steps = steps_before;
   store = std::move(bodies);
   soft_step.restore(scene.soft_step, scene.materials, scene.dt, std::move(last));
-  contacts = std::move(touching);
+  contacts.invalidate();
+  contacts.get([&list](ContactList* restored) { *restored = std::move(list); });
   contacts_by_body.invalidate();
-  detected_count = detected;
   shows_contacts = shown;
   shows_events = false;
   new_forces.commit(&forces);

@@ -1,13 +1,16 @@
 /// Tests of contact events: begin and end, rest, sleep, removal, set_state() and failed steps.
 #include <jfpx/error.hpp>
 
+#include "tests/world/random_bodies.hpp"
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace jfpx {
 namespace {
@@ -217,6 +220,78 @@ TEST_P(ContactEvents, AreTheDifferencesOfTheContactListsInARandomWorld) {
   }
   EXPECT_GT(begun, 40u);
   EXPECT_GT(ended, 10u);
+}
+
+/// A random change between two steps, but for the first three bodies.
+void change_randomly(World* world, Random random) {
+  const auto any = [&] { return world->bodies()[3 + random.below(world->bodies().size() - 3)]; };
+  switch (random.below(9)) {
+    case 0:
+      return world->remove(any());
+    case 1:
+      return void(world->add(test::random_body(&random, 2)));
+    case 2:
+      world->remove(any());
+      return void(world->add(test::random_body(&random, 2)));
+    case 3:
+      return world->set_friction(any(), random.uniform(0, 1));
+    case 4:
+      return world->set_restitution(any(), random.uniform(0, 1));
+    case 5:
+      return world->set_state(any(), world->state(any()));
+    case 6:
+      return world->set_filter(any(), {.category = 2});
+    case 7:
+      return world->restore(world->snapshot());
+    default:
+      return;
+  }
+}
+
+// The lists of contacts are made when they are needed.
+TEST_P(ContactEvents, AndContactsAreTheSameWheneverTheyAreAskedFor) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  std::size_t compared = 0;
+  for (int scene_number = 0; scene_number < 10; ++scene_number) {
+    Scene scene = test::empty_scene();
+    scene.solver = GetParam();
+    for (int i = 0; i < 40; ++i) {
+      scene.bodies.push_back(i % 2 == 0 ? test::ball(random.uniform_in_box({-2, -2, -2}, {2, 2, 2}))
+                                        : test::random_body(&random, 2));
+      scene.bodies.back().sensor = random.below(8) == 0;
+    }
+    World always(scene), seldom(scene);
+    if (scene_number % 3 == 0) {
+      for (World* world : {&always, &seldom}) {
+        world->add_contact_generator([](ContactContext& context) {
+          context.add({.a = {0, 0}, .b = {2, 0}, .normal = {1, 0, 0}});
+        });
+      }
+    }
+    for (int n = 0; n < 30; ++n) {
+      for (World* world : {&always, &seldom}) world->step();
+      const auto contacts = always.contacts();
+      const std::vector<Contact> expected(contacts.begin(), contacts.end());
+      const bool is_change = random.below(2) == 0;
+      (void)always.contact_events();
+      if (is_change) {
+        const Random same = random;
+        for (World* world : {&always, &seldom}) change_randomly(world, same);
+        random.below(2);
+      }
+      if (random.below(2) != 0) continue;
+      ASSERT_TRUE(std::ranges::equal(always.contact_events(), seldom.contact_events())) << n;
+      ASSERT_TRUE(std::ranges::equal(always.contacts(), seldom.contacts())) << n;
+      if (!is_change) {
+        ASSERT_TRUE(std::ranges::equal(expected, seldom.contacts())) << n;
+      }
+      compared += seldom.contacts().size() + seldom.contact_events().size();
+    }
+    ASSERT_EQ(always.state_hash(), seldom.state_hash());
+  }
+  EXPECT_GT(compared, 1000u);
 }
 
 }  // namespace

@@ -1,0 +1,127 @@
+/// Merges the contacts of a step into one sorted list; see the header.
+#include "src/world/contact_list.hpp"
+
+#include <jfpx/contact.hpp>
+
+#include "src/base/parallel_for.hpp"
+#include "src/base/reserve.hpp"
+#include "src/world/merge_contacts.hpp"
+#include "src/world/met_contacts.hpp"
+
+#include <atomic>
+#include <numeric>
+#include <span>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+using soft_step::ContactKey;
+using soft_step::ContactView;
+
+constexpr std::size_t kContactsPerListChunk = 4096;
+
+/// Appends the other contacts that met during the step.
+void append_met(const DetectedContacts& detected, const ContactView& contacts,
+                const BodyStore& bodies, std::vector<Contact>* list) {
+  soft_step::for_each_met(
+      contacts, contacts.sphere_count, contacts.size(),
+      [&](std::uint32_t body) { return detected.position[body]; },
+      [&](std::uint32_t body) { return bodies.radius(body); },
+      [&](const ContactKey& key, bool, const Vec3& normal, const Vec3& point) {
+        list->push_back({bodies.id(key.a), bodies.id(key.b), normal, point, 0});
+      });
+}
+
+}  // namespace
+
+MetCounts count_met_contacts(const ContactView& contacts, ThreadPool* pool) {
+  std::atomic<std::size_t> spheres{0}, others{0};
+  parallel_for(
+      pool, contacts.size(), kContactsPerListChunk, [&](std::size_t first, std::size_t last) {
+        MetCounts counts;
+        for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
+          (contacts.is_sphere(i) ? counts.spheres : counts.others) += count_met(contacts, i);
+        }
+        if (counts.spheres > 0) spheres.fetch_add(counts.spheres, std::memory_order_relaxed);
+        if (counts.others > 0) others.fetch_add(counts.others, std::memory_order_relaxed);
+      });
+  return {spheres, others};
+}
+
+/// Appends the contacts of ContactSet::spheres that touched at the start of the step and, with
+/// `with_met`, those that met during the step. Each is one contact at most, so that the list is
+/// sorted as the set is.
+void ContactListMaker::append_spheres(const DetectedContacts& detected, const ContactView& contacts,
+                                      bool with_met, const BodyStore& bodies,
+                                      std::vector<Contact>* list) {
+  const std::size_t chunks =
+      (contacts.sphere_count + kContactsPerListChunk - 1) / kContactsPerListChunk;
+  assign_geometric(&begin_, chunks + 1, 0);
+  const auto touches = [&](std::uint32_t i) { return contacts.distance(i, 0) <= 0; };
+  const auto is_listed = [&](std::uint32_t i) {
+    return touches(i) || (with_met && soft_step::has_met(contacts, i, 0));
+  };
+  const auto for_each_chunk = [&](const auto& visit) {
+    parallel_for(pool_, contacts.sphere_count, kContactsPerListChunk,
+                 [&](std::size_t first, std::size_t last) {
+                   visit(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
+                 });
+  };
+  for_each_chunk([&](std::uint32_t first, std::uint32_t last) {
+    std::size_t count = 0;
+    for (std::uint32_t i = first; i < last; ++i) count += is_listed(i) ? 1 : 0;
+    begin_[first / kContactsPerListChunk] = count;
+  });
+  std::exclusive_scan(begin_.begin(), begin_.end(), begin_.begin(), list->size());
+  resize_geometric(list, begin_[chunks]);
+  for_each_chunk([&](std::uint32_t first, std::uint32_t last) {
+    Contact* next = list->data() + begin_[first / kContactsPerListChunk];
+    for (std::uint32_t i = first; i < last; ++i) {
+      if (!is_listed(i)) continue;
+      const auto& [key, normal, distance] = contacts.spheres[i];
+      const Vec3& centre = detected.position[key.b];
+      const Real radius = bodies.radius(key.b);
+      const bool touch = touches(i);
+      const Vec3 point = touch ? middle_point(normal, distance, SphereInstance{centre, radius})
+                               : centre + normal * radius;
+      *next++ = {bodies.id(key.a), bodies.id(key.b), normal, point, touch ? distance : Real(0)};
+    }
+  });
+}
+
+void ContactListMaker::make(const DetectedContacts& detected, const ContactView& contacts,
+                            bool with_met, const BodyStore& bodies, const MaterialSettings& rules,
+                            ContactList* list) {
+  std::vector<Contact>& all = list->contacts;
+  const auto spheres = std::span(detected.others).first(detected.other_spheres);
+  const auto others = std::span(detected.others).subspan(detected.other_spheres);
+  all.clear();
+  append_spheres(detected, contacts, with_met, bodies, &all);
+  std::size_t middle = all.size();
+  all.insert(all.end(), spheres.begin(), spheres.end());
+  merge_by_bodies(middle, all, &merged_);
+  const std::size_t begin = all.size();
+  all.insert(all.end(), others.begin(), others.end());
+  middle = all.size();
+  if (with_met) append_met(detected, contacts, bodies, &all);
+  merge_by_bodies(middle - begin, std::span(all).subspan(begin), &merged_);
+  set_materials(bodies, rules, pool_, &all);
+  list->detected = all.size();
+  all.insert(all.end(), detected.generated.begin(), detected.generated.end());
+}
+
+void set_materials(const BodyStore& bodies, const MaterialSettings& rules, ThreadPool* pool,
+                   std::vector<Contact>* contacts) {
+  parallel_for(pool, contacts->size(), 1024, [&](std::size_t first, std::size_t last) {
+    for (Contact& c : std::span(*contacts).subspan(first, last - first)) {
+      const std::uint32_t a = c.a.index, b = c.b.index;
+      c.friction = combined(rules.friction, bodies.friction(a), bodies.friction(b));
+      c.restitution = combined(rules.restitution, bodies.restitution(a), bodies.restitution(b));
+      c.sensor = bodies.sensor(a) || bodies.sensor(b);
+    }
+  });
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

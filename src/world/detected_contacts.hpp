@@ -1,0 +1,24 @@
+/// Contacts of a step that are not in its contact set.
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include <cstddef>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Complements a soft_step::ContactSet: ContactSet::spheres, of which most scenes have the most, is
+/// enough for make_contact_list(); the others would need their points once more.
+struct DetectedContacts {
+  /// Contacts of sensors, compounds, boxes and walls at the start of the step, without materials:
+  /// first those of two spheres, then all others, both as in World::contacts().
+  std::vector<Contact> others;
+  std::size_t other_spheres = 0;   ///< number of contacts of two spheres in `others`
+  std::vector<Contact> generated;  ///< contacts of contact generators
+  std::vector<Vec3> position;      ///< [m], by body, at the start of the step
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
