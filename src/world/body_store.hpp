@@ -116,6 +116,7 @@ class BodyStore {
   void set_user_data(std::uint32_t body, std::uint64_t value) { user_data_[body] = value; }
   bool sensor(std::uint32_t body) const { return sensor_[body] != 0; }
   bool has_sensors() const { return sensor_count_ > 0; }
+  bool has_kinematic_bodies() const { return kinematic_count_ > 0; }
   const CollisionFilter& filter(std::uint32_t body) const { return filter_[body]; }
   void set_filter(std::uint32_t body, const CollisionFilter& filter) noexcept;
   bool pair_ignored(const BodyPair& pair) const noexcept { return ignored_.contains(pair); }

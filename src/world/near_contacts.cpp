@@ -39,7 +39,7 @@ void append(ThreadPool* pool, std::span<Part> parts, const List& list, Refilled<
   std::size_t size = before;
   for (Part& part : parts) size += list(part).size();
   all->grow_to(size);
-  parallel_for(pool, parts.size(), 8, [&](std::size_t first, std::size_t last) {
+  parallel_for(pool, parts.size(), kChunksPerThread, [&](std::size_t first, std::size_t last) {
     std::size_t place = before;
     for (std::size_t i = 0; i < first; ++i) place += list(parts[i]).size();
     for (std::size_t i = first; i < last; ++i) {

@@ -79,7 +79,8 @@ void SoftStep::prepare(const BodyStore& bodies) {
 /// islands that touch a kinematic body in motion: a sleeping body has no velocity and could not be
 /// carried by it.
 template <class Touches>
-void SoftStep::find_islands(const BodyView& bodies, const Touches& touches) {
+void SoftStep::find_islands(const BodyStore& store, const Touches& touches) {
+  const BodyView bodies = store.view();
   islands_.reset(bodies.capacity);
   std::ranges::fill(marked_, std::uint8_t{0});
   const ContactView contacts = cache_.current().view();
@@ -91,6 +92,7 @@ void SoftStep::find_islands(const BodyView& bodies, const Touches& touches) {
       }
     }
   });
+  if (!store.has_kinematic_bodies()) return;
   for (std::uint32_t i = 0; i < contacts.size(); ++i) {
     const ContactKey& key = contacts.key(i);
     const bool a_carries = bodies.is_carrier(key.a);
@@ -103,22 +105,29 @@ void SoftStep::find_islands(const BodyView& bodies, const Touches& touches) {
 /// Wakes the islands that touch an awake body or a kinematic body in motion.
 void SoftStep::wake_touched(BodyStore* store) {
   const BodyView bodies = store->view();
-  const auto is_asleep = [&](BodyId id) { return bodies.is_asleep(id.index); };
-  if (std::ranges::none_of(store->ids(), is_asleep)) return;
-  find_islands(bodies, [&](const ContactView& contacts, std::uint32_t contact) {
+  std::atomic<bool> any_sleeps{false};
+  for_each_body(*store, [&](std::uint32_t i) {
+    if (bodies.is_asleep(i)) any_sleeps.store(true, std::memory_order_relaxed);
+  });
+  if (!any_sleeps) return;
+  find_islands(*store, [&](const ContactView& contacts, std::uint32_t contact) {
     return soft_step::will_touch(bodies, contacts, contact);
   });
-  for (const BodyId id : store->ids()) {
-    if (!bodies.is_active(id.index)) continue;
-    std::uint8_t& mark = marked_[islands_.find(id.index)];
-    if (!bodies.is_slow(id.index)) mark = soft_step::kTouchesFastBody;
-    if (mark == 0) mark = soft_step::kTouchesSlowBody;
-  }
+  for_each_body(*store, [&](std::uint32_t i) {
+    if (!bodies.is_active(i)) return;
+    const std::atomic_ref mark(marked_[islands_.find(i)]);
+    std::uint8_t unmarked = 0;
+    if (bodies.is_slow(i)) {
+      mark.compare_exchange_strong(unmarked, soft_step::kTouchesSlowBody);
+    } else {
+      mark.store(soft_step::kTouchesFastBody);
+    }
+  });
   const MotionPointers motion = store->motion_pointers();
-  for (const BodyId id : store->ids()) {
-    if (!is_asleep(id)) continue;
-    soft_step::wake_touched(bodies, motion, id.index, marked_[islands_.find(id.index)]);
-  }
+  for_each_body(*store, [&](std::uint32_t i) {
+    if (!bodies.is_asleep(i)) return;
+    soft_step::wake_touched(bodies, motion, i, marked_[islands_.find(i)]);
+  });
 }
 
 /// Marks the bodies that have a contact in this step.
@@ -167,15 +176,14 @@ bool SoftStep::store_bodies(const BodyStore& bodies) {
 /// Islands whose bodies have all been slow for long enough fall asleep.
 void SoftStep::put_islands_to_sleep(const BodyStore& store) {
   const BodyView bodies = store.view();
-  find_islands(bodies, soft_step::has_touched);
-  for (const BodyId id : store.ids()) {
-    const std::uint32_t i = id.index;
-    if (bodies.is_active(i) && !bodies.is_at_rest(i)) marked_[islands_.find(i)] = 1;
-  }
-  for (const BodyId id : store.ids()) {
-    const std::uint32_t i = id.index;
+  find_islands(store, soft_step::has_touched);
+  for_each_body(store, [&](std::uint32_t i) {
+    if (!bodies.is_active(i) || bodies.is_at_rest(i)) return;
+    std::atomic_ref(marked_[islands_.find(i)]).store(1, std::memory_order_relaxed);
+  });
+  for_each_body(store, [&](std::uint32_t i) {
     if (bodies.is_active(i) && marked_[islands_.find(i)] == 0) step_.motion.put_to_sleep(i);
-  }
+  });
 }
 
 std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {

@@ -56,7 +56,7 @@ class SoftStep {
  private:
   void prepare(const BodyStore& bodies);
   template <class Touches>
-  void find_islands(const BodyView& bodies, const Touches& touches);
+  void find_islands(const BodyStore& store, const Touches& touches);
   void wake_touched(BodyStore* bodies);
   void find_near();
   template <class Stage>

@@ -2,11 +2,13 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/parallel_for.hpp"
+#include "src/base/reserve.hpp"
 #include "src/base/stopwatch.hpp"
 #include "src/sphere_collider/backend_table.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <functional>
 #include <iterator>
 #include <new>
@@ -20,6 +22,8 @@ namespace {
 /// Upper estimate of the memory per body: in the scene, in the body store and in the copy that
 /// undo() restores. Used in an error message only.
 constexpr std::size_t kBytesPerBody = 1280;
+
+constexpr std::size_t kBodiesPerTask = 4096;
 
 std::string no_memory_for(const char* what, std::size_t bodies) {
   return "no memory for " + std::string(what) + " of " + std::to_string(bodies) +
@@ -82,7 +86,11 @@ void World::Impl::find_soft_step_contacts(StepReport* report) {
       store, scene.soft_step.speculative_margin, pool.get(), &near, &detected);
   report->sphere_contacts = spheres + detected.other_spheres;
   report->contacts = spheres + detected.others.size();
-  detected.position = store.moving.position;
+  resize_geometric(&detected.position, store.capacity());
+  parallel_for(
+      pool.get(), store.capacity(), kBodiesPerTask, [this](std::size_t first, std::size_t last) {
+        std::copy_n(&store.moving.position[first], last - first, &detected.position[first]);
+      });
   detected.generated.clear();
   if (generators.ids().empty()) return;
   ContactList& list = *contacts.storage();
@@ -98,6 +106,20 @@ void World::Impl::call_generators(std::vector<Contact>* list, StepReport* report
   ContactContext context(store, time(), list);
   generators.call(context);
   report->generated_contacts = list->size() - count;
+}
+
+/// Number of movable bodies awake.
+std::uint32_t World::Impl::count_awake() const {
+  std::atomic<std::uint32_t> awake{0};
+  const std::span<const BodyId> ids = store.ids();
+  parallel_for(pool.get(), ids.size(), kBodiesPerTask, [&](std::size_t first, std::size_t last) {
+    std::uint32_t count = 0;
+    for (const BodyId id : ids.subspan(first, last - first)) {
+      if (store.movable(id.index)) count += store.moving.awake[id.index];
+    }
+    awake.fetch_add(count, std::memory_order_relaxed);
+  });
+  return awake;
 }
 
 /// Adds the contacts that began during the step to the report.
@@ -258,9 +280,7 @@ StepReport World::step() {
     report.backend = collider.backend();
     report.algorithm = collider.algorithm();
     report.choice = w.device_failure.empty() ? collider.reason() : ChoiceReason::device_failed;
-    for (const BodyId id : w.store.ids()) {
-      if (w.store.movable(id.index)) report.awake += w.store.moving.awake[id.index];
-    }
+    report.awake = w.count_awake();
   }
   report.total_ms = watch.lap_ms();
   w.spent_us = 1e3 * report.total_ms;

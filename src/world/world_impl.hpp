@@ -142,6 +142,7 @@ struct World::Impl {
   void find_soft_step_contacts(StepReport* report);
   void call_generators(std::vector<Contact>* list, StepReport* report);
   void count_met_contacts(StepReport* report);
+  std::uint32_t count_awake() const;
   void save_for_undo();
   void undo_motion() noexcept;
   void undo() noexcept;
