@@ -5,6 +5,7 @@
 
 #include "src/contact_solver/contact_set.hpp"
 #include "src/world/body_store.hpp"
+#include "src/world/detected_contacts.hpp"
 #include "src/world/force_table.hpp"
 #include "src/world/sub_shape_table.hpp"
 
@@ -35,7 +36,7 @@ using BodyEdits = std::unordered_map<std::uint32_t, BodyEdit>;
 class DeviceWorld {
  public:
   struct Result {
-    std::uint64_t contacts = 0;         ///< size of the list that fetch_contacts() returns
+    std::uint64_t contacts = 0;         ///< size of World::contacts()
     std::uint64_t sphere_contacts = 0;  ///< of these, of two spheres
     std::uint32_t awake = 0;            ///< movable bodies awake after the step
     /// Device times: forces, contact search, all other stages.
@@ -71,10 +72,9 @@ class DeviceWorld {
   virtual void fetch_motion(MotionArrays* moving) = 0;
   /// Copies the contacts of the last step, with their impulses and colors.
   virtual void fetch_contact_set(soft_step::ContactSet* last) = 0;
-  /// Makes the list of World::contacts() of the last step, or of the step before it, without
-  /// materials. @returns the number of contacts of two spheres, which come first
-  virtual std::uint64_t fetch_contacts(const BodyStore& bodies, bool of_step_before,
-                                       std::vector<Contact>* contacts) = 0;
+  /// Copies what ContactListMaker needs, of the last step or of the step before it.
+  virtual void fetch_contacts(const BodyStore& bodies, bool of_step_before,
+                              soft_step::ContactSet* set, DetectedContacts* detected) = 0;
 };
 
 /// A world on a CUDA device. @param device its number

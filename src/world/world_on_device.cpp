@@ -118,16 +118,14 @@ void World::Impl::fetch_motion() {
 
 void World::Impl::make_list(bool of_step_before, ContactList* list) {
   const std::lock_guard lock(fetching);
-  if (!resident) {
-    list_maker.make(of_step_before ? detected_before : detected,
-                    of_step_before ? soft_step.contacts_before() : soft_step.last_contacts().view(),
-                    true, store, scene.materials, list);
-    return;
-  }
   const ScopedTimer timer(&spent_us);
-  device->fetch_contacts(store, of_step_before, &list->contacts);
-  set_materials(store, scene.materials, pool.get(), &list->contacts);
-  list->detected = list->contacts.size();
+  DetectedContacts* found = of_step_before ? &detected_before : &detected;
+  soft_step::ContactSet fetched;
+  if (resident) device->fetch_contacts(store, of_step_before, &fetched, found);
+  const soft_step::ContactView set = resident         ? fetched.view()
+                                     : of_step_before ? soft_step.contacts_before()
+                                                      : soft_step.last_contacts().view();
+  list_maker.make(*found, set, true, store, scene.materials, list);
 }
 
 const ContactList& World::Impl::contact_list() {

@@ -52,9 +52,9 @@ class FailingDevice final : public DeviceWorld {
   Vec3 fetch_position(std::uint32_t body) override { return device_->fetch_position(body); }
   void fetch_motion(MotionArrays* moving) override { device_->fetch_motion(moving); }
   void fetch_contact_set(soft_step::ContactSet* last) override { device_->fetch_contact_set(last); }
-  std::uint64_t fetch_contacts(const BodyStore& bodies, bool of_step_before,
-                               std::vector<Contact>* contacts) override {
-    return device_->fetch_contacts(bodies, of_step_before, contacts);
+  void fetch_contacts(const BodyStore& bodies, bool of_step_before, soft_step::ContactSet* set,
+                      DetectedContacts* detected) override {
+    device_->fetch_contacts(bodies, of_step_before, set, detected);
   }
 
  private:

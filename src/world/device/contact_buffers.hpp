@@ -4,9 +4,9 @@
 #include <jfpx/world.hpp>
 
 #include "src/world/body_store.hpp"
+#include "src/world/detected_contacts.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
-#include "src/world/met_contacts.hpp"
 
 #include <algorithm>
 #include <array>
@@ -91,49 +91,24 @@ class ContactBuffers {
     transfer.wait();
   }
 
-  /// World::contacts() after the step. @returns the number of contacts of two spheres
-  std::uint64_t fetch_touching(const Transfer<Device>& transfer, const BodyStore& bodies,
-                               std::vector<Contact>* contacts) const {
+  /// What detection leaves on the host, for ContactListMaker.
+  void fetch_detected(const Transfer<Device>& transfer, const BodyStore& bodies,
+                      DetectedContacts* detected) const {
     std::vector<Touch> touches(touch_count_);
-    std::vector<Vec3> position(bodies.capacity());
-    soft_step::ContactSet set;
+    detected->position.resize(bodies.capacity());
     transfer.get(&touches, touches_);
-    transfer.get(&position, position_before_);
-    fetch(transfer, &set);
-    for (const soft_step::SphereContactInput& c : set.spheres) {
-      if (!(c.distance <= 0)) continue;
-      // The sphere of a body that is a sphere is where the body was at the start of the step.
-      const SphereInstance sphere_b{position[c.key.b], bodies.radius(c.key.b)};
-      touches.push_back({{c.key.a, c.key.b, 0, 0},
-                         0,
-                         1,
-                         c.normal,
-                         middle_point(c.normal, c.distance, sphere_b),
-                         c.distance});
-    }
-    // After the other contacts of the same bodies.
-    constexpr std::uint32_t kLast = 0xffffffffu;
-    std::uint32_t number = 0;
-    soft_step::for_each_met(
-        set.view(), 0, set.size(), [&](std::uint32_t body) { return position[body]; },
-        [&](std::uint32_t body) { return bodies.radius(body); },
-        [&](const soft_step::ContactKey& key, bool of_spheres, const Vec3& normal,
-            const Vec3& point) {
-          touches.push_back(
-              {{key.a, key.b, kLast, kLast}, number++, of_spheres ? 1u : 0u, normal, point, 0});
-        });
-    const auto order = [](const Touch& t) {
-      return std::tuple(1 - t.of_spheres, t.pair, t.number);
-    };
-    std::ranges::sort(touches, {}, order);
-    contacts->clear();
-    std::uint64_t of_spheres = 0;
+    transfer.get(&detected->position, position_before_);
+    transfer.wait();
+    std::ranges::sort(
+        touches, {}, [](const Touch& t) { return std::tuple(1 - t.of_spheres, t.pair, t.number); });
+    detected->others.clear();
+    detected->generated.clear();
+    detected->other_spheres = 0;
     for (const Touch& t : touches) {
-      contacts->push_back(
+      detected->others.push_back(
           {bodies.id(t.pair.a), bodies.id(t.pair.b), t.normal, t.point, t.distance});
-      of_spheres += t.of_spheres;
+      detected->other_spheres += t.of_spheres;
     }
-    return of_spheres;
   }
 
  private:

@@ -138,10 +138,11 @@ class DeviceStep final : public DeviceWorld {
     last_contacts().fetch(transfer_, last);
   }
 
-  std::uint64_t fetch_contacts(const BodyStore& bodies, bool of_step_before,
-                               std::vector<Contact>* contacts) override {
+  void fetch_contacts(const BodyStore& bodies, bool of_step_before, soft_step::ContactSet* set,
+                      DetectedContacts* detected) override {
     const Contacts& from = of_step_before ? contacts_[now_] : last_contacts();
-    return from.fetch_touching(transfer_, bodies, contacts);
+    from.fetch(transfer_, set);
+    from.fetch_detected(transfer_, bodies, detected);
   }
 
   Device& device() { return *device_; }
