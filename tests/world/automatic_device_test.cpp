@@ -97,6 +97,20 @@ void expect_equal_contacts(const World& a, const World& b) {
   ASSERT_EQ(copy(a.contact_events()), copy(b.contact_events()));
 }
 
+// A program that reads contacts pays for the list wherever the world is.
+TEST(AutomaticWorld, CountsTheTimeOfListsOfContactsOnTheHost) {
+  Scene scene;
+  scene.bodies = {test::heavy({0, 0.9999_r, 0}), test::ground()};
+  World world = on_host(scene);
+  world.step();
+  set_time(&world, 0);
+  EXPECT_EQ(world.contacts().size(), 1u);
+  const double spent = WorldAccess::impl(world).spent_us;
+  EXPECT_GT(spent, 0);
+  (void)world.contacts();  // makes no second list
+  EXPECT_EQ(WorldAccess::impl(world).spent_us, spent);
+}
+
 TEST(AutomaticWorld, HasTheSameBitsWhereverItMoves) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
