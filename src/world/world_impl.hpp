@@ -66,13 +66,13 @@ struct World::Impl {
   /// Records that all bodies may have forces for the next step on the host.
   void note_forces();
   void fetch_motion();
-  /// The contacts of the last step that was not undone, and those of the step before. They are made
-  /// on demand: on the host, from what detection has left; while the world is on a device, there.
+  /// The contacts of the last step that was not undone, and those of the step before, made on
+  /// demand from the contact sets of the solver and `detected`, which a resident world fetches.
   /// Const functions may call them concurrently. @throws std::bad_alloc, DeviceError
   const ContactList& contact_list();
   const ContactList& contact_list_before();
-  /// Makes the lists that later calls may ask for, before a change of the bodies or of the place of
-  /// the world.
+  /// Makes both lists, before a change of bodies, or a move to or from the device, that would
+  /// change what they are made from.
   void make_contact_lists();
   void make_list(bool of_step_before, ContactList* list);
   /// Fetches everything, so that the host has the state of the world.
