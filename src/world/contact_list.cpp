@@ -21,16 +21,19 @@ using soft_step::ContactView;
 
 constexpr std::size_t kContactsPerListChunk = 4096;
 
-/// Appends the other contacts that met during the step.
+/// Appends the points of manifolds that met during the step.
 void append_met(const DetectedContacts& detected, const ContactView& contacts,
                 const BodyStore& bodies, std::vector<Contact>* list) {
-  soft_step::for_each_met(
-      contacts, contacts.sphere_count, contacts.size(),
-      [&](std::uint32_t body) { return detected.position[body]; },
-      [&](std::uint32_t body) { return bodies.radius(body); },
-      [&](const ContactKey& key, bool, const Vec3& normal, const Vec3& point) {
-        list->push_back({bodies.id(key.a), bodies.id(key.b), normal, point, 0});
-      });
+  for (std::uint32_t i = contacts.sphere_count; i < contacts.size(); ++i) {
+    const soft_step::ManifoldInput& manifold = contacts.manifold(i);
+    const ContactKey& key = manifold.key;
+    if (key.is_generated()) continue;
+    for (std::uint32_t p = 0; p < manifold.count; ++p) {
+      if (!soft_step::has_met(contacts, i, p)) continue;
+      const Vec3 point = detected.position[key.b] + contacts.points[manifold.first + p].arm_b;
+      list->push_back({bodies.id(key.a), bodies.id(key.b), manifold.normal, point, 0});
+    }
+  }
 }
 
 }  // namespace
@@ -80,11 +83,10 @@ void ContactListMaker::append_spheres(const DetectedContacts& detected, const Co
     for (std::uint32_t i = first; i < last; ++i) {
       if (!is_listed(i)) continue;
       const auto& [key, normal, distance] = contacts.spheres[i];
-      const Vec3& centre = detected.position[key.b];
-      const Real radius = bodies.radius(key.b);
+      const SphereInstance sphere_b{detected.position[key.b], bodies.radius(key.b)};
       const bool touch = touches(i);
-      const Vec3 point = touch ? middle_point(normal, distance, SphereInstance{centre, radius})
-                               : centre + normal * radius;
+      const Vec3 point =
+          touch ? middle_point(normal, distance, sphere_b) : point_on_b(normal, sphere_b);
       *next++ = {bodies.id(key.a), bodies.id(key.b), normal, point, touch ? distance : Real(0)};
     }
   });

@@ -9,8 +9,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Complements a soft_step::ContactSet: ContactSet::spheres, of which most scenes have the most, is
-/// enough for make_contact_list(); the others would need their points once more.
+/// Complements a soft_step::ContactSet: ContactListMaker makes the contacts of ContactSet::spheres
+/// from the set itself, and takes all others from here.
 struct DetectedContacts {
   /// Contacts of sensors, compounds, boxes and walls at the start of the step, without materials:
   /// first those of two spheres, then all others, both as in World::contacts().

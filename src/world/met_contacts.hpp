@@ -27,29 +27,6 @@ JFPX_HD inline std::uint32_t count_met(const ContactView& contacts, std::uint32_
   return count;
 }
 
-/// Calls add(key, whether both are spheres, normal, point of body b at the start of the step) for
-/// all points of the contacts [first, last) that have met, in the order of the contacts.
-/// @param position(body) [m], at the start of the step
-/// @param radius(body)   [m]
-template <class Position, class Radius, class Add>
-void for_each_met(const ContactView& contacts, std::uint32_t first, std::uint32_t last,
-                  const Position& position, const Radius& radius, const Add& add) {
-  for (std::uint32_t i = first; i < last; ++i) {
-    if (count_met(contacts, i) == 0) continue;
-    const ContactKey& key = contacts.key(i);
-    const Vec3& normal = contacts.normal(i);
-    if (contacts.is_sphere(i)) {
-      add(key, true, normal, position(key.b) + normal * radius(key.b));
-      continue;
-    }
-    const ManifoldInput& manifold = contacts.manifold(i);
-    for (std::uint32_t p = 0; p < manifold.count; ++p) {
-      if (!has_met(contacts, i, p)) continue;
-      add(key, false, normal, position(key.b) + contacts.points[manifold.first + p].arm_b);
-    }
-  }
-}
-
 }  // namespace soft_step
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -122,13 +122,6 @@ std::uint32_t World::Impl::count_awake() const {
   return awake;
 }
 
-/// Adds the contacts that began during the step to the report.
-void World::Impl::count_met_contacts(StepReport* report) {
-  const MetCounts met = jfpx::count_met_contacts(soft_step.contacts().view(), pool.get());
-  report->contacts += met.spheres + met.others;
-  report->sphere_contacts += met.spheres;
-}
-
 /// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
 /// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
 bool World::Impl::advance(StepReport* report) {
@@ -152,7 +145,9 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   soft_step.add_generated(store, detected.generated);
   const double detect_ms = watch.lap_ms();
   if (!all_finite(soft_step.solve(&store), report)) return false;
-  count_met_contacts(report);
+  const MetCounts met = count_met_contacts(soft_step.contacts().view(), pool.get());
+  report->contacts += met.spheres + met.others;
+  report->sphere_contacts += met.spheres;
   soft_step.commit(&store);
   report->integrate_ms = forces_ms;
   report->detect_ms = detect_ms;

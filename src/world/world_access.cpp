@@ -30,8 +30,7 @@ BodyId World::add(const BodyDef& body) {
 
 void World::remove(BodyId id) {
   impl_->store.require(id);
-  BodyStore& bodies = impl_->changed_bodies();
-  impl_->make_contact_lists();  // before the id becomes unknown
+  BodyStore& bodies = impl_->changed_bodies_with_contacts();
   impl_->wake_neighbors(id);
   bodies.remove(id);
   impl_->soft_step.forget(id.index);

@@ -51,6 +51,14 @@ struct World::Impl {
     if (resident) leave_device();
     return store;
   }
+  /// As changed_bodies(), after making the lists of contacts: for changes of ids and materials,
+  /// which the lists show, and for changes that wake neighbors, which then cannot fail after the
+  /// change.
+  BodyStore& changed_bodies_with_contacts() {
+    BodyStore& bodies = changed_bodies();
+    make_contact_lists();
+    return bodies;
+  }
   /// The bodies for an edit of one of them. While the world is on a device, the motion of the
   /// others may be older than that on the device, and the next step edits the body there, too.
   BodyStore& edited_body(std::uint32_t body, const BodyEdit& edit);
@@ -141,7 +149,6 @@ struct World::Impl {
   void find_contacts(StepReport* report);
   void find_soft_step_contacts(StepReport* report);
   void call_generators(std::vector<Contact>* list, StepReport* report);
-  void count_met_contacts(StepReport* report);
   std::uint32_t count_awake() const;
   void save_for_undo();
   void undo_motion() noexcept;

@@ -51,9 +51,7 @@ void World::set_friction(BodyId id, Real friction) {
   const std::uint32_t body = impl_->store.require(id);
   require_valid(find_friction_fault(friction));
   if (impl_->store.friction(body) == friction) return;
-  BodyStore& bodies = impl_->changed_bodies();
-  impl_->make_contact_lists();  // contacts() has the friction of the step
-  bodies.set_friction(body, friction);
+  impl_->changed_bodies_with_contacts().set_friction(body, friction);
   impl_->wake_with_neighbors(id);
 }
 
@@ -64,9 +62,7 @@ Real World::restitution(BodyId id) const {
 void World::set_restitution(BodyId id, Real restitution) {
   const std::uint32_t body = impl_->store.require(id);
   require_valid(find_restitution_fault(restitution));
-  BodyStore& bodies = impl_->changed_bodies();
-  impl_->make_contact_lists();  // as in set_friction()
-  bodies.set_restitution(body, restitution);
+  impl_->changed_bodies_with_contacts().set_restitution(body, restitution);
 }
 
 Vec3 World::acceleration(BodyId id) const {
@@ -112,9 +108,8 @@ CollisionFilter World::filter(BodyId id) const {
 void World::set_filter(BodyId id, const CollisionFilter& filter) {
   const std::uint32_t body = impl_->store.require(id);
   if (impl_->store.filter(body) == filter) return;
-  impl_->changed_bodies();
+  impl_->changed_bodies_with_contacts().set_filter(body, filter);
   impl_->wake_with_neighbors(id);
-  impl_->store.set_filter(body, filter);
 }
 
 bool World::pair_ignored(BodyId a, BodyId b) const {
@@ -128,9 +123,7 @@ void World::set_pair_ignored(BodyId a, BodyId b, bool ignored) {
                           "); it must be of two different bodies");
   }
   if (impl_->store.pair_ignored(pair) == ignored) return;
-  BodyStore& bodies = impl_->changed_bodies();
-  impl_->make_contact_lists();  // so that only the next line can fail
-  bodies.set_pair_ignored(pair, ignored);
+  impl_->changed_bodies_with_contacts().set_pair_ignored(pair, ignored);
   impl_->wake_with_neighbors(a);
   impl_->wake_with_neighbors(b);
 }

@@ -360,7 +360,7 @@ TEST(Compound, ALongRunStaysFiniteGainsNoEnergyAndStaysAboveTheGround) {
     World world(scene);
     // Bodies that overlap at the start are moved apart in the first steps, which can lift them.
     for (int n = 0; n < 10; ++n) world.step();
-    // So does worst_first at any time: it corrects the overlap of two fast bodies within a step.
+    // worst_first can lift bodies at any time: it corrects the overlap of fast ones within a step.
     const double most = energy(world) * (solver == Solver::worst_first ? 1.5 : 1.01);
     const char* more = std::getenv("JFPX_LONG_STEPS");
     const int steps = more != nullptr ? std::atoi(more) : 2000;

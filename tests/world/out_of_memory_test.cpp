@@ -269,12 +269,12 @@ constexpr int kChanges = 10;
 /// Changes of bodies that need no memory but for the contacts of the last step.
 /// @param number below kChanges
 void change_bodies(World& w, int number) {
-  const BodyId moved = w.bodies()[1], pushed = w.bodies()[2], gone = w.bodies()[4];
+  const BodyId moved = w.bodies()[1], pushed = w.bodies()[2], gone = w.bodies()[3];
   BodyState state = w.state(moved);
   state.position.y += 1;
   switch (number) {
     case 0:
-      return w.set_filter(moved, {.category = 2});
+      return w.set_filter(gone, {.category = 2});
     case 1:
       return w.set_mass(pushed, 2);
     case 2:
@@ -284,15 +284,15 @@ void change_bodies(World& w, int number) {
     case 4:
       return w.set_damping(moved, 1, 1);
     case 5:
-      return w.set_pair_ignored(w.bodies()[0], moved, false);
-    case 6:
-      return w.set_state(moved, state);
-    case 7:
-      return w.apply_force(pushed, {1, 2, 3});
-    case 8:
-      return w.remove_force(w.forces()[0]);
-    default:
       return w.remove(gone);
+    case 6:
+      return w.set_pair_ignored(w.bodies()[0], moved, false);
+    case 7:
+      return w.set_state(moved, state);
+    case 8:
+      return w.apply_force(pushed, {1, 2, 3});
+    default:
+      return w.remove_force(w.forces()[0]);
   }
 }
 
