@@ -18,37 +18,54 @@ struct alignas(16) Cell {
 };
 static_assert(sizeof(Cell) == 16);
 
-/// Loads a cell atomically. On a device, from the L2 cache, which all multiprocessors share.
-JFPX_HD inline Cell load_cell(const Cell* at) {
+/// 16 bytes of memory.
+struct alignas(16) MemoryCell {
+  std::uint32_t words[4];
+};
+
+/// Loads 16 bytes atomically. On a device, from the L2 cache, which all multiprocessors share.
+JFPX_HD inline MemoryCell load_memory_cell(const MemoryCell* at) {
 #if defined(__CUDA_ARCH__)
-  union {
-    unsigned long long words[2];
-    Cell cell;
-  } u;
+  unsigned long long low, high;
   asm volatile("{ .reg .b128 t; ld.relaxed.gpu.global.b128 t, [%2]; mov.b128 {%0, %1}, t; }"
-               : "=l"(u.words[0]), "=l"(u.words[1])
+               : "=l"(low), "=l"(high)
                : "l"(at));
-  return u.cell;
+  return {{static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(low >> 32),
+           static_cast<std::uint32_t>(high), static_cast<std::uint32_t>(high >> 32)}};
 #else
   return *at;
 #endif
 }
 
-/// Stores a cell atomically, as load_cell().
-JFPX_HD inline void store_cell(Cell* at, const Cell& cell) {
+/// Stores 16 bytes atomically, as load_memory_cell().
+JFPX_HD inline void store_memory_cell(MemoryCell* at, const MemoryCell& cell) {
 #if defined(__CUDA_ARCH__)
-  union {
-    unsigned long long words[2];
-    Cell cell;
-  } u;
-  u.words[1] = 0;
-  u.cell = cell;
+  const auto pair = [&](int i) {
+    return cell.words[i] | static_cast<unsigned long long>(cell.words[i + 1]) << 32;
+  };
   asm volatile("{ .reg .b128 t; mov.b128 t, {%1, %2}; st.relaxed.gpu.global.b128 [%0], t; }"
                :
-               : "l"(at), "l"(u.words[0]), "l"(u.words[1]));
+               : "l"(at), "l"(pair(0)), "l"(pair(2)));
 #else
   *at = cell;
 #endif
+}
+
+JFPX_HD inline Cell load_cell(const Cell* at) {
+  union {
+    MemoryCell memory;
+    Cell cell;
+  } u{load_memory_cell(reinterpret_cast<const MemoryCell*>(at))};
+  return u.cell;
+}
+
+JFPX_HD inline void store_cell(Cell* at, const Cell& cell) {
+  union {
+    MemoryCell memory;
+    Cell cell;
+  } u{};
+  u.cell = cell;
+  store_memory_cell(reinterpret_cast<MemoryCell*>(at), u.memory);
 }
 
 }  // namespace JFPX_ABI

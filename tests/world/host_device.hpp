@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <memory>
 #include <stdexcept>
-#include <type_traits>
 #include <vector>
 
 namespace jfpx {
@@ -44,8 +43,8 @@ class HostTeam {
   /// Completes the items in another order than the one in which they depend on each other.
   template <class Flow>
   void flow(std::uint32_t n, const Flow& flow) const {
-    std::vector<std::remove_cvref_t<decltype(flow.begin(0))>> items;
-    for (std::uint32_t i = 0; i < n; ++i) items.push_back(flow.begin(i));
+    std::vector<typename Flow::Item> items(n);
+    for (std::uint32_t i = 0; i < n; ++i) flow.begin(i, &items[i]);
     while (!items.empty()) {
       const std::size_t before = items.size();
       std::ranges::reverse(items);

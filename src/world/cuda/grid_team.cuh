@@ -95,14 +95,15 @@ class GridTeam {
 #endif
   }
 
-  /// Dataflow without a barrier: for all i < n, makes an item with begin(i), waits until
+  /// Dataflow without a barrier: for all i < n, starts an item with begin(i, &item), waits until
   /// is_ready(item), and calls complete(item). An item may wait for items of lower warps, of 32
   /// items each, and for those of earlier calls.
   template <class Flow>
   JFPX_HD void flow(std::uint32_t n, const Flow& flow) const {
 #if defined(__CUDA_ARCH__)
     for (std::uint32_t i = first(); i - lane_id() < n; i += blocks_ * kThreads) {
-      auto item = flow.begin(i < n ? i : n - 1);
+      typename Flow::Item item;
+      if (i < n) flow.begin(i, &item);
       // All lanes at the same time: one after the other, they would take 32 times as long.
       bool waits = i < n;
       while (__any_sync(kFullWarp, waits)) {

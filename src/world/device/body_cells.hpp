@@ -6,6 +6,7 @@
 #include "src/contact_solver/greedy_coloring.hpp"
 #include "src/contact_solver/step_constants.hpp"
 
+#include <array>
 #include <bit>
 #include <cstdint>
 
@@ -44,18 +45,66 @@ struct Turns {
   }
 };
 
-/// Number of cells of a vector.
-inline constexpr int kVectorCells = 3 / kCellNumbers;
+/// A vector in cells, each of which has the same word besides numbers: in double, one number and
+/// half of the third one.
+class VectorCells {
+ public:
+  static constexpr std::uint32_t kMixed = ~0u;  ///< its turn is higher than all turns
 
-/// Motion that the rows of a body read: in float, with one access of memory.
-struct alignas(64) MotionCells {
-  Cell velocity[kVectorCells], angular_velocity[kVectorCells], shift[kVectorCells],
-      rotation[kVectorCells];
+  VectorCells() = default;
+  JFPX_HD VectorCells(const Vec3& vector, std::uint32_t word) {
+    const Words x = words_of(vector.x), y = words_of(vector.y), z = words_of(vector.z);
+    if constexpr (kCells == 1) {
+      cells_[0] = {{x[0], y[0], z[0], word}};
+    } else {
+      cells_[0] = {{x[0], x[1], z[0], word}};
+      cells_[1] = {{y[0], y[1], z[1], word}};
+    }
+  }
+
+  JFPX_HD Vec3 vector() const {
+    const auto& first = cells_[0].words;
+    if constexpr (kCells == 1) {
+      return {number(first[0]), number(first[1]), number(first[2])};
+    } else {
+      const auto& second = cells_[1].words;
+      return {number(first[0], first[1]), number(second[0], second[1]),
+              number(first[2], second[2])};
+    }
+  }
+  /// The word of all cells, or kMixed.
+  JFPX_HD std::uint32_t word() const {
+    const std::uint32_t word = cells_[0].words[3];
+    return cells_[kCells - 1].words[3] == word ? word : kMixed;
+  }
+
+  JFPX_HD void load(const VectorCells* at) {
+    for (int c = 0; c < kCells; ++c) cells_[c] = load_memory_cell(&at->cells_[c]);
+  }
+  JFPX_HD void store(VectorCells* at) const {
+    for (int c = 0; c < kCells; ++c) store_memory_cell(&at->cells_[c], cells_[c]);
+  }
+
+ private:
+  static constexpr int kCells = sizeof(Real) / 4;
+  using Words = std::array<std::uint32_t, sizeof(Real) / 4>;
+  JFPX_HD static Words words_of(Real x) { return std::bit_cast<Words>(x); }
+  template <class... Word>
+  JFPX_HD static Real number(Word... words) {
+    return std::bit_cast<Real>(Words{words...});
+  }
+
+  MemoryCell cells_[kCells];
+};
+
+/// Motion that the rows of a body read, in one line of the cache.
+struct alignas(16 * sizeof(Real)) MotionCells {
+  VectorCells velocity, angular_velocity, shift, rotation;
 };
 
 /// Free motion, which a row reads only if it rebounds.
 struct FreeCells {
-  Cell velocity[kVectorCells], angular_velocity[kVectorCells];
+  VectorCells velocity, angular_velocity;
 };
 
 /// Access to the motion of a body as cells. The cells of the velocities are written at each turn,
@@ -84,21 +133,21 @@ class BodyCells {
   /// @returns whether the turn has been made, and all of it is visible
   template <bool kRotation>
   JFPX_HD bool read(std::uint32_t turn, soft_step::SolverBody* body, Version* version) const {
-    Read v, w, s, r;
-    v.load(motion_->velocity);
-    w.load(motion_->angular_velocity);
-    s.load(motion_->shift);
-    if constexpr (kRotation) r.load(motion_->rotation);
-    const std::uint32_t word = v.get(&body->velocity);
+    VectorCells v, w, s, r;
+    v.load(&motion_->velocity);
+    w.load(&motion_->angular_velocity);
+    s.load(&motion_->shift);
+    if constexpr (kRotation) r.load(&motion_->rotation);
+    body->velocity = v.vector();
+    body->angular_velocity = w.vector();
+    body->shift = s.vector();
+    if constexpr (kRotation) body->rotation = r.vector();
+    const std::uint32_t word = v.word();
     version->shift = word >> kTurnBits & kVersionMask;
     version->rotation = word >> (kTurnBits + kVersionBits) & kVersionMask;
     version->free = word >> (kTurnBits + 2 * kVersionBits) & kVersionMask;
-    bool is_complete = (word & kTurnMask) == turn;
-    is_complete = w.get(&body->angular_velocity) == word && is_complete;
-    is_complete = s.get(&body->shift) == version->shift && is_complete;
-    if constexpr (kRotation) {
-      is_complete = r.get(&body->rotation) == version->rotation && is_complete;
-    }
+    bool is_complete = (word & kTurnMask) == turn && w.word() == word && s.word() == version->shift;
+    if constexpr (kRotation) is_complete = r.word() == version->rotation && is_complete;
     return is_complete;
   }
 
@@ -108,69 +157,40 @@ class BodyCells {
     const std::uint32_t word = turn | version.shift << kTurnBits |
                                version.rotation << (kTurnBits + kVersionBits) |
                                version.free << (kTurnBits + 2 * kVersionBits);
-    store(motion_->velocity, body.velocity, word);
-    store(motion_->angular_velocity, body.angular_velocity, word);
+    VectorCells(body.velocity, word).store(&motion_->velocity);
+    VectorCells(body.angular_velocity, word).store(&motion_->angular_velocity);
   }
   /// Write a new version, before the velocities.
   JFPX_HD void write_shift(const soft_step::SolverBody& body, Version* version) const {
     version->shift = (version->shift + 1) & kVersionMask;
-    store(motion_->shift, body.shift, version->shift);
+    VectorCells(body.shift, version->shift).store(&motion_->shift);
   }
   JFPX_HD void write_rotation(const soft_step::SolverBody& body, Version* version) const {
     version->rotation = (version->rotation + 1) & kVersionMask;
-    store(motion_->rotation, body.rotation, version->rotation);
+    VectorCells(body.rotation, version->rotation).store(&motion_->rotation);
   }
   JFPX_HD void write_free(const soft_step::FreeMotion& free, Version* version) const {
     version->free = (version->free + 1) & kVersionMask;
-    store(free_->velocity, free.velocity, version->free);
-    store(free_->angular_velocity, free.angular_velocity, version->free);
+    VectorCells(free.velocity, version->free).store(&free_->velocity);
+    VectorCells(free.angular_velocity, version->free).store(&free_->angular_velocity);
   }
   /// Reads the free motion of a version that read() has returned. Its stores precede those of the
   /// velocities, so the wait is short.
   JFPX_HD soft_step::FreeMotion read_free(const Version& version) const {
-    soft_step::FreeMotion free;
-    Read v, w;
+    VectorCells v, w;
     do {
-      v.load(free_->velocity);
-      w.load(free_->angular_velocity);
-    } while (v.get(&free.velocity) != version.free ||
-             w.get(&free.angular_velocity) != version.free);
-    return free;
+      v.load(&free_->velocity);
+      w.load(&free_->angular_velocity);
+    } while (v.word() != version.free || w.word() != version.free);
+    return {v.vector(), w.vector()};
   }
 
  private:
   static constexpr std::uint32_t kTurnBits = 14, kVersionBits = 6;
   static constexpr std::uint32_t kTurnMask = (1u << kTurnBits) - 1;
   static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
-  static constexpr std::uint32_t kMixed = ~0u;  ///< its turn is higher than all turns
   // Versions may start again at 0, because no store is delayed for that many turns.
   static_assert((2 * kMaxSubsteps + 2) * Turns::kPerSweep < kTurnMask);
-
-  struct Read {
-    Cell cells[kVectorCells];
-    JFPX_HD void load(const Cell* from) {
-      for (int c = 0; c < kVectorCells; ++c) cells[c] = load_cell(from + c);
-    }
-    /// @returns the word of all cells, or kMixed
-    JFPX_HD std::uint32_t get(Vec3* vector) const {
-      *vector = {cells[0].numbers[0], cells[1 / kCellNumbers].numbers[1 % kCellNumbers],
-                 cells[2 / kCellNumbers].numbers[2 % kCellNumbers]};
-      std::uint32_t word = cells[0].sequence;
-      for (int c = 1; c < kVectorCells; ++c) {
-        if (cells[c].sequence != word) word = kMixed;
-      }
-      return word;
-    }
-  };
-  JFPX_HD static void store(Cell* to, const Vec3& vector, std::uint32_t word) {
-    const Real numbers[3] = {vector.x, vector.y, vector.z};
-    for (int c = 0; c < kVectorCells; ++c) {
-      Cell cell;
-      for (int k = 0; k < kCellNumbers; ++k) cell.numbers[k] = numbers[c * kCellNumbers + k];
-      cell.sequence = word;
-      store_cell(to + c, cell);
-    }
-  }
 
   MotionCells* motion_;
   FreeCells* free_;

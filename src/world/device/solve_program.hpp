@@ -20,7 +20,7 @@ namespace device {
 /// The items of a thread are in the order of the sweeps, and an item waits only for items before
 /// it in this order. So the first item that is not complete never waits.
 struct SolveProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = 2;
+  static constexpr unsigned kBlocksPerMultiprocessor = sizeof(Real) == 4 ? 2 : 1;
   /// Least number of items per thread from which a multiprocessor gets a second block. Waiting
   /// threads poll memory, so a second block pays only where rows rarely wait.
   static constexpr std::size_t kItemsPerThread = 32;
@@ -179,16 +179,20 @@ struct SolveProgram {
     std::uint32_t first_fixed = kNone;  ///< of its rows with fixed bodies
   };
 
+  // Items are started in place, and bodies a and b are treated without a loop: otherwise nvcc keeps
+  // items in memory, 6.6 kB a thread in double.
+
   /// The rows of a sweep, for Team::flow().
   template <class Operation>
   class RowFlow {
    public:
+    using Item = RowItem;
     JFPX_HD RowFlow(const SolveProgram& program, const Sweep& sweep, const Operation& operation)
         : program_(program), sweep_(sweep), operation_(operation), cursor_(sweep) {}
 
-    JFPX_HD RowItem begin(std::uint32_t i) const {
+    JFPX_HD void begin(std::uint32_t i, RowItem* item) const {
       const std::uint32_t row = cursor_.find(i);
-      return row == kNone ? RowItem{} : program_.colored_row(sweep_, row, cursor_.color());
+      if (row != kNone) program_.begin_colored_row(sweep_, row, cursor_.color(), item);
     }
     JFPX_HD bool is_ready(RowItem* item) const { return program_.is_ready(item); }
     JFPX_HD void complete(RowItem* item) const { program_.solve_row(sweep_, operation_, item); }
@@ -204,11 +208,12 @@ struct SolveProgram {
   template <class Operation>
   class BodyFlow {
    public:
+    using Item = BodyItem;
     JFPX_HD BodyFlow(const SolveProgram& program, const Sweep& sweep, const Operation& operation)
         : program_(program), sweep_(sweep), operation_(operation) {}
 
-    JFPX_HD BodyItem begin(std::uint32_t i) const {
-      return program_.begin_body(sweep_, program_.data.step.bodies.ids[i].index);
+    JFPX_HD void begin(std::uint32_t i, BodyItem* item) const {
+      program_.begin_body(sweep_, program_.data.step.bodies.ids[i].index, item);
     }
     JFPX_HD bool is_ready(BodyItem* item) const {
       if (item->is_active && !item->is_ready) item->read<true>(program_.data);
@@ -240,50 +245,52 @@ struct SolveProgram {
   JFPX_HD void run_overflow(const Sweep& sweep, const Operation& operation) const {
     const std::uint32_t rows = sweep.size(0) + sweep.size(soft_step::kGroups);
     for (std::uint32_t k = 0; k < rows; ++k) {
-      RowItem item = load_row(sweep, data.overflow[k]);
-      for (ItemBody* body : {&item.a, &item.b}) {
-        body->before = body->after = Turns(sweep.number, 0).first;
-      }
+      RowItem item;
+      begin_row(sweep, data.overflow[k], &item);
+      item.a.before = item.a.after = Turns(sweep.number, 0).first;
+      item.b.before = item.b.after = item.a.after;
       is_ready(&item);
       solve_row(sweep, operation, &item);
     }
   }
 
-  /// A row without its turns.
-  JFPX_HD RowItem load_row(const Sweep& sweep, std::uint32_t r) const {
+  /// Starts a row without its turns.
+  JFPX_HD void begin_row(const Sweep& sweep, std::uint32_t r, RowItem* item) const {
     const StepData& d = data;
-    RowItem item;
-    item.row = r;
-    item.is_manifold = r >= sweep.first_manifold();
+    item->row = r;
+    item->is_manifold = r >= sweep.first_manifold();
     std::uint32_t a = 0, b = 0;
-    if (item.is_manifold) {
+    if (item->is_manifold) {
       const soft_step::ManifoldRow& row = d.manifold_rows[r - sweep.first_manifold()];
       a = row.a, b = row.b;
     } else {
-      item.sphere = d.sphere_rows.load(r);
-      a = item.sphere.a, b = item.sphere.b;
+      item->sphere = d.sphere_rows.load(r);
+      a = item->sphere.a, b = item->sphere.b;
     }
-    item.a.start(a, d.row_bodies[a]);
-    item.b.start(b, d.row_bodies[b]);
-    return item;
+    item->a.start(a, d.row_bodies[a]);
+    item->b.start(b, d.row_bodies[b]);
   }
 
-  JFPX_HD RowItem colored_row(const Sweep& sweep, std::uint32_t r, std::uint32_t color) const {
-    RowItem item = load_row(sweep, r);
-    for (ItemBody* body : {&item.a, &item.b}) {
+  JFPX_HD void begin_colored_row(const Sweep& sweep, std::uint32_t r, std::uint32_t color,
+                                 RowItem* item) const {
+    begin_row(sweep, r, item);
+    const auto set_turns = [&](ItemBody* body) {
       const Turns turns(sweep.number, data.row_bodies[body->index].colors);
       body->before = turns.before(color);
       body->after = turns.after(color);
-    }
-    return item;
+    };
+    set_turns(&item->a);
+    set_turns(&item->b);
   }
 
   JFPX_HD bool is_ready(RowItem* item) const {
     if (item->row == kNone) return true;
-    for (ItemBody* body : {&item->a, &item->b}) {
-      if (body->is_ready) continue;
+    const auto read = [&](ItemBody* body) {
+      if (body->is_ready) return;
       item->is_manifold ? body->read<true>(data) : body->read<false>(data);
-    }
+    };
+    read(&item->a);
+    read(&item->b);
     return item->a.is_ready && item->b.is_ready;
   }
 
@@ -329,28 +336,28 @@ struct SolveProgram {
     operation.template run<false>(
         &row, data.point_rows + row.first,
         soft_step::BodyPair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b});
-    for (ItemBody* body : {&item->a, &item->b}) {
+    const auto write = [&](ItemBody* body) {
       const BodyCells cells = data.cells(body->index);
       if constexpr (Operation::kMovesBodies) {
         cells.write_shift(body->motion, &body->version);
         cells.write_rotation(body->motion, &body->version);
       }
       cells.write(body->after, body->motion, body->version);
-    }
+    };
+    write(&item->a);
+    write(&item->b);
     store<Operation>(sweep, row, item->row);
   }
 
-  JFPX_HD BodyItem begin_body(const Sweep& sweep, std::uint32_t body) const {
+  JFPX_HD void begin_body(const Sweep& sweep, std::uint32_t body, BodyItem* item) const {
     const StepData& d = data;
-    BodyItem item;
     const RowBody constants = d.row_bodies[body];
-    item.start(body, constants);
-    item.is_active = constants.inverse_mass > 0 && d.step.bodies.awake[body] != 0;
-    item.first_fixed = d.first_fixed[body];
+    item->start(body, constants);
+    item->is_active = constants.inverse_mass > 0 && d.step.bodies.awake[body] != 0;
+    item->first_fixed = d.first_fixed[body];
     const Turns turns(sweep.number, constants.colors);
-    item.before = turns.before_body();
-    item.after = turns.after_body();
-    return item;
+    item->before = turns.before_body();
+    item->after = turns.after_body();
   }
 
   template <class Operation>
