@@ -38,13 +38,17 @@ class Finder {
 
 }  // namespace
 
-void ContactCache::match(std::span<const Real> inverse_mass, ThreadPool* pool) {
+void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls, ThreadPool* pool) {
   reserve(inverse_mass.size());
   drop_forgotten();
   ContactSet& now = current_;
   const auto spheres = static_cast<std::uint32_t>(now.spheres.size());
   resize_geometric(&now.impulses, spheres + now.points.size());
-  resize_geometric(&now.rolling_impulses, now.size());
+  if (any_rolls) {
+    resize_geometric(&now.rolling_impulses, now.size());
+  } else {
+    now.rolling_impulses = {};
+  }
   resize_geometric(&now.colors, now.size());
   coloring_.start(inverse_mass.size());
   parallel_for(pool, spheres, kContactsPerChunk, [&](std::size_t first, std::size_t last) {
@@ -69,7 +73,9 @@ void ContactCache::match(std::span<const Real> inverse_mass, ThreadPool* pool) {
 
 /// Keeps the color and the rolling impulse. @param i,before contacts of this and of the last step
 void ContactCache::keep(std::uint32_t i, std::uint32_t before) {
-  current_.rolling_impulses[i] = last_.rolling_impulses[before];
+  if (current_.has_rolling() && last_.has_rolling()) {
+    current_.rolling_impulses[i] = last_.rolling_impulses[before];
+  }
   const std::uint8_t color = last_.colors[before];
   if (color >= kColors) return;
   current_.colors[i] = color;
@@ -82,7 +88,7 @@ void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last) {
   for (std::uint32_t i = first; i < last; ++i) {
     const SphereContactInput& contact = current_.spheres[i];
     current_.impulses[i] = {};
-    current_.rolling_impulses[i] = {};
+    if (current_.has_rolling()) current_.rolling_impulses[i] = {};
     current_.colors[i] = kNoColor;
     std::uint32_t before = 0;
     if (!finder.find(contact.key, &before)) continue;
@@ -97,7 +103,7 @@ void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last) {
   Finder<ManifoldInput> finder(last_.manifolds, current_.manifolds[first].key);
   for (std::uint32_t m = first; m < last; ++m) {
     const ManifoldInput& contact = current_.manifolds[m];
-    current_.rolling_impulses[spheres + m] = {};
+    if (current_.has_rolling()) current_.rolling_impulses[spheres + m] = {};
     current_.colors[spheres + m] = kNoColor;
     for (std::uint32_t p = 0; p < contact.count; ++p) {
       current_.impulses[spheres + contact.first + p] = {};
@@ -129,6 +135,7 @@ void ContactCache::forget(std::uint32_t body) noexcept {
 void ContactCache::drop_forgotten() noexcept {
   if (!any_forgotten_) return;
   ContactSet& set = last_;
+  const bool has_rolling = set.has_rolling();
   const auto involved = [this](const ContactKey& key) {
     return forgotten_[key.a] != 0 || forgotten_[key.b] != 0;
   };
@@ -139,7 +146,7 @@ void ContactCache::drop_forgotten() noexcept {
     if (involved(set.spheres[i].key)) continue;
     set.spheres[kept] = set.spheres[i];
     set.impulses[kept] = set.impulses[i];
-    set.rolling_impulses[kept] = set.rolling_impulses[i];
+    if (has_rolling) set.rolling_impulses[kept] = set.rolling_impulses[i];
     set.colors[kept++] = set.colors[i];
   }
   kept_spheres = kept;
@@ -147,13 +154,13 @@ void ContactCache::drop_forgotten() noexcept {
   std::uint32_t kept_manifolds = 0;
   for (std::uint32_t m = 0; m < set.manifolds.size(); ++m) {
     if (involved(set.manifolds[m].key)) continue;
-    set.rolling_impulses[kept] = set.rolling_impulses[spheres + m];
+    if (has_rolling) set.rolling_impulses[kept] = set.rolling_impulses[spheres + m];
     set.colors[kept++] = set.colors[spheres + m];
     set.manifolds[kept_manifolds++] = set.manifolds[m];
   }
   set.spheres.resize(kept_spheres);
   set.manifolds.resize(kept_manifolds);
-  set.rolling_impulses.resize(kept);
+  if (has_rolling) set.rolling_impulses.resize(kept);
   set.colors.resize(kept);
   std::ranges::fill(forgotten_, std::uint8_t{0});
   any_forgotten_ = false;

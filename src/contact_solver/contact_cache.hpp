@@ -31,8 +31,9 @@ class ContactCache {
   /// Gives each contact the impulses and the color that the same contact had in the last step, and
   /// colors the new ones. Friction impulses are turned into the new tangent planes.
   /// @param inverse_mass by body [1/kg]; 0: immovable or kinematic
+  /// @param any_rolls whether a body has rolling or spinning friction
   /// @param pool null: in the calling thread
-  void match(std::span<const Real> inverse_mass, ThreadPool* pool);
+  void match(std::span<const Real> inverse_mass, bool any_rolls, ThreadPool* pool);
   /// Completes the step: the current contacts become the last ones. Does not allocate.
   void commit() noexcept { std::swap(last_, current_); }
   /// Makes room for forget() of bodies with indices below `bodies`. @throws std::bad_alloc

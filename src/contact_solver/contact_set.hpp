@@ -60,9 +60,10 @@ struct ContactView {
   SphereContactInput* spheres = nullptr;
   ManifoldInput* manifolds = nullptr;
   PointInput* points = nullptr;
-  KeptImpulse* impulses = nullptr;   ///< by contact of spheres or point
-  Vec3* rolling_impulses = nullptr;  ///< [N m s], by contact: torque impulse on body a
-  std::uint8_t* colors = nullptr;    ///< by contact
+  KeptImpulse* impulses = nullptr;  ///< by contact of spheres or point
+  /// [N m s], by contact: torque impulse on body a; null: all are zero.
+  Vec3* rolling_impulses = nullptr;
+  std::uint8_t* colors = nullptr;  ///< by contact
   std::uint32_t sphere_count = 0, manifold_count = 0, point_count = 0;
 
   JFPX_HD std::uint32_t size() const { return sphere_count + manifold_count; }
@@ -106,11 +107,15 @@ struct ContactSet {
   std::vector<ManifoldInput> manifolds;
   std::vector<PointInput> points;
   std::vector<KeptImpulse> impulses;
-  std::vector<Vec3> rolling_impulses;
+  std::vector<Vec3> rolling_impulses;  ///< empty if no body has rolling or spinning friction
   std::vector<std::uint8_t> colors;
 
   std::uint32_t size() const {
     return static_cast<std::uint32_t>(spheres.size() + manifolds.size());
+  }
+  bool has_rolling() const { return !rolling_impulses.empty(); }
+  Vec3 rolling_impulse(std::size_t contact) const {
+    return has_rolling() ? rolling_impulses[contact] : Vec3{};
   }
   /// Valid until an array changes its size.
   ContactView view() {
@@ -118,7 +123,7 @@ struct ContactSet {
             manifolds.data(),
             points.data(),
             impulses.data(),
-            rolling_impulses.data(),
+            has_rolling() ? rolling_impulses.data() : nullptr,
             colors.data(),
             static_cast<std::uint32_t>(spheres.size()),
             static_cast<std::uint32_t>(manifolds.size()),

@@ -117,7 +117,8 @@ struct RowSetup {
     row->normal = basis.normal;
     row->tangent = basis.tangent;
     row->bitangent = basis.bitangent;
-    const Vec3& rolling = contacts.rolling_impulses[contact];
+    const Vec3 rolling =
+        contacts.rolling_impulses != nullptr ? contacts.rolling_impulses[contact] : Vec3{};
     row->rolling_impulse = flipped ? -rolling : rolling;
     Real restitution = 0;
     if (key.is_generated()) {
@@ -170,7 +171,9 @@ struct RowSetup {
   }
   JFPX_HD void store(const ManifoldRow& row, const PointRow* points, std::uint32_t contact) const {
     const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
-    contacts.rolling_impulses[contact] = row.rolling_impulse * side;
+    if (contacts.rolling_impulses != nullptr) {
+      contacts.rolling_impulses[contact] = row.rolling_impulse * side;
+    }
     for (std::uint32_t p = 0; p < row.count; ++p) {
       const Vec3 friction =
           row.tangent * points[p].friction_x + row.bitangent * points[p].friction_y;

@@ -110,6 +110,7 @@ void BodyStore::count_body(std::uint32_t i) noexcept {
   if (movable(i)) ++movable_count_;
   if (kinematic(i)) ++kinematic_count_;
   if (sensor(i)) ++sensor_count_;
+  if (rolls(i)) ++rolling_count_;
 }
 
 BodyId BodyStore::add(const BodyDef& def) {
@@ -199,6 +200,7 @@ void BodyStore::remove(BodyId id) noexcept {
   if (movable(id.index)) --movable_count_;
   if (kinematic(id.index)) --kinematic_count_;
   if (sensor(id.index)) --sensor_count_;
+  if (rolls(id.index)) --rolling_count_;
   moving.awake[id.index] = 0;
   given_inertia_.erase(id.index);
   ignored_.erase_body(id.index);

@@ -116,6 +116,11 @@ class BodyStore {
   void set_user_data(std::uint32_t body, std::uint64_t value) { user_data_[body] = value; }
   bool sensor(std::uint32_t body) const { return sensor_[body] != 0; }
   bool has_sensors() const { return sensor_count_ > 0; }
+  /// Whether a body has rolling or spinning friction.
+  bool rolls(std::uint32_t body) const {
+    return rolling_friction_[body] > 0 || spinning_friction_[body] > 0;
+  }
+  bool any_rolls() const { return rolling_count_ > 0; }
   bool has_kinematic_bodies() const { return kinematic_count_ > 0; }
   const CollisionFilter& filter(std::uint32_t body) const { return filter_[body]; }
   void set_filter(std::uint32_t body, const CollisionFilter& filter) noexcept;
@@ -195,7 +200,7 @@ class BodyStore {
   bool filters_in_use_ = false;       ///< whether may_collide() may return false
 
   IdPool<BodyId> pool_;
-  std::uint32_t movable_count_ = 0, kinematic_count_ = 0, sensor_count_ = 0;
+  std::uint32_t movable_count_ = 0, kinematic_count_ = 0, sensor_count_ = 0, rolling_count_ = 0;
 };
 
 }  // namespace JFPX_ABI

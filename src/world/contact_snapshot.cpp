@@ -35,11 +35,13 @@ class Checker {
   explicit Checker(const BodyStore& bodies) : bodies_(bodies), used_(bodies.capacity()) {}
 
   void start_list() { last_ = {}; }
-  void check(const ContactKey& key, std::uint8_t color) {
+  void check(const ContactKey& key, const Vec3& rolling_impulse, std::uint8_t color) {
     BinaryReader::require(!(key < last_), "its contacts are not sorted");
     last_ = key;
     BinaryReader::require(key.a != key.b && bodies_.lives(key.a) && bodies_.lives(key.b),
                           "a contact is not of two bodies");
+    BinaryReader::require(rolling_impulse == Vec3{} || bodies_.rolls(key.a) || bodies_.rolls(key.b),
+                          "a contact of bodies without rolling friction has a rolling impulse");
     if (color >= soft_step::kColors) return;
     BinaryReader::require(bodies_.movable(key.a) && bodies_.movable(key.b),
                           "a contact with an immovable body has a color");
@@ -73,7 +75,7 @@ void read_spheres(BinaryReader& reader, Checker* checker, ContactSet* set) {
   for (std::size_t i = 0; i < count; ++i) {
     ContactKey& key = set->spheres[i].key;
     reader(key, set->rolling_impulses[i], set->colors[i], set->impulses[i]);
-    checker->check(key, set->colors[i]);
+    checker->check(key, set->rolling_impulses[i], set->colors[i]);
   }
 }
 
@@ -96,7 +98,7 @@ void read_manifolds(BinaryReader& reader, Checker* checker, ContactSet* set) {
     Vec3& rolling_impulse = set->rolling_impulses.emplace_back();
     std::uint8_t& color = set->colors.emplace_back();
     reader(manifold.key, rolling_impulse, color, manifold.normal);
-    checker->check(manifold.key, color);
+    checker->check(manifold.key, rolling_impulse, color);
     read_points(reader, &manifold, set);
   }
 }
@@ -107,13 +109,13 @@ void write_contacts(BinaryWriter* writer, const ContactSet& set) {
   BinaryWriter& write = *writer;
   write(std::uint64_t{set.spheres.size()});
   for (std::size_t i = 0; i < set.spheres.size(); ++i) {
-    write(set.spheres[i].key, set.rolling_impulses[i], set.colors[i], set.impulses[i]);
+    write(set.spheres[i].key, set.rolling_impulse(i), set.colors[i], set.impulses[i]);
   }
   write(std::uint64_t{set.manifolds.size()});
   for (std::size_t m = 0; m < set.manifolds.size(); ++m) {
     const ManifoldInput& manifold = set.manifolds[m];
     const std::size_t contact = set.spheres.size() + m;
-    write(manifold.key, set.rolling_impulses[contact], set.colors[contact], manifold.normal);
+    write(manifold.key, set.rolling_impulse(contact), set.colors[contact], manifold.normal);
     write(std::uint64_t{manifold.count});
     // Points and impulses of contacts that ContactCache::forget() has removed are left out.
     for (std::uint32_t p = manifold.first; p < manifold.first + manifold.count; ++p) {

@@ -188,7 +188,7 @@ void SoftStep::put_islands_to_sleep(const BodyStore& store) {
 
 std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
   prepare(*bodies);
-  cache_.match(bodies->inverse_masses(), pool_);
+  cache_.match(bodies->inverse_masses(), bodies->any_rolls(), pool_);
   wake_touched(bodies);
   find_near();
   step_ = {.bodies = bodies->view(),

@@ -520,6 +520,7 @@ TEST_P(Snapshots, OfBadContentIsAnErrorOrAWorldThoughTheChecksumIsRight) {
     expected.insert(expected.end(),
                     {"its contacts are not sorted", "a contact is not of two bodies",
                      "a contact with an immovable body has a color",
+                     "a contact of bodies without rolling friction has a rolling impulse",
                      "two contacts of a body have the same color"});
   }
   for (const std::string& reason : expected) {

@@ -31,7 +31,10 @@ class ContactBuffers {
     transfer.put(&manifolds_, from.manifolds, from.manifold_count);
     transfer.put(&points_, from.points, from.point_count);
     transfer.put(&impulses_, from.impulses, std::size_t{from.sphere_count} + from.point_count);
-    transfer.put(&rolling_impulses_, from.rolling_impulses, from.size());
+    // A device always has the rolling impulses.
+    const std::vector<Vec3> none(from.rolling_impulses != nullptr ? 0 : from.size());
+    transfer.put(&rolling_impulses_, none.empty() ? from.rolling_impulses : none.data(),
+                 from.size());
     transfer.put(&colors_, from.colors, from.size());
     put_ranges(transfer, &spheres_of_, from.spheres, from.sphere_count, bodies);
     put_ranges(transfer, &manifolds_of_, from.manifolds, from.manifold_count, bodies);
