@@ -4,21 +4,30 @@
 
 #include "src/contact_solver/step_constants.hpp"
 
+#include <cmath>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
 struct PointRow {
-  Vec3 arm_a, arm_b;                    ///< [m], from the centres of mass to the point
-  Real distance = 0;                    ///< [m], at the start of the step
-  Real normal_mass = 0;                 ///< [kg]
-  Real xx = 0, xy = 0, yy = 0;          ///< [kg], effective mass of the two tangents, at rest
-  Real slip_mass = 0;                   ///< [kg], the smallest effective mass of a tangent
-  Real rebound = 0;                     ///< [m/s], as in SphereRow
+  Vec3 arm_a, arm_b;            ///< [m], from the centres of mass to the point
+  Real distance = 0;            ///< [m], at the start of the step
+  Real normal_mass = 0;         ///< [kg]
+  Real xx = 0, xy = 0, yy = 0;  ///< [kg], effective mass of the two tangents, at rest
+  Real slip_mass = 0;           ///< [kg], the smallest effective mass of a tangent
+  /// [m/s], speed of separation after the impact; 0: no rebound. Its sign, also that of 0, is
+  /// negative until the point has pushed the bodies apart in this step.
+  Real rebound = 0;
   Real normal_impulse = 0;              ///< [N s]
   Real friction_x = 0, friction_y = 0;  ///< [N s], along the tangents
 };
 
+/// Whether the point has pushed the bodies apart in this step.
+JFPX_HD inline bool has_pushed(const PointRow& p) { return !std::signbit(p.rebound); }
+
+/// A sweep changes only `rolling_impulse` and the points: device::SolveProgram::store() writes no
+/// other field back.
 struct ManifoldRow {
   std::uint32_t a = 0, b = 0;  ///< bodies; a is movable
   std::uint32_t first = 0;     ///< index of the first point
@@ -185,7 +194,7 @@ JFPX_HD inline void solve_normals(const ManifoldRow& row, PointRow* points, cons
     const Real normal_impulse = wanted > 0 ? wanted : Real(0);
     const Vec3 impulse = n * (normal_impulse - p.normal_impulse);
     p.normal_impulse = normal_impulse;
-    if (normal_impulse > 0 && p.rebound < 0) p.rebound = -p.rebound;
+    if (normal_impulse > 0 && !has_pushed(p)) p.rebound = -p.rebound;
     apply<kFixed>(pair, p.arm_a, p.arm_b, impulse);
     if (bias.projection > 0) project<kFixed>(pair, p, n * (bias.projection * p.normal_mass));
   }

@@ -26,22 +26,26 @@ struct BodyProperties {
   MaterialSettings rules;
 };
 
+/// Kind of the row of a contact, which may differ from that of the contact: two balls with rolling
+/// friction have a row of a manifold, and a ball on a fixed box has a row of spheres.
 enum class RowKind : std::uint8_t { none, sphere, manifold };
 
-/// Groups of rows: without a color, the colors, with a fixed body.
+/// Groups of rows: the overflow, the colors, with a fixed body.
 inline constexpr std::uint32_t kGroups = kColors + 2u, kFixedGroup = kGroups - 1;
 
 /// Makes rows of contacts. A row has the bodies of its contact in the order of a movable body a.
 struct RowSetup {
   ContactView contacts;
   BodyProperties properties;
-  const SolverBody* start = nullptr;  ///< by body, before the accelerations of the step
-  Real restitution_threshold = 0;     ///< StepConstants::restitution_threshold
+  /// By body. Its velocities are those before the accelerations of the step during fill() only: on
+  /// the CPU, the substeps change this array.
+  const SolverBody* start = nullptr;
+  Real restitution_threshold = 0;  ///< StepConstants::restitution_threshold
 
   /// Whether body b of a contact becomes body a of its row, which must be movable.
   JFPX_HD bool is_flipped(const ContactKey& key) const { return !is_movable(key.a); }
 
-  /// `none` for a contact without an awake movable body.
+  /// `none` if no body is movable and awake, or if a movable body sleeps.
   JFPX_HD RowKind kind_of(std::uint32_t contact) const {
     const ContactKey& key = contacts.key(contact);
     // A body that is still asleep is near, but does not touch: the contact has no effect.
@@ -177,8 +181,9 @@ struct RowSetup {
     for (std::uint32_t p = 0; p < row.count; ++p) {
       const Vec3 friction =
           row.tangent * points[p].friction_x + row.bitangent * points[p].friction_y;
-      contacts.impulses[contacts.first_impulse(contact) + p] = {friction * side,
-                                                                points[p].normal_impulse};
+      const bool is_released = !(points[p].normal_impulse > 0) && has_pushed(points[p]);
+      contacts.impulses[contacts.first_impulse(contact) + p] = {
+          friction * side, is_released ? KeptImpulse::kReleased : points[p].normal_impulse};
     }
   }
 

@@ -73,6 +73,36 @@ TEST(ContactEvents, OfABallThatReboundsWithinAStepBeginAndEnd) {
   EXPECT_EQ(ended, rebounds);
 }
 
+/// A corner or an edge of a box may push in a part of a step only, also without a rebound.
+TEST(ContactEvents, OfBoxesThatMeetWithinAStepBegin) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int impacts = 0;
+  for (int n = 0; n < 600; ++n) {
+    BodyDef box;
+    box.shape = Box{{0.5_r, 0.5_r, 0.5_r}};
+    box.mass = 1;
+    box.restitution = static_cast<Real>(n % 3) * 0.5_r;
+    box.acceleration = {};
+    Scene scene;
+    scene.bodies = {box, box};
+    BodyDef& other = scene.bodies[1];
+    other.position = {random.uniform(1.4_r, 1.6_r), random.uniform(-0.2_r, 0.2_r), 0};
+    other.orientation = test::random_rotation(&random);
+    other.velocity = {random.uniform(-12, -0.5_r), 0, 0};
+    World world(scene);
+    bool has_begun = false, has_pushed = false;
+    for (int k = 0; k < 90; ++k) {
+      has_begun |= step(&world).starts_with('+');
+      has_pushed |= !(world.states()[0].velocity == Vec3{});
+    }
+    EXPECT_TRUE(has_begun || !has_pushed) << n;
+    impacts += has_pushed ? 1 : 0;
+  }
+  EXPECT_GT(impacts, 300);
+}
+
 // Solver::soft_step resolves an impact before the bodies touch.
 TEST(ContactEvents, BeginStayAndEndWithABounce) {
   Scene scene = test::thesis_scene();
