@@ -1,5 +1,9 @@
 /// Operations of the sweeps of a soft step on one row of either kind. For spheres, `impacts` is
 /// ImpactBodies, or a type that rebound() can use in its place.
+///
+/// `kChangesRow`: the operation changes fields of the row. `kMovesBodies`: it changes the shift,
+/// the rotation or the free motion of bodies. A device writes nothing else back; the CPU ignores
+/// both.
 #pragma once
 
 #include "src/contact_solver/manifold_row.hpp"

@@ -10,7 +10,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// Aligned, so that a device reads and writes it in few accesses; what a sweep changes is adjacent.
+/// Aligned, so that a device reads and writes it in few accesses. A sweep changes only the fields
+/// before `normal`, and `restitution`: device::SolveProgram::store() writes no others back.
 struct alignas(4 * sizeof(Real)) SphereRow {
   Vec3 friction_impulse;    ///< [N s], on a, in the tangent plane
   Real normal_impulse = 0;  ///< [N s], on a

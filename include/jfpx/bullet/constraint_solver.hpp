@@ -24,8 +24,8 @@ struct ConstraintSolverOptions {
   int device = 0;                         ///< cuda: ordinal of the GPU
   unsigned threads = 1;                   ///< at most 256; 0: one per core
   SimdLevel simd = SimdLevel::automatic;  ///< vector instructions for rows: AVX2 or none
-  /// Groups with fewer manifolds are solved by Bullet's own code, and so are groups with little
-  /// parallelism where that has measured faster; with 0, or with Backend::cuda, neither.
+  /// Groups with fewer manifolds are solved by Bullet's own code, for every backend. So are groups
+  /// with little parallelism where that has measured faster, but with 0 or with Backend::cuda.
   std::size_t minimum_batch = 24;
 };
 

@@ -13,10 +13,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// Solves contacts in this order: those without a color, one after the other; the colors in
-/// ascending order; the contacts with immovable and kinematic bodies. Contacts of one color share
-/// no movable body, so threads may solve them in any order, and so may contacts of different
-/// movable bodies with fixed bodies.
+/// Solves contacts in this order: the overflow, for which no color was free, one after the other;
+/// the colors in ascending order; the contacts with immovable and kinematic bodies, by movable
+/// body. In the overflow, rows of spheres precede manifolds. Contacts of one color share no movable
+/// body, so threads may solve them in any order, and so may contacts of different movable bodies
+/// with fixed bodies.
 ///
 /// Owns its buffers, which only grow. In a step: build(), then warm_start(), solve() and
 /// restitute() as the integrator requires, then store().
@@ -25,7 +26,7 @@ class SoftStepSolver {
   /// @param pool outlives the solver
   explicit SoftStepSolver(ThreadPool* pool) : pool_(pool) {}
 
-  /// Makes rows of the contacts that have an awake movable body.
+  /// Makes rows of the contacts whose RowKind is not `none`.
   /// @param setup     its arrays are valid until store()
   void build(const RowSetup& setup, const ImpactBodies& impacts, const StepConstants& constants);
   /// Applies the impulses of the last step.

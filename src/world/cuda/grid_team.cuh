@@ -97,7 +97,8 @@ class GridTeam {
 
   /// Dataflow without a barrier: for all i < n, starts an item with begin(i, &item), waits until
   /// is_ready(item), and calls complete(item). An item may wait for items of lower warps, of 32
-  /// items each, and for those of earlier calls.
+  /// items each, and for those of earlier calls. All calls with the same n give item i to the same
+  /// thread, and once() always uses the same thread.
   template <class Flow>
   JFPX_HD void flow(std::uint32_t n, const Flow& flow) const {
 #if defined(__CUDA_ARCH__)

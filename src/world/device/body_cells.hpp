@@ -14,8 +14,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Order of the changes of a body: in each sweep over the rows, first the rows of its contacts by
-/// color, then the body itself. A turn is the sequence number of the last change that was made.
+/// Order of the changes of a body in a sweep over the rows: the rows of the overflow, which make no
+/// turns, because barriers enclose them; the rows of its contacts by color, at most one of each;
+/// the body itself, with its fixed bodies. A turn is the sequence number of the last change that
+/// was made. The turns of colors that the body does not have are left out.
 struct Turns {
   static constexpr std::uint32_t kPerSweep = soft_step::kColors + 2u;
 
@@ -108,8 +110,8 @@ struct FreeCells {
 };
 
 /// Access to the motion of a body as cells. The cells of the velocities are written at each turn,
-/// all others only when they change: the words of the velocities contain the versions of the other
-/// cells that belong to them.
+/// all others when they may have changed: the words of the velocities contain the versions of the
+/// other cells that belong to them.
 class BodyCells {
  public:
   /// Versions of the other vectors.
@@ -151,7 +153,7 @@ class BodyCells {
     return is_complete;
   }
 
-  /// Writes the velocities after a turn. @param version of the shift and the rotation
+  /// Writes the velocities after a turn. @param version of the other vectors
   JFPX_HD void write(std::uint32_t turn, const soft_step::SolverBody& body,
                      const Version& version) const {
     const std::uint32_t word = turn | version.shift << kTurnBits |
@@ -189,7 +191,8 @@ class BodyCells {
   static constexpr std::uint32_t kTurnBits = 14, kVersionBits = 6;
   static constexpr std::uint32_t kTurnMask = (1u << kTurnBits) - 1;
   static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
-  // Versions may start again at 0, because no store is delayed for that many turns.
+  // Versions start again at 0 after 64 changes: no cell is read that is that many changes old.
+  // All turns are below that of VectorCells::kMixed.
   static_assert((2 * kMaxSubsteps + 2) * Turns::kPerSweep < kTurnMask);
 
   MotionCells* motion_;

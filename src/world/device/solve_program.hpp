@@ -14,8 +14,9 @@ namespace device {
 /// Sweeps over all rows, as soft_step::SoftStepSolver, without barriers: a row waits only for the
 /// earlier rows of its two bodies (see Turns), so that consecutive colors and sweeps overlap. After
 /// the rows of a sweep, each body solves its rows with fixed bodies and completes its part of the
-/// substep. Only the motion of bodies passes from thread to thread: the rows themselves, and the
-/// other arrays by body, are used by one thread.
+/// substep. Only the motion of bodies passes from thread to thread: Team::flow() gives a row to the
+/// same thread in all sweeps, and the other arrays by body are constant, or written by the thread
+/// of the body alone.
 ///
 /// The items of a thread are in the order of the sweeps, and an item waits only for items before
 /// it in this order. So the first item that is not complete never waits.
@@ -26,6 +27,9 @@ struct SolveProgram {
   static constexpr std::size_t kItemsPerThread = 32;
   StepData data;
 
+  /// The sequence is that of SoftStep::solve(). Sweep 0 is the warm start. In substep k, sweep
+  /// 2k + 1 pushes penetrations out, and the bodies move; sweep 2k + 2 does not push. The last one
+  /// is the restitution. Sweep::moves() and the highest turn of BodyCells depend on this.
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
     if (data.has_failed()) return;
@@ -240,7 +244,8 @@ struct SolveProgram {
     team.flow(data.step.bodies.count, BodyFlow<Operation>(*this, sweep, operation));
   }
 
-  /// The rows without a color are solved one after the other, in the order of their contacts.
+  /// The rows of the overflow are solved one after the other: those of spheres, then the manifolds,
+  /// each in the order of their contacts.
   template <class Operation>
   JFPX_HD void run_overflow(const Sweep& sweep, const Operation& operation) const {
     const std::uint32_t rows = sweep.size(0) + sweep.size(soft_step::kGroups);

@@ -139,7 +139,8 @@ struct StepData {
   soft_step::PointRow* point_rows = nullptr;
   std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies
   std::uint32_t* next_fixed = nullptr;   ///< by row of either kind
-  std::uint32_t* overflow = nullptr;  ///< the rows without a color, in the order of their contacts
+  /// The rows without a free color: those of spheres, then the manifolds, in the order of contacts.
+  std::uint32_t* overflow = nullptr;
   MotionCells* motion_cells = nullptr;  ///< by body
   FreeCells* free_cells = nullptr;      ///< by body
   RowBody* row_bodies = nullptr;        ///< by body
