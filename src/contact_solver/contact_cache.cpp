@@ -73,9 +73,7 @@ void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls, Thr
 
 /// Keeps the color and the rolling impulse. @param i,before contacts of this and of the last step
 void ContactCache::keep(std::uint32_t i, std::uint32_t before) {
-  if (current_.has_rolling() && last_.has_rolling()) {
-    current_.rolling_impulses[i] = last_.rolling_impulses[before];
-  }
+  if (current_.has_rolling()) current_.rolling_impulses[i] = last_.rolling_impulse(before);
   const std::uint8_t color = last_.colors[before];
   if (color >= kColors) return;
   current_.colors[i] = color;
@@ -135,32 +133,33 @@ void ContactCache::forget(std::uint32_t body) noexcept {
 void ContactCache::drop_forgotten() noexcept {
   if (!any_forgotten_) return;
   ContactSet& set = last_;
-  const bool has_rolling = set.has_rolling();
   const auto involved = [this](const ContactKey& key) {
     return forgotten_[key.a] != 0 || forgotten_[key.b] != 0;
   };
   // Points keep their indices, so their impulses must keep their distance from the first one.
   const auto spheres = static_cast<std::uint32_t>(set.spheres.size());
   std::uint32_t kept = 0, kept_spheres = 0;
+  const auto keep_contact = [&, has_rolling = set.has_rolling()](std::uint32_t i) {
+    if (has_rolling) set.rolling_impulses[kept] = set.rolling_impulses[i];
+    set.colors[kept++] = set.colors[i];
+  };
   for (std::uint32_t i = 0; i < spheres; ++i) {
     if (involved(set.spheres[i].key)) continue;
     set.spheres[kept] = set.spheres[i];
     set.impulses[kept] = set.impulses[i];
-    if (has_rolling) set.rolling_impulses[kept] = set.rolling_impulses[i];
-    set.colors[kept++] = set.colors[i];
+    keep_contact(i);
   }
   kept_spheres = kept;
   std::copy(set.impulses.begin() + spheres, set.impulses.end(), set.impulses.begin() + kept);
   std::uint32_t kept_manifolds = 0;
   for (std::uint32_t m = 0; m < set.manifolds.size(); ++m) {
     if (involved(set.manifolds[m].key)) continue;
-    if (has_rolling) set.rolling_impulses[kept] = set.rolling_impulses[spheres + m];
-    set.colors[kept++] = set.colors[spheres + m];
+    keep_contact(spheres + m);
     set.manifolds[kept_manifolds++] = set.manifolds[m];
   }
   set.spheres.resize(kept_spheres);
   set.manifolds.resize(kept_manifolds);
-  if (has_rolling) set.rolling_impulses.resize(kept);
+  if (set.has_rolling()) set.rolling_impulses.resize(kept);
   set.colors.resize(kept);
   std::ranges::fill(forgotten_, std::uint8_t{0});
   any_forgotten_ = false;
