@@ -1,5 +1,6 @@
-/// Benchmarks of worlds in motion: the search for touching pairs of moving spheres, and the removal
-/// of bodies.
+/// Benchmarks of worlds in motion: the search for touching pairs of moving spheres, and bodies that
+/// come and go.
+#include <jfpx/backend.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/world.hpp>
 
@@ -67,6 +68,34 @@ void remove_bodies(benchmark::State& state, std::uint32_t spheres) {
   state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * kRemoved));
 }
 
+/// A step of a pile in which `count` balls come and as many go.
+void come_and_go(benchmark::State& state, Backend backend, std::uint32_t spheres,
+                 std::size_t count) {
+  for (const BackendStatus& status : available_backends()) {
+    if (status.backend == backend && !status.usable) {
+      return state.SkipWithError("the backend is not usable");
+    }
+  }
+  const Scene scene = scenes::make("pile", {.spheres = spheres});
+  World world(scene, {.collider = {.backend = backend, .threads = 0}});
+  for (int n = 0; n < 60; ++n) world.step();
+  Random random(1);
+  // Ids in the order of removal; the sorted list of all ids would be made anew for each step.
+  std::vector<BodyId> balls;
+  for (const BodyId id : world.bodies()) {
+    if (std::holds_alternative<Sphere>(world.shape(id))) balls.push_back(id);
+  }
+  for (auto _ : state) {
+    for (std::size_t k = 0; k < count; ++k) {
+      BodyId& ball = balls[random.below(balls.size())];
+      world.remove(ball);
+      ball = world.add(scene.bodies[random.below(spheres)]);
+    }
+    world.step();
+  }
+  state.counters["contacts"] = static_cast<double>(world.step().contacts);
+}
+
 void register_all() {
   for (const double speed : {0.001, 0.01, 0.03, 0.1}) {
     for (const bool keeps : {false, true}) {
@@ -81,6 +110,21 @@ void register_all() {
     benchmark::RegisterBenchmark(("remove_100/pile:" + std::to_string(spheres)).c_str(),
                                  [=](benchmark::State& state) { remove_bodies(state, spheres); })
         ->Iterations(5);
+  }
+  for (const Backend backend : {Backend::cpu, Backend::cuda}) {
+    for (const std::uint32_t spheres : {10'000u, 100'000u, 1'000'000u}) {
+      for (const std::size_t count : {0u, 1u, 1000u}) {
+        const std::string name = "come_and_go/" + std::string(to_string(backend)) +
+                                 "/pile:" + std::to_string(spheres) +
+                                 "/count:" + std::to_string(count);
+        benchmark::RegisterBenchmark(
+            name.c_str(),
+            [=](benchmark::State& state) { come_and_go(state, backend, spheres, count); })
+            ->Iterations(20)
+            ->Unit(benchmark::kMillisecond)
+            ->UseRealTime();
+      }
+    }
   }
 }
 

@@ -127,7 +127,8 @@ class JFPX_API World {
 
   /// Adds a body. If memory runs out, this and all other functions that change bodies throw
   /// std::bad_alloc and leave the world unchanged. Those that wake or describe neighbors may need
-  /// memory once after each step, for contacts().
+  /// memory once after each step, for contacts(). For a world on a GPU, they throw DeviceError, and
+  /// leave the world unchanged, if they must copy it to the host and that fails.
   /// @throws InvalidScene if the definition is invalid
   BodyId add(const BodyDef& body);
   /// Removes a body and wakes the bodies in contact with it.

@@ -118,9 +118,14 @@ void ContactCache::reserve(std::size_t bodies) {
 }
 
 void ContactCache::restore(ContactSet last) noexcept {
+  forget_none();
+  last_ = std::move(last);
+}
+
+void ContactCache::forget_none() noexcept {
+  if (!any_forgotten_) return;
   std::ranges::fill(forgotten_, std::uint8_t{0});
   any_forgotten_ = false;
-  last_ = std::move(last);
 }
 
 void ContactCache::forget(std::uint32_t body) noexcept {
@@ -161,8 +166,7 @@ void ContactCache::drop_forgotten() noexcept {
   set.manifolds.resize(kept_manifolds);
   if (set.has_rolling()) set.rolling_impulses.resize(kept);
   set.colors.resize(kept);
-  std::ranges::fill(forgotten_, std::uint8_t{0});
-  any_forgotten_ = false;
+  forget_none();
 }
 
 }  // namespace soft_step

@@ -44,6 +44,10 @@ class ContactCache {
   /// all removed bodies together. Bodies that match() and reserve() did not include have none.
   void forget(std::uint32_t body) noexcept;
   void drop_forgotten() noexcept;
+  /// Revokes forget(): the last contacts are now those of a step after it.
+  void forget_none() noexcept;
+  /// Replaces the contacts of the last completed step, as they were before forget().
+  void replace_last(ContactSet last) noexcept { last_ = std::move(last); }
 
  private:
   void match_spheres(std::uint32_t first, std::uint32_t last);

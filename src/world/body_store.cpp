@@ -342,6 +342,12 @@ bool BodyStore::falls_asleep(std::uint32_t i) {
 }
 
 BodyView BodyStore::view() const {
+  BodyView view = view_without_ids();
+  view.ids = ids().data();
+  return view;
+}
+
+BodyView BodyStore::view_without_ids() const {
   return {.position = moving.position.data(),
           .orientation = moving.orientation.data(),
           .velocity = moving.velocity.data(),
@@ -371,7 +377,6 @@ BodyView BodyStore::view() const {
           .ignored = ignored_.keys().data(),
           .ignored_count = static_cast<std::uint32_t>(ignored_.keys().size()),
           .filters_in_use = filters_in_use_,
-          .ids = ids().data(),
           .count = static_cast<std::uint32_t>(size()),
           .capacity = static_cast<std::uint32_t>(capacity()),
           .dt = dt_,

@@ -50,6 +50,8 @@ class BodyStore {
   /// @param def must have passed validation
   /// @throws std::bad_alloc; the store is then unchanged
   BodyId add(const BodyDef& def);
+  /// The index of the body that add() adds next.
+  std::uint32_t next_index() const noexcept { return pool_.next_index(); }
   /// @param id of a body in the store
   void remove(BodyId id) noexcept;
   bool contains(BodyId id) const noexcept { return pool_.contains(id); }
@@ -136,6 +138,8 @@ class BodyStore {
   }
   /// Pointers to the arrays. Valid until a body is added or removed, or the ignored pairs change.
   BodyView view() const;
+  /// The same without the sorted list of ids, which takes a pass over all slots after a change.
+  BodyView view_without_ids() const;
   MotionPointers motion_pointers();
 
   bool movable(std::uint32_t body) const { return inverse_mass_[body] > 0; }

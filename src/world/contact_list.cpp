@@ -23,7 +23,7 @@ constexpr std::size_t kContactsPerListChunk = 4096;
 
 /// Appends the points of manifolds that met during the step.
 void append_met(const DetectedContacts& detected, const ContactView& contacts,
-                const BodyStore& bodies, std::vector<Contact>* list) {
+                const BodiesOfStep& bodies, std::vector<Contact>* list) {
   for (std::uint32_t i = contacts.sphere_count; i < contacts.size(); ++i) {
     const soft_step::ManifoldInput& manifold = contacts.manifold(i);
     const ContactKey& key = manifold.key;
@@ -31,7 +31,7 @@ void append_met(const DetectedContacts& detected, const ContactView& contacts,
     for (std::uint32_t p = 0; p < manifold.count; ++p) {
       if (!soft_step::has_met(contacts, i, p)) continue;
       const Vec3 point = detected.position[key.b] + contacts.points[manifold.first + p].arm_b;
-      list->push_back({bodies.id(key.a), bodies.id(key.b), manifold.normal, point, 0});
+      list->push_back({bodies[key.a].id, bodies[key.b].id, manifold.normal, point, 0});
     }
   }
 }
@@ -56,7 +56,7 @@ MetCounts count_met_contacts(const ContactView& contacts, ThreadPool* pool) {
 /// `with_met`, those that met during the step. Each is one contact at most, so that the list is
 /// sorted as the set is.
 void ContactListMaker::append_spheres(const DetectedContacts& detected, const ContactView& contacts,
-                                      bool with_met, const BodyStore& bodies,
+                                      bool with_met, const BodiesOfStep& bodies,
                                       std::vector<Contact>* list) {
   const std::size_t chunks =
       (contacts.sphere_count + kContactsPerListChunk - 1) / kContactsPerListChunk;
@@ -83,18 +83,19 @@ void ContactListMaker::append_spheres(const DetectedContacts& detected, const Co
     for (std::uint32_t i = first; i < last; ++i) {
       if (!is_listed(i)) continue;
       const auto& [key, normal, distance] = contacts.spheres[i];
-      const SphereInstance sphere_b{detected.position[key.b], bodies.radius(key.b)};
+      const ListedBody a = bodies[key.a], b = bodies[key.b];
+      const SphereInstance sphere_b{detected.position[key.b], b.radius};
       const bool touch = touches(i);
       const Vec3 point =
           touch ? middle_point(normal, distance, sphere_b) : point_on_b(normal, sphere_b);
-      *next++ = {bodies.id(key.a), bodies.id(key.b), normal, point, touch ? distance : Real(0)};
+      *next++ = {a.id, b.id, normal, point, touch ? distance : Real(0)};
     }
   });
 }
 
 void ContactListMaker::make(const DetectedContacts& detected, const ContactView& contacts,
-                            bool with_met, const BodyStore& bodies, const MaterialSettings& rules,
-                            ContactList* list) {
+                            bool with_met, const BodiesOfStep& bodies,
+                            const MaterialSettings& rules, ContactList* list) {
   std::vector<Contact>& all = list->contacts;
   const auto spheres = std::span(detected.others).first(detected.other_spheres);
   const auto others = std::span(detected.others).subspan(detected.other_spheres);
@@ -113,14 +114,14 @@ void ContactListMaker::make(const DetectedContacts& detected, const ContactView&
   all.insert(all.end(), detected.generated.begin(), detected.generated.end());
 }
 
-void set_materials(const BodyStore& bodies, const MaterialSettings& rules, ThreadPool* pool,
+void set_materials(const BodiesOfStep& bodies, const MaterialSettings& rules, ThreadPool* pool,
                    std::vector<Contact>* contacts) {
   parallel_for(pool, contacts->size(), 1024, [&](std::size_t first, std::size_t last) {
     for (Contact& c : std::span(*contacts).subspan(first, last - first)) {
-      const std::uint32_t a = c.a.index, b = c.b.index;
-      c.friction = combined(rules.friction, bodies.friction(a), bodies.friction(b));
-      c.restitution = combined(rules.restitution, bodies.restitution(a), bodies.restitution(b));
-      c.sensor = bodies.sensor(a) || bodies.sensor(b);
+      const ListedBody a = bodies[c.a.index], b = bodies[c.b.index];
+      c.friction = combined(rules.friction, a.friction, b.friction);
+      c.restitution = combined(rules.restitution, a.restitution, b.restitution);
+      c.sensor = a.sensor || b.sensor;
     }
   });
 }

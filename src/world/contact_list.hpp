@@ -6,7 +6,7 @@
 
 #include "src/base/thread_pool.hpp"
 #include "src/contact_solver/contact_set.hpp"
-#include "src/world/body_store.hpp"
+#include "src/world/bodies_of_step.hpp"
 #include "src/world/detected_contacts.hpp"
 
 #include <cstddef>
@@ -34,11 +34,11 @@ class ContactListMaker {
   /// @param bodies   with the ids and materials of the step
   /// @throws std::bad_alloc
   void make(const DetectedContacts& detected, const soft_step::ContactView& contacts, bool with_met,
-            const BodyStore& bodies, const MaterialSettings& rules, ContactList* list);
+            const BodiesOfStep& bodies, const MaterialSettings& rules, ContactList* list);
 
  private:
   void append_spheres(const DetectedContacts& detected, const soft_step::ContactView& contacts,
-                      bool with_met, const BodyStore& bodies, std::vector<Contact>* list);
+                      bool with_met, const BodiesOfStep& bodies, std::vector<Contact>* list);
 
   ThreadPool* pool_;
   std::vector<std::size_t> begin_;  ///< by chunk of contacts of spheres: its first place in a list
@@ -53,7 +53,7 @@ struct MetCounts {
 MetCounts count_met_contacts(const soft_step::ContactView& contacts, ThreadPool* pool);
 
 /// Sets the fields of detected contacts that follow from the properties of their bodies.
-void set_materials(const BodyStore& bodies, const MaterialSettings& rules, ThreadPool* pool,
+void set_materials(const BodiesOfStep& bodies, const MaterialSettings& rules, ThreadPool* pool,
                    std::vector<Contact>* contacts);
 
 }  // namespace JFPX_ABI

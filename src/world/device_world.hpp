@@ -4,7 +4,7 @@
 #include <jfpx/cuda/world.hpp>
 
 #include "src/contact_solver/contact_set.hpp"
-#include "src/world/body_store.hpp"
+#include "src/world/bodies_of_step.hpp"
 #include "src/world/detected_contacts.hpp"
 #include "src/world/force_table.hpp"
 #include "src/world/sub_shape_table.hpp"
@@ -18,12 +18,14 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// A change of a movable body between two steps. The forces, acceleration and damping of the body
-/// are always those of the host.
+/// A change of a body between two steps. The forces, acceleration and damping of the body are
+/// always those of the host.
 struct BodyEdit {
   bool sets_state = false;       ///< position, orientation and velocities are those of the host
   bool wakes = false;            ///< wakes the body
   bool wakes_neighbors = false;  ///< wakes the bodies in contact with it in the last step
+  bool is_removed = false;       ///< the body that had the index in the last step was removed
+  bool is_added = false;         ///< the body that has the index now is new
 };
 /// By BodyId::index.
 using BodyEdits = std::unordered_map<std::uint32_t, BodyEdit>;
@@ -59,6 +61,8 @@ class DeviceWorld {
                       soft_step::ContactSet* last) = 0;
   /// Replaces forces and torques, and which bodies are awake.
   virtual void upload_forces(const BodyStore& bodies) = 0;
+  /// Whether edit() may add bodies with indices below `slots`.
+  virtual bool has_room(std::size_t slots) const noexcept = 0;
   /// Edits bodies of the state on the device. The same edits may be repeated after a failure.
   virtual void edit(const BodyStore& bodies, const BodyEdits& edits) = 0;
   /// One step. If a body runs away, the state does not change.
@@ -73,7 +77,7 @@ class DeviceWorld {
   /// Copies the contacts of the last step, with their impulses and colors.
   virtual void fetch_contact_set(soft_step::ContactSet* last) = 0;
   /// Copies what ContactListMaker needs, of the last step or of the step before it.
-  virtual void fetch_contacts(const BodyStore& bodies, bool of_step_before,
+  virtual void fetch_contacts(const BodiesOfStep& bodies, bool of_step_before,
                               soft_step::ContactSet* set, DetectedContacts* detected) = 0;
 };
 

@@ -24,6 +24,10 @@ class IdPool {
   std::size_t capacity() const noexcept { return generation_.size(); }
   /// Whether the next add() needs another slot.
   bool is_full() const noexcept { return free_.empty(); }
+  /// The index that the next add() uses.
+  std::uint32_t next_index() const noexcept {
+    return is_full() ? static_cast<std::uint32_t>(capacity()) : free_.back();
+  }
   /// Number of ids in use.
   std::size_t size() const noexcept { return size_; }
   bool contains(Id id) const noexcept {

@@ -52,6 +52,14 @@ class SoftStep {
   /// removal.
   void forget(std::uint32_t body) noexcept { cache_.forget(body); }
   void drop_removed() noexcept { cache_.drop_forgotten(); }
+  /// Replaces the contacts of the last step by those that a device has made of it, without those of
+  /// removed bodies.
+  void replace_last_contacts(soft_step::ContactSet last) noexcept {
+    cache_.replace_last(std::move(last));
+    cache_.drop_forgotten();
+  }
+  /// A device has made a step, whose contacts are all of bodies that exist.
+  void forget_none() noexcept { cache_.forget_none(); }
 
  private:
   void prepare(const BodyStore& bodies);

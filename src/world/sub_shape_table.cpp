@@ -35,7 +35,7 @@ void for_each_sub_shape(const Shape& shape, Visit visit) {
 
 }  // namespace
 
-void SubShapeTable::set_bodies(const BodyStore& bodies) {
+void SubShapeTable::set_bodies(const BodyStore& bodies, std::span<const BodyId> ids) {
   body_.clear();
   number_.clear();
   bounds_.clear();
@@ -44,7 +44,7 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
   part_.clear();
   local_.clear();
   kinematic_.clear();
-  const std::size_t least = bodies.size();  // exact without compounds
+  const std::size_t least = ids.size();  // exact without compounds
   body_.reserve(least);
   number_.reserve(least);
   bounds_.reserve(least);
@@ -59,7 +59,7 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
     local_.push_back(make_transform(part->orientation, part->position));
     part_.back() = static_cast<std::uint32_t>(local_.size());
   };
-  for (const BodyId id : bodies.ids()) {
+  for (const BodyId id : ids) {
     for_each_sub_shape<Sphere>(bodies.shape(id.index),
                                [&](const Sphere& s, const CompoundPart* part, std::uint32_t i) {
                                  add(id.index, bounding_radius(s), part, i);
@@ -67,7 +67,7 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
   }
   sphere_count_ = size();
   for (const bool movable : {true, false}) {
-    for (const BodyId id : bodies.ids()) {
+    for (const BodyId id : ids) {
       if (bodies.movable(id.index) != movable) continue;
       for_each_sub_shape<Box>(bodies.shape(id.index),
                               [&](const Box& box, const CompoundPart* part, std::uint32_t i) {
@@ -77,7 +77,7 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
     }
     if (movable) fixed_begin_ = size();
   }
-  for (const BodyId id : bodies.ids()) {
+  for (const BodyId id : ids) {
     const Shape& shape = bodies.shape(id.index);
     if (const auto* half_space = std::get_if<HalfSpace>(&shape)) {
       walls_.push_back({*half_space, false});
@@ -91,7 +91,7 @@ void SubShapeTable::set_bodies(const BodyStore& bodies) {
   }
   const SubShapeView all = view();
   for (SubShape sub_shape = fixed_begin_; sub_shape < bounded_size(); ++sub_shape) {
-    all.update_pose(bodies.view(), sub_shape);
+    all.update_pose(bodies.view_without_ids(), sub_shape);
     if (bodies.kinematic(body_[sub_shape])) kinematic_.push_back(sub_shape);
   }
 }
@@ -112,7 +112,7 @@ SubShapeView SubShapeTable::view() {
 
 void SubShapeTable::update_poses(const BodyStore& store, ThreadPool* pool) {
   const SubShapeView all = view();
-  const BodyView bodies = store.view();
+  const BodyView bodies = store.view_without_ids();
   parallel_for(pool, fixed_begin_, 1024, [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<SubShape>(first); i < last; ++i) all.update_pose(bodies, i);
   });

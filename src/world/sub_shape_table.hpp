@@ -19,7 +19,9 @@ class SubShapeTable {
   using SubShape = std::uint32_t;
 
   /// Must be called after a body was added or removed, or got another state by set_state().
-  void set_bodies(const BodyStore& bodies);
+  void set_bodies(const BodyStore& bodies) { set_bodies(bodies, bodies.ids()); }
+  /// Makes the table of some of the bodies. @param ids sorted by index
+  void set_bodies(const BodyStore& bodies, std::span<const BodyId> ids);
   /// Updates the poses of all sub-shapes from their bodies, except immovable boxes and walls.
   /// @param pool null: in the calling thread
   void update_poses(const BodyStore& bodies, ThreadPool* pool = nullptr);

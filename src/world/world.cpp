@@ -71,7 +71,7 @@ void World::Impl::find_contacts(StepReport* report) {
       list->contacts.clear();
       report->sphere_contacts = contact_finder.find_contacts(store, &list->contacts);
       report->contacts = list->detected = list->contacts.size();
-      set_materials(store, scene.materials, pool.get(), &list->contacts);
+      set_materials(BodiesOfStep(store), scene.materials, pool.get(), &list->contacts);
       call_generators(&list->contacts, report);
     });
   }
@@ -94,7 +94,7 @@ void World::Impl::find_soft_step_contacts(StepReport* report) {
   detected.generated.clear();
   if (generators.ids().empty()) return;
   ContactList& list = *contacts.storage();
-  list_maker.make(detected, near.view(), false, store, scene.materials, &list);
+  list_maker.make(detected, near.view(), false, BodiesOfStep(store), scene.materials, &list);
   call_generators(&list.contacts, report);
   const auto generated = std::span(list.contacts).subspan(list.detected);
   detected.generated.assign(generated.begin(), generated.end());

@@ -22,7 +22,7 @@ BodyId World::add(const BodyDef& body) {
   const std::uint64_t number = impl_->store.size();
   validate_body_count(number + 1);
   validate_body(body, number);
-  const BodyId id = impl_->changed_bodies().add(body);
+  const BodyId id = impl_->add(body);
   impl_->note_change();
   impl_->shows_contacts = false;
   return id;
@@ -30,10 +30,7 @@ BodyId World::add(const BodyDef& body) {
 
 void World::remove(BodyId id) {
   impl_->store.require(id);
-  BodyStore& bodies = impl_->changed_bodies_with_contacts();
-  impl_->wake_neighbors(id);
-  bodies.remove(id);
-  impl_->soft_step.forget(id.index);
+  impl_->remove(id);
   impl_->shows_contacts = false;
   impl_->note_change();
 }

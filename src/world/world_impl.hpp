@@ -4,6 +4,7 @@
 #include <jfpx/world.hpp>
 
 #include "src/world/automatic_device.hpp"
+#include "src/world/bodies_of_step.hpp"
 #include "src/world/body_store.hpp"
 #include "src/world/callback_registry.hpp"
 #include "src/world/contact_events.hpp"
@@ -59,6 +60,10 @@ struct World::Impl {
     make_contact_lists();
     return bodies;
   }
+  /// Adds a body, on the device, too, if that has the state of the world.
+  BodyId add(const BodyDef& def);
+  /// Removes a body, likewise. Wakes the bodies in contact with it.
+  void remove(BodyId id);
   /// The bodies for an edit of one of them. While the world is on a device, the motion of the
   /// others may be older than that on the device, and the next step edits the body there, too.
   BodyStore& edited_body(std::uint32_t body, const BodyEdit& edit);
@@ -98,7 +103,6 @@ struct World::Impl {
 
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
-    if (!store.movable(body.index)) changed_bodies();
     if (resident && contacts.current() == nullptr) {
       edited_body(body.index, {.wakes_neighbors = true});
       return;
@@ -196,6 +200,8 @@ struct World::Impl {
   /// While resident: edits that the device does not have yet, and the bodies whose forces on the
   /// host are those of the next step. The forces of all others are 0 on the host.
   BodyEdits edits;
+  /// While resident: bodies that were removed since the last step, and since the step before it.
+  RemovedBodies removed, removed_before;
   std::vector<std::uint32_t> forced_bodies;
   /// While resident: whether the arrays of the host are those of the device.
   bool motion_is_current = true, contact_set_is_current = true;

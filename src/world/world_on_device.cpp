@@ -73,17 +73,49 @@ void World::Impl::enter_device() {
 
 BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
   if (!resident) return store;
-  // Immovable and kinematic bodies have shapes that the contact search prepares.
-  if (!store.movable(body)) {
-    if (edit.sets_state) leave_device();
-    return store;
-  }
   BodyEdit& all = edits[body];
   all.sets_state |= edit.sets_state;
   all.wakes |= edit.wakes;
   all.wakes_neighbors |= edit.wakes_neighbors;
   if (edit.wakes_neighbors) motion_is_current = false;
   return store;
+}
+
+BodyId World::Impl::add(const BodyDef& def) {
+  const std::uint32_t body = store.next_index();
+  if (resident && !device->has_room(std::size_t{body} + 1)) leave_device();
+  if (!resident) return store.add(def);
+  // Everything that may throw, before the store changes.
+  BodyEdits added{{body, {.is_added = true}}};
+  edits.reserve(edits.size() + 1);
+  const BodyId id = store.add(def);
+  const auto edit = edits.find(body);
+  edit == edits.end() ? void(edits.insert(added.extract(body)))
+                      : void(edit->second.is_added = true);
+  force_table.invalidate();
+  return id;
+}
+
+void World::Impl::remove(BodyId id) {
+  const std::uint32_t body = id.index;
+  if (!resident) {
+    make_contact_lists();
+    wake_neighbors(id);
+    store.remove(id);
+    soft_step.forget(body);
+    return;
+  }
+  // Everything that may throw, before the store changes.
+  soft_step.reserve(store.capacity());
+  BodyEdit& edit = edits[body];
+  const ListedBody shown = listed(store, body);
+  removed_before.try_emplace(body, shown);
+  removed.try_emplace(body, shown);
+  edit = {.wakes_neighbors = true, .is_removed = true};
+  motion_is_current = false;
+  store.remove(id);
+  soft_step.forget(body);
+  force_table.invalidate();
 }
 
 void World::Impl::note_forces() {
@@ -96,14 +128,17 @@ void World::Impl::flush_edits() {
   const ScopedTimer timer(&spent_us);
   forced_bodies.reserve(forced_bodies.size() + edits.size());
   device->edit(store, edits);
-  for (const auto& [body, edit] : edits) forced_bodies.push_back(body);
+  for (const auto& [body, edit] : edits) {
+    if (store.lives(body)) forced_bodies.push_back(body);
+  }
   edits.clear();
 }
 
 Vec3 World::Impl::position(std::uint32_t body) {
   if (!resident || motion_is_current) return store.moving.position[body];
   const auto edit = edits.find(body);
-  if (edit != edits.end() && edit->second.sets_state) return store.moving.position[body];
+  if (edit != edits.end() && (edit->second.sets_state || edit->second.is_added))
+    return store.moving.position[body];
   return device->fetch_position(body);
 }
 
@@ -121,11 +156,12 @@ void World::Impl::make_list(bool of_step_before, ContactList* list) {
   const ScopedTimer timer(&spent_us);
   DetectedContacts* found = of_step_before ? &detected_before : &detected;
   soft_step::ContactSet fetched;
-  if (resident) device->fetch_contacts(store, of_step_before, &fetched, found);
+  const BodiesOfStep bodies(store, of_step_before ? &removed_before : &removed);
+  if (resident) device->fetch_contacts(bodies, of_step_before, &fetched, found);
   const soft_step::ContactView set = resident         ? fetched.view()
                                      : of_step_before ? soft_step.contacts_before()
                                                       : soft_step.last_contacts().view();
-  list_maker.make(*found, set, true, store, scene.materials, list);
+  list_maker.make(*found, set, true, bodies, scene.materials, list);
 }
 
 const ContactList& World::Impl::contact_list() {
@@ -146,24 +182,27 @@ void World::Impl::fetch_contact_set() {
   if (contact_set_is_current) return;
   soft_step.reserve(store.capacity());
   const ScopedTimer timer(&spent_us);
-  device->fetch_contact_set(&soft_step.last_contacts());
+  soft_step::ContactSet last;
+  device->fetch_contact_set(&last);
+  soft_step.replace_last_contacts(std::move(last));
   contact_set_is_current = true;
 }
 
 void World::Impl::fetch_all() {
   make_contact_lists();
-  {
-    const std::lock_guard lock(fetching);
-    soft_step.drop_removed();
+  if (resident) {
+    fetch_motion();
+    fetch_contact_set();
   }
-  if (!resident) return;
-  fetch_motion();
-  fetch_contact_set();
+  const std::lock_guard lock(fetching);
+  soft_step.drop_removed();
 }
 
 void World::Impl::leave_device() {
   fetch_all();
   edits.clear();
+  removed.clear();
+  removed_before.clear();
   resident = false;
 }
 
@@ -229,6 +268,8 @@ bool World::Impl::step_on_device(StepReport* report) {
   forced_bodies.clear();
   std::swap(contacts, contacts_before);
   contacts.invalidate();
+  removed_before = std::exchange(removed, {});
+  soft_step.forget_none();
   motion_is_current = contact_set_is_current = false;
   report->integrate_ms = result.forces_ms;
   report->detect_ms = result.detect_ms;

@@ -40,6 +40,7 @@ class FailingDevice final : public DeviceWorld {
     count_call();
     device_->upload_forces(bodies);
   }
+  bool has_room(std::size_t slots) const noexcept override { return device_->has_room(slots); }
   void edit(const BodyStore& bodies, const BodyEdits& edits) override {
     count_call();
     device_->edit(bodies, edits);
@@ -52,7 +53,7 @@ class FailingDevice final : public DeviceWorld {
   Vec3 fetch_position(std::uint32_t body) override { return device_->fetch_position(body); }
   void fetch_motion(MotionArrays* moving) override { device_->fetch_motion(moving); }
   void fetch_contact_set(soft_step::ContactSet* last) override { device_->fetch_contact_set(last); }
-  void fetch_contacts(const BodyStore& bodies, bool of_step_before, soft_step::ContactSet* set,
+  void fetch_contacts(const BodiesOfStep& bodies, bool of_step_before, soft_step::ContactSet* set,
                       DetectedContacts* detected) override {
     device_->fetch_contacts(bodies, of_step_before, set, detected);
   }

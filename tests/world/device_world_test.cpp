@@ -260,6 +260,78 @@ TEST_P(DeviceWorldTest, EditsOfBodiesDoNotMoveTheWorld) {
   EXPECT_TRUE(host.snapshot() == device.snapshot());
 }
 
+/// Bodies of all kinds come and go between steps, also several times before a step and in the same
+/// slot, and the world stays on the device.
+TEST_P(DeviceWorldTest, BodiesComeAndGoOnTheDevice) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  for (int k = 0; k < 8; ++k) {
+    Scene scene = random_scene(&random);
+    World host = on_host(scene), device = on_device(scene);
+    int uploads = 0;
+    for (int n = 0; n < 50; ++n) {
+      const bool shows_events = random.below(2) == 0, asks_between = random.below(3) == 0;
+      for (std::uint64_t changes = random.below(6); changes > 0; --changes) {
+        const std::uint64_t action = random.below(7), i = random.below(1000);
+        BodyDef def = test::random_body(&random, 3);
+        def.velocity = def.mass > 0 ? random.uniform_in_box({-3, -3, -3}, {3, 3, 3}) : Vec3{};
+        def.restitution = random.uniform(0, 1);
+        def.sensor = random.below(8) == 0;
+        const bool is_posed = !std::holds_alternative<Plane>(def.shape) &&
+                              !std::holds_alternative<HalfSpace>(def.shape);
+        def.kinematic = def.mass == 0 && is_posed && random.below(2) == 0;
+        if (def.kinematic) def.velocity = {0.2_r, 0, 0};
+        if (random.below(20) == 0) def = test::half_space({0, 1, 0}, -3.5_r);
+        for (World* world : {&host, &device}) {
+          const BodyId id = world->bodies()[i % world->bodies().size()];
+          if (action < 3) world->add(def);
+          if (action >= 3 && action < 6 && world->bodies().size() > 4) world->remove(id);
+          if (action == 6) world->set_state(id, {def.position, def.orientation, def.velocity, {}});
+        }
+        if (!asks_between) continue;
+        ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k << ", step " << n;
+        for (const BodyId id : host.bodies()) ASSERT_EQ(host.awake(id), device.awake(id));
+      }
+      if (random.below(8) == 0) {
+        ASSERT_TRUE(host.snapshot() == device.snapshot()) << "step " << n;
+      }
+      if (!WorldAccess::impl(device).resident) ++uploads;
+      const StepReport a = host.step(), b = device.step();
+      ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "scene " << k << ", step " << n;
+      ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k << ", step " << n;
+      if (!shows_events) continue;
+      ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device)) << "step " << n;
+    }
+    // Memory for more bodies grows by half of their number.
+    EXPECT_LE(uploads, 8) << "of 50 steps";
+    EXPECT_TRUE(host.snapshot() == device.snapshot());
+  }
+}
+
+/// A body in the slot of a removed one does not take over its impulses or its neighbors.
+TEST_P(DeviceWorldTest, ABodyInTheSlotOfARemovedOneStartsWithoutContacts) {
+  const Scene scene = scenes::make("tower", {});
+  World host = on_host(scene), device = on_device(scene);
+  for (int n = 0; n < 60; ++n) host.step(), device.step();
+  const BodyDef crate = scene.bodies[5];
+  for (int n = 0; n < 4; ++n) {
+    for (World* world : {&host, &device}) {
+      const BodyState state = world->state(world->body_at(5));
+      world->remove(world->body_at(5));
+      BodyDef same = crate;
+      same.position = state.position;
+      same.orientation = state.orientation;
+      EXPECT_EQ(world->add(same).index, 5u);
+    }
+    host.step(), device.step();
+    ASSERT_TRUE(WorldAccess::impl(device).resident);
+    ASSERT_EQ(host.state_hash(), device.state_hash());
+    ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
+  }
+  EXPECT_TRUE(host.snapshot() == device.snapshot());
+}
+
 /// Whether the host has applied the forces of the last step.
 bool used_host_forces(World& world) { return WorldAccess::impl(world).is_saved; }
 

@@ -166,10 +166,11 @@ class CudaDevice {
   DeviceSphereCollider collider_;
   DeviceBuffer<std::uint32_t> scratch_;
   int multiprocessors_ = 0;
-  std::tuple<
-      Limits<device::ForceProgram>, Limits<device::BoundsProgram>, Limits<device::SphereProgram>,
-      Limits<device::ShapeProgram>, Limits<device::MatchProgram>, Limits<device::PrepareProgram>,
-      Limits<device::SolveProgram>, Limits<device::CommitProgram>, Limits<device::EditProgram>>
+  std::tuple<Limits<device::ForceProgram>, Limits<device::BoundsProgram>,
+             Limits<device::SphereProgram>, Limits<device::ShapeProgram>,
+             Limits<device::MatchProgram>, Limits<device::PrepareProgram>,
+             Limits<device::SolveProgram>, Limits<device::CommitProgram>,
+             Limits<device::EditProgram>, Limits<device::MergeProgram>>
       limits_;
 };
 

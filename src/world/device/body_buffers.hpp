@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/world/body_store.hpp"
+#include "src/world/device/slot_values.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
 
@@ -14,11 +15,15 @@ namespace device {
 template <class Device>
 class BodyBuffers {
  public:
-  /// Copies all bodies to the device. @param data gets their addresses
-  void upload(const Transfer<Device>& transfer, const BodyStore& store, StepData* data) {
+  /// Copies all bodies to the device.
+  /// @param room number of slots to reserve memory for
+  /// @param data gets the addresses
+  void upload(const Transfer<Device>& transfer, const BodyStore& store, std::size_t room,
+              StepData* data) {
+    reserve(transfer, room);
     upload_properties(transfer, store.view(), &data->step.bodies);
     upload_motion(transfer, store.moving, &data->step);
-    const std::size_t n = store.capacity();
+    const std::size_t n = room;
     data->saved = {transfer.room(&saved_last_acceleration_, n),
                    transfer.room(&saved_mean_motion_, n), transfer.room(&saved_rest_time_, n),
                    transfer.room(&saved_awake_, n)};
@@ -58,10 +63,45 @@ class BodyBuffers {
     transfer.copy(to.awake, data.saved.awake, n);
   }
 
-  // What an edit of a body changes.
-  Vec3* acceleration() const { return acceleration_.data(); }
-  Real* velocity_kept() const { return velocity_kept_.data(); }
-  Real* angular_velocity_kept() const { return angular_velocity_kept_.data(); }
+  PropertyPointers properties() const {
+    return {.radius = radius_.data(),
+            .extent = extent_.data(),
+            .inverse_mass = inverse_mass_.data(),
+            .friction = friction_.data(),
+            .restitution = restitution_.data(),
+            .rolling_friction = rolling_friction_.data(),
+            .spinning_friction = spinning_friction_.data(),
+            .body_inverse_inertia = body_inverse_inertia_.data(),
+            .tensor = tensor_.data(),
+            .acceleration = acceleration_.data(),
+            .velocity_kept = velocity_kept_.data(),
+            .angular_velocity_kept = angular_velocity_kept_.data(),
+            .can_sleep = can_sleep_.data(),
+            .kinematic = kinematic_.data(),
+            .sensor = sensor_.data(),
+            .filter = filter_.data()};
+  }
+
+  /// Takes over the numbers and the ignored pairs of the host, after bodies have come or gone.
+  void update_counts(const Transfer<Device>& transfer, const BodyView& from, BodyView* to) {
+    // Pairs are only erased, by the removal of bodies.
+    if (to->ignored_count != from.ignored_count) {
+      to->ignored = transfer.put(&ignored_, from.ignored, from.ignored_count);
+      to->ignored_count = from.ignored_count;
+    }
+    to->filters_in_use = from.filters_in_use;
+    to->count = from.count;
+    to->capacity = from.capacity;
+  }
+  /// Room for the ids of `count` bodies, which swap_ids() makes the current ones.
+  BodyId* other_ids(const Transfer<Device>& transfer, std::size_t count) {
+    return transfer.room(&ids_[1 - ids_now_], count);
+  }
+  void swap_ids(BodyView* bodies) {
+    ids_now_ = 1 - ids_now_;
+    bodies->ids = ids_[ids_now_].data();
+  }
+
   // What accumulates until the next step.
   const Vec3* force() const { return force_.data(); }
   const Vec3* torque() const { return torque_.data(); }
@@ -69,6 +109,15 @@ class BodyBuffers {
  private:
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
+
+  void reserve(const Transfer<Device>& transfer, std::size_t n) {
+    const auto all = [&](auto&... buffers) { (transfer.room(&buffers, n), ...); };
+    all(radius_, extent_, inverse_mass_, friction_, restitution_, rolling_friction_,
+        spinning_friction_, velocity_kept_, angular_velocity_kept_, body_inverse_inertia_, tensor_,
+        acceleration_, can_sleep_, kinematic_, sensor_, filter_);
+    all(position_, velocity_, angular_velocity_, force_, torque_, last_acceleration_, orientation_,
+        inverse_inertia_, mean_motion_, rest_time_, awake_);
+  }
 
   void upload_properties(const Transfer<Device>& transfer, const BodyView& from, BodyView* to) {
     const std::size_t n = from.capacity;
@@ -91,7 +140,7 @@ class BodyBuffers {
     to->sensor = transfer.put(&sensor_, from.sensor, n);
     to->filter = transfer.put(&filter_, from.filter, n);
     to->ignored = transfer.put(&ignored_, from.ignored, from.ignored_count);
-    to->ids = transfer.put(&ids_, from.ids, from.count);
+    to->ids = transfer.put(&ids_[ids_now_], from.ids, from.count);
   }
 
   void upload_motion(const Transfer<Device>& transfer, const MotionArrays& from,
@@ -129,7 +178,8 @@ class BodyBuffers {
   Buffer<std::uint8_t> can_sleep_, kinematic_, sensor_;
   Buffer<CollisionFilter> filter_;
   Buffer<std::uint64_t> ignored_;
-  Buffer<BodyId> ids_;
+  Buffer<BodyId> ids_[2];
+  int ids_now_ = 0;  ///< which of the two are the current ones
   // Motion.
   Buffer<Vec3> position_, velocity_, angular_velocity_, force_, torque_, last_acceleration_;
   Buffer<Quat> orientation_;

@@ -3,7 +3,7 @@
 
 #include <jfpx/world.hpp>
 
-#include "src/world/body_store.hpp"
+#include "src/world/bodies_of_step.hpp"
 #include "src/world/detected_contacts.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
@@ -23,8 +23,9 @@ template <class Device>
 class ContactBuffers {
  public:
   /// The contacts become those of another set. Waits for the copies.
+  /// @param room number of slots of bodies to reserve memory for
   void upload(const Transfer<Device>& transfer, const soft_step::ContactView& from,
-              std::size_t bodies) {
+              std::size_t room) {
     counts_ = {from.sphere_count, from.manifold_count, from.point_count};
     touch_count_ = 0;
     transfer.put(&spheres_, from.spheres, from.sphere_count);
@@ -36,25 +37,26 @@ class ContactBuffers {
     transfer.put(&rolling_impulses_, none.empty() ? from.rolling_impulses : none.data(),
                  from.size());
     transfer.put(&colors_, from.colors, from.size());
-    put_ranges(transfer, &spheres_of_, from.spheres, from.sphere_count, bodies);
-    put_ranges(transfer, &manifolds_of_, from.manifolds, from.manifold_count, bodies);
+    put_ranges(transfer, &spheres_of_, from.spheres, from.sphere_count, room);
+    put_ranges(transfer, &manifolds_of_, from.manifolds, from.manifold_count, room);
   }
 
-  /// Makes room for the contacts that a step finds.
-  void reserve(const Transfer<Device>& transfer, const Capacity& capacity, StepData* data) {
+  /// Makes room for the contacts that a step finds. @param room number of slots of bodies
+  void reserve(const Transfer<Device>& transfer, const Capacity& capacity, std::size_t room,
+               StepData* data) {
     const std::size_t contacts = std::size_t{capacity.spheres} + capacity.candidates;
-    const std::size_t bodies = data->step.bodies.capacity;
+    slots_ = data->step.bodies.capacity;
     transfer.room(&spheres_, capacity.spheres);
     transfer.room(&manifolds_, capacity.candidates);
     transfer.room(&points_, capacity.points);
     transfer.room(&impulses_, std::size_t{capacity.spheres} + capacity.points);
     transfer.room(&rolling_impulses_, contacts);
     transfer.room(&colors_, contacts);
-    transfer.room(&spheres_of_, bodies);
-    transfer.room(&manifolds_of_, bodies);
+    transfer.room(&spheres_of_, room);
+    transfer.room(&manifolds_of_, room);
     data->now = view();
     data->touches = transfer.room(&touches_, capacity.touches);
-    data->position_before = transfer.room(&position_before_, bodies);
+    data->position_before = transfer.room(&position_before_, room);
   }
 
   /// A complete step has found these numbers of contacts.
@@ -95,10 +97,10 @@ class ContactBuffers {
   }
 
   /// What detection leaves on the host, for ContactListMaker.
-  void fetch_detected(const Transfer<Device>& transfer, const BodyStore& bodies,
+  void fetch_detected(const Transfer<Device>& transfer, const BodiesOfStep& bodies,
                       DetectedContacts* detected) const {
     std::vector<Touch> touches(touch_count_);
-    detected->position.resize(bodies.capacity());
+    detected->position.resize(slots_);
     transfer.get(&touches, touches_);
     transfer.get(&detected->position, position_before_);
     transfer.wait();
@@ -109,7 +111,7 @@ class ContactBuffers {
     detected->other_spheres = 0;
     for (const Touch& t : touches) {
       detected->others.push_back(
-          {bodies.id(t.pair.a), bodies.id(t.pair.b), t.normal, t.point, t.distance});
+          {bodies[t.pair.a].id, bodies[t.pair.b].id, t.normal, t.point, t.distance});
       detected->other_spheres += t.of_spheres;
     }
   }
@@ -121,8 +123,8 @@ class ContactBuffers {
   /// By body a: its range of a list that is sorted by it.
   template <class C>
   static void put_ranges(const Transfer<Device>& transfer, Buffer<Range>* to, const C* contacts,
-                         std::uint32_t count, std::size_t bodies) {
-    std::vector<Range> ranges(bodies);
+                         std::uint32_t count, std::size_t room) {
+    std::vector<Range> ranges(room);
     for (std::uint32_t i = 0; i < count; ++i) {
       Range& range = ranges[contacts[i].key.a];
       if (range.end == 0) range.begin = i;
@@ -143,6 +145,7 @@ class ContactBuffers {
   Buffer<Touch> touches_;
   std::uint32_t touch_count_ = 0;
   Buffer<Vec3> position_before_;
+  std::size_t slots_ = 0;  ///< of bodies in the step
 };
 
 }  // namespace device

@@ -10,6 +10,7 @@
 #include "src/world/device/edit_program.hpp"
 #include "src/world/device/force_buffers.hpp"
 #include "src/world/device/match_program.hpp"
+#include "src/world/device/merge_program.hpp"
 #include "src/world/device/prepare_program.hpp"
 #include "src/world/device/scratch_buffers.hpp"
 #include "src/world/device/solve_program.hpp"
@@ -55,10 +56,16 @@ class DeviceStep final : public DeviceWorld {
 
   void upload(const BodyStore& bodies, SubShapeTable* sub_shapes,
               soft_step::ContactSet* last) override {
-    bodies_.upload(transfer_, bodies, &data_);
-    scratch_.reserve_bodies(transfer_, bodies.capacity(), &data_);
-    sub_shapes_.upload(transfer_, sub_shapes->view(), sub_shapes->part_count(), &data_.near);
-    last_contacts().upload(transfer_, last->view(), bodies.capacity());
+    if (bodies.capacity() > room_) {
+      room_ = room_ == 0 ? bodies.capacity() : bodies.capacity() + bodies.capacity() / 2;
+    }
+    bodies_.upload(transfer_, bodies, room_, &data_);
+    id_count_ = data_.step.bodies.count;
+    scratch_.reserve_bodies(transfer_, room_, &data_);
+    current_sub_shapes().upload(transfer_, sub_shapes->view(), sub_shapes->part_count());
+    use_sub_shapes();
+    most_parts_ = 2 * sub_shapes->part_count() + 4096;
+    last_contacts().upload(transfer_, last->view(), room_);
     forces_.clear();
     device_->wait();
   }
@@ -68,25 +75,42 @@ class DeviceStep final : public DeviceWorld {
     device_->wait();
   }
 
+  bool has_room(std::size_t slots) const noexcept override {
+    return slots <= room_ && sub_shapes_[sub_shapes_now_].part_count() <= most_parts_;
+  }
+
   void edit(const BodyStore& bodies, const BodyEdits& edits) override {
-    const BodyView& from = bodies.view();
+    const BodyView from = bodies.view_without_ids();
     std::vector<EditedBody> edited;
-    bool any_wakes_neighbors = false;
+    std::vector<SlotValues> replaced;
+    std::vector<std::uint32_t> changed;  // slots whose body has come or gone
+    std::vector<BodyId> added;
+    bool visits_contacts = false;
     for (const auto& [i, edit] : edits) {
-      any_wakes_neighbors |= edit.wakes_neighbors;
-      edited.push_back({i, edit.sets_state, edit.wakes, edit.wakes_neighbors, bodies.state(i),
-                        from.inverse_inertia[i], from.force[i], from.torque[i],
+      visits_contacts |= edit.wakes_neighbors || edit.is_removed;
+      edited.push_back({i, edit.sets_state, edit.wakes, edit.wakes_neighbors, edit.is_removed,
+                        bodies.state(i), from.inverse_inertia[i], from.force[i], from.torque[i],
                         from.acceleration[i], from.velocity_kept[i],
                         from.angular_velocity_kept[i]});
+      if (edit.is_added || edit.is_removed) {
+        changed.push_back(i);
+        if (edit.is_added) added.push_back(bodies.id(i));
+        replaced.push_back(edit.is_added ? slot_values(bodies, from, i) : unused_slot(i));
+        replaced.back().has_no_contacts = true;
+      } else if (edit.sets_state && !bodies.movable(i)) {  // its velocities say if it is awake
+        replaced.push_back(slot_values(bodies, from, i));
+      }
     }
+    bodies_.update_counts(transfer_, from, &data_.step.bodies);
     const Contacts& last = last_contacts();
     data_.last = last.view();
     device_->run(
-        EditProgram{data_, transfer_.put(&edits_, edited),
-                    static_cast<std::uint32_t>(edited.size()), any_wakes_neighbors, last.touches(),
-                    last.touch_count(), bodies_.acceleration(), bodies_.velocity_kept(),
-                    bodies_.angular_velocity_kept()},
-        any_wakes_neighbors ? std::max(last.sphere_count(), edited.size()) : edited.size());
+        EditProgram{data_, bodies_.properties(), transfer_.put(&edits_, edited),
+                    static_cast<std::uint32_t>(edited.size()), transfer_.put(&replaced_, replaced),
+                    static_cast<std::uint32_t>(replaced.size()), visits_contacts, last.touches(),
+                    last.touch_count()},
+        visits_contacts ? std::max(last.sphere_count(), edited.size()) : edited.size());
+    if (!changed.empty()) merge(bodies, changed, &added);
   }
 
   Result step(const ForceTable* forces, double time) override {
@@ -138,7 +162,7 @@ class DeviceStep final : public DeviceWorld {
     last_contacts().fetch(transfer_, last);
   }
 
-  void fetch_contacts(const BodyStore& bodies, bool of_step_before, soft_step::ContactSet* set,
+  void fetch_contacts(const BodiesOfStep& bodies, bool of_step_before, soft_step::ContactSet* set,
                       DetectedContacts* detected) override {
     const Contacts& from = of_step_before ? contacts_[now_] : last_contacts();
     from.fetch(transfer_, set);
@@ -149,8 +173,50 @@ class DeviceStep final : public DeviceWorld {
 
  private:
   using Contacts = ContactBuffers<Device>;
+  using SubShapes = SubShapeBuffers<Device>;
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
+
+  SubShapes& current_sub_shapes() { return sub_shapes_[sub_shapes_now_]; }
+  void use_sub_shapes() {
+    data_.near.sub_shapes = current_sub_shapes().view();
+    scratch_.reserve_sub_shapes(transfer_, current_sub_shapes().counts().bounded(), &data_);
+  }
+
+  /// Updates the ids and the sub-shapes. Waits.
+  /// @param changed slots whose body has come or gone
+  /// @param added   the bodies that have come, in any order
+  void merge(const BodyStore& bodies, const std::vector<std::uint32_t>& changed,
+             std::vector<BodyId>* added) {
+    std::ranges::sort(*added, {}, &BodyId::index);
+    SubShapeTable table;
+    table.set_bodies(bodies, *added);
+    added_shapes_.upload(transfer_, table.view(), table.part_count());
+    SubShapes &before = current_sub_shapes(), &after = sub_shapes_[1 - sub_shapes_now_];
+    SubShapeCounts* kept = transfer_.room(&kept_shapes_, 1);
+    device_->run(MergeProgram{.data = data_,
+                              .changed = transfer_.put(&changed_, changed),
+                              .changed_count = static_cast<std::uint32_t>(changed.size()),
+                              .ids = data_.step.bodies.ids,
+                              .id_count = id_count_,
+                              .added_ids = transfer_.put(&added_ids_, *added),
+                              .added_id_count = static_cast<std::uint32_t>(added->size()),
+                              .to_ids = bodies_.other_ids(transfer_, bodies.size()),
+                              .added = added_shapes_.view(),
+                              .part_count = before.part_count(),
+                              .added_part_count = added_shapes_.part_count(),
+                              .to = after.reserve(transfer_, before, added_shapes_),
+                              .kept = kept},
+                 std::max<std::size_t>(id_count_, before.counts().all()));
+    SubShapeCounts counts;
+    device_->download(&counts, kept, 1);
+    device_->wait();
+    after.complete(counts + added_shapes_.counts());
+    sub_shapes_now_ = 1 - sub_shapes_now_;
+    use_sub_shapes();
+    id_count_ = static_cast<std::uint32_t>(bodies.size());
+    bodies_.swap_ids(&data_.step.bodies);
+  }
 
   /// Between two steps, contacts_[now_] are those of the step before the last.
   Contacts& last_contacts() { return contacts_[1 - now_]; }
@@ -185,7 +251,7 @@ class DeviceStep final : public DeviceWorld {
   void run_programs() {
     data_.capacity = capacity_;
     scratch_.reserve_lists(transfer_, capacity_, &data_);
-    contacts_[now_].reserve(transfer_, capacity_, &data_);
+    contacts_[now_].reserve(transfer_, capacity_, room_, &data_);
     const Contacts& last = last_contacts();
     data_.last = last.view();
     data_.near.bodies = data_.step.bodies;
@@ -246,12 +312,21 @@ class DeviceStep final : public DeviceWorld {
   StepData data_;
   Capacity capacity_;
   BodyBuffers<Device> bodies_;
-  SubShapeBuffers<Device> sub_shapes_;
+  SubShapes sub_shapes_[2], added_shapes_;
+  int sub_shapes_now_ = 0;  ///< which of the two are those of the bodies
   ForceBuffers<Device> forces_;
   Contacts contacts_[2];
   int now_ = 0;  ///< the contacts of the step in progress; the others are those of the last step
   ScratchBuffers<Device> scratch_;
+  std::size_t room_ = 0;        ///< number of slots that the buffers of bodies have memory for
+  std::size_t most_parts_ = 0;  ///< of compounds, with those that were removed
+  std::uint32_t id_count_ = 0;  ///< number of sorted ids on the device
+  // Of edit().
   Buffer<EditedBody> edits_;
+  Buffer<SlotValues> replaced_;
+  Buffer<std::uint32_t> changed_;
+  Buffer<BodyId> added_ids_;
+  Buffer<SubShapeCounts> kept_shapes_;
   // Of the step in progress.
   double time_ = 0;
   Vec3 *force_sum_ = nullptr, *torque_sum_ = nullptr;  ///< null if no force of the table acts

@@ -1,7 +1,8 @@
 /// Changes of single bodies between two steps on a device.
 #pragma once
 
-#include "src/world/device/atomic.hpp"
+#include "src/contact_solver/greedy_coloring.hpp"
+#include "src/world/device/slot_values.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/met_contacts.hpp"
 
@@ -12,50 +13,66 @@ namespace device {
 /// The values of a BodyEdit.
 struct EditedBody {
   std::uint32_t body = 0;
-  bool sets_state = false, wakes = false, wakes_neighbors = false;
+  bool sets_state = false, wakes = false, wakes_neighbors = false, is_removed = false;
   BodyState state;
   Mat3 inverse_inertia;
   Vec3 force, torque, acceleration;
   Real velocity_kept = 1, angular_velocity_kept = 1;
 };
 
-/// Wakes the bodies in contact with some of the edited bodies, then edits these.
+/// Wakes the bodies in contact with some of the edited bodies, forgets the contacts of removed
+/// bodies, edits the bodies, and then replaces some.
 struct EditProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = 3;
   StepData data;
+  PropertyPointers properties;
   const EditedBody* edits = nullptr;
   std::uint32_t count = 0;
-  bool any_wakes_neighbors = false;
+  const SlotValues* replaced = nullptr;
+  std::uint32_t replaced_count = 0;
+  bool visits_contacts = false;         ///< whether an edit wakes neighbors or removes a body
   const Touch* last_touches = nullptr;  ///< of the last step
   std::uint32_t last_touch_count = 0;
-  Vec3* acceleration = nullptr;                                     ///< as BodyView
-  Real *velocity_kept = nullptr, *angular_velocity_kept = nullptr;  ///< as BodyView
 
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
-    if (any_wakes_neighbors) wake_neighbors(team);
+    if (visits_contacts) visit_contacts(team);
     team.for_each(count, [&](std::uint32_t k) { edit(edits[k]); });
+    team.for_each(replaced_count, [&](std::uint32_t k) { replace(replaced[k]); });
   }
 
  private:
+  static constexpr std::uint8_t kWakesNeighbors = 1, kIsRemoved = 2;
+
+  /// Wakes neighbors, and takes the color of the contacts of removed bodies: MatchProgram does not
+  /// match a contact without color.
   template <class Team>
-  JFPX_HD void wake_neighbors(const Team& team) const {
+  JFPX_HD void visit_contacts(const Team& team) const {
     const StepData& d = data;
     const BodyView& bodies = d.step.bodies;
     team.for_each(bodies.capacity, [&](std::uint32_t i) { d.marked[i] = 0; });
     team.for_each(count, [&](std::uint32_t k) {
-      if (edits[k].wakes_neighbors) d.marked[edits[k].body] = 1;
+      const EditedBody& e = edits[k];
+      d.marked[e.body] = static_cast<std::uint8_t>((e.wakes_neighbors ? kWakesNeighbors : 0) |
+                                                   (e.is_removed ? kIsRemoved : 0));
     });
     const auto wake = [&](std::uint32_t a, std::uint32_t b) {
       if (bodies.sensor[a] != 0 || bodies.sensor[b] != 0) return;
-      if (d.marked[a] != 0 && bodies.movable(b)) d.step.motion.wake(bodies, b);
-      if (d.marked[b] != 0 && bodies.movable(a)) d.step.motion.wake(bodies, a);
+      if ((d.marked[a] & kWakesNeighbors) != 0 && bodies.movable(b)) {
+        d.step.motion.wake(bodies, b);
+      }
+      if ((d.marked[b] & kWakesNeighbors) != 0 && bodies.movable(a)) {
+        d.step.motion.wake(bodies, a);
+      }
     };
     const soft_step::ContactView contacts = d.last_contacts();
     team.spread(contacts.size(), [&](std::uint32_t i) {
       const soft_step::ContactKey& key = contacts.key(i);
+      const auto marks = d.marked[key.a] | d.marked[key.b];
+      if (marks == 0 || contacts.colors[i] == soft_step::kNoColor) return;
       const bool touched = contacts.is_sphere(i) && contacts.distance(i, 0) <= 0;
       if (touched || soft_step::count_met(contacts, i) > 0) wake(key.a, key.b);
+      if ((marks & kIsRemoved) != 0) contacts.colors[i] = soft_step::kNoColor;
     });
     team.for_each(last_touch_count,
                   [&](std::uint32_t i) { wake(last_touches[i].pair.a, last_touches[i].pair.b); });
@@ -73,10 +90,17 @@ struct EditProgram {
     }
     motion.force[i] = e.force;
     motion.torque[i] = e.torque;
-    acceleration[i] = e.acceleration;
-    velocity_kept[i] = e.velocity_kept;
-    angular_velocity_kept[i] = e.angular_velocity_kept;
-    if (e.wakes) motion.wake(data.step.bodies, i);
+    properties.acceleration[i] = e.acceleration;
+    properties.velocity_kept[i] = e.velocity_kept;
+    properties.angular_velocity_kept[i] = e.angular_velocity_kept;
+    if (e.wakes && data.step.bodies.movable(i)) motion.wake(data.step.bodies, i);
+  }
+
+  JFPX_HD void replace(const SlotValues& values) const {
+    values.store(data.step.motion, properties);
+    if (values.has_no_contacts) {
+      data.last.spheres_of[values.body] = data.last.manifolds_of[values.body] = {};
+    }
   }
 };
 

@@ -68,6 +68,11 @@ struct MatchProgram {
     return kNone;
   }
 
+  /// See EditProgram.
+  JFPX_HD static bool is_of_removed_body(const soft_step::ContactView& last, std::uint32_t i) {
+    return last.colors[i] == soft_step::kNoColor;
+  }
+
   /// @returns whether the contact keeps a color
   JFPX_HD bool match_sphere(std::uint32_t i) const {
     const StepData& d = data;
@@ -78,7 +83,7 @@ struct MatchProgram {
       d.now.spheres_of[key.a].end = i + 1;
     }
     const std::uint32_t before = find(last.spheres, d.last.spheres_of[key.a], key);
-    if (before == kNone) {
+    if (before == kNone || is_of_removed_body(last, before)) {
       now.impulses[i] = {};
       now.rolling_impulses[i] = {};
       return false;
@@ -97,7 +102,7 @@ struct MatchProgram {
     }
     const std::uint32_t before =
         find(last.manifolds, data.last.manifolds_of[contact.key.a], contact.key);
-    if (before == kNone) {
+    if (before == kNone || is_of_removed_body(last, last.sphere_count + before)) {
       now.rolling_impulses[i] = {};
       return false;
     }

@@ -13,7 +13,7 @@ namespace device {
 template <class Device>
 class ScratchBuffers {
  public:
-  /// Makes room for what is indexed by body.
+  /// Makes room for what is indexed by body. @param n number of slots
   void reserve_bodies(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
     StepData& d = *data;
     d.motion = transfer.room(&motion_, n);
@@ -35,6 +35,12 @@ class ScratchBuffers {
     d.row_bodies = transfer.room(&row_bodies_, n);
     d.pair_count = transfer.room(&pair_count_, 1);
     d.counters = transfer.room(&counters_, 1);
+  }
+
+  /// Makes room for what is indexed by sub-shape. @param n number of sub-shapes that are no walls
+  void reserve_sub_shapes(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
+    data->near.margins = transfer.room(&margins_, n);
+    data->near.swept = transfer.room(&swept_, n);
   }
 
   /// Makes room for lists.
@@ -63,6 +69,8 @@ class ScratchBuffers {
   using Buffer = typename Device::template Buffer<T>;
 
   Buffer<Vec3> motion_;
+  Buffer<Real> margins_;
+  Buffer<SphereInstance> swept_;
   Buffer<SpherePair> pairs_;
   Buffer<cuda::ContactCount> pair_count_;
   Buffer<NormalDistance> pair_results_;

@@ -1,6 +1,7 @@
 /// The sub-shapes of the bodies in the memory of a device.
 #pragma once
 
+#include "src/world/device/merge_program.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
 
@@ -13,35 +14,63 @@ namespace device {
 template <class Device>
 class SubShapeBuffers {
  public:
-  /// @param part_count number of parts of compounds
-  void upload(const Transfer<Device>& transfer, const SubShapeView& from, std::size_t part_count,
-              NearBounds* near) {
-    SubShapeView& to = near->sub_shapes;
-    to = from;
+  /// Copies sub-shapes to the device. @param part_count number of parts of compounds
+  void upload(const Transfer<Device>& transfer, const SubShapeView& from, std::size_t part_count) {
     const std::uint32_t boxes = from.bounded_count - from.sphere_count;
-    to.bodies = transfer.put(&bodies_, from.bodies, from.count);
-    to.numbers = transfer.put(&numbers_, from.numbers, from.count);
+    counts_ = counts_of(from);
+    part_count_ = static_cast<std::uint32_t>(part_count);
+    transfer.put(&bodies_, from.bodies, from.count);
+    transfer.put(&numbers_, from.numbers, from.count);
     transfer.put(&bounds_, from.all_bounds, from.bounded_count);
     transfer.put(&boxes_, from.boxes, boxes);
-    to.all_bounds = bounds_.data();
-    to.boxes = boxes_.data();
-    to.walls = transfer.put(&walls_, from.walls, from.count - from.bounded_count);
-    to.parts = transfer.put(&parts_, from.parts, from.bounded_count);
-    to.local = transfer.put(&local_, from.local, part_count);
-    near->margins = transfer.room(&margins_, from.bounded_count);
-    near->swept = transfer.room(&swept_, from.bounded_count);
+    transfer.put(&walls_, from.walls, from.count - from.bounded_count);
+    transfer.put(&parts_, from.parts, from.bounded_count);
+    transfer.put(&local_, from.local, part_count);
   }
+
+  /// Makes room for the sub-shapes of two objects. complete() must follow.
+  SubShapeArrays reserve(const Transfer<Device>& transfer, const SubShapeBuffers& a,
+                         const SubShapeBuffers& b) {
+    const SubShapeCounts &x = a.counts_, &y = b.counts_;
+    part_count_ = a.part_count_ + b.part_count_;
+    const std::size_t all = x.all() + y.all(), bounded = x.bounded() + y.bounded();
+    return {.bodies = transfer.room(&bodies_, all),
+            .numbers = transfer.room(&numbers_, all),
+            .bounds = transfer.room(&bounds_, bounded),
+            .boxes = transfer.room(&boxes_, bounded - x.spheres - y.spheres),
+            .walls = transfer.room(&walls_, x.walls + y.walls),
+            .parts = transfer.room(&parts_, bounded),
+            .local = transfer.room(&local_, part_count_)};
+  }
+  void complete(const SubShapeCounts& counts) { counts_ = counts; }
+
+  SubShapeView view() const {
+    return {.sphere_count = counts_.spheres,
+            .fixed_begin = counts_.fixed_begin(),
+            .bounded_count = counts_.bounded(),
+            .count = counts_.all(),
+            .bodies = bodies_.data(),
+            .numbers = numbers_.data(),
+            .all_bounds = bounds_.data(),
+            .boxes = boxes_.data(),
+            .walls = walls_.data(),
+            .parts = parts_.data(),
+            .local = local_.data()};
+  }
+  const SubShapeCounts& counts() const { return counts_; }
+  std::uint32_t part_count() const { return part_count_; }
 
  private:
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
 
   Buffer<std::uint32_t> bodies_, numbers_, parts_;
-  Buffer<SphereInstance> bounds_, swept_;
+  Buffer<SphereInstance> bounds_;
   Buffer<PosedBox> boxes_;
   Buffer<Wall> walls_;
   Buffer<Transform> local_;
-  Buffer<Real> margins_;
+  SubShapeCounts counts_;
+  std::uint32_t part_count_ = 0;  ///< size of local_, with parts of compounds that were removed
 };
 
 }  // namespace device

@@ -1,0 +1,162 @@
+/// Ids and sub-shapes of a world on a device after bodies have come or gone.
+#pragma once
+
+#include "src/world/device/step_data.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+/// The arrays of a SubShapeView.
+struct SubShapeArrays {
+  std::uint32_t *bodies = nullptr, *numbers = nullptr;
+  SphereInstance* bounds = nullptr;
+  PosedBox* boxes = nullptr;
+  Wall* walls = nullptr;
+  std::uint32_t* parts = nullptr;
+  Transform* local = nullptr;
+};
+
+/// Numbers of sub-shapes by kind, in the order of SubShapeTable.
+struct SubShapeCounts {
+  std::uint32_t spheres = 0, movable_boxes = 0, fixed_boxes = 0, walls = 0;
+
+  JFPX_HD std::uint32_t fixed_begin() const { return spheres + movable_boxes; }
+  JFPX_HD std::uint32_t bounded() const { return fixed_begin() + fixed_boxes; }
+  JFPX_HD std::uint32_t all() const { return bounded() + walls; }
+};
+
+JFPX_HD inline SubShapeCounts operator+(const SubShapeCounts& a, const SubShapeCounts& b) {
+  return {a.spheres + b.spheres, a.movable_boxes + b.movable_boxes, a.fixed_boxes + b.fixed_boxes,
+          a.walls + b.walls};
+}
+
+JFPX_HD inline SubShapeCounts counts_of(const SubShapeView& view) {
+  return {view.sphere_count, view.fixed_begin - view.sphere_count,
+          view.bounded_count - view.fixed_begin, view.count - view.bounded_count};
+}
+
+/// Merges the kept items of a sorted array with another sorted array, which must not have the keys
+/// of kept items.
+/// @param key_of,added_key_of  keys by item, ascending
+/// @param copy_kept,copy_added receive an item of the arrays and its place in the merged one
+template <class Team, class KeyOf, class IsKept, class AddedKeyOf, class CopyKept, class CopyAdded>
+JFPX_HD void merge_sorted(const Team& team, std::uint32_t n, const KeyOf& key_of,
+                          const IsKept& is_kept, std::uint32_t added_count,
+                          const AddedKeyOf& added_key_of, const CopyKept& copy_kept,
+                          const CopyAdded& copy_added) {
+  // Number of added items up to the key of an item.
+  const auto added_up_to = [&](std::uint32_t i) {
+    const auto key = key_of(i);
+    std::uint32_t first = 0, last = added_count;
+    while (first < last) {
+      const std::uint32_t middle = first + (last - first) / 2;
+      if (key < added_key_of(middle)) {
+        last = middle;
+      } else {
+        first = middle + 1;
+      }
+    }
+    return first;
+  };
+  const auto size = [&](std::uint32_t i) { return is_kept(i) ? 1u : 0u; };
+  const std::uint32_t kept = team.scan(n, size, size, [&](std::uint32_t i, std::uint32_t before) {
+    const std::uint32_t end = added_up_to(i);
+    for (std::uint32_t k = i == 0 ? 0 : added_up_to(i - 1); k < end; ++k) {
+      copy_added(k, before + k);
+    }
+    if (is_kept(i)) copy_kept(i, before + end);
+  });
+  const std::uint32_t begin = n == 0 ? 0 : added_up_to(n - 1);
+  team.for_each(added_count - begin,
+                [&](std::uint32_t k) { copy_added(begin + k, kept + begin + k); });
+}
+
+/// Makes the sorted ids and the sub-shapes from those before: without the ones of `changed` bodies,
+/// and with the ones that are `added`.
+struct MergeProgram {
+  static constexpr unsigned kBlocksPerMultiprocessor = 3;
+  StepData data;
+  const std::uint32_t* changed = nullptr;  ///< slots whose body has come or gone
+  std::uint32_t changed_count = 0;
+  const BodyId* ids = nullptr;  ///< before
+  std::uint32_t id_count = 0;
+  const BodyId* added_ids = nullptr;
+  std::uint32_t added_id_count = 0;
+  BodyId* to_ids = nullptr;
+  SubShapeView added;
+  std::uint32_t part_count = 0, added_part_count = 0;  ///< sizes of SubShapeView::local
+  SubShapeArrays to;
+  SubShapeCounts* kept = nullptr;  ///< receives the numbers of sub-shapes that stay
+
+  template <class Team>
+  JFPX_HD void operator()(const Team& team) const {
+    const SubShapeView& before = data.near.sub_shapes;
+    team.once([&] { *kept = {}; });
+    team.for_each(data.step.bodies.capacity, [&](std::uint32_t i) { data.marked[i] = 0; });
+    team.for_each(changed_count, [&](std::uint32_t k) { data.marked[changed[k]] = 1; });
+    merge_sorted(
+        team, id_count, [&](std::uint32_t i) { return ids[i].index; },
+        [&](std::uint32_t i) { return data.marked[ids[i].index] == 0; }, added_id_count,
+        [&](std::uint32_t k) { return added_ids[k].index; },
+        [&](std::uint32_t i, std::uint32_t place) { to_ids[place] = ids[i]; },
+        [&](std::uint32_t k, std::uint32_t place) { to_ids[place] = added_ids[k]; });
+    team.spread(part_count, [&](std::uint32_t i) { to.local[i] = before.local[i]; });
+    team.spread(added_part_count,
+                [&](std::uint32_t i) { to.local[part_count + i] = added.local[i]; });
+    const SubShapeCounts counts = counts_of(before);
+    count_kept(team, 0, counts.spheres, &kept->spheres);
+    count_kept(team, counts.spheres, counts.movable_boxes, &kept->movable_boxes);
+    count_kept(team, counts.fixed_begin(), counts.fixed_boxes, &kept->fixed_boxes);
+    count_kept(team, counts.bounded(), counts.walls, &kept->walls);
+    merge_sorted(
+        team, before.count, [&](std::uint32_t i) { return key(before, i); },
+        [&](std::uint32_t i) { return stays(i); }, added.count,
+        [&](std::uint32_t k) { return key(added, k); },
+        [&](std::uint32_t i, std::uint32_t place) { copy(before, i, 0, place); },
+        [&](std::uint32_t k, std::uint32_t place) { copy(added, k, part_count, place); });
+  }
+
+ private:
+  JFPX_HD bool stays(std::uint32_t i) const {
+    return data.marked[data.near.sub_shapes.bodies[i]] == 0;
+  }
+
+  template <class Team>
+  JFPX_HD void count_kept(const Team& team, std::uint32_t first, std::uint32_t count,
+                          std::uint32_t* sum) const {
+    team.count(
+        count, [&](std::uint32_t i) { return stays(first + i); }, sum);
+  }
+
+  /// The order of SubShapeTable, without that of the parts of a body.
+  JFPX_HD static std::uint64_t key(const SubShapeView& view, std::uint32_t i) {
+    const std::uint64_t kind = i < view.sphere_count    ? 0
+                               : i < view.fixed_begin   ? 1
+                               : i < view.bounded_count ? 2
+                                                        : 3;
+    return kind << 32 | view.bodies[i];
+  }
+
+  /// @param first_part index of the first of the parts of `from`
+  JFPX_HD void copy(const SubShapeView& from, std::uint32_t i, std::uint32_t first_part,
+                    std::uint32_t place) const {
+    to.bodies[place] = from.bodies[i];
+    to.numbers[place] = from.numbers[i];
+    if (from.is_wall(i)) {
+      to.walls[place - (kept->bounded() + added.bounded_count)] = from.wall(i);
+      return;
+    }
+    to.bounds[place] = from.bounds(i);
+    to.parts[place] = from.parts[i] == 0 ? 0 : from.parts[i] + first_part;
+    if (!from.is_sphere(i)) {
+      to.boxes[place - (kept->spheres + added.sphere_count)] = from.box(i);
+    }
+  }
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx
