@@ -91,7 +91,7 @@ void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last) {
     std::uint32_t before = 0;
     if (!finder.find(contact.key, &before)) continue;
     keep(i, before);
-    current_.impulses[i] = turned(last_.impulses[before], contact.normal);
+    current_.impulses[i] = at_start_of_step(last_.impulses[before]);
   }
 }
 

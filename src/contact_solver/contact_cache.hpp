@@ -29,7 +29,7 @@ class ContactCache {
   const ContactSet& last() const { return last_; }
 
   /// Gives each contact the impulses and the color that the same contact had in the last step, and
-  /// colors the new ones. Friction impulses are turned into the new tangent planes.
+  /// colors the new ones.
   /// @param inverse_mass by body [1/kg]; 0: immovable or kinematic
   /// @param any_rolls whether a body has rolling or spinning friction
   /// @param pool null: in the calling thread

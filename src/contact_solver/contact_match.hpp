@@ -7,11 +7,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// The impulse at the start of the next step: its friction is projected into the plane
-/// perpendicular to `normal`.
-JFPX_HD inline KeptImpulse turned(const KeptImpulse& kept, const Vec3& normal) {
-  return {kept.friction - normal * dot(kept.friction, normal),
-          kept.normal > 0 ? kept.normal : Real(0)};
+/// The impulse at the start of the next step. RowSetup turns its friction into the new tangent
+/// plane, so that the impulses of contacts without a row, of sleeping bodies, stay what they are.
+JFPX_HD inline KeptImpulse at_start_of_step(const KeptImpulse& kept) {
+  return {kept.friction, kept.normal > 0 ? kept.normal : Real(0)};
 }
 
 /// Adds the impulses of a manifold of the last step to those of the same manifold of this step.
@@ -39,7 +38,7 @@ JFPX_HD inline void match_points(const ContactView& now, std::uint32_t m, const 
       }
     }
     if (next == end) continue;
-    const KeptImpulse kept = turned(last.impulses[last.sphere_count + q], contact.normal);
+    const KeptImpulse kept = at_start_of_step(last.impulses[last.sphere_count + q]);
     KeptImpulse& impulse = now.impulses[now.sphere_count + next];
     impulse.friction += kept.friction;
     impulse.normal += kept.normal;

@@ -101,7 +101,8 @@ struct RowSetup {
     row->arm_b = kFixed ? Real(0) : properties.radius[row->b] + half_overlap;
     row->friction = combined(properties.rules.friction, properties.friction[row->a],
                              properties.friction[row->b]);
-    row->friction_impulse = flipped ? -kept.friction : kept.friction;
+    const Vec3 friction = in_tangent_plane(kept.friction, normal);
+    row->friction_impulse = flipped ? -friction : friction;
     row->normal_impulse = kept.normal;
     const SolverBody &a = start[row->a], &b = start[row->b];
     set_masses<kFixed>(row, a, b);
@@ -153,7 +154,8 @@ struct RowSetup {
         p.arm_b = flipped ? point.arm_a : point.arm_b;
       }
       const KeptImpulse& kept = contacts.impulses[contacts.first_impulse(contact) + i];
-      const Vec3 friction = flipped ? -kept.friction : kept.friction;
+      const Vec3 unflipped = in_tangent_plane(kept.friction, normal);
+      const Vec3 friction = flipped ? -unflipped : unflipped;
       p.normal_impulse = kept.normal;
       p.friction_x = dot(friction, row->tangent);
       p.friction_y = dot(friction, row->bitangent);
@@ -188,6 +190,10 @@ struct RowSetup {
   }
 
  private:
+  /// The friction impulse of the last step, whose normal was another one.
+  JFPX_HD static Vec3 in_tangent_plane(const Vec3& friction, const Vec3& normal) {
+    return friction - normal * dot(friction, normal);
+  }
   JFPX_HD bool is_movable(std::uint32_t body) const { return start[body].inverse_mass > 0; }
   JFPX_HD bool is_active(std::uint32_t body) const {
     return is_movable(body) && properties.awake[body] != 0;

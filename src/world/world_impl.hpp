@@ -49,6 +49,7 @@ struct World::Impl {
   }
   /// The bodies for a change. The next step uploads the world again.
   BodyStore& changed_bodies() {
+    steps_at_rest = 0;
     if (resident) leave_device();
     return store;
   }
@@ -142,6 +143,12 @@ struct World::Impl {
 
   double time() const { return static_cast<double>(steps) * static_cast<double>(scene.dt); }
 
+  /// Whether the next step would change nothing: all bodies have slept during all of the last step,
+  /// whose contacts are therefore those of the next one, and nothing has changed since.
+  bool is_at_rest() const {
+    return steps_at_rest >= 2 && forces.ids().empty() && generators.ids().empty();
+  }
+  void note_rest(const StepReport& report);
   bool advance(StepReport* report);
   bool advance_soft_step(StepReport* report);
   bool advance_worst_first(StepReport* report);
@@ -187,6 +194,11 @@ struct World::Impl {
   MotionArrays before;    ///< state that an undone step restores
   bool is_saved = false;  ///< whether `before` is that of the current step
   std::uint64_t steps = 0;
+  /// Number of steps, up to the last one, after which no body was awake, without a change since.
+  std::uint32_t steps_at_rest = 0;
+  StepReport last_report;
+  /// Whether the last step was left out: the contacts before it are those after it.
+  bool repeats_contacts = false;
 
   std::unique_ptr<DeviceWorld> device;  ///< null: the world is not stepped on a device
   std::string device_failure;           ///< why there is no `device` any more; empty: no failure

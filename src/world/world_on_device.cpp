@@ -72,6 +72,7 @@ void World::Impl::enter_device() {
 }
 
 BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
+  steps_at_rest = 0;
   if (!resident) return store;
   BodyEdit& all = edits[body];
   all.sets_state |= edit.sets_state;
@@ -82,6 +83,7 @@ BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
 }
 
 BodyId World::Impl::add(const BodyDef& def) {
+  steps_at_rest = 0;
   const std::uint32_t body = store.next_index();
   if (resident && !device->has_room(std::size_t{body} + 1)) leave_device();
   if (!resident) return store.add(def);
@@ -97,6 +99,7 @@ BodyId World::Impl::add(const BodyDef& def) {
 }
 
 void World::Impl::remove(BodyId id) {
+  steps_at_rest = 0;
   const std::uint32_t body = id.index;
   if (!resident) {
     make_contact_lists();
@@ -169,6 +172,7 @@ const ContactList& World::Impl::contact_list() {
 }
 
 const ContactList& World::Impl::contact_list_before() {
+  if (repeats_contacts) return contact_list();
   return contacts_before.get([this](ContactList* list) { make_list(true, list); });
 }
 

@@ -48,6 +48,7 @@ void World::Impl::read(BinaryReader* reader) {
   settings.ignored_pairs = std::move(scene.ignored_pairs);
   scene = std::move(settings);
   resident = false;
+  steps_at_rest = 0;
   if (device != nullptr) device->configure(scene);
   steps = steps_before;
   store = std::move(bodies);

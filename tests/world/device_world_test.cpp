@@ -332,6 +332,62 @@ TEST_P(DeviceWorldTest, ABodyInTheSlotOfARemovedOneStartsWithoutContacts) {
   EXPECT_TRUE(host.snapshot() == device.snapshot());
 }
 
+/// Steps of a world that sleeps are left out, on the processor and on a device. They would have
+/// changed nothing.
+TEST_P(DeviceWorldTest, StepsOfASleepingWorldAreLeftOut) {
+  Scene scene;
+  scene.bodies = {test::half_space({0, 1, 0}, 0), test::half_space({1, 0, 0}, -1)};
+  for (int k = 0; k < 3; ++k) {
+    BodyDef crate;
+    crate.shape = Box{{0.5_r, 0.5_r, 0.5_r}};
+    crate.position = {0.01_r * static_cast<Real>(k), 0.5_r + static_cast<Real>(k), 0};
+    scene.bodies.push_back(crate);
+  }
+  for (int k = 0; k < 3; ++k) {  // a ball falls between two others
+    BodyDef ball;
+    ball.shape = Sphere{0.5_r};
+    ball.position = {2 + 0.9_r * static_cast<Real>(k), k == 1 ? 1.3_r : 0.5_r, 0.1_r};
+    scene.bodies.push_back(ball);
+  }
+  for (BodyDef& def : scene.bodies) def.rolling_friction = 0.05_r;
+  World whole = on_host(scene), host = on_host(scene), device = on_device(scene);
+  const auto make_step = [&](World& world) {
+    const StepReport report = world.step();
+    WorldAccess::impl(whole).steps_at_rest = 0;
+    return report;
+  };
+  int left_out = 0;
+  for (int n = 0; n < 700; ++n) {
+    const std::uint64_t steps = host.steps() + 1;
+    if (WorldAccess::impl(host).is_at_rest()) ++left_out;
+    ASSERT_EQ(WorldAccess::impl(host).is_at_rest(), WorldAccess::impl(device).is_at_rest());
+    const StepReport a = make_step(whole), b = make_step(host), c = make_step(device);
+    ASSERT_EQ(b.step, steps);
+    ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "step " << n;
+    ASSERT_NO_FATAL_FAILURE(expect_equal(a, c)) << "step " << n;
+    ASSERT_EQ(whole.state_hash(), host.state_hash()) << "step " << n;
+    ASSERT_EQ(whole.state_hash(), device.state_hash()) << "step " << n;
+    if (left_out > 0 && n % 7 == 0) {
+      ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(whole, host)) << "step " << n;
+      ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(whole, device)) << "step " << n;
+      ASSERT_TRUE(whole.snapshot() == host.snapshot()) << "step " << n;
+      ASSERT_TRUE(whole.snapshot() == device.snapshot()) << "step " << n;
+    }
+    if (left_out != 0 && left_out % 20 == 0) {
+      for (World* world : {&whole, &host, &device}) {
+        const BodyId last = world->bodies().back();
+        if (left_out == 20) world->apply_force(last, {3, 0, 0});
+        if (left_out == 40) world->set_state(last, world->state(last));
+        if (left_out == 60) world->remove(last);
+        if (left_out == 80) world->restore(world->snapshot());
+        if (left_out == 100) world->add_force(Gravity{{0.1_r, 0, 0}});
+      }
+      ++left_out;
+    }
+  }
+  EXPECT_GT(left_out, 100) << "the world must sleep after each change";
+}
+
 /// Whether the host has applied the forces of the last step.
 bool used_host_forces(World& world) { return WorldAccess::impl(world).is_saved; }
 

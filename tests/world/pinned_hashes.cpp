@@ -49,7 +49,7 @@ constexpr Pin kSoftStepPins[] = {
     {"overlap", 32, 60, 0x1aa5330e3d17bbf6u, 0xe54219b9024930d0u},
     {"lattice", 125, 30, 0xc1b4bc0d5892cdceu, 0xfdde9b1863a93df8u},
     {"polydisperse", 100, 60, 0x347dbd6648aa912du, 0x6334b248a85c88dfu},
-    {"mixed", 40, 150, 0x90b9b1b4b8265593u, 0x9b0132a9be32e248u},
+    {"mixed", 40, 150, 0xb2e10c3add6e50ccu, 0x35aa8b3c8aa3ef49u},
     // Enough for several threads to solve the contacts of a color.
     {"polydisperse", 20000, 3, 0x1fc1c4e3ef568f9au, 0xd2fc64b8df212ecbu},
     {"columns", 20000, 3, 0xf1dc6c610329eee1u, 0x8cfcea0c434ee1fdu},

@@ -88,7 +88,7 @@ struct MatchProgram {
       now.rolling_impulses[i] = {};
       return false;
     }
-    now.impulses[i] = soft_step::turned(last.impulses[before], now.spheres[i].normal);
+    now.impulses[i] = soft_step::at_start_of_step(last.impulses[before]);
     return keep(now, i, last, before);
   }
 
