@@ -15,12 +15,21 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
+/// What decides about the rows of a body's contacts, in one byte.
+struct BodyTraits {
+  static constexpr std::uint8_t kMovable = 1;
+  static constexpr std::uint8_t kActive = 2;  ///< movable and awake
+  /// A movable sphere with the same inertia about every axis, or a body of mass 0 that is at rest.
+  static constexpr std::uint8_t kIsRound = 4;
+  static constexpr std::uint8_t kRolls = 8;  ///< has rolling or spinning friction
+};
+
 /// Properties of the bodies at the start of a step, as arrays by body.
 struct BodyProperties {
   const Mat3* inverse_inertia = nullptr;  ///< [1/(kg m^2)], world axes
   const Vec3* acceleration = nullptr;     ///< [m/s^2], of this step
   const Real* radius = nullptr;           ///< [m]; 0: not a sphere
-  const std::uint8_t* awake = nullptr;    ///< of an immovable body: 0; kinematic: 1 if it moves
+  const std::uint8_t* traits = nullptr;   ///< bits of BodyTraits
   const Real *friction = nullptr, *restitution = nullptr;
   const Real *rolling_friction = nullptr, *spinning_friction = nullptr;  ///< [m]
   MaterialSettings rules;
@@ -48,15 +57,13 @@ struct RowSetup {
   /// `none` if no body is movable and awake, or if a movable body sleeps.
   JFPX_HD RowKind kind_of(std::uint32_t contact) const {
     const ContactKey& key = contacts.key(contact);
+    const std::uint8_t a = properties.traits[key.a], b = properties.traits[key.b];
     // A body that is still asleep is near, but does not touch: the contact has no effect.
-    const bool a_rests = is_movable(key.a) && !is_active(key.a);
-    const bool b_rests = is_movable(key.b) && !is_active(key.b);
-    if (a_rests || b_rests || (!is_active(key.a) && !is_active(key.b))) return RowKind::none;
+    if (sleeps(a) || sleeps(b) || ((a | b) & BodyTraits::kActive) == 0) return RowKind::none;
     // The arms of a generated contact are not multiples of the normal.
     if (contacts.impulse_count(contact) != 1 || key.is_generated()) return RowKind::manifold;
-    if (rolls(key.a) || rolls(key.b)) return RowKind::manifold;
-    return is_round_or_fixed(key.a) && is_round_or_fixed(key.b) ? RowKind::sphere
-                                                                : RowKind::manifold;
+    if (((a | b) & BodyTraits::kRolls) != 0) return RowKind::manifold;
+    return (a & b & BodyTraits::kIsRound) != 0 ? RowKind::sphere : RowKind::manifold;
   }
 
   JFPX_HD std::uint32_t group_of(std::uint32_t contact) const {
@@ -194,16 +201,11 @@ struct RowSetup {
   JFPX_HD static Vec3 in_tangent_plane(const Vec3& friction, const Vec3& normal) {
     return friction - normal * dot(friction, normal);
   }
-  JFPX_HD bool is_movable(std::uint32_t body) const { return start[body].inverse_mass > 0; }
-  JFPX_HD bool is_active(std::uint32_t body) const {
-    return is_movable(body) && properties.awake[body] != 0;
+  JFPX_HD bool is_movable(std::uint32_t body) const {
+    return (properties.traits[body] & BodyTraits::kMovable) != 0;
   }
-  JFPX_HD bool rolls(std::uint32_t body) const {
-    return properties.rolling_friction[body] > 0 || properties.spinning_friction[body] > 0;
-  }
-  /// Of a body: a movable sphere with the same inertia about every axis, or not in motion.
-  JFPX_HD bool is_round_or_fixed(std::uint32_t body) const {
-    return is_movable(body) ? start[body].inverse_inertia > 0 : properties.awake[body] == 0;
+  JFPX_HD static bool sleeps(std::uint8_t traits) {
+    return (traits & (BodyTraits::kMovable | BodyTraits::kActive)) == BodyTraits::kMovable;
   }
 };
 

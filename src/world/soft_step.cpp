@@ -69,6 +69,7 @@ void SoftStep::add_generated(const BodyStore& bodies, std::span<const Contact> g
 void SoftStep::prepare(const BodyStore& bodies) {
   const std::size_t capacity = bodies.capacity();
   bodies_.resize(capacity);
+  traits_.resize(capacity);
   orientation_.resize(capacity);
   free_.resize(capacity);
   marked_.resize(capacity);
@@ -194,6 +195,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
   step_ = {.bodies = bodies->view(),
            .motion = bodies->motion_pointers(),
            .solver = bodies_.data(),
+           .traits = traits_.data(),
            .orientation = orientation_.data(),
            .near = near_.data(),
            .h = constants_.h};
@@ -203,7 +205,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
                  .properties = {.inverse_inertia = view.inverse_inertia,
                                 .acceleration = view.last_acceleration,
                                 .radius = view.radius,
-                                .awake = view.awake,
+                                .traits = traits_.data(),
                                 .friction = view.friction,
                                 .restitution = view.restitution,
                                 .rolling_friction = view.rolling_friction,

@@ -83,6 +83,7 @@ class SoftStep {
 
   soft_step::StepBodies step_;  ///< of the arrays below and the bodies, during a step
   std::vector<soft_step::SolverBody> bodies_;  ///< by body
+  std::vector<std::uint8_t> traits_;           ///< by body: soft_step::BodyTraits
   std::vector<Quat> orientation_;              ///< by body, during the step
   std::vector<soft_step::FreeMotion> free_;    ///< by body
   std::vector<std::uint8_t> near_;             ///< by body: 1 if it has a contact

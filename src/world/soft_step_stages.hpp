@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/contact_solver/contact_set.hpp"
-#include "src/contact_solver/sphere_row.hpp"
+#include "src/contact_solver/row_setup.hpp"
 #include "src/world/body_view.hpp"
 
 #include <cstdint>
@@ -45,6 +45,7 @@ struct StepBodies {
   BodyView bodies;
   MotionPointers motion;  ///< of the same bodies
   SolverBody* solver = nullptr;
+  std::uint8_t* traits = nullptr;      ///< bits of BodyTraits
   Quat* orientation = nullptr;         ///< during the step
   const std::uint8_t* near = nullptr;  ///< 1 if the body has a contact
   Real h = 0;                          ///< [s], length of a substep
@@ -60,7 +61,19 @@ struct StepBodies {
     body.inverse_mass = bodies.inverse_mass[i];
     if (bodies.is_round(i)) body.inverse_inertia = bodies.inverse_inertia[i](0, 0);
     solver[i] = body;
+    traits[i] = traits_of(i, body);
     orientation[i] = bodies.orientation[i];
+  }
+
+  JFPX_HD std::uint8_t traits_of(std::uint32_t i, const SolverBody& body) const {
+    const bool is_movable = bodies.movable(i), is_awake = bodies.awake[i] != 0;
+    std::uint8_t bits = is_movable ? BodyTraits::kMovable : 0;
+    if (is_movable && is_awake) bits |= BodyTraits::kActive;
+    if (is_movable ? body.inverse_inertia > 0 : !is_awake) bits |= BodyTraits::kIsRound;
+    if (bodies.rolling_friction[i] > 0 || bodies.spinning_friction[i] > 0) {
+      bits |= BodyTraits::kRolls;
+    }
+    return bits;
   }
 
   /// Starts a substep: applies accelerations, and, unless it is the first of the step, the contact

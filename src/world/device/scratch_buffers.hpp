@@ -29,6 +29,7 @@ class ScratchBuffers {
     d.near_flag = transfer.room(&near_flag_, n);
     d.step.near = d.near_flag;
     d.step.solver = transfer.room(&solver_, n);
+    d.step.traits = transfer.room(&traits_, n);
     d.step.orientation = transfer.room(&orientation_, n);
     d.motion_cells = transfer.room(&motion_cells_, n);
     d.free_cells = transfer.room(&free_cells_, n);
@@ -79,7 +80,7 @@ class ScratchBuffers {
   Buffer<std::uint32_t> first_candidate_, next_candidate_, first_contact_, uncolored_,
       still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_;
   Buffer<std::uint64_t> manifold_sizes_, used_colors_, first_order_;
-  Buffer<std::uint8_t> pair_found_, row_bins_, marked_, near_flag_;
+  Buffer<std::uint8_t> pair_found_, row_bins_, marked_, near_flag_, traits_;
   Buffer<soft_step::SolverBody> solver_;
   Buffer<Quat> orientation_;
   Buffer<soft_step::SphereRow> sphere_rows_;

@@ -166,7 +166,7 @@ struct StepData {
   JFPX_HD soft_step::RowSetup row_setup() const {
     const BodyView& bodies = step.bodies;
     return {contacts(),
-            {bodies.inverse_inertia, bodies.last_acceleration, bodies.radius, bodies.awake,
+            {bodies.inverse_inertia, bodies.last_acceleration, bodies.radius, step.traits,
              bodies.friction, bodies.restitution, bodies.rolling_friction, bodies.spinning_friction,
              materials},
             step.solver,
