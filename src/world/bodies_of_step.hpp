@@ -16,34 +16,34 @@ struct ListedBody {
   bool sensor = false;
 };
 /// By BodyId::index.
-using RemovedBodies = std::unordered_map<std::uint32_t, ListedBody>;
+using ListedBodies = std::unordered_map<std::uint32_t, ListedBody>;
 
 inline ListedBody listed(const BodyStore& store, std::uint32_t body) {
   return {store.id(body), store.radius(body), store.friction(body), store.restitution(body),
           store.sensor(body)};
 }
 
-/// The bodies that a step had, of which some may have been removed since.
+/// The bodies that a step had, of which some may have changed or been removed since.
 class BodiesOfStep {
  public:
-  /// @param removed the bodies that were removed since the step; null: none
-  explicit BodiesOfStep(const BodyStore& store, const RemovedBodies* removed = nullptr)
-      : store_(store), removed_(removed) {}
+  /// @param changed what the step has of bodies that have changed since; null: none has
+  explicit BodiesOfStep(const BodyStore& store, const ListedBodies* changed = nullptr)
+      : store_(store), changed_(changed) {}
 
   ListedBody operator[](std::uint32_t body) const {
-    const ListedBody* removed = find_removed(body);
-    return removed != nullptr ? *removed : listed(store_, body);
+    const ListedBody* changed = find_changed(body);
+    return changed != nullptr ? *changed : listed(store_, body);
   }
 
  private:
-  const ListedBody* find_removed(std::uint32_t body) const {
-    if (removed_ == nullptr || removed_->empty()) return nullptr;
-    const auto found = removed_->find(body);
-    return found != removed_->end() ? &found->second : nullptr;
+  const ListedBody* find_changed(std::uint32_t body) const {
+    if (changed_ == nullptr || changed_->empty()) return nullptr;
+    const auto found = changed_->find(body);
+    return found != changed_->end() ? &found->second : nullptr;
   }
 
   const BodyStore& store_;
-  const RemovedBodies* removed_;
+  const ListedBodies* changed_;
 };
 
 }  // namespace JFPX_ABI

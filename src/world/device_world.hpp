@@ -18,10 +18,12 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// A change of a body between two steps. The forces, acceleration and damping of the body are
-/// always those of the host.
+/// A change of a body between two steps. The forces and properties of the body are always those of
+/// the host, except mass and inertia.
 struct BodyEdit {
   bool sets_state = false;       ///< position, orientation and velocities are those of the host
+  bool sets_mass = false;        ///< mass and inertia in body axes are those of the host
+  bool sets_pairs = false;       ///< the ignored pairs of the world are those of the host
   bool wakes = false;            ///< wakes the body
   bool wakes_neighbors = false;  ///< wakes the bodies in contact with it in the last step
   bool is_removed = false;       ///< the body that had the index in the last step was removed

@@ -53,14 +53,6 @@ struct World::Impl {
     if (resident) leave_device();
     return store;
   }
-  /// As changed_bodies(), after making the lists of contacts: for changes of ids and materials,
-  /// which the lists show, and for changes that wake neighbors, which then cannot fail after the
-  /// change.
-  BodyStore& changed_bodies_with_contacts() {
-    BodyStore& bodies = changed_bodies();
-    make_contact_lists();
-    return bodies;
-  }
   /// Adds a body, on the device, too, if that has the state of the world.
   BodyId add(const BodyDef& def);
   /// Removes a body, likewise. Wakes the bodies in contact with it.
@@ -68,6 +60,10 @@ struct World::Impl {
   /// The bodies for an edit of one of them. While the world is on a device, the motion of the
   /// others may be older than that on the device, and the next step edits the body there, too.
   BodyStore& edited_body(std::uint32_t body, const BodyEdit& edit);
+  /// The same for a change of what contact lists show, or of a body whose neighbors must wake. On
+  /// the host it makes the lists, so that waking the neighbors cannot fail after the change.
+  BodyStore& edited_body_in_lists(std::uint32_t body, const BodyEdit& edit);
+  void remember_listed(std::uint32_t body);
   /// [m], of the centre of mass
   Vec3 position(std::uint32_t body);
   /// Makes a device that has made a step, so that its kernels are loaded.
@@ -104,7 +100,7 @@ struct World::Impl {
 
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
-    if (resident && contacts.current() == nullptr) {
+    if (resident) {
       edited_body(body.index, {.wakes_neighbors = true});
       return;
     }
@@ -212,8 +208,9 @@ struct World::Impl {
   /// While resident: edits that the device does not have yet, and the bodies whose forces on the
   /// host are those of the next step. The forces of all others are 0 on the host.
   BodyEdits edits;
-  /// While resident: bodies that were removed since the last step, and since the step before it.
-  RemovedBodies removed, removed_before;
+  /// While resident: bodies that contact lists of the last step, and of the step before it, show
+  /// otherwise than they are now.
+  ListedBodies changed, changed_before;
   std::vector<std::uint32_t> forced_bodies;
   /// While resident: whether the arrays of the host are those of the device.
   bool motion_is_current = true, contact_set_is_current = true;

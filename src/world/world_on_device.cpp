@@ -67,6 +67,8 @@ void World::Impl::enter_device() {
   device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
   resident = true;
   edits.clear();
+  changed.clear();
+  changed_before.clear();
   note_forces();
   motion_is_current = contact_set_is_current = true;
 }
@@ -76,10 +78,31 @@ BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
   if (!resident) return store;
   BodyEdit& all = edits[body];
   all.sets_state |= edit.sets_state;
+  all.sets_mass |= edit.sets_mass;
+  all.sets_pairs |= edit.sets_pairs;
   all.wakes |= edit.wakes;
   all.wakes_neighbors |= edit.wakes_neighbors;
   if (edit.wakes_neighbors) motion_is_current = false;
+  if (edit.sets_mass) {  // the device has the orientation, and computes the inertia in world axes
+    motion_is_current = false;
+    force_table.invalidate();
+  }
   return store;
+}
+
+BodyStore& World::Impl::edited_body_in_lists(std::uint32_t body, const BodyEdit& edit) {
+  if (resident) {
+    remember_listed(body);
+  } else {
+    make_contact_lists();
+  }
+  return edited_body(body, edit);
+}
+
+void World::Impl::remember_listed(std::uint32_t body) {
+  const ListedBody shown = listed(store, body);
+  changed_before.try_emplace(body, shown);
+  changed.try_emplace(body, shown);
 }
 
 BodyId World::Impl::add(const BodyDef& def) {
@@ -89,11 +112,10 @@ BodyId World::Impl::add(const BodyDef& def) {
   if (!resident) return store.add(def);
   // Everything that may throw, before the store changes.
   BodyEdits added{{body, {.is_added = true}}};
-  edits.reserve(edits.size() + 1);
+  if (edits.size() + 1 >= edits.bucket_count()) edits.reserve(2 * edits.size() + 16);
   const BodyId id = store.add(def);
-  const auto edit = edits.find(body);
-  edit == edits.end() ? void(edits.insert(added.extract(body)))
-                      : void(edit->second.is_added = true);
+  edits.insert(added.extract(body));  // no effect if the slot of a removed body has an edit
+  edits.find(body)->second.is_added = true;
   force_table.invalidate();
   return id;
 }
@@ -111,9 +133,7 @@ void World::Impl::remove(BodyId id) {
   // Everything that may throw, before the store changes.
   soft_step.reserve(store.capacity());
   BodyEdit& edit = edits[body];
-  const ListedBody shown = listed(store, body);
-  removed_before.try_emplace(body, shown);
-  removed.try_emplace(body, shown);
+  remember_listed(body);
   edit = {.wakes_neighbors = true, .is_removed = true};
   motion_is_current = false;
   store.remove(id);
@@ -159,7 +179,7 @@ void World::Impl::make_list(bool of_step_before, ContactList* list) {
   const ScopedTimer timer(&spent_us);
   DetectedContacts* found = of_step_before ? &detected_before : &detected;
   soft_step::ContactSet fetched;
-  const BodiesOfStep bodies(store, of_step_before ? &removed_before : &removed);
+  const BodiesOfStep bodies(store, of_step_before ? &changed_before : &changed);
   if (resident) device->fetch_contacts(bodies, of_step_before, &fetched, found);
   const soft_step::ContactView set = resident         ? fetched.view()
                                      : of_step_before ? soft_step.contacts_before()
@@ -204,9 +224,6 @@ void World::Impl::fetch_all() {
 
 void World::Impl::leave_device() {
   fetch_all();
-  edits.clear();
-  removed.clear();
-  removed_before.clear();
   resident = false;
 }
 
@@ -272,7 +289,7 @@ bool World::Impl::step_on_device(StepReport* report) {
   forced_bodies.clear();
   std::swap(contacts, contacts_before);
   contacts.invalidate();
-  removed_before = std::exchange(removed, {});
+  changed_before = std::exchange(changed, {});
   soft_step.forget_none();
   motion_is_current = contact_set_is_current = false;
   report->integrate_ms = result.forces_ms;

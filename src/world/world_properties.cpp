@@ -31,7 +31,7 @@ void World::set_mass(BodyId id, Real mass) {
   }
   if (bodies.mass(body) == mass) return;
   if (!bodies.inertia_given(body)) require_valid(find_inertia_fault(bodies.shape(body), mass));
-  impl_->changed_bodies().set_mass(body, mass);
+  impl_->edited_body(body, {.sets_mass = true, .wakes = true}).set_mass(body, mass);
   bodies.wake(body);
 }
 
@@ -41,7 +41,7 @@ void World::set_inertia(BodyId id, const std::optional<Mat3>& inertia) {
   if (inertia) require_valid(find_inertia_fault(*inertia));
   if (!bodies.movable(body)) return;
   if (!inertia) require_valid(find_inertia_fault(bodies.shape(body), bodies.mass(body)));
-  impl_->changed_bodies().set_inertia(body, inertia);
+  impl_->edited_body(body, {.sets_mass = true, .wakes = true}).set_inertia(body, inertia);
   bodies.wake(body);
 }
 
@@ -51,7 +51,7 @@ void World::set_friction(BodyId id, Real friction) {
   const std::uint32_t body = impl_->store.require(id);
   require_valid(find_friction_fault(friction));
   if (impl_->store.friction(body) == friction) return;
-  impl_->changed_bodies_with_contacts().set_friction(body, friction);
+  impl_->edited_body_in_lists(body, {}).set_friction(body, friction);
   impl_->wake_with_neighbors(id);
 }
 
@@ -62,7 +62,7 @@ Real World::restitution(BodyId id) const {
 void World::set_restitution(BodyId id, Real restitution) {
   const std::uint32_t body = impl_->store.require(id);
   require_valid(find_restitution_fault(restitution));
-  impl_->changed_bodies_with_contacts().set_restitution(body, restitution);
+  impl_->edited_body_in_lists(body, {}).set_restitution(body, restitution);
 }
 
 Vec3 World::acceleration(BodyId id) const {
@@ -108,7 +108,7 @@ CollisionFilter World::filter(BodyId id) const {
 void World::set_filter(BodyId id, const CollisionFilter& filter) {
   const std::uint32_t body = impl_->store.require(id);
   if (impl_->store.filter(body) == filter) return;
-  impl_->changed_bodies_with_contacts().set_filter(body, filter);
+  impl_->edited_body_in_lists(body, {}).set_filter(body, filter);
   impl_->wake_with_neighbors(id);
 }
 
@@ -123,7 +123,8 @@ void World::set_pair_ignored(BodyId a, BodyId b, bool ignored) {
                           "); it must be of two different bodies");
   }
   if (impl_->store.pair_ignored(pair) == ignored) return;
-  impl_->changed_bodies_with_contacts().set_pair_ignored(pair, ignored);
+  impl_->edited_body_in_lists(pair.a, {.sets_pairs = true});
+  impl_->edited_body_in_lists(pair.b, {}).set_pair_ignored(pair, ignored);
   impl_->wake_with_neighbors(a);
   impl_->wake_with_neighbors(b);
 }

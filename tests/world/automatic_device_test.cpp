@@ -75,6 +75,13 @@ CostModel device_wins() {
   return costs;
 }
 
+/// A pile that stays awake: steps of a sleeping world are left out, whatever the device.
+Scene small_pile() {
+  Scene scene = scenes::make("pile", {.spheres = 10});
+  scene.sleep.enabled = false;
+  return scene;
+}
+
 World on_host(const Scene& scene) {
   return World(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
 }
@@ -198,7 +205,7 @@ TEST(AutomaticWorld, IsContinuedByTheProcessorInTheStepInWhichTheDeviceFails) {
 }
 
 TEST(AutomaticWorld, DoesNotStartTheDeviceBeforeItPays) {
-  const Scene scene = scenes::make("pile", {.spheres = 10});
+  const Scene scene = small_pile();
   CostModel costs = device_wins();
   costs.cuda_start_ms = 10;
   costs.cpu_world = {.call_us = 1000};
@@ -223,7 +230,7 @@ TEST(AutomaticWorld, DoesNotStartTheDeviceBeforeItPays) {
 }
 
 TEST(AutomaticWorld, StartsTheDeviceOnAnotherThreadWhileTheProcessorGoesOn) {
-  const Scene scene = scenes::make("pile", {.spheres = 10});
+  const Scene scene = small_pile();
   CostModel costs = device_wins();
   costs.cuda_start_ms = 1e-6;
   std::promise<void> may_end;
@@ -254,7 +261,7 @@ TEST(AutomaticWorld, IsDestroyedWhileTheDeviceStarts) {
   costs.cuda_start_ms = 1e-6;
   bool made = false;
   {
-    World world = automatic(scenes::make("pile", {.spheres = 10}), costs, [&made] {
+    World world = automatic(small_pile(), costs, [&made] {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
       made = true;
       return test::make_host_device_world(Scene{});
@@ -265,7 +272,7 @@ TEST(AutomaticWorld, IsDestroyedWhileTheDeviceStarts) {
 }
 
 TEST(AutomaticWorld, StaysOnTheProcessorWithoutADeviceAndSaysWhyOneFailed) {
-  const Scene scene = scenes::make("pile", {.spheres = 10});
+  const Scene scene = small_pile();
   for (const std::string failure : {"", "the device is gone"}) {
     World world = automatic(scene, device_wins(), [failure]() -> std::unique_ptr<DeviceWorld> {
       if (failure.empty()) throw BackendUnavailable("cuda: there is none");

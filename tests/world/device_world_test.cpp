@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <functional>
 #include <optional>
 #include <string>
@@ -99,6 +100,12 @@ Scene random_scene(Random* random) {
   return scene;
 }
 
+/// Number of steps of each random scene: JFPX_TEST_SCENE_STEPS, or a default.
+int scene_steps(int otherwise) {
+  const char* given = std::getenv("JFPX_TEST_SCENE_STEPS");
+  return given != nullptr ? std::atoi(given) : otherwise;
+}
+
 TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
@@ -106,7 +113,7 @@ TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) {
   for (int k = 0; k < 25; ++k) {
     const Scene scene = random_scene(&random);
     World host = on_host(scene), device = on_device(scene);
-    for (int n = 0; n < 40; ++n) {
+    for (int n = 0; n < scene_steps(40); ++n) {
       const StepReport a = host.step(), b = device.step();
       ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "scene " << k << ", step " << n;
       ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k << ", step " << n;
@@ -172,42 +179,61 @@ TEST_P(DeviceWorldTest, ChangesBetweenStepsReachTheDevice) {
   for (int k = 0; k < 6; ++k) {
     const Scene scene = random_scene(&random);
     World host = on_host(scene), device = on_device(scene);
-    for (int n = 0; n < 60; ++n) {
-      const std::uint64_t action = random.below(13);
-      const auto at = [&](const World& world, std::uint64_t i) {
-        return world.bodies()[i % world.bodies().size()];
-      };
-      const std::uint64_t i = random.below(1000);
-      const BodyDef def = test::random_body(&random, 3);
-      const Vec3 force = random.uniform_in_box({-9, -9, -9}, {9, 9, 9});
-      for (World* world : {&host, &device}) {
-        const BodyId id = at(*world, i);
-        if (action == 0) world->add(def);
-        if (action == 1 && world->bodies().size() > 2) world->remove(id);
-        if (action == 2) world->apply_force(id, force);
-        if (action == 3) world->set_friction(id, absolute(force.x));
-        if (action == 4) {
-          BodyState state = world->state(id);
-          state.velocity = force;
-          world->set_state(id, state);
-        }
-        if (action == 5) world->wake(id);
-        if (action == 6) {
-          for (const BodyId other : world->bodies()) world->apply_force_at_point(other, force, {});
-        }
-        if (action == 7) world->set_state(id, {def.position, def.orientation, force, {}});
-        if (action == 8) {
-          world->set_acceleration(id, force);
-          world->set_damping(id, 0.5_r, 0.9_r);
-          world->apply_torque(id, force);
-          world->apply_torque(at(*world, i + 1), force);
+    int uploads = 0;
+    for (int n = 0; n < scene_steps(60); ++n) {
+      for (std::uint64_t changes = 1 + random.below(3); changes > 0; --changes) {
+        const std::uint64_t action = random.below(18);
+        const auto at = [&](const World& world, std::uint64_t i) {
+          return world.bodies()[i % world.bodies().size()];
+        };
+        const std::uint64_t i = random.below(1000);
+        const BodyDef def = test::random_body(&random, 3);
+        const Vec3 force = random.uniform_in_box({-9, -9, -9}, {9, 9, 9});
+        for (World* world : {&host, &device}) {
+          const BodyId id = at(*world, i);
+          if (action == 0) world->add(def);
+          if (action == 1 && world->bodies().size() > 2) world->remove(id);
+          if (action == 2) world->apply_force(id, force);
+          if (action == 3) world->set_friction(id, absolute(force.x));
+          if (action == 4) {
+            BodyState state = world->state(id);
+            state.velocity = force;
+            world->set_state(id, state);
+          }
+          if (action == 5) world->wake(id);
+          if (action == 6) {
+            for (const BodyId other : world->bodies())
+              world->apply_force_at_point(other, force, {});
+          }
+          if (action == 7) world->set_state(id, {def.position, def.orientation, force, {}});
+          if (action == 8) {
+            world->set_acceleration(id, force);
+            world->set_damping(id, 0.5_r, 0.9_r);
+            world->apply_torque(id, force);
+            world->apply_torque(at(*world, i + 1), force);
+          }
+          if (action == 9) world->set_restitution(id, absolute(force.y) / 9);
+          if (action == 10) world->set_filter(id, {.category = 2, .mask = 0xfffffffdu});
+          if (action == 11) {
+            const BodyId other = at(*world, i + 1);
+            if (other != id) world->set_pair_ignored(id, other, !world->pair_ignored(id, other));
+          }
+          if (action == 12 && world->mass(id) > 0) world->set_mass(id, 0.3_r + absolute(force.z));
+          if (action == 13) {
+            world->set_inertia(id, diagonal({3 + 0.1_r * absolute(force.x), 4, 5}));
+          }
         }
       }
+      if (!WorldAccess::impl(device).resident) ++uploads;
       host.step();
       device.step();
       ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k << ", step " << n;
-      ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device)) << "action " << action;
+      if (random.below(2) == 0) continue;
+      ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device)) << "step " << n;
     }
+    // Memory for more bodies grows by half of their number.
+    EXPECT_LE(uploads, 4 + scene_steps(60) / 10);
+    EXPECT_TRUE(host.snapshot() == device.snapshot());
   }
 }
 
@@ -270,7 +296,7 @@ TEST_P(DeviceWorldTest, BodiesComeAndGoOnTheDevice) {
     Scene scene = random_scene(&random);
     World host = on_host(scene), device = on_device(scene);
     int uploads = 0;
-    for (int n = 0; n < 50; ++n) {
+    for (int n = 0; n < scene_steps(50); ++n) {
       const bool shows_events = random.below(2) == 0, asks_between = random.below(3) == 0;
       for (std::uint64_t changes = random.below(6); changes > 0; --changes) {
         const std::uint64_t action = random.below(7), i = random.below(1000);
@@ -304,7 +330,7 @@ TEST_P(DeviceWorldTest, BodiesComeAndGoOnTheDevice) {
       ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device)) << "step " << n;
     }
     // Memory for more bodies grows by half of their number.
-    EXPECT_LE(uploads, 8) << "of 50 steps";
+    EXPECT_LE(uploads, 8 + scene_steps(50) / 10) << "of " << scene_steps(50) << " steps";
     EXPECT_TRUE(host.snapshot() == device.snapshot());
   }
 }
@@ -449,7 +475,7 @@ TEST_P(DeviceWorldTest, RandomForcesHaveTheBitsOfTheProcessor) {
   for (int k = 0; k < 12; ++k) {
     const Scene scene = random_scene(&random);
     World host = on_host(scene), device = on_device(scene);
-    for (int n = 0; n < 60; ++n) {
+    for (int n = 0; n < scene_steps(60); ++n) {
       const std::uint64_t action = random.below(8);
       const std::uint64_t i = random.below(1000);
       const Vec3 vector = random.uniform_in_box({-9, -9, -9}, {9, 9, 9});

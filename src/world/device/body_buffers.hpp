@@ -82,16 +82,15 @@ class BodyBuffers {
             .filter = filter_.data()};
   }
 
-  /// Takes over the numbers and the ignored pairs of the host, after bodies have come or gone.
-  void update_counts(const Transfer<Device>& transfer, const BodyView& from, BodyView* to) {
-    // Pairs are only erased, by the removal of bodies.
-    if (to->ignored_count != from.ignored_count) {
-      to->ignored = transfer.put(&ignored_, from.ignored, from.ignored_count);
-      to->ignored_count = from.ignored_count;
-    }
+  /// Takes over the numbers of the host, after bodies have come or gone or changed.
+  void update_counts(const BodyView& from, BodyView* to) {
     to->filters_in_use = from.filters_in_use;
     to->count = from.count;
     to->capacity = from.capacity;
+  }
+  void update_pairs(const Transfer<Device>& transfer, const BodyView& from, BodyView* to) {
+    to->ignored = transfer.put(&ignored_, from.ignored, from.ignored_count);
+    to->ignored_count = from.ignored_count;
   }
   /// Room for the ids of `count` bodies, which swap_ids() makes the current ones.
   BodyId* other_ids(const Transfer<Device>& transfer, std::size_t count) {

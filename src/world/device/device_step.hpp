@@ -82,16 +82,19 @@ class DeviceStep final : public DeviceWorld {
   void edit(const BodyStore& bodies, const BodyEdits& edits) override {
     const BodyView from = bodies.view_without_ids();
     std::vector<EditedBody> edited;
+    std::vector<EditedMass> masses;
     std::vector<SlotValues> replaced;
     std::vector<std::uint32_t> changed;  // slots whose body has come or gone
     std::vector<BodyId> added;
-    bool visits_contacts = false;
+    edited.reserve(edits.size());
+    bool visits_contacts = false, sets_pairs = false;
     for (const auto& [i, edit] : edits) {
       visits_contacts |= edit.wakes_neighbors || edit.is_removed;
+      sets_pairs |= edit.sets_pairs || edit.is_removed;
       edited.push_back({i, edit.sets_state, edit.wakes, edit.wakes_neighbors, edit.is_removed,
                         bodies.state(i), from.inverse_inertia[i], from.force[i], from.torque[i],
-                        from.acceleration[i], from.velocity_kept[i],
-                        from.angular_velocity_kept[i]});
+                        from.acceleration[i], from.velocity_kept[i], from.angular_velocity_kept[i],
+                        from.friction[i], from.restitution[i], from.filter[i]});
       if (edit.is_added || edit.is_removed) {
         changed.push_back(i);
         if (edit.is_added) added.push_back(bodies.id(i));
@@ -99,14 +102,18 @@ class DeviceStep final : public DeviceWorld {
         replaced.back().has_no_contacts = true;
       } else if (edit.sets_state && !bodies.movable(i)) {  // its velocities say if it is awake
         replaced.push_back(slot_values(bodies, from, i));
+      } else if (edit.sets_mass) {
+        masses.push_back({i, from.inverse_mass[i], from.body_inverse_inertia[i], from.tensor[i]});
       }
     }
-    bodies_.update_counts(transfer_, from, &data_.step.bodies);
+    bodies_.update_counts(from, &data_.step.bodies);
+    if (sets_pairs) bodies_.update_pairs(transfer_, from, &data_.step.bodies);
     const Contacts& last = last_contacts();
     data_.last = last.view();
     device_->run(
         EditProgram{data_, bodies_.properties(), transfer_.put(&edits_, edited),
-                    static_cast<std::uint32_t>(edited.size()), transfer_.put(&replaced_, replaced),
+                    static_cast<std::uint32_t>(edited.size()), transfer_.put(&masses_, masses),
+                    static_cast<std::uint32_t>(masses.size()), transfer_.put(&replaced_, replaced),
                     static_cast<std::uint32_t>(replaced.size()), visits_contacts, last.touches(),
                     last.touch_count()},
         visits_contacts ? std::max(last.sphere_count(), edited.size()) : edited.size());
@@ -323,6 +330,7 @@ class DeviceStep final : public DeviceWorld {
   std::uint32_t id_count_ = 0;  ///< number of sorted ids on the device
   // Of edit().
   Buffer<EditedBody> edits_;
+  Buffer<EditedMass> masses_;
   Buffer<SlotValues> replaced_;
   Buffer<std::uint32_t> changed_;
   Buffer<BodyId> added_ids_;

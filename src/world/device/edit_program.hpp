@@ -18,6 +18,15 @@ struct EditedBody {
   Mat3 inverse_inertia;
   Vec3 force, torque, acceleration;
   Real velocity_kept = 1, angular_velocity_kept = 1;
+  Real friction = 0, restitution = 0;
+  CollisionFilter filter;
+};
+
+/// Mass and inertia of a body whose BodyEdit::sets_mass is set.
+struct EditedMass {
+  std::uint32_t body = 0;
+  Real inverse_mass = 0;
+  Mat3 body_inverse_inertia, tensor;
 };
 
 /// Wakes the bodies in contact with some of the edited bodies, forgets the contacts of removed
@@ -28,6 +37,8 @@ struct EditProgram {
   PropertyPointers properties;
   const EditedBody* edits = nullptr;
   std::uint32_t count = 0;
+  const EditedMass* masses = nullptr;
+  std::uint32_t mass_count = 0;
   const SlotValues* replaced = nullptr;
   std::uint32_t replaced_count = 0;
   bool visits_contacts = false;         ///< whether an edit wakes neighbors or removes a body
@@ -38,6 +49,7 @@ struct EditProgram {
   JFPX_HD void operator()(const Team& team) const {
     if (visits_contacts) visit_contacts(team);
     team.for_each(count, [&](std::uint32_t k) { edit(edits[k]); });
+    team.for_each(mass_count, [&](std::uint32_t k) { edit_mass(masses[k]); });
     team.for_each(replaced_count, [&](std::uint32_t k) { replace(replaced[k]); });
   }
 
@@ -93,7 +105,17 @@ struct EditProgram {
     properties.acceleration[i] = e.acceleration;
     properties.velocity_kept[i] = e.velocity_kept;
     properties.angular_velocity_kept[i] = e.angular_velocity_kept;
+    properties.friction[i] = e.friction;
+    properties.restitution[i] = e.restitution;
+    properties.filter[i] = e.filter;
     if (e.wakes && data.step.bodies.movable(i)) motion.wake(data.step.bodies, i);
+  }
+
+  JFPX_HD void edit_mass(const EditedMass& mass) const {
+    properties.inverse_mass[mass.body] = mass.inverse_mass;
+    properties.body_inverse_inertia[mass.body] = mass.body_inverse_inertia;
+    properties.tensor[mass.body] = mass.tensor;
+    data.step.motion.refresh_inertia(data.step.bodies, mass.body);
   }
 
   JFPX_HD void replace(const SlotValues& values) const {
