@@ -1,4 +1,4 @@
-/// Scenes of spheres: pile, heap, gas, columns, overlap, lattice and polydisperse.
+/// Scenes of spheres: pile, heap, dam-break, gas, columns, overlap, lattice and polydisperse.
 #include "src/scenes/makers.hpp"
 
 namespace jfpx {
@@ -14,8 +14,9 @@ Vec3 jitter(Random& random, Real amount) {
 
 /// A lattice of spheres above the floor of an open box.
 /// @param sphere(site) the sphere at a site of the lattice
+/// @param length of the box along x, in widths of the lattice
 template <class Sphere>
-Scene in_open_box(const char* name, std::uint32_t count, const Sphere& sphere) {
+Scene in_open_box(const char* name, std::uint32_t count, const Sphere& sphere, Real length = 1) {
   constexpr Real kSpacing = Real(1.1), kGap = Real(0.6);
   Scene scene;
   scene.name = name;
@@ -24,8 +25,18 @@ Scene in_open_box(const char* name, std::uint32_t count, const Sphere& sphere) {
     scene.bodies.push_back(sphere(lattice_site(i, side) * kSpacing + Vec3{0, Real(0.6), 0}));
   }
   const Real width = static_cast<Real>(side - 1) * kSpacing;
-  add_container(scene, {-kGap, 0, -kGap}, {width + kGap, 2 * width + 2, width + kGap}, false, {});
+  add_container(scene, {-kGap, 0, -kGap}, {width * length + kGap, 2 * width + 2, width + kGap},
+                false, {});
   return scene;
+}
+
+BodyDef ball_of_a_heap(Random* random, const Vec3& site) {
+  const Real scale = random->uniform(Real(0.9), 1);
+  BodyDef body =
+      sphere_at(site + jitter(*random, Real(0.04)), kRadius * scale, scale * scale * scale);
+  // For the resistance to rolling: without any, some spheres roll in their hollows without end.
+  body.angular_damping = Real(0.5);
+  return body;
 }
 
 }  // namespace
@@ -39,14 +50,15 @@ Scene make_pile(const Counts& counts) {
 
 Scene make_heap(const Counts& counts) {
   Random random(counts.seed);
-  return in_open_box("heap", counts.spheres, [&random](const Vec3& site) {
-    const Real scale = random.uniform(Real(0.9), 1);
-    BodyDef body =
-        sphere_at(site + jitter(random, Real(0.04)), kRadius * scale, scale * scale * scale);
-    // For the resistance to rolling: without any, some spheres roll in their hollows without end.
-    body.angular_damping = Real(0.5);
-    return body;
-  });
+  return in_open_box("heap", counts.spheres,
+                     [&random](const Vec3& site) { return ball_of_a_heap(&random, site); });
+}
+
+Scene make_dam_break(const Counts& counts) {
+  Random random(counts.seed);
+  return in_open_box(
+      "dam-break", counts.spheres,
+      [&random](const Vec3& site) { return ball_of_a_heap(&random, site); }, 4);
 }
 
 Scene make_gas(const Counts& counts) {

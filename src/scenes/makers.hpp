@@ -15,6 +15,7 @@ Scene make_big_ballistic(const Counts& counts);
 Scene make_mixed(const Counts& counts);
 Scene make_pile(const Counts& counts);
 Scene make_heap(const Counts& counts);
+Scene make_dam_break(const Counts& counts);
 Scene make_gas(const Counts& counts);
 Scene make_columns(const Counts& counts);
 Scene make_overlap(const Counts& counts);

@@ -24,6 +24,8 @@ constexpr Entry kScenes[] = {
      Boxes::none, make_pile},
     {"heap", "spheres of radius 0.45 to 0.5 m fall into an open box, come to rest and sleep", 4096,
      Boxes::none, make_heap},
+    {"dam-break", "a cube of spheres collapses and flows along a basin", 4096, Boxes::none,
+     make_dam_break},
     {"gas", "fast spheres without gravity in a closed box, volume fraction 0.30", 4096, Boxes::none,
      make_gas},
     {"columns", "stacks of 32 spheres that initially overlap by a quarter of a diameter", 1024,
