@@ -87,6 +87,13 @@ struct World::Impl {
   void make_list(bool of_step_before, ContactList* list);
   /// Fetches everything, so that the host has the state of the world.
   void leave_device();
+  /// The host has the state of the world, and the device no longer.
+  void forget_device() noexcept {
+    resident = false;
+    edits.clear();
+    changed.clear();
+    changed_before.clear();
+  }
   /// As leave_device(), but the device keeps the state, too. Const functions may call it
   /// concurrently.
   void fetch_all();

@@ -66,9 +66,6 @@ void World::Impl::enter_device() {
   force_table.invalidate();
   device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
   resident = true;
-  edits.clear();
-  changed.clear();
-  changed_before.clear();
   note_forces();
   motion_is_current = contact_set_is_current = true;
 }
@@ -224,7 +221,7 @@ void World::Impl::fetch_all() {
 
 void World::Impl::leave_device() {
   fetch_all();
-  resident = false;
+  forget_device();
 }
 
 /// One step on the device. If it fails, the CPU continues: the state is fetched, and later steps do

@@ -358,6 +358,23 @@ TEST_P(DeviceWorldTest, ABodyInTheSlotOfARemovedOneStartsWithoutContacts) {
   EXPECT_TRUE(host.snapshot() == device.snapshot());
 }
 
+/// The contacts of a removed sensor wake nobody when another body has its slot.
+TEST_P(DeviceWorldTest, ABodyInTheSlotOfASensorDoesNotWakeWhatTheSensorTouched) {
+  Scene scene;
+  scene.bodies = {test::ground(), test::heavy({0, 1, 0}), test::ball({0, 1.5_r, 0})};
+  scene.bodies[2].sensor = true;
+  World host = on_host(scene), device = on_device(scene);
+  for (int n = 0; n < 20; ++n) host.step(), device.step();
+  for (World* world : {&host, &device}) {
+    world->remove(world->body_at(2));
+    EXPECT_TRUE(world->awake(world->body_at(1)));  // a query, which makes the device edit
+    const BodyId body = world->add(test::ball({9, 9, 9}));
+    EXPECT_EQ(body.index, 2u);
+    world->set_state(body, {{9, 8, 9}, {}, {}, {}});
+  }
+  EXPECT_TRUE(host.snapshot() == device.snapshot());
+}
+
 /// Steps of a world that sleeps are left out, on the processor and on a device. They would have
 /// changed nothing.
 TEST_P(DeviceWorldTest, StepsOfASleepingWorldAreLeftOut) {

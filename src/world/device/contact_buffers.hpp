@@ -76,7 +76,7 @@ class ContactBuffers {
   }
   std::size_t sphere_count() const { return counts_[0]; }
   std::size_t manifold_count() const { return counts_[1]; }
-  const Touch* touches() const { return touches_.data(); }
+  Touch* touches() const { return touches_.data(); }
   std::uint32_t touch_count() const { return touch_count_; }
 
   void fetch(const Transfer<Device>& transfer, soft_step::ContactSet* to) const {

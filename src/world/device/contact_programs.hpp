@@ -186,7 +186,8 @@ struct ShapeProgram {
       if (first + k >= d.capacity.touches) return;
       d.touches[first + k] = {pair,
                               k,
-                              of_spheres ? 1u : 0u,
+                              static_cast<std::uint16_t>(of_spheres ? 1 : 0),
+                              0,
                               near.normal,
                               near.touches[k].point,
                               near.touches[k].distance};

@@ -41,8 +41,8 @@ struct EditProgram {
   std::uint32_t mass_count = 0;
   const SlotValues* replaced = nullptr;
   std::uint32_t replaced_count = 0;
-  bool visits_contacts = false;         ///< whether an edit wakes neighbors or removes a body
-  const Touch* last_touches = nullptr;  ///< of the last step
+  bool visits_contacts = false;   ///< whether an edit wakes neighbors or removes a body
+  Touch* last_touches = nullptr;  ///< of the last step
   std::uint32_t last_touch_count = 0;
 
   template <class Team>
@@ -56,8 +56,8 @@ struct EditProgram {
  private:
   static constexpr std::uint8_t kWakesNeighbors = 1, kIsRemoved = 2;
 
-  /// Wakes neighbors, and takes the color of the contacts of removed bodies: MatchProgram does not
-  /// match a contact without color.
+  /// Wakes neighbors, and marks the contacts of removed bodies, because new bodies may have their
+  /// slots: MatchProgram does not match a contact without color.
   template <class Team>
   JFPX_HD void visit_contacts(const Team& team) const {
     const StepData& d = data;
@@ -86,8 +86,13 @@ struct EditProgram {
       if (touched || soft_step::count_met(contacts, i) > 0) wake(key.a, key.b);
       if ((marks & kIsRemoved) != 0) contacts.colors[i] = soft_step::kNoColor;
     });
-    team.for_each(last_touch_count,
-                  [&](std::uint32_t i) { wake(last_touches[i].pair.a, last_touches[i].pair.b); });
+    team.for_each(last_touch_count, [&](std::uint32_t i) {
+      Touch& touch = last_touches[i];
+      const auto marks = d.marked[touch.pair.a] | d.marked[touch.pair.b];
+      if (marks == 0 || touch.is_of_removed_body != 0) return;
+      wake(touch.pair.a, touch.pair.b);
+      if ((marks & kIsRemoved) != 0) touch.is_of_removed_body = 1;
+    });
   }
 
   JFPX_HD void edit(const EditedBody& e) const {

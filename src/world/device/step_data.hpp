@@ -70,8 +70,9 @@ struct NormalDistance {
 /// are bodies and no sensors are not in the list: they are in the contact set.
 struct Touch {
   Candidate pair;
-  std::uint32_t number = 0;      ///< of the point in its pair
-  std::uint32_t of_spheres = 0;  ///< 1: both sub-shapes are spheres
+  std::uint32_t number = 0;              ///< of the point in its pair
+  std::uint16_t of_spheres = 0;          ///< 1: both sub-shapes are spheres
+  std::uint16_t is_of_removed_body = 0;  ///< 1: a body was removed after the step
   Vec3 normal, point;
   Real distance = 0;
 };
