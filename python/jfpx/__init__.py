@@ -1,7 +1,7 @@
 """jfpx: contacts among spheres and rigid-body worlds, with the same bits on CPU and GPU.
 
 docs/python.md in the repository is the guide. Units are SI; vectors are (x, y, z), and quaternions
-(w, x, y, z).
+(w, x, y, z). All exceptions of the package derive from jfpx.Error.
 """
 
 from ._collider import (ContactRows, Contacts, PeriodicContactRows, PeriodicContacts, PeriodicPairs,

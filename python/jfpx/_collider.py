@@ -13,7 +13,8 @@ from ._errors import ConcurrentUse, InvalidArgument
 
 
 class Contacts(NamedTuple):
-    """Touching pairs of spheres, sorted by (pairs[0], pairs[1])."""
+    """Touching pairs of spheres, sorted by (pairs[0], pairs[1]). Floating-point arrays have the
+    type of the positions, indices that of `index_dtype`."""
 
     pairs: Any
     """(2, E): indices a and b of the two spheres."""
@@ -24,7 +25,8 @@ class Contacts(NamedTuple):
 
 
 class ContactRows(NamedTuple):
-    """Touching pairs of spheres as compressed rows (CSR): row i has the contacts with a = i."""
+    """Touching pairs of spheres as compressed rows (CSR): row i has the contacts with a = i. Types
+    are those of Contacts."""
 
     offsets: Any
     """(N + 1,) int64: row i is columns[offsets[i]:offsets[i + 1]]."""
@@ -37,7 +39,7 @@ class ContactRows(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Pairs as compressed rows (CSR)."""
+    """Pairs as compressed rows (CSR): row i has the pairs with a = i."""
 
     offsets: Any
     """(N + 1,) int64: row i is columns[offsets[i]:offsets[i + 1]]."""
@@ -46,7 +48,8 @@ class Rows(NamedTuple):
 
 
 class PeriodicContacts(NamedTuple):
-    """Touching pairs of spheres and images of spheres, sorted by (pairs[0], pairs[1])."""
+    """Touching pairs of spheres and images of spheres, sorted by (pairs[0], pairs[1]). Types are
+    those of Contacts."""
 
     pairs: Any
     """(2, E): indices a and b."""
@@ -62,14 +65,19 @@ class PeriodicContactRows(NamedTuple):
     """The same as compressed rows (CSR)."""
 
     offsets: Any
+    """(N + 1,) int64: row i is columns[offsets[i]:offsets[i + 1]]."""
     columns: Any
+    """(E,): indices b, ascending in each row."""
     normal: Any
+    """(E, 3) [-]: unit vectors from the image of b to a."""
     distance: Any
+    """(E,) [m], <= 0: negative penetration depths."""
     shifts: Any
+    """(E, 3) int32: the image of b is at positions[b] + shifts * lengths."""
 
 
 class PeriodicPairs(NamedTuple):
-    """Pairs of points and images of points."""
+    """Pairs of points and images of points, sorted by (pairs[0], pairs[1])."""
 
     pairs: Any
     """(2, E): indices a and b."""
@@ -81,8 +89,11 @@ class PeriodicRows(NamedTuple):
     """The same as compressed rows (CSR)."""
 
     offsets: Any
+    """(N + 1,) int64: row i is columns[offsets[i]:offsets[i + 1]]."""
     columns: Any
+    """(E,): indices b, ascending in each row."""
     shifts: Any
+    """(E, 3) int32: the image of b is at positions[b] + shifts * lengths."""
 
 
 _INDEX_TYPES = ("int32", "int64")
@@ -94,16 +105,22 @@ class SphereCollider:
     Results do not depend on backend, algorithm or number of threads, to the last bit. One thread
     may use an object at a time; different objects are independent.
 
+    The options but `dtype` are for arrays in host memory. Arrays on a device are searched there,
+    with an algorithm that is selected for each search; backend="cpu" refuses them.
+
     Parameters
     ----------
     dtype : "float32" or "float64"
         Type of positions, radii, normals and distances.
     backend : "auto", "cpu" or "cuda"
-        "auto" selects the fastest, by a cost model and by measured times.
+        Device that searches arrays in host memory. "cuda" copies them to the GPU and back. "auto"
+        selects the fastest, by a cost model and by measured times.
     algorithm : "automatic", "all_pairs" or "sorted_tiles"
+        All pairs are tested, or those of neighboring cells of a grid. "automatic" selects the
+        fastest.
     threads : int in [0, 256]
         Number of threads of the CPU; 0: one per core.
-    device : int
+    device : int in [0, 2^31 - 1]
         Ordinal of the GPU.
 
     Raises
@@ -112,6 +129,8 @@ class SphereCollider:
         The backend was requested by name and cannot be used.
     InvalidArgument
         An option is out of its range.
+    DeviceError
+        With backend="cuda": a call of CUDA failed.
     """
 
     def __init__(self, dtype: Any = "float32", *, backend: str = "auto",
@@ -127,21 +146,29 @@ class SphereCollider:
 
     @property
     def dtype(self) -> np.dtype:
+        """float32 or float64: type of positions, radii, normals and distances."""
         return self._dtype
 
     @property
     def backend(self) -> str:
-        """Backend of the last call."""
+        """"cpu" or "cuda": backend of the last search of arrays in host memory. Before the first
+        one, that of the options, or "cpu" for "auto". A search of arrays on a device uses that
+        device, and does not change this property."""
         return self._collider.backend
 
     @property
     def algorithm(self) -> str:
-        """Algorithm of the last call."""
+        """"all pairs" or "sorted tiles": algorithm of the last search of arrays in host memory;
+        "automatic" before the first one. A search of arrays on a device selects its algorithm
+        there, and does not change this property."""
         return self._collider.algorithm
 
     @property
     def reason(self) -> str:
-        """Reason for the backend and algorithm of the last call."""
+        """Reason for `backend` and `algorithm`, also for arrays in host memory alone: "fixed" (by
+        the options, or the only usable choice), "predicted" or "measured" (to be the fastest),
+        "kept" (another may be faster, but not by enough), "trial" (for a few calls, to measure the
+        time) or "device failed" (the CPU has replaced the GPU)."""
         return self._collider.reason
 
     def find_contacts(self, positions: Any, radii: Any, *, batch: Any = None,
@@ -154,7 +181,8 @@ class SphereCollider:
         ----------
         out : Contacts, or PeriodicContacts with `periodic`, optional
             Arrays to write to, pairs (2, C), normal (C, 3), distance (C,), shifts (C, 3) with
-            C >= E. Requires output="coo".
+            C >= E. Indices are int32 or int64, shifts int32, the others of `dtype`. In host memory,
+            or on the device of the positions with contiguous rows. Requires output="coo".
         count : array (2,) of int64 on the device, optional
             With `out`, for arrays on a device: receives E, and 1 if the contacts were written.
             The call neither allocates nor waits, so that it can be captured in a CUDA graph. If E
@@ -164,7 +192,7 @@ class SphereCollider:
 
         Returns
         -------
-        Contacts or ContactRows, or int, or None
+        Contacts, ContactRows, PeriodicContacts or PeriodicContactRows, or int, or None
             With `out`, the number E of contacts; with `count`, None.
 
         Raises
@@ -172,7 +200,12 @@ class SphereCollider:
         ConcurrentUse
             Another thread uses the collider.
         InvalidArgument
-            As jfpx.find_contacts(), or `out` is too small; the message has the number of contacts.
+            As jfpx.find_contacts(); the type of the positions is not `dtype`; `out` is too small,
+            and the message has the number of contacts; with `count`, more spheres than reserve()
+            has allowed.
+        OutOfMemory, DeviceError, BackendUnavailable
+            As jfpx.find_contacts(); with backend="cuda", DeviceError also for arrays in host
+            memory. The collider stays usable.
         """
         if _device.is_on_device(positions):
             search = _device_search(self._dtype, positions, None, radii, None, None, batch,
@@ -192,15 +225,21 @@ class SphereCollider:
         Parameters
         ----------
         out : array, or PeriodicPairs with `periodic`, optional
-            Array of shape (2, C) to write to, with C >= E, and shifts (C, 3). Requires
-            output="coo".
+            Array of shape (2, C) of int32 or int64 to write to, with C >= E, and shifts (C, 3) of
+            int32. Requires output="coo".
         count : array (2,) of int64 on the device, optional
             As for find_contacts().
 
         Returns
         -------
-        array of shape (2, E) or Rows, or int, or None
+        array of shape (2, E) or Rows, or PeriodicPairs or PeriodicRows with `periodic`, or int, or
+        None
             With `out`, the number E of pairs; with `count`, None.
+
+        Raises
+        ------
+        ConcurrentUse, InvalidArgument, OutOfMemory, DeviceError, BackendUnavailable
+            As find_contacts().
         """
         if _device.is_on_device(positions):
             search = _device_search(self._dtype, positions, cutoff, radii, query, query_radii,
@@ -213,14 +252,24 @@ class SphereCollider:
 
     def reserve(self, like: Any, spheres: int, contacts: int) -> None:
         """Reserves memory for searches with `count`, on the device and the current stream of
-        `like`. Raises OutOfMemory.
+        `like`.
 
         Parameters
         ----------
-        like : array (N, 3) on a device
+        like : array (N, 3) of `dtype` on a device
             Positions.
-        spheres, contacts : int
-            The most of both.
+        spheres : int in [0, 2^31]
+        contacts : int in [0, 2^48]
+            The most of both in a search.
+
+        Raises
+        ------
+        InvalidArgument
+            A number is out of its range, or `like` has a wrong shape or type.
+        OutOfMemory, DeviceError
+            Earlier reservations remain.
+        BackendUnavailable
+            The package has no CUDA, or the device cannot be used.
         """
         search = _device.DeviceSearch(like, None, self._dtype)
         search.collider(self._on_devices).reserve(
@@ -491,7 +540,7 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
 
     Parameters
     ----------
-    positions : array (N, 3) of float32 or float64
+    positions : array (N, 3) of float32 or float64, N < 2^32, on a device N <= 2^31
         Centres [m], finite. NumPy, any array with DLPack, or nested lists. Any strides. Arrays of
         PyTorch and CuPy on a CUDA device, and those that share with them, are searched there in
         the order of the current stream.
@@ -504,8 +553,9 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
     periodic : three lengths, optional
         [m], of an orthogonal cell that repeats; None along an axis that does not. Each length is
         at least twice the largest sum of two radii. The nearest image of a sphere counts, and its
-        shift is returned. Positions may be outside of the cell. With `batch`, the cell is that of each
-        system, or there is a row of three lengths for each.
+        shift is returned. Positions may be outside of the cell, less than 2^20 lengths from
+        the origin. With `batch`, the cell is that of each system, or there is a row of three
+        lengths for each.
     device : "cpu", "cuda" or "cuda:N", optional
         Must be the device of the arrays, which is the default.
     output : "coo" or "csr"
@@ -513,7 +563,7 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
     half : bool
         True: each pair once, with a < b. False: also (b, a), with the opposite normal.
     index_dtype : "int32" or "int64"
-        Type of the indices.
+        Type of the indices; int64 is necessary for more than 2^31 spheres.
     threads : int in [0, 256]
         Number of threads of the CPU; 0: one per core. Has no effect on the result.
 
@@ -525,8 +575,13 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
     Raises
     ------
     InvalidArgument
-        A wrong shape, type or device; a value that is not finite; a radius that is not > 0.
+        A wrong shape, type or device; a value that is not finite; a radius that is not > 0; an
+        option out of its range; offsets that do not ascend from 0 to N; a bad length of a cell.
     OutOfMemory
+        In host memory, or in that of the device.
+    DeviceError, BackendUnavailable
+        For arrays on a device: a call of CUDA failed, or the package has no CUDA, or the device
+        cannot be used.
     """
     if _device.is_on_device(positions):
         search = _device_search(None, positions, None, radii, None, None, batch, periodic, device)
@@ -550,14 +605,15 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
     positions : array (N, 3) of float32 or float64
         Points [m], finite.
     cutoff : number
-        [m], > 0: pairs at this distance or closer, as the type of `positions` computes it.
+        [m], finite and > 0: pairs at this distance or closer, as the type of `positions` computes
+        it.
     radii : number or array (N,)
-        Instead of `cutoff`, as in find_contacts().
-    query : array (M, 3), optional
+        [m], instead of `cutoff`, as in find_contacts().
+    query : array (M, 3) of the type of `positions`, optional
         Finds pairs of a point of `query` and a point of `positions`, and no others: pairs[0] are
         indices of `query`, pairs[1] of `positions`. `half` has no effect.
     query_radii : number or array (M,)
-        With `radii`: those of `query`.
+        [m], with `radii` and `query`: those of `query`.
     batch, periodic, device, output, half, index_dtype, threads
         As in find_contacts(). `batch` and `query` exclude each other.
 
@@ -568,8 +624,9 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
 
     Raises
     ------
-    InvalidArgument, OutOfMemory
-        As find_contacts().
+    InvalidArgument, OutOfMemory, DeviceError, BackendUnavailable
+        As find_contacts(). InvalidArgument also for arguments that exclude each other, or that
+        require another.
     """
     if _device.is_on_device(positions):
         search = _device_search(None, positions, cutoff, radii, query, query_radii, batch,
@@ -582,6 +639,14 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
 
 
 def available_backends() -> list[dict[str, Any]]:
-    """Status of "cpu" and "cuda": whether compiled and usable, the device, and the reason if it is
-    unusable. Starts CUDA where there is a GPU."""
+    """Status of "cpu" and "cuda", in this order. Starts CUDA where there is a GPU. A device that is
+    missing raises nothing.
+
+    Returns
+    -------
+    list of dict
+        "backend", its name; "compiled", whether the package has it; "usable", whether it can be
+        used now; "device", the name of the processor or GPU, empty if unknown; "reason", why it is
+        unusable, otherwise empty.
+    """
     return _core.f32.available_backends()

@@ -15,11 +15,14 @@ class BodyId(NamedTuple):
     """Identifies a body of one World for the lifetime of the body. Never reused."""
 
     index: int
+    """In [0, 2^32 - 1]; that of a removed body may be given to a later one."""
     generation: int
+    """In [0, 2^32 - 1]; differs for bodies with the same index."""
 
 
 class States(NamedTuple):
-    """States of all bodies, in the order of World.bodies."""
+    """States of all bodies, in the order of World.bodies. The arrays are of the dtype of the
+    world."""
 
     positions: Any
     """(N, 3) [m]."""
@@ -32,15 +35,16 @@ class States(NamedTuple):
 
     @classmethod
     def empty(cls, size: int, dtype: Any) -> States:
+        """New arrays of NumPy with `size` rows, whose values are undefined."""
         return cls(np.empty((size, 3), dtype), np.empty((size, 4), dtype),
                    np.empty((size, 3), dtype), np.empty((size, 3), dtype))
 
 
 class BodyState(NamedTuple):
-    """State of motion of a body."""
+    """State of motion of a body. World.set_state() has the ranges."""
 
     position: tuple[float, ...]
-    """[m]."""
+    """[m], centre of mass."""
     orientation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
     """[-]: unit quaternion (w, x, y, z)."""
     velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
@@ -55,7 +59,8 @@ Vector = Sequence[float]
 @dataclass(frozen=True)
 class Gravity:
     """Force mass * acceleration [m/s^2] on one body or on all, in addition to their own
-    acceleration, which is gravity by default."""
+    acceleration, which is gravity by default; acceleration finite. World.add_force() checks the
+    fields of all forces, and raises InvalidArgument."""
 
     acceleration: Vector = (0.0, -9.81, 0.0)
     body: BodyId | None = None
@@ -66,8 +71,8 @@ class Gravity:
 
 @dataclass(frozen=True)
 class Drag:
-    """Drag -(linear + quadratic * |u|) * u, where u is the velocity relative to the wind [m/s];
-    linear [kg/s] >= 0, quadratic [kg/m] >= 0."""
+    """Drag -(linear + quadratic * |u|) * u on one body or on all, where u is the velocity relative
+    to the wind [m/s]; linear [kg/s] >= 0, quadratic [kg/m] >= 0, all finite."""
 
     linear: float = 0.0
     quadratic: float = 0.0
@@ -81,7 +86,8 @@ class Drag:
 
 @dataclass(frozen=True)
 class Attachment:
-    """Attachment point of a spring: a point [m] in the axes of a body, or of the world."""
+    """Attachment point of a spring: a point [m], finite, in the axes of a body from its centre of
+    mass, or without a body in those of the world."""
 
     body: BodyId | None = None
     point: Vector = (0.0, 0.0, 0.0)
@@ -92,8 +98,8 @@ class Attachment:
 
 @dataclass(frozen=True)
 class Spring:
-    """Spring between two attachments; stiffness [N/m] >= 0, damping [N s/m] >= 0, rest_length [m]
-    >= 0."""
+    """Spring between two attachments, at least one of which has a body, and not both the same one;
+    stiffness [N/m] >= 0, damping [N s/m] >= 0, rest_length [m] >= 0, all finite."""
 
     a: Attachment
     b: Attachment
@@ -108,7 +114,7 @@ class Spring:
 
 @dataclass(frozen=True)
 class Bungee(Spring):
-    """A spring without force while it is shorter than its rest length."""
+    """A spring without force while it is shorter than its rest length. Fields as in Spring."""
 
     def _add(self, core: Any) -> int:
         return core.add_bungee(self.a._pair(), self.b._pair(), float(self.stiffness),
@@ -117,8 +123,9 @@ class Bungee(Spring):
 
 @dataclass(frozen=True)
 class Buoyancy:
-    """Buoyancy in the liquid dot(normal, p) <= offset; density [kg/m^3] >= 0, gravity [m/s^2]
-    >= 0."""
+    """Buoyancy of one body or of all in the liquid dot(normal, p) <= offset; normal [-] of unit
+    length to a thousandth of its square, offset [m] finite, density [kg/m^3] >= 0 and gravity
+    [m/s^2] >= 0, finite."""
 
     normal: Vector = (0.0, 1.0, 0.0)
     offset: float = 0.0
@@ -135,7 +142,7 @@ class Buoyancy:
 class Explosion:
     """Pressure wave: a spherical shell that expands from `centre` [m] at `start` [s] of the time
     of the world with `speed` [m/s] > 0, and fades in `duration` [s] > 0; `peak_force` [N] >= 0 in
-    the middle of its `thickness` [m] > 0."""
+    the middle of its `thickness` [m] > 0. All finite."""
 
     centre: Vector = (0.0, 0.0, 0.0)
     start: float = 0.0
@@ -152,7 +159,9 @@ class Explosion:
 
 class ForceContext:
     """The world at the start of a step, for a force that is a function of Python. Valid during the
-    call. Contributions affect awake bodies only."""
+    call: afterwards, every use raises InvalidArgument. Contributions affect awake bodies only. They
+    are not checked: a value that is not finite undoes the step, and sets StepReport.non_finite. A
+    body is unknown if its id is not of a living body of the world."""
 
     def __init__(self, core: Any, dtype: Any) -> None:
         self._core = core
@@ -160,12 +169,12 @@ class ForceContext:
 
     @property
     def dt(self) -> float:
-        """[s], length of the step."""
+        """[s], > 0: length of the step."""
         return self._core.dt
 
     @property
     def time(self) -> float:
-        """[s], start of the step; 0 in the first."""
+        """[s], >= 0: start of the step; 0 in the first."""
         return self._core.time
 
     @property
@@ -174,40 +183,45 @@ class ForceContext:
         return [BodyId(*body) for body in self._core.bodies()]
 
     def states(self) -> States:
-        """States of all bodies, in the order of `bodies`."""
+        """States of all bodies as new arrays (N, 3) and (N, 4) of the dtype of the world, in the
+        order of `bodies`."""
         states = States.empty(self._core.size(), self._dtype)
         self._core.write_states(*states)
         return states
 
     def state(self, body: BodyId) -> BodyState:
+        """State of a body. Raises InvalidArgument for an unknown body."""
         return BodyState(*self._core.state(body))
 
     def mass(self, body: BodyId) -> float:
-        """[kg]; 0: immovable or kinematic."""
+        """[kg], >= 0; 0: immovable or kinematic. Raises InvalidArgument for an unknown body."""
         return self._core.mass(body)
 
     def awake(self, body: BodyId) -> bool:
+        """Whether a body is awake. Raises InvalidArgument for an unknown body."""
         return self._core.awake(body)
 
     def wake(self, body: BodyId) -> None:
-        """Wakes a movable body."""
+        """Wakes a movable body. Raises InvalidArgument for an unknown body."""
         self._core.wake(body)
 
     def apply_force(self, body: BodyId, force: Vector) -> None:
-        """Adds a force [N] at the centre of mass, in world axes."""
+        """Adds a force [N] at the centre of mass, in world axes. Raises InvalidArgument for an
+        unknown body, or if there are not three numbers."""
         self._core.apply_force(body, _arrays.triple(force, "force"))
 
     def apply_torque(self, body: BodyId, torque: Vector) -> None:
-        """Adds a torque [N m], in world axes."""
+        """Adds a torque [N m], in world axes. Raises InvalidArgument as apply_force()."""
         self._core.apply_torque(body, _arrays.triple(torque, "torque"))
 
     def apply_force_at_point(self, body: BodyId, force: Vector, point: Vector) -> None:
-        """Adds a force [N] at a point [m] of the world."""
+        """Adds a force [N] at a point [m] of the world. Raises InvalidArgument as apply_force()."""
         self._core.apply_force_at_point(body, _arrays.triple(force, "force"),
                                         _arrays.triple(point, "point"))
 
     def apply_forces(self, forces: Any) -> None:
-        """Adds a force [N] on each body: an array (N, 3) in the order of `bodies`."""
+        """Adds a force [N] on each body: an array (N, 3) of the dtype of the world, in the order of
+        `bodies`. Raises InvalidArgument for a wrong shape or type."""
         forces = _arrays.rows(forces, "forces", 3, self._dtype)
         size = self._core.size()
         if forces.shape[0] != size:

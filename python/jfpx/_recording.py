@@ -15,12 +15,22 @@ from ._world import World
 class RecordingWriter:
     """Writes a recording, which `jfpx replay` and Recording read. The file appears under its name
     when the recording is finished: by finish(), or at the end of a `with` statement that raised
-    nothing.
+    nothing. Until then, the data are in a file with the suffix .part, which an exception in the
+    `with` statement removes.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    world : World
+        A new world, without forces; see docs/python.md.
 
     Raises
     ------
     FileError
-        The file cannot be written.
+        The file cannot be created.
+    Closed, ConcurrentUse
+        The world is closed, or is in use by another call.
     """
 
     def __init__(self, path: str | os.PathLike[str], world: World) -> None:
@@ -30,11 +40,24 @@ class RecordingWriter:
 
     def append(self) -> None:
         """Appends the states of the world after a step. The world must have the bodies of its
-        scene. Raises InvalidArgument, FileError."""
+        scene.
+
+        Raises
+        ------
+        InvalidArgument
+            The number of bodies is not that of the scene.
+        FileError
+            The file cannot be written, for example because the disk is full.
+        Closed
+            The recording is finished or was given up, or the world is closed.
+        ConcurrentUse, OutOfMemory, DeviceError
+            As World.states().
+        """
         self._writer.append(self._world._core)
 
     def finish(self) -> None:
-        """Completes the file. Raises FileError."""
+        """Completes the file. Raises FileError, and Closed if the recording is finished or was
+        given up."""
         self._writer.finish()
 
     def __enter__(self) -> RecordingWriter:
@@ -50,6 +73,11 @@ class RecordingWriter:
 class Recording:
     """Reads a recording of this version, in the precision in which it was written.
 
+    Parameters
+    ----------
+    path : str or path
+        The file, which is checked as a whole.
+
     Raises
     ------
     FileError
@@ -64,15 +92,17 @@ class Recording:
 
     @property
     def scene(self) -> Scene:
+        """A copy of the scene at the beginning of the run."""
         return Scene._of(self._reader.scene, self._dtype)
 
     @property
     def dtype(self) -> np.dtype:
+        """float32 or float64: precision of the run."""
         return self._dtype
 
     @property
     def engine(self) -> str:
-        """"native", "bullet" or "bullet-stock"."""
+        """Engine of the run: "native", "bullet" or "bullet-stock"."""
         return self._reader.engine
 
     def __len__(self) -> int:
@@ -80,7 +110,21 @@ class Recording:
         return self._reader.steps
 
     def states(self, step: int) -> States:
-        """States after a step, from 1 to the number of steps. Raises InvalidArgument."""
+        """States after a step, as new arrays (N, 3) and (N, 4) of `dtype`, in the order of the
+        bodies.
+
+        Parameters
+        ----------
+        step : int in [1, len(self)]
+
+        Raises
+        ------
+        InvalidArgument
+            `step` is not an integer or is out of its range; or the run has added or removed bodies,
+            so that their number is not that of the scene.
+        FileError
+            The file cannot be read any more.
+        """
         step = _arrays.count(step, "step", 1, len(self))
         states = States.empty(len(self.scene), self._dtype)
         self._reader.write_states(step, *states)

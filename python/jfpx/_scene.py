@@ -26,6 +26,8 @@ class Scene:
     ------
     InvalidScene
         A field is unknown or out of range. The message names the body, the field and the range.
+    InvalidArgument
+        `dtype` is neither float32 nor float64.
     """
 
     def __init__(self, fields: dict[str, Any] | None = None, *, dtype: Any = "float32") -> None:
@@ -39,25 +41,52 @@ class Scene:
 
     @classmethod
     def from_json(cls, text: str, *, dtype: Any = "float32") -> Scene:
-        """Parses JSON text. Raises InvalidScene."""
+        """Parses JSON text.
+
+        Raises
+        ------
+        InvalidScene
+            The text is not JSON, and the message has line and column; or a field is unknown,
+            missing or out of range.
+        InvalidArgument
+            `dtype` is neither float32 nor float64.
+        """
         return cls._of(_arrays.precision_of(dtype).Scene.from_json(text), dtype)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, dtype: Any = "float32") -> Scene:
-        """Reads a JSON file. Raises FileError, InvalidScene."""
+        """Reads a JSON file.
+
+        Raises
+        ------
+        FileError
+            The file cannot be read.
+        InvalidScene, InvalidArgument
+            As from_json(). The message of InvalidScene begins with the path.
+        """
         return cls._of(_arrays.precision_of(dtype).Scene.load(os.fspath(path)), dtype)
 
     @classmethod
     def named(cls, name: str, *, spheres: int | None = None, boxes: int | None = None,
               seed: int = 1, dtype: Any = "float32") -> Scene:
-        """Generates one of scene_names(). Raises InvalidArgument, OutOfMemory.
+        """Generates one of scene_names().
 
         Parameters
         ----------
-        spheres, boxes : int, optional
+        name : str
+        spheres, boxes : int in [0, 2^32 - 1], optional
             Numbers of movable bodies; the defaults of the scene if absent.
-        seed : int
+        seed : int in [0, 2^64 - 1]
             Of the random scenes.
+        dtype : "float32" or "float64"
+
+        Raises
+        ------
+        InvalidArgument
+            There is no scene of this name, a number or `dtype` is out of its range, or `boxes` is
+            given for a scene that has no variable number of boxes.
+        OutOfMemory
+            The scene needs more memory than the machine has.
         """
         limit = 2**32 - 1
         scene = _arrays.precision_of(dtype).Scene.named(
@@ -80,13 +109,20 @@ class Scene:
         Parameters
         ----------
         positions : array (N, 3) of the dtype of the scene
-            [m].
-        radii : number or array (N,)
-            [m], > 0.
-        masses : number or array (N,)
-            [kg], >= 0; 0: immovable.
+            [m], each coordinate in [-1e9, 1e9].
+        radii : number or array (N,) of the dtype of the scene
+            [m], in (0, 1e9].
+        masses : number or array (N,) of the dtype of the scene
+            [kg], finite and >= 0; 0: immovable.
         velocities : three numbers or array (N, 3)
-            [m/s].
+            [m/s], finite; converted to the dtype of the scene.
+
+        Raises
+        ------
+        InvalidArgument
+            A wrong shape or type of an array.
+        InvalidScene
+            A value is out of its range. The message has the body.
         """
         positions = _arrays.rows(positions, "positions", 3, self._dtype)
         size = positions.shape[0]
@@ -102,15 +138,17 @@ class Scene:
 
     @property
     def dtype(self) -> np.dtype:
+        """float32 or float64: precision of a world that is made from the scene."""
         return self._dtype
 
     @property
     def name(self) -> str:
+        """Name of the scene; "unnamed" by default."""
         return self._scene.name
 
     @property
     def dt(self) -> float:
-        """[s], length of a step."""
+        """[s], > 0: length of a step."""
         return self._scene.dt
 
     def __len__(self) -> int:
@@ -122,14 +160,15 @@ class Scene:
         return self._scene.to_json()
 
     def to_dict(self) -> dict[str, Any]:
-        """The fields of the JSON form."""
+        """The fields of the JSON form, of which Scene() makes a scene with the same bits."""
         return json.loads(self.to_json())
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a JSON file. Raises FileError."""
+        """Writes a JSON file: the path has the complete file or is unchanged. Raises FileError."""
         self._scene.save(os.fspath(path))
 
     def __eq__(self, other: object) -> bool:
+        """Whether dtype and all fields are equal."""
         if not isinstance(other, Scene):
             return NotImplemented
         return self._dtype == other._dtype and self._scene.equals(other._scene)

@@ -33,16 +33,20 @@ class StepReport(NamedTuple):
     iterations_exhausted: bool
     """A loop of the solver stopped at its limit with work left."""
     non_finite: bool
-    """A value of a body is no longer finite; the step was undone, and so are further ones."""
+    """A value of a body is no longer finite, or a coordinate exceeds 1e9 m; the step was undone,
+    and so are further ones until the body is removed or gets another state."""
     non_finite_body: tuple[int, int] | None
-    """The first such body."""
+    """The first such body, as (index, generation); None if there is none."""
     awake: int
     """Movable bodies awake after the step."""
     backend: str
-    """Device of the step, or that found the sphere contacts of a step on the CPU."""
+    """"cpu" or "cuda": device of the step, or that found the sphere contacts of a step on the
+    CPU."""
     algorithm: str
+    """Algorithm that found the sphere contacts: "all pairs" or "sorted tiles"; "automatic" in a
+    step on a GPU."""
     choice: str
-    """Reason for backend and algorithm."""
+    """Reason for backend and algorithm, as SphereCollider.reason."""
     device_failure: str
     """Error of a device whose work the CPU took over; empty if there was none."""
     integrate_ms: float
@@ -56,7 +60,8 @@ class StepReport(NamedTuple):
 
 
 class WorldContacts(NamedTuple):
-    """Contact points of the last step, in the order of World::contacts() in C++."""
+    """Contact points of the last step, in the order of World::contacts() in C++.
+    Floating-point arrays have the dtype of the world."""
 
     pairs: Any
     """(2, E) int64: BodyId.index of a and b."""
@@ -67,39 +72,43 @@ class WorldContacts(NamedTuple):
     distance: Any
     """(E,) [m], <= 0: negative penetration depths; 0 if the bodies met in the step."""
     friction: Any
-    """(E,) [-]."""
+    """(E,) [-], >= 0, of the pair."""
     restitution: Any
-    """(E,) [-]."""
+    """(E,) [-], in [0, 1], of the pair."""
     sensor: Any
     """(E,) bool: a or b is a sensor."""
 
 
 BEGIN, STAY, END = 0, 1, 2
+"""Values of ContactEvents.phase."""
 
 
 class ContactEvents(NamedTuple):
-    """Pairs of bodies that began to touch, stay in contact or ceased to touch in the last step."""
+    """Pairs of bodies that began to touch, stay in contact or ceased to touch in the last step,
+    sorted by (pairs[0], pairs[1]). Floating-point arrays have the dtype of the world."""
 
     phase: Any
     """(E,) int64: BEGIN, STAY or END."""
     pairs: Any
-    """(2, E) int64: BodyId.index, pairs[0] < pairs[1]."""
+    """(2, E) int64: BodyId.index of a and b, a < b. Bodies of END may have been removed."""
     contacts: Any
-    """(E,) int64: number of contact points."""
+    """(E,) int64, > 0: number of contact points."""
     normal: Any
     """(E, 3) [-]: unit vectors from b to a, at the deepest point."""
     point: Any
     """(E, 3) [m], world: the deepest points."""
     distance: Any
-    """(E,) [m], <= 0."""
+    """(E,) [m], <= 0, at the deepest point."""
 
 
 class RayHit(NamedTuple):
-    """Point where a ray enters a body."""
+    """Point where a ray enters a body. A ray that starts in a body, or on its surface, hits it at
+    distance 0 with a normal opposite to the ray."""
 
     body: BodyId
+    """The body that is hit."""
     distance: float
-    """[m], from the origin."""
+    """[m], >= 0, from the origin."""
     point: tuple[float, ...]
     """[m], world."""
     normal: tuple[float, ...]
@@ -107,12 +116,12 @@ class RayHit(NamedTuple):
 
 
 class RayHits(NamedTuple):
-    """First hits of many rays."""
+    """First hits of many rays. Floating-point arrays have the dtype of the world."""
 
     bodies: Any
     """(R,) int64: BodyId.index; -1: no hit."""
     distance: Any
-    """(R,) [m]; infinity: no hit."""
+    """(R,) [m], >= 0; infinity: no hit."""
     point: Any
     """(R, 3) [m]; zero: no hit."""
     normal: Any
@@ -124,20 +133,36 @@ class World:
     backend, the algorithm and the number of threads.
 
     One thread may use a world at a time: while step() or run() of one thread works, without
-    Python's global lock, every call of another raises ConcurrentUse.
+    Python's global lock, every call of another raises ConcurrentUse, and so does every call by a
+    force of the world. After close(), every call but close() raises Closed. `dtype` and `report`
+    raise nothing.
+
+    Any call may raise OutOfMemory. If the states are on a GPU, a call that reads states or contacts
+    or that changes the world may raise DeviceError. The docstrings of the methods contain the other
+    exceptions. There, a body is unknown if its id is not of a living body of this world.
 
     Parameters
     ----------
     scene : Scene, dict or str
         A scene, its fields, or the name of a scene.
     dtype : "float32" or "float64", optional
-        Precision, where `scene` is not a Scene.
+        Precision, where `scene` is not a Scene: "float32" if absent. Otherwise it must be that of
+        the scene.
     backend, algorithm, threads, device
-        As for SphereCollider. `threads` also run the other parts of a step.
+        As for SphereCollider with arrays in host memory. `threads` also run the other parts of a
+        step. With the solver soft_step, "cuda" runs all parts of a step on the GPU, and "auto"
+        moves the world there and back, whichever takes less time.
 
     Raises
     ------
-    InvalidScene, InvalidArgument, BackendUnavailable, OutOfMemory
+    InvalidScene
+        A field of `scene` is unknown or out of range.
+    InvalidArgument
+        An option is out of its range, there is no scene of this name, `scene` has another type, or
+        `dtype` is not that of the scene.
+    BackendUnavailable
+        The backend was requested by name and cannot be used.
+    OutOfMemory, DeviceError
     """
 
     def __init__(self, scene: Scene | dict[str, Any] | str, *, dtype: Any = None,
@@ -161,24 +186,39 @@ class World:
     # Steps
 
     def step(self) -> StepReport:
-        """Advances the world by the dt of its scene. An exception of a force undoes the step.
+        """Advances the world by the dt of its scene. A step in which a value is no longer finite
+        raises nothing: the step is undone, and StepReport.non_finite is set.
 
         Raises
         ------
-        OutOfMemory, DeviceError, ConcurrentUse
+        Exception
+            An exception of a force that is a function. It undoes the step.
+        OutOfMemory, DeviceError
+            The state is then as before the step.
+        ConcurrentUse, Closed
         """
         self._report = StepReport(*self._core.step())
         return self._report
 
     def run(self, steps: int, *, after_step: Callable[[StepReport], Any] | None = None) -> StepReport:
         """Makes many steps, and returns the report of the last. Stops after a step that was undone
-        because a value is no longer finite. KeyboardInterrupt ends it between two steps.
+        because a value is no longer finite.
 
         Parameters
         ----------
-        steps : int, > 0
+        steps : int in [1, 2^63 - 1]
+            Number of steps.
         after_step : function, optional
-            Called with the report of every step.
+            Called with the report of every step. It may use the world. An exception ends the run.
+
+        Raises
+        ------
+        InvalidArgument
+            `steps` is not an integer or is out of its range.
+        KeyboardInterrupt
+            Ctrl-C was pressed. It ends the run between two steps.
+        OutOfMemory, DeviceError, ConcurrentUse, Closed, and exceptions of forces
+            As step(). The steps before are kept.
         """
         steps = _arrays.count(steps, "steps", 1, 2**63 - 1)
         if after_step is None:
@@ -193,43 +233,60 @@ class World:
 
     @property
     def report(self) -> StepReport | None:
-        """Report of the last step; None before the first."""
+        """Report of the last step() or run() that returned; None before the first."""
         return self._report
 
     @property
     def dtype(self) -> np.dtype:
+        """float32 or float64: type of all floating-point arrays."""
         return self._dtype
 
     @property
     def time(self) -> float:
-        """[s], completed steps times dt."""
+        """[s], >= 0: completed steps times dt."""
         return self._core.time()
 
     @property
     def scene(self) -> Scene:
-        """The scene of which the world was made."""
+        """A copy of the scene of which the world was made. restore() replaces its name and its
+        settings, but not its bodies."""
         return Scene._of(self._core.scene(), self._dtype)
 
     def state_hash(self) -> int:
-        """Hash of all states: equal hashes mean equal states to the last bit."""
+        """Hash of all states, in [0, 2^64 - 1]: equal hashes mean equal states to the last bit.
+        Worlds of float32 and float64 have different hashes. Raises DeviceError."""
         return self._core.state_hash()
 
     def snapshot(self) -> bytes:
         """The state as a value: all that the following steps depend on, except for Python functions.
-        Equal states have equal bytes, whatever the backend and the number of threads."""
+        Equal states have equal bytes, whatever the backend and the number of threads. Raises
+        OutOfMemory, DeviceError."""
         return self._core.snapshot()
 
     def restore(self, snapshot: bytes) -> None:
         """Replaces the state by that of a snapshot of this or of another world of the same dtype. The
-        following steps have the bits of those without. A world that is to be restored must have
-        Python functions as forces with the ids of the snapshot. Raises InvalidSnapshot; the world is
-        then unchanged."""
+        following steps have the bits of those without. The ids of bodies and the contacts are those
+        of the snapshot; contact_events() has none until the next step. A world that is to be
+        restored must have Python functions as forces with the ids of the snapshot.
+
+        Raises
+        ------
+        InvalidSnapshot
+            The bytes are damaged, or of another version or dtype, or the world has other functions
+            as forces. The world is then unchanged.
+        InvalidArgument
+            `snapshot` is not of type bytes.
+        OutOfMemory
+            The world is then unchanged.
+        DeviceError
+        """
         if not isinstance(snapshot, bytes):
             raise InvalidArgument(f"snapshot is of type {type(snapshot).__name__}; it must be bytes")
         self._core.restore(snapshot)
 
     def close(self) -> None:
-        """Frees the world now. Later calls raise Closed. Also at the end of a `with` statement."""
+        """Frees the world now. Later calls raise Closed. Also at the end of a `with` statement.
+        Raises ConcurrentUse during a step."""
         self._core.close()
 
     def __enter__(self) -> World:
@@ -246,32 +303,40 @@ class World:
 
     @property
     def bodies(self) -> list[BodyId]:
-        """Living bodies in the order of their indices."""
+        """Living bodies in the order of their indices, as a new list."""
         return [BodyId(*body) for body in self._core.bodies()]
 
     def body_at(self, index: int) -> BodyId:
-        """The living body with an index. Raises InvalidArgument if there is none."""
+        """The living body with an index in [0, 2^32 - 1]. Raises InvalidArgument if there is
+        none."""
         return BodyId(*self._core.body_at(_arrays.count(index, "index", 0, 2**32 - 1)))
 
     def __contains__(self, body: BodyId) -> bool:
+        """Whether the id is of a living body of this world."""
         return self._core.contains(body)
 
     def add(self, body: dict[str, Any]) -> BodyId:
-        """Adds a body, with the fields of a body in a scene. Raises InvalidScene."""
+        """Adds a body, with the fields of a body in a scene (docs/scenes.md), and returns its id.
+        contacts() has none until the next step. Raises InvalidScene for a field that is unknown or
+        out of range; the world is then unchanged."""
         return self.add_scene(Scene({"bodies": [body]}, dtype=self._dtype))[0]
 
     def add_scene(self, scene: Scene) -> list[BodyId]:
-        """Adds the bodies of a scene; its settings have no effect."""
+        """Adds the bodies of a scene, and returns their ids in its order; its settings and its
+        ignored pairs have no effect. Raises InvalidArgument if the dtype of the scene is not that
+        of the world."""
         if scene.dtype != self._dtype:
             raise InvalidArgument(f"the scene has dtype {scene.dtype}; the world has {self._dtype}")
         return [BodyId(*body) for body in self._core.add(scene._scene)]
 
     def remove(self, body: BodyId) -> None:
-        """Removes a body and wakes the bodies in contact with it."""
+        """Removes a body and wakes the bodies in contact with it. contacts() has none until the
+        next step. Raises InvalidArgument for an unknown body."""
         self._core.remove(body)
 
     def states(self) -> States:
-        """States of all bodies as new arrays, in the order of `bodies`."""
+        """States of all bodies as new arrays (N, 3) and (N, 4) of the dtype of the world, in the
+        order of `bodies`. Raises OutOfMemory, DeviceError."""
         states = States.empty(len(self), self._dtype)
         self._core.write_states(*states)
         return states
@@ -285,16 +350,40 @@ class World:
         step or change waits for all work of the GPU, which may still read them. The first call after
         a change by the host uploads the world.
 
+        Returns
+        -------
+        States
+            Arrays (M, 3) and (M, 4) of the dtype of the world, M > the largest BodyId.index. They
+            have `shape` and DLPack alone. `__dlpack__()` raises InvalidArgument after a step or
+            change, and BufferError if a copy is requested.
+
         Raises
         ------
         BackendUnavailable
-            No GPU steps the world; it needs backend="cuda" and the solver soft_step.
+            No GPU steps the world. It needs the solver soft_step and backend="cuda"; "auto"
+            suffices from the step on that has started the GPU. The message has the reason.
         OutOfMemory, DeviceError
+            The world is then unchanged.
         """
         return States(*self._core.device_states())
 
     def set_states(self, states: States) -> None:
-        """Replaces the states of all bodies, or of none if one is invalid."""
+        """Replaces the states of all bodies, or of none if one is invalid. Wakes the bodies.
+
+        Parameters
+        ----------
+        states : States
+            Arrays in host memory of the dtype of the world, with a row for each body in the order
+            of `bodies`: positions (N, 3) [m], each coordinate in [-1e9, 1e9]; orientations (N, 4)
+            [-], unit quaternions (w, x, y, z) to a thousandth of the squared length, which are
+            normalized; velocities (N, 3) [m/s] and angular_velocities (N, 3) [rad/s], finite.
+
+        Raises
+        ------
+        InvalidArgument
+            A wrong shape or type, or a value out of its range.
+        OutOfMemory, DeviceError
+        """
         size = len(self)
         arrays = []
         for name, array, columns in zip(States._fields, states, (3, 4, 3, 3)):
@@ -307,19 +396,39 @@ class World:
 
     @property
     def positions(self) -> np.ndarray:
-        """(N, 3) [m]: a copy of the positions of all bodies, in the order of `bodies`."""
+        """(N, 3) [m]: a copy of the positions of all bodies, in the order of `bodies`. Raises
+        OutOfMemory, DeviceError."""
         return self.states().positions
 
     @property
     def velocities(self) -> np.ndarray:
-        """(N, 3) [m/s]: a copy of the velocities."""
+        """(N, 3) [m/s]: a copy of the velocities, in the order of `bodies`. Raises OutOfMemory,
+        DeviceError."""
         return self.states().velocities
 
     def state(self, body: BodyId) -> BodyState:
+        """State of a body. Raises InvalidArgument for an unknown body, DeviceError."""
         return BodyState(*self._core.state(body))
 
     def set_state(self, body: BodyId, state: BodyState) -> None:
-        """Replaces the state of a body, and wakes it and the bodies in contact with it."""
+        """Replaces the state of a body, and wakes it and the bodies in contact with it. An
+        immovable body is moved and stays at rest; a kinematic body continues with the new
+        velocities.
+
+        Parameters
+        ----------
+        body : BodyId
+        state : BodyState
+            position [m], each coordinate in [-1e9, 1e9]; orientation [-], a unit quaternion
+            (w, x, y, z) to a thousandth of the squared length, which is normalized; velocity [m/s]
+            and angular_velocity [rad/s], finite.
+
+        Raises
+        ------
+        InvalidArgument
+            An unknown body, or a value out of its range.
+        DeviceError
+        """
         state = BodyState(*state)
         self._core.set_state(body, _arrays.triple(state.position, "position"),
                              _arrays.triple(state.orientation, "orientation", 4),
@@ -327,75 +436,96 @@ class World:
                              _arrays.triple(state.angular_velocity, "angular_velocity"))
 
     def awake(self, body: BodyId) -> bool:
+        """Whether a body is awake. A body of mass 0 is awake only if it is kinematic and moves.
+        Raises InvalidArgument for an unknown body, DeviceError."""
         return self._core.awake(body)
 
     def wake(self, body: BodyId) -> None:
+        """Wakes a body; has no effect on one of mass 0. The next step also wakes the bodies in
+        contact with it. Raises InvalidArgument for an unknown body."""
         self._core.wake(body)
 
     def mass(self, body: BodyId) -> float:
-        """[kg]; 0: immovable or kinematic."""
+        """[kg], >= 0; 0: immovable or kinematic. Raises InvalidArgument for an unknown body."""
         return self._core.mass(body)
 
     def set_mass(self, body: BodyId, mass: float) -> None:
-        """[kg], > 0. The inertia follows, unless it was given."""
+        """[kg], finite and > 0; a mass of 0 remains 0. The inertia follows, unless it was given.
+        Wakes the body. Raises InvalidArgument for an unknown body or a mass out of range."""
         self._core.set_mass(body, _arrays.number(mass, "mass"))
 
     def friction(self, body: BodyId) -> float:
-        """[-]."""
+        """[-], >= 0. Raises InvalidArgument for an unknown body."""
         return self._core.friction(body)
 
     def set_friction(self, body: BodyId, friction: float) -> None:
-        """[-], >= 0."""
+        """[-], finite and >= 0, from the next step on. A change wakes the body and the bodies in
+        contact with it. Raises InvalidArgument for an unknown body or a value out of range."""
         self._core.set_friction(body, _arrays.number(friction, "friction"))
 
     def restitution(self, body: BodyId) -> float:
-        """[-]."""
+        """[-], in [0, 1]. Raises InvalidArgument for an unknown body."""
         return self._core.restitution(body)
 
     def set_restitution(self, body: BodyId, restitution: float) -> None:
-        """[-], in [0, 1]."""
+        """[-], in [0, 1], from the next step on. Raises InvalidArgument for an unknown body or a
+        value out of range."""
         self._core.set_restitution(body, _arrays.number(restitution, "restitution"))
 
     def acceleration(self, body: BodyId) -> tuple[float, ...]:
-        """[m/s^2], constant; gravity by default."""
+        """Three numbers [m/s^2], constant; gravity by default. Raises InvalidArgument for an
+        unknown body."""
         return self._core.acceleration(body)
 
     def set_acceleration(self, body: BodyId, acceleration: Vector) -> None:
+        """Three numbers [m/s^2], finite, from the next step on. A change wakes the body. Raises
+        InvalidArgument for an unknown body or a value out of range."""
         self._core.set_acceleration(body, _arrays.triple(acceleration, "acceleration"))
 
     def damping(self, body: BodyId) -> tuple[float, float]:
-        """[-]: fractions of velocity and of angular velocity kept per second."""
+        """[-], each in (0, 1]: fractions of velocity and of angular velocity kept per second.
+        Raises InvalidArgument for an unknown body."""
         return self._core.damping(body)
 
     def set_damping(self, body: BodyId, linear: float, angular: float) -> None:
-        """[-], each in (0, 1]."""
+        """[-], each in (0, 1]: fractions of velocity and of angular velocity kept per second, from
+        the next step on. Raises InvalidArgument for an unknown body or a value out of range."""
         self._core.set_damping(body, _arrays.number(linear, "linear"),
                                _arrays.number(angular, "angular"))
 
     def sensor(self, body: BodyId) -> bool:
+        """Whether a body is a sensor: it has contacts, but they are not resolved. Raises
+        InvalidArgument for an unknown body."""
         return self._core.sensor(body)
 
     def filter(self, body: BodyId) -> tuple[int, int]:
-        """Category and mask."""
+        """Category and mask, each in [0, 2^32 - 1]. Raises InvalidArgument for an unknown body."""
         return self._core.filter(body)
 
     def set_filter(self, body: BodyId, category: int, mask: int) -> None:
-        """Two bodies collide if each has a category that is in the mask of the other."""
+        """Two bodies collide if each has a category that is in the mask of the other. `category`
+        and `mask` are bits in [0, 2^32 - 1]. A change wakes the body and the bodies in contact with
+        it. Raises InvalidArgument for an unknown body or a value out of range."""
         self._core.set_filter(body, _arrays.count(category, "category", 0, 2**32 - 1),
                               _arrays.count(mask, "mask", 0, 2**32 - 1))
 
     def pair_ignored(self, a: BodyId, b: BodyId) -> bool:
+        """Whether two bodies do not collide, whatever their filters. Raises InvalidArgument for an
+        unknown body."""
         return self._core.pair_ignored(a, b)
 
     def set_pair_ignored(self, a: BodyId, b: BodyId, ignored: bool) -> None:
-        """Adds two bodies to the pairs that do not collide, or removes them."""
+        """Adds two bodies to the pairs that do not collide, or removes them. A change wakes both
+        bodies and the bodies in contact with them. Raises InvalidArgument for an unknown body, and
+        if both are the same body."""
         self._core.set_pair_ignored(a, b, bool(ignored))
 
     # Forces
 
     def apply_force(self, body: BodyId, force: Vector, point: Vector | None = None) -> None:
-        """Applies a force [N] in the next step, at a point [m] of the world or at the centre of
-        mass. Wakes the body."""
+        """Applies a force [N] in world axes in the next step, at a point [m] of the world or at the
+        centre of mass. Several calls add up. Wakes the body; has no effect on one of mass 0. Raises
+        InvalidArgument for an unknown body or a value that is not finite."""
         force = _arrays.triple(force, "force")
         if point is None:
             self._core.apply_force(body, force)
@@ -403,7 +533,9 @@ class World:
             self._core.apply_force_at_point(body, force, _arrays.triple(point, "point"))
 
     def apply_torque(self, body: BodyId, torque: Vector) -> None:
-        """Applies a torque [N m] in the next step. Wakes the body."""
+        """Applies a torque [N m] in world axes in the next step. Several calls add up. Wakes the
+        body; has no effect on one of mass 0. Raises InvalidArgument for an unknown body or a value
+        that is not finite."""
         self._core.apply_torque(body, _arrays.triple(torque, "torque"))
 
     def add_force(self, force: Any) -> int:
@@ -415,6 +547,12 @@ class World:
             A function is called with a ForceContext at the start of every step. Calls in the same
             state must have the same result. It must not use the world. Its exceptions undo the
             step and are raised by step().
+
+        Raises
+        ------
+        InvalidArgument
+            A field is out of its range, a body is unknown, or `force` is neither a force of jfpx
+            nor a function.
         """
         if hasattr(force, "_add"):
             return force._add(self._core)
@@ -424,7 +562,8 @@ class World:
         return self._core.add_function(functools.partial(_call, force, self._dtype))
 
     def remove_force(self, number: int) -> None:
-        """Removes a force and wakes all bodies. Raises InvalidArgument for an unknown number."""
+        """Removes the force with a number of add_force(), and wakes all bodies. Raises
+        InvalidArgument for an unknown number."""
         self._core.remove_force(_arrays.count(number, "force", 0, 2**64 - 1))
 
     @property
@@ -435,7 +574,9 @@ class World:
     # Contacts and queries
 
     def contacts(self) -> WorldContacts:
-        """Contact points of the last step, as new arrays."""
+        """Contact points of the last step, as new arrays. There are none before the first step,
+        after an undone step, and after bodies were added or removed. The first call after a step
+        makes the list. Raises OutOfMemory, DeviceError."""
         size = self._core.contact_count()
         result = WorldContacts(np.empty((2, size), np.int64), self._rows(size), self._rows(size),
                                self._values(size), self._values(size), self._values(size),
@@ -444,7 +585,9 @@ class World:
         return result
 
     def contact_events(self) -> ContactEvents:
-        """Changes of the contacts in the last step, as new arrays."""
+        """Changes of the contacts in the last step, as new arrays. There are none before the first
+        step and after an undone step. The contacts of a removed body end in the next step. Raises
+        OutOfMemory, DeviceError."""
         size = self._core.event_count()
         result = ContactEvents(np.empty(size, np.int64), np.empty((2, size), np.int64),
                                np.empty(size, np.int64), self._rows(size), self._rows(size),
@@ -454,18 +597,26 @@ class World:
 
     def cast_ray(self, origin: Vector, direction: Vector, max_distance: float = math.inf, *,
                  filter: Callable[[BodyId], bool] | None = None) -> RayHit | None:
-        """The first hit of a ray.
+        """The first hit of a ray, or None; of bodies at the same distance, that with the lowest
+        index. Rays hit all bodies, also sensors, whatever their collision filters.
 
         Parameters
         ----------
         origin : three numbers
-            [m].
+            [m], each in [-1e9, 1e9].
         direction : three numbers
-            Of any length but 0.
+            Finite, of any length but 0.
         max_distance : float
-            [m], >= 0.
+            [m], >= 0; infinity is allowed.
         filter : function, optional
-            Selects bodies.
+            Called with the BodyId of a body that the ray hits, at most once for each; the body
+            counts if the result is true. It must not change the world.
+
+        Raises
+        ------
+        InvalidArgument
+            A number is out of its range.
+        OutOfMemory, DeviceError, and exceptions of `filter`
         """
         hit = self._core.cast_ray(_arrays.triple(origin, "origin"),
                                   _arrays.triple(direction, "direction"),
@@ -474,7 +625,8 @@ class World:
 
     def cast_ray_through(self, origin: Vector, direction: Vector, max_distance: float = math.inf,
                          *, filter: Callable[[BodyId], bool] | None = None) -> list[RayHit]:
-        """All hits of a ray, sorted by distance; one hit per body."""
+        """All hits of a ray, sorted by distance, then by index; one hit per body. Parameters and
+        exceptions are those of cast_ray()."""
         hits = self._core.cast_ray_through(_arrays.triple(origin, "origin"),
                                            _arrays.triple(direction, "direction"),
                                            _arrays.number(max_distance, "max_distance"),
@@ -482,7 +634,23 @@ class World:
         return [RayHit(BodyId(*hit[0]), *hit[1:]) for hit in hits]
 
     def cast_rays(self, origins: Any, directions: Any, max_distances: Any = math.inf) -> RayHits:
-        """The first hits of many rays: arrays (R, 3), and a number or an array (R,)."""
+        """The first hits of many rays, as those of cast_ray().
+
+        Parameters
+        ----------
+        origins : array (R, 3) of the dtype of the world
+            [m], each number in [-1e9, 1e9].
+        directions : array (R, 3) of the dtype of the world
+            Finite, of any length but 0.
+        max_distances : number or array (R,) of the dtype of the world
+            [m], >= 0; infinity is allowed.
+
+        Raises
+        ------
+        InvalidArgument
+            A wrong shape or type, or a number out of its range; the message then has the ray.
+        OutOfMemory, DeviceError
+        """
         origins = _arrays.rows(origins, "origins", 3, self._dtype)
         directions = _arrays.rows(directions, "directions", 3, self._dtype)
         size = origins.shape[0]
@@ -495,14 +663,19 @@ class World:
         return result
 
     def overlapping_sphere(self, centre: Vector, radius: float) -> list[BodyId]:
-        """Bodies that overlap a sphere; lengths in [m]."""
+        """Bodies that overlap or touch a sphere, in the order of `bodies`. `centre` [m] has numbers
+        in [-1e9, 1e9]; `radius` [m] is in (0, 1e9]. Raises InvalidArgument for a number out of its
+        range, OutOfMemory, DeviceError."""
         found = self._core.overlapping_sphere(_arrays.number(radius, "radius"),
                                               _arrays.triple(centre, "centre"))
         return [BodyId(*body) for body in found]
 
     def overlapping_box(self, centre: Vector, half_extents: Vector,
                         orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0)) -> list[BodyId]:
-        """Bodies that overlap a box; lengths in [m]."""
+        """Bodies that overlap or touch a box, in the order of `bodies`. `centre` [m] has numbers in
+        [-1e9, 1e9], `half_extents` [m] in (0, 1e9]; `orientation` [-] is a unit quaternion
+        (w, x, y, z) to a thousandth of the squared length. Raises InvalidArgument for a number out
+        of its range, OutOfMemory, DeviceError."""
         found = self._core.overlapping_box(_arrays.triple(half_extents, "half_extents"),
                                            _arrays.triple(centre, "centre"),
                                            _arrays.triple(orientation, "orientation", 4))

@@ -72,14 +72,22 @@ cuda::DeviceStates PythonWorld::device_states() {
 }
 
 void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world) {
-  nb::class_<DeviceRows>(module, "DeviceRows", nb::type_slots(kRowsSlots))
-      .def("__dlpack__", &to_dlpack)
-      .def("__dlpack_device__",
-           [](const DeviceRows& self) {
-             return std::pair<int, int>(nb::device::cuda::value, self.device);
-           })
-      .def_prop_ro("shape",
-                   [](const DeviceRows& self) { return std::pair(self.rows, self.columns); });
+  nb::class_<DeviceRows>(
+      module, "DeviceRows", nb::type_slots(kRowsSlots),
+      "Array of World.device_states() in the memory of a GPU. Valid until the next step or change "
+      "of the world; must not be written.")
+      .def("__dlpack__", &to_dlpack,
+           "A capsule of DLPack that shares the array. Raises InvalidArgument after a step or "
+           "change of the world, BufferError if `copy` is true.")
+      .def(
+          "__dlpack_device__",
+          [](const DeviceRows& self) {
+            return std::pair<int, int>(nb::device::cuda::value, self.device);
+          },
+          "(2, ordinal of the GPU): 2 is CUDA in DLPack.")
+      .def_prop_ro(
+          "shape", [](const DeviceRows& self) { return std::pair(self.rows, self.columns); },
+          "(rows, columns): a row for each BodyId.index; 4 columns for orientations, otherwise 3.");
   world.def("device_states", [](nb::handle_t<PythonWorld> self) {
     const cuda::DeviceStates s = nb::cast<PythonWorld&>(self).device_states();
     return nb::make_tuple(rows_of(s.positions, s, self), rows_of(s.orientations, s, self),
