@@ -65,7 +65,8 @@ class RecordingWriter:
 
     def __exit__(self, kind: object, *_: object) -> None:
         if kind is None:
-            self.finish()
+            if self._writer.is_open():
+                self.finish()
         else:
             self._writer.discard()
 

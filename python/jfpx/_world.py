@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _arrays
-from ._errors import InvalidArgument
+from ._errors import Closed, ConcurrentUse, InvalidArgument
 from ._forces import BodyId, BodyState, ForceContext, States, Vector
 from ._scene import Scene
 
@@ -688,7 +688,10 @@ class World:
         return np.empty(size, self._dtype)
 
     def __repr__(self) -> str:
-        return f"<jfpx.World: {len(self)} bodies at {self.time:g} s, {self._dtype}>"
+        try:
+            return f"<jfpx.World: {len(self)} bodies at {self.time:g} s, {self._dtype}>"
+        except (Closed, ConcurrentUse) as error:
+            return f"<jfpx.World: {error}>"
 
 
 def _call(force: Callable[[ForceContext], Any], dtype: Any, context: Any) -> None:

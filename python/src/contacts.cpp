@@ -8,11 +8,17 @@ namespace {
 
 using Flags = Vector<bool>;
 
+/// @throws ConcurrentUse if a step was made since the arrays were allocated
+void require_size(const Vector<Real>& array, std::size_t size) {
+  if (array.shape(0) != size) throw ConcurrentUse(UseGuard::message("world"));
+}
+
 void write_contacts(const PythonWorld& self, const Rows<std::int64_t>& pairs,
                     const Rows<Real>& normals, const Rows<Real>& points,
                     const Vector<Real>& distances, const Vector<Real>& frictions,
                     const Vector<Real>& restitutions, const Flags& sensors) {
   const std::span<const Contact> contacts = self.get().contacts();
+  require_size(distances, contacts.size());
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const Contact& c = contacts[i];
     pairs(0, i) = c.a.index;
@@ -31,6 +37,7 @@ void write_events(const PythonWorld& self, const Vector<std::int64_t>& phases,
                   const Rows<Real>& normals, const Rows<Real>& points,
                   const Vector<Real>& distances) {
   const std::span<const ContactEvent> events = self.get().contact_events();
+  require_size(distances, events.size());
   for (std::size_t i = 0; i < events.size(); ++i) {
     const ContactEvent& e = events[i];
     phases(i) = static_cast<std::int64_t>(e.phase);

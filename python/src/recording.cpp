@@ -34,6 +34,7 @@ void bind_recording(nb::module_& module) {
              self.get().finish();
              self.writer.reset();
            })
+      .def("is_open", [](const Writer& self) { return self.writer.has_value(); })
       .def("discard", [](Writer& self) { self.writer.reset(); });
 
   nb::class_<RecordingReader>(module, "RecordingReader")

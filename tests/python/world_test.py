@@ -330,6 +330,17 @@ def test_a_recording_has_the_states_of_the_run(tmp_path, dtype):
         recording.states(6)
 
 
+def test_a_recording_may_be_finished_within_its_block(tmp_path):
+    world = jfpx.World({"bodies": [BALL]})
+    with jfpx.RecordingWriter(tmp_path / "run.rec", world) as writer:
+        world.step()
+        writer.append()
+        writer.finish()
+        with pytest.raises(jfpx.Closed):
+            writer.append()
+    assert len(jfpx.Recording(tmp_path / "run.rec")) == 1
+
+
 def test_a_recording_of_a_failed_run_leaves_no_file(tmp_path):
     world = jfpx.World({"bodies": [BALL]})
     with pytest.raises(LookupError):
@@ -385,6 +396,20 @@ def test_a_closed_world_is_a_named_exception():
         with pytest.raises(jfpx.Closed, match="the world is closed"):
             call()
     world.close()
+    assert repr(world) == "<jfpx.World: the world is closed>"
+
+
+def test_contacts_of_a_step_between_two_calls_are_a_named_exception():
+    world = jfpx.World("pile", backend="cpu")
+    world.run(40)
+    contacts, events = world.contacts(), world.contact_events()
+    assert len(contacts.distance) > 0 and len(events.distance) > 0
+    world.remove(world.bodies[0])
+    assert len(world.contacts().distance) == 0
+    with pytest.raises(jfpx.ConcurrentUse):
+        world._core.write_contacts(*world.contacts()._replace(distance=contacts.distance))
+    with pytest.raises(jfpx.ConcurrentUse):
+        world._core.write_events(*events._replace(distance=events.distance[:-1]))
 
 
 def test_use_of_a_world_from_two_threads_is_a_named_exception():
