@@ -102,7 +102,8 @@ struct StepReport {
   std::string device_failure;
   /// With Solver::soft_step, `integrate_ms` is the time of forces, and `resolve_ms` includes the
   /// integration in substeps. In a step on a GPU, the first three are times of the device: they do
-  /// not include launches and transfers, as `total_ms` does, nor forces that the host applies.
+  /// not include launches and transfers, as `total_ms` does, nor forces that the host applies. They
+  /// are 0 in a step that is left out, because the world sleeps.
   double integrate_ms = 0, detect_ms = 0, resolve_ms = 0, total_ms = 0;
 };
 

@@ -81,8 +81,7 @@ def floats(array: np.ndarray, name: str, dtype: Any = None) -> np.ndarray:
     if array.dtype not in PRECISIONS:
         raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be float32 or float64")
     if dtype is not None and array.dtype != dtype:
-        raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be that of the positions, "
-                              f"{np.dtype(dtype)}")
+        raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be {np.dtype(dtype)}")
     if any(stride % array.itemsize for stride in array.strides):
         return array.copy()
     return array

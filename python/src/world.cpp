@@ -1,8 +1,11 @@
 /// Binding of worlds: bodies, states, steps.
 #include "python/src/world.hpp"
 
+#include "src/scene/scene_validate.hpp"
+
 #include <algorithm>
 #include <chrono>
+#include <string>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -32,19 +35,17 @@ WorldSettings world_settings(const std::string& backend, const std::string& algo
 /// Replaces all states, or none if one is invalid.
 void set_states(World& world, const std::vector<BodyState>& states) {
   const std::vector<BodyId> bodies(world.bodies().begin(), world.bodies().end());
-  const std::vector<BodyState> before = world.states();
   if (states.size() != bodies.size()) {
     throw InvalidArgument("there are " + std::to_string(states.size()) +
                           " states; there must be one for each of " +
                           std::to_string(bodies.size()) + " bodies");
   }
-  std::size_t i = 0;
-  try {
-    for (; i < bodies.size(); ++i) world.set_state(bodies[i], states[i]);
-  } catch (...) {
-    while (i-- > 0) world.set_state(bodies[i], before[i]);
-    throw;
+  for (const BodyState& state : states) {
+    if (const std::string fault = find_fault(state); !fault.empty()) {
+      throw InvalidArgument("state: " + fault);
+    }
   }
+  for (std::size_t i = 0; i < bodies.size(); ++i) world.set_state(bodies[i], states[i]);
 }
 
 /// A report as the tuple jfpx.StepReport, in the order of its fields.
