@@ -42,8 +42,8 @@ JFPX_HD constexpr std::uint8_t lowest_free_color(std::uint64_t used) {
 
 /// Assigns the lowest color that neither body has to each new contact, in the order of a hash of
 /// the key. The order is a function of the keys alone, and random orders need few rounds in
-/// parallel (Blelloch, Fineman and Shun 2012). A contact that persists keeps its color, but for
-/// those of the overflow, which are colored again.
+/// parallel (Blelloch, Fineman and Shun 2012). A contact that persists keeps its color, except
+/// in the overflow, whose contacts are colored again.
 ///
 /// Usage in a step: start(), keep() for all colored contacts, add() for all others, finish().
 /// Owns its buffers, which only grow.

@@ -15,7 +15,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// What decides about the rows of a body's contacts, in one byte.
+/// Properties of a body that select the kinds of its rows, as bits of one byte.
 struct BodyTraits {
   static constexpr std::uint8_t kMovable = 1;
   static constexpr std::uint8_t kActive = 2;  ///< movable and awake

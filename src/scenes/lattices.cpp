@@ -30,13 +30,18 @@ Scene in_open_box(const char* name, std::uint32_t count, const Sphere& sphere, R
   return scene;
 }
 
-BodyDef ball_of_a_heap(Random* random, const Vec3& site) {
-  const Real scale = random->uniform(Real(0.9), 1);
-  BodyDef body =
-      sphere_at(site + jitter(*random, Real(0.04)), kRadius * scale, scale * scale * scale);
-  // For the resistance to rolling: without any, some spheres roll in their hollows without end.
-  body.angular_damping = Real(0.5);
-  return body;
+/// @param length as for in_open_box()
+Scene heap(const char* name, const Counts& counts, Real length) {
+  Random random(counts.seed);
+  const auto ball = [&random](const Vec3& site) {
+    const Real scale = random.uniform(Real(0.9), 1);
+    BodyDef body =
+        sphere_at(site + jitter(random, Real(0.04)), kRadius * scale, scale * scale * scale);
+    // For the resistance to rolling: without any, some spheres roll in their hollows without end.
+    body.angular_damping = Real(0.5);
+    return body;
+  };
+  return in_open_box(name, counts.spheres, ball, length);
 }
 
 }  // namespace
@@ -48,18 +53,9 @@ Scene make_pile(const Counts& counts) {
   });
 }
 
-Scene make_heap(const Counts& counts) {
-  Random random(counts.seed);
-  return in_open_box("heap", counts.spheres,
-                     [&random](const Vec3& site) { return ball_of_a_heap(&random, site); });
-}
+Scene make_heap(const Counts& counts) { return heap("heap", counts, 1); }
 
-Scene make_dam_break(const Counts& counts) {
-  Random random(counts.seed);
-  return in_open_box(
-      "dam-break", counts.spheres,
-      [&random](const Vec3& site) { return ball_of_a_heap(&random, site); }, 4);
-}
+Scene make_dam_break(const Counts& counts) { return heap("dam-break", counts, 4); }
 
 Scene make_gas(const Counts& counts) {
   // Volume fraction 0.30: a sphere of radius 1/2 in a cell of edge cbrt(pi / 6 / 0.30).

@@ -58,7 +58,7 @@ class SoftStep {
     cache_.replace_last(std::move(last));
     cache_.drop_forgotten();
   }
-  /// A device has made a step, whose contacts are all of bodies that exist.
+  /// Must be called after a step on a device, whose contacts are all of existing bodies.
   void forget_none() noexcept { cache_.forget_none(); }
 
  private:

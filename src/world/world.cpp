@@ -236,12 +236,13 @@ void World::Impl::undo() noexcept {
   spent_us = 0;
 }
 
-/// Counts the steps at the end of which all bodies sleep.
+/// Counts the steps at the end of which all bodies sleep. A report with a failure is not kept: the
+/// copy of its text may throw.
 void World::Impl::note_rest(const StepReport& report) {
   const bool rests = scene.solver == Solver::soft_step && !report.non_finite && report.awake == 0 &&
-                     !store.has_moving_kinematic_body();
+                     report.device_failure.empty() && !store.has_moving_kinematic_body();
   steps_at_rest = rests ? steps_at_rest + 1 : 0;
-  last_report = report;
+  if (rests) last_report = report;
 }
 
 StepReport World::step() {
@@ -252,7 +253,6 @@ StepReport World::step() {
     report = w.last_report;
     report.step = ++w.steps;
     report.integrate_ms = report.detect_ms = report.resolve_ms = 0;
-    report.device_failure.clear();
     if (!w.repeats_contacts) w.events.invalidate();
     w.repeats_contacts = w.shows_contacts = w.shows_events = true;
     report.total_ms = watch.lap_ms();

@@ -199,7 +199,7 @@ struct World::Impl {
   std::uint64_t steps = 0;
   /// Number of steps, up to the last one, after which no body was awake, without a change since.
   std::uint32_t steps_at_rest = 0;
-  StepReport last_report;
+  StepReport last_report;  ///< of the last of these steps
   /// Whether the last step was left out: the contacts before it are those after it.
   bool repeats_contacts = false;
 

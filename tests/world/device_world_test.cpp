@@ -358,7 +358,7 @@ TEST_P(DeviceWorldTest, ABodyInTheSlotOfARemovedOneStartsWithoutContacts) {
   EXPECT_TRUE(host.snapshot() == device.snapshot());
 }
 
-/// The contacts of a removed sensor wake nobody when another body has its slot.
+/// Contacts of a removed sensor wake no body when another body has its slot.
 TEST_P(DeviceWorldTest, ABodyInTheSlotOfASensorDoesNotWakeWhatTheSensorTouched) {
   Scene scene;
   scene.bodies = {test::ground(), test::heavy({0, 1, 0}), test::ball({0, 1.5_r, 0})};

@@ -25,7 +25,7 @@ struct ConstraintSolverOptions {
   unsigned threads = 1;                   ///< at most 256; 0: one per core
   SimdLevel simd = SimdLevel::automatic;  ///< vector instructions for rows: AVX2 or none
   /// Groups with fewer manifolds are solved by Bullet's own code, for every backend. So are groups
-  /// with little parallelism where that has measured faster, but with 0 or with Backend::cuda.
+  /// with little parallelism where that has measured faster, except with 0 or with Backend::cuda.
   std::size_t minimum_batch = 24;
 };
 

@@ -20,13 +20,11 @@ class BodyBuffers {
   /// @param data gets the addresses
   void upload(const Transfer<Device>& transfer, const BodyStore& store, std::size_t room,
               StepData* data) {
-    reserve(transfer, room);
-    upload_properties(transfer, store.view(), &data->step.bodies);
-    upload_motion(transfer, store.moving, &data->step);
-    const std::size_t n = room;
-    data->saved = {transfer.room(&saved_last_acceleration_, n),
-                   transfer.room(&saved_mean_motion_, n), transfer.room(&saved_rest_time_, n),
-                   transfer.room(&saved_awake_, n)};
+    upload_properties(transfer, store.view(), room, &data->step.bodies);
+    upload_motion(transfer, store.moving, room, &data->step);
+    data->saved = {transfer.room(&saved_last_acceleration_, room),
+                   transfer.room(&saved_mean_motion_, room), transfer.room(&saved_rest_time_, room),
+                   transfer.room(&saved_awake_, room)};
   }
 
   /// Copies forces, and what waking a body changes.
@@ -82,23 +80,18 @@ class BodyBuffers {
             .filter = filter_.data()};
   }
 
-  /// Takes over the numbers of the host, after bodies have come or gone or changed.
-  void update_counts(const BodyView& from, BodyView* to) {
-    to->filters_in_use = from.filters_in_use;
-    to->count = from.count;
-    to->capacity = from.capacity;
-  }
   void update_pairs(const Transfer<Device>& transfer, const BodyView& from, BodyView* to) {
     to->ignored = transfer.put(&ignored_, from.ignored, from.ignored_count);
     to->ignored_count = from.ignored_count;
   }
-  /// Room for the ids of `count` bodies, which swap_ids() makes the current ones.
+  /// Room for the ids of `count` bodies. swap_ids() makes them the current ones.
   BodyId* other_ids(const Transfer<Device>& transfer, std::size_t count) {
     return transfer.room(&ids_[1 - ids_now_], count);
   }
-  void swap_ids(BodyView* bodies) {
+  void swap_ids(std::size_t count, BodyView* bodies) {
     ids_now_ = 1 - ids_now_;
     bodies->ids = ids_[ids_now_].data();
+    bodies->count = static_cast<std::uint32_t>(count);
   }
 
   // What accumulates until the next step.
@@ -109,53 +102,49 @@ class BodyBuffers {
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
 
-  void reserve(const Transfer<Device>& transfer, std::size_t n) {
-    const auto all = [&](auto&... buffers) { (transfer.room(&buffers, n), ...); };
-    all(radius_, extent_, inverse_mass_, friction_, restitution_, rolling_friction_,
-        spinning_friction_, velocity_kept_, angular_velocity_kept_, body_inverse_inertia_, tensor_,
-        acceleration_, can_sleep_, kinematic_, sensor_, filter_);
-    all(position_, velocity_, angular_velocity_, force_, torque_, last_acceleration_, orientation_,
-        inverse_inertia_, mean_motion_, rest_time_, awake_);
-  }
-
-  void upload_properties(const Transfer<Device>& transfer, const BodyView& from, BodyView* to) {
-    const std::size_t n = from.capacity;
+  void upload_properties(const Transfer<Device>& transfer, const BodyView& from, std::size_t room,
+                         BodyView* to) {
+    const auto put = [&](auto* array, const auto* values) {
+      return transfer.put(array, values, from.capacity, room);
+    };
     *to = from;  // the numbers; the pointers follow
-    to->radius = transfer.put(&radius_, from.radius, n);
-    to->extent = transfer.put(&extent_, from.extent, n);
-    to->inverse_mass = transfer.put(&inverse_mass_, from.inverse_mass, n);
-    to->friction = transfer.put(&friction_, from.friction, n);
-    to->restitution = transfer.put(&restitution_, from.restitution, n);
-    to->rolling_friction = transfer.put(&rolling_friction_, from.rolling_friction, n);
-    to->spinning_friction = transfer.put(&spinning_friction_, from.spinning_friction, n);
-    to->velocity_kept = transfer.put(&velocity_kept_, from.velocity_kept, n);
-    to->angular_velocity_kept =
-        transfer.put(&angular_velocity_kept_, from.angular_velocity_kept, n);
-    to->body_inverse_inertia = transfer.put(&body_inverse_inertia_, from.body_inverse_inertia, n);
-    to->tensor = transfer.put(&tensor_, from.tensor, n);
-    to->acceleration = transfer.put(&acceleration_, from.acceleration, n);
-    to->can_sleep = transfer.put(&can_sleep_, from.can_sleep, n);
-    to->kinematic = transfer.put(&kinematic_, from.kinematic, n);
-    to->sensor = transfer.put(&sensor_, from.sensor, n);
-    to->filter = transfer.put(&filter_, from.filter, n);
-    to->ignored = transfer.put(&ignored_, from.ignored, from.ignored_count);
+    to->radius = put(&radius_, from.radius);
+    to->extent = put(&extent_, from.extent);
+    to->inverse_mass = put(&inverse_mass_, from.inverse_mass);
+    to->friction = put(&friction_, from.friction);
+    to->restitution = put(&restitution_, from.restitution);
+    to->rolling_friction = put(&rolling_friction_, from.rolling_friction);
+    to->spinning_friction = put(&spinning_friction_, from.spinning_friction);
+    to->velocity_kept = put(&velocity_kept_, from.velocity_kept);
+    to->angular_velocity_kept = put(&angular_velocity_kept_, from.angular_velocity_kept);
+    to->body_inverse_inertia = put(&body_inverse_inertia_, from.body_inverse_inertia);
+    to->tensor = put(&tensor_, from.tensor);
+    to->acceleration = put(&acceleration_, from.acceleration);
+    to->can_sleep = put(&can_sleep_, from.can_sleep);
+    to->kinematic = put(&kinematic_, from.kinematic);
+    to->sensor = put(&sensor_, from.sensor);
+    to->filter = put(&filter_, from.filter);
+    update_pairs(transfer, from, to);
     to->ids = transfer.put(&ids_[ids_now_], from.ids, from.count);
   }
 
-  void upload_motion(const Transfer<Device>& transfer, const MotionArrays& from,
+  void upload_motion(const Transfer<Device>& transfer, const MotionArrays& from, std::size_t room,
                      soft_step::StepBodies* step) {
+    const auto put = [&](auto* array, const auto& values) {
+      return transfer.put(array, values, room);
+    };
     MotionPointers& to = step->motion;
-    to.position = transfer.put(&position_, from.position);
-    to.orientation = transfer.put(&orientation_, from.orientation);
-    to.velocity = transfer.put(&velocity_, from.velocity);
-    to.angular_velocity = transfer.put(&angular_velocity_, from.angular_velocity);
-    to.force = transfer.put(&force_, from.force);
-    to.torque = transfer.put(&torque_, from.torque);
-    to.last_acceleration = transfer.put(&last_acceleration_, from.last_acceleration);
-    to.inverse_inertia = transfer.put(&inverse_inertia_, from.inverse_inertia);
-    to.mean_motion = transfer.put(&mean_motion_, from.mean_motion);
-    to.rest_time = transfer.put(&rest_time_, from.rest_time);
-    to.awake = transfer.put(&awake_, from.awake);
+    to.position = put(&position_, from.position);
+    to.orientation = put(&orientation_, from.orientation);
+    to.velocity = put(&velocity_, from.velocity);
+    to.angular_velocity = put(&angular_velocity_, from.angular_velocity);
+    to.force = put(&force_, from.force);
+    to.torque = put(&torque_, from.torque);
+    to.last_acceleration = put(&last_acceleration_, from.last_acceleration);
+    to.inverse_inertia = put(&inverse_inertia_, from.inverse_inertia);
+    to.mean_motion = put(&mean_motion_, from.mean_motion);
+    to.rest_time = put(&rest_time_, from.rest_time);
+    to.awake = put(&awake_, from.awake);
     BodyView& bodies = step->bodies;
     bodies.position = to.position;
     bodies.orientation = to.orientation;

@@ -16,8 +16,8 @@ namespace device {
 
 /// Order of the changes of a body in a sweep over the rows: the rows of the overflow, which make no
 /// turns, because barriers enclose them; the rows of its contacts by color, at most one of each;
-/// the body itself, with its fixed bodies. A turn is the sequence number of the last change that
-/// was made. The turns of colors that the body does not have are left out.
+/// the body itself, with its rows with fixed bodies. A turn is the sequence number of the last
+/// change that was made. The turns of colors that the body does not have are left out.
 struct Turns {
   static constexpr std::uint32_t kPerSweep = soft_step::kColors + 2u;
 

@@ -60,7 +60,6 @@ class DeviceStep final : public DeviceWorld {
       room_ = room_ == 0 ? bodies.capacity() : bodies.capacity() + bodies.capacity() / 2;
     }
     bodies_.upload(transfer_, bodies, room_, &data_);
-    id_count_ = data_.step.bodies.count;
     scratch_.reserve_bodies(transfer_, room_, &data_);
     current_sub_shapes().upload(transfer_, sub_shapes->view(), sub_shapes->part_count());
     use_sub_shapes();
@@ -100,13 +99,14 @@ class DeviceStep final : public DeviceWorld {
         if (edit.is_added) added.push_back(bodies.id(i));
         replaced.push_back(edit.is_added ? slot_values(bodies, from, i) : unused_slot(i));
         replaced.back().has_no_contacts = true;
-      } else if (edit.sets_state && !bodies.movable(i)) {  // its velocities say if it is awake
+      } else if (edit.sets_state && !bodies.movable(i)) {  // awake depends on the velocities
         replaced.push_back(slot_values(bodies, from, i));
       } else if (edit.sets_mass) {
         masses.push_back({i, from.inverse_mass[i], from.body_inverse_inertia[i], from.tensor[i]});
       }
     }
-    bodies_.update_counts(from, &data_.step.bodies);
+    data_.step.bodies.capacity = from.capacity;
+    data_.step.bodies.filters_in_use = from.filters_in_use;
     if (sets_pairs) bodies_.update_pairs(transfer_, from, &data_.step.bodies);
     const Contacts& last = last_contacts();
     data_.last = last.view();
@@ -204,8 +204,6 @@ class DeviceStep final : public DeviceWorld {
     device_->run(MergeProgram{.data = data_,
                               .changed = transfer_.put(&changed_, changed),
                               .changed_count = static_cast<std::uint32_t>(changed.size()),
-                              .ids = data_.step.bodies.ids,
-                              .id_count = id_count_,
                               .added_ids = transfer_.put(&added_ids_, *added),
                               .added_id_count = static_cast<std::uint32_t>(added->size()),
                               .to_ids = bodies_.other_ids(transfer_, bodies.size()),
@@ -214,15 +212,14 @@ class DeviceStep final : public DeviceWorld {
                               .added_part_count = added_shapes_.part_count(),
                               .to = after.reserve(transfer_, before, added_shapes_),
                               .kept = kept},
-                 std::max<std::size_t>(id_count_, before.counts().all()));
+                 std::max(data_.step.bodies.count, before.counts().all()));
     SubShapeCounts counts;
     device_->download(&counts, kept, 1);
     device_->wait();
     after.complete(counts + added_shapes_.counts());
     sub_shapes_now_ = 1 - sub_shapes_now_;
     use_sub_shapes();
-    id_count_ = static_cast<std::uint32_t>(bodies.size());
-    bodies_.swap_ids(&data_.step.bodies);
+    bodies_.swap_ids(bodies.size(), &data_.step.bodies);
   }
 
   /// Between two steps, contacts_[now_] are those of the step before the last.
@@ -327,7 +324,6 @@ class DeviceStep final : public DeviceWorld {
   ScratchBuffers<Device> scratch_;
   std::size_t room_ = 0;        ///< number of slots that the buffers of bodies have memory for
   std::size_t most_parts_ = 0;  ///< of compounds, with those that were removed
-  std::uint32_t id_count_ = 0;  ///< number of sorted ids on the device
   // Of edit().
   Buffer<EditedBody> edits_;
   Buffer<EditedMass> masses_;

@@ -81,8 +81,6 @@ struct MergeProgram {
   StepData data;
   const std::uint32_t* changed = nullptr;  ///< slots whose body has come or gone
   std::uint32_t changed_count = 0;
-  const BodyId* ids = nullptr;  ///< before
-  std::uint32_t id_count = 0;
   const BodyId* added_ids = nullptr;
   std::uint32_t added_id_count = 0;
   BodyId* to_ids = nullptr;
@@ -94,11 +92,12 @@ struct MergeProgram {
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
     const SubShapeView& before = data.near.sub_shapes;
+    const BodyId* ids = data.step.bodies.ids;
     team.once([&] { *kept = {}; });
     team.for_each(data.step.bodies.capacity, [&](std::uint32_t i) { data.marked[i] = 0; });
     team.for_each(changed_count, [&](std::uint32_t k) { data.marked[changed[k]] = 1; });
     merge_sorted(
-        team, id_count, [&](std::uint32_t i) { return ids[i].index; },
+        team, data.step.bodies.count, [&](std::uint32_t i) { return ids[i].index; },
         [&](std::uint32_t i) { return data.marked[ids[i].index] == 0; }, added_id_count,
         [&](std::uint32_t k) { return added_ids[k].index; },
         [&](std::uint32_t i, std::uint32_t place) { to_ids[place] = ids[i]; },

@@ -20,15 +20,16 @@ class Transfer {
   explicit Transfer(Device* device) : device_(device) {}
 
   /// Copies an array to the device. @returns its address there
+  /// @param room number of items to reserve memory for, if it is above `count`
   template <class T>
-  const T* put(Buffer<T>* to, const T* from, std::size_t count) const {
-    device_->reserve(to, std::max<std::size_t>(count, 1), "the bodies of a world");
+  const T* put(Buffer<T>* to, const T* from, std::size_t count, std::size_t room = 0) const {
+    device_->reserve(to, std::max({count, room, std::size_t{1}}), "the bodies of a world");
     device_->upload(to->data(), from, count);
     return to->data();
   }
   template <class T>
-  T* put(Buffer<T>* to, const std::vector<T>& from) const {
-    put(to, from.data(), from.size());
+  T* put(Buffer<T>* to, const std::vector<T>& from, std::size_t room = 0) const {
+    put(to, from.data(), from.size(), room);
     return to->data();
   }
   /// Copies as many items as `to` has.
