@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cfenv>
+#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <mutex>
@@ -23,8 +24,18 @@ inline namespace JFPX_ABI {
 
 namespace {
 
-/// Some tens of microseconds, more than most serial parts between two loops of a step.
+using Clock = std::chrono::steady_clock;
+
+/// Some tens of microseconds.
 constexpr unsigned kPolls = 2000;
+/// Longer than the serial parts between two loops of a step.
+constexpr auto kLongWait = std::chrono::milliseconds(1);
+/// A thread that polls takes longer than this between two looks at the clock only if another thread
+/// has had its core.
+constexpr auto kInterruption = std::chrono::microseconds(500);
+/// For so long after an interruption, workers do not poll for long: they would take cores from
+/// threads that have work.
+constexpr auto kCrowded = std::chrono::milliseconds(50);
 constexpr std::uint64_t kChunksLeft = 0xffffffffu;
 
 }  // namespace
@@ -68,7 +79,8 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
 
   void run_job(const Job& job);
   void work(unsigned self);
-  void wait_for_job(std::uint32_t* seen) const;
+  void wait_for_job(std::uint32_t* seen);
+  void poll(std::uint32_t last);
   void take_chunks(unsigned self);
   void take_chunks_of(unsigned owner, bool is_worker, std::uint32_t* prepared);
   void run_chunk(std::size_t chunk);
@@ -87,6 +99,8 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   unsigned polls_ = 0;                 ///< number of times that a worker polls before it sleeps
   std::unique_ptr<Ticket[]> tickets_;  ///< by thread; 0 is the caller
   std::atomic<bool> busy_{false};
+  /// Since the epoch of the clock.
+  std::atomic<Clock::duration> crowded_until_{Clock::duration::zero()};
   alignas(64) std::atomic<std::uint32_t> number_{0};  ///< of the last job
   alignas(64) std::atomic<std::uint32_t> done_{0};    ///< chunks of the job that are complete
   std::atomic<bool> stopped_{false};
@@ -186,11 +200,29 @@ void ThreadPool::Workers::work(unsigned self) {
 }
 
 /// @param seen number of the last job
-void ThreadPool::Workers::wait_for_job(std::uint32_t* seen) const {
-  const std::uint32_t last = *seen;
-  for (unsigned i = 0; i < polls_ && number_.load() == last; ++i) pause();
-  number_.wait(last);
+void ThreadPool::Workers::wait_for_job(std::uint32_t* seen) {
+  poll(*seen);
+  number_.wait(*seen);
   *seen = number_.load();
+}
+
+/// Polls until the next job begins, for a limited time. @param last number of the last job
+void ThreadPool::Workers::poll(std::uint32_t last) {
+  const auto begins = [&](unsigned polls) {
+    for (unsigned i = 0; i < polls && number_.load() == last; ++i) pause();
+    return number_.load() != last;
+  };
+  if (begins(polls_) || polls_ == 0) return;
+  constexpr unsigned kPollsPerLook = 64;
+  const auto start = Clock::now();
+  if (start.time_since_epoch() < crowded_until_.load(std::memory_order_relaxed)) return;
+  auto now = start;
+  while (now - start < kLongWait && !begins(kPollsPerLook)) {
+    const auto before = std::exchange(now, Clock::now());
+    if (now - before < kInterruption) continue;
+    crowded_until_.store((now + kCrowded).time_since_epoch(), std::memory_order_relaxed);
+    return;
+  }
 }
 
 /// The first chunk of a thread, among those of the job; for `owner` = thread_count_, their end.
