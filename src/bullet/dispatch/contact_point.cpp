@@ -6,6 +6,7 @@
 #include <jfpx/math.hpp>
 
 #include "src/bullet/dispatch/body_wrapper.hpp"
+#include "src/bullet/dispatch/plane_gap.hpp"
 #include "src/bullet/dispatch/sphere_box.hpp"
 #include "src/bullet/dispatch/sphere_plane.hpp"
 
@@ -89,6 +90,12 @@ bool update_sphere_plane(btPersistentManifold* manifold, const btCollisionObject
                          const btCollisionObject& body_b, bool sphere_first) {
   const btCollisionObject& sphere = sphere_first ? body_a : body_b;
   const btCollisionObject& plane = sphere_first ? body_b : body_a;
+  if (manifold->getNumContacts() == 0 &&
+      is_clear_of_plane(sphere,
+                        static_cast<const btSphereShape&>(*sphere.getCollisionShape()).getRadius(),
+                        plane, manifold->getContactBreakingThreshold())) {
+    return true;
+  }
   const SpherePlaneContact contact = find_closest_points(
       sphere.getWorldTransform(), static_cast<const btSphereShape&>(*sphere.getCollisionShape()),
       plane.getWorldTransform(),

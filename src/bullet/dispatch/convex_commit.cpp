@@ -8,9 +8,11 @@
 
 #include "src/bullet/dispatch/body_wrapper.hpp"
 #include "src/bullet/dispatch/contact_point.hpp"
+#include "src/bullet/dispatch/plane_gap.hpp"
 #include "src/bullet/exact_class.hpp"
 
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 
 #include <typeinfo>
@@ -65,6 +67,19 @@ bool update_sphere(const SphereBatch& batch, std::size_t i, CommitCounts* counts
   return false;
 }
 
+/// Whether pair i is a box far from a plane, without contact points.
+bool is_clear_box(const SphereBatch& batch, std::size_t i) {
+  const bool box_first = batch.kind(i) == PairKind::convex_plane;
+  if (!box_first && batch.kind(i) != PairKind::plane_convex) return false;
+  const btPersistentManifold& manifold = *batch.manifold(i);
+  if ((batch.either_trait(i) & kBox) == 0 || manifold.getNumContacts() != 0) return false;
+  const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
+  const btCollisionObject &box = box_first ? a : b, &plane = box_first ? b : a;
+  const auto& shape = static_cast<const btBoxShape&>(*box.getCollisionShape());
+  return is_clear_of_plane(box, shape.getHalfExtentsWithMargin().length(), plane,
+                           manifold.getContactBreakingThreshold());
+}
+
 void run_algorithm(const ConvexDispatch& dispatch, std::size_t i) {
   const btCollisionObjectWrapper a = wrapper_of(*dispatch.batch.body_a(i));
   const btCollisionObjectWrapper b = wrapper_of(*dispatch.batch.body_b(i));
@@ -96,7 +111,7 @@ bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* 
   }
   if (update_sphere(batch, i, counts)) return true;
   if (!dispatch.runs_algorithms) return false;
-  run_algorithm(dispatch, i);
+  if (!is_clear_box(batch, i)) run_algorithm(dispatch, i);
   ++counts->convex_pairs;
   return true;
 }

@@ -20,7 +20,7 @@ struct CommitCounts {
   std::uint64_t written = 0;        ///< sphere pairs updated without Bullet's algorithm
   std::uint64_t sphere_boxes = 0;   ///< sphere-box pairs updated without Bullet's algorithm
   std::uint64_t sphere_planes = 0;  ///< sphere-plane pairs updated without Bullet's algorithm
-  std::uint64_t convex_pairs = 0;   ///< other convex pairs updated by Bullet's algorithms
+  std::uint64_t convex_pairs = 0;   ///< other convex pairs, updated by Bullet's algorithms if near
 
   CommitCounts& operator+=(const CommitCounts& other);
 };
