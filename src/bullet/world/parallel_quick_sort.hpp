@@ -24,6 +24,10 @@ class ParallelQuickSort {
   /// Allocates no memory.
   void sort(ThreadPool& pool, std::span<T> items) const {
     if (items.size() < 2) return;
+    if (are_equal(items)) {
+      permute_equal(items);
+      return;
+    }
     std::array<Part, kMaxParts> parts{Part{0, items.size() - 1}}, halves;
     std::size_t count = 1;
     // Each round halves the parts, so its time is that of the largest part.
@@ -69,11 +73,35 @@ class ParallelQuickSort {
   }
   void sort_part(std::span<T> items, Part part) const {
     while (part.steps() > 0) {
+      const std::span<T> all = items.subspan(part.first, part.steps() + 1);
+      if (are_equal(all)) {
+        permute_equal(all);
+        return;
+      }
       // Recursion into the smaller part limits the depth.
       const auto [left, right] = partition(items, part);
       const bool left_is_smaller = left.steps() < right.steps();
       sort_part(items, left_is_smaller ? left : right);
       part = left_is_smaller ? right : left;
+    }
+  }
+
+  bool are_equal(std::span<const T> items) const {
+    return std::all_of(items.begin() + 1, items.end(), [&](const T& item) {
+      return !less_(item, items[0]) && !less_(items[0], item);
+    });
+  }
+  /// The permutation of equal items. The partition of a range reverses it, except for the item in
+  /// the middle, and the partitions of its halves reverse these back. Both rounds together exchange
+  /// the halves.
+  static void permute_equal(std::span<T> items) {
+    const std::size_t half = items.size() / 2, quarter = half / 2;
+    if (half == 0) return;
+    const std::span<T> left = items.first(half), right = items.last(half);
+    std::swap_ranges(left.begin(), left.end(), right.begin());
+    for (const std::span<T> part : {left, right}) {
+      permute_equal(part.first(quarter));
+      permute_equal(part.last(quarter));
     }
   }
 
