@@ -671,6 +671,54 @@ TEST(DynamicsWorld, AllowsADebugDrawerToRemoveBodies) {
   worlds.ours().world.setDebugDrawer(nullptr);
 }
 
+/// Logs the poses that it receives; moves a kinematic body.
+class LoggingMotionState final : public btMotionState {
+ public:
+  explicit LoggingMotionState(int number) : number_(number) {}
+  void getWorldTransform(btTransform& pose) const override {
+    pose.setIdentity();
+    pose.setOrigin(btVector3(btScalar(asked_++) / 64, btScalar(0.49), -5));
+  }
+  void setWorldTransform(const btTransform& pose) override {
+    std::ostringstream text;
+    text << std::hexfloat << number_ << ": " << pose.getOrigin().x() << ' ' << pose.getOrigin().y();
+    log_event(text.str());
+  }
+
+ private:
+  int number_;
+  mutable int asked_ = 0;
+};
+
+TEST(DynamicsWorld, CallsMotionStatesAsStockDoes) {
+  Twins twins({.parts = {.world = our_world({}).world}});
+  std::vector<std::unique_ptr<LoggingMotionState>> states;
+  twins.both([&](BulletWorld& w) {
+    w.world.setSynchronizeAllMotionStates(false);
+    add_heap(w, 60, 5);
+    for (int i = 1; i <= 20; ++i) {
+      states.push_back(std::make_unique<LoggingMotionState>(i));
+      w.bodies[static_cast<std::size_t>(i)]->setMotionState(states.back().get());
+    }
+    btRigidBody* pusher = w.bodies[20].get();
+    w.world.removeRigidBody(pusher);
+    pusher->setCollisionFlags(pusher->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    pusher->setActivationState(DISABLE_DEACTIVATION);
+    w.world.addRigidBody(pusher);
+  });
+  for (int step = 0; step < 60; ++step) {
+    twins.both([&](BulletWorld& w) {
+      if (step == 20) w.world.setSynchronizeAllMotionStates(true);
+      if (step == 30) w.world.setLatencyMotionStateInterpolation(false);
+      if (step == 40) w.bodies[3]->forceActivationState(ISLAND_SLEEPING);
+      w.bodies[5]->applyCentralForce(btVector3(0, 3, 0));
+      w.world.stepSimulation(btScalar(1) / 60, 3, btScalar(1) / 100);
+    });
+    ASSERT_TRUE(twins.compare()) << "step " << step;
+  }
+  EXPECT_GT(twins.ours().log.size(), 500u);
+}
+
 TEST(DynamicsWorld, OwnsADefaultSolver) {
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher(&configuration);

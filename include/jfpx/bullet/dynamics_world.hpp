@@ -19,9 +19,10 @@ struct DynamicsWorldOptions {
 };
 
 /// A btDiscreteDynamicsWorld that sorts manifolds by island with compact keys instead of through
-/// pointers, predicts and integrates bodies in parallel, and finds the overlapping pairs of a
+/// pointers, runs the loops over bodies in parallel, and finds the overlapping pairs of a
 /// btDbvtBroadphase, and those of an object to remove, in parallel. Pairs, groups, their order,
-/// sleeping, velocities and transforms are those of btDiscreteDynamicsWorld, bit for bit.
+/// sleeping, velocities and transforms are those of btDiscreteDynamicsWorld, bit for bit. Motion
+/// states are called by the thread that steps the world.
 ///
 /// In steps with continuous collision of any body, bodies are integrated one at a time, because the
 /// sweep of each body depends on the new positions of the bodies before it. All overrides and calls
@@ -47,6 +48,9 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
   DynamicsWorld(const DynamicsWorld&) = delete;
   DynamicsWorld& operator=(const DynamicsWorld&) = delete;
 
+  void applyGravity() override;
+  void clearForces() override;
+  void synchronizeMotionStates() override;
   void updateAabbs() override;
   void computeOverlappingPairs() override;
   void solveConstraints(btContactSolverInfo& info) override;
@@ -62,6 +66,7 @@ class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
   void createPredictiveContacts(btScalar dt) override;
   void calculateSimulationIslands() override;
   void integrateTransforms(btScalar dt) override;
+  void updateActivationState(btScalar dt) override;
 
  private:
   bool is_small() const noexcept;

@@ -32,6 +32,21 @@ int island_of(const btTypedConstraint* constraint) {
 }
 bool is_movable(const btCollisionObject& object) { return !object.isStaticOrKinematicObject(); }
 
+/// As btDiscreteDynamicsWorld::updateActivationState().
+void update_activation(btRigidBody& body, btScalar dt) {
+  body.updateDeactivation(dt);
+  if (!body.wantsSleeping()) {
+    if (body.getActivationState() != DISABLE_DEACTIVATION) body.setActivationState(ACTIVE_TAG);
+  } else if (!is_movable(body)) {
+    body.setActivationState(ISLAND_SLEEPING);
+  } else if (body.getActivationState() == ACTIVE_TAG) {
+    body.setActivationState(WANTS_DEACTIVATION);
+  } else if (body.getActivationState() == ISLAND_SLEEPING) {
+    body.setAngularVelocity(btVector3(0, 0, 0));
+    body.setLinearVelocity(btVector3(0, 0, 0));
+  }
+}
+
 }  // namespace
 
 struct DynamicsWorld::Impl {
@@ -54,18 +69,19 @@ struct DynamicsWorld::Impl {
                 run(&bodies[static_cast<int>(first)], static_cast<int>(last - first));
               });
   }
-  /// Whether continuous collision may shorten the path of any body.
-  bool has_swept_bodies(btAlignedObjectArray<btRigidBody*>& bodies, const btDispatcherInfo& info) {
-    if (!info.m_useContinuous) return false;
+  template <class Predicate>
+  bool any_body(btAlignedObjectArray<btRigidBody*>& bodies, const Predicate& predicate) {
     std::atomic<bool> found{false};
     in_body_chunks(bodies, [&](btRigidBody** part, int count) {
-      if (std::any_of(part, part + count, [](const btRigidBody* body) {
-            return body->getCcdSquareMotionThreshold() != 0;
-          })) {
-        found.store(true, std::memory_order_relaxed);
-      }
+      if (std::any_of(part, part + count, predicate)) found.store(true, std::memory_order_relaxed);
     });
     return found;
+  }
+  /// Whether continuous collision may shorten the path of any body.
+  bool has_swept_bodies(btAlignedObjectArray<btRigidBody*>& bodies, const btDispatcherInfo& info) {
+    return info.m_useContinuous && any_body(bodies, [](const btRigidBody* body) {
+             return body->getCcdSquareMotionThreshold() != 0;
+           });
   }
 };
 
@@ -82,6 +98,49 @@ void DynamicsWorld::set_minimum_batch(std::size_t bodies) noexcept {
 }
 bool DynamicsWorld::is_small() const noexcept {
   return static_cast<std::size_t>(m_nonStaticRigidBodies.size()) < impl_->minimum_batch;
+}
+
+void DynamicsWorld::applyGravity() {
+  if (is_small()) {
+    btDiscreteDynamicsWorld::applyGravity();
+    return;
+  }
+  impl_->in_body_chunks(m_nonStaticRigidBodies, [](btRigidBody** bodies, int count) {
+    for (int i = 0; i < count; ++i) {
+      if (bodies[i]->isActive()) bodies[i]->applyGravity();
+    }
+  });
+}
+
+void DynamicsWorld::clearForces() {
+  if (is_small()) {
+    btDiscreteDynamicsWorld::clearForces();
+    return;
+  }
+  impl_->in_body_chunks(m_nonStaticRigidBodies, [](btRigidBody** bodies, int count) {
+    for (int i = 0; i < count; ++i) bodies[i]->clearForces();
+  });
+}
+
+// A motion state may be of the user's class.
+void DynamicsWorld::synchronizeMotionStates() {
+  if (is_small() || m_synchronizeAllMotionStates ||
+      impl_->any_body(m_nonStaticRigidBodies, [](const btRigidBody* body) {
+        return body->getMotionState() != nullptr && body->isActive();
+      })) {
+    btDiscreteDynamicsWorld::synchronizeMotionStates();
+  }
+}
+
+void DynamicsWorld::updateActivationState(btScalar dt) {
+  if (is_small()) {
+    btDiscreteDynamicsWorld::updateActivationState(dt);
+    return;
+  }
+  BT_PROFILE("updateActivationState");
+  impl_->in_body_chunks(m_nonStaticRigidBodies, [&](btRigidBody** bodies, int count) {
+    for (int i = 0; i < count; ++i) update_activation(*bodies[i], dt);
+  });
 }
 
 void DynamicsWorld::predictUnconstraintMotion(btScalar dt) {
