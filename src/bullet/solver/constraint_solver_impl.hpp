@@ -76,7 +76,7 @@ struct ConstraintSolver::Impl {
   void set_up_joints();
   void set_up_unlisted_bodies(std::span<btPersistentManifold* const> manifolds);
   void pack(const btSolverBody& body, std::size_t id);
-  void clear_velocities(std::size_t id);
+  void start(const btSolverBody& body, std::size_t id);
 
   // group_rows.cpp
   void set_up_rows();

@@ -100,13 +100,12 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
   std::uint32_t count = 0;
   bool rolling = false, unlisted = false, anisotropic = false;
   for (std::size_t i = first; i < last; ++i) {
-    if (i + kManifoldsAhead < last) {
-      prefetch_header(manifolds[i + kManifoldsAhead]);
-      prefetch(&manifolds[i + kManifoldsAhead]->getContactPoint(0).m_distance1);
-    }
+    if (i + kManifoldsAhead < last) prefetch_header(manifolds[i + kManifoldsAhead]);
     if (i + kObjectsAhead < last) {
-      prefetch_island_state(manifolds[i + kObjectsAhead]->getBody0());
-      prefetch_island_state(manifolds[i + kObjectsAhead]->getBody1());
+      const btPersistentManifold& later = *manifolds[i + kObjectsAhead];
+      prefetch_island_state(later.getBody0());
+      prefetch_island_state(later.getBody1());
+      if (later.getNumContacts() > 0) prefetch(&later.getContactPoint(0).m_distance1);
     }
     btPersistentManifold* manifold = manifolds[i];
     const int points = manifold->getNumContacts();

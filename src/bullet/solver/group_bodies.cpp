@@ -39,7 +39,7 @@ void ConstraintSolver::Impl::set_up_body(std::size_t i, btCollisionObject* objec
   btSolverBody& body = self.m_tmpSolverBodyPool[static_cast<int>(i)];
   btRigidBody* original = moving_body(object);
   self.initSolverBody(&body, original, settings.dt);
-  clear_velocities(i + 1);
+  start(body, i + 1);
   if (original == nullptr) return;
   object->setCompanionId(static_cast<int>(i));
   if (original->getInvMass() != 0) add_gyroscopic_impulses(*info, &body);
@@ -57,7 +57,10 @@ void ConstraintSolver::Impl::pack(const btSolverBody& body, std::size_t id) {
   }
 }
 
-void ConstraintSolver::Impl::clear_velocities(std::size_t id) {
+/// Sets the position of a body, and its velocities to 0.
+void ConstraintSolver::Impl::start(const btSolverBody& body, std::size_t id) {
+  const btVector3& position = body.m_worldTransform.getOrigin();
+  solver.set_position(id, {position.x(), position.y(), position.z()});
   std::fill_n(solver.velocity(id), rows::kVelocityFields, Real(0));
   std::fill_n(solver.push_velocity(id), rows::kVelocityFields, Real(0));
 }
@@ -86,7 +89,7 @@ void ConstraintSolver::Impl::set_up_joints() {
   for (std::size_t i = 0; i < count; ++i) {
     const btSolverBody& body = pool[static_cast<int>(i)];
     if (i >= bodies.size()) {
-      clear_velocities(i + 1);
+      start(body, i + 1);
       if (body.m_originalBody != nullptr) {
         pack(body, i + 1);
         flags[i + 1] = body_flags(*body.m_originalBody);
@@ -108,7 +111,7 @@ void ConstraintSolver::Impl::set_up_unlisted_bodies(
     const auto id = static_cast<std::size_t>(unlisted.object->getCompanionId()) + 1;
     btSolverBody& body = self.m_tmpSolverBodyPool.expandNonInitializing();
     self.initSolverBody(&body, unlisted.object, settings.dt);
-    clear_velocities(id);
+    start(body, id);
     pack(body, id);
   }
 }

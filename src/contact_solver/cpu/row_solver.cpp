@@ -1,8 +1,8 @@
-/// Scheduling of rows in blocks, and the threads that sweep over them; see the header.
+/// Arrangement of rows in blocks, and the threads that sweep over them; see the header.
 #include "src/contact_solver/cpu/row_solver.hpp"
 
+#include "src/base/backoff.hpp"
 #include "src/base/cpu.hpp"
-#include "src/base/pause.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <thread>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -19,10 +19,16 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Blocks of a work item: about a microsecond of work, ten times the cost of claiming the item.
-constexpr std::uint32_t kBlocksPerItem = 12;
+/// Blocks of a color that are worth a thread: about half a microsecond of work, several times what
+/// the threads wait for each other.
+constexpr std::uint32_t kBlocksPerPart = 12;
 /// Below this number of blocks, waking a second thread costs more than it saves.
 constexpr std::uint32_t kBlocksPerThread = 64;
+/// Number of waits after which a thread takes over the items of another one, which may have lost
+/// its core: some microseconds, longer than an item takes.
+constexpr std::uint64_t kWaitsForOthers = 200;
+/// Resolution of the order of the bodies along an axis.
+constexpr std::uint32_t kSlices = 1024;
 /// First of the two alternatives of the chooser; the other is one thread.
 constexpr std::size_t kSeveralThreads = 0;
 /// [us] Shorter than any sweep over a block, so that the chooser measures both alternatives.
@@ -43,130 +49,132 @@ bool all_finite(const Real* values, std::size_t count) {
   return finite;
 }
 
-/// Bounded waiting for other threads, which may be waiting for a processor themselves: spins first,
-/// then yields.
-class Backoff {
- public:
-  /// @param endless without it the wait ends after some tens of microseconds on a free processor,
-  ///   and after some time slices of other threads on a busy one
-  explicit Backoff(bool endless) : endless_(endless) {}
-
-  /// Waits a moment. @return false when the limit is reached
-  bool wait() {
-    if (waits_ < kSpins) {
-      pause();
-    } else {
-      if (!endless_ && waits_ >= kSpins + kYields) return false;
-      std::this_thread::yield();
-    }
-    ++waits_;
-    return true;
-  }
-  void reset() { waits_ = 0; }
-
- private:
-  static constexpr std::uint64_t kSpins = 1000, kYields = 50;
-  bool endless_;
-  std::uint64_t waits_ = 0;
-};
-
 }  // namespace
 
-/// Passes over the blocks, repeated until the residual is small. Work items are numbered through
-/// all passes and iterations and claimed in order. A thread claims an item only when the item can
-/// run immediately, so a waiting thread blocks no other one and may leave.
+/// A thread that sweeps, written by itself except for its presence.
+struct alignas(64) RowSolver::Participant {
+  std::atomic<std::uint64_t> done[kPrograms];  ///< by program: number of items that it has solved
+  std::atomic<bool> present;                   ///< whether it solves the items of its part
+
+  bool is_present() const { return present.load(std::memory_order_relaxed); }
+  /// Writes only changes, because other threads read the cache line.
+  void set_present(bool value) {
+    if (is_present() != value) present.store(value, std::memory_order_relaxed);
+  }
+};
+
+/// Passes over the blocks, repeated until the residual is small. Each pass is a sequence of stages,
+/// which end when all of their items are done. A thread solves the items of its part of the bodies,
+/// so that its caches keep them, and takes over those of threads that are absent or late. A waiting
+/// thread has claimed nothing and may leave.
 struct RowSolver::Program {
   struct Pass {
-    RowSweep sweep;
-    const WorkItem* items;
-    std::uint64_t item_count;
+    RowSweep sweep;  ///< null: the serial rows
+    const WorkList* list;
+    std::atomic<std::uint32_t>* claims;  ///< number of iterations in which an item was claimed
   };
 
   RowArrays arrays{};
-  Pass passes[3];
+  Pass passes[4];
   std::size_t pass_count = 0;
   std::uint64_t iterations = 0;        ///< iterations of the serial rows and of all
   std::uint64_t block_iterations = 0;  ///< iterations that include the blocks
   SerialRows* serial = nullptr;
   Real threshold = -1;
   std::atomic<Real>* residuals = nullptr;  ///< one per iteration
-  std::atomic<std::uint64_t> next{0}, done{0};
-  std::atomic<bool> broken{false}, ended{false};
+  std::size_t number = 0;                  ///< of the program
+  std::span<Participant> participants{};   ///< by part
+  std::atomic<bool> broken{false};
 
-  /// The serial rows are one work item, the first of an iteration.
-  std::uint64_t serial_items() const { return serial == nullptr ? 0 : 1; }
-  std::uint64_t items_per_iteration() const {
-    std::uint64_t count = serial_items();
-    for (std::size_t i = 0; i < pass_count; ++i) count += passes[i].item_count;
-    return count;
-  }
-  void add(RowSweep sweep, const WorkItem* list, std::uint64_t count) {
-    passes[pass_count++] = {sweep, list, count};
-  }
-
-  /// Runs work items until none is left. @return false if the backoff reached its limit before
-  bool join(Backoff backoff) {
-    const std::uint64_t per_iteration = items_per_iteration();
-    std::uint64_t number = next.load(std::memory_order_relaxed);
-    for (;;) {
-      const std::uint64_t iteration = per_iteration == 0 ? iterations : number / per_iteration;
-      if (iteration >= iterations) return true;
-      const std::uint64_t start = iteration * per_iteration;
-      const Task task = task_of(number - start, iteration);
-      if (done.load(std::memory_order_acquire) < start + task.after) {
-        if (ended.load(std::memory_order_relaxed)) return true;
-        if (!backoff.wait()) return false;
-        number = next.load(std::memory_order_relaxed);
-        continue;
+  /// Runs the program, together with the other threads that join.
+  /// @param self the part of this thread
+  /// @return false if the backoff has reached its limit before the end
+  bool join(std::uint32_t self, Backoff backoff) {
+    std::uint64_t before = 0;  // number of items of earlier stages
+    for (std::uint64_t iteration = 0; iteration < iterations; ++iteration) {
+      if (iteration > 0 && is_last(iteration - 1)) break;
+      Real raised = 0;
+      for (std::size_t i = 0; i < pass_count; ++i) {
+        const Pass& pass = passes[i];
+        if (pass.sweep != nullptr && iteration >= block_iterations) continue;
+        for (const WorkStage& stage : pass.list->stages()) {
+          if (!run_stage(pass, stage, iteration, before, self, backoff, &raised)) return false;
+          before += stage.last - stage.first;
+        }
       }
-      if (iteration > 0 && is_last(iteration - 1)) ended.store(true, std::memory_order_relaxed);
-      if (ended.load(std::memory_order_relaxed)) return true;
-      if (!next.compare_exchange_weak(number, number + 1, std::memory_order_relaxed)) continue;
-      backoff.reset();
-      RowResidual residual;
-      if (task.sweep != nullptr) {
-        task.sweep(arrays, task.first, task.last, &residual);
-      } else if (task.is_serial) {
-        serial->sweep(static_cast<int>(iteration), &residual);
-      }
-      if (residual.broken) broken.store(true, std::memory_order_relaxed);
-      raise(residuals + iteration, residual.largest);
-      done.fetch_add(1, std::memory_order_release);
-      ++number;
     }
-  }
-  bool is_done() const {
-    return done.load(std::memory_order_acquire) >= iterations * items_per_iteration();
+    return true;
   }
 
-  /// The task of a work item. It may begin when the first `after` items of its iteration, and all
-  /// items of earlier iterations, are done.
-  struct Task {
-    RowSweep sweep = nullptr;
-    bool is_serial = false;
-    std::uint32_t first = 0, last = 0;
-    std::uint64_t after = 0;
-  };
-  Task task_of(std::uint64_t number, std::uint64_t iteration) const {
-    if (number < serial_items()) return {.is_serial = true};
-    std::uint64_t start = serial_items();
-    const Pass* pass = passes;
-    for (; number - start >= pass->item_count; ++pass) start += pass->item_count;
-    const WorkItem& item = pass->items[number - start];
-    return {.sweep = iteration < block_iterations ? pass->sweep : nullptr,
-            .first = item.first,
-            .last = item.last,
-            .after = start + item.after};
-  }
-  bool is_last(std::uint64_t iteration) const {
-    return iteration + 1 == iterations ||
-           residuals[iteration].load(std::memory_order_relaxed) <= threshold;
-  }
   int iterations_done() const {
     if (iterations == 0) return 0;
     std::uint64_t i = 0;
     while (!is_last(i)) ++i;
     return static_cast<int>(i) + 1;
+  }
+
+ private:
+  /// @param before number of items of earlier stages, which are done
+  /// @param raised the residual of the iteration is at least that
+  bool run_stage(const Pass& pass, const WorkStage& stage, std::uint64_t iteration,
+                 std::uint64_t before, std::uint32_t self, Backoff backoff, Real* raised) {
+    const std::uint64_t after = before + (stage.last - stage.first);
+    if (is_done(after)) return true;
+    participants[self].set_present(true);
+    const WorkItem* const items = pass.list->items();
+    for (std::uint32_t i = stage.first; i < stage.last; ++i) {
+      const std::uint32_t part = items[i].part;
+      if (part == self || !participants[part].is_present()) {
+        run_item(pass, items[i], iteration, self, raised);
+      }
+    }
+    for (std::uint64_t waits = 1; !is_done(after); ++waits) {
+      if (!backoff.wait()) {
+        participants[self].set_present(false);
+        return false;
+      }
+      if (waits % kWaitsForOthers != 0) continue;
+      for (std::uint32_t i = stage.first; i < stage.last; ++i) {
+        if (run_item(pass, items[i], iteration, self, raised)) {
+          participants[items[i].part].set_present(false);
+        }
+      }
+    }
+    return true;
+  }
+
+  /// @return whether the item was not claimed before
+  bool run_item(const Pass& pass, const WorkItem& item, std::uint64_t iteration, std::uint32_t self,
+                Real* raised) {
+    auto claimed = static_cast<std::uint32_t>(iteration);
+    if (!pass.claims[item.claim].compare_exchange_strong(claimed, claimed + 1,
+                                                         std::memory_order_relaxed)) {
+      return false;
+    }
+    RowResidual residual;
+    if (pass.sweep != nullptr) {
+      pass.sweep(arrays, item.blocks.first, item.blocks.last, &residual);
+    } else {
+      serial->sweep(static_cast<int>(iteration), &residual);
+    }
+    if (residual.broken) broken.store(true, std::memory_order_relaxed);
+    if (residual.largest > *raised) raise(residuals + iteration, *raised = residual.largest);
+    std::atomic<std::uint64_t>& done = participants[self].done[number];
+    done.store(done.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+    return true;
+  }
+
+  /// Whether all threads together have completed so many items.
+  bool is_done(std::uint64_t items) const {
+    std::uint64_t sum = 0;
+    for (const Participant& participant : participants) {
+      sum += participant.done[number].load(std::memory_order_acquire);
+    }
+    return sum >= items;
+  }
+  bool is_last(std::uint64_t iteration) const {
+    return iteration + 1 == iterations ||
+           residuals[iteration].load(std::memory_order_relaxed) <= threshold;
   }
   static void raise(std::atomic<Real>* value, Real to) {
     Real now = value->load(std::memory_order_relaxed);
@@ -175,8 +183,15 @@ struct RowSolver::Program {
   }
 };
 
+RowSolver::~RowSolver() = default;
+
 RowSolver::RowSolver(unsigned threads, SimdLevel simd)
-    : kernels_(row_kernels(simd)), pool_(threads) {}
+    : kernels_(row_kernels(simd)), pool_(threads) {
+  static_assert(ThreadPool::kMaxThreads <= 256, "part_of_body_ has a byte a body");
+  participants_ = std::make_unique<Participant[]>(pool_.threads());
+  constexpr BlockRange kOne{0, 1};
+  serial_list_.build({&kOne, 1}, 1);
+}
 
 void RowSolver::resize_bodies(std::size_t count) {
   bodies_.reserve(count * rows::kBodyFields, "bodies of a solver", body_count_ * rows::kBodyFields);
@@ -186,25 +201,44 @@ void RowSolver::resize_bodies(std::size_t count) {
                            body_count_ * rows::kVelocityFields);
   factors_.reserve(count * rows::kFactorFields, "factors of a solver",
                    body_count_ * rows::kFactorFields);
+  positions_.reserve(count, "bodies of a solver", body_count_);
   body_count_ = count;
+  is_divided_ = false;
   std::fill_n(body(0), rows::kBodyFields, Real(0));
   std::fill_n(velocity(0), rows::kVelocityFields, Real(0));
   std::fill_n(push_velocity(0), rows::kVelocityFields, Real(0));
   std::fill_n(factors(0), rows::kFactorFields, Real(0));
+  set_position(0, {});
 }
 
 void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t directions) {
   directions_ = directions;
-  rolling_friction_blocks_.count = rolling_friction_blocks_.item_count = 0;
-  const std::uint32_t lanes = kernels_.lanes;
+  rolling_friction_blocks_.count = 0;
+  rolling_friction_blocks_.list.build({}, 1);
   coloring_.build(pairs, body_count_);
-  next_lane_.reserve(pairs.size(), "contacts of a solver");
-  color_end_.reserve(pairs.size(), "contacts of a solver");
+  pairs_ = pairs;
+  choose_parts();
+  if (parts_ > 1) divide_bodies();
+  const std::uint32_t lanes = kernels_.lanes;
+  const std::size_t groups = std::size_t{colors()} * parts_;
+  ranges_.reserve(groups, "contacts of a solver");
+  next_lane_.reserve(groups, "contacts of a solver");
+  const auto group_of = [&](std::size_t contact) {
+    const std::uint32_t color = coloring_.colors_of_contacts()[contact];
+    const bool is_small = coloring_.contacts_of(color) <= WorkList::kSmallColor * lanes;
+    return std::size_t{color} * parts_ + (is_small ? 0 : part_of(pairs[contact]));
+  };
+  std::fill_n(next_lane_.data(), groups, 0u);
+  for (std::size_t i = 0; i < pairs.size(); ++i) ++next_lane_[group_of(i)];
+  // The blocks of a part follow each other, so that its thread sets them up.
   blocks_ = 0;
-  for (std::uint32_t color = 0; color < coloring_.colors(); ++color) {
-    next_lane_[color] = blocks_ * lanes;
-    blocks_ += (coloring_.contacts_of(color) + lanes - 1) / lanes;
-    color_end_[color] = blocks_;
+  for (std::uint32_t part = 0; part < parts_; ++part) {
+    for (std::size_t group = part; group < groups; group += parts_) {
+      const std::uint32_t first = blocks_;
+      blocks_ += (next_lane_[group] + lanes - 1) / lanes;
+      ranges_[group] = {first, blocks_};
+      next_lane_[group] = first * lanes;
+    }
   }
   const std::size_t slots = std::size_t{blocks_} * lanes;
   order_.reserve(slots, "contacts of a solver");
@@ -213,70 +247,133 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
   frictions_.reserve(slots * directions * rows::kFrictionFields, "rows of a solver");
   std::fill_n(order_.data(), slots, kNoContact);
   std::fill_n(ids_.data(), 2 * slots, rows::kFixedBody);
-  const std::uint32_t* const colors = coloring_.colors_of_contacts();
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const std::uint32_t slot = next_lane_[colors[i]]++;
+    const std::uint32_t slot = next_lane_[group_of(i)]++;
     order_[slot] = static_cast<std::uint32_t>(i);
     std::int32_t* ids = ids_.data() + std::size_t{slot / lanes} * 2 * lanes + slot % lanes;
-    ids[0] = pairs[i].a;
-    ids[lanes] = pairs[i].b;
+    ids[0] = slot_of_id(pairs[i].a);
+    ids[lanes] = slot_of_id(pairs[i].b);
   }
-  make_work_items({color_end_.data(), coloring_.colors()}, &items_, &item_count_);
+  list_.build({ranges_.data(), groups}, parts_);
 }
 
-// Large colors are split, so that threads share them. A run of small colors becomes one work item,
-// because one thread completes them sooner than several threads that wait for each other.
-void RowSolver::make_work_items(std::span<const std::uint32_t> color_ends, Buffer<WorkItem>* items,
-                                std::uint32_t* count) {
-  const std::uint32_t total = color_ends.empty() ? 0 : color_ends.back();
-  items->reserve(total, "work items of a solver");
-  *count = 0;
-  const auto add = [&](std::uint32_t first, std::uint32_t last, std::uint32_t after) {
-    (*items)[(*count)++] = {first, last, after};
-  };
-  std::uint32_t first = 0, begin = 0;  // of the run of small colors; of the color
-  const auto flush = [&](std::uint32_t end) {
-    if (first < end) add(first, end, *count);
-  };
-  for (const std::uint32_t end : color_ends) {
-    if (end - begin > kBlocksPerItem) {
-      flush(begin);
-      const std::uint32_t after = *count;
-      for (std::uint32_t i = begin; i < end; i += kBlocksPerItem) {
-        add(i, std::min(end, i + kBlocksPerItem), after);
-      }
-      first = end;
-    } else if (end - first >= kBlocksPerItem) {
-      flush(end);
-      first = end;
+/// Chooses between one part and as many threads as have kBlocksPerPart blocks of each color on
+/// average.
+void RowSolver::choose_parts() {
+  const std::size_t blocks = pairs_.size() / kernels_.lanes;
+  const std::size_t most =
+      std::min(blocks / kBlocksPerThread, blocks / (kBlocksPerPart * std::max(colors(), 1u)));
+  parts_ =
+      static_cast<std::uint32_t>(std::clamp<std::size_t>(most, 1, std::size_t{pool_.threads()}));
+  chooser_ = nullptr;
+  if (parts_ == 1) return;
+  chooser_ = &choosers_[std::bit_width(blocks)];
+  predicted_us_ = kLowerBoundBlockUs * static_cast<double>(blocks);
+  const std::array predicted{predicted_us_, predicted_us_};
+  const auto decision = chooser_->choose(static_cast<double>(blocks), predicted);
+  if (decision.alternative != kSeveralThreads) parts_ = 1;
+}
+
+/// Divides the bodies into parts of equal numbers along the longest axis, so that few contacts join
+/// bodies of two parts. The results do not depend on the parts.
+void RowSolver::divide_bodies() {
+  Vec3 lower = positions_[1], upper = lower;  // body 0 is the fixed body
+  for (std::size_t i = 1; i < body_count_; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      lower[k] = std::min(lower[k], positions_[i][k]);
+      upper[k] = std::max(upper[k], positions_[i][k]);
     }
-    begin = end;
   }
-  flush(total);
+  const Vec3 size = upper - lower;
+  const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
+  const Real scale = Real(kSlices) / size[axis];
+  const auto slice_of = [&](std::size_t i) {
+    const Real slice = (positions_[i][axis] - lower[axis]) * scale;
+    return slice > 0 ? static_cast<std::uint32_t>(std::min(slice, Real(kSlices - 1))) : 0u;
+  };
+  std::array<std::uint32_t, kSlices> counts{};
+  for (std::size_t i = 1; i < body_count_; ++i) ++counts[slice_of(i)];
+  std::uint64_t before = 0;
+  for (std::uint32_t& count : counts) {
+    before += std::exchange(count, static_cast<std::uint32_t>(before * parts_ / body_count_));
+  }
+  part_of_body_.reserve(body_count_, "bodies of a solver");
+  part_of_body_[0] = 0;
+  for (std::size_t i = 1; i < body_count_; ++i) {
+    part_of_body_[i] = static_cast<std::uint8_t>(counts[slice_of(i)]);
+  }
+  assign_slots();
 }
 
-/// The number of threads that can work concurrently: at most the average number of work items that
-/// do not depend on each other.
-unsigned RowSolver::useful_threads() const {
-  std::uint32_t stages = 0;
-  for (std::uint32_t i = 0; i < item_count_; ++i) {
-    if (i == 0 || items_[i].after != items_[i - 1].after) ++stages;
+/// Orders the bodies by their parts in the arrays that sweeps change, so that threads write to
+/// different cache lines.
+void RowSolver::assign_slots() {
+  std::array<std::uint32_t, ThreadPool::kMaxThreads> next_slot{};
+  for (std::size_t i = 0; i < body_count_; ++i) ++next_slot[part_of_body_[i]];
+  std::uint32_t slot = 0;
+  for (std::uint32_t& next : next_slot) slot += std::exchange(next, slot);
+  slots_.reserve(body_count_, "bodies of a solver");
+  for (std::size_t i = 0; i < body_count_; ++i) slots_[i] = next_slot[part_of_body_[i]]++;
+  is_divided_ = true;
+  to_slots(&velocities_, rows::kVelocityFields);
+  to_slots(&push_velocities_, rows::kVelocityFields);
+  to_slots(&factors_, rows::kFactorFields);
+}
+
+/// Moves values of the bodies to their slots.
+void RowSolver::to_slots(Buffer<Real>* values, std::size_t fields) {
+  spare_values_.reserve(body_count_ * fields, "bodies of a solver");
+  constexpr std::size_t kBodiesPerChunk = 1024;
+  pool_.run((body_count_ + kBodiesPerChunk - 1) / kBodiesPerChunk, [&](std::size_t chunk) {
+    const std::size_t last = std::min(body_count_, (chunk + 1) * kBodiesPerChunk);
+    for (std::size_t i = chunk * kBodiesPerChunk; i < last; ++i) {
+      std::copy_n(values->data() + i * fields, fields, spare_values_.data() + slots_[i] * fields);
+    }
+  });
+  std::swap(*values, spare_values_);
+}
+
+/// The part of the first body that moves.
+std::uint32_t RowSolver::part_of(const RowPair& pair) const {
+  if (parts_ == 1) return 0;
+  const std::int32_t body = pair.a >= 0 ? pair.a : std::max(pair.b, 0);
+  return part_of_body_[static_cast<std::size_t>(body)];
+}
+
+/// The bodies of a block: all bodies a, then all bodies b.
+RowSolver::BlockIds RowSolver::ids_of(std::uint32_t block) const {
+  BlockIds ids;
+  ids.fill(rows::kFixedBody);
+  const std::uint32_t* const contacts = contacts_of(block);
+  for (std::uint32_t lane = 0; lane < kernels_.lanes && contacts[lane] != kNoContact; ++lane) {
+    ids[lane] = pairs_[contacts[lane]].a;
+    ids[kernels_.lanes + lane] = pairs_[contacts[lane]].b;
   }
-  const std::uint32_t concurrent = item_count_ / std::max(stages, 1u);
-  return std::clamp(std::min(concurrent, blocks_ / kBlocksPerThread), 1u, pool_.threads());
+  return ids;
 }
 
 unsigned RowSolver::set_up_contacts(const rows::RowSettings& settings, std::uint32_t block,
                                     const Real* inputs, Real* second) {
-  return kernels_.set_up_contacts(settings, inputs, bodies_.data(),
-                                  ids_.data() + std::size_t{block} * 2 * kernels_.lanes,
+  return kernels_.set_up_contacts(settings, inputs, bodies_.data(), ids_of(block).data(),
                                   contact_rows(block), friction_rows(block), second);
 }
 void RowSolver::set_up_frictions(const rows::RowSettings& settings, std::uint32_t block,
                                  std::uint32_t direction, const Real* inputs) {
-  kernels_.set_up_frictions(settings, inputs, bodies_.data(),
-                            ids_.data() + std::size_t{block} * 2 * kernels_.lanes,
+  kernels_.set_up_frictions(settings, inputs, bodies_.data(), ids_of(block).data(),
                             friction_rows(block, direction));
+}
+
+/// Prepares claims of items, and the presence of the threads.
+void RowSolver::reset_claims(std::uint32_t count) {
+  if (count > claim_capacity_) {
+    claims_ = std::make_unique<std::atomic<std::uint32_t>[]>(count);
+    claim_capacity_ = count;
+  }
+  for (std::uint32_t i = 0; i < count; ++i) claims_[i].store(0, std::memory_order_relaxed);
+  for (unsigned i = 0; i < pool_.threads(); ++i) {
+    for (auto& done : participants_[i].done) done.store(0, std::memory_order_relaxed);
+    participants_[i].set_present(false);
+  }
 }
 
 RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_factors) {
@@ -313,58 +410,57 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
                    .split_impulse_blocks = split_impulse_blocks_.blocks.data(),
                    .rolling_friction_blocks = rolling_friction_blocks_.blocks.data(),
                    .rolling_frictions = rolling_frictions_.data()};
+  const std::uint32_t claims = 3 * list_.claims() + split_impulse_blocks_.list.claims() +
+                               rolling_friction_blocks_.list.claims() + serial_list_.claims();
+  reset_claims(claims);
+  std::atomic<std::uint32_t>* next_claim = claims_.get();
+  const auto add = [&](Program* program, RowSweep sweep, const WorkList& list) {
+    program->passes[program->pass_count++] = {sweep, &list, next_claim};
+    next_claim += list.claims();
+  };
   Program warm, split, main;
   for (Program* program : {&warm, &split, &main}) {
     program->arrays = arrays;
     program->iterations = program->block_iterations = block_iterations;
     program->threshold = settings.threshold;
+    program->participants = {participants_.get(), parts_};
   }
-  warm.add(kernels_.warm_starts[factors], items_.data(), item_count_);
+  split.number = 1;
+  main.number = 2;
+  add(&warm, kernels_.warm_starts[factors], list_);
   warm.iterations = settings.warm_start ? 1 : 0;
   warm.residuals = residuals_.get() + 2 * iterations;
-  split.add(kernels_.split_impulses[factors], split_impulse_blocks_.items.data(),
-            split_impulse_blocks_.item_count);
+  add(&split, kernels_.split_impulses[factors], split_impulse_blocks_.list);
   split.iterations = split_rows > 0 ? block_iterations : 0;
   split.residuals = residuals_.get() + iterations;
   main.residuals = residuals_.get();
   main.iterations = iterations;
   main.serial = settings.serial;
+  if (settings.serial != nullptr) add(&main, nullptr, serial_list_);
   if (settings.interleave) {
-    main.add(kernels_.both[factors], items_.data(), item_count_);
+    add(&main, kernels_.both[factors], list_);
   } else {
-    main.add(kernels_.contacts[factors], items_.data(), item_count_);
-    main.add(kernels_.frictions[factors], items_.data(), item_count_);
+    add(&main, kernels_.contacts[factors], list_);
+    add(&main, kernels_.frictions[factors], list_);
   }
-  main.add(kernels_.rolling_frictions[factors], rolling_friction_blocks_.items.data(),
-           rolling_friction_blocks_.item_count);
+  add(&main, kernels_.rolling_frictions[factors], rolling_friction_blocks_.list);
   // The first participant always stays, so that the work is completed. The others leave when they
   // wait for long: then there are more threads than free processors, and they only take time from
   // the threads that work.
-  const unsigned most = useful_threads();
-  TimeChooser& chooser = thread_choosers_[std::bit_width(blocks_)];
-  const auto predicted_us = [&](int sweeps) {
-    return kLowerBoundBlockUs * static_cast<double>(blocks_) * (sweeps + 1);
-  };
-  unsigned threads = 1;
-  if (most > 1) {
-    const double us = predicted_us(settings.iterations);
-    if (chooser.choose(blocks_, std::array{us, us}).alternative == kSeveralThreads) threads = most;
-  }
-  const auto start = most > 1 ? Clock::now() : Clock::time_point{};
-  pool_.run(threads, [&](std::size_t participant) {
-    Backoff backoff(participant == 0);
-    if (!warm.join(backoff) || !split.join(backoff)) return;
-    while (!warm.is_done()) {
-      if (!backoff.wait()) return;
+  const auto start = chooser_ != nullptr ? Clock::now() : Clock::time_point{};
+  pool_.run(parts_, [&](std::size_t participant) {
+    const auto self = static_cast<std::uint32_t>(participant);
+    const Backoff backoff(self == 0);
+    for (Program* program : {&warm, &split, &main}) {
+      if (!program->join(self, backoff)) return;
     }
-    main.join(backoff);
   });
 
   RowSweepReport report;
   report.iterations = main.iterations_done();
-  if (most > 1) {
+  if (chooser_ != nullptr) {
     const std::chrono::duration<double, std::micro> us = Clock::now() - start;
-    chooser.record(us.count(), predicted_us(report.iterations));
+    chooser_->record(us.count() / (report.iterations + 1), predicted_us_);
   }
   if (report.iterations > 0) {
     report.residual = residuals_[static_cast<std::size_t>(report.iterations) - 1];

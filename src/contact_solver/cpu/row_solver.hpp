@@ -2,6 +2,7 @@
 /// parallel, in vector lanes and in threads, with the bits of the serial order.
 #pragma once
 
+#include <jfpx/math.hpp>
 #include <jfpx/simd_level.hpp>
 
 #include "src/base/buffer.hpp"
@@ -9,7 +10,9 @@
 #include "src/base/time_chooser.hpp"
 #include "src/contact_solver/coloring.hpp"
 #include "src/contact_solver/cpu/row_kernels.hpp"
+#include "src/contact_solver/cpu/work_list.hpp"
 
+#include <array>
 #include <atomic>
 #include <memory>
 #include <span>
@@ -47,6 +50,7 @@ class JFPX_API RowSolver {
  public:
   /// @param threads upper limit; 0: one per core. Sweeps use one thread where that has been faster.
   explicit RowSolver(unsigned threads = 1, SimdLevel simd = SimdLevel::automatic);
+  ~RowSolver();
 
   ThreadPool& pool() noexcept { return pool_; }
   unsigned lanes() const noexcept { return kernels_.lanes; }
@@ -55,12 +59,18 @@ class JFPX_API RowSolver {
   void resize_bodies(std::size_t count);
   std::size_t bodies() const noexcept { return body_count_; }
   Real* body(std::size_t i) { return bodies_.data() + i * rows::kBodyFields; }
-  Real* velocity(std::size_t i) { return velocities_.data() + i * rows::kVelocityFields; }
-  Real* push_velocity(std::size_t i) { return push_velocities_.data() + i * rows::kVelocityFields; }
-  Real* factors(std::size_t i) { return factors_.data() + i * rows::kFactorFields; }
+  Real* velocity(std::size_t i) { return velocities_.data() + slot_of(i) * rows::kVelocityFields; }
+  Real* push_velocity(std::size_t i) {
+    return push_velocities_.data() + slot_of(i) * rows::kVelocityFields;
+  }
+  Real* factors(std::size_t i) { return factors_.data() + slot_of(i) * rows::kFactorFields; }
+  /// Threads share the bodies by their positions, which only affect the speed.
+  void set_position(std::size_t i, const Vec3& position) { positions_[i] = position; }
 
-  /// Arranges the contacts, given in their serial order, in blocks of one color each. Removes all
+  /// Arranges the contacts, given in their serial order, in blocks of one color and one part of the
+  /// bodies each. Removes all
   /// rolling friction rows.
+  /// @param pairs must remain valid until the rows are set up
   /// @param directions number of friction directions: 1 or 2
   void schedule(std::span<const RowPair> pairs, std::uint32_t directions);
   std::uint32_t blocks() const noexcept { return blocks_; }
@@ -106,53 +116,77 @@ class JFPX_API RowSolver {
   RowSweepReport solve(const RowSweepSettings& settings, bool factors);
 
  private:
-  /// A range of blocks that one thread runs as a unit, after the first `after` items are done.
-  struct WorkItem {
-    std::uint32_t first, last, after;
-  };
+  static constexpr std::size_t kPrograms = 3;
+  struct Participant;
   struct Program;
-  /// Selected blocks, in their order.
+  /// Selected blocks, by color and part.
   struct BlockSubset {
-    Buffer<std::uint32_t> blocks, color_ends;
-    Buffer<WorkItem> items;
-    std::uint32_t count = 0, item_count = 0;
+    Buffer<std::uint32_t> blocks;
+    Buffer<BlockRange> ranges;
+    WorkList list;
+    std::uint32_t count = 0;
   };
 
   template <class Has>
   void select(const Has& has, BlockSubset* subset) {
+    const std::size_t groups = std::size_t{colors()} * parts_;
     subset->blocks.reserve(blocks_, "rows of a solver");
-    subset->color_ends.reserve(colors(), "rows of a solver");
+    subset->ranges.reserve(groups, "rows of a solver");
     subset->count = 0;
-    std::uint32_t block = 0, subset_colors = 0;
-    for (std::uint32_t color = 0; color < colors(); ++color) {
+    for (std::size_t group = 0; group < groups; ++group) {
       const std::uint32_t before = subset->count;
-      for (; block < color_end_[color]; ++block) {
-        if (has(block)) subset->blocks[subset->count++] = block;
+      for (std::uint32_t i = ranges_[group].first; i < ranges_[group].last; ++i) {
+        if (has(i)) subset->blocks[subset->count++] = i;
       }
-      if (subset->count > before) subset->color_ends[subset_colors++] = subset->count;
+      subset->ranges[group] = {before, subset->count};
     }
-    make_work_items({subset->color_ends.data(), subset_colors}, &subset->items,
-                    &subset->item_count);
+    subset->list.build({subset->ranges.data(), groups}, parts_);
   }
-  unsigned useful_threads() const;
-  static void make_work_items(std::span<const std::uint32_t> color_ends, Buffer<WorkItem>* items,
-                              std::uint32_t* count);
+  using BlockIds = std::array<std::int32_t, 2 * rows::kMaxLanes>;
+
+  void choose_parts();
+  void divide_bodies();
+  void assign_slots();
+  void to_slots(Buffer<Real>* values, std::size_t fields);
+  /// The place of a body in the arrays that sweeps change.
+  std::size_t slot_of(std::size_t body) const { return is_divided_ ? slots_[body] : body; }
+  std::int32_t slot_of_id(std::int32_t id) const {
+    const auto slot = [&](std::int32_t i) {
+      return static_cast<std::int32_t>(slot_of(static_cast<std::size_t>(i)));
+    };
+    return id >= 0 ? slot(id) : ~slot(~id);
+  }
+  BlockIds ids_of(std::uint32_t block) const;
+  std::uint32_t part_of(const RowPair& pair) const;
+  void reset_claims(std::uint32_t count);
 
   const RowKernels& kernels_;
   ThreadPool pool_;
-  std::uint32_t blocks_ = 0, directions_ = 1, item_count_ = 0;
+  std::uint32_t blocks_ = 0, directions_ = 1, parts_ = 1;
   std::size_t body_count_ = 0;
   ContactColoring coloring_;
   Buffer<Real> bodies_, velocities_, push_velocities_, factors_;
+  Buffer<Vec3> positions_;
+  std::span<const RowPair> pairs_;
+  bool is_divided_ = false;  ///< whether the bodies have parts and slots
+  Buffer<std::uint8_t> part_of_body_;
+  Buffer<std::uint32_t> slots_;  ///< by body, in the order of the parts; 0 for the fixed body
+  Buffer<Real> spare_values_;
   Buffer<Real> contacts_, frictions_, rolling_frictions_;
   Buffer<std::int32_t> ids_;
-  Buffer<std::uint32_t> order_, next_lane_, color_end_;
-  Buffer<WorkItem> items_;
+  Buffer<std::uint32_t> order_, next_lane_;
+  Buffer<BlockRange> ranges_;  ///< of the blocks, by color and part
+  WorkList list_, serial_list_;
   BlockSubset split_impulse_blocks_, rolling_friction_blocks_;
   std::unique_ptr<std::atomic<Real>[]> residuals_;
   std::size_t residual_capacity_ = 0;
+  std::unique_ptr<std::atomic<std::uint32_t>[]> claims_;
+  std::uint32_t claim_capacity_ = 0;
+  std::unique_ptr<Participant[]> participants_;
   /// Choose between several threads and one, by the number of bits of the number of blocks.
-  std::vector<TimeChooser> thread_choosers_ = std::vector(33, TimeChooser(2));
+  std::vector<TimeChooser> choosers_ = std::vector(33, TimeChooser(2));
+  TimeChooser* chooser_ = nullptr;  ///< null: only one thread is useful
+  double predicted_us_ = 0;         ///< [us], of an iteration
 };
 
 }  // namespace cpu
