@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/backoff.hpp"
 #include "src/base/reserve.hpp"
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
@@ -154,42 +155,81 @@ bool AabbUpdate::run_in_parallel(btDbvtBroadphase& tree, btHashedOverlappingPair
   std::size_t overlaps = 0;
   try {
     overlaps = search_.run(pool, leaves_, cache);
-    jfpx::reserve_geometric(&others_, leaves_.size());
+    resize_geometric(&new_pairs_, search_.found().size());
   } catch (const OutOfMemory&) {
     return false;
   } catch (const std::bad_alloc&) {
     return false;
   }
   tree.m_newpairs += static_cast<int>(overlaps);
-  std::span<const NewOverlap> found = search_.found();
-  for (std::size_t i = 0; i < leaves_.size(); ++i) {
-    prefetch_leaf(leaves_, i);
-    if (!leaves_[i].active) continue;
-    apply_update(tree, leaves_[i]);
-    std::size_t news = 0;
-    while (news < found.size() && found[news].turn == i) ++news;
-    if (news > 0) add_in_order(cache, leaves_[i].proxy, found.first(news));
-    found = found.subspan(news);
+  ordered_ = 0;
+  if (adds_without_allocation(cache)) {
+    // The pair cache is not read while leaves move, so another thread adds the pairs.
+    pool.run(2, [&](std::size_t part) {
+      if (part == 0) {
+        move_leaves(tree);
+      } else {
+        add_new_pairs(cache);
+      }
+    });
+  } else {
+    move_leaves(tree);
+    add_new_pairs(cache);
   }
   return true;
 }
 
-/// Adds the new pairs of a leaf in the order in which Bullet finds them: fixed objects first, then
-/// by position in the tree.
-void AabbUpdate::add_in_order(btHashedOverlappingPairCache& cache, btDbvtProxy* moved,
-                              std::span<const NewOverlap> overlaps) {
-  others_.clear();
-  for (const NewOverlap& overlap : overlaps) others_.push_back(overlap.other);
-  const auto is_fixed = [](const btDbvtProxy* proxy) {
-    return proxy->stage == btDbvtBroadphase::STAGECOUNT;
+/// Whether the new pairs can be added on another thread: the user's allocator need not be
+/// thread-safe.
+bool AabbUpdate::adds_without_allocation(btHashedOverlappingPairCache& cache) const {
+  const btBroadphasePairArray& pairs = cache.getOverlappingPairArray();
+  const auto room = static_cast<std::size_t>(pairs.capacity() - pairs.size());
+  return new_pairs_.size() < room && cache.*PairTables::ghosts == nullptr;
+}
+
+/// Moves the leaves, one after the other, and puts the new pairs of each in the order in which
+/// Bullet finds them: fixed objects first, then by position in the tree.
+void AabbUpdate::move_leaves(btDbvtBroadphase& tree) {
+  const auto is_fixed = [](const NewPair& pair) {
+    return pair.other->stage == btDbvtBroadphase::STAGECOUNT;
   };
-  if (others_.size() > 1) {
-    std::sort(others_.begin(), others_.end(), [&](const btDbvtProxy* a, const btDbvtProxy* b) {
-      if (is_fixed(a) != is_fixed(b)) return is_fixed(a);
-      return is_visited_before(a->leaf, b->leaf);
-    });
+  const auto is_found_before = [&](const NewPair& a, const NewPair& b) {
+    if (is_fixed(a) != is_fixed(b)) return is_fixed(a);
+    return is_visited_before(a.other->leaf, b.other->leaf);
+  };
+  const std::span<const NewOverlap> found = search_.found();
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < leaves_.size(); ++i) {
+    prefetch_leaf(leaves_, i);
+    if (!leaves_[i].active) continue;
+    apply_update(tree, leaves_[i]);
+    const std::size_t first = next;
+    for (; next < found.size() && found[next].turn == i; ++next) {
+      new_pairs_[next] = {found[next].other, leaves_[i].proxy};
+    }
+    if (next == first) continue;
+    if (next - first > 1) {
+      std::sort(new_pairs_.begin() + static_cast<std::ptrdiff_t>(first),
+                new_pairs_.begin() + static_cast<std::ptrdiff_t>(next), is_found_before);
+    }
+    ordered_.store(next, std::memory_order_release);
   }
-  for (btDbvtProxy* other : others_) cache.addOverlappingPair(other, moved);
+}
+
+/// Adds the new pairs as move_leaves() orders them, which may run at the same time.
+void AabbUpdate::add_new_pairs(btHashedOverlappingPairCache& cache) {
+  Backoff backoff(true);
+  for (std::size_t next = 0; next < new_pairs_.size();) {
+    const std::size_t ordered = ordered_.load(std::memory_order_acquire);
+    if (next == ordered) {
+      backoff.wait();
+      continue;
+    }
+    backoff.reset();
+    for (; next < ordered; ++next) {
+      cache.addOverlappingPair(new_pairs_[next].other, new_pairs_[next].moved);
+    }
+  }
 }
 
 /// Moves a leaf, and adds its new pairs, before the update of the next object is computed.

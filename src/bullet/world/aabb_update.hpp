@@ -10,7 +10,8 @@
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
 
-#include <span>
+#include <atomic>
+#include <cstddef>
 #include <vector>
 
 namespace jfpx {
@@ -34,6 +35,9 @@ class JFPX_API AabbUpdate {
   bool run(btCollisionWorld& world, ThreadPool& pool);
 
  private:
+  struct NewPair {
+    btDbvtProxy *other, *moved;
+  };
   struct Pair {
     btDbvtProxy *a, *b;  ///< by ascending id
     bool swapped;        ///< `a` is the body that has moved
@@ -47,19 +51,21 @@ class JFPX_API AabbUpdate {
   void run_in_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache);
   bool run_in_parallel(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
                        ThreadPool& pool);
+  bool adds_without_allocation(btHashedOverlappingPairCache& cache) const;
+  void move_leaves(btDbvtBroadphase& tree);
+  void add_new_pairs(btHashedOverlappingPairCache& cache);
   void run_one_by_one(btCollisionWorld& world, btDbvtBroadphase& tree,
                       btHashedOverlappingPairCache& cache);
   void search_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
                    const btDbvtProxy& moved);
   void find_overlaps(const btDbvtNode* root, const btDbvtNode* leaf);
   void add_pairs(btHashedOverlappingPairCache& cache);
-  void add_in_order(btHashedOverlappingPairCache& cache, btDbvtProxy* moved,
-                    std::span<const NewOverlap> overlaps);
 
   int minimum_objects_;
   std::vector<LeafUpdate> leaves_;
   OverlapSearch search_;
-  std::vector<btDbvtProxy*> others_;
+  std::vector<NewPair> new_pairs_;  ///< in Bullet's order, as far as `ordered_`
+  std::atomic<std::size_t> ordered_{0};
   std::vector<const btDbvtNode*> stack_;
   std::vector<Pair> pairs_;
 };

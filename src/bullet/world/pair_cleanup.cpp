@@ -8,6 +8,7 @@
 #include "src/bullet/world/plain_dispatcher.hpp"
 #include "src/bullet/world/plain_ghosts.hpp"
 
+#include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
 #include <LinearMath/btQuickprof.h>
 
 #include <algorithm>
@@ -43,13 +44,52 @@ void prefetch_volumes(const btBroadphasePairArray& pairs, int i) {
   }
 }
 
-/// Prefetches what a removal reads: the slot of the pair in the hash table, and the algorithm.
-void prefetch_removal(const btBroadphasePairArray& pairs, const int* heads, int i) {
-  const btBroadphasePair& pair = pairs[i];
-  const unsigned mask = static_cast<unsigned>(pairs.capacity()) - 1;
-  prefetch(heads + (pair_hash(pair.m_pProxy0->m_uniqueId, pair.m_pProxy1->m_uniqueId) & mask));
-  if (pair.m_algorithm != nullptr) prefetch(pair.m_algorithm);
-}
+/// Prefetches what removals of pairs read. Pairs to remove are few and far apart, so that every
+/// removal would wait for memory.
+class RemovalPrefetch {
+ public:
+  RemovalPrefetch(btHashedOverlappingPairCache& cache, btDispatcher* dispatcher)
+      : pairs_(cache.getOverlappingPairArray()),
+        heads_(&(cache.*PairTables::heads)[0]),
+        dispatcher_(dispatcher) {
+    manifolds_.reserve(1);
+  }
+
+  /// For pair `i`, some time before its removal: its slot in the hash table, and its algorithm.
+  void early(int i) const {
+    const btBroadphasePair& pair = pairs_[i];
+    const unsigned mask = static_cast<unsigned>(pairs_.capacity()) - 1;
+    prefetch(heads_ + (pair_hash(pair.m_pProxy0->m_uniqueId, pair.m_pProxy1->m_uniqueId) & mask));
+    if (pair.m_algorithm != nullptr) {
+      prefetch_ends(pair.m_algorithm, sizeof(btSphereSphereCollisionAlgorithm));
+    }
+  }
+
+  /// Later: the manifold of its algorithm.
+  void late(int i) {
+    btCollisionAlgorithm* algorithm = pairs_[i].m_algorithm;
+    if (algorithm == nullptr || !is_exactly<btSphereSphereCollisionAlgorithm>(*algorithm)) return;
+    manifolds_.resizeNoInitialize(0);
+    algorithm->getAllContactManifolds(manifolds_);
+    if (manifolds_.size() > 0) prefetch_header(manifolds_[0]);
+  }
+
+  /// The last pairs and manifolds take the places of removed ones.
+  void last() const {
+    constexpr int kLast = 4;
+    if (pairs_.size() > kLast) early(pairs_.size() - kLast);
+    const int manifolds = dispatcher_->getNumManifolds();
+    if (manifolds > kLast) {
+      prefetch_header(dispatcher_->getInternalManifoldPointer()[manifolds - kLast]);
+    }
+  }
+
+ private:
+  const btBroadphasePairArray& pairs_;
+  const int* heads_;
+  btDispatcher* dispatcher_;
+  btManifoldArray manifolds_;
+};
 
 /// Number of pairs that Bullet tests if none is removed.
 int pairs_to_test(const btDbvtBroadphase& tree, int pairs) {
@@ -128,26 +168,23 @@ bool PairCleanup::test_pairs(const btBroadphasePairArray& pairs, int first, int 
 /// @return the number of pairs that were tested and kept
 int PairCleanup::remove_pairs(btDbvtBroadphase& tree, btDispatcher* dispatcher, int count) {
   const btBroadphasePairArray& pairs = tree.m_paircache->getOverlappingPairArray();
-  const auto& cache = static_cast<btHashedOverlappingPairCache&>(*tree.m_paircache);
-  const int* heads = &(cache.*PairTables::heads)[0];
+  RemovalPrefetch ahead(static_cast<btHashedOverlappingPairCache&>(*tree.m_paircache), dispatcher);
+  const auto state_of = [&](int i) -> State& { return states_[static_cast<std::size_t>(i)]; };
+  constexpr int kEarly = 128, kLate = 64;  // one pair in a hundred is removed
   int i = pairs.size() > 0 ? tree.m_cid % pairs.size() : 0;
   for (int kept = 0; kept < count;) {
-    State& state = states_[static_cast<std::size_t>(i)];
-    if (state == State::overlaps || (state == State::unknown && !is_apart(pairs[i]))) {
+    if (state_of(i) == State::overlaps || (state_of(i) == State::unknown && !is_apart(pairs[i]))) {
       ++kept;
-      constexpr int kAhead = 128;  // one pair in a hundred is removed
-      if (i + kAhead < pairs.size() &&
-          states_[static_cast<std::size_t>(i + kAhead)] == State::apart) {
-        prefetch_removal(pairs, heads, i + kAhead);
-      }
+      if (i + kEarly < pairs.size() && state_of(i + kEarly) == State::apart)
+        ahead.early(i + kEarly);
+      if (i + kLate < pairs.size() && state_of(i + kLate) == State::apart) ahead.late(i + kLate);
       if (++i == pairs.size()) i = 0;
       continue;
     }
     tree.m_paircache->removeOverlappingPair(pairs[i].m_pProxy0, pairs[i].m_pProxy1, dispatcher);
-    state = states_[static_cast<std::size_t>(pairs.size())];
+    state_of(i) = state_of(pairs.size());
     --count;
-    constexpr int kLast = 4;
-    if (pairs.size() > kLast) prefetch_removal(pairs, heads, pairs.size() - kLast);
+    ahead.last();
     if (pairs.size() > 0) i = (tree.m_cid + kept) % pairs.size();
   }
   return count;
