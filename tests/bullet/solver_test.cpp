@@ -104,6 +104,33 @@ TEST(ConstraintSolver, HasStocksBitsForAnyThreadsVectorsAndModes) {
   }
 }
 
+// Few colors with many contacts each: the solver divides the bodies among the threads.
+TEST(ConstraintSolver, HasStocksBitsForBodiesDividedAmongThreads) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  for (const unsigned threads : {2u, 3u, 8u}) {
+    SCOPED_TRACE(threads);
+    TwinOptions options;
+    options.parts.solver = [threads] {
+      return std::make_unique<ConstraintSolver>(ConstraintSolverOptions{.threads = threads});
+    };
+    Twins twins(options);
+    twins.both([&](BulletWorld& w) {
+      Random random(seed);
+      w.add(w.keep(new btBoxShape(btVector3(100, 1, 100))), btVector3(0, -1, 0), 0);
+      btCollisionShape* ball = w.keep(new btSphereShape(btScalar(0.5)));
+      constexpr int kRows = 64;
+      for (int i = 0; i < kRows * kRows; ++i) {
+        const btVector3 site(btScalar(i % kRows) * btScalar(0.98), btScalar(0.495),
+                             btScalar(i / kRows) * btScalar(0.98));
+        const Vec3 v = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
+        w.add(ball, site)->setLinearVelocity(btVector3(v.x, v.y, v.z));
+      }
+    });
+    ASSERT_TRUE(twins.step(12));
+  }
+}
+
 WorldParts plain_parts() {
   WorldParts parts;
   parts.solver = [] {
