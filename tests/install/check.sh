@@ -73,6 +73,16 @@ refused" ] || fail "$("$work/cmake/both")"
       EXAMPLES=examples PROGRAMS="$programs" CXX="${LAUNCHER:-} $CXX"
     run_programs "$work/makefile" -f64
     ;;
+  # The programs with which Conan tests the package, with the Bullet adapter in float where that is there.
+  conan)
+    bullet=float
+    [ "$HAS_BULLET" = ON ] || bullet=False
+    folder=$(dirname "$(find "$prefix" -name jfpx.pc)")
+    export PKG_CONFIG_PATH=$folder LD_LIBRARY_PATH=${folder%/pkgconfig}
+    configure "$root/packaging/conan/test_package" "$work/conan" -DBULLET=$bullet -DCMAKE_CXX_STANDARD=20 >/dev/null
+    cmake --build "$work/conan" >/dev/null
+    ctest --test-dir "$work/conan" --no-tests=error --output-on-failure
+    ;;
   # A CUDA program; where no device is, it says so.
   cuda)
     [ "$HAS_CUDA" = ON ] || { echo "skipped: built without CUDA"; exit 0; }

@@ -16,6 +16,7 @@ set_tests_properties(Install.LeavesNoTraceOfWhereItWas PROPERTIES FIXTURES_REQUI
 jfpx_add_install_test(cmake Install.ServesCMakeProjects)
 jfpx_add_install_test(cuda Install.ServesCudaPrograms)
 jfpx_add_install_test(pkg_config Install.ServesMakefilesThroughPkgConfig)
+jfpx_add_install_test(conan Install.ServesTheTestPackageOfConan)
 jfpx_add_install_test(messages Install.SaysWhatIsMissing)
 jfpx_add_install_test(mismatch Install.RefusesProgramsOfOtherHeaders)
 jfpx_add_install_test(symbols Install.ExportsOwnSymbolsOnly)
