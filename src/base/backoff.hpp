@@ -11,8 +11,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Bounded waiting for other threads, which may be waiting for a processor themselves: spins first,
-/// then yields.
+/// Waiting for other threads, which may be waiting for a processor themselves: spins first, then
+/// yields, for a limited time or without end.
 class Backoff {
  public:
   /// @param endless without it the wait ends after some tens of microseconds on a free processor,

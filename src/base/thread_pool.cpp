@@ -28,10 +28,10 @@ using Clock = std::chrono::steady_clock;
 
 /// Some tens of microseconds.
 constexpr unsigned kPolls = 2000;
-/// Longer than the serial parts between two loops of a step.
+/// Longer than most serial parts between two loops of a step of ten thousand bodies.
 constexpr auto kLongWait = std::chrono::milliseconds(1);
-/// A thread that polls takes longer than this between two looks at the clock only if another thread
-/// has had its core.
+/// A thread that polls takes longer than this between two looks at the clock only if it has lost
+/// its core.
 constexpr auto kInterruption = std::chrono::microseconds(500);
 /// For so long after an interruption, workers do not poll for long: they would take cores from
 /// threads that have work.

@@ -13,8 +13,8 @@ inline namespace JFPX_ABI {
 /// The calling thread takes part in each loop. Every thread begins with chunks of its own, which
 /// are consecutive and the same in equal loops, so that caches keep their data; then it takes
 /// chunks of the others. Worker threads poll for the next loop, so that consecutive loops start
-/// without a system call, and then sleep: after a millisecond, or after some microseconds where
-/// other threads need the cores. A pool runs one loop at a time: run() must not be called
+/// without a system call, and then sleep: after a millisecond, or after some tens of microseconds
+/// where other threads need the cores. A pool runs one loop at a time: run() must not be called
 /// concurrently or from within a loop.
 ///
 /// Pools of equal size that one thread creates share their workers, so that the parts of a step

@@ -5,7 +5,7 @@
 
 #include <BulletCollision/CollisionDispatch/btConvexPlaneCollisionAlgorithm.h>
 
-#include <cmath>
+#include <limits>
 
 namespace jfpx {
 inline namespace JFPX_ABI {

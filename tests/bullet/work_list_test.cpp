@@ -58,15 +58,15 @@ TEST(WorkList, EachBlockIsInOneItemAndColorsFollowEachOther) {
   }
 }
 
-TEST(WorkList, ClaimsOfDifferentPartsShareNoCacheLine) {
+TEST(WorkList, ClaimsOfDifferentPartsShareNoLine) {
   std::vector<BlockRange> ranges;
   for (std::uint32_t i = 0; i < 40; ++i) ranges.push_back({i * 100, (i + 1) * 100});
   WorkList list;
   list.build(ranges, 4);
-  std::vector<int> part_of_line(list.claims() / 16 + 1, -1);
+  std::vector<int> part_of_line(list.claims() / kClaimsPerLine, -1);
   for (std::uint32_t i = 0; i < list.item_count(); ++i) {
     const WorkItem& item = list.items()[i];
-    int& part = part_of_line[item.claim / 16];
+    int& part = part_of_line[item.claim / kClaimsPerLine];
     if (part < 0) part = static_cast<int>(item.part);
     EXPECT_EQ(part, static_cast<int>(item.part));
   }

@@ -1,7 +1,7 @@
 /// Bounds the distance that Bullet computes. With the poses x -> B x + c of the body and
 /// x -> P x + o of the plane n x = k, the distance of a point v is
 ///   n P^T (B v + c - o) - k  >=  (P n) (c - o) - k - |B^T P n| |v|.
-/// A perturbation rotates v. The bases need not be orthonormal.
+/// A perturbation selects another point of the shape. The bases need not be orthonormal.
 #include "src/bullet/dispatch/plane_gap.hpp"
 
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
@@ -23,6 +23,7 @@ btScalar norm(const btMatrix3x3& m) {
 
 bool is_clear_of_plane(const btCollisionObject& body, btScalar radius,
                        const btCollisionObject& plane, btScalar threshold) {
+  radius = std::abs(radius);  // Bullet does not reject negative ones
   const auto& shape = static_cast<const btStaticPlaneShape&>(*plane.getCollisionShape());
   const btTransform &pose = body.getWorldTransform(), &plane_pose = plane.getWorldTransform();
   const btMatrix3x3 &basis = pose.getBasis(), &plane_basis = plane_pose.getBasis();

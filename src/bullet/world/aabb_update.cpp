@@ -163,13 +163,19 @@ bool AabbUpdate::run_in_parallel(btDbvtBroadphase& tree, btHashedOverlappingPair
   }
   tree.m_newpairs += static_cast<int>(overlaps);
   ordered_ = 0;
+  failed_ = false;
   if (adds_without_allocation(cache)) {
     // The pair cache is not read while leaves move, so another thread adds the pairs.
     pool.run(2, [&](std::size_t part) {
-      if (part == 0) {
-        move_leaves(tree);
-      } else {
+      if (part == 1) {
         add_new_pairs(cache);
+        return;
+      }
+      try {
+        move_leaves(tree);
+      } catch (...) {  // of the user's allocator
+        failed_.store(true, std::memory_order_release);
+        throw;
       }
     });
   } else {
@@ -179,12 +185,12 @@ bool AabbUpdate::run_in_parallel(btDbvtBroadphase& tree, btHashedOverlappingPair
   return true;
 }
 
-/// Whether the new pairs can be added on another thread: the user's allocator need not be
-/// thread-safe.
+/// Whether there are new pairs that can be added on another thread: the user's allocator need not
+/// be thread-safe.
 bool AabbUpdate::adds_without_allocation(btHashedOverlappingPairCache& cache) const {
   const btBroadphasePairArray& pairs = cache.getOverlappingPairArray();
   const auto room = static_cast<std::size_t>(pairs.capacity() - pairs.size());
-  return new_pairs_.size() < room && cache.*PairTables::ghosts == nullptr;
+  return !new_pairs_.empty() && new_pairs_.size() < room && cache.*PairTables::ghosts == nullptr;
 }
 
 /// Moves the leaves, one after the other, and puts the new pairs of each in the order in which
@@ -222,6 +228,7 @@ void AabbUpdate::add_new_pairs(btHashedOverlappingPairCache& cache) {
   for (std::size_t next = 0; next < new_pairs_.size();) {
     const std::size_t ordered = ordered_.load(std::memory_order_acquire);
     if (next == ordered) {
+      if (failed_.load(std::memory_order_acquire)) return;
       backoff.wait();
       continue;
     }

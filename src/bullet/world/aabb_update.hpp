@@ -66,6 +66,7 @@ class JFPX_API AabbUpdate {
   OverlapSearch search_;
   std::vector<NewPair> new_pairs_;  ///< in Bullet's order, as far as `ordered_`
   std::atomic<std::size_t> ordered_{0};
+  std::atomic<bool> failed_{false};  ///< whether the moves have ended with an exception
   std::vector<const btDbvtNode*> stack_;
   std::vector<Pair> pairs_;
 };

@@ -25,14 +25,18 @@ constexpr std::uint32_t kBlocksPerPart = 12;
 /// Below this number of blocks, waking a second thread costs more than it saves.
 constexpr std::uint32_t kBlocksPerThread = 64;
 /// Number of waits after which a thread takes over the items of another one, which may have lost
-/// its core: some microseconds, longer than an item takes.
+/// its core: some microseconds, longer than an item of blocks takes.
 constexpr std::uint64_t kWaitsForOthers = 200;
-/// Resolution of the order of the bodies along an axis.
-constexpr std::uint32_t kSlices = 1024;
+/// Number of bodies from whose positions the parts are derived, at most.
+constexpr std::size_t kSample = 256;
 /// First of the two alternatives of the chooser; the other is one thread.
 constexpr std::size_t kSeveralThreads = 0;
 /// [us] Shorter than any sweep over a block, so that the chooser measures both alternatives.
 constexpr double kLowerBoundBlockUs = 1e-4;
+
+double us_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+}
 
 const RowKernels& row_kernels([[maybe_unused]] SimdLevel simd) {
 #if defined(__x86_64__)
@@ -63,6 +67,11 @@ struct alignas(64) RowSolver::Participant {
   }
 };
 
+/// For each item, the number of iterations in which it was claimed.
+struct alignas(64) RowSolver::ClaimLine {
+  std::atomic<std::uint32_t> items[kClaimsPerLine];
+};
+
 /// Passes over the blocks, repeated until the residual is small. Each pass is a sequence of stages,
 /// which end when all of their items are done. A thread solves the items of its part of the bodies,
 /// so that its caches keep them, and takes over those of threads that are absent or late. A waiting
@@ -71,7 +80,7 @@ struct RowSolver::Program {
   struct Pass {
     RowSweep sweep;  ///< null: the serial rows
     const WorkList* list;
-    std::atomic<std::uint32_t>* claims;  ///< number of iterations in which an item was claimed
+    ClaimLine* claims;
   };
 
   RowArrays arrays{};
@@ -147,8 +156,9 @@ struct RowSolver::Program {
   bool run_item(const Pass& pass, const WorkItem& item, std::uint64_t iteration, std::uint32_t self,
                 Real* raised) {
     auto claimed = static_cast<std::uint32_t>(iteration);
-    if (!pass.claims[item.claim].compare_exchange_strong(claimed, claimed + 1,
-                                                         std::memory_order_relaxed)) {
+    std::atomic<std::uint32_t>& claim =
+        pass.claims[item.claim / kClaimsPerLine].items[item.claim % kClaimsPerLine];
+    if (!claim.compare_exchange_strong(claimed, claimed + 1, std::memory_order_relaxed)) {
       return false;
     }
     RowResidual residual;
@@ -188,7 +198,9 @@ RowSolver::~RowSolver() = default;
 RowSolver::RowSolver(unsigned threads, SimdLevel simd)
     : kernels_(row_kernels(simd)), pool_(threads) {
   static_assert(ThreadPool::kMaxThreads <= 256, "part_of_body_ has a byte a body");
-  participants_ = std::make_unique<Participant[]>(pool_.threads());
+  // The pool may have more threads later.
+  most_parts_ = pool_.threads();
+  participants_ = std::make_unique<Participant[]>(most_parts_);
   constexpr BlockRange kOne{0, 1};
   serial_list_.build({&kOne, 1}, 1);
 }
@@ -218,7 +230,9 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
   coloring_.build(pairs, body_count_);
   pairs_ = pairs;
   choose_parts();
+  const auto start = chooser_ != nullptr ? Clock::now() : Clock::time_point{};
   if (parts_ > 1) divide_bodies();
+  if (chooser_ != nullptr) division_us_ = us_since(start);
   const std::uint32_t lanes = kernels_.lanes;
   const std::size_t groups = std::size_t{colors()} * parts_;
   ranges_.reserve(groups, "contacts of a solver");
@@ -263,8 +277,7 @@ void RowSolver::choose_parts() {
   const std::size_t blocks = pairs_.size() / kernels_.lanes;
   const std::size_t most =
       std::min(blocks / kBlocksPerThread, blocks / (kBlocksPerPart * std::max(colors(), 1u)));
-  parts_ =
-      static_cast<std::uint32_t>(std::clamp<std::size_t>(most, 1, std::size_t{pool_.threads()}));
+  parts_ = static_cast<std::uint32_t>(std::clamp<std::size_t>(most, 1, std::size_t{most_parts_}));
   chooser_ = nullptr;
   if (parts_ == 1) return;
   chooser_ = &choosers_[std::bit_width(blocks)];
@@ -274,33 +287,39 @@ void RowSolver::choose_parts() {
   if (decision.alternative != kSeveralThreads) parts_ = 1;
 }
 
-/// Divides the bodies into parts of equal numbers along the longest axis, so that few contacts join
-/// bodies of two parts. The results do not depend on the parts.
+/// Divides the bodies into parts of about equal numbers along the longest axis, so that few
+/// contacts join bodies of two parts. The results do not depend on the parts.
 void RowSolver::divide_bodies() {
-  Vec3 lower = positions_[1], upper = lower;  // body 0 is the fixed body
-  for (std::size_t i = 1; i < body_count_; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      lower[k] = std::min(lower[k], positions_[i][k]);
-      upper[k] = std::max(upper[k], positions_[i][k]);
+  // Quantiles of a sample, because single bodies may be far away.
+  std::array<Real, kSample> longest{};
+  std::size_t count = 0;
+  int axis = 0;
+  Real length = -1;
+  const std::size_t stride = (body_count_ + kSample - 1) / kSample;
+  for (int k = 0; k < 3; ++k) {
+    std::array<Real, kSample> sample{};
+    count = 0;
+    for (std::size_t i = 1; i < body_count_; i += stride) {
+      const Real position = positions_[i][k];
+      sample[count++] = std::isfinite(position) ? position : 0;
     }
+    std::sort(sample.begin(), sample.begin() + static_cast<std::ptrdiff_t>(count));
+    const Real middle = sample[count - 1 - count / 8] - sample[count / 8];
+    if (!(middle > length)) continue;
+    length = middle;
+    axis = k;
+    longest = sample;
   }
-  const Vec3 size = upper - lower;
-  const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
-  const Real scale = Real(kSlices) / size[axis];
-  const auto slice_of = [&](std::size_t i) {
-    const Real slice = (positions_[i][axis] - lower[axis]) * scale;
-    return slice > 0 ? static_cast<std::uint32_t>(std::min(slice, Real(kSlices - 1))) : 0u;
-  };
-  std::array<std::uint32_t, kSlices> counts{};
-  for (std::size_t i = 1; i < body_count_; ++i) ++counts[slice_of(i)];
-  std::uint64_t before = 0;
-  for (std::uint32_t& count : counts) {
-    before += std::exchange(count, static_cast<std::uint32_t>(before * parts_ / body_count_));
+  std::array<Real, ThreadPool::kMaxThreads> ends{};
+  for (std::size_t part = 0; part + 1 < parts_; ++part) {
+    ends[part] = longest[(part + 1) * count / parts_];
   }
+  const auto last = ends.begin() + static_cast<std::ptrdiff_t>(parts_ - 1);
   part_of_body_.reserve(body_count_, "bodies of a solver");
   part_of_body_[0] = 0;
   for (std::size_t i = 1; i < body_count_; ++i) {
-    part_of_body_[i] = static_cast<std::uint8_t>(counts[slice_of(i)]);
+    const auto end = std::upper_bound(ends.begin(), last, positions_[i][axis]);
+    part_of_body_[i] = static_cast<std::uint8_t>(end - ends.begin());
   }
   assign_slots();
 }
@@ -366,11 +385,13 @@ void RowSolver::set_up_frictions(const rows::RowSettings& settings, std::uint32_
 /// Prepares claims of items, and the presence of the threads.
 void RowSolver::reset_claims(std::uint32_t count) {
   if (count > claim_capacity_) {
-    claims_ = std::make_unique<std::atomic<std::uint32_t>[]>(count);
+    claims_ = std::make_unique<ClaimLine[]>(count / kClaimsPerLine);
     claim_capacity_ = count;
   }
-  for (std::uint32_t i = 0; i < count; ++i) claims_[i].store(0, std::memory_order_relaxed);
-  for (unsigned i = 0; i < pool_.threads(); ++i) {
+  for (std::uint32_t i = 0; i < count / kClaimsPerLine; ++i) {
+    for (auto& item : claims_[i].items) item.store(0, std::memory_order_relaxed);
+  }
+  for (std::uint32_t i = 0; i < parts_; ++i) {
     for (auto& done : participants_[i].done) done.store(0, std::memory_order_relaxed);
     participants_[i].set_present(false);
   }
@@ -413,10 +434,10 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
   const std::uint32_t claims = 3 * list_.claims() + split_impulse_blocks_.list.claims() +
                                rolling_friction_blocks_.list.claims() + serial_list_.claims();
   reset_claims(claims);
-  std::atomic<std::uint32_t>* next_claim = claims_.get();
+  ClaimLine* next_claim = claims_.get();
   const auto add = [&](Program* program, RowSweep sweep, const WorkList& list) {
     program->passes[program->pass_count++] = {sweep, &list, next_claim};
-    next_claim += list.claims();
+    next_claim += list.claims() / kClaimsPerLine;
   };
   Program warm, split, main;
   for (Program* program : {&warm, &split, &main}) {
@@ -459,8 +480,8 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
   RowSweepReport report;
   report.iterations = main.iterations_done();
   if (chooser_ != nullptr) {
-    const std::chrono::duration<double, std::micro> us = Clock::now() - start;
-    chooser_->record(us.count() / (report.iterations + 1), predicted_us_);
+    const double us = division_us_ + us_since(start);
+    chooser_->record(us / (report.iterations + 1), predicted_us_);
   }
   if (report.iterations > 0) {
     report.residual = residuals_[static_cast<std::size_t>(report.iterations) - 1];

@@ -67,9 +67,8 @@ class JFPX_API RowSolver {
   /// Threads share the bodies by their positions, which only affect the speed.
   void set_position(std::size_t i, const Vec3& position) { positions_[i] = position; }
 
-  /// Arranges the contacts, given in their serial order, in blocks of one color and one part of the
-  /// bodies each. Removes all
-  /// rolling friction rows.
+  /// Arranges the contacts, given in their serial order, in blocks of one color each, and those of
+  /// a large color by parts of the bodies. Removes all rolling friction rows.
   /// @param pairs must remain valid until the rows are set up
   /// @param directions number of friction directions: 1 or 2
   void schedule(std::span<const RowPair> pairs, std::uint32_t directions);
@@ -118,6 +117,7 @@ class JFPX_API RowSolver {
  private:
   static constexpr std::size_t kPrograms = 3;
   struct Participant;
+  struct ClaimLine;
   struct Program;
   /// Selected blocks, by color and part.
   struct BlockSubset {
@@ -180,13 +180,14 @@ class JFPX_API RowSolver {
   BlockSubset split_impulse_blocks_, rolling_friction_blocks_;
   std::unique_ptr<std::atomic<Real>[]> residuals_;
   std::size_t residual_capacity_ = 0;
-  std::unique_ptr<std::atomic<std::uint32_t>[]> claims_;
-  std::uint32_t claim_capacity_ = 0;
+  std::unique_ptr<ClaimLine[]> claims_;
+  std::uint32_t claim_capacity_ = 0, most_parts_ = 1;
   std::unique_ptr<Participant[]> participants_;
   /// Choose between several threads and one, by the number of bits of the number of blocks.
   std::vector<TimeChooser> choosers_ = std::vector(33, TimeChooser(2));
   TimeChooser* chooser_ = nullptr;  ///< null: only one thread is useful
   double predicted_us_ = 0;         ///< [us], of an iteration
+  double division_us_ = 0;          ///< [us], of the division of the bodies
 };
 
 }  // namespace cpu

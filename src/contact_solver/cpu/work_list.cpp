@@ -10,7 +10,6 @@ namespace {
 
 /// Large parts of a color are divided, so that other threads may help a late one.
 constexpr std::uint32_t kBlocksPerItem = 48;
-constexpr std::uint32_t kClaimsPerCacheLine = 16;
 
 }  // namespace
 
@@ -73,7 +72,7 @@ void WorkList::number_claims(std::uint32_t parts) {
   for (std::uint32_t part = 0; part < parts; ++part) {
     const std::uint32_t count = next_claim_[part];
     next_claim_[part] = claims_;
-    claims_ += (count + kClaimsPerCacheLine - 1) / kClaimsPerCacheLine * kClaimsPerCacheLine;
+    claims_ += (count + kClaimsPerLine - 1) / kClaimsPerLine * kClaimsPerLine;
   }
   for (std::uint32_t i = 0; i < item_count_; ++i) items_[i].claim = next_claim_[items_[i].part]++;
 }

@@ -23,8 +23,11 @@ struct BlockRange {
 struct WorkItem {
   BlockRange blocks;
   std::uint32_t part;   ///< of the bodies; see RowSolver
-  std::uint32_t claim;  ///< index of its claim; claims of different parts share no cache line
+  std::uint32_t claim;  ///< index of its claim; those of different parts are in different lines
 };
+
+/// Number of claims in a cache line.
+inline constexpr std::uint32_t kClaimsPerLine = 16;
 
 /// Items [first, last), which may run at the same time, but only after the stage before.
 struct WorkStage {
@@ -46,7 +49,7 @@ class JFPX_API WorkList {
   std::span<const WorkStage> stages() const { return {stages_.data(), stage_count_}; }
   const WorkItem* items() const { return items_.data(); }
   std::uint32_t item_count() const { return item_count_; }
-  /// All claims are below it.
+  /// All claims are below it. A multiple of kClaimsPerLine.
   std::uint32_t claims() const { return claims_; }
 
  private:
