@@ -90,20 +90,19 @@ bool update_sphere_plane(btPersistentManifold* manifold, const btCollisionObject
                          const btCollisionObject& body_b, bool sphere_first) {
   const btCollisionObject& sphere = sphere_first ? body_a : body_b;
   const btCollisionObject& plane = sphere_first ? body_b : body_a;
+  const auto& shape = static_cast<const btSphereShape&>(*sphere.getCollisionShape());
+  const btScalar threshold = manifold->getContactBreakingThreshold();
   if (manifold->getNumContacts() == 0 &&
-      is_clear_of_plane(sphere,
-                        static_cast<const btSphereShape&>(*sphere.getCollisionShape()).getRadius(),
-                        plane, manifold->getContactBreakingThreshold())) {
+      is_clear_of_plane(sphere, shape.getRadius(), plane, threshold)) {
     return true;
   }
-  const SpherePlaneContact contact = find_closest_points(
-      sphere.getWorldTransform(), static_cast<const btSphereShape&>(*sphere.getCollisionShape()),
-      plane.getWorldTransform(),
-      static_cast<const btStaticPlaneShape&>(*plane.getCollisionShape()));
+  const SpherePlaneContact contact =
+      find_closest_points(sphere.getWorldTransform(), shape, plane.getWorldTransform(),
+                          static_cast<const btStaticPlaneShape&>(*plane.getCollisionShape()));
   // The compiler determines which of two NaNs an operation returns.
   const btVector3 sum = contact.normal_on_plane + contact.point_on_plane;
   if (!is_finite(sum.x() + sum.y() + sum.z() + contact.distance)) return false;
-  const bool touching = contact.distance < manifold->getContactBreakingThreshold();
+  const bool touching = contact.distance < threshold;
   if (!touching && manifold->getNumContacts() == 0) return true;
   const btCollisionObjectWrapper a = wrapper_of(body_a);
   const btCollisionObjectWrapper b = wrapper_of(body_b);
