@@ -166,6 +166,9 @@ void register_all() {
     if (n <= 32000) add_on_device("sorted_tiles", gas, n, SphereAlgorithm::sorted_tiles);
   }
   add_on_device("pairs_only", gas, 1000000, SphereAlgorithm::automatic, true);
+  for (const std::size_t n : {10000, 100000, 1000000}) {
+    add_on_device("pairs_only", input("crowded"), n, SphereAlgorithm::automatic, true);
+  }
   add_on_device("automatic", input("overlap"), 4096, SphereAlgorithm::automatic);
   for (const Input& i : inputs()) {
     if (i.name != "gas" && i.name != "overlap")

@@ -20,15 +20,19 @@ Real side_of(std::size_t n, double mean_volume, double contacts) {
 }
 constexpr double kUnitSphere = 4.18879020478639;
 
-Spheres gas(std::size_t n) {
+Spheres gas_with(std::size_t n, double contacts) {
   Random random(1);
-  const Real side = side_of(n, kUnitSphere / 8, 3);
+  const Real side = side_of(n, kUnitSphere / 8, contacts);
   Spheres spheres(n);
   for (SphereInstance& s : spheres) {
     s = {random.uniform_in_box({0, 0, 0}, {side, side, side}), Real(0.5)};
   }
   return spheres;
 }
+
+Spheres gas(std::size_t n) { return gas_with(n, 3); }
+/// Each sphere touches 30 others.
+Spheres crowded(std::size_t n) { return gas_with(n, 15); }
 
 /// Log-uniform radii from 1e-3 to 10. Two spheres touch with probability 4/3 pi (r_a + r_b)^3 / V,
 /// and E (r_a + r_b)^3 = 2 E r^3 + 6 E r^2 E r, with E r^k = (10^k - 1e-3^k) / (k ln 1e4).
@@ -122,11 +126,11 @@ Spheres overlap(std::size_t n) {
   return spheres;
 }
 
-constexpr Input kInputs[] = {{"gas", gas},           {"polydisperse", polydisperse},
-                             {"clusters", clusters}, {"line", line},
-                             {"plane", plane},       {"far", far},
-                             {"giant", giant},       {"coincident", coincident},
-                             {"outliers", outliers}, {"overlap", overlap}};
+constexpr Input kInputs[] = {
+    {"gas", gas},           {"crowded", crowded}, {"polydisperse", polydisperse},
+    {"clusters", clusters}, {"line", line},       {"plane", plane},
+    {"far", far},           {"giant", giant},     {"coincident", coincident},
+    {"outliers", outliers}, {"overlap", overlap}};
 
 }  // namespace
 

@@ -17,9 +17,10 @@ struct Input {
   std::vector<SphereInstance> (*make)(std::size_t n);
 };
 
-/// gas (three contacts per sphere), polydisperse (radii over four decades, as many contacts),
-/// clusters, line, plane, far (1e6 m from the origin), giant (one sphere contains all others),
-/// coincident (groups of 7 concentric spheres), outliers, overlap (all pairs touch).
+/// gas (three contacts per sphere), crowded (fifteen), polydisperse (radii over four decades, as
+/// many contacts as gas), clusters, line, plane, far (1e6 m from the origin), giant (one sphere
+/// contains all others), coincident (groups of 7 concentric spheres), outliers, overlap (all pairs
+/// touch).
 std::span<const Input> inputs();
 const Input& input(std::string_view name);
 

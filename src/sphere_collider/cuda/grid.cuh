@@ -4,6 +4,7 @@
 
 #include "src/sphere_collider/cuda/grid.hpp"
 #include "src/sphere_collider/cuda/grid_cells.hpp"
+#include "src/sphere_collider/cuda/local_filter.hpp"
 #include "src/sphere_collider/cuda/search.cuh"
 
 #include <cub/block/block_scan.cuh>
@@ -79,8 +80,9 @@ inline constexpr Real kCrowded = 3;
 struct GridPlan {
   GridScale scale;
   bool dense;
-  bool single;      ///< dense, and all spheres are on level 0
-  bool crowded;     ///< single, with more than kCrowded spheres a cube of the cell width on average
+  bool single;   ///< dense, and all spheres are on level 0
+  bool crowded;  ///< single, with more than kCrowded spheres a cube of the cell width on average
+  bool equal_radii;
   Real inverse_yz;  ///< inverse cell width of level 0, in y and z
   std::uint32_t buckets;
   std::uint32_t coarse_shift;  ///< 2^coarse_shift consecutive buckets are a coarse bucket
@@ -176,8 +178,11 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
       plan.scale = scale;
       plan.dense = dense;
       plan.single = dense && scale.last_level == 0;
-      plan.crowded = plan.single && x_cells * static_cast<Real>(args.input.n) >
-                                        kCrowded * static_cast<Real>(all_cells);
+      plan.crowded =
+          plan.single &&
+          x_cells * static_cast<Real>(args.input.n) > kCrowded * static_cast<Real>(all_cells) &&
+          scale.half_0 >= kLeastLocalHalf && scale.half_0 <= kLargestLocalHalf;
+      plan.equal_radii = state.largest_half == ~state.smallest_half;
       plan.inverse_yz = inverse_width(half_cell_of(scale.half_0, 0));
       plan.buckets = dense ? static_cast<std::uint32_t>(all_cells) : args.table.size;
       plan.coarse_shift = 0;

@@ -3,72 +3,74 @@
 #pragma once
 
 #include "src/sphere_collider/cuda/grid_single_level.cuh"
+#include "src/sphere_collider/cuda/local_filter.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Number of spheres, the queries, whose neighbors a warp finds together.
-inline constexpr unsigned kQueries = 8;
+/// Number of spheres, the queries, whose neighbors a warp finds together, and of consecutive lanes
+/// that share the tests of a query.
+inline constexpr unsigned kQueries = 8, kLanesOfQuery = 32 / kQueries;
+/// Number of candidates that a warp holds, and of tests between two looks at how many there are.
+inline constexpr unsigned kCandidates = 96, kTestsAtOnce = 32 / kLanesOfQuery;
+inline constexpr unsigned kLoads = kCandidates / 32;  // of a lane
+/// Largest number of neighbors that a lane finds of a row that is staged.
+inline constexpr unsigned kMaxOfLane = 15;
+inline constexpr unsigned kSorted = 8;  // neighbors that a lane sorts in registers
+/// Largest number of cells in y or z around a sphere. The distance between the first and the last
+/// is two search radii, which are 2 cells wide but for rounding: an error of 1/4 cell in each
+/// coordinate, which has at most kMaxCells cells, and of 1/4 in each product of cell_of().
+inline constexpr unsigned kMaxRows = 5;
 
 /// Shared memory of a warp.
 struct CrowdedStorage {
-  alignas(32) unsigned char spheres[kQueries * sizeof(SphereInstance)];
-  std::uint32_t ids[kQueries];
-  std::uint32_t found[kQueries];                              // number of neighbors
-  alignas(16) std::uint32_t neighbors[kQueries][kMaxStaged];  // in the order of discovery
+  union {
+    LocalCandidate candidates[kCandidates];
+    std::uint32_t rows[kQueries * kMaxStaged];  // after the search: the b's of all queries
+  };
+  std::uint32_t ids[kCandidates];
+  std::uint32_t found[kMaxOfLane * 32];  // lane l has the elements l, l + 32, l + 64, ...
 };
-static_assert(kMaxStaged % 4 == 0);
+static_assert(sizeof(CrowdedStorage) <= sizeof(SingleLevelStorage));
 
 /// Finds the neighbors b > a of each sphere a, and stages them as SingleLevelSearcher does.
 class CrowdedSearcher {
  public:
   __device__ CrowdedSearcher(const GridArgs& args, const SearchOutput& output, const GridPlan& plan,
                              CrowdedStorage& storage)
-      : args_(args),
-        staging_(staging_output(args, output)),
-        level_(plan),
-        error_bound_(error_bound_of(2 * level_.half)),
-        s_(storage) {}
+      : args_(args), staging_(staging_output(args, output)), plan_(plan), s_(storage) {}
 
   /// Finds the neighbors of the spheres at kQueries consecutive positions, or at the last ones.
   /// Call from all lanes of a warp.
   __device__ void run(std::uint32_t position) {
     const unsigned queries = min(kQueries, args_.input.n - position);
-    const bool is_query = lane_id() < queries;
-    CellRange near{};
-    std::int32_t y = 0, z = 0;
-    __syncwarp();
-    if (lane_id() < kQueries) {
-      // Elements after the last query get no neighbor, because no index is larger than theirs.
-      const std::uint32_t at = position + min(lane_id(), queries - 1);
-      const SphereInstance self = load_sorted(args_.table.sorted + at);
-      near = neighbor_cells(level_, self);
-      y = cell_of(self.centre.y, level_.inverse_yz);
-      z = cell_of(self.centre.z, level_.inverse_yz);
-      sphere(lane_id()) = self;
-      s_.ids[lane_id()] = is_query ? args_.table.ids[at] : ~0u;
-      s_.found[lane_id()] = 0;
-    }
-    __syncwarp();
-    for (unsigned left = (1u << queries) - 1; left != 0;) {
+    const bool is_query = query() < queries;
+    const std::uint32_t at = position + min(query(), queries - 1);
+    self_ = load_sorted(args_.table.sorted + at);
+    id_ = args_.table.ids[at];
+    found_ = 0;
+    const SingleLevel level(plan_);
+    const CellRange near = neighbor_cells(level, self_);
+    const std::int32_t y = cell_of(self_.centre.y, level.inverse_yz),
+                       z = cell_of(self_.centre.z, level.inverse_yz);
+    for (unsigned left = __ballot_sync(kFullWarp, is_query); left != 0;) {
       // Queries in one row of cells are searched together, because the cells around them overlap.
       const int first = __ffs(static_cast<int>(left)) - 1;
       const std::int32_t first_y = __shfl_sync(kFullWarp, y, first),
                          first_z = __shfl_sync(kFullWarp, z, first);
       const bool is_in = is_query && y == first_y && z == first_z;
-      const unsigned together = __ballot_sync(kFullWarp, is_in);
-      search(together, united(near, is_in));
-      left &= ~together;
+      search(level, is_in, first, united(near, is_in));
+      left &= ~__ballot_sync(kFullWarp, is_in);
     }
-    __syncwarp();
     stage(position, queries);
   }
 
  private:
-  __device__ SphereInstance& sphere(unsigned query) {
-    return reinterpret_cast<SphereInstance*>(s_.spheres)[query];
-  }
+  __device__ static unsigned query() { return lane_id() / kLanesOfQuery; }
+  /// Index of this lane among those of its query.
+  __device__ static unsigned part() { return lane_id() % kLanesOfQuery; }
+  __device__ std::uint32_t& found(unsigned k) { return s_.found[32 * k + lane_id()]; }
 
   /// The smallest range that contains those of the lanes with `is_in`.
   __device__ static CellRange united(const CellRange& range, bool is_in) {
@@ -79,104 +81,242 @@ class CrowdedSearcher {
             highest(range.y1), lowest(range.z0),  highest(range.z1)};
   }
 
-  /// Tests all spheres in a range of cells against the queries whose bits are set. A lane tests one
-  /// sphere at a time.
-  __device__ void search(unsigned queries, const CellRange& near) {
-    const std::int32_t rows_y = near.y1 - near.y0 + 1, rows = rows_y * (near.z1 - near.z0 + 1);
-    for (std::int32_t first_row = 0; first_row < rows; first_row += 32) {
-      const auto row = first_row + static_cast<std::int32_t>(lane_id());
-      uint2 positions{0, 0};  // of the spheres in the row of this lane
-      if (row < rows) {
-        const std::uint32_t cells =
-            row_of_box(level_.box, near.y0 + row % rows_y, near.z0 + row / rows_y);
-        positions = {args_.table.starts[cells + static_cast<std::uint32_t>(near.x0)],
-                     args_.table.starts[cells + static_cast<std::uint32_t>(near.x1) + 1]};
-      }
-      const std::uint32_t sum = warp_inclusive_sum(positions.y - positions.x);
-      const std::uint32_t candidates = __shfl_sync(kFullWarp, sum, 31);
-      for (std::uint32_t first = 0; first < candidates; first += 32) {
-        const std::uint32_t i = first + lane_id();
-        const unsigned owner = owner_of(i, sum);
-        const std::uint32_t past = __shfl_sync(kFullWarp, positions.y, owner);
-        const std::uint32_t before_past = __shfl_sync(kFullWarp, sum, owner) - i;
-        const std::uint32_t position = i < candidates ? past - before_past : 0;
-        const SphereInstance other = load_sorted(args_.table.sorted + position);
-        // Index 0 is a neighbor of no query, because it is not larger than any index.
-        test(queries, other, i < candidates ? args_.table.ids[position] : 0);
-      }
+  /// Tests all spheres in a range of cells against the queries of the lanes with `is_in`. The
+  /// origin of local coordinates is the centre of the query of lane `first`.
+  __device__ void search(const SingleLevel& level, bool is_in, int first, const CellRange& near) {
+    const Vec3 origin{__shfl_sync(kFullWarp, self_.centre.x, first),
+                      __shfl_sync(kFullWarp, self_.centre.y, first),
+                      __shfl_sync(kFullWarp, self_.centre.z, first)};
+    LocalQuery local = local_query(self_, level.half, origin);
+    if (!is_in) local.limit = -std::numeric_limits<float>::infinity();
+    const std::int32_t y = near.y0 + static_cast<std::int32_t>(lane_id() % kMaxRows),
+                       z = near.z0 + static_cast<std::int32_t>(lane_id() / kMaxRows);
+    uint2 positions{0, 0};  // of the spheres in the row of this lane
+    if (y <= near.y1 && z <= near.z1) {
+      const std::uint32_t row = row_of_box(level.box, y, z);
+      positions = {args_.table.starts[row + static_cast<std::uint32_t>(near.x0)],
+                   args_.table.starts[row + static_cast<std::uint32_t>(near.x1) + 1]};
     }
+    const std::uint32_t sum = warp_inclusive_sum(positions.y - positions.x);
+    const std::uint32_t candidates = __shfl_sync(kFullWarp, sum, 31);
+    for (std::uint32_t done = 0; done < candidates; done += kCandidates) {
+      __syncwarp();
+      load_candidates(done, candidates, sum, positions.y - sum, origin);
+      __syncwarp();
+      test_candidates(min(kCandidates, candidates - done), local);
+    }
+    __syncwarp();
   }
 
-  /// Adds a sphere to the neighbors of the queries that it touches.
-  __device__ void test(unsigned queries, const SphereInstance& other, std::uint32_t id) {
-    unsigned touching = 0;
-    bool is_uncertain = false;
+  /// Loads the candidates from `done` on. Lane l has those before `sum`, and candidate i of them is
+  /// at position i + shift.
+  __device__ void load_candidates(std::uint32_t done, std::uint32_t candidates, std::uint32_t sum,
+                                  std::uint32_t shift, const Vec3& origin) {
+    std::uint32_t positions[kLoads], ids[kLoads];
+    Vec3 centres[kLoads];
 #pragma unroll
-    for (unsigned query = 0; query < kQueries; ++query) {
-      const Real e = excess(load_sorted(&sphere(query)), other);
-      const bool may_touch = !(e > error_bound_) && id > s_.ids[query];
-      is_uncertain = is_uncertain || !(absolute(e) > error_bound_);
-      touching |= may_touch ? 1u << query : 0;
+    for (unsigned k = 0; k < kLoads; ++k) {
+      const std::uint32_t i = done + 32 * k + lane_id();
+      const std::uint32_t position = i + __shfl_sync(kFullWarp, shift, owner_of(i, sum));
+      positions[k] = i < candidates ? position : 0;
     }
-    for (touching &= queries; touching != 0; touching &= touching - 1) {
-      const auto query = static_cast<unsigned>(__ffs(static_cast<int>(touching)) - 1);
-      if (is_uncertain && !touch(load_sorted(&sphere(query)), other)) continue;
-      const std::uint32_t at = atomicAdd(&s_.found[query], 1u);
-      if (at < kMaxStaged) s_.neighbors[query][at] = id;
+#pragma unroll
+    for (unsigned k = 0; k < kLoads; ++k) {
+      centres[k] = load_sorted(args_.table.sorted + positions[k]).centre;
+      ids[k] = args_.table.ids[positions[k]];
+    }
+#pragma unroll
+    for (unsigned k = 0; k < kLoads; ++k) {
+      LocalCandidate candidate = local_candidate(centres[k], origin);
+      const unsigned slot = 32 * k + lane_id();
+      if (done + slot >= candidates) candidate.square = std::numeric_limits<float>::infinity();
+      s_.candidates[slot] = candidate;
+      s_.ids[slot] = ids[k];
     }
   }
 
-  /// Sorts the neighbors of each query by rank, that is, by the number of smaller ones, and writes
-  /// them to the staging buffer.
+  /// Each lane tests every kLanesOfQuery-th of the first `count` candidates, and keeps those that
+  /// are neighbors b > a.
+  __device__ void test_candidates(unsigned count, const LocalQuery& local) {
+    static_assert(kCandidates / kLanesOfQuery <= 32);
+    unsigned touching = 0, tested = 0;  // the last test has the lowest bit
+    float nearest = std::numeric_limits<float>::infinity();
+    do {
+#pragma unroll
+      for (unsigned k = 0; k < kTestsAtOnce; ++k) {
+        const float e = local_excess(local, s_.candidates[kLanesOfQuery * (tested + k) + part()]);
+        touching = __funnelshift_l(__float_as_uint(e), touching, 1);  // appends the sign
+        nearest = ::fminf(nearest, ::fabsf(e));
+      }
+      tested += kTestsAtOnce;
+    } while (kLanesOfQuery * tested < count);
+    if (plan_.equal_radii && __all_sync(kFullWarp, nearest > local.doubt)) {
+      keep_neighbors(touching, tested, [](std::uint32_t) { return true; });
+    } else {
+      keep_neighbors(touching, tested,
+                     [&](std::uint32_t id) { return touch(self_, load_sphere(args_.input, id)); });
+    }
+  }
+  template <class Touches>
+  __device__ void keep_neighbors(unsigned touching, unsigned tests, const Touches& touches) {
+    const std::uint32_t* const last = s_.ids + kLanesOfQuery * (tests - 1) + part();
+    while (touching != 0) {
+      const int bit = 31 - __clz(static_cast<int>(touching));
+      touching ^= 1u << bit;
+      const std::uint32_t id = last[-static_cast<int>(kLanesOfQuery) * bit];
+      if (id > id_ && touches(id)) {
+        if (found_ < kMaxOfLane) found(found_) = id;
+        ++found_;
+      }
+    }
+  }
+
+  /// Writes the neighbors of each query in order to the staging buffer.
   __device__ void stage(std::uint32_t position, unsigned queries) {
-    const std::uint32_t found = lane_id() < queries ? s_.found[lane_id()] : 0,
-                        kept = found > kMaxStaged ? 0 : found;
-    const std::uint32_t sum = warp_inclusive_sum(kept);
+    std::uint32_t length = found_;  // of this lane and of the lower ones of the query
+    for (unsigned d = 1; d < kLanesOfQuery; d *= 2) {
+      const std::uint32_t below = __shfl_up_sync(kFullWarp, length, d, kLanesOfQuery);
+      if (part() >= d) length += below;
+    }
+    const std::uint32_t before = length - found_;
+    length = __shfl_sync(kFullWarp, length, kLanesOfQuery - 1, kLanesOfQuery);
+    const unsigned parts_of_query = ((1u << kLanesOfQuery) - 1) << (kLanesOfQuery * query());
+    const unsigned full = __ballot_sync(kFullWarp, found_ > kMaxOfLane) & parts_of_query;
+    const bool is_staged = length <= kMaxStaged && full == 0;
+    const bool is_query = query() < queries, is_last = part() == kLanesOfQuery - 1;
+    const std::uint32_t kept = is_query && is_staged ? length : 0;
+    const std::uint32_t sum = warp_inclusive_sum(is_last ? kept : 0);
+    const std::uint32_t start = is_last ? sum - kept : sum;  // of the row of the query
     const std::uint32_t all = __shfl_sync(kFullWarp, sum, 31);
     unsigned long long index = 0;
     if (lane_id() == 0) {
       index = atomicAdd(&args_.state->contacts, static_cast<unsigned long long>(all));
     }
     index = __shfl_sync(kFullWarp, index, 0);
-    if (lane_id() < queries) {
-      const std::uint32_t id = s_.ids[lane_id()];
-      atomicAdd(&args_.rows.bin_sums[id / kBin], static_cast<unsigned long long>(found));
-      if (found <= kMaxStaged) {
-        args_.rows.offsets[id] = staged_list(index + sum - kept, kept).bits;
+    if (is_last && is_query) {
+      atomicAdd(&args_.rows.bin_sums[id_ / kBin], static_cast<unsigned long long>(length));
+      if (is_staged) {
+        args_.rows.offsets[id_] = staged_list(index + start, kept).bits;
       } else {
-        args_.rows.offsets[id] = staged_list(found, StagedList::kNotStaged).bits;
-        args_.table.positions[id] = position + lane_id();
-        atomicAdd(&args_.state->long_row_contacts, static_cast<unsigned long long>(found));
+        args_.rows.offsets[id_] = staged_list(length, StagedList::kNotStaged).bits;
+        args_.table.positions[id_] = position + query();
+        atomicAdd(&args_.state->long_row_contacts, static_cast<unsigned long long>(length));
         atomicAdd(&args_.state->overflow, 1ull);
       }
-      // The sums below read four neighbors at a time.
-      for (std::uint32_t k = kept; k % 4 != 0; ++k) s_.neighbors[lane_id()][k] = ~0u;
+    }
+    if (index + all > args_.rows.capacity) return;
+    std::uint32_t* const row = s_.rows + start;
+    if (kept != 0) {
+      for (unsigned k = 0; k < found_; ++k) row[before + k] = found(k);
     }
     __syncwarp();
-    if (index + all > args_.rows.capacity) return;
-    for (unsigned query = 0; query < queries; ++query) {
-      const std::uint32_t length = __shfl_sync(kFullWarp, kept, query);
-      const unsigned long long to = index + __shfl_sync(kFullWarp, sum, query) - length;
-      const auto* const neighbors = reinterpret_cast<const uint4*>(s_.neighbors[query]);
-      for (std::uint32_t i = lane_id(); i < length; i += 32) {
-        const std::uint32_t b = s_.neighbors[query][i];
-        std::uint32_t rank = 0;
-        for (std::uint32_t k = 0; 4 * k < length; ++k) {
-          const uint4 four = neighbors[k];
-          rank += (four.x < b ? 1 : 0) + (four.y < b ? 1 : 0) + (four.z < b ? 1 : 0) +
-                  (four.w < b ? 1 : 0);
-        }
-        write_contact(staging_, to + rank, s_.ids[query], b, load_sorted(&sphere(query)),
-                      load_sphere(args_.input, b));
+    sort_row(row, kept <= kMaxSorted ? kept : 0);
+    for (unsigned left = __ballot_sync(kFullWarp, kept > kMaxSorted && part() == 0); left != 0;
+         left &= left - 1) {
+      const int first = __ffs(static_cast<int>(left)) - 1;
+      sort_long_row(s_.rows + __shfl_sync(kFullWarp, start, first),
+                    __shfl_sync(kFullWarp, kept, first));
+    }
+    if (staging_.contacts == nullptr) {
+      for (std::uint32_t i = lane_id(); i < all; i += 32) {
+        staging_.neighbors[index + i] = s_.rows[i];
       }
+    } else {
+      write_contacts(index, row, kept);
+    }
+    __syncwarp();
+  }
+
+  /// Largest number of neighbors of a row that its lanes sort.
+  static constexpr unsigned kMaxSorted = kSorted * kLanesOfQuery;
+
+  /// Sorts the row of each query: each lane sorts kSorted neighbors, and the lanes of a query merge
+  /// theirs (bitonic; K. Batcher, 1968).
+  __device__ void sort_row(std::uint32_t* row, std::uint32_t length) {
+    std::uint32_t ids[kSorted];
+#pragma unroll
+    for (unsigned k = 0; k < kSorted; ++k) {
+      const unsigned i = kSorted * part() + k;
+      ids[k] = i < length ? row[i] : ~0u;
+    }
+    sort_eight(ids);
+    merge<true>(ids, 1, 1);
+    merge_halves(ids);
+    merge<true>(ids, 3, 2);
+    merge<false>(ids, 1, 1);
+    merge_halves(ids);
+#pragma unroll
+    for (unsigned k = 0; k < kSorted; ++k) {
+      const unsigned i = kSorted * part() + k;
+      if (i < length) row[i] = ids[k];
+    }
+    __syncwarp();
+  }
+  /// Exchanges values with the lane whose number differs by the bits of `other`: lanes with the bit
+  /// `upper` keep the larger ones. With kReversed, first values meet last ones.
+  template <bool kReversed>
+  __device__ static void merge(std::uint32_t (&ids)[kSorted], int other, unsigned upper) {
+    std::uint32_t theirs[kSorted];
+#pragma unroll
+    for (unsigned k = 0; k < kSorted; ++k) {
+      theirs[k] = __shfl_xor_sync(kFullWarp, ids[kReversed ? kSorted - 1 - k : k], other);
+    }
+    const bool keeps_larger = (lane_id() & upper) != 0;
+#pragma unroll
+    for (unsigned k = 0; k < kSorted; ++k) {
+      ids[k] = keeps_larger ? max(ids[k], theirs[k]) : min(ids[k], theirs[k]);
+    }
+  }
+  /// Sorts a bitonic sequence.
+  __device__ static void merge_halves(std::uint32_t (&ids)[kSorted]) {
+#pragma unroll
+    for (unsigned distance = kSorted / 2; distance != 0; distance /= 2) {
+#pragma unroll
+      for (unsigned k = 0; k < kSorted; ++k) {
+        if ((k & distance) == 0) exchange(ids[k], ids[k + distance]);
+      }
+    }
+  }
+
+  /// A warp sorts a row of up to kMaxStaged neighbors by rank, that is, by the number of smaller
+  /// ones.
+  __device__ static void sort_long_row(std::uint32_t* row, std::uint32_t length) {
+    constexpr unsigned kOfLane = (kMaxStaged + 31) / 32;
+    std::uint32_t ids[kOfLane], ranks[kOfLane] = {};
+#pragma unroll
+    for (unsigned k = 0; k < kOfLane; ++k) {
+      const unsigned i = 32 * k + lane_id();
+      ids[k] = i < length ? row[i] : ~0u;
+    }
+    for (std::uint32_t i = 0; i < length; ++i) {
+      const std::uint32_t id = row[i];
+#pragma unroll
+      for (unsigned k = 0; k < kOfLane; ++k) ranks[k] += id < ids[k] ? 1 : 0;
+    }
+    __syncwarp();
+#pragma unroll
+    for (unsigned k = 0; k < kOfLane; ++k) {
+      if (32 * k + lane_id() < length) row[ranks[k]] = ids[k];
+    }
+    __syncwarp();
+  }
+
+  /// Writes the contacts of the sorted row of each query, of which the first begins at `index`.
+  __device__ void write_contacts(unsigned long long index, const std::uint32_t* row,
+                                 std::uint32_t length) {
+    const unsigned long long to = index + static_cast<std::uint32_t>(row - s_.rows);
+    for (std::uint32_t i = part(); i < length; i += kLanesOfQuery) {
+      write_contact(staging_, to + i, id_, row[i], self_, load_sphere(args_.input, row[i]));
     }
   }
 
   const GridArgs& args_;
   SearchOutput staging_;
-  SingleLevel level_;
-  Real error_bound_;  // of excess()
+  const GridPlan& plan_;
   CrowdedStorage& s_;
+  SphereInstance self_;      // of the query of this lane
+  std::uint32_t id_ = 0;     // its index
+  std::uint32_t found_ = 0;  // neighbors of it that this lane has found
 };
 
 }  // namespace cuda

@@ -67,19 +67,24 @@ __device__ inline void exchange(std::uint32_t& p, std::uint32_t& q) {
   p = low;
 }
 
-/// A thread sorts a row: the first eight neighbors by a sorting network (19 exchanges, Knuth
-/// 5.3.4), further ones, which are rare, by insertion.
-__device__ inline void sort_neighbors(const std::uint32_t* neighbors, std::uint32_t count,
-                                      std::uint32_t* sorted, std::uint8_t* owners) {
-  std::uint32_t v[8];
-#pragma unroll
-  for (unsigned k = 0; k < 8; ++k) v[k] = k < count ? neighbors[k] : ~0u;
+/// Sorts eight values by a network of 19 exchanges (Knuth 5.3.4).
+__device__ inline void sort_eight(std::uint32_t (&v)[8]) {
   exchange(v[0], v[2]), exchange(v[1], v[3]), exchange(v[4], v[6]), exchange(v[5], v[7]);
   exchange(v[0], v[4]), exchange(v[1], v[5]), exchange(v[2], v[6]), exchange(v[3], v[7]);
   exchange(v[0], v[1]), exchange(v[2], v[3]), exchange(v[4], v[5]), exchange(v[6], v[7]);
   exchange(v[2], v[4]), exchange(v[3], v[5]);
   exchange(v[1], v[4]), exchange(v[3], v[6]);
   exchange(v[1], v[2]), exchange(v[3], v[4]), exchange(v[5], v[6]);
+}
+
+/// A thread sorts a row: the first eight neighbors by a network, further ones, which are rare, by
+/// insertion.
+__device__ inline void sort_neighbors(const std::uint32_t* neighbors, std::uint32_t count,
+                                      std::uint32_t* sorted, std::uint8_t* owners) {
+  std::uint32_t v[8];
+#pragma unroll
+  for (unsigned k = 0; k < 8; ++k) v[k] = k < count ? neighbors[k] : ~0u;
+  sort_eight(v);
 #pragma unroll
   for (unsigned k = 0; k < 8; ++k) {
     if (k < count) sorted[k] = v[k], owners[k] = static_cast<std::uint8_t>(threadIdx.x);

@@ -63,6 +63,35 @@ TEST_F(Cuda, FewCrowdedSpheres) {
   expect_cpu_contacts(gas, SphereAlgorithm::automatic, "gas with coincident spheres");
 }
 
+TEST_F(Cuda, FewCrowdedSpheresThatTouchExactly) {
+  Random random(base_seed());
+  // Each sphere touches 32 others, six of them in one point.
+  std::vector<SphereInstance> lattice(20 * 20 * 20);
+  for (std::size_t i = 0; i < lattice.size(); ++i) {
+    lattice[i] = {
+        Vec3{static_cast<Real>(i % 20), static_cast<Real>(i / 20 % 20), static_cast<Real>(i / 400)},
+        Real(1)};
+  }
+  for (std::size_t i = lattice.size(); i > 1; --i) {
+    std::swap(lattice[i - 1], lattice[random.below(i)]);
+  }
+  expect_cpu_contacts(lattice, SphereAlgorithm::sorted_tiles, "lattice");
+  for (SphereInstance& s : lattice) s.centre = s.centre + Vec3{1e6, -1e6, 3e5};
+  expect_cpu_contacts(lattice, SphereAlgorithm::sorted_tiles, "lattice far from the origin");
+  for (SphereInstance& s : lattice) s = {s.centre * Real(0x1p-40), s.radius * Real(0x1p-40)};
+  expect_cpu_contacts(lattice, SphereAlgorithm::sorted_tiles, "the same, tiny");
+}
+
+TEST_F(Cuda, FewCrowdedSpheresOfSeveralRadii) {
+  Random random(base_seed());
+  auto gas = make_gas(6000, Real(0.5), 20, random);
+  for (SphereInstance& s : gas) s.radius = random.uniform(Real(0.35), Real(0.5));
+  expect_cpu_contacts(gas, SphereAlgorithm::sorted_tiles, "radii");
+  // Consecutive spheres in the order of cells are far from each other.
+  for (std::size_t i = 0; i < gas.size(); i += 2) gas[i].centre.x += 400;
+  expect_cpu_contacts(gas, SphereAlgorithm::sorted_tiles, "two parts");
+}
+
 TEST_F(Cuda, FewPairsOfAList) {
   Random random(base_seed());
   const auto spheres = make_gas(200, Real(0.5), 3, random);
