@@ -1,7 +1,33 @@
-/// Callbacks that log their calls.
+/// Callbacks that log their calls, and a function of Bullet that is replaced.
 #include "tests/bullet/random_world_globals.hpp"
 
+#include "tests/bullet/stack_bytes.hpp"
+
+#include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
+
 #include <cstdio>
+#include <dlfcn.h>
+
+#define JFPX_PROCESS_COLLISION                          \
+  "_ZN23btConvexConvexAlgorithm16processCollisionEPK24" \
+  "btCollisionObjectWrapperS2_RK16btDispatcherInfoP16btManifoldResult"
+
+/// Replaces the function of Bullet's library in its virtual table, for both worlds. Bullet's reads
+/// variables that it has not set: the points of a simplex without vertices, if GJK ends before its
+/// first one because a squared distance exceeds BT_LARGE_FLOAT (1e18 in float, 1e30 in double), and
+/// the fourth component of a normal, for a capsule and a sphere with the same centre. Here they are
+/// 0, whatever the process, the compiler or the other world has left on the stack.
+[[gnu::visibility("default")]] void btConvexConvexAlgorithm::processCollision(
+    const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+    const btDispatcherInfo& info, btManifoldResult* result) {
+  using Function =
+      void (*)(btConvexConvexAlgorithm*, const btCollisionObjectWrapper*,
+               const btCollisionObjectWrapper*, const btDispatcherInfo&, btManifoldResult*);
+  static const auto original = reinterpret_cast<Function>(dlsym(RTLD_NEXT, JFPX_PROCESS_COLLISION));
+  jfpx::bullet::fill_stack(0);
+  original(this, a, b, info, result);
+  asm volatile("");  // no tail call: the frame must begin where fill_stack() did
+}
 
 namespace jfpx {
 inline namespace JFPX_ABI {

@@ -84,8 +84,7 @@ class LiveSolverWorld {
     made->setBreakingImpulseThreshold(joint.breaking);
     made->setOverrideNumSolverIterations(joint.iterations);
     if (joint.feedback) {
-      feedbacks_.push_back(std::make_unique<btJointFeedback>());
-      *feedbacks_.back() = {};
+      feedbacks_.push_back(std::make_unique<btJointFeedback>());  // zeros
       made->setJointFeedback(feedbacks_.back().get());
     }
     bullet().addConstraint(made.get(), !joint.collide);

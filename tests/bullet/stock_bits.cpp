@@ -1,8 +1,6 @@
 /// Comparison of random worlds with stock Bullet; see the header.
 #include "tests/bullet/stock_bits.hpp"
 
-#include "tests/bullet/stack_residue.hpp"
-
 #include <sstream>
 
 namespace jfpx {
@@ -26,21 +24,15 @@ std::uint64_t wanted_solver_steps() { return world_steps_to_run(5'000, 50'000); 
 SolverTotals expect_stocks_bits(std::uint64_t steps, MakeParts parts, MakeDispatcher dispatcher) {
   const std::uint64_t seed = test_seed();
   SolverTotals totals;
-  int accidents = 0;
   for (std::uint64_t i = 0; totals.steps < steps; ++i) {
     const SolverWorld world = make_solver_world(seed + i);
     const auto failure = run(world, &totals, parts, dispatcher);
-    if (failure && is_stock_nondeterminism(world, *failure)) {
-      ++accidents;
-      continue;
-    }
     if (failure) {
       ADD_FAILURE() << "JFPX_TEST_SEED=" << seed + i << '\n'
                     << report(world, *failure, parts, dispatcher);
       return totals;
     }
   }
-  ::testing::Test::RecordProperty("accidents_of_stock", accidents);
   return totals;
 }
 

@@ -1,7 +1,7 @@
 /// Report of a difference that a fuzz target for Bullet worlds has found.
 #pragma once
 
-#include "tests/bullet/stack_residue.hpp"
+#include "tests/bullet/solver_world.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 #include <sstream>
