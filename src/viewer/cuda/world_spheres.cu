@@ -29,6 +29,7 @@ class WorldSpheres final : public ResidentSpheres {
     const std::size_t bytes = count_ * sizeof(Ball);
     JFPX_CUDA_TRY_ALLOC(cudaMalloc(&balls_, bytes), bytes, "pictures");
     JFPX_CUDA_TRY(cudaMemcpy(balls_, balls.data(), bytes, cudaMemcpyHostToDevice));
+    JFPX_CUDA_TRY(cudaStreamSynchronize(nullptr));  // the copy may end after cudaMemcpy() returns
   }
   ~WorldSpheres() override { cudaFree(balls_); }
 

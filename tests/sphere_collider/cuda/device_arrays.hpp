@@ -18,9 +18,11 @@ class DeviceArray {
     JFPX_CUDA_TRY(cudaMalloc(&data, (n + 1) * sizeof(T)));
     data_ = static_cast<T*>(data);
     JFPX_CUDA_TRY(cudaMemset(data, 0xff, (n + 1) * sizeof(T)));
+    JFPX_CUDA_TRY(cudaDeviceSynchronize());  // streams of the tests do not wait for the default one
   }
   explicit DeviceArray(const std::vector<T>& from) : DeviceArray(from.size()) {
     JFPX_CUDA_TRY(cudaMemcpy(data_, from.data(), size_ * sizeof(T), cudaMemcpyHostToDevice));
+    JFPX_CUDA_TRY(cudaDeviceSynchronize());  // the memory of a vector is copied in the background
   }
   ~DeviceArray() { static_cast<void>(cudaFree(data_)); }
   DeviceArray(const DeviceArray&) = delete;

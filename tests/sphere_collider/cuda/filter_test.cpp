@@ -2,6 +2,7 @@
 /// those of the kernels, compiled for the host, so that no GPU is needed.
 #include "src/collide/sphere_pair.hpp"
 #include "src/sphere_collider/cuda/grid_cells.hpp"
+#include "src/sphere_collider/cuda/local_filter.hpp"
 #include "src/sphere_collider/cuda/quantized_filter.hpp"
 #include "src/sphere_collider/cuda/sphere_filter.hpp"
 #include "tests/support/sphere_fixtures.hpp"
@@ -128,6 +129,40 @@ TEST(CudaFilter, ExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
   EXPECT_GT(apart, 100'000) << "the test must cover pairs that are just apart";
   EXPECT_GT(certain, 10'000) << "a filter that is never certain would pass";
   EXPECT_GT(excluded, 1'000) << "a filter that excludes nothing would pass";
+}
+
+TEST(CudaFilter, LocalExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
+  Random random(base_seed());
+  int touching = 0, apart = 0, certain = 0, excluded = 0;
+  const auto point = [&](Real size) {
+    return Vec3{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)} * size;
+  };
+  for (int i = 0; i < 1'000'000; ++i) {
+    const Real largest = std::ldexp(random.uniform(1, 2), static_cast<int>(random.below(39)) - 20);
+    const bool is_equal = random.below(2) == 0;
+    const Vec3 origin = point(largest * std::ldexp(Real(1), static_cast<int>(random.below(20))));
+    SphereInstance a{origin + point(4 * largest), is_equal ? largest : largest * Real(0.7)};
+    // The distance differs from the sum of the radii by a factor of 1 + 2^-12 to 1 + 2^-26.
+    const Real gap = std::ldexp(random.uniform(-1, 1), -12 - static_cast<int>(random.below(15)));
+    SphereInstance b{a.centre + normalized(point(1)) * ((a.radius + largest) * (1 + gap)), largest};
+    if (random.below(4) == 0) std::swap(a.centre, b.centre);
+    const bool is_touching = detail::test_sphere_pair(a, b).touching != 0;
+    const cuda::LocalQuery query = cuda::local_query(a, largest, origin);
+    const float excess = cuda::local_excess(query, cuda::local_candidate(b.centre, origin));
+    (is_touching ? touching : apart) += 1;
+    if (!(excess < 0)) {
+      ++excluded;
+      ASSERT_FALSE(is_touching) << "pair " << i << ", " << seed_note();
+    }
+    if (excess < -query.doubt) {
+      ++certain;
+      ASSERT_TRUE(is_touching) << "pair " << i << ", " << seed_note();
+    }
+  }
+  EXPECT_GT(touching, 300'000) << "the test must cover touching pairs";
+  EXPECT_GT(apart, 300'000) << "the test must cover pairs that are just apart";
+  EXPECT_GT(certain, 10'000) << "a filter that is never certain would pass";
+  EXPECT_GT(excluded, 10'000) << "a filter that excludes nothing would pass";
 }
 
 // No decision may be wrong if the square of the sum of the radii overflows.
