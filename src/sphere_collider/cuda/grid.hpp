@@ -25,7 +25,7 @@ namespace cuda {
 /// Neighbors that a sphere keeps in its own slots; further ones go to a list for all spheres.
 inline constexpr std::uint32_t kSlots = 16;
 /// Largest number of contacts of a row in the staging buffer. No contact of a longer row is staged.
-inline constexpr std::uint32_t kMaxStaged = 48;
+inline constexpr std::uint32_t kMaxStaged = 60;
 /// Number of elements after the last sphere that a search reads, but does not use.
 inline constexpr std::uint32_t kReadBeyond = 2;
 /// Longest row that one warp sorts. Longer rows are sorted by many blocks.

@@ -15,7 +15,7 @@ inline constexpr unsigned kQueries = 8, kLanesOfQuery = 32 / kQueries;
 /// Number of candidates that a warp holds, and of tests between two looks at how many there are.
 inline constexpr unsigned kCandidates = 96, kTestsAtOnce = 32 / kLanesOfQuery;
 inline constexpr unsigned kLoads = kCandidates / 32;  // of a lane
-/// Largest number of neighbors that a lane finds of a row that is staged.
+/// Largest number of neighbors that a lane keeps.
 inline constexpr unsigned kMaxOfLane = 15;
 inline constexpr unsigned kSorted = 8;  // neighbors that a lane sorts in registers
 /// Largest number of cells in y or z around a sphere. The distance between the first and the last
@@ -25,11 +25,14 @@ inline constexpr unsigned kMaxRows = 5;
 
 /// Shared memory of a warp.
 struct CrowdedStorage {
+  struct Candidates {
+    LocalCandidate spheres[kCandidates];
+    std::uint32_t ids[kCandidates];
+  };
   union {
-    LocalCandidate candidates[kCandidates];
+    Candidates candidates;
     std::uint32_t rows[kQueries * kMaxStaged];  // after the search: the b's of all queries
   };
-  std::uint32_t ids[kCandidates];
   std::uint32_t found[kMaxOfLane * 32];  // lane l has the elements l, l + 32, l + 64, ...
 };
 static_assert(sizeof(CrowdedStorage) <= sizeof(SingleLevelStorage));
@@ -51,9 +54,9 @@ class CrowdedSearcher {
     id_ = args_.table.ids[at];
     found_ = 0;
     const SingleLevel level(plan_);
-    const CellRange near = neighbor_cells(level, self_);
-    const std::int32_t y = cell_of(self_.centre.y, level.inverse_yz),
-                       z = cell_of(self_.centre.z, level.inverse_yz);
+    const AxisRange near = neighbor_cells_of_axis(level);
+    const std::int32_t y = __shfl_sync(kFullWarp, near.cell, 1, kLanesOfQuery),
+                       z = __shfl_sync(kFullWarp, near.cell, 2, kLanesOfQuery);
     for (unsigned left = __ballot_sync(kFullWarp, is_query); left != 0;) {
       // Queries in one row of cells are searched together, because the cells around them overlap.
       const int first = __ffs(static_cast<int>(left)) - 1;
@@ -72,13 +75,38 @@ class CrowdedSearcher {
   __device__ static unsigned part() { return lane_id() % kLanesOfQuery; }
   __device__ std::uint32_t& found(unsigned k) { return s_.found[32 * k + lane_id()]; }
 
+  /// The cell of a sphere, and the cells that can contain its neighbors, along one axis.
+  struct AxisRange {
+    std::int32_t cell, low, high;
+  };
+  /// Those of the query of this lane. The first three lanes of a query compute x, y and z.
+  __device__ AxisRange neighbor_cells_of_axis(const SingleLevel& level) const {
+    const LevelBox& box = level.box;
+    const bool is_x = part() == 0, is_y = part() == 1;
+    const Real centre = is_x   ? self_.centre.x
+                        : is_y ? self_.centre.y
+                               : self_.centre.z,
+               scale = is_x ? level.inverse_x : level.inverse_yz,
+               radius = search_radius_of(self_.radius, level.half);
+    const std::int32_t first = is_x   ? box.x0
+                               : is_y ? box.y0
+                                      : box.z0,
+                       count = is_x   ? box.nx
+                               : is_y ? box.ny
+                                      : box.nz;
+    return {cell_of(centre, scale), max(cell_of(moved(centre, -radius), scale), first),
+            min(cell_of(moved(centre, radius), scale), first + (count - 1))};
+  }
   /// The smallest range that contains those of the lanes with `is_in`.
-  __device__ static CellRange united(const CellRange& range, bool is_in) {
+  __device__ static CellRange united(const AxisRange& range, bool is_in) {
     using Limits = std::numeric_limits<std::int32_t>;
-    const auto lowest = [&](std::int32_t x) { return lowest_of_warp(is_in ? x : Limits::max()); };
-    const auto highest = [&](std::int32_t x) { return highest_of_warp(is_in ? x : Limits::min()); };
-    return {lowest(range.x0),  highest(range.x1), lowest(range.y0),
-            highest(range.y1), lowest(range.z0),  highest(range.z1)};
+    const auto lowest = [&](unsigned axis) {
+      return lowest_of_warp(is_in && part() == axis ? range.low : Limits::max());
+    };
+    const auto highest = [&](unsigned axis) {
+      return highest_of_warp(is_in && part() == axis ? range.high : Limits::min());
+    };
+    return {lowest(0), highest(0), lowest(1), highest(1), lowest(2), highest(2)};
   }
 
   /// Tests all spheres in a range of cells against the queries of the lanes with `is_in`. The
@@ -117,21 +145,20 @@ class CrowdedSearcher {
 #pragma unroll
     for (unsigned k = 0; k < kLoads; ++k) {
       const std::uint32_t i = done + 32 * k + lane_id();
+      if (done + 32 * k >= candidates) break;
       const std::uint32_t position = i + __shfl_sync(kFullWarp, shift, owner_of(i, sum));
       positions[k] = i < candidates ? position : 0;
-    }
-#pragma unroll
-    for (unsigned k = 0; k < kLoads; ++k) {
       centres[k] = load_sorted(args_.table.sorted + positions[k]).centre;
       ids[k] = args_.table.ids[positions[k]];
     }
 #pragma unroll
     for (unsigned k = 0; k < kLoads; ++k) {
+      if (done + 32 * k >= candidates) break;
       LocalCandidate candidate = local_candidate(centres[k], origin);
       const unsigned slot = 32 * k + lane_id();
       if (done + slot >= candidates) candidate.square = std::numeric_limits<float>::infinity();
-      s_.candidates[slot] = candidate;
-      s_.ids[slot] = ids[k];
+      s_.candidates.spheres[slot] = candidate;
+      s_.candidates.ids[slot] = ids[k];
     }
   }
 
@@ -144,7 +171,8 @@ class CrowdedSearcher {
     do {
 #pragma unroll
       for (unsigned k = 0; k < kTestsAtOnce; ++k) {
-        const float e = local_excess(local, s_.candidates[kLanesOfQuery * (tested + k) + part()]);
+        const float e =
+            local_excess(local, s_.candidates.spheres[kLanesOfQuery * (tested + k) + part()]);
         touching = __funnelshift_l(__float_as_uint(e), touching, 1);  // appends the sign
         nearest = ::fminf(nearest, ::fabsf(e));
       }
@@ -159,7 +187,7 @@ class CrowdedSearcher {
   }
   template <class Touches>
   __device__ void keep_neighbors(unsigned touching, unsigned tests, const Touches& touches) {
-    const std::uint32_t* const last = s_.ids + kLanesOfQuery * (tests - 1) + part();
+    const std::uint32_t* const last = s_.candidates.ids + kLanesOfQuery * (tests - 1) + part();
     while (touching != 0) {
       const int bit = 31 - __clz(static_cast<int>(touching));
       touching ^= 1u << bit;
@@ -181,8 +209,8 @@ class CrowdedSearcher {
     const std::uint32_t before = length - found_;
     length = __shfl_sync(kFullWarp, length, kLanesOfQuery - 1, kLanesOfQuery);
     const unsigned parts_of_query = ((1u << kLanesOfQuery) - 1) << (kLanesOfQuery * query());
-    const unsigned full = __ballot_sync(kFullWarp, found_ > kMaxOfLane) & parts_of_query;
-    const bool is_staged = length <= kMaxStaged && full == 0;
+    const bool is_staged = length <= kMaxStaged,
+               is_kept = (__ballot_sync(kFullWarp, found_ > kMaxOfLane) & parts_of_query) == 0;
     const bool is_query = query() < queries, is_last = part() == kLanesOfQuery - 1;
     const std::uint32_t kept = is_query && is_staged ? length : 0;
     const std::uint32_t sum = warp_inclusive_sum(is_last ? kept : 0);
@@ -206,8 +234,16 @@ class CrowdedSearcher {
     }
     if (index + all > args_.rows.capacity) return;
     std::uint32_t* const row = s_.rows + start;
-    if (kept != 0) {
+    if (kept != 0 && is_kept) {
       for (unsigned k = 0; k < found_; ++k) row[before + k] = found(k);
+    }
+    // A lane of these has found more neighbors than it keeps, so that they are searched again.
+    for (unsigned left = __ballot_sync(kFullWarp, kept != 0 && !is_kept && part() == 0); left != 0;
+         left &= left - 1) {
+      const int first = __ffs(static_cast<int>(left)) - 1;
+      list_neighbors(args_, SingleLevel(plan_),
+                     position + static_cast<unsigned>(first) / kLanesOfQuery,
+                     s_.rows + __shfl_sync(kFullWarp, start, first));
     }
     __syncwarp();
     sort_row(row, kept <= kMaxSorted ? kept : 0);
@@ -222,7 +258,7 @@ class CrowdedSearcher {
         staging_.neighbors[index + i] = s_.rows[i];
       }
     } else {
-      write_contacts(index, row, kept);
+      write_contacts(index + start, row, kept);
     }
     __syncwarp();
   }
@@ -301,10 +337,9 @@ class CrowdedSearcher {
     __syncwarp();
   }
 
-  /// Writes the contacts of the sorted row of each query, of which the first begins at `index`.
-  __device__ void write_contacts(unsigned long long index, const std::uint32_t* row,
+  /// Writes the contacts of the sorted row of the query from index `to` on.
+  __device__ void write_contacts(unsigned long long to, const std::uint32_t* row,
                                  std::uint32_t length) {
-    const unsigned long long to = index + static_cast<std::uint32_t>(row - s_.rows);
     for (std::uint32_t i = part(); i < length; i += kLanesOfQuery) {
       write_contact(staging_, to + i, id_, row[i], self_, load_sphere(args_.input, row[i]));
     }

@@ -274,12 +274,11 @@ class SingleLevelSearcher {
   std::uint32_t not_kept_ = 0;  // neighbors that were only counted, because the row is long
 };
 
-/// A warp finds the neighbors b > a of a sphere whose row was not staged, in any order.
+/// A warp writes the neighbors b > a of the sphere a at a position, in any order.
 __device__ inline void list_neighbors(const GridArgs& args, const SingleLevel& level,
-                                      std::uint32_t a) {
-  const std::uint32_t position = args.table.positions[a];
+                                      std::uint32_t position, std::uint32_t* neighbors) {
   const SphereInstance self = load_sorted(args.table.sorted + position);
-  unsigned long long at = args.rows.offsets[a];
+  const std::uint32_t a = args.table.ids[position];
   Rows rows(level.box, neighbor_cells(level, self));
   while (rows.left() > 0) {
     uint2 mine{0, 0};  // the row of this lane
@@ -300,9 +299,8 @@ __device__ inline void list_neighbors(const GridArgs& args, const SingleLevel& l
       std::uint32_t b = 0;
       if (i < candidates && touch(self, load_sorted(args.table.sorted + k))) b = args.table.ids[k];
       const unsigned found = __ballot_sync(kFullWarp, b > a);
-      if (b > a)
-        args.rows.long_row_neighbors[at + static_cast<unsigned>(__popc(found & lanes_below()))] = b;
-      at += static_cast<unsigned>(__popc(found));
+      if (b > a) neighbors[__popc(found & lanes_below())] = b;
+      neighbors += __popc(found);
     }
   }
 }
@@ -314,9 +312,10 @@ __device__ inline void list_long_rows(const GridArgs& args, const GridPlan& plan
                       all = long_rows + args.state->very_long_rows;
   for (std::uint32_t k = blockIdx.x * kGridWarps + threadIdx.x / 32; k < all;
        k += gridDim.x * kGridWarps) {
-    list_neighbors(
-        args, level,
-        k < long_rows ? args.rows.long_rows[k] : args.rows.very_long_rows[k - long_rows]);
+    const std::uint32_t a =
+        k < long_rows ? args.rows.long_rows[k] : args.rows.very_long_rows[k - long_rows];
+    list_neighbors(args, level, args.table.positions[a],
+                   args.rows.long_row_neighbors + args.rows.offsets[a]);
   }
 }
 

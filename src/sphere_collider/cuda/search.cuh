@@ -51,12 +51,13 @@ __device__ inline std::uint32_t first_invalid(const SearchState* state) {
   return first_invalid(state->valid_before);
 }
 
-/// Writes the pair a < b to index `at` of the output.
+/// Writes the pair a < b to index `at` of the output. Indices that the search does not read again
+/// are the first to leave the cache.
 __device__ inline void write_pair(const SearchOutput& output, unsigned long long at,
                                   std::uint32_t a, std::uint32_t b) {
   const IndexRows& rows = output.rows;
   if (output.pairs != nullptr) {
-    output.pairs[at] = {a, b};
+    __stcs(reinterpret_cast<uint2*>(output.pairs) + at, uint2{a, b});
   } else if (output.neighbors != nullptr) {
     output.neighbors[at] = b;
   } else if (rows.is_wide) {
@@ -65,8 +66,8 @@ __device__ inline void write_pair(const SearchOutput& output, unsigned long long
     indices[rows.length + at] = b;
   } else {
     auto* const indices = static_cast<std::int32_t*>(rows.indices);
-    indices[at] = static_cast<std::int32_t>(a);
-    indices[rows.length + at] = static_cast<std::int32_t>(b);
+    __stcs(indices + at, static_cast<std::int32_t>(a));
+    __stcs(indices + rows.length + at, static_cast<std::int32_t>(b));
   }
 }
 
