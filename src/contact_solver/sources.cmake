@@ -6,7 +6,6 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/row_order.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_scalar.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/row_solver.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/cpu/work_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/soft_step_solver.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/group_solver_cuda.cpp

@@ -15,7 +15,6 @@ jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   bullet/pair_table_test.cpp
   bullet/parallel_quick_sort_test.cpp
   bullet/plane_gap_test.cpp
-  bullet/work_list_test.cpp
   bullet/replaced_test.cpp
   bullet/situations_test.cpp
   bullet/sphere_box_test.cpp

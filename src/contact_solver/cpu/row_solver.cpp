@@ -55,32 +55,24 @@ bool all_finite(const Real* values, std::size_t count) {
 
 }  // namespace
 
-/// A thread that sweeps, written by itself except for its presence.
-struct alignas(64) RowSolver::Participant {
-  std::atomic<std::uint64_t> done[kPrograms];  ///< by program: number of items that it has solved
-  std::atomic<bool> present;                   ///< whether it solves the items of its part
-
-  bool is_present() const { return present.load(std::memory_order_relaxed); }
-  /// Writes only changes, because other threads read the cache line.
-  void set_present(bool value) {
-    if (is_present() != value) present.store(value, std::memory_order_relaxed);
-  }
+/// Progress of a part in a program. Threads of other parts read only the last member, so that it
+/// has a cache line of its own.
+struct alignas(64) RowSolver::PartProgress {
+  std::atomic<std::uint64_t> claimed, done;            ///< numbers of items
+  alignas(64) std::atomic<std::uint64_t> shared_done;  ///< items whose shared contacts are done
 };
 
-/// For each item, the number of iterations in which it was claimed.
-struct alignas(64) RowSolver::ClaimLine {
-  std::atomic<std::uint32_t> items[kClaimsPerLine];
-};
-
-/// Passes over the blocks, repeated until the residual is small. Each pass is a sequence of stages,
-/// which end when all of their items are done. A thread solves the items of its part of the bodies,
-/// so that its caches keep them, and takes over those of threads that are absent or late. A waiting
-/// thread has claimed nothing and may leave.
+/// Passes over the blocks, repeated until the residual is small. Each pass has a stage for each
+/// color, and each stage an item for each part of the bodies. The items of a part run one after the
+/// other: first the contacts that move a shared body, which contacts of other parts move, too, then
+/// the others. Shared contacts of a stage wait until those of all earlier stages in conflicting
+/// parts are done. A thread runs the items of its part, so that its caches keep them; while it
+/// waits, it runs those of parts whose threads are absent or late. A waiting thread has claimed
+/// nothing and may leave.
 struct RowSolver::Program {
   struct Pass {
-    RowSweep sweep;  ///< null: the serial rows
-    const WorkList* list;
-    ClaimLine* claims;
+    RowSweep sweep;
+    const BlockRange* ranges;  ///< those of group g are its shared and its other blocks
   };
 
   RowArrays arrays{};
@@ -91,28 +83,29 @@ struct RowSolver::Program {
   SerialRows* serial = nullptr;
   Real threshold = -1;
   std::atomic<Real>* residuals = nullptr;  ///< one per iteration
-  std::size_t number = 0;                  ///< of the program
-  std::span<Participant> participants{};   ///< by part
+  std::uint64_t colors = 0;
+  std::span<const std::uint64_t> conflicts{};  ///< by part: those with common bodies
+  std::span<PartProgress> parts{};
+  std::atomic<std::uint64_t> absent{~std::uint64_t{0}};  ///< parts whose threads are not here
+  std::atomic<std::uint64_t> serial_done{0};             ///< sweeps over the serial rows
   std::atomic<bool> broken{false};
 
   /// Runs the program, together with the other threads that join.
-  /// @param self the part of this thread
+  /// @param self the part of this thread; part 0 also solves the serial rows
   /// @return false if the backoff has reached its limit before the end
   bool join(std::uint32_t self, Backoff backoff) {
-    std::uint64_t before = 0;  // number of items of earlier stages
+    const std::uint64_t stages = colors * pass_count;  // of an iteration
     for (std::uint64_t iteration = 0; iteration < iterations; ++iteration) {
-      if (iteration > 0 && is_last(iteration - 1)) break;
-      Real raised = 0;
-      for (std::size_t i = 0; i < pass_count; ++i) {
-        const Pass& pass = passes[i];
-        if (pass.sweep != nullptr && iteration >= block_iterations) continue;
-        for (const WorkStage& stage : pass.list->stages()) {
-          if (!run_stage(pass, stage, iteration, before, self, backoff, &raised)) return false;
-          before += stage.last - stage.first;
-        }
+      const std::uint64_t first = std::min(iteration, block_iterations) * stages;
+      if (!wait_for_all(first, self, backoff)) return false;
+      if (iteration > 0 && is_last(iteration - 1)) return true;
+      if (!sweep_serial_rows(iteration, self, backoff)) return false;
+      if (iteration >= block_iterations) continue;
+      for (std::uint64_t stage = first; stage < first + stages; ++stage) {
+        if (!complete(stage, self, backoff)) return false;
       }
     }
-    return true;
+    return wait_for_all(std::min(iterations, block_iterations) * stages, self, backoff);
   }
 
   int iterations_done() const {
@@ -123,73 +116,106 @@ struct RowSolver::Program {
   }
 
  private:
-  /// @param before number of items of earlier stages, which are done
-  /// @param raised the residual of the iteration is at least that
-  bool run_stage(const Pass& pass, const WorkStage& stage, std::uint64_t iteration,
-                 std::uint64_t before, std::uint32_t self, Backoff backoff, Real* raised) {
-    const std::uint64_t after = before + (stage.last - stage.first);
-    if (is_done(after)) return true;
-    participants[self].set_present(true);
-    const WorkItem* const items = pass.list->items();
-    for (std::uint32_t i = stage.first; i < stage.last; ++i) {
-      const std::uint32_t part = items[i].part;
-      if (part == self || !participants[part].is_present()) {
-        run_item(pass, items[i], iteration, self, raised);
-      }
+  bool sweep_serial_rows(std::uint64_t iteration, std::uint32_t self, Backoff backoff) {
+    if (serial == nullptr) return true;
+    if (self == 0) {
+      RowResidual residual;
+      serial->sweep(static_cast<int>(iteration), &residual);
+      note(residual, iteration);
+      serial_done.store(iteration + 1, std::memory_order_release);
+      return true;
     }
-    for (std::uint64_t waits = 1; !is_done(after); ++waits) {
-      if (!backoff.wait()) {
-        participants[self].set_present(false);
-        return false;
-      }
-      if (waits % kWaitsForOthers != 0) continue;
-      for (std::uint32_t i = stage.first; i < stage.last; ++i) {
-        if (run_item(pass, items[i], iteration, self, raised)) {
-          participants[items[i].part].set_present(false);
-        }
-      }
+    while (serial_done.load(std::memory_order_acquire) <= iteration) {
+      if (!backoff.wait()) return leave(self);
     }
     return true;
   }
 
-  /// @return whether the item was not claimed before
-  bool run_item(const Pass& pass, const WorkItem& item, std::uint64_t iteration, std::uint32_t self,
-                Real* raised) {
-    auto claimed = static_cast<std::uint32_t>(iteration);
-    std::atomic<std::uint32_t>& claim =
-        pass.claims[item.claim / kClaimsPerLine].items[item.claim % kClaimsPerLine];
-    if (!claim.compare_exchange_strong(claimed, claimed + 1, std::memory_order_relaxed)) {
+  /// Completes an item of part `self`, or waits until another thread has.
+  bool complete(std::uint64_t stage, std::uint32_t self, Backoff backoff) {
+    const PartProgress& part = parts[self];
+    if (part.done.load(std::memory_order_acquire) > stage) return true;
+    const std::uint64_t bit = std::uint64_t{1} << self;
+    if ((absent.load(std::memory_order_relaxed) & bit) != 0) absent.fetch_and(~bit);
+    for (std::uint64_t waits = 1; !run_next(self, stage + 1); ++waits) {
+      if (part.done.load(std::memory_order_acquire) > stage) return true;
+      if (!help_or_wait(stage, self, waits, &backoff)) return false;
+    }
+    return true;
+  }
+
+  /// Waits until all parts have completed so many items.
+  bool wait_for_all(std::uint64_t items, std::uint32_t self, Backoff backoff) {
+    const auto is_done = [&](const PartProgress& part) {
+      return part.done.load(std::memory_order_acquire) >= items;
+    };
+    for (std::uint64_t waits = 1; !std::all_of(parts.begin(), parts.end(), is_done); ++waits) {
+      if (!help_or_wait(items, self, waits, &backoff)) return false;
+    }
+    return true;
+  }
+
+  /// Runs an item below `end` of a part whose thread is absent, or after some waits, late. If there
+  /// is none, waits a moment.
+  bool help_or_wait(std::uint64_t end, std::uint32_t self, std::uint64_t waits, Backoff* backoff) {
+    const bool helps_late = waits % kWaitsForOthers == 0;
+    const std::uint64_t missing = absent.load(std::memory_order_relaxed);
+    if (helps_late || missing != 0) {
+      for (std::uint32_t part = 0; part < parts.size(); ++part) {
+        const std::uint64_t bit = std::uint64_t{1} << part;
+        if (!helps_late && (missing & bit) == 0) continue;
+        if (!run_next(part, end)) continue;
+        absent.fetch_or(bit, std::memory_order_relaxed);
+        return true;
+      }
+    }
+    return backoff->wait() || leave(self);
+  }
+  bool leave(std::uint32_t self) {
+    absent.fetch_or(std::uint64_t{1} << self, std::memory_order_relaxed);
+    return false;
+  }
+
+  /// Runs the next item of a part if it is below `end`, ready, and not claimed.
+  bool run_next(std::uint32_t part, std::uint64_t end) {
+    PartProgress& progress = parts[part];
+    std::uint64_t item = progress.done.load(std::memory_order_acquire);
+    if (item >= end || progress.claimed.load(std::memory_order_relaxed) != item) return false;
+    const std::uint64_t pass = item / colors % pass_count, color = item % colors;
+    const BlockRange* const blocks = passes[pass].ranges + 2 * (color * parts.size() + part);
+    if (blocks[0].size() != 0 && !are_shared_done(conflicts[part], item)) return false;
+    if (!progress.claimed.compare_exchange_strong(item, item + 1, std::memory_order_relaxed)) {
       return false;
     }
     RowResidual residual;
-    if (pass.sweep != nullptr) {
-      pass.sweep(arrays, item.blocks.first, item.blocks.last, &residual);
-    } else {
-      serial->sweep(static_cast<int>(iteration), &residual);
+    if (blocks[0].size() != 0)
+      passes[pass].sweep(arrays, blocks[0].first, blocks[0].last, &residual);
+    progress.shared_done.store(item + 1, std::memory_order_release);
+    if (blocks[1].size() != 0)
+      passes[pass].sweep(arrays, blocks[1].first, blocks[1].last, &residual);
+    note(residual, item / (colors * pass_count));
+    progress.done.store(item + 1, std::memory_order_release);
+    return true;
+  }
+  bool are_shared_done(std::uint64_t of_parts, std::uint64_t items) const {
+    for (; of_parts != 0; of_parts &= of_parts - 1) {
+      const PartProgress& part = parts[static_cast<std::size_t>(std::countr_zero(of_parts))];
+      if (part.shared_done.load(std::memory_order_acquire) < items) return false;
     }
-    if (residual.broken) broken.store(true, std::memory_order_relaxed);
-    if (residual.largest > *raised) raise(residuals + iteration, *raised = residual.largest);
-    std::atomic<std::uint64_t>& done = participants[self].done[number];
-    done.store(done.load(std::memory_order_relaxed) + 1, std::memory_order_release);
     return true;
   }
 
-  /// Whether all threads together have completed so many items.
-  bool is_done(std::uint64_t items) const {
-    std::uint64_t sum = 0;
-    for (const Participant& participant : participants) {
-      sum += participant.done[number].load(std::memory_order_acquire);
+  void note(const RowResidual& residual, std::uint64_t iteration) {
+    if (residual.broken) broken.store(true, std::memory_order_relaxed);
+    std::atomic<Real>& largest = residuals[iteration];
+    Real now = largest.load(std::memory_order_relaxed);
+    while (residual.largest > now &&
+           !largest.compare_exchange_weak(now, residual.largest, std::memory_order_relaxed)) {
     }
-    return sum >= items;
   }
   bool is_last(std::uint64_t iteration) const {
     return iteration + 1 == iterations ||
            residuals[iteration].load(std::memory_order_relaxed) <= threshold;
-  }
-  static void raise(std::atomic<Real>* value, Real to) {
-    Real now = value->load(std::memory_order_relaxed);
-    while (to > now && !value->compare_exchange_weak(now, to, std::memory_order_relaxed)) {
-    }
   }
 };
 
@@ -197,12 +223,9 @@ RowSolver::~RowSolver() = default;
 
 RowSolver::RowSolver(unsigned threads, SimdLevel simd)
     : kernels_(row_kernels(simd)), pool_(threads) {
-  static_assert(ThreadPool::kMaxThreads <= 256, "part_of_body_ has a byte a body");
   // The pool may have more threads later.
-  most_parts_ = pool_.threads();
-  participants_ = std::make_unique<Participant[]>(most_parts_);
-  constexpr BlockRange kOne{0, 1};
-  serial_list_.build({&kOne, 1}, 1);
+  most_parts_ = std::min(pool_.threads(), kMaxParts);
+  progress_ = std::make_unique<PartProgress[]>(kPrograms * most_parts_);
 }
 
 void RowSolver::resize_bodies(std::size_t count) {
@@ -226,7 +249,6 @@ void RowSolver::resize_bodies(std::size_t count) {
 void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t directions) {
   directions_ = directions;
   rolling_friction_blocks_.count = 0;
-  rolling_friction_blocks_.list.build({}, 1);
   coloring_.build(pairs, body_count_);
   pairs_ = pairs;
   choose_parts();
@@ -234,24 +256,20 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
   if (parts_ > 1) divide_bodies();
   if (chooser_ != nullptr) division_us_ = us_since(start);
   const std::uint32_t lanes = kernels_.lanes;
-  const std::size_t groups = std::size_t{colors()} * parts_;
+  assign_groups();
+  const std::size_t groups = group_count();
   ranges_.reserve(groups, "contacts of a solver");
-  next_lane_.reserve(groups, "contacts of a solver");
-  const auto group_of = [&](std::size_t contact) {
-    const std::uint32_t color = coloring_.colors_of_contacts()[contact];
-    const bool is_small = coloring_.contacts_of(color) <= WorkList::kSmallColor * lanes;
-    return std::size_t{color} * parts_ + (is_small ? 0 : part_of(pairs[contact]));
-  };
-  std::fill_n(next_lane_.data(), groups, 0u);
-  for (std::size_t i = 0; i < pairs.size(); ++i) ++next_lane_[group_of(i)];
   // The blocks of a part follow each other, so that its thread sets them up.
   blocks_ = 0;
-  for (std::uint32_t part = 0; part < parts_; ++part) {
-    for (std::size_t group = part; group < groups; group += parts_) {
-      const std::uint32_t first = blocks_;
-      blocks_ += (next_lane_[group] + lanes - 1) / lanes;
-      ranges_[group] = {first, blocks_};
-      next_lane_[group] = first * lanes;
+  for (std::size_t part = 0; part < parts_; ++part) {
+    for (std::size_t color = 0; color < colors(); ++color) {
+      for (std::size_t kind = 0; kind < 2; ++kind) {
+        const std::size_t group = 2 * (color * parts_ + part) + kind;
+        const std::uint32_t first = blocks_;
+        blocks_ += (next_lane_[group] + lanes - 1) / lanes;
+        ranges_[group] = {first, blocks_};
+        next_lane_[group] = first * lanes;
+      }
     }
   }
   const std::size_t slots = std::size_t{blocks_} * lanes;
@@ -262,13 +280,56 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
   std::fill_n(order_.data(), slots, kNoContact);
   std::fill_n(ids_.data(), 2 * slots, rows::kFixedBody);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const std::uint32_t slot = next_lane_[group_of(i)]++;
+    const std::uint32_t slot = next_lane_[groups_[i]]++;
     order_[slot] = static_cast<std::uint32_t>(i);
     std::int32_t* ids = ids_.data() + std::size_t{slot / lanes} * 2 * lanes + slot % lanes;
     ids[0] = slot_of_id(pairs[i].a);
     ids[lanes] = slot_of_id(pairs[i].b);
   }
-  list_.build({ranges_.data(), groups}, parts_);
+}
+
+/// Assigns a group to each contact: its color, the part of its first moving body, and whether it
+/// moves a shared body. Counts the contacts of each group, and finds the parts that conflict.
+void RowSolver::assign_groups() {
+  groups_.reserve(pairs_.size(), "contacts of a solver");
+  next_lane_.reserve(group_count(), "contacts of a solver");
+  std::fill_n(next_lane_.data(), group_count(), 0u);
+  const std::uint32_t* const colors = coloring_.colors_of_contacts();
+  conflicts_.fill(0);
+  if (parts_ == 1) {
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      ++next_lane_[groups_[i] = 2 * colors[i] + 1];
+    }
+    return;
+  }
+  mark_shared_bodies();
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const RowPair& pair = pairs_[i];
+    const std::uint32_t part = part_of(pair);
+    std::uint64_t sharing = 0;
+    for (const std::int32_t id : {pair.a, pair.b}) {
+      const auto body = static_cast<std::size_t>(id);
+      if (id >= 0 && (part_of_body_[body] & kIsShared) != 0) sharing |= parts_of_body_[body];
+    }
+    conflicts_[part] |= sharing & ~(std::uint64_t{1} << part);
+    ++next_lane_[groups_[i] = 2 * (colors[i] * parts_ + part) + (sharing != 0 ? 0 : 1)];
+  }
+}
+
+/// Marks the bodies that contacts of other parts move.
+void RowSolver::mark_shared_bodies() {
+  parts_of_body_.reserve(body_count_, "bodies of a solver");
+  for (const RowPair& pair : pairs_) {
+    if (pair.a < 0 || pair.b < 0) continue;
+    const auto b = static_cast<std::size_t>(pair.b);
+    const std::uint32_t part = part_of(pair), part_of_b = part_of_body_[b] & ~kIsShared;
+    if (part == part_of_b) continue;
+    if ((part_of_body_[b] & kIsShared) == 0) {
+      part_of_body_[b] |= kIsShared;
+      parts_of_body_[b] = std::uint64_t{1} << part_of_b;
+    }
+    parts_of_body_[b] |= std::uint64_t{1} << part;
+  }
 }
 
 /// Chooses between one part and as many threads as have kBlocksPerPart blocks of each color on
@@ -356,7 +417,7 @@ void RowSolver::to_slots(Buffer<Real>* values, std::size_t fields) {
 std::uint32_t RowSolver::part_of(const RowPair& pair) const {
   if (parts_ == 1) return 0;
   const std::int32_t body = pair.a >= 0 ? pair.a : std::max(pair.b, 0);
-  return part_of_body_[static_cast<std::size_t>(body)];
+  return part_of_body_[static_cast<std::size_t>(body)] & ~kIsShared;
 }
 
 /// The bodies of a block: all bodies a, then all bodies b.
@@ -380,21 +441,6 @@ void RowSolver::set_up_frictions(const rows::RowSettings& settings, std::uint32_
                                  std::uint32_t direction, const Real* inputs) {
   kernels_.set_up_frictions(settings, inputs, bodies_.data(), ids_of(block).data(),
                             friction_rows(block, direction));
-}
-
-/// Prepares claims of items, and the presence of the threads.
-void RowSolver::reset_claims(std::uint32_t count) {
-  if (count > claim_capacity_) {
-    claims_ = std::make_unique<ClaimLine[]>(count / kClaimsPerLine);
-    claim_capacity_ = count;
-  }
-  for (std::uint32_t i = 0; i < count / kClaimsPerLine; ++i) {
-    for (auto& item : claims_[i].items) item.store(0, std::memory_order_relaxed);
-  }
-  for (std::uint32_t i = 0; i < parts_; ++i) {
-    for (auto& done : participants_[i].done) done.store(0, std::memory_order_relaxed);
-    participants_[i].set_present(false);
-  }
 }
 
 RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_factors) {
@@ -431,40 +477,42 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
                    .split_impulse_blocks = split_impulse_blocks_.blocks.data(),
                    .rolling_friction_blocks = rolling_friction_blocks_.blocks.data(),
                    .rolling_frictions = rolling_frictions_.data()};
-  const std::uint32_t claims = 3 * list_.claims() + split_impulse_blocks_.list.claims() +
-                               rolling_friction_blocks_.list.claims() + serial_list_.claims();
-  reset_claims(claims);
-  ClaimLine* next_claim = claims_.get();
-  const auto add = [&](Program* program, RowSweep sweep, const WorkList& list) {
-    program->passes[program->pass_count++] = {sweep, &list, next_claim};
-    next_claim += list.claims() / kClaimsPerLine;
+  for (std::size_t i = 0; i < kPrograms * parts_; ++i) {
+    PartProgress& part = progress_[i];
+    for (auto* count : {&part.claimed, &part.done, &part.shared_done}) *count = 0;
+  }
+  const auto add = [&](Program* program, RowSweep sweep, const BlockRange* ranges) {
+    program->passes[program->pass_count++] = {sweep, ranges};
   };
   Program warm, split, main;
+  PartProgress* next_progress = progress_.get();
   for (Program* program : {&warm, &split, &main}) {
     program->arrays = arrays;
     program->iterations = program->block_iterations = block_iterations;
     program->threshold = settings.threshold;
-    program->participants = {participants_.get(), parts_};
+    program->colors = colors();
+    program->conflicts = conflicts_;
+    program->parts = {next_progress, parts_};
+    next_progress += parts_;
   }
-  split.number = 1;
-  main.number = 2;
-  add(&warm, kernels_.warm_starts[factors], list_);
+  add(&warm, kernels_.warm_starts[factors], ranges_.data());
   warm.iterations = settings.warm_start ? 1 : 0;
   warm.residuals = residuals_.get() + 2 * iterations;
-  add(&split, kernels_.split_impulses[factors], split_impulse_blocks_.list);
+  add(&split, kernels_.split_impulses[factors], split_impulse_blocks_.ranges.data());
   split.iterations = split_rows > 0 ? block_iterations : 0;
   split.residuals = residuals_.get() + iterations;
   main.residuals = residuals_.get();
   main.iterations = iterations;
   main.serial = settings.serial;
-  if (settings.serial != nullptr) add(&main, nullptr, serial_list_);
   if (settings.interleave) {
-    add(&main, kernels_.both[factors], list_);
+    add(&main, kernels_.both[factors], ranges_.data());
   } else {
-    add(&main, kernels_.contacts[factors], list_);
-    add(&main, kernels_.frictions[factors], list_);
+    add(&main, kernels_.contacts[factors], ranges_.data());
+    add(&main, kernels_.frictions[factors], ranges_.data());
   }
-  add(&main, kernels_.rolling_frictions[factors], rolling_friction_blocks_.list);
+  if (rolling_friction_blocks_.count > 0) {
+    add(&main, kernels_.rolling_frictions[factors], rolling_friction_blocks_.ranges.data());
+  }
   // The first participant always stays, so that the work is completed. The others leave when they
   // wait for long: then there are more threads than free processors, and they only take time from
   // the threads that work.

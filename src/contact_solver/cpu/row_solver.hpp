@@ -10,7 +10,6 @@
 #include "src/base/time_chooser.hpp"
 #include "src/contact_solver/coloring.hpp"
 #include "src/contact_solver/cpu/row_kernels.hpp"
-#include "src/contact_solver/cpu/work_list.hpp"
 
 #include <array>
 #include <atomic>
@@ -67,8 +66,8 @@ class JFPX_API RowSolver {
   /// Threads share the bodies by their positions, which only affect the speed.
   void set_position(std::size_t i, const Vec3& position) { positions_[i] = position; }
 
-  /// Arranges the contacts, given in their serial order, in blocks of one color each, and those of
-  /// a large color by parts of the bodies. Removes all rolling friction rows.
+  /// Arranges the contacts, given in their serial order, in blocks of one color and one part of the
+  /// bodies each. Removes all rolling friction rows.
   /// @param pairs must remain valid until the rows are set up
   /// @param directions number of friction directions: 1 or 2
   void schedule(std::span<const RowPair> pairs, std::uint32_t directions);
@@ -116,20 +115,25 @@ class JFPX_API RowSolver {
 
  private:
   static constexpr std::size_t kPrograms = 3;
-  struct Participant;
-  struct ClaimLine;
+  static constexpr unsigned kMaxParts = 64;   // sets of parts are words
+  static constexpr unsigned kIsShared = 128;  // of a body, in part_of_body_
+  struct PartProgress;
   struct Program;
-  /// Selected blocks, by color and part.
+  /// Blocks [first, last).
+  struct BlockRange {
+    std::uint32_t first, last;
+    std::uint32_t size() const { return last - first; }
+  };
+  /// Selected blocks, by group.
   struct BlockSubset {
     Buffer<std::uint32_t> blocks;
     Buffer<BlockRange> ranges;
-    WorkList list;
     std::uint32_t count = 0;
   };
 
   template <class Has>
   void select(const Has& has, BlockSubset* subset) {
-    const std::size_t groups = std::size_t{colors()} * parts_;
+    const std::size_t groups = group_count();
     subset->blocks.reserve(blocks_, "rows of a solver");
     subset->ranges.reserve(groups, "rows of a solver");
     subset->count = 0;
@@ -140,10 +144,12 @@ class JFPX_API RowSolver {
       }
       subset->ranges[group] = {before, subset->count};
     }
-    subset->list.build({subset->ranges.data(), groups}, parts_);
   }
   using BlockIds = std::array<std::int32_t, 2 * rows::kMaxLanes>;
 
+  /// Groups of contacts: 2 * (color * parts + part), and for contacts that move no body of another
+  /// part the next number.
+  std::size_t group_count() const { return std::size_t{2} * colors() * parts_; }
   void choose_parts();
   void divide_bodies();
   void assign_slots();
@@ -158,7 +164,8 @@ class JFPX_API RowSolver {
   }
   BlockIds ids_of(std::uint32_t block) const;
   std::uint32_t part_of(const RowPair& pair) const;
-  void reset_claims(std::uint32_t count);
+  void assign_groups();
+  void mark_shared_bodies();
 
   const RowKernels& kernels_;
   ThreadPool pool_;
@@ -168,21 +175,22 @@ class JFPX_API RowSolver {
   Buffer<Real> bodies_, velocities_, push_velocities_, factors_;
   Buffer<Vec3> positions_;
   std::span<const RowPair> pairs_;
-  bool is_divided_ = false;  ///< whether the bodies have parts and slots
-  Buffer<std::uint8_t> part_of_body_;
-  Buffer<std::uint32_t> slots_;  ///< by body, in the order of the parts; 0 for the fixed body
+  bool is_divided_ = false;            ///< whether the bodies have parts and slots
+  Buffer<std::uint8_t> part_of_body_;  ///< with kIsShared if contacts of other parts move it
+  Buffer<std::uint32_t> slots_;        ///< by body, in the order of the parts; 0 for the fixed body
   Buffer<Real> spare_values_;
   Buffer<Real> contacts_, frictions_, rolling_frictions_;
   Buffer<std::int32_t> ids_;
   Buffer<std::uint32_t> order_, next_lane_;
-  Buffer<BlockRange> ranges_;  ///< of the blocks, by color and part
-  WorkList list_, serial_list_;
+  Buffer<std::uint32_t> groups_;         ///< by contact
+  Buffer<BlockRange> ranges_;            ///< of the blocks, by group
+  Buffer<std::uint64_t> parts_of_body_;  ///< by shared body: the parts whose contacts move it
+  std::array<std::uint64_t, kMaxParts> conflicts_{};  ///< by part: those with common bodies
   BlockSubset split_impulse_blocks_, rolling_friction_blocks_;
   std::unique_ptr<std::atomic<Real>[]> residuals_;
   std::size_t residual_capacity_ = 0;
-  std::unique_ptr<ClaimLine[]> claims_;
-  std::uint32_t claim_capacity_ = 0, most_parts_ = 1;
-  std::unique_ptr<Participant[]> participants_;
+  std::uint32_t most_parts_ = 1;
+  std::unique_ptr<PartProgress[]> progress_;  ///< by program and part
   /// Choose between several threads and one, by the number of bits of the number of blocks.
   std::vector<TimeChooser> choosers_ = std::vector(33, TimeChooser(2));
   TimeChooser* chooser_ = nullptr;  ///< null: only one thread is useful
