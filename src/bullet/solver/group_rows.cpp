@@ -53,7 +53,8 @@ void ConstraintSolver::Impl::set_up_block(std::uint32_t block) {
     pack_contact(point, *info, lanes, inputs + used);
     if (point.m_appliedImpulse != 0) warm.store(settings.warm_start, std::memory_order_relaxed);
   }
-  const unsigned has_second = solver.set_up_contacts(settings, block, inputs, second);
+  const cpu::RowSolver::BlockIds ids = solver.ids_of(block);
+  const unsigned has_second = solver.set_up_contacts(settings, block, ids, inputs, second);
   Real* const one = solver.friction_rows(block);
   Real* const two = directions() == 2 ? solver.friction_rows(block, 1) : nullptr;
   for (std::size_t lane = 0; lane < used; ++lane) {
@@ -62,7 +63,7 @@ void ConstraintSolver::Impl::set_up_block(std::uint32_t block) {
                             two != nullptr ? two + lane : nullptr);
   }
   for (std::uint32_t k = 0; k < directions(); ++k) {
-    solver.set_up_frictions(settings, block, k, inputs);
+    solver.set_up_frictions(settings, block, ids, k, inputs);
   }
 }
 

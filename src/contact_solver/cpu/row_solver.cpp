@@ -55,8 +55,8 @@ bool all_finite(const Real* values, std::size_t count) {
 
 }  // namespace
 
-/// Progress of a part in a program. Threads of other parts read only the last member, so that it
-/// has a cache line of its own.
+/// Progress of a part in a program. While shared contacts wait, threads of other parts read only
+/// the last member, so that it has a cache line of its own.
 struct alignas(64) RowSolver::PartProgress {
   std::atomic<std::uint64_t> claimed, done;            ///< numbers of items
   alignas(64) std::atomic<std::uint64_t> shared_done;  ///< items whose shared contacts are done
@@ -78,7 +78,7 @@ struct RowSolver::Program {
   RowArrays arrays{};
   Pass passes[4];
   std::size_t pass_count = 0;
-  std::uint64_t iterations = 0;        ///< iterations of the serial rows and of all
+  std::uint64_t iterations = 0;        ///< all iterations; the serial rows take part in each
   std::uint64_t block_iterations = 0;  ///< iterations that include the blocks
   SerialRows* serial = nullptr;
   Real threshold = -1;
@@ -86,8 +86,8 @@ struct RowSolver::Program {
   std::uint64_t colors = 0;
   std::span<const std::uint64_t> conflicts{};  ///< by part: those with common bodies
   std::span<PartProgress> parts{};
-  std::atomic<std::uint64_t> absent{~std::uint64_t{0}};  ///< parts whose threads are not here
-  std::atomic<std::uint64_t> serial_done{0};             ///< sweeps over the serial rows
+  std::atomic<std::uint64_t> absent{0};       ///< parts whose threads are not here; first, all
+  std::atomic<std::uint64_t> serial_done{0};  ///< sweeps over the serial rows
   std::atomic<bool> broken{false};
 
   /// Runs the program, together with the other threads that join.
@@ -166,6 +166,7 @@ struct RowSolver::Program {
         if (!helps_late && (missing & bit) == 0) continue;
         if (!run_next(part, end)) continue;
         absent.fetch_or(bit, std::memory_order_relaxed);
+        backoff->reset();
         return true;
       }
     }
@@ -272,17 +273,17 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
       }
     }
   }
-  const std::size_t slots = std::size_t{blocks_} * lanes;
-  order_.reserve(slots, "contacts of a solver");
-  ids_.reserve(2 * slots, "contacts of a solver");
-  contacts_.reserve(slots * rows::kContactFields, "rows of a solver");
-  frictions_.reserve(slots * directions * rows::kFrictionFields, "rows of a solver");
-  std::fill_n(order_.data(), slots, kNoContact);
-  std::fill_n(ids_.data(), 2 * slots, rows::kFixedBody);
+  const std::size_t places = std::size_t{blocks_} * lanes;
+  order_.reserve(places, "contacts of a solver");
+  ids_.reserve(2 * places, "contacts of a solver");
+  contacts_.reserve(places * rows::kContactFields, "rows of a solver");
+  frictions_.reserve(places * directions * rows::kFrictionFields, "rows of a solver");
+  std::fill_n(order_.data(), places, kNoContact);
+  std::fill_n(ids_.data(), 2 * places, rows::kFixedBody);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const std::uint32_t slot = next_lane_[groups_[i]]++;
-    order_[slot] = static_cast<std::uint32_t>(i);
-    std::int32_t* ids = ids_.data() + std::size_t{slot / lanes} * 2 * lanes + slot % lanes;
+    const std::uint32_t place = next_lane_[groups_[i]]++;
+    order_[place] = static_cast<std::uint32_t>(i);
+    std::int32_t* ids = ids_.data() + std::size_t{place / lanes} * 2 * lanes + place % lanes;
     ids[0] = slot_of_id(pairs[i].a);
     ids[lanes] = slot_of_id(pairs[i].b);
   }
@@ -420,7 +421,6 @@ std::uint32_t RowSolver::part_of(const RowPair& pair) const {
   return part_of_body_[static_cast<std::size_t>(body)] & ~kIsShared;
 }
 
-/// The bodies of a block: all bodies a, then all bodies b.
 RowSolver::BlockIds RowSolver::ids_of(std::uint32_t block) const {
   BlockIds ids;
   ids.fill(rows::kFixedBody);
@@ -433,13 +433,13 @@ RowSolver::BlockIds RowSolver::ids_of(std::uint32_t block) const {
 }
 
 unsigned RowSolver::set_up_contacts(const rows::RowSettings& settings, std::uint32_t block,
-                                    const Real* inputs, Real* second) {
-  return kernels_.set_up_contacts(settings, inputs, bodies_.data(), ids_of(block).data(),
-                                  contact_rows(block), friction_rows(block), second);
+                                    const BlockIds& ids, const Real* inputs, Real* second) {
+  return kernels_.set_up_contacts(settings, inputs, bodies_.data(), ids.data(), contact_rows(block),
+                                  friction_rows(block), second);
 }
 void RowSolver::set_up_frictions(const rows::RowSettings& settings, std::uint32_t block,
-                                 std::uint32_t direction, const Real* inputs) {
-  kernels_.set_up_frictions(settings, inputs, bodies_.data(), ids_of(block).data(),
+                                 const BlockIds& ids, std::uint32_t direction, const Real* inputs) {
+  kernels_.set_up_frictions(settings, inputs, bodies_.data(), ids.data(),
                             friction_rows(block, direction));
 }
 
@@ -493,6 +493,7 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
     program->colors = colors();
     program->conflicts = conflicts_;
     program->parts = {next_progress, parts_};
+    program->absent = ~std::uint64_t{0} >> (kMaxParts - parts_);
     next_progress += parts_;
   }
   add(&warm, kernels_.warm_starts[factors], ranges_.data());

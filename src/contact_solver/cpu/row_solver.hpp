@@ -67,7 +67,7 @@ class JFPX_API RowSolver {
   void set_position(std::size_t i, const Vec3& position) { positions_[i] = position; }
 
   /// Arranges the contacts, given in their serial order, in blocks of one color and one part of the
-  /// bodies each. Removes all rolling friction rows.
+  /// bodies each. Removes all rolling friction rows. Call once after resize_bodies().
   /// @param pairs must remain valid until the rows are set up
   /// @param directions number of friction directions: 1 or 2
   void schedule(std::span<const RowPair> pairs, std::uint32_t directions);
@@ -104,10 +104,14 @@ class JFPX_API RowSolver {
            (k * kRollingFrictionRows + t) * kernels_.lanes * rows::kFrictionFields;
   }
 
+  /// The bodies of a block: all bodies a, then all bodies b.
+  using BlockIds = std::array<std::int32_t, 2 * rows::kMaxLanes>;
+  BlockIds ids_of(std::uint32_t block) const;
   /// Sets up the contact rows of a block from its inputs. Thread-safe for different blocks.
+  /// @param ids ids_of() the block
   unsigned set_up_contacts(const rows::RowSettings& settings, std::uint32_t block,
-                           const Real* inputs, Real* second);
-  void set_up_frictions(const rows::RowSettings& settings, std::uint32_t block,
+                           const BlockIds& ids, const Real* inputs, Real* second);
+  void set_up_frictions(const rows::RowSettings& settings, std::uint32_t block, const BlockIds& ids,
                         std::uint32_t direction, const Real* inputs);
 
   /// @param factors whether any body has a linear or angular factor other than 1
@@ -145,10 +149,9 @@ class JFPX_API RowSolver {
       subset->ranges[group] = {before, subset->count};
     }
   }
-  using BlockIds = std::array<std::int32_t, 2 * rows::kMaxLanes>;
 
-  /// Groups of contacts: 2 * (color * parts + part), and for contacts that move no body of another
-  /// part the next number.
+  /// Groups of contacts: 2 * (color * parts + part) for those that move a shared body, which
+  /// contacts of another part move, too, and the next number for the others.
   std::size_t group_count() const { return std::size_t{2} * colors() * parts_; }
   void choose_parts();
   void divide_bodies();
@@ -162,7 +165,6 @@ class JFPX_API RowSolver {
     };
     return id >= 0 ? slot(id) : ~slot(~id);
   }
-  BlockIds ids_of(std::uint32_t block) const;
   std::uint32_t part_of(const RowPair& pair) const;
   void assign_groups();
   void mark_shared_bodies();
@@ -182,9 +184,10 @@ class JFPX_API RowSolver {
   Buffer<Real> contacts_, frictions_, rolling_frictions_;
   Buffer<std::int32_t> ids_;
   Buffer<std::uint32_t> order_, next_lane_;
-  Buffer<std::uint32_t> groups_;         ///< by contact
-  Buffer<BlockRange> ranges_;            ///< of the blocks, by group
-  Buffer<std::uint64_t> parts_of_body_;  ///< by shared body: the parts whose contacts move it
+  Buffer<std::uint32_t> groups_;  ///< by contact
+  Buffer<BlockRange> ranges_;     ///< of the blocks, by group
+  Buffer<std::uint64_t>
+      parts_of_body_;  ///< by shared body: its part, and those whose contacts move it
   std::array<std::uint64_t, kMaxParts> conflicts_{};  ///< by part: those with common bodies
   BlockSubset split_impulse_blocks_, rolling_friction_blocks_;
   std::unique_ptr<std::atomic<Real>[]> residuals_;

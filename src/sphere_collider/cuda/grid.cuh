@@ -80,10 +80,12 @@ inline constexpr Real kCrowded = 3;
 struct GridPlan {
   GridScale scale;
   bool dense;
-  bool single;   ///< dense, and all spheres are on level 0
-  bool crowded;  ///< single, with more than kCrowded spheres a cube of the cell width on average
-  bool equal_radii;
-  Real inverse_yz;  ///< inverse cell width of level 0, in y and z
+  bool single;  ///< dense, and all spheres are on level 0
+  /// single, with more than kCrowded spheres a cube of the cell width on average, and a cell width
+  /// that local_filter.hpp allows
+  bool crowded;
+  bool equal_radii;  ///< of all spheres
+  Real inverse_yz;   ///< inverse cell width of level 0, in y and z
   std::uint32_t buckets;
   std::uint32_t coarse_shift;  ///< 2^coarse_shift consecutive buckets are a coarse bucket
   LevelBox boxes[kLastLevel + 1];

@@ -12,15 +12,18 @@ namespace cuda {
 /// Number of spheres, the queries, whose neighbors a warp finds together, and of consecutive lanes
 /// that share the tests of a query.
 inline constexpr unsigned kQueries = 8, kLanesOfQuery = 32 / kQueries;
-/// Number of candidates that a warp holds, and of tests between two looks at how many there are.
+/// Number of candidates that a warp holds, and of tests that a lane does before it checks whether
+/// candidates are left.
 inline constexpr unsigned kCandidates = 96, kTestsAtOnce = 32 / kLanesOfQuery;
 inline constexpr unsigned kLoads = kCandidates / 32;  // of a lane
 /// Largest number of neighbors that a lane keeps.
 inline constexpr unsigned kMaxOfLane = 15;
 inline constexpr unsigned kSorted = 8;  // neighbors that a lane sorts in registers
-/// Largest number of cells in y or z around a sphere. The distance between the first and the last
-/// is two search radii, which are 2 cells wide but for rounding: an error of 1/4 cell in each
-/// coordinate, which has at most kMaxCells cells, and of 1/4 in each product of cell_of().
+/// Largest number of cells in y or z around the spheres of one cell c. A search radius is one cell
+/// wide. Coordinates have at most kMaxCells cells, so that a sum is rounded by at most 1/4 cell,
+/// and a product of cell_of() by as much. The products of the spheres themselves are between c -
+/// 1/4 and c + 1, those of the ends of the range between c - 1.75 and c + 2.5, but for 2^-19: their
+/// cells are c - 2 to c + 2.
 inline constexpr unsigned kMaxRows = 5;
 
 /// Shared memory of a warp.
@@ -73,7 +76,7 @@ class CrowdedSearcher {
   __device__ static unsigned query() { return lane_id() / kLanesOfQuery; }
   /// Index of this lane among those of its query.
   __device__ static unsigned part() { return lane_id() % kLanesOfQuery; }
-  __device__ std::uint32_t& found(unsigned k) { return s_.found[32 * k + lane_id()]; }
+  __device__ std::uint32_t& kept_id(unsigned k) { return s_.found[32 * k + lane_id()]; }
 
   /// The cell of a sphere, and the cells that can contain its neighbors, along one axis.
   struct AxisRange {
@@ -136,8 +139,8 @@ class CrowdedSearcher {
     __syncwarp();
   }
 
-  /// Loads the candidates from `done` on. Lane l has those before `sum`, and candidate i of them is
-  /// at position i + shift.
+  /// Loads the candidates from `done` on. Candidate i belongs to the first lane with sum > i, and
+  /// is at position i + shift of that lane.
   __device__ void load_candidates(std::uint32_t done, std::uint32_t candidates, std::uint32_t sum,
                                   std::uint32_t shift, const Vec3& origin) {
     std::uint32_t positions[kLoads], ids[kLoads];
@@ -193,7 +196,7 @@ class CrowdedSearcher {
       touching ^= 1u << bit;
       const std::uint32_t id = last[-static_cast<int>(kLanesOfQuery) * bit];
       if (id > id_ && touches(id)) {
-        if (found_ < kMaxOfLane) found(found_) = id;
+        if (found_ < kMaxOfLane) kept_id(found_) = id;
         ++found_;
       }
     }
@@ -235,7 +238,7 @@ class CrowdedSearcher {
     if (index + all > args_.rows.capacity) return;
     std::uint32_t* const row = s_.rows + start;
     if (kept != 0 && is_kept) {
-      for (unsigned k = 0; k < found_; ++k) row[before + k] = found(k);
+      for (unsigned k = 0; k < found_; ++k) row[before + k] = kept_id(k);
     }
     // A lane of these has found more neighbors than it keeps, so that they are searched again.
     for (unsigned left = __ballot_sync(kFullWarp, kept != 0 && !is_kept && part() == 0); left != 0;

@@ -132,6 +132,7 @@ __device__ inline unsigned long long copy_bin(const GridArgs& args, const Search
   // One scan computes two sums: of staged contacts (low bits, at most kMaxStaged * kGridThreads),
   // and of all contacts.
   constexpr unsigned kStagedBits = 16;
+  static_assert(kMaxStaged * kGridThreads < 1u << kStagedBits);
   unsigned long long total = 0;
   const unsigned long long sums = block_exclusive_sum(
       static_cast<unsigned long long>(count) << kStagedBits | staged, s.sums, total);

@@ -141,7 +141,9 @@ TEST(CudaFilter, LocalExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
     const Real largest = std::ldexp(random.uniform(1, 2), static_cast<int>(random.below(39)) - 20);
     const bool is_equal = random.below(2) == 0;
     const Vec3 origin = point(largest * std::ldexp(Real(1), static_cast<int>(random.below(20))));
-    SphereInstance a{origin + point(4 * largest), is_equal ? largest : largest * Real(0.7)};
+    // Spheres that are searched together can be far from each other along a row of cells.
+    const Real distance = std::ldexp(largest, static_cast<int>(random.below(4) * random.below(6)));
+    SphereInstance a{origin + point(4 * distance), is_equal ? largest : largest * Real(0.7)};
     // The distance differs from the sum of the radii by a factor of 1 + 2^-12 to 1 + 2^-26.
     const Real gap = std::ldexp(random.uniform(-1, 1), -12 - static_cast<int>(random.below(15)));
     SphereInstance b{a.centre + normalized(point(1)) * ((a.radius + largest) * (1 + gap)), largest};
