@@ -86,7 +86,7 @@ struct RowSolver::Program {
   std::uint64_t colors = 0;
   std::span<const std::uint64_t> conflicts{};  ///< by part: those with common bodies
   std::span<PartProgress> parts{};
-  std::atomic<std::uint64_t> absent{0};       ///< parts whose threads are not here; first, all
+  std::atomic<std::uint64_t> absent{0};       ///< parts without a thread; all at the start
   std::atomic<std::uint64_t> serial_done{0};  ///< sweeps over the serial rows
   std::atomic<bool> broken{false};
 
@@ -372,7 +372,7 @@ void RowSolver::divide_bodies() {
     axis = k;
     longest = sample;
   }
-  std::array<Real, ThreadPool::kMaxThreads> ends{};
+  std::array<Real, kMaxParts> ends{};
   for (std::size_t part = 0; part + 1 < parts_; ++part) {
     ends[part] = longest[(part + 1) * count / parts_];
   }
@@ -389,7 +389,7 @@ void RowSolver::divide_bodies() {
 /// Orders the bodies by their parts in the arrays that sweeps change, so that threads write to
 /// different cache lines.
 void RowSolver::assign_slots() {
-  std::array<std::uint32_t, ThreadPool::kMaxThreads> next_slot{};
+  std::array<std::uint32_t, kMaxParts> next_slot{};
   for (std::size_t i = 0; i < body_count_; ++i) ++next_slot[part_of_body_[i]];
   std::uint32_t slot = 0;
   for (std::uint32_t& next : next_slot) slot += std::exchange(next, slot);

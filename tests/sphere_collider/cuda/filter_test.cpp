@@ -72,6 +72,20 @@ bool covers_cell_of(const SphereInstance& from, const SphereInstance& to,
   return true;
 }
 
+/// Counts the decisions of a filter, which may exclude pairs or be certain that they touch.
+struct Decisions {
+  int touching = 0, apart = 0, certain = 0, excluded = 0;
+
+  /// @return whether the decision agrees with the exact test
+  bool add(const SphereInstance& a, const SphereInstance& b, bool is_excluded, bool is_certain) {
+    const bool is_touching = detail::test_sphere_pair(a, b).touching != 0;
+    (is_touching ? touching : apart) += 1;
+    excluded += is_excluded ? 1 : 0;
+    certain += is_certain ? 1 : 0;
+    return !(is_touching && is_excluded) && !(is_certain && !is_touching);
+  }
+};
+
 TEST(CudaFilter, LetsEveryTouchingPairThrough) {
   Random random(base_seed());
   int touching = 0;
@@ -105,7 +119,7 @@ TEST(CudaFilter, DecidesAsTheExactTestDoes) {
 
 TEST(CudaFilter, ExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
   Random random(base_seed());
-  int touching = 0, apart = 0, certain = 0, excluded = 0;
+  Decisions decisions;
   for (int i = 0; i < 2'000'000; ++i) {
     Pair p = nearly_touching(random);
     p.a.radius *= 1 + static_cast<Real>(random.below(64)) * (Limits::epsilon() / 2);
@@ -114,26 +128,18 @@ TEST(CudaFilter, ExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
     const Real bound =
         cuda::error_bound_of(random.below(2) == 0 ? sum : sum * random.uniform(1, 4));
     const Real excess = cuda::excess(p.a, p.b);
-    const bool is_touching = detail::test_sphere_pair(p.a, p.b).touching != 0;
-    (is_touching ? touching : apart) += 1;
-    if (excess > bound) {
-      ++excluded;
-      ASSERT_FALSE(is_touching) << "pair " << i << ", " << seed_note();
-    }
-    if (excess < -bound) {
-      ++certain;
-      ASSERT_TRUE(is_touching) << "pair " << i << ", " << seed_note();
-    }
+    ASSERT_TRUE(decisions.add(p.a, p.b, excess > bound, excess < -bound))
+        << "pair " << i << ", " << seed_note();
   }
-  EXPECT_GT(touching, 400'000) << "the test must cover touching pairs";
-  EXPECT_GT(apart, 100'000) << "the test must cover pairs that are just apart";
-  EXPECT_GT(certain, 10'000) << "a filter that is never certain would pass";
-  EXPECT_GT(excluded, 1'000) << "a filter that excludes nothing would pass";
+  EXPECT_GT(decisions.touching, 400'000) << "the test must cover touching pairs";
+  EXPECT_GT(decisions.apart, 100'000) << "the test must cover pairs that are just apart";
+  EXPECT_GT(decisions.certain, 10'000) << "a filter that is never certain would pass";
+  EXPECT_GT(decisions.excluded, 1'000) << "a filter that excludes nothing would pass";
 }
 
 TEST(CudaFilter, LocalExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
   Random random(base_seed());
-  int touching = 0, apart = 0, certain = 0, excluded = 0;
+  Decisions decisions;
   const auto point = [&](Real size) {
     return Vec3{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)} * size;
   };
@@ -148,23 +154,15 @@ TEST(CudaFilter, LocalExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
     const Real gap = std::ldexp(random.uniform(-1, 1), -12 - static_cast<int>(random.below(15)));
     SphereInstance b{a.centre + normalized(point(1)) * ((a.radius + largest) * (1 + gap)), largest};
     if (random.below(4) == 0) std::swap(a.centre, b.centre);
-    const bool is_touching = detail::test_sphere_pair(a, b).touching != 0;
     const cuda::LocalQuery query = cuda::local_query(a, largest, origin);
     const float excess = cuda::local_excess(query, cuda::local_candidate(b.centre, origin));
-    (is_touching ? touching : apart) += 1;
-    if (!(excess < 0)) {
-      ++excluded;
-      ASSERT_FALSE(is_touching) << "pair " << i << ", " << seed_note();
-    }
-    if (excess < -query.doubt) {
-      ++certain;
-      ASSERT_TRUE(is_touching) << "pair " << i << ", " << seed_note();
-    }
+    ASSERT_TRUE(decisions.add(a, b, !(excess < 0), excess < -query.doubt))
+        << "pair " << i << ", " << seed_note();
   }
-  EXPECT_GT(touching, 300'000) << "the test must cover touching pairs";
-  EXPECT_GT(apart, 300'000) << "the test must cover pairs that are just apart";
-  EXPECT_GT(certain, 10'000) << "a filter that is never certain would pass";
-  EXPECT_GT(excluded, 10'000) << "a filter that excludes nothing would pass";
+  EXPECT_GT(decisions.touching, 300'000) << "the test must cover touching pairs";
+  EXPECT_GT(decisions.apart, 300'000) << "the test must cover pairs that are just apart";
+  EXPECT_GT(decisions.certain, 10'000) << "a filter that is never certain would pass";
+  EXPECT_GT(decisions.excluded, 10'000) << "a filter that excludes nothing would pass";
 }
 
 // No decision may be wrong if the square of the sum of the radii overflows.
