@@ -17,6 +17,7 @@ inline constexpr unsigned kFullWarp = 0xffffffffu;
 
 __device__ inline unsigned lane_id() { return threadIdx.x % 32; }
 __device__ inline unsigned lanes_below() { return (1u << lane_id()) - 1; }
+__device__ inline unsigned lanes_above() { return ~1u << lane_id(); }
 
 /// Reduction over the 32 lanes of a warp, returned in every lane.
 template <typename T, typename Combine>
@@ -71,6 +72,15 @@ __device__ inline std::int32_t lowest_of_warp(std::int32_t x) {
 #endif
 }
 __device__ inline std::int32_t highest_of_warp(std::int32_t x) { return ~lowest_of_warp(~x); }
+
+/// The bits that are set in any lane of a warp, returned in every lane.
+__device__ inline unsigned union_of_warp(unsigned bits) {
+#if __CUDA_ARCH__ >= 800
+  return __reduce_or_sync(kFullWarp, bits);
+#else
+  return warp_reduce(bits, [](unsigned p, unsigned q) { return p | q; });
+#endif
+}
 
 /// Binary search in the inclusive sums of all lanes. Call from all lanes of the warp; `i` may
 /// differ between them.

@@ -96,20 +96,25 @@ constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 5 : 3;
 __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
     single_level_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
-  union Storage {
-    SingleLevelStorage single;
-    CrowdedStorage crowded;
-  };
-  __shared__ Storage storage[kGridWarps];
-  if (!is_valid_input(args) || !args.plan->single) return;
-  const std::uint32_t position = blockIdx.x * kGridThreads + threadIdx.x;
-  if (!args.plan->crowded) {
-    SingleLevelSearcher(args, output, storage[threadIdx.x / 32].single).run(position);
-    return;
-  }
-  CrowdedSearcher searcher(args, output, *args.plan, storage[threadIdx.x / 32].crowded);
-  for (std::uint32_t first = position - lane_id(), k = 0; k < 32; k += kQueries) {
-    if (first + k < args.input.n) searcher.run(first + k);
+  __shared__ SingleLevelStorage storage[kGridWarps];
+  if (!is_valid_input(args) || !args.plan->single || args.plan->crowded) return;
+  SingleLevelSearcher(args, output, storage[threadIdx.x / 32])
+      .run(blockIdx.x * kGridThreads + threadIdx.x);
+}
+
+/// Resident blocks per multiprocessor of crowded_phase. Registers for the loads of several
+/// candidates gain more than a fifth block.
+constexpr unsigned kCrowdedBlocks = std::min(kSearchBlocks, 4u);
+
+__global__ void __launch_bounds__(kGridThreads, kCrowdedBlocks)
+    crowded_phase(GridArgs args, SearchOutput output) {
+  wait_for_previous_kernel();
+  __shared__ CrowdedStorage storage[kGridWarps];
+  if (!is_valid_input(args) || !args.plan->crowded) return;
+  CrowdedSearcher searcher(args, output, *args.plan, storage[threadIdx.x / 32]);
+  const std::uint32_t position = blockIdx.x * kGridThreads + threadIdx.x - lane_id();
+  for (std::uint32_t k = 0; k < 32; k += kQueries) {
+    if (position + k < args.input.n) searcher.run(position + k);
   }
 }
 
@@ -252,6 +257,7 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, const GridL
   launch(plan_phase, kLastLevel + 1, 1, kPlanThreads, stream, args);
   launch_sort(args, limits, stream);
   run(single_level_phase, chunks, args, output);
+  run(crowded_phase, chunks, args, output);
   run(search_phase<true>, std::min(chunks, multiprocessors * kLevelBlocks<true>), args);
   run(search_phase<false>, std::min(chunks, multiprocessors * kLevelBlocks<false>), args);
   run(sum_phase, many_blocks, args, output);

@@ -14,7 +14,7 @@ namespace cuda {
 inline constexpr unsigned kQueries = 8, kLanesOfQuery = 32 / kQueries;
 /// Number of candidates that a warp holds, and of tests that a lane does before it checks whether
 /// candidates are left.
-inline constexpr unsigned kCandidates = 96, kTestsAtOnce = 32 / kLanesOfQuery;
+inline constexpr unsigned kCandidates = 128, kTestsAtOnce = 32 / kLanesOfQuery;
 inline constexpr unsigned kLoads = kCandidates / 32;  // of a lane
 /// Largest number of neighbors that a lane keeps.
 inline constexpr unsigned kMaxOfLane = 15;
@@ -38,7 +38,6 @@ struct CrowdedStorage {
   };
   std::uint32_t found[kMaxOfLane * 32];  // lane l has the elements l, l + 32, l + 64, ...
 };
-static_assert(sizeof(CrowdedStorage) <= sizeof(SingleLevelStorage));
 
 /// Finds the neighbors b > a of each sphere a, and stages them as SingleLevelSearcher does.
 class CrowdedSearcher {
@@ -57,16 +56,16 @@ class CrowdedSearcher {
     id_ = args_.table.ids[at];
     found_ = 0;
     const SingleLevel level(plan_);
-    const AxisRange near = neighbor_cells_of_axis(level);
-    const std::int32_t y = __shfl_sync(kFullWarp, near.cell, 1, kLanesOfQuery),
-                       z = __shfl_sync(kFullWarp, near.cell, 2, kLanesOfQuery);
+    const CellsOfAxis cells = cells_of_axis(level);
+    const std::int32_t y = __shfl_sync(kFullWarp, cells.own, 1, kLanesOfQuery),
+                       z = __shfl_sync(kFullWarp, cells.own, 2, kLanesOfQuery);
     for (unsigned left = __ballot_sync(kFullWarp, is_query); left != 0;) {
       // Queries in one row of cells are searched together, because the cells around them overlap.
       const int first = __ffs(static_cast<int>(left)) - 1;
       const std::int32_t first_y = __shfl_sync(kFullWarp, y, first),
                          first_z = __shfl_sync(kFullWarp, z, first);
       const bool is_in = is_query && y == first_y && z == first_z;
-      search(level, is_in, first, united(near, is_in));
+      search(level, is_in, first, united(cells.near, is_in));
       left &= ~__ballot_sync(kFullWarp, is_in);
     }
     stage(position, queries);
@@ -79,26 +78,26 @@ class CrowdedSearcher {
   __device__ std::uint32_t& kept_id(unsigned k) { return s_.found[32 * k + lane_id()]; }
 
   /// The cell of a sphere, and the cells that can contain its neighbors, along one axis.
-  struct AxisRange {
-    std::int32_t cell, low, high;
+  struct CellsOfAxis {
+    std::int32_t own;
+    AxisRange near;
   };
   /// Those of the query of this lane. The first three lanes of a query compute x, y and z.
-  __device__ AxisRange neighbor_cells_of_axis(const SingleLevel& level) const {
+  __device__ CellsOfAxis cells_of_axis(const SingleLevel& level) const {
     const LevelBox& box = level.box;
     const bool is_x = part() == 0, is_y = part() == 1;
     const Real centre = is_x   ? self_.centre.x
                         : is_y ? self_.centre.y
                                : self_.centre.z,
-               scale = is_x ? level.inverse_x : level.inverse_yz,
-               radius = search_radius_of(self_.radius, level.half);
+               inverse_width = is_x ? level.inverse_x : level.inverse_yz;
     const std::int32_t first = is_x   ? box.x0
                                : is_y ? box.y0
                                       : box.z0,
                        count = is_x   ? box.nx
                                : is_y ? box.ny
                                       : box.nz;
-    return {cell_of(centre, scale), max(cell_of(moved(centre, -radius), scale), first),
-            min(cell_of(moved(centre, radius), scale), first + (count - 1))};
+    return {cell_of(centre, inverse_width), cells_within(search_radius_of(self_.radius, level.half),
+                                                         centre, inverse_width, first, count)};
   }
   /// The smallest range that contains those of the lanes with `is_in`.
   __device__ static CellRange united(const AxisRange& range, bool is_in) {
@@ -109,7 +108,7 @@ class CrowdedSearcher {
     const auto highest = [&](unsigned axis) {
       return highest_of_warp(is_in && part() == axis ? range.high : Limits::min());
     };
-    return {lowest(0), highest(0), lowest(1), highest(1), lowest(2), highest(2)};
+    return {{lowest(0), highest(0)}, {lowest(1), highest(1)}, {lowest(2), highest(2)}};
   }
 
   /// Tests all spheres in a range of cells against the queries of the lanes with `is_in`. The
@@ -120,39 +119,56 @@ class CrowdedSearcher {
                       __shfl_sync(kFullWarp, self_.centre.z, first)};
     LocalQuery local = local_query(self_, level.half, origin);
     if (!is_in) local.limit = -std::numeric_limits<float>::infinity();
-    const std::int32_t y = near.y0 + static_cast<std::int32_t>(lane_id() % kMaxRows),
-                       z = near.z0 + static_cast<std::int32_t>(lane_id() / kMaxRows);
+    const std::int32_t y = near.y.low + static_cast<std::int32_t>(lane_id() % kMaxRows),
+                       z = near.z.low + static_cast<std::int32_t>(lane_id() / kMaxRows);
     uint2 positions{0, 0};  // of the spheres in the row of this lane
-    if (y <= near.y1 && z <= near.z1) {
+    if (y <= near.y.high && z <= near.z.high) {
       const std::uint32_t row = row_of_box(level.box, y, z);
-      positions = {args_.table.starts[row + static_cast<std::uint32_t>(near.x0)],
-                   args_.table.starts[row + static_cast<std::uint32_t>(near.x1) + 1]};
+      positions = {args_.table.starts[row + static_cast<std::uint32_t>(near.x.low)],
+                   args_.table.starts[row + static_cast<std::uint32_t>(near.x.high) + 1]};
     }
-    const std::uint32_t sum = warp_inclusive_sum(positions.y - positions.x);
+    const std::uint32_t count = positions.y - positions.x, sum = warp_inclusive_sum(count);
     const std::uint32_t candidates = __shfl_sync(kFullWarp, sum, 31);
+    // Candidate i is in the last row that starts at or before i, at position i + shift of that row.
+    const std::uint32_t start = count != 0 ? sum - count : ~0u;
+    const std::uint32_t shift = without_empty_rows(positions.y - sum, count != 0);
+    std::uint32_t rows = 0;  // rows that start before the candidates that are loaded next
     for (std::uint32_t done = 0; done < candidates; done += kCandidates) {
       __syncwarp();
-      load_candidates(done, candidates, sum, positions.y - sum, origin);
+      rows = load_candidates(done, candidates, start, shift, rows, origin);
       __syncwarp();
       test_candidates(min(kCandidates, candidates - done), local);
     }
     __syncwarp();
   }
 
-  /// Loads the candidates from `done` on. Candidate i belongs to the first lane with sum > i, and
-  /// is at position i + shift of that lane.
-  __device__ void load_candidates(std::uint32_t done, std::uint32_t candidates, std::uint32_t sum,
-                                  std::uint32_t shift, const Vec3& origin) {
-    std::uint32_t positions[kLoads], ids[kLoads];
+  /// @return in lane k, the value of the k-th lane whose row is not empty
+  __device__ std::uint32_t without_empty_rows(std::uint32_t value, bool has_row) {
+    const unsigned lanes = __ballot_sync(kFullWarp, has_row);
+    if (has_row) s_.candidates.ids[__popc(lanes & lanes_below())] = value;
+    __syncwarp();
+    return s_.candidates.ids[lane_id()];
+  }
+
+  /// Loads the candidates from `done` on.
+  /// @param rows number of rows that start before them
+  /// @return the number of rows that start before the next ones
+  __device__ std::uint32_t load_candidates(std::uint32_t done, std::uint32_t candidates,
+                                           std::uint32_t start, std::uint32_t shift,
+                                           std::uint32_t rows, const Vec3& origin) {
+    std::uint32_t ids[kLoads];
     Vec3 centres[kLoads];
 #pragma unroll
     for (unsigned k = 0; k < kLoads; ++k) {
-      const std::uint32_t i = done + 32 * k + lane_id();
       if (done + 32 * k >= candidates) break;
-      const std::uint32_t position = i + __shfl_sync(kFullWarp, shift, owner_of(i, sum));
-      positions[k] = i < candidates ? position : 0;
-      centres[k] = load_sorted(args_.table.sorted + positions[k]).centre;
-      ids[k] = args_.table.ids[positions[k]];
+      const std::uint32_t i = done + 32 * k + lane_id(), until_start = start - (done + 32 * k);
+      const unsigned starts = union_of_warp(until_start < 32 ? 1u << until_start : 0);
+      const unsigned row = rows + static_cast<unsigned>(__popc(starts & ~lanes_above())) - 1;
+      rows += static_cast<unsigned>(__popc(starts));
+      const std::uint32_t position = i + __shfl_sync(kFullWarp, shift, static_cast<int>(row));
+      const std::uint32_t at = i < candidates ? position : 0;
+      centres[k] = load_sorted(args_.table.sorted + at).centre;
+      ids[k] = args_.table.ids[at];
     }
 #pragma unroll
     for (unsigned k = 0; k < kLoads; ++k) {
@@ -163,6 +179,7 @@ class CrowdedSearcher {
       s_.candidates.spheres[slot] = candidate;
       s_.candidates.ids[slot] = ids[k];
     }
+    return rows;
   }
 
   /// Each lane tests every kLanesOfQuery-th of the first `count` candidates, and keeps those that

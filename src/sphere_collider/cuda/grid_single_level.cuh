@@ -30,36 +30,37 @@ struct SingleLevel {
   Real half, inverse_x, inverse_yz;
 };
 
+/// The cells of one axis of a box that are within `distance` of a coordinate.
+struct AxisRange {
+  std::int32_t low, high;
+};
+__device__ inline AxisRange cells_within(Real distance, Real x, Real inverse_width,
+                                         std::int32_t first, std::int32_t count) {
+  return {max(cell_of(moved(x, -distance), inverse_width), first),
+          min(cell_of(moved(x, distance), inverse_width), first + (count - 1))};
+}
+
 /// The cells that can contain neighbors of a sphere.
 struct CellRange {
-  std::int32_t x0, x1, y0, y1, z0, z1;
+  AxisRange x, y, z;
 };
 __device__ inline CellRange neighbor_cells(const SingleLevel& level, const SphereInstance& s) {
-  const Real search_radius = search_radius_of(s.radius, level.half);
+  const Real distance = search_radius_of(s.radius, level.half);
   const LevelBox& box = level.box;
-  const auto low = [&](Real x, Real scale, std::int32_t first) {
-    return max(cell_of(moved(x, -search_radius), scale), first);
-  };
-  const auto high = [&](Real x, Real scale, std::int32_t first, std::int32_t count) {
-    return min(cell_of(moved(x, search_radius), scale), first + (count - 1));
-  };
-  return {low(s.centre.x, level.inverse_x, box.x0),
-          high(s.centre.x, level.inverse_x, box.x0, box.nx),
-          low(s.centre.y, level.inverse_yz, box.y0),
-          high(s.centre.y, level.inverse_yz, box.y0, box.ny),
-          low(s.centre.z, level.inverse_yz, box.z0),
-          high(s.centre.z, level.inverse_yz, box.z0, box.nz)};
+  return {cells_within(distance, s.centre.x, level.inverse_x, box.x0, box.nx),
+          cells_within(distance, s.centre.y, level.inverse_yz, box.y0, box.ny),
+          cells_within(distance, s.centre.z, level.inverse_yz, box.z0, box.nz)};
 }
 
 /// Iterates over the rows of a range of cells.
 class Rows {
  public:
   __device__ Rows(const LevelBox& box, const CellRange& near)
-      : cells_(static_cast<std::uint32_t>(near.x1 - near.x0 + 1)),
-        rows_y_(near.y1 - near.y0 + 1),
-        left_(rows_y_ * (near.z1 - near.z0 + 1)),
+      : cells_(static_cast<std::uint32_t>(near.x.high - near.x.low + 1)),
+        rows_y_(near.y.high - near.y.low + 1),
+        left_(rows_y_ * (near.z.high - near.z.low + 1)),
         left_y_(rows_y_) {
-    first_ = row_of_box(box, near.y0, near.z0) + static_cast<std::uint32_t>(near.x0);
+    first_ = row_of_box(box, near.y.low, near.z.low) + static_cast<std::uint32_t>(near.x.low);
     next_y_ = static_cast<std::uint32_t>(box.nx);
     next_z_ = static_cast<std::uint32_t>((box.ny - rows_y_ + 1) * box.nx);
   }
@@ -104,7 +105,7 @@ class SingleLevelSearcher {
     const bool searching = position < args_.input.n;
     position_ = searching ? position : 0;
     const SingleLevel level(*args_.plan);
-    CellRange near{0, 0, 0, -1, 0, -1};
+    CellRange near{{0, 0}, {0, -1}, {0, -1}};
     if (searching) {
       self_ = load_sorted(args_.table.sorted + position);
       id_ = args_.table.ids[position];
