@@ -265,15 +265,29 @@ class SphereCollider:
         Raises
         ------
         InvalidArgument
-            A number is out of its range, or `like` has a wrong shape or type.
+            A number is out of its range, or `like` is not on a device, or has a wrong shape or
+            type.
+        ConcurrentUse
+            The collider is in use by another call.
         OutOfMemory, DeviceError
             Earlier reservations remain.
         BackendUnavailable
             The package has no CUDA, or the device cannot be used.
         """
-        search = _device.DeviceSearch(like, None, self._dtype)
-        search.collider(self._on_devices).reserve(
-            _arrays.count(spheres, "spheres", 0, 2**31), _arrays.count(contacts, "contacts", 0, 2**48))
+        spheres = _arrays.count(spheres, "spheres", 0, 2**31)
+        contacts = _arrays.count(contacts, "contacts", 0, 2**48)
+        self._acquire()
+        try:
+            if not _device.is_on_device(like):
+                raise InvalidArgument("like is not an array on a CUDA device")
+            _device.DeviceSearch(like, None, self._dtype).collider(self._on_devices).reserve(
+                spheres, contacts)
+        finally:
+            self._lock.release()
+
+    def _acquire(self) -> None:
+        if not self._lock.acquire(blocking=False):
+            raise ConcurrentUse("the collider is in use by another call; use one for each thread")
 
     def _find(self, search: _Search, output: str, half: bool, index_dtype: Any, out: Any,
               contacts: bool) -> Any:
@@ -282,8 +296,7 @@ class SphereCollider:
                                                            search.periodic)
         if index == "int32" and search.largest() > 2**31:
             raise InvalidArgument("more than 2^31 spheres require index_dtype=\"int64\"")
-        if not self._lock.acquire(blocking=False):
-            raise ConcurrentUse("the collider is in use by another call; use one for each thread")
+        self._acquire()
         try:
             size = search.run(self._collider, bool(half), contacts)
             if outputs is not None:
@@ -315,8 +328,7 @@ class SphereCollider:
         if count is not None and (search.waits() or search.periodic):
             raise InvalidArgument("count excludes query, batch and periodic")
         outputs = None if out is None else _arrays.outputs(out, search.dtype, contacts, search.periodic)
-        if not self._lock.acquire(blocking=False):
-            raise ConcurrentUse("the collider is in use by another call; use one for each thread")
+        self._acquire()
         try:
             core = search.collider(self._on_devices)
             if count is not None:

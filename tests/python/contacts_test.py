@@ -3,6 +3,7 @@
 import gc
 import resource
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -408,6 +409,35 @@ def test_use_from_two_threads_is_a_named_exception(rng):
         thread.join()
     assert refused
     assert collider.find_pairs(positions, 0.01).shape[1] > 0
+
+
+def test_memory_is_reserved_for_a_device_and_not_during_a_search(rng):
+    positions = rng.random((20_000, 3)).astype(np.float32)
+    collider = jfpx.SphereCollider(backend="cpu", algorithm="all_pairs")
+    with pytest.raises(jfpx.InvalidArgument, match="like is not an array on a CUDA device"):
+        collider.reserve(positions, 10, 10)
+    stop = threading.Event()
+
+    def search():
+        while not stop.is_set():
+            try:
+                collider.find_pairs(positions, 0.01)
+            except jfpx.ConcurrentUse:  # of the other thread
+                pass
+
+    thread = threading.Thread(target=search)
+    thread.start()
+    refused, end = False, time.monotonic() + 60
+    while not refused and time.monotonic() < end:
+        try:
+            collider.reserve(positions, 10, 10)
+        except jfpx.ConcurrentUse:
+            refused = True
+        except jfpx.InvalidArgument:
+            pass
+    stop.set()
+    thread.join()
+    assert refused
 
 
 def test_threads_may_search_at_the_same_time(rng):

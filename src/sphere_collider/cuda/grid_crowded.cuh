@@ -142,7 +142,7 @@ class CrowdedSearcher {
     __syncwarp();
   }
 
-  /// @return in lane k, the value of the k-th lane whose row is not empty
+  /// @return in lane k, the value of the k-th lane whose row is not empty; undefined in other lanes
   __device__ std::uint32_t without_empty_rows(std::uint32_t value, bool has_row) {
     const unsigned lanes = __ballot_sync(kFullWarp, has_row);
     if (has_row) s_.candidates.ids[__popc(lanes & lanes_below())] = value;
