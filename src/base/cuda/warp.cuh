@@ -17,7 +17,8 @@ inline constexpr unsigned kFullWarp = 0xffffffffu;
 
 __device__ inline unsigned lane_id() { return threadIdx.x % 32; }
 __device__ inline unsigned lanes_below() { return (1u << lane_id()) - 1; }
-__device__ inline unsigned lanes_above() { return ~1u << lane_id(); }
+/// This lane and all lower ones.
+__device__ inline unsigned lanes_up_to() { return ~(~1u << lane_id()); }
 
 /// Reduction over the 32 lanes of a warp, returned in every lane.
 template <typename T, typename Combine>

@@ -163,7 +163,7 @@ class CrowdedSearcher {
       if (done + 32 * k >= candidates) break;
       const std::uint32_t i = done + 32 * k + lane_id(), until_start = start - (done + 32 * k);
       const unsigned starts = union_of_warp(until_start < 32 ? 1u << until_start : 0);
-      const unsigned row = rows + static_cast<unsigned>(__popc(starts & ~lanes_above())) - 1;
+      const unsigned row = rows + static_cast<unsigned>(__popc(starts & lanes_up_to())) - 1;
       rows += static_cast<unsigned>(__popc(starts));
       const std::uint32_t position = i + __shfl_sync(kFullWarp, shift, static_cast<int>(row));
       const std::uint32_t at = i < candidates ? position : 0;

@@ -30,10 +30,11 @@ struct SingleLevel {
   Real half, inverse_x, inverse_yz;
 };
 
-/// The cells of one axis of a box that are within `distance` of a coordinate.
+/// Consecutive cells along an axis, with both ends.
 struct AxisRange {
   std::int32_t low, high;
 };
+/// The `count` cells from `first` on, as far as they are within `distance` of x.
 __device__ inline AxisRange cells_within(Real distance, Real x, Real inverse_width,
                                          std::int32_t first, std::int32_t count) {
   return {max(cell_of(moved(x, -distance), inverse_width), first),
