@@ -470,8 +470,9 @@ def _half(cutoff: Any, dtype: str) -> float:
 
 @functools.lru_cache(maxsize=256)
 def _exact_half(cutoff: float, dtype: str) -> float | None:
-    value = np.dtype(dtype).type(cutoff)
-    radius = value / 2
+    real = np.dtype(dtype).type
+    value = real(cutoff)
+    radius = value / real(2)  # before version 2, NumPy divides a float32 by 2 in float64
     return float(radius) if 0 < value < np.inf and radius + radius == value else None
 
 
