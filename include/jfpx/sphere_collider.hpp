@@ -48,7 +48,7 @@ struct SphereColliderOptions {
   Backend backend = Backend::automatic;
   SphereAlgorithm algorithm = SphereAlgorithm::automatic;
   unsigned threads = 1;                   ///< cpu: number of threads, at most 256; 0: one per core
-  SimdLevel simd = SimdLevel::automatic;  ///< cpu: widest vector instructions
+  SimdLevel simd = SimdLevel::automatic;  ///< cpu: widest vector instructions, also of a World
   int device = 0;                         ///< cuda: ordinal of the GPU
   CostModel costs = {};                   ///< automatic: predicted costs
 };

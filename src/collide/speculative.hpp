@@ -46,15 +46,20 @@ struct BoxDistance {
   Vec3 normal;        ///< unit, from the box to the sphere
   Real distance = 0;  ///< [m], between the surfaces
 };
+/// From the closest point of a box to a point; zero inside. Both in the axes of the box.
+JFPX_HD inline Vec3 offset_from_box(const Vec3& point, const Box& box) {
+  Vec3 offset;
+  for (int i = 0; i < 3; ++i) {
+    const Real h = box.half_extents[i];
+    offset[i] = point[i] > h ? point[i] - h : point[i] < -h ? point[i] + h : Real(0);
+  }
+  return offset;
+}
 /// The arithmetic of collide(sphere, box, pose).
 JFPX_HD inline BoxDistance distance_to_box(const Vec3& centre, Real radius, const Box& box,
                                            const Transform& pose) {
   const Vec3 local = transform_transpose(pose.basis, centre - pose.origin);
-  Vec3 outside;
-  for (int i = 0; i < 3; ++i) {
-    const Real h = box.half_extents[i];
-    outside[i] = local[i] > h ? local[i] - h : local[i] < -h ? local[i] + h : Real(0);
-  }
+  const Vec3 outside = offset_from_box(local, box);
   const Real gap = length(outside);
   if (gap > kEpsilon) return {pose.basis * (outside * (Real(1) / gap)), gap - radius};
   int face = 0;

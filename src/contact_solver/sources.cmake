@@ -12,7 +12,9 @@ list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/row_kernels.cu)
 # Chosen at run time, like the kernels of sphere_collider.
 if(JFPX_PROCESSOR STREQUAL "x86_64")
-  list(APPEND JFPX_SOURCES ${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_avx2.cpp)
-  set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/row_kernels_avx2.cpp
-    PROPERTIES COMPILE_OPTIONS "-mavx2;-mpopcnt")
+  foreach(kernels IN ITEMS row_kernels_avx2 sphere_sweep_avx2)
+    list(APPEND JFPX_SOURCES ${CMAKE_CURRENT_LIST_DIR}/cpu/${kernels}.cpp)
+    set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/${kernels}.cpp
+      PROPERTIES COMPILE_OPTIONS "-mavx2;-mpopcnt")
+  endforeach()
 endif()

@@ -85,13 +85,17 @@ struct NearBounds {
     // of the box is farther than 2 * moved from the box at the start.
     const Real moved = swept[fixed].radius - sub_shapes.bounds(fixed).radius;
     const PosedBox& box = sub_shapes.box(fixed);
-    const Real far = length(box.pose.origin) + swept[fixed].radius + length(swept[i].centre);
+    const Vec3& centre = swept[i].centre;
+    const Real far = sum(box.pose.origin) + swept[fixed].radius + sum(centre);
     const Real radius = swept[i].radius + 2 * moved + 16 * kEpsilon * far;
-    return detail::distance_to_box(swept[i].centre, radius, box.box, box.pose).distance <= 0;
+    const Vec3 local = transform_transpose(box.pose.basis, centre - box.pose.origin);
+    return length_squared(detail::offset_from_box(local, box.box)) <= radius * radius;
   }
 
  private:
   JFPX_HD static Real smaller(Real a, Real b) { return b < a ? b : a; }
+  /// Sum of the absolute coordinates, which is not less than the length.
+  JFPX_HD static Real sum(const Vec3& v) { return absolute(v.x) + absolute(v.y) + absolute(v.z); }
   JFPX_HD static Real larger(Real a, Real b) { return a < b ? b : a; }
   JFPX_HD static Real smallest_half_extent(const Box& box) {
     const Vec3& h = box.half_extents;

@@ -26,11 +26,12 @@ constexpr std::size_t kBodiesPerChunk = 512, kContactsPerChunk = 2048;
 }  // namespace
 
 SoftStep::SoftStep(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
-                   ThreadPool* pool)
+                   ThreadPool* pool, SimdLevel simd)
     : constants_(soft_step::make_step_constants(settings, dt)),
       settings_(settings),
       materials_(materials),
-      pool_(pool) {}
+      pool_(pool),
+      solver_(pool, simd) {}
 
 void SoftStep::restore(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
                        ContactSet last) noexcept {

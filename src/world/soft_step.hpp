@@ -24,8 +24,9 @@ inline namespace JFPX_ABI {
 class SoftStep {
  public:
   /// @param pool outlives the object
+  /// @param simd widest vector instructions of the sweeps
   SoftStep(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
-           ThreadPool* pool);
+           ThreadPool* pool, SimdLevel simd);
 
   /// Contacts of the current step, for ContactFinder::find_near_contacts().
   soft_step::ContactSet& contacts() { return cache_.current(); }
@@ -78,7 +79,7 @@ class SoftStep {
   MaterialSettings materials_;
   ThreadPool* pool_;
   soft_step::ContactCache cache_;
-  soft_step::SoftStepSolver solver_{pool_};
+  soft_step::SoftStepSolver solver_;
   Islands islands_;
 
   soft_step::StepBodies step_;  ///< of the arrays below and the bodies, during a step

@@ -304,7 +304,8 @@ StepReport World::step() {
 World::World(const Scene& scene, const WorldSettings& settings) {
   auto pool = std::make_unique<ThreadPool>(settings.collider.threads);
   auto collider = make_sphere_collider(settings.collider, pool.get());
-  impl_ = Impl::make(scene, std::move(pool), std::move(collider), settings.broad_phase);
+  impl_ = Impl::make(scene, std::move(pool), std::move(collider), settings.broad_phase,
+                     settings.collider.simd);
   if (settings.collider.backend == Backend::cuda && scene.solver == Solver::soft_step) {
     impl_->device = make_device_world(scene, settings.collider.device);
   }
@@ -318,16 +319,16 @@ World::World(const Scene& scene, const WorldSettings& settings) {
 World::World(const Scene& scene, std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase,
              unsigned threads) {
   if (collider == nullptr) throw InvalidArgument("collider is null; it must be a sphere collider");
-  impl_ =
-      Impl::make(scene, std::make_unique<ThreadPool>(threads), std::move(collider), broad_phase);
+  impl_ = Impl::make(scene, std::make_unique<ThreadPool>(threads), std::move(collider), broad_phase,
+                     SimdLevel::automatic);
 }
 
 std::unique_ptr<World::Impl> World::Impl::make(const Scene& scene, std::unique_ptr<ThreadPool> pool,
                                                std::unique_ptr<SphereCollider> collider,
-                                               BroadPhase broad_phase) {
+                                               BroadPhase broad_phase, SimdLevel simd) {
   validate(scene);
   try {
-    return std::make_unique<Impl>(scene, std::move(pool), std::move(collider), broad_phase);
+    return std::make_unique<Impl>(scene, std::move(pool), std::move(collider), broad_phase, simd);
   } catch (const std::bad_alloc&) {
     throw OutOfMemory(no_memory_for("a world", scene.bodies.size()));
   }

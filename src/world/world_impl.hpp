@@ -27,14 +27,14 @@ struct World::Impl {
   /// Validates the scene. @throws InvalidScene, InvalidArgument, OutOfMemory
   static std::unique_ptr<Impl> make(const Scene& scene, std::unique_ptr<ThreadPool> pool,
                                     std::unique_ptr<SphereCollider> collider,
-                                    BroadPhase broad_phase);
+                                    BroadPhase broad_phase, SimdLevel simd);
   Impl(const Scene& given, std::unique_ptr<ThreadPool> threads,
-       std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase)
+       std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase, SimdLevel simd)
       : pool(std::move(threads)),
         scene(given),
         store(empty_store(given)),
         contact_finder(std::move(collider), broad_phase),
-        soft_step(given.soft_step, given.materials, given.dt, pool.get()) {
+        soft_step(given.soft_step, given.materials, given.dt, pool.get(), simd) {
     store.reserve(given.bodies.size());
     for (const BodyDef& def : given.bodies) store.add(def);
     store.set_ignored_pairs(given.ignored_pairs);  // a body of the scene has the index of its slot

@@ -44,6 +44,7 @@ jfpx_add_test(world_test SOURCES
   world/rest_test.cpp
   world/sensor_test.cpp
   world/snapshot_test.cpp
+  world/vector_width_test.cpp
   world/world_test.cpp)
 jfpx_add_test(portable_files_test SOURCES world/portable_files_test.cpp)
 set_source_files_properties(world/portable_files_test.cpp PROPERTIES

@@ -1,11 +1,13 @@
 /// Rows and sweeps of the soft step on the CPU; see the header.
 #include "src/contact_solver/cpu/soft_step_solver.hpp"
 
+#include "src/base/cpu.hpp"
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
 #include "src/contact_solver/row_operations.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -17,7 +19,39 @@ namespace {
 
 constexpr std::size_t kRowsPerChunk = 128, kContactsPerChunk = 4096;
 
+// The layout that sphere_sweep.hpp assumes.
+constexpr std::size_t kReal = sizeof(Real);
+static_assert(sizeof(SphereRow) == cpu::kSweepStride * kReal);
+static_assert(offsetof(SphereRow, friction_impulse) == cpu::sphere_row_quad::kImpulses * kReal);
+static_assert(offsetof(SphereRow, normal_impulse) == 3 * kReal);
+static_assert(offsetof(SphereRow, normal) == cpu::sphere_row_quad::kNormal * kReal);
+static_assert(offsetof(SphereRow, distance) == 7 * kReal);
+static_assert(offsetof(SphereRow, friction) == cpu::sphere_row_quad::kFriction * kReal);
+static_assert(offsetof(SphereRow, arm_a) == 9 * kReal && offsetof(SphereRow, arm_b) == 10 * kReal);
+static_assert(offsetof(SphereRow, normal_mass) == 11 * kReal);
+static_assert(offsetof(SphereRow, tangent_mass) == cpu::sphere_row_quad::kTangentMass * kReal);
+static_assert(offsetof(SphereRow, a) == cpu::sphere_row_quad::kBodies * kReal);
+static_assert(offsetof(SphereRow, b) == offsetof(SphereRow, a) + 4);
+static_assert(sizeof(SolverBody) == cpu::kSweepStride * kReal);
+static_assert(offsetof(SolverBody, inverse_mass) == 3 * kReal);
+static_assert(offsetof(SolverBody, angular_velocity) ==
+              cpu::solver_body_quad::kAngularVelocity * kReal);
+static_assert(offsetof(SolverBody, inverse_inertia) == 7 * kReal);
+static_assert(offsetof(SolverBody, shift) == cpu::solver_body_quad::kShift * kReal);
+
+const cpu::SphereSweepKernels* kernels_for(SimdLevel level) {
+#if defined(__x86_64__)
+  if (level >= SimdLevel::avx2) return &cpu::kAvx2SphereSweep;
+#else
+  static_cast<void>(level);
+#endif
+  return nullptr;
+}
+
 }  // namespace
+
+SoftStepSolver::SoftStepSolver(ThreadPool* pool, SimdLevel simd)
+    : pool_(pool), kernels_(kernels_for(usable_simd_level(simd))) {}
 
 /// Counting sort of the contacts into rows by kind and group. Rows of a group are in the order of
 /// contacts, those with fixed bodies in the order of bodies.
@@ -137,25 +171,22 @@ BodyPair SoftStepSolver::pair_of(const ManifoldRow& row, std::span<SolverBody> b
           &setup_.properties.inverse_inertia[row.b]};
 }
 
-/// Calls operation(row, is_fixed) for all rows, in the order of the solver.
-template <class Operation>
-void SoftStepSolver::sweep(const Operation& operation) {
-  const auto run = [&](auto* kind_rows, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) operation(&kind_rows->rows[i], std::false_type());
-  };
-  run(&spheres_, 0, spheres_.begin[1]);
-  run(&manifolds_, 0, manifolds_.begin[1]);
+template <class RunSpheres, class RunManifolds, class OnFixed>
+void SoftStepSolver::sweep(const RunSpheres& run_spheres, const RunManifolds& run_manifolds,
+                           const OnFixed& on_fixed) {
+  for (std::size_t i = 0; i < spheres_.begin[1]; ++i) run_spheres(i, i + 1);
+  run_manifolds(0, manifolds_.begin[1]);
   for (std::size_t group = 1; group < kFixedGroup; ++group) {
     // One loop over the rows of both kinds: the end of a loop costs as much as dozens of rows.
     const std::size_t sphere = spheres_.begin[group], manifold = manifolds_.begin[group];
     const std::size_t spheres = spheres_.begin[group + 1] - sphere;
     const std::size_t manifolds = manifolds_.begin[group + 1] - manifold;
-    parallel_for(
-        pool_, spheres + manifolds, kRowsPerChunk, [&](std::size_t first, std::size_t last) {
-          run(&spheres_, sphere + std::min(first, spheres), sphere + std::min(last, spheres));
-          run(&manifolds_, manifold + std::max(first, spheres) - spheres,
-              manifold + std::max(last, spheres) - spheres);
-        });
+    parallel_for(pool_, spheres + manifolds, kRowsPerChunk,
+                 [&](std::size_t first, std::size_t last) {
+                   run_spheres(sphere + std::min(first, spheres), sphere + std::min(last, spheres));
+                   run_manifolds(manifold + std::max(first, spheres) - spheres,
+                                 manifold + std::max(last, spheres) - spheres);
+                 });
   }
   parallel_for(pool_, fixed_.size(), kRowsPerChunk, [&](std::size_t first, std::size_t last) {
     // A chunk begins and ends at the first contact of a body.
@@ -167,37 +198,74 @@ void SoftStepSolver::sweep(const Operation& operation) {
     for (std::size_t i = first; i < last; ++i) {
       const FixedContact& fixed = fixed_[i];
       if (fixed.is_sphere_row) {
-        operation(&spheres_.rows[fixed.row], std::true_type());
+        on_fixed(&spheres_.rows[fixed.row]);
       } else {
-        operation(&manifolds_.rows[fixed.row], std::true_type());
+        on_fixed(&manifolds_.rows[fixed.row]);
       }
     }
   });
 }
 
+/// @param kernel null: rows of spheres are treated one by one
 template <class Operation>
-void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operation) {
-  sweep([&]<class Row, bool kFixed>(Row* row, std::bool_constant<kFixed>) {
-    if constexpr (std::is_same_v<Row, SphereRow>) {
+void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operation,
+                         cpu::SphereSweepFunction kernel) {
+  const auto one = [&]<bool kFixed>(auto* row, std::bool_constant<kFixed>) {
+    if constexpr (std::is_same_v<decltype(row), SphereRow*>) {
       operation.template run<kFixed>(row, &bodies[row->a], &bodies[row->b], impacts_);
     } else {
       operation.template run<kFixed>(row, &points_[row->first], pair_of(*row, bodies));
     }
-  });
+  };
+  const cpu::SphereSweep arrays = arrays_of(bodies);
+  sweep(
+      [&](std::size_t first, std::size_t last) {
+        if (kernel == nullptr) {
+          for (std::size_t i = first; i < last; ++i) one(&spheres_.rows[i], std::false_type());
+          return;
+        }
+        std::array<std::uint32_t, kRowsPerChunk> left;
+        const std::size_t count = kernel(arrays, first, last, left.data());
+        for (std::size_t k = 0; k < count; ++k) one(&spheres_.rows[left[k]], std::false_type());
+      },
+      [&](std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i) one(&manifolds_.rows[i], std::false_type());
+      },
+      [&](auto* row) { one(row, std::true_type()); });
 }
 
-void SoftStepSolver::warm_start(std::span<SolverBody> bodies) { run(bodies, WarmStart()); }
+cpu::SphereSweep SoftStepSolver::arrays_of(std::span<SolverBody> bodies) {
+  const StepConstants& c = constants_;
+  const auto softness = [](const Softness& s) {
+    return cpu::SweepSoftness{s.bias_rate, s.mass_scale, s.impulse_scale};
+  };
+  return {reinterpret_cast<Real*>(spheres_.rows.data()),
+          reinterpret_cast<Real*>(bodies.data()),
+          c.h,
+          c.inverse_h,
+          c.push_out_speed,
+          c.soft_speed,
+          c.restitution_threshold,
+          softness(c.balls),
+          softness(c.deep_balls),
+          kDeepPenetration};
+}
+
+void SoftStepSolver::warm_start(std::span<SolverBody> bodies) {
+  run(bodies, WarmStart(), kernels_ != nullptr ? kernels_->warm_start : nullptr);
+}
 
 void SoftStepSolver::solve(std::span<SolverBody> bodies, bool soft) {
+  const cpu::SphereSweepFunction kernel = kernels_ != nullptr ? kernels_->solve[soft] : nullptr;
   if (soft) {
-    run(bodies, Solve<true>{constants_});
+    run(bodies, Solve<true>{constants_}, kernel);
   } else {
-    run(bodies, Solve<false>{constants_});
+    run(bodies, Solve<false>{constants_}, kernel);
   }
 }
 
 void SoftStepSolver::restitute(std::span<SolverBody> bodies) {
-  if (!manifolds_.rows.empty()) run(bodies, Restitute());
+  if (!manifolds_.rows.empty()) run(bodies, Restitute(), nullptr);
 }
 
 void SoftStepSolver::store() {

@@ -1,7 +1,10 @@
 /// Sweeps of the soft step over the contacts of all colors.
 #pragma once
 
+#include <jfpx/simd_level.hpp>
+
 #include "src/base/thread_pool.hpp"
+#include "src/contact_solver/cpu/sphere_sweep.hpp"
 #include "src/contact_solver/row_setup.hpp"
 
 #include <array>
@@ -24,7 +27,8 @@ namespace soft_step {
 class SoftStepSolver {
  public:
   /// @param pool outlives the solver
-  explicit SoftStepSolver(ThreadPool* pool) : pool_(pool) {}
+  /// @param simd widest vectors for rows of spheres
+  SoftStepSolver(ThreadPool* pool, SimdLevel simd);
 
   /// Makes rows of the contacts whose RowKind is not `none`.
   /// @param setup     its arrays are valid until store()
@@ -63,14 +67,20 @@ class SoftStepSolver {
   void count_contacts();
   void place_contacts(std::uint32_t first, std::uint32_t last, Counts before);
   void place_fixed_contacts();
+  /// Calls run_spheres(first, last) and run_manifolds(first, last) for the rows of the overflow and
+  /// of the colors, and operation(row) for each row with a fixed body.
+  template <class RunSpheres, class RunManifolds, class OnFixed>
+  void sweep(const RunSpheres& run_spheres, const RunManifolds& run_manifolds,
+             const OnFixed& on_fixed);
   template <class Operation>
-  void sweep(const Operation& operation);
-  template <class Operation>
-  void run(std::span<SolverBody> bodies, const Operation& operation);
+  void run(std::span<SolverBody> bodies, const Operation& operation,
+           cpu::SphereSweepFunction kernel);
+  cpu::SphereSweep arrays_of(std::span<SolverBody> bodies);
   BodyPair pair_of(const ManifoldRow& row, std::span<SolverBody> bodies) const;
 
   ThreadPool* pool_;
-  RowSetup setup_;  ///< from build() to store()
+  const cpu::SphereSweepKernels* kernels_;  ///< null: rows are solved one by one
+  RowSetup setup_;                          ///< from build() to store()
   ImpactBodies impacts_;
   StepConstants constants_;
 
