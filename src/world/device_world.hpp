@@ -35,6 +35,9 @@ using BodyEdits = std::unordered_map<std::uint32_t, BodyEdit>;
 /// Steps of Solver::soft_step on a device, with the bits of SoftStep. The caller uploads a world,
 /// then calls step() any number of times, and fetches the results that it needs. Not thread-safe.
 ///
+/// Steps that do not wait for the host: after enqueue() or capture(), finish() must precede all
+/// functions but enqueue(), capture(), is_capturing() and states().
+///
 /// All functions but the destructor throw DeviceError if the device fails, and OutOfMemory. After a
 /// failed step(), the state on the device is that before the step.
 class DeviceWorld {
@@ -52,6 +55,12 @@ class DeviceWorld {
     /// A force must wake a body: the step had no effect, and the host is to apply the forces.
     bool must_wake = false;
   };
+  /// Steps that finish() has found.
+  struct Finished {
+    std::uint64_t completed = 0;  ///< number of complete steps
+    std::uint64_t missing = 0;    ///< number of steps after them that the caller must make
+    Result last;                  ///< of the last complete step, if none is missing; without times
+  };
 
   virtual ~DeviceWorld() = default;
 
@@ -65,12 +74,38 @@ class DeviceWorld {
   virtual void upload_forces(const BodyStore& bodies) = 0;
   /// Whether edit() may add bodies with indices below `slots`.
   virtual bool has_room(std::size_t slots) const noexcept = 0;
-  /// Edits bodies of the state on the device. The same edits may be repeated after a failure.
+  /// Edits bodies of the state on the device. The same edits may be repeated after a failure. May
+  /// return before the device is done.
   virtual void edit(const BodyStore& bodies, const BodyEdits& edits) = 0;
   /// One step. If a body runs away, the state does not change.
   /// @param forces act in this step, as far as they wake no body; null: none
-  /// @param time   [s], start of the step
-  virtual Result step(const ForceTable* forces, double time) = 0;
+  /// @param steps  World::steps(), which gives the time
+  virtual Result step(const ForceTable* forces, std::uint64_t steps) = 0;
+
+  /// Sends the forces, and makes room, so that capture() can follow. Enables steps after hold().
+  /// Waits.
+  /// @param forces,steps as for step(), like those of the functions below
+  virtual void prepare(const ForceTable* forces, std::uint64_t steps) = 0;
+  /// Enqueues steps, before later work of a stream. wait_for(stream) must precede. Does not wait.
+  /// If a step cannot be completed, the later ones have no effect.
+  /// @param left number of steps; becomes that of those which were not enqueued, if that fails
+  virtual void enqueue(const ForceTable* forces, std::uint64_t steps, cuda::Stream stream,
+                       std::uint64_t* left) = 0;
+  virtual bool is_capturing(cuda::Stream stream) = 0;
+  /// Adds steps to the CUDA graph that is being captured from a stream. The graph is valid as long
+  /// as the version of states().
+  /// @returns false, without effect, if prepare() or a step since upload() is missing
+  virtual bool capture(const ForceTable* forces, std::uint64_t steps, std::uint32_t count,
+                       cuda::Stream stream) = 0;
+  /// Until step(), enqueue() or prepare(), steps of captured graphs have no effect. Waits.
+  virtual void hold() = 0;
+  virtual bool is_held() const noexcept = 0;
+  /// Later work of the world waits for earlier work of a stream.
+  virtual void wait_for(cuda::Stream stream) = 0;
+  /// Waits for all steps, also of captured graphs. The state is then that after the last complete
+  /// one. May be repeated after a failure.
+  virtual Finished finish() = 0;
+
   /// The states on the device, with the lifetimes of cuda::device_states().
   virtual cuda::DeviceStates states() const noexcept = 0;
   virtual Vec3 fetch_position(std::uint32_t body) = 0;

@@ -37,6 +37,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_access.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_on_device.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/world_queue.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_properties.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_queries.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_snapshot.cpp)

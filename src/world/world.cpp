@@ -246,58 +246,66 @@ void World::Impl::note_rest(const StepReport& report) {
 }
 
 StepReport World::step() {
-  Impl& w = *impl_;
+  impl_->finish();
+  return impl_->make_step();
+}
+
+void World::Impl::report_backend(StepReport* report) const {
+  if (resident) {
+    report->backend = Backend::cuda;
+    if (automatic != nullptr) report->choice = automatic->reason();
+    return;
+  }
+  const SphereCollider& collider = contact_finder.collider();
+  report->backend = collider.backend();
+  report->algorithm = collider.algorithm();
+  report->choice = device_failure.empty() ? collider.reason() : ChoiceReason::device_failed;
+}
+
+StepReport World::Impl::make_step() {
   StepReport report;
   Stopwatch watch;
-  if (w.is_at_rest()) {
-    report = w.last_report;
-    report.step = ++w.steps;
+  if (is_at_rest()) {
+    report = last_report;
+    report.step = ++steps;
     report.integrate_ms = report.detect_ms = report.resolve_ms = 0;
-    if (!w.repeats_contacts) w.events.invalidate();
-    w.repeats_contacts = w.shows_contacts = w.shows_events = true;
+    if (!repeats_contacts) events.invalidate();
+    repeats_contacts = shows_contacts = shows_events = true;
     report.total_ms = watch.lap_ms();
     return report;
   }
   try {
-    w.choose_device(&report);
+    choose_device(&report);
     // A step on the device changes nothing on the host, unless the host applies the forces.
-    w.is_saved = false;
-    if (!w.steps_on_device) w.save_for_undo();
+    is_saved = false;
+    if (!steps_on_device) save_for_undo();
   } catch (const std::bad_alloc&) {
-    throw OutOfMemory(no_memory_for("a step", w.store.size()));
+    throw OutOfMemory(no_memory_for("a step", store.size()));
   }
-  w.contacts_are_new = w.repeats_contacts = false;
-  w.query_tree.invalidate();
-  w.events.invalidate();
-  w.contacts_by_body.invalidate();
+  contacts_are_new = repeats_contacts = false;
+  query_tree.invalidate();
+  events.invalidate();
+  contacts_by_body.invalidate();
   try {
-    if (w.advance(&report)) {
-      ++w.steps;
-      w.shows_contacts = w.shows_events = true;
+    if (advance(&report)) {
+      ++steps;
+      shows_contacts = shows_events = true;
     } else {
-      w.undo();
+      undo();
     }
   } catch (const std::bad_alloc&) {
-    w.undo();
-    throw OutOfMemory(no_memory_for("a step", w.store.size()) + ", and more for their contacts");
+    undo();
+    throw OutOfMemory(no_memory_for("a step", store.size()) + ", and more for their contacts");
   } catch (...) {
-    w.undo();
+    undo();
     throw;
   }
-  report.step = w.steps;
-  if (w.resident) {
-    report.backend = Backend::cuda;
-    if (w.automatic != nullptr) report.choice = w.automatic->reason();
-  } else {
-    const SphereCollider& collider = w.contact_finder.collider();
-    report.backend = collider.backend();
-    report.algorithm = collider.algorithm();
-    report.choice = w.device_failure.empty() ? collider.reason() : ChoiceReason::device_failed;
-    report.awake = w.count_awake();
-  }
+  report.step = steps;
+  report_backend(&report);
+  if (!resident) report.awake = count_awake();
   report.total_ms = watch.lap_ms();
-  w.spent_us = 1e3 * report.total_ms;
-  w.note_rest(report);
+  spent_us = 1e3 * report.total_ms;
+  note_rest(report);
   return report;
 }
 

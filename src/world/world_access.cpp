@@ -109,14 +109,21 @@ Vec3 World::last_acceleration(BodyId id) const {
 ForceContext World::force_context() { return {impl_->changed_bodies(), impl_->time()}; }
 
 ForceId World::add_any(std::function<void(ForceContext&)> force) {
+  impl_->finish();
   const ForceId id = impl_->forces.add(std::move(force));
   impl_->wake_all();
   return id;
 }
 
-std::function<void(ForceContext&)>& World::any_force(ForceId id) { return impl_->forces.at(id); }
+std::function<void(ForceContext&)>& World::any_force(ForceId id) {
+  impl_->finish();
+  std::function<void(ForceContext&)>& force = impl_->forces.at(id);
+  impl_->hold_graphs();
+  return force;
+}
 
 void World::remove_force(ForceId id) {
+  impl_->finish();
   impl_->forces.remove(id);
   impl_->wake_all();
 }
@@ -124,6 +131,7 @@ void World::remove_force(ForceId id) {
 std::span<const ForceId> World::forces() const { return impl_->forces.ids(); }
 
 ContactGeneratorId World::add_any_generator(std::function<void(ContactContext&)> generator) {
+  impl_->finish();
   const ContactGeneratorId id = impl_->generators.add(std::move(generator));
   impl_->wake_all();
   return id;
@@ -142,16 +150,24 @@ std::span<const ContactGeneratorId> World::contact_generators() const {
   return impl_->generators.ids();
 }
 
-std::uint64_t World::steps() const { return impl_->steps; }
+std::uint64_t World::steps() const {
+  impl_->finish();
+  return impl_->steps;
+}
 
-double World::time() const { return impl_->time(); }
+double World::time() const {
+  impl_->finish();
+  return impl_->time();
+}
 
 std::span<const Contact> World::contacts() const {
+  impl_->finish();
   if (!impl_->shows_contacts) return {};
   return impl_->contact_list().contacts;
 }
 
 std::span<const ContactEvent> World::contact_events() const {
+  impl_->finish();
   if (!impl_->shows_events) return {};
   const ContactList &before = impl_->contact_list_before(), &now = impl_->contact_list();
   return impl_->events.between(std::span(before.contacts).first(before.detected),

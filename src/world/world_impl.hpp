@@ -18,6 +18,7 @@
 #include "src/world/soft_step.hpp"
 #include "src/world/wake_propagation.hpp"
 
+#include <atomic>
 #include <mutex>
 
 namespace jfpx {
@@ -44,11 +45,13 @@ struct World::Impl {
   /// `store` alone serves for ids and properties. Const functions of a World may call it
   /// concurrently.
   const BodyStore& bodies() {
+    finish();
     if (resident) fetch_motion();
     return store;
   }
   /// The bodies for a change. The next step uploads the world again.
   BodyStore& changed_bodies() {
+    finish();
     steps_at_rest = 0;
     if (resident) leave_device();
     return store;
@@ -99,6 +102,33 @@ struct World::Impl {
   void fetch_all();
   void fetch_contact_set();
 
+  // Steps that do not wait for the host (world_queue.cpp).
+
+  /// cuda::enqueue_steps(), while the stream is not being captured, and while it is.
+  void enqueue(std::uint32_t count, cuda::Stream stream);
+  void capture(std::uint32_t count, cuda::Stream stream);
+  /// Waits for the enqueued and replayed steps, and makes those that the device could not complete.
+  /// Everything that reads or changes the state calls it first. Const functions may call it
+  /// concurrently.
+  void finish() {
+    if (has_queue.load(std::memory_order_acquire)) finish_queue();
+  }
+  void finish_queue();
+  void finish_launched();
+  void make_missing_steps();
+  void launch(cuda::Stream stream);
+  void keep_report(StepReport report);
+  /// Steps of captured graphs must see a change that the host is going to record: until the host
+  /// has sent it, it makes them.
+  void hold_graphs();
+  bool is_graph_valid() const;
+  /// Whether the host has changes for the next step that the device does not have yet.
+  bool has_changes() const { return !resident || !edits.empty() || device->is_held(); }
+  /// Sends them, so that graphs can be captured and replayed.
+  void send_changes();
+  /// Forgets the queue, before the state is replaced.
+  void drop_queue() noexcept;
+
   /// A store without bodies for a scene.
   static BodyStore empty_store(const Scene& scene) {
     return {scene.dt, scene.sleep,
@@ -107,6 +137,7 @@ struct World::Impl {
 
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
+    finish();
     if (resident) {
       edited_body(body.index, {.wakes_neighbors = true});
       return;
@@ -152,12 +183,17 @@ struct World::Impl {
     return steps_at_rest >= 2 && forces.ids().empty() && generators.ids().empty();
   }
   void note_rest(const StepReport& report);
+  StepReport make_step();
+  void report_backend(StepReport* report) const;
   bool advance(StepReport* report);
   bool advance_soft_step(StepReport* report);
   bool advance_worst_first(StepReport* report);
   void choose_device(StepReport* report);
   bool advance_on_device(StepReport* report);
   bool step_on_device(StepReport* report);
+  void complete_on_device(std::uint64_t count);
+  void lose_device(const std::string& failure) noexcept;
+  static void fill_report(const DeviceWorld::Result& result, StepReport* report);
   void apply_forces_on_host();
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   void find_contacts(StepReport* report);
@@ -222,6 +258,17 @@ struct World::Impl {
   /// While resident: whether the arrays of the host are those of the device.
   bool motion_is_current = true, contact_set_is_current = true;
   std::mutex fetching;  ///< held by functions that fetch, because const functions may call them
+
+  /// Whether steps may have been enqueued, or replayed by a graph, that the host has not waited
+  /// for.
+  std::atomic<bool> has_queue{false};
+  bool is_launched = false;         ///< whether the device has enqueued steps
+  std::uint64_t graph_version = 0;  ///< DeviceStates::version of the last captured graph; 0: none
+  std::uint64_t missing_steps = 0;  ///< steps of the queue that the host must make
+  std::string queue_failure;        ///< why the device cannot make them; empty: no failure
+  StepReport queue_report;          ///< of the last step of a queue
+  bool is_finishing = false;        ///< guarded by `finishing`
+  std::recursive_mutex finishing;   ///< held by finish_queue(), whose steps call finish() again
 };
 
 /// Access to the members of a World, for tests and for cuda::device_states().

@@ -71,6 +71,8 @@ void World::Impl::enter_device() {
 }
 
 BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
+  finish();
+  hold_graphs();
   steps_at_rest = 0;
   if (!resident) return store;
   BodyEdit& all = edits[body];
@@ -88,6 +90,7 @@ BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
 }
 
 BodyStore& World::Impl::edited_body_in_lists(std::uint32_t body, const BodyEdit& edit) {
+  finish();
   if (resident) {
     remember_listed(body);
   } else {
@@ -103,6 +106,8 @@ void World::Impl::remember_listed(std::uint32_t body) {
 }
 
 BodyId World::Impl::add(const BodyDef& def) {
+  finish();
+  hold_graphs();
   steps_at_rest = 0;
   const std::uint32_t body = store.next_index();
   if (resident && !device->has_room(std::size_t{body} + 1)) leave_device();
@@ -118,6 +123,8 @@ BodyId World::Impl::add(const BodyDef& def) {
 }
 
 void World::Impl::remove(BodyId id) {
+  finish();
+  hold_graphs();
   steps_at_rest = 0;
   const std::uint32_t body = id.index;
   if (!resident) {
@@ -155,6 +162,7 @@ void World::Impl::flush_edits() {
 }
 
 Vec3 World::Impl::position(std::uint32_t body) {
+  finish();
   if (!resident || motion_is_current) return store.moving.position[body];
   const auto edit = edits.find(body);
   if (edit != edits.end() && (edit->second.sets_state || edit->second.is_added))
@@ -210,6 +218,7 @@ void World::Impl::fetch_contact_set() {
 }
 
 void World::Impl::fetch_all() {
+  finish();
   make_contact_lists();
   if (resident) {
     fetch_motion();
@@ -239,11 +248,7 @@ bool World::Impl::advance_on_device(StepReport* report) {
     if (is_saved) undo_motion();  // the host applies the forces of this step again
     leave_device();
   }
-  if (!report->device_failure.empty()) {
-    device_failure = report->device_failure;
-    device.reset();
-    if (automatic != nullptr) automatic->give_up();
-  }
+  if (!report->device_failure.empty()) lose_device(report->device_failure);
   if (!is_saved) save_for_undo();
   return false;
 }
@@ -265,10 +270,10 @@ bool World::Impl::step_on_device(StepReport* report) {
   const bool are_known = force_table.update(forces, store);
   if (!are_known) apply_forces_on_host();
   const bool act_there = are_known && !forces.empty();
-  DeviceWorld::Result result = device->step(act_there ? &force_table : nullptr, time());
+  DeviceWorld::Result result = device->step(act_there ? &force_table : nullptr, steps);
   if (result.must_wake) {
     apply_forces_on_host();
-    result = device->step(nullptr, time());
+    result = device->step(nullptr, steps);
   }
   if (result.invalid_bounds) return false;
   report->non_finite = result.runaway.has_value();
@@ -280,42 +285,43 @@ bool World::Impl::step_on_device(StepReport* report) {
     }
     return true;
   }
+  complete_on_device(1);
+  fill_report(result, report);
+  return true;
+}
+
+/// The device has completed steps: the host has nothing of the last one yet.
+void World::Impl::complete_on_device(std::uint64_t count) {
   for (const std::uint32_t body : forced_bodies) {
     store.moving.force[body] = store.moving.torque[body] = {};
   }
   forced_bodies.clear();
+  if (count > 1) {  // then those of the step before the last are on the device, too
+    contacts.invalidate();
+    changed.clear();
+  }
   std::swap(contacts, contacts_before);
   contacts.invalidate();
   changed_before = std::exchange(changed, {});
   soft_step.forget_none();
   motion_is_current = contact_set_is_current = false;
+}
+
+void World::Impl::fill_report(const DeviceWorld::Result& result, StepReport* report) {
   report->integrate_ms = result.forces_ms;
   report->detect_ms = result.detect_ms;
   report->resolve_ms = result.resolve_ms;
   report->contacts = result.contacts;
   report->sphere_contacts = result.sphere_contacts;
   report->awake = result.awake;
-  return true;
 }
 
-namespace cuda {
-
-DeviceStates device_states(World& world) {
-  auto& w = WorldAccess::impl(world);
-  if (w.device == nullptr) {
-    if (!w.device_failure.empty()) {
-      throw BackendUnavailable("cuda: the device of this world has failed: " + w.device_failure);
-    }
-    throw BackendUnavailable(
-        w.automatic != nullptr
-            ? "cuda: Backend::automatic has not started a device for this world"
-            : "cuda: this world has no device; it needs Backend::cuda and Solver::soft_step");
-  }
-  w.enter_device();
-  w.flush_edits();
-  return w.device->states();
+/// The CPU makes all later steps.
+void World::Impl::lose_device(const std::string& failure) noexcept {
+  device_failure = failure;
+  device.reset();
+  if (automatic != nullptr) automatic->give_up();
 }
 
-}  // namespace cuda
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -47,6 +47,7 @@ void World::Impl::read(BinaryReader* reader) {
   settings.bodies = std::move(scene.bodies);
   settings.ignored_pairs = std::move(scene.ignored_pairs);
   scene = std::move(settings);
+  drop_queue();
   forget_device();
   steps_at_rest = 0;
   if (device != nullptr) device->configure(scene);

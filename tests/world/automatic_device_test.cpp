@@ -45,10 +45,28 @@ class FailingDevice final : public DeviceWorld {
     count_call();
     device_->edit(bodies, edits);
   }
-  Result step(const ForceTable* forces, double time) override {
+  Result step(const ForceTable* forces, std::uint64_t steps) override {
     count_call();
-    return device_->step(forces, time);
+    return device_->step(forces, steps);
   }
+  void prepare(const ForceTable* forces, std::uint64_t steps) override {
+    count_call();
+    device_->prepare(forces, steps);
+  }
+  void enqueue(const ForceTable* forces, std::uint64_t steps, cuda::Stream stream,
+               std::uint64_t* left) override {
+    count_call();
+    device_->enqueue(forces, steps, stream, left);
+  }
+  bool is_capturing(cuda::Stream stream) override { return device_->is_capturing(stream); }
+  bool capture(const ForceTable* forces, std::uint64_t steps, std::uint32_t count,
+               cuda::Stream stream) override {
+    return device_->capture(forces, steps, count, stream);
+  }
+  void hold() override { device_->hold(); }
+  bool is_held() const noexcept override { return device_->is_held(); }
+  void wait_for(cuda::Stream stream) override { device_->wait_for(stream); }
+  Finished finish() override { return device_->finish(); }
   cuda::DeviceStates states() const noexcept override { return device_->states(); }
   Vec3 fetch_position(std::uint32_t body) override { return device_->fetch_position(body); }
   void fetch_motion(MotionArrays* moving) override { device_->fetch_motion(moving); }

@@ -1,5 +1,6 @@
 /// Steps on a CUDA device while CUDA calls fail.
 #include <jfpx/backend.hpp>
+#include <jfpx/cuda/world.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 
@@ -9,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <cstdlib>
 
 namespace jfpx {
@@ -72,6 +74,55 @@ TEST(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
     }
     cuda::inject_fault(-1, cudaSuccess);
     ASSERT_EQ(world.state_hash(), host.state_hash()) << "call " << failing;
+  }
+  EXPECT_GT(failing, 50);
+}
+
+/// The same for enqueued steps: whichever call fails, of the queue, of the wait for it, or of the
+/// changes in between, the processor makes the steps that the device has not completed.
+TEST(CudaWorld, AnyFailingCallOfAQueueLeavesTheBitsOfTheProcessor) {
+  if (!has_device()) {
+    ASSERT_EQ(std::getenv("JFPX_REQUIRE_CUDA"), nullptr);
+    GTEST_SKIP() << "no CUDA device";
+  }
+  const Scene scene = scenes::make("mixed", {.spheres = 40});
+  const auto run = [](World* world, bool is_queue) {
+    for (std::uint32_t n = 1; n < 4; ++n) {
+      world->apply_force(world->bodies()[1], {3, 4, 5});
+      bool was_enqueued = false;
+      if (is_queue) {
+        try {
+          cuda::enqueue_steps(*world, n, nullptr);
+          was_enqueued = true;
+        } catch (const BackendUnavailable&) {  // the device has failed before
+        } catch (const DeviceError&) {         // it cannot report whether the stream is captured
+        }
+      }
+      for (std::uint32_t k = 0; k < n && !was_enqueued; ++k) world->step();
+      if (n == 2) retry([&] { world->remove(world->bodies()[20]); });
+    }
+  };
+  World host(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+  add_forces(&host);
+  run(&host, false);
+  long failing = 0;
+  for (bool was_reached = true; was_reached; ++failing) {
+    ASSERT_LT(failing, 2000);
+    World world(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    add_forces(&world);
+    WorldAccess::impl(world).device = make_device_world(scene);
+    cuda::inject_fault(failing, cudaErrorLaunchOutOfResources);
+    run(&world, true);
+    const StepReport report = cuda::finish_steps(world);
+    for (long n = 0; n <= failing; ++n) {
+      if (cuda::take_injected_fault() != cudaSuccess) was_reached = false;
+    }
+    cuda::inject_fault(-1, cudaSuccess);
+    ASSERT_EQ(world.steps(), host.steps()) << "call " << failing;
+    ASSERT_EQ(world.state_hash(), host.state_hash()) << "call " << failing;
+    if (was_reached) {
+      EXPECT_EQ(report.device_failure.empty(), WorldAccess::impl(world).device != nullptr);
+    }
   }
   EXPECT_GT(failing, 50);
 }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <vector>
@@ -109,6 +110,7 @@ class HostDevice {
       std::fill_n(reinterpret_cast<unsigned char*>(items_.data()), count * sizeof(T),
                   static_cast<unsigned char>(0xcd));
     }
+    void swap(Buffer& other) noexcept { items_.swap(other.items_); }
 
    private:
     std::vector<T> items_;
@@ -133,8 +135,12 @@ class HostDevice {
   void copy(T* to, const T* from, std::size_t count) {
     std::copy_n(from, count, to);
   }
+  void reserve_pairs(std::size_t, std::size_t) {}
   void find_pairs(const SphereInstance* spheres, std::size_t n, SpherePair* pairs,
                   std::size_t capacity, cuda::ContactCount* count) {
+    if (graph_ != nullptr) {
+      return graph_->work.push_back([=, this] { find_pairs(spheres, n, pairs, capacity, count); });
+    }
     *count = {};
     const ContactSpan found = collider_->find_contacts({spheres, n});
     count->contacts = found.size();
@@ -144,13 +150,43 @@ class HostDevice {
   }
   template <class Program>
   void run(const Program& program, std::size_t) {
-    program(team_);
+    if (runs_left_ >= 0 && runs_left_-- == 0) throw DeviceError("a program could not be started");
+    if (graph_ == nullptr) {
+      program(team_);
+    } else {
+      graph_->work.push_back([=, this] { program(team_); });
+    }
   }
   void wait() {}
+  void fork(cuda::Stream) {}
+  void join(cuda::Stream) {}
   void mark(int) {}
   double elapsed_ms(int from, int to) const { return to - from; }
 
+  /// Starts this number of programs, fails once, and then starts programs again.
+  void fail_after(int runs) { runs_left_ = runs; }
+
+  /// As a CUDA graph.
+  struct Graph {
+    std::vector<std::function<void()>> work;
+    void launch() const {
+      for (const auto& f : work) f();
+    }
+  };
+  /// While it is not null, work on any stream is captured.
+  void set_graph(Graph* graph) { captured_ = graph; }
+  bool is_capturing(cuda::Stream) const { return captured_ != nullptr; }
+  template <class Work>
+  void capture(cuda::Stream, const Work& work) {
+    graph_ = captured_;
+    work();
+    graph_ = nullptr;
+  }
+
  private:
+  int runs_left_ = -1;
+  Graph* captured_ = nullptr;
+  Graph* graph_ = nullptr;  ///< of the work in progress
   std::unique_ptr<SphereCollider> collider_ = make_sphere_collider({.backend = Backend::cpu});
   HostTeam team_;
 };

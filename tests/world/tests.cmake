@@ -16,7 +16,8 @@ jfpx_add_test(device_states_test INTERNAL
     world/automatic_device_test.cpp
     world/device_states_test.cpp
   LINK ${cuda_runtime})
-foreach(target IN ITEMS device_states_test device_states_test_f64)
+jfpx_add_test(device_queue_test INTERNAL SOURCES world/device_queue_test.cpp LINK ${cuda_runtime})
+foreach(target IN ITEMS device_states_test device_states_test_f64 device_queue_test device_queue_test_f64)
   if(TARGET ${target}) # not in shared libraries, nor in one precision
     target_compile_definitions(${target} PRIVATE JFPX_HAS_CUDA=$<BOOL:${JFPX_HAS_CUDA}>)
   endif()

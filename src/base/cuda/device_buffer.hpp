@@ -144,6 +144,7 @@ class DeviceBuffer {
     return array_.reserve_geometric(
         count, [&](std::size_t bytes) { return DeviceMemory(pool, stream, bytes, what); });
   }
+  void swap(DeviceBuffer& other) noexcept { array_.swap(other.array_); }
   T* data() const noexcept { return array_.data(); }
   std::size_t capacity() const noexcept { return array_.capacity(); }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -46,6 +47,10 @@ class GrowableArray {
   template <typename Allocate>
   bool reserve_geometric(std::size_t count, const Allocate& allocate) {
     return reserve(geometric_capacity(capacity_, count), allocate);
+  }
+  void swap(GrowableArray& other) noexcept {
+    std::swap(memory_, other.memory_);
+    std::swap(capacity_, other.capacity_);
   }
   T* data() const noexcept { return static_cast<T*>(memory_.data()); }
   std::size_t capacity() const noexcept { return capacity_; }

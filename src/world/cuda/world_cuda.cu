@@ -1,13 +1,15 @@
 /// The world on a CUDA device: launches of the programs of a step.
 #include "src/base/cuda/device_buffer.hpp"
 #include "src/base/cuda/device_code.hpp"
-#include "src/base/cuda/probe.hpp"
+#include "src/base/cuda/ordering_event.hpp"
+#include "src/sphere_collider/cuda/device_search.hpp"
 #include "src/world/cuda/grid_team.cuh"
 #include "src/world/cuda/world_cuda.hpp"
 #include "src/world/device/device_step.hpp"
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -23,12 +25,8 @@ __global__ void __launch_bounds__(GridTeam::kThreads, Program::kBlocksPerMultipr
 /// Launches of up to this number of blocks use one cluster. More than 8 are not portable, and all
 /// Hopper GPUs support 16.
 constexpr unsigned kClusterBlocks = 16;
-
-int usable_device(int device) {
-  const BackendStatus status = probe(device);
-  if (!status.usable) throw BackendUnavailable("cuda: " + status.reason);
-  return device;
-}
+/// Largest Program::kBlocksPerMultiprocessor.
+constexpr unsigned kMostBlocks = 6;
 
 /// The stream, the memory and the launches of a DeviceStep.
 class CudaDevice {
@@ -41,10 +39,15 @@ class CudaDevice {
         stream_(device_),
         pool_(device_),
         marks_{OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_)},
-        collider_(stream_.get(), device_) {
+        fork_(device_),
+        serial_(device_),
+        search_(stream_.get(), device_, SphereAlgorithm::automatic) {
     const DeviceGuard guard(device_);
     JFPX_CUDA_TRY(
         cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device_));
+    // Enough for every program, so that it never moves: captured graphs have its address.
+    const unsigned blocks = kMostBlocks * static_cast<unsigned>(multiprocessors_);
+    scratch_.reserve(pool_, stream_.get(), GridTeam::scratch_words(blocks), "scratch memory");
   }
 
   int number() const noexcept { return device_; }
@@ -69,10 +72,11 @@ class CudaDevice {
     transfer(to, from, count, cudaMemcpyDeviceToDevice);
   }
 
+  void reserve_pairs(std::size_t n, std::size_t capacity) { search_.reserve(n, capacity); }
   void find_pairs(const SphereInstance* spheres, std::size_t n, SpherePair* pairs,
                   std::size_t capacity, ContactCount* count) {
-    collider_.reserve(n, capacity);
-    collider_.find_pairs(spheres, n, pairs, capacity, count);
+    search_.find({.spheres = spheres, .n = static_cast<std::uint32_t>(n)},
+                 {.pairs = pairs, .capacity = capacity, .count = count}, target_);
   }
 
   template <class Program>
@@ -90,7 +94,6 @@ class CudaDevice {
       blocks = std::min(blocks, kClusterBlocks);
     }
     const bool is_cluster = limits.has_clusters && blocks > 1 && blocks <= kClusterBlocks;
-    scratch_.reserve(pool_, stream_.get(), GridTeam::scratch_words(blocks), "scratch memory");
     cudaLaunchAttribute attribute{};
     if (is_cluster) {
       attribute.id = cudaLaunchAttributeClusterDimension;
@@ -102,7 +105,7 @@ class CudaDevice {
     cudaLaunchConfig_t config{};
     config.gridDim = blocks;
     config.blockDim = GridTeam::kThreads;
-    config.stream = stream_.get();
+    config.stream = target_;
     config.attrs = &attribute;
     config.numAttrs = 1;
     JFPX_CUDA_TRY(
@@ -111,7 +114,40 @@ class CudaDevice {
 
   void wait() {
     const DeviceGuard guard(device_);
+    wait_for_graphs();
     JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get()));
+  }
+
+  void fork(Stream stream) {
+    const DeviceGuard guard(device_);
+    fork_.order(stream, stream_.get());
+    wait_for_graphs();
+  }
+  void join(Stream stream) {
+    const DeviceGuard guard(device_);
+    serial_.order(stream_.get(), stream);
+  }
+
+  bool is_capturing(Stream stream) const {
+    const DeviceGuard guard(device_);
+    cudaStreamCaptureStatus status = cudaStreamCaptureStatusNone;
+    JFPX_CUDA_TRY(cudaStreamIsCapturing(stream, &status));
+    return status != cudaStreamCaptureStatusNone;
+  }
+  /// The work is captured from the user's stream, not from that of the world, so that the world can
+  /// be used while the capture goes on.
+  template <class Work>
+  void capture(Stream stream, const Work& work) {
+    const DeviceGuard guard(device_);
+    if (!is_captured_) serial_.record(stream_.get());
+    is_captured_ = true;
+    struct Target {
+      ~Target() { *target = before; }
+      Stream *target, before;
+    } const target{&target_, std::exchange(target_, stream)};
+    serial_.wait_in_graph(stream);
+    work();
+    serial_.record_in_graph(stream);
   }
 
   void mark(int i) { JFPX_CUDA_TRY(cudaEventRecord(marks_[i].get(), stream_.get())); }
@@ -134,6 +170,7 @@ class CudaDevice {
 
   template <class Program>
   const Launch& limits_of() {
+    static_assert(Program::kBlocksPerMultiprocessor <= kMostBlocks);
     Launch& limits = std::get<Limits<Program>>(limits_);
     if (limits.most_blocks > 0) return limits;
     int resident = 0;
@@ -152,6 +189,11 @@ class CudaDevice {
   template <class Program>
   struct Limits : Launch {};
 
+  /// Later work of the world waits for the graphs that have been launched so far.
+  void wait_for_graphs() {
+    if (is_captured_) serial_.wait(stream_.get());
+  }
+
   template <class T>
   void transfer(T* to, const T* from, std::size_t count, cudaMemcpyKind kind) {
     if (count == 0) return;
@@ -161,9 +203,14 @@ class CudaDevice {
 
   int device_;
   OwnedStream stream_;
+  Stream target_ = stream_.get();  ///< of launches: `stream_`, or one that is being captured
   MemoryPool pool_;
   OwnedEvent marks_[device::kMarks];
-  DeviceSphereCollider collider_;
+  OrderingEvent fork_;
+  /// Recorded after enqueued steps, and by captured graphs, so that these follow each other.
+  OrderingEvent serial_;
+  bool is_captured_ = false;
+  DeviceSearch search_;
   DeviceBuffer<std::uint32_t> scratch_;
   int multiprocessors_ = 0;
   std::tuple<Limits<device::ForceProgram>, Limits<device::BoundsProgram>,

@@ -8,27 +8,31 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Ends the step: moves the bodies, clears forces, and puts islands to sleep. Has no effect if a
-/// body has run away.
+/// Ends the step: moves the bodies, clears forces, and puts islands to sleep. Has no effect, except
+/// that it counts the step, if the step cannot be completed or a body has run away.
 struct CommitProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = 3;
   StepData data;
 
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
-    if (data.has_failed() || data.counters->runaway != kNone) return;
     const StepData& d = data;
+    if (d.has_failed() || d.counters->runaway != kNone) {
+      team.once([&] { ++d.counters->progress.missing; });
+      return;
+    }
     const BodyView& bodies = d.step.bodies;
+    const soft_step::ContactView contacts = d.contacts();  // before complete() changes the parity
+    Vec3* const position_before = d.now().position_before;
     team.for_each(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
-      d.position_before[body] = bodies.position[body];
+      position_before[body] = bodies.position[body];
       if (d.step.store(body)) d.counters->any_rests = 1;
     });
     if (d.counters->any_rests != 0) put_islands_to_sleep(team);
     team.count(
         bodies.count, [&](std::uint32_t i) { return bodies.is_active(bodies.ids[i].index); },
         &d.counters->awake);
-    const soft_step::ContactView contacts = d.contacts();
     team.count(
         contacts.sphere_count, [&](std::uint32_t i) { return soft_step::has_touched(contacts, i); },
         &d.counters->touching_spheres);
@@ -36,10 +40,18 @@ struct CommitProgram {
       const std::uint32_t met = soft_step::count_met(contacts, contacts.sphere_count + m);
       if (met > 0) atomic_add(&d.counters->met_points, met);
     });
-    team.once([&] { d.counters->completed = d.number; });
+    team.once([&] { complete(); });
   }
 
  private:
+  JFPX_HD void complete() const {
+    const Counters& c = *data.counters;
+    Progress& progress = data.counters->progress;
+    progress.contacts[progress.completed & 1] = {c.spheres, c.manifolds, c.points, c.touches};
+    progress.started = 0;
+    ++progress.completed;
+  }
+
   template <class Team>
   JFPX_HD void put_islands_to_sleep(const Team& team) const {
     const StepData& d = data;

@@ -9,7 +9,6 @@
 #include "src/world/device/transfer.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <tuple>
 #include <vector>
@@ -26,8 +25,7 @@ class ContactBuffers {
   /// @param room number of slots of bodies to reserve memory for
   void upload(const Transfer<Device>& transfer, const soft_step::ContactView& from,
               std::size_t room) {
-    counts_ = {from.sphere_count, from.manifold_count, from.point_count};
-    touch_count_ = 0;
+    sizes_ = {from.sphere_count, from.manifold_count, from.point_count, 0};
     transfer.put(&spheres_, from.spheres, from.sphere_count);
     transfer.put(&manifolds_, from.manifolds, from.manifold_count);
     transfer.put(&points_, from.points, from.point_count);
@@ -41,46 +39,42 @@ class ContactBuffers {
     put_ranges(transfer, &manifolds_of_, from.manifolds, from.manifold_count, room);
   }
 
-  /// Makes room for the contacts that a step finds. @param room number of slots of bodies
-  void reserve(const Transfer<Device>& transfer, const Capacity& capacity, std::size_t room,
-               StepData* data) {
+  /// Makes room for the contacts that a step finds, and keeps those of an earlier step.
+  /// @param room number of slots of bodies, as in the last upload
+  void reserve(const Transfer<Device>& transfer, const Capacity& capacity, std::size_t room) {
     const std::size_t contacts = std::size_t{capacity.spheres} + capacity.candidates;
-    slots_ = data->step.bodies.capacity;
-    transfer.room(&spheres_, capacity.spheres);
-    transfer.room(&manifolds_, capacity.candidates);
-    transfer.room(&points_, capacity.points);
-    transfer.room(&impulses_, std::size_t{capacity.spheres} + capacity.points);
-    transfer.room(&rolling_impulses_, contacts);
-    transfer.room(&colors_, contacts);
+    const std::size_t kept = std::size_t{sizes_.spheres} + sizes_.manifolds;
+    grow(transfer, &spheres_, capacity.spheres, sizes_.spheres);
+    grow(transfer, &manifolds_, capacity.candidates, sizes_.manifolds);
+    grow(transfer, &points_, capacity.points, sizes_.points);
+    grow(transfer, &impulses_, std::size_t{capacity.spheres} + capacity.points,
+         std::size_t{sizes_.spheres} + sizes_.points);
+    grow(transfer, &rolling_impulses_, contacts, kept);
+    grow(transfer, &colors_, contacts, kept);
+    grow(transfer, &touches_, capacity.touches, sizes_.touches);
     transfer.room(&spheres_of_, room);
     transfer.room(&manifolds_of_, room);
-    data->now = view();
-    data->touches = transfer.room(&touches_, capacity.touches);
-    data->position_before = transfer.room(&position_before_, room);
+    transfer.room(&position_before_, room);
   }
-
-  /// A complete step has found these numbers of contacts.
-  void complete(const Counters& counters) {
-    counts_ = {counters.spheres, counters.manifolds, counters.points};
-    touch_count_ = counters.touches;
+  /// A complete step has found these numbers of contacts. @param slots of bodies in the step
+  void complete(const ContactSizes& sizes, std::size_t slots) {
+    sizes_ = sizes;
+    slots_ = slots;
   }
 
   DeviceContacts view() const {
-    DeviceContacts result{{spheres_.data(), manifolds_.data(), points_.data(), impulses_.data(),
-                           rolling_impulses_.data(), colors_.data(), 0, 0, 0},
-                          spheres_of_.data(),
-                          manifolds_of_.data(),
-                          {}};
-    std::ranges::copy(counts_, result.counts);
-    return result;
+    return {{spheres_.data(), manifolds_.data(), points_.data(), impulses_.data(),
+             rolling_impulses_.data(), colors_.data(), 0, 0, 0},
+            spheres_of_.data(),
+            manifolds_of_.data(),
+            touches_.data(),
+            position_before_.data()};
   }
-  std::size_t sphere_count() const { return counts_[0]; }
-  std::size_t manifold_count() const { return counts_[1]; }
+  const ContactSizes& sizes() const { return sizes_; }
   Touch* touches() const { return touches_.data(); }
-  std::uint32_t touch_count() const { return touch_count_; }
 
   void fetch(const Transfer<Device>& transfer, soft_step::ContactSet* to) const {
-    const auto [spheres, manifolds, points] = counts_;
+    const auto [spheres, manifolds, points, touches] = sizes_;
     to->spheres.resize(spheres);
     to->manifolds.resize(manifolds);
     to->points.resize(points);
@@ -99,7 +93,7 @@ class ContactBuffers {
   /// What detection leaves on the host, for ContactListMaker.
   void fetch_detected(const Transfer<Device>& transfer, const BodiesOfStep& bodies,
                       DetectedContacts* detected) const {
-    std::vector<Touch> touches(touch_count_);
+    std::vector<Touch> touches(sizes_.touches);
     detected->position.resize(slots_);
     transfer.get(&touches, touches_);
     transfer.get(&detected->position, position_before_);
@@ -119,6 +113,17 @@ class ContactBuffers {
  private:
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
+
+  /// Makes the capacity of an array at least `count`, and keeps its first items.
+  template <class T>
+  static void grow(const Transfer<Device>& transfer, Buffer<T>* array, std::size_t count,
+                   std::size_t kept) {
+    if (count <= array->capacity() && array->capacity() > 0) return;
+    Buffer<T> larger;
+    T* const to = transfer.room(&larger, count);
+    transfer.copy(to, array->data(), kept);
+    array->swap(larger);
+  }
 
   /// By body a: its range of a list that is sorted by it.
   template <class C>
@@ -141,10 +146,9 @@ class ContactBuffers {
   Buffer<Vec3> rolling_impulses_;
   Buffer<std::uint8_t> colors_;
   Buffer<Range> spheres_of_, manifolds_of_;
-  std::array<std::uint32_t, 3> counts_{};  ///< of spheres, manifolds and points
   Buffer<Touch> touches_;
-  std::uint32_t touch_count_ = 0;
   Buffer<Vec3> position_before_;
+  ContactSizes sizes_;
   std::size_t slots_ = 0;  ///< of bodies in the step
 };
 

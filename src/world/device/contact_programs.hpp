@@ -20,6 +20,7 @@ struct BoundsProgram {
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
     const StepData& d = data;
+    if (d.is_skipped()) return;
     const BodyView& bodies = d.step.bodies;
     if (!is_started) start_counters(team, d);
     team.for_each(bodies.capacity, [&](std::uint32_t i) { start(i); });
@@ -44,7 +45,7 @@ struct BoundsProgram {
     d.first_order[body] = ~std::uint64_t{0};
     d.first_contact[body] = kNone;
     d.near_flag[body] = 0;
-    d.now.spheres_of[body] = {};
+    d.now().spheres_of[body] = {};
   }
 };
 
@@ -56,6 +57,7 @@ struct SphereProgram {
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
     const StepData& d = data;
+    if (d.has_failed()) return;
     if (d.pair_count->first_invalid != cuda::kNoSphere) {
       team.once([&] { d.counters->invalid_bounds = 1; });
       return;
@@ -82,7 +84,7 @@ struct SphereProgram {
           const std::uint32_t *bodies = d.near.sub_shapes.bodies, a = bodies[d.pairs[i].a],
                               b = bodies[d.pairs[i].b];
           const NormalDistance result = d.pair_results[i];
-          d.now.view.spheres[place] = {{a, b, 0, 0}, result.normal, result.distance};
+          d.now().view.spheres[place] = {{a, b, 0, 0}, result.normal, result.distance};
         });
     team.once([&] {
       Counters& c = *d.counters;
@@ -145,7 +147,7 @@ struct ShapeProgram {
     if (data.has_failed()) return;
     const StepData& d = data;
     if (d.counters->candidates == 0) {
-      team.spread(d.step.bodies.capacity, [&](std::uint32_t i) { d.now.manifolds_of[i] = {}; });
+      team.spread(d.step.bodies.capacity, [&](std::uint32_t i) { d.now().manifolds_of[i] = {}; });
       return;
     }
     team.for_each(d.counters->candidates, [&](std::uint32_t i) { test(i); });
@@ -182,15 +184,16 @@ struct ShapeProgram {
                             sub_shapes.is_sphere(pair.sub_shape_b);
     const std::uint32_t first = atomic_add(&d.counters->touches, near.touch_count);
     if (of_spheres) atomic_add(&d.counters->sphere_touches, near.touch_count);
+    Touch* const touches = d.now().touches;
     for (std::uint32_t k = 0; k < near.touch_count; ++k) {
       if (first + k >= d.capacity.touches) return;
-      d.touches[first + k] = {pair,
-                              k,
-                              static_cast<std::uint16_t>(of_spheres ? 1 : 0),
-                              0,
-                              near.normal,
-                              near.touches[k].point,
-                              near.touches[k].distance};
+      touches[first + k] = {pair,
+                            k,
+                            static_cast<std::uint16_t>(of_spheres ? 1 : 0),
+                            0,
+                            near.normal,
+                            near.touches[k].point,
+                            near.touches[k].distance};
     }
   }
 
@@ -199,7 +202,7 @@ struct ShapeProgram {
     const StepData& d = data;
     auto manifold = static_cast<std::uint32_t>(sizes >> 32);
     auto point = static_cast<std::uint32_t>(sizes);
-    Range& range = d.now.manifolds_of[body];
+    Range& range = d.now().manifolds_of[body];
     range.begin = manifold;
     const std::uint32_t first =
         sort_list(d.first_candidate[body], d.next_candidate, [&](std::uint32_t x, std::uint32_t y) {
@@ -210,12 +213,12 @@ struct ShapeProgram {
         });
     for (std::uint32_t i = first; i != kNone; i = d.next_candidate[i]) {
       const NearPair& near = d.tested[i];
-      d.now.view.manifolds[manifold++] = {near.key, near.normal, point, near.point_count, 0, 0};
+      d.now().view.manifolds[manifold++] = {near.key, near.normal, point, near.point_count, 0, 0};
       for (std::uint32_t k = 0; k < near.point_count; ++k, ++point) {
         if (point >= d.capacity.points) continue;
         // Members, because the padding of a point is not initialized.
         const soft_step::PointInput& p = near.points[k];
-        d.now.view.points[point] = {p.arm_a, p.arm_b, p.distance, p.feature};
+        d.now().view.points[point] = {p.arm_a, p.arm_b, p.distance, p.feature};
       }
     }
     range.end = manifold;

@@ -33,16 +33,21 @@ inline constexpr int kMarks = 4;
 ///   - `Buffer<T>`: array in the memory of the device; data(), capacity();
 ///   - `reserve(&buffer, count, what)`: makes the capacity at least `count`, discards the contents;
 ///   - `upload(to, from, count)`, `download(to, from, count)`, `copy(to, from, count)`;
-///   - `find_pairs(spheres, n, pairs, capacity, count)`: as cuda::DeviceSphereCollider;
+///   - `find_pairs(spheres, n, pairs, capacity, count)`: as cuda::DeviceSphereCollider, after
+///     `reserve_pairs(n, capacity)`;
 ///   - `run(program, items)`: runs program(team) with about one thread per item;
-///   - `wait()`: until all work is complete;
+///   - `wait()`: until all work is complete, also that of captured graphs;
+///   - `fork(stream)`, `join(stream)`: later work of this object waits for earlier work of another
+///     stream, and the other way round;
+///   - `is_capturing(stream)`: whether it is being captured; `capture(stream, work)`: calls work(),
+///     whose programs and searches become part of the graph;
 ///   - `mark(i)`: marks a point of the work, i < kMarks; `elapsed_ms(i, j)`: the time between two
 ///     points, once all work is complete.
 template <class Device>
 class DeviceStep final : public DeviceWorld {
  public:
   DeviceStep(const Scene& scene, std::unique_ptr<Device> device)
-      : device_(std::move(device)), transfer_(device_.get()) {
+      : device_(std::move(device)), transfer_(device_.get()), edit_transfer_(device_.get()) {
     configure(scene);
   }
 
@@ -64,8 +69,15 @@ class DeviceStep final : public DeviceWorld {
     current_sub_shapes().upload(transfer_, sub_shapes->view(), sub_shapes->part_count());
     use_sub_shapes();
     most_parts_ = 2 * sub_shapes->part_count() + 4096;
+    known_ = sent_ = {};
     last_contacts().upload(transfer_, last->view(), room_);
+    known_.contacts[1 - now()] = last_contacts().sizes();
+    Counters counters;
+    counters.progress = known_;
+    device_->upload(data_.counters, &counters, 1);
     forces_.clear();
+    has_stepped_ = is_ready_ = false;
+    ++changes_;
     device_->wait();
   }
 
@@ -105,52 +117,108 @@ class DeviceStep final : public DeviceWorld {
         masses.push_back({i, from.inverse_mass[i], from.body_inverse_inertia[i], from.tensor[i]});
       }
     }
-    data_.step.bodies.capacity = from.capacity;
-    data_.step.bodies.filters_in_use = from.filters_in_use;
-    if (sets_pairs) bodies_.update_pairs(transfer_, from, &data_.step.bodies);
+    BodyView& to = data_.step.bodies;
+    if (to.filters_in_use != from.filters_in_use || to.ignored_count != from.ignored_count) {
+      ++changes_;
+    }
+    to.capacity = from.capacity;
+    to.filters_in_use = from.filters_in_use;
+    if (sets_pairs) bodies_.update_pairs(transfer_, from, &to);
     const Contacts& last = last_contacts();
-    data_.last = last.view();
+    const std::size_t spheres = last.sizes().spheres;
+    use_contacts();
+    is_ready_ = false;  // until prepare() has waited for the edits
     device_->run(
-        EditProgram{data_, bodies_.properties(), transfer_.put(&edits_, edited),
-                    static_cast<std::uint32_t>(edited.size()), transfer_.put(&masses_, masses),
-                    static_cast<std::uint32_t>(masses.size()), transfer_.put(&replaced_, replaced),
+        EditProgram{data_, bodies_.properties(), edit_transfer_.put(&edits_, edited),
+                    static_cast<std::uint32_t>(edited.size()), edit_transfer_.put(&masses_, masses),
+                    static_cast<std::uint32_t>(masses.size()),
+                    edit_transfer_.put(&replaced_, replaced),
                     static_cast<std::uint32_t>(replaced.size()), visits_contacts, last.touches(),
-                    last.touch_count()},
-        visits_contacts ? std::max(last.sphere_count(), edited.size()) : edited.size());
+                    last.sizes().touches},
+        visits_contacts ? std::max(spheres, edited.size()) : edited.size());
     if (!changed.empty()) merge(bodies, changed, &added);
   }
 
-  Result step(const ForceTable* forces, double time) override {
-    select_forces(forces, time);
-    ++data_.number;
+  Result step(const ForceTable* forces, std::uint64_t steps) override {
+    const std::uint64_t before = known_.completed;
+    select_forces(forces);
+    release(steps);
     const Counters counters = run_until_complete();
     Result result;
-    result.must_wake = counters.must_wake != 0;
-    if (result.must_wake) return result;
-    result.invalid_bounds = counters.invalid_bounds != 0;
-    if (counters.runaway != kNone) result.runaway = counters.runaway;
-    if (result.invalid_bounds || result.runaway) {
-      bodies_.restore(transfer_, data_);
-      device_->wait();
+    if (known_.completed == before) {
+      result.must_wake = counters.must_wake != 0;
+      result.invalid_bounds = counters.invalid_bounds != 0;
+      if (counters.runaway != kNone) result.runaway = counters.runaway;
       return result;
     }
-    contacts_[now_].complete(counters);
-    now_ = 1 - now_;
+    result = result_of(counters);
     if (forces != nullptr) result.forces_ms = device_->elapsed_ms(0, 1);
     result.detect_ms = device_->elapsed_ms(1, 2);
     result.resolve_ms = device_->elapsed_ms(2, 3);
-    result.awake = counters.awake;
-    result.contacts =
-        std::uint64_t{counters.touching_spheres} + counters.touches + counters.met_points;
-    result.sphere_contacts = std::uint64_t{counters.touching_spheres} + counters.sphere_touches;
+    return result;
+  }
+
+  void prepare(const ForceTable* forces, std::uint64_t steps) override {
+    if (is_prepared(forces, steps)) return;
+    select_forces(forces);
+    release(steps);
+    make_room();
+    device_->wait();
+  }
+
+  void enqueue(const ForceTable* forces, std::uint64_t steps, cuda::Stream stream,
+               std::uint64_t* left) override {
+    select_forces(forces);
+    release(steps);
+    for (; *left > 0; --*left) run_programs(false);
+    device_->join(stream);
+  }
+
+  bool is_capturing(cuda::Stream stream) override { return device_->is_capturing(stream); }
+
+  bool capture(const ForceTable* forces, std::uint64_t steps, std::uint32_t count,
+               cuda::Stream stream) override {
+    if (!has_stepped_ || !is_prepared(forces, steps)) return false;
+    select_forces(forces);
+    device_->capture(stream, [&] {
+      for (std::uint32_t n = 0; n < count; ++n) run_programs(false);
+    });
+    return true;
+  }
+
+  void hold() override {
+    sent_.held = 1;
+    device_->upload(&data_.counters->progress.held, &sent_.held, 1);
+    device_->wait();
+  }
+  bool is_held() const noexcept override { return sent_.held != 0; }
+
+  void wait_for(cuda::Stream stream) override { device_->fork(stream); }
+
+  Finished finish() override {
+    const Counters found = counters();
+    const Progress& progress = found.progress;
+    if (progress.missing > 0) missing_ = progress.missing;  // or a failed call has found them
+    if (progress.missing > 0 || progress.started != 0) restore(progress);
+    Finished result{progress.completed - known_.completed, missing_, result_of(found)};
+    note(progress);
+    missing_ = 0;
     return result;
   }
 
   cuda::DeviceStates states() const noexcept override {
     const BodyView& bodies = data_.step.bodies;
-    return {device_->number(),  device_->stream(), bodies.capacity,
-            bodies.count,       bodies.ids,        bodies.position,
-            bodies.orientation, bodies.velocity,   bodies.angular_velocity};
+    return {device_->number(),
+            device_->stream(),
+            bodies.capacity,
+            bodies.count,
+            bodies.ids,
+            bodies.position,
+            bodies.orientation,
+            bodies.velocity,
+            bodies.angular_velocity,
+            &data_.counters->progress.missing,
+            transfer_.moves() + changes_};
   }
 
   Vec3 fetch_position(std::uint32_t body) override {
@@ -171,7 +239,7 @@ class DeviceStep final : public DeviceWorld {
 
   void fetch_contacts(const BodiesOfStep& bodies, bool of_step_before, soft_step::ContactSet* set,
                       DetectedContacts* detected) override {
-    const Contacts& from = of_step_before ? contacts_[now_] : last_contacts();
+    const Contacts& from = of_step_before ? contacts_[now()] : last_contacts();
     from.fetch(transfer_, set);
     from.fetch_detected(transfer_, bodies, detected);
   }
@@ -188,6 +256,7 @@ class DeviceStep final : public DeviceWorld {
   void use_sub_shapes() {
     data_.near.sub_shapes = current_sub_shapes().view();
     scratch_.reserve_sub_shapes(transfer_, current_sub_shapes().counts().bounded(), &data_);
+    is_ready_ = false;
   }
 
   /// Updates the ids and the sub-shapes. Waits.
@@ -198,13 +267,13 @@ class DeviceStep final : public DeviceWorld {
     std::ranges::sort(*added, {}, &BodyId::index);
     SubShapeTable table;
     table.set_bodies(bodies, *added);
-    added_shapes_.upload(transfer_, table.view(), table.part_count());
+    added_shapes_.upload(edit_transfer_, table.view(), table.part_count());
     SubShapes &before = current_sub_shapes(), &after = sub_shapes_[1 - sub_shapes_now_];
-    SubShapeCounts* kept = transfer_.room(&kept_shapes_, 1);
+    SubShapeCounts* kept = edit_transfer_.room(&kept_shapes_, 1);
     device_->run(MergeProgram{.data = data_,
-                              .changed = transfer_.put(&changed_, changed),
+                              .changed = edit_transfer_.put(&changed_, changed),
                               .changed_count = static_cast<std::uint32_t>(changed.size()),
-                              .added_ids = transfer_.put(&added_ids_, *added),
+                              .added_ids = edit_transfer_.put(&added_ids_, *added),
                               .added_id_count = static_cast<std::uint32_t>(added->size()),
                               .to_ids = bodies_.other_ids(transfer_, bodies.size()),
                               .added = added_shapes_.view(),
@@ -218,30 +287,55 @@ class DeviceStep final : public DeviceWorld {
     device_->wait();
     after.complete(counts + added_shapes_.counts());
     sub_shapes_now_ = 1 - sub_shapes_now_;
+    ++changes_;
     use_sub_shapes();
     bodies_.swap_ids(bodies.size(), &data_.step.bodies);
   }
 
-  /// Between two steps, contacts_[now_] are those of the step before the last.
-  Contacts& last_contacts() { return contacts_[1 - now_]; }
+  /// Between two steps, contacts_[now()] are those of the step before the last.
+  std::uint64_t now() const { return known_.completed & 1; }
+  Contacts& last_contacts() { return contacts_[1 - now()]; }
+  void use_contacts() {
+    for (int i = 0; i < 2; ++i) data_.contacts_of[i] = contacts_[i].view();
+  }
 
   /// Selects what acts in a step, apart from accumulated forces. @param table null: nothing
-  void select_forces(const ForceTable* table, double time) {
+  void select_forces(const ForceTable* table) {
     BodyView& bodies = data_.step.bodies;
     bodies.force = bodies_.force();
     bodies.torque = bodies_.torque();
     force_sum_ = torque_sum_ = nullptr;
     if (table == nullptr) return;
-    forces_.upload(transfer_, *table);
-    time_ = time;
+    if (forces_.upload(transfer_, *table)) ++changes_;
     force_sum_ = forces_.force_sums(transfer_, bodies.capacity);
     torque_sum_ = forces_.torque_sums(transfer_, bodies.capacity);
     bodies.force = force_sum_;
     bodies.torque = torque_sum_;
   }
 
+  /// Whether prepare() has nothing to do.
+  bool is_prepared(const ForceTable* forces, std::uint64_t steps) const {
+    return is_ready_ && !is_held() && offset(steps) == sent_.offset &&
+           (forces == nullptr || forces_.has(*forces));
+  }
+
+  /// Progress::offset
+  std::uint64_t offset(std::uint64_t steps) const { return steps - known_.completed; }
+
+  /// Sends what the host knows of the progress, so that steps may have effects.
+  void release(std::uint64_t steps) {
+    const auto send = [this](auto Progress::*field, auto value) {
+      if (sent_.*field == value) return;
+      source_.*field = value;
+      device_->upload(&(data_.counters->progress.*field), &(source_.*field), 1);
+      sent_.*field = value;
+    };
+    send(&Progress::offset, offset(steps));
+    send(&Progress::held, 0u);
+  }
+
   /// Grows the lists that were too short, and some more.
-  void make_room(const Capacity& needed) {
+  void grow_lists(const Capacity& needed) {
     const auto grow = [](auto* capacity, auto count) {
       if (count > *capacity) *capacity = count + count / 4 + 64;
     };
@@ -250,36 +344,50 @@ class DeviceStep final : public DeviceWorld {
     grow(&capacity_.candidates, needed.candidates);
     grow(&capacity_.points, needed.points);
     grow(&capacity_.touches, needed.touches);
+    is_ready_ = false;
+    ++changes_;
   }
 
-  void run_programs() {
+  /// Makes room for a step, which then allocates nothing.
+  void make_room() {
+    if (is_ready_) return;
     data_.capacity = capacity_;
     scratch_.reserve_lists(transfer_, capacity_, &data_);
-    contacts_[now_].reserve(transfer_, capacity_, room_, &data_);
-    const Contacts& last = last_contacts();
-    data_.last = last.view();
+    for (Contacts& contacts : contacts_) contacts.reserve(transfer_, capacity_, room_);
+    use_contacts();
+    device_->reserve_pairs(data_.near.sub_shapes.fixed_begin, capacity_.pairs);
+    is_ready_ = true;
+  }
+
+  /// @param is_timed whether to mark the stages
+  void run_programs(bool is_timed) {
+    make_room();
+    const ContactSizes& last = last_contacts().sizes();
     data_.near.bodies = data_.step.bodies;
     const StepData& d = data_;
     const std::size_t bodies = d.step.bodies.count;
     const std::size_t sub_shapes = d.near.sub_shapes.bounded_count;
-    const std::size_t contacts = std::max({bodies, last.sphere_count(), last.manifold_count()});
+    const std::size_t contacts = std::max<std::size_t>({bodies, last.spheres, last.manifolds});
+    const auto mark = [&](int i) {
+      if (is_timed) device_->mark(i);
+    };
     const bool forces_act = force_sum_ != nullptr;
     if (forces_act) {
-      device_->mark(0);
-      device_->run(ForceProgram{d, forces_.view(), time_, force_sum_, torque_sum_}, bodies);
+      mark(0);
+      device_->run(ForceProgram{d, forces_.view(), force_sum_, torque_sum_}, bodies);
     }
-    device_->mark(1);
+    mark(1);
     device_->run(BoundsProgram{d, forces_act}, std::max(bodies, sub_shapes));
     device_->find_pairs(d.near.swept, d.near.sub_shapes.fixed_begin, d.pairs, capacity_.pairs,
                         d.pair_count);
     device_->run(SphereProgram{d}, contacts);
     device_->run(ShapeProgram{d}, contacts);
     device_->run(MatchProgram{d}, contacts);
-    device_->mark(2);
+    mark(2);
     device_->run(PrepareProgram{d}, contacts);
     device_->run(SolveProgram{d}, contacts);
     device_->run(CommitProgram{d}, contacts);
-    device_->mark(3);
+    mark(3);
   }
 
   Counters counters() {
@@ -289,41 +397,77 @@ class DeviceStep final : public DeviceWorld {
     return result;
   }
 
-  /// Runs the programs, again with more room if a list was too short. If the device fails, restores
-  /// the state, unless the step was already complete.
+  /// Undoes what a step that is not complete has changed.
+  void restore(const Progress& progress) {
+    if (progress.started != 0) bodies_.restore(transfer_, data_);
+    source_ = progress;
+    source_.started = 0;
+    source_.missing = 0;
+    device_->upload(&data_.counters->progress, &source_, 1);
+    device_->wait();
+  }
+
+  /// Steps have been completed.
+  void note(const Progress& progress) {
+    for (; known_.completed < progress.completed; ++known_.completed) {
+      if (known_.completed + 2 < progress.completed) continue;
+      contacts_[now()].complete(progress.contacts[now()], data_.step.bodies.capacity);
+      has_stepped_ = true;
+    }
+  }
+
+  static Result result_of(const Counters& counters) {
+    Result result;
+    result.awake = counters.awake;
+    result.contacts =
+        std::uint64_t{counters.touching_spheres} + counters.touches + counters.met_points;
+    result.sphere_contacts = std::uint64_t{counters.touching_spheres} + counters.sphere_touches;
+    return result;
+  }
+
+  /// Runs the programs, again with more room if a list was too short. If the device fails, or the
+  /// step has no effect for another reason, restores the state.
   Counters run_until_complete() {
     for (;;) {
       try {
-        run_programs();
+        run_programs(true);
         const Counters result = counters();
-        if (result.failed == 0) return result;
-        bodies_.restore(transfer_, data_);
-        if (result.must_wake != 0) return result;
-        make_room(result.needed);
+        if (result.progress.completed == known_.completed) restore(result.progress);
+        note(result.progress);
+        if (result.failed == 0 || result.must_wake != 0) return result;
+        grow_lists(result.needed);
       } catch (...) {
         device_->wait();
         const Counters result = counters();
-        if (result.completed == data_.number) return result;
-        if (result.started == data_.number) bodies_.restore(transfer_, data_);
-        device_->wait();
-        throw;
+        if (result.progress.completed == known_.completed) {
+          restore(result.progress);
+          throw;
+        }
+        note(result.progress);
+        return result;
       }
     }
   }
 
   std::unique_ptr<Device> device_;
-  Transfer<Device> transfer_;
+  Transfer<Device> transfer_, edit_transfer_;
   StepData data_;
   Capacity capacity_;
   BodyBuffers<Device> bodies_;
   SubShapes sub_shapes_[2], added_shapes_;
   int sub_shapes_now_ = 0;  ///< which of the two are those of the bodies
   ForceBuffers<Device> forces_;
-  Contacts contacts_[2];
-  int now_ = 0;  ///< the contacts of the step in progress; the others are those of the last step
+  Contacts contacts_[2];  ///< as Progress::contacts
   ScratchBuffers<Device> scratch_;
   std::size_t room_ = 0;        ///< number of slots that the buffers of bodies have memory for
   std::size_t most_parts_ = 0;  ///< of compounds, with those that were removed
+  Progress known_;              ///< of the steps that the host has waited for
+  Progress sent_;               ///< Progress::offset and held, as the device has them
+  Progress source_;             ///< of copies to the device
+  std::uint64_t missing_ = 0;   ///< for finish(), if a call of it fails
+  std::uint64_t changes_ = 0;   ///< of arguments of the programs, apart from addresses
+  bool has_stepped_ = false;    ///< whether a step was completed since the upload
+  bool is_ready_ = false;       ///< whether all lists have the room of capacity_
   // Of edit().
   Buffer<EditedBody> edits_;
   Buffer<EditedMass> masses_;
@@ -332,7 +476,6 @@ class DeviceStep final : public DeviceWorld {
   Buffer<BodyId> added_ids_;
   Buffer<SubShapeCounts> kept_shapes_;
   // Of the step in progress.
-  double time_ = 0;
   Vec3 *force_sum_ = nullptr, *torque_sum_ = nullptr;  ///< null if no force of the table acts
 };
 

@@ -126,7 +126,7 @@ struct EditProgram {
   JFPX_HD void replace(const SlotValues& values) const {
     values.store(data.step.motion, properties);
     if (values.has_no_contacts) {
-      data.last.spheres_of[values.body] = data.last.manifolds_of[values.body] = {};
+      data.last().spheres_of[values.body] = data.last().manifolds_of[values.body] = {};
     }
   }
 };

@@ -17,13 +17,20 @@ namespace device {
 template <class Device>
 class ForceBuffers {
  public:
-  /// Uploads what has changed since the last call.
-  void upload(const Transfer<Device>& transfer, const ForceTable& table) {
+  /// Uploads what has changed since the last call. @returns whether the lists have changed
+  bool upload(const Transfer<Device>& transfer, const ForceTable& table) {
     const ForceView from = table.view();
+    const bool has_new_lists = lists_version_ != table.lists_version();
     if (parameters_version_ != table.parameters_version()) put_parameters(transfer, from);
-    if (lists_version_ != table.lists_version()) put_lists(transfer, from);
+    if (has_new_lists) put_lists(transfer, from);
     parameters_version_ = table.parameters_version();
     lists_version_ = table.lists_version();
+    return has_new_lists;
+  }
+  /// Whether upload() would do nothing.
+  bool has(const ForceTable& table) const {
+    return parameters_version_ == table.parameters_version() &&
+           lists_version_ == table.lists_version();
   }
   /// The next upload() copies everything.
   void clear() { parameters_version_ = lists_version_ = 0; }

@@ -81,18 +81,22 @@ struct ForceProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = 2;
   StepData data;
   ForceView forces;
-  double time = 0;                                   ///< [s], start of the step
   Vec3 *force_sum = nullptr, *torque_sum = nullptr;  ///< by body
 
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
+    if (data.is_skipped()) return;
     start_counters(team, data);
     team.for_each(data.step.bodies.capacity, [&](std::uint32_t i) { save(data, i); });
-    team.spread(data.step.bodies.capacity, [&](std::uint32_t i) { add_forces(i); });
+    const Progress& progress = data.counters->progress;
+    const double time = static_cast<double>(progress.offset + progress.completed) *
+                        static_cast<double>(data.step.bodies.dt);  // as World::time()
+    team.spread(data.step.bodies.capacity, [&](std::uint32_t i) { add_forces(i, time); });
   }
 
  private:
-  JFPX_HD void add_forces(std::uint32_t i) const {
+  /// @param time [s], start of the step
+  JFPX_HD void add_forces(std::uint32_t i, double time) const {
     ForcedBody body(data, forces, i);
     const bool is_awake = body.is_awake();
     if (is_awake || forces.array<Explosion>().count > 0) {

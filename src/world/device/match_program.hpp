@@ -78,11 +78,11 @@ struct MatchProgram {
     const StepData& d = data;
     const soft_step::ContactView now = d.contacts(), last = d.last_contacts();
     const soft_step::ContactKey& key = now.spheres[i].key;
-    if (i == 0 || now.spheres[i - 1].key.a != key.a) d.now.spheres_of[key.a].begin = i;
+    if (i == 0 || now.spheres[i - 1].key.a != key.a) d.now().spheres_of[key.a].begin = i;
     if (i + 1 == now.sphere_count || now.spheres[i + 1].key.a != key.a) {
-      d.now.spheres_of[key.a].end = i + 1;
+      d.now().spheres_of[key.a].end = i + 1;
     }
-    const std::uint32_t before = find(last.spheres, d.last.spheres_of[key.a], key);
+    const std::uint32_t before = find(last.spheres, d.last().spheres_of[key.a], key);
     if (before == kNone || is_of_removed_body(last, before)) {
       now.impulses[i] = {};
       now.rolling_impulses[i] = {};
@@ -101,7 +101,7 @@ struct MatchProgram {
       now.impulses[now.sphere_count + contact.first + p] = {};
     }
     const std::uint32_t before =
-        find(last.manifolds, data.last.manifolds_of[contact.key.a], contact.key);
+        find(last.manifolds, data.last().manifolds_of[contact.key.a], contact.key);
     if (before == kNone || is_of_removed_body(last, last.sphere_count + before)) {
       now.rolling_impulses[i] = {};
       return false;

@@ -7,12 +7,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Resets the counters, without a barrier.
+/// Resets the counters of the step before, without a barrier.
 template <class Team>
 JFPX_HD void start_counters(const Team& team, const StepData& data) {
   team.once([&] {
-    *data.counters = Counters{};
-    data.counters->started = data.number;
+    static_cast<StepCounters&>(*data.counters) = {};
+    data.counters->progress.started = 1;
   });
 }
 

@@ -33,11 +33,25 @@ struct Capacity {
   std::uint32_t touches = 0;     ///< points of World::contacts(), except contacts of two spheres
 };
 
+/// Sizes of the contact set of a step, and of its list of touches.
+struct ContactSizes {
+  std::uint32_t spheres = 0, manifolds = 0, points = 0, touches = 0;
+};
+
+/// What steps leave to later ones and to the host, which may have enqueued many of them. A step
+/// that cannot be completed, and all later ones, have no effect until the host repeats them.
+struct Progress {
+  std::uint64_t completed = 0;  ///< number of complete steps since the upload
+  std::uint64_t missing = 0;    ///< number of steps without effect since the last complete one
+  std::uint64_t offset = 0;     ///< World::steps() minus `completed`
+  std::uint32_t started = 0;    ///< 1: SavedArrays are those of a step that is not complete
+  std::uint32_t held = 0;       ///< 1: the host has changes that the next step must see
+  ContactSizes contacts[2];     ///< of the last two steps, by the parity of `completed` before them
+};
+
 /// Numbers that the stages of a step pass to each other and to the host.
-struct Counters {
-  std::uint64_t started = 0;    ///< StepData::number once the state before the step is saved
-  std::uint64_t completed = 0;  ///< StepData::number once the step is complete
-  std::uint32_t failed = 0;     ///< 1: a list has no room, or must_wake: the step has no effect
+struct StepCounters {
+  std::uint32_t failed = 0;  ///< 1: a list has no room, or must_wake: the step has no effect
   std::uint32_t invalid_bounds = 0;  ///< 1: swept bounds are not finite, the step has no effect
   Capacity needed;
 
@@ -57,6 +71,9 @@ struct Counters {
   /// 1: a force must wake a body, the step has no effect. Without this number there would be
   /// padding, which initcheck would report.
   std::uint32_t must_wake = 0;
+};
+struct Counters : StepCounters {
+  Progress progress;
 };
 static_assert(std::has_unique_object_representations_v<Counters>);
 
@@ -87,7 +104,8 @@ struct DeviceContacts {
   soft_step::ContactView view;    ///< without the counts: see StepData::contacts()
   Range* spheres_of = nullptr;    ///< by body a: its contacts of two spheres
   Range* manifolds_of = nullptr;  ///< by body a
-  std::uint32_t counts[3] = {};   ///< of the last step: spheres, manifolds, points
+  Touch* touches = nullptr;
+  Vec3* position_before = nullptr;  ///< by body, at the start of the step
 };
 
 /// The arrays that a step changes before it can fail, as they were at its start, by body.
@@ -101,17 +119,15 @@ struct SavedArrays {
 struct StepData {
   soft_step::StepBodies step;
   NearBounds near;
-  DeviceContacts now, last;
+  DeviceContacts contacts_of[2];  ///< as Progress::contacts
   MaterialSettings materials;
   soft_step::StepConstants constants;
   std::uint32_t substeps = 0;
-  std::uint64_t number = 0;  ///< of the step, > 0
   Capacity capacity;
   Counters* counters = nullptr;
 
-  Vec3* motion = nullptr;           ///< by body
-  Vec3* position_before = nullptr;  ///< by body, at the start of the step
-  SpherePair* pairs = nullptr;      ///< of swept bounds
+  Vec3* motion = nullptr;       ///< by body
+  SpherePair* pairs = nullptr;  ///< of swept bounds
   cuda::ContactCount* pair_count = nullptr;
   NormalDistance* pair_results = nullptr;  ///< by pair
   std::uint8_t* pair_found = nullptr;      ///< by pair: 1 if it is a contact of two spheres
@@ -121,7 +137,6 @@ struct StepData {
   std::uint32_t* next_candidate = nullptr;   ///< by candidate
   /// By body a: its number of manifolds, and in the lower half that of their points.
   std::uint64_t* manifold_sizes = nullptr;
-  Touch* touches = nullptr;
 
   std::uint64_t* used_colors = nullptr;  ///< by body
   /// By body: lowest color_order() of its uncolored contacts, and the lowest of those contacts.
@@ -150,18 +165,23 @@ struct StepData {
   JFPX_HD BodyCells cells(std::uint32_t body) const {
     return {&motion_cells[body], &free_cells[body]};
   }
+  /// The contacts of the step in progress, and those of the last complete one. The device selects
+  /// them, because the host need not know how many steps are complete.
+  JFPX_HD const DeviceContacts& now() const { return contacts_of[parity()]; }
+  JFPX_HD const DeviceContacts& last() const { return contacts_of[1 - parity()]; }
   JFPX_HD soft_step::ContactView contacts() const {
-    soft_step::ContactView view = now.view;
+    soft_step::ContactView view = now().view;
     view.sphere_count = counters->spheres;
     view.manifold_count = counters->manifolds;
     view.point_count = counters->points;
     return view;
   }
   JFPX_HD soft_step::ContactView last_contacts() const {
-    soft_step::ContactView view = last.view;
-    view.sphere_count = last.counts[0];
-    view.manifold_count = last.counts[1];
-    view.point_count = last.counts[2];
+    soft_step::ContactView view = last().view;
+    const ContactSizes& sizes = counters->progress.contacts[1 - parity()];
+    view.sphere_count = sizes.spheres;
+    view.manifold_count = sizes.manifolds;
+    view.point_count = sizes.points;
     return view;
   }
   JFPX_HD soft_step::RowSetup row_setup() const {
@@ -173,8 +193,20 @@ struct StepData {
             step.solver,
             constants.restitution_threshold};
   }
+  /// Whether an earlier step was not completed, or the host must send changes first: the step has
+  /// no effect.
+  JFPX_HD bool is_skipped() const {
+    return counters->progress.missing != 0 || counters->progress.held != 0;
+  }
   /// Whether an earlier stage has found that the step can't be completed.
-  JFPX_HD bool has_failed() const { return counters->failed != 0 || counters->invalid_bounds != 0; }
+  JFPX_HD bool has_failed() const {
+    return is_skipped() || counters->failed != 0 || counters->invalid_bounds != 0;
+  }
+
+ private:
+  JFPX_HD std::uint32_t parity() const {
+    return static_cast<std::uint32_t>(counters->progress.completed & 1);
+  }
 };
 
 }  // namespace device

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace jfpx {
@@ -9,7 +11,7 @@ inline namespace JFPX_ABI {
 namespace device {
 
 /// Copies between the host and the buffers of a device. The functions only enqueue work: what they
-/// read or write on the host must stay until wait() returns.
+/// read or write on the host must stay until wait() returns. Counts the buffers that it moves.
 /// @tparam Device as for DeviceStep
 template <class Device>
 class Transfer {
@@ -23,7 +25,7 @@ class Transfer {
   /// @param room number of items to reserve memory for, if it is above `count`
   template <class T>
   const T* put(Buffer<T>* to, const T* from, std::size_t count, std::size_t room = 0) const {
-    device_->reserve(to, std::max({count, room, std::size_t{1}}), "the bodies of a world");
+    reserve(to, std::max({count, room, std::size_t{1}}), "the bodies of a world");
     device_->upload(to->data(), from, count);
     return to->data();
   }
@@ -40,7 +42,7 @@ class Transfer {
   /// Makes room for `count` items, which discards the contents. @returns the address
   template <class T>
   T* room(Buffer<T>* buffer, std::size_t count) const {
-    device_->reserve(buffer, std::max<std::size_t>(count, 1), "a step of a world");
+    reserve(buffer, std::max<std::size_t>(count, 1), "a step of a world");
     return buffer->data();
   }
   template <class T>
@@ -48,9 +50,19 @@ class Transfer {
     device_->copy(to, from, count);
   }
   void wait() const { device_->wait(); }
+  /// Changes whenever an array gets another address.
+  std::uint64_t moves() const { return moves_; }
 
  private:
+  template <class T>
+  void reserve(Buffer<T>* buffer, std::size_t count, const char* what) const {
+    const T* const before = buffer->data();
+    device_->reserve(buffer, count, what);
+    if (buffer->data() != before) ++moves_;
+  }
+
   Device* device_;
+  mutable std::uint64_t moves_ = 0;
 };
 
 }  // namespace device

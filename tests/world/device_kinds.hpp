@@ -1,0 +1,141 @@
+/// The devices on which tests of queues run: the host, and a GPU if there is one.
+#pragma once
+
+#include <jfpx/backend.hpp>
+
+#include "src/world/world_impl.hpp"
+#include "tests/world/host_device.hpp"
+
+#include <gtest/gtest.h>
+#if JFPX_HAS_CUDA
+#include <cuda_runtime_api.h>
+#endif
+
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace test {
+
+inline HostDevice& host_device_of(World* world) {
+  DeviceWorld* device = WorldAccess::impl(*world).device.get();
+  return static_cast<device::DeviceStep<HostDevice>*>(device)->device();
+}
+
+struct DeviceKind {
+  std::string name;
+  bool is_cuda = false;
+  std::function<std::unique_ptr<DeviceWorld>(const Scene&)> make;
+  /// Captures what `work` enqueues on a stream. @returns a function that launches the graph
+  std::function<std::function<void()>(World*, const std::function<void(cuda::Stream)>& work)>
+      capture;
+};
+
+inline std::function<void()> capture_on_host(World* world,
+                                             const std::function<void(cuda::Stream)>& work) {
+  const auto graph = std::make_shared<HostDevice::Graph>();
+  struct Scope {
+    Scope(HostDevice* on, HostDevice::Graph* to) : device(on) { device->set_graph(to); }
+    ~Scope() { device->set_graph(nullptr); }
+    HostDevice* device;
+  } const scope(&host_device_of(world), graph.get());
+  work(nullptr);
+  return [graph] { graph->launch(); };
+}
+
+#if JFPX_HAS_CUDA
+inline void require(cudaError_t error) {
+  if (error != cudaSuccess) throw std::runtime_error(cudaGetErrorString(error));
+}
+
+/// A stream, and the graph that was captured from it.
+struct CapturedGraph {
+  CapturedGraph() { require(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking)); }
+  ~CapturedGraph() {
+    if (graph != nullptr) cudaGraphExecDestroy(graph);
+    cudaStreamDestroy(stream);
+  }
+  CapturedGraph(const CapturedGraph&) = delete;
+  CapturedGraph& operator=(const CapturedGraph&) = delete;
+  cudaStream_t stream = nullptr;
+  cudaGraphExec_t graph = nullptr;
+};
+
+inline std::function<void()> capture_on_cuda(World*,
+                                             const std::function<void(cuda::Stream)>& work) {
+  const auto made = std::make_shared<CapturedGraph>();
+  cudaGraph_t captured = nullptr;
+  require(cudaStreamBeginCapture(made->stream, cudaStreamCaptureModeGlobal));
+  try {
+    work(made->stream);
+  } catch (...) {
+    require(cudaStreamEndCapture(made->stream, &captured));
+    cudaGraphDestroy(captured);
+    throw;
+  }
+  require(cudaStreamEndCapture(made->stream, &captured));
+  const cudaError_t error = cudaGraphInstantiate(&made->graph, captured, 0);
+  cudaGraphDestroy(captured);
+  require(error);
+  return [made] { require(cudaGraphLaunch(made->graph, made->stream)); };
+}
+#endif
+
+/// Without a GPU, only the host, unless JFPX_REQUIRE_CUDA is set.
+inline std::vector<DeviceKind> device_kinds() {
+  std::vector<DeviceKind> kinds{{"Host", false, make_host_device_world, capture_on_host}};
+#if JFPX_HAS_CUDA
+  bool has_device = std::getenv("JFPX_REQUIRE_CUDA") != nullptr;
+  for (const BackendStatus& status : available_backends()) {
+    has_device = has_device || (status.backend == Backend::cuda && status.usable);
+  }
+  if (has_device) {
+    kinds.push_back({"Cuda", true, [](const Scene& scene) { return make_device_world(scene); },
+                     capture_on_cuda});
+  }
+#endif
+  return kinds;
+}
+
+/// A stream that a program has made itself; on the host, none.
+class StreamOfUser {
+ public:
+  explicit StreamOfUser(const DeviceKind& kind) : is_cuda_(kind.is_cuda) {
+#if JFPX_HAS_CUDA
+    if (is_cuda_) require(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
+#endif
+  }
+  ~StreamOfUser() {
+#if JFPX_HAS_CUDA
+    if (is_cuda_) cudaStreamDestroy(stream_);
+#endif
+  }
+  StreamOfUser(const StreamOfUser&) = delete;
+  StreamOfUser& operator=(const StreamOfUser&) = delete;
+
+  cuda::Stream get() const { return stream_; }
+  /// Copies from the device in the order of the stream, and waits.
+  void read(void* to, const void* from, std::size_t bytes) const {
+#if JFPX_HAS_CUDA
+    if (is_cuda_) {
+      require(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, stream_));
+      return require(cudaStreamSynchronize(stream_));
+    }
+#endif
+    std::memcpy(to, from, bytes);
+  }
+
+ private:
+  bool is_cuda_;
+  cuda::Stream stream_ = nullptr;
+};
+
+}  // namespace test
+}  // namespace JFPX_ABI
+}  // namespace jfpx

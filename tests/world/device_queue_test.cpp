@@ -1,0 +1,555 @@
+/// Steps of a world on a device that do not wait for the host: enqueued ones, and those of captured
+/// graphs. Without a GPU, the programs of the device run on the host; with one, on the GPU too.
+#include <jfpx/backend.hpp>
+#include <jfpx/cuda/world.hpp>
+#include <jfpx/error.hpp>
+#include <jfpx/force.hpp>
+
+#include "src/scenes/scenes.hpp"
+#include "src/world/world_impl.hpp"
+#include "tests/world/device_kinds.hpp"
+#include "tests/world/random_bodies.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+
+class DeviceQueueTest : public testing::TestWithParam<test::DeviceKind> {
+ protected:
+  World on_device(const Scene& scene) const {
+    World world(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    WorldAccess::impl(world).device = GetParam().make(scene);
+    return world;
+  }
+  static World on_host(const Scene& scene) {
+    return World(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+  }
+  /// A graph of steps, which the returned function launches.
+  std::function<void()> graph_of(World* world, std::uint32_t steps) const {
+    return GetParam().capture(
+        world, [&](cuda::Stream stream) { cuda::enqueue_steps(*world, steps, stream); });
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Devices, DeviceQueueTest, testing::ValuesIn(test::device_kinds()),
+                         [](const auto& row) { return row.param.name; });
+
+/// @returns the report of the last step
+StepReport make_steps(World* world, std::uint64_t count) {
+  StepReport report;
+  for (; count > 0; --count) report = world->step();
+  return report;
+}
+
+void expect_equal(const StepReport& host, const StepReport& device) {
+  ASSERT_EQ(host.step, device.step);
+  ASSERT_EQ(host.contacts, device.contacts);
+  ASSERT_EQ(host.sphere_contacts, device.sphere_contacts);
+  ASSERT_EQ(host.awake, device.awake);
+  ASSERT_EQ(host.non_finite, device.non_finite);
+}
+void expect_equal_contacts(const World& host, const World& device) {
+  const auto a = host.contacts(), b = device.contacts();
+  ASSERT_EQ(std::vector(a.begin(), a.end()), std::vector(b.begin(), b.end()));
+  const auto c = host.contact_events(), d = device.contact_events();
+  ASSERT_EQ(std::vector(c.begin(), c.end()), std::vector(d.begin(), d.end()));
+}
+
+/// Bodies of all shapes in a small room.
+Scene random_room(Random* random) {
+  Scene scene;
+  scene.soft_step.substeps = 1 + static_cast<std::uint32_t>(random->below(4));
+  const std::uint64_t count = 2 + random->below(40);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    BodyDef def = test::random_body(random, 3);
+    if (def.mass > 0) def.velocity = random->uniform_in_box({-3, -3, -3}, {3, 3, 3});
+    def.restitution = random->below(2) == 0 ? Real(0) : random->uniform(0, 1);
+    def.sensor = random->below(10) == 0;
+    scene.bodies.push_back(def);
+  }
+  scene.bodies.push_back(test::half_space({0, 1, 0}, -3));
+  return scene;
+}
+
+/// A change that both worlds get.
+class Change {
+ public:
+  Change(Random* random, double time)
+      : action_(random->below(12)),
+        i_(random->below(1000)),
+        def_(test::random_body(random, 3)),
+        vector_(random->uniform_in_box({-9, -9, -9}, {9, 9, 9})),
+        start_(static_cast<Real>(time) + random->uniform(0, 0.1_r)) {}
+
+  void make(World* world) const {
+    const BodyId id = world->bodies()[i_ % world->bodies().size()];
+    if (action_ == 0) world->add(def_);
+    if (action_ == 1 && world->bodies().size() > 3) world->remove(id);
+    if (action_ == 2) world->apply_force(id, vector_);
+    if (action_ == 3) world->set_friction(id, absolute(vector_.x));
+    if (action_ == 4) world->set_state(id, {def_.position, def_.orientation, vector_, {}});
+    if (action_ == 5) world->apply_force_at_point(id, vector_, {});
+    if (action_ == 6) world->set_filter(id, {.category = 2, .mask = 0xfffffffdu});
+    if (action_ == 7 && world->mass(id) > 0) world->set_mass(id, 0.3_r + absolute(vector_.z));
+    if (action_ == 8 && world->forces().size() < 6) {
+      world->add_force(Explosion{.centre = vector_ * 0.3_r,
+                                 .start = start_,
+                                 .peak_force = 20,
+                                 .speed = 9,
+                                 .thickness = 2,
+                                 .duration = 0.2_r});
+    }
+    if (action_ == 9 && world->forces().size() < 6) world->add_force(Gravity{vector_ * 0.3_r, id});
+    if (action_ == 10 && !world->forces().empty()) world->remove_force(world->forces()[0]);
+    if (action_ == 11) {
+      for (const ForceId force : world->forces()) {
+        auto* gravity = WorldAccess::impl(*world).forces.find(force)->target<Gravity>();
+        if (gravity != nullptr) world->force<Gravity>(force).acceleration = vector_;
+      }
+    }
+  }
+
+ private:
+  std::uint64_t action_, i_;
+  BodyDef def_;
+  Vec3 vector_;
+  Real start_;
+};
+
+/// Queues between single steps, changes of all kinds, looks at everything, and snapshots.
+TEST_P(DeviceQueueTest, EnqueuedStepsHaveTheBitsOfTheProcessor) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  for (int k = 0; k < 10; ++k) {
+    const Scene scene = random_room(&random);
+    World host = on_host(scene), device = on_device(scene);
+    for (int n = 0; n < 40; ++n) {
+      SCOPED_TRACE("scene " + std::to_string(k) + ", round " + std::to_string(n));
+      StepReport a, b;
+      for (std::uint64_t queues = random.below(3); queues > 0; --queues) {
+        const auto count = static_cast<std::uint32_t>(random.below(5));
+        cuda::enqueue_steps(device, count, nullptr);
+        if (count > 0) a = make_steps(&host, count);
+        if (random.below(3) == 0) cuda::device_states(device);
+      }
+      if (a.step > 0 && random.below(2) == 0) {
+        b = cuda::finish_steps(device);
+        ASSERT_NO_FATAL_FAILURE(expect_equal(a, b));
+      }
+      if (random.below(3) == 0) {
+        a = host.step(), b = device.step();
+        ASSERT_NO_FATAL_FAILURE(expect_equal(a, b));
+      }
+      if (random.below(3) == 0) {
+        ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
+      }
+      if (random.below(6) == 0) {
+        ASSERT_TRUE(host.snapshot() == device.snapshot());
+      }
+      if (random.below(20) == 0) {
+        const Snapshot snapshot = host.snapshot();
+        cuda::enqueue_steps(device, 2, nullptr);
+        for (World* world : {&host, &device}) world->restore(snapshot);
+      }
+      if (random.below(2) == 0) {
+        const Change change(&random, host.time());
+        for (World* world : {&host, &device}) change.make(world);
+      }
+      if (random.below(2) == 0) {
+        ASSERT_EQ(host.state_hash(), device.state_hash());
+      }
+    }
+    ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k;
+    ASSERT_EQ(host.time(), device.time());
+    ASSERT_NE(WorldAccess::impl(device).device, nullptr);
+  }
+}
+
+/// Graphs of one to three steps, between queues, single steps and changes.
+TEST_P(DeviceQueueTest, ReplayedStepsHaveTheBitsOfTheProcessor) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  std::uint64_t replayed = 0;
+  for (int k = 0; k < 6; ++k) {
+    const Scene scene = random_room(&random);
+    World host = on_host(scene), device = on_device(scene);
+    std::function<void()> graph;
+    std::uint32_t size = 0;
+    std::uint64_t version = 0;
+    for (int n = 0; n < 60; ++n) {
+      SCOPED_TRACE("scene " + std::to_string(k) + ", round " + std::to_string(n));
+      if (size == 0 || cuda::device_states(device).version != version) {
+        host.step(), device.step();
+        version = cuda::device_states(device).version;
+        size = 1 + static_cast<std::uint32_t>(random.below(3));
+        graph = graph_of(&device, size);
+        ASSERT_EQ(cuda::device_states(device).version, version);
+      }
+      const std::uint64_t action = random.below(8);
+      if (action < 4) {
+        for (std::uint64_t launches = 1 + random.below(4); launches > 0; --launches) {
+          graph();
+          make_steps(&host, size);
+          replayed += size;
+        }
+      }
+      if (action == 4) host.step(), device.step();
+      if (action == 5) make_steps(&host, 2), cuda::enqueue_steps(device, 2, nullptr);
+      if (action == 6) {
+        const Change change(&random, host.time());
+        for (World* world : {&host, &device}) change.make(world);
+      }
+      if (action == 7) {
+        ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
+      }
+      if (random.below(2) == 0) {
+        ASSERT_EQ(host.state_hash(), device.state_hash());
+      }
+      // A graph that is not valid must not be launched.
+      if (random.below(3) == 0) cuda::finish_steps(device);
+      if (cuda::device_states(device).version != version) size = 0;
+    }
+    ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k;
+    ASSERT_EQ(host.steps(), device.steps());
+    ASSERT_TRUE(host.snapshot() == device.snapshot());
+  }
+  EXPECT_GT(replayed, 50u);
+}
+
+TEST_P(DeviceQueueTest, AGraphOfTwoStepsMovesAPile) {
+  const Scene scene = scenes::make("pile", {.spheres = 200});
+  World host = on_host(scene), device = on_device(scene);
+  make_steps(&host, 400), make_steps(&device, 400);  // then the lists of contacts are long enough
+  const std::uint64_t version = cuda::device_states(device).version;
+  const auto graph = graph_of(&device, 2);
+  for (int n = 0; n < 50; ++n) graph();
+  const StepReport a = make_steps(&host, 100), b = cuda::finish_steps(device);
+  ASSERT_NO_FATAL_FAILURE(expect_equal(a, b));
+  EXPECT_EQ(host.state_hash(), device.state_hash());
+  EXPECT_EQ(cuda::device_states(device).version, version);
+}
+
+/// Balls that meet all at once need room for contacts in the middle of a queue, or of replays.
+TEST_P(DeviceQueueTest, AStepWithoutRoomIsRepeatedBeforeItCanBeSeen) {
+  Scene scene;
+  for (int i = 0; i < 400; ++i) {
+    const Vec3 place{static_cast<Real>(i % 20), static_cast<Real>(i / 20), 0};
+    BodyDef def = test::ball(place * Real(4), 0.5_r);
+    def.velocity = place * Real(-8);
+    def.acceleration = {};
+    scene.bodies.push_back(def);
+  }
+  for (const bool is_graph : {false, true}) {
+    World host = on_host(scene), device = on_device(scene);
+    make_steps(&host, 2), make_steps(&device, 2);
+    const std::uint64_t version = cuda::device_states(device).version;
+    if (is_graph) {
+      const auto graph = graph_of(&device, 1);
+      for (int n = 0; n < 31; ++n) graph();
+    } else {
+      cuda::enqueue_steps(device, 31, nullptr);
+    }
+    std::uint64_t missing = 0;
+    const test::StreamOfUser stream(GetParam());
+    cuda::enqueue_steps(device, 1, stream.get());
+    stream.read(&missing, cuda::device_states(device).missing_steps, sizeof missing);
+    EXPECT_GT(missing, 0u);
+    const StepReport a = make_steps(&host, 32), b = cuda::finish_steps(device);
+    ASSERT_GT(a.contacts, 200u);
+    ASSERT_NO_FATAL_FAILURE(expect_equal(a, b));
+    ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
+    EXPECT_TRUE(host.snapshot() == device.snapshot());
+    EXPECT_NE(cuda::device_states(device).version, version) << "lists have grown";
+  }
+}
+
+/// Each step after the one in which a body runs away is undone, as step() would undo it.
+TEST_P(DeviceQueueTest, ARunawayBodyUndoesTheRestOfTheQueue) {
+  Scene scene;
+  scene.bodies = {test::ball({0, 0, 0}), test::ball({kMaxCoordinate * 0.9_r, 0, 0})};
+  scene.bodies[1].velocity = {kMaxCoordinate * 0.03_r, 0, 0};
+  scene.dt = 1;
+  for (const bool is_graph : {false, true}) {
+    World host = on_host(scene), device = on_device(scene);
+    host.step(), device.step();
+    cuda::device_states(device);
+    StepReport b;
+    if (is_graph) {
+      const auto graph = graph_of(&device, 3);
+      for (int n = 0; n < 3; ++n) graph();
+      b = cuda::finish_steps(device);
+    } else {
+      cuda::enqueue_steps(device, 9, nullptr);
+      b = cuda::finish_steps(device);
+    }
+    const StepReport a = make_steps(&host, 9);
+    ASSERT_TRUE(a.non_finite);
+    EXPECT_GT(a.step, 2u);
+    EXPECT_LT(a.step, 10u);
+    EXPECT_TRUE(b.non_finite);
+    EXPECT_EQ(a.step, b.step);
+    EXPECT_EQ(a.non_finite_body, b.non_finite_body);
+    EXPECT_TRUE(host.snapshot() == device.snapshot());
+    EXPECT_TRUE(device.contacts().empty());
+    for (World* world : {&host, &device}) world->remove(world->bodies()[1]);
+    make_steps(&host, 3);
+    cuda::enqueue_steps(device, 3, nullptr);
+    EXPECT_TRUE(host.snapshot() == device.snapshot());
+    EXPECT_TRUE(WorldAccess::impl(device).resident);
+  }
+}
+
+/// A blast reaches sleeping bodies, which only the host can wake, and its time counts on.
+TEST_P(DeviceQueueTest, ForcesThatWakeABodyAreLeftToTheHost) {
+  Scene scene;
+  scene.dt = 0.01_r;
+  for (int i = 0; i < 4; ++i) {
+    BodyDef def = test::ball({3 * static_cast<Real>(i), 0, 0});
+    def.acceleration = {};
+    def.can_sleep = i < 3;
+    scene.bodies.push_back(def);
+  }
+  World host = on_host(scene), device = on_device(scene);
+  for (World* world : {&host, &device}) {
+    world->add_force(Drag{.linear = 0.1_r});
+    world->add_force(Explosion{.centre = {-2, 0, 0},
+                               .start = 2,
+                               .peak_force = 9,
+                               .speed = 5,
+                               .thickness = 1,
+                               .duration = 2});
+  }
+  make_steps(&host, 400);
+  for (int n = 0; n < 4; ++n) cuda::enqueue_steps(device, 100, nullptr);
+  EXPECT_TRUE(host.snapshot() == device.snapshot());
+  EXPECT_NE(device.state(device.bodies()[2]).velocity, Vec3{});
+  EXPECT_TRUE(WorldAccess::impl(device).resident);
+}
+
+/// A replay after a change of the host must see it, though the graph has no part of it.
+TEST_P(DeviceQueueTest, ReplaysSeeTheChangesBeforeThem) {
+  const Scene scene = scenes::make("pile", {.spheres = 30});
+  World host = on_host(scene), device = on_device(scene);
+  std::vector<ForceId> ids;
+  for (World* world : {&host, &device}) ids.push_back(world->add_force(Gravity{{1, 0, 0}}));
+  make_steps(&host, 40), make_steps(&device, 40);
+  const std::uint64_t version = cuda::device_states(device).version;
+  const auto graph = graph_of(&device, 1);
+  const BodyId ball = host.bodies()[3];
+  for (int n = 0; n < 30; ++n) {
+    for (World* world : {&host, &device}) {
+      if (n % 3 == 0) world->apply_force(ball, {0, 40, 0});
+      if (n % 5 == 0) world->force<Gravity>(ids[world == &device]).acceleration.x += 1;
+    }
+    if (n % 2 == 0) cuda::device_states(device);  // sends the change
+    graph();
+    host.step();
+    if (n % 4 == 0) {
+      ASSERT_EQ(host.state_hash(), device.state_hash()) << n;
+    }
+  }
+  EXPECT_TRUE(host.snapshot() == device.snapshot());
+  EXPECT_EQ(cuda::device_states(device).version, version);
+}
+
+TEST_P(DeviceQueueTest, TheVersionChangesWhenAGraphIsNoLongerValid) {
+  const Scene scene = scenes::make("mixed", {.spheres = 20});
+  World world = on_device(scene);
+  make_steps(&world, 60);
+  std::uint64_t version = cuda::device_states(world).version;
+  const auto changes = [&] {
+    const std::uint64_t before = std::exchange(version, cuda::device_states(world).version);
+    return version != before;
+  };
+  EXPECT_FALSE(changes());
+  const Vec3* const before = cuda::device_states(world).positions;
+  world.step();
+  cuda::enqueue_steps(world, 3, nullptr);
+  EXPECT_FALSE(changes());
+  EXPECT_EQ(cuda::device_states(world).positions, before);
+  world.apply_force(world.bodies()[0], {1, 2, 3});
+  world.set_state(world.bodies()[1], {{0, 9, 0}, {}, {}, {}});
+  EXPECT_FALSE(changes());
+  world.set_filter(world.bodies()[0], {.category = 2, .mask = 1});
+  EXPECT_TRUE(changes()) << "filters were not in use";
+  world.set_pair_ignored(world.bodies()[0], world.bodies()[1], true);
+  EXPECT_TRUE(changes());
+  world.remove(world.bodies()[0]);
+  EXPECT_TRUE(changes());
+  world.add(test::ball({0, 20, 0}));
+  EXPECT_TRUE(changes());
+  world.add_force(Gravity{});
+  EXPECT_TRUE(changes());
+  world.restore(world.snapshot());
+  EXPECT_TRUE(changes());
+}
+
+TEST_P(DeviceQueueTest, ACaptureNeedsAWorldThatIsOnTheDevice) {
+  const Scene scene = scenes::make("pile", {.spheres = 20});
+  World world = on_device(scene);
+  EXPECT_THROW(graph_of(&world, 1), InvalidArgument) << "not uploaded";
+  cuda::device_states(world);
+  EXPECT_THROW(graph_of(&world, 1), InvalidArgument) << "no step";
+  make_steps(&world, 1);
+  cuda::device_states(world);
+  graph_of(&world, 1);
+  world.apply_force(world.bodies()[0], {1, 0, 0});
+  EXPECT_THROW(graph_of(&world, 1), InvalidArgument) << "an edit";
+  cuda::device_states(world);
+  graph_of(&world, 1);
+  const ForceId force = world.add_force([](ForceContext&) {});
+  make_steps(&world, 1);
+  cuda::device_states(world);
+  EXPECT_THROW(graph_of(&world, 1), InvalidArgument) << "a user-defined force";
+  world.remove_force(force);
+  const ContactGeneratorId generator = world.add_contact_generator([](ContactContext&) {});
+  make_steps(&world, 1);
+  cuda::device_states(world);
+  EXPECT_THROW(graph_of(&world, 1), InvalidArgument) << "a contact generator";
+  world.remove_contact_generator(generator);
+  make_steps(&world, 1);
+  cuda::device_states(world);
+  EXPECT_EQ(world.steps(), 4u);
+  graph_of(&world, 1)();
+  EXPECT_EQ(world.steps(), 5u);
+}
+
+/// A world that sleeps launches nothing, except in a graph.
+TEST_P(DeviceQueueTest, ASleepingWorldIsLeftAlone) {
+  Scene scene;
+  scene.bodies = {test::ground(), test::heavy({0, 1, 0})};
+  World host = on_host(scene), device = on_device(scene);
+  make_steps(&host, 300), make_steps(&device, 300);
+  auto& impl = WorldAccess::impl(device);
+  ASSERT_TRUE(impl.is_at_rest());
+  cuda::enqueue_steps(device, 7, nullptr);
+  EXPECT_FALSE(impl.is_launched);
+  EXPECT_EQ(cuda::finish_steps(device).step, 307u);
+  make_steps(&host, 7);
+  cuda::device_states(device);
+  const auto graph = graph_of(&device, 3);
+  graph();
+  make_steps(&host, 3);
+  EXPECT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
+  EXPECT_EQ(device.steps(), 310u);
+  for (World* world : {&host, &device}) world->apply_force(world->bodies()[1], {0, 5000, 0});
+  graph();
+  make_steps(&host, 3);
+  EXPECT_TRUE(host.snapshot() == device.snapshot());
+  EXPECT_TRUE(device.awake(device.bodies()[1]));
+}
+
+TEST_P(DeviceQueueTest, StepsThatNeedTheHostAreMadeAtOnce) {
+  const Scene scene = scenes::make("pile", {.spheres = 20});
+  World host = on_host(scene), device = on_device(scene);
+  for (World* world : {&host, &device}) {
+    world->add_force([](ForceContext& context) {
+      for (const BodyId id : context.bodies()) context.apply_force(id, {1, 0, 0});
+    });
+  }
+  cuda::enqueue_steps(device, 5, nullptr);
+  const StepReport a = make_steps(&host, 5), b = cuda::finish_steps(device);
+  ASSERT_NO_FATAL_FAILURE(expect_equal(a, b));
+  EXPECT_TRUE(host.snapshot() == device.snapshot());
+}
+
+/// The arrays of device_states() are those after the queue, in the order of the user's stream.
+TEST_P(DeviceQueueTest, StatesAreUpdatedInTheOrderOfTheStream) {
+  const Scene scene = scenes::make("pile", {.spheres = 100});
+  World host = on_host(scene), device = on_device(scene);
+  make_steps(&host, 400), make_steps(&device, 400);
+  for (int n = 0; n < 5; ++n) {
+    for (World* world : {&host, &device}) world->apply_force(world->bodies()[n], {0, 50, 0});
+    const test::StreamOfUser stream(GetParam());
+    cuda::enqueue_steps(device, 4, stream.get());
+    const cuda::DeviceStates states = cuda::device_states(device);
+    std::vector<Vec3> positions(states.slots);
+    stream.read(positions.data(), states.positions, states.slots * sizeof(Vec3));
+    std::uint64_t missing = 1;
+    stream.read(&missing, states.missing_steps, sizeof missing);
+    ASSERT_EQ(missing, 0u);
+    make_steps(&host, 4);
+    for (const BodyId id : host.bodies()) {
+      ASSERT_EQ(positions[id.index], host.state(id).position) << n;
+    }
+    EXPECT_TRUE(WorldAccess::impl(device).is_launched) << "nothing has waited for the queue";
+  }
+}
+
+TEST_P(DeviceQueueTest, ConcurrentReadersFinishAQueueOnce) {
+  const Scene scene = scenes::make("pile", {.spheres = 60});
+  World host = on_host(scene), device = on_device(scene);
+  make_steps(&host, 2), make_steps(&device, 2);
+  for (int n = 0; n < 10; ++n) {
+    cuda::enqueue_steps(device, 12, nullptr);
+    make_steps(&host, 12);
+    const std::uint64_t hash = host.state_hash();
+    const std::size_t contacts = host.contacts().size();
+    std::vector<std::thread> readers;
+    for (int k = 0; k < 4; ++k) {
+      readers.emplace_back([&, k] {
+        if (k % 2 == 0) {
+          EXPECT_EQ(device.contacts().size(), contacts);
+        }
+        EXPECT_EQ(device.steps(), host.steps());
+        EXPECT_EQ(device.state_hash(), hash);
+      });
+    }
+    for (std::thread& reader : readers) reader.join();
+  }
+}
+
+TEST(DeviceQueue, NeedsADevice) {
+  World world(scenes::make("pile", {.spheres = 5}), {.collider = {.backend = Backend::cpu}});
+  EXPECT_THROW(cuda::enqueue_steps(world, 1, nullptr), BackendUnavailable);
+  EXPECT_EQ(world.steps(), 0u);
+}
+
+/// Whichever program of a queue cannot be started, the processor completes the steps.
+TEST(DeviceQueue, AFailingDeviceIsReplacedInTheMiddleOfAQueue) {
+  const Scene scene = scenes::make("mixed", {.spheres = 20});
+  World host(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+  const auto prepare = [](World* world) {
+    world->add_force(Gravity{{0, 0, 1}});
+    make_steps(world, 3);
+    world->apply_force(world->bodies()[1], {3, 4, 5});
+    world->remove(world->bodies()[4]);
+  };
+  prepare(&host);
+  make_steps(&host, 5);
+  bool was_reached = true;
+  for (int runs = 0; was_reached; ++runs) {
+    ASSERT_LT(runs, 100);
+    World world(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    auto& impl = WorldAccess::impl(world);
+    impl.device = test::make_host_device_world(scene);
+    prepare(&world);
+    test::host_device_of(&world).fail_after(runs);
+    cuda::enqueue_steps(world, 3, nullptr);
+    if (impl.device != nullptr) {
+      cuda::enqueue_steps(world, 2, nullptr);
+    } else {
+      EXPECT_THROW(cuda::enqueue_steps(world, 2, nullptr), BackendUnavailable);
+      make_steps(&world, 2);
+    }
+    was_reached = impl.device == nullptr;
+    ASSERT_EQ(cuda::finish_steps(world).device_failure.empty(), !was_reached) << runs;
+    ASSERT_TRUE(cuda::finish_steps(world).device_failure.empty()) << "reported once";
+    ASSERT_EQ(world.steps(), host.steps());
+    ASSERT_EQ(world.state_hash(), host.state_hash()) << runs;
+    ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, world));
+  }
+}
+
+}  // namespace
+}  // namespace jfpx
