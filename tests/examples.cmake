@@ -18,6 +18,9 @@ foreach(suffix IN ITEMS "" "_f64")
     add_test(NAME cuda_world${suffix} COMMAND cuda_world${suffix})
     set_tests_properties(cuda_world${suffix} PROPERTIES
       PASS_REGULAR_EXPRESSION "step 120, bodies by height: [1-9][0-9]* [1-9]|cuda_world: cuda: ")
+    add_test(NAME cuda_graph${suffix} COMMAND cuda_graph${suffix})
+    set_tests_properties(cuda_graph${suffix} PROPERTIES
+      PASS_REGULAR_EXPRESSION "step 481: +[1-9][0-9]* contacts|cuda_graph: cuda: ")
   endif()
   add_test(NAME native_world${suffix} COMMAND native_world${suffix})
   set_tests_properties(native_world${suffix} PROPERTIES

@@ -97,13 +97,15 @@ class DeviceWorld {
   /// @returns false, without effect, if prepare() or a step since upload() is missing
   virtual bool capture(const ForceTable* forces, std::uint64_t steps, std::uint32_t count,
                        cuda::Stream stream) = 0;
+  /// Whether the last captured graph is valid.
+  virtual bool has_graph() const noexcept = 0;
   /// Until step(), enqueue() or prepare(), steps of captured graphs have no effect. Waits.
   virtual void hold() = 0;
   virtual bool is_held() const noexcept = 0;
   /// Later work of the world waits for earlier work of a stream.
   virtual void wait_for(cuda::Stream stream) = 0;
-  /// Waits for all steps, also of captured graphs. The state is then that after the last complete
-  /// one. May be repeated after a failure.
+  /// Waits for all steps, also of the graphs that have been launched. The state is then that after
+  /// the last complete one. May be repeated after a failure.
   virtual Finished finish() = 0;
 
   /// The states on the device, with the lifetimes of cuda::device_states().

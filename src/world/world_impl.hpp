@@ -121,7 +121,8 @@ struct World::Impl {
   /// Steps of captured graphs must see a change that the host is going to record: until the host
   /// has sent it, it makes them.
   void hold_graphs();
-  bool is_graph_valid() const;
+  /// Whether a graph may be launched at any time.
+  bool has_graph() const { return resident && device->has_graph(); }
   /// Whether the host has changes for the next step that the device does not have yet.
   bool has_changes() const { return !resident || !edits.empty() || device->is_held(); }
   /// Sends them, so that graphs can be captured and replayed.
@@ -263,7 +264,6 @@ struct World::Impl {
   /// for.
   std::atomic<bool> has_queue{false};
   bool is_launched = false;         ///< whether the device has enqueued steps
-  std::uint64_t graph_version = 0;  ///< DeviceStates::version of the last captured graph; 0: none
   std::uint64_t missing_steps = 0;  ///< steps of the queue that the host must make
   std::string queue_failure;        ///< why the device cannot make them; empty: no failure
   StepReport queue_report;          ///< of the last step of a queue

@@ -14,12 +14,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-bool World::Impl::is_graph_valid() const {
-  return graph_version != 0 && resident && device->states().version == graph_version;
-}
-
 void World::Impl::hold_graphs() {
-  if (is_graph_valid() && !device->is_held()) device->hold();
+  if (has_graph() && !device->is_held()) device->hold();
 }
 
 void World::Impl::send_changes() {
@@ -51,7 +47,7 @@ void World::Impl::enqueue(std::uint32_t count, cuda::Stream stream) {
 
 /// Enqueues the missing steps on the device, as far as it can make them without the host.
 void World::Impl::launch(cuda::Stream stream) {
-  if (device == nullptr || (!is_launched && !is_graph_valid() && is_at_rest())) return;
+  if (device == nullptr || (!is_launched && !has_graph() && is_at_rest())) return;
   device->wait_for(stream);
   if (!generators.ids().empty()) return;
   enter_device();
@@ -83,7 +79,6 @@ void World::Impl::capture(std::uint32_t count, cuda::Stream stream) {
         "stream is being captured; the world must then have made a step on the device since it "
         "moved there, and cuda::device_states() must have been called before the capture");
   }
-  graph_version = device->states().version;
   has_queue.store(true, std::memory_order_release);
 }
 
@@ -94,12 +89,12 @@ void World::Impl::finish_queue() {
     explicit Scope(Impl* impl) : w(impl) { w->is_finishing = true; }
     ~Scope() {
       w->is_finishing = false;
-      const bool is_open = w->is_launched || w->missing_steps > 0 || w->is_graph_valid();
+      const bool is_open = w->is_launched || w->missing_steps > 0 || w->has_graph();
       w->has_queue.store(is_open, std::memory_order_release);
     }
     Impl* w;
   } const scope(this);
-  if (is_launched || is_graph_valid()) finish_launched();
+  if (is_launched || has_graph()) finish_launched();
   if (!queue_failure.empty()) {
     if (resident) leave_device();
     lose_device(queue_failure);
@@ -156,14 +151,14 @@ void World::Impl::make_missing_steps() {
 }
 
 void World::Impl::drop_queue() noexcept {
-  if (is_launched || is_graph_valid()) {
+  if (is_launched || has_graph()) {
     try {
       device->finish();
     } catch (...) {  // the state that the device has lost is about to be replaced
     }
   }
   is_launched = false;
-  missing_steps = graph_version = 0;
+  missing_steps = 0;
   queue_failure.clear();
 }
 

@@ -63,6 +63,7 @@ class FailingDevice final : public DeviceWorld {
                cuda::Stream stream) override {
     return device_->capture(forces, steps, count, stream);
   }
+  bool has_graph() const noexcept override { return device_->has_graph(); }
   void hold() override { device_->hold(); }
   bool is_held() const noexcept override { return device_->is_held(); }
   void wait_for(cuda::Stream stream) override { device_->wait_for(stream); }

@@ -32,7 +32,8 @@ struct DeviceKind {
   std::string name;
   bool is_cuda = false;
   std::function<std::unique_ptr<DeviceWorld>(const Scene&)> make;
-  /// Captures what `work` enqueues on a stream. @returns a function that launches the graph
+  /// Captures what `work` enqueues on a stream. @returns a function that launches the graph on the
+  /// default stream
   std::function<std::function<void()>(World*, const std::function<void(cuda::Stream)>& work)>
       capture;
 };
@@ -83,7 +84,7 @@ inline std::function<void()> capture_on_cuda(World*,
   const cudaError_t error = cudaGraphInstantiate(&made->graph, captured, 0);
   cudaGraphDestroy(captured);
   require(error);
-  return [made] { require(cudaGraphLaunch(made->graph, made->stream)); };
+  return [made] { require(cudaGraphLaunch(made->graph, nullptr)); };
 }
 #endif
 
@@ -103,17 +104,19 @@ inline std::vector<DeviceKind> device_kinds() {
   return kinds;
 }
 
-/// A stream that a program has made itself; on the host, none.
+/// A stream that a program has made itself, or the default stream; on the host, none.
 class StreamOfUser {
  public:
-  explicit StreamOfUser(const DeviceKind& kind) : is_cuda_(kind.is_cuda) {
+  explicit StreamOfUser(const DeviceKind& kind, bool is_default = false) : is_cuda_(kind.is_cuda) {
 #if JFPX_HAS_CUDA
-    if (is_cuda_) require(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
+    if (is_cuda_ && !is_default) {
+      require(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
+    }
 #endif
   }
   ~StreamOfUser() {
 #if JFPX_HAS_CUDA
-    if (is_cuda_) cudaStreamDestroy(stream_);
+    if (stream_ != nullptr) cudaStreamDestroy(stream_);
 #endif
   }
   StreamOfUser(const StreamOfUser&) = delete;

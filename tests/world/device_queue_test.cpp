@@ -260,7 +260,7 @@ TEST_P(DeviceQueueTest, AStepWithoutRoomIsRepeatedBeforeItCanBeSeen) {
       cuda::enqueue_steps(device, 31, nullptr);
     }
     std::uint64_t missing = 0;
-    const test::StreamOfUser stream(GetParam());
+    const test::StreamOfUser stream(GetParam(), true);
     cuda::enqueue_steps(device, 1, stream.get());
     stream.read(&missing, cuda::device_states(device).missing_steps, sizeof missing);
     EXPECT_GT(missing, 0u);

@@ -158,6 +158,7 @@ class HostDevice {
     }
   }
   void wait() {}
+  void wait_for_graphs() {}
   void fork(cuda::Stream) {}
   void join(cuda::Stream) {}
   void mark(int) {}

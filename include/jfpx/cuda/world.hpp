@@ -62,15 +62,18 @@ JFPX_API DeviceStates device_states(World& world);
 /// the steps, and finish_steps() reports the reason.
 ///
 /// If `stream` is being captured, the steps become part of its CUDA graph, and each launch of the
-/// graph makes them. Graphs and all other steps may follow each other in any order; after a change
+/// graph makes them. Graphs, enqueued steps and single steps may follow each other; after a change
 /// of the world, a graph leaves its steps to the host until device_states(), step() or
 /// enqueue_steps() has sent the change. Requirements:
 ///   - the world has made a step on the device since it moved there, has no changes since, has no
 ///     user-defined forces and contact generators, and device_states() has been called since the
-///     last step;
+///     last change;
 ///   - a graph is launched only while DeviceStates::version is that of the capture, and not
-///     concurrently with a call on the world;
-///   - after an exception, the captured graph is discarded.
+///     concurrently with another call on the world; the caller orders streams, if several launch
+///     graphs of the world, or enqueue steps;
+///   - after an exception, the captured graph is discarded;
+///   - while a stream is captured, only enqueue_steps() and device_states() are called.
+/// As long as a graph is valid, waiting for the steps of the world waits for the whole device.
 ///
 /// A reference from World::force() must not be used for a change while steps are in progress: call
 /// force() again, which waits. Must not run concurrently with any call on the same world.

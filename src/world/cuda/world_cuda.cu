@@ -39,8 +39,7 @@ class CudaDevice {
         stream_(device_),
         pool_(device_),
         marks_{OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_)},
-        fork_(device_),
-        serial_(device_),
+        order_(device_),
         search_(stream_.get(), device_, SphereAlgorithm::automatic) {
     const DeviceGuard guard(device_);
     JFPX_CUDA_TRY(
@@ -114,18 +113,21 @@ class CudaDevice {
 
   void wait() {
     const DeviceGuard guard(device_);
-    wait_for_graphs();
     JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get()));
+  }
+  /// Graphs may have been launched on any stream.
+  void wait_for_graphs() {
+    const DeviceGuard guard(device_);
+    JFPX_CUDA_TRY(cudaDeviceSynchronize());
   }
 
   void fork(Stream stream) {
     const DeviceGuard guard(device_);
-    fork_.order(stream, stream_.get());
-    wait_for_graphs();
+    order_.order(stream, stream_.get());
   }
   void join(Stream stream) {
     const DeviceGuard guard(device_);
-    serial_.order(stream_.get(), stream);
+    order_.order(stream_.get(), stream);
   }
 
   bool is_capturing(Stream stream) const {
@@ -139,15 +141,11 @@ class CudaDevice {
   template <class Work>
   void capture(Stream stream, const Work& work) {
     const DeviceGuard guard(device_);
-    if (!is_captured_) serial_.record(stream_.get());
-    is_captured_ = true;
     struct Target {
       ~Target() { *target = before; }
       Stream *target, before;
     } const target{&target_, std::exchange(target_, stream)};
-    serial_.wait_in_graph(stream);
     work();
-    serial_.record_in_graph(stream);
   }
 
   void mark(int i) { JFPX_CUDA_TRY(cudaEventRecord(marks_[i].get(), stream_.get())); }
@@ -189,11 +187,6 @@ class CudaDevice {
   template <class Program>
   struct Limits : Launch {};
 
-  /// Later work of the world waits for the graphs that have been launched so far.
-  void wait_for_graphs() {
-    if (is_captured_) serial_.wait(stream_.get());
-  }
-
   template <class T>
   void transfer(T* to, const T* from, std::size_t count, cudaMemcpyKind kind) {
     if (count == 0) return;
@@ -206,10 +199,7 @@ class CudaDevice {
   Stream target_ = stream_.get();  ///< of launches: `stream_`, or one that is being captured
   MemoryPool pool_;
   OwnedEvent marks_[device::kMarks];
-  OrderingEvent fork_;
-  /// Recorded after enqueued steps, and by captured graphs, so that these follow each other.
-  OrderingEvent serial_;
-  bool is_captured_ = false;
+  OrderingEvent order_;
   DeviceSearch search_;
   DeviceBuffer<std::uint32_t> scratch_;
   int multiprocessors_ = 0;

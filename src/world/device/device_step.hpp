@@ -36,7 +36,7 @@ inline constexpr int kMarks = 4;
 ///   - `find_pairs(spheres, n, pairs, capacity, count)`: as cuda::DeviceSphereCollider, after
 ///     `reserve_pairs(n, capacity)`;
 ///   - `run(program, items)`: runs program(team) with about one thread per item;
-///   - `wait()`: until all work is complete, also that of captured graphs;
+///   - `wait()`: until all work is complete; `wait_for_graphs()`: until all launched graphs are;
 ///   - `fork(stream)`, `join(stream)`: later work of this object waits for earlier work of another
 ///     stream, and the other way round;
 ///   - `is_capturing(stream)`: whether it is being captured; `capture(stream, work)`: calls work(),
@@ -183,8 +183,10 @@ class DeviceStep final : public DeviceWorld {
     device_->capture(stream, [&] {
       for (std::uint32_t n = 0; n < count; ++n) run_programs(false);
     });
+    graph_version_ = version();
     return true;
   }
+  bool has_graph() const noexcept override { return graph_version_ == version(); }
 
   void hold() override {
     sent_.held = 1;
@@ -196,6 +198,7 @@ class DeviceStep final : public DeviceWorld {
   void wait_for(cuda::Stream stream) override { device_->fork(stream); }
 
   Finished finish() override {
+    if (has_graph()) device_->wait_for_graphs();
     const Counters found = counters();
     const Progress& progress = found.progress;
     if (progress.missing > 0) missing_ = progress.missing;  // or a failed call has found them
@@ -218,7 +221,7 @@ class DeviceStep final : public DeviceWorld {
             bodies.velocity,
             bodies.angular_velocity,
             &data_.counters->progress.missing,
-            transfer_.moves() + changes_};
+            version()};
   }
 
   Vec3 fetch_position(std::uint32_t body) override {
@@ -291,6 +294,9 @@ class DeviceStep final : public DeviceWorld {
     use_sub_shapes();
     bodies_.swap_ids(bodies.size(), &data_.step.bodies);
   }
+
+  /// DeviceStates::version; never 0 after an upload.
+  std::uint64_t version() const { return transfer_.moves() + changes_; }
 
   /// Between two steps, contacts_[now()] are those of the step before the last.
   std::uint64_t now() const { return known_.completed & 1; }
@@ -459,15 +465,16 @@ class DeviceStep final : public DeviceWorld {
   ForceBuffers<Device> forces_;
   Contacts contacts_[2];  ///< as Progress::contacts
   ScratchBuffers<Device> scratch_;
-  std::size_t room_ = 0;        ///< number of slots that the buffers of bodies have memory for
-  std::size_t most_parts_ = 0;  ///< of compounds, with those that were removed
-  Progress known_;              ///< of the steps that the host has waited for
-  Progress sent_;               ///< Progress::offset and held, as the device has them
-  Progress source_;             ///< of copies to the device
-  std::uint64_t missing_ = 0;   ///< for finish(), if a call of it fails
-  std::uint64_t changes_ = 0;   ///< of arguments of the programs, apart from addresses
-  bool has_stepped_ = false;    ///< whether a step was completed since the upload
-  bool is_ready_ = false;       ///< whether all lists have the room of capacity_
+  std::size_t room_ = 0;             ///< number of slots that the buffers of bodies have memory for
+  std::size_t most_parts_ = 0;       ///< of compounds, with those that were removed
+  Progress known_;                   ///< of the steps that the host has waited for
+  Progress sent_;                    ///< Progress::offset and held, as the device has them
+  Progress source_;                  ///< of copies to the device
+  std::uint64_t missing_ = 0;        ///< for finish(), if a call of it fails
+  std::uint64_t changes_ = 0;        ///< of arguments of the programs, apart from addresses
+  std::uint64_t graph_version_ = 0;  ///< version() of the last captured graph; 0: none
+  bool has_stepped_ = false;         ///< whether a step was completed since the upload
+  bool is_ready_ = false;            ///< whether all lists have the room of capacity_
   // Of edit().
   Buffer<EditedBody> edits_;
   Buffer<EditedMass> masses_;
