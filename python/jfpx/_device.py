@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -23,6 +24,27 @@ def is_on_device(array: Any) -> bool:
     if hasattr(array, "__dlpack_device__"):
         return array.__dlpack_device__()[0] in _CUDA_DEVICES
     return hasattr(array, "__cuda_array_interface__")
+
+
+def stream_address(stream: Any, device: int) -> int:
+    """Address of a CUDA stream of PyTorch, CuPy or another library; None: the current stream of
+    PyTorch, if it uses a GPU, or of CuPy, otherwise the default stream."""
+    if stream is None:
+        torch, cupy = sys.modules.get("torch"), sys.modules.get("cupy")
+        if torch is not None and torch.cuda.is_initialized():
+            return torch.cuda.current_stream(device).cuda_stream
+        if cupy is not None:
+            with cupy.cuda.Device(device):
+                return cupy.cuda.get_current_stream().ptr
+        return 0
+    for name in ("cuda_stream", "ptr"):
+        if hasattr(stream, name):
+            return int(getattr(stream, name))
+    if hasattr(stream, "__cuda_stream__"):
+        return int(stream.__cuda_stream__()[1])
+    if isinstance(stream, int) and not isinstance(stream, bool) and stream >= 0:
+        return stream
+    raise InvalidArgument(f"stream is {stream!r}; it must be a CUDA stream or the address of one")
 
 
 class View(NamedTuple):

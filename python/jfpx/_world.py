@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _arrays
+from . import _arrays, _device
 from ._errors import Closed, ConcurrentUse, InvalidArgument
 from ._forces import BodyId, BodyState, ForceContext, States, Vector
 from ._scene import Scene
@@ -181,6 +181,7 @@ class World:
         self._core = _arrays.precision_of(self._dtype).World(
             scene._scene, backend, algorithm, _arrays.count(threads, "threads", 0, 256),
             _arrays.count(device, "device", 0, 2**31 - 1))
+        self._device = device
         self._report: StepReport | None = None
 
     # Steps
@@ -231,9 +232,60 @@ class World:
                 break
         return report
 
+    def enqueue_steps(self, count: int, stream: Any = None) -> None:
+        """Enqueues steps on the GPU that steps the world, after earlier work of a stream and before
+        its later work, and returns without waiting. All results are those of step(), bit for bit:
+        whatever reads or changes the world waits first, and makes the steps that the GPU has left
+        to the host. Arrays of device_states() stay valid, and change in place.
+
+        While the stream is being captured, the steps become part of its graph. The world must then
+        have made a step on the GPU, and `device_version` must have been read after the last change;
+        the graph is valid as long as that has the same value. With functions as forces, and in a
+        world that sleeps, the steps are made at once.
+
+        Parameters
+        ----------
+        count : int in [0, 2^32 - 1]
+            Number of steps.
+        stream : optional
+            A stream of PyTorch or CuPy, an object with `__cuda_stream__()`, or the address of a
+            cudaStream_t. None: the current stream of PyTorch, if that uses a GPU, or of CuPy,
+            otherwise the default stream.
+
+        Raises
+        ------
+        InvalidArgument
+            An argument is out of its range, or the stream is being captured and the world needs the
+            host for its steps.
+        BackendUnavailable
+            As device_states().
+        OutOfMemory, DeviceError, ConcurrentUse, Closed
+        """
+        self._core.enqueue_steps(_arrays.count(count, "count", 0, 2**32 - 1),
+                                 _device.stream_address(stream, self._device))
+
+    def finish_steps(self) -> StepReport:
+        """Waits for all steps of enqueue_steps() and of graphs, makes those that the GPU has left to
+        the host, and returns the report of the last, without times of the stages.
+
+        Raises
+        ------
+        OutOfMemory, DeviceError, ConcurrentUse, Closed
+        """
+        self._report = StepReport(*self._core.finish_steps())
+        return self._report
+
+    @property
+    def device_version(self) -> int:
+        """Changes when a captured graph of steps becomes invalid: when bodies or forces come or go,
+        when the world moves to the host, and when lists of contacts need more memory. Sends changes
+        to the GPU. Raises as device_states()."""
+        return self._core.device_version()
+
     @property
     def report(self) -> StepReport | None:
-        """Report of the last step() or run() that returned; None before the first."""
+        """Report of the last step(), run() or finish_steps() that returned; None before the
+        first."""
         return self._report
 
     @property

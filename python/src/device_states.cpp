@@ -71,6 +71,24 @@ cuda::DeviceStates PythonWorld::device_states() {
   return states;
 }
 
+void PythonWorld::enqueue_steps(std::uint32_t count, cuda::Stream stream) {
+  if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
+  World& world = *existing();
+  const UseGuard guard(in_use_, "world");
+  const nb::gil_scoped_release release;
+  cuda::enqueue_steps(world, count, stream);
+}
+
+StepReport PythonWorld::finish_steps() {
+  if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
+  World& world = *existing();
+  const UseGuard guard(in_use_, "world");
+  const nb::gil_scoped_release release;
+  const StepReport report = cuda::finish_steps(world);
+  if (!report.device_failure.empty()) ++changes_;
+  return report;
+}
+
 void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world) {
   nb::class_<DeviceRows>(
       module, "DeviceRows", nb::type_slots(kRowsSlots),
@@ -93,6 +111,12 @@ void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world) {
     return nb::make_tuple(rows_of(s.positions, s, self), rows_of(s.orientations, s, self),
                           rows_of(s.velocities, s, self), rows_of(s.angular_velocities, s, self));
   });
+  world.def("device_version", [](PythonWorld& self) { return self.device_states().version; })
+      .def("enqueue_steps",
+           [](PythonWorld& self, std::uint32_t count, std::uintptr_t stream) {
+             self.enqueue_steps(count, reinterpret_cast<cuda::Stream>(stream));
+           })
+      .def("finish_steps", [](PythonWorld& self) { return to_python(self.finish_steps()); });
 }
 
 }  // namespace python

@@ -48,17 +48,6 @@ void set_states(World& world, const std::vector<BodyState>& states) {
   for (std::size_t i = 0; i < bodies.size(); ++i) world.set_state(bodies[i], states[i]);
 }
 
-/// A report as the tuple jfpx.StepReport, in the order of its fields.
-nb::tuple to_python(const StepReport& r) {
-  std::optional<IdTuple> lost;
-  if (r.non_finite) lost = to_tuple(r.non_finite_body);
-  return nb::make_tuple(r.step, r.contacts, r.sphere_contacts, r.generated_contacts,
-                        r.position_iterations, r.velocity_iterations, r.iterations_exhausted,
-                        r.non_finite, lost, r.awake, std::string(to_string(r.backend)),
-                        std::string(to_string(r.algorithm)), std::string(to_string(r.choice)),
-                        r.device_failure, r.integrate_ms, r.detect_ms, r.resolve_ms, r.total_ms);
-}
-
 void bind_bodies(nb::class_<PythonWorld>& world) {
   world.def("size", [](const PythonWorld& self) { return self.get().bodies().size(); })
       .def("bodies",
@@ -171,6 +160,16 @@ void bind_properties(nb::class_<PythonWorld>& world) {
 }
 
 }  // namespace
+
+nb::tuple to_python(const StepReport& r) {
+  std::optional<IdTuple> lost;
+  if (r.non_finite) lost = to_tuple(r.non_finite_body);
+  return nb::make_tuple(r.step, r.contacts, r.sphere_contacts, r.generated_contacts,
+                        r.position_iterations, r.velocity_iterations, r.iterations_exhausted,
+                        r.non_finite, lost, r.awake, std::string(to_string(r.backend)),
+                        std::string(to_string(r.algorithm)), std::string(to_string(r.choice)),
+                        r.device_failure, r.integrate_ms, r.detect_ms, r.resolve_ms, r.total_ms);
+}
 
 void fill(const StateArrays& arrays, std::span<const BodyState> states) {
   for (const Rows<Real>* array :

@@ -43,6 +43,9 @@ class PythonWorld {
   StepReport run(std::uint64_t steps);
   /// States in device memory, valid until the next step or change.
   cuda::DeviceStates device_states();
+  /// Steps on a GPU that do not wait, and the wait for them. device_states() of before stay valid.
+  void enqueue_steps(std::uint32_t count, cuda::Stream stream);
+  StepReport finish_steps();
   /// Changes when device_states() of before become invalid.
   std::uint64_t changes() const { return changes_; }
   /// Frees the world now. Every later access fails.
@@ -80,6 +83,9 @@ struct FunctionContext {
     return *context;
   }
 };
+
+/// A report as the tuple jfpx.StepReport, in the order of its fields.
+nb::tuple to_python(const StepReport& report);
 
 void bind_forces(nb::module_& module, nb::class_<PythonWorld>& world);
 void bind_contacts(nb::class_<PythonWorld>& world);

@@ -456,3 +456,37 @@ def test_a_step_waits_for_readers_of_the_states():
         world.step()
         np.testing.assert_array_equal(copy.cpu().numpy(), expected)
         assert (world.positions != expected).any()
+
+
+def test_steps_are_enqueued_on_the_current_stream(library, dtype):
+    host, world = (jfpx.World(grid_scene(dtype), backend=backend) for backend in ("cpu", "cuda"))
+    world.step()
+    host.step()
+    positions = library.module.from_dlpack(world.device_states().positions)
+    for count in (1, 5, 0, 3):
+        world.enqueue_steps(count)
+        for _ in range(count):
+            host.step()
+        assert world.finish_steps().step == host.report.step
+        np.testing.assert_array_equal(library.to_host(positions), host.positions)
+
+
+def test_steps_are_captured_in_a_graph_of_torch(dtype):
+    torch = Torch().module
+    host, world = (jfpx.World(grid_scene(dtype), backend=backend) for backend in ("cpu", "cuda"))
+    for made in (host, world):
+        made.run(300)
+    version = world.device_version
+    positions = torch.from_dlpack(world.device_states().positions)
+    heights = torch.zeros(len(positions), dtype=positions.dtype, device="cuda")
+    graph = torch.cuda.CUDAGraph()
+    with torch.cuda.graph(graph):
+        world.enqueue_steps(2)
+        heights.copy_(positions[:, 1])
+    for _ in range(10):
+        graph.replay()
+        host.run(2)
+    assert world.finish_steps().step == host.report.step
+    assert world.state_hash() == host.state_hash()
+    if world.device_version == version:
+        np.testing.assert_array_equal(heights.cpu().numpy(), host.positions[:, 1])

@@ -27,9 +27,16 @@ def test_a_world_on_the_host_has_no_device_states():
     world = jfpx.World("pile", backend="cpu")
     with pytest.raises(jfpx.BackendUnavailable, match="has no device"):
         world.device_states()
+    with pytest.raises(jfpx.BackendUnavailable, match="has no device"):
+        world.enqueue_steps(1)
+    for count, stream in ((-1, None), (1.5, None), (2**32, None), (1, "stream"), (1, -1)):
+        with pytest.raises(jfpx.InvalidArgument):
+            world.enqueue_steps(count, stream)
+    assert world.finish_steps().step == 0 and world.time == 0
     world.close()
-    with pytest.raises(jfpx.Closed):
-        world.device_states()
+    for call in (world.device_states, world.finish_steps, lambda: world.enqueue_steps(1)):
+        with pytest.raises(jfpx.Closed):
+            call()
 
 
 def test_a_ball_falls_and_comes_to_rest_on_the_floor(dtype):
