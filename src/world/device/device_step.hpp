@@ -170,6 +170,7 @@ class DeviceStep final : public DeviceWorld {
                std::uint64_t* left) override {
     select_forces(forces);
     release(steps);
+    is_queued_ = true;
     for (; *left > 0; --*left) run_programs(false);
     device_->join(stream);
   }
@@ -180,6 +181,7 @@ class DeviceStep final : public DeviceWorld {
                cuda::Stream stream) override {
     if (!has_stepped_ || !is_prepared(forces, steps)) return false;
     select_forces(forces);
+    is_queued_ = true;
     device_->capture(stream, [&] {
       for (std::uint32_t n = 0; n < count; ++n) run_programs(false);
     });
@@ -340,10 +342,11 @@ class DeviceStep final : public DeviceWorld {
     send(&Progress::held, 0u);
   }
 
-  /// Grows the lists that were too short, and some more.
+  /// Grows the lists that were too short, and some more: much more, if a step without room leaves
+  /// those after it to the host.
   void grow_lists(const Capacity& needed) {
-    const auto grow = [](auto* capacity, auto count) {
-      if (count > *capacity) *capacity = count + count / 4 + 64;
+    const auto grow = [this](auto* capacity, auto count) {
+      if (count > *capacity) *capacity = count + (is_queued_ ? count : count / 4) + 64;
     };
     grow(&capacity_.pairs, needed.pairs);
     grow(&capacity_.spheres, needed.spheres);
@@ -474,6 +477,7 @@ class DeviceStep final : public DeviceWorld {
   std::uint64_t changes_ = 0;        ///< of arguments of the programs, apart from addresses
   std::uint64_t graph_version_ = 0;  ///< version() of the last captured graph; 0: none
   bool has_stepped_ = false;         ///< whether a step was completed since the upload
+  bool is_queued_ = false;           ///< whether the host has enqueued or captured steps
   bool is_ready_ = false;            ///< whether all lists have the room of capacity_
   // Of edit().
   Buffer<EditedBody> edits_;
