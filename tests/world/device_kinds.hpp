@@ -107,16 +107,15 @@ inline std::vector<DeviceKind> device_kinds() {
 /// A stream that a program has made itself, or the default stream; on the host, none.
 class StreamOfUser {
  public:
-  explicit StreamOfUser(const DeviceKind& kind, bool is_default = false) : is_cuda_(kind.is_cuda) {
+  explicit StreamOfUser(const DeviceKind& kind, bool is_default = false)
+      : is_cuda_(kind.is_cuda), is_own_(kind.is_cuda && !is_default) {
 #if JFPX_HAS_CUDA
-    if (is_cuda_ && !is_default) {
-      require(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
-    }
+    if (is_own_) require(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
 #endif
   }
   ~StreamOfUser() {
 #if JFPX_HAS_CUDA
-    if (stream_ != nullptr) cudaStreamDestroy(stream_);
+    if (is_own_) cudaStreamDestroy(stream_);
 #endif
   }
   StreamOfUser(const StreamOfUser&) = delete;
@@ -135,7 +134,7 @@ class StreamOfUser {
   }
 
  private:
-  bool is_cuda_;
+  bool is_cuda_, is_own_;
   cuda::Stream stream_ = nullptr;
 };
 

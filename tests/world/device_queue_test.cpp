@@ -511,9 +511,13 @@ TEST_P(DeviceQueueTest, StatesAreUpdatedInTheOrderOfTheStream) {
 TEST_P(DeviceQueueTest, ConcurrentReadersFinishAQueueOnce) {
   const Scene scene = scenes::make("pile", {.spheres = 60});
   World host = on_host(scene), device = on_device(scene);
-  make_steps(&host, 2), make_steps(&device, 2);
+  make_steps(&host, 300), make_steps(&device, 300);
+  const std::uint64_t version = cuda::device_states(device).version;
+  const auto graph = graph_of(&device, 12);
   for (int n = 0; n < 10; ++n) {
-    cuda::enqueue_steps(device, 12, nullptr);
+    for (World* world : {&host, &device}) world->apply_force(world->bodies()[5], {0, 60, 0});
+    ASSERT_EQ(cuda::device_states(device).version, version);
+    n % 2 == 0 ? graph() : cuda::enqueue_steps(device, 12, nullptr);
     make_steps(&host, 12);
     const std::uint64_t hash = host.state_hash();
     const std::size_t contacts = host.contacts().size();
