@@ -193,7 +193,7 @@ struct World::Impl {
   bool advance_on_device(StepReport* report);
   bool step_on_device(StepReport* report);
   void complete_on_device(std::uint64_t count);
-  void lose_device(const std::string& failure) noexcept;
+  void lose_device(const std::string& failure);
   static void fill_report(const DeviceWorld::Result& result, StepReport* report);
   void apply_forces_on_host();
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);

@@ -317,7 +317,7 @@ void World::Impl::fill_report(const DeviceWorld::Result& result, StepReport* rep
 }
 
 /// The CPU makes all later steps.
-void World::Impl::lose_device(const std::string& failure) noexcept {
+void World::Impl::lose_device(const std::string& failure) {
   device_failure = failure;
   device.reset();
   if (automatic != nullptr) automatic->give_up();
