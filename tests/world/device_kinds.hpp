@@ -104,19 +104,16 @@ inline std::vector<DeviceKind> device_kinds() {
   return kinds;
 }
 
+#if JFPX_HAS_CUDA
 /// A stream that a program has made itself, or the default stream; on the host, none.
 class StreamOfUser {
  public:
   explicit StreamOfUser(const DeviceKind& kind, bool is_default = false)
       : is_cuda_(kind.is_cuda), is_own_(kind.is_cuda && !is_default) {
-#if JFPX_HAS_CUDA
     if (is_own_) require(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
-#endif
   }
   ~StreamOfUser() {
-#if JFPX_HAS_CUDA
     if (is_own_) cudaStreamDestroy(stream_);
-#endif
   }
   StreamOfUser(const StreamOfUser&) = delete;
   StreamOfUser& operator=(const StreamOfUser&) = delete;
@@ -124,19 +121,26 @@ class StreamOfUser {
   cuda::Stream get() const { return stream_; }
   /// Copies from the device in the order of the stream, and waits.
   void read(void* to, const void* from, std::size_t bytes) const {
-#if JFPX_HAS_CUDA
-    if (is_cuda_) {
-      require(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, stream_));
-      return require(cudaStreamSynchronize(stream_));
+    if (!is_cuda_) {
+      std::memcpy(to, from, bytes);
+      return;
     }
-#endif
-    std::memcpy(to, from, bytes);
+    require(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, stream_));
+    require(cudaStreamSynchronize(stream_));
   }
 
  private:
   bool is_cuda_, is_own_;
   cuda::Stream stream_ = nullptr;
 };
+#else
+class StreamOfUser {
+ public:
+  explicit StreamOfUser(const DeviceKind&, bool = false) {}
+  cuda::Stream get() const { return nullptr; }
+  void read(void* to, const void* from, std::size_t bytes) const { std::memcpy(to, from, bytes); }
+};
+#endif
 
 }  // namespace test
 }  // namespace JFPX_ABI

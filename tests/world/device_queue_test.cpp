@@ -490,7 +490,7 @@ TEST_P(DeviceQueueTest, StatesAreUpdatedInTheOrderOfTheStream) {
   const Scene scene = scenes::make("pile", {.spheres = 100});
   World host = on_host(scene), device = on_device(scene);
   make_steps(&host, 400), make_steps(&device, 400);
-  for (int n = 0; n < 5; ++n) {
+  for (std::size_t n = 0; n < 5; ++n) {
     for (World* world : {&host, &device}) world->apply_force(world->bodies()[n], {0, 50, 0});
     const test::StreamOfUser stream(GetParam());
     cuda::enqueue_steps(device, 4, stream.get());

@@ -56,23 +56,22 @@ JFPX_API DeviceStates device_states(World& world);
 ///
 /// The device leaves a step to the host if a list of contacts is too short, if a body runs away, or
 /// if a force must wake a body. This step and those after it then have no effect on the device, and
-/// the host makes them when it waits. Kernels that cannot rely on the host read
-/// *DeviceStates::missing_steps. Steps with user-defined forces or contact generators, and all
-/// steps of a sleeping world, are made before the call returns. If a CUDA call fails, the CPU makes
-/// the steps, and finish_steps() reports the reason.
+/// the host makes them when it waits. Kernels find the number of these steps at
+/// DeviceStates::missing_steps. Steps with user-defined forces or contact generators, and all steps
+/// of a sleeping world, are made before the call returns. If a CUDA call fails, the CPU makes the
+/// steps, and finish_steps() reports the reason.
 ///
 /// If `stream` is being captured, the steps become part of its CUDA graph, and each launch of the
 /// graph makes them. Graphs, enqueued steps and single steps may follow each other; after a change
 /// of the world, a graph leaves its steps to the host until device_states(), step() or
 /// enqueue_steps() has sent the change. Requirements:
-///   - the world has made a step on the device since it moved there, has no changes since, has no
-///     user-defined forces and contact generators, and device_states() has been called since the
-///     last change;
+///   - the world has made a step on the device since it moved there, device_states() has been called
+///     after the last change, and there are no user-defined forces and contact generators;
 ///   - a graph is launched only while DeviceStates::version is that of the capture, and not
 ///     concurrently with another call on the world; the caller orders streams, if several launch
 ///     graphs of the world, or enqueue steps;
 ///   - after an exception, the captured graph is discarded;
-///   - while a stream is captured, only enqueue_steps() and device_states() are called.
+///   - while a stream is being captured, no other function of the world is called.
 /// As long as a graph is valid, waiting for the steps of the world waits for the whole device.
 ///
 /// A reference from World::force() must not be used for a change while steps are in progress: call
