@@ -1,11 +1,13 @@
 /// Times of the steps of worlds on a GPU: device_steps SCENE SPHERES STEPS [SCENE SPHERES STEPS]...
-/// Prints the median of the last 100 steps, with all bodies awake. "shuffled" is `pile` with its
+/// Prints the median of the last 100 steps, with all bodies awake, and of 20 calls of states() each
+/// of which follows another step. "shuffled" is `pile` with its
 /// bodies in a random order. The boxes of `mixed` do not count as spheres.
 #include <jfpx/error.hpp>
 #include <jfpx/random.hpp>
 #include <jfpx/world.hpp>
 
 #include "bench/world/samples.hpp"
+#include "src/base/stopwatch.hpp"
 #include "src/scenes/scenes.hpp"
 
 #include <algorithm>
@@ -32,7 +34,7 @@ jfpx::Scene make_scene(const std::string& name, std::uint32_t spheres) {
 
 void measure(const std::string& name, std::uint32_t spheres, int steps) {
   jfpx::World world(make_scene(name, spheres), {.collider = {.backend = jfpx::Backend::cuda}});
-  std::vector<double> total, detect, resolve;
+  std::vector<double> total, detect, resolve, read;
   jfpx::StepReport report;
   for (int n = 0; n < steps; ++n) {
     report = world.step();
@@ -42,9 +44,17 @@ void measure(const std::string& name, std::uint32_t spheres, int steps) {
     detect.push_back(report.detect_ms);
     resolve.push_back(report.resolve_ms);
   }
-  std::printf("%-14s %9u %6d %10" PRIu64 " %8.3f %8.3f %8.3f   %016" PRIx64 "\n", name.c_str(),
-              spheres, steps, report.contacts, jfpx::bench::median(total),
-              jfpx::bench::median(detect), jfpx::bench::median(resolve), world.state_hash());
+  const std::uint64_t hash = world.state_hash();
+  for (int n = 0; n < 20; ++n) {
+    world.step();
+    jfpx::Stopwatch watch;
+    benchmark::DoNotOptimize(world.states());
+    read.push_back(watch.lap_ms());
+  }
+  std::printf("%-14s %9u %6d %10" PRIu64 " %8.3f %8.3f %8.3f %9.3f   %016" PRIx64 "\n",
+              name.c_str(), spheres, steps, report.contacts, jfpx::bench::median(total),
+              jfpx::bench::median(detect), jfpx::bench::median(resolve), jfpx::bench::median(read),
+              hash);
   std::fflush(stdout);
 }
 
@@ -56,7 +66,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    std::printf("scene            spheres  steps   contacts  step ms   detect    solve   hash\n");
+    std::printf(
+        "scene            spheres  steps   contacts  step ms   detect    solve  states()   hash\n");
     for (int i = 1; i < argc; i += 3) {
       measure(argv[i], static_cast<std::uint32_t>(std::strtoul(argv[i + 1], nullptr, 10)),
               std::atoi(argv[i + 2]));

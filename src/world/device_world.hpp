@@ -3,6 +3,7 @@
 
 #include <jfpx/cuda/world.hpp>
 
+#include "src/base/thread_pool.hpp"
 #include "src/contact_solver/contact_set.hpp"
 #include "src/world/bodies_of_step.hpp"
 #include "src/world/detected_contacts.hpp"
@@ -111,8 +112,10 @@ class DeviceWorld {
   /// The states on the device, with the lifetimes of cuda::device_states().
   virtual cuda::DeviceStates states() const noexcept = 0;
   virtual Vec3 fetch_position(std::uint32_t body) = 0;
-  /// Copies the motion of all bodies to the host.
-  virtual void fetch_motion(MotionArrays* moving) = 0;
+  /// Copies what BodyState has of all bodies to the host. @param pool makes a part of the copies
+  virtual void fetch_states(MotionArrays* moving, ThreadPool* pool) = 0;
+  /// Copies the motion of all bodies to the host, likewise.
+  virtual void fetch_motion(MotionArrays* moving, ThreadPool* pool) = 0;
   /// Copies the contacts of the last step, with their impulses and colors.
   virtual void fetch_contact_set(soft_step::ContactSet* last) = 0;
   /// Copies what ContactListMaker needs, of the last step or of the step before it.

@@ -52,12 +52,14 @@ const Shape& World::shape(BodyId id) const { return impl_->store.shape(impl_->st
 std::vector<BodyState> World::states() const {
   std::vector<BodyState> states;
   states.reserve(bodies().size());
-  const BodyStore& store = impl_->bodies();
+  const BodyStore& store = impl_->bodies_with_states();
   for (const BodyId id : bodies()) states.push_back(store.state(id.index));
   return states;
 }
 
-BodyState World::state(BodyId id) const { return impl_->bodies().state(impl_->store.require(id)); }
+BodyState World::state(BodyId id) const {
+  return impl_->bodies_with_states().state(impl_->store.require(id));
+}
 
 void World::set_state(BodyId id, const BodyState& state) {
   const std::uint32_t body = impl_->store.require(id);

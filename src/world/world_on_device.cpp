@@ -67,7 +67,7 @@ void World::Impl::enter_device() {
   device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
   resident = true;
   note_forces();
-  motion_is_current = contact_set_is_current = true;
+  motion_is_current = states_are_current = contact_set_is_current = true;
 }
 
 BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
@@ -81,9 +81,9 @@ BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
   all.sets_pairs |= edit.sets_pairs;
   all.wakes |= edit.wakes;
   all.wakes_neighbors |= edit.wakes_neighbors;
-  if (edit.wakes_neighbors) motion_is_current = false;
+  if (edit.wakes_neighbors) motion_is_current = states_are_current = false;
   if (edit.sets_mass) {  // the device has the orientation, and computes the inertia in world axes
-    motion_is_current = false;
+    motion_is_current = states_are_current = false;
     force_table.invalidate();
   }
   return store;
@@ -139,7 +139,7 @@ void World::Impl::remove(BodyId id) {
   BodyEdit& edit = edits[body];
   remember_listed(body);
   edit = {.wakes_neighbors = true, .is_removed = true};
-  motion_is_current = false;
+  motion_is_current = states_are_current = false;
   store.remove(id);
   soft_step.forget(body);
   force_table.invalidate();
@@ -163,7 +163,7 @@ void World::Impl::flush_edits() {
 
 Vec3 World::Impl::position(std::uint32_t body) {
   finish();
-  if (!resident || motion_is_current) return store.moving.position[body];
+  if (!resident || states_are_current) return store.moving.position[body];
   const auto edit = edits.find(body);
   if (edit != edits.end() && (edit->second.sets_state || edit->second.is_added))
     return store.moving.position[body];
@@ -175,8 +175,17 @@ void World::Impl::fetch_motion() {
   if (motion_is_current) return;
   flush_edits();
   const ScopedTimer timer(&spent_us);
-  device->fetch_motion(&store.moving);
-  motion_is_current = true;
+  device->fetch_motion(&store.moving, pool.get());
+  motion_is_current = states_are_current = true;
+}
+
+void World::Impl::fetch_states() {
+  const std::lock_guard lock(fetching);
+  if (states_are_current) return;
+  flush_edits();
+  const ScopedTimer timer(&spent_us);
+  device->fetch_states(&store.moving, pool.get());
+  states_are_current = true;
 }
 
 void World::Impl::make_list(bool of_step_before, ContactList* list) {
@@ -304,7 +313,7 @@ void World::Impl::complete_on_device(std::uint64_t count) {
   contacts.invalidate();
   changed_before = std::exchange(changed, {});
   soft_step.forget_none();
-  motion_is_current = contact_set_is_current = false;
+  motion_is_current = states_are_current = contact_set_is_current = false;
 }
 
 void World::Impl::fill_report(const DeviceWorld::Result& result, StepReport* report) {

@@ -128,7 +128,7 @@ std::vector<BodyId> bodies_touching(const Solid& solid, const Vec3& centre, cons
 
 std::optional<RayHit> World::cast_ray(const Ray& given, const BodyFilter& filter) const {
   const Ray ray = checked(given);
-  const BodyStore& bodies = impl_->bodies();
+  const BodyStore& bodies = impl_->bodies_with_states();
   std::optional<RayHit> closest;
   impl_->tree_of(bodies).visit_along(ray, [&](std::uint32_t body) {
     const std::optional<RayHit> hit = hit_of(ray, bodies, body);
@@ -140,7 +140,7 @@ std::optional<RayHit> World::cast_ray(const Ray& given, const BodyFilter& filter
 
 std::vector<RayHit> World::cast_ray_through(const Ray& given, const BodyFilter& filter) const {
   const Ray ray = checked(given);
-  const BodyStore& bodies = impl_->bodies();
+  const BodyStore& bodies = impl_->bodies_with_states();
   std::vector<RayHit> hits;
   impl_->tree_of(bodies).visit_along(ray, [&](std::uint32_t body) {
     const std::optional<RayHit> hit = hit_of(ray, bodies, body);
@@ -156,7 +156,7 @@ std::vector<BodyId> World::overlapping(const Sphere& sphere, const Vec3& centre)
   if (!(sphere.radius > 0 && sphere.radius <= kMaxCoordinate)) {
     throw_invalid("sphere radius", to_text(sphere.radius), "> 0 and at most 1e9");
   }
-  const BodyStore& bodies = impl_->bodies();
+  const BodyStore& bodies = impl_->bodies_with_states();
   return bodies_touching(SphereInstance{centre, sphere.radius}, centre,
                          half_extents(sphere, Transform{}), impl_->tree_of(bodies), bodies);
 }
@@ -172,7 +172,7 @@ std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
   const std::string fault = find_fault(BodyState{centre, orientation, {}, {}});
   if (!fault.empty()) throw InvalidArgument("box " + fault);
   const Transform pose = make_transform(normalized(orientation), centre);
-  const BodyStore& bodies = impl_->bodies();
+  const BodyStore& bodies = impl_->bodies_with_states();
   return bodies_touching(PosedBox{box, pose}, centre, half_extents(box, pose),
                          impl_->tree_of(bodies), bodies);
 }

@@ -70,7 +70,12 @@ class FailingDevice final : public DeviceWorld {
   Finished finish() override { return device_->finish(); }
   cuda::DeviceStates states() const noexcept override { return device_->states(); }
   Vec3 fetch_position(std::uint32_t body) override { return device_->fetch_position(body); }
-  void fetch_motion(MotionArrays* moving) override { device_->fetch_motion(moving); }
+  void fetch_states(MotionArrays* moving, ThreadPool* pool) override {
+    device_->fetch_states(moving, pool);
+  }
+  void fetch_motion(MotionArrays* moving, ThreadPool* pool) override {
+    device_->fetch_motion(moving, pool);
+  }
   void fetch_contact_set(soft_step::ContactSet* last) override { device_->fetch_contact_set(last); }
   void fetch_contacts(const BodiesOfStep& bodies, bool of_step_before, soft_step::ContactSet* set,
                       DetectedContacts* detected) override {

@@ -745,6 +745,28 @@ TEST_P(DeviceWorldTest, ARunawayBodyUndoesTheStep) {
   }
 }
 
+// The states are a part of the motion, and are fetched without the rest.
+TEST_P(DeviceWorldTest, TheRestOfTheMotionIsFetchedAfterTheStates) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  const Scene scene = random_scene(&random);
+  World host = on_host(scene), device = on_device(scene);
+  for (int n = 0; n < 40; ++n) {
+    host.step();
+    device.step();
+    if (n % 3 != 0) {
+      ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
+    }
+    for (const BodyId id : host.bodies()) {
+      ASSERT_EQ(host.awake(id), device.awake(id));
+      ASSERT_EQ(host.last_acceleration(id), device.last_acceleration(id));
+      ASSERT_EQ(host.inverse_inertia(id), device.inverse_inertia(id));
+    }
+    ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
+  }
+}
+
 TEST_P(DeviceWorldTest, AWorldWithoutBodies) {
   World device = on_device(Scene{});
   for (int n = 0; n < 3; ++n) EXPECT_EQ(device.step().contacts, 0u);

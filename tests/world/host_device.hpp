@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <stdexcept>
@@ -130,6 +131,9 @@ class HostDevice {
   template <class T>
   void download(T* to, const T* from, std::size_t count) {
     std::copy_n(from, count, to);
+  }
+  void fetch(const device::HostCopies& copies, ThreadPool*) {
+    for (const device::HostCopy& copy : copies) std::memcpy(copy.to, copy.from, copy.bytes);
   }
   template <class T>
   void copy(T* to, const T* from, std::size_t count) {

@@ -2,12 +2,15 @@
 #include "src/base/cuda/device_buffer.hpp"
 #include "src/base/cuda/device_code.hpp"
 #include "src/base/cuda/ordering_event.hpp"
+#include "src/base/parallel_for.hpp"
 #include "src/sphere_collider/cuda/device_search.hpp"
 #include "src/world/cuda/grid_team.cuh"
 #include "src/world/cuda/world_cuda.hpp"
 #include "src/world/device/device_step.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstring>
 #include <tuple>
 #include <utility>
 
@@ -65,6 +68,28 @@ class CudaDevice {
   template <class T>
   void download(T* to, const T* from, std::size_t count) {
     transfer(to, from, count, cudaMemcpyDeviceToHost);
+  }
+  /// Through page-locked memory, from which the pool copies: CUDA copies to other memory by one
+  /// thread, and in small pieces.
+  void fetch(const device::HostCopies& copies, ThreadPool* pool) {
+    const DeviceGuard guard(device_);
+    std::size_t bytes = 0;
+    for (const device::HostCopy& copy : copies) bytes += copy.bytes;
+    staging_.reserve_geometric(bytes, "the states of a world");
+    std::byte* at = staging_.data();
+    for (const device::HostCopy& copy : copies) {
+      transfer(at, static_cast<const std::byte*>(copy.from), copy.bytes, cudaMemcpyDeviceToHost);
+      at += copy.bytes;
+    }
+    wait();
+    constexpr std::size_t kBytesPerTask = std::size_t{1} << 18;
+    const std::byte* from = staging_.data();
+    for (const device::HostCopy& copy : copies) {
+      parallel_for(pool, copy.bytes, kBytesPerTask, [&](std::size_t first, std::size_t last) {
+        std::memcpy(static_cast<std::byte*>(copy.to) + first, from + first, last - first);
+      });
+      from += copy.bytes;
+    }
   }
   template <class T>
   void copy(T* to, const T* from, std::size_t count) {
@@ -202,6 +227,7 @@ class CudaDevice {
   OrderingEvent order_;
   DeviceSearch search_;
   DeviceBuffer<std::uint32_t> scratch_;
+  PinnedBuffer<std::byte> staging_;
   int multiprocessors_ = 0;
   std::tuple<Limits<device::ForceProgram>, Limits<device::BoundsProgram>,
              Limits<device::SphereProgram>, Limits<device::ShapeProgram>,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/world/body_store.hpp"
+#include "src/world/device/host_copy.hpp"
 #include "src/world/device/slot_values.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
@@ -36,19 +37,26 @@ class BodyBuffers {
     transfer.put(&rest_time_, from.rest_time);
   }
 
-  /// @param to as large as the arrays that were uploaded
-  void fetch_motion(const Transfer<Device>& transfer, MotionArrays* to) const {
-    transfer.get(&to->position, position_);
-    transfer.get(&to->orientation, orientation_);
-    transfer.get(&to->velocity, velocity_);
-    transfer.get(&to->angular_velocity, angular_velocity_);
-    transfer.get(&to->force, force_);
-    transfer.get(&to->torque, torque_);
-    transfer.get(&to->last_acceleration, last_acceleration_);
-    transfer.get(&to->inverse_inertia, inverse_inertia_);
-    transfer.get(&to->mean_motion, mean_motion_);
-    transfer.get(&to->rest_time, rest_time_);
-    transfer.get(&to->awake, awake_);
+  /// Copies of what BodyState has. @param to as large as the arrays that were uploaded
+  HostCopies state_copies(MotionArrays* to) const {
+    HostCopies copies;
+    add_copy(&copies, &to->position, position_);
+    add_copy(&copies, &to->orientation, orientation_);
+    add_copy(&copies, &to->velocity, velocity_);
+    add_copy(&copies, &to->angular_velocity, angular_velocity_);
+    return copies;
+  }
+  /// Copies of all arrays, likewise.
+  HostCopies motion_copies(MotionArrays* to) const {
+    HostCopies copies = state_copies(to);
+    add_copy(&copies, &to->force, force_);
+    add_copy(&copies, &to->torque, torque_);
+    add_copy(&copies, &to->last_acceleration, last_acceleration_);
+    add_copy(&copies, &to->inverse_inertia, inverse_inertia_);
+    add_copy(&copies, &to->mean_motion, mean_motion_);
+    add_copy(&copies, &to->rest_time, rest_time_);
+    add_copy(&copies, &to->awake, awake_);
+    return copies;
   }
 
   /// Undoes what a step changes before it can fail.

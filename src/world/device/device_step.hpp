@@ -33,6 +33,7 @@ inline constexpr int kMarks = 4;
 ///   - `Buffer<T>`: array in the memory of the device; data(), capacity();
 ///   - `reserve(&buffer, count, what)`: makes the capacity at least `count`, discards the contents;
 ///   - `upload(to, from, count)`, `download(to, from, count)`, `copy(to, from, count)`;
+///   - `fetch(copies, pool)`: makes HostCopies, and waits;
 ///   - `find_pairs(spheres, n, pairs, capacity, count)`: as cuda::DeviceSphereCollider, after
 ///     `reserve_pairs(n, capacity)`;
 ///   - `run(program, items)`: runs program(team) with about one thread per item;
@@ -233,9 +234,11 @@ class DeviceStep final : public DeviceWorld {
     return position;
   }
 
-  void fetch_motion(MotionArrays* moving) override {
-    bodies_.fetch_motion(transfer_, moving);
-    device_->wait();
+  void fetch_states(MotionArrays* moving, ThreadPool* pool) override {
+    device_->fetch(bodies_.state_copies(moving), pool);
+  }
+  void fetch_motion(MotionArrays* moving, ThreadPool* pool) override {
+    device_->fetch(bodies_.motion_copies(moving), pool);
   }
 
   void fetch_contact_set(soft_step::ContactSet* last) override {
