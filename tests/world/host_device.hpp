@@ -125,6 +125,11 @@ class HostDevice {
     buffer->reserve(count);
   }
   template <class T>
+  void reserve_exactly(Buffer<T>* buffer, std::size_t count, const char*) {
+    buffer->reserve(count);
+  }
+  void release_unused() {}
+  template <class T>
   void upload(T* to, const T* from, std::size_t count) {
     std::copy_n(from, count, to);
   }

@@ -62,6 +62,16 @@ class CudaDevice {
     buffer->reserve_geometric(pool_, stream_.get(), count, what);
   }
   template <class T>
+  void reserve_exactly(Buffer<T>* buffer, std::size_t count, const char* what) {
+    if (count <= buffer->capacity()) return;
+    const DeviceGuard guard(device_);
+    buffer->reserve(pool_, stream_.get(), count, what);
+  }
+  void release_unused() {
+    wait();
+    JFPX_CUDA_TRY(cudaMemPoolTrimTo(pool_.get(), 0));
+  }
+  template <class T>
   void upload(T* to, const T* from, std::size_t count) {
     transfer(to, from, count, cudaMemcpyHostToDevice);
   }

@@ -31,7 +31,9 @@ inline constexpr int kMarks = 4;
 /// @tparam Device owns a stream of work, or imitates one on the host:
 ///   - `number()`, `stream()`: as cuda::DeviceStates;
 ///   - `Buffer<T>`: array in the memory of the device; data(), capacity();
-///   - `reserve(&buffer, count, what)`: makes the capacity at least `count`, discards the contents;
+///   - `reserve(&buffer, count, what)`, `reserve_exactly(&buffer, count, what)`: makes the capacity
+///     at least `count`, with and without slack, and discards the contents; `release_unused()`:
+///     gives memory of smaller buffers back;
 ///   - `upload(to, from, count)`, `download(to, from, count)`, `copy(to, from, count)`;
 ///   - `fetch(copies, pool)`: makes HostCopies, and waits;
 ///   - `find_pairs(spheres, n, pairs, capacity, count)`: as cuda::DeviceSphereCollider, after
@@ -348,14 +350,7 @@ class DeviceStep final : public DeviceWorld {
   /// Grows the lists that were too short, and some more: much more, if a step without room leaves
   /// those after it to the host.
   void grow_lists(const Capacity& needed) {
-    const auto grow = [this](auto* capacity, auto count) {
-      if (count > *capacity) *capacity = count + (is_queued_ ? count : count / 4) + 64;
-    };
-    grow(&capacity_.pairs, needed.pairs);
-    grow(&capacity_.spheres, needed.spheres);
-    grow(&capacity_.candidates, needed.candidates);
-    grow(&capacity_.points, needed.points);
-    grow(&capacity_.touches, needed.touches);
+    capacity_.grow(needed, is_queued_);
     is_ready_ = false;
     ++changes_;
   }
@@ -368,6 +363,7 @@ class DeviceStep final : public DeviceWorld {
     for (Contacts& contacts : contacts_) contacts.reserve(transfer_, capacity_, room_);
     use_contacts();
     device_->reserve_pairs(data_.near.sub_shapes.fixed_begin, capacity_.pairs);
+    device_->release_unused();
     is_ready_ = true;
   }
 

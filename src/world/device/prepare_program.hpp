@@ -23,7 +23,7 @@ struct PrepareProgram {
     if (d.counters->any_asleep != 0) wake_touched(team);
     team.for_each(bodies.count, [&](std::uint32_t i) { start(bodies.ids[i].index); });
     place_rows(team);
-    if (row_count() > first_manifold()) place_points(team);
+    if (row_count() > first_manifold() && !place_points(team)) return;
     sort_overflow(team);
     team.spread(bodies.count, [&](std::uint32_t i) { sort_fixed(bodies.ids[i].index); });
     team.spread(row_count(), [&](std::uint32_t r) { fill_row(r); });
@@ -97,16 +97,27 @@ struct PrepareProgram {
         });
   }
 
+  /// @returns whether there is room for the rows of manifolds and their points
   template <class Team>
-  JFPX_HD void place_points(const Team& team) const {
+  JFPX_HD bool place_points(const Team& team) const {
     const StepData& d = data;
     const soft_step::ContactView contacts = d.contacts();
-    const std::uint32_t first_row = first_manifold();
+    const std::uint32_t first_row = first_manifold(), rows = row_count() - first_row;
+    const bool has_rows = rows <= d.capacity.manifold_rows;
     const auto size = [&](std::uint32_t r) {
       return contacts.impulse_count(d.row_contact[first_row + r]);
     };
-    team.scan(row_count() - first_row, size, size,
-              [&](std::uint32_t r, std::uint32_t first) { d.manifold_rows[r].first = first; });
+    const std::uint32_t points =
+        team.scan(rows, size, size, [&](std::uint32_t r, std::uint32_t first) {
+          if (has_rows) d.manifold_rows[r].first = first;
+        });
+    if (has_rows && points <= d.capacity.row_points) return true;
+    team.once([&] {
+      d.counters->needed.manifold_rows = rows;
+      d.counters->needed.row_points = points;
+      d.counters->failed = 1;
+    });
+    return false;
   }
 
   /// Sorts the rows without a color by their contacts: those of spheres, then the manifolds.

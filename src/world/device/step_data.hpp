@@ -26,11 +26,27 @@ static_assert(kBins < kNoBin);
 /// Lists whose size is known only on the device. A step that needs more room than there is does not
 /// change the state of the world; the host reserves Counters::needed and repeats it.
 struct Capacity {
-  std::uint64_t pairs = 0;       ///< of swept bounds
-  std::uint32_t spheres = 0;     ///< contacts of two spheres
-  std::uint32_t candidates = 0;  ///< pairs of other sub-shapes, also the capacity of manifolds
-  std::uint32_t points = 0;      ///< of manifolds
-  std::uint32_t touches = 0;     ///< points of World::contacts(), except contacts of two spheres
+  std::uint64_t pairs = 0;          ///< of swept bounds
+  std::uint32_t spheres = 0;        ///< contacts of two spheres
+  std::uint32_t candidates = 0;     ///< pairs of other sub-shapes, also the capacity of manifolds
+  std::uint32_t points = 0;         ///< of manifolds
+  std::uint32_t touches = 0;        ///< points of World::contacts(), except contacts of two spheres
+  std::uint32_t manifold_rows = 0;  ///< rows of manifolds, and of spheres that are none of spheres
+  std::uint32_t row_points = 0;     ///< points of these rows
+
+  /// Grows what is less than needed, and some more. @param doubles whether by as much again
+  void grow(const Capacity& needed, bool doubles) {
+    const auto grow_one = [doubles](auto* capacity, auto count) {
+      if (count > *capacity) *capacity = count + (doubles ? count : count / 4) + 64;
+    };
+    grow_one(&pairs, needed.pairs);
+    grow_one(&spheres, needed.spheres);
+    grow_one(&candidates, needed.candidates);
+    grow_one(&points, needed.points);
+    grow_one(&touches, needed.touches);
+    grow_one(&manifold_rows, needed.manifold_rows);
+    grow_one(&row_points, needed.row_points);
+  }
 };
 
 /// Sizes of the contact set of a step, and of its list of touches.

@@ -45,6 +45,14 @@ class Transfer {
     reserve(buffer, std::max<std::size_t>(count, 1), "a step of a world");
     return buffer->data();
   }
+  /// The same for a count that has slack already.
+  template <class T>
+  T* exact_room(Buffer<T>* buffer, std::size_t count) const {
+    const T* const before = buffer->data();
+    device_->reserve_exactly(buffer, std::max<std::size_t>(count, 1), "a step of a world");
+    if (buffer->data() != before) ++moves_;
+    return buffer->data();
+  }
   template <class T>
   void copy(T* to, const T* from, std::size_t count) const {
     device_->copy(to, from, count);
