@@ -210,7 +210,8 @@ void SoftStepSolver::sweep(const RunSpheres& run_spheres, const RunManifolds& ru
 template <class Operation>
 void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operation,
                          cpu::SphereSweepFunction kernel) {
-  const auto one = [&]<bool kFixed>(auto* row, std::bool_constant<kFixed>) {
+  const auto one = [&](auto* row, auto is_fixed) {
+    constexpr bool kFixed = decltype(is_fixed)::value;
     if constexpr (std::is_same_v<decltype(row), SphereRow*>) {
       operation.template run<kFixed>(row, &bodies[row->a], &bodies[row->b], impacts_);
     } else {
