@@ -114,8 +114,8 @@ class DeviceWorld {
   virtual Vec3 fetch_position(std::uint32_t body) = 0;
   /// Copies what BodyState has of all bodies to the host. @param pool makes a part of the copies
   virtual void fetch_states(MotionArrays* moving, ThreadPool* pool) = 0;
-  /// Copies the motion of all bodies to the host, likewise.
-  virtual void fetch_motion(MotionArrays* moving, ThreadPool* pool) = 0;
+  /// Copies the rest of the motion of all bodies to the host, likewise.
+  virtual void fetch_other_motion(MotionArrays* moving, ThreadPool* pool) = 0;
   /// Copies the contacts of the last step, with their impulses and colors.
   virtual void fetch_contact_set(soft_step::ContactSet* last) = 0;
   /// Copies what ContactListMaker needs, of the last step or of the step before it.

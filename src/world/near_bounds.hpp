@@ -87,7 +87,8 @@ struct NearBounds {
     const PosedBox& box = sub_shapes.box(fixed);
     const Vec3& centre = swept[i].centre;
     const Real far = sum(box.pose.origin) + swept[fixed].radius + sum(centre);
-    const Real radius = swept[i].radius + 2 * moved + 16 * kEpsilon * far;
+    // A centre that is not farther than kEpsilon counts as inside.
+    const Real radius = swept[i].radius + 2 * moved + 16 * kEpsilon * far + kEpsilon;
     const Vec3 local = transform_transpose(box.pose.basis, centre - box.pose.origin);
     return length_squared(detail::offset_from_box(local, box.box)) <= radius * radius;
   }

@@ -41,6 +41,9 @@ struct World::Impl {
     store.set_ignored_pairs(given.ignored_pairs);  // a body of the scene has the index of its slot
   }
 
+  /// Steps of graphs may be in progress, which use the memory of the device.
+  ~Impl() { drop_queue(); }
+
   /// The bodies for reading their motion, which it fetches from the device if it is newer there.
   /// `store` alone serves for ids and properties. Const functions of a World may call it
   /// concurrently.

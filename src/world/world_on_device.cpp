@@ -175,7 +175,9 @@ void World::Impl::fetch_motion() {
   if (motion_is_current) return;
   flush_edits();
   const ScopedTimer timer(&spent_us);
-  device->fetch_motion(&store.moving, pool.get());
+  // Other threads may be reading states that are current.
+  if (!states_are_current) device->fetch_states(&store.moving, pool.get());
+  device->fetch_other_motion(&store.moving, pool.get());
   motion_is_current = states_are_current = true;
 }
 

@@ -29,7 +29,7 @@ void World::Impl::send_changes() {
 
 void World::Impl::enqueue(std::uint32_t count, cuda::Stream stream) {
   if (count == 0) return;
-  if (has_changes()) finish();
+  if (has_changes() || missing_steps > 0 || !queue_failure.empty()) finish();
   has_queue.store(true, std::memory_order_release);
   missing_steps = count;
   try {
@@ -114,6 +114,7 @@ void World::Impl::finish_launched() {
     queue_failure = error.what();
     done = device->finish();
   }
+  spent_us = 0;
   missing_steps += done.missing;
   if (done.completed == 0) return;
   complete_on_device(done.completed);
@@ -167,6 +168,9 @@ namespace {
 
 auto& with_device(World& world) {
   auto& w = WorldAccess::impl(world);
+  if (w.scene.solver != Solver::soft_step) {
+    throw BackendUnavailable("cuda: this world has Solver::worst_first, which runs on the host");
+  }
   if (w.device != nullptr) return w;
   if (!w.device_failure.empty()) {
     throw BackendUnavailable("cuda: the device of this world has failed: " + w.device_failure);

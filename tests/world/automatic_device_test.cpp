@@ -73,8 +73,8 @@ class FailingDevice final : public DeviceWorld {
   void fetch_states(MotionArrays* moving, ThreadPool* pool) override {
     device_->fetch_states(moving, pool);
   }
-  void fetch_motion(MotionArrays* moving, ThreadPool* pool) override {
-    device_->fetch_motion(moving, pool);
+  void fetch_other_motion(MotionArrays* moving, ThreadPool* pool) override {
+    device_->fetch_other_motion(moving, pool);
   }
   void fetch_contact_set(soft_step::ContactSet* last) override { device_->fetch_contact_set(last); }
   void fetch_contacts(const BodiesOfStep& bodies, bool of_step_before, soft_step::ContactSet* set,

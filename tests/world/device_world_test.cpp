@@ -767,6 +767,20 @@ TEST_P(DeviceWorldTest, TheRestOfTheMotionIsFetchedAfterTheStates) {
   }
 }
 
+TEST_P(DeviceWorldTest, AWorldThatIsRestoredToTheOtherSolverHasNoDevice) {
+  Scene scene = scenes::make("pile", {.spheres = 10});
+  World device = on_device(scene);
+  device.step();
+  scene.solver = Solver::worst_first;
+  World host = on_host(scene);
+  device.restore(host.snapshot());
+  EXPECT_THROW(cuda::device_states(device), BackendUnavailable);
+  EXPECT_THROW(cuda::enqueue_steps(device, 1, nullptr), BackendUnavailable);
+  host.step();
+  device.step();
+  EXPECT_EQ(host.state_hash(), device.state_hash());
+}
+
 TEST_P(DeviceWorldTest, AWorldWithoutBodies) {
   World device = on_device(Scene{});
   for (int n = 0; n < 3; ++n) EXPECT_EQ(device.step().contacts, 0u);

@@ -65,9 +65,8 @@ JFPX_API DeviceStates device_states(World& world);
 /// graph makes them. Graphs, enqueued steps and single steps may follow each other; after a change
 /// of the world, a graph leaves its steps to the host until device_states(), step() or
 /// enqueue_steps() has sent the change. Requirements:
-///   - the world has made a step on the device since it moved there, device_states() has been
-///   called
-///     after the last change, and there are no user-defined forces and contact generators;
+///   - the world has made a step on the device since it moved there, there are no user-defined
+///     forces and contact generators, and device_states() has been called after the last change;
 ///   - a graph is launched only while DeviceStates::version is that of the capture, and not
 ///     concurrently with another call on the world; the caller orders streams, if several launch
 ///     graphs of the world, or enqueue steps;

@@ -85,7 +85,16 @@ class CudaDevice {
     const DeviceGuard guard(device_);
     std::size_t bytes = 0;
     for (const device::HostCopy& copy : copies) bytes += copy.bytes;
-    staging_.reserve_geometric(bytes, "the states of a world");
+    try {
+      staging_.reserve_geometric(bytes, "the states of a world");
+    } catch (const OutOfMemory&) {  // of page-locked memory
+      for (const device::HostCopy& copy : copies) {
+        transfer(static_cast<std::byte*>(copy.to), static_cast<const std::byte*>(copy.from),
+                 copy.bytes, cudaMemcpyDeviceToHost);
+      }
+      wait();
+      return;
+    }
     std::byte* at = staging_.data();
     for (const device::HostCopy& copy : copies) {
       transfer(at, static_cast<const std::byte*>(copy.from), copy.bytes, cudaMemcpyDeviceToHost);

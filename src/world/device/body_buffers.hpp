@@ -46,9 +46,9 @@ class BodyBuffers {
     add_copy(&copies, &to->angular_velocity, angular_velocity_);
     return copies;
   }
-  /// Copies of all arrays, likewise.
-  HostCopies motion_copies(MotionArrays* to) const {
-    HostCopies copies = state_copies(to);
+  /// Copies of all other arrays, likewise.
+  HostCopies other_copies(MotionArrays* to) const {
+    HostCopies copies;
     add_copy(&copies, &to->force, force_);
     add_copy(&copies, &to->torque, torque_);
     add_copy(&copies, &to->last_acceleration, last_acceleration_);

@@ -239,8 +239,8 @@ class DeviceStep final : public DeviceWorld {
   void fetch_states(MotionArrays* moving, ThreadPool* pool) override {
     device_->fetch(bodies_.state_copies(moving), pool);
   }
-  void fetch_motion(MotionArrays* moving, ThreadPool* pool) override {
-    device_->fetch(bodies_.motion_copies(moving), pool);
+  void fetch_other_motion(MotionArrays* moving, ThreadPool* pool) override {
+    device_->fetch(bodies_.other_copies(moving), pool);
   }
 
   void fetch_contact_set(soft_step::ContactSet* last) override {
@@ -358,12 +358,13 @@ class DeviceStep final : public DeviceWorld {
   /// Makes room for a step, which then allocates nothing.
   void make_room() {
     if (is_ready_) return;
+    const std::uint64_t moves = transfer_.moves();
     data_.capacity = capacity_;
     scratch_.reserve_lists(transfer_, capacity_, &data_);
     for (Contacts& contacts : contacts_) contacts.reserve(transfer_, capacity_, room_);
     use_contacts();
     device_->reserve_pairs(data_.near.sub_shapes.fixed_begin, capacity_.pairs);
-    device_->release_unused();
+    if (transfer_.moves() != moves) device_->release_unused();
     is_ready_ = true;
   }
 

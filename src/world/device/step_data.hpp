@@ -9,7 +9,9 @@
 #include "src/world/near_pair_test.hpp"
 #include "src/world/soft_step_stages.hpp"
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 namespace jfpx {
@@ -37,7 +39,11 @@ struct Capacity {
   /// Grows what is less than needed, and some more. @param doubles whether by as much again
   void grow(const Capacity& needed, bool doubles) {
     const auto grow_one = [doubles](auto* capacity, auto count) {
-      if (count > *capacity) *capacity = count + (doubles ? count : count / 4) + 64;
+      if (count <= *capacity) return;
+      using Count = decltype(count);
+      const std::uint64_t wanted = std::uint64_t{count} + (doubles ? count : count / 4) + 64;
+      *capacity =
+          static_cast<Count>(std::min(wanted, std::uint64_t{std::numeric_limits<Count>::max()}));
     };
     grow_one(&pairs, needed.pairs);
     grow_one(&spheres, needed.spheres);
