@@ -26,7 +26,7 @@ namespace soft_step {
 /// restitute() as the integrator requires, then store().
 class SoftStepSolver {
  public:
-  /// @param pool outlives the solver
+  /// @param pool not null; outlives the solver
   /// @param simd widest vectors for rows of spheres
   SoftStepSolver(ThreadPool* pool, SimdLevel simd);
 
@@ -68,7 +68,8 @@ class SoftStepSolver {
   void place_contacts(std::uint32_t first, std::uint32_t last, Counts before);
   void place_fixed_contacts();
   /// Calls run_spheres(first, last) and run_manifolds(first, last) for the rows of the overflow and
-  /// of the colors, and operation(row) for each row with a fixed body.
+  /// of the colors, one at a time in the overflow, whose rows may share bodies, and on_fixed(row)
+  /// for each row with a fixed body.
   template <class RunSpheres, class RunManifolds, class OnFixed>
   void sweep(const RunSpheres& run_spheres, const RunManifolds& run_manifolds,
              const OnFixed& on_fixed);
