@@ -6,6 +6,7 @@
 
 #include "src/scenes/scenes.hpp"
 #include "src/world/world_impl.hpp"
+#include "tests/world/equal_worlds.hpp"
 #include "tests/world/host_device.hpp"
 #include "tests/world/random_bodies.hpp"
 
@@ -21,6 +22,7 @@
 namespace jfpx {
 namespace {
 
+using test::expect_equal_contacts;
 using test::operator""_r;
 
 /// A device that fails on request.
@@ -122,12 +124,6 @@ World automatic(const Scene& scene, const CostModel& costs = device_wins()) {
 
 /// Makes the next choice believe that the last step took this time.
 void set_time(World* world, double us) { WorldAccess::impl(*world).spent_us = us; }
-
-void expect_equal_contacts(const World& a, const World& b) {
-  const auto copy = [](const auto& span) { return std::vector(span.begin(), span.end()); };
-  ASSERT_EQ(copy(a.contacts()), copy(b.contacts()));
-  ASSERT_EQ(copy(a.contact_events()), copy(b.contact_events()));
-}
 
 // A program that reads contacts pays for the list wherever the world is.
 TEST(AutomaticWorld, CountsTheTimeOfListsOfContactsOnTheHost) {

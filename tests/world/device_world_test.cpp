@@ -6,6 +6,7 @@
 
 #include "src/scenes/scenes.hpp"
 #include "src/world/world_impl.hpp"
+#include "tests/world/equal_worlds.hpp"
 #include "tests/world/host_device.hpp"
 #include "tests/world/random_bodies.hpp"
 
@@ -25,6 +26,8 @@
 namespace jfpx {
 namespace {
 
+using test::expect_equal;
+using test::expect_equal_contacts;
 using test::operator""_r;
 
 using MakeDevice = std::function<std::unique_ptr<DeviceWorld>(const Scene&)>;
@@ -56,20 +59,6 @@ std::vector<Kind> kinds() {
 }
 INSTANTIATE_TEST_SUITE_P(Devices, DeviceWorldTest, testing::ValuesIn(kinds()),
                          [](const auto& row) { return row.param.name; });
-
-/// Both worlds report the same step.
-void expect_equal(const StepReport& host, const StepReport& device) {
-  ASSERT_EQ(host.contacts, device.contacts);
-  ASSERT_EQ(host.sphere_contacts, device.sphere_contacts);
-  ASSERT_EQ(host.awake, device.awake);
-  ASSERT_EQ(host.non_finite, device.non_finite);
-}
-void expect_equal_contacts(const World& host, const World& device) {
-  const auto a = host.contacts(), b = device.contacts();
-  ASSERT_EQ(std::vector(a.begin(), a.end()), std::vector(b.begin(), b.end()));
-  const auto c = host.contact_events(), d = device.contact_events();
-  ASSERT_EQ(std::vector(c.begin(), c.end()), std::vector(d.begin(), d.end()));
-}
 
 /// A scene of bodies of all kinds in a small room.
 Scene random_scene(Random* random) {
