@@ -37,7 +37,8 @@ using BodyEdits = std::unordered_map<std::uint32_t, BodyEdit>;
 /// then calls step() any number of times, and fetches the results that it needs. Not thread-safe.
 ///
 /// Steps that do not wait for the host: after enqueue() or capture(), finish() must precede all
-/// functions but enqueue(), capture(), is_capturing() and states().
+/// functions but enqueue(), capture(), is_capturing(), has_graph(), is_held(), wait_for() and
+/// states().
 ///
 /// All functions but the destructor throw DeviceError if the device fails, and OutOfMemory. After a
 /// failed step(), the state on the device is that before the step.
@@ -87,8 +88,8 @@ class DeviceWorld {
   /// Waits.
   /// @param forces,steps as for step(), like those of the functions below
   virtual void prepare(const ForceTable* forces, std::uint64_t steps) = 0;
-  /// Enqueues steps, before later work of a stream. wait_for(stream) must precede. Does not wait.
-  /// If a step cannot be completed, the later ones have no effect.
+  /// Enqueues steps, before later work of a stream. wait_for(stream) must precede. Waits only
+  /// if lists move. If a step cannot be completed, the later ones have no effect.
   /// @param left number of steps; becomes that of those which were not enqueued, if that fails
   virtual void enqueue(const ForceTable* forces, std::uint64_t steps, cuda::Stream stream,
                        std::uint64_t* left) = 0;

@@ -76,6 +76,12 @@ struct World::Impl {
   /// the host it makes the lists, so that waking the neighbors cannot fail after the change.
   BodyStore& edited_body_in_lists(std::uint32_t body, const BodyEdit& edit);
   void remember_listed(std::uint32_t body);
+  /// What every edit begins with.
+  void begin_edit() {
+    finish();
+    hold_graphs();
+    steps_at_rest = 0;
+  }
   /// [m], of the centre of mass
   Vec3 position(std::uint32_t body);
   /// Makes a device that has made a step, so that its kernels are loaded.
@@ -267,7 +273,7 @@ struct World::Impl {
   ListedBodies changed, changed_before;
   std::vector<std::uint32_t> forced_bodies;
   /// While resident: whether the arrays of the host are those of the device.
-  /// `states_are_current`: at least what BodyState has.
+  /// `states_are_current`: at least what BodyState has, which edits of other bodies do not change.
   bool motion_is_current = true, states_are_current = true, contact_set_is_current = true;
   std::mutex fetching;  ///< held by functions that fetch, because const functions may call them
 

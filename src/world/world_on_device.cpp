@@ -71,9 +71,7 @@ void World::Impl::enter_device() {
 }
 
 BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
-  finish();
-  hold_graphs();
-  steps_at_rest = 0;
+  begin_edit();
   if (!resident) return store;
   BodyEdit& all = edits[body];
   all.sets_state |= edit.sets_state;
@@ -81,9 +79,9 @@ BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
   all.sets_pairs |= edit.sets_pairs;
   all.wakes |= edit.wakes;
   all.wakes_neighbors |= edit.wakes_neighbors;
-  if (edit.wakes_neighbors) motion_is_current = states_are_current = false;
+  if (edit.wakes_neighbors) motion_is_current = false;
   if (edit.sets_mass) {  // the device has the orientation, and computes the inertia in world axes
-    motion_is_current = states_are_current = false;
+    motion_is_current = false;
     force_table.invalidate();
   }
   return store;
@@ -106,9 +104,7 @@ void World::Impl::remember_listed(std::uint32_t body) {
 }
 
 BodyId World::Impl::add(const BodyDef& def) {
-  finish();
-  hold_graphs();
-  steps_at_rest = 0;
+  begin_edit();
   const std::uint32_t body = store.next_index();
   if (resident && !device->has_room(std::size_t{body} + 1)) leave_device();
   if (!resident) return store.add(def);
@@ -123,9 +119,7 @@ BodyId World::Impl::add(const BodyDef& def) {
 }
 
 void World::Impl::remove(BodyId id) {
-  finish();
-  hold_graphs();
-  steps_at_rest = 0;
+  begin_edit();
   const std::uint32_t body = id.index;
   if (!resident) {
     make_contact_lists();
@@ -139,7 +133,7 @@ void World::Impl::remove(BodyId id) {
   BodyEdit& edit = edits[body];
   remember_listed(body);
   edit = {.wakes_neighbors = true, .is_removed = true};
-  motion_is_current = states_are_current = false;
+  motion_is_current = false;
   store.remove(id);
   soft_step.forget(body);
   force_table.invalidate();

@@ -43,8 +43,9 @@ struct DeviceStates {
 static_assert(sizeof(Vec3) == 3 * sizeof(Real) && sizeof(Quat) == 4 * sizeof(Real));
 
 /// Returns the states after the last step and all changes since. Copies nothing if the device has
-/// them, as after a step there; otherwise sends the changes, or uploads the world. Does not wait
-/// for enqueued or replayed steps. Must not run concurrently with any call on the same world.
+/// them, as after a step there; otherwise sends the changes, or uploads the world. Waits for
+/// enqueued or replayed steps only if there are changes to send. Must not run concurrently with any
+/// call on the same world.
 /// @throws BackendUnavailable with the reason if the world has no device. A world has one with
 ///   Solver::soft_step and Backend::cuda, or Backend::automatic after that has started the device,
 ///   until it fails. DeviceError, OutOfMemory; the world is then unchanged.

@@ -180,8 +180,7 @@ class CudaDevice {
     JFPX_CUDA_TRY(cudaStreamIsCapturing(stream, &status));
     return status != cudaStreamCaptureStatusNone;
   }
-  /// The work is captured from the user's stream, not from that of the world, so that the world can
-  /// be used while the capture goes on.
+  /// The work is captured from the user's stream. That of the world is not captured.
   template <class Work>
   void capture(Stream stream, const Work& work) {
     const DeviceGuard guard(device_);

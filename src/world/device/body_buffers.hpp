@@ -94,7 +94,7 @@ class BodyBuffers {
   }
   /// Room for the ids of `count` bodies. swap_ids() makes them the current ones.
   BodyId* other_ids(const Transfer<Device>& transfer, std::size_t count) {
-    return transfer.room(&ids_[1 - ids_now_], count);
+    return transfer.room_to_grow(&ids_[1 - ids_now_], count);
   }
   void swap_ids(std::size_t count, BodyView* bodies) {
     ids_now_ = 1 - ids_now_;

@@ -52,9 +52,9 @@ class ContactBuffers {
     grow(transfer, &rolling_impulses_, contacts, kept);
     grow(transfer, &colors_, contacts, kept);
     grow(transfer, &touches_, capacity.touches, sizes_.touches);
-    transfer.exact_room(&spheres_of_, room);
-    transfer.exact_room(&manifolds_of_, room);
-    transfer.exact_room(&position_before_, room);
+    transfer.room(&spheres_of_, room);
+    transfer.room(&manifolds_of_, room);
+    transfer.room(&position_before_, room);
   }
   /// A complete step has found these numbers of contacts. @param slots of bodies in the step
   void complete(const ContactSizes& sizes, std::size_t slots) {
@@ -120,7 +120,7 @@ class ContactBuffers {
                    std::size_t kept) {
     if (count <= array->capacity() && array->capacity() > 0) return;
     Buffer<T> larger;
-    T* const to = transfer.exact_room(&larger, count);
+    T* const to = transfer.room(&larger, count);
     transfer.copy(to, array->data(), kept);
     array->swap(larger);
   }

@@ -38,10 +38,10 @@ class ForceBuffers {
   const ForceView& view() const { return view_; }
   /// Sums of what acts on each body in a step.
   Vec3* force_sums(const Transfer<Device>& transfer, std::size_t bodies) {
-    return transfer.room(&force_sum_, bodies);
+    return transfer.room_to_grow(&force_sum_, bodies);
   }
   Vec3* torque_sums(const Transfer<Device>& transfer, std::size_t bodies) {
-    return transfer.room(&torque_sum_, bodies);
+    return transfer.room_to_grow(&torque_sum_, bodies);
   }
 
  private:

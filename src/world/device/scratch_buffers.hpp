@@ -16,53 +16,53 @@ class ScratchBuffers {
   /// Makes room for what is indexed by body. @param n number of slots
   void reserve_bodies(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
     StepData& d = *data;
-    d.motion = transfer.exact_room(&motion_, n);
+    d.motion = transfer.room(&motion_, n);
     d.near.motion = d.motion;
-    d.first_candidate = transfer.exact_room(&first_candidate_, n);
-    d.manifold_sizes = transfer.exact_room(&manifold_sizes_, n);
-    d.first_fixed = transfer.exact_room(&first_fixed_, n);
-    d.used_colors = transfer.exact_room(&used_colors_, n);
-    d.first_order = transfer.exact_room(&first_order_, n);
-    d.first_contact = transfer.exact_room(&first_contact_, n);
-    d.parent = transfer.exact_room(&parent_, n);
-    d.marked = transfer.exact_room(&marked_, n);
-    d.near_flag = transfer.exact_room(&near_flag_, n);
+    d.first_candidate = transfer.room(&first_candidate_, n);
+    d.manifold_sizes = transfer.room(&manifold_sizes_, n);
+    d.first_fixed = transfer.room(&first_fixed_, n);
+    d.used_colors = transfer.room(&used_colors_, n);
+    d.first_order = transfer.room(&first_order_, n);
+    d.first_contact = transfer.room(&first_contact_, n);
+    d.parent = transfer.room(&parent_, n);
+    d.marked = transfer.room(&marked_, n);
+    d.near_flag = transfer.room(&near_flag_, n);
     d.step.near = d.near_flag;
-    d.step.solver = transfer.exact_room(&solver_, n);
-    d.step.traits = transfer.exact_room(&traits_, n);
-    d.step.orientation = transfer.exact_room(&orientation_, n);
-    d.motion_cells = transfer.exact_room(&motion_cells_, n);
-    d.free_cells = transfer.exact_room(&free_cells_, n);
-    d.row_bodies = transfer.exact_room(&row_bodies_, n);
-    d.pair_count = transfer.exact_room(&pair_count_, 1);
-    d.counters = transfer.exact_room(&counters_, 1);
+    d.step.solver = transfer.room(&solver_, n);
+    d.step.traits = transfer.room(&traits_, n);
+    d.step.orientation = transfer.room(&orientation_, n);
+    d.motion_cells = transfer.room(&motion_cells_, n);
+    d.free_cells = transfer.room(&free_cells_, n);
+    d.row_bodies = transfer.room(&row_bodies_, n);
+    d.pair_count = transfer.room(&pair_count_, 1);
+    d.counters = transfer.room(&counters_, 1);
   }
 
   /// Makes room for what is indexed by sub-shape. @param n number of sub-shapes that are no walls
   void reserve_sub_shapes(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
-    data->near.margins = transfer.room(&margins_, n);
-    data->near.swept = transfer.room(&swept_, n);
+    data->near.margins = transfer.room_to_grow(&margins_, n);
+    data->near.swept = transfer.room_to_grow(&swept_, n);
   }
 
   /// Makes room for lists.
   void reserve_lists(const Transfer<Device>& transfer, const Capacity& c, StepData* data) {
     StepData& d = *data;
     const std::size_t contacts = std::size_t{c.spheres} + c.candidates;
-    d.pairs = transfer.exact_room(&pairs_, c.pairs);
-    d.pair_found = transfer.exact_room(&pair_found_, c.pairs);
-    d.pair_results = transfer.exact_room(&pair_results_, c.pairs);
-    d.candidates = transfer.exact_room(&candidates_, c.candidates);
-    d.tested = transfer.exact_room(&tested_, c.candidates);
-    d.next_candidate = transfer.exact_room(&next_candidate_, c.candidates);
-    d.uncolored = transfer.exact_room(&uncolored_, contacts);
-    d.still_uncolored = transfer.exact_room(&still_uncolored_, contacts);
-    d.row_bins = transfer.exact_room(&row_bins_, contacts);
-    d.row_contact = transfer.exact_room(&row_contact_, contacts);
-    d.next_fixed = transfer.exact_room(&next_fixed_, contacts);
-    d.overflow = transfer.exact_room(&overflow_, contacts);
-    d.sphere_rows = {transfer.exact_room(&sphere_rows_, contacts), contacts};
-    d.manifold_rows = transfer.exact_room(&manifold_rows_, c.manifold_rows);
-    d.point_rows = transfer.exact_room(&point_rows_, c.row_points);
+    d.pairs = transfer.room(&pairs_, c.pairs);
+    d.pair_found = transfer.room(&pair_found_, c.pairs);
+    d.pair_results = transfer.room(&pair_results_, c.pairs);
+    d.candidates = transfer.room(&candidates_, c.candidates);
+    d.tested = transfer.room(&tested_, c.candidates);
+    d.next_candidate = transfer.room(&next_candidate_, c.candidates);
+    d.uncolored = transfer.room(&uncolored_, contacts);
+    d.still_uncolored = transfer.room(&still_uncolored_, contacts);
+    d.row_bins = transfer.room(&row_bins_, contacts);
+    d.row_contact = transfer.room(&row_contact_, contacts);
+    d.next_fixed = transfer.room(&next_fixed_, contacts);
+    d.overflow = transfer.room(&overflow_, contacts);
+    d.sphere_rows = {transfer.room(&sphere_rows_, contacts), contacts};
+    d.manifold_rows = transfer.room(&manifold_rows_, c.manifold_rows);
+    d.point_rows = transfer.room(&point_rows_, c.row_points);
   }
 
  private:

@@ -34,13 +34,13 @@ class SubShapeBuffers {
     const SubShapeCounts &x = a.counts_, &y = b.counts_;
     part_count_ = a.part_count_ + b.part_count_;
     const std::size_t all = x.all() + y.all(), bounded = x.bounded() + y.bounded();
-    return {.bodies = transfer.room(&bodies_, all),
-            .numbers = transfer.room(&numbers_, all),
-            .bounds = transfer.room(&bounds_, bounded),
-            .boxes = transfer.room(&boxes_, bounded - x.spheres - y.spheres),
-            .walls = transfer.room(&walls_, x.walls + y.walls),
-            .parts = transfer.room(&parts_, bounded),
-            .local = transfer.room(&local_, part_count_)};
+    return {.bodies = transfer.room_to_grow(&bodies_, all),
+            .numbers = transfer.room_to_grow(&numbers_, all),
+            .bounds = transfer.room_to_grow(&bounds_, bounded),
+            .boxes = transfer.room_to_grow(&boxes_, bounded - x.spheres - y.spheres),
+            .walls = transfer.room_to_grow(&walls_, x.walls + y.walls),
+            .parts = transfer.room_to_grow(&parts_, bounded),
+            .local = transfer.room_to_grow(&local_, part_count_)};
   }
   void complete(const SubShapeCounts& counts) { counts_ = counts; }
 

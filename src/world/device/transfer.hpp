@@ -25,7 +25,9 @@ class Transfer {
   /// @param room number of items to reserve memory for, if it is above `count`
   template <class T>
   const T* put(Buffer<T>* to, const T* from, std::size_t count, std::size_t room = 0) const {
-    reserve(to, std::max({count, room, std::size_t{1}}), "the bodies of a world");
+    note_move(to, [&] {
+      device_->reserve(to, std::max({count, room, std::size_t{1}}), "the bodies of a world");
+    });
     device_->upload(to->data(), from, count);
     return to->data();
   }
@@ -42,15 +44,17 @@ class Transfer {
   /// Makes room for `count` items, which discards the contents. @returns the address
   template <class T>
   T* room(Buffer<T>* buffer, std::size_t count) const {
-    reserve(buffer, std::max<std::size_t>(count, 1), "a step of a world");
+    note_move(buffer, [&] {
+      device_->reserve_exactly(buffer, std::max<std::size_t>(count, 1), "a step of a world");
+    });
     return buffer->data();
   }
-  /// The same for a count that has slack already.
+  /// The same for a count that may grow by little from call to call.
   template <class T>
-  T* exact_room(Buffer<T>* buffer, std::size_t count) const {
-    const T* const before = buffer->data();
-    device_->reserve_exactly(buffer, std::max<std::size_t>(count, 1), "a step of a world");
-    if (buffer->data() != before) ++moves_;
+  T* room_to_grow(Buffer<T>* buffer, std::size_t count) const {
+    note_move(buffer, [&] {
+      device_->reserve(buffer, std::max<std::size_t>(count, 1), "a step of a world");
+    });
     return buffer->data();
   }
   template <class T>
@@ -62,10 +66,11 @@ class Transfer {
   std::uint64_t moves() const { return moves_; }
 
  private:
-  template <class T>
-  void reserve(Buffer<T>* buffer, std::size_t count, const char* what) const {
+  /// Counts the move of a buffer, if reserve() moves it.
+  template <class T, class Reserve>
+  void note_move(Buffer<T>* buffer, const Reserve& reserve) const {
     const T* const before = buffer->data();
-    device_->reserve(buffer, count, what);
+    reserve();
     if (buffer->data() != before) ++moves_;
   }
 
