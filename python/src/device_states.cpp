@@ -84,9 +84,7 @@ StepReport PythonWorld::finish_steps() {
   World& world = *existing();
   const UseGuard guard(in_use_, "world");
   const nb::gil_scoped_release release;
-  const StepReport report = cuda::finish_steps(world);
-  if (!report.device_failure.empty()) ++changes_;
-  return report;
+  return cuda::finish_steps(world);
 }
 
 void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world) {

@@ -226,7 +226,6 @@ void PythonWorld::free() noexcept {
   } catch (const Error&) {
     // The device is lost.
   }
-  ++changes_;
   world_.reset();
   functions_.clear();
 }

@@ -4,6 +4,7 @@
 #include <jfpx/cuda/world.hpp>
 
 #include "python/src/bindings.hpp"
+#include "src/world/world_impl.hpp"
 
 #include <memory>
 #include <optional>
@@ -47,7 +48,9 @@ class PythonWorld {
   void enqueue_steps(std::uint32_t count, cuda::Stream stream);
   StepReport finish_steps();
   /// Changes when device_states() of before become invalid.
-  std::uint64_t changes() const { return changes_; }
+  std::uint64_t changes() const {
+    return world_ == nullptr ? ~std::uint64_t{0} : changes_ + WorldAccess::impl(*world_).departures;
+  }
   /// Frees the world now. Every later access fails.
   void close();
 

@@ -109,6 +109,7 @@ struct World::Impl {
   /// The host has the state of the world, and the device no longer.
   void forget_device() noexcept {
     resident = false;
+    ++departures;
     edits.clear();
     changed.clear();
     changed_before.clear();
@@ -260,7 +261,8 @@ struct World::Impl {
   std::string device_failure;           ///< why there is no `device` any more; empty: no failure
   ForceTable force_table;               ///< of `forces`, for the device
   bool resident = false;                ///< whether the device has the state of the world
-  bool steps_on_device = false;         ///< whether the device makes the step in progress
+  std::atomic<std::uint64_t> departures{0};    ///< how often it has lost that state
+  bool steps_on_device = false;                ///< whether the device makes the step in progress
   std::unique_ptr<AutomaticDevice> automatic;  ///< of Backend::automatic; null: a fixed backend
   /// [us] Duration of the last step and of the copies between host and device since, for
   /// `automatic`; 0: unknown.
@@ -288,7 +290,7 @@ struct World::Impl {
   std::recursive_mutex finishing;   ///< held by finish_queue(), whose steps call finish() again
 };
 
-/// Access to the members of a World, for tests and for cuda::device_states().
+/// Access to the members of a World, for tests, cuda::device_states() and the Python package.
 struct WorldAccess {
   static World::Impl& impl(World& world) { return *world.impl_; }
 };

@@ -89,12 +89,16 @@ void World::Impl::finish_queue() {
     explicit Scope(Impl* impl) : w(impl) { w->is_finishing = true; }
     ~Scope() {
       w->is_finishing = false;
+      const std::lock_guard lock(w->fetching);
       const bool is_open = w->is_launched || w->missing_steps > 0 || w->has_graph();
       w->has_queue.store(is_open, std::memory_order_release);
     }
     Impl* w;
   } const scope(this);
-  if (is_launched || has_graph()) finish_launched();
+  {
+    const std::lock_guard device_lock(fetching);  // other const functions may be fetching
+    if (is_launched || has_graph()) finish_launched();
+  }
   if (!queue_failure.empty()) {
     if (resident) leave_device();
     lose_device(queue_failure);

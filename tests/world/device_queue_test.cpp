@@ -383,6 +383,14 @@ TEST_P(DeviceQueueTest, ASleepingWorldIsLeftAlone) {
   make_steps(&host, 3);
   EXPECT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
   EXPECT_EQ(device.steps(), 310u);
+  make_steps(&host, 4), make_steps(&device, 4);  // the last of them are left out
+  ASSERT_TRUE(impl.is_at_rest());
+  cuda::device_states(device);
+  const auto other_graph = graph_of(&device, 3);
+  other_graph();
+  make_steps(&host, 3);
+  EXPECT_EQ(device.steps(), 317u);
+  EXPECT_EQ(host.state_hash(), device.state_hash());
   for (World* world : {&host, &device}) world->apply_force(world->bodies()[1], {0, 5000, 0});
   graph();
   make_steps(&host, 3);
@@ -401,6 +409,13 @@ TEST_P(DeviceQueueTest, StepsThatNeedTheHostAreMadeAtOnce) {
   cuda::enqueue_steps(device, 5, nullptr);
   const StepReport a = make_steps(&host, 5), b = cuda::finish_steps(device);
   ASSERT_NO_FATAL_FAILURE(expect_equal(a, b));
+  EXPECT_TRUE(host.snapshot() == device.snapshot());
+  const std::uint64_t departures = WorldAccess::impl(device).departures;
+  for (World* world : {&host, &device}) world->add_contact_generator([](ContactContext&) {});
+  cuda::device_states(device);
+  cuda::enqueue_steps(device, 2, nullptr);
+  EXPECT_GT(WorldAccess::impl(device).departures, departures) << "arrays of before are invalid";
+  make_steps(&host, 2);
   EXPECT_TRUE(host.snapshot() == device.snapshot());
 }
 
@@ -438,6 +453,11 @@ TEST_P(DeviceQueueTest, ConcurrentReadersFinishAQueueOnce) {
     ASSERT_EQ(cuda::device_states(device).version, version);
     n % 2 == 0 ? graph() : cuda::enqueue_steps(device, 12, nullptr);
     make_steps(&host, 12);
+    if (n % 3 == 0) {  // the readers find an edit that the device does not have yet
+      cuda::finish_steps(device);
+      for (World* world : {&host, &device})
+        world->set_mass(world->bodies()[5], 2 + static_cast<Real>(n));
+    }
     const std::uint64_t hash = host.state_hash();
     const std::size_t contacts = host.contacts().size();
     std::vector<std::thread> readers;

@@ -326,10 +326,10 @@ class DeviceStep final : public DeviceWorld {
     bodies.torque = torque_sum_;
   }
 
-  /// Whether prepare() has nothing to do.
+  /// Whether prepare() has nothing to do. Only forces depend on the number of the step.
   bool is_prepared(const ForceTable* forces, std::uint64_t steps) const {
-    return is_ready_ && !is_held() && offset(steps) == sent_.offset &&
-           (forces == nullptr || forces_.has(*forces));
+    return is_ready_ && !is_held() &&
+           (forces == nullptr || (offset(steps) == sent_.offset && forces_.has(*forces)));
   }
 
   /// Progress::offset
