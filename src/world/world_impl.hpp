@@ -19,6 +19,7 @@
 #include "src/world/wake_propagation.hpp"
 
 #include <atomic>
+#include <functional>
 #include <mutex>
 
 namespace jfpx {
@@ -85,8 +86,9 @@ struct World::Impl {
   /// [m], of the centre of mass
   Vec3 position(std::uint32_t body);
   /// Makes a device that has made a step, so that its kernels are loaded.
-  /// @throws BackendUnavailable, DeviceError, OutOfMemory
-  static std::unique_ptr<DeviceWorld> make_warm_device(int number);
+  /// @param make as make_device_world() @throws what that throws, DeviceError, OutOfMemory
+  static std::unique_ptr<DeviceWorld> make_warm_device(
+      const std::function<std::unique_ptr<DeviceWorld>(const Scene&)>& make);
   /// Uploads the world, unless the device has its state.
   void enter_device();
   /// Makes the recorded edits on the device.
@@ -292,7 +294,8 @@ struct World::Impl {
 
 /// Access to the members of a World, for tests, cuda::device_states() and the Python package.
 struct WorldAccess {
-  static World::Impl& impl(World& world) { return *world.impl_; }
+  using Impl = World::Impl;
+  static Impl& impl(World& world) { return *world.impl_; }
 };
 
 }  // namespace JFPX_ABI

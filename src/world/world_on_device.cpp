@@ -28,14 +28,16 @@ class ScopedTimer {
 
 }  // namespace
 
-std::unique_ptr<DeviceWorld> World::Impl::make_warm_device(int number) {
+std::unique_ptr<DeviceWorld> World::Impl::make_warm_device(
+    const std::function<std::unique_ptr<DeviceWorld>(const Scene&)>& make) {
   Scene scene;
   scene.bodies.resize(2);
   scene.bodies[1].shape = Box{};
   World world(scene, {.collider = {.backend = Backend::cpu}});
-  world.impl_->device = make_device_world(scene, number);
+  world.impl_->device = make(scene);
   const StepReport report = world.step();
   if (!report.device_failure.empty()) throw DeviceError(report.device_failure);
+  world.impl_->forget_device();
   return std::move(world.impl_->device);
 }
 

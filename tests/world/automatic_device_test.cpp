@@ -307,6 +307,22 @@ TEST(AutomaticWorld, StaysOnTheProcessorWithoutADeviceAndSaysWhyOneFailed) {
   }
 }
 
+TEST(AutomaticWorld, MovesToAWarmDevice) {
+  const Scene scene = small_pile();
+  CostModel costs = device_wins();
+  costs.cuda_start_ms = 1e-6;
+  World host = on_host(scene),
+        world = automatic(scene, costs, [] {
+          return WorldAccess::Impl::make_warm_device(test::make_host_device_world);
+        });
+  for (int on_device = 0; on_device < 5;) {
+    host.step();
+    on_device += world.step().backend == Backend::cuda ? 1 : 0;
+    ASSERT_EQ(host.state_hash(), world.state_hash());
+    set_time(&world, 1000);
+  }
+}
+
 /// With a GPU, as a program makes a world.
 TEST(AutomaticWorld, MovesToTheGpu) {
   const auto backends = available_backends();
