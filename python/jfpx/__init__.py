@@ -16,6 +16,6 @@ from ._scene import Scene, scene_names
 from ._world import (BEGIN, END, STAY, ContactEvents, RayHit, RayHits, StepReport, World,
                      WorldContacts)
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [name for name in dir() if not name.startswith("_")]
