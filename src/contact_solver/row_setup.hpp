@@ -110,7 +110,7 @@ struct RowSetup {
                              properties.friction[row->b]);
     const Vec3 friction = in_tangent_plane(kept.friction, normal);
     row->friction_impulse = flipped ? -friction : friction;
-    row->normal_impulse = kept.normal;
+    row->normal_impulse = -kept.normal;
     const SolverBody &a = start[row->a], &b = start[row->b];
     set_masses<kFixed>(row, a, b);
     row->restitution = combined(properties.rules.restitution, properties.restitution[row->a],
@@ -178,9 +178,10 @@ struct RowSetup {
   /// Writes the impulses of a row to its contact.
   JFPX_HD void store(const SphereRow& row, std::uint32_t contact) const {
     const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
-    const bool is_released = !(row.normal_impulse > 0) && rebounds_of(row) > 0;
+    const Real impulse = normal_impulse_of(row);
+    const bool is_released = !(impulse > 0) && has_pushed(row);
     contacts.impulses[contacts.first_impulse(contact)] = {
-        row.friction_impulse * side, is_released ? KeptImpulse::kReleased : row.normal_impulse};
+        row.friction_impulse * side, is_released ? KeptImpulse::kReleased : impulse};
   }
   JFPX_HD void store(const ManifoldRow& row, const PointRow* points, std::uint32_t contact) const {
     const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);

@@ -6,6 +6,8 @@
 
 #include "src/contact_solver/step_constants.hpp"
 
+#include <cmath>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
@@ -13,16 +15,24 @@ namespace soft_step {
 /// Aligned, so that a device reads and writes it in few accesses. A sweep changes only the fields
 /// before `normal`, and `restitution`: device::SolveProgram::store() writes no others back.
 struct alignas(4 * sizeof(Real)) SphereRow {
-  Vec3 friction_impulse;    ///< [N s], on a, in the tangent plane
-  Real normal_impulse = 0;  ///< [N s], on a
-  Vec3 normal;              ///< from b to a
-  Real distance = 0;        ///< [m], at the start of the step
+  Vec3 friction_impulse;  ///< [N s], on a, in the tangent plane
+  /// [N s], on a. Its magnitude is the impulse. The sign bit is set until the bodies have pushed
+  /// each other in this step; the impulse of the last step does not count.
+  Real normal_impulse = 0;
+  Vec3 normal;        ///< from b to a
+  Real distance = 0;  ///< [m], at the start of the step
   Real friction = 0;
   Real arm_a = 0, arm_b = 0;               ///< [m], from the centres to the common point
   Real normal_mass = 0, tangent_mass = 0;  ///< [kg]
   Real restitution = 0;                    ///< in [0, 1], plus 2 for each rebound in this step
   std::uint32_t a = 0, b = 0;              ///< bodies; a is movable
 };
+
+/// [N s], >= 0, on a.
+JFPX_HD inline Real normal_impulse_of(const SphereRow& row) { return absolute(row.normal_impulse); }
+
+/// Whether the bodies have pushed each other in this step.
+JFPX_HD inline bool has_pushed(const SphereRow& row) { return !std::signbit(row.normal_impulse); }
 
 /// `kFixed`: body b does not move.
 template <bool kFixed>
@@ -73,9 +83,9 @@ JFPX_HD constexpr Real separation_of(const SphereRow& row, const SolverBody& a,
 }
 
 template <bool kFixed>
-JFPX_HD constexpr void warm_start(const SphereRow& row, SolverBody* a, SolverBody* b) {
-  apply<kFixed>(row, row.normal * row.normal_impulse + row.friction_impulse, row.friction_impulse,
-                a, b);
+JFPX_HD inline void warm_start(const SphereRow& row, SolverBody* a, SolverBody* b) {
+  apply<kFixed>(row, row.normal * normal_impulse_of(row) + row.friction_impulse,
+                row.friction_impulse, a, b);
 }
 
 /// What an impact needs of the bodies, as arrays by body.
@@ -120,7 +130,7 @@ JFPX_HD inline bool rebound(SphereRow* at, const StepConstants& step, const Impa
     acceleration -= bodies.acceleration[row.b];
     largest += length(bodies.acceleration[row.b]);
   }
-  if (!(-closing > largest * step.h + row.normal_impulse / row.normal_mass)) return false;
+  if (!(-closing > largest * step.h + normal_impulse_of(row) / row.normal_mass)) return false;
   // Time until the impact; negative if it is past, and at most a substep ago.
   Real until = separation / -closing;
   if (until < -step.h) until = -step.h;
@@ -143,6 +153,7 @@ JFPX_HD inline bool rebound(SphereRow* at, const StepConstants& step, const Impa
   deflect(row.a, a, a->inverse_mass, row.arm_a);
   if constexpr (!kFixed) deflect(row.b, b, -b->inverse_mass, row.arm_b);
   at->restitution += 2;
+  at->normal_impulse = normal_impulse_of(row);
   return true;
 }
 
@@ -163,8 +174,9 @@ template <bool kFixed, class Impacts>
 JFPX_HD inline void solve(SphereRow* row, SolverBody* a, SolverBody* b, const StepConstants& step,
                           const Impacts& bodies, bool soft) {
   const Vec3& n = row->normal;
+  const Real impulse_before = normal_impulse_of(*row);
   Real separation = separation_of<kFixed>(*row, *a, *b);
-  if (is_idle(separation, row->normal_impulse, soft)) return;
+  if (is_idle(separation, impulse_before, soft)) return;
   Vec3 velocity = relative_velocity<kFixed>(*row, *a, *b);
   Real closing = dot(velocity, n);
   const Real left = soft ? step.h : Real(0);
@@ -178,18 +190,18 @@ JFPX_HD inline void solve(SphereRow* row, SolverBody* a, SolverBody* b, const St
   const Bias bias = bias_of(separation, softness_of<kFixed>(*row, step, separation), step, soft);
 
   Vec3 friction = row->friction_impulse - (velocity - n * closing) * row->tangent_mass;
-  const Real limit = row->friction * row->normal_impulse;
+  const Real limit = row->friction * impulse_before;
   const Real size2 = length_squared(friction);
   if (size2 > limit * limit) friction *= limit / square_root(size2);
   const Vec3 tangential = friction - row->friction_impulse;
   row->friction_impulse = friction;
 
   const Real change = -(row->normal_mass * bias.mass_scale) * (closing + bias.velocity) -
-                      bias.impulse_scale * row->normal_impulse;
-  const Real wanted = row->normal_impulse + change;
+                      bias.impulse_scale * impulse_before;
+  const Real wanted = impulse_before + change;
   const Real normal_impulse = wanted > 0 ? wanted : Real(0);
-  const Real along = normal_impulse - row->normal_impulse;
-  row->normal_impulse = normal_impulse;
+  const Real along = normal_impulse - impulse_before;
+  row->normal_impulse = wanted > 0 ? wanted : std::copysign(Real(0), row->normal_impulse);
   apply<kFixed>(*row, n * along + tangential, tangential, a, b);
   if (bias.projection > 0) {
     const Vec3 impulse = n * (bias.projection * row->normal_mass);

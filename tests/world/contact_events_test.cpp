@@ -103,6 +103,30 @@ TEST(ContactEvents, OfBoxesThatMeetWithinAStepBegin) {
   EXPECT_GT(impacts, 300);
 }
 
+/// Balls that meet slowly do not rebound, and may have parted at the end of the step.
+TEST(ContactEvents, OfBallsThatMeetSlowlyWithinAStepBegin) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  for (int n = 0; n < 600; ++n) {
+    BodyDef ball;
+    ball.mass = 1;
+    ball.restitution = static_cast<Real>(n % 3) * 0.5_r;
+    ball.acceleration = {};
+    ball.can_sleep = false;
+    Scene scene;
+    scene.bodies = {ball, ball};
+    BodyDef& other = scene.bodies[1];
+    other.position = {random.uniform(1.001_r, 1.01_r), random.uniform(-0.5_r, 0.5_r) * 0.01_r, 0};
+    other.velocity = {random.uniform(-0.24_r, -0.05_r), 0, 0};
+    World world(scene);
+    bool has_begun = false;
+    for (int k = 0; k < 20; ++k) has_begun |= step(&world).starts_with('+');
+    ASSERT_NE(world.states()[0].velocity, Vec3{}) << n;
+    EXPECT_TRUE(has_begun) << n;
+  }
+}
+
 // Solver::soft_step resolves an impact before the bodies touch.
 TEST(ContactEvents, BeginStayAndEndWithABounce) {
   Scene scene = test::thesis_scene();

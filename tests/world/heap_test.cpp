@@ -1,6 +1,9 @@
 /// Heaps of many bodies: penetration, rest and sleep.
 #include "tests/world/quality.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace jfpx {
 namespace {
 
@@ -56,11 +59,19 @@ TEST(Heaps, ASleepingBodyGainsTheVelocityOfManySmallHits) {
 }
 
 TEST(Heaps, BodiesThatOverlapAtTheStartArePushedApartAndDoNotExplode) {
-  World world(test::awake(scenes::make("columns", {.spheres = 256})));
-  const auto push_out = static_cast<double>(world.scene().soft_step.push_out_speed);
+  const Scene scene = test::awake(scenes::make("columns", {.spheres = 256}));
+  World world(scene);
+  double height = 0;
+  for (const BodyDef& def : scene.bodies) {
+    height = std::max(height, static_cast<double>(def.position.y));
+  }
+  const auto push_out = static_cast<double>(scene.soft_step.push_out_speed);
+  const double fallen = std::sqrt(push_out * push_out + 2 * test::kGravity * height);
   for (int n = 0; n < 300; ++n) {
     world.step();
-    ASSERT_LE(test::speeds(world).largest, push_out + test::kGravity * world.time()) << n;
+    ASSERT_LE(test::speeds(world).largest,
+              std::min(push_out + test::kGravity * world.time(), fallen))
+        << n;
   }
   EXPECT_LE(test::penetration(world).largest, 0.01);
 }

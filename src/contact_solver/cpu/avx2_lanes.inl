@@ -22,6 +22,7 @@ struct Avx2Lanes {
   static void store(Real* p, Vec v) { _mm256_storeu_pd(p, v); }
   static Vec negate(Vec v) { return _mm256_xor_pd(v, set(-0.0)); }
   static Vec absolute(Vec v) { return _mm256_andnot_pd(set(-0.0), v); }
+  static Vec zero_with_sign_of(Vec v) { return _mm256_and_pd(set(-0.0), v); }
   static Vec square_root(Vec v) { return _mm256_sqrt_pd(v); }
   static Vec select(Mask m, Vec a, Vec b) { return _mm256_blendv_pd(b, a, m); }
   static Vec keep(Mask m, Vec v) { return _mm256_and_pd(m, v); }
@@ -56,6 +57,7 @@ struct Avx2Lanes {
   static void store(Real* p, Vec v) { _mm256_storeu_ps(p, v); }
   static Vec negate(Vec v) { return _mm256_xor_ps(v, set(-0.0f)); }
   static Vec absolute(Vec v) { return _mm256_andnot_ps(set(-0.0f), v); }
+  static Vec zero_with_sign_of(Vec v) { return _mm256_and_ps(set(-0.0f), v); }
   static Vec square_root(Vec v) { return _mm256_sqrt_ps(v); }
   static Vec select(Mask m, Vec a, Vec b) { return _mm256_blendv_ps(b, a, m); }
   static Vec keep(Mask m, Vec v) { return _mm256_and_ps(m, v); }

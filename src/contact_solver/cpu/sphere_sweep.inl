@@ -81,8 +81,8 @@ class RowLanes {
     const Quads impulses = quad(sphere_row_quad::kImpulses);
     const Quads normal = quad(sphere_row_quad::kNormal), arms = quad(sphere_row_quad::kFriction);
     BodyLanes<S> a(sweep_, a_), b(sweep_, b_);
-    apply(normal.vector, arms.vector, normal.vector * impulses.scalar + impulses.vector,
-          impulses.vector, &a, &b);
+    apply(normal.vector, arms.vector,
+          normal.vector * S::absolute(impulses.scalar) + impulses.vector, impulses.vector, &a, &b);
     a.store(sweep_, a_, kAll);
     b.store(sweep_, b_, kAll);
   }
@@ -98,6 +98,7 @@ class RowLanes {
     const Vec friction_coefficient = friction_arms.vector.x, normal_mass = friction_arms.scalar;
     const Vec arm_a = friction_arms.vector.y, arm_b = friction_arms.vector.z;
     const Vec tangent_mass = S::load_column(sweep_.rows + sphere_row_quad::kTangentMass, rows_);
+    const Vec impulse_before = S::absolute(impulses.scalar);
     BodyLanes<S> a(sweep_, a_), b(sweep_, b_);
     Quads shift_a = Quads::load(sweep_.bodies, a_, solver_body_quad::kShift);
     Quads shift_b = Quads::load(sweep_.bodies, b_, solver_body_quad::kShift);
@@ -107,7 +108,7 @@ class RowLanes {
     const typename S::Mask is_apart = S::less(zero, separation);
     unsigned lanes = kAll;
     if constexpr (!kSoft) {
-      lanes &= ~(S::bits(is_apart) & ~S::bits(S::less(zero, impulses.scalar)));
+      lanes &= ~(S::bits(is_apart) & ~S::bits(S::less(zero, impulse_before)));
     }
     const Vectors spin = a.angular_velocity.vector * arm_a + b.angular_velocity.vector * arm_b;
     const Vectors velocity = (a.velocity.vector - b.velocity.vector) - Vectors::cross(spin, normal);
@@ -142,7 +143,7 @@ class RowLanes {
     }
 
     Vectors friction = impulses.vector - (velocity - normal * closing) * tangent_mass;
-    const Vec limit = friction_coefficient * impulses.scalar;
+    const Vec limit = friction_coefficient * impulse_before;
     const Vec size2 = Vectors::dot(friction, friction);
     const typename S::Mask slides = S::less(limit * limit, size2);
     if (S::bits(slides) != 0) {
@@ -150,11 +151,11 @@ class RowLanes {
     }
     const Vectors tangential = friction - impulses.vector;
     const Vec change = S::negate(normal_mass * mass_scale) * (closing + bias_velocity) -
-                       impulse_scale * impulses.scalar;
-    const Vec wanted = impulses.scalar + change;
-    const Vec normal_impulse = S::select(S::less(zero, wanted), wanted, zero);
-    const Vec along = normal_impulse - impulses.scalar;
-    impulses = {friction, normal_impulse};
+                       impulse_scale * impulse_before;
+    const Vec wanted = impulse_before + change;
+    const typename S::Mask pushes = S::less(zero, wanted);
+    const Vec along = S::select(pushes, wanted, zero) - impulse_before;
+    impulses = {friction, S::select(pushes, wanted, S::zero_with_sign_of(impulses.scalar))};
     apply(normal, friction_arms.vector, normal * along + tangential, tangential, &a, &b);
 
     impulses.store(sweep_.rows, rows_, sphere_row_quad::kImpulses, lanes);
