@@ -37,8 +37,9 @@ struct SoftStepSettings {
   /// [Hz], >= 0, frequency of the contact springs between movable bodies; twice that against
   /// immovable and kinematic bodies. 0, and values above it, mean a quarter of the substep rate.
   Real contact_hertz = 0;
-  /// [-], in [0.01, 1000], of the contact springs; twice that between two movable spheres without
-  /// rolling friction.
+  /// [-], in [0.01, 1000], of the contact springs. Between two movable spheres without rolling
+  /// friction it is multiplied by 6, and by 2 where they penetrate by more than 3 % of the smaller
+  /// radius.
   Real damping_ratio = 1;
   Real push_out_speed = 3;  ///< [m/s], > 0: maximum speed that removes a penetration
   Real restitution_threshold = Real(0.25);  ///< [m/s], >= 0: slower contacts do not bounce

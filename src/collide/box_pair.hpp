@@ -179,20 +179,28 @@ JFPX_HD inline void face_points(const Vec3& half, int face, Real side, const Vec
 /// The midpoint between the closest points of two lines (Goldman 1990), clamped to the edges: edge
 /// i of a and edge j of b, of each direction the edge nearest to the other box. The edges must not
 /// be parallel.
-JFPX_HD inline Vec3 edge_point(const BoxPair& pair, int i, int j, const Vec3& normal) {
+JFPX_HD inline Vec3 edge_point(const BoxPair& pair, int i, int j, const LeastOverlap& least) {
   const Mat3 identity;
   const Vec3 dir_a = unit_axis(i), dir_b = pair.rotation.column(j);
-  Vec3 on_a = support(pair.half_a, identity, {}, -normal);
+  Vec3 on_a = support(pair.half_a, identity, {}, -least.normal);
   on_a[i] = 0;
-  Vec3 on_b = support(pair.half_b, pair.rotation, pair.offset, normal);
+  Vec3 on_b = support(pair.half_b, pair.rotation, pair.offset, least.normal);
   on_b -= dir_b * dot(dir_b, on_b - pair.offset);
   const Vec3 across = on_b - on_a, common = cross(dir_a, dir_b);
   // Determinants lose half as many digits as the cosine does for edges at a small angle.
   const Real scale = Real(1) / length_squared(common);
   const auto clamp = [](Real x, Real limit) { return x > limit ? limit : x < -limit ? -limit : x; };
-  const Real s = clamp(dot(cross(across, dir_b), common) * scale, pair.half_a[i]);
-  const Real t = clamp(dot(cross(across, dir_a), common) * scale, pair.half_b[j]);
-  return (add_scaled(on_a, dir_a, s) + add_scaled(on_b, dir_b, t)) * Real(0.5);
+  const Real s = dot(cross(across, dir_b), common) * scale;
+  const Real t = dot(cross(across, dir_a), common) * scale;
+  const Real s_on_edge = clamp(s, pair.half_a[i]), t_on_edge = clamp(t, pair.half_b[j]);
+  const Vec3 p = add_scaled(on_a, dir_a, s_on_edge), q = add_scaled(on_b, dir_b, t_on_edge);
+  // Edges of least overlap cross each other. If rounding has selected others, the end of the one
+  // that does not reach the other is in the overlap.
+  const bool overlaps = least.distance <= 0;
+  const bool a_ends = overlaps && s != s_on_edge, b_ends = overlaps && t != t_on_edge;
+  if (a_ends && !b_ends) return add_scaled(p, least.normal, least.distance * Real(-0.5));
+  if (b_ends && !a_ends) return add_scaled(q, least.normal, least.distance * Real(0.5));
+  return (p + q) * Real(0.5);
 }
 
 /// Two boxes in the axes of the first.
@@ -229,7 +237,7 @@ JFPX_HD inline Manifold box_manifold(const BoxPair& pair, const LeastOverlap& le
                 -transform_transpose(pair.rotation, pair.offset), margin, &manifold);
   } else {
     const int edges = least.axis - 6;
-    manifold.points[manifold.count++] = {edge_point(pair, edges / 3, edges % 3, least.normal),
+    manifold.points[manifold.count++] = {edge_point(pair, edges / 3, edges % 3, least),
                                          least.distance,
                                          2 * kFeaturesOfBox + static_cast<std::uint32_t>(edges)};
   }

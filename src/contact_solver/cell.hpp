@@ -23,7 +23,8 @@ struct alignas(16) MemoryCell {
   std::uint32_t words[4];
 };
 
-/// Loads 16 bytes atomically. On a device, from the L2 cache, which all multiprocessors share.
+/// Loads 16 bytes atomically. On a device, from the L2 cache, which all multiprocessors share;
+/// registers of 128 bits take PTX ISA 8.3, of CUDA 12.3.
 JFPX_HD inline MemoryCell load_memory_cell(const MemoryCell* at) {
 #if defined(__CUDA_ARCH__)
   unsigned long long low, high;

@@ -4,7 +4,7 @@
 
 #include <jfpx/math.hpp>
 
-#include "src/contact_solver/contact_basis.hpp"
+#include "src/collide/contact_basis.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {

@@ -1,7 +1,7 @@
 /// Writing and checked reading of contacts; see the header.
 #include "src/world/contact_snapshot.hpp"
 
-#include "src/contact_solver/greedy_coloring.hpp"
+#include "src/contact_solver/soft_step/greedy_coloring.hpp"
 #include "src/world/snapshot_fields.hpp"
 
 #include <limits>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/base/binary_archive.hpp"
-#include "src/contact_solver/contact_set.hpp"
+#include "src/contact_solver/soft_step/contact_set.hpp"
 #include "src/world/body_store.hpp"
 
 namespace jfpx {

@@ -4,7 +4,7 @@
 #include <jfpx/cuda/world.hpp>
 
 #include "src/base/thread_pool.hpp"
-#include "src/contact_solver/contact_set.hpp"
+#include "src/contact_solver/soft_step/contact_set.hpp"
 #include "src/world/bodies_of_step.hpp"
 #include "src/world/detected_contacts.hpp"
 #include "src/world/force_table.hpp"

@@ -1,7 +1,7 @@
 /// Contacts that began during a step, after contact detection.
 #pragma once
 
-#include "src/contact_solver/contact_set.hpp"
+#include "src/contact_solver/soft_step/contact_set.hpp"
 
 #include <cstdint>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/collide/speculative.hpp"
-#include "src/contact_solver/contact_set.hpp"
+#include "src/contact_solver/soft_step/contact_set.hpp"
 #include "src/world/near_bounds.hpp"
 
 #include <cstdint>

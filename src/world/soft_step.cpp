@@ -1,9 +1,10 @@
 /// The soft step of a world (Catto, Solver2D, 2023; Macklin et al., Small Steps in Physics
 /// Simulation, 2019).
 ///
-/// Substeps after the first need no warm start by contacts: as normals and anchors are constant
-/// within a step, the impulses of a substep changed a body's velocity by what it has gained since
-/// the accelerations of that substep, and applying them again changes it by the same amount.
+/// Box2D applies the accumulated impulse of every contact at the start of each substep. Here this
+/// is done per body: FreeMotion has its velocities right after its accelerations, so its velocity
+/// minus these is what the contacts of the substep have changed, and accelerate() adds it again.
+/// This is the same, because normals and anchors are constant within a step.
 #include "src/world/soft_step.hpp"
 
 #include "src/base/parallel_for.hpp"
@@ -222,7 +223,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
     if (substep == 0) solver_.warm_start(bodies_);
     solver_.solve(bodies_, true);
     for_each_body(*bodies, [this](std::uint32_t i) { step_.move(i, &step_.solver[i]); });
-    solver_.solve(bodies_, false);
+    for (std::uint32_t k = 0; k < soft_step::kRelaxSweeps; ++k) solver_.solve(bodies_, false);
   }
   solver_.restitute(bodies_);
   solver_.store();

@@ -4,8 +4,8 @@
 #include <jfpx/world.hpp>
 
 #include "src/base/thread_pool.hpp"
-#include "src/contact_solver/contact_cache.hpp"
-#include "src/contact_solver/cpu/soft_step_solver.hpp"
+#include "src/contact_solver/soft_step/contact_cache.hpp"
+#include "src/contact_solver/soft_step/cpu/soft_step_solver.hpp"
 #include "src/world/body_store.hpp"
 #include "src/world/islands.hpp"
 #include "src/world/soft_step_stages.hpp"

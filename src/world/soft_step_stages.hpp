@@ -1,8 +1,8 @@
 /// The stages of a soft step for one body or one contact, for the CPU and for devices.
 #pragma once
 
-#include "src/contact_solver/contact_set.hpp"
-#include "src/contact_solver/row_setup.hpp"
+#include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/contact_solver/soft_step/row_setup.hpp"
 #include "src/world/body_view.hpp"
 
 #include <cstdint>

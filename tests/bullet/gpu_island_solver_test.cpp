@@ -3,8 +3,8 @@
 #include <jfpx/error.hpp>
 
 #include "src/bullet/solver/constraint_solver_test_access.hpp"
-#include "src/contact_solver/coloring.hpp"
-#include "src/contact_solver/row_order.hpp"
+#include "src/contact_solver/sequential_impulse/coloring.hpp"
+#include "src/contact_solver/sequential_impulse/row_order.hpp"
 #include "tests/bullet/stock_bits.hpp"
 #include "tests/contact_solver/host_group_solver.hpp"
 

@@ -1,8 +1,8 @@
 /// Groups of contacts have the same bits on a GPU and on the host.
 #include <jfpx/error.hpp>
 
-#include "src/contact_solver/cuda/group_solver_cuda.hpp"
-#include "src/contact_solver/row_order.hpp"
+#include "src/contact_solver/sequential_impulse/cuda/group_solver_cuda.hpp"
+#include "src/contact_solver/sequential_impulse/row_order.hpp"
 #include "tests/contact_solver/host_group_solver.hpp"
 #include "tests/sphere_collider/cuda/cuda_fixture.hpp"
 

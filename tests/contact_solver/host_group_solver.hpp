@@ -5,7 +5,7 @@
 #include <jfpx/error.hpp>
 #include <jfpx/random.hpp>
 
-#include "src/contact_solver/group_solver.hpp"
+#include "src/contact_solver/sequential_impulse/group_solver.hpp"
 
 #include <algorithm>
 #include <functional>

@@ -15,6 +15,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <ostream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -29,6 +30,7 @@ inline HostDevice& host_device_of(World* world) {
 }
 
 struct DeviceKind {
+  friend void PrintTo(const DeviceKind& kind, std::ostream* out) { *out << kind.name; }
   std::string name;
   bool is_cuda = false;
   std::function<std::unique_ptr<DeviceWorld>(const Scene&)> make;

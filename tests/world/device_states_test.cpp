@@ -16,6 +16,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ namespace jfpx {
 namespace {
 
 struct Kind {
+  friend void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
   std::string name;
   std::function<std::unique_ptr<DeviceWorld>(const Scene&)> make;
   /// Copies bytes from the device to the host.

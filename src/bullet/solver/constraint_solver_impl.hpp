@@ -6,7 +6,7 @@
 #include "src/bullet/solver/contact_scan.hpp"
 #include "src/bullet/solver/gpu_island_solver.hpp"
 #include "src/bullet/solver/group_choice.hpp"
-#include "src/contact_solver/cpu/row_solver.hpp"
+#include "src/contact_solver/sequential_impulse/cpu/row_solver.hpp"
 
 #include <array>
 #include <atomic>

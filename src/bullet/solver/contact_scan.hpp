@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/base/buffer.hpp"
-#include "src/contact_solver/cpu/row_solver.hpp"
+#include "src/contact_solver/sequential_impulse/cpu/row_solver.hpp"
 
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>

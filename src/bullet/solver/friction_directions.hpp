@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/bullet/solver/contact_scan.hpp"
-#include "src/contact_solver/row_layout.hpp"
+#include "src/contact_solver/sequential_impulse/row_layout.hpp"
 
 #include <cstddef>
 

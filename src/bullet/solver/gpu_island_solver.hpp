@@ -5,9 +5,9 @@
 
 #include "src/base/time_chooser.hpp"
 #include "src/bullet/solver/contact_scan.hpp"
-#include "src/contact_solver/cpu/row_solver.hpp"
-#include "src/contact_solver/group_solver.hpp"
-#include "src/contact_solver/row_order.hpp"
+#include "src/contact_solver/sequential_impulse/cpu/row_solver.hpp"
+#include "src/contact_solver/sequential_impulse/group_solver.hpp"
+#include "src/contact_solver/sequential_impulse/row_order.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>
 

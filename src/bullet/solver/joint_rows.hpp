@@ -1,7 +1,7 @@
 /// Rows of joints, which are solved serially on the velocities of the row solver.
 #pragma once
 
-#include "src/contact_solver/cpu/row_solver.hpp"
+#include "src/contact_solver/sequential_impulse/cpu/row_solver.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btSolverConstraint.h>
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>

@@ -1,7 +1,7 @@
 /// Conversion of Bullet's settings, bodies and contacts to the inputs of the row solver.
 #pragma once
 
-#include "src/contact_solver/row_layout.hpp"
+#include "src/contact_solver/sequential_impulse/row_layout.hpp"
 
 #include <BulletCollision/NarrowPhaseCollision/btManifoldPoint.h>
 #include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>

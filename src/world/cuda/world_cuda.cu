@@ -25,8 +25,9 @@ __global__ void __launch_bounds__(GridTeam::kThreads, Program::kBlocksPerMultipr
   program(GridTeam(scratch, is_cluster));
 }
 
-/// Launches of up to this number of blocks use one cluster. More than 8 are not portable, and all
-/// Hopper GPUs support 16.
+/// Number of blocks of a cluster, whose barriers are faster than those of a grid. Launches of up to
+/// twice as many blocks are reduced to one cluster. More than 8 blocks are not portable, and Hopper
+/// supports 16.
 constexpr unsigned kClusterBlocks = 16;
 /// Largest Program::kBlocksPerMultiprocessor.
 constexpr unsigned kMostBlocks = 6;

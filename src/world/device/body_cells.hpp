@@ -3,8 +3,8 @@
 #pragma once
 
 #include "src/contact_solver/cell.hpp"
-#include "src/contact_solver/greedy_coloring.hpp"
-#include "src/contact_solver/step_constants.hpp"
+#include "src/contact_solver/soft_step/greedy_coloring.hpp"
+#include "src/contact_solver/soft_step/step_constants.hpp"
 
 #include <array>
 #include <bit>
@@ -14,10 +14,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Order of the changes of a body in a sweep over the rows: the rows of the overflow, which make no
-/// turns, because barriers enclose them; the rows of its contacts by color, at most one of each;
-/// the body itself, with its rows with fixed bodies. A turn is the sequence number of the last
-/// change that was made. The turns of colors that the body does not have are left out.
+/// Sequence numbers of the changes of a body, its turns. Each sweep has kPerSweep of them: 1 + c
+/// for the row of color c, and the last one for the body itself, with its rows with fixed bodies. A
+/// row waits for the turn of the body's previous row, and then sets its own. The turns of colors
+/// that the body does not have are left out. Rows of the overflow keep the turn before the sweep:
+/// barriers enclose them.
 struct Turns {
   static constexpr std::uint32_t kPerSweep = soft_step::kColors + 2u;
 
@@ -191,9 +192,12 @@ class BodyCells {
   static constexpr std::uint32_t kTurnBits = 14, kVersionBits = 6;
   static constexpr std::uint32_t kTurnMask = (1u << kTurnBits) - 1;
   static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
-  // Versions start again at 0 after 64 changes: no cell is read that is that many changes old.
-  // All turns are below that of VectorCells::kMixed.
-  static_assert((2 * kMaxSubsteps + 2) * Turns::kPerSweep < kTurnMask);
+  // Versions start again at 0 after 64 changes. A thread loads all cells of a body one right after
+  // the other, and each change takes at least a round trip to L2, so a cell that it loads is not 64
+  // changes older than another.
+  // All turns are below that of VectorCells::kMixed. The sweeps of a step are the warm start, those
+  // of the substeps and the restitution.
+  static_assert((soft_step::kSweepsPerSubstep * kMaxSubsteps + 2) * Turns::kPerSweep < kTurnMask);
 
   MotionCells* motion_;
   FreeCells* free_;

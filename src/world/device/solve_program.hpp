@@ -1,7 +1,7 @@
 /// Substeps and restitution of a soft step on a device.
 #pragma once
 
-#include "src/contact_solver/row_operations.hpp"
+#include "src/contact_solver/soft_step/row_operations.hpp"
 #include "src/world/device/atomic.hpp"
 #include "src/world/device/step_data.hpp"
 
@@ -27,9 +27,9 @@ struct SolveProgram {
   static constexpr std::size_t kItemsPerThread = 32;
   StepData data;
 
-  /// The sequence is that of SoftStep::solve(). Sweep 0 is the warm start. In substep k, sweep
-  /// 2k + 1 pushes penetrations out, and the bodies move; sweep 2k + 2 does not push. The last one
-  /// is the restitution. Sweep::moves() and the highest turn of BodyCells depend on this.
+  /// The sequence is that of SoftStep::solve(). Sweep 0 is the warm start. Each substep has a bias
+  /// sweep, after which the bodies move, and kRelaxSweeps relax sweeps. The last sweep is the
+  /// restitution. Sweep::moves() and the highest turn of BodyCells depend on this.
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
     if (data.has_failed()) return;
@@ -41,11 +41,16 @@ struct SolveProgram {
       const bool is_last = substep + 1 == d.substeps;
       sweep.start(BodyStage::move);
       run(team, sweep, soft_step::Solve<true>{d.constants});
-      sweep.start(!is_last   ? BodyStage::accelerate
-                  : rebounds ? BodyStage::none
-                             : BodyStage::finish);
-      sweep.stores_impulses = is_last;
-      run(team, sweep, soft_step::Solve<false>{d.constants});
+      for (std::uint32_t k = 1; k <= soft_step::kRelaxSweeps; ++k) {
+        const bool ends_substep = k == soft_step::kRelaxSweeps;
+        const bool ends_step = is_last && ends_substep;
+        sweep.start(!ends_substep ? BodyStage::none
+                    : !is_last    ? BodyStage::accelerate
+                    : rebounds    ? BodyStage::none
+                                  : BodyStage::finish);
+        sweep.stores_impulses = ends_step;
+        run(team, sweep, soft_step::Solve<false>{d.constants});
+      }
     }
     if (!rebounds) return;
     sweep.start(BodyStage::finish);
@@ -115,7 +120,9 @@ struct SolveProgram {
     }
     JFPX_HD bool has_overflow() const { return size(0) + size(soft_step::kGroups) > 0; }
     /// Number of moves that a kinematic body has made when the rows of the sweep are solved.
-    JFPX_HD std::uint32_t moves() const { return number / 2; }
+    JFPX_HD std::uint32_t moves() const {
+      return (number + soft_step::kRelaxSweeps - 1) / soft_step::kSweepsPerSubstep;
+    }
   };
 
   /// Finds the rows of the colors, in the order of a sweep: by color, and first those of spheres.

@@ -3,7 +3,7 @@
 
 #include <jfpx/cuda/sphere_collider.hpp>
 
-#include "src/contact_solver/row_setup.hpp"
+#include "src/contact_solver/soft_step/row_setup.hpp"
 #include "src/world/device/body_cells.hpp"
 #include "src/world/device/striped_array.hpp"
 #include "src/world/near_pair_test.hpp"

@@ -1,0 +1,59 @@
+/// Vector kernels of the row solver: one table of functions per instruction set.
+#pragma once
+
+// The includes are restricted; see src/sphere_collider/cpu/kernels.hpp for the reason.
+#include "src/contact_solver/sequential_impulse/row_layout.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cpu {
+
+/// Arrays of a sweep. The ids of block i start at 2 * lanes * i: all bodies a, then all bodies b.
+struct RowArrays {
+  const std::int32_t* ids;
+  Real* velocities;
+  Real* push_velocities;  ///< velocities of the split impulse, which only correct positions
+  const Real* factors;    ///< null if all factors are 1
+  Real* contacts;
+  Real* frictions;
+  std::uint32_t directions;                   ///< friction rows per contact, in consecutive order
+  const std::uint32_t* split_impulse_blocks;  ///< blocks with a row of the split impulse
+  const std::uint32_t* rolling_friction_blocks;  ///< blocks with rolling or spinning friction
+  Real* rolling_frictions;                       ///< kRollingFrictionRows rows per such block
+};
+
+using rows::kRollingFrictionRows;
+
+struct RowResidual {
+  Real largest = 0;     ///< largest squared residual
+  bool broken = false;  ///< whether a residual is NaN
+};
+
+/// Sweeps over the blocks [first, last) in their order.
+using RowSweep = void (*)(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
+                          RowResidual* residual);
+
+struct RowKernels {
+  unsigned lanes;
+  /// Sets up the contacts of a block and their friction directions; see set_up_contact().
+  /// @return one bit per lane: whether `second` holds the second direction
+  unsigned (*set_up_contacts)(const rows::RowSettings& settings, const Real* inputs,
+                              const Real* bodies, const std::int32_t* ids, Real* contacts,
+                              Real* frictions, Real* second);
+  void (*set_up_frictions)(const rows::RowSettings& settings, const Real* inputs,
+                           const Real* bodies, const std::int32_t* ids, Real* frictions);
+  // Index 1: with factors.
+  RowSweep warm_starts[2];
+  RowSweep contacts[2];
+  RowSweep frictions[2];
+  RowSweep both[2];               ///< the friction of each block directly after its contacts
+  RowSweep split_impulses[2];     ///< blocks are indices into split_impulse_blocks
+  RowSweep rolling_frictions[2];  ///< blocks are indices into rolling_friction_blocks
+};
+
+extern const RowKernels kScalarRowKernels;
+extern const RowKernels kAvx2RowKernels;
+
+}  // namespace cpu
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,174 @@
+/// Matching of the contacts of consecutive steps; see the header.
+#include "src/contact_solver/soft_step/contact_cache.hpp"
+
+#include "src/base/parallel_for.hpp"
+#include "src/base/reserve.hpp"
+#include "src/contact_solver/soft_step/contact_match.hpp"
+
+#include <algorithm>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+namespace {
+
+constexpr std::size_t kContactsPerChunk = 2048;
+
+/// Finds contacts of a sorted list by ascending keys.
+template <class Contact>
+class Finder {
+ public:
+  /// @param first key that is not above those to be found
+  Finder(const std::vector<Contact>& sorted, const ContactKey& first)
+      : next_(std::ranges::lower_bound(sorted, first, {}, &Contact::key)),
+        begin_(sorted.begin()),
+        end_(sorted.end()) {}
+
+  /// @param key not below that of the last call
+  /// @param index receives the index of the contact
+  bool find(const ContactKey& key, std::uint32_t* index) {
+    while (next_ != end_ && next_->key < key) ++next_;
+    *index = static_cast<std::uint32_t>(next_ - begin_);
+    return next_ != end_ && next_->key == key;
+  }
+
+ private:
+  typename std::vector<Contact>::const_iterator next_, begin_, end_;
+};
+
+}  // namespace
+
+void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls, ThreadPool* pool) {
+  reserve(inverse_mass.size());
+  drop_forgotten();
+  ContactSet& now = current_;
+  const auto spheres = static_cast<std::uint32_t>(now.spheres.size());
+  resize_geometric(&now.impulses, spheres + now.points.size());
+  if (any_rolls) {
+    resize_geometric(&now.rolling_impulses, now.size());
+  } else {
+    now.rolling_impulses = {};
+  }
+  resize_geometric(&now.colors, now.size());
+  coloring_.start(inverse_mass.size());
+  parallel_for(pool, spheres, kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+    match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
+  });
+  parallel_for(
+      pool, now.manifolds.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+        match_manifolds(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
+      });
+  const ContactView contacts = now.view();
+  for (std::uint32_t i = 0; i < contacts.size(); ++i) {
+    if (now.colors[i] < kColors) continue;
+    const ContactKey& key = contacts.key(i);
+    if (!(inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0)) {
+      now.colors[i] = kFixedColor;
+    } else {
+      coloring_.add(key, i, &now.colors[i]);
+    }
+  }
+  coloring_.finish();
+}
+
+/// Keeps the color and the rolling impulse. @param i,before contacts of this and of the last step
+void ContactCache::keep(std::uint32_t i, std::uint32_t before) {
+  if (current_.has_rolling()) current_.rolling_impulses[i] = last_.rolling_impulse(before);
+  const std::uint8_t color = last_.colors[before];
+  if (color >= kColors) return;
+  current_.colors[i] = color;
+  const ContactKey& key = current_.view().key(i);
+  coloring_.keep(key.a, key.b, color);
+}
+
+void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last) {
+  Finder<SphereContactInput> finder(last_.spheres, current_.spheres[first].key);
+  for (std::uint32_t i = first; i < last; ++i) {
+    const SphereContactInput& contact = current_.spheres[i];
+    current_.impulses[i] = {};
+    if (current_.has_rolling()) current_.rolling_impulses[i] = {};
+    current_.colors[i] = kNoColor;
+    std::uint32_t before = 0;
+    if (!finder.find(contact.key, &before)) continue;
+    keep(i, before);
+    current_.impulses[i] = at_start_of_step(last_.impulses[before]);
+  }
+}
+
+void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last) {
+  const auto spheres = static_cast<std::uint32_t>(current_.spheres.size());
+  const auto spheres_before = static_cast<std::uint32_t>(last_.spheres.size());
+  Finder<ManifoldInput> finder(last_.manifolds, current_.manifolds[first].key);
+  for (std::uint32_t m = first; m < last; ++m) {
+    const ManifoldInput& contact = current_.manifolds[m];
+    if (current_.has_rolling()) current_.rolling_impulses[spheres + m] = {};
+    current_.colors[spheres + m] = kNoColor;
+    for (std::uint32_t p = 0; p < contact.count; ++p) {
+      current_.impulses[spheres + contact.first + p] = {};
+    }
+    std::uint32_t old = 0;
+    if (!finder.find(contact.key, &old)) continue;
+    keep(spheres + m, spheres_before + old);
+    match_points(current_.view(), m, last_.view(), old);
+  }
+}
+
+void ContactCache::reserve(std::size_t bodies) {
+  if (forgotten_.size() < bodies) forgotten_.resize(bodies);
+}
+
+void ContactCache::restore(ContactSet last) noexcept {
+  forget_none();
+  last_ = std::move(last);
+}
+
+void ContactCache::forget_none() noexcept {
+  if (!any_forgotten_) return;
+  std::ranges::fill(forgotten_, std::uint8_t{0});
+  any_forgotten_ = false;
+}
+
+void ContactCache::forget(std::uint32_t body) noexcept {
+  if (body >= forgotten_.size()) return;
+  forgotten_[body] = 1;
+  any_forgotten_ = true;
+}
+
+/// The impulses of removed manifolds stay unused until the next step.
+void ContactCache::drop_forgotten() noexcept {
+  if (!any_forgotten_) return;
+  ContactSet& set = last_;
+  const auto involved = [this](const ContactKey& key) {
+    return forgotten_[key.a] != 0 || forgotten_[key.b] != 0;
+  };
+  // Points keep their indices, so their impulses must keep their distance from the first one.
+  const auto spheres = static_cast<std::uint32_t>(set.spheres.size());
+  std::uint32_t kept = 0, kept_spheres = 0;
+  const auto keep_contact = [&, has_rolling = set.has_rolling()](std::uint32_t i) {
+    if (has_rolling) set.rolling_impulses[kept] = set.rolling_impulses[i];
+    set.colors[kept++] = set.colors[i];
+  };
+  for (std::uint32_t i = 0; i < spheres; ++i) {
+    if (involved(set.spheres[i].key)) continue;
+    set.spheres[kept] = set.spheres[i];
+    set.impulses[kept] = set.impulses[i];
+    keep_contact(i);
+  }
+  kept_spheres = kept;
+  std::copy(set.impulses.begin() + spheres, set.impulses.end(), set.impulses.begin() + kept);
+  std::uint32_t kept_manifolds = 0;
+  for (std::uint32_t m = 0; m < set.manifolds.size(); ++m) {
+    if (involved(set.manifolds[m].key)) continue;
+    keep_contact(spheres + m);
+    set.manifolds[kept_manifolds++] = set.manifolds[m];
+  }
+  set.spheres.resize(kept_spheres);
+  set.manifolds.resize(kept_manifolds);
+  if (set.has_rolling()) set.rolling_impulses.resize(kept);
+  set.colors.resize(kept);
+  forget_none();
+}
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

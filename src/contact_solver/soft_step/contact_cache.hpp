@@ -1,0 +1,65 @@
+/// Contacts of this step and of the last one, and the transfer of impulses and colors.
+#pragma once
+
+#include "src/base/thread_pool.hpp"
+#include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/contact_solver/soft_step/greedy_coloring.hpp"
+
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Owns the contacts of two steps. Buffers grow and never shrink.
+class ContactCache {
+ public:
+  /// Contacts of the current step. The caller replaces the three lists of contacts and calls
+  /// match().
+  ContactSet& current() { return current_; }
+  const ContactSet& current() const { return current_; }
+  /// Contacts of the last completed step, without those of forgotten bodies.
+  ContactSet& last() {
+    drop_forgotten();
+    return last_;
+  }
+  /// drop_forgotten() must have been called since the last forget().
+  const ContactSet& last() const { return last_; }
+
+  /// Gives each contact the impulses and the color that the same contact had in the last step, and
+  /// colors the new ones.
+  /// @param inverse_mass by body [1/kg]; 0: immovable or kinematic
+  /// @param any_rolls whether a body has rolling or spinning friction
+  /// @param pool null: in the calling thread
+  void match(std::span<const Real> inverse_mass, bool any_rolls, ThreadPool* pool);
+  /// Completes the step: the current contacts become the last ones. Does not allocate.
+  void commit() noexcept { std::swap(last_, current_); }
+  /// Makes room for forget() of bodies with indices below `bodies`. @throws std::bad_alloc
+  void reserve(std::size_t bodies);
+  /// Replaces the contacts of the last completed step.
+  void restore(ContactSet last) noexcept;
+  /// Removes the contacts of a body: takes constant time, and drop_forgotten() does the work for
+  /// all removed bodies together. Bodies that match() and reserve() did not include have none.
+  void forget(std::uint32_t body) noexcept;
+  void drop_forgotten() noexcept;
+  /// Revokes forget(): the last contacts are now those of a step after it.
+  void forget_none() noexcept;
+  /// Replaces the contacts of the last completed step, as they were before forget().
+  void replace_last(ContactSet last) noexcept { last_ = std::move(last); }
+
+ private:
+  void match_spheres(std::uint32_t first, std::uint32_t last);
+  void match_manifolds(std::uint32_t first, std::uint32_t last);
+  void keep(std::uint32_t i, std::uint32_t before);
+
+  ContactSet current_, last_;
+  std::vector<std::uint8_t> forgotten_;  ///< by body: 1 if last_ must lose its contacts
+  bool any_forgotten_ = false;
+  GreedyColoring coloring_;
+};
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

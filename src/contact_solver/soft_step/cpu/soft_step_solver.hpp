@@ -1,0 +1,98 @@
+/// Sweeps of the soft step over the contacts of all colors.
+#pragma once
+
+#include <jfpx/simd_level.hpp>
+
+#include "src/base/thread_pool.hpp"
+#include "src/contact_solver/soft_step/cpu/sphere_sweep.hpp"
+#include "src/contact_solver/soft_step/row_setup.hpp"
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Solves contacts in this order: the overflow, for which no color was free, one after the other;
+/// the colors in ascending order; the contacts with immovable and kinematic bodies, by movable
+/// body. In the overflow, rows of spheres precede manifolds. Contacts of one color share no movable
+/// body, so threads may solve them in any order, and so may contacts of different movable bodies
+/// with fixed bodies.
+///
+/// Owns its buffers, which only grow. In a step: build(), then warm_start(), solve() and
+/// restitute() as the integrator requires, then store().
+class SoftStepSolver {
+ public:
+  /// @param pool not null; outlives the solver
+  /// @param simd widest vectors for rows of spheres
+  SoftStepSolver(ThreadPool* pool, SimdLevel simd);
+
+  /// Makes rows of the contacts whose RowKind is not `none`.
+  /// @param setup     its arrays are valid until store()
+  void build(const RowSetup& setup, const ImpactBodies& impacts, const StepConstants& constants);
+  /// Applies the impulses of the last step.
+  void warm_start(std::span<SolverBody> bodies);
+  /// One sweep over all contacts. @param soft whether penetrations are pushed out
+  void solve(std::span<SolverBody> bodies, bool use_bias);
+  /// Makes the bodies of impacts rebound, but for spheres, which rebound in solve().
+  void restitute(std::span<SolverBody> bodies);
+  /// Writes the impulses to the contacts that build() received.
+  void store();
+
+ private:
+  /// Rows of one kind, sorted by group. @param Row SphereRow or ManifoldRow
+  template <class Row>
+  struct Rows {
+    std::vector<Row> rows;
+    std::vector<std::uint32_t> contacts;  ///< by row
+    std::array<std::uint32_t, kGroups + 1> begin{};
+  };
+  /// A contact with a fixed body.
+  struct FixedContact {
+    std::uint32_t body = 0;  ///< the movable one
+    std::uint32_t contact = 0;
+    std::uint32_t row = 0;
+    bool is_sphere_row = false;
+  };
+  /// Numbers of rows by group, of a chunk of contacts.
+  struct Counts {
+    std::array<std::uint32_t, kGroups> spheres{}, manifolds{};
+    std::uint32_t fixed = 0;
+  };
+
+  void sort_contacts();
+  void count_contacts();
+  void place_contacts(std::uint32_t first, std::uint32_t last, Counts before);
+  void place_fixed_contacts();
+  /// Calls run_spheres(first, last) and run_manifolds(first, last) for the rows of the overflow and
+  /// of the colors, one at a time in the overflow, whose rows may share bodies, and on_fixed(row)
+  /// for each row with a fixed body.
+  template <class RunSpheres, class RunManifolds, class OnFixed>
+  void sweep(const RunSpheres& run_spheres, const RunManifolds& run_manifolds,
+             const OnFixed& on_fixed);
+  template <class Operation>
+  void run(std::span<SolverBody> bodies, const Operation& operation,
+           cpu::SphereSweepFunction kernel);
+  cpu::SphereSweep arrays_of(std::span<SolverBody> bodies);
+  BodyPair pair_of(const ManifoldRow& row, std::span<SolverBody> bodies) const;
+
+  ThreadPool* pool_;
+  const cpu::SphereSweepKernels* kernels_;  ///< null: rows are solved one by one
+  RowSetup setup_;                          ///< from build() to store()
+  ImpactBodies impacts_;
+  StepConstants constants_;
+
+  std::vector<RowKind> kinds_;  ///< by contact
+  std::vector<Counts> counts_;  ///< by chunk of contacts
+  Rows<SphereRow> spheres_;
+  Rows<ManifoldRow> manifolds_;
+  std::vector<PointRow> points_;
+  std::vector<FixedContact> fixed_;  ///< sorted by (body, contact)
+};
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

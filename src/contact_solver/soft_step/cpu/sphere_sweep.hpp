@@ -1,0 +1,66 @@
+/// Vector kernels of the soft step for rows of two spheres. With narrower vectors than those of
+/// AVX2, rows are solved one by one.
+#pragma once
+
+// The includes are restricted; see src/sphere_collider/cpu/kernels.hpp for the reason. So rows and
+// bodies are arrays of Reals here, and soft_step_solver.cpp checks their layout.
+#include <jfpx/config.hpp>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cpu {
+
+/// Reals per SphereRow and per SolverBody.
+inline constexpr std::size_t kSweepStride = 16;
+
+/// Quadruples of Reals in a SphereRow.
+namespace sphere_row_quad {
+inline constexpr std::size_t kImpulses = 0;  ///< friction impulse, normal impulse
+inline constexpr std::size_t kNormal = 4;    ///< normal, distance
+inline constexpr std::size_t kFriction = 8;  ///< friction, arm a, arm b, normal mass
+inline constexpr std::size_t kTangentMass = 12;
+inline constexpr std::size_t kBodies = 14;  ///< the numbers of both bodies, 32 bits each
+}  // namespace sphere_row_quad
+
+/// Quadruples of Reals in a SolverBody.
+namespace solver_body_quad {
+inline constexpr std::size_t kVelocity = 0;         ///< velocity, inverse mass
+inline constexpr std::size_t kAngularVelocity = 4;  ///< angular velocity, inverse inertia
+inline constexpr std::size_t kShift = 8;            ///< shift, unused
+}  // namespace solver_body_quad
+
+/// As soft_step::Softness.
+struct SweepSoftness {
+  Real bias_rate, mass_scale, impulse_scale;
+};
+
+/// Rows of pairs of movable spheres, no two of which have a body in common.
+struct SphereSweep {
+  Real* rows;    ///< SphereRow
+  Real* bodies;  ///< SolverBody
+  // As StepConstants.
+  Real h, inverse_h, push_out_speed, max_bias_velocity, restitution_threshold;
+  SweepSoftness balls, deep_balls;
+  Real deep_penetration;  ///< soft_step::kDeepPenetration
+};
+
+/// Does with the rows [first, last) what the functions of sphere_row.hpp do with one, but leaves
+/// out some of them.
+/// @param left receives the rows that are left out, at most last - first
+/// @returns their number
+using SphereSweepFunction = std::size_t (*)(const SphereSweep& sweep, std::size_t first,
+                                            std::size_t last, std::uint32_t* left);
+
+struct SphereSweepKernels {
+  SphereSweepFunction warm_start;
+  SphereSweepFunction solve[2];  ///< index 1: soft. They leave out rows whose bodies may rebound.
+};
+
+extern const SphereSweepKernels kAvx2SphereSweep;
+
+}  // namespace cpu
+}  // namespace JFPX_ABI
+}  // namespace jfpx

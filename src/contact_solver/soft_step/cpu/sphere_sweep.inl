@@ -1,0 +1,230 @@
+/// Kernels for rows of two spheres, for any instruction set. The arithmetic is that of
+/// sphere_row.hpp, operation by operation.
+#include "src/contact_solver/soft_step/cpu/sphere_sweep.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cpu {
+namespace {
+
+template <class S>
+struct Vec3Lanes {
+  using Vec = typename S::Vec;
+  Vec x, y, z;
+
+  Vec3Lanes operator+(const Vec3Lanes& o) const { return {x + o.x, y + o.y, z + o.z}; }
+  Vec3Lanes operator-(const Vec3Lanes& o) const { return {x - o.x, y - o.y, z - o.z}; }
+  Vec3Lanes operator*(Vec k) const { return {x * k, y * k, z * k}; }
+  static Vec dot(const Vec3Lanes& a, const Vec3Lanes& b) {
+    return (a.x * b.x + a.y * b.y) + a.z * b.z;
+  }
+  static Vec3Lanes cross(const Vec3Lanes& a, const Vec3Lanes& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  }
+  static Vec3Lanes select(typename S::Mask mask, const Vec3Lanes& a, const Vec3Lanes& b) {
+    return {S::select(mask, a.x, b.x), S::select(mask, a.y, b.y), S::select(mask, a.z, b.z)};
+  }
+};
+
+/// Four numbers of each lane: a vector and a scalar.
+template <class S>
+struct QuadLanes {
+  Vec3Lanes<S> vector;
+  typename S::Vec scalar;
+
+  static QuadLanes load(const Real* base, const std::uint32_t* items, std::size_t quad) {
+    typename S::Vec columns[4];
+    S::load_quads(base + quad, items, columns);
+    return {{columns[0], columns[1], columns[2]}, columns[3]};
+  }
+  /// Stores the lanes whose bits are set.
+  void store(Real* base, const std::uint32_t* items, std::size_t quad, unsigned lanes) const {
+    const typename S::Vec columns[4] = {vector.x, vector.y, vector.z, scalar};
+    S::store_quads(base + quad, items, columns, lanes);
+  }
+};
+
+template <class S>
+struct BodyLanes {
+  QuadLanes<S> velocity, angular_velocity;
+
+  BodyLanes(const SphereSweep& sweep, const std::uint32_t* bodies)
+      : velocity(QuadLanes<S>::load(sweep.bodies, bodies, solver_body_quad::kVelocity)),
+        angular_velocity(
+            QuadLanes<S>::load(sweep.bodies, bodies, solver_body_quad::kAngularVelocity)) {}
+  void store(const SphereSweep& sweep, const std::uint32_t* bodies, unsigned lanes) const {
+    velocity.store(sweep.bodies, bodies, solver_body_quad::kVelocity, lanes);
+    angular_velocity.store(sweep.bodies, bodies, solver_body_quad::kAngularVelocity, lanes);
+  }
+};
+
+template <class S>
+class RowLanes {
+ public:
+  using Vec = typename S::Vec;
+  using Vectors = Vec3Lanes<S>;
+  using Quads = QuadLanes<S>;
+  static constexpr unsigned kLanes = S::kLanes, kAll = (1u << kLanes) - 1;
+
+  RowLanes(const SphereSweep& sweep, std::size_t first) : sweep_(sweep) {
+    for (unsigned k = 0; k < kLanes; ++k) {
+      rows_[k] = static_cast<std::uint32_t>(first) + k;
+      std::uint32_t bodies[2];
+      __builtin_memcpy(bodies, sweep.rows + (first + k) * kSweepStride + sphere_row_quad::kBodies,
+                       sizeof bodies);
+      a_[k] = bodies[0];
+      b_[k] = bodies[1];
+    }
+  }
+
+  void warm_start() const {
+    const Quads impulses = quad(sphere_row_quad::kImpulses);
+    const Quads normal = quad(sphere_row_quad::kNormal), arms = quad(sphere_row_quad::kFriction);
+    BodyLanes<S> a(sweep_, a_), b(sweep_, b_);
+    apply(normal.vector, arms.vector,
+          normal.vector * S::absolute(impulses.scalar) + impulses.vector, impulses.vector, &a, &b);
+    a.store(sweep_, a_, kAll);
+    b.store(sweep_, b_, kAll);
+  }
+
+  /// @returns one bit per lane: whether the bodies may rebound. These rows are left out.
+  template <bool kUseBias>
+  unsigned solve() const {
+    const Vec zero = S::set(0);
+    Quads impulses = quad(sphere_row_quad::kImpulses);
+    const Quads normal_distance = quad(sphere_row_quad::kNormal);
+    const Quads friction_arms = quad(sphere_row_quad::kFriction);
+    const Vectors& normal = normal_distance.vector;
+    const Vec friction_coefficient = friction_arms.vector.x, normal_mass = friction_arms.scalar;
+    const Vec arm_a = friction_arms.vector.y, arm_b = friction_arms.vector.z;
+    const Vec tangent_mass = S::load_column(sweep_.rows + sphere_row_quad::kTangentMass, rows_);
+    const Vec impulse_before = S::absolute(impulses.scalar);
+    BodyLanes<S> a(sweep_, a_), b(sweep_, b_);
+    Quads shift_a = Quads::load(sweep_.bodies, a_, solver_body_quad::kShift);
+    Quads shift_b = Quads::load(sweep_.bodies, b_, solver_body_quad::kShift);
+
+    const Vec separation =
+        normal_distance.scalar + Vectors::dot(shift_a.vector - shift_b.vector, normal);
+    const typename S::Mask is_apart = S::less(zero, separation);
+    unsigned lanes = kAll;
+    if constexpr (!kUseBias) {
+      lanes &= ~(S::bits(is_apart) & ~S::bits(S::less(zero, impulse_before)));
+    }
+    const Vectors spin = a.angular_velocity.vector * arm_a + b.angular_velocity.vector * arm_b;
+    const Vectors velocity = (a.velocity.vector - b.velocity.vector) - Vectors::cross(spin, normal);
+    const Vec closing = Vectors::dot(velocity, normal);
+    const Vec left = S::set(kUseBias ? sweep_.h : Real(0));
+    const unsigned may_rebound = lanes &
+                                 S::bits(S::less(closing, S::set(-sweep_.restitution_threshold))) &
+                                 S::bits(S::less_equal(separation + closing * left, zero));
+    lanes &= ~may_rebound;
+    if (lanes == 0) return may_rebound;
+
+    Vec bias_velocity = separation * S::set(sweep_.inverse_h), mass_scale = S::set(1);
+    Vec impulse_scale = zero, projection = zero;
+    if constexpr (kUseBias) {
+      const Vec radius = S::select(S::less(arm_a, arm_b), arm_a, arm_b);
+      const typename S::Mask is_deep =
+          S::less(S::set(sweep_.deep_penetration) * radius, S::negate(separation));
+      const auto softness = [&](Real SweepSoftness::*member) {
+        return S::select(is_deep, S::set(sweep_.deep_balls.*member), S::set(sweep_.balls.*member));
+      };
+      const Vec push_out_speed = S::set(sweep_.push_out_speed);
+      const Vec max_bias_velocity = S::set(sweep_.max_bias_velocity);
+      const Vec wanted = S::negate(softness(&SweepSoftness::bias_rate)) * separation;
+      const Vec push = S::select(S::less(wanted, push_out_speed), wanted, push_out_speed);
+      const Vec speed = S::select(S::less(push, max_bias_velocity), push, max_bias_velocity);
+      bias_velocity = S::select(is_apart, bias_velocity, S::negate(speed));
+      mass_scale = S::select(is_apart, mass_scale, softness(&SweepSoftness::mass_scale));
+      impulse_scale = S::select(is_apart, zero, softness(&SweepSoftness::impulse_scale));
+      projection = S::select(is_apart, zero, (push - speed) * S::set(sweep_.h));
+    } else {
+      bias_velocity = S::select(is_apart, bias_velocity, zero);
+    }
+
+    Vectors friction = impulses.vector - (velocity - normal * closing) * tangent_mass;
+    const Vec limit = friction_coefficient * impulse_before;
+    const Vec size2 = Vectors::dot(friction, friction);
+    const typename S::Mask slides = S::less(limit * limit, size2);
+    if (S::bits(slides) != 0) {
+      friction = Vectors::select(slides, friction * (limit / S::square_root(size2)), friction);
+    }
+    const Vectors tangential = friction - impulses.vector;
+    const Vec change = S::negate(normal_mass * mass_scale) * (closing + bias_velocity) -
+                       impulse_scale * impulse_before;
+    const Vec wanted = impulse_before + change;
+    const typename S::Mask pushes = S::less(zero, wanted);
+    const Vec along = S::select(pushes, wanted, zero) - impulse_before;
+    impulses = {friction, S::select(pushes, wanted, S::zero_with_sign_of(impulses.scalar))};
+    apply(normal, friction_arms.vector, normal * along + tangential, tangential, &a, &b);
+
+    impulses.store(sweep_.rows, rows_, sphere_row_quad::kImpulses, lanes);
+    a.store(sweep_, a_, lanes);
+    b.store(sweep_, b_, lanes);
+    if constexpr (kUseBias) {
+      const unsigned projects = lanes & S::bits(S::less(zero, projection));
+      if (projects == 0) return may_rebound;
+      const Vectors impulse = normal * (projection * normal_mass);
+      shift_a.vector = shift_a.vector + impulse * a.velocity.scalar;
+      shift_b.vector = shift_b.vector - impulse * b.velocity.scalar;
+      shift_a.store(sweep_.bodies, a_, solver_body_quad::kShift, projects);
+      shift_b.store(sweep_.bodies, b_, solver_body_quad::kShift, projects);
+    }
+    return may_rebound;
+  }
+
+ private:
+  Quads quad(std::size_t offset) const { return Quads::load(sweep_.rows, rows_, offset); }
+
+  /// @param arms in y and z
+  static void apply(const Vectors& normal, const Vectors& arms, const Vectors& impulse,
+                    const Vectors& tangential, BodyLanes<S>* a, BodyLanes<S>* b) {
+    const Vectors twist = Vectors::cross(tangential, normal);
+    a->velocity.vector = a->velocity.vector + impulse * a->velocity.scalar;
+    a->angular_velocity.vector =
+        a->angular_velocity.vector + twist * (arms.y * a->angular_velocity.scalar);
+    b->velocity.vector = b->velocity.vector - impulse * b->velocity.scalar;
+    b->angular_velocity.vector =
+        b->angular_velocity.vector + twist * (arms.z * b->angular_velocity.scalar);
+  }
+
+  const SphereSweep& sweep_;
+  std::uint32_t rows_[kLanes], a_[kLanes], b_[kLanes];
+};
+
+/// Calls one(first) for all vectors of rows. @returns as SphereSweepFunction
+template <unsigned kLanes, class One>
+std::size_t for_each_vector(std::size_t first, std::size_t last, std::uint32_t* left,
+                            const One& one) {
+  std::size_t count = 0;
+  std::size_t i = first;
+  for (; i + kLanes <= last; i += kLanes) {
+    for (unsigned lanes = one(i); lanes != 0; lanes &= lanes - 1) {
+      left[count++] = static_cast<std::uint32_t>(i) + static_cast<unsigned>(__builtin_ctz(lanes));
+    }
+  }
+  for (; i < last; ++i) left[count++] = static_cast<std::uint32_t>(i);
+  return count;
+}
+
+template <class S>
+std::size_t warm_start(const SphereSweep& sweep, std::size_t first, std::size_t last,
+                       std::uint32_t* left) {
+  return for_each_vector<S::kLanes>(first, last, left, [&](std::size_t i) {
+    RowLanes<S>(sweep, i).warm_start();
+    return 0u;
+  });
+}
+
+template <class S, bool kUseBias>
+std::size_t solve(const SphereSweep& sweep, std::size_t first, std::size_t last,
+                  std::uint32_t* left) {
+  return for_each_vector<S::kLanes>(first, last, left, [&](std::size_t i) {
+    return RowLanes<S>(sweep, i).template solve<kUseBias>();
+  });
+}
+
+}  // namespace
+}  // namespace cpu
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,76 @@
+/// Greedy coloring of the contacts of a step, which persists from step to step.
+#pragma once
+
+#include "src/contact_solver/soft_step/contact_set.hpp"
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Number of colors. Contacts beyond it get kOverflowColor and are solved one after the other.
+inline constexpr std::uint8_t kColors = 64;
+inline constexpr std::uint8_t kOverflowColor = kColors;
+/// Color of a contact with an immovable or kinematic body, which needs none.
+inline constexpr std::uint8_t kFixedColor = 254;
+/// Color of a contact that has not been colored.
+inline constexpr std::uint8_t kNoColor = 255;
+
+/// Finalizer of SplitMix64 (Steele, Lea and Flood 2014).
+JFPX_HD constexpr std::uint64_t mixed(std::uint64_t x) {
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+/// Place of a contact in the order of coloring; equal values are ordered by number of contact.
+JFPX_HD constexpr std::uint64_t color_order(const ContactKey& key) {
+  const std::uint64_t bodies = std::uint64_t{key.a} << 32 | key.b;
+  const std::uint64_t parts = std::uint64_t{key.part_a} << 32 | key.part_b;
+  return mixed(mixed(bodies + 0x9e3779b97f4a7c15u) ^ parts);
+}
+
+/// The lowest color that is not in a set of colors; kOverflowColor if all are.
+JFPX_HD constexpr std::uint8_t lowest_free_color(std::uint64_t used) {
+  std::uint8_t color = 0;
+  while (color < kColors && (used >> color & 1) != 0) ++color;
+  return color;
+}
+
+/// Assigns the lowest color that neither body has to each new contact, in the order of a hash of
+/// the key. The order is a function of the keys alone, and random orders need few rounds in
+/// parallel (Blelloch, Fineman and Shun 2012). A contact that persists keeps its color, except
+/// in the overflow, whose contacts are colored again.
+///
+/// Usage in a step: start(), keep() for all colored contacts, add() for all others, finish().
+/// Owns its buffers, which only grow.
+class GreedyColoring {
+ public:
+  void start(std::size_t bodies);
+  /// Several threads may call it concurrently.
+  void keep(std::uint32_t a, std::uint32_t b, std::uint8_t color) {
+    const std::uint64_t bit = std::uint64_t{1} << color;
+    std::atomic_ref(used_[a]).fetch_or(bit, std::memory_order_relaxed);
+    std::atomic_ref(used_[b]).fetch_or(bit, std::memory_order_relaxed);
+  }
+  /// @param contact number of the contact
+  /// @param color   receives the color in finish()
+  void add(const ContactKey& key, std::uint32_t contact, std::uint8_t* color);
+  void finish();
+
+ private:
+  struct Uncolored {
+    std::uint64_t order;
+    std::uint32_t contact, a, b;
+    std::uint8_t* color;
+  };
+  std::vector<std::uint64_t> used_;  ///< by body: the set of its colors
+  std::vector<Uncolored> uncolored_;
+};
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

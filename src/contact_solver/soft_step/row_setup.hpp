@@ -1,0 +1,218 @@
+/// Setup of the rows of a soft step from its contacts, and the impulses that contacts keep.
+#pragma once
+
+#include <jfpx/material.hpp>
+
+#include "src/collide/contact_basis.hpp"
+#include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/contact_solver/soft_step/greedy_coloring.hpp"
+#include "src/contact_solver/soft_step/manifold_row.hpp"
+#include "src/contact_solver/soft_step/sphere_row.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Properties of a body that select the kinds of its rows, as bits of one byte.
+struct BodyTraits {
+  static constexpr std::uint8_t kMovable = 1;
+  static constexpr std::uint8_t kActive = 2;  ///< movable and awake
+  /// A movable sphere with the same inertia about every axis, or a body of mass 0 that is at rest.
+  static constexpr std::uint8_t kIsRound = 4;
+  static constexpr std::uint8_t kRolls = 8;  ///< has rolling or spinning friction
+};
+
+/// Properties of the bodies at the start of a step, as arrays by body.
+struct BodyProperties {
+  const Mat3* inverse_inertia = nullptr;  ///< [1/(kg m^2)], world axes
+  const Vec3* acceleration = nullptr;     ///< [m/s^2], of this step
+  const Real* radius = nullptr;           ///< [m]; 0: not a sphere
+  const std::uint8_t* traits = nullptr;   ///< bits of BodyTraits
+  const Real *friction = nullptr, *restitution = nullptr;
+  const Real *rolling_friction = nullptr, *spinning_friction = nullptr;  ///< [m]
+  MaterialSettings rules;
+};
+
+/// Kind of the row of a contact, which may differ from that of the contact: two balls with rolling
+/// friction have a row of a manifold, and a ball on a fixed box has a row of spheres.
+enum class RowKind : std::uint8_t { none, sphere, manifold };
+
+/// Groups of rows, which a sweep solves one after the other: contacts without a color, those of
+/// each color, and those with an immovable or kinematic body.
+inline constexpr std::uint32_t kGroups = kColors + 2u;
+inline constexpr std::uint32_t kOverflowGroup = 0, kFixedGroup = kGroups - 1;
+JFPX_HD constexpr std::uint32_t group_of_color(std::uint32_t color) { return 1 + color; }
+
+/// Makes rows of contacts. A row has the bodies of its contact in the order of a movable body a.
+struct RowSetup {
+  ContactView contacts;
+  BodyProperties properties;
+  /// By body. Its velocities are those before the accelerations of the step during fill() only: on
+  /// the CPU, the substeps change this array.
+  const SolverBody* start = nullptr;
+  Real restitution_threshold = 0;  ///< StepConstants::restitution_threshold
+
+  /// Whether body b of a contact becomes body a of its row, which must be movable.
+  JFPX_HD bool is_flipped(const ContactKey& key) const { return !is_movable(key.a); }
+
+  /// `none` if no body is movable and awake, or if a movable body sleeps.
+  JFPX_HD RowKind kind_of(std::uint32_t contact) const {
+    const ContactKey& key = contacts.key(contact);
+    const std::uint8_t a = properties.traits[key.a], b = properties.traits[key.b];
+    // A body that is still asleep is near, but does not touch: the contact has no effect.
+    if (sleeps(a) || sleeps(b) || ((a | b) & BodyTraits::kActive) == 0) return RowKind::none;
+    // The arms of a generated contact are not multiples of the normal.
+    if (contacts.impulse_count(contact) != 1 || key.is_generated()) return RowKind::manifold;
+    if (((a | b) & BodyTraits::kRolls) != 0) return RowKind::manifold;
+    return (a & b & BodyTraits::kIsRound) != 0 ? RowKind::sphere : RowKind::manifold;
+  }
+
+  JFPX_HD std::uint32_t group_of(std::uint32_t contact) const {
+    const std::uint8_t color = contacts.colors[contact];
+    if (color == kFixedColor) return kFixedGroup;
+    return color == kOverflowColor ? kOverflowGroup : group_of_color(color);
+  }
+
+  /// Speed of separation after an impact, or 0. The speed of the impact is that at the start of the
+  /// step and what the bodies gain on the way, because impulses end the motion in the middle of a
+  /// step.
+  /// @param velocity of a's point relative to b's, at the start of the step
+  JFPX_HD Real rebound_speed(const Vec3& velocity, const Vec3& normal, Real distance,
+                             std::uint32_t a, std::uint32_t b, Real restitution) const {
+    if (!(restitution > 0)) return 0;
+    const Real closing = -dot(velocity, normal);
+    if (!(closing > 0)) return 0;
+    const auto acceleration = [this](std::uint32_t body) {
+      return start[body].inverse_mass > 0 ? properties.acceleration[body] : Vec3{};
+    };
+    const Real gap = distance > 0 ? distance : Real(0);
+    const Real gained = -2 * gap * dot(acceleration(a) - acceleration(b), normal);
+    const Real square = closing * closing + gained;
+    const Real speed = square > 0 ? square_root(square) : Real(0);
+    return speed > restitution_threshold ? restitution * speed : Real(0);
+  }
+
+  template <bool kFixed>
+  JFPX_HD void fill(SphereRow* row, std::uint32_t contact) const {
+    const ContactKey& key = contacts.key(contact);
+    const bool flipped = is_flipped(key);
+    const Real distance = contacts.distance(contact, 0);
+    const Vec3& normal = contacts.normal(contact);
+    const KeptImpulse& kept = contacts.impulses[contacts.first_impulse(contact)];
+    row->a = flipped ? key.b : key.a;
+    row->b = flipped ? key.a : key.b;
+    row->normal = flipped ? -normal : normal;
+    row->distance = distance;
+    // Penetrating spheres share the middle of the overlap, so that angular momentum is conserved.
+    const Real half_overlap = distance < 0 ? distance * Real(0.5) : Real(0);
+    row->arm_a = properties.radius[row->a] + half_overlap;
+    row->arm_b = kFixed ? Real(0) : properties.radius[row->b] + half_overlap;
+    row->friction = combined(properties.rules.friction, properties.friction[row->a],
+                             properties.friction[row->b]);
+    const Vec3 friction = in_tangent_plane(kept.friction, normal);
+    row->friction_impulse = flipped ? -friction : friction;
+    row->normal_impulse = -kept.normal;
+    const SolverBody &a = start[row->a], &b = start[row->b];
+    set_masses<kFixed>(row, a, b);
+    row->restitution = combined(properties.rules.restitution, properties.restitution[row->a],
+                                properties.restitution[row->b]);
+  }
+
+  template <bool kFixed>
+  JFPX_HD void fill(ManifoldRow* row, PointRow* points, std::uint32_t contact) const {
+    const ContactKey& key = contacts.key(contact);
+    const bool flipped = is_flipped(key);
+    const Vec3& normal = contacts.normal(contact);
+    row->a = flipped ? key.b : key.a;
+    row->b = flipped ? key.a : key.b;
+    row->count = contacts.impulse_count(contact);
+    const detail::ContactBasis basis = detail::contact_basis(flipped ? -normal : normal);
+    row->normal = basis.normal;
+    row->tangent = basis.tangent;
+    row->bitangent = basis.bitangent;
+    const Vec3 rolling =
+        contacts.rolling_impulses != nullptr ? contacts.rolling_impulses[contact] : Vec3{};
+    row->rolling_impulse = flipped ? -rolling : rolling;
+    Real restitution = 0;
+    if (key.is_generated()) {
+      row->friction = contacts.manifold(contact).friction;
+      row->rolling_friction = row->spinning_friction = 0;
+      restitution = contacts.manifold(contact).restitution;
+    } else {
+      row->friction = combined(properties.rules.friction, properties.friction[row->a],
+                               properties.friction[row->b]);
+      row->rolling_friction =
+          std::max(properties.rolling_friction[row->a], properties.rolling_friction[row->b]);
+      row->spinning_friction =
+          std::max(properties.spinning_friction[row->a], properties.spinning_friction[row->b]);
+      restitution = combined(properties.rules.restitution, properties.restitution[row->a],
+                             properties.restitution[row->b]);
+    }
+    const SolverBody &start_a = start[row->a], &start_b = start[row->b];
+    for (std::uint32_t i = 0; i < row->count; ++i) {
+      PointRow& p = points[i];
+      p.distance = contacts.distance(contact, i);
+      if (contacts.is_sphere(contact)) {
+        const Real half_overlap = p.distance < 0 ? p.distance * Real(0.5) : Real(0);
+        p.arm_a = -row->normal * (properties.radius[row->a] + half_overlap);
+        p.arm_b = row->normal * (properties.radius[row->b] + half_overlap);
+      } else {
+        const PointInput& point = contacts.points[contacts.manifold(contact).first + i];
+        p.arm_a = flipped ? point.arm_b : point.arm_a;
+        p.arm_b = flipped ? point.arm_a : point.arm_b;
+      }
+      const KeptImpulse& kept = contacts.impulses[contacts.first_impulse(contact) + i];
+      const Vec3 unflipped = in_tangent_plane(kept.friction, normal);
+      const Vec3 friction = flipped ? -unflipped : unflipped;
+      p.normal_impulse = kept.normal;
+      p.friction_x = dot(friction, row->tangent);
+      p.friction_y = dot(friction, row->bitangent);
+      SolverBody a = start_a, b = start_b;
+      const BodyPair pair{&a, &b, &properties.inverse_inertia[row->a],
+                          &properties.inverse_inertia[row->b]};
+      set_masses<kFixed>(*row, &p, pair);
+      p.rebound = -rebound_speed(relative_velocity(pair, p.arm_a, p.arm_b), row->normal, p.distance,
+                                 row->a, row->b, restitution);
+    }
+  }
+
+  /// Writes the impulses of a row to its contact.
+  JFPX_HD void store(const SphereRow& row, std::uint32_t contact) const {
+    const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
+    const Real impulse = normal_impulse_of(row);
+    const bool is_released = !(impulse > 0) && has_pushed(row);
+    contacts.impulses[contacts.first_impulse(contact)] = {
+        row.friction_impulse * side, is_released ? KeptImpulse::kReleased : impulse};
+  }
+  JFPX_HD void store(const ManifoldRow& row, const PointRow* points, std::uint32_t contact) const {
+    const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
+    if (contacts.rolling_impulses != nullptr) {
+      contacts.rolling_impulses[contact] = row.rolling_impulse * side;
+    }
+    for (std::uint32_t p = 0; p < row.count; ++p) {
+      const Vec3 friction =
+          row.tangent * points[p].friction_x + row.bitangent * points[p].friction_y;
+      const bool is_released = !(points[p].normal_impulse > 0) && has_pushed(points[p]);
+      contacts.impulses[contacts.first_impulse(contact) + p] = {
+          friction * side, is_released ? KeptImpulse::kReleased : points[p].normal_impulse};
+    }
+  }
+
+ private:
+  /// The friction impulse of the last step, whose normal was another one.
+  JFPX_HD static Vec3 in_tangent_plane(const Vec3& friction, const Vec3& normal) {
+    return friction - normal * dot(friction, normal);
+  }
+  JFPX_HD bool is_movable(std::uint32_t body) const {
+    return (properties.traits[body] & BodyTraits::kMovable) != 0;
+  }
+  JFPX_HD static bool sleeps(std::uint8_t traits) {
+    return (traits & (BodyTraits::kMovable | BodyTraits::kActive)) == BodyTraits::kMovable;
+  }
+};
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,126 @@
+/// Constants of a soft step: softness of contacts, from the settings of a scene.
+#pragma once
+
+#include <jfpx/scene.hpp>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Sweeps over the rows in a substep: one with bias, and relax sweeps without.
+inline constexpr std::uint32_t kRelaxSweeps = 1, kSweepsPerSubstep = 1 + kRelaxSweeps;
+
+/// A contact as a damped spring whose coefficients depend on the substep, so that it is stable for
+/// every stiffness (Catto, Solver2D, 2023).
+struct Softness {
+  Real bias_rate = 0;      ///< [1/s], push-out velocity per penetration
+  Real mass_scale = 1;     ///< [-], weight of the velocity error
+  Real impulse_scale = 0;  ///< [-], part of the accumulated impulse that relaxes
+};
+
+/// @param hertz   [Hz], frequency of the spring, > 0
+/// @param damping [-], damping ratio, > 0
+/// @param h       [s], length of a substep
+JFPX_HD constexpr Softness make_softness(Real hertz, Real damping, Real h) {
+  const Real omega = 2 * kPi * hertz;
+  const Real a1 = 2 * damping + h * omega;
+  const Real a2 = h * omega * a1;
+  const Real a3 = 1 / (1 + a2);
+  return {omega / a1, a2 * a3, a3};
+}
+
+/// Values that all contacts of a step share.
+struct StepConstants {
+  Real h = 0;               ///< [s], length of a substep
+  Real inverse_h = 0;       ///< [1/s]
+  Softness movable;         ///< between two movable bodies
+  Softness balls;           ///< between two movable spheres, in a SphereRow
+  Softness deep_balls;      ///< the same, for penetrations that heaps at rest do not have
+  Softness fixed;           ///< between a movable and an immovable or kinematic body
+  Real push_out_speed = 0;  ///< [m/s], of a push-out by velocity and projection together
+  /// [m/s], of a push-out by velocity. The relax sweep removes most of it from the velocities, but
+  /// not all of it in chains of overlapping bodies, which would fly apart at a higher speed.
+  Real max_bias_velocity = 0;
+  Real restitution_threshold = 0;  ///< [m/s], slower contacts do not bounce
+};
+
+/// Factors of the damping ratio between movable spheres. With less, layers at the bottom of deep
+/// heaps keep creeping; pyramids of boxes would keep oscillating with more. Deep penetrations, as
+/// of bodies that overlap at the start, are pushed out faster with the second one.
+inline constexpr Real kSphereDamping = 6, kDeepSphereDamping = 2;
+/// A push-out by velocity has at most the push-out speed divided by this.
+inline constexpr Real kBiasSpeedDivisor = 6;
+
+/// Frequencies are limited to a quarter of the substep rate, and twice that for fixed bodies: a
+/// faster spring would not be resolved by the substeps.
+JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& settings, Real dt) {
+  const Real h = dt / static_cast<Real>(settings.substeps);
+  const Real inverse_h = static_cast<Real>(settings.substeps) / dt;
+  const Real highest = Real(0.25) * inverse_h;
+  const bool is_set = settings.contact_hertz > 0 && settings.contact_hertz < highest;
+  const Real hertz = is_set ? settings.contact_hertz : highest;
+  return {h,
+          inverse_h,
+          make_softness(hertz, settings.damping_ratio, h),
+          make_softness(hertz, kSphereDamping * settings.damping_ratio, h),
+          make_softness(hertz, kDeepSphereDamping * settings.damping_ratio, h),
+          make_softness(2 * hertz, settings.damping_ratio, h),
+          settings.push_out_speed,
+          settings.push_out_speed / kBiasSpeedDivisor,
+          settings.restitution_threshold};
+}
+
+/// Motion of a body during a step, for the rows of its contacts.
+struct alignas(16 * sizeof(Real)) SolverBody {
+  Vec3 velocity;             ///< [m/s]
+  Real inverse_mass = 0;     ///< [1/kg]; 0: immovable or kinematic
+  Vec3 angular_velocity;     ///< [rad/s], world axes
+  Real inverse_inertia = 0;  ///< [1/(kg m^2)], of a sphere with isotropic inertia, otherwise 0
+  Vec3 shift;                ///< [m], translation since the start of the step
+  Real unused = 0;
+  Vec3 rotation;  ///< [rad], rotation since the start of the step, to first order
+  Real unused_too = 0;
+};
+static_assert(sizeof(SolverBody) == 16 * sizeof(Real));
+
+/// Velocities of a body without the contact impulses of the current substep: those after its
+/// accelerations. The next substep adds what contacts have changed since, as a warm start. A
+/// rebound changes these velocities, too, so that it is not applied again.
+struct FreeMotion {
+  Vec3 velocity, angular_velocity;
+
+  JFPX_HD void add(const Vec3& change, const Vec3& spun) {
+    velocity += change;
+    angular_velocity += spun;
+  }
+};
+
+/// Velocity along the normal that a contact must reach, and the weights of its impulse.
+struct Bias {
+  Real velocity, mass_scale, impulse_scale;
+  Real projection;  ///< [m], >= 0: distance by which the bodies are moved apart, without velocity
+};
+
+/// Whether a relax sweep skips a contact. A speculative contact (separation > 0) is solved in the
+/// bias sweep, before positions are integrated. A relax sweep solves only those that have an
+/// impulse: the others would push apart bodies that have not met.
+JFPX_HD constexpr bool is_idle(Real separation, Real normal_impulse, bool use_bias) {
+  return !use_bias && separation > 0 && !(normal_impulse > 0);
+}
+
+/// A separated contact may close its gap within the substep (speculative contact). With bias, a
+/// penetration is pushed out: by velocity up to max_bias_velocity, and by projection beyond it.
+/// @param separation [m] at this substep
+JFPX_HD constexpr Bias bias_of(Real separation, const Softness& softness, const StepConstants& step,
+                               bool use_bias) {
+  if (separation > 0) return {separation * step.inverse_h, 1, 0, 0};
+  if (!use_bias) return {0, 1, 0, 0};
+  const Real wanted = -softness.bias_rate * separation;
+  const Real push = wanted < step.push_out_speed ? wanted : step.push_out_speed;
+  const Real velocity = push < step.max_bias_velocity ? push : step.max_bias_velocity;
+  return {-velocity, softness.mass_scale, softness.impulse_scale, (push - velocity) * step.h};
+}
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx
