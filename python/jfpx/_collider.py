@@ -115,9 +115,9 @@ class SphereCollider:
     backend : "auto", "cpu" or "cuda"
         Device that searches arrays in host memory. "cuda" copies them to the GPU and back. "auto"
         selects the fastest, by a cost model and by measured times.
-    algorithm : "automatic", "all_pairs" or "sorted_tiles"
-        All pairs are tested, or those of neighboring cells of a grid. "automatic" selects the
-        fastest.
+    algorithm : "auto", "all_pairs" or "sorted_tiles"
+        All pairs are tested, or those of neighboring cells of a grid. "auto" (also "automatic")
+        selects the fastest.
     threads : int in [0, 256]
         Number of threads of the CPU; 0: one per core.
     device : int in [0, 2^31 - 1]
@@ -134,14 +134,12 @@ class SphereCollider:
     """
 
     def __init__(self, dtype: Any = "float32", *, backend: str = "auto",
-                 algorithm: str = "automatic", threads: int = 1, device: int = 0) -> None:
+                 algorithm: str = "auto", threads: int = 1, device: int = 0) -> None:
         core = _arrays.precision_of(dtype)
         self._dtype = np.dtype(dtype)
         self._backend = backend
         self._on_devices: dict[Any, Any] = {}
-        self._collider = core.Collider(backend, algorithm,
-                                       _arrays.count(threads, "threads", 0, 256),
-                                       _arrays.count(device, "device", 0, 2**31 - 1))
+        self._collider = core.Collider(*_arrays.options(backend, algorithm, threads, device))
         self._lock = threading.Lock()
 
     @property

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _arrays
+from ._errors import InvalidArgument
 
 
 class BodyId(NamedTuple):
@@ -56,6 +57,14 @@ class BodyState(NamedTuple):
 Vector = Sequence[float]
 
 
+def _optional(body: Any) -> tuple[int, int] | None:
+    return None if body is None else _arrays.body(body)
+
+
+def _numbers(force: Any, *fields: str) -> list[float]:
+    return [_arrays.number(getattr(force, field), field) for field in fields]
+
+
 @dataclass(frozen=True)
 class Gravity:
     """Force mass * acceleration [m/s^2] on one body or on all, in addition to their own
@@ -66,7 +75,8 @@ class Gravity:
     body: BodyId | None = None
 
     def _add(self, core: Any) -> int:
-        return core.add_gravity(_arrays.triple(self.acceleration, "acceleration"), self.body)
+        return core.add_gravity(_arrays.triple(self.acceleration, "acceleration"),
+                                _optional(self.body))
 
 
 @dataclass(frozen=True)
@@ -80,8 +90,8 @@ class Drag:
     body: BodyId | None = None
 
     def _add(self, core: Any) -> int:
-        return core.add_drag(float(self.linear), float(self.quadratic),
-                             _arrays.triple(self.wind, "wind"), self.body)
+        return core.add_drag(*_numbers(self, "linear", "quadratic"),
+                             _arrays.triple(self.wind, "wind"), _optional(self.body))
 
 
 @dataclass(frozen=True)
@@ -93,7 +103,7 @@ class Attachment:
     point: Vector = (0.0, 0.0, 0.0)
 
     def _pair(self) -> tuple[BodyId | None, tuple[float, ...]]:
-        return self.body, _arrays.triple(self.point, "point")
+        return _optional(self.body), _arrays.triple(self.point, "point")
 
 
 @dataclass(frozen=True)
@@ -108,8 +118,13 @@ class Spring:
     rest_length: float = 0.0
 
     def _add(self, core: Any) -> int:
-        return core.add_spring(self.a._pair(), self.b._pair(), float(self.stiffness),
-                               float(self.damping), float(self.rest_length))
+        return core.add_spring(*self._fields())
+
+    def _fields(self) -> tuple[Any, ...]:
+        ends = (_arrays.instance(getattr(self, name), name, Attachment, ", such as Attachment(body)")
+                for name in ("a", "b"))
+        return (*(end._pair() for end in ends),
+                *_numbers(self, "stiffness", "damping", "rest_length"))
 
 
 @dataclass(frozen=True)
@@ -117,8 +132,7 @@ class Bungee(Spring):
     """A spring without force while it is shorter than its rest length. Fields as in Spring."""
 
     def _add(self, core: Any) -> int:
-        return core.add_bungee(self.a._pair(), self.b._pair(), float(self.stiffness),
-                               float(self.damping), float(self.rest_length))
+        return core.add_bungee(*self._fields())
 
 
 @dataclass(frozen=True)
@@ -134,8 +148,9 @@ class Buoyancy:
     body: BodyId | None = None
 
     def _add(self, core: Any) -> int:
-        return core.add_buoyancy(_arrays.triple(self.normal, "normal"), float(self.offset),
-                                 float(self.density), float(self.gravity), self.body)
+        return core.add_buoyancy(_arrays.triple(self.normal, "normal"),
+                                 *_numbers(self, "offset", "density", "gravity"),
+                                 _optional(self.body))
 
 
 @dataclass(frozen=True)
@@ -152,9 +167,9 @@ class Explosion:
     duration: float = 1.0
 
     def _add(self, core: Any) -> int:
-        return core.add_explosion(_arrays.triple(self.centre, "centre"), float(self.start),
-                                  float(self.peak_force), float(self.speed),
-                                  float(self.thickness), float(self.duration))
+        return core.add_explosion(
+            _arrays.triple(self.centre, "centre"),
+            *_numbers(self, "start", "peak_force", "speed", "thickness", "duration"))
 
 
 class ForceContext:
@@ -191,40 +206,40 @@ class ForceContext:
 
     def state(self, body: BodyId) -> BodyState:
         """State of a body. Raises InvalidArgument for an unknown body."""
-        return BodyState(*self._core.state(body))
+        return BodyState(*self._core.state(_arrays.body(body)))
 
     def mass(self, body: BodyId) -> float:
         """[kg], >= 0; 0: immovable or kinematic. Raises InvalidArgument for an unknown body."""
-        return self._core.mass(body)
+        return self._core.mass(_arrays.body(body))
 
     def awake(self, body: BodyId) -> bool:
         """Whether a body is awake. Raises InvalidArgument for an unknown body."""
-        return self._core.awake(body)
+        return self._core.awake(_arrays.body(body))
 
     def wake(self, body: BodyId) -> None:
         """Wakes a movable body. Raises InvalidArgument for an unknown body."""
-        self._core.wake(body)
+        self._core.wake(_arrays.body(body))
 
     def apply_force(self, body: BodyId, force: Vector) -> None:
         """Adds a force [N] at the centre of mass, in world axes. Raises InvalidArgument for an
         unknown body, or if there are not three numbers."""
-        self._core.apply_force(body, _arrays.triple(force, "force"))
+        self._core.apply_force(_arrays.body(body), _arrays.triple(force, "force"))
 
     def apply_torque(self, body: BodyId, torque: Vector) -> None:
         """Adds a torque [N m], in world axes. Raises InvalidArgument as apply_force()."""
-        self._core.apply_torque(body, _arrays.triple(torque, "torque"))
+        self._core.apply_torque(_arrays.body(body), _arrays.triple(torque, "torque"))
 
     def apply_force_at_point(self, body: BodyId, force: Vector, point: Vector) -> None:
         """Adds a force [N] at a point [m] of the world. Raises InvalidArgument as apply_force()."""
-        self._core.apply_force_at_point(body, _arrays.triple(force, "force"),
+        self._core.apply_force_at_point(_arrays.body(body), _arrays.triple(force, "force"),
                                         _arrays.triple(point, "point"))
 
     def apply_forces(self, forces: Any) -> None:
-        """Adds a force [N] on each body: an array (N, 3) of the dtype of the world, in the order of
-        `bodies`. Raises InvalidArgument for a wrong shape or type."""
-        forces = _arrays.rows(forces, "forces", 3, self._dtype)
+        """Adds a force [N] on each body: an array (N, 3), in the order of `bodies`, which is converted
+        to the dtype of the world. Raises InvalidArgument for a wrong shape or type."""
+        forces = _arrays.rows(_arrays.converted(forces, "forces", self._dtype), "forces", 3)
         size = self._core.size()
         if forces.shape[0] != size:
-            raise _arrays.InvalidArgument(f"forces has {forces.shape[0]} rows; it must have one "
-                                          f"for each of {size} bodies")
+            raise InvalidArgument(f"forces has {forces.shape[0]} rows; it must have one for each "
+                                  f"of {size} bodies")
         self._core.apply_forces(forces)

@@ -35,7 +35,7 @@ class StepReport(NamedTuple):
     non_finite: bool
     """A value of a body is no longer finite, or a coordinate exceeds 1e9 m; the step was undone,
     and so are further ones until the body is removed or gets another state."""
-    non_finite_body: tuple[int, int] | None
+    non_finite_body: BodyId | None
     """The first such body, as (index, generation); None if there is none."""
     awake: int
     """Movable bodies awake after the step."""
@@ -166,21 +166,22 @@ class World:
     """
 
     def __init__(self, scene: Scene | dict[str, Any] | str, *, dtype: Any = None,
-                 backend: str = "auto", algorithm: str = "automatic", threads: int = 1,
+                 backend: str = "auto", algorithm: str = "auto", threads: int = 1,
                  device: int = 0) -> None:
+        if dtype is not None:
+            _arrays.precision_of(dtype)
         if isinstance(scene, str):
             scene = Scene.named(scene, dtype=dtype or "float32")
         elif isinstance(scene, dict):
             scene = Scene(scene, dtype=dtype or "float32")
         elif not isinstance(scene, Scene):
             raise InvalidArgument(f"scene is {type(scene).__name__}; it must be a Scene, a dict "
-                                  "or a name")
+                                  "or a name; Scene.load() reads a file")
         elif dtype is not None and np.dtype(dtype) != scene.dtype:
             raise InvalidArgument(f"dtype is {dtype}; that of the scene is {scene.dtype}")
         self._dtype = scene.dtype
         self._core = _arrays.precision_of(self._dtype).World(
-            scene._scene, backend, algorithm, _arrays.count(threads, "threads", 0, 256),
-            _arrays.count(device, "device", 0, 2**31 - 1))
+            scene._scene, *_arrays.options(backend, algorithm, threads, device))
         self._device = device
         self._report: StepReport | None = None
 
@@ -198,7 +199,7 @@ class World:
             The state is then as before the step.
         ConcurrentUse, Closed
         """
-        self._report = StepReport(*self._core.step())
+        self._report = _report(self._core.step())
         return self._report
 
     def run(self, steps: int, *, after_step: Callable[[StepReport], Any] | None = None) -> StepReport:
@@ -223,8 +224,9 @@ class World:
         """
         steps = _arrays.count(steps, "steps", 1, 2**63 - 1)
         if after_step is None:
-            self._report = StepReport(*self._core.run(steps))
+            self._report = _report(self._core.run(steps))
             return self._report
+        _arrays.function(after_step, "after_step")
         for _ in range(steps):
             report = self.step()
             after_step(report)
@@ -272,7 +274,7 @@ class World:
         ------
         OutOfMemory, DeviceError, ConcurrentUse, Closed
         """
-        self._report = StepReport(*self._core.finish_steps())
+        self._report = _report(self._core.finish_steps())
         return self._report
 
     @property
@@ -364,8 +366,8 @@ class World:
         return BodyId(*self._core.body_at(_arrays.count(index, "index", 0, 2**32 - 1)))
 
     def __contains__(self, body: BodyId) -> bool:
-        """Whether the id is of a living body of this world."""
-        return self._core.contains(body)
+        """Whether the id is of a living body of this world. Raises InvalidArgument if it is no id."""
+        return self._core.contains(_arrays.body(body))
 
     def add(self, body: dict[str, Any]) -> BodyId:
         """Adds a body, with the fields of a body in a scene (docs/scenes.md), and returns its id.
@@ -377,6 +379,7 @@ class World:
         """Adds the bodies of a scene, and returns their ids in its order; its settings and its
         ignored pairs have no effect. Raises InvalidArgument if the dtype of the scene is not that
         of the world."""
+        _arrays.instance(scene, "scene", Scene, ", such as Scene({...})")
         if scene.dtype != self._dtype:
             raise InvalidArgument(f"the scene has dtype {scene.dtype}; the world has {self._dtype}")
         return [BodyId(*body) for body in self._core.add(scene._scene)]
@@ -384,7 +387,7 @@ class World:
     def remove(self, body: BodyId) -> None:
         """Removes a body and wakes the bodies in contact with it. contacts() has none until the
         next step. Raises InvalidArgument for an unknown body."""
-        self._core.remove(body)
+        self._core.remove(_arrays.body(body))
 
     def states(self) -> States:
         """States of all bodies as new arrays (N, 3) and (N, 4) of the dtype of the world, in the
@@ -425,8 +428,8 @@ class World:
         Parameters
         ----------
         states : States
-            Arrays in host memory of the dtype of the world, with a row for each body in the order
-            of `bodies`: positions (N, 3) [m], each coordinate in [-1e9, 1e9]; orientations (N, 4)
+            Arrays in host memory or lists, which are converted to the dtype of the world, with a
+            row for each body in the order of `bodies`: positions (N, 3) [m], each coordinate in [-1e9, 1e9]; orientations (N, 4)
             [-], unit quaternions (w, x, y, z) to a thousandth of the squared length, which are
             normalized; velocities (N, 3) [m/s] and angular_velocities (N, 3) [rad/s], finite.
 
@@ -436,10 +439,12 @@ class World:
             A wrong shape or type, or a value out of its range.
         OutOfMemory, DeviceError
         """
+        if not isinstance(states, (tuple, list)) or len(states) != len(States._fields):
+            raise InvalidArgument("states is not a States, such as that of World.states()")
         size = len(self)
         arrays = []
         for name, array, columns in zip(States._fields, states, (3, 4, 3, 3)):
-            array = _arrays.rows(array, name, columns, self._dtype)
+            array = _arrays.rows(_arrays.converted(array, name, self._dtype), name, columns)
             if array.shape[0] != size:
                 raise InvalidArgument(f"{name} has {array.shape[0]} rows; it must have one for "
                                       f"each of {size} bodies")
@@ -460,7 +465,7 @@ class World:
 
     def state(self, body: BodyId) -> BodyState:
         """State of a body. Raises InvalidArgument for an unknown body, DeviceError."""
-        return BodyState(*self._core.state(body))
+        return BodyState(*self._core.state(_arrays.body(body)))
 
     def set_state(self, body: BodyId, state: BodyState) -> None:
         """Replaces the state of a body, and wakes it and the bodies in contact with it. An
@@ -481,8 +486,11 @@ class World:
             An unknown body, or a value out of its range.
         DeviceError
         """
-        state = BodyState(*state)
-        self._core.set_state(body, _arrays.triple(state.position, "position"),
+        try:
+            state = BodyState(*state)
+        except TypeError:
+            raise InvalidArgument(f"state is {state!r}; it must be a BodyState") from None
+        self._core.set_state(_arrays.body(body), _arrays.triple(state.position, "position"),
                              _arrays.triple(state.orientation, "orientation", 4),
                              _arrays.triple(state.velocity, "velocity"),
                              _arrays.triple(state.angular_velocity, "angular_velocity"))
@@ -490,87 +498,87 @@ class World:
     def awake(self, body: BodyId) -> bool:
         """Whether a body is awake. A body of mass 0 is awake only if it is kinematic and moves.
         Raises InvalidArgument for an unknown body, DeviceError."""
-        return self._core.awake(body)
+        return self._core.awake(_arrays.body(body))
 
     def wake(self, body: BodyId) -> None:
         """Wakes a body; has no effect on one of mass 0. The next step also wakes the bodies in
         contact with it. Raises InvalidArgument for an unknown body."""
-        self._core.wake(body)
+        self._core.wake(_arrays.body(body))
 
     def mass(self, body: BodyId) -> float:
         """[kg], >= 0; 0: immovable or kinematic. Raises InvalidArgument for an unknown body."""
-        return self._core.mass(body)
+        return self._core.mass(_arrays.body(body))
 
     def set_mass(self, body: BodyId, mass: float) -> None:
         """[kg], finite and > 0; a mass of 0 remains 0. The inertia follows, unless it was given.
         Wakes the body. Raises InvalidArgument for an unknown body or a mass out of range."""
-        self._core.set_mass(body, _arrays.number(mass, "mass"))
+        self._core.set_mass(_arrays.body(body), _arrays.number(mass, "mass"))
 
     def friction(self, body: BodyId) -> float:
         """[-], >= 0. Raises InvalidArgument for an unknown body."""
-        return self._core.friction(body)
+        return self._core.friction(_arrays.body(body))
 
     def set_friction(self, body: BodyId, friction: float) -> None:
         """[-], finite and >= 0, from the next step on. A change wakes the body and the bodies in
         contact with it. Raises InvalidArgument for an unknown body or a value out of range."""
-        self._core.set_friction(body, _arrays.number(friction, "friction"))
+        self._core.set_friction(_arrays.body(body), _arrays.number(friction, "friction"))
 
     def restitution(self, body: BodyId) -> float:
         """[-], in [0, 1]. Raises InvalidArgument for an unknown body."""
-        return self._core.restitution(body)
+        return self._core.restitution(_arrays.body(body))
 
     def set_restitution(self, body: BodyId, restitution: float) -> None:
         """[-], in [0, 1], from the next step on. Raises InvalidArgument for an unknown body or a
         value out of range."""
-        self._core.set_restitution(body, _arrays.number(restitution, "restitution"))
+        self._core.set_restitution(_arrays.body(body), _arrays.number(restitution, "restitution"))
 
     def acceleration(self, body: BodyId) -> tuple[float, ...]:
         """Three numbers [m/s^2], constant; gravity by default. Raises InvalidArgument for an
         unknown body."""
-        return self._core.acceleration(body)
+        return self._core.acceleration(_arrays.body(body))
 
     def set_acceleration(self, body: BodyId, acceleration: Vector) -> None:
         """Three numbers [m/s^2], finite, from the next step on. A change wakes the body. Raises
         InvalidArgument for an unknown body or a value out of range."""
-        self._core.set_acceleration(body, _arrays.triple(acceleration, "acceleration"))
+        self._core.set_acceleration(_arrays.body(body), _arrays.triple(acceleration, "acceleration"))
 
     def damping(self, body: BodyId) -> tuple[float, float]:
         """[-], each in (0, 1]: fractions of velocity and of angular velocity kept per second.
         Raises InvalidArgument for an unknown body."""
-        return self._core.damping(body)
+        return self._core.damping(_arrays.body(body))
 
     def set_damping(self, body: BodyId, linear: float, angular: float) -> None:
         """[-], each in (0, 1]: fractions of velocity and of angular velocity kept per second, from
         the next step on. Raises InvalidArgument for an unknown body or a value out of range."""
-        self._core.set_damping(body, _arrays.number(linear, "linear"),
+        self._core.set_damping(_arrays.body(body), _arrays.number(linear, "linear"),
                                _arrays.number(angular, "angular"))
 
     def sensor(self, body: BodyId) -> bool:
         """Whether a body is a sensor: it has contacts, but they are not resolved. Raises
         InvalidArgument for an unknown body."""
-        return self._core.sensor(body)
+        return self._core.sensor(_arrays.body(body))
 
     def filter(self, body: BodyId) -> tuple[int, int]:
         """Category and mask, each in [0, 2^32 - 1]. Raises InvalidArgument for an unknown body."""
-        return self._core.filter(body)
+        return self._core.filter(_arrays.body(body))
 
     def set_filter(self, body: BodyId, category: int, mask: int) -> None:
         """Two bodies collide if each has a category that is in the mask of the other. `category`
         and `mask` are bits in [0, 2^32 - 1]. A change wakes the body and the bodies in contact with
         it. Raises InvalidArgument for an unknown body or a value out of range."""
-        self._core.set_filter(body, _arrays.count(category, "category", 0, 2**32 - 1),
+        self._core.set_filter(_arrays.body(body), _arrays.count(category, "category", 0, 2**32 - 1),
                               _arrays.count(mask, "mask", 0, 2**32 - 1))
 
     def pair_ignored(self, a: BodyId, b: BodyId) -> bool:
         """Whether two bodies do not collide, whatever their filters. Raises InvalidArgument for an
         unknown body."""
-        return self._core.pair_ignored(a, b)
+        return self._core.pair_ignored(_arrays.body(a, "a"), _arrays.body(b, "b"))
 
     def set_pair_ignored(self, a: BodyId, b: BodyId, ignored: bool) -> None:
         """Adds two bodies to the pairs that do not collide, or removes them. A change wakes both
         bodies and the bodies in contact with them. Raises InvalidArgument for an unknown body, and
         if both are the same body."""
-        self._core.set_pair_ignored(a, b, bool(ignored))
+        self._core.set_pair_ignored(_arrays.body(a, "a"), _arrays.body(b, "b"), bool(ignored))
 
     # Forces
 
@@ -580,15 +588,15 @@ class World:
         InvalidArgument for an unknown body or a value that is not finite."""
         force = _arrays.triple(force, "force")
         if point is None:
-            self._core.apply_force(body, force)
+            self._core.apply_force(_arrays.body(body), force)
         else:
-            self._core.apply_force_at_point(body, force, _arrays.triple(point, "point"))
+            self._core.apply_force_at_point(_arrays.body(body), force, _arrays.triple(point, "point"))
 
     def apply_torque(self, body: BodyId, torque: Vector) -> None:
         """Applies a torque [N m] in world axes in the next step. Several calls add up. Wakes the
         body; has no effect on one of mass 0. Raises InvalidArgument for an unknown body or a value
         that is not finite."""
-        self._core.apply_torque(body, _arrays.triple(torque, "torque"))
+        self._core.apply_torque(_arrays.body(body), _arrays.triple(torque, "torque"))
 
     def add_force(self, force: Any) -> int:
         """Adds a force that acts in every step, and returns its number. Wakes all bodies.
@@ -606,6 +614,9 @@ class World:
             A field is out of its range, a body is unknown, or `force` is neither a force of jfpx
             nor a function.
         """
+        if isinstance(force, type) and hasattr(force, "_add"):
+            raise InvalidArgument(f"force is the class {force.__name__}; it must be an object, "
+                                  f"such as {force.__name__}(...)")
         if hasattr(force, "_add"):
             return force._add(self._core)
         if not callable(force):
@@ -686,15 +697,16 @@ class World:
         return [RayHit(BodyId(*hit[0]), *hit[1:]) for hit in hits]
 
     def cast_rays(self, origins: Any, directions: Any, max_distances: Any = math.inf) -> RayHits:
-        """The first hits of many rays, as those of cast_ray().
+        """The first hits of many rays, as those of cast_ray(). Lists and arrays of other numbers are
+        converted to the dtype of the world.
 
         Parameters
         ----------
-        origins : array (R, 3) of the dtype of the world
+        origins : array (R, 3)
             [m], each number in [-1e9, 1e9].
-        directions : array (R, 3) of the dtype of the world
+        directions : array (R, 3)
             Finite, of any length but 0.
-        max_distances : number or array (R,) of the dtype of the world
+        max_distances : number or array (R,)
             [m], >= 0; infinity is allowed.
 
         Raises
@@ -703,14 +715,16 @@ class World:
             A wrong shape or type, or a number out of its range; the message then has the ray.
         OutOfMemory, DeviceError
         """
-        origins = _arrays.rows(origins, "origins", 3, self._dtype)
-        directions = _arrays.rows(directions, "directions", 3, self._dtype)
+        origins, directions = (
+            _arrays.rows(_arrays.converted(array, name, self._dtype), name, 3)
+            for array, name in ((origins, "origins"), (directions, "directions")))
         size = origins.shape[0]
         if directions.shape[0] != size:
             raise InvalidArgument(f"directions has {directions.shape[0]} rows; origins has {size}")
         result = RayHits(np.empty(size, np.int64), self._values(size), self._rows(size),
                          self._rows(size))
-        limits = _arrays.vector(max_distances, "max_distances", size, self._dtype)
+        limits = _arrays.vector(_arrays.converted(max_distances, "max_distances", self._dtype),
+                                "max_distances", size, self._dtype)
         self._core.cast_rays(origins, directions, limits, *result)
         return result
 
@@ -746,9 +760,19 @@ class World:
             return f"<jfpx.World: {error}>"
 
 
+def _report(fields: tuple[Any, ...]) -> StepReport:
+    report = StepReport(*fields)
+    if report.non_finite_body is None:
+        return report
+    return report._replace(non_finite_body=BodyId(*report.non_finite_body))
+
+
 def _call(force: Callable[[ForceContext], Any], dtype: Any, context: Any) -> None:
     force(ForceContext(context, dtype))
 
 
 def _of_body(filter: Callable[[BodyId], bool] | None) -> Any:
-    return None if filter is None else lambda body: bool(filter(BodyId(*body)))
+    if filter is None:
+        return None
+    _arrays.function(filter, "filter")
+    return lambda body: bool(filter(BodyId(*body)))
