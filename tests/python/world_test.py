@@ -25,10 +25,14 @@ FREE = {**BALL, "acceleration": [0, 0, 0]}
 
 def test_a_world_on_the_host_has_no_device_states():
     world = jfpx.World("pile", backend="cpu")
-    with pytest.raises(jfpx.BackendUnavailable, match="has no device"):
+    with pytest.raises(jfpx.BackendUnavailable, match='has no device; make it with the backend "cuda"'):
         world.device_states()
     with pytest.raises(jfpx.BackendUnavailable, match="has no device"):
         world.enqueue_steps(1)
+    for other, remedy in ((jfpx.World({"solver": "worst_first"}), "use soft_step"),
+                          (jfpx.World({}), 'with the backend "cuda"')):
+        with pytest.raises(jfpx.BackendUnavailable, match=remedy):
+            other.device_version
     for count, stream in ((-1, None), (1.5, None), (2**32, None), (1, "stream"), (1, -1)):
         with pytest.raises(jfpx.InvalidArgument):
             world.enqueue_steps(count, stream)
@@ -445,6 +449,8 @@ def test_a_damaged_snapshot_is_a_named_exception(dtype):
     for bad in (b"", snapshot[:-1], bytes(damaged), wrong_dtype.snapshot()):
         with pytest.raises(jfpx.InvalidSnapshot):
             world.restore(bad)
+    with pytest.raises(jfpx.InvalidSnapshot, match=f"is float.* it must be {dtype}"):
+        world.restore(wrong_dtype.snapshot())
     with pytest.raises(jfpx.InvalidArgument, match="it must be bytes"):
         world.restore("text")
     assert world.state_hash() == before
@@ -634,7 +640,8 @@ def test_python_m_jfpx_runs_the_command(tmp_path):
     if os.path.exists(os.path.join(folder, "jfpx")):
         pytest.skip("the command is beside Python")
     missing = run("")
-    assert missing.returncode == 3 and "not installed" in missing.stderr
+    assert missing.returncode == 3
+    assert "not installed" in missing.stderr and "jfpx.Recording" in missing.stderr
     command = tmp_path / "jfpx"
     command.write_text("#!/bin/sh\necho \"got $1\"\n")
     command.chmod(0o755)
