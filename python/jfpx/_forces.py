@@ -13,26 +13,40 @@ from ._errors import InvalidArgument
 
 
 class BodyId(NamedTuple):
-    """Identifies a body of one World for the lifetime of the body. Never reused."""
+    """Identifies a body of one World for the lifetime of the body. Never reused.
+
+    Attributes
+    ----------
+    index : int
+        Row of the body in World.device_states(), and its number in arrays of contacts and rays.
+        That of a removed body may be given to a later one.
+    generation : int
+        Differs for bodies with the same index.
+    """
 
     index: int
-    """In [0, 2^32 - 1]; that of a removed body may be given to a later one."""
     generation: int
-    """In [0, 2^32 - 1]; differs for bodies with the same index."""
 
 
 class States(NamedTuple):
-    """States of all bodies, in the order of World.bodies. The arrays are of the dtype of the
-    world."""
+    """States of all bodies, in the order of World.bodies, in the dtype of the world.
+
+    Attributes
+    ----------
+    positions : array (N, 3)
+        Centres of mass [m].
+    orientations : array (N, 4)
+        Unit quaternions (w, x, y, z).
+    velocities : array (N, 3)
+        [m/s]
+    angular_velocities : array (N, 3)
+        [rad/s], in the axes of the world.
+    """
 
     positions: Any
-    """(N, 3) [m]."""
     orientations: Any
-    """(N, 4) [-]: unit quaternions (w, x, y, z)."""
     velocities: Any
-    """(N, 3) [m/s]."""
     angular_velocities: Any
-    """(N, 3) [rad/s], world axes."""
 
     @classmethod
     def empty(cls, size: int, dtype: Any) -> States:
@@ -42,16 +56,24 @@ class States(NamedTuple):
 
 
 class BodyState(NamedTuple):
-    """State of motion of a body. World.set_state() has the ranges."""
+    """State of motion of a body. World.set_state() has the ranges.
+
+    Attributes
+    ----------
+    position : three numbers
+        Centre of mass [m].
+    orientation : four numbers
+        Unit quaternion (w, x, y, z).
+    velocity : three numbers
+        [m/s]
+    angular_velocity : three numbers
+        [rad/s], in the axes of the world.
+    """
 
     position: tuple[float, ...]
-    """[m], centre of mass."""
     orientation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
-    """[-]: unit quaternion (w, x, y, z)."""
     velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """[m/s]."""
     angular_velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """[rad/s], world axes."""
 
 
 Vector = Sequence[float]
@@ -118,9 +140,9 @@ class Spring:
     rest_length: float = 0.0
 
     def _add(self, core: Any) -> int:
-        return core.add_spring(*self._fields())
+        return core.add_spring(*self._arguments())
 
-    def _fields(self) -> tuple[Any, ...]:
+    def _arguments(self) -> tuple[Any, ...]:
         ends = (_arrays.instance(getattr(self, name), name, Attachment, ", such as Attachment(body)")
                 for name in ("a", "b"))
         return (*(end._pair() for end in ends),
@@ -132,14 +154,14 @@ class Bungee(Spring):
     """A spring without force while it is shorter than its rest length. Fields as in Spring."""
 
     def _add(self, core: Any) -> int:
-        return core.add_bungee(*self._fields())
+        return core.add_bungee(*self._arguments())
 
 
 @dataclass(frozen=True)
 class Buoyancy:
-    """Buoyancy of one body or of all in the liquid dot(normal, p) <= offset; normal [-] of unit
-    length to a thousandth of its square, offset [m] finite, density [kg/m^3] >= 0 and gravity
-    [m/s^2] >= 0, finite."""
+    """Buoyancy of one body or of all in the liquid where dot(normal, p) <= offset [m]. `normal`
+    is a unit vector, to a thousandth of the squared length; density [kg/m^3] >= 0 and gravity
+    [m/s^2] >= 0, all finite."""
 
     normal: Vector = (0.0, 1.0, 0.0)
     offset: float = 0.0
@@ -184,12 +206,12 @@ class ForceContext:
 
     @property
     def dt(self) -> float:
-        """[s], > 0: length of the step."""
+        """Length of the step [s], > 0."""
         return self._core.dt
 
     @property
     def time(self) -> float:
-        """[s], >= 0: start of the step; 0 in the first."""
+        """Time of the world at the start of the step [s]; 0 in the first."""
         return self._core.time
 
     @property
@@ -209,7 +231,8 @@ class ForceContext:
         return BodyState(*self._core.state(_arrays.body(body)))
 
     def mass(self, body: BodyId) -> float:
-        """[kg], >= 0; 0: immovable or kinematic. Raises InvalidArgument for an unknown body."""
+        """Mass of a body [kg], >= 0; 0: immovable or kinematic. Raises InvalidArgument for an unknown
+        body."""
         return self._core.mass(_arrays.body(body))
 
     def awake(self, body: BodyId) -> bool:

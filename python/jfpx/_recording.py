@@ -96,7 +96,15 @@ class RecordingWriter:
 
 
 class Recording:
-    """Reads a recording of this version, in the precision in which it was written.
+    """Reads a recording of jfpx 0.1 or 0.2, in the precision in which it was written.
+
+    To repeat it, compare the states of a new world::
+
+        recording = jfpx.Recording("run.rec")
+        world = jfpx.World(recording.scene)
+        for step in range(1, len(recording) + 1):
+            world.step()
+            same = world.positions.tobytes() == recording.states(step).positions.tobytes()
 
     Parameters
     ----------
@@ -106,7 +114,8 @@ class Recording:
     Raises
     ------
     FileError
-        The file cannot be read, is truncated or corrupt, or is no recording of this version.
+        The file cannot be read, is truncated or corrupt, is no recording, or was written by a later
+        version.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -122,7 +131,7 @@ class Recording:
 
     @property
     def dtype(self) -> np.dtype:
-        """float32 or float64: precision of the run."""
+        """Precision of the run: float32 or float64."""
         return self._dtype
 
     @property

@@ -16,10 +16,19 @@ from ._errors import InvalidArgument, InvalidScene
 class Scene:
     """Bodies and the settings of their simulation. A scene is validated when it is made.
 
+    A floor and a ball that falls on it::
+
+        jfpx.Scene({"dt": 1 / 60, "bodies": [
+            {"shape": {"type": "half_space", "normal": [0, 1, 0], "offset": 0}, "mass": 0},
+            {"shape": {"type": "sphere", "radius": 0.5}, "position": [0, 2, 0], "mass": 1},
+        ]})
+
+    to_dict() of a scene shows all fields with their defaults.
+
     Parameters
     ----------
     fields : dict, optional
-        The scene as in a JSON file, see docs/scenes.md. "jfpx_scene" and "bodies" may be absent.
+        The scene as in a JSON file. All fields may be absent.
     dtype : "float32" or "float64"
         Precision of a world that is made from the scene.
 
@@ -55,7 +64,8 @@ class Scene:
         InvalidArgument
             `text` is not a str, or `dtype` is neither float32 nor float64.
         """
-        return cls._of(_arrays.precision_of(dtype).Scene.from_json(_arrays.instance(text, "text", str)), dtype)
+        text = _arrays.instance(text, "text", str)
+        return cls._of(_arrays.precision_of(dtype).Scene.from_json(text), dtype)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, dtype: Any = "float32") -> Scene:
@@ -81,7 +91,7 @@ class Scene:
         spheres, boxes : int in [0, 2^32 - 1], optional
             Numbers of movable bodies; the defaults of the scene if absent.
         seed : int in [0, 2^64 - 1]
-            Of the random scenes.
+            Seed of the scenes that are random.
         dtype : "float32" or "float64"
 
         Raises
@@ -94,7 +104,8 @@ class Scene:
         """
         limit = 2**32 - 1
         scene = _arrays.precision_of(dtype).Scene.named(
-            _arrays.instance(name, "name", str), None if spheres is None else _arrays.count(spheres, "spheres", 0, limit),
+            _arrays.instance(name, "name", str),
+            None if spheres is None else _arrays.count(spheres, "spheres", 0, limit),
             None if boxes is None else _arrays.count(boxes, "boxes", 0, limit),
             _arrays.count(seed, "seed", 0, 2**64 - 1))
         return cls._of(scene, dtype)
@@ -146,7 +157,7 @@ class Scene:
 
     @property
     def dtype(self) -> np.dtype:
-        """float32 or float64: precision of a world that is made from the scene."""
+        """Precision of a world that is made from the scene: float32 or float64."""
         return self._dtype
 
     @property
@@ -156,7 +167,7 @@ class Scene:
 
     @property
     def dt(self) -> float:
-        """[s], > 0: length of a step."""
+        """Length of a step [s], > 0."""
         return self._scene.dt
 
     def __len__(self) -> int:
@@ -164,11 +175,12 @@ class Scene:
         return self._scene.bodies
 
     def to_json(self) -> str:
-        """JSON text, of which from_json() makes a scene with the same bits."""
+        """The scene as JSON text; from_json() makes an equal scene of it."""
         return self._scene.to_json()
 
     def to_dict(self) -> dict[str, Any]:
-        """The fields of the JSON form, of which Scene() makes a scene with the same bits."""
+        """All fields of the scene, also those that had been absent; Scene() makes an equal scene of
+        them."""
         return json.loads(self.to_json())
 
     def save(self, path: str | os.PathLike[str]) -> None:
