@@ -648,13 +648,25 @@ def test_python_m_jfpx_runs_the_command(tmp_path):
     assert run(f"{tmp_path}:/bin").stdout == "got devices\n"
 
 
-def test_the_code_of_the_guide_runs(tmp_path, monkeypatch):
-    guide = (pathlib.Path(__file__).parents[2] / "docs/python.md").read_text()
-    blocks = re.findall(r"```python\n(.*?)```", guide, re.DOTALL)
-    assert len(blocks) >= 5
-    monkeypatch.chdir(tmp_path)
+ROOT = pathlib.Path(__file__).parents[2]
+
+
+def run_code_of(document):
+    """The names that the Python code of a document defines."""
     names = {}
-    for block in blocks:
+    for block in re.findall(r"```python\n(.*?)```", (ROOT / document).read_text(), re.DOTALL):
         exec(block, names)
+    return names
+
+
+def test_the_code_of_the_readme_runs():
+    names = run_code_of("README.md")
+    assert names["pairs"].shape[1] > 0 and names["world"].report.step == 600
+
+
+def test_the_code_of_the_guide_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = run_code_of("docs/python.md")
     assert names["pairs"].shape[1] == names["size"] == names["contacts"].pairs.shape[1] > 0
-    assert names["report"].step == 120 and (tmp_path / "run.rec").exists()
+    assert names["report"].step == 120 and len(names["recording"]) == 10
+    assert np.isfinite(names["trajectory"]).all()
