@@ -473,9 +473,9 @@ class World:
         read them with their `from_dlpack()`, and jfpx takes them as they are.
 
         Row i is that of the body with BodyId.index i; rows of removed bodies have no meaning. The
-        arrays must not be written. After step(), run() or a change of the world, call
-        device_states() again: these wait for all work of the GPU that may still read the arrays,
-        which are then no longer valid. Steps of enqueue_steps() and of graphs, and finish_steps(),
+        arrays must not be written. step(), run() and changes of the world wait for all work of the
+        GPU that may still read the arrays. Afterwards the arrays are not valid: call device_states()
+        again. Steps of enqueue_steps() and of graphs, and finish_steps(),
         change the arrays in place, and they stay valid as long as `device_version` is the same. The
         first call after a change copies the world to the GPU.
 

@@ -190,6 +190,17 @@ def test_bodies_are_added_changed_and_removed():
         world.state(ball)
 
 
+def test_contacts_have_indices_of_bodies_also_after_a_removal():
+    world = jfpx.World({"bodies": [FREE, {**FREE, "position": [9, 0, 0]}, {**FREE, "position": [9.9, 0, 0]}]})
+    world.remove(world.bodies[0])
+    world.step()
+    pairs = world.contacts().pairs
+    assert sorted(pairs[:, 0]) == [1, 2] == [body.index for body in world.bodies]
+    rows = np.searchsorted([body.index for body in world.bodies], pairs)
+    assert sorted(rows[:, 0]) == [0, 1] and world.cast_rays([[9, 5, 0]], [[0, -1, 0]]).bodies == [1]
+    assert sorted(world.contact_events().pairs[:, 0]) == [1, 2]
+
+
 def test_filters_decide_which_bodies_touch():
     world = jfpx.World({"bodies": [FREE, {**FREE, "position": [0, 2.9, 0]}]})
     a, b = world.bodies
