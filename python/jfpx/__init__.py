@@ -1,7 +1,9 @@
-"""jfpx: contacts among spheres and rigid-body worlds, with the same bits on CPU and GPU.
+"""Contacts among spheres and worlds of rigid bodies, with equal results on CPU and GPU.
 
-docs/python.md in the repository is the guide. Units are SI; vectors are (x, y, z), and quaternions
-(w, x, y, z). All exceptions of the package derive from jfpx.Error.
+find_contacts(), find_pairs() and SphereCollider search arrays of spheres or points. World makes the
+steps of a Scene. All results are the same to the last bit on every backend and for every number of
+threads. Units of worlds are SI; vectors are (x, y, z), and quaternions (w, x, y, z). All exceptions
+of the package derive from jfpx.Error.
 """
 
 from ._collider import (ContactRows, Contacts, PeriodicContactRows, PeriodicContacts, PeriodicPairs,

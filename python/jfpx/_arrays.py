@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -20,6 +21,54 @@ def precision_of(dtype: Any) -> Any:
         return PRECISIONS[np.dtype(dtype)]
     except (KeyError, TypeError):
         raise InvalidArgument(f"dtype is {dtype!r}; it must be float32 or float64") from None
+
+
+def instance(value: Any, name: str, kind: type, remedy: str = "") -> Any:
+    """The value, which must be of a type."""
+    if not isinstance(value, kind):
+        simple = value is None or isinstance(value, (str, int, float, tuple))
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        given = repr(value) if simple else f"of type {type(value).__name__}"
+        raise InvalidArgument(f"{name} is {given}; it must be {article} {kind.__name__}{remedy}")
+    return value
+
+
+def function(value: Any, name: str) -> Any:
+    """The value, which must be a function."""
+    if not callable(value):
+        raise InvalidArgument(f"{name} is {value!r}; it must be a function")
+    return value
+
+
+def path(value: Any) -> str:
+    """The path of a file."""
+    try:
+        return os.fsdecode(value)
+    except TypeError:
+        raise InvalidArgument(f"path is {value!r}; it must be a str or a path") from None
+
+
+def body(value: Any, name: str = "body") -> tuple[int, int]:
+    """The index and the generation of a BodyId."""
+    try:
+        index, generation = (part.__index__() for part in value)
+    except (AttributeError, TypeError, ValueError):
+        index = generation = -1
+    if not (0 <= index < 2**32 and 0 <= generation < 2**32):
+        raise InvalidArgument(f"{name} is {value!r}; it must be a BodyId: one of World.bodies, or "
+                              "World.body_at(index)")
+    return index, generation
+
+
+def options(backend: Any, algorithm: Any, threads: Any, device: Any) -> tuple[str, str, int, int]:
+    """The options of a collider or a world."""
+    if backend not in ("auto", "cpu", "cuda"):
+        raise InvalidArgument(f"backend is {backend!r}; it must be 'auto', 'cpu' or 'cuda'")
+    if algorithm not in ("auto", "automatic", "all_pairs", "sorted_tiles"):
+        raise InvalidArgument(f"algorithm is {algorithm!r}; it must be 'auto', 'all_pairs' or "
+                              "'sorted_tiles'")
+    return (backend, "automatic" if algorithm == "auto" else algorithm,
+            count(threads, "threads", 0, 256), count(device, "device", 0, 2**31 - 1))
 
 
 def to_host(array: Any, name: str) -> np.ndarray:
@@ -74,6 +123,15 @@ def vector(array: Any, name: str, size: int, dtype: Any) -> np.ndarray:
     array = floats(array, name, dtype if given else None).astype(dtype, copy=False)
     # One value for all and one value for one row are the same.
     return array if size else np.ones(1, dtype)
+
+
+def converted(array: Any, name: str, dtype: Any) -> np.ndarray:
+    """An array of numbers, or a list, as an array of a dtype."""
+    array = to_host(array, name)
+    if array.dtype.kind not in "fiu":
+        raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be an array of numbers")
+    with np.errstate(over="ignore"):  # infinity is refused where it is not allowed
+        return floats(array.astype(dtype, copy=False), name)
 
 
 def floats(array: np.ndarray, name: str, dtype: Any = None) -> np.ndarray:

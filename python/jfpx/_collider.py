@@ -13,87 +13,142 @@ from ._errors import ConcurrentUse, InvalidArgument
 
 
 class Contacts(NamedTuple):
-    """Touching pairs of spheres, sorted by (pairs[0], pairs[1]). Floating-point arrays have the
-    type of the positions, indices that of `index_dtype`."""
+    """The E touching pairs of spheres, sorted by (pairs[0], pairs[1]). Arrays are of the kind of the
+    positions. Floating-point arrays have their type, indices that of `index_dtype`.
+
+    Attributes
+    ----------
+    pairs : array (2, E)
+        Indices a and b of the two spheres.
+    normal : array (E, 3)
+        Unit vectors from b to a; (1, 0, 0) where the centres coincide.
+    distance : array (E,)
+        Gap between the surfaces: 0, or negative where the spheres overlap.
+    """
 
     pairs: Any
-    """(2, E): indices a and b of the two spheres."""
     normal: Any
-    """(E, 3) [-]: unit vectors from b to a; (1, 0, 0) where the centres coincide."""
     distance: Any
-    """(E,) [m], <= 0: negative penetration depths."""
 
 
 class ContactRows(NamedTuple):
     """Touching pairs of spheres as compressed rows (CSR): row i has the contacts with a = i. Types
-    are those of Contacts."""
+    are those of Contacts.
+
+    Attributes
+    ----------
+    offsets : array (N + 1,) of int64
+        Row i is columns[offsets[i]:offsets[i + 1]].
+    columns : array (E,)
+        Indices b, ascending in each row.
+    normal : array (E, 3)
+        Unit vectors from b to a; (1, 0, 0) where the centres coincide.
+    distance : array (E,)
+        Gap between the surfaces: 0, or negative where the spheres overlap.
+    """
 
     offsets: Any
-    """(N + 1,) int64: row i is columns[offsets[i]:offsets[i + 1]]."""
     columns: Any
-    """(E,): indices b, ascending in each row."""
     normal: Any
-    """(E, 3) [-]: unit vectors from b to a."""
     distance: Any
-    """(E,) [m], <= 0: negative penetration depths."""
 
 
 class Rows(NamedTuple):
-    """Pairs as compressed rows (CSR): row i has the pairs with a = i."""
+    """Pairs as compressed rows (CSR): row i has the pairs with a = i.
+
+    Attributes
+    ----------
+    offsets : array (N + 1,) of int64
+        Row i is columns[offsets[i]:offsets[i + 1]].
+    columns : array (E,)
+        Indices b, ascending in each row.
+    """
 
     offsets: Any
-    """(N + 1,) int64: row i is columns[offsets[i]:offsets[i + 1]]."""
     columns: Any
-    """(E,): indices b, ascending in each row."""
 
 
 class PeriodicContacts(NamedTuple):
     """Touching pairs of spheres and images of spheres, sorted by (pairs[0], pairs[1]). Types are
-    those of Contacts."""
+    those of Contacts.
+
+    Attributes
+    ----------
+    pairs : array (2, E)
+        Indices a and b.
+    normal : array (E, 3)
+        Unit vectors from the image of b to a.
+    distance : array (E,)
+        Gap between the surfaces: 0, or negative where the spheres overlap.
+    shifts : array (E, 3) of int32
+        The image of b is at positions[b] + shifts * lengths, with length 0 along axes that do not
+        repeat.
+    """
 
     pairs: Any
-    """(2, E): indices a and b."""
     normal: Any
-    """(E, 3) [-]: unit vectors from the image of b to a."""
     distance: Any
-    """(E,) [m], <= 0: negative penetration depths."""
     shifts: Any
-    """(E, 3) int32: the image of b is at positions[b] + shifts * lengths."""
 
 
 class PeriodicContactRows(NamedTuple):
-    """The same as compressed rows (CSR)."""
+    """Touching pairs of spheres and images of spheres as compressed rows (CSR).
+
+    Attributes
+    ----------
+    offsets : array (N + 1,) of int64
+        Row i is columns[offsets[i]:offsets[i + 1]].
+    columns : array (E,)
+        Indices b, ascending in each row.
+    normal : array (E, 3)
+        Unit vectors from the image of b to a.
+    distance : array (E,)
+        Gap between the surfaces: 0, or negative where the spheres overlap.
+    shifts : array (E, 3) of int32
+        The image of b is at positions[b] + shifts * lengths, with length 0 along axes that do not
+        repeat.
+    """
 
     offsets: Any
-    """(N + 1,) int64: row i is columns[offsets[i]:offsets[i + 1]]."""
     columns: Any
-    """(E,): indices b, ascending in each row."""
     normal: Any
-    """(E, 3) [-]: unit vectors from the image of b to a."""
     distance: Any
-    """(E,) [m], <= 0: negative penetration depths."""
     shifts: Any
-    """(E, 3) int32: the image of b is at positions[b] + shifts * lengths."""
 
 
 class PeriodicPairs(NamedTuple):
-    """Pairs of points and images of points, sorted by (pairs[0], pairs[1])."""
+    """The E pairs of points and images of points, sorted by (pairs[0], pairs[1]).
+
+    Attributes
+    ----------
+    pairs : array (2, E)
+        Indices a and b.
+    shifts : array (E, 3) of int32
+        The image of b is at positions[b] + shifts * lengths, with length 0 along axes that do not
+        repeat.
+    """
 
     pairs: Any
-    """(2, E): indices a and b."""
     shifts: Any
-    """(E, 3) int32: the image of b is at positions[b] + shifts * lengths."""
 
 
 class PeriodicRows(NamedTuple):
-    """The same as compressed rows (CSR)."""
+    """Pairs of points and images of points as compressed rows (CSR).
+
+    Attributes
+    ----------
+    offsets : array (N + 1,) of int64
+        Row i is columns[offsets[i]:offsets[i + 1]].
+    columns : array (E,)
+        Indices b, ascending in each row.
+    shifts : array (E, 3) of int32
+        The image of b is at positions[b] + shifts * lengths, with length 0 along axes that do not
+        repeat.
+    """
 
     offsets: Any
-    """(N + 1,) int64: row i is columns[offsets[i]:offsets[i + 1]]."""
     columns: Any
-    """(E,): indices b, ascending in each row."""
     shifts: Any
-    """(E, 3) int32: the image of b is at positions[b] + shifts * lengths."""
 
 
 _INDEX_TYPES = ("int32", "int64")
@@ -102,8 +157,8 @@ _INDEX_TYPES = ("int32", "int64")
 class SphereCollider:
     """Finds contacts among spheres, with buffers that are kept from call to call.
 
-    Results do not depend on backend, algorithm or number of threads, to the last bit. One thread
-    may use an object at a time; different objects are independent.
+    Results are the same to the last bit for every backend, algorithm and number of threads. One
+    thread may use an object at a time; different objects are independent.
 
     The options but `dtype` are for arrays in host memory. Arrays on a device are searched there,
     with an algorithm that is selected for each search; backend="cpu" refuses them.
@@ -115,9 +170,9 @@ class SphereCollider:
     backend : "auto", "cpu" or "cuda"
         Device that searches arrays in host memory. "cuda" copies them to the GPU and back. "auto"
         selects the fastest, by a cost model and by measured times.
-    algorithm : "automatic", "all_pairs" or "sorted_tiles"
-        All pairs are tested, or those of neighboring cells of a grid. "automatic" selects the
-        fastest.
+    algorithm : "auto", "all_pairs" or "sorted_tiles"
+        All pairs are tested, or those of neighboring cells of a grid. "auto" (also "automatic")
+        selects the fastest.
     threads : int in [0, 256]
         Number of threads of the CPU; 0: one per core.
     device : int in [0, 2^31 - 1]
@@ -134,19 +189,17 @@ class SphereCollider:
     """
 
     def __init__(self, dtype: Any = "float32", *, backend: str = "auto",
-                 algorithm: str = "automatic", threads: int = 1, device: int = 0) -> None:
+                 algorithm: str = "auto", threads: int = 1, device: int = 0) -> None:
         core = _arrays.precision_of(dtype)
         self._dtype = np.dtype(dtype)
         self._backend = backend
         self._on_devices: dict[Any, Any] = {}
-        self._collider = core.Collider(backend, algorithm,
-                                       _arrays.count(threads, "threads", 0, 256),
-                                       _arrays.count(device, "device", 0, 2**31 - 1))
+        self._collider = core.Collider(*_arrays.options(backend, algorithm, threads, device))
         self._lock = threading.Lock()
 
     @property
     def dtype(self) -> np.dtype:
-        """float32 or float64: type of positions, radii, normals and distances."""
+        """Type of positions, radii, normals and distances: float32 or float64."""
         return self._dtype
 
     @property
@@ -184,11 +237,11 @@ class SphereCollider:
             C >= E. Indices are int32 or int64, shifts int32, the others of `dtype`. In host memory,
             or on the device of the positions with contiguous rows. Requires output="coo".
         count : array (2,) of int64 on the device, optional
-            With `out`, for arrays on a device: receives E, and 1 if the contacts were written.
-            The call neither allocates nor waits, so that it can be captured in a CUDA graph. If E
-            exceeds the capacity of `out`, the first contacts are written; if it exceeds that of
-            reserve(), or a sphere is invalid, none are. Finds each pair once. Excludes query, batch
-            and periodic.
+            With `out`, for arrays on a device: becomes [E, 1], or [E, 0] if E exceeds the capacity of
+            reserve(), or [0, 0] if a value of a sphere is not finite or a radius is not > 0. With 0,
+            no contact was written. With 1, `out` has all contacts, or the first ones if E exceeds
+            its own capacity. The call neither allocates nor waits, so that it can be captured in a
+            CUDA graph. Finds each pair once. Excludes query, batch and periodic.
 
         Returns
         -------
@@ -549,22 +602,24 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
     """Finds all touching pairs of spheres. The number of contacts is limited by memory only.
 
     Two spheres touch if the distance of their centres is at most the sum of their radii. May be
-    called from any number of threads.
+    called from any number of threads. The CPU searches arrays in host memory, with one thread unless
+    `threads` is given; SphereCollider can copy them to a GPU.
 
     Parameters
     ----------
     positions : array (N, 3) of float32 or float64, N < 2^32, on a device N <= 2^31
-        Centres [m], finite. NumPy, any array with DLPack, or nested lists. Any strides. Arrays of
+        Centres, finite, in any unit of length: radii, distances and lengths of cells have the same.
+        NumPy, any array with DLPack, or nested lists, which become float64. Any strides. Arrays of
         PyTorch and CuPy on a CUDA device, and those that share with them, are searched there in
         the order of the current stream.
     radii : number or array (N,) of the type of `positions`
-        [m], finite and > 0.
+        Finite and > 0.
     batch : array of integers, optional
         Offsets of independent systems, from 0 to N: system i has the spheres batch[i] to
         batch[i + 1] - 1. Spheres of different systems do not touch. On a device, all pairs of each
         system are tested.
     periodic : three lengths, optional
-        [m], of an orthogonal cell that repeats; None along an axis that does not. Each length is
+        Lengths of an orthogonal cell that repeats; None along an axis that does not. Each length is
         at least twice the largest sum of two radii. The nearest image of a sphere counts, and its
         shift is returned. Positions may be outside of the cell, less than 2^20 lengths from
         the origin. With `batch`, the cell is that of each system, or there is a row of three
@@ -616,17 +671,17 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
     Parameters
     ----------
     positions : array (N, 3) of float32 or float64
-        Points [m], finite.
+        Points, finite, in any unit of length.
     cutoff : number
-        [m], finite and > 0: pairs at this distance or closer, as the type of `positions` computes
-        it.
+        Finite and > 0, in the same unit: pairs at this distance or closer, as the type of
+        `positions` computes it.
     radii : number or array (N,)
-        [m], instead of `cutoff`, as in find_contacts().
+        Instead of `cutoff`, as in find_contacts().
     query : array (M, 3) of the type of `positions`, optional
         Finds pairs of a point of `query` and a point of `positions`, and no others: pairs[0] are
         indices of `query`, pairs[1] of `positions`. `half` has no effect.
     query_radii : number or array (M,)
-        [m], with `radii` and `query`: those of `query`.
+        With `radii` and `query`: the radii of `query`.
     batch, periodic, device, output, half, index_dtype, threads
         As in find_contacts(). `batch` and `query` exclude each other.
 

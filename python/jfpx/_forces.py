@@ -9,29 +9,44 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _arrays
+from ._errors import InvalidArgument
 
 
 class BodyId(NamedTuple):
-    """Identifies a body of one World for the lifetime of the body. Never reused."""
+    """Identifies a body of one World for the lifetime of the body. Never reused.
+
+    Attributes
+    ----------
+    index : int
+        Row of the body in World.device_states(), and its number in arrays of contacts and rays.
+        That of a removed body may be given to a later one.
+    generation : int
+        Differs for bodies with the same index.
+    """
 
     index: int
-    """In [0, 2^32 - 1]; that of a removed body may be given to a later one."""
     generation: int
-    """In [0, 2^32 - 1]; differs for bodies with the same index."""
 
 
 class States(NamedTuple):
-    """States of all bodies, in the order of World.bodies. The arrays are of the dtype of the
-    world."""
+    """States of all bodies, in the order of World.bodies, in the dtype of the world.
+
+    Attributes
+    ----------
+    positions : array (N, 3)
+        Centres of mass [m].
+    orientations : array (N, 4)
+        Unit quaternions (w, x, y, z).
+    velocities : array (N, 3)
+        [m/s]
+    angular_velocities : array (N, 3)
+        [rad/s], in the axes of the world.
+    """
 
     positions: Any
-    """(N, 3) [m]."""
     orientations: Any
-    """(N, 4) [-]: unit quaternions (w, x, y, z)."""
     velocities: Any
-    """(N, 3) [m/s]."""
     angular_velocities: Any
-    """(N, 3) [rad/s], world axes."""
 
     @classmethod
     def empty(cls, size: int, dtype: Any) -> States:
@@ -41,19 +56,35 @@ class States(NamedTuple):
 
 
 class BodyState(NamedTuple):
-    """State of motion of a body. World.set_state() has the ranges."""
+    """State of motion of a body. World.set_state() has the ranges.
+
+    Attributes
+    ----------
+    position : three numbers
+        Centre of mass [m].
+    orientation : four numbers
+        Unit quaternion (w, x, y, z).
+    velocity : three numbers
+        [m/s]
+    angular_velocity : three numbers
+        [rad/s], in the axes of the world.
+    """
 
     position: tuple[float, ...]
-    """[m], centre of mass."""
     orientation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
-    """[-]: unit quaternion (w, x, y, z)."""
     velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """[m/s]."""
     angular_velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """[rad/s], world axes."""
 
 
 Vector = Sequence[float]
+
+
+def _optional(body: Any) -> tuple[int, int] | None:
+    return None if body is None else _arrays.body(body)
+
+
+def _numbers(force: Any, *fields: str) -> list[float]:
+    return [_arrays.number(getattr(force, field), field) for field in fields]
 
 
 @dataclass(frozen=True)
@@ -66,7 +97,8 @@ class Gravity:
     body: BodyId | None = None
 
     def _add(self, core: Any) -> int:
-        return core.add_gravity(_arrays.triple(self.acceleration, "acceleration"), self.body)
+        return core.add_gravity(_arrays.triple(self.acceleration, "acceleration"),
+                                _optional(self.body))
 
 
 @dataclass(frozen=True)
@@ -80,8 +112,8 @@ class Drag:
     body: BodyId | None = None
 
     def _add(self, core: Any) -> int:
-        return core.add_drag(float(self.linear), float(self.quadratic),
-                             _arrays.triple(self.wind, "wind"), self.body)
+        return core.add_drag(*_numbers(self, "linear", "quadratic"),
+                             _arrays.triple(self.wind, "wind"), _optional(self.body))
 
 
 @dataclass(frozen=True)
@@ -93,7 +125,7 @@ class Attachment:
     point: Vector = (0.0, 0.0, 0.0)
 
     def _pair(self) -> tuple[BodyId | None, tuple[float, ...]]:
-        return self.body, _arrays.triple(self.point, "point")
+        return _optional(self.body), _arrays.triple(self.point, "point")
 
 
 @dataclass(frozen=True)
@@ -108,8 +140,13 @@ class Spring:
     rest_length: float = 0.0
 
     def _add(self, core: Any) -> int:
-        return core.add_spring(self.a._pair(), self.b._pair(), float(self.stiffness),
-                               float(self.damping), float(self.rest_length))
+        return core.add_spring(*self._arguments())
+
+    def _arguments(self) -> tuple[Any, ...]:
+        ends = (_arrays.instance(getattr(self, name), name, Attachment, ", such as Attachment(body)")
+                for name in ("a", "b"))
+        return (*(end._pair() for end in ends),
+                *_numbers(self, "stiffness", "damping", "rest_length"))
 
 
 @dataclass(frozen=True)
@@ -117,15 +154,14 @@ class Bungee(Spring):
     """A spring without force while it is shorter than its rest length. Fields as in Spring."""
 
     def _add(self, core: Any) -> int:
-        return core.add_bungee(self.a._pair(), self.b._pair(), float(self.stiffness),
-                               float(self.damping), float(self.rest_length))
+        return core.add_bungee(*self._arguments())
 
 
 @dataclass(frozen=True)
 class Buoyancy:
-    """Buoyancy of one body or of all in the liquid dot(normal, p) <= offset; normal [-] of unit
-    length to a thousandth of its square, offset [m] finite, density [kg/m^3] >= 0 and gravity
-    [m/s^2] >= 0, finite."""
+    """Buoyancy of one body or of all in the liquid where dot(normal, p) <= offset [m]. `normal`
+    is a unit vector, to a thousandth of the squared length; density [kg/m^3] >= 0 and gravity
+    [m/s^2] >= 0, all finite."""
 
     normal: Vector = (0.0, 1.0, 0.0)
     offset: float = 0.0
@@ -134,8 +170,9 @@ class Buoyancy:
     body: BodyId | None = None
 
     def _add(self, core: Any) -> int:
-        return core.add_buoyancy(_arrays.triple(self.normal, "normal"), float(self.offset),
-                                 float(self.density), float(self.gravity), self.body)
+        return core.add_buoyancy(_arrays.triple(self.normal, "normal"),
+                                 *_numbers(self, "offset", "density", "gravity"),
+                                 _optional(self.body))
 
 
 @dataclass(frozen=True)
@@ -152,9 +189,9 @@ class Explosion:
     duration: float = 1.0
 
     def _add(self, core: Any) -> int:
-        return core.add_explosion(_arrays.triple(self.centre, "centre"), float(self.start),
-                                  float(self.peak_force), float(self.speed),
-                                  float(self.thickness), float(self.duration))
+        return core.add_explosion(
+            _arrays.triple(self.centre, "centre"),
+            *_numbers(self, "start", "peak_force", "speed", "thickness", "duration"))
 
 
 class ForceContext:
@@ -169,12 +206,12 @@ class ForceContext:
 
     @property
     def dt(self) -> float:
-        """[s], > 0: length of the step."""
+        """Length of the step [s], > 0."""
         return self._core.dt
 
     @property
     def time(self) -> float:
-        """[s], >= 0: start of the step; 0 in the first."""
+        """Time of the world at the start of the step [s]; 0 in the first."""
         return self._core.time
 
     @property
@@ -191,40 +228,41 @@ class ForceContext:
 
     def state(self, body: BodyId) -> BodyState:
         """State of a body. Raises InvalidArgument for an unknown body."""
-        return BodyState(*self._core.state(body))
+        return BodyState(*self._core.state(_arrays.body(body)))
 
     def mass(self, body: BodyId) -> float:
-        """[kg], >= 0; 0: immovable or kinematic. Raises InvalidArgument for an unknown body."""
-        return self._core.mass(body)
+        """Mass of a body [kg], >= 0; 0: immovable or kinematic. Raises InvalidArgument for an unknown
+        body."""
+        return self._core.mass(_arrays.body(body))
 
     def awake(self, body: BodyId) -> bool:
         """Whether a body is awake. Raises InvalidArgument for an unknown body."""
-        return self._core.awake(body)
+        return self._core.awake(_arrays.body(body))
 
     def wake(self, body: BodyId) -> None:
         """Wakes a movable body. Raises InvalidArgument for an unknown body."""
-        self._core.wake(body)
+        self._core.wake(_arrays.body(body))
 
     def apply_force(self, body: BodyId, force: Vector) -> None:
         """Adds a force [N] at the centre of mass, in world axes. Raises InvalidArgument for an
         unknown body, or if there are not three numbers."""
-        self._core.apply_force(body, _arrays.triple(force, "force"))
+        self._core.apply_force(_arrays.body(body), _arrays.triple(force, "force"))
 
     def apply_torque(self, body: BodyId, torque: Vector) -> None:
         """Adds a torque [N m], in world axes. Raises InvalidArgument as apply_force()."""
-        self._core.apply_torque(body, _arrays.triple(torque, "torque"))
+        self._core.apply_torque(_arrays.body(body), _arrays.triple(torque, "torque"))
 
     def apply_force_at_point(self, body: BodyId, force: Vector, point: Vector) -> None:
         """Adds a force [N] at a point [m] of the world. Raises InvalidArgument as apply_force()."""
-        self._core.apply_force_at_point(body, _arrays.triple(force, "force"),
+        self._core.apply_force_at_point(_arrays.body(body), _arrays.triple(force, "force"),
                                         _arrays.triple(point, "point"))
 
     def apply_forces(self, forces: Any) -> None:
-        """Adds a force [N] on each body: an array (N, 3) of the dtype of the world, in the order of
-        `bodies`. Raises InvalidArgument for a wrong shape or type."""
-        forces = _arrays.rows(forces, "forces", 3, self._dtype)
+        """Adds a force [N] on each body: an array (N, 3), in the order of `bodies`, which is converted
+        to the dtype of the world. Raises InvalidArgument for a wrong shape or type."""
+        forces = _arrays.rows(_arrays.converted(forces, "forces", self._dtype), "forces", 3)
         size = self._core.size()
         if forces.shape[0] != size:
-            raise _arrays.InvalidArgument(f"forces has {forces.shape[0]} rows; it must have one "
-                                          f"for each of {size} bodies")
+            raise InvalidArgument(f"forces has {forces.shape[0]} rows; it must have one for each "
+                                  f"of {size} bodies")
         self._core.apply_forces(forces)

@@ -7,6 +7,7 @@ import os
 import numpy as np
 
 from . import _arrays, _core
+from ._errors import InvalidArgument
 from ._forces import States
 from ._scene import Scene
 from ._world import World
@@ -23,10 +24,13 @@ class RecordingWriter:
     path : str or path
         The file.
     world : World
-        A new world, without forces; see docs/python.md.
+        A new world, without forces of add_force(). It must not be changed by other calls than
+        step(), because a recording contains only the scene and the states.
 
     Raises
     ------
+    InvalidArgument
+        The world has made steps or has forces.
     FileError
         The file cannot be created.
     Closed, ConcurrentUse
@@ -34,18 +38,31 @@ class RecordingWriter:
     """
 
     def __init__(self, path: str | os.PathLike[str], world: World) -> None:
+        _arrays.instance(world, "world", World)
+        if world.time != 0:
+            raise InvalidArgument("the world has made steps; a recording begins with a new world, "
+                                  "such as World(world.scene)")
+        self._refuse_forces(world)
         core = _arrays.precision_of(world.dtype)
-        self._writer = core.RecordingWriter(os.fspath(path), world._core)
+        self._writer = core.RecordingWriter(_arrays.path(path), world._core)
         self._world = world
+        self._dt = world.scene.dt
+        self._steps = 0
+
+    @staticmethod
+    def _refuse_forces(world: World) -> None:
+        if world.forces:
+            raise InvalidArgument("the world has forces of add_force(), which a recording does not "
+                                  "contain; record a world without them")
 
     def append(self) -> None:
-        """Appends the states of the world after a step. The world must have the bodies of its
-        scene.
+        """Appends the states of the world. Call it once after each step.
 
         Raises
         ------
         InvalidArgument
-            The number of bodies is not that of the scene.
+            The world has not made exactly one step since the last call, has forces, or has not the
+            number of bodies of its scene.
         FileError
             The file cannot be written, for example because the disk is full.
         Closed
@@ -53,7 +70,14 @@ class RecordingWriter:
         ConcurrentUse, OutOfMemory, DeviceError
             As World.states().
         """
-        self._writer.append(self._world._core)
+        world = self._world
+        self._refuse_forces(world)
+        made = round(world.time / self._dt) - self._steps
+        if made != 1 and self._writer.is_open():
+            raise InvalidArgument(f"the world has made {made} steps since the last append(); append "
+                                  "the states of each step, once")
+        self._writer.append(world._core)
+        self._steps += 1
 
     def finish(self) -> None:
         """Completes the file. Raises FileError, and Closed if the recording is finished or was
@@ -72,7 +96,15 @@ class RecordingWriter:
 
 
 class Recording:
-    """Reads a recording of this version, in the precision in which it was written.
+    """Reads a recording of jfpx 0.1 or 0.2, in the precision in which it was written.
+
+    To repeat it, compare the states of a new world::
+
+        recording = jfpx.Recording("run.rec")
+        world = jfpx.World(recording.scene)
+        for step in range(1, len(recording) + 1):
+            world.step()
+            same = world.positions.tobytes() == recording.states(step).positions.tobytes()
 
     Parameters
     ----------
@@ -82,11 +114,12 @@ class Recording:
     Raises
     ------
     FileError
-        The file cannot be read, is truncated or corrupt, or is no recording of this version.
+        The file cannot be read, is truncated or corrupt, is no recording, or was written by a later
+        version.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        path = os.fspath(path)
+        path = _arrays.path(path)
         single = _core.f32.recording_precision(path) == "float"
         self._dtype = np.dtype(np.float32 if single else np.float64)
         self._reader = _arrays.precision_of(self._dtype).RecordingReader(path)
@@ -98,7 +131,7 @@ class Recording:
 
     @property
     def dtype(self) -> np.dtype:
-        """float32 or float64: precision of the run."""
+        """Precision of the run: float32 or float64."""
         return self._dtype
 
     @property

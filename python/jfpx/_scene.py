@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from . import _arrays, _core
-from ._errors import InvalidScene
+from ._errors import InvalidArgument, InvalidScene
 
 
 class Scene:
     """Bodies and the settings of their simulation. A scene is validated when it is made.
 
+    A floor and a ball that falls on it::
+
+        jfpx.Scene({"dt": 1 / 60, "bodies": [
+            {"shape": {"type": "half_space", "normal": [0, 1, 0], "offset": 0}, "mass": 0},
+            {"shape": {"type": "sphere", "radius": 0.5}, "position": [0, 2, 0], "mass": 1},
+        ]})
+
+    to_dict() of a scene shows all fields with their defaults.
+
     Parameters
     ----------
     fields : dict, optional
-        The scene as in a JSON file, see docs/scenes.md. "jfpx_scene" and "bodies" may be absent.
+        The scene as in a JSON file. All fields may be absent.
     dtype : "float32" or "float64"
         Precision of a world that is made from the scene.
 
@@ -27,11 +37,14 @@ class Scene:
     InvalidScene
         A field is unknown or out of range. The message names the body, the field and the range.
     InvalidArgument
-        `dtype` is neither float32 nor float64.
+        `fields` is not a dict, or `dtype` is neither float32 nor float64.
     """
 
     def __init__(self, fields: dict[str, Any] | None = None, *, dtype: Any = "float32") -> None:
         self._dtype = np.dtype(dtype) if _arrays.precision_of(dtype) else None
+        if fields is not None and not isinstance(fields, Mapping):
+            hint = f"; Scene.named({fields!r}) makes a named scene" if isinstance(fields, str) else ""
+            raise InvalidArgument(f"fields is of type {type(fields).__name__}; it must be a dict{hint}")
         fields = {"jfpx_scene": 2, "bodies": [], **(fields or {})}
         try:
             text = json.dumps(fields, default=_to_json, allow_nan=False)
@@ -49,8 +62,9 @@ class Scene:
             The text is not JSON, and the message has line and column; or a field is unknown,
             missing or out of range.
         InvalidArgument
-            `dtype` is neither float32 nor float64.
+            `text` is not a str, or `dtype` is neither float32 nor float64.
         """
+        text = _arrays.instance(text, "text", str)
         return cls._of(_arrays.precision_of(dtype).Scene.from_json(text), dtype)
 
     @classmethod
@@ -64,7 +78,7 @@ class Scene:
         InvalidScene, InvalidArgument
             As from_json(). The message of InvalidScene begins with the path.
         """
-        return cls._of(_arrays.precision_of(dtype).Scene.load(os.fspath(path)), dtype)
+        return cls._of(_arrays.precision_of(dtype).Scene.load(_arrays.path(path)), dtype)
 
     @classmethod
     def named(cls, name: str, *, spheres: int | None = None, boxes: int | None = None,
@@ -77,7 +91,7 @@ class Scene:
         spheres, boxes : int in [0, 2^32 - 1], optional
             Numbers of movable bodies; the defaults of the scene if absent.
         seed : int in [0, 2^64 - 1]
-            Of the random scenes.
+            Seed of the scenes that are random.
         dtype : "float32" or "float64"
 
         Raises
@@ -90,7 +104,8 @@ class Scene:
         """
         limit = 2**32 - 1
         scene = _arrays.precision_of(dtype).Scene.named(
-            name, None if spheres is None else _arrays.count(spheres, "spheres", 0, limit),
+            _arrays.instance(name, "name", str),
+            None if spheres is None else _arrays.count(spheres, "spheres", 0, limit),
             None if boxes is None else _arrays.count(boxes, "boxes", 0, limit),
             _arrays.count(seed, "seed", 0, 2**64 - 1))
         return cls._of(scene, dtype)
@@ -106,39 +121,43 @@ class Scene:
                     velocities: Any = (0.0, 0.0, 0.0)) -> None:
         """Adds a movable sphere for each row of an array; nothing if one of them is invalid.
 
+        Lists and arrays of other numbers are converted to the dtype of the scene.
+
         Parameters
         ----------
-        positions : array (N, 3) of the dtype of the scene
+        positions : array (N, 3)
             [m], each coordinate in [-1e9, 1e9].
-        radii : number or array (N,) of the dtype of the scene
+        radii : number or array (N,)
             [m], in (0, 1e9].
-        masses : number or array (N,) of the dtype of the scene
+        masses : number or array (N,)
             [kg], finite and >= 0; 0: immovable.
         velocities : three numbers or array (N, 3)
-            [m/s], finite; converted to the dtype of the scene.
+            [m/s], finite.
 
         Raises
         ------
         InvalidArgument
-            A wrong shape or type of an array.
+            An array has a wrong shape or is not one of numbers.
         InvalidScene
             A value is out of its range. The message has the body.
         """
-        positions = _arrays.rows(positions, "positions", 3, self._dtype)
+        positions, radii, masses, speeds = (
+            _arrays.converted(array, name, self._dtype)
+            for array, name in ((positions, "positions"), (radii, "radii"), (masses, "masses"),
+                                (velocities, "velocities")))
+        positions = _arrays.rows(positions, "positions", 3)
         size = positions.shape[0]
-        speeds = _arrays.to_host(velocities, "velocities").astype(self._dtype, copy=False)
         if speeds.ndim == 1:
             speeds = np.array([_arrays.triple(speeds, "velocities")], self._dtype)
-        speeds = _arrays.rows(speeds, "velocities", 3, self._dtype)
+        speeds = _arrays.rows(speeds, "velocities", 3)
         if speeds.shape[0] not in (1, size):
-            raise _arrays.InvalidArgument(
-                f"velocities has {speeds.shape[0]} rows; it must have 1 or {size}")
+            raise InvalidArgument(f"velocities has {speeds.shape[0]} rows; it must have 1 or {size}")
         self._scene.add_spheres(positions, _arrays.vector(radii, "radii", size, self._dtype),
                                 _arrays.vector(masses, "masses", size, self._dtype), speeds)
 
     @property
     def dtype(self) -> np.dtype:
-        """float32 or float64: precision of a world that is made from the scene."""
+        """Precision of a world that is made from the scene: float32 or float64."""
         return self._dtype
 
     @property
@@ -148,7 +167,7 @@ class Scene:
 
     @property
     def dt(self) -> float:
-        """[s], > 0: length of a step."""
+        """Length of a step [s], > 0."""
         return self._scene.dt
 
     def __len__(self) -> int:
@@ -156,16 +175,17 @@ class Scene:
         return self._scene.bodies
 
     def to_json(self) -> str:
-        """JSON text, of which from_json() makes a scene with the same bits."""
+        """The scene as JSON text; from_json() makes an equal scene of it."""
         return self._scene.to_json()
 
     def to_dict(self) -> dict[str, Any]:
-        """The fields of the JSON form, of which Scene() makes a scene with the same bits."""
+        """All fields of the scene, also those that had been absent; Scene() makes an equal scene of
+        them."""
         return json.loads(self.to_json())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a JSON file: the path has the complete file or is unchanged. Raises FileError."""
-        self._scene.save(os.fspath(path))
+        self._scene.save(_arrays.path(path))
 
     def __eq__(self, other: object) -> bool:
         """Whether dtype and all fields are equal."""

@@ -16,67 +16,102 @@ from ._scene import Scene
 
 
 class StepReport(NamedTuple):
-    """Result of a step. Times are wall-clock times."""
+    """Result of a step. Times are wall-clock times in milliseconds.
+
+    Attributes
+    ----------
+    step : int
+        Number of completed steps, without undone ones.
+    contacts : int
+        Contacts that were found, including those of sensors.
+    sphere_contacts : int
+        Of these, contacts between two spheres.
+    generated_contacts : int
+        0: programs in C++ can add contacts of their own.
+    position_iterations : int
+        Corrections of positions by the solver worst_first.
+    velocity_iterations : int
+        Corrections of velocities by the solver worst_first.
+    iterations_exhausted : bool
+        A loop of the solver stopped at its limit with work left.
+    non_finite : bool
+        A value of a body is no longer finite, or a coordinate exceeds 1e9 m. The step was undone,
+        and so are further ones until the body is removed or gets another state.
+    non_finite_body : BodyId or None
+        The first such body.
+    awake : int
+        Movable bodies that are awake after the step.
+    backend : str
+        "cpu" or "cuda": device of the step, or that found the sphere contacts of a step on the CPU.
+    algorithm : str
+        Algorithm that found the sphere contacts: "all pairs" or "sorted tiles"; "automatic" in a
+        step on a GPU.
+    choice : str
+        Reason for backend and algorithm, as SphereCollider.reason.
+    device_failure : str
+        Error of a GPU whose work the CPU took over; empty if there was none.
+    integrate_ms : float
+        Forces and, with the solver worst_first, integration.
+    detect_ms : float
+        Search for contacts.
+    resolve_ms : float
+        All other stages. In a step on a GPU, these three are times of the GPU.
+    total_ms : float
+        The whole step.
+    """
 
     step: int
-    """Number of completed steps, without undone ones."""
     contacts: int
-    """Contacts found by detection, including those of sensors."""
     sphere_contacts: int
-    """Of these, contacts between two spheres."""
     generated_contacts: int
-    """Contacts of contact generators, not included in `contacts`."""
     position_iterations: int
-    """Corrections of positions by the solver worst_first."""
     velocity_iterations: int
-    """Corrections of velocities by the solver worst_first."""
     iterations_exhausted: bool
-    """A loop of the solver stopped at its limit with work left."""
     non_finite: bool
-    """A value of a body is no longer finite, or a coordinate exceeds 1e9 m; the step was undone,
-    and so are further ones until the body is removed or gets another state."""
-    non_finite_body: tuple[int, int] | None
-    """The first such body, as (index, generation); None if there is none."""
+    non_finite_body: BodyId | None
     awake: int
-    """Movable bodies awake after the step."""
     backend: str
-    """"cpu" or "cuda": device of the step, or that found the sphere contacts of a step on the
-    CPU."""
     algorithm: str
-    """Algorithm that found the sphere contacts: "all pairs" or "sorted tiles"; "automatic" in a
-    step on a GPU."""
     choice: str
-    """Reason for backend and algorithm, as SphereCollider.reason."""
     device_failure: str
-    """Error of a device whose work the CPU took over; empty if there was none."""
     integrate_ms: float
-    """[ms], forces and, with the solver worst_first, integration."""
     detect_ms: float
-    """[ms], contact detection."""
     resolve_ms: float
-    """[ms], all other stages. In a step on a GPU, these three are times of the device."""
     total_ms: float
-    """[ms], the whole step."""
 
 
 class WorldContacts(NamedTuple):
-    """Contact points of the last step, in the order of World::contacts() in C++.
-    Floating-point arrays have the dtype of the world."""
+    """The E contact points of the last step, in the dtype of the world. Their order is the same on
+    all backends.
 
-    pairs: Any
-    """(2, E) int64: BodyId.index of a and b."""
-    normal: Any
-    """(E, 3) [-]: unit vectors from b to a."""
-    point: Any
-    """(E, 3) [m], world: middle of the overlap, or a point of b if the bodies met in the step."""
-    distance: Any
-    """(E,) [m], <= 0: negative penetration depths; 0 if the bodies met in the step."""
-    friction: Any
-    """(E,) [-], >= 0, of the pair."""
-    restitution: Any
-    """(E,) [-], in [0, 1], of the pair."""
-    sensor: Any
-    """(E,) bool: a or b is a sensor."""
+    Attributes
+    ----------
+    pairs : array (2, E) of int64
+        BodyId.index of a and b. It is not the row of World.states() once a body was removed: the
+        row of a body is np.searchsorted(indices, index), with indices = [body.index for body in
+        world.bodies].
+    normal : array (E, 3)
+        Unit vectors from b to a.
+    point : array (E, 3)
+        [m], in the axes of the world: the middle of the overlap, or a point of b if the bodies met
+        in the step.
+    distance : array (E,)
+        [m]: 0, or negative where the bodies overlap; 0 if they met in the step.
+    friction : array (E,)
+        Friction coefficient of the pair, >= 0.
+    restitution : array (E,)
+        Coefficient of restitution of the pair, in [0, 1].
+    sensor : array (E,) of bool
+        Whether a or b is a sensor.
+    """
+
+    pairs: np.ndarray
+    normal: np.ndarray
+    point: np.ndarray
+    distance: np.ndarray
+    friction: np.ndarray
+    restitution: np.ndarray
+    sensor: np.ndarray
 
 
 BEGIN, STAY, END = 0, 1, 2
@@ -85,52 +120,78 @@ BEGIN, STAY, END = 0, 1, 2
 
 class ContactEvents(NamedTuple):
     """Pairs of bodies that began to touch, stay in contact or ceased to touch in the last step,
-    sorted by (pairs[0], pairs[1]). Floating-point arrays have the dtype of the world."""
+    sorted by (pairs[0], pairs[1]). Floating-point arrays have the dtype of the world.
 
-    phase: Any
-    """(E,) int64: BEGIN, STAY or END."""
-    pairs: Any
-    """(2, E) int64: BodyId.index of a and b, a < b. Bodies of END may have been removed."""
-    contacts: Any
-    """(E,) int64, > 0: number of contact points."""
-    normal: Any
-    """(E, 3) [-]: unit vectors from b to a, at the deepest point."""
-    point: Any
-    """(E, 3) [m], world: the deepest points."""
-    distance: Any
-    """(E,) [m], <= 0, at the deepest point."""
+    Attributes
+    ----------
+    phase : array (E,) of int64
+        BEGIN, STAY or END.
+    pairs : array (2, E) of int64
+        BodyId.index of a and b, a < b, as in WorldContacts. Bodies of END may have been removed.
+    contacts : array (E,) of int64
+        Numbers of contact points, > 0.
+    normal : array (E, 3)
+        Unit vectors from b to a, at the deepest points.
+    point : array (E, 3)
+        The deepest points [m], in the axes of the world.
+    distance : array (E,)
+        [m], <= 0, at the deepest points.
+    """
+
+    phase: np.ndarray
+    pairs: np.ndarray
+    contacts: np.ndarray
+    normal: np.ndarray
+    point: np.ndarray
+    distance: np.ndarray
 
 
 class RayHit(NamedTuple):
     """Point where a ray enters a body. A ray that starts in a body, or on its surface, hits it at
-    distance 0 with a normal opposite to the ray."""
+    distance 0 with a normal opposite to the ray.
+
+    Attributes
+    ----------
+    body : BodyId
+        The body that is hit.
+    distance : float
+        [m], >= 0, from the origin of the ray.
+    point : three numbers
+        [m], in the axes of the world.
+    normal : three numbers
+        Unit vector, outwards.
+    """
 
     body: BodyId
-    """The body that is hit."""
     distance: float
-    """[m], >= 0, from the origin."""
     point: tuple[float, ...]
-    """[m], world."""
     normal: tuple[float, ...]
-    """[-], unit, outwards."""
 
 
 class RayHits(NamedTuple):
-    """First hits of many rays. Floating-point arrays have the dtype of the world."""
+    """First hits of R rays. Floating-point arrays have the dtype of the world.
 
-    bodies: Any
-    """(R,) int64: BodyId.index; -1: no hit."""
-    distance: Any
-    """(R,) [m], >= 0; infinity: no hit."""
-    point: Any
-    """(R, 3) [m]; zero: no hit."""
-    normal: Any
-    """(R, 3) [-]; zero: no hit."""
+    Attributes
+    ----------
+    bodies : array (R,) of int64
+        BodyId.index, as in WorldContacts; -1: no hit.
+    distance : array (R,)
+        [m], >= 0; infinity: no hit.
+    point : array (R, 3)
+        [m]; zero: no hit.
+    normal : array (R, 3)
+        Unit vectors, outwards; zero: no hit.
+    """
+
+    bodies: np.ndarray
+    distance: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
 
 
 class World:
-    """Rigid bodies and their motion. Steps are deterministic to the last bit, whatever the
-    backend, the algorithm and the number of threads.
+    """Rigid bodies and their motion. The states after a step are the same to the last bit for every
+    backend, algorithm and number of threads.
 
     One thread may use a world at a time: while step() or run() of one thread works, without
     Python's global lock, every call of another raises ConcurrentUse, and so does every call by a
@@ -148,10 +209,14 @@ class World:
     dtype : "float32" or "float64", optional
         Precision, where `scene` is not a Scene: "float32" if absent. Otherwise it must be that of
         the scene.
-    backend, algorithm, threads, device
-        As for SphereCollider with arrays in host memory. `threads` also run the other parts of a
-        step. With the solver soft_step, "cuda" runs all parts of a step on the GPU, and "auto"
-        moves the world there and back, whichever takes less time.
+    backend : "auto", "cpu" or "cuda"
+        Device of the steps. With the solver soft_step, "cuda" makes all parts of a step on the GPU,
+        and "auto" moves the world there and back, whichever takes less time. With the solver
+        worst_first, only the search for contacts can use the GPU.
+    algorithm, device
+        As for SphereCollider.
+    threads : int in [0, 256]
+        Number of threads of the CPU; 0: one per core.
 
     Raises
     ------
@@ -166,21 +231,22 @@ class World:
     """
 
     def __init__(self, scene: Scene | dict[str, Any] | str, *, dtype: Any = None,
-                 backend: str = "auto", algorithm: str = "automatic", threads: int = 1,
+                 backend: str = "auto", algorithm: str = "auto", threads: int = 1,
                  device: int = 0) -> None:
+        if dtype is not None:
+            _arrays.precision_of(dtype)
         if isinstance(scene, str):
             scene = Scene.named(scene, dtype=dtype or "float32")
         elif isinstance(scene, dict):
             scene = Scene(scene, dtype=dtype or "float32")
         elif not isinstance(scene, Scene):
             raise InvalidArgument(f"scene is {type(scene).__name__}; it must be a Scene, a dict "
-                                  "or a name")
+                                  "or a name; Scene.load() reads a file")
         elif dtype is not None and np.dtype(dtype) != scene.dtype:
             raise InvalidArgument(f"dtype is {dtype}; that of the scene is {scene.dtype}")
         self._dtype = scene.dtype
         self._core = _arrays.precision_of(self._dtype).World(
-            scene._scene, backend, algorithm, _arrays.count(threads, "threads", 0, 256),
-            _arrays.count(device, "device", 0, 2**31 - 1))
+            scene._scene, *_arrays.options(backend, algorithm, threads, device))
         self._device = device
         self._report: StepReport | None = None
 
@@ -198,12 +264,14 @@ class World:
             The state is then as before the step.
         ConcurrentUse, Closed
         """
-        self._report = StepReport(*self._core.step())
+        self._report = _report(self._core.step())
         return self._report
 
     def run(self, steps: int, *, after_step: Callable[[StepReport], Any] | None = None) -> StepReport:
-        """Makes many steps, and returns the report of the last. Stops after a step that was undone
-        because a value is no longer finite.
+        """Makes many steps, and returns the report of the last.
+
+        If a body runs away, nothing is raised: the run stops early, before the step in which a
+        value is no longer finite, and the report has `non_finite` and `non_finite_body`.
 
         Parameters
         ----------
@@ -223,8 +291,9 @@ class World:
         """
         steps = _arrays.count(steps, "steps", 1, 2**63 - 1)
         if after_step is None:
-            self._report = StepReport(*self._core.run(steps))
+            self._report = _report(self._core.run(steps))
             return self._report
+        _arrays.function(after_step, "after_step")
         for _ in range(steps):
             report = self.step()
             after_step(report)
@@ -233,15 +302,19 @@ class World:
         return report
 
     def enqueue_steps(self, count: int, stream: Any = None) -> None:
-        """Enqueues steps on the GPU that steps the world, after earlier work of a stream and before
-        its later work, and returns without waiting. All results are those of step(), bit for bit:
-        whatever reads or changes the world waits first, and makes the steps that the GPU has left
-        to the host. Arrays of device_states() stay valid, and change in place.
+        """Enqueues steps on the GPU, after earlier work of a stream and before its later work, and
+        returns without waiting. The states are those of step(), to the last bit. Arrays of
+        device_states() stay valid, and change in place.
 
-        While the stream is being captured, the steps become part of its graph. The world must then
-        have made a step on the GPU, and `device_version` must have been read after the last change;
-        the graph is valid as long as that has the same value. With functions as forces, and in a
-        world that sleeps, the steps are made at once.
+        If a contact list is full, a body runs away or a force must wake a body, the GPU leaves this
+        step and all later ones to the host. The arrays on the GPU then have older states, until
+        finish_steps() or any call that reads or changes the world, which make these steps. Copies
+        that later work of the stream or of a graph has made keep the older states. With functions
+        as forces, the host makes the steps at once; a world that sleeps needs none.
+
+        While the stream is being captured, the steps become part of its CUDA graph. The world must
+        then have made a step on the GPU, and `device_version` must have been read after the last
+        change; the graph is valid as long as that has the same value.
 
         Parameters
         ----------
@@ -249,7 +322,7 @@ class World:
             Number of steps.
         stream : optional
             A stream of PyTorch or CuPy, an object with `__cuda_stream__()`, or the address of a
-            cudaStream_t. None: the current stream of PyTorch, if that uses a GPU, or of CuPy,
+            CUDA stream. None: the current stream of PyTorch, if that uses a GPU, or of CuPy,
             otherwise the default stream.
 
         Raises
@@ -265,21 +338,21 @@ class World:
                                  _device.stream_address(stream, self._device))
 
     def finish_steps(self) -> StepReport:
-        """Waits for all steps of enqueue_steps() and of graphs, makes those that the GPU has left to
-        the host, and returns the report of the last, without times of the stages.
+        """Waits for all steps of enqueue_steps() and of graphs, makes those that the GPU has left
+        to the host, and returns the report of the last, without times of the stages.
 
         Raises
         ------
         OutOfMemory, DeviceError, ConcurrentUse, Closed
         """
-        self._report = StepReport(*self._core.finish_steps())
+        self._report = _report(self._core.finish_steps())
         return self._report
 
     @property
     def device_version(self) -> int:
-        """Changes when a captured graph of steps becomes invalid: when bodies or forces come or go,
-        when the world moves to the host, and when lists of contacts need more memory. Sends changes
-        to the GPU. Raises as device_states()."""
+        """A number that changes when a captured graph of steps becomes invalid: when bodies or
+        forces are added or removed, when the world moves to the host, and when lists of contacts
+        need more memory. Sends changes of the world to the GPU. Raises as device_states()."""
         return self._core.device_version()
 
     @property
@@ -290,12 +363,12 @@ class World:
 
     @property
     def dtype(self) -> np.dtype:
-        """float32 or float64: type of all floating-point arrays."""
+        """Type of all floating-point arrays: float32 or float64."""
         return self._dtype
 
     @property
     def time(self) -> float:
-        """[s], >= 0: completed steps times dt."""
+        """Number of completed steps times dt [s]."""
         return self._core.time()
 
     @property
@@ -310,16 +383,16 @@ class World:
         return self._core.state_hash()
 
     def snapshot(self) -> bytes:
-        """The state as a value: all that the following steps depend on, except for Python functions.
-        Equal states have equal bytes, whatever the backend and the number of threads. Raises
-        OutOfMemory, DeviceError."""
+        """All that the following steps depend on, except for Python functions, as bytes. Equal
+        states have equal bytes, on all backends. Raises OutOfMemory, DeviceError."""
         return self._core.snapshot()
 
     def restore(self, snapshot: bytes) -> None:
-        """Replaces the state by that of a snapshot of this or of another world of the same dtype. The
-        following steps have the bits of those without. The ids of bodies and the contacts are those
-        of the snapshot; contact_events() has none until the next step. A world that is to be
-        restored must have Python functions as forces with the ids of the snapshot.
+        """Replaces the state by that of a snapshot of this or of another world of the same dtype.
+        The following steps are those that the other world would have made, to the last bit. The ids
+        of bodies and the contacts are those of the snapshot; contact_events() has none until the
+        next step. If the snapshot was taken of a world with Python functions as forces, add the
+        same functions first, so that they have the same numbers.
 
         Raises
         ------
@@ -364,11 +437,12 @@ class World:
         return BodyId(*self._core.body_at(_arrays.count(index, "index", 0, 2**32 - 1)))
 
     def __contains__(self, body: BodyId) -> bool:
-        """Whether the id is of a living body of this world."""
-        return self._core.contains(body)
+        """Whether the id is of a living body of this world. Raises InvalidArgument if it is no
+        id."""
+        return self._core.contains(_arrays.body(body))
 
     def add(self, body: dict[str, Any]) -> BodyId:
-        """Adds a body, with the fields of a body in a scene (docs/scenes.md), and returns its id.
+        """Adds a body, with the fields of a body in a Scene, and returns its id.
         contacts() has none until the next step. Raises InvalidScene for a field that is unknown or
         out of range; the world is then unchanged."""
         return self.add_scene(Scene({"bodies": [body]}, dtype=self._dtype))[0]
@@ -377,6 +451,7 @@ class World:
         """Adds the bodies of a scene, and returns their ids in its order; its settings and its
         ignored pairs have no effect. Raises InvalidArgument if the dtype of the scene is not that
         of the world."""
+        _arrays.instance(scene, "scene", Scene, ", such as Scene({...})")
         if scene.dtype != self._dtype:
             raise InvalidArgument(f"the scene has dtype {scene.dtype}; the world has {self._dtype}")
         return [BodyId(*body) for body in self._core.add(scene._scene)]
@@ -384,7 +459,7 @@ class World:
     def remove(self, body: BodyId) -> None:
         """Removes a body and wakes the bodies in contact with it. contacts() has none until the
         next step. Raises InvalidArgument for an unknown body."""
-        self._core.remove(body)
+        self._core.remove(_arrays.body(body))
 
     def states(self) -> States:
         """States of all bodies as new arrays (N, 3) and (N, 4) of the dtype of the world, in the
@@ -394,20 +469,22 @@ class World:
         return states
 
     def device_states(self) -> States:
-        """States in the memory of the GPU that steps the world, as arrays that share it: a library
-        reads them with its `from_dlpack()`, and jfpx takes them as they are.
+        """States in the memory of the GPU that makes the steps, without a copy: other libraries
+        read them with their `from_dlpack()`, and jfpx takes them as they are.
 
         Row i is that of the body with BodyId.index i; rows of removed bodies have no meaning. The
-        arrays are valid until the next step or change of the world, and must not be written. The
-        step or change waits for all work of the GPU, which may still read them. The first call after
-        a change by the host uploads the world.
+        arrays must not be written. step(), run() and changes of the world wait for all work of the
+        GPU that may still read the arrays. Afterwards the arrays are not valid: call device_states()
+        again. Steps of enqueue_steps() and of graphs, and finish_steps(),
+        change the arrays in place, and they stay valid as long as `device_version` is the same. The
+        first call after a change copies the world to the GPU.
 
         Returns
         -------
         States
             Arrays (M, 3) and (M, 4) of the dtype of the world, M > the largest BodyId.index. They
-            have `shape` and DLPack alone. `__dlpack__()` raises InvalidArgument after a step or
-            change, and BufferError if a copy is requested.
+            can be read by other libraries only, and have a `shape`. `__dlpack__()` raises
+            InvalidArgument if they are no longer valid, and BufferError if a copy is requested.
 
         Raises
         ------
@@ -425,10 +502,11 @@ class World:
         Parameters
         ----------
         states : States
-            Arrays in host memory of the dtype of the world, with a row for each body in the order
-            of `bodies`: positions (N, 3) [m], each coordinate in [-1e9, 1e9]; orientations (N, 4)
-            [-], unit quaternions (w, x, y, z) to a thousandth of the squared length, which are
-            normalized; velocities (N, 3) [m/s] and angular_velocities (N, 3) [rad/s], finite.
+            Arrays in host memory or lists, which are converted to the dtype of the world, with a
+            row for each body in the order of `bodies`: positions (N, 3) [m], each coordinate in
+            [-1e9, 1e9]; orientations (N, 4), unit quaternions (w, x, y, z) to a thousandth of the
+            squared length, which are normalized; velocities (N, 3) [m/s] and angular_velocities (N,
+            3) [rad/s], finite.
 
         Raises
         ------
@@ -436,10 +514,12 @@ class World:
             A wrong shape or type, or a value out of its range.
         OutOfMemory, DeviceError
         """
+        if not isinstance(states, (tuple, list)) or len(states) != len(States._fields):
+            raise InvalidArgument("states is not a States, such as that of World.states()")
         size = len(self)
         arrays = []
         for name, array, columns in zip(States._fields, states, (3, 4, 3, 3)):
-            array = _arrays.rows(array, name, columns, self._dtype)
+            array = _arrays.rows(_arrays.converted(array, name, self._dtype), name, columns)
             if array.shape[0] != size:
                 raise InvalidArgument(f"{name} has {array.shape[0]} rows; it must have one for "
                                       f"each of {size} bodies")
@@ -448,19 +528,19 @@ class World:
 
     @property
     def positions(self) -> np.ndarray:
-        """(N, 3) [m]: a copy of the positions of all bodies, in the order of `bodies`. Raises
+        """A copy of the positions of all bodies [m], (N, 3), in the order of `bodies`. Raises
         OutOfMemory, DeviceError."""
         return self.states().positions
 
     @property
     def velocities(self) -> np.ndarray:
-        """(N, 3) [m/s]: a copy of the velocities, in the order of `bodies`. Raises OutOfMemory,
-        DeviceError."""
+        """A copy of the velocities of all bodies [m/s], (N, 3), in the order of `bodies`. Raises
+        OutOfMemory, DeviceError."""
         return self.states().velocities
 
     def state(self, body: BodyId) -> BodyState:
         """State of a body. Raises InvalidArgument for an unknown body, DeviceError."""
-        return BodyState(*self._core.state(body))
+        return BodyState(*self._core.state(_arrays.body(body)))
 
     def set_state(self, body: BodyId, state: BodyState) -> None:
         """Replaces the state of a body, and wakes it and the bodies in contact with it. An
@@ -471,7 +551,7 @@ class World:
         ----------
         body : BodyId
         state : BodyState
-            position [m], each coordinate in [-1e9, 1e9]; orientation [-], a unit quaternion
+            position [m], each coordinate in [-1e9, 1e9]; orientation, a unit quaternion
             (w, x, y, z) to a thousandth of the squared length, which is normalized; velocity [m/s]
             and angular_velocity [rad/s], finite.
 
@@ -481,8 +561,11 @@ class World:
             An unknown body, or a value out of its range.
         DeviceError
         """
-        state = BodyState(*state)
-        self._core.set_state(body, _arrays.triple(state.position, "position"),
+        try:
+            state = BodyState(*state)
+        except TypeError:
+            raise InvalidArgument(f"state is {state!r}; it must be a BodyState") from None
+        self._core.set_state(_arrays.body(body), _arrays.triple(state.position, "position"),
                              _arrays.triple(state.orientation, "orientation", 4),
                              _arrays.triple(state.velocity, "velocity"),
                              _arrays.triple(state.angular_velocity, "angular_velocity"))
@@ -490,87 +573,96 @@ class World:
     def awake(self, body: BodyId) -> bool:
         """Whether a body is awake. A body of mass 0 is awake only if it is kinematic and moves.
         Raises InvalidArgument for an unknown body, DeviceError."""
-        return self._core.awake(body)
+        return self._core.awake(_arrays.body(body))
 
     def wake(self, body: BodyId) -> None:
         """Wakes a body; has no effect on one of mass 0. The next step also wakes the bodies in
         contact with it. Raises InvalidArgument for an unknown body."""
-        self._core.wake(body)
+        self._core.wake(_arrays.body(body))
 
     def mass(self, body: BodyId) -> float:
-        """[kg], >= 0; 0: immovable or kinematic. Raises InvalidArgument for an unknown body."""
-        return self._core.mass(body)
+        """Returns the mass of a body [kg], >= 0; 0: immovable or kinematic. Raises InvalidArgument
+        for an unknown body."""
+        return self._core.mass(_arrays.body(body))
 
     def set_mass(self, body: BodyId, mass: float) -> None:
-        """[kg], finite and > 0; a mass of 0 remains 0. The inertia follows, unless it was given.
-        Wakes the body. Raises InvalidArgument for an unknown body or a mass out of range."""
-        self._core.set_mass(body, _arrays.number(mass, "mass"))
+        """Sets the mass of a body [kg], finite and > 0; a mass of 0 remains 0. The inertia changes
+        in proportion, unless it was given. Wakes the body. Raises InvalidArgument for an unknown
+        body or a mass out of range."""
+        self._core.set_mass(_arrays.body(body), _arrays.number(mass, "mass"))
 
     def friction(self, body: BodyId) -> float:
-        """[-], >= 0. Raises InvalidArgument for an unknown body."""
-        return self._core.friction(body)
+        """Returns the friction coefficient of a body, >= 0. Raises InvalidArgument for an unknown
+        body."""
+        return self._core.friction(_arrays.body(body))
 
     def set_friction(self, body: BodyId, friction: float) -> None:
-        """[-], finite and >= 0, from the next step on. A change wakes the body and the bodies in
-        contact with it. Raises InvalidArgument for an unknown body or a value out of range."""
-        self._core.set_friction(body, _arrays.number(friction, "friction"))
+        """Sets the friction coefficient of a body, finite and >= 0, from the next step on. A change
+        wakes the body and the bodies in contact with it. Raises InvalidArgument for an unknown body
+        or a value out of range."""
+        self._core.set_friction(_arrays.body(body), _arrays.number(friction, "friction"))
 
     def restitution(self, body: BodyId) -> float:
-        """[-], in [0, 1]. Raises InvalidArgument for an unknown body."""
-        return self._core.restitution(body)
+        """Returns the coefficient of restitution of a body, in [0, 1]. Raises InvalidArgument for
+        an unknown body."""
+        return self._core.restitution(_arrays.body(body))
 
     def set_restitution(self, body: BodyId, restitution: float) -> None:
-        """[-], in [0, 1], from the next step on. Raises InvalidArgument for an unknown body or a
-        value out of range."""
-        self._core.set_restitution(body, _arrays.number(restitution, "restitution"))
+        """Sets the coefficient of restitution of a body, in [0, 1], from the next step on. Raises
+        InvalidArgument for an unknown body or a value out of range."""
+        self._core.set_restitution(_arrays.body(body), _arrays.number(restitution, "restitution"))
 
     def acceleration(self, body: BodyId) -> tuple[float, ...]:
-        """Three numbers [m/s^2], constant; gravity by default. Raises InvalidArgument for an
-        unknown body."""
-        return self._core.acceleration(body)
+        """Returns the constant acceleration of a body [m/s^2], three numbers; gravity by default.
+        Raises InvalidArgument for an unknown body."""
+        return self._core.acceleration(_arrays.body(body))
 
     def set_acceleration(self, body: BodyId, acceleration: Vector) -> None:
-        """Three numbers [m/s^2], finite, from the next step on. A change wakes the body. Raises
-        InvalidArgument for an unknown body or a value out of range."""
-        self._core.set_acceleration(body, _arrays.triple(acceleration, "acceleration"))
+        """Sets the constant acceleration of a body [m/s^2], three finite numbers, from the next
+        step on. A change wakes the body. Raises InvalidArgument for an unknown body or a value out
+        of range."""
+        self._core.set_acceleration(_arrays.body(body), _arrays.triple(acceleration, "acceleration"))
 
     def damping(self, body: BodyId) -> tuple[float, float]:
-        """[-], each in (0, 1]: fractions of velocity and of angular velocity kept per second.
-        Raises InvalidArgument for an unknown body."""
-        return self._core.damping(body)
+        """Returns the fractions of velocity and of angular velocity that a body keeps per second,
+        each in (0, 1]. Raises InvalidArgument for an unknown body."""
+        return self._core.damping(_arrays.body(body))
 
     def set_damping(self, body: BodyId, linear: float, angular: float) -> None:
-        """[-], each in (0, 1]: fractions of velocity and of angular velocity kept per second, from
-        the next step on. Raises InvalidArgument for an unknown body or a value out of range."""
-        self._core.set_damping(body, _arrays.number(linear, "linear"),
+        """Sets the fractions of velocity and of angular velocity that a body keeps per second, each
+        in (0, 1], from the next step on. Raises InvalidArgument for an unknown body or a value out
+        of range."""
+        self._core.set_damping(_arrays.body(body), _arrays.number(linear, "linear"),
                                _arrays.number(angular, "angular"))
 
     def sensor(self, body: BodyId) -> bool:
         """Whether a body is a sensor: it has contacts, but they are not resolved. Raises
         InvalidArgument for an unknown body."""
-        return self._core.sensor(body)
+        return self._core.sensor(_arrays.body(body))
 
     def filter(self, body: BodyId) -> tuple[int, int]:
-        """Category and mask, each in [0, 2^32 - 1]. Raises InvalidArgument for an unknown body."""
-        return self._core.filter(body)
+        """Returns category and mask of a body, see set_filter(). Raises InvalidArgument for an
+        unknown body."""
+        return self._core.filter(_arrays.body(body))
 
     def set_filter(self, body: BodyId, category: int, mask: int) -> None:
-        """Two bodies collide if each has a category that is in the mask of the other. `category`
-        and `mask` are bits in [0, 2^32 - 1]. A change wakes the body and the bodies in contact with
-        it. Raises InvalidArgument for an unknown body or a value out of range."""
-        self._core.set_filter(body, _arrays.count(category, "category", 0, 2**32 - 1),
+        """Sets category and mask of a body. Two bodies collide if each has a category that is in
+        the mask of the other. Both are bits in [0, 2^32 - 1]. A change wakes the body and the
+        bodies in contact with it. Raises InvalidArgument for an unknown body or a value out of
+        range."""
+        self._core.set_filter(_arrays.body(body), _arrays.count(category, "category", 0, 2**32 - 1),
                               _arrays.count(mask, "mask", 0, 2**32 - 1))
 
     def pair_ignored(self, a: BodyId, b: BodyId) -> bool:
         """Whether two bodies do not collide, whatever their filters. Raises InvalidArgument for an
         unknown body."""
-        return self._core.pair_ignored(a, b)
+        return self._core.pair_ignored(_arrays.body(a, "a"), _arrays.body(b, "b"))
 
     def set_pair_ignored(self, a: BodyId, b: BodyId, ignored: bool) -> None:
         """Adds two bodies to the pairs that do not collide, or removes them. A change wakes both
         bodies and the bodies in contact with them. Raises InvalidArgument for an unknown body, and
         if both are the same body."""
-        self._core.set_pair_ignored(a, b, bool(ignored))
+        self._core.set_pair_ignored(_arrays.body(a, "a"), _arrays.body(b, "b"), bool(ignored))
 
     # Forces
 
@@ -580,15 +672,15 @@ class World:
         InvalidArgument for an unknown body or a value that is not finite."""
         force = _arrays.triple(force, "force")
         if point is None:
-            self._core.apply_force(body, force)
+            self._core.apply_force(_arrays.body(body), force)
         else:
-            self._core.apply_force_at_point(body, force, _arrays.triple(point, "point"))
+            self._core.apply_force_at_point(_arrays.body(body), force, _arrays.triple(point, "point"))
 
     def apply_torque(self, body: BodyId, torque: Vector) -> None:
         """Applies a torque [N m] in world axes in the next step. Several calls add up. Wakes the
         body; has no effect on one of mass 0. Raises InvalidArgument for an unknown body or a value
         that is not finite."""
-        self._core.apply_torque(body, _arrays.triple(torque, "torque"))
+        self._core.apply_torque(_arrays.body(body), _arrays.triple(torque, "torque"))
 
     def add_force(self, force: Any) -> int:
         """Adds a force that acts in every step, and returns its number. Wakes all bodies.
@@ -606,6 +698,9 @@ class World:
             A field is out of its range, a body is unknown, or `force` is neither a force of jfpx
             nor a function.
         """
+        if isinstance(force, type) and hasattr(force, "_add"):
+            raise InvalidArgument(f"force is the class {force.__name__}; it must be an object, "
+                                  f"such as {force.__name__}(...)")
         if hasattr(force, "_add"):
             return force._add(self._core)
         if not callable(force):
@@ -686,15 +781,16 @@ class World:
         return [RayHit(BodyId(*hit[0]), *hit[1:]) for hit in hits]
 
     def cast_rays(self, origins: Any, directions: Any, max_distances: Any = math.inf) -> RayHits:
-        """The first hits of many rays, as those of cast_ray().
+        """The first hits of many rays, as those of cast_ray(). Lists and arrays of other numbers
+        are converted to the dtype of the world.
 
         Parameters
         ----------
-        origins : array (R, 3) of the dtype of the world
+        origins : array (R, 3)
             [m], each number in [-1e9, 1e9].
-        directions : array (R, 3) of the dtype of the world
+        directions : array (R, 3)
             Finite, of any length but 0.
-        max_distances : number or array (R,) of the dtype of the world
+        max_distances : number or array (R,)
             [m], >= 0; infinity is allowed.
 
         Raises
@@ -703,14 +799,16 @@ class World:
             A wrong shape or type, or a number out of its range; the message then has the ray.
         OutOfMemory, DeviceError
         """
-        origins = _arrays.rows(origins, "origins", 3, self._dtype)
-        directions = _arrays.rows(directions, "directions", 3, self._dtype)
+        origins, directions = (
+            _arrays.rows(_arrays.converted(array, name, self._dtype), name, 3)
+            for array, name in ((origins, "origins"), (directions, "directions")))
         size = origins.shape[0]
         if directions.shape[0] != size:
             raise InvalidArgument(f"directions has {directions.shape[0]} rows; origins has {size}")
         result = RayHits(np.empty(size, np.int64), self._values(size), self._rows(size),
                          self._rows(size))
-        limits = _arrays.vector(max_distances, "max_distances", size, self._dtype)
+        limits = _arrays.vector(_arrays.converted(max_distances, "max_distances", self._dtype),
+                                "max_distances", size, self._dtype)
         self._core.cast_rays(origins, directions, limits, *result)
         return result
 
@@ -725,7 +823,7 @@ class World:
     def overlapping_box(self, centre: Vector, half_extents: Vector,
                         orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0)) -> list[BodyId]:
         """Bodies that overlap or touch a box, in the order of `bodies`. `centre` [m] has numbers in
-        [-1e9, 1e9], `half_extents` [m] in (0, 1e9]; `orientation` [-] is a unit quaternion
+        [-1e9, 1e9], `half_extents` [m] in (0, 1e9]; `orientation` is a unit quaternion
         (w, x, y, z) to a thousandth of the squared length. Raises InvalidArgument for a number out
         of its range, OutOfMemory, DeviceError."""
         found = self._core.overlapping_box(_arrays.triple(half_extents, "half_extents"),
@@ -746,9 +844,19 @@ class World:
             return f"<jfpx.World: {error}>"
 
 
+def _report(fields: tuple[Any, ...]) -> StepReport:
+    report = StepReport(*fields)
+    if report.non_finite_body is None:
+        return report
+    return report._replace(non_finite_body=BodyId(*report.non_finite_body))
+
+
 def _call(force: Callable[[ForceContext], Any], dtype: Any, context: Any) -> None:
     force(ForceContext(context, dtype))
 
 
 def _of_body(filter: Callable[[BodyId], bool] | None) -> Any:
-    return None if filter is None else lambda body: bool(filter(BodyId(*body)))
+    if filter is None:
+        return None
+    _arrays.function(filter, "filter")
+    return lambda body: bool(filter(BodyId(*body)))

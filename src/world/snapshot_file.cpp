@@ -35,6 +35,12 @@ std::uint64_t checksum(std::span<const std::byte> bytes) {
   return hash.value();
 }
 
+std::string precision_name(std::uint32_t real_size) {
+  if (real_size == sizeof(float)) return "float32 (single precision)";
+  if (real_size == sizeof(double)) return "float64 (double precision)";
+  return "of numbers of " + std::to_string(real_size) + " bytes";
+}
+
 [[noreturn]] void fail(const std::string& what) { throw InvalidSnapshot("the snapshot " + what); }
 
 /// @throws InvalidSnapshot
@@ -49,9 +55,7 @@ void check(std::span<const std::byte> bytes) {
          std::to_string(kVersion));
   }
   if (header.real_size != sizeof(Real)) {
-    fail("has numbers of " + std::to_string(header.real_size) +
-         " bytes; this build computes with numbers of " + std::to_string(sizeof(Real)) +
-         " bytes (4: float, 8: double)");
+    fail("is " + precision_name(header.real_size) + "; it must be " + precision_name(sizeof(Real)));
   }
   const std::size_t rest = bytes.size() - sizeof header;
   if (rest < kChecksumSize || rest - kChecksumSize != header.content_size) {

@@ -66,7 +66,7 @@ void World::Impl::capture(std::uint32_t count, cuda::Stream stream) {
   if (has_changes()) {
     throw InvalidArgument(
         "stream is being captured; the world must then have no changes since its last step, or "
-        "cuda::device_states() must have sent them to the device before the capture");
+        "device_states() must have sent them to the device before the capture");
   }
   if (!force_table.update(forces, store)) {
     throw InvalidArgument(
@@ -77,7 +77,7 @@ void World::Impl::capture(std::uint32_t count, cuda::Stream stream) {
   if (!device->capture(table, steps, count, stream)) {
     throw InvalidArgument(
         "stream is being captured; the world must then have made a step on the device since it "
-        "moved there, and cuda::device_states() must have been called before the capture");
+        "moved there, and device_states() must have been called before the capture");
   }
   has_queue.store(true, std::memory_order_release);
 }
@@ -173,7 +173,8 @@ namespace {
 auto& with_device(World& world) {
   auto& w = WorldAccess::impl(world);
   if (w.scene.solver != Solver::soft_step) {
-    throw BackendUnavailable("cuda: this world has Solver::worst_first, which runs on the host");
+    throw BackendUnavailable(
+        "cuda: this world has the solver worst_first, which runs on the CPU; use soft_step");
   }
   if (w.device != nullptr) return w;
   if (!w.device_failure.empty()) {
@@ -181,8 +182,9 @@ auto& with_device(World& world) {
   }
   throw BackendUnavailable(
       w.automatic != nullptr
-          ? "cuda: Backend::automatic has not started a device for this world"
-          : "cuda: this world has no device; it needs Backend::cuda and Solver::soft_step");
+          ? "cuda: \"auto\" has not started a GPU for this world; make it with the backend \"cuda\""
+          : "cuda: this world has no device; make it with the backend \"cuda\" and the solver "
+            "soft_step");
 }
 
 }  // namespace

@@ -38,6 +38,14 @@ if(NOT manifest_version STREQUAL version)
   message(FATAL_ERROR "vcpkg.json has version ${manifest_version}; the project has ${version}")
 endif()
 
+# The Python package.
+foreach(file IN ITEMS pyproject.toml python/jfpx/__init__.py)
+  file(STRINGS ${SOURCE_DIR}/${file} lines REGEX "^(__version__|version) = ")
+  if(NOT lines MATCHES "^[a-z_]+ = \"${version}\"$")
+    message(FATAL_ERROR "${file} has: ${lines}; the project has version ${version}")
+  endif()
+endforeach()
+
 # The port, with and without its features.
 set(CURRENT_PACKAGES_DIR ${WORK_DIR}/packages)
 set(steps "")

@@ -55,6 +55,7 @@ def test_threads_and_algorithms_have_the_same_bits(rng, dtype):
                 assert x.tobytes() == y.tobytes()
             assert collider.algorithm == algorithm.replace("_", " ")
             assert collider.backend == "cpu"
+    assert jfpx.SphereCollider(algorithm="auto").algorithm == "automatic"
 
 
 def test_cutoff_is_inclusive_and_exact(dtype):
@@ -344,8 +345,9 @@ NAN = np.array([[0, 0, 0], [0, np.nan, 0]], np.float32)
                                               out=np.zeros((2, 9), np.int32)),
      "out is ndarray; it must be a tuple of 2 arrays: pairs, shifts"),
     (lambda: jfpx.SphereCollider("float16"), "dtype is 'float16'"),
-    (lambda: jfpx.SphereCollider(backend="gpu"), 'backend is "gpu"'),
-    (lambda: jfpx.SphereCollider(algorithm="fast"), 'algorithm is "fast"'),
+    (lambda: jfpx.SphereCollider(backend="gpu"), "backend is 'gpu'"),
+    (lambda: jfpx.SphereCollider(backend="x86"), "backend is 'x86'"),
+    (lambda: jfpx.SphereCollider(algorithm="fast"), "algorithm is 'fast'"),
     (lambda: jfpx.SphereCollider(device=-1), "device is -1"),
     (lambda: jfpx.SphereCollider("float64").find_contacts(POINTS, 1), "positions has dtype float32"),
 ])

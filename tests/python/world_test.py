@@ -25,10 +25,14 @@ FREE = {**BALL, "acceleration": [0, 0, 0]}
 
 def test_a_world_on_the_host_has_no_device_states():
     world = jfpx.World("pile", backend="cpu")
-    with pytest.raises(jfpx.BackendUnavailable, match="has no device"):
+    with pytest.raises(jfpx.BackendUnavailable, match='has no device; make it with the backend "cuda"'):
         world.device_states()
     with pytest.raises(jfpx.BackendUnavailable, match="has no device"):
         world.enqueue_steps(1)
+    for other, remedy in ((jfpx.World({"solver": "worst_first"}), "use soft_step"),
+                          (jfpx.World({}), 'with the backend "cuda"')):
+        with pytest.raises(jfpx.BackendUnavailable, match=remedy):
+            other.device_version
     for count, stream in ((-1, None), (1.5, None), (2**32, None), (1, "stream"), (1, -1)):
         with pytest.raises(jfpx.InvalidArgument):
             world.enqueue_steps(count, stream)
@@ -114,6 +118,26 @@ def test_spheres_of_arrays_become_bodies(rng, dtype):
     assert [b["shape"]["radius"] for b in scene.to_dict()["bodies"]] == pytest.approx(radii.tolist())
 
 
+def test_lists_and_arrays_of_other_types_are_converted_to_the_dtype(dtype):
+    other = {"float32": np.float64, "float64": np.float32}[dtype.name]
+    scenes = []
+    for convert in (lambda values: values, np.array, lambda values: np.array(values, other),
+                    lambda values: np.array(values, dtype)):
+        scene = jfpx.Scene({"dt": 0.01}, dtype=dtype)
+        scene.add_spheres(convert([[0, 1, 0], [5, 1, 0]]), convert([0.5, 0.25]),
+                          masses=convert([1, 2]), velocities=convert([[0, 0, 0], [1, 0, 0]]))
+        scenes.append(scene)
+        world = jfpx.World(scene)
+        hits = world.cast_rays(convert([[0, 9, 0], [5, 9, 0]]), convert([[0, -1, 0], [0, -1, 0]]),
+                               convert([99, 1]))
+        assert hits.bodies.tolist() == [0, -1] and hits.distance.dtype == dtype
+        world.set_states([convert(array.tolist()) for array in world.states()])
+        world.add_force(lambda context: context.apply_forces(convert([[1, 0, 0], [0, 0, 0]])))
+        world.step()
+        assert world.velocities[0, 0] > 0
+    assert all(scene == scenes[0] for scene in scenes)
+
+
 def test_states_that_are_set_are_read_with_every_bit(rng, dtype):
     world = jfpx.World({"bodies": [FREE] * 5}, dtype=dtype)
     rotations = rng.normal(size=(5, 4))
@@ -164,6 +188,17 @@ def test_bodies_are_added_changed_and_removed():
     assert ball not in world and world.bodies == [world.body_at(0), other]
     with pytest.raises(jfpx.InvalidArgument):
         world.state(ball)
+
+
+def test_contacts_have_indices_of_bodies_also_after_a_removal():
+    world = jfpx.World({"bodies": [FREE, {**FREE, "position": [9, 0, 0]}, {**FREE, "position": [9.9, 0, 0]}]})
+    world.remove(world.bodies[0])
+    world.step()
+    pairs = world.contacts().pairs
+    assert sorted(pairs[:, 0]) == [1, 2] == [body.index for body in world.bodies]
+    rows = np.searchsorted([body.index for body in world.bodies], pairs)
+    assert sorted(rows[:, 0]) == [0, 1] and world.cast_rays([[9, 5, 0]], [[0, -1, 0]]).bodies == [1]
+    assert sorted(world.contact_events().pairs[:, 0]) == [1, 2]
 
 
 def test_filters_decide_which_bodies_touch():
@@ -358,6 +393,7 @@ def test_a_recording_of_a_failed_run_leaves_no_file(tmp_path):
     world = jfpx.World({"bodies": [BALL]})
     with pytest.raises(LookupError):
         with jfpx.RecordingWriter(tmp_path / "run.rec", world) as writer:
+            world.step()
             writer.append()
             raise LookupError
     assert list(tmp_path.iterdir()) == []
@@ -365,11 +401,39 @@ def test_a_recording_of_a_failed_run_leaves_no_file(tmp_path):
         writer.append()
 
 
+def test_a_recording_that_could_not_be_repeated_is_refused(tmp_path):
+    path = tmp_path / "run.rec"
+    world = jfpx.World({"bodies": [BALL]})
+    force = world.add_force(jfpx.Drag(1.0))
+    with pytest.raises(jfpx.InvalidArgument, match="the world has forces"):
+        jfpx.RecordingWriter(path, world)
+    world.remove_force(force)
+    with jfpx.RecordingWriter(path, world) as writer:
+        with pytest.raises(jfpx.InvalidArgument, match="has made 0 steps"):
+            writer.append()
+        world.step()
+        writer.append()
+        with pytest.raises(jfpx.InvalidArgument, match="has made 0 steps"):
+            writer.append()
+        force = world.add_force(jfpx.Drag(1.0))
+        with pytest.raises(jfpx.InvalidArgument, match="the world has forces"):
+            writer.append()
+        world.remove_force(force)
+        world.run(2)
+        with pytest.raises(jfpx.InvalidArgument, match="has made 2 steps"):
+            writer.append()
+    with pytest.raises(jfpx.InvalidArgument, match="begins with a new world"):
+        jfpx.RecordingWriter(path, world)
+    assert len(jfpx.Recording(path)) == 1
+
+
 def test_a_body_that_leaves_the_finite_numbers_ends_a_run():
     world = jfpx.World({"bodies": [{**FREE, "velocity": [1e38, 0, 0]}], "dt": 1e6,
                         "solver": "worst_first"})
     report = world.run(10)
     assert report.non_finite and report.non_finite_body == (0, 0) and report.step == 0
+    world.remove(report.non_finite_body)
+    assert isinstance(report.non_finite_body, jfpx.BodyId) and not world.run(10).non_finite
 
 
 def test_steps_after_a_restoration_have_the_same_bits(dtype):
@@ -396,6 +460,8 @@ def test_a_damaged_snapshot_is_a_named_exception(dtype):
     for bad in (b"", snapshot[:-1], bytes(damaged), wrong_dtype.snapshot()):
         with pytest.raises(jfpx.InvalidSnapshot):
             world.restore(bad)
+    with pytest.raises(jfpx.InvalidSnapshot, match=f"is float.* it must be {dtype}"):
+        world.restore(wrong_dtype.snapshot())
     with pytest.raises(jfpx.InvalidArgument, match="it must be bytes"):
         world.restore("text")
     assert world.state_hash() == before
@@ -501,16 +567,36 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: jfpx.Scene.named("pile", spheres=-1), jfpx.InvalidArgument, "spheres is -1"),
     (lambda w: jfpx.Scene().add_spheres(np.zeros((1, 3), np.float32), -1), jfpx.InvalidScene,
      "radius"),
-    (lambda w: jfpx.Scene().add_spheres(np.zeros((1, 3)), 1), jfpx.InvalidArgument, "float64"),
+    (lambda w: jfpx.Scene().add_spheres(np.zeros((1, 3), complex), 1), jfpx.InvalidArgument,
+     "positions has dtype complex128"),
+    (lambda w: jfpx.Scene().add_spheres([[1e300, 0, 0]], 1), jfpx.InvalidScene, "position"),
+    (lambda w: jfpx.Scene("pile"), jfpx.InvalidArgument, r"it must be a dict; Scene.named\('pile'\)"),
+    (lambda w: jfpx.Scene([BALL]), jfpx.InvalidArgument, "fields is of type list; it must be a dict"),
+    (lambda w: jfpx.Scene.named(3), jfpx.InvalidArgument, "name is 3; it must be a str"),
+    (lambda w: jfpx.Scene.from_json({}), jfpx.InvalidArgument, "text is of type dict"),
+    (lambda w: jfpx.Scene.load(3), jfpx.InvalidArgument, "path is 3; it must be a str or a path"),
     (lambda w: jfpx.Scene().add_spheres(np.zeros((3, 3), np.float32), 1,
                                         velocities=np.zeros((2, 3), np.float32)),
      jfpx.InvalidArgument, "velocities has 2 rows"),
     (lambda w: jfpx.World(3), jfpx.InvalidArgument, "scene is int"),
+    (lambda w: jfpx.World(pathlib.Path("a.json")), jfpx.InvalidArgument, r"Scene.load\(\) reads a file"),
     (lambda w: jfpx.World(w.scene, dtype="float64"), jfpx.InvalidArgument, "dtype is float64"),
-    (lambda w: jfpx.World("pile", backend="gpu"), jfpx.InvalidArgument, 'backend is "gpu"'),
+    (lambda w: jfpx.World(w.scene, dtype="foo"), jfpx.InvalidArgument, "dtype is 'foo'"),
+    (lambda w: jfpx.World("pile", dtype="foo"), jfpx.InvalidArgument, "dtype is 'foo'"),
+    (lambda w: jfpx.World("pile", backend="gpu"), jfpx.InvalidArgument, "backend is 'gpu'"),
+    (lambda w: jfpx.World("pile", backend="x86"), jfpx.InvalidArgument, "backend is 'x86'"),
+    (lambda w: jfpx.World("pile", backend=None), jfpx.InvalidArgument, "backend is None"),
+    (lambda w: jfpx.World("pile", algorithm=3), jfpx.InvalidArgument, "algorithm is 3"),
     (lambda w: jfpx.World("pile", threads=1000), jfpx.InvalidArgument, "threads is 1000"),
     (lambda w: w.run(0), jfpx.InvalidArgument, "steps is 0"),
+    (lambda w: w.run(1, after_step=3), jfpx.InvalidArgument, "after_step is 3"),
     (lambda w: w.body_at(7), jfpx.InvalidArgument, "7"),
+    (lambda w: w.state(3), jfpx.InvalidArgument, r"body is 3; it must be a BodyId.*World.body_at\(index\)"),
+    (lambda w: w.state((-1, 0)), jfpx.InvalidArgument, r"body is \(-1, 0\)"),
+    (lambda w: 3 in w, jfpx.InvalidArgument, "body is 3"),
+    (lambda w: w.set_mass("ball", 1), jfpx.InvalidArgument, "body is 'ball'"),
+    (lambda w: w.set_pair_ignored(w.bodies[0], 1, True), jfpx.InvalidArgument, "b is 1"),
+    (lambda w: w.add_scene({"bodies": [BALL]}), jfpx.InvalidArgument, "scene is of type dict"),
     (lambda w: w.remove(jfpx.BodyId(7, 0)), jfpx.InvalidArgument, "7"),
     (lambda w: w.set_mass(w.bodies[0], -1), jfpx.InvalidArgument, "mass"),
     (lambda w: w.set_friction(w.bodies[0], "high"), jfpx.InvalidArgument, "friction is 'high'"),
@@ -520,9 +606,17 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: w.apply_force(w.bodies[0], (float("nan"), 0, 0)), jfpx.InvalidArgument, "force"),
     (lambda w: w.add_force(3), jfpx.InvalidArgument, "force is int"),
     (lambda w: w.add_force(jfpx.Drag(linear=-1)), jfpx.InvalidArgument, "linear"),
+    (lambda w: w.add_force(jfpx.Drag(linear="x")), jfpx.InvalidArgument, "linear is 'x'"),
+    (lambda w: w.add_force(jfpx.Drag(body=1)), jfpx.InvalidArgument, "body is 1; it must be a BodyId"),
+    (lambda w: w.add_force(jfpx.Gravity), jfpx.InvalidArgument, r"the class Gravity.*Gravity\(\.\.\.\)"),
+    (lambda w: w.add_force(jfpx.Spring(w.bodies[0], w.bodies[1], 2)), jfpx.InvalidArgument,
+     r"a is .*it must be an Attachment, such as Attachment\(body\)"),
+    (lambda w: w.add_force(jfpx.Bungee(jfpx.Attachment(1), jfpx.Attachment(), 2)),
+     jfpx.InvalidArgument, "body is 1"),
     (lambda w: w.remove_force(99), jfpx.InvalidArgument, "99"),
     (lambda w: w.cast_ray((0, 0, 0), (0, 0, 0)), jfpx.InvalidArgument, "direction"),
     (lambda w: w.cast_ray((0, 0, 0), (0, 0, 1), -1), jfpx.InvalidArgument, "distance"),
+    (lambda w: w.cast_ray((0, 0, 0), (0, 0, 1), filter=3), jfpx.InvalidArgument, "filter is 3"),
     (lambda w: w.cast_rays(np.zeros((2, 3), np.float32), np.zeros((2, 3), np.float32)),
      jfpx.InvalidArgument, "ray 0: .*direction"),
     (lambda w: w.cast_rays(np.zeros((2, 3), np.float32), np.zeros((1, 3), np.float32)),
@@ -530,10 +624,15 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: w.overlapping_sphere((0, 0, 0), -1), jfpx.InvalidArgument, "radius"),
     (lambda w: w.set_states(w.states()._replace(positions=np.zeros((9, 3), np.float32))),
      jfpx.InvalidArgument, "positions has 9 rows"),
+    (lambda w: w.set_states(w.positions), jfpx.InvalidArgument, "states is not a States"),
+    (lambda w: w.set_state(w.bodies[0], 3), jfpx.InvalidArgument, "state is 3; it must be a BodyState"),
     (lambda w: w.add({**BALL, "mass": -1}), jfpx.InvalidScene, "mass"),
     (lambda w: w.add_scene(jfpx.Scene(dtype="float64")), jfpx.InvalidArgument, "float64"),
     (lambda w: jfpx.Recording("/nowhere/run.rec"), jfpx.FileError, "/nowhere/run.rec"),
     (lambda w: jfpx.RecordingWriter("/nowhere/run.rec", w), jfpx.FileError, "/nowhere/run.rec"),
+    (lambda w: jfpx.RecordingWriter("/nowhere/run.rec", "pile"), jfpx.InvalidArgument,
+     "world is 'pile'; it must be a World"),
+    (lambda w: jfpx.RecordingWriter(3, w), jfpx.InvalidArgument, "path is 3"),
 ])
 def test_bad_input_is_a_named_exception_and_changes_nothing(call, error, message):
     world = jfpx.World({"bodies": [BALL, FLOOR]})
@@ -552,20 +651,33 @@ def test_python_m_jfpx_runs_the_command(tmp_path):
     if os.path.exists(os.path.join(folder, "jfpx")):
         pytest.skip("the command is beside Python")
     missing = run("")
-    assert missing.returncode == 3 and "not installed" in missing.stderr
+    assert missing.returncode == 3
+    assert "not installed" in missing.stderr and "jfpx.Recording" in missing.stderr
     command = tmp_path / "jfpx"
     command.write_text("#!/bin/sh\necho \"got $1\"\n")
     command.chmod(0o755)
     assert run(f"{tmp_path}:/bin").stdout == "got devices\n"
 
 
-def test_the_code_of_the_guide_runs(tmp_path, monkeypatch):
-    guide = (pathlib.Path(__file__).parents[2] / "docs/python.md").read_text()
-    blocks = re.findall(r"```python\n(.*?)```", guide, re.DOTALL)
-    assert len(blocks) >= 5
-    monkeypatch.chdir(tmp_path)
+ROOT = pathlib.Path(__file__).parents[2]
+
+
+def run_code_of(document):
+    """The names that the Python code of a document defines."""
     names = {}
-    for block in blocks:
+    for block in re.findall(r"```python\n(.*?)```", (ROOT / document).read_text(), re.DOTALL):
         exec(block, names)
+    return names
+
+
+def test_the_code_of_the_readme_runs():
+    names = run_code_of("README.md")
+    assert names["pairs"].shape[1] > 0 and names["world"].report.step == 600
+
+
+def test_the_code_of_the_guide_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = run_code_of("docs/python.md")
     assert names["pairs"].shape[1] == names["size"] == names["contacts"].pairs.shape[1] > 0
-    assert names["report"].step == 120 and (tmp_path / "run.rec").exists()
+    assert names["report"].step == 120 and len(names["recording"]) == 10
+    assert np.isfinite(names["trajectory"]).all()
