@@ -38,6 +38,9 @@ endif()
 set_source_files_properties(bullet/fused_unit.cpp PROPERTIES
   COMPILE_OPTIONS "${fused}" SKIP_PRECOMPILE_HEADERS ON)
 jfpx_add_test(bullet_trajectory_test SOURCES
+  bullet/mt_classes_test.cpp
+  bullet/program_test.cpp
+  bullet/terrain_test.cpp
   bullet/trajectory_test.cpp
   LINK jfpx_bullet)
 jfpx_add_test(bullet_random_worlds_test SOURCES
