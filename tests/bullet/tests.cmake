@@ -149,6 +149,9 @@ if(JFPX_EXAMPLES)
     add_test(NAME bullet_app${suffix} COMMAND bullet_app${suffix})
     set_tests_properties(bullet_app${suffix} PROPERTIES
       PASS_REGULAR_EXPRESSION "[1-9][0-9]* of 120 dispatches in batches; [1-9][0-9]* contacts")
+    add_test(NAME bullet_check${suffix} COMMAND bullet_check${suffix})
+    set_tests_properties(bullet_check${suffix} PROPERTIES
+      PASS_REGULAR_EXPRESSION "no difference; [1-9][0-9]* contacts compared with SphereCollider, 0 different\n$")
     add_test(NAME bullet_parallel${suffix} COMMAND bullet_parallel${suffix})
     set_tests_properties(bullet_parallel${suffix} PROPERTIES
       PASS_REGULAR_EXPRESSION "contacts by (cpu|cuda) \\(.*\n.*: both times\n$")
