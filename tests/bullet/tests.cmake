@@ -93,7 +93,10 @@ jfpx_add_test(bullet_thread_safe_library_test SOURCES
 # Unsupported configurations of Bullet are rejected with a helpful message.
 function(jfpx_add_guard_test name text)
   set(source ${CMAKE_CURRENT_BINARY_DIR}/bullet_guard.cpp)
-  file(WRITE ${source} "#include <jfpx/bullet/constraint_solver.hpp>\n")
+  file(WRITE ${source} "#include <jfpx/bullet/constraint_solver.hpp>
+#include <jfpx/bullet/dispatcher.hpp>
+#include <jfpx/bullet/dynamics_world.hpp>
+")
   set(includes ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include ${JFPX_BULLET_F32_INCLUDE_DIRS} ${JFPX_BULLET_F64_INCLUDE_DIRS})
   list(TRANSFORM includes PREPEND -I)
   add_test(NAME bullet_guard_${name} COMMAND sh -c
@@ -105,6 +108,7 @@ jfpx_add_guard_test(double "this build mixes the two" -DBT_USE_DOUBLE_PRECISION)
 jfpx_add_guard_test(float "this build mixes the two" -DJFPX_DOUBLE_PRECISION)
 jfpx_add_guard_test(none "^compiles")
 jfpx_add_guard_test(threads "^compiles" -DBT_THREADSAFE=1)
+jfpx_add_guard_test(exceptions "^compiles" "-fno-exceptions -fno-rtti")
 
 add_test(NAME Bullet.OnePrecisionIsEnough COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/bullet/find_bullet/check.sh)
 
