@@ -1,4 +1,4 @@
-/// A typical Bullet program with three changed lines, each of which is optional.
+/// A typical Bullet program with the three classes of jfpx, each of which is optional.
 #include <jfpx/bullet/constraint_solver.hpp>
 #include <jfpx/bullet/dispatcher.hpp>
 #include <jfpx/bullet/dynamics_world.hpp>
@@ -45,7 +45,7 @@ int main() {
               static_cast<unsigned long long>(stats.batches),
               static_cast<unsigned long long>(stats.dispatches),
               static_cast<unsigned long long>(stats.touching));
-  std::printf("%llu contacts solved side by side\n",
+  std::printf("%llu contacts solved by jfpx\n",
               static_cast<unsigned long long>(solver.stats().contacts));
   for (const auto& body : bodies) world.removeRigidBody(body.get());
 }

@@ -44,7 +44,8 @@ std::unique_ptr<btCollisionDispatcher> make_dispatcher(bool stock,
       configuration, jfpx::bullet::DispatcherOptions{.minimum_batch = 0});
 }
 
-/// Adds spheres in a narrow heap; the last one is a sensor in its middle.
+/// Adds spheres in a narrow heap. The last one, in the top layer, is a sensor: it falls through the
+/// others and the ground.
 void fill(btDiscreteDynamicsWorld* world, btCollisionShape* shape,
           std::vector<std::unique_ptr<btRigidBody>>* bodies) {
   btVector3 inertia;

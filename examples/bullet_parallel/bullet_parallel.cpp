@@ -14,7 +14,7 @@
 
 namespace {
 
-/// Drops 4,000 balls and returns the final position of the last one.
+/// Drops 12,000 balls and returns the final position of the last one.
 btVector3 let_fall(btDiscreteDynamicsWorld& world) {
   btStaticPlaneShape ground_shape(btVector3(0, 1, 0), 0);
   btSphereShape sphere_shape(btScalar(0.5));
@@ -22,15 +22,15 @@ btVector3 let_fall(btDiscreteDynamicsWorld& world) {
   sphere_shape.calculateLocalInertia(1, inertia);
   std::vector<std::unique_ptr<btRigidBody>> bodies;
   bodies.push_back(std::make_unique<btRigidBody>(0, nullptr, &ground_shape));
-  for (int i = 0; i < 4000; ++i) {
+  for (int i = 0; i < 12000; ++i) {
     bodies.push_back(std::make_unique<btRigidBody>(1, nullptr, &sphere_shape, inertia));
-    const int layer = i / 400, row = i / 20 % 20;
-    const btVector3 cell{btScalar(i % 20), btScalar(layer), btScalar(row)};
+    const int layer = i / 1600, row = i / 40 % 40;
+    const btVector3 cell{btScalar(i % 40), btScalar(layer), btScalar(row)};
     bodies.back()->getWorldTransform().setOrigin(
         cell * btScalar(0.97) + btVector3(cell.y() * btScalar(0.1), btScalar(0.5), 0));
   }
   for (const auto& body : bodies) world.addRigidBody(body.get());
-  for (int step = 0; step < 60; ++step) world.stepSimulation(btScalar(1) / 60, 1);
+  for (int step = 0; step < 40; ++step) world.stepSimulation(btScalar(1) / 60, 1);
   const btVector3 last = bodies.back()->getWorldTransform().getOrigin();
   for (const auto& body : bodies) world.removeRigidBody(body.get());
   return last;

@@ -30,7 +30,7 @@ class JFPX_API InvalidArgument : public Error {
   ~InvalidArgument() override;
 };
 
-/// A snapshot that a world can't restore: truncated, corrupt, of another version or precision, or
+/// A snapshot that a world can't restore: truncated, corrupt, of another format or precision, or
 /// of a world with other callbacks. The message gives the reason.
 class JFPX_API InvalidSnapshot : public Error {
  public:

@@ -302,7 +302,7 @@ class JFPX_API World {
   /// snapshot: this world must have user-defined forces and contact generators with the same ids,
   /// which remain as they are. A world of another process has them if it has added all forces and
   /// generators in the same order.
-  /// @throws InvalidSnapshot if the bytes are not of snapshot() in this version and precision, or
+  /// @throws InvalidSnapshot if the bytes are not of snapshot() in this format and precision, or
   ///   the user-defined callbacks differ; OutOfMemory. The world is then unchanged.
   void restore(const Snapshot& snapshot);
 

@@ -113,9 +113,10 @@ void add_calibrate_command(CLI::App& app, int& status) {
   command->add_flag("--quiet", options->quiet, "Print only the output of --json -");
   command->footer(
       "Takes a few seconds. The costs are stored in the cache folder (XDG_CACHE_HOME) together\n"
-      "with the machine, the driver and the version. The commands run, compare and replay and\n"
-      "jfpx-view use them as long as these three are unchanged. Other programs load them with\n"
-      "calibrated_costs() and pass them in SphereColliderOptions::costs.");
+      "with the machine, the driver and the version. The commands run, compare, replay, preload\n"
+      "and jfpx-view use them as long as these three are unchanged; after a new version of jfpx,\n"
+      "calibrate again. Other programs load them with calibrated_costs() and pass them in\n"
+      "SphereColliderOptions::costs.");
   command->callback([options, &status] { status = run(*options); });
 }
 

@@ -100,7 +100,9 @@ void add_compare_command(CLI::App& app, int& status) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand(
       "compare",
-      "Run a scene natively, in stock Bullet and in Bullet with jfpx, and compare all bits");
+      "Run a scene natively, in stock Bullet and in Bullet with jfpx; compare the two runs of "
+      "Bullet bit for bit, and their sphere contacts with SphereCollider. The native solver is "
+      "another one, so that the native run differs");
   add_scene_options(*command, *options);
   add_run_options(*command, *options);
   command->callback([options, &status] { status = run(*options); });

@@ -86,8 +86,9 @@ void add_preload_command(CLI::App& app, int&) {
       ->required()
       ->type_name("PROGRAM [ARGS]");
   command->add_flag("--summary", options->summary, "Print a summary on stderr at exit");
-  command->add_flag("--verify", options->verify,
-                    "Recompute every sphere pair with Bullet's algorithm and compare (slow)");
+  command->add_flag(
+      "--verify", options->verify,
+      "Recompute every pair that jfpx has computed with Bullet's algorithm, and compare (slow)");
   command->add_option("--backend", options->backend, "Backend: auto, cpu or cuda [auto]")
       ->check(backend_name());
   command
@@ -103,7 +104,7 @@ void add_preload_command(CLI::App& app, int&) {
       ->add_option(
           "--minimum-batch", options->minimum_batch,
           "Smallest number of overlapping pairs in a dispatch, and of manifolds in a group, "
-          "that jfpx computes instead of Bullet")
+          "that jfpx computes instead of Bullet [256 pairs, 24 manifolds]")
       ->check(whole_number());
   command->footer(
       "Usage: jfpx preload [OPTIONS] PROGRAM [ARGS]. All arguments after PROGRAM are its own.\n"

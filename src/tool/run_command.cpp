@@ -183,6 +183,8 @@ void add_run_command(CLI::App& app, int& status) {
       "Write one line per step to this file: step, contacts, awake bodies, milliseconds (detect "
       "and solve of a step on a GPU: of the device, by CUDA events), deepest and mean penetration "
       "[m], largest speed [m/s]; - writes to stdout instead of a table");
+  command->get_option("--quiet")->description(
+      "Print only the output of --hash, --json - and --csv -");
   command->add_option("--record", options->run.record,
                       "Write the state after every step to this file (see: jfpx replay)");
   command->add_option("--snapshot", options->snapshot,

@@ -141,7 +141,7 @@ class Page(Folder):
             for backend, n, t in (("x86", 32, 0.5), ("x86", 448, 4), ("cuda", 32, 1), ("cuda", 448, 2))]
         self.write("results/box/thesis_float.json", thesis)
         rendering = result()
-        rendering["context"]["pictures"] = "800 x 600 by a card"
+        rendering["context"].update(pictures="800 x 600 by a card", version="0.1.0")
         rendering["benchmarks"] = [
             {"name": f"rendering/{mode}/cpu/32/iterations:1000/manual_time", "real_time": t, "time_unit": "ms",
              "iterations": 1000, "first_ms": 2, "median_ms": t, "picture_ms": 7}
@@ -167,6 +167,7 @@ class Page(Folder):
         self.assertIn("| gas | 448 | 1300 | 1.00 | 1.50 | cpu all pairs | cpu, all pairs | 1.10 |", page)
         self.assertIn("0.220 (1)", page, "the doubtful point is marked")
         self.assertIn("`x_bench`, 2026-01-02", page)
+        self.assertIn("Measured with jfpx 0.1.0.", page)
         # 0.5 against 1 at 32, 4 against 2 at 448: ratios 1/2 and 2, so the geometric mean, 120.
         self.assertIn("from N = 120 here", page)
         self.assertIn("800 x 600 by a card", page)

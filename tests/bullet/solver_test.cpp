@@ -3,6 +3,7 @@
 #include <jfpx/bullet/dynamics_world.hpp>
 #include <jfpx/error.hpp>
 
+#include "tests/bullet/all_parts.hpp"
 #include "tests/bullet/joint_without_rtti.hpp"
 #include "tests/bullet/stock_bits.hpp"
 
@@ -289,7 +290,7 @@ TEST(ConstraintSolver, LeavesGroupsWithLittleParallelismToTheFasterCodeWithTheSa
 /// All parts of jfpx with three threads, and enough bodies for all of them.
 class ThousandsOfBodies : public ::testing::Test {
  protected:
-  ThousandsOfBodies() : twins_(options()) {
+  ThousandsOfBodies() : twins_(all_parts(3)) {
     twins_.both([](BulletWorld& w) {
       Random random(3);
       btCollisionShape* shape = w.keep(new btSphereShape(btScalar(0.5)));
@@ -300,23 +301,6 @@ class ThousandsOfBodies : public ::testing::Test {
         body->setAngularVelocity(btVector3(p.x, 1, p.z));
       }
     });
-  }
-  static TwinOptions options() {
-    TwinOptions options;
-    options.ours = [](btCollisionConfiguration* c) {
-      return std::make_unique<CollisionDispatcher>(
-          c, DispatcherOptions{.collider = {.backend = Backend::cpu, .threads = 3}});
-    };
-    options.parts.solver = [] {
-      return std::make_unique<ConstraintSolver>(
-          ConstraintSolverOptions{.backend = Backend::cpu, .threads = 3});
-    };
-    options.parts.world = [](btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
-                             btConstraintSolver* solver, btCollisionConfiguration* configuration) {
-      return std::make_unique<DynamicsWorld>(dispatcher, broadphase, solver, configuration,
-                                             DynamicsWorldOptions{.threads = 3});
-    };
-    return options;
   }
   Twins twins_;
 };

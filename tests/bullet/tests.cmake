@@ -38,6 +38,9 @@ endif()
 set_source_files_properties(bullet/fused_unit.cpp PROPERTIES
   COMPILE_OPTIONS "${fused}" SKIP_PRECOMPILE_HEADERS ON)
 jfpx_add_test(bullet_trajectory_test SOURCES
+  bullet/mt_classes_test.cpp
+  bullet/program_test.cpp
+  bullet/terrain_test.cpp
   bullet/trajectory_test.cpp
   LINK jfpx_bullet)
 jfpx_add_test(bullet_random_worlds_test SOURCES
@@ -90,7 +93,10 @@ jfpx_add_test(bullet_thread_safe_library_test SOURCES
 # Unsupported configurations of Bullet are rejected with a helpful message.
 function(jfpx_add_guard_test name text)
   set(source ${CMAKE_CURRENT_BINARY_DIR}/bullet_guard.cpp)
-  file(WRITE ${source} "#include <jfpx/bullet/constraint_solver.hpp>\n")
+  file(WRITE ${source} "#include <jfpx/bullet/constraint_solver.hpp>
+#include <jfpx/bullet/dispatcher.hpp>
+#include <jfpx/bullet/dynamics_world.hpp>
+")
   set(includes ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include ${JFPX_BULLET_F32_INCLUDE_DIRS} ${JFPX_BULLET_F64_INCLUDE_DIRS})
   list(TRANSFORM includes PREPEND -I)
   add_test(NAME bullet_guard_${name} COMMAND sh -c
@@ -102,6 +108,7 @@ jfpx_add_guard_test(double "this build mixes the two" -DBT_USE_DOUBLE_PRECISION)
 jfpx_add_guard_test(float "this build mixes the two" -DJFPX_DOUBLE_PRECISION)
 jfpx_add_guard_test(none "^compiles")
 jfpx_add_guard_test(threads "^compiles" -DBT_THREADSAFE=1)
+jfpx_add_guard_test(exceptions "^compiles" "-fno-exceptions -fno-rtti")
 
 add_test(NAME Bullet.OnePrecisionIsEnough COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/bullet/find_bullet/check.sh)
 
@@ -146,6 +153,9 @@ if(JFPX_EXAMPLES)
     add_test(NAME bullet_app${suffix} COMMAND bullet_app${suffix})
     set_tests_properties(bullet_app${suffix} PROPERTIES
       PASS_REGULAR_EXPRESSION "[1-9][0-9]* of 120 dispatches in batches; [1-9][0-9]* contacts")
+    add_test(NAME bullet_check${suffix} COMMAND bullet_check${suffix})
+    set_tests_properties(bullet_check${suffix} PROPERTIES
+      PASS_REGULAR_EXPRESSION "no difference; [1-9][0-9]* contacts compared with SphereCollider, 0 different\n$")
     add_test(NAME bullet_parallel${suffix} COMMAND bullet_parallel${suffix})
     set_tests_properties(bullet_parallel${suffix} PROPERTIES
       PASS_REGULAR_EXPRESSION "contacts by (cpu|cuda) \\(.*\n.*: both times\n$")

@@ -61,6 +61,11 @@ case $step in
 cpu compiled
 cuda $compiled
 refused" ] || fail "$("$work/cmake/both")"
+    if [ "$HAS_BULLET" = ON ]; then # the project that users copy
+      configure "$root/examples/bullet_app" "$work/bullet_app" >/dev/null
+      cmake --build "$work/bullet_app" >/dev/null
+      "$work/bullet_app/bullet_app" | grep -q '[1-9][0-9]* contacts of spheres' || fail "examples/bullet_app"
+    fi
     ;;
   pkg_config)
     folder=$(dirname "$(find "$prefix" -name jfpx.pc)")

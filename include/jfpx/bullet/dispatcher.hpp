@@ -19,14 +19,19 @@ class SceneWorld;
 
 struct DispatcherOptions {
   SphereColliderOptions collider = {};  ///< the collider that tests the sphere pairs
-  /// Dispatches of fewer pairs run in Bullet's own code. In the worst case, a gas, in which no
-  /// pairs touch and Bullet rejects them cheaply, a batch breaks even at fewer than 100 pairs; the
-  /// gain is small below 256 pairs.
+  /// Dispatches of fewer pairs run in Bullet's own code. Below 256 pairs, the gain is small; from
+  /// about 100 pairs on, a batch is no slower than Bullet's code in any measured scene.
   std::size_t minimum_batch = 256;
   bool verify = false;  ///< see set_verify()
 };
 
-/// A btCollisionDispatcher that tests all sphere-sphere pairs of a dispatch in one batch.
+/// A btCollisionDispatcher that computes the pairs of a dispatch in one batch: it tests all pairs
+/// of two spheres on the CPU or a GPU; and unless a callback or an overridden filter can observe
+/// the order of the pairs, it also computes pairs of a sphere with a btBoxShape or
+/// btStaticPlaneShape, and runs Bullet's algorithms of the other pairs of boxes, capsules,
+/// cylinders, cones, spheres and planes on all threads. Bullet computes the pairs of all other
+/// shapes.
+///
 /// Manifolds, their order, every field of every point, callbacks, and therefore trajectories are
 /// those of btCollisionDispatcher, bit for bit. No create function is registered: the pairs keep
 /// Bullet's own algorithms.
