@@ -10,6 +10,8 @@
 
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <array>
 #include <string>
 
 namespace jfpx {
@@ -42,11 +44,20 @@ void search(benchmark::State& state, Real speed, bool keeps) {
   MovingGas gas(speed);
   const auto collider = make_sphere_collider({.backend = Backend::cpu});
   NeighborList list;
+  std::array<SpherePair, NearPairs::kMostSelected> room;
   std::size_t pairs = 0;
   for (auto _ : state) {
     gas.move();
-    pairs = keeps ? list.find(gas.spheres(), collider.get(), nullptr).size()
-                  : collider->find_pairs(gas.spheres()).size();
+    if (!keeps) {
+      pairs = collider->find_pairs(gas.spheres()).size();
+      continue;
+    }
+    const NearPairs found = list.find(gas.spheres(), collider.get(), nullptr);
+    pairs = 0;
+    for (std::size_t first = 0; first < found.pairs.size(); first += room.size()) {
+      const std::size_t last = std::min(first + room.size(), found.pairs.size());
+      pairs += found.touching(gas.spheres(), first, last, room.data()).size();
+    }
   }
   state.counters["pairs"] = static_cast<double>(pairs);
 }

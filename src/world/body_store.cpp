@@ -79,9 +79,9 @@ void BodyStore::for_each_array(const Visit& visit) {
       moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.mean_motion,
       moving.rest_time, moving.awake);
   all(shape_, radius_, extent_, mass_, inverse_mass_, friction_, restitution_, rolling_friction_,
-      spinning_friction_, body_inverse_inertia_, tensor_, acceleration_, linear_damping_,
-      angular_damping_, velocity_kept_, angular_velocity_kept_, can_sleep_, kinematic_, sensor_,
-      user_data_, filter_);
+      spinning_friction_, acceleration_, linear_damping_, angular_damping_, velocity_kept_,
+      angular_velocity_kept_, can_sleep_, kinematic_, sensor_, user_data_, filter_);
+  if (has_inertia_arrays_) all(body_inverse_inertia_, tensor_);
 }
 
 void BodyStore::reserve(std::size_t bodies) {
@@ -117,6 +117,8 @@ BodyId BodyStore::add(const BodyDef& def) {
   Shape shape = normalized(def.shape);  // may throw, hence before any change
   std::map<std::uint32_t, Mat3> given;
   if (def.inertia && def.mass > 0) given[0] = {};
+  const bool is_solid_ball = std::holds_alternative<Sphere>(def.shape) && !def.inertia;
+  if (def.kinematic || (def.mass > 0 && !is_solid_ball)) make_inertia_arrays();
   if (pool_.is_full()) add_slot();
   const BodyId id = pool_.add();  // from here on nothing allocates
   const std::uint32_t i = id.index;
@@ -160,7 +162,23 @@ Mat3 BodyStore::inertia(std::uint32_t i) const {
   return inertia_given(i) ? given_inertia_.at(i) : tensor_of(shape_[i], mass_[i]);
 }
 
+void BodyStore::make_inertia_arrays() {
+  if (has_inertia_arrays_) return;
+  body_inverse_inertia_.reserve(shape_.capacity());
+  body_inverse_inertia_.resize(shape_.size());
+  tensor_.reserve(shape_.capacity());
+  tensor_.assign(shape_.size(), diagonal({0, 0, 0}));
+  for (const BodyId id : ids()) body_inverse_inertia_[id.index] = body_inverse_inertia(id.index);
+  has_inertia_arrays_ = true;
+}
+
+Mat3 BodyStore::body_inverse_inertia(std::uint32_t i) const {
+  if (has_inertia_arrays_) return body_inverse_inertia_[i];
+  return movable(i) ? inverse_inertia(inertia(i)) : diagonal({0, 0, 0});
+}
+
 void BodyStore::set_inertia(std::uint32_t i, const std::optional<Mat3>& given) {
+  if (given && movable(i)) make_inertia_arrays();
   compute_inertia(i, given);
   refresh_inertia(i);
 }
@@ -171,6 +189,7 @@ void BodyStore::compute_inertia(std::uint32_t i, const std::optional<Mat3>& give
   } else {
     given_inertia_.erase(i);
   }
+  if (!has_inertia_arrays_) return;
   if (movable(i)) {
     set_tensor(i, inertia(i));
   } else {  // infinite inertia: the inverse is zero (erratum E26)
@@ -313,7 +332,7 @@ void BodyStore::integrate(std::uint32_t i) {
                                                    dt_, velocity_kept_[i]);
   moving.angular_velocity[i] = detail::integrated_velocity(
       moving.angular_velocity[i], angular_acceleration, dt_, angular_velocity_kept_[i]);
-  if (tensor_[i](0, 0) > 0) {
+  if (has_inertia_arrays_ && tensor_[i](0, 0) > 0) {
     moving.angular_velocity[i] = detail::precessed(moving.angular_velocity[i], tensor_[i],
                                                    to_matrix(moving.orientation[i]), dt_);
   }
@@ -365,8 +384,8 @@ BodyView BodyStore::view_without_ids() const {
           .restitution = restitution_.data(),
           .rolling_friction = rolling_friction_.data(),
           .spinning_friction = spinning_friction_.data(),
-          .body_inverse_inertia = body_inverse_inertia_.data(),
-          .tensor = tensor_.data(),
+          .body_inverse_inertia = has_inertia_arrays_ ? body_inverse_inertia_.data() : nullptr,
+          .tensor = has_inertia_arrays_ ? tensor_.data() : nullptr,
           .acceleration = acceleration_.data(),
           .velocity_kept = velocity_kept_.data(),
           .angular_velocity_kept = angular_velocity_kept_.data(),
@@ -402,7 +421,7 @@ MotionPointers BodyStore::motion_pointers() {
 
 void BodyStore::refresh_inertia(std::uint32_t i) {
   moving.inverse_inertia[i] =
-      detail::in_world_axes(body_inverse_inertia_[i], to_matrix(moving.orientation[i]));
+      detail::in_world_axes(body_inverse_inertia(i), to_matrix(moving.orientation[i]));
 }
 
 }  // namespace JFPX_ABI

@@ -103,6 +103,9 @@ class BodyStore {
   /// [kg m^2], body axes; zero for mass 0
   Mat3 inertia(std::uint32_t body) const;
   bool inertia_given(std::uint32_t body) const { return given_inertia_.contains(body); }
+  /// Makes the arrays of BodyView that have the inertia in body axes. A store does without while
+  /// all bodies are immovable or balls with the inertia of a solid ball. @throws std::bad_alloc
+  void make_inertia_arrays();
   /// Has no effect on a body of mass 0. @param given absent: the inertia of the solid shape
   /// @throws std::bad_alloc; the store is then unchanged
   void set_inertia(std::uint32_t body, const std::optional<Mat3>& given);
@@ -166,6 +169,7 @@ class BodyStore {
   void add_slot();
   void set_shape(std::uint32_t body, Shape shape) noexcept;
   void count_body(std::uint32_t body) noexcept;
+  Mat3 body_inverse_inertia(std::uint32_t body) const;
   void compute_inertia(std::uint32_t body, const std::optional<Mat3>& given);
   void set_tensor(std::uint32_t body, const Mat3& tensor);
   template <class Archive, class Self>
@@ -187,8 +191,9 @@ class BodyStore {
   std::vector<Shape> shape_;
   std::vector<Real> radius_, extent_, mass_, inverse_mass_, friction_, restitution_;
   std::vector<Real> rolling_friction_, spinning_friction_;
-  std::vector<Mat3> body_inverse_inertia_;       ///< body axes
   std::map<std::uint32_t, Mat3> given_inertia_;  ///< by body
+  bool has_inertia_arrays_ = false;              ///< whether the following two arrays are in use
+  std::vector<Mat3> body_inverse_inertia_;       ///< body axes
   /// Inertia in body axes, divided by its largest diagonal entry, for the gyroscopic term; zero if
   /// that term is zero (isotropic inertia or mass 0).
   std::vector<Mat3> tensor_;

@@ -26,6 +26,7 @@ struct BodyView {
   const Real *radius = nullptr, *extent = nullptr, *inverse_mass = nullptr;
   const Real *friction = nullptr, *restitution = nullptr;
   const Real *rolling_friction = nullptr, *spinning_friction = nullptr;
+  /// Null: all bodies are immovable or balls with the inertia of a solid ball.
   const Mat3 *body_inverse_inertia = nullptr, *tensor = nullptr;
   const Vec3* acceleration = nullptr;
   const Real *velocity_kept = nullptr, *angular_velocity_kept = nullptr;
@@ -51,7 +52,10 @@ struct BodyView {
   JFPX_HD bool is_carrier(std::uint32_t i) const { return !movable(i) && awake[i] != 0; }
   /// Whether the body is a movable sphere whose inertia is the same about every axis.
   JFPX_HD bool is_round(std::uint32_t i) const {
-    return movable(i) && radius[i] > 0 && !(tensor[i](0, 0) > 0);
+    return movable(i) && radius[i] > 0 && !has_gyroscopic_term(i);
+  }
+  JFPX_HD bool has_gyroscopic_term(std::uint32_t i) const {
+    return tensor != nullptr && tensor[i](0, 0) > 0;
   }
   JFPX_HD bool is_at_rest(std::uint32_t i) const { return rest_time[i] >= sleep_time; }
   /// Whether a body was slow in the last step, and nothing has woken it since.
@@ -100,7 +104,7 @@ struct BodyView {
     const bool is_driven = !(torque[i] == Vec3{});
     const Vec3 angular = is_driven ? inverse_inertia[i] * torque[i] : Vec3{};
     *w = detail::integrated_velocity(*w, angular, substep, angular_velocity_kept[i]);
-    if (!(tensor[i](0, 0) > 0)) return;
+    if (!has_gyroscopic_term(i)) return;
     // Unlike precessed(), this does not rotate the velocity to and fro: rounding makes axes not
     // quite orthonormal, always to the same side, and with many substeps energy would grow
     // noticeably.

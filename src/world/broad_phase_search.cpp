@@ -36,13 +36,12 @@ ContactSpan BroadPhaseSearch::find(std::span<const SphereInstance> spheres) {
   return contacts_;
 }
 
-std::span<const SpherePair> BroadPhaseSearch::find_pairs(std::span<const SphereInstance> spheres,
-                                                         ThreadPool* pool) {
+NearPairs BroadPhaseSearch::find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool) {
   if (broad_phase_ == BroadPhase::cells) return neighbors_.find(spheres, collider_.get(), pool);
   const ContactSpan found = find(spheres);
   pairs_.clear();
   for (const SphereContact& c : found) pairs_.push_back({c.a, c.b});
-  return pairs_;
+  return {pairs_};
 }
 
 /// Works in batches, because all pairs of many spheres would exhaust the memory.

@@ -22,10 +22,10 @@ class BroadPhaseSearch {
   /// All touching pairs, sorted. Valid until the next call.
   /// @throws the exceptions of SphereCollider::find_contacts() and find_touching()
   ContactSpan find(std::span<const SphereInstance> spheres);
-  /// The pairs of find() as indices alone. Takes less time if the spheres have moved little since
-  /// the last call. Valid until the next call of either function.
+  /// The pairs of find() as indices alone, perhaps among others. Takes less time if the spheres
+  /// have moved little since the last call. Valid until the next call of either function.
   /// @throws as find()
-  std::span<const SpherePair> find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool);
+  NearPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool);
 
   const SphereCollider& collider() const noexcept { return *collider_; }
 

@@ -5,6 +5,7 @@
 #include "src/world/merge_contacts.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace jfpx {
@@ -13,7 +14,7 @@ namespace {
 
 using soft_step::ContactSet;
 
-constexpr std::size_t kSubShapesPerChunk = 1024, kPairsPerChunk = 1024;
+constexpr std::size_t kSubShapesPerChunk = 1024, kPairsPerChunk = NearPairs::kMostSelected;
 /// Chunks of a batch for each thread: enough to balance their loads.
 constexpr std::size_t kChunksPerThread = 4;
 
@@ -195,12 +196,16 @@ std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real marg
   std::size_t touching_spheres = 0;
   Refilled<Candidate> candidates{&candidates_}, compounds{&compounds_};
 
-  const std::span<const SpherePair> found =
-      broad_phase_.find_pairs(std::span(swept_).first(sub_shapes_.fixed_begin()), pool);
+  const auto bounds = std::span(swept_).first(sub_shapes_.fixed_begin());
+  const NearPairs found = broad_phase_.find_pairs(bounds, pool);
   const auto test_pairs = [&](std::size_t first, std::size_t last, Part* part) {
-    test_sphere_pairs(bodies, found.subspan(first, last - first), part);
+    std::array<SpherePair, kPairsPerChunk> room;
+    for (; first < last; first += room.size()) {  // without a pool, a chunk may be larger
+      const std::size_t end = std::min(last, first + room.size());
+      test_sphere_pairs(bodies, found.touching(bounds, first, end, room.data()), part);
+    }
   };
-  for_each_batch(pool, found.size(), test_pairs, [&](std::span<Part> parts) {
+  for_each_batch(pool, found.pairs.size(), test_pairs, [&](std::span<Part> parts) {
     for (const Part& part : parts) touching_spheres += part.touching_spheres;
     append(
         pool, parts, [](Part & p) -> auto& { return p.spheres; }, &results.spheres);

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -15,7 +14,7 @@ namespace {
 
 /// Fewer spheres are tested pair by pair in about the same time.
 constexpr std::size_t kFewest = 512;
-constexpr std::size_t kSpheresPerChunk = 4096, kNearPairsPerChunk = 4096;
+constexpr std::size_t kSpheresPerChunk = 4096;
 /// The slack is the motion of about this number of searches, within these parts of the smallest
 /// radius. More slack means more pairs to test in every search (bench/results/soft_step.md).
 constexpr Real kSearches = 10, kLeast = Real(0.02), kMost = Real(0.15);
@@ -55,17 +54,17 @@ Real NeighborList::choose_slack(std::span<const SphereInstance> spheres, Real mo
   return std::clamp(kSearches * motion, kLeast * smallest, kMost * smallest);
 }
 
-std::span<const SpherePair> NeighborList::find(std::span<const SphereInstance> spheres,
-                                               SphereCollider* collider, ThreadPool* pool) {
+NearPairs NeighborList::find(std::span<const SphereInstance> spheres, SphereCollider* collider,
+                             ThreadPool* pool) {
   if (spheres.size() < kFewest || collider->backend() != Backend::cpu) {
     clear();
-    return collider->find_pairs(spheres);
+    return {collider->find_pairs(spheres)};
   }
   Real slack = 0;
   if (spheres.size() == count_) {
     ++searches_;
     const Real motion = largest_motion(spheres, pool);
-    if (motion <= slack_) return select(spheres, pool);
+    if (motion <= slack_) return {pairs_, false};
     slack = choose_slack(spheres, motion / static_cast<Real>(searches_));
   }
   clear();
@@ -79,47 +78,23 @@ std::span<const SpherePair> NeighborList::find(std::span<const SphereInstance> s
   slack_ = slack;
   searches_ = 0;
   if (collider->backend() == Backend::cpu) count_ = spheres.size();
-  return slack > 0 ? select(spheres, pool) : pairs_;
+  return {pairs_, !(slack > 0)};
 }
 
-/// The pairs of pairs_ whose spheres touch. Several threads count them first, so that each has its
-/// range of the list.
-std::span<const SpherePair> NeighborList::select(std::span<const SphereInstance> spheres,
-                                                 ThreadPool* pool) {
-  selected_.reserve(pairs_.size(), "pairs of spheres");
-  const auto for_each_selected = [&](std::size_t chunk, const auto& visit) {
-    const std::size_t begin = chunk * kNearPairsPerChunk;
-    const auto part = pairs_.subspan(begin, std::min(kNearPairsPerChunk, pairs_.size() - begin));
-    std::array<std::uint32_t, kNearPairsPerChunk> found;
-    const std::size_t count =
-        cpu::find_candidates(spheres.data(), part.data(), part.size(), found.data());
-    for (std::size_t k = 0; k < count; ++k) {
-      const SpherePair& pair = part[found[k]];
-      if (detail::test_sphere_pair(spheres[pair.a], spheres[pair.b]).touching != 0) visit(pair);
-    }
-  };
-  const std::size_t chunks = (pairs_.size() + kNearPairsPerChunk - 1) / kNearPairsPerChunk;
-  if (pool == nullptr || pool->threads() == 1) {
-    SpherePair* next = selected_.data();
-    for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
-      for_each_selected(chunk, [&next](const SpherePair& pair) { *next++ = pair; });
-    }
-    return {selected_.data(), next};
+std::span<const SpherePair> NearPairs::touching(std::span<const SphereInstance> spheres,
+                                                std::size_t first, std::size_t last,
+                                                SpherePair* room) const {
+  const std::span<const SpherePair> part = pairs.subspan(first, last - first);
+  if (all_touch) return part;
+  std::array<std::uint32_t, kMostSelected> found;
+  const std::size_t count =
+      cpu::find_candidates(spheres.data(), part.data(), part.size(), found.data());
+  SpherePair* next = room;
+  for (std::size_t k = 0; k < count; ++k) {
+    const SpherePair& pair = part[found[k]];
+    if (detail::test_sphere_pair(spheres[pair.a], spheres[pair.b]).touching != 0) *next++ = pair;
   }
-  selected_counts_.resize(chunks + 1);
-  pool->run(chunks, [&](std::size_t chunk) {
-    std::size_t count = 0;
-    for_each_selected(chunk, [&count](const SpherePair&) { ++count; });
-    selected_counts_[chunk] = count;
-  });
-  selected_counts_[chunks] = 0;
-  std::exclusive_scan(selected_counts_.begin(), selected_counts_.end(), selected_counts_.begin(),
-                      std::size_t{0});
-  pool->run(chunks, [&](std::size_t chunk) {
-    SpherePair* next = selected_.data() + selected_counts_[chunk];
-    for_each_selected(chunk, [&next](const SpherePair& pair) { *next++ = pair; });
-  });
-  return {selected_.data(), selected_counts_[chunks]};
+  return {room, next};
 }
 
 }  // namespace JFPX_ABI

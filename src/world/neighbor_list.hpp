@@ -13,10 +13,22 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
+/// Sorted pairs of spheres, among which are all that touch.
+struct NearPairs {
+  std::span<const SpherePair> pairs;
+  bool all_touch = true;
+
+  /// The touching pairs of a range of at most kMostSelected pairs.
+  /// @param room receives them, unless all pairs touch
+  std::span<const SpherePair> touching(std::span<const SphereInstance> spheres, std::size_t first,
+                                       std::size_t last, SpherePair* room) const;
+  static constexpr std::size_t kMostSelected = 1024;
+};
+
 /// Finds the touching pairs of spheres that move little between two searches. Each sphere has a
 /// larger bound. While all spheres are within their bounds, only pairs of touching bounds are
-/// tested. The pairs and their order are those of a search among the spheres, whatever happened
-/// before. Owns its buffers, which only grow.
+/// tested. The touching pairs and their order are those of a search among the spheres, whatever
+/// happened before. Owns its buffers, which only grow.
 ///
 /// Claim: if two spheres that are within their bounds touch, the bounds touch. A sphere counts as
 /// within its bound if (distance of the centres + radius) * (1 + 16 eps) <= radius of the bound.
@@ -26,10 +38,10 @@ inline namespace JFPX_ABI {
 /// counts.
 class NeighborList {
  public:
-  /// All touching pairs, sorted. Valid until the next call, or another call of the collider.
+  /// Valid until the next call, or another call of the collider.
   /// @throws the exceptions of SphereCollider::find_pairs()
-  std::span<const SpherePair> find(std::span<const SphereInstance> spheres,
-                                   SphereCollider* collider, ThreadPool* pool);
+  NearPairs find(std::span<const SphereInstance> spheres, SphereCollider* collider,
+                 ThreadPool* pool);
   /// Must be called after every other call of the collider.
   void clear() noexcept { count_ = 0; }
 
@@ -38,16 +50,13 @@ class NeighborList {
 
   Real largest_motion(std::span<const SphereInstance> spheres, ThreadPool* pool);
   Real choose_slack(std::span<const SphereInstance> spheres, Real motion) const;
-  std::span<const SpherePair> select(std::span<const SphereInstance> spheres, ThreadPool* pool);
 
   std::size_t count_ = 0;              ///< number of bounds; 0: there are none
   Buffer<SphereInstance> bounds_;      ///< by sphere
   Real slack_ = 0;                     ///< [m], radius of a bound, minus that of its sphere
   std::size_t searches_ = 0;           ///< since the bounds were made
   std::span<const SpherePair> pairs_;  ///< of bounds that touch; in the collider
-  Buffer<SpherePair> selected_;
-  std::vector<Real> largest_;                 ///< by chunk of spheres
-  std::vector<std::size_t> selected_counts_;  ///< by chunk of pairs
+  std::vector<Real> largest_;          ///< by chunk of spheres
 };
 
 }  // namespace JFPX_ABI

@@ -66,6 +66,7 @@ void World::Impl::enter_device() {
   if (bodies_changed) contact_finder.set_bodies(store);
   bodies_changed = false;
   force_table.invalidate();
+  store.make_inertia_arrays();  // the device adds and edits bodies of any kind
   device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
   resident = true;
   note_forces();

@@ -149,7 +149,6 @@ template <class Reserve, class Done>
 std::span<const SpherePair> ContactWriter::write_rows(std::size_t spheres, const PairChunks& chunks,
                                                       PairOrder order, ThreadPool& pool,
                                                       const Reserve& reserve, const Done& done) {
-  rows_.reserve(spheres, "rows of pairs");
   const bool grouped = order == PairOrder::by_lower_sphere;
   const unsigned part_bits =
       grouped ? index_rows(chunks, spheres, pool) : divide(chunks, spheres, pool);
@@ -157,18 +156,22 @@ std::span<const SpherePair> ContactWriter::write_rows(std::size_t spheres, const
   const std::uint64_t total = sections_[parts];
   pairs_.reserve(total, "pairs");
   reserve(total);
-  if (spares_.size() < parts) spares_.resize(parts);
+  const std::size_t rows_per_part = std::size_t{1} << part_bits;
+  reserve_workspaces(std::min<std::size_t>(parts, pool.threads()), grouped ? 0 : rows_per_part,
+                     parts);
   pool.run(parts, [&](std::size_t part) {
     const std::size_t first = part << part_bits;
-    const std::size_t last = std::min(spheres, first + (std::size_t{1} << part_bits));
+    const std::size_t last = std::min(spheres, first + rows_per_part);
     if (first >= last) return;
-    if (!grouped) make_rows(part, first, last);
+    const auto workspace = take_workspace();
+    const Row* const rows =
+        grouped ? rows_.data() + first : make_rows(part, first, last, workspace.get());
     SpherePair* const begin = pairs_.data() + sections_[part];
     SpherePair* end = begin;
-    for (std::size_t a = first; a < last; ++a) {
-      prefetch(rows_[std::min(a + kRowsAhead, last - 1)]);
-      sort_row(rows_[a].pairs, rows_[a].count, end, &spares_[part]);
-      end += rows_[a].count;
+    for (std::size_t a = 0; a < last - first; ++a) {
+      prefetch(rows[std::min(a + kRowsAhead, last - first - 1)]);
+      sort_row(rows[a].pairs, rows[a].count, end, &workspace->spare);
+      end += rows[a].count;
     }
     done(std::span<const SpherePair>(begin, end));
   });
@@ -221,6 +224,7 @@ void ContactWriter::prefetch(const Row& row) {
 /// the begins of parts of rows. Returns the bits of the size of a part.
 unsigned ContactWriter::index_rows(const PairChunks& chunks, std::size_t spheres,
                                    ThreadPool& pool) {
+  rows_.reserve(spheres, "rows of pairs");
   std::fill_n(rows_.data(), spheres, Row{});
   pool.run(chunks.size(), [&](std::size_t chunk) {
     const std::span<const std::uint64_t> all = chunks[chunk];
@@ -246,25 +250,57 @@ unsigned ContactWriter::index_rows(const PairChunks& chunks, std::size_t spheres
   return kPartBits;
 }
 
-/// Fills the rows of a bucket of neighbouring lower spheres [first, last).
-void ContactWriter::make_rows(std::size_t bucket, std::size_t first, std::size_t last) {
-  const std::span<const std::uint64_t> own(divided_.data() + sections_[bucket],
-                                           divided_.data() + sections_[bucket + 1]);
-  std::fill(rows_.data() + first, rows_.data() + last, Row{});
-  for (const std::uint64_t p : own) ++rows_[lower(p)].count;
-  const std::uint64_t* begin = grouped_.data() + sections_[bucket];
-  for (std::size_t a = first; a < last; ++a) {
-    rows_[a].pairs = begin;
-    begin += std::exchange(rows_[a].count, 0);
+/// Makes as many workspaces as threads may need. Only a long row grows one later.
+/// @param rows number of rows of a part that make_rows() fills
+void ContactWriter::reserve_workspaces(std::size_t count, std::size_t rows, std::size_t parts) {
+  std::uint64_t most = 0;
+  for (std::size_t i = 0; rows > 0 && i < parts; ++i) {
+    most = std::max(most, sections_[i + 1] - sections_[i]);
   }
-  for (const std::uint64_t p : own) {
-    Row& row = rows_[lower(p)];
-    grouped_[static_cast<std::size_t>(row.pairs - grouped_.data()) + row.count++] = p;
+  if (workspaces_.size() < count) workspaces_.resize(count);
+  idle_.clear();
+  for (Workspace& workspace : workspaces_) {
+    workspace.pairs.reserve(most, "pairs in rows");
+    workspace.rows.reserve(rows, "rows of pairs");
+    idle_.push_back(&workspace);
   }
 }
 
+ContactWriter::TakenWorkspace ContactWriter::take_workspace() {
+  const std::lock_guard lock(mutex_);
+  Workspace* const taken = idle_.back();
+  idle_.pop_back();
+  return {taken, GiveBack{this}};
+}
+
+void ContactWriter::GiveBack::operator()(Workspace* workspace) const {
+  const std::lock_guard lock(writer->mutex_);
+  writer->idle_.push_back(workspace);
+}
+
+/// Moves the pairs of a bucket of neighbouring lower spheres [first, last) to the workspace, by
+/// lower sphere. Returns their rows.
+const ContactWriter::Row* ContactWriter::make_rows(std::size_t bucket, std::size_t first,
+                                                   std::size_t last, Workspace* workspace) const {
+  const std::span<const SpherePair> own(pairs_.data() + sections_[bucket],
+                                        pairs_.data() + sections_[bucket + 1]);
+  Row* const rows = workspace->rows.data();
+  std::uint64_t* const pairs = workspace->pairs.data();
+  std::fill_n(rows, last - first, Row{});
+  const auto row_of = [&](std::uint64_t pair) -> Row& { return rows[lower(pair) - first]; };
+  for (const SpherePair& bits : own) ++row_of(std::bit_cast<std::uint64_t>(bits)).count;
+  std::uint64_t* end = pairs;
+  for (std::size_t a = 0; a < last - first; ++a) rows[a].pairs = end += rows[a].count;
+  for (const SpherePair& bits : own) {  // from the ends of the rows to their begins
+    const auto p = std::bit_cast<std::uint64_t>(bits);
+    pairs[--row_of(p).pairs - pairs] = p;
+  }
+  return rows;
+}
+
 /// Divides pairs into buckets of neighbouring lower spheres, so that the rest stays in the cache of
-/// one core. Fills divided_ and sections_. Returns the bits of the size of a bucket.
+/// one core. Fills sections_, and pairs_ with the bits of packed pairs. Returns the bits of the
+/// size of a bucket.
 unsigned ContactWriter::divide(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool) {
   const auto bits = static_cast<unsigned>(std::bit_width(spheres));
   // At most 256 buckets: streams that fit in the TLB.
@@ -286,11 +322,12 @@ unsigned ContactWriter::divide(const PairChunks& chunks, std::size_t spheres, Th
     }
   }
   sections_[buckets] = sum;
-  divided_.reserve(sum, "pairs in buckets");
-  grouped_.reserve(sum, "pairs in rows");
+  pairs_.reserve(sum, "pairs");
   pool.run(chunks.size(), [&](std::size_t chunk) {
     std::uint64_t* next = offsets_.data() + chunk * buckets;
-    for (const std::uint64_t p : chunks[chunk]) divided_[next[lower(p) >> bucket_bits]++] = p;
+    for (const std::uint64_t p : chunks[chunk]) {
+      pairs_[next[lower(p) >> bucket_bits]++] = std::bit_cast<SpherePair>(p);
+    }
   });
   return bucket_bits;
 }

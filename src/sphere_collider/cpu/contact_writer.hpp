@@ -6,6 +6,8 @@
 #include "src/base/thread_pool.hpp"
 #include "src/sphere_collider/cpu/pair_chunks.hpp"
 
+#include <memory>
+#include <mutex>
 #include <vector>
 
 namespace jfpx {
@@ -28,6 +30,17 @@ class ContactWriter {
     const std::uint64_t* pairs = nullptr;
     std::uint64_t count = 0;
   };
+  /// What a thread needs to sort a part of the result.
+  struct Workspace {
+    Buffer<std::uint64_t> pairs;  ///< of the part, by lower sphere
+    Buffer<Row> rows;             ///< of the part
+    Buffer<SpherePair> spare;     ///< for sorting a long row
+  };
+  struct GiveBack {
+    ContactWriter* writer;
+    void operator()(Workspace* workspace) const;
+  };
+  using TakenWorkspace = std::unique_ptr<Workspace, GiveBack>;
 
   template <class Item, class Make>
   std::span<const Item> write_chunks(const PairChunks& chunks, ThreadPool& pool,
@@ -39,16 +52,19 @@ class ContactWriter {
   static void prefetch(const Row& row);
   unsigned index_rows(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool);
   unsigned divide(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool);
-  void make_rows(std::size_t bucket, std::size_t first, std::size_t last);
+  void reserve_workspaces(std::size_t count, std::size_t rows, std::size_t parts);
+  TakenWorkspace take_workspace();
+  const Row* make_rows(std::size_t bucket, std::size_t first, std::size_t last,
+                       Workspace* workspace) const;
 
   Buffer<SphereContact> contacts_;
-  Buffer<SpherePair> pairs_;
-  std::vector<Buffer<SpherePair>> spares_;  ///< by part of the result, for sorting long rows
-  Buffer<std::uint64_t> sections_;          ///< begins of parts of the result, and its end
-  Buffer<Row> rows_;                        ///< by lower sphere
-  Buffer<std::uint64_t> offsets_;           ///< per chunk and bucket
-  Buffer<std::uint64_t> divided_;           ///< pairs by bucket of neighbouring lower spheres
-  Buffer<std::uint64_t> grouped_;           ///< pairs by lower sphere
+  Buffer<SpherePair> pairs_;           ///< the result; before, the bits of packed pairs by bucket
+  Buffer<std::uint64_t> sections_;     ///< begins of parts of the result, and its end
+  Buffer<Row> rows_;                   ///< by lower sphere; for PairOrder::by_lower_sphere
+  Buffer<std::uint64_t> offsets_;      ///< per chunk and bucket
+  std::vector<Workspace> workspaces_;  ///< by thread
+  std::vector<Workspace*> idle_;       ///< those that no thread has
+  std::mutex mutex_;                   ///< guards idle_
 };
 
 }  // namespace cpu

@@ -71,8 +71,9 @@ class PairChunks {
       Buffer<std::uint64_t>& pairs = self->chunk->pairs;
       const auto used = static_cast<std::size_t>(self->next - pairs.data());
       constexpr std::size_t kSmallest = 1024;
-      static_assert(kSmallest >= kRoom);
-      pairs.reserve(std::max(kSmallest, 2 * pairs.capacity()), "pairs of spheres", used);
+      static_assert(kSmallest / 4 >= kRoom);
+      pairs.reserve(std::max(kSmallest, pairs.capacity() + pairs.capacity() / 4),
+                    "pairs of spheres", used);
       self->next = pairs.data() + used;
       self->end = pairs.data() + pairs.capacity();
     }
