@@ -1,0 +1,3 @@
+jfpx_add_test(soft_step_test INTERNAL SOURCES
+  contact_solver/sequence_numbers_test.cpp
+  contact_solver/sphere_row_test.cpp)
