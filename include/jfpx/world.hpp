@@ -332,9 +332,9 @@ class JFPX_API World {
   std::span<const ContactEvent> contact_events() const;
   /// state_hash() of states().
   std::uint64_t state_hash() const;
-  /// The scene that was passed to the constructor; its bodies are those at construction. restore()
-  /// replaces name and settings, but not the bodies and ignored pairs.
-  const Scene& scene() const;
+  /// Name and settings of the world, as a Scene without bodies and ignored pairs; restore()
+  /// replaces them.
+  const Scene& settings() const;
 
  private:
   ForceContext force_context();

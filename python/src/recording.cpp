@@ -25,7 +25,7 @@ void bind_recording(nb::module_& module) {
       .def("__init__",
            [](Writer* self, const std::string& path, const PythonWorld& world) {
              new (self) Writer{RecordingWriter(
-                 path, {.engine = "native", .backend = "cpu", .scene = world.get().scene()})};
+                 path, {.engine = "native", .backend = "cpu", .scene = world.scene()})};
            })
       .def("append",
            [](Writer& self, const PythonWorld& world) { self.get().append(world.get().states()); })

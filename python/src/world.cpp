@@ -261,7 +261,7 @@ void bind_world(nb::module_& module) {
              const auto* first = static_cast<const std::byte*>(snapshot.data());
              self.get().restore({.bytes = {first, first + snapshot.size()}});
            })
-      .def("scene", [](const PythonWorld& self) { return self.get().scene(); });
+      .def("scene", &PythonWorld::scene);
   bind_bodies(world);
   bind_properties(world);
   bind_forces(module, world);

@@ -18,7 +18,7 @@ namespace python {
 class PythonWorld {
  public:
   PythonWorld(const Scene& scene, const WorldSettings& settings)
-      : world_(std::make_unique<World>(scene, settings)) {}
+      : scene_(scene), world_(std::make_unique<World>(scene, settings)) {}
   ~PythonWorld() { free(); }
   PythonWorld(const PythonWorld&) = delete;
   PythonWorld& operator=(const PythonWorld&) = delete;
@@ -36,6 +36,14 @@ class PythonWorld {
     wait_for_readers();
     ++changes_;
     return world;
+  }
+
+  /// The scene of the constructor, with the settings that restore() has replaced.
+  Scene scene() const {
+    Scene scene = get().settings();
+    scene.bodies = scene_.bodies;
+    scene.ignored_pairs = scene_.ignored_pairs;
+    return scene;
   }
 
   /// One step without Python's global lock.
@@ -70,6 +78,7 @@ class PythonWorld {
   }
 
   std::vector<std::pair<ForceId, nb::object>> functions_;  // outlive the world, which calls them
+  Scene scene_;                                            ///< of the constructor
   std::unique_ptr<World> world_;
   std::atomic<bool> in_use_ = false;
   std::uint64_t changes_ = 0;

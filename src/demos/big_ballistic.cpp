@@ -13,12 +13,14 @@ namespace {
 
 class BigBallistic final : public GunDemo {
  public:
-  explicit BigBallistic(const Options& options) : options_(options), world_(start()) {}
+  explicit BigBallistic(const Options& options)
+      : settings_(options.world), scene_(make_scene(options)), world_(scene_, settings_) {}
 
   std::string_view name() const override { return "big-ballistic"; }
-  Real dt() const override { return world_.scene().dt; }
+  Real dt() const override { return scene_.dt; }
   std::vector<BodyState> states() const override { return world_.states(); }
   const World* world() const override { return &world_; }
+  const Scene* scene() const override { return &scene_; }
   void draw(View* view) const override;
 
  private:
@@ -28,14 +30,14 @@ class BigBallistic final : public GunDemo {
     double fired;  ///< [s]
   };
 
-  World start() const {
-    Scene scene = scenes::make("big-ballistic", options_.scene);
-    scene.dt = options_.dt.value_or(scene.dt);
-    return World(scene, options_.world);
+  static Scene make_scene(const Options& options) {
+    Scene scene = scenes::make("big-ballistic", options.scene);
+    scene.dt = options.dt.value_or(scene.dt);
+    return scene;
   }
   std::size_t rounds() const override { return rounds_.size(); }
   void restart() override {
-    world_ = start();
+    world_ = World(scene_, settings_);
     rounds_.clear();
   }
   void fire(Weapon weapon) override {
@@ -45,14 +47,15 @@ class BigBallistic final : public GunDemo {
   bool is_crate(std::uint32_t body) const;
   bool hit_a_crate(BodyId round) const;
 
-  Options options_;
+  WorldSettings settings_;
+  Scene scene_;
   World world_;
   std::vector<Round> rounds_;  ///< rounds in flight, oldest first
 };
 
 /// Bodies of the scene keep their indices, because only rounds are added and removed.
 bool BigBallistic::is_crate(std::uint32_t body) const {
-  const std::vector<BodyDef>& bodies = world_.scene().bodies;
+  const std::vector<BodyDef>& bodies = scene_.bodies;
   return body < bodies.size() && std::holds_alternative<Box>(bodies[body].shape);
 }
 
@@ -95,7 +98,7 @@ void BigBallistic::draw(View* view) const {
     view->items.push_back(shadow_of(item, Real(0.01)));
     view->items.push_back(item);
   };
-  const std::vector<BodyDef>& bodies = world_.scene().bodies;
+  const std::vector<BodyDef>& bodies = scene_.bodies;
   for (const BodyId id : world_.bodies()) {
     if (id.index < bodies.size() && bodies[id.index].mass > 0) {
       add(bodies[id.index].shape, id, {0.75F, 0.55F, 0.3F});

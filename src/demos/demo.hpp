@@ -55,6 +55,8 @@ class Demo {
   virtual void draw(View* view) const = 0;
   /// The world of the demo's rigid bodies; null if the demo has none.
   virtual const World* world() const { return nullptr; }
+  /// The scene that this world starts from; null if the demo has none.
+  virtual const Scene* scene() const { return nullptr; }
 
  protected:
   explicit Demo(std::span<const Control> controls) : controls_(controls), down_(controls.size()) {}

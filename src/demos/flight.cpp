@@ -101,14 +101,16 @@ class Flight final : public Demo {
  public:
   explicit Flight(const Options& options)
       : Demo(kControls),
-        world_(flight_scene(options.dt.value_or(Real(1) / Real(60))), options.world) {
+        scene_(flight_scene(options.dt.value_or(Real(1) / Real(60)))),
+        world_(scene_, options.world) {
     add_forces();
   }
 
   std::string_view name() const override { return "flight"; }
-  Real dt() const override { return world_.scene().dt; }
+  Real dt() const override { return scene_.dt; }
   std::vector<BodyState> states() const override { return world_.states(); }
   const World* world() const override { return &world_; }
+  const Scene* scene() const override { return &scene_; }
   void draw(View* view) const override;
 
  private:
@@ -121,6 +123,7 @@ class Flight final : public Demo {
   StepReport advance() override;
   void keep_above_ground();
 
+  Scene scene_;
   World world_;
   std::array<ForceId, kSurfaces> surfaces_;
   std::array<Real, kSurfaces> control_{};  ///< [-], deflections in [-1, 1]

@@ -42,7 +42,8 @@ class Fountain final : public Demo {
         balls_(options.scene.spheres.value_or(kDefaultBalls)),
         side_(nozzle_side(balls_)),
         random_(options.scene.seed),
-        world_(start()) {
+        scene_(basin()),
+        world_(scene_, options.world) {
     if (options.scene.boxes) {
       throw InvalidArgument("boxes is " + std::to_string(*options.scene.boxes) +
                             "; it must be absent, because \"fountain\" has no boxes");
@@ -50,9 +51,10 @@ class Fountain final : public Demo {
   }
 
   std::string_view name() const override { return "fountain"; }
-  Real dt() const override { return world_.scene().dt; }
+  Real dt() const override { return scene_.dt; }
   std::vector<BodyState> states() const override { return world_.states(); }
   const World* world() const override { return &world_; }
+  const Scene* scene() const override { return &scene_; }
   void draw(View* view) const override;
 
  private:
@@ -61,14 +63,13 @@ class Fountain final : public Demo {
     std::uint64_t step;  ///< World::steps() at the addition
   };
 
-  /// The basin.
-  World start() const {
+  Scene basin() const {
     Scene scene;
     scene.name = "fountain";
     scene.dt = options_.dt.value_or(scene.dt);
     const Real half = side_ * kSpacing * Real(0.5) + 4;
     scenes::add_container(scene, {-half, 0, -half}, {half, kRim, half}, false, BodyDef{});
-    return World(scene, options_.world);
+    return scene;
   }
   void act(std::size_t control) override {
     if (control == kJet) {
@@ -76,7 +77,7 @@ class Fountain final : public Demo {
       return;
     }
     random_ = Random(options_.scene.seed);
-    world_ = start();
+    world_ = World(scene_, options_.world);
     alive_.clear();
     flows_ = true;
     flow_steps_ = emitted_ = 0;
@@ -88,6 +89,7 @@ class Fountain final : public Demo {
   std::uint32_t balls_;  ///< in the world after kLifetime
   Real side_;            ///< sites along an edge of the nozzle
   Random random_;
+  Scene scene_;  ///< the basin
   World world_;
   bool flows_ = true;
   std::uint64_t flow_steps_ = 0;  ///< in which the jet was on
@@ -133,7 +135,7 @@ void Fountain::draw(View* view) const {
   const Real distance = side_ * kSpacing + 11;
   view->camera.eye = {distance * Real(0.35), distance * Real(0.6), distance * Real(0.8)};
   view->camera.target = {0, Real(1.5), 0};
-  for (const BodyDef& wall : world_.scene().bodies) {
+  for (const BodyDef& wall : scene_.bodies) {
     view->items.push_back({.shape = wall.shape, .position = wall.position, .colour = kGrey});
   }
   for (const Ball& ball : alive_) {

@@ -41,6 +41,7 @@ class SceneDemo final : public Demo {
   Real dt() const override { return scene_.dt; }
   std::vector<BodyState> states() const override { return world_.states(); }
   const World* world() const override { return &world_; }
+  const Scene* scene() const override { return &scene_; }
 
   void draw(View* view) const override {
     *view = {};

@@ -53,7 +53,7 @@ class DemoEngine final : public Engine {
   std::string backend() const override { return std::string(to_string(report_.backend)); }
   std::string resolver() const override {
     const World* world = demo_->world();
-    return world == nullptr ? std::string() : std::string(resolver_name(world->scene().solver));
+    return world == nullptr ? std::string() : std::string(resolver_name(world->settings().solver));
   }
   std::string device_failure() const override { return device_failure_; }
   std::string trouble() const override { return trouble_of(report_); }
@@ -70,7 +70,7 @@ class DemoEngine final : public Engine {
 std::unique_ptr<Engine> make_demo_engine(const RunOptions& options, const std::string& script,
                                          Scene* start) {
   std::unique_ptr<demos::Demo> demo = make_demo(options);
-  *start = demo->world() != nullptr ? demo->world()->scene() : Scene{};
+  *start = demo->scene() != nullptr ? *demo->scene() : Scene{};
   start->name = demo->name();
   start->dt = demo->dt();
   const demos::InputScript inputs = script.empty()

@@ -28,7 +28,7 @@ class NativeEngine final : public Engine {
   World* world() override { return &world_; }
   std::string backend() const override { return std::string(to_string(report_.backend)); }
   std::string resolver() const override {
-    return std::string(resolver_name(world_.scene().solver));
+    return std::string(resolver_name(world_.settings().solver));
   }
   std::string choice() const override {
     return fmt::format("{}, {}, {}", to_string(report_.backend), to_string(report_.algorithm),

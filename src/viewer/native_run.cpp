@@ -13,7 +13,8 @@ class NativeRun final : public Run {
   NativeRun(const Scene& scene, const EngineChoice& choice, std::uint64_t first_step)
       : choice_(choice),
         first_step_(first_step),
-        world_(scene, {.collider = collider_options(choice)}) {}
+        scene_(scene),
+        world_(scene_, {.collider = collider_options(choice)}) {}
 
   void step() override { report_ = world_.step(); }
 
@@ -26,8 +27,7 @@ class NativeRun final : public Run {
     run_state.times = {report_.integrate_ms, 0, report_.detect_ms, report_.resolve_ms,
                        report_.total_ms};
     run_state.iterations = report_.position_iterations + report_.velocity_iterations;
-    const Scene& scene = world_.scene();
-    if (scene.solver == Solver::soft_step) run_state.substeps = scene.soft_step.substeps;
+    if (scene_.solver == Solver::soft_step) run_state.substeps = scene_.soft_step.substeps;
     run_state.computed_by = to_string(report_.backend);
     if (report_.non_finite) {
       run_state.trouble = "body " + std::to_string(report_.non_finite_body.index) +
@@ -40,7 +40,7 @@ class NativeRun final : public Run {
   bool switch_to(const EngineChoice& choice) override {
     if (choice.engine != EngineKind::native || choice.threads != choice_.threads) return false;
     // A world on another device continues with the same bits.
-    World next(world_.scene(), {.collider = collider_options(choice)});
+    World next(scene_, {.collider = collider_options(choice)});
     next.restore(world_.snapshot());
     world_ = std::move(next);
     choice_ = choice;
@@ -50,6 +50,7 @@ class NativeRun final : public Run {
  private:
   EngineChoice choice_;
   std::uint64_t first_step_;
+  Scene scene_;
   World world_;
   StepReport report_;
 };

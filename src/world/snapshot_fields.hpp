@@ -73,7 +73,7 @@ void serialize(auto& archive, Is<MaterialSettings> auto& settings) {
   auto& [friction, restitution] = settings;
   archive(friction, restitution);
 }
-/// Name and settings, without the bodies and pairs, which are those at construction.
+/// Name and settings, without the bodies and pairs.
 void serialize(auto& archive, Is<Scene> auto& scene) {
   auto& [name, dt, bodies, solver, soft_step, resolver, sleep, materials, ignored_pairs] = scene;
   archive(name, dt, solver, soft_step, resolver, sleep, materials);

@@ -19,9 +19,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// Upper estimate of the memory per body: in the scene, in the body store and in the copy that
-/// undo() restores. Used in an error message only.
-constexpr std::size_t kBytesPerBody = 1280;
+/// Upper estimate of the memory per body: in the body store and in the copy that undo() restores.
+/// Used in an error message only.
+constexpr std::size_t kBytesPerBody = 128 * sizeof(Real);
 
 constexpr std::size_t kBodiesPerTask = 4096;
 

@@ -178,7 +178,7 @@ std::span<const ContactEvent> World::contact_events() const {
 
 std::uint64_t World::state_hash() const { return jfpx::state_hash(states()); }
 
-const Scene& World::scene() const { return impl_->scene; }
+const Scene& World::settings() const { return impl_->scene; }
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -33,7 +33,7 @@ struct World::Impl {
   Impl(const Scene& given, std::unique_ptr<ThreadPool> threads,
        std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase, SimdLevel simd)
       : pool(std::move(threads)),
-        scene(given),
+        scene(settings_of(given)),
         store(empty_store(given)),
         contact_finder(std::move(collider), broad_phase),
         soft_step(given.soft_step, given.materials, given.dt, pool.get(), simd) {
@@ -149,6 +149,12 @@ struct World::Impl {
   /// Forgets the queue, before the state is replaced.
   void drop_queue() noexcept;
 
+  /// A copy of a scene without bodies and ignored pairs.
+  static Scene settings_of(const Scene& scene) {
+    const auto& [name, dt, bodies, solver, soft_step, resolver, sleep, materials, ignored_pairs] =
+        scene;
+    return {name, dt, {}, solver, soft_step, resolver, sleep, materials, {}};
+  }
   /// A store without bodies for a scene.
   static BodyStore empty_store(const Scene& scene) {
     return {scene.dt, scene.sleep,
@@ -227,7 +233,7 @@ struct World::Impl {
   void read(BinaryReader* reader);
 
   std::unique_ptr<ThreadPool> pool;  ///< of the collider, if make_sphere_collider() made it, too
-  Scene scene;
+  Scene scene;                       ///< the settings, without bodies and ignored pairs
   /// Bodies. While `resident`, their motion may be older than that on the device.
   BodyStore store;
   ContactFinder contact_finder;

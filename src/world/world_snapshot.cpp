@@ -44,8 +44,6 @@ void World::Impl::read(BinaryReader* reader) {
   soft_step.reserve(bodies.capacity());
 
   // From here on, nothing throws.
-  settings.bodies = std::move(scene.bodies);
-  settings.ignored_pairs = std::move(scene.ignored_pairs);
   scene = std::move(settings);
   drop_queue();
   forget_device();

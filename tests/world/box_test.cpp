@@ -37,8 +37,9 @@ BodyDef floating(BodyDef def) {
 test::Sums box_sums(const World& world) {
   test::Sums total;
   const auto states = world.states();
+  const std::vector<BodyDef> bodies = test::definitions(world);
   for (std::size_t i = 0; i < states.size(); ++i) {
-    const BodyDef& def = world.scene().bodies[i];
+    const BodyDef& def = bodies[i];
     if (!(def.mass > 0)) continue;
     const BodyState& s = states[i];
     const auto* box = std::get_if<Box>(&def.shape);

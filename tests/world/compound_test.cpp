@@ -327,8 +327,9 @@ TEST(Compound, RunsTheSameWithAnyNumberOfThreadsAndAlgorithm) {
 double energy(const World& world) {
   double sum = 0;
   const auto states = world.states();
+  const std::vector<BodyDef> bodies = test::definitions(world);
   for (std::size_t i = 0; i < states.size(); ++i) {
-    const BodyDef& def = world.scene().bodies[i];
+    const BodyDef& def = bodies[i];
     if (!(def.mass > 0)) continue;
     const BodyState& s = states[i];
     const Mat3 tensor = detail::in_world_axes(

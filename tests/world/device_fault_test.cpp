@@ -47,13 +47,13 @@ TEST(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
   }
   constexpr int kSteps = 4;
   const Scene scene = scenes::make("mixed", {.spheres = 40});
-  const auto run = [](World* world) {
+  const auto run = [&scene](World* world) {
     for (int n = 0; n < kSteps; ++n) {
       world->apply_force(world->bodies()[1], {3, 4, 5});
       world->set_state(world->bodies()[2], {{0, static_cast<Real>(n), 0}, {}, {1, 0, 0}, {}});
       if (n == 2) retry([&] { world->remove(world->bodies()[20]); });
       if (n > 0) {
-        retry([&] { world->add(world->scene().bodies[static_cast<std::size_t>(10 + n)]); });
+        retry([&] { world->add(scene.bodies[static_cast<std::size_t>(10 + n)]); });
       }
       world->step();
     }

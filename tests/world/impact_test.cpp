@@ -144,11 +144,11 @@ TEST(Impacts, CollisionsConserveTheMomentum) {
       scene.bodies.push_back(body);
     }
     World world(test::awake(scene));
-    const auto momentum = [&world] {
+    const auto momentum = [&world, &scene] {
       Vec3 sum;
       const std::vector<BodyState> states = world.states();
       for (std::size_t i = 0; i < states.size(); ++i) {
-        sum += states[i].velocity * world.scene().bodies[i].mass;
+        sum += states[i].velocity * scene.bodies[i].mass;
       }
       return sum;
     };

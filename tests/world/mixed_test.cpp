@@ -16,9 +16,10 @@ JFPX_SOLVER_SUITE(Mixed);
 /// Kinetic and potential energy of the movable bodies, in double.
 double energy(const World& world) {
   const std::vector<BodyState> states = world.states();
+  const std::vector<BodyDef> bodies = test::definitions(world);
   double sum = 0;
   for (std::size_t i = 0; i < states.size(); ++i) {
-    const BodyDef& def = world.scene().bodies[i];
+    const BodyDef& def = bodies[i];
     if (!(def.mass > 0)) continue;
     const Vec3 spin =
         transform_transpose(to_matrix(states[i].orientation), states[i].angular_velocity);
@@ -44,12 +45,13 @@ Real extent(const Shape& shape) {
 /// The largest penetration of a wall, as a fraction of the body's smallest extent.
 Real worst_intrusion(const World& world) {
   const std::vector<BodyState> states = world.states();
+  const std::vector<BodyDef> bodies = test::definitions(world);
   Real worst = 0;
-  for (const BodyDef& wall : world.scene().bodies) {
+  for (const BodyDef& wall : bodies) {
     const auto* solid = std::get_if<HalfSpace>(&wall.shape);
     if (solid == nullptr) continue;
     for (std::size_t i = 0; i < states.size(); ++i) {
-      const BodyDef& def = world.scene().bodies[i];
+      const BodyDef& def = bodies[i];
       if (!(def.mass > 0)) continue;
       const Real height = dot(solid->normal, states[i].position) - solid->offset;
       worst = std::max(worst, 1 - height / extent(def.shape));

@@ -111,7 +111,7 @@ TEST_P(Property, ThatIsSetGivesTheBitsOfABodyDefinedWithIt) {
 TEST_P(Property, MassAndInertiaDivideForceAndTorque) {
   World world = world_with({test::ball({0, 0, 0}, 1, 2)});
   const BodyId id = world.bodies()[0];
-  const Real dt = world.scene().dt;
+  const Real dt = world.settings().dt;
   world.set_mass(id, 8);
   world.apply_force(id, {4, 0, 0});
   world.apply_torque(id, {0, 0, 6.4_r});
@@ -214,7 +214,7 @@ TEST_P(Property, AccelerationWakesTheBody) {
   EXPECT_TRUE(world.awake(id));
   world.step();
   // Each of k substeps accelerates by 0.1 / k and then damps: a geometric sum.
-  const double k = test::substeps(world.scene()), q = std::pow(0.5, 1 / (60 * k));
+  const double k = test::substeps(world.settings()), q = std::pow(0.5, 1 / (60 * k));
   EXPECT_NEAR(world.state(id).velocity.x, 0.1 / k * q * (1 - std::pow(q, k)) / (1 - q), 1e-6);
   for (const auto& change :
        std::vector<std::function<void()>>{[&] { world.set_mass(id, 3); },

@@ -37,7 +37,7 @@ inline BodyDef heavy_ball(const Vec3& position, Real radius, Real mass = 1) {
 
 inline std::vector<BodyState> states_of(const World& world) { return world.states(); }
 inline void run(World* world, double seconds) {
-  const auto steps = std::lround(seconds / static_cast<double>(world->scene().dt));
+  const auto steps = std::lround(seconds / static_cast<double>(world->settings().dt));
   for (long i = 0; i < steps; ++i) world->step();
 }
 /// [s], time after which all bodies sleep; the limit if they do not.
@@ -77,7 +77,7 @@ inline Speeds speeds(const World& world) {
   double squares = 0, count = 0;
   const std::vector<BodyState> states = world.states();
   for (std::size_t i = 0; i < states.size(); ++i) {
-    if (!(world.scene().bodies[i].mass > 0)) continue;
+    if (!(world.mass(world.bodies()[i]) > 0)) continue;
     const auto speed = static_cast<double>(length(states[i].velocity));
     squares += speed * speed;
     count += 1;

@@ -27,12 +27,13 @@ TEST(Stacks, AWallOf80BricksStands) {
   expect_that_it_stands(scenes::make("wall", {.spheres = 0}), 10);
 }
 TEST(Stacks, AWallFallsWhenABallHitsIt) {
-  World world(scenes::make("wall"));
+  const Scene scene = scenes::make("wall");
+  World world(scene);
   test::run(&world, 3);
   const std::vector<BodyState> states = world.states();
   int fallen = 0;
   for (std::size_t i = 0; i < 80; ++i) {
-    if (length(states[i].position - world.scene().bodies[i].position) > 1) ++fallen;
+    if (length(states[i].position - scene.bodies[i].position) > 1) ++fallen;
   }
   EXPECT_GT(fallen, 5);
   EXPECT_LT(fallen, 70);

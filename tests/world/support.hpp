@@ -166,7 +166,19 @@ inline Sums sums(std::span<const BodyDef> bodies, std::span<const BodyState> sta
   }
   return total;
 }
-inline Sums sums(const World& world) { return sums(world.scene().bodies, world.states()); }
+/// Shapes, masses and accelerations of the bodies, in the order of their states.
+inline std::vector<BodyDef> definitions(const World& world) {
+  std::vector<BodyDef> definitions;
+  for (const BodyId id : world.bodies()) {
+    BodyDef def;
+    def.shape = world.shape(id);
+    def.mass = world.mass(id);
+    def.acceleration = world.acceleration(id);
+    definitions.push_back(def);
+  }
+  return definitions;
+}
+inline Sums sums(const World& world) { return sums(definitions(world), world.states()); }
 
 }  // namespace test
 }  // namespace JFPX_ABI
