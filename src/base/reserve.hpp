@@ -12,13 +12,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Reserves capacity for `count` elements in total. The capacity grows geometrically, so that a
-/// series of calls takes linear time, but by a quarter only, because the lists of contacts are most
+/// series of calls takes linear time, but by an eighth only, because the lists of contacts are most
 /// of the memory of a world.
 /// @throws std::bad_alloc, std::length_error as std::vector::reserve()
 template <class T>
 void reserve_geometric(std::vector<T>* items, std::size_t count) {
   const std::size_t capacity = items->capacity();
-  if (capacity < count) items->reserve(std::max(count, capacity + capacity / 4));
+  if (capacity < count) items->reserve(std::max(count, capacity + capacity / 8));
 }
 
 /// As items->resize(count), but the capacity grows geometrically even if the size was reduced

@@ -181,8 +181,9 @@ bool World::Impl::advance_worst_first(StepReport* report) {
   return true;
 }
 
-/// Copies the arrays that a step changes before it can fail. Copying all of them would take longer
-/// than some stages of a step on many threads.
+/// Copies the arrays that a step changes before it can fail; of soft_step, forces and torques only
+/// if there are functions that add to them. Copying all arrays would take longer than some stages
+/// of a step on many threads.
 void World::Impl::save_for_undo() {
   const MotionArrays& now = bodies().moving;
   is_saved = true;
@@ -190,12 +191,19 @@ void World::Impl::save_for_undo() {
     before = now;
     return;
   }
+  const bool saves_forces = !forces.ids().empty();
+  if (!saves_forces) {
+    before.force.clear();
+    before.torque.clear();
+  }
   pool->run(6, [&](std::size_t array) {
     switch (array) {
       case 0:
-        return void(before.force = now.force);
+        if (saves_forces) before.force = now.force;
+        return;
       case 1:
-        return void(before.torque = now.torque);
+        if (saves_forces) before.torque = now.torque;
+        return;
       case 2:
         return void(before.last_acceleration = now.last_acceleration);
       case 3:
@@ -214,8 +222,10 @@ void World::Impl::undo_motion() noexcept {
   if (scene.solver == Solver::worst_first) {
     std::swap(now, before);
   } else {
-    std::swap(now.force, before.force);
-    std::swap(now.torque, before.torque);
+    if (!before.force.empty()) {
+      std::swap(now.force, before.force);
+      std::swap(now.torque, before.torque);
+    }
     std::swap(now.last_acceleration, before.last_acceleration);
     std::swap(now.mean_motion, before.mean_motion);
     std::swap(now.rest_time, before.rest_time);
