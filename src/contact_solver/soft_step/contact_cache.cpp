@@ -12,7 +12,7 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 namespace {
 
-constexpr std::size_t kContactsPerChunk = 2048;
+constexpr std::size_t kMatchesPerChunk = 2048;
 
 /// Finds contacts of a sorted list by ascending keys.
 template <class Contact>
@@ -51,11 +51,11 @@ void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls, Thr
   }
   resize_geometric(&now.colors, now.size());
   coloring_.start(inverse_mass.size());
-  parallel_for(pool, spheres, kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+  parallel_for(pool, spheres, kMatchesPerChunk, [&](std::size_t first, std::size_t last) {
     match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
   });
   parallel_for(
-      pool, now.manifolds.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+      pool, now.manifolds.size(), kMatchesPerChunk, [&](std::size_t first, std::size_t last) {
         match_manifolds(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
       });
   const ContactView contacts = now.view();
