@@ -10,8 +10,6 @@
 
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <array>
 #include <string>
 
 namespace jfpx {
@@ -44,7 +42,6 @@ void search(benchmark::State& state, Real speed, bool keeps) {
   MovingGas gas(speed);
   const auto collider = make_sphere_collider({.backend = Backend::cpu});
   NeighborList list;
-  std::array<SpherePair, NearPairs::kMostSelected> room;
   std::size_t pairs = 0;
   for (auto _ : state) {
     gas.move();
@@ -54,10 +51,8 @@ void search(benchmark::State& state, Real speed, bool keeps) {
     }
     const NearPairs found = list.find(gas.spheres(), collider.get(), nullptr);
     pairs = 0;
-    for (std::size_t first = 0; first < found.pairs.size(); first += room.size()) {
-      const std::size_t last = std::min(first + room.size(), found.pairs.size());
-      pairs += found.touching(gas.spheres(), first, last, room.data()).size();
-    }
+    found.for_each_touching(gas.spheres(), 0, found.pairs.size(),
+                            [&pairs](std::span<const SpherePair> part) { pairs += part.size(); });
   }
   state.counters["pairs"] = static_cast<double>(pairs);
 }

@@ -30,7 +30,7 @@ btVector3 let_fall(btDiscreteDynamicsWorld& world) {
         cell * btScalar(0.97) + btVector3(cell.y() * btScalar(0.1), btScalar(0.5), 0));
   }
   for (const auto& body : bodies) world.addRigidBody(body.get());
-  for (int step = 0; step < 40; ++step) world.stepSimulation(btScalar(1) / 60, 1);
+  for (int step = 0; step < 15; ++step) world.stepSimulation(btScalar(1) / 60, 1);
   const btVector3 last = bodies.back()->getWorldTransform().getOrigin();
   for (const auto& body : bodies) world.removeRigidBody(body.get());
   return last;

@@ -39,14 +39,13 @@ class RecordingWriter:
 
     def __init__(self, path: str | os.PathLike[str], world: World) -> None:
         _arrays.instance(world, "world", World)
-        if world.time != 0:
+        if world._core.steps() != 0:
             raise InvalidArgument("the world has made steps; a recording begins with a new world, "
                                   "such as World(world.scene)")
         self._refuse_forces(world)
         core = _arrays.precision_of(world.dtype)
         self._writer = core.RecordingWriter(_arrays.path(path), world._core)
         self._world = world
-        self._dt = world.scene.dt
         self._steps = 0
 
     @staticmethod
@@ -72,7 +71,7 @@ class RecordingWriter:
         """
         world = self._world
         self._refuse_forces(world)
-        made = round(world.time / self._dt) - self._steps
+        made = world._core.steps() - self._steps
         if made != 1 and self._writer.is_open():
             raise InvalidArgument(f"the world has made {made} steps since the last append(); append "
                                   "the states of each step, once")

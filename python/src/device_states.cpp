@@ -91,8 +91,7 @@ void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world) {
   nb::class_<DeviceRows>(
       module, "DeviceRows", nb::type_slots(kRowsSlots),
       "Array of World.device_states() in the memory of a GPU. Valid until step(), run() or a "
-      "change "
-      "of the world; steps of enqueue_steps() change it in place. Must not be written.")
+      "change of the world; steps of enqueue_steps() change it in place. Must not be written.")
       .def("__dlpack__", &to_dlpack,
            "A capsule of DLPack that shares the array. Raises InvalidArgument after a step or "
            "change of the world, BufferError if `copy` is true.")

@@ -250,6 +250,7 @@ void bind_world(nb::module_& module) {
       .def("run", [](PythonWorld& self, std::uint64_t steps) { return to_python(self.run(steps)); })
       .def("close", &PythonWorld::close)
       .def("time", [](const PythonWorld& self) { return self.get().time(); })
+      .def("steps", [](const PythonWorld& self) { return self.get().steps(); })
       .def("state_hash", [](const PythonWorld& self) { return self.get().state_hash(); })
       .def("snapshot",
            [](const PythonWorld& self) {

@@ -177,8 +177,9 @@ JFPX_HD inline void face_points(const Vec3& half, int face, Real side, const Vec
 }
 
 /// The midpoint between the closest points of two lines (Goldman 1990), clamped to the edges: edge
-/// i of a and edge j of b, of each direction the edge nearest to the other box. The edges must not
-/// be parallel.
+/// i of a and edge j of b, of each direction the edge nearest to the other box. If the boxes
+/// overlap and only one edge ends before the other, the midpoint at that end. The edges must not be
+/// parallel.
 JFPX_HD inline Vec3 edge_point(const BoxPair& pair, int i, int j, const LeastOverlap& least) {
   const Mat3 identity;
   const Vec3 dir_a = unit_axis(i), dir_b = pair.rotation.column(j);

@@ -95,8 +95,9 @@ void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_fr
     pool_.use(i);
     set_shape(i, std::move(shape_[i]));
     inverse_mass_[i] = mass_[i] > 0 ? Real(1) / mass_[i] : Real(0);
-    const bool is_solid_ball = std::holds_alternative<Sphere>(shape_[i]) && !inertia_given(i);
-    if (kinematic(i) || (movable(i) && !is_solid_ball)) make_inertia_arrays();
+    if (needs_inertia_arrays(shape_[i], mass_[i], kinematic(i), inertia_given(i))) {
+      make_inertia_arrays();
+    }
     inertia_given(i) ? set_tensor(i, given_inertia_.at(i)) : compute_inertia(i, std::nullopt);
     set_damping(i, linear_damping_[i], angular_damping_[i]);
     if (filter_[i] != CollisionFilter{}) ++filtered_count_;

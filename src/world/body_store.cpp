@@ -117,8 +117,9 @@ BodyId BodyStore::add(const BodyDef& def) {
   Shape shape = normalized(def.shape);  // may throw, hence before any change
   std::map<std::uint32_t, Mat3> given;
   if (def.inertia && def.mass > 0) given[0] = {};
-  const bool is_solid_ball = std::holds_alternative<Sphere>(def.shape) && !def.inertia;
-  if (def.kinematic || (def.mass > 0 && !is_solid_ball)) make_inertia_arrays();
+  if (needs_inertia_arrays(def.shape, def.mass, def.kinematic, def.inertia.has_value())) {
+    make_inertia_arrays();
+  }
   if (pool_.is_full()) add_slot();
   const BodyId id = pool_.add();  // from here on nothing allocates
   const std::uint32_t i = id.index;
@@ -160,6 +161,12 @@ void BodyStore::set_mass(std::uint32_t i, Real mass) {
 Mat3 BodyStore::inertia(std::uint32_t i) const {
   if (!movable(i)) return diagonal({0, 0, 0});
   return inertia_given(i) ? given_inertia_.at(i) : tensor_of(shape_[i], mass_[i]);
+}
+
+bool BodyStore::needs_inertia_arrays(const Shape& shape, Real mass, bool kinematic,
+                                     bool inertia_given) {
+  const bool is_solid_ball = std::holds_alternative<Sphere>(shape) && !inertia_given;
+  return kinematic || (mass > 0 && !is_solid_ball);
 }
 
 void BodyStore::make_inertia_arrays() {

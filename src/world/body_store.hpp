@@ -169,6 +169,8 @@ class BodyStore {
   void add_slot();
   void set_shape(std::uint32_t body, Shape shape) noexcept;
   void count_body(std::uint32_t body) noexcept;
+  static bool needs_inertia_arrays(const Shape& shape, Real mass, bool kinematic,
+                                   bool inertia_given);
   Mat3 body_inverse_inertia(std::uint32_t body) const;
   void compute_inertia(std::uint32_t body, const std::optional<Mat3>& given);
   void set_tensor(std::uint32_t body, const Mat3& tensor);

@@ -5,7 +5,6 @@
 #include "src/world/merge_contacts.hpp"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 namespace jfpx {
@@ -199,11 +198,9 @@ std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real marg
   const auto bounds = std::span(swept_).first(sub_shapes_.fixed_begin());
   const NearPairs found = broad_phase_.find_pairs(bounds, pool);
   const auto test_pairs = [&](std::size_t first, std::size_t last, Part* part) {
-    std::array<SpherePair, kPairsPerChunk> room;
-    for (; first < last; first += room.size()) {  // without a pool, a chunk may be larger
-      const std::size_t end = std::min(last, first + room.size());
-      test_sphere_pairs(bodies, found.touching(bounds, first, end, room.data()), part);
-    }
+    found.for_each_touching(bounds, first, last, [&](std::span<const SpherePair> pairs) {
+      test_sphere_pairs(bodies, pairs, part);
+    });
   };
   for_each_batch(pool, found.pairs.size(), test_pairs, [&](std::span<Part> parts) {
     for (const Part& part : parts) touching_spheres += part.touching_spheres;

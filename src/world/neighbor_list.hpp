@@ -6,6 +6,8 @@
 #include "src/base/buffer.hpp"
 #include "src/base/thread_pool.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -18,11 +20,21 @@ struct NearPairs {
   std::span<const SpherePair> pairs;
   bool all_touch = true;
 
-  /// The touching pairs of a range of at most kMostSelected pairs.
-  /// @param room receives them, unless all pairs touch
+  /// Calls visit(std::span<const SpherePair>) for the touching pairs of a range, in order, in parts
+  /// of at most kMostSelected pairs.
+  template <class Visit>
+  void for_each_touching(std::span<const SphereInstance> spheres, std::size_t first,
+                         std::size_t last, const Visit& visit) const {
+    std::array<SpherePair, kMostSelected> room;
+    for (; first < last; first += kMostSelected) {
+      visit(touching(spheres, first, std::min(last, first + kMostSelected), room.data()));
+    }
+  }
+  static constexpr std::size_t kMostSelected = 1024;
+
+ private:
   std::span<const SpherePair> touching(std::span<const SphereInstance> spheres, std::size_t first,
                                        std::size_t last, SpherePair* room) const;
-  static constexpr std::size_t kMostSelected = 1024;
 };
 
 /// Finds the touching pairs of spheres that move little between two searches. Each sphere has a

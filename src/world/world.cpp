@@ -330,8 +330,7 @@ World::World(const Scene& scene, const WorldSettings& settings) {
   if (settings.collider.backend == Backend::automatic && backend_row(Backend::cuda).compiled) {
     impl_->automatic = std::make_unique<AutomaticDevice>(
         settings.collider.costs, [number = settings.collider.device] {
-          return Impl::make_warm_device(
-              [number](const Scene& warming) { return make_device_world(warming, number); });
+          return Impl::warmed(make_device_world(Scene{}, number));
         });
   }
 }

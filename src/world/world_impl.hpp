@@ -19,7 +19,6 @@
 #include "src/world/wake_propagation.hpp"
 
 #include <atomic>
-#include <functional>
 #include <mutex>
 
 namespace jfpx {
@@ -85,10 +84,9 @@ struct World::Impl {
   }
   /// [m], of the centre of mass
   Vec3 position(std::uint32_t body);
-  /// Makes a device that has made a step, so that its kernels are loaded.
-  /// @param make as make_device_world() @throws what that throws, DeviceError, OutOfMemory
-  static std::unique_ptr<DeviceWorld> make_warm_device(
-      const std::function<std::unique_ptr<DeviceWorld>(const Scene&)>& make);
+  /// Makes a step on a device, so that its kernels are loaded. upload() must follow.
+  /// @param device of a Scene{} @throws DeviceError, OutOfMemory
+  static std::unique_ptr<DeviceWorld> warmed(std::unique_ptr<DeviceWorld> device);
   /// Uploads the world, unless the device has its state.
   void enter_device();
   /// Makes the recorded edits on the device.

@@ -28,13 +28,12 @@ class ScopedTimer {
 
 }  // namespace
 
-std::unique_ptr<DeviceWorld> World::Impl::make_warm_device(
-    const std::function<std::unique_ptr<DeviceWorld>(const Scene&)>& make) {
+std::unique_ptr<DeviceWorld> World::Impl::warmed(std::unique_ptr<DeviceWorld> device) {
   Scene scene;
   scene.bodies.resize(2);
   scene.bodies[1].shape = Box{};
   World world(scene, {.collider = {.backend = Backend::cpu}});
-  world.impl_->device = make(scene);
+  world.impl_->device = std::move(device);
   const StepReport report = world.step();
   if (!report.device_failure.empty()) throw DeviceError(report.device_failure);
   world.impl_->forget_device();

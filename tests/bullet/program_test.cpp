@@ -3,22 +3,10 @@
 
 #include <BulletDynamics/Vehicle/btRaycastVehicle.h>
 
-#include <cstdio>
-
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
-
-/// Every bit of a number.
-std::string bits_of(btScalar value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%a", static_cast<double>(value));
-  return text;
-}
-std::string bits_of(const btVector3& v) {
-  return bits_of(v.x()) + "," + bits_of(v.y()) + "," + bits_of(v.z());
-}
 
 /// Heaps of spheres and boxes.
 void add_town(BulletWorld& w, std::uint64_t seed) {

@@ -5,7 +5,6 @@
 
 #include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
 
-#include <cstdio>
 #include <dlfcn.h>
 
 #define JFPX_PROCESS_COLLISION                          \
@@ -34,16 +33,10 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-std::string bits_of(btScalar value) {
-  char text[32];
-  std::snprintf(text, sizeof text, " %a", static_cast<double>(value));
-  return text;
-}
-
 bool on_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, int part_a, int index_a,
               const btCollisionObjectWrapper* b, int part_b, int index_b) {
   log_event("added " + name_of(a->getCollisionObject()) + " " + name_of(b->getCollisionObject()) +
-            bits_of(point.m_distance1) + bits_of(point.m_combinedFriction) + " " +
+            " " + bits_of(point.m_distance1) + " " + bits_of(point.m_combinedFriction) + " " +
             std::to_string(part_a + part_b) + " " + std::to_string(index_a) + " " +
             std::to_string(index_b));
   point.m_combinedFriction *= btScalar(0.5);
@@ -52,7 +45,7 @@ bool on_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, int par
 }
 bool on_processed(btManifoldPoint& point, void* a, void* b) {
   log_event("processed " + name_of(static_cast<btCollisionObject*>(a)) + " " +
-            name_of(static_cast<btCollisionObject*>(b)) + bits_of(point.m_distance1));
+            name_of(static_cast<btCollisionObject*>(b)) + " " + bits_of(point.m_distance1));
   return true;
 }
 bool on_destroyed(void* data) {
@@ -83,7 +76,7 @@ void logging_near_callback(btBroadphasePair& pair, btCollisionDispatcher& dispat
 btScalar LoggingReport::addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper* a,
                                         int, int i, const btCollisionObjectWrapper* b, int, int j) {
   log_event("tested " + name_of(a->getCollisionObject()) + " " + name_of(b->getCollisionObject()) +
-            bits_of(point.m_distance1) + " " + std::to_string(i) + " " + std::to_string(j));
+            " " + bits_of(point.m_distance1) + " " + std::to_string(i) + " " + std::to_string(j));
   return 0;
 }
 

@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <functional>
 #include <iterator>
@@ -133,6 +134,15 @@ inline BulletWorld* g_current = nullptr;
 
 inline void log_event(std::string text) {
   if (g_current != nullptr) g_current->log.push_back(std::move(text));
+}
+/// Every bit of a number.
+inline std::string bits_of(btScalar value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%a", static_cast<double>(value));
+  return text;
+}
+inline std::string bits_of(const btVector3& v) {
+  return bits_of(v.x()) + "," + bits_of(v.y()) + "," + bits_of(v.z());
 }
 inline std::string name_of(const btCollisionObject* body) {
   return std::to_string(body->getUserIndex());

@@ -313,7 +313,7 @@ TEST(AutomaticWorld, MovesToAWarmDevice) {
   costs.cuda_start_ms = 1e-6;
   World host = on_host(scene),
         world = automatic(scene, costs, [] {
-          return WorldAccess::Impl::make_warm_device(test::make_host_device_world);
+          return WorldAccess::Impl::warmed(test::make_host_device_world(Scene{}));
         });
   for (int on_device = 0; on_device < 5;) {
     host.step();

@@ -40,16 +40,10 @@ class CountedCollider final : public SphereCollider {
 std::vector<SpherePair> find(NeighborList* list, std::span<const SphereInstance> spheres,
                              SphereCollider* collider, ThreadPool* pool) {
   const NearPairs found = list->find(spheres, collider, pool);
-  std::vector<SpherePair> all(found.pairs.size());
-  std::size_t count = 0;
-  for (std::size_t first = 0; first < all.size(); first += NearPairs::kMostSelected) {
-    const std::size_t last = std::min(all.size(), first + NearPairs::kMostSelected);
-    std::array<SpherePair, NearPairs::kMostSelected> room;
-    const auto touching = found.touching(spheres, first, last, room.data());
-    std::ranges::copy(touching, all.begin() + static_cast<std::ptrdiff_t>(count));
-    count += touching.size();
-  }
-  all.resize(count);
+  std::vector<SpherePair> all;
+  found.for_each_touching(spheres, 0, found.pairs.size(), [&all](std::span<const SpherePair> part) {
+    all.insert(all.end(), part.begin(), part.end());
+  });
   return all;
 }
 

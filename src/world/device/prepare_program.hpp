@@ -126,7 +126,8 @@ struct PrepareProgram {
     const StepData& d = data;
     const std::uint32_t* begin = d.counters->bin_begin;
     std::uint32_t before = 0;
-    for (const std::uint32_t bin : {0u, soft_step::kGroups}) {
+    for (const std::uint32_t bin :
+         {soft_step::kOverflowGroup, soft_step::kGroups + soft_step::kOverflowGroup}) {
       const Range range{begin[bin], begin[bin + 1]};
       team.spread(range.end - range.begin, [&](std::uint32_t k) {
         const std::uint32_t row = range.begin + k;

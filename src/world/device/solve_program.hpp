@@ -103,7 +103,8 @@ struct SolveProgram {
     bool stores_impulses = false;  ///< whether the impulses of rows are those of the step
 
     JFPX_HD explicit Sweep(const std::uint32_t* bins) : begin(bins) {
-      for (std::uint32_t group = 1; group < soft_step::kFixedGroup; ++group) {
+      for (std::uint32_t group = soft_step::group_of_color(0); group < soft_step::kFixedGroup;
+           ++group) {
         colored_items += items(group) + items(soft_step::kGroups + group);
       }
     }
@@ -118,7 +119,10 @@ struct SolveProgram {
     JFPX_HD std::uint32_t items(std::uint32_t bin) const {
       return (size(bin) + kWarpItems - 1) / kWarpItems * kWarpItems;
     }
-    JFPX_HD bool has_overflow() const { return size(0) + size(soft_step::kGroups) > 0; }
+    /// Number of rows without a color, of both kinds.
+    JFPX_HD std::uint32_t overflow() const {
+      return size(soft_step::kOverflowGroup) + size(soft_step::kGroups + soft_step::kOverflowGroup);
+    }
     /// Number of moves that a kinematic body has made when the rows of the sweep are solved.
     JFPX_HD std::uint32_t moves() const {
       return (number + soft_step::kRelaxSweeps - 1) / soft_step::kSweepsPerSubstep;
@@ -135,7 +139,7 @@ struct SolveProgram {
     JFPX_HD std::uint32_t find(std::uint32_t item) {
       if (item < before_) {
         before_ = 0;
-        group_ = 1;
+        group_ = soft_step::group_of_color(0);
         of_manifolds_ = false;
       }
       while (item - before_ >= sweep_.items(bin())) {
@@ -147,14 +151,14 @@ struct SolveProgram {
       return index < sweep_.size(bin()) ? sweep_.begin[bin()] + index : kNone;
     }
 
-    JFPX_HD std::uint32_t color() const { return group_ - 1; }
+    JFPX_HD std::uint32_t color() const { return group_ - soft_step::group_of_color(0); }
 
    private:
     JFPX_HD std::uint32_t bin() const {
       return of_manifolds_ ? soft_step::kGroups + group_ : group_;
     }
     const Sweep& sweep_;
-    std::uint32_t before_ = 0, group_ = 1;
+    std::uint32_t before_ = 0, group_ = soft_step::group_of_color(0);
     bool of_manifolds_ = false;
   };
 
@@ -242,7 +246,7 @@ struct SolveProgram {
 
   template <class Team, class Operation>
   JFPX_HD void run(const Team& team, const Sweep& sweep, const Operation& operation) const {
-    if (sweep.has_overflow()) {
+    if (sweep.overflow() > 0) {
       team.sync();
       team.once([&] { run_overflow(sweep, operation); });
       team.sync();
@@ -255,7 +259,7 @@ struct SolveProgram {
   /// each in the order of their contacts.
   template <class Operation>
   JFPX_HD void run_overflow(const Sweep& sweep, const Operation& operation) const {
-    const std::uint32_t rows = sweep.size(0) + sweep.size(soft_step::kGroups);
+    const std::uint32_t rows = sweep.overflow();
     for (std::uint32_t k = 0; k < rows; ++k) {
       RowItem item;
       begin_row(sweep, data.overflow[k], &item);

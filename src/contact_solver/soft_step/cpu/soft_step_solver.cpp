@@ -174,9 +174,9 @@ BodyPair SoftStepSolver::pair_of(const ManifoldRow& row, std::span<SolverBody> b
 template <class RunSpheres, class RunManifolds, class OnFixed>
 void SoftStepSolver::sweep(const RunSpheres& run_spheres, const RunManifolds& run_manifolds,
                            const OnFixed& on_fixed) {
-  for (std::size_t i = 0; i < spheres_.begin[1]; ++i) run_spheres(i, i + 1);
-  run_manifolds(0, manifolds_.begin[1]);
-  for (std::size_t group = 1; group < kFixedGroup; ++group) {
+  for (std::size_t i = 0; i < spheres_.begin[kOverflowGroup + 1]; ++i) run_spheres(i, i + 1);
+  run_manifolds(0, manifolds_.begin[kOverflowGroup + 1]);
+  for (std::size_t group = group_of_color(0); group < kFixedGroup; ++group) {
     // One loop over the rows of both kinds: the end of a loop costs as much as dozens of rows.
     const std::size_t sphere = spheres_.begin[group], manifold = manifolds_.begin[group];
     const std::size_t spheres = spheres_.begin[group + 1] - sphere;

@@ -35,7 +35,7 @@ class SoftStepSolver {
   void build(const RowSetup& setup, const ImpactBodies& impacts, const StepConstants& constants);
   /// Applies the impulses of the last step.
   void warm_start(std::span<SolverBody> bodies);
-  /// One sweep over all contacts. @param soft whether penetrations are pushed out
+  /// A sweep over all contacts. @param use_bias whether it is a bias sweep or a relax sweep
   void solve(std::span<SolverBody> bodies, bool use_bias);
   /// Makes the bodies of impacts rebound, but for spheres, which rebound in solve().
   void restitute(std::span<SolverBody> bodies);

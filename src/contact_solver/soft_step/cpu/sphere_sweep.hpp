@@ -56,7 +56,8 @@ using SphereSweepFunction = std::size_t (*)(const SphereSweep& sweep, std::size_
 
 struct SphereSweepKernels {
   SphereSweepFunction warm_start;
-  SphereSweepFunction solve[2];  ///< index 1: soft. They leave out rows whose bodies may rebound.
+  SphereSweepFunction
+      solve[2];  ///< index 1: with bias. They leave out rows whose bodies may rebound.
 };
 
 extern const SphereSweepKernels kAvx2SphereSweep;
