@@ -1,10 +1,11 @@
-/// Loop over a range in chunks of a fixed size, on a thread pool.
+/// Loops over a range in chunks of a fixed size, on a thread pool.
 #pragma once
 
 #include "src/base/thread_pool.hpp"
 
 #include <algorithm>
 #include <cstddef>
+#include <mutex>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -20,6 +21,22 @@ void parallel_for(ThreadPool* pool, std::size_t count, std::size_t chunk, const 
   }
   pool->run((count + chunk - 1) / chunk,
             [&](std::size_t i) { body(i * chunk, std::min(count, (i + 1) * chunk)); });
+}
+
+/// Combines `identity` and the results of body(first, last) for the chunks of [0, count), in any
+/// order: combine(x, y) must be associative and commutative to the last bit, as a minimum is.
+/// @param pool null: one chunk in the calling thread
+template <class Value, class Body, class Combine>
+Value parallel_reduce(ThreadPool* pool, std::size_t count, std::size_t chunk, const Value& identity,
+                      const Body& body, const Combine& combine) {
+  std::mutex mutex;
+  Value result = identity;
+  parallel_for(pool, count, chunk, [&](std::size_t first, std::size_t last) {
+    const Value value = body(first, last);
+    const std::lock_guard lock(mutex);
+    result = combine(result, value);
+  });
+  return result;
 }
 
 }  // namespace JFPX_ABI

@@ -59,7 +59,7 @@ class RadixSorter {
 
  private:
   static constexpr unsigned kMaxBits = 11;  ///< bits per digit, limited by the first-level TLB
-  static constexpr std::size_t kChunk = 16384;
+  static constexpr std::size_t kChunk = 4096;
   static constexpr std::size_t kMaxChunks = 64;
 
   Buffer<std::uint32_t> offsets_;  ///< for each chunk and digit, the position of its next item

@@ -37,6 +37,7 @@ constexpr auto kInterruption = std::chrono::microseconds(500);
 /// threads that have work.
 constexpr auto kCrowded = std::chrono::milliseconds(50);
 constexpr std::uint64_t kChunksLeft = 0xffffffffu;
+constexpr std::uint64_t kPartsOfTheRest = 4;
 
 }  // namespace
 
@@ -83,7 +84,7 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   void poll(std::uint32_t last);
   void take_chunks(unsigned self);
   void take_chunks_of(unsigned owner, bool is_worker, std::uint32_t* prepared);
-  void run_chunk(std::size_t chunk);
+  void run_chunks(std::size_t first, std::uint32_t count);
   std::size_t first_chunk(unsigned owner) const;
 
   /// Workers that pools may share. Both are trivially destructible, because pools may be static.
@@ -238,33 +239,39 @@ void ThreadPool::Workers::take_chunks(unsigned self) {
   }
 }
 
+/// Takes a part of the chunks that are left at a time, so that threads access shared counters
+/// seldom, and still end at the same time (guided self-scheduling, Polychronopoulos and Kuck 1987).
 /// @param is_worker whether the thread must take over the floating-point environment of the caller
 void ThreadPool::Workers::take_chunks_of(unsigned owner, bool is_worker, std::uint32_t* prepared) {
   std::atomic<std::uint64_t>& value = tickets_[owner].value;
   std::uint64_t ticket = value.load();
   while ((ticket & kChunksLeft) != 0) {
-    if (!value.compare_exchange_weak(ticket, ticket - 1)) continue;
+    const std::uint64_t left = ticket & kChunksLeft;
+    const std::uint64_t taken = std::max<std::uint64_t>(left / kPartsOfTheRest, 1);
+    if (!value.compare_exchange_weak(ticket, ticket - taken)) continue;
     const auto number = static_cast<std::uint32_t>(ticket >> 32);
     if (is_worker && *prepared != number) std::fesetenv(&job_.environment);
     *prepared = number;
-    run_chunk(job_.first + first_chunk(owner + 1) - (ticket & kChunksLeft));
+    run_chunks(job_.first + first_chunk(owner + 1) - left, static_cast<std::uint32_t>(taken));
     ticket = value.load();
   }
 }
 
-void ThreadPool::Workers::run_chunk(std::size_t chunk) {
+void ThreadPool::Workers::run_chunks(std::size_t first, std::uint32_t count) {
   const auto chunks = static_cast<std::uint32_t>(job_.loop.chunks);
-  try {
-    job_.loop.call(job_.loop.body, chunk);
-  } catch (...) {
-    const std::lock_guard lock(error_mutex_);
-    if (!error_ || chunk < error_chunk_) {
-      error_ = std::current_exception();
-      error_chunk_ = chunk;
+  for (std::size_t chunk = first; chunk < first + count; ++chunk) {
+    try {
+      job_.loop.call(job_.loop.body, chunk);
+    } catch (...) {
+      const std::lock_guard lock(error_mutex_);
+      if (!error_ || chunk < error_chunk_) {
+        error_ = std::current_exception();
+        error_chunk_ = chunk;
+      }
     }
   }
   // After the last chunk, the next job may begin at once and overwrite this one.
-  if (done_.fetch_add(1, std::memory_order_acq_rel) + 1 == chunks) done_.notify_one();
+  if (done_.fetch_add(count, std::memory_order_acq_rel) + count == chunks) done_.notify_one();
 }
 
 void ThreadPool::check(unsigned threads) {

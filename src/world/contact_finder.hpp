@@ -90,7 +90,7 @@ class ContactFinder {
   void test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
                        Results* results, ThreadPool* pool);
   template <class Find, class AppendAll>
-  void for_each_batch(ThreadPool* pool, std::size_t count, const Find& find,
+  void for_each_batch(ThreadPool* pool, std::size_t count, std::size_t chunk, const Find& find,
                       const AppendAll& append_all);
 
   BroadPhaseSearch broad_phase_;

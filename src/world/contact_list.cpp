@@ -8,7 +8,6 @@
 #include "src/world/merge_contacts.hpp"
 #include "src/world/met_contacts.hpp"
 
-#include <atomic>
 #include <numeric>
 #include <span>
 
@@ -39,17 +38,18 @@ void append_met(const DetectedContacts& detected, const ContactView& contacts,
 }  // namespace
 
 MetCounts count_met_contacts(const ContactView& contacts, ThreadPool* pool) {
-  std::atomic<std::size_t> spheres{0}, others{0};
-  parallel_for(
-      pool, contacts.size(), kContactsPerListChunk, [&](std::size_t first, std::size_t last) {
+  return parallel_reduce(
+      pool, contacts.size(), kContactsPerListChunk, MetCounts(),
+      [&](std::size_t first, std::size_t last) {
         MetCounts counts;
         for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
           (contacts.is_sphere(i) ? counts.spheres : counts.others) += count_met(contacts, i);
         }
-        if (counts.spheres > 0) spheres.fetch_add(counts.spheres, std::memory_order_relaxed);
-        if (counts.others > 0) others.fetch_add(counts.others, std::memory_order_relaxed);
+        return counts;
+      },
+      [](const MetCounts& x, const MetCounts& y) {
+        return MetCounts{x.spheres + y.spheres, x.others + y.others};
       });
-  return {spheres, others};
 }
 
 /// Appends the contacts of ContactSet::spheres that touched at the start of the step and, with

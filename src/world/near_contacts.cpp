@@ -14,6 +14,8 @@ namespace {
 using soft_step::ContactSet;
 
 constexpr std::size_t kSubShapesPerChunk = 1024, kPairsPerChunk = NearPairs::kMostSelected;
+/// A test of a box takes as long as dozens of tests of spheres.
+constexpr std::size_t kCandidatesPerChunk = 128;
 /// Chunks of a batch for each thread: enough to balance their loads.
 constexpr std::size_t kChunksPerThread = 4;
 
@@ -141,18 +143,18 @@ void ContactFinder::Part::add(const BodyStore& bodies, const NearPair& near) {
 /// append_all(parts) in this thread; batch by batch, so that the parts take little memory, and are
 /// still in the cache when they are appended.
 template <class Find, class AppendAll>
-void ContactFinder::for_each_batch(ThreadPool* pool, std::size_t count, const Find& find,
-                                   const AppendAll& append_all) {
-  const std::size_t chunks = (count + kPairsPerChunk - 1) / kPairsPerChunk;
+void ContactFinder::for_each_batch(ThreadPool* pool, std::size_t count, std::size_t chunk,
+                                   const Find& find, const AppendAll& append_all) {
+  const std::size_t chunks = (count + chunk - 1) / chunk;
   const std::size_t threads = pool == nullptr ? 1 : pool->threads();
   const std::size_t most = std::min(chunks, kChunksPerThread * threads);
   if (parts_.size() < most) parts_.resize(most);
   for (std::size_t batch = 0; batch < chunks; batch += most) {
     const std::span<Part> parts = std::span(parts_).first(std::min(most, chunks - batch));
-    const std::size_t begin = batch * kPairsPerChunk;
-    const std::size_t size = std::min(count - begin, parts.size() * kPairsPerChunk);
-    parallel_for(pool, size, kPairsPerChunk, [&](std::size_t first, std::size_t last) {
-      Part& part = parts[first / kPairsPerChunk];
+    const std::size_t begin = batch * chunk;
+    const std::size_t size = std::min(count - begin, parts.size() * chunk);
+    parallel_for(pool, size, chunk, [&](std::size_t first, std::size_t last) {
+      Part& part = parts[first / chunk];
       part.clear();
       find(begin + first, begin + last, &part);
     });
@@ -171,19 +173,20 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
       part->add(bodies, near);
     }
   };
-  for_each_batch(pool, candidates.size(), test_chunk, [&](std::span<Part> parts) {
-    auto first_point = static_cast<std::uint32_t>(results->points.size);
-    for (Part& part : parts) {
-      for (soft_step::ManifoldInput& manifold : part.manifolds) manifold.first += first_point;
-      first_point += static_cast<std::uint32_t>(part.points.size());
-    }
-    append(
-        pool, parts, [](Part & p) -> auto& { return p.manifolds; }, &results->manifolds);
-    append(
-        pool, parts, [](Part & p) -> auto& { return p.points; }, &results->points);
-    append(
-        pool, parts, [](Part & p) -> auto& { return p.others; }, &results->others);
-  });
+  for_each_batch(
+      pool, candidates.size(), kCandidatesPerChunk, test_chunk, [&](std::span<Part> parts) {
+        auto first_point = static_cast<std::uint32_t>(results->points.size);
+        for (Part& part : parts) {
+          for (soft_step::ManifoldInput& manifold : part.manifolds) manifold.first += first_point;
+          first_point += static_cast<std::uint32_t>(part.points.size());
+        }
+        append(
+            pool, parts, [](Part & p) -> auto& { return p.manifolds; }, &results->manifolds);
+        append(
+            pool, parts, [](Part & p) -> auto& { return p.points; }, &results->points);
+        append(
+            pool, parts, [](Part & p) -> auto& { return p.others; }, &results->others);
+      });
 }
 
 std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real margin,
@@ -202,7 +205,7 @@ std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real marg
       test_sphere_pairs(bodies, pairs, part);
     });
   };
-  for_each_batch(pool, found.pairs.size(), test_pairs, [&](std::span<Part> parts) {
+  for_each_batch(pool, found.pairs.size(), kPairsPerChunk, test_pairs, [&](std::span<Part> parts) {
     for (const Part& part : parts) touching_spheres += part.touching_spheres;
     append(
         pool, parts, [](Part & p) -> auto& { return p.spheres; }, &results.spheres);
@@ -226,10 +229,11 @@ std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real marg
   const auto find_fixed = [&](std::size_t first, std::size_t last, Part* part) {
     find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last), part);
   };
-  for_each_batch(pool, sub_shapes_.fixed_begin(), find_fixed, [&](std::span<Part> parts) {
-    append(
-        pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
-  });
+  for_each_batch(pool, sub_shapes_.fixed_begin(), kSubShapesPerChunk, find_fixed,
+                 [&](std::span<Part> parts) {
+                   append(
+                       pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
+                 });
   candidates.finish();
   if (!std::ranges::is_sorted(candidates_)) std::ranges::sort(candidates_);
   test_candidates(bodies, candidates_, &results, pool);

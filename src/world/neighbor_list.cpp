@@ -21,34 +21,37 @@ constexpr Real kSearches = 10, kLeast = Real(0.02), kMost = Real(0.15);
 /// Bounds that would last for fewer searches take more time than they save.
 constexpr Real kFewestSearches = Real(2.5);
 
+/// NaN is the largest number.
+Real larger(Real x, Real y) { return x > y || x != x ? x : y; }
+
 }  // namespace
 
 /// The largest distance by which a sphere has moved or grown since the bounds were made; above
 /// slack_ if a sphere is not within its bound.
 Real NeighborList::largest_motion(std::span<const SphereInstance> spheres, ThreadPool* pool) {
   constexpr Real kMargin = 1 + 16 * kEpsilon;
-  largest_.resize((spheres.size() + kSpheresPerChunk - 1) / kSpheresPerChunk);
-  parallel_for(pool, largest_.size(), 1, [&](std::size_t first, std::size_t last) {
-    for (std::size_t chunk = first; chunk < last; ++chunk) {
-      const std::size_t begin = chunk * kSpheresPerChunk;
-      const std::size_t end = std::min(spheres.size(), begin + kSpheresPerChunk);
-      Real largest = -slack_;
-      for (std::size_t i = begin; i < end; ++i) {
-        const Real moved = length(spheres[i].centre - bounds_[i].centre);
-        const Real outside = (moved + spheres[i].radius) * kMargin - bounds_[i].radius;
-        largest = outside <= largest ? largest : outside;  // NaN is the largest
-      }
-      largest_[chunk] = largest;
+  const auto largest_of = [&](std::size_t first, std::size_t last) {
+    Real largest = -slack_;
+    for (std::size_t i = first; i < last; ++i) {
+      const Real moved = length(spheres[i].centre - bounds_[i].centre);
+      const Real outside = (moved + spheres[i].radius) * kMargin - bounds_[i].radius;
+      largest = larger(largest, outside);
     }
-  });
-  Real largest = -slack_;
-  for (const Real outside : largest_) largest = outside <= largest ? largest : outside;
-  return slack_ + largest;
+    return largest;
+  };
+  return slack_ +
+         parallel_reduce(pool, spheres.size(), kSpheresPerChunk, -slack_, largest_of, larger);
 }
 
 /// @param motion [m], per search
-Real NeighborList::choose_slack(std::span<const SphereInstance> spheres, Real motion) const {
-  const Real smallest = std::ranges::min(spheres, {}, &SphereInstance::radius).radius;
+Real NeighborList::choose_slack(std::span<const SphereInstance> spheres, Real motion,
+                                ThreadPool* pool) const {
+  const auto smallest_of = [&](std::size_t first, std::size_t last) {
+    return std::ranges::min(spheres.subspan(first, last - first), {}, &SphereInstance::radius)
+        .radius;
+  };
+  const Real smallest = parallel_reduce(pool, spheres.size(), kSpheresPerChunk, spheres[0].radius,
+                                        smallest_of, std::ranges::min);
   const bool pays = kFewestSearches * motion <= kMost * smallest;
   if (!pays || !(smallest >= kLeastRadius)) return 0;
   return std::clamp(kSearches * motion, kLeast * smallest, kMost * smallest);
@@ -65,7 +68,7 @@ NearPairs NeighborList::find(std::span<const SphereInstance> spheres, SphereColl
     ++searches_;
     const Real motion = largest_motion(spheres, pool);
     if (motion <= slack_) return {pairs_, false};
-    slack = choose_slack(spheres, motion / static_cast<Real>(searches_));
+    slack = choose_slack(spheres, motion / static_cast<Real>(searches_), pool);
   }
   clear();
   bounds_.reserve(spheres.size(), "bounds of spheres");

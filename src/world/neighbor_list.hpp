@@ -10,7 +10,6 @@
 #include <array>
 #include <cstddef>
 #include <span>
-#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -61,14 +60,13 @@ class NeighborList {
   static constexpr Real kLeastRadius = Real(1e-9);
 
   Real largest_motion(std::span<const SphereInstance> spheres, ThreadPool* pool);
-  Real choose_slack(std::span<const SphereInstance> spheres, Real motion) const;
+  Real choose_slack(std::span<const SphereInstance> spheres, Real motion, ThreadPool* pool) const;
 
   std::size_t count_ = 0;              ///< number of bounds; 0: there are none
   Buffer<SphereInstance> bounds_;      ///< by sphere
   Real slack_ = 0;                     ///< [m], radius of a bound, minus that of its sphere
   std::size_t searches_ = 0;           ///< since the bounds were made
   std::span<const SpherePair> pairs_;  ///< of bounds that touch; in the collider
-  std::vector<Real> largest_;          ///< by chunk of spheres
 };
 
 }  // namespace JFPX_ABI

@@ -108,11 +108,7 @@ void SoftStep::find_islands(const BodyStore& store, const Touches& touches) {
 /// Wakes the islands that touch an awake body or a kinematic body in motion.
 void SoftStep::wake_touched(BodyStore* store) {
   const BodyView bodies = store->view();
-  std::atomic<bool> any_sleeps{false};
-  for_each_body(*store, [&](std::uint32_t i) {
-    if (bodies.is_asleep(i)) any_sleeps.store(true, std::memory_order_relaxed);
-  });
-  if (!any_sleeps) return;
+  if (!any_body(*store, [&](std::uint32_t i) { return bodies.is_asleep(i); })) return;
   find_islands(*store, [&](const ContactView& contacts, std::uint32_t contact) {
     return soft_step::will_touch(bodies, contacts, contact);
   });
@@ -155,25 +151,37 @@ void SoftStep::for_each_body(const BodyStore& bodies, const Stage& stage) {
   });
 }
 
-std::optional<BodyId> SoftStep::find_runaway(const BodyStore& bodies) {
-  constexpr std::uint32_t kNone = 0xffffffffu;
-  std::atomic<std::uint32_t> found{kNone};
-  for_each_body(bodies, [&](std::uint32_t i) {
-    if (bodies.moving.awake[i] == 0 || is_in_world(step_.state(i))) return;
-    std::uint32_t lowest = found.load();
-    while (i < lowest && !found.compare_exchange_weak(lowest, i)) {
-    }
-  });
-  return found == kNone ? std::nullopt : std::optional(bodies.id(found));
+/// Calls test(index) for all bodies. @returns whether one call returned true
+template <class Test>
+bool SoftStep::any_body(const BodyStore& bodies, const Test& test) {
+  const std::span<const BodyId> ids = bodies.ids();
+  return parallel_reduce(
+      pool_, ids.size(), kBodiesPerChunk, false,
+      [&](std::size_t first, std::size_t last) {
+        bool any = false;
+        for (const BodyId id : ids.subspan(first, last - first)) any |= test(id.index);
+        return any;
+      },
+      std::logical_or<>());
 }
 
-/// @returns whether a body has been slow for long enough to sleep
-bool SoftStep::store_bodies(const BodyStore& bodies) {
-  std::atomic<bool> any_rests{false};
-  for_each_body(bodies, [&](std::uint32_t i) {
-    if (step_.store(i)) any_rests.store(true, std::memory_order_relaxed);
-  });
-  return any_rests;
+std::optional<BodyId> SoftStep::find_runaway(const BodyStore& bodies) {
+  const auto is_runaway = [&](const BodyId& id) {
+    return bodies.moving.awake[id.index] != 0 && !is_in_world(step_.state(id.index));
+  };
+  constexpr BodyId kNone;
+  const std::span<const BodyId> ids = bodies.ids();
+  const BodyId found = parallel_reduce(
+      pool_, ids.size(), kBodiesPerChunk, kNone,
+      [&](std::size_t first, std::size_t last) {
+        BodyId lowest = kNone;
+        for (const BodyId& id : ids.subspan(first, last - first)) {
+          if (is_runaway(id) && id.index < lowest.index) lowest = id;
+        }
+        return lowest;
+      },
+      [](const BodyId& x, const BodyId& y) { return x.index < y.index ? x : y; });
+  return found == kNone ? std::nullopt : std::optional(found);
 }
 
 /// Islands whose bodies have all been slow for long enough fall asleep.
@@ -231,7 +239,8 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
 }
 
 void SoftStep::commit(BodyStore* bodies) noexcept {
-  if (store_bodies(*bodies)) put_islands_to_sleep(*bodies);
+  const bool any_rests = any_body(*bodies, [this](std::uint32_t i) { return step_.store(i); });
+  if (any_rests) put_islands_to_sleep(*bodies);
   cache_.commit();
 }
 

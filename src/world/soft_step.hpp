@@ -70,8 +70,9 @@ class SoftStep {
   void find_near();
   template <class Stage>
   void for_each_body(const BodyStore& bodies, const Stage& stage);
+  template <class Test>
+  bool any_body(const BodyStore& bodies, const Test& test);
   std::optional<BodyId> find_runaway(const BodyStore& bodies);
-  bool store_bodies(const BodyStore& bodies);
   void put_islands_to_sleep(const BodyStore& bodies);
 
   soft_step::StepConstants constants_;

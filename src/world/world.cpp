@@ -8,7 +8,6 @@
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <functional>
 #include <iterator>
 #include <new>
@@ -79,6 +78,15 @@ void World::Impl::find_contacts(StepReport* report) {
   report->device_failure = contact_finder.collider().device_failure();
 }
 
+/// As *copy = array, on all threads.
+template <class Item>
+void World::Impl::copy_array(const std::vector<Item>& array, std::vector<Item>* copy) {
+  resize_geometric(copy, array.size());
+  parallel_for(pool.get(), array.size(), kBodiesPerTask, [&](std::size_t first, std::size_t last) {
+    std::copy_n(array.data() + first, last - first, copy->data() + first);
+  });
+}
+
 /// Detection of Solver::soft_step. The list of contacts is made only if generators may read it.
 void World::Impl::find_soft_step_contacts(StepReport* report) {
   soft_step::ContactSet& near = soft_step.contacts();
@@ -86,11 +94,7 @@ void World::Impl::find_soft_step_contacts(StepReport* report) {
       store, scene.soft_step.speculative_margin, pool.get(), &near, &detected);
   report->sphere_contacts = spheres + detected.other_spheres;
   report->contacts = spheres + detected.others.size();
-  resize_geometric(&detected.position, store.capacity());
-  parallel_for(
-      pool.get(), store.capacity(), kBodiesPerTask, [this](std::size_t first, std::size_t last) {
-        std::copy_n(&store.moving.position[first], last - first, &detected.position[first]);
-      });
+  copy_array(store.moving.position, &detected.position);
   detected.generated.clear();
   if (generators.ids().empty()) return;
   ContactList& list = *contacts.storage();
@@ -110,16 +114,17 @@ void World::Impl::call_generators(std::vector<Contact>* list, StepReport* report
 
 /// Number of movable bodies awake.
 std::uint32_t World::Impl::count_awake() const {
-  std::atomic<std::uint32_t> awake{0};
   const std::span<const BodyId> ids = store.ids();
-  parallel_for(pool.get(), ids.size(), kBodiesPerTask, [&](std::size_t first, std::size_t last) {
-    std::uint32_t count = 0;
-    for (const BodyId id : ids.subspan(first, last - first)) {
-      if (store.movable(id.index)) count += store.moving.awake[id.index];
-    }
-    awake.fetch_add(count, std::memory_order_relaxed);
-  });
-  return awake;
+  return parallel_reduce(
+      pool.get(), ids.size(), kBodiesPerTask, 0u,
+      [&](std::size_t first, std::size_t last) {
+        std::uint32_t count = 0;
+        for (const BodyId id : ids.subspan(first, last - first)) {
+          if (store.movable(id.index)) count += store.moving.awake[id.index];
+        }
+        return count;
+      },
+      std::plus<>());
 }
 
 /// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
@@ -196,24 +201,14 @@ void World::Impl::save_for_undo() {
     before.force.clear();
     before.torque.clear();
   }
-  pool->run(6, [&](std::size_t array) {
-    switch (array) {
-      case 0:
-        if (saves_forces) before.force = now.force;
-        return;
-      case 1:
-        if (saves_forces) before.torque = now.torque;
-        return;
-      case 2:
-        return void(before.last_acceleration = now.last_acceleration);
-      case 3:
-        return void(before.mean_motion = now.mean_motion);
-      case 4:
-        return void(before.rest_time = now.rest_time);
-      default:
-        return void(before.awake = now.awake);
-    }
-  });
+  if (saves_forces) {
+    copy_array(now.force, &before.force);
+    copy_array(now.torque, &before.torque);
+  }
+  copy_array(now.last_acceleration, &before.last_acceleration);
+  copy_array(now.mean_motion, &before.mean_motion);
+  copy_array(now.rest_time, &before.rest_time);
+  copy_array(now.awake, &before.awake);
 }
 
 /// Restores the motion that save_for_undo() has copied.

@@ -106,6 +106,15 @@ inline std::vector<DeviceKind> device_kinds() {
   return kinds;
 }
 
+/// [bytes], memory of the GPU in use, also by other processes; 0 on the host.
+inline std::size_t device_bytes_in_use([[maybe_unused]] const DeviceKind& kind) {
+  std::size_t free = 0, total = 0;
+#if JFPX_HAS_CUDA
+  if (kind.is_cuda) require(cudaMemGetInfo(&free, &total));
+#endif
+  return total - free;
+}
+
 #if JFPX_HAS_CUDA
 /// A stream that a program has made itself, or the default stream; on the host, none.
 class StreamOfUser {

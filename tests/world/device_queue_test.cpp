@@ -7,12 +7,15 @@
 
 #include "src/scenes/scenes.hpp"
 #include "src/world/world_impl.hpp"
+#include "tests/support/soak.hpp"
+#include "tests/world/bouncing_bodies.hpp"
 #include "tests/world/device_kinds.hpp"
 #include "tests/world/equal_worlds.hpp"
 #include "tests/world/random_changes.hpp"
 
 #include <gtest/gtest.h>
 
+#include <deque>
 #include <string>
 #include <thread>
 #include <utility>
@@ -514,6 +517,54 @@ TEST(DeviceQueue, AFailingDeviceIsReplacedInTheMiddleOfAQueue) {
     ASSERT_EQ(world.state_hash(), host.state_hash()) << runs;
     ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, world));
   }
+}
+
+/// Several worlds, whose steps run at the same time.
+TEST_P(DeviceQueueTest, WorldsWithChangingBodiesKeepTheirMemoryFlat) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  constexpr std::size_t kWorlds = 8;
+  constexpr std::uint32_t kSteps = 20;
+  constexpr Real kRoom = 3;
+  constexpr std::size_t kMostGrowth = std::size_t{32} << 20;
+  struct Running {
+    Running(World on_device, const test::DeviceKind& kind)
+        : world(std::move(on_device)), stream(kind) {}
+    World world;
+    test::StreamOfUser stream;
+    std::deque<BodyId> bodies;
+  };
+  std::deque<Running> running;
+  Scene scene;
+  scene.bodies = test::walls(kRoom);
+  while (running.size() < kWorlds) {
+    Running& one = running.emplace_back(on_device(scene), GetParam());
+    for (int i = 0; i < 12; ++i) {
+      one.bodies.push_back(one.world.add(test::bouncing_body(&random, kRoom - 2)));
+    }
+  }
+  // Without a GPU, a step takes much longer.
+  const std::uint64_t steps = test::soak_steps() / (GetParam().is_cuda ? 1 : 2);
+  const std::uint64_t rounds = steps / (kWorlds * kSteps) + 1;
+  std::uint64_t contacts = 0;
+  std::size_t before = 0;
+  test::expect_flat_memory(rounds, [&](std::uint64_t round) {
+    if (round == rounds / 2) before = test::device_bytes_in_use(GetParam());
+    for (Running& one : running) {
+      const StepReport report = cuda::finish_steps(one.world);
+      ASSERT_FALSE(report.non_finite);
+      ASSERT_TRUE(report.device_failure.empty()) << report.device_failure;
+      contacts += report.contacts;
+      one.world.remove(one.bodies.front());
+      one.bodies.pop_front();
+      one.bodies.push_back(one.world.add(test::bouncing_body(&random, kRoom - 2)));
+      cuda::enqueue_steps(one.world, kSteps, one.stream.get());
+    }
+  });
+  for (Running& one : running) cuda::finish_steps(one.world);
+  EXPECT_LE(test::device_bytes_in_use(GetParam()), before + kMostGrowth);
+  EXPECT_GT(contacts, rounds);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <memory>
 #include <random>
 #include <vector>
@@ -118,6 +119,22 @@ TEST(NeighborList, SearchesOnceWhileSpheresMoveLittle) {
     cloud.move(Real(1e-4));
   }
   EXPECT_EQ(collider.searches, 2);  // the second one knows how far the spheres move
+}
+
+TEST(NeighborList, FindsAnInvalidSphereAmongMany) {
+  constexpr std::size_t kSpheres = 10000;  // in several chunks
+  for (const std::size_t bad : {std::size_t{0}, kSpheres / 2, kSpheres - 1}) {
+    ThreadPool pool(bad == 0 ? 1 : 3);
+    CountedCollider collider;
+    NeighborList list;
+    Cloud cloud(1, kSpheres);
+    for (int n = 0; n < 2; ++n) {  // the second list has a slack
+      find(&list, cloud.spheres, &collider, &pool);
+      cloud.move(Real(1e-4));
+    }
+    cloud.spheres[bad].centre.y = std::numeric_limits<Real>::quiet_NaN();
+    EXPECT_THROW(find(&list, cloud.spheres, &collider, &pool), InvalidArgument) << bad;
+  }
 }
 
 TEST(NeighborList, KeepsPairsThatTouchWithinRoundingAtTheEdgeOfTheirBounds) {

@@ -4,7 +4,7 @@
 
 #include <jfpx/particle.hpp>
 
-#include "tests/world/random_bodies.hpp"
+#include "tests/world/bouncing_bodies.hpp"
 
 #include <deque>
 
@@ -12,29 +12,6 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 namespace {
-
-/// A box of half-spaces.
-std::vector<BodyDef> walls(Real room) {
-  std::vector<BodyDef> bodies;
-  for (const Real side : {Real(1), Real(-1)}) {
-    for (const Vec3& axis : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}) {
-      bodies.push_back(half_space(axis * side, -room));
-    }
-  }
-  return bodies;
-}
-
-/// A body that does not come to rest.
-BodyDef bouncing_body(Random* random, Real room) {
-  BodyDef def;
-  do {
-    def = random_body(random, room);
-  } while (def.mass == 0);
-  def.restitution = 1;
-  def.friction = Real(0.1);
-  def.velocity = random->uniform_in_box({-3, -3, -3}, {3, 3, 3});
-  return def;
-}
 
 JFPX_SOLVER_SUITE(Soak);
 

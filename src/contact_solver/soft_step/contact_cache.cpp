@@ -52,65 +52,79 @@ void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls, Thr
   resize_geometric(&now.colors, now.size());
   coloring_.start(inverse_mass.size());
   parallel_for(pool, spheres, kMatchesPerChunk, [&](std::size_t first, std::size_t last) {
-    match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
+    match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
+                  inverse_mass);
   });
-  parallel_for(
-      pool, now.manifolds.size(), kMatchesPerChunk, [&](std::size_t first, std::size_t last) {
-        match_manifolds(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
-      });
-  const ContactView contacts = now.view();
-  for (std::uint32_t i = 0; i < contacts.size(); ++i) {
-    if (now.colors[i] < kColors) continue;
-    const ContactKey& key = contacts.key(i);
-    if (!(inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0)) {
-      now.colors[i] = kFixedColor;
-    } else {
-      coloring_.add(key, i, &now.colors[i]);
-    }
-  }
+  parallel_for(pool, now.manifolds.size(), kMatchesPerChunk,
+               [&](std::size_t first, std::size_t last) {
+                 match_manifolds(static_cast<std::uint32_t>(first),
+                                 static_cast<std::uint32_t>(last), inverse_mass);
+               });
   coloring_.finish();
 }
 
-/// Keeps the color and the rolling impulse. @param i,before contacts of this and of the last step
-void ContactCache::keep(std::uint32_t i, std::uint32_t before) {
+/// Keeps the rolling impulse. @param i,before contacts of this and of the last step
+void ContactCache::keep_rolling(std::uint32_t i, std::uint32_t before) {
   if (current_.has_rolling()) current_.rolling_impulses[i] = last_.rolling_impulse(before);
-  const std::uint8_t color = last_.colors[before];
-  if (color >= kColors) return;
-  current_.colors[i] = color;
-  const ContactKey& key = current_.view().key(i);
-  coloring_.keep(key.a, key.b, color);
 }
 
-void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last) {
+/// Gives contact i the color that it had, or that of a contact with a fixed body, or adds it to
+/// those that GreedyColoring::finish() colors.
+/// @param before kNoColor: the contact is new
+void ContactCache::choose_color(std::uint32_t i, std::uint8_t before,
+                                std::span<const Real> inverse_mass,
+                                GreedyColoring::Portion* uncolored) {
+  const ContactKey& key = current_.view().key(i);
+  if (before < kColors) {
+    current_.colors[i] = before;
+    coloring_.keep(key.a, key.b, before);
+  } else if (!(inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0)) {
+    current_.colors[i] = kFixedColor;
+  } else {
+    current_.colors[i] = kNoColor;
+    uncolored->add(key, i, &current_.colors[i]);
+  }
+}
+
+void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last,
+                                 std::span<const Real> inverse_mass) {
+  GreedyColoring::Portion uncolored(&coloring_);
   Finder<SphereContactInput> finder(last_.spheres, current_.spheres[first].key);
   for (std::uint32_t i = first; i < last; ++i) {
     const SphereContactInput& contact = current_.spheres[i];
     current_.impulses[i] = {};
     if (current_.has_rolling()) current_.rolling_impulses[i] = {};
-    current_.colors[i] = kNoColor;
     std::uint32_t before = 0;
-    if (!finder.find(contact.key, &before)) continue;
-    keep(i, before);
+    const bool is_kept = finder.find(contact.key, &before);
+    choose_color(i, is_kept ? last_.colors[before] : kNoColor, inverse_mass, &uncolored);
+    if (!is_kept) continue;
+    keep_rolling(i, before);
     current_.impulses[i] = at_start_of_step(last_.impulses[before]);
   }
+  uncolored.flush();
 }
 
-void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last) {
+void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last,
+                                   std::span<const Real> inverse_mass) {
+  GreedyColoring::Portion uncolored(&coloring_);
   const auto spheres = static_cast<std::uint32_t>(current_.spheres.size());
   const auto spheres_before = static_cast<std::uint32_t>(last_.spheres.size());
   Finder<ManifoldInput> finder(last_.manifolds, current_.manifolds[first].key);
   for (std::uint32_t m = first; m < last; ++m) {
     const ManifoldInput& contact = current_.manifolds[m];
     if (current_.has_rolling()) current_.rolling_impulses[spheres + m] = {};
-    current_.colors[spheres + m] = kNoColor;
     for (std::uint32_t p = 0; p < contact.count; ++p) {
       current_.impulses[spheres + contact.first + p] = {};
     }
     std::uint32_t old = 0;
-    if (!finder.find(contact.key, &old)) continue;
-    keep(spheres + m, spheres_before + old);
+    const bool is_kept = finder.find(contact.key, &old);
+    choose_color(spheres + m, is_kept ? last_.colors[spheres_before + old] : kNoColor, inverse_mass,
+                 &uncolored);
+    if (!is_kept) continue;
+    keep_rolling(spheres + m, spheres_before + old);
     match_points(current_.view(), m, last_.view(), old);
   }
+  uncolored.flush();
 }
 
 void ContactCache::reserve(std::size_t bodies) {

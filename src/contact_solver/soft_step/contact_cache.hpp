@@ -50,9 +50,11 @@ class ContactCache {
   void replace_last(ContactSet last) noexcept { last_ = std::move(last); }
 
  private:
-  void match_spheres(std::uint32_t first, std::uint32_t last);
-  void match_manifolds(std::uint32_t first, std::uint32_t last);
-  void keep(std::uint32_t i, std::uint32_t before);
+  void match_spheres(std::uint32_t first, std::uint32_t last, std::span<const Real> inverse_mass);
+  void match_manifolds(std::uint32_t first, std::uint32_t last, std::span<const Real> inverse_mass);
+  void choose_color(std::uint32_t i, std::uint8_t before, std::span<const Real> inverse_mass,
+                    GreedyColoring::Portion* uncolored);
+  void keep_rolling(std::uint32_t i, std::uint32_t before);
 
   ContactSet current_, last_;
   std::vector<std::uint8_t> forgotten_;  ///< by body: 1 if last_ must lose its contacts

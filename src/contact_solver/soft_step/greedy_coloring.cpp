@@ -9,13 +9,16 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
+
 void GreedyColoring::start(std::size_t bodies) {
   assign_geometric(&used_, bodies, 0);
   uncolored_.clear();
 }
 
-void GreedyColoring::add(const ContactKey& key, std::uint32_t contact, std::uint8_t* color) {
-  uncolored_.push_back({color_order(key), contact, key.a, key.b, color});
+void GreedyColoring::append(std::span<const Uncolored> contacts) {
+  if (contacts.empty()) return;
+  const std::lock_guard lock(mutex_);
+  uncolored_.insert(uncolored_.end(), contacts.begin(), contacts.end());
 }
 
 void GreedyColoring::finish() {

@@ -3,8 +3,11 @@
 
 #include "src/contact_solver/soft_step/contact_set.hpp"
 
+#include <array>
 #include <atomic>
 #include <cstdint>
+#include <mutex>
+#include <span>
 #include <vector>
 
 namespace jfpx {
@@ -45,7 +48,8 @@ JFPX_HD constexpr std::uint8_t lowest_free_color(std::uint64_t used) {
 /// parallel (Blelloch, Fineman and Shun 2012). A contact that persists keeps its color, except
 /// in the overflow, whose contacts are colored again.
 ///
-/// Usage in a step: start(), keep() for all colored contacts, add() for all others, finish().
+/// Usage in a step: start(), keep() for all colored contacts, Portion::add() for all others,
+/// finish().
 /// Owns its buffers, which only grow.
 class GreedyColoring {
  public:
@@ -56,9 +60,9 @@ class GreedyColoring {
     std::atomic_ref(used_[a]).fetch_or(bit, std::memory_order_relaxed);
     std::atomic_ref(used_[b]).fetch_or(bit, std::memory_order_relaxed);
   }
-  /// @param contact number of the contact
-  /// @param color   receives the color in finish()
-  void add(const ContactKey& key, std::uint32_t contact, std::uint8_t* color);
+  /// Contacts that a thread adds, in portions. Several threads may do so concurrently, each with an
+  /// object of its own.
+  class Portion;
   void finish();
 
  private:
@@ -67,8 +71,32 @@ class GreedyColoring {
     std::uint32_t contact, a, b;
     std::uint8_t* color;
   };
+  void append(std::span<const Uncolored> contacts);
+
   std::vector<std::uint64_t> used_;  ///< by body: the set of its colors
+  std::mutex mutex_;                 ///< of uncolored_
   std::vector<Uncolored> uncolored_;
+};
+
+class GreedyColoring::Portion {
+ public:
+  explicit Portion(GreedyColoring* coloring) : coloring_(coloring) {}
+  /// @param contact number of the contact
+  /// @param color   receives the color in GreedyColoring::finish()
+  void add(const ContactKey& key, std::uint32_t contact, std::uint8_t* color) {
+    if (count_ == contacts_.size()) flush();
+    contacts_[count_++] = {color_order(key), contact, key.a, key.b, color};
+  }
+  /// Must be called after the last add().
+  void flush() {
+    coloring_->append(std::span(contacts_).first(count_));
+    count_ = 0;
+  }
+
+ private:
+  GreedyColoring* coloring_;
+  std::array<Uncolored, 64> contacts_;
+  std::size_t count_ = 0;
 };
 
 }  // namespace soft_step

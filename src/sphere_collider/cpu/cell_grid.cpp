@@ -1,6 +1,8 @@
 /// Fitting of a grid to spheres at any positions and distances.
 #include "src/sphere_collider/cpu/cell_grid.hpp"
 
+#include "src/base/parallel_for.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -9,6 +11,8 @@ inline namespace JFPX_ABI {
 namespace cpu {
 
 namespace {
+
+constexpr std::size_t kTargetsPerChunk = 8192;
 
 /// Returns the median of a sample of up to 64 targets, which is robust against outliers.
 Real typical_coordinate(const SphereSubset& targets, int axis) {
@@ -75,12 +79,17 @@ bool CellGrid::multiply() noexcept {
   return true;
 }
 
-void CellGrid::fit(const SphereSubset& targets, Real distance) {
-  Aabb box;
-  for (std::size_t i = 0; i < targets.count; ++i) {
-    const Vec3& p = targets[i].centre;
-    box = merged(box, {p, p});
-  }
+void CellGrid::fit(const SphereSubset& targets, Real distance, ThreadPool& pool) {
+  const auto box_of = [&](std::size_t first, std::size_t last) {
+    Aabb box;
+    for (std::size_t i = first; i < last; ++i) {
+      const Vec3& p = targets[i].centre;
+      box = merged(box, {p, p});
+    }
+    return box;
+  };
+  const Aabb box = parallel_reduce(&pool, targets.count, kTargetsPerChunk, Aabb(), box_of,
+                                   [](const Aabb& a, const Aabb& b) { return merged(a, b); });
   for (int i = 0; i < 3; ++i) {
     axis(i).fit(box.lower[i], typical_coordinate(targets, i), box.upper[i], distance);
   }

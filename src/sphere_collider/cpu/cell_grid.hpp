@@ -84,7 +84,7 @@ class CellGrid {
  public:
   /// @param distance the largest sum of the extended radii of a target and of a sphere that it is
   ///   tested against
-  void fit(const SphereSubset& targets, Real distance);
+  void fit(const SphereSubset& targets, Real distance, ThreadPool& pool);
 
   /// Returns the number of the cell of a point, or kNowhere if no target is near. The numbers of
   /// spheres that touch differ by dx + dy*row() + dz*slab() with dx, dy, dz in -1..1.

@@ -1,9 +1,12 @@
 /// The sweep over classes of radii; the header describes the algorithm.
 #include "src/sphere_collider/cpu/cell_sweep.hpp"
 
+#include "src/base/parallel_for.hpp"
+
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <functional>
 #include <type_traits>
 #include <utility>
 
@@ -34,6 +37,7 @@ constexpr Real kLargest = std::numeric_limits<Real>::max();
 
 /// Up to this number of targets, all pairs are tested, without cells.
 constexpr std::size_t kFewTargets = 32;
+constexpr std::size_t kSpheresPerChunk = 8192;
 
 std::uint64_t to_unsigned(std::int64_t v) { return static_cast<std::uint64_t>(v); }
 
@@ -63,7 +67,7 @@ int make_rows(const CellGrid& grid, bool half, std::array<CellRow, kRows>* rows)
 
 PairOrder CellSweep::find_pairs(std::span<const SphereInstance> spheres, const Kernels& kernels,
                                 ThreadPool& pool, PairChunks* pairs) {
-  sort_by_radius(spheres);
+  sort_by_radius(spheres, pool);
   const std::uint32_t* order = bins_.size() > 1 ? order_.data() : nullptr;
   const auto part = [&](std::size_t from, std::size_t to) {
     return SphereSubset{spheres, order != nullptr ? order + from : nullptr, to - from};
@@ -80,10 +84,10 @@ PairOrder CellSweep::find_pairs(std::span<const SphereInstance> spheres, const K
       targets = part(begin, bins_[next - 1].end);
       // If the sum of two radii can overflow, the claim of CellAxis does not hold.
       by_cell = targets.count > kFewTargets && largest < kLargest / 8;
-      if (by_cell) grid_.fit(targets, 2 * extended);
+      if (by_cell) grid_.fit(targets, 2 * extended, pool);
       fill_table(targets, by_cell, pool, &targets_);
       if (!by_cell || width == kNarrowest || next == first + 1 ||
-          others_per_cell(targets_) <= kDense)
+          others_per_cell(targets_, pool) <= kDense)
         break;
     }
     const PairOrder found = search(kernels, targets_, by_cell, pool, pairs);
@@ -91,7 +95,7 @@ PairOrder CellSweep::find_pairs(std::span<const SphereInstance> spheres, const K
     begin += targets.count;
     if (next < bins_.size()) {
       if (by_cell) {  // smaller spheres allow smaller cells with fewer targets
-        grid_.fit(targets, extended + extended_radius(bins_[next].largest));
+        grid_.fit(targets, extended + extended_radius(bins_[next].largest), pool);
         fill_table(targets, by_cell, pool, &targets_);
       }
       fill_table(part(begin, spheres.size()), by_cell, pool, &queries_);
@@ -103,13 +107,23 @@ PairOrder CellSweep::find_pairs(std::span<const SphereInstance> spheres, const K
 }
 
 /// Fills bins_ from the largest radii to the smallest, and order_.
-void CellSweep::sort_by_radius(std::span<const SphereInstance> spheres) {
-  Real smallest = kLargest;
-  Real largest = 0;
-  for (const SphereInstance& s : spheres) {
-    smallest = std::min(smallest, s.radius);
-    largest = std::max(largest, s.radius);
-  }
+void CellSweep::sort_by_radius(std::span<const SphereInstance> spheres, ThreadPool& pool) {
+  struct Radii {
+    Real smallest = kLargest, largest = 0;
+  };
+  const auto [smallest, largest] = parallel_reduce(
+      &pool, spheres.size(), kSpheresPerChunk, Radii(),
+      [&](std::size_t first, std::size_t last) {
+        Radii radii;
+        for (const SphereInstance& s : spheres.subspan(first, last - first)) {
+          radii.smallest = std::min(radii.smallest, s.radius);
+          radii.largest = std::max(radii.largest, s.radius);
+        }
+        return radii;
+      },
+      [](const Radii& a, const Radii& b) {
+        return Radii{std::min(a.smallest, b.smallest), std::max(a.largest, b.largest)};
+      });
   bins_.clear();
   if (largest <= smallest * kOneBin) {
     bins_.push_back({0, spheres.size(), largest});
@@ -135,15 +149,22 @@ void CellSweep::sort_by_radius(std::span<const SphereInstance> spheres) {
 }
 
 /// Average number of other spheres in the cell of a sphere.
-double CellSweep::others_per_cell(const SphereTable& table) const {
+double CellSweep::others_per_cell(const SphereTable& table, ThreadPool& pool) {
   const std::int64_t* cell = table.columns().cell;
-  std::uint64_t pairs = 0;
-  std::uint64_t in_cell = 0;  // previous spheres in the cell
-  for (std::uint32_t i = 1; i < table.count(); ++i) {
-    const std::uint64_t same = cell[i] == cell[i - 1] ? 1 : 0;
-    in_cell = (in_cell + 1) & (0 - same);  // no branch, which would be unpredictable
+  const auto pairs_of = [&](std::size_t first, std::size_t last) {
+    std::uint64_t pairs = 0;
+    std::uint64_t in_cell = 0;  // previous spheres in the cell
+    while (in_cell < first && cell[first - in_cell - 1] == cell[first]) ++in_cell;
     pairs += in_cell;
-  }
+    for (std::size_t i = first + 1; i < last; ++i) {
+      const std::uint64_t same = cell[i] == cell[i - 1] ? 1 : 0;
+      in_cell = (in_cell + 1) & (0 - same);  // no branch, which would be unpredictable
+      pairs += in_cell;
+    }
+    return pairs;
+  };
+  const std::uint64_t pairs = parallel_reduce(&pool, table.count(), kSpheresPerChunk,
+                                              std::uint64_t{0}, pairs_of, std::plus<>());
   return 2.0 * static_cast<double>(pairs) / std::max(table.count(), 1u);
 }
 
@@ -184,7 +205,7 @@ void CellSweep::fill_by_cell(const SphereSubset& subset, unsigned cell_bits, uns
   const std::uint64_t nowhere = to_unsigned(grid_.cells());  // greater than all cells
   Item* items = buffers->items.reserve(subset.count, "cells of spheres");
   Item* spare = buffers->spare.reserve(subset.count, "cells of spheres");
-  constexpr std::size_t kChunk = 8192;
+  constexpr std::size_t kChunk = 2048;
   pool.run((subset.count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     const std::size_t end = std::min(subset.count, (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) {
@@ -206,7 +227,7 @@ void CellSweep::fill_by_cell(const SphereSubset& subset, unsigned cell_bits, uns
 PairOrder CellSweep::search(const Kernels& kernels, const SphereTable& queries, bool by_cell,
                             ThreadPool& pool, PairChunks* pairs) {
   const bool self = &queries == &targets_;
-  const bool crowded = by_cell && others_per_cell(queries) > kCrowded;
+  const bool crowded = by_cell && others_per_cell(queries, pool) > kCrowded;
   const std::size_t step = queries_per_chunk(queries.count());
   const std::size_t chunks = (queries.count() + step - 1) / step;
   const std::size_t first_chunk = pairs->add(chunks);

@@ -42,8 +42,8 @@ class CellSweep {
     Buffer<Item> items, spare;
   };
 
-  void sort_by_radius(std::span<const SphereInstance> spheres);
-  double others_per_cell(const SphereTable& table) const;
+  void sort_by_radius(std::span<const SphereInstance> spheres, ThreadPool& pool);
+  static double others_per_cell(const SphereTable& table, ThreadPool& pool);
   void fill_table(const SphereSubset& subset, bool by_cell, ThreadPool& pool, SphereTable* table);
   template <class Item, class Pack, class Key, class Index>
   void fill_by_cell(const SphereSubset& subset, unsigned cell_bits, unsigned low_bit,

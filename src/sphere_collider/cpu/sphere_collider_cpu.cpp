@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/cpu.hpp"
+#include "src/base/parallel_for.hpp"
 #include "src/collide/sphere_pair.hpp"
 #include "src/sphere_collider/cpu/cell_sweep.hpp"
 #include "src/sphere_collider/cpu/contact_writer.hpp"
@@ -12,6 +13,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -92,7 +94,7 @@ class SphereColliderCpu final : public SphereCollider {
   SphereAlgorithm algorithm() const noexcept override { return used_; }
 
  private:
-  static constexpr std::size_t kPairChunk = 2048;
+  static constexpr std::size_t kPairChunk = 2048, kSpheresPerChunk = 8192;
   static std::size_t chunks_of(std::span<const SpherePair> pairs) {
     return (pairs.size() + kPairChunk - 1) / kPairChunk;
   }
@@ -107,9 +109,21 @@ class SphereColliderCpu final : public SphereCollider {
     return pairs.subspan(begin, end - begin);
   }
 
+  /// detail::check_spheres() on all threads.
+  void check(std::span<const SphereInstance> spheres) {
+    detail::check_count(spheres);
+    const bool valid = parallel_reduce(
+        &pool_, spheres.size(), kSpheresPerChunk, true,
+        [&](std::size_t first, std::size_t last) {
+          return detail::all_valid(spheres.subspan(first, last - first));
+        },
+        std::logical_and<>());
+    if (!valid) detail::reject_sphere(spheres);
+  }
+
   /// Fills pairs_, and returns its order.
   PairOrder search(std::span<const SphereInstance> spheres) {
-    detail::check_spheres(spheres);
+    check(spheres);
     used_ = requested_;
     if (used_ == SphereAlgorithm::automatic) {
       used_ = spheres.size() < kAllPairsBelow ? SphereAlgorithm::all_pairs

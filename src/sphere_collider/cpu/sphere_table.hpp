@@ -32,7 +32,7 @@ class SphereTable {
             const Id& id_of, const Cell& cell_of) {
     reserve(count + kMaxLanes);
     count_ = static_cast<std::uint32_t>(count);
-    constexpr std::size_t kChunk = 8192;
+    constexpr std::size_t kChunk = 2048;
     pool.run((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
       const std::size_t end = std::min(count, (chunk + 1) * kChunk);
       for (std::size_t i = chunk * kChunk; i < end; ++i) {

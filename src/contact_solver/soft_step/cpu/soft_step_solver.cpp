@@ -17,7 +17,7 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 namespace {
 
-constexpr std::size_t kRowsPerChunk = 128, kContactsPerChunk = 4096;
+constexpr std::size_t kRowsPerChunk = 32, kContactsPerChunk = 4096;
 
 // The layout that sphere_sweep.hpp assumes.
 constexpr std::size_t kReal = sizeof(Real);
@@ -56,14 +56,16 @@ SoftStepSolver::SoftStepSolver(ThreadPool* pool, SimdLevel simd)
 /// Counting sort of the contacts into rows by kind and group. Rows of a group are in the order of
 /// contacts, those with fixed bodies in the order of bodies.
 void SoftStepSolver::sort_contacts() {
-  count_contacts();
+  const std::size_t colored_end = count_contacts();
   std::array<std::uint32_t, kGroups> spheres{}, manifolds{};
   std::uint32_t fixed = 0;
   for (Counts& chunk : counts_) {
-    for (std::size_t g = 0; g < kGroups; ++g) {
+    const auto add = [&](std::size_t g) {
       spheres[g] += std::exchange(chunk.spheres[g], spheres[g]);
       manifolds[g] += std::exchange(chunk.manifolds[g], manifolds[g]);
-    }
+    };
+    for (std::size_t g = 0; g < colored_end; ++g) add(g);
+    add(kFixedGroup);
     fixed += std::exchange(chunk.fixed, fixed);
   }
   const auto start = [](auto* kind_rows, const auto& counts) {
@@ -92,21 +94,30 @@ void SoftStepSolver::sort_contacts() {
 }
 
 /// Fills kinds_, and counts_ by chunk of contacts.
-void SoftStepSolver::count_contacts() {
+/// @returns end of the groups of colors that occur
+std::size_t SoftStepSolver::count_contacts() {
   const std::uint32_t count = setup_.contacts.size();
   resize_geometric(&kinds_, count);
   resize_geometric(&counts_, (count + kContactsPerChunk - 1) / kContactsPerChunk);
-  parallel_for(pool_, count, kContactsPerChunk, [this](std::size_t first, std::size_t last) {
+  const auto count_chunk = [this](std::size_t first, std::size_t last) {
     Counts& counts = counts_[first / kContactsPerChunk];
     counts = {};
+    std::size_t colored_end = 0;
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
       kinds_[i] = setup_.kind_of(i);
       if (kinds_[i] == RowKind::none) continue;
       const std::size_t group = setup_.group_of(i);
       ++(kinds_[i] == RowKind::sphere ? counts.spheres : counts.manifolds)[group];
-      if (group == kFixedGroup) ++counts.fixed;
+      if (group == kFixedGroup) {
+        ++counts.fixed;
+      } else {
+        colored_end = std::max(colored_end, group + 1);
+      }
     }
-  });
+    return colored_end;
+  };
+  return parallel_reduce(pool_, count, kContactsPerChunk, std::size_t{0}, count_chunk,
+                         std::ranges::max);
 }
 
 /// Assigns rows to the contacts of a chunk. @param before number of rows in the chunks before
@@ -270,17 +281,19 @@ void SoftStepSolver::restitute(std::span<SolverBody> bodies) {
 }
 
 void SoftStepSolver::store() {
-  parallel_for(pool_, spheres_.rows.size(), 4096, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      setup_.store(spheres_.rows[i], spheres_.contacts[i]);
-    }
-  });
-  parallel_for(pool_, manifolds_.rows.size(), 1024, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      const ManifoldRow& row = manifolds_.rows[i];
-      setup_.store(row, &points_[row.first], manifolds_.contacts[i]);
-    }
-  });
+  parallel_for(pool_, spheres_.rows.size(), kContactsPerChunk,
+               [&](std::size_t first, std::size_t last) {
+                 for (std::size_t i = first; i < last; ++i) {
+                   setup_.store(spheres_.rows[i], spheres_.contacts[i]);
+                 }
+               });
+  parallel_for(pool_, manifolds_.rows.size(), kContactsPerChunk / 4,
+               [&](std::size_t first, std::size_t last) {
+                 for (std::size_t i = first; i < last; ++i) {
+                   const ManifoldRow& row = manifolds_.rows[i];
+                   setup_.store(row, &points_[row.first], manifolds_.contacts[i]);
+                 }
+               });
 }
 
 }  // namespace soft_step

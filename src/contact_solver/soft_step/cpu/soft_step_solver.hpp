@@ -64,7 +64,7 @@ class SoftStepSolver {
   };
 
   void sort_contacts();
-  void count_contacts();
+  std::size_t count_contacts();
   void place_contacts(std::uint32_t first, std::uint32_t last, Counts before);
   void place_fixed_contacts();
   /// Calls run_spheres(first, last) and run_manifolds(first, last) for the rows of the overflow and
