@@ -74,7 +74,8 @@ void ContactCache::keep_rolling(std::uint32_t i, std::uint32_t before) {
 void ContactCache::choose_color(std::uint32_t i, std::uint8_t before,
                                 std::span<const Real> inverse_mass,
                                 GreedyColoring::Portion* uncolored) {
-  const ContactKey& key = current_.view().key(i);
+  const ContactView contacts = current_.view();
+  const ContactKey& key = contacts.key(i);
   if (before < kColors) {
     current_.colors[i] = before;
     coloring_.keep(key.a, key.b, before);
