@@ -1,4 +1,4 @@
-/// Software prefetch of a cache line.
+/// Software prefetch of cache lines.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -17,6 +17,17 @@ inline void prefetch(const void* address) {
   asm volatile("prefetcht1 (%0)" : : "r"(address));
 #else
   asm volatile("prfm pldl2keep, [%0]" : : "r"(address));
+#endif
+}
+
+/// Prefetches the cache line of `address` for writing, also from the cache of another core, which
+/// loses it: a later store then need not wait for the line. The address may be invalid. Processors
+/// with AVX2 have the instruction, or ignore it.
+inline void prefetch_for_write(const void* address) {
+#if defined(__x86_64__)
+  asm volatile("prefetchw (%0)" : : "r"(address));
+#else
+  asm volatile("prfm pstl1keep, [%0]" : : "r"(address));
 #endif
 }
 

@@ -6,6 +6,7 @@
 #include <SDL.h>
 
 #include <bitset>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>

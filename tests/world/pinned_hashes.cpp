@@ -115,8 +115,9 @@ bool check(const DemoPin& pin) {
   Hash64 hash;
   bool finite = true;
   std::size_t control = reset;
+  std::vector<demos::Input> inputs;
   for (int n = 0; n < pin.steps; ++n) {
-    std::vector<demos::Input> inputs;
+    inputs.clear();
     if (n % 5 == 0) {
       if (control != reset) inputs.push_back({control, false});
       control = random.below(demo->controls().size());

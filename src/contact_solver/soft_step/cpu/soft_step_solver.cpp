@@ -17,7 +17,7 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 namespace {
 
-constexpr std::size_t kRowsPerChunk = 32, kContactsPerChunk = 4096;
+constexpr std::size_t kRowsPerChunk = 64, kContactsPerChunk = 4096;
 
 // The layout that sphere_sweep.hpp assumes.
 constexpr std::size_t kReal = sizeof(Real);

@@ -1,5 +1,6 @@
 /// Kernels for rows of two spheres, for any instruction set. The arithmetic is that of
 /// sphere_row.hpp, operation by operation.
+#include "src/base/prefetch.hpp"
 #include "src/contact_solver/soft_step/cpu/sphere_sweep.hpp"
 
 namespace jfpx {
@@ -58,6 +59,18 @@ struct BodyLanes {
   }
 };
 
+/// The bodies of a row. @param k number of the row
+struct RowBodies {
+  std::uint32_t a, b;
+  RowBodies(const SphereSweep& sweep, std::size_t k) {
+    std::uint32_t bodies[2];
+    __builtin_memcpy(bodies, sweep.rows + k * kSweepStride + sphere_row_quad::kBodies,
+                     sizeof bodies);
+    a = bodies[0];
+    b = bodies[1];
+  }
+};
+
 template <class S>
 class RowLanes {
  public:
@@ -68,12 +81,10 @@ class RowLanes {
 
   RowLanes(const SphereSweep& sweep, std::size_t first) : sweep_(sweep) {
     for (unsigned k = 0; k < kLanes; ++k) {
+      const RowBodies row(sweep, first + k);
       rows_[k] = static_cast<std::uint32_t>(first) + k;
-      std::uint32_t bodies[2];
-      __builtin_memcpy(bodies, sweep.rows + (first + k) * kSweepStride + sphere_row_quad::kBodies,
-                       sizeof bodies);
-      a_[k] = bodies[0];
-      b_[k] = bodies[1];
+      a_[k] = row.a;
+      b_[k] = row.b;
     }
   }
 
@@ -192,13 +203,27 @@ class RowLanes {
   std::uint32_t rows_[kLanes], a_[kLanes], b_[kLanes];
 };
 
+/// Requests the bodies of at most `count` rows, which other threads may have written in the last
+/// color.
+void prefetch_bodies(const SphereSweep& sweep, std::size_t first, std::size_t count,
+                     std::size_t last) {
+  for (std::size_t k = first; k < first + count && k < last; ++k) {
+    const RowBodies row(sweep, k);
+    prefetch_for_write(sweep.bodies + row.a * kSweepStride);
+    prefetch_for_write(sweep.bodies + row.b * kSweepStride);
+  }
+}
+
 /// Calls one(first) for all vectors of rows. @returns as SphereSweepFunction
 template <unsigned kLanes, class One>
-std::size_t for_each_vector(std::size_t first, std::size_t last, std::uint32_t* left,
-                            const One& one) {
+std::size_t for_each_vector(const SphereSweep& sweep, std::size_t first, std::size_t last,
+                            std::uint32_t* left, const One& one) {
+  constexpr std::size_t kAhead = 2 * kLanes;  // some hundred nanoseconds
+  prefetch_bodies(sweep, first, kAhead, last);
   std::size_t count = 0;
   std::size_t i = first;
   for (; i + kLanes <= last; i += kLanes) {
+    prefetch_bodies(sweep, i + kAhead, kLanes, last);
     for (unsigned lanes = one(i); lanes != 0; lanes &= lanes - 1) {
       left[count++] = static_cast<std::uint32_t>(i) + static_cast<unsigned>(__builtin_ctz(lanes));
     }
@@ -210,7 +235,7 @@ std::size_t for_each_vector(std::size_t first, std::size_t last, std::uint32_t* 
 template <class S>
 std::size_t warm_start(const SphereSweep& sweep, std::size_t first, std::size_t last,
                        std::uint32_t* left) {
-  return for_each_vector<S::kLanes>(first, last, left, [&](std::size_t i) {
+  return for_each_vector<S::kLanes>(sweep, first, last, left, [&](std::size_t i) {
     RowLanes<S>(sweep, i).warm_start();
     return 0u;
   });
@@ -219,7 +244,7 @@ std::size_t warm_start(const SphereSweep& sweep, std::size_t first, std::size_t 
 template <class S, bool kUseBias>
 std::size_t solve(const SphereSweep& sweep, std::size_t first, std::size_t last,
                   std::uint32_t* left) {
-  return for_each_vector<S::kLanes>(first, last, left, [&](std::size_t i) {
+  return for_each_vector<S::kLanes>(sweep, first, last, left, [&](std::size_t i) {
     return RowLanes<S>(sweep, i).template solve<kUseBias>();
   });
 }
