@@ -2,18 +2,23 @@
 /// linked Bullet programs by those of jfpx.
 ///
 /// If it is listed in LD_PRELOAD, symbol lookup finds its definitions before Bullet's, also for the
-/// vtables inside Bullet's libraries, which are not linked with -Bsymbolic. This file depends on
-/// neither Bullet nor the C++ library, because it is loaded into programs that have neither; the
-/// engine of the right precision is loaded when Bullet first calls one of the functions.
+/// vtables inside Bullet's libraries, unless these are linked with -Bsymbolic-functions, as on
+/// Ubuntu: then it changes the vtables. This file depends on neither Bullet nor the C++ library,
+/// because it is loaded into programs that have neither; the engine of the right precision is
+/// loaded when Bullet first calls one of the functions.
 #include "src/bullet/preload/preload_engine.hpp"
 
 #include <cerrno>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
 #include <initializer_list>
+#include <link.h>
 #include <pthread.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #define JFPX_DISPATCH                                           \
   "_ZN21btCollisionDispatcher25dispatchAllCollisionPairsEP22bt" \
@@ -22,6 +27,16 @@
   "_ZN35btSequentialImpulseConstraintSolver10solveGroupEPP17btCollisionObjectiPP20btPersiste" \
   "ntManifoldiPP17btTypedConstraintiRK19btContactSolverInfoP12btIDebugDrawP12btDispatcher"
 #define JFPX_UPDATE_BOXES "_ZN16btCollisionWorld11updateAabbsEv"
+
+#define JFPX_EXPORT extern "C" __attribute__((visibility("default")))
+
+JFPX_EXPORT void jfpx_preload_dispatch(void* dispatcher, void* pair_cache, const void* info,
+                                       void* argument) __asm__(JFPX_DISPATCH);
+JFPX_EXPORT double jfpx_preload_solve(void* solver, void** bodies, int body_count, void** manifolds,
+                                      int manifold_count, void** joints, int joint_count,
+                                      const void* info, void* drawer,
+                                      void* dispatcher) __asm__(JFPX_SOLVE);
+JFPX_EXPORT void jfpx_preload_update_boxes(void* world) __asm__(JFPX_UPDATE_BOXES);
 
 namespace {
 
@@ -33,6 +48,8 @@ struct Function {
   const char* part;  ///< its name in JFPX_PRELOAD_PARTS
   const char *library, *library_f64;
   const char* attempt_symbol;  ///< in the engine
+  const char* vtable;          ///< symbol of the vtable of its class
+  void* replacement;           ///< the definition in this library
   pthread_once_t found = PTHREAD_ONCE_INIT;
   void* original = nullptr;
   bool is_private = false;  ///< loaded with RTLD_LOCAL, so that other copies may exist
@@ -43,17 +60,23 @@ Function g_dispatch{.symbol = JFPX_DISPATCH,
                     .part = "dispatcher",
                     .library = JFPX_BULLET_COLLISION_F32,
                     .library_f64 = JFPX_BULLET_COLLISION_F64,
-                    .attempt_symbol = kTryDispatch};
+                    .attempt_symbol = kTryDispatch,
+                    .vtable = "_ZTV21btCollisionDispatcher",
+                    .replacement = reinterpret_cast<void*>(jfpx_preload_dispatch)};
 Function g_solve{.symbol = JFPX_SOLVE,
                  .part = "solver",
                  .library = JFPX_BULLET_DYNAMICS_F32,
                  .library_f64 = JFPX_BULLET_DYNAMICS_F64,
-                 .attempt_symbol = kTrySolve};
+                 .attempt_symbol = kTrySolve,
+                 .vtable = "_ZTV35btSequentialImpulseConstraintSolver",
+                 .replacement = reinterpret_cast<void*>(jfpx_preload_solve)};
 Function g_update_boxes{.symbol = JFPX_UPDATE_BOXES,
                         .part = "world",
                         .library = JFPX_BULLET_COLLISION_F32,
                         .library_f64 = JFPX_BULLET_COLLISION_F64,
-                        .attempt_symbol = kTryUpdateBoxes};
+                        .attempt_symbol = kTryUpdateBoxes,
+                        .vtable = "_ZTV16btCollisionWorld",
+                        .replacement = reinterpret_cast<void*>(jfpx_preload_update_boxes)};
 
 pthread_mutex_t g_mutex = PTHREAD_MUTEX_INITIALIZER;
 PrintSummary g_print_summary = nullptr;
@@ -96,6 +119,34 @@ void* definition(const char* symbol, const void* caller, bool* is_private) {
   *is_private = next == nullptr;
   return next != nullptr ? next : private_definition(symbol, caller);
 }
+
+/// Replaces the function in the vtable of its class, if symbol lookup has not. The pages of the
+/// vtable remain writable.
+void replace_in_vtable(const Function& function, const void* caller) {
+  bool is_private = false;
+  void* const original = definition(function.symbol, caller, &is_private);
+  void* const vtable = definition(function.vtable, caller, &is_private);
+  if (original == nullptr || vtable == nullptr) return;
+  Dl_info info;
+  void* symbol = nullptr;
+  if (dladdr1(vtable, &info, &symbol, RTLD_DL_SYMENT) == 0 || symbol == nullptr) return;
+  void** const slots = static_cast<void**>(vtable);
+  const std::size_t size = static_cast<const ElfW(Sym)*>(symbol)->st_size / sizeof *slots;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (slots[i] != original) continue;
+    const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+    void* const start =
+        reinterpret_cast<void*>(reinterpret_cast<std::uintptr_t>(&slots[i]) / page * page);
+    if (mprotect(start, page, PROT_READ | PROT_WRITE) == 0) slots[i] = function.replacement;
+  }
+}
+/// @param caller null: in the libraries that the program was started with
+void replace_in_vtables(const void* caller) {
+  for (const Function* function : {&g_dispatch, &g_solve, &g_update_boxes}) {
+    replace_in_vtable(*function, caller);
+  }
+}
+__attribute__((constructor)) void start() { replace_in_vtables(nullptr); }
 
 /// The engine for the precision of the Bullet library that contains the function. Null, with a
 /// reason in g_reason, if the engines were compiled for another version, whose class layout may
@@ -148,6 +199,7 @@ void find_function() {
     std::abort();
   }
   function.base = info.dli_fbase;
+  replace_in_vtables(t_caller);  // Bullet may have been loaded after the program's start
   if (!is_enabled(function.part)) return;
   pthread_mutex_lock(&g_mutex);
   if (const char* engine = common_engine(function, t_caller)) load_engine(&function, engine);
@@ -191,16 +243,6 @@ __attribute__((destructor)) void summarise() {
 }
 
 }  // namespace
-
-#define JFPX_EXPORT extern "C" __attribute__((visibility("default")))
-
-JFPX_EXPORT void jfpx_preload_dispatch(void* dispatcher, void* pair_cache, const void* info,
-                                       void* argument) __asm__(JFPX_DISPATCH);
-JFPX_EXPORT double jfpx_preload_solve(void* solver, void** bodies, int body_count, void** manifolds,
-                                      int manifold_count, void** joints, int joint_count,
-                                      const void* info, void* drawer,
-                                      void* dispatcher) __asm__(JFPX_SOLVE);
-JFPX_EXPORT void jfpx_preload_update_boxes(void* world) __asm__(JFPX_UPDATE_BOXES);
 
 void jfpx_preload_dispatch(void* dispatcher, void* pair_cache, const void* info, void* argument) {
   using Original = void (*)(void*, void*, const void*, void*);
