@@ -66,8 +66,9 @@ void Ui::fit_text(float pixel_ratio) {
   ImFontConfig font;
   font.SizePixels = kTextSize * pixel_ratio;
   io.Fonts->Clear();
-  io.Fonts->AddFontDefault(&font);
-  io.FontGlobalScale = 1 / pixel_ratio;
+  const ImFont* const text = io.Fonts->AddFontDefault(&font);
+  io.Fonts->Build();  // some versions of Dear ImGui round the size
+  io.FontGlobalScale = kTextSize / text->FontSize;
   ImGui_ImplOpenGL3_DestroyDeviceObjects();  // the next frame recreates them
 }
 

@@ -1,6 +1,7 @@
 /// Callbacks that log their calls, and a function of Bullet that is replaced.
 #include "tests/bullet/random_world_globals.hpp"
 
+#include "src/bullet/preload/vtable.hpp"
 #include "tests/bullet/stack_bytes.hpp"
 
 #include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
@@ -27,6 +28,15 @@
   original(this, a, b, info, result);
   asm volatile("");  // no tail call: the frame must begin where fill_stack() did
 }
+
+namespace {
+[[maybe_unused]] const bool g_is_replaced = [] {
+  jfpx::preload::replace_in_vtable(dlsym(RTLD_DEFAULT, "_ZTV23btConvexConvexAlgorithm"),
+                                   dlsym(RTLD_NEXT, JFPX_PROCESS_COLLISION),
+                                   dlsym(RTLD_DEFAULT, JFPX_PROCESS_COLLISION));
+  return true;
+}();
+}  // namespace
 
 namespace jfpx {
 inline namespace JFPX_ABI {

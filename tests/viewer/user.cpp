@@ -102,6 +102,9 @@ void User::choose(const std::string& list, const std::string& entry) {
     SDL_Event event{};
     event.type = SDL_MOUSEWHEEL;
     event.wheel.y = -1;
+#if SDL_VERSION_ATLEAST(2, 0, 18)
+    event.wheel.preciseY = -1;  // which Dear ImGui reads since 1.89
+#endif
     SDL_PushEvent(&event);
     frame();
     frame();

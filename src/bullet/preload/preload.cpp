@@ -7,18 +7,15 @@
 /// because it is loaded into programs that have neither; the engine of the right precision is
 /// loaded when Bullet first calls one of the functions.
 #include "src/bullet/preload/preload_engine.hpp"
+#include "src/bullet/preload/vtable.hpp"
 
 #include <cerrno>
-#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
 #include <initializer_list>
-#include <link.h>
 #include <pthread.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #define JFPX_DISPATCH                                           \
   "_ZN21btCollisionDispatcher25dispatchAllCollisionPairsEP22bt" \
@@ -120,30 +117,13 @@ void* definition(const char* symbol, const void* caller, bool* is_private) {
   return next != nullptr ? next : private_definition(symbol, caller);
 }
 
-/// Replaces the function in the vtable of its class, if symbol lookup has not. The pages of the
-/// vtable remain writable.
-void replace_in_vtable(const Function& function, const void* caller) {
-  bool is_private = false;
-  void* const original = definition(function.symbol, caller, &is_private);
-  void* const vtable = definition(function.vtable, caller, &is_private);
-  if (original == nullptr || vtable == nullptr) return;
-  Dl_info info;
-  void* symbol = nullptr;
-  if (dladdr1(vtable, &info, &symbol, RTLD_DL_SYMENT) == 0 || symbol == nullptr) return;
-  void** const slots = static_cast<void**>(vtable);
-  const std::size_t size = static_cast<const ElfW(Sym)*>(symbol)->st_size / sizeof *slots;
-  for (std::size_t i = 0; i < size; ++i) {
-    if (slots[i] != original) continue;
-    const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
-    void* const start =
-        reinterpret_cast<void*>(reinterpret_cast<std::uintptr_t>(&slots[i]) / page * page);
-    if (mprotect(start, page, PROT_READ | PROT_WRITE) == 0) slots[i] = function.replacement;
-  }
-}
+/// Replaces the functions in the vtables of their classes, if symbol lookup has not.
 /// @param caller null: in the libraries that the program was started with
 void replace_in_vtables(const void* caller) {
+  bool is_private = false;
   for (const Function* function : {&g_dispatch, &g_solve, &g_update_boxes}) {
-    replace_in_vtable(*function, caller);
+    replace_in_vtable(definition(function->vtable, caller, &is_private),
+                      definition(function->symbol, caller, &is_private), function->replacement);
   }
 }
 __attribute__((constructor)) void start() { replace_in_vtables(nullptr); }

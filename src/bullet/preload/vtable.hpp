@@ -1,0 +1,33 @@
+/// Replacement of virtual functions where symbol lookup does not replace them: in libraries that
+/// are linked with -Bsymbolic-functions, as Ubuntu's Bullet is. Depends on the C library alone.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <dlfcn.h>
+#include <link.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+namespace jfpx::preload {
+
+/// Replaces a function in a vtable; has no effect if the vtable does not contain it. The pages of
+/// the vtable remain writable. No other thread may use the vtable.
+/// @param vtable,original null: no effect
+inline void replace_in_vtable(void* vtable, const void* original, void* replacement) {
+  if (vtable == nullptr || original == nullptr) return;
+  Dl_info info;
+  void* symbol = nullptr;
+  if (dladdr1(vtable, &info, &symbol, RTLD_DL_SYMENT) == 0 || symbol == nullptr) return;
+  void** const slots = static_cast<void**>(vtable);
+  const std::size_t size = static_cast<const ElfW(Sym)*>(symbol)->st_size / sizeof *slots;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (slots[i] != original) continue;
+    const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+    void* const start =
+        reinterpret_cast<void*>(reinterpret_cast<std::uintptr_t>(&slots[i]) / page * page);
+    if (mprotect(start, page, PROT_READ | PROT_WRITE) == 0) slots[i] = replacement;
+  }
+}
+
+}  // namespace jfpx::preload
