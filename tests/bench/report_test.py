@@ -167,7 +167,7 @@ class Page(Folder):
         self.assertIn("| gas | 448 | 1300 | 1.00 | 1.50 | cpu all pairs | cpu, all pairs | 1.10 |", page)
         self.assertIn("0.220 (1)", page, "the doubtful point is marked")
         self.assertIn("`x_bench`, 2026-01-02", page)
-        self.assertIn("Measured with jfpx 0.1.0.", page)
+        self.assertIn(", jfpx 0.1.0; data: ", page)
         # 0.5 against 1 at 32, 4 against 2 at 448: ratios 1/2 and 2, so the geometric mean, 120.
         self.assertIn("from N = 120 here", page)
         self.assertIn("800 x 600 by a card", page)
