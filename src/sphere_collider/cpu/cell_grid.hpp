@@ -4,6 +4,7 @@
 #include <jfpx/shape.hpp>
 
 #include "src/base/buffer.hpp"
+#include "src/base/thread_pool.hpp"
 
 #include <algorithm>
 #include <array>
