@@ -140,7 +140,7 @@ def stages(machine):
     for scene, backend in dict.fromkeys((s, b) for s, b, _ in series):
         slopes = [exponent(series[scene, backend, stage]) for stage in NATIVE_STAGES]
         fits.append([scene, backend, *[f"{x:.2f}" if x is not None else "" for x in slopes]])
-    return ("### Stages of a native step\n\n" + origin(machine, "stages") +
+    return ("### Stages of a native step with `worst_first`\n\n" + origin(machine, "stages") +
             "\nMedians in ms. Allocations are those of the median step.\n\n" +
             table(["scene", "backend", "N", "contacts", *NATIVE_STAGES, "step", "detect ns per sphere",
                    "allocations", "computed last by"], rows) +

@@ -1,4 +1,5 @@
-/// Benchmark of the stages of a native step: times and allocations by the number of spheres.
+/// Benchmark of the stages of a native step with Solver::worst_first, which are those of the
+/// thesis: times and allocations by the number of spheres.
 #include <jfpx/world.hpp>
 
 #include "bench/world/floor.hpp"
@@ -39,6 +40,7 @@ constexpr Run kRuns[] = {
 
 void stages(benchmark::State& state, Backend backend, const Run& run) {
   Scene scene = scenes::make(run.scene, {.spheres = run.spheres, .seed = 1});
+  scene.solver = Solver::worst_first;
   scene.sleep.enabled = false;
   World world(scene, {.collider = {.backend = backend}});
   for (int n = 0; n < run.settle; ++n) world.step();

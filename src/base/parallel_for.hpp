@@ -24,7 +24,8 @@ void parallel_for(ThreadPool* pool, std::size_t count, std::size_t chunk, const 
 }
 
 /// Combines `identity` and the results of body(first, last) for the chunks of [0, count), in any
-/// order: combine(x, y) must be associative and commutative to the last bit, as a minimum is.
+/// order: combine(x, y) must be associative and commutative for the values that occur. Minima and
+/// maxima are so apart from the sign of zero, sums of floating-point numbers are not.
 /// @param pool null: one chunk in the calling thread
 template <class Value, class Body, class Combine>
 Value parallel_reduce(ThreadPool* pool, std::size_t count, std::size_t chunk, const Value& identity,

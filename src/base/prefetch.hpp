@@ -1,4 +1,5 @@
-/// Software prefetch of cache lines.
+/// Software prefetch of cache lines. The functions are always inlined, so that sources for other
+/// instruction sets may use them.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,7 +13,7 @@ inline namespace JFPX_ABI {
 ///
 /// Uses inline assembly instead of __builtin_prefetch: GCC treats a function that contains only
 /// __builtin_prefetch as free of side effects and silently removes calls that were not inlined.
-inline void prefetch(const void* address) {
+[[gnu::always_inline]] inline void prefetch(const void* address) {
 #if defined(__x86_64__)
   asm volatile("prefetcht1 (%0)" : : "r"(address));
 #else
@@ -23,7 +24,7 @@ inline void prefetch(const void* address) {
 /// Prefetches the cache line of `address` for writing, also from the cache of another core, which
 /// loses it: a later store then need not wait for the line. The address may be invalid. Processors
 /// with AVX2 have the instruction, or ignore it.
-inline void prefetch_for_write(const void* address) {
+[[gnu::always_inline]] inline void prefetch_for_write(const void* address) {
 #if defined(__x86_64__)
   asm volatile("prefetchw (%0)" : : "r"(address));
 #else

@@ -37,7 +37,9 @@ constexpr auto kInterruption = std::chrono::microseconds(500);
 /// threads that have work.
 constexpr auto kCrowded = std::chrono::milliseconds(50);
 constexpr std::uint64_t kChunksLeft = 0xffffffffu;
-constexpr std::uint64_t kPartsOfTheRest = 4;
+/// A thread takes this part of the chunks that are left, and so many at most: a thread that loses
+/// its core delays the loop by its portion.
+constexpr std::uint64_t kPortionDivisor = 4, kLargestPortion = 8;
 
 }  // namespace
 
@@ -239,7 +241,7 @@ void ThreadPool::Workers::take_chunks(unsigned self) {
   }
 }
 
-/// Takes a part of the chunks that are left at a time, so that threads access shared counters
+/// Takes a portion of the chunks that are left at a time, so that threads access shared counters
 /// seldom, and still end at the same time (guided self-scheduling, Polychronopoulos and Kuck 1987).
 /// @param is_worker whether the thread must take over the floating-point environment of the caller
 void ThreadPool::Workers::take_chunks_of(unsigned owner, bool is_worker, std::uint32_t* prepared) {
@@ -247,7 +249,8 @@ void ThreadPool::Workers::take_chunks_of(unsigned owner, bool is_worker, std::ui
   std::uint64_t ticket = value.load();
   while ((ticket & kChunksLeft) != 0) {
     const std::uint64_t left = ticket & kChunksLeft;
-    const std::uint64_t taken = std::max<std::uint64_t>(left / kPartsOfTheRest, 1);
+    const std::uint64_t taken =
+        std::clamp<std::uint64_t>(left / kPortionDivisor, 1, kLargestPortion);
     if (!value.compare_exchange_weak(ticket, ticket - taken)) continue;
     const auto number = static_cast<std::uint32_t>(ticket >> 32);
     if (is_worker && *prepared != number) std::fesetenv(&job_.environment);

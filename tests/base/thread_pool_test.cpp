@@ -1,5 +1,7 @@
-/// Tests of ThreadPool.
+/// Tests of ThreadPool and of the loops that it runs.
 #include "src/base/thread_pool.hpp"
+
+#include "src/base/parallel_for.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +10,8 @@
 #include <cfenv>
 #include <chrono>
 #include <cstdint>
+#include <functional>
+#include <initializer_list>
 #include <limits>
 #include <numeric>
 #include <set>
@@ -32,6 +36,21 @@ TEST(ThreadPool, RunsEveryChunkOnce) {
       std::vector<int> runs(chunks);
       pool.run(chunks, [&](std::size_t i) { ++runs[i]; });
       EXPECT_EQ(runs, std::vector<int>(chunks, 1));
+    }
+  }
+}
+
+TEST(ThreadPool, ReducesEveryItemOnce) {
+  ThreadPool pool(4);
+  for (ThreadPool* const p : {static_cast<ThreadPool*>(nullptr), &pool}) {
+    for (const std::size_t count : std::initializer_list<std::size_t>{0, 1, 63, 64, 65, 10000}) {
+      const auto sum_of = [](std::size_t first, std::size_t last) {
+        std::size_t sum = 0;
+        for (std::size_t i = first; i < last; ++i) sum += i;
+        return sum;
+      };
+      const std::size_t sum = parallel_reduce(p, count, 64, std::size_t{7}, sum_of, std::plus<>());
+      EXPECT_EQ(sum, 7 + count * (count + 1) / 2 - count) << count;
     }
   }
 }

@@ -120,11 +120,18 @@ void* definition(const char* symbol, const void* caller, bool* is_private) {
 /// Replaces the functions in the vtables of their classes, if symbol lookup has not.
 /// @param caller null: in the libraries that the program was started with
 void replace_in_vtables(const void* caller) {
-  bool is_private = false;
   for (const Function* function : {&g_dispatch, &g_solve, &g_update_boxes}) {
-    replace_in_vtable(definition(function->vtable, caller, &is_private),
-                      definition(function->symbol, caller, &is_private), function->replacement);
+    // A program may have its own copy of the vtable, which the library then uses.
+    void* vtable = dlsym(RTLD_DEFAULT, function->vtable);
+    if (vtable == nullptr) vtable = private_definition(function->vtable, caller);
+    if (vtable == nullptr) continue;
+    bool is_private = false;
+    const void* const original = definition(function->symbol, caller, &is_private);
+    if (replace_in_vtable(vtable, original, function->replacement)) continue;
+    std::snprintf(g_reason, sizeof g_reason, "left to Bullet: the %s's vtable can't be changed: %s",
+                  function->part, std::strerror(errno));
   }
+  dlerror();  // forgets the errors of symbols that were not found
 }
 __attribute__((constructor)) void start() { replace_in_vtables(nullptr); }
 

@@ -11,14 +11,15 @@
 
 namespace jfpx::preload {
 
-/// Replaces a function in a vtable; has no effect if the vtable does not contain it. The pages of
-/// the vtable remain writable. No other thread may use the vtable.
+/// Replaces a function in a vtable; has no effect if the vtable does not contain it. The page of
+/// the entry remains writable. Other threads call either function.
 /// @param vtable,original null: no effect
-inline void replace_in_vtable(void* vtable, const void* original, void* replacement) {
-  if (vtable == nullptr || original == nullptr) return;
+/// @return false if the system does not allow it
+inline bool replace_in_vtable(void* vtable, const void* original, void* replacement) {
+  if (vtable == nullptr || original == nullptr) return true;
   Dl_info info;
   void* symbol = nullptr;
-  if (dladdr1(vtable, &info, &symbol, RTLD_DL_SYMENT) == 0 || symbol == nullptr) return;
+  if (dladdr1(vtable, &info, &symbol, RTLD_DL_SYMENT) == 0 || symbol == nullptr) return true;
   void** const slots = static_cast<void**>(vtable);
   const std::size_t size = static_cast<const ElfW(Sym)*>(symbol)->st_size / sizeof *slots;
   for (std::size_t i = 0; i < size; ++i) {
@@ -26,8 +27,10 @@ inline void replace_in_vtable(void* vtable, const void* original, void* replacem
     const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
     void* const start =
         reinterpret_cast<void*>(reinterpret_cast<std::uintptr_t>(&slots[i]) / page * page);
-    if (mprotect(start, page, PROT_READ | PROT_WRITE) == 0) slots[i] = replacement;
+    if (mprotect(start, page, PROT_READ | PROT_WRITE) != 0) return false;
+    __atomic_store_n(&slots[i], replacement, __ATOMIC_RELAXED);
   }
+  return true;
 }
 
 }  // namespace jfpx::preload

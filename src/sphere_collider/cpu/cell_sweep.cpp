@@ -152,10 +152,9 @@ void CellSweep::sort_by_radius(std::span<const SphereInstance> spheres, ThreadPo
 double CellSweep::others_per_cell(const SphereTable& table, ThreadPool& pool) {
   const std::int64_t* cell = table.columns().cell;
   const auto pairs_of = [&](std::size_t first, std::size_t last) {
-    std::uint64_t pairs = 0;
-    std::uint64_t in_cell = 0;  // previous spheres in the cell
-    while (in_cell < first && cell[first - in_cell - 1] == cell[first]) ++in_cell;
-    pairs += in_cell;
+    // Previous spheres in the cell. Cells are sorted.
+    auto in_cell = to_unsigned(cell + first - std::lower_bound(cell, cell + first, cell[first]));
+    std::uint64_t pairs = in_cell;
     for (std::size_t i = first + 1; i < last; ++i) {
       const std::uint64_t same = cell[i] == cell[i - 1] ? 1 : 0;
       in_cell = (in_cell + 1) & (0 - same);  // no branch, which would be unpredictable
