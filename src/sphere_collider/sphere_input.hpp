@@ -4,9 +4,12 @@
 #include <jfpx/contact.hpp>
 #include <jfpx/error.hpp>
 
+#include "src/base/parallel_for.hpp"
+
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <limits>
 #include <span>
 #include <string>
@@ -68,9 +71,17 @@ inline void check_count(std::span<const SphereInstance> spheres) {
 
 /// @throws InvalidArgument if there are too many spheres, or with the first sphere and field that
 /// find_contacts() does not accept.
-inline void check_spheres(std::span<const SphereInstance> spheres) {
+/// @param pool null: in the calling thread
+inline void check_spheres(std::span<const SphereInstance> spheres, ThreadPool* pool = nullptr) {
+  constexpr std::size_t kSpheresPerChunk = 8192;
   check_count(spheres);
-  if (!all_valid(spheres)) reject_sphere(spheres);
+  const bool valid = parallel_reduce(
+      pool, spheres.size(), kSpheresPerChunk, true,
+      [&](std::size_t first, std::size_t last) {
+        return all_valid(spheres.subspan(first, last - first));
+      },
+      std::logical_and<>());
+  if (!valid) reject_sphere(spheres);
 }
 
 /// @throws InvalidArgument if the number of pairs exceeds the range of PairContact::pair.

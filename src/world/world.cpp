@@ -29,6 +29,15 @@ std::string no_memory_for(const char* what, std::size_t bodies) {
          " bodies: about " + std::to_string(bodies * kBytesPerBody) + " bytes are needed";
 }
 
+/// As *copy = array, on all threads.
+template <class Item>
+void copy_array(ThreadPool* pool, const std::vector<Item>& array, std::vector<Item>* copy) {
+  resize_geometric(copy, array.size());
+  parallel_for(pool, array.size(), kBodiesPerTask, [&](std::size_t first, std::size_t last) {
+    std::copy_n(array.data() + first, last - first, copy->data() + first);
+  });
+}
+
 /// The first body that is_in_world() refuses.
 std::optional<BodyId> find_runaway(const BodyStore& store) {
   for (const BodyId id : store.ids()) {
@@ -78,15 +87,6 @@ void World::Impl::find_contacts(StepReport* report) {
   report->device_failure = contact_finder.collider().device_failure();
 }
 
-/// As *copy = array, on all threads.
-template <class Item>
-void World::Impl::copy_array(const std::vector<Item>& array, std::vector<Item>* copy) {
-  resize_geometric(copy, array.size());
-  parallel_for(pool.get(), array.size(), kBodiesPerTask, [&](std::size_t first, std::size_t last) {
-    std::copy_n(array.data() + first, last - first, copy->data() + first);
-  });
-}
-
 /// Detection of Solver::soft_step. The list of contacts is made only if generators may read it.
 void World::Impl::find_soft_step_contacts(StepReport* report) {
   soft_step::ContactSet& near = soft_step.contacts();
@@ -94,7 +94,7 @@ void World::Impl::find_soft_step_contacts(StepReport* report) {
       store, scene.soft_step.speculative_margin, pool.get(), &near, &detected);
   report->sphere_contacts = spheres + detected.other_spheres;
   report->contacts = spheres + detected.others.size();
-  copy_array(store.moving.position, &detected.position);
+  copy_array(pool.get(), store.moving.position, &detected.position);
   detected.generated.clear();
   if (generators.ids().empty()) return;
   ContactList& list = *contacts.storage();
@@ -202,13 +202,13 @@ void World::Impl::save_for_undo() {
     before.torque.clear();
   }
   if (saves_forces) {
-    copy_array(now.force, &before.force);
-    copy_array(now.torque, &before.torque);
+    copy_array(pool.get(), now.force, &before.force);
+    copy_array(pool.get(), now.torque, &before.torque);
   }
-  copy_array(now.last_acceleration, &before.last_acceleration);
-  copy_array(now.mean_motion, &before.mean_motion);
-  copy_array(now.rest_time, &before.rest_time);
-  copy_array(now.awake, &before.awake);
+  copy_array(pool.get(), now.last_acceleration, &before.last_acceleration);
+  copy_array(pool.get(), now.mean_motion, &before.mean_motion);
+  copy_array(pool.get(), now.rest_time, &before.rest_time);
+  copy_array(pool.get(), now.awake, &before.awake);
 }
 
 /// Restores the motion that save_for_undo() has copied.

@@ -222,8 +222,6 @@ struct World::Impl {
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   void find_contacts(StepReport* report);
   void find_soft_step_contacts(StepReport* report);
-  template <class Item>
-  void copy_array(const std::vector<Item>& array, std::vector<Item>* copy);
   void call_generators(std::vector<Contact>* list, StepReport* report);
   std::uint32_t count_awake() const;
   void save_for_undo();

@@ -30,12 +30,10 @@
 }
 
 namespace {
-[[maybe_unused]] const bool g_is_replaced = [] {
-  jfpx::preload::replace_in_vtable(dlsym(RTLD_DEFAULT, "_ZTV23btConvexConvexAlgorithm"),
-                                   dlsym(RTLD_NEXT, JFPX_PROCESS_COLLISION),
-                                   dlsym(RTLD_DEFAULT, JFPX_PROCESS_COLLISION));
-  return true;
-}();
+/// Where symbol lookup does not replace it.
+[[maybe_unused]] const bool g_is_replaced = jfpx::preload::replace_in_vtable(
+    dlsym(RTLD_DEFAULT, "_ZTV23btConvexConvexAlgorithm"), dlsym(RTLD_NEXT, JFPX_PROCESS_COLLISION),
+    dlsym(RTLD_DEFAULT, JFPX_PROCESS_COLLISION));
 }  // namespace
 
 namespace jfpx {

@@ -186,10 +186,10 @@ void find_function() {
     std::abort();
   }
   function.base = info.dli_fbase;
-  replace_in_vtables(t_caller);  // Bullet may have been loaded after the program's start
-  if (!is_enabled(function.part)) return;
   pthread_mutex_lock(&g_mutex);
-  if (const char* engine = common_engine(function, t_caller)) load_engine(&function, engine);
+  replace_in_vtables(t_caller);  // Bullet may have been loaded after the program's start
+  const char* engine = is_enabled(function.part) ? common_engine(function, t_caller) : nullptr;
+  if (engine != nullptr) load_engine(&function, engine);
   pthread_mutex_unlock(&g_mutex);
 }
 

@@ -63,22 +63,22 @@ void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls, Thr
   coloring_.finish();
 }
 
-/// Keeps the rolling impulse. @param i,before contacts of this and of the last step
-void ContactCache::keep_rolling(std::uint32_t i, std::uint32_t before) {
-  if (current_.has_rolling()) current_.rolling_impulses[i] = last_.rolling_impulse(before);
-}
-
-/// Gives contact i the color that it had, or that of a contact with a fixed body, or adds it to
-/// those that GreedyColoring::finish() colors.
-/// @param before kNoColor: the contact is new
-void ContactCache::choose_color(std::uint32_t i, std::uint8_t before,
-                                std::span<const Real> inverse_mass,
-                                GreedyColoring::Portion* uncolored) {
+/// Gives contact i the rolling impulse and the color of the same contact of the last step. A
+/// contact without a color gets that of a contact with a fixed body, or one in
+/// GreedyColoring::finish().
+/// @param before number in the last step, if `is_kept`
+void ContactCache::keep(std::uint32_t i, bool is_kept, std::uint32_t before,
+                        std::span<const Real> inverse_mass, GreedyColoring::Portion* uncolored) {
+  if (current_.has_rolling()) {
+    current_.rolling_impulses[i] = {};
+    if (is_kept) current_.rolling_impulses[i] = last_.rolling_impulse(before);
+  }
+  const std::uint8_t color = is_kept ? last_.colors[before] : kNoColor;
   const ContactView contacts = current_.view();
   const ContactKey& key = contacts.key(i);
-  if (before < kColors) {
-    current_.colors[i] = before;
-    coloring_.keep(key.a, key.b, before);
+  if (color < kColors) {
+    current_.colors[i] = color;
+    coloring_.keep(key.a, key.b, color);
   } else if (!(inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0)) {
     current_.colors[i] = kFixedColor;
   } else {
@@ -94,13 +94,10 @@ void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last,
   for (std::uint32_t i = first; i < last; ++i) {
     const SphereContactInput& contact = current_.spheres[i];
     current_.impulses[i] = {};
-    if (current_.has_rolling()) current_.rolling_impulses[i] = {};
     std::uint32_t before = 0;
     const bool is_kept = finder.find(contact.key, &before);
-    choose_color(i, is_kept ? last_.colors[before] : kNoColor, inverse_mass, &uncolored);
-    if (!is_kept) continue;
-    keep_rolling(i, before);
-    current_.impulses[i] = at_start_of_step(last_.impulses[before]);
+    keep(i, is_kept, before, inverse_mass, &uncolored);
+    if (is_kept) current_.impulses[i] = at_start_of_step(last_.impulses[before]);
   }
   uncolored.flush();
 }
@@ -113,17 +110,13 @@ void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last,
   Finder<ManifoldInput> finder(last_.manifolds, current_.manifolds[first].key);
   for (std::uint32_t m = first; m < last; ++m) {
     const ManifoldInput& contact = current_.manifolds[m];
-    if (current_.has_rolling()) current_.rolling_impulses[spheres + m] = {};
     for (std::uint32_t p = 0; p < contact.count; ++p) {
       current_.impulses[spheres + contact.first + p] = {};
     }
     std::uint32_t old = 0;
     const bool is_kept = finder.find(contact.key, &old);
-    choose_color(spheres + m, is_kept ? last_.colors[spheres_before + old] : kNoColor, inverse_mass,
-                 &uncolored);
-    if (!is_kept) continue;
-    keep_rolling(spheres + m, spheres_before + old);
-    match_points(current_.view(), m, last_.view(), old);
+    keep(spheres + m, is_kept, spheres_before + old, inverse_mass, &uncolored);
+    if (is_kept) match_points(current_.view(), m, last_.view(), old);
   }
   uncolored.flush();
 }

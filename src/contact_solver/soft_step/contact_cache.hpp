@@ -52,9 +52,8 @@ class ContactCache {
  private:
   void match_spheres(std::uint32_t first, std::uint32_t last, std::span<const Real> inverse_mass);
   void match_manifolds(std::uint32_t first, std::uint32_t last, std::span<const Real> inverse_mass);
-  void choose_color(std::uint32_t i, std::uint8_t before, std::span<const Real> inverse_mass,
-                    GreedyColoring::Portion* uncolored);
-  void keep_rolling(std::uint32_t i, std::uint32_t before);
+  void keep(std::uint32_t i, bool is_kept, std::uint32_t before, std::span<const Real> inverse_mass,
+            GreedyColoring::Portion* uncolored);
 
   ContactSet current_, last_;
   std::vector<std::uint8_t> forgotten_;  ///< by body: 1 if last_ must lose its contacts

@@ -49,8 +49,7 @@ JFPX_HD constexpr std::uint8_t lowest_free_color(std::uint64_t used) {
 /// in the overflow, whose contacts are colored again.
 ///
 /// Usage in a step: start(), keep() for all colored contacts, Portion::add() for all others,
-/// finish().
-/// Owns its buffers, which only grow.
+/// finish(). Owns its buffers, which only grow.
 class GreedyColoring {
  public:
   void start(std::size_t bodies);

@@ -4,7 +4,6 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/cpu.hpp"
-#include "src/base/parallel_for.hpp"
 #include "src/collide/sphere_pair.hpp"
 #include "src/sphere_collider/cpu/cell_sweep.hpp"
 #include "src/sphere_collider/cpu/contact_writer.hpp"
@@ -13,7 +12,6 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -94,7 +92,7 @@ class SphereColliderCpu final : public SphereCollider {
   SphereAlgorithm algorithm() const noexcept override { return used_; }
 
  private:
-  static constexpr std::size_t kPairChunk = 2048, kSpheresPerChunk = 8192;
+  static constexpr std::size_t kPairChunk = 2048;
   static std::size_t chunks_of(std::span<const SpherePair> pairs) {
     return (pairs.size() + kPairChunk - 1) / kPairChunk;
   }
@@ -109,21 +107,9 @@ class SphereColliderCpu final : public SphereCollider {
     return pairs.subspan(begin, end - begin);
   }
 
-  /// detail::check_spheres() on all threads.
-  void check(std::span<const SphereInstance> spheres) {
-    detail::check_count(spheres);
-    const bool valid = parallel_reduce(
-        &pool_, spheres.size(), kSpheresPerChunk, true,
-        [&](std::size_t first, std::size_t last) {
-          return detail::all_valid(spheres.subspan(first, last - first));
-        },
-        std::logical_and<>());
-    if (!valid) detail::reject_sphere(spheres);
-  }
-
   /// Fills pairs_, and returns its order.
   PairOrder search(std::span<const SphereInstance> spheres) {
-    check(spheres);
+    detail::check_spheres(spheres, &pool_);
     used_ = requested_;
     if (used_ == SphereAlgorithm::automatic) {
       used_ = spheres.size() < kAllPairsBelow ? SphereAlgorithm::all_pairs

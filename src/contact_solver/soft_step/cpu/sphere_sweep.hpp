@@ -56,8 +56,8 @@ using SphereSweepFunction = std::size_t (*)(const SphereSweep& sweep, std::size_
 
 struct SphereSweepKernels {
   SphereSweepFunction warm_start;
-  SphereSweepFunction
-      solve[2];  ///< index 1: with bias. They leave out rows whose bodies may rebound.
+  /// Index 1: with bias. They leave out rows whose bodies may rebound.
+  SphereSweepFunction solve[2];
 };
 
 extern const SphereSweepKernels kAvx2SphereSweep;
