@@ -224,7 +224,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
                                 .rules = materials_},
                  .start = bodies_.data(),
                  .restitution_threshold = constants_.restitution_threshold},
-                {step_.bodies.last_acceleration, free_.data()}, constants_);
+                bodies_.size(), {step_.bodies.last_acceleration, free_.data()}, constants_);
   for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
     for_each_body(*bodies, [&](std::uint32_t i) {
       step_.accelerate(i, &step_.solver[i], &free_[i], substep == 0);

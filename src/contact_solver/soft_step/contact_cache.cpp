@@ -50,7 +50,7 @@ void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls, Thr
     now.rolling_impulses = {};
   }
   resize_geometric(&now.colors, now.size());
-  coloring_.start(inverse_mass.size());
+  coloring_.start(inverse_mass.size(), pool);
   parallel_for(pool, spheres, kMatchesPerChunk, [&](std::size_t first, std::size_t last) {
     match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
                   inverse_mass);
@@ -60,7 +60,7 @@ void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls, Thr
                  match_manifolds(static_cast<std::uint32_t>(first),
                                  static_cast<std::uint32_t>(last), inverse_mass);
                });
-  coloring_.finish();
+  coloring_.finish(now.colors.data(), pool);
 }
 
 /// Gives contact i the rolling impulse and the color of the same contact of the last step. A
@@ -83,7 +83,7 @@ void ContactCache::keep(std::uint32_t i, bool is_kept, std::uint32_t before,
     current_.colors[i] = kFixedColor;
   } else {
     current_.colors[i] = kNoColor;
-    uncolored->add(key, i, &current_.colors[i]);
+    uncolored->add(key, i);
   }
 }
 

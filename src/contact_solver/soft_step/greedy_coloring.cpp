@@ -1,17 +1,34 @@
 /// Greedy coloring in the order of hashes; see the header.
 #include "src/contact_solver/soft_step/greedy_coloring.hpp"
 
+#include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <tuple>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-void GreedyColoring::start(std::size_t bodies) {
-  assign_geometric(&used_, bodies, 0);
+namespace {
+
+/// Orders are divided by their highest bits. Hashes are uniform, so the buckets have equal sizes.
+constexpr unsigned kBucketBits = 6, kBuckets = 1u << kBucketBits;
+constexpr std::size_t kBodiesPerChunk = 16384;
+/// So few contacts are sorted in less time than a loop takes to begin and to end.
+constexpr std::size_t kFewContacts = 256;
+
+std::size_t bucket_of(std::uint64_t order) { return order >> (64 - kBucketBits); }
+
+}  // namespace
+
+void GreedyColoring::start(std::size_t bodies, ThreadPool* pool) {
+  resize_geometric(&used_, bodies);
+  parallel_for(pool, bodies, kBodiesPerChunk, [this](std::size_t first, std::size_t last) {
+    std::ranges::fill(std::span(used_).subspan(first, last - first), std::uint64_t{0});
+  });
   uncolored_.clear();
 }
 
@@ -21,14 +38,32 @@ void GreedyColoring::append(std::span<const Uncolored> contacts) {
   uncolored_.insert(uncolored_.end(), contacts.begin(), contacts.end());
 }
 
-void GreedyColoring::finish() {
-  std::ranges::sort(uncolored_, [](const Uncolored& x, const Uncolored& y) {
+/// Fills sorted_: a counting sort into buckets, which are sorted in parallel.
+void GreedyColoring::sort(ThreadPool* pool) {
+  resize_geometric(&sorted_, uncolored_.size());
+  std::array<std::size_t, kBuckets + 1> begin{};
+  for (const Uncolored& contact : uncolored_) ++begin[bucket_of(contact.order) + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  auto next = begin;
+  for (const Uncolored& contact : uncolored_) sorted_[next[bucket_of(contact.order)]++] = contact;
+  const auto order = [](const Uncolored& x, const Uncolored& y) {
     return std::tie(x.order, x.contact) < std::tie(y.order, y.contact);
+  };
+  ThreadPool* const sorters = uncolored_.size() > kFewContacts ? pool : nullptr;
+  parallel_for(sorters, kBuckets, 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t bucket = first; bucket < last; ++bucket) {
+      std::ranges::sort(
+          std::span(sorted_).subspan(begin[bucket], begin[bucket + 1] - begin[bucket]), order);
+    }
   });
-  for (const Uncolored& contact : uncolored_) {
+}
+
+void GreedyColoring::finish(std::uint8_t* colors, ThreadPool* pool) {
+  sort(pool);
+  for (const Uncolored& contact : sorted_) {
     std::uint64_t &a = used_[contact.a], &b = used_[contact.b];
     const std::uint8_t color = lowest_free_color(a | b);
-    *contact.color = color;
+    colors[contact.contact] = color;
     if (color == kOverflowColor) continue;
     a |= std::uint64_t{1} << color;
     b |= std::uint64_t{1} << color;

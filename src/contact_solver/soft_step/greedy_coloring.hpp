@@ -1,10 +1,12 @@
 /// Greedy coloring of the contacts of a step, which persists from step to step.
 #pragma once
 
+#include "src/base/thread_pool.hpp"
 #include "src/contact_solver/soft_step/contact_set.hpp"
 
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cstdint>
 #include <mutex>
 #include <span>
@@ -37,10 +39,13 @@ JFPX_HD constexpr std::uint64_t color_order(const ContactKey& key) {
 }
 
 /// The lowest color that is not in a set of colors; kOverflowColor if all are.
-JFPX_HD constexpr std::uint8_t lowest_free_color(std::uint64_t used) {
-  std::uint8_t color = 0;
-  while (color < kColors && (used >> color & 1) != 0) ++color;
-  return color;
+JFPX_HD inline std::uint8_t lowest_free_color(std::uint64_t used) {
+  static_assert(kColors == 64 && kOverflowColor == 64);
+#if defined(__CUDA_ARCH__)
+  return static_cast<std::uint8_t>(__popcll(used & ~(used + 1)));
+#else
+  return static_cast<std::uint8_t>(std::countr_one(used));
+#endif
 }
 
 /// Assigns the lowest color that neither body has to each new contact, in the order of a hash of
@@ -52,7 +57,8 @@ JFPX_HD constexpr std::uint8_t lowest_free_color(std::uint64_t used) {
 /// finish(). Owns its buffers, which only grow.
 class GreedyColoring {
  public:
-  void start(std::size_t bodies);
+  /// @param pool null: in the calling thread; likewise in finish()
+  void start(std::size_t bodies, ThreadPool* pool);
   /// Several threads may call it concurrently.
   void keep(std::uint32_t a, std::uint32_t b, std::uint8_t color) {
     const std::uint64_t bit = std::uint64_t{1} << color;
@@ -62,29 +68,30 @@ class GreedyColoring {
   /// Contacts that a thread adds, in portions. Several threads may do so concurrently, each with an
   /// object of its own.
   class Portion;
-  void finish();
+  /// @param colors by contact; those of the added contacts are assigned
+  void finish(std::uint8_t* colors, ThreadPool* pool);
 
  private:
   struct Uncolored {
     std::uint64_t order;
     std::uint32_t contact, a, b;
-    std::uint8_t* color;
   };
   void append(std::span<const Uncolored> contacts);
+  void sort(ThreadPool* pool);
 
   std::vector<std::uint64_t> used_;  ///< by body: the set of its colors
   std::mutex mutex_;                 ///< of uncolored_
   std::vector<Uncolored> uncolored_;
+  std::vector<Uncolored> sorted_;  ///< by order and number
 };
 
 class GreedyColoring::Portion {
  public:
   explicit Portion(GreedyColoring* coloring) : coloring_(coloring) {}
   /// @param contact number of the contact
-  /// @param color   receives the color in GreedyColoring::finish()
-  void add(const ContactKey& key, std::uint32_t contact, std::uint8_t* color) {
+  void add(const ContactKey& key, std::uint32_t contact) {
     if (count_ == contacts_.size()) flush();
-    contacts_[count_++] = {color_order(key), contact, key.a, key.b, color};
+    contacts_[count_++] = {color_order(key), contact, key.a, key.b};
   }
   /// Must be called after the last add().
   void flush() {

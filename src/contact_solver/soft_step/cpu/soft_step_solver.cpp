@@ -17,7 +17,8 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 namespace {
 
-constexpr std::size_t kRowsPerChunk = 64, kContactsPerChunk = 4096;
+constexpr std::size_t kRowsPerChunk = 64, kContactsPerChunk = 4096, kBodiesPerPart = 512;
+constexpr std::size_t kRowsPerKernel = 64;
 
 // The layout that sphere_sweep.hpp assumes.
 constexpr std::size_t kReal = sizeof(Real);
@@ -56,46 +57,39 @@ SoftStepSolver::SoftStepSolver(ThreadPool* pool, SimdLevel simd)
 /// Counting sort of the contacts into rows by kind and group. Rows of a group are in the order of
 /// contacts, those with fixed bodies in the order of bodies.
 void SoftStepSolver::sort_contacts() {
-  const std::size_t colored_end = count_contacts();
-  std::array<std::uint32_t, kGroups> spheres{}, manifolds{};
+  count_contacts();
+  GroupCounts spheres{}, manifolds{};
   std::uint32_t fixed = 0;
   for (Counts& chunk : counts_) {
     const auto add = [&](std::size_t g) {
       spheres[g] += std::exchange(chunk.spheres[g], spheres[g]);
       manifolds[g] += std::exchange(chunk.manifolds[g], manifolds[g]);
     };
-    for (std::size_t g = 0; g < colored_end; ++g) add(g);
+    for (std::size_t g = 0; g < colored_end_; ++g) add(g);
     add(kFixedGroup);
     fixed += std::exchange(chunk.fixed, fixed);
   }
-  const auto start = [](auto* kind_rows, const auto& counts) {
-    kind_rows->begin[0] = 0;
-    for (std::size_t g = 0; g < kGroups; ++g) {
-      kind_rows->begin[g + 1] = kind_rows->begin[g] + counts[g];
-    }
-    resize_geometric(&kind_rows->rows, kind_rows->begin[kGroups]);
-    resize_geometric(&kind_rows->contacts, kind_rows->begin[kGroups]);
-  };
-  start(&spheres_, spheres);
-  start(&manifolds_, manifolds);
+  spheres_.start(spheres, colored_end_, bodies_);
+  manifolds_.start(manifolds, colored_end_, bodies_);
   resize_geometric(&fixed_, fixed);
   parallel_for(pool_, setup_.contacts.size(), kContactsPerChunk,
                [&](std::size_t first, std::size_t last) {
                  place_contacts(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
                                 counts_[first / kContactsPerChunk]);
                });
+  spheres_.finish();
+  manifolds_.finish();
   place_fixed_contacts();
   std::uint32_t points = 0;
-  for (std::size_t i = 0; i < manifolds_.rows.size(); ++i) {
+  for (std::size_t i = 0; i < manifolds_.size(); ++i) {
     manifolds_.rows[i].first = points;
     points += setup_.contacts.impulse_count(manifolds_.contacts[i]);
   }
-  resize_geometric(&points_, points);
+  reserve_geometric(&points_, points, "points of contacts");
 }
 
 /// Fills kinds_, and counts_ by chunk of contacts.
-/// @returns end of the groups of colors that occur
-std::size_t SoftStepSolver::count_contacts() {
+void SoftStepSolver::count_contacts() {
   const std::uint32_t count = setup_.contacts.size();
   resize_geometric(&kinds_, count);
   resize_geometric(&counts_, (count + kContactsPerChunk - 1) / kContactsPerChunk);
@@ -116,8 +110,8 @@ std::size_t SoftStepSolver::count_contacts() {
     }
     return colored_end;
   };
-  return parallel_reduce(pool_, count, kContactsPerChunk, std::size_t{0}, count_chunk,
-                         std::ranges::max);
+  colored_end_ = parallel_reduce(pool_, count, kContactsPerChunk, std::size_t{0}, count_chunk,
+                                 std::ranges::max);
 }
 
 /// Assigns rows to the contacts of a chunk. @param before number of rows in the chunks before
@@ -129,10 +123,13 @@ void SoftStepSolver::place_contacts(std::uint32_t first, std::uint32_t last, Cou
     if (group == kFixedGroup) {
       const ContactKey& key = setup_.contacts.key(i);
       fixed_[before.fixed++] = {setup_.is_flipped(key) ? key.b : key.a, i, 0, is_sphere_row};
-    } else if (is_sphere_row) {
-      spheres_.contacts[spheres_.begin[group] + before.spheres[group]++] = i;
+      continue;
+    }
+    const std::uint32_t body = setup_.contacts.key(i).a;
+    if (is_sphere_row) {
+      spheres_.place(group, spheres_.begin(group) + before.spheres[group]++, i, body);
     } else {
-      manifolds_.contacts[manifolds_.begin[group] + before.manifolds[group]++] = i;
+      manifolds_.place(group, manifolds_.begin(group) + before.manifolds[group]++, i, body);
     }
   }
 }
@@ -143,37 +140,32 @@ void SoftStepSolver::place_fixed_contacts() {
     return std::tie(x.body, x.contact) < std::tie(y.body, y.contact);
   };
   if (!std::ranges::is_sorted(fixed_, order)) std::ranges::sort(fixed_, order);
-  std::uint32_t sphere = spheres_.begin[kFixedGroup], manifold = manifolds_.begin[kFixedGroup];
+  std::uint32_t sphere = spheres_.begin(kFixedGroup), manifold = manifolds_.begin(kFixedGroup);
   for (FixedContact& fixed : fixed_) {
     fixed.row = fixed.is_sphere_row ? sphere++ : manifold++;
     (fixed.is_sphere_row ? spheres_.contacts : manifolds_.contacts)[fixed.row] = fixed.contact;
   }
 }
 
-void SoftStepSolver::build(const RowSetup& setup, const ImpactBodies& impacts,
+void SoftStepSolver::build(const RowSetup& setup, std::size_t bodies, const ImpactBodies& impacts,
                            const StepConstants& constants) {
   setup_ = setup;
   impacts_ = impacts;
   constants_ = constants;
+  bodies_ = bodies;
   sort_contacts();
-  const auto fill_all = [this](auto* kind_rows, const auto& fill) {
-    const std::uint32_t first_fixed = kind_rows->begin[kFixedGroup];
-    parallel_for(pool_, kind_rows->rows.size(), kRowsPerChunk,
-                 [&](std::size_t first, std::size_t last) {
-                   for (std::size_t i = first; i < last; ++i) {
-                     const std::uint32_t contact = kind_rows->contacts[i];
-                     i < first_fixed ? fill(&kind_rows->rows[i], contact, std::false_type())
-                                     : fill(&kind_rows->rows[i], contact, std::true_type());
-                   }
-                 });
+  const auto fill = [this](auto* row, std::uint32_t contact, auto is_fixed) {
+    constexpr bool kFixed = decltype(is_fixed)::value;
+    if constexpr (std::is_same_v<decltype(row), SphereRow*>) {
+      setup_.fill<kFixed>(row, contact);
+    } else {
+      setup_.fill<kFixed>(row, &points_[row->first], contact);
+    }
   };
-  fill_all(&spheres_,
-           [this]<bool kFixed>(SphereRow* row, std::uint32_t contact, std::bool_constant<kFixed>) {
-             setup_.fill<kFixed>(row, contact);
-           });
-  fill_all(&manifolds_, [this]<bool kFixed>(ManifoldRow* row, std::uint32_t contact,
-                                            std::bool_constant<kFixed>) {
-    setup_.fill<kFixed>(row, &points_[row->first], contact);
+  for_all_rows([&](auto* grouped, std::size_t first, std::size_t last, auto is_fixed) {
+    for (std::size_t i = first; i < last; ++i) {
+      fill(&grouped->rows[i], grouped->contacts[i], is_fixed);
+    }
   });
 }
 
@@ -182,22 +174,45 @@ BodyPair SoftStepSolver::pair_of(const ManifoldRow& row, std::span<SolverBody> b
           &setup_.properties.inverse_inertia[row.b]};
 }
 
+template <class Operation>
+void SoftStepSolver::for_all_rows(const Operation& operation) {
+  const std::size_t parts = (bodies_ + kBodiesPerPart - 1) / kBodiesPerPart;
+  const auto of_part = [&](auto* rows, std::size_t part) {
+    for (std::size_t group = 0; group < colored_end_; ++group) {
+      operation(rows, rows->part_begin(group, part, parts),
+                rows->part_begin(group, part + 1, parts), std::false_type());
+    }
+  };
+  pool_->run(parts, [&](std::size_t part) {
+    of_part(&spheres_, part);
+    of_part(&manifolds_, part);
+  });
+  const auto fixed = [&](auto* rows) {
+    const std::size_t begin = rows->begin(kFixedGroup);
+    parallel_for(pool_, rows->size(kFixedGroup), kRowsPerChunk,
+                 [&](std::size_t first, std::size_t last) {
+                   operation(rows, begin + first, begin + last, std::true_type());
+                 });
+  };
+  fixed(&spheres_);
+  fixed(&manifolds_);
+}
+
 template <class RunSpheres, class RunManifolds, class OnFixed>
 void SoftStepSolver::sweep(const RunSpheres& run_spheres, const RunManifolds& run_manifolds,
                            const OnFixed& on_fixed) {
-  for (std::size_t i = 0; i < spheres_.begin[kOverflowGroup + 1]; ++i) run_spheres(i, i + 1);
-  run_manifolds(0, manifolds_.begin[kOverflowGroup + 1]);
-  for (std::size_t group = group_of_color(0); group < kFixedGroup; ++group) {
+  for (std::size_t i = 0; i < spheres_.end(kOverflowGroup); ++i) run_spheres(i, i + 1);
+  run_manifolds(0, manifolds_.end(kOverflowGroup));
+  for (std::size_t group = group_of_color(0); group < colored_end_; ++group) {
     // One loop over the rows of both kinds: the end of a loop costs as much as dozens of rows.
-    const std::size_t sphere = spheres_.begin[group], manifold = manifolds_.begin[group];
-    const std::size_t spheres = spheres_.begin[group + 1] - sphere;
-    const std::size_t manifolds = manifolds_.begin[group + 1] - manifold;
-    parallel_for(pool_, spheres + manifolds, kRowsPerChunk,
-                 [&](std::size_t first, std::size_t last) {
-                   run_spheres(sphere + std::min(first, spheres), sphere + std::min(last, spheres));
-                   run_manifolds(manifold + std::max(first, spheres) - spheres,
-                                 manifold + std::max(last, spheres) - spheres);
-                 });
+    const std::size_t count = spheres_.size(group) + manifolds_.size(group);
+    const std::size_t parts = (count + kRowsPerChunk - 1) / kRowsPerChunk;
+    pool_->run(parts, [&](std::size_t part) {
+      run_spheres(spheres_.part_begin(group, part, parts),
+                  spheres_.part_begin(group, part + 1, parts));
+      run_manifolds(manifolds_.part_begin(group, part, parts),
+                    manifolds_.part_begin(group, part + 1, parts));
+    });
   }
   parallel_for(pool_, fixed_.size(), kRowsPerChunk, [&](std::size_t first, std::size_t last) {
     // A chunk begins and ends at the first contact of a body.
@@ -236,9 +251,14 @@ void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operatio
           for (std::size_t i = first; i < last; ++i) one(&spheres_.rows[i], std::false_type());
           return;
         }
-        std::array<std::uint32_t, kRowsPerChunk> skipped;  // a chunk has no more rows
-        const std::size_t count = kernel(arrays, first, last, skipped.data());
-        for (std::size_t k = 0; k < count; ++k) one(&spheres_.rows[skipped[k]], std::false_type());
+        for (std::size_t begin = first; begin < last; begin += kRowsPerKernel) {
+          std::array<std::uint32_t, kRowsPerKernel> skipped;
+          const std::size_t end = std::min(last, begin + kRowsPerKernel);
+          const std::size_t count = kernel(arrays, begin, end, skipped.data());
+          for (std::size_t k = 0; k < count; ++k) {
+            one(&spheres_.rows[skipped[k]], std::false_type());
+          }
+        }
       },
       [&](std::size_t first, std::size_t last) {
         for (std::size_t i = first; i < last; ++i) one(&manifolds_.rows[i], std::false_type());
@@ -277,23 +297,20 @@ void SoftStepSolver::solve(std::span<SolverBody> bodies, bool use_bias) {
 }
 
 void SoftStepSolver::restitute(std::span<SolverBody> bodies) {
-  if (!manifolds_.rows.empty()) run(bodies, Restitute(), nullptr);
+  if (manifolds_.size() > 0) run(bodies, Restitute(), nullptr);
 }
 
 void SoftStepSolver::store() {
-  parallel_for(pool_, spheres_.rows.size(), kContactsPerChunk,
-               [&](std::size_t first, std::size_t last) {
-                 for (std::size_t i = first; i < last; ++i) {
-                   setup_.store(spheres_.rows[i], spheres_.contacts[i]);
-                 }
-               });
-  parallel_for(pool_, manifolds_.rows.size(), kContactsPerChunk / 4,
-               [&](std::size_t first, std::size_t last) {
-                 for (std::size_t i = first; i < last; ++i) {
-                   const ManifoldRow& row = manifolds_.rows[i];
-                   setup_.store(row, &points_[row.first], manifolds_.contacts[i]);
-                 }
-               });
+  for_all_rows([this](auto* grouped, std::size_t first, std::size_t last, auto) {
+    for (std::size_t i = first; i < last; ++i) {
+      const auto& row = grouped->rows[i];
+      if constexpr (std::is_same_v<decltype(row), const SphereRow&>) {
+        setup_.store(row, grouped->contacts[i]);
+      } else {
+        setup_.store(row, &points_[row.first], grouped->contacts[i]);
+      }
+    }
+  });
 }
 
 }  // namespace soft_step

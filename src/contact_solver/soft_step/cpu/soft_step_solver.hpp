@@ -3,11 +3,14 @@
 
 #include <jfpx/simd_level.hpp>
 
+#include "src/base/buffer.hpp"
 #include "src/base/thread_pool.hpp"
+#include "src/contact_solver/soft_step/cpu/grouped_rows.hpp"
 #include "src/contact_solver/soft_step/cpu/sphere_sweep.hpp"
 #include "src/contact_solver/soft_step/row_setup.hpp"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -32,7 +35,9 @@ class SoftStepSolver {
 
   /// Makes rows of the contacts whose RowKind is not `none`.
   /// @param setup     its arrays are valid until store()
-  void build(const RowSetup& setup, const ImpactBodies& impacts, const StepConstants& constants);
+  /// @param bodies    number of bodies in these arrays
+  void build(const RowSetup& setup, std::size_t bodies, const ImpactBodies& impacts,
+             const StepConstants& constants);
   /// Applies the impulses of the last step.
   void warm_start(std::span<SolverBody> bodies);
   /// A sweep over all contacts. @param use_bias whether it is a bias sweep or a relax sweep
@@ -43,13 +48,6 @@ class SoftStepSolver {
   void store();
 
  private:
-  /// Rows of one kind, sorted by group. @param Row SphereRow or ManifoldRow
-  template <class Row>
-  struct Rows {
-    std::vector<Row> rows;
-    std::vector<std::uint32_t> contacts;  ///< by row
-    std::array<std::uint32_t, kGroups + 1> begin{};
-  };
   /// A contact with a fixed body.
   struct FixedContact {
     std::uint32_t body = 0;  ///< the movable one
@@ -59,12 +57,12 @@ class SoftStepSolver {
   };
   /// Numbers of rows by group, of a chunk of contacts.
   struct Counts {
-    std::array<std::uint32_t, kGroups> spheres{}, manifolds{};
+    GroupCounts spheres{}, manifolds{};
     std::uint32_t fixed = 0;
   };
 
   void sort_contacts();
-  std::size_t count_contacts();
+  void count_contacts();
   void place_contacts(std::uint32_t first, std::uint32_t last, Counts before);
   void place_fixed_contacts();
   /// Calls run_spheres(first, last) and run_manifolds(first, last) for the rows of the overflow and
@@ -73,6 +71,11 @@ class SoftStepSolver {
   template <class RunSpheres, class RunManifolds, class OnFixed>
   void sweep(const RunSpheres& run_spheres, const RunManifolds& run_manifolds,
              const OnFixed& on_fixed);
+  /// Calls operation(rows, first, last, is_fixed) for ranges of all rows, where `rows` is &spheres_
+  /// or &manifolds_, and `is_fixed` whether one body is: std::true_type or std::false_type. The
+  /// rows of a part of the bodies follow each other, because their contacts do.
+  template <class Operation>
+  void for_all_rows(const Operation& operation);
   template <class Operation>
   void run(std::span<SolverBody> bodies, const Operation& operation,
            cpu::SphereSweepFunction kernel);
@@ -84,12 +87,14 @@ class SoftStepSolver {
   RowSetup setup_;                          ///< from build() to store()
   ImpactBodies impacts_;
   StepConstants constants_;
+  std::size_t bodies_ = 0;  ///< number of them
 
   std::vector<RowKind> kinds_;  ///< by contact
   std::vector<Counts> counts_;  ///< by chunk of contacts
-  Rows<SphereRow> spheres_;
-  Rows<ManifoldRow> manifolds_;
-  std::vector<PointRow> points_;
+  GroupedRows<SphereRow> spheres_;
+  GroupedRows<ManifoldRow> manifolds_;
+  std::size_t colored_end_ = 0;  ///< end of the overflow and of the colors that occur, as groups
+  Buffer<PointRow> points_;      ///< of manifolds_
   std::vector<FixedContact> fixed_;  ///< sorted by (body, contact)
 };
 

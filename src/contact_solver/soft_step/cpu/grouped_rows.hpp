@@ -1,0 +1,94 @@
+/// Rows of the soft step by group, divided among threads by their bodies.
+#pragma once
+
+#include "src/base/buffer.hpp"
+#include "src/base/reserve.hpp"
+#include "src/contact_solver/soft_step/row_setup.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Number of rows by group.
+using GroupCounts = std::array<std::uint32_t, kGroups>;
+
+/// Rows of one kind, sorted by group. Within the overflow and each color, rows are sorted by the
+/// lower body of their contact, and are divided into parts at the same bodies. A thread that takes
+/// the same part of each group, and of the bodies, therefore has most of them in its own cache.
+///
+/// Usage in a step: start(), place() for all rows before kFixedGroup, finish().
+/// @param Row SphereRow or ManifoldRow
+template <class Row>
+class GroupedRows {
+ public:
+  /// Bodies of a block. Parts end at blocks.
+  static constexpr std::uint32_t kBodiesPerBlock = 128;
+
+  Buffer<Row> rows;                ///< size() of them
+  Buffer<std::uint32_t> contacts;  ///< by row
+
+  std::uint32_t size() const { return begin_[kGroups]; }
+  std::uint32_t begin(std::size_t group) const { return begin_[group]; }
+  std::uint32_t end(std::size_t group) const { return begin_[group + 1]; }
+  std::uint32_t size(std::size_t group) const { return end(group) - begin(group); }
+
+  /// @param counts by group
+  /// @param groups end of the groups before kFixedGroup that have rows
+  void start(const GroupCounts& counts, std::size_t groups, std::size_t bodies) {
+    begin_[0] = 0;
+    for (std::size_t g = 0; g < kGroups; ++g) begin_[g + 1] = begin_[g] + counts[g];
+    reserve_geometric(&rows, size(), "rows of contacts");
+    reserve_geometric(&contacts, size(), "rows of contacts");
+    blocks_ = begin_[kFixedGroup] == 0 ? 0 : (bodies + kBodiesPerBlock - 1) / kBodiesPerBlock;
+    block_begin_.clear();
+    reserve_geometric(&block_begin_, groups * blocks_);
+    for (std::size_t g = 0; g < groups; ++g)
+      block_begin_.insert(block_begin_.end(), blocks_, end(g));
+  }
+
+  /// Assigns a contact to a row of a group before kFixedGroup. Several threads may do so
+  /// concurrently. @param body lower body of the contact
+  void place(std::size_t group, std::uint32_t row, std::uint32_t contact, std::uint32_t body) {
+    contacts[row] = contact;
+    std::atomic_ref begin(block_begin_[group * blocks_ + body / kBodiesPerBlock]);
+    for (std::uint32_t first = begin.load(std::memory_order_relaxed);
+         row < first && !begin.compare_exchange_weak(first, row, std::memory_order_relaxed);) {
+    }
+  }
+
+  void finish() {
+    // Blocks in which no row begins.
+    for (std::size_t i = block_begin_.size(); i-- > 0;) {
+      if ((i + 1) % blocks_ == 0) continue;  // last block of a group
+      block_begin_[i] = std::min(block_begin_[i], block_begin_[i + 1]);
+    }
+  }
+
+  /// Begin of a part of the rows of a group before kFixedGroup, for `part` in [0, parts]. Part i
+  /// has the rows of the i-th part of the bodies, to within a few rows.
+  std::uint32_t part_begin(std::size_t group, std::size_t part, std::size_t parts) const {
+    const std::size_t block = blocks_ * part / parts;
+    if (block == blocks_) return end(group);
+    const std::uint32_t row = block_begin_[group * blocks_ + block];
+    // Parts begin at a multiple of the longest vector, so that only the last part has a rest.
+    constexpr std::uint32_t kRowsPerVector = 8;
+    return row - (row - begin(group)) % kRowsPerVector;
+  }
+
+ private:
+  std::array<std::uint32_t, kGroups + 1> begin_{};
+  std::size_t blocks_ = 0;  ///< 0: there are no rows before kFixedGroup
+  /// By group and block: the first row of the group whose body is in the block or a later one.
+  std::vector<std::uint32_t> block_begin_;
+};
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,77 @@
+/// Tests of the greedy coloring of contacts.
+#include "src/contact_solver/soft_step/greedy_coloring.hpp"
+
+#include "tests/support/seed.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <initializer_list>
+#include <numeric>
+#include <random>
+#include <tuple>
+
+namespace jfpx {
+namespace {
+
+using namespace soft_step;  // NOLINT: the namespace under test
+
+TEST(GreedyColoring, FindsTheLowestFreeColor) {
+  EXPECT_EQ(lowest_free_color(0), 0);
+  for (unsigned color = 0; color < kColors; ++color) {
+    EXPECT_EQ(lowest_free_color(~(std::uint64_t{1} << color)), color);
+  }
+  EXPECT_EQ(lowest_free_color(~std::uint64_t{0}), kOverflowColor);
+}
+
+/// One contact after the other, in the order of the hash of its key.
+std::vector<std::uint8_t> colored_one_by_one(const std::vector<ContactKey>& keys,
+                                             std::uint32_t bodies) {
+  std::vector<std::uint32_t> order(keys.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::ranges::sort(order, {},
+                    [&](std::uint32_t i) { return std::tuple(color_order(keys[i]), i); });
+  std::vector<std::vector<bool>> used(bodies, std::vector<bool>(kColors + 1, false));
+  std::vector<std::uint8_t> colors(keys.size());
+  for (const std::uint32_t i : order) {
+    std::uint8_t color = 0;
+    while (color < kColors && (used[keys[i].a][color] || used[keys[i].b][color])) ++color;
+    colors[i] = color;
+    if (color < kColors) used[keys[i].a][color] = used[keys[i].b][color] = true;
+  }
+  return colors;
+}
+
+TEST(GreedyColoring, IsThatOfTheSortedContactsForAnyNumberOfThreads) {
+  const test::Seed seed;
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<std::uint32_t> part(0, 1);
+  ThreadPool pool(3);
+  GreedyColoring coloring;
+  for (const std::uint32_t count : {0u, 1u, 63u, 64u, 65u, 256u, 257u, 20000u}) {
+    // Body 0 has more contacts than there are colors.
+    const std::uint32_t bodies = count / 3 + 2;
+    std::uniform_int_distribution<std::uint32_t> body(0, bodies - 1);
+    std::vector<ContactKey> keys(count);
+    for (ContactKey& key : keys) {
+      key = {body(random) < bodies / 50 ? 0 : body(random), body(random), part(random), 0};
+      if (key.a == key.b) key.b = (key.a + 1) % bodies;
+    }
+    const std::vector<std::uint8_t> expected = colored_one_by_one(keys, bodies);
+    for (ThreadPool* const p : {static_cast<ThreadPool*>(nullptr), &pool}) {
+      coloring.start(bodies, p);
+      GreedyColoring::Portion portion(&coloring);
+      for (std::uint32_t i = 0; i < count; ++i) portion.add(keys[i], i);
+      portion.flush();
+      std::vector<std::uint8_t> colors(count, kNoColor);
+      coloring.finish(colors.data(), p);
+      EXPECT_EQ(colors, expected) << count << " contacts";
+    }
+    if (count == 20000) {
+      EXPECT_TRUE(std::ranges::count(expected, kOverflowColor) > 0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace jfpx
