@@ -28,7 +28,7 @@ struct LibraryUsesSameCompilerSwitches {
 
 /// A translation unit that is compiled with other switches refers to a symbol that does not exist,
 /// so that the program does not link.
-[[gnu::used]] static const char* const kLayoutCheck =
+[[gnu::used]] static constexpr const char* kLayoutCheck =
     &LibraryUsesSameCompilerSwitches<sizeof(LayoutProbe)>::value;
 
 }  // namespace detail

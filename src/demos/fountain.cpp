@@ -102,9 +102,10 @@ class Fountain final : public Demo {
 void Fountain::emit(Real delay) {
   const auto side = static_cast<std::uint64_t>(side_);
   const std::uint64_t site = emitted_++ % (side * side);
+  const std::uint64_t column = site % side, row = site / side;
   const Real middle = (side_ - 1) * Real(0.5);
-  const Real x = static_cast<Real>(site % side) - middle;
-  const Real z = static_cast<Real>(site / side) - middle;
+  const Real x = static_cast<Real>(column) - middle;
+  const Real z = static_cast<Real>(row) - middle;
   BodyDef ball =
       scenes::sphere_at({x * kSpacing, kRim + kSpeed * delay, z * kSpacing}, kRadius, Real(0.5));
   // The jet diverges by a tenth of the speed at the edge of the nozzle.

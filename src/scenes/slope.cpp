@@ -31,9 +31,9 @@ Scene make_slope(const Counts& counts) {
                           {half_width, kThickness, kLength}, 0);
     ramp.orientation = orientation;
     scene.bodies.push_back(ramp);
-    for (std::uint32_t i = static_cast<std::uint32_t>(s); i < counts.boxes + counts.spheres;
-         i += 2) {
-      const Real column = static_cast<Real>(i / 2) - static_cast<Real>(columns - 1) * Real(0.5);
+    for (auto i = static_cast<std::uint32_t>(s); i < counts.boxes + counts.spheres; i += 2) {
+      const std::uint32_t place = i / 2;
+      const Real column = static_cast<Real>(place) - static_cast<Real>(columns - 1) * Real(0.5);
       const Vec3 position = start + Vec3{column * kSpacing, 0, 0} + normal * kHalf;
       BodyDef body = i < counts.boxes ? box_at(position, {kHalf, kHalf, kHalf}, 1)
                                       : sphere_at(position, kHalf, 1);

@@ -34,8 +34,8 @@ std::vector<Ball> balls_of(const ScenePainter& painter) {
 
 }  // namespace
 
-DeviceViewer::DeviceViewer(const ViewOptions& options, const Scene& scene, DeviceRun run)
-    : options_(options),
+DeviceViewer::DeviceViewer(ViewOptions options, const Scene& scene, DeviceRun run)
+    : options_(std::move(options)),
       run_(std::move(run)),
       painter_(scene),
       world_(run_.make_world(scene)),

@@ -23,7 +23,7 @@ struct DeviceRun {
 class DeviceViewer final : public Viewer {
  public:
   /// @param scene must suit(): its balls are drawn, and its immovable bodies
-  DeviceViewer(const ViewOptions& options, const Scene& scene, DeviceRun run);
+  DeviceViewer(ViewOptions options, const Scene& scene, DeviceRun run);
 
   /// Whether every body is a movable ball, or immovable.
   static bool suits(const Scene& scene);

@@ -10,10 +10,10 @@ namespace {
 
 class NativeRun final : public Run {
  public:
-  NativeRun(const Scene& scene, const EngineChoice& choice, std::uint64_t first_step)
+  NativeRun(Scene scene, const EngineChoice& choice, std::uint64_t first_step)
       : choice_(choice),
         first_step_(first_step),
-        scene_(scene),
+        scene_(std::move(scene)),
         world_(scene_, {.collider = collider_options(choice)}) {}
 
   void step() override { report_ = world_.step(); }

@@ -178,11 +178,11 @@ void SphereHierarchy::unlink(Index leaf) {
   refit_up(above);
 }
 
-void SphereHierarchy::replace_child(Index parent, Index old, Index replacement) {
-  if (parent == kNone) {
+void SphereHierarchy::replace_child(Index above, Index child, Index replacement) {
+  if (above == kNone) {
     root_ = replacement;
   } else {
-    nodes_[parent].child[nodes_[parent].child[0] == old ? 0 : 1] = replacement;
+    nodes_[above].child[nodes_[above].child[0] == child ? 0 : 1] = replacement;
   }
 }
 

@@ -69,7 +69,7 @@ class SphereHierarchy {
   void set_sphere(Index leaf, const SphereInstance& sphere);
   void link(Index leaf);
   void unlink(Index leaf);
-  void replace_child(Index parent, Index old, Index replacement);
+  void replace_child(Index above, Index child, Index replacement);
   void refit(Index node);
   void refit_up(Index node);
   void collect_leaves(Index node);

@@ -182,7 +182,7 @@ auto& with_device(World& world) {
   }
   throw BackendUnavailable(
       w.automatic != nullptr
-          ? "cuda: \"auto\" has not started a GPU for this world; make it with the backend \"cuda\""
+          ? R"(cuda: "auto" has not started a GPU for this world; make it with the backend "cuda")"
           : "cuda: this world has no device; make it with the backend \"cuda\" and the solver "
             "soft_step");
 }

@@ -25,8 +25,8 @@ inline bool replace_in_vtable(void* vtable, const void* original, void* replacem
   for (std::size_t i = 0; i < size; ++i) {
     if (slots[i] != original) continue;
     const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
-    void* const start =
-        reinterpret_cast<void*>(reinterpret_cast<std::uintptr_t>(&slots[i]) / page * page);
+    char* const slot = reinterpret_cast<char*>(&slots[i]);
+    char* const start = slot - reinterpret_cast<std::uintptr_t>(slot) % page;
     if (mprotect(start, page, PROT_READ | PROT_WRITE) != 0) return false;
     __atomic_store_n(&slots[i], replacement, __ATOMIC_RELAXED);
   }

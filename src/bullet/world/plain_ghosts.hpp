@@ -16,11 +16,10 @@ namespace bullet {
 inline bool is_plain_ghost(const btCollisionObject& object) {
   if (is_exactly<btGhostObject>(object)) return true;
   if (!is_exactly<btPairCachingGhostObject>(object)) return false;
+  const auto& ghost = static_cast<const btPairCachingGhostObject&>(object);
   // Only the getter for mutable objects exists.
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast)
-  auto& ghost =
-      const_cast<btPairCachingGhostObject&>(static_cast<const btPairCachingGhostObject&>(object));
-  btHashedOverlappingPairCache& cache = *ghost.getOverlappingPairCache();
+  auto& cache = *const_cast<btPairCachingGhostObject&>(ghost).getOverlappingPairCache();
   return cache.*PairTables::ghosts == nullptr && cache.getOverlapFilterCallback() == nullptr;
 }
 

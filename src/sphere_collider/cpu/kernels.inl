@@ -337,9 +337,7 @@ void search_cells(const PairSearch& search, CellRow* rows) {
       if (copied) {
         search_run<S>(q, near.columns(), {0, static_cast<std::uint32_t>(total)}, self, &pairs);
       } else {
-        for (std::uint32_t row = 0; row < kRows; ++row) {
-          search_run<S>(q, targets, runs[row], self, &pairs);
-        }
+        for (const TargetRun& run : runs) search_run<S>(q, targets, run, self, &pairs);
       }
     }
   }
