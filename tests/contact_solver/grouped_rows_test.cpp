@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <initializer_list>
 #include <random>
 
 namespace jfpx {
@@ -49,48 +48,42 @@ struct RandomRows {
 TEST(GroupedRows, DividesEveryGroupAtTheSameBodies) {
   const test::Seed seed;
   std::mt19937 random(seed);
-  constexpr std::uint32_t kBlock = GroupsOfRows::kBodiesPerBlock;
+  constexpr std::uint32_t kBlock = kBodiesPerBlock;
   for (const std::uint32_t bodies : {1u, kBlock - 1, kBlock, kBlock + 1, 10 * kBlock + 3}) {
     for (const std::uint32_t count : {1u, 7u, 8u, 100u, 3000u}) {
       const RandomRows r(bodies, count, &random);
       for (std::uint32_t row = 0; row < r.body_of_row.size(); ++row) {
         ASSERT_EQ(r.rows.contacts[row], 1000 + row);
       }
-      for (const std::size_t parts : std::initializer_list<std::size_t>{1, 2, 7, 64, 1000}) {
-        for (std::size_t group = 0; group < RandomRows::kGroupsOfTest; ++group) {
-          std::uint32_t next = r.rows.begin(group);
-          for (std::size_t part = 0; part < parts; ++part) {
-            const std::uint32_t first = r.rows.part_begin(group, part, parts);
-            const std::uint32_t last = r.rows.part_begin(group, part + 1, parts);
-            ASSERT_EQ(first, next) << "a row is in no part or in two";
-            ASSERT_LE(first, last);
-            next = last;
-            // Up to the rest of a vector, the rows of the blocks that begin in the part.
-            const std::size_t blocks = (bodies + kBlock - 1) / kBlock;
-            const std::size_t begin = blocks * part / parts, end = blocks * (part + 1) / parts;
-            for (std::uint32_t row = first; row < last; ++row) {
-              const std::size_t block = r.body_of_row[row] / kBlock;
-              ASSERT_LT(block, end);
-              if (row >= first + 7) {
-                ASSERT_GE(block, begin);
-              }
+      const std::size_t blocks = block_count(bodies);
+      for (std::size_t group = 0; group < RandomRows::kGroupsOfTest; ++group) {
+        EXPECT_EQ(r.rows.begin(group, 0), r.rows.begin(group));
+        EXPECT_EQ(r.rows.begin(group, blocks), r.rows.end(group));
+        for (std::size_t block = 0; block < blocks; ++block) {
+          const std::uint32_t first = r.rows.begin(group, block);
+          const std::uint32_t last = r.rows.begin(group, block + 1);
+          ASSERT_LE(first, last);
+          // Up to the rest of a vector, the rows of the block.
+          for (std::uint32_t row = first; row < last; ++row) {
+            ASSERT_LE(r.body_of_row[row] / kBlock, block);
+            if (row >= first + 7) {
+              ASSERT_EQ(r.body_of_row[row] / kBlock, block);
             }
           }
-          ASSERT_EQ(next, r.rows.end(group));
         }
       }
     }
   }
 }
 
-TEST(GroupedRows, HasNoPartsOfFixedRowsOnly) {
+TEST(GroupedRows, HasNoBlocksOfFixedRowsOnly) {
   GroupsOfRows rows;
   GroupCounts counts{};
   counts[kFixedGroup] = 9;
   rows.start(counts, 1, 1000);
   rows.finish();
   EXPECT_EQ(rows.size(), 9u);
-  for (std::size_t part = 0; part <= 3; ++part) EXPECT_EQ(rows.part_begin(0, part, 3), 0u);
+  for (std::size_t block = 0; block <= 8; ++block) EXPECT_EQ(rows.begin(0, block), 0u);
   rows.start({}, 0, 0);  // a world without bodies
   rows.finish();
   EXPECT_EQ(rows.size(), 0u);

@@ -16,21 +16,24 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
+/// Rows are divided among threads by blocks of so many bodies.
+inline constexpr std::uint32_t kBodiesPerBlock = 128;
+constexpr std::size_t block_count(std::size_t bodies) {
+  return (bodies + kBodiesPerBlock - 1) / kBodiesPerBlock;
+}
+
 /// Number of rows by group.
 using GroupCounts = std::array<std::uint32_t, kGroups>;
 
 /// Rows of one kind, sorted by group. Within the overflow and each color, rows are sorted by the
-/// lower body of their contact, and are divided into parts at the same bodies. A thread that takes
-/// the same part of each group, and of the bodies, therefore has most of them in its own cache.
+/// lower body of their contact, and are divided at the same blocks of bodies. A thread that takes
+/// the same blocks of each group, and of the bodies, therefore has most of them in its own cache.
 ///
 /// Usage in a step: start(), place() for all rows before kFixedGroup, finish().
 /// @param Row SphereRow or ManifoldRow
 template <class Row>
 class GroupedRows {
  public:
-  /// Bodies of a block. Parts end at blocks.
-  static constexpr std::uint32_t kBodiesPerBlock = 128;
-
   Buffer<Row> rows;                ///< size() of them
   Buffer<std::uint32_t> contacts;  ///< by row
 
@@ -46,7 +49,7 @@ class GroupedRows {
     for (std::size_t g = 0; g < kGroups; ++g) begin_[g + 1] = begin_[g] + counts[g];
     reserve_geometric(&rows, size(), "rows of contacts");
     reserve_geometric(&contacts, size(), "rows of contacts");
-    blocks_ = begin_[kFixedGroup] == 0 ? 0 : (bodies + kBodiesPerBlock - 1) / kBodiesPerBlock;
+    blocks_ = begin_[kFixedGroup] == 0 ? 0 : block_count(bodies);
     block_begin_.clear();
     reserve_geometric(&block_begin_, groups * blocks_);
     for (std::size_t g = 0; g < groups; ++g)
@@ -71,13 +74,12 @@ class GroupedRows {
     }
   }
 
-  /// Begin of a part of the rows of a group before kFixedGroup, for `part` in [0, parts]. Part i
-  /// has the rows of the i-th part of the bodies, to within a few rows.
-  std::uint32_t part_begin(std::size_t group, std::size_t part, std::size_t parts) const {
-    const std::size_t block = blocks_ * part / parts;
-    if (block == blocks_) return end(group);
+  /// First row of a group before kFixedGroup for the bodies of a block, to within a few rows; for
+  /// `block` = block_count(bodies), the end of the group.
+  std::uint32_t begin(std::size_t group, std::size_t block) const {
+    if (block >= blocks_) return end(group);
     const std::uint32_t row = block_begin_[group * blocks_ + block];
-    // Parts begin at a multiple of the longest vector, so that only the last part has a rest.
+    // Rounded to the longest vector, so that only the last rows of a group are less than one.
     constexpr std::uint32_t kRowsPerVector = 8;
     return row - (row - begin(group)) % kRowsPerVector;
   }

@@ -17,7 +17,7 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 namespace {
 
-constexpr std::size_t kRowsPerChunk = 64, kContactsPerChunk = 4096, kBodiesPerPart = 512;
+constexpr std::size_t kRowsPerChunk = 64, kContactsPerChunk = 4096, kBlocksPerChunk = 4;
 constexpr std::size_t kRowsPerKernel = 64;
 
 // The layout that sphere_sweep.hpp assumes.
@@ -176,17 +176,16 @@ BodyPair SoftStepSolver::pair_of(const ManifoldRow& row, std::span<SolverBody> b
 
 template <class Operation>
 void SoftStepSolver::for_all_rows(const Operation& operation) {
-  const std::size_t parts = (bodies_ + kBodiesPerPart - 1) / kBodiesPerPart;
-  const auto of_part = [&](auto* rows, std::size_t part) {
+  const auto of_blocks = [&](auto* rows, std::size_t first, std::size_t last) {
     for (std::size_t group = 0; group < colored_end_; ++group) {
-      operation(rows, rows->part_begin(group, part, parts),
-                rows->part_begin(group, part + 1, parts), std::false_type());
+      operation(rows, rows->begin(group, first), rows->begin(group, last), std::false_type());
     }
   };
-  pool_->run(parts, [&](std::size_t part) {
-    of_part(&spheres_, part);
-    of_part(&manifolds_, part);
-  });
+  parallel_for(pool_, block_count(bodies_), kBlocksPerChunk,
+               [&](std::size_t first, std::size_t last) {
+                 of_blocks(&spheres_, first, last);
+                 of_blocks(&manifolds_, first, last);
+               });
   const auto fixed = [&](auto* rows) {
     const std::size_t begin = rows->begin(kFixedGroup);
     parallel_for(pool_, rows->size(kFixedGroup), kRowsPerChunk,
@@ -206,12 +205,12 @@ void SoftStepSolver::sweep(const RunSpheres& run_spheres, const RunManifolds& ru
   for (std::size_t group = group_of_color(0); group < colored_end_; ++group) {
     // One loop over the rows of both kinds: the end of a loop costs as much as dozens of rows.
     const std::size_t count = spheres_.size(group) + manifolds_.size(group);
-    const std::size_t parts = (count + kRowsPerChunk - 1) / kRowsPerChunk;
-    pool_->run(parts, [&](std::size_t part) {
-      run_spheres(spheres_.part_begin(group, part, parts),
-                  spheres_.part_begin(group, part + 1, parts));
-      run_manifolds(manifolds_.part_begin(group, part, parts),
-                    manifolds_.part_begin(group, part + 1, parts));
+    if (count == 0) continue;
+    const std::size_t blocks = block_count(bodies_);
+    const std::size_t chunk = std::max<std::size_t>(1, blocks * kRowsPerChunk / count);
+    parallel_for(pool_, blocks, chunk, [&](std::size_t first, std::size_t last) {
+      run_spheres(spheres_.begin(group, first), spheres_.begin(group, last));
+      run_manifolds(manifolds_.begin(group, first), manifolds_.begin(group, last));
     });
   }
   parallel_for(pool_, fixed_.size(), kRowsPerChunk, [&](std::size_t first, std::size_t last) {
