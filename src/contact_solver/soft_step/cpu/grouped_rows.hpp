@@ -52,8 +52,9 @@ class GroupedRows {
     blocks_ = begin_[kFixedGroup] == 0 ? 0 : block_count(bodies);
     block_begin_.clear();
     reserve_geometric(&block_begin_, groups * blocks_);
-    for (std::size_t g = 0; g < groups; ++g)
+    for (std::size_t g = 0; g < groups; ++g) {
       block_begin_.insert(block_begin_.end(), blocks_, end(g));
+    }
   }
 
   /// Assigns a contact to a row of a group before kFixedGroup. Several threads may do so
@@ -67,7 +68,7 @@ class GroupedRows {
   }
 
   void finish() {
-    // Blocks in which no row begins.
+    // A block without rows begins where the next one does.
     for (std::size_t i = block_begin_.size(); i-- > 0;) {
       if ((i + 1) % blocks_ == 0) continue;  // last block of a group
       block_begin_[i] = std::min(block_begin_[i], block_begin_[i + 1]);

@@ -73,7 +73,7 @@ class SoftStepSolver {
              const OnFixed& on_fixed);
   /// Calls operation(rows, first, last, is_fixed) for ranges of all rows, where `rows` is &spheres_
   /// or &manifolds_, and `is_fixed` whether one body is: std::true_type or std::false_type. The
-  /// rows of a part of the bodies follow each other, because their contacts do.
+  /// rows of a block of bodies follow each other, because their contacts do.
   template <class Operation>
   void for_all_rows(const Operation& operation);
   template <class Operation>
