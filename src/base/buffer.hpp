@@ -51,6 +51,11 @@ class Buffer {
     return data_;
   }
 
+  /// As reserve(), but the capacity grows geometrically, by an eighth. Discards the contents.
+  void reserve_geometric(std::size_t count, const char* purpose) {
+    if (count > capacity_) reserve(std::max(count, capacity_ + capacity_ / 8), purpose);
+  }
+
  private:
   static constexpr std::size_t kHugePage = std::size_t{1} << 21;
   // NOLINTNEXTLINE(bugprone-sizeof-expression): T may well be a pointer

@@ -3,8 +3,6 @@
 
 #include <jfpx/config.hpp>
 
-#include "src/base/buffer.hpp"
-
 #include <algorithm>
 #include <cstddef>
 #include <type_traits>
@@ -36,15 +34,6 @@ void assign_geometric(std::vector<T>* items, std::size_t count,
                       const std::type_identity_t<T>& value) {
   reserve_geometric(items, count);
   items->assign(count, value);
-}
-
-/// Makes the capacity of a buffer at least `count`. It grows geometrically, and the contents are
-/// discarded: unlike those of a vector, they are neither copied nor initialized by one thread.
-/// @param purpose as of Buffer::reserve() @throws OutOfMemory
-template <class T>
-void reserve_geometric(Buffer<T>* items, std::size_t count, const char* purpose) {
-  const std::size_t capacity = items->capacity();
-  if (capacity < count) items->reserve(std::max(count, capacity + capacity / 8), purpose);
 }
 
 }  // namespace JFPX_ABI

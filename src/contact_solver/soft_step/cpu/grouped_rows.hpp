@@ -47,8 +47,8 @@ class GroupedRows {
   void start(const GroupCounts& counts, std::size_t groups, std::size_t bodies) {
     begin_[0] = 0;
     for (std::size_t g = 0; g < kGroups; ++g) begin_[g + 1] = begin_[g] + counts[g];
-    reserve_geometric(&rows, size(), "rows of contacts");
-    reserve_geometric(&contacts, size(), "rows of contacts");
+    rows.reserve_geometric(size(), "rows of contacts");
+    contacts.reserve_geometric(size(), "rows of contacts");
     blocks_ = begin_[kFixedGroup] == 0 ? 0 : block_count(bodies);
     block_begin_.clear();
     reserve_geometric(&block_begin_, groups * blocks_);

@@ -85,7 +85,7 @@ void SoftStepSolver::sort_contacts() {
     manifolds_.rows[i].first = points;
     points += setup_.contacts.impulse_count(manifolds_.contacts[i]);
   }
-  reserve_geometric(&points_, points, "points of contacts");
+  points_.reserve_geometric(points, "points of contacts");
 }
 
 /// Fills kinds_, and counts_ by chunk of contacts.
@@ -120,16 +120,13 @@ void SoftStepSolver::place_contacts(std::uint32_t first, std::uint32_t last, Cou
     if (kinds_[i] == RowKind::none) continue;
     const std::size_t group = setup_.group_of(i);
     const bool is_sphere_row = kinds_[i] == RowKind::sphere;
+    const ContactKey& key = setup_.contacts.key(i);
     if (group == kFixedGroup) {
-      const ContactKey& key = setup_.contacts.key(i);
       fixed_[before.fixed++] = {setup_.is_flipped(key) ? key.b : key.a, i, 0, is_sphere_row};
-      continue;
-    }
-    const std::uint32_t body = setup_.contacts.key(i).a;
-    if (is_sphere_row) {
-      spheres_.place(group, spheres_.begin(group) + before.spheres[group]++, i, body);
+    } else if (is_sphere_row) {
+      spheres_.place(group, spheres_.begin(group) + before.spheres[group]++, i, key.a);
     } else {
-      manifolds_.place(group, manifolds_.begin(group) + before.manifolds[group]++, i, body);
+      manifolds_.place(group, manifolds_.begin(group) + before.manifolds[group]++, i, key.a);
     }
   }
 }
@@ -202,11 +199,11 @@ void SoftStepSolver::sweep(const RunSpheres& run_spheres, const RunManifolds& ru
                            const OnFixed& on_fixed) {
   for (std::size_t i = 0; i < spheres_.end(kOverflowGroup); ++i) run_spheres(i, i + 1);
   run_manifolds(0, manifolds_.end(kOverflowGroup));
+  const std::size_t blocks = block_count(bodies_);
   for (std::size_t group = group_of_color(0); group < colored_end_; ++group) {
     // One loop over the rows of both kinds: the end of a loop costs as much as dozens of rows.
     const std::size_t count = spheres_.size(group) + manifolds_.size(group);
     if (count == 0) continue;
-    const std::size_t blocks = block_count(bodies_);
     const std::size_t chunk = std::max<std::size_t>(1, blocks * kRowsPerChunk / count);
     parallel_for(pool_, blocks, chunk, [&](std::size_t first, std::size_t last) {
       run_spheres(spheres_.begin(group, first), spheres_.begin(group, last));

@@ -87,7 +87,7 @@ class SoftStepSolver {
   RowSetup setup_;                          ///< from build() to store()
   ImpactBodies impacts_;
   StepConstants constants_;
-  std::size_t bodies_ = 0;  ///< number of them
+  std::size_t bodies_ = 0;  ///< number of bodies, those of mass 0 included
 
   std::vector<RowKind> kinds_;  ///< by contact
   std::vector<Counts> counts_;  ///< by chunk of contacts
