@@ -39,9 +39,12 @@ struct Plane {
   friend bool operator==(const Plane&, const Plane&) = default;
 };
 
-/// A sphere or a box of a compound, with its pose in the axes of the body.
+/// The shapes that have a volume, and that can be parts of compounds.
+using SolidShape = std::variant<Sphere, Box>;
+
+/// A solid of a compound, with its pose in the axes of the body.
 struct CompoundPart {
-  std::variant<Sphere, Box> shape = Sphere{};
+  SolidShape shape = Sphere{};
   Vec3 position = {};  ///< [m], body axes, centre of the part
   Quat orientation = {};
   Real density = 1;  ///< [-], in (0, 1e9], relative to the other parts

@@ -1,2 +1,3 @@
 list(APPEND JFPX_SOURCES
+  ${CMAKE_CURRENT_LIST_DIR}/block_tree.cpp
   ${CMAKE_CURRENT_LIST_DIR}/collide.cpp)

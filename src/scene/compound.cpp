@@ -1,23 +1,15 @@
 /// Mass properties of compounds, as sums over their parts.
 #include "src/scene/compound.hpp"
 
+#include "src/collide/shapes.hpp"
 #include "src/scene/inertia.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-// Computed in double, because the cube of a small float may underflow.
-double volume(const Sphere& sphere) {
-  const auto r = static_cast<double>(sphere.radius);
-  return 4.0 / 3.0 * 3.14159265358979323846 * r * r * r;
-}
-double volume(const Box& box) {
-  const Vec3& h = box.half_extents;
-  return 8.0 * static_cast<double>(h.x) * static_cast<double>(h.y) * static_cast<double>(h.z);
-}
 double weight(const CompoundPart& part) {
-  const double v = std::visit([](const auto& shape) { return volume(shape); }, part.shape);
+  const double v = std::visit([](const auto& shape) { return detail::volume(shape); }, part.shape);
   return v * static_cast<double>(part.density);
 }
 
@@ -54,9 +46,9 @@ Compound centred(Compound compound) {
   return compound;
 }
 
-Real bounding_radius(const CompoundPart& part) {
-  if (const auto* sphere = std::get_if<Sphere>(&part.shape)) return sphere->radius;
-  return length(std::get<Box>(part.shape).half_extents);
+Real outer_radius(const CompoundPart& part) {
+  const auto radius = [](const auto& solid) { return detail::outer_radius(solid); };
+  return length(part.position) + std::visit(radius, part.shape);
 }
 
 }  // namespace JFPX_ABI

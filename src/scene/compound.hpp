@@ -16,9 +16,9 @@ struct MassProperties {
 /// @param mass [kg], total mass of the compound
 JFPX_API MassProperties mass_properties(const Compound& compound, Real mass);
 
-/// [m], radius of the smallest sphere around the part's centre that encloses the part, without a
-/// margin for rounding errors.
-Real bounding_radius(const CompoundPart& part);
+/// [m], radius of the smallest sphere about the origin that encloses a sphere around the part's
+/// centre that encloses the part, without a margin for rounding errors.
+Real outer_radius(const CompoundPart& part);
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

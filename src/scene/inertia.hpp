@@ -1,4 +1,4 @@
-/// Inertia tensors of solid shapes, and their transformation between axes (thesis 4.1.5, 4.4.2).
+/// Transformations of inertia tensors between axes (thesis 4.1.5, 4.4.2).
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -6,19 +6,6 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
-
-/// [kg m^2], principal moments of a solid sphere.
-JFPX_HD constexpr Vec3 moments_of_inertia(const Sphere& sphere, Real mass) {
-  const Real i = Real(0.4) * mass * sphere.radius * sphere.radius;
-  return {i, i, i};
-}
-
-/// [kg m^2], principal moments of a solid box: m/3 (b^2 + c^2) for half extents b and c (erratum
-/// E23).
-JFPX_HD constexpr Vec3 moments_of_inertia(const Box& box, Real mass) {
-  const Vec3 h2 = component_product(box.half_extents, box.half_extents);
-  return Vec3{h2.y + h2.z, h2.z + h2.x, h2.x + h2.y} * (mass / 3);
-}
 
 /// Contribution of a point mass at `position` to the tensor about the origin (parallel axis
 /// theorem).

@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/collide/shapes.hpp"
 #include "src/scene/compound.hpp"
 #include "src/scene/inertia.hpp"
 #include "src/scene/inertia_tensor.hpp"
@@ -116,7 +117,7 @@ std::string find_fault(const Compound& compound, Real mass) {
     const CompoundPart& part = compound.parts[i];
     const std::string found = find_fault(part);
     if (!found.empty()) return "parts[" + std::to_string(i) + "]." + found;
-    radius = std::max(radius, length(part.position) + bounding_radius(part));
+    radius = std::max(radius, outer_radius(part));
   }
   if (mass == 0) return {};
   std::string found = find_solid_fault(compound, mass);

@@ -5,6 +5,7 @@
 
 #include "src/base/power.hpp"
 #include "src/base/reserve.hpp"
+#include "src/collide/shapes.hpp"
 #include "src/scene/compound.hpp"
 #include "src/scene/inertia.hpp"
 #include "src/scene/inertia_tensor.hpp"
@@ -25,13 +26,17 @@ Real kept_per_step(Real kept_per_second, Real dt) {
 
 /// Inertia tensor of a solid body; `shape` must be one of a movable body.
 Mat3 tensor_of(const Shape& shape, Real mass) {
-  if (const auto* sphere = std::get_if<Sphere>(&shape)) {
-    return diagonal(detail::moments_of_inertia(*sphere, mass));
-  }
-  if (const auto* box = std::get_if<Box>(&shape)) {
-    return diagonal(detail::moments_of_inertia(*box, mass));
-  }
-  return mass_properties(std::get<Compound>(shape), mass).inertia;
+  const auto tensor = [mass](const auto& s) -> Mat3 {
+    using S = std::decay_t<decltype(s)>;
+    if constexpr (std::is_same_v<S, Compound>) {
+      return mass_properties(s, mass).inertia;
+    } else if constexpr (detail::kIsSolid<S>) {
+      return diagonal(detail::moments_of_inertia(s, mass));
+    } else {
+      return {};
+    }
+  };
+  return std::visit(tensor, shape);
 }
 
 /// The shape with normals and quaternions scaled to unit length; validation tolerates deviations up
@@ -52,14 +57,14 @@ Shape normalized(Shape shape) {
 
 /// Radius of a sphere about the origin of the body's axes that encloses the shape.
 Real extent_of(const Shape& shape) {
-  if (const auto* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
-  if (const auto* box = std::get_if<Box>(&shape)) return length(box->half_extents);
-  const auto* compound = std::get_if<Compound>(&shape);
-  if (compound == nullptr) return std::numeric_limits<Real>::infinity();
   Real extent = 0;
-  for (const CompoundPart& part : compound->parts) {
-    extent = std::max(extent, length(part.position) + bounding_radius(part));
-  }
+  detail::for_each_part(shape, [&](const auto& s, const CompoundPart* part, std::uint32_t) {
+    if constexpr (detail::kIsSolid<std::decay_t<decltype(s)>>) {
+      extent = std::max(extent, part != nullptr ? outer_radius(*part) : detail::outer_radius(s));
+    } else {
+      extent = std::numeric_limits<Real>::infinity();
+    }
+  });
   return extent;
 }
 
@@ -148,6 +153,7 @@ BodyId BodyStore::add(const BodyDef& def) {
   moving.mean_motion[i] = moving.rest_time[i] = 0;
   moving.awake[i] = 0;
   count_body(i);
+  if (!movable(i)) ++fixed_version_;
   set_state(i, {def.position, def.orientation, def.velocity, def.angular_velocity});
   return id;
 }
@@ -222,6 +228,7 @@ void BodyStore::set_damping(std::uint32_t i, Real linear, Real angular) {
 }
 
 void BodyStore::remove(BodyId id) noexcept {
+  if (!movable(id.index)) ++fixed_version_;
   pool_.remove(id);
   if (movable(id.index)) --movable_count_;
   if (kinematic(id.index)) --kinematic_count_;
@@ -246,6 +253,7 @@ BodyState BodyStore::state(std::uint32_t i) const {
 }
 
 void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
+  if (!movable(i) && !kinematic(i)) ++fixed_version_;
   moving.position[i] = state.position;
   moving.orientation[i] = normalized(state.orientation);
   const bool moves = movable(i) || kinematic(i);

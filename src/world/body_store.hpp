@@ -65,6 +65,9 @@ class BodyStore {
   /// Number of slots; all indices are below it.
   std::size_t capacity() const noexcept { return pool_.capacity(); }
   std::uint32_t movable_count() const noexcept { return movable_count_; }
+  /// Changes when a body of mass 0 is added or removed, or an immovable body gets another state;
+  /// never 0.
+  std::uint64_t fixed_version() const noexcept { return fixed_version_; }
 
   /// Writes all bodies, the ids, and the ignored pairs.
   void write(BinaryWriter* writer) const;
@@ -211,6 +214,7 @@ class BodyStore {
   bool filters_in_use_ = false;       ///< whether may_collide() may return false
 
   IdPool<BodyId> pool_;
+  std::uint64_t fixed_version_ = 1;
   std::uint32_t movable_count_ = 0, kinematic_count_ = 0, sensor_count_ = 0, rolling_count_ = 0;
 };
 

@@ -1,7 +1,6 @@
 /// Contact detection of a world: broad phase and pair tests of all shapes.
 #pragma once
 
-#include <jfpx/collide.hpp>
 #include <jfpx/world.hpp>
 
 #include "src/base/thread_pool.hpp"
@@ -9,18 +8,18 @@
 #include "src/world/body_store.hpp"
 #include "src/world/broad_phase_search.hpp"
 #include "src/world/detected_contacts.hpp"
+#include "src/world/fixed_trees.hpp"
 #include "src/world/near_pair_test.hpp"
 #include "src/world/sub_shape_table.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// The broad phase tests all spheres and the bounding spheres of movable boxes: it finds the
-/// contacts of two spheres and the candidate pairs of a box with a sphere or a box. The "fixed"
-/// sub-shapes, which are the boxes of mass 0 (immovable or kinematic), half-spaces and planes, are
-/// not in the broad phase: each of them is tested against every sub-shape of every movable body.
-/// Contacts within one body, between two bodies of mass 0, and of pairs that
-/// BodyStore::may_collide() excludes, are discarded.
+/// The broad phase tests all spheres and the bounding spheres of the other solids of movable
+/// bodies: it finds the contacts of two spheres and the candidate pairs with another solid. The
+/// other solids of bodies of mass 0 (immovable or kinematic) are in trees, which each solid of a
+/// movable body traverses; walls are tested against all of these. Contacts within one body, between
+/// two bodies of mass 0, and of pairs that BodyStore::may_collide() excludes, are discarded.
 class ContactFinder {
  public:
   ContactFinder(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase);
@@ -60,9 +59,6 @@ class ContactFinder {
   };
 
   void find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts);
-  void find_fixed_candidates(const BodyStore& bodies);
-  static bool may_touch(const SubShapeView& sub_shapes, SubShape sub_shape, SubShape fixed,
-                        const Vec3& centre);
   /// Results of a chunk of a parallel loop.
   struct Part {
     std::vector<soft_step::SphereContactInput> spheres;
@@ -82,10 +78,14 @@ class ContactFinder {
       compounds.clear();
     }
   };
+  void start_bounds(const BodyStore& bodies, Real margin);
+  template <class Sweep>
+  void sweep_fixed(const Sweep& sweep);
   void sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool);
+  void enclose_bounds(const BodyStore& bodies);
   void test_sphere_pairs(const BodyStore& bodies, std::span<const SpherePair> pairs,
                          Part* part) const;
-  void find_fixed_pairs(SubShape first, SubShape last, Part* part) const;
+  void find_fixed_pairs(SubShape first, SubShape last, std::vector<Candidate>* candidates) const;
   struct Results;
   void test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
                        Results* results, ThreadPool* pool);
@@ -97,12 +97,14 @@ class ContactFinder {
   SubShapeTable sub_shapes_;
   std::vector<SphereHit> hits_;
   std::vector<Candidate> candidates_;
-  // Of find_near_contacts():
+  FixedTrees fixed_trees_;
+  bool fixed_changed_ = true;          ///< whether `swept_` and the trees lack solids of mass 0
   std::vector<Vec3> motion_;           ///< by body [m]
-  std::vector<SphereInstance> swept_;  ///< by sub-shape, without walls: bounds of the step's motion
-  std::vector<Real> margins_;          ///< by sub-shape, without walls [m]
+  std::vector<SphereInstance> swept_;  ///< by solid: bounds of the step's motion
+  std::vector<Real> margins_;          ///< by solid [m]
   NearBounds near_;                    ///< of the arrays above, during a search
-  std::vector<Candidate> compounds_;   ///< pairs of spheres, at least one of a compound
+  // Of find_near_contacts():
+  std::vector<Candidate> compounds_;  ///< pairs of spheres, at least one of a compound
   std::vector<Part> parts_;
   std::vector<Contact> merged_;  ///< copy of the contacts of compounds
 };

@@ -28,13 +28,6 @@ JFPX_HD inline Vec3 spring_force(const Vec3& span, const Vec3& velocity, Real st
   return axis * -pull;
 }
 
-/// Volume of the spherical cap below a plane at `height` above the centre.
-JFPX_HD constexpr Real submerged_volume(Real radius, Real height) {
-  if (!(height > -radius)) return 0;
-  const Real depth = height < radius ? height + radius : 2 * radius;
-  return kPi / 3 * depth * depth * (3 * radius - depth);
-}
-
 /// Fraction of an explosion's peak force at a distance from its centre, `age` after its start.
 JFPX_HD inline Real blast(Real distance, Real age, Real speed, Real thickness, Real duration) {
   if (!(age >= 0 && age < duration)) return 0;

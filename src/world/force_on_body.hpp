@@ -8,7 +8,6 @@
 
 #include "src/world/force_laws.hpp"
 #include "src/world/solid_part.hpp"
-#include "src/world/submerged.hpp"
 
 #include <type_traits>
 
@@ -48,20 +47,6 @@ JFPX_HD void act_on_surface(const Mat3& tensor, const Vec3& point, const Vec3& w
   body->apply_at(axes * (tensor * airspeed), surface.position);
 }
 
-/// Applies the buoyancy of a box at the centroid of the displaced volume.
-/// @param weight [N/m^3] of the liquid, against gravity
-template <class Body>
-JFPX_HD void act_on_box(const HalfSpace& liquid, const Vec3& weight, const Box& box,
-                        const Transform& pose, Body* body) {
-  // Computed relative to the centre of the box, so that the centroid keeps its precision far from
-  // the origin.
-  const HalfSpace below{liquid.normal, liquid.offset - dot(liquid.normal, pose.origin)};
-  Submerged part;
-  add_submerged(box, {pose.basis, {}}, below, &part);
-  if (!(part.volume > 0)) return;
-  body->apply_at(weight * part.volume, pose.origin + part.moment * (1 / part.volume));
-}
-
 // Each applies a force to an awake body. Springs are not among them: they have two ends.
 template <class Body>
 JFPX_HD void act_on(const Gravity& force, Body* body) {
@@ -88,13 +73,15 @@ JFPX_HD void act_on(const Buoyancy& force, Body* body) {
   const Transform whole = make_transform(state.orientation, state.position);
   body->for_each_part([&](const SolidPart& part) {
     const Transform pose = part.in_compound != 0 ? whole * part.local : whole;
-    if (!(part.radius > 0)) {
-      act_on_box(liquid, weight, part.box, pose, body);
-      return;
-    }
-    const Real height = liquid.offset - dot(liquid.normal, pose.origin);
-    const Vec3 lift = weight * submerged_volume(part.radius, height);
-    part.in_compound != 0 ? body->apply_at(lift, pose.origin) : body->apply(lift);
+    // Relative to the centre of the solid, so that the centroid keeps its precision far from the
+    // origin.
+    const HalfSpace below{liquid.normal, liquid.offset - dot(liquid.normal, pose.origin)};
+    part.visit([&](const auto& solid) {
+      const Submerged displaced = submerged(solid, pose.basis, below);
+      if (!(displaced.volume > 0)) return;
+      body->apply_at(weight * displaced.volume,
+                     pose.origin + displaced.moment * (1 / displaced.volume));
+    });
   });
 }
 /// Also for a body that sleeps.

@@ -53,25 +53,54 @@ void append(ThreadPool* pool, std::span<Part> parts, const List& list, Refilled<
 
 }  // namespace
 
-/// Fills near_: the bounds of the motion of all sub-shapes during the step.
-void ContactFinder::sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool) {
+/// Points near_ to the arrays of a search.
+void ContactFinder::start_bounds(const BodyStore& bodies, Real margin) {
   motion_.resize(bodies.capacity());
-  swept_.resize(sub_shapes_.bounded_size());
-  margins_.resize(sub_shapes_.bounded_size());
+  swept_.resize(sub_shapes_.ranges().bounded());
+  margins_.resize(sub_shapes_.ranges().bounded());
   near_ = {.bodies = bodies.view(),
            .sub_shapes = sub_shapes_.view(),
            .motion = motion_.data(),
            .margins = margins_.data(),
            .swept = swept_.data(),
            .largest_margin = margin * Real(0.5)};
+}
+
+/// Makes the swept bounds of the solids of mass 0 that are no spheres, and their trees.
+/// @param sweep function that makes the bounds of a sub-shape
+template <class Sweep>
+void ContactFinder::sweep_fixed(const Sweep& sweep) {
+  if (!fixed_changed_) {
+    for (const SubShape i : sub_shapes_.kinematic()) sweep(i);
+    fixed_trees_.move_kinematic(near_);
+    return;
+  }
+  const SubShapeRanges& ranges = sub_shapes_.ranges();
+  for (SubShape i = ranges.fixed_begin(); i < ranges.bounded(); ++i) sweep(i);
+  fixed_trees_.set_bodies(sub_shapes_, near_);
+  fixed_changed_ = false;
+}
+
+/// Fills near_: the bounds of the motion of all sub-shapes during the step.
+void ContactFinder::sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool) {
+  start_bounds(bodies, margin);
   parallel_for(pool, bodies.size(), kSubShapesPerChunk, [&](std::size_t first, std::size_t last) {
     for (const BodyId id : bodies.ids().subspan(first, last - first)) {
       motion_[id.index] = near_.bodies.predicted_motion(id.index);
     }
   });
-  parallel_for(pool, swept_.size(), kSubShapesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (auto i = static_cast<SubShape>(first); i < last; ++i) near_.sweep(i);
-  });
+  parallel_for(pool, sub_shapes_.ranges().fixed_begin(), kSubShapesPerChunk,
+               [&](std::size_t first, std::size_t last) {
+                 for (auto i = static_cast<SubShape>(first); i < last; ++i) near_.sweep(i);
+               });
+  sweep_fixed([this](SubShape i) { near_.sweep(i); });
+}
+
+/// Fills near_ with bounds of the sub-shapes where they are.
+void ContactFinder::enclose_bounds(const BodyStore& bodies) {
+  start_bounds(bodies, 0);
+  for (SubShape i = 0; i < sub_shapes_.ranges().fixed_begin(); ++i) near_.enclose(i);
+  sweep_fixed([this](SubShape i) { near_.enclose(i); });
 }
 
 /// Tests pairs of swept bounds: contacts of two spheres go to *part, pairs with a box or a part of
@@ -103,19 +132,19 @@ void ContactFinder::test_sphere_pairs(const BodyStore& bodies, std::span<const S
   }
 }
 
-/// Appends the pairs of a movable and a fixed sub-shape whose swept bounds touch.
+/// Appends the pairs of a movable sub-shape and a wall, or a solid of mass 0 that is no sphere,
+/// whose bounds touch; sorted for each sub-shape.
 /// @param first,last range of movable sub-shapes
-void ContactFinder::find_fixed_pairs(SubShape first, SubShape last, Part* part) const {
-  const BodyView& bodies = near_.bodies;
-  const SubShapeView& sub_shapes = near_.sub_shapes;
-  for (SubShape sub_shape = first; sub_shape < last; ++sub_shape) {
-    const std::uint32_t body = sub_shapes.body(sub_shape);
-    if (!bodies.movable(body)) continue;
-    for (SubShape fixed = sub_shapes.fixed_begin; fixed < sub_shapes.count; ++fixed) {
-      if (bodies.may_collide(body, sub_shapes.body(fixed)) && near_.may_meet(sub_shape, fixed)) {
-        part->candidates.push_back(ordered(bodies, sub_shapes, sub_shape, fixed));
-      }
-    }
+void ContactFinder::find_fixed_pairs(SubShape first, SubShape last,
+                                     std::vector<Candidate>* candidates) const {
+  const FixedTreesView trees = fixed_trees_.view();
+  for (SubShape i = first; i < last; ++i) {
+    if (!near_.bodies.movable(near_.sub_shapes.body(i))) continue;
+    const auto before = static_cast<std::ptrdiff_t>(candidates->size());
+    near_.visit_fixed(i, trees, [&](SubShape fixed) {
+      candidates->push_back(ordered(near_.bodies, near_.sub_shapes, i, fixed));
+    });
+    std::sort(candidates->begin() + before, candidates->end());
   }
 }
 
@@ -167,9 +196,8 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
                                     Results* results, ThreadPool* pool) {
   const auto test_chunk = [&](std::size_t first, std::size_t last, Part* part) {
     NearPair near;
-    NearPairTest test(near_, &near);
     for (const Candidate& pair : candidates.subspan(first, last - first)) {
-      test(pair);
+      test_near_pair(near_, pair, &near);
       part->add(bodies, near);
     }
   };
@@ -198,7 +226,7 @@ std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real marg
   std::size_t touching_spheres = 0;
   Refilled<Candidate> candidates{&candidates_}, compounds{&compounds_};
 
-  const auto bounds = std::span(swept_).first(sub_shapes_.fixed_begin());
+  const auto bounds = std::span(swept_).first(sub_shapes_.ranges().fixed_begin());
   const NearPairs found = broad_phase_.find_pairs(bounds, pool);
   const auto test_pairs = [&](std::size_t first, std::size_t last, Part* part) {
     found.for_each_touching(bounds, first, last, [&](std::span<const SpherePair> pairs) {
@@ -227,9 +255,9 @@ std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real marg
   detected->other_spheres = results.others.size;
 
   const auto find_fixed = [&](std::size_t first, std::size_t last, Part* part) {
-    find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last), part);
+    find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last), &part->candidates);
   };
-  for_each_batch(pool, sub_shapes_.fixed_begin(), kSubShapesPerChunk, find_fixed,
+  for_each_batch(pool, sub_shapes_.ranges().fixed_begin(), kSubShapesPerChunk, find_fixed,
                  [&](std::span<Part> parts) {
                    append(
                        pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);

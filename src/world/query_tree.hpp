@@ -3,6 +3,7 @@
 
 #include <jfpx/query.hpp>
 
+#include "src/collide/block_tree.hpp"
 #include "src/collide/bounding_sphere.hpp"
 #include "src/world/body_store.hpp"
 
@@ -15,8 +16,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Selects the bodies that a query may find; the query then applies its exact test to them. A node
-/// is a block of eight bounding boxes. The bodies are sorted along a Morton curve and packed into
-/// blocks (Leutenegger, Lopez and Edgington 1997; Morton codes as in Lauterbach et al. 2009).
+/// is a block of a BlockTree.
 ///
 /// Queries are conservative: they visit every body that the exact test in world_queries.cpp finds,
 /// including its rounding errors. Let u be half of kEpsilon, and let D be the largest coordinate
@@ -59,22 +59,8 @@ class QueryTree {
   }
 
  private:
-  static constexpr std::uint32_t kWidth = 8;
+  static constexpr std::uint32_t kWidth = TreeBlock::kWidth;
   using Lanes = std::array<Real, kWidth>;
-
-  /// Bounds of eight bodies or blocks. Unused lanes are empty: their lower bounds exceed the upper
-  /// ones by more than any margin.
-  struct alignas(64) Block {
-    Lanes lower[3], upper[3];  ///< [m], by axis
-  };
-  struct Item {
-    Aabb bounds;
-    std::uint32_t body;
-  };
-  struct Key {
-    std::uint32_t code;  ///< size class and Morton code
-    std::uint32_t item;
-  };
 
   /// Distance at which a ray enters each lane. The margin makes the test conservative; see above.
   struct SlabTest {
@@ -89,11 +75,11 @@ class QueryTree {
     }
 
     /// @return a lane is hit if entry <= exit
-    void operator()(const Block& block, Real limit, Lanes& entry, Lanes& exit) const {
+    void operator()(const TreeBlock& block, Real limit, Lanes& entry, Lanes& exit) const {
       Lanes near[3], far[3], size{};
       for (int i = 0; i < 3; ++i) {
-        const Lanes& first = descends[i] ? block.upper[i] : block.lower[i];
-        const Lanes& last = descends[i] ? block.lower[i] : block.upper[i];
+        const Real* const first = descends[i] ? block.upper[i] : block.lower[i];
+        const Real* const last = descends[i] ? block.lower[i] : block.upper[i];
         for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
           near[i][lane] = first[lane] - origin[i];
           far[i][lane] = last[lane] - origin[i];
@@ -121,7 +107,7 @@ class QueryTree {
 
   /// Overlap of a box with each lane, with the margin of the comment above.
   struct OverlapTest {
-    void operator()(const Block& block, Real, Lanes& entry, Lanes& exit) const {
+    void operator()(const TreeBlock& block, Real, Lanes& entry, Lanes& exit) const {
       constexpr Real kMargin = sizeof(Real) == 4 ? Real(0x1p-7) : Real(0x1p-21);
       const Real reach = std::max({half_extents.x, half_extents.y, half_extents.z});
       Lanes size, gap;
@@ -149,29 +135,29 @@ class QueryTree {
   template <class Test, class Visit>
   void traverse(const Test& test, Real limit, const Visit& visit) const {
     for (const std::uint32_t wall : walls_) limit = visit(wall);
-    if (blocks_.empty()) return;
+    const BlockTreeView tree = tree_.view();
+    if (tree.block_count == 0) return;
     struct Entry {
       Real distance;
       std::uint32_t block;
     };
-    // 2^32 bodies make at most 12 levels; each block on the way leaves seven others on the stack.
-    std::array<Entry, std::size_t{12} * kWidth> stack;
+    std::array<Entry, BlockTreeView::kMostWaiting> stack;
     std::size_t count = 0;
-    stack[count++] = {0, static_cast<std::uint32_t>(blocks_.size() - 1)};
+    stack[count++] = {0, tree.block_count - 1};
     Lanes entry, exit;
     while (count > 0) {
       const Entry next = stack[--count];
       if (next.distance > limit) continue;
-      test(blocks_[next.block], limit, entry, exit);
-      if (next.block < leaf_blocks_) {
+      test(tree.blocks[next.block], limit, entry, exit);
+      if (next.block < tree.leaf_blocks) {
         for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
           if (!(entry[lane] <= exit[lane]) || entry[lane] > limit) continue;
-          limit = visit(bodies_[std::size_t{next.block} * kWidth + lane]);
+          limit = visit(tree.items[next.block * kWidth + lane]);
         }
         continue;
       }
       const std::size_t base = count;
-      const std::uint32_t first_child = (next.block - leaf_blocks_) * kWidth;
+      const std::uint32_t first_child = (next.block - tree.leaf_blocks) * kWidth;
       for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
         if (!(entry[lane] <= exit[lane])) continue;
         std::size_t slot = count++;
@@ -183,20 +169,11 @@ class QueryTree {
     }
   }
 
-  void add(const BodyStore& bodies, std::uint32_t body);
-  void sort();
-  void pack();
-  static void set(Block* block, std::size_t lane, const Aabb& bounds);
-  static Aabb bounds_of(const Block& block);
-
-  std::vector<std::uint32_t> walls_;   ///< bodies without bounds
-  std::vector<std::uint32_t> bodies_;  ///< by leaf block and lane
-  /// The leaf blocks, then their parents and so on; the last one is the root. Inner block i has the
-  /// children 8 i to 8 i + 7.
-  std::vector<Block> blocks_;
-  std::uint32_t leaf_blocks_ = 0;
-  std::vector<Item> items_;  ///< during build(): the bodies with bounds
-  std::vector<Key> keys_, spare_keys_;
+  std::vector<std::uint32_t> walls_;  ///< bodies without bounds
+  BlockTree tree_;                    ///< of the others
+  // During build(): the bodies of the tree.
+  std::vector<std::uint32_t> bodies_;
+  std::vector<Aabb> bounds_;
 };
 
 }  // namespace JFPX_ABI

@@ -11,6 +11,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/contact_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts_by_body.cpp
   ${CMAKE_CURRENT_LIST_DIR}/device_world.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/fixed_trees.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/force_table.cpp

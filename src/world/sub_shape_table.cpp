@@ -3,108 +3,82 @@
 
 #include "src/base/parallel_for.hpp"
 
-#include <algorithm>
+#include <numeric>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// Exceeds the rounding errors of the pair tests, so that bounds never exclude a contact.
-constexpr Real kBoundsMargin = 1 + 64 * kEpsilon;
-
-Real bounding_radius(const Sphere& sphere) { return sphere.radius; }
-Real bounding_radius(const Box& box) {
-  constexpr Real kUnderflowLimit = Real(1e-15);  // below it, squares of floats are inexact or 0
-  const Vec3& h = box.half_extents;
-  const Real largest = std::max({h.x, h.y, h.z});
-  return largest < kUnderflowLimit ? 2 * largest : length(h) * kBoundsMargin;
-}
-
-/// Calls visit(sub_shape, part or null, index of the part) for each sub-shape of type T in the
-/// body.
-template <class T, class Visit>
-void for_each_sub_shape(const Shape& shape, Visit visit) {
-  if (const auto* whole = std::get_if<T>(&shape)) return visit(*whole, nullptr, 0);
-  const auto* compound = std::get_if<Compound>(&shape);
-  if (compound == nullptr) return;
-  for (std::uint32_t i = 0; i < compound->parts.size(); ++i) {
-    const CompoundPart& part = compound->parts[i];
-    if (const auto* sub_shape = std::get_if<T>(&part.shape)) visit(*sub_shape, &part, i);
+/// The range of a sub-shape.
+template <class S>
+std::uint32_t range_of(const S&, bool is_movable) {
+  if constexpr (detail::kIsSolid<S>) {
+    return SubShapeRanges::range_of(detail::kSolidKind<S>, is_movable);
+  } else {
+    return SubShapeRanges::kWalls;
   }
 }
 
 }  // namespace
 
+/// In two passes: the first one counts the sub-shapes of each range, the second one places them.
 void SubShapeTable::set_bodies(const BodyStore& bodies, std::span<const BodyId> ids) {
-  body_.clear();
-  number_.clear();
-  bounds_.clear();
-  boxes_.clear();
-  walls_.clear();
-  part_.clear();
-  local_.clear();
-  kinematic_.clear();
-  const std::size_t least = ids.size();  // exact without compounds
-  body_.reserve(least);
-  number_.reserve(least);
-  bounds_.reserve(least);
-  part_.reserve(least);
-  const auto add = [&](std::uint32_t body, Real radius, const CompoundPart* part,
-                       std::uint32_t number) {
-    body_.push_back(body);
-    number_.push_back(number);
-    bounds_.push_back({{}, radius});
-    part_.push_back(0);
-    if (part == nullptr) return;
-    local_.push_back(make_transform(part->orientation, part->position));
-    part_.back() = static_cast<std::uint32_t>(local_.size());
-  };
-  for (const BodyId id : ids) {
-    for_each_sub_shape<Sphere>(bodies.shape(id.index),
-                               [&](const Sphere& s, const CompoundPart* part, std::uint32_t i) {
-                                 add(id.index, bounding_radius(s), part, i);
-                               });
-  }
-  sphere_count_ = size();
-  for (const bool movable : {true, false}) {
+  const auto for_each = [&](const auto& visit) {
     for (const BodyId id : ids) {
-      if (bodies.movable(id.index) != movable) continue;
-      for_each_sub_shape<Box>(bodies.shape(id.index),
-                              [&](const Box& box, const CompoundPart* part, std::uint32_t i) {
-                                add(id.index, bounding_radius(box), part, i);
-                                boxes_.push_back({box, {}});
-                              });
+      const bool is_movable = bodies.movable(id.index);
+      detail::for_each_part(bodies.shape(id.index),
+                            [&](const auto& shape, const CompoundPart* part, std::uint32_t number) {
+                              visit(id.index, shape, part, number, range_of(shape, is_movable));
+                            });
     }
-    if (movable) fixed_begin_ = size();
-  }
-  for (const BodyId id : ids) {
-    const Shape& shape = bodies.shape(id.index);
-    if (const auto* half_space = std::get_if<HalfSpace>(&shape)) {
-      walls_.push_back({*half_space, false});
-    } else if (const auto* plane = std::get_if<Plane>(&shape)) {
-      walls_.push_back({{plane->normal, plane->offset}, true});
+  };
+  ranges_ = {};
+  std::size_t parts = 0;
+  for_each([&](std::uint32_t, const auto&, const CompoundPart* part, std::uint32_t,
+               std::uint32_t range) {
+    ++ranges_.begin[range + 1];
+    parts += part != nullptr ? 1 : 0;
+  });
+  std::partial_sum(std::begin(ranges_.begin), std::end(ranges_.begin), ranges_.begin);
+  body_.resize(ranges_.all());
+  number_.resize(ranges_.all());
+  bounds_.resize(ranges_.bounded());
+  part_.resize(ranges_.bounded());
+  solids_.resize(ranges_.bounded() - ranges_.spheres());
+  walls_.resize(ranges_.all() - ranges_.bounded());
+  local_.clear();
+  local_.reserve(parts);
+  SubShapeRanges next = ranges_;
+  for_each([&](std::uint32_t body, const auto& shape, const CompoundPart* part,
+               std::uint32_t number, std::uint32_t range) {
+    const SubShape i = next.begin[range]++;
+    body_[i] = body;
+    number_[i] = number;
+    if constexpr (detail::kIsSolid<std::decay_t<decltype(shape)>>) {
+      bounds_[i] = {{}, detail::bounding_radius(shape)};
+      if (range > 0) solids_[i - ranges_.spheres()].solid = detail::to_solid(shape);
+      part_[i] = 0;
+      if (part == nullptr) return;
+      local_.push_back(make_transform(part->orientation, part->position));
+      part_[i] = static_cast<std::uint32_t>(local_.size());
     } else {
-      continue;
+      walls_[i - ranges_.bounded()] = to_wall(shape);
     }
-    body_.push_back(id.index);
-    number_.push_back(0);
-  }
+  });
+  kinematic_.clear();
   const SubShapeView all = view();
-  for (SubShape sub_shape = fixed_begin_; sub_shape < bounded_size(); ++sub_shape) {
-    all.update_pose(bodies.view_without_ids(), sub_shape);
-    if (bodies.kinematic(body_[sub_shape])) kinematic_.push_back(sub_shape);
+  for (SubShape i = ranges_.fixed_begin(); i < ranges_.bounded(); ++i) {
+    all.update_pose(bodies.view_without_ids(), i);
+    if (bodies.kinematic(body_[i])) kinematic_.push_back(i);
   }
 }
 
 SubShapeView SubShapeTable::view() {
-  return {.sphere_count = sphere_count_,
-          .fixed_begin = fixed_begin_,
-          .bounded_count = bounded_size(),
-          .count = size(),
+  return {.ranges = ranges_,
           .bodies = body_.data(),
           .numbers = number_.data(),
           .all_bounds = bounds_.data(),
-          .boxes = boxes_.data(),
+          .solids = solids_.data(),
           .walls = walls_.data(),
           .parts = part_.data(),
           .local = local_.data()};
@@ -113,7 +87,7 @@ SubShapeView SubShapeTable::view() {
 void SubShapeTable::update_poses(const BodyStore& store, ThreadPool* pool) {
   const SubShapeView all = view();
   const BodyView bodies = store.view_without_ids();
-  parallel_for(pool, fixed_begin_, 1024, [&](std::size_t first, std::size_t last) {
+  parallel_for(pool, ranges_.fixed_begin(), 1024, [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<SubShape>(first); i < last; ++i) all.update_pose(bodies, i);
   });
   for (const SubShape sub_shape : kinematic_) all.update_pose(bodies, sub_shape);

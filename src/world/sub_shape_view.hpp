@@ -2,8 +2,8 @@
 #pragma once
 
 #include <jfpx/contact.hpp>
-#include <jfpx/shape.hpp>
 
+#include "src/collide/shapes.hpp"
 #include "src/world/body_view.hpp"
 
 #include <compare>
@@ -12,9 +12,11 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-struct PosedBox {
-  Box box;
+/// A solid that is no sphere.
+struct PosedSolid {
+  detail::Solid solid;
   Transform pose;
+  friend bool operator==(const PosedSolid&, const PosedSolid&) = default;
 };
 
 /// A half-space or a plane.
@@ -29,20 +31,49 @@ struct Wall {
   }
 };
 
-/// See SubShapeTable for the order of the sub-shapes.
+inline Wall to_wall(const HalfSpace& half_space) { return {half_space, false}; }
+inline Wall to_wall(const Plane& plane) { return {{plane.normal, plane.offset}, true}; }
+
+/// Numbers of the first sub-shapes of each range. The ranges are: all spheres; the other solids of
+/// movable bodies, by kind; those of bodies of mass 0 (also kinematic ones), by kind; walls.
+struct SubShapeRanges {
+  static constexpr std::uint32_t kSolidKinds = detail::SolidKinds::kCount;
+  static constexpr std::uint32_t kWalls = 2 * kSolidKinds - 1, kCount = kWalls + 1;
+  std::uint32_t begin[kCount + 1] = {};
+
+  /// The range of a solid.
+  JFPX_HD static constexpr std::uint32_t range_of(std::uint32_t kind, bool is_movable) {
+    return kind == 0 || is_movable ? kind : kSolidKinds - 1 + kind;
+  }
+  /// The kind of the solids in a range.
+  JFPX_HD static constexpr std::uint32_t kind_of_range(std::uint32_t range) {
+    return range < kSolidKinds ? range : range + 1 - kSolidKinds;
+  }
+  JFPX_HD std::uint32_t range_of(std::uint32_t i) const {
+    std::uint32_t range = 0;
+    while (i >= begin[range + 1]) ++range;
+    return range;
+  }
+
+  JFPX_HD std::uint32_t spheres() const { return begin[1]; }
+  /// The first solid of a body of mass 0 that is no sphere.
+  JFPX_HD std::uint32_t fixed_begin() const { return begin[kSolidKinds]; }
+  /// Number of all sub-shapes but walls.
+  JFPX_HD std::uint32_t bounded() const { return begin[kWalls]; }
+  JFPX_HD std::uint32_t all() const { return begin[kCount]; }
+};
+
+/// See SubShapeRanges for the order of the sub-shapes.
 struct SubShapeView {
   using SubShape = std::uint32_t;
 
-  SubShape sphere_count = 0;   ///< the sub-shapes before it are spheres
-  SubShape fixed_begin = 0;    ///< the first box or wall of mass 0
-  SubShape bounded_count = 0;  ///< number of spheres and boxes: the others are walls
-  SubShape count = 0;
+  SubShapeRanges ranges;
   const std::uint32_t* bodies = nullptr;   ///< by sub-shape
   const std::uint32_t* numbers = nullptr;  ///< by sub-shape: its index in the compound
-  SphereInstance* all_bounds = nullptr;    ///< of spheres and boxes
-  PosedBox* boxes = nullptr;
+  SphereInstance* all_bounds = nullptr;    ///< of solids
+  PosedSolid* solids = nullptr;            ///< of solids that are no spheres
   const Wall* walls = nullptr;
-  const std::uint32_t* parts = nullptr;  ///< by sphere or box: 0, or 1 + index in `local`
+  const std::uint32_t* parts = nullptr;  ///< by solid: 0, or 1 + index in `local`
   const Transform* local = nullptr;      ///< poses of parts, in body axes
 
   JFPX_HD std::uint32_t body(SubShape i) const { return bodies[i]; }
@@ -50,14 +81,37 @@ struct SubShapeView {
   JFPX_HD std::uint32_t part(SubShape i) const { return numbers[i]; }
   /// Whether the body of the sub-shape is a compound.
   JFPX_HD bool is_part(SubShape i) const { return !is_wall(i) && parts[i] != 0; }
-  JFPX_HD bool is_sphere(SubShape i) const { return i < sphere_count; }
-  JFPX_HD bool is_wall(SubShape i) const { return i >= bounded_count; }
-  JFPX_HD const PosedBox& box(SubShape i) const { return boxes[i - sphere_count]; }
-  JFPX_HD const Wall& wall(SubShape i) const { return walls[i - bounded_count]; }
-  /// The sphere itself, or the bounding sphere of the box.
+  JFPX_HD bool is_sphere(SubShape i) const { return i < ranges.spheres(); }
+  JFPX_HD bool is_wall(SubShape i) const { return i >= ranges.bounded(); }
+  JFPX_HD const PosedSolid& solid(SubShape i) const { return solids[i - ranges.spheres()]; }
+  JFPX_HD const Wall& wall(SubShape i) const { return walls[i - ranges.bounded()]; }
+  /// The sphere itself, or the bounding sphere of another solid.
   JFPX_HD const SphereInstance& bounds(SubShape i) const { return all_bounds[i]; }
 
-  /// Moves a sphere or box to the pose of its body.
+  /// Calls visit(solid, pose) with the shape of a solid that is no sphere.
+  template <class Visit>
+  JFPX_HD void visit_solid(SubShape i, const Visit& visit) const {
+    const PosedSolid& posed = solid(i);
+    const std::uint32_t kind = SubShapeRanges::kind_of_range(ranges.range_of(i));
+    detail::SolidKinds::visit(kind, [&](auto type) {
+      if constexpr (detail::kSolidKind < typename decltype(type)::type >> 0) {
+        visit(from_solid(posed.solid, type), posed.pose);
+      }
+    });
+  }
+  /// Calls visit(instance) with a solid as find_contact() takes it.
+  template <class Visit>
+  JFPX_HD void visit_instance(SubShape i, const Visit& visit) const {
+    if (is_sphere(i)) {
+      visit(all_bounds[i]);
+    } else {
+      visit_solid(i, [&](const auto& shape, const Transform& pose) {
+        visit(detail::instance(shape, pose));
+      });
+    }
+  }
+
+  /// Moves a solid to the pose of its body.
   JFPX_HD void update_pose(const BodyView& store, SubShape i) const {
     const Vec3& position = store.position[bodies[i]];
     SphereInstance& bounds = all_bounds[i];
@@ -70,9 +124,32 @@ struct SubShapeView {
       if (is_sphere(i)) return;
       pose = {pose.basis * of_part.basis, bounds.centre};
     }
-    boxes[i - sphere_count].pose = pose;
+    solids[i - ranges.spheres()].pose = pose;
   }
 };
+
+/// Finds the contact of two sub-shapes. Only the second may be a wall.
+/// @param centre   centre of mass of the body of `p`, which selects the side of a plane
+/// @param manifold empty; receives the contact
+JFPX_HD inline void find_contact(const SubShapeView& sub_shapes, SubShapeView::SubShape p,
+                                 SubShapeView::SubShape q, const Vec3& centre,
+                                 const detail::PairMotion& pair, detail::PairManifold* manifold) {
+  if (sub_shapes.is_wall(q)) {
+    const HalfSpace wall = sub_shapes.wall(q).solid_for(centre);
+    sub_shapes.visit_instance(p, [&](const auto& a) { find_contact(a, wall, pair, manifold); });
+  } else if (sub_shapes.is_sphere(p) && sub_shapes.is_sphere(q)) {
+    // The arithmetic of the collider depends on the order of the spheres, which is its own.
+    const SphereInstance &a = sub_shapes.bounds(p), &b = sub_shapes.bounds(q);
+    if (p < q) return find_contact(a, b, pair, manifold);
+    find_contact(b, a, pair.flipped(), manifold);
+    manifold->flip();
+  } else {
+    sub_shapes.visit_instance(p, [&](const auto& a) {
+      sub_shapes.visit_instance(
+          q, [&](const auto& b) { detail::find_contact_of_any(a, b, pair, manifold); });
+    });
+  }
+}
 
 /// Two sub-shapes that may touch.
 struct Candidate {

@@ -1,8 +1,6 @@
 /// Ray and overlap queries: exact tests of the bodies that a bounding-volume tree selects.
-#include <jfpx/collide.hpp>
 #include <jfpx/error.hpp>
 
-#include "src/collide/ray.hpp"
 #include "src/scene/scene_validate.hpp"
 #include "src/world/posed_sub_shapes.hpp"
 #include "src/world/world_impl.hpp"
@@ -47,15 +45,14 @@ Ray checked(const Ray& ray) {
   return {ray.origin, unit_direction(ray.direction), ray.max_distance};
 }
 
-detail::RayEntry enter(const Ray& ray, const Sphere& sphere, const Transform& pose) {
-  return detail::enter(ray.origin, ray.direction, SphereInstance{pose.origin, sphere.radius});
-}
-detail::RayEntry enter(const Ray& ray, const Box& box, const Transform& pose) {
-  return detail::enter(ray.origin, ray.direction, box, pose);
-}
-template <class Wall>
-detail::RayEntry enter(const Ray& ray, const Wall& wall, const Transform&) {
-  return detail::enter(ray.origin, ray.direction, wall);
+/// A solid has a pose; a wall has none.
+template <class S>
+detail::RayEntry enter(const Ray& ray, const S& shape, const Transform& pose) {
+  if constexpr (detail::kIsSolid<S>) {
+    return detail::enter(ray.origin, ray.direction, shape, pose);
+  } else {
+    return detail::enter(ray.origin, ray.direction, shape);
+  }
 }
 
 /// The first entry into a body; of parts at the same distance, that of the first part.
@@ -85,38 +82,30 @@ bool before(const RayHit& a, const RayHit& b) {
 
 bool accepts(const BodyFilter& filter, BodyId body) { return !filter || filter(body); }
 
-bool touch(const SphereInstance& sphere, const Sphere& other, const Transform& pose) {
-  return !(length(sphere.centre - pose.origin) > sphere.radius + other.radius);
-}
-bool touch(const SphereInstance& sphere, const Box& box, const Transform& pose) {
-  return collide(sphere, box, pose).touching;
-}
-template <class Wall>
-bool touch(const SphereInstance& sphere, const Wall& wall, const Transform&) {
-  return collide(sphere, wall).touching;
-}
-
-bool touch(const PosedBox& box, const Sphere& sphere, const Transform& pose) {
-  return collide(SphereInstance{pose.origin, sphere.radius}, box.box, box.pose).touching;
-}
-bool touch(const PosedBox& box, const Box& other, const Transform& pose) {
-  return collide(box.box, box.pose, other, pose).count > 0;
-}
-template <class Wall>
-bool touch(const PosedBox& box, const Wall& wall, const Transform&) {
-  return collide(box.box, box.pose, wall).count > 0;
+/// Whether a solid touches a shape. @param solid as find_contact() takes it
+template <class Instance, class S>
+bool touch(const Instance& solid, const Vec3& centre, const S& shape, const Transform& pose) {
+  const detail::PairMotion at_rest{{}, 0, 0, {}, {}};
+  detail::PairManifold manifold;
+  if constexpr (std::is_same_v<S, HalfSpace> || std::is_same_v<S, Plane>) {
+    find_contact(solid, to_wall(shape).solid_for(centre), at_rest, &manifold);
+  } else {
+    detail::find_contact_of_any(solid, detail::instance(shape, pose), at_rest, &manifold);
+  }
+  return manifold.touch_count > 0;
 }
 
-/// @param solid a SphereInstance or a PosedBox
-/// @param extents half extents of its bounds around `centre`
-template <class Solid>
-std::vector<BodyId> bodies_touching(const Solid& solid, const Vec3& centre, const Vec3& extents,
-                                    const QueryTree& tree, const BodyStore& bodies) {
+/// The bodies that touch a solid.
+template <class S>
+std::vector<BodyId> bodies_touching(const S& solid, const Transform& pose, const QueryTree& tree,
+                                    const BodyStore& bodies) {
   std::vector<BodyId> found;
-  tree.visit_around(centre, extents, [&](std::uint32_t body) {
+  const auto instance = detail::instance(solid, pose);
+  const Vec3 extents = detail::half_extents(solid, pose);
+  tree.visit_around(pose.origin, extents, [&](std::uint32_t body) {
     bool touches = false;
-    for_each_posed_sub_shape(bodies, body, [&](const auto& shape, const Transform& pose) {
-      touches = touches || touch(solid, shape, pose);
+    for_each_posed_sub_shape(bodies, body, [&](const auto& shape, const Transform& at) {
+      touches = touches || touch(instance, pose.origin, shape, at);
     });
     if (touches) found.push_back(bodies.id(body));
   });
@@ -157,8 +146,7 @@ std::vector<BodyId> World::overlapping(const Sphere& sphere, const Vec3& centre)
     throw_invalid("sphere radius", to_text(sphere.radius), "> 0 and at most 1e9");
   }
   const BodyStore& bodies = impl_->bodies_with_states();
-  return bodies_touching(SphereInstance{centre, sphere.radius}, centre,
-                         half_extents(sphere, Transform{}), impl_->tree_of(bodies), bodies);
+  return bodies_touching(sphere, {{}, centre}, impl_->tree_of(bodies), bodies);
 }
 
 std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
@@ -173,8 +161,7 @@ std::vector<BodyId> World::overlapping(const Box& box, const Vec3& centre,
   if (!fault.empty()) throw InvalidArgument("box " + fault);
   const Transform pose = make_transform(normalized(orientation), centre);
   const BodyStore& bodies = impl_->bodies_with_states();
-  return bodies_touching(PosedBox{box, pose}, centre, half_extents(box, pose),
-                         impl_->tree_of(bodies), bodies);
+  return bodies_touching(box, pose, impl_->tree_of(bodies), bodies);
 }
 
 }  // namespace JFPX_ABI

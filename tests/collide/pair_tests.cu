@@ -5,6 +5,7 @@
 
 #include "src/collide/bounding_sphere.hpp"
 #include "src/collide/box_pair.hpp"
+#include "src/collide/shapes.hpp"
 #include "src/collide/sphere_pair.hpp"
 #include "src/scene/inertia.hpp"
 #include "tests/collide/pair_tests.hpp"

@@ -1,6 +1,7 @@
 /// Tests of bodies with a given inertia, and of quantities that are derived from a body's state.
 #include <jfpx/error.hpp>
 
+#include "src/collide/shapes.hpp"
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>

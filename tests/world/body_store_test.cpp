@@ -2,6 +2,7 @@
 #include "src/world/body_store.hpp"
 
 #include "src/base/power.hpp"
+#include "src/collide/shapes.hpp"
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 /// Tests of the buoyancy of boxes and compounds; force_test.cpp tests spheres.
-#include "src/world/submerged.hpp"
+#include "src/collide/shapes.hpp"
 #include "tests/world/force_support.hpp"
 
 #include <algorithm>
@@ -40,8 +40,7 @@ TEST(Submerged, PartsOfBoxesHaveTheVolumeOfTheFormula) {
     const Vec3 normal = normalized(direction);
     const Real half_extent = dot(normal, box.half_extents);
     const Real offset = random.uniform(-1.2_r, 1.2_r) * half_extent;
-    detail::Submerged below;
-    detail::add_submerged(box, {}, {normal, offset}, &below);
+    const detail::Submerged below = detail::submerged(box, {}, {normal, offset});
     const Vec3 extents = 2 * box.half_extents;  // exact
     const std::array<double, 3> size{extents.x, extents.y, extents.z};
     const std::array<double, 3> n{normal.x, normal.y, normal.z};
@@ -60,19 +59,16 @@ TEST(Submerged, TheVolumesBelowAndAboveAddUpToTheBox) {
   for (int i = 0; i < 3000; ++i) {
     const Box box{random.uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {2, 2, 2})};
     const Vec3 axis = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
-    const Transform pose =
-        make_transform(normalized(Quat{random.uniform(-1, 1), axis.x, axis.y, axis.z}),
-                       random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    const Mat3 basis = to_matrix(normalized(Quat{random.uniform(-1, 1), axis.x, axis.y, axis.z}));
     const Vec3 normal = normalized(random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
     if (length_squared(normal) < 0.5_r) continue;
     const Real offset = random.uniform(-2, 2);
-    detail::Submerged both;
-    detail::add_submerged(box, pose, {normal, offset}, &both);
-    detail::add_submerged(box, pose, {-normal, -offset}, &both);
+    const detail::Submerged below = detail::submerged(box, basis, {normal, offset}),
+                            above = detail::submerged(box, basis, {-normal, -offset});
     const Vec3& h = box.half_extents;
     const Real volume = 8 * h.x * h.y * h.z;
-    ASSERT_NEAR(both.volume, volume, 100 * kEpsilon * volume);
-    expect_near(both.moment * (1 / both.volume), pose.origin, 500 * kEpsilon);
+    ASSERT_NEAR(below.volume + above.volume, volume, 100 * kEpsilon * volume);
+    expect_near((below.moment + above.moment) * (1 / volume), {}, 500 * kEpsilon);
   }
 }
 
@@ -80,8 +76,8 @@ TEST(Submerged, TheCentroidAgreesWithSampling) {
   const Box box{{1, 0.5_r, 2}};
   const Transform pose = make_transform(normalized(Quat{2, 0.3_r, -0.5_r, 0.7_r}), {1, 2, 3});
   const HalfSpace liquid{normalized(Vec3{0.2_r, 1, 0.1_r}), 2.3_r};
-  detail::Submerged below;
-  detail::add_submerged(box, pose, liquid, &below);
+  const detail::Submerged below = detail::submerged(
+      box, pose.basis, {liquid.normal, liquid.offset - dot(liquid.normal, pose.origin)});
   constexpr int kSide = 100;
   double sum[3] = {}, count = 0;
   for (int n = 0; n < kSide * kSide * kSide; ++n) {
@@ -94,7 +90,9 @@ TEST(Submerged, TheCentroidAgreesWithSampling) {
     for (int k = 0; k < 3; ++k) sum[k] += point[k];
   }
   EXPECT_NEAR(below.volume, count * 8 / (kSide * kSide * kSide), 0.01);
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(below.moment[k] / below.volume, sum[k] / count, 0.003);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(pose.origin[k] + below.moment[k] / below.volume, sum[k] / count, 0.003);
+  }
 }
 
 BodyDef plank(const Vec3& half_extents, Real density) {

@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/collide/shapes.hpp"
 #include "src/scene/inertia.hpp"
 #include "src/scene/principal_inertia.hpp"
 #include "src/world/contact_finder.hpp"

@@ -4,7 +4,7 @@
 #include <jfpx/collide.hpp>
 #include <jfpx/world.hpp>
 
-#include "src/collide/ray.hpp"
+#include "src/collide/shapes.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,6 +4,7 @@
 #include <jfpx/random.hpp>
 #include <jfpx/world.hpp>
 
+#include "src/collide/shapes.hpp"
 #include "src/scene/inertia.hpp"
 #include "src/world/body_store.hpp"
 

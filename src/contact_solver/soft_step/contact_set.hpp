@@ -2,7 +2,7 @@
 /// next step.
 #pragma once
 
-#include <jfpx/math.hpp>
+#include "src/collide/pair_manifold.hpp"
 
 #include <compare>
 #include <cstddef>
@@ -38,11 +38,7 @@ struct ManifoldInput {
   /// [-], of a generated contact; the others combine those of the bodies.
   Real friction = 0, restitution = 0;
 };
-struct PointInput {
-  Vec3 arm_a, arm_b;          ///< [m], world axes, from the centres of mass
-  Real distance = 0;          ///< [m]
-  std::uint32_t feature = 0;  ///< identifies the point within its manifold
-};
+using PointInput = detail::SolverPoint;
 
 /// Impulses of a contact point on body a [N s], in world axes.
 struct KeptImpulse {

@@ -28,13 +28,30 @@ struct BoundsProgram {
       const std::uint32_t body = bodies.ids[i].index;
       if (bodies.is_asleep(body)) d.counters->any_asleep = 1;
     });
-    team.spread(d.near.sub_shapes.bounded_count, [&](std::uint32_t i) {
+    team.spread(d.near.sub_shapes.ranges.bounded(), [&](std::uint32_t i) {
       d.near.sub_shapes.update_pose(bodies, i);
       d.near.sweep(i);
     });
+    if (d.trees.kinematic.block_count > 0) refit(team, d.trees.kinematic);
   }
 
  private:
+  /// Makes the bounds of the kinematic solids, level by level.
+  template <class Team>
+  JFPX_HD void refit(const Team& team, const BlockTreeView& tree) const {
+    team.sync();
+    const std::uint32_t first = data.near.sub_shapes.ranges.fixed_begin();
+    team.for_each(tree.leaf_blocks, [&](std::uint32_t leaf) {
+      tree.refit_leaf(leaf,
+                      [&](std::uint32_t item) { return data.near.tree_bounds(first + item); });
+    });
+    for (std::uint32_t begin = tree.leaf_blocks; begin < tree.block_count;) {
+      const std::uint32_t end = tree.end_of_level(begin);
+      team.for_each(end - begin, [&](std::uint32_t i) { tree.refit_inner(begin + i); });
+      begin = end;
+    }
+  }
+
   JFPX_HD void start(std::uint32_t body) const {
     const StepData& d = data;
     if (!is_started) save(d, body);
@@ -69,8 +86,9 @@ struct SphereProgram {
       });
       return;
     }
-    if (d.near.sub_shapes.fixed_begin < d.near.sub_shapes.count) {
-      team.spread(d.near.sub_shapes.fixed_begin, [&](std::uint32_t i) { find_fixed(i); });
+    const SubShapeRanges& ranges = d.near.sub_shapes.ranges;
+    if (ranges.fixed_begin() < ranges.all()) {
+      team.spread(ranges.fixed_begin(), [&](std::uint32_t i) { find_fixed(i); });
     }
     const std::uint32_t found = team.scan(
         static_cast<std::uint32_t>(d.pair_count->contacts),
@@ -101,17 +119,10 @@ struct SphereProgram {
     data.candidates[place] = ordered(data.step.bodies, data.near.sub_shapes, a, b);
   }
 
-  /// Lists the fixed boxes and walls that a sub-shape of a movable body may meet.
+  /// Lists the solids of mass 0 and the walls that a sub-shape of a movable body may meet.
   JFPX_HD void find_fixed(std::uint32_t i) const {
-    const BodyView& bodies = data.step.bodies;
-    const SubShapeView& sub_shapes = data.near.sub_shapes;
-    const std::uint32_t body = sub_shapes.body(i);
-    if (!bodies.movable(body)) return;
-    for (std::uint32_t fixed = sub_shapes.fixed_begin; fixed < sub_shapes.count; ++fixed) {
-      if (bodies.may_collide(body, sub_shapes.body(fixed)) && data.near.may_meet(i, fixed)) {
-        add_candidate(i, fixed);
-      }
-    }
+    if (!data.step.bodies.movable(data.near.sub_shapes.body(i))) return;
+    data.near.visit_fixed(i, data.trees, [&](std::uint32_t fixed) { add_candidate(i, fixed); });
   }
 
   /// @returns whether the pair is a contact of two spheres
@@ -169,7 +180,7 @@ struct ShapeProgram {
     const StepData& d = data;
     const Candidate& pair = d.candidates[i];
     NearPair* near = &d.tested[i];
-    NearPairTest(d.near, near)(pair);
+    test_near_pair(d.near, pair, near);
     if (near->touch_count > 0) add_touches(pair, *near);
     if (near->point_count == 0) return;
     prepend(&d.first_candidate[near->key.a], d.next_candidate, i);

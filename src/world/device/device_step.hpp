@@ -8,6 +8,7 @@
 #include "src/world/device/contact_buffers.hpp"
 #include "src/world/device/contact_programs.hpp"
 #include "src/world/device/edit_program.hpp"
+#include "src/world/device/fixed_tree_buffers.hpp"
 #include "src/world/device/force_buffers.hpp"
 #include "src/world/device/match_program.hpp"
 #include "src/world/device/merge_program.hpp"
@@ -71,6 +72,8 @@ class DeviceStep final : public DeviceWorld {
     scratch_.reserve_bodies(transfer_, room_, &data_);
     current_sub_shapes().upload(transfer_, sub_shapes->view(), sub_shapes->part_count());
     use_sub_shapes();
+    trees_.clear();
+    update_trees(bodies);
     most_parts_ = 2 * sub_shapes->part_count() + 4096;
     known_ = sent_ = {};
     last_contacts().upload(transfer_, last->view(), room_);
@@ -140,6 +143,7 @@ class DeviceStep final : public DeviceWorld {
                     last.sizes().touches},
         visits_contacts ? std::max(spheres, edited.size()) : edited.size());
     if (!changed.empty()) merge(bodies, changed, &added);
+    update_trees(bodies);
   }
 
   Result step(const ForceTable* forces, std::uint64_t steps) override {
@@ -265,8 +269,14 @@ class DeviceStep final : public DeviceWorld {
   SubShapes& current_sub_shapes() { return sub_shapes_[sub_shapes_now_]; }
   void use_sub_shapes() {
     data_.near.sub_shapes = current_sub_shapes().view();
-    scratch_.reserve_sub_shapes(transfer_, current_sub_shapes().counts().bounded(), &data_);
+    scratch_.reserve_sub_shapes(transfer_, current_sub_shapes().ranges().bounded(), &data_);
     is_ready_ = false;
+  }
+
+  void update_trees(const BodyStore& bodies) {
+    if (!trees_.upload(transfer_, bodies, data_.near.largest_margin)) return;
+    data_.trees = trees_.view();
+    ++changes_;
   }
 
   /// Updates the ids and the sub-shapes. Waits.
@@ -279,7 +289,7 @@ class DeviceStep final : public DeviceWorld {
     table.set_bodies(bodies, *added);
     added_shapes_.upload(edit_transfer_, table.view(), table.part_count());
     SubShapes &before = current_sub_shapes(), &after = sub_shapes_[1 - sub_shapes_now_];
-    SubShapeCounts* kept = edit_transfer_.room(&kept_shapes_, 1);
+    SubShapeRanges* kept = edit_transfer_.room(&kept_shapes_, 1);
     device_->run(MergeProgram{.data = data_,
                               .changed = edit_transfer_.put(&changed_, changed),
                               .changed_count = static_cast<std::uint32_t>(changed.size()),
@@ -291,11 +301,11 @@ class DeviceStep final : public DeviceWorld {
                               .added_part_count = added_shapes_.part_count(),
                               .to = after.reserve(transfer_, before, added_shapes_),
                               .kept = kept},
-                 std::max(data_.step.bodies.count, before.counts().all()));
-    SubShapeCounts counts;
-    device_->download(&counts, kept, 1);
+                 std::max(data_.step.bodies.count, before.ranges().all()));
+    SubShapeRanges ranges;
+    device_->download(&ranges, kept, 1);
     device_->wait();
-    after.complete(counts + added_shapes_.counts());
+    after.complete(ranges + added_shapes_.ranges());
     sub_shapes_now_ = 1 - sub_shapes_now_;
     ++changes_;
     use_sub_shapes();
@@ -363,7 +373,7 @@ class DeviceStep final : public DeviceWorld {
     scratch_.reserve_lists(transfer_, capacity_, &data_);
     for (Contacts& contacts : contacts_) contacts.reserve(transfer_, capacity_, room_);
     use_contacts();
-    device_->reserve_pairs(data_.near.sub_shapes.fixed_begin, capacity_.pairs);
+    device_->reserve_pairs(data_.near.sub_shapes.ranges.fixed_begin(), capacity_.pairs);
     if (transfer_.moves() != moves) device_->release_unused();
     is_ready_ = true;
   }
@@ -375,7 +385,7 @@ class DeviceStep final : public DeviceWorld {
     data_.near.bodies = data_.step.bodies;
     const StepData& d = data_;
     const std::size_t bodies = d.step.bodies.count;
-    const std::size_t sub_shapes = d.near.sub_shapes.bounded_count;
+    const std::size_t sub_shapes = d.near.sub_shapes.ranges.bounded();
     const std::size_t contacts = std::max<std::size_t>({bodies, last.spheres, last.manifolds});
     const auto mark = [&](int i) {
       if (is_timed) device_->mark(i);
@@ -387,8 +397,8 @@ class DeviceStep final : public DeviceWorld {
     }
     mark(1);
     device_->run(BoundsProgram{d, forces_act}, std::max(bodies, sub_shapes));
-    device_->find_pairs(d.near.swept, d.near.sub_shapes.fixed_begin, d.pairs, capacity_.pairs,
-                        d.pair_count);
+    device_->find_pairs(d.near.swept, d.near.sub_shapes.ranges.fixed_begin(), d.pairs,
+                        capacity_.pairs, d.pair_count);
     device_->run(SphereProgram{d}, contacts);
     device_->run(ShapeProgram{d}, contacts);
     device_->run(MatchProgram{d}, contacts);
@@ -465,6 +475,7 @@ class DeviceStep final : public DeviceWorld {
   BodyBuffers<Device> bodies_;
   SubShapes sub_shapes_[2], added_shapes_;
   int sub_shapes_now_ = 0;  ///< which of the two are those of the bodies
+  FixedTreeBuffers<Device> trees_;
   ForceBuffers<Device> forces_;
   Contacts contacts_[2];  ///< as Progress::contacts
   ScratchBuffers<Device> scratch_;
@@ -485,7 +496,7 @@ class DeviceStep final : public DeviceWorld {
   Buffer<SlotValues> replaced_;
   Buffer<std::uint32_t> changed_;
   Buffer<BodyId> added_ids_;
-  Buffer<SubShapeCounts> kept_shapes_;
+  Buffer<SubShapeRanges> kept_shapes_;
   // Of the step in progress.
   Vec3 *force_sum_ = nullptr, *torque_sum_ = nullptr;  ///< null if no force of the table acts
 };

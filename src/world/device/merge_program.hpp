@@ -13,29 +13,18 @@ namespace device {
 struct SubShapeArrays {
   std::uint32_t *bodies = nullptr, *numbers = nullptr;
   SphereInstance* bounds = nullptr;
-  PosedBox* boxes = nullptr;
+  PosedSolid* solids = nullptr;
   Wall* walls = nullptr;
   std::uint32_t* parts = nullptr;
   Transform* local = nullptr;
 };
 
-/// Numbers of sub-shapes by kind, in the order of SubShapeTable.
-struct SubShapeCounts {
-  std::uint32_t spheres = 0, movable_boxes = 0, fixed_boxes = 0, walls = 0;
-
-  JFPX_HD std::uint32_t fixed_begin() const { return spheres + movable_boxes; }
-  JFPX_HD std::uint32_t bounded() const { return fixed_begin() + fixed_boxes; }
-  JFPX_HD std::uint32_t all() const { return bounded() + walls; }
-};
-
-JFPX_HD inline SubShapeCounts operator+(const SubShapeCounts& a, const SubShapeCounts& b) {
-  return {a.spheres + b.spheres, a.movable_boxes + b.movable_boxes, a.fixed_boxes + b.fixed_boxes,
-          a.walls + b.walls};
-}
-
-JFPX_HD inline SubShapeCounts counts_of(const SubShapeView& view) {
-  return {view.sphere_count, view.fixed_begin - view.sphere_count,
-          view.bounded_count - view.fixed_begin, view.count - view.bounded_count};
+/// The ranges of the sub-shapes of two objects together.
+inline SubShapeRanges operator+(const SubShapeRanges& a, const SubShapeRanges& b) {
+  SubShapeRanges sum;
+  for (std::uint32_t i = 0; i <= SubShapeRanges::kCount; ++i)
+    sum.begin[i] = a.begin[i] + b.begin[i];
+  return sum;
 }
 
 /// Merges the kept items of a sorted array with another sorted array, which must not have the keys
@@ -87,7 +76,7 @@ struct MergeProgram {
   SubShapeView added;
   std::uint32_t part_count = 0, added_part_count = 0;  ///< sizes of SubShapeView::local
   SubShapeArrays to;
-  SubShapeCounts* kept = nullptr;  ///< receives the numbers of sub-shapes that stay
+  SubShapeRanges* kept = nullptr;  ///< receives the ranges of the sub-shapes that stay
 
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
@@ -105,14 +94,20 @@ struct MergeProgram {
     team.spread(part_count, [&](std::uint32_t i) { to.local[i] = before.local[i]; });
     team.spread(added_part_count,
                 [&](std::uint32_t i) { to.local[part_count + i] = added.local[i]; });
-    const SubShapeCounts counts = counts_of(before);
-    count_kept(team, 0, counts.spheres, &kept->spheres);
-    count_kept(team, counts.spheres, counts.movable_boxes, &kept->movable_boxes);
-    count_kept(team, counts.fixed_begin(), counts.fixed_boxes, &kept->fixed_boxes);
-    count_kept(team, counts.bounded(), counts.walls, &kept->walls);
+    for (std::uint32_t range = 0; range < SubShapeRanges::kCount; ++range) {
+      const std::uint32_t first = before.ranges.begin[range];
+      team.count(
+          before.ranges.begin[range + 1] - first, [&](std::uint32_t i) { return stays(first + i); },
+          &kept->begin[range + 1]);
+    }
+    team.sync();
+    team.once([&] {
+      for (std::uint32_t i = 0; i < SubShapeRanges::kCount; ++i)
+        kept->begin[i + 1] += kept->begin[i];
+    });
     merge_sorted(
-        team, before.count, [&](std::uint32_t i) { return key(before, i); },
-        [&](std::uint32_t i) { return stays(i); }, added.count,
+        team, before.ranges.all(), [&](std::uint32_t i) { return key(before, i); },
+        [&](std::uint32_t i) { return stays(i); }, added.ranges.all(),
         [&](std::uint32_t k) { return key(added, k); },
         [&](std::uint32_t i, std::uint32_t place) { copy(before, i, 0, place); },
         [&](std::uint32_t k, std::uint32_t place) { copy(added, k, part_count, place); });
@@ -123,20 +118,9 @@ struct MergeProgram {
     return data.marked[data.near.sub_shapes.bodies[i]] == 0;
   }
 
-  template <class Team>
-  JFPX_HD void count_kept(const Team& team, std::uint32_t first, std::uint32_t count,
-                          std::uint32_t* sum) const {
-    team.count(
-        count, [&](std::uint32_t i) { return stays(first + i); }, sum);
-  }
-
   /// The order of SubShapeTable, without that of the parts of a body.
   JFPX_HD static std::uint64_t key(const SubShapeView& view, std::uint32_t i) {
-    const std::uint64_t kind = i < view.sphere_count    ? 0
-                               : i < view.fixed_begin   ? 1
-                               : i < view.bounded_count ? 2
-                                                        : 3;
-    return kind << 32 | view.bodies[i];
+    return std::uint64_t{view.ranges.range_of(i)} << 32 | view.bodies[i];
   }
 
   /// @param first_part index of the first of the parts of `from`
@@ -145,13 +129,13 @@ struct MergeProgram {
     to.bodies[place] = from.bodies[i];
     to.numbers[place] = from.numbers[i];
     if (from.is_wall(i)) {
-      to.walls[place - (kept->bounded() + added.bounded_count)] = from.wall(i);
+      to.walls[place - (kept->bounded() + added.ranges.bounded())] = from.wall(i);
       return;
     }
     to.bounds[place] = from.bounds(i);
     to.parts[place] = from.parts[i] == 0 ? 0 : from.parts[i] + first_part;
     if (!from.is_sphere(i)) {
-      to.boxes[place - (kept->spheres + added.sphere_count)] = from.box(i);
+      to.solids[place - (kept->spheres() + added.ranges.spheres())] = from.solid(i);
     }
   }
 };

@@ -141,6 +141,7 @@ struct SavedArrays {
 struct StepData {
   soft_step::StepBodies step;
   NearBounds near;
+  FixedTreesView trees;
   DeviceContacts contacts_of[2];  ///< as Progress::contacts
   MaterialSettings materials;
   soft_step::StepConstants constants;

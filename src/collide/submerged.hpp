@@ -1,4 +1,4 @@
-/// Volume and centroid of the part of a solid below a plane.
+/// Volume and centroid of the part of a polyhedron below a plane.
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -61,27 +61,6 @@ JFPX_HD inline void add_clipped(Corner (&c)[4], Submerged* sum) {
   } else {
     add_prism({c[0].point, c[1].point, c[2].point},
               {intersection(c[0], c[3]), intersection(c[1], c[3]), intersection(c[2], c[3])}, sum);
-  }
-}
-
-/// Divides the box into six tetrahedra around its diagonal from corner --- to corner +++, one for
-/// each order of the axes on a path along three edges (Kuhn's triangulation).
-JFPX_HD inline void add_submerged(const Box& box, const Transform& pose, const HalfSpace& liquid,
-                                  Submerged* sum) {
-  const auto corner = [&](int signs) {
-    const Vec3& h = box.half_extents;
-    const Vec3 local{(signs & 1) != 0 ? h.x : -h.x, (signs & 2) != 0 ? h.y : -h.y,
-                     (signs & 4) != 0 ? h.z : -h.z};
-    const Vec3 point = transform_point(pose, local);
-    return Corner{point, dot(liquid.normal, point) - liquid.offset};
-  };
-  for (int first = 0; first < 3; ++first) {
-    for (int second = 0; second < 3; ++second) {
-      if (second == first) continue;
-      Corner path[4] = {corner(0), corner(1 << first), corner((1 << first) | (1 << second)),
-                        corner(7)};
-      add_clipped(path, sum);
-    }
   }
 }
 

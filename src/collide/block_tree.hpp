@@ -1,0 +1,153 @@
+/// A bounding-volume tree of axis-aligned boxes in blocks of eight, for the CPU and for devices.
+#pragma once
+
+#include <jfpx/math.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Bounds of eight items or blocks. Unused lanes are empty: their lower bounds exceed the upper
+/// ones by more than any margin.
+struct alignas(64) TreeBlock {
+  static constexpr std::uint32_t kWidth = 8;
+  Real lower[3][kWidth], upper[3][kWidth];  ///< [m], by axis
+
+  /// [m], far outside of the world, where all coordinates of bodies are below 1e10. Differences,
+  /// and their products with the reciprocal direction of a ray, are finite.
+  static constexpr Real kFar = Real(1e12);
+  static constexpr Aabb kEmpty{{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
+
+  JFPX_HD void set(std::uint32_t lane, const Aabb& bounds) {
+    for (int i = 0; i < 3; ++i) {
+      lower[i][lane] = bounds.lower[i];
+      upper[i][lane] = bounds.upper[i];
+    }
+  }
+  /// Bounds of all lanes.
+  JFPX_HD Aabb bounds() const {
+    Aabb all;
+    for (int i = 0; i < 3; ++i) {
+      Real least = lower[i][0], most = upper[i][0];
+      for (std::uint32_t lane = 1; lane < kWidth; ++lane) {
+        least = lower[i][lane] < least ? lower[i][lane] : least;
+        most = upper[i][lane] > most ? upper[i][lane] : most;
+      }
+      all.lower[i] = least;
+      all.upper[i] = most;
+    }
+    return all;
+  }
+};
+
+/// The arrays of a BlockTree, in host memory or on a device.
+struct BlockTreeView {
+  static constexpr std::uint32_t kWidth = TreeBlock::kWidth;
+  /// 2^32 items make at most 12 levels; each block on the way leaves seven others on the stack.
+  static constexpr std::uint32_t kMostWaiting = 12 * kWidth;
+
+  /// The leaf blocks, then their parents and so on; the last one is the root. Inner block i has the
+  /// children 8 i to 8 i + 7.
+  TreeBlock* blocks = nullptr;
+  const std::uint32_t* items = nullptr;  ///< by leaf block and lane
+  std::uint32_t leaf_blocks = 0, block_count = 0;
+  std::uint32_t item_count = 0;
+
+  /// Calls visit(item) for the items whose bounds overlap a box.
+  template <class Visit>
+  JFPX_HD void visit_overlapping(const Aabb& box, const Visit& visit) const {
+    if (block_count == 0) return;
+    std::uint32_t waiting[kMostWaiting];
+    std::uint32_t count = 0;
+    waiting[count++] = block_count - 1;
+    while (count > 0) {
+      const std::uint32_t index = waiting[--count];
+      const TreeBlock& block = blocks[index];
+      std::uint32_t overlaps = 0;
+      for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+        bool overlap = true;
+        for (int i = 0; i < 3; ++i) {
+          overlap &= block.lower[i][lane] <= box.upper[i];
+          overlap &= block.upper[i][lane] >= box.lower[i];
+        }
+        overlaps |= (overlap ? 1u : 0u) << lane;
+      }
+      const bool is_leaf = index < leaf_blocks;
+      const std::uint32_t first = (is_leaf ? index : index - leaf_blocks) * kWidth;
+      for (std::uint32_t lane = 0; overlaps >> lane != 0; ++lane) {
+        if ((overlaps >> lane & 1) == 0) continue;
+        if (is_leaf) {
+          visit(items[first + lane]);
+        } else {
+          waiting[count++] = first + lane;
+        }
+      }
+    }
+  }
+
+  /// Makes the bounds of a leaf block anew. @param bounds_of function from an item to its bounds
+  template <class BoundsOf>
+  JFPX_HD void refit_leaf(std::uint32_t leaf, const BoundsOf& bounds_of) const {
+    for (std::uint32_t lane = 0; lane < kWidth && leaf * kWidth + lane < item_count; ++lane) {
+      blocks[leaf].set(lane, bounds_of(items[leaf * kWidth + lane]));
+    }
+  }
+  /// Makes the bounds of an inner block anew, whose children have theirs.
+  JFPX_HD void refit_inner(std::uint32_t block) const {
+    const std::uint32_t first = (block - leaf_blocks) * kWidth;
+    for (std::uint32_t lane = 0; lane < kWidth && first + lane < block; ++lane) {
+      blocks[block].set(lane, blocks[first + lane].bounds());
+    }
+  }
+  /// End of the inner blocks from `begin` on that depend only on blocks before `begin`.
+  JFPX_HD std::uint32_t end_of_level(std::uint32_t begin) const {
+    const std::uint32_t end = leaf_blocks + begin / kWidth;
+    return end > begin ? end : begin + 1;
+  }
+};
+
+/// Owns the blocks of a tree. The items are sorted along a Morton curve and packed into blocks
+/// (Leutenegger, Lopez and Edgington 1997; Morton codes as in Lauterbach et al. 2009).
+class BlockTree {
+ public:
+  /// Replaces the contents, in O(n) time. Memory is kept for the next call.
+  /// @param bounds,items of the same size
+  void build(std::span<const Aabb> bounds, std::span<const std::uint32_t> items);
+  /// Makes the bounds of all items anew, and keeps their order.
+  template <class BoundsOf>
+  void refit(const BoundsOf& bounds_of) {
+    const BlockTreeView tree = view();
+    for (std::uint32_t leaf = 0; leaf < leaf_blocks_; ++leaf) tree.refit_leaf(leaf, bounds_of);
+    refit_inner();
+  }
+  /// Valid until the next build().
+  BlockTreeView view() const {
+    return {const_cast<TreeBlock*>(blocks_.data()), items_.data(), leaf_blocks_,
+            static_cast<std::uint32_t>(blocks_.size()), item_count_};
+  }
+
+ private:
+  struct Key {
+    std::uint32_t code;   ///< size class and Morton code
+    std::uint32_t index;  ///< of the item and its bounds
+  };
+
+  void sort(std::span<const Aabb> bounds);
+  void refit_inner() {
+    const BlockTreeView tree = view();
+    for (std::uint32_t b = leaf_blocks_; b < tree.block_count; ++b) tree.refit_inner(b);
+  }
+
+  std::vector<TreeBlock> blocks_;
+  std::vector<std::uint32_t> items_;
+  std::uint32_t leaf_blocks_ = 0, item_count_ = 0;
+  std::vector<Key> keys_, spare_keys_;
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

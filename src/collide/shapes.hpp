@@ -1,0 +1,42 @@
+/// All shapes, and the test of any two solids.
+#pragma once
+
+#include "src/collide/shapes/box.hpp"
+#include "src/collide/shapes/plane.hpp"
+#include "src/collide/shapes/sphere.hpp"
+
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace detail {
+
+template <>
+inline constexpr const char* kShapeName<Compound> = "compound";
+
+/// A solid as find_contact() takes it: a sphere is a SphereInstance.
+template <class S>
+JFPX_HD inline Posed<S> instance(const S& solid, const Transform& pose) {
+  return {solid, pose};
+}
+JFPX_HD inline SphereInstance instance(const Sphere& sphere, const Transform& pose) {
+  return {pose.origin, sphere.radius};
+}
+
+/// The contact of two solids. A pair has one test, for one order of its kinds, in the header of a
+/// solid; without one, this function does not compile.
+/// @param manifold empty; receives the contact
+template <class A, class B>
+JFPX_HD void find_contact_of_any(const A& a, const B& b, const PairMotion& pair,
+                                 PairManifold* manifold) {
+  if constexpr (requires { find_contact(a, b, pair, manifold); }) {
+    find_contact(a, b, pair, manifold);
+  } else {
+    find_contact(b, a, pair.flipped(), manifold);
+    manifold->flip();
+  }
+}
+
+}  // namespace detail
+}  // namespace JFPX_ABI
+}  // namespace jfpx

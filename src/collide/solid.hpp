@@ -1,0 +1,75 @@
+/// A bounded solid of any kind as one plain record, for arrays in host memory and on devices.
+#pragma once
+
+#include <jfpx/shape.hpp>
+
+#include <cstdint>
+#include <type_traits>
+#include <variant>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace detail {
+
+/// Name of a shape in the field "type" of the JSON of scenes. Each shape's header has its own.
+template <class S>
+inline constexpr const char* kShapeName = nullptr;
+
+/// Dimensions of a solid: a core, which is a point, a segment along the y axis or a box, and a
+/// radius around it.
+struct Solid {
+  Vec3 half_extents;  ///< [m], of the core
+  Real radius = 0;    ///< [m]
+  friend bool operator==(const Solid&, const Solid&) = default;
+};
+
+template <class Variant>
+struct KindsOf;
+template <class... S>
+struct KindsOf<std::variant<S...>> {
+  static constexpr std::uint32_t kCount = sizeof...(S);
+  /// Index of a kind.
+  template <class Kind>
+  static constexpr std::uint32_t index_of() {
+    std::uint32_t index = 0, found = kCount;
+    ((std::is_same_v<S, Kind> ? found = index++ : index++), ...);
+    return found;
+  }
+  /// Calls f(std::type_identity<S>) for the kind with an index.
+  template <class F>
+  JFPX_HD static void visit(std::uint32_t kind, const F& f) {
+    std::uint32_t index = 0;
+    ((kind == index++ ? f(std::type_identity<S>()) : void()), ...);
+  }
+};
+
+/// Kinds of solids, in the order of SolidShape. The sphere is the first.
+using SolidKinds = KindsOf<SolidShape>;
+template <class S>
+inline constexpr std::uint32_t kSolidKind = SolidKinds::template index_of<S>();
+static_assert(kSolidKind<Sphere> == 0);
+
+/// Calls visit(shape, part, number) for the shape of a body, or for each part of a compound in
+/// order. `part` is null, and `number` 0, for a body that is no compound.
+template <class Visit>
+void for_each_part(const Shape& shape, const Visit& visit) {
+  const auto visit_parts = [&](const auto& whole) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(whole)>, Compound>) {
+      for (std::uint32_t i = 0; i < whole.parts.size(); ++i) {
+        const CompoundPart& part = whole.parts[i];
+        std::visit([&](const auto& solid) { visit(solid, &part, i); }, part.shape);
+      }
+    } else {
+      visit(whole, static_cast<const CompoundPart*>(nullptr), 0u);
+    }
+  };
+  std::visit(visit_parts, shape);
+}
+
+/// Whether S is one of the solids, and not a half-space or a plane.
+template <class S>
+inline constexpr bool kIsSolid = kSolidKind<S> < SolidKinds::kCount;
+
+}  // namespace detail
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,78 @@
+/// The trees of the solids of mass 0 in the memory of a device.
+#pragma once
+
+#include "src/world/device/transfer.hpp"
+#include "src/world/fixed_trees.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+template <class Device>
+class FixedTreeBuffers {
+ public:
+  /// Builds the trees on the host and copies them, unless the bodies of mass 0 are those of the
+  /// last call. The bounds of kinematic solids are not valid: the device makes them in every step.
+  /// @param margin NearBounds::largest_margin
+  /// @returns whether the trees are new
+  bool upload(const Transfer<Device>& transfer, const BodyStore& bodies, Real margin) {
+    if (bodies.fixed_version() == version_) return false;
+    ids_.clear();
+    for (const BodyId id : bodies.ids()) {
+      if (!bodies.movable(id.index)) ids_.push_back(id);
+    }
+    table_.set_bodies(bodies, ids_);
+    margins_.resize(table_.ranges().bounded());
+    swept_.resize(table_.ranges().bounded());
+    const NearBounds near{.bodies = bodies.view_without_ids(),
+                          .sub_shapes = table_.view(),
+                          .margins = margins_.data(),
+                          .swept = swept_.data(),
+                          .largest_margin = margin};
+    for (std::uint32_t i = table_.ranges().fixed_begin(); i < table_.ranges().bounded(); ++i) {
+      bodies.kinematic(near.sub_shapes.body(i)) ? near.enclose(i) : near.sweep(i);
+    }
+    trees_.set_bodies(table_, near);
+    view_ = {immovable_.upload(transfer, trees_.view().immovable),
+             kinematic_.upload(transfer, trees_.view().kinematic)};
+    transfer.wait();
+    version_ = bodies.fixed_version();
+    return true;
+  }
+  /// The next upload() copies the trees.
+  void clear() { version_ = 0; }
+  const FixedTreesView& view() const { return view_; }
+
+ private:
+  template <class T>
+  using Buffer = typename Device::template Buffer<T>;
+  struct Tree {
+    Buffer<TreeBlock> blocks;
+    Buffer<std::uint32_t> items;
+    BlockTreeView upload(const Transfer<Device>& transfer, BlockTreeView tree) {
+      transfer.put(&items, tree.items, std::size_t{tree.leaf_blocks} * TreeBlock::kWidth);
+      transfer.put(&blocks, tree.blocks, tree.block_count);
+      tree.items = items.data();
+      tree.blocks = blocks.data();
+      return tree;
+    }
+  };
+
+  Tree immovable_, kinematic_;
+  FixedTreesView view_;
+  std::uint64_t version_ = 0;  ///< BodyStore::fixed_version() of the trees; 0: none
+  // On the host, during upload().
+  std::vector<BodyId> ids_;
+  SubShapeTable table_;
+  std::vector<Real> margins_;
+  std::vector<SphereInstance> swept_;
+  FixedTrees trees_;
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx
