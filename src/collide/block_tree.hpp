@@ -68,19 +68,18 @@ struct BlockTreeView {
     while (count > 0) {
       const std::uint32_t index = waiting[--count];
       const TreeBlock& block = blocks[index];
-      std::uint32_t overlaps = 0;
-      for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-        bool overlap = true;
-        for (int i = 0; i < 3; ++i) {
-          overlap &= block.lower[i][lane] <= box.upper[i];
-          overlap &= block.upper[i][lane] >= box.lower[i];
+      std::int32_t gaps[kWidth] = {};
+      for (int i = 0; i < 3; ++i) {
+        const Real lower = box.lower[i], upper = box.upper[i];
+        for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+          gaps[lane] |= block.lower[i][lane] > upper ? 1 : 0;
+          gaps[lane] |= block.upper[i][lane] < lower ? 1 : 0;
         }
-        overlaps |= (overlap ? 1u : 0u) << lane;
       }
       const bool is_leaf = index < leaf_blocks;
       const std::uint32_t first = (is_leaf ? index : index - leaf_blocks) * kWidth;
-      for (std::uint32_t lane = 0; overlaps >> lane != 0; ++lane) {
-        if ((overlaps >> lane & 1) == 0) continue;
+      for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+        if (gaps[lane] != 0) continue;
         if (is_leaf) {
           visit(items[first + lane]);
         } else {

@@ -91,6 +91,7 @@ void BodyStore::for_each_array(const Visit& visit) {
 
 void BodyStore::reserve(std::size_t bodies) {
   pool_.reserve(bodies);
+  mobile_.storage()->reserve(bodies);
   for_each_array([bodies](auto& array) { array.reserve(bodies); });
 }
 
@@ -101,6 +102,7 @@ void BodyStore::resize_slots(std::size_t slots) {
 /// Adds an unused slot. If an allocation fails, capacity() is unchanged, because the pool is last.
 void BodyStore::add_slot() {
   resize_slots(capacity() + 1);
+  reserve_geometric(mobile_.storage(), capacity() + 1);
   pool_.add_slot();
 }
 
@@ -116,6 +118,24 @@ void BodyStore::count_body(std::uint32_t i) noexcept {
   if (kinematic(i)) ++kinematic_count_;
   if (sensor(i)) ++sensor_count_;
   if (rolls(i)) ++rolling_count_;
+  note_mobile(i);
+}
+
+std::span<const std::uint32_t> BodyStore::mobile() const noexcept {
+  return mobile_.get([this](std::vector<std::uint32_t>* bodies) {
+    bodies->clear();  // has the capacity of the slots
+    for (const BodyId id : ids()) {
+      if (!immovable(id.index)) bodies->push_back(id.index);
+    }
+  });
+}
+
+/// Keeps the list of mobile() up to date when a body is added.
+void BodyStore::note_mobile(std::uint32_t i) noexcept {
+  if (immovable(i)) return;
+  std::vector<std::uint32_t>* bodies = mobile_.current();
+  const bool is_last = bodies != nullptr && (bodies->empty() || bodies->back() < i);
+  is_last ? bodies->push_back(i) : mobile_.invalidate();
 }
 
 BodyId BodyStore::add(const BodyDef& def) {
@@ -229,6 +249,7 @@ void BodyStore::set_damping(std::uint32_t i, Real linear, Real angular) {
 
 void BodyStore::remove(BodyId id) noexcept {
   if (!movable(id.index)) ++fixed_version_;
+  if (!immovable(id.index)) mobile_.invalidate();
   pool_.remove(id);
   if (movable(id.index)) --movable_count_;
   if (kinematic(id.index)) --kinematic_count_;
@@ -253,7 +274,7 @@ BodyState BodyStore::state(std::uint32_t i) const {
 }
 
 void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
-  if (!movable(i) && !kinematic(i)) ++fixed_version_;
+  if (immovable(i)) ++fixed_version_;
   moving.position[i] = state.position;
   moving.orientation[i] = normalized(state.orientation);
   const bool moves = movable(i) || kinematic(i);

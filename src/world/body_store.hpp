@@ -58,6 +58,9 @@ class BodyStore {
   /// Returns the index of a body in the store. @throws InvalidArgument for an unknown id
   std::uint32_t require(BodyId id) const;
   std::span<const BodyId> ids() const noexcept { return pool_.ids(); }
+  /// Indices of the bodies that are not immovable, ascending. Valid until a body is added or
+  /// removed.
+  std::span<const std::uint32_t> mobile() const noexcept;
   /// Number of bodies.
   std::size_t size() const noexcept { return pool_.size(); }
   /// The id of the body that currently has the index.
@@ -149,6 +152,7 @@ class BodyStore {
   MotionPointers motion_pointers();
 
   bool movable(std::uint32_t body) const { return inverse_mass_[body] > 0; }
+  bool immovable(std::uint32_t body) const { return !movable(body) && !kinematic(body); }
   bool kinematic(std::uint32_t body) const { return kinematic_[body] != 0; }
   /// Whether a kinematic body is in motion.
   bool has_moving_kinematic_body() const;
@@ -172,6 +176,7 @@ class BodyStore {
   void add_slot();
   void set_shape(std::uint32_t body, Shape shape) noexcept;
   void count_body(std::uint32_t body) noexcept;
+  void note_mobile(std::uint32_t body) noexcept;
   static bool needs_inertia_arrays(const Shape& shape, Real mass, bool kinematic,
                                    bool inertia_given);
   Mat3 body_inverse_inertia(std::uint32_t body) const;
@@ -214,6 +219,7 @@ class BodyStore {
   bool filters_in_use_ = false;       ///< whether may_collide() may return false
 
   IdPool<BodyId> pool_;
+  Lazy<std::vector<std::uint32_t>> mobile_;
   std::uint64_t fixed_version_ = 1;
   std::uint32_t movable_count_ = 0, kinematic_count_ = 0, sensor_count_ = 0, rolling_count_ = 0;
 };

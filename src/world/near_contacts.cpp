@@ -84,9 +84,11 @@ void ContactFinder::sweep_fixed(const Sweep& sweep) {
 /// Fills near_: the bounds of the motion of all sub-shapes during the step.
 void ContactFinder::sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool) {
   start_bounds(bodies, margin);
-  parallel_for(pool, bodies.size(), kSubShapesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (const BodyId id : bodies.ids().subspan(first, last - first)) {
-      motion_[id.index] = near_.bodies.predicted_motion(id.index);
+  if (fixed_changed_) std::ranges::fill(motion_, Vec3{});  // that of immovable bodies
+  const std::span<const std::uint32_t> mobile = bodies.mobile();
+  parallel_for(pool, mobile.size(), kSubShapesPerChunk, [&](std::size_t first, std::size_t last) {
+    for (const std::uint32_t i : mobile.subspan(first, last - first)) {
+      motion_[i] = near_.bodies.predicted_motion(i);
     }
   });
   parallel_for(pool, sub_shapes_.ranges().fixed_begin(), kSubShapesPerChunk,

@@ -143,46 +143,54 @@ void SoftStep::find_near() {
   });
 }
 
-/// Calls stage(index) for all bodies.
+/// Calls stage(index) for all bodies that are not immovable.
 template <class Stage>
-void SoftStep::for_each_body(const BodyStore& bodies, const Stage& stage) {
-  const std::span<const BodyId> ids = bodies.ids();
-  parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (const BodyId id : ids.subspan(first, last - first)) stage(id.index);
+void SoftStep::for_each_body(const BodyStore& store, const Stage& stage) {
+  const std::span<const std::uint32_t> bodies = store.mobile();
+  parallel_for(pool_, bodies.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+    for (const std::uint32_t i : bodies.subspan(first, last - first)) stage(i);
   });
 }
 
-/// Calls test(index) for all bodies. @returns whether one call returned true
+/// Calls test(index) for all bodies that are not immovable. @returns whether one call returned true
 template <class Test>
-bool SoftStep::any_body(const BodyStore& bodies, const Test& test) {
-  const std::span<const BodyId> ids = bodies.ids();
+bool SoftStep::any_body(const BodyStore& store, const Test& test) {
+  const std::span<const std::uint32_t> bodies = store.mobile();
   return parallel_reduce(
-      pool_, ids.size(), kBodiesPerChunk, false,
+      pool_, bodies.size(), kBodiesPerChunk, false,
       [&](std::size_t first, std::size_t last) {
         bool any = false;
-        for (const BodyId id : ids.subspan(first, last - first)) any |= test(id.index);
+        for (const std::uint32_t i : bodies.subspan(first, last - first)) any |= test(i);
         return any;
       },
       std::logical_or<>());
 }
 
-std::optional<BodyId> SoftStep::find_runaway(const BodyStore& bodies) {
-  const auto is_runaway = [&](const BodyId& id) {
-    return bodies.moving.awake[id.index] != 0 && !is_in_world(step_.state(id.index));
-  };
-  constexpr BodyId kNone;
-  const std::span<const BodyId> ids = bodies.ids();
-  const BodyId found = parallel_reduce(
-      pool_, ids.size(), kBodiesPerChunk, kNone,
+/// Loads the bodies of a step: of the immovable ones, those that have a contact.
+void SoftStep::load(const BodyStore& store) {
+  for_each_body(store, [this](std::uint32_t i) { step_.load(i); });
+  if (store.mobile().size() == store.size()) return;
+  const std::span<const BodyId> ids = store.ids();
+  parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+    for (const BodyId id : ids.subspan(first, last - first)) {
+      if (near_[id.index] != 0 && store.immovable(id.index)) step_.load(id.index);
+    }
+  });
+}
+
+std::optional<BodyId> SoftStep::find_runaway(const BodyStore& store) {
+  constexpr std::uint32_t kNone = BodyId{}.index;
+  const std::span<const std::uint32_t> bodies = store.mobile();
+  const std::uint32_t found = parallel_reduce(
+      pool_, bodies.size(), kBodiesPerChunk, kNone,
       [&](std::size_t first, std::size_t last) {
-        BodyId lowest = kNone;
-        for (const BodyId& id : ids.subspan(first, last - first)) {
-          if (is_runaway(id) && id.index < lowest.index) lowest = id;
+        for (const std::uint32_t i : bodies.subspan(first, last - first)) {
+          if (store.moving.awake[i] != 0 && !is_in_world(step_.state(i))) return i;
         }
-        return lowest;
+        return kNone;
       },
-      [](const BodyId& x, const BodyId& y) { return x.index < y.index ? x : y; });
-  return found == kNone ? std::nullopt : std::optional(found);
+      [](std::uint32_t x, std::uint32_t y) { return std::min(x, y); });
+  return found == kNone ? std::nullopt : std::optional(store.id(found));
 }
 
 /// Islands whose bodies have all been slow for long enough fall asleep.
@@ -210,7 +218,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
            .orientation = orientation_.data(),
            .near = near_.data(),
            .h = constants_.h};
-  for_each_body(*bodies, [this](std::uint32_t i) { step_.load(i); });
+  load(*bodies);
   const BodyView& view = step_.bodies;
   solver_.build({.contacts = cache_.current().view(),
                  .properties = {.inverse_inertia = view.inverse_inertia,

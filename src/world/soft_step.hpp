@@ -72,6 +72,7 @@ class SoftStep {
   void for_each_body(const BodyStore& bodies, const Stage& stage);
   template <class Test>
   bool any_body(const BodyStore& bodies, const Test& test);
+  void load(const BodyStore& bodies);
   std::optional<BodyId> find_runaway(const BodyStore& bodies);
   void put_islands_to_sleep(const BodyStore& bodies);
 

@@ -114,13 +114,13 @@ void World::Impl::call_generators(std::vector<Contact>* list, StepReport* report
 
 /// Number of movable bodies awake.
 std::uint32_t World::Impl::count_awake() const {
-  const std::span<const BodyId> ids = store.ids();
+  const std::span<const std::uint32_t> bodies = store.mobile();
   return parallel_reduce(
-      pool.get(), ids.size(), kBodiesPerTask, 0u,
+      pool.get(), bodies.size(), kBodiesPerTask, 0u,
       [&](std::size_t first, std::size_t last) {
         std::uint32_t count = 0;
-        for (const BodyId id : ids.subspan(first, last - first)) {
-          if (store.movable(id.index)) count += store.moving.awake[id.index];
+        for (const std::uint32_t i : bodies.subspan(first, last - first)) {
+          if (store.movable(i)) count += store.moving.awake[i];
         }
         return count;
       },
