@@ -3,6 +3,8 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/is.hpp"
+
 #include <bit>
 #include <concepts>
 #include <cstddef>
@@ -21,14 +23,12 @@ inline namespace JFPX_ABI {
 
 static_assert(std::endian::native == std::endian::little);
 
-/// T is U or const U. A function serialize(archive, value) with this constraint describes the bytes
-/// of a type for all archives, which call it for values that are neither numbers nor enumerations.
-template <class T, class U>
-concept Is = std::same_as<std::remove_const_t<T>, U>;
-
 template <class T>
 concept Scalar = (std::is_arithmetic_v<T> ||
                   std::is_enum_v<T>)&&!std::same_as<std::remove_const_t<T>, bool>;
+
+// A function serialize(archive, value) that Is<T> constrains describes the bytes of a type for all
+// archives, which call it for values that are neither numbers nor enumerations.
 
 /// Appends values to a sequence of bytes.
 class BinaryWriter {

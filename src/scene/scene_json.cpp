@@ -5,6 +5,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/file.hpp"
+#include "src/scene/scene_fields.hpp"
 #include "src/scene/scene_json_value.hpp"
 
 #include <algorithm>
@@ -100,15 +101,12 @@ void read(const Json& json, const std::string& where, Quat& q) {
   read_array(json, where, parts);
 }
 
-void read(const Json& json, const std::string& where, Shape& shape);
-void read(const Json& json, const std::string& where, std::variant<Sphere, Box>& shape);
-void read(const Json& json, const std::string& where, std::vector<CompoundPart>& parts);
-void read(const Json& json, const std::string& where, CollisionFilter& filter);
-void read(const Json& json, const std::string& where, std::vector<BodyPair>& pairs);
-void read(const Json& json, const std::string& where, SoftStepSettings& settings);
-void read(const Json& json, const std::string& where, ResolverSettings& settings);
-void read(const Json& json, const std::string& where, SleepSettings& settings);
-void read(const Json& json, const std::string& where, MaterialSettings& settings);
+template <HasFields T>
+void read(const Json& json, const std::string& where, T& object);
+template <class... Shapes>
+void read(const Json& json, const std::string& where, std::variant<Shapes...>& shape);
+template <class T>
+void read(const Json& json, const std::string& where, std::vector<T>& list);
 
 /// Reads the fields of one object and rejects the fields that were not read.
 class ObjectReader {
@@ -118,12 +116,17 @@ class ObjectReader {
       fail(where_, std::string("is ") + kind_of(json) + "; it must be an object");
   }
   template <typename T>
-  void optional(const char* name, T& out) {
-    if (const Json* value = find(name)) read(*value, path(name), out);
-  }
-  template <typename T>
   void required(const char* name, T& out) {
     read(at(name), path(name), out);
+  }
+  /// Reads the fields of each_field().
+  template <HasFields T>
+  void fields(T& object) {
+    each_field(object, [this]<class Field>(const Field& field, auto& member) {
+      const bool is_required = Field::kPresence == Presence::required;
+      const Json* value = is_required ? &at(field.name) : find(field.name);
+      if (value != nullptr) read(*value, path(field.name), member);
+    });
   }
   const Json* find(const char* name) {
     known_.insert(name);
@@ -151,22 +154,11 @@ class ObjectReader {
   std::set<std::string> known_;
 };
 
-void read_fields(ObjectReader* object, Sphere* sphere) {
-  object->required("radius", sphere->radius);
-}
-void read_fields(ObjectReader* object, Box* box) {
-  object->required("half_extents", box->half_extents);
-}
-void read_fields(ObjectReader* object, HalfSpace* half_space) {
-  object->required("normal", half_space->normal);
-  object->required("offset", half_space->offset);
-}
-void read_fields(ObjectReader* object, Plane* plane) {
-  object->required("normal", plane->normal);
-  object->required("offset", plane->offset);
-}
-void read_fields(ObjectReader* object, Compound* compound) {
-  object->required("parts", compound->parts);
+template <HasFields T>
+void read(const Json& json, const std::string& where, T& object) {
+  ObjectReader reader(json, where);
+  reader.fields(object);
+  reader.reject_unknown();
 }
 
 /// True if `type` is the name of shape T. Version 0.1 named a compound "assembly".
@@ -177,14 +169,14 @@ bool is_name_of(const std::string& type) {
 
 /// Reads the shape that the field "type" names.
 template <class... Shapes>
-void read_shape(const Json& json, const std::string& where, std::variant<Shapes...>* shape) {
+void read(const Json& json, const std::string& where, std::variant<Shapes...>& shape) {
   ObjectReader object(json, where);
   std::string type;
   object.required("type", type);
   const auto read_if = [&](auto value) {
     if (!is_name_of<decltype(value)>(type)) return false;
-    read_fields(&object, &value);
-    *shape = std::move(value);
+    object.fields(value);
+    shape = std::move(value);
     return true;
   };
   if (!(read_if(Shapes{}) || ...)) {
@@ -200,21 +192,7 @@ void read_shape(const Json& json, const std::string& where, std::variant<Shapes.
   }
   object.reject_unknown();
 }
-void read(const Json& json, const std::string& where, Shape& shape) {
-  read_shape(json, where, &shape);
-}
-void read(const Json& json, const std::string& where, std::variant<Sphere, Box>& shape) {
-  read_shape(json, where, &shape);
-}
 
-void read(const Json& json, const std::string& where, CompoundPart& part) {
-  ObjectReader object(json, where);
-  object.required("shape", part.shape);
-  object.optional("position", part.position);
-  object.optional("orientation", part.orientation);
-  object.optional("density", part.density);
-  object.reject_unknown();
-}
 void read(const Json& json, const std::string& where, BodyPair& pair) {
   if (!json.is_array() || json.size() != 2) fail(where, "must be an array of 2 indices of bodies");
   read(json[0], where + "[0]", pair.a);
@@ -222,7 +200,7 @@ void read(const Json& json, const std::string& where, BodyPair& pair) {
 }
 
 template <class T>
-void read_list(const Json& json, const std::string& where, std::vector<T>& list) {
+void read(const Json& json, const std::string& where, std::vector<T>& list) {
   if (!json.is_array()) fail(where, std::string("is ") + kind_of(json) + "; it must be an array");
   list.clear();
   for (const Json& item : json) {
@@ -230,82 +208,6 @@ void read_list(const Json& json, const std::string& where, std::vector<T>& list)
     read(item, place, list.emplace_back());
   }
 }
-void read(const Json& json, const std::string& where, std::vector<CompoundPart>& parts) {
-  read_list(json, where, parts);
-}
-void read(const Json& json, const std::string& where, std::vector<BodyPair>& pairs) {
-  read_list(json, where, pairs);
-}
-
-void read(const Json& json, const std::string& where, CollisionFilter& filter) {
-  ObjectReader object(json, where);
-  object.optional("category", filter.category);
-  object.optional("mask", filter.mask);
-  object.reject_unknown();
-}
-
-void read(const Json& json, const std::string& where, BodyDef& body) {
-  ObjectReader object(json, where);
-  object.required("shape", body.shape);
-  object.optional("mass", body.mass);
-  object.optional("kinematic", body.kinematic);
-  object.optional("inertia", body.inertia);
-  object.optional("position", body.position);
-  object.optional("orientation", body.orientation);
-  object.optional("velocity", body.velocity);
-  object.optional("angular_velocity", body.angular_velocity);
-  object.optional("acceleration", body.acceleration);
-  object.optional("linear_damping", body.linear_damping);
-  object.optional("angular_damping", body.angular_damping);
-  object.optional("friction", body.friction);
-  object.optional("restitution", body.restitution);
-  object.optional("rolling_friction", body.rolling_friction);
-  object.optional("spinning_friction", body.spinning_friction);
-  object.optional("can_sleep", body.can_sleep);
-  object.optional("filter", body.filter);
-  object.optional("sensor", body.sensor);
-  object.optional("user_data", body.user_data);
-  object.reject_unknown();
-}
-
-void read(const Json& json, const std::string& where, SoftStepSettings& settings) {
-  ObjectReader object(json, where);
-  object.optional("substeps", settings.substeps);
-  object.optional("contact_hertz", settings.contact_hertz);
-  object.optional("damping_ratio", settings.damping_ratio);
-  object.optional("push_out_speed", settings.push_out_speed);
-  object.optional("restitution_threshold", settings.restitution_threshold);
-  object.optional("speculative_margin", settings.speculative_margin);
-  object.reject_unknown();
-}
-
-void read(const Json& json, const std::string& where, ResolverSettings& settings) {
-  ObjectReader object(json, where);
-  object.optional("max_iterations", settings.max_iterations);
-  object.optional("velocity_epsilon", settings.velocity_epsilon);
-  object.optional("position_epsilon", settings.position_epsilon);
-  object.optional("restitution_velocity", settings.restitution_velocity);
-  object.optional("angular_limit", settings.angular_limit);
-  object.reject_unknown();
-}
-
-void read(const Json& json, const std::string& where, SleepSettings& settings) {
-  ObjectReader object(json, where);
-  object.optional("enabled", settings.enabled);
-  object.optional("speed", settings.speed);
-  object.optional("time", settings.time);
-  object.optional("epsilon", settings.epsilon);
-  object.optional("bias", settings.bias);
-  object.reject_unknown();
-}
-
-void read(const Json& json, const std::string& where, MaterialSettings& settings) {
-  ObjectReader object(json, where);
-  object.optional("friction", settings.friction);
-  object.optional("restitution", settings.restitution);
-  object.reject_unknown();
-}
-
 Scene scene_from(const Json& json) {
   ObjectReader object(json, "scene");
   const Json& version = object.at("jfpx_scene");
@@ -316,14 +218,10 @@ Scene scene_from(const Json& json) {
   }
   Scene scene;
   if (version == 1) scene.solver = Solver::worst_first;  // the only one of that version
-  object.optional("name", scene.name);
-  object.optional("dt", scene.dt);
-  object.optional("solver", scene.solver);
-  object.optional("soft_step", scene.soft_step);
-  object.optional("resolver", scene.resolver);
-  object.optional("sleep", scene.sleep);
-  object.optional("materials", scene.materials);
-  object.optional("ignored_pairs", scene.ignored_pairs);
+  object.fields(scene);
+  if (const Json* pairs = object.find("ignored_pairs")) {
+    read(*pairs, object.path("ignored_pairs"), scene.ignored_pairs);
+  }
   const Json& bodies = object.at("bodies");
   if (!bodies.is_array())
     fail("scene.bodies", std::string("is ") + kind_of(bodies) + "; it must be an array");

@@ -35,9 +35,7 @@ inline constexpr const char* kTypeName<Compound> = "compound";
 
 }  // namespace detail
 
-/// A body as in the JSON of a scene.
-detail::SceneJson body_to_value(const BodyDef& body);
-/// @throws InvalidScene
+/// A body from the JSON of a scene. @throws InvalidScene
 BodyDef body_from_value(const detail::SceneJson& json);
 /// Parses a text of bounded depth whose objects have unique keys. @throws InvalidScene
 detail::SceneJson parse_json(std::string_view text);

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <string>
+#include <type_traits>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -19,20 +20,30 @@ void validate_body_count(std::uint64_t bodies);
 /// orientation has unit length to kUnitTolerance. Returns an empty string for a valid state, else a
 /// message with field, value and range, without the body.
 std::string find_fault(const BodyState& state);
-/// Checks of single fields of a body, with results as those of find_fault().
+/// Checks each field of a body alone, with a result as that of find_fault().
+std::string find_range_fault(const BodyDef& def);
+/// The same for one field.
+template <class T>
+std::string find_range_fault(T BodyDef::*field, const std::type_identity_t<T>& value) {
+  BodyDef def;
+  def.*field = value;
+  return find_range_fault(def);
+}
+/// Checks of what a range does not describe, with such results.
 std::string find_mass_fault(Real mass);
 std::string find_inertia_fault(const Mat3& inertia);
 /// Checks the inertia of a solid body of a valid shape that can be movable.
 std::string find_inertia_fault(const Shape& shape, Real mass);
-std::string find_acceleration_fault(const Vec3& acceleration);
-std::string find_damping_fault(Real linear, Real angular);
-std::string find_friction_fault(Real friction);
-std::string find_restitution_fault(Real restitution);
 /// The shortest text that converts back to the same value.
 std::string to_text(Real value);
 std::string to_text(const Vec3& v);
 std::string to_text(const Quat& q);
 std::string to_text(const Mat3& m);
+/// The number of an integer or of a value of an enumeration.
+template <class T>
+requires std::is_integral_v<T> || std::is_enum_v<T> std::string to_text(T value) {
+  return to_text(static_cast<Real>(value));
+}
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

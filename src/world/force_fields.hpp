@@ -1,80 +1,72 @@
-/// Names and members of the forces of force.hpp and of their parts, for recordings and snapshots.
-/// Each function names all members of its type, so that a new member does not compile until it is
-/// here.
+/// Fields of the forces of force.hpp and of their parts; see field.hpp.
 #pragma once
 
 #include <jfpx/force.hpp>
 
-#include "src/base/binary_archive.hpp"
+#include "src/scene/shape_fields.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-// Each calls visit(name, member) for each field.
 void each_field(Is<Attachment> auto& attachment, const auto& visit) {
   auto& [body, point] = attachment;
-  visit("body", body);
-  visit("point", point);
-}
-void each_field(Is<HalfSpace> auto& half_space, const auto& visit) {
-  auto& [normal, offset] = half_space;
-  visit("normal", normal);
-  visit("offset", offset);
+  visit(field("body"), body);
+  visit(field("point", kFinite), point);
 }
 void each_field(Is<Gravity> auto& force, const auto& visit) {
   auto& [acceleration, body] = force;
-  visit("acceleration", acceleration);
-  visit("body", body);
+  visit(field("acceleration", kFinite), acceleration);
+  visit(field("body"), body);
 }
 void each_field(Is<Drag> auto& force, const auto& visit) {
   auto& [linear, quadratic, wind, body] = force;
-  visit("linear", linear);
-  visit("quadratic", quadratic);
-  visit("wind", wind);
-  visit("body", body);
+  visit(field("linear", kNotNegative), linear);
+  visit(field("quadratic", kNotNegative), quadratic);
+  visit(field("wind", kFinite), wind);
+  visit(field("body"), body);
 }
 template <class T>
 concept Elastic = Is<T, Spring> || Is<T, Bungee>;
 void each_field(Elastic auto& force, const auto& visit) {
   auto& [a, b, stiffness, damping, rest_length] = force;
-  visit("a", a);
-  visit("b", b);
-  visit("stiffness", stiffness);
-  visit("damping", damping);
-  visit("rest_length", rest_length);
+  visit(field("a"), a);
+  visit(field("b"), b);
+  visit(field("stiffness", kNotNegative), stiffness);
+  visit(field("damping", kNotNegative), damping);
+  visit(field("rest_length", kNotNegative), rest_length);
 }
 void each_field(Is<Aero> auto& force, const auto& visit) {
   auto& [body, tensor, point, wind] = force;
-  visit("body", body);
-  visit("tensor", tensor);
-  visit("point", point);
-  visit("wind", wind);
+  visit(field("body"), body);
+  visit(field("tensor", kFinite), tensor);
+  visit(field("point", kFinite), point);
+  visit(field("wind", kFinite), wind);
 }
 void each_field(Is<AeroControl> auto& force, const auto& visit) {
   auto& [body, lowest, base, highest, point, wind, control] = force;
-  visit("body", body);
-  visit("lowest", lowest);
-  visit("base", base);
-  visit("highest", highest);
-  visit("point", point);
-  visit("wind", wind);
-  visit("control", control);
+  visit(field("body"), body);
+  visit(field("lowest", kFinite), lowest);
+  visit(field("base", kFinite), base);
+  visit(field("highest", kFinite), highest);
+  visit(field("point", kFinite), point);
+  visit(field("wind", kFinite), wind);
+  visit(field("control", kFinite), control);
 }
 void each_field(Is<Buoyancy> auto& force, const auto& visit) {
   auto& [liquid, density, gravity, body] = force;
-  visit("liquid", liquid);
-  visit("density", density);
-  visit("gravity", gravity);
-  visit("body", body);
+  visit(field("liquid", CheckedByCode{}), liquid);
+  visit(field("density", kNotNegative), density);
+  visit(field("gravity", kNotNegative), gravity);
+  visit(field("body"), body);
 }
 void each_field(Is<Explosion> auto& force, const auto& visit) {
   auto& [centre, start, peak_force, speed, thickness, duration] = force;
-  visit("centre", centre);
-  visit("start", start);
-  visit("peak_force", peak_force);
-  visit("speed", speed);
-  visit("thickness", thickness);
-  visit("duration", duration);
+  visit(field("centre", kFinite), centre);
+  visit(field("start", kFinite), start);
+  visit(field("peak_force", kNotNegative), peak_force);
+  visit(field("speed", kPositive), speed);
+  visit(field("thickness", kPositive), thickness);
+  visit(field("duration", kPositive), duration);
 }
 
 }  // namespace JFPX_ABI

@@ -2,63 +2,54 @@
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 
-#include "src/scene/scene_validate.hpp"
+#include "src/scene/field_fault.hpp"
+#include "src/world/force_fields.hpp"
 #include "src/world/force_on_body.hpp"
+
+#include <concepts>
+#include <optional>
+#include <string>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// Checks the fields of one force, with error messages in the common form.
-class Check {
- public:
-  Check(const char* force, const ForceContext& context) : force_(force), context_(context) {}
+[[noreturn]] void refuse_force(const char* force, const std::string& fault) {
+  throw InvalidArgument(std::string(force) + ": " + fault);
+}
 
-  template <class Value>
-  void require(bool good, const char* field, const Value& value, const char* range) const {
-    if (good) return;
-    throw InvalidArgument(std::string(force_) + ": " + field + " is " + to_text(value) +
-                          "; it must be " + range);
-  }
-  void finite(const char* field, const Vec3& value) const {
-    require(is_finite(value), field, value, "finite");
-  }
-  void finite(const char* field, const Mat3& value) const {
-    for (const Vec3& row : value.row) finite(field, row);
-  }
-  void not_negative(const char* field, Real value) const {
-    require(value >= 0 && is_finite(value), field, value, "finite and >= 0");
-  }
-  void positive(const char* field, Real value) const {
-    require(value > 0 && is_finite(value), field, value, "finite and > 0");
-  }
-  void alive(const char* field, const std::optional<BodyId>& body) const {
-    if (!body || context_.contains(*body)) return;
-    throw InvalidArgument(std::string(force_) + ": " + field + " (index " +
-                          std::to_string(body->index) + ", generation " +
-                          std::to_string(body->generation) +
-                          ") is unknown; it must be of a living body of this world");
-  }
-  void spring(const Attachment& a, const Attachment& b, Real stiffness, Real damping,
-              Real rest_length) const {
-    alive("a.body", a.body);
-    alive("b.body", b.body);
-    if (a.body == b.body) {
-      throw InvalidArgument(std::string(force_) +
-                            (a.body ? ": both ends are fixed to one body" : ": no end has a body") +
-                            "; it must join two bodies, or a body and the world");
+/// Checks that the bodies of a force, or of a part of it, are alive.
+/// @param path of the object in the force, with a dot at its end
+template <class T>
+void require_alive(const char* force, const ForceContext& context, const T& object,
+                   const std::string& path = {}) {
+  each_field(object, [&]<class Member>(const auto& field, const Member& member) {
+    if constexpr (std::convertible_to<Member, std::optional<BodyId>>) {
+      const std::optional<BodyId> body = member;
+      if (!body || context.contains(*body)) return;
+      refuse_force(force, path + field.name + " (index " + std::to_string(body->index) +
+                              ", generation " + std::to_string(body->generation) +
+                              ") is unknown; it must be of a living body of this world");
+    } else if constexpr (HasFields<Member>) {
+      require_alive(force, context, member, path + field.name + ".");
     }
-    finite("a.point", a.point);
-    finite("b.point", b.point);
-    not_negative("stiffness", stiffness);
-    not_negative("damping", damping);
-    not_negative("rest_length", rest_length);
-  }
+  });
+}
 
- private:
-  const char* force_;
-  const ForceContext& context_;
-};
+/// Checks all fields of a force. @throws InvalidArgument
+template <class Force>
+void check_force(const char* name, const ForceContext& context, const Force& force) {
+  require_alive(name, context, force);
+  if constexpr (Elastic<const Force>) {
+    if (force.a.body == force.b.body) {
+      refuse_force(name, std::string(force.a.body ? "both ends are fixed to one body"
+                                                  : "no end has a body") +
+                             "; it must join two bodies, or a body and the world");
+    }
+  }
+  const std::string found = find_field_fault(force);
+  if (!found.empty()) refuse_force(name, found);
+}
 
 /// A body of a ForceContext, for act_on().
 class ContextBody {
@@ -118,72 +109,39 @@ void apply_spring(ForceContext& context, const S& spring) {
 }  // namespace
 
 void Gravity::validate(const ForceContext& context) const {
-  const Check check("gravity", context);
-  check.finite("acceleration", acceleration);
-  check.alive("body", body);
+  check_force("gravity", context, *this);
 }
 void Gravity::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
 
-void Drag::validate(const ForceContext& context) const {
-  const Check check("drag", context);
-  check.not_negative("linear", linear);
-  check.not_negative("quadratic", quadratic);
-  check.finite("wind", wind);
-  check.alive("body", body);
-}
+void Drag::validate(const ForceContext& context) const { check_force("drag", context, *this); }
 void Drag::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
 
-void Spring::validate(const ForceContext& context) const {
-  Check("spring", context).spring(a, b, stiffness, damping, rest_length);
-}
+void Spring::validate(const ForceContext& context) const { check_force("spring", context, *this); }
 void Spring::operator()(ForceContext& context) const { apply_spring(context, *this); }
 
-void Bungee::validate(const ForceContext& context) const {
-  Check("bungee", context).spring(a, b, stiffness, damping, rest_length);
-}
+void Bungee::validate(const ForceContext& context) const { check_force("bungee", context, *this); }
 void Bungee::operator()(ForceContext& context) const { apply_spring(context, *this); }
 
-void Aero::validate(const ForceContext& context) const {
-  const Check check("aero", context);
-  check.alive("body", body);
-  check.finite("tensor", tensor);
-  check.finite("point", point);
-  check.finite("wind", wind);
-}
+void Aero::validate(const ForceContext& context) const { check_force("aero", context, *this); }
 void Aero::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
 
 void AeroControl::validate(const ForceContext& context) const {
-  const Check check("aero control", context);
-  check.alive("body", body);
-  check.finite("lowest", lowest);
-  check.finite("base", base);
-  check.finite("highest", highest);
-  check.finite("point", point);
-  check.finite("wind", wind);
-  check.require(is_finite(control), "control", control, "finite");
+  check_force("aero control", context, *this);
 }
 void AeroControl::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
 Mat3 AeroControl::tensor() const { return detail::tensor_at_control(*this); }
 
 void Buoyancy::validate(const ForceContext& context) const {
-  const Check check("buoyancy", context);
-  check.require(absolute(length_squared(liquid.normal) - 1) <= kUnitTolerance, "liquid.normal",
-                liquid.normal, "a unit vector, to a thousandth");
-  check.require(is_finite(liquid.offset), "liquid.offset", liquid.offset, "finite");
-  check.not_negative("density", density);
-  check.not_negative("gravity", gravity);
-  check.alive("body", body);
+  check_force("buoyancy", context, *this);
+  std::string found;
+  find_fault_of(field("liquid.normal", kUnitVector), liquid.normal, &found);
+  if (found.empty()) find_fault_of(field("liquid.offset", kFinite), liquid.offset, &found);
+  if (!found.empty()) refuse_force("buoyancy", found);
 }
 void Buoyancy::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
 
 void Explosion::validate(const ForceContext& context) const {
-  const Check check("explosion", context);
-  check.finite("centre", centre);
-  check.require(is_finite(start), "start", start, "finite");
-  check.not_negative("peak_force", peak_force);
-  check.positive("speed", speed);
-  check.positive("thickness", thickness);
-  check.positive("duration", duration);
+  check_force("explosion", context, *this);
 }
 void Explosion::operator()(ForceContext& context) const {
   for (const BodyId id : context.bodies()) {

@@ -18,30 +18,9 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& what) { throw InvalidScene(what); }
 
-// Further types: each calls visit(name, member) for each field.
-void each_field(Is<BodyState> auto& state, const auto& visit) {
-  auto& [position, orientation, velocity, angular_velocity] = state;
-  visit("position", position);
-  visit("orientation", orientation);
-  visit("velocity", velocity);
-  visit("angular_velocity", angular_velocity);
-}
-void each_field(Is<CollisionFilter> auto& filter, const auto& visit) {
-  auto& [category, mask] = filter;
-  visit("category", category);
-  visit("mask", mask);
-}
-
 /// Names of the forces, in the order of RecordableForce.
 constexpr std::array<const char*, std::variant_size_v<RecordableForce>> kForceNames{
     "gravity", "drag", "spring", "bungee", "aero", "aero_control", "buoyancy", "explosion"};
-
-template <class T>
-Json object_of(const T& value) {
-  Json json = Json::object();
-  each_field(value, [&](const char* name, const auto& field) { json[name] = to_value(field); });
-  return json;
-}
 
 void read(const Json& json, Real& value) { value = json.get<Real>(); }
 void read(const Json& json, bool& value) { value = json.get<bool>(); }
@@ -75,12 +54,9 @@ void read(const Json& json, std::optional<T>& value) {
   value.reset();
   if (!json.is_null()) read(json, value.emplace());
 }
-template <class T>
-requires requires(T& value) {
-  each_field(value, [](const char*, auto&) {});
-}
+template <HasFields T>
 void read(const Json& json, T& value) {
-  each_field(value, [&](const char* name, auto& field) { read(json.at(name), field); });
+  each_field(value, [&](const auto& field, auto& member) { read(json.at(field.name), member); });
 }
 template <std::size_t... I>
 void read_force(const Json& json, RecordableForce& force, std::index_sequence<I...>) {
@@ -150,33 +126,12 @@ void read_and_call(World& world, const Json& call, Result (*function)(World&, Pa
 
 }  // namespace
 
-Json to_value(Real value) {
-  if (!is_finite(value)) throw InvalidArgument("a recorded call has a number that is not finite");
-  return value;
-}
-Json to_value(std::uint32_t value) { return value; }
-Json to_value(const Quat& q) {
-  return Json::array({to_value(q.w), to_value(q.x), to_value(q.y), to_value(q.z)});
-}
-Json to_value(const Mat3& m) {
-  return Json::array({to_value(m.row[0]), to_value(m.row[1]), to_value(m.row[2])});
-}
-Json to_value(const std::optional<BodyId>& id) { return id ? to_value(*id) : Json(); }
-Json to_value(const Attachment& attachment) { return object_of(attachment); }
-Json to_value(const HalfSpace& half_space) { return object_of(half_space); }
-Json to_value(bool value) { return value; }
-Json to_value(std::uint64_t value) { return value; }
-Json to_value(const Vec3& v) { return Json::array({to_value(v.x), to_value(v.y), to_value(v.z)}); }
-Json to_value(const std::optional<Mat3>& m) { return m ? to_value(*m) : Json(); }
-Json to_value(BodyId id) { return Json::array({id.index, id.generation}); }
-Json to_value(ForceId id) { return id.number; }
-Json to_value(const BodyDef& body) { return body_to_value(body); }
-Json to_value(const BodyState& state) { return object_of(state); }
-Json to_value(const CollisionFilter& filter) { return object_of(filter); }
-Json to_value(const RecordableForce& force) {
-  Json json = {{"type", kForceNames[force.index()]}};
-  json.update(std::visit([](const auto& value) { return object_of(value); }, force));
-  return json;
+void require_finite(const Json& json) {
+  for (const Json& item : json) {
+    if (item.is_structured()) require_finite(item);
+    if (!item.is_number_float() || is_finite(item.get<Real>())) continue;
+    throw InvalidArgument("a recorded call has a number that is not finite");
+  }
 }
 
 ForceId add_force(World& world, const RecordableForce& force) {
@@ -199,5 +154,13 @@ void make_call_on(World& world, const Json& call) {
 }
 
 }  // namespace recorded
+
+detail::SceneJson to_value(ForceId id) { return id.number; }
+detail::SceneJson to_value(const RecordableForce& force) {
+  detail::SceneJson json = {{"type", recorded::kForceNames[force.index()]}};
+  std::visit([&json](const auto& value) { add_fields(&json, value); }, force);
+  return json;
+}
+
 }  // namespace JFPX_ABI
 }  // namespace jfpx

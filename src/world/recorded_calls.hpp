@@ -3,39 +3,38 @@
 
 #include <jfpx/recorded_world.hpp>
 
-#include "src/scene/scene_json_value.hpp"
+#include "src/scene/json_writer.hpp"
 
+#include <concepts>
 #include <type_traits>
 #include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
+
+detail::SceneJson to_value(ForceId id);
+detail::SceneJson to_value(const RecordableForce& force);
+
 namespace recorded {
 
 using Json = detail::SceneJson;
 
-Json to_value(Real value);
-Json to_value(bool value);
-Json to_value(std::uint64_t value);
-Json to_value(const Vec3& v);
-Json to_value(const std::optional<Mat3>& m);
-Json to_value(BodyId id);
-Json to_value(ForceId id);
-Json to_value(const BodyDef& body);
-Json to_value(const BodyState& state);
-Json to_value(const CollisionFilter& filter);
-Json to_value(const RecordableForce& force);
-Json to_value(std::uint32_t value);
-Json to_value(const Quat& q);
-Json to_value(const Mat3& m);
-Json to_value(const std::optional<BodyId>& id);
-Json to_value(const Attachment& attachment);
-Json to_value(const HalfSpace& half_space);
+/// @throws InvalidArgument if a number is not finite
+void require_finite(const Json& json);
+
+/// The argument of a call. World::add() refuses a body with a number that is not finite.
+/// @throws InvalidArgument for another argument with such a number
+template <class T>
+Json argument(const T& value) {
+  Json json = to_value(value);
+  if constexpr (!std::same_as<T, BodyDef>) require_finite(json);
+  return json;
+}
 
 /// A call of the function `name`.
 template <class... Arguments>
 Json make_call(const char* name, const Arguments&... arguments) {
-  return Json::array({name, to_value(arguments)...});
+  return Json::array({name, argument(arguments)...});
 }
 /// Makes a call on a world.
 /// @throws nlohmann::json::exception or InvalidScene for a value that is not a call, and the

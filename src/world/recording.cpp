@@ -37,17 +37,12 @@ constexpr std::uint64_t kMaxEmptyFrames = 10'000'000;
 
 static_assert(sizeof(BodyState) == kRealsPerBody * sizeof(Real), "a state has no padding");
 
-struct Field {
-  const char* name;
-  std::size_t index;
-};
-constexpr Field kFields[kRealsPerBody] = {
-    {"position.x", 0},          {"position.y", 1},          {"position.z", 2},
-    {"orientation.w", 3},       {"orientation.x", 4},       {"orientation.y", 5},
-    {"orientation.z", 6},       {"velocity.x", 7},          {"velocity.y", 8},
-    {"velocity.z", 9},          {"angular_velocity.x", 10}, {"angular_velocity.y", 11},
-    {"angular_velocity.z", 12},
-};
+/// Names of the numbers of a BodyState.
+constexpr const char* kNames[kRealsPerBody] = {
+    "position.x",        "position.y",    "position.z",         "orientation.w",
+    "orientation.x",     "orientation.y", "orientation.z",      "velocity.x",
+    "velocity.y",        "velocity.z",    "angular_velocity.x", "angular_velocity.y",
+    "angular_velocity.z"};
 
 struct Prefix {
   std::array<char, 8> magic = kMagic;
@@ -320,11 +315,10 @@ std::optional<StateDifference> first_difference(std::span<const BodyState> expec
     Real e[kRealsPerBody], a[kRealsPerBody];
     std::memcpy(e, &expected[body], sizeof e);
     std::memcpy(a, &actual[body], sizeof a);
-    for (const Field& field : kFields) {
+    for (std::size_t k = 0; k < kRealsPerBody; ++k) {
       // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): compares bits on purpose
-      if (std::memcmp(&e[field.index], &a[field.index], sizeof(Real)) != 0) {
-        return StateDifference{static_cast<std::uint32_t>(body), field.name, e[field.index],
-                               a[field.index]};
+      if (std::memcmp(&e[k], &a[k], sizeof(Real)) != 0) {
+        return StateDifference{static_cast<std::uint32_t>(body), kNames[k], e[k], a[k]};
       }
     }
   }

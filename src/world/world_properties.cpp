@@ -49,7 +49,7 @@ Real World::friction(BodyId id) const { return impl_->store.friction(impl_->stor
 
 void World::set_friction(BodyId id, Real friction) {
   const std::uint32_t body = impl_->store.require(id);
-  require_valid(find_friction_fault(friction));
+  require_valid(find_range_fault(&BodyDef::friction, friction));
   if (impl_->store.friction(body) == friction) return;
   impl_->edited_body_in_lists(body, {}).set_friction(body, friction);
   impl_->wake_with_neighbors(id);
@@ -61,7 +61,7 @@ Real World::restitution(BodyId id) const {
 
 void World::set_restitution(BodyId id, Real restitution) {
   const std::uint32_t body = impl_->store.require(id);
-  require_valid(find_restitution_fault(restitution));
+  require_valid(find_range_fault(&BodyDef::restitution, restitution));
   impl_->edited_body_in_lists(body, {}).set_restitution(body, restitution);
 }
 
@@ -71,7 +71,7 @@ Vec3 World::acceleration(BodyId id) const {
 
 void World::set_acceleration(BodyId id, const Vec3& acceleration) {
   const std::uint32_t body = impl_->store.require(id);
-  require_valid(find_acceleration_fault(acceleration));
+  require_valid(find_range_fault(&BodyDef::acceleration, acceleration));
   if (impl_->store.acceleration(body) == acceleration) return;
   impl_->edited_body(body, {.wakes = true}).set_acceleration(body, acceleration);
   impl_->store.wake(body);
@@ -87,7 +87,8 @@ Real World::angular_damping(BodyId id) const {
 
 void World::set_damping(BodyId id, Real linear, Real angular) {
   const std::uint32_t body = impl_->store.require(id);
-  require_valid(find_damping_fault(linear, angular));
+  require_valid(find_range_fault(&BodyDef::linear_damping, linear));
+  require_valid(find_range_fault(&BodyDef::angular_damping, angular));
   impl_->edited_body(body, {}).set_damping(body, linear, angular);
 }
 

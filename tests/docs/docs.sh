@@ -58,11 +58,14 @@ for document in README.md docs/*.md; do
 done
 [ "$snippets" -gt 5 ] || complain "only $snippets snippets were found"
 
-# Fields of a scene, as the reader asks for them.
+# Fields of a scene.
+fields=0
 while read -r field; do
+  fields=$((fields + 1))
   grep -qE "\`([a-z_]+\.)?$field\`" docs/scenes.md || complain "docs/scenes.md: no field $field"
-done < <(sed '/RecordingHeader recording_header_from_json/,$d' src/scene/scene_json.cpp |
-  grep -oE '(required|optional|at)\("[a-z_]+"' | cut -d'"' -f2 | sort -u)
+done < <(sed '/RecordingHeader recording_header_from_json/,$d' src/scene/{scene,shape}_fields.hpp src/scene/scene_json.cpp |
+  grep -oE '(field|find|required|at)\("[a-z_]+"' | cut -d'"' -f2 | sort -u)
+[ "$fields" -gt 45 ] || complain "only $fields fields of scenes were found"
 
 # Lists like "1, 4-7", one number a line.
 expand() {

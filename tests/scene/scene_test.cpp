@@ -266,6 +266,43 @@ TEST(SceneJson, NewerFieldsAreWrittenOnlyIfTheyAreNotTheDefault) {
   EXPECT_EQ(from_json(text), scene);
 }
 
+TEST(SceneJson, TheOrderOfFieldsIsFixed) {
+  Scene scene;
+  scene.dt = Real(0.5);
+  BodyDef& body = scene.bodies.emplace_back();
+  body.shape = Compound{{CompoundPart{.shape = Box{{1, 2, 3}}}}};
+  body.inertia = Mat3{};
+  body.filter.mask = 6;
+  body.sensor = true;
+  body.rolling_friction = body.spinning_friction = Real(0.5);
+  body.acceleration = {};
+  body.user_data = 7;
+  EXPECT_EQ(to_json(scene), R"({"jfpx_scene": 2,
+ "name": "unnamed",
+ "dt": 0.5,
+ "solver": "soft_step",
+ "soft_step": {"substeps":4,"contact_hertz":0.0,"damping_ratio":1.0,"push_out_speed":3.0,)"
+                            R"("restitution_threshold":0.25,"speculative_margin":0.02},
+ "resolver": {"max_iterations":0,"velocity_epsilon":0.01,"position_epsilon":0.01,)"
+                            R"("restitution_velocity":0.25,"angular_limit":0.2},
+ "sleep": {"enabled":true,"speed":0.05,"time":0.5,"epsilon":0.3,"bias":0.05},
+ "materials": {"friction":"geometric_mean","restitution":"geometric_mean"},
+ "bodies": [
+  {"shape":{"type":"compound","parts":[{"shape":{"type":"box","half_extents":[1.0,2.0,3.0]},)"
+                            R"("position":[0.0,0.0,0.0],"orientation":[1.0,0.0,0.0,0.0],)"
+                            R"("density":1.0}]},"mass":1.0,"kinematic":false,)"
+                            R"("position":[0.0,0.0,0.0],"orientation":[1.0,0.0,0.0,0.0],)"
+                            R"("velocity":[0.0,0.0,0.0],"angular_velocity":[0.0,0.0,0.0],)"
+                            R"("acceleration":[0.0,0.0,0.0],"linear_damping":1.0,)"
+                            R"("angular_damping":1.0,"friction":0.5,"restitution":0.0,)"
+                            R"("can_sleep":true,)"
+                            R"("inertia":[[1.0,0.0,0.0],[0.0,1.0,0.0],[0.0,0.0,1.0]],)"
+                            R"("filter":{"category":1,"mask":6},"rolling_friction":0.5,)"
+                            R"("spinning_friction":0.5,"sensor":true,"user_data":7}
+]}
+)");
+}
+
 TEST(SceneJson, ErrorsOfNewerFieldsNameFieldValueAndRange) {
   EXPECT_EQ(complaint(with_body("\"user_data\": -1")),
             "body 0.user_data: is -1; it must be a whole number from 0 to 2^64 - 1");

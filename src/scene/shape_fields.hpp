@@ -1,0 +1,42 @@
+/// Fields of shapes; see field.hpp.
+#pragma once
+
+#include <jfpx/shape.hpp>
+
+#include "src/scene/field.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+void each_field(Is<Sphere> auto& sphere, const auto& visit) {
+  auto& [radius] = sphere;
+  visit(required_field("radius", kSize), radius);
+}
+void each_field(Is<Box> auto& box, const auto& visit) {
+  auto& [half_extents] = box;
+  visit(required_field("half_extents", kSizes), half_extents);
+}
+void each_field(Is<HalfSpace> auto& half_space, const auto& visit) {
+  auto& [normal, offset] = half_space;
+  visit(required_field("normal", kUnitVector), normal);
+  visit(required_field("offset", kInWorld), offset);
+}
+void each_field(Is<Plane> auto& plane, const auto& visit) {
+  auto& [normal, offset] = plane;
+  visit(required_field("normal", kUnitVector), normal);
+  visit(required_field("offset", kInWorld), offset);
+}
+void each_field(Is<CompoundPart> auto& part, const auto& visit) {
+  auto& [shape, position, orientation, density] = part;
+  visit(required_field("shape"), shape);
+  visit(field("position", kInWorld), position);
+  visit(field("orientation", kUnitQuaternion), orientation);
+  visit(field("density", kSize), density);
+}
+void each_field(Is<Compound> auto& compound, const auto& visit) {
+  auto& [parts] = compound;
+  visit(required_field("parts", NotEmpty{"at least one sphere or box"}), parts);
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
