@@ -27,7 +27,7 @@ void find_fault_of(const Field& field, const T& member, std::string* found) {
   using Range = typename Field::Range;
   if constexpr (HasFields<T> && std::same_as<Range, AnyValue>) {
     find_field_fault(member, found);
-    if (!found->empty()) found->insert(0, std::string(field.name) + ".");
+    if (!found->empty()) *found = std::string(field.name) + "." + *found;
   } else if constexpr (!std::same_as<Range, AnyValue> && !std::same_as<Range, CheckedByCode>) {
     if (!field.range.contains(member)) *found = fault(field.name, member, field.range.text);
   }
@@ -51,7 +51,7 @@ void find_fault_of(const Field<kPresence, NotEmpty>& field, const std::vector<T>
   }
   for (std::size_t i = 0; i < members.size() && found->empty(); ++i) {
     find_field_fault(members[i], found);
-    if (!found->empty()) found->insert(0, field.name + ("[" + std::to_string(i) + "]."));
+    if (!found->empty()) *found = std::string(field.name) + "[" + std::to_string(i) + "]." + *found;
   }
 }
 

@@ -1,6 +1,7 @@
 /// Values of public types as JSON, which preserves every bit.
 #pragma once
 
+#include "src/collide/shapes.hpp"
 #include "src/scene/scene_fields.hpp"
 #include "src/scene/scene_json_value.hpp"
 
@@ -68,7 +69,7 @@ template <class... Shapes>
 detail::SceneJson to_value(const std::variant<Shapes...>& shape) {
   return std::visit(
       []<class T>(const T& value) {
-        detail::SceneJson json = {{"type", detail::kTypeName<T>}};
+        detail::SceneJson json = {{"type", detail::kShapeName<T>}};
         add_fields(&json, value);
         return json;
       },

@@ -5,6 +5,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/file.hpp"
+#include "src/collide/shapes.hpp"
 #include "src/scene/scene_fields.hpp"
 #include "src/scene/scene_json_value.hpp"
 
@@ -21,7 +22,7 @@ inline namespace JFPX_ABI {
 namespace {
 
 using Json = detail::SceneJson;
-using detail::kTypeName;
+using detail::kShapeName;
 
 [[noreturn]] void fail(const std::string& where, const std::string& what) {
   throw InvalidScene(where + ": " + what);
@@ -164,7 +165,7 @@ void read(const Json& json, const std::string& where, T& object) {
 /// True if `type` is the name of shape T. Version 0.1 named a compound "assembly".
 template <class T>
 bool is_name_of(const std::string& type) {
-  return type == kTypeName<T> || (std::is_same_v<T, Compound> && type == "assembly");
+  return type == kShapeName<T> || (std::is_same_v<T, Compound> && type == "assembly");
 }
 
 /// Reads the shape that the field "type" names.
@@ -187,7 +188,7 @@ void read(const Json& json, const std::string& where, std::variant<Shapes...>& s
       names += name;
       --left;
     };
-    (list(kTypeName<Shapes>), ...);
+    (list(kShapeName<Shapes>), ...);
     fail(object.path("type"), "is \"" + type + "\"; it must be " + names);
   }
   object.reject_unknown();

@@ -1,4 +1,4 @@
-/// JSON values of scenes, and the names of shapes in them.
+/// JSON values of scenes.
 #pragma once
 
 #include <jfpx/body.hpp>
@@ -18,20 +18,6 @@ namespace detail {
 /// bits is written in either precision.
 using SceneJson = nlohmann::basic_json<nlohmann::ordered_map, std::vector, std::string, bool,
                                        std::int64_t, std::uint64_t, Real>;
-
-/// Name of a shape in the field "type".
-template <class T>
-inline constexpr const char* kTypeName = nullptr;
-template <>
-inline constexpr const char* kTypeName<Sphere> = "sphere";
-template <>
-inline constexpr const char* kTypeName<Box> = "box";
-template <>
-inline constexpr const char* kTypeName<HalfSpace> = "half_space";
-template <>
-inline constexpr const char* kTypeName<Plane> = "plane";
-template <>
-inline constexpr const char* kTypeName<Compound> = "compound";
 
 }  // namespace detail
 
