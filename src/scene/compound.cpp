@@ -46,10 +46,5 @@ Compound centred(Compound compound) {
   return compound;
 }
 
-Real outer_radius(const CompoundPart& part) {
-  const auto radius = [](const auto& solid) { return detail::outer_radius(solid); };
-  return length(part.position) + std::visit(radius, part.shape);
-}
-
 }  // namespace JFPX_ABI
 }  // namespace jfpx

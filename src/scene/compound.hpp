@@ -1,7 +1,9 @@
-/// Mass properties of compounds.
+/// Mass properties and extents of bodies.
 #pragma once
 
-#include <jfpx/shape.hpp>
+#include "src/collide/shapes.hpp"
+
+#include <algorithm>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -16,9 +18,42 @@ struct MassProperties {
 /// @param mass [kg], total mass of the compound
 JFPX_API MassProperties mass_properties(const Compound& compound, Real mass);
 
-/// [m], radius of the smallest sphere about the origin that encloses a sphere around the part's
-/// centre that encloses the part, without a margin for rounding errors.
-Real outer_radius(const CompoundPart& part);
+/// [m], radius of a sphere about the origin that encloses the part, without a margin for rounding
+/// errors.
+inline Real outer_radius(const CompoundPart& part) {
+  const auto radius = [](const auto& solid) { return detail::outer_radius(solid); };
+  return length(part.position) + std::visit(radius, part.shape);
+}
+/// The same for all solids of a body; 0 for half-spaces and planes.
+inline Real outer_radius(const Shape& shape) {
+  Real radius = 0;
+  detail::for_each_part(shape, [&](const auto& s, const CompoundPart* part, std::uint32_t) {
+    if constexpr (detail::kIsSolid<std::decay_t<decltype(s)>>) {
+      radius = std::max(radius, part != nullptr ? outer_radius(*part) : detail::outer_radius(s));
+    }
+  });
+  return radius;
+}
+
+/// Whether the shape is a half-space or a plane, which is infinite and follows no pose.
+inline bool is_wall(const Shape& shape) {
+  return std::holds_alternative<HalfSpace>(shape) || std::holds_alternative<Plane>(shape);
+}
+
+/// [kg m^2], inertia tensor of a solid body; zero for half-spaces and planes.
+inline Mat3 solid_inertia(const Shape& shape, Real mass) {
+  const auto tensor = [mass](const auto& s) -> Mat3 {
+    using S = std::decay_t<decltype(s)>;
+    if constexpr (std::is_same_v<S, Compound>) {
+      return mass_properties(s, mass).inertia;
+    } else if constexpr (detail::kIsSolid<S>) {
+      return diagonal(detail::moments_of_inertia(s, mass));
+    } else {
+      return diagonal({});
+    }
+  };
+  return std::visit(tensor, shape);
+}
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -3,7 +3,6 @@
 
 #include <jfpx/error.hpp>
 
-#include "src/collide/shapes.hpp"
 #include "src/scene/compound.hpp"
 #include "src/scene/field_fault.hpp"
 #include "src/scene/inertia.hpp"
@@ -41,25 +40,24 @@ std::string find_moments_fault(const Vec3& moments) {
   return fault("moments of inertia", moments, "such that they and their inverses are finite");
 }
 
-std::string find_solid_fault(const Sphere& sphere, Real mass) {
-  const Real inertia = detail::moments_of_inertia(sphere, mass).x;
-  if (has_inverse(inertia)) return {};
-  return fault("moment of inertia", inertia, "such that it and its inverse are finite");
+template <class S>
+std::string find_solid_fault(const S& solid, Real mass) {
+  if constexpr (std::is_same_v<S, Sphere>) {
+    const Real inertia = detail::moments_of_inertia(solid, mass).x;
+    if (has_inverse(inertia)) return {};
+    return fault("moment of inertia", inertia, "such that it and its inverse are finite");
+  } else if constexpr (std::is_same_v<S, Compound>) {
+    return find_moments_fault(principal_inertia(mass_properties(solid, mass).inertia).moments);
+  } else if constexpr (detail::kIsSolid<S>) {
+    return find_moments_fault(detail::moments_of_inertia(solid, mass));
+  } else {
+    return {};
+  }
 }
-std::string find_solid_fault(const Box& box, Real mass) {
-  return find_moments_fault(detail::moments_of_inertia(box, mass));
-}
-std::string find_solid_fault(const Compound& compound, Real mass) {
-  return find_moments_fault(principal_inertia(mass_properties(compound, mass).inertia).moments);
-}
-std::string find_solid_fault(const HalfSpace&, Real) { return {}; }
-std::string find_solid_fault(const Plane&, Real) { return {}; }
 
 std::string find_centre_fault(const Compound& compound, Real mass) {
   const Vec3 centre = mass_properties(compound, mass).centre;
-  Real radius = 0;
-  for (const CompoundPart& part : compound.parts) radius = std::max(radius, outer_radius(part));
-  if (length(centre) <= radius * kUnitTolerance) return {};
+  if (length(centre) <= outer_radius(compound) * kUnitTolerance) return {};
   return fault("centre of mass of parts", centre,
                "the origin, to a thousandth of the body's radius; centred() moves it there");
 }

@@ -35,7 +35,7 @@ void each_field(Is<CompoundPart> auto& part, const auto& visit) {
 }
 void each_field(Is<Compound> auto& compound, const auto& visit) {
   auto& [parts] = compound;
-  visit(required_field("parts", NotEmpty{"at least one sphere or box"}), parts);
+  visit(required_field("parts", NotEmpty{"at least one solid"}), parts);
 }
 
 }  // namespace JFPX_ABI

@@ -1,6 +1,7 @@
 /// Bounding sphere of the bodies of a scene, without outliers.
 #include "src/viewer/bounds.hpp"
 
+#include "src/scene/compound.hpp"
 #include "src/viewer/shapes.hpp"
 
 #include <algorithm>
@@ -34,7 +35,7 @@ BoundsEstimator::BoundsEstimator(const Scene& scene) {
   for (const bool wanted : {true, false}) {
     for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
       const BodyDef& body = scene.bodies[i];
-      if ((body.mass > 0) != wanted || is_endless(body.shape)) continue;
+      if ((body.mass > 0) != wanted || is_wall(body.shape)) continue;
       largest_ = std::max(largest_, size_of(body.shape));
       if (i % stride == 0) bodies_.push_back(static_cast<std::uint32_t>(i));
     }

@@ -1,6 +1,8 @@
 /// Differences between runs: contacts bit by bit, drift and energy.
 #include "src/viewer/comparison.hpp"
 
+#include "src/scene/compound.hpp"
+
 #include <algorithm>
 #include <cstring>
 
@@ -34,45 +36,8 @@ std::vector<Bits> sorted(std::span<const Contact> contacts) {
   return bits;
 }
 
-Real volume_of(const Sphere& sphere) {
-  return Real(4) / 3 * kPi * sphere.radius * sphere.radius * sphere.radius;
-}
-Real volume_of(const Box& box) {
-  return 8 * box.half_extents.x * box.half_extents.y * box.half_extents.z;
-}
-
-Mat3 inertia_of(const Sphere& sphere, Real mass) {
-  const Real i = Real(0.4) * mass * sphere.radius * sphere.radius;
-  return diagonal({i, i, i});
-}
-Mat3 inertia_of(const Box& box, Real mass) {
-  const Vec3 squares = component_product(box.half_extents, box.half_extents);
-  const Real k = mass / 3;
-  return diagonal(
-      {k * (squares.y + squares.z), k * (squares.x + squares.z), k * (squares.x + squares.y)});
-}
-Mat3 inertia_of(const Compound& compound, Real mass) {
-  const auto weight = [](const CompoundPart& part) {
-    return part.density * std::visit([](const auto& s) { return volume_of(s); }, part.shape);
-  };
-  Real whole = 0;
-  for (const CompoundPart& part : compound.parts) whole += weight(part);
-  Mat3 sum = diagonal({});
-  for (const CompoundPart& part : compound.parts) {
-    const Real m = mass * weight(part) / whole;
-    const Mat3 own = std::visit([m](const auto& s) { return inertia_of(s, m); }, part.shape);
-    const Mat3 turn = to_matrix(part.orientation), arm = skew_symmetric(part.position);
-    sum = sum + turn * own * transposed(turn) + arm * transposed(arm) * m;  // parallel axis theorem
-  }
-  return sum;
-}
-Mat3 inertia_of(const HalfSpace&, Real) { return diagonal({}); }
-Mat3 inertia_of(const Plane&, Real) { return diagonal({}); }
-
 Mat3 inertia_of(const BodyDef& body) {
-  if (body.inertia) return *body.inertia;
-  return std::visit([&body](const auto& shape) { return inertia_of(shape, body.mass); },
-                    body.shape);
+  return body.inertia ? *body.inertia : solid_inertia(body.shape, body.mass);
 }
 
 }  // namespace

@@ -77,11 +77,10 @@ void draw_demo(const demos::View& from, const demos::View& to, Real share, Drawi
     const demos::Item& old = interpolates ? from.items[i] : item;
     const Vec3 position = interpolate(old.position, item.position, share);
     const Quat turn = interpolate(old.orientation, item.orientation, share);
-    if (const Sphere* sphere = std::get_if<Sphere>(&item.shape)) {
-      drawing->add_sphere(position, sphere->radius, turn, paint_of(item.colour, true));
-    } else if (const Box* box = std::get_if<Box>(&item.shape)) {
-      drawing->add_box(position, box->half_extents, turn, paint_of(item.colour, false));
-    }
+    for_each_solid(item.shape, {position, turn, {}, {}}, [&](const auto& solid, const BodyState&) {
+      const bool is_ball = std::is_same_v<std::decay_t<decltype(solid)>, Sphere>;
+      drawing->add_solid(solid, position, turn, paint_of(item.colour, is_ball));
+    });
   }
   for (const demos::Line& line : to.lines) {
     if (line.from.y == 0 && line.to.y == 0) continue;  // the ground is drawn with a grid

@@ -38,6 +38,7 @@ float Drawing::nearest_box() const {
   for (const auto* items : {&boxes_, &glass_}) {
     for (const BoxItem& item : *items) nearest = std::min(nearest, distance_to(item));
   }
+  for (const RoundedItem& item : rounded_) nearest = std::min(nearest, distance_to(item.box));
   return nearest;
 }
 
@@ -45,12 +46,25 @@ void Drawing::add_sphere(const Vec3& centre, Real radius, const Quat& turn, Pain
   spheres_.push_back(make_sphere_item(centre - eye_, radius, turn, paint));
 }
 
-void Drawing::add_box(const Vec3& centre, const Vec3& half_extents, const Quat& turn, Paint paint) {
-  BoxItem& item = (paint.pattern == Pattern::glass ? glass_ : boxes_).emplace_back();
+BoxItem Drawing::box_item(const Vec3& centre, const Vec3& half_extents, const Quat& turn,
+                          Paint paint) const {
+  BoxItem item;
   put(item.centre, centre - eye_);
   put(item.half_extents, half_extents);
   put(item.turn, turn);
   item.paint = paint;
+  return item;
+}
+
+void Drawing::add_box(const Vec3& centre, const Vec3& half_extents, const Quat& turn, Paint paint) {
+  auto& items = paint.pattern == Pattern::glass ? glass_ : boxes_;
+  items.push_back(box_item(centre, half_extents, turn, paint));
+}
+
+void Drawing::add_rounded(const Vec3& centre, const Vec3& half_extents, Real radius,
+                          const Quat& turn, Paint paint) {
+  const Vec3 outer = half_extents + Vec3{radius, radius, radius};
+  rounded_.push_back({box_item(centre, outer, turn, paint), static_cast<float>(radius)});
 }
 
 void Drawing::add_line(const Vec3& from, const Vec3& to, Paint paint, float width,

@@ -1,7 +1,7 @@
 /// Content of a picture: lists of instances in the layout of the GPU buffers.
 #pragma once
 
-#include <jfpx/math.hpp>
+#include "src/collide/shapes.hpp"
 
 #include <cstdint>
 #include <vector>
@@ -50,6 +50,11 @@ struct BoxItem {
   float turn[4];
   Paint paint;
 };
+/// A rounded box; `half_extents` include the radius.
+struct RoundedItem {
+  BoxItem box;
+  float radius;
+};
 struct LineItem {
   float from[3], to[3];
   std::uint8_t rgba[4];
@@ -74,6 +79,21 @@ class Drawing {
   /// Reserves memory for `count` spheres.
   void reserve_spheres(std::size_t count) { spheres_.reserve(count); }
   void add_sphere(const Vec3& centre, Real radius, const Quat& turn, Paint paint);
+  /// Adds a box whose edges are rounded by `radius`: a capsule if only one half extent is not 0.
+  void add_rounded(const Vec3& centre, const Vec3& half_extents, Real radius, const Quat& turn,
+                   Paint paint);
+  /// Adds a solid of any kind.
+  template <class S>
+  void add_solid(const S& solid, const Vec3& centre, const Quat& turn, Paint paint) {
+    if constexpr (std::is_same_v<S, Sphere>) {
+      add_sphere(centre, solid.radius, turn, paint);
+    } else if constexpr (std::is_same_v<S, Box>) {
+      add_box(centre, solid.half_extents, turn, paint);
+    } else {
+      const jfpx::detail::Solid rounded = to_solid(solid);
+      add_rounded(centre, rounded.half_extents, rounded.radius, turn, paint);
+    }
+  }
   void add_box(const Vec3& centre, const Vec3& half_extents, const Quat& turn, Paint paint);
   void add_line(const Vec3& from, const Vec3& to, Paint paint, float width,
                 std::uint8_t alpha = 255);
@@ -90,7 +110,9 @@ class Drawing {
   const std::vector<SphereItem>& spheres() const { return spheres_; }
   const std::vector<BoxItem>& boxes() const { return boxes_; }
   const std::vector<BoxItem>& glass() const { return glass_; }
-  /// Distance of the nearest box, including glass, from the eye [m]; infinite without boxes.
+  const std::vector<RoundedItem>& rounded() const { return rounded_; }
+  /// Distance of the nearest box, including glass and rounded boxes, from the eye [m]; infinite
+  /// without boxes.
   float nearest_box() const;
   const std::vector<LineItem>& lines() const { return lines_; }
   const std::vector<GroundItem>& grounds() const { return grounds_; }
@@ -100,9 +122,13 @@ class Drawing {
   float detail() const { return detail_; }
 
  private:
+  BoxItem box_item(const Vec3& centre, const Vec3& half_extents, const Quat& turn,
+                   Paint paint) const;
+
   Vec3 eye_;
   std::vector<SphereItem> spheres_;
   std::vector<BoxItem> boxes_, glass_;
+  std::vector<RoundedItem> rounded_;
   std::vector<LineItem> lines_;
   std::vector<GroundItem> grounds_;
   ResidentSpheres* resident_ = nullptr;

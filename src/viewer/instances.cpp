@@ -16,6 +16,11 @@ constexpr Field kBoxFields[] = {{3, GL_FLOAT, offsetof(BoxItem, centre)},
                                 {3, GL_FLOAT, offsetof(BoxItem, half_extents)},
                                 {4, GL_FLOAT, offsetof(BoxItem, turn)},
                                 {4, GL_UNSIGNED_BYTE, offsetof(BoxItem, paint)}};
+constexpr Field kRoundedFields[] = {{3, GL_FLOAT, offsetof(RoundedItem, box.centre)},
+                                    {3, GL_FLOAT, offsetof(RoundedItem, box.half_extents)},
+                                    {4, GL_FLOAT, offsetof(RoundedItem, box.turn)},
+                                    {4, GL_UNSIGNED_BYTE, offsetof(RoundedItem, box.paint)},
+                                    {1, GL_FLOAT, offsetof(RoundedItem, radius)}};
 constexpr Field kLineFields[] = {{3, GL_FLOAT, offsetof(LineItem, from)},
                                  {3, GL_FLOAT, offsetof(LineItem, to)},
                                  {4, GL_UNSIGNED_BYTE, offsetof(LineItem, rgba)},
@@ -64,6 +69,8 @@ void Instances::draw(std::size_t items) const {
 SphereInstances::SphereInstances()
     : Instances(kSphereFields, sizeof(SphereItem), GL_TRIANGLE_STRIP, 4) {}
 BoxInstances::BoxInstances() : Instances(kBoxFields, sizeof(BoxItem), GL_TRIANGLES, 36) {}
+RoundedInstances::RoundedInstances()
+    : Instances(kRoundedFields, sizeof(RoundedItem), GL_TRIANGLES, 36) {}
 LineInstances::LineInstances() : Instances(kLineFields, sizeof(LineItem), GL_TRIANGLE_STRIP, 4) {}
 
 }  // namespace view

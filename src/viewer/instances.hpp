@@ -47,6 +47,11 @@ class BoxInstances : public Instances {
   BoxInstances();
   void upload(const std::vector<BoxItem>& items) { upload_bytes(items.data(), items.size()); }
 };
+class RoundedInstances : public Instances {
+ public:
+  RoundedInstances();
+  void upload(const std::vector<RoundedItem>& items) { upload_bytes(items.data(), items.size()); }
+};
 class LineInstances : public Instances {
  public:
   LineInstances();

@@ -104,6 +104,10 @@ struct Renderer::Impl {
   GlProgram box[kPasses] = {pass_program(shaders::box_vert, shaders::box_frag, kShadowPass),
                             pass_program(shaders::box_vert, shaders::box_frag, kGeometryPass),
                             pass_program(shaders::box_vert, shaders::box_frag, kColourPass)};
+  GlProgram rounded[kPasses] = {
+      pass_program(shaders::rounded_vert, shaders::rounded_frag, kShadowPass),
+      pass_program(shaders::rounded_vert, shaders::rounded_frag, kGeometryPass),
+      pass_program(shaders::rounded_vert, shaders::rounded_frag, kColourPass)};
   GlProgram ground_geometry =
       pass_program(shaders::screen_vert, shaders::ground_frag, kGeometryPass);
   GlProgram ground_colour = pass_program(shaders::screen_vert, shaders::ground_frag, kColourPass);
@@ -118,6 +122,7 @@ struct Renderer::Impl {
   SphereInstances spheres, resident_spheres;
   std::unique_ptr<SharedBuffer> resident_buffer;  ///< that of resident_spheres
   BoxInstances boxes, glass;
+  RoundedInstances rounded_boxes;
   LineInstances lines;
   std::optional<Targets> targets;
   std::optional<ShadowMap> shadow_map;
@@ -152,6 +157,7 @@ struct Renderer::Impl {
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame.name());
     boxes.upload(drawing.boxes());
     glass.upload(drawing.glass());
+    rounded_boxes.upload(drawing.rounded());
     lines.upload(drawing.lines());
     write_resident(drawing.resident(), drawing.eye());
   }
@@ -169,6 +175,8 @@ struct Renderer::Impl {
   void draw_bodies(Pass pass) {
     box[pass].use();
     boxes.draw();
+    rounded[pass].use();
+    rounded_boxes.draw();
     sphere[pass].use();
     const bool smooth = pass == kColourPass && quality.samples > 1;
     if (smooth) glEnable(GL_SAMPLE_ALPHA_TO_COVERAGE);

@@ -1,6 +1,7 @@
 /// Drawing and picking of the bodies of a scene.
 #include "src/viewer/scene_painter.hpp"
 
+#include "src/scene/compound.hpp"
 #include "src/viewer/colours.hpp"
 #include "src/viewer/forces.hpp"
 #include "src/viewer/shapes.hpp"
@@ -100,7 +101,7 @@ void ScenePainter::find_room() {
     const BodyDef& body = scene_.bodies[i];
     if (movable(body) || appearances_[i].kind == Appearance::Kind::hidden) continue;
     obstacles_.push_back(i);
-    if (!is_endless(body.shape)) lowest_ = std::min(lowest_, body.position.y - size_of(body.shape));
+    if (!is_wall(body.shape)) lowest_ = std::min(lowest_, body.position.y - size_of(body.shape));
   }
 }
 
@@ -197,16 +198,9 @@ void ScenePainter::draw_immovable(const Bounds& bounds, Drawing* drawing) const 
 
 void ScenePainter::draw_shape(const Shape& shape, const BodyState& at, Paint paint,
                               Drawing* drawing) const {
-  if (const Sphere* sphere = std::get_if<Sphere>(&shape)) {
-    drawing->add_sphere(at.position, sphere->radius, at.orientation, paint);
-  } else if (const Box* box = std::get_if<Box>(&shape)) {
-    drawing->add_box(at.position, box->half_extents, at.orientation, paint);
-  } else if (const Compound* compound = std::get_if<Compound>(&shape)) {
-    for (const CompoundPart& part : compound->parts) {
-      draw_shape(std::visit([](const auto& s) { return Shape(s); }, part.shape), placed(part, at),
-                 paint, drawing);
-    }
-  }
+  for_each_solid(shape, at, [&](const auto& solid, const BodyState& state) {
+    drawing->add_solid(solid, state.position, state.orientation, paint);
+  });
 }
 
 void ScenePainter::draw_contacts(const std::vector<Contact>& contacts, bool red,

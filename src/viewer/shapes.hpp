@@ -1,7 +1,9 @@
-/// Extents of shapes, and intersections of rays with them.
+/// Solids and extents of bodies, and intersections of rays with them.
 #pragma once
 
 #include <jfpx/scene.hpp>
+
+#include "src/collide/shapes.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -17,8 +19,16 @@ Real ray_distance(const Shape& shape, const BodyState& state, const Vec3& from,
 Real size_of(const Shape& shape);
 /// The state of a part of a compound body, at rest.
 BodyState placed(const CompoundPart& part, const BodyState& body);
-/// True for half-spaces and planes, whose extent is infinite.
-bool is_endless(const Shape& shape);
+/// Calls visit(solid, state) for the solids of a body: its shape, or the parts of a compound.
+template <class Visit>
+void for_each_solid(const Shape& shape, const BodyState& state, const Visit& visit) {
+  jfpx::detail::for_each_part(
+      shape, [&](const auto& solid, const CompoundPart* part, std::uint32_t) {
+        if constexpr (jfpx::detail::kIsSolid<std::decay_t<decltype(solid)>>) {
+          visit(solid, part != nullptr ? placed(*part, state) : state);
+        }
+      });
+}
 
 }  // namespace view
 }  // namespace JFPX_ABI

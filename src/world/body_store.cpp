@@ -5,7 +5,6 @@
 
 #include "src/base/power.hpp"
 #include "src/base/reserve.hpp"
-#include "src/collide/shapes.hpp"
 #include "src/scene/compound.hpp"
 #include "src/scene/inertia.hpp"
 #include "src/scene/inertia_tensor.hpp"
@@ -24,21 +23,6 @@ Real kept_per_step(Real kept_per_second, Real dt) {
   return static_cast<Real>(detail::power(kept_per_second, dt));
 }
 
-/// Inertia tensor of a solid body; `shape` must be one of a movable body.
-Mat3 tensor_of(const Shape& shape, Real mass) {
-  const auto tensor = [mass](const auto& s) -> Mat3 {
-    using S = std::decay_t<decltype(s)>;
-    if constexpr (std::is_same_v<S, Compound>) {
-      return mass_properties(s, mass).inertia;
-    } else if constexpr (detail::kIsSolid<S>) {
-      return diagonal(detail::moments_of_inertia(s, mass));
-    } else {
-      return {};
-    }
-  };
-  return std::visit(tensor, shape);
-}
-
 /// The shape with normals and quaternions scaled to unit length; validation tolerates deviations up
 /// to kUnitTolerance.
 Shape normalized(Shape shape) {
@@ -53,19 +37,6 @@ Shape normalized(Shape shape) {
     for (CompoundPart& part : compound->parts) part.orientation = normalized(part.orientation);
   }
   return shape;
-}
-
-/// Radius of a sphere about the origin of the body's axes that encloses the shape.
-Real extent_of(const Shape& shape) {
-  Real extent = 0;
-  detail::for_each_part(shape, [&](const auto& s, const CompoundPart* part, std::uint32_t) {
-    if constexpr (detail::kIsSolid<std::decay_t<decltype(s)>>) {
-      extent = std::max(extent, part != nullptr ? outer_radius(*part) : detail::outer_radius(s));
-    } else {
-      extent = std::numeric_limits<Real>::infinity();
-    }
-  });
-  return extent;
 }
 
 }  // namespace
@@ -110,7 +81,7 @@ void BodyStore::set_shape(std::uint32_t i, Shape shape) noexcept {
   shape_[i] = std::move(shape);
   const auto* sphere = std::get_if<Sphere>(&shape_[i]);
   radius_[i] = sphere != nullptr ? sphere->radius : Real(0);
-  extent_[i] = extent_of(shape_[i]);
+  extent_[i] = is_wall(shape_[i]) ? std::numeric_limits<Real>::infinity() : outer_radius(shape_[i]);
 }
 
 void BodyStore::count_body(std::uint32_t i) noexcept {
@@ -186,7 +157,7 @@ void BodyStore::set_mass(std::uint32_t i, Real mass) {
 
 Mat3 BodyStore::inertia(std::uint32_t i) const {
   if (!movable(i)) return diagonal({0, 0, 0});
-  return inertia_given(i) ? given_inertia_.at(i) : tensor_of(shape_[i], mass_[i]);
+  return inertia_given(i) ? given_inertia_.at(i) : solid_inertia(shape_[i], mass_[i]);
 }
 
 bool BodyStore::needs_inertia_arrays(const Shape& shape, Real mass, bool kinematic,

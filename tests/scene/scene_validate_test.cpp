@@ -319,7 +319,7 @@ TEST(Validate, MassesWithoutFiniteInertiaAreRefused) {
 TEST(Validate, ACompoundNeedsPartsAroundItsCentreOfMass) {
   Scene scene = valid_scene();
   scene.bodies[5].shape = Compound{};
-  EXPECT_EQ(message(scene), "body 5: parts is empty; it must have at least one sphere or box");
+  EXPECT_EQ(message(scene), "body 5: parts is empty; it must have at least one solid");
   scene = valid_scene();
   auto& compound = std::get<Compound>(scene.bodies[5].shape);
   for (CompoundPart& part : compound.parts) part.position.y += 0.5_r;

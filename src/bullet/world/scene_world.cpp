@@ -44,6 +44,12 @@ btTransform principal_axes(const PrincipalInertia& inertia) {
       btMatrix3x3(m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2)));
 }
 
+// The shape of Bullet for each kind of solid.
+btCollisionShape* bullet_shape(const Sphere& sphere) { return new btSphereShape(sphere.radius); }
+btCollisionShape* bullet_shape(const Box& box) {
+  return new btBoxShape(to_bullet(box.half_extents));
+}
+
 /// Creates and owns shapes; if they are shared, equal shapes are created once.
 class ShapeStore {
  public:
@@ -51,36 +57,36 @@ class ShapeStore {
 
   /// @param axes of the Bullet body relative to the scene's; identity for all but compounds
   btCollisionShape* get(const Shape& shape, const btTransform& axes) {
-    if (const auto* compound = std::get_if<Compound>(&shape)) return make(*compound, axes);
-    if (const auto* plane = std::get_if<HalfSpace>(&shape)) return make(*plane);
-    if (const auto* box = std::get_if<Box>(&shape)) return make(*box);
-    return make(std::get<Sphere>(shape));
+    return std::visit([&](const auto& s) { return make(s, axes); }, shape);
   }
 
  private:
-  using Key = std::array<Real, 3>;
+  /// Kind of the shape, and its dimensions.
+  using Key = std::array<Real, 5>;
 
-  btCollisionShape* make(const Sphere& sphere) {
-    return get(Key{sphere.radius, 0, 0}, [&] { return new btSphereShape(sphere.radius); });
-  }
-  btCollisionShape* make(const Box& box) {
-    const Vec3& h = box.half_extents;
-    return get(Key{h.x, h.y, h.z}, [&] { return new btBoxShape(to_bullet(h)); });
-  }
-  btCollisionShape* make(const HalfSpace& plane) {
+  btCollisionShape* make(const HalfSpace& plane, const btTransform&) {
     shapes_.emplace_back(new btStaticPlaneShape(to_bullet(plane.normal), plane.offset));
     return shapes_.back().get();
   }
+  /// require_bullet() refuses planes.
+  btCollisionShape* make(const Plane&, const btTransform&) { return nullptr; }
 
   btCollisionShape* make(const Compound& compound, const btTransform& axes) {
     auto shape = std::make_unique<btCompoundShape>();
     for (const CompoundPart& part : compound.parts) {
       const btTransform place(to_bullet(normalized(part.orientation)), to_bullet(part.position));
-      btCollisionShape* child = std::visit([this](const auto& s) { return make(s); }, part.shape);
-      shape->addChildShape(axes.inverse() * place, child);
+      const auto child = [&](const auto& solid) { return make(solid, axes); };
+      shape->addChildShape(axes.inverse() * place, std::visit(child, part.shape));
     }
     shapes_.push_back(std::move(shape));
     return shapes_.back().get();
+  }
+
+  template <class S>
+  btCollisionShape* make(const S& solid, const btTransform&) {
+    const auto& [h, radius] = detail::to_solid(solid);
+    return get(Key{static_cast<Real>(detail::kSolidKind<S>), h.x, h.y, h.z, radius},
+               [&] { return bullet_shape(solid); });
   }
 
   template <class Make>
