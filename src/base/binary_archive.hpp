@@ -101,7 +101,12 @@ class BinaryReader {
 
   template <class... T>
   void operator()(T&... values) {
-    (read(values), ...);
+    if constexpr ((Scalar<T> && ...)) {
+      const std::byte* from = take((sizeof values + ...));
+      ((std::memcpy(&values, from, sizeof values), from += sizeof values), ...);
+    } else {
+      (read(values), ...);
+    }
   }
   template <class T>
   T get() {
@@ -132,12 +137,16 @@ class BinaryReader {
       require(byte <= 1, "a truth value is neither 0 nor 1");
       value = byte != 0;
     } else if constexpr (Scalar<T>) {
-      if (left() < sizeof value) fail("it ends too early");
-      std::memcpy(&value, left_.data(), sizeof value);
-      left_ = left_.subspan(sizeof value);
+      (*this)(value);
     } else {
       serialize(*this, value);
     }
+  }
+  const std::byte* take(std::size_t size) {
+    if (left() < size) fail("it ends too early");
+    const std::byte* const from = left_.data();
+    left_ = left_.subspan(size);
+    return from;
   }
 
   std::span<const std::byte> left_;

@@ -4,6 +4,7 @@
 #include "src/scene/field.hpp"
 #include "src/scene/scene_validate.hpp"
 
+#include <algorithm>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -17,55 +18,67 @@ std::string fault(std::string_view field, const Value& value, std::string_view r
   return std::string(field) + " is " + to_text(value) + "; it must be " + std::string(range);
 }
 
-/// Finds the first field that is not in its range. @param found gets name, value and range
-template <HasFields T>
-void find_field_fault(const T& object, std::string* found);
+/// Apart from the functions below, so that compilers inline these.
+template <class Value>
+bool put_fault(const char* field, const Value& value, const char* range, std::string* found) {
+  *found = fault(field, value, range);
+  return false;
+}
 
-/// The same for one field. `found` must be empty.
+/// Whether all fields are in their ranges. @param found gets name, value and range of the first one
+/// that is not
+template <HasFields T>
+bool are_in_range(const T& object, std::string* found);
+
+/// Whether a field is in its range, likewise.
 template <class Field, class T>
-void find_fault_of(const Field& field, const T& member, std::string* found) {
+bool is_in_range(const Field& field, const T& member, std::string* found) {
   using Range = typename Field::Range;
   if constexpr (HasFields<T> && std::same_as<Range, AnyValue>) {
-    find_field_fault(member, found);
-    if (!found->empty()) *found = std::string(field.name) + "." + *found;
+    if (are_in_range(member, found)) return true;
+    *found = std::string(field.name) + "." + *found;
+    return false;
   } else if constexpr (!std::same_as<Range, AnyValue> && !std::same_as<Range, CheckedByCode>) {
-    if (!field.range.contains(member)) *found = fault(field.name, member, field.range.text);
+    return field.range.contains(member) || put_fault(field.name, member, field.range.text, found);
   }
+  return true;
 }
 template <Presence kPresence>
-void find_fault_of(const Field<kPresence, Interval>& field, const Mat3& member,
-                   std::string* found) {
-  for (const Vec3& row : member.row) {
-    if (found->empty()) find_fault_of(field, row, found);
-  }
+bool is_in_range(const Field<kPresence, Interval>& field, const Mat3& member, std::string* found) {
+  return std::ranges::all_of(member.row,
+                             [&](const Vec3& row) { return is_in_range(field, row, found); });
 }
 template <class Field, class... T>
-void find_fault_of(const Field&, const std::variant<T...>& member, std::string* found) {
-  std::visit([found](const auto& value) { find_field_fault(value, found); }, member);
+bool is_in_range(const Field&, const std::variant<T...>& member, std::string* found) {
+  return std::visit([found](const auto& value) { return are_in_range(value, found); }, member);
 }
 template <Presence kPresence, HasFields T>
-void find_fault_of(const Field<kPresence, NotEmpty>& field, const std::vector<T>& members,
-                   std::string* found) {
+bool is_in_range(const Field<kPresence, NotEmpty>& field, const std::vector<T>& members,
+                 std::string* found) {
   if (members.empty()) {
     *found = std::string(field.name) + " is empty; it must have " + field.range.text;
   }
-  for (std::size_t i = 0; i < members.size() && found->empty(); ++i) {
-    find_field_fault(members[i], found);
-    if (!found->empty()) *found = std::string(field.name) + "[" + std::to_string(i) + "]." + *found;
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    if (are_in_range(members[i], found)) continue;
+    *found = std::string(field.name) + "[" + std::to_string(i) + "]." + *found;
+    return false;
   }
+  return !members.empty();
 }
 
 template <HasFields T>
-void find_field_fault(const T& object, std::string* found) {
-  each_field(object, [found](const auto& field, const auto& member) {
-    if (found->empty()) find_fault_of(field, member, found);
+bool are_in_range(const T& object, std::string* found) {
+  bool are = true;
+  each_field(object, [&are, found](const auto& field, const auto& member) {
+    are = are && is_in_range(field, member, found);
   });
+  return are;
 }
 /// The first field that is not in its range, with value and range; empty if there is none.
 template <HasFields T>
 std::string find_field_fault(const T& object) {
   std::string found;
-  find_field_fault(object, &found);
+  are_in_range(object, &found);
   return found;
 }
 

@@ -18,6 +18,9 @@ namespace {
 /// Bytes of the smallest body, a sphere without a given inertia; somewhat less is sufficient.
 constexpr std::size_t kLeastBodySize = 32 * sizeof(Real);
 
+constinit const BodyDef kAnyBody{};
+constexpr const char* kNoFlag = "a flag of a body is neither 0 nor 1";
+
 /// Validation tolerates normals that are not quite of unit length, whose offset BodyStore::add()
 /// scales with them: by that much, it may exceed kMaxCoordinate.
 template <class Wall>
@@ -32,24 +35,26 @@ void check_wall(Wall* wall) {
 /// All that a body consists of, in the order of the bytes. `Self` is const for a writer.
 template <class Archive, class Self>
 void BodyStore::serialize_body(Archive& archive, Self& self, std::uint32_t i) {
-  std::uint8_t inertia_given = self.inertia_given(i) ? 1 : 0;
-  archive(self.shape_[i], self.mass_[i], self.kinematic_[i], self.sensor_[i], self.can_sleep_[i],
-          inertia_given);
-  BinaryReader::require(inertia_given <= 1, "a flag of a body is neither 0 nor 1");
-  if (inertia_given != 0) {
+  const auto inertia = [&](auto& given) {
+    std::uint8_t is_given = self.inertia_given(i) ? 1 : 0;
+    archive(is_given);
+    BinaryReader::require(is_given <= 1, kNoFlag);
+    if (is_given == 0) return;
     if constexpr (std::is_const_v<Self>) {
-      archive(self.given_inertia_.at(i));
+      archive(given.at(i));
     } else {
-      archive(self.given_inertia_[i]);
+      archive(given[i]);
     }
-  }
-  archive(self.acceleration_[i], self.linear_damping_[i], self.angular_damping_[i],
-          self.friction_[i], self.restitution_[i], self.rolling_friction_[i],
-          self.spinning_friction_[i], self.filter_[i], self.user_data_[i]);
-  auto& [position, orientation, velocity, angular_velocity, force, torque, last_acceleration,
-         inverse_inertia, mean_motion, rest_time, awake] = self.moving;
-  archive(position[i], orientation[i], velocity[i], angular_velocity[i], force[i], torque[i],
-          last_acceleration[i], inverse_inertia[i], mean_motion[i], rest_time[i], awake[i]);
+  };
+  const auto column = [&]<class Column>(Column& values, const auto&...) {
+    if constexpr (Is<Column, GivenInertia>) {
+      inertia(values);
+    } else {
+      archive(values[i]);
+    }
+  };
+  each_given(self.moving, self.properties_, self.host_, self.given_inertia_, kAnyBody, column);
+  each_other_motion(column, self.moving);
 }
 
 void BodyStore::write(BinaryWriter* writer) const {
@@ -93,45 +98,42 @@ void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_fr
     serialize_body(*reader, *this, i);
     check_body(i);
     pool_.use(i);
-    set_shape(i, std::move(shape_[i]));
-    inverse_mass_[i] = mass_[i] > 0 ? Real(1) / mass_[i] : Real(0);
-    if (needs_inertia_arrays(shape_[i], mass_[i], kinematic(i), inertia_given(i))) {
+    derive_properties(i);
+    if (needs_inertia_arrays(host_.shape[i], host_.mass[i], kinematic(i), inertia_given(i))) {
       make_inertia_arrays();
     }
     inertia_given(i) ? set_tensor(i, given_inertia_.at(i)) : compute_inertia(i, std::nullopt);
-    set_damping(i, linear_damping_[i], angular_damping_[i]);
-    if (filter_[i] != CollisionFilter{}) ++filtered_count_;
-    count_body(i);
   }
+}
+
+/// The body as add() gets it.
+BodyDef BodyStore::definition(std::uint32_t i) const {
+  BodyDef def;
+  const auto get = [i]<class Column>(const Column& column, auto& value) {
+    if constexpr (Is<Column, GivenInertia>) {
+      if (const auto found = column.find(i); found != column.end()) value = found->second;
+    } else {
+      value = column[i];
+    }
+  };
+  each_given(moving, properties_, host_, given_inertia_, def, get);
+  return def;
 }
 
 /// Checks a body as add() and set_state() do, and the further conditions that the engine relies on.
 void BodyStore::check_body(std::uint32_t i) const {
-  BodyDef def;
-  def.shape = shape_[i];
-  def.mass = mass_[i];
-  def.kinematic = kinematic(i);
+  BodyDef def = definition(i);
   if (auto* half_space = std::get_if<HalfSpace>(&def.shape)) check_wall(half_space);
   if (auto* plane = std::get_if<Plane>(&def.shape)) check_wall(plane);
-  if (inertia_given(i)) def.inertia = given_inertia_.at(i);
-  def.position = moving.position[i];
-  def.orientation = moving.orientation[i];
-  def.velocity = moving.velocity[i];
-  def.angular_velocity = moving.angular_velocity[i];
-  def.acceleration = acceleration_[i];
-  def.linear_damping = linear_damping_[i];
-  def.angular_damping = angular_damping_[i];
-  def.friction = friction_[i];
-  def.restitution = restitution_[i];
-  def.rolling_friction = rolling_friction_[i];
-  def.spinning_friction = spinning_friction_[i];
   validate_body(def, i);
-  const auto is_flag = [](std::uint8_t value) { return value <= 1; };
-  BinaryReader::require(is_flag(kinematic_[i]) && is_flag(sensor_[i]) && is_flag(can_sleep_[i]) &&
-                            is_flag(moving.awake[i]),
-                        "a flag of a body is neither 0 nor 1");
-  BinaryReader::require(!inertia_given(i) || mass_[i] > 0, "an immovable body has a given inertia");
-  BinaryReader::require(moving.awake[i] == 0 || mass_[i] > 0 || kinematic(i),
+  const auto check_flag = [i]<class T>(const std::vector<T>& column) {
+    if constexpr (std::is_same_v<T, std::uint8_t>) BinaryReader::require(column[i] <= 1, kNoFlag);
+  };
+  each_property(check_flag, properties_);
+  check_flag(moving.awake);
+  BinaryReader::require(!inertia_given(i) || host_.mass[i] > 0,
+                        "an immovable body has a given inertia");
+  BinaryReader::require(moving.awake[i] == 0 || host_.mass[i] > 0 || kinematic(i),
                         "an immovable body is awake");
 }
 

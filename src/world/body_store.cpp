@@ -39,6 +39,16 @@ Shape normalized(Shape shape) {
   return shape;
 }
 
+constexpr auto point_to = [](auto& pointer, auto& array) { pointer = array.data(); };
+
+/// Puts the members of a BodyDef into the columns, except those that need memory.
+struct PutValue {
+  std::uint32_t body;
+  void operator()(auto& column, const auto& value) const { column[body] = value; }
+  void operator()(std::vector<Shape>&, const Shape&) const {}
+  void operator()(GivenInertia&, const std::optional<Mat3>&) const {}
+};
+
 }  // namespace
 
 BodyStore::BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps)
@@ -50,14 +60,12 @@ BodyStore::BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps
 /// Calls visit(array) for the arrays that have an item per slot.
 template <class Visit>
 void BodyStore::for_each_array(const Visit& visit) {
+  each_motion(visit, moving);
+  each_property(visit, properties_);
+  auto& [shape, mass, linear_damping, angular_damping, user_data] = host_;
   const auto all = [&visit](auto&... arrays) { (visit(arrays), ...); };
-  all(moving.position, moving.orientation, moving.velocity, moving.angular_velocity, moving.force,
-      moving.torque, moving.last_acceleration, moving.inverse_inertia, moving.mean_motion,
-      moving.rest_time, moving.awake);
-  all(shape_, radius_, extent_, mass_, inverse_mass_, friction_, restitution_, rolling_friction_,
-      spinning_friction_, acceleration_, linear_damping_, angular_damping_, velocity_kept_,
-      angular_velocity_kept_, can_sleep_, kinematic_, sensor_, user_data_, filter_);
-  if (has_inertia_arrays_) all(body_inverse_inertia_, tensor_);
+  all(shape, mass, linear_damping, angular_damping, user_data);
+  if (has_inertia_arrays_) each_inertia(visit, inertia_);
 }
 
 void BodyStore::reserve(std::size_t bodies) {
@@ -77,11 +85,18 @@ void BodyStore::add_slot() {
   pool_.add_slot();
 }
 
-void BodyStore::set_shape(std::uint32_t i, Shape shape) noexcept {
-  shape_[i] = std::move(shape);
-  const auto* sphere = std::get_if<Sphere>(&shape_[i]);
-  radius_[i] = sphere != nullptr ? sphere->radius : Real(0);
-  extent_[i] = is_wall(shape_[i]) ? std::numeric_limits<Real>::infinity() : outer_radius(shape_[i]);
+/// Computes the properties that follow from the given ones, and counts the body.
+void BodyStore::derive_properties(std::uint32_t i) noexcept {
+  const Shape& shape = host_.shape[i];
+  const auto* sphere = std::get_if<Sphere>(&shape);
+  properties_.radius[i] = sphere != nullptr ? sphere->radius : Real(0);
+  properties_.extent[i] =
+      is_wall(shape) ? std::numeric_limits<Real>::infinity() : outer_radius(shape);
+  properties_.inverse_mass[i] = host_.mass[i] > 0 ? Real(1) / host_.mass[i] : Real(0);
+  set_damping(i, host_.linear_damping[i], host_.angular_damping[i]);
+  if (properties_.filter[i] != CollisionFilter{}) ++filtered_count_;
+  update_filters_in_use();
+  count_body(i);
 }
 
 void BodyStore::count_body(std::uint32_t i) noexcept {
@@ -125,39 +140,28 @@ BodyId BodyStore::add(const BodyDef& def) {
     given_inertia_.insert(std::move(node));
   }
 
-  set_shape(i, std::move(shape));
-  friction_[i] = def.friction;
-  rolling_friction_[i] = def.rolling_friction;
-  spinning_friction_[i] = def.spinning_friction;
-  restitution_[i] = def.restitution;
-  mass_[i] = def.mass;
-  inverse_mass_[i] = def.mass > 0 ? Real(1) / def.mass : Real(0);
+  each_given(moving, properties_, host_, given_inertia_, def, PutValue{i});
+  host_.shape[i] = std::move(shape);
+  if (!sleep_.enabled) properties_.can_sleep[i] = 0;
+  derive_properties(i);
   compute_inertia(i, def.inertia);
-  acceleration_[i] = def.acceleration;
-  set_damping(i, def.linear_damping, def.angular_damping);
-  user_data_[i] = def.user_data;
-  kinematic_[i] = def.kinematic ? 1 : 0;
-  can_sleep_[i] = sleep_.enabled && def.can_sleep ? 1 : 0;
-  sensor_[i] = def.sensor ? 1 : 0;
-  set_filter(i, def.filter);
   moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
   moving.mean_motion[i] = moving.rest_time[i] = 0;
   moving.awake[i] = 0;
-  count_body(i);
   if (!movable(i)) ++fixed_version_;
   set_state(i, {def.position, def.orientation, def.velocity, def.angular_velocity});
   return id;
 }
 
 void BodyStore::set_mass(std::uint32_t i, Real mass) {
-  mass_[i] = mass;
-  inverse_mass_[i] = Real(1) / mass;
+  host_.mass[i] = mass;
+  properties_.inverse_mass[i] = Real(1) / mass;
   if (!inertia_given(i)) set_inertia(i, std::nullopt);
 }
 
 Mat3 BodyStore::inertia(std::uint32_t i) const {
   if (!movable(i)) return diagonal({0, 0, 0});
-  return inertia_given(i) ? given_inertia_.at(i) : solid_inertia(shape_[i], mass_[i]);
+  return inertia_given(i) ? given_inertia_.at(i) : solid_inertia(host_.shape[i], host_.mass[i]);
 }
 
 bool BodyStore::needs_inertia_arrays(const Shape& shape, Real mass, bool kinematic,
@@ -168,16 +172,17 @@ bool BodyStore::needs_inertia_arrays(const Shape& shape, Real mass, bool kinemat
 
 void BodyStore::make_inertia_arrays() {
   if (has_inertia_arrays_) return;
-  body_inverse_inertia_.reserve(shape_.capacity());
-  body_inverse_inertia_.resize(shape_.size());
-  tensor_.reserve(shape_.capacity());
-  tensor_.assign(shape_.size(), diagonal({0, 0, 0}));
-  for (const BodyId id : ids()) body_inverse_inertia_[id.index] = body_inverse_inertia(id.index);
+  inertia_.body_inverse_inertia.reserve(host_.shape.capacity());
+  inertia_.body_inverse_inertia.resize(host_.shape.size());
+  inertia_.tensor.reserve(host_.shape.capacity());
+  inertia_.tensor.assign(host_.shape.size(), diagonal({0, 0, 0}));
+  for (const BodyId id : ids())
+    inertia_.body_inverse_inertia[id.index] = body_inverse_inertia(id.index);
   has_inertia_arrays_ = true;
 }
 
 Mat3 BodyStore::body_inverse_inertia(std::uint32_t i) const {
-  if (has_inertia_arrays_) return body_inverse_inertia_[i];
+  if (has_inertia_arrays_) return inertia_.body_inverse_inertia[i];
   return movable(i) ? inverse_inertia(inertia(i)) : diagonal({0, 0, 0});
 }
 
@@ -197,25 +202,25 @@ void BodyStore::compute_inertia(std::uint32_t i, const std::optional<Mat3>& give
   if (movable(i)) {
     set_tensor(i, inertia(i));
   } else {  // infinite inertia: the inverse is zero (erratum E26)
-    body_inverse_inertia_[i] = tensor_[i] = diagonal({0, 0, 0});
+    inertia_.body_inverse_inertia[i] = inertia_.tensor[i] = diagonal({0, 0, 0});
   }
 }
 
 /// @param tensor inertia of a movable body in body axes, symmetric
 void BodyStore::set_tensor(std::uint32_t i, const Mat3& tensor) {
-  body_inverse_inertia_[i] = inverse_inertia(tensor);
+  inertia_.body_inverse_inertia[i] = inverse_inertia(tensor);
   // The largest entry of a positive definite matrix is on its diagonal.
   const Vec3 moments{tensor(0, 0), tensor(1, 1), tensor(2, 2)};
   const bool isotropic = moments.x == moments.y && moments.y == moments.z && is_diagonal(tensor);
-  tensor_[i] = isotropic ? diagonal({0, 0, 0})
-                         : tensor * (Real(1) / std::max({moments.x, moments.y, moments.z}));
+  inertia_.tensor[i] = isotropic ? diagonal({0, 0, 0})
+                                 : tensor * (Real(1) / std::max({moments.x, moments.y, moments.z}));
 }
 
 void BodyStore::set_damping(std::uint32_t i, Real linear, Real angular) {
-  linear_damping_[i] = linear;
-  angular_damping_[i] = angular;
-  velocity_kept_[i] = kept_per_step(linear, substep_);
-  angular_velocity_kept_[i] = kept_per_step(angular, substep_);
+  host_.linear_damping[i] = linear;
+  host_.angular_damping[i] = angular;
+  properties_.velocity_kept[i] = kept_per_step(linear, substep_);
+  properties_.angular_velocity_kept[i] = kept_per_step(angular, substep_);
 }
 
 void BodyStore::remove(BodyId id) noexcept {
@@ -259,9 +264,9 @@ void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
 }
 
 void BodyStore::set_filter(std::uint32_t i, const CollisionFilter& filter) noexcept {
-  if (filter_[i] != CollisionFilter{}) --filtered_count_;
-  filter_[i] = filter;
-  if (filter_[i] != CollisionFilter{}) ++filtered_count_;
+  if (properties_.filter[i] != CollisionFilter{}) --filtered_count_;
+  properties_.filter[i] = filter;
+  if (properties_.filter[i] != CollisionFilter{}) ++filtered_count_;
   update_filters_in_use();
 }
 
@@ -333,17 +338,18 @@ void BodyStore::integrate() {
 }
 
 void BodyStore::integrate(std::uint32_t i) {
-  moving.last_acceleration[i] = add_scaled(acceleration_[i], moving.force[i], inverse_mass_[i]);
+  moving.last_acceleration[i] =
+      add_scaled(properties_.acceleration[i], moving.force[i], properties_.inverse_mass[i]);
   const Vec3 angular_acceleration = moving.inverse_inertia[i] * moving.torque[i];
   moving.velocity[i] = detail::integrated_velocity(moving.velocity[i], moving.last_acceleration[i],
-                                                   dt_, velocity_kept_[i]);
+                                                   dt_, properties_.velocity_kept[i]);
   moving.angular_velocity[i] = detail::integrated_velocity(
-      moving.angular_velocity[i], angular_acceleration, dt_, angular_velocity_kept_[i]);
-  if (has_inertia_arrays_ && tensor_[i](0, 0) > 0) {
-    moving.angular_velocity[i] = detail::precessed(moving.angular_velocity[i], tensor_[i],
+      moving.angular_velocity[i], angular_acceleration, dt_, properties_.angular_velocity_kept[i]);
+  if (has_inertia_arrays_ && inertia_.tensor[i](0, 0) > 0) {
+    moving.angular_velocity[i] = detail::precessed(moving.angular_velocity[i], inertia_.tensor[i],
                                                    to_matrix(moving.orientation[i]), dt_);
   }
-  if (can_sleep_[i] != 0 && falls_asleep(i)) return;
+  if (properties_.can_sleep[i] != 0 && falls_asleep(i)) return;
   move(i);
 }
 
@@ -374,56 +380,27 @@ BodyView BodyStore::view() const {
 }
 
 BodyView BodyStore::view_without_ids() const {
-  return {.position = moving.position.data(),
-          .orientation = moving.orientation.data(),
-          .velocity = moving.velocity.data(),
-          .angular_velocity = moving.angular_velocity.data(),
-          .force = moving.force.data(),
-          .torque = moving.torque.data(),
-          .last_acceleration = moving.last_acceleration.data(),
-          .inverse_inertia = moving.inverse_inertia.data(),
-          .rest_time = moving.rest_time.data(),
-          .awake = moving.awake.data(),
-          .radius = radius_.data(),
-          .extent = extent_.data(),
-          .inverse_mass = inverse_mass_.data(),
-          .friction = friction_.data(),
-          .restitution = restitution_.data(),
-          .rolling_friction = rolling_friction_.data(),
-          .spinning_friction = spinning_friction_.data(),
-          .body_inverse_inertia = has_inertia_arrays_ ? body_inverse_inertia_.data() : nullptr,
-          .tensor = has_inertia_arrays_ ? tensor_.data() : nullptr,
-          .acceleration = acceleration_.data(),
-          .velocity_kept = velocity_kept_.data(),
-          .angular_velocity_kept = angular_velocity_kept_.data(),
-          .can_sleep = can_sleep_.data(),
-          .kinematic = kinematic_.data(),
-          .sensor = sensor_.data(),
-          .filter = filter_.data(),
-          .ignored = ignored_.keys().data(),
-          .ignored_count = static_cast<std::uint32_t>(ignored_.keys().size()),
-          .filters_in_use = filters_in_use_,
-          .count = static_cast<std::uint32_t>(size()),
-          .capacity = static_cast<std::uint32_t>(capacity()),
-          .dt = dt_,
-          .substep = substep_,
-          .sleep_speed = sleep_.speed,
-          .sleep_time = sleep_.time,
-          .woken_motion = 2 * sleep_.epsilon};
+  BodyView view;
+  each_motion(point_to, view, moving);
+  each_property(point_to, view, properties_);
+  if (has_inertia_arrays_) each_inertia(point_to, view, inertia_);
+  view.ignored = ignored_.keys().data();
+  view.ignored_count = static_cast<std::uint32_t>(ignored_.keys().size());
+  view.filters_in_use = filters_in_use_;
+  view.count = static_cast<std::uint32_t>(size());
+  view.capacity = static_cast<std::uint32_t>(capacity());
+  view.dt = dt_;
+  view.substep = substep_;
+  view.sleep_speed = sleep_.speed;
+  view.sleep_time = sleep_.time;
+  view.woken_motion = 2 * sleep_.epsilon;
+  return view;
 }
 
 MotionPointers BodyStore::motion_pointers() {
-  return {.position = moving.position.data(),
-          .orientation = moving.orientation.data(),
-          .velocity = moving.velocity.data(),
-          .angular_velocity = moving.angular_velocity.data(),
-          .force = moving.force.data(),
-          .torque = moving.torque.data(),
-          .last_acceleration = moving.last_acceleration.data(),
-          .inverse_inertia = moving.inverse_inertia.data(),
-          .mean_motion = moving.mean_motion.data(),
-          .rest_time = moving.rest_time.data(),
-          .awake = moving.awake.data()};
+  MotionPointers pointers;
+  each_motion(point_to, pointers, moving);
+  return pointers;
 }
 
 void BodyStore::refresh_inertia(std::uint32_t i) {

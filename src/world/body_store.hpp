@@ -1,4 +1,4 @@
-/// Storage of a world's bodies: one array per quantity, indexed by BodyId::index.
+/// Storage of a world's bodies: the arrays of body_columns.hpp.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -19,23 +19,8 @@ inline namespace JFPX_ABI {
 class BinaryReader;
 class BinaryWriter;
 
-/// State that a step changes, indexed by BodyId::index. World::step() copies the arrays that a step
-/// may change before it can fail, so that a failed step can be undone.
-struct MotionArrays {
-  std::vector<Vec3> position;           ///< [m]
-  std::vector<Quat> orientation;        ///< unit quaternions
-  std::vector<Vec3> velocity;           ///< [m/s]
-  std::vector<Vec3> angular_velocity;   ///< [rad/s], world axes
-  std::vector<Vec3> force;              ///< [N], for the next step
-  std::vector<Vec3> torque;             ///< [N m], for the next step
-  std::vector<Vec3> last_acceleration;  ///< [m/s^2], in the last step in which the body was awake
-  std::vector<Mat3> inverse_inertia;    ///< [1/(kg m^2)], world axes
-  /// [m^2/s^2], recency-weighted mean of v^2 + w^2, compared with SleepSettings::epsilon (thesis
-  /// 4.4.2)
-  std::vector<Real> mean_motion;
-  std::vector<Real> rest_time;      ///< [s], for which the body has been slow; soft_step
-  std::vector<std::uint8_t> awake;  ///< 1 or 0; a body of mass 0: 1 if kinematic and moving
-};
+/// [kg m^2], BodyDef::inertia of the bodies that have one, by body.
+using GivenInertia = std::map<std::uint32_t, Mat3>;
 
 /// Owns the bodies and their ids, and integrates their free motion. The arrays have unused slots,
 /// so loops over the bodies iterate over ids(), which is sorted by index.
@@ -115,25 +100,27 @@ class BodyStore {
   /// Has no effect on a body of mass 0. @param given absent: the inertia of the solid shape
   /// @throws std::bad_alloc; the store is then unchanged
   void set_inertia(std::uint32_t body, const std::optional<Mat3>& given);
-  void set_friction(std::uint32_t body, Real friction) { friction_[body] = friction; }
-  void set_restitution(std::uint32_t body, Real value) { restitution_[body] = value; }
+  void set_friction(std::uint32_t body, Real friction) { properties_.friction[body] = friction; }
+  void set_restitution(std::uint32_t body, Real value) { properties_.restitution[body] = value; }
   /// Without the acceleration by forces. [m/s^2]
-  const Vec3& acceleration(std::uint32_t body) const { return acceleration_[body]; }
-  void set_acceleration(std::uint32_t body, const Vec3& value) { acceleration_[body] = value; }
-  Real linear_damping(std::uint32_t body) const { return linear_damping_[body]; }
-  Real angular_damping(std::uint32_t body) const { return angular_damping_[body]; }
+  const Vec3& acceleration(std::uint32_t body) const { return properties_.acceleration[body]; }
+  void set_acceleration(std::uint32_t body, const Vec3& value) {
+    properties_.acceleration[body] = value;
+  }
+  Real linear_damping(std::uint32_t body) const { return host_.linear_damping[body]; }
+  Real angular_damping(std::uint32_t body) const { return host_.angular_damping[body]; }
   void set_damping(std::uint32_t body, Real linear, Real angular);
-  std::uint64_t user_data(std::uint32_t body) const { return user_data_[body]; }
-  void set_user_data(std::uint32_t body, std::uint64_t value) { user_data_[body] = value; }
-  bool sensor(std::uint32_t body) const { return sensor_[body] != 0; }
+  std::uint64_t user_data(std::uint32_t body) const { return host_.user_data[body]; }
+  void set_user_data(std::uint32_t body, std::uint64_t value) { host_.user_data[body] = value; }
+  bool sensor(std::uint32_t body) const { return properties_.sensor[body] != 0; }
   bool has_sensors() const { return sensor_count_ > 0; }
   /// Whether a body has rolling or spinning friction.
   bool rolls(std::uint32_t body) const {
-    return rolling_friction_[body] > 0 || spinning_friction_[body] > 0;
+    return properties_.rolling_friction[body] > 0 || properties_.spinning_friction[body] > 0;
   }
   bool any_rolls() const { return rolling_count_ > 0; }
   bool has_kinematic_bodies() const { return kinematic_count_ > 0; }
-  const CollisionFilter& filter(std::uint32_t body) const { return filter_[body]; }
+  const CollisionFilter& filter(std::uint32_t body) const { return properties_.filter[body]; }
   void set_filter(std::uint32_t body, const CollisionFilter& filter) noexcept;
   bool pair_ignored(const BodyPair& pair) const noexcept { return ignored_.contains(pair); }
   /// @throws std::bad_alloc; the store is then unchanged
@@ -142,8 +129,8 @@ class BodyStore {
   void set_ignored_pairs(std::span<const BodyPair> pairs);
   /// Whether the filters let two bodies collide, and they are not an ignored pair.
   bool may_collide(std::uint32_t a, std::uint32_t b) const noexcept {
-    return !filters_in_use_ ||
-           (jfpx::may_collide(filter_[a], filter_[b]) && !ignored_.contains({a, b}));
+    return !filters_in_use_ || (jfpx::may_collide(properties_.filter[a], properties_.filter[b]) &&
+                                !ignored_.contains({a, b}));
   }
   /// Pointers to the arrays. Valid until a body is added or removed, or the ignored pairs change.
   BodyView view() const;
@@ -151,22 +138,24 @@ class BodyStore {
   BodyView view_without_ids() const;
   MotionPointers motion_pointers();
 
-  bool movable(std::uint32_t body) const { return inverse_mass_[body] > 0; }
+  bool movable(std::uint32_t body) const { return properties_.inverse_mass[body] > 0; }
   bool immovable(std::uint32_t body) const { return !movable(body) && !kinematic(body); }
-  bool kinematic(std::uint32_t body) const { return kinematic_[body] != 0; }
+  bool kinematic(std::uint32_t body) const { return properties_.kinematic[body] != 0; }
   /// Whether a kinematic body is in motion.
   bool has_moving_kinematic_body() const;
-  const Shape& shape(std::uint32_t body) const { return shape_[body]; }
-  Real mass(std::uint32_t body) const { return mass_[body]; }
-  Real inverse_mass(std::uint32_t body) const { return inverse_mass_[body]; }
-  std::span<const Real> inverse_masses() const { return inverse_mass_; }
-  Real friction(std::uint32_t body) const { return friction_[body]; }
-  Real restitution(std::uint32_t body) const { return restitution_[body]; }
+  const Shape& shape(std::uint32_t body) const { return host_.shape[body]; }
+  Real mass(std::uint32_t body) const { return host_.mass[body]; }
+  Real inverse_mass(std::uint32_t body) const { return properties_.inverse_mass[body]; }
+  std::span<const Real> inverse_masses() const { return properties_.inverse_mass; }
+  Real friction(std::uint32_t body) const { return properties_.friction[body]; }
+  Real restitution(std::uint32_t body) const { return properties_.restitution[body]; }
   /// [m]; 0 for a body that is not a sphere, as for compounds
-  Real radius(std::uint32_t body) const { return radius_[body]; }
+  Real radius(std::uint32_t body) const { return properties_.radius[body]; }
   /// [m], of the bounding sphere about the centre of mass; infinite for half-spaces and planes
-  Real extent(std::uint32_t body) const { return extent_[body]; }
+  Real extent(std::uint32_t body) const { return properties_.extent[body]; }
   Real dt() const { return dt_; }
+  /// World::step() copies the arrays that a step may change before it can fail, so that a failed
+  /// step can be undone.
   MotionArrays moving;
 
  private:
@@ -174,7 +163,8 @@ class BodyStore {
   void for_each_array(const Visit& visit);
   void resize_slots(std::size_t slots);
   void add_slot();
-  void set_shape(std::uint32_t body, Shape shape) noexcept;
+  void derive_properties(std::uint32_t body) noexcept;
+  BodyDef definition(std::uint32_t body) const;
   void count_body(std::uint32_t body) noexcept;
   void note_mobile(std::uint32_t body) noexcept;
   static bool needs_inertia_arrays(const Shape& shape, Real mass, bool kinematic,
@@ -198,21 +188,11 @@ class BodyStore {
   SleepSettings sleep_;
   Real motion_kept_;  ///< SleepSettings::bias^dt: weight of the previous mean motion
 
-  std::vector<Shape> shape_;
-  std::vector<Real> radius_, extent_, mass_, inverse_mass_, friction_, restitution_;
-  std::vector<Real> rolling_friction_, spinning_friction_;
-  std::map<std::uint32_t, Mat3> given_inertia_;  ///< by body
-  bool has_inertia_arrays_ = false;              ///< whether the following two arrays are in use
-  std::vector<Mat3> body_inverse_inertia_;       ///< body axes
-  /// Inertia in body axes, divided by its largest diagonal entry, for the gyroscopic term; zero if
-  /// that term is zero (isotropic inertia or mass 0).
-  std::vector<Mat3> tensor_;
-  std::vector<Vec3> acceleration_;                           ///< BodyDef::acceleration
-  std::vector<Real> linear_damping_, angular_damping_;       ///< those of BodyDef
-  std::vector<Real> velocity_kept_, angular_velocity_kept_;  ///< damping^substep
-  std::vector<std::uint8_t> can_sleep_, kinematic_, sensor_;
-  std::vector<std::uint64_t> user_data_;
-  std::vector<CollisionFilter> filter_;  ///< the default in unused slots
+  PropertyColumns<ArrayColumn> properties_;
+  HostArrays host_;
+  GivenInertia given_inertia_;
+  bool has_inertia_arrays_ = false;  ///< whether `inertia_` is in use
+  InertiaColumns<ArrayColumn> inertia_;
 
   IgnoredPairs ignored_;
   std::uint32_t filtered_count_ = 0;  ///< number of bodies whose filter is not the default

@@ -5,6 +5,7 @@
 #include <jfpx/scene.hpp>
 
 #include "src/scene/inertia.hpp"
+#include "src/world/body_columns.hpp"
 #include "src/world/integrate.hpp"
 
 #include <cstdint>
@@ -12,26 +13,11 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Properties and state of bodies that the steps of a world read. All arrays are indexed by
-/// BodyId::index. See MotionArrays and BodyStore for the meaning and the units of the fields.
-struct BodyView {
-  const Vec3* position = nullptr;
-  const Quat* orientation = nullptr;
-  const Vec3 *velocity = nullptr, *angular_velocity = nullptr;
-  const Vec3 *force = nullptr, *torque = nullptr, *last_acceleration = nullptr;
-  const Mat3* inverse_inertia = nullptr;
-  const Real* rest_time = nullptr;
-  const std::uint8_t* awake = nullptr;
-
-  const Real *radius = nullptr, *extent = nullptr, *inverse_mass = nullptr;
-  const Real *friction = nullptr, *restitution = nullptr;
-  const Real *rolling_friction = nullptr, *spinning_friction = nullptr;
-  /// Null: all bodies are immovable or balls with the inertia of a solid ball.
-  const Mat3 *body_inverse_inertia = nullptr, *tensor = nullptr;
-  const Vec3* acceleration = nullptr;
-  const Real *velocity_kept = nullptr, *angular_velocity_kept = nullptr;
-  const std::uint8_t *can_sleep = nullptr, *kinematic = nullptr, *sensor = nullptr;
-  const CollisionFilter* filter = nullptr;
+/// Properties and state of bodies that the steps of a world read. The pointers of InertiaColumns
+/// are null while a world does without them.
+struct BodyView : MotionColumns<ConstPointerColumn>,
+                  PropertyColumns<ConstPointerColumn>,
+                  InertiaColumns<ConstPointerColumn> {
   const std::uint64_t* ignored = nullptr;  ///< keys of IgnoredPairs, sorted
   std::uint32_t ignored_count = 0;
   bool filters_in_use = false;
@@ -117,15 +103,7 @@ struct BodyView {
 };
 
 /// The arrays of a BodyView that a step of soft_step changes.
-struct MotionPointers {
-  Vec3* position = nullptr;
-  Quat* orientation = nullptr;
-  Vec3 *velocity = nullptr, *angular_velocity = nullptr;
-  Vec3 *force = nullptr, *torque = nullptr, *last_acceleration = nullptr;
-  Mat3* inverse_inertia = nullptr;
-  Real *mean_motion = nullptr, *rest_time = nullptr;
-  std::uint8_t* awake = nullptr;
-
+struct MotionPointers : MotionColumns<PointerColumn> {
   JFPX_HD void refresh_inertia(const BodyView& bodies, std::uint32_t i) const {
     inverse_inertia[i] =
         detail::in_world_axes(bodies.body_inverse_inertia[i], to_matrix(orientation[i]));

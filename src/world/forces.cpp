@@ -134,9 +134,10 @@ Mat3 AeroControl::tensor() const { return detail::tensor_at_control(*this); }
 void Buoyancy::validate(const ForceContext& context) const {
   check_force("buoyancy", context, *this);
   std::string found;
-  find_fault_of(field("liquid.normal", kUnitVector), liquid.normal, &found);
-  if (found.empty()) find_fault_of(field("liquid.offset", kFinite), liquid.offset, &found);
-  if (!found.empty()) refuse_force("buoyancy", found);
+  if (!is_in_range(field("liquid.normal", kUnitVector), liquid.normal, &found) ||
+      !is_in_range(field("liquid.offset", kFinite), liquid.offset, &found)) {
+    refuse_force("buoyancy", found);
+  }
 }
 void Buoyancy::operator()(ForceContext& context) const { act_on_awake(*this, body, &context); }
 

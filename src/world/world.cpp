@@ -205,10 +205,8 @@ void World::Impl::save_for_undo() {
     copy_array(pool.get(), now.force, &before.force);
     copy_array(pool.get(), now.torque, &before.torque);
   }
-  copy_array(pool.get(), now.last_acceleration, &before.last_acceleration);
-  copy_array(pool.get(), now.mean_motion, &before.mean_motion);
-  copy_array(pool.get(), now.rest_time, &before.rest_time);
-  copy_array(pool.get(), now.awake, &before.awake);
+  each_saved([this](const auto& from, auto& to) { copy_array(pool.get(), from, &to); }, now,
+             before);
 }
 
 /// Restores the motion that save_for_undo() has copied.
@@ -221,10 +219,7 @@ void World::Impl::undo_motion() noexcept {
       std::swap(now.force, before.force);
       std::swap(now.torque, before.torque);
     }
-    std::swap(now.last_acceleration, before.last_acceleration);
-    std::swap(now.mean_motion, before.mean_motion);
-    std::swap(now.rest_time, before.rest_time);
-    std::swap(now.awake, before.awake);
+    each_saved([](auto& a, auto& b) { std::swap(a, b); }, now, before);
   }
   is_saved = false;
 }

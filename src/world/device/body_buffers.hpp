@@ -23,69 +23,45 @@ class BodyBuffers {
               StepData* data) {
     upload_properties(transfer, store.view(), room, &data->step.bodies);
     upload_motion(transfer, store.moving, room, &data->step);
-    data->saved = {transfer.room(&saved_last_acceleration_, room),
-                   transfer.room(&saved_mean_motion_, room), transfer.room(&saved_rest_time_, room),
-                   transfer.room(&saved_awake_, room)};
+    each_saved([&](auto*& to, auto& buffer) { to = transfer.room(&buffer, room); }, data->saved,
+               saved_);
   }
 
   /// Copies forces, and what waking a body changes.
   void upload_forces(const Transfer<Device>& transfer, const MotionArrays& from) {
-    transfer.put(&force_, from.force);
-    transfer.put(&torque_, from.torque);
-    transfer.put(&awake_, from.awake);
-    transfer.put(&mean_motion_, from.mean_motion);
-    transfer.put(&rest_time_, from.rest_time);
+    transfer.put(&motion_.force, from.force);
+    transfer.put(&motion_.torque, from.torque);
+    transfer.put(&motion_.awake, from.awake);
+    transfer.put(&motion_.mean_motion, from.mean_motion);
+    transfer.put(&motion_.rest_time, from.rest_time);
   }
 
   /// Copies of what BodyState has. @param to as large as the arrays that were uploaded
   HostCopies state_copies(MotionArrays* to) const {
     HostCopies copies;
-    add_copy(&copies, &to->position, position_);
-    add_copy(&copies, &to->orientation, orientation_);
-    add_copy(&copies, &to->velocity, velocity_);
-    add_copy(&copies, &to->angular_velocity, angular_velocity_);
+    each_state(copy_to(&copies), *to, motion_);
     return copies;
   }
   /// Copies of all other arrays, likewise.
   HostCopies other_copies(MotionArrays* to) const {
     HostCopies copies;
-    add_copy(&copies, &to->force, force_);
-    add_copy(&copies, &to->torque, torque_);
-    add_copy(&copies, &to->last_acceleration, last_acceleration_);
-    add_copy(&copies, &to->inverse_inertia, inverse_inertia_);
-    add_copy(&copies, &to->mean_motion, mean_motion_);
-    add_copy(&copies, &to->rest_time, rest_time_);
-    add_copy(&copies, &to->awake, awake_);
+    each_other_motion(copy_to(&copies), *to, motion_);
     return copies;
   }
 
   /// Undoes what a step changes before it can fail.
   void restore(const Transfer<Device>& transfer, const StepData& data) const {
-    const MotionPointers& to = data.step.motion;
     const std::size_t n = data.step.bodies.capacity;
-    transfer.copy(to.last_acceleration, data.saved.last_acceleration, n);
-    transfer.copy(to.mean_motion, data.saved.mean_motion, n);
-    transfer.copy(to.rest_time, data.saved.rest_time, n);
-    transfer.copy(to.awake, data.saved.awake, n);
+    each_saved([&](auto* to, const auto* from) { transfer.copy(to, from, n); }, data.step.motion,
+               data.saved);
   }
 
   PropertyPointers properties() const {
-    return {.radius = radius_.data(),
-            .extent = extent_.data(),
-            .inverse_mass = inverse_mass_.data(),
-            .friction = friction_.data(),
-            .restitution = restitution_.data(),
-            .rolling_friction = rolling_friction_.data(),
-            .spinning_friction = spinning_friction_.data(),
-            .body_inverse_inertia = body_inverse_inertia_.data(),
-            .tensor = tensor_.data(),
-            .acceleration = acceleration_.data(),
-            .velocity_kept = velocity_kept_.data(),
-            .angular_velocity_kept = angular_velocity_kept_.data(),
-            .can_sleep = can_sleep_.data(),
-            .kinematic = kinematic_.data(),
-            .sensor = sensor_.data(),
-            .filter = filter_.data()};
+    PropertyPointers pointers;
+    const auto point_to = [](auto*& pointer, const auto& buffer) { pointer = buffer.data(); };
+    each_property(point_to, pointers, properties_);
+    each_inertia(point_to, pointers, inertia_);
+    return pointers;
   }
 
   void update_pairs(const Transfer<Device>& transfer, const BodyView& from, BodyView* to) {
@@ -103,8 +79,8 @@ class BodyBuffers {
   }
 
   // What accumulates until the next step.
-  const Vec3* force() const { return force_.data(); }
-  const Vec3* torque() const { return torque_.data(); }
+  const Vec3* force() const { return motion_.force.data(); }
+  const Vec3* torque() const { return motion_.torque.data(); }
 
  private:
   template <class T>
@@ -112,80 +88,34 @@ class BodyBuffers {
 
   void upload_properties(const Transfer<Device>& transfer, const BodyView& from, std::size_t room,
                          BodyView* to) {
-    const auto put = [&](auto* array, const auto* values) {
-      return transfer.put(array, values, from.capacity, room);
-    };
     *to = from;  // the numbers; the pointers follow
-    to->radius = put(&radius_, from.radius);
-    to->extent = put(&extent_, from.extent);
-    to->inverse_mass = put(&inverse_mass_, from.inverse_mass);
-    to->friction = put(&friction_, from.friction);
-    to->restitution = put(&restitution_, from.restitution);
-    to->rolling_friction = put(&rolling_friction_, from.rolling_friction);
-    to->spinning_friction = put(&spinning_friction_, from.spinning_friction);
-    to->velocity_kept = put(&velocity_kept_, from.velocity_kept);
-    to->angular_velocity_kept = put(&angular_velocity_kept_, from.angular_velocity_kept);
-    to->body_inverse_inertia = put(&body_inverse_inertia_, from.body_inverse_inertia);
-    to->tensor = put(&tensor_, from.tensor);
-    to->acceleration = put(&acceleration_, from.acceleration);
-    to->can_sleep = put(&can_sleep_, from.can_sleep);
-    to->kinematic = put(&kinematic_, from.kinematic);
-    to->sensor = put(&sensor_, from.sensor);
-    to->filter = put(&filter_, from.filter);
+    const auto put = [&](auto*& pointer, auto& buffer, const auto* values) {
+      pointer = transfer.put(&buffer, values, from.capacity, room);
+    };
+    each_property(put, *to, properties_, from);
+    each_inertia(put, *to, inertia_, from);
     update_pairs(transfer, from, to);
     to->ids = transfer.put(&ids_[ids_now_], from.ids, from.count);
   }
 
   void upload_motion(const Transfer<Device>& transfer, const MotionArrays& from, std::size_t room,
                      soft_step::StepBodies* step) {
-    const auto put = [&](auto* array, const auto& values) {
-      return transfer.put(array, values, room);
-    };
-    MotionPointers& to = step->motion;
-    to.position = put(&position_, from.position);
-    to.orientation = put(&orientation_, from.orientation);
-    to.velocity = put(&velocity_, from.velocity);
-    to.angular_velocity = put(&angular_velocity_, from.angular_velocity);
-    to.force = put(&force_, from.force);
-    to.torque = put(&torque_, from.torque);
-    to.last_acceleration = put(&last_acceleration_, from.last_acceleration);
-    to.inverse_inertia = put(&inverse_inertia_, from.inverse_inertia);
-    to.mean_motion = put(&mean_motion_, from.mean_motion);
-    to.rest_time = put(&rest_time_, from.rest_time);
-    to.awake = put(&awake_, from.awake);
-    BodyView& bodies = step->bodies;
-    bodies.position = to.position;
-    bodies.orientation = to.orientation;
-    bodies.velocity = to.velocity;
-    bodies.angular_velocity = to.angular_velocity;
-    bodies.force = to.force;
-    bodies.torque = to.torque;
-    bodies.last_acceleration = to.last_acceleration;
-    bodies.inverse_inertia = to.inverse_inertia;
-    bodies.rest_time = to.rest_time;
-    bodies.awake = to.awake;
+    each_motion([&](auto*& pointer, auto*& view, auto& buffer,
+                    const auto& values) { view = pointer = transfer.put(&buffer, values, room); },
+                step->motion, step->bodies, motion_, from);
   }
 
-  // Properties.
-  Buffer<Real> radius_, extent_, inverse_mass_, friction_, restitution_, rolling_friction_,
-      spinning_friction_, velocity_kept_, angular_velocity_kept_;
-  Buffer<Mat3> body_inverse_inertia_, tensor_;
-  Buffer<Vec3> acceleration_;
-  Buffer<std::uint8_t> can_sleep_, kinematic_, sensor_;
-  Buffer<CollisionFilter> filter_;
+  static auto copy_to(HostCopies* copies) {
+    return [copies](auto& to, const auto& from) { add_copy(copies, &to, from); };
+  }
+
+  PropertyColumns<Buffer> properties_;
+  InertiaColumns<Buffer> inertia_;
   Buffer<std::uint64_t> ignored_;
   Buffer<BodyId> ids_[2];
   int ids_now_ = 0;  ///< which of the two are the current ones
-  // Motion.
-  Buffer<Vec3> position_, velocity_, angular_velocity_, force_, torque_, last_acceleration_;
-  Buffer<Quat> orientation_;
-  Buffer<Mat3> inverse_inertia_;
-  Buffer<Real> mean_motion_, rest_time_;
-  Buffer<std::uint8_t> awake_;
-  // SavedArrays.
-  Buffer<Vec3> saved_last_acceleration_;
-  Buffer<Real> saved_mean_motion_, saved_rest_time_;
-  Buffer<std::uint8_t> saved_awake_;
+  MotionColumns<Buffer> motion_;
+  SavedColumns<Buffer> saved_;
 };
 
 }  // namespace device

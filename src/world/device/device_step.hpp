@@ -110,17 +110,16 @@ class DeviceStep final : public DeviceWorld {
       sets_pairs |= edit.sets_pairs || edit.is_removed;
       edited.push_back({i, edit.sets_state, edit.wakes, edit.wakes_neighbors, edit.is_removed,
                         bodies.state(i), from.inverse_inertia[i], from.force[i], from.torque[i],
-                        from.acceleration[i], from.velocity_kept[i], from.angular_velocity_kept[i],
-                        from.friction[i], from.restitution[i], from.filter[i]});
+                        slot_values(from, i).properties});
       if (edit.is_added || edit.is_removed) {
         changed.push_back(i);
         if (edit.is_added) added.push_back(bodies.id(i));
-        replaced.push_back(edit.is_added ? slot_values(bodies, from, i) : unused_slot(i));
+        replaced.push_back(edit.is_added ? slot_values(from, i) : unused_slot(i));
         replaced.back().has_no_contacts = true;
       } else if (edit.sets_state && !bodies.movable(i)) {  // awake depends on the velocities
-        replaced.push_back(slot_values(bodies, from, i));
+        replaced.push_back(slot_values(from, i));
       } else if (edit.sets_mass) {
-        masses.push_back({i, from.inverse_mass[i], from.body_inverse_inertia[i], from.tensor[i]});
+        masses.push_back({i, slot_values(from, i).inertia});
       }
     }
     BodyView& to = data_.step.bodies;

@@ -16,17 +16,14 @@ struct EditedBody {
   bool sets_state = false, wakes = false, wakes_neighbors = false, is_removed = false;
   BodyState state;
   Mat3 inverse_inertia;
-  Vec3 force, torque, acceleration;
-  Real velocity_kept = 1, angular_velocity_kept = 1;
-  Real friction = 0, restitution = 0;
-  CollisionFilter filter;
+  Vec3 force, torque;
+  PropertyColumns<ValueColumn> properties;
 };
 
-/// Mass and inertia of a body whose BodyEdit::sets_mass is set.
+/// Inertia of a body whose BodyEdit::sets_mass is set.
 struct EditedMass {
   std::uint32_t body = 0;
-  Real inverse_mass = 0;
-  Mat3 body_inverse_inertia, tensor;
+  InertiaColumns<ValueColumn> inertia;
 };
 
 /// Wakes the bodies in contact with some of the edited bodies, forgets the contacts of removed
@@ -98,29 +95,22 @@ struct EditProgram {
   JFPX_HD void edit(const EditedBody& e) const {
     const MotionPointers& motion = data.step.motion;
     const std::uint32_t i = e.body;
+    const auto put = [i](auto* column, const auto& value) { column[i] = value; };
     if (e.sets_state) {
-      motion.position[i] = e.state.position;
-      motion.orientation[i] = e.state.orientation;
-      motion.velocity[i] = e.state.velocity;
-      motion.angular_velocity[i] = e.state.angular_velocity;
+      each_state(put, motion, e.state);
       motion.inverse_inertia[i] = e.inverse_inertia;
     }
     motion.force[i] = e.force;
     motion.torque[i] = e.torque;
-    properties.acceleration[i] = e.acceleration;
-    properties.velocity_kept[i] = e.velocity_kept;
-    properties.angular_velocity_kept[i] = e.angular_velocity_kept;
-    properties.friction[i] = e.friction;
-    properties.restitution[i] = e.restitution;
-    properties.filter[i] = e.filter;
+    each_property(put, properties, e.properties);
     if (e.wakes && data.step.bodies.movable(i)) motion.wake(data.step.bodies, i);
   }
 
   JFPX_HD void edit_mass(const EditedMass& mass) const {
-    properties.inverse_mass[mass.body] = mass.inverse_mass;
-    properties.body_inverse_inertia[mass.body] = mass.body_inverse_inertia;
-    properties.tensor[mass.body] = mass.tensor;
-    data.step.motion.refresh_inertia(data.step.bodies, mass.body);
+    const std::uint32_t i = mass.body;
+    const auto put = [i](auto* column, const auto& value) { column[i] = value; };
+    each_inertia(put, properties, mass.inertia);
+    data.step.motion.refresh_inertia(data.step.bodies, i);
   }
 
   JFPX_HD void replace(const SlotValues& values) const {

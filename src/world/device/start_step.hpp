@@ -18,11 +18,8 @@ JFPX_HD void start_counters(const Team& team, const StepData& data) {
 
 /// Saves what the step changes of a body before it can fail.
 JFPX_HD inline void save(const StepData& data, std::uint32_t body) {
-  const MotionPointers& motion = data.step.motion;
-  data.saved.last_acceleration[body] = motion.last_acceleration[body];
-  data.saved.mean_motion[body] = motion.mean_motion[body];
-  data.saved.rest_time[body] = motion.rest_time[body];
-  data.saved.awake[body] = motion.awake[body];
+  each_saved([body](auto* to, const auto* from) { to[body] = from[body]; }, data.saved,
+             data.step.motion);
 }
 
 }  // namespace device

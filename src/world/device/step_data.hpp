@@ -66,7 +66,7 @@ struct Progress {
   std::uint64_t completed = 0;  ///< number of complete steps since the upload
   std::uint64_t missing = 0;    ///< number of steps without effect since the last complete one
   std::uint64_t offset = 0;     ///< World::steps() minus `completed`
-  std::uint32_t started = 0;    ///< 1: SavedArrays are those of a step that is not complete
+  std::uint32_t started = 0;    ///< 1: SavedColumns are those of a step that is not complete
   std::uint32_t held = 0;       ///< 1: the host has changes that the next step must see
   ContactSizes contacts[2];     ///< of the last two steps, by the parity of `completed` before them
 };
@@ -130,13 +130,6 @@ struct DeviceContacts {
   Vec3* position_before = nullptr;  ///< by body, at the start of the step
 };
 
-/// The arrays that a step changes before it can fail, as they were at its start, by body.
-struct SavedArrays {
-  Vec3* last_acceleration = nullptr;
-  Real *mean_motion = nullptr, *rest_time = nullptr;
-  std::uint8_t* awake = nullptr;
-};
-
 /// Everything that the programs of a step use, passed to kernels by value.
 struct StepData {
   soft_step::StepBodies step;
@@ -183,7 +176,7 @@ struct StepData {
   MotionCells* motion_cells = nullptr;  ///< by body
   FreeCells* free_cells = nullptr;      ///< by body
   RowBody* row_bodies = nullptr;        ///< by body
-  SavedArrays saved;
+  SavedColumns<PointerColumn> saved;    ///< as they were at the start of the step
 
   JFPX_HD BodyCells cells(std::uint32_t body) const {
     return {&motion_cells[body], &free_cells[body]};
