@@ -63,6 +63,9 @@ inline constexpr Interval kAboveZeroToOne{0, 1, "in (0, 1]", true};
 inline constexpr Interval kSize{0, kMaxCoordinate, "> 0 and at most 1e9", true};
 inline constexpr Interval kSizes{0, kMaxCoordinate, "> 0 and at most 1e9 each", true};
 inline constexpr Interval kInWorld{-kMaxCoordinate, kMaxCoordinate, "between -1e9 and 1e9"};
+/// A denormal length of a step, and all values computed from it, would lose digits.
+inline constexpr Interval kStepLength{std::numeric_limits<Real>::min(), kMostReal,
+                                      "finite, > 0 and not denormal"};
 inline constexpr UnitLength kUnitVector{"a unit vector, to a thousandth"};
 inline constexpr UnitLength kUnitQuaternion{"a unit quaternion, to a thousandth"};
 

@@ -1,5 +1,7 @@
-/// Validation of fields by the ranges of field.hpp.
+/// Validation of fields and arguments by the ranges of field.hpp.
 #pragma once
+
+#include <jfpx/error.hpp>
 
 #include "src/scene/field.hpp"
 #include "src/scene/scene_validate.hpp"
@@ -16,6 +18,12 @@ inline namespace JFPX_ABI {
 template <class Value>
 std::string fault(std::string_view field, const Value& value, std::string_view range) {
   return std::string(field) + " is " + to_text(value) + "; it must be " + std::string(range);
+}
+
+/// @throws InvalidArgument if a value is not in its range
+template <class Value, class Range>
+void require_in_range(std::string_view name, const Value& value, const Range& range) {
+  if (!range.contains(value)) throw InvalidArgument(fault(name, value, range.text));
 }
 
 /// Apart from the functions below, so that compilers inline these.

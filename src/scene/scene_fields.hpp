@@ -88,11 +88,8 @@ void each_field(Is<MaterialSettings> auto& settings, const auto& visit) {
 /// Name and settings, without the bodies and pairs.
 void each_field(Is<Scene> auto& scene, const auto& visit) {
   auto& [name, dt, bodies, solver, soft_step, resolver, sleep, materials, ignored_pairs] = scene;
-  // A denormal dt, and all values computed from it, would lose digits.
-  constexpr Interval kStep{std::numeric_limits<Real>::min(), kMostReal,
-                           "finite, > 0 and not denormal"};
   visit(field("name"), name);
-  visit(field("dt", kStep), dt);
+  visit(field("dt", kStepLength), dt);
   visit(field("solver", Enumerator{"one of the values of Solver"}), solver);
   visit(field("soft_step"), soft_step);
   visit(field("resolver"), resolver);

@@ -2,10 +2,9 @@
 #include <jfpx/error.hpp>
 #include <jfpx/particle.hpp>
 
-#include "src/scene/scene_validate.hpp"
+#include "src/scene/field_fault.hpp"
 #include "src/world/particle_resolver.hpp"
 
-#include <limits>
 #include <new>
 #include <string>
 #include <utility>
@@ -14,51 +13,30 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-template <class Value>
-void require(bool good, const char* field, const Value& value, const char* range) {
-  if (good) return;
-  throw InvalidArgument(std::string(field) + " is " + to_text(value) + "; it must be " + range);
-}
-
-bool in_world(const Vec3& v) {
-  return absolute(v.x) <= kMaxCoordinate && absolute(v.y) <= kMaxCoordinate &&
-         absolute(v.z) <= kMaxCoordinate;
-}
-
 void validate(const ParticleState& state) {
-  require(in_world(state.position), "position", state.position, "between -1e9 and 1e9");
-  require(is_finite(state.velocity), "velocity", state.velocity, "finite");
+  require_in_range("position", state.position, kInWorld);
+  require_in_range("velocity", state.velocity, kFinite);
 }
 
 void validate(const ParticleDef& def) {
-  require(def.mass >= 0 && is_finite(def.mass), "mass", def.mass, "finite and >= 0");
-  require(!(def.mass > 0) || is_finite(Real(1) / def.mass), "mass", def.mass,
-          "0 or such that its inverse is finite");
+  const std::string found = find_mass_fault(def.mass);
+  if (!found.empty()) throw InvalidArgument(found);
   validate(ParticleState{def.position, def.velocity});
-  require(is_finite(def.acceleration), "acceleration", def.acceleration, "finite");
-  require(def.damping > 0 && def.damping <= 1, "damping", def.damping, "in (0, 1]");
-  require(def.radius >= 0 && def.radius <= kMaxCoordinate, "radius", def.radius,
-          ">= 0 and at most 1e9");
-  require(def.restitution >= 0 && def.restitution <= 1, "restitution", def.restitution,
-          "in [0, 1]");
+  require_in_range("acceleration", def.acceleration, kFinite);
+  require_in_range("damping", def.damping, kAboveZeroToOne);
+  require_in_range("radius", def.radius, Interval{0, kMaxCoordinate, ">= 0 and at most 1e9"});
+  require_in_range("restitution", def.restitution, kZeroToOne);
 }
 
 void validate(const ParticleSettings& settings) {
-  const auto positive = [](Real x) { return x > 0 && is_finite(x); };
-  require(settings.dt >= std::numeric_limits<Real>::min() && is_finite(settings.dt), "dt",
-          settings.dt, "finite, > 0 and not denormal");
+  require_in_range("dt", settings.dt, kStepLength);
   for (const HalfSpace& ground : settings.grounds) {
-    require(absolute(length_squared(ground.normal) - 1) <= kUnitTolerance, "normal of a ground",
-            ground.normal, "a unit vector, to a thousandth");
-    require(absolute(ground.offset) <= kMaxCoordinate, "offset of a ground", ground.offset,
-            "between -1e9 and 1e9");
+    require_in_range("normal of a ground", ground.normal, kUnitVector);
+    require_in_range("offset of a ground", ground.offset, kInWorld);
   }
-  require(positive(settings.velocity_epsilon), "velocity_epsilon", settings.velocity_epsilon,
-          "finite and > 0");
-  require(positive(settings.position_epsilon), "position_epsilon", settings.position_epsilon,
-          "finite and > 0");
-  require(settings.restitution_velocity >= 0 && is_finite(settings.restitution_velocity),
-          "restitution_velocity", settings.restitution_velocity, "finite and >= 0");
+  require_in_range("velocity_epsilon", settings.velocity_epsilon, kPositive);
+  require_in_range("position_epsilon", settings.position_epsilon, kPositive);
+  require_in_range("restitution_velocity", settings.restitution_velocity, kNotNegative);
 }
 
 }  // namespace
@@ -129,7 +107,7 @@ void ParticleWorld::Impl::find_contacts() {
 
 bool ParticleWorld::Impl::all_in_world(ParticleReport* report) const {
   for (const ParticleId id : particles.ids()) {
-    if (in_world(particles.moving.position[id.index]) &&
+    if (kInWorld.contains(particles.moving.position[id.index]) &&
         is_finite(particles.moving.velocity[id.index])) {
       continue;
     }
@@ -213,7 +191,7 @@ void ParticleWorld::set_state(ParticleId id, const ParticleState& state) {
 
 void ParticleWorld::apply_force(ParticleId id, const Vec3& force) {
   const std::uint32_t i = impl_->require_alive(id);
-  require(is_finite(force), "force", force, "finite");
+  require_in_range("force", force, kFinite);
   impl_->particles.moving.force[i] += force;
 }
 

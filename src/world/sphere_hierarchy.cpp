@@ -6,7 +6,7 @@
 #include "src/base/reserve.hpp"
 #include "src/collide/bounding_sphere.hpp"
 #include "src/collide/sphere_pair.hpp"
-#include "src/scene/scene_validate.hpp"
+#include "src/scene/field_fault.hpp"
 
 #include <algorithm>
 #include <string>
@@ -20,11 +20,8 @@ bool touch(const SphereInstance& a, const SphereInstance& b) {
 }
 
 void check(const SphereInstance& sphere) {
-  if (!is_finite(sphere.centre)) {
-    throw InvalidArgument("centre is " + to_text(sphere.centre) + "; it must be finite");
-  }
-  if (sphere.radius > 0 && is_finite(sphere.radius)) return;
-  throw InvalidArgument("radius is " + to_text(sphere.radius) + "; it must be finite and > 0");
+  require_in_range("centre", sphere.centre, kFinite);
+  require_in_range("radius", sphere.radius, kPositive);
 }
 
 /// Whether one child holds more than three quarters of the leaves.
@@ -37,8 +34,7 @@ Vec3 extent(const Aabb& box) { return box.upper - box.lower; }
 }  // namespace
 
 SphereHierarchy::SphereHierarchy(Real slack) : slack_(slack) {
-  if (slack >= 0 && is_finite(slack)) return;
-  throw InvalidArgument("slack is " + to_text(slack) + "; it must be finite and >= 0");
+  require_in_range("slack", slack, kNotNegative);
 }
 
 SphereHierarchy::Leaf SphereHierarchy::insert(const SphereInstance& sphere) {

@@ -1,7 +1,7 @@
 /// Access to a World between two steps: bodies, states, forces and contact generators.
 #include <jfpx/error.hpp>
 
-#include "src/scene/scene_validate.hpp"
+#include "src/scene/field_fault.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>
@@ -9,15 +9,6 @@
 
 namespace jfpx {
 inline namespace JFPX_ABI {
-namespace {
-
-void require_finite(const char* name, const Vec3& value) {
-  if (is_finite(value)) return;
-  throw InvalidArgument(std::string(name) + " is " + to_text(value) + "; it must be finite");
-}
-
-}  // namespace
-
 BodyId World::add(const BodyDef& body) {
   const std::uint64_t number = impl_->store.size();
   validate_body_count(number + 1);
@@ -84,14 +75,14 @@ Mat3 World::inverse_inertia(BodyId id) const {
 
 void World::apply_force(BodyId id, const Vec3& force) {
   const std::uint32_t body = impl_->store.require(id);
-  require_finite("force", force);
+  require_in_range("force", force, kFinite);
   impl_->edited_body(body, {.wakes = true}).apply_force(body, force);
 }
 
 void World::apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point) {
   const std::uint32_t body = impl_->store.require(id);
-  require_finite("force", force);
-  require_finite("point", point);
+  require_in_range("force", force, kFinite);
+  require_in_range("point", point, kFinite);
   const Vec3 arm = point - impl_->position(body);
   BodyStore& store = impl_->edited_body(body, {.wakes = true});
   store.apply_force(body, force);
@@ -100,7 +91,7 @@ void World::apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point
 
 void World::apply_torque(BodyId id, const Vec3& torque) {
   const std::uint32_t body = impl_->store.require(id);
-  require_finite("torque", torque);
+  require_in_range("torque", torque, kFinite);
   impl_->edited_body(body, {.wakes = true}).apply_torque(body, torque);
 }
 
