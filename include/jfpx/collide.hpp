@@ -122,5 +122,14 @@ JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose, const 
 JFPX_API Manifold collide(const Box& a, const Transform& pose_a, const Box& b,
                           const Transform& pose_b);
 
+/// Two solids of any kind. Thread-safe. Two capsules within 3 degrees of parallel, and a capsule
+/// within 3 degrees of a face of a box, have two points if both touch; other pairs with a capsule
+/// have one. The features are the numbers of the points.
+JFPX_API Manifold collide(const SolidShape& a, const Transform& pose_a, const SolidShape& b,
+                          const Transform& pose_b);
+/// A solid of any kind against a half-space: of a capsule, the half balls that touch. Thread-safe.
+JFPX_API Manifold collide(const SolidShape& solid, const Transform& pose,
+                          const HalfSpace& half_space);
+
 }  // namespace JFPX_ABI
 }  // namespace jfpx

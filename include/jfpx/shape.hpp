@@ -22,6 +22,13 @@ struct Box {
   friend bool operator==(const Box&, const Box&) = default;
 };
 
+/// A solid capsule: all points within `radius` of a segment on the y axis of its body.
+struct Capsule {
+  Real radius = Real(0.5);       ///< [m], > 0
+  Real half_height = Real(0.5);  ///< [m], > 0, half the length of the segment
+  friend bool operator==(const Capsule&, const Capsule&) = default;
+};
+
 /// A solid half-space: all points p with dot(normal, p) <= offset, in world coordinates. It ignores
 /// the pose of its body.
 struct HalfSpace {
@@ -40,7 +47,7 @@ struct Plane {
 };
 
 /// The shapes that have a volume, and that can be parts of compounds.
-using SolidShape = std::variant<Sphere, Box>;
+using SolidShape = std::variant<Sphere, Box, Capsule>;
 
 /// A solid of a compound, with its pose in the axes of the body.
 struct CompoundPart {
@@ -51,7 +58,7 @@ struct CompoundPart {
   friend bool operator==(const CompoundPart&, const CompoundPart&) = default;
 };
 
-/// Spheres and boxes that move as one body (thesis 4.4.5) and do not collide with each other. The
+/// Solids that move as one body (thesis 4.4.5) and do not collide with each other. The
 /// body's mass is distributed in proportion to density times volume; overlapping volume counts for
 /// each of the parts. The centre of mass of a movable body must be the origin of its axes, to a
 /// thousandth of its bounding radius, because engines use the origin as the centre of mass. See
@@ -65,7 +72,7 @@ struct Compound {
 /// @param compound each part must be in the ranges that validate() requires
 JFPX_API Compound centred(Compound compound);
 
-using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound>;
+using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound, Capsule>;
 
 /// A sphere in world coordinates, the input of SphereCollider. The layout is that of four Reals.
 struct alignas(4 * sizeof(Real)) SphereInstance {

@@ -20,7 +20,8 @@ struct Posed {
 struct PairMotion {
   Vec3 motion;      ///< [m], of a relative to b during the step
   Real margin = 0;  ///< [m], >= 0
-  /// [m]: boxes that an axis separates by more have no contact, whatever their motion.
+  /// [m]: a box and a sphere, or another box, that are farther apart have no contact, whatever
+  /// their motion.
   Real limit = kMaxReal;
   Vec3 origin_a, origin_b;  ///< [m], centres of mass of the bodies
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/collide/shapes/box.hpp"
+#include "src/collide/shapes/capsule.hpp"
 #include "src/collide/shapes/plane.hpp"
 #include "src/collide/shapes/sphere.hpp"
 

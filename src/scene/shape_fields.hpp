@@ -16,6 +16,11 @@ void each_field(Is<Box> auto& box, const auto& visit) {
   auto& [half_extents] = box;
   visit(required_field("half_extents", kSizes), half_extents);
 }
+void each_field(Is<Capsule> auto& capsule, const auto& visit) {
+  auto& [radius, half_height] = capsule;
+  visit(required_field("radius", kSize), radius);
+  visit(required_field("half_height", kSize), half_height);
+}
 void each_field(Is<HalfSpace> auto& half_space, const auto& visit) {
   auto& [normal, offset] = half_space;
   visit(required_field("normal", kUnitVector), normal);

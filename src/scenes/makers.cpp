@@ -17,6 +17,16 @@ Vec3 lattice_site(std::uint32_t i, std::uint32_t side) {
   return {static_cast<Real>(in_layer % side), static_cast<Real>(storey), static_cast<Real>(row)};
 }
 
+/// A point of the four-dimensional unit ball, normalised.
+Quat random_orientation(Random& random) {
+  for (;;) {
+    const Quat q{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1),
+                 random.uniform(-1, 1)};
+    const Real n2 = length_squared(q);
+    if (n2 > Real(0.01) && n2 < 1) return normalized(q);
+  }
+}
+
 BodyDef sphere_at(const Vec3& position, Real radius, Real mass) {
   BodyDef body;
   body.shape = Sphere{radius};

@@ -13,6 +13,7 @@ namespace scenes {
 Scene make_boxes_and_balls(const Counts& counts);
 Scene make_big_ballistic(const Counts& counts);
 Scene make_mixed(const Counts& counts);
+Scene make_capsules(const Counts& counts);
 Scene make_pile(const Counts& counts);
 Scene make_heap(const Counts& counts);
 Scene make_dam_break(const Counts& counts);
@@ -33,6 +34,9 @@ std::uint32_t cube_side(std::uint32_t n);
 /// Site i of a cubic lattice of spacing 1, with `side` sites along x and z and as many layers along
 /// y as required.
 Vec3 lattice_site(std::uint32_t i, std::uint32_t side);
+
+/// A uniformly distributed rotation.
+Quat random_orientation(Random& random);
 
 /// A movable sphere.
 BodyDef sphere_at(const Vec3& position, Real radius, Real mass);

@@ -6,16 +6,6 @@ inline namespace JFPX_ABI {
 namespace scenes {
 namespace {
 
-/// A uniformly distributed rotation: a point of the four-dimensional unit ball, normalised.
-Quat random_orientation(Random& random) {
-  for (;;) {
-    const Quat q{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1),
-                 random.uniform(-1, 1)};
-    const Real n2 = length_squared(q);
-    if (n2 > Real(0.01) && n2 < 1) return normalized(q);
-  }
-}
-
 BodyDef half_space(const Vec3& normal, Real offset) {
   BodyDef def;
   def.shape = HalfSpace{normal, offset};

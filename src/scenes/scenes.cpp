@@ -20,6 +20,8 @@ constexpr Entry kScenes[] = {
      make_big_ballistic},
     {"mixed", "balls and boxes of many sizes fall into a pit of half-spaces", 1000,
      Boxes::as_many_as_spheres, make_mixed},
+    {"capsules", "balls, boxes, capsules and crosses of two capsules fall onto the ground", 40,
+     Boxes::as_many_as_spheres, make_capsules},
     {"pile", "a jittered lattice of spheres falls into an open box and comes to rest", 2048,
      Boxes::none, make_pile},
     {"heap", "spheres of radius 0.45 to 0.5 m fall into an open box, come to rest and sleep", 4096,

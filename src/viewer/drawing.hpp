@@ -90,7 +90,7 @@ class Drawing {
     } else if constexpr (std::is_same_v<S, Box>) {
       add_box(centre, solid.half_extents, turn, paint);
     } else {
-      const jfpx::detail::Solid rounded = to_solid(solid);
+      const jfpx::detail::Solid rounded = jfpx::detail::to_solid(solid);
       add_rounded(centre, rounded.half_extents, rounded.radius, turn, paint);
     }
   }

@@ -45,14 +45,25 @@ class ContactOracle {
     Transform pose;
     Shape shape;
     bool is_sphere() const { return std::holds_alternative<Sphere>(shape); }
-    bool is_box() const { return std::holds_alternative<Box>(shape); }
+    bool is_wall() const {
+      return std::holds_alternative<HalfSpace>(shape) || std::holds_alternative<Plane>(shape);
+    }
+    /// Order of the kinds: spheres, boxes, capsules, walls.
+    int kind() const {
+      if (is_sphere()) return 0;
+      return std::holds_alternative<Box>(shape) ? 1 : is_wall() ? 3 : 2;
+    }
+    SolidShape solid() const {
+      if (is_sphere()) return std::get<Sphere>(shape);
+      if (const auto* box = std::get_if<Box>(&shape)) return *box;
+      return std::get<Capsule>(shape);
+    }
     SphereInstance sphere() const { return {pose.origin, std::get<Sphere>(shape).radius}; }
-    const Box& box() const { return std::get<Box>(shape); }
   };
   struct Found {
-    /// Sort key: sphere pairs first, then by bodies, then by sub-shapes: spheres first, each kind
+    /// Sort key: sphere pairs first, then by bodies, then by sub-shapes: by kind, each kind
     /// in the order of the parts.
-    std::tuple<bool, std::uint32_t, std::uint32_t, bool, std::uint32_t, bool, std::uint32_t> order;
+    std::tuple<bool, std::uint32_t, std::uint32_t, int, std::uint32_t, int, std::uint32_t> order;
     Contact contact;
   };
 
@@ -86,16 +97,10 @@ class ContactOracle {
       const PairResult r = detail::test_sphere_pair(a, b);
       if (r.touching == 0) return;
       add(p, q, swap ? -r.normal : r.normal, middle_point(r.normal, r.distance, b), r.distance);
-    } else if (p.is_sphere() && q.is_box()) {
-      add(p, q, collide(p.sphere(), q.box(), q.pose), false);
-    } else if (p.is_box() && q.is_sphere()) {
-      add(p, q, collide(q.sphere(), p.box(), p.pose), true);
-    } else if (p.is_box() && q.is_box()) {
-      add(p, q, collide(p.box(), p.pose, q.box(), q.pose));
-    } else if (p.is_sphere()) {
-      add(p, q, collide(p.sphere(), solid(q.shape, p.body)), false);
+    } else if (q.is_wall()) {
+      add(p, q, collide(p.solid(), p.pose, solid(q.shape, p.body)));
     } else {
-      add(p, q, collide(p.box(), p.pose, solid(q.shape, p.body)));
+      add(p, q, collide(p.solid(), p.pose, q.solid(), q.pose));
     }
   }
 
@@ -109,12 +114,9 @@ class ContactOracle {
 
   void add(const SubShape& p, const SubShape& q, const Vec3& normal, const Vec3& point,
            Real distance) {
-    found_.push_back({{!(p.is_sphere() && q.is_sphere()), p.body, q.body, !p.is_sphere(), p.part,
-                       !q.is_sphere(), q.part},
-                      {bodies_.id(p.body), bodies_.id(q.body), normal, point, distance}});
-  }
-  void add(const SubShape& p, const SubShape& q, const Touch& t, bool flip) {
-    if (t.touching) add(p, q, flip ? -t.normal : t.normal, t.point, t.distance);
+    found_.push_back(
+        {{!(p.is_sphere() && q.is_sphere()), p.body, q.body, p.kind(), p.part, q.kind(), q.part},
+         {bodies_.id(p.body), bodies_.id(q.body), normal, point, distance}});
   }
   void add(const SubShape& p, const SubShape& q, const Manifold& m) {
     for (int k = 0; k < m.count; ++k) {

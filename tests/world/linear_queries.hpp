@@ -43,33 +43,13 @@ class LinearQueries {
   }
 
   std::vector<BodyId> overlapping(const Sphere& sphere, const Vec3& centre) const {
-    const SphereInstance solid{centre, sphere.radius};
-    return bodies_touching([&](const auto& shape, const Transform& pose) {
-      using S = std::decay_t<decltype(shape)>;
-      if constexpr (std::is_same_v<S, Sphere>) {
-        return !(length(centre - pose.origin) > sphere.radius + shape.radius);
-      } else if constexpr (std::is_same_v<S, Box>) {
-        return collide(solid, shape, pose).touching;
-      } else {
-        return collide(solid, shape).touching;
-      }
-    });
+    return bodies_touching(sphere, {{}, centre});
   }
 
   /// @param orientation of length 1
   std::vector<BodyId> overlapping(const Box& box, const Vec3& centre,
                                   const Quat& orientation) const {
-    const Transform at = make_transform(normalized(orientation), centre);
-    return bodies_touching([&](const auto& shape, const Transform& pose) {
-      using S = std::decay_t<decltype(shape)>;
-      if constexpr (std::is_same_v<S, Sphere>) {
-        return collide(SphereInstance{pose.origin, shape.radius}, box, at).touching;
-      } else if constexpr (std::is_same_v<S, Box>) {
-        return collide(box, at, shape, pose).count > 0;
-      } else {
-        return collide(box, at, shape).count > 0;
-      }
-    });
+    return bodies_touching(box, make_transform(normalized(orientation), centre));
   }
 
  private:
@@ -96,15 +76,13 @@ class LinearQueries {
     std::visit(visit_parts, *body.shape);
   }
 
-  static detail::RayEntry enter(const Ray& ray, const Sphere& sphere, const Transform& pose) {
-    return detail::enter(ray.origin, ray.direction, SphereInstance{pose.origin, sphere.radius});
-  }
-  static detail::RayEntry enter(const Ray& ray, const Box& box, const Transform& pose) {
-    return detail::enter(ray.origin, ray.direction, box, pose);
-  }
-  template <class Wall>
-  static detail::RayEntry enter(const Ray& ray, const Wall& wall, const Transform&) {
-    return detail::enter(ray.origin, ray.direction, wall);
+  template <class S>
+  static detail::RayEntry enter(const Ray& ray, const S& shape, const Transform& pose) {
+    if constexpr (detail::kIsSolid<S>) {
+      return detail::enter(ray.origin, ray.direction, shape, pose);
+    } else {
+      return detail::enter(ray.origin, ray.direction, shape);
+    }
   }
 
   /// Scaled by a power of two before the normalization, as in a World.
@@ -131,8 +109,21 @@ class LinearQueries {
     }
   }
 
-  template <class Touches>
-  std::vector<BodyId> bodies_touching(const Touches& touches) const {
+  std::vector<BodyId> bodies_touching(const SolidShape& solid, const Transform& at) const {
+    const auto touches = [&](const auto& shape, const Transform& pose) {
+      using S = std::decay_t<decltype(shape)>;
+      if constexpr (std::is_same_v<S, HalfSpace>) {
+        return collide(solid, at, shape).count > 0;
+      } else if constexpr (std::is_same_v<S, Plane>) {
+        const bool behind = dot(shape.normal, at.origin) < shape.offset;
+        return collide(solid, at,
+                       behind ? HalfSpace{-shape.normal, -shape.offset}
+                              : HalfSpace{shape.normal, shape.offset})
+                   .count > 0;
+      } else {
+        return collide(solid, at, SolidShape(shape), pose).count > 0;
+      }
+    };
     std::vector<BodyId> found;
     for (const Body& body : bodies_) {
       bool any = false;

@@ -57,6 +57,12 @@ struct Solid {
       const double len = std::sqrt(dot(n, n));
       return (dot(n, p) - static_cast<double>(plane->offset)) / len;
     }
+    if (const auto* capsule = std::get_if<Capsule>(&shape)) {
+      Point local = to_local(p);
+      const auto half = static_cast<double>(capsule->half_height);
+      local[1] -= std::clamp(local[1], -half, half);
+      return std::sqrt(dot(local, local)) - static_cast<double>(capsule->radius);
+    }
     const Point local = to_local(p), h = to_double(std::get<Box>(shape).half_extents);
     double outside = 0, inside = -1e300;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -66,9 +72,24 @@ struct Solid {
     }
     return outside > 0 ? std::sqrt(outside) : inside;
   }
-  /// The point of a box nearest to p.
+  /// Radius of a box or a capsule.
+  double size() const {
+    if (const auto* capsule = std::get_if<Capsule>(&shape)) {
+      return static_cast<double>(capsule->radius + capsule->half_height);
+    }
+    return static_cast<double>(length(std::get<Box>(shape).half_extents));
+  }
+  /// The point of a box or a capsule nearest to p.
   Point nearest(const Point& p, double shrunk_by) const {
     Point local = to_local(p);
+    if (const auto* capsule = std::get_if<Capsule>(&shape)) {
+      const auto half = static_cast<double>(capsule->half_height);
+      const double radius = static_cast<double>(capsule->radius) - shrunk_by;
+      const Point core{0, std::clamp(local[1], -half, half), 0};
+      local[1] -= core[1];
+      const double reach = std::sqrt(dot(local, local));
+      return to_world(along(core, local, reach > radius ? radius / reach : 1));
+    }
     const Point h = to_double(std::get<Box>(shape).half_extents);
     for (std::size_t i = 0; i < 3; ++i) {
       local[i] = std::clamp(local[i], shrunk_by - h[i], h[i] - shrunk_by);
@@ -89,14 +110,15 @@ double march(const Solid& solid, const Point& origin, const Point& direction, do
   return std::numeric_limits<double>::infinity();
 }
 
-/// Balls, boxes and a half-space, some of them overlapping.
+/// Balls, boxes, capsules and a half-space, some of them overlapping.
 Scene random_scene(Random* random, int bodies) {
   Scene scene;
   for (int i = 0; i < bodies; ++i) {
     BodyDef def = test::ball(random->uniform_in_box({-5, -5, -5}, {5, 5, 5}),
                              random->uniform(0.1_r, 1.5_r), static_cast<Real>(i % 3));
-    if (i % 2 != 0) {
+    if (i % 3 != 0) {
       def.shape = Box{random->uniform_in_box({0.05_r, 0.05_r, 0.05_r}, {2, 2, 2})};
+      if (i % 3 == 1) def.shape = Capsule{random->uniform(0.05_r, 1), random->uniform(0.05_r, 2)};
       const Vec3 v = random->uniform_in_box({-1, -1, -1}, {1, 1, 1});
       def.orientation = normalized(Quat{random->uniform(-1, 1), v.x, v.y, v.z});
     }
@@ -352,8 +374,8 @@ TEST(Overlap, OfASphereAgreesWithTheDistanceFunctions) {
   EXPECT_GT(touching, 1000u);
 }
 
-/// Upper bound of the distance of two boxes, by alternating projections (Cheney and Goldstein 1959)
-/// until it is at most `enough`. Nearly parallel edges converge slowly.
+/// Upper bound of the distance of two boxes or capsules, by alternating projections (Cheney and
+/// Goldstein 1959) until it is at most `enough`. Nearly parallel edges converge slowly.
 double gap(const Solid& a, const Solid& b, double shrunk_by, double enough, int most = 300000) {
   Point p = a.centre, q = b.centre;
   double distance = 1e300;
@@ -400,8 +422,7 @@ TEST(Overlap, OfABoxAgreesWithTheDistanceFunctions) {
           }
         } else if (found.contains(body)) {
           // The tolerance of collide() for nearly parallel edges, and 1 mm for the oracle.
-          const double size = static_cast<double>(length(std::get<Box>(def.shape).half_extents) +
-                                                  length(std::get<Box>(solid.shape).half_extents));
+          const double size = box.size() + solid.size();
           const double near = 2 * std::sqrt(static_cast<double>(kEpsilon)) * size + 1e-3;
           distance = gap(box, solid, 0, near) <= near ? -1 : 1;
         } else {

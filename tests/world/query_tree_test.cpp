@@ -42,6 +42,10 @@ class RandomPlace {
         return std::max(x, std::numeric_limits<Real>::denorm_min());
       };
       if constexpr (std::is_same_v<S, Sphere>) shape.radius = positive(shape.radius * k);
+      if constexpr (std::is_same_v<S, Capsule>) {
+        shape.radius = positive(shape.radius * k);
+        shape.half_height = positive(shape.half_height * k);
+      }
       if constexpr (std::is_same_v<S, Box>) {
         for (int i = 0; i < 3; ++i) shape.half_extents[i] = positive(shape.half_extents[i] * k);
       }
@@ -104,6 +108,7 @@ Ray random_ray(Random* random, const RandomPlace& place, const World& world) {
   Real radius = place.length();
   if (const auto* sphere = std::get_if<Sphere>(&world.shape(body))) radius = sphere->radius;
   if (const auto* box = std::get_if<Box>(&world.shape(body))) radius = length(box->half_extents);
+  if (const auto* capsule = std::get_if<Capsule>(&world.shape(body))) radius = capsule->radius;
   const Vec3 beside = normalized(cross(ray.direction, random_direction(random)));
   const Vec3 target =
       add_scaled(centre, beside, radius * random->uniform(Real(0.999), Real(1.001)));

@@ -21,8 +21,10 @@ inline Vec3 random_direction(Random* random) {
   return normalized(rotate(random_rotation(random), {1, 0, 0}));
 }
 
-inline std::variant<Sphere, Box> random_sub_shape(Random* random) {
-  if (random->below(2) == 0) return Sphere{random->uniform(0.1_r, 0.6_r)};
+inline SolidShape random_sub_shape(Random* random) {
+  const std::uint64_t kind = random->below(5);
+  if (kind < 2) return Sphere{random->uniform(0.1_r, 0.6_r)};
+  if (kind == 2) return Capsule{random->uniform(0.1_r, 0.4_r), random->uniform(0.1_r, 0.6_r)};
   return Box{random->uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {0.5_r, 0.7_r, 0.9_r})};
 }
 
@@ -40,8 +42,8 @@ inline Compound random_compound(Random* random) {
   return centred(compound);
 }
 
-/// A sphere, a box or a compound with a probability of about a third each, sometimes immovable;
-/// rarely a wall.
+/// A sphere, another solid or a compound with a probability of about a third each, sometimes
+/// immovable; rarely a wall.
 inline BodyDef random_body(Random* random, Real room) {
   BodyDef def;
   const std::uint64_t kind = random->below(31);

@@ -28,6 +28,7 @@ endif()
 jfpx_add_test(world_test SOURCES
   world/box_test.cpp
   world/buoyancy_test.cpp
+  world/capsule_world_test.cpp
   world/contact_events_test.cpp
   world/contact_generator_test.cpp
   world/erratum_test.cpp

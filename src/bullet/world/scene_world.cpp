@@ -12,6 +12,7 @@
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
+#include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
@@ -48,6 +49,10 @@ btTransform principal_axes(const PrincipalInertia& inertia) {
 btCollisionShape* bullet_shape(const Sphere& sphere) { return new btSphereShape(sphere.radius); }
 btCollisionShape* bullet_shape(const Box& box) {
   return new btBoxShape(to_bullet(box.half_extents));
+}
+
+btCollisionShape* bullet_shape(const Capsule& capsule) {
+  return new btCapsuleShape(capsule.radius, 2 * capsule.half_height);
 }
 
 /// Creates and owns shapes; if they are shared, equal shapes are created once.
@@ -142,6 +147,18 @@ PrincipalInertia inertia_of(const BodyDef& def) {
                                        : mass_properties(*compound, def.mass).inertia);
 }
 
+/// The moments of inertia of a solid. Bullet's are exact for spheres and boxes; those of other
+/// shapes are of a box around them.
+btVector3 inertia_of(const BodyDef& def, const btCollisionShape* shape) {
+  if (std::holds_alternative<Sphere>(def.shape) || std::holds_alternative<Box>(def.shape)) {
+    btVector3 inertia(0, 0, 0);
+    shape->calculateLocalInertia(def.mass, inertia);
+    return inertia;
+  }
+  const Mat3 inertia = solid_inertia(def.shape, def.mass);
+  return {inertia(0, 0), inertia(1, 1), inertia(2, 2)};
+}
+
 Real factor(CombineRule rule, Real coefficient) {
   return rule == CombineRule::product ? coefficient : square_root(coefficient);
 }
@@ -153,7 +170,7 @@ std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const PrincipalInerti
   const bool compound = std::holds_alternative<Compound>(def.shape);
   btVector3 inertia(0, 0, 0);
   if (compound) inertia = to_bullet(own.moments);
-  if (mass > 0 && !compound) shape->calculateLocalInertia(mass, inertia);
+  if (mass > 0 && !compound) inertia = inertia_of(def, shape);
   if (mass > 0 && !compound && def.inertia) {
     inertia = {(*def.inertia)(0, 0), (*def.inertia)(1, 1), (*def.inertia)(2, 2)};
   }

@@ -104,11 +104,14 @@ JFPX_HD inline Vec3 offset_from_box(const Vec3& point, const Box& box) {
   }
   return offset;
 }
-/// Distance of a sphere from a box, with the arithmetic of collide(sphere, box, pose).
-JFPX_HD inline Separation separation(const Vec3& centre, Real radius, const Posed<Box>& box) {
+/// Distance of a sphere from a box, with the arithmetic of collide(sphere, box, pose). Not valid if
+/// it is larger than `limit`.
+JFPX_HD inline Separation separation(const Vec3& centre, Real radius, const Posed<Box>& box,
+                                     Real limit) {
   const Vec3 local = transform_transpose(box.pose.basis, centre - box.pose.origin);
   const Vec3 outside = offset_from_box(local, box.shape);
   const Real gap = length(outside);
+  if (gap > radius + limit) return {{}, 0, false};
   if (gap > kEpsilon) return {box.pose.basis * (outside * (Real(1) / gap)), gap - radius};
   int face = 0;
   Vec3 depth;
@@ -127,7 +130,7 @@ JFPX_HD inline void find_contact(const SphereInstance& a, const Posed<Box>& b,
   Real t = 0;
   const auto separation_at = [&](Real part) {
     centre = moved(a.centre, pair, part);
-    return closest = separation(centre, a.radius, b);
+    return closest = separation(centre, a.radius, b, pair.limit);
   };
   if (!advance(pair, separation_at, &t)) return;
   const Vec3& n = closest.normal;
