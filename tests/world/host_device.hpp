@@ -79,7 +79,7 @@ class HostTeam {
     return sum;
   }
   template <class BinOf, class Place>
-  void partition(std::uint32_t n, std::uint8_t* bins, std::uint32_t* begin, const BinOf& bin_of,
+  void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* begin, const BinOf& bin_of,
                  const Place& place) const {
     std::vector<std::uint32_t> next(device::kBins + 1);
     for (std::uint32_t i = 0; i < n; ++i) {

@@ -26,9 +26,11 @@ struct PointRow {
 /// Whether the point has pushed the bodies apart in this step.
 JFPX_HD inline bool has_pushed(const PointRow& p) { return !std::signbit(p.rebound); }
 
-/// A sweep changes only `rolling_impulse` and the points: device::SolveProgram::store() writes no
-/// other field back.
+/// A sweep changes only `rolling_impulse` and the points: see store_changes().
 struct ManifoldRow {
+  using Part = PointRow;
+  static constexpr bool kReadsRotation = true;
+
   std::uint32_t a = 0, b = 0;  ///< bodies; a is movable
   std::uint32_t first = 0;     ///< index of the first point
   std::uint32_t count = 0;     ///< number of points
@@ -37,6 +39,11 @@ struct ManifoldRow {
   Real rolling_friction = 0, spinning_friction = 0;  ///< [m]
   Vec3 rolling_impulse;  ///< [N m s], torque impulse of rolling and spinning friction on a
 };
+
+/// Writes the fields that a sweep changes.
+JFPX_HD inline void store_changes(const ManifoldRow& from, ManifoldRow* to) {
+  to->rolling_impulse = from.rolling_impulse;
+}
 
 /// The bodies of a manifold, and their inverse inertia in world axes.
 struct BodyPair {
@@ -215,6 +222,13 @@ JFPX_HD inline void solve(ManifoldRow* row, PointRow* points, const BodyPair& pa
   }
   solve_normals<kFixed>(*row, points, pair, step, use_bias);
   if (row->count > 1) solve_normals<kFixed>(*row, points, pair, step, use_bias);
+}
+
+/// Whether restitute() has an effect if the points push the bodies apart.
+JFPX_HD inline bool any_rebounds(const ManifoldRow& row, const PointRow* points) {
+  bool any = false;
+  for (std::uint32_t i = 0; i < row.count; ++i) any |= points[i].rebound < 0;
+  return any;
 }
 
 template <bool kFixed>

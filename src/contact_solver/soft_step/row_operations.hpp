@@ -1,27 +1,39 @@
-/// Operations of the sweeps of a soft step on one row of either kind. For spheres, `impacts` is
-/// ImpactBodies, or a type that rebound() can use in its place.
+/// Operations of the sweeps of a soft step on one row of any kind.
 ///
 /// `kChangesRow`: the operation changes fields of the row. `kMovesBodies`: it changes the shift,
 /// the rotation or the free motion of bodies. A device writes nothing else back; the CPU ignores
 /// both.
 #pragma once
 
-#include "src/contact_solver/soft_step/manifold_row.hpp"
-#include "src/contact_solver/soft_step/sphere_row.hpp"
+#include "src/contact_solver/soft_step/row_setup.hpp"
+
+#include <concepts>
+#include <cstdint>
+#include <tuple>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
+/// What an operation uses besides the row.
+/// @tparam Part    Row::Part
+/// @tparam Impacts ImpactBodies, or a type that rebound() can use in its place
+template <class Part, class Impacts>
+struct RowContext {
+  BodyPair bodies;         ///< without the inertia for a row that does not read it
+  Part* parts;             ///< of the row; null for NoPart
+  const Impacts* impacts;  ///< may be null for a row that does not rebound in a sweep
+};
+
 struct WarmStart {
   static constexpr bool kChangesRow = false, kMovesBodies = false;
   template <bool kFixed, class Impacts>
-  JFPX_HD void run(SphereRow* row, SolverBody* a, SolverBody* b, const Impacts&) const {
-    warm_start<kFixed>(*row, a, b);
+  JFPX_HD void run(SphereRow* row, const RowContext<NoPart, Impacts>& c) const {
+    warm_start<kFixed>(*row, c.bodies.a, c.bodies.b);
   }
-  template <bool kFixed>
-  JFPX_HD void run(ManifoldRow* row, PointRow* points, const BodyPair& pair) const {
-    warm_start<kFixed>(*row, points, pair);
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(ManifoldRow* row, const RowContext<PointRow, Impacts>& c) const {
+    warm_start<kFixed>(*row, c.parts, c.bodies);
   }
 };
 
@@ -31,12 +43,12 @@ struct Solve {
   static constexpr bool kChangesRow = true, kMovesBodies = true;
   const StepConstants& constants;
   template <bool kFixed, class Impacts>
-  JFPX_HD void run(SphereRow* row, SolverBody* a, SolverBody* b, const Impacts& impacts) const {
-    solve<kFixed>(row, a, b, constants, impacts, kUseBias);
+  JFPX_HD void run(SphereRow* row, const RowContext<NoPart, Impacts>& c) const {
+    solve<kFixed>(row, c.bodies.a, c.bodies.b, constants, *c.impacts, kUseBias);
   }
-  template <bool kFixed>
-  JFPX_HD void run(ManifoldRow* row, PointRow* points, const BodyPair& pair) const {
-    solve<kFixed>(row, points, pair, constants, kUseBias);
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(ManifoldRow* row, const RowContext<PointRow, Impacts>& c) const {
+    solve<kFixed>(row, c.parts, c.bodies, constants, kUseBias);
   }
 };
 
@@ -44,12 +56,34 @@ struct Solve {
 struct Restitute {
   static constexpr bool kChangesRow = false, kMovesBodies = false;
   template <bool kFixed, class Impacts>
-  JFPX_HD void run(SphereRow*, SolverBody*, SolverBody*, const Impacts&) const {}
-  template <bool kFixed>
-  JFPX_HD void run(ManifoldRow* row, PointRow* points, const BodyPair& pair) const {
-    restitute<kFixed>(*row, points, pair);
+  JFPX_HD void run(SphereRow*, const RowContext<NoPart, Impacts>&) const {}
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(ManifoldRow* row, const RowContext<PointRow, Impacts>& c) const {
+    restitute<kFixed>(*row, c.parts, c.bodies);
   }
 };
+
+/// What every type of RowTypes has; see there.
+template <class Row>
+concept RowType = requires(Row row, typename Row::Part* parts, const RowSetup& setup,
+                           const RowContext<typename Row::Part, ImpactBodies>& context,
+                           const StepConstants& constants) {
+  { row.a } -> std::convertible_to<std::uint32_t>;
+  { row.b } -> std::convertible_to<std::uint32_t>;
+  { Row::kReadsRotation } -> std::convertible_to<bool>;
+  setup.template fill<false>(&row, parts, std::uint32_t{});
+  setup.template fill<true>(&row, parts, std::uint32_t{});
+  setup.store(row, parts, std::uint32_t{});
+  WarmStart().template run<false>(&row, context);
+  Solve<true>{constants}.template run<false>(&row, context);
+  Solve<false>{constants}.template run<false>(&row, context);
+  Restitute().template run<false>(&row, context);
+};
+template <class... Rows>
+constexpr bool are_row_types(const std::tuple<Rows...>*) {
+  return (RowType<Rows> && ...);
+}
+static_assert(are_row_types(static_cast<RowTypes*>(nullptr)));
 
 }  // namespace soft_step
 }  // namespace JFPX_ABI

@@ -5,9 +5,7 @@
 
 #include "src/collide/contact_basis.hpp"
 #include "src/contact_solver/soft_step/contact_set.hpp"
-#include "src/contact_solver/soft_step/greedy_coloring.hpp"
-#include "src/contact_solver/soft_step/manifold_row.hpp"
-#include "src/contact_solver/soft_step/sphere_row.hpp"
+#include "src/contact_solver/soft_step/row_kinds.hpp"
 
 #include <cstdint>
 
@@ -35,16 +33,6 @@ struct BodyProperties {
   MaterialSettings rules;
 };
 
-/// Kind of the row of a contact, which may differ from that of the contact: two balls with rolling
-/// friction have a row of a manifold, and a ball on a fixed box has a row of spheres.
-enum class RowKind : std::uint8_t { none, sphere, manifold };
-
-/// Groups of rows, which a sweep solves one after the other: contacts without a color, those of
-/// each color, and those with an immovable or kinematic body.
-inline constexpr std::uint32_t kGroups = kColors + 2u;
-inline constexpr std::uint32_t kOverflowGroup = 0, kFixedGroup = kGroups - 1;
-JFPX_HD constexpr std::uint32_t group_of_color(std::uint32_t color) { return 1 + color; }
-
 /// Makes rows of contacts. A row has the bodies of its contact in the order of a movable body a.
 struct RowSetup {
   ContactView contacts;
@@ -57,16 +45,18 @@ struct RowSetup {
   /// Whether body b of a contact becomes body a of its row, which must be movable.
   JFPX_HD bool is_flipped(const ContactKey& key) const { return !is_movable(key.a); }
 
-  /// `none` if no body is movable and awake, or if a movable body sleeps.
+  /// Kind of the row of a contact, which may differ from that of the contact: two balls with
+  /// rolling friction have a row of a manifold, and a ball on a fixed box has a row of spheres.
+  /// @returns kNoRow if no body is movable and awake, or if a movable body sleeps
   JFPX_HD RowKind kind_of(std::uint32_t contact) const {
     const ContactKey& key = contacts.key(contact);
     const std::uint8_t a = properties.traits[key.a], b = properties.traits[key.b];
     // A body that is still asleep is near, but does not touch: the contact has no effect.
-    if (sleeps(a) || sleeps(b) || ((a | b) & BodyTraits::kActive) == 0) return RowKind::none;
+    if (sleeps(a) || sleeps(b) || ((a | b) & BodyTraits::kActive) == 0) return kNoRow;
     // The arms of a generated contact are not multiples of the normal.
-    if (contacts.impulse_count(contact) != 1 || key.is_generated()) return RowKind::manifold;
-    if (((a | b) & BodyTraits::kRolls) != 0) return RowKind::manifold;
-    return (a & b & BodyTraits::kIsRound) != 0 ? RowKind::sphere : RowKind::manifold;
+    if (contacts.impulse_count(contact) != 1 || key.is_generated()) return kKindOf<ManifoldRow>;
+    if (((a | b) & BodyTraits::kRolls) != 0) return kKindOf<ManifoldRow>;
+    return (a & b & BodyTraits::kIsRound) != 0 ? kKindOf<SphereRow> : kKindOf<ManifoldRow>;
   }
 
   JFPX_HD std::uint32_t group_of(std::uint32_t contact) const {
@@ -95,7 +85,7 @@ struct RowSetup {
   }
 
   template <bool kFixed>
-  JFPX_HD void fill(SphereRow* row, std::uint32_t contact) const {
+  JFPX_HD void fill(SphereRow* row, NoPart*, std::uint32_t contact) const {
     const ContactKey& key = contacts.key(contact);
     const bool flipped = is_flipped(key);
     const Real distance = contacts.distance(contact, 0);
@@ -179,7 +169,7 @@ struct RowSetup {
   }
 
   /// Writes the impulses of a row to its contact.
-  JFPX_HD void store(const SphereRow& row, std::uint32_t contact) const {
+  JFPX_HD void store(const SphereRow& row, const NoPart*, std::uint32_t contact) const {
     const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
     const Real impulse = normal_impulse_of(row);
     const bool is_released = !(impulse > 0) && has_pushed(row);

@@ -15,6 +15,9 @@ namespace soft_step {
 /// Aligned, so that a device reads and writes it in few accesses. A sweep changes only the fields
 /// before `normal`, and `restitution`: device::SolveProgram::store() writes no others back.
 struct alignas(4 * sizeof(Real)) SphereRow {
+  using Part = NoPart;
+  static constexpr bool kReadsRotation = false;
+
   Vec3 friction_impulse;  ///< [N s], on a, in the tangent plane
   /// [N s], on a. Its magnitude is the impulse. The sign bit is set until the bodies have pushed
   /// each other in this step; the impulse of the last step does not count.

@@ -70,6 +70,9 @@ JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& sett
           settings.restitution_threshold};
 }
 
+/// Part of a row that has no parts.
+struct NoPart {};
+
 /// Motion of a body during a step, for the rows of its contacts.
 struct alignas(16 * sizeof(Real)) SolverBody {
   Vec3 velocity;             ///< [m/s]

@@ -165,7 +165,7 @@ class GridTeam {
   /// @param bins  receives bin_of(i), which is called once
   /// @param begin receives the first position of each bin, and the number of all
   template <class BinOf, class Place>
-  JFPX_HD void partition(std::uint32_t n, std::uint8_t* bins, std::uint32_t* begin,
+  JFPX_HD void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* begin,
                          const BinOf& bin_of, const Place& place) const {
 #if defined(__CUDA_ARCH__)
     constexpr std::uint32_t kBins = device::kBins;
@@ -175,7 +175,7 @@ class GridTeam {
     for (std::uint32_t b = threadIdx.x; b < kBins; b += kThreads) next[b] = 0;
     __syncthreads();
     for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
-      const std::uint8_t bin = bin_of(i);
+      const std::uint16_t bin = bin_of(i);
       bins[i] = bin;
       if (bin < kBins) atomicAdd(&next[bin], 1u);
     }
@@ -205,7 +205,7 @@ class GridTeam {
     }
     __syncthreads();
     for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
-      const std::uint8_t bin = bins[i];
+      const std::uint16_t bin = bins[i];
       if (bin < kBins) place(i, atomicAdd(&next[bin], 1u), bin);
     }
     sync();

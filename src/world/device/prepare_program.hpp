@@ -23,7 +23,7 @@ struct PrepareProgram {
     if (d.counters->any_asleep != 0) wake_touched(team);
     team.for_each(bodies.count, [&](std::uint32_t i) { start(bodies.ids[i].index); });
     place_rows(team);
-    if (row_count() > first_manifold() && !place_points(team)) return;
+    if (size<soft_step::ManifoldRow>() > 0 && !place_points(team)) return;
     sort_overflow(team);
     team.spread(bodies.count, [&](std::uint32_t i) { sort_fixed(bodies.ids[i].index); });
     team.spread(row_count(), [&](std::uint32_t r) { fill_row(r); });
@@ -75,14 +75,12 @@ struct PrepareProgram {
     const soft_step::RowSetup setup = d.row_setup();
     team.partition(
         setup.contacts.size(), d.row_bins, d.counters->bin_begin,
-        [&](std::uint32_t i) -> std::uint8_t {
+        [&](std::uint32_t i) -> std::uint16_t {
           const soft_step::RowKind kind = setup.kind_of(i);
-          if (kind == soft_step::RowKind::none) return kNoBin;
-          const std::uint32_t group = setup.group_of(i);
-          return static_cast<std::uint8_t>(
-              kind == soft_step::RowKind::sphere ? group : soft_step::kGroups + group);
+          return kind == soft_step::kNoRow ? soft_step::kNoBin
+                                           : soft_step::bin_of(kind, setup.group_of(i));
         },
-        [&](std::uint32_t i, std::uint32_t row, std::uint8_t bin) {
+        [&](std::uint32_t i, std::uint32_t row, std::uint16_t bin) {
           d.row_contact[row] = i;
           const soft_step::ContactKey& key = setup.contacts.key(i);
           const std::uint32_t group = bin % soft_step::kGroups;
@@ -102,7 +100,8 @@ struct PrepareProgram {
   JFPX_HD bool place_points(const Team& team) const {
     const StepData& d = data;
     const soft_step::ContactView contacts = d.contacts();
-    const std::uint32_t first_row = first_manifold(), rows = row_count() - first_row;
+    const std::uint32_t first_row = first<soft_step::ManifoldRow>();
+    const std::uint32_t rows = size<soft_step::ManifoldRow>();
     const bool has_rows = rows <= d.capacity.manifold_rows;
     const auto size = [&](std::uint32_t r) {
       return contacts.impulse_count(d.row_contact[first_row + r]);
@@ -120,14 +119,14 @@ struct PrepareProgram {
     return false;
   }
 
-  /// Sorts the rows without a color by their contacts: those of spheres, then the manifolds.
+  /// Sorts the rows without a color by kind, then by their contacts.
   template <class Team>
   JFPX_HD void sort_overflow(const Team& team) const {
     const StepData& d = data;
     const std::uint32_t* begin = d.counters->bin_begin;
     std::uint32_t before = 0;
-    for (const std::uint32_t bin :
-         {soft_step::kOverflowGroup, soft_step::kGroups + soft_step::kOverflowGroup}) {
+    for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
+      const std::uint32_t bin = soft_step::bin_of(kind, soft_step::kOverflowGroup);
       const Range range{begin[bin], begin[bin + 1]};
       team.spread(range.end - range.begin, [&](std::uint32_t k) {
         const std::uint32_t row = range.begin + k;
@@ -137,7 +136,7 @@ struct PrepareProgram {
         }
         d.overflow[rank] = row;
       });
-      before = range.end - range.begin;
+      before += range.end - range.begin;
     }
   }
 
@@ -150,29 +149,43 @@ struct PrepareProgram {
   }
 
   JFPX_HD void fill_row(std::uint32_t r) const {
+    soft_step::visit_row(soft_step::kind_of_row(data.counters->bin_begin, r),
+                         [&](auto type) { fill<typename decltype(type)::type>(r); });
+  }
+  template <class Row>
+  JFPX_HD void fill(std::uint32_t r) const {
     const StepData& d = data;
     const soft_step::RowSetup setup = d.row_setup();
-    const std::uint32_t* begin = d.counters->bin_begin;
     const std::uint32_t contact = d.row_contact[r];
-    bool rebounds = false;
-    if (r < first_manifold()) {
-      soft_step::SphereRow row;
-      r < begin[soft_step::kFixedGroup] ? setup.fill<false>(&row, contact)
-                                        : setup.fill<true>(&row, contact);
+    constexpr soft_step::RowKind kKind = soft_step::kKindOf<Row>;
+    const bool is_fixed =
+        r >= d.counters->bin_begin[soft_step::bin_of(kKind, soft_step::kFixedGroup)];
+    const auto fill_in = [&](Row* row) {
+      typename Row::Part* parts = d.parts_of(*row);
+      is_fixed ? setup.fill<true>(row, parts, contact) : setup.fill<false>(row, parts, contact);
+    };
+    if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
+      Row row;
+      fill_in(&row);
       d.sphere_rows.store(r, row);
     } else {
-      soft_step::ManifoldRow* row = &d.manifold_rows[r - first_manifold()];
-      soft_step::PointRow* points = d.point_rows + row->first;
-      const bool has_color = r < begin[soft_step::kGroups + soft_step::kFixedGroup];
-      has_color ? setup.fill<false>(row, points, contact) : setup.fill<true>(row, points, contact);
-      for (std::uint32_t p = 0; p < row->count; ++p) rebounds |= points[p].rebound < 0;
+      Row* row = &d.rows<Row>()[r - first<Row>()];
+      fill_in(row);
+      if (any_rebounds(*row, d.parts_of(*row))) d.counters->any_rebound = 1;
     }
-    if (rebounds) d.counters->any_rebound = 1;
   }
 
   JFPX_HD std::uint32_t row_count() const { return data.counters->bin_begin[kBins]; }
-  JFPX_HD std::uint32_t first_manifold() const {
-    return data.counters->bin_begin[soft_step::kGroups];
+  /// First row of a kind.
+  template <class Row>
+  JFPX_HD std::uint32_t first() const {
+    return data.counters->bin_begin[soft_step::bin_of(soft_step::kKindOf<Row>, 0)];
+  }
+  /// Number of rows of a kind.
+  template <class Row>
+  JFPX_HD std::uint32_t size() const {
+    return data.counters->bin_begin[soft_step::bin_of(soft_step::kKindOf<Row> + 1u, 0)] -
+           first<Row>();
   }
 };
 

@@ -80,7 +80,8 @@ class ScratchBuffers {
   Buffer<std::uint32_t> first_candidate_, next_candidate_, first_contact_, uncolored_,
       still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_;
   Buffer<std::uint64_t> manifold_sizes_, used_colors_, first_order_;
-  Buffer<std::uint8_t> pair_found_, row_bins_, marked_, near_flag_, traits_;
+  Buffer<std::uint8_t> pair_found_, marked_, near_flag_, traits_;
+  Buffer<std::uint16_t> row_bins_;
   Buffer<soft_step::SolverBody> solver_;
   Buffer<Quat> orientation_;
   Buffer<soft_step::SphereRow> sphere_rows_;

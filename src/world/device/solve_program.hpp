@@ -31,7 +31,7 @@ struct SolveProgram {
   /// sweep, after which the bodies move, and kRelaxSweeps relax sweeps. The last sweep is the
   /// restitution. Sweep::moves() and the highest turn of BodyCells depend on this.
   template <class Team>
-  JFPX_HD void operator()(const Team& team) const {
+  [[gnu::always_inline]] JFPX_HD void operator()(const Team& team) const {
     if (data.has_failed()) return;
     const StepData& d = data;
     const bool rebounds = d.counters->any_rebound != 0;
@@ -103,25 +103,38 @@ struct SolveProgram {
     bool stores_impulses = false;  ///< whether the impulses of rows are those of the step
 
     JFPX_HD explicit Sweep(const std::uint32_t* bins) : begin(bins) {
-      for (std::uint32_t group = soft_step::group_of_color(0); group < soft_step::kFixedGroup;
-           ++group) {
-        colored_items += items(group) + items(soft_step::kGroups + group);
+      for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
+        for (std::uint32_t group = soft_step::group_of_color(0); group < soft_step::kFixedGroup;
+             ++group) {
+          colored_items += items(soft_step::bin_of(kind, group));
+        }
       }
     }
     JFPX_HD void start(BodyStage next) {
       ++number;
       stage = next;
     }
-    JFPX_HD std::uint32_t first_manifold() const { return begin[soft_step::kGroups]; }
+    JFPX_HD soft_step::RowKind kind_of(std::uint32_t row) const {
+      return soft_step::kind_of_row(begin, row);
+    }
+    /// First row of a kind.
+    template <class Row>
+    JFPX_HD std::uint32_t first() const {
+      return begin[soft_step::bin_of(soft_step::kKindOf<Row>, 0)];
+    }
     JFPX_HD std::uint32_t size(std::uint32_t bin) const { return begin[bin + 1] - begin[bin]; }
     /// Number of items for the rows of a bin: a warp has rows of one bin only, none of which waits
     /// for another.
     JFPX_HD std::uint32_t items(std::uint32_t bin) const {
       return (size(bin) + kWarpItems - 1) / kWarpItems * kWarpItems;
     }
-    /// Number of rows without a color, of both kinds.
+    /// Number of rows without a color.
     JFPX_HD std::uint32_t overflow() const {
-      return size(soft_step::kOverflowGroup) + size(soft_step::kGroups + soft_step::kOverflowGroup);
+      std::uint32_t rows = 0;
+      for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
+        rows += size(soft_step::bin_of(kind, soft_step::kOverflowGroup));
+      }
+      return rows;
     }
     /// Number of moves that a kinematic body has made when the rows of the sweep are solved.
     JFPX_HD std::uint32_t moves() const {
@@ -129,7 +142,7 @@ struct SolveProgram {
     }
   };
 
-  /// Finds the rows of the colors, in the order of a sweep: by color, and first those of spheres.
+  /// Finds the rows of the colors, in the order of a sweep: by color, then by kind.
   class Cursor {
    public:
     JFPX_HD explicit Cursor(const Sweep& sweep) : sweep_(sweep) {}
@@ -140,12 +153,14 @@ struct SolveProgram {
       if (item < before_) {
         before_ = 0;
         group_ = soft_step::group_of_color(0);
-        of_manifolds_ = false;
+        kind_ = 0;
       }
       while (item - before_ >= sweep_.items(bin())) {
         before_ += sweep_.items(bin());
-        if (of_manifolds_) ++group_;
-        of_manifolds_ = !of_manifolds_;
+        if (++kind_ == soft_step::kRowKinds) {
+          kind_ = 0;
+          ++group_;
+        }
       }
       const std::uint32_t index = item - before_;
       return index < sweep_.size(bin()) ? sweep_.begin[bin()] + index : kNone;
@@ -154,12 +169,10 @@ struct SolveProgram {
     JFPX_HD std::uint32_t color() const { return group_ - soft_step::group_of_color(0); }
 
    private:
-    JFPX_HD std::uint32_t bin() const {
-      return of_manifolds_ ? soft_step::kGroups + group_ : group_;
-    }
+    JFPX_HD std::uint32_t bin() const { return soft_step::bin_of(kind_, group_); }
     const Sweep& sweep_;
     std::uint32_t before_ = 0, group_ = soft_step::group_of_color(0);
-    bool of_manifolds_ = false;
+    std::uint32_t kind_ = 0;
   };
 
   /// A body of an item: the turn that the item waits for, and the motion of the body at that turn.
@@ -184,9 +197,9 @@ struct SolveProgram {
   /// A row that has a color, or that is solved before the colors.
   struct RowItem {
     std::uint32_t row = kNone;
-    bool is_manifold = false;
+    soft_step::RowKind kind = 0;
     ItemBody a, b;
-    soft_step::SphereRow sphere;
+    soft_step::SphereRow sphere;  ///< the row, if it is of this kind
   };
 
   struct BodyItem : ItemBody {
@@ -194,8 +207,8 @@ struct SolveProgram {
     std::uint32_t first_fixed = kNone;  ///< of its rows with fixed bodies
   };
 
-  // Items are started in place, and bodies a and b are treated without a loop: otherwise nvcc keeps
-  // items in memory, 6.6 kB a thread in double.
+  // Items are started in place, bodies a and b are treated without a loop, and run() is inlined:
+  // otherwise nvcc keeps items, 6.6 kB a thread in double, or the sweep in memory.
 
   /// The rows of a sweep, for Team::flow().
   template <class Operation>
@@ -245,7 +258,8 @@ struct SolveProgram {
   };
 
   template <class Team, class Operation>
-  JFPX_HD void run(const Team& team, const Sweep& sweep, const Operation& operation) const {
+  [[gnu::always_inline]] JFPX_HD void run(const Team& team, const Sweep& sweep,
+                                          const Operation& operation) const {
     if (sweep.overflow() > 0) {
       team.sync();
       team.once([&] { run_overflow(sweep, operation); });
@@ -255,8 +269,8 @@ struct SolveProgram {
     team.flow(data.step.bodies.count, BodyFlow<Operation>(*this, sweep, operation));
   }
 
-  /// The rows of the overflow are solved one after the other: those of spheres, then the manifolds,
-  /// each in the order of their contacts.
+  /// The rows of the overflow are solved one after the other: by kind, then in the order of their
+  /// contacts.
   template <class Operation>
   JFPX_HD void run_overflow(const Sweep& sweep, const Operation& operation) const {
     const std::uint32_t rows = sweep.overflow();
@@ -274,15 +288,18 @@ struct SolveProgram {
   JFPX_HD void begin_row(const Sweep& sweep, std::uint32_t r, RowItem* item) const {
     const StepData& d = data;
     item->row = r;
-    item->is_manifold = r >= sweep.first_manifold();
+    item->kind = sweep.kind_of(r);
     std::uint32_t a = 0, b = 0;
-    if (item->is_manifold) {
-      const soft_step::ManifoldRow& row = d.manifold_rows[r - sweep.first_manifold()];
-      a = row.a, b = row.b;
-    } else {
-      item->sphere = d.sphere_rows.load(r);
-      a = item->sphere.a, b = item->sphere.b;
-    }
+    soft_step::visit_row(item->kind, [&](auto type) {
+      using Row = typename decltype(type)::type;
+      if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
+        item->sphere = d.sphere_rows.load(r);
+        a = item->sphere.a, b = item->sphere.b;
+      } else {
+        const Row& row = d.rows<Row>()[r - sweep.first<Row>()];
+        a = row.a, b = row.b;
+      }
+    });
     item->a.start(a, d.row_bodies[a]);
     item->b.start(b, d.row_bodies[b]);
   }
@@ -303,7 +320,8 @@ struct SolveProgram {
     if (item->row == kNone) return true;
     const auto read = [&](ItemBody* body) {
       if (body->is_ready) return;
-      item->is_manifold ? body->read<true>(data) : body->read<false>(data);
+      soft_step::visit_row(
+          item->kind, [&](auto type) { body->read<decltype(type)::type::kReadsRotation>(data); });
     };
     read(&item->a);
     read(&item->b);
@@ -313,11 +331,14 @@ struct SolveProgram {
   template <class Operation>
   JFPX_HD void solve_row(const Sweep& sweep, const Operation& operation, RowItem* item) const {
     if (item->row == kNone) return;
-    if (item->is_manifold) {
-      solve_manifold(sweep, operation, item);
-    } else {
-      solve_spheres(sweep, operation, item);
-    }
+    soft_step::visit_row(item->kind, [&](auto type) {
+      using Row = typename decltype(type)::type;
+      if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
+        solve_spheres(sweep, operation, item);
+      } else {
+        solve_other<Row>(sweep, operation, item);
+      }
+    });
   }
 
   template <class Operation>
@@ -326,7 +347,9 @@ struct SolveProgram {
     const Real restitution = row.restitution;
     const Vec3 shift_a = item->a.motion.shift, shift_b = item->b.motion.shift;
     const Impact impact{data.step.bodies.last_acceleration, row.a};
-    operation.template run<false>(&row, &item->a.motion, &item->b.motion, impact);
+    const soft_step::BodyPair pair{&item->a.motion, &item->b.motion, nullptr, nullptr};
+    operation.template run<false>(
+        &row, soft_step::RowContext<soft_step::NoPart, Impact>{pair, nullptr, &impact});
     const auto write = [&](ItemBody* body, const Vec3& shift, const soft_step::FreeMotion& change) {
       const BodyCells cells = data.cells(body->index);
       if constexpr (Operation::kMovesBodies) {
@@ -344,14 +367,13 @@ struct SolveProgram {
     store<Operation>(sweep, row, restitution, item->row);
   }
 
-  template <class Operation>
-  JFPX_HD void solve_manifold(const Sweep& sweep, const Operation& operation, RowItem* item) const {
-    soft_step::ManifoldRow row = data.manifold_rows[item->row - sweep.first_manifold()];
+  template <class Row, class Operation>
+  JFPX_HD void solve_other(const Sweep& sweep, const Operation& operation, RowItem* item) const {
+    Row row = data.rows<Row>()[item->row - sweep.first<Row>()];
     const Mat3* inertia = data.step.bodies.inverse_inertia;
     const Mat3 inertia_a = inertia[item->a.index], inertia_b = inertia[item->b.index];
-    operation.template run<false>(
-        &row, data.point_rows + row.first,
-        soft_step::BodyPair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b});
+    const soft_step::BodyPair pair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b};
+    operation.template run<false>(&row, context_of(row, pair));
     const auto write = [&](ItemBody* body) {
       const BodyCells cells = data.cells(body->index);
       if constexpr (Operation::kMovesBodies) {
@@ -363,6 +385,13 @@ struct SolveProgram {
     write(&item->a);
     write(&item->b);
     store<Operation>(sweep, row, item->row);
+  }
+
+  /// Of a row that does not rebound in the sweeps.
+  template <class Row>
+  JFPX_HD soft_step::RowContext<typename Row::Part, soft_step::ImpactBodies> context_of(
+      const Row& row, const soft_step::BodyPair& pair) const {
+    return {pair, data.parts_of(row), nullptr};
   }
 
   JFPX_HD void begin_body(const Sweep& sweep, std::uint32_t body, BodyItem* item) const {
@@ -443,27 +472,43 @@ struct SolveProgram {
   template <class Operation>
   JFPX_HD void solve_fixed(const Sweep& sweep, const Operation& operation, std::uint32_t r,
                            BodyItem* item, BodyFree* free) const {
-    SolverBody* body = &item->motion;
-    if (r < sweep.first_manifold()) {
-      soft_step::SphereRow row = data.sphere_rows.load(r);
-      const Real restitution = row.restitution;
-      SolverBody fixed;  // not read: the body does not move
-      const Impact impact{data.step.bodies.last_acceleration, row.a};
-      operation.template run<true>(&row, body, &fixed, impact);
-      if (impact.is_pending) {
-        free->read(data.cells(item->index), item->version);
-        free->motion.add(impact.of_a.velocity, impact.of_a.angular_velocity);
-        free->is_changed = true;
+    soft_step::visit_row(sweep.kind_of(r), [&](auto type) {
+      using Row = typename decltype(type)::type;
+      if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
+        solve_fixed_spheres(sweep, operation, r, item, free);
+      } else {
+        solve_fixed_other<Row>(sweep, operation, r, item);
       }
-      store<Operation>(sweep, row, restitution, r);
-      return;
+    });
+  }
+
+  template <class Operation>
+  JFPX_HD void solve_fixed_spheres(const Sweep& sweep, const Operation& operation, std::uint32_t r,
+                                   BodyItem* item, BodyFree* free) const {
+    soft_step::SphereRow row = data.sphere_rows.load(r);
+    const Real restitution = row.restitution;
+    SolverBody fixed;  // not read: the body does not move
+    const Impact impact{data.step.bodies.last_acceleration, row.a};
+    const soft_step::BodyPair pair{&item->motion, &fixed, nullptr, nullptr};
+    operation.template run<true>(
+        &row, soft_step::RowContext<soft_step::NoPart, Impact>{pair, nullptr, &impact});
+    if (impact.is_pending) {
+      free->read(data.cells(item->index), item->version);
+      free->motion.add(impact.of_a.velocity, impact.of_a.angular_velocity);
+      free->is_changed = true;
     }
-    soft_step::ManifoldRow row = data.manifold_rows[r - sweep.first_manifold()];
+    store<Operation>(sweep, row, restitution, r);
+  }
+
+  template <class Row, class Operation>
+  JFPX_HD void solve_fixed_other(const Sweep& sweep, const Operation& operation, std::uint32_t r,
+                                 BodyItem* item) const {
+    Row row = data.rows<Row>()[r - sweep.first<Row>()];
     SolverBody fixed = fixed_body(row.b, sweep.moves());
     const Mat3 inertia = data.step.bodies.inverse_inertia[row.a];
     const Mat3 none;
-    operation.template run<true>(&row, data.point_rows + row.first,
-                                 soft_step::BodyPair{body, &fixed, &inertia, &none});
+    const soft_step::BodyPair pair{&item->motion, &fixed, &inertia, &none};
+    operation.template run<true>(&row, context_of(row, pair));
     store<Operation>(sweep, row, r);
   }
 
@@ -477,15 +522,15 @@ struct SolveProgram {
       if (restitution != row.restitution) {
         data.sphere_rows.store_bytes<offsetof(Row, restitution), offsetof(Row, a)>(r, row);
       }
-      if (sweep.stores_impulses) data.row_setup().store(row, data.row_contact[r]);
+      if (sweep.stores_impulses) data.row_setup().store(row, nullptr, data.row_contact[r]);
     }
   }
-  template <class Operation>
-  JFPX_HD void store(const Sweep& sweep, const soft_step::ManifoldRow& row, std::uint32_t r) const {
+  template <class Operation, class Row>
+  JFPX_HD void store(const Sweep& sweep, const Row& row, std::uint32_t r) const {
     if constexpr (Operation::kChangesRow) {
-      data.manifold_rows[r - sweep.first_manifold()].rolling_impulse = row.rolling_impulse;
+      store_changes(row, &data.rows<Row>()[r - sweep.first<Row>()]);
       if (sweep.stores_impulses) {
-        data.row_setup().store(row, data.point_rows + row.first, data.row_contact[r]);
+        data.row_setup().store(row, data.parts_of(row), data.row_contact[r]);
       }
     }
   }

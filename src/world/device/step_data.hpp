@@ -20,10 +20,7 @@ namespace device {
 
 inline constexpr std::uint32_t kNone = 0xffffffffu;
 
-/// Rows are grouped by kind, then by soft_step::kGroups.
-inline constexpr std::uint32_t kBins = 2 * soft_step::kGroups;
-inline constexpr std::uint8_t kNoBin = 255;
-static_assert(kBins < kNoBin);
+using soft_step::kBins;
 
 /// Lists whose size is known only on the device. A step that needs more room than there is does not
 /// change the state of the world; the host reserves Counters::needed and repeats it.
@@ -82,7 +79,7 @@ struct StepCounters {
   std::uint32_t any_rests = 0;      ///< 1: a body has been slow for long enough to sleep
   std::uint32_t runaway = kNone;    ///< index of the first body that is_in_world() refuses
   std::uint32_t uncolored[3] = {};  ///< number of contacts without a color, by round modulo 3
-  std::uint32_t bin_begin[kBins + 1] = {};  ///< of rows; those of manifolds follow the others
+  std::uint32_t bin_begin[kBins + 1] = {};  ///< of rows
 
   std::uint32_t candidates = 0, touches = 0;
   std::uint32_t spheres = 0, manifolds = 0, points = 0;  ///< sizes of the contact set
@@ -164,20 +161,36 @@ struct StepData {
   std::uint8_t* marked = nullptr;     ///< by label of an island
   std::uint8_t* near_flag = nullptr;  ///< by body: StepBodies::near
 
-  std::uint8_t* row_bins = nullptr;      ///< by contact
-  std::uint32_t* row_contact = nullptr;  ///< by row of either kind
+  std::uint16_t* row_bins = nullptr;     ///< by contact
+  std::uint32_t* row_contact = nullptr;  ///< by row of any kind
   StripedArray<soft_step::SphereRow> sphere_rows;
   soft_step::ManifoldRow* manifold_rows = nullptr;
   soft_step::PointRow* point_rows = nullptr;
   std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies
-  std::uint32_t* next_fixed = nullptr;   ///< by row of either kind
-  /// The rows without a free color: those of spheres, then the manifolds, in the order of contacts.
+  std::uint32_t* next_fixed = nullptr;   ///< by row of any kind
+  /// The rows without a free color: by kind, then in the order of contacts.
   std::uint32_t* overflow = nullptr;
   MotionCells* motion_cells = nullptr;  ///< by body
   FreeCells* free_cells = nullptr;      ///< by body
   RowBody* row_bodies = nullptr;        ///< by body
   SavedColumns<PointerColumn> saved;    ///< as they were at the start of the step
 
+  /// The rows of a kind other than spheres, by their number in this kind.
+  template <class Row>
+  JFPX_HD Row* rows() const {
+    static_assert(std::is_same_v<Row, soft_step::ManifoldRow>);
+    return manifold_rows;
+  }
+  /// The parts of a row; null if it has none.
+  template <class Row>
+  JFPX_HD typename Row::Part* parts_of(const Row& row) const {
+    if constexpr (soft_step::kHasParts<Row>) {
+      static_assert(std::is_same_v<typename Row::Part, soft_step::PointRow>);
+      return point_rows + row.first;
+    } else {
+      return nullptr;
+    }
+  }
   JFPX_HD BodyCells cells(std::uint32_t body) const {
     return {&motion_cells[body], &free_cells[body]};
   }

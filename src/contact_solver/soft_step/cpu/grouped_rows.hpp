@@ -3,7 +3,7 @@
 
 #include "src/base/buffer.hpp"
 #include "src/base/reserve.hpp"
-#include "src/contact_solver/soft_step/row_setup.hpp"
+#include "src/contact_solver/soft_step/row_kinds.hpp"
 
 #include <algorithm>
 #include <array>
@@ -30,7 +30,7 @@ using GroupCounts = std::array<std::uint32_t, kGroups>;
 /// the same blocks of each group, and of the bodies, therefore has most of them in its own cache.
 ///
 /// Usage in a step: start(), place() for all rows before kFixedGroup, finish().
-/// @param Row SphereRow or ManifoldRow
+/// @param Row one of RowTypes
 template <class Row>
 class GroupedRows {
  public:

@@ -58,34 +58,30 @@ SoftStepSolver::SoftStepSolver(ThreadPool* pool, SimdLevel simd)
 /// contacts, those with fixed bodies in the order of bodies.
 void SoftStepSolver::sort_contacts() {
   count_contacts();
-  GroupCounts spheres{}, manifolds{};
-  std::uint32_t fixed = 0;
+  Counts before;
   for (Counts& chunk : counts_) {
-    const auto add = [&](std::size_t g) {
-      spheres[g] += std::exchange(chunk.spheres[g], spheres[g]);
-      manifolds[g] += std::exchange(chunk.manifolds[g], manifolds[g]);
-    };
-    for (std::size_t g = 0; g < colored_end_; ++g) add(g);
-    add(kFixedGroup);
-    fixed += std::exchange(chunk.fixed, fixed);
+    for (std::uint32_t kind = 0; kind < kRowKinds; ++kind) {
+      const auto add = [sums = &before.by_kind[kind],
+                        counts = &chunk.by_kind[kind]](std::size_t g) {
+        (*sums)[g] += std::exchange((*counts)[g], (*sums)[g]);
+      };
+      for (std::size_t g = 0; g < colored_end_; ++g) add(g);
+      add(kFixedGroup);
+    }
+    before.fixed += std::exchange(chunk.fixed, before.fixed);
   }
-  spheres_.start(spheres, colored_end_, bodies_);
-  manifolds_.start(manifolds, colored_end_, bodies_);
-  resize_geometric(&fixed_, fixed);
+  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
+    rows->start(before.by_kind[kKindOf<Row>], colored_end_, bodies_);
+  });
+  resize_geometric(&fixed_, before.fixed);
   parallel_for(pool_, setup_.contacts.size(), kContactsPerChunk,
                [&](std::size_t first, std::size_t last) {
                  place_contacts(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
                                 counts_[first / kContactsPerChunk]);
                });
-  spheres_.finish();
-  manifolds_.finish();
+  for_all_kinds([](auto* rows) { rows->finish(); });
   place_fixed_contacts();
-  std::uint32_t points = 0;
-  for (std::size_t i = 0; i < manifolds_.size(); ++i) {
-    manifolds_.rows[i].first = points;
-    points += setup_.contacts.impulse_count(manifolds_.contacts[i]);
-  }
-  points_.reserve_geometric(points, "points of contacts");
+  place_parts();
 }
 
 /// Fills kinds_, and counts_ by chunk of contacts.
@@ -99,9 +95,9 @@ void SoftStepSolver::count_contacts() {
     std::size_t colored_end = 0;
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
       kinds_[i] = setup_.kind_of(i);
-      if (kinds_[i] == RowKind::none) continue;
+      if (kinds_[i] == kNoRow) continue;
       const std::size_t group = setup_.group_of(i);
-      ++(kinds_[i] == RowKind::sphere ? counts.spheres : counts.manifolds)[group];
+      ++counts.by_kind[kinds_[i]][group];
       if (group == kFixedGroup) {
         ++counts.fixed;
       } else {
@@ -117,17 +113,18 @@ void SoftStepSolver::count_contacts() {
 /// Assigns rows to the contacts of a chunk. @param before number of rows in the chunks before
 void SoftStepSolver::place_contacts(std::uint32_t first, std::uint32_t last, Counts before) {
   for (std::uint32_t i = first; i < last; ++i) {
-    if (kinds_[i] == RowKind::none) continue;
+    const RowKind kind = kinds_[i];
+    if (kind == kNoRow) continue;
     const std::size_t group = setup_.group_of(i);
-    const bool is_sphere_row = kinds_[i] == RowKind::sphere;
     const ContactKey& key = setup_.contacts.key(i);
     if (group == kFixedGroup) {
-      fixed_[before.fixed++] = {setup_.is_flipped(key) ? key.b : key.a, i, 0, is_sphere_row};
-    } else if (is_sphere_row) {
-      spheres_.place(group, spheres_.begin(group) + before.spheres[group]++, i, key.a);
-    } else {
-      manifolds_.place(group, manifolds_.begin(group) + before.manifolds[group]++, i, key.a);
+      fixed_[before.fixed++] = {setup_.is_flipped(key) ? key.b : key.a, i, 0, kind};
+      continue;
     }
+    visit_row(kind, [&]<class Row>(std::type_identity<Row>) {
+      const std::uint32_t row = rows<Row>().begin(group) + before.by_kind[kind][group]++;
+      rows<Row>().place(group, row, i, key.a);
+    });
   }
 }
 
@@ -137,11 +134,28 @@ void SoftStepSolver::place_fixed_contacts() {
     return std::tie(x.body, x.contact) < std::tie(y.body, y.contact);
   };
   if (!std::ranges::is_sorted(fixed_, order)) std::ranges::sort(fixed_, order);
-  std::uint32_t sphere = spheres_.begin(kFixedGroup), manifold = manifolds_.begin(kFixedGroup);
+  std::array<std::uint32_t, kRowKinds> next{};
+  for_all_kinds([&]<class Row>(Rows<Row>* rows) { next[kKindOf<Row>] = rows->begin(kFixedGroup); });
   for (FixedContact& fixed : fixed_) {
-    fixed.row = fixed.is_sphere_row ? sphere++ : manifold++;
-    (fixed.is_sphere_row ? spheres_.contacts : manifolds_.contacts)[fixed.row] = fixed.contact;
+    fixed.row = next[fixed.kind]++;
+    visit_row(fixed.kind, [&]<class Row>(std::type_identity<Row>) {
+      rows<Row>().contacts[fixed.row] = fixed.contact;
+    });
   }
+}
+
+/// Assigns parts to the rows that have some.
+void SoftStepSolver::place_parts() {
+  for_all_kinds([this]<class Row>(Rows<Row>* rows) {
+    if constexpr (kHasParts<Row>) {
+      std::uint32_t parts = 0;
+      for (std::size_t i = 0; i < rows->size(); ++i) {
+        rows->rows[i].first = parts;
+        parts += setup_.contacts.impulse_count(rows->contacts[i]);
+      }
+      rows->parts.reserve_geometric(parts, "points of contacts");
+    }
+  });
 }
 
 void SoftStepSolver::build(const RowSetup& setup, std::size_t bodies, const ImpactBodies& impacts,
@@ -151,63 +165,48 @@ void SoftStepSolver::build(const RowSetup& setup, std::size_t bodies, const Impa
   constants_ = constants;
   bodies_ = bodies;
   sort_contacts();
-  const auto fill = [this](auto* row, std::uint32_t contact, auto is_fixed) {
-    constexpr bool kFixed = decltype(is_fixed)::value;
-    if constexpr (std::is_same_v<decltype(row), SphereRow*>) {
-      setup_.fill<kFixed>(row, contact);
-    } else {
-      setup_.fill<kFixed>(row, &points_[row->first], contact);
-    }
-  };
-  for_all_rows([&](auto* grouped, std::size_t first, std::size_t last, auto is_fixed) {
+  for_all_rows([this](auto* rows, std::size_t first, std::size_t last, auto is_fixed) {
     for (std::size_t i = first; i < last; ++i) {
-      fill(&grouped->rows[i], grouped->contacts[i], is_fixed);
+      auto& row = rows->rows[i];
+      setup_.fill<decltype(is_fixed)::value>(&row, rows->parts_of(row), rows->contacts[i]);
     }
   });
 }
 
-BodyPair SoftStepSolver::pair_of(const ManifoldRow& row, std::span<SolverBody> bodies) const {
-  return {&bodies[row.a], &bodies[row.b], &setup_.properties.inverse_inertia[row.a],
-          &setup_.properties.inverse_inertia[row.b]};
-}
-
 template <class Operation>
 void SoftStepSolver::for_all_rows(const Operation& operation) {
-  const auto of_blocks = [&](auto* rows, std::size_t first, std::size_t last) {
-    for (std::size_t group = 0; group < colored_end_; ++group) {
-      operation(rows, rows->begin(group, first), rows->begin(group, last), std::false_type());
-    }
-  };
-  parallel_for(pool_, block_count(bodies_), kBlocksPerChunk,
-               [&](std::size_t first, std::size_t last) {
-                 of_blocks(&spheres_, first, last);
-                 of_blocks(&manifolds_, first, last);
-               });
-  const auto fixed = [&](auto* rows) {
+  parallel_for(
+      pool_, block_count(bodies_), kBlocksPerChunk, [&](std::size_t first, std::size_t last) {
+        for_all_kinds([&](auto* rows) {
+          for (std::size_t group = 0; group < colored_end_; ++group) {
+            operation(rows, rows->begin(group, first), rows->begin(group, last), std::false_type());
+          }
+        });
+      });
+  for_all_kinds([&](auto* rows) {
     const std::size_t begin = rows->begin(kFixedGroup);
     parallel_for(pool_, rows->size(kFixedGroup), kRowsPerChunk,
                  [&](std::size_t first, std::size_t last) {
                    operation(rows, begin + first, begin + last, std::true_type());
                  });
-  };
-  fixed(&spheres_);
-  fixed(&manifolds_);
+  });
 }
 
-template <class RunSpheres, class RunManifolds, class OnFixed>
-void SoftStepSolver::sweep(const RunSpheres& run_spheres, const RunManifolds& run_manifolds,
-                           const OnFixed& on_fixed) {
-  for (std::size_t i = 0; i < spheres_.end(kOverflowGroup); ++i) run_spheres(i, i + 1);
-  run_manifolds(0, manifolds_.end(kOverflowGroup));
+template <class Run, class OnFixed>
+void SoftStepSolver::sweep(const Run& run, const OnFixed& on_fixed) {
+  for_all_kinds([&](auto* rows) {
+    for (std::size_t i = 0; i < rows->end(kOverflowGroup); ++i) run(rows, i, i + 1);
+  });
   const std::size_t blocks = block_count(bodies_);
   for (std::size_t group = group_of_color(0); group < colored_end_; ++group) {
-    // One loop over the rows of both kinds: the end of a loop costs as much as dozens of rows.
-    const std::size_t count = spheres_.size(group) + manifolds_.size(group);
+    // One loop over the rows of all kinds: the end of a loop costs as much as dozens of rows.
+    std::size_t count = 0;
+    for_all_kinds([&](auto* rows) { count += rows->size(group); });
     if (count == 0) continue;
     const std::size_t chunk = std::max<std::size_t>(1, blocks * kRowsPerChunk / count);
     parallel_for(pool_, blocks, chunk, [&](std::size_t first, std::size_t last) {
-      run_spheres(spheres_.begin(group, first), spheres_.begin(group, last));
-      run_manifolds(manifolds_.begin(group, first), manifolds_.begin(group, last));
+      for_all_kinds(
+          [&](auto* rows) { run(rows, rows->begin(group, first), rows->begin(group, last)); });
     });
   }
   parallel_for(pool_, fixed_.size(), kRowsPerChunk, [&](std::size_t first, std::size_t last) {
@@ -218,12 +217,8 @@ void SoftStepSolver::sweep(const RunSpheres& run_spheres, const RunManifolds& ru
     while (is_inside(first)) ++first;
     while (is_inside(last)) ++last;
     for (std::size_t i = first; i < last; ++i) {
-      const FixedContact& fixed = fixed_[i];
-      if (fixed.is_sphere_row) {
-        on_fixed(&spheres_.rows[fixed.row]);
-      } else {
-        on_fixed(&manifolds_.rows[fixed.row]);
-      }
+      visit_row(fixed_[i].kind,
+                [&]<class Row>(std::type_identity<Row>) { on_fixed(&rows<Row>(), fixed_[i].row); });
     }
   });
 }
@@ -232,34 +227,29 @@ void SoftStepSolver::sweep(const RunSpheres& run_spheres, const RunManifolds& ru
 template <class Operation>
 void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operation,
                          cpu::SphereSweepFunction kernel) {
-  const auto one = [&](auto* row, auto is_fixed) {
-    constexpr bool kFixed = decltype(is_fixed)::value;
-    if constexpr (std::is_same_v<decltype(row), SphereRow*>) {
-      operation.template run<kFixed>(row, &bodies[row->a], &bodies[row->b], impacts_);
-    } else {
-      operation.template run<kFixed>(row, &points_[row->first], pair_of(*row, bodies));
-    }
+  const Mat3* const inertia = setup_.properties.inverse_inertia;
+  const auto one = [&]<class Row>(Rows<Row>* rows, std::size_t i, auto is_fixed) {
+    Row& row = rows->rows[i];
+    const BodyPair pair{&bodies[row.a], &bodies[row.b], &inertia[row.a], &inertia[row.b]};
+    using Context = RowContext<typename Row::Part, ImpactBodies>;
+    operation.template run<decltype(is_fixed)::value>(
+        &row, Context{pair, rows->parts_of(row), &impacts_});
   };
   const cpu::SphereSweep arrays = arrays_of(bodies);
   sweep(
-      [&](std::size_t first, std::size_t last) {
-        if (kernel == nullptr) {
-          for (std::size_t i = first; i < last; ++i) one(&spheres_.rows[i], std::false_type());
+      [&]<class Row>(Rows<Row>* rows, std::size_t first, std::size_t last) {
+        if (!std::is_same_v<Row, SphereRow> || kernel == nullptr) {
+          for (std::size_t i = first; i < last; ++i) one(rows, i, std::false_type());
           return;
         }
         for (std::size_t begin = first; begin < last; begin += kRowsPerKernel) {
           std::array<std::uint32_t, kRowsPerKernel> skipped;
           const std::size_t end = std::min(last, begin + kRowsPerKernel);
           const std::size_t count = kernel(arrays, begin, end, skipped.data());
-          for (std::size_t k = 0; k < count; ++k) {
-            one(&spheres_.rows[skipped[k]], std::false_type());
-          }
+          for (std::size_t k = 0; k < count; ++k) one(rows, skipped[k], std::false_type());
         }
       },
-      [&](std::size_t first, std::size_t last) {
-        for (std::size_t i = first; i < last; ++i) one(&manifolds_.rows[i], std::false_type());
-      },
-      [&](auto* row) { one(row, std::true_type()); });
+      [&](auto* rows, std::size_t row) { one(rows, row, std::true_type()); });
 }
 
 cpu::SphereSweep SoftStepSolver::arrays_of(std::span<SolverBody> bodies) {
@@ -267,7 +257,7 @@ cpu::SphereSweep SoftStepSolver::arrays_of(std::span<SolverBody> bodies) {
   const auto softness = [](const Softness& s) {
     return cpu::SweepSoftness{s.bias_rate, s.mass_scale, s.impulse_scale};
   };
-  return {reinterpret_cast<Real*>(spheres_.rows.data()),
+  return {reinterpret_cast<Real*>(rows<SphereRow>().rows.data()),
           reinterpret_cast<Real*>(bodies.data()),
           c.h,
           c.inverse_h,
@@ -293,18 +283,14 @@ void SoftStepSolver::solve(std::span<SolverBody> bodies, bool use_bias) {
 }
 
 void SoftStepSolver::restitute(std::span<SolverBody> bodies) {
-  if (manifolds_.size() > 0) run(bodies, Restitute(), nullptr);
+  if (rows<ManifoldRow>().size() > 0) run(bodies, Restitute(), nullptr);
 }
 
 void SoftStepSolver::store() {
-  for_all_rows([this](auto* grouped, std::size_t first, std::size_t last, auto) {
+  for_all_rows([this](auto* rows, std::size_t first, std::size_t last, auto) {
     for (std::size_t i = first; i < last; ++i) {
-      const auto& row = grouped->rows[i];
-      if constexpr (std::is_same_v<decltype(row), const SphereRow&>) {
-        setup_.store(row, grouped->contacts[i]);
-      } else {
-        setup_.store(row, &points_[row.first], grouped->contacts[i]);
-      }
+      const auto& row = rows->rows[i];
+      setup_.store(row, rows->parts_of(row), rows->contacts[i]);
     }
   });
 }

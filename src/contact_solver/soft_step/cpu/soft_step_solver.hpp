@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <vector>
 
 namespace jfpx {
@@ -21,7 +22,7 @@ namespace soft_step {
 
 /// Solves contacts in this order: the overflow, for which no color was free, one after the other;
 /// the colors in ascending order; the contacts with immovable and kinematic bodies, by movable
-/// body. In the overflow, rows of spheres precede manifolds. Contacts of one color share no movable
+/// body. In the overflow, rows are in the order of RowTypes. Contacts of one color share no movable
 /// body, so threads may solve them in any order, and so may contacts of different movable bodies
 /// with fixed bodies.
 ///
@@ -33,7 +34,7 @@ class SoftStepSolver {
   /// @param simd widest vectors for rows of spheres
   SoftStepSolver(ThreadPool* pool, SimdLevel simd);
 
-  /// Makes rows of the contacts whose RowKind is not `none`.
+  /// Makes rows of the contacts whose kind is not kNoRow.
   /// @param setup     its arrays are valid until store()
   /// @param bodies    number of bodies in these arrays
   void build(const RowSetup& setup, std::size_t bodies, const ImpactBodies& impacts,
@@ -48,39 +49,69 @@ class SoftStepSolver {
   void store();
 
  private:
+  /// The rows of a kind.
+  template <class RowOfKind>
+  struct Rows : GroupedRows<RowOfKind> {
+    using Row = RowOfKind;
+    using Part = typename Row::Part;
+    Buffer<Part> parts;
+
+    Part* parts_of(const Row& row) {
+      if constexpr (kHasParts<Row>) {
+        return &parts[row.first];
+      } else {
+        return nullptr;
+      }
+    }
+  };
+  template <class List>
+  struct RowsOfTypes;
+  template <class... Row>
+  struct RowsOfTypes<std::tuple<Row...>> {
+    using type = std::tuple<Rows<Row>...>;
+  };
   /// A contact with a fixed body.
   struct FixedContact {
     std::uint32_t body = 0;  ///< the movable one
     std::uint32_t contact = 0;
     std::uint32_t row = 0;
-    bool is_sphere_row = false;
+    RowKind kind = kNoRow;
   };
-  /// Numbers of rows by group, of a chunk of contacts.
+  /// Numbers of rows by kind and group, of a chunk of contacts.
   struct Counts {
-    GroupCounts spheres{}, manifolds{};
+    std::array<GroupCounts, kRowKinds> by_kind{};
     std::uint32_t fixed = 0;
   };
+
+  template <class Row>
+  Rows<Row>& rows() {
+    return std::get<Rows<Row>>(rows_);
+  }
+  /// Calls f(&rows<Row>()) for all kinds of rows.
+  template <class F>
+  void for_all_kinds(const F& f) {
+    std::apply([&f](auto&... rows) { (f(&rows), ...); }, rows_);
+  }
 
   void sort_contacts();
   void count_contacts();
   void place_contacts(std::uint32_t first, std::uint32_t last, Counts before);
   void place_fixed_contacts();
-  /// Calls run_spheres(first, last) and run_manifolds(first, last) for the rows of the overflow and
-  /// of the colors, one at a time in the overflow, whose rows may share bodies, and on_fixed(row)
-  /// for each row with a fixed body.
-  template <class RunSpheres, class RunManifolds, class OnFixed>
-  void sweep(const RunSpheres& run_spheres, const RunManifolds& run_manifolds,
-             const OnFixed& on_fixed);
-  /// Calls operation(rows, first, last, is_fixed) for ranges of all rows, where `rows` is &spheres_
-  /// or &manifolds_, and `is_fixed` whether one body is: std::true_type or std::false_type. The
-  /// rows of a block of bodies follow each other, because their contacts do.
+  void place_parts();
+  /// Calls run(rows, first, last) for the rows of the overflow and of the colors, one at a time in
+  /// the overflow, whose rows may share bodies, and on_fixed(rows, row) for each row with a fixed
+  /// body. `rows` is a pointer to Rows.
+  template <class Run, class OnFixed>
+  void sweep(const Run& run, const OnFixed& on_fixed);
+  /// Calls operation(rows, first, last, is_fixed) for ranges of all rows, where `rows` is a pointer
+  /// to Rows, and `is_fixed` whether one body is: std::true_type or std::false_type. The rows of a
+  /// block of bodies follow each other, because their contacts do.
   template <class Operation>
   void for_all_rows(const Operation& operation);
   template <class Operation>
   void run(std::span<SolverBody> bodies, const Operation& operation,
            cpu::SphereSweepFunction kernel);
   cpu::SphereSweep arrays_of(std::span<SolverBody> bodies);
-  BodyPair pair_of(const ManifoldRow& row, std::span<SolverBody> bodies) const;
 
   ThreadPool* pool_;
   const cpu::SphereSweepKernels* kernels_;  ///< null: rows are solved one by one
@@ -91,10 +122,8 @@ class SoftStepSolver {
 
   std::vector<RowKind> kinds_;  ///< by contact
   std::vector<Counts> counts_;  ///< by chunk of contacts
-  GroupedRows<SphereRow> spheres_;
-  GroupedRows<ManifoldRow> manifolds_;
+  RowsOfTypes<RowTypes>::type rows_;
   std::size_t colored_end_ = 0;  ///< end of the overflow and of the colors that occur, as groups
-  Buffer<PointRow> points_;      ///< of manifolds_
   std::vector<FixedContact> fixed_;  ///< sorted by (body, contact)
 };
 

@@ -1,0 +1,78 @@
+/// The kinds of rows of a soft step, and the groups in which a sweep solves them.
+#pragma once
+
+#include "src/contact_solver/soft_step/greedy_coloring.hpp"
+#include "src/contact_solver/soft_step/manifold_row.hpp"
+#include "src/contact_solver/soft_step/sphere_row.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <tuple>
+#include <type_traits>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// All types of rows. Rows of the overflow are solved in this order of kinds. A type has:
+///   - `a`, `b`: its bodies, of which a is movable;
+///   - `Part`: type of what a row has several of, or NoPart. A row with parts has the index `first`
+///     of its first one, and their number `count`;
+///   - `kReadsRotation`: whether a row reads the rotation of its bodies, and their inertia;
+///   - RowSetup::fill() from a contact, and RowSetup::store() back to it: what a contact keeps from
+///     step to step, and what a snapshot has;
+///   - run() of each operation in row_operations.hpp.
+using RowTypes = std::tuple<SphereRow, ManifoldRow>;
+
+/// Index of a type in RowTypes.
+using RowKind = std::uint8_t;
+inline constexpr std::uint32_t kRowKinds = std::tuple_size_v<RowTypes>;
+/// Kind of a contact without a row.
+inline constexpr RowKind kNoRow = 255;
+
+template <class Row, class... Rows>
+constexpr RowKind index_in(const std::tuple<Rows...>*) {
+  RowKind index = 0;
+  static_cast<void>(((std::is_same_v<Row, Rows> || (++index, false)) || ...));
+  return index;
+}
+template <class Row>
+inline constexpr RowKind kKindOf = index_in<Row>(static_cast<RowTypes*>(nullptr));
+
+template <class Row>
+inline constexpr bool kHasParts = !std::is_same_v<typename Row::Part, NoPart>;
+
+/// Calls f(std::type_identity<Row>()) for the type of a kind.
+template <RowKind kFirst = 0, class F>
+JFPX_HD constexpr decltype(auto) visit_row(RowKind kind, const F& f) {
+  if constexpr (kFirst + 1u < kRowKinds) {
+    if (kind != kFirst) return visit_row<kFirst + 1>(kind, f);
+  }
+  return f(std::type_identity<std::tuple_element_t<kFirst, RowTypes>>());
+}
+
+/// Groups of rows, which a sweep solves one after the other: contacts without a color, those of
+/// each color, and those with an immovable or kinematic body.
+inline constexpr std::uint32_t kGroups = kColors + 2u;
+inline constexpr std::uint32_t kOverflowGroup = 0, kFixedGroup = kGroups - 1;
+JFPX_HD constexpr std::uint32_t group_of_color(std::uint32_t color) { return 1 + color; }
+
+/// Rows are sorted into bins by kind, then by group.
+inline constexpr std::uint32_t kBins = kRowKinds * kGroups;
+inline constexpr std::uint16_t kNoBin = 0xffff;
+static_assert(kRowKinds < kNoRow && kBins < kNoBin);
+JFPX_HD constexpr std::uint16_t bin_of(std::uint32_t kind, std::uint32_t group) {
+  return static_cast<std::uint16_t>(kind * kGroups + group);
+}
+
+/// Kind of a row, by its number among the rows of all bins.
+/// @param begin by bin: its first row
+JFPX_HD inline RowKind kind_of_row(const std::uint32_t* begin, std::uint32_t row) {
+  RowKind kind = 0;
+  while (kind + 1u < kRowKinds && row >= begin[bin_of(kind + 1u, 0)]) ++kind;
+  return kind;
+}
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx
