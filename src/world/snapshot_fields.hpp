@@ -21,10 +21,6 @@ void serialize(auto& archive, Is<BodyId> auto& id) {
   auto& [index, generation] = id;
   archive(index, generation);
 }
-void serialize(auto& archive, Is<BodyPair> auto& pair) {
-  auto& [a, b] = pair;
-  archive(a, b);
-}
 void serialize(auto& archive, Is<Contact> auto& contact) {
   auto& [a, b, normal, point, distance, friction, restitution, sensor] = contact;
   archive(a, b, normal, point, distance, friction, restitution, sensor);
