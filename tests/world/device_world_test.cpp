@@ -113,8 +113,58 @@ TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) {
   }
 }
 
+/// Enough immovable and kinematic solids for trees of several levels, which come, go and move.
+TEST_P(DeviceWorldTest, ManyFixedBodiesHaveTheBitsOfTheProcessor) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  const auto fixed = [&random] {
+    BodyDef def;
+    def.shape = random.below(3) == 0 ? Shape(Capsule{0.2_r, 0.3_r}) : Box{{0.5_r, 0.3_r, 0.5_r}};
+    def.mass = 0;
+    def.kinematic = random.below(3) == 0;
+    def.position = random.uniform_in_box({-5, -0.5_r, -5}, {5, 0.5_r, 5});
+    def.orientation = test::random_rotation(&random);
+    def.velocity = {0.3_r, 0.1_r, 0};
+    def.angular_velocity = {0, 0.5_r, 0};
+    return def;
+  };
+  Scene scene;
+  for (int i = 0; i < 600; ++i) {
+    if (i % 6 != 0) {
+      scene.bodies.push_back(fixed());
+      continue;
+    }
+    BodyDef def = test::random_body(&random, 4);
+    if (is_wall(def.shape)) def.shape = Sphere{0.3_r};
+    def.mass = 1;
+    def.position.y += 3;
+    scene.bodies.push_back(def);
+  }
+  World host = on_host(scene), device = on_device(scene);
+  std::uint64_t contacts = 0;
+  for (int n = 0; n < scene_steps(90); ++n) {
+    const StepReport a = host.step(), b = device.step();
+    ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "step " << n;
+    ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
+    contacts += a.contacts;
+    if (n % 4 != 3) continue;
+    const BodyDef def = fixed();
+    const BodyId id = host.bodies()[random.below(host.bodies().size())];
+    const std::uint64_t action = random.below(3);
+    for (World* world : {&host, &device}) {
+      if (action == 0) world->add(def);
+      if (action == 1 && world->mass(id) == 0) world->remove(id);
+      if (action == 2) world->set_state(id, {def.position, def.orientation, def.velocity, {}});
+    }
+  }
+  EXPECT_GT(contacts, 1000u);
+  EXPECT_TRUE(WorldAccess::impl(device).resident);
+}
+
 TEST_P(DeviceWorldTest, NamedScenesHaveTheBitsOfTheProcessor) {
-  for (const char* name : {"pile", "mixed", "polydisperse", "columns", "overlap", "tower"}) {
+  for (const char* name :
+       {"pile", "mixed", "polydisperse", "columns", "overlap", "tower", "capsules"}) {
     scenes::Options options;
     if (name != std::string("tower")) options.spheres = 60;
     const Scene scene = scenes::make(name, options);

@@ -3,6 +3,7 @@ jfpx_add_test(world_parts_test INTERNAL SOURCES
   world/broad_phase_test.cpp
   world/compound_test.cpp
   world/contact_resolver_test.cpp
+  world/fixed_trees_test.cpp
   world/indexed_priority_queue_test.cpp
   world/neighbor_list_test.cpp
   world/query_tree_test.cpp)
