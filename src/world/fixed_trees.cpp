@@ -18,9 +18,10 @@ void FixedTrees::set_bodies(const SubShapeTable& table, const NearBounds& bounds
   }
   if (next_keys_ == keys_ && margin_ == bounds.largest_margin) return move_kinematic(bounds);
   std::swap(keys_, next_keys_);
-  margin_ = bounds.largest_margin;
+  margin_ = -1;  // the next call builds again if this one throws
   build(bounds, false, &immovable_);
   build(bounds, true, &kinematic_);
+  margin_ = bounds.largest_margin;
 }
 
 void FixedTrees::move_kinematic(const NearBounds& bounds) {

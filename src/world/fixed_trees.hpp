@@ -33,8 +33,8 @@ class FixedTrees {
 
   BlockTree immovable_, kinematic_;
   std::vector<Key> keys_, next_keys_;  ///< of the last build
-  Real margin_ = 0;                    ///< NearBounds::largest_margin of the last build
-  std::uint32_t steps_ = 0;            ///< since the tree of the kinematic solids was built
+  Real margin_ = 0;          ///< NearBounds::largest_margin of the last build; -1: it failed
+  std::uint32_t steps_ = 0;  ///< since the tree of the kinematic solids was built
   // During a build.
   std::vector<std::uint32_t> items_;
   std::vector<Aabb> bounds_;
