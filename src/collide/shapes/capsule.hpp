@@ -191,6 +191,9 @@ JFPX_HD inline void find_contact(const Posed<Capsule>& a, const HalfSpace& wall,
 /// Features of the points of a capsule: those at the lower and the upper end of the common part of
 /// two axes, or of an axis and a face, and a single point.
 inline constexpr std::uint32_t kLowerPoint = 0, kUpperPoint = 1, kSinglePoint = 2;
+/// [-], of the radius: two points replace the closest points only if one of them is as deep as
+/// these, to this part.
+inline constexpr Real kNearlyDeepest = Real(0.01);
 
 /// Parameters of the closest points of two segments (Ericson 2005, 5.1.9).
 struct ClosestPoints {
@@ -214,7 +217,7 @@ JFPX_HD inline ClosestPoints closest_points(const Segment& a, const Segment& b) 
 /// between these ends, the closest points.
 JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<Capsule>& b,
                                  const PairMotion& pair, PairManifold* manifold) {
-  constexpr Real kParallelSine = Real(0.05), kCrossing = Real(0.01);
+  constexpr Real kParallelSine = Real(0.05);
   const Segment fixed = axis_of(b);
   const Real radii = a.shape.radius + b.shape.radius;
   Segment segment;
@@ -254,7 +257,7 @@ JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<Capsule>& 
   const Vec3 high_offset = high - fixed.point(fixed.closest(high));
   const Real low_gap = length(low_offset), high_gap = length(high_offset);
   const Real least = low_gap < high_gap ? low_gap : high_gap;
-  if (!(least <= closest.distance + radii * (1 + kCrossing))) return add_single();
+  if (!(least <= closest.distance + radii * (1 + kNearlyDeepest))) return add_single();
   const Vec3 mean = low_offset + high_offset;
   const Real size = length(mean);
   if (!(size > kEpsilon)) return add_single();
@@ -389,13 +392,17 @@ JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<Box>& b,
   }
   if (absolute(state.normal[face]) > kParallelCosine && lower <= upper) {
     const Real side = state.normal[face] < 0 ? Real(-1) : Real(1);
-    manifold->normal = axes.column(face) * side;
-    const auto add_end = [&](Real at, std::uint32_t feature) {
-      const Real distance = side * segment.point(at)[face] - b.shape.half_extents[face];
-      if (distance - a.shape.radius <= pair.margin) add(at, distance, feature);
+    const auto height = [&](Real at) {
+      return side * segment.point(at)[face] - b.shape.half_extents[face];
     };
-    add_end(lower, kLowerPoint);
-    if (upper > lower) add_end(upper, kUpperPoint);
+    const Real low = height(lower), high = height(upper);
+    // Unless an end beside the face is deeper.
+    if ((low < high ? low : high) <= state.distance + kNearlyDeepest * a.shape.radius) {
+      const Real highest = pair.margin + a.shape.radius;
+      manifold->normal = axes.column(face) * side;
+      if (low <= highest) add(lower, low, kLowerPoint);
+      if (high <= highest && upper > lower) add(upper, high, kUpperPoint);
+    }
   }
   if (manifold->point_count > 0) return;
   manifold->normal = axes * state.normal;
