@@ -2,7 +2,7 @@
 """Generates tables and plots from benchmark results; compares and checks results.
 
     report.py store RAW.json DEST.json   store a result without names of users, hosts and folders
-    report.py tables [--out FILE]        generate docs/benchmarks.md from all machines in bench/results
+    report.py tables [--out FILE]        generate build/benchmarks.md from all machines in bench/results
     report.py plots [--out FOLDER]       draw the figures of the thesis; requires matplotlib
     report.py compare A.json B.json      list changes of more than 10 %; status 1 if any is slower
     report.py check [DOCUMENT...]        check all results, and that each result cited in a document exists
@@ -26,7 +26,7 @@ def parse(arguments):
     store = commands.add_parser("store")
     store.add_argument("raw", type=pathlib.Path)
     store.add_argument("dest", type=pathlib.Path)
-    for name, out in (("tables", "docs/benchmarks.md"), ("plots", "docs/images")):
+    for name, out in (("tables", "build/benchmarks.md"), ("plots", "docs/images")):
         command = commands.add_parser(name)
         command.add_argument("--results", type=pathlib.Path, default=ROOT / "bench/results")
         command.add_argument("--out", type=pathlib.Path, default=ROOT / out)

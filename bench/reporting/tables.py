@@ -1,4 +1,4 @@
-"""Generates docs/benchmarks.md from the files in bench/results."""
+"""Generates build/benchmarks.md from the files in bench/results."""
 import math
 
 BULLET_STAGES = ("integrate", "broadphase", "dispatch", "islands", "solve", "step")

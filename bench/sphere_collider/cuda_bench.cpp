@@ -163,7 +163,7 @@ void register_all() {
                               400000, 1000000, 10000000}) {
     add_on_device("automatic", gas, n, SphereAlgorithm::automatic);
     if (n > 1000 && n <= 32000) add_on_device("all_pairs", gas, n, SphereAlgorithm::all_pairs);
-    if (n <= 32000) add_on_device("sorted_tiles", gas, n, SphereAlgorithm::sorted_tiles);
+    if (n <= 32000) add_on_device("grid", gas, n, SphereAlgorithm::grid);
   }
   add_on_device("pairs_only", gas, 1000000, SphereAlgorithm::automatic, true);
   for (const std::size_t n : {10000, 100000, 1000000}) {

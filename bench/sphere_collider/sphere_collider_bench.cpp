@@ -168,24 +168,24 @@ void add_all() {
   add("tower/automatic", tower, 448, automatic, SimdLevel::automatic);
   for (const std::int64_t n : {128, 256, 512, 768, 1024, 4096, 8192}) {
     add("gas/all_pairs", gas3, n, all_pairs, SimdLevel::automatic);
-    add("gas/sorted", gas3, n, sorted_tiles, SimdLevel::automatic);
+    add("gas/sorted", gas3, n, grid, SimdLevel::automatic);
   }
   for (const std::int64_t n : {10'000, 32'000, 100'000, 320'000, 1'000'000}) {
-    add("gas/sorted", gas3, n, sorted_tiles, SimdLevel::automatic);
+    add("gas/sorted", gas3, n, grid, SimdLevel::automatic);
   }
   for (const Level& l : kLevels)
-    add(std::string("gas/sorted/") + l.name, gas3, 100'000, sorted_tiles, l.level);
+    add(std::string("gas/sorted/") + l.name, gas3, 100'000, grid, l.level);
   for (const unsigned threads : {1u, 2u}) {
-    add("gas/sorted/threads" + std::to_string(threads), gas3, 1'000'000, sorted_tiles,
-        SimdLevel::automatic, threads);
+    add("gas/sorted/threads" + std::to_string(threads), gas3, 1'000'000, grid, SimdLevel::automatic,
+        threads);
   }
   for (const std::int64_t n : {100'000, 1'000'000}) {
-    add("polydisperse/sorted", polydisperse, n, sorted_tiles, SimdLevel::automatic);
-    add("giant_in_dust/sorted", giant_in_dust, n, sorted_tiles, SimdLevel::automatic);
-    add("larger_one/sorted", larger_one, n, sorted_tiles, SimdLevel::automatic);
-    add("outliers/sorted", outliers, n, sorted_tiles, SimdLevel::automatic);
+    add("polydisperse/sorted", polydisperse, n, grid, SimdLevel::automatic);
+    add("giant_in_dust/sorted", giant_in_dust, n, grid, SimdLevel::automatic);
+    add("larger_one/sorted", larger_one, n, grid, SimdLevel::automatic);
+    add("outliers/sorted", outliers, n, grid, SimdLevel::automatic);
   }
-  add("coincident/sorted", coincident, 2'000, sorted_tiles, SimdLevel::automatic);
+  add("coincident/sorted", coincident, 2'000, grid, SimdLevel::automatic);
   add("coincident/all_pairs", coincident, 2'000, all_pairs, SimdLevel::automatic);
 }
 

@@ -38,11 +38,11 @@ std::vector<Contender> contenders_for(std::size_t n, const CostModel& costs) {
   };
   for (const Backend backend : {Backend::cpu, Backend::cuda}) {
     if (backend == Backend::cuda && !cuda_is_usable()) continue;
-    for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+    for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::grid}) {
       if (algorithm == SphereAlgorithm::all_pairs && n > max_spheres_for_all_pairs(backend))
         continue;
       add(std::string(to_string(backend)) + "_" +
-              (algorithm == SphereAlgorithm::all_pairs ? "all_pairs" : "sorted_tiles"),
+              (algorithm == SphereAlgorithm::all_pairs ? "all_pairs" : "grid"),
           {.backend = backend, .algorithm = algorithm});
     }
   }

@@ -39,8 +39,8 @@ constexpr double microseconds(const CostTerms& t, const ColliderWork& work) {
 /// EPYC of 2022 with AVX-512, with one thread, and on an NVIDIA H200. Backend::automatic corrects
 /// them by the times of the last calls.
 struct CostModel {
-  CostTerms cpu_all_pairs, cpu_sorted_tiles, cpu_given_pairs;
-  CostTerms cuda_all_pairs, cuda_sorted_tiles, cuda_given_pairs;
+  CostTerms cpu_all_pairs, cpu_grid, cpu_given_pairs;
+  CostTerms cuda_all_pairs, cuda_grid, cuda_given_pairs;
   CostTerms cpu_world, cuda_world;  ///< steps of a world of touching bodies
   /// [ms] First use of the device, >= 0. When the predicted gain exceeds it, another thread starts
   /// the device while the CPU goes on; 0 states that it is started already, and uses it at once.

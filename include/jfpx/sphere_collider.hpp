@@ -19,11 +19,11 @@ inline namespace JFPX_ABI {
 /// Algorithm that finds pairs of spheres. All algorithms produce bitwise identical contacts.
 enum class SphereAlgorithm : std::uint8_t {
   automatic,
-  all_pairs,     ///< tests every pair: fastest for up to some hundreds of spheres
-  sorted_tiles,  ///< sorts the spheres into grid cells and tests neighbouring cells only
+  all_pairs,  ///< tests every pair: fastest for up to some hundreds of spheres
+  grid,       ///< sorts the spheres into grid cells and tests neighbouring cells only
 };
 
-/// Returns "automatic", "all pairs" or "sorted tiles".
+/// Returns "automatic", "all pairs" or "grid".
 JFPX_API std::string_view to_string(SphereAlgorithm algorithm) noexcept;
 
 /// Reason for the backend and algorithm of a call. The results do not depend on it.

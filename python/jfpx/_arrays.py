@@ -64,9 +64,9 @@ def options(backend: Any, algorithm: Any, threads: Any, device: Any) -> tuple[st
     """The options of a collider or a world."""
     if backend not in ("auto", "cpu", "cuda"):
         raise InvalidArgument(f"backend is {backend!r}; it must be 'auto', 'cpu' or 'cuda'")
-    if algorithm not in ("auto", "automatic", "all_pairs", "sorted_tiles"):
+    if algorithm not in ("auto", "automatic", "all_pairs", "grid"):
         raise InvalidArgument(f"algorithm is {algorithm!r}; it must be 'auto', 'all_pairs' or "
-                              "'sorted_tiles'")
+                              "'grid'")
     return (backend, "automatic" if algorithm == "auto" else algorithm,
             count(threads, "threads", 0, 256), count(device, "device", 0, 2**31 - 1))
 

@@ -170,7 +170,7 @@ class SphereCollider:
     backend : "auto", "cpu" or "cuda"
         Device that searches arrays in host memory. "cuda" copies them to the GPU and back. "auto"
         selects the fastest, by a cost model and by measured times.
-    algorithm : "auto", "all_pairs" or "sorted_tiles"
+    algorithm : "auto", "all_pairs" or "grid"
         All pairs are tested, or those of neighboring cells of a grid. "auto" (also "automatic")
         selects the fastest.
     threads : int in [0, 256]
@@ -211,7 +211,7 @@ class SphereCollider:
 
     @property
     def algorithm(self) -> str:
-        """"all pairs" or "sorted tiles": algorithm of the last search of arrays in host memory;
+        """"all pairs" or "grid": algorithm of the last search of arrays in host memory;
         "automatic" before the first one. A search of arrays on a device selects its algorithm
         there, and does not change this property."""
         return self._collider.algorithm

@@ -44,7 +44,7 @@ class StepReport(NamedTuple):
     backend : str
         "cpu" or "cuda": device of the step, or that found the sphere contacts of a step on the CPU.
     algorithm : str
-        Algorithm that found the sphere contacts: "all pairs" or "sorted tiles"; "automatic" in a
+        Algorithm that found the sphere contacts: "all pairs" or "grid"; "automatic" in a
         step on a GPU.
     choice : str
         Reason for backend and algorithm, as SphereCollider.reason.

@@ -183,7 +183,7 @@ SphereColliderOptions collider_options(const std::string& backend, const std::st
   }
   options.backend = *known;
   for (const SphereAlgorithm a :
-       {SphereAlgorithm::automatic, SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+       {SphereAlgorithm::automatic, SphereAlgorithm::all_pairs, SphereAlgorithm::grid}) {
     std::string name(to_string(a));
     std::replace(name.begin(), name.end(), ' ', '_');
     if (name == algorithm) {
@@ -192,7 +192,7 @@ SphereColliderOptions collider_options(const std::string& backend, const std::st
     }
   }
   throw InvalidArgument("algorithm is \"" + algorithm +
-                        "\"; it must be automatic, all_pairs or sorted_tiles");
+                        "\"; it must be automatic, all_pairs or grid");
 }
 
 void bind_collider(nb::module_& module) {

@@ -54,9 +54,9 @@ auto AutomaticSphereCollider::ways_to_search(const SphereColliderOptions& option
   const CostModel& costs = options.costs;
   std::vector<Way> ways = {
       {Backend::cpu, all_pairs, costs.cpu_all_pairs},
-      {Backend::cpu, sorted_tiles, costs.cpu_sorted_tiles},
+      {Backend::cpu, grid, costs.cpu_grid},
       {Backend::cuda, all_pairs, costs.cuda_all_pairs},
-      {Backend::cuda, sorted_tiles, costs.cuda_sorted_tiles},
+      {Backend::cuda, grid, costs.cuda_grid},
   };
   std::erase_if(ways, [&](const Way& way) {
     return (way.backend == Backend::cuda && !with_cuda) ||
@@ -196,7 +196,7 @@ std::span<const PairContact> AutomaticSphereCollider::find_touching(
 SphereCollider& AutomaticSphereCollider::collider(Backend backend, SphereAlgorithm algorithm) {
   OfBackend& of_backend = colliders_[backend == Backend::cuda ? 1 : 0];
   if (algorithm == SphereAlgorithm::automatic) {
-    algorithm = of_backend[0] ? SphereAlgorithm::all_pairs : SphereAlgorithm::sorted_tiles;
+    algorithm = of_backend[0] ? SphereAlgorithm::all_pairs : SphereAlgorithm::grid;
   }
   std::unique_ptr<SphereCollider>& slot = of_backend[index_of(algorithm)];
   if (slot == nullptr) {
@@ -234,7 +234,7 @@ void AutomaticSphereCollider::start_device_if_it_pays(const Calls& calls,
     options.backend = Backend::cuda;
     for (const Way& way : ways) {
       const bool any = way.algorithm == SphereAlgorithm::automatic;
-      options.algorithm = any ? SphereAlgorithm::sorted_tiles : way.algorithm;
+      options.algorithm = any ? SphereAlgorithm::grid : way.algorithm;
       auto& collider = colliders[index_of(options.algorithm)];
       collider = make(options);
       try {

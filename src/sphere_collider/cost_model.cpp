@@ -22,14 +22,14 @@ constexpr const char* kPrecision = sizeof(Real) == 4 ? "float" : "double";
 struct Way {
   const char* name;
   CostTerms CostModel::*terms;
-  const char* old_name = nullptr;  ///< still read: once, the CPU backend was named x86
+  const char* old_name = nullptr;  ///< still read: the name in 0.2, or in 0.1
 };
 constexpr Way kWays[] = {
     {"cpu_all_pairs", &CostModel::cpu_all_pairs, "x86_all_pairs"},
-    {"cpu_sorted_tiles", &CostModel::cpu_sorted_tiles, "x86_sorted_tiles"},
+    {"cpu_grid", &CostModel::cpu_grid, "cpu_sorted_tiles"},
     {"cpu_given_pairs", &CostModel::cpu_given_pairs, "x86_given_pairs"},
     {"cuda_all_pairs", &CostModel::cuda_all_pairs},
-    {"cuda_sorted_tiles", &CostModel::cuda_sorted_tiles},
+    {"cuda_grid", &CostModel::cuda_grid, "cuda_sorted_tiles"},
     {"cuda_given_pairs", &CostModel::cuda_given_pairs},
     {"cpu_world", &CostModel::cpu_world, "x86_world"},
     {"cuda_world", &CostModel::cuda_world},
@@ -85,10 +85,10 @@ std::string fault_of(const std::string& name, double value) {
 CostModel::CostModel() {
   constexpr double kWide = sizeof(Real) / 4.0;
   cpu_all_pairs = {.call_us = 0.05, .sphere_ns = 6, .pair_ns = 0.175 * kWide, .contact_ns = 5};
-  cpu_sorted_tiles = {.call_us = 0.2, .sphere_ns = 52 * kWide, .contact_ns = 11};
+  cpu_grid = {.call_us = 0.2, .sphere_ns = 52 * kWide, .contact_ns = 11};
   cpu_given_pairs = {.call_us = 0.05, .pair_ns = 5};
   cuda_all_pairs = {.call_us = 13, .byte_ns = 0.05, .sphere_ns = 2.5, .pair_ns = 0.0006 * kWide};
-  cuda_sorted_tiles = {.call_us = 41, .byte_ns = 0.05};
+  cuda_grid = {.call_us = 41, .byte_ns = 0.05};
   cuda_given_pairs = {.call_us = 15, .byte_ns = 0.05};
   cpu_world = {.call_us = 5, .sphere_ns = 1250};
   cuda_world = {.call_us = 270, .sphere_ns = 5 * kWide};

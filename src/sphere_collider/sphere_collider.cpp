@@ -43,7 +43,7 @@ std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions
 std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options,
                                                      ThreadPool* pool) {
   ThreadPool::check(options.threads);
-  if (options.algorithm > SphereAlgorithm::sorted_tiles) {
+  if (options.algorithm > SphereAlgorithm::grid) {
     throw InvalidArgument("algorithm is not a value of SphereAlgorithm");
   }
   if (options.simd > SimdLevel::avx512) throw InvalidArgument("simd is not a value of SimdLevel");
@@ -61,8 +61,8 @@ std::string_view to_string(SphereAlgorithm algorithm) noexcept {
       return "automatic";
     case SphereAlgorithm::all_pairs:
       return "all pairs";
-    case SphereAlgorithm::sorted_tiles:
-      return "sorted tiles";
+    case SphereAlgorithm::grid:
+      return "grid";
   }
   return "unknown";
 }

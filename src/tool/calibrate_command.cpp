@@ -38,21 +38,21 @@ std::string report(const CostModel& costs, bool with_cuda) {
                number(t.contact_ns)});
   };
   add("cpu, all pairs", costs.cpu_all_pairs);
-  add("cpu, sorted tiles", costs.cpu_sorted_tiles);
+  add("cpu, grid", costs.cpu_grid);
   add("cpu, given pairs", costs.cpu_given_pairs);
   add("cpu, step of a world", costs.cpu_world);
   if (with_cuda) {
     add("cuda, all pairs", costs.cuda_all_pairs);
-    add("cuda, sorted tiles", costs.cuda_sorted_tiles);
+    add("cuda, grid", costs.cuda_grid);
     add("cuda, given pairs", costs.cuda_given_pairs);
     add("cuda, step of a world", costs.cuda_world);
   }
   Table crossovers({"with 3 contacts per sphere", "faster from spheres"});
-  crossovers.add({"cpu: sorted tiles instead of all pairs",
-                  from_how_many(costs.cpu_all_pairs, costs.cpu_sorted_tiles)});
+  crossovers.add(
+      {"cpu: grid instead of all pairs", from_how_many(costs.cpu_all_pairs, costs.cpu_grid)});
   if (!with_cuda) return fmt::format("{}\n{}", terms.text(), crossovers.text());
-  crossovers.add({"cuda: sorted tiles instead of all pairs",
-                  from_how_many(costs.cuda_all_pairs, costs.cuda_sorted_tiles)});
+  crossovers.add(
+      {"cuda: grid instead of all pairs", from_how_many(costs.cuda_all_pairs, costs.cuda_grid)});
   crossovers.add(
       {"all pairs: cuda instead of cpu", from_how_many(costs.cpu_all_pairs, costs.cuda_all_pairs)});
   crossovers.add(

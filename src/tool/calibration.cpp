@@ -169,8 +169,7 @@ constexpr Term kCopiedTerms[] = {&CostTerms::call_us, &CostTerms::byte_ns, &Cost
 void measure_cpu(Bench& bench, CostModel* costs) {
   using enum SphereAlgorithm;
   costs->cpu_all_pairs = fit_costs(bench.search(Backend::cpu, all_pairs, kFew), kAllPairsTerms);
-  costs->cpu_sorted_tiles =
-      fit_costs(bench.search(Backend::cpu, sorted_tiles, kMany), kSortedTerms);
+  costs->cpu_grid = fit_costs(bench.search(Backend::cpu, grid, kMany), kSortedTerms);
   costs->cpu_given_pairs = fit_costs(bench.given(Backend::cpu, {}), kGivenTerms);
   costs->cpu_world = fit_costs(bench.world(Backend::cpu, kBodies), kWorldTerms);
 }
@@ -189,8 +188,8 @@ void measure_cuda(Bench& bench, CostModel* costs) {
   const CostTerms copies{.byte_ns = costs->cuda_given_pairs.byte_ns};
   costs->cuda_all_pairs =
       fit_costs(bench.search(Backend::cuda, all_pairs, kFewForDevice), kAllPairsTerms, copies);
-  costs->cuda_sorted_tiles =
-      fit_costs(bench.search(Backend::cuda, sorted_tiles, kManyForDevice), kSortedTerms, copies);
+  costs->cuda_grid =
+      fit_costs(bench.search(Backend::cuda, grid, kManyForDevice), kSortedTerms, copies);
   costs->cuda_world = fit_costs(bench.world(Backend::cuda, kBodiesForDevice), kWorldTerms);
 }
 

@@ -47,7 +47,7 @@ def test_one_radius_for_all_equals_an_array_of_it(rng, dtype):
 def test_threads_and_algorithms_have_the_same_bits(rng, dtype):
     positions, radii = random_spheres(rng, 3000, dtype)
     expected = jfpx.find_contacts(positions, radii)
-    for algorithm in ("all_pairs", "sorted_tiles"):
+    for algorithm in ("all_pairs", "grid"):
         for threads in (1, 3, 0):
             collider = jfpx.SphereCollider(dtype, backend="cpu", algorithm=algorithm,
                                            threads=threads)

@@ -9,7 +9,7 @@ namespace {
 /// Like `automatic`, but with predicted costs of zero for the device.
 ColliderCase device_first() {
   ColliderCase c{"device_first", {}};
-  c.options.costs.cuda_all_pairs = c.options.costs.cuda_sorted_tiles = {};
+  c.options.costs.cuda_all_pairs = c.options.costs.cuda_grid = {};
   c.options.costs.cuda_given_pairs = {};
   c.options.costs.cuda_start_ms = 0;
   return c;

@@ -262,7 +262,7 @@ TEST_F(AutomaticCollider, AFailureOfTheCpuIsThrown) {
 }
 
 TEST_F(AutomaticCollider, KeepsTheRequestedAlgorithm) {
-  for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+  for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::grid}) {
     const auto collider = make_sphere_collider({.algorithm = algorithm});
     for (const std::size_t n : {2u, 200u, 3000u}) {
       collider->find_contacts(make_gas(n, 1, 3, random_));
@@ -276,7 +276,7 @@ TEST_F(AutomaticCollider, AdaptsToANewSizeInTheSameCall) {
   const auto few = make_gas(2, 1, 3, random_), many = make_gas(20000, 1, 3, random_);
   for (int i = 0; i < 50; ++i) collider->find_contacts(few);  // share a decision
   collider->find_contacts(many);
-  EXPECT_EQ(collider->algorithm(), SphereAlgorithm::sorted_tiles);
+  EXPECT_EQ(collider->algorithm(), SphereAlgorithm::grid);
   collider->find_contacts(few);
   EXPECT_EQ(collider->algorithm(), SphereAlgorithm::all_pairs);
 }

@@ -47,8 +47,7 @@ TEST(CostModel, DefaultsPreferAllPairsForFewAndSortingForMany) {
   for (const double n : {2.0, 100.0, 20000.0, 1e6}) {
     const ColliderWork work{.spheres = n, .pairs = n * (n - 1) / 2, .contacts = 3 * n};
     const bool few = n < 1000;
-    EXPECT_EQ(microseconds(costs.cpu_all_pairs, work) < microseconds(costs.cpu_sorted_tiles, work),
-              few);
+    EXPECT_EQ(microseconds(costs.cpu_all_pairs, work) < microseconds(costs.cpu_grid, work), few);
     EXPECT_EQ(microseconds(costs.cpu_all_pairs, work) < microseconds(costs.cuda_all_pairs, work),
               few);
   }

@@ -62,7 +62,7 @@ inline SphereColliderMaker maker_with(Device* device) {
 /// Options whose costs state that the device has been started and takes no time.
 inline SphereColliderOptions device_wins() {
   SphereColliderOptions options;
-  options.costs.cuda_all_pairs = options.costs.cuda_sorted_tiles = {};
+  options.costs.cuda_all_pairs = options.costs.cuda_grid = {};
   options.costs.cuda_given_pairs = {};
   options.costs.cuda_start_ms = 0;
   return options;

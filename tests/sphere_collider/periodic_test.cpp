@@ -179,8 +179,7 @@ TEST(Periodic, AlgorithmsAndThreadsHaveTheSameBits) {
   const PeriodicCell cell{{9, 9, 9}};
   const Spheres spheres = gas_in(cell, 2000, Real(0.4), random);
   const auto expected = find_periodic_contacts(*make_sphere_collider(), spheres, cell);
-  for (const SphereAlgorithm algorithm :
-       {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+  for (const SphereAlgorithm algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::grid}) {
     const auto collider =
         make_sphere_collider({.backend = Backend::cpu, .algorithm = algorithm, .threads = 3});
     EXPECT_EQ(find_periodic_contacts(*collider, spheres, cell), expected) << seed_note();

@@ -18,7 +18,7 @@ bool cuda_is_usable() { return available_backends()[1].usable; }
 class RandomSwitcher final : public SphereCollider {
  public:
   explicit RandomSwitcher(std::uint64_t seed) : random_(seed) {
-    for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+    for (const auto algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::grid}) {
       for (const auto simd : {SimdLevel::scalar, SimdLevel::sse2, SimdLevel::automatic}) {
         add({.backend = Backend::cpu, .algorithm = algorithm, .simd = simd});
       }
@@ -78,8 +78,8 @@ TEST(Switching, ByAnyCostModelGivesTheSameHash) {
     WorldSettings settings;
     CostModel& costs = settings.collider.costs;
     costs.cuda_start_ms = 0;
-    for (CostTerms* terms : {&costs.cpu_all_pairs, &costs.cpu_sorted_tiles, &costs.cuda_all_pairs,
-                             &costs.cuda_sorted_tiles}) {
+    for (CostTerms* terms :
+         {&costs.cpu_all_pairs, &costs.cpu_grid, &costs.cuda_all_pairs, &costs.cuda_grid}) {
       terms->sphere_ns = static_cast<double>(random.uniform(0, 1000));
       terms->pair_ns = static_cast<double>(random.uniform(0, 10));
     }

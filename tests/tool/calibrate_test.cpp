@@ -58,12 +58,12 @@ TEST_F(Calibrate, StoresCostsThatProgramsCanLoad) {
 TEST_F(Calibrate, StoresCostsThatTheOtherCommandsUse) {
   const auto result = jfpx("calibrate");
   EXPECT_EQ(result.status, 0) << result.output;
-  EXPECT_THAT(result.output, HasSubstr("cpu, sorted tiles"));
+  EXPECT_THAT(result.output, HasSubstr("cpu, grid"));
   EXPECT_THAT(result.output, HasSubstr(path()));
   EXPECT_THAT(result.output, Not(HasSubstr("measuring"))) << "progress is shown on terminals only";
   const MeasuredCostModel model = load_cost_model(path());
   EXPECT_GT(model.costs.cpu_all_pairs.pair_ns, 0.0);
-  EXPECT_GT(model.costs.cpu_sorted_tiles.sphere_ns, 0.0);
+  EXPECT_GT(model.costs.cpu_grid.sphere_ns, 0.0);
   EXPECT_GT(model.costs.cpu_given_pairs.pair_ns, 0.0);
   EXPECT_GT(model.costs.cpu_world.sphere_ns, 0.0);
   EXPECT_FALSE(model.origin.machine.empty());
@@ -83,7 +83,7 @@ TEST_F(Calibrate, ReportsCudaOnlyWhereItIsUsable) {
   }
   for (const std::string command : {"calibrate --show", "calibrate"}) {
     const auto result = jfpx(command, "2>/dev/null");
-    EXPECT_THAT(result.output, HasSubstr("cpu: sorted tiles instead of all pairs"));
+    EXPECT_THAT(result.output, HasSubstr("cpu: grid instead of all pairs"));
     EXPECT_EQ(result.output.find("cuda") != std::string::npos, usable) << result.output;
   }
 }

@@ -310,7 +310,7 @@ TEST(Compound, RunsTheSameWithAnyNumberOfThreadsAndAlgorithm) {
     scene.solver = solver;
     std::uint64_t expected = 0;
     for (const SphereAlgorithm algorithm :
-         {SphereAlgorithm::automatic, SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+         {SphereAlgorithm::automatic, SphereAlgorithm::all_pairs, SphereAlgorithm::grid}) {
       for (const unsigned threads : {1u, 2u, 8u}) {
         WorldSettings settings;
         settings.collider.algorithm = algorithm;

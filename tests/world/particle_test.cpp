@@ -250,7 +250,7 @@ TEST(Particle, HasTheSameBitsWithAnyColliderAndRepeat) {
       {.algorithm = SphereAlgorithm::all_pairs},
       {.algorithm = SphereAlgorithm::all_pairs},
       {.algorithm = SphereAlgorithm::all_pairs, .threads = 3},  // threads process blocks of 64 rows
-      {.algorithm = SphereAlgorithm::sorted_tiles, .threads = 3, .simd = SimdLevel::scalar}};
+      {.algorithm = SphereAlgorithm::grid, .threads = 3, .simd = SimdLevel::scalar}};
   for (const SphereColliderOptions& collider : ways) {
     Random random(7);
     ParticleWorld world({.grounds = {kGround}, .collider = collider});

@@ -389,10 +389,10 @@ TEST(Determinism, ThreadsAlgorithmsAndRepeatsGiveTheSameBits) {
   using enum SphereAlgorithm;
   for (const std::string_view name : {"pile", "gas", "polydisperse"}) {
     expect_one_hash(scenes::make(name, {.spheres = 200, .seed = 3}), 40,
-                    std::array{automatic, all_pairs, sorted_tiles});
+                    std::array{automatic, all_pairs, grid});
     // Enough spheres for several threads to sort and search cells.
     expect_one_hash(scenes::make(name, {.spheres = 20'000, .seed = 3}), 2,
-                    std::array{automatic, sorted_tiles});
+                    std::array{automatic, grid});
   }
 }
 

@@ -112,11 +112,10 @@ class SphereColliderCpu final : public SphereCollider {
     detail::check_spheres(spheres, &pool_);
     used_ = requested_;
     if (used_ == SphereAlgorithm::automatic) {
-      used_ = spheres.size() < kAllPairsBelow ? SphereAlgorithm::all_pairs
-                                              : SphereAlgorithm::sorted_tiles;
+      used_ = spheres.size() < kAllPairsBelow ? SphereAlgorithm::all_pairs : SphereAlgorithm::grid;
     }
     pairs_.clear();
-    if (used_ == SphereAlgorithm::sorted_tiles) {
+    if (used_ == SphereAlgorithm::grid) {
       return sweep_.find_pairs(spheres, kernels_, pool_, &pairs_);
     }
     find_all_pairs(spheres);

@@ -65,7 +65,7 @@ DeviceSearch::DeviceSearch(cudaStream_t stream, int device, SphereAlgorithm algo
 std::uint32_t* DeviceSearch::counts() const { return counters_.data() + kStateWords; }
 
 bool DeviceSearch::uses_grid(std::size_t n) const {
-  return algorithm_ == SphereAlgorithm::sorted_tiles ||
+  return algorithm_ == SphereAlgorithm::grid ||
          (algorithm_ == SphereAlgorithm::automatic && n > kMaxForAllPairs);
 }
 
@@ -103,7 +103,7 @@ void DeviceSearch::reserve_spheres(std::size_t n) {
   const std::size_t table_size = uses_grid(n) ? table_size_for(n) : 0;
   counters_.reserve(pool_, stream_, kStateWords + n + 4, "contact counts");
   offsets_.reserve(pool_, stream_, n + 1, "contact offsets");
-  if (algorithm_ != SphereAlgorithm::sorted_tiles) {
+  if (algorithm_ != SphereAlgorithm::grid) {
     const bool all = algorithm_ == SphereAlgorithm::all_pairs;
     const std::size_t max_spheres = all ? n : std::min(n, kMaxForAllPairs);
     masks_.reserve(pool_, stream_, mask_words(max_spheres), "pair masks");

@@ -62,7 +62,7 @@ void DeviceSphereCollider::test_pairs(const SphereInstance* d_spheres, const Sph
 }
 
 SphereAlgorithm DeviceSphereCollider::algorithm_for(std::size_t n) const noexcept {
-  return impl_->search.uses_grid(n) ? SphereAlgorithm::sorted_tiles : SphereAlgorithm::all_pairs;
+  return impl_->search.uses_grid(n) ? SphereAlgorithm::grid : SphereAlgorithm::all_pairs;
 }
 
 }  // namespace cuda

@@ -95,7 +95,7 @@ TEST_P(Allocation, RunningOutIsAnErrorThatNamesBytesAndTheColliderStaysUsable) {
 
 INSTANTIATE_TEST_SUITE_P(X86, Allocation,
                          testing::Combine(testing::Values(SphereAlgorithm::all_pairs,
-                                                          SphereAlgorithm::sorted_tiles),
+                                                          SphereAlgorithm::grid),
                                           testing::Values(1u, 3u)));
 
 }  // namespace

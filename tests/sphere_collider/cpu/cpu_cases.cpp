@@ -19,7 +19,7 @@ std::vector<ColliderCase> cases() {
                                                       {"avx2", SimdLevel::avx2},
                                                       {"avx512", SimdLevel::avx512}};
   const std::pair<const char*, SphereAlgorithm> algorithms[] = {
-      {"all_pairs", SphereAlgorithm::all_pairs}, {"sorted_tiles", SphereAlgorithm::sorted_tiles}};
+      {"all_pairs", SphereAlgorithm::all_pairs}, {"grid", SphereAlgorithm::grid}};
   std::vector<ColliderCase> cases;
   for (const auto& [algorithm_name, algorithm] : algorithms) {
     for (const auto& [level_name, level] : levels) {

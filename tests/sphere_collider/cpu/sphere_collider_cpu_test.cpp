@@ -16,7 +16,7 @@ std::unique_ptr<SphereCollider> make(SphereAlgorithm algorithm, unsigned threads
 }
 
 TEST(SphereColliderCpu, AMillionSpheresOnALatticeHaveThreeNSquaredTimesNMinusOneContacts) {
-  const auto collider = make(SphereAlgorithm::sorted_tiles, 2);
+  const auto collider = make(SphereAlgorithm::grid, 2);
   for (const std::size_t n : std::initializer_list<std::size_t>{55, 100}) {
     const auto spheres = make_lattice(n, Real(1.99));
     EXPECT_EQ(collider->find_contacts(spheres).size(), 3 * n * n * (n - 1)) << "n = " << n;
@@ -27,8 +27,8 @@ TEST(SphereColliderCpu, TwentyThousandSpheresEqualBruteForce) {
   Random random(base_seed());
   for (const char* name : {"polydisperse", "clusters"}) {
     const auto spheres = sphere_kind(name).make(20000, random);
-    EXPECT_TRUE(same_bits(make(SphereAlgorithm::sorted_tiles)->find_contacts(spheres),
-                          brute_force(spheres)))
+    EXPECT_TRUE(
+        same_bits(make(SphereAlgorithm::grid)->find_contacts(spheres), brute_force(spheres)))
         << name << ", " << seed_note();
   }
 }
@@ -50,7 +50,7 @@ TEST(SphereColliderCpu, SpheresThatNearlyTouchEqualBruteForce) {
     for (const SimdLevel level :
          {SimdLevel::scalar, SimdLevel::sse2, SimdLevel::avx2, SimdLevel::avx512}) {
       const auto collider = make_sphere_collider({.backend = Backend::cpu,
-                                                  .algorithm = SphereAlgorithm::sorted_tiles,
+                                                  .algorithm = SphereAlgorithm::grid,
                                                   .threads = 1,
                                                   .simd = level});
       EXPECT_TRUE(same_bits(collider->find_contacts(spheres), expected))
@@ -61,7 +61,7 @@ TEST(SphereColliderCpu, SpheresThatNearlyTouchEqualBruteForce) {
 
 // Too large for brute force. The two algorithms have only the vector filter in common.
 TEST(SphereColliderCpu, AlgorithmsAgreeOnAllKindsOfTensOfThousands) {
-  const auto sorted = make(SphereAlgorithm::sorted_tiles, 2);
+  const auto sorted = make(SphereAlgorithm::grid, 2);
   const auto all = make(SphereAlgorithm::all_pairs, 2);
   for (const SphereKind& kind : sphere_kinds()) {
     if (kind.name == "subnormal") continue;  // all touch: hundreds of millions of contacts
@@ -76,7 +76,7 @@ TEST(SphereColliderCpu, AlgorithmsAgreeOnAllKindsOfTensOfThousands) {
 TEST(SphereColliderCpu, ALargeSphereTouchesEverySmallOne) {
   Random random(base_seed());
   auto spheres = sphere_kind("one_large").make(100000, random);
-  const auto collider = make(SphereAlgorithm::sorted_tiles, 2);
+  const auto collider = make(SphereAlgorithm::grid, 2);
   const ContactSpan contacts = collider->find_contacts(spheres);
   std::set<SphereIndex> touched;
   SphereIndex large = 0;
@@ -107,8 +107,7 @@ TEST(SphereColliderCpu, ClustersAtTheCornersOfAnEnormousWorldAreFound) {
     }
   }
   shuffle(spheres, random);
-  EXPECT_TRUE(
-      same_bits(make(SphereAlgorithm::sorted_tiles)->find_contacts(spheres), brute_force(spheres)))
+  EXPECT_TRUE(same_bits(make(SphereAlgorithm::grid)->find_contacts(spheres), brute_force(spheres)))
       << seed_note();
 }
 
@@ -130,7 +129,7 @@ TEST(SphereColliderCpu, AMillionSpheresAcrossAnEnormousWorldAreFound) {
                           static_cast<SphereIndex>(kCount + i));
     spheres.push_back(spheres[expected.back().first]);
   }
-  const auto collider = make(SphereAlgorithm::sorted_tiles);
+  const auto collider = make(SphereAlgorithm::grid);
   for (const SphereContact& c : collider->find_contacts(spheres)) found.emplace_back(c.a, c.b);
   EXPECT_EQ(found, expected) << seed_note();
 }
@@ -140,7 +139,7 @@ TEST(SphereColliderCpu, AMillionSpheresAcrossAnEnormousWorldAreFound) {
 TEST(SphereColliderCpu, DistantSpheresDoNotCoarsenTheCellsOfTheOthers) {
   Random random(base_seed());
   auto spheres = make_gas(200000, 1, 3, random);
-  const auto collider = make(SphereAlgorithm::sorted_tiles, 2);
+  const auto collider = make(SphereAlgorithm::grid, 2);
   const ContactSpan before = collider->find_contacts(spheres);
   const std::vector<SphereContact> expected(before.begin(), before.end());
   spheres.push_back({{Real(-1e30), Real(1e25), Real(1e12)}, 1});
@@ -156,7 +155,7 @@ TEST(SphereColliderCpu, AutomaticChoosesBySizeAndReportsTheAlgorithm) {
   collider->find_contacts(sphere_kind("uniform").make(100, random));
   EXPECT_EQ(collider->algorithm(), SphereAlgorithm::all_pairs);
   collider->find_contacts(sphere_kind("uniform").make(20000, random));
-  EXPECT_EQ(collider->algorithm(), SphereAlgorithm::sorted_tiles);
+  EXPECT_EQ(collider->algorithm(), SphereAlgorithm::grid);
 }
 
 TEST(SphereColliderCpu, TheBackendTableNamesTheProcessor) {

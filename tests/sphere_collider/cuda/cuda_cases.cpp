@@ -13,7 +13,7 @@ ColliderCase make_case(std::string name, SphereAlgorithm algorithm) {
 INSTANTIATE_TEST_SUITE_P(Cuda, SphereColliderContract,
                          testing::Values(make_case("automatic", SphereAlgorithm::automatic),
                                          make_case("all_pairs", SphereAlgorithm::all_pairs),
-                                         make_case("sorted_tiles", SphereAlgorithm::sorted_tiles)),
+                                         make_case("grid", SphereAlgorithm::grid)),
                          case_name);
 
 }  // namespace

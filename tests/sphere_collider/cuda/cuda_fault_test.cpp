@@ -72,8 +72,7 @@ TEST_F(Cuda, AnyFailingCallIsAnErrorAndTheColliderGoesOn) {
   const auto expected = brute_force(spheres);
   const std::vector<SpherePair> pairs(100, {1, 2});
   for (const cudaError_t error : {cudaErrorMemoryAllocation, cudaErrorLaunchOutOfResources}) {
-    for (const SphereAlgorithm algorithm :
-         {SphereAlgorithm::automatic, SphereAlgorithm::sorted_tiles}) {
+    for (const SphereAlgorithm algorithm : {SphereAlgorithm::automatic, SphereAlgorithm::grid}) {
       std::unique_ptr<SphereCollider> collider;
       with_every_call_failing(error, [&] {
         collider = make(algorithm);  // a new one, so that buffers grow while a call fails
@@ -255,8 +254,8 @@ TEST_F(Cuda, WithoutDeviceMemoryASearchNamesTheBytesAndTheColliderGoesOn) {
     const Spheres spheres = make_lattice(12, Real(1.9));
     const std::vector<SpherePair> pairs(10, {0, 1});
     auto collider = make_sphere_collider({.backend = Backend::cuda});
-    auto grid = make_sphere_collider(
-        {.backend = Backend::cuda, .algorithm = SphereAlgorithm::sorted_tiles});
+    auto grid =
+        make_sphere_collider({.backend = Backend::cuda, .algorithm = SphereAlgorithm::grid});
     check(collider->find_contacts(spheres).size() == 3 * 12 * 12 * 11, "it works before");
     check(grid->find_contacts(spheres).size() == 3 * 12 * 12 * 11, "the grid works before");
     {

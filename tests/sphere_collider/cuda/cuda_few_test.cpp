@@ -30,13 +30,13 @@ TEST_F(Cuda, FewSpheresAsAllPairs) {
 
 TEST_F(Cuda, FewSpheresInCellsWithRoom) {
   Random random(base_seed());
-  expect_cpu_contacts(make_gas(2000, Real(0.5), 3, random), SphereAlgorithm::sorted_tiles, "gas");
+  expect_cpu_contacts(make_gas(2000, Real(0.5), 3, random), SphereAlgorithm::grid, "gas");
 }
 
 TEST_F(Cuda, FewSpheresInOneLaunch) {
   Random random(base_seed());
   for (const char* const name : {"polydisperse", "outliers", "one_large"}) {
-    expect_cpu_contacts(sphere_kind(name).make(1500, random), SphereAlgorithm::sorted_tiles, name);
+    expect_cpu_contacts(sphere_kind(name).make(1500, random), SphereAlgorithm::grid, name);
   }
 }
 
@@ -57,7 +57,7 @@ TEST_F(Cuda, FewSpheresInManyLaunches) {
 TEST_F(Cuda, FewCrowdedSpheres) {
   Random random(base_seed());
   // Rows in one launch are longer than the staging buffer holds, and the cells have no room.
-  expect_cpu_contacts(make_gas(1500, Real(0.5), 60, random), SphereAlgorithm::sorted_tiles, "gas");
+  expect_cpu_contacts(make_gas(1500, Real(0.5), 60, random), SphereAlgorithm::grid, "gas");
   auto gas = make_gas((1 << 18) + 1, Real(0.5), 14, random);
   for (std::size_t i = 0; i < 50; ++i) gas[999 * i].centre = gas[7].centre;  // a long row
   expect_cpu_contacts(gas, SphereAlgorithm::automatic, "gas with coincident spheres");
@@ -75,21 +75,21 @@ TEST_F(Cuda, FewCrowdedSpheresThatTouchExactly) {
   for (std::size_t i = lattice.size(); i > 1; --i) {
     std::swap(lattice[i - 1], lattice[random.below(i)]);
   }
-  expect_cpu_contacts(lattice, SphereAlgorithm::sorted_tiles, "lattice");
+  expect_cpu_contacts(lattice, SphereAlgorithm::grid, "lattice");
   for (SphereInstance& s : lattice) s.centre = s.centre + Vec3{1e6, -1e6, 3e5};
-  expect_cpu_contacts(lattice, SphereAlgorithm::sorted_tiles, "lattice far from the origin");
+  expect_cpu_contacts(lattice, SphereAlgorithm::grid, "lattice far from the origin");
   for (SphereInstance& s : lattice) s = {s.centre * Real(0x1p-40), s.radius * Real(0x1p-40)};
-  expect_cpu_contacts(lattice, SphereAlgorithm::sorted_tiles, "the same, tiny");
+  expect_cpu_contacts(lattice, SphereAlgorithm::grid, "the same, tiny");
 }
 
 TEST_F(Cuda, FewCrowdedSpheresOfSeveralRadii) {
   Random random(base_seed());
   auto gas = make_gas(6000, Real(0.5), 20, random);
   for (SphereInstance& s : gas) s.radius = random.uniform(Real(0.35), Real(0.5));
-  expect_cpu_contacts(gas, SphereAlgorithm::sorted_tiles, "radii");
+  expect_cpu_contacts(gas, SphereAlgorithm::grid, "radii");
   // Consecutive spheres in the order of cells are far from each other.
   for (std::size_t i = 0; i < gas.size(); i += 2) gas[i].centre.x += 400;
-  expect_cpu_contacts(gas, SphereAlgorithm::sorted_tiles, "two parts");
+  expect_cpu_contacts(gas, SphereAlgorithm::grid, "two parts");
 }
 
 TEST_F(Cuda, FewPairsOfAList) {

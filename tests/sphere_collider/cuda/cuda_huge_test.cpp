@@ -75,8 +75,7 @@ TEST_F(Cuda, AHundredMillionSpheresOfALatticeHaveAllTheirContacts) {
 TEST_F(Cuda, MoreThanFourThousandMillionPairsAreFoundInOrder) {
   constexpr std::uint64_t kSpheres = 92'683, kPairs = kSpheres * (kSpheres - 1) / 2;
   static_assert(kPairs > std::uint64_t{1} << 32);
-  for (const SphereAlgorithm algorithm :
-       {SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+  for (const SphereAlgorithm algorithm : {SphereAlgorithm::all_pairs, SphereAlgorithm::grid}) {
     const std::size_t free = free_bytes();
     if (free < std::size_t{105} << 30) GTEST_SKIP() << "needs 105 GiB, free are " << free;
     const Spheres spheres(kSpheres, {{-1, 2, 3}, Real(0.25)});

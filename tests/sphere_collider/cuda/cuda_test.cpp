@@ -14,15 +14,14 @@ inline namespace JFPX_ABI {
 namespace test {
 namespace {
 
-constexpr SphereAlgorithm kAlgorithms[] = {SphereAlgorithm::all_pairs,
-                                           SphereAlgorithm::sorted_tiles};
+constexpr SphereAlgorithm kAlgorithms[] = {SphereAlgorithm::all_pairs, SphereAlgorithm::grid};
 
 // Boundaries of tiles, blocks, warps and buffers: 256 rows per tile, 32 bits per word, the largest
 // N of one launch and of mapped output.
 TEST_F(Cuda, EqualsBruteForceAroundEveryBoundary) {
   Random random(base_seed());
   for (const SphereAlgorithm algorithm :
-       {SphereAlgorithm::automatic, SphereAlgorithm::all_pairs, SphereAlgorithm::sorted_tiles}) {
+       {SphereAlgorithm::automatic, SphereAlgorithm::all_pairs, SphereAlgorithm::grid}) {
     const auto collider = make(algorithm);
     for (const std::size_t edge : {32, 128, 256, 512, 768, 1024, 2048, 2304, 4096}) {
       for (const std::size_t n : {edge - 1, edge, edge + 1}) {
@@ -36,7 +35,7 @@ TEST_F(Cuda, EqualsBruteForceAroundEveryBoundary) {
 
 TEST_F(Cuda, BothAlgorithmsAgreeOnLargeSets) {
   const auto all_pairs = make(SphereAlgorithm::all_pairs);
-  const auto grid = make(SphereAlgorithm::sorted_tiles);
+  const auto grid = make(SphereAlgorithm::grid);
   for (const SphereKind& kind : sphere_kinds()) {
     Random random(base_seed());
     const auto spheres = kind.make(30'000 + random.below(5'000), random);
@@ -50,7 +49,7 @@ TEST_F(Cuda, AllPairsInBandsAgreesWithTheGrid) {
   Random random(base_seed());
   const auto spheres = sphere_kind("uniform").make(70'000, random);
   const auto all_pairs = make(SphereAlgorithm::all_pairs);
-  const auto grid = make(SphereAlgorithm::sorted_tiles);
+  const auto grid = make(SphereAlgorithm::grid);
   EXPECT_TRUE(same_bits(grid->find_contacts(spheres), all_pairs->find_contacts(spheres)))
       << seed_note();
 }
@@ -60,7 +59,7 @@ TEST_F(Cuda, AllPairsInBandsAgreesWithTheGrid) {
 // is the CPU.
 TEST_F(Cuda, SearchesWithoutSortingEqualX86) {
   const auto cpu = make_sphere_collider({.backend = Backend::cpu, .threads = 0});
-  const auto collider = make(SphereAlgorithm::sorted_tiles);
+  const auto collider = make(SphereAlgorithm::grid);
   Random random(base_seed());
   const auto check = [&](const Spheres& spheres, const char* what) {
     for (int repeat = 0; repeat < 2; ++repeat) {
@@ -160,7 +159,7 @@ TEST_F(Cuda, ALargeSphereTouchesAllOthers) {
 TEST_F(Cuda, TwentyRepeatsGiveTheSameBits) {
   Random random(base_seed());
   const auto spheres = sphere_kind("polydisperse").make(50'000, random);
-  const auto collider = make(SphereAlgorithm::sorted_tiles);
+  const auto collider = make(SphereAlgorithm::grid);
   const ContactSpan span = collider->find_contacts(spheres);
   const std::vector<SphereContact> first(span.begin(), span.end());
   for (int i = 0; i < 20; ++i) {
