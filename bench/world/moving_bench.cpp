@@ -83,7 +83,7 @@ void come_and_go(benchmark::State& state, Backend backend, std::uint32_t spheres
     }
   }
   const Scene scene = scenes::make("pile", {.spheres = spheres});
-  World world(scene, {.collider = {.backend = backend, .threads = 0}});
+  World world(scene, {.collider = {.backend = backend}, .threads = 0});
   for (int n = 0; n < 60; ++n) world.step();
   Random random(1);
   // Ids in the order of removal; the sorted list of all ids would be made anew for each step.

@@ -29,12 +29,15 @@ enum class BroadPhase : std::uint8_t {
 };
 
 struct WorldSettings {
-  /// Device and algorithm that find sphere contacts. Its `threads` also run the other parts of a
-  /// step with Solver::soft_step. With Backend::cuda and Solver::soft_step, the state of the world
-  /// is on the device, and all parts of a step run there (docs/cuda.md); functions that read or
-  /// change the state may then also throw DeviceError. With Backend::automatic and
-  /// Solver::soft_step, the world moves to the device and back, whichever takes less time.
-  SphereColliderOptions collider;
+  /// Device and algorithm that find sphere contacts; `collider.threads` must be left at 1. With
+  /// Backend::cuda and Solver::soft_step, the state of the world is on the device, and all parts of
+  /// a step run there (docs/cuda.md); functions that read or change the state may then also throw
+  /// DeviceError. With Backend::automatic and Solver::soft_step, the world moves to the device and
+  /// back, whichever takes less time.
+  SphereColliderOptions collider = {};
+  /// Number of threads of a step on the CPU, at most 256; 0: one per core. With
+  /// Solver::worst_first, only the search for sphere contacts uses them.
+  unsigned threads = 1;
   BroadPhase broad_phase = BroadPhase::cells;
 };
 

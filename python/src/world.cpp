@@ -29,7 +29,7 @@ PyType_Slot kWorldSlots[] = {{Py_tp_traverse, reinterpret_cast<void*>(traverse_w
 
 WorldSettings world_settings(const std::string& backend, const std::string& algorithm,
                              unsigned threads, int device) {
-  return {.collider = collider_options(backend, algorithm, threads, device)};
+  return {.collider = collider_options(backend, algorithm, 1, device), .threads = threads};
 }
 
 /// Replaces all states, or none if one is invalid.

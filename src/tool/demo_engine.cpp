@@ -17,7 +17,7 @@ namespace tool {
 namespace {
 
 std::unique_ptr<demos::Demo> make_demo(const RunOptions& options) {
-  const WorldSettings world{.collider = collider_options(options)};
+  const WorldSettings world = world_settings(options);
   if (!is_demo(options.scene)) return demos::make(load(options), world);
   if (const char* option = option_of_scenes(options)) {
     throw InvalidArgument(std::string(option) + " requires a scene; " + options.scene +

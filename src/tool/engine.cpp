@@ -67,6 +67,12 @@ SphereColliderOptions collider_options(const RunOptions& options) {
   return collider;
 }
 
+WorldSettings world_settings(const RunOptions& options) {
+  SphereColliderOptions collider = collider_options(options);
+  collider.threads = 1;
+  return {.collider = collider, .threads = options.threads};
+}
+
 std::unique_ptr<Engine> make_engine(EngineKind kind, const Scene& scene,
                                     const RunOptions& options) {
   if (kind == EngineKind::native) return make_native_engine(scene, options);

@@ -83,6 +83,7 @@ int report_trouble(const std::string& device_failure, const std::string& trouble
 
 /// The options of the sphere collider.
 SphereColliderOptions collider_options(const RunOptions& options);
+WorldSettings world_settings(const RunOptions& options);
 
 }  // namespace tool
 }  // namespace JFPX_ABI

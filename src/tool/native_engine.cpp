@@ -14,7 +14,7 @@ namespace {
 class NativeEngine final : public Engine {
  public:
   NativeEngine(const Scene& scene, const RunOptions& options)
-      : world_(scene, {.collider = collider_options(options)}) {}
+      : world_(scene, world_settings(options)) {}
 
   void step() override {
     report_ = world_.step();

@@ -23,11 +23,9 @@ namespace {
 constexpr Real kFlat = Real(0.5);  // items with a smaller scale are shadows
 
 std::unique_ptr<demos::Demo> make_demo(const ViewOptions& options) {
-  WorldSettings world;
-  world.collider = collider_options(options.choice);
-  return demos::make(
-      options.run.scene,
-      {.scene = tool::scene_options(options.run), .dt = options.run.dt, .world = world});
+  return demos::make(options.run.scene, {.scene = tool::scene_options(options.run),
+                                         .dt = options.run.dt,
+                                         .world = world_settings(options.choice)});
 }
 
 /// Draws the acceleration of each body by forces in the last step, weight included. An acceleration

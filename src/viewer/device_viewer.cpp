@@ -124,7 +124,7 @@ std::unique_ptr<Viewer> make_device_viewer(const ViewOptions& options) {
   }
   return std::make_unique<DeviceViewer>(
       options, scene, DeviceRun{.make_world = [choice = options.choice](const Scene& given) {
-        return World(given, {.collider = collider_options(choice)});
+        return World(given, world_settings(choice));
       }});
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>
+#include <jfpx/world.hpp>
 
 #include "src/viewer/run.hpp"
 
@@ -19,6 +20,12 @@ inline SphereColliderOptions collider_options(const EngineChoice& choice) {
   options.threads = choice.threads;
   if (choice.backend == Backend::automatic) options.costs = calibrated_costs().costs;
   return options;
+}
+
+inline WorldSettings world_settings(const EngineChoice& choice) {
+  WorldSettings settings{.collider = collider_options(choice), .threads = choice.threads};
+  settings.collider.threads = 1;
+  return settings;
 }
 
 /// Delegates to a collider that can be replaced during the lifetime of the owner. All colliders

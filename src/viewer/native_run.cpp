@@ -14,7 +14,7 @@ class NativeRun final : public Run {
       : choice_(choice),
         first_step_(first_step),
         scene_(std::move(scene)),
-        world_(scene_, {.collider = collider_options(choice)}) {}
+        world_(scene_, world_settings(choice)) {}
 
   void step() override { report_ = world_.step(); }
 
@@ -40,7 +40,7 @@ class NativeRun final : public Run {
   bool switch_to(const EngineChoice& choice) override {
     if (choice.engine != EngineKind::native || choice.threads != choice_.threads) return false;
     // A world on another device continues with the same bits.
-    World next(scene_, {.collider = collider_options(choice)});
+    World next(scene_, world_settings(choice));
     next.restore(world_.snapshot());
     world_ = std::move(next);
     choice_ = choice;

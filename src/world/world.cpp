@@ -310,7 +310,12 @@ StepReport World::Impl::make_step() {
 }
 
 World::World(const Scene& scene, const WorldSettings& settings) {
-  auto pool = std::make_unique<ThreadPool>(settings.collider.threads);
+  if (settings.collider.threads != 1) {
+    throw InvalidArgument("collider.threads of a world is " +
+                          std::to_string(settings.collider.threads) +
+                          "; it must be 1: WorldSettings::threads are those of the whole step");
+  }
+  auto pool = std::make_unique<ThreadPool>(settings.threads);
   auto collider = make_sphere_collider(settings.collider, pool.get());
   impl_ = Impl::make(scene, std::move(pool), std::move(collider), settings.broad_phase,
                      settings.collider.simd);

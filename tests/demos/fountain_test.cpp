@@ -50,17 +50,18 @@ TEST(Fountain, EachBallLivesThreeSecondsAndStaysInTheBasin) {
 }
 
 TEST(Fountain, HasTheSameBitsWithAnyNumberOfThreadsOnEveryBackend) {
-  const auto hash = [](const SphereColliderOptions& collider) {
-    const auto demo = demos::make(
-        "fountain", {.scene = {.spheres = 900, .seed = 7}, .world = {.collider = collider}});
+  const auto hash = [](const WorldSettings& settings) {
+    const auto demo =
+        demos::make("fountain", {.scene = {.spheres = 900, .seed = 7}, .world = settings});
     for (int n = 0; n < 200; ++n) demo->step();
     return demo->state_hash();
   };
-  const std::uint64_t expected = hash({.backend = Backend::cpu});
-  EXPECT_EQ(hash({.backend = Backend::cpu, .threads = 3}), expected);
+  const std::uint64_t expected = hash({.collider = {.backend = Backend::cpu}});
+  EXPECT_EQ(hash({.collider = {.backend = Backend::cpu}, .threads = 3}), expected);
   for (const BackendStatus& status : available_backends()) {
     if (!status.usable) continue;
-    EXPECT_EQ(hash({.backend = status.backend}), expected) << to_string(status.backend);
+    EXPECT_EQ(hash({.collider = {.backend = status.backend}}), expected)
+        << to_string(status.backend);
   }
 }
 

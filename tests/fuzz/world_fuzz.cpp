@@ -357,7 +357,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   // Drawn from the last byte, so that inputs of the corpus keep their meaning.
   const unsigned last = size > 0 ? data[size - 1] : 0;
   if (size > 0) scene.solver = last % 2 == 0 ? Solver::soft_step : Solver::worst_first;
-  if (last / 2 % 4 != 0) settings.collider.threads = 1 + last / 2 % 4;
+  if (last / 2 % 4 != 0) settings.threads = 1 + last / 2 % 4;
   std::optional<Twins> twins;
   try {
     twins.emplace(scene, settings);

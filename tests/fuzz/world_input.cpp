@@ -151,7 +151,7 @@ WorldSettings draw_settings(Bytes& bytes) {
   settings.collider.backend = Backend::cpu;
   settings.collider.algorithm = SphereAlgorithm{static_cast<std::uint8_t>(bytes.below(3))};
   settings.collider.simd = SimdLevel{static_cast<std::uint8_t>(bytes.below(5))};
-  settings.collider.threads = bytes.chance(Real(0.05)) ? 2 : 1;
+  settings.threads = bytes.chance(Real(0.05)) ? 2 : 1;
   settings.broad_phase = BroadPhase{static_cast<std::uint8_t>(bytes.below(3))};
   return settings;
 }

@@ -108,9 +108,7 @@ Scene small_pile() {
   return scene;
 }
 
-World on_host(const Scene& scene) {
-  return World(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
-}
+World on_host(const Scene& scene) { return World(scene, {.collider = {.backend = Backend::cpu}}); }
 
 /// A world that moves to the devices of `make`.
 World automatic(const Scene& scene, const CostModel& costs, AutomaticDevice::Maker make) {

@@ -364,7 +364,7 @@ TEST_P(Boxes, RunTheSameWithAnyNumberOfThreads) {
   std::uint64_t expected = 0;
   for (const unsigned threads : {1u, 2u, 8u}) {
     WorldSettings settings;
-    settings.collider.threads = threads;
+    settings.threads = threads;
     World world(scene, settings);
     for (int n = 0; n < 120; ++n) world.step();
     if (threads == 1) expected = world.state_hash();

@@ -314,7 +314,7 @@ TEST(Compound, RunsTheSameWithAnyNumberOfThreadsAndAlgorithm) {
       for (const unsigned threads : {1u, 2u, 8u}) {
         WorldSettings settings;
         settings.collider.algorithm = algorithm;
-        settings.collider.threads = threads;
+        settings.threads = threads;
         World world(scene, settings);
         for (int n = 0; n < 120; ++n) world.step();
         if (expected == 0) expected = world.state_hash();

@@ -73,7 +73,7 @@ TEST_P(Concurrency, WorldsInSeveralThreadsAreIndependent) {
   SCOPED_TRACE(trace(seed));
   const Scene scene = dense_scene(seed);
   const auto run = [&scene] {
-    World world(scene, {.collider = {.threads = 2}});
+    World world(scene, {.threads = 2});
     for (int n = 0; n < 50; ++n) world.step();
     return world.state_hash();
   };
@@ -108,7 +108,7 @@ TEST(SoftStepConcurrency, AHeapOfThousandsStepsOnSeveralThreads) {
   }
   std::uint64_t expected = 0;
   for (const unsigned threads : {1u, 3u}) {
-    World world(scene, {.collider = {.threads = threads}});
+    World world(scene, {.threads = threads});
     for (int n = 0; n < 4; ++n) world.step();
     EXPECT_GT(world.contacts().size(), 20000u);
     if (threads == 1) expected = world.state_hash();

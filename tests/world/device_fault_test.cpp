@@ -58,13 +58,13 @@ TEST(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
       world->step();
     }
   };
-  World host(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+  World host(scene, {.collider = {.backend = Backend::cpu}});
   add_forces(&host);
   run(&host);
   long failing = 0;
   for (bool was_reached = true; was_reached; ++failing) {
     ASSERT_LT(failing, 2000);
-    World world(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    World world(scene, {.collider = {.backend = Backend::cpu}});
     add_forces(&world);
     WorldAccess::impl(world).device = make_device_world(scene);
     cuda::inject_fault(failing, cudaErrorLaunchOutOfResources);
@@ -102,13 +102,13 @@ TEST(CudaWorld, AnyFailingCallOfAQueueLeavesTheBitsOfTheProcessor) {
       if (n == 2) retry([&] { world->remove(world->bodies()[20]); });
     }
   };
-  World host(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+  World host(scene, {.collider = {.backend = Backend::cpu}});
   add_forces(&host);
   run(&host, false);
   long failing = 0;
   for (bool was_reached = true; was_reached; ++failing) {
     ASSERT_LT(failing, 2000);
-    World world(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    World world(scene, {.collider = {.backend = Backend::cpu}});
     add_forces(&world);
     WorldAccess::impl(world).device = make_device_world(scene);
     cuda::inject_fault(failing, cudaErrorLaunchOutOfResources);

@@ -32,12 +32,12 @@ using test::operator""_r;
 class DeviceQueueTest : public testing::TestWithParam<test::DeviceKind> {
  protected:
   World on_device(const Scene& scene) const {
-    World world(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    World world(scene, {.collider = {.backend = Backend::cpu}});
     WorldAccess::impl(world).device = GetParam().make(scene);
     return world;
   }
   static World on_host(const Scene& scene) {
-    return World(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    return World(scene, {.collider = {.backend = Backend::cpu}});
   }
   /// A graph of steps, which the returned function launches.
   std::function<void()> graph_of(World* world, std::uint32_t steps) const {
@@ -486,7 +486,7 @@ TEST(DeviceQueue, NeedsADevice) {
 /// Whichever program of a queue cannot be started, the processor completes the steps.
 TEST(DeviceQueue, AFailingDeviceIsReplacedInTheMiddleOfAQueue) {
   const Scene scene = scenes::make("mixed", {.spheres = 20});
-  World host(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+  World host(scene, {.collider = {.backend = Backend::cpu}});
   const auto prepare = [](World* world) {
     world->add_force(Gravity{{0, 0, 1}});
     make_steps(world, 3);
@@ -498,7 +498,7 @@ TEST(DeviceQueue, AFailingDeviceIsReplacedInTheMiddleOfAQueue) {
   bool was_reached = true;
   for (int runs = 0; was_reached; ++runs) {
     ASSERT_LT(runs, 100);
-    World world(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    World world(scene, {.collider = {.backend = Backend::cpu}});
     auto& impl = WorldAccess::impl(world);
     impl.device = test::make_host_device_world(scene);
     prepare(&world);

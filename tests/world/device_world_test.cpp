@@ -39,12 +39,12 @@ struct Kind {
 class DeviceWorldTest : public testing::TestWithParam<Kind> {
  protected:
   World on_device(const Scene& scene) const {
-    World world(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    World world(scene, {.collider = {.backend = Backend::cpu}});
     WorldAccess::impl(world).device = GetParam().make(scene);
     return world;
   }
   static World on_host(const Scene& scene) {
-    return World(scene, {.collider = {.backend = Backend::cpu, .threads = 1}});
+    return World(scene, {.collider = {.backend = Backend::cpu}});
   }
 };
 

@@ -17,7 +17,7 @@ namespace {
 
 const std::array<WorldSettings, 5> kSettings{{
     {.collider = {.backend = Backend::cpu, .algorithm = SphereAlgorithm::all_pairs}},
-    {.collider = {.backend = Backend::cpu, .algorithm = SphereAlgorithm::grid, .threads = 3}},
+    {.collider = {.backend = Backend::cpu, .algorithm = SphereAlgorithm::grid}, .threads = 3},
     {.collider = {}},
     {.collider = {.backend = Backend::cpu}, .broad_phase = BroadPhase::hierarchy},
     {.collider = {.backend = Backend::cpu}, .broad_phase = BroadPhase::brute_force},

@@ -79,7 +79,8 @@ SimdLevel simd_of(unsigned threads) {
 /// hash.
 bool check(const Pin& pin, Solver solver, unsigned threads) {
   WorldSettings settings;
-  settings.collider = {.backend = Backend::cpu, .threads = threads, .simd = simd_of(threads)};
+  settings.collider = {.backend = Backend::cpu, .simd = simd_of(threads)};
+  settings.threads = threads;
   // Small sets use several threads only in the all-pairs search.
   if (threads > 1 && pin.spheres < 20000) {
     settings.collider.algorithm = SphereAlgorithm::all_pairs;

@@ -29,9 +29,9 @@ JFPX_SOLVER_SUITE(Snapshots);
 
 const WorldSettings kSettings[] = {
     {.collider = {.backend = Backend::cpu}},
-    {.collider = {.backend = Backend::cpu, .threads = 3}},
+    {.collider = {.backend = Backend::cpu}, .threads = 3},
     {.collider = {.backend = Backend::cpu, .algorithm = SphereAlgorithm::all_pairs}},
-    {.collider = {.backend = Backend::cpu, .threads = 2}, .broad_phase = BroadPhase::hierarchy},
+    {.collider = {.backend = Backend::cpu}, .threads = 2, .broad_phase = BroadPhase::hierarchy},
     {.collider = {.backend = Backend::cpu}, .broad_phase = BroadPhase::brute_force},
 };
 

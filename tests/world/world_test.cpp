@@ -32,6 +32,17 @@ TEST(World, AnEmptyWorldSteps) {
   EXPECT_EQ(world.state_hash(), state_hash({}));
 }
 
+TEST(World, RefusesThreadsInTheOptionsOfItsCollider) {
+  try {
+    const World world(Scene{}, {.collider = {.threads = 4}});
+    ADD_FAILURE() << "no exception";
+  } catch (const InvalidArgument& error) {
+    EXPECT_STREQ(error.what(),
+                 "collider.threads of a world is 4; it must be 1: WorldSettings::threads are those "
+                 "of the whole step");
+  }
+}
+
 TEST(World, StartsInTheStateOfTheScene) {
   Scene scene = two_balls();
   scene.bodies[0].velocity = {1, 2, 3};
@@ -375,7 +386,7 @@ void expect_one_hash(Scene scene, int steps, std::span<const SphereAlgorithm> al
     std::optional<std::uint64_t> expected;
     for (const SphereAlgorithm algorithm : algorithms) {
       for (const unsigned threads : {1u, 2u, 3u, 8u}) {
-        World world(scene, {.collider = {.algorithm = algorithm, .threads = threads}});
+        World world(scene, {.collider = {.algorithm = algorithm}, .threads = threads});
         for (int n = 0; n < steps; ++n) world.step();
         if (!expected) expected = world.state_hash();
         ASSERT_EQ(world.state_hash(), *expected)
