@@ -1,4 +1,4 @@
-/// Example of a native world: bodies, a force, a rope, contact events and queries.
+/// Example of a native world: bodies, a force, joints, contact events and queries.
 #include <jfpx/world.hpp>
 
 #include <algorithm>
@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <optional>
 #include <span>
+#include <variant>
 #include <vector>
 
 namespace {
@@ -29,20 +30,22 @@ jfpx::BodyDef ball(const jfpx::Vec3& position, Real radius = Real(0.5), Real mas
   return def;
 }
 
-/// Contact generator: the distance of the centres of two bodies is at most `length`.
-struct Rope {
-  jfpx::BodyId a, b;
-  Real length = 1;  ///< [m]
+/// Contact generator: the centre of a body stays inside a hollow sphere, which is no shape of jfpx.
+struct Dome {
+  jfpx::BodyId body, ground;
+  jfpx::Vec3 centre;
+  Real radius = 1;  ///< [m]
 
   void operator()(jfpx::ContactContext& context) const {
-    const jfpx::Vec3 from = context.state(a).position, d = context.state(b).position - from;
-    const Real distance = jfpx::length(d);
-    if (distance < length) return;
-    context.add({.a = a,
-                 .b = b,
-                 .normal = d * (1 / distance),
-                 .point = from,
-                 .distance = length - distance});
+    const jfpx::Vec3 inwards = centre - context.state(body).position;
+    const Real distance = jfpx::length(inwards);
+    if (distance < radius) return;
+    const jfpx::Vec3 normal = inwards * (1 / distance);
+    context.add({.a = body,
+                 .b = ground,
+                 .normal = normal,
+                 .point = centre - normal * radius,
+                 .distance = radius - distance});
   }
 };
 
@@ -65,7 +68,14 @@ int main() {
 
   const jfpx::BodyId hook = world.add(ball({-3, 6, 3}, Real(0.1), 0));
   const jfpx::BodyId lamp = world.add(ball({-3, 5, 3}, Real(0.2), 10));
-  world.add_contact_generator(Rope{hook, lamp, 1});
+  const jfpx::JointId rope =
+      world.add_joint(jfpx::DistanceJoint{.a = lamp, .b = hook, .max_length = 1});
+  jfpx::DistanceJoint shorter = std::get<jfpx::DistanceJoint>(world.joint(rope));
+  shorter.max_length = Real(0.8);
+  world.set_joint(rope, shorter);
+  const jfpx::BodyId floor = world.bodies()[0];
+  const jfpx::BodyId bird = world.add(ball({0, 2, -9}, Real(0.1)));
+  world.add_contact_generator(Dome{bird, floor, {0, 2, -9}, 1});
   constexpr std::uint32_t kDecoration = 2;  // a bit of its own
   world.set_filter(lamp, {.category = kDecoration, .mask = 0});
 
@@ -97,6 +107,10 @@ int main() {
   std::printf("%d touches, %d balls were blown off the floor\n", began, fell);
 
   std::printf("bodies above the floor: %d\n", visitors);
+
+  const jfpx::JointState taut = world.joint_state(rope);
+  std::printf("the rope of %.2f m pulls with %.0f N\n", static_cast<double>(taut.length),
+              static_cast<double>(taut.force));
 
   const auto is_solid = [&world](jfpx::BodyId id) { return !world.sensor(id); };
   const std::optional<jfpx::RayHit> hit =

@@ -10,6 +10,7 @@
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 #include <jfpx/intersect.hpp>
+#include <jfpx/joint.hpp>
 #include <jfpx/material.hpp>
 #include <jfpx/particle.hpp>
 #include <jfpx/periodic.hpp>

@@ -62,6 +62,10 @@ class JFPX_API RecordedWorld {
   void set_force(ForceId id, const RecordableForce& force);
   void remove_force(ForceId id);
 
+  JointId add_joint(const Joint& joint);
+  void set_joint(JointId id, const Joint& joint);
+  void remove_joint(JointId id);
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -3,6 +3,7 @@
 
 #include <jfpx/body.hpp>
 #include <jfpx/build.hpp>
+#include <jfpx/joint.hpp>
 #include <jfpx/material.hpp>
 
 #include <string>
@@ -95,6 +96,8 @@ struct Scene {
   /// Pairs of bodies that do not collide, whatever their filters. The order of the pairs and of the
   /// two bodies of a pair has no effect, and a pair may occur more than once.
   std::vector<BodyPair> ignored_pairs;
+  /// Joints, whose bodies are indices in `bodies`. Solver::soft_step only.
+  std::vector<Joint> joints;
   friend bool operator==(const Scene&, const Scene&) = default;
 };
 
@@ -110,7 +113,8 @@ inline constexpr Real kUnitTolerance = Real(1e-3);
 /// Checks every field that can affect a step. In addition to the ranges given with the fields,
 /// sizes, positions and offsets must not exceed kMaxCoordinate, masses and moments of inertia must
 /// have finite inverses, dt must not be denormal, there may be at most 2^32 - 1 bodies, and an
-/// ignored pair must consist of two different bodies of the scene.
+/// ignored pair or a joint must consist of two different bodies of the scene, of which one must be
+/// movable for a joint.
 /// @throws InvalidScene naming the first invalid body, the field, its value and the allowed range.
 JFPX_API void validate(const Scene& scene);
 

@@ -4,6 +4,7 @@
 #include <jfpx/contact_generator.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
+#include <jfpx/joint.hpp>
 #include <jfpx/query.hpp>
 #include <jfpx/scene.hpp>
 #include <jfpx/snapshot.hpp>
@@ -219,6 +220,26 @@ class JFPX_API World {
   /// @throws InvalidArgument also if both are the same body
   void set_pair_ignored(BodyId a, BodyId b, bool ignored);
 
+  /// Adds a joint, which acts from the next step on, and wakes its bodies. Their contacts with each
+  /// other end, unless the joint lets them collide. Joints are removed with their bodies.
+  /// @throws InvalidArgument, as do all functions of joints, for an unknown id or a field out of
+  ///   its range; if both bodies are the same or have mass 0; if the solver is worst_first
+  JointId add_joint(const Joint& joint);
+  /// Removes a joint and wakes its bodies.
+  void remove_joint(JointId id);
+  /// Whether the id is of a joint of this world.
+  bool contains_joint(JointId id) const noexcept;
+  /// Joints in the order of their indices. Valid until a joint or a body is added or removed.
+  std::span<const JointId> joints() const;
+  /// Valid until a joint or a body is added or removed.
+  const Joint& joint(JointId id) const;
+  /// Replaces a joint by one of the same type and bodies, for example with another length or
+  /// another spring. Wakes its bodies.
+  void set_joint(JointId id, const Joint& joint);
+  /// The joint after the last step: its length is that of the present states of the bodies, its
+  /// force that of the last step.
+  JointState joint_state(JointId id) const;
+
   /// Applies a force [N] at the centre of mass or at a point in the world [m], or a torque [N m],
   /// in the next step. Vectors are in world axes. Several calls add up. Wakes the body (erratum
   /// E29); has no effect on a body of mass 0 (erratum E19).
@@ -289,7 +310,7 @@ class JFPX_API World {
   std::vector<BodyId> overlapping(const Box& box, const Vec3& centre,
                                   const Quat& orientation = {}) const;
 
-  /// Everything that the following steps depend on, as a value: bodies, ids, ignored pairs,
+  /// Everything that the following steps depend on, as a value: bodies, joints, ids, ignored pairs,
   /// settings, sleep, accumulated forces, contacts with their impulses, and forces of force.hpp. A
   /// function of the state alone. User-defined forces and contact generators are recorded by id.
   /// @throws OutOfMemory, DeviceError
@@ -335,7 +356,7 @@ class JFPX_API World {
   std::span<const ContactEvent> contact_events() const;
   /// state_hash() of states().
   std::uint64_t state_hash() const;
-  /// Name and settings of the world, as a Scene without bodies and ignored pairs; restore()
+  /// Name and settings of the world, as a Scene without bodies, joints and ignored pairs; restore()
   /// replaces them.
   const Scene& settings() const;
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/collide/shapes.hpp"
+#include "src/scene/joint_fields.hpp"
 #include "src/scene/scene_fields.hpp"
 #include "src/scene/scene_json_value.hpp"
 
@@ -64,16 +65,21 @@ detail::SceneJson to_value(const T& object) {
   add_fields(&json, object);
   return json;
 }
-/// A shape: the fields of the alternative, after its name.
+/// The fields of an object, after the name of its type.
+template <HasFields T>
+detail::SceneJson named_value(const char* type, const T& object) {
+  detail::SceneJson json = {{"type", type}};
+  add_fields(&json, object);
+  return json;
+}
 template <class... Shapes>
 detail::SceneJson to_value(const std::variant<Shapes...>& shape) {
   return std::visit(
-      []<class T>(const T& value) {
-        detail::SceneJson json = {{"type", detail::kShapeName<T>}};
-        add_fields(&json, value);
-        return json;
-      },
-      shape);
+      []<class T>(const T& value) { return named_value(detail::kShapeName<T>, value); }, shape);
+}
+inline detail::SceneJson to_value(const Joint& joint) {
+  return std::visit([]<class T>(const T& value) { return named_value(kJointName<T>, value); },
+                    joint);
 }
 
 }  // namespace JFPX_ABI

@@ -85,9 +85,10 @@ void each_field(Is<MaterialSettings> auto& settings, const auto& visit) {
   visit(field("restitution", kRule), restitution);
 }
 
-/// Name and settings, without the bodies and pairs.
+/// Name and settings, without the bodies, pairs and joints.
 void each_field(Is<Scene> auto& scene, const auto& visit) {
-  auto& [name, dt, bodies, solver, soft_step, resolver, sleep, materials, ignored_pairs] = scene;
+  auto& [name, dt, bodies, solver, soft_step, resolver, sleep, materials, ignored_pairs, joints] =
+      scene;
   visit(field("name"), name);
   visit(field("dt", kStepLength), dt);
   visit(field("solver", Enumerator{"one of the values of Solver"}), solver);

@@ -6,6 +6,7 @@
 
 #include "src/base/file.hpp"
 #include "src/collide/shapes.hpp"
+#include "src/scene/joint_fields.hpp"
 #include "src/scene/scene_fields.hpp"
 #include "src/scene/scene_json_value.hpp"
 
@@ -108,6 +109,8 @@ template <class... Shapes>
 void read(const Json& json, const std::string& where, std::variant<Shapes...>& shape);
 template <class T>
 void read(const Json& json, const std::string& where, std::vector<T>& list);
+void read(const Json& json, const std::string& where, BodyId& body);
+void read(const Json& json, const std::string& where, std::optional<BodyId>& body);
 
 /// Reads the fields of one object and rejects the fields that were not read.
 class ObjectReader {
@@ -162,36 +165,51 @@ void read(const Json& json, const std::string& where, T& object) {
   reader.reject_unknown();
 }
 
-/// True if `type` is the name of shape T. Version 0.1 named a compound "assembly".
+/// Name of a shape or a joint.
+template <class T>
+inline constexpr const char* kTypeName = kShapeName<T>;
+template <>
+inline constexpr const char* kTypeName<DistanceJoint> = kJointName<DistanceJoint>;
+
+/// True if `type` is the name of shape or joint T. Version 0.1 named a compound "assembly".
 template <class T>
 bool is_name_of(const std::string& type) {
-  return type == kShapeName<T> || (std::is_same_v<T, Compound> && type == "assembly");
+  return type == kTypeName<T> || (std::is_same_v<T, Compound> && type == "assembly");
 }
 
-/// Reads the shape that the field "type" names.
-template <class... Shapes>
-void read(const Json& json, const std::string& where, std::variant<Shapes...>& shape) {
+/// Reads the shape or joint that the field "type" names.
+template <class... Types>
+void read(const Json& json, const std::string& where, std::variant<Types...>& out) {
   ObjectReader object(json, where);
   std::string type;
   object.required("type", type);
   const auto read_if = [&](auto value) {
     if (!is_name_of<decltype(value)>(type)) return false;
     object.fields(value);
-    shape = std::move(value);
+    out = std::move(value);
     return true;
   };
-  if (!(read_if(Shapes{}) || ...)) {
+  if (!(read_if(Types{}) || ...)) {
     std::string names;
-    std::size_t left = sizeof...(Shapes);
+    std::size_t left = sizeof...(Types);
     const auto list = [&](const char* name) {
       names += names.empty() ? "" : left == 1 ? " or " : ", ";
       names += name;
       --left;
     };
-    (list(kShapeName<Shapes>), ...);
+    (list(kTypeName<Types>), ...);
     fail(object.path("type"), "is \"" + type + "\"; it must be " + names);
   }
   object.reject_unknown();
+}
+
+/// A body of a joint: its index in the scene.
+void read(const Json& json, const std::string& where, BodyId& body) {
+  body = {};
+  read(json, where, body.index);
+}
+void read(const Json& json, const std::string& where, std::optional<BodyId>& body) {
+  read(json, where, body.emplace());
 }
 
 void read(const Json& json, const std::string& where, BodyPair& pair) {
@@ -222,6 +240,9 @@ Scene scene_from(const Json& json) {
   object.fields(scene);
   if (const Json* pairs = object.find("ignored_pairs")) {
     read(*pairs, object.path("ignored_pairs"), scene.ignored_pairs);
+  }
+  if (const Json* joints = object.find("joints")) {
+    read(*joints, object.path("joints"), scene.joints);
   }
   const Json& bodies = object.at("bodies");
   if (!bodies.is_array())

@@ -16,6 +16,18 @@ std::string dumped(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+/// A joint of a scene, whose bodies are indices.
+Json joint_value(const Joint& joint) {
+  Json json = to_value(joint);
+  std::visit(
+      [&json](const auto& j) {
+        json["a"] = j.a.index;
+        if (j.b) json["b"] = j.b->index;
+      },
+      joint);
+  return json;
+}
+
 }  // namespace
 
 std::string to_json(const Scene& scene) {
@@ -29,11 +41,16 @@ std::string to_json(const Scene& scene) {
     add(field.name, dumped(to_value(member)));
   });
   if (!scene.ignored_pairs.empty()) add("ignored_pairs", dumped(to_value(scene.ignored_pairs)));
-  add("bodies", "[");
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    text += (i == 0 ? "\n  " : ",\n  ") + dumped(to_value(scene.bodies[i]));
-  }
-  return text + "\n]}\n";
+  const auto add_list = [&](const char* name, const auto& items, const auto& value_of) {
+    add(name, "[");
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      text += (i == 0 ? "\n  " : ",\n  ") + dumped(value_of(items[i]));
+    }
+    text += "\n]";
+  };
+  if (!scene.joints.empty()) add_list("joints", scene.joints, joint_value);
+  add_list("bodies", scene.bodies, [](const BodyDef& body) { return to_value(body); });
+  return text + "}\n";
 }
 
 void save_scene(const Scene& scene, const std::string& path) { write_file(path, to_json(scene)); }

@@ -7,6 +7,7 @@
 #include "src/scene/field_fault.hpp"
 #include "src/scene/inertia.hpp"
 #include "src/scene/inertia_tensor.hpp"
+#include "src/scene/joint_fields.hpp"
 #include "src/scene/principal_inertia.hpp"
 #include "src/scene/scene_fields.hpp"
 
@@ -99,6 +100,42 @@ std::string find_pair_fault(std::span<const BodyPair> ignored_pairs, std::uint64
   return {};
 }
 
+std::string find_coupled_fault(const DistanceJoint& joint) {
+  if (joint.min_length <= joint.max_length) return {};
+  return fault("min_length", joint.min_length,
+               "at most max_length, which is " + to_text(joint.max_length));
+}
+
+/// The first fault of the joints of a scene.
+std::string find_joint_fault(const Scene& scene) {
+  if (!scene.joints.empty() && scene.solver != Solver::soft_step) {
+    return "solver is worst_first; it must be soft_step for a scene with joints";
+  }
+  for (std::size_t i = 0; i < scene.joints.size(); ++i) {
+    std::string found = find_fault(scene.joints[i]);
+    const auto check = [&](const auto& joint) {
+      bool any_movable = false;
+      const auto check_body = [&](const char* field, const BodyId& body) {
+        if (!found.empty()) return;
+        if (body.index >= scene.bodies.size()) {
+          found = std::string(field) + " is " + std::to_string(body.index) +
+                  "; it must be an index of the scene's " + std::to_string(scene.bodies.size()) +
+                  " bodies";
+        } else {
+          any_movable |= scene.bodies[body.index].mass > 0;
+        }
+      };
+      check_body("a", joint.a);
+      if (joint.b) check_body("b", *joint.b);
+      if (!found.empty() || any_movable) return;
+      found = "its bodies have mass 0; one of them must be movable";
+    };
+    std::visit(check, scene.joints[i]);
+    if (!found.empty()) return "joints[" + std::to_string(i) + "]: " + found;
+  }
+  return {};
+}
+
 }  // namespace
 
 std::string to_text(Real value) {
@@ -116,6 +153,18 @@ std::string to_text(const Mat3& m) {
 std::string to_text(const Quat& q) { return list_text({q.w, q.x, q.y, q.z}); }
 
 std::string find_fault(const BodyState& state) { return find_field_fault(state); }
+std::string find_fault(const Joint& joint) {
+  return std::visit(
+      [](const auto& j) {
+        std::string found = find_field_fault(j);
+        if (found.empty()) found = find_coupled_fault(j);
+        if (found.empty() && j.b && j.a.index == j.b->index) {
+          found = "b is body " + std::to_string(j.b->index) + "; it must be another body than a";
+        }
+        return found;
+      },
+      joint);
+}
 std::string find_range_fault(const BodyDef& def) { return find_field_fault(def); }
 
 std::string find_mass_fault(Real mass) {
@@ -152,6 +201,7 @@ void validate(const Scene& scene) {
   validate_body_count(scene.bodies.size());
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) validate_body(scene.bodies[i], i);
   found = find_pair_fault(scene.ignored_pairs, scene.bodies.size());
+  if (found.empty()) found = find_joint_fault(scene);
   if (!found.empty()) throw InvalidScene("scene: " + found);
 }
 

@@ -20,6 +20,8 @@ void validate_body_count(std::uint64_t bodies);
 /// orientation has unit length to kUnitTolerance. Returns an empty string for a valid state, else a
 /// message with field, value and range, without the body.
 std::string find_fault(const BodyState& state);
+/// Checks all fields of a joint, but not which bodies there are, with a result as above.
+std::string find_fault(const Joint& joint);
 /// Checks each field of a body alone, with a result as that of find_fault().
 std::string find_range_fault(const BodyDef& def);
 /// The same for one field.

@@ -234,6 +234,7 @@ void BodyStore::remove(BodyId id) noexcept {
   moving.awake[id.index] = 0;
   given_inertia_.erase(id.index);
   ignored_.erase_body(id.index);
+  joined_.erase_body(id.index);
   set_filter(id.index, {});
 }
 
@@ -275,13 +276,18 @@ void BodyStore::set_pair_ignored(const BodyPair& pair, bool ignored) {
   update_filters_in_use();
 }
 
+void BodyStore::set_pair_joined(const BodyPair& pair, bool joined) {
+  joined ? joined_.insert(pair) : joined_.erase(pair);
+  update_filters_in_use();
+}
+
 void BodyStore::set_ignored_pairs(std::span<const BodyPair> pairs) {
   ignored_.assign(pairs);
   update_filters_in_use();
 }
 
 void BodyStore::update_filters_in_use() noexcept {
-  filters_in_use_ = filtered_count_ > 0 || !ignored_.empty();
+  filters_in_use_ = filtered_count_ > 0 || !ignored_.empty() || !joined_.empty();
 }
 
 void BodyStore::displace(std::uint32_t i, const Vec3& shift, const Vec3& rotation) {
@@ -386,6 +392,8 @@ BodyView BodyStore::view_without_ids() const {
   if (has_inertia_arrays_) each_inertia(point_to, view, inertia_);
   view.ignored = ignored_.keys().data();
   view.ignored_count = static_cast<std::uint32_t>(ignored_.keys().size());
+  view.joined = joined_.keys().data();
+  view.joined_count = static_cast<std::uint32_t>(joined_.keys().size());
   view.filters_in_use = filters_in_use_;
   view.count = static_cast<std::uint32_t>(size());
   view.capacity = static_cast<std::uint32_t>(capacity());

@@ -127,10 +127,13 @@ class BodyStore {
   void set_pair_ignored(const BodyPair& pair, bool ignored);
   /// Replaces the ignored pairs. @throws std::bad_alloc; the store is then unchanged
   void set_ignored_pairs(std::span<const BodyPair> pairs);
-  /// Whether the filters let two bodies collide, and they are not an ignored pair.
+  /// Adds or removes a pair of bodies that do not collide because of a joint.
+  /// @throws std::bad_alloc; the store is then unchanged
+  void set_pair_joined(const BodyPair& pair, bool joined);
+  /// Whether the filters let two bodies collide, and they are neither an ignored nor a joined pair.
   bool may_collide(std::uint32_t a, std::uint32_t b) const noexcept {
     return !filters_in_use_ || (jfpx::may_collide(properties_.filter[a], properties_.filter[b]) &&
-                                !ignored_.contains({a, b}));
+                                !ignored_.contains({a, b}) && !joined_.contains({a, b}));
   }
   /// Pointers to the arrays. Valid until a body is added or removed, or the ignored pairs change.
   BodyView view() const;
@@ -194,7 +197,7 @@ class BodyStore {
   bool has_inertia_arrays_ = false;  ///< whether `inertia_` is in use
   InertiaColumns<ArrayColumn> inertia_;
 
-  IgnoredPairs ignored_;
+  IgnoredPairs ignored_, joined_;
   std::uint32_t filtered_count_ = 0;  ///< number of bodies whose filter is not the default
   bool filters_in_use_ = false;       ///< whether may_collide() may return false
 

@@ -20,6 +20,8 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
                   InertiaColumns<ConstPointerColumn> {
   const std::uint64_t* ignored = nullptr;  ///< keys of IgnoredPairs, sorted
   std::uint32_t ignored_count = 0;
+  const std::uint64_t* joined = nullptr;  ///< likewise, of joints
+  std::uint32_t joined_count = 0;
   bool filters_in_use = false;
 
   const BodyId* ids = nullptr;  ///< of the living bodies, sorted by index
@@ -50,19 +52,22 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
   JFPX_HD bool may_collide(std::uint32_t a, std::uint32_t b) const {
     return !filters_in_use || (jfpx::may_collide(filter[a], filter[b]) && !is_ignored(a, b));
   }
-  /// Binary search in the ignored pairs.
   JFPX_HD bool is_ignored(std::uint32_t a, std::uint32_t b) const {
     const std::uint64_t key = a < b ? std::uint64_t{a} << 32 | b : std::uint64_t{b} << 32 | a;
-    std::uint32_t first = 0, last = ignored_count;
+    return has_pair(ignored, ignored_count, key) || has_pair(joined, joined_count, key);
+  }
+  /// Binary search in sorted keys of pairs.
+  JFPX_HD static bool has_pair(const std::uint64_t* keys, std::uint32_t count, std::uint64_t key) {
+    std::uint32_t first = 0, last = count;
     while (first < last) {
       const std::uint32_t middle = first + (last - first) / 2;
-      if (ignored[middle] < key) {
+      if (keys[middle] < key) {
         first = middle + 1;
       } else {
         last = middle;
       }
     }
-    return first < ignored_count && ignored[first] == key;
+    return first < count && keys[first] == key;
   }
 
   /// Acceleration of a movable body by its constant acceleration and the accumulated force.

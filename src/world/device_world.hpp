@@ -8,6 +8,7 @@
 #include "src/world/bodies_of_step.hpp"
 #include "src/world/detected_contacts.hpp"
 #include "src/world/force_table.hpp"
+#include "src/world/joint_store.hpp"
 #include "src/world/sub_shape_table.hpp"
 
 #include <cstdint>
@@ -74,6 +75,8 @@ class DeviceWorld {
                       soft_step::ContactSet* last) = 0;
   /// Replaces forces and torques, and which bodies are awake.
   virtual void upload_forces(const BodyStore& bodies) = 0;
+  /// Replaces the joints, and what they keep from the last step. upload() must precede. Waits.
+  virtual void upload_joints(JointStore* joints) = 0;
   /// Whether edit() may add bodies with indices below `slots`.
   virtual bool has_room(std::size_t slots) const noexcept = 0;
   /// Edits bodies of the state on the device. The same edits may be repeated after a failure. May
@@ -119,6 +122,8 @@ class DeviceWorld {
   virtual void fetch_other_motion(MotionArrays* moving, ThreadPool* pool) = 0;
   /// Copies the contacts of the last step, with their impulses and colors.
   virtual void fetch_contact_set(soft_step::ContactSet* last) = 0;
+  /// Copies what the joints have kept in the last step.
+  virtual void fetch_joints(JointStore* joints) = 0;
   /// Copies what ContactListMaker needs, of the last step or of the step before it.
   virtual void fetch_contacts(const BodiesOfStep& bodies, bool of_step_before,
                               soft_step::ContactSet* set, DetectedContacts* detected) = 0;

@@ -1,6 +1,7 @@
 /// Calls of functions of World as JSON.
 #include "src/world/recorded_calls.hpp"
 
+#include "src/scene/joint_fields.hpp"
 #include "src/scene/scene_json.hpp"
 #include "src/world/force_fields.hpp"
 
@@ -47,6 +48,10 @@ void read(const Json& json, BodyId& id) {
   read(json.at(0), id.index);
   read(json.at(1), id.generation);
 }
+void read(const Json& json, JointId& id) {
+  read(json.at(0), id.index);
+  read(json.at(1), id.generation);
+}
 void read(const Json& json, ForceId& id) { read(json, id.number); }
 void read(const Json& json, BodyDef& body) { body = body_from_value(json); }
 template <class T>
@@ -56,7 +61,17 @@ void read(const Json& json, std::optional<T>& value) {
 }
 template <HasFields T>
 void read(const Json& json, T& value) {
-  each_field(value, [&](const auto& field, auto& member) { read(json.at(field.name), member); });
+  each_field(value, [&]<class Field>(const Field& field, auto& member) {
+    if (Field::kPresence == Presence::newer && !json.contains(field.name)) return;
+    read(json.at(field.name), member);
+  });
+}
+void read(const Json& json, Joint& joint) {
+  const std::string name = json.at("type").get<std::string>();
+  const auto read_if = [&]<class... T>(const std::variant<T...>&) {
+    return ((name == kJointName<T> && (read(json, joint.emplace<T>()), true)) || ...);
+  };
+  if (!read_if(Joint())) refuse("there is no joint \"" + name + "\"");
 }
 template <std::size_t... I>
 void read_force(const Json& json, RecordableForce& force, std::index_sequence<I...>) {
@@ -103,6 +118,9 @@ constexpr std::tuple kFunctions{
     Named{"add_force", &add_force},
     Named{"set_force", &set_force},
     Named{"remove_force", &World::remove_force},
+    Named{"add_joint", &World::add_joint},
+    Named{"set_joint", &World::set_joint},
+    Named{"remove_joint", &World::remove_joint},
 };
 
 /// Reads the arguments and calls the function.
@@ -156,6 +174,9 @@ void make_call_on(World& world, const Json& call) {
 }  // namespace recorded
 
 detail::SceneJson to_value(ForceId id) { return id.number; }
+detail::SceneJson to_value(JointId id) {
+  return detail::SceneJson::array({id.index, id.generation});
+}
 detail::SceneJson to_value(const RecordableForce& force) {
   detail::SceneJson json = {{"type", recorded::kForceNames[force.index()]}};
   std::visit([&json](const auto& value) { add_fields(&json, value); }, force);

@@ -13,6 +13,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 detail::SceneJson to_value(ForceId id);
+detail::SceneJson to_value(JointId id);
 detail::SceneJson to_value(const RecordableForce& force);
 
 namespace recorded {

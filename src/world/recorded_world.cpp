@@ -108,6 +108,15 @@ void RecordedWorld::set_force(ForceId id, const RecordableForce& force) {
 void RecordedWorld::remove_force(ForceId id) {
   impl_->call("remove_force", &World::remove_force, id);
 }
+JointId RecordedWorld::add_joint(const Joint& joint) {
+  return impl_->call("add_joint", &World::add_joint, joint);
+}
+void RecordedWorld::set_joint(JointId id, const Joint& joint) {
+  impl_->call("set_joint", &World::set_joint, id, joint);
+}
+void RecordedWorld::remove_joint(JointId id) {
+  impl_->call("remove_joint", &World::remove_joint, id);
+}
 
 void repeat_calls(RecordingReader& reader, std::uint64_t step, World& world) {
   const std::string text = reader.calls(step);

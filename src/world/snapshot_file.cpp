@@ -2,7 +2,8 @@
 ///
 /// Layout, little-endian: magic (8 bytes), version and size of Real (4 bytes each), length of the
 /// content (8 bytes), the content, and the checksum of all preceding bytes (8 bytes). A change of
-/// the content requires another version.
+/// the content requires another version. Version 2 has joints after the content of version 1; a
+/// world that never had joints has snapshots of version 1.
 #include "src/world/snapshot_file.hpp"
 
 #include "src/base/file.hpp"
@@ -17,7 +18,7 @@ inline namespace JFPX_ABI {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'J', 'F', 'P', 'X', 'S', 'N', 'P', '\n'};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 1, kVersionWithJoints = 2;
 
 struct Header {
   std::array<char, 8> magic = kMagic;
@@ -50,9 +51,9 @@ void check(std::span<const std::byte> bytes) {
   if (bytes.size() < sizeof header || header.magic != kMagic) {
     throw InvalidSnapshot("this is not a snapshot of jfpx, or it is truncated");
   }
-  if (header.version != kVersion) {
-    fail("is of version " + std::to_string(header.version) + "; this build reads version " +
-         std::to_string(kVersion));
+  if (header.version != kVersion && header.version != kVersionWithJoints) {
+    fail("is of version " + std::to_string(header.version) + "; this build reads versions " +
+         std::to_string(kVersion) + " and " + std::to_string(kVersionWithJoints));
   }
   if (header.real_size != sizeof(Real)) {
     fail("is " + precision_name(header.real_size) + "; it must be " + precision_name(sizeof(Real)));
@@ -79,10 +80,11 @@ void start_snapshot(BinaryWriter* writer) {
   }
 }
 
-Snapshot finish_snapshot(BinaryWriter* writer) {
+Snapshot finish_snapshot(BinaryWriter* writer, bool has_joints) {
   Snapshot snapshot{writer->take()};
   std::vector<std::byte>& bytes = snapshot.bytes;
   Header header;
+  if (has_joints) header.version = kVersionWithJoints;
   header.content_size = bytes.size() - sizeof header;
   std::memcpy(bytes.data(), &header, sizeof header);
   const auto sum = std::bit_cast<std::array<std::byte, kChecksumSize>>(checksum(bytes));

@@ -79,9 +79,9 @@ void SoftStep::prepare(const BodyStore& bodies) {
   islands_.reserve(capacity);
 }
 
-/// Unites the movable bodies of the contacts for which touches(contact) holds, and marks the
-/// islands that touch a kinematic body in motion: a sleeping body has no velocity and could not be
-/// carried by it.
+/// Unites the movable bodies of joints, and of the contacts for which touches(contact) holds, and
+/// marks the islands that touch, or are joined with, a kinematic body in motion: a sleeping body
+/// has no velocity and could not be carried by it.
 template <class Touches>
 void SoftStep::find_islands(const BodyStore& store, const Touches& touches) {
   const BodyView bodies = store.view();
@@ -96,7 +96,19 @@ void SoftStep::find_islands(const BodyStore& store, const Touches& touches) {
       }
     }
   });
+  for (std::uint32_t joint = 0; joint < joints_.count; ++joint) {
+    soft_step::with_joined_bodies(joints_, joint, [&](std::uint32_t a, std::uint32_t b) {
+      if (bodies.movable(a) && bodies.movable(b)) islands_.unite(a, b);
+    });
+  }
   if (!store.has_kinematic_bodies()) return;
+  for (std::uint32_t joint = 0; joint < joints_.count; ++joint) {
+    soft_step::with_joined_bodies(joints_, joint, [&](std::uint32_t a, std::uint32_t b) {
+      const bool a_carries = bodies.is_carrier(a);
+      if (!a_carries && !bodies.is_carrier(b)) return;
+      marked_[islands_.find(a_carries ? b : a)] = soft_step::kTouchesFastBody;
+    });
+  }
   for (std::uint32_t i = 0; i < contacts.size(); ++i) {
     const ContactKey& key = contacts.key(i);
     const bool a_carries = bodies.is_carrier(key.a);
@@ -130,17 +142,23 @@ void SoftStep::wake_touched(BodyStore* store) {
   });
 }
 
-/// Marks the bodies that have a contact in this step.
+/// Marks the bodies that have a contact in this step, or a joint.
 void SoftStep::find_near() {
   assign_geometric(&near_, bodies_.size(), 0);
   const ContactView contacts = cache_.current().view();
   parallel_for(pool_, contacts.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
       for (const std::uint32_t body : {contacts.key(i).a, contacts.key(i).b}) {
-        std::atomic_ref(near_[body]).store(1, std::memory_order_relaxed);
+        std::atomic_ref(near_[body]).store(soft_step::kHasContact, std::memory_order_relaxed);
       }
     }
   });
+  for (std::uint32_t joint = 0; joint < joints_.count; ++joint) {
+    if (!joints_.is_used(joint)) continue;
+    const soft_step::JointInput& input = joints_.inputs[joint];
+    near_[input.a] = soft_step::kHasJoint;
+    if (input.b != soft_step::kWorld) near_[input.b] = soft_step::kHasJoint;
+  }
 }
 
 /// Calls stage(index) for all bodies that are not immovable.
@@ -166,7 +184,7 @@ bool SoftStep::any_body(const BodyStore& store, const Test& test) {
       std::logical_or<>());
 }
 
-/// Loads the bodies of a step: of the immovable ones, those that have a contact.
+/// Loads the bodies of a step: of the immovable ones, those that have a contact or a joint.
 void SoftStep::load(const BodyStore& store) {
   for_each_body(store, [this](std::uint32_t i) { step_.load(i); });
   if (store.mobile().size() == store.size()) return;
@@ -206,9 +224,10 @@ void SoftStep::put_islands_to_sleep(const BodyStore& store) {
   });
 }
 
-std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
+std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointView& joints) {
   prepare(*bodies);
-  cache_.match(bodies->inverse_masses(), bodies->any_rolls(), pool_);
+  joints_ = joints;
+  cache_.match(bodies->inverse_masses(), bodies->any_rolls(), joints, pool_);
   wake_touched(bodies);
   find_near();
   step_ = {.bodies = bodies->view(),
@@ -221,6 +240,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
   load(*bodies);
   const BodyView& view = step_.bodies;
   solver_.build({.contacts = cache_.current().view(),
+                 .joints = joints,
                  .properties = {.inverse_inertia = view.inverse_inertia,
                                 .acceleration = view.last_acceleration,
                                 .radius = view.radius,
@@ -229,7 +249,9 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies) {
                                 .restitution = view.restitution,
                                 .rolling_friction = view.rolling_friction,
                                 .spinning_friction = view.spinning_friction,
-                                .rules = materials_},
+                                .rules = materials_,
+                                .position = view.position,
+                                .orientation = orientation_.data()},
                  .start = bodies_.data(),
                  .restitution_threshold = constants_.restitution_threshold},
                 bodies_.size(), {step_.bodies.last_acceleration, free_.data()}, constants_);

@@ -41,7 +41,8 @@ class SoftStep {
   /// Computes the motion of the step. Wakes bodies and updates accelerations. Forces must have been
   /// added up.
   /// @returns the first body that is_in_world() refuses, if there is one
-  std::optional<BodyId> solve(BodyStore* bodies);
+  /// @param joints its arrays are valid until commit(); `now` receives what they keep
+  std::optional<BodyId> solve(BodyStore* bodies, const soft_step::JointView& joints);
   /// Moves the bodies, clears forces, and puts islands to sleep.
   void commit(BodyStore* bodies) noexcept;
   /// Makes room for bodies with indices below `bodies`. @throws std::bad_alloc
@@ -84,12 +85,13 @@ class SoftStep {
   soft_step::SoftStepSolver solver_;
   Islands islands_;
 
-  soft_step::StepBodies step_;  ///< of the arrays below and the bodies, during a step
+  soft_step::JointView joints_;  ///< during a step
+  soft_step::StepBodies step_;   ///< of the arrays below and the bodies, during a step
   std::vector<soft_step::SolverBody> bodies_;  ///< by body
   std::vector<std::uint8_t> traits_;           ///< by body: soft_step::BodyTraits
   std::vector<Quat> orientation_;              ///< by body, during the step
   std::vector<soft_step::FreeMotion> free_;    ///< by body
-  std::vector<std::uint8_t> near_;             ///< by body: 1 if it has a contact
+  std::vector<std::uint8_t> near_;             ///< by body: StepBodies::near
   std::vector<std::uint8_t> marked_;           ///< by label of an island
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/contact_solver/soft_step/joint_set.hpp"
 #include "src/contact_solver/soft_step/row_setup.hpp"
 #include "src/world/body_view.hpp"
 
@@ -40,6 +41,16 @@ JFPX_HD inline void wake_touched(const BodyView& bodies, const MotionPointers& m
   if (mark == kTouchesSlowBody) motion.wake_by_slow_body(bodies, i);
 }
 
+/// Values of StepBodies::near. A body with joints may have contacts, too.
+inline constexpr std::uint8_t kHasContact = 1, kHasJoint = 2;
+
+/// Calls f(a, b) if a joint is one of two bodies.
+template <class F>
+JFPX_HD inline void with_joined_bodies(const JointView& joints, std::uint32_t joint, const F& f) {
+  if (!joints.is_used(joint) || joints.inputs[joint].b == kWorld) return;
+  f(joints.inputs[joint].a, joints.inputs[joint].b);
+}
+
 /// The bodies of a step, as arrays by body.
 struct StepBodies {
   BodyView bodies;
@@ -47,7 +58,7 @@ struct StepBodies {
   SolverBody* solver = nullptr;
   std::uint8_t* traits = nullptr;      ///< bits of BodyTraits
   Quat* orientation = nullptr;         ///< during the step
-  const std::uint8_t* near = nullptr;  ///< 1 if the body has a contact
+  const std::uint8_t* near = nullptr;  ///< kHasContact, kHasJoint, or 0
   Real h = 0;                          ///< [s], length of a substep
 
   /// Starts the step.
@@ -106,9 +117,14 @@ struct StepBodies {
     if (bodies.awake[i] == 0) return;
     body->shift = add_scaled(body->shift, body->velocity, h);
     body->rotation = add_scaled(body->rotation, body->angular_velocity, h);
-    // After an overflow it is zero, and remains so until the step is undone.
-    if (orientation[i] == Quat{0, 0, 0, 0}) return;
-    orientation[i] = detail::integrated_orientation(orientation[i], body->angular_velocity, h);
+    orientation[i] = turned(orientation[i], *body);
+  }
+
+  /// The orientation of a body after a substep. After an overflow it is zero, and remains so until
+  /// the step is undone.
+  JFPX_HD Quat turned(const Quat& before, const SolverBody& body) const {
+    if (before == Quat{0, 0, 0, 0}) return before;
+    return detail::integrated_orientation(before, body.angular_velocity, h);
   }
 
   /// State of an awake body at the end of the step.

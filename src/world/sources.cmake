@@ -19,6 +19,8 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/ignored_pairs.cpp
   ${CMAKE_CURRENT_LIST_DIR}/indexed_priority_queue.cpp
   ${CMAKE_CURRENT_LIST_DIR}/islands.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/joint_snapshot.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/joint_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/near_contacts.cpp
   ${CMAKE_CURRENT_LIST_DIR}/neighbor_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/particle_resolver.cpp
@@ -37,6 +39,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/wake_propagation.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_access.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/world_joints.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_on_device.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_queue.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_properties.cpp

@@ -149,11 +149,12 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   find_contacts(report);
   soft_step.add_generated(store, detected.generated);
   const double detect_ms = watch.lap_ms();
-  if (!all_finite(soft_step.solve(&store), report)) return false;
+  if (!all_finite(soft_step.solve(&store, joints.view()), report)) return false;
   const MetCounts met = count_met_contacts(soft_step.contacts().view(), pool.get());
   report->contacts += met.spheres + met.others;
   report->sphere_contacts += met.spheres;
   soft_step.commit(&store);
+  joints.commit();
   report->integrate_ms = forces_ms;
   report->detect_ms = detect_ms;
   report->resolve_ms = watch.lap_ms();

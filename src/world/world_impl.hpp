@@ -14,6 +14,7 @@
 #include "src/world/contacts_by_body.hpp"
 #include "src/world/device_world.hpp"
 #include "src/world/force_snapshot.hpp"
+#include "src/world/joint_store.hpp"
 #include "src/world/query_tree.hpp"
 #include "src/world/soft_step.hpp"
 #include "src/world/wake_propagation.hpp"
@@ -38,7 +39,19 @@ struct World::Impl {
         soft_step(given.soft_step, given.materials, given.dt, pool.get(), simd) {
     store.reserve(given.bodies.size());
     for (const BodyDef& def : given.bodies) store.add(def);
-    store.set_ignored_pairs(given.ignored_pairs);  // a body of the scene has the index of its slot
+    // A body of the scene has the index of its slot.
+    store.set_ignored_pairs(given.ignored_pairs);
+    for (Joint joint : given.joints) {
+      std::visit(
+          [this](auto& j) {
+            j.a = store.id(j.a.index);
+            if (j.b) j.b = store.id(j.b->index);
+          },
+          joint);
+      joints.add(joint);
+      const JoinedBodies joined = joined_bodies(joint);
+      if (joined.excludes_contacts) store.set_pair_joined({joined.a, joined.b}, true);
+    }
   }
 
   /// Steps of graphs may be in progress, which use the memory of the device.
@@ -76,6 +89,18 @@ struct World::Impl {
   /// the host it makes the lists, so that waking the neighbors cannot fail after the change.
   BodyStore& edited_body_in_lists(std::uint32_t body, const BodyEdit& edit);
   void remember_listed(std::uint32_t body);
+  JointId add_joint(const Joint& joint);
+  void remove_joint(std::uint32_t joint);
+  void set_joint(std::uint32_t joint, const Joint& value);
+  void remove_joints_of(std::uint32_t body);
+  void begin_joint_edit(const JoinedBodies& joined);
+  void complete_joint_edit(const JoinedBodies& joined);
+  template <class F>
+  void for_each_joined(const JoinedBodies& joined, const F& f);
+  /// Fetches what the joints keep. Const functions may call it concurrently.
+  void fetch_joints();
+  /// Sends changed joints to the device.
+  void flush_joints();
   /// What every edit begins with.
   void begin_edit() {
     finish();
@@ -113,6 +138,8 @@ struct World::Impl {
     edits.clear();
     changed.clear();
     changed_before.clear();
+    joints_changed = false;
+    joints_are_current = true;
   }
   /// As leave_device(), but the device keeps the state, too. Const functions may call it
   /// concurrently.
@@ -141,17 +168,19 @@ struct World::Impl {
   /// Whether a graph may be launched at any time.
   bool has_graph() const { return resident && device->has_graph(); }
   /// Whether the host has changes for the next step that the device does not have yet.
-  bool has_changes() const { return !resident || !edits.empty() || device->is_held(); }
+  bool has_changes() const {
+    return !resident || !edits.empty() || joints_changed || device->is_held();
+  }
   /// Sends them, so that graphs can be captured and replayed.
   void send_changes();
   /// Forgets the queue, before the state is replaced.
   void drop_queue() noexcept;
 
-  /// A copy of a scene without bodies and ignored pairs.
+  /// A copy of a scene without bodies, ignored pairs and joints.
   static Scene settings_of(const Scene& scene) {
-    const auto& [name, dt, bodies, solver, soft_step, resolver, sleep, materials, ignored_pairs] =
-        scene;
-    return {name, dt, {}, solver, soft_step, resolver, sleep, materials, {}};
+    const auto& [name, dt, bodies, solver, soft_step, resolver, sleep, materials, ignored_pairs,
+                 joints] = scene;
+    return {name, dt, {}, solver, soft_step, resolver, sleep, materials, {}, {}};
   }
   /// A store without bodies for a scene.
   static BodyStore empty_store(const Scene& scene) {
@@ -231,9 +260,10 @@ struct World::Impl {
   void read(BinaryReader* reader);
 
   std::unique_ptr<ThreadPool> pool;  ///< of the collider, if make_sphere_collider() made it, too
-  Scene scene;                       ///< the settings, without bodies and ignored pairs
+  Scene scene;                       ///< the settings, without bodies, pairs and joints
   /// Bodies. While `resident`, their motion may be older than that on the device.
   BodyStore store;
+  JointStore joints;  ///< while `resident`, what they keep may be older than on the device
   ContactFinder contact_finder;
   SoftStep soft_step;                ///< of Solver::soft_step
   WakePropagation propagate_waking;  ///< of Solver::worst_first, like the resolver
@@ -280,9 +310,11 @@ struct World::Impl {
   /// otherwise than they are now.
   ListedBodies changed, changed_before;
   std::vector<std::uint32_t> forced_bodies;
+  bool joints_changed = false;  ///< while resident: since the device has received the joints
   /// While resident: whether the arrays of the host are those of the device.
   /// `states_are_current`: at least what BodyState has, which edits of other bodies do not change.
   bool motion_is_current = true, states_are_current = true, contact_set_is_current = true;
+  bool joints_are_current = true;
   std::mutex fetching;  ///< held by functions that fetch, because const functions may call them
 
   /// Whether steps may have been enqueued, or replayed by a graph, that the host has not waited

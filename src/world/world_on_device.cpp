@@ -68,7 +68,10 @@ void World::Impl::enter_device() {
   store.make_inertia_arrays();  // the device adds and edits bodies of any kind
   device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
   resident = true;
+  device->upload_joints(&joints);
   note_forces();
+  joints_changed = false;
+  joints_are_current = true;
   motion_is_current = states_are_current = contact_set_is_current = true;
 }
 
@@ -126,14 +129,17 @@ void World::Impl::remove(BodyId id) {
   if (!resident) {
     make_contact_lists();
     wake_neighbors(id);
+    remove_joints_of(body);
     store.remove(id);
     soft_step.forget(body);
     return;
   }
   // Everything that may throw, before the store changes.
   soft_step.reserve(store.capacity());
-  BodyEdit& edit = edits[body];
   remember_listed(body);
+  edits[body];
+  remove_joints_of(body);
+  BodyEdit& edit = edits[body];
   edit = {.wakes_neighbors = true, .is_removed = true};
   motion_is_current = false;
   store.remove(id);
@@ -147,6 +153,7 @@ void World::Impl::note_forces() {
 }
 
 void World::Impl::flush_edits() {
+  flush_joints();
   if (edits.empty()) return;
   const ScopedTimer timer(&spent_us);
   forced_bodies.reserve(forced_bodies.size() + edits.size());
@@ -230,6 +237,7 @@ void World::Impl::fetch_all() {
   if (resident) {
     fetch_motion();
     fetch_contact_set();
+    fetch_joints();
   }
   const std::lock_guard lock(fetching);
   soft_step.drop_removed();
@@ -312,6 +320,7 @@ void World::Impl::complete_on_device(std::uint64_t count) {
   changed_before = std::exchange(changed, {});
   soft_step.forget_none();
   motion_is_current = states_are_current = contact_set_is_current = false;
+  joints_are_current = joints.empty();
 }
 
 void World::Impl::fill_report(const DeviceWorld::Result& result, StepReport* report) {

@@ -2,6 +2,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/world/contact_snapshot.hpp"
+#include "src/world/joint_snapshot.hpp"
 #include "src/world/snapshot_fields.hpp"
 #include "src/world/snapshot_file.hpp"
 #include "src/world/world_impl.hpp"
@@ -21,6 +22,7 @@ void World::Impl::write(BinaryWriter* writer) {
   (*writer)(list.contacts, std::uint64_t{list.detected}, shows_contacts);
   write_forces(writer, forces);
   write_generators(writer, generators);
+  if (joints.capacity() > 0) write_joints(writer, joints);
 }
 
 /// Reads and checks everything before it changes the world.
@@ -39,7 +41,11 @@ void World::Impl::read(BinaryReader* reader) {
                         "it has fewer contacts than were detected");
   ForceRestorer new_forces(reader, forces);
   GeneratorRestorer new_generators(reader, generators);
+  JointStore new_joints;
+  if (reader->left() > 0) new_joints = read_joints(reader, last, &bodies);
   BinaryReader::require(reader->left() == 0, "it is too long");
+  BinaryReader::require(new_joints.empty() || settings.solver == Solver::soft_step,
+                        "it has joints, and the solver worst_first");
 
   soft_step.reserve(bodies.capacity());
 
@@ -51,6 +57,7 @@ void World::Impl::read(BinaryReader* reader) {
   if (device != nullptr) device->configure(scene);
   steps = steps_before;
   store = std::move(bodies);
+  joints = std::move(new_joints);
   soft_step.restore(scene.soft_step, scene.materials, scene.dt, std::move(last));
   contacts.invalidate();
   contacts.get([&list](ContactList* restored) { *restored = std::move(list); });
@@ -68,7 +75,7 @@ Snapshot World::snapshot() const {
     start_snapshot(&writer);
     impl_->fetch_all();
     impl_->write(&writer);
-    return finish_snapshot(&writer);
+    return finish_snapshot(&writer, impl_->joints.capacity() > 0);
   } catch (const std::bad_alloc&) {
     throw OutOfMemory("no memory for a snapshot of " + std::to_string(bodies().size()) + " bodies");
   }

@@ -252,6 +252,20 @@ TEST(SceneWorld, ATwoSidedPlaneIsRejected) {
   }
 }
 
+TEST(SceneWorld, JointsAreRejected) {
+  Scene scene;
+  scene.bodies = {ball({0, 0, 0}), ball({3, 0, 0})};
+  scene.joints = {DistanceJoint{.a = {0, 0}, .b = BodyId{1, 0}}};
+  try {
+    SceneWorld world(scene);
+    FAIL();
+  } catch (const InvalidScene& error) {
+    EXPECT_STREQ(error.what(),
+                 "scene: joints has 1 joints, which SceneWorld does not support; it must be empty "
+                 "to run in Bullet");
+  }
+}
+
 TEST(SceneWorld, PutsOnlyBodiesToSleepThatMaySleep) {
   for (const bool enabled : {true, false}) {
     Scene scene;

@@ -64,7 +64,7 @@ TEST(GreedyColoring, IsThatOfTheSortedContactsForAnyNumberOfThreads) {
       for (std::uint32_t i = 0; i < count; ++i) portion.add(keys[i], i);
       portion.flush();
       std::vector<std::uint8_t> colors(count, kNoColor);
-      coloring.finish(colors.data(), p);
+      coloring.finish([&](std::uint32_t i, std::uint8_t color) { colors[i] = color; }, p);
       EXPECT_EQ(colors, expected) << count << " contacts";
     }
     if (count == 20000) {

@@ -38,6 +38,10 @@ class FailingDevice final : public DeviceWorld {
     count_call();
     device_->upload(bodies, sub_shapes, last);
   }
+  void upload_joints(JointStore* joints) override {
+    count_call();
+    device_->upload_joints(joints);
+  }
   void upload_forces(const BodyStore& bodies) override {
     count_call();
     device_->upload_forces(bodies);
@@ -79,6 +83,7 @@ class FailingDevice final : public DeviceWorld {
     device_->fetch_other_motion(moving, pool);
   }
   void fetch_contact_set(soft_step::ContactSet* last) override { device_->fetch_contact_set(last); }
+  void fetch_joints(JointStore* joints) override { device_->fetch_joints(joints); }
   void fetch_contacts(const BodiesOfStep& bodies, bool of_step_before, soft_step::ContactSet* set,
                       DetectedContacts* detected) override {
     device_->fetch_contacts(bodies, of_step_before, set, detected);

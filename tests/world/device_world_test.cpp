@@ -4,6 +4,7 @@
 #include <jfpx/force.hpp>
 #include <jfpx/recorded_world.hpp>
 
+#include "src/scene/compound.hpp"
 #include "src/scenes/scenes.hpp"
 #include "src/world/world_impl.hpp"
 #include "tests/world/equal_worlds.hpp"
@@ -86,6 +87,7 @@ Scene random_scene(Random* random) {
     const auto b = static_cast<std::uint32_t>(random->below(count));
     if (a != b) scene.ignored_pairs.push_back({a, b});
   }
+  if (random->below(2) == 0) test::add_random_joints(random, &scene);
   return scene;
 }
 

@@ -8,6 +8,7 @@
 #include "src/base/hash64.hpp"
 #include "src/demos/demo.hpp"
 #include "src/scenes/scenes.hpp"
+#include "tests/world/joint_scene.hpp"
 
 #include <cinttypes>
 #include <cstdio>
@@ -56,6 +57,9 @@ constexpr Pin kSoftStepPins[] = {
     {"columns", 20000, 3, 0xf1dc6c610329eee1u, 0x8cfcea0c434ee1fdu},
 };
 
+/// joint_scene() with Solver::soft_step.
+constexpr Pin kJointPin{"joints", 100, 200, 0x7f8ba1c014a130bbu, 0x28f56fec60674350u};
+
 struct DemoPin {
   const char* demo;
   int steps;
@@ -77,7 +81,7 @@ SimdLevel simd_of(unsigned threads) {
 
 /// Returns false and prints the reason if the run fails, resolves nothing, or ends with another
 /// hash.
-bool check(const Pin& pin, Solver solver, unsigned threads) {
+bool check(const Pin& pin, Scene scene, Solver solver, unsigned threads) {
   WorldSettings settings;
   settings.collider = {.backend = Backend::cpu, .simd = simd_of(threads)};
   settings.threads = threads;
@@ -85,7 +89,6 @@ bool check(const Pin& pin, Solver solver, unsigned threads) {
   if (threads > 1 && pin.spheres < 20000) {
     settings.collider.algorithm = SphereAlgorithm::all_pairs;
   }
-  Scene scene = scenes::make(pin.scene, {.spheres = pin.spheres, .seed = 1});
   scene.solver = solver;
   World world(scene, settings);
   std::uint64_t resolved = 0;
@@ -106,6 +109,10 @@ bool check(const Pin& pin, Solver solver, unsigned threads) {
               : !same         ? "WRONG: another hash is pinned"
                               : "as pinned");
   return finite && resolved > 0 && same;
+}
+
+bool check(const Pin& pin, Solver solver, unsigned threads) {
+  return check(pin, scenes::make(pin.scene, {.spheres = pin.spheres, .seed = 1}), solver, threads);
 }
 
 /// A demo with random inputs except its reset. The hash covers the states of all steps, because
@@ -152,6 +159,9 @@ int main(int count, char** arguments) {
     for (const jfpx::Pin& pin : jfpx::kSoftStepPins) {
       all = jfpx::check(pin, jfpx::Solver::soft_step, static_cast<unsigned>(threads)) && all;
     }
+    all = jfpx::check(jfpx::kJointPin, jfpx::test::joint_scene(), jfpx::Solver::soft_step,
+                      static_cast<unsigned>(threads)) &&
+          all;
   }
   for (const jfpx::DemoPin& pin : jfpx::kDemoPins) all = jfpx::check(pin) && all;
   return all ? 0 : 1;

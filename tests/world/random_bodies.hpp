@@ -58,6 +58,52 @@ inline BodyDef random_body(Random* random, Real room) {
   return def;
 }
 
+/// A joint of any type and with any parameters, of two given bodies.
+/// @param b absent: the world
+inline Joint random_joint(Random* random, BodyId a, std::optional<BodyId> b) {
+  DistanceJoint joint{.a = a, .b = b};
+  const auto anchor = [&]() -> Vec3 {
+    if (random->below(3) == 0) return {};
+    return random->uniform_in_box({-0.5_r, -0.5_r, -0.5_r}, {0.5_r, 0.5_r, 0.5_r});
+  };
+  joint.anchor_a = anchor();
+  joint.anchor_b = anchor();
+  const std::uint64_t kind = random->below(4);
+  joint.max_length = kind == 0 ? Real(1e9) : random->uniform(0, 3);
+  joint.min_length = kind == 1 ? joint.max_length : kind == 2 ? joint.max_length / 2 : Real(0);
+  if (kind == 0 || random->below(3) == 0) {
+    joint.rest_length = random->uniform(0, 2);
+    joint.hertz = random->uniform(0, random->below(5) == 0 ? Real(60) : Real(5));
+    joint.damping_ratio = random->uniform(0, 1);
+  }
+  joint.collide_connected = random->below(3) == 0;
+  return joint;
+}
+
+/// Adds joints to a scene: some of any bodies, and some of one body, up to more than there are
+/// colors.
+inline void add_random_joints(Random* random, Scene* scene) {
+  const std::uint64_t bodies = scene->bodies.size();
+  const auto add = [&](std::uint64_t a, std::uint64_t b) {
+    const bool has_b = b < bodies;
+    const auto movable = [&](std::uint64_t i) { return scene->bodies[i].mass > 0; };
+    if (a == b || !(movable(a) || (has_b && movable(b)))) return;
+    const BodyId id_a{static_cast<std::uint32_t>(a), 0}, id_b{static_cast<std::uint32_t>(b), 0};
+    scene->joints.push_back(random_joint(random, id_a, has_b ? std::optional(id_b) : std::nullopt));
+  };
+  const std::uint64_t count = random->below(bodies + 1);
+  for (std::uint64_t k = 0; k < count; ++k) add(random->below(bodies), random->below(bodies + 2));
+  const std::uint64_t hub = random->below(bodies);
+  if (random->below(4) == 0) {
+    const std::size_t first = scene->joints.size();
+    for (int k = 0; k < 70; ++k) add(hub, random->below(bodies));
+    // So many springs would throw the bodies apart.
+    for (Joint& joint : std::span(scene->joints).subspan(first)) {
+      std::get<DistanceJoint>(joint).hertz = 0;
+    }
+  }
+}
+
 }  // namespace test
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -25,6 +25,7 @@ inline Scene random_room(Random* random) {
     scene.bodies.push_back(def);
   }
   scene.bodies.push_back(half_space({0, 1, 0}, -3));
+  add_random_joints(random, &scene);
   return scene;
 }
 
@@ -32,10 +33,13 @@ inline Scene random_room(Random* random) {
 class Change {
  public:
   Change(Random* random, double time)
-      : action_(random->below(12)),
+      : action_(random->below(16)),
         i_(random->below(1000)),
+        j_(random->below(1000)),
         def_(random_body(random, 3)),
         vector_(random->uniform_in_box({-9, -9, -9}, {9, 9, 9})),
+        joint_(random_joint(random, {},
+                            random->below(4) == 0 ? std::nullopt : std::optional(BodyId{}))),
         start_(static_cast<Real>(time) + random->uniform(0, Real(0.1))) {}
 
   void make(World* world) const {
@@ -65,12 +69,36 @@ class Change {
         if (gravity != nullptr) world->force<Gravity>(force).acceleration = vector_;
       }
     }
+    if (action_ >= 12) change_joints(world, id);
   }
 
  private:
-  std::uint64_t action_, i_;
+  void change_joints(World* world, BodyId id) const {
+    const std::span<const JointId> joints = world->joints();
+    Joint joint = joint_;
+    BodyId& a = std::get<DistanceJoint>(joint).a;
+    std::optional<BodyId>& b = std::get<DistanceJoint>(joint).b;
+    if (action_ < 14) {
+      const BodyId other = world->bodies()[j_ % world->bodies().size()];
+      a = id;
+      if (b) b = other;
+      const bool any_movable = world->mass(a) > 0 || (b && world->mass(*b) > 0);
+      if (any_movable && !(b && *b == a)) world->add_joint(joint);
+      return;
+    }
+    if (joints.empty()) return;
+    const JointId changed = joints[i_ % joints.size()];
+    if (action_ == 14) return world->remove_joint(changed);
+    const auto& before = std::get<DistanceJoint>(world->joint(changed));
+    a = before.a;
+    b = before.b;
+    world->set_joint(changed, joint);
+  }
+
+  std::uint64_t action_, i_, j_;
   BodyDef def_;
   Vec3 vector_;
+  Joint joint_;
   Real start_;
 };
 

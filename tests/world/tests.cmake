@@ -36,6 +36,8 @@ jfpx_add_test(world_test SOURCES
   world/filter_test.cpp
   world/force_registry_test.cpp
   world/force_test.cpp
+  world/joint_test.cpp
+  world/joint_world_test.cpp
   world/kinematic_test.cpp
   world/mixed_test.cpp
   world/motion_test.cpp

@@ -66,9 +66,9 @@ struct StageTimes {
 /// Not thread-safe; different worlds may be used by different threads.
 class JFPX_API SceneWorld {
  public:
-  /// @throws InvalidScene, also for features that Bullet lacks: a two-sided plane, an inertia that
-  ///   is not diagonal, a combine rule of friction or restitution other than geometric mean and
-  ///   product; any exception of the constructor of CollisionDispatcher.
+  /// @throws InvalidScene, also for joints, and for features that Bullet lacks: a two-sided plane,
+  ///   an inertia that is not diagonal, a combine rule of friction or restitution other than
+  ///   geometric mean and product; any exception of the constructor of CollisionDispatcher.
   [[gnu::always_inline]] explicit SceneWorld(const Scene& scene,
                                              const SceneWorldOptions& options = {})
       : SceneWorld(fuses_products(), scene, options) {}

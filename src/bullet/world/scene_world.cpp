@@ -311,6 +311,11 @@ struct SceneWorld::Impl {
 SceneWorld::SceneWorld(bool caller_is_fused, const Scene& scene, const SceneWorldOptions& options) {
   validate(scene);
   require_bullet(scene.materials);
+  if (!scene.joints.empty()) {
+    throw InvalidScene("scene: joints has " + std::to_string(scene.joints.size()) +
+                       " joints, which SceneWorld does not support; it must be empty to run in "
+                       "Bullet");
+  }
   impl_ = std::make_unique<Impl>(caller_is_fused, scene, options);
 }
 SceneWorld::~SceneWorld() = default;

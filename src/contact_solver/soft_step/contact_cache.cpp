@@ -38,7 +38,8 @@ class Finder {
 
 }  // namespace
 
-void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls, ThreadPool* pool) {
+void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls,
+                         const JointView& joints, ThreadPool* pool) {
   reserve(inverse_mass.size());
   drop_forgotten();
   ContactSet& now = current_;
@@ -60,7 +61,34 @@ void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls, Thr
                  match_manifolds(static_cast<std::uint32_t>(first),
                                  static_cast<std::uint32_t>(last), inverse_mass);
                });
-  coloring_.finish(now.colors.data(), pool);
+  match_joints(joints, inverse_mass);
+  coloring_.finish(
+      [&](std::uint32_t i, std::uint8_t color) {
+        if (i < now.size()) {
+          now.colors[i] = color;
+        } else {
+          joints.now[i - now.size()].color = color;
+        }
+      },
+      pool);
+}
+
+void ContactCache::match_joints(const JointView& joints, std::span<const Real> inverse_mass) {
+  GreedyColoring::Portion uncolored(&coloring_);
+  for (std::uint32_t joint = 0; joint < joints.count; ++joint) {
+    KeptJoint& now = joints.now[joint];
+    now = joints.last[joint];
+    if (!joints.is_used(joint)) continue;
+    const ContactKey key = joints.key(joint);
+    if (now.color < kColors) {
+      coloring_.keep(key.a, key.b, static_cast<std::uint8_t>(now.color));
+    } else if (key.b != kWorld && inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0) {
+      uncolored.add(key, current_.size() + joint);
+    } else {
+      now.color = kFixedColor;
+    }
+  }
+  uncolored.flush();
 }
 
 /// Gives contact i the rolling impulse and the color of the same contact of the last step. A

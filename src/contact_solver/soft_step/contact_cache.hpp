@@ -4,6 +4,7 @@
 #include "src/base/thread_pool.hpp"
 #include "src/contact_solver/soft_step/contact_set.hpp"
 #include "src/contact_solver/soft_step/greedy_coloring.hpp"
+#include "src/contact_solver/soft_step/joint_set.hpp"
 
 #include <span>
 #include <utility>
@@ -28,12 +29,13 @@ class ContactCache {
   /// drop_forgotten() must have been called since the last forget().
   const ContactSet& last() const { return last_; }
 
-  /// Gives each contact the impulses and the color that the same contact had in the last step, and
+  /// Gives each contact and joint the impulses and the color that it had in the last step, and
   /// colors the new ones.
   /// @param inverse_mass by body [1/kg]; 0: immovable or kinematic
   /// @param any_rolls whether a body has rolling or spinning friction
   /// @param pool null: in the calling thread
-  void match(std::span<const Real> inverse_mass, bool any_rolls, ThreadPool* pool);
+  void match(std::span<const Real> inverse_mass, bool any_rolls, const JointView& joints,
+             ThreadPool* pool);
   /// Completes the step: the current contacts become the last ones. Does not allocate.
   void commit() noexcept { std::swap(last_, current_); }
   /// Makes room for forget() of bodies with indices below `bodies`. @throws std::bad_alloc
@@ -52,6 +54,7 @@ class ContactCache {
  private:
   void match_spheres(std::uint32_t first, std::uint32_t last, std::span<const Real> inverse_mass);
   void match_manifolds(std::uint32_t first, std::uint32_t last, std::span<const Real> inverse_mass);
+  void match_joints(const JointView& joints, std::span<const Real> inverse_mass);
   void keep(std::uint32_t i, bool is_kept, std::uint32_t before, std::span<const Real> inverse_mass,
             GreedyColoring::Portion* uncolored);
 

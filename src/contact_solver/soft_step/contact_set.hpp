@@ -19,6 +19,8 @@ struct ContactKey {
   std::uint32_t part_a = 0, part_b = 0;
   /// `part_a` of the contacts of contact generators; those of shapes have lower numbers.
   static constexpr std::uint32_t kGenerated = 0xffffffffu;
+  /// `part_a` of joints; `part_b` is the slot of its id.
+  static constexpr std::uint32_t kJoint = kGenerated - 1;
   JFPX_HD bool is_generated() const { return part_a == kGenerated; }
   friend auto operator<=>(const ContactKey&, const ContactKey&) = default;
 };

@@ -58,18 +58,6 @@ void GreedyColoring::sort(ThreadPool* pool) {
   });
 }
 
-void GreedyColoring::finish(std::uint8_t* colors, ThreadPool* pool) {
-  sort(pool);
-  for (const Uncolored& contact : sorted_) {
-    std::uint64_t &a = used_[contact.a], &b = used_[contact.b];
-    const std::uint8_t color = lowest_free_color(a | b);
-    colors[contact.contact] = color;
-    if (color == kOverflowColor) continue;
-    a |= std::uint64_t{1} << color;
-    b |= std::uint64_t{1} << color;
-  }
-}
-
 }  // namespace soft_step
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -54,7 +54,8 @@ JFPX_HD inline std::uint8_t lowest_free_color(std::uint64_t used) {
 /// in the overflow, whose contacts are colored again.
 ///
 /// Usage in a step: start(), keep() for all colored contacts, Portion::add() for all others,
-/// finish(). Owns its buffers, which only grow.
+/// finish(). Joints are colored with the contacts, in the order of the same hash, and numbered
+/// after them. Owns its buffers, which only grow.
 class GreedyColoring {
  public:
   /// @param pool null: in the calling thread; likewise in finish()
@@ -68,8 +69,19 @@ class GreedyColoring {
   /// Contacts that a thread adds, in portions. Several threads may do so concurrently, each with an
   /// object of its own.
   class Portion;
-  /// @param colors by contact; those of the added contacts are assigned
-  void finish(std::uint8_t* colors, ThreadPool* pool);
+  /// Calls assign(contact, color) for the added contacts.
+  template <class Assign>
+  void finish(const Assign& assign, ThreadPool* pool) {
+    sort(pool);
+    for (const Uncolored& contact : sorted_) {
+      std::uint64_t &a = used_[contact.a], &b = used_[contact.b];
+      const std::uint8_t color = lowest_free_color(a | b);
+      assign(contact.contact, color);
+      if (color == kOverflowColor) continue;
+      a |= std::uint64_t{1} << color;
+      b |= std::uint64_t{1} << color;
+    }
+  }
 
  private:
   struct Uncolored {

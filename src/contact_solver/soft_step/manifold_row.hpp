@@ -2,7 +2,7 @@
 /// are solved one after the other, and rolling and spinning friction.
 #pragma once
 
-#include "src/contact_solver/soft_step/step_constants.hpp"
+#include "src/contact_solver/soft_step/body_pair.hpp"
 
 #include <cmath>
 
@@ -29,7 +29,7 @@ JFPX_HD inline bool has_pushed(const PointRow& p) { return !std::signbit(p.rebou
 /// A sweep changes only `rolling_impulse` and the points: see store_changes().
 struct ManifoldRow {
   using Part = PointRow;
-  static constexpr bool kReadsRotation = true;
+  static constexpr bool kReadsRotation = true, kReadsOrientation = false;
 
   std::uint32_t a = 0, b = 0;  ///< bodies; a is movable
   std::uint32_t first = 0;     ///< index of the first point
@@ -44,12 +44,6 @@ struct ManifoldRow {
 JFPX_HD inline void store_changes(const ManifoldRow& from, ManifoldRow* to) {
   to->rolling_impulse = from.rolling_impulse;
 }
-
-/// The bodies of a manifold, and their inverse inertia in world axes.
-struct BodyPair {
-  SolverBody *a, *b;
-  const Mat3 *inertia_a, *inertia_b;
-};
 
 template <bool kFixed>
 JFPX_HD constexpr void apply(const BodyPair& pair, const Vec3& arm_a, const Vec3& arm_b,
@@ -77,13 +71,6 @@ template <bool kFixed>
 JFPX_HD constexpr void apply_torque(const BodyPair& pair, const Vec3& torque_impulse) {
   pair.a->angular_velocity += *pair.inertia_a * torque_impulse;
   if constexpr (!kFixed) pair.b->angular_velocity -= *pair.inertia_b * torque_impulse;
-}
-
-/// Velocity of a's point relative to b's. A kinematic body b has a velocity.
-JFPX_HD constexpr Vec3 relative_velocity(const BodyPair& pair, const Vec3& arm_a,
-                                         const Vec3& arm_b) {
-  return (pair.a->velocity + cross(pair.a->angular_velocity, arm_a)) -
-         (pair.b->velocity + cross(pair.b->angular_velocity, arm_b));
 }
 
 /// Change of the relative velocity along u per impulse along v.

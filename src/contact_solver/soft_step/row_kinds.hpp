@@ -1,6 +1,7 @@
 /// The kinds of rows of a soft step, and the groups in which a sweep solves them.
 #pragma once
 
+#include "src/contact_solver/soft_step/distance_row.hpp"
 #include "src/contact_solver/soft_step/greedy_coloring.hpp"
 #include "src/contact_solver/soft_step/manifold_row.hpp"
 #include "src/contact_solver/soft_step/sphere_row.hpp"
@@ -18,11 +19,14 @@ namespace soft_step {
 ///   - `a`, `b`: its bodies, of which a is movable;
 ///   - `Part`: type of what a row has several of, or NoPart. A row with parts has the index `first`
 ///     of its first one, and their number `count`;
-///   - `kReadsRotation`: whether a row reads the rotation of its bodies, and their inertia;
-///   - RowSetup::fill() from a contact, and RowSetup::store() back to it: what a contact keeps from
-///     step to step, and what a snapshot has;
-///   - run() of each operation in row_operations.hpp.
-using RowTypes = std::tuple<SphereRow, ManifoldRow>;
+///   - `kReadsRotation`: whether a row reads and changes SolverBody::rotation; `kReadsOrientation`:
+///     whether it reads the orientations of its bodies at the moment of a sweep;
+///   - RowSetup::fill() from a contact or a joint, and RowSetup::store() back to it: what it keeps
+///     from step to step, and what a snapshot has;
+///   - run() of each operation in row_operations.hpp;
+///   - if it is not SphereRow, store_changes().
+/// Rows of joints are the last ones, in the order of the alternatives of Joint.
+using RowTypes = std::tuple<SphereRow, ManifoldRow, DistanceRow>;
 
 /// Index of a type in RowTypes.
 using RowKind = std::uint8_t;
@@ -39,6 +43,11 @@ constexpr RowKind index_in(const std::tuple<Rows...>*) {
 template <class Row>
 inline constexpr RowKind kKindOf = index_in<Row>(static_cast<RowTypes*>(nullptr));
 
+/// Kind of the rows of a joint. @param type index of the alternative of Joint
+JFPX_HD constexpr RowKind kind_of_joint(std::uint32_t type) {
+  return static_cast<RowKind>(kKindOf<DistanceRow> + type);
+}
+
 template <class Row>
 inline constexpr bool kHasParts = !std::is_same_v<typename Row::Part, NoPart>;
 
@@ -51,8 +60,8 @@ JFPX_HD constexpr decltype(auto) visit_row(RowKind kind, const F& f) {
   return f(std::type_identity<std::tuple_element_t<kFirst, RowTypes>>());
 }
 
-/// Groups of rows, which a sweep solves one after the other: contacts without a color, those of
-/// each color, and those with an immovable or kinematic body.
+/// Groups of rows, which a sweep solves one after the other: contacts and joints without a color,
+/// those of each color, and those with an immovable or kinematic body or with the world.
 inline constexpr std::uint32_t kGroups = kColors + 2u;
 inline constexpr std::uint32_t kOverflowGroup = 0, kFixedGroup = kGroups - 1;
 JFPX_HD constexpr std::uint32_t group_of_color(std::uint32_t color) { return 1 + color; }

@@ -20,7 +20,7 @@ namespace soft_step {
 /// @tparam Impacts ImpactBodies, or a type that rebound() can use in its place
 template <class Part, class Impacts>
 struct RowContext {
-  BodyPair bodies;         ///< without the inertia for a row that does not read it
+  BodyPair bodies;         ///< without what the row does not read
   Part* parts;             ///< of the row; null for NoPart
   const Impacts* impacts;  ///< may be null for a row that does not rebound in a sweep
 };
@@ -34,6 +34,10 @@ struct WarmStart {
   template <bool kFixed, class Impacts>
   JFPX_HD void run(ManifoldRow* row, const RowContext<PointRow, Impacts>& c) const {
     warm_start<kFixed>(*row, c.parts, c.bodies);
+  }
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(DistanceRow* row, const RowContext<NoPart, Impacts>& c) const {
+    warm_start<kFixed>(*row, c.bodies);
   }
 };
 
@@ -50,9 +54,13 @@ struct Solve {
   JFPX_HD void run(ManifoldRow* row, const RowContext<PointRow, Impacts>& c) const {
     solve<kFixed>(row, c.parts, c.bodies, constants, kUseBias);
   }
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(DistanceRow* row, const RowContext<NoPart, Impacts>& c) const {
+    solve<kFixed>(row, c.bodies, constants, kUseBias);
+  }
 };
 
-/// Spheres have rebounded in the substeps.
+/// Spheres have rebounded in the substeps, and joints do not.
 struct Restitute {
   static constexpr bool kChangesRow = false, kMovesBodies = false;
   template <bool kFixed, class Impacts>
@@ -61,6 +69,8 @@ struct Restitute {
   JFPX_HD void run(ManifoldRow* row, const RowContext<PointRow, Impacts>& c) const {
     restitute<kFixed>(*row, c.parts, c.bodies);
   }
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(DistanceRow*, const RowContext<NoPart, Impacts>&) const {}
 };
 
 /// What every type of RowTypes has; see there.
@@ -71,6 +81,7 @@ concept RowType = requires(Row row, typename Row::Part* parts, const RowSetup& s
   { row.a } -> std::convertible_to<std::uint32_t>;
   { row.b } -> std::convertible_to<std::uint32_t>;
   { Row::kReadsRotation } -> std::convertible_to<bool>;
+  { Row::kReadsOrientation } -> std::convertible_to<bool>;
   setup.template fill<false>(&row, parts, std::uint32_t{});
   setup.template fill<true>(&row, parts, std::uint32_t{});
   setup.store(row, parts, std::uint32_t{});

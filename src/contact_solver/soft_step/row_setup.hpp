@@ -5,6 +5,7 @@
 
 #include "src/collide/contact_basis.hpp"
 #include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/contact_solver/soft_step/joint_set.hpp"
 #include "src/contact_solver/soft_step/row_kinds.hpp"
 
 #include <cstdint>
@@ -31,24 +32,53 @@ struct BodyProperties {
   const Real *friction = nullptr, *restitution = nullptr;
   const Real *rolling_friction = nullptr, *spinning_friction = nullptr;  ///< [m]
   MaterialSettings rules;
+  const Vec3* position = nullptr;     ///< [m]
+  const Quat* orientation = nullptr;  ///< on the CPU, at this moment of the step
 };
 
-/// Makes rows of contacts. A row has the bodies of its contact in the order of a movable body a.
+/// Makes rows of contacts and joints. A row has the bodies in the order of a movable body a.
+/// Contacts and joints are numbered together: first the contacts, then the slots of joints.
 struct RowSetup {
   ContactView contacts;
+  JointView joints;
   BodyProperties properties;
   /// By body. Its velocities are those before the accelerations of the step during fill() only: on
   /// the CPU, the substeps change this array.
   const SolverBody* start = nullptr;
   Real restitution_threshold = 0;  ///< StepConstants::restitution_threshold
 
-  /// Whether body b of a contact becomes body a of its row, which must be movable.
+  /// Number of contacts and slots of joints.
+  JFPX_HD std::uint32_t size() const { return contacts.size() + joints.count; }
+  JFPX_HD bool is_joint(std::uint32_t i) const { return i >= contacts.size(); }
+  JFPX_HD std::uint32_t joint_of(std::uint32_t i) const { return i - contacts.size(); }
+  JFPX_HD ContactKey key(std::uint32_t i) const {
+    return is_joint(i) ? joints.key(joint_of(i)) : contacts.key(i);
+  }
+  JFPX_HD void set_color(std::uint32_t i, std::uint8_t color) const {
+    if (is_joint(i)) {
+      joints.now[joint_of(i)].color = color;
+    } else {
+      contacts.colors[i] = color;
+    }
+  }
+  /// Place in the order of the rows of a body with fixed bodies: joints precede contacts, which are
+  /// solved last, because they must not be passed.
+  JFPX_HD std::uint32_t fixed_order(std::uint32_t i) const {
+    return is_joint(i) ? joint_of(i) : joints.count + i;
+  }
+
+  /// Whether body b of a contact or joint becomes body a of its row, which must be movable.
   JFPX_HD bool is_flipped(const ContactKey& key) const { return !is_movable(key.a); }
+  /// Body a of its row.
+  JFPX_HD std::uint32_t movable_body(const ContactKey& key) const {
+    return is_flipped(key) ? key.b : key.a;
+  }
 
   /// Kind of the row of a contact, which may differ from that of the contact: two balls with
   /// rolling friction have a row of a manifold, and a ball on a fixed box has a row of spheres.
   /// @returns kNoRow if no body is movable and awake, or if a movable body sleeps
   JFPX_HD RowKind kind_of(std::uint32_t contact) const {
+    if (is_joint(contact)) return joint_kind(joint_of(contact));
     const ContactKey& key = contacts.key(contact);
     const std::uint8_t a = properties.traits[key.a], b = properties.traits[key.b];
     // A body that is still asleep is near, but does not touch: the contact has no effect.
@@ -59,8 +89,8 @@ struct RowSetup {
     return (a & b & BodyTraits::kIsRound) != 0 ? kKindOf<SphereRow> : kKindOf<ManifoldRow>;
   }
 
-  JFPX_HD std::uint32_t group_of(std::uint32_t contact) const {
-    const std::uint8_t color = contacts.colors[contact];
+  JFPX_HD std::uint32_t group_of(std::uint32_t i) const {
+    const std::uint32_t color = is_joint(i) ? joints.now[joint_of(i)].color : contacts.colors[i];
     if (color == kFixedColor) return kFixedGroup;
     return color == kOverflowColor ? kOverflowGroup : group_of_color(color);
   }
@@ -168,7 +198,36 @@ struct RowSetup {
     }
   }
 
-  /// Writes the impulses of a row to its contact.
+  template <bool kFixed>
+  JFPX_HD void fill(DistanceRow* row, NoPart*, std::uint32_t i) const {
+    const JointInput& joint = joints.inputs[joint_of(i)];
+    const DistanceInput& input = joint.distance;
+    const bool flipped = is_flipped(key(i));
+    row->a = flipped ? joint.b : joint.a;
+    row->b = flipped ? joint.a : joint.b;
+    row->anchor_a = flipped ? input.anchor_b : input.anchor_a;
+    row->anchor_b = flipped ? input.anchor_a : input.anchor_b;
+    Vec3 centre_b = row->anchor_b;
+    Quat orientation_b;
+    if (row->b == kWorld) {
+      row->anchor_b = {};
+    } else {
+      centre_b = properties.position[row->b];
+      orientation_b = properties.orientation[row->b];
+    }
+    row->centres = properties.position[row->a] - centre_b;
+    row->min_length = input.min_length;
+    row->max_length = input.max_length;
+    row->rest_length = input.rest_length;
+    row->spring_rate = input.spring_rate;
+    row->damp_rate = input.damp_rate;
+    const Real* kept = joints.now[joint_of(i)].impulses;
+    row->spring_impulse = kept[0], row->lower_impulse = kept[1], row->upper_impulse = kept[2];
+    row->spring_error = 0;
+    set_impulse(row, axis_of(*row, row->centres, properties.orientation[row->a], orientation_b));
+  }
+
+  /// Writes the impulses of a row to its contact or joint.
   JFPX_HD void store(const SphereRow& row, const NoPart*, std::uint32_t contact) const {
     const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
     const Real impulse = normal_impulse_of(row);
@@ -189,8 +248,21 @@ struct RowSetup {
           friction * side, is_released ? KeptImpulse::kReleased : points[p].normal_impulse};
     }
   }
+  JFPX_HD void store(const DistanceRow& row, const NoPart*, std::uint32_t i) const {
+    Real* kept = joints.now[joint_of(i)].impulses;
+    kept[0] = row.spring_impulse, kept[1] = row.lower_impulse, kept[2] = row.upper_impulse;
+  }
 
  private:
+  /// As kind_of().
+  JFPX_HD RowKind joint_kind(std::uint32_t joint) const {
+    if (!joints.is_used(joint)) return kNoRow;
+    const ContactKey key = joints.key(joint);
+    const std::uint8_t a = properties.traits[key.a];
+    const std::uint8_t b = key.b == kWorld ? std::uint8_t{0} : properties.traits[key.b];
+    if (sleeps(a) || sleeps(b) || ((a | b) & BodyTraits::kActive) == 0) return kNoRow;
+    return kind_of_joint(joints.inputs[joint].type);
+  }
   /// The friction impulse of the last step, whose normal was another one.
   JFPX_HD static Vec3 in_tangent_plane(const Vec3& friction, const Vec3& normal) {
     return friction - normal * dot(friction, normal);

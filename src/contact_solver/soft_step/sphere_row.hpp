@@ -16,7 +16,7 @@ namespace soft_step {
 /// before `normal`, and `restitution`: device::SolveProgram::store() writes no others back.
 struct alignas(4 * sizeof(Real)) SphereRow {
   using Part = NoPart;
-  static constexpr bool kReadsRotation = false;
+  static constexpr bool kReadsRotation = false, kReadsOrientation = false;
 
   Vec3 friction_impulse;  ///< [N s], on a, in the tangent plane
   /// [N s], on a. Its magnitude is the impulse. The sign bit is set until the bodies have pushed

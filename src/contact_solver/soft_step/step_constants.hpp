@@ -31,13 +31,14 @@ JFPX_HD constexpr Softness make_softness(Real hertz, Real damping, Real h) {
 
 /// Values that all contacts of a step share.
 struct StepConstants {
-  Real h = 0;               ///< [s], length of a substep
-  Real inverse_h = 0;       ///< [1/s]
-  Softness movable;         ///< between two movable bodies
-  Softness balls;           ///< between two movable spheres, in a SphereRow
-  Softness deep_balls;      ///< the same, for penetrations that heaps at rest do not have
-  Softness fixed;           ///< between a movable and an immovable or kinematic body
-  Real push_out_speed = 0;  ///< [m/s], of a push-out by velocity and projection together
+  Real h = 0;           ///< [s], length of a substep
+  Real inverse_h = 0;   ///< [1/s]
+  Softness movable;     ///< between two movable bodies
+  Softness balls;       ///< between two movable spheres, in a SphereRow
+  Softness deep_balls;  ///< the same, for penetrations that heaps at rest do not have
+  Softness fixed;       ///< between a movable and an immovable or kinematic body
+  /// [m/s], of a push-out by velocity and projection together, and of joints by projection
+  Real push_out_speed = 0;
   /// [m/s], of a push-out by velocity. The relax sweep removes most of it from the velocities, but
   /// not all of it in chains of overlapping bodies, which would fly apart at a higher speed.
   Real max_bias_velocity = 0;

@@ -100,7 +100,7 @@ class GridTeam {
   /// items each, and for those of earlier calls. All calls with the same n give item i to the same
   /// thread, and once() always uses the same thread.
   template <class Flow>
-  JFPX_HD void flow(std::uint32_t n, const Flow& flow) const {
+  [[gnu::always_inline]] JFPX_HD void flow(std::uint32_t n, const Flow& flow) const {
 #if defined(__CUDA_ARCH__)
     for (std::uint32_t i = first(); i - lane_id() < n; i += blocks_ * kThreads) {
       typename Flow::Item item;

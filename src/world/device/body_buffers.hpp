@@ -67,6 +67,8 @@ class BodyBuffers {
   void update_pairs(const Transfer<Device>& transfer, const BodyView& from, BodyView* to) {
     to->ignored = transfer.put(&ignored_, from.ignored, from.ignored_count);
     to->ignored_count = from.ignored_count;
+    to->joined = transfer.put(&joined_, from.joined, from.joined_count);
+    to->joined_count = from.joined_count;
   }
   /// Room for the ids of `count` bodies. swap_ids() makes them the current ones.
   BodyId* other_ids(const Transfer<Device>& transfer, std::size_t count) {
@@ -111,7 +113,7 @@ class BodyBuffers {
 
   PropertyColumns<Buffer> properties_;
   InertiaColumns<Buffer> inertia_;
-  Buffer<std::uint64_t> ignored_;
+  Buffer<std::uint64_t> ignored_, joined_;
   Buffer<BodyId> ids_[2];
   int ids_now_ = 0;  ///< which of the two are the current ones
   MotionColumns<Buffer> motion_;

@@ -110,6 +110,29 @@ struct FreeCells {
   VectorCells velocity, angular_velocity;
 };
 
+/// Orientation of a body with joints, and the number of moves in the step that it has made. A move
+/// stores it before the velocities, so a row that has read these waits only for a short time.
+class OrientationCells {
+ public:
+  JFPX_HD void store(const Quat& orientation, std::uint32_t moves) {
+    const auto [w, x, y, z] = orientation;
+    VectorCells({x, y, z}, moves).store(&vector_);
+    VectorCells({w, 0, 0}, moves).store(&scalar_);
+  }
+  JFPX_HD Quat load(std::uint32_t moves) const {
+    VectorCells vector, scalar;
+    do {
+      vector.load(&vector_);
+      scalar.load(&scalar_);
+    } while (vector.word() != moves || scalar.word() != moves);
+    const Vec3 v = vector.vector();
+    return {scalar.vector().x, v.x, v.y, v.z};
+  }
+
+ private:
+  VectorCells vector_, scalar_;
+};
+
 /// Access to the motion of a body as cells. The cells of the velocities are written at each turn,
 /// all others when they may have changed: the words of the velocities contain the versions of the
 /// other cells that belong to them.

@@ -10,6 +10,7 @@
 #include "src/world/device/edit_program.hpp"
 #include "src/world/device/fixed_tree_buffers.hpp"
 #include "src/world/device/force_buffers.hpp"
+#include "src/world/device/joint_buffers.hpp"
 #include "src/world/device/match_program.hpp"
 #include "src/world/device/merge_program.hpp"
 #include "src/world/device/prepare_program.hpp"
@@ -87,6 +88,12 @@ class DeviceStep final : public DeviceWorld {
     device_->wait();
   }
 
+  void upload_joints(JointStore* joints) override {
+    joints_.upload(transfer_, joints->view(), 1 - now(), room_, &data_);
+    is_ready_ = false;
+    ++changes_;
+  }
+
   void upload_forces(const BodyStore& bodies) override {
     bodies_.upload_forces(transfer_, bodies.moving);
     device_->wait();
@@ -123,7 +130,8 @@ class DeviceStep final : public DeviceWorld {
       }
     }
     BodyView& to = data_.step.bodies;
-    if (to.filters_in_use != from.filters_in_use || to.ignored_count != from.ignored_count) {
+    if (to.filters_in_use != from.filters_in_use || to.ignored_count != from.ignored_count ||
+        to.joined_count != from.joined_count) {
       ++changes_;
     }
     to.capacity = from.capacity;
@@ -249,6 +257,8 @@ class DeviceStep final : public DeviceWorld {
   void fetch_contact_set(soft_step::ContactSet* last) override {
     last_contacts().fetch(transfer_, last);
   }
+
+  void fetch_joints(JointStore* joints) override { joints_.fetch(transfer_, 1 - now(), joints); }
 
   void fetch_contacts(const BodiesOfStep& bodies, bool of_step_before, soft_step::ContactSet* set,
                       DetectedContacts* detected) override {
@@ -475,6 +485,7 @@ class DeviceStep final : public DeviceWorld {
   SubShapes sub_shapes_[2], added_shapes_;
   int sub_shapes_now_ = 0;  ///< which of the two are those of the bodies
   FixedTreeBuffers<Device> trees_;
+  JointBuffers<Device> joints_;
   ForceBuffers<Device> forces_;
   Contacts contacts_[2];  ///< as Progress::contacts
   ScratchBuffers<Device> scratch_;

@@ -39,11 +39,24 @@ JFPX_HD void find_islands(const Team& team, const StepData& d, const Touches& to
     d.parent[i] = i;
     d.marked[i] = 0;
   });
+  const soft_step::JointView joints = d.joints();
+  team.spread(joints.count, [&](std::uint32_t joint) {
+    soft_step::with_joined_bodies(joints, joint, [&](std::uint32_t a, std::uint32_t b) {
+      if (bodies.movable(a) && bodies.movable(b)) unite(d, a, b);
+    });
+  });
   team.for_each(contacts.size(), [&](std::uint32_t i) {
     const soft_step::ContactKey& key = contacts.key(i);
     if (bodies.movable(key.a) && bodies.movable(key.b) && touches(contacts, i)) {
       unite(d, key.a, key.b);
     }
+  });
+  team.spread(joints.count, [&](std::uint32_t joint) {
+    soft_step::with_joined_bodies(joints, joint, [&](std::uint32_t a, std::uint32_t b) {
+      const bool a_carries = bodies.is_carrier(a);
+      if (!a_carries && !bodies.is_carrier(b)) return;
+      d.marked[island_of(d, a_carries ? b : a)] = soft_step::kTouchesFastBody;
+    });
   });
   team.for_each(contacts.size(), [&](std::uint32_t i) {
     const soft_step::ContactKey& key = contacts.key(i);

@@ -10,7 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Gives each contact the impulses and the color of the same contact of the last step, and colors
+/// Gives each contact and joint the impulses and the color that it had in the last step, and colors
 /// the others: as soft_step::ContactCache.
 struct MatchProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = 6;
@@ -27,7 +27,7 @@ struct MatchProgram {
       const bool is_colored = i < spheres ? match_sphere(i) : match_manifold(i - spheres);
       const soft_step::ContactView now = d.contacts();
       const soft_step::ContactKey& key = now.key(i);
-      d.near_flag[key.a] = d.near_flag[key.b] = 1;
+      d.near_flag[key.a] = d.near_flag[key.b] = soft_step::kHasContact;
       if (is_colored) return;
       const BodyView& bodies = d.step.bodies;
       if (bodies.movable(key.a) && bodies.movable(key.b)) {
@@ -37,6 +37,9 @@ struct MatchProgram {
         now.colors[i] = soft_step::kFixedColor;
       }
     });
+    if (d.world_joints.count > 0) {
+      team.for_each(d.world_joints.count, [&](std::uint32_t joint) { match_joint(joint); });
+    }
     if (d.counters->uncolored[0] <= kFewContacts) {
       team.in_one_block([&](const auto& block) { color(block); });
     } else {
@@ -123,26 +126,49 @@ struct MatchProgram {
     return true;
   }
 
+  /// As ContactCache::match_joints() and SoftStep::find_near().
+  JFPX_HD void match_joint(std::uint32_t joint) const {
+    const StepData& d = data;
+    const soft_step::JointView joints = d.joints();
+    soft_step::KeptJoint now = joints.last[joint];
+    if (joints.is_used(joint)) {
+      const auto [a, b, part_a, part_b] = joints.key(joint);
+      const bool is_of_world = b == soft_step::kWorld;
+      d.near_flag[a] = soft_step::kHasJoint;
+      if (!is_of_world) d.near_flag[b] = soft_step::kHasJoint;
+      if (now.color < soft_step::kColors) {
+        const std::uint64_t bit = std::uint64_t{1} << now.color;
+        atomic_or(&d.used_colors[a], bit);
+        atomic_or(&d.used_colors[b], bit);
+      } else if (!is_of_world && d.step.bodies.movable(a) && d.step.bodies.movable(b)) {
+        d.uncolored[atomic_add(&d.counters->uncolored[0], 1)] = d.contacts().size() + joint;
+      } else {
+        now.color = soft_step::kFixedColor;
+      }
+    }
+    joints.now[joint] = now;
+  }
+
   /// Colors in rounds: a contact gets its color when it is the first of the uncolored ones at both
   /// bodies, which gives the colors of the sequential order.
   template <class Team>
   JFPX_HD void color(const Team& team) const {
     const StepData& d = data;
-    const soft_step::ContactView now = d.contacts();
+    const soft_step::RowSetup setup = d.row_setup();
     std::uint32_t *list = d.uncolored, *next_list = d.still_uncolored;
     for (std::uint32_t round = 0;; ++round) {
       const std::uint32_t left = load_shared(&d.counters->uncolored[round % 3]);
       if (left == 0) return;
       std::uint32_t* const next_count = &d.counters->uncolored[(round + 1) % 3];
       team.for_each(left, [&](std::uint32_t k) {
-        const soft_step::ContactKey& key = now.key(list[k]);
+        const soft_step::ContactKey key = setup.key(list[k]);
         const std::uint64_t order = soft_step::color_order(key);
         atomic_min(&d.first_order[key.a], order);
         atomic_min(&d.first_order[key.b], order);
       });
       // Contacts with the same value of color_order() are served by their index.
       team.for_each(left, [&](std::uint32_t k) {
-        const soft_step::ContactKey& key = now.key(list[k]);
+        const soft_step::ContactKey key = setup.key(list[k]);
         const std::uint64_t order = soft_step::color_order(key);
         if (order == d.first_order[key.a]) atomic_min(&d.first_contact[key.a], list[k]);
         if (order == d.first_order[key.b]) atomic_min(&d.first_contact[key.b], list[k]);
@@ -150,20 +176,20 @@ struct MatchProgram {
       team.once([&] { d.counters->uncolored[(round + 2) % 3] = 0; });
       team.for_each(left, [&](std::uint32_t k) {
         const std::uint32_t i = list[k];
-        const soft_step::ContactKey& key = now.key(i);
+        const soft_step::ContactKey key = setup.key(i);
         if (d.first_contact[key.a] != i || d.first_contact[key.b] != i) {
           next_list[atomic_add(next_count, 1)] = i;
           return;
         }
         std::uint64_t &a = d.used_colors[key.a], &b = d.used_colors[key.b];
         const std::uint8_t color = soft_step::lowest_free_color(a | b);
-        now.colors[i] = color;
+        setup.set_color(i, color);
         if (color == soft_step::kOverflowColor) return;
         a |= std::uint64_t{1} << color;
         b |= std::uint64_t{1} << color;
       });
       team.for_each(left, [&](std::uint32_t k) {
-        const soft_step::ContactKey& key = now.key(list[k]);
+        const soft_step::ContactKey key = setup.key(list[k]);
         d.first_order[key.a] = d.first_order[key.b] = kNoOrder;
         d.first_contact[key.a] = d.first_contact[key.b] = kNone;
       });

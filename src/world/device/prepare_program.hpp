@@ -40,6 +40,7 @@ struct PrepareProgram {
     soft_step::FreeMotion free;
     d.step.accelerate(i, &body, &free, true);
     d.cells(i).start(body, free);
+    if (d.is_joined(i)) d.orientation_cells[i].store(d.step.orientation[i], 0);
   }
 
   template <class Team>
@@ -68,13 +69,13 @@ struct PrepareProgram {
     });
   }
 
-  /// Assigns a row to each contact, sorted by bin.
+  /// Assigns a row to each contact and joint, sorted by bin.
   template <class Team>
   JFPX_HD void place_rows(const Team& team) const {
     const StepData& d = data;
     const soft_step::RowSetup setup = d.row_setup();
     team.partition(
-        setup.contacts.size(), d.row_bins, d.counters->bin_begin,
+        setup.size(), d.row_bins, d.counters->bin_begin,
         [&](std::uint32_t i) -> std::uint16_t {
           const soft_step::RowKind kind = setup.kind_of(i);
           return kind == soft_step::kNoRow ? soft_step::kNoBin
@@ -82,11 +83,10 @@ struct PrepareProgram {
         },
         [&](std::uint32_t i, std::uint32_t row, std::uint16_t bin) {
           d.row_contact[row] = i;
-          const soft_step::ContactKey& key = setup.contacts.key(i);
+          const soft_step::ContactKey key = setup.key(i);
           const std::uint32_t group = bin % soft_step::kGroups;
           if (group == soft_step::kFixedGroup) {
-            const std::uint32_t body = setup.is_flipped(key) ? key.b : key.a;
-            prepend(&d.first_fixed[body], d.next_fixed, row);
+            prepend(&d.first_fixed[setup.movable_body(key)], d.next_fixed, row);
           } else if (group > 0) {
             const std::uint64_t bit = std::uint64_t{1} << (group - 1);
             atomic_or(&d.row_bodies[key.a].colors, bit);
@@ -140,12 +140,14 @@ struct PrepareProgram {
     }
   }
 
-  /// The rows of a body with fixed bodies are solved in the order of their contacts.
+  /// Sorts the rows of a body with fixed bodies.
   JFPX_HD void sort_fixed(std::uint32_t body) const {
     const StepData& d = data;
-    d.first_fixed[body] = sort_list(
-        d.first_fixed[body], d.next_fixed,
-        [&](std::uint32_t x, std::uint32_t y) { return d.row_contact[x] < d.row_contact[y]; });
+    const soft_step::RowSetup setup = d.row_setup();
+    const auto order = [&](std::uint32_t row) { return setup.fixed_order(d.row_contact[row]); };
+    d.first_fixed[body] =
+        sort_list(d.first_fixed[body], d.next_fixed,
+                  [&](std::uint32_t x, std::uint32_t y) { return order(x) < order(y); });
   }
 
   JFPX_HD void fill_row(std::uint32_t r) const {
@@ -171,7 +173,9 @@ struct PrepareProgram {
     } else {
       Row* row = &d.rows<Row>()[r - first<Row>()];
       fill_in(row);
-      if (any_rebounds(*row, d.parts_of(*row))) d.counters->any_rebound = 1;
+      if constexpr (std::is_same_v<Row, soft_step::ManifoldRow>) {
+        if (any_rebounds(*row, d.parts_of(*row))) d.counters->any_rebound = 1;
+      }
     }
   }
 

@@ -48,18 +48,19 @@ class ScratchBuffers {
   void reserve_lists(const Transfer<Device>& transfer, const Capacity& c, StepData* data) {
     StepData& d = *data;
     const std::size_t contacts = std::size_t{c.spheres} + c.candidates;
+    const std::size_t rows = contacts + d.world_joints.count;
     d.pairs = transfer.room(&pairs_, c.pairs);
     d.pair_found = transfer.room(&pair_found_, c.pairs);
     d.pair_results = transfer.room(&pair_results_, c.pairs);
     d.candidates = transfer.room(&candidates_, c.candidates);
     d.tested = transfer.room(&tested_, c.candidates);
     d.next_candidate = transfer.room(&next_candidate_, c.candidates);
-    d.uncolored = transfer.room(&uncolored_, contacts);
-    d.still_uncolored = transfer.room(&still_uncolored_, contacts);
-    d.row_bins = transfer.room(&row_bins_, contacts);
-    d.row_contact = transfer.room(&row_contact_, contacts);
-    d.next_fixed = transfer.room(&next_fixed_, contacts);
-    d.overflow = transfer.room(&overflow_, contacts);
+    d.uncolored = transfer.room(&uncolored_, rows);
+    d.still_uncolored = transfer.room(&still_uncolored_, rows);
+    d.row_bins = transfer.room(&row_bins_, rows);
+    d.row_contact = transfer.room(&row_contact_, rows);
+    d.next_fixed = transfer.room(&next_fixed_, rows);
+    d.overflow = transfer.room(&overflow_, rows);
     d.sphere_rows = {transfer.room(&sphere_rows_, contacts), contacts};
     d.manifold_rows = transfer.room(&manifold_rows_, c.manifold_rows);
     d.point_rows = transfer.room(&point_rows_, c.row_points);

@@ -372,13 +372,20 @@ struct SolveProgram {
     Row row = data.rows<Row>()[item->row - sweep.first<Row>()];
     const Mat3* inertia = data.step.bodies.inverse_inertia;
     const Mat3 inertia_a = inertia[item->a.index], inertia_b = inertia[item->b.index];
-    const soft_step::BodyPair pair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b};
+    soft_step::BodyPair pair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b};
+    Quat orientation_a, orientation_b;
+    if constexpr (Row::kReadsOrientation) {
+      orientation_a = data.orientation_cells[item->a.index].load(sweep.moves());
+      orientation_b = data.orientation_cells[item->b.index].load(sweep.moves());
+      pair.orientation_a = &orientation_a;
+      pair.orientation_b = &orientation_b;
+    }
     operation.template run<false>(&row, context_of(row, pair));
     const auto write = [&](ItemBody* body) {
       const BodyCells cells = data.cells(body->index);
       if constexpr (Operation::kMovesBodies) {
         cells.write_shift(body->motion, &body->version);
-        cells.write_rotation(body->motion, &body->version);
+        if constexpr (Row::kReadsRotation) cells.write_rotation(body->motion, &body->version);
       }
       cells.write(body->after, body->motion, body->version);
     };
@@ -427,7 +434,10 @@ struct SolveProgram {
       check_state(i);
       return;
     }
-    if (sweep.stage == BodyStage::move) d.step.move(i, &body);
+    if (sweep.stage == BodyStage::move) {
+      d.step.move(i, &body);
+      if (d.is_joined(i)) d.orientation_cells[i].store(d.step.orientation[i], sweep.moves() + 1);
+    }
     if (sweep.stage == BodyStage::accelerate) {
       free.read(cells, item->version);
       d.step.accelerate(i, &body, &free.motion, false);
@@ -468,6 +478,17 @@ struct SolveProgram {
     return body;
   }
 
+  /// Its orientation, likewise.
+  JFPX_HD Quat fixed_orientation(std::uint32_t i, std::uint32_t moves) const {
+    const StepData& d = data;
+    Quat orientation = d.step.bodies.orientation[i];
+    if (d.step.bodies.awake[i] == 0) return orientation;
+    for (std::uint32_t k = 0; k < moves; ++k) {
+      orientation = d.step.turned(orientation, d.step.solver[i]);
+    }
+    return orientation;
+  }
+
   /// Solves a row of a movable body with a fixed one.
   template <class Operation>
   JFPX_HD void solve_fixed(const Sweep& sweep, const Operation& operation, std::uint32_t r,
@@ -504,10 +525,20 @@ struct SolveProgram {
   JFPX_HD void solve_fixed_other(const Sweep& sweep, const Operation& operation, std::uint32_t r,
                                  BodyItem* item) const {
     Row row = data.rows<Row>()[r - sweep.first<Row>()];
-    SolverBody fixed = fixed_body(row.b, sweep.moves());
+    SolverBody fixed;
     const Mat3 inertia = data.step.bodies.inverse_inertia[row.a];
     const Mat3 none;
-    const soft_step::BodyPair pair{&item->motion, &fixed, &inertia, &none};
+    soft_step::BodyPair pair{&item->motion, &fixed, &inertia, &none};
+    Quat orientation_a, orientation_b;
+    if constexpr (Row::kReadsOrientation) {
+      orientation_a = data.step.orientation[row.a];
+      pair.orientation_a = &orientation_a;
+      pair.orientation_b = &orientation_b;
+    }
+    if (!Row::kReadsOrientation || row.b != soft_step::kWorld) {
+      fixed = fixed_body(row.b, sweep.moves());
+      if constexpr (Row::kReadsOrientation) orientation_b = fixed_orientation(row.b, sweep.moves());
+    }
     operation.template run<true>(&row, context_of(row, pair));
     store<Operation>(sweep, row, r);
   }

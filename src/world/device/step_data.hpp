@@ -127,12 +127,20 @@ struct DeviceContacts {
   Vec3* position_before = nullptr;  ///< by body, at the start of the step
 };
 
+/// The joints on the device.
+struct DeviceJoints {
+  const soft_step::JointInput* inputs = nullptr;
+  soft_step::KeptJoint* kept[2] = {};  ///< of the last two steps, as Progress::contacts
+  std::uint32_t count = 0;             ///< number of slots
+};
+
 /// Everything that the programs of a step use, passed to kernels by value.
 struct StepData {
   soft_step::StepBodies step;
   NearBounds near;
   FixedTreesView trees;
   DeviceContacts contacts_of[2];  ///< as Progress::contacts
+  DeviceJoints world_joints;
   MaterialSettings materials;
   soft_step::StepConstants constants;
   std::uint32_t substeps = 0;
@@ -161,25 +169,31 @@ struct StepData {
   std::uint8_t* marked = nullptr;     ///< by label of an island
   std::uint8_t* near_flag = nullptr;  ///< by body: StepBodies::near
 
-  std::uint16_t* row_bins = nullptr;     ///< by contact
-  std::uint32_t* row_contact = nullptr;  ///< by row of any kind
+  std::uint16_t* row_bins = nullptr;     ///< by contact or joint, as RowSetup numbers them
+  std::uint32_t* row_contact = nullptr;  ///< by row of any kind: the same number
   StripedArray<soft_step::SphereRow> sphere_rows;
   soft_step::ManifoldRow* manifold_rows = nullptr;
   soft_step::PointRow* point_rows = nullptr;
+  soft_step::DistanceRow* distance_rows = nullptr;
   std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies
   std::uint32_t* next_fixed = nullptr;   ///< by row of any kind
   /// The rows without a free color: by kind, then in the order of contacts.
   std::uint32_t* overflow = nullptr;
-  MotionCells* motion_cells = nullptr;  ///< by body
-  FreeCells* free_cells = nullptr;      ///< by body
-  RowBody* row_bodies = nullptr;        ///< by body
-  SavedColumns<PointerColumn> saved;    ///< as they were at the start of the step
+  MotionCells* motion_cells = nullptr;            ///< by body
+  FreeCells* free_cells = nullptr;                ///< by body
+  RowBody* row_bodies = nullptr;                  ///< by body
+  OrientationCells* orientation_cells = nullptr;  ///< by body, of bodies with joints
+  SavedColumns<PointerColumn> saved;              ///< as they were at the start of the step
 
   /// The rows of a kind other than spheres, by their number in this kind.
   template <class Row>
   JFPX_HD Row* rows() const {
-    static_assert(std::is_same_v<Row, soft_step::ManifoldRow>);
-    return manifold_rows;
+    if constexpr (std::is_same_v<Row, soft_step::ManifoldRow>) {
+      return manifold_rows;
+    } else {
+      static_assert(std::is_same_v<Row, soft_step::DistanceRow>);
+      return distance_rows;
+    }
   }
   /// The parts of a row; null if it has none.
   template <class Row>
@@ -213,12 +227,21 @@ struct StepData {
     view.point_count = sizes.points;
     return view;
   }
+  JFPX_HD soft_step::JointView joints() const {
+    const DeviceJoints& all = world_joints;
+    return {all.inputs, all.kept[1 - parity()], all.kept[parity()], all.count};
+  }
+  /// Whether a body has joints, once MatchProgram is complete.
+  JFPX_HD bool is_joined(std::uint32_t body) const {
+    return world_joints.count > 0 && near_flag[body] == soft_step::kHasJoint;
+  }
   JFPX_HD soft_step::RowSetup row_setup() const {
     const BodyView& bodies = step.bodies;
     return {contacts(),
+            joints(),
             {bodies.inverse_inertia, bodies.last_acceleration, bodies.radius, step.traits,
              bodies.friction, bodies.restitution, bodies.rolling_friction, bodies.spinning_friction,
-             materials},
+             materials, bodies.position, step.orientation},
             step.solver,
             constants.restitution_threshold};
   }

@@ -54,8 +54,8 @@ const cpu::SphereSweepKernels* kernels_for(SimdLevel level) {
 SoftStepSolver::SoftStepSolver(ThreadPool* pool, SimdLevel simd)
     : pool_(pool), kernels_(kernels_for(usable_simd_level(simd))) {}
 
-/// Counting sort of the contacts into rows by kind and group. Rows of a group are in the order of
-/// contacts, those with fixed bodies in the order of bodies.
+/// Counting sort of the contacts and joints into rows by kind and group. Rows of a group are in the
+/// order of their numbers, those with fixed bodies in the order of bodies.
 void SoftStepSolver::sort_contacts() {
   count_contacts();
   Counts before;
@@ -74,11 +74,10 @@ void SoftStepSolver::sort_contacts() {
     rows->start(before.by_kind[kKindOf<Row>], colored_end_, bodies_);
   });
   resize_geometric(&fixed_, before.fixed);
-  parallel_for(pool_, setup_.contacts.size(), kContactsPerChunk,
-               [&](std::size_t first, std::size_t last) {
-                 place_contacts(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
-                                counts_[first / kContactsPerChunk]);
-               });
+  parallel_for(pool_, setup_.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+    place_contacts(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
+                   counts_[first / kContactsPerChunk]);
+  });
   for_all_kinds([](auto* rows) { rows->finish(); });
   place_fixed_contacts();
   place_parts();
@@ -86,7 +85,7 @@ void SoftStepSolver::sort_contacts() {
 
 /// Fills kinds_, and counts_ by chunk of contacts.
 void SoftStepSolver::count_contacts() {
-  const std::uint32_t count = setup_.contacts.size();
+  const std::uint32_t count = setup_.size();
   resize_geometric(&kinds_, count);
   resize_geometric(&counts_, (count + kContactsPerChunk - 1) / kContactsPerChunk);
   const auto count_chunk = [this](std::size_t first, std::size_t last) {
@@ -116,22 +115,23 @@ void SoftStepSolver::place_contacts(std::uint32_t first, std::uint32_t last, Cou
     const RowKind kind = kinds_[i];
     if (kind == kNoRow) continue;
     const std::size_t group = setup_.group_of(i);
-    const ContactKey& key = setup_.contacts.key(i);
+    const ContactKey key = setup_.key(i);
     if (group == kFixedGroup) {
-      fixed_[before.fixed++] = {setup_.is_flipped(key) ? key.b : key.a, i, 0, kind};
+      fixed_[before.fixed++] = {setup_.movable_body(key), i, 0, kind};
       continue;
     }
     visit_row(kind, [&]<class Row>(std::type_identity<Row>) {
       const std::uint32_t row = rows<Row>().begin(group) + before.by_kind[kind][group]++;
-      rows<Row>().place(group, row, i, key.a);
+      rows<Row>().place(group, row, i, std::min(key.a, key.b));
     });
   }
 }
 
 /// Sorts the contacts with fixed bodies by movable body, and assigns their rows.
 void SoftStepSolver::place_fixed_contacts() {
-  const auto order = [](const FixedContact& x, const FixedContact& y) {
-    return std::tie(x.body, x.contact) < std::tie(y.body, y.contact);
+  const auto order = [this](const FixedContact& x, const FixedContact& y) {
+    return x.body != y.body ? x.body < y.body
+                            : setup_.fixed_order(x.contact) < setup_.fixed_order(y.contact);
   };
   if (!std::ranges::is_sorted(fixed_, order)) std::ranges::sort(fixed_, order);
   std::array<std::uint32_t, kRowKinds> next{};
@@ -223,14 +223,30 @@ void SoftStepSolver::sweep(const Run& run, const OnFixed& on_fixed) {
   });
 }
 
+template <class Row>
+BodyPair SoftStepSolver::pair_of(const Row& row, std::span<SolverBody> bodies) {
+  const BodyProperties& all = setup_.properties;
+  BodyPair pair{&bodies[row.a], nullptr, &all.inverse_inertia[row.a], &world_inertia_};
+  if (!Row::kReadsOrientation || row.b != kWorld) {
+    pair.b = &bodies[row.b];
+    pair.inertia_b = &all.inverse_inertia[row.b];
+  } else {
+    pair.b = &world_;
+  }
+  if constexpr (Row::kReadsOrientation) {
+    pair.orientation_a = &all.orientation[row.a];
+    pair.orientation_b = row.b != kWorld ? &all.orientation[row.b] : &world_orientation_;
+  }
+  return pair;
+}
+
 /// @param kernel null: rows of spheres are treated one by one
 template <class Operation>
 void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operation,
                          cpu::SphereSweepFunction kernel) {
-  const Mat3* const inertia = setup_.properties.inverse_inertia;
   const auto one = [&]<class Row>(Rows<Row>* rows, std::size_t i, auto is_fixed) {
     Row& row = rows->rows[i];
-    const BodyPair pair{&bodies[row.a], &bodies[row.b], &inertia[row.a], &inertia[row.b]};
+    const BodyPair pair = pair_of(row, bodies);
     using Context = RowContext<typename Row::Part, ImpactBodies>;
     operation.template run<decltype(is_fixed)::value>(
         &row, Context{pair, rows->parts_of(row), &impacts_});

@@ -20,11 +20,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// Solves contacts in this order: the overflow, for which no color was free, one after the other;
-/// the colors in ascending order; the contacts with immovable and kinematic bodies, by movable
-/// body. In the overflow, rows are in the order of RowTypes. Contacts of one color share no movable
-/// body, so threads may solve them in any order, and so may contacts of different movable bodies
-/// with fixed bodies.
+/// Solves contacts and joints in this order: the overflow, for which no color was free, one after
+/// the other; the colors in ascending order; those with immovable and kinematic bodies or with the
+/// world, by movable body, joints first. In the overflow, rows are in the order of RowTypes. Rows
+/// of one color share no movable body, so threads may solve them in any order, and so may those of
+/// different movable bodies with fixed bodies.
 ///
 /// Owns its buffers, which only grow. In a step: build(), then warm_start(), solve() and
 /// restitute() as the integrator requires, then store().
@@ -34,7 +34,8 @@ class SoftStepSolver {
   /// @param simd widest vectors for rows of spheres
   SoftStepSolver(ThreadPool* pool, SimdLevel simd);
 
-  /// Makes rows of the contacts whose kind is not kNoRow.
+  /// Makes rows of the contacts and joints whose kind is not kNoRow. Below, "contact" is the number
+  /// of either; see RowSetup.
   /// @param setup     its arrays are valid until store()
   /// @param bodies    number of bodies in these arrays
   void build(const RowSetup& setup, std::size_t bodies, const ImpactBodies& impacts,
@@ -111,6 +112,8 @@ class SoftStepSolver {
   template <class Operation>
   void run(std::span<SolverBody> bodies, const Operation& operation,
            cpu::SphereSweepFunction kernel);
+  template <class Row>
+  BodyPair pair_of(const Row& row, std::span<SolverBody> bodies);
   cpu::SphereSweep arrays_of(std::span<SolverBody> bodies);
 
   ThreadPool* pool_;
@@ -124,7 +127,11 @@ class SoftStepSolver {
   std::vector<Counts> counts_;  ///< by chunk of contacts
   RowsOfTypes<RowTypes>::type rows_;
   std::size_t colored_end_ = 0;  ///< end of the overflow and of the colors that occur, as groups
-  std::vector<FixedContact> fixed_;  ///< sorted by (body, contact)
+  std::vector<FixedContact> fixed_;  ///< sorted by (body, RowSetup::fixed_order())
+  // Body b of a joint with the world.
+  SolverBody world_;
+  Mat3 world_inertia_;
+  Quat world_orientation_;
 };
 
 }  // namespace soft_step

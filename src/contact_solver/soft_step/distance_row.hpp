@@ -1,0 +1,245 @@
+/// A DistanceJoint in a soft step: a spring, and limits of the distance of two anchors.
+///
+/// The anchors turn with their bodies within the step, so that the axis is that of the moment in
+/// each sweep. The limits are solved for the distance at the end of the substep, with the second
+/// order of the motion across the axis: the positions follow the circle of a pendulum instead of
+/// its tangent, from which a projection would take energy (as in RATTLE: Andersen 1983).
+#pragma once
+
+#include "src/contact_solver/soft_step/body_pair.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// A sweep changes only the fields from `spring_impulse` on: see store_changes().
+struct DistanceRow {
+  using Part = NoPart;
+  static constexpr bool kReadsRotation = false, kReadsOrientation = true;
+
+  std::uint32_t a = 0, b = 0;  ///< bodies; a is movable, b may be kWorld
+  Vec3 centres;                ///< [m], from b's centre to a's at the start of the step
+  Vec3 anchor_a, anchor_b;     ///< [m], body axes; of the world: zero
+  Real min_length = 0, max_length = 0, rest_length = 0;  ///< [m]
+  Real spring_rate = 0, damp_rate = 0;                   ///< [1/s], as DistanceInput
+
+  /// [N s]. The spring pushes the bodies apart if it is positive, the lower limit always does, and
+  /// the upper one pulls. That of a rod, whose limits are equal, may do both.
+  Real spring_impulse = 0, lower_impulse = 0, upper_impulse = 0;
+  Real spring_error = 0;  ///< [m], length of the spring minus its rest length, in this substep
+  /// What the bodies have received in this substep: impulse on a [N s], and angular impulses on a
+  /// and against b [N m s].
+  Vec3 impulse, twist_a, twist_b;
+
+  JFPX_HD bool is_rod() const { return min_length == max_length; }
+  JFPX_HD Real total_impulse() const { return spring_impulse + lower_impulse - upper_impulse; }
+};
+
+/// Writes the fields that a sweep changes.
+JFPX_HD inline void store_changes(const DistanceRow& from, DistanceRow* to) {
+  to->spring_impulse = from.spring_impulse;
+  to->lower_impulse = from.lower_impulse;
+  to->upper_impulse = from.upper_impulse;
+  to->spring_error = from.spring_error;
+  to->impulse = from.impulse;
+  to->twist_a = from.twist_a;
+  to->twist_b = from.twist_b;
+}
+
+/// Part of an error of a joint that a substep corrects. With more, chains that swing gain energy.
+inline constexpr Real kJointCorrection = Real(0.2);
+
+/// Square of half the largest angle [rad] by which a joint turns in a substep on an exact circle.
+/// It is not exact beyond it, where the impulse changes the velocities too much.
+inline constexpr Real kMostTurn = Real(1) / 16;
+
+/// The anchors at a moment of the step.
+struct DistanceAxis {
+  Vec3 arm_a, arm_b;  ///< [m], world axes, from the centres
+  Real length;        ///< [m]
+  Vec3 direction;  ///< unit, from b's anchor to a's; of anchors that coincide, that of the x axis
+};
+
+/// @param centres from b's centre to a's
+JFPX_HD inline DistanceAxis axis_of(const DistanceRow& row, const Vec3& centres,
+                                    const Quat& orientation_a, const Quat& orientation_b) {
+  DistanceAxis axis;
+  axis.arm_a = rotate(orientation_a, row.anchor_a);
+  axis.arm_b = rotate(orientation_b, row.anchor_b);
+  const Vec3 between = centres + (axis.arm_a - axis.arm_b);
+  axis.length = length(between);
+  axis.direction = axis.length > kEpsilon ? between * (1 / axis.length) : Vec3{1, 0, 0};
+  return axis;
+}
+
+/// Applies an impulse on a, the opposite one on b, and their angular impulses.
+template <bool kFixed>
+JFPX_HD inline void apply_impulse(const BodyPair& pair, const Vec3& impulse, const Vec3& twist_a,
+                                  const Vec3& twist_b) {
+  pair.a->velocity += impulse * pair.a->inverse_mass;
+  pair.a->angular_velocity += *pair.inertia_a * twist_a;
+  if constexpr (!kFixed) {
+    pair.b->velocity -= impulse * pair.b->inverse_mass;
+    pair.b->angular_velocity -= *pair.inertia_b * twist_b;
+  }
+}
+
+/// Sets what the bodies receive by the impulses along an axis.
+JFPX_HD inline void set_impulse(DistanceRow* row, const DistanceAxis& axis) {
+  row->impulse = axis.direction * row->total_impulse();
+  row->twist_a = cross(axis.arm_a, row->impulse);
+  row->twist_b = cross(axis.arm_b, row->impulse);
+}
+
+template <bool kFixed>
+JFPX_HD inline void warm_start(const DistanceRow& row, const BodyPair& pair) {
+  apply_impulse<kFixed>(pair, row.impulse, row.twist_a, row.twist_b);
+}
+
+/// Solves a DistanceRow in a sweep.
+template <bool kFixed>
+class DistanceSolver {
+ public:
+  JFPX_HD DistanceSolver(DistanceRow* row, const BodyPair& pair, const StepConstants& step)
+      : row_(row), pair_(pair), step_(step) {
+    const Vec3 centres = row->centres + (pair.a->shift - pair.b->shift);
+    axis_ = axis_of(*row, centres, *pair.orientation_a, *pair.orientation_b);
+    const Vec3& n = axis_.direction;
+    const Vec3 turn_a = cross(axis_.arm_a, n);
+    Real inverse_mass = pair.a->inverse_mass + dot(turn_a, *pair.inertia_a * turn_a);
+    if constexpr (!kFixed) {
+      const Vec3 turn_b = cross(axis_.arm_b, n);
+      inverse_mass += pair.b->inverse_mass + dot(turn_b, *pair.inertia_b * turn_b);
+    }
+    mass_ = 1 / inverse_mass;
+  }
+
+  /// In the first sweep of a substep, the bodies have received again what they received in the last
+  /// one, along the axis of that time.
+  JFPX_HD void turn_impulse() {
+    const Vec3 before = row_->impulse, twist_a = row_->twist_a, twist_b = row_->twist_b;
+    set_impulse(row_, axis_);
+    apply_impulse<kFixed>(pair_, row_->impulse - before, row_->twist_a - twist_a,
+                          row_->twist_b - twist_b);
+    row_->spring_error = axis_.length - row_->rest_length;
+  }
+
+  JFPX_HD void solve(bool use_bias) {
+    if (row_->spring_rate > 0 && !row_->is_rod()) solve_spring();
+    if (row_->is_rod()) {
+      solve_limit(&row_->upper_impulse, axis_.length - row_->max_length, 1, use_bias);
+      return;
+    }
+    if (row_->min_length > 0) {
+      solve_limit(&row_->lower_impulse, row_->min_length - axis_.length, -1, use_bias);
+    }
+    solve_limit(&row_->upper_impulse, axis_.length - row_->max_length, 1, use_bias);
+  }
+
+ private:
+  JFPX_HD Vec3 velocity() const { return relative_velocity(pair_, axis_.arm_a, axis_.arm_b); }
+
+  /// @param along impulse that pushes the bodies apart
+  JFPX_HD void push(Real along) {
+    const Vec3 impulse = axis_.direction * along;
+    const Vec3 twist_a = cross(axis_.arm_a, impulse), twist_b = cross(axis_.arm_b, impulse);
+    apply_impulse<kFixed>(pair_, impulse, twist_a, twist_b);
+    row_->impulse += impulse;
+    row_->twist_a += twist_a;
+    row_->twist_b += twist_b;
+  }
+
+  /// The force of the spring is that of the length at the start of the substep, which keeps energy,
+  /// and the damping that of the velocity at its end, which is stable. A spring that oscillates by
+  /// more than a quarter of a radian per substep is damped further, so that it is stable, too, even
+  /// if dozens of springs act on a body.
+  JFPX_HD void solve_spring() {
+    constexpr Real kLargest = Real(1) / 16;
+    const Real angle = step_.h * row_->spring_rate, square = angle * angle;
+    const Real small = square < kLargest ? square : kLargest;
+    // (2 sin(angle / 2))^2 = square * factor: the oscillation then has the given frequency.
+    const Real factor = 1 - small * (Real(1) / 12);
+    const Real damping = step_.h * row_->damp_rate + (square - small);
+    const Real pull = mass_ * (factor * square * step_.inverse_h * row_->spring_error +
+                               damping * dot(velocity(), axis_.direction));
+    const Real change = -(pull + row_->spring_impulse) / (1 + damping);
+    row_->spring_impulse += change;
+    push(change);
+  }
+
+  /// Velocity by which an arm that turns with a body for a substep differs from cross(w, arm), for
+  /// integrated_orientation(), which turns by the angle 2 atan(h w / 2).
+  JFPX_HD Vec3 turning(const SolverBody& body, const Vec3& arm) const {
+    const Vec3& w = body.angular_velocity;
+    const Real half = step_.h * Real(0.5), square = length_squared(w) * (half * half);
+    const Vec3 first = cross(w, arm);
+    const Real bound = square > kMostTurn ? kMostTurn / square : Real(1);
+    return (cross(w, first) * half - first * square) * (bound / (1 + square));
+  }
+
+  /// Velocity by which the length grows beyond its first order within the substep: the anchors move
+  /// across the axis, and turn with their bodies. @param limit the length at the end
+  JFPX_HD Real bend(Real limit, const Vec3& across) const {
+    const Real arms =
+        dot(turning(*pair_.a, axis_.arm_a) - turning(*pair_.b, axis_.arm_b), axis_.direction);
+    if (!(limit > 0)) return arms;
+    const Real square = limit * limit, way2 = length_squared(across) * (step_.h * step_.h);
+    const Real most = 4 * kMostTurn * square, bounded = way2 < most ? way2 : most;
+    return arms + bounded * step_.inverse_h / (limit + square_root(square - bounded));
+  }
+
+  /// Corrects a part of an error of the length by a translation of the bodies, without velocity:
+  /// one relax sweep would not remove the velocity from long chains, which would gain energy.
+  /// @param excess [m], by which the length is beyond the limit; below 0 for a rod that is too
+  /// short
+  JFPX_HD void project(Real excess, Real sign) {
+    Real inverse_mass = pair_.a->inverse_mass;
+    if constexpr (!kFixed) inverse_mass += pair_.b->inverse_mass;
+    const Real most = step_.push_out_speed * step_.h, wanted = kJointCorrection * excess;
+    const Real way = wanted > most ? most : wanted < -most ? -most : wanted;
+    const Vec3 impulse = axis_.direction * (way * sign / inverse_mass);
+    pair_.a->shift -= impulse * pair_.a->inverse_mass;
+    if constexpr (!kFixed) pair_.b->shift += impulse * pair_.b->inverse_mass;
+  }
+
+  /// @param excess [m], by which the length is beyond the limit
+  /// @param sign   1: upper limit, -1: lower limit
+  JFPX_HD void solve_limit(Real* impulse, Real excess, Real sign, bool use_bias) {
+    const bool is_rod = row_->is_rod();
+    const bool is_slack = !is_rod && excess <= 0;
+    // As is_idle(): a limit that is not reached acts only if it is about to be.
+    if (!use_bias && is_slack && !(*impulse > 0)) return;
+    const Vec3 all = velocity();
+    const Real along = dot(all, axis_.direction);
+    Real speed = along;
+    if (use_bias) {
+      const Real limit = sign > 0 ? row_->max_length : row_->min_length;
+      speed += bend(limit, all - axis_.direction * along);
+    }
+    speed *= sign;
+    if (use_bias && is_slack) speed += excess * step_.inverse_h;
+    if (use_bias && !is_slack) project(excess, sign);
+    const Real wanted = *impulse + mass_ * speed;
+    const Real after = is_rod || wanted > 0 ? wanted : Real(0);
+    push((*impulse - after) * sign);
+    *impulse = after;
+  }
+
+  DistanceRow* row_;
+  const BodyPair& pair_;
+  const StepConstants& step_;
+  DistanceAxis axis_;
+  Real mass_ = 0;  ///< [kg], effective, along the axis
+};
+
+template <bool kFixed>
+JFPX_HD inline void solve(DistanceRow* row, const BodyPair& pair, const StepConstants& step,
+                          bool use_bias) {
+  DistanceSolver<kFixed> solver(row, pair, step);
+  if (use_bias) solver.turn_impulse();
+  solver.solve(use_bias);
+}
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx

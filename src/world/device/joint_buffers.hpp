@@ -1,0 +1,53 @@
+/// The joints of a world in the memory of a device.
+#pragma once
+
+#include "src/world/device/step_data.hpp"
+#include "src/world/device/transfer.hpp"
+#include "src/world/joint_store.hpp"
+
+#include <cstddef>
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+template <class Device>
+class JointBuffers {
+ public:
+  /// The joints become those of the host. Waits for the copies.
+  /// @param last index of what the joints keep from the last step, in DeviceJoints::kept
+  /// @param room number of slots of bodies to reserve memory for
+  void upload(const Transfer<Device>& transfer, const soft_step::JointView& from,
+              std::uint64_t last, std::size_t room, StepData* data) {
+    DeviceJoints& to = data->world_joints;
+    to.count = from.count;
+    to.inputs = transfer.put(&inputs_, from.inputs, from.count);
+    transfer.put(&kept_[last], from.last, from.count);
+    transfer.room(&kept_[1 - last], from.count);
+    for (int i = 0; i < 2; ++i) to.kept[i] = kept_[i].data();
+    if (from.count > 0) {
+      data->orientation_cells = transfer.room(&orientation_cells_, room);
+      data->distance_rows = transfer.room_to_grow(&distance_rows_, from.count);
+    }
+    transfer.wait();
+  }
+
+  void fetch(const Transfer<Device>& transfer, std::uint64_t last, JointStore* to) const {
+    transfer.get(&to->last(), kept_[last]);
+    transfer.wait();
+  }
+
+ private:
+  template <class T>
+  using Buffer = typename Device::template Buffer<T>;
+
+  Buffer<soft_step::JointInput> inputs_;
+  Buffer<soft_step::KeptJoint> kept_[2];
+  Buffer<OrientationCells> orientation_cells_;
+  Buffer<soft_step::DistanceRow> distance_rows_;
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx

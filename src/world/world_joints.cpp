@@ -1,0 +1,178 @@
+/// Joints of a World.
+#include <jfpx/error.hpp>
+
+#include "src/scene/scene_validate.hpp"
+#include "src/world/world_impl.hpp"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+void require_valid(const BodyStore& bodies, const Joint& joint) {
+  std::string found = find_fault(joint);
+  if (!found.empty()) throw InvalidArgument("joint: " + found);
+  bool any_movable = false;
+  std::visit(
+      [&](const auto& j) {
+        any_movable = bodies.movable(bodies.require(j.a));
+        if (j.b) any_movable |= bodies.movable(bodies.require(*j.b));
+      },
+      joint);
+  if (any_movable) return;
+  throw InvalidArgument("joint: both bodies have mass 0; one of them must be movable");
+}
+
+}  // namespace
+
+/// Calls f(body) for the bodies of a joint.
+template <class F>
+void World::Impl::for_each_joined(const JoinedBodies& joined, const F& f) {
+  f(joined.a);
+  if (joined.b != soft_step::kWorld) f(joined.b);
+}
+
+/// Prepares a change of joints of two bodies, which then cannot fail.
+void World::Impl::begin_joint_edit(const JoinedBodies& joined) {
+  begin_edit();
+  fetch_joints();
+  if (joined.excludes_contacts) {
+    edited_body_in_lists(joined.a, {.sets_pairs = true});
+    edited_body_in_lists(joined.b, {});
+  }
+  for_each_joined(joined, [this](std::uint32_t body) { edited_body(body, {}); });
+}
+
+void World::Impl::complete_joint_edit(const JoinedBodies& joined) {
+  joints_changed = true;
+  for_each_joined(joined, [this](std::uint32_t body) { wake(body); });
+}
+
+JointId World::Impl::add_joint(const Joint& joint) {
+  const JoinedBodies joined = joined_bodies(joint);
+  begin_joint_edit(joined);
+  const bool is_new_pair =
+      joined.excludes_contacts && !joints.excludes_contacts(joined.a, joined.b);
+  if (is_new_pair) store.set_pair_joined({joined.a, joined.b}, true);
+  JointId id;
+  try {
+    id = joints.add(joint);
+  } catch (...) {
+    if (is_new_pair) store.set_pair_joined({joined.a, joined.b}, false);
+    throw;
+  }
+  complete_joint_edit(joined);
+  return id;
+}
+
+void World::Impl::remove_joint(std::uint32_t joint) {
+  const JoinedBodies joined = joined_bodies(joints.joint(joint));
+  begin_joint_edit(joined);
+  joints.remove(joint);
+  if (joined.excludes_contacts && !joints.excludes_contacts(joined.a, joined.b)) {
+    store.set_pair_joined({joined.a, joined.b}, false);
+  }
+  complete_joint_edit(joined);
+}
+
+void World::Impl::set_joint(std::uint32_t joint, const Joint& value) {
+  const bool excluded = joined_bodies(joints.joint(joint)).excludes_contacts;
+  const auto [a, b, excludes] = joined_bodies(value);
+  begin_joint_edit({a, b, excluded || excludes});
+  if (excludes) store.set_pair_joined({a, b}, true);
+  joints.set(joint, value);
+  if (excluded && !joints.excludes_contacts(a, b)) store.set_pair_joined({a, b}, false);
+  complete_joint_edit({a, b, excludes});
+}
+
+/// Removes the joints of a body that is about to be removed, and wakes the bodies joined with it.
+void World::Impl::remove_joints_of(std::uint32_t body) {
+  bool any = false;
+  joints.for_each_of(body, [&](std::uint32_t joint) {
+    if (!any) fetch_joints();
+    any = true;
+    for_each_joined(joined_bodies(joints.joint(joint)), [&](std::uint32_t i) {
+      if (i != body) edited_body(i, {});
+    });
+  });
+  if (!any) return;
+  // From here on, nothing throws.
+  joints_changed = true;
+  joints.for_each_of(body, [&](std::uint32_t joint) {
+    const JoinedBodies joined = joined_bodies(joints.joint(joint));
+    joints.remove(joint);
+    for_each_joined(joined, [&](std::uint32_t i) {
+      if (i != body) wake(i);
+    });
+  });
+}
+
+void World::Impl::fetch_joints() {
+  const std::lock_guard lock(fetching);
+  if (joints_are_current) return;
+  device->fetch_joints(&joints);
+  joints_are_current = true;
+}
+
+void World::Impl::flush_joints() {
+  if (!joints_changed) return;
+  device->upload_joints(&joints);
+  joints_changed = false;
+}
+
+JointId World::add_joint(const Joint& joint) {
+  if (impl_->scene.solver != Solver::soft_step) {
+    throw InvalidArgument(
+        "the solver is worst_first; it must be soft_step for a world with joints");
+  }
+  require_valid(impl_->store, joint);
+  return impl_->add_joint(joint);
+}
+
+void World::remove_joint(JointId id) { impl_->remove_joint(impl_->joints.require(id)); }
+
+std::span<const JointId> World::joints() const { return impl_->joints.ids(); }
+
+bool World::contains_joint(JointId id) const noexcept { return impl_->joints.contains(id); }
+
+const Joint& World::joint(JointId id) const {
+  return impl_->joints.joint(impl_->joints.require(id));
+}
+
+void World::set_joint(JointId id, const Joint& joint) {
+  const std::uint32_t slot = impl_->joints.require(id);
+  require_valid(impl_->store, joint);
+  const Joint& replaced = impl_->joints.joint(slot);
+  const JoinedBodies old = joined_bodies(replaced), now = joined_bodies(joint);
+  if (replaced.index() != joint.index() || old.a != now.a || old.b != now.b) {
+    throw InvalidArgument("joint: its type and its bodies must be those of the joint it replaces");
+  }
+  impl_->set_joint(slot, joint);
+}
+
+JointState World::joint_state(JointId id) const {
+  const std::uint32_t slot = impl_->joints.require(id);
+  const BodyStore& bodies = impl_->bodies_with_states();
+  impl_->fetch_joints();
+  const auto point = [&](std::uint32_t body, const Vec3& anchor) {
+    return body == soft_step::kWorld ? anchor : to_world_point(bodies.state(body), anchor);
+  };
+  const Real h = impl_->scene.dt / static_cast<Real>(impl_->scene.soft_step.substeps);
+  const JoinedBodies joined = joined_bodies(impl_->joints.joint(slot));
+  return std::visit(
+      [&](const auto& joint) {
+        JointState state;
+        state.point_a = point(joined.a, joint.anchor_a);
+        state.point_b = point(joined.b, joint.anchor_b);
+        state.length = length(state.point_a - state.point_b);
+        state.force = pull_of(joint, impl_->joints.kept(slot)) / h;
+        return state;
+      },
+      impl_->joints.joint(slot));
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
