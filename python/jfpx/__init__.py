@@ -13,6 +13,7 @@ from ._errors import (BackendUnavailable, Closed, ConcurrentUse, DeviceError, Er
                       InvalidArgument, InvalidScene, InvalidSnapshot, OutOfMemory)
 from ._forces import (Attachment, BodyId, BodyState, Bungee, Buoyancy, Drag, Explosion,
                       ForceContext, Gravity, Spring, States)
+from ._joints import DistanceJoint, JointId, JointState
 from ._recording import Recording, RecordingWriter
 from ._scene import Scene, scene_names
 from ._world import (BEGIN, END, STAY, ContactEvents, RayHit, RayHits, StepReport, World,

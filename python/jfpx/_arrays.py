@@ -48,16 +48,24 @@ def path(value: Any) -> str:
         raise InvalidArgument(f"path is {value!r}; it must be a str or a path") from None
 
 
-def body(value: Any, name: str = "body") -> tuple[int, int]:
-    """The index and the generation of a BodyId."""
+def _id(value: Any, name: str, kind: str) -> tuple[int, int]:
     try:
         index, generation = (part.__index__() for part in value)
     except (AttributeError, TypeError, ValueError):
         index = generation = -1
     if not (0 <= index < 2**32 and 0 <= generation < 2**32):
-        raise InvalidArgument(f"{name} is {value!r}; it must be a BodyId: one of World.bodies, or "
-                              "World.body_at(index)")
+        raise InvalidArgument(f"{name} is {value!r}; it must be a {kind}")
     return index, generation
+
+
+def body(value: Any, name: str = "body") -> tuple[int, int]:
+    """The index and the generation of a BodyId."""
+    return _id(value, name, "BodyId: one of World.bodies, or World.body_at(index)")
+
+
+def joint(value: Any) -> tuple[int, int]:
+    """The index and the generation of a JointId."""
+    return _id(value, "joint_id", "JointId: one of World.joints")
 
 
 def options(backend: Any, algorithm: Any, threads: Any, device: Any) -> tuple[str, str, int, int]:

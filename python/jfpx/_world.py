@@ -12,6 +12,7 @@ import numpy as np
 from . import _arrays, _device
 from ._errors import Closed, ConcurrentUse, InvalidArgument
 from ._forces import BodyId, BodyState, ForceContext, States, Vector
+from ._joints import JointId, JointState, arguments, joint_of
 from ._scene import Scene
 
 
@@ -707,6 +708,44 @@ class World:
             raise InvalidArgument(f"force is {type(force).__name__}; it must be a force of jfpx "
                                   "or a function")
         return self._core.add_function(functools.partial(_call, force, self._dtype))
+
+    def add_joint(self, joint: Any) -> JointId:
+        """Adds a joint, which acts from the next step on, and wakes its bodies. Their contacts with
+        each other end, unless the joint lets them collide. Joints are removed with their bodies.
+
+        Parameters
+        ----------
+        joint : DistanceJoint
+
+        Raises
+        ------
+        InvalidArgument
+            A field is out of its range, a body is unknown, both bodies are the same or have mass 0,
+            or the solver is worst_first.
+        """
+        return JointId(*self._core.add_joint(*arguments(joint)))
+
+    def set_joint(self, joint_id: JointId, joint: Any) -> None:
+        """Replaces a joint by one of the same type and bodies, for example with another length, and
+        wakes its bodies. Raises InvalidArgument as add_joint(), and for an unknown id."""
+        self._core.set_joint(_arrays.joint(joint_id), *arguments(joint))
+
+    def remove_joint(self, joint_id: JointId) -> None:
+        """Removes a joint and wakes its bodies. Raises InvalidArgument for an unknown id."""
+        self._core.remove_joint(_arrays.joint(joint_id))
+
+    @property
+    def joints(self) -> list[JointId]:
+        """Joints in the order of their indices."""
+        return [JointId(*joint_id) for joint_id in self._core.joints()]
+
+    def joint(self, joint_id: JointId) -> Any:
+        """The definition of a joint. Raises InvalidArgument for an unknown id."""
+        return joint_of(*self._core.joint(_arrays.joint(joint_id)))
+
+    def joint_state(self, joint_id: JointId) -> JointState:
+        """A joint after the last step. Raises InvalidArgument for an unknown id."""
+        return JointState(*self._core.joint_state(_arrays.joint(joint_id)))
 
     def remove_force(self, number: int) -> None:
         """Removes the force with a number of add_force(), and wakes all bodies. Raises

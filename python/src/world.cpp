@@ -266,6 +266,7 @@ void bind_world(nb::module_& module) {
   bind_bodies(world);
   bind_properties(world);
   bind_forces(module, world);
+  bind_joints(world);
   bind_contacts(world);
   bind_device_states(module, world);
 }

@@ -43,6 +43,7 @@ class PythonWorld {
     Scene scene = get().settings();
     scene.bodies = scene_.bodies;
     scene.ignored_pairs = scene_.ignored_pairs;
+    scene.joints = scene_.joints;
     return scene;
   }
 
@@ -100,6 +101,7 @@ struct FunctionContext {
 nb::tuple to_python(const StepReport& report);
 
 void bind_forces(nb::module_& module, nb::class_<PythonWorld>& world);
+void bind_joints(nb::class_<PythonWorld>& world);
 void bind_contacts(nb::class_<PythonWorld>& world);
 void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world);
 

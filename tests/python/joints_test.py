@@ -1,0 +1,91 @@
+"""Joints of worlds."""
+
+import math
+
+import numpy as np
+import pytest
+
+import jfpx
+
+BALL = {"shape": {"type": "sphere", "radius": 0.1}, "can_sleep": False}
+
+
+def row_of_balls(count, **options):
+    return jfpx.World({"bodies": [{**BALL, "position": [i, 0, 0]} for i in range(count)]}, **options)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_a_pendulum_swings_about_its_anchor(dtype):
+    world = row_of_balls(1, dtype=dtype)
+    ball = world.bodies[0]
+    rod = world.add_joint(jfpx.DistanceJoint(ball, anchor_b=(0, 1, 0), min_length=1, max_length=1))
+    states = world.state(ball)
+    world.set_state(ball, states._replace(velocity=(0.5, 0, 0)))
+    lengths, heights = [], []
+    for _ in range(240):
+        world.step()
+        state = world.joint_state(rod)
+        lengths.append(state.length)
+        heights.append(world.state(ball).position[1])
+        assert math.dist(state.point_b, (0, 1, 0)) == 0
+    np.testing.assert_allclose(lengths, 1, atol=1e-5)
+    # The height of the energy at the start.
+    assert max(heights) == pytest.approx(0.5**2 / (2 * 9.81), rel=0.02)
+
+
+def test_joints_are_added_changed_and_removed():
+    world = row_of_balls(3)
+    a, b, c = world.bodies
+    spring = jfpx.DistanceJoint(a, b, (0.1, 0, 0), (0, 0, 0.25), 0.5, 2, 1, 3, 0.5, True, 2**63)
+    first = world.add_joint(spring)
+    second = world.add_joint(jfpx.DistanceJoint(b, c, max_length=1))
+    assert world.joints == [first, second] and isinstance(first, jfpx.JointId)
+    definition = world.joint(first)
+    assert (definition.a, definition.b, definition.user_data) == (a, b, 2**63)
+    assert definition.anchor_b == (0, 0, 0.25) and definition.collide_connected is True
+    assert world.joint(second) == jfpx.DistanceJoint(b, c, max_length=1)
+    world.set_joint(second, jfpx.DistanceJoint(b, c, max_length=0.5))
+    for _ in range(120):
+        world.step()
+    assert world.joint_state(second).length < 0.51
+    world.remove(b)
+    assert world.joints == []
+    for call in (world.joint, world.joint_state, world.remove_joint):
+        with pytest.raises(jfpx.InvalidArgument, match="joint id"):
+            call(first)
+
+
+def test_a_scene_has_joints_and_a_snapshot_keeps_them():
+    scene = {"bodies": [{**BALL, "position": [i, 0, 0]} for i in range(2)],
+             "joints": [{"type": "distance", "a": 0, "b": 1, "max_length": 1.5},
+                        {"type": "distance", "a": 0, "anchor_b": [0, 1, 0], "max_length": 1}]}
+    assert len(jfpx.Scene(scene).to_dict()["joints"]) == 2
+    world, other = jfpx.World(scene, threads=1), jfpx.World({"bodies": []})
+    assert len(world.joints) == 2
+    for _ in range(30):
+        world.step()
+    other.restore(world.snapshot())
+    for _ in range(30):
+        world.step()
+        other.step()
+    assert world.state_hash() == other.state_hash() and other.joints == world.joints
+
+
+def test_errors_name_the_field_of_a_joint():
+    world = row_of_balls(2)
+    a, b = world.bodies
+    for joint, message in ((jfpx.DistanceJoint(a, b, min_length=2, max_length=1), "min_length is 2"),
+                           (jfpx.DistanceJoint(a, a), "b is body 0"),
+                           (jfpx.DistanceJoint((7, 0), b), "body id"),
+                           (jfpx.DistanceJoint(a, b, hertz=-1), "hertz is -1"),
+                           (jfpx.DistanceJoint(a, b, hertz=math.nan), "hertz is nan"),
+                           (jfpx.DistanceJoint(a, b, anchor_a=(1, 2)), "anchor_a has 2 numbers"),
+                           (jfpx.DistanceJoint(a, b, user_data=-1), "user_data is -1"),
+                           (jfpx.DistanceJoint(0), "a is 0; it must be a BodyId"),
+                           (jfpx.DistanceJoint, "it must be a joint of jfpx"),
+                           (jfpx.Gravity(), "it must be a joint of jfpx")):
+        with pytest.raises(jfpx.InvalidArgument, match=message):
+            world.add_joint(joint)
+    with pytest.raises(jfpx.InvalidArgument, match="it must be a JointId"):
+        world.joint(3)
+    assert world.joints == []
