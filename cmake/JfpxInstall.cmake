@@ -1,6 +1,6 @@
 # Installation of libraries with their CMake and pkg-config files, headers and programs. The installation is
-# relocatable: no file contains the prefix. Components follow Debian's conventions: runtime, runtime_bullet,
-# dev, tools.
+# relocatable: no file contains the prefix. Components follow Debian's conventions: runtime, runtime_thesis,
+# runtime_bullet, dev, tools.
 if(JFPX_INSTALL)
   foreach(folder IN ITEMS BINDIR LIBDIR INCLUDEDIR)
     if(IS_ABSOLUTE "${CMAKE_INSTALL_${folder}}")
@@ -72,14 +72,17 @@ function(_jfpx_install_pkg_config file suffix)
   endif()
   set(requires "")
   set(libraries "-L\${libdir} -l${file}")
+  string(REGEX REPLACE "-(bullet|thesis)" "" core ${file})
   if(file MATCHES "bullet")
     set(description "${description}: the adapter for Bullet")
     set(bullet bullet)
-    string(REPLACE "-bullet" "" core ${file})
     if(suffix)
       set(bullet ${JFPX_BULLET_F64_MODULE_NAME})
     endif()
     set(requires "${core} = ${PROJECT_VERSION}, ${bullet} = ${JFPX_BULLET_VERSION}")
+  elseif(file MATCHES "thesis")
+    set(description "${description}: the solver and the particles of the thesis")
+    set(requires "${core} = ${PROJECT_VERSION}")
   elseif(NOT BUILD_SHARED_LIBS)
     string(APPEND libraries " -pthread")
     if(JFPX_HAS_CUDA)

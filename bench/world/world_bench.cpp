@@ -1,10 +1,8 @@
-/// Benchmarks of native steps, of rays, and of the resolver with a tournament tree and a linear
-/// scan.
+/// Benchmarks of native steps, of rays, and of the resolver of Solver::worst_first.
 #include <jfpx/random.hpp>
 
 #include "src/scenes/scenes.hpp"
-#include "src/world/contact_resolver.hpp"
-#include "tests/world/linear_scan.hpp"
+#include "src/thesis/contact_resolver.hpp"
 
 #include <benchmark/benchmark.h>
 
@@ -70,11 +68,9 @@ struct DenseLattice {
   std::vector<Contact> contacts;
 };
 
-template <class Queue>
 void resolve_20000(benchmark::State& state) {
   const DenseLattice lattice;
-  BasicContactResolver<Queue> resolver;
-  // Limited to what the linear scan can do in reasonable time.
+  ContactResolver resolver;
   const ResolverSettings settings{.max_iterations = static_cast<std::uint32_t>(state.range(0))};
   std::uint64_t iterations = 0;
   for (auto _ : state) {
@@ -94,8 +90,7 @@ void resolve_20000(benchmark::State& state) {
 BENCHMARK(step_pile_2048)->Unit(benchmark::kMillisecond);
 BENCHMARK(step_tower_448)->Unit(benchmark::kMillisecond);
 BENCHMARK(cast_ray)->Arg(1000)->Arg(10000)->Arg(100000);
-BENCHMARK(resolve_20000<IndexedPriorityQueue>)->Arg(20000)->Unit(benchmark::kMillisecond);
-BENCHMARK(resolve_20000<test::LinearScan>)->Arg(20000)->Unit(benchmark::kMillisecond);
+BENCHMARK(resolve_20000)->Arg(20000)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace jfpx

@@ -1,4 +1,4 @@
-/// Includes all public headers of jfpx that require neither CUDA nor Bullet.
+/// Includes all public headers of jfpx that require none of CUDA, Bullet and jfpx_thesis.
 #pragma once
 
 #include <jfpx/backend.hpp>
@@ -9,10 +9,8 @@
 #include <jfpx/cost_model.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
-#include <jfpx/intersect.hpp>
 #include <jfpx/joint.hpp>
 #include <jfpx/material.hpp>
-#include <jfpx/particle.hpp>
 #include <jfpx/periodic.hpp>
 #include <jfpx/query.hpp>
 #include <jfpx/random.hpp>

@@ -1,6 +1,8 @@
 /// The bindings of one precision, and the translation of exceptions to the classes of jfpx._errors.
 #include "python/src/bindings.hpp"
 
+#include <jfpx/thesis/worst_first.hpp>
+
 #include <new>
 
 #if defined(JFPX_DOUBLE_PRECISION)
@@ -59,6 +61,7 @@ void register_exceptions() { nb::register_exception_translator(translate); }
 }  // namespace jfpx
 
 void JFPX_BIND(nanobind::module_& module) {
+  jfpx::thesis::enable();
   jfpx::python::register_exceptions();
   jfpx::python::bind_collider(module);
 #if JFPX_HAS_CUDA

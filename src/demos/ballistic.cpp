@@ -1,6 +1,6 @@
 /// Demo ballistic: four weapons fire particles along a range (thesis 3.7), based on Millington's
 /// demo of the same name.
-#include <jfpx/particle.hpp>
+#include <jfpx/thesis/particle.hpp>
 
 #include "src/demos/gunnery.hpp"
 

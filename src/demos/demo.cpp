@@ -2,6 +2,7 @@
 #include "src/demos/demo.hpp"
 
 #include <jfpx/error.hpp>
+#include <jfpx/thesis/worst_first.hpp>
 
 #include "src/demos/makers.hpp"
 
@@ -26,6 +27,7 @@ constexpr Entry kDemos[] = {
 std::span<const Entry> all() { return kDemos; }
 
 std::unique_ptr<Demo> make(std::string_view name, const Options& options) {
+  thesis::enable();
   for (const Entry& entry : kDemos) {
     if (entry.name == name) return entry.make(options);
   }

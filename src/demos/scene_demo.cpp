@@ -1,4 +1,6 @@
 /// Demo of any scene, whose only control is a restart; and the demo boxes-and-balls.
+#include <jfpx/thesis/worst_first.hpp>
+
 #include "src/demos/makers.hpp"
 
 #include <algorithm>
@@ -72,6 +74,7 @@ class SceneDemo final : public Demo {
 }  // namespace
 
 std::unique_ptr<Demo> make(const Scene& scene, const WorldSettings& settings) {
+  thesis::enable();
   return std::make_unique<SceneDemo>(scene, settings, camera_for(scene), 0);
 }
 

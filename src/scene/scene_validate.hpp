@@ -32,15 +32,15 @@ std::string find_range_fault(T BodyDef::*field, const std::type_identity_t<T>& v
   return find_range_fault(def);
 }
 /// Checks of what a range does not describe, with such results.
-std::string find_mass_fault(Real mass);
+JFPX_API std::string find_mass_fault(Real mass);
 std::string find_inertia_fault(const Mat3& inertia);
 /// Checks the inertia of a solid body of a valid shape that can be movable.
 std::string find_inertia_fault(const Shape& shape, Real mass);
 /// The shortest text that converts back to the same value.
-std::string to_text(Real value);
-std::string to_text(const Vec3& v);
-std::string to_text(const Quat& q);
-std::string to_text(const Mat3& m);
+JFPX_API std::string to_text(Real value);
+JFPX_API std::string to_text(const Vec3& v);
+JFPX_API std::string to_text(const Quat& q);
+JFPX_API std::string to_text(const Mat3& m);
 /// The number of an integer or of a value of an enumeration.
 template <class T>
 requires std::is_integral_v<T> || std::is_enum_v<T> std::string to_text(T value) {

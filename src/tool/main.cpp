@@ -1,5 +1,6 @@
 /// The jfpx command.
 #include <jfpx/error.hpp>
+#include <jfpx/thesis/worst_first.hpp>
 
 #include "src/tool/commands.hpp"
 #include "src/tool/interrupts.hpp"
@@ -104,6 +105,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
+    thesis::enable();
     return finish_output(run(argc, argv));
   } catch (const tool::Interrupted& interrupted) {
     // Ends the process by the signal itself, so that the shell sees the reason.

@@ -1,6 +1,7 @@
 /// The program jfpx-view.
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
+#include <jfpx/thesis/worst_first.hpp>
 
 #include "src/tool/precision.hpp"
 #include "src/viewer/app.hpp"
@@ -33,6 +34,7 @@ int fail(const char* what, int status) {
 
 int main(int argc, char** argv) {
   try {
+    thesis::enable();
     return run(argc, argv);
   } catch (const BackendUnavailable& error) {
     return fail(error.what(), tool::kBackendUnavailable);

@@ -1,4 +1,4 @@
-/// Addition, removal, free motion and sleep of bodies.
+/// Addition, removal and waking of bodies.
 #include "src/world/body_store.hpp"
 
 #include <jfpx/error.hpp>
@@ -8,7 +8,6 @@
 #include "src/scene/compound.hpp"
 #include "src/scene/inertia.hpp"
 #include "src/scene/inertia_tensor.hpp"
-#include "src/world/integrate.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -52,10 +51,7 @@ struct PutValue {
 }  // namespace
 
 BodyStore::BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps)
-    : dt_(dt),
-      substep_(dt / static_cast<Real>(substeps)),
-      sleep_(sleep),
-      motion_kept_(kept_per_step(sleep.bias, dt)) {}
+    : dt_(dt), substep_(dt / static_cast<Real>(substeps)), sleep_(sleep) {}
 
 /// Calls visit(array) for the arrays that have an item per slot.
 template <class Visit>
@@ -290,13 +286,6 @@ void BodyStore::update_filters_in_use() noexcept {
   filters_in_use_ = filtered_count_ > 0 || !ignored_.empty() || !joined_.empty();
 }
 
-void BodyStore::displace(std::uint32_t i, const Vec3& shift, const Vec3& rotation) {
-  moving.position[i] += shift;
-  if (rotation == Vec3{}) return;
-  moving.orientation[i] = rotated_by(moving.orientation[i], rotation);
-  refresh_inertia(i);
-}
-
 void BodyStore::apply_force(std::uint32_t i, const Vec3& force) {
   if (!movable(i)) return;
   moving.force[i] += force;
@@ -324,59 +313,10 @@ void BodyStore::wake_by_contact(std::uint32_t sleeper, std::uint32_t awake) {
   moving.rest_time[sleeper] = 0;
 }
 
-void BodyStore::keep_awake(std::uint32_t i) {
-  moving.mean_motion[i] = std::max(moving.mean_motion[i], 2 * sleep_.epsilon);
-}
-
 bool BodyStore::has_moving_kinematic_body() const {
   return kinematic_count_ > 0 && std::ranges::any_of(ids(), [this](BodyId id) {
            return kinematic(id.index) && moving.awake[id.index] != 0;
          });
-}
-
-void BodyStore::integrate() {
-  for (const BodyId id : ids()) {
-    if (moving.awake[id.index] != 0) {
-      kinematic(id.index) ? move(id.index) : integrate(id.index);
-    }
-    moving.force[id.index] = moving.torque[id.index] = {};
-  }
-}
-
-void BodyStore::integrate(std::uint32_t i) {
-  moving.last_acceleration[i] =
-      add_scaled(properties_.acceleration[i], moving.force[i], properties_.inverse_mass[i]);
-  const Vec3 angular_acceleration = moving.inverse_inertia[i] * moving.torque[i];
-  moving.velocity[i] = detail::integrated_velocity(moving.velocity[i], moving.last_acceleration[i],
-                                                   dt_, properties_.velocity_kept[i]);
-  moving.angular_velocity[i] = detail::integrated_velocity(
-      moving.angular_velocity[i], angular_acceleration, dt_, properties_.angular_velocity_kept[i]);
-  if (has_inertia_arrays_ && inertia_.tensor[i](0, 0) > 0) {
-    moving.angular_velocity[i] = detail::precessed(moving.angular_velocity[i], inertia_.tensor[i],
-                                                   to_matrix(moving.orientation[i]), dt_);
-  }
-  if (properties_.can_sleep[i] != 0 && falls_asleep(i)) return;
-  move(i);
-}
-
-void BodyStore::move(std::uint32_t i) {
-  moving.position[i] = detail::integrated_position(moving.position[i], moving.velocity[i], dt_);
-  moving.orientation[i] =
-      detail::integrated_orientation(moving.orientation[i], moving.angular_velocity[i], dt_);
-  refresh_inertia(i);
-}
-
-/// Updates the mean motion and puts the body to sleep if it is small. Must be called before move():
-/// the velocity already contains the gravity of this step, and a body at rest that moved by it
-/// before falling asleep would remain deeper in the ground.
-bool BodyStore::falls_asleep(std::uint32_t i) {
-  moving.mean_motion[i] =
-      detail::mean_motion(moving.mean_motion[i], moving.velocity[i], moving.angular_velocity[i],
-                          motion_kept_, 10 * sleep_.epsilon);
-  if (!(moving.mean_motion[i] < sleep_.epsilon)) return false;
-  moving.awake[i] = 0;
-  moving.velocity[i] = moving.angular_velocity[i] = {};
-  return true;
 }
 
 BodyView BodyStore::view() const {

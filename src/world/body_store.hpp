@@ -22,8 +22,8 @@ class BinaryWriter;
 /// [kg m^2], BodyDef::inertia of the bodies that have one, by body.
 using GivenInertia = std::map<std::uint32_t, Mat3>;
 
-/// Owns the bodies and their ids, and integrates their free motion. The arrays have unused slots,
-/// so loops over the bodies iterate over ids(), which is sorted by index.
+/// Owns the bodies and their ids. The arrays have unused slots, so loops over the bodies iterate
+/// over ids(), which is sorted by index.
 class BodyStore {
  public:
   /// @param dt       [s], length of a step
@@ -65,7 +65,7 @@ class BodyStore {
   /// Whether a body has the index.
   bool lives(std::uint32_t body) const noexcept { return pool_.is_used(body); }
 
-  BodyState state(std::uint32_t body) const;
+  JFPX_API BodyState state(std::uint32_t body) const;
   /// Replaces position, orientation and velocities. Wakes a movable body; makes a kinematic body
   /// awake if it has a velocity; the velocities of an immovable body remain 0.
   void set_state(std::uint32_t body, const BodyState& state);
@@ -78,16 +78,9 @@ class BodyStore {
   /// time to act. Has no effect on a body of mass 0.
   void wake(std::uint32_t body);
   /// Wakes a movable body and sets its mean motion to that of an awake body in contact with it.
-  void wake_by_contact(std::uint32_t sleeper, std::uint32_t awake);
-  /// Raises the mean motion of an awake body to at least twice the sleep epsilon.
-  void keep_awake(std::uint32_t body);
-
-  /// Translates and rotates a body, and does not change its velocities.
-  void displace(std::uint32_t body, const Vec3& shift, const Vec3& rotation);
-
-  /// Advances all awake bodies by one step of free motion, puts bodies at rest to sleep, and clears
-  /// the accumulated forces and torques.
-  void integrate();
+  JFPX_API void wake_by_contact(std::uint32_t sleeper, std::uint32_t awake);
+  /// Must be called after a change of the orientation in `moving`.
+  JFPX_API void refresh_inertia(std::uint32_t body);
 
   /// Replaces the mass of a movable body, and its inertia unless that was given. @param mass > 0
   void set_mass(std::uint32_t body, Real mass);
@@ -136,16 +129,16 @@ class BodyStore {
                                 !ignored_.contains({a, b}) && !joined_.contains({a, b}));
   }
   /// Pointers to the arrays. Valid until a body is added or removed, or the ignored pairs change.
-  BodyView view() const;
+  JFPX_API BodyView view() const;
   /// The same without the sorted list of ids, which takes a pass over all slots after a change.
-  BodyView view_without_ids() const;
+  JFPX_API BodyView view_without_ids() const;
   MotionPointers motion_pointers();
 
   bool movable(std::uint32_t body) const { return properties_.inverse_mass[body] > 0; }
   bool immovable(std::uint32_t body) const { return !movable(body) && !kinematic(body); }
   bool kinematic(std::uint32_t body) const { return properties_.kinematic[body] != 0; }
   /// Whether a kinematic body is in motion.
-  bool has_moving_kinematic_body() const;
+  JFPX_API bool has_moving_kinematic_body() const;
   const Shape& shape(std::uint32_t body) const { return host_.shape[body]; }
   Real mass(std::uint32_t body) const { return host_.mass[body]; }
   Real inverse_mass(std::uint32_t body) const { return properties_.inverse_mass[body]; }
@@ -181,15 +174,10 @@ class BodyStore {
   void read_bodies(BinaryReader* reader, const std::vector<bool>& is_free);
   void read_pairs(BinaryReader* reader);
   void check_body(std::uint32_t body) const;
-  void integrate(std::uint32_t body);
-  void move(std::uint32_t body);
-  bool falls_asleep(std::uint32_t body);
-  void refresh_inertia(std::uint32_t body);
   void update_filters_in_use() noexcept;
 
   Real dt_, substep_;
   SleepSettings sleep_;
-  Real motion_kept_;  ///< SleepSettings::bias^dt: weight of the previous mean motion
 
   PropertyColumns<ArrayColumn> properties_;
   HostArrays host_;

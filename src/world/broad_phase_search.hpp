@@ -4,41 +4,54 @@
 #include <jfpx/world.hpp>
 
 #include "src/world/neighbor_list.hpp"
-#include "src/world/sphere_hierarchy.hpp"
+
+#include <memory>
+#include <span>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Searches as BroadPhase selects. The collider tests every pair in all of them, so the contacts,
-/// their bits and their order are the same.
+/// Interface of the searches that BroadPhase selects. The collider tests every pair in all of them,
+/// so the contacts, their bits and their order are the same.
 class BroadPhaseSearch {
  public:
   /// @param collider not null
-  /// @throws InvalidArgument if `broad_phase` is not a value of the enumeration
-  BroadPhaseSearch(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase);
+  explicit BroadPhaseSearch(std::unique_ptr<SphereCollider> collider)
+      : collider_(std::move(collider)) {}
+  virtual ~BroadPhaseSearch() = default;
 
   /// Must be called after the number of spheres, or the body that a sphere belongs to, has changed.
-  void set_spheres(std::span<const SphereInstance> spheres);
+  virtual void set_spheres(std::span<const SphereInstance> spheres) = 0;
   /// All touching pairs, sorted. Valid until the next call.
   /// @throws the exceptions of SphereCollider::find_contacts() and find_touching()
-  ContactSpan find(std::span<const SphereInstance> spheres);
+  virtual ContactSpan find(std::span<const SphereInstance> spheres) = 0;
   /// The pairs of find() as indices alone, perhaps among others. Takes less time if the spheres
   /// have moved little since the last call. Valid until the next call of either function.
   /// @throws as find()
-  NearPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool);
+  virtual NearPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool) = 0;
 
-  const SphereCollider& collider() const noexcept { return *collider_; }
+  SphereCollider& collider() const noexcept { return *collider_; }
 
  private:
-  void test_every_pair(std::span<const SphereInstance> spheres);
-  void add_touching(std::span<const SphereInstance> spheres);
-
   std::unique_ptr<SphereCollider> collider_;
-  BroadPhase broad_phase_;
-  SphereHierarchy hierarchy_;
+};
+
+/// BroadPhase::cells: the collider's own search.
+class CellSearch final : public BroadPhaseSearch {
+ public:
+  using BroadPhaseSearch::BroadPhaseSearch;
+  void set_spheres(std::span<const SphereInstance>) override {}
+  ContactSpan find(std::span<const SphereInstance> spheres) override {
+    neighbors_.clear();
+    return collider().find_contacts(spheres);
+  }
+  NearPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool) override {
+    return neighbors_.find(spheres, &collider(), pool);
+  }
+
+ private:
   NeighborList neighbors_;
-  std::vector<SpherePair> pairs_;
-  std::vector<SphereContact> contacts_;
 };
 
 }  // namespace JFPX_ABI

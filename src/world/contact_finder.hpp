@@ -22,22 +22,18 @@ inline namespace JFPX_ABI {
 /// two bodies of mass 0, and of pairs that BodyStore::may_collide() excludes, are discarded.
 class ContactFinder {
  public:
-  ContactFinder(std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase);
+  /// @param broad_phase not null
+  explicit ContactFinder(std::unique_ptr<BroadPhaseSearch> broad_phase)
+      : broad_phase_(std::move(broad_phase)) {}
 
   /// Must be called after a body was added or removed, or got another state by set_state().
   void set_bodies(const BodyStore& bodies);
 
-  /// Finds the contacts of the current poses: those of two spheres, then all others, both sorted by
-  /// (a.index, b.index), then by the sub-shapes of a and of b. Contact defines which body is a.
-  /// Friction and restitution are left 0.
-  /// @param contacts empty; receives the contacts
-  /// @returns the number of contacts of two spheres
-  /// @throws the exceptions of SphereCollider::find_contacts()
-  std::uint64_t find_contacts(const BodyStore& bodies, std::vector<Contact>* contacts);
-
-  /// Finds the contacts of the current poses, as find_contacts() does, and all pairs that may touch
-  /// during the step: those that are closer than a margin, and those that meet at their velocities.
-  /// Forces of the step must have been added up.
+  /// Finds the contacts of the current poses, and all pairs that may touch during the step: those
+  /// that are closer than a margin, and those that meet at their velocities. Contacts of two
+  /// spheres precede all others; both are sorted by (a.index, b.index), then by the sub-shapes of a
+  /// and of b. Contact defines which body is a. Friction and restitution are left 0. Forces of the
+  /// step must have been added up.
   /// @param margin   [m], >= 0: SoftStepSettings::speculative_margin
   /// @param near     receives all pairs, each list sorted by key
   /// @param detected receives the contacts with distance <= 0 that are not in near->spheres
@@ -47,18 +43,21 @@ class ContactFinder {
                                  soft_step::ContactSet* near, DetectedContacts* detected);
 
   SubShapeTable& sub_shapes() noexcept { return sub_shapes_; }
-  const SphereCollider& collider() const noexcept { return broad_phase_.collider(); }
+  BroadPhaseSearch& broad_phase() noexcept { return *broad_phase_; }
+  const SphereCollider& collider() const noexcept { return broad_phase_->collider(); }
+
+  // Parts of a search among the current poses, without margin and motion.
+
+  using SubShape = SubShapeTable::SubShape;
+  /// Makes bounds of the sub-shapes where they are, for find_fixed_pairs(). Poses must be updated.
+  JFPX_API const NearBounds& enclose_bounds(const BodyStore& bodies);
+  /// Appends the pairs of a movable sub-shape and a wall, or a solid of mass 0 that is no sphere,
+  /// whose bounds touch; sorted for each sub-shape.
+  /// @param first,last range of movable sub-shapes
+  JFPX_API void find_fixed_pairs(SubShape first, SubShape last,
+                                 std::vector<Candidate>* candidates) const;
 
  private:
-  using SubShape = SubShapeTable::SubShape;
-  /// Two spheres that touch, sortable by body and sub-shape.
-  struct SphereHit {
-    Candidate pair;
-    std::uint64_t index = 0;  ///< in the contacts that the collider returned
-    friend auto operator<=>(const SphereHit&, const SphereHit&) = default;
-  };
-
-  void find_sphere_pairs(const BodyStore& bodies, std::vector<Contact>* contacts);
   /// Results of a chunk of a parallel loop.
   struct Part {
     std::vector<soft_step::SphereContactInput> spheres;
@@ -82,10 +81,8 @@ class ContactFinder {
   template <class Sweep>
   void sweep_fixed(const Sweep& sweep);
   void sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool);
-  void enclose_bounds(const BodyStore& bodies);
   void test_sphere_pairs(const BodyStore& bodies, std::span<const SpherePair> pairs,
                          Part* part) const;
-  void find_fixed_pairs(SubShape first, SubShape last, std::vector<Candidate>* candidates) const;
   struct Results;
   void test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
                        Results* results, ThreadPool* pool);
@@ -93,9 +90,8 @@ class ContactFinder {
   void for_each_batch(ThreadPool* pool, std::size_t count, std::size_t chunk, const Find& find,
                       const AppendAll& append_all);
 
-  BroadPhaseSearch broad_phase_;
+  std::unique_ptr<BroadPhaseSearch> broad_phase_;
   SubShapeTable sub_shapes_;
-  std::vector<SphereHit> hits_;
   std::vector<Candidate> candidates_;
   FixedTrees fixed_trees_;
   bool fixed_changed_ = true;          ///< whether `swept_` and the trees lack solids of mass 0

@@ -53,8 +53,8 @@ struct MetCounts {
 MetCounts count_met_contacts(const soft_step::ContactView& contacts, ThreadPool* pool);
 
 /// Sets the fields of detected contacts that follow from the properties of their bodies.
-void set_materials(const BodiesOfStep& bodies, const MaterialSettings& rules, ThreadPool* pool,
-                   std::vector<Contact>* contacts);
+JFPX_API void set_materials(const BodiesOfStep& bodies, const MaterialSettings& rules,
+                            ThreadPool* pool, std::vector<Contact>* contacts);
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -22,7 +22,7 @@ class IgnoredPairs {
   void erase(const BodyPair& pair) noexcept;
   /// Erases all pairs of a body.
   void erase_body(std::uint32_t body) noexcept;
-  bool contains(const BodyPair& pair) const noexcept;
+  JFPX_API bool contains(const BodyPair& pair) const noexcept;
   bool empty() const noexcept { return keys_.empty(); }
   /// By pair: the lower index in the upper half, the higher one in the lower half; sorted.
   std::span<const std::uint64_t> keys() const noexcept { return keys_; }

@@ -1,4 +1,4 @@
-/// Integration of one rigid body over one step, and its mean motion (thesis 4.4.2).
+/// Integration of one rigid body over one step (thesis 4.4.2).
 #pragma once
 
 #include <jfpx/math.hpp>
@@ -47,15 +47,6 @@ JFPX_HD inline Vec3 precessed(const Vec3& angular_velocity, const Mat3& inertia,
   const Vec3 w = transform_transpose(axes, angular_velocity);
   Vec3 change;
   return gyroscopic_change(w, inertia, dt, &change) ? axes * (w + change) : angular_velocity;
-}
-
-/// Recency-weighted mean of v.v + w.w. `kept` is bias^dt. The cap bounds the time that a fast body
-/// stays awake after it has stopped.
-JFPX_HD constexpr Real mean_motion(Real mean, const Vec3& velocity, const Vec3& angular_velocity,
-                                   Real kept, Real cap) {
-  const Real now = length_squared(velocity) + length_squared(angular_velocity);
-  const Real next = kept * mean + (1 - kept) * now;
-  return next > cap ? cap : next;
 }
 
 }  // namespace detail

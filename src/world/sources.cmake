@@ -2,12 +2,10 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/automatic_device.cpp
   ${CMAKE_CURRENT_LIST_DIR}/body_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/body_store.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/broad_phase_search.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_events.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_finder.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_list.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/contact_resolver.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contact_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts_by_body.cpp
   ${CMAKE_CURRENT_LIST_DIR}/device_world.cpp
@@ -17,26 +15,20 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/force_table.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces.cpp
   ${CMAKE_CURRENT_LIST_DIR}/ignored_pairs.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/indexed_priority_queue.cpp
   ${CMAKE_CURRENT_LIST_DIR}/islands.cpp
   ${CMAKE_CURRENT_LIST_DIR}/joint_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/joint_store.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/near_contacts.cpp
   ${CMAKE_CURRENT_LIST_DIR}/neighbor_list.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/particle_resolver.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/particle_store.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/particle_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/query_tree.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recorded_calls.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recorded_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording.cpp
   ${CMAKE_CURRENT_LIST_DIR}/snapshot_file.cpp
   ${CMAKE_CURRENT_LIST_DIR}/soft_step.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/sphere_hierarchy.cpp
   ${CMAKE_CURRENT_LIST_DIR}/state_hash.cpp
   ${CMAKE_CURRENT_LIST_DIR}/step_view.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sub_shape_table.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/wake_propagation.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/thesis_table.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_access.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_joints.cpp

@@ -23,10 +23,10 @@ class SubShapeTable {
   void set_bodies(const BodyStore& bodies, std::span<const BodyId> ids);
   /// Updates the poses of all sub-shapes from their bodies, except immovable solids and walls.
   /// @param pool null: in the calling thread
-  void update_poses(const BodyStore& bodies, ThreadPool* pool = nullptr);
+  JFPX_API void update_poses(const BodyStore& bodies, ThreadPool* pool = nullptr);
 
   /// Valid until set_bodies().
-  SubShapeView view();
+  JFPX_API SubShapeView view();
   const SubShapeRanges& ranges() const { return ranges_; }
   /// Bounding spheres of all spheres and of the other solids of movable bodies.
   std::span<const SphereInstance> bounds() const { return {bounds_.data(), ranges_.fixed_begin()}; }

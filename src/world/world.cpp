@@ -1,4 +1,4 @@
-/// The step of a world, with either solver.
+/// The step of a world.
 #include <jfpx/error.hpp>
 
 #include "src/base/parallel_for.hpp"
@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <iterator>
 #include <new>
 #include <optional>
 #include <utility>
@@ -38,24 +37,7 @@ void copy_array(ThreadPool* pool, const std::vector<Item>& array, std::vector<It
   });
 }
 
-/// The first body that is_in_world() refuses.
-std::optional<BodyId> find_runaway(const BodyStore& store) {
-  for (const BodyId id : store.ids()) {
-    if (!is_in_world(store.state(id.index))) return id;
-  }
-  return std::nullopt;
-}
-
 }  // namespace
-
-/// The contacts that wake bodies and are resolved: all but those of sensors, in the same order.
-std::span<const Contact> World::Impl::contacts_to_resolve() {
-  const std::vector<Contact>& all = contact_list().contacts;
-  if (!store.has_sensors()) return all;
-  resolved.clear();
-  std::ranges::copy_if(all, std::back_inserter(resolved), std::logical_not(), &Contact::sensor);
-  return resolved;
-}
 
 /// Whether no body has run away. @param runaway the first one that has
 bool World::Impl::all_finite(const std::optional<BodyId>& runaway, StepReport* report) {
@@ -64,31 +46,23 @@ bool World::Impl::all_finite(const std::optional<BodyId>& runaway, StepReport* r
   return !runaway;
 }
 
-/// Detects the contacts of the current poses and calls the contact generators.
-void World::Impl::find_contacts(StepReport* report) {
+/// Prepares for the contacts of a step: those of the last one become those of the step before.
+void World::Impl::start_detection() {
   if (bodies_changed) contact_finder.set_bodies(store);
   bodies_changed = false;
   std::swap(contacts, contacts_before);
   std::swap(detected, detected_before);
   contacts.invalidate();
   contacts_are_new = true;
-  if (scene.solver == Solver::soft_step) {
-    find_soft_step_contacts(report);
-  } else {
-    contacts.get([&](ContactList* list) {
-      list->contacts.clear();
-      report->sphere_contacts = contact_finder.find_contacts(store, &list->contacts);
-      report->contacts = list->detected = list->contacts.size();
-      set_materials(BodiesOfStep(store), scene.materials, pool.get(), &list->contacts);
-      call_generators(&list->contacts, report);
-    });
-  }
+}
+
+void World::Impl::finish_detection(StepReport* report) {
   // Copying the string may throw; at this point the step can still be undone.
   report->device_failure = contact_finder.collider().device_failure();
 }
 
 /// Detection of Solver::soft_step. The list of contacts is made only if generators may read it.
-void World::Impl::find_soft_step_contacts(StepReport* report) {
+void World::Impl::find_contacts(StepReport* report) {
   soft_step::ContactSet& near = soft_step.contacts();
   const std::size_t spheres = contact_finder.find_near_contacts(
       store, scene.soft_step.speculative_margin, pool.get(), &near, &detected);
@@ -134,7 +108,7 @@ bool World::Impl::advance(StepReport* report) {
   if (resident) leave_device();
   const std::string failure = report->device_failure;
   const bool completed =
-      scene.solver == Solver::soft_step ? advance_soft_step(report) : advance_worst_first(report);
+      worst_first == nullptr ? advance_soft_step(report) : worst_first->advance(this, report);
   if (!failure.empty()) report->device_failure = failure;
   return completed;
 }
@@ -146,7 +120,9 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   ForceContext context(store, time());
   forces.call(context);
   const double forces_ms = watch.lap_ms();
+  start_detection();
   find_contacts(report);
+  finish_detection(report);
   soft_step.add_generated(store, detected.generated);
   const double detect_ms = watch.lap_ms();
   if (!all_finite(soft_step.solve(&store, joints.view()), report)) return false;
@@ -156,32 +132,6 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   soft_step.commit(&store);
   joints.commit();
   report->integrate_ms = forces_ms;
-  report->detect_ms = detect_ms;
-  report->resolve_ms = watch.lap_ms();
-  return true;
-}
-
-/// Integration, then detection, then resolution (thesis 4.3).
-bool World::Impl::advance_worst_first(StepReport* report) {
-  Stopwatch watch;
-  ForceContext context(store, time());
-  forces.call(context);
-  store.integrate();
-  if (!all_finite(find_runaway(store), report)) return false;
-
-  const double integrate_ms = watch.lap_ms();
-  find_contacts(report);
-
-  const double detect_ms = watch.lap_ms();
-  const std::span<const Contact> active = contacts_to_resolve();
-  propagate_waking(active, &store);
-  const ResolverReport resolution =
-      resolver.resolve(store, active, scene.resolver, report->generated_contacts);
-  report->position_iterations = resolution.position_iterations;
-  report->velocity_iterations = resolution.velocity_iterations;
-  report->iterations_exhausted = resolution.exhausted;
-  if (!all_finite(find_runaway(store), report)) return false;
-  report->integrate_ms = integrate_ms;
   report->detect_ms = detect_ms;
   report->resolve_ms = watch.lap_ms();
   return true;

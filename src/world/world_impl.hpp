@@ -10,14 +10,13 @@
 #include "src/world/contact_events.hpp"
 #include "src/world/contact_finder.hpp"
 #include "src/world/contact_list.hpp"
-#include "src/world/contact_resolver.hpp"
 #include "src/world/contacts_by_body.hpp"
 #include "src/world/device_world.hpp"
 #include "src/world/force_snapshot.hpp"
 #include "src/world/joint_store.hpp"
 #include "src/world/query_tree.hpp"
 #include "src/world/soft_step.hpp"
-#include "src/world/wake_propagation.hpp"
+#include "src/world/thesis_table.hpp"
 
 #include <atomic>
 #include <mutex>
@@ -35,8 +34,9 @@ struct World::Impl {
       : pool(std::move(threads)),
         scene(settings_of(given)),
         store(empty_store(given)),
-        contact_finder(std::move(collider), broad_phase),
-        soft_step(given.soft_step, given.materials, given.dt, pool.get(), simd) {
+        contact_finder(make_broad_phase(std::move(collider), broad_phase)),
+        soft_step(given.soft_step, given.materials, given.dt, pool.get(), simd),
+        worst_first(make_worst_first_step(given)) {
     store.reserve(given.bodies.size());
     for (const BodyDef& def : given.bodies) store.add(def);
     // A body of the scene has the index of its slot.
@@ -221,8 +221,6 @@ struct World::Impl {
     query_tree.invalidate();
   }
 
-  std::span<const Contact> contacts_to_resolve();
-
   /// The tree of the bodies for queries. @throws as QueryTree::build()
   const QueryTree& tree_of(const BodyStore& bodies) const {
     return query_tree.get([&bodies](QueryTree* tree) { tree->build(bodies); });
@@ -240,7 +238,6 @@ struct World::Impl {
   void report_backend(StepReport* report) const;
   bool advance(StepReport* report);
   bool advance_soft_step(StepReport* report);
-  bool advance_worst_first(StepReport* report);
   void choose_device(StepReport* report);
   bool advance_on_device(StepReport* report);
   bool step_on_device(StepReport* report);
@@ -249,8 +246,9 @@ struct World::Impl {
   static void fill_report(const DeviceWorld::Result& result, StepReport* report);
   void apply_forces_on_host();
   static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
+  void start_detection();
   void find_contacts(StepReport* report);
-  void find_soft_step_contacts(StepReport* report);
+  void finish_detection(StepReport* report);
   void call_generators(std::vector<Contact>* list, StepReport* report);
   std::uint32_t count_awake() const;
   void save_for_undo();
@@ -265,9 +263,8 @@ struct World::Impl {
   BodyStore store;
   JointStore joints;  ///< while `resident`, what they keep may be older than on the device
   ContactFinder contact_finder;
-  SoftStep soft_step;                ///< of Solver::soft_step
-  WakePropagation propagate_waking;  ///< of Solver::worst_first, like the resolver
-  ContactResolver resolver;
+  SoftStep soft_step;                           ///< of Solver::soft_step
+  std::unique_ptr<WorstFirstStep> worst_first;  ///< of Solver::worst_first; otherwise null
   CallbackRegistry<ForceContext, ForceId> forces{"force"};
   CallbackRegistry<ContactContext, ContactGeneratorId> generators{"contact generator"};
   bool bodies_changed = true;  ///< whether contact_finder.set_bodies() must be called
@@ -277,7 +274,6 @@ struct World::Impl {
   DetectedContacts detected, detected_before;  ///< of the same steps, unless on a device
   ContactListMaker list_maker{pool.get()};
   ContactsByBody contacts_by_body;  ///< of `contacts`
-  std::vector<Contact> resolved;    ///< during a step with sensors: the contacts of other bodies
   bool contacts_are_new = false;    ///< whether the contacts of both steps have been swapped
   /// Whether World::contacts() returns `contacts`; false after a body was added or removed, or a
   /// step undone.
@@ -326,12 +322,6 @@ struct World::Impl {
   StepReport queue_report;          ///< of the last step of a queue
   bool is_finishing = false;        ///< guarded by `finishing`
   std::recursive_mutex finishing;   ///< held by finish_queue(), whose steps call finish() again
-};
-
-/// Access to the members of a World, for tests, cuda::device_states() and the Python package.
-struct WorldAccess {
-  using Impl = World::Impl;
-  static Impl& impl(World& world) { return *world.impl_; }
 };
 
 }  // namespace JFPX_ABI

@@ -47,10 +47,12 @@ void World::Impl::read(BinaryReader* reader) {
   BinaryReader::require(new_joints.empty() || settings.solver == Solver::soft_step,
                         "it has joints, and the solver worst_first");
 
+  auto new_worst_first = make_worst_first_step(settings);
   soft_step.reserve(bodies.capacity());
 
   // From here on, nothing throws.
   scene = std::move(settings);
+  worst_first = std::move(new_worst_first);
   drop_queue();
   forget_device();
   steps_at_rest = 0;

@@ -1,7 +1,7 @@
 /// Pair tests of src/collide on the device: they compile with nvcc, and give the same bits as on
 /// the host.
-#include <jfpx/intersect.hpp>
 #include <jfpx/random.hpp>
+#include <jfpx/thesis/intersect.hpp>
 
 #include "src/collide/bounding_sphere.hpp"
 #include "src/collide/box_pair.hpp"

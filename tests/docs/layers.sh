@@ -11,11 +11,12 @@ declare -A allowed=(
   [sphere_collider]="base collide scene"
   [contact_solver]="base collide scene sphere_collider"
   [world]="base collide scene sphere_collider contact_solver"
+  [thesis]="base collide scene sphere_collider contact_solver world"
   [bullet]="base collide scene sphere_collider contact_solver"
   [scenes]=""
   [demos]="base scenes"
-  [tool]="base collide scene sphere_collider contact_solver world bullet scenes demos"
-  [viewer]="base collide scene sphere_collider contact_solver world bullet scenes demos tool"
+  [tool]="base collide scene sphere_collider contact_solver world thesis bullet scenes demos"
+  [viewer]="base collide scene sphere_collider contact_solver world thesis bullet scenes demos tool"
 )
 # SceneWorld integrates kinematic bodies with the code of the native world.
 exceptions="bullet/world/scene_world.cpp->world"

@@ -1,4 +1,4 @@
-jfpx_add_test(scene_test SOURCES
+jfpx_add_test(scene_test THESIS SOURCES
   scene/inertia_test.cpp
   scene/scene_test.cpp)
 jfpx_add_test(scene_parts_test INTERNAL SOURCES

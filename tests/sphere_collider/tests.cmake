@@ -20,7 +20,7 @@ if(JFPX_HAS_BULLET)
   set(bullet_takeover sphere_collider/bullet_takeover_test.cpp)
   set(bullet_library jfpx_bullet)
 endif()
-jfpx_add_test(automatic_test INTERNAL
+jfpx_add_test(automatic_test THESIS INTERNAL
   SOURCES
     sphere_collider/automatic_sphere_collider_test.cpp
     sphere_collider/cost_model_test.cpp

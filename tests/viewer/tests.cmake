@@ -1,17 +1,17 @@
-jfpx_add_test(controls_test SINGLE SOURCES
+jfpx_add_test(controls_test THESIS SINGLE SOURCES
   viewer/controls_test.cpp
   viewer/player_test.cpp
   viewer/scene_painter_test.cpp
   LINK jfpx_viewer)
-jfpx_add_test(demo_viewer_test SINGLE SOURCES viewer/demo_viewer_test.cpp LINK jfpx_viewer)
-jfpx_add_test(device_viewer_test INTERNAL SINGLE SOURCES viewer/device_viewer_test.cpp LINK jfpx_viewer)
-jfpx_add_test(interactive_test SINGLE SOURCES viewer/interactive_test.cpp LINK jfpx_viewer)
-jfpx_add_test(panel_test SINGLE SOURCES
+jfpx_add_test(demo_viewer_test THESIS SINGLE SOURCES viewer/demo_viewer_test.cpp LINK jfpx_viewer)
+jfpx_add_test(device_viewer_test THESIS INTERNAL SINGLE SOURCES viewer/device_viewer_test.cpp LINK jfpx_viewer)
+jfpx_add_test(interactive_test THESIS SINGLE SOURCES viewer/interactive_test.cpp LINK jfpx_viewer)
+jfpx_add_test(panel_test THESIS SINGLE SOURCES
   viewer/panel_test.cpp
   viewer/dense_screen_test.cpp
   viewer/user.cpp
   LINK jfpx_viewer)
-jfpx_add_test(renderer_test SINGLE SOURCES viewer/renderer_test.cpp LINK jfpx_viewer)
+jfpx_add_test(renderer_test THESIS SINGLE SOURCES viewer/renderer_test.cpp LINK jfpx_viewer)
 foreach(suffix IN ITEMS "" "_f64")
   target_compile_definitions(demo_viewer_test${suffix} PRIVATE
     JFPX_INPUT_FOLDER="${PROJECT_SOURCE_DIR}/src/demos/inputs")

@@ -1,6 +1,6 @@
 /// Tests that warm steps allocate nothing, and of the memory of a world. A separate program,
 /// because it replaces operator new.
-#include <jfpx/particle.hpp>
+#include <jfpx/thesis/particle.hpp>
 
 #include "src/scenes/scenes.hpp"
 #include "tests/world/support.hpp"

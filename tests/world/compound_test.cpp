@@ -6,7 +6,8 @@
 #include "src/collide/shapes.hpp"
 #include "src/scene/inertia.hpp"
 #include "src/scene/principal_inertia.hpp"
-#include "src/world/contact_finder.hpp"
+#include "src/thesis/contact_search.hpp"
+#include "src/world/thesis_table.hpp"
 #include "tests/collide/contact_oracle.hpp"
 #include "tests/world/random_bodies.hpp"
 
@@ -44,10 +45,10 @@ Compound angle_iron() {
 }
 
 std::vector<Contact> find_contacts(const BodyStore& bodies, std::uint64_t* sphere_contacts) {
-  ContactFinder contact_finder(make_sphere_collider(), BroadPhase::cells);
+  ContactFinder contact_finder(make_broad_phase(make_sphere_collider(), BroadPhase::cells));
   contact_finder.set_bodies(bodies);
   std::vector<Contact> contacts;
-  *sphere_contacts = contact_finder.find_contacts(bodies, &contacts);
+  *sphere_contacts = thesis::ContactSearch().find_contacts(bodies, &contact_finder, &contacts);
   return contacts;
 }
 

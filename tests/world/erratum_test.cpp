@@ -1,7 +1,7 @@
 /// Tests of errata that concern several parts of the engine; the tests of a part contain its own.
 #include <jfpx/collide.hpp>
 #include <jfpx/error.hpp>
-#include <jfpx/particle.hpp>
+#include <jfpx/thesis/particle.hpp>
 
 #include "src/scenes/scenes.hpp"
 #include "tests/world/support.hpp"

@@ -1,8 +1,8 @@
 /// Tests with every allocation failing once, in steps, additions, reading and writing: the failure
 /// is an error, the state is unchanged, nothing leaks, and later results have the same bits.
 #include <jfpx/error.hpp>
-#include <jfpx/particle.hpp>
 #include <jfpx/recording.hpp>
+#include <jfpx/thesis/particle.hpp>
 
 #include "tests/support/failing_new.hpp"
 #include "tests/support/temporary_folder.hpp"

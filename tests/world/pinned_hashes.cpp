@@ -3,6 +3,7 @@
 /// without a test framework, so that flavours/ can build it quickly in many ways. The arguments are
 /// numbers of threads, used one after the other; the default is 1.
 #include <jfpx/random.hpp>
+#include <jfpx/thesis/worst_first.hpp>
 #include <jfpx/world.hpp>
 
 #include "src/base/hash64.hpp"
@@ -149,6 +150,7 @@ bool check(const DemoPin& pin) {
 }  // namespace jfpx
 
 int main(int count, char** arguments) {
+  jfpx::thesis::enable();
   bool all = true;
   for (int i = 1; i < count || i == 1; ++i) {
     const unsigned long threads = i < count ? std::strtoul(arguments[i], nullptr, 10) : 1;

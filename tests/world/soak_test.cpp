@@ -2,7 +2,7 @@
 /// the memory use stays constant.
 #include "tests/support/soak.hpp"
 
-#include <jfpx/particle.hpp>
+#include <jfpx/thesis/particle.hpp>
 
 #include "tests/world/bouncing_bodies.hpp"
 

@@ -1,18 +1,15 @@
-jfpx_add_test(world_parts_test INTERNAL SOURCES
+jfpx_add_test(world_parts_test THESIS INTERNAL SOURCES
   world/body_store_test.cpp
-  world/broad_phase_test.cpp
   world/compound_test.cpp
-  world/contact_resolver_test.cpp
   world/fixed_trees_test.cpp
-  world/indexed_priority_queue_test.cpp
   world/neighbor_list_test.cpp
   world/query_tree_test.cpp)
-jfpx_add_test(device_world_test INTERNAL SOURCES world/device_world_test.cpp)
+jfpx_add_test(device_world_test THESIS INTERNAL SOURCES world/device_world_test.cpp)
 if(JFPX_HAS_CUDA)
   set(cuda_runtime CUDA::cudart_static)
 endif()
 # Compiling the programs of the device for the host takes most of the time, so these two share them.
-jfpx_add_test(device_states_test INTERNAL
+jfpx_add_test(device_states_test THESIS INTERNAL
   SOURCES
     world/automatic_device_test.cpp
     world/device_states_test.cpp
@@ -26,7 +23,7 @@ endforeach()
 if(JFPX_HAS_CUDA)
   jfpx_add_test(device_fault_test INTERNAL SOURCES world/device_fault_test.cpp LINK jfpx_cuda CUDA::cudart_static)
 endif()
-jfpx_add_test(world_test SOURCES
+jfpx_add_test(world_test THESIS SOURCES
   world/box_test.cpp
   world/buoyancy_test.cpp
   world/capsule_world_test.cpp
@@ -41,7 +38,6 @@ jfpx_add_test(world_test SOURCES
   world/kinematic_test.cpp
   world/mixed_test.cpp
   world/motion_test.cpp
-  world/particle_test.cpp
   world/property_test.cpp
   world/query_test.cpp
   world/recorded_world_test.cpp
@@ -51,21 +47,21 @@ jfpx_add_test(world_test SOURCES
   world/snapshot_test.cpp
   world/vector_width_test.cpp
   world/world_test.cpp)
-jfpx_add_test(portable_files_test SOURCES world/portable_files_test.cpp)
+jfpx_add_test(portable_files_test THESIS SOURCES world/portable_files_test.cpp)
 set_source_files_properties(world/portable_files_test.cpp PROPERTIES
   COMPILE_DEFINITIONS "JFPX_FILES=\"${CMAKE_CURRENT_SOURCE_DIR}/world/files/\"")
-jfpx_add_test(quality_test SOURCES
+jfpx_add_test(quality_test THESIS SOURCES
   world/equilibrium_test.cpp
   world/friction_test.cpp
   world/heap_test.cpp
   world/impact_test.cpp
   world/oracle_test.cpp
   world/stack_test.cpp)
-jfpx_add_test(concurrency_test SOURCES world/concurrency_test.cpp)
-jfpx_add_test(soak_test SOURCES world/soak_test.cpp)
+jfpx_add_test(concurrency_test THESIS SOURCES world/concurrency_test.cpp)
+jfpx_add_test(soak_test THESIS SOURCES world/soak_test.cpp)
 # These replace operator new: programs of their own.
-jfpx_add_test(allocation_test SOURCES world/allocation_test.cpp)
-jfpx_add_test(out_of_memory_test SOURCES
+jfpx_add_test(allocation_test THESIS SOURCES world/allocation_test.cpp)
+jfpx_add_test(out_of_memory_test THESIS SOURCES
   support/failing_new.cpp
   world/out_of_memory_test.cpp)
 

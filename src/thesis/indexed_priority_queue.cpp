@@ -1,5 +1,5 @@
 /// Construction of the tournament tree and comparison of the children of a node.
-#include "src/world/indexed_priority_queue.hpp"
+#include "src/thesis/indexed_priority_queue.hpp"
 
 #include <array>
 #include <bit>

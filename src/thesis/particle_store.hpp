@@ -1,7 +1,7 @@
 /// Storage of a world's particles: one array per quantity, indexed by ParticleId::index.
 #pragma once
 
-#include <jfpx/particle.hpp>
+#include <jfpx/thesis/particle.hpp>
 
 #include "src/world/id_pool.hpp"
 

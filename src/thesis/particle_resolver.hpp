@@ -1,8 +1,8 @@
 /// Contact resolver of particles: the two loops of the thesis (4.4.6) without rotation.
 #pragma once
 
-#include "src/world/indexed_priority_queue.hpp"
-#include "src/world/particle_store.hpp"
+#include "src/thesis/indexed_priority_queue.hpp"
+#include "src/thesis/particle_store.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {

@@ -3,8 +3,10 @@
 
 #include "src/collide/bounding_sphere.hpp"
 #include "src/collide/sphere_pair.hpp"
-#include "src/world/contact_finder.hpp"
-#include "src/world/sphere_hierarchy.hpp"
+#include "src/thesis/contact_search.hpp"
+#include "src/thesis/free_motion.hpp"
+#include "src/thesis/sphere_hierarchy.hpp"
+#include "src/world/thesis_table.hpp"
 #include "tests/collide/contact_oracle.hpp"
 #include "tests/world/random_bodies.hpp"
 
@@ -227,7 +229,7 @@ TEST(BroadPhase, AllWaysFindTheSameContactsThroughInsertionsAndRemovals) {
     std::vector<ContactFinder> ways;
     for (const BroadPhase way :
          {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {
-      ways.emplace_back(make_sphere_collider(), way);
+      ways.emplace_back(make_broad_phase(make_sphere_collider(), way));
     }
     for (int change = 0; change < 40; ++change) {
       const bool remove = bodies.ids().size() > 2 && random.below(3) == 0;
@@ -241,13 +243,14 @@ TEST(BroadPhase, AllWaysFindTheSameContactsThroughInsertionsAndRemovals) {
       for (int move = 0; move < 3; ++move) {
         for (const BodyId id : bodies.ids()) {
           if (!bodies.movable(id.index)) continue;
-          bodies.displace(id.index, random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * 0.1_r,
-                          random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * 0.1_r);
+          thesis::displace(&bodies, id.index,
+                           random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * 0.1_r,
+                           random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * 0.1_r);
         }
         const std::vector<Contact> expected = test::ContactOracle(bodies).contacts();
         for (ContactFinder& way : ways) {
           std::vector<Contact> found;
-          way.find_contacts(bodies, &found);
+          thesis::ContactSearch().find_contacts(bodies, &way, &found);
           ASSERT_EQ(found, expected) << round << ", change " << change;
         }
         contacts += expected.size();

@@ -1,7 +1,7 @@
 /// Tests of the contact resolver on small sets of contacts with known solutions.
-#include "src/world/contact_resolver.hpp"
+#include "src/thesis/contact_resolver.hpp"
 
-#include "tests/world/linear_scan.hpp"
+#include "tests/thesis/linear_scan.hpp"
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
@@ -346,20 +346,67 @@ Scenario dense_cloud(std::uint64_t seed, std::uint32_t count) {
   return s;
 }
 
-TEST(ContactResolver, TheTournamentTreeGivesTheBitsOfTheLinearScan) {
+/// Expects that two states differ in the bodies of one contact only, and that they do differ.
+void expect_corrected(const Contact& contact, const BodyStore& before, const BodyStore& after) {
+  bool differs = false;
+  for (const BodyId id : before.ids()) {
+    const bool equal = before.state(id.index) == after.state(id.index);
+    ASSERT_TRUE(equal || id == contact.a || id == contact.b) << id.index;
+    differs = differs || !equal;
+  }
+  ASSERT_TRUE(differs);
+}
+
+TEST(ContactResolver, ProjectsTheContactThatALinearScanSelects) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   for (std::uint64_t k = 0; k < 10; ++k) {
     Scenario s = dense_cloud(seed + k, 100);
-    BodyStore copy = s.bodies;
-    const ResolverReport with_tree = s.resolve();
-    BasicContactResolver<test::LinearScan> scanner;
-    const ResolverReport with_scan = scanner.resolve(copy, s.contacts, {});
-    ASSERT_GT(with_tree.position_iterations, 100u);
-    ASSERT_EQ(with_tree.position_iterations, with_scan.position_iterations);
-    ASSERT_EQ(with_tree.velocity_iterations, with_scan.velocity_iterations);
-    for (std::uint32_t i = 0; i < 100; ++i) ASSERT_EQ(s.bodies.state(i), copy.state(i)) << i;
+    const BodyStore before = s.bodies;
+    std::vector<Real> depths;
+    for (const Contact& c : s.contacts) depths.push_back(-c.distance);
+    test::LinearScan scan;
+    scan.assign(depths);
+    const ResolverReport report = s.resolve({.max_iterations = 1, .velocity_epsilon = 1e9_r});
+    ASSERT_EQ(report.position_iterations, 1u);
+    ASSERT_EQ(report.velocity_iterations, 0u);
+    ASSERT_NO_FATAL_FAILURE(expect_corrected(s.contacts[scan.top()], before, s.bodies));
   }
+}
+
+/// The key of a contact of two spheres in the velocity loop.
+Real target_delta_velocity(const Contact& c, const BodyStore& bodies) {
+  const auto velocity = [&](BodyId id, Real side) {
+    const Vec3 arm = c.normal * (side * (bodies.radius(id.index) + c.distance * 0.5_r));
+    return detail::point_velocity(bodies.moving.velocity[id.index],
+                                  bodies.moving.angular_velocity[id.index], arm);
+  };
+  return detail::target_delta_velocity(dot(c.normal, velocity(c.a, -1) - velocity(c.b, 1)), 0,
+                                       c.restitution, ResolverSettings{}.restitution_velocity);
+}
+
+TEST(ContactResolver, AppliesEachImpulseToTheContactThatALinearScanSelects) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  std::uint32_t impulses = 0;
+  for (std::uint64_t k = 0; k < 4; ++k) {
+    const Scenario start = dense_cloud(seed + k, 100);
+    BodyStore before = start.bodies;
+    for (std::uint32_t n = 1; n <= 100; ++n) {
+      std::vector<Real> keys;
+      for (const Contact& c : start.contacts) keys.push_back(target_delta_velocity(c, before));
+      test::LinearScan scan;
+      scan.assign(keys);
+      const ResolverSettings settings{.max_iterations = n, .position_epsilon = 100};
+      if (!(scan.key(scan.top()) > settings.velocity_epsilon)) break;
+      Scenario s = start;
+      ASSERT_EQ(s.resolve(settings).velocity_iterations, n);
+      ASSERT_NO_FATAL_FAILURE(expect_corrected(s.contacts[scan.top()], before, s.bodies));
+      before = s.bodies;
+      ++impulses;
+    }
+  }
+  EXPECT_GE(impulses, 100u);
 }
 
 TEST(TargetDeltaVelocity, BouncesOnTheImpactSpeedButNotOnTheWeight) {

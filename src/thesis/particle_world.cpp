@@ -1,9 +1,9 @@
 /// ParticleWorld: validation and the step of integration, detection and resolution.
 #include <jfpx/error.hpp>
-#include <jfpx/particle.hpp>
+#include <jfpx/thesis/particle.hpp>
 
 #include "src/scene/field_fault.hpp"
-#include "src/world/particle_resolver.hpp"
+#include "src/thesis/particle_resolver.hpp"
 
 #include <new>
 #include <string>

@@ -1,6 +1,6 @@
 /// Tests of particles: flight, bounces and rest against formulas; ids, bad input, determinism.
 #include <jfpx/error.hpp>
-#include <jfpx/particle.hpp>
+#include <jfpx/thesis/particle.hpp>
 
 #include "tests/world/support.hpp"
 

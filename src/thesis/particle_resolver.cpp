@@ -1,8 +1,8 @@
 /// Resolution of particle contacts: the deepest first, then the one with the largest target change
 /// of velocity. Each correction updates the other contacts of its particles.
-#include "src/world/particle_resolver.hpp"
+#include "src/thesis/particle_resolver.hpp"
 
-#include "src/world/contact_response.hpp"
+#include "src/thesis/contact_response.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {

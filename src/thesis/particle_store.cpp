@@ -1,5 +1,5 @@
 /// Addition, removal and free motion of particles.
-#include "src/world/particle_store.hpp"
+#include "src/thesis/particle_store.hpp"
 
 #include "src/base/power.hpp"
 #include "src/world/integrate.hpp"

@@ -1,5 +1,5 @@
 /// Insertion, removal, balancing and queries of the tree of bounding spheres.
-#include "src/world/sphere_hierarchy.hpp"
+#include "src/thesis/sphere_hierarchy.hpp"
 
 #include <jfpx/error.hpp>
 

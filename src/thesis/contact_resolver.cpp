@@ -1,105 +1,16 @@
-/// Sequential contact resolver: corrects penetrations, then velocities, always the worst contact
-/// first (thesis 4.4.6).
-#pragma once
+/// The two loops of the contact resolver.
+#include "src/thesis/contact_resolver.hpp"
 
-#include <jfpx/world.hpp>
-
-#include "src/world/body_store.hpp"
-#include "src/world/contact_response.hpp"
-#include "src/world/indexed_priority_queue.hpp"
+#include "src/thesis/contact_response.hpp"
+#include "src/thesis/free_motion.hpp"
 
 #include <numeric>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Iteration counts of the resolver in a step.
-struct ResolverReport {
-  std::uint64_t position_iterations = 0;
-  std::uint64_t velocity_iterations = 0;
-  bool exhausted = false;  ///< a loop stopped at its limit with work left
-};
-
-/// There are two loops, one for positions and one for velocities. Each iteration takes the worst
-/// contact, resolves it, and updates the keys of all contacts of its two bodies (errata E6, E10,
-/// E11). The key of a contact is its penetration in the first loop, and the required change of its
-/// separating velocity in the second.
-///
-/// `Queue` has the functions of IndexedPriorityQueue, which the engine uses; tests and benchmarks
-/// also use the linear scan of the thesis. All queues that select the largest key, and the lowest
-/// index among equal keys, give the same bits. Buffers grow and never shrink.
-template <class Queue>
-class BasicContactResolver {
- public:
-  /// @param contacts between `bodies`. Two movable bodies in contact must be both awake or both
-  ///   asleep. Contacts without an awake body are ignored.
-  /// @param generated number of contacts, at the end of `contacts`, that come from contact
-  ///   generators. They act at Contact::point, even on spheres, and form no patches.
-  ResolverReport resolve(BodyStore& bodies, std::span<const Contact> contacts,
-                         const ResolverSettings& settings, std::size_t generated = 0);
-
- private:
-  struct alignas(64) Row {  // a cache line in float, two in double
-    std::uint32_t a, b;
-    Vec3 normal, arm_a, arm_b;  ///< arms: from the centre of mass to the contact
-    Real from_acceleration;     ///< [m/s], part of the separating velocity that this step's
-                                ///< accelerations have added
-    Real friction, restitution;
-    std::uint32_t first, last;  ///< rows of the same two bodies with the same normal: [first, last)
-  };
-  /// One correction for one or several rows of the same two bodies with the same normal.
-  struct Patch {
-    const Row& row;     ///< the worst row
-    Vec3 arm_a, arm_b;  ///< to the point of the correction
-    Real amount;        ///< of the correction: [m] in the position loop, [m/s] in the velocity loop
-    Real radius = 0;    ///< [m], mean distance of the points from their centre; 0 for one point
-  };
-  /// Fractions of a patch's friction that act against sliding and against spinning; their squares
-  /// add up to 1.
-  struct FrictionShares {
-    Real sliding, spinning;
-  };
-  using RowIndex = std::uint32_t;
-
-  void prepare(std::span<const Contact> contacts, std::size_t generated);
-  void add_row(const Contact& contact, const Vec3& arm_a, const Vec3& arm_b);
-  void group_patches();
-  Patch patch_of(RowIndex worst, Real slack) const;
-  void index_rows_by_body();
-  std::span<const RowIndex> rows_of(std::uint32_t body) const;
-  Vec3 lever_arm(std::uint32_t body, const Contact& contact, Real side) const;
-
-  void resolve_positions(ResolverReport* report);
-  void project(const Patch& patch);
-  void displace(std::uint32_t body, const detail::Displacement& displacement);
-
-  void resolve_velocities(ResolverReport* report);
-  void apply_impulse(const Patch& patch);
-  FrictionShares share_friction(const Patch& patch, const Vec3& velocity) const;
-  Real spin(const Row& row) const;
-  void apply_spin_friction(const Row& row, Real limit);
-  void add_impulse(std::uint32_t body, const Vec3& arm, const Vec3& impulse);
-  Vec3 relative_velocity(const Row& row, const Vec3& arm_a, const Vec3& arm_b) const;
-  Real target_delta_velocity(const Row& row) const;
-  std::uint64_t limit() const;
-
-  BodyStore* bodies_ = nullptr;  ///< during resolve()
-  ResolverSettings settings_;
-  std::vector<Row> rows_;
-  std::vector<Real> keys_;
-  Queue queue_;
-  std::vector<std::uint32_t> first_row_;  ///< by body: start of its range in body_rows_
-  std::vector<RowIndex> body_rows_;
-};
-
-extern template class BasicContactResolver<IndexedPriorityQueue>;
-using ContactResolver = BasicContactResolver<IndexedPriorityQueue>;
-
-template <class Queue>
-ResolverReport BasicContactResolver<Queue>::resolve(BodyStore& bodies,
-                                                    std::span<const Contact> contacts,
-                                                    const ResolverSettings& settings,
-                                                    std::size_t generated) {
+ResolverReport ContactResolver::resolve(BodyStore& bodies, std::span<const Contact> contacts,
+                                        const ResolverSettings& settings, std::size_t generated) {
   bodies_ = &bodies;
   settings_ = settings;
   prepare(contacts, generated);
@@ -112,9 +23,7 @@ ResolverReport BasicContactResolver<Queue>::resolve(BodyStore& bodies,
 }
 
 /// Fills rows_, and keys_ with the penetrations.
-template <class Queue>
-void BasicContactResolver<Queue>::prepare(std::span<const Contact> contacts,
-                                          std::size_t generated) {
+void ContactResolver::prepare(std::span<const Contact> contacts, std::size_t generated) {
   const MotionArrays& moving = bodies_->moving;
   const auto asleep = [&moving](const Contact& c) {
     return moving.awake[c.a.index] == 0 && moving.awake[c.b.index] == 0;
@@ -132,8 +41,7 @@ void BasicContactResolver<Queue>::prepare(std::span<const Contact> contacts,
 }
 
 /// Appends a row, initially a patch of its own.
-template <class Queue>
-void BasicContactResolver<Queue>::add_row(const Contact& c, const Vec3& arm_a, const Vec3& arm_b) {
+void ContactResolver::add_row(const Contact& c, const Vec3& arm_a, const Vec3& arm_b) {
   const MotionArrays& moving = bodies_->moving;
   Vec3 acceleration;
   const std::uint32_t a = c.a.index, b = c.b.index;
@@ -147,8 +55,7 @@ void BasicContactResolver<Queue>::add_row(const Contact& c, const Vec3& arm_a, c
 
 /// Sets the range [first, last) of each row to the consecutive rows with the same bodies and
 /// normal.
-template <class Queue>
-void BasicContactResolver<Queue>::group_patches() {
+void ContactResolver::group_patches() {
   for (RowIndex first = 0, last = 0; first < rows_.size(); first = last) {
     const Row& head = rows_[first];
     while (last < rows_.size() && rows_[last].a == head.a && rows_[last].b == head.b &&
@@ -166,9 +73,7 @@ void BasicContactResolver<Queue>::group_patches() {
 /// in the arm, so the mean is exact at the centre. A corner with a key above the mean remains the
 /// worst and has more weight in the next iteration.
 /// @param slack part of the key that is not corrected
-template <class Queue>
-typename BasicContactResolver<Queue>::Patch BasicContactResolver<Queue>::patch_of(
-    RowIndex worst, Real slack) const {
+ContactResolver::Patch ContactResolver::patch_of(RowIndex worst, Real slack) const {
   const Row& row = rows_[worst];
   Patch patch{row, row.arm_a, row.arm_b, queue_.key(worst) - slack};
   if (row.last - row.first == 1) return patch;
@@ -196,17 +101,14 @@ typename BasicContactResolver<Queue>::Patch BasicContactResolver<Queue>::patch_o
 /// The vector from the centre of mass to the contact. For a sphere it is computed from the normal,
 /// because the difference of two points far from the origin loses precision (erratum E2).
 /// @param side -1 for body a, 1 for body b
-template <class Queue>
-Vec3 BasicContactResolver<Queue>::lever_arm(std::uint32_t body, const Contact& contact,
-                                            Real side) const {
+Vec3 ContactResolver::lever_arm(std::uint32_t body, const Contact& contact, Real side) const {
   const Real radius = bodies_->radius(body);
   if (radius > 0) return contact.normal * (side * (radius + contact.distance * Real(0.5)));
   return contact.point - bodies_->moving.position[body];
 }
 
 /// Counting sort of the rows by movable body; the rows of a body keep their order.
-template <class Queue>
-void BasicContactResolver<Queue>::index_rows_by_body() {
+void ContactResolver::index_rows_by_body() {
   first_row_.assign(bodies_->capacity() + 1, 0);
   for (const Row& row : rows_) {
     for (const std::uint32_t body : {row.a, row.b}) {
@@ -223,20 +125,17 @@ void BasicContactResolver<Queue>::index_rows_by_body() {
   }
 }
 
-template <class Queue>
-std::span<const std::uint32_t> BasicContactResolver<Queue>::rows_of(std::uint32_t body) const {
+std::span<const std::uint32_t> ContactResolver::rows_of(std::uint32_t body) const {
   return std::span(body_rows_).subspan(first_row_[body], first_row_[body + 1] - first_row_[body]);
 }
 
 /// Maximum number of iterations of each loop.
-template <class Queue>
-std::uint64_t BasicContactResolver<Queue>::limit() const {
+std::uint64_t ContactResolver::limit() const {
   return settings_.max_iterations != 0 ? settings_.max_iterations
                                        : std::uint64_t{8} * bodies_->movable_count();
 }
 
-template <class Queue>
-void BasicContactResolver<Queue>::resolve_positions(ResolverReport* report) {
+void ContactResolver::resolve_positions(ResolverReport* report) {
   // Penetrations are reduced to slightly less than position_epsilon. If they were reduced to zero,
   // a body at rest would repeatedly sink and be lifted by position_epsilon. If they were reduced to
   // position_epsilon itself, rounding errors and neighboring contacts would exceed it again
@@ -256,8 +155,7 @@ void BasicContactResolver<Queue>::resolve_positions(ResolverReport* report) {
 
 /// Moves the bodies apart by the amount of the patch, each in proportion to its inverse effective
 /// mass (erratum E6a).
-template <class Queue>
-void BasicContactResolver<Queue>::project(const Patch& patch) {
+void ContactResolver::project(const Patch& patch) {
   const MotionArrays& moving = bodies_->moving;
   const Row& row = patch.row;
   const auto inverse_effective_mass = [&](std::uint32_t body, const Vec3& arm) {
@@ -280,11 +178,9 @@ void BasicContactResolver<Queue>::project(const Patch& patch) {
 /// Moves a body and updates the depths of its contacts to first order, without new detection
 /// (Millington 2007, 14.4). A displacement along the normal reduces the depth if the body is a, and
 /// increases it if the body is b (erratum E10).
-template <class Queue>
-void BasicContactResolver<Queue>::displace(std::uint32_t body,
-                                           const detail::Displacement& displacement) {
+void ContactResolver::displace(std::uint32_t body, const detail::Displacement& displacement) {
   if (!bodies_->movable(body)) return;
-  bodies_->displace(body, displacement.translation, displacement.rotation);
+  thesis::displace(bodies_, body, displacement.translation, displacement.rotation);
   for (const RowIndex i : rows_of(body)) {
     const Row& row = rows_[i];
     const bool is_a = row.a == body;
@@ -295,8 +191,7 @@ void BasicContactResolver<Queue>::displace(std::uint32_t body,
   }
 }
 
-template <class Queue>
-void BasicContactResolver<Queue>::resolve_velocities(ResolverReport* report) {
+void ContactResolver::resolve_velocities(ResolverReport* report) {
   for (RowIndex i = 0; i < rows_.size(); ++i) keys_[i] = target_delta_velocity(rows_[i]);
   queue_.assign(keys_);
   for (std::uint64_t left = limit();; --left) {
@@ -314,16 +209,14 @@ void BasicContactResolver<Queue>::resolve_velocities(ResolverReport* report) {
   report->exhausted = true;
 }
 
-template <class Queue>
-inline Vec3 BasicContactResolver<Queue>::relative_velocity(const Row& row, const Vec3& arm_a,
-                                                           const Vec3& arm_b) const {
+inline Vec3 ContactResolver::relative_velocity(const Row& row, const Vec3& arm_a,
+                                               const Vec3& arm_b) const {
   const MotionArrays& moving = bodies_->moving;
   return detail::point_velocity(moving.velocity[row.a], moving.angular_velocity[row.a], arm_a) -
          detail::point_velocity(moving.velocity[row.b], moving.angular_velocity[row.b], arm_b);
 }
 
-template <class Queue>
-Real BasicContactResolver<Queue>::target_delta_velocity(const Row& row) const {
+Real ContactResolver::target_delta_velocity(const Row& row) const {
   return detail::target_delta_velocity(
       dot(row.normal, relative_velocity(row, row.arm_a, row.arm_b)), row.from_acceleration,
       row.restitution, settings_.restitution_velocity);
@@ -331,8 +224,7 @@ Real BasicContactResolver<Queue>::target_delta_velocity(const Row& row) const {
 
 /// Applies equal and opposite impulses to both bodies at one common point, which conserves momentum
 /// and angular momentum (errata E2, E3, E5).
-template <class Queue>
-void BasicContactResolver<Queue>::apply_impulse(const Patch& patch) {
+void ContactResolver::apply_impulse(const Patch& patch) {
   const Row& row = patch.row;
   const MotionArrays& moving = bodies_->moving;
   const detail::ContactBasis basis = detail::contact_basis(row.normal);
@@ -362,9 +254,8 @@ void BasicContactResolver<Queue>::apply_impulse(const Patch& patch) {
 /// Sliding and spinning share the friction of a patch: friction opposes the velocity of the contact
 /// points, whose sliding and spinning components are perpendicular on average.
 /// @param velocity of the patch, in contact axes
-template <class Queue>
-typename BasicContactResolver<Queue>::FrictionShares BasicContactResolver<Queue>::share_friction(
-    const Patch& patch, const Vec3& velocity) const {
+ContactResolver::FrictionShares ContactResolver::share_friction(const Patch& patch,
+                                                                const Vec3& velocity) const {
   if (!(patch.radius > 0)) return {1, 0};
   const Real slide = square_root(velocity.y * velocity.y + velocity.z * velocity.z);
   const Real spin_speed = absolute(spin(patch.row)) * patch.radius;
@@ -373,8 +264,7 @@ typename BasicContactResolver<Queue>::FrictionShares BasicContactResolver<Queue>
 }
 
 /// [rad/s], relative angular velocity about the normal.
-template <class Queue>
-Real BasicContactResolver<Queue>::spin(const Row& row) const {
+Real ContactResolver::spin(const Row& row) const {
   const MotionArrays& moving = bodies_->moving;
   return dot(row.normal, moving.angular_velocity[row.a] - moving.angular_velocity[row.b]);
 }
@@ -382,8 +272,7 @@ Real BasicContactResolver<Queue>::spin(const Row& row) const {
 /// Friction against spinning about the normal, which an impulse at the centre of the patch does not
 /// affect.
 /// @param limit largest angular impulse of the friction
-template <class Queue>
-void BasicContactResolver<Queue>::apply_spin_friction(const Row& row, Real limit) {
+void ContactResolver::apply_spin_friction(const Row& row, Real limit) {
   MotionArrays& moving = bodies_->moving;
   const Vec3 response_a = moving.inverse_inertia[row.a] * row.normal;
   const Vec3 response_b = moving.inverse_inertia[row.b] * row.normal;
@@ -395,9 +284,7 @@ void BasicContactResolver<Queue>::apply_spin_friction(const Row& row, Real limit
   moving.angular_velocity[row.b] -= response_b * impulse;
 }
 
-template <class Queue>
-void BasicContactResolver<Queue>::add_impulse(std::uint32_t body, const Vec3& arm,
-                                              const Vec3& impulse) {
+void ContactResolver::add_impulse(std::uint32_t body, const Vec3& arm, const Vec3& impulse) {
   if (!bodies_->movable(body)) return;
   MotionArrays& moving = bodies_->moving;
   moving.velocity[body] += impulse * bodies_->inverse_mass(body);

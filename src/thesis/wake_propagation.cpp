@@ -1,5 +1,7 @@
 /// Propagation of a property of bodies through contacts, by repeated sweeps.
-#include "src/world/wake_propagation.hpp"
+#include "src/thesis/wake_propagation.hpp"
+
+#include <algorithm>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -32,6 +34,7 @@ void WakePropagation::operator()(std::span<const Contact> contacts, BodyStore* b
   });
   if (!bodies->has_moving_kinematic_body()) return;
 
+  const Real woken_motion = bodies->view_without_ids().woken_motion;
   carried_.assign(bodies->capacity(), 0);
   for (const BodyId id : bodies->ids()) {
     carried_[id.index] = bodies->kinematic(id.index) ? awake[id.index] : 0;
@@ -42,7 +45,8 @@ void WakePropagation::operator()(std::span<const Contact> contacts, BodyStore* b
     const std::uint32_t passenger = carried_[a] != 0 ? b : a;
     if (!bodies->movable(passenger)) return false;
     carried_[passenger] = 1;
-    bodies->keep_awake(passenger);
+    Real& mean_motion = bodies->moving.mean_motion[passenger];
+    mean_motion = std::max(mean_motion, woken_motion);
     return true;
   });
 }

@@ -1,5 +1,5 @@
 /// Randomised search for contacts that the early-out tests rule out.
-#include <jfpx/intersect.hpp>
+#include <jfpx/thesis/intersect.hpp>
 
 #include "tests/world/random_bodies.hpp"
 

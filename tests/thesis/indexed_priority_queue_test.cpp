@@ -1,7 +1,7 @@
 /// Tests of the tournament tree against a linear scan.
-#include "src/world/indexed_priority_queue.hpp"
+#include "src/thesis/indexed_priority_queue.hpp"
 
-#include "tests/world/linear_scan.hpp"
+#include "tests/thesis/linear_scan.hpp"
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
