@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <variant>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -185,6 +186,20 @@ void ScenePainter::draw(const RunState& from, const RunState& to, Real share, Co
       draw_shape(scene_.bodies[i].shape, shown, paint, drawing);
     }
   }
+  draw_joints(from, to, share, drawing);
+}
+
+void ScenePainter::draw_joints(const RunState& from, const RunState& to, Real share,
+                               Drawing* drawing) const {
+  const auto point = [&](const BodyId& body, const Vec3& anchor) {
+    return to_world_point(interpolate(from.states[body.index], to.states[body.index], share),
+                          anchor);
+  };
+  const auto draw_one = [&](const auto& joint) {
+    const Vec3 end = joint.b ? point(*joint.b, joint.anchor_b) : joint.anchor_b;
+    drawing->add_line(point(joint.a, joint.anchor_a), end, {235, 235, 225}, 3.0f);
+  };
+  for (const Joint& joint : scene_.joints) std::visit(draw_one, joint);
 }
 
 void ScenePainter::draw_immovable(const Bounds& bounds, Drawing* drawing) const {

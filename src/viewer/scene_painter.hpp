@@ -75,6 +75,8 @@ class ScenePainter {
   Appearance appearance_of(std::uint32_t body) const;
   void draw_shape(const Shape& shape, const BodyState& at, Paint paint, Drawing* drawing) const;
   void draw_still(const Bounds& bounds, Drawing* drawing) const;
+  /// Adds a line between the anchors of each joint.
+  void draw_joints(const RunState& from, const RunState& to, Real share, Drawing* drawing) const;
 
   Scene scene_;
   BoundsEstimator bounds_estimator_;

@@ -338,5 +338,19 @@ TEST(DrawOrder, PutsVisibleSpheresFirstFrontToBackAndLosesNone) {
   }
 }
 
+TEST(ScenePainter, DrawsALineBetweenTheAnchorsOfAJoint) {
+  Scene scene = balls(3);
+  scene.bodies[1].position = {3, 0, 0};
+  DistanceJoint joint{.a = {0, 0}, .b = BodyId{1, 0}};
+  joint.anchor_a = {0, 1, 0};
+  scene.joints = {joint, DistanceJoint{.a = {1, 0}, .anchor_b = {0, 0, 9}}};
+  const Drawing drawing = draw(scene, run_state_of(scene));
+  ASSERT_EQ(drawing.lines().size(), 2u);
+  EXPECT_THAT(drawing.lines()[0].from, ElementsAre(0, 1, 0));
+  EXPECT_THAT(drawing.lines()[0].to, ElementsAre(3, 0, 0));
+  EXPECT_THAT(drawing.lines()[1].from, ElementsAre(3, 0, 0));
+  EXPECT_THAT(drawing.lines()[1].to, ElementsAre(0, 0, 9));
+}
+
 }  // namespace
 }  // namespace jfpx
