@@ -16,7 +16,7 @@ inline namespace JFPX_ABI {
 /// Algorithm that resolves the contacts of a native world.
 enum class Solver : std::uint8_t {
   soft_step,    ///< substeps over soft contacts with warm starting: stacks and heaps come to rest
-  worst_first,  ///< the thesis' resolver (4.4.6): one correction after the other, in one thread
+  worst_first,  ///< of the thesis (4.4.6), after thesis::enable(): one correction after the other
 };
 /// Name in the JSON of a scene; null for a value outside the enumeration.
 constexpr const char* to_string(Solver solver) {

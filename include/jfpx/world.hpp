@@ -25,8 +25,8 @@ inline namespace JFPX_ABI {
 /// bit. Queries (World::cast_ray() and others) do not use it.
 enum class BroadPhase : std::uint8_t {
   cells,        ///< the collider's own search, by SphereColliderOptions::algorithm
-  hierarchy,    ///< the thesis' tree of bounding spheres (4.4.5); the collider tests its pairs
-  brute_force,  ///< the collider tests every pair; a reference for tests
+  hierarchy,    ///< after thesis::enable(): the thesis' tree of bounding spheres (4.4.5)
+  brute_force,  ///< after thesis::enable(): every pair; a reference for tests
 };
 
 struct WorldSettings {
@@ -327,7 +327,8 @@ class JFPX_API World {
   /// which remain as they are. A world of another process has them if it has added all forces and
   /// generators in the same order.
   /// @throws InvalidSnapshot if the bytes are not of snapshot() in this format and precision, or
-  ///   the user-defined callbacks differ; OutOfMemory. The world is then unchanged.
+  ///   the user-defined callbacks differ; OutOfMemory; InvalidArgument without thesis::enable().
+  ///   The world is then unchanged.
   void restore(const Snapshot& snapshot);
 
   std::uint64_t steps() const;  ///< number of completed steps, without undone ones

@@ -25,10 +25,12 @@ run_programs() {
   local suffix
   for suffix in "" "$2"; do
     [ "$("$1/collider$suffix")" = "spheres 0 and 1 overlap by 0.5" ] || fail "collider$suffix"
+    [ "$("$1/thesis$suffix")" = "a step of worst_first: 1 contact, 1 particle" ] || fail "thesis$suffix"
     [ "$HAS_BULLET" = OFF ] || "$1/bullet_app$suffix" | grep -E '[1-9][0-9]* contacts of spheres' || fail "bullet_app$suffix"
   done
 }
 components() {
+  echo -n "thesis;"
   [ "$HAS_BULLET" = OFF ] || echo -n "bullet;"
   [ "$HAS_CUDA" = OFF ] || echo -n "cuda;"
 }
@@ -71,11 +73,12 @@ refused" ] || fail "$("$work/cmake/both")"
     folder=$(dirname "$(find "$prefix" -name jfpx.pc)")
     mkdir -p "$work/makefile"
     ln -sfn "$root/examples" "$work/makefile/examples" # make knows no path with a space in it
-    programs="collider collider-f64"
+    ln -sfn "$here/cmake" "$work/makefile/sources"
+    programs="collider collider-f64 thesis thesis-f64"
     [ "$HAS_BULLET" = OFF ] || programs+=" bullet_app bullet_app-f64"
     export LD_LIBRARY_PATH=${folder%/pkgconfig}
     PKG_CONFIG_PATH=$folder make -B -s -C "$work/makefile" -f "$here/makefile/Makefile" \
-      EXAMPLES=examples PROGRAMS="$programs" CXX="${LAUNCHER:-} $CXX"
+      EXAMPLES=examples SOURCES=sources PROGRAMS="$programs" CXX="${LAUNCHER:-} $CXX"
     run_programs "$work/makefile" -f64
     ;;
   # The programs with which Conan tests the package, with the Bullet adapter in float where that is there.
@@ -105,7 +108,7 @@ refused" ] || fail "$("$work/cmake/both")"
       if configure "$here/cmake" "$work/messages" "$@" >"$work/messages.txt" 2>&1; then fail "accepted: $*"; fi
       tr '\n' ' ' <"$work/messages.txt" | tr -s ' ' | grep -qF "$text" || fail "no \"$text\" in: $(cat "$work/messages.txt")"
     }
-    expect 'jfpx has no component "rockets"; it has bullet and cuda.' -DCOMPONENTS=rockets
+    expect 'jfpx has no component "rockets"; it has thesis, bullet and cuda.' -DCOMPONENTS=rockets
     [ "$HAS_CUDA" = ON ] || expect "This jfpx was built without CUDA" -DCOMPONENTS=cuda
     if [ "$HAS_BULLET" = OFF ]; then
       expect "This jfpx was built without Bullet" -DCOMPONENTS=bullet
@@ -140,7 +143,7 @@ refused" ] || fail "$("$work/cmake/both")"
   symbols)
     if [ "$KIND" = static ]; then
       folder=$(dirname "$(find "$prefix" -name jfpx.pc)")
-      for name in jfpx jfpx-f64; do
+      for name in jfpx jfpx-f64 jfpx-thesis jfpx-thesis-f64; do
         # shellcheck disable=SC2046  # words are what is wanted
         $CXX -shared -o "$prefix/lib$name.so.probe" -Wl,--no-undefined "-Wl,--version-script=$root/cmake/exports.map" \
           -Wl,--whole-archive "${folder%/pkgconfig}/lib$name.a" -Wl,--no-whole-archive \
@@ -150,7 +153,7 @@ refused" ] || fail "$("$work/cmake/both")"
     checked=0
     while read -r library; do
       symbols=$(nm -DC --defined-only "$library" | cut -d' ' -f3-)
-      grep -qE '::(World::step|bullet::CollisionDispatcher::dispatchAllCollisionPairs)\(' <<<"$symbols" || fail "$library exports: $symbols"
+      grep -qE '::(World::step|thesis::enable|bullet::CollisionDispatcher::dispatchAllCollisionPairs)\(' <<<"$symbols" || fail "$library exports: $symbols"
       foreign=$(grep -vE '^((vtable|typeinfo|typeinfo name) for |(non-virtual|virtual) thunk to )?jfpx::v[0-9]+_[0-9]+_f(32|64)::' <<<"$symbols" || true)
       [ -z "$foreign" ] || fail "$library exports: $foreign"
       ! objdump -p "$library" | grep -E 'NEEDED.*(cuda|cudart)' || fail "$library needs CUDA"
@@ -188,6 +191,8 @@ refused" ] || fail "$("$work/cmake/both")"
     depends libjfpx0.2 | grep -q 'libstdc++6' || fail "libjfpx0.2 depends on: $(depends libjfpx0.2)"
     depends libjfpx-dev | grep -q 'libjfpx0.2 (= ' || fail "libjfpx-dev depends on: $(depends libjfpx-dev)"
     depends jfpx-tools | grep -q 'libjfpx0.2 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
+    depends libjfpx-thesis0.2 | grep -q 'libjfpx0.2 (= ' || fail "libjfpx-thesis0.2 depends on: $(depends libjfpx-thesis0.2)"
+    depends jfpx-tools | grep -q 'libjfpx-thesis0.2 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
     if [ "$HAS_VIEWER" = ON ]; then
       depends jfpx-tools | grep -q libsdl2 || fail "jfpx-tools depends on: $(depends jfpx-tools)"
       depends jfpx-tools Recommends | grep -q 'libegl1, libgl1-mesa-dri' ||
