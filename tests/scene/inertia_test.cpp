@@ -13,8 +13,8 @@ namespace {
 
 using test::operator""_r;
 
-JFPX_SOLVER_SUITE(Inertia);
-JFPX_SOLVER_SUITE(DerivedData);
+JFPX_SOFT_STEP_SUITE(Inertia);
+JFPX_SOFT_STEP_SUITE(DerivedData);
 
 BodyDef spinning(const std::optional<Mat3>& inertia) {
   BodyDef def = test::ball({0, 0, 0});

@@ -9,7 +9,7 @@ inline namespace JFPX_ABI {
 namespace test {
 namespace {
 
-JFPX_SOLVER_SUITE(Concurrency);
+JFPX_SOFT_STEP_SUITE(Concurrency);
 
 Scene dense_scene(std::uint64_t seed) {
   Random random(seed);

@@ -18,7 +18,7 @@ namespace {
 using test::operator""_r;
 using test::heavy;
 
-JFPX_SOLVER_SUITE(ContactEvents);
+JFPX_SOFT_STEP_SUITE(ContactEvents);
 
 /// Phases and indices of a step's events, as "+0-1 =0-2 -1-2".
 std::string to_string_of_events(const World& world) {
@@ -310,7 +310,6 @@ TEST_P(ContactEvents, AndContactsAreTheSameWheneverTheyAreAskedFor) {
   std::size_t compared = 0;
   for (int scene_number = 0; scene_number < 10; ++scene_number) {
     Scene scene = test::empty_scene();
-    scene.solver = GetParam();
     for (int i = 0; i < 40; ++i) {
       scene.bodies.push_back(i % 2 == 0 ? test::ball(random.uniform_in_box({-2, -2, -2}, {2, 2, 2}))
                                         : test::random_body(&random, 2));

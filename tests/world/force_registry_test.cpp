@@ -15,8 +15,8 @@ using test::Erratum;
 using test::expect_near;
 using test::world_of;
 
-JFPX_SOLVER_SUITE(AppliedForce);
-JFPX_SOLVER_SUITE(Forces);
+JFPX_SOFT_STEP_SUITE(AppliedForce);
+JFPX_SOFT_STEP_SUITE(Forces);
 
 TEST_P(AppliedForce, AcceleratesForOneStepOnly) {
   World world = world_of({ball_at({0, 0, 0})});

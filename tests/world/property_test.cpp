@@ -20,7 +20,7 @@ using test::kInfinity;
 using test::kNan;
 using test::world_with;
 
-JFPX_SOLVER_SUITE(Property);
+JFPX_SOFT_STEP_SUITE(Property);
 
 BodyDef resting_box(const Vec3& position) {
   BodyDef def;

@@ -45,7 +45,7 @@ inline Scene thesis_scene() {
 
 inline constexpr Solver kSolvers[] = {Solver::soft_step, Solver::worst_first};
 
-/// Fixture of tests that hold with every solver.
+/// Fixture of tests that hold with every solver, or with any.
 using SolverTest = testing::TestWithParam<Solver>;
 /// An empty scene for the solver of a SolverTest.
 inline Scene empty_scene() {
@@ -64,10 +64,17 @@ inline std::string solver_name(const testing::TestParamInfo<Solver>& info) {
 #define JFPX_INSTANTIATE_SOLVERS(Suite)                                               \
   INSTANTIATE_TEST_SUITE_P(Solvers, Suite, testing::ValuesIn(::jfpx::test::kSolvers), \
                            ::jfpx::test::solver_name)
-/// Defines a suite of tests that run with each solver.
+/// Defines a suite of tests of what each solver does in its own way.
 #define JFPX_SOLVER_SUITE(Suite)                    \
   class Suite : public ::jfpx::test::SolverTest {}; \
   JFPX_INSTANTIATE_SOLVERS(Suite)
+/// The same for tests of what does not depend on the solver, with Solver::soft_step alone.
+#define JFPX_INSTANTIATE_SOFT_STEP(Suite)                                              \
+  INSTANTIATE_TEST_SUITE_P(Solvers, Suite, testing::Values(::jfpx::Solver::soft_step), \
+                           ::jfpx::test::solver_name)
+#define JFPX_SOFT_STEP_SUITE(Suite)                 \
+  class Suite : public ::jfpx::test::SolverTest {}; \
+  JFPX_INSTANTIATE_SOFT_STEP(Suite)
 
 /// A ball without gravity, damping, friction and sleep.
 inline BodyDef ball(const Vec3& position, Real radius = 1, Real mass = 1) {
