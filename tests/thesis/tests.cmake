@@ -6,4 +6,5 @@ jfpx_add_test(thesis_parts_test THESIS INTERNAL SOURCES
 jfpx_add_test(thesis_test THESIS SOURCES
   thesis/intersect_test.cpp
   thesis/particle_test.cpp
+  thesis/worst_first_motion_test.cpp
   thesis/worst_first_test.cpp)

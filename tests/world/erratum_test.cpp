@@ -9,7 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <limits>
 #include <type_traits>
 
@@ -19,26 +18,6 @@ namespace {
 using test::operator""_r;
 using test::kNan;
 using ::testing::HasSubstr;
-
-// The original clamps the depth of every contact to the epsilon and then picks any of them.
-TEST(Erratum, E06_the_deepest_contact_is_resolved_first) {
-  Scene scene = test::thesis_scene();
-  for (const Real overlap : {0.2_r, 0.5_r, 0.3_r}) {
-    const Real y = 10 * static_cast<Real>(scene.bodies.size());
-    scene.bodies.push_back(test::ball({0, y, 0}));
-    scene.bodies.push_back(test::ball({2 - overlap, y, 0}));
-  }
-  scene.resolver.max_iterations = 2;
-  World world(scene);
-  const StepReport report = world.step();
-  EXPECT_EQ(report.position_iterations, 2u);
-  EXPECT_TRUE(report.iterations_exhausted);
-  const std::vector<BodyState> s = world.states();
-  const auto gap = [&](std::size_t i) { return s[2 * i + 1].position.x - s[2 * i].position.x; };
-  EXPECT_EQ(gap(0), 2 - 0.2_r);  // the two deeper contacts have used the limit
-  EXPECT_NEAR(gap(1), 2, 0.011);
-  EXPECT_NEAR(gap(2), 2, 0.011);
-}
 
 TEST(Erratum, E08_a_position_that_is_no_number_is_refused_and_reaches_no_other_body) {
   Scene scene;
@@ -114,22 +93,6 @@ TEST(Erratum, E47_the_engine_prints_nothing) {
   EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   EXPECT_GT(contacts, 1000u);
-}
-
-// The thesis prints 0.01^dt, its source uses 0.05^dt, Millington 0.5^dt.
-TEST(Erratum, E55_the_bias_decides_how_soon_a_body_at_rest_sleeps) {
-  for (const Real bias : {0.01_r, 0.05_r, 0.5_r}) {
-    Scene scene = test::thesis_scene();
-    scene.dt = 0.001_r;
-    scene.sleep.bias = bias;
-    scene.bodies = {test::ball({})};
-    scene.bodies[0].can_sleep = true;
-    World world(scene);
-    int steps = 0;
-    for (; world.awake(world.bodies()[0]) && steps < 5000; ++steps) world.step();
-    // From 2 epsilon to epsilon: bias^t = 1/2.
-    EXPECT_NEAR(steps * 0.001, std::log(0.5) / std::log(static_cast<double>(bias)), 0.002) << bias;
-  }
 }
 
 }  // namespace

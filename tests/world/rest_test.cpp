@@ -100,26 +100,6 @@ TEST_P(Rest, AHeapOfBallsComesToRestAboveTheGround) {
   }
 }
 
-TEST(Erratum, E07_coincident_centres_part_along_x_and_stay_finite) {
-  Scene scene = test::thesis_scene();
-  scene.bodies = {test::ball({5, 5, 5}), test::ball({5, 5, 5})};
-  World world(scene);
-  const StepReport report = world.step();
-  EXPECT_EQ(report.sphere_contacts, 1u);
-  EXPECT_FALSE(report.non_finite);
-  const auto states = world.states();
-  EXPECT_NEAR(states[0].position.x - states[1].position.x, 2, 0.0101);
-  EXPECT_EQ(states[0].position.y, 5);
-}
-
-TEST(Erratum, E06_a_ball_on_the_ground_does_not_sink) {
-  Scene scene = test::thesis_scene();
-  scene.bodies = {heavy({0, 1, 0}, false), test::ground()};
-  World world(scene);
-  for (int n = 0; n < 600; ++n) world.step();
-  EXPECT_GT(world.states()[0].position.y, 0.98_r);  // the original: 0.02 after 600 steps
-}
-
 /// Four balls in a row on the ground, touching, asleep.
 World sleeping_row() {
   std::vector<BodyDef> balls;
