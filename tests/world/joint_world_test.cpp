@@ -37,7 +37,7 @@ void step(World* world, int count) {
 }
 
 WorldSettings with_threads(unsigned threads, SimdLevel simd = SimdLevel::automatic) {
-  return {.collider = {.backend = Backend::cpu, .threads = threads, .simd = simd}};
+  return {.collider = {.backend = Backend::cpu, .simd = simd}, .threads = threads};
 }
 
 TEST(JointWorld, HasTheSameBitsForAllThreadsAndVectorWidths) {
