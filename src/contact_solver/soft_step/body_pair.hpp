@@ -7,12 +7,15 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// The bodies of a row, their inverse inertia in world axes, and their orientations at this moment
-/// of the step.
+/// The bodies of a row, and their inverse inertia in world axes.
 struct BodyPair {
   SolverBody *a, *b;
   const Mat3 *inertia_a, *inertia_b;
-  const Quat *orientation_a = nullptr, *orientation_b = nullptr;
+};
+
+/// Orientations of the bodies of a row at this moment of the step.
+struct PairOrientations {
+  const Quat *a = nullptr, *b = nullptr;
 };
 
 /// Velocity of a's point relative to b's. A kinematic body b has a velocity.

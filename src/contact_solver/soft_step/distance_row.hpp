@@ -100,10 +100,11 @@ JFPX_HD inline void warm_start(const DistanceRow& row, const BodyPair& pair) {
 template <bool kFixed>
 class DistanceSolver {
  public:
-  JFPX_HD DistanceSolver(DistanceRow* row, const BodyPair& pair, const StepConstants& step)
+  JFPX_HD DistanceSolver(DistanceRow* row, const BodyPair& pair,
+                         const PairOrientations& orientations, const StepConstants& step)
       : row_(row), pair_(pair), step_(step) {
     const Vec3 centres = row->centres + (pair.a->shift - pair.b->shift);
-    axis_ = axis_of(*row, centres, *pair.orientation_a, *pair.orientation_b);
+    axis_ = axis_of(*row, centres, *orientations.a, *orientations.b);
     const Vec3& n = axis_.direction;
     const Vec3 turn_a = cross(axis_.arm_a, n);
     Real inverse_mass = pair.a->inverse_mass + dot(turn_a, *pair.inertia_a * turn_a);
@@ -233,9 +234,10 @@ class DistanceSolver {
 };
 
 template <bool kFixed>
-JFPX_HD inline void solve(DistanceRow* row, const BodyPair& pair, const StepConstants& step,
+JFPX_HD inline void solve(DistanceRow* row, const BodyPair& pair,
+                          const PairOrientations& orientations, const StepConstants& step,
                           bool use_bias) {
-  DistanceSolver<kFixed> solver(row, pair, step);
+  DistanceSolver<kFixed> solver(row, pair, orientations, step);
   if (use_bias) solver.turn_impulse();
   solver.solve(use_bias);
 }

@@ -23,6 +23,7 @@ struct RowContext {
   BodyPair bodies;         ///< without what the row does not read
   Part* parts;             ///< of the row; null for NoPart
   const Impacts* impacts;  ///< may be null for a row that does not rebound in a sweep
+  PairOrientations orientations = {};
 };
 
 struct WarmStart {
@@ -56,7 +57,7 @@ struct Solve {
   }
   template <bool kFixed, class Impacts>
   JFPX_HD void run(DistanceRow* row, const RowContext<NoPart, Impacts>& c) const {
-    solve<kFixed>(row, c.bodies, constants, kUseBias);
+    solve<kFixed>(row, c.bodies, c.orientations, constants, kUseBias);
   }
 };
 

@@ -372,15 +372,15 @@ struct SolveProgram {
     Row row = data.rows<Row>()[item->row - sweep.first<Row>()];
     const Mat3* inertia = data.step.bodies.inverse_inertia;
     const Mat3 inertia_a = inertia[item->a.index], inertia_b = inertia[item->b.index];
-    soft_step::BodyPair pair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b};
+    auto context = context_of(
+        row, soft_step::BodyPair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b});
     Quat orientation_a, orientation_b;
     if constexpr (Row::kReadsOrientation) {
       orientation_a = data.orientation_cells[item->a.index].load(sweep.moves());
       orientation_b = data.orientation_cells[item->b.index].load(sweep.moves());
-      pair.orientation_a = &orientation_a;
-      pair.orientation_b = &orientation_b;
+      context.orientations = {&orientation_a, &orientation_b};
     }
-    operation.template run<false>(&row, context_of(row, pair));
+    operation.template run<false>(&row, context);
     const auto write = [&](ItemBody* body) {
       const BodyCells cells = data.cells(body->index);
       if constexpr (Operation::kMovesBodies) {
@@ -528,18 +528,17 @@ struct SolveProgram {
     SolverBody fixed;
     const Mat3 inertia = data.step.bodies.inverse_inertia[row.a];
     const Mat3 none;
-    soft_step::BodyPair pair{&item->motion, &fixed, &inertia, &none};
+    auto context = context_of(row, soft_step::BodyPair{&item->motion, &fixed, &inertia, &none});
     Quat orientation_a, orientation_b;
     if constexpr (Row::kReadsOrientation) {
       orientation_a = data.step.orientation[row.a];
-      pair.orientation_a = &orientation_a;
-      pair.orientation_b = &orientation_b;
+      context.orientations = {&orientation_a, &orientation_b};
     }
     if (!Row::kReadsOrientation || row.b != soft_step::kWorld) {
       fixed = fixed_body(row.b, sweep.moves());
       if constexpr (Row::kReadsOrientation) orientation_b = fixed_orientation(row.b, sweep.moves());
     }
-    operation.template run<true>(&row, context_of(row, pair));
+    operation.template run<true>(&row, context);
     store<Operation>(sweep, row, r);
   }
 

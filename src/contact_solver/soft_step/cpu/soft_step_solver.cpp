@@ -223,33 +223,28 @@ void SoftStepSolver::sweep(const Run& run, const OnFixed& on_fixed) {
   });
 }
 
-template <class Row>
-BodyPair SoftStepSolver::pair_of(const Row& row, std::span<SolverBody> bodies) {
-  const BodyProperties& all = setup_.properties;
-  BodyPair pair{&bodies[row.a], nullptr, &all.inverse_inertia[row.a], &world_inertia_};
-  if (!Row::kReadsOrientation || row.b != kWorld) {
-    pair.b = &bodies[row.b];
-    pair.inertia_b = &all.inverse_inertia[row.b];
-  } else {
-    pair.b = &world_;
-  }
-  if constexpr (Row::kReadsOrientation) {
-    pair.orientation_a = &all.orientation[row.a];
-    pair.orientation_b = row.b != kWorld ? &all.orientation[row.b] : &world_orientation_;
-  }
-  return pair;
-}
-
 /// @param kernel null: rows of spheres are treated one by one
 template <class Operation>
 void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operation,
                          cpu::SphereSweepFunction kernel) {
   const auto one = [&]<class Row>(Rows<Row>* rows, std::size_t i, auto is_fixed) {
     Row& row = rows->rows[i];
-    const BodyPair pair = pair_of(row, bodies);
-    using Context = RowContext<typename Row::Part, ImpactBodies>;
-    operation.template run<decltype(is_fixed)::value>(
-        &row, Context{pair, rows->parts_of(row), &impacts_});
+    const Mat3* const inertia = setup_.properties.inverse_inertia;
+    RowContext<typename Row::Part, ImpactBodies> context{
+        {&bodies[row.a], nullptr, &inertia[row.a], nullptr}, rows->parts_of(row), &impacts_};
+    if (Row::kReadsOrientation && row.b == kWorld) {
+      context.bodies.b = &world_;
+      context.bodies.inertia_b = &world_inertia_;
+    } else {
+      context.bodies.b = &bodies[row.b];
+      context.bodies.inertia_b = &inertia[row.b];
+    }
+    if constexpr (Row::kReadsOrientation) {
+      const Quat* const orientation = setup_.properties.orientation;
+      context.orientations = {&orientation[row.a],
+                              row.b == kWorld ? &world_orientation_ : &orientation[row.b]};
+    }
+    operation.template run<decltype(is_fixed)::value>(&row, context);
   };
   const cpu::SphereSweep arrays = arrays_of(bodies);
   sweep(

@@ -112,8 +112,6 @@ class SoftStepSolver {
   template <class Operation>
   void run(std::span<SolverBody> bodies, const Operation& operation,
            cpu::SphereSweepFunction kernel);
-  template <class Row>
-  BodyPair pair_of(const Row& row, std::span<SolverBody> bodies);
   cpu::SphereSweep arrays_of(std::span<SolverBody> bodies);
 
   ThreadPool* pool_;
