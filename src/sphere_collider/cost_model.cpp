@@ -22,16 +22,16 @@ constexpr const char* kPrecision = sizeof(Real) == 4 ? "float" : "double";
 struct Way {
   const char* name;
   CostTerms CostModel::*terms;
-  const char* old_name = nullptr;  ///< still read: the name in 0.2, or in 0.1
+  const char* old_name = nullptr;  ///< still read: the name in 0.2
 };
 constexpr Way kWays[] = {
-    {"cpu_all_pairs", &CostModel::cpu_all_pairs, "x86_all_pairs"},
+    {"cpu_all_pairs", &CostModel::cpu_all_pairs},
     {"cpu_grid", &CostModel::cpu_grid, "cpu_sorted_tiles"},
-    {"cpu_given_pairs", &CostModel::cpu_given_pairs, "x86_given_pairs"},
+    {"cpu_given_pairs", &CostModel::cpu_given_pairs},
     {"cuda_all_pairs", &CostModel::cuda_all_pairs},
     {"cuda_grid", &CostModel::cuda_grid, "cuda_sorted_tiles"},
     {"cuda_given_pairs", &CostModel::cuda_given_pairs},
-    {"cpu_world", &CostModel::cpu_world, "x86_world"},
+    {"cpu_world", &CostModel::cpu_world},
     {"cuda_world", &CostModel::cuda_world},
 };
 

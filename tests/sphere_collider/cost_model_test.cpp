@@ -64,7 +64,7 @@ TEST(CostModel, SurvivesItsFileToTheLastBit) {
   EXPECT_EQ(folder.entries(), 1u);
 }
 
-TEST(CostModel, TheOldNamesOfTheCpuAreRead) {
+TEST(CostModel, TheOldNamesOfTheGridAreRead) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("costs.json");
   save_cost_model(example(), path);
@@ -72,9 +72,11 @@ TEST(CostModel, TheOldNamesOfTheCpuAreRead) {
   std::ifstream(path) >> json;
   for (const auto& item : json.items()) {
     const std::string& key = item.key();
-    old[key.rfind("cpu_", 0) == 0 ? "x86_" + key.substr(4) : key] = item.value();
+    const std::size_t at = key.find("_grid");
+    old[at != std::string::npos ? key.substr(0, at) + "_sorted_tiles" : key] = item.value();
   }
   std::ofstream(path) << old.dump();
+  EXPECT_NE(old.dump().find("cpu_sorted_tiles"), std::string::npos);
   EXPECT_EQ(load_cost_model(path).costs, example().costs);
 }
 
