@@ -4,6 +4,7 @@
 #include "src/contact_solver/soft_step/row_operations.hpp"
 #include "src/world/device/atomic.hpp"
 #include "src/world/device/step_data.hpp"
+#include "src/world/device/sweep.hpp"
 
 #include <cstddef>
 
@@ -60,7 +61,6 @@ struct SolveProgram {
 
  private:
   using SolverBody = soft_step::SolverBody;
-  static constexpr std::uint32_t kWarpItems = 32;
 
   /// Change that the impact of a row adds to the free motion of its bodies; see
   /// soft_step::ImpactBodies.
@@ -85,94 +85,6 @@ struct SolveProgram {
       if (!is_read) motion = cells.read_free(version);
       is_read = true;
     }
-  };
-
-  /// Work on a body after the rows of a sweep.
-  enum class BodyStage : std::uint8_t {
-    none,
-    move,        ///< ends a substep
-    accelerate,  ///< starts the next substep
-    finish       ///< ends the last sweep
-  };
-
-  struct Sweep {
-    const std::uint32_t* begin;       ///< Counters::bin_begin
-    std::uint32_t colored_items = 0;  ///< number of items for all rows that have a color
-    std::uint32_t number = 0;
-    BodyStage stage = BodyStage::none;
-    bool stores_impulses = false;  ///< whether the impulses of rows are those of the step
-
-    JFPX_HD explicit Sweep(const std::uint32_t* bins) : begin(bins) {
-      for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
-        for (std::uint32_t group = soft_step::group_of_color(0); group < soft_step::kFixedGroup;
-             ++group) {
-          colored_items += items(soft_step::bin_of(kind, group));
-        }
-      }
-    }
-    JFPX_HD void start(BodyStage next) {
-      ++number;
-      stage = next;
-    }
-    JFPX_HD soft_step::RowKind kind_of(std::uint32_t row) const {
-      return soft_step::kind_of_row(begin, row);
-    }
-    /// First row of a kind.
-    template <class Row>
-    JFPX_HD std::uint32_t first() const {
-      return begin[soft_step::bin_of(soft_step::kKindOf<Row>, 0)];
-    }
-    JFPX_HD std::uint32_t size(std::uint32_t bin) const { return begin[bin + 1] - begin[bin]; }
-    /// Number of items for the rows of a bin: a warp has rows of one bin only, none of which waits
-    /// for another.
-    JFPX_HD std::uint32_t items(std::uint32_t bin) const {
-      return (size(bin) + kWarpItems - 1) / kWarpItems * kWarpItems;
-    }
-    /// Number of rows without a color.
-    JFPX_HD std::uint32_t overflow() const {
-      std::uint32_t rows = 0;
-      for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
-        rows += size(soft_step::bin_of(kind, soft_step::kOverflowGroup));
-      }
-      return rows;
-    }
-    /// Number of moves that a kinematic body has made when the rows of the sweep are solved.
-    JFPX_HD std::uint32_t moves() const {
-      return (number + soft_step::kRelaxSweeps - 1) / soft_step::kSweepsPerSubstep;
-    }
-  };
-
-  /// Finds the rows of the colors, in the order of a sweep: by color, then by kind.
-  class Cursor {
-   public:
-    JFPX_HD explicit Cursor(const Sweep& sweep) : sweep_(sweep) {}
-
-    /// Moves to an item; the search restarts if it precedes that of the last call.
-    /// @returns the row, or kNone
-    JFPX_HD std::uint32_t find(std::uint32_t item) {
-      if (item < before_) {
-        before_ = 0;
-        group_ = soft_step::group_of_color(0);
-        kind_ = 0;
-      }
-      while (item - before_ >= sweep_.items(bin())) {
-        before_ += sweep_.items(bin());
-        if (++kind_ == soft_step::kRowKinds) {
-          kind_ = 0;
-          ++group_;
-        }
-      }
-      const std::uint32_t index = item - before_;
-      return index < sweep_.size(bin()) ? sweep_.begin[bin()] + index : kNone;
-    }
-
-    JFPX_HD std::uint32_t color() const { return group_ - soft_step::group_of_color(0); }
-
-   private:
-    JFPX_HD std::uint32_t bin() const { return soft_step::bin_of(kind_, group_); }
-    const Sweep& sweep_;
-    std::uint32_t before_ = 0, group_ = soft_step::group_of_color(0);
-    std::uint32_t kind_ = 0;
   };
 
   /// A body of an item: the turn that the item waits for, and the motion of the body at that turn.
@@ -229,7 +141,7 @@ struct SolveProgram {
     const SolveProgram& program_;
     const Sweep& sweep_;
     const Operation& operation_;
-    mutable Cursor cursor_;
+    mutable RowCursor cursor_;
   };
 
   /// The bodies after the rows of a sweep, for Team::flow().
