@@ -46,8 +46,8 @@ void BodyStore::serialize_body(Archive& archive, Self& self, std::uint32_t i) {
       archive(given[i]);
     }
   };
-  const auto column = [&]<class Column>(Column& values, const auto&...) {
-    if constexpr (Is<Column, GivenInertia>) {
+  const auto column = [&](auto& values, const auto&...) {
+    if constexpr (Is<std::remove_reference_t<decltype(values)>, GivenInertia>) {
       inertia(values);
     } else {
       archive(values[i]);
@@ -109,8 +109,8 @@ void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_fr
 /// The body as add() gets it.
 BodyDef BodyStore::definition(std::uint32_t i) const {
   BodyDef def;
-  const auto get = [i]<class Column>(const Column& column, auto& value) {
-    if constexpr (Is<Column, GivenInertia>) {
+  const auto get = [i](const auto& column, auto& value) {
+    if constexpr (Is<std::remove_cvref_t<decltype(column)>, GivenInertia>) {
       if (const auto found = column.find(i); found != column.end()) value = found->second;
     } else {
       value = column[i];
@@ -126,8 +126,11 @@ void BodyStore::check_body(std::uint32_t i) const {
   if (auto* half_space = std::get_if<HalfSpace>(&def.shape)) check_wall(half_space);
   if (auto* plane = std::get_if<Plane>(&def.shape)) check_wall(plane);
   validate_body(def, i);
-  const auto check_flag = [i]<class T>(const std::vector<T>& column) {
-    if constexpr (std::is_same_v<T, std::uint8_t>) BinaryReader::require(column[i] <= 1, kNoFlag);
+  const auto check_flag = [i](const auto& column) {
+    using Value = typename std::remove_cvref_t<decltype(column)>::value_type;
+    if constexpr (std::is_same_v<Value, std::uint8_t>) {
+      BinaryReader::require(column[i] <= 1, kNoFlag);
+    }
   };
   each_property(check_flag, properties_);
   check_flag(moving.awake);

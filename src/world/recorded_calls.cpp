@@ -66,13 +66,14 @@ void read(const Json& json, T& value) {
     read(json.at(field.name), member);
   });
 }
-void read(const Json& json, Joint& joint) {
+template <class... T>
+void read_joint(const Json& json, std::variant<T...>& joint) {
   const std::string name = json.at("type").get<std::string>();
-  const auto read_if = [&]<class... T>(const std::variant<T...>&) {
-    return ((name == kJointName<T> && (read(json, joint.emplace<T>()), true)) || ...);
-  };
-  if (!read_if(Joint())) refuse("there is no joint \"" + name + "\"");
+  const bool is_read =
+      ((name == kJointName<T> && (read(json, joint.template emplace<T>()), true)) || ...);
+  if (!is_read) refuse("there is no joint \"" + name + "\"");
 }
+void read(const Json& json, Joint& joint) { read_joint(json, joint); }
 template <std::size_t... I>
 void read_force(const Json& json, RecordableForce& force, std::index_sequence<I...>) {
   const std::string name = json.at("type").get<std::string>();

@@ -102,9 +102,11 @@ class DistanceSolver {
  public:
   JFPX_HD DistanceSolver(DistanceRow* row, const BodyPair& pair,
                          const PairOrientations& orientations, const StepConstants& step)
-      : row_(row), pair_(pair), step_(step) {
-    const Vec3 centres = row->centres + (pair.a->shift - pair.b->shift);
-    axis_ = axis_of(*row, centres, *orientations.a, *orientations.b);
+      : row_(row),
+        pair_(pair),
+        step_(step),
+        axis_(axis_of(*row, row->centres + (pair.a->shift - pair.b->shift), *orientations.a,
+                      *orientations.b)) {
     const Vec3& n = axis_.direction;
     const Vec3 turn_a = cross(axis_.arm_a, n);
     Real inverse_mass = pair.a->inverse_mass + dot(turn_a, *pair.inertia_a * turn_a);

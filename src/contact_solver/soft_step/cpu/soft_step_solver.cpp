@@ -227,8 +227,9 @@ void SoftStepSolver::sweep(const Run& run, const OnFixed& on_fixed) {
 template <class Operation>
 void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operation,
                          cpu::SphereSweepFunction kernel) {
-  const auto one = [&]<class Row>(Rows<Row>* rows, std::size_t i, auto is_fixed) {
-    Row& row = rows->rows[i];
+  const auto one = [&](auto* rows, std::size_t i, auto is_fixed) {
+    auto& row = rows->rows[i];
+    using Row = std::remove_reference_t<decltype(row)>;
     const Mat3* const inertia = setup_.properties.inverse_inertia;
     RowContext<typename Row::Part, ImpactBodies> context{
         {&bodies[row.a], nullptr, &inertia[row.a], nullptr}, rows->parts_of(row), &impacts_};
