@@ -4,6 +4,7 @@
 /// in world axes is an exception: that of a sphere does not follow every rotation.
 #include "src/scene/scene_validate.hpp"
 #include "src/world/body_store.hpp"
+#include "src/world/snapshot_checks.hpp"
 #include "src/world/snapshot_fields.hpp"
 
 #include <algorithm>
@@ -75,18 +76,13 @@ void BodyStore::read(BinaryReader* reader) {
 
 /// Reads generations and unused slots. @returns by slot: whether it is unused
 std::vector<bool> BodyStore::read_slots(BinaryReader* reader) {
-  const auto generation = reader->get<std::vector<std::uint32_t>>();
-  validate_body_count(generation.size());
-  resize_slots(generation.size());
-  const auto unused = reader->get<std::vector<std::uint32_t>>();
-  std::vector<bool> is_free(generation.size());
-  for (const std::uint32_t slot : unused) {
-    BinaryReader::require(slot < is_free.size() && !is_free[slot],
-                          "its list of unused ids is invalid");
-    is_free[slot] = true;
-  }
-  pool_.assign(generation, unused);
-  return is_free;
+  SnapshotSlots slots;
+  slots.generations = reader->get<std::vector<std::uint32_t>>();
+  validate_body_count(slots.generations.size());
+  resize_slots(slots.generations.size());
+  slots.read_unused(reader, "its list of unused ids is invalid");
+  pool_.assign(slots.generations, slots.unused);
+  return slots.is_free;
 }
 
 void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_free) {

@@ -1,7 +1,6 @@
 /// Writing and checked reading of contacts; see the header.
 #include "src/world/contact_snapshot.hpp"
 
-#include "src/contact_solver/soft_step/greedy_coloring.hpp"
 #include "src/world/snapshot_fields.hpp"
 
 #include <limits>
@@ -32,7 +31,7 @@ using soft_step::PointInput;
 /// on it.
 class Checker {
  public:
-  explicit Checker(const BodyStore& bodies) : bodies_(bodies), used_(bodies.capacity()) {}
+  Checker(const BodyStore& bodies, SnapshotColors* colors) : bodies_(bodies), colors_(*colors) {}
 
   void start_list() { last_ = {}; }
   void check(const ContactKey& key, const Vec3& rolling_impulse, std::uint8_t color) {
@@ -42,20 +41,15 @@ class Checker {
                           "a contact is not of two bodies");
     BinaryReader::require(rolling_impulse == Vec3{} || bodies_.rolls(key.a) || bodies_.rolls(key.b),
                           "a contact of bodies without rolling friction has a rolling impulse");
-    if (color >= soft_step::kColors) return;
-    BinaryReader::require(bodies_.movable(key.a) && bodies_.movable(key.b),
-                          "a contact with an immovable body has a color");
-    const std::uint64_t bit = std::uint64_t{1} << color;
-    BinaryReader::require(((used_[key.a] | used_[key.b]) & bit) == 0,
-                          "two contacts of a body have the same color");
-    used_[key.a] |= bit;
-    used_[key.b] |= bit;
+    colors_.add(bodies_, key.a, key.b, color,
+                {.immovable = "a contact with an immovable body has a color",
+                 .same = "two contacts of a body have the same color"});
   }
 
  private:
   const BodyStore& bodies_;
+  SnapshotColors& colors_;
   ContactKey last_;
-  std::vector<std::uint64_t> used_;  ///< by body: the set of its colors
 };
 
 /// Bytes of a contact of two spheres, of a manifold without points and of a point.
@@ -125,9 +119,9 @@ void write_contacts(BinaryWriter* writer, const ContactSet& set) {
   }
 }
 
-ContactSet read_contacts(BinaryReader* reader, const BodyStore& bodies) {
+ContactSet read_contacts(BinaryReader* reader, const BodyStore& bodies, SnapshotColors* colors) {
   ContactSet set;
-  Checker checker(bodies);
+  Checker checker(bodies, colors);
   read_spheres(*reader, &checker, &set);
   read_manifolds(*reader, &checker, &set);
   BinaryReader::require(

@@ -4,6 +4,7 @@
 #include "src/base/binary_archive.hpp"
 #include "src/contact_solver/soft_step/contact_set.hpp"
 #include "src/world/body_store.hpp"
+#include "src/world/snapshot_checks.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -11,8 +12,10 @@ inline namespace JFPX_ABI {
 /// Writes what ContactCache::match() reads of the contacts of a completed step.
 void write_contacts(BinaryWriter* writer, const soft_step::ContactSet& contacts);
 /// Reads contacts of the bodies; all other members of the contacts are zero.
+/// @param colors receives the colors of the contacts
 /// @throws InvalidSnapshot, std::bad_alloc
-soft_step::ContactSet read_contacts(BinaryReader* reader, const BodyStore& bodies);
+soft_step::ContactSet read_contacts(BinaryReader* reader, const BodyStore& bodies,
+                                    SnapshotColors* colors);
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -32,7 +32,8 @@ void World::Impl::read(BinaryReader* reader) {
   const auto steps_before = reader->get<std::uint64_t>();
   BodyStore bodies = empty_store(settings);
   bodies.read(reader);
-  soft_step::ContactSet last = read_contacts(reader, bodies);
+  SnapshotColors colors(bodies.capacity());
+  soft_step::ContactSet last = read_contacts(reader, bodies, &colors);
   ContactList list;
   list.contacts = reader->get<std::vector<Contact>>();
   list.detected = reader->get<std::uint64_t>();
@@ -42,7 +43,7 @@ void World::Impl::read(BinaryReader* reader) {
   ForceRestorer new_forces(reader, forces);
   GeneratorRestorer new_generators(reader, generators);
   JointStore new_joints;
-  if (reader->left() > 0) new_joints = read_joints(reader, last, &bodies);
+  if (reader->left() > 0) new_joints = read_joints(reader, &colors, &bodies);
   BinaryReader::require(reader->left() == 0, "it is too long");
   BinaryReader::require(new_joints.empty() || settings.solver == Solver::soft_step,
                         "it has joints, and the solver worst_first");
