@@ -481,13 +481,16 @@ void seal(Snapshot* snapshot) {
   std::memcpy(bytes.data() + bytes.size() - kChecksum, &checksum, sizeof checksum);
 }
 
-TEST_P(Snapshots, OfBadContentIsAnErrorOrAWorldThoughTheChecksumIsRight) {
-  World world = small_world();
+constexpr std::size_t kHeader = 24;
+
+/// Restores the snapshot of a world with each byte changed to some values, from byte `first` on.
+/// Checks that each is either an error or the world of the snapshot, which makes steps.
+/// @param accepted receives how many are no error. @returns the messages of the errors
+std::set<std::string> complaints_about_bytes(World& world, std::size_t first,
+                                             std::size_t* accepted) {
   const Snapshot good = world.snapshot();
   std::set<std::string> complaints;
-  std::size_t accepted = 0;
-  constexpr std::size_t kHeader = 24;
-  for (std::size_t i = kHeader; i < good.bytes.size() - 8; ++i) {
+  for (std::size_t i = first; i < good.bytes.size() - 8; ++i) {
     for (const int value : {0x00, 0x01, 0x7f, 0x80, 0xff}) {
       Snapshot bad = good;
       bad.bytes[i] = static_cast<std::byte>(value);
@@ -497,11 +500,19 @@ TEST_P(Snapshots, OfBadContentIsAnErrorOrAWorldThoughTheChecksumIsRight) {
         complaints.insert(found);
         continue;
       }
-      ++accepted;
+      ++*accepted;
       EXPECT_TRUE(world.snapshot() == bad) << "byte " << i << ", value " << value;
       for (int n = 0; n < 2; ++n) world.step();
     }
   }
+  return complaints;
+}
+
+TEST_P(Snapshots, OfBadContentIsAnErrorOrAWorldThoughTheChecksumIsRight) {
+  World world = small_world();
+  const Snapshot good = world.snapshot();
+  std::size_t accepted = 0;
+  const std::set<std::string> complaints = complaints_about_bytes(world, kHeader, &accepted);
   EXPECT_GT(accepted, 200u);
   std::vector<std::string> expected{
       "its list of unused ids is invalid",
@@ -530,6 +541,32 @@ TEST_P(Snapshots, OfBadContentIsAnErrorOrAWorldThoughTheChecksumIsRight) {
     bad.bytes.resize(size);
     seal(&bad);
     EXPECT_NE(complaint(world, bad), "") << "size " << size;
+  }
+}
+
+TEST(SnapshotsOfJoints, OfBadContentAreAnErrorOrAWorldThoughTheChecksumIsRight) {
+  Scene scene;
+  scene.bodies = {test::ground(), test::ball({0, 1, 0}), test::ball({3, 1, 0}),
+                  test::ball({6, 1, 0})};
+  World world(scene);
+  const std::vector<BodyId> ids(world.bodies().begin(), world.bodies().end());
+  world.step();
+  const std::size_t without_joints = world.snapshot().bytes.size();
+  const JointId removed = world.add_joint(DistanceJoint{.a = ids[1]});
+  world.add_joint(DistanceJoint{.a = ids[1], .b = ids[2], .max_length = 3});
+  world.add_joint(DistanceJoint{.a = ids[2], .b = ids[3], .max_length = 3});
+  world.add_joint(DistanceJoint{.a = ids[3], .max_length = 7});
+  world.remove_joint(removed);
+  world.step();
+  std::size_t accepted = 0;
+  const std::set<std::string> complaints =
+      complaints_about_bytes(world, without_joints - 8, &accepted);
+  EXPECT_GT(accepted, 100u);
+  for (const char* reason :
+       {"its list of unused ids of joints is invalid", "its list of joints is invalid",
+        "a joint is not of bodies of the world", "a joint with an immovable body has a color",
+        "two joints or contacts of a body have the same color"}) {
+    EXPECT_TRUE(complaints.contains(std::string("the snapshot is corrupt: ") + reason)) << reason;
   }
 }
 
