@@ -62,6 +62,7 @@ struct PairManifold {
   }
   /// Exchanges the shapes.
   JFPX_HD void flip() {
+    if (point_count == 0 && touch_count == 0) return;  // then the normal is not set
     normal = -normal;
     for (std::uint32_t i = 0; i < point_count; ++i) {
       const Vec3 arm_a = points[i].arm_a;
