@@ -519,6 +519,27 @@ TEST(DeviceQueue, AFailingDeviceIsReplacedInTheMiddleOfAQueue) {
   }
 }
 
+/// Parts of removed compounds stay in the arrays of the device until the world is sent again.
+TEST_P(DeviceQueueTest, CompoundsThatComeAndGoTakeNoMoreMemory) {
+  Compound compound;
+  for (const int x : {-1, 0, 1}) compound.parts.push_back({Sphere{}, {Real(x), 0, 0}});
+  Scene scene;
+  scene.bodies.emplace_back().shape = compound;
+  World world = on_device(scene);
+  BodyId last = world.bodies().front();
+  const auto replace = [&](int times) {
+    for (int n = 0; n < times; ++n) {
+      world.remove(last);
+      last = world.add(scene.bodies.front());
+      ASSERT_TRUE(world.step().device_failure.empty());
+    }
+  };
+  replace(500);
+  const std::size_t before = test::bytes_in_use();
+  replace(2000);
+  EXPECT_LE(test::bytes_in_use(), before + 1024);
+}
+
 /// Several worlds, whose steps run at the same time.
 TEST_P(DeviceQueueTest, WorldsWithChangingBodiesKeepTheirMemoryFlat) {
   const std::uint64_t seed = test::fresh_seed();

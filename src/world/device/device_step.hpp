@@ -75,7 +75,6 @@ class DeviceStep final : public DeviceWorld {
     use_sub_shapes();
     trees_.clear();
     update_trees(bodies);
-    most_parts_ = 2 * sub_shapes->part_count() + 4096;
     known_ = sent_ = {};
     last_contacts().upload(transfer_, last->view(), room_);
     known_.contacts[1 - now()] = last_contacts().sizes();
@@ -100,7 +99,7 @@ class DeviceStep final : public DeviceWorld {
   }
 
   bool has_room(std::size_t slots) const noexcept override {
-    return slots <= room_ && sub_shapes_[sub_shapes_now_].part_count() <= most_parts_;
+    return slots <= room_ && sub_shapes_[sub_shapes_now_].has_room();
   }
 
   void edit(const BodyStore& bodies, const BodyEdits& edits) override {
@@ -490,7 +489,6 @@ class DeviceStep final : public DeviceWorld {
   Contacts contacts_[2];  ///< as Progress::contacts
   ScratchBuffers<Device> scratch_;
   std::size_t room_ = 0;             ///< number of slots that the buffers of bodies have memory for
-  std::size_t most_parts_ = 0;       ///< of compounds, with those that were removed
   Progress known_;                   ///< of the steps that the host has waited for
   Progress sent_;                    ///< Progress::offset and held, as the device has them
   Progress source_;                  ///< of copies to the device

@@ -5,6 +5,8 @@
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 
 namespace jfpx {
@@ -14,18 +16,20 @@ namespace device {
 template <class Device>
 class SubShapeBuffers {
  public:
-  /// Copies sub-shapes to the device. @param part_count number of parts of compounds
+  /// Copies sub-shapes to the device, with memory for parts of compounds that are added later.
+  /// @param part_count number of parts of compounds
   void upload(const Transfer<Device>& transfer, const SubShapeView& from, std::size_t part_count) {
     const std::uint32_t bounded = from.ranges.bounded();
     ranges_ = from.ranges;
     part_count_ = static_cast<std::uint32_t>(part_count);
+    part_room_ = 2 * part_count + 1024;
     transfer.put(&bodies_, from.bodies, ranges_.all());
     transfer.put(&numbers_, from.numbers, ranges_.all());
     transfer.put(&bounds_, from.all_bounds, bounded);
     transfer.put(&solids_, from.solids, bounded - ranges_.spheres());
     transfer.put(&walls_, from.walls, ranges_.all() - bounded);
     transfer.put(&parts_, from.parts, bounded);
-    transfer.put(&local_, from.local, part_count);
+    transfer.put(&local_, from.local, part_count, part_room_);
   }
 
   /// Makes room for the sub-shapes of two objects. complete() must follow.
@@ -34,13 +38,15 @@ class SubShapeBuffers {
     const SubShapeRanges most = a.ranges_ + b.ranges_;
     const std::size_t all = most.all(), bounded = most.bounded();
     part_count_ = a.part_count_ + b.part_count_;
-    return {.bodies = transfer.room_to_grow(&bodies_, all),
-            .numbers = transfer.room_to_grow(&numbers_, all),
-            .bounds = transfer.room_to_grow(&bounds_, bounded),
-            .solids = transfer.room_to_grow(&solids_, bounded - most.spheres()),
-            .walls = transfer.room_to_grow(&walls_, all - bounded),
-            .parts = transfer.room_to_grow(&parts_, bounded),
-            .local = transfer.room_to_grow(&local_, part_count_)};
+    part_room_ = a.part_room_;
+    return {
+        .bodies = transfer.room_to_grow(&bodies_, all),
+        .numbers = transfer.room_to_grow(&numbers_, all),
+        .bounds = transfer.room_to_grow(&bounds_, bounded),
+        .solids = transfer.room_to_grow(&solids_, bounded - most.spheres()),
+        .walls = transfer.room_to_grow(&walls_, all - bounded),
+        .parts = transfer.room_to_grow(&parts_, bounded),
+        .local = transfer.room_to_grow(&local_, std::max<std::size_t>(part_room_, part_count_))};
   }
   void complete(const SubShapeRanges& ranges) { ranges_ = ranges; }
 
@@ -56,6 +62,8 @@ class SubShapeBuffers {
   }
   const SubShapeRanges& ranges() const { return ranges_; }
   std::uint32_t part_count() const { return part_count_; }
+  /// Whether so few parts were added and removed since upload() that no new upload() is due.
+  bool has_room() const { return part_count_ <= part_room_; }
 
  private:
   template <class T>
@@ -68,6 +76,7 @@ class SubShapeBuffers {
   Buffer<Transform> local_;
   SubShapeRanges ranges_;
   std::uint32_t part_count_ = 0;  ///< size of local_, with parts of compounds that were removed
+  std::size_t part_room_ = 0;
 };
 
 }  // namespace device
