@@ -1,5 +1,5 @@
-// Exit status 0 if Bullet's library rounds each product before it adds it, 1 if it was compiled with fused
-// multiply-add. The inertia of a box is a sum of two products, computed in the library.
+// Exit status 0 if Bullet's library rounds each product before it adds it, 1 if it was compiled
+// with fused multiply-add. The inertia of a box is a sum of two products, computed in the library.
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 
 int main() {

@@ -29,7 +29,7 @@ struct Record {
 
 /// Runs in one block.
 __global__ void record_height(jfpx::cuda::DeviceStates states, Record* record) {
-  if (*states.missing_steps != 0) return;  // the host will make these steps
+  if (*states.deferred_steps != 0) return;  // the host will make these steps
   __shared__ unsigned highest;
   if (threadIdx.x == 0) highest = 0;
   __syncthreads();

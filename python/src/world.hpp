@@ -58,7 +58,8 @@ class PythonWorld {
   StepReport finish_steps();
   /// Changes when device_states() of before become invalid.
   std::uint64_t changes() const {
-    return world_ == nullptr ? ~std::uint64_t{0} : changes_ + WorldAccess::impl(*world_).departures;
+    return world_ == nullptr ? ~std::uint64_t{0}
+                             : changes_ + WorldAccess::impl(*world_).mirror.departures;
   }
   /// Frees the world now. Every later access fails.
   void close();

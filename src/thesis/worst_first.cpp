@@ -75,7 +75,7 @@ bool WorstFirst::advance(WorldAccess::Impl* world, StepReport* report) {
 /// Detects the contacts of the current poses and calls the contact generators.
 void WorstFirst::find_contacts(WorldAccess::Impl* world, StepReport* report) {
   world->start_detection();
-  world->contacts.get([&](ContactList* list) {
+  world->contacts.last.get([&](ContactList* list) {
     const BodyStore& store = world->store;
     list->contacts.clear();
     report->sphere_contacts = search_.find_contacts(store, &world->contact_finder, &list->contacts);

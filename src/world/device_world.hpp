@@ -61,7 +61,7 @@ class DeviceWorld {
   /// Steps that finish() has found.
   struct Finished {
     std::uint64_t completed = 0;  ///< number of complete steps
-    std::uint64_t missing = 0;    ///< number of steps after them that the caller must make
+    std::uint64_t deferred = 0;   ///< number of steps after them that the caller must make
     Result last;                  ///< of the last complete step, if none is missing; without times
   };
 

@@ -50,10 +50,7 @@ bool World::Impl::all_finite(const std::optional<BodyId>& runaway, StepReport* r
 void World::Impl::start_detection() {
   if (bodies_changed) contact_finder.set_bodies(store);
   bodies_changed = false;
-  std::swap(contacts, contacts_before);
-  std::swap(detected, detected_before);
-  contacts.invalidate();
-  contacts_are_new = true;
+  contacts.begin_detection();
 }
 
 void World::Impl::finish_detection(StepReport* report) {
@@ -64,18 +61,19 @@ void World::Impl::finish_detection(StepReport* report) {
 /// Detection of Solver::soft_step. The list of contacts is made only if generators may read it.
 void World::Impl::find_contacts(StepReport* report) {
   soft_step::ContactSet& near = soft_step.contacts();
+  DetectedContacts& found = contacts.detected;
   const std::size_t spheres = contact_finder.find_near_contacts(
-      store, scene.soft_step.speculative_margin, pool.get(), &near, &detected);
-  report->sphere_contacts = spheres + detected.other_spheres;
-  report->contacts = spheres + detected.others.size();
-  copy_array(pool.get(), store.moving.position, &detected.position);
-  detected.generated.clear();
+      store, scene.soft_step.speculative_margin, pool.get(), &near, &found);
+  report->sphere_contacts = spheres + found.other_spheres;
+  report->contacts = spheres + found.others.size();
+  copy_array(pool.get(), store.moving.position, &found.position);
+  found.generated.clear();
   if (generators.ids().empty()) return;
-  ContactList& list = *contacts.storage();
-  list_maker.make(detected, near.view(), false, BodiesOfStep(store), scene.materials, &list);
+  ContactList& list = *contacts.last.storage();
+  contacts.maker.make(found, near.view(), false, BodiesOfStep(store), scene.materials, &list);
   call_generators(&list.contacts, report);
   const auto generated = std::span(list.contacts).subspan(list.detected);
-  detected.generated.assign(generated.begin(), generated.end());
+  found.generated.assign(generated.begin(), generated.end());
 }
 
 /// The contact generators append to the list of contacts.
@@ -105,7 +103,7 @@ std::uint32_t World::Impl::count_awake() const {
 /// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
 bool World::Impl::advance(StepReport* report) {
   if (steps_on_device && advance_on_device(report)) return !report->non_finite;
-  if (resident) leave_device();
+  if (resident()) leave_device();
   const std::string failure = report->device_failure;
   const bool completed =
       worst_first == nullptr ? advance_soft_step(report) : worst_first->advance(this, report);
@@ -123,7 +121,7 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   start_detection();
   find_contacts(report);
   finish_detection(report);
-  soft_step.add_generated(store, detected.generated);
+  soft_step.add_generated(store, contacts.detected.generated);
   const double detect_ms = watch.lap_ms();
   if (!all_finite(soft_step.solve(&store, joints.view()), report)) return false;
   const MetCounts met = count_met_contacts(soft_step.contacts().view(), pool.get());
@@ -179,11 +177,7 @@ void World::Impl::undo_motion() noexcept {
 /// empties World::contacts() and World::contact_events().
 void World::Impl::undo() noexcept {
   if (is_saved) undo_motion();
-  if (contacts_are_new) {
-    std::swap(contacts, contacts_before);
-    std::swap(detected, detected_before);
-  }
-  shows_contacts = shows_events = false;
+  contacts.undo_step();
   spent_us = 0;
 }
 
@@ -202,7 +196,7 @@ StepReport World::step() {
 }
 
 void World::Impl::report_backend(StepReport* report) const {
-  if (resident) {
+  if (resident()) {
     report->backend = Backend::cuda;
     if (automatic != nullptr) report->choice = automatic->reason();
     return;
@@ -220,8 +214,7 @@ StepReport World::Impl::make_step() {
     report = last_report;
     report.step = ++steps;
     report.integrate_ms = report.detect_ms = report.resolve_ms = 0;
-    if (!repeats_contacts) events.invalidate();
-    repeats_contacts = shows_contacts = shows_events = true;
+    contacts.repeat_step();
     report.total_ms = watch.lap_ms();
     return report;
   }
@@ -233,14 +226,12 @@ StepReport World::Impl::make_step() {
   } catch (const std::bad_alloc&) {
     throw OutOfMemory(no_memory_for("a step", store.size()));
   }
-  contacts_are_new = repeats_contacts = false;
+  contacts.begin_step();
   query_tree.invalidate();
-  events.invalidate();
-  contacts_by_body.invalidate();
   try {
     if (advance(&report)) {
       ++steps;
-      shows_contacts = shows_events = true;
+      contacts.complete_step();
     } else {
       undo();
     }
@@ -253,7 +244,7 @@ StepReport World::Impl::make_step() {
   }
   report.step = steps;
   report_backend(&report);
-  if (!resident) report.awake = count_awake();
+  if (!resident()) report.awake = count_awake();
   report.total_ms = watch.lap_ms();
   spent_us = 1e3 * report.total_ms;
   note_rest(report);

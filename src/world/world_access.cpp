@@ -15,14 +15,14 @@ BodyId World::add(const BodyDef& body) {
   validate_body(body, number);
   const BodyId id = impl_->add(body);
   impl_->note_change();
-  impl_->shows_contacts = false;
+  impl_->contacts.shows_list = false;
   return id;
 }
 
 void World::remove(BodyId id) {
   impl_->store.require(id);
   impl_->remove(id);
-  impl_->shows_contacts = false;
+  impl_->contacts.shows_list = false;
   impl_->note_change();
 }
 
@@ -155,16 +155,16 @@ double World::time() const {
 
 std::span<const Contact> World::contacts() const {
   impl_->finish();
-  if (!impl_->shows_contacts) return {};
+  if (!impl_->contacts.shows_list) return {};
   return impl_->contact_list().contacts;
 }
 
 std::span<const ContactEvent> World::contact_events() const {
   impl_->finish();
-  if (!impl_->shows_events) return {};
+  if (!impl_->contacts.shows_events) return {};
   const ContactList &before = impl_->contact_list_before(), &now = impl_->contact_list();
-  return impl_->events.between(std::span(before.contacts).first(before.detected),
-                               std::span(now.contacts).first(now.detected));
+  return impl_->contacts.events.between(std::span(before.contacts).first(before.detected),
+                                        std::span(now.contacts).first(now.detected));
 }
 
 std::uint64_t World::state_hash() const { return jfpx::state_hash(states()); }

@@ -4,21 +4,19 @@
 #include <jfpx/world.hpp>
 
 #include "src/world/automatic_device.hpp"
-#include "src/world/bodies_of_step.hpp"
 #include "src/world/body_store.hpp"
 #include "src/world/callback_registry.hpp"
-#include "src/world/contact_events.hpp"
 #include "src/world/contact_finder.hpp"
-#include "src/world/contact_list.hpp"
-#include "src/world/contacts_by_body.hpp"
 #include "src/world/device_world.hpp"
 #include "src/world/force_snapshot.hpp"
+#include "src/world/host_mirror.hpp"
 #include "src/world/joint_store.hpp"
 #include "src/world/query_tree.hpp"
 #include "src/world/soft_step.hpp"
+#include "src/world/step_contacts.hpp"
+#include "src/world/step_queue.hpp"
 #include "src/world/thesis_table.hpp"
 
-#include <atomic>
 #include <mutex>
 
 namespace jfpx {
@@ -62,20 +60,20 @@ struct World::Impl {
   /// concurrently.
   const BodyStore& bodies() {
     finish();
-    if (resident) fetch_motion();
+    if (resident()) fetch_motion();
     return store;
   }
   /// The bodies for reading what BodyState has, likewise: a copy of less than half as much.
   const BodyStore& bodies_with_states() {
     finish();
-    if (resident) fetch_states();
+    if (resident()) fetch_states();
     return store;
   }
   /// The bodies for a change. The next step uploads the world again.
   BodyStore& changed_bodies() {
     finish();
     steps_at_rest = 0;
-    if (resident) leave_device();
+    if (resident()) leave_device();
     return store;
   }
   /// Adds a body, on the device, too, if that has the state of the world.
@@ -121,7 +119,7 @@ struct World::Impl {
   void fetch_motion();
   void fetch_states();
   /// The contacts of the last step that was not undone, and those of the step before, made on
-  /// demand from the contact sets of the solver and `detected`, which a resident world fetches.
+  /// demand; a resident world fetches what they are made from.
   /// Const functions may call them concurrently. @throws std::bad_alloc, DeviceError
   const ContactList& contact_list();
   const ContactList& contact_list_before();
@@ -129,18 +127,10 @@ struct World::Impl {
   /// change what they are made from.
   void make_contact_lists();
   void make_list(bool of_step_before, ContactList* list);
+  /// Whether the device has the state of the world.
+  bool resident() const noexcept { return mirror.is_resident(); }
   /// Fetches everything, so that the host has the state of the world.
   void leave_device();
-  /// The host has the state of the world, and the device no longer.
-  void forget_device() noexcept {
-    resident = false;
-    ++departures;
-    edits.clear();
-    changed.clear();
-    changed_before.clear();
-    joints_changed = false;
-    joints_are_current = true;
-  }
   /// As leave_device(), but the device keeps the state, too. Const functions may call it
   /// concurrently.
   void fetch_all();
@@ -155,21 +145,27 @@ struct World::Impl {
   /// Everything that reads or changes the state calls it first. Const functions may call it
   /// concurrently.
   void finish() {
-    if (has_queue.load(std::memory_order_acquire)) finish_queue();
+    if (queue.state.load(std::memory_order_acquire) != StepQueue::State::empty) finish_queue();
   }
+  void open_queue() noexcept {
+    StepQueue::State expected = StepQueue::State::empty;
+    queue.state.compare_exchange_strong(expected, StepQueue::State::open);
+  }
+  bool is_launched() const { return queue.state == StepQueue::State::launched; }
   void finish_queue();
   void finish_launched();
-  void make_missing_steps();
+  void make_deferred_steps();
   void launch(cuda::Stream stream);
   void keep_report(StepReport report);
-  /// Steps of captured graphs must see a change that the host is going to record: until the host
-  /// has sent it, it makes them.
+  /// Disables captured graphs before the host records a change. Steps of graphs are deferred until
+  /// the host has sent the change.
   void hold_graphs();
   /// Whether a graph may be launched at any time.
-  bool has_graph() const { return resident && device->has_graph(); }
+  bool has_graph() const { return resident() && device->has_graph(); }
   /// Whether the host has changes for the next step that the device does not have yet.
   bool has_changes() const {
-    return !resident || !edits.empty() || joints_changed || device->is_held();
+    return !resident() || !mirror.edits.empty() ||
+           mirror.joints == HostMirror::Joints::newer_on_host || device->is_held();
   }
   /// Sends them, so that graphs can be captured and replayed.
   void send_changes();
@@ -191,11 +187,11 @@ struct World::Impl {
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
     finish();
-    if (resident) {
+    if (resident()) {
       edited_body(body.index, {.wakes_neighbors = true});
       return;
     }
-    contacts_by_body.for_each(contact_list().contacts, body, [&](const Contact& c) {
+    contacts.by_body.for_each(contact_list().contacts, body, [&](const Contact& c) {
       const BodyId other = c.a == body ? c.b : c.a;
       if (!c.sensor && store.contains(other)) wake(other.index);
     });
@@ -259,9 +255,8 @@ struct World::Impl {
 
   std::unique_ptr<ThreadPool> pool;  ///< of the collider, if make_sphere_collider() made it, too
   Scene scene;                       ///< the settings, without bodies, pairs and joints
-  /// Bodies. While `resident`, their motion may be older than that on the device.
-  BodyStore store;
-  JointStore joints;  ///< while `resident`, what they keep may be older than on the device
+  BodyStore store;                   ///< `mirror` says whether the motion is that on a device
+  JointStore joints;                 ///< likewise for what they keep
   ContactFinder contact_finder;
   SoftStep soft_step;                           ///< of Solver::soft_step
   std::unique_ptr<WorstFirstStep> worst_first;  ///< of Solver::worst_first; otherwise null
@@ -269,59 +264,25 @@ struct World::Impl {
   CallbackRegistry<ContactContext, ContactGeneratorId> generators{"contact generator"};
   bool bodies_changed = true;  ///< whether contact_finder.set_bodies() must be called
   Lazy<QueryTree> query_tree;  ///< of the bodies, built by the first query after a change
-  /// Of contact_list() and contact_list_before(). Bodies may have been removed since.
-  Lazy<ContactList> contacts, contacts_before;
-  DetectedContacts detected, detected_before;  ///< of the same steps, unless on a device
-  ContactListMaker list_maker{pool.get()};
-  ContactsByBody contacts_by_body;  ///< of `contacts`
-  bool contacts_are_new = false;    ///< whether the contacts of both steps have been swapped
-  /// Whether World::contacts() returns `contacts`; false after a body was added or removed, or a
-  /// step undone.
-  bool shows_contacts = false;
-  bool shows_events = false;  ///< whether the last step was not undone
-  ContactEvents events;
+  StepContacts contacts{pool.get()};
   MotionArrays before;    ///< state that an undone step restores
   bool is_saved = false;  ///< whether `before` is that of the current step
   std::uint64_t steps = 0;
   /// Number of steps, up to the last one, after which no body was awake, without a change since.
   std::uint32_t steps_at_rest = 0;
   StepReport last_report;  ///< of the last of these steps
-  /// Whether the last step was left out: the contacts before it are those after it.
-  bool repeats_contacts = false;
 
   std::unique_ptr<DeviceWorld> device;  ///< null: the world is not stepped on a device
   std::string device_failure;           ///< why there is no `device` any more; empty: no failure
   ForceTable force_table;               ///< of `forces`, for the device
-  bool resident = false;                ///< whether the device has the state of the world
-  std::atomic<std::uint64_t> departures{0};    ///< how often it has lost that state
+  HostMirror mirror;
   bool steps_on_device = false;                ///< whether the device makes the step in progress
   std::unique_ptr<AutomaticDevice> automatic;  ///< of Backend::automatic; null: a fixed backend
   /// [us] Duration of the last step and of the copies between host and device since, for
   /// `automatic`; 0: unknown.
   double spent_us = 0;
-  /// While resident: edits that the device does not have yet, and the bodies whose forces on the
-  /// host are those of the next step. The forces of all others are 0 on the host.
-  BodyEdits edits;
-  /// While resident: bodies that contact lists of the last step, and of the step before it, show
-  /// otherwise than they are now.
-  ListedBodies changed, changed_before;
-  std::vector<std::uint32_t> forced_bodies;
-  bool joints_changed = false;  ///< while resident: since the device has received the joints
-  /// While resident: whether the arrays of the host are those of the device.
-  /// `states_are_current`: at least what BodyState has, which edits of other bodies do not change.
-  bool motion_is_current = true, states_are_current = true, contact_set_is_current = true;
-  bool joints_are_current = true;
   std::mutex fetching;  ///< held by functions that fetch, because const functions may call them
-
-  /// Whether steps may have been enqueued, or replayed by a graph, that the host has not waited
-  /// for.
-  std::atomic<bool> has_queue{false};
-  bool is_launched = false;         ///< whether the device has enqueued steps
-  std::uint64_t missing_steps = 0;  ///< steps of the queue that the host must make
-  std::string queue_failure;        ///< why the device cannot make them; empty: no failure
-  StepReport queue_report;          ///< of the last step of a queue
-  bool is_finishing = false;        ///< guarded by `finishing`
-  std::recursive_mutex finishing;   ///< held by finish_queue(), whose steps call finish() again
+  StepQueue queue;
 };
 
 }  // namespace JFPX_ABI

@@ -47,7 +47,7 @@ void World::Impl::begin_joint_edit(const JoinedBodies& joined) {
 }
 
 void World::Impl::complete_joint_edit(const JoinedBodies& joined) {
-  joints_changed = true;
+  mirror.joints = HostMirror::Joints::newer_on_host;
   for_each_joined(joined, [this](std::uint32_t body) { wake(body); });
 }
 
@@ -100,7 +100,7 @@ void World::Impl::remove_joints_of(std::uint32_t body) {
   });
   if (!any) return;
   // From here on, nothing throws.
-  joints_changed = true;
+  mirror.joints = HostMirror::Joints::newer_on_host;
   joints.for_each_of(body, [&](std::uint32_t joint) {
     const JoinedBodies joined = joined_bodies(joints.joint(joint));
     joints.remove(joint);
@@ -112,15 +112,15 @@ void World::Impl::remove_joints_of(std::uint32_t body) {
 
 void World::Impl::fetch_joints() {
   const std::lock_guard lock(fetching);
-  if (joints_are_current) return;
+  if (mirror.joints != HostMirror::Joints::newer_on_device) return;
   device->fetch_joints(&joints);
-  joints_are_current = true;
+  mirror.joints = HostMirror::Joints::equal;
 }
 
 void World::Impl::flush_joints() {
-  if (!joints_changed) return;
+  if (mirror.joints != HostMirror::Joints::newer_on_host) return;
   device->upload_joints(&joints);
-  joints_changed = false;
+  mirror.joints = HostMirror::Joints::equal;
 }
 
 JointId World::add_joint(const Joint& joint) {

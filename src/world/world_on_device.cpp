@@ -13,6 +13,8 @@ inline namespace JFPX_ABI {
 
 namespace {
 
+using Motion = HostMirror::Motion;
+
 /// Adds the duration of a scope to `us`, also if an exception leaves the scope.
 class ScopedTimer {
  public:
@@ -36,7 +38,7 @@ std::unique_ptr<DeviceWorld> World::Impl::warmed(std::unique_ptr<DeviceWorld> de
   world.impl_->device = std::move(device);
   const StepReport report = world.step();
   if (!report.device_failure.empty()) throw DeviceError(report.device_failure);
-  world.impl_->forget_device();
+  world.impl_->mirror.leave();
   return std::move(world.impl_->device);
 }
 
@@ -59,7 +61,7 @@ void World::Impl::choose_device(StepReport* report) {
 }
 
 void World::Impl::enter_device() {
-  if (resident) return;
+  if (resident()) return;
   make_contact_lists();
   const ScopedTimer timer(&spent_us);
   if (bodies_changed) contact_finder.set_bodies(store);
@@ -67,26 +69,23 @@ void World::Impl::enter_device() {
   force_table.invalidate();
   store.make_inertia_arrays();  // the device adds and edits bodies of any kind
   device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
-  resident = true;
+  mirror.enter();
   device->upload_joints(&joints);
   note_forces();
-  joints_changed = false;
-  joints_are_current = true;
-  motion_is_current = states_are_current = contact_set_is_current = true;
 }
 
 BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
   begin_edit();
-  if (!resident) return store;
-  BodyEdit& all = edits[body];
+  if (!resident()) return store;
+  BodyEdit& all = mirror.edits[body];
   all.sets_state |= edit.sets_state;
   all.sets_mass |= edit.sets_mass;
   all.sets_pairs |= edit.sets_pairs;
   all.wakes |= edit.wakes;
   all.wakes_neighbors |= edit.wakes_neighbors;
-  if (edit.wakes_neighbors) motion_is_current = false;
+  if (edit.wakes_neighbors) mirror.invalidate_other_motion();
   if (edit.sets_mass) {  // the device has the orientation, and computes the inertia in world axes
-    motion_is_current = false;
+    mirror.invalidate_other_motion();
     force_table.invalidate();
   }
   return store;
@@ -94,7 +93,7 @@ BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
 
 BodyStore& World::Impl::edited_body_in_lists(std::uint32_t body, const BodyEdit& edit) {
   finish();
-  if (resident) {
+  if (resident()) {
     remember_listed(body);
   } else {
     make_contact_lists();
@@ -104,16 +103,17 @@ BodyStore& World::Impl::edited_body_in_lists(std::uint32_t body, const BodyEdit&
 
 void World::Impl::remember_listed(std::uint32_t body) {
   const ListedBody shown = listed(store, body);
-  changed_before.try_emplace(body, shown);
-  changed.try_emplace(body, shown);
+  mirror.changed_before.try_emplace(body, shown);
+  mirror.changed.try_emplace(body, shown);
 }
 
 BodyId World::Impl::add(const BodyDef& def) {
   begin_edit();
   const std::uint32_t body = store.next_index();
-  if (resident && !device->has_room(std::size_t{body} + 1)) leave_device();
-  if (!resident) return store.add(def);
+  if (resident() && !device->has_room(std::size_t{body} + 1)) leave_device();
+  if (!resident()) return store.add(def);
   // Everything that may throw, before the store changes.
+  BodyEdits& edits = mirror.edits;
   BodyEdits added{{body, {.is_added = true}}};
   if (edits.size() + 1 >= edits.bucket_count()) edits.reserve(2 * edits.size() + 16);
   const BodyId id = store.add(def);
@@ -126,7 +126,7 @@ BodyId World::Impl::add(const BodyDef& def) {
 void World::Impl::remove(BodyId id) {
   begin_edit();
   const std::uint32_t body = id.index;
-  if (!resident) {
+  if (!resident()) {
     make_contact_lists();
     wake_neighbors(id);
     remove_joints_of(body);
@@ -137,25 +137,26 @@ void World::Impl::remove(BodyId id) {
   // Everything that may throw, before the store changes.
   soft_step.reserve(store.capacity());
   remember_listed(body);
-  edits[body];
+  mirror.edits[body];
   remove_joints_of(body);
-  BodyEdit& edit = edits[body];
-  edit = {.wakes_neighbors = true, .is_removed = true};
-  motion_is_current = false;
+  mirror.edits[body] = {.wakes_neighbors = true, .is_removed = true};
+  mirror.invalidate_other_motion();
   store.remove(id);
   soft_step.forget(body);
   force_table.invalidate();
 }
 
 void World::Impl::note_forces() {
-  forced_bodies.clear();
-  for (const BodyId id : store.ids()) forced_bodies.push_back(id.index);
+  mirror.forced_bodies.clear();
+  for (const BodyId id : store.ids()) mirror.forced_bodies.push_back(id.index);
 }
 
 void World::Impl::flush_edits() {
   flush_joints();
+  BodyEdits& edits = mirror.edits;
   if (edits.empty()) return;
   const ScopedTimer timer(&spent_us);
+  std::vector<std::uint32_t>& forced_bodies = mirror.forced_bodies;
   forced_bodies.reserve(forced_bodies.size() + edits.size());
   device->edit(store, edits);
   for (const auto& [body, edit] : edits) {
@@ -166,75 +167,75 @@ void World::Impl::flush_edits() {
 
 Vec3 World::Impl::position(std::uint32_t body) {
   finish();
-  if (!resident || states_are_current) return store.moving.position[body];
-  const auto edit = edits.find(body);
-  if (edit != edits.end() && (edit->second.sets_state || edit->second.is_added))
+  if (!resident() || mirror.motion >= Motion::states) return store.moving.position[body];
+  const auto edit = mirror.edits.find(body);
+  if (edit != mirror.edits.end() && (edit->second.sets_state || edit->second.is_added))
     return store.moving.position[body];
   return device->fetch_position(body);
 }
 
 void World::Impl::fetch_motion() {
   const std::lock_guard lock(fetching);
-  if (motion_is_current) return;
+  if (mirror.motion == Motion::all) return;
   flush_edits();
   const ScopedTimer timer(&spent_us);
   // Other threads may be reading states that are current.
-  if (!states_are_current) device->fetch_states(&store.moving, pool.get());
+  if (mirror.motion == Motion::stale) device->fetch_states(&store.moving, pool.get());
   device->fetch_other_motion(&store.moving, pool.get());
-  motion_is_current = states_are_current = true;
+  mirror.motion = Motion::all;
 }
 
 void World::Impl::fetch_states() {
   const std::lock_guard lock(fetching);
-  if (states_are_current) return;
+  if (mirror.motion >= Motion::states) return;
   flush_edits();
   const ScopedTimer timer(&spent_us);
   device->fetch_states(&store.moving, pool.get());
-  states_are_current = true;
+  mirror.motion = Motion::states;
 }
 
 void World::Impl::make_list(bool of_step_before, ContactList* list) {
   const std::lock_guard lock(fetching);
   const ScopedTimer timer(&spent_us);
-  DetectedContacts* found = of_step_before ? &detected_before : &detected;
+  DetectedContacts* found = of_step_before ? &contacts.detected_before : &contacts.detected;
   soft_step::ContactSet fetched;
-  const BodiesOfStep bodies(store, of_step_before ? &changed_before : &changed);
-  if (resident) device->fetch_contacts(bodies, of_step_before, &fetched, found);
-  const soft_step::ContactView set = resident         ? fetched.view()
+  const BodiesOfStep bodies(store, of_step_before ? &mirror.changed_before : &mirror.changed);
+  if (resident()) device->fetch_contacts(bodies, of_step_before, &fetched, found);
+  const soft_step::ContactView set = resident()       ? fetched.view()
                                      : of_step_before ? soft_step.contacts_before()
                                                       : soft_step.last_contacts().view();
-  list_maker.make(*found, set, true, bodies, scene.materials, list);
+  contacts.maker.make(*found, set, true, bodies, scene.materials, list);
 }
 
 const ContactList& World::Impl::contact_list() {
-  return contacts.get([this](ContactList* list) { make_list(false, list); });
+  return contacts.last.get([this](ContactList* list) { make_list(false, list); });
 }
 
 const ContactList& World::Impl::contact_list_before() {
-  if (repeats_contacts) return contact_list();
-  return contacts_before.get([this](ContactList* list) { make_list(true, list); });
+  if (contacts.state == StepContacts::State::repeated) return contact_list();
+  return contacts.before.get([this](ContactList* list) { make_list(true, list); });
 }
 
 void World::Impl::make_contact_lists() {
   contact_list();
-  if (shows_events) contact_list_before();
+  if (contacts.shows_events) contact_list_before();
 }
 
 void World::Impl::fetch_contact_set() {
   const std::lock_guard lock(fetching);
-  if (contact_set_is_current) return;
+  if (mirror.has_contact_set) return;
   soft_step.reserve(store.capacity());
   const ScopedTimer timer(&spent_us);
   soft_step::ContactSet last;
   device->fetch_contact_set(&last);
   soft_step.replace_last_contacts(std::move(last));
-  contact_set_is_current = true;
+  mirror.has_contact_set = true;
 }
 
 void World::Impl::fetch_all() {
   finish();
   make_contact_lists();
-  if (resident) {
+  if (resident()) {
     fetch_motion();
     fetch_contact_set();
     fetch_joints();
@@ -245,7 +246,7 @@ void World::Impl::fetch_all() {
 
 void World::Impl::leave_device() {
   fetch_all();
-  forget_device();
+  mirror.leave();
 }
 
 /// One step on the device. If it fails, the CPU continues: the state is fetched, and later steps do
@@ -259,7 +260,7 @@ bool World::Impl::advance_on_device(StepReport* report) {
   } catch (const OutOfMemory& error) {
     report->device_failure = error.what();
   }
-  if (resident) {
+  if (resident()) {
     if (is_saved) undo_motion();  // the host applies the forces of this step again
     leave_device();
   }
@@ -307,20 +308,13 @@ bool World::Impl::step_on_device(StepReport* report) {
 
 /// The device has completed steps: the host has nothing of the last one yet.
 void World::Impl::complete_on_device(std::uint64_t count) {
-  for (const std::uint32_t body : forced_bodies) {
+  for (const std::uint32_t body : mirror.forced_bodies) {
     store.moving.force[body] = store.moving.torque[body] = {};
   }
-  forced_bodies.clear();
-  if (count > 1) {  // then those of the step before the last are on the device, too
-    contacts.invalidate();
-    changed.clear();
-  }
-  std::swap(contacts, contacts_before);
-  contacts.invalidate();
-  changed_before = std::exchange(changed, {});
+  if (count > 1) contacts.last.invalidate();  // the step before the last is one of these steps
+  contacts.begin_detection();
   soft_step.forget_none();
-  motion_is_current = states_are_current = contact_set_is_current = false;
-  joints_are_current = joints.empty();
+  mirror.complete_steps(count, !joints.empty());
 }
 
 void World::Impl::fill_report(const DeviceWorld::Result& result, StepReport* report) {

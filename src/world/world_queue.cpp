@@ -29,32 +29,32 @@ void World::Impl::send_changes() {
 
 void World::Impl::enqueue(std::uint32_t count, cuda::Stream stream) {
   if (count == 0) return;
-  if (has_changes() || missing_steps > 0 || !queue_failure.empty()) finish();
-  has_queue.store(true, std::memory_order_release);
-  missing_steps = count;
+  if (has_changes() || queue.deferred_steps > 0 || !queue.failure.empty()) finish();
+  open_queue();
+  queue.deferred_steps = count;
   try {
     launch(stream);
   } catch (const DeviceError& error) {
-    queue_failure = error.what();
+    queue.failure = error.what();
   } catch (const OutOfMemory& error) {
-    queue_failure = error.what();
+    queue.failure = error.what();
   } catch (...) {
-    missing_steps = 0;
+    queue.deferred_steps = 0;
     throw;
   }
-  if (missing_steps > 0) finish();
+  if (queue.deferred_steps > 0) finish();
 }
 
-/// Enqueues the missing steps on the device, as far as it can make them without the host.
+/// Enqueues the deferred steps on the device, as far as it can make them without the host.
 void World::Impl::launch(cuda::Stream stream) {
-  if (device == nullptr || (!is_launched && !has_graph() && is_at_rest())) return;
+  if (device == nullptr || (!is_launched() && !has_graph() && is_at_rest())) return;
   device->wait_for(stream);
   if (!generators.ids().empty()) return;
   enter_device();
   flush_edits();
   if (!force_table.update(forces, store)) return;
-  is_launched = true;
-  device->enqueue(forces.empty() ? nullptr : &force_table, steps, stream, &missing_steps);
+  queue.state.store(StepQueue::State::launched, std::memory_order_release);
+  device->enqueue(forces.empty() ? nullptr : &force_table, steps, stream, &queue.deferred_steps);
 }
 
 void World::Impl::capture(std::uint32_t count, cuda::Stream stream) {
@@ -79,34 +79,39 @@ void World::Impl::capture(std::uint32_t count, cuda::Stream stream) {
         "stream is being captured; the world must then have made a step on the device since it "
         "moved there, and device_states() must have been called before the capture");
   }
-  has_queue.store(true, std::memory_order_release);
+  open_queue();
 }
 
 void World::Impl::finish_queue() {
-  const std::lock_guard lock(finishing);
-  if (is_finishing || !has_queue.load(std::memory_order_relaxed)) return;
+  using State = StepQueue::State;
+  const std::lock_guard lock(queue.finishing);
+  const State state = queue.state.load(std::memory_order_relaxed);
+  if (state == State::empty || state == State::finishing) return;
   struct Scope {
-    explicit Scope(Impl* impl) : w(impl) { w->is_finishing = true; }
+    Scope(Impl* impl, State state) : w(impl), after(state) {
+      w->queue.state.store(State::finishing, std::memory_order_relaxed);
+    }
     ~Scope() {
-      w->is_finishing = false;
-      const std::lock_guard lock(w->fetching);
-      const bool is_open = w->is_launched || w->missing_steps > 0 || w->has_graph();
-      w->has_queue.store(is_open, std::memory_order_release);
+      const std::lock_guard device_lock(w->fetching);
+      const bool is_open = w->queue.deferred_steps > 0 || w->has_graph();
+      if (after != State::launched) after = is_open ? State::open : State::empty;
+      w->queue.state.store(after, std::memory_order_release);
     }
     Impl* w;
-  } const scope(this);
+    State after;
+  } scope(this, state);
   {
     const std::lock_guard device_lock(fetching);  // other const functions may be fetching
-    if (is_launched || has_graph()) finish_launched();
+    if (state == State::launched || has_graph()) finish_launched();
   }
-  if (!queue_failure.empty()) {
-    if (resident) leave_device();
-    lose_device(queue_failure);
-    queue_report.device_failure = std::exchange(queue_failure, {});
-    queue_report.step = steps;
+  if (!queue.failure.empty()) {
+    if (resident()) leave_device();
+    lose_device(queue.failure);
+    queue.report.device_failure = std::exchange(queue.failure, {});
+    queue.report.step = steps;
   }
-  is_launched = false;
-  make_missing_steps();
+  scope.after = State::open;
+  make_deferred_steps();
 }
 
 /// Waits for the device, and records what it has completed.
@@ -115,21 +120,19 @@ void World::Impl::finish_launched() {
   try {
     done = device->finish();
   } catch (const DeviceError& error) {
-    queue_failure = error.what();
+    queue.failure = error.what();
     done = device->finish();
   }
   spent_us = 0;
-  missing_steps += done.missing;
+  queue.deferred_steps += done.deferred;
   if (done.completed == 0) return;
+  contacts.begin_step();
   complete_on_device(done.completed);
   steps += done.completed;
-  contacts_are_new = repeats_contacts = false;
-  shows_contacts = shows_events = true;
+  contacts.complete_step();
   query_tree.invalidate();
-  events.invalidate();
-  contacts_by_body.invalidate();
-  if (done.completed > 1 || done.missing > 0) steps_at_rest = 0;  // unknown
-  if (done.missing > 0) return;
+  if (done.completed > 1 || done.deferred > 0) steps_at_rest = 0;  // unknown
+  if (done.deferred > 0) return;
   StepReport report;
   report.step = steps;
   fill_report(done.last, &report);
@@ -140,31 +143,31 @@ void World::Impl::finish_launched() {
 
 /// Keeps the first failure of a device, until finish_steps() has returned it.
 void World::Impl::keep_report(StepReport report) {
-  if (report.device_failure.empty()) std::swap(report.device_failure, queue_report.device_failure);
-  queue_report = std::move(report);
+  if (report.device_failure.empty()) std::swap(report.device_failure, queue.report.device_failure);
+  queue.report = std::move(report);
 }
 
-void World::Impl::make_missing_steps() {
-  for (; missing_steps > 0; --missing_steps) {
+void World::Impl::make_deferred_steps() {
+  for (; queue.deferred_steps > 0; --queue.deferred_steps) {
     try {
       keep_report(make_step());
     } catch (...) {
-      missing_steps = 0;
+      queue.deferred_steps = 0;
       throw;
     }
   }
 }
 
 void World::Impl::drop_queue() noexcept {
-  if (is_launched || has_graph()) {
+  if (is_launched() || has_graph()) {
     try {
       device->finish();
     } catch (...) {  // the state that the device has lost is about to be replaced
     }
   }
-  is_launched = false;
-  missing_steps = 0;
-  queue_failure.clear();
+  if (is_launched()) queue.state.store(StepQueue::State::open, std::memory_order_release);
+  queue.deferred_steps = 0;
+  queue.failure.clear();
 }
 
 namespace cuda {
@@ -191,7 +194,7 @@ auto& with_device(World& world) {
 
 DeviceStates device_states(World& world) {
   auto& w = with_device(world);
-  const bool waits_for_nothing = w.has_queue.load(std::memory_order_relaxed) && !w.has_changes();
+  const bool waits_for_nothing = w.queue.state != StepQueue::State::empty && !w.has_changes();
   if (!waits_for_nothing) w.send_changes();
   return with_device(world).device->states();
 }
@@ -204,8 +207,8 @@ void enqueue_steps(World& world, std::uint32_t count, Stream stream) {
 StepReport finish_steps(World& world) {
   auto& w = WorldAccess::impl(world);
   w.finish();
-  StepReport report = w.queue_report;
-  w.queue_report.device_failure.clear();
+  StepReport report = w.queue.report;
+  w.queue.report.device_failure.clear();
   return report;
 }
 

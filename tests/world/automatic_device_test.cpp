@@ -180,7 +180,7 @@ TEST(AutomaticWorld, HasTheSameBitsWhereverItMoves) {
       ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, world)) << "step " << n;
     }
     const bool on_device = b.backend == Backend::cuda;
-    ASSERT_EQ(on_device, WorldAccess::impl(world).resident);
+    ASSERT_EQ(on_device, WorldAccess::impl(world).resident());
     moves += on_device != was_on_device ? 1 : 0;
     was_on_device = on_device;
     // The device is faster in every second hundred of steps.

@@ -181,11 +181,11 @@ TEST_P(DeviceQueueTest, AStepWithoutRoomIsRepeatedBeforeItCanBeSeen) {
     } else {
       cuda::enqueue_steps(device, 31, nullptr);
     }
-    std::uint64_t missing = 0;
+    std::uint64_t deferred = 0;
     const test::StreamOfUser stream(GetParam(), true);
     cuda::enqueue_steps(device, 1, stream.get());
-    stream.read(&missing, cuda::device_states(device).missing_steps, sizeof missing);
-    EXPECT_GT(missing, 0u);
+    stream.read(&deferred, cuda::device_states(device).deferred_steps, sizeof deferred);
+    EXPECT_GT(deferred, 0u);
     const StepReport a = make_steps(&host, 32), b = cuda::finish_steps(device);
     ASSERT_GT(a.contacts, 200u);
     ASSERT_NO_FATAL_FAILURE(expect_equal(a, b));
@@ -242,7 +242,7 @@ TEST_P(DeviceQueueTest, ARunawayBodyUndoesTheRestOfTheQueue) {
     cuda::enqueue_steps(device, 3, nullptr);
     EXPECT_TRUE(host.snapshot() == device.snapshot());
     EXPECT_NE(device.state(device.bodies()[0]).velocity, Vec3{});
-    EXPECT_TRUE(WorldAccess::impl(device).resident);
+    EXPECT_TRUE(WorldAccess::impl(device).resident());
   }
 }
 
@@ -270,7 +270,7 @@ TEST_P(DeviceQueueTest, ForcesThatWakeABodyAreLeftToTheHost) {
   for (int n = 0; n < 4; ++n) cuda::enqueue_steps(device, 100, nullptr);
   EXPECT_TRUE(host.snapshot() == device.snapshot());
   EXPECT_NE(device.state(device.bodies()[2]).velocity, Vec3{});
-  EXPECT_TRUE(WorldAccess::impl(device).resident);
+  EXPECT_TRUE(WorldAccess::impl(device).resident());
 }
 
 /// A replay after a change of the host must see it, though the graph has no part of it.
@@ -377,7 +377,7 @@ TEST_P(DeviceQueueTest, ASleepingWorldIsLeftAlone) {
   auto& impl = WorldAccess::impl(device);
   ASSERT_TRUE(impl.is_at_rest());
   cuda::enqueue_steps(device, 7, nullptr);
-  EXPECT_FALSE(impl.is_launched);
+  EXPECT_FALSE(impl.is_launched());
   EXPECT_EQ(cuda::finish_steps(device).step, 307u);
   make_steps(&host, 7);
   cuda::device_states(device);
@@ -413,11 +413,12 @@ TEST_P(DeviceQueueTest, StepsThatNeedTheHostAreMadeAtOnce) {
   const StepReport a = make_steps(&host, 5), b = cuda::finish_steps(device);
   ASSERT_NO_FATAL_FAILURE(expect_equal(a, b));
   EXPECT_TRUE(host.snapshot() == device.snapshot());
-  const std::uint64_t departures = WorldAccess::impl(device).departures;
+  const std::uint64_t departures = WorldAccess::impl(device).mirror.departures;
   for (World* world : {&host, &device}) world->add_contact_generator([](ContactContext&) {});
   cuda::device_states(device);
   cuda::enqueue_steps(device, 2, nullptr);
-  EXPECT_GT(WorldAccess::impl(device).departures, departures) << "arrays of before are invalid";
+  EXPECT_GT(WorldAccess::impl(device).mirror.departures, departures)
+      << "arrays of before are invalid";
   make_steps(&host, 2);
   EXPECT_TRUE(host.snapshot() == device.snapshot());
 }
@@ -434,14 +435,14 @@ TEST_P(DeviceQueueTest, StatesAreUpdatedInTheOrderOfTheStream) {
     const cuda::DeviceStates states = cuda::device_states(device);
     std::vector<Vec3> positions(states.slots);
     stream.read(positions.data(), states.positions, states.slots * sizeof(Vec3));
-    std::uint64_t missing = 1;
-    stream.read(&missing, states.missing_steps, sizeof missing);
-    ASSERT_EQ(missing, 0u);
+    std::uint64_t deferred = 1;
+    stream.read(&deferred, states.deferred_steps, sizeof deferred);
+    ASSERT_EQ(deferred, 0u);
     make_steps(&host, 4);
     for (const BodyId id : host.bodies()) {
       ASSERT_EQ(positions[id.index], host.state(id).position) << n;
     }
-    EXPECT_TRUE(WorldAccess::impl(device).is_launched) << "nothing has waited for the queue";
+    EXPECT_TRUE(WorldAccess::impl(device).is_launched()) << "nothing has waited for the queue";
   }
 }
 

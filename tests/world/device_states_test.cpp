@@ -103,7 +103,7 @@ TEST_P(DeviceStatesTest, AreThoseAfterEachStepAndChange) {
       if (n == 9) world->set_state(world->bodies()[2], {{0, 30, 0}, {}, {1, 0, 0}, {0, 2, 0}});
     }
     ASSERT_NO_FATAL_FAILURE(expect_states(&device, host.states())) << "after step " << n;
-    EXPECT_TRUE(WorldAccess::impl(device).resident);
+    EXPECT_TRUE(WorldAccess::impl(device).resident());
   }
 }
 

@@ -111,7 +111,7 @@ TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) {
       if (n % 3 != 0) continue;
       ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
     }
-    EXPECT_TRUE(WorldAccess::impl(device).resident);
+    EXPECT_TRUE(WorldAccess::impl(device).resident());
   }
 }
 
@@ -163,7 +163,7 @@ TEST_P(DeviceWorldTest, ManyFixedBodiesHaveTheBitsOfTheProcessor) {
     }
   }
   EXPECT_GT(contacts, 1000u);
-  EXPECT_TRUE(WorldAccess::impl(device).resident);
+  EXPECT_TRUE(WorldAccess::impl(device).resident());
 }
 
 TEST_P(DeviceWorldTest, NamedScenesHaveTheBitsOfTheProcessor) {
@@ -273,7 +273,7 @@ TEST_P(DeviceWorldTest, ChangesBetweenStepsReachTheDevice) {
           }
         }
       }
-      if (!WorldAccess::impl(device).resident) ++uploads;
+      if (!WorldAccess::impl(device).resident()) ++uploads;
       host.step();
       device.step();
       ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k << ", step " << n;
@@ -297,7 +297,7 @@ TEST_P(DeviceWorldTest, EditsOfBodiesDoNotMoveTheWorld) {
       host.step();
       device.step();
       ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
-      ASSERT_TRUE(WorldAccess::impl(device).resident);
+      ASSERT_TRUE(WorldAccess::impl(device).resident());
     }
   };
   const BodyId ball = host.bodies().back(), box = host.body_at(5);
@@ -371,7 +371,7 @@ TEST_P(DeviceWorldTest, BodiesComeAndGoOnTheDevice) {
       if (random.below(8) == 0) {
         ASSERT_TRUE(host.snapshot() == device.snapshot()) << "step " << n;
       }
-      if (!WorldAccess::impl(device).resident) ++uploads;
+      if (!WorldAccess::impl(device).resident()) ++uploads;
       const StepReport a = host.step(), b = device.step();
       ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "scene " << k << ", step " << n;
       ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k << ", step " << n;
@@ -400,7 +400,7 @@ TEST_P(DeviceWorldTest, ABodyInTheSlotOfARemovedOneStartsWithoutContacts) {
       EXPECT_EQ(world->add(same).index, 5u);
     }
     host.step(), device.step();
-    ASSERT_TRUE(WorldAccess::impl(device).resident);
+    ASSERT_TRUE(WorldAccess::impl(device).resident());
     ASSERT_EQ(host.state_hash(), device.state_hash());
     ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
   }
@@ -638,7 +638,7 @@ TEST_P(DeviceWorldTest, ForcesThatWakeABodyRunOnTheHostInThatStep) {
   EXPECT_FALSE(host.awake(host.bodies()[0]));
   // The blast wakes the first ball, this wakes the second by the spring, and the blast the third.
   EXPECT_EQ(steps_with_host_forces(&host, &device, 200), 3);
-  EXPECT_TRUE(WorldAccess::impl(device).resident);
+  EXPECT_TRUE(WorldAccess::impl(device).resident());
 }
 
 TEST_P(DeviceWorldTest, UserDefinedForcesRunOnTheHost) {
@@ -656,7 +656,7 @@ TEST_P(DeviceWorldTest, UserDefinedForcesRunOnTheHost) {
   host.remove_force(ids[0]);
   device.remove_force(ids[1]);
   EXPECT_EQ(steps_with_host_forces(&host, &device, 20), 0);
-  EXPECT_TRUE(WorldAccess::impl(device).resident);
+  EXPECT_TRUE(WorldAccess::impl(device).resident());
 }
 
 TEST_P(DeviceWorldTest, ChangedParametersOfForcesReachTheDevice) {
@@ -685,7 +685,7 @@ TEST_P(DeviceWorldTest, ChangedParametersOfForcesReachTheDevice) {
     world->remove(world->bodies()[2]);
   }
   EXPECT_EQ(steps_with_host_forces(&host, &device, 5), 0);
-  EXPECT_TRUE(WorldAccess::impl(device).resident);
+  EXPECT_TRUE(WorldAccess::impl(device).resident());
 }
 
 /// The step in which a body runs away is undone: no force acts twice, and the blast, which keeps
@@ -734,7 +734,7 @@ TEST_P(DeviceWorldTest, ContactGeneratorsRunOnTheHost) {
   }
   host.step();
   device.step();
-  EXPECT_FALSE(WorldAccess::impl(device).resident);
+  EXPECT_FALSE(WorldAccess::impl(device).resident());
   host.remove_contact_generator(ids[0]);
   device.remove_contact_generator(ids[1]);
   for (int n = 0; n < 50; ++n) {
@@ -742,7 +742,7 @@ TEST_P(DeviceWorldTest, ContactGeneratorsRunOnTheHost) {
     device.step();
     ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
   }
-  EXPECT_TRUE(WorldAccess::impl(device).resident);
+  EXPECT_TRUE(WorldAccess::impl(device).resident());
 }
 
 TEST_P(DeviceWorldTest, SnapshotsAreThoseOfTheHostAndRestoreOnTheDevice) {
@@ -757,7 +757,7 @@ TEST_P(DeviceWorldTest, SnapshotsAreThoseOfTheHostAndRestoreOnTheDevice) {
   }
   const Snapshot snapshot = host.snapshot();
   EXPECT_TRUE(device.snapshot() == snapshot);
-  EXPECT_TRUE(WorldAccess::impl(device).resident) << "a snapshot does not move the world";
+  EXPECT_TRUE(WorldAccess::impl(device).resident()) << "a snapshot does not move the world";
   Scene other;
   other.dt = scene.dt / 2;
   other.soft_step.substeps = 9;
@@ -770,7 +770,7 @@ TEST_P(DeviceWorldTest, SnapshotsAreThoseOfTheHostAndRestoreOnTheDevice) {
     expect_equal_contacts(host, restored);
     ASSERT_EQ(host.state_hash(), restored.state_hash()) << "step " << n;
   }
-  EXPECT_TRUE(WorldAccess::impl(restored).resident);
+  EXPECT_TRUE(WorldAccess::impl(restored).resident());
   EXPECT_TRUE(restored.snapshot() == host.snapshot());
 }
 

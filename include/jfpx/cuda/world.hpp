@@ -31,9 +31,9 @@ struct DeviceStates {
   const Quat* orientations = nullptr;        ///< unit quaternions
   const Vec3* velocities = nullptr;          ///< [m/s]
   const Vec3* angular_velocities = nullptr;  ///< [rad/s], world axes
-  /// In device memory: number of enqueued and replayed steps that the device has left to the host;
-  /// see enqueue_steps(). The states are those before these steps.
-  const std::uint64_t* missing_steps = nullptr;
+  /// In device memory: number of enqueued and replayed steps that the device has deferred to the
+  /// host; see enqueue_steps(). The states are those before these steps.
+  const std::uint64_t* deferred_steps = nullptr;
   /// Changes when arrays move, and whenever a captured graph of steps becomes invalid: when bodies
   /// come or go, when a list of contacts needs more memory, when the world moves to the host, when
   /// add_force(), remove_force() or restore() is called, when masses change in a world with forces,
@@ -55,17 +55,17 @@ JFPX_API DeviceStates device_states(World& world);
 /// and returns without waiting for them. Every function of World that reads or changes the state
 /// waits, as finish_steps() does; all results are those of World::step(), bit for bit.
 ///
-/// The device leaves a step to the host if a list of contacts is too short, if a body runs away, or
+/// The device defers a step to the host if a list of contacts is too short, if a body runs away, or
 /// if a force must wake a body. This step and those after it then have no effect on the device, and
-/// the host makes them when it waits. Kernels find the number of these steps at
-/// DeviceStates::missing_steps. Steps with user-defined forces or contact generators, and all steps
-/// of a sleeping world, are made before the call returns. If a CUDA call fails, the CPU makes the
-/// steps, and finish_steps() reports the reason.
+/// the host makes them when it waits. Kernels read the number of these steps from
+/// DeviceStates::deferred_steps. Steps with user-defined forces or contact generators, and all
+/// steps of a sleeping world, are made before the call returns. If a CUDA call fails, the CPU makes
+/// the steps, and finish_steps() reports the reason.
 ///
 /// If `stream` is being captured, the steps become part of its CUDA graph, and each launch of the
 /// graph makes them. Graphs, enqueued steps and single steps may follow each other; after a change
-/// of the world, a graph leaves its steps to the host until device_states(), step() or
-/// enqueue_steps() has sent the change. Requirements:
+/// of the world, the steps of a graph are deferred until device_states(), step() or enqueue_steps()
+/// has sent the change. Requirements:
 ///   - the world has made a step on the device since it moved there, there are no user-defined
 ///     forces and contact generators, and device_states() has been called after the last change;
 ///   - a graph is launched only while DeviceStates::version is that of the capture, and not

@@ -18,7 +18,7 @@ struct CommitProgram {
   JFPX_HD void operator()(const Team& team) const {
     const StepData& d = data;
     if (d.has_failed() || d.counters->runaway != kNone) {
-      team.once([&] { ++d.counters->progress.missing; });
+      team.once([&] { ++d.counters->progress.deferred; });
       return;
     }
     const BodyView& bodies = d.step.bodies;

@@ -216,11 +216,11 @@ class DeviceStep final : public DeviceWorld {
     if (has_graph()) device_->wait_for_graphs();
     const Counters found = counters();
     const Progress& progress = found.progress;
-    if (progress.missing > 0) missing_ = progress.missing;  // or a failed call has found them
-    if (progress.missing > 0 || progress.started != 0) restore(progress);
-    Finished result{progress.completed - known_.completed, missing_, result_of(found)};
+    if (progress.deferred > 0) deferred_ = progress.deferred;  // or a failed call has found them
+    if (progress.deferred > 0 || progress.started != 0) restore(progress);
+    Finished result{progress.completed - known_.completed, deferred_, result_of(found)};
     note(progress);
-    missing_ = 0;
+    deferred_ = 0;
     return result;
   }
 
@@ -235,7 +235,7 @@ class DeviceStep final : public DeviceWorld {
             bodies.orientation,
             bodies.velocity,
             bodies.angular_velocity,
-            &data_.counters->progress.missing,
+            &data_.counters->progress.deferred,
             version()};
   }
 
@@ -429,7 +429,7 @@ class DeviceStep final : public DeviceWorld {
     if (progress.started != 0) bodies_.restore(transfer_, data_);
     source_ = progress;
     source_.started = 0;
-    source_.missing = 0;
+    source_.deferred = 0;
     device_->upload(&data_.counters->progress, &source_, 1);
     device_->wait();
   }
@@ -492,7 +492,7 @@ class DeviceStep final : public DeviceWorld {
   Progress known_;                   ///< of the steps that the host has waited for
   Progress sent_;                    ///< Progress::offset and held, as the device has them
   Progress source_;                  ///< of copies to the device
-  std::uint64_t missing_ = 0;        ///< for finish(), if a call of it fails
+  std::uint64_t deferred_ = 0;       ///< for finish(), if a call of it fails
   std::uint64_t changes_ = 0;        ///< of arguments of the programs, apart from addresses
   std::uint64_t graph_version_ = 0;  ///< version() of the last captured graph; 0: none
   bool has_stepped_ = false;         ///< whether a step was completed since the upload

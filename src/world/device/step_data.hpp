@@ -61,7 +61,7 @@ struct ContactSizes {
 /// that cannot be completed, and all later ones, have no effect until the host repeats them.
 struct Progress {
   std::uint64_t completed = 0;  ///< number of complete steps since the upload
-  std::uint64_t missing = 0;    ///< number of steps without effect since the last complete one
+  std::uint64_t deferred = 0;   ///< number of steps without effect since the last complete one
   std::uint64_t offset = 0;     ///< World::steps() minus `completed`
   std::uint32_t started = 0;    ///< 1: SavedColumns are those of a step that is not complete
   std::uint32_t held = 0;       ///< 1: the host has changes that the next step must see
@@ -248,7 +248,7 @@ struct StepData {
   /// Whether an earlier step was not completed, or the host must send changes first: the step has
   /// no effect.
   JFPX_HD bool is_skipped() const {
-    return counters->progress.missing != 0 || counters->progress.held != 0;
+    return counters->progress.deferred != 0 || counters->progress.held != 0;
   }
   /// Whether an earlier stage has found that the step can't be completed.
   JFPX_HD bool has_failed() const {
