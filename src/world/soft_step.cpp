@@ -8,6 +8,7 @@
 #include "src/world/soft_step.hpp"
 
 #include "src/base/parallel_for.hpp"
+#include "src/base/pool_team.hpp"
 #include "src/base/reserve.hpp"
 
 #include <algorithm>
@@ -76,70 +77,19 @@ void SoftStep::prepare(const BodyStore& bodies) {
   orientation_.resize(capacity);
   free_.resize(capacity);
   marked_.resize(capacity);
-  islands_.reserve(capacity);
+  parent_.resize(capacity);
 }
 
-/// Unites the movable bodies of joints, and of the contacts for which touches(contact) holds, and
-/// marks the islands that touch, or are joined with, a kinematic body in motion: a sleeping body
-/// has no velocity and could not be carried by it.
-template <class Touches>
-void SoftStep::find_islands(const BodyStore& store, const Touches& touches) {
-  const BodyView bodies = store.view();
-  islands_.reset(bodies.capacity);
-  std::ranges::fill(marked_, std::uint8_t{0});
-  const ContactView contacts = cache_.current().view();
-  parallel_for(pool_, contacts.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
-    for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
-      const ContactKey& key = contacts.key(i);
-      if (bodies.movable(key.a) && bodies.movable(key.b) && touches(contacts, i)) {
-        islands_.unite(key.a, key.b);
-      }
-    }
-  });
-  for (std::uint32_t joint = 0; joint < joints_.count; ++joint) {
-    soft_step::with_joined_bodies(joints_, joint, [&](std::uint32_t a, std::uint32_t b) {
-      if (bodies.movable(a) && bodies.movable(b)) islands_.unite(a, b);
-    });
-  }
-  if (!store.has_kinematic_bodies()) return;
-  for (std::uint32_t joint = 0; joint < joints_.count; ++joint) {
-    soft_step::with_joined_bodies(joints_, joint, [&](std::uint32_t a, std::uint32_t b) {
-      const bool a_carries = bodies.is_carrier(a);
-      if (!a_carries && !bodies.is_carrier(b)) return;
-      marked_[islands_.find(a_carries ? b : a)] = soft_step::kTouchesFastBody;
-    });
-  }
-  for (std::uint32_t i = 0; i < contacts.size(); ++i) {
-    const ContactKey& key = contacts.key(i);
-    const bool a_carries = bodies.is_carrier(key.a);
-    if ((a_carries || bodies.is_carrier(key.b)) && touches(contacts, i)) {
-      marked_[islands_.find(a_carries ? key.b : key.a)] = soft_step::kTouchesFastBody;
-    }
-  }
-}
-
-/// Wakes the islands that touch an awake body or a kinematic body in motion.
-void SoftStep::wake_touched(BodyStore* store) {
-  const BodyView bodies = store->view();
-  if (!any_body(*store, [&](std::uint32_t i) { return bodies.is_asleep(i); })) return;
-  find_islands(*store, [&](const ContactView& contacts, std::uint32_t contact) {
-    return soft_step::will_touch(bodies, contacts, contact);
-  });
-  for_each_body(*store, [&](std::uint32_t i) {
-    if (!bodies.is_active(i)) return;
-    const std::atomic_ref mark(marked_[islands_.find(i)]);
-    std::uint8_t unmarked = 0;
-    if (bodies.is_slow(i)) {
-      mark.compare_exchange_strong(unmarked, soft_step::kTouchesSlowBody);
-    } else {
-      mark.store(soft_step::kTouchesFastBody);
-    }
-  });
-  const MotionPointers motion = store->motion_pointers();
-  for_each_body(*store, [&](std::uint32_t i) {
-    if (!bodies.is_asleep(i)) return;
-    soft_step::wake_touched(bodies, motion, i, marked_[islands_.find(i)]);
-  });
+soft_step::Islands SoftStep::islands_of(const BodyStore& bodies) {
+  const std::span<const std::uint32_t> mobile = bodies.mobile();
+  return {.step = step_,
+          .contacts = cache_.current().view(),
+          .joints = joints_,
+          .sets = {parent_.data()},
+          .marked = marked_.data(),
+          .any_carriers = bodies.has_kinematic_bodies(),
+          .mobile = mobile.data(),
+          .mobile_count = static_cast<std::uint32_t>(mobile.size())};
 }
 
 /// Marks the bodies that have a contact in this step, or a joint.
@@ -211,24 +161,10 @@ std::optional<BodyId> SoftStep::find_runaway(const BodyStore& store) {
   return found == kNone ? std::nullopt : std::optional(store.id(found));
 }
 
-/// Islands whose bodies have all been slow for long enough fall asleep.
-void SoftStep::put_islands_to_sleep(const BodyStore& store) {
-  const BodyView bodies = store.view();
-  find_islands(store, soft_step::has_touched);
-  for_each_body(store, [&](std::uint32_t i) {
-    if (!bodies.is_active(i) || bodies.is_at_rest(i)) return;
-    std::atomic_ref(marked_[islands_.find(i)]).store(1, std::memory_order_relaxed);
-  });
-  for_each_body(store, [&](std::uint32_t i) {
-    if (bodies.is_active(i) && marked_[islands_.find(i)] == 0) step_.motion.put_to_sleep(i);
-  });
-}
-
 std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointView& joints) {
   prepare(*bodies);
   joints_ = joints;
   cache_.match(bodies->inverse_masses(), bodies->any_rolls(), joints, pool_);
-  wake_touched(bodies);
   find_near();
   step_ = {.bodies = bodies->view(),
            .motion = bodies->motion_pointers(),
@@ -237,6 +173,9 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
            .orientation = orientation_.data(),
            .near = near_.data(),
            .h = constants_.h};
+  if (any_body(*bodies, [this](std::uint32_t i) { return step_.bodies.is_asleep(i); })) {
+    islands_of(*bodies).wake_touched(PoolTeam(pool_));
+  }
   load(*bodies);
   const BodyView& view = step_.bodies;
   solver_.build({.contacts = cache_.current().view(),
@@ -271,7 +210,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
 
 void SoftStep::commit(BodyStore* bodies) noexcept {
   const bool any_rests = any_body(*bodies, [this](std::uint32_t i) { return step_.store(i); });
-  if (any_rests) put_islands_to_sleep(*bodies);
+  if (any_rests) islands_of(*bodies).put_to_sleep(PoolTeam(pool_));
   cache_.commit();
 }
 

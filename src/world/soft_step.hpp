@@ -65,9 +65,7 @@ class SoftStep {
 
  private:
   void prepare(const BodyStore& bodies);
-  template <class Touches>
-  void find_islands(const BodyStore& store, const Touches& touches);
-  void wake_touched(BodyStore* bodies);
+  soft_step::Islands islands_of(const BodyStore& bodies);
   void find_near();
   template <class Stage>
   void for_each_body(const BodyStore& bodies, const Stage& stage);
@@ -75,7 +73,6 @@ class SoftStep {
   bool any_body(const BodyStore& bodies, const Test& test);
   void load(const BodyStore& bodies);
   std::optional<BodyId> find_runaway(const BodyStore& bodies);
-  void put_islands_to_sleep(const BodyStore& bodies);
 
   soft_step::StepConstants constants_;
   SoftStepSettings settings_;
@@ -83,7 +80,6 @@ class SoftStep {
   ThreadPool* pool_;
   soft_step::ContactCache cache_;
   soft_step::SoftStepSolver solver_;
-  Islands islands_;
 
   soft_step::JointView joints_;  ///< during a step
   soft_step::StepBodies step_;   ///< of the arrays below and the bodies, during a step
@@ -92,6 +88,7 @@ class SoftStep {
   std::vector<Quat> orientation_;              ///< by body, during the step
   std::vector<soft_step::FreeMotion> free_;    ///< by body
   std::vector<std::uint8_t> near_;             ///< by body: StepBodies::near
+  std::vector<std::uint32_t> parent_;          ///< by body: soft_step::DisjointSets::parent
   std::vector<std::uint8_t> marked_;           ///< by label of an island
 };
 

@@ -15,7 +15,6 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/force_table.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces.cpp
   ${CMAKE_CURRENT_LIST_DIR}/ignored_pairs.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/islands.cpp
   ${CMAKE_CURRENT_LIST_DIR}/joint_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/joint_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/neighbor_list.cpp

@@ -1,7 +1,7 @@
 /// End of a soft step on a device.
 #pragma once
 
-#include "src/world/device/islands.hpp"
+#include "src/world/device/step_data.hpp"
 #include "src/world/met_contacts.hpp"
 
 namespace jfpx {
@@ -29,7 +29,7 @@ struct CommitProgram {
       position_before[body] = bodies.position[body];
       if (d.step.store(body)) d.counters->any_rests = 1;
     });
-    if (d.counters->any_rests != 0) put_islands_to_sleep(team);
+    if (d.counters->any_rests != 0) d.islands().put_to_sleep(team);
     team.count(
         bodies.count, [&](std::uint32_t i) { return bodies.is_active(bodies.ids[i].index); },
         &d.counters->awake);
@@ -50,25 +50,6 @@ struct CommitProgram {
     progress.contacts[progress.completed & 1] = {c.spheres, c.manifolds, c.points, c.touches};
     progress.started = 0;
     ++progress.completed;
-  }
-
-  template <class Team>
-  JFPX_HD void put_islands_to_sleep(const Team& team) const {
-    const StepData& d = data;
-    const BodyView& bodies = d.step.bodies;
-    find_islands(team, d, [](const soft_step::ContactView& contacts, std::uint32_t i) {
-      return soft_step::has_touched(contacts, i);
-    });
-    team.for_each(bodies.count, [&](std::uint32_t i) {
-      const std::uint32_t body = bodies.ids[i].index;
-      if (bodies.is_active(body) && !bodies.is_at_rest(body)) d.marked[island_of(d, body)] = 1;
-    });
-    team.for_each(bodies.count, [&](std::uint32_t i) {
-      const std::uint32_t body = bodies.ids[i].index;
-      if (bodies.is_active(body) && d.marked[island_of(d, body)] == 0) {
-        d.step.motion.put_to_sleep(body);
-      }
-    });
   }
 };
 

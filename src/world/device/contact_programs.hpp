@@ -1,7 +1,7 @@
 /// Contact search of a soft step on a device.
 #pragma once
 
-#include "src/world/device/atomic.hpp"
+#include "src/base/atomic.hpp"
 #include "src/world/device/list.hpp"
 #include "src/world/device/start_step.hpp"
 #include "src/world/device/step_data.hpp"

@@ -1,7 +1,7 @@
 /// Linked lists of items, as one array of the next item of each.
 #pragma once
 
-#include "src/world/device/atomic.hpp"
+#include "src/base/atomic.hpp"
 #include "src/world/device/step_data.hpp"
 
 #include <cstdint>

@@ -1,9 +1,9 @@
 /// Matching and coloring of the contacts of a soft step on a device.
 #pragma once
 
+#include "src/base/atomic.hpp"
 #include "src/contact_solver/soft_step/contact_match.hpp"
 #include "src/contact_solver/soft_step/greedy_coloring.hpp"
-#include "src/world/device/atomic.hpp"
 #include "src/world/device/step_data.hpp"
 
 namespace jfpx {

@@ -1,8 +1,7 @@
 /// Waking and rows of a soft step on a device.
 #pragma once
 
-#include "src/world/device/atomic.hpp"
-#include "src/world/device/islands.hpp"
+#include "src/base/atomic.hpp"
 #include "src/world/device/list.hpp"
 #include "src/world/device/step_data.hpp"
 
@@ -20,7 +19,7 @@ struct PrepareProgram {
     if (data.has_failed()) return;
     const StepData& d = data;
     const BodyView& bodies = d.step.bodies;
-    if (d.counters->any_asleep != 0) wake_touched(team);
+    if (d.counters->any_asleep != 0) d.islands().wake_touched(team);
     team.for_each(bodies.count, [&](std::uint32_t i) { start(bodies.ids[i].index); });
     place_rows(team);
     if (size<soft_step::ManifoldRow>() > 0 && !place_points(team)) return;
@@ -41,32 +40,6 @@ struct PrepareProgram {
     d.step.accelerate(i, &body, &free, true);
     d.cells(i).start(body, free);
     if (d.is_joined(i)) d.orientation_cells[i].store(d.step.orientation[i], 0);
-  }
-
-  template <class Team>
-  JFPX_HD void wake_touched(const Team& team) const {
-    const StepData& d = data;
-    const BodyView& bodies = d.step.bodies;
-    find_islands(team, d, [&](const soft_step::ContactView& contacts, std::uint32_t i) {
-      return soft_step::will_touch(bodies, contacts, i);
-    });
-    team.for_each(bodies.count, [&](std::uint32_t i) {
-      const std::uint32_t body = bodies.ids[i].index;
-      if (!bodies.is_active(body)) return;
-      std::uint8_t& mark = d.marked[island_of(d, body)];
-      if (mark == 0) mark = soft_step::kTouchesSlowBody;
-    });
-    team.for_each(bodies.count, [&](std::uint32_t i) {
-      const std::uint32_t body = bodies.ids[i].index;
-      if (bodies.is_active(body) && !bodies.is_slow(body)) {
-        d.marked[island_of(d, body)] = soft_step::kTouchesFastBody;
-      }
-    });
-    team.for_each(bodies.count, [&](std::uint32_t i) {
-      const std::uint32_t body = bodies.ids[i].index;
-      if (!bodies.is_asleep(body)) return;
-      soft_step::wake_touched(bodies, d.step.motion, body, d.marked[island_of(d, body)]);
-    });
   }
 
   /// Assigns a row to each contact and joint, sorted by bin.

@@ -1,8 +1,8 @@
 /// Substeps and restitution of a soft step on a device.
 #pragma once
 
+#include "src/base/atomic.hpp"
 #include "src/contact_solver/soft_step/row_operations.hpp"
-#include "src/world/device/atomic.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/sweep.hpp"
 

@@ -6,8 +6,8 @@
 #include "src/contact_solver/soft_step/row_setup.hpp"
 #include "src/world/device/body_cells.hpp"
 #include "src/world/device/striped_array.hpp"
+#include "src/world/islands.hpp"
 #include "src/world/near_pair_test.hpp"
-#include "src/world/soft_step_stages.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -234,6 +234,13 @@ struct StepData {
   /// Whether a body has joints, once MatchProgram is complete.
   JFPX_HD bool is_joined(std::uint32_t body) const {
     return world_joints.count > 0 && near_flag[body] == soft_step::kHasJoint;
+  }
+  JFPX_HD soft_step::Islands islands() const {
+    return {.step = step,
+            .contacts = contacts(),
+            .joints = joints(),
+            .sets = {parent},
+            .marked = marked};
   }
   JFPX_HD soft_step::RowSetup row_setup() const {
     const BodyView& bodies = step.bodies;

@@ -1,0 +1,36 @@
+/// The threads of a pool as a team, as the threads of a cooperative launch on a device.
+#pragma once
+
+#include "src/base/parallel_for.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Runs the same loops as a team of threads on a device.
+class PoolTeam {
+ public:
+  /// @param pool outlives the object; null: the calling thread
+  explicit PoolTeam(ThreadPool* pool) : pool_(pool) {}
+
+  /// Calls f(i) for all i < n, in any order, and waits.
+  template <class F>
+  void for_each(std::uint32_t n, const F& f) const {
+    constexpr std::size_t kItemsPerChunk = 1024;
+    parallel_for(pool_, n, kItemsPerChunk, [&](std::size_t first, std::size_t last) {
+      for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) f(i);
+    });
+  }
+  /// The same. On a device it does not wait.
+  template <class F>
+  void spread(std::uint32_t n, const F& f) const {
+    for_each(n, f);
+  }
+
+ private:
+  ThreadPool* pool_;
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
