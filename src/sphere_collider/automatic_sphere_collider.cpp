@@ -8,9 +8,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
-#include <exception>
-#include <system_error>
 #include <utility>
 
 namespace jfpx {
@@ -79,7 +76,9 @@ AutomaticSphereCollider::AutomaticSphereCollider(const SphereColliderOptions& op
       make_(std::move(make)),
       search_(ways_to_search(options, with_cuda)),
       given_(ways_to_test(options, with_cuda)),
-      device_asleep_(with_cuda) {}
+      starter_(1e3 * options.costs.cuda_start_ms) {
+  if (!with_cuda) starter_.cancel();
+}
 
 /// Whether the last decision also covers this call; then `calls.by` computes it.
 bool AutomaticSphereCollider::reuse_decision(Calls& calls, std::size_t spheres, std::size_t pairs) {
@@ -208,19 +207,15 @@ SphereCollider& AutomaticSphereCollider::collider(Backend backend, SphereAlgorit
   return *slot;
 }
 
-/// The break-even rule of the ski rental problem: costs at most twice as much as the optimal
-/// decision made in hindsight.
-///
 /// The other thread also repeats the current call, because the first one allocates memory of the
 /// device, pins memory of the host and loads the kernels.
 template <class KeepInput>
 void AutomaticSphereCollider::start_device_if_it_pays(const Calls& calls,
                                                       const ColliderWork& expected,
                                                       const KeepInput& keep_input) {
-  if (!device_asleep_) return;
-  const double start_us = 1e3 * options_.costs.cuda_start_ms;
-  if (search_.chooser.missed_us() + given_.chooser.missed_us() < start_us) return;
-  if (start_us == 0) {
+  if (!starter_.is_due(search_.chooser.missed_us() + given_.chooser.missed_us())) return;
+  if (options_.costs.cuda_start_ms == 0) {
+    starter_.cancel();
     wake_device();
     return;
   }
@@ -229,7 +224,7 @@ void AutomaticSphereCollider::start_device_if_it_pays(const Calls& calls,
   const auto predicted_us = [&](const Way& way) { return microseconds(way.terms, expected); };
   const double least_us = predicted_us(*std::ranges::min_element(ways, {}, predicted_us));
   std::erase_if(ways, [&](const Way& way) { return predicted_us(way) > kMaxSlowdown * least_us; });
-  const auto start = [make = make_, options = options_, ways, repeat = keep_input()]() mutable {
+  starter_.start([make = make_, options = options_, ways, repeat = keep_input()]() mutable {
     OfBackend colliders;
     options.backend = Backend::cuda;
     for (const Way& way : ways) {
@@ -243,30 +238,18 @@ void AutomaticSphereCollider::start_device_if_it_pays(const Calls& calls,
       }
     }
     return colliders;
-  };
-  device_asleep_ = false;
-  try {
-    starting_ = std::async(std::launch::async, start);
-  } catch (const std::system_error&) {  // no thread could be created
-    give_up_device({});
-  }
+  });
 }
 
 void AutomaticSphereCollider::take_started_device() {
-  if (!starting_.valid()) return;
-  if (starting_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
-  try {
-    colliders_[1] = starting_.get();
-    wake_device();
-  } catch (const BackendUnavailable&) {
-    give_up_device({});
-  } catch (const std::exception& error) {
-    give_up_device(error.what());
-  }
+  auto outcome = starter_.take();
+  if (!outcome) return;
+  if (outcome->has_failed) return give_up_device(outcome->failure);
+  colliders_[1] = std::move(outcome->device);
+  wake_device();
 }
 
 void AutomaticSphereCollider::wake_device() {
-  device_asleep_ = false;
   for (Calls* calls : {&search_, &given_}) calls->chooser.wake();
 }
 

@@ -3,11 +3,11 @@
 
 #include <jfpx/sphere_collider.hpp>
 
+#include "src/base/device_starter.hpp"
 #include "src/base/time_chooser.hpp"
 
 #include <array>
 #include <functional>
-#include <future>
 #include <memory>
 #include <string>
 #include <vector>
@@ -91,12 +91,11 @@ class AutomaticSphereCollider final : public SphereCollider {
   const Calls* last_ = &search_;
   std::array<OfBackend, 2> colliders_;  ///< by backend
   double contacts_per_sphere_ = 1;      ///< in the last search that was measured
-  bool device_asleep_;
   bool device_lost_ = false;
   std::string device_failure_;
   TransferredBytes transferred_;
   SphereAlgorithm algorithm_ = SphereAlgorithm::automatic;
-  std::future<OfBackend> starting_;  ///< valid while the device starts; its destructor waits
+  DeviceStarter<OfBackend> starter_;
 };
 
 }  // namespace JFPX_ABI

@@ -3,13 +3,13 @@
 
 #include <jfpx/cost_model.hpp>
 
+#include "src/base/device_starter.hpp"
 #include "src/base/time_chooser.hpp"
 #include "src/sphere_collider/choice_reason.hpp"
 #include "src/world/device_world.hpp"
 
 #include <array>
 #include <functional>
-#include <future>
 #include <memory>
 #include <string>
 
@@ -41,16 +41,12 @@ class AutomaticDevice {
  private:
   enum Way : std::size_t { kCpu, kDevice, kWays };
 
-  void start();
-
   CostTerms terms_[kWays];
-  double start_us_;
   Maker make_;
   TimeChooser chooser_;
   std::array<double, kWays> predicted_us_{};
   std::size_t chosen_ = kCpu;
-  bool is_asleep_ = true;                               ///< the device has not been started
-  std::future<std::unique_ptr<DeviceWorld>> starting_;  ///< valid while the device starts
+  DeviceStarter<std::unique_ptr<DeviceWorld>> starter_;
 };
 
 }  // namespace JFPX_ABI

@@ -13,7 +13,6 @@
 #include <atomic>
 #include <chrono>
 #include <exception>
-#include <system_error>
 #include <utility>
 
 namespace jfpx {
@@ -54,13 +53,12 @@ bool may_have_split_impulse(const btManifoldPoint& point, const rows::RowSetting
 
 GpuIslandSolver::GpuIslandSolver(Backend backend, GroupSolverMaker make, unsigned threads,
                                  double start_ms)
-    : backend_(backend), make_(std::move(make)), threads_(threads), start_ms_(start_ms) {
+    : backend_(backend), make_(std::move(make)), threads_(threads), starter_(1e3 * start_ms) {
   if (backend_ == Backend::cuda) {
     if (make_ == nullptr) throw BackendUnavailable("cuda: built without CUDA");
     solver_ = make_();
   }
   if (backend_ == Backend::automatic && make_ != nullptr) {
-    dormant_ = true;
     const TimeChooser::Alternative alternatives[] = {{}, {.dormant = true}};
     chooser_.emplace(alternatives);
   }
@@ -80,7 +78,7 @@ bool GpuIslandSolver::choose(const ContactScan& scan, const btContactSolverInfo&
   }
   if (!chooser_) return solver_ != nullptr;
   if (contacts < kMinContacts) return false;
-  if (dormant_ && chooser_->missed_us() >= 1e3 * start_ms_) start(contacts);
+  if (starter_.is_due(chooser_->missed_us())) start(contacts);
   take_started();
   if (!chooser_) return false;
   const std::array<double, 2> predicted = predicted_us(contacts, info.m_numIterations);
@@ -93,27 +91,19 @@ bool GpuIslandSolver::choose(const ContactScan& scan, const btContactSolverInfo&
 }
 
 void GpuIslandSolver::start(std::size_t contacts) {
-  dormant_ = false;
-  try {
-    starting_ = std::async(std::launch::async, [make = make_, contacts] {
-      auto solver = make();
-      solver->inputs({.bodies = contacts, .contacts = contacts});  // allocates memory
-      return solver;
-    });
-  } catch (const std::system_error&) {
-    chooser_.reset();  // no thread could be created
-  }
+  starter_.start([make = make_, contacts] {
+    auto solver = make();
+    solver->inputs({.bodies = contacts, .contacts = contacts});  // allocates memory
+    return solver;
+  });
 }
 
 void GpuIslandSolver::take_started() {
-  if (!starting_.valid()) return;
-  if (starting_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
-  try {
-    solver_ = starting_.get();
-    chooser_->wake();
-  } catch (const std::exception&) {
-    chooser_.reset();  // a machine without a usable device is not a failure
-  }
+  auto outcome = starter_.take();
+  if (!outcome) return;
+  if (outcome->has_failed) return chooser_.reset();  // no usable device: not a failure
+  solver_ = std::move(outcome->device);
+  chooser_->wake();
 }
 
 void GpuIslandSolver::disable(const std::string& why) {

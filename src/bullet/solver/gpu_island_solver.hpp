@@ -3,6 +3,7 @@
 
 #include <jfpx/backend.hpp>
 
+#include "src/base/device_starter.hpp"
 #include "src/base/time_chooser.hpp"
 #include "src/bullet/solver/contact_scan.hpp"
 #include "src/contact_solver/sequential_impulse/cpu/row_solver.hpp"
@@ -14,7 +15,6 @@
 #include <array>
 #include <chrono>
 #include <functional>
-#include <future>
 #include <memory>
 #include <optional>
 #include <span>
@@ -93,9 +93,8 @@ class GpuIslandSolver {
   Backend backend_;
   GroupSolverMaker make_;
   unsigned threads_;
-  double start_ms_;
   std::optional<TimeChooser> chooser_;
-  bool dormant_ = false;  ///< the device has not been started
+  DeviceStarter<std::unique_ptr<GroupSolver>> starter_;
   std::unique_ptr<GroupSolver> solver_;
   RowOrder order_;
   std::vector<std::uint8_t> split_impulse_candidates_;  ///< by contact: 1 if it may have one
@@ -108,7 +107,6 @@ class GpuIslandSolver {
   Clock::time_point since_;
   bool timed_ = false;
   std::string failure_;
-  std::future<std::unique_ptr<GroupSolver>> starting_;  ///< its destructor waits
 };
 
 }  // namespace bullet
