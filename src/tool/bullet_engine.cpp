@@ -29,7 +29,7 @@ class BulletEngine final : public Engine {
     return awake;
   }
   StepMeasures measures() const override { return measures_of(world_); }
-  StageTimes times() const override { return last_step_times(world_); }
+  StageTimes times() const override { return stage_times_of_bullet(world_.last_step()); }
   std::string backend() const override { return sphere_backend(world_); }
   std::string device_failure() const override { return tool::device_failure(world_); }
 

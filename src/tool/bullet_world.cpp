@@ -28,15 +28,6 @@ bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
   return bullet::SceneWorld(scene, world);
 }
 
-StageTimes last_step_times(const bullet::SceneWorld& world) {
-  const bullet::StageTimes& t = world.last_step();
-  return {.integrate = t.integrate,
-          .broad = t.broadphase,
-          .detect = t.dispatch,
-          .solve = t.islands + t.solve,
-          .total = t.total};
-}
-
 std::uint64_t count_contacts(bullet::SceneWorld& world) {
   btCollisionDispatcher& dispatcher = world.dispatcher();
   std::uint64_t contacts = 0;

@@ -11,7 +11,6 @@ namespace tool {
 
 bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
                                      const RunOptions& options);
-StageTimes last_step_times(const bullet::SceneWorld& world);
 /// Number of contact points in all manifolds.
 std::uint64_t count_contacts(bullet::SceneWorld& world);
 /// Measures of the last step. Contact points with a positive distance are not penetrations.

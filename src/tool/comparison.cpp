@@ -29,12 +29,12 @@ Comparison compare(const Scene& scene, const RunOptions& given) {
 
     contacts.capture(stock.world());
     stock.step();
-    result.ms_stock += last_step_times(stock);
+    result.ms_stock += stage_times_of_bullet(stock.last_step());
     result.contacts_stock += count_contacts(stock);
     contacts.compare(stock.world(), step);
 
     jfpx.step();
-    result.ms_jfpx += last_step_times(jfpx);
+    result.ms_jfpx += stage_times_of_bullet(jfpx.last_step());
     result.contacts_jfpx += count_contacts(jfpx);
     // All later differences follow from the first one.
     if (result.first_difference.empty()) {

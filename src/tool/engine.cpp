@@ -33,15 +33,6 @@ const CostModel& costs_of_this_machine(bool quiet) {
 
 }  // namespace
 
-StageTimes& StageTimes::operator+=(const StageTimes& other) {
-  integrate += other.integrate;
-  broad += other.broad;
-  detect += other.detect;
-  solve += other.solve;
-  total += other.total;
-  return *this;
-}
-
 nlohmann::ordered_json to_json_value(const StageTimes& times) {
   return {{"integrate", times.integrate},
           {"broad", times.broad},

@@ -6,6 +6,7 @@
 #include <jfpx/world.hpp>
 
 #include "src/tool/run_options.hpp"
+#include "src/tool/stage_times.hpp"
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -21,11 +22,6 @@ class World;
 
 namespace tool {
 
-/// Duration of each stage of a step [ms].
-struct StageTimes {
-  double integrate = 0, broad = 0, detect = 0, solve = 0, total = 0;
-  StageTimes& operator+=(const StageTimes& other);
-};
 nlohmann::ordered_json to_json_value(const StageTimes& times);
 
 /// Measures of the last step.

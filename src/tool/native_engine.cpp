@@ -59,20 +59,6 @@ StepMeasures measures_of(const World& world, const StepReport& report) {
   return {penetrations.deepest(), penetrations.mean(), speed};
 }
 
-StageTimes stage_times(const StepReport& report) {
-  return {.integrate = report.integrate_ms,
-          .broad = 0,
-          .detect = report.detect_ms,
-          .solve = report.resolve_ms,
-          .total = report.total_ms};
-}
-
-std::string trouble_of(const StepReport& report) {
-  if (!report.non_finite) return {};
-  return fmt::format("step {}: body {} became non-finite; the state is frozen", report.step,
-                     report.non_finite_body.index);
-}
-
 std::unique_ptr<Engine> make_native_engine(const Scene& scene, const RunOptions& options) {
   return std::make_unique<NativeEngine>(scene, options);
 }

@@ -14,10 +14,6 @@ std::unique_ptr<Engine> make_native_engine(const Scene& scene, const RunOptions&
 /// Measures of the last step of a world. @param report of this step
 StepMeasures measures_of(const World& world, const StepReport& report);
 
-/// Conversions of a step report.
-StageTimes stage_times(const StepReport& report);
-std::string trouble_of(const StepReport& report);
-
 }  // namespace tool
 }  // namespace JFPX_ABI
 }  // namespace jfpx

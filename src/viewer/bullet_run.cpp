@@ -123,8 +123,7 @@ RunState run_state_of(bullet::SceneWorld& world, std::uint64_t step) {
     run_state.awake.push_back(body->isActive() || body->isStaticObject() ? 1 : 0);
   }
   run_state.contacts = contacts_of(world.dispatcher());
-  const bullet::StageTimes& t = world.last_step();
-  run_state.times = {t.integrate, t.broadphase, t.dispatch, t.islands + t.solve, t.total};
+  run_state.times = tool::stage_times_of_bullet(world.last_step());
   run_state.computed_by = "Bullet";
   if (const bullet::CollisionDispatcher* dispatcher = world.jfpx_dispatcher()) {
     const bullet::DispatchStats& stats = dispatcher->stats();

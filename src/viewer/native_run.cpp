@@ -24,15 +24,11 @@ class NativeRun final : public Run {
     run_state.states = world_.states();
     for (const BodyId id : world_.bodies()) run_state.awake.push_back(world_.awake(id) ? 1 : 0);
     run_state.contacts.assign(world_.contacts().begin(), world_.contacts().end());
-    run_state.times = {report_.integrate_ms, 0, report_.detect_ms, report_.resolve_ms,
-                       report_.total_ms};
+    run_state.times = tool::stage_times(report_);
     run_state.iterations = report_.position_iterations + report_.velocity_iterations;
     if (scene_.solver == Solver::soft_step) run_state.substeps = scene_.soft_step.substeps;
     run_state.computed_by = to_string(report_.backend);
-    if (report_.non_finite) {
-      run_state.trouble = "body " + std::to_string(report_.non_finite_body.index) +
-                          " became non-finite; the state is frozen";
-    }
+    run_state.trouble = tool::trouble_of(report_);
     return run_state;
   }
 

@@ -213,12 +213,12 @@ void SceneViewer::show_counters() {
                                                     : fmt::format("{} corrections", now.iterations);
   widget::text(fmt::format("spheres by {}, {}", now.computed_by, solved));
   if (!now.trouble.empty()) widget::warning(now.trouble);
-  const std::array<std::pair<const char*, double StageTimes::*>, 5> stages = {
-      {{"integrate", &StageTimes::integrate},
-       {"broad", &StageTimes::broad},
-       {"detect", &StageTimes::detect},
-       {"solve", &StageTimes::solve},
-       {"total", &StageTimes::total}}};
+  const std::array<std::pair<const char*, double tool::StageTimes::*>, 5> stages = {
+      {{"integrate", &tool::StageTimes::integrate},
+       {"broad", &tool::StageTimes::broad},
+       {"detect", &tool::StageTimes::detect},
+       {"solve", &tool::StageTimes::solve},
+       {"total", &tool::StageTimes::total}}};
   const auto& history = player_.history();
   constexpr std::size_t kPlotted = 240;
   const std::size_t first = history.size() > kPlotted ? history.size() - kPlotted : 0;

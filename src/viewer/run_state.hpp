@@ -3,6 +3,8 @@
 
 #include <jfpx/world.hpp>
 
+#include "src/tool/stage_times.hpp"
+
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -11,11 +13,6 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Duration of each stage of a step [ms].
-struct StageTimes {
-  double integrate = 0, broad = 0, detect = 0, solve = 0, total = 0;
-};
-
 struct RunState {
   std::uint64_t step = 0;
   double time = 0;                  ///< [s] since the run began
@@ -23,7 +20,7 @@ struct RunState {
   std::vector<BodyState> states;    ///< in the order of the scene's bodies
   std::vector<std::uint8_t> awake;  ///< in the same order, 1 or 0
   std::vector<Contact> contacts;    ///< BodyId::index is the index in the scene
-  StageTimes times;
+  tool::StageTimes times;
   std::uint32_t substeps = 0;    ///< of the native resolver soft-step; 0: another one
   std::uint64_t iterations = 0;  ///< of the native resolver worst-first, both loops
   std::string computed_by;       ///< backend of a native step, or of the sphere contacts
