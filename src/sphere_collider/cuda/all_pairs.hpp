@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/sphere_collider/cuda/search.hpp"
+#include "src/sphere_collider/cuda/tuning.hpp"
 
 #include <cuda_runtime_api.h>
 
@@ -9,8 +10,6 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Edge of the square tiles of pairs that a thread block tests.
-inline constexpr std::uint32_t kTile = 256;
 inline constexpr std::uint32_t kWordsPerTile = kTile / 32;
 
 /// Words of a row of the bit matrix, which has a row per sphere.

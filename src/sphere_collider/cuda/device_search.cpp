@@ -17,13 +17,6 @@ inline namespace JFPX_ABI {
 namespace cuda {
 namespace {
 
-/// Largest number of spheres for which the test of all pairs is faster than the grid (measured on
-/// an H200: bench/results).
-constexpr std::size_t kMaxForAllPairs = 4500;
-/// Largest size of the bit matrix of all pairs. Larger searches process bands of rows, in two
-/// passes: one counts the contacts, one writes them.
-constexpr std::size_t kMaskBytes = std::size_t{256} << 20;
-
 constexpr std::size_t kMaskWords = kMaskBytes / sizeof(std::uint32_t);
 constexpr std::size_t kStateWords = sizeof(SearchState) / sizeof(std::uint32_t);
 static_assert(sizeof(SearchState) % 16 == 0);

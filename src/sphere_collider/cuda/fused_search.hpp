@@ -2,14 +2,13 @@
 #pragma once
 
 #include "src/sphere_collider/cuda/search.hpp"
+#include "src/sphere_collider/cuda/tuning.hpp"
 
 #include <cuda_runtime_api.h>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
-
-inline constexpr std::uint32_t kFusedSpheres = 1024;
 
 struct FusedArgs {
   SphereInput input;  ///< at most kFusedSpheres

@@ -66,14 +66,6 @@ __global__ void __launch_bounds__(TileStorage<kLarge>::kThreads, 1) partition_ph
   partition(args, plan, *reinterpret_cast<TileStorage<kLarge>*>(dynamic_storage), sums);
 }
 
-/// Resident blocks of 512 threads per multiprocessor for which sort_phase is compiled. Shared
-/// memory limits them, of which Turing has less.
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
-constexpr unsigned kSortBlocks = 2;
-#else
-constexpr unsigned kSortBlocks = sizeof(Real) == 4 ? 3 : 2;
-#endif
-
 template <unsigned kThreads>
 __global__ void __launch_bounds__(kThreads, kThreads == 512 ? kSortBlocks : 1)
     sort_phase(GridArgs args, SortCapacity capacity) {
@@ -85,14 +77,6 @@ __global__ void __launch_bounds__(kThreads, kThreads == 512 ? kSortBlocks : 1)
   sort_coarse<kThreads>(args, plan, capacity, sort_storage(dynamic_storage, capacity), sums);
 }
 
-/// Resident blocks per multiprocessor for which the searches are compiled. A multiprocessor of
-/// Turing has 1024 threads, that is, four blocks.
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
-constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 4 : 3;
-#else
-constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 5 : 3;
-#endif
-
 __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
     single_level_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
@@ -101,10 +85,6 @@ __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
   SingleLevelSearcher(args, output, storage[threadIdx.x / 32])
       .run(blockIdx.x * kGridThreads + threadIdx.x);
 }
-
-/// Resident blocks per multiprocessor of crowded_phase. Registers for the loads of several
-/// candidates gain more than a fifth block.
-constexpr unsigned kCrowdedBlocks = std::min(kSearchBlocks, 4u);
 
 __global__ void __launch_bounds__(kGridThreads, kCrowdedBlocks)
     crowded_phase(GridArgs args, SearchOutput output) {
@@ -117,11 +97,6 @@ __global__ void __launch_bounds__(kGridThreads, kCrowdedBlocks)
     if (position + k < args.input.n) searcher.run(position + k);
   }
 }
-
-/// Resident blocks per multiprocessor of search_phase. Fewer blocks search hashed cells, because
-/// each needs more of the L1 cache.
-template <bool kDense>
-constexpr unsigned kLevelBlocks = kDense ? kSearchBlocks : std::min(kSearchBlocks, 4u);
 
 template <bool kDense>
 __global__ void __launch_bounds__(kGridThreads, kLevelBlocks<kDense>) search_phase(GridArgs args) {
@@ -147,13 +122,6 @@ __global__ void __launch_bounds__(kGridThreads) sum_phase(GridArgs args, SearchO
     sum_counts(args, storage);
   }
 }
-
-/// Resident blocks per multiprocessor that use all its threads: 2048, on Turing 1024.
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
-constexpr unsigned kCopyBlocks = 4;
-#else
-constexpr unsigned kCopyBlocks = 8;
-#endif
 
 __global__ void __launch_bounds__(kGridThreads, kCopyBlocks)
     copy_phase(GridArgs args, SearchOutput output) {
@@ -266,13 +234,6 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, const GridL
   run(list_phase, few_blocks, args, output);
   run(long_row_phase, 6 * multiprocessors, args, output);
 }
-
-/// Largest number of spheres that are searched in one launch (measured on an H200: bench/results).
-constexpr std::uint32_t kMaxInOneLaunch = 1 << 18;
-
-/// Intended mean number of spheres of a coarse bucket, and smallest limit of the number of coarse
-/// buckets. Fewer buckets need fewer atomics; more buckets are sorted by more blocks.
-constexpr std::uint32_t kSpheresOfCoarse = 1024, kFewestCoarse = 256;
 
 constexpr std::size_t rounded(std::size_t bytes) { return (bytes + 255) / 256 * 256; }
 

@@ -13,7 +13,6 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-inline constexpr unsigned kGridThreads = 256;
 inline constexpr unsigned kGridWarps = kGridThreads / 32;
 
 /// The half cell width of level 0. The state holds its bits, because the bits of positive
@@ -70,9 +69,6 @@ __device__ inline std::uint32_t row_of_box(const LevelBox& box, std::int32_t y, 
   return box.base + yz * static_cast<std::uint32_t>(box.nx) - static_cast<std::uint32_t>(box.x0);
 }
 
-/// Number of spheres a cell from which on a warp searches for several spheres together.
-inline constexpr Real kCrowded = 3;
-
 /// Layout of the cell table. It is dense if the cells of all levels between the lowest and the
 /// highest coordinates fit into the table and no sphere is far: then each cell has its own bucket,
 /// and rows follow rows, so that cells that are close in y and z are close in memory. Otherwise the
@@ -117,8 +113,6 @@ struct GridPlan {
     return dense ? bucket<true>(cell) : bucket<false>(cell);
   }
 };
-
-inline constexpr std::uint32_t kSamples = 4096;
 
 /// The finest level in use: the first one on which a sphere shares its cell with about two others
 /// at most, estimated from a sample of all spheres. All smaller spheres are on this level, too.

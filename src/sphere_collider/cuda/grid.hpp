@@ -2,7 +2,7 @@
 ///
 /// There are four variants. All write the same contacts:
 ///  - direct (grid_direct.cuh): up to kMaxDirect spheres of similar radius, not sorted;
-///  - in one cooperative launch (grid_one_launch.cu): up to kMaxInOneLaunch spheres (grid.cu), if
+///  - in one cooperative launch (grid_one_launch.cu): up to kMaxInOneLaunch spheres, if
 ///    the direct search, which the same kernel tries first, does not apply;
 ///  - single-level (grid_single_level.cuh): more spheres, of similar radius, in several launches;
 ///    if they are crowded, a warp searches for several of them together (grid_crowded.cuh);
@@ -13,6 +13,7 @@
 #pragma once
 
 #include "src/sphere_collider/cuda/search.hpp"
+#include "src/sphere_collider/cuda/tuning.hpp"
 
 #include <cuda_runtime_api.h>
 
@@ -22,14 +23,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Neighbors that a sphere keeps in its own slots; further ones go to a list for all spheres.
-inline constexpr std::uint32_t kSlots = 16;
-/// Largest number of contacts of a row in the staging buffer. No contact of a longer row is staged.
-inline constexpr std::uint32_t kMaxStaged = 60;
 /// Number of elements after the last sphere that a search reads, but does not use.
 inline constexpr std::uint32_t kReadBeyond = 2;
-/// Longest row that one warp sorts. Longer rows are sorted by many blocks.
-inline constexpr std::uint32_t kMaxLongRow = 1024;
 
 /// The pair a < b; `rank` counts the pairs of a in the order of discovery.
 struct OverflowPair {
@@ -43,13 +38,6 @@ struct AlternatingStates {
   std::uint32_t padding[3];
 };
 
-/// Largest number of spheres of the direct search, which does not sort them.
-inline constexpr std::uint32_t kMaxDirect = 24'000;
-/// Total number of slots in the cells of the direct search, divided by the number of spheres.
-inline constexpr std::uint32_t kDirectSlots = 12;
-
-/// Largest number of coarse buckets of a search in several launches.
-inline constexpr unsigned kCoarseBuckets = 2048;
 /// Histogram of the coarse buckets, and the positions of their spheres.
 struct CoarseBuckets {
   /// Padded to a memory sector: atomics on values in the same sector are serialized.
@@ -73,11 +61,6 @@ struct GridLimits {
 /// @pre `device` is the current device. @throws DeviceError
 GridLimits grid_limits(int device);
 
-/// The single-level search counts contacts in bins of this number of consecutive rows. One block
-/// copies a bin to the output.
-inline constexpr std::uint32_t kBin = 256;
-/// Number of consecutive bins whose counts are summed before the copy.
-inline constexpr std::uint32_t kBinsOfSum = 64;
 /// Number of elements of GridArgs::Rows::sums in a search among n spheres: enough for one sum per
 /// block or per kBinsOfSum bins. It is even, so that the array after it is 16-byte aligned.
 constexpr std::size_t grid_sums(std::size_t n, const GridLimits& limits) {

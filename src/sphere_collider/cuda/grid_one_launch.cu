@@ -17,8 +17,6 @@ namespace {
 
 namespace cg = cooperative_groups;
 
-constexpr unsigned kBlocksPerMultiprocessor = sizeof(Real) == 4 ? 4 : 3;
-
 union PhaseStorage {
   BuildStorage build;
   DirectStorage direct;
@@ -86,7 +84,7 @@ __device__ void search_crowded(const GridArgs& args, const SearchOutput& output,
   emit_long_rows(args, known, storage.long_rows);
 }
 
-__global__ void __launch_bounds__(kGridThreads, kBlocksPerMultiprocessor)
+__global__ void __launch_bounds__(kGridThreads, kOneLaunchBlocks)
     grid_search(const __grid_constant__ GridArgs arguments,
                 const __grid_constant__ SearchOutput output) {
   __shared__ PhaseStorage storage;

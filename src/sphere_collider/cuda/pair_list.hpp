@@ -3,6 +3,8 @@
 
 #include <jfpx/sphere_collider.hpp>
 
+#include "src/sphere_collider/cuda/tuning.hpp"
+
 #include <cuda_runtime_api.h>
 
 #include <cstddef>
@@ -16,8 +18,6 @@ namespace cuda {
 void launch_test_pairs(const SphereInstance* spheres, const SpherePair* pairs, std::size_t m,
                        PairResult* results, cudaStream_t stream);
 
-/// Number of pairs that a block tests.
-inline constexpr std::size_t kTouchingPerBlock = 2048;
 constexpr std::size_t touching_blocks(std::size_t m) {
   return (m + kTouchingPerBlock - 1) / kTouchingPerBlock;
 }

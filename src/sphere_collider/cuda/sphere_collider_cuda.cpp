@@ -19,10 +19,6 @@ inline namespace JFPX_ABI {
 namespace cuda {
 namespace {
 
-/// Up to this number of spheres, kernels write the contacts directly into mapped host memory, which
-/// saves a copy and a synchronization.
-constexpr std::size_t kMaxMappedSpheres = 20'000;
-
 void check_pairs(std::span<const SpherePair> pairs, std::size_t n) {
   if (std::any_of(pairs.begin(), pairs.end(), [n](SpherePair p) { return p.a >= n || p.b >= n; })) {
     detail::reject_pair(pairs, n);

@@ -15,7 +15,7 @@ namespace cuda {
 /// of scan() and partition() belong to consecutive chunks, one for each block.
 class GridTeam {
  public:
-  static constexpr unsigned kThreads = 256;
+  static constexpr unsigned kThreads = device::tuning::kThreads;
 
   /// Words of scratch memory for a launch with this number of blocks.
   static std::size_t scratch_words(unsigned blocks) {

@@ -19,18 +19,13 @@ inline namespace JFPX_ABI {
 namespace cuda {
 namespace {
 
+namespace tuning = device::tuning;
+
 template <class Program>
 __global__ void __launch_bounds__(GridTeam::kThreads, Program::kBlocksPerMultiprocessor)
     run_program(const __grid_constant__ Program program, std::uint32_t* scratch, bool is_cluster) {
   program(GridTeam(scratch, is_cluster));
 }
-
-/// Number of blocks of a cluster, whose barriers are faster than those of a grid. Launches of up to
-/// twice as many blocks are reduced to one cluster. More than 8 blocks are not portable, and Hopper
-/// supports 16.
-constexpr unsigned kClusterBlocks = 16;
-/// Largest Program::kBlocksPerMultiprocessor.
-constexpr unsigned kMostBlocks = 6;
 
 /// The stream, the memory and the launches of a DeviceStep.
 class CudaDevice {
@@ -49,7 +44,7 @@ class CudaDevice {
     JFPX_CUDA_TRY(
         cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device_));
     // Enough for every program, so that it never moves: captured graphs have its address.
-    const unsigned blocks = kMostBlocks * static_cast<unsigned>(multiprocessors_);
+    const unsigned blocks = tuning::kMost * static_cast<unsigned>(multiprocessors_);
     scratch_.reserve(pool_, stream_.get(), GridTeam::scratch_words(blocks), "scratch memory");
   }
 
@@ -134,10 +129,10 @@ class CudaDevice {
                         static_cast<std::size_t>(multiprocessors_), most);
     }
     auto blocks = static_cast<unsigned>(std::clamp<std::size_t>(wanted, 1, most));
-    if (limits.has_clusters && blocks <= 2 * kClusterBlocks) {
-      blocks = std::min(blocks, kClusterBlocks);
+    if (limits.has_clusters && blocks <= 2 * tuning::kClusterBlocks) {
+      blocks = std::min(blocks, tuning::kClusterBlocks);
     }
-    const bool is_cluster = limits.has_clusters && blocks > 1 && blocks <= kClusterBlocks;
+    const bool is_cluster = limits.has_clusters && blocks > 1 && blocks <= tuning::kClusterBlocks;
     cudaLaunchAttribute attribute{};
     if (is_cluster) {
       attribute.id = cudaLaunchAttributeClusterDimension;
@@ -212,7 +207,7 @@ class CudaDevice {
 
   template <class Program>
   const Launch& limits_of() {
-    static_assert(Program::kBlocksPerMultiprocessor <= kMostBlocks);
+    static_assert(Program::kBlocksPerMultiprocessor <= tuning::kMost);
     Launch& limits = std::get<Limits<Program>>(limits_);
     if (limits.most_blocks > 0) return limits;
     int resident = 0;

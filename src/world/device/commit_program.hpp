@@ -11,7 +11,7 @@ namespace device {
 /// Ends the step: moves the bodies, clears forces, and puts islands to sleep. Has no effect, except
 /// that it counts the step, if the step cannot be completed or a body has run away.
 struct CommitProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kCommit;
   StepData data;
 
   template <class Team>

@@ -13,7 +13,7 @@ namespace device {
 /// Starts the step, unless a ForceProgram has, and makes the bounds of the motion of all
 /// sub-shapes.
 struct BoundsProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kBounds;
   StepData data;
   bool is_started = false;
 
@@ -68,7 +68,7 @@ struct BoundsProgram {
 
 /// Makes the contacts of two spheres from the pairs of swept bounds, and lists all other pairs.
 struct SphereProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = 6;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSphere;
   StepData data;
 
   template <class Team>
@@ -150,7 +150,7 @@ struct SphereProgram {
 
 /// Makes the contacts of all other sub-shapes.
 struct ShapeProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kShape;
   StepData data;
 
   template <class Team>

@@ -29,7 +29,7 @@ struct EditedMass {
 /// Wakes the bodies in contact with some of the edited bodies, forgets the contacts of removed
 /// bodies, edits the bodies, and then replaces some.
 struct EditProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kEdit;
   StepData data;
   PropertyPointers properties;
   const EditedBody* edits = nullptr;

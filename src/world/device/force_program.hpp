@@ -78,7 +78,7 @@ class ForcedBody {
 /// Starts the step, and adds all forces to those that the bodies have accumulated. A body depends
 /// on no other one, because forces that would wake a body are left to the host.
 struct ForceProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = 2;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kForce;
   StepData data;
   ForceView forces;
   Vec3 *force_sum = nullptr, *torque_sum = nullptr;  ///< by body

@@ -13,7 +13,7 @@ namespace device {
 /// Gives each contact and joint the impulses and the color that it had in the last step, and colors
 /// the others: as soft_step::ContactCache.
 struct MatchProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = 6;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kMatch;
   /// Up to this number of contacts, one block colors them: its barriers are faster.
   static constexpr std::uint32_t kFewContacts = 4096;
   StepData data;

@@ -66,7 +66,7 @@ JFPX_HD void merge_sorted(const Team& team, std::uint32_t n, const KeyOf& key_of
 /// Makes the sorted ids and the sub-shapes from those before: without the ones of `changed` bodies,
 /// and with the ones that are `added`.
 struct MergeProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kMerge;
   StepData data;
   const std::uint32_t* changed = nullptr;  ///< slots whose body has come or gone
   std::uint32_t changed_count = 0;

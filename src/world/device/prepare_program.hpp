@@ -11,7 +11,7 @@ namespace device {
 
 /// Wakes the islands that touch an awake body, starts the bodies, and assigns rows to contacts.
 struct PrepareProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = 3;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kPrepare;
   StepData data;
 
   template <class Team>

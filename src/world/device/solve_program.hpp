@@ -22,7 +22,7 @@ namespace device {
 /// The items of a thread are in the order of the sweeps, and an item waits only for items before
 /// it in this order. So the first item that is not complete never waits.
 struct SolveProgram {
-  static constexpr unsigned kBlocksPerMultiprocessor = sizeof(Real) == 4 ? 2 : 1;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSolve;
   /// Least number of items per thread from which a multiprocessor gets a second block. Waiting
   /// threads poll memory, so a second block pays only where rows rarely wait.
   static constexpr std::size_t kItemsPerThread = 32;
