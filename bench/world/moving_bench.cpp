@@ -6,7 +6,7 @@
 
 #include "bench/sphere_collider/inputs.hpp"
 #include "src/scenes/scenes.hpp"
-#include "src/world/neighbor_list.hpp"
+#include "src/world/contacts/neighbor_list.hpp"
 
 #include <benchmark/benchmark.h>
 

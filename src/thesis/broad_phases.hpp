@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/thesis/sphere_hierarchy.hpp"
-#include "src/world/broad_phase_search.hpp"
+#include "src/world/contacts/broad_phase_search.hpp"
 
 #include <vector>
 

@@ -6,7 +6,7 @@
 
 #include "src/thesis/contact_response.hpp"
 #include "src/thesis/indexed_priority_queue.hpp"
-#include "src/world/body_store.hpp"
+#include "src/world/bodies/body_store.hpp"
 
 #include <cstdint>
 #include <span>

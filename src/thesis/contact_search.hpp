@@ -1,7 +1,7 @@
 /// Search for the contacts of a step of Solver::worst_first.
 #pragma once
 
-#include "src/world/contact_finder.hpp"
+#include "src/world/contacts/contact_finder.hpp"
 
 #include <cstdint>
 #include <vector>

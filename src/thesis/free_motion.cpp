@@ -2,7 +2,7 @@
 #include "src/thesis/free_motion.hpp"
 
 #include "src/base/power.hpp"
-#include "src/world/integrate.hpp"
+#include "src/world/bodies/integrate.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {

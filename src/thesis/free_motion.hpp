@@ -1,7 +1,7 @@
 /// Free motion and sleep of bodies in a step of Solver::worst_first (thesis 4.4.2).
 #pragma once
 
-#include "src/world/body_store.hpp"
+#include "src/world/bodies/body_store.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {

@@ -2,7 +2,7 @@
 #include "src/thesis/particle_store.hpp"
 
 #include "src/base/power.hpp"
-#include "src/world/integrate.hpp"
+#include "src/world/bodies/integrate.hpp"
 
 #include <utility>
 

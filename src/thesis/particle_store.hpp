@@ -3,7 +3,7 @@
 
 #include <jfpx/thesis/particle.hpp>
 
-#include "src/world/id_pool.hpp"
+#include "src/world/bodies/id_pool.hpp"
 
 #include <span>
 #include <vector>

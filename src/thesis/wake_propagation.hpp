@@ -3,7 +3,7 @@
 
 #include <jfpx/world.hpp>
 
-#include "src/world/body_store.hpp"
+#include "src/world/bodies/body_store.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {

@@ -1,7 +1,7 @@
 /// The functions that a World takes from the library jfpx_thesis.
 #pragma once
 
-#include "src/world/broad_phase_search.hpp"
+#include "src/world/contacts/broad_phase_search.hpp"
 #include "src/world/impl_access.hpp"
 
 #include <memory>

@@ -3,18 +3,18 @@
 
 #include <jfpx/world.hpp>
 
-#include "src/world/automatic_device.hpp"
-#include "src/world/body_store.hpp"
-#include "src/world/callback_registry.hpp"
-#include "src/world/contact_finder.hpp"
-#include "src/world/device_world.hpp"
-#include "src/world/force_snapshot.hpp"
-#include "src/world/host_mirror.hpp"
-#include "src/world/joint_store.hpp"
-#include "src/world/query_tree.hpp"
-#include "src/world/soft_step.hpp"
-#include "src/world/step_contacts.hpp"
-#include "src/world/step_queue.hpp"
+#include "src/world/bodies/body_store.hpp"
+#include "src/world/contacts/contact_finder.hpp"
+#include "src/world/contacts/step_contacts.hpp"
+#include "src/world/device/automatic_device.hpp"
+#include "src/world/device/device_world.hpp"
+#include "src/world/device/host_mirror.hpp"
+#include "src/world/device/step_queue.hpp"
+#include "src/world/forces/callback_registry.hpp"
+#include "src/world/joints/joint_store.hpp"
+#include "src/world/queries/query_tree.hpp"
+#include "src/world/snapshots/force_snapshot.hpp"
+#include "src/world/step/soft_step.hpp"
 #include "src/world/thesis_table.hpp"
 
 #include <mutex>
@@ -260,8 +260,8 @@ struct World::Impl {
   ContactFinder contact_finder;
   SoftStep soft_step;                           ///< of Solver::soft_step
   std::unique_ptr<WorstFirstStep> worst_first;  ///< of Solver::worst_first; otherwise null
-  CallbackRegistry<ForceContext, ForceId> forces{"force"};
-  CallbackRegistry<ContactContext, ContactGeneratorId> generators{"contact generator"};
+  ForceRegistry forces{"force"};
+  GeneratorRegistry generators{"contact generator"};
   bool bodies_changed = true;  ///< whether contact_finder.set_bodies() must be called
   Lazy<QueryTree> query_tree;  ///< of the bodies, built by the first query after a change
   StepContacts contacts{pool.get()};

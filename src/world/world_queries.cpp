@@ -2,7 +2,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/scene/scene_validate.hpp"
-#include "src/world/posed_sub_shapes.hpp"
+#include "src/world/bodies/posed_sub_shapes.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>

@@ -1,10 +1,10 @@
 /// Snapshots of a World.
 #include <jfpx/error.hpp>
 
-#include "src/world/contact_snapshot.hpp"
-#include "src/world/joint_snapshot.hpp"
-#include "src/world/snapshot_fields.hpp"
-#include "src/world/snapshot_file.hpp"
+#include "src/world/snapshots/contact_snapshot.hpp"
+#include "src/world/snapshots/joint_snapshot.hpp"
+#include "src/world/snapshots/snapshot_fields.hpp"
+#include "src/world/snapshots/snapshot_file.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <new>

@@ -6,7 +6,7 @@
 #include <jfpx/world.hpp>
 
 #include "src/collide/sphere_pair.hpp"
-#include "src/world/body_store.hpp"
+#include "src/world/bodies/body_store.hpp"
 
 #include <algorithm>
 #include <tuple>

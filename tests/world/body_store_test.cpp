@@ -1,5 +1,5 @@
 /// Tests of the body store: ids and poses.
-#include "src/world/body_store.hpp"
+#include "src/world/bodies/body_store.hpp"
 
 #include "src/collide/shapes.hpp"
 #include "tests/world/support.hpp"

@@ -1,5 +1,5 @@
 /// Tests of the trees of the solids of mass 0: a test of every pair finds the same.
-#include "src/world/fixed_trees.hpp"
+#include "src/world/contacts/fixed_trees.hpp"
 
 #include "tests/world/random_bodies.hpp"
 

@@ -1,5 +1,5 @@
 /// Tests of NeighborList against a search in every call.
-#include "src/world/neighbor_list.hpp"
+#include "src/world/contacts/neighbor_list.hpp"
 
 #include "tests/world/support.hpp"
 

@@ -1,5 +1,5 @@
 /// Tests of the tree of the queries: a linear scan finds the same, and the tree visits few bodies.
-#include "src/world/query_tree.hpp"
+#include "src/world/queries/query_tree.hpp"
 
 #include "tests/world/linear_queries.hpp"
 #include "tests/world/random_bodies.hpp"

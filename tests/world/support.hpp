@@ -6,7 +6,7 @@
 
 #include "src/collide/shapes.hpp"
 #include "src/scene/inertia.hpp"
-#include "src/world/body_store.hpp"
+#include "src/world/bodies/body_store.hpp"
 
 #include <gtest/gtest.h>
 

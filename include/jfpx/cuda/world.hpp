@@ -84,7 +84,7 @@ JFPX_API DeviceStates device_states(World& world);
 JFPX_API void enqueue_steps(World& world, std::uint32_t count, Stream stream);
 
 /// Waits for all enqueued steps, and for those of all graphs that have been launched, and makes the
-/// steps that the device has left to the host.
+/// deferred steps.
 /// @returns the report of the last of these steps, without times of the stages; if there are none,
 ///   that of the last earlier one. A failure of the device is reported once.
 /// @throws as World::step(); the steps that were not yet made are then left out

@@ -7,7 +7,7 @@
 #include "src/scene/compound.hpp"
 #include "src/scene/inertia_tensor.hpp"
 #include "src/scene/principal_inertia.hpp"
-#include "src/world/integrate.hpp"
+#include "src/world/bodies/integrate.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>

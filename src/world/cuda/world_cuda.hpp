@@ -1,7 +1,7 @@
 /// Factory of worlds on CUDA devices.
 #pragma once
 
-#include "src/world/device_world.hpp"
+#include "src/world/device/device_world.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {

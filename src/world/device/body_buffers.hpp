@@ -1,7 +1,7 @@
 /// The bodies of a world in the memory of a device.
 #pragma once
 
-#include "src/world/body_store.hpp"
+#include "src/world/bodies/body_store.hpp"
 #include "src/world/device/host_copy.hpp"
 #include "src/world/device/slot_values.hpp"
 #include "src/world/device/step_data.hpp"

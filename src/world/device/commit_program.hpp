@@ -1,8 +1,8 @@
 /// End of a soft step on a device.
 #pragma once
 
+#include "src/world/contacts/met_contacts.hpp"
 #include "src/world/device/step_data.hpp"
-#include "src/world/met_contacts.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {

@@ -3,8 +3,8 @@
 
 #include <jfpx/world.hpp>
 
-#include "src/world/bodies_of_step.hpp"
-#include "src/world/detected_contacts.hpp"
+#include "src/world/bodies/bodies_of_step.hpp"
+#include "src/world/contacts/detected_contacts.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
 

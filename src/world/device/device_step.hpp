@@ -7,6 +7,7 @@
 #include "src/world/device/commit_program.hpp"
 #include "src/world/device/contact_buffers.hpp"
 #include "src/world/device/contact_programs.hpp"
+#include "src/world/device/device_world.hpp"
 #include "src/world/device/edit_program.hpp"
 #include "src/world/device/fixed_tree_buffers.hpp"
 #include "src/world/device/force_buffers.hpp"
@@ -17,7 +18,6 @@
 #include "src/world/device/scratch_buffers.hpp"
 #include "src/world/device/solve_program.hpp"
 #include "src/world/device/sub_shape_buffers.hpp"
-#include "src/world/device_world.hpp"
 
 #include <algorithm>
 #include <memory>

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "src/contact_solver/soft_step/greedy_coloring.hpp"
+#include "src/world/contacts/met_contacts.hpp"
 #include "src/world/device/slot_values.hpp"
 #include "src/world/device/step_data.hpp"
-#include "src/world/met_contacts.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {

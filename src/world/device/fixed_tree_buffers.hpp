@@ -1,8 +1,8 @@
 /// The trees of the solids of mass 0 in the memory of a device.
 #pragma once
 
+#include "src/world/contacts/fixed_trees.hpp"
 #include "src/world/device/transfer.hpp"
-#include "src/world/fixed_trees.hpp"
 
 #include <cstddef>
 #include <cstdint>

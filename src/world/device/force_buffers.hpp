@@ -3,7 +3,7 @@
 
 #include "src/world/device/force_program.hpp"
 #include "src/world/device/transfer.hpp"
-#include "src/world/force_table.hpp"
+#include "src/world/forces/force_table.hpp"
 
 #include <cstdint>
 #include <tuple>

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "src/world/device/start_step.hpp"
-#include "src/world/force_on_body.hpp"
-#include "src/world/force_view.hpp"
+#include "src/world/forces/force_on_body.hpp"
+#include "src/world/forces/force_view.hpp"
 
 #include <type_traits>
 
@@ -76,7 +76,7 @@ class ForcedBody {
 };
 
 /// Starts the step, and adds all forces to those that the bodies have accumulated. A body depends
-/// on no other one, because forces that would wake a body are left to the host.
+/// on no other one, because steps in which a force would wake a body are deferred to the host.
 struct ForceProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kForce;
   StepData data;

@@ -3,7 +3,7 @@
 
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
-#include "src/world/joint_store.hpp"
+#include "src/world/joints/joint_store.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 /// All values of one body, for a device that gets a body between two steps.
 #pragma once
 
-#include "src/world/body_view.hpp"
+#include "src/world/bodies/body_view.hpp"
 
 #include <cstdint>
 

@@ -4,11 +4,11 @@
 #include <jfpx/cuda/sphere_collider.hpp>
 
 #include "src/contact_solver/soft_step/row_setup.hpp"
+#include "src/world/contacts/near_pair_test.hpp"
 #include "src/world/device/body_cells.hpp"
 #include "src/world/device/striped_array.hpp"
 #include "src/world/device/tuning.hpp"
-#include "src/world/islands.hpp"
-#include "src/world/near_pair_test.hpp"
+#include "src/world/step/islands.hpp"
 
 #include <algorithm>
 #include <cstdint>

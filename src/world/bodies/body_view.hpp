@@ -1,0 +1,171 @@
+/// The bodies of a world as pointers to arrays, in host memory or on a device, and the functions of
+/// a body that both share.
+#pragma once
+
+#include <jfpx/scene.hpp>
+
+#include "src/scene/inertia.hpp"
+#include "src/world/bodies/body_columns.hpp"
+#include "src/world/bodies/integrate.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Properties and state of bodies that the steps of a world read. The pointers of InertiaColumns
+/// are null while a world does without them.
+struct BodyView : MotionColumns<ConstPointerColumn>,
+                  PropertyColumns<ConstPointerColumn>,
+                  InertiaColumns<ConstPointerColumn> {
+  const std::uint64_t* ignored = nullptr;  ///< keys of IgnoredPairs, sorted
+  std::uint32_t ignored_count = 0;
+  const std::uint64_t* joined = nullptr;  ///< likewise, of joints
+  std::uint32_t joined_count = 0;
+  bool filters_in_use = false;
+
+  const BodyId* ids = nullptr;  ///< of the living bodies, sorted by index
+  std::uint32_t count = 0;      ///< number of ids
+  std::uint32_t capacity = 0;   ///< number of slots
+  Real dt = 0, substep = 0;     ///< [s]
+  Real sleep_speed = 0;         ///< [m/s]
+  Real sleep_time = 0;          ///< [s]
+  Real woken_motion = 0;        ///< [m^2/s^2], mean motion of a body that wakes
+
+  JFPX_HD bool movable(std::uint32_t i) const { return inverse_mass[i] > 0; }
+  /// Whether the body is movable and awake.
+  JFPX_HD bool is_active(std::uint32_t i) const { return movable(i) && awake[i] != 0; }
+  JFPX_HD bool is_asleep(std::uint32_t i) const { return movable(i) && awake[i] == 0; }
+  /// Whether the body is kinematic and in motion.
+  JFPX_HD bool is_carrier(std::uint32_t i) const { return !movable(i) && awake[i] != 0; }
+  /// Whether the body is a movable sphere whose inertia is the same about every axis.
+  JFPX_HD bool is_round(std::uint32_t i) const {
+    return movable(i) && radius[i] > 0 && !has_gyroscopic_term(i);
+  }
+  JFPX_HD bool has_gyroscopic_term(std::uint32_t i) const {
+    return tensor != nullptr && tensor[i](0, 0) > 0;
+  }
+  JFPX_HD bool is_at_rest(std::uint32_t i) const { return rest_time[i] >= sleep_time; }
+  /// Whether a body was slow in the last step, and nothing has woken it since.
+  JFPX_HD bool is_slow(std::uint32_t i) const { return rest_time[i] > 0; }
+
+  JFPX_HD bool may_collide(std::uint32_t a, std::uint32_t b) const {
+    return !filters_in_use || (jfpx::may_collide(filter[a], filter[b]) && !is_ignored(a, b));
+  }
+  JFPX_HD bool is_ignored(std::uint32_t a, std::uint32_t b) const {
+    const std::uint64_t key = a < b ? std::uint64_t{a} << 32 | b : std::uint64_t{b} << 32 | a;
+    return has_pair(ignored, ignored_count, key) || has_pair(joined, joined_count, key);
+  }
+  /// Binary search in sorted keys of pairs.
+  JFPX_HD static bool has_pair(const std::uint64_t* keys, std::uint32_t count, std::uint64_t key) {
+    std::uint32_t first = 0, last = count;
+    while (first < last) {
+      const std::uint32_t middle = first + (last - first) / 2;
+      if (keys[middle] < key) {
+        first = middle + 1;
+      } else {
+        last = middle;
+      }
+    }
+    return first < count && keys[first] == key;
+  }
+
+  /// Acceleration of a movable body by its constant acceleration and the accumulated force.
+  JFPX_HD Vec3 acceleration_of_step(std::uint32_t i) const {
+    return add_scaled(acceleration[i], force[i], inverse_mass[i]);
+  }
+
+  /// Displacement of the centre of mass during the next step, without contacts and damping [m];
+  /// zero for a body at rest, and for one so fast that it leaves the world.
+  JFPX_HD Vec3 predicted_motion(std::uint32_t i) const {
+    if (awake[i] == 0) return {};
+    const Vec3 gained = movable(i) ? acceleration_of_step(i) : Vec3{};
+    const Vec3 motion = add_scaled(velocity[i], gained, dt) * dt;
+    constexpr Real kFarthest = 2 * kMaxCoordinate;
+    const bool stays = absolute(motion.x) <= kFarthest && absolute(motion.y) <= kFarthest &&
+                       absolute(motion.z) <= kFarthest;
+    return stays ? motion : Vec3{};
+  }
+
+  /// Velocities after the accelerations and the damping of a substep, without contacts.
+  /// @param orientation_now at the start of the substep
+  JFPX_HD void accelerate(std::uint32_t i, const Quat& orientation_now, Vec3* v, Vec3* w) const {
+    *v = detail::integrated_velocity(*v, last_acceleration[i], substep, velocity_kept[i]);
+    // A product of the inertia with 0 is +0; it is not read then.
+    const bool is_driven = !(torque[i] == Vec3{});
+    const Vec3 angular = is_driven ? inverse_inertia[i] * torque[i] : Vec3{};
+    *w = detail::integrated_velocity(*w, angular, substep, angular_velocity_kept[i]);
+    if (!has_gyroscopic_term(i)) return;
+    // Unlike precessed(), this does not rotate the velocity to and fro: rounding makes axes not
+    // quite orthonormal, always to the same side, and with many substeps energy would grow
+    // noticeably.
+    const Mat3 axes = to_matrix(orientation_now);
+    Vec3 change;
+    if (detail::gyroscopic_change(transform_transpose(axes, *w), tensor[i], substep, &change)) {
+      *w += axes * change;
+    }
+  }
+};
+
+/// The arrays of a BodyView that a step of soft_step changes.
+struct MotionPointers : MotionColumns<PointerColumn> {
+  JFPX_HD void refresh_inertia(const BodyView& bodies, std::uint32_t i) const {
+    inverse_inertia[i] =
+        detail::in_world_axes(bodies.body_inverse_inertia[i], to_matrix(orientation[i]));
+  }
+
+  /// Wakes a movable body.
+  JFPX_HD void wake(const BodyView& bodies, std::uint32_t i) const {
+    wake_by_slow_body(bodies, i);
+    rest_time[i] = 0;
+  }
+  /// Wakes a sleeping body whose island touches slow bodies only. It keeps its rest time: if each
+  /// touch began it anew, two islands could wake each other alternately without end.
+  JFPX_HD void wake_by_slow_body(const BodyView& bodies, std::uint32_t i) const {
+    awake[i] = 1;
+    mean_motion[i] = bodies.woken_motion;
+  }
+
+  JFPX_HD void put_to_sleep(std::uint32_t i) const {
+    awake[i] = 0;
+    velocity[i] = angular_velocity[i] = {};
+  }
+
+  /// Ends a step of an awake body at the given state.
+  JFPX_HD void end_step(const BodyView& bodies, std::uint32_t i, const BodyState& state) const {
+    position[i] = state.position;
+    orientation[i] = state.orientation;
+    velocity[i] = state.velocity;
+    angular_velocity[i] = state.angular_velocity;
+    if (!bodies.is_round(i)) refresh_inertia(bodies, i);
+  }
+
+  /// Updates the time for which the body has been slow. A body that a force drives must be slower
+  /// before it may sleep: at the ordinary speed, a damped spring would still be far from its
+  /// equilibrium. The rotation of a sphere counts less, because it moves the surface within itself,
+  /// and no friction ends a rotation about the contact normal.
+  JFPX_HD void update_rest_time(const BodyView& bodies, std::uint32_t i, bool is_driven) const {
+    constexpr Real kDriven = Real(0.04), kRotationOfSphere = Real(0.04);
+    const Real limit = is_driven ? bodies.sleep_speed * kDriven : bodies.sleep_speed;
+    const Real weight = bodies.radius[i] > 0 ? kRotationOfSphere : Real(1);
+    const Real spin = length(angular_velocity[i]) * bodies.extent[i] * weight;
+    const Real linear = length(velocity[i]);
+    const Real speed = linear < spin ? spin : linear;
+    const bool is_slow = bodies.can_sleep[i] != 0 && speed <= limit;
+    rest_time[i] = is_slow ? rest_time[i] + bodies.dt : Real(0);
+  }
+};
+
+/// Whether all values of a state are finite, and no coordinate is above kMaxCoordinate.
+JFPX_HD inline bool is_in_world(const BodyState& state) {
+  const Vec3& x = state.position;
+  const bool is_near = absolute(x.x) <= kMaxCoordinate && absolute(x.y) <= kMaxCoordinate &&
+                       absolute(x.z) <= kMaxCoordinate;
+  // If the square of the angular velocity overflows, normalized() returns a zero quaternion.
+  const bool is_rotation = length_squared(state.orientation) > Real(0.5);
+  return is_near && is_rotation && is_finite(state.orientation) && is_finite(state.velocity) &&
+         is_finite(state.angular_velocity);
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

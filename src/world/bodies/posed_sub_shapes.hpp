@@ -1,0 +1,28 @@
+/// The sub-shapes of a body with their poses in the world, as the queries test them.
+#pragma once
+
+#include "src/collide/shapes.hpp"
+#include "src/world/bodies/body_store.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Calls visit(shape, pose) for the shape of the body, or for each part of a compound in order. The
+/// pose of a half-space or a plane is the identity.
+template <class Visit>
+void for_each_posed_sub_shape(const BodyStore& bodies, std::uint32_t body, const Visit& visit) {
+  const Transform whole =
+      make_transform(bodies.moving.orientation[body], bodies.moving.position[body]);
+  detail::for_each_part(
+      bodies.shape(body), [&](const auto& shape, const CompoundPart* part, std::uint32_t) {
+        if constexpr (!detail::kIsSolid<std::decay_t<decltype(shape)>>) {
+          visit(shape, Transform{});
+        } else {
+          visit(shape, part == nullptr ? whole
+                                       : whole * make_transform(part->orientation, part->position));
+        }
+      });
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,285 @@
+/// Broad phase and pair tests of a world's contact detection.
+#include "src/world/contacts/contact_finder.hpp"
+
+#include "src/base/parallel_for.hpp"
+#include "src/base/reserve.hpp"
+#include "src/world/contacts/merge_contacts.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+using soft_step::ContactSet;
+
+constexpr std::size_t kSubShapesPerChunk = 1024, kPairsPerChunk = NearPairs::kMostSelected;
+/// A test of a box takes as long as dozens of tests of spheres.
+constexpr std::size_t kCandidatesPerChunk = 128;
+/// Chunks of a batch for each thread: enough to balance their loads.
+constexpr std::size_t kChunksPerThread = 4;
+
+/// A list that is filled again in every step. Its vector keeps the items of the last step until
+/// they are overwritten, because constructing them again would take as long as filling them.
+template <class Item>
+struct Refilled {
+  std::vector<Item>* items;
+  std::size_t size = 0;
+
+  void grow_to(std::size_t new_size) {
+    size = new_size;
+    if (items->size() < size) resize_geometric(items, size);
+  }
+  void finish() { items->resize(size); }
+};
+
+/// Appends the lists of all parts to a list.
+/// @param list returns the list of a part
+template <class Part, class List, class Item>
+void append(ThreadPool* pool, std::span<Part> parts, const List& list, Refilled<Item>* all) {
+  const std::size_t before = all->size;
+  std::size_t size = before;
+  for (Part& part : parts) size += list(part).size();
+  all->grow_to(size);
+  parallel_for(pool, parts.size(), kChunksPerThread, [&](std::size_t first, std::size_t last) {
+    std::size_t place = before;
+    for (std::size_t i = 0; i < first; ++i) place += list(parts[i]).size();
+    for (std::size_t i = first; i < last; ++i) {
+      std::ranges::copy(list(parts[i]), all->items->begin() + static_cast<std::ptrdiff_t>(place));
+      place += list(parts[i]).size();
+    }
+  });
+}
+
+}  // namespace
+
+void ContactFinder::set_bodies(const BodyStore& bodies) {
+  sub_shapes_.set_bodies(bodies);
+  sub_shapes_.update_poses(bodies);
+  broad_phase_->set_spheres(sub_shapes_.bounds());
+  fixed_changed_ = true;
+}
+
+/// Points near_ to the arrays of a search.
+void ContactFinder::start_bounds(const BodyStore& bodies, Real margin) {
+  motion_.resize(bodies.capacity());
+  swept_.resize(sub_shapes_.ranges().bounded());
+  margins_.resize(sub_shapes_.ranges().bounded());
+  near_ = {.bodies = bodies.view(),
+           .sub_shapes = sub_shapes_.view(),
+           .motion = motion_.data(),
+           .margins = margins_.data(),
+           .swept = swept_.data(),
+           .largest_margin = margin * Real(0.5)};
+}
+
+/// Makes the swept bounds of the solids of mass 0 that are no spheres, and their trees.
+/// @param sweep function that makes the bounds of a sub-shape
+template <class Sweep>
+void ContactFinder::sweep_fixed(const Sweep& sweep) {
+  if (!fixed_changed_) {
+    for (const SubShape i : sub_shapes_.kinematic()) sweep(i);
+    fixed_trees_.move_kinematic(near_);
+    return;
+  }
+  const SubShapeRanges& ranges = sub_shapes_.ranges();
+  for (SubShape i = ranges.fixed_begin(); i < ranges.bounded(); ++i) sweep(i);
+  fixed_trees_.set_bodies(sub_shapes_, near_);
+  fixed_changed_ = false;
+}
+
+/// Fills near_: the bounds of the motion of all sub-shapes during the step.
+void ContactFinder::sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool) {
+  start_bounds(bodies, margin);
+  if (fixed_changed_) std::ranges::fill(motion_, Vec3{});  // that of immovable bodies
+  const std::span<const std::uint32_t> mobile = bodies.mobile();
+  parallel_for(pool, mobile.size(), kSubShapesPerChunk, [&](std::size_t first, std::size_t last) {
+    for (const std::uint32_t i : mobile.subspan(first, last - first)) {
+      motion_[i] = near_.bodies.predicted_motion(i);
+    }
+  });
+  parallel_for(pool, sub_shapes_.ranges().fixed_begin(), kSubShapesPerChunk,
+               [&](std::size_t first, std::size_t last) {
+                 for (auto i = static_cast<SubShape>(first); i < last; ++i) near_.sweep(i);
+               });
+  sweep_fixed([this](SubShape i) { near_.sweep(i); });
+}
+
+const NearBounds& ContactFinder::enclose_bounds(const BodyStore& bodies) {
+  start_bounds(bodies, 0);
+  for (SubShape i = 0; i < sub_shapes_.ranges().fixed_begin(); ++i) near_.enclose(i);
+  sweep_fixed([this](SubShape i) { near_.enclose(i); });
+  return near_;
+}
+
+/// Tests pairs of swept bounds: contacts of two spheres go to *part, pairs with a box or a part of
+/// a compound to its candidates. Spheres of compounds become manifolds, because their arms are not
+/// multiples of the normal.
+void ContactFinder::test_sphere_pairs(const BodyStore& bodies, std::span<const SpherePair> pairs,
+                                      Part* part) const {
+  const BodyView& view = near_.bodies;
+  const SubShapeView& sub_shapes = near_.sub_shapes;
+  for (const SpherePair& pair : pairs) {
+    const PairKind kind = near_.kind_of(pair.a, pair.b);
+    if (kind == PairKind::none) continue;
+    if (kind != PairKind::spheres) {
+      auto& list = kind == PairKind::others ? part->candidates : part->compounds;
+      list.push_back(ordered(view, sub_shapes, pair.a, pair.b));
+      continue;
+    }
+    const detail::SpeculativeContact c = near_.test_spheres(pair.a, pair.b);
+    if (!c.found) continue;
+    const std::uint32_t a = sub_shapes.body(pair.a), b = sub_shapes.body(pair.b);
+    const bool touch = c.distance <= 0;
+    if (view.sensor[a] == 0 && view.sensor[b] == 0) {
+      part->spheres.push_back({{a, b}, c.normal, c.distance});
+      if (touch) ++part->touching_spheres;
+    } else if (touch) {
+      const Vec3 point = middle_point(c.normal, c.distance, sub_shapes.bounds(pair.b));
+      part->others.push_back({bodies.id(a), bodies.id(b), c.normal, point, c.distance});
+    }
+  }
+}
+
+void ContactFinder::find_fixed_pairs(SubShape first, SubShape last,
+                                     std::vector<Candidate>* candidates) const {
+  const FixedTreesView trees = fixed_trees_.view();
+  for (SubShape i = first; i < last; ++i) {
+    if (!near_.bodies.movable(near_.sub_shapes.body(i))) continue;
+    const auto before = static_cast<std::ptrdiff_t>(candidates->size());
+    near_.visit_fixed(i, trees, [&](SubShape fixed) {
+      candidates->push_back(ordered(near_.bodies, near_.sub_shapes, i, fixed));
+    });
+    std::sort(candidates->begin() + before, candidates->end());
+  }
+}
+
+/// The lists that find_near_contacts() fills.
+struct ContactFinder::Results {
+  Refilled<soft_step::SphereContactInput> spheres;
+  Refilled<soft_step::ManifoldInput> manifolds;
+  Refilled<soft_step::PointInput> points;
+  Refilled<Contact> others;
+};
+
+/// Appends the contact of two sub-shapes.
+void ContactFinder::Part::add(const BodyStore& bodies, const NearPair& near) {
+  for (const NearPair::Touch& touch : std::span(near.touches, near.touch_count)) {
+    others.push_back(
+        {bodies.id(near.key.a), bodies.id(near.key.b), near.normal, touch.point, touch.distance});
+  }
+  if (near.point_count == 0) return;
+  const auto first = static_cast<std::uint32_t>(points.size());
+  points.insert(points.end(), near.points, near.points + near.point_count);
+  manifolds.push_back({near.key, near.normal, first, near.point_count});
+}
+
+/// Calls find(first, last, part) for the chunks of [0, count), from any thread, and then
+/// append_all(parts) in this thread; batch by batch, so that the parts take little memory, and are
+/// still in the cache when they are appended.
+template <class Find, class AppendAll>
+void ContactFinder::for_each_batch(ThreadPool* pool, std::size_t count, std::size_t chunk,
+                                   const Find& find, const AppendAll& append_all) {
+  const std::size_t chunks = (count + chunk - 1) / chunk;
+  const std::size_t threads = pool == nullptr ? 1 : pool->threads();
+  const std::size_t most = std::min(chunks, kChunksPerThread * threads);
+  if (parts_.size() < most) parts_.resize(most);
+  for (std::size_t batch = 0; batch < chunks; batch += most) {
+    const std::span<Part> parts = std::span(parts_).first(std::min(most, chunks - batch));
+    const std::size_t begin = batch * chunk;
+    const std::size_t size = std::min(count - begin, parts.size() * chunk);
+    parallel_for(pool, size, chunk, [&](std::size_t first, std::size_t last) {
+      Part& part = parts[first / chunk];
+      part.clear();
+      find(begin + first, begin + last, &part);
+    });
+    append_all(parts);
+  }
+}
+
+/// Runs the pair tests of a sorted list of candidates and appends the results.
+void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
+                                    Results* results, ThreadPool* pool) {
+  const auto test_chunk = [&](std::size_t first, std::size_t last, Part* part) {
+    NearPair near;
+    for (const Candidate& pair : candidates.subspan(first, last - first)) {
+      test_near_pair(near_, pair, &near);
+      part->add(bodies, near);
+    }
+  };
+  for_each_batch(
+      pool, candidates.size(), kCandidatesPerChunk, test_chunk, [&](std::span<Part> parts) {
+        auto first_point = static_cast<std::uint32_t>(results->points.size);
+        for (Part& part : parts) {
+          for (soft_step::ManifoldInput& manifold : part.manifolds) manifold.first += first_point;
+          first_point += static_cast<std::uint32_t>(part.points.size());
+        }
+        append(
+            pool, parts, [](Part & p) -> auto& { return p.manifolds; }, &results->manifolds);
+        append(
+            pool, parts, [](Part & p) -> auto& { return p.points; }, &results->points);
+        append(
+            pool, parts, [](Part & p) -> auto& { return p.others; }, &results->others);
+      });
+}
+
+std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real margin,
+                                              ThreadPool* pool, ContactSet* near,
+                                              DetectedContacts* detected) {
+  sub_shapes_.update_poses(bodies, pool);
+  sweep_bounds(bodies, margin, pool);
+  Results results{{&near->spheres}, {&near->manifolds}, {&near->points}, {&detected->others}};
+  std::size_t touching_spheres = 0;
+  Refilled<Candidate> candidates{&candidates_}, compounds{&compounds_};
+
+  const auto bounds = std::span(swept_).first(sub_shapes_.ranges().fixed_begin());
+  const NearPairs found = broad_phase_->find_pairs(bounds, pool);
+  const auto test_pairs = [&](std::size_t first, std::size_t last, Part* part) {
+    found.for_each_touching(bounds, first, last, [&](std::span<const SpherePair> pairs) {
+      test_sphere_pairs(bodies, pairs, part);
+    });
+  };
+  for_each_batch(pool, found.pairs.size(), kPairsPerChunk, test_pairs, [&](std::span<Part> parts) {
+    for (const Part& part : parts) touching_spheres += part.touching_spheres;
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.spheres; }, &results.spheres);
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.others; }, &results.others);
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
+    append(
+        pool, parts, [](Part & p) -> auto& { return p.compounds; }, &compounds);
+  });
+
+  compounds.finish();
+  if (!compounds_.empty()) {
+    const std::size_t middle = results.others.size;
+    std::ranges::sort(compounds_);
+    test_candidates(bodies, compounds_, &results, pool);
+    merge_by_bodies(middle, std::span(detected->others).first(results.others.size), &merged_);
+  }
+  detected->other_spheres = results.others.size;
+
+  const auto find_fixed = [&](std::size_t first, std::size_t last, Part* part) {
+    find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last), &part->candidates);
+  };
+  for_each_batch(pool, sub_shapes_.ranges().fixed_begin(), kSubShapesPerChunk, find_fixed,
+                 [&](std::span<Part> parts) {
+                   append(
+                       pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
+                 });
+  candidates.finish();
+  if (!std::ranges::is_sorted(candidates_)) std::ranges::sort(candidates_);
+  test_candidates(bodies, candidates_, &results, pool);
+  results.spheres.finish();
+  results.manifolds.finish();
+  results.points.finish();
+  results.others.finish();
+  const auto by_key = [](const auto& x, const auto& y) { return x.key < y.key; };
+  if (!std::ranges::is_sorted(near->manifolds, by_key)) std::ranges::sort(near->manifolds, by_key);
+  return touching_spheres;
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

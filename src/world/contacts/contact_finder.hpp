@@ -1,0 +1,109 @@
+/// Contact detection of a world: broad phase and pair tests of all shapes.
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include "src/base/thread_pool.hpp"
+#include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/world/bodies/body_store.hpp"
+#include "src/world/bodies/sub_shape_table.hpp"
+#include "src/world/contacts/broad_phase_search.hpp"
+#include "src/world/contacts/detected_contacts.hpp"
+#include "src/world/contacts/fixed_trees.hpp"
+#include "src/world/contacts/near_pair_test.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// The broad phase tests all spheres and the bounding spheres of the other solids of movable
+/// bodies: it finds the contacts of two spheres and the candidate pairs with another solid. The
+/// other solids of bodies of mass 0 (immovable or kinematic) are in trees, which each solid of a
+/// movable body traverses; walls are tested against all of these. Contacts within one body, between
+/// two bodies of mass 0, and of pairs that BodyStore::may_collide() excludes, are discarded.
+class ContactFinder {
+ public:
+  /// @param broad_phase not null
+  explicit ContactFinder(std::unique_ptr<BroadPhaseSearch> broad_phase)
+      : broad_phase_(std::move(broad_phase)) {}
+
+  /// Must be called after a body was added or removed, or got another state by set_state().
+  void set_bodies(const BodyStore& bodies);
+
+  /// Finds the contacts of the current poses, and all pairs that may touch during the step: those
+  /// that are closer than a margin, and those that meet at their velocities. Contacts of two
+  /// spheres precede all others; both are sorted by (a.index, b.index), then by the sub-shapes of a
+  /// and of b. Contact defines which body is a. Friction and restitution are left 0. Forces of the
+  /// step must have been added up.
+  /// @param margin   [m], >= 0: SoftStepSettings::speculative_margin
+  /// @param near     receives all pairs, each list sorted by key
+  /// @param detected receives the contacts with distance <= 0 that are not in near->spheres
+  /// @returns the number of contacts in near->spheres with distance <= 0
+  /// @throws the exceptions of SphereCollider::find_pairs()
+  std::size_t find_near_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
+                                 soft_step::ContactSet* near, DetectedContacts* detected);
+
+  SubShapeTable& sub_shapes() noexcept { return sub_shapes_; }
+  BroadPhaseSearch& broad_phase() noexcept { return *broad_phase_; }
+  const SphereCollider& collider() const noexcept { return broad_phase_->collider(); }
+
+  // Parts of a search among the current poses, without margin and motion.
+
+  using SubShape = SubShapeTable::SubShape;
+  /// Makes bounds of the sub-shapes where they are, for find_fixed_pairs(). Poses must be updated.
+  JFPX_API const NearBounds& enclose_bounds(const BodyStore& bodies);
+  /// Appends the pairs of a movable sub-shape and a wall, or a solid of mass 0 that is no sphere,
+  /// whose bounds touch; sorted for each sub-shape.
+  /// @param first,last range of movable sub-shapes
+  JFPX_API void find_fixed_pairs(SubShape first, SubShape last,
+                                 std::vector<Candidate>* candidates) const;
+
+ private:
+  /// Results of a chunk of a parallel loop.
+  struct Part {
+    std::vector<soft_step::SphereContactInput> spheres;
+    std::vector<soft_step::ManifoldInput> manifolds;
+    std::vector<soft_step::PointInput> points;
+    std::size_t touching_spheres = 0;  ///< contacts in `spheres` with distance <= 0
+    std::vector<Contact> others;       ///< other contacts with distance <= 0
+    std::vector<Candidate> candidates, compounds;
+    void add(const BodyStore& bodies, const NearPair& near);
+    void clear() {
+      spheres.clear();
+      manifolds.clear();
+      points.clear();
+      touching_spheres = 0;
+      others.clear();
+      candidates.clear();
+      compounds.clear();
+    }
+  };
+  void start_bounds(const BodyStore& bodies, Real margin);
+  template <class Sweep>
+  void sweep_fixed(const Sweep& sweep);
+  void sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool);
+  void test_sphere_pairs(const BodyStore& bodies, std::span<const SpherePair> pairs,
+                         Part* part) const;
+  struct Results;
+  void test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
+                       Results* results, ThreadPool* pool);
+  template <class Find, class AppendAll>
+  void for_each_batch(ThreadPool* pool, std::size_t count, std::size_t chunk, const Find& find,
+                      const AppendAll& append_all);
+
+  std::unique_ptr<BroadPhaseSearch> broad_phase_;
+  SubShapeTable sub_shapes_;
+  std::vector<Candidate> candidates_;
+  FixedTrees fixed_trees_;
+  bool fixed_changed_ = true;          ///< whether `swept_` and the trees lack solids of mass 0
+  std::vector<Vec3> motion_;           ///< by body [m]
+  std::vector<SphereInstance> swept_;  ///< by solid: bounds of the step's motion
+  std::vector<Real> margins_;          ///< by solid [m]
+  NearBounds near_;                    ///< of the arrays above, during a search
+  // Of find_near_contacts():
+  std::vector<Candidate> compounds_;  ///< pairs of spheres, at least one of a compound
+  std::vector<Part> parts_;
+  std::vector<Contact> merged_;  ///< copy of the contacts of compounds
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,130 @@
+/// Merges the contacts of a step into one sorted list; see the header.
+#include "src/world/contacts/contact_list.hpp"
+
+#include <jfpx/contact.hpp>
+
+#include "src/base/parallel_for.hpp"
+#include "src/base/reserve.hpp"
+#include "src/world/contacts/merge_contacts.hpp"
+#include "src/world/contacts/met_contacts.hpp"
+
+#include <numeric>
+#include <span>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+using soft_step::ContactKey;
+using soft_step::ContactView;
+
+constexpr std::size_t kContactsPerListChunk = 4096;
+
+/// Appends the points of manifolds that met during the step.
+void append_met(const DetectedContacts& detected, const ContactView& contacts,
+                const BodiesOfStep& bodies, std::vector<Contact>* list) {
+  for (std::uint32_t i = contacts.sphere_count; i < contacts.size(); ++i) {
+    const soft_step::ManifoldInput& manifold = contacts.manifold(i);
+    const ContactKey& key = manifold.key;
+    if (key.is_generated()) continue;
+    for (std::uint32_t p = 0; p < manifold.count; ++p) {
+      if (!soft_step::has_met(contacts, i, p)) continue;
+      const Vec3 point = detected.position[key.b] + contacts.points[manifold.first + p].arm_b;
+      list->push_back({bodies[key.a].id, bodies[key.b].id, manifold.normal, point, 0});
+    }
+  }
+}
+
+}  // namespace
+
+MetCounts count_met_contacts(const ContactView& contacts, ThreadPool* pool) {
+  return parallel_reduce(
+      pool, contacts.size(), kContactsPerListChunk, MetCounts(),
+      [&](std::size_t first, std::size_t last) {
+        MetCounts counts;
+        for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
+          (contacts.is_sphere(i) ? counts.spheres : counts.others) += count_met(contacts, i);
+        }
+        return counts;
+      },
+      [](const MetCounts& x, const MetCounts& y) {
+        return MetCounts{x.spheres + y.spheres, x.others + y.others};
+      });
+}
+
+/// Appends the contacts of ContactSet::spheres that touched at the start of the step and, with
+/// `with_met`, those that met during the step. Each is one contact at most, so that the list is
+/// sorted as the set is.
+void ContactListMaker::append_spheres(const DetectedContacts& detected, const ContactView& contacts,
+                                      bool with_met, const BodiesOfStep& bodies,
+                                      std::vector<Contact>* list) {
+  const std::size_t chunks =
+      (contacts.sphere_count + kContactsPerListChunk - 1) / kContactsPerListChunk;
+  assign_geometric(&begin_, chunks + 1, 0);
+  const auto touches = [&](std::uint32_t i) { return contacts.distance(i, 0) <= 0; };
+  const auto is_listed = [&](std::uint32_t i) {
+    return touches(i) || (with_met && soft_step::has_met(contacts, i, 0));
+  };
+  const auto for_each_chunk = [&](const auto& visit) {
+    parallel_for(pool_, contacts.sphere_count, kContactsPerListChunk,
+                 [&](std::size_t first, std::size_t last) {
+                   visit(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
+                 });
+  };
+  for_each_chunk([&](std::uint32_t first, std::uint32_t last) {
+    std::size_t count = 0;
+    for (std::uint32_t i = first; i < last; ++i) count += is_listed(i) ? 1 : 0;
+    begin_[first / kContactsPerListChunk] = count;
+  });
+  std::exclusive_scan(begin_.begin(), begin_.end(), begin_.begin(), list->size());
+  resize_geometric(list, begin_[chunks]);
+  for_each_chunk([&](std::uint32_t first, std::uint32_t last) {
+    Contact* next = list->data() + begin_[first / kContactsPerListChunk];
+    for (std::uint32_t i = first; i < last; ++i) {
+      if (!is_listed(i)) continue;
+      const auto& [key, normal, distance] = contacts.spheres[i];
+      const ListedBody a = bodies[key.a], b = bodies[key.b];
+      const SphereInstance sphere_b{detected.position[key.b], b.radius};
+      const bool touch = touches(i);
+      const Vec3 point =
+          touch ? middle_point(normal, distance, sphere_b) : point_on_b(normal, sphere_b);
+      *next++ = {a.id, b.id, normal, point, touch ? distance : Real(0)};
+    }
+  });
+}
+
+void ContactListMaker::make(const DetectedContacts& detected, const ContactView& contacts,
+                            bool with_met, const BodiesOfStep& bodies,
+                            const MaterialSettings& rules, ContactList* list) {
+  std::vector<Contact>& all = list->contacts;
+  const auto spheres = std::span(detected.others).first(detected.other_spheres);
+  const auto others = std::span(detected.others).subspan(detected.other_spheres);
+  all.clear();
+  append_spheres(detected, contacts, with_met, bodies, &all);
+  std::size_t middle = all.size();
+  all.insert(all.end(), spheres.begin(), spheres.end());
+  merge_by_bodies(middle, all, &merged_);
+  const std::size_t begin = all.size();
+  all.insert(all.end(), others.begin(), others.end());
+  middle = all.size();
+  if (with_met) append_met(detected, contacts, bodies, &all);
+  merge_by_bodies(middle - begin, std::span(all).subspan(begin), &merged_);
+  set_materials(bodies, rules, pool_, &all);
+  list->detected = all.size();
+  all.insert(all.end(), detected.generated.begin(), detected.generated.end());
+}
+
+void set_materials(const BodiesOfStep& bodies, const MaterialSettings& rules, ThreadPool* pool,
+                   std::vector<Contact>* contacts) {
+  parallel_for(pool, contacts->size(), 1024, [&](std::size_t first, std::size_t last) {
+    for (Contact& c : std::span(*contacts).subspan(first, last - first)) {
+      const ListedBody a = bodies[c.a.index], b = bodies[c.b.index];
+      c.friction = combined(rules.friction, a.friction, b.friction);
+      c.restitution = combined(rules.restitution, a.restitution, b.restitution);
+      c.sensor = a.sensor || b.sensor;
+    }
+  });
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,44 @@
+/// Trees of the solids of mass 0 that are no spheres, for the contact search.
+#pragma once
+
+#include "src/collide/block_tree.hpp"
+#include "src/world/bodies/sub_shape_table.hpp"
+#include "src/world/contacts/near_bounds.hpp"
+
+#include <cstdint>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Two trees: that of the immovable solids is built when one of them has come, gone or moved; that
+/// of the kinematic solids, which move in every step, gets new bounds in every step.
+class FixedTrees {
+ public:
+  /// Must be called after SubShapeTable::set_bodies().
+  /// @param bounds with the swept bounds of the solids of mass 0
+  void set_bodies(const SubShapeTable& table, const NearBounds& bounds);
+  /// Updates the bounds of the kinematic solids. @param bounds with their swept bounds
+  void move_kinematic(const NearBounds& bounds);
+  FixedTreesView view() const { return {immovable_.view(), kinematic_.view()}; }
+
+ private:
+  /// A solid of mass 0 as the tree has it: the pose of a kinematic one has no effect.
+  struct Key {
+    PosedSolid solid;
+    bool is_kinematic = false;
+    friend bool operator==(const Key&, const Key&) = default;
+  };
+  void build(const NearBounds& bounds, bool is_kinematic, BlockTree* tree);
+
+  BlockTree immovable_, kinematic_;
+  std::vector<Key> keys_, next_keys_;  ///< of the last build
+  Real margin_ = 0;          ///< NearBounds::largest_margin of the last build; -1: it failed
+  std::uint32_t steps_ = 0;  ///< since the tree of the kinematic solids was built
+  // During a build.
+  std::vector<std::uint32_t> items_;
+  std::vector<Aabb> bounds_;
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

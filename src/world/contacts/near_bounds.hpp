@@ -1,0 +1,179 @@
+/// Bounds of the motion of sub-shapes during a step.
+#pragma once
+
+#include "src/collide/block_tree.hpp"
+#include "src/world/bodies/sub_shape_view.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Trees of the solids of mass 0 that are no spheres. An item is the number of a sub-shape minus
+/// SubShapeRanges::fixed_begin(), which does not change while movable bodies come and go.
+struct FixedTreesView {
+  BlockTreeView immovable, kinematic;
+};
+
+enum class PairKind : std::uint8_t {
+  none,       ///< not in contact, whatever the shapes
+  spheres,    ///< two bodies that are spheres
+  compounds,  ///< two spheres, at least one of a compound
+  others
+};
+
+/// Bounds and pair tests of a step's contact search.
+struct NearBounds {
+  using SubShape = SubShapeView::SubShape;
+
+  BodyView bodies;
+  SubShapeView sub_shapes;
+  const Vec3* motion = nullptr;     ///< [m], by body: BodyView::predicted_motion()
+  Real* margins = nullptr;          ///< [m], by sub-shape
+  SphereInstance* swept = nullptr;  ///< by sub-shape, without walls: bounds of the step's motion
+  Real largest_margin = 0;          ///< [m]
+
+  /// Fills swept[i] with a sphere that encloses the motion of the sub-shape, and margins[i].
+  JFPX_HD void sweep(SubShape i) const {
+    // The margin is at most this part of the size, so that small bodies do not collect contacts
+    // with everything around them.
+    constexpr Real kMarginPerSize = Real(0.04);
+    const SphereInstance& bounds = sub_shapes.bounds(i);
+    Real size = bounds.radius;
+    if (!sub_shapes.is_sphere(i)) {
+      sub_shapes.visit_solid(
+          i, [&](const auto& solid, const Transform&) { size = detail::least_half_width(solid); });
+    }
+    margins[i] = smaller(largest_margin, size * kMarginPerSize);
+    const std::uint32_t body = sub_shapes.body(i);
+    SphereInstance sphere{bounds.centre, bounds.radius + margins[i]};
+    if (bodies.awake[body] != 0) {
+      const Vec3 half_motion = motion[body] * Real(0.5);
+      const Real arm = length(bounds.centre - bodies.position[body]);
+      const Real reach = sub_shapes.is_sphere(i) ? arm : arm + bounds.radius;
+      const Real turned = length(bodies.angular_velocity[body]) * bodies.dt;
+      sphere.centre += half_motion;
+      sphere.radius += length(half_motion) + smaller(turned, Real(2)) * reach;
+    }
+    swept[i] = rounded(sphere);
+  }
+  /// The same without margin and motion: a sphere that encloses the sub-shape where it is.
+  JFPX_HD void enclose(SubShape i) const {
+    margins[i] = 0;
+    swept[i] = rounded(sub_shapes.bounds(i));
+  }
+
+  /// @param a,b sub-shapes whose swept bounds touch, a < b
+  JFPX_HD PairKind kind_of(SubShape a, SubShape b) const {
+    const std::uint32_t x = sub_shapes.body(a), y = sub_shapes.body(b);
+    const bool any_movable = bodies.movable(x) || bodies.movable(y);
+    if (x == y || !any_movable || !bodies.may_collide(x, y)) return PairKind::none;
+    if (!sub_shapes.is_sphere(b)) return PairKind::others;
+    return bodies.radius[x] > 0 && bodies.radius[y] > 0 ? PairKind::spheres : PairKind::compounds;
+  }
+
+  /// The contact of a pair of kind `spheres`.
+  JFPX_HD detail::SpeculativeContact test_spheres(SubShape a, SubShape b) const {
+    const Vec3 relative = motion[sub_shapes.body(a)] - motion[sub_shapes.body(b)];
+    return detail::find_speculative(sub_shapes.bounds(a), sub_shapes.bounds(b), relative,
+                                    2 * smaller(margins[a], margins[b]));
+  }
+
+  /// Whether the swept bounds of a movable sub-shape touch a fixed one. Conservative.
+  JFPX_HD bool may_meet(SubShape i, SubShape fixed) const {
+    if (sub_shapes.is_wall(fixed)) {
+      const Vec3& centre = bodies.position[sub_shapes.body(i)];
+      const HalfSpace solid = sub_shapes.wall(fixed).solid_for(centre);
+      const Real height = dot(solid.normal, swept[i].centre) - solid.offset;
+      return height <= swept[i].radius + 8 * kEpsilon * absolute(solid.offset);
+    }
+    const Real most = swept[i].radius + swept[fixed].radius;
+    if (!(length_squared(swept[i].centre - swept[fixed].centre) <=
+          most * most * (1 + 64 * kEpsilon)))
+      return false;
+    // The bounding sphere of a wide floor contains everything above it. During the step, no point
+    // of the solid is farther than 2 * moved from the solid at the start.
+    const Real moved = swept[fixed].radius - sub_shapes.bounds(fixed).radius;
+    const PosedSolid& posed = sub_shapes.solid(fixed);
+    const Vec3& centre = swept[i].centre;
+    const Real far = sum(posed.pose.origin) + swept[fixed].radius + sum(centre);
+    // A centre that is not farther than kEpsilon counts as inside.
+    const Real radius =
+        swept[i].radius + posed.solid.radius + 2 * moved + 16 * kEpsilon * far + kEpsilon;
+    const Vec3 local = transform_transpose(posed.pose.basis, centre - posed.pose.origin);
+    const Vec3 outside = detail::offset_from_box(local, {posed.solid.half_extents});
+    return length_squared(outside) <= radius * radius;
+  }
+
+  /// [m]: the sub-shapes of a candidate have a contact if they come closer.
+  JFPX_HD Real margin_of(const Candidate& pair) const {
+    const SubShape p = pair.sub_shape_a, q = pair.sub_shape_b;
+    if (sub_shapes.is_wall(q)) return 2 * margins[p] + spin(p);
+    return 2 * smaller(margins[p], margins[q]) + spin(p) + spin(q);
+  }
+
+  /// Bounds of a solid of mass 0 in the tree. If they do not overlap query_bounds() of a movable
+  /// sub-shape, may_meet() is false: both are larger by their part of its radius, twice the error.
+  JFPX_HD Aabb tree_bounds(SubShape fixed) const {
+    const PosedSolid& posed = sub_shapes.solid(fixed);
+    const Real moved = swept[fixed].radius - sub_shapes.bounds(fixed).radius;
+    const Real far = sum(posed.pose.origin) + swept[fixed].radius;
+    const Real reach = posed.solid.radius + 2 * moved + 32 * kEpsilon * far + kEpsilon;
+    Aabb box;
+    for (int i = 0; i < 3; ++i) {
+      const Real half =
+          reach + detail::projected_half_length(posed.solid.half_extents, posed.pose.basis.row[i]);
+      box.lower[i] = posed.pose.origin[i] - half;
+      box.upper[i] = posed.pose.origin[i] + half;
+    }
+    return box;
+  }
+  JFPX_HD Aabb query_bounds(SubShape i) const {
+    const SphereInstance& sphere = swept[i];
+    const Real reach = sphere.radius + 32 * kEpsilon * (sum(sphere.centre) + sphere.radius);
+    const Vec3 half{reach, reach, reach};
+    return {sphere.centre - half, sphere.centre + half};
+  }
+  /// Calls visit(fixed) for the walls, and the other solids of mass 0 that are no spheres, that a
+  /// movable sub-shape may meet, in any order.
+  template <class Visit>
+  JFPX_HD void visit_fixed(SubShape i, const FixedTreesView& trees, const Visit& visit) const {
+    const std::uint32_t body = sub_shapes.body(i);
+    const auto test = [&](SubShape fixed) {
+      if (bodies.may_collide(body, sub_shapes.body(fixed)) && may_meet(i, fixed)) visit(fixed);
+    };
+    const Aabb box = query_bounds(i);
+    const SubShape first = sub_shapes.ranges.fixed_begin();
+    const auto test_item = [&](std::uint32_t item) { test(first + item); };
+    trees.immovable.visit_overlapping(box, test_item);
+    trees.kinematic.visit_overlapping(box, test_item);
+    for (SubShape wall = sub_shapes.ranges.bounded(); wall < sub_shapes.ranges.all(); ++wall) {
+      test(wall);
+    }
+  }
+
+ private:
+  /// Larger by more than the rounding errors of the centre and of the radius.
+  JFPX_HD static SphereInstance rounded(SphereInstance sphere) {
+    const Vec3& c = sphere.centre;
+    const Real largest = larger(larger(absolute(c.x), absolute(c.y)), absolute(c.z));
+    sphere.radius += 8 * kEpsilon * (largest + sphere.radius);
+    return sphere;
+  }
+  /// [m], bound of the motion of a solid's surface by the rotation of its body; 0 for a sphere.
+  JFPX_HD Real spin(SubShape i) const {
+    const std::uint32_t body = sub_shapes.body(i);
+    if (sub_shapes.is_sphere(i) || bodies.awake[body] == 0) return 0;
+    const SphereInstance& bounds = sub_shapes.bounds(i);
+    const Real reach = length(bounds.centre - bodies.position[body]) + bounds.radius;
+    const Real turned = length(bodies.angular_velocity[body]) * bodies.dt;
+    return smaller(turned, Real(1)) * reach;
+  }
+  JFPX_HD static Real smaller(Real a, Real b) { return b < a ? b : a; }
+  /// Sum of the absolute coordinates, which is not less than the length.
+  JFPX_HD static Real sum(const Vec3& v) { return absolute(v.x) + absolute(v.y) + absolute(v.z); }
+  JFPX_HD static Real larger(Real a, Real b) { return a < b ? b : a; }
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,87 @@
+/// Joints of a world.
+#pragma once
+
+#include <jfpx/joint.hpp>
+
+#include "src/contact_solver/soft_step/joint_set.hpp"
+#include "src/world/bodies/id_pool.hpp"
+
+#include <cstdint>
+#include <set>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// The bodies of a joint, by their indices; b may be soft_step::kWorld.
+struct JoinedBodies {
+  std::uint32_t a = 0, b = soft_step::kWorld;
+  /// Whether the joint is of two bodies that must not collide with each other.
+  bool excludes_contacts = false;
+};
+JoinedBodies joined_bodies(const Joint& joint) noexcept;
+
+/// Impulse that pulls the bodies together in the last substep [N s].
+Real pull_of(const DistanceJoint& joint, const soft_step::KeptJoint& kept) noexcept;
+
+/// Owns the joints, their ids, and what they keep from step to step.
+class JointStore {
+ public:
+  bool empty() const noexcept { return pool_.size() == 0; }
+  std::size_t size() const noexcept { return pool_.size(); }
+  /// Number of slots; all indices are below it.
+  std::size_t capacity() const noexcept { return pool_.capacity(); }
+  std::span<const JointId> ids() const noexcept { return pool_.ids(); }
+  bool contains(JointId id) const noexcept { return pool_.contains(id); }
+  /// Returns the slot of a joint in the store. @throws InvalidArgument for an unknown id
+  std::uint32_t require(JointId id) const;
+  JointId id(std::uint32_t joint) const { return pool_.id(joint); }
+  const Joint& joint(std::uint32_t joint) const { return joints_[joint]; }
+  const soft_step::KeptJoint& kept(std::uint32_t joint) const { return last_[joint]; }
+
+  /// @param joint must have passed validation
+  /// @throws std::bad_alloc; the store is then unchanged
+  JointId add(const Joint& joint);
+  void remove(std::uint32_t joint) noexcept;
+  /// Replaces a joint by one of the same type and bodies, which keeps the impulses.
+  void set(std::uint32_t joint, const Joint& value) noexcept;
+  /// Calls f(joint) for all joints of a body.
+  template <class F>
+  void for_each_of(std::uint32_t body, const F& f) const {
+    for (auto at = of_body_.lower_bound({body, 0}); at != of_body_.end() && at->first == body;) {
+      f((at++)->second);  // which may remove the joint
+    }
+  }
+  /// Whether a joint excludes contacts of two bodies.
+  bool excludes_contacts(std::uint32_t a, std::uint32_t b) const noexcept;
+
+  /// The joints of the next step. Valid until a joint is added or removed.
+  soft_step::JointView view();
+  /// Completes the step: what the joints keep now becomes what they kept in the last step.
+  void commit() noexcept { last_.swap(now_); }
+  /// Replaces what the joints keep, by slot.
+  std::vector<soft_step::KeptJoint>& last() noexcept { return last_; }
+
+  /// Replaces all joints and ids, as IdPool::assign(); restore() adds the joints.
+  void assign(const std::vector<std::uint32_t>& generations,
+              const std::vector<std::uint32_t>& unused);
+  void restore(std::uint32_t slot, const Joint& joint, const soft_step::KeptJoint& kept);
+  const std::vector<std::uint32_t>& generations() const noexcept { return pool_.generations(); }
+  const std::vector<std::uint32_t>& unused() const noexcept { return pool_.unused(); }
+
+ private:
+  using BodyJoints = std::set<std::pair<std::uint32_t, std::uint32_t>>;
+  void put(std::uint32_t slot, const Joint& joint) noexcept;
+
+  IdPool<JointId> pool_;
+  // By slot.
+  std::vector<Joint> joints_;
+  std::vector<soft_step::JointInput> inputs_;
+  std::vector<soft_step::KeptJoint> last_, now_;
+  BodyJoints of_body_;  ///< (body, slot)
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,21 @@
+/// The contacts of the last step in a snapshot.
+#pragma once
+
+#include "src/base/binary_archive.hpp"
+#include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/world/bodies/body_store.hpp"
+#include "src/world/snapshots/snapshot_checks.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Writes what ContactCache::match() reads of the contacts of a completed step.
+void write_contacts(BinaryWriter* writer, const soft_step::ContactSet& contacts);
+/// Reads contacts of the bodies; all other members of the contacts are zero.
+/// @param colors receives the colors of the contacts
+/// @throws InvalidSnapshot, std::bad_alloc
+soft_step::ContactSet read_contacts(BinaryReader* reader, const BodyStore& bodies,
+                                    SnapshotColors* colors);
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,44 @@
+/// The bytes of the types that a snapshot consists of. Each function names all members of its type,
+/// so that a new member does not compile until it is here or in a list of fields (field.hpp).
+#pragma once
+
+#include <jfpx/force.hpp>
+#include <jfpx/scene.hpp>
+#include <jfpx/world.hpp>
+
+#include "src/base/binary_archive.hpp"
+#include "src/scene/scene_fields.hpp"
+#include "src/world/forces/force_fields.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+void serialize(auto& archive, Is<Vec3> auto& v) { archive(v.x, v.y, v.z); }
+void serialize(auto& archive, Is<Quat> auto& q) { archive(q.w, q.x, q.y, q.z); }
+void serialize(auto& archive, Is<Mat3> auto& m) { archive(m.row[0], m.row[1], m.row[2]); }
+
+void serialize(auto& archive, Is<BodyId> auto& id) {
+  auto& [index, generation] = id;
+  archive(index, generation);
+}
+void serialize(auto& archive, Is<Contact> auto& contact) {
+  auto& [a, b, normal, point, distance, friction, restitution, sensor] = contact;
+  archive(a, b, normal, point, distance, friction, restitution, sensor);
+}
+
+void serialize(auto& archive, Is<ForceId> auto& id) {
+  auto& [number] = id;
+  archive(number);
+}
+void serialize(auto& archive, Is<ContactGeneratorId> auto& id) {
+  auto& [number] = id;
+  archive(number);
+}
+template <class T>
+requires HasFields<T>
+void serialize(auto& archive, T& value) {
+  each_field(value, [&](const auto&, auto& member) { archive(member); });
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

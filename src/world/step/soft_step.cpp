@@ -1,0 +1,218 @@
+/// The soft step of a world (Catto, Solver2D, 2023; Macklin et al., Small Steps in Physics
+/// Simulation, 2019).
+///
+/// Box2D applies the accumulated impulse of every contact at the start of each substep. Here this
+/// is done per body: FreeMotion has its velocities right after its accelerations, so its velocity
+/// minus these is what the contacts of the substep have changed, and accelerate() adds it again.
+/// This is the same, because normals and anchors are constant within a step.
+#include "src/world/step/soft_step.hpp"
+
+#include "src/base/parallel_for.hpp"
+#include "src/base/pool_team.hpp"
+#include "src/base/reserve.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <functional>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace {
+
+using soft_step::ContactKey;
+using soft_step::ContactSet;
+using soft_step::ContactView;
+
+constexpr std::size_t kBodiesPerChunk = 512, kContactsPerChunk = 2048;
+
+}  // namespace
+
+SoftStep::SoftStep(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
+                   ThreadPool* pool, SimdLevel simd)
+    : constants_(soft_step::make_step_constants(settings, dt)),
+      settings_(settings),
+      materials_(materials),
+      pool_(pool),
+      solver_(pool, simd) {}
+
+void SoftStep::restore(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
+                       ContactSet last) noexcept {
+  constants_ = soft_step::make_step_constants(settings, dt);
+  settings_ = settings;
+  materials_ = materials;
+  cache_.restore(std::move(last));
+}
+
+/// Generated contacts of the same bodies are identified by their sequence.
+void SoftStep::add_generated(const BodyStore& bodies, std::span<const Contact> generated) {
+  if (generated.empty()) return;
+  ContactSet& set = cache_.current();
+  const auto by_key = [](const auto& x, const auto& y) { return x.key < y.key; };
+  for (std::uint32_t i = 0; i < generated.size(); ++i) {
+    const Contact& c = generated[i];
+    const auto point = static_cast<std::uint32_t>(set.points.size());
+    set.points.push_back({c.point - bodies.moving.position[c.a.index],
+                          c.point - bodies.moving.position[c.b.index], c.distance, 0});
+    const ContactKey key{c.a.index, c.b.index, ContactKey::kGenerated, i};
+    set.manifolds.push_back({key, c.normal, point, 1, c.friction, c.restitution});
+  }
+  std::ranges::sort(set.manifolds, by_key);
+  // Numbered for each pair of bodies, so that a contact that comes or goes renames no other pair's.
+  const ContactKey* before = nullptr;
+  for (soft_step::ManifoldInput& manifold : set.manifolds) {
+    ContactKey& key = manifold.key;
+    if (!key.is_generated()) continue;
+    const bool same_pair = before != nullptr && before->a == key.a && before->b == key.b;
+    key.part_b = same_pair ? before->part_b + 1 : 0;
+    before = &key;
+  }
+}
+
+/// Sizes all buffers, so that commit() does not allocate.
+void SoftStep::prepare(const BodyStore& bodies) {
+  const std::size_t capacity = bodies.capacity();
+  bodies_.resize(capacity);
+  traits_.resize(capacity);
+  orientation_.resize(capacity);
+  free_.resize(capacity);
+  marked_.resize(capacity);
+  parent_.resize(capacity);
+}
+
+soft_step::Islands SoftStep::islands_of(const BodyStore& bodies) {
+  const std::span<const std::uint32_t> mobile = bodies.mobile();
+  return {.step = step_,
+          .contacts = cache_.current().view(),
+          .joints = joints_,
+          .sets = {parent_.data()},
+          .marked = marked_.data(),
+          .any_carriers = bodies.has_kinematic_bodies(),
+          .mobile = mobile.data(),
+          .mobile_count = static_cast<std::uint32_t>(mobile.size())};
+}
+
+/// Marks the bodies that have a contact in this step, or a joint.
+void SoftStep::find_near() {
+  assign_geometric(&near_, bodies_.size(), 0);
+  const ContactView contacts = cache_.current().view();
+  parallel_for(pool_, contacts.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+    for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
+      for (const std::uint32_t body : {contacts.key(i).a, contacts.key(i).b}) {
+        std::atomic_ref(near_[body]).store(soft_step::kHasContact, std::memory_order_relaxed);
+      }
+    }
+  });
+  for (std::uint32_t joint = 0; joint < joints_.count; ++joint) {
+    if (!joints_.is_used(joint)) continue;
+    const soft_step::JointInput& input = joints_.inputs[joint];
+    near_[input.a] = soft_step::kHasJoint;
+    if (input.b != soft_step::kWorld) near_[input.b] = soft_step::kHasJoint;
+  }
+}
+
+/// Calls stage(index) for all bodies that are not immovable.
+template <class Stage>
+void SoftStep::for_each_body(const BodyStore& store, const Stage& stage) {
+  const std::span<const std::uint32_t> bodies = store.mobile();
+  parallel_for(pool_, bodies.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+    for (const std::uint32_t i : bodies.subspan(first, last - first)) stage(i);
+  });
+}
+
+/// Calls test(index) for all bodies that are not immovable. @returns whether one call returned true
+template <class Test>
+bool SoftStep::any_body(const BodyStore& store, const Test& test) {
+  const std::span<const std::uint32_t> bodies = store.mobile();
+  return parallel_reduce(
+      pool_, bodies.size(), kBodiesPerChunk, false,
+      [&](std::size_t first, std::size_t last) {
+        bool any = false;
+        for (const std::uint32_t i : bodies.subspan(first, last - first)) any |= test(i);
+        return any;
+      },
+      std::logical_or<>());
+}
+
+/// Loads the bodies of a step: of the immovable ones, those that have a contact or a joint.
+void SoftStep::load(const BodyStore& store) {
+  for_each_body(store, [this](std::uint32_t i) { step_.load(i); });
+  if (store.mobile().size() == store.size()) return;
+  const std::span<const BodyId> ids = store.ids();
+  parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+    for (const BodyId id : ids.subspan(first, last - first)) {
+      if (near_[id.index] != 0 && store.immovable(id.index)) step_.load(id.index);
+    }
+  });
+}
+
+std::optional<BodyId> SoftStep::find_runaway(const BodyStore& store) {
+  constexpr std::uint32_t kNone = BodyId{}.index;
+  const std::span<const std::uint32_t> bodies = store.mobile();
+  const std::uint32_t found = parallel_reduce(
+      pool_, bodies.size(), kBodiesPerChunk, kNone,
+      [&](std::size_t first, std::size_t last) {
+        for (const std::uint32_t i : bodies.subspan(first, last - first)) {
+          if (store.moving.awake[i] != 0 && !is_in_world(step_.state(i))) return i;
+        }
+        return kNone;
+      },
+      [](std::uint32_t x, std::uint32_t y) { return std::min(x, y); });
+  return found == kNone ? std::nullopt : std::optional(store.id(found));
+}
+
+std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointView& joints) {
+  prepare(*bodies);
+  joints_ = joints;
+  cache_.match(bodies->inverse_masses(), bodies->any_rolls(), joints, pool_);
+  find_near();
+  step_ = {.bodies = bodies->view(),
+           .motion = bodies->motion_pointers(),
+           .solver = bodies_.data(),
+           .traits = traits_.data(),
+           .orientation = orientation_.data(),
+           .near = near_.data(),
+           .h = constants_.h};
+  if (any_body(*bodies, [this](std::uint32_t i) { return step_.bodies.is_asleep(i); })) {
+    islands_of(*bodies).wake_touched(PoolTeam(pool_));
+  }
+  load(*bodies);
+  const BodyView& view = step_.bodies;
+  solver_.build({.contacts = cache_.current().view(),
+                 .joints = joints,
+                 .properties = {.inverse_inertia = view.inverse_inertia,
+                                .acceleration = view.last_acceleration,
+                                .radius = view.radius,
+                                .traits = traits_.data(),
+                                .friction = view.friction,
+                                .restitution = view.restitution,
+                                .rolling_friction = view.rolling_friction,
+                                .spinning_friction = view.spinning_friction,
+                                .rules = materials_,
+                                .position = view.position,
+                                .orientation = orientation_.data()},
+                 .start = bodies_.data(),
+                 .restitution_threshold = constants_.restitution_threshold},
+                bodies_.size(), {step_.bodies.last_acceleration, free_.data()}, constants_);
+  for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
+    for_each_body(*bodies, [&](std::uint32_t i) {
+      step_.accelerate(i, &step_.solver[i], &free_[i], substep == 0);
+    });
+    if (substep == 0) solver_.warm_start(bodies_);
+    solver_.solve(bodies_, true);
+    for_each_body(*bodies, [this](std::uint32_t i) { step_.move(i, &step_.solver[i]); });
+    for (std::uint32_t k = 0; k < soft_step::kRelaxSweeps; ++k) solver_.solve(bodies_, false);
+  }
+  solver_.restitute(bodies_);
+  solver_.store();
+  return find_runaway(*bodies);
+}
+
+void SoftStep::commit(BodyStore* bodies) noexcept {
+  const bool any_rests = any_body(*bodies, [this](std::uint32_t i) { return step_.store(i); });
+  if (any_rests) islands_of(*bodies).put_to_sleep(PoolTeam(pool_));
+  cache_.commit();
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,96 @@
+/// The step of Solver::soft_step: contacts, waking, substeps, sleep.
+#pragma once
+
+#include <jfpx/world.hpp>
+
+#include "src/base/thread_pool.hpp"
+#include "src/contact_solver/soft_step/contact_cache.hpp"
+#include "src/contact_solver/soft_step/cpu/soft_step_solver.hpp"
+#include "src/world/bodies/body_store.hpp"
+#include "src/world/step/islands.hpp"
+#include "src/world/step/soft_step_stages.hpp"
+
+#include <optional>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Moves the bodies of a world by one step. Owns its buffers, which grow and never shrink, and the
+/// contacts of the last step, whose impulses and colors are part of the state of the world.
+///
+/// A step: the caller fills contacts() and calls add_generated(), solve() and commit(). Without
+/// commit(), the next step has the contacts of the last completed one, and no pose or velocity has
+/// changed.
+class SoftStep {
+ public:
+  /// @param pool outlives the object
+  /// @param simd widest vector instructions of the sweeps
+  SoftStep(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
+           ThreadPool* pool, SimdLevel simd);
+
+  /// Contacts of the current step, for ContactFinder::find_near_contacts().
+  soft_step::ContactSet& contacts() { return cache_.current(); }
+  /// After commit(): contacts of the step before the last one, until the next detection.
+  soft_step::ContactView contacts_before() { return cache_.current().view(); }
+  /// Contacts of the last completed step, with their impulses and colors.
+  soft_step::ContactSet& last_contacts() { return cache_.last(); }
+  /// The same. drop_removed() must have been called since the last forget().
+  const soft_step::ContactSet& last_contacts() const { return cache_.last(); }
+  /// Adds the contacts of contact generators.
+  void add_generated(const BodyStore& bodies, std::span<const Contact> generated);
+  /// Computes the motion of the step. Wakes bodies and updates accelerations. Forces must have been
+  /// added up.
+  /// @returns the first body that is_in_world() refuses, if there is one
+  /// @param joints its arrays are valid until commit(); `now` receives what they keep
+  std::optional<BodyId> solve(BodyStore* bodies, const soft_step::JointView& joints);
+  /// Moves the bodies, clears forces, and puts islands to sleep.
+  void commit(BodyStore* bodies) noexcept;
+  /// Makes room for bodies with indices below `bodies`. @throws std::bad_alloc
+  void reserve(std::size_t bodies) { cache_.reserve(bodies); }
+  /// Replaces the parameters of the constructor and the contacts of the last completed step.
+  void restore(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
+               soft_step::ContactSet last) noexcept;
+  /// Removes the contacts of a removed body, in constant time; drop_removed() completes the
+  /// removal.
+  void forget(std::uint32_t body) noexcept { cache_.forget(body); }
+  void drop_removed() noexcept { cache_.drop_forgotten(); }
+  /// Replaces the contacts of the last step by those that a device has made of it, without those of
+  /// removed bodies.
+  void replace_last_contacts(soft_step::ContactSet last) noexcept {
+    cache_.replace_last(std::move(last));
+    cache_.drop_forgotten();
+  }
+  /// Must be called after a step on a device, whose contacts are all of existing bodies.
+  void forget_none() noexcept { cache_.forget_none(); }
+
+ private:
+  void prepare(const BodyStore& bodies);
+  soft_step::Islands islands_of(const BodyStore& bodies);
+  void find_near();
+  template <class Stage>
+  void for_each_body(const BodyStore& bodies, const Stage& stage);
+  template <class Test>
+  bool any_body(const BodyStore& bodies, const Test& test);
+  void load(const BodyStore& bodies);
+  std::optional<BodyId> find_runaway(const BodyStore& bodies);
+
+  soft_step::StepConstants constants_;
+  SoftStepSettings settings_;
+  MaterialSettings materials_;
+  ThreadPool* pool_;
+  soft_step::ContactCache cache_;
+  soft_step::SoftStepSolver solver_;
+
+  soft_step::JointView joints_;  ///< during a step
+  soft_step::StepBodies step_;   ///< of the arrays below and the bodies, during a step
+  std::vector<soft_step::SolverBody> bodies_;  ///< by body
+  std::vector<std::uint8_t> traits_;           ///< by body: soft_step::BodyTraits
+  std::vector<Quat> orientation_;              ///< by body, during the step
+  std::vector<soft_step::FreeMotion> free_;    ///< by body
+  std::vector<std::uint8_t> near_;             ///< by body: StepBodies::near
+  std::vector<std::uint32_t> parent_;          ///< by body: soft_step::DisjointSets::parent
+  std::vector<std::uint8_t> marked_;           ///< by label of an island
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx

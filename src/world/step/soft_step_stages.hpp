@@ -1,0 +1,154 @@
+/// The stages of a soft step for one body or one contact, for the CPU and for devices.
+#pragma once
+
+#include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/contact_solver/soft_step/joint_set.hpp"
+#include "src/contact_solver/soft_step/row_setup.hpp"
+#include "src/world/bodies/body_view.hpp"
+
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace soft_step {
+
+/// Whether the bodies of a contact touch, or meet during the step at their velocities.
+JFPX_HD inline bool will_touch(const BodyView& bodies, const ContactView& contacts,
+                               std::uint32_t contact) {
+  const ContactKey& key = contacts.key(contact);
+  const Vec3 motion = bodies.predicted_motion(key.a) - bodies.predicted_motion(key.b);
+  const Real opening = dot(motion, contacts.normal(contact));
+  return contacts.any_point(contact, [opening](Real distance, const KeptImpulse& impulse) {
+    return distance <= 0 || distance + opening <= 0 || impulse.normal > 0;
+  });
+}
+
+/// Whether the bodies of a contact touched, or pushed each other, during the step.
+JFPX_HD inline bool has_touched(const ContactView& contacts, std::uint32_t contact) {
+  return contacts.any_point(contact, [](Real distance, const KeptImpulse& impulse) {
+    return distance <= 0 || impulse.has_pushed();
+  });
+}
+
+/// Why a sleeping island wakes: it touches a kinematic body in motion or a body that is not slow,
+/// or it touches slow bodies only.
+inline constexpr std::uint8_t kTouchesFastBody = 1, kTouchesSlowBody = 2;
+
+/// Wakes a body of an island. @param mark of the island; 0: it does not wake
+JFPX_HD inline void wake_touched(const BodyView& bodies, const MotionPointers& motion,
+                                 std::uint32_t i, std::uint8_t mark) {
+  if (mark == kTouchesFastBody) motion.wake(bodies, i);
+  if (mark == kTouchesSlowBody) motion.wake_by_slow_body(bodies, i);
+}
+
+/// Values of StepBodies::near. A body with joints may have contacts, too.
+inline constexpr std::uint8_t kHasContact = 1, kHasJoint = 2;
+
+/// Calls f(a, b) if a joint is one of two bodies.
+template <class F>
+JFPX_HD inline void with_joined_bodies(const JointView& joints, std::uint32_t joint, const F& f) {
+  if (!joints.is_used(joint) || joints.inputs[joint].b == kWorld) return;
+  f(joints.inputs[joint].a, joints.inputs[joint].b);
+}
+
+/// The bodies of a step, as arrays by body.
+struct StepBodies {
+  BodyView bodies;
+  MotionPointers motion;  ///< of the same bodies
+  SolverBody* solver = nullptr;
+  std::uint8_t* traits = nullptr;      ///< bits of BodyTraits
+  Quat* orientation = nullptr;         ///< during the step
+  const std::uint8_t* near = nullptr;  ///< kHasContact, kHasJoint, or 0
+  Real h = 0;                          ///< [s], length of a substep
+
+  /// Starts the step.
+  JFPX_HD void load(std::uint32_t i) const {
+    if (bodies.is_active(i)) {
+      motion.last_acceleration[i] = bodies.acceleration_of_step(i);
+    }
+    SolverBody body;
+    body.velocity = bodies.velocity[i];
+    body.angular_velocity = bodies.angular_velocity[i];
+    body.inverse_mass = bodies.inverse_mass[i];
+    if (bodies.is_round(i)) body.inverse_inertia = bodies.inverse_inertia[i](0, 0);
+    solver[i] = body;
+    traits[i] = traits_of(i, body);
+    orientation[i] = bodies.orientation[i];
+  }
+
+  JFPX_HD std::uint8_t traits_of(std::uint32_t i, const SolverBody& body) const {
+    const bool is_movable = bodies.movable(i), is_awake = bodies.awake[i] != 0;
+    std::uint8_t bits = is_movable ? BodyTraits::kMovable : 0;
+    if (is_movable && is_awake) bits |= BodyTraits::kActive;
+    if (is_movable ? body.inverse_inertia > 0 : !is_awake) bits |= BodyTraits::kIsRound;
+    if (bodies.rolling_friction[i] > 0 || bodies.spinning_friction[i] > 0) {
+      bits |= BodyTraits::kRolls;
+    }
+    return bits;
+  }
+
+  /// Starts a substep: applies accelerations, and, unless it is the first of the step, the contact
+  /// impulses of the last substep again. A body without contacts moves by the mean of its
+  /// velocities before and after, so that its path is an exact parabola; with contacts, the mean
+  /// would contain a part of the acceleration that impulses have cancelled. Forces may depend on
+  /// the position, and are constant in a step: they move the body as in the semi-implicit Euler
+  /// method for the whole step, because a spring would gain energy otherwise.
+  JFPX_HD void accelerate(std::uint32_t i, SolverBody* body, FreeMotion* free,
+                          bool is_first) const {
+    if (!bodies.is_active(i)) return;
+    Vec3 velocity = body->velocity, angular_velocity = body->angular_velocity;
+    bodies.accelerate(i, orientation[i], &velocity, &angular_velocity);
+    if (near[i] == 0) {
+      body->shift = add_scaled(body->shift, body->velocity - velocity, h * Real(0.5));
+      if (!(bodies.force[i] == Vec3{})) {
+        const Real half_step = h * bodies.dt * Real(0.5);
+        body->shift = add_scaled(body->shift, bodies.last_acceleration[i], half_step);
+      }
+    }
+    const Vec3 gained = is_first ? Vec3{} : body->velocity - free->velocity;
+    const Vec3 spun = is_first ? Vec3{} : body->angular_velocity - free->angular_velocity;
+    *free = {velocity, angular_velocity};
+    body->velocity = velocity + gained;
+    body->angular_velocity = angular_velocity + spun;
+  }
+
+  /// Ends a substep: integrates the velocities of a body that moves.
+  JFPX_HD void move(std::uint32_t i, SolverBody* body) const {
+    if (bodies.awake[i] == 0) return;
+    body->shift = add_scaled(body->shift, body->velocity, h);
+    body->rotation = add_scaled(body->rotation, body->angular_velocity, h);
+    orientation[i] = turned(orientation[i], *body);
+  }
+
+  /// The orientation of a body after a substep. After an overflow it is zero, and remains so until
+  /// the step is undone.
+  JFPX_HD Quat turned(const Quat& before, const SolverBody& body) const {
+    if (before == Quat{0, 0, 0, 0}) return before;
+    return detail::integrated_orientation(before, body.angular_velocity, h);
+  }
+
+  /// State of an awake body at the end of the step.
+  JFPX_HD BodyState state(std::uint32_t i) const {
+    return {bodies.position[i] + solver[i].shift, orientation[i], solver[i].velocity,
+            solver[i].angular_velocity};
+  }
+
+  /// Ends the step. @returns whether the body has been slow for long enough to sleep
+  JFPX_HD bool store(std::uint32_t i) const {
+    bool rests = false;
+    if (bodies.awake[i] != 0) {
+      motion.end_step(bodies, i, state(i));
+      if (bodies.movable(i)) {
+        const bool is_driven = !(bodies.force[i] == Vec3{} && bodies.torque[i] == Vec3{});
+        motion.update_rest_time(bodies, i, is_driven);
+        rests = bodies.is_at_rest(i);
+      }
+    }
+    motion.force[i] = motion.torque[i] = {};
+    return rests;
+  }
+};
+
+}  // namespace soft_step
+}  // namespace JFPX_ABI
+}  // namespace jfpx
