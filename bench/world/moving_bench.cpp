@@ -49,7 +49,7 @@ void search(benchmark::State& state, Real speed, bool keeps) {
       pairs = collider->find_pairs(gas.spheres()).size();
       continue;
     }
-    const NearPairs found = list.find(gas.spheres(), collider.get(), nullptr);
+    const NeighborPairs found = list.find(gas.spheres(), collider.get(), nullptr);
     pairs = 0;
     found.for_each_touching(gas.spheres(), 0, found.pairs.size(),
                             [&pairs](std::span<const SpherePair> part) { pairs += part.size(); });

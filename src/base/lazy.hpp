@@ -34,7 +34,7 @@ class Lazy {
   void invalidate() noexcept { is_current_.store(false, std::memory_order_relaxed); }
   /// The value, for an owner that keeps it up to date, or null after invalidate().
   T* current() noexcept { return is_current_.load(std::memory_order_relaxed) ? &value_ : nullptr; }
-  /// The value, current or not: for memory that the computation shall find.
+  /// The value, current or not, so that its owner can fill it before get() computes the rest.
   T* storage() noexcept { return &value_; }
 
   /// Calls compute(T*) after invalidate(), and returns the value. Takes a lock only to compute.

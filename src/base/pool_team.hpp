@@ -24,7 +24,7 @@ class PoolTeam {
   }
   /// The same. On a device it does not wait.
   template <class F>
-  void spread(std::uint32_t n, const F& f) const {
+  void for_each_nowait(std::uint32_t n, const F& f) const {
     for_each(n, f);
   }
 

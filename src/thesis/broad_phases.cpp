@@ -11,7 +11,7 @@ ContactSpan CandidateSearch::find(std::span<const SphereInstance> spheres) {
   return contacts_;
 }
 
-NearPairs CandidateSearch::find_pairs(std::span<const SphereInstance> spheres, ThreadPool*) {
+NeighborPairs CandidateSearch::find_pairs(std::span<const SphereInstance> spheres, ThreadPool*) {
   const ContactSpan found = find(spheres);
   pairs_.clear();
   for (const SphereContact& c : found) pairs_.push_back({c.a, c.b});

@@ -15,7 +15,7 @@ class CandidateSearch : public BroadPhaseSearch {
  public:
   using BroadPhaseSearch::BroadPhaseSearch;
   ContactSpan find(std::span<const SphereInstance> spheres) final;
-  NearPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool) final;
+  NeighborPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool) final;
 
  protected:
   /// Calls add_touching() for all pairs that may touch, in order.

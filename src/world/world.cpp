@@ -60,17 +60,17 @@ void World::Impl::finish_detection(StepReport* report) {
 
 /// Detection of Solver::soft_step. The list of contacts is made only if generators may read it.
 void World::Impl::find_contacts(StepReport* report) {
-  soft_step::ContactSet& near = soft_step.contacts();
+  soft_step::ContactSet& set = soft_step.contacts();
   DetectedContacts& found = contacts.detected;
-  const std::size_t spheres = contact_finder.find_near_contacts(
-      store, scene.soft_step.speculative_margin, pool.get(), &near, &found);
-  report->sphere_contacts = spheres + found.other_spheres;
-  report->contacts = spheres + found.others.size();
+  const std::size_t spheres = contact_finder.find_speculative_contacts(
+      store, scene.soft_step.speculative_margin, pool.get(), &set, &found);
+  report->sphere_contacts = spheres + found.sphere_count;
+  report->contacts = spheres + found.contacts.size();
   copy_array(pool.get(), store.moving.position, &found.position);
   found.generated.clear();
   if (generators.ids().empty()) return;
   ContactList& list = *contacts.last.storage();
-  contacts.maker.make(found, near.view(), false, BodiesOfStep(store), scene.materials, &list);
+  contacts.maker.make(found, set.view(), false, BodiesOfStep(store), scene.materials, &list);
   call_generators(&list.contacts, report);
   const auto generated = std::span(list.contacts).subspan(list.detected);
   found.generated.assign(generated.begin(), generated.end());
@@ -124,9 +124,9 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   soft_step.add_generated(store, contacts.detected.generated);
   const double detect_ms = watch.lap_ms();
   if (!all_finite(soft_step.solve(&store, joints.view()), report)) return false;
-  const MetCounts met = count_met_contacts(soft_step.contacts().view(), pool.get());
-  report->contacts += met.spheres + met.others;
-  report->sphere_contacts += met.spheres;
+  const BegunCounts begun = count_begun_contacts(soft_step.contacts().view(), pool.get());
+  report->contacts += begun.spheres + begun.points;
+  report->sphere_contacts += begun.spheres;
   soft_step.commit(&store);
   joints.commit();
   report->integrate_ms = forces_ms;

@@ -6,26 +6,26 @@
 namespace jfpx {
 namespace {
 
-using device::Turns;
+using device::Tickets;
 
 /// Each change waits for the one before it, whatever colors the rows of a body have.
 TEST(SequenceNumbers, FormOneChainPerBody) {
   constexpr std::uint64_t kLast = std::uint64_t{1} << 63;
   for (const std::uint64_t colors : {std::uint64_t{0}, std::uint64_t{1}, kLast, kLast | 1,
                                      ~std::uint64_t{0}, std::uint64_t{0x8000400020001}}) {
-    std::uint32_t turn = 0;  // before the first sweep
+    std::uint32_t ticket = 0;  // before the first sweep
     for (std::uint32_t sweep = 0; sweep < 3; ++sweep) {
-      const Turns turns(sweep, colors);
-      ASSERT_EQ(turns.first, turn);
+      const Tickets tickets(sweep, colors);
+      ASSERT_EQ(tickets.first, ticket);
       for (std::uint32_t color = 0; color < soft_step::kColors; ++color) {
         if ((colors >> color & 1) == 0) continue;
-        ASSERT_EQ(turns.before(color), turn) << color;
-        ASSERT_GT(turns.after(color), turn);
-        turn = turns.after(color);
+        ASSERT_EQ(tickets.before(color), ticket) << color;
+        ASSERT_GT(tickets.after(color), ticket);
+        ticket = tickets.after(color);
       }
-      ASSERT_EQ(turns.before_body(), turn);
-      ASSERT_GT(turns.after_body(), turn);
-      turn = turns.after_body();
+      ASSERT_EQ(tickets.before_body(), ticket);
+      ASSERT_GT(tickets.after_body(), ticket);
+      ticket = tickets.after_body();
     }
   }
 }

@@ -69,7 +69,7 @@ class Search {
   std::vector<Real> margins_;
   std::vector<SphereInstance> swept_;
   std::vector<Vec3> motion_;
-  NearBounds bounds_;
+  SweptBounds bounds_;
   bool is_new_ = true;
 };
 

@@ -24,7 +24,7 @@ class HostTeam {
   const std::uint32_t* cached_bins(const std::uint32_t* numbers) const { return numbers; }
 
   template <class F>
-  void spread(std::uint32_t n, const F& f) const {
+  void for_each_nowait(std::uint32_t n, const F& f) const {
     if (n == 0) return;
     const std::uint32_t start = static_cast<std::uint32_t>(++loops_ * 2654435761u % n);
     for (std::uint32_t i = start; i < n; ++i) f(i);
@@ -32,7 +32,7 @@ class HostTeam {
   }
   template <class F>
   void for_each(std::uint32_t n, const F& f) const {
-    spread(n, f);
+    for_each_nowait(n, f);
   }
   template <class F>
   void once(const F& f) const {
@@ -43,19 +43,20 @@ class HostTeam {
     f(*this);
   }
   /// Completes the items in another order than the one in which they depend on each other.
-  template <class Flow>
-  void flow(std::uint32_t n, const Flow& flow) const {
-    std::vector<typename Flow::Item> items(n);
-    for (std::uint32_t i = 0; i < n; ++i) flow.begin(i, &items[i]);
+  template <class Dataflow>
+  void run_dataflow(std::uint32_t n, const Dataflow& dataflow) const {
+    std::vector<typename Dataflow::Item> items(n);
+    for (std::uint32_t i = 0; i < n; ++i) dataflow.begin(i, &items[i]);
     while (!items.empty()) {
       const std::size_t before = items.size();
       std::ranges::reverse(items);
       std::erase_if(items, [&](auto& item) {
-        if (!flow.is_ready(&item)) return false;
-        flow.complete(&item);
+        if (!dataflow.is_ready(&item)) return false;
+        dataflow.complete(&item);
         return true;
       });
-      if (items.size() == before) throw std::logic_error("the items of a flow wait for each other");
+      if (items.size() == before)
+        throw std::logic_error("the items of a dataflow wait for each other");
     }
   }
   template <class Condition>

@@ -40,7 +40,7 @@ class CountedCollider final : public SphereCollider {
 /// The touching pairs that a list finds.
 std::vector<SpherePair> find(NeighborList* list, std::span<const SphereInstance> spheres,
                              SphereCollider* collider, ThreadPool* pool) {
-  const NearPairs found = list->find(spheres, collider, pool);
+  const NeighborPairs found = list->find(spheres, collider, pool);
   std::vector<SpherePair> all;
   found.for_each_touching(spheres, 0, found.pairs.size(), [&all](std::span<const SpherePair> part) {
     all.insert(all.end(), part.begin(), part.end());

@@ -29,7 +29,7 @@ class BroadPhaseSearch {
   /// The pairs of find() as indices alone, perhaps among others. Takes less time if the spheres
   /// have moved little since the last call. Valid until the next call of either function.
   /// @throws as find()
-  virtual NearPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool) = 0;
+  virtual NeighborPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool) = 0;
 
   SphereCollider& collider() const noexcept { return *collider_; }
 
@@ -46,7 +46,7 @@ class CellSearch final : public BroadPhaseSearch {
     neighbors_.clear();
     return collider().find_contacts(spheres);
   }
-  NearPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool) override {
+  NeighborPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool) override {
     return neighbors_.find(spheres, &collider(), pool);
   }
 

@@ -14,7 +14,7 @@ namespace {
 
 using soft_step::ContactSet;
 
-constexpr std::size_t kSubShapesPerChunk = 1024, kPairsPerChunk = NearPairs::kMostSelected;
+constexpr std::size_t kSubShapesPerChunk = 1024, kPairsPerChunk = NeighborPairs::kMostSelected;
 /// A test of a box takes as long as dozens of tests of spheres.
 constexpr std::size_t kCandidatesPerChunk = 128;
 /// Chunks of a batch for each thread: enough to balance their loads.
@@ -61,17 +61,17 @@ void ContactFinder::set_bodies(const BodyStore& bodies) {
   fixed_changed_ = true;
 }
 
-/// Points near_ to the arrays of a search.
+/// Points swept_bounds_ to the arrays of a search.
 void ContactFinder::start_bounds(const BodyStore& bodies, Real margin) {
   motion_.resize(bodies.capacity());
   swept_.resize(sub_shapes_.ranges().bounded());
   margins_.resize(sub_shapes_.ranges().bounded());
-  near_ = {.bodies = bodies.view(),
-           .sub_shapes = sub_shapes_.view(),
-           .motion = motion_.data(),
-           .margins = margins_.data(),
-           .swept = swept_.data(),
-           .largest_margin = margin * Real(0.5)};
+  swept_bounds_ = {.bodies = bodies.view(),
+                   .sub_shapes = sub_shapes_.view(),
+                   .motion = motion_.data(),
+                   .margins = margins_.data(),
+                   .swept = swept_.data(),
+                   .largest_margin = margin * Real(0.5)};
 }
 
 /// Makes the swept bounds of the solids of mass 0 that are no spheres, and their trees.
@@ -80,37 +80,37 @@ template <class Sweep>
 void ContactFinder::sweep_fixed(const Sweep& sweep) {
   if (!fixed_changed_) {
     for (const SubShape i : sub_shapes_.kinematic()) sweep(i);
-    fixed_trees_.move_kinematic(near_);
+    fixed_trees_.move_kinematic(swept_bounds_);
     return;
   }
   const SubShapeRanges& ranges = sub_shapes_.ranges();
   for (SubShape i = ranges.fixed_begin(); i < ranges.bounded(); ++i) sweep(i);
-  fixed_trees_.set_bodies(sub_shapes_, near_);
+  fixed_trees_.set_bodies(sub_shapes_, swept_bounds_);
   fixed_changed_ = false;
 }
 
-/// Fills near_: the bounds of the motion of all sub-shapes during the step.
+/// Fills swept_bounds_: the bounds of the motion of all sub-shapes during the step.
 void ContactFinder::sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool) {
   start_bounds(bodies, margin);
   if (fixed_changed_) std::ranges::fill(motion_, Vec3{});  // that of immovable bodies
   const std::span<const std::uint32_t> mobile = bodies.mobile();
   parallel_for(pool, mobile.size(), kSubShapesPerChunk, [&](std::size_t first, std::size_t last) {
     for (const std::uint32_t i : mobile.subspan(first, last - first)) {
-      motion_[i] = near_.bodies.predicted_motion(i);
+      motion_[i] = swept_bounds_.bodies.predicted_motion(i);
     }
   });
   parallel_for(pool, sub_shapes_.ranges().fixed_begin(), kSubShapesPerChunk,
                [&](std::size_t first, std::size_t last) {
-                 for (auto i = static_cast<SubShape>(first); i < last; ++i) near_.sweep(i);
+                 for (auto i = static_cast<SubShape>(first); i < last; ++i) swept_bounds_.sweep(i);
                });
-  sweep_fixed([this](SubShape i) { near_.sweep(i); });
+  sweep_fixed([this](SubShape i) { swept_bounds_.sweep(i); });
 }
 
-const NearBounds& ContactFinder::enclose_bounds(const BodyStore& bodies) {
+const SweptBounds& ContactFinder::enclose_bounds(const BodyStore& bodies) {
   start_bounds(bodies, 0);
-  for (SubShape i = 0; i < sub_shapes_.ranges().fixed_begin(); ++i) near_.enclose(i);
-  sweep_fixed([this](SubShape i) { near_.enclose(i); });
-  return near_;
+  for (SubShape i = 0; i < sub_shapes_.ranges().fixed_begin(); ++i) swept_bounds_.enclose(i);
+  sweep_fixed([this](SubShape i) { swept_bounds_.enclose(i); });
+  return swept_bounds_;
 }
 
 /// Tests pairs of swept bounds: contacts of two spheres go to *part, pairs with a box or a part of
@@ -118,17 +118,17 @@ const NearBounds& ContactFinder::enclose_bounds(const BodyStore& bodies) {
 /// multiples of the normal.
 void ContactFinder::test_sphere_pairs(const BodyStore& bodies, std::span<const SpherePair> pairs,
                                       Part* part) const {
-  const BodyView& view = near_.bodies;
-  const SubShapeView& sub_shapes = near_.sub_shapes;
+  const BodyView& view = swept_bounds_.bodies;
+  const SubShapeView& sub_shapes = swept_bounds_.sub_shapes;
   for (const SpherePair& pair : pairs) {
-    const PairKind kind = near_.kind_of(pair.a, pair.b);
+    const PairKind kind = swept_bounds_.kind_of(pair.a, pair.b);
     if (kind == PairKind::none) continue;
     if (kind != PairKind::spheres) {
-      auto& list = kind == PairKind::others ? part->candidates : part->compounds;
+      auto& list = kind == PairKind::general ? part->candidates : part->compounds;
       list.push_back(ordered(view, sub_shapes, pair.a, pair.b));
       continue;
     }
-    const detail::SpeculativeContact c = near_.test_spheres(pair.a, pair.b);
+    const detail::SpeculativeContact c = swept_bounds_.test_spheres(pair.a, pair.b);
     if (!c.found) continue;
     const std::uint32_t a = sub_shapes.body(pair.a), b = sub_shapes.body(pair.b);
     const bool touch = c.distance <= 0;
@@ -137,7 +137,7 @@ void ContactFinder::test_sphere_pairs(const BodyStore& bodies, std::span<const S
       if (touch) ++part->touching_spheres;
     } else if (touch) {
       const Vec3 point = middle_point(c.normal, c.distance, sub_shapes.bounds(pair.b));
-      part->others.push_back({bodies.id(a), bodies.id(b), c.normal, point, c.distance});
+      part->touches.push_back({bodies.id(a), bodies.id(b), c.normal, point, c.distance});
     }
   }
 }
@@ -146,33 +146,33 @@ void ContactFinder::find_fixed_pairs(SubShape first, SubShape last,
                                      std::vector<Candidate>* candidates) const {
   const FixedTreesView trees = fixed_trees_.view();
   for (SubShape i = first; i < last; ++i) {
-    if (!near_.bodies.movable(near_.sub_shapes.body(i))) continue;
+    if (!swept_bounds_.bodies.movable(swept_bounds_.sub_shapes.body(i))) continue;
     const auto before = static_cast<std::ptrdiff_t>(candidates->size());
-    near_.visit_fixed(i, trees, [&](SubShape fixed) {
-      candidates->push_back(ordered(near_.bodies, near_.sub_shapes, i, fixed));
+    swept_bounds_.visit_fixed(i, trees, [&](SubShape fixed) {
+      candidates->push_back(ordered(swept_bounds_.bodies, swept_bounds_.sub_shapes, i, fixed));
     });
     std::sort(candidates->begin() + before, candidates->end());
   }
 }
 
-/// The lists that find_near_contacts() fills.
+/// The lists that find_speculative_contacts() fills.
 struct ContactFinder::Results {
   Refilled<soft_step::SphereContactInput> spheres;
   Refilled<soft_step::ManifoldInput> manifolds;
   Refilled<soft_step::PointInput> points;
-  Refilled<Contact> others;
+  Refilled<Contact> touches;
 };
 
 /// Appends the contact of two sub-shapes.
-void ContactFinder::Part::add(const BodyStore& bodies, const NearPair& near) {
-  for (const NearPair::Touch& touch : std::span(near.touches, near.touch_count)) {
-    others.push_back(
-        {bodies.id(near.key.a), bodies.id(near.key.b), near.normal, touch.point, touch.distance});
+void ContactFinder::Part::add(const BodyStore& bodies, const CandidateManifold& found) {
+  for (const CandidateManifold::Touch& touch : std::span(found.touches, found.touch_count)) {
+    touches.push_back({bodies.id(found.key.a), bodies.id(found.key.b), found.normal, touch.point,
+                       touch.distance});
   }
-  if (near.point_count == 0) return;
+  if (found.point_count == 0) return;
   const auto first = static_cast<std::uint32_t>(points.size());
-  points.insert(points.end(), near.points, near.points + near.point_count);
-  manifolds.push_back({near.key, near.normal, first, near.point_count});
+  points.insert(points.end(), found.points, found.points + found.point_count);
+  manifolds.push_back({found.key, found.normal, first, found.point_count});
 }
 
 /// Calls find(first, last, part) for the chunks of [0, count), from any thread, and then
@@ -202,10 +202,10 @@ void ContactFinder::for_each_batch(ThreadPool* pool, std::size_t count, std::siz
 void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
                                     Results* results, ThreadPool* pool) {
   const auto test_chunk = [&](std::size_t first, std::size_t last, Part* part) {
-    NearPair near;
+    CandidateManifold found;
     for (const Candidate& pair : candidates.subspan(first, last - first)) {
-      test_near_pair(near_, pair, &near);
-      part->add(bodies, near);
+      test_candidate(swept_bounds_, pair, &found);
+      part->add(bodies, found);
     }
   };
   for_each_batch(
@@ -220,21 +220,21 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
         append(
             pool, parts, [](Part & p) -> auto& { return p.points; }, &results->points);
         append(
-            pool, parts, [](Part & p) -> auto& { return p.others; }, &results->others);
+            pool, parts, [](Part & p) -> auto& { return p.touches; }, &results->touches);
       });
 }
 
-std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real margin,
-                                              ThreadPool* pool, ContactSet* near,
-                                              DetectedContacts* detected) {
+std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Real margin,
+                                                     ThreadPool* pool, ContactSet* set,
+                                                     DetectedContacts* detected) {
   sub_shapes_.update_poses(bodies, pool);
   sweep_bounds(bodies, margin, pool);
-  Results results{{&near->spheres}, {&near->manifolds}, {&near->points}, {&detected->others}};
+  Results results{{&set->spheres}, {&set->manifolds}, {&set->points}, {&detected->contacts}};
   std::size_t touching_spheres = 0;
   Refilled<Candidate> candidates{&candidates_}, compounds{&compounds_};
 
   const auto bounds = std::span(swept_).first(sub_shapes_.ranges().fixed_begin());
-  const NearPairs found = broad_phase_->find_pairs(bounds, pool);
+  const NeighborPairs found = broad_phase_->find_pairs(bounds, pool);
   const auto test_pairs = [&](std::size_t first, std::size_t last, Part* part) {
     found.for_each_touching(bounds, first, last, [&](std::span<const SpherePair> pairs) {
       test_sphere_pairs(bodies, pairs, part);
@@ -245,7 +245,7 @@ std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real marg
     append(
         pool, parts, [](Part & p) -> auto& { return p.spheres; }, &results.spheres);
     append(
-        pool, parts, [](Part & p) -> auto& { return p.others; }, &results.others);
+        pool, parts, [](Part & p) -> auto& { return p.touches; }, &results.touches);
     append(
         pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
     append(
@@ -254,12 +254,12 @@ std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real marg
 
   compounds.finish();
   if (!compounds_.empty()) {
-    const std::size_t middle = results.others.size;
+    const std::size_t middle = results.touches.size;
     std::ranges::sort(compounds_);
     test_candidates(bodies, compounds_, &results, pool);
-    merge_by_bodies(middle, std::span(detected->others).first(results.others.size), &merged_);
+    merge_by_bodies(middle, std::span(detected->contacts).first(results.touches.size), &merged_);
   }
-  detected->other_spheres = results.others.size;
+  detected->sphere_count = results.touches.size;
 
   const auto find_fixed = [&](std::size_t first, std::size_t last, Part* part) {
     find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last), &part->candidates);
@@ -275,9 +275,9 @@ std::size_t ContactFinder::find_near_contacts(const BodyStore& bodies, Real marg
   results.spheres.finish();
   results.manifolds.finish();
   results.points.finish();
-  results.others.finish();
+  results.touches.finish();
   const auto by_key = [](const auto& x, const auto& y) { return x.key < y.key; };
-  if (!std::ranges::is_sorted(near->manifolds, by_key)) std::ranges::sort(near->manifolds, by_key);
+  if (!std::ranges::is_sorted(set->manifolds, by_key)) std::ranges::sort(set->manifolds, by_key);
   return touching_spheres;
 }
 

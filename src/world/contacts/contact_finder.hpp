@@ -8,9 +8,9 @@
 #include "src/world/bodies/body_store.hpp"
 #include "src/world/bodies/sub_shape_table.hpp"
 #include "src/world/contacts/broad_phase_search.hpp"
+#include "src/world/contacts/candidate_test.hpp"
 #include "src/world/contacts/detected_contacts.hpp"
 #include "src/world/contacts/fixed_trees.hpp"
-#include "src/world/contacts/near_pair_test.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -35,12 +35,12 @@ class ContactFinder {
   /// and of b. Contact defines which body is a. Friction and restitution are left 0. Forces of the
   /// step must have been added up.
   /// @param margin   [m], >= 0: SoftStepSettings::speculative_margin
-  /// @param near     receives all pairs, each list sorted by key
-  /// @param detected receives the contacts with distance <= 0 that are not in near->spheres
-  /// @returns the number of contacts in near->spheres with distance <= 0
+  /// @param set      receives all pairs, each list sorted by key
+  /// @param detected receives the contacts with distance <= 0 that are not in set->spheres
+  /// @returns the number of contacts in set->spheres with distance <= 0
   /// @throws the exceptions of SphereCollider::find_pairs()
-  std::size_t find_near_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
-                                 soft_step::ContactSet* near, DetectedContacts* detected);
+  std::size_t find_speculative_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
+                                        soft_step::ContactSet* set, DetectedContacts* detected);
 
   SubShapeTable& sub_shapes() noexcept { return sub_shapes_; }
   BroadPhaseSearch& broad_phase() noexcept { return *broad_phase_; }
@@ -50,7 +50,7 @@ class ContactFinder {
 
   using SubShape = SubShapeTable::SubShape;
   /// Makes bounds of the sub-shapes where they are, for find_fixed_pairs(). Poses must be updated.
-  JFPX_API const NearBounds& enclose_bounds(const BodyStore& bodies);
+  JFPX_API const SweptBounds& enclose_bounds(const BodyStore& bodies);
   /// Appends the pairs of a movable sub-shape and a wall, or a solid of mass 0 that is no sphere,
   /// whose bounds touch; sorted for each sub-shape.
   /// @param first,last range of movable sub-shapes
@@ -64,15 +64,15 @@ class ContactFinder {
     std::vector<soft_step::ManifoldInput> manifolds;
     std::vector<soft_step::PointInput> points;
     std::size_t touching_spheres = 0;  ///< contacts in `spheres` with distance <= 0
-    std::vector<Contact> others;       ///< other contacts with distance <= 0
+    std::vector<Contact> touches;      ///< other contacts with distance <= 0
     std::vector<Candidate> candidates, compounds;
-    void add(const BodyStore& bodies, const NearPair& near);
+    void add(const BodyStore& bodies, const CandidateManifold& found);
     void clear() {
       spheres.clear();
       manifolds.clear();
       points.clear();
       touching_spheres = 0;
-      others.clear();
+      touches.clear();
       candidates.clear();
       compounds.clear();
     }
@@ -98,8 +98,8 @@ class ContactFinder {
   std::vector<Vec3> motion_;           ///< by body [m]
   std::vector<SphereInstance> swept_;  ///< by solid: bounds of the step's motion
   std::vector<Real> margins_;          ///< by solid [m]
-  NearBounds near_;                    ///< of the arrays above, during a search
-  // Of find_near_contacts():
+  SweptBounds swept_bounds_;           ///< of the arrays above, during a search
+  // Of find_speculative_contacts():
   std::vector<Candidate> compounds_;  ///< pairs of spheres, at least one of a compound
   std::vector<Part> parts_;
   std::vector<Contact> merged_;  ///< copy of the contacts of compounds

@@ -5,8 +5,8 @@
 
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
+#include "src/world/contacts/begun_contacts.hpp"
 #include "src/world/contacts/merge_contacts.hpp"
-#include "src/world/contacts/met_contacts.hpp"
 
 #include <numeric>
 #include <span>
@@ -20,15 +20,15 @@ using soft_step::ContactView;
 
 constexpr std::size_t kContactsPerListChunk = 4096;
 
-/// Appends the points of manifolds that met during the step.
-void append_met(const DetectedContacts& detected, const ContactView& contacts,
-                const BodiesOfStep& bodies, std::vector<Contact>* list) {
+/// Appends the points of manifolds that began to touch during the step.
+void append_begun(const DetectedContacts& detected, const ContactView& contacts,
+                  const BodiesOfStep& bodies, std::vector<Contact>* list) {
   for (std::uint32_t i = contacts.sphere_count; i < contacts.size(); ++i) {
     const soft_step::ManifoldInput& manifold = contacts.manifold(i);
     const ContactKey& key = manifold.key;
     if (key.is_generated()) continue;
     for (std::uint32_t p = 0; p < manifold.count; ++p) {
-      if (!soft_step::has_met(contacts, i, p)) continue;
+      if (!soft_step::has_begun(contacts, i, p)) continue;
       const Vec3 point = detected.position[key.b] + contacts.points[manifold.first + p].arm_b;
       list->push_back({bodies[key.a].id, bodies[key.b].id, manifold.normal, point, 0});
     }
@@ -37,33 +37,33 @@ void append_met(const DetectedContacts& detected, const ContactView& contacts,
 
 }  // namespace
 
-MetCounts count_met_contacts(const ContactView& contacts, ThreadPool* pool) {
+BegunCounts count_begun_contacts(const ContactView& contacts, ThreadPool* pool) {
   return parallel_reduce(
-      pool, contacts.size(), kContactsPerListChunk, MetCounts(),
+      pool, contacts.size(), kContactsPerListChunk, BegunCounts(),
       [&](std::size_t first, std::size_t last) {
-        MetCounts counts;
+        BegunCounts counts;
         for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
-          (contacts.is_sphere(i) ? counts.spheres : counts.others) += count_met(contacts, i);
+          (contacts.is_sphere(i) ? counts.spheres : counts.points) += count_begun(contacts, i);
         }
         return counts;
       },
-      [](const MetCounts& x, const MetCounts& y) {
-        return MetCounts{x.spheres + y.spheres, x.others + y.others};
+      [](const BegunCounts& x, const BegunCounts& y) {
+        return BegunCounts{x.spheres + y.spheres, x.points + y.points};
       });
 }
 
 /// Appends the contacts of ContactSet::spheres that touched at the start of the step and, with
-/// `with_met`, those that met during the step. Each is one contact at most, so that the list is
+/// `with_begun`, those that began during the step. Each is one contact at most, so that the list is
 /// sorted as the set is.
 void ContactListMaker::append_spheres(const DetectedContacts& detected, const ContactView& contacts,
-                                      bool with_met, const BodiesOfStep& bodies,
+                                      bool with_begun, const BodiesOfStep& bodies,
                                       std::vector<Contact>* list) {
   const std::size_t chunks =
       (contacts.sphere_count + kContactsPerListChunk - 1) / kContactsPerListChunk;
   assign_geometric(&begin_, chunks + 1, 0);
   const auto touches = [&](std::uint32_t i) { return contacts.distance(i, 0) <= 0; };
   const auto is_listed = [&](std::uint32_t i) {
-    return touches(i) || (with_met && soft_step::has_met(contacts, i, 0));
+    return touches(i) || (with_begun && soft_step::has_begun(contacts, i, 0));
   };
   const auto for_each_chunk = [&](const auto& visit) {
     parallel_for(pool_, contacts.sphere_count, kContactsPerListChunk,
@@ -94,20 +94,20 @@ void ContactListMaker::append_spheres(const DetectedContacts& detected, const Co
 }
 
 void ContactListMaker::make(const DetectedContacts& detected, const ContactView& contacts,
-                            bool with_met, const BodiesOfStep& bodies,
+                            bool with_begun, const BodiesOfStep& bodies,
                             const MaterialSettings& rules, ContactList* list) {
   std::vector<Contact>& all = list->contacts;
-  const auto spheres = std::span(detected.others).first(detected.other_spheres);
-  const auto others = std::span(detected.others).subspan(detected.other_spheres);
+  const auto spheres = std::span(detected.contacts).first(detected.sphere_count);
+  const auto others = std::span(detected.contacts).subspan(detected.sphere_count);
   all.clear();
-  append_spheres(detected, contacts, with_met, bodies, &all);
+  append_spheres(detected, contacts, with_begun, bodies, &all);
   std::size_t middle = all.size();
   all.insert(all.end(), spheres.begin(), spheres.end());
   merge_by_bodies(middle, all, &merged_);
   const std::size_t begin = all.size();
   all.insert(all.end(), others.begin(), others.end());
   middle = all.size();
-  if (with_met) append_met(detected, contacts, bodies, &all);
+  if (with_begun) append_begun(detected, contacts, bodies, &all);
   merge_by_bodies(middle - begin, std::span(all).subspan(begin), &merged_);
   set_materials(bodies, rules, pool_, &all);
   list->detected = all.size();

@@ -29,16 +29,17 @@ class ContactListMaker {
   explicit ContactListMaker(ThreadPool* pool) : pool_(pool) {}
 
   /// @param detected,contacts of the same step
-  /// @param with_met whether the step has ended, so that `contacts` has its impulses; adds the
+  /// @param with_begun whether the step has ended, so that `contacts` has its impulses; adds the
   ///                 contacts that began during the step
   /// @param bodies   with the ids and materials of the step
   /// @throws std::bad_alloc
-  void make(const DetectedContacts& detected, const soft_step::ContactView& contacts, bool with_met,
-            const BodiesOfStep& bodies, const MaterialSettings& rules, ContactList* list);
+  void make(const DetectedContacts& detected, const soft_step::ContactView& contacts,
+            bool with_begun, const BodiesOfStep& bodies, const MaterialSettings& rules,
+            ContactList* list);
 
  private:
   void append_spheres(const DetectedContacts& detected, const soft_step::ContactView& contacts,
-                      bool with_met, const BodiesOfStep& bodies, std::vector<Contact>* list);
+                      bool with_begun, const BodiesOfStep& bodies, std::vector<Contact>* list);
 
   ThreadPool* pool_;
   std::vector<std::size_t> begin_;  ///< by chunk of contacts of spheres: its first place in a list
@@ -46,11 +47,11 @@ class ContactListMaker {
 };
 
 /// Numbers of contacts that began during a step.
-struct MetCounts {
-  std::size_t spheres = 0, others = 0;
+struct BegunCounts {
+  std::size_t spheres = 0, points = 0;
 };
 /// @param contacts after the step, with its impulses
-MetCounts count_met_contacts(const soft_step::ContactView& contacts, ThreadPool* pool);
+BegunCounts count_begun_contacts(const soft_step::ContactView& contacts, ThreadPool* pool);
 
 /// Sets the fields of detected contacts that follow from the properties of their bodies.
 JFPX_API void set_materials(const BodiesOfStep& bodies, const MaterialSettings& rules,

@@ -14,8 +14,8 @@ inline namespace JFPX_ABI {
 struct DetectedContacts {
   /// Contacts of sensors, compounds, boxes and walls at the start of the step, without materials:
   /// first those of two spheres, then all others, both as in World::contacts().
-  std::vector<Contact> others;
-  std::size_t other_spheres = 0;   ///< number of contacts of two spheres in `others`
+  std::vector<Contact> contacts;
+  std::size_t sphere_count = 0;    ///< number of contacts of two spheres in `contacts`
   std::vector<Contact> generated;  ///< contacts of contact generators
   std::vector<Vec3> position;      ///< [m], by body, at the start of the step
 };

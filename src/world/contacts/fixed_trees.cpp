@@ -6,7 +6,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-void FixedTrees::set_bodies(const SubShapeTable& table, const NearBounds& bounds) {
+void FixedTrees::set_bodies(const SubShapeTable& table, const SweptBounds& bounds) {
   const SubShapeRanges& ranges = table.ranges();
   next_keys_.clear();
   for (std::uint32_t i = ranges.fixed_begin(); i < ranges.bounded(); ++i) {
@@ -24,7 +24,7 @@ void FixedTrees::set_bodies(const SubShapeTable& table, const NearBounds& bounds
   margin_ = bounds.largest_margin;
 }
 
-void FixedTrees::move_kinematic(const NearBounds& bounds) {
+void FixedTrees::move_kinematic(const SweptBounds& bounds) {
   // Bodies that have moved apart make large blocks.
   constexpr std::uint32_t kStepsPerBuild = 32;
   if (kinematic_.view().block_count == 0) return;
@@ -33,7 +33,7 @@ void FixedTrees::move_kinematic(const NearBounds& bounds) {
   kinematic_.refit([&](std::uint32_t item) { return bounds.tree_bounds(first + item); });
 }
 
-void FixedTrees::build(const NearBounds& bounds, bool is_kinematic, BlockTree* tree) {
+void FixedTrees::build(const SweptBounds& bounds, bool is_kinematic, BlockTree* tree) {
   const std::uint32_t first = bounds.sub_shapes.ranges.fixed_begin();
   items_.clear();
   bounds_.clear();

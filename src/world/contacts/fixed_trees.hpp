@@ -3,7 +3,7 @@
 
 #include "src/collide/block_tree.hpp"
 #include "src/world/bodies/sub_shape_table.hpp"
-#include "src/world/contacts/near_bounds.hpp"
+#include "src/world/contacts/swept_bounds.hpp"
 
 #include <cstdint>
 #include <vector>
@@ -17,9 +17,9 @@ class FixedTrees {
  public:
   /// Must be called after SubShapeTable::set_bodies().
   /// @param bounds with the swept bounds of the solids of mass 0
-  void set_bodies(const SubShapeTable& table, const NearBounds& bounds);
+  void set_bodies(const SubShapeTable& table, const SweptBounds& bounds);
   /// Updates the bounds of the kinematic solids. @param bounds with their swept bounds
-  void move_kinematic(const NearBounds& bounds);
+  void move_kinematic(const SweptBounds& bounds);
   FixedTreesView view() const { return {immovable_.view(), kinematic_.view()}; }
 
  private:
@@ -29,11 +29,11 @@ class FixedTrees {
     bool is_kinematic = false;
     friend bool operator==(const Key&, const Key&) = default;
   };
-  void build(const NearBounds& bounds, bool is_kinematic, BlockTree* tree);
+  void build(const SweptBounds& bounds, bool is_kinematic, BlockTree* tree);
 
   BlockTree immovable_, kinematic_;
   std::vector<Key> keys_, next_keys_;  ///< of the last build
-  Real margin_ = 0;          ///< NearBounds::largest_margin of the last build; -1: it failed
+  Real margin_ = 0;          ///< SweptBounds::largest_margin of the last build; -1: it failed
   std::uint32_t steps_ = 0;  ///< since the tree of the kinematic solids was built
   // During a build.
   std::vector<std::uint32_t> items_;

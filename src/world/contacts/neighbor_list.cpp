@@ -57,8 +57,8 @@ Real NeighborList::choose_slack(std::span<const SphereInstance> spheres, Real mo
   return std::clamp(kSearches * motion, kLeast * smallest, kMost * smallest);
 }
 
-NearPairs NeighborList::find(std::span<const SphereInstance> spheres, SphereCollider* collider,
-                             ThreadPool* pool) {
+NeighborPairs NeighborList::find(std::span<const SphereInstance> spheres, SphereCollider* collider,
+                                 ThreadPool* pool) {
   if (spheres.size() < kFewest || collider->backend() != Backend::cpu) {
     clear();
     return {collider->find_pairs(spheres)};
@@ -84,9 +84,9 @@ NearPairs NeighborList::find(std::span<const SphereInstance> spheres, SphereColl
   return {pairs_, !(slack > 0)};
 }
 
-std::span<const SpherePair> NearPairs::touching(std::span<const SphereInstance> spheres,
-                                                std::size_t first, std::size_t last,
-                                                SpherePair* room) const {
+std::span<const SpherePair> NeighborPairs::touching(std::span<const SphereInstance> spheres,
+                                                    std::size_t first, std::size_t last,
+                                                    SpherePair* room) const {
   const std::span<const SpherePair> part = pairs.subspan(first, last - first);
   if (all_touch) return part;
   std::array<std::uint32_t, kMostSelected> found;

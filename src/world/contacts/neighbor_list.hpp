@@ -15,7 +15,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Sorted pairs of spheres, among which are all that touch.
-struct NearPairs {
+struct NeighborPairs {
   std::span<const SpherePair> pairs;
   bool all_touch = true;
 
@@ -51,8 +51,8 @@ class NeighborList {
  public:
   /// Valid until the next call, or another call of the collider.
   /// @throws the exceptions of SphereCollider::find_pairs()
-  NearPairs find(std::span<const SphereInstance> spheres, SphereCollider* collider,
-                 ThreadPool* pool);
+  NeighborPairs find(std::span<const SphereInstance> spheres, SphereCollider* collider,
+                     ThreadPool* pool);
   /// Must be called after every other call of the collider.
   void clear() noexcept { count_ = 0; }
 

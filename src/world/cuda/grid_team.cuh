@@ -65,7 +65,7 @@ class GridTeam {
 
   /// Calls f(i) for all i < n, in any order, without a barrier.
   template <class F>
-  JFPX_HD void spread(std::uint32_t n, const F& f) const {
+  JFPX_HD void for_each_nowait(std::uint32_t n, const F& f) const {
 #if defined(__CUDA_ARCH__)
     for (std::uint32_t i = first(); i < n; i += blocks_ * kThreads) f(i);
 #endif
@@ -73,7 +73,7 @@ class GridTeam {
   /// Calls f(i) for all i < n, in any order, then waits for all threads.
   template <class F>
   JFPX_HD void for_each(std::uint32_t n, const F& f) const {
-    spread(n, f);
+    for_each_nowait(n, f);
     sync();
   }
   /// Calls f in one thread, without a barrier.
@@ -99,18 +99,19 @@ class GridTeam {
   /// is_ready(item), and calls complete(item). An item may wait for items of lower warps, of 32
   /// items each, and for those of earlier calls. All calls with the same n give item i to the same
   /// thread, and once() always uses the same thread.
-  template <class Flow>
-  [[gnu::always_inline]] JFPX_HD void flow(std::uint32_t n, const Flow& flow) const {
+  template <class Dataflow>
+  [[gnu::always_inline]] JFPX_HD void run_dataflow(std::uint32_t n,
+                                                   const Dataflow& dataflow) const {
 #if defined(__CUDA_ARCH__)
     for (std::uint32_t i = first(); i - lane_id() < n; i += blocks_ * kThreads) {
-      typename Flow::Item item;
-      if (i < n) flow.begin(i, &item);
+      typename Dataflow::Item item;
+      if (i < n) dataflow.begin(i, &item);
       // All lanes at the same time: one after the other, they would take 32 times as long.
       bool waits = i < n;
       while (__any_sync(kFullWarp, waits)) {
-        if (waits) waits = !flow.is_ready(&item);
+        if (waits) waits = !dataflow.is_ready(&item);
       }
-      if (i < n) flow.complete(&item);
+      if (i < n) dataflow.complete(&item);
     }
 #endif
   }

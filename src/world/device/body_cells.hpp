@@ -14,27 +14,27 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Sequence numbers of the changes of a body, its turns. Each sweep has kPerSweep of them: 1 + c
+/// Sequence numbers of the changes of a body, its tickets. Each sweep has kPerSweep of them: 1 + c
 /// for the row of color c, and the last one for the body itself, with its rows with fixed bodies. A
-/// row waits for the turn of the body's previous row, and then sets its own. The turns of colors
-/// that the body does not have are left out. Rows of the overflow keep the turn before the sweep:
-/// barriers enclose them.
-struct Turns {
+/// row waits for the ticket of the body's previous row, and then sets its own. The tickets of
+/// colors that the body does not have are left out. Rows of the overflow keep the ticket before the
+/// sweep: barriers enclose them.
+struct Tickets {
   static constexpr std::uint32_t kPerSweep = soft_step::kColors + 2u;
 
   std::uint64_t colors = 0;  ///< of the body's rows
-  std::uint32_t first = 0;   ///< the turn before the sweep
+  std::uint32_t first = 0;   ///< the ticket before the sweep
 
-  JFPX_HD Turns(std::uint32_t sweep, std::uint64_t row_colors)
+  JFPX_HD Tickets(std::uint32_t sweep, std::uint64_t row_colors)
       : colors(row_colors), first(sweep * kPerSweep) {}
 
-  /// The turn after the row of a color.
+  /// The ticket after the row of a color.
   JFPX_HD std::uint32_t after(std::uint32_t color) const { return first + 1 + color; }
-  /// The turn that the row of a color waits for.
+  /// The ticket that the row of a color waits for.
   JFPX_HD std::uint32_t before(std::uint32_t color) const {
     return after_all(colors & ((std::uint64_t{1} << color) - 1));
   }
-  /// The turn that the body waits for.
+  /// The ticket that the body waits for.
   JFPX_HD std::uint32_t before_body() const { return after_all(colors); }
   JFPX_HD std::uint32_t after_body() const { return first + kPerSweep; }
 
@@ -52,7 +52,7 @@ struct Turns {
 /// half of the third one.
 class VectorCells {
  public:
-  static constexpr std::uint32_t kMixed = ~0u;  ///< its turn is higher than all turns
+  static constexpr std::uint32_t kMixed = ~0u;  ///< its ticket is higher than all tickets
 
   VectorCells() = default;
   JFPX_HD VectorCells(const Vec3& vector, std::uint32_t word) {
@@ -133,7 +133,7 @@ class OrientationCells {
   VectorCells vector_, scalar_;
 };
 
-/// Access to the motion of a body as cells. The cells of the velocities are written at each turn,
+/// Access to the motion of a body as cells. The cells of the velocities are written at each ticket,
 /// all others when they may have changed: the words of the velocities contain the versions of the
 /// other cells that belong to them.
 class BodyCells {
@@ -145,7 +145,7 @@ class BodyCells {
 
   JFPX_HD BodyCells(MotionCells* motion, FreeCells* free) : motion_(motion), free_(free) {}
 
-  /// The motion before the first turn.
+  /// The motion before the first ticket.
   JFPX_HD void start(const soft_step::SolverBody& body, const soft_step::FreeMotion& free) const {
     Version version;
     write_shift(body, &version);
@@ -154,11 +154,11 @@ class BodyCells {
     write(0, body, version);
   }
 
-  /// Reads the motion after a turn.
+  /// Reads the motion after a ticket.
   /// @tparam kRotation whether to read the rotation
-  /// @returns whether the turn has been made, and all of it is visible
+  /// @returns whether the ticket has been made, and all of it is visible
   template <bool kRotation>
-  JFPX_HD bool read(std::uint32_t turn, soft_step::SolverBody* body, Version* version) const {
+  JFPX_HD bool read(std::uint32_t ticket, soft_step::SolverBody* body, Version* version) const {
     VectorCells v, w, s, r;
     v.load(&motion_->velocity);
     w.load(&motion_->angular_velocity);
@@ -169,20 +169,21 @@ class BodyCells {
     body->shift = s.vector();
     if constexpr (kRotation) body->rotation = r.vector();
     const std::uint32_t word = v.word();
-    version->shift = word >> kTurnBits & kVersionMask;
-    version->rotation = word >> (kTurnBits + kVersionBits) & kVersionMask;
-    version->free = word >> (kTurnBits + 2 * kVersionBits) & kVersionMask;
-    bool is_complete = (word & kTurnMask) == turn && w.word() == word && s.word() == version->shift;
+    version->shift = word >> kTicketBits & kVersionMask;
+    version->rotation = word >> (kTicketBits + kVersionBits) & kVersionMask;
+    version->free = word >> (kTicketBits + 2 * kVersionBits) & kVersionMask;
+    bool is_complete =
+        (word & kTicketMask) == ticket && w.word() == word && s.word() == version->shift;
     if constexpr (kRotation) is_complete = r.word() == version->rotation && is_complete;
     return is_complete;
   }
 
-  /// Writes the velocities after a turn. @param version of the other vectors
-  JFPX_HD void write(std::uint32_t turn, const soft_step::SolverBody& body,
+  /// Writes the velocities after a ticket. @param version of the other vectors
+  JFPX_HD void write(std::uint32_t ticket, const soft_step::SolverBody& body,
                      const Version& version) const {
-    const std::uint32_t word = turn | version.shift << kTurnBits |
-                               version.rotation << (kTurnBits + kVersionBits) |
-                               version.free << (kTurnBits + 2 * kVersionBits);
+    const std::uint32_t word = ticket | version.shift << kTicketBits |
+                               version.rotation << (kTicketBits + kVersionBits) |
+                               version.free << (kTicketBits + 2 * kVersionBits);
     VectorCells(body.velocity, word).store(&motion_->velocity);
     VectorCells(body.angular_velocity, word).store(&motion_->angular_velocity);
   }
@@ -212,15 +213,16 @@ class BodyCells {
   }
 
  private:
-  static constexpr std::uint32_t kTurnBits = 14, kVersionBits = 6;
-  static constexpr std::uint32_t kTurnMask = (1u << kTurnBits) - 1;
+  static constexpr std::uint32_t kTicketBits = 14, kVersionBits = 6;
+  static constexpr std::uint32_t kTicketMask = (1u << kTicketBits) - 1;
   static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
   // Versions start again at 0 after 64 changes. A thread loads all cells of a body one right after
   // the other, and each change takes at least a round trip to L2, so a cell that it loads is not 64
   // changes older than another.
-  // All turns are below that of VectorCells::kMixed. The sweeps of a step are the warm start, those
-  // of the substeps and the restitution.
-  static_assert((soft_step::kSweepsPerSubstep * kMaxSubsteps + 2) * Turns::kPerSweep < kTurnMask);
+  // All tickets are below that of VectorCells::kMixed. The sweeps of a step are the warm start,
+  // those of the substeps and the restitution.
+  static_assert((soft_step::kSweepsPerSubstep * kMaxSubsteps + 2) * Tickets::kPerSweep <
+                kTicketMask);
 
   MotionCells* motion_;
   FreeCells* free_;

@@ -1,7 +1,7 @@
 /// End of a soft step on a device.
 #pragma once
 
-#include "src/world/contacts/met_contacts.hpp"
+#include "src/world/contacts/begun_contacts.hpp"
 #include "src/world/device/step_data.hpp"
 
 namespace jfpx {
@@ -36,9 +36,9 @@ struct CommitProgram {
     team.count(
         contacts.sphere_count, [&](std::uint32_t i) { return soft_step::has_touched(contacts, i); },
         &d.counters->touching_spheres);
-    team.spread(contacts.manifold_count, [&](std::uint32_t m) {
-      const std::uint32_t met = soft_step::count_met(contacts, contacts.sphere_count + m);
-      if (met > 0) atomic_add(&d.counters->met_points, met);
+    team.for_each_nowait(contacts.manifold_count, [&](std::uint32_t m) {
+      const std::uint32_t begun = soft_step::count_begun(contacts, contacts.sphere_count + m);
+      if (begun > 0) atomic_add(&d.counters->begun_points, begun);
     });
     team.once([&] { complete(); });
   }

@@ -100,13 +100,13 @@ class ContactBuffers {
     transfer.wait();
     std::ranges::sort(
         touches, {}, [](const Touch& t) { return std::tuple(1 - t.of_spheres, t.pair, t.number); });
-    detected->others.clear();
+    detected->contacts.clear();
     detected->generated.clear();
-    detected->other_spheres = 0;
+    detected->sphere_count = 0;
     for (const Touch& t : touches) {
-      detected->others.push_back(
+      detected->contacts.push_back(
           {bodies[t.pair.a].id, bodies[t.pair.b].id, t.normal, t.point, t.distance});
-      detected->other_spheres += t.of_spheres;
+      detected->sphere_count += t.of_spheres;
     }
   }
 

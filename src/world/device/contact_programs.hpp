@@ -24,13 +24,13 @@ struct BoundsProgram {
     const BodyView& bodies = d.step.bodies;
     if (!is_started) start_counters(team, d);
     team.for_each(bodies.capacity, [&](std::uint32_t i) { start(i); });
-    team.spread(bodies.count, [&](std::uint32_t i) {
+    team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
       if (bodies.is_asleep(body)) d.counters->any_asleep = 1;
     });
-    team.spread(d.near.sub_shapes.ranges.bounded(), [&](std::uint32_t i) {
-      d.near.sub_shapes.update_pose(bodies, i);
-      d.near.sweep(i);
+    team.for_each_nowait(d.swept_bounds.sub_shapes.ranges.bounded(), [&](std::uint32_t i) {
+      d.swept_bounds.sub_shapes.update_pose(bodies, i);
+      d.swept_bounds.sweep(i);
     });
     if (d.trees.kinematic.block_count > 0) refit(team, d.trees.kinematic);
   }
@@ -40,10 +40,10 @@ struct BoundsProgram {
   template <class Team>
   JFPX_HD void refit(const Team& team, const BlockTreeView& tree) const {
     team.sync();
-    const std::uint32_t first = data.near.sub_shapes.ranges.fixed_begin();
+    const std::uint32_t first = data.swept_bounds.sub_shapes.ranges.fixed_begin();
     team.for_each(tree.leaf_blocks, [&](std::uint32_t leaf) {
-      tree.refit_leaf(leaf,
-                      [&](std::uint32_t item) { return data.near.tree_bounds(first + item); });
+      tree.refit_leaf(
+          leaf, [&](std::uint32_t item) { return data.swept_bounds.tree_bounds(first + item); });
     });
     for (std::uint32_t begin = tree.leaf_blocks; begin < tree.block_count;) {
       const std::uint32_t end = tree.end_of_level(begin);
@@ -61,7 +61,7 @@ struct BoundsProgram {
     d.used_colors[body] = 0;
     d.first_order[body] = ~std::uint64_t{0};
     d.first_contact[body] = kNone;
-    d.near_flag[body] = 0;
+    d.constrained[body] = 0;
     d.now().spheres_of[body] = {};
   }
 };
@@ -86,9 +86,9 @@ struct SphereProgram {
       });
       return;
     }
-    const SubShapeRanges& ranges = d.near.sub_shapes.ranges;
+    const SubShapeRanges& ranges = d.swept_bounds.sub_shapes.ranges;
     if (ranges.fixed_begin() < ranges.all()) {
-      team.spread(ranges.fixed_begin(), [&](std::uint32_t i) { find_fixed(i); });
+      team.for_each_nowait(ranges.fixed_begin(), [&](std::uint32_t i) { find_fixed(i); });
     }
     const std::uint32_t found = team.scan(
         static_cast<std::uint32_t>(d.pair_count->contacts),
@@ -99,7 +99,7 @@ struct SphereProgram {
         [&](std::uint32_t i) { return std::uint32_t{d.pair_found[i]}; },
         [&](std::uint32_t i, std::uint32_t place) {
           if (d.pair_found[i] == 0 || place >= d.capacity.spheres) return;
-          const std::uint32_t *bodies = d.near.sub_shapes.bodies, a = bodies[d.pairs[i].a],
+          const std::uint32_t *bodies = d.swept_bounds.sub_shapes.bodies, a = bodies[d.pairs[i].a],
                               b = bodies[d.pairs[i].b];
           const NormalDistance result = d.pair_results[i];
           d.now().view.spheres[place] = {{a, b, 0, 0}, result.normal, result.distance};
@@ -116,29 +116,30 @@ struct SphereProgram {
   JFPX_HD void add_candidate(std::uint32_t a, std::uint32_t b) const {
     const std::uint32_t place = atomic_add(&data.counters->candidates, 1);
     if (place >= data.capacity.candidates) return;
-    data.candidates[place] = ordered(data.step.bodies, data.near.sub_shapes, a, b);
+    data.candidates[place] = ordered(data.step.bodies, data.swept_bounds.sub_shapes, a, b);
   }
 
   /// Lists the solids of mass 0 and the walls that a sub-shape of a movable body may meet.
   JFPX_HD void find_fixed(std::uint32_t i) const {
-    if (!data.step.bodies.movable(data.near.sub_shapes.body(i))) return;
-    data.near.visit_fixed(i, data.trees, [&](std::uint32_t fixed) { add_candidate(i, fixed); });
+    if (!data.step.bodies.movable(data.swept_bounds.sub_shapes.body(i))) return;
+    data.swept_bounds.visit_fixed(i, data.trees,
+                                  [&](std::uint32_t fixed) { add_candidate(i, fixed); });
   }
 
   /// @returns whether the pair is a contact of two spheres
   JFPX_HD bool test(std::uint32_t i) const {
     const StepData& d = data;
     const SpherePair pair = d.pairs[i];
-    const PairKind kind = d.near.kind_of(pair.a, pair.b);
+    const PairKind kind = d.swept_bounds.kind_of(pair.a, pair.b);
     if (kind == PairKind::none) return false;
     if (kind != PairKind::spheres) {
       add_candidate(pair.a, pair.b);
       return false;
     }
-    const detail::SpeculativeContact contact = d.near.test_spheres(pair.a, pair.b);
+    const detail::SpeculativeContact contact = d.swept_bounds.test_spheres(pair.a, pair.b);
     if (!contact.found) return false;
     const std::uint8_t* sensor = d.step.bodies.sensor;
-    const std::uint32_t* bodies = d.near.sub_shapes.bodies;
+    const std::uint32_t* bodies = d.swept_bounds.sub_shapes.bodies;
     if (sensor[bodies[pair.a]] != 0 || sensor[bodies[pair.b]] != 0) {
       if (contact.distance <= 0) add_candidate(pair.a, pair.b);
       return false;
@@ -158,7 +159,8 @@ struct ShapeProgram {
     if (data.has_failed()) return;
     const StepData& d = data;
     if (d.counters->candidates == 0) {
-      team.spread(d.step.bodies.capacity, [&](std::uint32_t i) { d.now().manifolds_of[i] = {}; });
+      team.for_each_nowait(d.step.bodies.capacity,
+                           [&](std::uint32_t i) { d.now().manifolds_of[i] = {}; });
       return;
     }
     team.for_each(d.counters->candidates, [&](std::uint32_t i) { test(i); });
@@ -179,32 +181,32 @@ struct ShapeProgram {
   JFPX_HD void test(std::uint32_t i) const {
     const StepData& d = data;
     const Candidate& pair = d.candidates[i];
-    NearPair* near = &d.tested[i];
-    test_near_pair(d.near, pair, near);
-    if (near->touch_count > 0) add_touches(pair, *near);
-    if (near->point_count == 0) return;
-    prepend(&d.first_candidate[near->key.a], d.next_candidate, i);
-    atomic_add(&d.manifold_sizes[near->key.a], std::uint64_t{1} << 32 | near->point_count);
+    CandidateManifold* found = &d.tested[i];
+    test_candidate(d.swept_bounds, pair, found);
+    if (found->touch_count > 0) add_touches(pair, *found);
+    if (found->point_count == 0) return;
+    prepend(&d.first_candidate[found->key.a], d.next_candidate, i);
+    atomic_add(&d.manifold_sizes[found->key.a], std::uint64_t{1} << 32 | found->point_count);
   }
 
-  JFPX_HD void add_touches(const Candidate& pair, const NearPair& near) const {
+  JFPX_HD void add_touches(const Candidate& pair, const CandidateManifold& found) const {
     const StepData& d = data;
-    const SubShapeView& sub_shapes = d.near.sub_shapes;
+    const SubShapeView& sub_shapes = d.swept_bounds.sub_shapes;
     const bool of_spheres = sub_shapes.is_sphere(pair.sub_shape_a) &&
                             !sub_shapes.is_wall(pair.sub_shape_b) &&
                             sub_shapes.is_sphere(pair.sub_shape_b);
-    const std::uint32_t first = atomic_add(&d.counters->touches, near.touch_count);
-    if (of_spheres) atomic_add(&d.counters->sphere_touches, near.touch_count);
+    const std::uint32_t first = atomic_add(&d.counters->touches, found.touch_count);
+    if (of_spheres) atomic_add(&d.counters->sphere_touches, found.touch_count);
     Touch* const touches = d.now().touches;
-    for (std::uint32_t k = 0; k < near.touch_count; ++k) {
+    for (std::uint32_t k = 0; k < found.touch_count; ++k) {
       if (first + k >= d.capacity.touches) return;
       touches[first + k] = {pair,
                             k,
                             static_cast<std::uint16_t>(of_spheres ? 1 : 0),
                             0,
-                            near.normal,
-                            near.touches[k].point,
-                            near.touches[k].distance};
+                            found.normal,
+                            found.touches[k].point,
+                            found.touches[k].distance};
     }
   }
 
@@ -223,12 +225,13 @@ struct ShapeProgram {
           return p.part_b < q.part_b;
         });
     for (std::uint32_t i = first; i != kNone; i = d.next_candidate[i]) {
-      const NearPair& near = d.tested[i];
-      d.now().view.manifolds[manifold++] = {near.key, near.normal, point, near.point_count, 0, 0};
-      for (std::uint32_t k = 0; k < near.point_count; ++k, ++point) {
+      const CandidateManifold& found = d.tested[i];
+      d.now().view.manifolds[manifold++] = {found.key, found.normal, point, found.point_count, 0,
+                                            0};
+      for (std::uint32_t k = 0; k < found.point_count; ++k, ++point) {
         if (point >= d.capacity.points) continue;
         // Members, because the padding of a point is not initialized.
-        const soft_step::PointInput& p = near.points[k];
+        const soft_step::PointInput& p = found.points[k];
         d.now().view.points[point] = {p.arm_a, p.arm_b, p.distance, p.feature};
       }
     }

@@ -61,7 +61,7 @@ class DeviceStep final : public DeviceWorld {
     data_.constants = soft_step::make_step_constants(scene.soft_step, scene.dt);
     data_.substeps = scene.soft_step.substeps;
     data_.step.h = data_.constants.h;
-    data_.near.largest_margin = scene.soft_step.speculative_margin * Real(0.5);
+    data_.swept_bounds.largest_margin = scene.soft_step.speculative_margin * Real(0.5);
   }
 
   void upload(const BodyStore& bodies, SubShapeTable* sub_shapes,
@@ -276,13 +276,13 @@ class DeviceStep final : public DeviceWorld {
 
   SubShapes& current_sub_shapes() { return sub_shapes_[sub_shapes_now_]; }
   void use_sub_shapes() {
-    data_.near.sub_shapes = current_sub_shapes().view();
+    data_.swept_bounds.sub_shapes = current_sub_shapes().view();
     scratch_.reserve_sub_shapes(transfer_, current_sub_shapes().ranges().bounded(), &data_);
     is_ready_ = false;
   }
 
   void update_trees(const BodyStore& bodies) {
-    if (!trees_.upload(transfer_, bodies, data_.near.largest_margin)) return;
+    if (!trees_.upload(transfer_, bodies, data_.swept_bounds.largest_margin)) return;
     data_.trees = trees_.view();
     ++changes_;
   }
@@ -381,7 +381,7 @@ class DeviceStep final : public DeviceWorld {
     scratch_.reserve_lists(transfer_, capacity_, &data_);
     for (Contacts& contacts : contacts_) contacts.reserve(transfer_, capacity_, room_);
     use_contacts();
-    device_->reserve_pairs(data_.near.sub_shapes.ranges.fixed_begin(), capacity_.pairs);
+    device_->reserve_pairs(data_.swept_bounds.sub_shapes.ranges.fixed_begin(), capacity_.pairs);
     if (transfer_.moves() != moves) device_->release_unused();
     is_ready_ = true;
   }
@@ -390,10 +390,10 @@ class DeviceStep final : public DeviceWorld {
   void run_programs(bool is_timed) {
     make_room();
     const ContactSizes& last = last_contacts().sizes();
-    data_.near.bodies = data_.step.bodies;
+    data_.swept_bounds.bodies = data_.step.bodies;
     const StepData& d = data_;
     const std::size_t bodies = d.step.bodies.count;
-    const std::size_t sub_shapes = d.near.sub_shapes.ranges.bounded();
+    const std::size_t sub_shapes = d.swept_bounds.sub_shapes.ranges.bounded();
     const std::size_t contacts = std::max<std::size_t>({bodies, last.spheres, last.manifolds});
     const auto mark = [&](int i) {
       if (is_timed) device_->mark(i);
@@ -405,8 +405,8 @@ class DeviceStep final : public DeviceWorld {
     }
     mark(1);
     device_->run(BoundsProgram{d, forces_act}, std::max(bodies, sub_shapes));
-    device_->find_pairs(d.near.swept, d.near.sub_shapes.ranges.fixed_begin(), d.pairs,
-                        capacity_.pairs, d.pair_count);
+    device_->find_pairs(d.swept_bounds.swept, d.swept_bounds.sub_shapes.ranges.fixed_begin(),
+                        d.pairs, capacity_.pairs, d.pair_count);
     device_->run(SphereProgram{d}, contacts);
     device_->run(ShapeProgram{d}, contacts);
     device_->run(MatchProgram{d}, contacts);
@@ -447,7 +447,7 @@ class DeviceStep final : public DeviceWorld {
     Result result;
     result.awake = counters.awake;
     result.contacts =
-        std::uint64_t{counters.touching_spheres} + counters.touches + counters.met_points;
+        std::uint64_t{counters.touching_spheres} + counters.touches + counters.begun_points;
     result.sphere_contacts = std::uint64_t{counters.touching_spheres} + counters.sphere_touches;
     return result;
   }

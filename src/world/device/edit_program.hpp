@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/contact_solver/soft_step/greedy_coloring.hpp"
-#include "src/world/contacts/met_contacts.hpp"
+#include "src/world/contacts/begun_contacts.hpp"
 #include "src/world/device/slot_values.hpp"
 #include "src/world/device/step_data.hpp"
 
@@ -75,12 +75,12 @@ struct EditProgram {
       }
     };
     const soft_step::ContactView contacts = d.last_contacts();
-    team.spread(contacts.size(), [&](std::uint32_t i) {
+    team.for_each_nowait(contacts.size(), [&](std::uint32_t i) {
       const soft_step::ContactKey& key = contacts.key(i);
       const auto marks = d.marked[key.a] | d.marked[key.b];
       if (marks == 0 || contacts.colors[i] == soft_step::kNoColor) return;
       const bool touched = contacts.is_sphere(i) && contacts.distance(i, 0) <= 0;
-      if (touched || soft_step::count_met(contacts, i) > 0) wake(key.a, key.b);
+      if (touched || soft_step::count_begun(contacts, i) > 0) wake(key.a, key.b);
       if ((marks & kIsRemoved) != 0) contacts.colors[i] = soft_step::kNoColor;
     });
     team.for_each(last_touch_count, [&](std::uint32_t i) {

@@ -17,7 +17,7 @@ class FixedTreeBuffers {
  public:
   /// Builds the trees on the host and copies them, unless the bodies of mass 0 are those of the
   /// last call. The bounds of kinematic solids are not valid: the device makes them in every step.
-  /// @param margin NearBounds::largest_margin
+  /// @param margin SweptBounds::largest_margin
   /// @returns whether the trees are new
   bool upload(const Transfer<Device>& transfer, const BodyStore& bodies, Real margin) {
     if (bodies.fixed_version() == version_) return false;
@@ -28,15 +28,15 @@ class FixedTreeBuffers {
     table_.set_bodies(bodies, ids_);
     margins_.resize(table_.ranges().bounded());
     swept_.resize(table_.ranges().bounded());
-    const NearBounds near{.bodies = bodies.view_without_ids(),
-                          .sub_shapes = table_.view(),
-                          .margins = margins_.data(),
-                          .swept = swept_.data(),
-                          .largest_margin = margin};
+    const SweptBounds bounds{.bodies = bodies.view_without_ids(),
+                             .sub_shapes = table_.view(),
+                             .margins = margins_.data(),
+                             .swept = swept_.data(),
+                             .largest_margin = margin};
     for (std::uint32_t i = table_.ranges().fixed_begin(); i < table_.ranges().bounded(); ++i) {
-      bodies.kinematic(near.sub_shapes.body(i)) ? near.enclose(i) : near.sweep(i);
+      bodies.kinematic(bounds.sub_shapes.body(i)) ? bounds.enclose(i) : bounds.sweep(i);
     }
-    trees_.set_bodies(table_, near);
+    trees_.set_bodies(table_, bounds);
     view_ = {immovable_.upload(transfer, trees_.view().immovable),
              kinematic_.upload(transfer, trees_.view().kinematic)};
     transfer.wait();

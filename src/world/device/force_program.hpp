@@ -91,7 +91,7 @@ struct ForceProgram {
     const Progress& progress = data.counters->progress;
     const double time = static_cast<double>(progress.offset + progress.completed) *
                         static_cast<double>(data.step.bodies.dt);  // as World::time()
-    team.spread(data.step.bodies.capacity, [&](std::uint32_t i) { add_forces(i, time); });
+    team.for_each_nowait(data.step.bodies.capacity, [&](std::uint32_t i) { add_forces(i, time); });
   }
 
  private:

@@ -27,7 +27,7 @@ struct MatchProgram {
       const bool is_colored = i < spheres ? match_sphere(i) : match_manifold(i - spheres);
       const soft_step::ContactView now = d.contacts();
       const soft_step::ContactKey& key = now.key(i);
-      d.near_flag[key.a] = d.near_flag[key.b] = soft_step::kHasContact;
+      d.constrained[key.a] = d.constrained[key.b] = soft_step::kHasContact;
       if (is_colored) return;
       const BodyView& bodies = d.step.bodies;
       if (bodies.movable(key.a) && bodies.movable(key.b)) {
@@ -134,8 +134,8 @@ struct MatchProgram {
     if (joints.is_used(joint)) {
       const auto [a, b, part_a, part_b] = joints.key(joint);
       const bool is_of_world = b == soft_step::kWorld;
-      d.near_flag[a] = soft_step::kHasJoint;
-      if (!is_of_world) d.near_flag[b] = soft_step::kHasJoint;
+      d.constrained[a] = soft_step::kHasJoint;
+      if (!is_of_world) d.constrained[b] = soft_step::kHasJoint;
       if (now.color < soft_step::kColors) {
         const std::uint64_t bit = std::uint64_t{1} << now.color;
         atomic_or(&d.used_colors[a], bit);

@@ -80,7 +80,7 @@ struct MergeProgram {
 
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
-    const SubShapeView& before = data.near.sub_shapes;
+    const SubShapeView& before = data.swept_bounds.sub_shapes;
     const BodyId* ids = data.step.bodies.ids;
     team.once([&] { *kept = {}; });
     team.for_each(data.step.bodies.capacity, [&](std::uint32_t i) { data.marked[i] = 0; });
@@ -91,9 +91,9 @@ struct MergeProgram {
         [&](std::uint32_t k) { return added_ids[k].index; },
         [&](std::uint32_t i, std::uint32_t place) { to_ids[place] = ids[i]; },
         [&](std::uint32_t k, std::uint32_t place) { to_ids[place] = added_ids[k]; });
-    team.spread(part_count, [&](std::uint32_t i) { to.local[i] = before.local[i]; });
-    team.spread(added_part_count,
-                [&](std::uint32_t i) { to.local[part_count + i] = added.local[i]; });
+    team.for_each_nowait(part_count, [&](std::uint32_t i) { to.local[i] = before.local[i]; });
+    team.for_each_nowait(added_part_count,
+                         [&](std::uint32_t i) { to.local[part_count + i] = added.local[i]; });
     for (std::uint32_t range = 0; range < SubShapeRanges::kCount; ++range) {
       const std::uint32_t first = before.ranges.begin[range];
       team.count(
@@ -115,7 +115,7 @@ struct MergeProgram {
 
  private:
   JFPX_HD bool stays(std::uint32_t i) const {
-    return data.marked[data.near.sub_shapes.bodies[i]] == 0;
+    return data.marked[data.swept_bounds.sub_shapes.bodies[i]] == 0;
   }
 
   /// The order of SubShapeTable, without that of the parts of a body.

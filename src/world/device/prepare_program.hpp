@@ -24,8 +24,8 @@ struct PrepareProgram {
     place_rows(team);
     if (size<soft_step::ManifoldRow>() > 0 && !place_points(team)) return;
     sort_overflow(team);
-    team.spread(bodies.count, [&](std::uint32_t i) { sort_fixed(bodies.ids[i].index); });
-    team.spread(row_count(), [&](std::uint32_t r) { fill_row(r); });
+    team.for_each_nowait(bodies.count, [&](std::uint32_t i) { sort_fixed(bodies.ids[i].index); });
+    team.for_each_nowait(row_count(), [&](std::uint32_t r) { fill_row(r); });
   }
 
  private:
@@ -101,7 +101,7 @@ struct PrepareProgram {
     for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
       const std::uint32_t bin = soft_step::bin_of(kind, soft_step::kOverflowGroup);
       const Range range{begin[bin], begin[bin + 1]};
-      team.spread(range.end - range.begin, [&](std::uint32_t k) {
+      team.for_each_nowait(range.end - range.begin, [&](std::uint32_t k) {
         const std::uint32_t row = range.begin + k;
         std::uint32_t rank = before;
         for (std::uint32_t r = range.begin; r < range.end; ++r) {

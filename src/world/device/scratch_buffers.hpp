@@ -17,7 +17,7 @@ class ScratchBuffers {
   void reserve_bodies(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
     StepData& d = *data;
     d.motion = transfer.room(&motion_, n);
-    d.near.motion = d.motion;
+    d.swept_bounds.motion = d.motion;
     d.first_candidate = transfer.room(&first_candidate_, n);
     d.manifold_sizes = transfer.room(&manifold_sizes_, n);
     d.first_fixed = transfer.room(&first_fixed_, n);
@@ -26,8 +26,8 @@ class ScratchBuffers {
     d.first_contact = transfer.room(&first_contact_, n);
     d.parent = transfer.room(&parent_, n);
     d.marked = transfer.room(&marked_, n);
-    d.near_flag = transfer.room(&near_flag_, n);
-    d.step.near = d.near_flag;
+    d.constrained = transfer.room(&constrained_, n);
+    d.step.constrained = d.constrained;
     d.step.solver = transfer.room(&solver_, n);
     d.step.traits = transfer.room(&traits_, n);
     d.step.orientation = transfer.room(&orientation_, n);
@@ -40,8 +40,8 @@ class ScratchBuffers {
 
   /// Makes room for what is indexed by sub-shape. @param n number of sub-shapes that are no walls
   void reserve_sub_shapes(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
-    data->near.margins = transfer.room_to_grow(&margins_, n);
-    data->near.swept = transfer.room_to_grow(&swept_, n);
+    data->swept_bounds.margins = transfer.room_to_grow(&margins_, n);
+    data->swept_bounds.swept = transfer.room_to_grow(&swept_, n);
   }
 
   /// Makes room for lists.
@@ -77,11 +77,11 @@ class ScratchBuffers {
   Buffer<cuda::ContactCount> pair_count_;
   Buffer<NormalDistance> pair_results_;
   Buffer<Candidate> candidates_;
-  Buffer<NearPair> tested_;
+  Buffer<CandidateManifold> tested_;
   Buffer<std::uint32_t> first_candidate_, next_candidate_, first_contact_, uncolored_,
       still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_;
   Buffer<std::uint64_t> manifold_sizes_, used_colors_, first_order_;
-  Buffer<std::uint8_t> pair_found_, marked_, near_flag_, traits_;
+  Buffer<std::uint8_t> pair_found_, marked_, constrained_, traits_;
   Buffer<std::uint16_t> row_bins_;
   Buffer<soft_step::SolverBody> solver_;
   Buffer<Quat> orientation_;

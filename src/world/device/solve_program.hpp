@@ -13,11 +13,11 @@ inline namespace JFPX_ABI {
 namespace device {
 
 /// Sweeps over all rows, as soft_step::SoftStepSolver, without barriers: a row waits only for the
-/// earlier rows of its two bodies (see Turns), so that consecutive colors and sweeps overlap. After
-/// the rows of a sweep, each body solves its rows with fixed bodies and completes its part of the
-/// substep. Only the motion of bodies passes from thread to thread: Team::flow() gives a row to the
-/// same thread in all sweeps, and the other arrays by body are constant, or written by the thread
-/// of the body alone.
+/// earlier rows of its two bodies (see Tickets), so that consecutive colors and sweeps overlap.
+/// After the rows of a sweep, each body solves its rows with fixed bodies and completes its part of
+/// the substep. Only the motion of bodies passes from thread to thread: Team::run_dataflow() gives
+/// a row to the same thread in all sweeps, and the other arrays by body are constant, or written by
+/// the thread of the body alone.
 ///
 /// The items of a thread are in the order of the sweeps, and an item waits only for items before
 /// it in this order. So the first item that is not complete never waits.
@@ -30,7 +30,7 @@ struct SolveProgram {
 
   /// The sequence is that of SoftStep::solve(). Sweep 0 is the warm start. Each substep has a bias
   /// sweep, after which the bodies move, and kRelaxSweeps relax sweeps. The last sweep is the
-  /// restitution. Sweep::moves() and the highest turn of BodyCells depend on this.
+  /// restitution. Sweep::moves() and the highest ticket of BodyCells depend on this.
   template <class Team>
   [[gnu::always_inline]] JFPX_HD void operator()(const Team& team) const {
     if (data.has_failed()) return;
@@ -87,10 +87,11 @@ struct SolveProgram {
     }
   };
 
-  /// A body of an item: the turn that the item waits for, and the motion of the body at that turn.
+  /// A body of an item: the ticket that the item waits for, and the motion of the body at that
+  /// ticket.
   struct ItemBody {
     std::uint32_t index = 0;
-    std::uint32_t before = 0, after = 0;  ///< turns
+    std::uint32_t before = 0, after = 0;  ///< tickets
     bool is_ready = false;
     SolverBody motion;
     BodyCells::Version version;
@@ -122,12 +123,12 @@ struct SolveProgram {
   // Items are started in place, bodies a and b are treated without a loop, and run() is inlined:
   // otherwise nvcc keeps items, 6.6 kB a thread in double, or the sweep in memory.
 
-  /// The rows of a sweep, for Team::flow().
+  /// The rows of a sweep, for Team::run_dataflow().
   template <class Operation>
-  class RowFlow {
+  class RowDataflow {
    public:
     using Item = RowItem;
-    JFPX_HD RowFlow(const SolveProgram& program, const Sweep& sweep, const Operation& operation)
+    JFPX_HD RowDataflow(const SolveProgram& program, const Sweep& sweep, const Operation& operation)
         : program_(program), sweep_(sweep), operation_(operation), cursor_(sweep) {}
 
     JFPX_HD void begin(std::uint32_t i, RowItem* item) const {
@@ -144,12 +145,13 @@ struct SolveProgram {
     mutable RowCursor cursor_;
   };
 
-  /// The bodies after the rows of a sweep, for Team::flow().
+  /// The bodies after the rows of a sweep, for Team::run_dataflow().
   template <class Operation>
-  class BodyFlow {
+  class BodyDataflow {
    public:
     using Item = BodyItem;
-    JFPX_HD BodyFlow(const SolveProgram& program, const Sweep& sweep, const Operation& operation)
+    JFPX_HD BodyDataflow(const SolveProgram& program, const Sweep& sweep,
+                         const Operation& operation)
         : program_(program), sweep_(sweep), operation_(operation) {}
 
     JFPX_HD void begin(std::uint32_t i, BodyItem* item) const {
@@ -177,8 +179,8 @@ struct SolveProgram {
       team.once([&] { run_overflow(sweep, operation); });
       team.sync();
     }
-    team.flow(sweep.colored_items, RowFlow<Operation>(*this, sweep, operation));
-    team.flow(data.step.bodies.count, BodyFlow<Operation>(*this, sweep, operation));
+    team.run_dataflow(sweep.colored_items, RowDataflow<Operation>(*this, sweep, operation));
+    team.run_dataflow(data.step.bodies.count, BodyDataflow<Operation>(*this, sweep, operation));
   }
 
   /// The rows of the overflow are solved one after the other: by kind, then in the order of their
@@ -189,14 +191,14 @@ struct SolveProgram {
     for (std::uint32_t k = 0; k < rows; ++k) {
       RowItem item;
       begin_row(sweep, data.overflow[k], &item);
-      item.a.before = item.a.after = Turns(sweep.number, 0).first;
+      item.a.before = item.a.after = Tickets(sweep.number, 0).first;
       item.b.before = item.b.after = item.a.after;
       is_ready(&item);
       solve_row(sweep, operation, &item);
     }
   }
 
-  /// Starts a row without its turns.
+  /// Starts a row without its tickets.
   JFPX_HD void begin_row(const Sweep& sweep, std::uint32_t r, RowItem* item) const {
     const StepData& d = data;
     item->row = r;
@@ -219,13 +221,13 @@ struct SolveProgram {
   JFPX_HD void begin_colored_row(const Sweep& sweep, std::uint32_t r, std::uint32_t color,
                                  RowItem* item) const {
     begin_row(sweep, r, item);
-    const auto set_turns = [&](ItemBody* body) {
-      const Turns turns(sweep.number, data.row_bodies[body->index].colors);
-      body->before = turns.before(color);
-      body->after = turns.after(color);
+    const auto set_tickets = [&](ItemBody* body) {
+      const Tickets tickets(sweep.number, data.row_bodies[body->index].colors);
+      body->before = tickets.before(color);
+      body->after = tickets.after(color);
     };
-    set_turns(&item->a);
-    set_turns(&item->b);
+    set_tickets(&item->a);
+    set_tickets(&item->b);
   }
 
   JFPX_HD bool is_ready(RowItem* item) const {
@@ -319,9 +321,9 @@ struct SolveProgram {
     item->start(body, constants);
     item->is_active = constants.inverse_mass > 0 && d.step.bodies.awake[body] != 0;
     item->first_fixed = d.first_fixed[body];
-    const Turns turns(sweep.number, constants.colors);
-    item->before = turns.before_body();
-    item->after = turns.after_body();
+    const Tickets tickets(sweep.number, constants.colors);
+    item->before = tickets.before_body();
+    item->after = tickets.after_body();
   }
 
   template <class Operation>

@@ -4,7 +4,7 @@
 #include <jfpx/cuda/sphere_collider.hpp>
 
 #include "src/contact_solver/soft_step/row_setup.hpp"
-#include "src/world/contacts/near_pair_test.hpp"
+#include "src/world/contacts/candidate_test.hpp"
 #include "src/world/device/body_cells.hpp"
 #include "src/world/device/striped_array.hpp"
 #include "src/world/device/tuning.hpp"
@@ -85,7 +85,7 @@ struct StepCounters {
   std::uint32_t candidates = 0, touches = 0;
   std::uint32_t spheres = 0, manifolds = 0, points = 0;  ///< sizes of the contact set
   std::uint32_t touching_spheres = 0;  ///< contacts of two spheres that touched during the step
-  std::uint32_t met_points = 0;        ///< points of manifolds: soft_step::has_met()
+  std::uint32_t begun_points = 0;      ///< points of manifolds: soft_step::has_begun()
   std::uint32_t sphere_touches = 0;    ///< items of the list of touches of two spheres
   std::uint32_t awake = 0;             ///< movable bodies awake after the step
   /// 1: a force must wake a body, the step has no effect. Without this number there would be
@@ -138,7 +138,7 @@ struct DeviceJoints {
 /// Everything that the programs of a step use, passed to kernels by value.
 struct StepData {
   soft_step::StepBodies step;
-  NearBounds near;
+  SweptBounds swept_bounds;
   FixedTreesView trees;
   DeviceContacts contacts_of[2];  ///< as Progress::contacts
   DeviceJoints world_joints;
@@ -154,7 +154,7 @@ struct StepData {
   NormalDistance* pair_results = nullptr;  ///< by pair
   std::uint8_t* pair_found = nullptr;      ///< by pair: 1 if it is a contact of two spheres
   Candidate* candidates = nullptr;
-  NearPair* tested = nullptr;                ///< by candidate
+  CandidateManifold* tested = nullptr;       ///< by candidate
   std::uint32_t* first_candidate = nullptr;  ///< by body a: list of candidates that have points
   std::uint32_t* next_candidate = nullptr;   ///< by candidate
   /// By body a: its number of manifolds, and in the lower half that of their points.
@@ -166,9 +166,9 @@ struct StepData {
   std::uint32_t* first_contact = nullptr;
   std::uint32_t *uncolored = nullptr, *still_uncolored = nullptr;
 
-  std::uint32_t* parent = nullptr;    ///< by body, of the islands
-  std::uint8_t* marked = nullptr;     ///< by label of an island
-  std::uint8_t* near_flag = nullptr;  ///< by body: StepBodies::near
+  std::uint32_t* parent = nullptr;      ///< by body, of the islands
+  std::uint8_t* marked = nullptr;       ///< by label of an island
+  std::uint8_t* constrained = nullptr;  ///< by body: StepBodies::constrained
 
   std::uint16_t* row_bins = nullptr;     ///< by contact or joint, as RowSetup numbers them
   std::uint32_t* row_contact = nullptr;  ///< by row of any kind: the same number
@@ -234,7 +234,7 @@ struct StepData {
   }
   /// Whether a body has joints, once MatchProgram is complete.
   JFPX_HD bool is_joined(std::uint32_t body) const {
-    return world_joints.count > 0 && near_flag[body] == soft_step::kHasJoint;
+    return world_joints.count > 0 && constrained[body] == soft_step::kHasJoint;
   }
   JFPX_HD soft_step::Islands islands() const {
     return {.step = step,

@@ -108,7 +108,7 @@ struct Islands {
       sets.parent[i] = i;
       marked[i] = 0;
     });
-    team.spread(joints.count, [&](std::uint32_t joint) {
+    team.for_each_nowait(joints.count, [&](std::uint32_t joint) {
       with_joined_bodies(joints, joint, [&](std::uint32_t a, std::uint32_t b) {
         if (bodies.movable(a) && bodies.movable(b)) sets.unite(a, b);
       });
@@ -118,7 +118,7 @@ struct Islands {
       if (bodies.movable(key.a) && bodies.movable(key.b) && touches(i)) sets.unite(key.a, key.b);
     });
     if (!any_carriers) return;
-    team.spread(joints.count, [&](std::uint32_t joint) {
+    team.for_each_nowait(joints.count, [&](std::uint32_t joint) {
       with_joined_bodies(joints, joint, [&](std::uint32_t a, std::uint32_t b) {
         const bool a_carries = bodies.is_carrier(a);
         if (a_carries || bodies.is_carrier(b)) mark(a_carries ? b : a, kTouchesFastBody);

@@ -93,21 +93,22 @@ soft_step::Islands SoftStep::islands_of(const BodyStore& bodies) {
 }
 
 /// Marks the bodies that have a contact in this step, or a joint.
-void SoftStep::find_near() {
-  assign_geometric(&near_, bodies_.size(), 0);
+void SoftStep::mark_constrained() {
+  assign_geometric(&constrained_, bodies_.size(), 0);
   const ContactView contacts = cache_.current().view();
   parallel_for(pool_, contacts.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
       for (const std::uint32_t body : {contacts.key(i).a, contacts.key(i).b}) {
-        std::atomic_ref(near_[body]).store(soft_step::kHasContact, std::memory_order_relaxed);
+        std::atomic_ref(constrained_[body])
+            .store(soft_step::kHasContact, std::memory_order_relaxed);
       }
     }
   });
   for (std::uint32_t joint = 0; joint < joints_.count; ++joint) {
     if (!joints_.is_used(joint)) continue;
     const soft_step::JointInput& input = joints_.inputs[joint];
-    near_[input.a] = soft_step::kHasJoint;
-    if (input.b != soft_step::kWorld) near_[input.b] = soft_step::kHasJoint;
+    constrained_[input.a] = soft_step::kHasJoint;
+    if (input.b != soft_step::kWorld) constrained_[input.b] = soft_step::kHasJoint;
   }
 }
 
@@ -141,7 +142,7 @@ void SoftStep::load(const BodyStore& store) {
   const std::span<const BodyId> ids = store.ids();
   parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
     for (const BodyId id : ids.subspan(first, last - first)) {
-      if (near_[id.index] != 0 && store.immovable(id.index)) step_.load(id.index);
+      if (constrained_[id.index] != 0 && store.immovable(id.index)) step_.load(id.index);
     }
   });
 }
@@ -165,13 +166,13 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
   prepare(*bodies);
   joints_ = joints;
   cache_.match(bodies->inverse_masses(), bodies->any_rolls(), joints, pool_);
-  find_near();
+  mark_constrained();
   step_ = {.bodies = bodies->view(),
            .motion = bodies->motion_pointers(),
            .solver = bodies_.data(),
            .traits = traits_.data(),
            .orientation = orientation_.data(),
-           .near = near_.data(),
+           .constrained = constrained_.data(),
            .h = constants_.h};
   if (any_body(*bodies, [this](std::uint32_t i) { return step_.bodies.is_asleep(i); })) {
     islands_of(*bodies).wake_touched(PoolTeam(pool_));

@@ -28,7 +28,7 @@ class SoftStep {
   SoftStep(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
            ThreadPool* pool, SimdLevel simd);
 
-  /// Contacts of the current step, for ContactFinder::find_near_contacts().
+  /// Contacts of the current step, for ContactFinder::find_speculative_contacts().
   soft_step::ContactSet& contacts() { return cache_.current(); }
   /// After commit(): contacts of the step before the last one, until the next detection.
   soft_step::ContactView contacts_before() { return cache_.current().view(); }
@@ -66,7 +66,7 @@ class SoftStep {
  private:
   void prepare(const BodyStore& bodies);
   soft_step::Islands islands_of(const BodyStore& bodies);
-  void find_near();
+  void mark_constrained();
   template <class Stage>
   void for_each_body(const BodyStore& bodies, const Stage& stage);
   template <class Test>
@@ -87,7 +87,7 @@ class SoftStep {
   std::vector<std::uint8_t> traits_;           ///< by body: soft_step::BodyTraits
   std::vector<Quat> orientation_;              ///< by body, during the step
   std::vector<soft_step::FreeMotion> free_;    ///< by body
-  std::vector<std::uint8_t> near_;             ///< by body: StepBodies::near
+  std::vector<std::uint8_t> constrained_;      ///< by body: StepBodies::constrained
   std::vector<std::uint32_t> parent_;          ///< by body: soft_step::DisjointSets::parent
   std::vector<std::uint8_t> marked_;           ///< by label of an island
 };

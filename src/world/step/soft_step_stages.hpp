@@ -41,7 +41,7 @@ JFPX_HD inline void wake_touched(const BodyView& bodies, const MotionPointers& m
   if (mark == kTouchesSlowBody) motion.wake_by_slow_body(bodies, i);
 }
 
-/// Values of StepBodies::near. A body with joints may have contacts, too.
+/// Values of StepBodies::constrained. A body with joints may have contacts, too.
 inline constexpr std::uint8_t kHasContact = 1, kHasJoint = 2;
 
 /// Calls f(a, b) if a joint is one of two bodies.
@@ -56,10 +56,10 @@ struct StepBodies {
   BodyView bodies;
   MotionPointers motion;  ///< of the same bodies
   SolverBody* solver = nullptr;
-  std::uint8_t* traits = nullptr;      ///< bits of BodyTraits
-  Quat* orientation = nullptr;         ///< during the step
-  const std::uint8_t* near = nullptr;  ///< kHasContact, kHasJoint, or 0
-  Real h = 0;                          ///< [s], length of a substep
+  std::uint8_t* traits = nullptr;             ///< bits of BodyTraits
+  Quat* orientation = nullptr;                ///< during the step
+  const std::uint8_t* constrained = nullptr;  ///< kHasContact, kHasJoint, or 0
+  Real h = 0;                                 ///< [s], length of a substep
 
   /// Starts the step.
   JFPX_HD void load(std::uint32_t i) const {
@@ -98,7 +98,7 @@ struct StepBodies {
     if (!bodies.is_active(i)) return;
     Vec3 velocity = body->velocity, angular_velocity = body->angular_velocity;
     bodies.accelerate(i, orientation[i], &velocity, &angular_velocity);
-    if (near[i] == 0) {
+    if (constrained[i] == 0) {
       body->shift = add_scaled(body->shift, body->velocity - velocity, h * Real(0.5));
       if (!(bodies.force[i] == Vec3{})) {
         const Real half_step = h * bodies.dt * Real(0.5);

@@ -19,11 +19,11 @@ enum class PairKind : std::uint8_t {
   none,       ///< not in contact, whatever the shapes
   spheres,    ///< two bodies that are spheres
   compounds,  ///< two spheres, at least one of a compound
-  others
+  general     ///< all others
 };
 
 /// Bounds and pair tests of a step's contact search.
-struct NearBounds {
+struct SweptBounds {
   using SubShape = SubShapeView::SubShape;
 
   BodyView bodies;
@@ -68,7 +68,7 @@ struct NearBounds {
     const std::uint32_t x = sub_shapes.body(a), y = sub_shapes.body(b);
     const bool any_movable = bodies.movable(x) || bodies.movable(y);
     if (x == y || !any_movable || !bodies.may_collide(x, y)) return PairKind::none;
-    if (!sub_shapes.is_sphere(b)) return PairKind::others;
+    if (!sub_shapes.is_sphere(b)) return PairKind::general;
     return bodies.radius[x] > 0 && bodies.radius[y] > 0 ? PairKind::spheres : PairKind::compounds;
   }
 
