@@ -624,6 +624,10 @@ TEST(Tool, ReplayRefusesDamagedFiles) {
 #if JFPX_HAS_BULLET
 TEST(Tool, CompareFindsEveryNamedSceneIdentical) {
   for (const scenes::Entry& entry : scenes::all()) {
+    if (!scenes::make(entry.name).joints.empty()) {  // not supported in Bullet
+      expect_fails("compare " + std::string(entry.name), 2, "joints");
+      continue;
+    }
     for (const char* sleep : {"", " --no-sleep"}) {
       const ProcessResult result =
           jfpx_stdout("compare " + std::string(entry.name) +

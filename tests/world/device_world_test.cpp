@@ -168,7 +168,7 @@ TEST_P(DeviceWorldTest, ManyFixedBodiesHaveTheBitsOfTheProcessor) {
 
 TEST_P(DeviceWorldTest, NamedScenesHaveTheBitsOfTheProcessor) {
   for (const char* name :
-       {"pile", "mixed", "polydisperse", "columns", "overlap", "tower", "capsules"}) {
+       {"pile", "mixed", "polydisperse", "columns", "overlap", "tower", "capsules", "bridge"}) {
     scenes::Options options;
     if (name != std::string("tower")) options.spheres = 60;
     const Scene scene = scenes::make(name, options);

@@ -53,6 +53,7 @@ constexpr Pin kSoftStepPins[] = {
     {"polydisperse", 100, 60, 0x347dbd6648aa912du, 0x6334b248a85c88dfu},
     {"mixed", 40, 150, 0xb2e10c3add6e50ccu, 0x35aa8b3c8aa3ef49u},
     {"capsules", 20, 200, 0xaea0301d65c48ac6u, 0x42722b4dc86a94f0u},
+    {"bridge", 30, 200, 0xb587bf8eda4231ecu, 0x6014877ef2db3d2cu},
     // Enough for several threads to solve the contacts of a color.
     {"polydisperse", 20000, 3, 0x1fc1c4e3ef568f9au, 0xd2fc64b8df212ecbu},
     {"columns", 20000, 3, 0xf1dc6c610329eee1u, 0x8cfcea0c434ee1fdu},
