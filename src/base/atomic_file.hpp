@@ -33,7 +33,7 @@ class JFPX_API AtomicFile {
 
   std::string path_;
   std::string target_;  ///< path_ with symbolic links resolved
-  std::string part_;    ///< path of the temporary file; target_ itself if that is no regular file
+  std::string part_;    ///< path of the temporary file; target_ if that is not a regular file
   std::FILE* file_;
   bool finished_ = false, failed_ = false;
 };
