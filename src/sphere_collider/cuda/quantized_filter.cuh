@@ -1,5 +1,5 @@
 /// Overlap tests of 32 spheres against 32 others: quantized on the tensor cores of a warp, then
-/// exact for the pairs that may touch.
+/// exact for pairs that may touch.
 #pragma once
 
 #include "src/collide/sphere_pair.hpp"
@@ -102,7 +102,8 @@ __device__ inline OverlapBytes overlap_bytes(const QuantizedFragment& rows,
     for (unsigned r = 0; r < 4; r += 2) {
       const ProductSums s = multiply(rows.words[r], rows.words[r + 1], columns.words[c]);
 #pragma unroll
-      for (unsigned k = 0; k < 4; ++k) {  // higher columns first: a sign enters as the lowest bit
+      for (unsigned k = 0; k < 4;
+           ++k) {  // higher columns first: signs are shifted in as lowest bits
         const float value = s.values[k ^ 1];
         std::uint32_t& byte = bytes.of_rows[r + k / 2];
         byte = __funnelshift_l(std::bit_cast<std::uint32_t>(value), byte, 1);
