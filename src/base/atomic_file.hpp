@@ -22,7 +22,7 @@ class JFPX_API AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// @throws FileError; all later calls throw too, because part of the content may be missing
+  /// @throws FileError; all later calls also throw, because part of the content may be missing
   void write(std::string_view bytes);
   /// Completes the file. No call of write() may follow. @throws FileError
   void finish();

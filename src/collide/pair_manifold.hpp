@@ -29,7 +29,7 @@ struct PairMotion {
   JFPX_HD PairMotion flipped() const { return {-motion, margin, limit, origin_b, origin_a}; }
 };
 
-/// A point of a manifold, as a solver needs it.
+/// A point of a manifold, as input of a solver.
 struct SolverPoint {
   Vec3 arm_a, arm_b;          ///< [m], world axes, from the centres of mass
   Real distance = 0;          ///< [m]; > 0: a gap

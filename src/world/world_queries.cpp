@@ -55,7 +55,7 @@ detail::RayEntry enter(const Ray& ray, const S& shape, const Transform& pose) {
   }
 }
 
-/// The first entry of a ray into a body. Among parts at the same distance, the first part wins.
+/// The first entry of a ray into a body. Among parts at the same distance, the first part is hit.
 detail::RayEntry enter(const Ray& ray, const BodyStore& bodies, std::uint32_t body) {
   detail::RayEntry first;
   for_each_posed_sub_shape(bodies, body, [&](const auto& shape, const Transform& pose) {

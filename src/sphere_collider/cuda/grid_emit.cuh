@@ -41,7 +41,7 @@ __device__ inline SearchOutput with_row_length(const GridArgs& args, const Searc
   return known;
 }
 
-/// Lists a row that is too long for this phase, for a later phase.
+/// Defers a row that is too long for this phase to a later phase.
 __device__ inline void defer_row(const GridArgs& args, std::uint32_t a, std::uint32_t count,
                                  unsigned long long offset) {
   if (count > kMaxLongRow) {

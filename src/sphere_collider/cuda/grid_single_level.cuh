@@ -34,7 +34,7 @@ struct SingleLevel {
 struct AxisRange {
   std::int32_t low, high;
 };
-/// The `count` cells from `first` on, as far as they are within `distance` of x.
+/// Those of the `count` cells from `first` on that are within `distance` of x.
 __device__ inline AxisRange cells_within(Real distance, Real x, Real inverse_width,
                                          std::int32_t first, std::int32_t count) {
   return {max(cell_of(moved(x, -distance), inverse_width), first),

@@ -102,8 +102,7 @@ __device__ inline OverlapBytes overlap_bytes(const QuantizedFragment& rows,
     for (unsigned r = 0; r < 4; r += 2) {
       const ProductSums s = multiply(rows.words[r], rows.words[r + 1], columns.words[c]);
 #pragma unroll
-      for (unsigned k = 0; k < 4;
-           ++k) {  // higher columns first: signs are shifted in as lowest bits
+      for (unsigned k = 0; k < 4; ++k) {  // higher columns first: a sign enters as the lowest bit
         const float value = s.values[k ^ 1];
         std::uint32_t& byte = bytes.of_rows[r + k / 2];
         byte = __funnelshift_l(std::bit_cast<std::uint32_t>(value), byte, 1);

@@ -79,7 +79,7 @@ using MotionArrays = MotionColumns<ArrayColumn>;
 /// Columns that no step reads.
 struct HostArrays {
   std::vector<Shape> shape;
-  std::vector<Real> mass, linear_damping, angular_damping;  ///< those of BodyDef
+  std::vector<Real> mass, linear_damping, angular_damping;  ///< as in BodyDef
   std::vector<std::uint64_t> user_data;
 };
 

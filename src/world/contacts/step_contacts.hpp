@@ -27,7 +27,7 @@ struct StepContacts {
     events.invalidate();
     by_body.invalidate();
   }
-  /// The contacts of the last step become those of the step before.
+  /// Stores the contacts of the last step as those of the step before.
   void begin_detection() noexcept {
     swap_steps();
     last.invalidate();

@@ -65,7 +65,7 @@ struct Progress {
   std::uint64_t completed = 0;  ///< number of complete steps since the upload
   std::uint64_t deferred = 0;   ///< number of steps without effect since the last complete one
   std::uint64_t offset = 0;     ///< World::steps() minus `completed`
-  std::uint32_t started = 0;    ///< 1: SavedColumns are those of a step that is not complete
+  std::uint32_t started = 0;    ///< 1: SavedColumns belong to an incomplete step
   std::uint32_t held = 0;       ///< 1: the host has changes that must precede the next step
   ContactSizes contacts[2];     ///< of two steps, by the parity of `completed` before them
 };

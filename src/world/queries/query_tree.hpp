@@ -169,7 +169,7 @@ class QueryTree {
   }
 
   std::vector<std::uint32_t> walls_;  ///< bodies without bounds
-  BlockTree tree_;                    ///< of the others
+  BlockTree tree_;                    ///< of all other bodies
   // During build(): the bodies of the tree.
   std::vector<std::uint32_t> bodies_;
   std::vector<Aabb> bounds_;

@@ -24,7 +24,7 @@ void write_generators(BinaryWriter* writer, const GeneratorRegistry& generators)
 class ForceRestorer {
  public:
   /// Reads forces and prepares their restoration in `forces`.
-  /// @throws InvalidSnapshot if `forces` has not the same user-defined forces; std::bad_alloc
+  /// @throws InvalidSnapshot if `forces` has other user-defined forces; std::bad_alloc
   ForceRestorer(BinaryReader* reader, const ForceRegistry& forces);
   /// Replaces all forces. Forces that keep id and type also keep their address.
   // NOLINTNEXTLINE(bugprone-exception-escape): std::visit throws for valueless variants only
@@ -47,7 +47,7 @@ class ForceRestorer {
 /// The contact generators of a snapshot, all of which are user-defined.
 class GeneratorRestorer {
  public:
-  /// @throws InvalidSnapshot if `generators` has not the same generators
+  /// @throws InvalidSnapshot if `generators` has other generators
   GeneratorRestorer(BinaryReader* reader, const GeneratorRegistry& generators);
   void commit(GeneratorRegistry* generators) noexcept;
 

@@ -34,7 +34,7 @@ JFPX_HD inline bool has_touched(const ContactView& contacts, std::uint32_t conta
 /// slow, or contact with slow bodies only.
 inline constexpr std::uint8_t kTouchesFastBody = 1, kTouchesSlowBody = 2;
 
-/// Wakes a body of an island. @param mark of the island; 0: it does not wake
+/// Wakes a body of an island. @param mark of the island; 0: the island stays asleep
 JFPX_HD inline void wake_touched(const BodyView& bodies, const MotionPointers& motion,
                                  std::uint32_t i, std::uint8_t mark) {
   if (mark == kTouchesFastBody) motion.wake(bodies, i);
